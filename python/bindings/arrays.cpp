@@ -78,15 +78,6 @@ std::span<const Row> rows(const Floats& array) {
   return {reinterpret_cast<const Row*>(array.data), array.size() * sizeof(double) / sizeof(Row)};
 }
 
-template <std::size_t rank>
-Result<double, rank> copied(const double* values, const std::size_t (&shape)[rank]) {
-  std::size_t count = 1;
-  for (const std::size_t extent : shape) {
-    count *= extent;
-  }
-  return owned(std::vector<double>(values, values + count), shape);
-}
-
 }  // namespace
 
 std::span<const Pose> as_poses(const Floats& array) { return rows<Pose>(array); }
@@ -192,28 +183,6 @@ std::vector<glm::dvec2> points_of(nb::handle object, const char* name) {
   const Floats array = ArrayReader().floats(object, name, {"n", "2"});
   const auto points = as_points(array);
   return {points.begin(), points.end()};
-}
-
-Result<double, 1> to_array(const Pose& pose) {
-  return copied(reinterpret_cast<const double*>(&pose), {3});
-}
-Result<double, 1> to_array(const glm::dvec2& point) {
-  return copied(reinterpret_cast<const double*>(&point), {2});
-}
-Result<double, 2> to_array(std::span<const Pose> poses) {
-  return copied(reinterpret_cast<const double*>(poses.data()), {poses.size(), 3});
-}
-Result<double, 2> to_array(std::span<const glm::dvec2> points) {
-  return copied(reinterpret_cast<const double*>(points.data()), {points.size(), 2});
-}
-std::optional<FloatArray> to_array(const std::optional<Pose>& pose) {
-  return pose ? std::optional(nb::borrow<FloatArray>(to_array(*pose))) : std::nullopt;
-}
-Result<double, 2> to_array(const std::array<double, 9>& covariance) {
-  return copied(covariance.data(), {3, 3});
-}
-Result<double, 1> to_array(const std::array<double, 3>& values) {
-  return copied(values.data(), {3});
 }
 
 }  // namespace palpate::python

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <initializer_list>
@@ -7,6 +8,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -38,6 +40,10 @@ struct Array {
   }
   std::span<const Value> values() const& { return {data, size()}; }
   std::span<const Value> values() const&& = delete;  // the memory goes with the array
+  template <typename To = Value>
+  std::vector<To> copied() const {
+    return {data, data + size()};
+  }
 };
 using Floats = Array<double>;
 using Bytes = Array<std::uint8_t>;
@@ -104,12 +110,16 @@ class Result : public nb::object {
       : nb::object(nb::cast(Array(data, rank, shape, owner), nb::rv_policy::automatic)) {}
 };
 
+/// What a row of an array consists of: numbers of Pose and dvec2, or itself.
+template <typename Row>
+using NumberOf = std::conditional_t<std::is_arithmetic_v<Row>, Row, double>;
+
 /// An array that takes over the vector's memory.
-template <typename Value, std::size_t rank>
-Result<Value, rank> owned(std::vector<Value> values, const std::size_t (&shape)[rank]) {
-  auto* kept = new std::vector<Value>(std::move(values));
+template <typename Row, std::size_t rank>
+Result<NumberOf<Row>, rank> owned(std::vector<Row> rows, const std::size_t (&shape)[rank]) {
+  auto* kept = new std::vector<Row>(std::move(rows));
   const nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<decltype(kept)>(p); });
-  return {kept->data(), shape, owner};
+  return {reinterpret_cast<NumberOf<Row>*>(kept->data()), shape, owner};
 }
 template <typename Value>
 Result<Value, 1> owned(std::vector<Value> values) {
@@ -131,14 +141,28 @@ Result<const Value, rank> view(const Value* data, const std::size_t (&shape)[ran
 }
 
 /// [3] or [n, 3] of x_mm, y_mm and theta_rad; [2] or [n, 2] in mm.
-Result<double, 1> to_array(const Pose& pose);
-Result<double, 1> to_array(const glm::dvec2& point);
-Result<double, 2> to_array(std::span<const Pose> poses);
-Result<double, 2> to_array(std::span<const glm::dvec2> points);
-std::optional<FloatArray> to_array(const std::optional<Pose>& pose);
+inline Result<double, 1> to_array(const Pose& pose) { return owned(std::vector{pose}, {3}); }
+inline Result<double, 1> to_array(const glm::dvec2& point) {
+  return owned(std::vector{point}, {2});
+}
+inline Result<double, 2> to_array(std::vector<Pose> poses) {
+  const std::size_t n = poses.size();
+  return owned(std::move(poses), {n, 3});
+}
+inline Result<double, 2> to_array(std::vector<glm::dvec2> points) {
+  const std::size_t n = points.size();
+  return owned(std::move(points), {n, 2});
+}
+inline std::optional<FloatArray> to_array(const std::optional<Pose>& pose) {
+  return pose ? std::optional(nb::borrow<FloatArray>(to_array(*pose))) : std::nullopt;
+}
 /// [3, 3] of a covariance.
-Result<double, 2> to_array(const std::array<double, 9>& covariance);
-Result<double, 1> to_array(const std::array<double, 3>& values);
+inline Result<double, 2> to_array(const std::array<double, 9>& covariance) {
+  return owned(std::vector(covariance.begin(), covariance.end()), {3, 3});
+}
+inline Result<double, 1> to_array(const std::array<double, 3>& values) {
+  return owned(std::vector(values.begin(), values.end()));
+}
 
 // Properties by the member that holds their values.
 

@@ -21,9 +21,8 @@ using Bounded = Named<BoundedPosterior>;
 void bind_bounded_posterior(nb::module_& module) {
   nb::class_<Bounded>(
       module, "BoundedPosterior",
-      "The belief of PoseHistogram over the same bins, of which it evaluates only those that "
-      "matter,\n"
-      "and proves how little the others can. Memory follows the maps, not the bins.")
+      "The belief of PoseHistogram over the same bins, of which it evaluates only those that\n"
+      "matter, and proves how little the others can. Memory follows the maps, not the bins.")
       .def(
           "__init__",
           [](Bounded* self, const std::shared_ptr<Session>& device, const MapsLike& maps,
@@ -45,11 +44,10 @@ void bind_bounded_posterior(nb::module_& module) {
           "contact"_a = ContactModel{}, "tolerance"_a = BoundedOptions{}.tolerance,
           "budget_s"_a = nb::none(), "evidence_nats"_a = nb::none(), "none_weight"_a = nb::none(),
           "threads"_a = 0,
-          "tolerance: largest total variation distance from the posterior over all bins; "
-          "budget_s:\n"
-          "seconds after which estimate() reports what it has proven by then; evidence_nats: "
-          "bounds\n"
-          "every map's log evidence, too; threads: 0 for as many as the machine has cores.\n\n"
+          "tolerance: largest total variation distance from the posterior over all bins;\n"
+          "budget_s: seconds after which estimate() reports what it has proven by then;\n"
+          "evidence_nats: bounds every map's log evidence, too; threads: 0 for as many as the\n"
+          "machine has cores.\n\n"
           "Raises Error as PoseHistogram does.")
       .def(
           "update", &update<BoundedPosterior>, "touches"_a, "progress"_a = nb::none(),
@@ -57,9 +55,8 @@ void bind_bounded_posterior(nb::module_& module) {
           "them after Ctrl-C or where progress(fraction) raises. Raises Error on a touch that is\n"
           "not sound.")
       .def("estimate", on_device<Bounded>(&BoundedPosterior::estimate),
-           "Identity with its bounds, mode and certificate. Searches once after each update(). "
-           "After\n"
-           "Ctrl-C the belief is as it was, and the next call searches anew.")
+           "Identity with its bounds, mode and certificate. Searches once after each update().\n"
+           "After Ctrl-C the belief is as it was, and the next call searches anew.")
       .def("refine", &refine<BoundedPosterior>, "mode"_a = nb::none(),
            "The refined pose near a mode, and its covariance; see PoseHistogram.refine().")
       .def(

@@ -42,8 +42,7 @@ void bind_mode(nb::module_& module) {
 
   nb::class_<RefinedPose>(
       module, "RefinedPose",
-      "Where the posterior peaks near a mode, to a fraction of a bin, with its\n"
-      "uncertainty.")
+      "Where the posterior peaks near a mode, to a fraction of a bin, with its uncertainty.")
       .def_prop_ro("T_object_robot", array_of(&RefinedPose::T_object_robot),
                    "[3] (x_mm, y_mm, theta_rad).")
       .def_prop_ro("covariance", array_of(&RefinedPose::covariance),
@@ -93,9 +92,8 @@ void bind_estimate_class(nb::module_& module) {
       .def_prop_ro("identity", view_of(&Estimate::identity),
                    "Probability of every map (Eq. 14), [maps]; with `none` sums to 1.")
       .def_prop_ro("log_evidence", view_of(&Estimate::log_evidence),
-                   "Log of every map's prior weight times its summed likelihood, in nats but for a "
-                   "constant,\n"
-                   "[maps].")
+                   "Log of every map's prior weight times its summed likelihood, in nats but for\n"
+                   "a constant, [maps].")
       .def_prop_ro(
           "identity_bounds", [](const Estimate& self) { return pairs_of(self.identity_bounds); },
           "(low, high) of every probability, by bounds; empty where `identity` is exact.")

@@ -75,9 +75,8 @@ void bind_map_builder(nb::module_& module) {
            "progress(fraction) is called up to 50 times a second. Ctrl-C stops the call after a\n"
            "part of the touches. Raises Error on a touch that is not sound.")
       .def("build", on_device<Builder>(&MapBuilder::build), "label"_a,
-           "The map of all touches so far. Raises Error if no element of any touch was In Contact "
-           "or\n"
-           "No Contact.")
+           "The map of all touches so far. Raises Error if no element of any touch was In Contact\n"
+           "or No Contact.")
       .def("clear", on_device<Builder>(&MapBuilder::clear),
            "Forgets all touches, for the next object.")
       .def("__repr__", [](const Builder& self) {

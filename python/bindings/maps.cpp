@@ -22,8 +22,7 @@ using namespace nb::literals;
 namespace {
 
 std::vector<float> cells_of(const ArrayLike& cells, const char* name, ArrayReader& reader) {
-  const Floats array = reader.floats(cells, name, {"ny", "nx"});
-  return {array.data, array.data + array.size()};
+  return reader.floats(cells, name, {"ny", "nx"}).copied<float>();
 }
 
 OccupancyGrid make_map(const std::string& label, const ArrayLike& log_odds, double cell_mm,
@@ -84,12 +83,11 @@ void bind_map(nb::module_& module) {
           "label"_a, "log_odds"_a, nb::kw_only(), "cell_mm"_a, "origin_mm"_a, "prior"_a = 0.2,
           "symmetry"_a = 1, "spread_mm"_a = nb::none(), "mirror"_a = false,
           "observations"_a = nb::none(), "mean_level"_a = nb::none(),
-          "log_odds [ny, nx] in nats, copied; origin_mm [2], the centre of cell (0, 0);\n"
-          "symmetry: n-fold rotational symmetry, 0 = full; spread_mm of the sensor model;\n"
-          "mirror: the object may lie on its other side; observations [ny, nx]: touches that "
-          "sensed\n"
-          "each cell; mean_level [ny, nx]: mean pressure.\n\nRaises Error on a map that is not "
-          "sound.")
+          "log_odds [ny, nx] in nats, copied; origin_mm [2], the centre of cell (0, 0); symmetry:\n"
+          "n-fold rotational symmetry, 0 = full; spread_mm of the sensor model; mirror: the\n"
+          "object may lie on its other side; observations [ny, nx]: touches that sensed each\n"
+          "cell; mean_level [ny, nx]: mean pressure.\n\n"
+          "Raises Error on a map that is not sound.")
       .def_ro("label", &OccupancyGrid::label, "Name of the object.")
       .def_ro("cell_mm", &OccupancyGrid::cell_mm, "Edge of a cell.")
       .def_prop_ro("origin_mm", array_of(&OccupancyGrid::origin_mm),
@@ -142,12 +140,8 @@ void bind_hypothesis(nb::module_& module) {
   nb::class_<Hypothesis>(module, "Hypothesis",
                          "An object that the unknown may turn out to be. An OccupancyGrid stands "
                          "for one of weight 1.")
-      .def(
-          "__init__",
-          [](Hypothesis* self, const OccupancyGrid& map, double weight) {
-            new (self) Hypothesis{.map = map, .weight = weight};
-          },
-          "map"_a, "weight"_a = 1.0, "weight: prior weight relative to the other objects.")
+      .def(nb::init<const OccupancyGrid&, double>(), "map"_a, "weight"_a = 1.0,
+           "weight: prior weight relative to the other objects.")
       .def_ro("map", &Hypothesis::map, "The map of the object.")
       .def_ro("weight", &Hypothesis::weight, "Prior weight relative to the other objects.")
       .def_ro("mirrored", &Hypothesis::mirrored, "The map is the mirror image of the learned one.")
@@ -174,9 +168,8 @@ void bind_metric(nb::module_& module) {
         return measured ? std::optional(measured->suggested) : std::nullopt;
       },
       "map"_a,
-      "The n-fold rotational symmetry that the map itself shows, 0 = full; None where fewer than "
-      "16\n"
-      "cells are occupied.");
+      "The n-fold rotational symmetry that the map itself shows, 0 = full; None where fewer than\n"
+      "16 cells are occupied.");
 }
 
 /// What bins are to resolve, by the name that --bins has for it.
@@ -204,9 +197,8 @@ void bind_lattices(nb::module_& module) {
         return touch_region(hypotheses_of(maps), reach_mm).lattice;
       },
       "maps"_a, "reach_mm"_a,
-      "The poses of an object that an array touches, about the array's centre, as one bin. "
-      "reach_mm:\n"
-      "largest distance of an element from the array's centre.");
+      "The poses of an object that an array touches, about the array's centre, as one bin.\n"
+      "reach_mm: largest distance of an element from the array's centre.");
 }
 
 }  // namespace

@@ -102,20 +102,22 @@ void bind_lattice(nb::module_& module) {
       .def("__repr__", [](const PoseLattice& self) { return python::text_of(self); });
 }
 
+/// A constructor. Throws Error where the model's numbers are out of range.
+template <typename Model, typename... Arguments>
+void make_valid(Model* self, Arguments... arguments) {
+  const Model model{arguments...};
+  model.validate();
+  new (self) Model(model);
+}
+
 void bind_contact(nb::module_& module) {
   nb::class_<ContactClassifier>(
       module, "ContactClassifier",
       "Eq. 3: In Contact where the pressure exceeds both the threshold and ratio times the\n"
       "touch's largest pressure, No Contact where it is below both, else Unknown.")
-      .def(
-          "__init__",
-          [](ContactClassifier* self, double threshold, double ratio) {
-            const ContactClassifier classifier{threshold, ratio};
-            classifier.validate();
-            new (self) ContactClassifier(classifier);
-          },
-          "threshold"_a = ContactClassifier{}.threshold, "ratio"_a = ContactClassifier{}.ratio,
-          "threshold in the recording's pressure unit; ratio in [0, 1).")
+      .def("__init__", &make_valid<ContactClassifier, double, double>,
+           "threshold"_a = ContactClassifier{}.threshold, "ratio"_a = ContactClassifier{}.ratio,
+           "threshold in the recording's pressure unit; ratio in [0, 1).")
       .def_ro("threshold", &ContactClassifier::threshold)
       .def_ro("ratio", &ContactClassifier::ratio)
       .def("__repr__", [](const ContactClassifier& self) {
@@ -125,19 +127,12 @@ void bind_contact(nb::module_& module) {
 
   nb::class_<ContactModel>(module, "ContactModel",
                            "How likely a reading is at a place of a map (Eq. 3 and 7).")
-      .def(
-          "__init__",
-          [](ContactModel* self, const ContactClassifier& classifier, double gamma,
-             std::optional<double> prior) {
-            const ContactModel model{.classifier = classifier, .gamma = gamma, .prior = prior};
-            model.validate();
-            new (self) ContactModel(model);
-          },
-          "classifier"_a = ContactClassifier{}, "gamma"_a = ContactModel{}.gamma,
-          "prior"_a = nb::none(),
-          "gamma in [0, 1): how often the classifier answers at random. prior: probability that "
-          "an\n"
-          "unseen place is occupied; by default the maps' own, which must then agree.")
+      .def("__init__",
+           &make_valid<ContactModel, const ContactClassifier&, double, std::optional<double>>,
+           "classifier"_a = ContactClassifier{}, "gamma"_a = ContactModel{}.gamma,
+           "prior"_a = nb::none(),
+           "gamma in [0, 1): how often the classifier answers at random. prior: probability that\n"
+           "an unseen place is occupied; by default the maps' own, which must then agree.")
       .def_ro("classifier", &ContactModel::classifier)
       .def_ro("gamma", &ContactModel::gamma)
       .def_ro("prior", &ContactModel::prior)
@@ -150,17 +145,11 @@ void bind_contact(nb::module_& module) {
   nb::class_<InverseSensorModel>(
       module, "InverseSensorModel",
       "Eq. 4-6: how much one reading changes the log odds of the cells around it.")
-      .def(
-          "__init__",
-          [](InverseSensorModel* self, double spread_mm, double peak, double prior) {
-            const InverseSensorModel model{spread_mm, peak, prior};
-            model.validate();
-            new (self) InverseSensorModel(model);
-          },
-          "spread_mm"_a = InverseSensorModel{}.spread_mm, "peak"_a = InverseSensorModel{}.peak,
-          "prior"_a = InverseSensorModel{}.prior,
-          "spread_mm: half the standard deviation of the sensor's point spread; peak below 1;\n"
-          "prior: p(m), the probability that an unseen cell is occupied.")
+      .def("__init__", &make_valid<InverseSensorModel, double, double, double>,
+           "spread_mm"_a = InverseSensorModel{}.spread_mm, "peak"_a = InverseSensorModel{}.peak,
+           "prior"_a = InverseSensorModel{}.prior,
+           "spread_mm: half the standard deviation of the sensor's point spread; peak below 1;\n"
+           "prior: p(m), the probability that an unseen cell is occupied.")
       .def_ro("spread_mm", &InverseSensorModel::spread_mm)
       .def_ro("peak", &InverseSensorModel::peak)
       .def_ro("prior", &InverseSensorModel::prior)

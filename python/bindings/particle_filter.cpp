@@ -69,9 +69,8 @@ void bind_particle_filter(nb::module_& module) {
           "Raises Error as PoseHistogram does.")
       .def("update", &update<ParticleFilter>, "touches"_a, "progress"_a = nb::none(),
            "Resamples, moves and weighs the particles by each touch in turn (Eq. 7-8).\n\n"
-           "After Ctrl-C, or where progress(fraction) raises, call reset(). Raises Error on a "
-           "touch\n"
-           "that is not sound, of which none is taken in.")
+           "After Ctrl-C, or where progress(fraction) raises, call reset(). Raises Error on a\n"
+           "touch that is not sound, of which none is taken in.")
       .def("estimate", on_device<Particles>(&ParticleFilter::estimate),
            "Identity by Eq. 9; the pose is the maximum of the Parzen estimate (Eq. 10-12).")
       .def("reset", on_device<Particles>(&ParticleFilter::reset),

@@ -103,9 +103,8 @@ void bind_pose_histogram(nb::module_& module) {
           "touch_sd"_a = DisplacementSd{}, "slip_sd"_a = DisplacementSd{},
           "memory_limit_bytes"_a = nb::none(),
           "Starts with a uniform belief. still_array: the array stays in one place; none_weight:\n"
-          "prior weight of \"none of these\"; touch_sd: how far the sensor may have been from "
-          "where\n"
-          "it was said to be; slip_sd: how far the object moves between touches.\n\n"
+          "prior weight of \"none of these\"; touch_sd: how far the sensor may have been from\n"
+          "where it was said to be; slip_sd: how far the object moves between touches.\n\n"
           "Raises Error on maps that are not sound or differ in their prior, on options out of\n"
           "range, and where the device has too little memory.")
       .def(
@@ -128,9 +127,8 @@ void bind_pose_histogram(nb::module_& module) {
       .def("estimate", on_device<Histogram>(&PoseHistogram::estimate),
            "Identity probabilities (Eq. 14) and mode (Eq. 15-16).")
       .def("refine", &refine<PoseHistogram>, "mode"_a = nb::none(),
-           "The refined pose near a mode, by default that of estimate(), and its covariance: where "
-           "the\n"
-           "posterior peaks, to a fraction of a bin.")
+           "The refined pose near a mode, by default that of estimate(), and its covariance:\n"
+           "where the posterior peaks, to a fraction of a bin.")
       .def("marginals", on_device<Histogram>(&PoseHistogram::marginals), "object"_a,
            "Marginal probabilities of one object's poses, over the lattice.")
       .def("log_likelihood", &log_likelihood, "object"_a,

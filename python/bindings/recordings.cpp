@@ -196,19 +196,12 @@ void bind_recording(nb::module_& module) {
           "time_s"_a = nb::none(), "object"_a = "", "pressure_unit"_a = "kPa", "rows"_a = "touches",
           "truth"_a = nb::none(), "sensor"_a = "", "serial"_a = "", "baseline"_a = nb::none(),
           "device_time_s"_a = nb::none(), "lost_before"_a = nb::none(),
-          "pressure [n, e] in pressure_unit, \"kPa\" or \"raw\"; poses T_robot_sensor [n, 3] "
-          "(x_mm, "
-          "y_mm,\n"
-          "theta_rad); elements_mm [e, 2] in the sensor frame, or [n, e, 2] where the array "
-          "changes;\n"
-          "valid [e] or [n, e], False for a dead element; time_s [n] since the Unix epoch; object: "
-          "its\n"
-          "label, \"\" where unknown; rows: \"touches\", or \"frames\" of a raw stream, in which "
-          "poses "
-          "and\n"
-          "pressures may be NaN (unknown).\n\nRaises Error naming the argument whose shape does "
-          "not "
-          "fit.")
+          "pressure [n, e] in pressure_unit, \"kPa\" or \"raw\"; poses T_robot_sensor [n, 3]\n"
+          "(x_mm, y_mm, theta_rad); elements_mm [e, 2] in the sensor frame, or [n, e, 2] where\n"
+          "the array changes; valid [e] or [n, e], False for a dead element; time_s [n] since the\n"
+          "Unix epoch; object: its label, \"\" where unknown; rows: \"touches\", or \"frames\" of\n"
+          "a raw stream, in which poses and pressures may be NaN (unknown).\n\n"
+          "Raises Error naming the argument whose shape does not fit.")
       .def_prop_ro("pressure", array_in(&ArrayRecording::pressure), "[n, e] in pressure_unit.")
       .def_prop_ro("T_robot_sensor", array_in(&ArrayRecording::T_robot_sensor),
                    "[n, 3] (x_mm, y_mm, theta_rad).")
@@ -261,9 +254,8 @@ void bind_recording(nb::module_& module) {
         return array_recording(run([path = file.path()](Call&) { return read_recording(path); }));
       },
       "path"_a,
-      "Reads a recording file (HDF5); of an unclosed file, the whole rows. Raises Error naming "
-      "file,\n"
-      "field and remedy.");
+      "Reads a recording file (HDF5); of an unclosed file, the whole rows. Raises Error naming\n"
+      "file, field and remedy.");
 }
 
 }  // namespace

@@ -56,8 +56,8 @@ Result<double, 1> identity(const std::vector<ArrayLike>& log_likelihoods,
   reference::Posterior posterior;
   ArrayReader reader;
   for (const ArrayLike& bins : log_likelihoods) {
-    const Floats values = reader.floats(bins, "log_likelihoods", {"ntheta", "ny", "nx"});
-    posterior.log_likelihood.emplace_back(values.data, values.data + values.size());
+    posterior.log_likelihood.push_back(
+        reader.floats(bins, "log_likelihoods", {"ntheta", "ny", "nx"}).copied());
   }
   posterior.weight = weights.value_or(std::vector<double>(log_likelihoods.size(), 1.0));
   if (posterior.weight.size() != log_likelihoods.size()) {

@@ -134,18 +134,17 @@ void bind_frame(nb::module_& module) {
              const std::optional<ArrayLike>& T_robot_sensor) {
             ArrayReader reader;
             const Floats readings = reader.readings(values, "values", {"e"});
-            std::vector<double> known(readings.data, readings.data + readings.size());
+            std::vector<double> known = readings.copied();
             if (const auto flags = reader.unmasked(values, {}, {"e"})) {
               for (std::size_t k = 0; k < known.size(); ++k) {
                 known[k] = flags->data[k] != 0 ? known[k] : std::nan("");
               }
             }
-            std::optional<Pose> pose;
+            Frame frame{.host_time_s = host_time_s, .values = std::move(known)};
             if (T_robot_sensor) {
-              pose = pose_of(*T_robot_sensor, "T_robot_sensor");
+              frame.T_robot_sensor = pose_of(*T_robot_sensor, "T_robot_sensor");
             }
-            new (self) Frame{
-                .host_time_s = host_time_s, .values = std::move(known), .T_robot_sensor = pose};
+            new (self) Frame(std::move(frame));
           },
           "host_time_s"_a, "values"_a, "T_robot_sensor"_a = nb::none(),
           "host_time_s since the Unix epoch; values [e] in the pressure unit, NaN: unknown;\n"
@@ -265,12 +264,10 @@ void bind_detector(nb::module_& module) {
             std::vector<double> zeros;
             std::vector<std::uint8_t> alive;
             if (baseline) {
-              const Floats values = reader.floats(*baseline, "baseline", {"e"});
-              zeros.assign(values.data, values.data + values.size());
+              zeros = reader.floats(*baseline, "baseline", {"e"}).copied();
             }
             if (valid) {
-              const Bytes flags = reader.flags(*valid, "valid", {"e"});
-              alive.assign(flags.data, flags.data + flags.size());
+              alive = reader.flags(*valid, "valid", {"e"}).copied();
             }
             new (self) TouchDetector({.onset = onset,
                                       .release = release,
