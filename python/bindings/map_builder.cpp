@@ -31,22 +31,6 @@ void add_touches(const Builder& builder, const TouchesLike& touches, const Progr
               });
 }
 
-double estimated_prior(const std::shared_ptr<Session>& session,
-                       const std::map<std::string, TouchesLike>& objects,
-                       const MapOptions& options) {
-  std::vector<nb::object> kept;
-  std::vector<ObjectTouches> all;
-  for (const auto& [label, touches] : objects) {
-    TouchViews views = views_of(touches);
-    all.push_back({label, std::move(views.touches)});
-    kept.insert(kept.end(), views.kept.begin(), views.kept.end());
-  }
-  return run(std::move(kept), Progress(), [session, all = std::move(all), options](Call& call) {
-    auto lock = session->lock(call);
-    return estimate_prior(lock.device(), all, options);
-  });
-}
-
 MapOptions options_of(double cell_mm, const InverseSensorModel& sensor,
                       const ContactClassifier& classifier) {
   return {.cell_mm = cell_mm, .sensor = sensor, .classifier = classifier};
@@ -84,9 +68,21 @@ void bind_map_builder(nb::module_& module) {
       });
   module.def(
       "estimate_prior",
-      [](const std::shared_ptr<Session>& device, const std::map<std::string, TouchesLike>& objects,
+      [](const std::shared_ptr<Session>& session, const std::map<std::string, TouchesLike>& objects,
          double cell_mm, const InverseSensorModel& sensor, const ContactClassifier& classifier) {
-        return estimated_prior(device, objects, options_of(cell_mm, sensor, classifier));
+        std::vector<nb::object> kept;
+        std::vector<ObjectTouches> all;
+        for (const auto& [label, touches] : objects) {
+          TouchViews views = views_of(touches);
+          all.push_back({label, std::move(views.touches)});
+          kept.insert(kept.end(), views.kept.begin(), views.kept.end());
+        }
+        const MapOptions options = options_of(cell_mm, sensor, classifier);
+        return run(std::move(kept), Progress(),
+                   [session, all = std::move(all), options](Call& call) {
+                     auto lock = session->lock(call);
+                     return estimate_prior(lock.device(), all, options);
+                   });
       },
       "device"_a, "objects"_a, nb::kw_only(), "cell_mm"_a = MapOptions{}.cell_mm,
       "sensor"_a = InverseSensorModel{}, "classifier"_a = ContactClassifier{},

@@ -25,34 +25,6 @@ std::vector<float> cells_of(const ArrayLike& cells, const char* name, ArrayReade
   return reader.floats(cells, name, {"ny", "nx"}).copied<float>();
 }
 
-OccupancyGrid make_map(const std::string& label, const ArrayLike& log_odds, double cell_mm,
-                       const ArrayLike& origin_mm, double prior, int symmetry,
-                       std::optional<double> spread_mm, bool mirror,
-                       const std::optional<ArrayLike>& observations,
-                       const std::optional<ArrayLike>& mean_level) {
-  ArrayReader reader;
-  OccupancyGrid map{.label = label,
-                    .cell_mm = cell_mm,
-                    .origin_mm = point_of(origin_mm, "origin_mm"),
-                    .prior = prior,
-                    .symmetry = symmetry,
-                    .spread_mm = spread_mm,
-                    .mirror = mirror};
-  map.log_odds = cells_of(log_odds, "log_odds", reader);
-  map.ny = static_cast<int>(reader.extent("ny"));
-  map.nx = static_cast<int>(reader.extent("nx"));
-  if (observations) {
-    map.observations = cells_of(*observations, "observations", reader);
-  }
-  if (mean_level) {
-    map.mean_level = cells_of(*mean_level, "mean_level", reader);
-  }
-  if (const auto fault = fault_of(map)) {
-    throw Error(Fault::input, *fault);
-  }
-  return map;
-}
-
 /// [ny, nx], a view of cells of the map.
 Result<const float, 2> view_cells(const OccupancyGrid& map, const std::vector<float>& cells) {
   return view<float, 2>(cells.data(),
@@ -77,8 +49,27 @@ void bind_map(nb::module_& module) {
              std::optional<double> spread_mm, bool mirror,
              const std::optional<ArrayLike>& observations,
              const std::optional<ArrayLike>& mean_level) {
-            new (self) OccupancyGrid(make_map(label, log_odds, cell_mm, origin_mm, prior, symmetry,
-                                              spread_mm, mirror, observations, mean_level));
+            ArrayReader reader;
+            OccupancyGrid map{.label = label,
+                              .cell_mm = cell_mm,
+                              .origin_mm = point_of(origin_mm, "origin_mm"),
+                              .prior = prior,
+                              .symmetry = symmetry,
+                              .spread_mm = spread_mm,
+                              .mirror = mirror};
+            map.log_odds = cells_of(log_odds, "log_odds", reader);
+            map.ny = static_cast<int>(reader.extent("ny"));
+            map.nx = static_cast<int>(reader.extent("nx"));
+            if (observations) {
+              map.observations = cells_of(*observations, "observations", reader);
+            }
+            if (mean_level) {
+              map.mean_level = cells_of(*mean_level, "mean_level", reader);
+            }
+            if (const auto fault = fault_of(map)) {
+              throw Error(Fault::input, *fault);
+            }
+            new (self) OccupancyGrid(std::move(map));
           },
           "label"_a, "log_odds"_a, nb::kw_only(), "cell_mm"_a, "origin_mm"_a, "prior"_a = 0.2,
           "symmetry"_a = 1, "spread_mm"_a = nb::none(), "mirror"_a = false,

@@ -13,8 +13,6 @@ from . import _palpate
 from ._palpate import (
     Device,
     Evaluation,
-    Hypothesis,
-    OccupancyGrid,
     Recording,
     SensorCalibration,
     TouchGains,
@@ -22,17 +20,23 @@ from ._palpate import (
     Truth,
 )
 from .many import Recognized
-from .recognition import RecognitionOptions, Record, filled, request_of, warn
+from .recognition import (
+    RecognitionOptions,
+    Record,
+    _Maps,
+    _Pair,
+    _Path,
+    _Recordings,
+    filled,
+    request_of,
+    warn,
+)
 
 # The build writes the stubs by importing the package, where there is no NumPy.
 if TYPE_CHECKING:
     import numpy
     from numpy.typing import ArrayLike, NDArray
     from typing_extensions import Unpack
-
-_Path = str | bytes | os.PathLike[str] | os.PathLike[bytes]
-_Pair = tuple[float, float]
-_Maps = OccupancyGrid | Hypothesis | _Path | Iterable[OccupancyGrid | Hypothesis | _Path]
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +105,7 @@ def plan(
 
 
 def fit_touch_sd(
-    recordings: Recording | _Path | Iterable[Recording | _Path],
+    recordings: _Recordings,
     maps: _Maps = (),
     *,
     device: Device | str | int | None = None,
@@ -123,7 +127,7 @@ def fit_touch_sd(
 
 
 def calibrate(
-    recordings: Recording | _Path | Iterable[Recording | _Path],
+    recordings: _Recordings,
     *,
     maps: _Maps = (),
     unposed: bool = False,

@@ -22,12 +22,10 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 from . import _palpate
 from ._error import Error
 from ._palpate import Device, DeviceInfo
-from .recognition import RecognitionOptions, Record, request_of, warn
+from .recognition import RecognitionOptions, Record, _Path, request_of, warn
 
 if TYPE_CHECKING:
     from distributed import Client
-
-_Path = str | bytes | os.PathLike[str] | os.PathLike[bytes]
 
 
 class Task(RecognitionOptions, total=False):

@@ -11,6 +11,8 @@ from ._palpate import Device, Hypothesis, OccupancyGrid, Recording
 
 _Path = str | bytes | os.PathLike[str] | os.PathLike[bytes]
 _Pair = tuple[float, float]
+_Recordings = Recording | _Path | Iterable[Recording | _Path]
+_Maps = OccupancyGrid | Hypothesis | _Path | Iterable[OccupancyGrid | Hypothesis | _Path]
 _Request = TypeVar("_Request")
 
 
@@ -66,8 +68,8 @@ class Record(dict[str, Any]):
 
 
 def recognize(
-    recordings: Recording | _Path | Iterable[Recording | _Path],
-    maps: OccupancyGrid | Hypothesis | _Path | Iterable[OccupancyGrid | Hypothesis | _Path] = (),
+    recordings: _Recordings,
+    maps: _Maps = (),
     *,
     bins: tuple[int, int, int] | Literal["auto", "fine"] | None = None,
     x_mm: _Pair | None = None,
