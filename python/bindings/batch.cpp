@@ -54,7 +54,7 @@ Settled settle(const std::vector<std::string>& inputs, const Request& given, con
   hash_files(settled.task, request);
   const RecognitionTask recognition =
       resolve_batch(settled.task, request, [&device]() -> const Device& { return device; });
-  std::ranges::transform(recognition.remarks, std::back_inserter(settled.sentences), in_keywords);
+  settled.sentences = in_python(recognition.remarks);
   return settled;
 }
 
@@ -102,7 +102,8 @@ OpenBatch open_batch(const std::string& head, const Session& session, Device& de
   }
   RecognitionTask recognition = resolve_batch(
       task, request, [&device]() -> const Device& { return device; },
-      [&session] { session.check(); });  // which the open batch keeps
+      // The open batch keeps the session.
+      [&session] { session.check(); });
   take_threads(recognition, threads);
   Recogniser recogniser = open_batch_filter(&device, recognition);
   return {std::move(task), std::move(request), std::move(recognition), std::move(recogniser)};

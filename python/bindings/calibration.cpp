@@ -13,7 +13,6 @@
 #include "bindings.hpp"
 #include "learning/calibration_task.hpp"
 #include "palpate/files.hpp"
-#include "recognition/map_files.hpp"
 #include "recognition/recordings.hpp"
 #include "request.hpp"
 
@@ -23,17 +22,13 @@ using namespace nb::literals;
 
 namespace {
 
-std::vector<NamedMap> named_maps(const Request& request) {
+std::vector<NamedMap> named_maps(Request request) {
+  if (request.given_maps.empty()) {
+    read_maps(request);
+  }
   std::vector<NamedMap> maps;
   for (const GivenMap& given : request.given_maps) {
     maps.push_back({given.name, given.hypothesis.map});
-  }
-  if (request.given_maps.empty()) {
-    for (const std::string& argument : request.maps) {
-      for (const std::filesystem::path& file : map_files(argument)) {
-        maps.push_back({file.string(), read_map(file)});
-      }
-    }
   }
   return maps;
 }

@@ -1,6 +1,5 @@
 // `palpate plan` and `palpate recognize --fit-touch-sd`, for palpate/commands.py.
 
-#include <algorithm>
 #include <cmath>
 #include <string>
 #include <utility>
@@ -86,7 +85,6 @@ std::tuple<Fields, Sentences> plan_python(nb::handle recordings, const PythonReq
         return plan_next(subject, wanted, device, call);
       });
   sentences.insert(sentences.end(), planned.told.begin(), planned.told.end());
-  std::ranges::transform(sentences, sentences.begin(), in_keywords);
   const Plan& plan = planned.plan;
   TouchGains gains;
   std::vector<std::uint64_t> index;
@@ -96,8 +94,6 @@ std::tuple<Fields, Sentences> plan_python(nb::handle recordings, const PythonReq
     index.push_back(touch.index);
     poses.push_back(touch.T_robot_sensor);
   }
-  Sentences warnings = warnings_of(plan);
-  std::ranges::transform(warnings, warnings.begin(), in_keywords);
   Fields result;
   result["recording"] = plan.record.recording;
   result["touches"] = plan.record.touches;
@@ -108,32 +104,23 @@ std::tuple<Fields, Sentences> plan_python(nb::handle recordings, const PythonReq
   result["index"] = owned(std::move(index));
   result["T_robot_sensor"] = to_array(poses);
   result["gains"] = nb::cast(std::move(gains));
-  result["warnings"] = warnings;
+  result["warnings"] = in_python(warnings_of(plan));
   result["samples"] = plan.samples.size();
   result["seed"] = plan.seed;
   result["seconds"] = plan.seconds;
   result["device"] = planned.device;
-  return {result, sentences};
+  return {result, in_python(std::move(sentences))};
 }
 
 using Fitted = std::tuple<TouchSdFit, Sentences>;
 
 Fitted fit_recordings(const Subject& subject, Device& device, Call& call) {
-  const Recording& first = subject.recordings.front();
-  const RecognitionTask task =
-      resolve(subject.request, {.pressure_unit = first.pressure_unit,
-                                .source = first.path,
-                                .reach_mm = largest_reach_mm(subject.recordings),
-                                .still_array = array_is_still(subject.unknowns),
-                                .need = {"fit-touch-sd", touch_sd_fit_needs},
-                                .device = [&]() -> const Device& { return device; }});
+  const RecognitionTask task = task_of(subject, device, call, {"fit-touch-sd", touch_sd_fit_needs});
   require_fittable(task);
   TouchSdFit fit =
       fit_touch_sd(device, task, touched_objects(subject.recordings, subject.unknowns, task), {},
                    call.progress());
-  Sentences sentences;
-  std::ranges::transform(task.remarks, std::back_inserter(sentences), in_keywords);
-  return {std::move(fit), std::move(sentences)};
+  return {std::move(fit), in_python(task.remarks)};
 }
 
 void bind_touch_sd_fit(nb::module_& module) {

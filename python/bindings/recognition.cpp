@@ -1,6 +1,3 @@
-#include <algorithm>
-#include <iterator>
-
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 #include <nlohmann/json.hpp>
@@ -61,32 +58,25 @@ struct Answer {
 Answer recognize(const Subject& subject, Device& device, Call& call) {
   const std::function<void(double)> progress = call.progress();
   Answer answer;
-  const Request& request = subject.request;
   const std::vector<Unknown>& unknowns = subject.unknowns;
-  const Recording& first = subject.recordings.front();
-  const RecognitionTask task =
-      resolve(request, {.pressure_unit = first.pressure_unit,
-                        .source = first.path,
-                        .reach_mm = largest_reach_mm(subject.recordings),
-                        .still_array = array_is_still(unknowns),
-                        .cancel_point = [&call] { call.check(); },
-                        .device = [&device]() -> const Device& { return device; }});
+  const bool with_trace = subject.request.trace;
+  const RecognitionTask task = task_of(subject, device, call);
   Recogniser recogniser = open_recogniser(device, task);
-  std::ranges::transform(task.remarks, std::back_inserter(answer.sentences), in_keywords);
+  answer.sentences = task.remarks;
   std::string unresolved;
   for (std::size_t i = 0; i < unknowns.size(); ++i) {
     const auto show = [&](double fraction) {
       progress((static_cast<double>(i) + fraction) / static_cast<double>(unknowns.size()));
     };
-    const RecognitionRecord record = recognise(recogniser, task, unknowns[i], request.trace, show);
+    const RecognitionRecord record = recognise(recogniser, task, unknowns[i], with_trace, show);
     record.require_steps();
     if (unresolved.empty()) {
       unresolved = unresolved_words(task, recogniser.lattice(), unknowns[i].touches);
     }
-    answer.records.push_back(to_json(record, task, device.name(), request.trace, in_keywords));
+    answer.records.push_back(to_json(record, task, device.name(), with_trace, in_keywords));
   }
   if (!unresolved.empty()) {
-    answer.sentences.push_back(in_keywords(unresolved));
+    answer.sentences.push_back(unresolved);
   }
   return answer;
 }
@@ -96,7 +86,7 @@ using Records = nb::typed<nb::list, nb::typed<nb::dict, nb::str, nb::any>>;
 std::tuple<Records, Sentences> recognize_python(nb::handle recordings, const PythonRequest& request,
                                                 const Progress& progress) {
   const Answer answer = run_on_subject(recordings, request, progress, &recognize);
-  return {nb::borrow<Records>(to_python(answer.records)), answer.sentences};
+  return {nb::borrow<Records>(to_python(answer.records)), in_python(answer.sentences)};
 }
 
 }  // namespace

@@ -18,6 +18,7 @@
 
 #include "bindings.hpp"
 #include "estimate.hpp"
+#include "model/option_words.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
 #include "recognition/map_files.hpp"
@@ -146,9 +147,12 @@ void add_maps(nb::handle given, Request& request) {
       request.maps.push_back(nb::borrow<PathLike>(item).text());
     }
   }
-  if (request.given_maps.empty()) {
-    return;
+  if (!request.given_maps.empty()) {
+    read_maps(request);
   }
+}
+
+void read_maps(Request& request) {
   for (const std::string& argument : request.maps) {
     for (const std::filesystem::path& file : map_files(argument)) {
       request.given_maps.push_back({file.string(), {.map = read_map(file)}});
@@ -196,6 +200,23 @@ Subject subject_of(const GivenRecordings& recordings, const Request& given) {
   }
   subject.unknowns = list_unknowns(subject.request, subject.recordings);
   return subject;
+}
+
+RecognitionTask task_of(const Subject& subject, const Device& device, const Call& call,
+                        const HistogramNeed& need) {
+  const Recording& first = subject.recordings.front();
+  return resolve(subject.request, {.pressure_unit = first.pressure_unit,
+                                   .source = first.path,
+                                   .reach_mm = largest_reach_mm(subject.recordings),
+                                   .still_array = array_is_still(subject.unknowns),
+                                   .need = need,
+                                   .cancel_point = [&call] { call.check(); },
+                                   .device = [&device]() -> const Device& { return device; }});
+}
+
+Sentences in_python(Sentences sentences) {
+  std::ranges::transform(sentences, sentences.begin(), in_keywords);
+  return sentences;
 }
 
 void bind_request(nb::module_& module) {

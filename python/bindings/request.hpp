@@ -9,11 +9,15 @@
 
 #include "recognition/recognition_record.hpp"
 #include "recognition/request.hpp"
+#include "recognition/resolve.hpp"
 #include "session.hpp"
 
 namespace palpate::python {
 
 using Sentences = std::vector<std::string>;  ///< what is worth a warning
+
+/// The sentences with options in the words of Python.
+Sentences in_python(Sentences sentences);
 
 /// What a call from Python asks.
 struct PythonRequest : Request {
@@ -23,6 +27,8 @@ struct PythonRequest : Request {
 /// Adds a map or an iterable of maps: files, folders, and maps in memory, beside which files are
 /// read here.
 void add_maps(nb::handle given, Request& request);
+/// Reads the maps in the request's files, after those in memory.
+void read_maps(Request& request);
 
 /// Recordings as a call from Python gives them: files, or recordings in memory by their place among
 /// all.
@@ -46,6 +52,10 @@ struct Subject {
 /// Completes the request, reads the recordings, with the scene's array, and selects the unknowns.
 /// Throws Error.
 Subject subject_of(const GivenRecordings& recordings, const Request& given);
+
+/// The task of a subject, by what all its recordings have. Throws Error as resolve() does.
+RecognitionTask task_of(const Subject& subject, const Device& device, const Call& call,
+                        const HistogramNeed& need = {});
 
 /// The session, or where there is none, one that is nobody else's: of the device of this name, see
 /// Device::open(). Throws Error.
