@@ -1,7 +1,5 @@
 #include "model.hpp"
 
-#include <array>
-
 #include <fmt/format.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/tuple.h>
@@ -9,7 +7,6 @@
 
 #include "bindings.hpp"
 #include "palpate/contact_model.hpp"
-#include "palpate/error.hpp"
 #include "palpate/pose.hpp"
 #include "palpate/sensor_model.hpp"
 

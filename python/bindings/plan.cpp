@@ -1,6 +1,5 @@
 // `palpate plan` and `palpate recognize --fit-touch-sd`, for palpate/commands.py.
 
-#include <cmath>
 #include <string>
 #include <utility>
 #include <vector>

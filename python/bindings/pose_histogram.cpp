@@ -9,7 +9,6 @@
 
 #include "bindings.hpp"
 #include "estimate.hpp"
-#include "model.hpp"
 #include "palpate/pose_histogram.hpp"
 #include "touches.hpp"
 

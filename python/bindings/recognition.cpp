@@ -5,7 +5,6 @@
 #include "bindings.hpp"
 #include "recognition/record_json.hpp"
 #include "recognition/resolve.hpp"
-#include "recognition/unknowns.hpp"
 #include "request.hpp"
 
 namespace palpate::python {

@@ -4,7 +4,6 @@
 #include "bindings.hpp"
 #include "call.hpp"
 #include "model.hpp"
-#include "palpate/error.hpp"
 #include "palpate/files.hpp"
 #include "touches.hpp"
 

@@ -42,6 +42,7 @@ class Session {
 
  private:
   void sweep();
+  void sweep_unlocked();
   bool swept();
 
   OwnProcess process_;

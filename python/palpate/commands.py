@@ -230,7 +230,7 @@ def import_tables(
     between two poses, columns of poses that were left out, and units that nothing gives become a
     UserWarning.
     """
-    options = locals()
+    options = dict(locals())
     del options["truth"]
     elements_mm = None
     if isinstance(array, tuple) and len(array) == 3 and isinstance(array[0], int):
