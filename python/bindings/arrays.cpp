@@ -100,8 +100,12 @@ template Bytes in_place<std::uint8_t>(nb::object);
 template Counts in_place<std::uint64_t>(nb::object);
 
 template <typename Value>
-Array<Value> ArrayReader::checked(const nb::object& array, const char* name, Shape shape) {
+Array<Value> ArrayReader::checked(const nb::object& array, const char* name, Shape shape,
+                                  Shape longer) {
   Array<Value> result = in_place<Value>(array);
+  if (longer.size() > 0 && result.shape.size() > shape.size()) {
+    shape = longer;
+  }
   bool fits = result.shape.size() == shape.size();
   std::string known;
   std::map<std::string, Extent> extents = extents_;
@@ -128,32 +132,33 @@ Array<Value> ArrayReader::checked(const nb::object& array, const char* name, Sha
   return result;
 }
 
-Floats ArrayReader::floats(nb::handle object, const char* name, Shape shape) {
+Floats ArrayReader::floats(nb::handle object, const char* name, Shape shape, Shape longer) {
   refuse_masked(object, name);
-  return readings(object, name, shape);
+  return readings(object, name, shape, longer);
 }
 
-Floats ArrayReader::readings(nb::handle object, const char* name, Shape shape) {
+Floats ArrayReader::readings(nb::handle object, const char* name, Shape shape, Shape longer) {
   const nb::object array = as_array(object, name, "fiu", "numbers (float64)");
-  return checked<double>(with_layout(array, "float64"), name, shape);
+  return checked<double>(with_layout(array, "float64"), name, shape, longer);
 }
 
-std::optional<Bytes> ArrayReader::unmasked(nb::handle readings, const std::optional<Bytes>& valid,
-                                           Shape shape) {
+std::optional<Bytes> ArrayReader::valid(nb::handle readings, const std::optional<ArrayLike>& valid,
+                                        Shape shape) {
+  const auto given = valid ? std::optional(flags(*valid, "valid", {"e"}, shape)) : std::nullopt;
   const nb::object masked = masked_array(readings);
   if (!masked.is_valid()) {
-    return valid;
+    return given;
   }
   const nb::object known = call("numpy", "logical_not", call("numpy.ma", "getmaskarray", masked));
-  return flags(valid ? call("numpy", "logical_and", valid->object, known) : known, "valid", shape);
+  return flags(given ? call("numpy", "logical_and", given->object, known) : known, "valid", shape);
 }
 
-Bytes ArrayReader::flags(nb::handle object, const char* name, Shape shape) {
+Bytes ArrayReader::flags(nb::handle object, const char* name, Shape shape, Shape longer) {
   refuse_masked(object, name);
   const nb::object array = as_array(object, name, "biu", "booleans, False for a dead element");
   const bool bytes = nb::cast<std::string>(array.attr("dtype").attr("name")) == "uint8";
   return checked<std::uint8_t>(with_layout(array, bytes ? "uint8" : "bool").attr("view")("uint8"),
-                               name, shape);
+                               name, shape, longer);
 }
 
 Counts ArrayReader::counts(nb::handle object, const char* name, Shape shape) {

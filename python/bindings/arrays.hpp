@@ -61,19 +61,22 @@ std::span<const glm::dvec2> as_points(const Floats& array);
 /// the argument itself where dtype and layout allow it, or else a copy.
 /// @param name of the argument, for messages
 /// @param shape of the array: numbers, or letters that stand for one number throughout
+/// @param longer the shape of an array of more axes, where it may have more
 /// @throws Error naming the argument, its shape and the shape that it needs
 class ArrayReader {
  public:
   using Shape = std::initializer_list<const char*>;
 
-  Floats floats(nb::handle object, const char* name, Shape shape);
+  Floats floats(nb::handle object, const char* name, Shape shape, Shape longer = {});
   /// Readings, the only arrays that may have masked values (numpy.ma).
-  Floats readings(nb::handle object, const char* name, Shape shape);
-  /// The flags, 0 also where a reading is masked.
-  std::optional<Bytes> unmasked(nb::handle readings, const std::optional<Bytes>& valid,
-                                Shape shape);
+  Floats readings(nb::handle object, const char* name, Shape shape, Shape longer = {});
+  /// The flags `valid` of elements or of all readings, 0 also where a reading is masked; none where
+  /// all are valid.
+  /// @param shape of the readings
+  std::optional<Bytes> valid(nb::handle readings, const std::optional<ArrayLike>& valid,
+                             Shape shape);
   /// Booleans, or integers that are 0 or not.
-  Bytes flags(nb::handle object, const char* name, Shape shape);
+  Bytes flags(nb::handle object, const char* name, Shape shape, Shape longer = {});
   Counts counts(nb::handle object, const char* name, Shape shape);
   /// What a letter stands for by now.
   std::size_t extent(const std::string& letter) const { return extents_.at(letter).value; }
@@ -84,7 +87,7 @@ class ArrayReader {
     std::string given_by;
   };
   template <typename Value>
-  Array<Value> checked(const nb::object& array, const char* name, Shape shape);
+  Array<Value> checked(const nb::object& array, const char* name, Shape shape, Shape longer = {});
 
   std::map<std::string, Extent> extents_;
 };

@@ -31,53 +31,41 @@ namespace {
 nb::bytes bytes_of(const std::string& text) { return nb::bytes(text.data(), text.size()); }
 std::string text_in(const nb::bytes& bytes) { return {bytes.c_str(), bytes.size()}; }
 
-struct Settled {
-  BatchTask task;
-  Sentences sentences;
-};
-
-Settled settle(const std::vector<std::string>& inputs, const Request& given, const Device& device,
-               std::size_t threads, Call& call) {
-  refuse_budget(given);
-  require_selection(given);
-  const Request request = complete(given);
-  Settled settled{{.program = PALPATE_VERSION,
-                   .chunk_unknowns = 1,  // chunks are of recordings, whoever makes them
-                   .request = given},
-                  {}};
-  for (BatchInput& input : list_inputs(inputs)) {
-    settled.task.inputs.push_back({std::move(input), {}, {}});
-  }
-  stamp_inputs(settled.task);
-  survey(settled.task, request, threads, call.progress());
-  settled.task.inferred = infer(settled.task.inputs, request);
-  hash_files(settled.task, request);
-  const RecognitionTask recognition =
-      resolve_batch(settled.task, request, [&device]() -> const Device& { return device; });
-  settled.sentences = in_python(recognition.remarks);
-  return settled;
-}
-
 using Entries = std::vector<std::tuple<nb::bytes, std::size_t>>;
 
-std::tuple<nb::bytes, Entries, Sentences> settle_python(const std::vector<std::string>& inputs,
-                                                        nb::handle maps, PythonRequest request,
-                                                        const std::shared_ptr<Session>& session,
-                                                        std::size_t threads) {
+std::tuple<nb::bytes, Entries, Sentences> settle(const std::vector<std::string>& inputs,
+                                                 nb::handle maps, PythonRequest request,
+                                                 const std::shared_ptr<Session>& session,
+                                                 std::size_t threads) {
   if (inputs.empty()) {
     throw Error(Fault::input, "paths: none; give recordings, a folder of them or a manifest");
   }
   add_maps(maps, request);
-  Settled settled = run([=](Call& call) {
+  auto [task, sentences] = run([=](Call& call) {
     auto lock = session->lock(call);
-    return settle(inputs, request, lock.device(), threads, call);
+    refuse_budget(request);
+    require_selection(request);
+    const Request completed = complete(request);
+    BatchTask settled{.program = PALPATE_VERSION,
+                      .chunk_unknowns = 1,  // chunks are of recordings, whoever makes them
+                      .request = request};
+    for (BatchInput& input : list_inputs(inputs)) {
+      settled.inputs.push_back({std::move(input), {}, {}});
+    }
+    stamp_inputs(settled);
+    survey(settled, completed, threads, call.progress());
+    settled.inferred = infer(settled.inputs, completed);
+    hash_files(settled, completed);
+    const RecognitionTask recognition =
+        resolve_batch(settled, completed, [&]() -> const Device& { return lock.device(); });
+    return std::pair(std::move(settled), in_python(recognition.remarks));
   });
   Entries entries;
-  for (const BatchEntry& entry : settled.task.inputs) {
-    entries.emplace_back(bytes_of(entry_text(entry)), settled.task.unknowns_of(entry));
+  for (const BatchEntry& entry : task.inputs) {
+    entries.emplace_back(bytes_of(entry_text(entry)), task.unknowns_of(entry));
   }
-  settled.task.inputs.clear();
-  return {bytes_of(head_text(settled.task)), std::move(entries), std::move(settled.sentences)};
+  task.inputs.clear();
+  return {bytes_of(head_text(task)), std::move(entries), std::move(sentences)};
 }
 
 /// A settled batch on a device, ready to recognise any of its recordings.
@@ -165,8 +153,7 @@ std::tuple<Lines, std::string> recognise_python(const Owned<OpenBatch>& batch,
 }  // namespace
 
 void bind_batch(nb::module_& module) {
-  module.def("settle_batch", &settle_python, "paths"_a, "maps"_a, "request"_a, "device"_a,
-             "threads"_a,
+  module.def("settle_batch", &settle, "paths"_a, "maps"_a, "request"_a, "device"_a, "threads"_a,
              "What follows from all recordings together, as `palpate batch` settles it: the head\n"
              "of the task, an entry for each recording with the number of its unknowns, and what\n"
              "is worth a warning.");

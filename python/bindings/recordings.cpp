@@ -41,11 +41,7 @@ void bind_touch(nb::module_& module) {
                 .T_robot_sensor = reader.floats(T_robot_sensor, "T_robot_sensor", {"3"}),
                 .elements_mm = reader.floats(elements_mm, "elements_mm", {"e", "2"}),
                 .pressure = reader.readings(pressure, "pressure", {"e"}),
-                .valid = {}};
-            if (valid) {
-              touch.valid = reader.flags(*valid, "valid", {"e"});
-            }
-            touch.valid = reader.unmasked(pressure, touch.valid, {"e"});
+                .valid = reader.valid(pressure, valid, {"e"})};
             new (self) ArrayTouch(std::move(touch));
           },
           "T_robot_sensor"_a, "elements_mm"_a, "pressure"_a, "valid"_a = nb::none(),
@@ -64,18 +60,6 @@ void bind_touch(nb::module_& module) {
         return fmt::format("Touch({} elements at {})", self.pressure.size(),
                            text_of(as_poses(self.T_robot_sensor).front()));
       });
-}
-
-/// The array by its rank: constant, or with a row for each touch.
-bool changes(nb::handle array, long constant_rank) {
-  try {
-    return nb::cast<long>(call("numpy", "ndim", array)) > constant_rank;
-  } catch (const nb::python_error& error) {
-    if (!error.matches(PyExc_ValueError)) {
-      throw;
-    }
-    return false;  // no array: the reader refuses it by name
-  }
 }
 
 template <typename Value>
@@ -171,14 +155,9 @@ void bind_recording(nb::module_& module) {
             made.serial = serial;
             made.pressure = reader.readings(pressure, "pressure", {"n", "e"});
             made.T_robot_sensor = reader.floats(poses, "poses", {"n", "3"});
-            made.elements_mm = changes(elements_mm, 2)
-                                   ? reader.floats(elements_mm, "elements_mm", {"n", "e", "2"})
-                                   : reader.floats(elements_mm, "elements_mm", {"e", "2"});
-            if (valid) {
-              made.valid = changes(*valid, 1) ? reader.flags(*valid, "valid", {"n", "e"})
-                                              : reader.flags(*valid, "valid", {"e"});
-            }
-            made.valid = reader.unmasked(pressure, made.valid, {"n", "e"});
+            made.elements_mm =
+                reader.floats(elements_mm, "elements_mm", {"e", "2"}, {"n", "e", "2"});
+            made.valid = reader.valid(pressure, valid, {"n", "e"});
             const auto floats = [&](const std::optional<ArrayLike>& array, const char* name,
                                     const char* letter) {
               return array ? std::optional(reader.floats(*array, name, {letter})) : std::nullopt;

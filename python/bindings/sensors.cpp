@@ -135,7 +135,7 @@ void bind_frame(nb::module_& module) {
             ArrayReader reader;
             const Floats readings = reader.readings(values, "values", {"e"});
             std::vector<double> known = readings.copied();
-            if (const auto flags = reader.unmasked(values, {}, {"e"})) {
+            if (const auto flags = reader.valid(values, {}, {"e"})) {
               for (std::size_t k = 0; k < known.size(); ++k) {
                 known[k] = flags->data[k] != 0 ? known[k] : std::nan("");
               }

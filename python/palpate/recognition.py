@@ -118,13 +118,14 @@ def recognize(
     would say on standard error becomes a UserWarning; what looks wrong with the touches is in the
     records' `warnings`.
     """
-    options = {name: value for name, value in locals().items() if name not in _NO_OPTIONS}
+    options = {
+        name: value
+        for name, value in locals().items()
+        if name not in ("recordings", "maps", "progress")
+    }
     records, sentences = _palpate.recognize(recordings, request_of(options, maps), progress)
     warn(sentences)
     return [Record(record) for record in records]
-
-
-_NO_OPTIONS = ("recordings", "maps", "progress")
 
 
 def request_of(options: Mapping[str, object], maps: object = ()) -> _palpate.Request:
