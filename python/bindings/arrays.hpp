@@ -49,7 +49,7 @@ using Floats = Array<double>;
 using Bytes = Array<std::uint8_t>;
 using Counts = Array<std::uint64_t>;
 
-/// The array as C++ reads it. Of another layout than C's, it has no such memory.
+/// Reads the array in place. Throws what NumPy raises where the array's layout is not C's.
 template <typename Value>
 Array<Value> in_place(nb::object array);
 
@@ -113,7 +113,7 @@ class Result : public nb::object {
       : nb::object(nb::cast(Array(data, rank, shape, owner), nb::rv_policy::automatic)) {}
 };
 
-/// What a row of an array consists of: numbers of Pose and dvec2, or itself.
+/// The numbers that an item of an array holds: a Pose and a dvec2 are rows of doubles.
 template <typename Row>
 using NumberOf = std::conditional_t<std::is_arithmetic_v<Row>, Row, double>;
 
@@ -129,12 +129,11 @@ Result<Value, 1> owned(std::vector<Value> values) {
   const std::size_t n = values.size();
   return owned(std::move(values), {n});
 }
-/// [ntheta, ny, nx] of what every bin of a lattice has.
+/// [ntheta, ny, nx], of numbers of every bin of a lattice.
 inline Result<double, 3> owned(std::vector<double> bins, const PoseLattice& lattice) {
-  const auto [ntheta, ny, nx] =
-      std::array{lattice.theta_rad.count, lattice.y_mm.count, lattice.x_mm.count};
-  return owned(std::move(bins), {static_cast<std::size_t>(ntheta), static_cast<std::size_t>(ny),
-                                 static_cast<std::size_t>(nx)});
+  return owned(std::move(bins), {static_cast<std::size_t>(lattice.theta_rad.count),
+                                 static_cast<std::size_t>(lattice.y_mm.count),
+                                 static_cast<std::size_t>(lattice.x_mm.count)});
 }
 /// A read-only array over memory of an object of Python, which it keeps alive.
 template <typename Value, std::size_t rank>
