@@ -34,10 +34,12 @@ def definitions(module):
 
 def public_names():
     """Full names of all that the module offers."""
-    [names] = [
-        ast.literal_eval(node.value)
+    names = [
+        alias.asname
         for node in ast.parse((PACKAGE / "__init__.py").read_text()).body
-        if isinstance(node, ast.Assign) and node.targets[0].id == "__all__"
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+        if alias.asname
     ]
     functions = [name for name in definitions("palpate.reference") if name[0] != "_"]
     return [f"palpate.{name}" for name in names] + [
@@ -51,6 +53,7 @@ class Simpler(ast.NodeTransformer):
     names = {
         "_Path": "str | PathLike[str]",
         "_Pair": "tuple[float, float]",
+        "_Recordings": "Recording | str | PathLike[str] | Iterable[Recording | str | PathLike[str]]",
         "_Maps": "OccupancyGrid | Hypothesis | str | Iterable[OccupancyGrid | Hypothesis | str]",
     }
 

@@ -68,11 +68,8 @@ void refuse_masked(nb::handle object, const char* name) {
   }
 }
 
-std::string wanted_shape(ArrayReader::Shape shape) {
-  return fmt::format("({}{})", fmt::join(shape, ", "), shape.size() == 1 ? "," : "");
-}
-
-std::string given_shape(const std::vector<std::size_t>& shape) {
+template <typename Shape>
+std::string shape_text(const Shape& shape) {
   return fmt::format("({}{})", fmt::join(shape, ", "), shape.size() == 1 ? "," : "");
 }
 
@@ -81,26 +78,33 @@ std::span<const Row> rows(const Floats& array) {
   return {reinterpret_cast<const Row*>(array.data), array.size() * sizeof(double) / sizeof(Row)};
 }
 
-template <std::size_t rank>
-Result<double, rank> copied(const double* values, const std::size_t (&shape)[rank]) {
-  std::size_t count = 1;
-  for (const std::size_t extent : shape) {
-    count *= extent;
-  }
-  return owned(std::vector<double>(values, values + count), shape);
-}
-
 }  // namespace
 
 std::span<const Pose> as_poses(const Floats& array) { return rows<Pose>(array); }
 std::span<const glm::dvec2> as_points(const Floats& array) { return rows<glm::dvec2>(array); }
 
 template <typename Value>
-Array<Value> ArrayReader::checked(const nb::object& array, const char* name, Shape shape) {
-  Array<Value> result;
-  result.object = array;
-  for (const nb::handle extent : array.attr("shape")) {
-    result.shape.push_back(nb::cast<std::size_t>(extent));
+Array<Value> in_place(nb::object array) {
+  Py_buffer buffer{};
+  if (PyObject_GetBuffer(array.ptr(), &buffer, PyBUF_C_CONTIGUOUS) != 0) {
+    throw nb::python_error();
+  }
+  Array<Value> result{std::move(array),
+                      static_cast<const Value*>(buffer.buf),
+                      {buffer.shape, buffer.shape + buffer.ndim}};
+  PyBuffer_Release(&buffer);  // the array keeps the memory
+  return result;
+}
+template Floats in_place<double>(nb::object);
+template Bytes in_place<std::uint8_t>(nb::object);
+template Counts in_place<std::uint64_t>(nb::object);
+
+template <typename Value>
+Array<Value> ArrayReader::checked(const nb::object& array, const char* name, Shape shape,
+                                  Shape longer) {
+  Array<Value> result = in_place<Value>(array);
+  if (longer.size() > 0 && result.shape.size() > shape.size()) {
+    shape = longer;
   }
   bool fits = result.shape.size() == shape.size();
   std::string known;
@@ -121,45 +125,40 @@ Array<Value> ArrayReader::checked(const nb::object& array, const char* name, Sha
     }
   }
   if (!fits) {
-    refuse(name, fmt::format("shape {}; give {}{}", given_shape(result.shape), wanted_shape(shape),
-                             known));
+    refuse(name,
+           fmt::format("shape {}; give {}{}", shape_text(result.shape), shape_text(shape), known));
   }
   extents_ = std::move(extents);
-  Py_buffer buffer{};
-  if (PyObject_GetBuffer(array.ptr(), &buffer, PyBUF_C_CONTIGUOUS) != 0) {
-    throw nb::python_error();
-  }
-  result.data = static_cast<const Value*>(buffer.buf);
-  PyBuffer_Release(&buffer);  // the array keeps the memory
   return result;
 }
 
-Floats ArrayReader::floats(nb::handle object, const char* name, Shape shape) {
+Floats ArrayReader::floats(nb::handle object, const char* name, Shape shape, Shape longer) {
   refuse_masked(object, name);
-  return readings(object, name, shape);
+  return readings(object, name, shape, longer);
 }
 
-Floats ArrayReader::readings(nb::handle object, const char* name, Shape shape) {
+Floats ArrayReader::readings(nb::handle object, const char* name, Shape shape, Shape longer) {
   const nb::object array = as_array(object, name, "fiu", "numbers (float64)");
-  return checked<double>(with_layout(array, "float64"), name, shape);
+  return checked<double>(with_layout(array, "float64"), name, shape, longer);
 }
 
-std::optional<Bytes> ArrayReader::unmasked(nb::handle readings, const std::optional<Bytes>& valid,
-                                           Shape shape) {
+std::optional<Bytes> ArrayReader::valid(nb::handle readings, const std::optional<ArrayLike>& valid,
+                                        Shape shape) {
+  const auto given = valid ? std::optional(flags(*valid, "valid", {"e"}, shape)) : std::nullopt;
   const nb::object masked = masked_array(readings);
   if (!masked.is_valid()) {
-    return valid;
+    return given;
   }
   const nb::object known = call("numpy", "logical_not", call("numpy.ma", "getmaskarray", masked));
-  return flags(valid ? call("numpy", "logical_and", valid->object, known) : known, "valid", shape);
+  return flags(given ? call("numpy", "logical_and", given->object, known) : known, "valid", shape);
 }
 
-Bytes ArrayReader::flags(nb::handle object, const char* name, Shape shape) {
+Bytes ArrayReader::flags(nb::handle object, const char* name, Shape shape, Shape longer) {
   refuse_masked(object, name);
   const nb::object array = as_array(object, name, "biu", "booleans, False for a dead element");
   const bool bytes = nb::cast<std::string>(array.attr("dtype").attr("name")) == "uint8";
   return checked<std::uint8_t>(with_layout(array, bytes ? "uint8" : "bool").attr("view")("uint8"),
-                               name, shape);
+                               name, shape, longer);
 }
 
 Counts ArrayReader::counts(nb::handle object, const char* name, Shape shape) {
@@ -189,25 +188,6 @@ std::vector<glm::dvec2> points_of(nb::handle object, const char* name) {
   const Floats array = ArrayReader().floats(object, name, {"n", "2"});
   const auto points = as_points(array);
   return {points.begin(), points.end()};
-}
-
-Result<double, 1> to_array(const Pose& pose) {
-  return copied(reinterpret_cast<const double*>(&pose), {3});
-}
-Result<double, 1> to_array(const glm::dvec2& point) {
-  return copied(reinterpret_cast<const double*>(&point), {2});
-}
-Result<double, 2> to_array(std::span<const Pose> poses) {
-  return copied(reinterpret_cast<const double*>(poses.data()), {poses.size(), 3});
-}
-Result<double, 2> to_array(std::span<const glm::dvec2> points) {
-  return copied(reinterpret_cast<const double*>(points.data()), {points.size(), 2});
-}
-Result<double, 2> to_array(const std::array<double, 9>& covariance) {
-  return copied(covariance.data(), {3, 3});
-}
-Result<double, 1> to_array(const std::array<double, 3>& values) {
-  return copied(values.data(), {3});
 }
 
 }  // namespace palpate::python

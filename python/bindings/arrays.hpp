@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <initializer_list>
@@ -7,12 +8,14 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
 #include <nanobind/ndarray.h>
 #include <glm/vec2.hpp>
 
+#include "palpate/lattice.hpp"
 #include "palpate/pose.hpp"
 #include "types.hpp"
 
@@ -37,10 +40,18 @@ struct Array {
   }
   std::span<const Value> values() const& { return {data, size()}; }
   std::span<const Value> values() const&& = delete;  // the memory goes with the array
+  template <typename To = Value>
+  std::vector<To> copied() const {
+    return {data, data + size()};
+  }
 };
 using Floats = Array<double>;
 using Bytes = Array<std::uint8_t>;
 using Counts = Array<std::uint64_t>;
+
+/// Reads the array in place. Throws what NumPy raises where the array's layout is not C's.
+template <typename Value>
+Array<Value> in_place(nb::object array);
 
 /// Poses [n, 3] as rows of x_mm, y_mm and theta_rad, and points [n, 2] in mm.
 std::span<const Pose> as_poses(const Floats& array);
@@ -50,19 +61,22 @@ std::span<const glm::dvec2> as_points(const Floats& array);
 /// the argument itself where dtype and layout allow it, or else a copy.
 /// @param name of the argument, for messages
 /// @param shape of the array: numbers, or letters that stand for one number throughout
+/// @param longer the shape of an array of more axes, where it may have more
 /// @throws Error naming the argument, its shape and the shape that it needs
 class ArrayReader {
  public:
   using Shape = std::initializer_list<const char*>;
 
-  Floats floats(nb::handle object, const char* name, Shape shape);
+  Floats floats(nb::handle object, const char* name, Shape shape, Shape longer = {});
   /// Readings, the only arrays that may have masked values (numpy.ma).
-  Floats readings(nb::handle object, const char* name, Shape shape);
-  /// The flags, 0 also where a reading is masked.
-  std::optional<Bytes> unmasked(nb::handle readings, const std::optional<Bytes>& valid,
-                                Shape shape);
+  Floats readings(nb::handle object, const char* name, Shape shape, Shape longer = {});
+  /// The flags `valid` of elements or of all readings, 0 also where a reading is masked; none where
+  /// all are valid.
+  /// @param shape of the readings
+  std::optional<Bytes> valid(nb::handle readings, const std::optional<ArrayLike>& valid,
+                             Shape shape);
   /// Booleans, or integers that are 0 or not.
-  Bytes flags(nb::handle object, const char* name, Shape shape);
+  Bytes flags(nb::handle object, const char* name, Shape shape, Shape longer = {});
   Counts counts(nb::handle object, const char* name, Shape shape);
   /// What a letter stands for by now.
   std::size_t extent(const std::string& letter) const { return extents_.at(letter).value; }
@@ -73,7 +87,7 @@ class ArrayReader {
     std::string given_by;
   };
   template <typename Value>
-  Array<Value> checked(const nb::object& array, const char* name, Shape shape);
+  Array<Value> checked(const nb::object& array, const char* name, Shape shape, Shape longer = {});
 
   std::map<std::string, Extent> extents_;
 };
@@ -99,12 +113,27 @@ class Result : public nb::object {
       : nb::object(nb::cast(Array(data, rank, shape, owner), nb::rv_policy::automatic)) {}
 };
 
+/// The numbers that an item of an array holds: a Pose and a dvec2 are rows of doubles.
+template <typename Row>
+using NumberOf = std::conditional_t<std::is_arithmetic_v<Row>, Row, double>;
+
 /// An array that takes over the vector's memory.
-template <typename Value, std::size_t rank>
-Result<Value, rank> owned(std::vector<Value> values, const std::size_t (&shape)[rank]) {
-  auto* kept = new std::vector<Value>(std::move(values));
+template <typename Row, std::size_t rank>
+Result<NumberOf<Row>, rank> owned(std::vector<Row> rows, const std::size_t (&shape)[rank]) {
+  auto* kept = new std::vector<Row>(std::move(rows));
   const nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<decltype(kept)>(p); });
-  return {kept->data(), shape, owner};
+  return {reinterpret_cast<NumberOf<Row>*>(kept->data()), shape, owner};
+}
+template <typename Value>
+Result<Value, 1> owned(std::vector<Value> values) {
+  const std::size_t n = values.size();
+  return owned(std::move(values), {n});
+}
+/// [ntheta, ny, nx], of numbers of every bin of a lattice.
+inline Result<double, 3> owned(std::vector<double> bins, const PoseLattice& lattice) {
+  return owned(std::move(bins), {static_cast<std::size_t>(lattice.theta_rad.count),
+                                 static_cast<std::size_t>(lattice.y_mm.count),
+                                 static_cast<std::size_t>(lattice.x_mm.count)});
 }
 /// A read-only array over memory of an object of Python, which it keeps alive.
 template <typename Value, std::size_t rank>
@@ -114,12 +143,43 @@ Result<const Value, rank> view(const Value* data, const std::size_t (&shape)[ran
 }
 
 /// [3] or [n, 3] of x_mm, y_mm and theta_rad; [2] or [n, 2] in mm.
-Result<double, 1> to_array(const Pose& pose);
-Result<double, 1> to_array(const glm::dvec2& point);
-Result<double, 2> to_array(std::span<const Pose> poses);
-Result<double, 2> to_array(std::span<const glm::dvec2> points);
+inline Result<double, 1> to_array(const Pose& pose) { return owned(std::vector{pose}, {3}); }
+inline Result<double, 1> to_array(const glm::dvec2& point) {
+  return owned(std::vector{point}, {2});
+}
+inline Result<double, 2> to_array(std::vector<Pose> poses) {
+  const std::size_t n = poses.size();
+  return owned(std::move(poses), {n, 3});
+}
+inline Result<double, 2> to_array(std::vector<glm::dvec2> points) {
+  const std::size_t n = points.size();
+  return owned(std::move(points), {n, 2});
+}
+inline std::optional<FloatArray> to_array(const std::optional<Pose>& pose) {
+  return pose ? std::optional(nb::borrow<FloatArray>(to_array(*pose))) : std::nullopt;
+}
 /// [3, 3] of a covariance.
-Result<double, 2> to_array(const std::array<double, 9>& covariance);
-Result<double, 1> to_array(const std::array<double, 3>& values);
+inline Result<double, 2> to_array(const std::array<double, 9>& covariance) {
+  return owned(std::vector(covariance.begin(), covariance.end()), {3, 3});
+}
+inline Result<double, 1> to_array(const std::array<double, 3>& values) {
+  return owned(std::vector(values.begin(), values.end()));
+}
+
+// Properties by the member that holds their values.
+
+/// The member as an array of its own.
+template <typename Class, typename Value>
+auto array_of(Value Class::*member) {
+  return [member](const Class& self) { return to_array(self.*member); };
+}
+/// [n], a view of the member.
+template <typename Class, typename Value>
+auto view_of(std::vector<Value> Class::*member) {
+  return [member](nb::handle_t<Class> self) {
+    const std::vector<Value>& values = nb::cast<const Class&>(self).*member;
+    return view<Value, 1>(values.data(), {values.size()}, self);
+  };
+}
 
 }  // namespace palpate::python

@@ -21,7 +21,6 @@
 #include "recognition/recordings.hpp"
 #include "recognition/resolve.hpp"
 #include "request.hpp"
-#include "session.hpp"
 
 namespace palpate::python {
 
@@ -29,55 +28,44 @@ using namespace nb::literals;
 
 namespace {
 
-using Sentences = std::vector<std::string>;
-
 nb::bytes bytes_of(const std::string& text) { return nb::bytes(text.data(), text.size()); }
 std::string text_in(const nb::bytes& bytes) { return {bytes.c_str(), bytes.size()}; }
 
-struct Settled {
-  BatchTask task;
-  Sentences sentences;  ///< what is worth a warning
-};
+using Entries = std::vector<std::tuple<nb::bytes, std::size_t>>;
 
-Settled settle(const std::vector<std::string>& inputs, const Request& given, const Device& device,
-               std::size_t threads, Call& call) {
-  refuse_budget(given);
-  require_selection(given);
-  const Request request = complete(given);
-  Settled settled{{.program = PALPATE_VERSION,
-                   .chunk_unknowns = 1,  // chunks are of recordings, whoever makes them
-                   .request = given},
-                  {}};
-  for (BatchInput& input : list_inputs(inputs)) {
-    settled.task.inputs.push_back({std::move(input), {}, {}});
-  }
-  stamp_inputs(settled.task);
-  survey(settled.task, request, threads, call.progress());
-  settled.task.inferred = infer(settled.task.inputs, request);
-  hash_files(settled.task, request);
-  const RecognitionTask recognition =
-      resolve_batch(settled.task, request, [&device]() -> const Device& { return device; });
-  std::ranges::transform(recognition.remarks, std::back_inserter(settled.sentences), in_keywords);
-  return settled;
-}
-
-nb::tuple settle_python(const std::vector<std::string>& inputs, const nb::list& maps,
-                        Request request, const std::shared_ptr<Session>& session, int threads) {
+std::tuple<nb::bytes, Entries, Sentences> settle(const std::vector<std::string>& inputs,
+                                                 nb::handle maps, PythonRequest request,
+                                                 const std::shared_ptr<Session>& session,
+                                                 std::size_t threads) {
   if (inputs.empty()) {
     throw Error(Fault::input, "paths: none; give recordings, a folder of them or a manifest");
   }
   add_maps(maps, request);
-  const Settled settled = run([=](Call& call) {
+  auto [task, sentences] = run([=](Call& call) {
     auto lock = session->lock(call);
-    return settle(inputs, request, lock.device(), static_cast<std::size_t>(threads), call);
+    refuse_budget(request);
+    require_selection(request);
+    const Request completed = complete(request);
+    BatchTask settled{.program = PALPATE_VERSION,
+                      .chunk_unknowns = 1,  // chunks are of recordings, whoever makes them
+                      .request = request};
+    for (BatchInput& input : list_inputs(inputs)) {
+      settled.inputs.push_back({std::move(input), {}, {}});
+    }
+    stamp_inputs(settled);
+    survey(settled, completed, threads, call.progress());
+    settled.inferred = infer(settled.inputs, completed);
+    hash_files(settled, completed);
+    const RecognitionTask recognition =
+        resolve_batch(settled, completed, [&]() -> const Device& { return lock.device(); });
+    return std::pair(std::move(settled), in_python(recognition.remarks));
   });
-  nb::list entries;
-  for (const BatchEntry& entry : settled.task.inputs) {
-    entries.append(nb::make_tuple(bytes_of(entry_text(entry)), settled.task.unknowns_of(entry)));
+  Entries entries;
+  for (const BatchEntry& entry : task.inputs) {
+    entries.emplace_back(bytes_of(entry_text(entry)), task.unknowns_of(entry));
   }
-  BatchTask head = settled.task;
-  head.inputs.clear();
-  return nb::make_tuple(bytes_of(head_text(head)), entries, settled.sentences);
+  task.inputs.clear();
+  return {bytes_of(head_text(task)), std::move(entries), std::move(sentences)};
 }
 
 /// A settled batch on a device, ready to recognise any of its recordings.
@@ -85,11 +73,11 @@ struct OpenBatch {
   BatchTask task;
   Request request;  ///< completed
   RecognitionTask recognition;
-  std::shared_ptr<const Call*> current;  ///< the call at work, which sets it, for bounds' search
   Recogniser recogniser;
 };
 
-OpenBatch open_batch(const std::string& head, Device& device, std::size_t threads) {
+OpenBatch open_batch(const std::string& head, const Session& session, Device& device,
+                     std::size_t threads) {
   BatchTask task = head_from(head);
   Request request = complete(task.request);
   BatchTask own = task;
@@ -100,18 +88,13 @@ OpenBatch open_batch(const std::string& head, Device& device, std::size_t thread
                 fmt::format("{}; give all workers the same palpate, maps, scene and sensor model",
                             difference));
   }
-  const auto current = std::make_shared<const Call*>(nullptr);
   RecognitionTask recognition = resolve_batch(
       task, request, [&device]() -> const Device& { return device; },
-      [current] {
-        if (*current != nullptr) {
-          (*current)->check();
-        }
-      });
+      // The open batch keeps the session.
+      [&session] { session.check(); });
   take_threads(recognition, threads);
   Recogniser recogniser = open_batch_filter(&device, recognition);
-  return {std::move(task), std::move(request), std::move(recognition), current,
-          std::move(recogniser)};
+  return {std::move(task), std::move(request), std::move(recognition), std::move(recogniser)};
 }
 
 struct Line {
@@ -127,7 +110,6 @@ struct Chunk {
 
 Chunk recognise_entries(OpenBatch& batch, const std::vector<std::string>& entries,
                         const Call& call) {
-  *batch.current = &call;
   Chunk chunk;
   RecordingReader reader;
   for (const std::string& entry : entries) {
@@ -150,50 +132,46 @@ Chunk recognise_entries(OpenBatch& batch, const std::vector<std::string>& entrie
   return chunk;
 }
 
-nb::tuple recognise_python(const Owned<OpenBatch>& batch, const nb::list& entries) {
+using Lines = std::vector<std::tuple<nb::bytes, nb::bytes, double>>;
+
+std::tuple<Lines, std::string> recognise_python(const Owned<OpenBatch>& batch,
+                                                const std::vector<nb::bytes>& entries) {
   std::vector<std::string> texts;
-  for (const nb::handle entry : entries) {
-    texts.push_back(text_in(value_of<nb::bytes>(entry, "entries: give bytes of settle_batch()")));
-  }
+  std::ranges::transform(entries, std::back_inserter(texts), text_in);
   const Chunk chunk = batch.use([texts = std::move(texts)](OpenBatch& open, Call& call) {
     return recognise_entries(open, texts, call);
   });
-  nb::list lines;
+  Lines lines;
   for (const Line& line : chunk.lines) {
-    lines.append(nb::make_tuple(bytes_of(line.text),
-                                bytes_of(line.python_text == line.text ? "" : line.python_text),
-                                line.seconds));
+    lines.emplace_back(bytes_of(line.text),
+                       bytes_of(line.python_text == line.text ? "" : line.python_text),
+                       line.seconds);
   }
-  return nb::make_tuple(lines, in_keywords(chunk.unresolved));
+  return {std::move(lines), in_keywords(chunk.unresolved)};
 }
 
 }  // namespace
 
 void bind_batch(nb::module_& module) {
-  module.def("settle_batch", &settle_python, "paths"_a, "maps"_a, "request"_a, "device"_a,
-             "threads"_a,
-             nb::sig("def settle_batch(paths: collections.abc.Sequence[str], maps: list[str], "
-                     "request: Request, device: Device, threads: int) -> tuple[bytes, "
-                     "list[tuple[bytes, int]], list[str]]"),
+  module.def("settle_batch", &settle, "paths"_a, "maps"_a, "request"_a, "device"_a, "threads"_a,
              "What follows from all recordings together, as `palpate batch` settles it: the head\n"
              "of the task, an entry for each recording with the number of its unknowns, and what\n"
              "is worth a warning.");
   module.def(
-      "device_of", [](const Request& request) { return complete(request).device; }, "request"_a,
-      "The device that the request or its scene names, or \"\".");
+      "device_of", [](const PythonRequest& request) { return complete(request).device; },
+      "request"_a, "The device that the request or its scene names, or \"\".");
   nb::class_<Owned<OpenBatch>>(module, "OpenBatch",
                                "A settled batch on a device, ready to recognise any of its "
                                "recordings. One thread at\na time recognises.")
       .def_static(
           "open",
-          [](const nb::bytes& head, const std::shared_ptr<Session>& session, int threads) {
+          [](const nb::bytes& head, const std::shared_ptr<Session>& session, std::size_t threads) {
             return make_owned<OpenBatch>(
-                {}, session, [head = text_in(head), threads](Device& device) {
-                  return open_batch(head, device, static_cast<std::size_t>(threads));
+                session, [head = text_in(head), &on = *session, threads](Device& device) {
+                  return open_batch(head, on, device, threads);
                 });
           },
           "head"_a, "device"_a, "threads"_a,
-          nb::sig("def open(head: bytes, device: Device, threads: int) -> OpenBatch"),
           "Raises Error where palpate, a map, the scene or the sensor model is not as it was when\n"
           "the batch was settled.")
       .def_prop_ro(
@@ -228,8 +206,6 @@ void bind_batch(nb::module_& module) {
           "Memory held: the device's, or the host's where bounds recognise.")
       .def(
           "recognize", &recognise_python, "entries"_a,
-          nb::sig("def recognize(self, entries: list[bytes]) -> tuple[list[tuple[bytes, bytes, "
-                  "float]], str]"),
           "The record of each unknown as a line of JSON, as `palpate batch` writes it; again,\n"
           "with options in the words of Python, or b\"\" where that is the same; and its seconds.\n"
           "Then what is worth a warning, or \"\". A recording that cannot be recognised has a\n"

@@ -14,117 +14,51 @@ using namespace nb::literals;
 
 namespace {
 
-/// A belief whose searches ask the call that works on it whether to go on. One at a time does: the
-/// session sees to it.
-class Bounded : public Named<BoundedPosterior> {
- public:
-  using Working = std::shared_ptr<const Call*>;
-
-  Bounded(Named<BoundedPosterior> belief, Working working)
-      : Named<BoundedPosterior>(std::move(belief)), working_(std::move(working)) {}
-
-  template <typename F>
-  auto use(std::vector<nb::object> kept, const Progress& progress, F work) const {
-    return Named<BoundedPosterior>::use(
-        std::move(kept), progress,
-        [working = working_, work = std::move(work)](BoundedPosterior& belief, Call& call) {
-          *working = &call;
-          const std::unique_ptr<const Call*, void (*)(const Call**)> end(
-              working.get(), [](const Call** of) { *of = nullptr; });
-          return work(belief, call);
-        });
-  }
-  template <typename F>
-  auto use(F work) const {
-    return use({}, Progress(), std::move(work));
-  }
-
- private:
-  Working working_;
-};
-
-Bounded make_bounded(const std::shared_ptr<Session>& session, nb::handle maps,
-                     BoundedOptions options) {
-  std::vector<Hypothesis> hypotheses = hypotheses_of(maps);
-  std::vector<std::string> labels = labels_of(hypotheses);
-  const auto working = std::make_shared<const Call*>(nullptr);
-  options.cancel_point = [working] {
-    if (*working != nullptr) {
-      (*working)->check();
-    }
-  };
-  return {{make_owned<BoundedPosterior>(
-               {}, session,
-               [hypotheses = std::move(hypotheses), options](Device& /*device*/) {
-                 return BoundedPosterior(hypotheses, options);
-               }),
-           std::move(labels)},
-          working};
-}
-
-void update_bounded(const Bounded& self, const TouchesLike& touches, const Progress& progress) {
-  TouchViews views = views_of(touches);
-  self.use(std::move(views.kept), progress,
-           [all = std::move(views.touches)](BoundedPosterior& belief, Call& call) {
-             belief.update(all, call.progress());
-           });
-}
+using Bounded = Named<BoundedPosterior>;
 
 }  // namespace
 
 void bind_bounded_posterior(nb::module_& module) {
   nb::class_<Bounded>(
       module, "BoundedPosterior",
-      "The belief of PoseHistogram over the same bins, of which it evaluates only those that "
-      "matter,\n"
-      "and proves how little the others can. Memory follows the maps, not the bins.")
+      "The belief of PoseHistogram over the same bins, of which it evaluates only those that\n"
+      "matter, and proves how little the others can. Memory follows the maps, not the bins.")
       .def(
           "__init__",
           [](Bounded* self, const std::shared_ptr<Session>& device, const MapsLike& maps,
              const PoseLattice& lattice, const ContactModel& contact, double tolerance,
              std::optional<double> budget_s, std::optional<double> evidence_nats,
              std::optional<double> none_weight, int threads) {
-            new (self) Bounded(make_bounded(device, maps,
-                                            {.lattice = lattice,
-                                             .contact = contact,
-                                             .tolerance = tolerance,
-                                             .budget_s = budget_s,
-                                             .evidence_nats = evidence_nats,
-                                             .none_weight = none_weight,
-                                             .threads = threads}));
+            const BoundedOptions options{.lattice = lattice,
+                                         .contact = contact,
+                                         .tolerance = tolerance,
+                                         .budget_s = budget_s,
+                                         .evidence_nats = evidence_nats,
+                                         .none_weight = none_weight,
+                                         .threads = threads,
+                                         // The belief keeps the session.
+                                         .cancel_point = [on = device.get()] { on->check(); }};
+            new (self) Bounded(make_filter<BoundedPosterior>(device, maps, options));
           },
           "device"_a, "maps"_a, "lattice"_a = PoseLattice{}, nb::kw_only(),
           "contact"_a = ContactModel{}, "tolerance"_a = BoundedOptions{}.tolerance,
           "budget_s"_a = nb::none(), "evidence_nats"_a = nb::none(), "none_weight"_a = nb::none(),
           "threads"_a = 0,
-          "tolerance: largest total variation distance from the posterior over all bins; "
-          "budget_s:\n"
-          "seconds after which estimate() reports what it has proven by then; evidence_nats: "
-          "bounds\n"
-          "every map's log evidence, too; threads: 0 for as many as the machine has cores.\n\n"
+          "tolerance: largest total variation distance from the posterior over all bins;\n"
+          "budget_s: seconds after which estimate() reports what it has proven by then;\n"
+          "evidence_nats: bounds every map's log evidence, too; threads: 0 for as many as the\n"
+          "machine has cores.\n\n"
           "Raises Error as PoseHistogram does.")
       .def(
-          "update", &update_bounded, "touches"_a, "progress"_a = nb::none(),
+          "update", &update<BoundedPosterior>, "touches"_a, "progress"_a = nb::none(),
           "Multiplies the belief by the likelihood of these touches (Eq. 7, 13); takes in none of\n"
           "them after Ctrl-C or where progress(fraction) raises. Raises Error on a touch that is\n"
           "not sound.")
-      .def(
-          "estimate",
-          [](const Bounded& self) {
-            return self.use([](BoundedPosterior& belief, Call&) { return belief.estimate(); });
-          },
-          "Identity with its bounds, mode and certificate. Searches once after each update(). "
-          "After\n"
-          "Ctrl-C the belief is as it was, and the next call searches anew.")
-      .def(
-          "refine",
-          [](const Bounded& self, const std::optional<Mode>& mode) {
-            return self.use([mode](BoundedPosterior& belief, Call&) {
-              return belief.refine(mode ? *mode : belief.estimate().mode);
-            });
-          },
-          "mode"_a = nb::none(),
-          "The refined pose near a mode, and its covariance; see PoseHistogram.refine().")
+      .def("estimate", on_device<Bounded>(&BoundedPosterior::estimate),
+           "Identity with its bounds, mode and certificate. Searches once after each update().\n"
+           "After Ctrl-C the belief is as it was, and the next call searches anew.")
+      .def("refine", &refine<BoundedPosterior>, "mode"_a = nb::none(),
+           "The refined pose near a mode, and its covariance; see PoseHistogram.refine().")
       .def(
           "marginals",
           [](const Bounded& self, int object, const std::optional<PoseLattice>& grid) {
@@ -144,41 +78,16 @@ void bind_bounded_posterior(nb::module_& module) {
           },
           "object"_a, "T_object_robot"_a,
           "Log-likelihood of any pose [3] of an object in nats, in float64.")
-      .def(
-          "entropy",
-          [](const Bounded& self) {
-            return self.use([](BoundedPosterior& belief, Call&) { return belief.entropy(); });
-          },
-          "Entropy of the belief over objects and evaluated bins, in nats.")
-      .def(
-          "sample",
-          [](const Bounded& self, std::size_t count, std::uint64_t seed) {
-            return self.use([count, seed](BoundedPosterior& belief, Call&) {
-              return belief.sample(count, seed);
-            });
-          },
-          "count"_a, "seed"_a = 0, "Draws objects and poses from the belief.")
-      .def(
-          "reset",
-          [](const Bounded& self) {
-            self.use([](BoundedPosterior& belief, Call&) { belief.reset(); });
-          },
-          "Returns to the uniform belief, for the next unknown.")
-      .def_prop_ro(
-          "lattice",
-          [](const Bounded& self) {
-            return self.use([](BoundedPosterior& belief, Call&) { return belief.lattice(); });
-          },
-          "The bins.")
-      .def_prop_ro(
-          "host_bytes",
-          [](const Bounded& self) {
-            return self.use([](BoundedPosterior& belief, Call&) { return belief.host_bytes(); });
-          },
-          "Memory held.")
-      .def("__repr__", [](const Bounded& self) {
-        return fmt::format("BoundedPosterior({})", text_of(self.labels, self.session()));
-      });
+      .def("entropy", on_device<Bounded>(&BoundedPosterior::entropy),
+           "Entropy of the belief over objects and evaluated bins, in nats.")
+      .def("sample", on_device<Bounded>(&BoundedPosterior::sample), "count"_a, "seed"_a = 0,
+           "Draws objects and poses from the belief.")
+      .def("reset", on_device<Bounded>(&BoundedPosterior::reset),
+           "Returns to the uniform belief, for the next unknown.")
+      .def_prop_ro("lattice", on_device<Bounded>(&BoundedPosterior::lattice), "The bins.")
+      .def_prop_ro("host_bytes", on_device<Bounded>(&BoundedPosterior::host_bytes), "Memory held.")
+      .def("__repr__",
+           [](const Bounded& self) { return fmt::format("BoundedPosterior({})", self.name); });
 }
 
 }  // namespace palpate::python

@@ -1,23 +1,19 @@
 #include <array>
 #include <string>
 #include <tuple>
-#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
 #include <nanobind/stl/optional.h>
-#include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
 #include "arrays.hpp"
 #include "bindings.hpp"
-#include "given_recordings.hpp"
 #include "learning/calibration_task.hpp"
 #include "palpate/files.hpp"
-#include "recognition/map_files.hpp"
 #include "recognition/recordings.hpp"
-#include "session.hpp"
+#include "request.hpp"
 
 namespace palpate::python {
 
@@ -25,24 +21,19 @@ using namespace nb::literals;
 
 namespace {
 
-std::vector<NamedMap> named_maps(const Request& request) {
+std::vector<NamedMap> named_maps(Request request) {
+  if (request.given_maps.empty()) {
+    read_maps(request);
+  }
   std::vector<NamedMap> maps;
   for (const GivenMap& given : request.given_maps) {
     maps.push_back({given.name, given.hypothesis.map});
   }
-  if (request.given_maps.empty()) {
-    for (const std::string& argument : request.maps) {
-      for (const std::filesystem::path& file : map_files(argument)) {
-        maps.push_back({file.string(), read_map(file)});
-      }
-    }
-  }
   return maps;
 }
 
-SensorCalibration calibrate(const GivenRecordings& given, const Request& request,
-                            CalibrationRequest wanted, const std::shared_ptr<Session>& session,
-                            Call& call) {
+SensorCalibration calibrate(const GivenRecordings& given, const PythonRequest& request,
+                            CalibrationRequest wanted, Call& call) {
   constexpr double calibrating = 0.5;  // of the time, where touches' poses are fitted
   const std::vector<Recording> recordings = given.read();
   std::vector<std::array<std::size_t, 2>> touches;
@@ -50,6 +41,8 @@ SensorCalibration calibrate(const GivenRecordings& given, const Request& request
     const auto [begin, end] = selected_touches(recording, request.frames);
     touches.push_back({begin, end});
   }
+  wanted.gives_bins =
+      request.bins || request.x_mm || request.y_mm || request.theta_deg || request.pivot_mm;
   if (!infers_region(request)) {
     wanted.bins = {given_lattice(request), has_auto_pivot(request)};
   }
@@ -59,22 +52,12 @@ SensorCalibration calibrate(const GivenRecordings& given, const Request& request
   SensorCalibration calibration = calibrate_sensor(
       task.presses, task.maps, task.options, [&](double fraction) { report(share * fraction); });
   if (task.known_poses()) {
-    const auto used = session_on(session, request.device);
+    const auto used = session_on(request.session, request.device);
     auto lock = used->lock(call);
     add_touch_sd(lock.device(), task, calibration,
                  [&](double fraction) { report(share + (1.0 - share) * fraction); });
   }
   return calibration;
-}
-
-SensorCalibration calibrate_python(const nb::list& recordings, const nb::list& maps,
-                                   Request request, const CalibrationRequest& wanted,
-                                   const std::shared_ptr<Session>& session,
-                                   const Progress& progress) {
-  const GivenRecordings given = given_recordings(recordings);
-  add_maps(maps, request);
-  return run({}, progress,
-             [=](Call& call) { return calibrate(given, request, wanted, session, call); });
 }
 
 std::string layer_word(MapLayer layer) {
@@ -106,8 +89,7 @@ void bind_learned_sensor(nb::module_& module) {
       .def_prop_ro(
           "level_edges",
           [](const LearnedSensor& self) {
-            const std::vector<double>& edges = self.table->level_edges;
-            return owned(std::vector<double>(edges), {edges.size()});
+            return owned(std::vector<double>(self.table->level_edges));
           },
           "[levels - 2] ascending pressures that part In Contact into levels.")
       .def_prop_ro(
@@ -186,16 +168,17 @@ void bind_calibration(nb::module_& module) {
       .def_rw("ratio", &CalibrationRequest::ratio)
       .def_rw("layer", &CalibrationRequest::layer)
       .def_rw("levels", &CalibrationRequest::levels)
-      .def_rw("max_maps", &CalibrationRequest::max_maps)
-      .def_rw("gives_bins", &CalibrationRequest::gives_bins);
-  module.def("calibrate", &calibrate_python, "recordings"_a, "maps"_a, "request"_a, "calibration"_a,
-             "device"_a = nb::none(), "progress"_a = nb::none(),
-             nb::sig("def calibrate(recordings: list[Recording | str], maps: "
-                     "list[OccupancyGrid | Hypothesis | str], request: Request, "
-                     "calibration: CalibrationRequest, device: Device | None = None, progress: "
-                     "collections.abc.Callable[[float], object] | None = None) -> "
-                     "SensorCalibration"),
-             "The calibration; of the request count the maps, bins, frames and device.");
+      .def_rw("max_maps", &CalibrationRequest::max_maps);
+  module.def(
+      "calibrate",
+      [](nb::handle recordings, const PythonRequest& request, const CalibrationRequest& wanted,
+         const Progress& progress) {
+        return run({}, progress, [=, given = given_recordings(recordings)](Call& call) {
+          return calibrate(given, request, wanted, call);
+        });
+      },
+      "recordings"_a, "request"_a, "calibration"_a, "progress"_a = nb::none(),
+      "The calibration; of the request count the maps, bins, frames and device.");
 }
 
 }  // namespace palpate::python

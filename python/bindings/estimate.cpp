@@ -17,17 +17,22 @@ using namespace nb::literals;
 
 namespace {
 
-Result<const double, 1> values_view(const std::vector<double>& values, nb::handle owner) {
-  return view<double, 1>(values.data(), {values.size()}, owner);
+/// (low, high) of each.
+template <typename Interval>
+std::vector<std::tuple<double, double>> pairs_of(const std::vector<Interval>& intervals) {
+  std::vector<std::tuple<double, double>> pairs;
+  for (const Interval& interval : intervals) {
+    pairs.emplace_back(interval.low, interval.high);
+  }
+  return pairs;
 }
 
 void bind_mode(nb::module_& module) {
   nb::class_<Mode>(module, "Mode", "The pose of the largest posterior probability (Eq. 15-16).")
       .def_ro("object", &Mode::object, "Index into the maps.")
       .def_ro("bin", &Mode::bin, "Index into the lattice, where the filter has bins.")
-      .def_prop_ro(
-          "T_object_robot", [](const Mode& self) { return to_array(self.T_object_robot); },
-          "[3] (x_mm, y_mm, theta_rad); the bin's centre, where there is a bin.")
+      .def_prop_ro("T_object_robot", array_of(&Mode::T_object_robot),
+                   "[3] (x_mm, y_mm, theta_rad); the bin's centre, where there is a bin.")
       .def_ro("log_likelihood", &Mode::log_likelihood,
               "Of all touches, without prior weights, in nats.")
       .def("__repr__", [](const Mode& self) {
@@ -37,14 +42,11 @@ void bind_mode(nb::module_& module) {
 
   nb::class_<RefinedPose>(
       module, "RefinedPose",
-      "Where the posterior peaks near a mode, to a fraction of a bin, with its\n"
-      "uncertainty.")
-      .def_prop_ro(
-          "T_object_robot", [](const RefinedPose& self) { return to_array(self.T_object_robot); },
-          "[3] (x_mm, y_mm, theta_rad).")
-      .def_prop_ro(
-          "covariance", [](const RefinedPose& self) { return to_array(self.covariance); },
-          "[3, 3] of (x_mm, y_mm, theta_rad) of T_object_robot.")
+      "Where the posterior peaks near a mode, to a fraction of a bin, with its uncertainty.")
+      .def_prop_ro("T_object_robot", array_of(&RefinedPose::T_object_robot),
+                   "[3] (x_mm, y_mm, theta_rad).")
+      .def_prop_ro("covariance", array_of(&RefinedPose::covariance),
+                   "[3, 3] of (x_mm, y_mm, theta_rad) of T_object_robot.")
       .def_prop_ro(
           "T_robot_object",
           [](const RefinedPose& self) { return to_array(inverse(self).T_robot_object); },
@@ -77,14 +79,7 @@ void bind_certificate(nb::module_& module) {
               "Blocks of bins whose bound was computed.")
       .def_ro("bins_evaluated", &Certificate::bins_evaluated, "Bins whose likelihood was computed.")
       .def_prop_ro(
-          "log_evidence",
-          [](const Certificate& self) {
-            std::vector<std::tuple<double, double>> bounds;
-            for (const LogInterval& interval : self.log_evidence) {
-              bounds.emplace_back(interval.low, interval.high);
-            }
-            return bounds;
-          },
+          "log_evidence", [](const Certificate& self) { return pairs_of(self.log_evidence); },
           "(low, high) of every map's log evidence, in nats.")
       .def("__repr__", [](const Certificate& self) {
         return fmt::format("Certificate(dropped_mass={:.1e}, bins_evaluated={})", self.dropped_mass,
@@ -94,29 +89,13 @@ void bind_certificate(nb::module_& module) {
 
 void bind_estimate_class(nb::module_& module) {
   nb::class_<Estimate>(module, "Estimate", "What the belief says about the unknown object.")
+      .def_prop_ro("identity", view_of(&Estimate::identity),
+                   "Probability of every map (Eq. 14), [maps]; with `none` sums to 1.")
+      .def_prop_ro("log_evidence", view_of(&Estimate::log_evidence),
+                   "Log of every map's prior weight times its summed likelihood, in nats but for\n"
+                   "a constant, [maps].")
       .def_prop_ro(
-          "identity",
-          [](nb::handle_t<Estimate> self) {
-            return values_view(nb::cast<const Estimate&>(self).identity, self);
-          },
-          "Probability of every map (Eq. 14), [maps]; with `none` sums to 1.")
-      .def_prop_ro(
-          "log_evidence",
-          [](nb::handle_t<Estimate> self) {
-            return values_view(nb::cast<const Estimate&>(self).log_evidence, self);
-          },
-          "Log of every map's prior weight times its summed likelihood, in nats but for a "
-          "constant,\n"
-          "[maps].")
-      .def_prop_ro(
-          "identity_bounds",
-          [](const Estimate& self) {
-            std::vector<std::tuple<double, double>> bounds;
-            for (const ProbabilityInterval& interval : self.identity_bounds) {
-              bounds.emplace_back(interval.low, interval.high);
-            }
-            return bounds;
-          },
+          "identity_bounds", [](const Estimate& self) { return pairs_of(self.identity_bounds); },
           "(low, high) of every probability, by bounds; empty where `identity` is exact.")
       .def_ro("certificate", &Estimate::certificate,
               "Of a search by bounds; None of other filters.")
@@ -145,12 +124,8 @@ void bind_marginals(nb::module_& module) {
                                    self);
           },
           "Of every (x, y), summed over theta, [ny, nx].")
-      .def_prop_ro(
-          "theta",
-          [](nb::handle_t<Marginals> self) {
-            return values_view(nb::cast<const Marginals&>(self).theta, self);
-          },
-          "Of every theta, summed over (x, y), [ntheta].")
+      .def_prop_ro("theta", view_of(&Marginals::theta),
+                   "Of every theta, summed over (x, y), [ntheta].")
       .def("plot", plot_method, "ax"_a = nb::none(), plot_signature,
            "Draws the belief over x and y, in mm, with Matplotlib. Returns the axes.")
       .def("_repr_png_", png_method, png_signature)
@@ -160,9 +135,8 @@ void bind_marginals(nb::module_& module) {
 
   nb::class_<PoseSample>(module, "PoseSample", "An object and its pose, drawn from a belief.")
       .def_ro("object", &PoseSample::object, "Index into the maps.")
-      .def_prop_ro(
-          "T_object_robot", [](const PoseSample& self) { return to_array(self.T_object_robot); },
-          "[3] (x_mm, y_mm, theta_rad).")
+      .def_prop_ro("T_object_robot", array_of(&PoseSample::T_object_robot),
+                   "[3] (x_mm, y_mm, theta_rad).")
       .def("__repr__", [](const PoseSample& self) {
         return fmt::format("PoseSample(object {}, {})", self.object, text_of(self.T_object_robot));
       });
@@ -170,34 +144,36 @@ void bind_marginals(nb::module_& module) {
 
 }  // namespace
 
+std::optional<Hypothesis> hypothesis_in(nb::handle item) {
+  const OccupancyGrid* map = nullptr;
+  const Hypothesis* hypothesis = nullptr;
+  if (nb::try_cast(item, map) && map != nullptr) {
+    return Hypothesis{.map = *map};
+  }
+  return nb::try_cast(item, hypothesis) && hypothesis != nullptr ? std::optional(*hypothesis)
+                                                                 : std::nullopt;
+}
+
 std::vector<Hypothesis> hypotheses_of(nb::handle maps) {
   std::vector<Hypothesis> hypotheses;
   const nb::object all = call("builtins", "list", maps);
   for (const nb::handle item : all) {
-    const OccupancyGrid* map = nullptr;
-    const Hypothesis* hypothesis = nullptr;
-    if (nb::try_cast(item, map) && map != nullptr) {
-      hypotheses.push_back({.map = *map});
-    } else if (nb::try_cast(item, hypothesis) && hypothesis != nullptr) {
-      hypotheses.push_back(*hypothesis);
-    } else {
+    const auto hypothesis = hypothesis_in(item);
+    if (!hypothesis) {
       throw Error(Fault::input, fmt::format("maps: item {} is a {}; give OccupancyGrid or "
                                             "Hypothesis, such as of read_map()",
                                             hypotheses.size(), nb::inst_name(item).c_str()));
     }
+    hypotheses.push_back(*hypothesis);
   }
   return hypotheses;
 }
 
-std::vector<std::string> labels_of(const std::vector<Hypothesis>& hypotheses) {
+std::string name_of(const std::vector<Hypothesis>& hypotheses, const Session& session) {
   std::vector<std::string> labels;
   for (const Hypothesis& hypothesis : hypotheses) {
     labels.push_back(hypothesis.map.label);
   }
-  return labels;
-}
-
-std::string text_of(const std::vector<std::string>& labels, const Session& session) {
   return fmt::format("{} on '{}'", fmt::join(labels, ", "), session.name());
 }
 

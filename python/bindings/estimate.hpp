@@ -1,6 +1,10 @@
 #pragma once
 
 #include <memory>
+#include <optional>
+#include <string>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include <nanobind/nanobind.h>
@@ -9,6 +13,7 @@
 #include "palpate/estimate.hpp"
 #include "palpate/plan.hpp"
 #include "session.hpp"
+#include "touches.hpp"
 
 namespace palpate::python {
 
@@ -23,17 +28,46 @@ struct MapsLike : nb::object {
                     any_object)
 };
 std::vector<Hypothesis> hypotheses_of(nb::handle maps);
+/// Of an OccupancyGrid or a Hypothesis; none of anything else.
+std::optional<Hypothesis> hypothesis_in(nb::handle item);
 
-/// A filter, and the labels of its hypotheses, for the text of it.
+/// A filter over object and pose.
 template <typename Filter>
 struct Named : Owned<Filter> {
-  Named(Owned<Filter> filter, std::vector<std::string> names)
-      : Owned<Filter>(std::move(filter)), labels(std::move(names)) {}
-  std::vector<std::string> labels;
+  std::string name;  ///< "A, E, I on 'llvmpipe'"
 };
 
-std::vector<std::string> labels_of(const std::vector<Hypothesis>& hypotheses);
-/// "A, E, I on 'llvmpipe'"
-std::string text_of(const std::vector<std::string>& labels, const Session& session);
+std::string name_of(const std::vector<Hypothesis>& hypotheses, const Session& session);
+
+template <typename Filter, typename Options>
+Named<Filter> make_filter(const std::shared_ptr<Session>& session, nb::handle maps,
+                          const Options& options) {
+  const std::vector<Hypothesis> hypotheses = hypotheses_of(maps);
+  auto filter = make_owned<Filter>(session, [hypotheses, options](Device& device) {
+    if constexpr (std::is_constructible_v<Filter, Device&, decltype(hypotheses), Options>) {
+      return Filter(device, hypotheses, options);
+    } else {
+      return Filter(hypotheses, options);
+    }
+  });
+  return {std::move(filter), name_of(hypotheses, *session)};
+}
+
+template <typename Filter>
+void update(const Named<Filter>& self, const TouchesLike& touches, const Progress& progress) {
+  TouchViews views = views_of(touches);
+  self.use(std::move(views.kept), progress,
+           [all = std::move(views.touches)](Filter& filter, Call& call) {
+             filter.update(all, call.progress());
+           });
+}
+
+/// The refined pose near a mode, by default that of estimate().
+template <typename Filter>
+RefinedPose refine(const Named<Filter>& self, const std::optional<Mode>& mode) {
+  return self.use([mode](Filter& belief, Call&) {
+    return belief.refine(mode ? *mode : belief.estimate().mode);
+  });
+}
 
 }  // namespace palpate::python

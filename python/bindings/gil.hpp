@@ -1,7 +1,9 @@
 #pragma once
 
-#include <cxxabi.h>
+#include <atomic>
+#include <thread>
 
+#include <cxxabi.h>
 #include <nanobind/nanobind.h>
 #include <unistd.h>
 
@@ -33,16 +35,27 @@ auto with_python(F call) {
 class WithoutGil {
  public:
   WithoutGil() : state_(PyEval_SaveThread()) {}
-  ~WithoutGil();
+  ~WithoutGil() {
+    if (is_kept()) {
+      stay();
+    }
+    with_python([this] { PyEval_RestoreThread(state_); });
+  }
   WithoutGil(const WithoutGil&) = delete;
   WithoutGil& operator=(const WithoutGil&) = delete;
 
   /// From now on, threads other than this one do not come back; for the end of the interpreter.
-  static void keep_others();
+  static void keep_others() { ending_ = std::this_thread::get_id(); }
   /// Whether this thread would not come back.
-  static bool is_kept();
+  static bool is_kept() {
+    const std::thread::id by = ending_;
+    return by != std::thread::id() && by != std::this_thread::get_id();
+  }
 
  private:
+  /// The thread that ends the interpreter; none while it runs.
+  inline static std::atomic<std::thread::id> ending_;
+
   PyThreadState* state_;
 };
 

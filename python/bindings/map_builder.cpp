@@ -31,22 +31,6 @@ void add_touches(const Builder& builder, const TouchesLike& touches, const Progr
               });
 }
 
-double estimated_prior(const std::shared_ptr<Session>& session,
-                       const std::map<std::string, TouchesLike>& objects,
-                       const MapOptions& options) {
-  std::vector<nb::object> kept;
-  std::vector<ObjectTouches> all;
-  for (const auto& [label, touches] : objects) {
-    TouchViews views = views_of(touches);
-    all.push_back({label, std::move(views.touches)});
-    kept.insert(kept.end(), views.kept.begin(), views.kept.end());
-  }
-  return run(std::move(kept), Progress(), [session, all = std::move(all), options](Call& call) {
-    auto lock = session->lock(call);
-    return estimate_prior(lock.device(), all, options);
-  });
-}
-
 MapOptions options_of(double cell_mm, const InverseSensorModel& sensor,
                       const ContactClassifier& classifier) {
   return {.cell_mm = cell_mm, .sensor = sensor, .classifier = classifier};
@@ -65,7 +49,7 @@ void bind_map_builder(nb::module_& module) {
              const InverseSensorModel& sensor, const ContactClassifier& classifier) {
             const MapOptions options = options_of(cell_mm, sensor, classifier);
             new (self) Builder(make_owned<MapBuilder>(
-                {}, device, [options](Device& on) { return MapBuilder(on, options); }));
+                device, [options](Device& on) { return MapBuilder(on, options); }));
           },
           "device"_a, nb::kw_only(), "cell_mm"_a = MapOptions{}.cell_mm,
           "sensor"_a = InverseSensorModel{}, "classifier"_a = ContactClassifier{},
@@ -74,29 +58,31 @@ void bind_map_builder(nb::module_& module) {
            "Adds the evidence of these touches.\n\n"
            "progress(fraction) is called up to 50 times a second. Ctrl-C stops the call after a\n"
            "part of the touches. Raises Error on a touch that is not sound.")
-      .def(
-          "build",
-          [](const Builder& self, const std::string& label) {
-            return self.use([label](MapBuilder& builder, Call&) { return builder.build(label); });
-          },
-          "label"_a,
-          "The map of all touches so far. Raises Error if no element of any touch was In Contact "
-          "or\n"
-          "No Contact.")
-      .def(
-          "clear",
-          [](const Builder& self) {
-            self.use([](MapBuilder& builder, Call&) { builder.clear(); });
-          },
-          "Forgets all touches, for the next object.")
+      .def("build", on_device<Builder>(&MapBuilder::build), "label"_a,
+           "The map of all touches so far. Raises Error if no element of any touch was In Contact\n"
+           "or No Contact.")
+      .def("clear", on_device<Builder>(&MapBuilder::clear),
+           "Forgets all touches, for the next object.")
       .def("__repr__", [](const Builder& self) {
         return fmt::format("MapBuilder(on '{}')", self.session().name());
       });
   module.def(
       "estimate_prior",
-      [](const std::shared_ptr<Session>& device, const std::map<std::string, TouchesLike>& objects,
+      [](const std::shared_ptr<Session>& session, const std::map<std::string, TouchesLike>& objects,
          double cell_mm, const InverseSensorModel& sensor, const ContactClassifier& classifier) {
-        return estimated_prior(device, objects, options_of(cell_mm, sensor, classifier));
+        std::vector<nb::object> kept;
+        std::vector<ObjectTouches> all;
+        for (const auto& [label, touches] : objects) {
+          TouchViews views = views_of(touches);
+          all.push_back({label, std::move(views.touches)});
+          kept.insert(kept.end(), views.kept.begin(), views.kept.end());
+        }
+        const MapOptions options = options_of(cell_mm, sensor, classifier);
+        return run(std::move(kept), Progress(),
+                   [session, all = std::move(all), options](Call& call) {
+                     auto lock = session->lock(call);
+                     return estimate_prior(lock.device(), all, options);
+                   });
       },
       "device"_a, "objects"_a, nb::kw_only(), "cell_mm"_a = MapOptions{}.cell_mm,
       "sensor"_a = InverseSensorModel{}, "classifier"_a = ContactClassifier{},

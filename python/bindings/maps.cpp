@@ -22,46 +22,18 @@ using namespace nb::literals;
 namespace {
 
 std::vector<float> cells_of(const ArrayLike& cells, const char* name, ArrayReader& reader) {
-  const Floats array = reader.floats(cells, name, {"ny", "nx"});
-  return {array.data, array.data + array.size()};
+  return reader.floats(cells, name, {"ny", "nx"}).copied<float>();
 }
 
-OccupancyGrid make_map(const std::string& label, const ArrayLike& log_odds, double cell_mm,
-                       const ArrayLike& origin_mm, double prior, int symmetry,
-                       std::optional<double> spread_mm, bool mirror,
-                       const std::optional<ArrayLike>& observations,
-                       const std::optional<ArrayLike>& mean_level) {
-  ArrayReader reader;
-  OccupancyGrid map{.label = label,
-                    .cell_mm = cell_mm,
-                    .origin_mm = point_of(origin_mm, "origin_mm"),
-                    .prior = prior,
-                    .symmetry = symmetry,
-                    .spread_mm = spread_mm,
-                    .mirror = mirror};
-  map.log_odds = cells_of(log_odds, "log_odds", reader);
-  map.ny = static_cast<int>(reader.extent("ny"));
-  map.nx = static_cast<int>(reader.extent("nx"));
-  if (observations) {
-    map.observations = cells_of(*observations, "observations", reader);
-  }
-  if (mean_level) {
-    map.mean_level = cells_of(*mean_level, "mean_level", reader);
-  }
-  if (const auto fault = fault_of(map)) {
-    throw Error(Fault::input, *fault);
-  }
-  return map;
-}
-
-/// A view of cells [ny, nx]; None where there are none.
-nb::object cells_view(const OccupancyGrid& map, const std::vector<float>& cells) {
-  if (cells.empty()) {
-    return nb::none();
-  }
+/// [ny, nx], a view of cells of the map.
+Result<const float, 2> view_cells(const OccupancyGrid& map, const std::vector<float>& cells) {
   return view<float, 2>(cells.data(),
                         {static_cast<std::size_t>(map.ny), static_cast<std::size_t>(map.nx)},
                         nb::find(map));
+}
+
+nb::object cells_or_none(const OccupancyGrid& map, const std::vector<float>& cells) {
+  return cells.empty() ? nb::none() : nb::object(view_cells(map, cells));
 }
 
 void bind_map(nb::module_& module) {
@@ -77,23 +49,40 @@ void bind_map(nb::module_& module) {
              std::optional<double> spread_mm, bool mirror,
              const std::optional<ArrayLike>& observations,
              const std::optional<ArrayLike>& mean_level) {
-            new (self) OccupancyGrid(make_map(label, log_odds, cell_mm, origin_mm, prior, symmetry,
-                                              spread_mm, mirror, observations, mean_level));
+            ArrayReader reader;
+            OccupancyGrid map{.label = label,
+                              .cell_mm = cell_mm,
+                              .origin_mm = point_of(origin_mm, "origin_mm"),
+                              .prior = prior,
+                              .symmetry = symmetry,
+                              .spread_mm = spread_mm,
+                              .mirror = mirror};
+            map.log_odds = cells_of(log_odds, "log_odds", reader);
+            map.ny = static_cast<int>(reader.extent("ny"));
+            map.nx = static_cast<int>(reader.extent("nx"));
+            if (observations) {
+              map.observations = cells_of(*observations, "observations", reader);
+            }
+            if (mean_level) {
+              map.mean_level = cells_of(*mean_level, "mean_level", reader);
+            }
+            if (const auto fault = fault_of(map)) {
+              throw Error(Fault::input, *fault);
+            }
+            new (self) OccupancyGrid(std::move(map));
           },
           "label"_a, "log_odds"_a, nb::kw_only(), "cell_mm"_a, "origin_mm"_a, "prior"_a = 0.2,
           "symmetry"_a = 1, "spread_mm"_a = nb::none(), "mirror"_a = false,
           "observations"_a = nb::none(), "mean_level"_a = nb::none(),
-          "log_odds [ny, nx] in nats, copied; origin_mm [2], the centre of cell (0, 0);\n"
-          "symmetry: n-fold rotational symmetry, 0 = full; spread_mm of the sensor model;\n"
-          "mirror: the object may lie on its other side; observations [ny, nx]: touches that "
-          "sensed\n"
-          "each cell; mean_level [ny, nx]: mean pressure.\n\nRaises Error on a map that is not "
-          "sound.")
+          "log_odds [ny, nx] in nats, copied; origin_mm [2], the centre of cell (0, 0); symmetry:\n"
+          "n-fold rotational symmetry, 0 = full; spread_mm of the sensor model; mirror: the\n"
+          "object may lie on its other side; observations [ny, nx]: touches that sensed each\n"
+          "cell; mean_level [ny, nx]: mean pressure.\n\n"
+          "Raises Error on a map that is not sound.")
       .def_ro("label", &OccupancyGrid::label, "Name of the object.")
       .def_ro("cell_mm", &OccupancyGrid::cell_mm, "Edge of a cell.")
-      .def_prop_ro(
-          "origin_mm", [](const OccupancyGrid& self) { return to_array(self.origin_mm); },
-          "[2], the centre of cell (0, 0) in the object frame.")
+      .def_prop_ro("origin_mm", array_of(&OccupancyGrid::origin_mm),
+                   "[2], the centre of cell (0, 0) in the object frame.")
       .def_ro("prior", &OccupancyGrid::prior, "Probability that an unseen place is occupied.")
       .def_rw("symmetry", &OccupancyGrid::symmetry,
               "n-fold rotational symmetry; 0 = full, that of a disc.")
@@ -105,21 +94,16 @@ void bind_map(nb::module_& module) {
       .def_ro("nx", &OccupancyGrid::nx, "Cells along x.")
       .def_ro("ny", &OccupancyGrid::ny, "Cells along y.")
       .def_prop_ro(
-          "log_odds",
-          [](nb::handle_t<OccupancyGrid> self) {
-            const auto& map = nb::cast<const OccupancyGrid&>(self);
-            return view<float, 2>(
-                map.log_odds.data(),
-                {static_cast<std::size_t>(map.ny), static_cast<std::size_t>(map.nx)}, self);
-          },
+          "log_odds", [](const OccupancyGrid& self) { return view_cells(self, self.log_odds); },
           "[ny, nx] in nats: a read-only view, not a copy.")
       .def_prop_ro(
           "observations",
-          [](const OccupancyGrid& self) { return cells_view(self, self.observations); },
+          [](const OccupancyGrid& self) { return cells_or_none(self, self.observations); },
           nb::sig("def observations(self) -> numpy.typing.NDArray[numpy.float32] | None"),
           "Touches that sensed each cell, [ny, nx], or None.")
       .def_prop_ro(
-          "mean_level", [](const OccupancyGrid& self) { return cells_view(self, self.mean_level); },
+          "mean_level",
+          [](const OccupancyGrid& self) { return cells_or_none(self, self.mean_level); },
           nb::sig("def mean_level(self) -> numpy.typing.NDArray[numpy.float32] | None"),
           "Mean pressure at each cell, [ny, nx], or None.")
       .def(
@@ -147,12 +131,8 @@ void bind_hypothesis(nb::module_& module) {
   nb::class_<Hypothesis>(module, "Hypothesis",
                          "An object that the unknown may turn out to be. An OccupancyGrid stands "
                          "for one of weight 1.")
-      .def(
-          "__init__",
-          [](Hypothesis* self, const OccupancyGrid& map, double weight) {
-            new (self) Hypothesis{.map = map, .weight = weight};
-          },
-          "map"_a, "weight"_a = 1.0, "weight: prior weight relative to the other objects.")
+      .def(nb::init<const OccupancyGrid&, double>(), "map"_a, "weight"_a = 1.0,
+           "weight: prior weight relative to the other objects.")
       .def_ro("map", &Hypothesis::map, "The map of the object.")
       .def_ro("weight", &Hypothesis::weight, "Prior weight relative to the other objects.")
       .def_ro("mirrored", &Hypothesis::mirrored, "The map is the mirror image of the learned one.")
@@ -179,9 +159,8 @@ void bind_metric(nb::module_& module) {
         return measured ? std::optional(measured->suggested) : std::nullopt;
       },
       "map"_a,
-      "The n-fold rotational symmetry that the map itself shows, 0 = full; None where fewer than "
-      "16\n"
-      "cells are occupied.");
+      "The n-fold rotational symmetry that the map itself shows, 0 = full; None where fewer than\n"
+      "16 cells are occupied.");
 }
 
 /// What bins are to resolve, by the name that --bins has for it.
@@ -209,9 +188,8 @@ void bind_lattices(nb::module_& module) {
         return touch_region(hypotheses_of(maps), reach_mm).lattice;
       },
       "maps"_a, "reach_mm"_a,
-      "The poses of an object that an array touches, about the array's centre, as one bin. "
-      "reach_mm:\n"
-      "largest distance of an element from the array's centre.");
+      "The poses of an object that an array touches, about the array's centre, as one bin.\n"
+      "reach_mm: largest distance of an element from the array's centre.");
 }
 
 }  // namespace

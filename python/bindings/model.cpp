@@ -1,7 +1,5 @@
 #include "model.hpp"
 
-#include <array>
-
 #include <fmt/format.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/tuple.h>
@@ -9,7 +7,6 @@
 
 #include "bindings.hpp"
 #include "palpate/contact_model.hpp"
-#include "palpate/error.hpp"
 #include "palpate/pose.hpp"
 #include "palpate/sensor_model.hpp"
 
@@ -76,9 +73,7 @@ void bind_lattice(nb::module_& module) {
       .def_ro("x_mm", &PoseLattice::x_mm, "In the object frame.")
       .def_ro("y_mm", &PoseLattice::y_mm, "In the object frame.")
       .def_ro("theta_rad", &PoseLattice::theta_rad, "Angle of T_object_robot.")
-      .def_prop_ro(
-          "pivot_mm", [](const PoseLattice& self) { return to_array(self.pivot_mm); },
-          "[2] in the robot frame, mm.")
+      .def_prop_ro("pivot_mm", array_of(&PoseLattice::pivot_mm), "[2] in the robot frame, mm.")
       .def_prop_ro("bins", &PoseLattice::bins, "Number of bins of one object.")
       .def_prop_ro(
           "shape",
@@ -104,20 +99,22 @@ void bind_lattice(nb::module_& module) {
       .def("__repr__", [](const PoseLattice& self) { return python::text_of(self); });
 }
 
+/// A constructor. Throws Error where the model's numbers are out of range.
+template <typename Model, typename... Arguments>
+void make_valid(Model* self, Arguments... arguments) {
+  const Model model{arguments...};
+  model.validate();
+  new (self) Model(model);
+}
+
 void bind_contact(nb::module_& module) {
   nb::class_<ContactClassifier>(
       module, "ContactClassifier",
       "Eq. 3: In Contact where the pressure exceeds both the threshold and ratio times the\n"
       "touch's largest pressure, No Contact where it is below both, else Unknown.")
-      .def(
-          "__init__",
-          [](ContactClassifier* self, double threshold, double ratio) {
-            const ContactClassifier classifier{threshold, ratio};
-            classifier.validate();
-            new (self) ContactClassifier(classifier);
-          },
-          "threshold"_a = ContactClassifier{}.threshold, "ratio"_a = ContactClassifier{}.ratio,
-          "threshold in the recording's pressure unit; ratio in [0, 1).")
+      .def("__init__", &make_valid<ContactClassifier, double, double>,
+           "threshold"_a = ContactClassifier{}.threshold, "ratio"_a = ContactClassifier{}.ratio,
+           "threshold in the recording's pressure unit; ratio in [0, 1).")
       .def_ro("threshold", &ContactClassifier::threshold)
       .def_ro("ratio", &ContactClassifier::ratio)
       .def("__repr__", [](const ContactClassifier& self) {
@@ -127,19 +124,12 @@ void bind_contact(nb::module_& module) {
 
   nb::class_<ContactModel>(module, "ContactModel",
                            "How likely a reading is at a place of a map (Eq. 3 and 7).")
-      .def(
-          "__init__",
-          [](ContactModel* self, const ContactClassifier& classifier, double gamma,
-             std::optional<double> prior) {
-            const ContactModel model{.classifier = classifier, .gamma = gamma, .prior = prior};
-            model.validate();
-            new (self) ContactModel(model);
-          },
-          "classifier"_a = ContactClassifier{}, "gamma"_a = ContactModel{}.gamma,
-          "prior"_a = nb::none(),
-          "gamma in [0, 1): how often the classifier answers at random. prior: probability that "
-          "an\n"
-          "unseen place is occupied; by default the maps' own, which must then agree.")
+      .def("__init__",
+           &make_valid<ContactModel, const ContactClassifier&, double, std::optional<double>>,
+           "classifier"_a = ContactClassifier{}, "gamma"_a = ContactModel{}.gamma,
+           "prior"_a = nb::none(),
+           "gamma in [0, 1): how often the classifier answers at random. prior: probability that\n"
+           "an unseen place is occupied; by default the maps' own, which must then agree.")
       .def_ro("classifier", &ContactModel::classifier)
       .def_ro("gamma", &ContactModel::gamma)
       .def_ro("prior", &ContactModel::prior)
@@ -152,17 +142,11 @@ void bind_contact(nb::module_& module) {
   nb::class_<InverseSensorModel>(
       module, "InverseSensorModel",
       "Eq. 4-6: how much one reading changes the log odds of the cells around it.")
-      .def(
-          "__init__",
-          [](InverseSensorModel* self, double spread_mm, double peak, double prior) {
-            const InverseSensorModel model{spread_mm, peak, prior};
-            model.validate();
-            new (self) InverseSensorModel(model);
-          },
-          "spread_mm"_a = InverseSensorModel{}.spread_mm, "peak"_a = InverseSensorModel{}.peak,
-          "prior"_a = InverseSensorModel{}.prior,
-          "spread_mm: half the standard deviation of the sensor's point spread; peak below 1;\n"
-          "prior: p(m), the probability that an unseen cell is occupied.")
+      .def("__init__", &make_valid<InverseSensorModel, double, double, double>,
+           "spread_mm"_a = InverseSensorModel{}.spread_mm, "peak"_a = InverseSensorModel{}.peak,
+           "prior"_a = InverseSensorModel{}.prior,
+           "spread_mm: half the standard deviation of the sensor's point spread; peak below 1;\n"
+           "prior: p(m), the probability that an unseen cell is occupied.")
       .def_ro("spread_mm", &InverseSensorModel::spread_mm)
       .def_ro("peak", &InverseSensorModel::peak)
       .def_ro("prior", &InverseSensorModel::prior)

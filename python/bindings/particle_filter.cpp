@@ -15,14 +15,6 @@ namespace {
 
 using Particles = Named<ParticleFilter>;
 
-void update_particles(const Particles& self, const TouchesLike& touches, const Progress& progress) {
-  TouchViews views = views_of(touches);
-  self.use(std::move(views.kept), progress,
-           [all = std::move(views.touches)](ParticleFilter& filter, Call& call) {
-             filter.update(all, call.progress());
-           });
-}
-
 std::tuple<Result<std::int32_t, 1>, Result<double, 2>, Result<double, 1>> particles(
     const Particles& self) {
   const auto all = self.use([](ParticleFilter& filter, Call&) { return filter.particles(); });
@@ -34,8 +26,7 @@ std::tuple<Result<std::int32_t, 1>, Result<double, 2>, Result<double, 1>> partic
     poses.push_back(particle.T_object_robot);
     weights.push_back(particle.weight);
   }
-  return {owned(std::move(objects), {all.size()}), to_array(poses),
-          owned(std::move(weights), {all.size()})};
+  return {owned(std::move(objects)), to_array(poses), owned(std::move(weights))};
 }
 
 }  // namespace
@@ -64,14 +55,7 @@ void bind_particle_filter(nb::module_& module) {
                                           .alpha_slow = alpha_slow,
                                           .alpha_fast = alpha_fast,
                                           .seed = seed};
-            std::vector<Hypothesis> hypotheses = hypotheses_of(maps);
-            std::vector<std::string> labels = labels_of(hypotheses);
-            new (self) Particles(make_owned<ParticleFilter>(
-                                     {}, device,
-                                     [hypotheses = std::move(hypotheses), options](Device& on) {
-                                       return ParticleFilter(on, hypotheses, options);
-                                     }),
-                                 std::move(labels));
+            new (self) Particles(make_filter<ParticleFilter>(device, maps, options));
           },
           "device"_a, "maps"_a, "region"_a = PoseLattice{}, nb::kw_only(),
           "particles"_a = ParticleOptions{}.particles, "contact"_a = ContactModel{},
@@ -83,42 +67,23 @@ void bind_particle_filter(nb::module_& module) {
           "motion_rad: standard deviations of the noise at each touch; augmented: adds random\n"
           "particles while touches fit worse than before (Augmented MCL).\n\n"
           "Raises Error as PoseHistogram does.")
-      .def("update", &update_particles, "touches"_a, "progress"_a = nb::none(),
+      .def("update", &update<ParticleFilter>, "touches"_a, "progress"_a = nb::none(),
            "Resamples, moves and weighs the particles by each touch in turn (Eq. 7-8).\n\n"
-           "After Ctrl-C, or where progress(fraction) raises, call reset(). Raises Error on a "
-           "touch\n"
-           "that is not sound, of which none is taken in.")
-      .def(
-          "estimate",
-          [](const Particles& self) {
-            return self.use([](ParticleFilter& filter, Call&) { return filter.estimate(); });
-          },
-          "Identity by Eq. 9; the pose is the maximum of the Parzen estimate (Eq. 10-12).")
-      .def(
-          "reset",
-          [](const Particles& self) {
-            self.use([](ParticleFilter& filter, Call&) { filter.reset(); });
-          },
-          "Restores the initial particles for the next unknown.")
-      .def(
-          "effective_sample_size",
-          [](const Particles& self) {
-            return self.use(
-                [](ParticleFilter& filter, Call&) { return filter.effective_sample_size(); });
-          },
-          "1 / sum of squared weights, in [1, n].")
+           "After Ctrl-C, or where progress(fraction) raises, call reset(). Raises Error on a\n"
+           "touch that is not sound, of which none is taken in.")
+      .def("estimate", on_device<Particles>(&ParticleFilter::estimate),
+           "Identity by Eq. 9; the pose is the maximum of the Parzen estimate (Eq. 10-12).")
+      .def("reset", on_device<Particles>(&ParticleFilter::reset),
+           "Restores the initial particles for the next unknown.")
+      .def("effective_sample_size", on_device<Particles>(&ParticleFilter::effective_sample_size),
+           "1 / sum of squared weights, in [1, n].")
       .def("particles", &particles,
            "All particles: objects [n], T_object_robot [n, 3] (x_mm, y_mm, theta_rad) and weights\n"
            "[n], which sum to 1.")
-      .def_prop_ro(
-          "device_bytes",
-          [](const Particles& self) {
-            return self.use([](ParticleFilter& filter, Call&) { return filter.device_bytes(); });
-          },
-          "Device memory held.")
-      .def("__repr__", [](const Particles& self) {
-        return fmt::format("ParticleFilter({})", text_of(self.labels, self.session()));
-      });
+      .def_prop_ro("device_bytes", on_device<Particles>(&ParticleFilter::device_bytes),
+                   "Device memory held.")
+      .def("__repr__",
+           [](const Particles& self) { return fmt::format("ParticleFilter({})", self.name); });
 }
 
 }  // namespace palpate::python

@@ -1,26 +1,23 @@
 // `palpate plan` and `palpate recognize --fit-touch-sd`, for palpate/commands.py.
 
-#include <algorithm>
-#include <cmath>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include <fmt/format.h>
-#include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string_view.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
 #include "bindings.hpp"
 #include "estimate.hpp"
-#include "given_recordings.hpp"
 #include "model/option_words.hpp"
 #include "recognition/record_json.hpp"
 #include "recognition/recordings.hpp"
 #include "recognition/resolve.hpp"
 #include "recognition/touch_plan.hpp"
 #include "recognition/touch_sd_fit.hpp"
+#include "request.hpp"
 
 namespace palpate::python {
 
@@ -28,134 +25,101 @@ using namespace nb::literals;
 
 namespace {
 
-using Told = std::vector<std::string>;  // what is worth a warning
+using Fields = nb::typed<nb::dict, nb::str, nb::any>;
 
 /// A plan, with what is believed as JSON.
 struct Planned {
   Plan plan;
   std::string believed;
   std::string device;
-  Told told;
+  Sentences told;
 };
 
-/// What of a plan is asked beside what it is about.
-struct PlanWish {
-  std::string goal;
-  std::string candidates;   ///< of the command; candidate_grid_word where `poses` are given
-  std::vector<Pose> poses;  ///< T_robot_sensor
-  std::size_t samples;
-  std::uint64_t seed;
-};
-
-Planned plan_next(const GivenRecordings& given, const Request& request, const PlanWish& wish,
-                  const std::shared_ptr<Session>& session, Call& call) {
-  Planned planned;
-  const auto tell = [&](const std::string& sentence) {
-    planned.told.push_back(in_keywords(sentence));
-  };
-  PlanRequest wanted = plan_request(wish.goal, wish.candidates, wish.samples, wish.seed, tell);
-  if (!wish.poses.empty()) {
-    wanted.candidates = wish.poses;
-  }
-  const Subject subject = subject_of(given, request);
+Planned plan_next(const Subject& subject, const PlanRequest& wanted, Device& device, Call& call) {
+  Planned planned{.device = device.name()};
   const Unknown& unknown = subject.unknowns.front();
-  const auto used = session_on(session, subject.request.device);
-  auto lock = used->lock(call);
   const RecognitionTask task =
       resolve(subject.request, {.pressure_unit = subject.recordings.front().pressure_unit,
                                 .source = unknown.recording,
                                 .reach_mm = largest_reach_mm(unknown.touches),
                                 .need = {.why = plan_needs},
                                 .cancel_point = [&call] { call.check(); },
-                                .device = [&]() -> const Device& { return lock.device(); }});
+                                .device = [&]() -> const Device& { return device; }});
   require_histogram(task);
-  Recogniser recogniser = open_recogniser(lock.device(), task);
-  std::ranges::for_each(task.remarks, tell);
+  Recogniser recogniser = open_recogniser(device, task);
+  planned.told = task.remarks;
   planned.plan = plan_touch(recogniser, task, unknown, wanted, call.progress());
   if (const std::string words = unresolved_words(task, recogniser.lattice(), unknown.touches);
       !words.empty()) {
-    tell(words);
+    planned.told.push_back(words);
   }
   planned.believed = palpate::text_of(to_json(planned.plan.record.last(), task, in_keywords));
-  planned.device = used->name();
   return planned;
 }
 
-nb::tuple plan_python(const nb::list& recordings, const nb::list& maps, Request request,
-                      const std::string& goal, nb::handle candidates, std::size_t samples,
-                      std::uint64_t seed, const std::shared_ptr<Session>& session,
-                      const Progress& progress) {
-  const GivenRecordings given = given_recordings(recordings);
-  add_maps(maps, request);
-  PlanWish wish{goal, candidate_grid_word, {}, samples, seed};
-  if (nb::isinstance<nb::str>(candidates)) {
-    wish.candidates = nb::cast<std::string>(candidates);
+std::tuple<Fields, Sentences> plan_python(nb::handle recordings, const PythonRequest& request,
+                                          const std::string& goal, nb::handle candidates,
+                                          std::size_t samples, std::uint64_t seed,
+                                          const Progress& progress) {
+  std::string source = candidate_grid_word;  // where `poses` are given
+  std::vector<Pose> poses;                   // T_robot_sensor
+  if (is_path(candidates.ptr())) {
+    source = nb::borrow<PathLike>(candidates).text();
   } else {
-    wish.poses = poses_of(candidates, "candidates");
-    require_reachable("candidates", wish.poses);
+    poses = poses_of(candidates, "candidates");
+    require_reachable("candidates", poses);
   }
-  const Planned planned =
-      run({}, progress, [=](Call& call) { return plan_next(given, request, wish, session, call); });
+  auto [wanted, sentences] = run([=](Call&) {
+    Sentences told;
+    PlanRequest read = plan_request(goal, source, samples, seed,
+                                    [&](const std::string& sentence) { told.push_back(sentence); });
+    return std::pair(std::move(read), std::move(told));
+  });
+  if (!poses.empty()) {
+    wanted.candidates = poses;
+  }
+  const Planned planned = run_on_subject(
+      recordings, request, progress,
+      [wanted = std::move(wanted)](const Subject& subject, Device& device, Call& call) {
+        return plan_next(subject, wanted, device, call);
+      });
+  sentences.insert(sentences.end(), planned.told.begin(), planned.told.end());
   const Plan& plan = planned.plan;
   TouchGains gains;
   std::vector<std::uint64_t> index;
-  std::vector<Pose> poses;
+  poses.clear();
   for (const PlannedTouch& touch : plan.ranked) {
     gains.each.push_back(touch.gain);
     index.push_back(touch.index);
     poses.push_back(touch.T_robot_sensor);
   }
-  const std::size_t n = index.size();
-  nb::dict result;
+  Fields result;
   result["recording"] = plan.record.recording;
   result["touches"] = plan.record.touches;
   result["goal"] = goal_word(plan.goal);
   result["believed"] = nb::bytes(planned.believed.data(), planned.believed.size());
   result["identity_nats"] = plan.identity_nats;
   result["pose_nats"] = plan.both_nats - plan.identity_nats;
-  result["index"] = owned(std::move(index), {n});
+  result["index"] = owned(std::move(index));
   result["T_robot_sensor"] = to_array(poses);
   result["gains"] = nb::cast(std::move(gains));
-  std::vector<std::string> warnings = warnings_of(plan);
-  std::ranges::transform(warnings, warnings.begin(), in_keywords);
-  result["warnings"] = warnings;
+  result["warnings"] = in_python(warnings_of(plan));
   result["samples"] = plan.samples.size();
   result["seed"] = plan.seed;
   result["seconds"] = plan.seconds;
   result["device"] = planned.device;
-  return nb::make_tuple(result, planned.told);
+  return {result, in_python(std::move(sentences))};
 }
 
-using Fitted = std::tuple<TouchSdFit, Told>;
+using Fitted = std::tuple<TouchSdFit, Sentences>;
 
-Fitted fit_recordings(const GivenRecordings& given, const Request& request,
-                      const std::shared_ptr<Session>& session, Call& call) {
-  const Subject subject = subject_of(given, request);
-  const Recording& first = subject.recordings.front();
-  const auto used = session_on(session, subject.request.device);
-  auto lock = used->lock(call);
-  const RecognitionTask task =
-      resolve(subject.request, {.pressure_unit = first.pressure_unit,
-                                .source = first.path,
-                                .reach_mm = largest_reach_mm(subject.recordings),
-                                .still_array = array_is_still(subject.unknowns),
-                                .need = {"fit-touch-sd", touch_sd_fit_needs},
-                                .device = [&]() -> const Device& { return lock.device(); }});
+Fitted fit_recordings(const Subject& subject, Device& device, Call& call) {
+  const RecognitionTask task = task_of(subject, device, call, {"fit-touch-sd", touch_sd_fit_needs});
   require_fittable(task);
   TouchSdFit fit =
-      fit_touch_sd(lock.device(), task, touched_objects(subject.recordings, subject.unknowns, task),
-                   {}, call.progress());
-  Told told;
-  std::ranges::transform(task.remarks, std::back_inserter(told), in_keywords);
-  return {std::move(fit), std::move(told)};
-}
-
-Fitted fit_python(const nb::list& recordings, const nb::list& maps, Request request,
-                  const std::shared_ptr<Session>& session, const Progress& progress) {
-  const GivenRecordings given = given_recordings(recordings);
-  add_maps(maps, request);
-  return run({}, progress,
-             [=](Call& call) { return fit_recordings(given, request, session, call); });
+      fit_touch_sd(device, task, touched_objects(subject.recordings, subject.unknowns, task), {},
+                   call.progress());
+  return {std::move(fit), in_python(task.remarks)};
 }
 
 void bind_touch_sd_fit(nb::module_& module) {
@@ -180,22 +144,17 @@ void bind_touch_sd_fit(nb::module_& module) {
 }  // namespace
 
 void bind_plan(nb::module_& module) {
-  module.def("plan", &plan_python, "recordings"_a, "maps"_a, "request"_a, "goal"_a, "candidates"_a,
-             "samples"_a, "seed"_a, "device"_a = nb::none(), "progress"_a = nb::none(),
-             nb::sig("def plan(recordings: list[Recording | str], maps: "
-                     "list[OccupancyGrid | Hypothesis | str], request: Request, goal: str, "
-                     "candidates: object, samples: int, seed: int, device: Device | None = None, "
-                     "progress: collections.abc.Callable[[float], object] | None = None) -> "
-                     "tuple[dict[str, typing.Any], list[str]]"),
+  module.def("plan", &plan_python, "recordings"_a, "request"_a, "goal"_a, "candidates"_a,
+             "samples"_a, "seed"_a, "progress"_a = nb::none(),
              "The fields of a plan, and what is worth a warning.");
   bind_touch_sd_fit(module);
-  module.def("fit_touch_sd", &fit_python, "recordings"_a, "maps"_a, "request"_a,
-             "device"_a = nb::none(), "progress"_a = nb::none(),
-             nb::sig("def fit_touch_sd(recordings: list[Recording | str], maps: "
-                     "list[OccupancyGrid | Hypothesis | str], request: Request, device: "
-                     "Device | None = None, progress: collections.abc.Callable[[float], object] | "
-                     "None = None) -> tuple[TouchSdFit, list[str]]"),
-             "The fit, and what is worth a warning.");
+  module.def(
+      "fit_touch_sd",
+      [](nb::handle recordings, const PythonRequest& request, const Progress& progress) {
+        return run_on_subject(recordings, request, progress, &fit_recordings);
+      },
+      "recordings"_a, "request"_a, "progress"_a = nb::none(),
+      "The fit, and what is worth a warning.");
 }
 
 }  // namespace palpate::python

@@ -1,3 +1,6 @@
+#include <algorithm>
+#include <iterator>
+
 #include <fmt/format.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/shared_ptr.h>
@@ -6,7 +9,6 @@
 
 #include "bindings.hpp"
 #include "estimate.hpp"
-#include "model.hpp"
 #include "palpate/pose_histogram.hpp"
 #include "touches.hpp"
 
@@ -23,50 +25,21 @@ DisplacementSd sd_of(const DisplacementSdLike& sd, const char* name) {
       sd, fmt::format("{}: give a DisplacementSd or (mm, rad), such as (0.5, 0.02)", name));
 }
 
-Histogram make_histogram(const std::shared_ptr<Session>& session, nb::handle maps,
-                         HistogramOptions options) {
-  std::vector<Hypothesis> hypotheses = hypotheses_of(maps);
-  std::vector<std::string> labels = labels_of(hypotheses);
-  return {make_owned<PoseHistogram>({}, session,
-                                    [hypotheses = std::move(hypotheses), options](Device& device) {
-                                      return PoseHistogram(device, hypotheses, options);
-                                    }),
-          std::move(labels)};
-}
-
-void update_histogram(const Histogram& self, const TouchesLike& touches, const Progress& progress) {
-  TouchViews views = views_of(touches);
-  self.use(std::move(views.kept), progress,
-           [all = std::move(views.touches)](PoseHistogram& belief, Call& call) {
-             belief.update(all, call.progress());
-           });
-}
-
 /// The bins of one object, [ntheta, ny, nx].
 Result<double, 3> log_likelihood(const Histogram& self, int object) {
   auto bins =
       self.use([object](PoseHistogram& belief, Call&) { return belief.log_likelihood(object); });
-  const PoseLattice& lattice = self.constant().lattice();
-  return owned(std::move(bins), {static_cast<std::size_t>(lattice.theta_rad.count),
-                                 static_cast<std::size_t>(lattice.y_mm.count),
-                                 static_cast<std::size_t>(lattice.x_mm.count)});
+  return owned(std::move(bins), self.constant().lattice());
 }
 
 /// A number of every candidate, [n].
 template <typename Number>
-Result<double, 1> of_each(const std::vector<TouchGain>& gains, const Number& number) {
-  std::vector<double> numbers;
-  for (const TouchGain& gain : gains) {
-    numbers.push_back(number(gain));
-  }
-  return owned(std::move(numbers), {gains.size()});
-}
-
-Result<double, 1> identity_of(const TouchGains& gains) {
-  return of_each(gains.each, [](const TouchGain& gain) { return gain.identity; });
-}
-Result<double, 1> pose_of_each(const TouchGains& gains) {
-  return of_each(gains.each, [](const TouchGain& gain) { return gain.pose; });
+auto of_each(Number number) {
+  return [number](const TouchGains& gains) {
+    std::vector<double> numbers;
+    std::ranges::transform(gains.each, std::back_inserter(numbers), number);
+    return owned(std::move(numbers));
+  };
 }
 
 TouchGains expected_gain(const Histogram& self, const ArrayLike& T_robot_sensor,
@@ -83,134 +56,64 @@ void bind_gains(nb::module_& module) {
       module, "TouchGains",
       "What a touch at each of n candidate poses is expected to tell, in nats: estimates, none of\n"
       "them below 0, with standard errors. Unpacks into (identity, pose).")
-      .def_prop_ro("identity", &identity_of, "[n] about which object it is.")
-      .def_prop_ro("pose", &pose_of_each, "[n] about the pose, given the object.")
-      .def_prop_ro(
-          "both",
-          [](const TouchGains& self) {
-            return of_each(self.each, [](const TouchGain& gain) { return gain.both(); });
-          },
-          "[n] about object and pose together.")
-      .def_prop_ro(
-          "identity_error",
-          [](const TouchGains& self) {
-            return of_each(self.each,
-                           [](const TouchGain& gain) { return gain.standard_error.identity; });
-          },
-          "[n] standard error of identity.")
-      .def_prop_ro(
-          "pose_error",
-          [](const TouchGains& self) {
-            return of_each(self.each,
-                           [](const TouchGain& gain) { return gain.standard_error.pose; });
-          },
-          "[n] standard error of pose.")
-      .def_prop_ro(
-          "both_error",
-          [](const TouchGains& self) {
-            return of_each(self.each,
-                           [](const TouchGain& gain) { return gain.standard_error.both; });
-          },
-          "[n] standard error of both.")
+      .def_prop_ro("identity", of_each(&TouchGain::identity), "[n] about which object it is.")
+      .def_prop_ro("pose", of_each(&TouchGain::pose), "[n] about the pose, given the object.")
+      .def_prop_ro("both", of_each(&TouchGain::both), "[n] about object and pose together.")
+      .def_prop_ro("identity_error",
+                   of_each([](const TouchGain& gain) { return gain.standard_error.identity; }),
+                   "[n] standard error of identity.")
+      .def_prop_ro("pose_error",
+                   of_each([](const TouchGain& gain) { return gain.standard_error.pose; }),
+                   "[n] standard error of pose.")
+      .def_prop_ro("both_error",
+                   of_each([](const TouchGain& gain) { return gain.standard_error.both; }),
+                   "[n] standard error of both.")
       .def("__iter__", [](const TouchGains& self) -> nb::typed<nb::iterator, Result<double, 1>> {
-        return nb::iter(nb::make_tuple(identity_of(self), pose_of_each(self)));
+        return nb::iter(
+            nb::make_tuple(of_each(&TouchGain::identity)(self), of_each(&TouchGain::pose)(self)));
       });
-}
-
-void bind_beliefs(nb::class_<Histogram>& histogram) {
-  histogram
-      .def(
-          "estimate",
-          [](const Histogram& self) {
-            return self.use([](PoseHistogram& belief, Call&) { return belief.estimate(); });
-          },
-          "Identity probabilities (Eq. 14) and mode (Eq. 15-16).")
-      .def(
-          "refine",
-          [](const Histogram& self, const std::optional<Mode>& mode) {
-            return self.use([mode](PoseHistogram& belief, Call&) {
-              return belief.refine(mode ? *mode : belief.estimate().mode);
-            });
-          },
-          "mode"_a = nb::none(),
-          "The refined pose near a mode, by default that of estimate(), and its covariance: where "
-          "the\n"
-          "posterior peaks, to a fraction of a bin.")
-      .def(
-          "marginals",
-          [](const Histogram& self, int object) {
-            return self.use(
-                [object](PoseHistogram& belief, Call&) { return belief.marginals(object); });
-          },
-          "object"_a, "Marginal probabilities of one object's poses, over the lattice.")
-      .def("log_likelihood", &log_likelihood, "object"_a,
-           "Log-likelihood of every bin of one object in nats, [ntheta, ny, nx], without prior\n"
-           "weights.")
-      .def(
-          "entropy",
-          [](const Histogram& self) {
-            return self.use([](PoseHistogram& belief, Call&) { return belief.entropy(); });
-          },
-          "Entropy of the belief over objects and bins, in nats.")
-      .def(
-          "sample",
-          [](const Histogram& self, std::size_t count, std::uint64_t seed) {
-            return self.use(
-                [count, seed](PoseHistogram& belief, Call&) { return belief.sample(count, seed); });
-          },
-          "count"_a, "seed"_a = 0, "Draws objects and poses from the belief.")
-      .def("expected_gain", &expected_gain, "T_robot_sensor"_a, "elements_mm"_a, nb::kw_only(),
-           "samples"_a = PlanOptions{}.samples, "seed"_a = 0,
-           "What one more touch at each candidate pose [n, 3] is expected to tell, in nats.\n"
-           "elements_mm [e, 2]: living elements in the sensor frame.");
 }
 
 }  // namespace
 
 void bind_pose_histogram(nb::module_& module) {
   bind_gains(module);
-  nb::class_<Histogram> histogram(
+  nb::class_<Histogram>(
       module, "PoseHistogram",
       "Histogram filter over object identity and planar pose (Sec. III-C, Eq. 13-16), on the\n"
-      "device. The same input gives the same bits as in C++.");
-  histogram
+      "device. The same input gives the same bits as in C++.")
       .def(
           "__init__",
           [](Histogram* self, const std::shared_ptr<Session>& device, const MapsLike& maps,
              const PoseLattice& lattice, const ContactModel& contact, bool still_array,
              std::optional<double> none_weight, const DisplacementSdLike& touch_sd,
              const DisplacementSdLike& slip_sd, std::optional<std::uint64_t> memory_limit_bytes) {
-            new (self) Histogram(make_histogram(device, maps,
-                                                {.lattice = lattice,
-                                                 .contact = contact,
-                                                 .still_array = still_array,
-                                                 .none_weight = none_weight,
-                                                 .touch_sd = sd_of(touch_sd, "touch_sd"),
-                                                 .slip_sd = sd_of(slip_sd, "slip_sd"),
-                                                 .memory_limit_bytes = memory_limit_bytes}));
+            const HistogramOptions options{.lattice = lattice,
+                                           .contact = contact,
+                                           .still_array = still_array,
+                                           .none_weight = none_weight,
+                                           .touch_sd = sd_of(touch_sd, "touch_sd"),
+                                           .slip_sd = sd_of(slip_sd, "slip_sd"),
+                                           .memory_limit_bytes = memory_limit_bytes};
+            new (self) Histogram(make_filter<PoseHistogram>(device, maps, options));
           },
           "device"_a, "maps"_a, "lattice"_a = PoseLattice{}, nb::kw_only(),
           "contact"_a = ContactModel{}, "still_array"_a = false, "none_weight"_a = nb::none(),
           "touch_sd"_a = DisplacementSd{}, "slip_sd"_a = DisplacementSd{},
           "memory_limit_bytes"_a = nb::none(),
           "Starts with a uniform belief. still_array: the array stays in one place; none_weight:\n"
-          "prior weight of \"none of these\"; touch_sd: how far the sensor may have been from "
-          "where\n"
-          "it was said to be; slip_sd: how far the object moves between touches.\n\n"
+          "prior weight of \"none of these\"; touch_sd: how far the sensor may have been from\n"
+          "where it was said to be; slip_sd: how far the object moves between touches.\n\n"
           "Raises Error on maps that are not sound or differ in their prior, on options out of\n"
           "range, and where the device has too little memory.")
       .def(
-          "update", &update_histogram, "touches"_a, "progress"_a = nb::none(),
+          "update", &update<PoseHistogram>, "touches"_a, "progress"_a = nb::none(),
           "Multiplies the belief by the likelihood of these touches (Eq. 7, 13).\n\n"
           "progress(fraction) is called up to 50 times a second. After Ctrl-C, or where progress\n"
           "raises, the belief is left half-way: call reset(). Raises Error on a touch that is not\n"
           "sound, of which none is taken in.")
-      .def(
-          "reset",
-          [](const Histogram& self) {
-            self.use([](PoseHistogram& belief, Call&) { belief.reset(); });
-          },
-          "Returns to the uniform belief, for the next unknown.")
+      .def("reset", on_device<Histogram>(&PoseHistogram::reset),
+           "Returns to the uniform belief, for the next unknown.")
       .def(
           "move_pivot",
           [](const Histogram& self, const ArrayLike& pivot_mm) {
@@ -219,24 +122,30 @@ void bind_pose_histogram(nb::module_& module) {
             });
           },
           "pivot_mm"_a,
-          "Turns theta about another pivot [2], in the robot frame, before any touch.");
-  bind_beliefs(histogram);
-  histogram
-      .def_prop_ro(
-          "lattice",
-          [](const Histogram& self) {
-            return self.use([](PoseHistogram& belief, Call&) { return belief.lattice(); });
-          },
-          "The bins.")
-      .def_prop_ro(
-          "device_bytes",
-          [](const Histogram& self) {
-            return self.use([](PoseHistogram& belief, Call&) { return belief.device_bytes(); });
-          },
-          "Device memory held.")
-      .def("__repr__", [](const Histogram& self) {
-        return fmt::format("PoseHistogram({})", text_of(self.labels, self.session()));
-      });
+          "Turns theta about another pivot [2], in the robot frame, before any touch.")
+      .def("estimate", on_device<Histogram>(&PoseHistogram::estimate),
+           "Identity probabilities (Eq. 14) and mode (Eq. 15-16).")
+      .def("refine", &refine<PoseHistogram>, "mode"_a = nb::none(),
+           "The refined pose near a mode, by default that of estimate(), and its covariance:\n"
+           "where the posterior peaks, to a fraction of a bin.")
+      .def("marginals", on_device<Histogram>(&PoseHistogram::marginals), "object"_a,
+           "Marginal probabilities of one object's poses, over the lattice.")
+      .def("log_likelihood", &log_likelihood, "object"_a,
+           "Log-likelihood of every bin of one object in nats, [ntheta, ny, nx], without prior\n"
+           "weights.")
+      .def("entropy", on_device<Histogram>(&PoseHistogram::entropy),
+           "Entropy of the belief over objects and bins, in nats.")
+      .def("sample", on_device<Histogram>(&PoseHistogram::sample), "count"_a, "seed"_a = 0,
+           "Draws objects and poses from the belief.")
+      .def("expected_gain", &expected_gain, "T_robot_sensor"_a, "elements_mm"_a, nb::kw_only(),
+           "samples"_a = PlanOptions{}.samples, "seed"_a = 0,
+           "What one more touch at each candidate pose [n, 3] is expected to tell, in nats.\n"
+           "elements_mm [e, 2]: living elements in the sensor frame.")
+      .def_prop_ro("lattice", on_device<Histogram>(&PoseHistogram::lattice), "The bins.")
+      .def_prop_ro("device_bytes", on_device<Histogram>(&PoseHistogram::device_bytes),
+                   "Device memory held.")
+      .def("__repr__",
+           [](const Histogram& self) { return fmt::format("PoseHistogram({})", self.name); });
 }
 
 }  // namespace palpate::python

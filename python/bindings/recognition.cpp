@@ -1,18 +1,12 @@
-#include <algorithm>
-#include <iterator>
-
-#include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 #include <nlohmann/json.hpp>
 
 #include "bindings.hpp"
-#include "given_recordings.hpp"
 #include "recognition/record_json.hpp"
 #include "recognition/recordings.hpp"
 #include "recognition/resolve.hpp"
 #include "request.hpp"
-#include "session.hpp"
 
 namespace palpate::python {
 
@@ -58,65 +52,47 @@ nb::object to_python(const Json& json) {
 
 struct Answer {
   Json records = Json::array();
-  std::vector<std::string> sentences;  ///< what is worth a warning
+  Sentences sentences;
 };
 
 Answer recognize(const Subject& subject, Device& device, Call& call) {
   const std::function<void(double)> progress = call.progress();
   Answer answer;
-  const Request& request = subject.request;
   const std::vector<Unknown>& unknowns = subject.unknowns;
-  const Recording& first = subject.recordings.front();
-  const RecognitionTask task =
-      resolve(request, {.pressure_unit = first.pressure_unit,
-                        .source = first.path,
-                        .reach_mm = largest_reach_mm(subject.recordings),
-                        .still_array = array_is_still(unknowns),
-                        .cancel_point = [&call] { call.check(); },
-                        .device = [&device]() -> const Device& { return device; }});
+  const bool with_trace = subject.request.trace;
+  const RecognitionTask task = task_of(subject, device, call);
   Recogniser recogniser = open_recogniser(device, task);
-  std::ranges::transform(task.remarks, std::back_inserter(answer.sentences), in_keywords);
+  answer.sentences = task.remarks;
   std::string unresolved;
   for (std::size_t i = 0; i < unknowns.size(); ++i) {
     const auto show = [&](double fraction) {
       progress((static_cast<double>(i) + fraction) / static_cast<double>(unknowns.size()));
     };
-    const RecognitionRecord record = recognise(recogniser, task, unknowns[i], request.trace, show);
+    const RecognitionRecord record = recognise(recogniser, task, unknowns[i], with_trace, show);
     record.require_steps();
     if (unresolved.empty()) {
       unresolved = unresolved_words(task, recogniser.lattice(), unknowns[i].touches);
     }
-    answer.records.push_back(to_json(record, task, device.name(), request.trace, in_keywords));
+    answer.records.push_back(to_json(record, task, device.name(), with_trace, in_keywords));
   }
   if (!unresolved.empty()) {
-    answer.sentences.push_back(in_keywords(unresolved));
+    answer.sentences.push_back(unresolved);
   }
   return answer;
 }
 
-std::tuple<nb::object, std::vector<std::string>> recognize_python(
-    const nb::list& recordings, const nb::list& maps, Request given,
-    const std::shared_ptr<Session>& session, const Progress& progress) {
-  GivenRecordings wanted = given_recordings(recordings);
-  add_maps(maps, given);
-  const Answer answer = run({}, progress, [wanted = std::move(wanted), given, session](Call& call) {
-    const Subject subject = subject_of(wanted, given);
-    const auto used = session_on(session, subject.request.device);
-    auto lock = used->lock(call);
-    return recognize(subject, lock.device(), call);
-  });
-  return {to_python(answer.records), answer.sentences};
+using Records = nb::typed<nb::list, nb::typed<nb::dict, nb::str, nb::any>>;
+
+std::tuple<Records, Sentences> recognize_python(nb::handle recordings, const PythonRequest& request,
+                                                const Progress& progress) {
+  const Answer answer = run_on_subject(recordings, request, progress, &recognize);
+  return {nb::borrow<Records>(to_python(answer.records)), in_python(answer.sentences)};
 }
 
 }  // namespace
 
 void bind_recognition(nb::module_& module) {
-  module.def("recognize", &recognize_python, "recordings"_a, "maps"_a, "request"_a,
-             "device"_a = nb::none(), "progress"_a = nb::none(),
-             nb::sig("def recognize(recordings: list[Recording | str], maps: "
-                     "list[OccupancyGrid | Hypothesis | str], request: Request, device: "
-                     "Device | None = None, progress: collections.abc.Callable[[float], object] | "
-                     "None = None) -> tuple[list[dict[str, typing.Any]], list[str]]"),
+  module.def("recognize", &recognize_python, "recordings"_a, "request"_a, "progress"_a = nb::none(),
              "Records as in the JSON of `palpate recognize`, and what is worth a warning.");
 }
 

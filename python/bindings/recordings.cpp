@@ -4,7 +4,6 @@
 #include "bindings.hpp"
 #include "call.hpp"
 #include "model.hpp"
-#include "palpate/error.hpp"
 #include "palpate/files.hpp"
 #include "touches.hpp"
 
@@ -14,25 +13,18 @@ using namespace nb::literals;
 
 namespace {
 
-/// The array that C++ reads, as Python gave it or as a copy; None where there is none.
-template <typename Type, typename Value>
-std::optional<Type> object_of(const std::optional<Array<Value>>& array) {
-  return array ? std::optional(nb::borrow<Type>(array->object)) : std::nullopt;
-}
 FloatArray object_of(const Floats& array) { return nb::borrow<FloatArray>(array.object); }
+ByteArray object_of(const Bytes& array) { return nb::borrow<ByteArray>(array.object); }
+CountArray object_of(const Counts& array) { return nb::borrow<CountArray>(array.object); }
+template <typename Value>
+auto object_of(const std::optional<Array<Value>>& array) {
+  return array ? std::optional(object_of(*array)) : std::nullopt;
+}
 
-ArrayTouch make_touch(const ArrayLike& T_robot_sensor, const ArrayLike& elements_mm,
-                      const ArrayLike& pressure, const std::optional<ArrayLike>& valid) {
-  ArrayReader reader;
-  ArrayTouch touch{.T_robot_sensor = reader.floats(T_robot_sensor, "T_robot_sensor", {"3"}),
-                   .elements_mm = reader.floats(elements_mm, "elements_mm", {"e", "2"}),
-                   .pressure = reader.readings(pressure, "pressure", {"e"}),
-                   .valid = {}};
-  if (valid) {
-    touch.valid = reader.flags(*valid, "valid", {"e"});
-  }
-  touch.valid = reader.unmasked(pressure, touch.valid, {"e"});
-  return touch;
+/// A property: the array that C++ reads, as Python gave it or as a copy; None where there is none.
+template <typename Class, typename Member>
+auto array_in(Member Class::*member) {
+  return [member](const Class& self) { return object_of(self.*member); };
 }
 
 void bind_touch(nb::module_& module) {
@@ -44,88 +36,36 @@ void bind_touch(nb::module_& module) {
           "__init__",
           [](ArrayTouch* self, const ArrayLike& T_robot_sensor, const ArrayLike& elements_mm,
              const ArrayLike& pressure, const std::optional<ArrayLike>& valid) {
-            new (self) ArrayTouch(make_touch(T_robot_sensor, elements_mm, pressure, valid));
+            ArrayReader reader;
+            ArrayTouch touch{
+                .T_robot_sensor = reader.floats(T_robot_sensor, "T_robot_sensor", {"3"}),
+                .elements_mm = reader.floats(elements_mm, "elements_mm", {"e", "2"}),
+                .pressure = reader.readings(pressure, "pressure", {"e"}),
+                .valid = reader.valid(pressure, valid, {"e"})};
+            new (self) ArrayTouch(std::move(touch));
           },
           "T_robot_sensor"_a, "elements_mm"_a, "pressure"_a, "valid"_a = nb::none(),
           "T_robot_sensor [3] (x_mm, y_mm, theta_rad); elements_mm [e, 2], element centres in the\n"
           "sensor frame; pressure [e] in the recording's unit; valid [e], False for a dead "
           "element.\n"
           "\nRaises Error on other shapes.")
-      .def_prop_ro(
-          "T_robot_sensor", [](const ArrayTouch& self) { return object_of(self.T_robot_sensor); },
-          "[3] (x_mm, y_mm, theta_rad).")
-      .def_prop_ro(
-          "elements_mm", [](const ArrayTouch& self) { return object_of(self.elements_mm); },
-          "[e, 2], element centres in the sensor frame.")
-      .def_prop_ro(
-          "pressure", [](const ArrayTouch& self) { return object_of(self.pressure); },
-          "[e] in the recording's unit.")
-      .def_prop_ro(
-          "valid", [](const ArrayTouch& self) { return object_of<ByteArray>(self.valid); },
-          "[e], 0 for a dead element; None: all are alive.")
+      .def_prop_ro("T_robot_sensor", array_in(&ArrayTouch::T_robot_sensor),
+                   "[3] (x_mm, y_mm, theta_rad).")
+      .def_prop_ro("elements_mm", array_in(&ArrayTouch::elements_mm),
+                   "[e, 2], element centres in the sensor frame.")
+      .def_prop_ro("pressure", array_in(&ArrayTouch::pressure), "[e] in the recording's unit.")
+      .def_prop_ro("valid", array_in(&ArrayTouch::valid),
+                   "[e], 0 for a dead element; None: all are alive.")
       .def("__repr__", [](const ArrayTouch& self) {
         return fmt::format("Touch({} elements at {})", self.pressure.size(),
                            text_of(as_poses(self.T_robot_sensor).front()));
       });
 }
 
-struct RecordingArguments {
-  ArrayLike pressure, poses, elements_mm;
-  std::optional<ArrayLike> valid, time_s, baseline, device_time_s, lost_before;
-};
-
-/// The array by its rank: constant, or with a row for each touch.
-bool changes(nb::handle array, long constant_rank) {
-  try {
-    return nb::cast<long>(call("numpy", "ndim", array)) > constant_rank;
-  } catch (const nb::python_error& error) {
-    if (!error.matches(PyExc_ValueError)) {
-      throw;
-    }
-    return false;  // no array: the reader refuses it by name
-  }
-}
-
-ArrayRecording make_recording(const RecordingArguments& given) {
-  ArrayReader reader;
-  ArrayRecording recording;
-  recording.pressure = reader.readings(given.pressure, "pressure", {"n", "e"});
-  recording.T_robot_sensor = reader.floats(given.poses, "poses", {"n", "3"});
-  recording.elements_mm = changes(given.elements_mm, 2)
-                              ? reader.floats(given.elements_mm, "elements_mm", {"n", "e", "2"})
-                              : reader.floats(given.elements_mm, "elements_mm", {"e", "2"});
-  if (given.valid) {
-    recording.valid = changes(*given.valid, 1) ? reader.flags(*given.valid, "valid", {"n", "e"})
-                                               : reader.flags(*given.valid, "valid", {"e"});
-  }
-  recording.valid = reader.unmasked(given.pressure, recording.valid, {"n", "e"});
-  const auto floats = [&](const std::optional<ArrayLike>& array, const char* name,
-                          const char* letter) {
-    return array ? std::optional(reader.floats(*array, name, {letter})) : std::nullopt;
-  };
-  recording.time_s = floats(given.time_s, "time_s", "n");
-  recording.baseline = floats(given.baseline, "baseline", "e");
-  recording.device_time_s = floats(given.device_time_s, "device_time_s", "n");
-  if (given.lost_before) {
-    recording.lost_before = reader.counts(*given.lost_before, "lost_before", {"n"});
-  }
-  return recording;
-}
-
 template <typename Value>
 Array<Value> sliced(const Array<Value>& array, const nb::slice& slice) {
   // A step makes another layout, and so a copy.
-  const nb::object cut = array.object[slice];
-  const nb::object rows = call("numpy", "ascontiguousarray", cut);
-  Array<Value> result{rows, nullptr, array.shape};
-  result.shape[0] = nb::len(rows);
-  Py_buffer buffer{};
-  if (PyObject_GetBuffer(rows.ptr(), &buffer, PyBUF_C_CONTIGUOUS) != 0) {
-    throw nb::python_error();
-  }
-  result.data = static_cast<const Value*>(buffer.buf);
-  PyBuffer_Release(&buffer);
-  return result;
+  return in_place<Value>(call("numpy", "ascontiguousarray", array.object[slice]));
 }
 
 ArrayRecording sliced(const ArrayRecording& all, const nb::slice& slice) {
@@ -175,38 +115,6 @@ nb::object item(const ArrayRecording& recording, nb::handle index) {
   return nb::cast(recording.array_touch(static_cast<std::size_t>(i)));
 }
 
-void bind_arrays(nb::class_<ArrayRecording>& recording) {
-  recording
-      .def_prop_ro(
-          "pressure", [](const ArrayRecording& self) { return object_of(self.pressure); },
-          "[n, e] in pressure_unit.")
-      .def_prop_ro(
-          "T_robot_sensor",
-          [](const ArrayRecording& self) { return object_of(self.T_robot_sensor); },
-          "[n, 3] (x_mm, y_mm, theta_rad).")
-      .def_prop_ro(
-          "elements_mm", [](const ArrayRecording& self) { return object_of(self.elements_mm); },
-          "Element centres in the sensor frame, [e, 2], or [n, e, 2] where the array changes.")
-      .def_prop_ro(
-          "valid", [](const ArrayRecording& self) { return object_of<ByteArray>(self.valid); },
-          "[e] or [n, e], 0 for a dead element; None: all are alive.")
-      .def_prop_ro(
-          "time_s", [](const ArrayRecording& self) { return object_of<FloatArray>(self.time_s); },
-          "[n] since the Unix epoch, or None.")
-      .def_prop_ro(
-          "baseline",
-          [](const ArrayRecording& self) { return object_of<FloatArray>(self.baseline); },
-          "[e] untouched readings, or None.")
-      .def_prop_ro(
-          "device_time_s",
-          [](const ArrayRecording& self) { return object_of<FloatArray>(self.device_time_s); },
-          "[n] by the sensor's own clock, or None.")
-      .def_prop_ro(
-          "lost_before",
-          [](const ArrayRecording& self) { return object_of<CountArray>(self.lost_before); },
-          "[n] frames lost since the last row, or None.");
-}
-
 void bind_recording(nb::module_& module) {
   nb::class_<Truth>(module, "Truth", "The true identity and pose of an unknown object.")
       .def(
@@ -216,52 +124,79 @@ void bind_recording(nb::module_& module) {
           },
           "object"_a, "T_object_robot"_a, "T_object_robot [3] (x_mm, y_mm, theta_rad).")
       .def_ro("object", &Truth::object, "The label of the object.")
-      .def_prop_ro(
-          "T_object_robot", [](const Truth& self) { return to_array(self.T_object_robot); },
-          "[3] (x_mm, y_mm, theta_rad).")
+      .def_prop_ro("T_object_robot", array_of(&Truth::T_object_robot),
+                   "[3] (x_mm, y_mm, theta_rad).")
       .def("__repr__", [](const Truth& self) {
         return fmt::format("Truth('{}', {})", self.object, text_of(self.T_object_robot));
       });
 
-  nb::class_<ArrayRecording> recording(
+  nb::class_<ArrayRecording>(
       module, "Recording",
       "A sequence of readings of one array pressed against one object. Its arrays are those that\n"
       "were given, where dtype and layout allow; recording[i] is a Touch, and recording[a:b] a\n"
-      "Recording over the same memory.");
-  recording.def(
-      "__init__",
-      [](ArrayRecording* self, const ArrayLike& pressure, const ArrayLike& poses,
-         const ArrayLike& elements_mm, const std::optional<ArrayLike>& valid,
-         const std::optional<ArrayLike>& time_s, const std::string& object,
-         const std::string& pressure_unit, const std::string& rows,
-         const std::optional<Truth>& truth, const std::string& sensor, const std::string& serial,
-         const std::optional<ArrayLike>& baseline, const std::optional<ArrayLike>& device_time_s,
-         const std::optional<ArrayLike>& lost_before) {
-        ArrayRecording made = make_recording(
-            {pressure, poses, elements_mm, valid, time_s, baseline, device_time_s, lost_before});
-        made.object = object;
-        made.pressure_unit = pressure_unit;
-        made.rows = rows;
-        made.truth = truth;
-        made.sensor = sensor;
-        made.serial = serial;
-        new (self) ArrayRecording(std::move(made));
-      },
-      "pressure"_a, "poses"_a, "elements_mm"_a, nb::kw_only(), "valid"_a = nb::none(),
-      "time_s"_a = nb::none(), "object"_a = "", "pressure_unit"_a = "kPa", "rows"_a = "touches",
-      "truth"_a = nb::none(), "sensor"_a = "", "serial"_a = "", "baseline"_a = nb::none(),
-      "device_time_s"_a = nb::none(), "lost_before"_a = nb::none(),
-      "pressure [n, e] in pressure_unit, \"kPa\" or \"raw\"; poses T_robot_sensor [n, 3] (x_mm, "
-      "y_mm,\n"
-      "theta_rad); elements_mm [e, 2] in the sensor frame, or [n, e, 2] where the array changes;\n"
-      "valid [e] or [n, e], False for a dead element; time_s [n] since the Unix epoch; object: "
-      "its\n"
-      "label, \"\" where unknown; rows: \"touches\", or \"frames\" of a raw stream, in which poses "
-      "and\n"
-      "pressures may be NaN (unknown).\n\nRaises Error naming the argument whose shape does not "
-      "fit.");
-  bind_arrays(recording);
-  recording.def_ro("path", &ArrayRecording::path, "The file that it was read from, or \"\".")
+      "Recording over the same memory.")
+      .def(
+          "__init__",
+          [](ArrayRecording* self, const ArrayLike& pressure, const ArrayLike& poses,
+             const ArrayLike& elements_mm, const std::optional<ArrayLike>& valid,
+             const std::optional<ArrayLike>& time_s, const std::string& object,
+             const std::string& pressure_unit, const std::string& rows,
+             const std::optional<Truth>& truth, const std::string& sensor,
+             const std::string& serial, const std::optional<ArrayLike>& baseline,
+             const std::optional<ArrayLike>& device_time_s,
+             const std::optional<ArrayLike>& lost_before) {
+            ArrayReader reader;
+            ArrayRecording made;
+            made.object = object;
+            made.pressure_unit = pressure_unit;
+            made.rows = rows;
+            made.truth = truth;
+            made.sensor = sensor;
+            made.serial = serial;
+            made.pressure = reader.readings(pressure, "pressure", {"n", "e"});
+            made.T_robot_sensor = reader.floats(poses, "poses", {"n", "3"});
+            made.elements_mm =
+                reader.floats(elements_mm, "elements_mm", {"e", "2"}, {"n", "e", "2"});
+            made.valid = reader.valid(pressure, valid, {"n", "e"});
+            const auto floats = [&](const std::optional<ArrayLike>& array, const char* name,
+                                    const char* letter) {
+              return array ? std::optional(reader.floats(*array, name, {letter})) : std::nullopt;
+            };
+            made.time_s = floats(time_s, "time_s", "n");
+            made.baseline = floats(baseline, "baseline", "e");
+            made.device_time_s = floats(device_time_s, "device_time_s", "n");
+            if (lost_before) {
+              made.lost_before = reader.counts(*lost_before, "lost_before", {"n"});
+            }
+            new (self) ArrayRecording(std::move(made));
+          },
+          "pressure"_a, "poses"_a, "elements_mm"_a, nb::kw_only(), "valid"_a = nb::none(),
+          "time_s"_a = nb::none(), "object"_a = "", "pressure_unit"_a = "kPa", "rows"_a = "touches",
+          "truth"_a = nb::none(), "sensor"_a = "", "serial"_a = "", "baseline"_a = nb::none(),
+          "device_time_s"_a = nb::none(), "lost_before"_a = nb::none(),
+          "pressure [n, e] in pressure_unit, \"kPa\" or \"raw\"; poses T_robot_sensor [n, 3]\n"
+          "(x_mm, y_mm, theta_rad); elements_mm [e, 2] in the sensor frame, or [n, e, 2] where\n"
+          "the array changes; valid [e] or [n, e], False for a dead element; time_s [n] since the\n"
+          "Unix epoch; object: its label, \"\" where unknown; rows: \"touches\", or \"frames\" of\n"
+          "a raw stream, in which poses and pressures may be NaN (unknown).\n\n"
+          "Raises Error naming the argument whose shape does not fit.")
+      .def_prop_ro("pressure", array_in(&ArrayRecording::pressure), "[n, e] in pressure_unit.")
+      .def_prop_ro("T_robot_sensor", array_in(&ArrayRecording::T_robot_sensor),
+                   "[n, 3] (x_mm, y_mm, theta_rad).")
+      .def_prop_ro(
+          "elements_mm", array_in(&ArrayRecording::elements_mm),
+          "Element centres in the sensor frame, [e, 2], or [n, e, 2] where the array changes.")
+      .def_prop_ro("valid", array_in(&ArrayRecording::valid),
+                   "[e] or [n, e], 0 for a dead element; None: all are alive.")
+      .def_prop_ro("time_s", array_in(&ArrayRecording::time_s),
+                   "[n] since the Unix epoch, or None.")
+      .def_prop_ro("baseline", array_in(&ArrayRecording::baseline),
+                   "[e] untouched readings, or None.")
+      .def_prop_ro("device_time_s", array_in(&ArrayRecording::device_time_s),
+                   "[n] by the sensor's own clock, or None.")
+      .def_prop_ro("lost_before", array_in(&ArrayRecording::lost_before),
+                   "[n] frames lost since the last row, or None.")
+      .def_ro("path", &ArrayRecording::path, "The file that it was read from, or \"\".")
       .def_rw("object", &ArrayRecording::object, "Label of the object; \"\" where it is unknown.")
       .def_ro("pressure_unit", &ArrayRecording::pressure_unit, "\"kPa\" or \"raw\".")
       .def_ro("rows", &ArrayRecording::rows, "\"touches\", or \"frames\" of a raw stream.")
@@ -297,9 +232,8 @@ void bind_recording(nb::module_& module) {
         return array_recording(run([path = file.path()](Call&) { return read_recording(path); }));
       },
       "path"_a,
-      "Reads a recording file (HDF5); of an unclosed file, the whole rows. Raises Error naming "
-      "file,\n"
-      "field and remedy.");
+      "Reads a recording file (HDF5); of an unclosed file, the whole rows. Raises Error naming\n"
+      "file, field and remedy.");
 }
 
 }  // namespace

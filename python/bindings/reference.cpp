@@ -18,8 +18,7 @@ Result<std::uint8_t, 1> classify(const ArrayTouch& touch, const ContactClassifie
   for (const Reading reading : reference::classify(touch.touch(), classifier)) {
     classes.push_back(static_cast<std::uint8_t>(reading));
   }
-  const std::size_t e = classes.size();
-  return owned(std::move(classes), {e});
+  return owned(std::move(classes));
 }
 
 Result<double, 2> log_odds_map(const TouchesLike& touches, const OccupancyGrid& grid,
@@ -49,9 +48,7 @@ Result<double, 3> log_likelihoods(const TouchesLike& touches, const PoseLattice&
                   [all = std::move(views.touches), lattice, map, contact](Call&) {
                     return reference::log_likelihoods(all, lattice, map, contact);
                   });
-  return owned(std::move(bins), {static_cast<std::size_t>(lattice.theta_rad.count),
-                                 static_cast<std::size_t>(lattice.y_mm.count),
-                                 static_cast<std::size_t>(lattice.x_mm.count)});
+  return owned(std::move(bins), lattice);
 }
 
 Result<double, 1> identity(const std::vector<ArrayLike>& log_likelihoods,
@@ -59,16 +56,14 @@ Result<double, 1> identity(const std::vector<ArrayLike>& log_likelihoods,
   reference::Posterior posterior;
   ArrayReader reader;
   for (const ArrayLike& bins : log_likelihoods) {
-    const Floats values = reader.floats(bins, "log_likelihoods", {"ntheta", "ny", "nx"});
-    posterior.log_likelihood.emplace_back(values.data, values.data + values.size());
+    posterior.log_likelihood.push_back(
+        reader.floats(bins, "log_likelihoods", {"ntheta", "ny", "nx"}).copied());
   }
   posterior.weight = weights.value_or(std::vector<double>(log_likelihoods.size(), 1.0));
   if (posterior.weight.size() != log_likelihoods.size()) {
     throw Error(Fault::input, "weights: give one for each object");
   }
-  auto probabilities = reference::identity(posterior);
-  const std::size_t n = probabilities.size();
-  return owned(std::move(probabilities), {n});
+  return owned(reference::identity(posterior));
 }
 
 }  // namespace

@@ -3,21 +3,29 @@
 #include <algorithm>
 #include <array>
 #include <initializer_list>
+#include <memory>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <variant>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <nanobind/stl/array.h>
 #include <nanobind/stl/optional.h>
+#include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/variant.h>
 
 #include "bindings.hpp"
+#include "estimate.hpp"
+#include "model/option_words.hpp"
+#include "palpate/error.hpp"
 #include "palpate/files.hpp"
 #include "recognition/map_files.hpp"
 #include "recognition/option_text.hpp"
+#include "recognition/recordings.hpp"
 #include "recognition/refused_option.hpp"
+#include "touches.hpp"
 
 namespace palpate::python {
 
@@ -25,14 +33,10 @@ namespace {
 
 using namespace nb::literals;
 
-/// Throws TypeError where the value is of another type.
+/// The value as C++ has it. Throws TypeError, which Python words, where it is of another type.
 template <typename Value>
 Value typed(nb::handle value) {
-  Value result;
-  if (!nb::try_cast(value, result)) {
-    throw nb::type_error("another type is wanted");
-  }
-  return result;
+  return value_of<Value>(value, "another type is wanted");
 }
 
 // Each function takes an option's value from Python.
@@ -105,11 +109,16 @@ void take(const char* option, nb::handle given, std::optional<Value>& value) {
   take(option, given, value.emplace());
 }
 
-void set_option(Request& request, std::string option, nb::handle given) {
+void set_option(PythonRequest& request, std::string option, nb::handle given) {
   if (option == "device") {
-    const auto device = typed<std::variant<std::int64_t, std::string>>(given);
-    const auto* index = std::get_if<std::int64_t>(&device);
-    request.device = index != nullptr ? std::to_string(*index) : std::get<std::string>(device);
+    const auto device =
+        typed<std::variant<std::shared_ptr<Session>, std::int64_t, std::string>>(given);
+    if (const auto* session = std::get_if<std::shared_ptr<Session>>(&device)) {
+      request.session = *session;
+    } else {
+      const auto* index = std::get_if<std::int64_t>(&device);
+      request.device = index != nullptr ? std::to_string(*index) : std::get<std::string>(device);
+    }
     return;
   }
   std::ranges::replace(option, '_', '-');
@@ -120,23 +129,29 @@ void set_option(Request& request, std::string option, nb::handle given) {
   });
 }
 
+/// A list of what an argument gives: one item, or an iterable of them.
+nb::object items_of(nb::handle given) {
+  const bool is_one = is_path(given.ptr()) || nb::isinstance<ArrayRecording>(given) ||
+                      nb::isinstance<OccupancyGrid>(given) || nb::isinstance<Hypothesis>(given);
+  return call("builtins", "list", is_one ? nb::make_tuple(given) : nb::borrow(given));
+}
+
 }  // namespace
 
-void add_maps(const nb::list& items, Request& request) {
-  for (const nb::handle item : items) {
-    const OccupancyGrid* map = nullptr;
-    const Hypothesis* hypothesis = nullptr;
-    const bool is_map = nb::try_cast(item, map) && map != nullptr;
-    if (is_map || (nb::try_cast(item, hypothesis) && hypothesis != nullptr)) {
-      const Hypothesis given = is_map ? Hypothesis{.map = *map} : *hypothesis;
-      request.given_maps.push_back({fmt::format("map '{}'", given.map.label), given});
+void add_maps(nb::handle given, Request& request) {
+  for (const nb::handle item : items_of(given)) {
+    if (const auto hypothesis = hypothesis_in(item)) {
+      request.given_maps.push_back({fmt::format("map '{}'", hypothesis->map.label), *hypothesis});
     } else {
       request.maps.push_back(nb::borrow<PathLike>(item).text());
     }
   }
-  if (request.given_maps.empty()) {
-    return;
+  if (!request.given_maps.empty()) {
+    read_maps(request);
   }
+}
+
+void read_maps(Request& request) {
   for (const std::string& argument : request.maps) {
     for (const std::filesystem::path& file : map_files(argument)) {
       request.given_maps.push_back({file.string(), {.map = read_map(file)}});
@@ -144,10 +159,76 @@ void add_maps(const nb::list& items, Request& request) {
   }
 }
 
+std::vector<Recording> GivenRecordings::read() const {
+  std::vector<Recording> read_files = read_touch_recordings(files);
+  std::vector<Recording> all;
+  auto file = read_files.begin();
+  for (std::size_t i = 0; i < size; ++i) {
+    const auto given = in_memory.find(i);
+    all.push_back(given == in_memory.end() ? std::move(*file++) : given->second);
+    require_touches(all.back(), all.front());
+  }
+  return all;
+}
+
+GivenRecordings given_recordings(nb::handle given) {
+  GivenRecordings recordings;
+  for (const nb::handle item : items_of(given)) {
+    const ArrayRecording* recording = nullptr;
+    if (nb::try_cast(item, recording) && recording != nullptr) {
+      Recording copy = recording->copied();
+      if (copy.path.empty()) {
+        copy.path = fmt::format("recordings[{}]", recordings.size);
+      }
+      recordings.in_memory.emplace(recordings.size, std::move(copy));
+    } else {
+      recordings.files.push_back(nb::borrow<PathLike>(item).text());
+    }
+    ++recordings.size;
+  }
+  if (recordings.size == 0) {
+    throw Error(Fault::input, "recordings: none; give a Recording or a file");
+  }
+  return recordings;
+}
+
+Subject subject_of(const GivenRecordings& recordings, const Request& given) {
+  Subject subject{complete(given), recordings.read(), {}};
+  for (Recording& recording : subject.recordings) {
+    replace_array(subject.request, recording.path, recording.elements(), recording.elements_mm);
+  }
+  subject.unknowns = list_unknowns(subject.request, subject.recordings);
+  return subject;
+}
+
+RecognitionTask task_of(const Subject& subject, const Device& device, const Call& call,
+                        const HistogramNeed& need) {
+  const Recording& first = subject.recordings.front();
+  return resolve(subject.request, {.pressure_unit = first.pressure_unit,
+                                   .source = first.path,
+                                   .reach_mm = largest_reach_mm(subject.recordings),
+                                   .still_array = array_is_still(subject.unknowns),
+                                   .need = need,
+                                   .cancel_point = [&call] { call.check(); },
+                                   .device = [&device]() -> const Device& { return device; }});
+}
+
+Sentences in_python(Sentences sentences) {
+  std::ranges::transform(sentences, sentences.begin(), in_keywords);
+  return sentences;
+}
+
 void bind_request(nb::module_& module) {
-  nb::class_<Request>(module, "Request", "What is asked of a recognition.")
-      .def(nb::init<>())
-      .def("set", &set_option, "option"_a, "value"_a,
+  nb::class_<PythonRequest>(module, "Request", "What is asked of a recognition.")
+      .def(
+          "__init__",
+          [](PythonRequest* self, nb::handle maps) {
+            PythonRequest request;
+            add_maps(maps, request);
+            new (self) PythonRequest(std::move(request));
+          },
+          "maps"_a = nb::make_tuple())
+      .def("__setattr__", &set_option, "option"_a, "value"_a,
            "Sets an option of recognize(). Raises TypeError where the value is of another type.");
 }
 

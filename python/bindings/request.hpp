@@ -1,11 +1,80 @@
 #pragma once
 
+#include <cstddef>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "recognition/recognition_record.hpp"
 #include "recognition/request.hpp"
-#include "types.hpp"
+#include "recognition/resolve.hpp"
+#include "session.hpp"
 
 namespace palpate::python {
 
-/// Adds files, folders, and maps in memory, beside which files are read here.
-void add_maps(const nb::list& items, Request& request);
+using Sentences = std::vector<std::string>;  ///< what is worth a warning
+
+/// The sentences with options in the words of Python.
+Sentences in_python(Sentences sentences);
+
+/// What a call from Python asks.
+struct PythonRequest : Request {
+  std::shared_ptr<Session> session;  ///< in the place of `device`
+};
+
+/// Adds a map or an iterable of maps: files, folders, and maps in memory, beside which files are
+/// read here.
+void add_maps(nb::handle given, Request& request);
+/// Reads the maps in the request's files, after those in memory.
+void read_maps(Request& request);
+
+/// Recordings as a call from Python gives them: files, or recordings in memory by their place among
+/// all.
+struct GivenRecordings {
+  std::vector<std::string> files;
+  std::map<std::size_t, Recording> in_memory;
+  std::size_t size = 0;
+
+  /// Throws Error as read_touch_recordings() does.
+  std::vector<Recording> read() const;
+};
+/// Takes a Recording, a file, or an iterable of them. Throws Error where there are none.
+GivenRecordings given_recordings(nb::handle given);
+
+/// What a request is about.
+struct Subject {
+  Request request;  ///< completed
+  std::vector<Recording> recordings;
+  std::vector<Unknown> unknowns;  ///< views into the recordings
+};
+/// Completes the request, reads the recordings, with the scene's array, and selects the unknowns.
+/// Throws Error.
+Subject subject_of(const GivenRecordings& recordings, const Request& given);
+
+/// The task of a subject, by what all its recordings have. Throws Error as resolve() does.
+RecognitionTask task_of(const Subject& subject, const Device& device, const Call& call,
+                        const HistogramNeed& need = {});
+
+/// The session, or where there is none, one that is nobody else's: of the device of this name, see
+/// Device::open(). Throws Error.
+inline std::shared_ptr<Session> session_on(const std::shared_ptr<Session>& session,
+                                           const std::string& name) {
+  return session ? session : std::make_shared<Session>(Device::open(name));
+}
+
+/// Runs `work(subject, device, call)` on the request's device, as run() does.
+template <typename F>
+auto run_on_subject(nb::handle recordings, const PythonRequest& request, const Progress& progress,
+                    F work) {
+  return run({}, progress,
+             [given = given_recordings(recordings), request, work = std::move(work)](Call& call) {
+               const Subject subject = subject_of(given, request);
+               const auto session = session_on(request.session, subject.request.device);
+               auto lock = session->lock(call);
+               return work(subject, lock.device(), call);
+             });
+}
 
 }  // namespace palpate::python

@@ -1,5 +1,6 @@
 #include <chrono>
 #include <cmath>
+#include <functional>
 #include <memory>
 #include <mutex>
 
@@ -100,16 +101,30 @@ std::unique_ptr<SharedSensor> open_sensor(const PathLike& board_or_file,
   return std::make_unique<SharedSensor>(std::move(sensor));
 }
 
-Result<const double, 1> values_view(const std::vector<double>& values, nb::handle owner) {
-  return view<double, 1>(values.data(), {values.size()}, owner);
+// Methods and properties of the class Sensor.
+
+/// What `work`, a function or method of the sensor, returns.
+template <typename F>
+auto called(F work) {
+  return [work](SharedSensor& self) {
+    return self.use([&](Sensor& sensor) { return std::invoke(work, sensor); });
+  };
 }
 
-template <typename Class>
-nb::object pose_or_none(const Class& of) {
-  return of.T_robot_sensor ? nb::object(to_array(*of.T_robot_sensor)) : nb::none();
+template <typename Value>
+auto described(Value SensorDescription::*field) {
+  return [field](SharedSensor& self) { return self.description().*field; };
 }
-const nb::sig pose_signature(
-    "def T_robot_sensor(self) -> numpy.typing.NDArray[numpy.float64] | None");
+
+/// [e], or None where the sensor has no such values.
+template <typename ArrayType, typename Value>
+auto described_array(std::vector<Value> SensorDescription::*field) {
+  return [field](SharedSensor& self) -> std::optional<ArrayType> {
+    std::vector<Value> values = self.description().*field;
+    return values.empty() ? std::nullopt
+                          : std::optional(nb::borrow<ArrayType>(owned(std::move(values))));
+  };
+}
 
 void bind_frame(nb::module_& module) {
   nb::class_<Frame>(module, "Frame", "One reading of a whole array, as a sensor delivers it.")
@@ -119,18 +134,17 @@ void bind_frame(nb::module_& module) {
              const std::optional<ArrayLike>& T_robot_sensor) {
             ArrayReader reader;
             const Floats readings = reader.readings(values, "values", {"e"});
-            std::vector<double> known(readings.data, readings.data + readings.size());
-            if (const auto flags = reader.unmasked(values, {}, {"e"})) {
+            std::vector<double> known = readings.copied();
+            if (const auto flags = reader.valid(values, {}, {"e"})) {
               for (std::size_t k = 0; k < known.size(); ++k) {
                 known[k] = flags->data[k] != 0 ? known[k] : std::nan("");
               }
             }
-            std::optional<Pose> pose;
+            Frame frame{.host_time_s = host_time_s, .values = std::move(known)};
             if (T_robot_sensor) {
-              pose = pose_of(*T_robot_sensor, "T_robot_sensor");
+              frame.T_robot_sensor = pose_of(*T_robot_sensor, "T_robot_sensor");
             }
-            new (self) Frame{
-                .host_time_s = host_time_s, .values = std::move(known), .T_robot_sensor = pose};
+            new (self) Frame(std::move(frame));
           },
           "host_time_s"_a, "values"_a, "T_robot_sensor"_a = nb::none(),
           "host_time_s since the Unix epoch; values [e] in the pressure unit, NaN: unknown;\n"
@@ -138,13 +152,9 @@ void bind_frame(nb::module_& module) {
       .def_ro("host_time_s", &Frame::host_time_s, "Time of arrival, since the Unix epoch.")
       .def_ro("device_time_s", &Frame::device_time_s, "By the sensor's own clock, or None.")
       .def_ro("lost_before", &Frame::lost_before, "Frames lost since the last frame.")
-      .def_prop_ro(
-          "values",
-          [](nb::handle_t<Frame> self) {
-            return values_view(nb::cast<const Frame&>(self).values, self);
-          },
-          "[e] in the sensor's pressure unit; NaN: unknown.")
-      .def_prop_ro("T_robot_sensor", &pose_or_none<Frame>, pose_signature,
+      .def_prop_ro("values", view_of(&Frame::values),
+                   "[e] in the sensor's pressure unit; NaN: unknown.")
+      .def_prop_ro("T_robot_sensor", array_of(&Frame::T_robot_sensor),
                    "[3] (x_mm, y_mm, theta_rad), or None.")
       .def("__repr__", [](const Frame& self) {
         return fmt::format("Frame({} elements at {:.3f} s{})", self.values.size(), self.host_time_s,
@@ -157,23 +167,20 @@ void bind_sensor(nb::module_& module) {
       module, "Sensor",
       "A stream of frames from a board, a file or a simulation: a context manager that starts and\n"
       "stops it, and an iterator over its frames, which ends with the stream.")
-      .def(
-          "start", [](SharedSensor& self) { self.use([](Sensor& sensor) { sensor.start(); }); },
-          "Starts the stream. Raises Error where the hardware refuses.")
-      .def(
-          "stop", [](SharedSensor& self) { self.use([](Sensor& sensor) { sensor.stop(); }); },
-          "Stops the stream.")
+      .def("start", called(&Sensor::start),
+           "Starts the stream. Raises Error where the hardware refuses.")
+      .def("stop", called(&Sensor::stop), "Stops the stream.")
       .def(
           "__enter__",
           [](nb::handle_t<SharedSensor> self) {
-            nb::cast<SharedSensor&>(self).use([](Sensor& sensor) { sensor.start(); });
+            called (&Sensor::start)(nb::cast<SharedSensor&>(self));
             return self;
           },
           nb::sig("def __enter__(self) -> Sensor"))
       .def(
           "__exit__",
           [](SharedSensor& self, nb::handle, nb::handle, nb::handle) {
-            self.use([](Sensor& sensor) { sensor.stop(); });
+            called (&Sensor::stop)(self);
           },
           "type"_a.none(), "value"_a.none(), "traceback"_a.none(),
           nb::sig("def __exit__(self, type: object, value: object, traceback: object) -> None"))
@@ -191,61 +198,29 @@ void bind_sensor(nb::module_& module) {
       .def("next", &SharedSensor::next, "timeout_s"_a = nb::none(),
            "The next frame; None where none comes within timeout_s, and after the stream's end.\n"
            "Ctrl-C ends the wait.")
+      .def_prop_ro("ended", called(&Sensor::ended),
+                   "True after the last frame of a stream that ends.")
+      .def_prop_ro("gone", called(&Sensor::gone), "True while the board is unplugged.")
+      .def_prop_ro("name", described(&SensorDescription::name), "For people, such as \"TakkTile\".")
+      .def_prop_ro("pressure_unit", described(&SensorDescription::pressure_unit),
+                   "\"kPa\" or \"raw\".")
+      .def_prop_ro("rate_hz", described(&SensorDescription::rate_hz),
+                   "Frames per second, 0 if unknown.")
+      .def_prop_ro("object", described(&SensorDescription::object),
+                   "Label of the object, where a replay or a simulation knows it, or \"\".")
       .def_prop_ro(
-          "ended",
-          [](SharedSensor& self) {
-            return self.use([](const Sensor& sensor) { return sensor.ended(); });
-          },
-          "True after the last frame of a stream that ends.")
-      .def_prop_ro(
-          "gone",
-          [](SharedSensor& self) {
-            return self.use([](const Sensor& sensor) { return sensor.gone(); });
-          },
-          "True while the board is unplugged.")
-      .def_prop_ro(
-          "name", [](SharedSensor& self) { return self.description().name; },
-          "For people, such as \"TakkTile\".")
-      .def_prop_ro(
-          "pressure_unit", [](SharedSensor& self) { return self.description().pressure_unit; },
-          "\"kPa\" or \"raw\".")
-      .def_prop_ro(
-          "rate_hz", [](SharedSensor& self) { return self.description().rate_hz; },
-          "Frames per second, 0 if unknown.")
-      .def_prop_ro(
-          "object", [](SharedSensor& self) { return self.description().object; },
-          "Label of the object, where a replay or a simulation knows it, or \"\".")
-      .def_prop_ro(
-          "truth", [](SharedSensor& self) { return self.description().truth; },
+          "truth", described(&SensorDescription::truth),
           "The true identity and pose, where a replay or a simulation knows them, or None.")
       .def_prop_ro(
           "elements_mm",
           [](SharedSensor& self) { return to_array(self.description().elements_mm); },
           "[e, 2] in the sensor frame.")
-      .def_prop_ro(
-          "valid",
-          [](SharedSensor& self) -> nb::object {
-            auto valid = self.description().valid;
-            const std::size_t e = valid.size();
-            return e == 0 ? nb::none() : nb::object(owned(std::move(valid), {e}));
-          },
-          nb::sig("def valid(self) -> numpy.typing.NDArray[numpy.uint8] | None"),
-          "[e], 0 for a dead element; None: all are alive.")
-      .def_prop_ro(
-          "baseline",
-          [](SharedSensor& self) -> nb::object {
-            auto baseline = self.description().baseline;
-            const std::size_t e = baseline.size();
-            return e == 0 ? nb::none() : nb::object(owned(std::move(baseline), {e}));
-          },
-          nb::sig("def baseline(self) -> numpy.typing.NDArray[numpy.float64] | None"),
-          "[e] untouched readings, or None.")
-      .def_prop_ro(
-          "lost",
-          [](SharedSensor& self) {
-            return self.use([](const Sensor& sensor) { return sensor.counters().lost; });
-          },
-          "Frames lost since start().")
+      .def_prop_ro("valid", described_array<ByteArray>(&SensorDescription::valid),
+                   "[e], 0 for a dead element; None: all are alive.")
+      .def_prop_ro("baseline", described_array<FloatArray>(&SensorDescription::baseline),
+                   "[e] untouched readings, or None.")
+      .def_prop_ro("lost", called([](const Sensor& sensor) { return sensor.counters().lost; }),
+                   "Frames lost since start().")
       .def("__repr__", [](SharedSensor& self) {
         const SensorDescription sensor = self.description();
         return fmt::format("Sensor('{}', {} elements in {})", sensor.name,
@@ -267,20 +242,10 @@ void bind_detector(nb::module_& module) {
       .def_ro("end_s", &DetectedTouch::end_s,
               "Time of the last frame averaged, since the Unix epoch.")
       .def_ro("frames", &DetectedTouch::frames, "Number of frames averaged.")
-      .def_prop_ro(
-          "pressure",
-          [](nb::handle_t<DetectedTouch> self) {
-            return values_view(nb::cast<const DetectedTouch&>(self).pressure, self);
-          },
-          "[e], above the baseline.")
-      .def_prop_ro(
-          "valid",
-          [](nb::handle_t<DetectedTouch> self) {
-            const auto& valid = nb::cast<const DetectedTouch&>(self).valid;
-            return view<std::uint8_t, 1>(valid.data(), {valid.size()}, self);
-          },
-          "[e], 0 for an element that is dead or was hardly known; empty: all are alive.")
-      .def_prop_ro("T_robot_sensor", &pose_or_none<DetectedTouch>, pose_signature,
+      .def_prop_ro("pressure", view_of(&DetectedTouch::pressure), "[e], above the baseline.")
+      .def_prop_ro("valid", view_of(&DetectedTouch::valid),
+                   "[e], 0 for an element that is dead or was hardly known; empty: all are alive.")
+      .def_prop_ro("T_robot_sensor", array_of(&DetectedTouch::T_robot_sensor),
                    "[3] (x_mm, y_mm, theta_rad), or None.")
       .def("__repr__", [](const DetectedTouch& self) {
         return fmt::format("DetectedTouch({} frames from {:.3f} to {:.3f} s)", self.frames,
@@ -299,12 +264,10 @@ void bind_detector(nb::module_& module) {
             std::vector<double> zeros;
             std::vector<std::uint8_t> alive;
             if (baseline) {
-              const Floats values = reader.floats(*baseline, "baseline", {"e"});
-              zeros.assign(values.data, values.data + values.size());
+              zeros = reader.floats(*baseline, "baseline", {"e"}).copied();
             }
             if (valid) {
-              const Bytes flags = reader.flags(*valid, "valid", {"e"});
-              alive.assign(flags.data, flags.data + flags.size());
+              alive = reader.flags(*valid, "valid", {"e"}).copied();
             }
             new (self) TouchDetector({.onset = onset,
                                       .release = release,
@@ -332,9 +295,7 @@ void bind_detector(nb::module_& module) {
   module.def(
       "baseline_of",
       [](const std::vector<Frame>& frames, SharedSensor& sensor, std::optional<double> onset) {
-        std::vector<double> baseline = baseline_of(frames, sensor.description(), onset);
-        const std::size_t e = baseline.size();
-        return owned(std::move(baseline), {e});
+        return owned(baseline_of(frames, sensor.description(), onset));
       },
       "frames"_a, "sensor"_a, "onset"_a = nb::none(),
       "Takes a tare: what the untouched array reads, [e], as medians over the frames. With onset,\n"

@@ -9,16 +9,13 @@ Session::Lock::Lock(Session& session, const Call& call) : session_(session) {
   while (!session_.working_.try_lock_for(20ms)) {
     call.check();
   }
+  session_.working_call_ = &call;
 }
 
 Session::Lock::~Lock() {
   session_.sweep();
   session_.working_.unlock();
-  // What came after the sweep found the device locked.
-  while (!session_.swept() && session_.working_.try_lock()) {
-    session_.sweep();
-    session_.working_.unlock();
-  }
+  session_.sweep_unlocked();  // what came after the sweep found the device locked
 }
 
 void Session::sweep() {
@@ -34,6 +31,13 @@ bool Session::swept() {
   return unwanted_.empty();
 }
 
+void Session::sweep_unlocked() {
+  while (!swept() && working_.try_lock()) {
+    sweep();
+    working_.unlock();
+  }
+}
+
 void Session::destroy(std::shared_ptr<void> object) {
   if (!process_.is_here()) {
     return;  // the object's destructor leaves all to the parent, whose threads hold locks
@@ -42,10 +46,7 @@ void Session::destroy(std::shared_ptr<void> object) {
     const std::lock_guard lock(sweeping_);
     unwanted_.push_back(std::move(object));
   }
-  while (!swept() && working_.try_lock()) {
-    sweep();
-    working_.unlock();
-  }
+  sweep_unlocked();
 }
 
 }  // namespace palpate::python

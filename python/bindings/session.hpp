@@ -32,6 +32,8 @@ class Session {
 
   /// Waits until no other thread works on the device; throws where the call is given up meanwhile.
   Lock lock(const Call& call) { return {*this, call}; }
+  /// For long work on the device: throws where the call that holds the device is given up.
+  void check() const { working_call_->check(); }
   /// Destroys an object of the device now or, where a thread works on the device, after that.
   void destroy(std::shared_ptr<void> object);
 
@@ -40,21 +42,16 @@ class Session {
 
  private:
   void sweep();
+  void sweep_unlocked();
   bool swept();
 
   OwnProcess process_;
   Device device_;
   std::timed_mutex working_;
+  const Call* working_call_ = nullptr;  ///< of the thread that holds working_
   std::mutex sweeping_;
   std::vector<std::shared_ptr<void>> unwanted_;
 };
-
-/// The session, or where there is none, one that is nobody else's: of the device of this name, see
-/// Device::open(). Throws Error.
-inline std::shared_ptr<Session> session_on(const std::shared_ptr<Session>& session,
-                                           const std::string& name) {
-  return session ? session : std::make_shared<Session>(Device::open(name));
-}
 
 /// An object of a device: keeps it open, and is destroyed while no thread works on the device.
 template <typename Object>
@@ -90,12 +87,26 @@ class Owned {
 
 /// Makes an object on the device: `make(device)` as run() runs it.
 template <typename Object, typename F>
-Owned<Object> make_owned(std::vector<nb::object> kept, const std::shared_ptr<Session>& session,
-                         F make) {
-  return run(std::move(kept), Progress(), [session, make = std::move(make)](Call& call) {
+Owned<Object> make_owned(const std::shared_ptr<Session>& session, F make) {
+  return run([session, make = std::move(make)](Call& call) {
     auto lock = session->lock(call);
     return Owned<Object>(session, make(lock.device()));
   });
+}
+
+/// A method of an object that a class of Python owns, as a function of that class: it runs on the
+/// device, by use().
+template <typename Held, typename Object, typename Value, typename... Arguments>
+auto on_device(Value (Object::*method)(Arguments...)) {
+  return [method](const Held& self, std::decay_t<Arguments>... arguments) {
+    return self.use([=](Object& object, Call&) { return (object.*method)(arguments...); });
+  };
+}
+template <typename Held, typename Object, typename Value, typename... Arguments>
+auto on_device(Value (Object::*method)(Arguments...) const) {
+  return [method](const Held& self, std::decay_t<Arguments>... arguments) {
+    return self.use([=](const Object& object, Call&) { return (object.*method)(arguments...); });
+  };
 }
 
 }  // namespace palpate::python

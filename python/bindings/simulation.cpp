@@ -43,21 +43,15 @@ ArrayRecording simulate(const PathLike& letter_or_file,
 void bind_simulation(nb::module_& module) {
   nb::class_<SensorModel>(module, "SensorModel",
                           "The simulated sensor, that of the paper's reference [19].")
-      .def(
-          "__init__",
-          [](SensorModel* self, double psf_mm, double element_mm, double pressure_kpa,
-             double force_spread, double gain_spread, double noise_kpa) {
-            new (self)
-                SensorModel{psf_mm, element_mm, pressure_kpa, force_spread, gain_spread, noise_kpa};
-          },
-          nb::kw_only(), "psf_mm"_a = SensorModel{}.psf_mm,
-          "element_mm"_a = SensorModel{}.element_mm, "pressure_kpa"_a = SensorModel{}.pressure_kpa,
-          "force_spread"_a = SensorModel{}.force_spread,
-          "gain_spread"_a = SensorModel{}.gain_spread, "noise_kpa"_a = SensorModel{}.noise_kpa,
-          "psf_mm: standard deviation of the point spread; element_mm: edge of an element;\n"
-          "pressure_kpa: mean reading of an element wholly on the shape; force_spread and\n"
-          "gain_spread: relative standard deviations of press force and element gain; noise_kpa:\n"
-          "standard deviation of the additive noise.")
+      .def(nb::init<double, double, double, double, double, double>(), nb::kw_only(),
+           "psf_mm"_a = SensorModel{}.psf_mm, "element_mm"_a = SensorModel{}.element_mm,
+           "pressure_kpa"_a = SensorModel{}.pressure_kpa,
+           "force_spread"_a = SensorModel{}.force_spread,
+           "gain_spread"_a = SensorModel{}.gain_spread, "noise_kpa"_a = SensorModel{}.noise_kpa,
+           "psf_mm: standard deviation of the point spread; element_mm: edge of an element;\n"
+           "pressure_kpa: mean reading of an element wholly on the shape; force_spread and\n"
+           "gain_spread: relative standard deviations of press force and element gain; noise_kpa:\n"
+           "standard deviation of the additive noise.")
       .def_ro("psf_mm", &SensorModel::psf_mm)
       .def_ro("element_mm", &SensorModel::element_mm)
       .def_ro("pressure_kpa", &SensorModel::pressure_kpa)
@@ -70,11 +64,9 @@ void bind_simulation(nb::module_& module) {
       "sensor"_a = SensorModel{},
       "Simulates touches of a shape: A to Z, 0 to 9, ring, bar, or a polygon file.\n\n"
       "T_object_sensor [n, 3]: poses of the array about the object, by default training_grid();\n"
-      "T_object_robot [3]: the pose of an unknown object, which the recording stores as its "
-      "truth;\n"
-      "by default the object is known and lies at the robot's origin. elements_mm [e, 2]: by "
-      "default\n"
-      "digitacts_array(). The same seed gives the same recording, as in C++.");
+      "T_object_robot [3]: the pose of an unknown object, which the recording stores as its\n"
+      "truth; by default the object is known and lies at the robot's origin. elements_mm [e, 2]:\n"
+      "by default digitacts_array(). The same seed gives the same recording, as in C++.");
   module.def(
       "training_grid", [] { return to_array(training_grid()); },
       "The 192 training poses T_object_sensor of Sec. II, [192, 3] (x_mm, y_mm, theta_rad).");

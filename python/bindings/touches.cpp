@@ -11,12 +11,7 @@ namespace {
 /// Row i of an array [n, e...], where it has one more axis than `rank`; else all of it.
 template <typename Value>
 Array<Value> row(const Array<Value>& array, std::size_t rank, std::size_t i) {
-  if (array.shape.size() == rank) {
-    return array;
-  }
-  Array<Value> result{array.object[i], nullptr, {array.shape.begin() + 1, array.shape.end()}};
-  result.data = array.data + i * result.size();
-  return result;
+  return array.shape.size() == rank ? array : in_place<Value>(array.object[i]);
 }
 
 template <typename Value>
@@ -29,28 +24,14 @@ std::span<const Value> bytes_row(const std::optional<Array<Value>>& array, std::
 }
 
 /// An array over a vector's memory, which it takes over.
-template <typename Value, std::size_t rank>
-Array<Value> taken(std::vector<Value> values, const std::size_t (&shape)[rank]) {
-  Array<Value> array;
-  array.data = values.data();
-  array.shape.assign(shape, shape + rank);
-  array.object = owned(std::move(values), shape);
-  return array;
-}
-
-/// The same of poses or points, as rows of numbers.
 template <typename Row, std::size_t rank>
-Floats taken_rows(std::vector<Row> rows, const std::size_t (&shape)[rank]) {
-  auto* kept = new std::vector<Row>(std::move(rows));
-  const nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<decltype(kept)>(p); });
-  auto* data = reinterpret_cast<double*>(kept->data());
-  return {Result<double, rank>(data, shape, owner), data, {shape, shape + rank}};
+auto taken(std::vector<Row> rows, const std::size_t (&shape)[rank]) {
+  return in_place<NumberOf<Row>>(owned(std::move(rows), shape));
 }
 
 template <typename Value>
 std::vector<Value> vector_of(const std::optional<Array<Value>>& array) {
-  return array ? std::vector<Value>(array->data, array->data + array->size())
-               : std::vector<Value>();
+  return array ? array->copied() : std::vector<Value>();
 }
 
 }  // namespace
@@ -103,56 +84,42 @@ void ArrayRecording::keep(std::vector<nb::object>& kept) const {
 Recording ArrayRecording::copied() const {
   const auto poses = as_poses(T_robot_sensor);
   const auto places = as_points(elements_mm);
-  return {.path = path,
-          .object = object,
-          .pressure_unit = pressure_unit,
-          .rows = rows,
-          .T_robot_sensor = {poses.begin(), poses.end()},
-          .pressure = vector_of(std::optional(pressure)),
-          .elements_mm = {places.begin(), places.end()},
-          .valid = vector_of(valid),
-          .time_s = vector_of(time_s),
-          .truth = truth,
-          .sensor = sensor,
-          .serial = serial,
-          .baseline = vector_of(baseline),
-          .device_time_s = vector_of(device_time_s),
-          .lost_before = vector_of(lost_before),
-          .closed = closed};
+  Recording copy = static_cast<const Recording&>(*this);
+  copy.T_robot_sensor = {poses.begin(), poses.end()};
+  copy.pressure = pressure.copied();
+  copy.elements_mm = {places.begin(), places.end()};
+  copy.valid = vector_of(valid);
+  copy.time_s = vector_of(time_s);
+  copy.baseline = vector_of(baseline);
+  copy.device_time_s = vector_of(device_time_s);
+  copy.lost_before = vector_of(lost_before);
+  return copy;
 }
 
 ArrayRecording array_recording(Recording recording) {
   const std::size_t n = recording.size();
   const std::size_t e = recording.elements();
-  const auto optional = [](auto values, const auto&... shape) {
-    using Value = typename decltype(values)::value_type;
+  const auto optional = [](auto& values, const auto&... shape) {
+    using Value = typename std::decay_t<decltype(values)>::value_type;
     return values.empty() ? std::nullopt
                           : std::optional<Array<Value>>(taken(std::move(values), shape...));
   };
-  const bool moving_array = recording.elements_mm.size() != e;
-  const bool moving_valid = recording.valid.size() > e;
   const std::size_t frames[] = {n};
   const std::size_t array[] = {e};
   const std::size_t all[] = {n, e};
-  ArrayRecording result{.path = recording.path,
-                        .object = recording.object,
-                        .pressure_unit = recording.pressure_unit,
-                        .rows = recording.rows,
-                        .T_robot_sensor = taken_rows(std::move(recording.T_robot_sensor), {n, 3}),
-                        .pressure = taken(std::move(recording.pressure), {n, e}),
-                        .elements_mm = moving_array
-                                           ? taken_rows(std::move(recording.elements_mm), {n, e, 2})
-                                           : taken_rows(std::move(recording.elements_mm), {e, 2}),
-                        .valid = moving_valid ? optional(std::move(recording.valid), all)
-                                              : optional(std::move(recording.valid), array),
-                        .time_s = optional(std::move(recording.time_s), frames),
-                        .truth = recording.truth,
-                        .sensor = recording.sensor,
-                        .serial = recording.serial,
-                        .baseline = optional(std::move(recording.baseline), array),
-                        .device_time_s = optional(std::move(recording.device_time_s), frames),
-                        .lost_before = optional(std::move(recording.lost_before), frames),
-                        .closed = recording.closed};
+  ArrayRecording result;
+  const bool moves = recording.elements_mm.size() != e;
+  result.elements_mm = moves ? taken(std::move(recording.elements_mm), {n, e, 2})
+                             : taken(std::move(recording.elements_mm), {e, 2});
+  result.valid = recording.valid.size() > e ? optional(recording.valid, all)
+                                            : optional(recording.valid, array);
+  result.T_robot_sensor = taken(std::move(recording.T_robot_sensor), {n, 3});
+  result.pressure = taken(std::move(recording.pressure), {n, e});
+  result.time_s = optional(recording.time_s, frames);
+  result.baseline = optional(recording.baseline, array);
+  result.device_time_s = optional(recording.device_time_s, frames);
+  result.lost_before = optional(recording.lost_before, frames);
+  static_cast<Recording&>(result) = std::move(recording);
   return result;
 }
 

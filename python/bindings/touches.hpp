@@ -1,7 +1,6 @@
 #pragma once
 
 #include <optional>
-#include <string>
 #include <vector>
 
 #include <nanobind/nanobind.h>
@@ -23,24 +22,16 @@ struct ArrayTouch {
   void keep(std::vector<nb::object>& kept) const;
 };
 
-/// A recording whose arrays are NumPy's; fields as in palpate::Recording.
-struct ArrayRecording {
-  std::string path;
-  std::string object;
-  std::string pressure_unit = "kPa";
-  std::string rows = "touches";
+/// A recording whose arrays are NumPy's, in the place of Recording's own, which are empty.
+struct ArrayRecording : Recording {
   Floats T_robot_sensor;  ///< [n, 3]
   Floats pressure;        ///< [n, e]
   Floats elements_mm;     ///< [e, 2] or [n, e, 2]
   std::optional<Bytes> valid;
   std::optional<Floats> time_s;
-  std::optional<Truth> truth;
-  std::string sensor;
-  std::string serial;
   std::optional<Floats> baseline;
   std::optional<Floats> device_time_s;
   std::optional<Counts> lost_before;
-  bool closed = true;
 
   std::size_t size() const { return pressure.shape[0]; }
   std::size_t elements() const { return pressure.shape[1]; }

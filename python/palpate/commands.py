@@ -3,20 +3,16 @@
 They have the commands' rules, defaults and words.
 """
 
-import inspect
 import json
 import os
-import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, Literal
 
 from . import _palpate
 from ._palpate import (
     Device,
     Evaluation,
-    Hypothesis,
-    OccupancyGrid,
     Recording,
     SensorCalibration,
     TouchGains,
@@ -24,18 +20,23 @@ from ._palpate import (
     Truth,
 )
 from .many import Recognized
-from .recognition import RecognitionOptions, Record, request_of
+from .recognition import (
+    RecognitionOptions,
+    Record,
+    _Maps,
+    _Pair,
+    _Path,
+    _Recordings,
+    filled,
+    request_of,
+    warn,
+)
 
 # The build writes the stubs by importing the package, where there is no NumPy.
 if TYPE_CHECKING:
     import numpy
     from numpy.typing import ArrayLike, NDArray
     from typing_extensions import Unpack
-
-_Path = str | bytes | os.PathLike[str] | os.PathLike[bytes]
-_Pair = tuple[float, float]
-_Maps = OccupancyGrid | Hypothesis | _Path | Iterable[OccupancyGrid | Hypothesis | _Path]
-_Options = TypeVar("_Options")
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,25 +96,16 @@ def plan(
     Raises Error in the words of the command, also for particles, which have no belief of all poses.
     What the command would say on standard error becomes a UserWarning.
     """
-    if isinstance(candidates, (bytes, os.PathLike)):
-        candidates = os.fsdecode(candidates)
+    request = _request("plan", maps, options, device)
     fields, sentences = _palpate.plan(
-        _recordings([recording]),
-        _maps_of(maps),
-        _request("plan", options, device),
-        goal,
-        candidates,
-        samples,
-        plan_seed,
-        device if isinstance(device, Device) else None,
-        progress,
+        [recording], request, goal, candidates, samples, plan_seed, progress
     )
-    _warn(sentences)
+    warn(sentences)
     return Plan(**{**fields, "believed": Record(json.loads(fields["believed"]))})
 
 
 def fit_touch_sd(
-    recordings: Recording | _Path | Iterable[Recording | _Path],
+    recordings: _Recordings,
     maps: _Maps = (),
     *,
     device: Device | str | int | None = None,
@@ -128,19 +120,14 @@ def fit_touch_sd(
     Raises Error in the words of the command, also beside touch_sd, slip_sd, none and a sensor model.
     What the command would say on standard error becomes a UserWarning.
     """
-    fit, sentences = _palpate.fit_touch_sd(
-        _recordings(recordings),
-        _maps_of(maps),
-        _request("fit_touch_sd", options, device),
-        device if isinstance(device, Device) else None,
-        progress,
-    )
-    _warn(sentences)
+    request = _request("fit_touch_sd", maps, options, device)
+    fit, sentences = _palpate.fit_touch_sd(recordings, request, progress)
+    warn(sentences)
     return fit
 
 
 def calibrate(
-    recordings: Recording | _Path | Iterable[Recording | _Path],
+    recordings: _Recordings,
     *,
     maps: _Maps = (),
     unposed: bool = False,
@@ -171,25 +158,15 @@ def calibrate(
 
     Raises Error in the words of the command. What could not be learned is in the result's `warnings`.
     """
+    given = locals()
     if isinstance(bins, str):
         raise TypeError(f"bins: {bins!r}; give counts, such as (25, 25, 16), or leave it out")
-    region = {"bins": bins, "x_mm": x_mm, "y_mm": y_mm, "theta_deg": theta_deg, "pivot_mm": pivot_mm}
-    asked = {
-        "unposed": unposed,
-        "threshold": threshold,
-        "ratio": ratio,
-        "layer": layer,
-        "levels": levels,
-        "max_maps": max_maps,
-        "gives_bins": any(value is not None for value in region.values()),
-    }
-    named = None if isinstance(device, Device) else device
+    asked = ("bins", "x_mm", "y_mm", "theta_deg", "pivot_mm", "frames", "device")
+    learned = ("unposed", "threshold", "ratio", "layer", "levels", "max_maps")
     return _palpate.calibrate(
-        _recordings(recordings),
-        _maps_of(maps),
-        request_of({**region, "frames": frames, "device": named}),
-        _filled(_palpate.CalibrationRequest(), calibrate, asked),
-        device if isinstance(device, Device) else None,
+        recordings,
+        request_of({name: given[name] for name in asked}, maps),
+        filled(_palpate.CalibrationRequest(), calibrate, {name: given[name] for name in learned}),
         progress,
     )
 
@@ -253,71 +230,27 @@ def import_tables(
     between two poses, columns of poses that were left out, and units that nothing gives become a
     UserWarning.
     """
-    text, elements_mm = "", None
-    if isinstance(array, (str, bytes, os.PathLike)):
-        text = os.fsdecode(array)
-    elif isinstance(array, tuple) and len(array) == 3 and isinstance(array[0], int):
-        text = ":".join(map(str, array))
-    else:
-        elements_mm = array
-    options = {
-        "pressures": os.fsdecode(pressures),
-        "array": text,
-        "poses": None if poses is None else os.fsdecode(poses),
-        "unposed": unposed,
-        "rows": rows,
-        "pressure_unit": pressure_unit,
-        "pose_unit": None if pose_unit is None else ",".join(pose_unit),
-        "time_unit": time_unit,
-        "time_column": time_column,
-        "pressure_columns": pressure_columns,
-        "pose_columns": None if pose_columns is None else ",".join(pose_columns),
-        "largest_gap_s": largest_gap_s,
-        "rate": rate,
-        "object": object,
-    }
-    request = _filled(_palpate.ImportOptions(), import_tables, options)
+    options = dict(locals())
+    del options["truth"]
+    elements_mm = None
+    if isinstance(array, tuple) and len(array) == 3 and isinstance(array[0], int):
+        options["array"] = ":".join(map(str, array))
+    elif not isinstance(array, (str, bytes, os.PathLike)):
+        elements_mm = options.pop("array")
+    for names in ("pose_unit", "pose_columns"):
+        if options[names] is not None:
+            options[names] = ",".join(options[names])
+    request = filled(_palpate.ImportOptions(), import_tables, options)
     recording, sentences = _palpate.import_tables(request, elements_mm)
     recording.truth = truth
-    _warn(sentences)
+    warn(sentences)
     return recording
 
 
-def _recordings(given: Recording | _Path | Iterable[Recording | _Path]) -> list[Recording | str]:
-    if isinstance(given, (Recording, str, bytes, os.PathLike)):
-        given = [given]
-    return [item if isinstance(item, Recording) else os.fsdecode(item) for item in given]
-
-
-def _maps_of(given: _Maps) -> list[OccupancyGrid | Hypothesis | str]:
-    if isinstance(given, (OccupancyGrid, Hypothesis, str, bytes, os.PathLike)):
-        given = [given]
-    return [
-        item if isinstance(item, (OccupancyGrid, Hypothesis)) else os.fsdecode(item) for item in given
-    ]
-
-
 def _request(
-    function: str, options: RecognitionOptions, device: Device | str | int | None
+    function: str, maps: _Maps, options: RecognitionOptions, device: Device | str | int | None
 ) -> _palpate.Request:
     for name in options:
         if name not in RecognitionOptions.__annotations__:
             raise TypeError(f"{function}() got an unexpected keyword argument '{name}'")
-    return request_of({**options, "device": None if isinstance(device, Device) else device})
-
-
-def _filled(request: _Options, function: Callable[..., Any], options: Mapping[str, Any]) -> _Options:
-    """The request with the options of a function; None leaves the default."""
-    for name, value in options.items():
-        if value is not None:
-            try:
-                setattr(request, name, value)
-            except TypeError:
-                wanted = inspect.formatannotation(function.__annotations__[name])
-                raise TypeError(f"{name}: {value!r}; give {wanted}") from None
-    return request
-
-
-def _warn(sentences: list[str]) -> None:
-    for sentence in sentences:
-        warnings.warn(sentence, stacklevel=3)
+    return request_of({**options, "device": device}, maps)

@@ -22,12 +22,10 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 from . import _palpate
 from ._error import Error
 from ._palpate import Device, DeviceInfo
-from .recognition import RecognitionOptions, Record, request_of
+from .recognition import RecognitionOptions, Record, _Path, request_of, warn
 
 if TYPE_CHECKING:
     from distributed import Client
-
-_Path = str | bytes | os.PathLike[str] | os.PathLike[bytes]
 
 
 class Task(RecognitionOptions, total=False):
@@ -111,8 +109,7 @@ def recognize_many(
     else:
         with _connected(client) as cluster:
             batch, entries, sentences = cluster.submit(_settle, recordings, asked, pure=False).result()
-    for sentence in sentences:
-        warnings.warn(sentence, stacklevel=2)
+    warn(sentences)
     chunks = [entries[begin : begin + chunk] for begin in range(0, len(entries), chunk)]
     return _results(
         chunks, _here(batch, chunks) if client is None else _there(client, batch, chunks, ordered)
@@ -148,6 +145,8 @@ def _asked(recordings: list[str], task: Task) -> _Asked:
     for name in options:
         if name not in Task.__annotations__:
             raise Error(f"task: '{name}' is not known; give {', '.join(Task.__annotations__)}")
+    if isinstance(options.get("device"), Device):
+        raise TypeError("device: each worker opens its own; give a name or an index")
     files = [*recordings, *_paths(options.get("maps", ()))]
     files += [os.fsdecode(options[name]) for name in ("scene", "sensor_model") if options.get(name)]
     relative = [path for path in files if not os.path.isabs(path)]

@@ -4,13 +4,16 @@ import inspect
 import os
 import warnings
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any, Literal, TypedDict
+from typing import Any, Literal, TypedDict, TypeVar
 
 from . import _palpate
 from ._palpate import Device, Hypothesis, OccupancyGrid, Recording
 
 _Path = str | bytes | os.PathLike[str] | os.PathLike[bytes]
 _Pair = tuple[float, float]
+_Recordings = Recording | _Path | Iterable[Recording | _Path]
+_Maps = OccupancyGrid | Hypothesis | _Path | Iterable[OccupancyGrid | Hypothesis | _Path]
+_Request = TypeVar("_Request")
 
 
 class RecognitionOptions(TypedDict, total=False):
@@ -65,8 +68,8 @@ class Record(dict[str, Any]):
 
 
 def recognize(
-    recordings: Recording | _Path | Iterable[Recording | _Path],
-    maps: OccupancyGrid | Hypothesis | _Path | Iterable[OccupancyGrid | Hypothesis | _Path] = (),
+    recordings: _Recordings,
+    maps: _Maps = (),
     *,
     bins: tuple[int, int, int] | Literal["auto", "fine"] | None = None,
     x_mm: _Pair | None = None,
@@ -115,39 +118,35 @@ def recognize(
     would say on standard error becomes a UserWarning; what looks wrong with the touches is in the
     records' `warnings`.
     """
-    options = {name: value for name, value in locals().items() if name not in _NO_OPTIONS}
-    if isinstance(device, Device):
-        options["device"] = None
-    if isinstance(maps, (OccupancyGrid, Hypothesis, str, bytes, os.PathLike)):
-        maps = [maps]
-    if isinstance(recordings, (Recording, str, bytes, os.PathLike)):
-        recordings = [recordings]
-    records, sentences = _palpate.recognize(
-        [item if isinstance(item, Recording) else os.fsdecode(item) for item in recordings],
-        [
-            item if isinstance(item, (OccupancyGrid, Hypothesis)) else os.fsdecode(item)
-            for item in maps
-        ],
-        request_of(options),
-        device if isinstance(device, Device) else None,
-        progress,
-    )
-    for sentence in sentences:
-        warnings.warn(sentence, stacklevel=2)
+    options = {
+        name: value
+        for name, value in locals().items()
+        if name not in ("recordings", "maps", "progress")
+    }
+    records, sentences = _palpate.recognize(recordings, request_of(options, maps), progress)
+    warn(sentences)
     return [Record(record) for record in records]
 
 
-_NO_OPTIONS = ("recordings", "maps", "progress")
+def request_of(options: Mapping[str, object], maps: object = ()) -> _palpate.Request:
+    """The options and maps of recognize() as a request; None leaves the default."""
+    return filled(_palpate.Request(maps), recognize, options)
 
 
-def request_of(options: Mapping[str, object]) -> _palpate.Request:
-    """The options of recognize() as a request; None leaves the default."""
-    request = _palpate.Request()
+def filled(request: _Request, function: Callable[..., Any], options: Mapping[str, Any]) -> _Request:
+    """The request with the options of a function; None leaves the default."""
     for name, value in options.items():
         if value is not None:
+            path = isinstance(value, (bytes, os.PathLike))
             try:
-                request.set(name, os.fsdecode(value) if isinstance(value, (bytes, os.PathLike)) else value)
+                setattr(request, name, os.fsdecode(value) if path else value)
             except TypeError:
-                wanted = inspect.formatannotation(recognize.__annotations__[name])
+                wanted = inspect.formatannotation(function.__annotations__[name])
                 raise TypeError(f"{name}: {value!r}; give {wanted}") from None
     return request
+
+
+def warn(sentences: list[str]) -> None:
+    """Warns the caller of the function that calls this one."""
+    for sentence in sentences:
+        warnings.warn(sentence, stacklevel=3)

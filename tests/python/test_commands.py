@@ -191,6 +191,8 @@ def test_candidates_that_are_no_poses_are_refused(files: Files) -> None:
     for candidates, message in cases:
         with pytest.raises(palpate.Error, match=message):
             palpate.plan(files.unknown, files.maps, candidates=candidates)
+    with pytest.raises(TypeError, match="not list"):  # a plan is of one recording
+        palpate.plan([files.unknown], files.maps)  # type: ignore[arg-type]
     with pytest.raises(TypeError, match="unexpected keyword argument 'each_frame'"):
         palpate.plan(files.unknown, files.maps, each_frame=True)  # type: ignore[call-arg]
 

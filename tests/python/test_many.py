@@ -245,6 +245,14 @@ def test_a_wrong_call_is_refused_at_once(
         palpate.recognize_many(**{"paths": recordings, "task": task, **arguments})
 
 
+def test_an_open_device_is_no_part_of_a_task(
+    device: palpate.Device, files: Files, recordings: pathlib.Path
+) -> None:
+    task: Any = {"maps": files.maps, "device": device}
+    with pytest.raises(TypeError, match="^device: each worker opens its own; give a name"):
+        palpate.recognize_many(recordings, task)
+
+
 def test_what_every_recording_tells_is_told_once(files: Files, recordings: pathlib.Path) -> None:
     task: palpate.Task = {"maps": files.maps, "bins": (8, 8, 8), "x_mm": (-12, 12),
                           "y_mm": (-12, 12), "filter": "histogram", "touch_sd_deg": 3}  # fmt: skip
