@@ -42,17 +42,16 @@ void LevelCounts::add(Reading reading, double value, double weight) {
   counts_.at(at + 1) += share * weight;
 }
 
-void LevelCounts::add(std::span<const Touch> touches, std::span<const Pose> T_object_robot,
-                      const OccupancyGrid& layer, const ContactModel& classifier) {
+void LevelCounts::add(std::span<const TouchEvidence> touches, std::span<const Pose> T_object_robot,
+                      const OccupancyGrid& layer) {
   const InterpolatedMap values(layer, layer.prior);
   const double weight = 1.0 / static_cast<double>(T_object_robot.size());
-  for (const Touch& touch : touches) {
-    const std::vector<Reading> readings = classifier.classify(touch);
+  for (const TouchEvidence& touch : touches) {
     for (const Pose& pose : T_object_robot) {
       const Pose T_object_sensor = pose * touch.T_robot_sensor;
-      for (std::size_t e = 0; e < readings.size(); ++e) {
-        if (readings[e] != Reading::unknown) {
-          add(readings[e], values.log_odds(T_object_sensor * touch.elements_mm[e]), weight);
+      for (std::size_t e = 0; e < touch.readings.size(); ++e) {
+        if (touch.readings[e] != Reading::unknown) {
+          add(touch.readings[e], values.log_odds(T_object_sensor * touch.elements_mm[e]), weight);
         }
       }
     }

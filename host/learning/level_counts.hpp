@@ -4,11 +4,11 @@
 #include <span>
 #include <vector>
 
+#include "model/touch_evidence.hpp"
 #include "palpate/contact_model.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/pose.hpp"
 #include "palpate/reading_layer.hpp"
-#include "palpate/touch.hpp"
 
 namespace palpate {
 
@@ -28,12 +28,12 @@ class LevelCounts {
   /// @param value of the layer at the reading's place
   /// @param weight by which the reading counts, above 0
   void add(Reading reading, double value, double weight = 1.0);
-  /// Counts every element of touches of an object that is at one of some poses, each of them as
+  /// Counts every element of touches of an object that is at one of some poses, all of them as
   /// likely: a reading counts once in all.
+  /// @param touches classified into the table's levels
   /// @param T_object_robot the poses, at least one
-  /// @param classifier with the table's levels, see ContactModel::classify()
-  void add(std::span<const Touch> touches, std::span<const Pose> T_object_robot,
-           const OccupancyGrid& layer, const ContactModel& classifier);
+  void add(std::span<const TouchEvidence> touches, std::span<const Pose> T_object_robot,
+           const OccupancyGrid& layer);
   LevelCounts& operator+=(const LevelCounts& other);
 
   std::size_t levels() const { return counts_.size() / ReadingLayer::nodes; }

@@ -292,8 +292,8 @@ std::optional<double> learn_point_spread(const std::vector<Press>& presses,
       errors[i] = squared_error(objects[i], blurred(face, sigma_mm, edge_mm));
     });
     double sum = 0.0;
-    for (const double error : errors) {
-      sum += error;
+    for (const double of_object : errors) {
+      sum += of_object;
     }
     return sum;
   };
@@ -303,15 +303,15 @@ std::optional<double> learn_point_spread(const std::vector<Press>& presses,
   constexpr double tolerance = 0.005;
   const double lowest = std::log(least * spacing_mm);
   const double highest = std::log(most * spacing_mm);
-  const auto quality = [&](double log_sigma) { return -error_at(std::exp(log_sigma)); };
+  const auto error = [&](double log_sigma) { return error_at(std::exp(log_sigma)); };
   // The face's edges move from cell to cell, so that the error has minima besides the least one.
   constexpr int steps = 10;
   const double step = (highest - lowest) / steps;
   int best = 0;
-  double largest = quality(lowest);
+  double smallest = error(lowest);
   for (int i = 1; i <= steps; ++i) {
-    if (const double here = quality(lowest + i * step); here > largest) {
-      largest = here;
+    if (const double here = error(lowest + i * step); here < smallest) {
+      smallest = here;
       best = i;
     }
   }
@@ -319,7 +319,7 @@ std::optional<double> learn_point_spread(const std::vector<Press>& presses,
     return {};
   }
   const double found =
-      largest_at(lowest + (best - 1) * step, lowest + (best + 1) * step, tolerance, quality);
+      least_at(lowest + (best - 1) * step, lowest + (best + 1) * step, tolerance, error);
   return std::exp(found);
 }
 

@@ -41,11 +41,12 @@ PressPlacer::PressPlacer(const Hypothesis& hypothesis, const ContactModel& conta
   }
 }
 
-std::vector<float> PressPlacer::log_likelihoods(const Press& press) {
+std::vector<float> PressPlacer::log_likelihoods(std::span<const TouchEvidence> press) {
   return log_likelihoods(elements_of(press));
 }
 
-double PressPlacer::log_likelihood(const Press& press, const Pose& T_object_robot) const {
+double PressPlacer::log_likelihood(std::span<const TouchEvidence> press,
+                                   const Pose& T_object_robot) const {
   return log_likelihood(elements_of(press), T_object_robot);
 }
 
@@ -78,7 +79,7 @@ std::vector<float> PressPlacer::log_likelihoods(const std::vector<Element>& elem
   return bins;
 }
 
-PressPlacement PressPlacer::place(const Press& press) {
+PressPlacement PressPlacer::place(std::span<const TouchEvidence> press) {
   const std::vector<Element> elements = elements_of(press);
   const std::vector<float> bins = log_likelihoods(elements);
   std::vector<std::uint32_t> order(bins.size());
@@ -104,14 +105,14 @@ PressPlacement PressPlacer::place(const Press& press) {
           .log_evidence = *best + std::log(sum / static_cast<double>(bins.size()))};
 }
 
-std::vector<PressPlacer::Element> PressPlacer::elements_of(const Press& press) const {
+std::vector<PressPlacer::Element> PressPlacer::elements_of(
+    std::span<const TouchEvidence> press) const {
   std::vector<Element> elements;
-  for (const Touch& touch : press.touches) {
-    const std::vector<Reading> readings = contact_.classify(touch);
+  for (const TouchEvidence& touch : press) {
     const glm::dmat2 turn = rotation(touch.T_robot_sensor.theta_rad);
     const glm::dvec2 sensor_mm = touch.T_robot_sensor.translation_mm - lattice_.pivot_mm;
-    for (std::size_t e = 0; e < readings.size(); ++e) {
-      elements.push_back({sensor_mm + turn * touch.elements_mm[e], readings[e]});
+    for (std::size_t e = 0; e < touch.readings.size(); ++e) {
+      elements.push_back({sensor_mm + turn * touch.elements_mm[e], touch.readings[e]});
     }
   }
   return elements;

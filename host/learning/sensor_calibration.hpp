@@ -3,15 +3,10 @@
 #include <cstddef>
 #include <functional>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
-#include "learning/drawn_poses.hpp"
-#include "learning/fold_model.hpp"
-#include "learning/press.hpp"
-#include "learning/temperature_fit.hpp"
-#include "learning/training_maps.hpp"
+#include "learning/cross_validation.hpp"
 #include "palpate/learned_sensor.hpp"
 #include "palpate/occupancy_grid.hpp"
 
@@ -80,9 +75,9 @@ struct SensorCalibration {
 /// cross-validation by more than two standard errors. What one object cannot tell (temperature,
 /// weight, familiarity) keeps its default, with a warning. Takes all host threads.
 ///   The numbers before and after are of cross-validation. All that a fold's presses are judged by
-/// is learned again from the other folds' alone, from the contact threshold on: noise, prior, point
-/// spread, levels, maps, tables and features. Which table is kept, temperature, weight and
-/// familiarity come from the scores of the other folds' presses.
+/// is learned again from the presses of the other folds alone, from the contact threshold on:
+/// noise, prior, point spread, levels, maps, tables and features. Which table is kept, temperature,
+/// weight and familiarity come from the scores of the other folds' presses.
 ///
 /// Data that say little:
 ///   one press: refused; so are presses none of which has a map of its object without it

@@ -2,7 +2,7 @@ import json
 import os
 import pathlib
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import pytest
@@ -59,10 +59,18 @@ def refusal(*arguments: object) -> str:
     return run.stderr.removeprefix("palpate: ").rstrip("\n")
 
 
-def expect_refused(call: Callable[[], object], *arguments: object) -> None:
+def expect_refused(
+    call: Callable[[], object], *arguments: object, spelled: Mapping[str, str] = {}
+) -> None:
+    """The call is refused as the command with the arguments is; `spelled` has how Python spells
+    each option that the command's words name."""
     with pytest.raises(palpate.Error) as refused:
         call()
-    assert str(refused.value) == refusal(*arguments)
+    words = refusal(*arguments)
+    for flag, keyword in spelled.items():
+        assert flag in words
+        words = words.replace(flag, keyword)
+    assert str(refused.value) == words
     assert refused.value.fault == "input"
 
 
