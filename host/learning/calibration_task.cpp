@@ -128,42 +128,6 @@ std::vector<TouchedObject> unknowns_of(const std::vector<Press>& presses) {
   return unknowns;
 }
 
-/// See add_touch_sd(); none where that makes too few unknowns.
-std::optional<DisplacementSd> learn_touch_sd(Device& device, const std::vector<Press>& presses,
-                                             const LearnedSensor& sensor, const MapOptions& maps,
-                                             const std::function<void(double)>& progress) {
-  std::vector<Hypothesis> hypotheses;
-  std::vector<TouchedObject> unknowns = unknowns_of(presses);
-  const std::vector<std::size_t> fold = folds_of(presses, touch_sd_folds);
-  for (TrainingMap& map : maps_without_folds(presses, maps, touch_sd_folds)) {
-    const bool without_first =
-        std::ranges::none_of(map.presses, [&](std::size_t press) { return fold[press] == 0; });
-    if (without_first) {
-      hypotheses.push_back({.map = std::move(map.map)});
-    }
-  }
-  std::erase_if(unknowns, [&](const TouchedObject& unknown) {
-    return unknown.touches.size() < fewest_touches ||
-           std::ranges::none_of(hypotheses, [&](const Hypothesis& hypothesis) {
-             return hypothesis.map.label == unknown.label;
-           });
-  });
-  if (unknowns.size() < fewest_unknowns) {
-    return {};
-  }
-  const TouchSdFitOptions options;
-  HistogramOptions histogram{.lattice = about_known_pose(options.start)};
-  histogram.contact = {
-      .classifier = sensor.classifier, .gamma = ContactModel{}.gamma, .prior = sensor.prior};
-  const RecognitionTask task(std::move(hypotheses), histogram);
-  const TouchSdFit fit = fit_touch_sd(device, task, unknowns, options, progress);
-  const auto distinct = [](double sd, double error, double resolution) {
-    return sd > std::max(2.0 * error, resolution) ? sd : 0.0;
-  };
-  return DisplacementSd{distinct(fit.sd.mm, fit.standard_error.mm, fit.resolution.mm),
-                        distinct(fit.sd.rad, fit.standard_error.rad, fit.resolution.rad)};
-}
-
 }  // namespace
 
 CalibrationTask calibration_task(const CalibrationRequest& request,
@@ -200,10 +164,38 @@ CalibrationTask calibration_task(const CalibrationRequest& request,
 
 void add_touch_sd(Device& device, const CalibrationTask& task, SensorCalibration& calibration,
                   const std::function<void(double)>& progress) {
-  const std::optional<DisplacementSd> sd =
-      learn_touch_sd(device, task.presses, calibration.sensor, calibration.maps, progress);
-  calibration.touch_sd_fitted = sd.has_value();
-  calibration.sensor.touch_sd = sd.value_or(DisplacementSd{});
+  LearnedSensor& sensor = calibration.sensor;
+  std::vector<Hypothesis> hypotheses;
+  std::vector<TouchedObject> unknowns = unknowns_of(task.presses);
+  const std::vector<std::size_t> fold = folds_of(task.presses, touch_sd_folds);
+  for (TrainingMap& map : maps_without_folds(task.presses, calibration.maps, touch_sd_folds)) {
+    const bool without_first =
+        std::ranges::none_of(map.presses, [&](std::size_t press) { return fold[press] == 0; });
+    if (without_first) {
+      hypotheses.push_back({.map = std::move(map.map)});
+    }
+  }
+  std::erase_if(unknowns, [&](const TouchedObject& unknown) {
+    return unknown.touches.size() < fewest_touches ||
+           std::ranges::none_of(hypotheses, [&](const Hypothesis& hypothesis) {
+             return hypothesis.map.label == unknown.label;
+           });
+  });
+  if (unknowns.size() < fewest_unknowns) {
+    return;
+  }
+  const TouchSdFitOptions options;
+  HistogramOptions histogram{.lattice = about_known_pose(options.start)};
+  histogram.contact = {
+      .classifier = sensor.classifier, .gamma = ContactModel{}.gamma, .prior = sensor.prior};
+  const RecognitionTask recognition(std::move(hypotheses), histogram);
+  const TouchSdFit fit = fit_touch_sd(device, recognition, unknowns, options, progress);
+  const auto distinct = [](double sd, double error, double resolution) {
+    return sd > std::max(2.0 * error, resolution) ? sd : 0.0;
+  };
+  calibration.touch_sd_fitted = true;
+  sensor.touch_sd = {distinct(fit.sd.mm, fit.standard_error.mm, fit.resolution.mm),
+                     distinct(fit.sd.rad, fit.standard_error.rad, fit.resolution.rad)};
 }
 
 }  // namespace palpate

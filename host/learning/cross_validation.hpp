@@ -24,7 +24,7 @@ struct CrossValidationOptions {
 
 /// What models that had not seen the presses said of them.
 struct CrossValidation {
-  std::vector<ScoredPress> presses;  ///< those that have a map of their object in the other folds
+  std::vector<ScoredPress> presses;  ///< with a map of their object in the other folds
   /// Several presses at known poses of one object and fold together, with
   /// CrossValidationOptions::bins. A press is in groups of one half only. None where a fold has
   /// fewer presses of each object.

@@ -4,9 +4,28 @@
 #include <utility>
 
 #include "learning/feature_learning.hpp"
+#include "learning/host_progress.hpp"
 #include "learning/tried_bins.hpp"
+#include "palpate/error.hpp"
 
 namespace palpate {
+
+namespace {
+
+/// What presses say of presses that are not among them by Eq. 7.
+FoldModel eq7_model(const LearnedPresses& learned, const ModelLearning& how) {
+  FoldModel model{.maps = learned.maps, .how = table_learning({}, learned, how)};
+  if (how.bins && how.given.empty()) {
+    // Touches at known poses are tried on maps of all others, as unknowns will be.
+    model.maps = maps_of_objects(learned.presses, learned.readings.maps());
+  }
+  if (!how.bins) {
+    model.features = learn_features(learned.presses, learned.readings.classifier);
+  }
+  return model;
+}
+
+}  // namespace
 
 LearnedPresses with_maps(std::vector<Press> presses, LearnedReadings readings,
                          const ModelLearning& how) {
@@ -55,26 +74,28 @@ std::set<std::string> compared_labels(const LearnedPresses& learned) {
   return labels;
 }
 
-FoldModel eq7_model(const LearnedPresses& learned, const ModelLearning& how) {
-  FoldModel model{.maps = learned.maps, .how = table_learning({}, learned, how)};
-  if (how.bins && how.given.empty()) {
-    // Touches at known poses are tried on maps of all others, as unknowns will be.
-    model.maps = maps_of_objects(learned.presses, learned.readings.maps());
+std::vector<FoldModel> models_of(const std::vector<Press>& presses,
+                                 const std::vector<TableKind>& tables, const ModelLearning& how,
+                                 const std::function<void(double)>& progress) {
+  LearnedPresses learned;
+  FoldModel eq7;
+  try {
+    learned = with_maps(presses, learn_readings(presses, how.readings), how);
+    eq7 = eq7_model(learned, how);
+  } catch (const Error&) {
+    return {};
   }
-  if (!how.bins) {
-    model.features = learn_features(learned.presses, learned.readings.classifier);
+  SerialProgress work(static_cast<double>(tables.size()), progress);
+  std::vector<FoldModel> models;
+  for (const TableKind& kind : tables) {
+    FoldModel& model = models.emplace_back(eq7);
+    model.how = table_learning(kind, learned, how);
+    model.table = compared_labels(learned).empty()
+                      ? model.how.initial()
+                      : learn_table(learned.presses, learned.maps, model.how, work.part(1.0)).table;
   }
-  return model;
-}
-
-FoldModel with_table(FoldModel eq7, const TableKind& kind, const LearnedPresses& learned,
-                     const ModelLearning& how, const std::function<void(double)>& progress) {
-  FoldModel model = std::move(eq7);
-  model.how = table_learning(kind, learned, how);
-  model.table = compared_labels(learned).empty()
-                    ? model.how.initial()
-                    : learn_table(learned.presses, learned.maps, model.how, progress).table;
-  return model;
+  models.push_back(std::move(eq7));
+  return models;
 }
 
 }  // namespace palpate

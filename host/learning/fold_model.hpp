@@ -37,7 +37,8 @@ struct LearnedPresses {
   std::vector<TrainingMap> maps;  ///< to learn a table on
 };
 
-/// With the given maps to learn a table on, or maps of the presses. Takes all host threads.
+/// The presses with maps to learn a table on: the given ones, or maps of the presses. Takes all host
+/// threads.
 /// @throws Error as observed_map()
 LearnedPresses with_maps(std::vector<Press> presses, LearnedReadings readings,
                          const ModelLearning& how);
@@ -59,12 +60,12 @@ struct FoldModel {
   std::optional<LearnedFeatures> features = {};
 };
 
-/// What presses say of presses that are not among them by Eq. 7. Takes all host threads.
-/// @throws Error as observed_map()
-FoldModel eq7_model(const LearnedPresses& learned, const ModelLearning& how);
-
-/// An eq7_model() with a table that the presses learned. Takes all host threads.
-FoldModel with_table(FoldModel eq7, const TableKind& kind, const LearnedPresses& learned,
-                     const ModelLearning& how, const std::function<void(double)>& progress = {});
+/// Learns from presses of some folds a model with each table, and after these the model of Eq. 7.
+/// Takes all host threads.
+/// @returns none where so few presses tell no threshold or make no map
+/// @throws what `progress` throws
+std::vector<FoldModel> models_of(const std::vector<Press>& presses,
+                                 const std::vector<TableKind>& tables, const ModelLearning& how,
+                                 const std::function<void(double)>& progress = {});
 
 }  // namespace palpate

@@ -15,7 +15,7 @@ namespace {
 
 constexpr int nodes = ReadingLayer::nodes;
 constexpr double node_step = LevelCounts::node_step;
-/// Values below belong to cells that nothing sensed.
+/// Cells that nothing sensed have values below this one.
 constexpr double least_sensed = -ReadingLayer::largest_value;
 
 /// The value that a reading layer gives to a pressure; see ReadingLayer.
@@ -126,7 +126,7 @@ std::vector<double> shrunk_table(const LevelCounts& counts, std::span<const doub
 }
 
 ReadingLayer mean_level_layer(double threshold, double full_level) {
-  constexpr double least_full = 3.0;  // of thresholds: the unit is then one threshold
+  constexpr double least_full = 3.0;  // in thresholds; the unit is then one threshold
   if (!(threshold > 0.0 && std::isfinite(threshold))) {
     throw Error(Fault::input,
                 fmt::format("threshold = {}: a layer of mean levels needs one above 0", threshold));

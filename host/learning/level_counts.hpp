@@ -47,17 +47,17 @@ class LevelCounts {
   std::vector<double> counts_;
 };
 
-/// The table of Eq. 7 as far as it holds for a layer, in nats, [level, node]; every node's
-/// probabilities sum to 1, and In Contact is as likely at each of its levels. Over log odds it is
-/// Eq. 7 at the node's value; over mean levels at the value's excess over the threshold's. At the
-/// values of cells that nothing sensed it is Eq. 7 of the prior.
+/// The table of Eq. 7 as far as it holds for a layer, in nats, [level, node]. Every node's
+/// probabilities sum to 1, and all levels of In Contact are equally likely. A node of log odds has
+/// Eq. 7 at its value; a node of mean levels has Eq. 7 at the excess of its value over the
+/// threshold's value. Nodes of cells that nothing sensed have Eq. 7 at the prior.
 /// @param contact with its prior; its table is not used
 std::vector<double> initial_table(const ReadingLayer& layer, std::size_t levels,
                                   const ContactModel& contact);
 
 /// The table that counts say, in nats, as if `pseudo_counts` readings at every node had been
 /// distributed as `towards` says: log((n_level + pseudo p_level) / (n + pseudo)), at least
-/// log(1e-6). A node without counts keeps what `towards` says.
+/// log(1e-6). A node without counts keeps the probabilities of `towards`.
 /// @param towards table in nats of the same size; its probabilities are normalised
 /// @param pseudo_counts above 0
 std::vector<double> shrunk_table(const LevelCounts& counts, std::span<const double> towards,
@@ -65,8 +65,8 @@ std::vector<double> shrunk_table(const LevelCounts& counts, std::span<const doub
 
 /// A layer of mean levels whose value 0 is the threshold's, so that half of the nodes tell levels
 /// below it apart and half those above: unit_level = threshold^2 / (full - 2 threshold).
-/// @param full_level the largest pressure to tell apart, at least 3 thresholds; a lower one counts
-/// as 3 thresholds
+/// @param full_level the largest pressure to tell apart; a level below 3 thresholds counts as 3
+/// thresholds
 /// @throws Error on a threshold that is not positive
 ReadingLayer mean_level_layer(double threshold, double full_level);
 

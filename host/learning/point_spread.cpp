@@ -115,7 +115,7 @@ Field mean_field(const Readings& readings, const std::vector<double>& force, Fie
 /// Mean pressure relative to its plateau.
 Field relative_pressure(const Readings& readings, double spacing_mm) {
   constexpr double cells_per_spacing = 8.0;
-  constexpr double plateau_quantile = 0.9;  // of the cells above half of the largest
+  constexpr double plateau_quantile = 0.9;  // among the cells above half of the largest
   BoundingBox box;
   for (const Sample& sample : readings.samples) {
     box.take_in(sample.place_mm);
@@ -268,7 +268,7 @@ std::map<std::string, Readings> readings_of(const std::vector<Press>& presses,
 
 std::optional<double> learn_point_spread(const std::vector<Press>& presses,
                                          const ContactClassifier& classifier) {
-  constexpr std::size_t fewest_touches = 10;  // of an object: fewer leave gaps between elements
+  constexpr std::size_t fewest_touches = 10;  // fewer touches of an object leave gaps
   constexpr double of_spacing = 0.95;
   double spacing_mm = 0.0;
   std::vector<Readings> objects;
@@ -298,7 +298,7 @@ std::optional<double> learn_point_spread(const std::vector<Press>& presses,
     return sum;
   };
   // The search is along the spread's logarithm.
-  constexpr double least = 0.05;  // of the spacing
+  constexpr double least = 0.05;  // in spacings
   constexpr double most = 3.0;
   constexpr double tolerance = 0.005;
   const double lowest = std::log(least * spacing_mm);

@@ -107,7 +107,7 @@ CheckedPresses without_unknown(const std::vector<Press>& presses,
 std::vector<std::string> stuck_elements(const std::vector<Press>& presses, double threshold,
                                         std::span<const double> contact_pressures) {
   constexpr std::size_t fewest_touches = 5;
-  constexpr double rare = 0.01;  // of the readings In Contact of all other elements
+  constexpr double rare = 0.01;  // share of the other elements' readings In Contact
   std::map<std::size_t, std::vector<const Touch*>> arrays;
   for (const Press& press : presses) {
     for (const Touch& touch : press.touches) {

@@ -44,7 +44,7 @@ struct FusedPresses {
 FusedPresses fuse_presses(std::span<const UnposedPress> presses, const UnposedOptions& options,
                           double step_mm, const std::function<void(double)>& progress);
 
-/// How well presses fit the map of one press each: rows are presses, columns the maps. 1: as well
+/// How well presses fit maps of one press each: rows are presses, columns the maps. 1: as well
 /// as in the press's own map.
 struct FitTable {
   std::vector<std::size_t> columns;      ///< the press that each map is of

@@ -42,15 +42,7 @@ PressPlacer::PressPlacer(const Hypothesis& hypothesis, const ContactModel& conta
 }
 
 std::vector<float> PressPlacer::log_likelihoods(std::span<const TouchEvidence> press) {
-  return log_likelihoods(elements_of(press));
-}
-
-double PressPlacer::log_likelihood(std::span<const TouchEvidence> press,
-                                   const Pose& T_object_robot) const {
-  return log_likelihood(elements_of(press), T_object_robot);
-}
-
-std::vector<float> PressPlacer::log_likelihoods(const std::vector<Element>& elements) {
+  const std::vector<Element> elements = elements_of(press);
   double reach_mm = 0.0;
   for (const Element& element : elements) {
     reach_mm = std::max(reach_mm, std::hypot(element.from_pivot_mm.x, element.from_pivot_mm.y));
@@ -80,8 +72,7 @@ std::vector<float> PressPlacer::log_likelihoods(const std::vector<Element>& elem
 }
 
 PressPlacement PressPlacer::place(std::span<const TouchEvidence> press) {
-  const std::vector<Element> elements = elements_of(press);
-  const std::vector<float> bins = log_likelihoods(elements);
+  const std::vector<float> bins = log_likelihoods(press);
   std::vector<std::uint32_t> order(bins.size());
   std::iota(order.begin(), order.end(), 0U);
   const std::size_t best_count = std::min(evaluated_bins, bins.size());
@@ -92,7 +83,7 @@ PressPlacement PressPlacer::place(std::span<const TouchEvidence> press) {
                     order.end(), better);
   std::vector<double> evaluated;
   for (std::size_t i = 0; i < best_count; ++i) {
-    evaluated.push_back(log_likelihood(elements, lattice_.T_object_robot(order[i])));
+    evaluated.push_back(log_likelihood(press, lattice_.T_object_robot(order[i])));
   }
   const auto best = std::ranges::max_element(evaluated);
   double sum = 0.0;
@@ -206,13 +197,13 @@ void PressPlacer::add(std::vector<float>& bins, const glm::dvec2& turned,
   }
 }
 
-double PressPlacer::log_likelihood(const std::vector<Element>& elements,
+double PressPlacer::log_likelihood(std::span<const TouchEvidence> press,
                                    const Pose& T_object_robot) const {
   const InterpolatedMap map(layer_, contact_.table ? layer_.prior : contact_.prior.value());
   const glm::dmat2 turn = rotation(T_object_robot.theta_rad);
   const glm::dvec2 pivot_mm = T_object_robot * lattice_.pivot_mm;
   double sum = 0.0;
-  for (const Element& element : elements) {
+  for (const Element& element : elements_of(press)) {
     if (element.reading != Reading::unknown) {
       const glm::dvec2 place = pivot_mm + turn * element.from_pivot_mm;
       sum += contact_.log_likelihood(element.reading, {.log_odds = map.log_odds(place)});

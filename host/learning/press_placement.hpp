@@ -64,14 +64,12 @@ class PressPlacer {
   };
 
   std::vector<Element> elements_of(std::span<const TouchEvidence> press) const;
-  std::vector<float> log_likelihoods(const std::vector<Element>& elements);
   void cover(double reach_mm);
   void sum_rest(const std::vector<Element>& elements);
   /// Adds a table to the bins of one theta, at an element's places.
   /// @param turned the element relative to the pivot, in mm along the object frame's axes
   void add(std::vector<float>& bins, const glm::dvec2& turned,
            const std::vector<float>& table) const;
-  double log_likelihood(const std::vector<Element>& elements, const Pose& T_object_robot) const;
 
   const OccupancyGrid& layer_;
   ContactModel contact_;

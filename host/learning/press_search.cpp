@@ -63,11 +63,11 @@ struct PressSearch::Summit {
 
 namespace {
 
-/// So far beyond every map that it holds its prior there.
+/// A pose so far beyond every map that only the map's prior counts there.
 constexpr Pose beyond{{2.0 * farthest_mm, 0.0}, 0.0};
 
-/// Eq. 7 as a table, which is read several times faster: within 1e-4 nats of it, unless gamma is so
-/// small that log odds beyond the table matter.
+/// Eq. 7 as a table, which is read several times faster. The table is within 1e-4 nats of Eq. 7,
+/// unless gamma is so small that log odds beyond the table matter.
 ContactModel tabulated(ContactModel contact) {
   if (contact.table) {
     return contact;

@@ -147,27 +147,6 @@ double gamma_of(const PlacedPresses& placed, const TableLearning& table,
   return fit_gamma(all, learned.readings.prior);
 }
 
-/// What the presses of some folds say: a model of each table, and after these the model of Eq. 7;
-/// none where so few presses tell no threshold.
-std::vector<FoldModel> models_of(const std::vector<Press>& presses,
-                                 const std::vector<TableKind>& tables, const ModelLearning& how,
-                                 SerialProgress& progress) {
-  std::optional<LearnedPresses> learned;
-  std::optional<FoldModel> eq7;
-  try {
-    learned = with_maps(presses, learn_readings(presses, how.readings), how);
-    eq7 = eq7_model(*learned, how);
-  } catch (const Error&) {
-    return {};
-  }
-  std::vector<FoldModel> models;
-  for (const TableKind& kind : tables) {
-    models.push_back(with_table(*eq7, kind, *learned, how, progress.part(table_cost)));
-  }
-  models.push_back(*std::move(eq7));
-  return models;
-}
-
 /// Tries every fold's presses on the models_of() the others, [model][fold].
 std::vector<std::vector<CrossValidation>> cross_validate(const std::vector<Press>& presses,
                                                          const std::vector<std::string>& labels,
@@ -177,9 +156,10 @@ std::vector<std::vector<CrossValidation>> cross_validate(const std::vector<Press
                                                          SerialProgress& progress) {
   std::vector<std::vector<CrossValidation>> tried(tables.size() + 1);
   const double share = 1.0 / static_cast<double>(options.folds);
+  const double learning = static_cast<double>(tables.size()) * table_cost;
   for (std::size_t fold = 0; fold < options.folds; ++fold) {
-    const std::vector<FoldModel> models =
-        models_of(presses_without(fold, presses, options.folds), tables, how, progress);
+    const std::vector<FoldModel> models = models_of(presses_without(fold, presses, options.folds),
+                                                    tables, how, progress.part(learning));
     for (std::size_t i = 0; i < tried.size(); ++i) {
       tried[i].push_back(models.empty() ? CrossValidation{.familiarity = {{}}}
                                         : try_fold(fold, presses, labels, models[i], options,
@@ -195,7 +175,7 @@ struct TriedModel {
   PlacedPresses placed;
   std::vector<CrossValidation> folds;
   CrossValidation all;    ///< the folds together
-  TemperedPresses after;  ///< the same with temperature and features
+  TemperedPresses after;  ///< the folds together, with temperature and features
 };
 
 /// The losses of presses with their labels' log probabilities, in nats.

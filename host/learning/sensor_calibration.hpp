@@ -27,9 +27,10 @@ struct SensorCalibrationOptions {
   std::optional<RecognitionBins> bins = {};
 };
 
-/// Touches at known poses: seven levels over the mean pressure, which also tells where between the
-/// elements an edge lies. Presses at unknown poses: contact over log odds, and these seven levels,
-/// since pressures tell more, but change from day to day more than contact does.
+/// Touches at known poses have a table of seven levels over the mean pressure, which also tells
+/// where between the elements an edge lies. Presses at unknown poses have a table of contact over
+/// log odds, and one of seven levels: pressures tell more, but change from day to day more than
+/// contact does.
 std::vector<TableKind> default_tables(bool known_poses);
 
 /// A table that was tried: the cross-validation's log-loss with temperature and features, in nats.
@@ -41,7 +42,7 @@ struct TriedTable {
 /// Scores of the touches, several of one object at a time.
 struct GroupScores {
   std::size_t touches = 0;  ///< of a group
-  Scores before;            ///< as SensorCalibration has them of single touches
+  Scores before;            ///< see SensorCalibration::before
   Scores table;
   Scores after;
 };

@@ -109,8 +109,8 @@ TEST(CrossValidation, LooksForPressesAtKnownPosesAsForUnknownsAloneAndInGroups) 
                               .auto_pivot = false}};
   const CrossValidation found = tried(letters.presses, {"A", "U"}, options);
   ASSERT_EQ(found.presses.size(), 38U);
-  // Of either fold's 12 presses of A, 6 in each half make two groups three times over; of 7 of U, 3
-  // and 4 make one group each.
+  // Either fold has 12 presses of A: the 6 of each half make two groups three times over. It has 7
+  // presses of U: 3 and 4 make one group each.
   const std::vector<ScoredPress> groups = both(found.groups);
   EXPECT_EQ(groups.size(), 2U * (2U * 3U * 2U + 2U));
   EXPECT_FALSE(found.groups[0].empty() || found.groups[1].empty());

@@ -84,8 +84,7 @@ TEST_P(NoiseCalibration, JudgesAFoldByWhatTheOtherFoldsSayAlone) {
   const auto model = [&] {
     letters.make_presses(known_poses);
     const std::vector<Press> others = presses_without(judged, letters.presses, how.folds);
-    const LearnedPresses learned = with_maps(others, learn_readings(others, how.readings), how);
-    return with_table(eq7_model(learned, how), {MapLayer::mean_level, 4}, learned, how);
+    return models_of(others, {{MapLayer::mean_level, 4}}, how).front();
   };
   const auto press_harder = [&](bool judged_ones) {
     for (std::size_t i = 0; i < fold.size(); ++i) {
