@@ -125,7 +125,8 @@ std::vector<std::string> stuck_elements(const std::vector<Press>& presses, doubl
       if (!same || !(pressure > threshold)) {
         continue;
       }
-      const auto [first, last] = std::ranges::equal_range(contact_pressures, pressure);
+      const auto [first, last] =
+          std::equal_range(contact_pressures.begin(), contact_pressures.end(), pressure);
       const double others = static_cast<double>(last - first) - static_cast<double>(touches.size());
       if (others <= rare * static_cast<double>(contact_pressures.size() - touches.size())) {
         stuck.push_back(e);
