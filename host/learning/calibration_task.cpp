@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <utility>
 
 #include <fmt/format.h>
 
 #include "io/input_file.hpp"
-#include "learning/touch_sd_learning.hpp"
+#include "recognition/touch_sd_fit.hpp"
 
 namespace palpate {
 
@@ -20,7 +22,7 @@ bool all_have_poses(std::span<const Recording> recordings) {
       const Recording& without = first ? recording : recordings.front();
       refuse(without.path,
              "all touches are at one pose, so that their poses count as unknown, but other "
-             "recordings have poses; calibrate from one kind, or give --unposed");
+             "recordings have poses; calibrate from one kind, or give `unposed`");
     }
   }
   return first;
@@ -44,27 +46,28 @@ std::vector<Press> presses_of(std::span<const Recording> recordings,
 
 void check_numbers(const CalibrationRequest& request) {
   if (request.threshold && !(*request.threshold > 0.0 && std::isfinite(*request.threshold))) {
-    refuse(fmt::format("--threshold {}", *request.threshold), "must be above 0");
+    refuse(fmt::format("`threshold {}`", *request.threshold), "must be above 0");
   }
   if (request.ratio && !(*request.ratio >= 0.0)) {
-    refuse(fmt::format("--ratio {}", *request.ratio), "must be at least 0");
+    refuse(fmt::format("`ratio {}`", *request.ratio), "must be at least 0");
   }
   if (request.ratio && *request.ratio >= 1.0) {
-    refuse(fmt::format("--ratio {}", *request.ratio), "must be below 1");
+    refuse(fmt::format("`ratio {}`", *request.ratio), "must be below 1");
   }
   constexpr auto most = static_cast<int>(most_reading_levels);
   if (request.levels && (*request.levels < 2 || *request.levels > most)) {
-    refuse(fmt::format("--levels {}", *request.levels), "give 2 to {}", most);
+    refuse(fmt::format("`levels {}`", *request.levels), "give 2 to {}", most);
   }
   if (request.layer != "auto" && request.layer != "mean_level" && request.layer != "log_odds") {
-    refuse(fmt::format("--layer {}", request.layer), "give auto, mean_level or log_odds");
+    refuse(fmt::format("`layer {}`", request.layer), "give auto, mean_level or log_odds");
   }
   if (request.max_maps < 1) {
-    refuse(fmt::format("--max-maps {}", request.max_maps), "give 1 or more");
+    refuse(fmt::format("`max-maps {}`", request.max_maps), "give 1 or more");
   }
 }
 
-/// Those to try; at unknown poses, where a map lacks its mean level, the layer auto is log_odds.
+/// The tables to try; at unknown poses, where a map lacks its mean level, the layer auto is
+/// log_odds.
 std::vector<TableKind> tables_of(const CalibrationRequest& request, bool known_poses,
                                  std::span<const OccupancyGrid> maps) {
   const bool has_mean_levels =
@@ -82,6 +85,48 @@ std::vector<TableKind> tables_of(const CalibrationRequest& request, bool known_p
   return tables;
 }
 
+constexpr std::size_t touch_sd_folds = 5;
+constexpr std::size_t touches_of_unknown = 8;
+constexpr std::size_t fewest_touches = 5;  ///< of an unknown: one pose explains two touches
+constexpr std::size_t fewest_unknowns = 5;
+
+/// Poses so near to the known one, 0, that displacements of the search's start explain them.
+PoseLattice about_known_pose(const DisplacementSd& start) {
+  constexpr double sd = 4.0;
+  constexpr double steps_per_sd = 1.0 / 0.6;
+  const auto axis = [&](double deviation) {
+    return Axis{-sd * deviation, sd * deviation,
+                static_cast<int>(std::ceil(2.0 * sd * steps_per_sd))};
+  };
+  return {.x_mm = axis(start.mm), .y_mm = axis(start.mm), .theta_rad = axis(start.rad)};
+}
+
+/// The touches of the first fold, some of an object at a time.
+std::vector<TouchedObject> unknowns_of(const std::vector<Press>& presses) {
+  const std::vector<std::size_t> fold = folds_of(presses, touch_sd_folds);
+  std::map<std::string, std::vector<Touch>> touches;
+  for (std::size_t i = 0; i < presses.size(); ++i) {
+    if (fold[i] == 0) {
+      Touch touch = presses[i].touches.front();
+      touch.T_robot_sensor = *presses[i].T_object_robot * touch.T_robot_sensor;
+      touches[presses[i].label].push_back(touch);
+    }
+  }
+  std::vector<TouchedObject> unknowns;
+  for (const auto& [label, own] : touches) {
+    // Every k-th touch is of one unknown, so that each was touched in many places.
+    const std::size_t count = std::max<std::size_t>(1, own.size() / touches_of_unknown);
+    for (std::size_t first = 0; first < count; ++first) {
+      TouchedObject unknown{.name = label, .touches = {}, .label = label};
+      for (std::size_t i = first; i < own.size(); i += count) {
+        unknown.touches.push_back(own[i]);
+      }
+      unknowns.push_back(std::move(unknown));
+    }
+  }
+  return unknowns;
+}
+
 }  // namespace
 
 CalibrationTask calibration_task(const CalibrationRequest& request,
@@ -95,8 +140,8 @@ CalibrationTask calibration_task(const CalibrationRequest& request,
   for (const NamedMap& given : maps) {
     if (needs_mean_level && given.map.mean_level.empty()) {
       refuse(given.name,
-             "has no mean_level; build the map with palpate map --unposed or --sensor-model, or "
-             "give --layer log_odds");
+             "has no mean_level; build the map with `unposed` or `sensor-model`, or give "
+             "`layer log_odds`");
     }
     task.maps.push_back(given.map);
   }
@@ -104,8 +149,8 @@ CalibrationTask calibration_task(const CalibrationRequest& request,
   if (request.gives_bins && !known_poses) {
     throw Error(
         Fault::input,
-        "--bins, --x-mm, --y-mm, --theta-deg and --pivot-mm are for touches at known poses; "
-        "leave them out: where the others lie is found on bins one element wide");
+        "`bins`, `x-mm`, `y-mm`, `theta-deg` and `pivot-mm` are for touches at known poses; leave "
+        "them out: touches at unknown poses are placed on bins one element wide");
   }
   task.options = {.pressure_unit = recordings.front().pressure_unit,
                   .threshold = request.threshold,
@@ -118,10 +163,38 @@ CalibrationTask calibration_task(const CalibrationRequest& request,
 
 void add_touch_sd(Device& device, const CalibrationTask& task, SensorCalibration& calibration,
                   const std::function<void(double)>& progress) {
-  const std::optional<DisplacementSd> sd =
-      learn_touch_sd(device, task.presses, calibration.sensor, calibration.maps, progress);
-  calibration.touch_sd_fitted = sd.has_value();
-  calibration.sensor.touch_sd = sd.value_or(DisplacementSd{});
+  LearnedSensor& sensor = calibration.sensor;
+  std::vector<Hypothesis> hypotheses;
+  std::vector<TouchedObject> unknowns = unknowns_of(task.presses);
+  const std::vector<std::size_t> fold = folds_of(task.presses, touch_sd_folds);
+  for (TrainingMap& map : maps_without_folds(task.presses, calibration.maps, touch_sd_folds)) {
+    const bool without_first =
+        std::ranges::none_of(map.presses, [&](std::size_t press) { return fold[press] == 0; });
+    if (without_first) {
+      hypotheses.push_back({.map = std::move(map.map)});
+    }
+  }
+  std::erase_if(unknowns, [&](const TouchedObject& unknown) {
+    return unknown.touches.size() < fewest_touches ||
+           std::ranges::none_of(hypotheses, [&](const Hypothesis& hypothesis) {
+             return hypothesis.map.label == unknown.label;
+           });
+  });
+  if (unknowns.size() < fewest_unknowns) {
+    return;
+  }
+  const TouchSdFitOptions options;
+  HistogramOptions histogram{.lattice = about_known_pose(options.start)};
+  histogram.contact = {
+      .classifier = sensor.classifier, .gamma = ContactModel{}.gamma, .prior = sensor.prior};
+  const RecognitionTask recognition(std::move(hypotheses), histogram);
+  const TouchSdFit fit = fit_touch_sd(device, recognition, unknowns, options, progress);
+  const auto distinct = [](double sd, double error, double resolution) {
+    return sd > std::max(2.0 * error, resolution) ? sd : 0.0;
+  };
+  calibration.touch_sd_fitted = true;
+  sensor.touch_sd = {distinct(fit.sd.mm, fit.standard_error.mm, fit.resolution.mm),
+                     distinct(fit.sd.rad, fit.standard_error.rad, fit.resolution.rad)};
 }
 
 }  // namespace palpate

@@ -18,7 +18,7 @@ namespace palpate {
 struct CalibrationRequest {
   bool unposed = false;             ///< the recordings' poses do not count
   std::optional<double> threshold;  ///< in the recordings' pressure unit; none: learned
-  std::optional<double> ratio;      ///< the same
+  std::optional<double> ratio;      ///< of a touch's largest pressure; none: learned
   std::string layer = "auto";       ///< auto, mean_level or log_odds
   std::optional<int> levels;        ///< of readings; none: as default_tables() has them
   int max_maps = 5;                 ///< SensorCalibrationOptions::most_maps
@@ -46,16 +46,22 @@ struct CalibrationTask {
 /// both layers are tried, but without a mean level of every map only log odds.
 /// @param recordings of touches of one pressure unit, at least one
 /// @param touches [recording] to use, [begin, end)
-/// @throws Error naming the flag or the recording, where a value is out of range, a recording names
-/// no object, some recordings alone have poses, bins are given for unknown poses, or a map lacks
-/// the mean level that it needs
+/// @throws Error naming the option or the recording, where a value is out of range, a recording
+/// names no object, some recordings alone have poses, bins are given for unknown poses, or a map
+/// lacks the mean level that it needs
 CalibrationTask calibration_task(const CalibrationRequest& request,
                                  std::span<const Recording> recordings,
                                  std::span<const std::array<std::size_t, 2>> touches,
                                  std::span<const NamedMap> maps);
 
-/// Adds to the result of calibrate_sensor() how far touches at known poses lie from their poses;
-/// see learn_touch_sd().
+/// Adds to the result of calibrate_sensor() how far touches at known poses lie from the poses that
+/// the robot reported: standard deviations by fit_touch_sd(), and 0 where they lie below the fit's
+/// resolution or twice its standard error. A fifth of each object's touches, some at a time, is
+/// compared with maps of the others, by Eq. 7 with the sensor's classifier. The maps are of
+/// displaced touches, too: their edges are blurred, and the fit takes this for what elements read
+/// there. Nothing is added where there are fewer than five unknowns of at least five touches.
+/// @param progress called now and then with the fraction done
+/// @throws Error as fit_touch_sd() and observed_map(); what `progress` throws
 void add_touch_sd(Device& device, const CalibrationTask& task, SensorCalibration& calibration,
                   const std::function<void(double)>& progress = {});
 

@@ -2,13 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <numeric>
 
 #include <fmt/format.h>
 
 #include "io/element_spacing.hpp"
 #include "learning/golden_section.hpp"
+#include "learning/point_spread.hpp"
+#include "model/touch_evidence.hpp"
 #include "palpate/error.hpp"
 #include "palpate/occupancy_grid.hpp"
 
@@ -38,10 +39,6 @@ double otsu_threshold(const std::vector<double>& values) {
   return threshold;
 }
 
-bool is_living(const Touch& touch, std::size_t element) {
-  return (touch.valid.empty() || touch.valid[element] != 0) && !std::isnan(touch.pressure[element]);
-}
-
 /// Largest pressure of the living elements; 0 where none is above.
 double peak_of(const Touch& touch) {
   double peak = 0.0;
@@ -54,15 +51,12 @@ double peak_of(const Touch& touch) {
 }
 
 /// Marks the elements that lie within `near_mm` of an element In Contact.
-std::vector<bool> near_contact(const Touch& touch, const std::vector<Reading>& readings,
-                               double near_mm) {
-  std::vector<bool> near(readings.size(), false);
-  for (std::size_t c = 0; c < readings.size(); ++c) {
-    if (is_contact(readings[c])) {
-      for (std::size_t e = 0; e < near.size(); ++e) {
-        const glm::dvec2 apart = touch.elements_mm[e] - touch.elements_mm[c];
-        near[e] = near[e] || std::hypot(apart.x, apart.y) <= near_mm;
-      }
+std::vector<bool> near_contact(const TouchEvidence& touch, double near_mm) {
+  std::vector<bool> near(touch.readings.size(), false);
+  for (const glm::dvec2& contact_mm : touch.contact().elements_mm) {
+    for (std::size_t e = 0; e < near.size(); ++e) {
+      const glm::dvec2 apart = touch.elements_mm[e] - contact_mm;
+      near[e] = near[e] || std::hypot(apart.x, apart.y) <= near_mm;
     }
   }
   return near;
@@ -92,7 +86,90 @@ double learned_threshold(const std::vector<Press>& presses) {
   return std::exp(otsu_threshold(logs));
 }
 
+double share_in_contact(std::span<const TouchEvidence> touches) {
+  double contacts = 0.0;
+  double known = 0.0;
+  for (const TouchEvidence& touch : touches) {
+    contacts += static_cast<double>(touch.contacts);
+    known += static_cast<double>(touch.known().readings.size());
+  }
+  // No array, however it was pressed, says that the world is empty or full.
+  constexpr double least = 0.01;
+  constexpr double most = 0.5;
+  return std::clamp((contacts + 0.5) / (known + 1.0), least, most);
+}
+
+/// Pressures of all elements In Contact, ascending.
+std::vector<double> contact_pressures(std::span<const Touch> touches,
+                                      std::span<const TouchEvidence> evidence) {
+  std::vector<double> pressures;
+  for (std::size_t i = 0; i < touches.size(); ++i) {
+    for (std::size_t e = 0; e < touches[i].pressure.size(); ++e) {
+      if (is_contact(evidence[i].readings[e])) {
+        pressures.push_back(touches[i].pressure[e]);
+      }
+    }
+  }
+  std::ranges::sort(pressures);
+  return pressures;
+}
+
 }  // namespace
+
+MapOptions LearnedReadings::maps() const {
+  return {.cell_mm = 0.5 * spacing_mm,
+          .sensor = {.spread_mm = spread_mm, .prior = prior},
+          .classifier = classifier};
+}
+
+std::vector<double> LearnedReadings::level_edges(std::size_t levels) const {
+  std::vector<double> edges;
+  for (std::size_t level = 2; level < levels && !pressures.empty(); ++level) {
+    const double edge = pressures[(level - 1) * pressures.size() / (levels - 1)];
+    if (edge > (edges.empty() ? pressures.front() : edges.back())) {
+      edges.push_back(edge);
+    }
+  }
+  return edges;
+}
+
+LearnedReadings learn_readings(const std::vector<Press>& presses, const ReadingOptions& options) {
+  LearnedReadings readings{.spacing_mm = options.spacing_mm};
+  if (options.threshold && options.ratio) {
+    readings.classifier = {.threshold = *options.threshold, .ratio = *options.ratio};
+  } else {
+    readings.classifier = learn_classifier(presses, options.threshold);
+    readings.classifier.ratio = options.ratio.value_or(readings.classifier.ratio);
+  }
+  readings.noise = noise_floor(presses, readings.classifier);
+  if (!options.threshold) {
+    constexpr double noise_sd = 3.0;  // noise alone shall make no contact
+    readings.classifier.threshold =
+        std::max(readings.classifier.threshold, noise_sd * readings.noise);
+  }
+  readings.classifier.validate();
+  std::vector<Touch> touches;
+  for (const Press& press : presses) {
+    touches.insert(touches.end(), press.touches.begin(), press.touches.end());
+  }
+  const std::vector<TouchEvidence> evidence =
+      evidence_of(touches, {.classifier = readings.classifier});
+  readings.pressures = contact_pressures(touches, evidence);
+  if (readings.pressures.empty()) {
+    throw Error(Fault::input,
+                fmt::format("no pressure is above the contact threshold, {:g} {}; give a lower "
+                            "`threshold`",
+                            readings.classifier.threshold, options.pressure_unit));
+  }
+  readings.prior = share_in_contact(evidence);
+  if (at_known_poses(presses)) {
+    readings.psf_mm = learn_point_spread(presses, readings.classifier);
+  }
+  // Maps of presses at unknown poses have this spread, too: it leaves no gaps between elements.
+  constexpr double of_spacing = 0.6;
+  readings.spread_mm = readings.psf_mm ? *readings.psf_mm / 2.0 : of_spacing * options.spacing_mm;
+  return readings;
+}
 
 ContactClassifier learn_classifier(const std::vector<Press>& presses,
                                    std::optional<double> threshold) {
@@ -118,17 +195,18 @@ ContactClassifier learn_classifier(const std::vector<Press>& presses,
 
 double noise_floor(const std::vector<Press>& presses, const ContactClassifier& classifier) {
   constexpr double far = 2.0;  // in spacings
-  const ContactClassifier any_contact{.threshold = classifier.threshold, .ratio = 0.0};
+  const ContactModel any_contact{.classifier = {.threshold = classifier.threshold, .ratio = 0.0}};
   double squares = 0.0;
   double count = 0.0;
   bool any_negative = false;
   for (const Press& press : presses) {
     for (const Touch& touch : press.touches) {
       const auto spacing = spacing_of(touch.elements_mm);
-      const std::vector<bool> near = near_contact(touch, any_contact.classify(touch),
-                                                  spacing ? far * spacing->nearest_mm.most : 0.0);
+      const TouchEvidence evidence(touch, any_contact);
+      const std::vector<bool> near =
+          near_contact(evidence, spacing ? far * spacing->nearest_mm.most : 0.0);
       for (std::size_t e = 0; e < near.size(); ++e) {
-        if (!near[e] && is_living(touch, e)) {
+        if (!near[e] && evidence.lives[e] != 0) {
           squares += touch.pressure[e] * touch.pressure[e];
           count += 1.0;
           any_negative = any_negative || touch.pressure[e] < 0.0;
@@ -141,7 +219,7 @@ double noise_floor(const std::vector<Press>& presses, const ContactClassifier& c
 }
 
 double fit_gamma(const LevelCounts& counts, double prior) {
-  const auto log_likelihood = [&](double gamma) {
+  const auto loss = [&](double gamma) {
     double nats = 0.0;
     for (int node = 0; node < ReadingLayer::nodes; ++node) {
       const double value = LevelCounts::value_at(node);
@@ -153,26 +231,15 @@ double fit_gamma(const LevelCounts& counts, double prior) {
                 counts.at_node(node) * std::log(1.0 - gamma * (1.0 - 2.0 * prior));
       }
     }
-    return nats;
+    return -nats;
   };
   constexpr double least = 1e-3;
   constexpr double most = 0.9;
-  return largest_at(least, most, 1e-4, log_likelihood);
+  return least_at(least, most, 1e-4, loss);
 }
 
 double share_in_contact(std::span<const Touch> touches, const ContactClassifier& classifier) {
-  double contacts = 0.0;
-  double known = 0.0;
-  for (const Touch& touch : touches) {
-    for (const ElementReading& element : known_readings(touch, classifier)) {
-      contacts += is_contact(element.reading) ? 1.0 : 0.0;
-      known += 1.0;
-    }
-  }
-  // No array, however it was pressed, says that the world is empty or full.
-  constexpr double least = 0.01;
-  constexpr double most = 0.5;
-  return std::clamp((contacts + 0.5) / (known + 1.0), least, most);
+  return share_in_contact(evidence_of(touches, {.classifier = classifier}));
 }
 
 }  // namespace palpate

@@ -1,21 +1,56 @@
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "learning/level_counts.hpp"
 #include "learning/press.hpp"
 #include "palpate/contact.hpp"
+#include "palpate/map_builder.hpp"
 
 namespace palpate {
 
+/// How a sensor's readings are learned.
+struct ReadingOptions {
+  std::string pressure_unit = "kPa";
+  std::optional<double> threshold;  ///< learned where there is none
+  std::optional<double> ratio;      ///< learned where there is none
+  double spacing_mm = 0.0;          ///< between the elements
+};
+
+/// What presses say of a sensor's readings, whatever objects they are of.
+struct LearnedReadings {
+  ContactClassifier classifier;
+  double noise = 0.0;             ///< see noise_floor()
+  std::vector<double> pressures;  ///< of all elements In Contact, ascending
+  double prior = 0.2;             ///< see share_in_contact()
+  std::optional<double> psf_mm;   ///< where presses at known poses tell the point spread
+  double spread_mm = 0.5;         ///< of maps
+  double spacing_mm = 0.0;        ///< between the elements
+
+  /// Options of maps with cells of half a spacing.
+  MapOptions maps() const;
+  /// Pressures that part the elements In Contact into `levels` - 1 levels of about as many elements
+  /// each; fewer where pressures are the same.
+  std::vector<double> level_edges(std::size_t levels) const;
+};
+
+/// Learns the classifier, then what it makes of the presses. A learned threshold is at least three
+/// standard deviations of the noise. The maps' spread is half of the point spread's, or 0.6
+/// spacings.
+/// @throws Error as learn_classifier(), on a classifier out of range, and where no pressure is
+/// above the threshold
+LearnedReadings learn_readings(const std::vector<Press>& presses, const ReadingOptions& options);
+
 /// The contact threshold T and ratio of touches, by Otsu's method (1979): the threshold parts the
-/// logarithms of all pressures above 0 into two classes of the largest variance between them, and
-/// the ratio likewise those relative to the largest of their touch, of touches that exceed T; the
-/// usual ratio where these are all the same.
+/// logarithms of all pressures above 0 into two classes of the largest variance between them. The
+/// ratio parts pressures relative to the largest of their touch likewise, in touches that exceed T;
+/// it is the usual ratio where all of them are alike.
 /// @param threshold the T to learn the ratio for, where it is known
-/// @throws Error where T is to be learned and no pressure is above 0, or all are the same
+/// @throws Error where T is to be learned and no pressure is above 0, or all are alike
 ContactClassifier learn_classifier(const std::vector<Press>& presses,
                                    std::optional<double> threshold = {});
 

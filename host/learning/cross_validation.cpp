@@ -1,12 +1,11 @@
 #include "learning/cross_validation.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <map>
-#include <optional>
-#include <span>
-#include <string>
 #include <utility>
 
 #include <fmt/format.h>
@@ -46,20 +45,83 @@ struct LabelScore {
   }
 };
 
-/// A fold's presses before what the others say.
+void require_sound(const std::vector<Press>& presses, const CrossValidationOptions& options) {
+  if (options.folds < 2 || options.maps_per_object < 1) {
+    throw Error(Fault::input,
+                fmt::format("cross-validation: {} folds and {} maps per object; give at least two "
+                            "folds and a map",
+                            options.folds, options.maps_per_object));
+  }
+  if (options.bins && !at_known_poses(presses)) {
+    throw Error(
+        Fault::input,
+        "cross-validation: bins are for presses at known poses; leave them out, or give the "
+        "poses");
+  }
+}
+
+void shuffle(std::span<const Press*> presses, Random& random) {
+  for (std::size_t i = presses.size(); i > 1; --i) {
+    const auto place = static_cast<std::size_t>(random.uniform() * static_cast<double>(i));
+    std::swap(presses[i - 1], presses[place]);
+  }
+}
+
+/// Groups of presses of one object.
+std::vector<Press> groups_of(std::span<const Press*> presses, Random& random) {
+  std::vector<Press> groups;
+  const std::size_t times = presses.size() < 2 * presses_in_group ? 1 : groups_of_press;
+  for (std::size_t time = 0; time < times; ++time) {
+    shuffle(presses, random);
+    for (std::size_t i = 0; i + presses_in_group <= presses.size(); i += presses_in_group) {
+      groups.push_back(together(presses.subspan(i, presses_in_group)));
+    }
+  }
+  return groups;
+}
+
+/// What is to be recognised of a fold.
+struct Unknowns {
+  std::vector<Press> presses;  ///< single presses, and then groups of them
+  std::vector<std::size_t> half_of_group = {};
+};
+
+/// Presses and groups of them as if their poses were unknown.
+Unknowns unknowns_of(const std::vector<Press>& presses, const RecognitionBins& bins,
+                     std::size_t fold) {
+  Unknowns asked{.presses = presses};
+  std::map<std::string, std::vector<const Press*>> of_label;
+  for (const Press& press : presses) {
+    of_label[press.label].push_back(&press);
+  }
+  Random random(fold, Stream::unknowns);
+  std::size_t half = fold % 2;
+  for (auto& [label, own] : of_label) {
+    // Presses that are too few for two halves are all of one.
+    shuffle(own, random);
+    const bool divided = own.size() >= 2 * presses_in_group;
+    const std::size_t middle = divided ? own.size() / 2 : own.size();
+    const std::array parts{std::span(own).first(middle), std::span(own).subspan(middle)};
+    for (std::size_t k = 0; k < parts.size(); ++k) {
+      for (Press& group : groups_of(parts.at(k), random)) {
+        asked.presses.push_back(std::move(group));
+        asked.half_of_group.push_back((half + k) % 2);
+      }
+    }
+    half = 1 - half;
+  }
+  for (Press& press : asked.presses) {
+    press = as_unknown(press, bins, random);
+  }
+  return asked;
+}
+
+/// A model of the other folds, by whose maps presses are recognised.
 class FoldTrial {
  public:
-  FoldTrial(const std::vector<Press>& presses, const std::vector<std::size_t>& fold_of,
-            std::size_t fold, const std::vector<std::string>& labels, const FoldModel& model,
+  FoldTrial(const std::vector<std::string>& labels, const FoldModel& model,
             const CrossValidationOptions& options)
-      : presses_(presses),
-        fold_of_(fold_of),
-        fold_(fold),
-        labels_(labels),
-        model_(model),
-        options_(options),
-        maps_of_(labels.size()),
-        classifier_(model.how.contact) {
+      : labels_(labels), model_(model), options_(options), maps_of_(labels.size()) {
     for (std::size_t map = 0; map < model.maps.size(); ++map) {
       const std::optional<std::size_t> label = label_of(model.maps[map].map.label);
       if (label && maps_of_[*label].size() < options.maps_per_object) {
@@ -68,86 +130,56 @@ class FoldTrial {
     }
     if (model.table) {
       layers_ = layers_of(model.maps, model.how.layer);
-      classifier_ = contact_with(model.how.contact, *model.table, "");
     }
   }
 
-  void run(const std::function<void(double)>& progress, CrossValidation& result) const {
-    std::vector<std::size_t> tried;
-    for (std::size_t i = 0; i < presses_.size(); ++i) {
-      const std::optional<std::size_t> label = label_of(presses_[i].label);
-      if (fold_of_[i] == fold_ && label && !maps_of_[*label].empty()) {
-        tried.push_back(i);
-      }
-    }
+  bool has_map(const std::string& label) const {
+    const std::optional<std::size_t> at = label_of(label);
+    return at && !maps_of_[*at].empty();
+  }
+
+  /// @param tried presses of the fold whose objects have maps
+  CrossValidation run(const std::vector<Press>& tried, std::size_t fold,
+                      const std::function<void(double)>& progress) const {
+    CrossValidation result{.familiarity = {{}}};
     if (tried.empty()) {
-      return;
+      return result;
     }
-    const Unknowns asked = unknowns(tried);
-    const auto scores = score(asked.presses, progress);
+    const Unknowns asked =
+        options_.bins ? unknowns_of(tried, *options_.bins, fold) : Unknowns{.presses = tried};
+    const ContactModel classifier =
+        model_.table ? contact_with(model_.how.contact, *model_.table, "") : model_.how.contact;
+    std::vector<std::vector<TouchEvidence>> evidence;
+    for (const Press& press : asked.presses) {
+      evidence.push_back(evidence_of(press.touches, classifier));
+    }
+    const auto scores = score(evidence, progress);
     for (std::size_t i = 0; i < asked.presses.size(); ++i) {
-      ScoredPress scored = scored_press(asked.presses[i], scores[i]);
-      if (i < tried.size()) {
-        add_fit(asked.presses[i], scores[i], scored, result);
-        result.presses.push_back(std::move(scored));
-      } else {
+      ScoredPress scored{.truth = *label_of(asked.presses[i].label),
+                         .fold = fold,
+                         .touches = evidence[i].size(),
+                         .log_evidence = {},
+                         .log_density = log_densities(evidence[i].front())};
+      std::ranges::transform(scores[i], std::back_inserter(scored.log_evidence),
+                             &LabelScore::log_evidence);
+      if (i >= tried.size()) {
         result.groups[asked.half_of_group[i - tried.size()]].push_back(std::move(scored));
+        continue;
       }
+      // A press of which nothing is In Contact says nothing of its object.
+      if (evidence[i].front().in_contact()) {
+        add_familiarity(evidence[i].front(), scores[i], scored, result.familiarity.front());
+        if (const auto fit = fit_at_best(evidence[i], scores[i], scored.truth,
+                                         asked.presses[i].T_object_robot)) {
+          result.fit_z.push_back(fit->z);
+        }
+      }
+      result.presses.push_back(std::move(scored));
     }
+    return result;
   }
 
  private:
-  /// What is to be recognised of a fold.
-  struct Unknowns {
-    std::vector<Press> presses;  ///< of the fold, and then groups of them
-    std::vector<std::size_t> half_of_group = {};
-  };
-  Unknowns unknowns(const std::vector<std::size_t>& tried) const {
-    Unknowns asked;
-    std::map<std::string, std::vector<const Press*>> of_label;
-    for (const std::size_t press : tried) {
-      asked.presses.push_back(presses_[press]);
-      of_label[presses_[press].label].push_back(&presses_[press]);
-    }
-    if (!options_.bins) {
-      return asked;
-    }
-    Random random(fold_, Stream::unknowns);
-    std::size_t half = fold_ % 2;
-    for (auto& [label, own] : of_label) {
-      // Too few for two halves are all of one.
-      shuffle(own, random);
-      const bool divided = own.size() >= 2 * presses_in_group;
-      const std::size_t middle = divided ? own.size() / 2 : own.size();
-      add_groups(std::span(own).first(middle), half, random, asked);
-      half = 1 - half;
-      add_groups(std::span(own).subspan(middle), half, random, asked);
-    }
-    for (Press& press : asked.presses) {
-      press = as_unknown(press, *options_.bins, random);
-    }
-    return asked;
-  }
-
-  static void shuffle(std::span<const Press*> presses, Random& random) {
-    for (std::size_t i = presses.size(); i > 1; --i) {
-      const auto place = static_cast<std::size_t>(random.uniform() * static_cast<double>(i));
-      std::swap(presses[i - 1], presses[place]);
-    }
-  }
-
-  static void add_groups(std::span<const Press*> presses, std::size_t half, Random& random,
-                         Unknowns& asked) {
-    const std::size_t times = presses.size() < 2 * presses_in_group ? 1 : groups_of_press;
-    for (std::size_t time = 0; time < times; ++time) {
-      shuffle(presses, random);
-      for (std::size_t i = 0; i + presses_in_group <= presses.size(); i += presses_in_group) {
-        asked.presses.push_back(together(presses.subspan(i, presses_in_group)));
-        asked.half_of_group.push_back(half);
-      }
-    }
-  }
-
   /// The label's index; none where it is not to be recognised.
   std::optional<std::size_t> label_of(const std::string& label) const {
     const auto at = std::ranges::lower_bound(labels_, label);
@@ -163,9 +195,9 @@ class FoldTrial {
   }
 
   /// The scores of presses, [press][label].
-  std::vector<std::vector<LabelScore>> score(const std::vector<Press>& asked,
+  std::vector<std::vector<LabelScore>> score(const std::vector<std::vector<TouchEvidence>>& presses,
                                              const std::function<void(double)>& progress) const {
-    std::vector<std::vector<LabelScore>> scores(asked.size(),
+    std::vector<std::vector<LabelScore>> scores(presses.size(),
                                                 std::vector<LabelScore>(labels_.size()));
     HostProgress counter(labels_.size(), progress);
     tbb::parallel_for(std::size_t{0}, labels_.size(), [&](std::size_t label) {
@@ -177,8 +209,8 @@ class FoldTrial {
         }
         PressPlacer placer(hypothesis, contact,
                            options_.bins ? options_.bins->lattice : model_.how.lattice);
-        for (std::size_t i = 0; i < asked.size(); ++i) {
-          scores[i][label].add(map, placer.place(asked[i]));
+        for (std::size_t i = 0; i < presses.size(); ++i) {
+          scores[i][label].add(map, placer.place(presses[i]));
         }
       }
       counter.add();
@@ -186,121 +218,105 @@ class FoldTrial {
     return scores;
   }
 
-  ScoredPress scored_press(const Press& press, const std::vector<LabelScore>& scores) const {
-    ScoredPress scored{.truth = *label_of(press.label),
-                       .fold = fold_,
-                       .touches = press.touches.size(),
-                       .log_evidence = {},
-                       .log_density = {}};
-    for (const LabelScore& score : scores) {
-      scored.log_evidence.push_back(score.log_evidence());
-    }
+  /// Log density of a touch's features under every label; empty without features.
+  std::vector<double> log_densities(const TouchEvidence& touch) const {
+    std::vector<double> densities;
     if (model_.features) {
-      const PressFeatures own =
-          press_features(press.touches.front(), model_.how.contact.classifier);
+      const PressFeatures own = features_of(touch, model_.how.contact.classifier.threshold);
       for (const std::string& label : labels_) {
         const auto known = model_.features->objects.find(label);
         const FeatureDistribution& of_label =
             known == model_.features->objects.end() ? model_.features->any : known->second;
-        scored.log_density.push_back(of_label.log_density(own));
+        densities.push_back(of_label.log_density(own));
       }
     }
-    return scored;
+    return densities;
   }
 
-  /// Adds how a press fits the best object, and what tells whether its own was learned.
-  void add_fit(const Press& press, const std::vector<LabelScore>& scores, const ScoredPress& scored,
-               CrossValidation& result) const {
-    // A press of which nothing is In Contact says nothing of its object.
-    const std::vector<TouchEvidence> touches = evidence_of(press.touches, classifier_);
-    if (!touches.front().in_contact()) {
-      return;
-    }
+  /// Adds what tells whether a press's own object was learned.
+  void add_familiarity(const TouchEvidence& touch, const std::vector<LabelScore>& scores,
+                       const ScoredPress& scored, FamiliarityScores& familiarity) const {
     std::vector<std::size_t> others;
-    std::size_t best_label = scored.truth;
     for (std::size_t label = 0; label < labels_.size(); ++label) {
       if (label != scored.truth && scores[label].maps > 0) {
         others.push_back(label);
       }
-      if (scores[label].best_log_likelihood > scores[best_label].best_log_likelihood) {
-        best_label = label;
+    }
+    if (others.empty()) {
+      return;
+    }
+    const auto score_without = [&](std::size_t left_out) {
+      double best = nothing;
+      std::vector<double> log_evidence;
+      for (std::size_t label = 0; label < labels_.size(); ++label) {
+        if (label != left_out) {
+          best = std::max(best, scores[label].best_log_likelihood);
+          log_evidence.push_back(scored.log_evidence[label]);
+        }
+      }
+      return FamiliarityScore::of(touch.readings, best, log_evidence);
+    };
+    const std::size_t turn = familiarity.known.size() % others.size();
+    familiarity.known.push_back(score_without(others[turn]));
+    familiarity.unknown.push_back(score_without(scored.truth));
+  }
+
+  /// How a press fits the best object.
+  std::optional<Fit> fit_at_best(std::span<const TouchEvidence> press,
+                                 const std::vector<LabelScore>& scores, std::size_t truth,
+                                 const std::optional<Pose>& T_object_robot) const {
+    std::size_t label = truth;
+    for (std::size_t other = 0; other < labels_.size(); ++other) {
+      if (scores[other].best_log_likelihood > scores[label].best_log_likelihood) {
+        label = other;
       }
     }
-    if (!others.empty()) {
-      FamiliarityScores& familiarity = result.familiarity[fold_];
-      const auto score_without = [&](std::size_t left_out) {
-        double best = nothing;
-        std::vector<double> log_evidence;
-        for (std::size_t label = 0; label < labels_.size(); ++label) {
-          if (label != left_out) {
-            best = std::max(best, scores[label].best_log_likelihood);
-            log_evidence.push_back(scored.log_evidence[label]);
-          }
-        }
-        return FamiliarityScore::of(touches.front().readings, best, log_evidence);
-      };
-      const std::size_t turn = familiarity.known.size() % others.size();
-      familiarity.known.push_back(score_without(others[turn]));
-      familiarity.unknown.push_back(score_without(scored.truth));
-    }
-    const LabelScore& at = scores[best_label];
+    const LabelScore& at = scores[label];
     const OccupancyGrid& map = model_.table ? layers_[at.best_map] : model_.maps[at.best_map].map;
     // Recognition judges the fit at a refined pose, which lies near the true one, whatever the
     // bins.
-    const Pose& near =
-        press.T_object_robot && best_label == scored.truth ? *press.T_object_robot : at.best_pose;
-    if (const auto fit = best_fit_near(touches, near, map, contact_for(best_label), 0)) {
-      result.fit_z.push_back(fit->z);
-    }
+    const Pose& near = T_object_robot && label == truth ? *T_object_robot : at.best_pose;
+    return best_fit_near(press, near, map, contact_for(label), 0);
   }
 
-  const std::vector<Press>& presses_;
-  const std::vector<std::size_t>& fold_of_;
-  std::size_t fold_;
   const std::vector<std::string>& labels_;
   const FoldModel& model_;
   const CrossValidationOptions& options_;
   std::vector<std::vector<std::size_t>> maps_of_;  ///< [label]
-  std::vector<OccupancyGrid> layers_;
-  ContactModel classifier_;
+  std::vector<OccupancyGrid> layers_;              ///< [map] with a table
 };
 
 }  // namespace
 
-CrossValidator::CrossValidator(const std::vector<Press>& presses, std::vector<std::string> labels,
-                               const CrossValidationOptions& options)
-    : presses_(presses), labels_(std::move(labels)), options_(options) {
-  if (options.folds < 2 || options.maps_per_object < 1) {
-    throw Error(Fault::input,
-                fmt::format("cross-validation: {} folds and {} maps per object; give at least two "
-                            "folds and a map",
-                            options.folds, options.maps_per_object));
+CrossValidation joined(std::span<const CrossValidation> folds) {
+  CrossValidation all;
+  const auto append = [](const auto& from, auto& to) {
+    to.insert(to.end(), from.begin(), from.end());
+  };
+  for (const CrossValidation& fold : folds) {
+    append(fold.presses, all.presses);
+    append(fold.groups[0], all.groups[0]);
+    append(fold.groups[1], all.groups[1]);
+    append(fold.familiarity, all.familiarity);
+    append(fold.fit_z, all.fit_z);
   }
-  if (options.bins && std::ranges::any_of(presses, [](const Press& press) {
-        return !press.T_object_robot.has_value();
-      })) {
-    throw Error(
-        Fault::input,
-        "cross-validation: bins are for presses at known poses; leave them out, or give the "
-        "poses");
-  }
-  fold_ = folds_of(presses, options.folds);
+  return all;
 }
 
-std::vector<Press> CrossValidator::presses_without(std::size_t fold) const {
-  std::vector<Press> others;
-  for (std::size_t i = 0; i < presses_.size(); ++i) {
-    if (fold_[i] != fold) {
-      others.push_back(presses_[i]);
+CrossValidation try_fold(std::size_t fold, const std::vector<Press>& presses,
+                         const std::vector<std::string>& labels, const FoldModel& model,
+                         const CrossValidationOptions& options,
+                         const std::function<void(double)>& progress) {
+  require_sound(presses, options);
+  const FoldTrial trial(labels, model, options);
+  const std::vector<std::size_t> fold_of = folds_of(presses, options.folds);
+  std::vector<Press> tried;
+  for (std::size_t i = 0; i < presses.size(); ++i) {
+    if (fold_of[i] == fold && trial.has_map(presses[i].label)) {
+      tried.push_back(presses[i]);
     }
   }
-  return others;
-}
-
-void CrossValidator::try_fold(std::size_t fold, const FoldModel& model, CrossValidation& result,
-                              const std::function<void(double)>& progress) const {
-  result.familiarity.resize(options_.folds);
-  FoldTrial(presses_, fold_, fold, labels_, model, options_).run(progress, result);
+  return trial.run(tried, fold, progress);
 }
 
 }  // namespace palpate

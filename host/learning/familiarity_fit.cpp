@@ -131,7 +131,7 @@ Familiarity fit_familiarity(const FamiliarityScores& scores) {
     target.score = (target.score - mean) / sd;
   }
   glm::dvec3 weights = least_loss(targets, used);
-  // What speaks for the unknown says nothing, the worse of two first.
+  // A score that speaks for the unknown gets no weight; the worse of two is dropped first.
   while (std::min(weights[1], weights[2]) < 0.0) {
     used.at(weights[1] < weights[2] ? 1 : 2) = false;
     weights = least_loss(targets, used);

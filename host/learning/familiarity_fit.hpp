@@ -8,7 +8,8 @@
 
 namespace palpate {
 
-/// Both kinds of scores are of as many objects, since the best of more fits better by chance.
+/// Scores of known and of unknown presses. Both kinds are over equally many objects, since the best
+/// of more objects fits better by chance.
 struct FamiliarityScores {
   std::vector<FamiliarityScore> known;    ///< of presses whose object has maps; another has none
   std::vector<FamiliarityScore> unknown;  ///< of presses whose object's maps were left out
@@ -17,7 +18,7 @@ struct FamiliarityScores {
 FamiliarityScores all_of(std::span<const FamiliarityScores> folds);
 
 /// Logistic regression of known against unknown scores. As in Platt (1999) a known press counts as
-/// known with probability (n + 1) / (n + 2), n of them, and likewise an unknown one, so that scores
+/// known with probability (n + 1) / (n + 2), n of them, and an unknown one likewise, so that scores
 /// that do not overlap give finite numbers. The slopes are at least 0: where unknown presses score
 /// higher, the score says nothing.
 /// @throws Error where there is no known or no unknown score, or one that is not finite

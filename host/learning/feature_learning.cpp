@@ -13,9 +13,9 @@ namespace {
 using Values = std::array<double, PressFeatures::count>;
 using Matrix = std::array<Values, PressFeatures::count>;
 
-constexpr double least_sd = 0.05;  // of logarithms: 5 %
+constexpr double least_sd = 0.05;  ///< least deviation of a logarithm, 5 % of the feature
 constexpr double pseudo_presses = 4.0;
-/// Largest correlation: with it a distribution stays one when its numbers are rounded in a file.
+/// The largest correlation. Numbers rounded in a file still make a distribution below it.
 constexpr double most_correlated = 0.999;
 
 /// The products of the differences from a mean, summed over presses.

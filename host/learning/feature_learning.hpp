@@ -20,7 +20,7 @@ struct LabelledFeatures {
 /// C = (n C_object + 4 C_pooled) / (n + 4) * (1 + 1 / n) + 0.05^2 I, where the factor is what the
 /// mean of n presses misses, and the last term keeps presses that were all alike from being
 /// demanded alike. Where every object has one press, all presses' covariance stands for the pooled
-/// one. `any` has the mean and covariance of all presses. The weight is left at 0.
+/// one. `any` has the mean and covariance of all presses. The weight stays 0.
 /// @throws Error on no press
 LearnedFeatures learn_features(std::span<const LabelledFeatures> presses);
 /// The distributions of presses' features, each press by its first touch.

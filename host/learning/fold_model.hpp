@@ -3,11 +3,12 @@
 #include <cstddef>
 #include <functional>
 #include <optional>
+#include <set>
+#include <string>
 #include <vector>
 
-#include "learning/cross_validation.hpp"
+#include "learning/contact_learning.hpp"
 #include "learning/press.hpp"
-#include "learning/reading_learning.hpp"
 #include "learning/table_learning.hpp"
 #include "learning/training_maps.hpp"
 #include "palpate/learned_sensor.hpp"
@@ -21,7 +22,7 @@ struct TableKind {
   std::size_t levels = 2;
 };
 
-/// What presses are learned from with, whichever they are.
+/// How presses are learned from, all of them or those of some folds.
 struct ModelLearning {
   ReadingOptions readings;
   std::size_t folds = 5;                ///< that maps of touches at known poses are built without
@@ -32,38 +33,39 @@ struct ModelLearning {
 /// Presses, and what they say before any table.
 struct LearnedPresses {
   std::vector<Press> presses;
-  LearnedReadings readings = {};
-  std::vector<TrainingMap> maps = {};  ///< to learn a table on
+  LearnedReadings readings;
+  std::vector<TrainingMap> maps;  ///< to learn a table on
 };
 
-/// The maps to learn a table on: those given, or those of the presses. Takes all host threads.
+/// The presses with maps to learn a table on: the given ones, or maps of the presses. Takes all host
+/// threads.
 /// @throws Error as observed_map()
-std::vector<TrainingMap> maps_to_learn_on(const LearnedPresses& learned, const ModelLearning& how);
+LearnedPresses with_maps(std::vector<Press> presses, LearnedReadings readings,
+                         const ModelLearning& how);
 
 /// How the presses learn a table.
 TableLearning table_learning(const TableKind& kind, const LearnedPresses& learned,
                              const ModelLearning& how);
 
-/// Whether a press has a map of a label that it is no part of.
-bool has_map_without(std::size_t press, const std::string& label,
-                     const std::vector<TrainingMap>& maps);
+/// The labels of presses that have a map of their object without them.
+std::set<std::string> compared_labels(const LearnedPresses& learned);
 
-/// What is learned from the presses of all folds but one, from the contact threshold on: for each
-/// table in turn, and then by Eq. 7.
-class FoldLearning {
- public:
-  /// Takes all host threads.
-  /// @param others the presses of the other folds
-  /// @throws Error as learn_readings() and observed_map()
-  FoldLearning(std::vector<Press> others, const ModelLearning& how);
-
-  const FoldModel& learn(const TableKind& kind, const std::function<void(double)>& progress = {});
-  const FoldModel& by_eq7();
-
- private:
-  const ModelLearning& how_;
-  LearnedPresses learned_;
-  FoldModel model_;
+/// What the presses of all folds but one say, from the contact threshold on.
+struct FoldModel {
+  std::vector<TrainingMap> maps;
+  TableLearning how;
+  std::optional<LearnedTable> table = {};  ///< none: Eq. 7 on the maps' log odds
+  /// Only from presses at unknown poses: a touch at a known pose shows a part of an object, and its
+  /// features would tell where it is.
+  std::optional<LearnedFeatures> features = {};
 };
+
+/// Learns from presses of some folds a model with each table, and after these the model of Eq. 7.
+/// Takes all host threads.
+/// @returns none where so few presses tell no threshold or make no map
+/// @throws what `progress` throws
+std::vector<FoldModel> models_of(const std::vector<Press>& presses,
+                                 const std::vector<TableKind>& tables, const ModelLearning& how,
+                                 const std::function<void(double)>& progress = {});
 
 }  // namespace palpate

@@ -2,17 +2,17 @@
 
 namespace palpate {
 
-/// Where a function with one maximum in [low, high] is largest, by golden sections (Kiefer 1953),
-/// within half of `tolerance`; of places as good, the lowest.
+/// Where a function with one minimum in [low, high] is least, by golden sections (Kiefer 1953),
+/// within half of `tolerance`; the lowest of several such places.
 template <typename Function>
-double largest_at(double low, double high, double tolerance, const Function& function) {
+double least_at(double low, double high, double tolerance, const Function& function) {
   constexpr double golden = 0.6180339887498949;
   double left = high - golden * (high - low);
   double right = low + golden * (high - low);
   double at_left = function(left);
   double at_right = function(right);
   while (high - low > tolerance) {
-    if (at_left >= at_right) {
+    if (at_left <= at_right) {
       high = right;
       right = left;
       at_right = at_left;

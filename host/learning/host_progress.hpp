@@ -30,4 +30,27 @@ class HostProgress {
   std::function<void(double)> show_;
 };
 
+/// Tells the fraction done of a work of parts that follow each other, each of a cost.
+class SerialProgress {
+ public:
+  /// @param cost of all parts
+  /// @param show may be empty; outlives this object
+  SerialProgress(double cost, const std::function<void(double)>& show) : cost_(cost), show_(show) {}
+
+  /// Shows the progress of the next part. It may outlive this object.
+  std::function<void(double)> part(double cost) {
+    const double begin = std::exchange(done_, done_ + cost);
+    return [&show = show_, all = cost_, begin, cost](double fraction) {
+      if (show) {
+        show((begin + cost * fraction) / all);
+      }
+    };
+  }
+
+ private:
+  double cost_;
+  double done_ = 0.0;
+  const std::function<void(double)>& show_;
+};
+
 }  // namespace palpate

@@ -15,7 +15,7 @@ namespace {
 
 constexpr int nodes = ReadingLayer::nodes;
 constexpr double node_step = LevelCounts::node_step;
-/// Values below belong to cells that nothing sensed.
+/// Cells that nothing sensed have values below this one.
 constexpr double least_sensed = -ReadingLayer::largest_value;
 
 /// The value that a reading layer gives to a pressure; see ReadingLayer.
@@ -42,17 +42,16 @@ void LevelCounts::add(Reading reading, double value, double weight) {
   counts_.at(at + 1) += share * weight;
 }
 
-void LevelCounts::add(std::span<const Touch> touches, std::span<const Pose> T_object_robot,
-                      const OccupancyGrid& layer, const ContactModel& classifier) {
+void LevelCounts::add(std::span<const TouchEvidence> touches, std::span<const Pose> T_object_robot,
+                      const OccupancyGrid& layer) {
   const InterpolatedMap values(layer, layer.prior);
   const double weight = 1.0 / static_cast<double>(T_object_robot.size());
-  for (const Touch& touch : touches) {
-    const std::vector<Reading> readings = classifier.classify(touch);
+  for (const TouchEvidence& touch : touches) {
     for (const Pose& pose : T_object_robot) {
       const Pose T_object_sensor = pose * touch.T_robot_sensor;
-      for (std::size_t e = 0; e < readings.size(); ++e) {
-        if (readings[e] != Reading::unknown) {
-          add(readings[e], values.log_odds(T_object_sensor * touch.elements_mm[e]), weight);
+      for (std::size_t e = 0; e < touch.readings.size(); ++e) {
+        if (touch.readings[e] != Reading::unknown) {
+          add(touch.readings[e], values.log_odds(T_object_sensor * touch.elements_mm[e]), weight);
         }
       }
     }
@@ -127,7 +126,7 @@ std::vector<double> shrunk_table(const LevelCounts& counts, std::span<const doub
 }
 
 ReadingLayer mean_level_layer(double threshold, double full_level) {
-  constexpr double least_full = 3.0;  // of thresholds: the unit is then one threshold
+  constexpr double least_full = 3.0;  // in thresholds; the unit is then one threshold
   if (!(threshold > 0.0 && std::isfinite(threshold))) {
     throw Error(Fault::input,
                 fmt::format("threshold = {}: a layer of mean levels needs one above 0", threshold));

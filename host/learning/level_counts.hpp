@@ -4,11 +4,11 @@
 #include <span>
 #include <vector>
 
+#include "model/touch_evidence.hpp"
 #include "palpate/contact_model.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/pose.hpp"
 #include "palpate/reading_layer.hpp"
-#include "palpate/touch.hpp"
 
 namespace palpate {
 
@@ -28,12 +28,12 @@ class LevelCounts {
   /// @param value of the layer at the reading's place
   /// @param weight by which the reading counts, above 0
   void add(Reading reading, double value, double weight = 1.0);
-  /// Counts every element of touches of an object that is at one of some poses, each of them as
+  /// Counts every element of touches of an object that is at one of some poses, all of them as
   /// likely: a reading counts once in all.
+  /// @param touches classified into the table's levels
   /// @param T_object_robot the poses, at least one
-  /// @param classifier with the table's levels, see ContactModel::classify()
-  void add(std::span<const Touch> touches, std::span<const Pose> T_object_robot,
-           const OccupancyGrid& layer, const ContactModel& classifier);
+  void add(std::span<const TouchEvidence> touches, std::span<const Pose> T_object_robot,
+           const OccupancyGrid& layer);
   LevelCounts& operator+=(const LevelCounts& other);
 
   std::size_t levels() const { return counts_.size() / ReadingLayer::nodes; }
@@ -47,17 +47,17 @@ class LevelCounts {
   std::vector<double> counts_;
 };
 
-/// The table of Eq. 7 as far as it holds for a layer, in nats, [level, node]; every node's
-/// probabilities sum to 1, and In Contact is as likely at each of its levels. Over log odds it is
-/// Eq. 7 at the node's value; over mean levels at the value's excess over the threshold's. At the
-/// values of cells that nothing sensed it is Eq. 7 of the prior.
+/// The table of Eq. 7 as far as it holds for a layer, in nats, [level, node]. Every node's
+/// probabilities sum to 1, and all levels of In Contact are equally likely. A node of log odds has
+/// Eq. 7 at its value; a node of mean levels has Eq. 7 at the excess of its value over the
+/// threshold's value. Nodes of cells that nothing sensed have Eq. 7 at the prior.
 /// @param contact with its prior; its table is not used
 std::vector<double> initial_table(const ReadingLayer& layer, std::size_t levels,
                                   const ContactModel& contact);
 
 /// The table that counts say, in nats, as if `pseudo_counts` readings at every node had been
 /// distributed as `towards` says: log((n_level + pseudo p_level) / (n + pseudo)), at least
-/// log(1e-6). A node without counts keeps what `towards` says.
+/// log(1e-6). A node without counts keeps the probabilities of `towards`.
 /// @param towards table in nats of the same size; its probabilities are normalised
 /// @param pseudo_counts above 0
 std::vector<double> shrunk_table(const LevelCounts& counts, std::span<const double> towards,
@@ -65,8 +65,8 @@ std::vector<double> shrunk_table(const LevelCounts& counts, std::span<const doub
 
 /// A layer of mean levels whose value 0 is the threshold's, so that half of the nodes tell levels
 /// below it apart and half those above: unit_level = threshold^2 / (full - 2 threshold).
-/// @param full_level the largest pressure to tell apart, at least 3 thresholds; a lower one counts
-/// as 3 thresholds
+/// @param full_level the largest pressure to tell apart; a level below 3 thresholds counts as 3
+/// thresholds
 /// @throws Error on a threshold that is not positive
 ReadingLayer mean_level_layer(double threshold, double full_level);
 

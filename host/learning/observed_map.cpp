@@ -10,6 +10,7 @@
 #include "io/element_spacing.hpp"
 #include "model/bounding_box.hpp"
 #include "model/cell_range.hpp"
+#include "model/touch_evidence.hpp"
 #include "palpate/contact.hpp"
 #include "palpate/error.hpp"
 
@@ -90,8 +91,7 @@ class Layers {
     std::vector<double> weight(count(around), 0.0);
     std::vector<double> weighted(count(around), 0.0);
     for (std::size_t e = 0; e < touch.pressure.size(); ++e) {
-      const bool living = touch.valid.empty() || touch.valid[e] != 0;
-      if (!living || std::isnan(touch.pressure[e])) {
+      if (!is_living(touch, e)) {
         continue;
       }
       const double pressure = std::max(0.0, touch.pressure[e]);

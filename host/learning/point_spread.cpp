@@ -115,7 +115,7 @@ Field mean_field(const Readings& readings, const std::vector<double>& force, Fie
 /// Mean pressure relative to its plateau.
 Field relative_pressure(const Readings& readings, double spacing_mm) {
   constexpr double cells_per_spacing = 8.0;
-  constexpr double plateau_quantile = 0.9;  // of the cells above half of the largest
+  constexpr double plateau_quantile = 0.9;  // among the cells above half of the largest
   BoundingBox box;
   for (const Sample& sample : readings.samples) {
     box.take_in(sample.place_mm);
@@ -268,7 +268,7 @@ std::map<std::string, Readings> readings_of(const std::vector<Press>& presses,
 
 std::optional<double> learn_point_spread(const std::vector<Press>& presses,
                                          const ContactClassifier& classifier) {
-  constexpr std::size_t fewest_touches = 10;  // of an object: fewer leave gaps between elements
+  constexpr std::size_t fewest_touches = 10;  // fewer touches of an object leave gaps
   constexpr double of_spacing = 0.95;
   double spacing_mm = 0.0;
   std::vector<Readings> objects;
@@ -292,26 +292,26 @@ std::optional<double> learn_point_spread(const std::vector<Press>& presses,
       errors[i] = squared_error(objects[i], blurred(face, sigma_mm, edge_mm));
     });
     double sum = 0.0;
-    for (const double error : errors) {
-      sum += error;
+    for (const double of_object : errors) {
+      sum += of_object;
     }
     return sum;
   };
   // The search is along the spread's logarithm.
-  constexpr double least = 0.05;  // of the spacing
+  constexpr double least = 0.05;  // in spacings
   constexpr double most = 3.0;
   constexpr double tolerance = 0.005;
   const double lowest = std::log(least * spacing_mm);
   const double highest = std::log(most * spacing_mm);
-  const auto quality = [&](double log_sigma) { return -error_at(std::exp(log_sigma)); };
+  const auto error = [&](double log_sigma) { return error_at(std::exp(log_sigma)); };
   // The face's edges move from cell to cell, so that the error has minima besides the least one.
   constexpr int steps = 10;
   const double step = (highest - lowest) / steps;
   int best = 0;
-  double largest = quality(lowest);
+  double smallest = error(lowest);
   for (int i = 1; i <= steps; ++i) {
-    if (const double here = quality(lowest + i * step); here > largest) {
-      largest = here;
+    if (const double here = error(lowest + i * step); here < smallest) {
+      smallest = here;
       best = i;
     }
   }
@@ -319,7 +319,7 @@ std::optional<double> learn_point_spread(const std::vector<Press>& presses,
     return {};
   }
   const double found =
-      largest_at(lowest + (best - 1) * step, lowest + (best + 1) * step, tolerance, quality);
+      least_at(lowest + (best - 1) * step, lowest + (best + 1) * step, tolerance, error);
   return std::exp(found);
 }
 

@@ -5,7 +5,9 @@
 
 #include <fmt/format.h>
 
-#include "model/bounding_box.hpp"
+#include "model/elements_that.hpp"
+#include "model/touch_evidence.hpp"
+#include "palpate/error.hpp"
 
 namespace palpate {
 
@@ -47,21 +49,98 @@ std::vector<std::size_t> folds_of(const std::vector<Press>& presses, std::size_t
   return fold;
 }
 
-std::vector<double> contact_pressures(const std::vector<Press>& presses,
-                                      const ContactClassifier& classifier) {
-  std::vector<double> pressures;
-  for (const Press& press : presses) {
-    for (const Touch& touch : press.touches) {
-      const std::vector<Reading> readings = classifier.classify(touch);
-      for (std::size_t e = 0; e < readings.size(); ++e) {
-        if (is_contact(readings[e])) {
-          pressures.push_back(touch.pressure[e]);
-        }
-      }
+std::vector<Press> presses_without(std::size_t fold, const std::vector<Press>& presses,
+                                   std::size_t folds) {
+  const std::vector<std::size_t> fold_of = folds_of(presses, folds);
+  std::vector<Press> others;
+  for (std::size_t i = 0; i < presses.size(); ++i) {
+    if (fold_of[i] != fold) {
+      others.push_back(presses[i]);
     }
   }
-  std::ranges::sort(pressures);
-  return pressures;
+  return others;
+}
+
+bool at_known_poses(const std::vector<Press>& presses) {
+  return std::ranges::all_of(presses,
+                             [](const Press& press) { return press.T_object_robot.has_value(); });
+}
+
+void require_poses_of_one_kind(const std::vector<Press>& presses) {
+  for (const Press& press : presses) {
+    if (press.T_object_robot.has_value() != presses.front().T_object_robot.has_value()) {
+      throw Error(Fault::input,
+                  fmt::format("{}: its pose is {}known, unlike that of {}; calibrate "
+                              "from one kind",
+                              press.name, press.T_object_robot ? "" : "un", presses.front().name));
+    }
+  }
+}
+
+CheckedPresses without_unknown(const std::vector<Press>& presses,
+                               const ContactClassifier& classifier) {
+  CheckedPresses checked;
+  std::string first;
+  for (const Press& press : presses) {
+    const std::vector<TouchEvidence> evidence =
+        evidence_of(press.touches, {.classifier = classifier});
+    if (std::ranges::any_of(
+            evidence, [](const TouchEvidence& touch) { return !touch.known().readings.empty(); })) {
+      checked.presses.push_back(press);
+    } else if (first.empty()) {
+      first = press.name;
+    }
+  }
+  if (checked.presses.empty()) {
+    throw Error(Fault::input, fmt::format("{}: all elements are Unknown, as in all other touches: "
+                                          "dead, without a number, or of the same pressure",
+                                          first));
+  }
+  if (const std::size_t left_out = presses.size() - checked.presses.size(); left_out > 0) {
+    checked.warnings.push_back(fmt::format(
+        "{}: all elements are Unknown: dead, without a number, or of the same pressure; left out{}",
+        first, left_out > 1 ? fmt::format(", with {} more such touches", left_out - 1) : ""));
+  }
+  return checked;
+}
+
+std::vector<std::string> stuck_elements(const std::vector<Press>& presses, double threshold,
+                                        std::span<const double> contact_pressures) {
+  constexpr std::size_t fewest_touches = 5;
+  constexpr double rare = 0.01;  // share of the other elements' readings In Contact
+  std::map<std::size_t, std::vector<const Touch*>> arrays;
+  for (const Press& press : presses) {
+    for (const Touch& touch : press.touches) {
+      arrays[touch.pressure.size()].push_back(&touch);
+    }
+  }
+  std::vector<std::string> warnings;
+  for (const auto& [elements, touches] : arrays) {
+    std::vector<std::size_t> stuck;
+    for (std::size_t e = 0; touches.size() >= fewest_touches && e < elements; ++e) {
+      const double pressure = touches.front()->pressure[e];
+      const bool same = std::ranges::all_of(touches, [&](const Touch* touch) {
+        return is_living(*touch, e) && touch->pressure[e] == pressure;
+      });
+      if (!same || !(pressure > threshold)) {
+        continue;
+      }
+      const auto [first, last] =
+          std::equal_range(contact_pressures.begin(), contact_pressures.end(), pressure);
+      const double others = static_cast<double>(last - first) - static_cast<double>(touches.size());
+      if (others <= rare * static_cast<double>(contact_pressures.size() - touches.size())) {
+        stuck.push_back(e);
+      }
+    }
+    if (!stuck.empty()) {
+      warnings.push_back(
+          fmt::format("{} the same pressure above the threshold in all {} touches: "
+                      "it counts as in contact, and seems stuck; set 'valid' to 0 "
+                      "there",
+                      elements_that(stuck, "reads", "read"), touches.size()));
+    }
+  }
+  return warnings;
 }
 
 }  // namespace palpate

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -38,8 +39,31 @@ Press posed_press(const Recording& recording, std::size_t touch);
 /// more alike than those of another day.
 std::vector<std::size_t> folds_of(const std::vector<Press>& presses, std::size_t folds);
 
-/// Pressures of all elements In Contact, ascending.
-std::vector<double> contact_pressures(const std::vector<Press>& presses,
-                                      const ContactClassifier& classifier);
+/// The presses of all folds but one.
+std::vector<Press> presses_without(std::size_t fold, const std::vector<Press>& presses,
+                                   std::size_t folds);
+
+/// Whether all presses are at known poses.
+bool at_known_poses(const std::vector<Press>& presses);
+
+/// @throws Error where some presses are at known poses and others are not
+void require_poses_of_one_kind(const std::vector<Press>& presses);
+
+/// Presses, and sentences about what seems wrong with them.
+struct CheckedPresses {
+  std::vector<Press> presses;
+  std::vector<std::string> warnings;
+};
+/// Leaves out presses all of whose elements are Unknown, and warns of them.
+/// @throws Error where no press is left
+CheckedPresses without_unknown(const std::vector<Press>& presses,
+                               const ContactClassifier& classifier);
+
+/// Warns of elements that seem stuck: in arrays that touched five times or more, they read the very
+/// same pressure above the threshold each time, which hardly any other reading In Contact equals.
+/// @param contact_pressures of all elements In Contact, ascending
+/// @returns whole sentences; none where all is well
+std::vector<std::string> stuck_elements(const std::vector<Press>& presses, double threshold,
+                                        std::span<const double> contact_pressures);
 
 }  // namespace palpate

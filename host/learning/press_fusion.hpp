@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "learning/fused_map.hpp"
-#include "learning/press_groups.hpp"
 #include "learning/press_search.hpp"
 #include "learning/unposed_maps.hpp"
 
@@ -20,7 +19,7 @@ struct UnposedPress {
   PressImage image;              ///< in the robot frame of the first side
 };
 
-/// The map that a press is a part of so far, and its place there.
+/// The map that a press is a part of, and its place there.
 struct PressHome {
   std::optional<std::size_t> map;
   PressPlace place;  ///< on the map, or else on the one that it fits best
@@ -29,63 +28,35 @@ struct PressHome {
   ImagePlace image_place() const;
 };
 
-/// Assigns presses to maps and places them, as unposed_maps() says.
-class PressFusion {
- public:
-  /// @param presses, options, progress outlive this object
-  /// @param step_mm of the presses' lattices
-  PressFusion(std::span<const UnposedPress> presses, const UnposedOptions& options, double step_mm,
-              const std::function<void(double)>& progress);
-
-  /// Makes a map of each press.
-  void keep_apart();
-  /// Makes at most as many maps as the options say. Returns the number of rounds.
-  int fuse();
-
-  const std::vector<PressHome>& homes() const { return homes_; }  ///< [press]
-  std::size_t maps() const { return maps_.size(); }               ///< some may be of no press
-  bool settled() const { return settled_; }                       ///< the last round moved no press
-  /// Whether a press's contact gains so little, even on the map of this press alone, that the best
-  /// of all the places compared may gain as much by chance.
-  bool says_little(std::size_t press) const { return is_little(press, homes_[press].place); }
-
- private:
-  /// A map in the making.
-  struct Group {
-    FusedMap sums;
-    std::size_t presses = 0;
-  };
-
-  void report(double fraction) const;
-  Hypothesis compared(const FusedMap& map) const;
-  Hypothesis alone(std::size_t press) const;
-  bool is_little(std::size_t press, const PressPlace& place) const;
-  double fit_of(std::size_t press, const PressPlace& place) const;
-  std::size_t maps_in_use() const;
-
-  void begin_map(std::size_t press);
-  void join(std::size_t press);
-  void leave(std::size_t press);
-
-  void compare_single_presses();
-  bool open_maps();
-  void join_first_maps();
-  bool place_all();
-  PressHome best_home(std::size_t press, const PressHome& before) const;
-
-  std::span<const UnposedPress> presses_;
-  const UnposedOptions& options_;
-  double step_mm_;
-  const std::function<void(double)>& progress_;
-  PressSearch search_;
-  std::vector<double> own_gain_;      ///< [press] on the map of this press alone
-  std::vector<double> contact_gain_;  ///< [press] the part of its elements In Contact
-  std::vector<PressHome> homes_;      ///< [press]
-  std::vector<Group> maps_;           ///< those that all presses left keep their index
-  FitTable fits_;
-  std::vector<std::vector<PressPlace>> single_;  ///< [column][press] on the map of a single press
-  std::vector<std::size_t> opened_;              ///< columns of the maps begun since the last round
-  bool settled_ = true;
+/// Presses on maps.
+struct FusedPresses {
+  std::vector<PressHome> homes;  ///< [press]
+  /// [press] Whether its contact gains so little, even on the map of this press alone, that the
+  /// best of all the places compared may gain as much by chance.
+  std::vector<bool> says_little;
+  std::size_t maps = 0;  ///< some may be of no press
+  int rounds = 0;        ///< in which every press was placed anew
+  bool settled = true;   ///< the last round moved no press
 };
+
+/// Assigns presses to maps and places them, as unposed_maps() says. Takes all host threads.
+/// @param step_mm of the lattices on which presses are placed
+FusedPresses fuse_presses(std::span<const UnposedPress> presses, const UnposedOptions& options,
+                          double step_mm, const std::function<void(double)>& progress);
+
+/// How well presses fit maps of one press each: rows are presses, columns the maps. 1: as well
+/// as in the press's own map.
+struct FitTable {
+  std::vector<std::size_t> columns;      ///< the press that each map is of
+  std::vector<std::vector<double>> fit;  ///< [press][column]
+};
+
+/// The column that as a further map would raise the presses' best fits most, added up; a fit counts
+/// from 0 to 1. Columns of presses that fit a map already are left out.
+/// @param best [press] fit in the maps that there are, 0 without
+/// @param enough fit from which a press needs no further map
+/// @returns none where all presses fit
+std::optional<std::size_t> next_map(const FitTable& table, std::span<const double> best,
+                                    double enough);
 
 }  // namespace palpate

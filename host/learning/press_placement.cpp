@@ -41,15 +41,8 @@ PressPlacer::PressPlacer(const Hypothesis& hypothesis, const ContactModel& conta
   }
 }
 
-std::vector<float> PressPlacer::log_likelihoods(const Press& press) {
-  return log_likelihoods(elements_of(press));
-}
-
-double PressPlacer::log_likelihood(const Press& press, const Pose& T_object_robot) const {
-  return log_likelihood(elements_of(press), T_object_robot);
-}
-
-std::vector<float> PressPlacer::log_likelihoods(const std::vector<Element>& elements) {
+std::vector<float> PressPlacer::log_likelihoods(std::span<const TouchEvidence> press) {
+  const std::vector<Element> elements = elements_of(press);
   double reach_mm = 0.0;
   for (const Element& element : elements) {
     reach_mm = std::max(reach_mm, std::hypot(element.from_pivot_mm.x, element.from_pivot_mm.y));
@@ -78,9 +71,8 @@ std::vector<float> PressPlacer::log_likelihoods(const std::vector<Element>& elem
   return bins;
 }
 
-PressPlacement PressPlacer::place(const Press& press) {
-  const std::vector<Element> elements = elements_of(press);
-  const std::vector<float> bins = log_likelihoods(elements);
+PressPlacement PressPlacer::place(std::span<const TouchEvidence> press) {
+  const std::vector<float> bins = log_likelihoods(press);
   std::vector<std::uint32_t> order(bins.size());
   std::iota(order.begin(), order.end(), 0U);
   const std::size_t best_count = std::min(evaluated_bins, bins.size());
@@ -91,7 +83,7 @@ PressPlacement PressPlacer::place(const Press& press) {
                     order.end(), better);
   std::vector<double> evaluated;
   for (std::size_t i = 0; i < best_count; ++i) {
-    evaluated.push_back(log_likelihood(elements, lattice_.T_object_robot(order[i])));
+    evaluated.push_back(log_likelihood(press, lattice_.T_object_robot(order[i])));
   }
   const auto best = std::ranges::max_element(evaluated);
   double sum = 0.0;
@@ -104,14 +96,14 @@ PressPlacement PressPlacer::place(const Press& press) {
           .log_evidence = *best + std::log(sum / static_cast<double>(bins.size()))};
 }
 
-std::vector<PressPlacer::Element> PressPlacer::elements_of(const Press& press) const {
+std::vector<PressPlacer::Element> PressPlacer::elements_of(
+    std::span<const TouchEvidence> press) const {
   std::vector<Element> elements;
-  for (const Touch& touch : press.touches) {
-    const std::vector<Reading> readings = contact_.classify(touch);
+  for (const TouchEvidence& touch : press) {
     const glm::dmat2 turn = rotation(touch.T_robot_sensor.theta_rad);
     const glm::dvec2 sensor_mm = touch.T_robot_sensor.translation_mm - lattice_.pivot_mm;
-    for (std::size_t e = 0; e < readings.size(); ++e) {
-      elements.push_back({sensor_mm + turn * touch.elements_mm[e], readings[e]});
+    for (std::size_t e = 0; e < touch.readings.size(); ++e) {
+      elements.push_back({sensor_mm + turn * touch.elements_mm[e], touch.readings[e]});
     }
   }
   return elements;
@@ -205,13 +197,13 @@ void PressPlacer::add(std::vector<float>& bins, const glm::dvec2& turned,
   }
 }
 
-double PressPlacer::log_likelihood(const std::vector<Element>& elements,
+double PressPlacer::log_likelihood(std::span<const TouchEvidence> press,
                                    const Pose& T_object_robot) const {
   const InterpolatedMap map(layer_, contact_.table ? layer_.prior : contact_.prior.value());
   const glm::dmat2 turn = rotation(T_object_robot.theta_rad);
   const glm::dvec2 pivot_mm = T_object_robot * lattice_.pivot_mm;
   double sum = 0.0;
-  for (const Element& element : elements) {
+  for (const Element& element : elements_of(press)) {
     if (element.reading != Reading::unknown) {
       const glm::dvec2 place = pivot_mm + turn * element.from_pivot_mm;
       sum += contact_.log_likelihood(element.reading, {.log_odds = map.log_odds(place)});

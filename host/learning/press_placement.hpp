@@ -1,12 +1,11 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <span>
 #include <vector>
 
-#include "learning/press.hpp"
 #include "learning/training_maps.hpp"
+#include "model/touch_evidence.hpp"
 #include "palpate/contact_model.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
@@ -20,31 +19,32 @@ struct PressPlacement {
   double log_evidence = 0.0;    ///< log of the likelihood's mean over the lattice, in nats
 };
 
-/// Finds the places of presses on one map, over all bins of a lattice.
+/// Finds the places of presses on one map, over all bins of a lattice. A press is given by the
+/// evidence of its touches, classified by the contact model.
 ///
-/// A table of each reading's log-likelihood stands at samples of the map that divide the lattice's
-/// steps, so that an element adds rows of the table to rows of bins. Elements are taken to the
-/// nearest sample, at most half a cell of the map away along each axis; the best bins by these sums
-/// are then evaluated without. No Contact everywhere is summed once for all presses of one array at
-/// one place. Takes all host threads; not thread-safe, but objects of their own may work side by
-/// side.
+/// Each reading's log-likelihood is tabulated at samples of the map that divide the lattice's
+/// steps, so that an element adds rows of the table to rows of bins. An element takes the nearest
+/// sample, at most half a cell of the map away along each axis; the best bins by these sums are
+/// then evaluated at the elements' own places. No Contact everywhere is summed once for all presses
+/// of one array at one place. Takes all host threads; not thread-safe, but several placers may work
+/// side by side.
 class PressPlacer {
  public:
   /// @param hypothesis with a layer where the contact model has a table over one; its weight is
   /// ignored. It outlives this object
-  /// @param contact with its prior; of one set of numbers where it has a table
+  /// @param contact with its prior; a table has one set of numbers
   /// @throws Error on a lattice, contact model or map that is not sound
   PressPlacer(const Hypothesis& hypothesis, const ContactModel& contact,
               const PoseLattice& lattice);
 
-  /// @throws Error on a touch that is not sound, or a press that lies so far from the pivot that
-  /// its samples are more than `most_cells`
-  PressPlacement place(const Press& press);
+  /// @throws Error on a press that lies so far from the pivot that its samples are more than
+  /// `most_cells`
+  PressPlacement place(std::span<const TouchEvidence> press);
   /// The log-likelihood at every bin, in nats, by the nearest samples.
   /// @throws Error as place() does
-  std::vector<float> log_likelihoods(const Press& press);
+  std::vector<float> log_likelihoods(std::span<const TouchEvidence> press);
   /// The log-likelihood at any pose, in nats, at the elements' own places.
-  double log_likelihood(const Press& press, const Pose& T_object_robot) const;
+  double log_likelihood(std::span<const TouchEvidence> press, const Pose& T_object_robot) const;
 
  private:
   /// One axis of the samples: `per_step` of them to a step of the lattice.
@@ -62,15 +62,13 @@ class PressPlacer {
     Reading reading;
   };
 
-  std::vector<Element> elements_of(const Press& press) const;
-  std::vector<float> log_likelihoods(const std::vector<Element>& elements);
+  std::vector<Element> elements_of(std::span<const TouchEvidence> press) const;
   void cover(double reach_mm);
   void sum_rest(const std::vector<Element>& elements);
   /// Adds a table to the bins of one theta, at an element's places.
   /// @param turned the element relative to the pivot, in mm along the object frame's axes
   void add(std::vector<float>& bins, const glm::dvec2& turned,
            const std::vector<float>& table) const;
-  double log_likelihood(const std::vector<Element>& elements, const Pose& T_object_robot) const;
 
   const OccupancyGrid& layer_;
   ContactModel contact_;
@@ -78,8 +76,8 @@ class PressPlacer {
   double reach_mm_ = -1.0;  ///< the tables cover elements so far from the pivot
   Samples x_;
   Samples y_;
-  /// [y phase, x phase, row, column] in nats: of No Contact, and by how much each level of contact
-  /// exceeds it.
+  /// [y phase, x phase, row, column] in nats: the log-likelihood of No Contact, and by how much
+  /// that of each level of contact exceeds it.
   std::vector<float> no_contact_;
   std::vector<std::vector<float>> contact_excess_;
   std::vector<glm::dvec2> resting_;  ///< elements of rest_, relative to the pivot

@@ -6,15 +6,49 @@
 #include <numbers>
 #include <utility>
 
+#include <glm/geometric.hpp>
+
 #include "learning/press_placement.hpp"
 #include "model/bounding_box.hpp"
 
 namespace palpate {
 
+PressSide::PressSide(const Touch& touch, const ContactModel& contact, bool mirrored)
+    : evidence_(touch, contact), contact_(evidence_.contact()), touch_(touch) {
+  if (mirrored) {
+    for (std::vector<glm::dvec2>* elements : {&evidence_.elements_mm, &contact_.elements_mm}) {
+      for (glm::dvec2& element : *elements) {
+        element.x = -element.x;
+      }
+    }
+    touch_.elements_mm = evidence_.elements_mm;
+  }
+  const double count = in_contact() ? static_cast<double>(evidence_.contacts) : 1.0;
+  glm::dvec2 middle_mm(0.0);
+  for (const glm::dvec2& element : contact_.elements_mm) {
+    middle_mm += element;
+  }
+  middle_mm /= count;
+  for (const glm::dvec2& element : contact_.elements_mm) {
+    const glm::dvec2 from_middle = element - middle_mm;
+    reach_mm_ += glm::dot(from_middle, from_middle) / count;
+  }
+  reach_mm_ = std::sqrt(reach_mm_);
+  for (Pose* pose : {&evidence_.T_robot_sensor, &contact_.T_robot_sensor, &touch_.T_robot_sensor}) {
+    *pose = {-middle_mm, 0.0};
+  }
+}
+
+double displacement_mm(const PressSide& press, const Pose& T_object_robot, const Pose& other) {
+  const glm::dvec2 d = T_object_robot.translation_mm - other.translation_mm;
+  const double turned = 1.0 - std::cos(T_object_robot.theta_rad - other.theta_rad);
+  return std::sqrt(glm::dot(d, d) + 2.0 * press.reach_mm() * press.reach_mm() * turned);
+}
+
 /// One side of a press on a map, at all bins.
 struct PressSearch::SideScores {
   const PressSide& side;
-  bool mirrored = false;
+  bool mirrored;
   PoseLattice lattice;
   PressPlacer placer;
   std::vector<float> bins;
@@ -29,11 +63,11 @@ struct PressSearch::Summit {
 
 namespace {
 
-/// So far beyond every map that it holds its prior there.
+/// A pose so far beyond every map that only the map's prior counts there.
 constexpr Pose beyond{{2.0 * farthest_mm, 0.0}, 0.0};
 
-/// Eq. 7 as a table, which is read several times faster: within 1e-4 nats of it, unless gamma is so
-/// small that log odds beyond the table matter.
+/// Eq. 7 as a table, which is read several times faster. The table is within 1e-4 nats of Eq. 7,
+/// unless gamma is so small that log odds beyond the table matter.
 ContactModel tabulated(ContactModel contact) {
   if (contact.table) {
     return contact;
@@ -65,35 +99,36 @@ std::vector<std::size_t> best_bins(const std::vector<float>& bins, const PoseLat
   return best;
 }
 
+/// All angles, and the places of the middle of a press's contact that PressSearch compares.
+PoseLattice lattice_for(const PressSide& side, const Hypothesis& map, double step_mm, int angles) {
+  const BoundingBox box = occupied_box(map.map);
+  const double beside_mm = side.reach_mm() / 2.0;
+  const auto axis = [&](double lower, double upper) {
+    const double middle = (lower + upper) / 2.0;
+    const double extent = upper - lower + 2.0 * beside_mm;
+    const int count = std::max(1, static_cast<int>(std::ceil(extent / step_mm)));
+    return Axis{middle - count * step_mm / 2.0, middle + count * step_mm / 2.0, count};
+  };
+  return {.x_mm = axis(box.lower.x, box.upper.x),
+          .y_mm = axis(box.lower.y, box.upper.y),
+          .theta_rad = {0.0, 2.0 * std::numbers::pi, angles}};
+}
+
 }  // namespace
 
 PressSearch::PressSearch(const ContactModel& contact, double step_mm, int angles,
                          double temperature)
     : contact_(tabulated(contact)), step_mm_(step_mm), angles_(angles), temperature_(temperature) {}
 
-double PressSearch::gain(const Press& press, const Hypothesis& map,
+double PressSearch::gain(std::span<const TouchEvidence> press, const Hypothesis& map,
                          const Pose& T_object_robot) const {
   const PressPlacer placer(map, contact_, {});
   return placer.log_likelihood(press, T_object_robot) - placer.log_likelihood(press, beyond);
 }
 
-PoseLattice PressSearch::lattice_for(const PressSide& side, const Hypothesis& map) const {
-  const BoundingBox box = occupied_box(map.map);
-  const double beside_mm = side.reach_mm() / 2.0;
-  const auto axis = [&](double lower, double upper) {
-    const double middle = (lower + upper) / 2.0;
-    const double extent = upper - lower + 2.0 * beside_mm;
-    const int count = std::max(1, static_cast<int>(std::ceil(extent / step_mm_)));
-    return Axis{middle - count * step_mm_ / 2.0, middle + count * step_mm_ / 2.0, count};
-  };
-  return {.x_mm = axis(box.lower.x, box.upper.x),
-          .y_mm = axis(box.lower.y, box.upper.y),
-          .theta_rad = {0.0, 2.0 * std::numbers::pi, angles_}};
-}
-
 PressSearch::Summit PressSearch::climb(const Summit& start) const {
   constexpr int halvings = 3;
-  const Press& press = start.of->side.press();
+  const std::span<const TouchEvidence> press = start.of->side.evidence();
   const PressPlacer& placer = start.of->placer;
   double shift_mm = step_mm_ / 2.0;
   double turn_rad = std::numbers::pi / angles_;
@@ -156,14 +191,10 @@ PressPlace PressSearch::best_place(const std::vector<PressSide>& sides,
   std::vector<Summit> summits;
   std::size_t places = 0;
   for (const PressSide& side : sides) {
-    const PoseLattice lattice = lattice_for(side, map);
-    scores.push_back({.side = side,
-                      .mirrored = !scores.empty(),
-                      .lattice = lattice,
-                      .placer = PressPlacer(map, contact_, lattice),
-                      .bins = {}});
-    SideScores& of = scores.back();
-    of.bins = of.placer.log_likelihoods(side.press());
+    const PoseLattice lattice = lattice_for(side, map, step_mm_, angles_);
+    SideScores& of = scores.emplace_back(
+        SideScores{side, !scores.empty(), lattice, PressPlacer(map, contact_, lattice), {}});
+    of.bins = of.placer.log_likelihoods(side.evidence());
     places += of.bins.size();
     for (const std::size_t bin : best_bins(of.bins, lattice)) {
       summits.push_back(
@@ -190,12 +221,12 @@ PressPlace PressSearch::best_place(const std::vector<PressSide>& sides,
       best = top;
     }
   }
-  return {
-      .T_object_robot = best.T_object_robot,
-      .mirrored = best.of->mirrored,
-      .gain = best.log_likelihood - best.of->placer.log_likelihood(best.of->side.press(), beyond),
-      .certainty = certainty_of(best, scores),
-      .log_places = std::log(static_cast<double>(places))};
+  return {.T_object_robot = best.T_object_robot,
+          .mirrored = best.of->mirrored,
+          .gain = best.log_likelihood -
+                  best.of->placer.log_likelihood(best.of->side.evidence(), beyond),
+          .certainty = certainty_of(best, scores),
+          .log_places = std::log(static_cast<double>(places))};
 }
 
 }  // namespace palpate

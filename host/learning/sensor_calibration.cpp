@@ -5,19 +5,14 @@
 #include <iterator>
 #include <map>
 #include <numeric>
-#include <optional>
 #include <set>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "io/element_spacing.hpp"
-#include "learning/contact_learning.hpp"
-#include "learning/cross_validation.hpp"
 #include "learning/feature_learning.hpp"
-#include "learning/press_checks.hpp"
-#include "learning/reading_learning.hpp"
-#include "learning/tried_bins.hpp"
+#include "learning/host_progress.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
@@ -26,9 +21,162 @@ namespace {
 
 /// How long learning a table takes, in cross-validations.
 constexpr double table_cost = 4.0 / 3.0;
-/// To try touches at known poses, of one core; and on bins that are given.
+/// Minutes of one core to try touches at known poses; and to try them on bins that are given.
 constexpr double minutes = 0.25;
 constexpr double minutes_at_bins = 1.0;
+
+void require_sound(const std::vector<Press>& presses, const SensorCalibrationOptions& options) {
+  if (presses.empty()) {
+    throw Error(Fault::input, "no touches; give recordings with touches");
+  }
+  for (const TableKind& kind : options.tables) {
+    if (kind.levels < 2 || kind.levels > most_reading_levels) {
+      throw Error(Fault::input,
+                  fmt::format("levels = {}: give 2 to {}", kind.levels, most_reading_levels));
+    }
+  }
+  if (options.folds < 2) {
+    throw Error(Fault::input, fmt::format("folds = {}: give at least 2", options.folds));
+  }
+  require_poses_of_one_kind(presses);
+}
+
+/// The largest spacing of the presses' arrays.
+double spacing_mm_of(const std::vector<Press>& presses) {
+  double spacing_mm = 0.0;
+  for (const Press& press : presses) {
+    if (const auto spacing = spacing_of(press.touches.front().elements_mm)) {
+      spacing_mm = std::max(spacing_mm, spacing->nearest_mm.most);
+    }
+  }
+  if (!(spacing_mm > 0.0)) {
+    throw Error(Fault::input, "the arrays have one element each; a calibration needs several");
+  }
+  return spacing_mm;
+}
+
+/// The bins for which touches at known poses are learned.
+RecognitionBins bins_for(const std::vector<Press>& presses, const SensorCalibrationOptions& options,
+                         double spacing_mm) {
+  const RecognitionBins bins =
+      options.bins.value_or(RecognitionBins{fine_lattice(presses, spacing_mm)});
+  bins.lattice.validate();
+  if (bins.auto_pivot) {
+    require_within(presses, bins.lattice);
+  }
+  return bins;
+}
+
+/// No more of these bins than touches are tried on in a short time.
+RecognitionBins affordable_bins(const RecognitionBins& bins, const LearnedPresses& learned,
+                                const SensorCalibrationOptions& options) {
+  // Among the maps of folds, a touch is tried on the one that was built without it.
+  std::map<std::string, std::size_t> maps_of;
+  for (const TrainingMap& map : learned.maps) {
+    std::size_t& count = maps_of[map.map.label];
+    count = map.presses.empty() ? std::min(count + 1, options.most_maps) : 1;
+  }
+  std::size_t maps = 0;
+  for (const auto& [label, count] : maps_of) {
+    maps += count;
+  }
+  const TrialCost cost{.maps = maps,
+                       .spacing_mm = learned.readings.spacing_mm,
+                       .minutes = options.bins ? minutes_at_bins : minutes};
+  return {affordable_lattice(bins.lattice, learned.presses, learned.readings.classifier, cost),
+          bins.auto_pivot};
+}
+
+std::vector<std::string> labels_of(const std::vector<TrainingMap>& maps) {
+  std::set<std::string> labels;
+  for (const TrainingMap& map : maps) {
+    labels.insert(map.map.label);
+  }
+  return {labels.begin(), labels.end()};
+}
+
+/// Warns of what the presses cannot tell before any table, in whole sentences.
+std::vector<std::string> warnings_about(const LearnedPresses& learned) {
+  std::vector<std::string> warnings = stuck_elements(
+      learned.presses, learned.readings.classifier.threshold, learned.readings.pressures);
+  if (at_known_poses(learned.presses) && !learned.readings.psf_mm) {
+    warnings.emplace_back(
+        "the touches do not tell the point spread: too few of an object, or no edges; the "
+        "maps' spread is 0.6 element spacings");
+  }
+  std::set<std::string> alone;
+  for (const Press& press : learned.presses) {
+    alone.insert(press.label);
+  }
+  for (const std::string& label : compared_labels(learned)) {
+    alone.erase(label);
+  }
+  for (const std::string& label : alone) {
+    warnings.push_back(
+        fmt::format("'{}': no touch has a map of the object that it is no part of, so that "
+                    "nothing is learned of its readings; give it two touches or a map",
+                    label));
+  }
+  return warnings;
+}
+
+/// The sensor without what a table and its cross-validation say.
+LearnedSensor sensor_of(const LearnedReadings& readings, const std::string& pressure_unit,
+                        const std::optional<BinSteps>& bins) {
+  LearnedSensor sensor{
+      .pressure_unit = pressure_unit, .noise = readings.noise, .classifier = readings.classifier};
+  sensor.prior = readings.prior;
+  sensor.psf_mm = readings.psf_mm;
+  sensor.spread_mm = readings.spread_mm;
+  sensor.bins = bins;
+  return sensor;
+}
+
+/// Gamma by the placed presses, counted over log odds.
+double gamma_of(const PlacedPresses& placed, const TableLearning& table,
+                const LearnedPresses& learned) {
+  TableLearning how = table;
+  how.layer = {.near_mm = table.layer.near_mm, .far_mm = table.layer.far_mm};
+  how.level_edges.clear();
+  how.counted_within = {};  // gamma is of the sensor, whatever the bins
+  LevelCounts all(2);
+  for (const auto& [label, counts] :
+       count_placed(placed.placements, learned.presses, layers_of(learned.maps, how.layer), how)) {
+    all += counts;
+  }
+  return fit_gamma(all, learned.readings.prior);
+}
+
+/// Tries every fold's presses on the models_of() the others, [model][fold].
+std::vector<std::vector<CrossValidation>> cross_validate(const std::vector<Press>& presses,
+                                                         const std::vector<std::string>& labels,
+                                                         const std::vector<TableKind>& tables,
+                                                         const ModelLearning& how,
+                                                         const CrossValidationOptions& options,
+                                                         SerialProgress& progress) {
+  std::vector<std::vector<CrossValidation>> tried(tables.size() + 1);
+  const double share = 1.0 / static_cast<double>(options.folds);
+  const double learning = static_cast<double>(tables.size()) * table_cost;
+  for (std::size_t fold = 0; fold < options.folds; ++fold) {
+    const std::vector<FoldModel> models = models_of(presses_without(fold, presses, options.folds),
+                                                    tables, how, progress.part(learning));
+    for (std::size_t i = 0; i < tried.size(); ++i) {
+      tried[i].push_back(models.empty() ? CrossValidation{.familiarity = {{}}}
+                                        : try_fold(fold, presses, labels, models[i], options,
+                                                   progress.part(share)));
+    }
+  }
+  return tried;
+}
+
+/// A table, and what it says of presses that it has not seen.
+struct TriedModel {
+  TableLearning how;
+  PlacedPresses placed;
+  std::vector<CrossValidation> folds;
+  CrossValidation all;    ///< the folds together
+  TemperedPresses after;  ///< the folds together, with temperature and features
+};
 
 /// The losses of presses with their labels' log probabilities, in nats.
 std::vector<double> losses_of(const std::vector<ScoredPress>& presses) {
@@ -39,329 +187,121 @@ std::vector<double> losses_of(const std::vector<ScoredPress>& presses) {
   return of_each;
 }
 
-/// A calibration in the making.
-class SensorLearning {
- public:
-  SensorLearning(const std::vector<Press>& presses, const SensorCalibrationOptions& options)
-      : all_{.presses = presses}, options_(options) {
-    for (const TableKind& kind : options.tables) {
-      if (kind.levels < 2 || kind.levels > most_reading_levels) {
-        throw Error(Fault::input,
-                    fmt::format("levels = {}: give 2 to {}", kind.levels, most_reading_levels));
-      }
-    }
-    if (options.folds < 2) {
-      throw Error(Fault::input, fmt::format("folds = {}: give at least 2", options.folds));
-    }
-    require_poses_of_one_kind(presses);
-    known_poses_ = std::ranges::all_of(
-        presses, [](const Press& press) { return press.T_object_robot.has_value(); });
-    tables_ = options.tables.empty() ? default_tables(known_poses_) : options.tables;
-    for (const Press& press : presses) {
-      if (const auto spacing = spacing_of(press.touches.front().elements_mm)) {
-        spacing_mm_ = std::max(spacing_mm_, spacing->nearest_mm.most);
-      }
-    }
-    if (!(spacing_mm_ > 0.0)) {
-      throw Error(Fault::input, "the arrays have one element each; a calibration needs several");
-    }
-    result_.sensor.pressure_unit = options.pressure_unit;
-    learning_.readings = {.pressure_unit = options.pressure_unit,
-                          .threshold = options.threshold,
-                          .ratio = options.ratio,
-                          .spacing_mm = spacing_mm_};
-    learning_.folds = options.folds;
-  }
-
-  SensorCalibration run(const std::vector<OccupancyGrid>& given,
-                        const std::function<void(double)>& progress) {
-    for (const OccupancyGrid& map : given) {
-      learning_.given.push_back({map});
-    }
-    learn_readings();
-    if (known_poses_) {
-      settle_bins();
-    }
-    all_.maps = maps_to_learn_on(all_, learning_);
-    warn_of_objects_without_maps();
-    std::set<std::string> labels;
-    for (const TrainingMap& map : all_.maps) {
-      labels.insert(map.map.label);
-    }
-    result_.objects = labels.size();
-    if (labels.size() < 2) {
-      const TableLearning how = table_learning(tables_.back(), all_, learning_);
-      const PlacedPresses placed = learn_table(all_.presses, all_.maps, how, progress);
-      result_.sensor.table = placed.table;
-      learn_gamma(placed, how);
-      result_.warnings.emplace_back(
-          "touches of one object say nothing about confidence: the temperature stays 1, and "
-          "neither features nor familiarity are learned; give touches of two objects or more");
-      return std::move(result_);
-    }
-    if (known_poses_) {
-      settle_tried_bins();
-    }
-    const auto tables = static_cast<double>(tables_.size());
-    const auto folds = static_cast<double>(options_.folds);
-    // In cross-validations: the tables of all presses, those of the folds, and the trials.
-    const double all = tables * table_cost + folds * tables * table_cost + tables + 1.0;
-    double done = 0.0;
-    const Part part = [&](double cost) {
-      const double begin = std::exchange(done, done + cost);
-      return [&progress, begin, cost, all](double fraction) {
-        if (progress) {
-          progress((begin + cost * fraction) / all);
-        }
-      };
-    };
-    std::vector<TriedModel> tried;
-    for (const TableKind& kind : tables_) {
-      TriedModel& one = tried.emplace_back();
-      one.how = table_learning(kind, all_, learning_);
-      one.placed = learn_table(all_.presses, all_.maps, one.how, part(table_cost));
-    }
-    const CrossValidation eq7 = cross_validate({labels.begin(), labels.end()}, tried, part);
-    for (std::size_t i = 0; i < tried.size(); ++i) {
-      TriedModel& one = tried[i];
-      one.after = tempered_by_folds(one.validation.presses, one.validation.groups);
-      result_.tried.push_back({tables_[i], scores_of(one.after.presses, 1.0).log_loss});
-    }
-    const TriedModel& best = kept(tried);
-    result_.sensor.table = best.placed.table;
-    learn_gamma(best.placed, best.how);
-    judge(eq7, tried);
-    learn_confidence(best.validation);
-    return std::move(result_);
-  }
-
- private:
-  /// A table, and what it says of presses that it has not seen.
-  struct TriedModel {
-    TableLearning how;
-    PlacedPresses placed;
-    CrossValidation validation;
-    TemperedPresses after;  ///< with temperature and features
+/// The first table, unless a later one is clearly better about presses, without those of a fold.
+const TriedModel& kept(const std::vector<TriedModel>& tried,
+                       std::optional<std::size_t> without = {}) {
+  const auto losses = [&](const TriedModel& one) {
+    return losses_of(without ? of_fold(one.after.presses, *without, false) : one.after.presses);
   };
-  /// Shows the progress of the next part, of a given cost.
-  using Part = std::function<std::function<void(double)>(double cost)>;
-
-  void learn_readings() {
-    all_.readings = palpate::learn_readings(all_.presses, learning_.readings);
-    const LearnedReadings& readings = all_.readings;
-    LearnedSensor& sensor = result_.sensor;
-    sensor.classifier = readings.classifier;
-    sensor.noise = readings.noise;
-    sensor.prior = readings.prior;
-    sensor.psf_mm = readings.psf_mm;
-    sensor.spread_mm = readings.spread_mm;
-    result_.maps = readings.maps(spacing_mm_);
-    result_.warnings = leave_out_unknown(all_.presses, sensor.classifier);
-    std::ranges::copy(stuck_elements(all_.presses, sensor.classifier),
-                      std::back_inserter(result_.warnings));
-    if (known_poses_ && !sensor.psf_mm) {
-      result_.warnings.emplace_back(
-          "the touches do not tell the point spread: too few of an object, or no edges; the "
-          "maps' spread is 0.6 element spacings");
-    }
+  const TriedModel* best = &tried.front();
+  for (const TriedModel& one : tried) {
+    best = is_clearly_less(losses(one), losses(*best)) ? &one : best;
   }
+  return *best;
+}
 
-  /// Tries every fold's presses on what the others say, by each of the tables; returns what Eq. 7
-  /// says.
-  CrossValidation cross_validate(const std::vector<std::string>& labels,
-                                 std::vector<TriedModel>& tried, const Part& part) const {
-    const CrossValidator validator(
-        all_.presses, labels,
-        {.folds = options_.folds, .maps_per_object = options_.most_maps, .bins = bins_});
-    const double share = 1.0 / static_cast<double>(options_.folds);
-    CrossValidation eq7;
-    for (std::size_t fold = 0; fold < options_.folds; ++fold) {
-      std::optional<FoldLearning> learning;
-      try {
-        learning.emplace(validator.presses_without(fold), learning_);
-      } catch (const Error&) {
-        continue;  // these few presses tell no threshold: nothing can be tried on them
-      }
-      for (std::size_t i = 0; i < tried.size(); ++i) {
-        const FoldModel& model = learning->learn(tables_[i], part(table_cost));
-        validator.try_fold(fold, model, tried[i].validation, part(share));
-      }
-      validator.try_fold(fold, learning->by_eq7(), eq7, part(share));
-    }
-    return eq7;
-  }
-
-  /// The first table, unless a later one is clearly better about presses, without those of a fold.
-  static const TriedModel& kept(const std::vector<TriedModel>& tried,
-                                std::optional<std::size_t> without = {}) {
-    const auto losses = [&](const TriedModel& one) {
-      std::vector<ScoredPress> some = one.after.presses;
-      std::erase_if(some, [&](const ScoredPress& press) { return press.fold == without; });
-      return losses_of(some);
-    };
-    const TriedModel* best = &tried.front();
-    for (const TriedModel& one : tried) {
-      best = is_clearly_less(losses(one), losses(*best)) ? &one : best;
-    }
-    return *best;
-  }
-
-  void warn_of_objects_without_maps() {
-    std::set<std::string> compared;
-    std::set<std::string> labels;
-    for (std::size_t i = 0; i < all_.presses.size(); ++i) {
-      const std::string& label = all_.presses[i].label;
-      labels.insert(label);
-      if (has_map_without(i, label, all_.maps)) {
-        compared.insert(label);
-      }
-    }
-    for (const std::string& label : labels) {
-      if (!compared.contains(label)) {
-        result_.warnings.push_back(
-            fmt::format("'{}': no touch has a map of the object that it is no part of, so that "
-                        "nothing is learned of its readings; give it two touches or a map",
-                        label));
-      }
-    }
-  }
-
-  /// The bins for which touches at known poses are learned.
-  void settle_bins() {
-    bins_ = options_.bins.value_or(RecognitionBins{fine_lattice(all_.presses, spacing_mm_)});
-    const PoseLattice& lattice = bins_->lattice;
-    lattice.validate();
-    if (bins_->auto_pivot) {
-      require_within(all_.presses, lattice);
-    }
-    result_.sensor.bins = learning_.bins =
-        BinSteps{lattice.x_mm.step(), lattice.y_mm.step(), lattice.theta_rad.step()};
-  }
-
-  /// Leaves no more of these bins than touches are tried on in a short time.
-  void settle_tried_bins() {
-    // Among the maps of folds, a touch is tried on the one that was built without it.
-    std::map<std::string, std::size_t> maps_of;
-    for (const TrainingMap& map : all_.maps) {
-      std::size_t& count = maps_of[map.map.label];
-      count = map.presses.empty() ? std::min(count + 1, options_.most_maps) : 1;
-    }
-    std::size_t maps = 0;
-    for (const auto& [label, count] : maps_of) {
-      maps += count;
-    }
-    bins_->lattice = affordable_lattice(bins_->lattice, all_.presses, result_.sensor.classifier,
-                                        {.maps = maps,
-                                         .spacing_mm = spacing_mm_,
-                                         .minutes = options_.bins ? minutes_at_bins : minutes});
-  }
-
-  /// Counts the placed presses over log odds.
-  void learn_gamma(const PlacedPresses& placed, const TableLearning& table) {
-    TableLearning how = table;
-    how.layer = {.near_mm = table.layer.near_mm, .far_mm = table.layer.far_mm};
-    how.level_edges.clear();
-    how.counted_within = {};  // gamma is of the sensor, whatever the bins
-    LevelCounts all(2);
-    for (const auto& [label, counts] :
-         count_placed(placed.placements, all_.presses, layers_of(all_.maps, how.layer), how)) {
-      all += counts;
-    }
-    result_.sensor.gamma = fit_gamma(all, result_.sensor.prior);
-  }
-
-  /// How right the cross-validation is, each fold's presses by the table that the others keep.
-  void judge(const CrossValidation& eq7, const std::vector<TriedModel>& tried) {
-    CrossValidation table;
-    TemperedPresses after;
-    std::vector<double> areas;
-    for (std::size_t fold = 0; fold < options_.folds; ++fold) {
-      const TriedModel& model = kept(tried, fold);
-      const auto append = [&](const std::vector<ScoredPress>& from, std::vector<ScoredPress>& to) {
-        std::ranges::copy_if(from, std::back_inserter(to),
-                             [&](const ScoredPress& press) { return press.fold == fold; });
-      };
-      append(model.validation.presses, table.presses);
-      append(both(model.validation.groups), table.groups[0]);
-      append(model.after.presses, after.presses);
-      append(model.after.groups, after.groups);
-      if (const auto area = area_under_curve(model.validation.familiarity, fold)) {
-        areas.push_back(*area);
-      }
-    }
-    result_.before = scores_of(eq7.presses, 1.0);
-    result_.table = scores_of(table.presses, 1.0);
-    result_.after = scores_of(after.presses, 1.0);
-    if (!areas.empty()) {
-      result_.area_under_curve =
-          std::accumulate(areas.begin(), areas.end(), 0.0) / static_cast<double>(areas.size());
-    }
-    if (!after.groups.empty()) {
-      result_.groups = GroupScores{.touches = presses_in_group,
-                                   .before = scores_of(both(eq7.groups), 1.0),
-                                   .table = scores_of(both(table.groups), 1.0),
-                                   .after = scores_of(after.groups, 1.0)};
-    } else if (known_poses_) {
-      result_.warnings.push_back(
-          fmt::format("too few touches to try {} of an object together on maps without them, so "
-                      "that how sure to be after several touches is not learned; give {} or more "
-                      "of each object",
-                      presses_in_group, presses_in_group * options_.folds));
-    }
-    const std::vector<ScoredPress> without = tempered_by_folds(eq7.presses).presses;
-    // What few presses could show by chance is no warning.
-    if (is_clearly_less(losses_of(without), losses_of(after.presses))) {
-      result_.warnings.push_back(fmt::format(
-          "on touches that it has not seen, the learned table has a log-loss of {:.3f}, worse than "
-          "{:.3f} by Eq. 7 with a temperature: give more touches of each object, or recognize "
-          "without the sensor model",
-          result_.after->log_loss, scores_of(without, 1.0).log_loss));
-    }
-  }
-
-  void learn_confidence(const CrossValidation& learned) {
-    const TemperatureFit fit = fit_temperature(learned.presses, learned.groups);
-    result_.sensor.temperature = fit.temperature;
-    result_.sensor.temperature_growth = fit.growth;
-    if (!known_poses_) {
-      result_.sensor.features = learn_features(all_.presses, result_.sensor.classifier);
-      result_.sensor.features->weight = fit.feature_weight;
-    }
-    learn_fit_scale(learned.fit_z);
-    const FamiliarityScores scores = all_of(learned.familiarity);
-    if (!scores.known.empty()) {
-      result_.sensor.familiarity = fit_familiarity(scores);
-    }
-  }
-
-  /// Mean and standard deviation of the touches' z.
-  void learn_fit_scale(const std::vector<double>& z) {
-    if (z.size() < 2) {
-      return;
-    }
-    const auto n = static_cast<double>(z.size());
-    FitScale scale{.mean = 0.0, .sd = 0.0};
-    for (const double one : z) {
-      scale.mean += one / n;
-    }
-    for (const double one : z) {
-      scale.sd += (one - scale.mean) * (one - scale.mean) / (n - 1.0);
-    }
-    scale.sd = std::sqrt(scale.sd);
-    if (scale.sd > 0.0) {
-      result_.sensor.fit_scale = scale;
-    }
-  }
-
-  LearnedPresses all_;
-  const SensorCalibrationOptions& options_;
-  bool known_poses_ = false;
-  std::vector<TableKind> tables_;
-  double spacing_mm_ = 0.0;
-  ModelLearning learning_;               ///< but for the presses
-  std::optional<RecognitionBins> bins_;  ///< for touches at known poses
-  SensorCalibration result_;
+/// How right the cross-validation is.
+struct Judgement {
+  Scores before;
+  Scores table;
+  Scores after;
+  std::optional<GroupScores> groups;
+  std::optional<double> area_under_curve;
+  std::vector<std::string> warnings;
 };
+
+/// Judges each fold's presses by the table that the other folds keep.
+Judgement judge(const CrossValidation& eq7, const std::vector<TriedModel>& tried,
+                bool known_poses) {
+  const std::size_t folds = tried.front().folds.size();
+  std::vector<CrossValidation> of_folds;
+  TemperedPresses after;
+  std::vector<double> areas;
+  for (std::size_t fold = 0; fold < folds; ++fold) {
+    const TriedModel& model = kept(tried, fold);
+    of_folds.push_back(model.folds[fold]);
+    std::ranges::copy(of_fold(model.after.presses, fold, true), std::back_inserter(after.presses));
+    std::ranges::copy(of_fold(model.after.groups, fold, true), std::back_inserter(after.groups));
+    if (const auto area = area_under_curve(model.all.familiarity, fold)) {
+      areas.push_back(*area);
+    }
+  }
+  const CrossValidation table = joined(of_folds);
+  Judgement judged{.before = scores_of(eq7.presses, 1.0),
+                   .table = scores_of(table.presses, 1.0),
+                   .after = scores_of(after.presses, 1.0)};
+  if (!areas.empty()) {
+    judged.area_under_curve =
+        std::accumulate(areas.begin(), areas.end(), 0.0) / static_cast<double>(areas.size());
+  }
+  if (!after.groups.empty()) {
+    judged.groups = GroupScores{.touches = presses_in_group,
+                                .before = scores_of(both(eq7.groups), 1.0),
+                                .table = scores_of(both(table.groups), 1.0),
+                                .after = scores_of(after.groups, 1.0)};
+  } else if (known_poses) {
+    judged.warnings.push_back(
+        fmt::format("too few touches to try {} of an object together on maps without them, so "
+                    "that how sure to be after several touches is not learned; give {} or more "
+                    "of each object",
+                    presses_in_group, presses_in_group * folds));
+  }
+  const std::vector<ScoredPress> without = tempered_by_folds(eq7.presses).presses;
+  // What few presses could show by chance is no warning.
+  if (is_clearly_less(losses_of(without), losses_of(after.presses))) {
+    judged.warnings.push_back(fmt::format(
+        "on touches that it has not seen, the learned table has a log-loss of {:.3f}, worse than "
+        "{:.3f} by Eq. 7 with a temperature: give more touches of each object, or recognize "
+        "without the sensor model",
+        judged.after.log_loss, scores_of(without, 1.0).log_loss));
+  }
+  return judged;
+}
+
+/// Mean and standard deviation of the touches' z; none where they do not differ.
+std::optional<FitScale> fit_scale_of(const std::vector<double>& z) {
+  const auto n = static_cast<double>(z.size());
+  FitScale scale{.mean = 0.0, .sd = 0.0};
+  for (const double one : z) {
+    scale.mean += one / n;
+  }
+  for (const double one : z) {
+    scale.sd += (one - scale.mean) * (one - scale.mean) / (n - 1.0);
+  }
+  scale.sd = std::sqrt(scale.sd);
+  return z.size() > 1 && scale.sd > 0.0 ? std::optional(scale) : std::nullopt;
+}
+
+/// The sensor with how sure to be of what its table says.
+LearnedSensor with_confidence(LearnedSensor sensor, const CrossValidation& validation,
+                              const std::vector<Press>& presses) {
+  const TemperatureFit fit = fit_temperature(validation.presses, validation.groups);
+  sensor.temperature = fit.temperature;
+  sensor.temperature_growth = fit.growth;
+  if (!at_known_poses(presses)) {
+    sensor.features = learn_features(presses, sensor.classifier);
+    sensor.features->weight = fit.feature_weight;
+  }
+  sensor.fit_scale = fit_scale_of(validation.fit_z);
+  const FamiliarityScores scores = all_of(validation.familiarity);
+  if (!scores.known.empty()) {
+    sensor.familiarity = fit_familiarity(scores);
+  }
+  return sensor;
+}
+
+/// The calibration of the sensor with one table, of which nothing can be judged.
+SensorCalibration of_one_object(SensorCalibration calibration, const LearnedPresses& learned,
+                                const TableLearning& table,
+                                const std::function<void(double)>& progress) {
+  const PlacedPresses placed = learn_table(learned.presses, learned.maps, table, progress);
+  calibration.sensor.table = placed.table;
+  calibration.sensor.gamma = gamma_of(placed, table, learned);
+  calibration.warnings.emplace_back(
+      "touches of one object say nothing about confidence: the temperature stays 1, and "
+      "neither features nor familiarity are learned; give touches of two objects or more");
+  return calibration;
+}
 
 }  // namespace
 
@@ -375,10 +315,74 @@ SensorCalibration calibrate_sensor(const std::vector<Press>& presses,
                                    const std::vector<OccupancyGrid>& given,
                                    const SensorCalibrationOptions& options,
                                    const std::function<void(double)>& progress) {
-  if (presses.empty()) {
-    throw Error(Fault::input, "no touches; give recordings with touches");
+  require_sound(presses, options);
+  const bool known_poses = at_known_poses(presses);
+  const std::vector<TableKind> tables =
+      options.tables.empty() ? default_tables(known_poses) : options.tables;
+  ModelLearning how{.readings = {.pressure_unit = options.pressure_unit,
+                                 .threshold = options.threshold,
+                                 .ratio = options.ratio,
+                                 .spacing_mm = spacing_mm_of(presses)},
+                    .folds = options.folds};
+  for (const OccupancyGrid& map : given) {
+    how.given.push_back({map});
   }
-  return SensorLearning(presses, options).run(given, progress);
+
+  const LearnedReadings readings = learn_readings(presses, how.readings);
+  const CheckedPresses checked = without_unknown(presses, readings.classifier);
+  std::optional<RecognitionBins> bins;
+  if (known_poses) {
+    bins = bins_for(checked.presses, options, readings.spacing_mm);
+    const PoseLattice& lattice = bins->lattice;
+    how.bins = {lattice.x_mm.step(), lattice.y_mm.step(), lattice.theta_rad.step()};
+  }
+  const LearnedPresses learned = with_maps(checked.presses, readings, how);
+  const std::vector<std::string> labels = labels_of(learned.maps);
+  SensorCalibration calibration{.sensor = sensor_of(readings, options.pressure_unit, how.bins),
+                                .maps = readings.maps(),
+                                .objects = labels.size(),
+                                .warnings = checked.warnings};
+  std::ranges::copy(warnings_about(learned), std::back_inserter(calibration.warnings));
+  if (labels.size() < 2) {
+    return of_one_object(std::move(calibration), learned,
+                         table_learning(tables.back(), learned, how), progress);
+  }
+
+  if (bins) {
+    bins = affordable_bins(*bins, learned, options);
+  }
+  const auto table_count = static_cast<double>(tables.size());
+  const double learnings = table_count * (1.0 + static_cast<double>(options.folds));
+  SerialProgress work(learnings * table_cost + table_count + 1.0, progress);
+  std::vector<TriedModel> tried;
+  for (const TableKind& kind : tables) {
+    TriedModel& one = tried.emplace_back();
+    one.how = table_learning(kind, learned, how);
+    one.placed = learn_table(learned.presses, learned.maps, one.how, work.part(table_cost));
+  }
+  const std::vector<std::vector<CrossValidation>> validations = cross_validate(
+      learned.presses, labels, tables, how,
+      {.folds = options.folds, .maps_per_object = options.most_maps, .bins = bins}, work);
+  for (std::size_t i = 0; i < tables.size(); ++i) {
+    TriedModel& one = tried[i];
+    one.folds = validations[i];
+    one.all = joined(one.folds);
+    one.after = tempered_by_folds(one.all.presses, one.all.groups);
+    calibration.tried.push_back({tables[i], scores_of(one.after.presses, 1.0).log_loss});
+  }
+  const TriedModel& best = kept(tried);
+  calibration.sensor.table = best.placed.table;
+  calibration.sensor.gamma = gamma_of(best.placed, best.how, learned);
+  calibration.sensor = with_confidence(calibration.sensor, best.all, learned.presses);
+
+  const Judgement judged = judge(joined(validations.back()), tried, known_poses);
+  calibration.before = judged.before;
+  calibration.table = judged.table;
+  calibration.after = judged.after;
+  calibration.groups = judged.groups;
+  calibration.area_under_curve = judged.area_under_curve;
+  std::ranges::copy(judged.warnings, std::back_inserter(calibration.warnings));
+  return calibration;
 }
 
 }  // namespace palpate

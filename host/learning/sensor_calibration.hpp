@@ -3,15 +3,10 @@
 #include <cstddef>
 #include <functional>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
-#include "learning/drawn_poses.hpp"
-#include "learning/fold_model.hpp"
-#include "learning/press.hpp"
-#include "learning/temperature_fit.hpp"
-#include "learning/training_maps.hpp"
+#include "learning/cross_validation.hpp"
 #include "palpate/learned_sensor.hpp"
 #include "palpate/occupancy_grid.hpp"
 
@@ -32,9 +27,10 @@ struct SensorCalibrationOptions {
   std::optional<RecognitionBins> bins = {};
 };
 
-/// Touches at known poses: seven levels over the mean pressure, which also tells where between the
-/// elements an edge lies. Presses at unknown poses: contact over log odds, and these seven levels,
-/// since pressures tell more, but change from day to day more than contact does.
+/// Touches at known poses have a table of seven levels over the mean pressure, which also tells
+/// where between the elements an edge lies. Presses at unknown poses have a table of contact over
+/// log odds, and one of seven levels: pressures tell more, but change from day to day more than
+/// contact does.
 std::vector<TableKind> default_tables(bool known_poses);
 
 /// A table that was tried: the cross-validation's log-loss with temperature and features, in nats.
@@ -46,7 +42,7 @@ struct TriedTable {
 /// Scores of the touches, several of one object at a time.
 struct GroupScores {
   std::size_t touches = 0;  ///< of a group
-  Scores before;            ///< as SensorCalibration has them of single touches
+  Scores before;            ///< see SensorCalibration::before
   Scores table;
   Scores after;
 };
@@ -80,9 +76,9 @@ struct SensorCalibration {
 /// cross-validation by more than two standard errors. What one object cannot tell (temperature,
 /// weight, familiarity) keeps its default, with a warning. Takes all host threads.
 ///   The numbers before and after are of cross-validation. All that a fold's presses are judged by
-/// is learned again from the other folds' alone, from the contact threshold on: noise, prior, point
-/// spread, levels, maps, tables and features. Which table is kept, temperature, weight and
-/// familiarity come from the scores of the other folds' presses.
+/// is learned again from the presses of the other folds alone, from the contact threshold on:
+/// noise, prior, point spread, levels, maps, tables and features. Which table is kept, temperature,
+/// weight and familiarity come from the scores of the other folds' presses.
 ///
 /// Data that say little:
 ///   one press: refused; so are presses none of which has a map of its object without it

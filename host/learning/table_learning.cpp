@@ -14,8 +14,8 @@ namespace palpate {
 
 namespace {
 
-/// The maps on which each press is placed, [map][press]: those of its object that it is no part of,
-/// `most` at most, and all maps about equally often.
+/// The presses to place on each map, [map][press]. Each press is placed on maps of its object that
+/// it is no part of, `most` at most, and all maps are used about equally often.
 std::vector<std::vector<std::size_t>> presses_by_map(const std::vector<Press>& presses,
                                                      const std::vector<TrainingMap>& maps,
                                                      std::size_t most) {
@@ -44,7 +44,9 @@ std::vector<std::vector<std::size_t>> presses_by_map(const std::vector<Press>& p
 }
 
 /// Places presses on maps of their objects. Takes all host threads.
+/// @param evidence of the presses, [press][touch]
 std::vector<OwnPlacement> place_all(const std::vector<Press>& presses,
+                                    const std::vector<std::vector<TouchEvidence>>& evidence,
                                     const std::vector<TrainingMap>& maps,
                                     const std::vector<OccupancyGrid>& layers,
                                     const TableLearning& how, const LearnedTable& table,
@@ -63,7 +65,7 @@ std::vector<OwnPlacement> place_all(const std::vector<Press>& presses,
           placer.emplace(hypothesis, contact_with(how.contact, table, hypothesis.map.label),
                          how.lattice);
         }
-        placement = placer->place(presses[press]);
+        placement = placer->place(evidence[press]);
       }
       on_map[map].push_back({press, map, placement});
     }
@@ -93,7 +95,7 @@ std::map<std::string, glm::dvec2> middles_of(const std::vector<Press>& presses) 
 
 /// Where a press at a known pose is counted: at poses as far from it as the nearest bin may be. The
 /// bin that is nearest in theta turns all touches of an object at once, and its x and y make up for
-/// the turn in their middle: so it is about that point.
+/// the turn in the middle of the touches, so that the turn is about that point.
 std::vector<Pose> counted_at(const Pose& T_object_robot, const glm::dvec2& middle_mm,
                              const BinSteps& steps) {
   const auto offsets = [](double step) {
@@ -119,6 +121,8 @@ LearnedTable TableLearning::initial() const {
   table.shared = initial_table(layer, table.levels(), contact);
   return table;
 }
+
+ContactModel TableLearning::classifier() const { return contact_with(contact, initial(), ""); }
 
 LearnedTable table_of(const ObjectCounts& counts, const TableLearning& how) {
   LearnedTable table = how.initial();
@@ -153,13 +157,16 @@ std::vector<OccupancyGrid> layers_of(const std::vector<TrainingMap>& maps,
 PlacedPresses learn_table(const std::vector<Press>& presses, const std::vector<TrainingMap>& maps,
                           const TableLearning& how, const std::function<void(double)>& progress) {
   const std::vector<OccupancyGrid> layers = layers_of(maps, how.layer);
-  const bool known = std::ranges::all_of(
-      presses, [](const Press& press) { return press.T_object_robot.has_value(); });
-  const int rounds = known ? 1 : how.rounds;
+  const ContactModel classifier = how.classifier();
+  std::vector<std::vector<TouchEvidence>> evidence;
+  for (const Press& press : presses) {
+    evidence.push_back(evidence_of(press.touches, classifier));
+  }
+  const int rounds = at_known_poses(presses) ? 1 : how.rounds;
   PlacedPresses placed{.placements = {}, .table = how.initial()};
   HostProgress counter(maps.size() * static_cast<std::size_t>(rounds), progress);
   for (int round = 0; round < rounds; ++round) {
-    placed.placements = place_all(presses, maps, layers, how, placed.table, counter);
+    placed.placements = place_all(presses, evidence, maps, layers, how, placed.table, counter);
     if (placed.placements.empty()) {
       throw Error(
           Fault::input,
@@ -180,8 +187,7 @@ ObjectCounts count_placed(std::span<const OwnPlacement> placements,
   for (const OwnPlacement& placement : placements) {
     of_press[placement.press].push_back(&placement);
   }
-  const LearnedTable levels = how.initial();
-  const ContactModel classifier = contact_with(how.contact, levels, "");
+  const ContactModel classifier = how.classifier();
   const std::map<std::string, glm::dvec2> middles = middles_of(presses);
   ObjectCounts counts;
   for (std::size_t press = 0; press < presses.size(); ++press) {
@@ -190,14 +196,15 @@ ObjectCounts count_placed(std::span<const OwnPlacement> placements,
       return a->placement.log_likelihood > b->placement.log_likelihood;
     });
     on.resize(std::min(on.size(), how.best_maps));
+    const std::vector<TouchEvidence> evidence = evidence_of(presses[press].touches, classifier);
     for (const OwnPlacement* placement : on) {
       const std::vector<Pose> poses =
           presses[press].T_object_robot
               ? counted_at(*presses[press].T_object_robot, middles.at(presses[press].label),
                            how.counted_within)
               : std::vector{placement->placement.T_object_robot};
-      counts.try_emplace(presses[press].label, levels.levels())
-          .first->second.add(presses[press].touches, poses, layers[placement->map], classifier);
+      counts.try_emplace(presses[press].label, how.level_edges.size() + 2)
+          .first->second.add(evidence, poses, layers[placement->map]);
     }
   }
   return counts;

@@ -3,7 +3,6 @@
 #include <cstddef>
 #include <functional>
 #include <map>
-#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -22,8 +21,8 @@ struct TableLearning {
   std::vector<double> level_edges = {};  ///< see LikelihoodTable
   ContactModel contact = {};             ///< of Eq. 7, with its prior: where learning begins
   PoseLattice lattice = {};              ///< for placing presses at unknown poses
-  /// What presses at known poses read is counted within half of these steps of where they are,
-  /// since recognition compares it at bins so far away.
+  /// Readings of presses at known poses are counted within half of these steps of where they are,
+  /// since recognition compares them at bins so far away.
   BinSteps counted_within = {};
   int rounds = 3;                       ///< of placing and counting
   std::size_t most_maps = 8;            ///< of its object, on which a press is placed
@@ -31,16 +30,18 @@ struct TableLearning {
   double shared_pseudo_counts = 20.0;   ///< of Eq. 7 in the shared table, at every node
   double object_pseudo_counts = 200.0;  ///< of the shared table in an object's, at every node
 
-  /// Eq. 7 with the table's levels, for classifying readings and as the first table.
+  /// Eq. 7 with the table's levels: the first table.
   LearnedTable initial() const;
+  /// The contact model that classifies readings into the table's levels.
+  ContactModel classifier() const;
 };
 
 /// Counts of all objects' readings, by label.
 using ObjectCounts = std::map<std::string, LevelCounts>;
 
 /// The table that counts say: the shared one is drawn towards Eq. 7's, and each object's towards
-/// the shared one, see shrunk_table(). So a level or a node that was never seen keeps what Eq. 7
-/// says, and an object with few counts what all objects say together.
+/// the shared one, see shrunk_table(). A level or a node that was never seen so keeps what Eq. 7
+/// says, and an object with few counts keeps what all objects say together.
 LearnedTable table_of(const ObjectCounts& counts, const TableLearning& how);
 
 /// The contact model of Eq. 7's classifier with an object's numbers of a table, or the shared
@@ -52,7 +53,7 @@ ContactModel contact_with(const ContactModel& contact, const LearnedTable& table
 struct OwnPlacement {
   std::size_t press = 0;
   std::size_t map = 0;
-  PressPlacement placement;  ///< of a press at a known pose, no more than that pose
+  PressPlacement placement;  ///< of a press at a known pose only that pose is set
 };
 
 /// What presses say about readings.
@@ -67,7 +68,7 @@ std::vector<OccupancyGrid> layers_of(const std::vector<TrainingMap>& maps,
 
 /// Learns a table by alternation: places every press on maps of its object that it is no part of,
 /// counts its readings on the best of them, makes a table of all counts, and places again with it.
-/// Presses at known poses are where they are; where all are, one round does. Takes all host
+/// Presses at known poses are not moved; where all poses are known, one round does. Takes all host
 /// threads.
 /// @param progress called with the fraction done, by one thread at a time
 /// @throws Error where no press has a map of its object that it is no part of, or as PressPlacer

@@ -20,16 +20,6 @@ namespace {
 
 constexpr double most_temperature = 1e6;
 
-/// Logarithms of the labels' probabilities, before they are normalised.
-std::vector<double> scores(const ScoredPress& press, double temperature, double feature_weight) {
-  std::vector<double> nats = press.log_evidence;
-  for (std::size_t i = 0; i < nats.size(); ++i) {
-    nats[i] /= temperature;
-    nats[i] += press.log_density.empty() ? 0.0 : feature_weight * press.log_density[i];
-  }
-  return nats;
-}
-
 double log_sum_exp(std::span<const double> nats) {
   const double largest = *std::ranges::max_element(nats);
   double sum = 0.0;
@@ -39,10 +29,24 @@ double log_sum_exp(std::span<const double> nats) {
   return largest + std::log(sum);
 }
 
+/// Logarithms of the labels' probabilities.
+std::vector<double> log_probabilities(const ScoredPress& press, double temperature,
+                                      double feature_weight) {
+  std::vector<double> nats = press.log_evidence;
+  for (std::size_t i = 0; i < nats.size(); ++i) {
+    nats[i] /= temperature;
+    nats[i] += press.log_density.empty() ? 0.0 : feature_weight * press.log_density[i];
+  }
+  const double sum = log_sum_exp(nats);
+  for (double& x : nats) {
+    x -= sum;
+  }
+  return nats;
+}
+
 /// -log of the label's probability.
 double loss_of(const ScoredPress& press, double temperature, double feature_weight) {
-  const std::vector<double> nats = scores(press, temperature, feature_weight);
-  return log_sum_exp(nats) - nats[press.truth];
+  return -log_probabilities(press, temperature, feature_weight)[press.truth];
 }
 
 void require_sound(std::span<const ScoredPress> presses) {
@@ -86,31 +90,11 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-/// Logarithms of the labels' probabilities.
-std::vector<double> log_probabilities(const ScoredPress& press, double temperature,
-                                      double feature_weight) {
-  std::vector<double> nats = scores(press, temperature, feature_weight);
-  const double sum = log_sum_exp(nats);
-  for (double& x : nats) {
-    x -= sum;
-  }
-  return nats;
-}
-
 /// The place of the least value of a function with one minimum over [lower, upper], within a
 /// thousandth of the interval.
 template <typename Function>
 double least_place(double lower, double upper, const Function& function) {
-  return largest_at(lower, upper, 1e-3 * (upper - lower), [&](double x) { return -function(x); });
-}
-
-/// The presses whose fold is `fold`, or all others.
-std::vector<ScoredPress> of_fold(std::span<const ScoredPress> presses, std::size_t fold,
-                                 bool inside) {
-  std::vector<ScoredPress> some;
-  std::ranges::copy_if(presses, std::back_inserter(some),
-                       [&](const ScoredPress& press) { return (press.fold == fold) == inside; });
-  return some;
+  return least_at(lower, upper, 1e-3 * (upper - lower), function);
 }
 
 std::set<std::size_t> folds_in(std::span<const ScoredPress> presses) {
@@ -121,8 +105,8 @@ std::set<std::size_t> folds_in(std::span<const ScoredPress> presses) {
   return folds;
 }
 
-/// The loss of presses, over the inverse of the temperature and the weight of the features, in
-/// which it is convex.
+/// The loss of presses. It is convex in the inverse of the temperature and the weight of the
+/// features.
 class PressLoss {
  public:
   explicit PressLoss(std::span<const ScoredPress> presses) : presses_(presses) {
@@ -151,10 +135,10 @@ class PressLoss {
 
   bool has_features() const { return feature_margin_.has_value(); }
 
-  /// By the evidence alone.
+  /// The fit by the evidence alone.
   TemperatureFit of_evidence() const { return {.temperature = best_temperature(0.0, hottest)}; }
 
-  /// By the evidence and the features.
+  /// The fit by the evidence and the features.
   TemperatureFit of_both() const {
     const double alone = of_evidence().temperature;
     // The least loss at each weight has one minimum along it.
@@ -245,6 +229,14 @@ double fit_growth(const GroupHalves& groups, const TemperatureFit& fit) {
 }
 
 }  // namespace
+
+std::vector<ScoredPress> of_fold(std::span<const ScoredPress> presses, std::size_t fold,
+                                 bool inside) {
+  std::vector<ScoredPress> some;
+  std::ranges::copy_if(presses, std::back_inserter(some),
+                       [&](const ScoredPress& press) { return (press.fold == fold) == inside; });
+  return some;
+}
 
 std::vector<ScoredPress> both(const GroupHalves& groups) {
   std::vector<ScoredPress> all = groups[0];

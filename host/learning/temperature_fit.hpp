@@ -20,6 +20,10 @@ struct ScoredPress {
   std::vector<double> log_density;
 };
 
+/// The presses of a fold (inside) or of all other folds.
+std::vector<ScoredPress> of_fold(std::span<const ScoredPress> presses, std::size_t fold,
+                                 bool inside);
+
 /// Probabilities of the labels: proportional to evidence^(1 / temperature) * density^weight.
 std::vector<double> label_probabilities(const ScoredPress& press, double temperature,
                                         double feature_weight = 0.0);
@@ -47,14 +51,14 @@ struct TemperatureFit {
 /// them, of the least log-loss. Besides the presses, one more counts, of two labels whose log
 /// evidences differ by the median margin of the presses (label against the best other): it is
 /// right or wrong with equal weights, so that presses which are all told apart, however clearly, do
-/// not make the temperature 0. One more is such a press for the features, whose log densities
+/// not make the temperature 0. For the features a further such press counts, whose log densities
 /// differ by their median margin.
 ///   The evidence has at least the say that it has alone: features lower the temperature, but do
 /// not raise it. Where they tell all presses apart, the log-loss would leave the evidence none, and
 /// a day of lighter presses would be taken for other objects.
 ///   The weight is 0 unless what the other folds show helps each fold's presses, all together: the
 /// presses of a fold were made at another time than the others, see folds_of().
-///   The growth is that of the least log-loss of the groups; it is 0 unless what each half of them
+///   The growth has the least log-loss of the groups; it is 0 unless what each half of them
 /// shows helps the other half, both taken together.
 /// @param presses of one touch each
 /// @throws Error on no press, on a press without a log evidence for each of the same labels, finite

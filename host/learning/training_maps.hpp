@@ -31,7 +31,9 @@ std::vector<TrainingMap> maps_of_presses(const std::vector<Press>& presses,
 std::vector<TrainingMap> maps_without_folds(const std::vector<Press>& presses,
                                             const MapOptions& options, std::size_t folds);
 
-/// For every object the map of all its presses; else as maps_without_folds().
+/// For every object the map of all its presses, in the object frame. Takes all host threads.
+/// @param presses at known poses, of one touch each
+/// @throws Error, naming the object, as observed_map() does
 std::vector<TrainingMap> maps_of_objects(const std::vector<Press>& presses,
                                          const MapOptions& options);
 

@@ -7,6 +7,7 @@
 
 #include "learning/cross_validation.hpp"
 #include "model/bounding_box.hpp"
+#include "model/touch_evidence.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
@@ -16,11 +17,11 @@ namespace {
 constexpr double additions_per_minute = 1e11;  ///< of one core
 /// What a press costs at a bin besides its readings, in readings.
 constexpr double readings_per_press = 16.0;
-/// A press is tried alone, and in some groups.
+/// A press is tried alone and in groups.
 constexpr double times_tried = 1.0 + groups_of_press;
-/// What takes longer looks broken.
+/// A calibration that tries for longer would look broken.
 constexpr double most_minutes = 20.0;
-/// A core needs 12 B for each.
+/// A core needs 12 B for each bin.
 constexpr double most_bins = 5e7;
 
 double bins_of(const PoseLattice& lattice) {
@@ -33,17 +34,49 @@ double additions_per_bin(const std::vector<Press>& presses, const ContactClassif
   double readings = 0.0;
   for (const Press& press : presses) {
     readings += readings_per_press;
-    for (const Touch& touch : press.touches) {
-      // All elements for No Contact everywhere, and again those that are not in No Contact.
-      const std::vector<Reading> of = classifier.classify(touch);
-      readings += 2.0 * static_cast<double>(of.size()) -
-                  static_cast<double>(std::ranges::count(of, Reading::no_contact));
+    for (const TouchEvidence& touch : evidence_of(press.touches, {.classifier = classifier})) {
+      // All elements are added for No Contact everywhere, and all that read otherwise once more.
+      readings += 2.0 * static_cast<double>(touch.readings.size()) -
+                  static_cast<double>(std::ranges::count(touch.readings, Reading::no_contact));
     }
   }
   return times_tried * readings * static_cast<double>(maps);
 }
 
 }  // namespace
+
+Press as_unknown(const Press& press, const RecognitionBins& bins, Random& random) {
+  const PoseLattice& lattice = bins.lattice;
+  const auto drawn = [&](const Axis& axis, double here_mm) {
+    return bins.auto_pivot ? here_mm + random.uniform(-0.5, 0.5) * axis.step()
+                           : random.uniform(axis.lower, axis.upper);
+  };
+  // One draw per statement: within a statement the compiler chooses the order of evaluation.
+  const double x_mm = drawn(lattice.x_mm, press.T_object_robot->translation_mm.x);
+  const double y_mm = drawn(lattice.y_mm, press.T_object_robot->translation_mm.y);
+  const double theta_rad = random.uniform(lattice.theta_rad.lower, lattice.theta_rad.upper);
+
+  Press unknown = press;
+  unknown.T_object_robot = lattice.T_object_robot(x_mm, y_mm, theta_rad);
+  const Pose T_drawn_robot = inverse(*unknown.T_object_robot) * *press.T_object_robot;
+  for (Touch& touch : unknown.touches) {
+    touch.T_robot_sensor = T_drawn_robot * touch.T_robot_sensor;
+  }
+  return unknown;
+}
+
+Press together(std::span<const Press* const> presses) {
+  Press all = *presses.front();
+  const Pose T_robot_object = inverse(*all.T_object_robot);
+  for (const Press* press : presses.subspan(1)) {
+    const Pose T_robot_own = T_robot_object * *press->T_object_robot;
+    for (Touch touch : press->touches) {
+      touch.T_robot_sensor = T_robot_own * touch.T_robot_sensor;
+      all.touches.push_back(touch);
+    }
+  }
+  return all;
+}
 
 PoseLattice fine_lattice(const std::vector<Press>& presses, double spacing_mm) {
   constexpr double finer = 2.0;

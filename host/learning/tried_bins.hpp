@@ -2,15 +2,35 @@
 
 #include <cstddef>
 #include <numbers>
+#include <span>
 #include <vector>
 
 #include "learning/press.hpp"
+#include "model/random.hpp"
 #include "palpate/contact.hpp"
 #include "palpate/lattice.hpp"
 
 namespace palpate {
 
-/// Steps of theta at which presses at unknown poses are placed; those of x and y are the elements'
+/// The bins on which unknown objects are recognised.
+struct RecognitionBins {
+  PoseLattice lattice;
+  /// The pivot is the array's centre at the first touch of each unknown; else it is the lattice's.
+  bool auto_pivot = true;
+};
+
+/// A press as if the robot did not know the object's pose. Its robot frame is put so that the pose
+/// is anywhere in the bins' region, and as far from the nearest bin as an unknown's may be. With an
+/// automatic pivot, x and y stay within half a bin of where they are.
+/// @param bins with the pivot (0, 0) where it is automatic
+/// @param press at a known pose; T_object_robot of the returned one is the drawn pose
+Press as_unknown(const Press& press, const RecognitionBins& bins, Random& random);
+
+/// Touches of one object at known poses as one press, in the robot frame of the first.
+/// @param presses at known poses, at least one
+Press together(std::span<const Press* const> presses);
+
+/// Steps of theta at which presses at unknown poses are placed; steps of x and y are the elements'
 /// spacing.
 inline constexpr double placing_step_rad = std::numbers::pi / 18.0;
 
@@ -30,9 +50,9 @@ struct TrialCost {
   double minutes = 0.0;     ///< of one core
 };
 
-/// The lattice, or as fine a one of its region as the cost allows, but not coarser than presses at
-/// unknown poses are placed.
-/// @throws Error where even that would take too long, or too much memory
+/// The lattice, or the finest of its region that the cost allows, but none coarser than presses at
+/// unknown poses are placed on.
+/// @throws Error where even the coarsest would take too long, or too much memory
 PoseLattice affordable_lattice(PoseLattice lattice, const std::vector<Press>& presses,
                                const ContactClassifier& classifier, const TrialCost& cost);
 

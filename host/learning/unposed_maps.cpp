@@ -87,7 +87,7 @@ UnposedMaps unposed_maps(std::span<const Touch> presses, const std::string& labe
     if (options.mirror) {
       press.sides.emplace_back(presses[i], options.contact, true);
     }
-    if (press.sides.front().contacts() == 0) {
+    if (!press.sides.front().in_contact()) {
       result.misfits.push_back({.press = i, .reason = Misfit::Reason::no_contact});
       continue;
     }
@@ -100,28 +100,24 @@ UnposedMaps unposed_maps(std::span<const Touch> presses, const std::string& labe
   }
   tbb::parallel_for(std::size_t{0}, placeable.size(), [&](std::size_t p) {
     placeable[p].image =
-        observed_map(placeable[p].sides.front().press().touches, options.map, label);
+        observed_map(std::span(&placeable[p].sides.front().touch(), 1), options.map, label);
   });
 
-  PressFusion fusion(placeable, options, step_mm, progress);
-  if (placeable.size() <= options.most_maps) {
-    fusion.keep_apart();
-  } else {
-    result.rounds = fusion.fuse();
-    result.settled = fusion.settled();
-  }
+  const FusedPresses fused = fuse_presses(placeable, options, step_mm, progress);
+  result.rounds = fused.rounds;
+  result.settled = fused.settled;
   for (std::size_t p = 0; p < placeable.size(); ++p) {
-    const PressHome& home = fusion.homes()[p];
+    const PressHome& home = fused.homes[p];
     if (!home.map) {
       result.misfits.push_back(
           {.press = placeable[p].index,
-           .reason = fusion.says_little(p) ? Misfit::Reason::too_little : Misfit::Reason::unlike,
+           .reason = fused.says_little[p] ? Misfit::Reason::too_little : Misfit::Reason::unlike,
            .fit = home.fit});
     }
   }
   std::ranges::sort(result.misfits, {}, &Misfit::press);
-  for (std::size_t map = 0; map < fusion.maps(); ++map) {
-    UnposedMap one = final_map(map, placeable, fusion.homes(), label, options);
+  for (std::size_t map = 0; map < fused.maps; ++map) {
+    UnposedMap one = final_map(map, placeable, fused.homes, label, options);
     if (!one.presses.empty()) {
       result.maps.push_back(std::move(one));
     }

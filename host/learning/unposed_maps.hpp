@@ -39,7 +39,7 @@ struct PlacedPress {
 };
 
 /// A map with its presses, in the order of their indices. The object frame's origin is the middle
-/// of the contact of the press that the map began with, its axes are that press's at first.
+/// of the contact of the press that the map began with, and its axes are the axes of that press.
 struct UnposedMap {
   OccupancyGrid map;
   std::vector<PlacedPress> presses;
@@ -58,7 +58,7 @@ struct Misfit {
 };
 
 struct UnposedMaps {
-  std::vector<UnposedMap> maps;  ///< those of most presses first
+  std::vector<UnposedMap> maps;  ///< maps of more presses first
   std::vector<Misfit> misfits;
   int rounds = 0;       ///< in which every press was placed anew
   bool settled = true;  ///< the last round moved no press

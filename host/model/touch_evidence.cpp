@@ -5,6 +5,27 @@
 
 namespace palpate {
 
+namespace {
+
+/// The evidence of the elements whose reading is `kept`.
+template <typename Kept>
+TouchEvidence evidence_where(TouchEvidence evidence, const Kept& kept) {
+  std::size_t n = 0;
+  for (std::size_t e = 0; e < evidence.readings.size(); ++e) {
+    if (kept(evidence.readings[e])) {
+      evidence.elements_mm[n] = evidence.elements_mm[e];
+      evidence.readings[n] = evidence.readings[e];
+      evidence.lives[n++] = evidence.lives[e];
+    }
+  }
+  evidence.elements_mm.resize(n);
+  evidence.readings.resize(n);
+  evidence.lives.resize(n);
+  return evidence;
+}
+
+}  // namespace
+
 TouchEvidence::TouchEvidence(const Touch& touch, const ContactModel& contact)
     : T_robot_sensor(touch.T_robot_sensor),
       elements_mm(touch.elements_mm.begin(), touch.elements_mm.end()),
@@ -12,10 +33,10 @@ TouchEvidence::TouchEvidence(const Touch& touch, const ContactModel& contact)
       lives(readings.size()),
       contacts(static_cast<std::size_t>(std::ranges::count_if(readings, is_contact))) {
   for (std::size_t e = 0; e < readings.size(); ++e) {
-    const double pressure = touch.pressure[e];
-    if ((!touch.valid.empty() && touch.valid[e] == 0) || std::isnan(pressure)) {
+    if (!is_living(touch, e)) {
       continue;
     }
+    const double pressure = touch.pressure[e];
     lives[e] = 1;
     least_pressure = std::min(least_pressure, pressure);
     largest_pressure = std::max(largest_pressure, pressure);
@@ -24,19 +45,13 @@ TouchEvidence::TouchEvidence(const Touch& touch, const ContactModel& contact)
 }
 
 TouchEvidence TouchEvidence::known() const {
-  TouchEvidence evidence = *this;
-  std::size_t n = 0;
-  for (std::size_t e = 0; e < readings.size(); ++e) {
-    if (readings[e] != Reading::unknown) {
-      evidence.elements_mm[n] = elements_mm[e];
-      evidence.readings[n] = readings[e];
-      evidence.lives[n++] = lives[e];
-    }
-  }
-  evidence.elements_mm.resize(n);
-  evidence.readings.resize(n);
-  evidence.lives.resize(n);
-  return evidence;
+  return evidence_where(*this, [](Reading reading) { return reading != Reading::unknown; });
+}
+
+TouchEvidence TouchEvidence::contact() const { return evidence_where(*this, is_contact); }
+
+bool is_living(const Touch& touch, std::size_t element) {
+  return (touch.valid.empty() || touch.valid[element] != 0) && !std::isnan(touch.pressure[element]);
 }
 
 std::vector<TouchEvidence> evidence_of(std::span<const Touch> touches,

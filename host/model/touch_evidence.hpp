@@ -29,17 +29,23 @@ struct TouchEvidence {
   glm::dvec2 middle_mm() const { return T_robot_sensor * array_centre_mm(elements_mm); }
   /// The evidence without the elements that are Unknown.
   TouchEvidence known() const;
+  /// The evidence of the elements In Contact alone.
+  TouchEvidence contact() const;
 
   Pose T_robot_sensor;
   std::vector<glm::dvec2> elements_mm;  ///< [e] in the sensor frame
   std::vector<Reading> readings;        ///< [e]
   std::vector<std::uint8_t> lives;      ///< [e] 0: dead, or without a number for its pressure
   std::size_t contacts = 0;             ///< elements In Contact
-  /// Of the elements that live, in the recording's unit; least above largest where none does.
+  /// Pressures of the elements that live, in the recording's unit; where none lives, the least is
+  /// above the largest.
   double least_pressure = std::numeric_limits<double>::infinity();
   double largest_pressure = -std::numeric_limits<double>::infinity();
   double force = 0.0;  ///< sum of the pressures above 0, in contact thresholds
 };
+
+/// Whether an element of a touch is alive and has a number for its pressure.
+bool is_living(const Touch& touch, std::size_t element);
 
 std::vector<TouchEvidence> evidence_of(std::span<const Touch> touches, const ContactModel& contact);
 

@@ -25,10 +25,9 @@ TableLearning learning(const std::vector<TrainingMap>& maps) {
 /// Tries all folds on the maps of the others' presses, by Eq. 7 or a table that they learned.
 CrossValidation tried(const std::vector<Press>& presses, const std::vector<std::string>& labels,
                       const CrossValidationOptions& options, bool with_table = false) {
-  const CrossValidator validator(presses, labels, options);
-  CrossValidation result;
+  std::vector<CrossValidation> folds;
   for (std::size_t fold = 0; fold < options.folds; ++fold) {
-    const std::vector<Press> others = validator.presses_without(fold);
+    const std::vector<Press> others = presses_without(fold, presses, options.folds);
     FoldModel model;
     model.maps = options.bins ? maps_of_objects(others, map_options())
                               : maps_of_presses(others, map_options());
@@ -39,9 +38,9 @@ CrossValidation tried(const std::vector<Press>& presses, const std::vector<std::
     if (with_table) {
       model.table = learn_table(others, model.maps, model.how).table;
     }
-    validator.try_fold(fold, model, result);
+    folds.push_back(try_fold(fold, presses, labels, model, options));
   }
-  return result;
+  return joined(folds);
 }
 
 TEST(CrossValidation, TriesEveryPressOnMapsOfOtherFolds) {
@@ -110,8 +109,8 @@ TEST(CrossValidation, LooksForPressesAtKnownPosesAsForUnknownsAloneAndInGroups) 
                               .auto_pivot = false}};
   const CrossValidation found = tried(letters.presses, {"A", "U"}, options);
   ASSERT_EQ(found.presses.size(), 38U);
-  // Of either fold's 12 presses of A, 6 in each half make two groups three times over; of 7 of U, 3
-  // and 4 make one group each.
+  // Either fold has 12 presses of A: the 6 of each half make two groups three times over. It has 7
+  // presses of U: 3 and 4 make one group each.
   const std::vector<ScoredPress> groups = both(found.groups);
   EXPECT_EQ(groups.size(), 2U * (2U * 3U * 2U + 2U));
   EXPECT_FALSE(found.groups[0].empty() || found.groups[1].empty());

@@ -1,4 +1,4 @@
-#include "learning/drawn_poses.hpp"
+#include "learning/tried_bins.hpp"
 
 #include <cmath>
 #include <vector>

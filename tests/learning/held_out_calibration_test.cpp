@@ -83,8 +83,8 @@ TEST_P(NoiseCalibration, JudgesAFoldByWhatTheOtherFoldsSayAlone) {
       .bins = known_poses ? std::optional(BinSteps{1.0, 1.0, 0.5}) : std::nullopt};
   const auto model = [&] {
     letters.make_presses(known_poses);
-    const CrossValidator validator(letters.presses, {"A", "U"}, {});
-    return FoldLearning(validator.presses_without(judged), how).learn({MapLayer::mean_level, 4});
+    const std::vector<Press> others = presses_without(judged, letters.presses, how.folds);
+    return models_of(others, {{MapLayer::mean_level, 4}}, how).front();
   };
   const auto press_harder = [&](bool judged_ones) {
     for (std::size_t i = 0; i < fold.size(); ++i) {

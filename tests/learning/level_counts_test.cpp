@@ -40,7 +40,7 @@ TEST(LevelCounts, ReadsTheLayerAtTheElementsOfAPlacedTouch) {
   LevelCounts counts(3);
   // The object is moved by -1 mm along x, so that elements 1 and 2 lie on the layer's cells.
   const Pose T_object_robot{{-1.0, 0.0}, 0.0};
-  counts.add(std::span(&touch, 1), std::span(&T_object_robot, 1), layer, model);
+  counts.add(evidence_of(std::span(&touch, 1), model), std::span(&T_object_robot, 1), layer);
   EXPECT_DOUBLE_EQ(counts.at(1, node_of(-3.0)), 1.0);
   EXPECT_DOUBLE_EQ(counts.at(2, node_of(5.0)), 1.0);
   EXPECT_DOUBLE_EQ(counts.at(0, node_of(-12.0)), 2.0) << "beyond the layer";

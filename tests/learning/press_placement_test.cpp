@@ -51,7 +51,7 @@ TEST(PressPlacer, FindsTheBestBinOfTheReference) {
   for (std::size_t i = 0; i < 4; ++i) {
     const Press press = single_press(simulated.recordings[i], 0);
     const Exhaustive expected = over_all_bins(press, map, contact, lattice);
-    const PressPlacement found = placer.place(press);
+    const PressPlacement found = placer.place(evidence_of(press.touches, contact));
     EXPECT_NEAR(found.log_likelihood, expected.best, 1e-6) << i;
     EXPECT_NEAR(reference::log_likelihood(press.touches[0], found.T_object_robot, map, contact),
                 expected.best, 1e-6)
@@ -77,7 +77,7 @@ TEST(PressPlacer, TakesTouchesAtPosesAndATableOverALayer) {
   for (const Recording* recording : {&first, &second, &first}) {
     const Press press{.name = "touches", .label = "L", .touches = all_touches(*recording)};
     const Exhaustive expected = over_all_bins(press, *hypothesis.layer, contact, lattice);
-    const PressPlacement found = placer.place(press);
+    const PressPlacement found = placer.place(evidence_of(press.touches, contact));
     EXPECT_NEAR(found.log_likelihood, expected.best, 1e-6);
     EXPECT_NEAR(found.log_evidence, expected.log_evidence, 0.3);
   }
@@ -91,8 +91,8 @@ TEST(PressPlacer, OfASingleBinEvaluatesIt) {
   const PoseLattice lattice{
       .x_mm = {1.0, 1.0, 1}, .y_mm = {0.0, 0.0, 1}, .theta_rad = {0.2, 0.2, 1}};
   const Hypothesis hypothesis{.map = map};
-  const PressPlacement found =
-      PressPlacer(hypothesis, contact, lattice).place(simulated.presses[0]);
+  const PressPlacement found = PressPlacer(hypothesis, contact, lattice)
+                                   .place(evidence_of(simulated.presses[0].touches, contact));
   EXPECT_NEAR(found.log_evidence, found.log_likelihood, 1e-12);
   EXPECT_NEAR(found.T_object_robot.translation_mm.x, 1.0, 1e-12);
 }
@@ -103,8 +103,9 @@ TEST(PressPlacer, RefusesWhatIsTooFarAway) {
   simulated.presses[0].touches[0].T_robot_sensor.translation_mm = {1e8, 0.0};
   const OccupancyGrid map = map_of(on_disc, "disc");
   const Hypothesis hypothesis{.map = map};
-  PressPlacer placer(hypothesis, {.prior = map.prior}, {});
-  EXPECT_THROW(placer.place(simulated.presses[0]), Error);
+  const ContactModel contact{.prior = map.prior};
+  PressPlacer placer(hypothesis, contact, {});
+  EXPECT_THROW(placer.place(evidence_of(simulated.presses[0].touches, contact)), Error);
 }
 
 }  // namespace palpate::press_placement_test

@@ -7,7 +7,6 @@
 
 #include <gtest/gtest.h>
 
-#include "learning/reading_learning.hpp"
 #include "palpate/error.hpp"
 #include "simulated_presses.hpp"
 

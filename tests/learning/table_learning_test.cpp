@@ -28,15 +28,15 @@ TableLearning learning(const std::vector<TrainingMap>& maps) {
 LevelCounts true_counts(const SimulatedPresses& simulated, const std::vector<TrainingMap>& maps,
                         const TableLearning& how) {
   const std::vector<OccupancyGrid> layers = layers_of(maps, how.layer);
-  const ContactModel classifier = contact_with(how.contact, how.initial(), "");
+  const ContactModel classifier = how.classifier();
   LevelCounts counts(2);
   for (std::size_t i = 0; i < layers.size(); ++i) {
     for (std::size_t j = 0; j < layers.size(); ++j) {
       if (i != j && simulated.presses[i].label == simulated.presses[j].label) {
         const Pose T_object_robot =
             inverse(simulated.T_object_robot[j]) * simulated.T_object_robot[i];
-        counts.add(simulated.presses[i].touches, std::span(&T_object_robot, 1), layers[j],
-                   classifier);
+        counts.add(evidence_of(simulated.presses[i].touches, classifier),
+                   std::span(&T_object_robot, 1), layers[j]);
       }
     }
   }
@@ -63,7 +63,7 @@ TEST(TableLearning, CountsPressesAtKnownPosesWithinABinOfThem) {
   for (const Press& press : letters.presses) {
     box.take_in(press.T_object_robot->translation_mm);
   }
-  const ContactModel classifier = contact_with(how.contact, how.initial(), "");
+  const ContactModel classifier = how.classifier();
   LevelCounts expected(2);
   for (const OwnPlacement& own : placed.placements) {
     const Press& press = letters.presses[own.press];
@@ -102,7 +102,7 @@ TEST(TableLearning, RecoversTheTableOfASimulatedSensor) {
   };
   TableLearning how{.level_edges = {10.0}, .contact = {.prior = 0.2}};
   how.contact.classifier = {.threshold = 2.0, .ratio = 0.1};
-  const ContactModel classifier = contact_with(how.contact, how.initial(), "");
+  const ContactModel classifier = how.classifier();
   Uniform random(2);
   Recording recording;
   recording.T_robot_sensor = {Pose{}};
@@ -120,7 +120,7 @@ TEST(TableLearning, RecoversTheTableOfASimulatedSensor) {
   }
   LevelCounts counts(3);
   const std::vector<Touch> touches = all_touches(recording);
-  counts.add(touches, std::vector{Pose{}}, layer, classifier);
+  counts.add(evidence_of(touches, classifier), std::vector{Pose{}}, layer);
   const LearnedTable table = table_of({{"A", counts}}, how);
   for (std::size_t level = 0; level < 3; ++level) {
     for (int node = 17; node < 48; ++node) {

@@ -49,6 +49,9 @@ TEST(TouchEvidence, KnownLeavesOutUnknownElements) {
   EXPECT_EQ(known.elements_mm,
             (std::vector<glm::dvec2>{six.elements_mm[0], six.elements_mm[2], six.elements_mm[5]}));
   EXPECT_EQ(known.lives, (std::vector<std::uint8_t>{1, 1, 1}));
+  const TouchEvidence contact = known.contact();
+  EXPECT_EQ(contact.readings, (std::vector{in, in}));
+  EXPECT_EQ(contact.elements_mm, (std::vector<glm::dvec2>{six.elements_mm[0], six.elements_mm[5]}));
 }
 
 TEST(TouchEvidence, OfDeadElementsHasNoPressure) {

@@ -3,7 +3,7 @@ import os
 import pathlib
 import re
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import pytest
@@ -60,10 +60,20 @@ def refusal(*arguments: object) -> str:
     return run.stderr.removeprefix("palpate: ").rstrip("\n")
 
 
-def expect_refused(call: Callable[[], object], *arguments: object) -> None:
+def expect_refused(
+    call: Callable[[], object], *arguments: object, spelled: Mapping[str, str] = {}
+) -> None:
+    """The call is refused as the command with the arguments is, but for how each spells options.
+    `spelled` has how Python spells each option that the command's words name."""
     with pytest.raises(palpate.Error) as refused:
         call()
-    assert OPTION.sub("OPTION", str(refused.value)) == OPTION.sub("OPTION", refusal(*arguments))
+    words = refusal(*arguments)
+    for flag, keyword in spelled.items():
+        assert flag in words
+        words = words.replace(flag, keyword)
+    said = str(refused.value)
+    assert "--" not in said
+    assert said == words if spelled else OPTION.sub("OPTION", said) == OPTION.sub("OPTION", words)
     assert refused.value.fault == "input"
 
 

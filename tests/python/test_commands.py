@@ -285,22 +285,24 @@ def test_a_calibration_is_that_of_the_command(
 
 
 @pytest.mark.parametrize(
-    ("flags", "options"),
+    ("flags", "options", "spelled"),
     [
-        (["--ratio", 1], {"ratio": 1}),
-        (["--levels", 1], {"levels": 1}),
-        (["--layer", "both"], {"layer": "both"}),
-        (["--max-maps", 0], {"max_maps": 0}),
-        (["--unposed", "--x-mm=-1:1"], {"unposed": True, "x_mm": (-1, 1)}),
-        (["--frames", "0:99"], {"frames": (0, 99)}),
+        (["--ratio", 1], {"ratio": 1}, {"--ratio 1": "ratio=1"}),
+        (["--levels", 1], {"levels": 1}, {"--levels 1": "levels=1"}),
+        (["--layer", "both"], {"layer": "both"}, {"--layer both": "layer='both'"}),
+        (["--max-maps", 0], {"max_maps": 0}, {"--max-maps 0": "max_maps=0"}),
+        (["--unposed", "--x-mm=-1:1"], {"unposed": True, "x_mm": (-1, 1)},
+         {"--bins, --x-mm, --y-mm, --theta-deg and --pivot-mm":
+          "bins=, x_mm=, y_mm=, theta_deg= and pivot_mm="}),
+        (["--frames", "0:99"], {"frames": (0, 99)}, {}),
     ],
-)
+)  # fmt: skip
 def test_calibrations_are_refused_in_the_words_of_the_command(
-    presses: list[pathlib.Path], flags: list[Any], options: dict[str, Any]
+    presses: list[pathlib.Path], flags: list[Any], options: dict[str, Any], spelled: dict[str, str]
 ) -> None:
     expect_refused(
         lambda: palpate.calibrate(presses, **options),
-        "calibrate", *presses, "-o", presses[0].with_name("s.yaml"), *flags,
+        "calibrate", *presses, "-o", presses[0].with_name("s.yaml"), *flags, spelled=spelled,
     )  # fmt: skip
 
 
@@ -310,6 +312,8 @@ def test_calibrations_that_cannot_be_are_refused(
     expect_refused(
         lambda: palpate.calibrate(presses, maps=files.maps),
         "calibrate", *presses, "-o", presses[0].with_name("s.yaml"), "--maps", files.maps,
+        spelled={"--unposed or --sensor-model": "unposed= or sensor_model=",
+                 "--layer log_odds": "layer='log_odds'"},
     )  # fmt: skip
     with pytest.raises(TypeError, match="bins: 'auto'; give counts"):
         palpate.calibrate(presses, bins="auto")  # type: ignore[arg-type]

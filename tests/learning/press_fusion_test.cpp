@@ -1,8 +1,8 @@
-#include "learning/press_groups.hpp"
+#include "learning/press_fusion.hpp"
 
 #include <gtest/gtest.h>
 
-namespace palpate::press_groups_test {
+namespace palpate::press_fusion_test {
 
 /// Presses 0 to 2 are alike, 3 and 4 are, 5 is like none.
 FitTable sample_table() {
@@ -28,4 +28,4 @@ TEST(NextMap, NoneWhereAllPressesFit) {
   EXPECT_FALSE(next_map(sample_table(), std::vector<double>(6, 0.5), 0.5));
 }
 
-}  // namespace palpate::press_groups_test
+}  // namespace palpate::press_fusion_test
