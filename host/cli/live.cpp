@@ -99,7 +99,7 @@ void live(const LiveArguments& options) {
   }
   std::optional<PlanGoal> goal;
   if (!options.plan.empty()) {
-    goal = parse_goal("--plan", options.plan);
+    goal = parse_goal("plan", options.plan);
   }
   require_above("--tare", options.tare_s, 0.0, true);
   const Request request = complete(options.request);

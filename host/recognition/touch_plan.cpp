@@ -19,6 +19,7 @@
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/touch.hpp"
 #include "recognition/label_probability.hpp"
+#include "recognition/refused_option.hpp"
 
 namespace palpate {
 
@@ -135,13 +136,13 @@ double unknown_nats(const Plan& plan) {
 
 }  // namespace
 
-PlanGoal parse_goal(const std::string& flag, const std::string& text) {
+PlanGoal parse_goal(std::string_view option, const std::string& text) {
   for (const PlanGoal goal : {PlanGoal::identity, PlanGoal::pose, PlanGoal::both}) {
     if (text == goal_word(goal)) {
       return goal;
     }
   }
-  refuse(fmt::format("{} {}", flag, text), "not known; use identity, pose or both");
+  refuse_option(option, text, "not known; use identity, pose or both");
 }
 
 std::string goal_word(PlanGoal goal) {
@@ -228,10 +229,10 @@ PlanRequest plan_request(const std::string& goal, const std::string& candidates,
                          std::size_t samples, std::uint64_t seed,
                          const std::function<void(const std::string&)>& tell) {
   constexpr std::size_t most_samples = 4096;
-  PlanRequest request{.goal = parse_goal("--goal", goal),
+  PlanRequest request{.goal = parse_goal("goal", goal),
                       .options = {.samples = samples, .seed = seed}};
   if (samples < 2 || samples > most_samples) {
-    refuse(fmt::format("--samples {}", samples), "give 2 to {}", most_samples);
+    refuse_option("samples", samples, "give 2 to {}", most_samples);
   }
   if (candidates != candidate_grid_word) {
     request.candidates = read_candidates(candidates, tell);
@@ -242,7 +243,7 @@ PlanRequest plan_request(const std::string& goal, const std::string& candidates,
 
 void require_histogram(const RecognitionTask& task) {
   if (!traits_of(task.filter).every_bin) {
-    refuse("--filter particles", "{}; use --filter histogram, or leave it out", plan_needs);
+    refuse_option("filter", "particles", "{}; use `filter histogram`, or leave it out", plan_needs);
   }
 }
 

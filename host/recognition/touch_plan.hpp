@@ -5,6 +5,7 @@
 #include <functional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <glm/vec2.hpp>
@@ -20,8 +21,8 @@ namespace palpate {
 
 /// What the next touch shall tell.
 enum class PlanGoal { identity, pose, both };
-/// "identity", "pose" or "both". Throws Error naming the flag.
-PlanGoal parse_goal(const std::string& flag, const std::string& text);
+/// "identity", "pose" or "both". Throws Error naming the option.
+PlanGoal parse_goal(std::string_view option, const std::string& text);
 /// The goal's word.
 std::string goal_word(PlanGoal goal);
 

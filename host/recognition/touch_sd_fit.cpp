@@ -7,11 +7,11 @@
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
 
-#include "io/input_file.hpp"
 #include "model/bounding_box.hpp"
 #include "palpate/error.hpp"
 #include "recognition/evidence_search.hpp"
 #include "recognition/recogniser.hpp"
+#include "recognition/refused_option.hpp"
 
 namespace palpate {
 
@@ -196,25 +196,29 @@ std::vector<TouchedObject> touched_objects(std::span<const Recording> recordings
 
 void require_fittable(const RecognitionTask& task) {
   if (!traits_of(task.filter).every_bin) {
-    refuse("--fit-touch-sd", "particles cannot fit it; use --filter histogram");
+    refuse_option("fit-touch-sd", "particles cannot fit it; use `filter histogram`");
   }
   if (!task.touch_sd().none()) {
-    refuse("--fit-touch-sd",
-           "finds what --touch-sd-mm and --touch-sd-deg, the scene's touch_sd or the sensor model "
-           "say already; leave those out");
+    refuse_option(
+        "fit-touch-sd",
+        "finds what `touch-sd-mm` and `touch-sd-deg`, the scene's touch_sd or the sensor model "
+        "say already; leave those out");
   }
   if (!task.slip_sd().none()) {
-    refuse("--fit-touch-sd",
-           "takes objects to rest between touches; leave out --slip-sd-mm and --slip-sd-deg, or "
-           "the scene's slip_sd");
+    refuse_option(
+        "fit-touch-sd",
+        "takes objects to rest between touches; leave out `slip-sd-mm` and `slip-sd-deg`, or "
+        "the scene's slip_sd");
   }
   if (task.contact().table) {
-    refuse("--fit-touch-sd", "learns a model of the sensor of its own; leave out the sensor model");
+    refuse_option("fit-touch-sd",
+                  "learns a model of the sensor of its own; leave out the sensor model");
   }
   if (task.labels.back() == none_label) {
-    refuse("--fit-touch-sd",
-           "takes every unknown to be one of the maps' objects; leave out --none, or the scene's "
-           "none");
+    refuse_option(
+        "fit-touch-sd",
+        "takes every unknown to be one of the maps' objects; leave out `none`, or the scene's "
+        "none");
   }
 }
 

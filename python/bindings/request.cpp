@@ -122,11 +122,16 @@ void set_option(PythonRequest& request, std::string option, nb::handle given) {
     return;
   }
   std::ranges::replace(option, '_', '-');
+  bool known = false;
   visit_options(request, [&](const char* name, auto& value) {
     if (option == name) {
       take(name, given, value);
+      known = true;
     }
   });
+  if (!known) {
+    throw nb::attribute_error(option.c_str());
+  }
 }
 
 /// A list of what an argument gives: one item, or an iterable of them.

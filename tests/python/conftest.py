@@ -105,7 +105,10 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Files:
     return Files(tmp_path_factory.mktemp("files"))
 
 
-OPTION = re.compile(r"--[a-z-]+(?:[ =](?:auto|-?[0-9](?:[^ ,;]*[^ ,;:])?))?|[a-z_]+=(?:'\w+'|\([^)]*\)|[-0-9.]+)")
+OPTION = re.compile(
+    r"--[a-z-]+(?:[ =](?:auto|histogram|[a-z]+(?=:)|-?[0-9](?:[^ ,;]*[^ ,;:])?))?"
+    r"|[a-z_]+=(?:'\w+'|\([^)]*\)|[-0-9.]+)?|^[a-z_]+(?=:)"
+)
 
 
 def comparable(record: dict[str, Any]) -> dict[str, Any]:
