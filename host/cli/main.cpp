@@ -1,21 +1,43 @@
 #include <algorithm>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
+#include <filesystem>
 #include <iostream>
 #include <new>
 #include <string>
 
 #include <fmt/format.h>
+#include <fontconfig/fontconfig.h>
 #include <CLI/CLI.hpp>
 
 #include "cli/commands.hpp"
-#include "cli/own_font.hpp"
 #include "io/hdf5_process.hpp"
 #include "io/standard_streams.hpp"
 #include "model/option_words.hpp"
 #include "palpate/error.hpp"
 
 namespace {
+
+/// Has pictures drawn with the fonts that lie beside the program, in ../share/palpate/fonts, as in
+/// a Python wheel: the machine may have neither fonts nor a configuration of fontconfig. Without
+/// such a folder, and where FONTCONFIG_FILE is set in the environment, fontconfig finds the font.
+void use_bundled_fonts() {
+  std::error_code code;
+  const auto program = std::filesystem::canonical("/proc/self/exe", code);
+  const auto fonts = program.parent_path().parent_path() / "share" / "palpate" / "fonts";
+  if (!std::filesystem::is_directory(fonts, code) || std::getenv("FONTCONFIG_FILE") != nullptr) {
+    return;
+  }
+  // Fonts of an application, one file after another: with a folder, fontconfig would write a cache,
+  // and complain on standard error where it must not.
+  FcConfig* config = FcConfigCreate();
+  for (const char* font : {"DejaVuSans.ttf", "DejaVuSans-Bold.ttf"}) {
+    const std::string file = fonts / font;
+    FcConfigAppFontAddFile(config, reinterpret_cast<const FcChar8*>(file.c_str()));
+  }
+  FcConfigSetCurrent(config);
+}
 
 // The exit status that other programs rely on.
 constexpr int wrong_input = 2;
@@ -106,7 +128,7 @@ int run(int argc, char** argv) {
 int main(int argc, char** argv) {
   palpate::open_closed_streams();
   palpate::read_hdf5_in_children(true);
-  palpate::use_own_font();
+  use_bundled_fonts();
   try {
     return run(argc, argv);
   } catch (const palpate::Error& error) {

@@ -14,6 +14,7 @@
 #include "figures/figures.hpp"
 #include "learning/contact_learning.hpp"
 #include "learning/unposed_maps.hpp"
+#include "model/touch_evidence.hpp"
 #include "palpate/files.hpp"
 #include "palpate/rotational_symmetry.hpp"
 #include "recognition/recordings.hpp"
@@ -144,12 +145,9 @@ std::string words_of(const Misfit& misfit) {
 std::vector<glm::dvec2> contacts_of(const Touch& touch, const ContactClassifier& classifier,
                                     const PlacedPress& place) {
   std::vector<glm::dvec2> contacts;
-  const std::vector<Reading> readings = classifier.classify(touch);
-  for (std::size_t e = 0; e < readings.size(); ++e) {
-    if (is_contact(readings[e])) {
-      const glm::dvec2& p = touch.elements_mm[e];
-      contacts.push_back(place.T_object_sensor * glm::dvec2(place.mirrored ? -p.x : p.x, p.y));
-    }
+  const TouchEvidence evidence(touch, {.classifier = classifier});
+  for (const glm::dvec2& p : evidence.contact().elements_mm) {
+    contacts.push_back(place.T_object_sensor * glm::dvec2(place.mirrored ? -p.x : p.x, p.y));
   }
   return contacts;
 }

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
@@ -10,20 +11,87 @@
 
 #include "cli/commands.hpp"
 #include "cli/detector_flags.hpp"
-#include "cli/endless_touch.hpp"
 #include "cli/options.hpp"
 #include "io/command_files.hpp"
 #include "io/recording_state.hpp"
+#include "model/elements_that.hpp"
 #include "model/lost_count.hpp"
 #include "model/stream_time.hpp"
 #include "palpate/baseline.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
+#include "palpate/touch_detector.hpp"
 #include "palpate/virtual_sensor.hpp"
 
 namespace palpate::cli {
 
 namespace {
+
+/// Watches a stream for a last touch that does not end, and for the elements that hold it.
+class EndlessTouch {
+ public:
+  /// @param release of the touch detector
+  explicit EndlessTouch(double release) : release_(release) {}
+
+  /// Takes a frame that the detector has just taken.
+  void add(const Frame& frame, const TouchDetector& detector);
+
+  /// Returns what never releases and the remedy, as a sentence; "" where all touches end. The last
+  /// touch counts as endless where it goes on to the end of the stream and over more than half of
+  /// the frames. The only touch of a stream, which may just be cut short, counts where it goes over
+  /// more than nine tenths.
+  std::string complaint(const std::string& pressure_unit, const std::string& remedy) const;
+
+ private:
+  double release_;
+  StreamTime time_;
+  std::uint64_t frames_ = 0;
+  std::vector<std::uint64_t> held_;  ///< [e] frames since the element was last below the release
+  std::uint64_t touched_ = 0;        ///< frames of the touch under way
+  double onset_s_ = 0.0;             ///< its onset, since the first frame
+  bool released_before_ = false;     ///< an earlier touch has ended
+};
+
+void EndlessTouch::add(const Frame& frame, const TouchDetector& detector) {
+  ++frames_;
+  time_.advance(frame.host_time_s);
+  const std::vector<double>& pressure = detector.smoothed();
+  held_.resize(pressure.size(), 0);
+  for (std::size_t i = 0; i < pressure.size(); ++i) {
+    held_[i] = pressure[i] < release_ ? 0 : held_[i] + 1;
+  }
+  if (detector.touching()) {
+    onset_s_ = touched_ == 0 ? time_.elapsed_s() : onset_s_;
+    ++touched_;
+  } else {
+    released_before_ = released_before_ || touched_ > 0;
+    touched_ = 0;
+  }
+}
+
+std::string EndlessTouch::complaint(const std::string& pressure_unit,
+                                    const std::string& remedy) const {
+  const double part = released_before_ ? 0.5 : 0.9;
+  if (static_cast<double>(touched_) <= part * static_cast<double>(frames_)) {
+    return "";
+  }
+  std::vector<std::size_t> held;
+  for (std::size_t i = 0; i < held_.size(); ++i) {
+    if (held_[i] >= touched_) {
+      held.push_back(i);
+    }
+  }
+  const std::string below =
+      fmt::format("below {:.4g} {} from {:.2f} s on", release_, pressure_unit, onset_s_);
+  // Where most elements are held, the whole array reads too much.
+  if (held.empty() || 2 * held.size() > held_.size()) {
+    return fmt::format("the array never reads {}, so that its touch does not end; {}", below,
+                       remedy);
+  }
+  return fmt::format(
+      "{} {}, so that the touch does not end; mark broken elements dead in 'valid', or {}",
+      elements_that(held, "never reads", "never read"), below, remedy);
+}
 
 /// Seconds of the tare where a recording has no baseline, as in `palpate record`.
 constexpr double usual_tare_s = 0.5;

@@ -1,6 +1,6 @@
 // What `palpate live` draws, as text.
 
-#include "cli/live_view.hpp"
+#include "cli/live_screen.hpp"
 
 #include <gtest/gtest.h>
 

@@ -2,20 +2,110 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <limits>
+#include <span>
+#include <tuple>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 #include <tbb/info.h>
 
-#include "estimation/bounded/belief_draws.hpp"
+#include "estimation/bin_box.hpp"
 #include "estimation/bounded/log_sum.hpp"
 #include "estimation/hypotheses.hpp"
 #include "estimation/moved_pivot.hpp"
+#include "estimation/pose_draws.hpp"
+#include "model/random.hpp"
+#include "palpate/estimate.hpp"
+#include "palpate/lattice.hpp"
 
 namespace palpate {
 
 namespace {
+
+/// Draws poses from a belief whose bins come box by box, one in each of `count` equal parts of the
+/// belief.
+class BeliefDraws {
+ public:
+  /// @param lattice,log_weight outlive this object; log_weight is [hypothesis], the log of its
+  /// prior weight
+  /// @param log_total log of the summed likelihood of all bins to come, with prior weights
+  BeliefDraws(std::size_t count, std::uint64_t seed, const PoseLattice& lattice,
+              std::span<const double> log_weight, double log_total);
+
+  /// See BinVisitor.
+  void add(const BinBox& box, std::span<const double> log_likelihood);
+  /// The draws, uniform within their bins, in the order of objects and bins.
+  std::vector<PoseSample> take();
+
+ private:
+  struct Draw {
+    std::int32_t object = 0;
+    std::int64_t bin = 0;
+  };
+
+  /// Whether a draw is due before the belief has reached so much.
+  bool is_due(double reached) const {
+    return draws_.size() < targets_.size() && targets_[draws_.size()] < reached;
+  }
+
+  const PoseLattice& lattice_;
+  std::span<const double> log_weight_;
+  double log_total_;
+  Random random_;
+  std::vector<double> targets_;  ///< ascending, as parts of the belief
+  std::vector<Draw> draws_;
+  double reached_ = 0.0;  ///< part of the belief that has come
+  Draw last_;             ///< the last bin that has come
+};
+
+BeliefDraws::BeliefDraws(std::size_t count, std::uint64_t seed, const PoseLattice& lattice,
+                         std::span<const double> log_weight, double log_total)
+    : lattice_(lattice),
+      log_weight_(log_weight),
+      log_total_(log_total),
+      random_(seed, Stream::belief),
+      targets_(one_in_each_part(count, random_)) {
+  draws_.reserve(count);
+}
+
+void BeliefDraws::add(const BinBox& box, std::span<const double> log_likelihood) {
+  const double weight = log_weight_[box.object] - log_total_;
+  const std::int64_t bins = box.bins();
+  if (log_likelihood.size() == 1) {
+    const double p = std::exp(weight + log_likelihood[0]);
+    const double after = reached_ + p * static_cast<double>(bins);
+    while (is_due(after)) {
+      const auto i = static_cast<std::int64_t>((targets_[draws_.size()] - reached_) / p);
+      draws_.push_back({box.object, box.bin(std::min(i, bins - 1), lattice_)});
+    }
+    reached_ = after;
+  } else {
+    for (std::int64_t i = 0; i < bins; ++i) {
+      reached_ += std::exp(weight + log_likelihood[static_cast<std::size_t>(i)]);
+      while (is_due(reached_)) {
+        draws_.push_back({box.object, box.bin(i, lattice_)});
+      }
+    }
+  }
+  last_ = {box.object, box.bin(bins - 1, lattice_)};
+}
+
+std::vector<PoseSample> BeliefDraws::take() {
+  draws_.resize(targets_.size(), last_);  // rounding may leave the last draw out
+  std::sort(draws_.begin(), draws_.end(), [](const Draw& a, const Draw& b) {
+    return std::tie(a.object, a.bin) < std::tie(b.object, b.bin);
+  });
+  std::vector<PoseSample> samples;
+  samples.reserve(draws_.size());
+  for (const Draw& draw : draws_) {
+    samples.push_back({draw.object, draw_within(draw.bin, lattice_, random_)});
+  }
+  return samples;
+}
 
 /// Tolerance that a search with a budget reaches before it goes on, and enough to draw samples.
 constexpr double soon = 1e-2;
@@ -45,7 +135,7 @@ BoundedBelief::BoundedBelief(std::span<const Hypothesis> hypotheses, const Bound
 }
 
 void BoundedBelief::reset() {
-  half_done_.forget();
+  change_.forget();
   kept_.clear();
   touches_.clear();
   elements_ = {};
@@ -66,16 +156,16 @@ void BoundedBelief::move_pivot(const glm::dvec2& pivot_mm) {
 }
 
 void BoundedBelief::add(std::span<const Touch> touches) {
-  half_done_.refuse();
+  change_.refuse();
   kept_.add(touches, options_.contact, options_.lattice.pivot_mm);
 }
 
 void BoundedBelief::take_in() {
-  half_done_.refuse();
+  change_.refuse();
   if (kept_.empty()) {
     return;
   }
-  half_done_.change([&] {
+  change_.change([&] {
     if (found_ && found_->bins.complete() &&
         found_->bins.values().size() <= FollowedBins::most_bins) {
       followed_.emplace(found_->bins, found_->result, space_.log_weight);
@@ -179,7 +269,7 @@ SearchResult BoundedBelief::run(const SearchGoal& goal, const Deadline& deadline
                                 const BinVisitor& visitor, std::vector<PoseBlock>* refined) {
   return arena_.execute([&] {
     if (searched_ < touches_.size()) {
-      half_done_.change([&] { search_.largest().add(std::span(touches_).subspan(searched_)); });
+      change_.change([&] { search_.largest().add(std::span(touches_).subspan(searched_)); });
       searched_ = touches_.size();
     }
     return search_.run(elements_, goal, deadline, visitor, refined);

@@ -10,13 +10,12 @@
 #include <tbb/task_arena.h>
 
 #include "estimation/bounded/evaluated_bins.hpp"
-#include "estimation/bounded/kept_touches.hpp"
 #include "estimation/bounded/known_elements.hpp"
 #include "estimation/bounded/leaves/bin_likelihood.hpp"
 #include "estimation/bounded/none_evidence.hpp"
 #include "estimation/bounded/search/bound_search.hpp"
 #include "estimation/bounded/search/search_space.hpp"
-#include "estimation/half_done.hpp"
+#include "estimation/change_in_steps.hpp"
 #include "palpate/bounded_posterior.hpp"
 
 namespace palpate {
@@ -115,7 +114,7 @@ class BoundedBelief {
   std::size_t followed_touches_ = 0;      ///< that followed_ has taken in
   std::optional<NoneEvidence> none_;      ///< where the options ask for it
   double none_log_weight_ = 0.0;          ///< log of its prior weight times the number of bins
-  HalfDone half_done_{"bounded posterior: memory ended in the middle of an update; call reset()"};
+  ChangeInSteps change_{"bounded posterior: memory ended in the middle of an update; call reset()"};
 };
 
 }  // namespace palpate

@@ -44,4 +44,32 @@ KnownElements changed_elements(const ArrayReadings& array);
 /// The elements of all.
 KnownElements merged(std::span<const KnownElements> lists);
 
+/// Touches that wait until a filter is asked about its belief. The first one makes room for some
+/// more of its size, so that keeping these allocates no memory.
+class KeptTouches {
+ public:
+  /// Of the first touch's size; fewer where they would take more than `most_bytes`.
+  static constexpr std::size_t room_for = 64;
+  static constexpr std::size_t most_bytes = std::size_t{1} << 22;
+
+  /// Classifies the touches' elements (Eq. 3) and keeps them.
+  /// @throws Error on a touch that is not sound, and keeps none of these
+  void add(std::span<const Touch> touches, const ContactModel& model, const glm::dvec2& pivot_mm);
+  bool empty() const { return ends_.empty(); }
+  /// In the order in which they came.
+  std::vector<ArrayReadings> all() const;
+  /// Keeps the room.
+  void clear();
+
+ private:
+  void add(const Touch& touch, const ContactModel& model, const glm::dvec2& pivot_mm);
+  void shrink(std::size_t touches);
+
+  std::vector<glm::dvec2> from_pivot_mm_;   ///< of all touches' elements
+  std::vector<Reading> readings_;           ///< of the same
+  std::vector<std::size_t> ends_;           ///< [touch] of its elements
+  std::vector<ArrayRectangle> rectangles_;  ///< [touch]
+  std::vector<Reading> of_touch_;           ///< the last one's, for its memory
+};
+
 }  // namespace palpate

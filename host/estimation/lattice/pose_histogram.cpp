@@ -8,9 +8,9 @@
 
 #include <fmt/format.h>
 
+#include "estimation/change_in_steps.hpp"
 #include "estimation/contradiction.hpp"
 #include "estimation/displacement_check.hpp"
-#include "estimation/half_done.hpp"
 #include "estimation/hypotheses.hpp"
 #include "estimation/lattice/dense_belief.hpp"
 #include "estimation/lattice/dense_likelihood.hpp"
@@ -71,7 +71,7 @@ struct PoseHistogram::Impl {
     }
     const ContactEvidence& evidence = gather(still ? std::span<const Touch>() : touches);
     const ReadingCounts counts = evidence.counts;  // update_by_touch() gathers anew
-    half_done.change([&] {
+    change.change([&] {
       touched = touched || !touches.empty();
       summarised.reset();
       if (by_touch) {
@@ -199,7 +199,7 @@ struct PoseHistogram::Impl {
   std::vector<Body> bodies;
   bool touched = false;  ///< since reset()
   std::optional<std::vector<BeliefSummary>> summarised;
-  HalfDone half_done{
+  ChangeInSteps change{
       "histogram: an update or a prepared touch was broken off half-way; call reset()"};
   OwnProcess process;
 };
@@ -230,14 +230,14 @@ PoseHistogram::Impl& PoseHistogram::impl() const { return held_here(impl_, "hist
 
 PoseHistogram::Impl& PoseHistogram::whole() const {
   Impl& held = impl();
-  held.half_done.refuse();
+  held.change.refuse();
   return held;
 }
 
 void PoseHistogram::reset() {
   Impl& histogram = impl();
-  histogram.half_done.forget();
-  histogram.half_done.change([&] {
+  histogram.change.forget();
+  histogram.change.change([&] {
     histogram.belief.clear();
     // Now, or a device that fails later would leave the old belief behind a reset.
     histogram.stream.run();
@@ -265,7 +265,7 @@ void PoseHistogram::prepare(const Touch& touch) {
   Impl& histogram = whole();
   ContactEvidence evidence = histogram.gather(std::span(&touch, 1));
   if (histogram.by_touch && !histogram.still) {
-    histogram.half_done.change([&] {
+    histogram.change.change([&] {
       histogram.by_touch->prepare(evidence, [&](const DenseBelief& uniform) {
         histogram.likelihood.accumulate(evidence, uniform, {});
       });
@@ -277,7 +277,7 @@ void PoseHistogram::prepare(const Touch& touch) {
   }
   if (histogram.prepared.make_room(histogram.belief)) {
     // A device that fails also drops what reset() has recorded of the belief.
-    histogram.half_done.change(
+    histogram.change.change(
         [&] { histogram.prepared.evaluate(std::move(evidence), histogram.likelihood); });
   }
 }

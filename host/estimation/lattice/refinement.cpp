@@ -3,8 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <numbers>
 #include <optional>
+#include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
@@ -12,8 +15,6 @@
 #include <glm/matrix.hpp>
 
 #include "estimation/lattice/body_window.hpp"
-#include "estimation/lattice/flattening.hpp"
-#include "estimation/lattice/quadratic_peak.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
@@ -167,6 +168,57 @@ double on_circle(const Axis& theta, double theta_rad) {
   return theta_rad - period_rad * std::floor((theta_rad - theta.lower) / period_rad);
 }
 
+/// Solves matrix x = right in place, for a symmetric matrix, [n, n]. Returns false where the matrix
+/// is not positive definite within rounding.
+bool solve(std::vector<double> matrix, std::vector<double>& right) {
+  constexpr double rounding = 1e-9;
+  const std::size_t n = right.size();
+  std::vector<double> least;
+  for (std::size_t i = 0; i < n; ++i) {
+    least.push_back(rounding * matrix[i * n + i]);
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    const double pivot = matrix[i * n + i];
+    if (!(pivot > 0.0 && pivot > least[i])) {
+      return false;
+    }
+    for (std::size_t row = i + 1; row < n; ++row) {
+      const double factor = matrix[row * n + i] / pivot;
+      for (std::size_t column = i; column < n; ++column) {
+        matrix[row * n + column] -= factor * matrix[i * n + column];
+      }
+      right[row] -= factor * right[i];
+    }
+  }
+  for (std::size_t i = n; i-- > 0;) {
+    for (std::size_t column = i + 1; column < n; ++column) {
+      right[i] -= matrix[i * n + column] * right[column];
+    }
+    right[i] /= matrix[i * n + i];
+  }
+  return true;
+}
+
+// A larger share suits coarse bins after many touches, a smaller share fine bins after few.
+constexpr double wanted_share = 1.0 / 3.0;
+// To an n of 1e20. Where bins differ by more nats, one bin has all the weight whatever the n.
+constexpr int most_doublings = 64;
+
+/// Root mean square distance from the mean under weights exp(log-likelihood * inverse_root).
+double spread_mm(std::span<const DisplacedBin> bins, double top, double inverse_root) {
+  glm::dvec3 sum{0.0};
+  double squares = 0.0;
+  double total = 0.0;
+  for (const DisplacedBin& bin : bins) {
+    const double weight = std::exp((bin.log_likelihood - top) * inverse_root);
+    sum += weight * bin.moved_mm;
+    squares += weight * glm::dot(bin.moved_mm, bin.moved_mm);
+    total += weight;
+  }
+  sum /= total;
+  return std::sqrt(std::max(0.0, squares / total - glm::dot(sum, sum)));
+}
+
 }  // namespace
 
 Body displaced_body(const OccupancyGrid& map) {
@@ -203,6 +255,85 @@ RefinedPose refine(const BoxLogLikelihood& log_likelihood, const PoseLattice& la
   }
   return {.T_object_robot = lattice.T_object_robot(place.x, place.y, place.z),
           .covariance = pose_covariance(second_moment(window, lattice, offset), lattice, place.z)};
+}
+
+std::optional<glm::dvec3> quadratic_peak(std::span<const WeightedValue> values,
+                                         const std::array<bool, 3>& varies,
+                                         double least_curvature) {
+  std::vector<int> axes;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (varies[axis]) {
+      axes.push_back(axis);
+    }
+  }
+  const std::size_t d = axes.size();
+  const std::size_t unknowns = 1 + d + d * (d + 1) / 2;
+  if (d == 0 || values.size() < 2 * unknowns) {
+    return {};
+  }
+  // The normal equations in 1, the coordinates, and their products.
+  std::vector<double> matrix(unknowns * unknowns);
+  std::vector<double> fit(unknowns);
+  std::vector<double> terms(unknowns);
+  for (const WeightedValue& value : values) {
+    std::size_t k = 0;
+    terms[k++] = 1.0;
+    for (const int axis : axes) {
+      terms[k++] = value.at[axis];
+    }
+    for (std::size_t a = 0; a < d; ++a) {
+      for (std::size_t b = a; b < d; ++b) {
+        terms[k++] = value.at[axes[a]] * value.at[axes[b]];
+      }
+    }
+    for (std::size_t row = 0; row < unknowns; ++row) {
+      for (std::size_t column = 0; column < unknowns; ++column) {
+        matrix[row * unknowns + column] += value.weight * terms[row] * terms[column];
+      }
+      fit[row] += value.weight * terms[row] * value.value;
+    }
+  }
+  if (!solve(std::move(matrix), fit)) {
+    return {};
+  }
+  // The slope vanishes where -(second derivatives) x = slope at 0.
+  std::vector<double> curvature(d * d);
+  std::vector<double> peak(fit.begin() + 1, fit.begin() + 1 + static_cast<std::ptrdiff_t>(d));
+  std::size_t k = 1 + d;
+  for (std::size_t a = 0; a < d; ++a) {
+    for (std::size_t b = a; b < d; ++b, ++k) {
+      curvature[a * d + b] -= fit[k];
+      curvature[b * d + a] -= fit[k];
+    }
+    if (!(curvature[a * d + a] > least_curvature)) {
+      return {};
+    }
+  }
+  if (!solve(std::move(curvature), peak)) {
+    return {};
+  }
+  glm::dvec3 at{0.0};
+  for (std::size_t a = 0; a < d; ++a) {
+    at[axes[a]] = peak[a];
+  }
+  return at;
+}
+
+double flattening_root(std::span<const DisplacedBin> bins, double least) {
+  const double top = std::ranges::max(bins, {}, &DisplacedBin::log_likelihood).log_likelihood;
+  const double wanted_mm = wanted_share * spread_mm(bins, top, 0.0);
+  double root = least;
+  double narrow_mm = spread_mm(bins, top, 1.0 / root);
+  for (int i = 0; i < most_doublings && narrow_mm < wanted_mm; ++i) {
+    const double wide_mm = spread_mm(bins, top, 0.5 / root);
+    if (wide_mm >= wanted_mm) {
+      // Interpolated, so that the root follows the belief without steps.
+      return root * std::exp2((wanted_mm - narrow_mm) / (wide_mm - narrow_mm));
+    }
+    root *= 2.0;
+    narrow_mm = wide_mm;
+  }
+  return root;
 }
 
 }  // namespace palpate

@@ -1,5 +1,11 @@
 #pragma once
 
+#include <array>
+#include <optional>
+#include <span>
+
+#include <glm/vec3.hpp>
+
 #include "estimation/bin_box.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
@@ -16,5 +22,31 @@ Body displaced_body(const OccupancyGrid& map);
 /// @throws Error if there is no such bin or the pose is not finite; what `log_likelihood` throws
 RefinedPose refine(const BoxLogLikelihood& log_likelihood, const PoseLattice& lattice,
                    const Body& body, const Mode& mode);
+
+/// A value at a place, and its weight in the fit.
+struct WeightedValue {
+  glm::dvec3 at{0.0};
+  double value = 0.0;
+  double weight = 0.0;
+};
+
+/// The place of the maximum of the quadratic that fits the values in weighted least squares.
+/// Coordinates that do not vary stay at 0. Returns nothing where there are fewer than two values
+/// per coefficient, too few different places, or no maximum.
+/// @param least_curvature of a maximum, along each coordinate: values per coordinate squared
+std::optional<glm::dvec3> quadratic_peak(std::span<const WeightedValue> values,
+                                         const std::array<bool, 3>& varies, double least_curvature);
+
+/// A bin of a window.
+struct DisplacedBin {
+  glm::dvec3 moved_mm{0.0};  ///< how far the bin moves the object: shift and turn, in mm
+  double log_likelihood = 0.0;
+};
+
+/// The n, at least `least`, for which the bins under weights belief^(1/n) spread by a third of
+/// their spread under equal weights. The spread is the root mean square distance from the weighted
+/// mean. Returns `least` where the bins spread as far already. docs/refinement.md says why.
+/// @param bins at least one
+double flattening_root(std::span<const DisplacedBin> bins, double least);
 
 }  // namespace palpate

@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 #include <glm/common.hpp>
 
-#include "estimation/half_done.hpp"
+#include "estimation/change_in_steps.hpp"
 #include "estimation/maps/evidence_grid.hpp"
 #include "model/own_process.hpp"
 #include "palpate/error.hpp"
@@ -59,7 +59,7 @@ struct MapBuilder::Impl {
   EvidenceGrid grid;
   std::vector<ElementReading> pending;  ///< robot frame = object frame
   Seen seen;                            ///< all readings so far, pending ones too
-  HalfDone half_done{"map: adding touches failed half-way; clear() the builder"};
+  ChangeInSteps change{"map: adding touches failed half-way; clear() the builder"};
   OwnProcess process;
 };
 
@@ -79,7 +79,7 @@ MapBuilder::Impl& MapBuilder::impl() const { return held_here(impl_, "map builde
 
 void MapBuilder::add(std::span<const Touch> touches) {
   Impl& map = impl();
-  map.half_done.refuse();
+  map.change.refuse();
   // Every touch is checked before the first is added: one that cannot be mapped refuses all.
   Seen all = map.seen;
   for (std::size_t i = 0; i < touches.size(); ++i) {
@@ -94,7 +94,7 @@ void MapBuilder::add(std::span<const Touch> touches) {
   if (all.readings > 0) {
     map.range_of(all);
   }
-  map.half_done.change([&] {
+  map.change.change([&] {
     for (const Touch& touch : touches) {
       for (const ElementReading& r : known_readings(touch, map.options.classifier)) {
         map.seen.add(r.position_mm);
@@ -109,14 +109,14 @@ void MapBuilder::add(std::span<const Touch> touches) {
 
 OccupancyGrid MapBuilder::build(const std::string& label) {
   Impl& all = impl();
-  all.half_done.refuse();
+  all.change.refuse();
   if (all.seen.readings == 0) {
     throw Error(Fault::input,
                 fmt::format("object '{}': no element of any touch is In Contact or No "
                             "Contact; check the threshold and the pressure's unit",
                             label));
   }
-  all.half_done.change([&] { all.flush(); });
+  all.change.change([&] { all.flush(); });
   const MapOptions& options = all.options;
   const CellRange range = all.range_of(all.seen);
   OccupancyGrid map = map_frame(options, label, range);
@@ -135,7 +135,7 @@ void MapBuilder::clear() {
   map.pending.clear();
   map.seen = {};
   map.grid.clear();
-  map.half_done.forget();
+  map.change.forget();
 }
 
 double estimate_prior(Device& device, std::span<const ObjectTouches> objects, MapOptions options) {

@@ -7,9 +7,9 @@
 
 #include <fmt/format.h>
 
+#include "estimation/change_in_steps.hpp"
 #include "estimation/contact_evidence.hpp"
 #include "estimation/contradiction.hpp"
-#include "estimation/half_done.hpp"
 #include "estimation/hypotheses.hpp"
 #include "estimation/kernel_sizes.hpp"
 #include "estimation/moved_pivot.hpp"
@@ -252,7 +252,7 @@ struct ParticleFilter::Impl {
   /// How much more likely a map of the prior alone makes all touches since the start than the best
   /// particle does, in nats.
   double prior_over_best = 0.0;
-  HalfDone half_done{"particle filter: an update failed half-way; reset() the filter"};
+  ChangeInSteps half_done{"particle filter: an update failed half-way; reset() the filter"};
   OwnProcess process;
 };
 

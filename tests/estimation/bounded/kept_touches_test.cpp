@@ -1,4 +1,4 @@
-#include "estimation/bounded/kept_touches.hpp"
+#include "estimation/bounded/known_elements.hpp"
 
 #include <limits>
 #include <vector>

@@ -1,4 +1,4 @@
-#include "estimation/lattice/flattening.hpp"
+#include "estimation/lattice/refinement.hpp"
 
 #include <cmath>
 #include <vector>

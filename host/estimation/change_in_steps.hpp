@@ -6,14 +6,14 @@ namespace palpate {
 
 /// Remembers that an exception interrupted a change of several steps. The object then refuses every
 /// call until it is reset.
-class HalfDone {
+class ChangeInSteps {
  public:
   /// @param refusal message of the Error; says how to reset the object
-  explicit HalfDone(const char* refusal) : refusal_(refusal) {}
+  explicit ChangeInSteps(const char* refusal) : refusal_(refusal) {}
 
   /// Throws Error where a change was interrupted.
   void refuse() const {
-    if (half_done_) {
+    if (changing_) {
       throw Error(Fault::input, refusal_);
     }
   }
@@ -21,16 +21,16 @@ class HalfDone {
   template <typename Steps>
   void change(const Steps& steps) {
     refuse();
-    half_done_ = true;
+    changing_ = true;
     steps();
-    half_done_ = false;
+    changing_ = false;
   }
   /// The object was reset.
-  void forget() { half_done_ = false; }
+  void forget() { changing_ = false; }
 
  private:
   const char* refusal_;
-  bool half_done_ = false;
+  bool changing_ = false;
 };
 
 }  // namespace palpate

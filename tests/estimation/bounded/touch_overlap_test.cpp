@@ -9,7 +9,7 @@
 
 #include "synthetic.hpp"
 
-namespace palpate::array_overlap_test {
+namespace palpate::touch_overlap_test {
 
 /// Expects every bin to be counted where the reference says that rectangles meet there.
 /// @returns the number of such bins
@@ -126,4 +126,4 @@ TEST(ArrayOverlap, OfAnArrayBeyondAllMeasureIsEverywhere) {
   }
 }
 
-}  // namespace palpate::array_overlap_test
+}  // namespace palpate::touch_overlap_test
