@@ -60,7 +60,7 @@ def refined_errors(
     lattice: palpate.PoseLattice,
     touches: int,
 ) -> Errors:
-    """Of each trial after its first touches, on bins about the first of them."""
+    """Errors of each trial after its first touches, on bins about the first of them."""
     errors = []
     for trial in trials:
         about = palpate.PoseLattice(

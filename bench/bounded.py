@@ -29,7 +29,7 @@ from .trials import VOWELS, lattice_of, letter_maps, make_trials, size_of
 SEED = 1_404_000_000
 TOLERANCE = 1e-6  # BoundedPosterior's
 CHART, PICTURE = "bounded_growth", "bounded_search.png"
-#: Of large and smaller blocks that a search goes into, and of bins that it evaluates: the colour, and
+#: How large blocks, smaller ones that a search goes into, and evaluated bins are drawn: the colour, and
 #: its opacity at the fewest and at all thetas.
 LEVELS = (("#a8ccf0", 0.05, 0.26), ("#1a66b8", 0.05, 0.26), ("#e65c0d", 0.4, 0.95))
 

@@ -14,7 +14,7 @@ from palpate._tables import value_of
 
 from .report import write
 
-#: Of Okabe and Ito, who chose them for every kind of colour vision.
+#: Colours of Okabe and Ito, who chose them for every kind of colour vision.
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
 #: For a series that others are compared with.
 GREY = "#616161"

@@ -27,7 +27,7 @@ class CpuLoop {
 
   /// Adds the touches' log-likelihood to all bins.
   void update(std::span<const Touch> touches);
-  /// Of every bin of one object in nats, [theta, y, x].
+  /// The log-likelihood of every bin of one object in nats, [theta, y, x].
   const std::vector<double>& log_likelihood(std::size_t object) const { return belief_[object]; }
 
  private:

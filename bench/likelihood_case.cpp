@@ -17,7 +17,8 @@ constexpr double goal_nats_per_touch = 1e-4;
 // Bins per object that the baselines need about a second for.
 constexpr std::int64_t baseline_bins = 80000;
 
-/// The same x and y bins, and as many thetas of the full circle as the baselines have time for.
+/// The lattice with its x and y bins, and as many thetas of the full circle as the baselines have
+/// time for.
 PoseLattice part_of(PoseLattice lattice) {
   lattice.theta_rad.count = static_cast<int>(
       std::clamp<std::int64_t>(baseline_bins / lattice.plane(), 1, lattice.theta_rad.count));

@@ -22,7 +22,7 @@ SEEDS_PER_SHAPE = 1_000_000  # more trials begin with the same ones
 
 Floats = NDArray[numpy.float64]
 Bins = tuple[int, int, int]
-#: Of the paper: 100, 1,000 and 10,000 bins per object.
+#: The paper's bins: 100, 1,000 and 10,000 bins per object.
 TABLE_1: tuple[Bins, ...] = ((5, 5, 4), (10, 10, 10), (25, 25, 16))
 
 

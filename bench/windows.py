@@ -16,7 +16,7 @@ from .trials import Body, Floats, Step, judged, truth_of
 REACH_MM = 3.0
 # The refined pose takes bins within 2.5 mm of one that may lie a bin or two from the mode.
 _REFINED_REACH_MM = 4.0
-# Of the circle, for bodies of full symmetry: few enough for their fixed cost, and narrow enough that
+# Parts of the circle for bodies of full symmetry: few enough for their fixed cost, and narrow enough that
 # the body's origin stays near within one.
 _SECTORS = 8
 

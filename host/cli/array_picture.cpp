@@ -71,7 +71,7 @@ ArrayPicture::ArrayPicture(const std::vector<glm::dvec2>& elements_mm) {
   }
   std::ranges::sort(placed_, {},
                     [](const Placed& p) { return std::tuple(p.row, p.column, p.element); });
-  // Of elements at exactly equal positions, only the first can be seen.
+  // Only the first of several elements at one position can be seen.
   const auto end =
       std::unique(placed_.begin(), placed_.end(),
                   [](const Placed& a, const Placed& b) { return a.centre_mm == b.centre_mm; });

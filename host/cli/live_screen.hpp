@@ -23,7 +23,7 @@ struct LiveView {
   std::string object;              ///< the object and its probability
   std::string pose;                ///< T_robot_object in words; "" before the first touch
   std::string next;                ///< the best next touch in words; "" where not planned
-  std::string truth;               ///< the same of the truth, and the error; "" where unknown
+  std::string truth;               ///< true object, pose and error; "" where unknown
   std::vector<std::string> notes;  ///< what is wrong with the touches
   std::string sensor;
   double rate_hz = 0.0;

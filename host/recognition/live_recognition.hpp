@@ -136,7 +136,7 @@ class LiveRecognition {
   bool ended_ = false;     ///< nothing is left to do
   std::exception_ptr failure_;
 
-  // Of the reading thread alone.
+  // Only the reading thread uses these.
   Clock::time_point taken_;
   StreamTime time_;
   std::uint64_t unreadable_ = 0;

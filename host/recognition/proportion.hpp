@@ -15,7 +15,7 @@ struct Interval {
 /// trials > 0; `successes` may be a fraction, of an estimate that varies no more than a binomial's.
 Interval wilson_interval(double successes, std::size_t trials);
 
-/// Of all pairs of a value of one kind and one of the other, the fraction in which the value of
+/// The fraction of all pairs, of a value of one kind and one of the other, in which the value of
 /// `lower` is the lower one (the area under the ROC curve); a tie counts half. Neither is empty.
 double told_apart(std::span<const double> lower, std::span<const double> higher);
 

@@ -83,7 +83,7 @@ struct RecognitionStep {
   std::optional<double> pose_error_mm() const { return refined ? refined_error_mm : error_mm; }
   /// The inverse of pose(), for a robot to act on; theta in [-pi, pi).
   Pose T_robot_object() const;
-  /// The same of the mode.
+  /// The inverse of the mode's pose; theta in [-pi, pi).
   Pose mode_T_robot_object() const;
   /// Standard deviations of T_robot_object(), in mm, mm and rad; empty for particles.
   std::optional<std::array<double, 3>> sd() const;

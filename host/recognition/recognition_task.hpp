@@ -55,7 +55,7 @@ struct RecognitionTask {
   std::string filter_asked_for_by = {};
   /// The pivot is the array's centre at the first touch of each unknown with an element In Contact.
   bool auto_pivot = false;
-  /// Of labels' probabilities, see LearnedSensor; poses are left as they are.
+  /// How sure labels' probabilities are, see LearnedSensor; poses are left as they are.
   double temperature = 1.0;
   double temperature_growth = 0.0;
   std::optional<BinSteps> learned_bins = {};  ///< LearnedSensor::bins

@@ -28,7 +28,7 @@ struct MapsLike : nb::object {
                     any_object)
 };
 std::vector<Hypothesis> hypotheses_of(nb::handle maps);
-/// Of an OccupancyGrid or a Hypothesis; none of anything else.
+/// The hypothesis that an OccupancyGrid or a Hypothesis is; none where the item is neither.
 std::optional<Hypothesis> hypothesis_in(nb::handle item);
 
 /// A filter over object and pose.

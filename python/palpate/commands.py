@@ -66,7 +66,7 @@ class Plan:
     samples: int
     """Objects and poses that stood for the belief."""
     seed: int
-    """Of the samples and the readings that they simulate."""
+    """Seed of the samples and of the readings that they simulate."""
     seconds: float
     """Wall time of the plan alone, s."""
     device: str

@@ -295,7 +295,7 @@ def _threads() -> int:
 
 @functools.cache
 def _open_device(name: str) -> Device:
-    """Of several devices like the one that Device.open() takes, that of this process's place."""
+    """The device of this process's place among those like the one that Device.open() takes."""
     index = _index_of(Device.list(name), name or os.environ.get("PALPATE_DEVICE", ""), _place_on_host)
     return Device.open(name if index is None else index)
 

@@ -188,7 +188,7 @@ RefinedPose BoundedPosterior::refine(const Mode& mode) const {
   Impl& posterior = whole();
   posterior.require_object(mode.object);
   const BoundedBelief& belief = posterior.belief;
-  // Of very fine bins every few are enough, and all would take long.
+  // Where bins are very fine, a few of them tell the peak, and all would take long.
   const PoseLattice fit = thinned(lattice());
   const bool thin = fit.plane() != lattice().plane();
   std::optional<BinLikelihood> of_thin;

@@ -48,7 +48,8 @@ KnownElements merged(std::span<const KnownElements> lists);
 /// more of its size, so that keeping these allocates no memory.
 class KeptTouches {
  public:
-  /// Of the first touch's size; fewer where they would take more than `most_bytes`.
+  /// So many touches of the first one's size have room; fewer where they would take more than
+  /// `most_bytes`.
   static constexpr std::size_t room_for = 64;
   static constexpr std::size_t most_bytes = std::size_t{1} << 22;
 

@@ -91,7 +91,7 @@ struct PoseHistogram::Impl {
     });
   }
 
-  /// The same where each touch's likelihood is wanted by itself.
+  /// Updates as above where each touch's likelihood is wanted by itself.
   void update_by_touch(std::span<const Touch> touches, std::span<const StillTouch> still_touches,
                        const std::function<void(double)>& progress) {
     for (std::size_t i = 0; i < touches.size(); ++i) {
@@ -135,7 +135,7 @@ struct PoseHistogram::Impl {
     return log_evidence;
   }
 
-  /// The same of "none of these", where the options ask for it.
+  /// Log evidence of "none of these", where the options ask for it.
   double none_log_evidence() const { return *none_log_weight + by_touch->none_log_evidence(); }
 
   /// Eq. 14: an object's evidence over the sum for all objects and, where the options ask for it,

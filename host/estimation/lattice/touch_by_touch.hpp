@@ -118,7 +118,7 @@ class TouchByTouch {
   std::vector<TwoFloat> references_;  ///< all 0
   std::vector<TwoFloat> largest_;
   std::vector<shaders::Turn> touch_turns_;
-  std::vector<shaders::Turn> slip_turns_;  ///< the same for every slip
+  std::vector<shaders::Turn> slip_turns_;  ///< of every slip
   std::vector<BeliefSummary> before_slip_;
   std::vector<BeliefSummary> after_slip_;
   double none_log_evidence_ = 0.0;

@@ -113,7 +113,8 @@ class PALPATE_API BoundedPosterior {
   /// `none` together sum to 1; bins that were dropped count as 0.
   /// @throws Error if there is no such object
   Marginals marginals(int object) const;
-  /// The same on another grid; a bin counts in the grid's nearest bin (PoseLattice::bin_of()).
+  /// Marginal probabilities of one object's poses on another grid; a bin counts in the grid's
+  /// nearest bin (PoseLattice::bin_of()).
   Marginals marginals(int object, const PoseLattice& grid) const;
   /// Log-likelihood of any pose of an object in nats, in float64, without prior weights.
   /// @throws Error if there is no such object or the pose is not finite

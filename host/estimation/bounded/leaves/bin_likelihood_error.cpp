@@ -17,8 +17,8 @@ constexpr double second_order = 1.001;
 template <typename Lane>
 constexpr double unit = sizeof(Lane) == 4 ? 0x1p-24 : v;
 
-/// Of 2^f, relative. VectorMath's polynomials are within 4.4e-7 and 7.8e-14 of 2^f. Horner's rule
-/// adds at most (2 k + 1) u of each term c_k f^k, in all 2.5 u where 2^f is at least 0.7.
+/// Relative error of 2^f. VectorMath's polynomials are within 4.4e-7 and 7.8e-14 of 2^f. Horner's
+/// rule adds at most (2 k + 1) u of each term c_k f^k, in all 2.5 u where 2^f is at least 0.7.
 template <typename Lane>
 constexpr double exp_error = (sizeof(Lane) == 4 ? 4.5e-7 : 8e-14) + 4.0 * unit<Lane>;
 

@@ -49,7 +49,7 @@ struct ReadingForm {
   int float_interval = 1;
   int double_interval = 1;
 
-  // Of a table.
+  // What a table has beside.
   double first_log_odds = 0.0;
   double nodes_per_nat = 0.0;
   std::size_t nodes = 0;

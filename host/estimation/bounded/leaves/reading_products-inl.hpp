@@ -49,7 +49,7 @@ HWY_INLINE void multiply(D d, hn::Vec<D> l, hn::Vec<D> at_negative, hn::Vec<D> a
   product.denominator = hn::Mul(product.denominator, hn::Add(one, e));
 }
 
-/// The same in the form of sums, for log odds `z` of the reading.
+/// Multiplies as multiply() does, with a sum beside the product, for log odds `z` of the reading.
 template <class D>
 HWY_INLINE void multiply_and_add(D d, hn::Vec<D> z, hn::Vec<D> log_ratio, Products<D>& product) {
   const auto one = hn::Set(d, hn::TFromD<D>{1});

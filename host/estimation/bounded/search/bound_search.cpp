@@ -19,9 +19,9 @@ namespace {
 constexpr double search_share = 0.75;
 /// Tiles that are followed down to the bins, to know early how much mass there is at least.
 constexpr std::size_t beam_tiles = 64;
-/// The same where all tiles of a level are looked at first.
+/// Beam width during survey(), where all tiles of a level are looked at first.
 constexpr std::size_t surveyed_tiles = 1024;
-/// Of these, so many of the smallest have their bins evaluated.
+/// So many of the smallest surveyed tiles have their bins evaluated.
 constexpr std::size_t probed_tiles = 16;
 /// Tiles that are divided together: bounds the memory for their parts.
 constexpr std::size_t most_together = 16384;

@@ -160,7 +160,7 @@ std::vector<std::size_t> LeafEvaluator::to_be_refined(double share) const {
       refined.push_back(i);
     }
   }
-  // Those for the mode first: it is told in float64 whatever the budget.
+  // Bins that may be the mode come first: it is told in float64 whatever the budget.
   std::stable_partition(refined.begin(), refined.end(),
                         [&](std::size_t i) { return may_be_best(pending_[i]); });
   return refined;

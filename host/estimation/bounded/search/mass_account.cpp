@@ -55,7 +55,7 @@ void MassAccount::drop(const UnsettledMass& tiles) {
 void MassAccount::note_best(const BinBox& box, std::int64_t bin_of_box, double log_likelihood) {
   const std::int64_t bin = box.bin(bin_of_box, lattice_);
   const double value = log_weight_[box.object] + log_likelihood;
-  // Of equal bins the first one is the mode.
+  // The first of several equal bins is the mode.
   if (value > mode_value_ ||
       (value == mode_value_ && std::tie(box.object, bin) < std::tie(mode_object_, mode_bin_))) {
     mode_value_ = value;

@@ -55,7 +55,7 @@ class MassAccount {
   std::vector<std::size_t> droppable_from(const UnsettledMass& tiles, double tolerance) const;
   /// What was dropped so far as a part of the total, at most.
   double dropped_share() const;
-  /// The same of what rounding may have changed.
+  /// What rounding may have changed so far as a part of the total, at most.
   double rounding_share() const;
   /// Lower bound of the log of the total mass, in nats.
   double log_total() const { return log_total_; }
@@ -70,7 +70,7 @@ class MassAccount {
   SearchResult result() const;
 
  private:
-  /// Of each hypothesis, the largest log mass that may be dropped of it for evidence_nats.
+  /// [hypothesis] the largest log mass that evidence_nats lets a search drop.
   std::vector<double> droppable_evidence(double tolerance) const;
 
   std::span<const double> log_weight_;

@@ -27,7 +27,7 @@ class TileDivision {
   const TileRange& seen(std::size_t object, std::size_t theta) const {
     return seen_[object * thetas_ + theta];
   }
-  /// Of these, the tile of the largest bound of every object and theta.
+  /// The seen tile of the largest bound of every object and theta.
   std::vector<Tile> best_of_largest();
   /// Counts the bins of the largest tiles.
   void count_largest(UnsettledMass& unsettled) const;

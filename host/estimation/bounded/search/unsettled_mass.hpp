@@ -32,7 +32,7 @@ class UnsettledMass {
 
   /// The first slot from which on all tiles together hold at most this mass, in nats.
   std::size_t droppable_from(double log_allowance) const;
-  /// The same for one hypothesis's tiles.
+  /// The first slot from which on one hypothesis's tiles hold at most this mass, in nats.
   std::size_t droppable_from(std::size_t hypothesis, double log_allowance) const;
   /// Bound of the log of a hypothesis's summed likelihood, in nats.
   double log_mass(std::size_t hypothesis) const;

@@ -59,8 +59,8 @@ class TileBounds {
 
   std::vector<TileLevel> levels_;
   std::vector<std::vector<WindowTable>> tables_;  ///< [level][reading]
-  /// Of the largest tiles, from No Contact: to Unknown, which stands in the place of No Contact,
-  /// and to the other readings. Empty before make_change_tables().
+  /// How the largest tiles' bounds change from No Contact: to Unknown, which stands in the place of
+  /// No Contact, and to the other readings. Empty before make_change_tables().
   std::vector<ChangeTable> changes_;
   glm::dvec2 corner_mm_;  ///< of the first tile, from the map's square 0
 };

@@ -117,8 +117,8 @@ void AddRun(const WindowTable& table, const std::int32_t* plane, const std::int3
   }
 }
 
-/// The same over several batches: an element's entries for neighbouring batches stand together, and
-/// batches that see only the prior have a constant.
+/// Adds over several batches as above: an element's entries for neighbouring batches stand
+/// together, and batches that see only the prior have a constant.
 /// @param scratch three times as long
 void AddStrip(const WindowTable& table, const std::int32_t* plane, const std::int32_t* column,
               const std::int32_t* row, std::size_t count, int first_x, int first_y, int batches,
