@@ -73,6 +73,10 @@ void print_summary(const ImportArguments& options, const ImportedRecording& impo
   if (imported.assumed_units) {
     fmt::print(", poses taken to be in mm and rad");
   }
+  if (imported.whole_up_to) {
+    fmt::print(", readings are whole numbers up to {:.0f}: raw? (--pressure-unit raw)",
+               *imported.whole_up_to);
+  }
   fmt::print("; next: {}\n", next_command(options, r));
 }
 
@@ -123,8 +127,21 @@ void add_import(CLI::App& app) {
       ->add_option("--array", options->array,
                    "COLUMNS:ROWS:PITCH, a grid with its pitch in mm, centred about the sensor's "
                    "origin; or a CSV file with a row 'x y' in mm for each element. Elements are "
-                   "counted row by row: x grows along a row, y from row to row")
+                   "counted in the order of their readings: of a grid row by row, where x grows "
+                   "along a row and y from row to row, unless the next two flags say otherwise")
       ->required();
+  command
+      ->add_option("--first-element", options->first_element,
+                   "Corner of the grid whose element is read first, seen with x to the right and y "
+                   "upwards: bottom-left, bottom-right, top-left or top-right")
+      ->capture_default_str();
+  command
+      ->add_option("--order", options->order,
+                   "How the grid's elements follow each other: rows (along x first) or columns")
+      ->capture_default_str();
+  command->add_option("--dead", options->dead,
+                      "Elements that do not read, counted from 0 in the order of their readings, "
+                      "as 13,42 [default: those without any reading]");
   command->add_option("-o,--output", options->output, "Recording to write (HDF5)")->required();
   command->add_option(
       "--rows", options->rows,

@@ -47,6 +47,9 @@ std::string with_options(std::string_view message,
 
 /// A value as Python writes it: 0.5, (25, 25, 16), 'auto'.
 std::string python_value(std::string_view value) {
+  if (!value.empty() && value.find_first_of("0123456789") == value.npos) {
+    return "'" + std::string(value) + "'";
+  }
   std::string numbers;
   bool several = false;
   for (const char c : value) {

@@ -17,16 +17,11 @@
 #include "io/recording_rules.hpp"
 #include "io/table_columns.hpp"
 #include "model/number_text.hpp"
+#include "streaming/import_array.hpp"
 
 namespace palpate {
 
 namespace {
-
-/// The array of `array`: a grid, or a file.
-struct Array : ArrayTable {
-  std::size_t columns = 0;  ///< 0: not a grid
-  std::size_t rows = 0;
-};
 
 /// Splits the text into `count` parts, the first of which may hold the separator itself; no parts
 /// where there are fewer.
@@ -76,40 +71,18 @@ TableOptions table_options(const ImportOptions& options) {
   return table;
 }
 
-Array array_of(const std::string& text) {
-  const auto parts = split_last(text, ':', 3);
-  const auto columns = parts.empty() ? std::nullopt : whole_number_of(parts[0]);
-  if (!columns) {
-    return {read_array(text)};
-  }
-  constexpr std::int64_t most = 1024;
-  const auto rows = whole_number_of(parts[1]);
-  const auto pitch_mm = number_of(parts[2]);
-  if (*columns < 1 || *columns > most || !rows || *rows < 1 || *rows > most || !pitch_mm ||
-      *pitch_mm < 1e-3 || *pitch_mm > 1e3) {
-    refuse(fmt::format("`array {}`", text),
-           "give COLUMNS:ROWS:PITCH, with 1 to {} columns and rows and a pitch of 0.001 to "
-           "1000 mm, or a file",
-           most);
-  }
-  Array array;
-  array.columns = static_cast<std::size_t>(*columns);
-  array.rows = static_cast<std::size_t>(*rows);
-  array.elements_mm = grid_array(static_cast<int>(*columns), static_cast<int>(*rows), *pitch_mm);
-  return array;
-}
-
-PressureTable read_npy_pressures(const std::string& path, const Array& array) {
+PressureTable read_npy_pressures(const std::string& path, const ImportArray& array) {
   NpyArray npy = read_npy(path);
   const std::size_t elements = array.elements_mm.size();
   const auto& shape = npy.shape;
   const bool fits = (shape.size() == 2 && shape[1] == elements) ||
                     (shape.size() == 3 && shape[1] * shape[2] == elements &&
-                     (array.columns == 0 || shape[2] == array.columns));
+                     (array.line == 0 || shape[2] == array.line));
   if (!fits || shape[0] == 0) {
-    refuse(path, "has the shape ({}); save [n, {}]{}, n at least 1, or correct `array`",
-           fmt::format("{}", fmt::join(shape, ", ")), elements,
-           array.columns == 0 ? "" : fmt::format(" or [n, {}, {}]", array.rows, array.columns));
+    refuse(
+        path, "has the shape ({}); save [n, {}]{}, n at least 1, or correct `array`",
+        fmt::format("{}", fmt::join(shape, ", ")), elements,
+        array.line == 0 ? "" : fmt::format(" or [n, {}, {}]", elements / array.line, array.line));
   }
   const auto infinite = std::ranges::find_if(npy.values, [](double p) { return std::isinf(p); });
   if (infinite != npy.values.end()) {
@@ -118,6 +91,23 @@ PressureTable read_npy_pressures(const std::string& path, const Array& array) {
            at / elements, at % elements, *infinite);
   }
   return {.pressure = std::move(npy.values)};
+}
+
+/// ImportedRecording::whole_up_to
+std::optional<double> whole_numbers_as_kpa(const Recording& recording) {
+  constexpr double least = 100.0;  // thresholded pressures may be small whole numbers
+  double largest = 0.0;
+  for (const double p : recording.pressure) {
+    if (std::isnan(p)) {
+      continue;
+    }
+    if (p != std::floor(p)) {
+      return {};
+    }
+    largest = std::max(largest, p);
+  }
+  return recording.pressure_unit == "kPa" && largest >= least ? std::optional(largest)
+                                                              : std::nullopt;
 }
 
 /// Marks as dead the elements without any reading. In touches, which have no unknown readings, it
@@ -341,11 +331,7 @@ ImportedRecording import_tables(const ImportOptions& options) {
   const TableOptions columns = table_options(options);
   check_numbers(options);
   auto truth = options.truth.empty() ? std::nullopt : std::optional(truth_of(options.truth));
-  Array array =
-      options.elements_mm ? Array{{.elements_mm = *options.elements_mm}} : array_of(options.array);
-  if (array.elements_mm.empty()) {
-    refuse("array", "has no element; give centres [e, 2] in mm, e at least 1");
-  }
+  ImportArray array = import_array(options);
   if (!options.time_column.empty() && !has_column(options.pressures, options.time_column) &&
       !has_column(options.poses, options.time_column)) {
     refuse(fmt::format("`time-column {}`", options.time_column),
@@ -374,6 +360,7 @@ ImportedRecording import_tables(const ImportOptions& options) {
     // The rows of one file belong together, even where their times are equal.
     poses = read_poses(options.poses, columns, !in_one_file(options));
   }
+  imported.whole_up_to = whole_numbers_as_kpa(recording);
   choose_rows(options, recording);
   mark_unknown(options.pressures, recording);
   if (poses) {

@@ -18,6 +18,11 @@ struct ImportOptions {
   std::string pressures;
   std::string poses;
   std::string array;  ///< COLUMNS:ROWS:PITCH, or a file
+  /// Corner of the grid whose element is read first, as seen with x to the right and y upwards:
+  /// bottom-left, bottom-right, top-left or top-right.
+  std::string first_element = "bottom-left";
+  std::string order = "rows";  ///< of the grid's readings: row by row, or "columns"
+  std::string dead;            ///< elements that do not read, counted from 0, such as "13,42"
   /// [e] of a program, in the place of `array`
   std::optional<std::vector<glm::dvec2>> elements_mm;
   std::string pressure_unit = "kPa";
@@ -41,6 +46,8 @@ struct ImportedRecording {
   bool holds_poses = false;    ///< the table of pressures has columns of poses
   double largest_gap_s = 0.0;  ///< poses further apart in time were not interpolated
   std::size_t in_gaps = 0;     ///< frames between two poses that are further apart
+  /// The largest reading where all are whole numbers, as raw ones are, but said to be in kPa.
+  std::optional<double> whole_up_to = {};
 };
 
 /// Reads the pressures and the poses and joins them.

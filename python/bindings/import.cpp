@@ -36,6 +36,12 @@ std::vector<std::string> remarks_on(const ImportedRecording& imported,
     remarks.push_back(
         fmt::format("{}: poses taken to be in mm and rad; give pose_unit", options.poses));
   }
+  if (imported.whole_up_to) {
+    remarks.push_back(
+        fmt::format("{}: its readings are whole numbers up to {:.0f}: give "
+                    "pressure_unit='raw' where they are not kPa",
+                    options.pressures, *imported.whole_up_to));
+  }
   return remarks;
 }
 
@@ -58,6 +64,9 @@ void bind_import(nb::module_& module) {
       .def_rw("pressures", &ImportOptions::pressures)
       .def_rw("poses", &ImportOptions::poses)
       .def_rw("array", &ImportOptions::array)
+      .def_rw("first_element", &ImportOptions::first_element)
+      .def_rw("order", &ImportOptions::order)
+      .def_rw("dead", &ImportOptions::dead)
       .def_rw("pressure_unit", &ImportOptions::pressure_unit)
       .def_rw("pose_unit", &ImportOptions::pose_unit)
       .def_rw("time_unit", &ImportOptions::time_unit)

@@ -5,7 +5,7 @@ They have the commands' rules, defaults and words.
 
 import json
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -204,6 +204,9 @@ def import_tables(
     pressures: _Path,
     *,
     array: "tuple[int, int, float] | _Path | ArrayLike",
+    first_element: Literal["bottom-left", "bottom-right", "top-left", "top-right"] = "bottom-left",
+    order: Literal["rows", "columns"] = "rows",
+    dead: Sequence[int] = (),
     poses: _Path | None = None,
     unposed: bool = False,
     rows: Literal["frames", "touches"] | None = None,
@@ -221,7 +224,9 @@ def import_tables(
     """Makes a recording from tables, as `palpate import` does; docs/files.md describes them.
 
     pressures: a CSV file, or an array of numpy.save, [n, e] or [n, rows, columns]; array: (columns,
-    rows, pitch_mm), a CSV file, or the elements' centres [e, 2] in mm in the sensor frame; poses: a CSV
+    rows, pitch_mm), a CSV file, or the elements' centres [e, 2] in mm in the sensor frame, in the order
+    of their readings; first_element and order: where the first element of a grid lies, seen with x to
+    the right and y upwards, and which follow it; dead: elements that do not read, from 0; poses: a CSV
     file of T_robot_sensor, in mm and rad where neither its columns' names nor pose_unit say otherwise;
     rate: frames per second of pressures without times, Hz; object: label of what was touched; truth:
     its true identity and pose. Other options are the flags of the command, with its defaults.
@@ -237,6 +242,7 @@ def import_tables(
         options["array"] = ":".join(map(str, array))
     elif not isinstance(array, (str, bytes, os.PathLike)):
         elements_mm = options.pop("array")
+    options["dead"] = ",".join(map(str, dead))
     for names in ("pose_unit", "pose_columns"):
         if options[names] is not None:
             options[names] = ",".join(options[names])

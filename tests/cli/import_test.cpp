@@ -226,6 +226,54 @@ long largest_kib() {
 }
 
 // 200,000 frames: 7 MB of text and 6 MB of pressures.
+/// A 3 x 2 array whose readings are 1 to 6 in the order in which they are read.
+TEST_F(ImportCommand, AGridsReadingsComeInAnyOrder) {
+  put("log.csv", "time,a,b,c,d,e,f\n0,1,2,3,4,5,6\n");
+  // What stands where, seen with x to the right and y upwards: the upper row, then the lower one.
+  const auto seen = [&](const Arguments& flags) {
+    Arguments arguments{"import", "log.csv", "--array", "3x2x2.5", "-o", "o.h5"};
+    arguments.insert(arguments.end(), flags.begin(), flags.end());
+    done(arguments);
+    const Recording recording = read_recording(folder_ / "o.h5");
+    std::vector<double> places(6);
+    for (std::size_t e = 0; e < 6; ++e) {
+      const glm::dvec2& p = recording.elements_mm[e];
+      const auto column = static_cast<std::size_t>(p.x / 2.5 + 1.0);
+      places[(p.y > 0.0 ? 0 : 3) + column] = recording.pressure[e];
+    }
+    return places;
+  };
+  using testing::ElementsAre;
+  EXPECT_THAT(seen({}), ElementsAre(4, 5, 6, 1, 2, 3));
+  EXPECT_THAT(seen({"--first-element", "top-left"}), ElementsAre(1, 2, 3, 4, 5, 6));
+  EXPECT_THAT(seen({"--first-element", "top-right"}), ElementsAre(3, 2, 1, 6, 5, 4));
+  EXPECT_THAT(seen({"--first-element", "bottom-right"}), ElementsAre(6, 5, 4, 3, 2, 1));
+  EXPECT_THAT(seen({"--order", "columns"}), ElementsAre(2, 4, 6, 1, 3, 5));
+  EXPECT_THAT(seen({"--order", "columns", "--first-element", "top-left"}),
+              ElementsAre(1, 3, 5, 2, 4, 6));
+  EXPECT_THAT(seen({"--order", "columns", "--first-element", "top-right"}),
+              ElementsAre(5, 3, 1, 6, 4, 2));
+}
+
+TEST_F(ImportCommand, ElementsAreNamedDead) {
+  EXPECT_EQ(imported({"--dead", "1"}).valid, (std::vector<std::uint8_t>{1, 0}));
+  put("log.csv", "time,p0,p1,p2\n0,1,2,3\n");
+  put("array.csv", "x,y,valid\n0,0,0\n2,0,1\n4,0,1\n");
+  EXPECT_EQ(imported({"--array", "array.csv", "--dead", "1"}).valid,
+            (std::vector<std::uint8_t>{0, 0, 1}));
+}
+
+TEST_F(ImportCommand, WholeNumbersSaidToBePressuresAreNoticed) {
+  put("log.csv", "time,p0,p1\n0,12,4095\n0.05,,3\n");
+  EXPECT_NE(done(command({})).find("whole numbers up to 4095: raw? (--pressure-unit raw)"),
+            std::string::npos);
+  EXPECT_EQ(done(command({"--pressure-unit", "raw"})).find("whole numbers"), std::string::npos);
+  put("log.csv", "time,p0,p1\n0,12,4095\n0.05,0.5,3\n");
+  EXPECT_EQ(done(command({})).find("whole numbers"), std::string::npos);
+  put("log.csv", frames);
+  EXPECT_EQ(done(command({})).find("whole numbers"), std::string::npos) << "of few kPa";
+}
+
 TEST_F(ImportCommand, LongLogsTakeLittleMemory) {
 #ifdef __SANITIZE_ADDRESS__
   GTEST_SKIP() << "the sanitizer holds memory of its own";

@@ -13,6 +13,7 @@ TEST(OptionWords, EachFaceSaysAnOptionInItsOwnWords) {
             "give bins=(25, 25, 16), x_mm=(-5.5, 5) or filter='bounded'; not prior=");
   EXPECT_EQ(in_keywords("`gamma 1.5`: must be below 1"), "gamma=1.5: must be below 1");
   EXPECT_EQ(in_keywords("`pivot-mm`: missing"), "pivot_mm: missing");
+  EXPECT_EQ(in_keywords("`order x`: give rows"), "order='x': give rows") << "no list of numbers";
 }
 
 TEST(OptionWords, OtherTextBetweenBackticksStays) {

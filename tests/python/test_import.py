@@ -95,3 +95,23 @@ def test_arrays_that_no_table_can_have_are_refused(tables: pathlib.Path) -> None
         palpate.import_tables(path, array=numpy.zeros((0, 2)))
     with pytest.raises(TypeError, match="rate: 'fast'; give float"):
         palpate.import_tables(path, array=(2, 2, 1), rate="fast")  # type: ignore[arg-type]
+
+
+def test_a_grid_is_read_in_any_order(tables: pathlib.Path) -> None:
+    given = palpate.import_tables(
+        tables / "pressures.npy", array="2x2x1", first_element="top-right", order="columns",
+        dead=(0, 2), unposed=True, rate=10,
+    )  # fmt: skip
+    assert given.elements_mm.tolist() == [[0.5, 0.5], [0.5, -0.5], [-0.5, 0.5], [-0.5, -0.5]]
+    assert given.valid is not None and given.valid.tolist() == [False, True, False, True]
+    with pytest.raises(palpate.Error, match="^order='x': give rows or columns"):
+        palpate.import_tables(tables / "pressures.npy", array="2:2:1", order="x")  # type: ignore[arg-type]
+
+
+def test_whole_numbers_that_are_no_pressures_are_noticed(tables: pathlib.Path) -> None:
+    numpy.save(tables / "raw.npy", numpy.array([[0, 4095, 7, 8]], dtype=numpy.int16))
+    with pytest.warns(UserWarning, match="whole numbers up to 4095: give pressure_unit='raw'"):
+        palpate.import_tables(tables / "raw.npy", array=(2, 2, 1), rate=10)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        palpate.import_tables(tables / "raw.npy", array=(2, 2, 1), rate=10, pressure_unit="raw")

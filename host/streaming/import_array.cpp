@@ -1,0 +1,137 @@
+#include "streaming/import_array.hpp"
+
+#include <algorithm>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "io/input_file.hpp"
+#include "model/number_text.hpp"
+
+namespace palpate {
+
+namespace {
+
+/// The parts between separators, also empty ones.
+std::vector<std::string_view> split(std::string_view text, char separator) {
+  std::vector<std::string_view> parts;
+  for (std::size_t end = 0; end != text.npos; text.remove_prefix(std::min(end + 1, text.size()))) {
+    end = text.find(separator);
+    parts.push_back(text.substr(0, end));
+  }
+  return parts;
+}
+
+/// COLUMNS:ROWS:PITCH or COLUMNSxROWSxPITCH.
+struct Grid {
+  int columns = 0;
+  int rows = 0;
+  double pitch_mm = 0.0;
+};
+
+/// None where the text names a file.
+std::optional<Grid> grid_of(const std::string& text) {
+  std::vector<std::string_view> parts = split(text, ':');
+  if (parts.size() != 3) {
+    parts = split(text, 'x');
+    if (parts.size() == 3 && !(whole_number_of(parts[1]) && number_of(parts[2]))) {
+      return {};  // such as 8x8x3.csv
+    }
+  }
+  const auto columns = parts.size() == 3 ? whole_number_of(parts[0]) : std::nullopt;
+  if (!columns) {
+    return {};
+  }
+  constexpr std::int64_t most = 1024;
+  const auto rows = whole_number_of(parts[1]);
+  const auto pitch_mm = number_of(parts[2]);
+  if (*columns < 1 || *columns > most || !rows || *rows < 1 || *rows > most || !pitch_mm ||
+      *pitch_mm < 1e-3 || *pitch_mm > 1e3) {
+    refuse(fmt::format("`array {}`", text),
+           "give COLUMNS:ROWS:PITCH, with 1 to {} columns and rows and a pitch of 0.001 to "
+           "1000 mm, or a file",
+           most);
+  }
+  return Grid{static_cast<int>(*columns), static_cast<int>(*rows), *pitch_mm};
+}
+
+/// The grid's elements in the order in which they are read.
+ImportArray grid_array_of(const Grid& grid, const std::string& first, const std::string& order) {
+  const bool top = first == "top-left" || first == "top-right";
+  const bool right = first == "bottom-right" || first == "top-right";
+  if (!top && !right && first != "bottom-left") {
+    refuse(
+        fmt::format("`first-element {}`", first),
+        "give bottom-left, bottom-right, top-left or top-right: x grows to the right, y upwards");
+  }
+  if (order != "rows" && order != "columns") {
+    refuse(fmt::format("`order {}`", order), "give rows or columns");
+  }
+  const bool by_rows = order == "rows";
+  const std::vector<glm::dvec2> by_place = grid_array(grid.columns, grid.rows, grid.pitch_mm);
+  ImportArray array;
+  array.line = static_cast<std::size_t>(by_rows ? grid.columns : grid.rows);
+  for (std::size_t e = 0; e < by_place.size(); ++e) {
+    const auto along = static_cast<int>(e % array.line);
+    const auto across = static_cast<int>(e / array.line);
+    const int i = by_rows ? along : across;
+    const int j = by_rows ? across : along;
+    const int column = right ? grid.columns - 1 - i : i;
+    const int row = top ? grid.rows - 1 - j : j;
+    array.elements_mm.push_back(by_place[static_cast<std::size_t>(row * grid.columns + column)]);
+  }
+  return array;
+}
+
+/// Marks the elements of "13,42" as dead.
+void mark_dead(const std::string& dead, ArrayTable& array) {
+  if (dead.empty()) {
+    return;
+  }
+  const std::size_t elements = array.elements_mm.size();
+  array.valid.resize(elements, 1);
+  for (const std::string_view text : split(dead, ',')) {
+    const auto element = whole_number_of(text);
+    if (!element || *element < 0 || static_cast<std::size_t>(*element) >= elements) {
+      refuse(fmt::format("`dead {}`", dead),
+             "'{}' is no element; count them from 0 to {} in the order of their readings", text,
+             elements - 1);
+    }
+    array.valid[static_cast<std::size_t>(*element)] = 0;
+  }
+}
+
+}  // namespace
+
+ImportArray import_array(const ImportOptions& options) {
+  ImportArray array;
+  const std::optional<Grid> grid = options.elements_mm ? std::nullopt : grid_of(options.array);
+  if (grid) {
+    array = grid_array_of(*grid, options.first_element, options.order);
+  } else {
+    for (const auto& [option, is_default] :
+         {std::pair{"first-element", options.first_element == ImportOptions{}.first_element},
+          std::pair{"order", options.order == ImportOptions{}.order}}) {
+      if (!is_default) {
+        refuse(fmt::format("`{}`", option),
+               "is for a grid, COLUMNS:ROWS:PITCH; the elements of a file or of a program have "
+               "their places");
+      }
+    }
+    if (options.elements_mm) {
+      array.elements_mm = *options.elements_mm;
+    } else {
+      static_cast<ArrayTable&>(array) = read_array(options.array);
+    }
+  }
+  if (array.elements_mm.empty()) {
+    refuse("array", "has no element; give centres [e, 2] in mm, e at least 1");
+  }
+  mark_dead(options.dead, array);
+  return array;
+}
+
+}  // namespace palpate

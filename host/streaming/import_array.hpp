@@ -1,0 +1,20 @@
+#pragma once
+
+#include <cstddef>
+
+#include "io/pressure_table.hpp"
+#include "streaming/table_import.hpp"
+
+namespace palpate {
+
+/// The array of an import, its elements in the order of their readings.
+struct ImportArray : ArrayTable {
+  std::size_t line =
+      0;  ///< readings of one row, or of one column where these come first; 0: no grid
+};
+
+/// Reads `array` as a grid or as a file, or takes the elements of a program.
+/// @throws Error naming the option, or the file's line and column
+ImportArray import_array(const ImportOptions& options);
+
+}  // namespace palpate
