@@ -9,6 +9,7 @@
 
 #include "cli/commands.hpp"
 #include "cli/options.hpp"
+#include "cli/recognition_flags.hpp"
 #include "io/command_files.hpp"
 #include "io/recording_rules.hpp"
 #include "palpate/files.hpp"
@@ -78,6 +79,9 @@ void print_summary(const ImportArguments& options, const ImportedRecording& impo
                *imported.whole_up_to);
   }
   fmt::print("; next: {}\n", next_command(options, r));
+  for (const std::string& words : imported.of_poses) {
+    tell_on_stderr(fmt::format("{}: {}", options.poses, words));
+  }
 }
 
 void import_tables(const ImportArguments& options) {
@@ -166,7 +170,15 @@ void add_import(CLI::App& app) {
                       "Columns of the pressures: a prefix of their names, or FIRST:LAST [default: "
                       "all columns that are neither time nor pose]");
   command->add_option("--pose-columns", options->pose_columns,
-                      "Names of the columns of the poses, X,Y,THETA [default: x,y,theta]");
+                      "Names of the columns of the poses: X,Y,THETA, or TX,TY,TZ,QX,QY,QZ,QW of "
+                      "poses in space, with a quaternion [default: x,y,theta, or "
+                      "tx,ty,tz,qx,qy,qz,qw]");
+  command
+      ->add_option(
+          "--plane", options->plane,
+          "Plane of the touches, of poses in space: auto, the robot's xy plane or the plane "
+          "across the array's mean direction; or its normal NX,NY,NZ in the robot frame")
+      ->capture_default_str();
   command->add_option("--largest-gap-s", options->largest_gap_s,
                       "Poses further apart in time than this are not interpolated: a frame between "
                       "them has no pose, s [default: 2.5 times the median step of the poses' "

@@ -1,7 +1,12 @@
 #include "io/pose_table.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
+#include <utility>
+
+#include <fmt/ranges.h>
 
 #include "model/printable.hpp"
 #include "palpate/touch.hpp"
@@ -12,56 +17,74 @@ namespace {
 
 constexpr double most_turned_rad = 1e9;
 
+constexpr std::size_t in_space = 7;  // columns
+
 struct PoseColumns {
   std::optional<UnitColumn> time;
-  std::array<UnitColumn, 3> pose;
+  std::vector<UnitColumn> pose;  ///< of x, y, theta, or of a position and a quaternion
 };
 
 PoseColumns columns_without_names(const CsvTable& table, const TableOptions& options) {
   const std::size_t count = table.columns().size();
-  if (count != 3 && count != 4) {
+  const std::size_t of_pose = count >= in_space ? in_space : 3;
+  if (count != of_pose && count != of_pose + 1) {
     table.refuse(
-        "{} columns without names; write x, y, theta or time, x, y, theta, or add a "
-        "header",
+        "{} columns without names; write x, y, theta or tx, ty, tz, qx, qy, qz, qw, with or "
+        "without a time before them, or add a header",
         count);
   }
-  const auto column = [count](std::size_t from_end, const std::optional<Unit>& unit,
-                              const Unit& usual) {
-    return UnitColumn{.index = count - from_end, .unit = unit.value_or(usual), .assumed = !unit};
+  const auto column = [](std::size_t index, const std::optional<Unit>& unit, const Unit& usual) {
+    return UnitColumn{.index = index, .unit = unit.value_or(usual), .assumed = !unit};
   };
-  PoseColumns columns{.time = {},
-                      .pose = {column(3, options.length_unit, length_units.front()),
-                               column(2, options.length_unit, length_units.front()),
-                               column(1, options.angle_unit, angle_units.front())}};
-  if (count == 4) {
-    columns.time = column(4, options.time_unit, time_units.front());
+  PoseColumns columns;
+  std::size_t index = 0;
+  if (count > of_pose) {
+    columns.time = column(index++, options.time_unit, time_units.front());
+  }
+  const std::size_t lengths = of_pose == in_space ? 3 : 2;
+  for (std::size_t i = 0; i < of_pose; ++i) {
+    columns.pose.push_back(i < lengths ? column(index++, options.length_unit, length_units.front())
+                           : of_pose == in_space
+                               ? UnitColumn{.index = index++}
+                               : column(index++, options.angle_unit, angle_units.front()));
   }
   return columns;
 }
 
 PoseColumns find_columns(const CsvTable& table, const TableOptions& options) {
-  const auto pose = find_pose(table, options);
-  if (pose) {
-    return {find_time(table, options), *pose};
+  std::vector<UnitColumn> pose = find_pose(table, options);
+  if (!pose.empty()) {
+    return {find_time(table, options), std::move(pose)};
   }
   if (!table.has_header()) {
     return columns_without_names(table, options);
   }
-  const auto& [x, y, theta] = options.pose_columns;
-  table.refuse("has no columns '{}', '{}' and '{}'; rename its columns{}",
-               printable(x.empty() ? "x" : x), printable(y.empty() ? "y" : y),
-               printable(theta.empty() ? "theta" : theta),
-               options.may_name_poses ? ", or give `pose-columns X,Y,THETA`" : "");
+  std::vector<std::string> names = options.pose_columns;
+  if (names.empty()) {
+    names = {"x", "y", "theta"};
+  }
+  std::ranges::transform(names, names.begin(),
+                         [](const std::string& name) { return std::string(printable(name)); });
+  const std::string last = std::move(names.back());
+  names.pop_back();
+  table.refuse("has no columns '{}' and '{}'; rename its columns{}",
+               fmt::format("{}", fmt::join(names, "', '")), last,
+               options.may_name_poses ? ", or give `pose-columns X,Y,THETA` or "
+                                        "`pose-columns TX,TY,TZ,QX,QY,QZ,QW`"
+                                      : "");
 }
 
-Pose pose_in(const CsvTable& table, const std::array<UnitColumn, 3>& columns) {
-  std::array<double, 3> values{};
-  int known = 0;
-  for (std::size_t i = 0; i < 3; ++i) {
+/// The numbers of the columns in mm and rad; none where all cells are empty.
+std::optional<std::vector<double>> numbers_in(const CsvTable& table,
+                                              std::span<const UnitColumn> columns) {
+  std::vector<double> values;
+  std::size_t known = 0;
+  for (std::size_t i = 0; i < columns.size(); ++i) {
     const std::optional<double> number = table.number(columns[i].index);
     known += number ? 1 : 0;
-    values[i] = columns[i].unit.convert(number.value_or(0.0));
-    if (std::abs(values[i]) > (i < 2 ? farthest_mm : most_turned_rad)) {
+    values.push_back(columns[i].unit.convert(number.value_or(0.0)));
+    const bool is_length = i < (columns.size() == in_space ? 3 : 2);
+    if (std::abs(values[i]) > (is_length ? farthest_mm : most_turned_rad)) {
       table.refuse(
           "column '{}': {} {} is further than any robot gets; check the number and its "
           "unit",
@@ -69,12 +92,28 @@ Pose pose_in(const CsvTable& table, const std::array<UnitColumn, 3>& columns) {
     }
   }
   if (known == 0) {
-    return unknown_pose;
+    return {};
   }
-  if (known < 3) {
-    table.refuse("a part of the pose is empty; write x, y and theta, or leave all three empty");
+  if (known < columns.size()) {
+    const char* all =
+        columns.size() == in_space ? "tx, ty, tz, qx, qy, qz and qw" : "x, y and theta";
+    table.refuse("a part of the pose is empty; write {}, or leave all {} empty", all,
+                 columns.size() == in_space ? "seven" : "three");
   }
-  return {{values[0], values[1]}, values[2]};
+  return values;
+}
+
+SpatialPose spatial_pose(const CsvTable& table, std::span<const double> v) {
+  const glm::dquat rotation(v[6], v[3], v[4], v[5]);
+  const double length = glm::length(rotation);
+  constexpr double rounding = 1e-2;  // three decimals of a log leave less
+  if (std::abs(length - 1.0) > rounding) {
+    table.refuse(
+        "the quaternion's length is {:.4g}, so that it is no rotation; write qx, qy, qz "
+        "and qw in this order, of length 1",
+        length);
+  }
+  return {{v[0], v[1], v[2]}, rotation / length};
 }
 
 }  // namespace
@@ -84,7 +123,8 @@ PoseTable read_poses(const std::filesystem::path& path, const TableOptions& opti
   CsvTable table(path);
   const PoseColumns columns = find_columns(table, options);
   PoseTable poses;
-  for (std::size_t i = 0; i < columns.pose.size(); ++i) {
+  const bool spatial = columns.pose.size() == in_space;
+  for (std::size_t i = 0; i < (spatial ? 2 : 3); ++i) {
     poses.units[i] = columns.pose[i].unit;
     poses.assumed_units = poses.assumed_units || columns.pose[i].assumed;
   }
@@ -94,9 +134,16 @@ PoseTable read_poses(const std::filesystem::path& path, const TableOptions& opti
       last_s = time_in(table, *columns.time, last_s, true);
       poses.time_s.push_back(last_s);
     }
-    poses.T_robot_sensor.push_back(pose_in(table, columns.pose));
+    const auto numbers = numbers_in(table, columns.pose);
+    if (spatial) {
+      poses.spatial.push_back(numbers ? std::optional(spatial_pose(table, *numbers))
+                                      : std::nullopt);
+    } else {
+      poses.T_robot_sensor.push_back(numbers ? Pose{{(*numbers)[0], (*numbers)[1]}, (*numbers)[2]}
+                                             : unknown_pose);
+    }
   }
-  if (poses.T_robot_sensor.empty()) {
+  if (poses.T_robot_sensor.empty() && poses.spatial.empty()) {
     refuse(path, "holds a header and no row; write a row for each pose");
   }
   return poses;

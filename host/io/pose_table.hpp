@@ -2,24 +2,38 @@
 
 #include <array>
 #include <filesystem>
+#include <optional>
 #include <vector>
+
+#include <glm/gtc/quaternion.hpp>
+#include <glm/vec3.hpp>
 
 #include "io/table_columns.hpp"
 #include "palpate/pose.hpp"
 
 namespace palpate {
 
+/// A pose in space.
+struct SpatialPose {
+  glm::dvec3 translation_mm{0.0};
+  glm::dquat rotation{1.0, 0.0, 0.0, 0.0};  ///< of length 1; w, x, y, z
+};
+
 /// Poses T_robot_sensor, row by row.
 struct PoseTable {
   std::vector<double> time_s;        ///< [n], or empty
   std::vector<Pose> T_robot_sensor;  ///< [n]; unknown_pose where the row's cells are empty
-  std::array<Unit, 3> units;         ///< of the columns x, y and theta
-  bool assumed_units = false;        ///< neither names nor options give them: mm and rad
+  /// [n] in the place of T_robot_sensor, where the table has poses in space; none where the row's
+  /// cells are empty.
+  std::vector<std::optional<SpatialPose>> spatial;
+  std::array<Unit, 3> units{length_units[0], length_units[0], angle_units[0]};  ///< of x, y, theta
+  bool assumed_units = false;  ///< neither names nor options give them: mm and rad
 };
 
-/// Reads poses from a CSV file with the columns x, y and theta (or yaw), and time where the poses
-/// have times; see TableOptions for other names and units. A table without a header holds x, y and
-/// theta, or time, x, y and theta.
+/// Reads poses from a CSV file with the columns x, y and theta (or yaw), or tx, ty, tz (or x, y, z)
+/// and the quaternion qx, qy, qz, qw, and time where the poses have times; see TableOptions for
+/// other names and units. A table without a header holds x, y and theta, or time, x, y and theta;
+/// or all seven, or time and all seven, as trajectories of TUM do.
 /// @param with_times false: poses by their rows alone; times are neither read nor checked
 /// @throws Error, naming file, line and column, where a row is no pose, or not later than the one
 /// before

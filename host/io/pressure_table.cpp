@@ -142,7 +142,7 @@ class WideTable {
 
   PressureTable read() {
     PressureTable all;
-    all.holds_poses = pose_.has_value();
+    all.holds_poses = !pose_.empty();
     reserve(table_, "rows", table_.count_lines(), columns_.size(), all);
     double last_s = before_all;
     while (table_.next()) {
@@ -175,10 +175,8 @@ class WideTable {
     if (time_) {
       taken.push_back(time_->index);
     }
-    if (pose_) {
-      for (const UnitColumn& column : *pose_) {
-        taken.push_back(column.index);
-      }
+    for (const UnitColumn& column : pose_) {
+      taken.push_back(column.index);
     }
     return taken;
   }
@@ -205,7 +203,7 @@ class WideTable {
   std::optional<UnitColumn> time_;
   std::optional<std::size_t> device_time_;
   std::optional<std::size_t> lost_before_;
-  std::optional<std::array<UnitColumn, 3>> pose_;
+  std::vector<UnitColumn> pose_;
   std::vector<std::size_t> columns_;  ///< [e]
 };
 

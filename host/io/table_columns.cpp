@@ -15,11 +15,24 @@ constexpr std::string_view time_names[] = {"time", "timestamp", "stamp", "t", "%
 constexpr std::string_view x_names[] = {"x"};
 constexpr std::string_view y_names[] = {"y"};
 constexpr std::string_view theta_names[] = {"theta", "yaw"};
+constexpr std::string_view tx_names[] = {"tx", "x"};
+constexpr std::string_view ty_names[] = {"ty", "y"};
+constexpr std::string_view tz_names[] = {"tz", "z"};
+constexpr std::string_view qx_names[] = {"qx"};
+constexpr std::string_view qy_names[] = {"qy"};
+constexpr std::string_view qz_names[] = {"qz"};
+constexpr std::string_view qw_names[] = {"qw"};
+constexpr Unit no_unit[] = {{""}};
 
 constexpr Quantity time{time_names, time_units, "time-unit"};
 constexpr Quantity pose[] = {{x_names, length_units, "pose-unit"},
                              {y_names, length_units, "pose-unit"},
                              {theta_names, angle_units, "pose-unit"}};
+constexpr Quantity spatial_pose[] = {
+    {tx_names, length_units, "pose-unit"}, {ty_names, length_units, "pose-unit"},
+    {tz_names, length_units, "pose-unit"}, {qx_names, no_unit, "pose-unit"},
+    {qy_names, no_unit, "pose-unit"},      {qz_names, no_unit, "pose-unit"},
+    {qw_names, no_unit, "pose-unit"}};
 
 // The year 5138; a time in ms is larger.
 constexpr double latest_s = 1e11;
@@ -89,18 +102,35 @@ double time_in(const CsvTable& table, const UnitColumn& column, double last_s, b
   return time_s;
 }
 
-std::optional<std::array<UnitColumn, 3>> find_pose(const CsvTable& table,
-                                                   const TableOptions& options) {
-  std::array<UnitColumn, 3> columns;
-  for (std::size_t i = 0; i < columns.size(); ++i) {
-    const auto found = find_column(table, pose[i], options.pose_columns[i],
-                                   i < 2 ? options.length_unit : options.angle_unit);
+namespace {
+
+/// The columns of the quantities; none unless the table has all.
+std::vector<UnitColumn> find_all(const CsvTable& table, std::span<const Quantity> quantities,
+                                 const TableOptions& options) {
+  const auto& names = options.pose_columns;
+  std::vector<UnitColumn> columns;
+  if (!names.empty() && names.size() != quantities.size()) {
+    return columns;
+  }
+  for (std::size_t i = 0; i < quantities.size(); ++i) {
+    const std::optional<Unit>& unit =
+        quantities[i].units.data() == length_units.data()  ? options.length_unit
+        : quantities[i].units.data() == angle_units.data() ? options.angle_unit
+                                                           : std::optional<Unit>();
+    const auto found = find_column(table, quantities[i], names.empty() ? "" : names[i], unit);
     if (!found) {
       return {};
     }
-    columns[i] = *found;
+    columns.push_back(*found);
   }
   return columns;
+}
+
+}  // namespace
+
+std::vector<UnitColumn> find_pose(const CsvTable& table, const TableOptions& options) {
+  std::vector<UnitColumn> columns = find_all(table, pose, options);
+  return columns.empty() ? find_all(table, spatial_pose, options) : columns;
 }
 
 }  // namespace palpate

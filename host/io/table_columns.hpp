@@ -7,6 +7,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "io/csv_table.hpp"
 
@@ -30,13 +31,15 @@ inline constexpr std::array<Unit, 2> angle_units{{{"rad"}, {"deg", std::numbers:
 
 /// What the options say about the columns and units of tables.
 struct TableOptions {
-  std::string time_column;                  ///< "": the usual names
-  std::string pressure_columns;             ///< prefix or FIRST:LAST; "": all that are left
-  std::array<std::string, 3> pose_columns;  ///< of x, y and theta; "": the usual names
-  bool may_name_poses = true;               ///< there is an option `pose-columns`
-  std::optional<Unit> time_unit;            ///< none: by the column's name, else s
-  std::optional<Unit> length_unit;          ///< none: by the column's name, else mm
-  std::optional<Unit> angle_unit;           ///< none: by the column's name, else rad
+  std::string time_column;       ///< "": the usual names
+  std::string pressure_columns;  ///< prefix or FIRST:LAST; "": all that are left
+  /// Names of the columns of x, y and theta, or of x, y, z and a quaternion's x, y, z and w; none:
+  /// the usual names.
+  std::vector<std::string> pose_columns = {};
+  bool may_name_poses = true;       ///< there is an option `pose-columns`
+  std::optional<Unit> time_unit;    ///< none: by the column's name, else s
+  std::optional<Unit> length_unit;  ///< none: by the column's name, else mm
+  std::optional<Unit> angle_unit;   ///< none: by the column's name, else rad
 };
 
 /// A column whose unit is known.
@@ -66,8 +69,8 @@ std::optional<UnitColumn> find_time(const CsvTable& table, const TableOptions& o
 /// `later` is asked for
 double time_in(const CsvTable& table, const UnitColumn& column, double last_s, bool later);
 
-/// Finds the columns of x, y and theta; none unless the table has all three.
-std::optional<std::array<UnitColumn, 3>> find_pose(const CsvTable& table,
-                                                   const TableOptions& options);
+/// Finds the columns of x, y and theta, or else of x, y, z and a quaternion's x, y, z and w; none
+/// unless the table has all three, or all seven.
+std::vector<UnitColumn> find_pose(const CsvTable& table, const TableOptions& options);
 
 }  // namespace palpate

@@ -8,6 +8,7 @@
 #include <optional>
 #include <string_view>
 #include <system_error>
+#include <vector>
 
 namespace palpate {
 
@@ -29,6 +30,16 @@ std::optional<Number> all_of(std::string_view text, Base... base) {
 }
 
 }  // namespace detail
+
+/// The parts of the text between separators, also empty ones.
+inline std::vector<std::string_view> split_text(std::string_view text, char separator) {
+  std::vector<std::string_view> parts;
+  for (std::size_t end = 0; end != text.npos; text.remove_prefix(std::min(end + 1, text.size()))) {
+    end = text.find(separator);
+    parts.push_back(text.substr(0, end));
+  }
+  return parts;
+}
 
 /// Returns the text as a finite number; none where it is not one as a whole.
 inline std::optional<double> number_of(std::string_view text) {

@@ -118,6 +118,9 @@ std::vector<Pose> read_candidates(const std::filesystem::path& path,
     return std::move(recording.T_robot_sensor);
   }
   const PoseTable table = read_poses(path, {.may_name_poses = false}, false);
+  if (!table.spatial.empty()) {
+    refuse(path, "has poses in space; give x, y and theta in the plane of the touches");
+  }
   if (table.assumed_units) {
     tell(
         fmt::format("{}: poses taken to be in mm and rad; name the columns x_mm, y_mm, theta_deg "

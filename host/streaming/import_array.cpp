@@ -1,29 +1,23 @@
 #include "streaming/import_array.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "io/input_file.hpp"
+#include "io/npy_file.hpp"
 #include "model/number_text.hpp"
 
 namespace palpate {
 
 namespace {
-
-/// The parts between separators, also empty ones.
-std::vector<std::string_view> split(std::string_view text, char separator) {
-  std::vector<std::string_view> parts;
-  for (std::size_t end = 0; end != text.npos; text.remove_prefix(std::min(end + 1, text.size()))) {
-    end = text.find(separator);
-    parts.push_back(text.substr(0, end));
-  }
-  return parts;
-}
 
 /// COLUMNS:ROWS:PITCH or COLUMNSxROWSxPITCH.
 struct Grid {
@@ -34,9 +28,9 @@ struct Grid {
 
 /// None where the text names a file.
 std::optional<Grid> grid_of(const std::string& text) {
-  std::vector<std::string_view> parts = split(text, ':');
+  std::vector<std::string_view> parts = split_text(text, ':');
   if (parts.size() != 3) {
-    parts = split(text, 'x');
+    parts = split_text(text, 'x');
     if (parts.size() == 3 && !(whole_number_of(parts[1]) && number_of(parts[2]))) {
       return {};  // such as 8x8x3.csv
     }
@@ -93,7 +87,7 @@ void mark_dead(const std::string& dead, ArrayTable& array) {
   }
   const std::size_t elements = array.elements_mm.size();
   array.valid.resize(elements, 1);
-  for (const std::string_view text : split(dead, ',')) {
+  for (const std::string_view text : split_text(dead, ',')) {
     const auto element = whole_number_of(text);
     if (!element || *element < 0 || static_cast<std::size_t>(*element) >= elements) {
       refuse(fmt::format("`dead {}`", dead),
@@ -132,6 +126,28 @@ ImportArray import_array(const ImportOptions& options) {
   }
   mark_dead(options.dead, array);
   return array;
+}
+
+PressureTable read_npy_pressures(const std::string& path, const ImportArray& array) {
+  NpyArray npy = read_npy(path);
+  const std::size_t elements = array.elements_mm.size();
+  const auto& shape = npy.shape;
+  const bool fits = (shape.size() == 2 && shape[1] == elements) ||
+                    (shape.size() == 3 && shape[1] * shape[2] == elements &&
+                     (array.line == 0 || shape[2] == array.line));
+  if (!fits || shape[0] == 0) {
+    refuse(
+        path, "has the shape ({}); save [n, {}]{}, n at least 1, or correct `array`",
+        fmt::format("{}", fmt::join(shape, ", ")), elements,
+        array.line == 0 ? "" : fmt::format(" or [n, {}, {}]", elements / array.line, array.line));
+  }
+  const auto infinite = std::ranges::find_if(npy.values, [](double p) { return std::isinf(p); });
+  if (infinite != npy.values.end()) {
+    const auto at = static_cast<std::size_t>(infinite - npy.values.begin());
+    refuse(path, "row {}, element {} = {}; save finite numbers, or NaN where a reading is unknown",
+           at / elements, at % elements, *infinite);
+  }
+  return {.pressure = std::move(npy.values)};
 }
 
 }  // namespace palpate

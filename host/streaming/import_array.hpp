@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <string>
 
 #include "io/pressure_table.hpp"
 #include "streaming/table_import.hpp"
@@ -16,5 +17,9 @@ struct ImportArray : ArrayTable {
 /// Reads `array` as a grid or as a file, or takes the elements of a program.
 /// @throws Error naming the option, or the file's line and column
 ImportArray import_array(const ImportOptions& options);
+
+/// Reads pressures [n, e], or [n, lines, line] of a grid, from a file of numpy.save.
+/// @throws Error naming the file, where its shape is another or a number infinite
+PressureTable read_npy_pressures(const std::string& path, const ImportArray& array);
 
 }  // namespace palpate

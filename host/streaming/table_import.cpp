@@ -18,6 +18,7 @@
 #include "io/table_columns.hpp"
 #include "model/number_text.hpp"
 #include "streaming/import_array.hpp"
+#include "streaming/touch_plane.hpp"
 
 namespace palpate {
 
@@ -62,35 +63,20 @@ TableOptions table_options(const ImportOptions& options) {
     }
   }
   if (!options.pose_columns.empty()) {
-    const auto names = split_last(options.pose_columns, ',', 3);
-    if (names.empty()) {
-      refuse(fmt::format("`pose-columns {}`", options.pose_columns), "give three names, X,Y,THETA");
+    const bool in_space = std::ranges::count(options.pose_columns, ',') == 6;
+    table.pose_columns = split_last(options.pose_columns, ',', in_space ? 7 : 3);
+    if (table.pose_columns.empty()) {
+      refuse(fmt::format("`pose-columns {}`", options.pose_columns),
+             "give three names, X,Y,THETA, or seven, TX,TY,TZ,QX,QY,QZ,QW");
     }
-    std::ranges::copy(names, table.pose_columns.begin());
+    for (const char* part : {"qx", "qy", "qz", "qw"}) {
+      if (!in_space && std::ranges::find(table.pose_columns, part) != table.pose_columns.end()) {
+        refuse(fmt::format("`pose-columns {}`", options.pose_columns),
+               "'{}' is a part of a quaternion, no angle; give TX,TY,TZ,QX,QY,QZ,QW", part);
+      }
+    }
   }
   return table;
-}
-
-PressureTable read_npy_pressures(const std::string& path, const ImportArray& array) {
-  NpyArray npy = read_npy(path);
-  const std::size_t elements = array.elements_mm.size();
-  const auto& shape = npy.shape;
-  const bool fits = (shape.size() == 2 && shape[1] == elements) ||
-                    (shape.size() == 3 && shape[1] * shape[2] == elements &&
-                     (array.line == 0 || shape[2] == array.line));
-  if (!fits || shape[0] == 0) {
-    refuse(
-        path, "has the shape ({}); save [n, {}]{}, n at least 1, or correct `array`",
-        fmt::format("{}", fmt::join(shape, ", ")), elements,
-        array.line == 0 ? "" : fmt::format(" or [n, {}, {}]", elements / array.line, array.line));
-  }
-  const auto infinite = std::ranges::find_if(npy.values, [](double p) { return std::isinf(p); });
-  if (infinite != npy.values.end()) {
-    const auto at = static_cast<std::size_t>(infinite - npy.values.begin());
-    refuse(path, "row {}, element {} = {}; save finite numbers, or NaN where a reading is unknown",
-           at / elements, at % elements, *infinite);
-  }
-  return {.pressure = std::move(npy.values)};
 }
 
 /// ImportedRecording::whole_up_to
@@ -330,6 +316,7 @@ void check_numbers(const ImportOptions& options) {
 ImportedRecording import_tables(const ImportOptions& options) {
   const TableOptions columns = table_options(options);
   check_numbers(options);
+  const std::optional<glm::dvec3> normal = plane_normal(options.plane);
   auto truth = options.truth.empty() ? std::nullopt : std::optional(truth_of(options.truth));
   ImportArray array = import_array(options);
   if (!options.time_column.empty() && !has_column(options.pressures, options.time_column) &&
@@ -364,6 +351,13 @@ ImportedRecording import_tables(const ImportOptions& options) {
   choose_rows(options, recording);
   mark_unknown(options.pressures, recording);
   if (poses) {
+    if (poses->spatial.empty() && normal) {
+      refuse(fmt::format("`plane {}`", options.plane),
+             "is for poses in space; {} has x, y and theta", options.poses);
+    }
+    if (!poses->spatial.empty()) {
+      imported.of_poses = take_into_plane(normal, *poses, recording);
+    }
     imported.assumed_units = poses->assumed_units;
     pose_units = poses->units;
     join(std::move(*poses), options, imported);

@@ -31,6 +31,7 @@ struct ImportOptions {
   std::string time_column;
   std::string pressure_columns;
   std::string pose_columns;
+  std::string plane = "auto";           ///< of poses in space: auto, or its normal "NX,NY,NZ"
   std::optional<double> largest_gap_s;  ///< none: by the times of the poses
   std::optional<double> rate_hz;
   std::string rows;
@@ -48,6 +49,7 @@ struct ImportedRecording {
   std::size_t in_gaps = 0;     ///< frames between two poses that are further apart
   /// The largest reading where all are whole numbers, as raw ones are, but said to be in kPa.
   std::optional<double> whole_up_to = {};
+  std::vector<std::string> of_poses = {};  ///< what is worth saying of poses in space, in sentences
 };
 
 /// Reads the pressures and the poses and joins them.

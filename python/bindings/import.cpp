@@ -9,6 +9,7 @@
 
 #include "bindings.hpp"
 #include "call.hpp"
+#include "model/option_words.hpp"
 #include "streaming/table_import.hpp"
 #include "touches.hpp"
 
@@ -35,6 +36,9 @@ std::vector<std::string> remarks_on(const ImportedRecording& imported,
   if (imported.assumed_units) {
     remarks.push_back(
         fmt::format("{}: poses taken to be in mm and rad; give pose_unit", options.poses));
+  }
+  for (const std::string& words : imported.of_poses) {
+    remarks.push_back(fmt::format("{}: {}", options.poses, in_keywords(words)));
   }
   if (imported.whole_up_to) {
     remarks.push_back(
@@ -73,6 +77,7 @@ void bind_import(nb::module_& module) {
       .def_rw("time_column", &ImportOptions::time_column)
       .def_rw("pressure_columns", &ImportOptions::pressure_columns)
       .def_rw("pose_columns", &ImportOptions::pose_columns)
+      .def_rw("plane", &ImportOptions::plane)
       .def_rw("largest_gap_s", &ImportOptions::largest_gap_s)
       .def_rw("rate", &ImportOptions::rate_hz)
       .def_rw("rows", &ImportOptions::rows)

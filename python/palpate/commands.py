@@ -215,7 +215,8 @@ def import_tables(
     time_unit: Literal["s", "ms", "us", "ns"] | None = None,
     time_column: str | None = None,
     pressure_columns: str | None = None,
-    pose_columns: tuple[str, str, str] | None = None,
+    pose_columns: tuple[str, str, str] | tuple[str, str, str, str, str, str, str] | None = None,
+    plane: tuple[float, float, float] | Literal["auto"] = "auto",
     largest_gap_s: float | None = None,
     rate: float | None = None,
     object: str = "",
@@ -228,6 +229,7 @@ def import_tables(
     of their readings; first_element and order: where the first element of a grid lies, seen with x to
     the right and y upwards, and which follow it; dead: elements that do not read, from 0; poses: a CSV
     file of T_robot_sensor, in mm and rad where neither its columns' names nor pose_unit say otherwise;
+    plane: of the touches, where poses are in space: found from them, or its normal in the robot frame;
     rate: frames per second of pressures without times, Hz; object: label of what was touched; truth:
     its true identity and pose. Other options are the flags of the command, with its defaults.
 
@@ -243,6 +245,7 @@ def import_tables(
     elif not isinstance(array, (str, bytes, os.PathLike)):
         elements_mm = options.pop("array")
     options["dead"] = ",".join(map(str, dead))
+    options["plane"] = plane if isinstance(plane, str) else ",".join(map(str, plane))
     for names in ("pose_unit", "pose_columns"):
         if options[names] is not None:
             options[names] = ",".join(options[names])

@@ -205,7 +205,24 @@ INSTANTIATE_TEST_SUITE_P(
             "and its unit"},
         Case{"no_angle", "poses.csv", "time,x,y\n0,1,2\n", with_poses,
              "poses.csv:1: has no columns 'x', 'y' and 'theta'; rename its columns, or give "
-             "--pose-columns X,Y,THETA"},
+             "--pose-columns X,Y,THETA or --pose-columns TX,TY,TZ,QX,QY,QZ,QW"},
+        Case{"no_rotation", "poses.csv",
+             "time,tx,ty,tz,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n1,0,0,0,0,0,1,1\n", with_poses,
+             "poses.csv:3: the quaternion's length is 1.414, so that it is no rotation; write qx, "
+             "qy, qz and qw in this order, of length 1"},
+        Case{"a_part_of_a_pose_in_space", "poses.csv",
+             "time,tx,ty,tz,qx,qy,qz,qw\n0,0,0,,0,0,0,1\n", with_poses,
+             "poses.csv:2: a part of the pose is empty; write tx, ty, tz, qx, qy, qz and qw, or "
+             "leave all seven empty"},
+        Case{"looks_everywhere", "poses.csv",
+             "time,tx,ty,tz,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n0.1,0,0,0,1,0,0,0\n", with_poses,
+             "--plane: missing; the sensor's z axis points in unlike directions, so that the poses "
+             "do not tell the plane of the touches: give its normal, such as 0,0,1"},
+        Case{"a_plane_of_plane_poses",
+             "log.csv",
+             frames,
+             {"--poses", "poses.csv", "--plane", "0,0,1"},
+             "--plane 0,0,1: is for poses in space; poses.csv has x, y and theta"},
         Case{"an_array_of_one_column",
              "a.txt",
              "1\n2\n",
@@ -235,7 +252,15 @@ TEST_F(ImportCommand, FlagsNameTheirForm) {
   expect_said({"--rate", "1e-300"}, "--rate 1e-300: give 0.001 to 1000000 Hz");
   expect_said({"--rate", "1e300"}, "--rate 1e+300: give 0.001 to 1000000 Hz");
   expect_said({"--largest-gap-s", "0"}, "--largest-gap-s 0: must be above 0");
-  expect_said({"--pose-columns", "x,y"}, "--pose-columns x,y: give three names, X,Y,THETA");
+  expect_said({"--pose-columns", "x,y"},
+              "--pose-columns x,y: give three names, X,Y,THETA, or seven, TX,TY,TZ,QX,QY,QZ,QW");
+  expect_said({"--pose-columns", "tx,ty,qz"},
+              "--pose-columns tx,ty,qz: 'qz' is a part of a quaternion, no angle; give "
+              "TX,TY,TZ,QX,QY,QZ,QW");
+  expect_said({"--plane", "0,0"},
+              "--plane 0,0: give auto, or the plane's normal in the robot frame, such as 0,0,1");
+  expect_said({"--plane", "0,0,0"},
+              "--plane 0,0,0: give auto, or the plane's normal in the robot frame, such as 0,0,1");
   expect_said({"--truth", "1,2,3"},
               "--truth 1,2,3: give LABEL,X,Y,THETA, in the units of the poses");
   expect_said({"--truth", ",1,2,3"},

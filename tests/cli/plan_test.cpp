@@ -207,6 +207,8 @@ TEST_F(PlanCommand, RefusesBadInputInOneLine) {
   refuse({"--candidates", "none.csv"}, {"none.csv"});
   put_bytes(folder_ / "empty.csv", "x,y,theta\n");
   refuse({"--candidates", "empty.csv"}, {"empty.csv", "no row"});
+  put_bytes(folder_ / "space.csv", "tx,ty,tz,qx,qy,qz,qw\n1,2,3,0,0,0,1\n");
+  refuse({"--candidates", "space.csv"}, {"space.csv", "poses in space", "give x, y and theta"});
   put_bytes(folder_ / "wrong.csv", "x,y,angle\n1,2,3\n");
   refuse({"--candidates", "wrong.csv"}, {"wrong.csv", "'theta'", "rename its columns"});
   EXPECT_EQ(palpate(command({"--candidates", "wrong.csv"})).err.find("--pose-columns"),

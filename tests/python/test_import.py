@@ -115,3 +115,20 @@ def test_whole_numbers_that_are_no_pressures_are_noticed(tables: pathlib.Path) -
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         palpate.import_tables(tables / "raw.npy", array=(2, 2, 1), rate=10, pressure_unit="raw")
+
+
+def test_poses_in_space_are_taken_into_the_plane(tables: pathlib.Path) -> None:
+    (tables / "space.csv").write_text("time,x_m,y_m,z_m,qx,qy,qz,qw\n0,0.001,0.002,0.1,1,0,0,0\n")
+    names = ("x_m", "y_m", "z_m", "qx", "qy", "qz", "qw")
+    for options in ({}, {"pose_columns": names}, {"plane": (0, 0, 1)}):
+        with pytest.warns(UserWarning, match="its y is turned over"):
+            given = palpate.import_tables(
+                tables / "pressures.npy", array=(2, 2, 1), rate=1, poses=tables / "space.csv", **options
+            )  # type: ignore[arg-type]
+        assert given.T_robot_sensor[0].tolist() == [1, 2, 0]
+        assert given.elements_mm[0].tolist() == [-0.5, 0.5], "seen from above"
+    with pytest.raises(palpate.Error, match=r"^plane=\(0, 0, 0\): give auto"):
+        palpate.import_tables(
+            tables / "pressures.npy", array=(2, 2, 1), rate=1, poses=tables / "space.csv",
+            plane=(0, 0, 0),
+        )  # fmt: skip

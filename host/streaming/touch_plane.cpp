@@ -1,0 +1,209 @@
+#include "streaming/touch_plane.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include <fmt/format.h>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include "io/input_file.hpp"
+#include "model/number_text.hpp"
+
+namespace palpate {
+
+namespace {
+
+constexpr double degrees = 180.0 / std::numbers::pi;
+constexpr double much_tilt_rad = 3.0 / degrees;
+constexpr double much_height_mm = 2.0;
+
+glm::dvec3 axis(const SpatialPose& pose, const glm::dvec3& of_sensor) {
+  return pose.rotation * of_sensor;
+}
+
+double angle_between(const glm::dvec3& a, const glm::dvec3& b) {
+  return std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b));
+}
+
+/// The mean direction of the sensor's z axis.
+glm::dvec3 mean_direction(const std::vector<std::optional<SpatialPose>>& poses) {
+  glm::dvec3 sum{0.0};
+  double count = 0.0;
+  for (const auto& pose : poses) {
+    if (pose) {
+      sum += axis(*pose, {0.0, 0.0, 1.0});
+      ++count;
+    }
+  }
+  constexpr double least = 0.7;  // of the mean's length: directions within some 45 degrees
+  if (count > 0.0 && glm::length(sum) < least * count) {
+    throw Error(Fault::input,
+                "`plane`: missing; the sensor's z axis points in unlike directions, so that the "
+                "poses do not tell the plane of the touches: give its normal, such as 0,0,1");
+  }
+  return count > 0.0 ? glm::normalize(sum) : glm::dvec3(0.0, 0.0, 1.0);
+}
+
+/// [row] whether the array is pressed: some element reads at least half as far above its least
+/// reading as any reading lies above its own.
+std::vector<bool> pressed_rows(const Recording& recording) {
+  const std::size_t e = recording.elements_mm.size();
+  const std::size_t n = recording.pressure.size() / e;
+  if (recording.rows == "touches") {
+    return std::vector<bool>(n, true);
+  }
+  std::vector<double> least(e, std::numeric_limits<double>::infinity());
+  for (std::size_t k = 0; k < recording.pressure.size(); ++k) {
+    least[k % e] = std::fmin(least[k % e], recording.pressure[k]);
+  }
+  std::vector<double> above(n);
+  for (std::size_t k = 0; k < recording.pressure.size(); ++k) {
+    above[k / e] = std::fmax(above[k / e], recording.pressure[k] - least[k % e]);
+  }
+  const double most = *std::ranges::max_element(above);
+  std::vector<bool> pressed;
+  for (const double one : above) {
+    pressed.push_back(one > 0.0 && one >= 0.5 * most);
+  }
+  return pressed;
+}
+
+/// [pose] whether the array is pressed in the row of the pose, or in the one nearest in time.
+std::vector<bool> pressed_poses(const PoseTable& poses, const Recording& recording) {
+  const std::vector<bool> rows = pressed_rows(recording);
+  const std::vector<double>& time_s = recording.time_s;
+  std::vector<bool> pressed(poses.spatial.size());
+  for (std::size_t i = 0; i < pressed.size(); ++i) {
+    std::size_t row = i;
+    if (!poses.time_s.empty() && !time_s.empty()) {
+      const double at_s = poses.time_s[i];
+      row = static_cast<std::size_t>(std::ranges::lower_bound(time_s, at_s) - time_s.begin());
+      if (row > 0 && (row == rows.size() || at_s - time_s[row - 1] < time_s[row] - at_s)) {
+        --row;
+      }
+    }
+    pressed[i] = row < rows.size() && rows[row];
+  }
+  return pressed;
+}
+
+}  // namespace
+
+Pose TouchPlane::project(const SpatialPose& pose) const {
+  const glm::dvec3 along = axis(pose, {1.0, 0.0, 0.0});
+  return {{glm::dot(x, pose.translation_mm), glm::dot(y, pose.translation_mm)},
+          std::atan2(glm::dot(y, along), glm::dot(x, along))};
+}
+
+double TouchPlane::height_mm(const SpatialPose& pose) const {
+  return glm::dot(normal, pose.translation_mm);
+}
+
+double TouchPlane::tilt_rad(const SpatialPose& pose) const {
+  return angle_between(axis(pose, {0.0, 0.0, 1.0}), faces_down ? -normal : normal);
+}
+
+TouchPlane touch_plane(const std::vector<std::optional<SpatialPose>>& poses,
+                       const std::optional<glm::dvec3>& normal) {
+  constexpr double steep = 0.5;  // of the normal's part along the robot's z
+  const glm::dvec3 looks = mean_direction(poses);
+  glm::dvec3 n = normal ? glm::normalize(*normal) : looks;
+  if (!normal) {
+    const double side = std::abs(n.z) > steep ? n.z : std::abs(n.x) >= std::abs(n.y) ? n.x : n.y;
+    n = side < 0.0 ? -n : n;
+    n = angle_between(n, {0.0, 0.0, 1.0}) <= much_tilt_rad ? glm::dvec3(0.0, 0.0, 1.0) : n;
+  }
+  TouchPlane plane{.normal = n, .faces_down = glm::dot(looks, n) < 0.0};
+  constexpr double along = 0.9;
+  const glm::dvec3 start =
+      std::abs(n.x) > along ? glm::dvec3(0.0, 1.0, 0.0) : glm::dvec3(1.0, 0.0, 0.0);
+  plane.x = glm::normalize(start - glm::dot(start, n) * n);
+  plane.y = glm::cross(n, plane.x);
+  return plane;
+}
+
+std::vector<std::string> words_about(const TouchPlane& plane,
+                                     const std::vector<std::optional<SpatialPose>>& poses,
+                                     const std::vector<bool>& pressed) {
+  std::vector<std::string> words;
+  const auto text = [](const glm::dvec3& v) {
+    const glm::dvec3 r = glm::round(100.0 * v) / 100.0 + 0.0;  // without the sign of -0.00
+    return fmt::format("({:g}, {:g}, {:g})", r.x, r.y, r.z);
+  };
+  if (plane.normal != glm::dvec3(0.0, 0.0, 1.0)) {
+    words.push_back(fmt::format(
+        "the touches' plane is turned by {:.1f} degrees out of the robot's xy plane: x and y are "
+        "along {} and {} of the robot frame",
+        angle_between(plane.normal, {0.0, 0.0, 1.0}) * degrees, text(plane.x), text(plane.y)));
+  }
+  if (plane.faces_down) {
+    words.push_back(
+        "the array looks against the plane's normal, as under a tool that points down: its y is "
+        "turned over");
+  }
+  std::size_t tilted = 0;
+  double most_rad = 0.0;
+  double low = std::numeric_limits<double>::infinity();
+  double high = -low;
+  std::size_t rows = 0;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    if (!poses[i] || !pressed[i]) {
+      continue;
+    }
+    ++rows;
+    const double tilt = plane.tilt_rad(*poses[i]);
+    tilted += tilt > much_tilt_rad ? 1 : 0;
+    most_rad = std::max(most_rad, tilt);
+    low = std::min(low, plane.height_mm(*poses[i]));
+    high = std::max(high, plane.height_mm(*poses[i]));
+  }
+  if (tilted > 0) {
+    words.push_back(fmt::format(
+        "{} of {} poses under load are tilted by more than {:.0f} degrees, {:.1f} at most: press "
+        "the array flat, or give the `plane`",
+        tilted, rows, much_tilt_rad * degrees, most_rad * degrees));
+  }
+  if (high - low > much_height_mm) {
+    words.push_back(fmt::format(
+        "the height under load varies by {:.1f} mm: do all touches lie in one plane?", high - low));
+  }
+  return words;
+}
+
+std::optional<glm::dvec3> plane_normal(const std::string& plane) {
+  if (plane == "auto") {
+    return {};
+  }
+  const auto parts = split_text(plane, ',');
+  glm::dvec3 normal{0.0};
+  for (int i = 0; i < 3 && parts.size() == 3; ++i) {
+    const auto number = number_of(parts[static_cast<std::size_t>(i)]);
+    normal[i] = number.value_or(std::numeric_limits<double>::quiet_NaN());
+  }
+  if (!(glm::length(normal) > 0.0 && std::isfinite(glm::length(normal)))) {
+    refuse(fmt::format("`plane {}`", plane),
+           "give auto, or the plane's normal in the robot frame, such as 0,0,1");
+  }
+  return normal;
+}
+
+std::vector<std::string> take_into_plane(const std::optional<glm::dvec3>& normal, PoseTable& poses,
+                                         Recording& recording) {
+  const TouchPlane plane = touch_plane(poses.spatial, normal);
+  std::vector<std::string> words =
+      words_about(plane, poses.spatial, pressed_poses(poses, recording));
+  for (const auto& pose : poses.spatial) {
+    poses.T_robot_sensor.push_back(pose ? plane.project(*pose) : unknown_pose);
+  }
+  if (plane.faces_down) {
+    for (glm::dvec2& p : recording.elements_mm) {
+      p.y = -p.y;
+    }
+  }
+  return words;
+}
+
+}  // namespace palpate
