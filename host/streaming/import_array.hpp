@@ -22,4 +22,9 @@ ImportArray import_array(const ImportOptions& options);
 /// @throws Error naming the file, where its shape is another or a number infinite
 PressureTable read_npy_pressures(const std::string& path, const ImportArray& array);
 
+/// Marks as dead the elements without any reading. In touches, which have no unknown readings, it
+/// also marks single readings.
+/// @throws Error naming `path` where no element has any
+void mark_unknown(const std::string& path, Recording& recording);
+
 }  // namespace palpate

@@ -96,35 +96,6 @@ std::optional<double> whole_numbers_as_kpa(const Recording& recording) {
                                                               : std::nullopt;
 }
 
-/// Marks as dead the elements without any reading. In touches, which have no unknown readings, it
-/// also marks single readings.
-void mark_unknown(const std::string& path, Recording& recording) {
-  const std::size_t e = recording.elements_mm.size();
-  std::vector<std::uint8_t> read(e, 0);
-  bool some_unknown = false;
-  for (std::size_t k = 0; k < recording.pressure.size(); ++k) {
-    read[k % e] |= std::isnan(recording.pressure[k]) ? 0 : 1;
-  }
-  for (std::size_t i = 0; i < e; ++i) {
-    read[i] = recording.valid.empty() ? read[i] : read[i] & recording.valid[i];
-  }
-  if (e == 0 || std::ranges::count(read, 0) == static_cast<std::ptrdiff_t>(e)) {
-    refuse(path, "holds no reading of a living element; write the pressures");
-  }
-  for (std::size_t k = 0; k < recording.pressure.size(); ++k) {
-    some_unknown = some_unknown || (read[k % e] != 0 && std::isnan(recording.pressure[k]));
-  }
-  if (!recording.valid.empty() || std::ranges::count(read, 0) > 0) {
-    recording.valid = read;
-  }
-  if (some_unknown && recording.rows == "touches") {
-    recording.valid.resize(recording.pressure.size());
-    for (std::size_t k = 0; k < recording.pressure.size(); ++k) {
-      recording.valid[k] = std::isnan(recording.pressure[k]) ? 0 : read[k % e];
-    }
-  }
-}
-
 /// Drops the poses that are unknown.
 void keep_known(PoseTable& poses) {
   std::size_t kept = 0;
@@ -311,30 +282,15 @@ void check_numbers(const ImportOptions& options) {
   }
 }
 
-}  // namespace
-
-ImportedRecording import_tables(const ImportOptions& options) {
-  const TableOptions columns = table_options(options);
-  check_numbers(options);
+/// The recording of rows that are read.
+ImportedRecording recording_of(const ImportOptions& options, ImportArray array, ImportRows rows) {
   const std::optional<glm::dvec3> normal = plane_normal(options.plane);
-  auto truth = options.truth.empty() ? std::nullopt : std::optional(truth_of(options.truth));
-  ImportArray array = import_array(options);
-  if (!options.time_column.empty() && !has_column(options.pressures, options.time_column) &&
-      !has_column(options.poses, options.time_column)) {
-    refuse(fmt::format("`time-column {}`", options.time_column),
-           "no table has this column; give its name");
-  }
-  PressureTable pressures =
-      is_npy(options.pressures)
-          ? read_npy_pressures(options.pressures, array)
-          : read_pressures(options.pressures, array.elements_mm.size(), columns);
+  auto& [pressures, poses, T_robot_object] = rows;
   ImportedRecording imported;
-  const Unit length_unit = columns.length_unit.value_or(length_units.front());
-  std::array<Unit, 3> pose_units{length_unit, length_unit,
-                                 columns.angle_unit.value_or(angle_units.front())};
   imported.holds_poses = pressures.holds_poses;
   Recording& recording = imported.recording;
   recording.pressure_unit = options.pressure_unit;
+  recording.object = options.object;
   recording.elements_mm = std::move(array.elements_mm);
   recording.valid = std::move(array.valid);
   recording.baseline = std::move(array.baseline);
@@ -342,11 +298,6 @@ ImportedRecording import_tables(const ImportOptions& options) {
   recording.time_s = std::move(pressures.time_s);
   recording.device_time_s = std::move(pressures.device_time_s);
   recording.lost_before = std::move(pressures.lost_before);
-  std::optional<PoseTable> poses;
-  if (!options.poses.empty()) {
-    // The rows of one file belong together, even where their times are equal.
-    poses = read_poses(options.poses, columns, !in_one_file(options));
-  }
   imported.whole_up_to = whole_numbers_as_kpa(recording);
   choose_rows(options, recording);
   mark_unknown(options.pressures, recording);
@@ -356,10 +307,13 @@ ImportedRecording import_tables(const ImportOptions& options) {
              "is for poses in space; {} has x, y and theta", options.poses);
     }
     if (!poses->spatial.empty()) {
-      imported.of_poses = take_into_plane(normal, *poses, recording);
+      const TouchPlane plane = touch_plane(poses->spatial, normal);
+      imported.of_poses = take_into_plane(plane, *poses, recording);
+      if (T_robot_object) {
+        recording.truth = Truth{options.object, inverse(plane.project(*T_robot_object))};
+      }
     }
     imported.assumed_units = poses->assumed_units;
-    pose_units = poses->units;
     join(std::move(*poses), options, imported);
   } else {
     const bool at_zero = options.unposed && recording.rows == "touches";
@@ -369,12 +323,52 @@ ImportedRecording import_tables(const ImportOptions& options) {
   if (recording.rows == "touches" && !options.unposed) {
     require_touch_poses(options, imported);
   }
-  recording.object = options.object;
+  return imported;
+}
+
+}  // namespace
+
+ImportedRecording import_tables(const ImportOptions& options) {
+  const TableOptions columns = table_options(options);
+  check_numbers(options);
+  auto truth = options.truth.empty() ? std::nullopt : std::optional(truth_of(options.truth));
+  ImportArray array = import_array(options);
+  if (!options.time_column.empty() && !has_column(options.pressures, options.time_column) &&
+      !has_column(options.poses, options.time_column)) {
+    refuse(fmt::format("`time-column {}`", options.time_column),
+           "no table has this column; give its name");
+  }
+  ImportRows rows{.pressures =
+                      is_npy(options.pressures)
+                          ? read_npy_pressures(options.pressures, array)
+                          : read_pressures(options.pressures, array.elements_mm.size(), columns)};
+  const Unit length_unit = columns.length_unit.value_or(length_units.front());
+  std::array<Unit, 3> pose_units{length_unit, length_unit,
+                                 columns.angle_unit.value_or(angle_units.front())};
+  if (!options.poses.empty()) {
+    // The rows of one file belong together, even where their times are equal.
+    rows.poses = read_poses(options.poses, columns, !in_one_file(options));
+    pose_units = rows.poses->units;
+  }
+  ImportedRecording imported = recording_of(options, std::move(array), std::move(rows));
   if (truth) {
     truth->T_object_robot = truth_pose(options.truth, truth->T_object_robot, pose_units);
-    recording.truth = truth;
+    imported.recording.truth = truth;
   }
   return imported;
+}
+
+ImportedRecording import_rows(const ImportOptions& options, ImportRows rows) {
+  check_numbers(options);
+  ImportArray array = import_array(options);
+  const std::size_t elements = array.elements_mm.size();
+  if (const std::size_t n = rows.pressures.time_s.size();
+      rows.pressures.pressure.size() != n * elements) {
+    refuse(options.pressures,
+           "has {} readings a frame for an array of {} elements; correct `array`",
+           rows.pressures.pressure.size() / std::max<std::size_t>(n, 1), elements);
+  }
+  return recording_of(options, std::move(array), std::move(rows));
 }
 
 }  // namespace palpate

@@ -7,6 +7,8 @@
 
 #include <glm/vec2.hpp>
 
+#include "io/pose_table.hpp"
+#include "io/pressure_table.hpp"
 #include "palpate/pose_track.hpp"
 #include "palpate/touch.hpp"
 
@@ -56,5 +58,15 @@ struct ImportedRecording {
 /// @throws Error, naming the option and its value, or file and line or row, where the tables do not
 /// make a recording
 ImportedRecording import_tables(const ImportOptions& options);
+
+/// What tables hold, of a program that has read it elsewhere.
+struct ImportRows {
+  PressureTable pressures;
+  std::optional<PoseTable> poses;             ///< in space, in mm
+  std::optional<SpatialPose> T_robot_object;  ///< true pose of the object, in space
+};
+/// As import_tables() of tables that hold this. The options' files name what the rows came from.
+/// @throws Error as import_tables()
+ImportedRecording import_rows(const ImportOptions& options, ImportRows rows);
 
 }  // namespace palpate

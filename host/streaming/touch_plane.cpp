@@ -190,9 +190,8 @@ std::optional<glm::dvec3> plane_normal(const std::string& plane) {
   return normal;
 }
 
-std::vector<std::string> take_into_plane(const std::optional<glm::dvec3>& normal, PoseTable& poses,
+std::vector<std::string> take_into_plane(const TouchPlane& plane, PoseTable& poses,
                                          Recording& recording) {
-  const TouchPlane plane = touch_plane(poses.spatial, normal);
   std::vector<std::string> words =
       words_about(plane, poses.spatial, pressed_poses(poses, recording));
   for (const auto& pose : poses.spatial) {

@@ -48,8 +48,7 @@ std::optional<glm::dvec3> plane_normal(const std::string& plane);
 /// Takes a table's poses in space into the plane of the touches, and turns the recording's array
 /// over where it faces down.
 /// @returns what words_about() says
-/// @throws Error as touch_plane()
-std::vector<std::string> take_into_plane(const std::optional<glm::dvec3>& normal, PoseTable& poses,
+std::vector<std::string> take_into_plane(const TouchPlane& plane, PoseTable& poses,
                                          Recording& recording);
 
 }  // namespace palpate

@@ -1,3 +1,6 @@
+#include <algorithm>
+#include <cmath>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -7,6 +10,7 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
+#include "arrays.hpp"
 #include "bindings.hpp"
 #include "call.hpp"
 #include "model/option_words.hpp"
@@ -49,14 +53,61 @@ std::vector<std::string> remarks_on(const ImportedRecording& imported,
   return remarks;
 }
 
-std::tuple<ArrayRecording, std::vector<std::string>> import_python(
-    ImportOptions options, const std::optional<ArrayLike>& elements_mm) {
+using Imported = std::tuple<ArrayRecording, std::vector<std::string>>;
+
+/// The options, with the elements that stand for the array.
+ImportOptions with_elements(ImportOptions options, const std::optional<ArrayLike>& elements_mm) {
   if (elements_mm) {
     options.elements_mm = points_of(*elements_mm, "array");
   }
-  ImportedRecording imported = run([options](Call&) { return import_tables(options); });
+  return options;
+}
+
+Imported returned(ImportedRecording imported, const ImportOptions& options) {
   std::vector<std::string> remarks = remarks_on(imported, options);
   return {array_recording(std::move(imported.recording)), std::move(remarks)};
+}
+
+Imported import_tables_python(const ImportOptions& given,
+                              const std::optional<ArrayLike>& elements_mm) {
+  const ImportOptions options = with_elements(given, elements_mm);
+  return returned(run([options](Call&) { return import_tables(options); }), options);
+}
+
+std::optional<SpatialPose> spatial_pose(std::span<const double> row) {
+  if (std::ranges::any_of(row, [](double number) { return !std::isfinite(number); })) {
+    return {};
+  }
+  return SpatialPose{{row[0], row[1], row[2]},
+                     glm::normalize(glm::dquat(row[6], row[3], row[4], row[5]))};
+}
+
+Imported import_rows_python(const ImportOptions& given, const ArrayLike& pressure,
+                            const ArrayLike& time_s, const std::optional<ArrayLike>& elements_mm,
+                            const std::optional<ArrayLike>& pose_time_s,
+                            const std::optional<ArrayLike>& poses,
+                            const std::optional<ArrayLike>& object_pose) {
+  const ImportOptions options = with_elements(given, elements_mm);
+  ArrayReader reader;
+  ImportRows rows;
+  rows.pressures.pressure = reader.floats(pressure, "pressure", {"n", "e"}).copied();
+  rows.pressures.time_s = reader.floats(time_s, "time_s", {"n"}).copied();
+  if (poses) {
+    rows.poses.emplace();
+    rows.poses->time_s = reader.floats(pose_time_s.value(), "pose_time_s", {"m"}).copied();
+    const Floats all = reader.floats(*poses, "poses", {"m", "7"});
+    for (std::size_t i = 0; i < rows.poses->time_s.size(); ++i) {
+      rows.poses->spatial.push_back(spatial_pose(all.values().subspan(7 * i, 7)));
+    }
+  }
+  if (object_pose) {
+    const Floats row = reader.floats(*object_pose, "object_pose", {"7"});
+    rows.T_robot_object = spatial_pose(row.values());
+  }
+  return returned(run([options, rows = std::move(rows)](Call&) mutable {
+                    return import_rows(options, std::move(rows));
+                  }),
+                  options);
 }
 
 }  // namespace
@@ -84,8 +135,14 @@ void bind_import(nb::module_& module) {
       .def_rw("object", &ImportOptions::object)
       .def_rw("unposed", &ImportOptions::unposed);
   module.def(
-      "import_tables", &import_python, "options"_a, "elements_mm"_a = nb::none(),
+      "import_tables", &import_tables_python, "options"_a, "elements_mm"_a = nb::none(),
       "The recording, and what is worth a warning. elements_mm [e, 2] stands for the array.");
+  module.def(
+      "import_rows", &import_rows_python, "options"_a, "pressure"_a, "time_s"_a,
+      "elements_mm"_a = nb::none(), "pose_time_s"_a = nb::none(), "poses"_a = nb::none(),
+      "object_pose"_a = nb::none(),
+      "As import_tables() of pressures [n, e] at times [n] and poses of the sensor [m, 7] in\n"
+      "the robot frame, mm and a quaternion x, y, z, w, at times [m]; of an object's pose [7].");
 }
 
 }  // namespace palpate::python

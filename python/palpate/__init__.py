@@ -72,6 +72,7 @@ from ._palpate import (
     training_grid as training_grid,
     transform as transform,
 )
+from ._bag import read_bag as read_bag
 from .commands import (
     Plan as Plan,
     calibrate as calibrate,

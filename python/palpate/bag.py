@@ -1,0 +1,120 @@
+"""Recordings from logs of ROS 1 and ROS 2: rosbag, sqlite3 and MCAP, read by the package rosbags.
+
+`python -m palpate.bag LOG --list` shows what a log holds; docs/files.md describes the rest.
+"""
+
+import argparse
+import sys
+import warnings
+from typing import Any
+
+from ._bag import read_bag, topics
+from ._error import Error
+
+
+def _flag_parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        "python -m palpate.bag",
+        description="Makes a recording (HDF5) from a log of ROS 1 or ROS 2.",
+    )
+    add = parser.add_argument
+    add("log", metavar="LOG", help="bag of ROS 1 (.bag), or of ROS 2: its folder, .db3 or .mcap")
+    add("--list", action="store_true", help="show the topics, their types, rates and what they may be")
+    add("--pressure-topic", metavar="TOPIC", help="topic of the readings")
+    add("--pressure-field", metavar="FIELD", help="field of its messages, as sensors.taxels.z "
+        "[the only list of numbers]")  # fmt: skip
+    add("--pose-topic", metavar="TOPIC", help="topic of the array's poses in the robot frame")
+    add("--tf", metavar="TARGET:SOURCE", help="frames of the robot's base and of the array, from /tf")
+    add("--truth-tf", metavar="TARGET:SOURCE", help="frames of the robot's base and of the object")
+    add("--array", metavar="ARRAY", help="COLUMNS:ROWS:PITCH in mm, or a CSV file of the elements")
+    add("--first-element", default="bottom-left", metavar="CORNER",
+        help="corner that is read first: bottom-left, bottom-right, top-left, top-right [bottom-left]")  # fmt: skip
+    add("--order", default="rows", help="rows or columns [rows]")
+    add("--dead", default="", metavar="I,J", help="elements that do not read, from 0")
+    add("--pressure-unit", default="kPa", help="kPa or raw [kPa]")
+    add("--plane", default="auto", metavar="NX,NY,NZ", help="normal of the touches' plane [auto]")
+    add("--largest-gap-s", type=float, metavar="S", help="poses further apart are not interpolated")
+    add("--object", default="", metavar="LABEL", help="what was touched")
+    add("-o", "--output", metavar="FILE", help="recording to write (HDF5)")
+    return parser
+
+
+def _frames(flag: str, text: str | None) -> tuple[str, str] | None:
+    if text is None:
+        return None
+    target, _, source = text.partition(":")
+    if not target or not source:
+        raise Error(f"{flag} {text}: give two frames, TARGET:SOURCE")
+    return target, source
+
+
+def _show_progress(fraction: float) -> None:
+    print(f"\rreading {100.0 * fraction:3.0f} %", end="", file=sys.stderr, flush=True)
+
+
+def _run(arguments: argparse.Namespace) -> None:
+    if arguments.list:
+        rows = topics(arguments.log)
+        width = max((len(row.name) for row in rows), default=0)
+        for row in rows:
+            print(f"{row.name:{width}}  {row.messages:8d}  {row.rate_hz:7.1f} Hz  {row.type}"
+                  + (f"  ({row.guess})" if row.guess else ""))  # fmt: skip
+        return
+    for flag in ("pressure_topic", "array", "output"):
+        if getattr(arguments, flag) is None:
+            raise Error(f"--{flag.replace('_', '-')}: missing; --list shows the topics of the log")
+    try:
+        dead = [int(text) for text in arguments.dead.split(",") if arguments.dead]
+    except ValueError:
+        raise Error(f"--dead {arguments.dead}: give numbers of elements, such as 13,42") from None
+    plane: Any = arguments.plane
+    if plane != "auto":
+        try:
+            plane = tuple(float(text) for text in plane.split(","))
+        except ValueError:
+            raise Error(f"--plane {arguments.plane}: give auto, or a normal such as 0,0,1") from None
+    shown = sys.stderr.isatty()
+    recording = read_bag(
+        arguments.log,
+        pressure_topic=arguments.pressure_topic,
+        array=arguments.array,
+        pressure_field=arguments.pressure_field,
+        pose_topic=arguments.pose_topic,
+        tf=_frames("--tf", arguments.tf),
+        truth_tf=_frames("--truth-tf", arguments.truth_tf),
+        first_element=arguments.first_element,
+        order=arguments.order,
+        dead=dead,
+        pressure_unit=arguments.pressure_unit,
+        plane=plane,
+        largest_gap_s=arguments.largest_gap_s,
+        object=arguments.object,
+        progress=_show_progress if shown else None,
+    )
+    if shown:
+        print("\r" + " " * 16 + "\r", end="", file=sys.stderr)
+    recording.save(arguments.output)
+    posed = int((~_isnan(recording.T_robot_sensor[:, 2])).sum())
+    print(f"{arguments.output}: {len(recording)} frames of {recording.elements_mm.shape[0]} elements, "
+          f"{posed} with a pose; next: palpate touches {arguments.output} -o TOUCHES.h5")  # fmt: skip
+
+
+def _isnan(values: Any) -> Any:
+    import numpy
+
+    return numpy.isnan(values)
+
+
+def main() -> int:
+    """The command; returns its exit status, 2 where the input is wrong."""
+    warnings.showwarning = lambda message, *_: print(f"palpate.bag: {message}", file=sys.stderr)
+    try:
+        _run(_flag_parser().parse_args())
+    except (Error, OSError) as error:
+        print(f"palpate.bag: {error}", file=sys.stderr)
+        return 1 if getattr(error, "fault", "input") == "system" else 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,242 @@
+"""Bags of each storage become the recordings of what they hold; what they lack is said."""
+
+import math
+import os
+import pathlib
+import subprocess
+import sys
+from typing import Any
+
+import numpy
+import pytest
+from rosbags.rosbag1 import Writer as Writer1
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import Writer as Writer2
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+import palpate
+from palpate import read_bag
+from palpate.bag import topics
+
+START_S = 1_700_000_000.0
+#: A custom type, which only the bag knows: taxels in fingers, and a list that is no pressure.
+CUSTOM = """
+std_msgs/Header header
+int32[2] serial
+lab_msgs/Finger[] fingers
+================================================================================
+MSG: lab_msgs/Finger
+string name
+uint16[] taxels
+"""
+
+
+class Bag:
+    """Writes a bag of ROS 1, or of ROS 2 in either storage."""
+
+    def __init__(self, path: pathlib.Path, storage: str) -> None:
+        self.ros1 = storage == "bag"
+        store = Stores.ROS1_NOETIC if self.ros1 else Stores.ROS2_HUMBLE
+        self.types = get_typestore(store)
+        self.types.register(get_types_from_msg(CUSTOM, "lab_msgs/msg/Hand"))
+        if self.ros1:
+            tree = "geometry_msgs/TransformStamped[] transforms"
+            self.types.register(get_types_from_msg(tree, "tf2_msgs/msg/TFMessage"))
+        self.path = path / ("log.bag" if self.ros1 else storage)
+        if self.ros1:
+            self.writer: Any = Writer1(self.path)
+        else:
+            plugin = StoragePlugin.MCAP if storage == "mcap" else StoragePlugin.SQLITE3
+            self.writer = Writer2(self.path, version=9, storage_plugin=plugin)
+        self.writer.open()
+        self.connections: dict[str, Any] = {}
+
+    def of(self, name: str, *values: Any, **named: Any) -> Any:
+        return self.types.types[name](*values, **named)
+
+    def stamp(self, time_s: float) -> Any:
+        return self.of("builtin_interfaces/msg/Time", int(time_s), round(1e9 * (time_s - int(time_s))))
+
+    def header(self, time_s: float, frame: str = "") -> Any:
+        extra = {"seq": 0} if self.ros1 else {}
+        return self.of("std_msgs/msg/Header", stamp=self.stamp(time_s), frame_id=frame, **extra)
+
+    def pose(self, kind: str, x: float, y: float, z: float, turn: numpy.ndarray) -> Any:
+        q = self.of("geometry_msgs/msg/Quaternion", *turn)
+        if kind == "Pose":
+            return self.of("geometry_msgs/msg/Pose", self.of("geometry_msgs/msg/Point", x, y, z), q)
+        vector = self.of("geometry_msgs/msg/Vector3", x, y, z)
+        return self.of("geometry_msgs/msg/Transform", vector, q)
+
+    def write(self, topic: str, message: Any, received_s: float) -> None:
+        name = message.__msgtype__
+        if topic not in self.connections:
+            self.connections[topic] = self.writer.add_connection(topic, name, typestore=self.types)
+        serialize = self.types.serialize_ros1 if self.ros1 else self.types.serialize_cdr
+        self.writer.write(self.connections[topic], round(1e9 * received_s), serialize(message, name))
+
+    def close(self) -> pathlib.Path:
+        self.writer.close()
+        return self.path
+
+
+def about_z(theta: float) -> numpy.ndarray:
+    return numpy.array([0.0, 0.0, math.sin(theta / 2), math.cos(theta / 2)])
+
+
+#: A tool that points down: half a turn about x, then theta about the robot's z.
+def pointing_down(theta: float) -> numpy.ndarray:
+    return numpy.array([math.cos(theta / 2), math.sin(theta / 2), 0.0, 0.0])
+
+
+def readings(i: int) -> numpy.ndarray:
+    return numpy.array([i + 0.5, 0.25, 3, i], dtype=numpy.float32)
+
+
+def write_log(path: pathlib.Path, storage: str) -> pathlib.Path:
+    """Ten frames every 0.1 s; the arm moves 10 mm a frame and turns, and holds the array pointing down.
+
+    Messages arrive 5 ms after their time. Transforms come between the frames.
+    """
+    bag = Bag(path, storage)
+    moving = "geometry_msgs/msg/TransformStamped"
+    flange = bag.of(moving, bag.header(0.0, "arm"), "/array", bag.pose("Transform", 0, 0, -0.02, pointing_down(0)))
+    cup = bag.of(moving, bag.header(0.0, "base"), "cup", bag.pose("Transform", 0.6, 0.1, 0, about_z(0.3)))
+    array = "tf2_msgs/msg/TFMessage"
+    bag.write("/tf_static", bag.of(array, [flange, cup]), START_S)
+    for k in range(11):
+        at = START_S + 0.1 * k - 0.05
+        arm = bag.pose("Transform", 0.6 + 0.01 * (k - 0.5), 0.1, 0.3, about_z(0.05 * (k - 0.5)))
+        edges = [bag.of(moving, bag.header(at, "/base"), "arm", arm)]
+        bag.write("/tf", bag.of(array, edges), at + 0.005)
+    for i in range(10):
+        at = START_S + 0.1 * i
+        layout = bag.of("std_msgs/msg/MultiArrayLayout", [], 0)
+        bag.write("/plain", bag.of("std_msgs/msg/Float32MultiArray", layout, readings(i)), at)
+        taxels = (100 * readings(i)).astype(numpy.uint16)
+        fingers = [bag.of("lab_msgs/msg/Finger", name, part)
+                   for name, part in (("a", taxels[:1]), ("b", taxels[1:]))]  # fmt: skip
+        hand = bag.of("lab_msgs/msg/Hand", bag.header(at), numpy.array([7, 8], dtype=numpy.int32), fingers)
+        bag.write("/hand", hand, at + 0.005)
+        pose = bag.pose("Pose", 0.6 + 0.01 * i, 0.1, 0.28, pointing_down(0.05 * i))
+        bag.write("/pose", bag.of("geometry_msgs/msg/PoseStamped", bag.header(at, "base"), pose), at + 0.005)
+    return bag.close()
+
+
+@pytest.fixture(params=["bag", "sqlite3", "mcap"])
+def log(request: pytest.FixtureRequest, tmp_path: pathlib.Path) -> pathlib.Path:
+    return write_log(tmp_path, request.param)
+
+
+def expect_poses(recording: palpate.Recording) -> None:
+    expected = [[600 + 10 * i, 100, 0.05 * i] for i in range(10)]
+    # Times since 1970 resolve 0.2 us.
+    numpy.testing.assert_allclose(recording.T_robot_sensor, expected, atol=1e-4)
+    # Read row by row from the lower left corner, as the array's own frame has them, seen from above.
+    assert recording.elements_mm.tolist() == [[-1, 1], [1, 1], [-1, -1], [1, -1]]
+    numpy.testing.assert_allclose(recording.time_s, [START_S + 0.1 * i for i in range(10)], atol=1e-6)
+
+
+def test_frames_take_the_chain_of_transforms(log: pathlib.Path) -> None:
+    with pytest.warns(UserWarning) as said:
+        recording = read_bag(
+            log, pressure_topic="/hand", pressure_field="fingers.taxels", tf=("base", "array"),
+            truth_tf=("base", "cup"), array=(2, 2, 2), pressure_unit="raw", object="cup",
+        )  # fmt: skip
+    expect_poses(recording)
+    assert recording.pressure.tolist() == [(100 * readings(i)).astype(int).tolist() for i in range(10)]
+    assert recording.truth is not None and recording.object == "cup" == recording.truth.object
+    numpy.testing.assert_allclose(
+        inverse(recording.truth.T_object_robot), [600, 100, 0.3], atol=1e-9
+    )
+    assert any("its y is turned over" in str(warning.message) for warning in said)
+
+
+def inverse(pose: Any) -> list[float]:
+    x, y, theta = pose
+    c, s = math.cos(theta), math.sin(theta)
+    return [-c * x - s * y, s * x - c * y, -theta]
+
+
+def test_frames_take_the_poses_of_a_topic(log: pathlib.Path) -> None:
+    seen: list[float] = []
+    with pytest.warns(UserWarning) as said:
+        recording = read_bag(
+            log, pressure_topic="/plain", pose_topic="/pose", array="2:2:2", dead=(1,), progress=seen.append
+        )
+    expect_poses(recording)
+    assert recording.pressure.tolist() == [readings(i).tolist() for i in range(10)]
+    assert recording.valid is not None and recording.valid.tolist() == [True, False, True, True]
+    words = " ".join(str(warning.message) for warning in said)
+    assert "/plain: 10 of 10 messages have no time of their own" in words
+
+
+def test_topics_are_listed(log: pathlib.Path) -> None:
+    found = {topic.name: topic for topic in topics(log)}
+    assert {name: (topic.messages, topic.guess) for name, topic in found.items()} == {
+        "/hand": (10, ""), "/plain": (10, "pressures"), "/pose": (10, "poses"), "/tf": (11, "transforms"),
+        "/tf_static": (1, "transforms"),
+    }  # fmt: skip
+    assert found["/pose"].type == "geometry_msgs/msg/PoseStamped"
+    assert 8.0 < found["/pose"].rate_hz < 10.0
+
+
+def test_what_a_log_lacks_is_said(log: pathlib.Path) -> None:
+    def refused(words: str, **options: Any) -> None:
+        given = {"pressure_topic": "/plain", "array": (2, 2, 2), **options}
+        with pytest.raises(palpate.Error) as error:
+            read_bag(log, **given)
+        assert str(error.value).startswith(f"{log}: ") and words in str(error.value), error.value
+
+    refused("has no topic /none; it has /hand, /plain", pressure_topic="/none")
+    refused("/pose: geometry_msgs/msg/PoseStamped has no list of numbers", pressure_topic="/pose")
+    refused("has the lists serial, fingers.taxels; name one by pressure_field", pressure_topic="/hand")
+    refused("no list of numbers taxels; it has serial", pressure_topic="/hand", pressure_field="taxels")
+    refused("/hand: lab_msgs/msg/Hand is no pose", pose_topic="/hand")
+    refused("no chain of transforms joins these frames; the log has arm, array, base", tf=("base", "head"))
+    refused("has 4 readings a frame for an array of 6 elements; correct array", array=(2, 3, 2))
+    with pytest.raises(palpate.Error, match="both say where the sensor is"):
+        read_bag(log, pressure_topic="/plain", array=(2, 2, 2), pose_topic="/p", tf=("a", "b"))
+
+
+def test_a_log_that_is_cut_off_is_said(tmp_path: pathlib.Path) -> None:
+    log = write_log(tmp_path, "bag")
+    log.write_bytes(log.read_bytes()[:3000])
+    with pytest.raises(palpate.Error, match="log.bag: (cannot be read as a bag|is cut off or damaged)"):
+        topics(log)
+    folder = write_log(tmp_path, "mcap")
+    [storage] = folder.glob("*.mcap")
+    storage.write_bytes(storage.read_bytes()[:200])
+    with pytest.raises(palpate.Error, match="mcap: (cannot be read as a bag|is cut off or damaged)"):
+        topics(folder)
+    with pytest.raises(palpate.Error, match="none.bag: no such file"):
+        topics(tmp_path / "none.bag")
+
+
+def test_the_program_writes_what_the_function_returns(tmp_path: pathlib.Path) -> None:
+    log = write_log(tmp_path, "mcap")
+
+    def run(*arguments: object) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [sys.executable, "-m", "palpate.bag", *map(str, arguments)], capture_output=True, text=True
+        )
+
+    listed = run(log, "--list")
+    assert listed.returncode == 0 and "lab_msgs/msg/Hand" in listed.stdout, listed.stderr
+    file = tmp_path / "f.h5"
+    flags = ("--pressure-topic", "/plain", "--array", "2:2:2", "--tf", "base:array", "--plane", "0,0,1")
+    done = run(log, *flags, "-o", file)
+    assert done.returncode == 0, done.stderr
+    assert "10 frames of 4 elements, 10 with a pose; next: palpate touches" in done.stdout
+    assert "palpate.bag: " in done.stderr
+    expect_poses(palpate.read_recording(file))
+    for arguments, words in (
+        ((log,), "--pressure-topic: missing; --list shows"),
+        ((log, *flags), "--output: missing"),
+        ((log, *flags, "--tf", "base", "-o", file), "--tf base: give two frames, TARGET:SOURCE"),
+        ((tmp_path / "none.bag", "--list"), "none.bag: no such file"),
+    ):
+        wrong = run(*arguments)
+        assert wrong.returncode == 2 and words in wrong.stderr, wrong.stderr
+        assert wrong.stderr.count("\n") == 1
+    assert os.path.exists(file)
