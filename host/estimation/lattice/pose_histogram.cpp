@@ -9,14 +9,13 @@
 #include <fmt/format.h>
 
 #include "estimation/change_in_steps.hpp"
-#include "estimation/contradiction.hpp"
+#include "estimation/contact_evidence.hpp"
 #include "estimation/displacement_check.hpp"
 #include "estimation/hypotheses.hpp"
 #include "estimation/lattice/dense_belief.hpp"
 #include "estimation/lattice/dense_likelihood.hpp"
 #include "estimation/lattice/expected_gain.hpp"
 #include "estimation/lattice/memory_plan.hpp"
-#include "estimation/lattice/prepared_touch.hpp"
 #include "estimation/lattice/reading_predictor.hpp"
 #include "estimation/lattice/refinement.hpp"
 #include "estimation/lattice/still_array.hpp"

@@ -9,7 +9,6 @@
 
 #include "estimation/change_in_steps.hpp"
 #include "estimation/contact_evidence.hpp"
-#include "estimation/contradiction.hpp"
 #include "estimation/hypotheses.hpp"
 #include "estimation/kernel_sizes.hpp"
 #include "estimation/moved_pivot.hpp"

@@ -1,7 +1,7 @@
 // Tiles in which every element sees the prior: none may be taken for one, and their bins have the
 // likelihood of the prior.
 
-#include "estimation/bounded/search/seen_tiles.hpp"
+#include "estimation/bounded/search/largest_tiles.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "estimation/bounded/search/unsettled_mass.hpp"
+#include "estimation/bounded/search/mass_account.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -9,7 +9,7 @@
 #include "estimation/bounded/search/leaf_pass.hpp"
 #include "estimation/bounded/search/mass_account.hpp"
 #include "estimation/bounded/search/tile_division.hpp"
-#include "estimation/contradiction.hpp"
+#include "estimation/contact_evidence.hpp"
 
 namespace palpate {
 

@@ -8,6 +8,9 @@
 
 #include "estimation/bounded/known_elements.hpp"
 #include "estimation/bounded/search/search_space.hpp"
+#include "estimation/bounded/tables/tile_levels.hpp"
+#include "model/bounding_box.hpp"
+#include "palpate/occupancy_grid.hpp"
 
 namespace palpate {
 
@@ -85,5 +88,15 @@ class LargestTiles {
   /// Whole sums of a still array in No Contact, [hypothesis], as sums_.
   std::vector<std::vector<std::uint32_t>> still_sums_;
 };
+
+/// The box around the elements, from the pivot, at every theta.
+/// @param turns [theta] its cosine and sine
+std::vector<BoundingBox> reaches_of(const KnownElements& elements,
+                                    std::span<const glm::dvec2> turns);
+
+/// The tiles in which an element may see something else than the prior, at one theta; none without
+/// elements. In all others every bin has the same likelihood.
+/// @param reach of the elements at this theta
+TileRange seen_tiles(const BoundingBox& reach, const OccupancyGrid& map, const TileLevel& level);
 
 }  // namespace palpate

@@ -7,7 +7,6 @@
 
 #include "estimation/bounded/search/leaf_evaluator.hpp"
 #include "estimation/bounded/search/mass_account.hpp"
-#include "estimation/bounded/search/unsettled_mass.hpp"
 #include "estimation/bounded/tables/tile_bounds.hpp"
 
 namespace palpate {

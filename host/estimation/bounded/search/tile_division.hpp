@@ -6,8 +6,8 @@
 
 #include "estimation/bounded/known_elements.hpp"
 #include "estimation/bounded/search/largest_tiles.hpp"
+#include "estimation/bounded/search/mass_account.hpp"
 #include "estimation/bounded/search/search_space.hpp"
-#include "estimation/bounded/search/unsettled_mass.hpp"
 #include "estimation/bounded/touch_overlap.hpp"
 #include "model/bounding_box.hpp"
 
