@@ -37,8 +37,8 @@ struct LearnedPresses {
   std::vector<TrainingMap> maps;  ///< to learn a table on
 };
 
-/// The presses with maps to learn a table on: the given ones, or maps of the presses. Takes all host
-/// threads.
+/// The presses with maps to learn a table on: the given ones, or maps of the presses. Takes all
+/// host threads.
 /// @throws Error as observed_map()
 LearnedPresses with_maps(std::vector<Press> presses, LearnedReadings readings,
                          const ModelLearning& how);

@@ -11,9 +11,7 @@ ChosenBins chosen(const Device& device, const FilterOptions& filter, bool automa
   return chosen_bins(device, shapes(), {filter, automatic, ""}, BinWidth::fine);
 }
 
-PoseLattice wide_lattice() {
-  return {.x_mm = {-1000.0, 1000.0, 1}, .y_mm = {-1000.0, 1000.0, 1}};
-}
+PoseLattice wide_lattice() { return {.x_mm = {-1000.0, 1000.0, 1}, .y_mm = {-1000.0, 1000.0, 1}}; }
 
 TEST(ChosenBins, AreThoseOfTheMapsWhereTheDeviceHoldsSoMany) {
   const Device device = Device::open();
