@@ -67,15 +67,17 @@ ImportArray grid_array_of(const Grid& grid, const std::string& first, const std:
   const bool by_rows = order == "rows";
   const std::vector<glm::dvec2> by_place = grid_array(grid.columns, grid.rows, grid.pitch_mm);
   ImportArray array;
-  array.line = static_cast<std::size_t>(by_rows ? grid.columns : grid.rows);
+  const auto columns = static_cast<std::size_t>(grid.columns);
+  const auto rows = static_cast<std::size_t>(grid.rows);
+  array.line = by_rows ? columns : rows;
   for (std::size_t e = 0; e < by_place.size(); ++e) {
-    const auto along = static_cast<int>(e % array.line);
-    const auto across = static_cast<int>(e / array.line);
-    const int i = by_rows ? along : across;
-    const int j = by_rows ? across : along;
-    const int column = right ? grid.columns - 1 - i : i;
-    const int row = top ? grid.rows - 1 - j : j;
-    array.elements_mm.push_back(by_place[static_cast<std::size_t>(row * grid.columns + column)]);
+    const std::size_t along = e % array.line;
+    const std::size_t across = e / array.line;
+    const std::size_t i = by_rows ? along : across;
+    const std::size_t j = by_rows ? across : along;
+    const std::size_t column = right ? columns - 1 - i : i;
+    const std::size_t row = top ? rows - 1 - j : j;
+    array.elements_mm.push_back(by_place[row * columns + column]);
   }
   return array;
 }

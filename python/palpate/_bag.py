@@ -1,6 +1,5 @@
 """Recordings from logs of ROS 1 and ROS 2: rosbag, sqlite3 and MCAP, read by the package rosbags."""
 
-import itertools
 import os
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal
@@ -63,15 +62,15 @@ def read_bag(
         tree = bag.transforms(wanted) if wanted else None
         bag.read([part for part in (frames, poses, tree) if part is not None], progress)
     frames.require_some(name)
-    pose_time_s: Sequence[float] | None = None
-    rows: Sequence[Row] | None = None
+    pose_time_s: ArrayLike | None = None
+    rows: ArrayLike | None = None
     truth: Row | None = None
     if poses is not None:
         poses.require_some(name)
         pose_time_s, rows = poses.in_order()
     if tf is not None and tree is not None:
-        pose_time_s = sorted(set(frames.time_s))
-        rows = tree.chain(name, *tf, pose_time_s, largest_gap_s)
+        times = sorted(set(frames.time_s))
+        pose_time_s, rows = times, tree.chain(name, *tf, times, largest_gap_s)
     if truth_tf is not None and tree is not None:
         truth = tree.still(name, *truth_tf, frames.time_s)
     options = {
@@ -97,7 +96,7 @@ def read_bag(
         *frames.arrays(name),
         elements_mm,
         None if pose_time_s is None else _array(pose_time_s, (-1,)),
-        None if rows is None else _array(list(itertools.chain.from_iterable(rows)), (-1, 7)),
+        None if rows is None else _array(rows, (-1, 7)),
         None if truth is None else _array(truth, (7,)),
     )
     warn([*sentences, *frames.remarks(name), *(poses.remarks(name) if poses else ())])
@@ -110,7 +109,7 @@ def topics(log: _Path) -> "list[Topic]":
         return bag.topics()
 
 
-def _array(values: Sequence[float], shape: tuple[int, ...]) -> "NDArray[numpy.float64]":
+def _array(values: "ArrayLike", shape: tuple[int, ...]) -> "NDArray[numpy.float64]":
     import numpy
 
     return numpy.asarray(values, dtype=numpy.float64).reshape(shape)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ._bag_transforms import Row, Transforms, row_of, stamp_s
+from ._bag_transforms import Transforms, row_of, stamp_s
 from ._error import Error
 
 # The build writes the stubs by importing the package, where there is no NumPy.
@@ -139,19 +139,18 @@ class Poses(_Timed):
     def __init__(self, topic: str, has_header: bool, path: str) -> None:
         super().__init__(topic, has_header)
         self.path = path
-        self.rows: list[Row] = []
+        self.rows = numbers("d")  #: one behind the other
 
     def add(self, topic: str, message: Any, received_s: float) -> None:
-        self.rows.append(row_of(_at(message, self.path)))
+        self.rows.extend(row_of(_at(message, self.path)))
         self.time_s.append(self.time_of(message, received_s))
 
-    def in_order(self) -> tuple[list[float], list[Row]]:
-        """Times, ascending, and the first pose of each."""
-        first: dict[float, Row] = {}
-        for time_s, row in zip(self.time_s, self.rows, strict=True):
-            first.setdefault(time_s, row)
-        times = sorted(first)
-        return times, [first[time_s] for time_s in times]
+    def in_order(self) -> "tuple[NDArray[numpy.float64], NDArray[numpy.float64]]":
+        """Times, ascending, and the first pose of each, [n, 7]."""
+        import numpy
+
+        times, first = numpy.unique(numpy.frombuffer(self.time_s), return_index=True)
+        return times, numpy.frombuffer(self.rows).reshape(-1, 7)[first]
 
 
 class Bag:

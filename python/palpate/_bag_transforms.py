@@ -3,6 +3,7 @@
 import bisect
 import itertools
 import math
+from array import array as numbers
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -36,15 +37,21 @@ class _Edge:
 
     parent: str
     static: bool
-    time_s: list[float] = field(default_factory=list)
-    rows: list[Row] = field(default_factory=list)
+    time_s: "numbers[float]" = field(default_factory=lambda: numbers("d"))
+    rows: "numbers[float]" = field(default_factory=lambda: numbers("d"))  #: one behind the other
+
+    def row(self, index: int) -> Row:
+        return tuple(self.rows[7 * index : 7 * index + 7])  # type: ignore[return-value]
 
     def sort(self) -> None:
-        if self.static:
+        if self.static or all(a <= b for a, b in itertools.pairwise(self.time_s)):
             return
         order = sorted(range(len(self.time_s)), key=self.time_s.__getitem__)
-        self.time_s = [self.time_s[i] for i in order]
-        self.rows = [self.rows[i] for i in order]
+        rows = numbers("d")
+        for i in order:
+            rows.extend(self.row(i))
+        self.time_s = numbers("d", (self.time_s[i] for i in order))
+        self.rows = rows
 
     def gap_s(self) -> float:
         """The longest step that a regular log takes when its steps jitter or a message is lost."""
@@ -54,14 +61,14 @@ class _Edge:
     def at(self, time_s: float, gap_s: float) -> Row | None:
         """Interpolated; None outside the log or between rows further apart than the gap."""
         if self.static:
-            return self.rows[0]
+            return self.row(0)
         after = bisect.bisect_left(self.time_s, time_s)
         if after < len(self.time_s) and self.time_s[after] == time_s:
-            return self.rows[after]
+            return self.row(after)
         if after in (0, len(self.time_s)) or self.time_s[after] - self.time_s[after - 1] > gap_s:
             return None
         before_s, after_s = self.time_s[after - 1], self.time_s[after]
-        return _between(self.rows[after - 1], self.rows[after], (time_s - before_s) / (after_s - before_s))
+        return _between(self.row(after - 1), self.row(after), (time_s - before_s) / (after_s - before_s))
 
 
 def _between(a: Row, b: Row, part: float) -> Row:
@@ -129,10 +136,10 @@ class Transforms:
                 edge = self.edges[child] = _Edge(parent, topic in self.static)
             row = row_of(transform.transform)
             if edge.static:
-                edge.rows = [row]
+                edge.rows = numbers("d", row)
             elif not math.isnan(row[3]):
                 edge.time_s.append(stamp_s(transform.header.stamp) or received_s)
-                edge.rows.append(row)
+                edge.rows.extend(row)
 
     def path(self, log: str, target: str, source: str) -> tuple[list[_Edge], list[_Edge]]:
         """The edges from the source up to the common ancestor, and from the target up to it."""
@@ -156,8 +163,8 @@ class Transforms:
 
     def chain(
         self, log: str, target: str, source: str, time_s: Sequence[float], gap_s: float | None
-    ) -> list[Row]:
-        """T_target_source at each time; NaN where it is not known."""
+    ) -> "numbers[float]":
+        """Rows T_target_source, one behind the other, at each time; NaN where it is not known."""
         source_up, target_up = self.path(log, target, source)
         gaps: dict[int, float] = {}
         for edge in (*source_up, *target_up):
@@ -173,20 +180,22 @@ class Transforms:
                 product = _product(row, product)
             return product
 
-        rows = []
+        rows = numbers("d")
         for at_s in time_s:
             a, b = up_to_common(target_up, at_s), up_to_common(source_up, at_s)
-            rows.append(UNKNOWN if a is None or b is None else _product(_inverse(a), b))
+            rows.extend(UNKNOWN if a is None or b is None else _product(_inverse(a), b))
         return rows
 
     def still(self, log: str, target: str, source: str, time_s: Sequence[float]) -> Row:
         """T_target_source of a frame that does not move: at the middle of the times when it is known."""
         times = sorted(set(time_s))
-        known = [row for row in self.chain(log, target, source, times, None) if not math.isnan(row[0])]
+        rows = self.chain(log, target, source, times, None)
+        known = [i for i in range(len(times)) if not math.isnan(rows[7 * i])]
         if not known:
             raise Error(
                 f"{log}: tf {target}:{source}: is not known at any frame's time; check the clocks"
             )
-        return known[len(known) // 2]
+        middle = 7 * known[len(known) // 2]
+        return tuple(rows[middle : middle + 7])  # type: ignore[return-value]
 
 
