@@ -28,8 +28,8 @@ double angle_between(const glm::dvec3& a, const glm::dvec3& b) {
   return std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b));
 }
 
-/// The mean direction of the sensor's z axis.
-glm::dvec3 mean_direction(const std::vector<std::optional<SpatialPose>>& poses) {
+/// The mean of the sensor's z axis, shorter than 1 where it points in several directions.
+glm::dvec3 mean_z(const std::vector<std::optional<SpatialPose>>& poses) {
   glm::dvec3 sum{0.0};
   double count = 0.0;
   for (const auto& pose : poses) {
@@ -38,13 +38,23 @@ glm::dvec3 mean_direction(const std::vector<std::optional<SpatialPose>>& poses) 
       ++count;
     }
   }
+  return count > 0.0 ? sum / count : glm::dvec3(0.0, 0.0, 1.0);
+}
+
+/// The normal of the plane across the direction in which the array looks.
+glm::dvec3 normal_across(const glm::dvec3& looks) {
   constexpr double least = 0.7;  // of the mean's length: directions within some 45 degrees
-  if (count > 0.0 && glm::length(sum) < least * count) {
+  constexpr double steep = 0.5;  // of the normal's part along the robot's z
+  if (glm::length(looks) < least) {
     throw Error(Fault::input,
                 "`plane`: missing; the sensor's z axis points in unlike directions, so that the "
                 "poses do not tell the plane of the touches: give its normal, such as 0,0,1");
   }
-  return count > 0.0 ? glm::normalize(sum) : glm::dvec3(0.0, 0.0, 1.0);
+  const glm::dvec3 n = glm::normalize(looks);
+  const double side = std::abs(n.z) > steep ? n.z : std::abs(n.x) >= std::abs(n.y) ? n.x : n.y;
+  const glm::dvec3 towards = side < 0.0 ? -n : n;
+  return angle_between(towards, {0.0, 0.0, 1.0}) <= much_tilt_rad ? glm::dvec3(0.0, 0.0, 1.0)
+                                                                  : towards;
 }
 
 /// [row] whether the array is pressed: some element reads at least half as far above its least
@@ -108,14 +118,8 @@ double TouchPlane::tilt_rad(const SpatialPose& pose) const {
 
 TouchPlane touch_plane(const std::vector<std::optional<SpatialPose>>& poses,
                        const std::optional<glm::dvec3>& normal) {
-  constexpr double steep = 0.5;  // of the normal's part along the robot's z
-  const glm::dvec3 looks = mean_direction(poses);
-  glm::dvec3 n = normal ? glm::normalize(*normal) : looks;
-  if (!normal) {
-    const double side = std::abs(n.z) > steep ? n.z : std::abs(n.x) >= std::abs(n.y) ? n.x : n.y;
-    n = side < 0.0 ? -n : n;
-    n = angle_between(n, {0.0, 0.0, 1.0}) <= much_tilt_rad ? glm::dvec3(0.0, 0.0, 1.0) : n;
-  }
+  const glm::dvec3 looks = mean_z(poses);
+  const glm::dvec3 n = normal ? glm::normalize(*normal) : normal_across(looks);
   TouchPlane plane{.normal = n, .faces_down = glm::dot(looks, n) < 0.0};
   constexpr double along = 0.9;
   const glm::dvec3 start =

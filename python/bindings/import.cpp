@@ -83,8 +83,8 @@ std::optional<SpatialPose> spatial_pose(std::span<const double> row) {
 }
 
 Imported import_rows_python(const ImportOptions& given, const ArrayLike& pressure,
-                            const ArrayLike& time_s, const std::optional<ArrayLike>& elements_mm,
-                            const std::optional<ArrayLike>& pose_time_s,
+                            const ArrayLike& time_s, const ArrayLike& pose_time_s,
+                            const std::optional<ArrayLike>& elements_mm,
                             const std::optional<ArrayLike>& poses,
                             const std::optional<ArrayLike>& object_pose) {
   const ImportOptions options = with_elements(given, elements_mm);
@@ -94,9 +94,9 @@ Imported import_rows_python(const ImportOptions& given, const ArrayLike& pressur
   rows.pressures.time_s = reader.floats(time_s, "time_s", {"n"}).copied();
   if (poses) {
     rows.poses.emplace();
-    rows.poses->time_s = reader.floats(pose_time_s.value(), "pose_time_s", {"m"}).copied();
+    rows.poses->time_s = reader.floats(pose_time_s, "pose_time_s", {"t"}).copied();
     const Floats all = reader.floats(*poses, "poses", {"m", "7"});
-    for (std::size_t i = 0; i < rows.poses->time_s.size(); ++i) {
+    for (std::size_t i = 0; i < all.shape[0]; ++i) {
       rows.poses->spatial.push_back(spatial_pose(all.values().subspan(7 * i, 7)));
     }
   }
@@ -138,11 +138,12 @@ void bind_import(nb::module_& module) {
       "import_tables", &import_tables_python, "options"_a, "elements_mm"_a = nb::none(),
       "The recording, and what is worth a warning. elements_mm [e, 2] stands for the array.");
   module.def(
-      "import_rows", &import_rows_python, "options"_a, "pressure"_a, "time_s"_a,
-      "elements_mm"_a = nb::none(), "pose_time_s"_a = nb::none(), "poses"_a = nb::none(),
-      "object_pose"_a = nb::none(),
-      "As import_tables() of pressures [n, e] at times [n] and poses of the sensor [m, 7] in\n"
-      "the robot frame, mm and a quaternion x, y, z, w, at times [m]; of an object's pose [7].");
+      "import_rows", &import_rows_python, "options"_a, "pressure"_a, "time_s"_a, "pose_time_s"_a,
+      "elements_mm"_a = nb::none(), "poses"_a = nb::none(), "object_pose"_a = nb::none(),
+      "As import_tables() of pressures [n, e] at times [n] and poses of the sensor [m, 7] in the\n"
+      "robot frame, mm and a quaternion x, y, z, w, at times [m], or one for each frame where "
+      "there\n"
+      "are no times; and of an object's pose [7].");
 }
 
 }  // namespace palpate::python

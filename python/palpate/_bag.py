@@ -9,14 +9,12 @@ from ._bag_messages import Progress, Topic, opened
 from ._bag_transforms import Row
 from ._error import Error
 from ._palpate import Recording
-from .recognition import filled, warn
+from .recognition import _Path, array_option, filled, warn
 
 # The build writes the stubs by importing the package, where there is no NumPy.
 if TYPE_CHECKING:
     import numpy
     from numpy.typing import ArrayLike, NDArray
-
-_Path = str | bytes | os.PathLike[str] | os.PathLike[bytes]
 
 
 def read_bag(
@@ -62,18 +60,23 @@ def read_bag(
         tree = bag.transforms(wanted) if wanted else None
         bag.read([part for part in (frames, poses, tree) if part is not None], progress)
     frames.require_some(name)
-    pose_time_s: ArrayLike | None = None
+    pressure, time_s = frames.arrays(name)
+    pose_time_s: ArrayLike = ()
     rows: ArrayLike | None = None
     truth: Row | None = None
+    remarks = frames.remarks(name)
     if poses is not None:
         poses.require_some(name)
         pose_time_s, rows = poses.in_order()
+        remarks += poses.remarks(name)
     if tf is not None and tree is not None:
-        times = sorted(set(frames.time_s))
-        pose_time_s, rows = times, tree.chain(name, *tf, times, largest_gap_s)
+        rows = tree.chain(name, *tf, time_s.tolist(), largest_gap_s)  # one for each frame
+        remarks += tree.remarks(name, tf, rows)
     if truth_tf is not None and tree is not None:
-        truth = tree.still(name, *truth_tf, frames.time_s)
+        truth = tree.still(name, *truth_tf, time_s.tolist())
+    text, elements_mm = array_option(array)
     options = {
+        "array": text,
         "pressures": f"{name}: {pressure_topic}",
         "poses": f"{name}: {pose_topic or (':'.join(tf) if tf else '')}" if rows is not None else "",
         "first_element": first_element,
@@ -84,22 +87,16 @@ def read_bag(
         "largest_gap_s": largest_gap_s,
         "object": object,
     }
-    elements_mm = None
-    if isinstance(array, tuple) and len(array) == 3 and isinstance(array[0], int):
-        options["array"] = ":".join(map(str, array))
-    elif isinstance(array, (str, bytes, os.PathLike)):
-        options["array"] = os.fsdecode(array)
-    else:
-        elements_mm = array
     recording, sentences = _palpate.import_rows(
         filled(_palpate.ImportOptions(), read_bag, options),
-        *frames.arrays(name),
+        pressure,
+        time_s,
+        _array(pose_time_s, (-1,)),
         elements_mm,
-        None if pose_time_s is None else _array(pose_time_s, (-1,)),
         None if rows is None else _array(rows, (-1, 7)),
         None if truth is None else _array(truth, (7,)),
     )
-    warn([*sentences, *frames.remarks(name), *(poses.remarks(name) if poses else ())])
+    warn([*sentences, *remarks])
     return recording
 
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 Progress = Callable[[float], object]
 
-#: Where the pressures of known types lie; of another type, the longest list of numbers is taken.
+#: Where the pressures of known types lie; of another type, the only list of numbers is taken.
 _PRESSURES = {
     "tactile_msgs/msg/TactileState": "sensors.values",
     "takktile_ros/msg/Touch": "pressure",
@@ -51,14 +51,11 @@ class Topic:
 
 
 def _at(message: Any, path: str) -> Any:
-    """The field of a dotted path; of lists, the field of each item."""
-    for part in path.split(".") if path else ():
-        message = (
-            [getattr(item, part) for item in message]
-            if isinstance(message, list)
-            else getattr(message, part)
-        )
-    return message
+    """The field of a dotted path; of lists, and lists in them, the field of each item."""
+    if isinstance(message, list):
+        return [_at(item, path) for item in message]
+    field, _, rest = path.partition(".")
+    return _at(getattr(message, field), rest) if field else message
 
 
 def _flat(values: Any) -> list[float]:
@@ -104,6 +101,8 @@ class _Timed:
 
 
 class Pressures(_Timed):
+    """The readings of a topic, one frame behind the other."""
+
     def __init__(self, topic: str, has_header: bool, path: str) -> None:
         super().__init__(topic, has_header)
         self.path = path
@@ -136,6 +135,8 @@ class Pressures(_Timed):
 
 
 class Poses(_Timed):
+    """The poses of a topic."""
+
     def __init__(self, topic: str, has_header: bool, path: str) -> None:
         super().__init__(topic, has_header)
         self.path = path
@@ -154,6 +155,8 @@ class Poses(_Timed):
 
 
 class Bag:
+    """An open log."""
+
     def __init__(self, name: str, reader: Any) -> None:
         self.name = name
         self.reader = reader
@@ -195,10 +198,9 @@ class Bag:
 
     def pressure_path(self, msgtype: str) -> str | None:
         """Where the pressures of a type lie; None where several lists may be meant, or none."""
-        if msgtype in _PRESSURES:
-            return _PRESSURES[msgtype]
         found = list(self.lists(msgtype))
-        return found[0] if len(found) == 1 else None
+        known = _PRESSURES.get(msgtype)
+        return known if known in found else found[0] if len(found) == 1 else None
 
     def pressures(self, topic: str, path: str | None) -> Pressures:
         msgtype = self.connections(topic)[0].msgtype
@@ -210,7 +212,7 @@ class Bag:
                 f"{self.name}: {topic}: {msgtype} has the lists {', '.join(found)}; name one by "
                 "pressure_field"
             )
-        if path is None or not (path in found or msgtype in _PRESSURES):
+        if path is None or path not in found:
             raise Error(
                 f"{self.name}: {topic}: {msgtype} has no list of numbers"
                 + (f" {path}; it has {', '.join(found)}" if path and found else "; give another topic")
@@ -245,13 +247,19 @@ class Bag:
         connections = [c for c in self.reader.connections if c.topic in takers]
         total = max(1, sum(c.msgcount for c in connections))
         done = 0
-        for connection, received_ns, data in self.reader.messages(connections):
-            message = self.reader.deserialize(data, connection.msgtype)
-            for part in takers[connection.topic]:
-                part.add(connection.topic, message, 1e-9 * received_ns)
+        for topic, received_s, message in self.messages(connections):
+            for part in takers[topic]:
+                part.add(topic, message, received_s)
             done += 1
             if progress is not None and done % 1000 == 0:
                 progress(done / total)
+
+    def messages(self, connections: list[Any]) -> Iterator[tuple[str, float, Any]]:
+        """Topic, time of reception and message of each."""
+        with _readable(self.name):
+            for connection, received_ns, data in self.reader.messages(connections):
+                message = self.reader.deserialize(data, connection.msgtype)
+                yield connection.topic, 1e-9 * received_ns, message
 
     def topics(self) -> list[Topic]:
         duration_s = 1e-9 * self.reader.duration
@@ -276,9 +284,24 @@ class Bag:
 
 
 @contextmanager
-def opened(name: str) -> Iterator[Bag]:
+def _readable(name: str) -> Iterator[None]:
+    """Says of any failure of the reader that the log is at fault."""
     try:
-        from rosbags.highlevel import AnyReader, AnyReaderError
+        yield
+    except MemoryError:
+        raise
+    except Exception as error:  # a damaged bag may fail anywhere in rosbags
+        raise Error(
+            f"{name}: cannot be read as a bag ({error or type(error).__name__}); copy it again, or "
+            "reindex it"
+        ) from None
+
+
+@contextmanager
+def opened(name: str) -> Iterator[Bag]:
+    """The log. Raises Error where it cannot be read, or rosbags is missing."""
+    try:
+        from rosbags.highlevel import AnyReader
         from rosbags.typesys import Stores, get_typestore
     except ImportError:
         raise Error("rosbags is missing; pip install 'palpate[bag]'") from None
@@ -287,14 +310,10 @@ def opened(name: str) -> Iterator[Bag]:
         raise Error(f"{name}: no such file or folder; give a bag")
     if path.suffix in (".db3", ".mcap") and (path.parent / "metadata.yaml").exists():
         path = path.parent
+    with _readable(name):
+        reader = AnyReader([path], default_typestore=get_typestore(Stores.LATEST))
+        reader.open()
     try:
-        with AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as reader:
-            yield Bag(name, reader)
-    except Error:
-        raise
-    except AnyReaderError as error:
-        raise Error(f"{name}: cannot be read as a bag ({error}); copy it again, or reindex it") from None
-    except (OSError, ValueError, KeyError, AssertionError, IndexError) as error:
-        raise Error(f"{name}: is cut off or damaged ({error!r}); copy it again, or reindex it") from None
-
-
+        yield Bag(name, reader)
+    finally:
+        reader.close()

@@ -22,7 +22,7 @@ def row_of(pose: Any) -> Row:
     q = pose.orientation if hasattr(pose, "orientation") else pose.rotation
     length = math.sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w)
     if not length > 0.0:
-        return (math.nan,) * 7
+        return UNKNOWN
     x, y, z, w = q.x / length, q.y / length, q.z / length, q.w / length
     return (1e3 * p.x, 1e3 * p.y, 1e3 * p.z, x, y, z, w)
 
@@ -184,6 +184,10 @@ class Transforms:
         for at_s in time_s:
             a, b = up_to_common(target_up, at_s), up_to_common(source_up, at_s)
             rows.extend(UNKNOWN if a is None or b is None else _product(_inverse(a), b))
+        if all(map(math.isnan, rows[::7])):
+            raise Error(
+                f"{log}: tf {target}:{source}: is not known at any frame's time; check the clocks"
+            )
         return rows
 
     def still(self, log: str, target: str, source: str, time_s: Sequence[float]) -> Row:
@@ -191,11 +195,15 @@ class Transforms:
         times = sorted(set(time_s))
         rows = self.chain(log, target, source, times, None)
         known = [i for i in range(len(times)) if not math.isnan(rows[7 * i])]
-        if not known:
-            raise Error(
-                f"{log}: tf {target}:{source}: is not known at any frame's time; check the clocks"
-            )
         middle = 7 * known[len(known) // 2]
         return tuple(rows[middle : middle + 7])  # type: ignore[return-value]
 
-
+    def remarks(self, log: str, chain: tuple[str, str], rows: Sequence[float]) -> list[str]:
+        """What is worth saying of rows that chain() gave."""
+        unknown = sum(map(math.isnan, rows[::7]))
+        if not unknown:
+            return []
+        return [
+            f"{log}: tf {':'.join(chain)}: {unknown} of {len(rows) // 7} frames have no pose, as a "
+            "transform is missing, or the ones around them are too far apart (largest_gap_s)"
+        ]

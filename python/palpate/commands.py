@@ -27,6 +27,7 @@ from .recognition import (
     _Pair,
     _Path,
     _Recordings,
+    array_option,
     filled,
     request_of,
     warn,
@@ -239,11 +240,7 @@ def import_tables(
     """
     options = dict(locals())
     del options["truth"]
-    elements_mm = None
-    if isinstance(array, tuple) and len(array) == 3 and isinstance(array[0], int):
-        options["array"] = ":".join(map(str, array))
-    elif not isinstance(array, (str, bytes, os.PathLike)):
-        elements_mm = options.pop("array")
+    options["array"], elements_mm = array_option(array)
     options["dead"] = ",".join(map(str, dead))
     options["plane"] = plane if isinstance(plane, str) else ",".join(map(str, plane))
     for names in ("pose_unit", "pose_columns"):

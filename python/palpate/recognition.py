@@ -146,6 +146,15 @@ def filled(request: _Request, function: Callable[..., Any], options: Mapping[str
     return request
 
 
+def array_option(array: Any) -> tuple[str | None, Any]:
+    """What the option `array` says as a text, or else the elements' centres."""
+    if isinstance(array, tuple) and len(array) == 3 and isinstance(array[0], int):
+        return ":".join(map(str, array)), None
+    if isinstance(array, (str, bytes, os.PathLike)):
+        return os.fsdecode(array), None
+    return None, array
+
+
 def warn(sentences: list[str]) -> None:
     """Warns the caller of the function that calls this one."""
     for sentence in sentences:

@@ -2,10 +2,9 @@
 
 #include <cmath>
 #include <fstream>
-#include <numbers>
 
 #include <fmt/format.h>
-#include <glm/gtc/quaternion.hpp>
+#include <gmock/gmock.h>
 
 #include "import_command.hpp"
 
@@ -274,84 +273,6 @@ TEST_F(ImportCommand, WholeNumbersSaidToBePressuresAreNoticed) {
   EXPECT_EQ(done(command({})).find("whole numbers"), std::string::npos);
   put("log.csv", frames);
   EXPECT_EQ(done(command({})).find("whole numbers"), std::string::npos) << "of few kPa";
-}
-
-/// Poses in space, of an array 100 mm above the robot's xy plane whose frame the 2D poses have,
-/// taken on by `turn`.
-std::string spatial_poses(const std::vector<Pose>& poses, const glm::dquat& turn, double tilt_rad) {
-  std::string table = "time,tx,ty,tz,qx,qy,qz,qw\n";
-  for (std::size_t i = 0; i < poses.size(); ++i) {
-    const glm::dvec3 p = turn * glm::dvec3(poses[i].translation_mm, 100.0);
-    const glm::dquat q = turn * glm::angleAxis(poses[i].theta_rad, glm::dvec3(0.0, 0.0, 1.0)) *
-                         glm::angleAxis(tilt_rad, glm::dvec3(1.0, 0.0, 0.0));
-    table += fmt::format("{},{},{},{},{},{},{},{}\n", 0.05 * static_cast<double>(i), p.x, p.y, p.z,
-                         q.x, q.y, q.z, q.w);
-  }
-  return table;
-}
-
-TEST_F(ImportCommand, PosesInSpaceBecomePosesInThePlaneOfTheTouches) {
-  const std::vector<Pose> poses{{{1.0, 2.0}, 0.5}, {{-3.0, 4.0}, -2.0}, {{6.0, -5.0}, 3.0}};
-  const glm::dquat none(1.0, 0.0, 0.0, 0.0);
-  const glm::dquat upright = glm::angleAxis(std::numbers::pi / 2.0, glm::dvec3(1.0, 0.0, 0.0));
-  put("array.csv", "x,y\n-1,0.5\n1,-0.25\n");
-  for (const bool down : {false, true}) {
-    for (const glm::dquat& turn : {none, upright}) {
-      SCOPED_TRACE(fmt::format("{}, {}", down, turn.w));
-      put("poses.csv", spatial_poses(poses, turn, down ? std::numbers::pi : 0.0));
-      const Outcome outcome = palpate(
-          command({"--array", "array.csv", "--poses", "poses.csv", "--pose-unit", "mm,rad"}));
-      ASSERT_EQ(outcome.status, 0) << outcome.err;
-      const Recording recording = read_recording(folder_ / "o.h5");
-      // In an upright plane, whose normal is the robot's y, x is still the robot's and y its -z.
-      const double side = turn == none ? 1.0 : -1.0;
-      const bool faces_away = down == (side > 0.0);
-      for (std::size_t i = 0; i < poses.size(); ++i) {
-        const Pose& pose = recording.T_robot_sensor[i];
-        EXPECT_NEAR(pose.translation_mm.x, poses[i].translation_mm.x, 1e-9);
-        EXPECT_NEAR(pose.translation_mm.y, side * poses[i].translation_mm.y, 1e-9);
-        EXPECT_NEAR(wrap_angle(pose.theta_rad - side * poses[i].theta_rad, 2.0 * std::numbers::pi),
-                    0.0, 1e-9);
-      }
-      EXPECT_EQ(recording.elements_mm[0], glm::dvec2(-1.0, faces_away ? -0.5 : 0.5));
-      EXPECT_EQ(recording.elements_mm[1], glm::dvec2(1.0, faces_away ? 0.25 : -0.25));
-      EXPECT_EQ(outcome.err.find("y is turned over") != std::string::npos, faces_away);
-      EXPECT_EQ(outcome.err.find("x and y are along (1, 0, 0) and (0, 0, -1) of the robot frame") !=
-                    std::string::npos,
-                side < 0.0)
-          << outcome.err;
-      EXPECT_EQ(outcome.err.find("tilted"), std::string::npos);
-    }
-  }
-}
-
-TEST_F(ImportCommand, TiltAndHeightUnderLoadAreSaid) {
-  const std::vector<Pose> poses(3);
-  const glm::dquat none(1.0, 0.0, 0.0, 0.0);
-  put("poses.csv", spatial_poses(poses, none, 0.2));
-  const std::string tilted = palpate(command({"--poses", "poses.csv", "--plane", "0,0,2"})).err;
-  EXPECT_NE(
-      tilted.find("poses.csv: 2 of 2 poses under load are tilted by more than 3 degrees, 11.5 "
-                  "at most: press the array flat, or give the --plane"),
-      std::string::npos)
-      << tilted;
-  // Only the last two frames are pressed: the first pose's height does not count.
-  std::string table = spatial_poses(poses, none, 0.0);
-  table.replace(table.find("100"), 3, "190");
-  put("poses.csv", table);
-  EXPECT_EQ(palpate(command({"--poses", "poses.csv"})).err, "");
-  table.replace(table.rfind("100"), 3, "103");
-  put("poses.csv", table);
-  EXPECT_EQ(palpate(command({"--poses", "poses.csv"})).err,
-            "palpate: poses.csv: the height under load varies by 3.0 mm: do all touches lie in one "
-            "plane?\n");
-}
-
-TEST_F(ImportCommand, TrajectoriesWithoutAHeaderAreReadByTheirNumberOfColumns) {
-  put("poses.csv", "0 1 2 3 0 0 0 1\n0.1 2 3 3 0 0 0.479425538604203 0.8775825618903728\n");
-  const Recording recording = imported({"--poses", "poses.csv", "--pose-unit", "m,rad"});
-  EXPECT_EQ(recording.T_robot_sensor.front().translation_mm, glm::dvec2(1000.0, 2000.0));
-  EXPECT_NEAR(recording.T_robot_sensor.back().theta_rad, 1.0, 1e-12);
 }
 
 TEST_F(ImportCommand, LongLogsTakeLittleMemory) {

@@ -5,6 +5,7 @@ import os
 import pathlib
 import subprocess
 import sys
+import warnings
 from typing import Any
 
 import numpy
@@ -31,6 +32,29 @@ uint16[] taxels
 """
 
 
+#: Types that are known by their names, as their packages define them, shortened.
+KNOWN = {
+    "tactile_msgs/msg/TactileState": """
+std_msgs/Header header
+sensor_msgs/ChannelFloat32[] sensors
+""",
+    "takktile_ros/msg/Touch": "float32[] pressure\nfloat32[] temp\n",
+    "xela_server_ros2/msg/SensStream": """
+xela_server_ros2/SensorFull[] sensors
+================================================================================
+MSG: xela_server_ros2/SensorFull
+float64 time
+xela_server_ros2/Taxel[] taxels
+int32[] other
+================================================================================
+MSG: xela_server_ros2/Taxel
+uint16 x
+uint16 y
+uint16 z
+""",
+}
+
+
 class Bag:
     """Writes a bag of ROS 1, or of ROS 2 in either storage."""
 
@@ -39,6 +63,8 @@ class Bag:
         store = Stores.ROS1_NOETIC if self.ros1 else Stores.ROS2_HUMBLE
         self.types = get_typestore(store)
         self.types.register(get_types_from_msg(CUSTOM, "lab_msgs/msg/Hand"))
+        for name, text in KNOWN.items():
+            self.types.register(get_types_from_msg(text, name))
         if self.ros1:
             tree = "geometry_msgs/TransformStamped[] transforms"
             self.types.register(get_types_from_msg(tree, "tf2_msgs/msg/TFMessage"))
@@ -199,15 +225,117 @@ def test_what_a_log_lacks_is_said(log: pathlib.Path) -> None:
         read_bag(log, pressure_topic="/plain", array=(2, 2, 2), pose_topic="/p", tf=("a", "b"))
 
 
+@pytest.mark.parametrize("storage", ["bag", "mcap"])
+def test_known_types_need_no_field(tmp_path: pathlib.Path, storage: str) -> None:
+    bag = Bag(tmp_path, storage)
+    for i in range(2):
+        at, row = START_S + i, readings(i)
+        channels = [bag.of("sensor_msgs/msg/ChannelFloat32", "a", row[:3]),
+                    bag.of("sensor_msgs/msg/ChannelFloat32", "b", row[3:])]  # fmt: skip
+        bag.write("/state", bag.of("tactile_msgs/msg/TactileState", bag.header(at), channels), at)
+        bag.write("/takktile", bag.of("takktile_ros/msg/Touch", row, 0 * row), at)
+        taxels = [bag.of("xela_server_ros2/msg/Taxel", 1, 2, int(10 * value)) for value in row]
+        full = [bag.of("xela_server_ros2/msg/SensorFull", at, part, numpy.array([], dtype=numpy.int32))
+                for part in (taxels[:2], taxels[2:])]  # fmt: skip
+        bag.write("/xela", bag.of("xela_server_ros2/msg/SensStream", full), at)
+    log = bag.close()
+    assert {topic.guess for topic in topics(log)} == {"pressures"}
+    for topic, factor in (("/state", 1), ("/takktile", 1), ("/xela", 10)):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            recording = read_bag(log, pressure_topic=topic, array=(2, 2, 2))
+        expected = [[int(10 * v) if factor == 10 else float(v) for v in readings(i)] for i in range(2)]
+        assert recording.pressure.tolist() == expected
+        assert numpy.isnan(recording.T_robot_sensor).all()
+    with pytest.raises(palpate.Error, match="has no list of numbers pressures; it has pressure, temp"):
+        read_bag(log, pressure_topic="/takktile", pressure_field="pressures", array=(2, 2, 2))
+
+
+def test_every_kind_of_pose_is_read(tmp_path: pathlib.Path) -> None:
+    bag = Bag(tmp_path, "sqlite3")
+    layout = bag.of("std_msgs/msg/MultiArrayLayout", [], 0)
+    covariance = numpy.zeros(36)
+    zero = bag.of("geometry_msgs/msg/Vector3", 0, 0, 0)
+    for i in range(3):
+        at = START_S + i
+        pose, transform = (bag.pose(kind, 0.1 * i, 0.2, 0, about_z(0.1 * i)) for kind in ("Pose", "Transform"))
+        header = bag.header(at, "base")
+        with_covariance = bag.of("geometry_msgs/msg/PoseWithCovariance", pose, covariance)
+        twist = bag.of("geometry_msgs/msg/Twist", zero, zero)
+        moving = bag.of("geometry_msgs/msg/TwistWithCovariance", twist, covariance)
+        for topic, message in {
+            "/pose": pose,
+            "/stamped": bag.of("geometry_msgs/msg/PoseStamped", header, pose),
+            "/covariance": bag.of("geometry_msgs/msg/PoseWithCovarianceStamped", header, with_covariance),
+            "/odometry": bag.of("nav_msgs/msg/Odometry", header, "array", with_covariance, moving),
+            "/transform": bag.of("geometry_msgs/msg/TransformStamped", header, "array", transform),
+            "/plain": bag.of("std_msgs/msg/Float32MultiArray", layout, readings(i)),
+        }.items():
+            bag.write(topic, message, at)
+    log = bag.close()
+    for topic in ("/pose", "/stamped", "/covariance", "/odometry", "/transform"):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            recording = read_bag(log, pressure_topic="/plain", pose_topic=topic, array=(2, 2, 2))
+        expected = [[100 * i, 200, 0.1 * i] for i in range(3)]
+        numpy.testing.assert_allclose(recording.T_robot_sensor, expected, atol=1e-4, err_msg=topic)
+
+
+def test_frames_in_a_gap_of_transforms_have_no_pose(tmp_path: pathlib.Path) -> None:
+    bag = Bag(tmp_path, "mcap")
+    layout = bag.of("std_msgs/msg/MultiArrayLayout", [], 0)
+    for k in range(101):  # every 10 ms but for 0.4 s in the middle
+        if not 30 < k < 70:
+            at = START_S + 0.01 * k
+            arm = bag.pose("Transform", 0.01 * k, 0, 0, about_z(0))
+            edge = bag.of("geometry_msgs/msg/TransformStamped", bag.header(at, "base"), "array", arm)
+            other = bag.of("geometry_msgs/msg/TransformStamped", bag.header(at, "base"), "other", arm)
+            bag.write("/tf", bag.of("tf2_msgs/msg/TFMessage", [other, edge]), at)
+    for i in range(6):  # slower than the transforms
+        bag.write("/plain", bag.of("std_msgs/msg/Float32MultiArray", layout, readings(i)), START_S + 0.2 * i)
+    log = bag.close()
+    [file] = log.glob("*.mcap")
+    with pytest.warns(UserWarning, match="2 of 6 frames have no pose"):
+        recording = read_bag(file, pressure_topic="/plain", tf=("base", "array"), array=(2, 2, 2))
+    known = ~numpy.isnan(recording.T_robot_sensor[:, 0])
+    assert known.tolist() == [True, True, False, False, True, True]
+    numpy.testing.assert_allclose(recording.T_robot_sensor[known, 0], [0, 200, 800, 1000], atol=1e-3)
+    alone = tmp_path / "alone.mcap"
+    alone.write_bytes(file.read_bytes())
+    assert [topic.name for topic in topics(alone)] == ["/plain", "/tf"], "without its folder"
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        wide = read_bag(
+            log, pressure_topic="/plain", tf=("base", "array"), array=(2, 2, 2), largest_gap_s=1
+        )
+    numpy.testing.assert_allclose(wide.T_robot_sensor[:, 0], [200 * i for i in range(6)], atol=1e-3)
+    with pytest.raises(palpate.Error, match="tf array:cup: no chain"):
+        read_bag(log, pressure_topic="/plain", tf=("array", "cup"), array=(2, 2, 2))
+
+
+def test_what_a_callback_raises_is_not_the_logs_fault(tmp_path: pathlib.Path) -> None:
+    bag = Bag(tmp_path, "mcap")
+    layout = bag.of("std_msgs/msg/MultiArrayLayout", [], 0)
+    for i in range(1000):
+        bag.write("/plain", bag.of("std_msgs/msg/Float32MultiArray", layout, readings(i)), START_S + i)
+    log = bag.close()
+
+    def stop(fraction: float) -> None:
+        raise ValueError(f"at {fraction}")
+
+    with pytest.raises(ValueError, match="at 1.0"):
+        read_bag(log, pressure_topic="/plain", array=(2, 2, 2), progress=stop)
+
+
 def test_a_log_that_is_cut_off_is_said(tmp_path: pathlib.Path) -> None:
     log = write_log(tmp_path, "bag")
     log.write_bytes(log.read_bytes()[:3000])
-    with pytest.raises(palpate.Error, match="log.bag: (cannot be read as a bag|is cut off or damaged)"):
+    with pytest.raises(palpate.Error, match="log.bag: cannot be read as a bag"):
         topics(log)
     folder = write_log(tmp_path, "mcap")
     [storage] = folder.glob("*.mcap")
     storage.write_bytes(storage.read_bytes()[:200])
-    with pytest.raises(palpate.Error, match="mcap: (cannot be read as a bag|is cut off or damaged)"):
+    with pytest.raises(palpate.Error, match="mcap: cannot be read as a bag"):
         topics(folder)
     with pytest.raises(palpate.Error, match="none.bag: no such file"):
         topics(tmp_path / "none.bag")
