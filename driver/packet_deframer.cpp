@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -86,6 +87,9 @@ class PacketDeframer final : public Deframer {
     at_ = 0;
     in_step_ = true;
     values_.clear();
+    time_s_.reset();
+    last_ticks_.reset();
+    tick_s_ = 0.0;
   }
 
   const DeframerCounters& counters() const override { return counters_; }
@@ -102,6 +106,7 @@ class PacketDeframer final : public Deframer {
     std::size_t bytes = 0;  // its size with the tag; 0: no part has this tag
     std::size_t values = 0;
     std::size_t first_element = 0;
+    std::optional<PacketFormat::Time> time = {};
   };
 
   void know_parts(const PacketFormat::Parts& parts) {
@@ -111,7 +116,7 @@ class PacketDeframer final : public Deframer {
       std::size_t element = 0;
       for (const PacketFormat::Part& part : parts.parts) {
         if ((tag & part.mask) == (part.tag & part.mask)) {
-          parts_[tag] = {bytes_of(parts, part), part.values, element};
+          parts_[tag] = {bytes_of(parts, part), part.values, element, part.time};
           break;
         }
         element += part.values;
@@ -175,6 +180,7 @@ class PacketDeframer final : public Deframer {
   bool drop_byte() {
     if (in_step_) {
       values_.clear();
+      time_s_.reset();
     }
     in_step_ = false;
     ++at_;
@@ -260,7 +266,7 @@ class PacketDeframer final : public Deframer {
     if (packet.size() < whole_bytes_ || (packet.size() > whole_bytes_ && !shape_.parts)) {
       return Meaning::malformed;
     }
-    time_s_.reset();
+    time_s_ = shape_.parts ? time_s_ : std::nullopt;  // parts may come behind the clock's packet
     for (std::size_t i = 0; i < fields_.size(); ++i) {
       if (const auto* only = as<PacketFormat::Only>(fields_[i])) {
         if (!begins_like(place_of(i, packet), only->bytes)) {
@@ -274,10 +280,11 @@ class PacketDeframer final : public Deframer {
       if (const auto* values = as<PacketFormat::Values>(fields_[i])) {
         read_values(*values, place_of(i, packet), frames);
       } else if (const auto* parts = as<PacketFormat::Parts>(fields_[i])) {
-        const Bytes bytes = place_of(i, packet);
-        if (!are_parts(bytes)) {
+        const Bytes bytes = known_parts(place_of(i, packet));
+        if (bytes.empty()) {
           return Meaning::malformed;
         }
+        read_time(bytes);
         read_parts(*parts, bytes, frames);
       }
     }
@@ -294,15 +301,37 @@ class PacketDeframer final : public Deframer {
     complete_frame(frames);
   }
 
-  bool are_parts(Bytes bytes) const {
-    while (!bytes.empty()) {
-      const std::size_t part_bytes = parts_[bytes[0]].bytes;
-      if (part_bytes == 0 || part_bytes > bytes.size()) {
-        return false;
-      }
-      bytes = bytes.subspan(part_bytes);
+  /// The parts in front of the first whose tag is not known; none where a part is cut short.
+  Bytes known_parts(Bytes bytes) const {
+    std::size_t known = 0;
+    while (known < bytes.size() && parts_[bytes[known]].bytes > 0) {
+      known += parts_[bytes[known]].bytes;
     }
-    return true;
+    return known <= bytes.size() ? bytes.first(known) : Bytes();
+  }
+
+  /// Reads the clock that a part may hold; it is that of all parts of its packet.
+  void read_time(Bytes bytes) {
+    for (; !bytes.empty(); bytes = bytes.subspan(parts_[bytes[0]].bytes)) {
+      if (const auto& time = parts_[bytes[0]].time) {
+        const double ticks = time->type.read(bytes.subspan(1));
+        const double tick_s = time->tick_s > 0.0 ? time->tick_s : tick_of(ticks);
+        time_s_ = tick_s > 0.0 ? std::optional(tick_s * ticks) : std::nullopt;
+      }
+    }
+  }
+
+  /// The unit of a clock that does not state it, from its first step; 0 where it is not known yet.
+  double tick_of(double ticks) {
+    const double step = ticks - last_ticks_.value_or(ticks);
+    last_ticks_ = ticks;
+    if (tick_s_ == 0.0 && step > 0.0 && format_.period_s > 0.0) {
+      const auto misfit = [&](double tick_s) {
+        return std::abs(std::log(step * tick_s / format_.period_s));
+      };
+      tick_s_ = std::ranges::min(std::array{1e-3, 1e-6, 1e-9}, {}, misfit);
+    }
+    return tick_s_;
   }
 
   void read_parts(const PacketFormat::Parts& field, Bytes bytes, std::vector<ParsedFrame>& frames) {
@@ -335,6 +364,7 @@ class PacketDeframer final : public Deframer {
   void complete_frame(std::vector<ParsedFrame>& frames) {
     frames.push_back({values_, time_s_});
     values_.clear();
+    time_s_.reset();
   }
 
   PacketFormat format_;
@@ -357,6 +387,8 @@ class PacketDeframer final : public Deframer {
 
   std::vector<double> values_;  // of the frame in progress
   std::optional<double> time_s_;
+  std::optional<double> last_ticks_;  // of a clock whose unit is not stated
+  double tick_s_ = 0.0;               // its unit; 0: not known yet
   DeframerCounters counters_;
 };
 

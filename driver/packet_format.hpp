@@ -58,7 +58,7 @@ class Checksum {
 struct NumberType {
   enum class Kind : std::uint8_t { unsigned_integer, signed_integer, real };
   Kind kind = Kind::unsigned_integer;
-  std::uint8_t bytes = 1;  ///< 1, 2 or 4; a real (IEEE 754) has 4 or 8
+  std::uint8_t bytes = 1;  ///< 1, 2, 4 or 8; a real (IEEE 754) has 4 or 8
   bool big_endian = false;
 
   /// Decodes the number at the start of `bytes`, which must hold all of it.
@@ -103,6 +103,9 @@ struct PacketFormat {
     std::uint8_t mask = 0xff;  ///< bits of the tag byte that are compared with `tag`
     std::size_t values = 0;    ///< number of values, for the elements after the previous Part's
     std::size_t skip = 0;      ///< bytes of other data, if `values` is 0
+    /// The board's clock in those bytes. A tick of 0 s: its unit is a millisecond, microsecond or
+    /// nanosecond, whichever fits `period_s`.
+    std::optional<Time> time = {};
   };
   /// Parts up to the end of the bytes that the Length counts; exactly one part without a Length. A
   /// frame begins with the first Part of the list that has values, and ends with the last one.
@@ -122,6 +125,7 @@ struct PacketFormat {
   std::size_t elements = 0;  ///< values per frame
   double gain = 1.0;         ///< pressure = gain * number + offset
   double offset = 0.0;
+  double period_s = 0.0;  ///< from frame to frame; 0: unknown
 };
 
 /// The sections of a format: head | middle, whose bytes the Length counts | tail.

@@ -28,6 +28,8 @@ NumberType read_number_type(const Entry& entry) {
                                    {"s16be", {Kind::signed_integer, 2, true}},
                                    {"u32le", {Kind::unsigned_integer, 4, false}},
                                    {"u32be", {Kind::unsigned_integer, 4, true}},
+                                   {"u64le", {Kind::unsigned_integer, 8, false}},
+                                   {"u64be", {Kind::unsigned_integer, 8, true}},
                                    {"s32le", {Kind::signed_integer, 4, false}},
                                    {"s32be", {Kind::signed_integer, 4, true}},
                                    {"f32le", {Kind::real, 4, false}},
@@ -92,7 +94,7 @@ Format::Length read_length(const Entry& field) {
                      [&](const Entry& e) {
                        length.type = read_number_type(e);
                        if (length.type.kind != NumberType::Kind::unsigned_integer) {
-                         e.refuse("give u8, u16le, u16be, u32le or u32be");
+                         e.refuse("give u8, u16le, u16be, u32le, u32be, u64le or u64be");
                        }
                      }},
                     {"extra", whole(length.extra, 0, most_packet_bytes)},
@@ -131,16 +133,29 @@ Format::Values read_values(const Entry& field) {
 Format::Part read_part(const Entry& entry, std::size_t elements) {
   Format::Part part;
   std::optional<std::uint8_t> tag;
+  double tick_s = 0.0;
   read_keys(entry, {{"tag", whole(tag, 0, 255)},
                     {"mask", whole(part.mask, 0, 255)},
                     {"values", whole(part.values, 1, static_cast<std::uint32_t>(elements))},
-                    {"skip", whole(part.skip, 0, 4096)}});
+                    {"skip", whole(part.skip, 0, 4096)},
+                    {"time",
+                     [&](const Entry& e) {
+                       part.time = {read_number_type(e), 0.0};
+                     }},
+                    {"tick_s", [&](const Entry& e) { tick_s = e.number(1e-9, 1.0); }}});
   if (!tag) {
     entry.refuse("key 'tag' is missing; add the byte that the part begins with");
   }
   part.tag = *tag;
-  if (part.values > 0 && part.skip > 0) {
-    entry.refuse("a part has either 'values' or 'skip'; remove one");
+  if ((part.values > 0 ? 1 : 0) + (part.skip > 0 ? 1 : 0) + (part.time ? 1 : 0) > 1) {
+    entry.refuse("a part has either 'values', 'time' or 'skip'; remove one");
+  }
+  if (part.time) {
+    if (part.time->type.kind != NumberType::Kind::unsigned_integer) {
+      entry.refuse("'time' is an unsigned integer, such as u64be; correct it");
+    }
+    part.time->tick_s = tick_s;
+    part.skip = part.time->type.bytes;
   }
   return part;
 }

@@ -166,6 +166,7 @@ SerialProfile read_root(const Entry& root) {
   profile.packet = read_packet_format(*packet, profile.elements_mm.size());
   profile.packet.gain = gain;
   profile.packet.offset = offset;
+  profile.packet.period_s = profile.rate_hz > 0.0 ? 1.0 / profile.rate_hz : 0.0;
   return profile;
 }
 

@@ -185,6 +185,16 @@ class Tsf85 : public testing::Test {
     return packet;
   }
 
+  /// A packet of the board's clock, and of other bytes behind it.
+  static Bytes clock(std::uint64_t ticks, const Bytes& rest = {}) {
+    Bytes packet{0x9a, 0x00, 0x58, static_cast<std::uint8_t>(9 + rest.size()), 0x70};
+    for (int shift = 56; shift >= 0; shift -= 8) {
+      packet.push_back(static_cast<std::uint8_t>(ticks >> shift));
+    }
+    packet.insert(packet.end(), rest.begin(), rest.end());
+    return packet;
+  }
+
   Receiver receiver_{read_serial_profile("tsf85")};
 };
 
@@ -219,6 +229,49 @@ TEST_F(Tsf85, MayHoldThePreambleInItsPayload) {
     receiver_.push(finger(1, 0x9a));
   }
   EXPECT_EQ(receiver_.frames().size(), 4u);
+  EXPECT_EQ(receiver_.garbage(), 0u);
+}
+
+TEST_F(Tsf85, LaysTheTaxelsOutInSevenRowsOfFourFromTheTop) {
+  const std::vector<glm::dvec2> elements = read_serial_profile("tsf85").elements_mm;
+  for (int i = 0; i < 28; ++i) {
+    EXPECT_NEAR(elements[i].x, 3.2 * (i % 4 - 1.5), 1e-12) << i;
+    EXPECT_NEAR(elements[i].y, 3.2 * (3 - i / 4), 1e-12) << i;
+    EXPECT_EQ(elements[28 + i], elements[i] + glm::dvec2(0.0, 100.0)) << i;
+  }
+}
+
+TEST_F(Tsf85, TellsItsClockInTheUnitThatFitsTheRate) {
+  // Frames at 100 Hz; the last time stamp is of a frame after one that was lost.
+  for (const std::uint64_t unit : {1'000ULL, 1'000'000ULL, 1'000'000'000ULL}) {
+    Receiver receiver(read_serial_profile("tsf85"));
+    for (const double time_s : {5.0, 5.01, 5.03}) {
+      receiver.push(clock(static_cast<std::uint64_t>(std::llround(time_s * unit))));
+      receiver.push(finger(0, 1));
+      receiver.push(finger(1, 2));
+    }
+    receiver.push(finger(0, 1));  // no clock came with this frame
+    receiver.push(finger(1, 2));
+    ASSERT_EQ(receiver.frames().size(), 4u);
+    EXPECT_FALSE(receiver.frames()[0].device_time_s) << "one time stamp tells no unit";
+    EXPECT_NEAR(receiver.frames()[1].device_time_s.value(), 5.01, 1e-9) << unit;
+    EXPECT_NEAR(receiver.frames()[2].device_time_s.value(), 5.03, 1e-9) << unit;
+    EXPECT_FALSE(receiver.frames()[3].device_time_s);
+    EXPECT_EQ(receiver.garbage(), 0u);
+  }
+}
+
+TEST_F(Tsf85, KeepsWhatComesBeforeAnUnknownTag) {
+  receiver_.push(clock(1000, {0xf1, 1, 2, 3}));
+  receiver_.push(clock(1010, {0xf1, 1, 2, 3}));
+  Bytes first = finger(0, 1);
+  first[3] += 3;
+  first.insert(first.end(), {0x80, 0x9a, 0x00});
+  receiver_.push(first);
+  receiver_.push(finger(1, 2));
+  ASSERT_EQ(receiver_.frames().size(), 1u);
+  EXPECT_EQ(receiver_.frames()[0].values.front(), 1.0);
+  EXPECT_NEAR(receiver_.frames()[0].device_time_s.value(), 1.01, 1e-12);
   EXPECT_EQ(receiver_.garbage(), 0u);
 }
 
