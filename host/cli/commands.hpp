@@ -14,6 +14,7 @@ void add_touches(CLI::App& app);
 void add_live(CLI::App& app);
 void add_simulate(CLI::App& app);
 void add_map(CLI::App& app);
+void add_check(CLI::App& app);
 void add_calibrate(CLI::App& app);
 void add_recognize(CLI::App& app);
 /// @param status becomes the exit status of a run that succeeds

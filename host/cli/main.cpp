@@ -88,6 +88,7 @@ int run(int argc, char** argv) {
   palpate::cli::add_live(app);
   palpate::cli::add_simulate(app);
   palpate::cli::add_map(app);
+  palpate::cli::add_check(app);
   palpate::cli::add_calibrate(app);
   palpate::cli::add_recognize(app);
   int status = 0;

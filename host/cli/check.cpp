@@ -1,0 +1,148 @@
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "cli/commands.hpp"
+#include "cli/options.hpp"
+#include "cli/progress.hpp"
+#include "cli/recognition_flags.hpp"
+#include "io/command_files.hpp"
+#include "learning/setup_check.hpp"
+#include "model/option_words.hpp"
+#include "recognition/recordings.hpp"
+
+namespace palpate::cli {
+
+namespace {
+
+struct CheckArguments {
+  std::vector<std::string> recordings;
+  std::optional<double> threshold;
+  std::optional<double> ratio;
+  double cell_mm = 0.5;
+  double psf_mm = 1.0;
+  std::string json;
+  std::string write_array;
+  std::string device;
+};
+
+void check_outputs(const CheckArguments& options) {
+  CommandFiles files;
+  for (const std::string& recording : options.recordings) {
+    files.reads("RECORDING", recording);
+  }
+  if (!options.json.empty()) {
+    files.writes("--json", options.json, CommandFiles::Dash::stream);
+  }
+  if (!options.write_array.empty()) {
+    files.writes("--write-array", options.write_array);
+  }
+  files.require_distinct();
+  if (!options.json.empty() && options.json != "-") {
+    require_writable(options.json);
+  }
+  if (!options.write_array.empty()) {
+    require_writable(options.write_array);
+  }
+}
+
+std::string json_of(const SetupCheck& check) {
+  auto all = nlohmann::ordered_json::array();
+  for (const SetupFinding& finding : check.findings) {
+    nlohmann::ordered_json json{
+        {"what", finding.what}, {"nats", finding.nats}, {"words", in_flags(finding.words)}};
+    if (!finding.option.empty()) {
+      json["flag"] = "--" + finding.option;
+    }
+    if (finding.array_offset) {
+      const Pose& offset = *finding.array_offset;
+      json["array_offset"] = {offset.translation_mm.x, offset.translation_mm.y, offset.theta_rad};
+      json["sd"] = *finding.sd;
+    }
+    all.push_back(std::move(json));
+  }
+  return all.dump(2) + "\n";
+}
+
+std::string array_table(const SetupCheck& check) {
+  std::string text = "x,y\n";
+  for (const glm::dvec2& p : check.elements_mm) {
+    text += fmt::format("{},{}\n", p.x, p.y);
+  }
+  return text;
+}
+
+void check(const CheckArguments& options) {
+  check_outputs(options);
+  const std::vector<Recording> recordings = read_touch_recordings(options.recordings);
+  const Recording& first = recordings.front();
+  MapOptions maps{.cell_mm = require_above("--cell-mm", options.cell_mm, 0.0)};
+  maps.sensor.spread_mm = require_above("--psf-mm", options.psf_mm, 0.0) / 2.0;
+  maps.classifier =
+      make_classifier(first.pressure_unit, first.path, options.threshold, options.ratio);
+  Device device = Device::open(options.device);
+  SetupCheck found;
+  {
+    Progress progress("trying set-ups");
+    found = check_setup(device, recordings, maps, [&](double done) { progress.show(done); });
+  }
+  if (!options.write_array.empty()) {
+    write_file(options.write_array, array_table(found));
+  }
+  if (options.json == "-") {
+    fmt::print("{}", json_of(found));
+    return;
+  }
+  if (!options.json.empty()) {
+    write_file(options.json, json_of(found));
+  }
+  for (const SetupFinding& finding : found.findings) {
+    fmt::print("{} ({:.0f} nats)\n", in_flags(finding.words), finding.nats);
+  }
+  for (const std::string& remark : found.remarks) {
+    fmt::print("{}\n", in_flags(remark));
+  }
+  if (found.findings.empty()) {
+    fmt::print("{} touches: nothing is wrong with the set-up\n", found.touches);
+  }
+}
+
+}  // namespace
+
+void add_check(CLI::App& app) {
+  auto* command = app.add_subcommand(
+      "check",
+      "Ask touches at known poses which set-up explains them best: the order of the elements, "
+      "where "
+      "the array sits in the tool, its pitch, units of the poses, dead elements, and touches that "
+      "contradict the others. Each finding comes with its evidence, in nats, and what mends it");
+  const auto options = std::make_shared<CheckArguments>();
+  command
+      ->add_option("RECORDING", options->recordings,
+                   "Recordings of touches (HDF5), of one array and of objects that stay in place: "
+                   "some 60 of each, at several angles of the sensor, so that they overlap")
+      ->required();
+  command->add_option("--json", options->json, "File for the findings as JSON, or -");
+  command->add_option("--write-array", options->write_array,
+                      "File for the array as the findings correct it (CSV: x, y in mm), for "
+                      "--array of palpate import");
+  command->add_option(
+      "--threshold", options->threshold,
+      "Contact threshold, in the recording's pressure unit [default: 2 kPa; required "
+      "for raw pressure]");
+  command->add_option("--ratio", options->ratio,
+                      "Threshold as a fraction of the touch's largest pressure [default: 0.3]");
+  command->add_option("--cell-mm", options->cell_mm, "Edge of a map's cell, mm")
+      ->capture_default_str();
+  command->add_option("--psf-mm", options->psf_mm, "Standard deviation of the point spread, mm")
+      ->capture_default_str();
+  command->add_option("--device", options->device, "Vulkan device, by index or a part of its name");
+  command->callback([options] { check(*options); });
+}
+
+}  // namespace palpate::cli

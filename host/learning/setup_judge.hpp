@@ -1,0 +1,68 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <glm/vec2.hpp>
+
+#include "model/interpolated_map.hpp"
+#include "palpate/contact_model.hpp"
+#include "palpate/map_builder.hpp"
+#include "palpate/touch.hpp"
+
+namespace palpate {
+
+/// How the touches are tried.
+struct Setup {
+  std::vector<glm::dvec2> elements_mm;   ///< [e] in the order of the readings
+  double mm = 1.0;                       ///< that the poses' unit of length has
+  double rad = 1.0;                      ///< that the poses' unit of angle has
+  std::vector<std::uint8_t> valid = {};  ///< [e] 0: dead, whatever the recording says; empty: none
+};
+
+/// A touch in contact, and where it stands.
+struct TriedTouch {
+  Touch touch;
+  std::string recording;
+  std::size_t index = 0;  ///< in the recording
+};
+
+/// The predictive likelihood of set-ups: that of each half of an object's touches, every other one,
+/// on the map that the other half makes.
+class SetupJudge {
+ public:
+  using Take = std::function<void(const TriedTouch& given, const Touch& tried,
+                                  const OccupancyGrid& map_of_the_others)>;
+
+  /// @param recordings outlive this object
+  /// @throws Error where an object has fewer than four touches in contact
+  SetupJudge(Device& device, std::span<const Recording> recordings, const MapOptions& options);
+
+  /// Log-likelihood of all readings (Eq. 7), in nats; -1e300 where the touches lie so far apart
+  /// that no map holds them.
+  double nats(const Setup& setup);
+
+  /// Visits every touch as the set-up has it. @throws Error as MapBuilder does
+  void visit(const Setup& setup, const Take& take);
+
+  double log_likelihood(Reading reading, const InterpolatedMap& field, const glm::dvec2& p) const {
+    return contact_.log_likelihood(reading, MapSample{field.log_odds(p)});
+  }
+
+  /// By object.
+  const std::map<std::string, std::vector<TriedTouch>>& touches() const { return touches_; }
+  /// With the prior that the touches of the first set-up tell.
+  const ContactModel& contact() const { return contact_; }
+
+ private:
+  Device& device_;
+  MapOptions options_;
+  ContactModel contact_;
+  std::map<std::string, std::vector<TriedTouch>> touches_;
+};
+
+}  // namespace palpate

@@ -1,0 +1,160 @@
+// What touches at known poses say about the set-up that they were taken with.
+
+#include <algorithm>
+#include <numbers>
+
+#include <gmock/gmock.h>
+
+#include "learning/setup_check.hpp"
+#include "palpate/error.hpp"
+#include "palpate/simulation.hpp"
+
+namespace palpate::setup_check_test {
+
+using testing::ElementsAre;
+using testing::Field;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+class SetupTouches : public testing::Test {
+ protected:
+  /// Sixty touches each of some letters at random poses.
+  static std::vector<Recording> touches(std::vector<glm::dvec2> elements_mm,
+                                        bool at_one_angle = false) {
+    std::vector<Recording> recordings;
+    std::uint64_t seed = 3;
+    for (const char* letter : {"A", "E", "U"}) {
+      std::vector<Pose> poses = random_poses(60, ++seed);
+      for (Pose& pose : poses) {
+        pose.theta_rad = at_one_angle ? 0.3 : pose.theta_rad;
+      }
+      Simulator simulator(make_shape(letter), {}, elements_mm, seed);
+      recordings.push_back(simulator.touch(poses, {}));
+      recordings.back().path = std::string(letter) + ".h5";
+    }
+    return recordings;
+  }
+
+  SetupCheck check(std::span<const Recording> recordings) {
+    return check_setup(device_, recordings, MapOptions());
+  }
+
+  Device device_ = Device::open();
+};
+
+TEST_F(SetupTouches, FindNothingWhereTheSetupIsSound) {
+  for (const auto& elements_mm :
+       {digitacts_array(), grid_array(8, 8, 1.9), grid_array(4, 7, 2.2)}) {
+    const std::vector<Recording> recordings = touches(elements_mm);
+    const SetupCheck found = check(recordings);
+    EXPECT_THAT(found.findings, IsEmpty());
+    EXPECT_THAT(found.remarks, IsEmpty());
+    EXPECT_EQ(found.elements_mm, elements_mm);
+    EXPECT_GT(found.touches, 150u);
+  }
+}
+
+TEST_F(SetupTouches, TellTheOrderInWhichElementsAreRead) {
+  std::vector<Recording> recordings = touches(grid_array(4, 7, 2.2));
+  for (Recording& recording : recordings) {
+    // Read by columns from the top right: reading k is of this element.
+    const std::vector<double> truth = recording.pressure;
+    for (std::size_t k = 0; k < truth.size(); ++k) {
+      const std::size_t i = 3 - k % 28 / 7;
+      const std::size_t j = 6 - k % 28 % 7;
+      recording.pressure[k] = truth[k / 28 * 28 + 4 * j + i];
+    }
+  }
+  const SetupCheck found = check(recordings);
+  ASSERT_EQ(found.findings.size(), 1u);
+  EXPECT_EQ(found.findings[0].what, "element_order");
+  EXPECT_EQ(found.findings[0].option, "first-element top-right --order columns");
+  EXPECT_GT(found.findings[0].nats, 200.0);
+  for (Recording& recording : recordings) {
+    recording.elements_mm = found.elements_mm;
+  }
+  EXPECT_THAT(check(recordings).findings, IsEmpty()) << "as it corrects the array";
+}
+
+TEST_F(SetupTouches, TellWhereTheArraySitsInTheTool) {
+  const Pose offset{{2.1, -1.4}, 0.07};  // of the array that the recording has, in the true frame
+  std::vector<Recording> recordings = touches(digitacts_array());
+  for (Recording& recording : recordings) {
+    for (Pose& pose : recording.T_robot_sensor) {
+      pose = pose * inverse(offset);
+    }
+  }
+  const SetupCheck found = check(recordings);
+  ASSERT_EQ(found.findings.size(), 1u);
+  const SetupFinding& finding = found.findings[0];
+  EXPECT_EQ(finding.what, "array_offset");
+  EXPECT_NEAR(finding.array_offset->translation_mm.x, offset.translation_mm.x, 0.2);
+  EXPECT_NEAR(finding.array_offset->translation_mm.y, offset.translation_mm.y, 0.2);
+  EXPECT_NEAR(finding.array_offset->theta_rad, offset.theta_rad, 0.02);
+  EXPECT_LT(finding.sd->at(0), 0.2);
+  EXPECT_EQ(found.elements_mm[0], *finding.array_offset * digitacts_array()[0]);
+}
+
+TEST_F(SetupTouches, AtOneAngleTellNothingOfTheArraysPlace) {
+  std::vector<Recording> recordings = touches(digitacts_array(), true);
+  for (Recording& recording : recordings) {
+    for (Pose& pose : recording.T_robot_sensor) {
+      pose = pose * Pose{{-2.0, 1.0}, 0.0};
+    }
+  }
+  const SetupCheck found = check(recordings);
+  EXPECT_THAT(found.findings, IsEmpty());
+  EXPECT_THAT(found.remarks, ElementsAre(HasSubstr("all touches are at nearly one angle")));
+}
+
+TEST_F(SetupTouches, TellThePitchAndTheUnitsOfPoses) {
+  std::vector<Recording> recordings = touches(digitacts_array());
+  for (Recording& recording : recordings) {
+    for (Pose& pose : recording.T_robot_sensor) {
+      pose = {pose.translation_mm / 1000.0, pose.theta_rad * 180.0 / std::numbers::pi};
+    }
+    for (glm::dvec2& p : recording.elements_mm) {
+      p *= 0.8;
+    }
+  }
+  const SetupCheck found = check(recordings);
+  ASSERT_EQ(found.findings.size(), 2u);
+  EXPECT_EQ(found.findings[0].option, "pose-unit m,deg");
+  EXPECT_EQ(found.findings[1].what, "pitch");
+  EXPECT_NEAR(found.elements_mm[0].x, digitacts_array()[0].x, 0.15);
+}
+
+TEST_F(SetupTouches, TellDeadAndStuckElementsAndTouchesOfAnotherPlace) {
+  std::vector<Recording> recordings = touches(digitacts_array());
+  for (Recording& recording : recordings) {
+    for (std::size_t i = 0; i < recording.size(); ++i) {
+      recording.pressure[36 * i + 14] = 0.0;
+      recording.pressure[36 * i + 21] = 40.0;
+    }
+  }
+  recordings[1].T_robot_sensor[7].translation_mm += glm::dvec2(9.0, 4.0);
+  const SetupCheck found = check(recordings);
+  EXPECT_THAT(
+      found.findings,
+      ElementsAre(
+          Field(&SetupFinding::option, "dead 14"), Field(&SetupFinding::option, "dead 21"),
+          Field(&SetupFinding::words, HasSubstr("E.h5: touches that contradict the others: 7;"))));
+}
+
+TEST_F(SetupTouches, AreRefusedWhereTheyCannotBeJudged) {
+  std::vector<Recording> recordings = touches(digitacts_array());
+  Recording other = touches(grid_array(8, 8, 1.9))[0];
+  EXPECT_THAT(
+      [&] {
+        check(std::vector{recordings[0], other});
+      },
+      testing::ThrowsMessage<Error>(HasSubstr("A.h5: its array is not that of all")));
+  Recording& few = recordings[0];
+  few.T_robot_sensor.resize(3);
+  few.pressure.resize(3 * 36);
+  few.time_s.resize(std::min<std::size_t>(few.time_s.size(), 3));
+  EXPECT_THAT([&] { check(recordings); },
+              testing::ThrowsMessage<Error>(HasSubstr("object 'A': 3 touches in contact")));
+}
+
+}  // namespace palpate::setup_check_test
