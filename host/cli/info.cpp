@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <memory>
+#include <numbers>
 #include <string>
 
 #include <fmt/format.h>
@@ -187,9 +188,12 @@ void print_recording(const std::string& path) {
     print_stream(path, s);
   }
   if (r.truth) {
-    const Pose& T = r.truth->T_object_robot;
-    fmt::print("  truth             {} at x {:.3f} mm, y {:.3f} mm, theta {:.2f} deg\n",
-               r.truth->object, T.translation_mm.x, T.translation_mm.y, degrees(T.theta_rad));
+    const Pose T = inverse(r.truth->T_object_robot);
+    fmt::print(
+        "  truth             {} at x {:.3f} mm, y {:.3f} mm, theta {:.2f} deg in the robot "
+        "frame\n",
+        r.truth->object, T.translation_mm.x, T.translation_mm.y,
+        degrees(wrap_angle(T.theta_rad, 2.0 * std::numbers::pi)));
   }
   if (const std::vector<std::string> suspicions = suspicions_of(s); !suspicions.empty()) {
     fmt::print("Suspicious:\n");
@@ -207,6 +211,10 @@ void print_map(const std::string& path) {
              m.nx * m.cell_mm, m.ny * m.cell_mm);
   fmt::print("  origin            {:.3f}, {:.3f} mm, centre of cell (0, 0)\n", m.origin_mm.x,
              m.origin_mm.y);
+  const Pose& frame = m.T_learned_robot_object;
+  fmt::print(
+      "  frame             {:.3f}, {:.3f} mm, {:.2f} deg in the robot frame of the touches\n",
+      frame.translation_mm.x, frame.translation_mm.y, degrees(frame.theta_rad));
   if (m.spread_mm) {
     fmt::print("  spread            {} mm, standard deviation of the inverse sensor model\n",
                *m.spread_mm);

@@ -79,7 +79,7 @@ std::string summary(const LiveState& state, std::vector<double> latencies_ms,
   if (state.last) {
     const RecognitionStep& step = state.last->step;
     text += result_words(step, task) + "\n";
-    std::vector<std::string> more{truth_words(step, task), unproven_sentence(step, task),
+    std::vector<std::string> more{truth_words(step), unproven_sentence(step, task),
                                   misfit_sentence(step, state.touches, task),
                                   single_touch_words(task, state.touches)};
     std::ranges::move(warning_words(step), std::back_inserter(more));

@@ -275,7 +275,7 @@ void LiveScreen::describe(const LiveState& state) {
   }
   view_.object = identity_words(step, task_);
   view_.pose = pose_words(pose_text(step));
-  view_.truth = truth_words(step, task_);
+  view_.truth = truth_words(step);
   if (plan_) {
     view_.next = state.last->next ? next_touch_words(*state.last->next, *plan_) : "planning";
   }

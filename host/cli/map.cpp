@@ -19,7 +19,7 @@
 #include "learning/press.hpp"
 #include "palpate/files.hpp"
 #include "palpate/map_builder.hpp"
-#include "palpate/rotational_symmetry.hpp"
+#include "palpate/object_frame.hpp"
 #include "recognition/recordings.hpp"
 
 namespace palpate::cli {
@@ -39,9 +39,13 @@ void add_in_batches(MapBuilder& builder, std::span<const Touch> touches,
 std::string symmetry_words(const OccupancyGrid& map, const RotationalSymmetry& measured) {
   const int n = measured.suggested;
   const std::string given =
-      n == map.symmetry ? ""
-      : n == 1          ? fmt::format("; --symmetry {} was given", map.symmetry)
-                        : fmt::format("; --symmetry {} lets pose errors ignore such turns", n);
+      n == map.symmetry || (map.symmetry == 1 && !map.suggested_symmetry) ? ""
+      : n == 1 || map.symmetry != 1
+          ? fmt::format("; --symmetry {} was given", map.symmetry)
+          : fmt::format(
+                "; where touches do not tell them apart, recognition takes such turns as equal: "
+                "--symmetry {} always, --symmetry 1 never",
+                n);
   if (n == 1) {
     return fmt::format("{} looks different after every turn, by {:.2f} mm or more{}", map.label,
                        measured.apart_mm[measured.nearest()], given);
@@ -49,6 +53,58 @@ std::string symmetry_words(const OccupancyGrid& map, const RotationalSymmetry& m
   return fmt::format("{} looks the same after {}, within {:.2f} mm{}", map.label,
                      n == 0 ? "any turn" : fmt::format("every 1/{} of a turn", n),
                      measured.apart_mm[n], given);
+}
+
+/// Settles the object's frame of a map that was learned in the robot's, or in a given one.
+void settle_frame(const ObjectOrigin& origin, OccupancyGrid& map) {
+  using Kind = ObjectOrigin::Kind;
+  map.T_learned_robot_object = origin.T_learned_robot_object;
+  if (origin.kind == Kind::centroid || (origin.kind == Kind::automatic && !holds_origin(map))) {
+    centre_frame(map);
+  }
+}
+
+std::string frame_words(const OccupancyGrid& map) {
+  const Pose& frame = map.T_learned_robot_object;
+  return map.centred_mm == glm::dvec2(0.0) && frame.translation_mm == glm::dvec2(0.0) &&
+                 frame.theta_rad == 0.0
+             ? "the robot's"
+             : fmt::format("x {:.2f} mm, y {:.2f} mm, theta {:.2f} deg in the robot's{}",
+                           frame.translation_mm.x, frame.translation_mm.y, degrees(frame.theta_rad),
+                           map.centred_mm == glm::dvec2(0.0) ? "" : ", at the object's middle");
+}
+
+/// The touches as one recording. Where their arrays differ, it has elements for the largest, and
+/// those that a touch lacks are dead.
+Recording gathered(const ObjectTouches& object, const std::string& pressure_unit) {
+  Recording result{.object = object.label, .pressure_unit = pressure_unit};
+  std::size_t most = 0;
+  bool one_array = true;
+  bool dead = false;
+  for (const Touch& touch : object.touches) {
+    most = std::max(most, touch.pressure.size());
+    one_array =
+        one_array && std::ranges::equal(touch.elements_mm, object.touches.front().elements_mm);
+    dead = dead || !touch.valid.empty();
+  }
+  for (const Touch& touch : object.touches) {
+    const std::size_t lacks = most - touch.pressure.size();
+    result.T_robot_sensor.push_back(touch.T_robot_sensor);
+    result.pressure.insert(result.pressure.end(), touch.pressure.begin(), touch.pressure.end());
+    result.pressure.insert(result.pressure.end(), lacks, 0.0);
+    if (!one_array || result.elements_mm.empty()) {
+      result.elements_mm.insert(result.elements_mm.end(), touch.elements_mm.begin(),
+                                touch.elements_mm.end());
+      result.elements_mm.insert(result.elements_mm.end(), lacks, touch.elements_mm.front());
+    }
+    if (dead || !one_array) {
+      const std::vector<std::uint8_t> all_alive(touch.pressure.size(), 1);
+      const std::span<const std::uint8_t> valid = touch.valid.empty() ? all_alive : touch.valid;
+      result.valid.insert(result.valid.end(), valid.begin(), valid.end());
+      result.valid.insert(result.valid.end(), lacks, 0);
+    }
+  }
+  return result;
 }
 
 OccupancyGrid build_map(MapBuilder& builder, const ObjectTouches& object,
@@ -76,6 +132,7 @@ void build_maps(const MapFlags& flags) {
   const std::optional<LearnedSensor> sensor = sensor_of(flags, recordings);
   MapOptions model = map_options(flags, recordings, sensor);
   const std::optional<double> prior = given_prior(flags, sensor);
+  const ObjectOrigin origin = object_origin(flags);
   const std::vector<ObjectTouches> objects =
       group_by_label(flags, recordings, model.classifier).objects;
 
@@ -105,11 +162,10 @@ void build_maps(const MapFlags& flags) {
       maps.push_back(sensor ? observed_map(object.touches, model, object.label)
                             : build_map(builder, object, show));
       maps.back().mirror = flags.mirror;
-      maps.back().symmetry = flags.symmetry;
-      symmetries.push_back(measure_symmetry(maps.back()));
-      if (symmetries.back()) {
-        maps.back().suggested_symmetry = symmetries.back()->suggested;
-      }
+      maps.back().source = std::make_shared<const MapSource>(
+          gathered(object, recordings.front().pressure_unit), model);
+      settle_frame(origin, maps.back());
+      symmetries.push_back(settle_symmetry(flags, maps.back()));
     }
   }
 
@@ -128,6 +184,7 @@ void build_maps(const MapFlags& flags) {
     fmt::print("{}: {} from {} touches, {} x {} cells of {} mm, prior {:.3g}\n",
                map_paths[i].string(), map.label, objects[i].touches.size(), map.nx, map.ny,
                map.cell_mm, map.prior);
+    fmt::print("{}: the frame of {} is {}\n", map_paths[i].string(), map.label, frame_words(map));
     if (symmetries[i]) {
       fmt::print("{}: {}\n", map_paths[i].string(), symmetry_words(map, *symmetries[i]));
     }
@@ -148,10 +205,10 @@ void build_maps(const MapFlags& flags) {
 }  // namespace
 
 void add_map(CLI::App& app) {
-  auto* command = app.add_subcommand(
-      "map",
-      "Build an object's occupancy grid from touches at known poses, where the robot frame is the "
-      "object's frame, or with --unposed from presses at unknown poses");
+  auto* command = app.add_subcommand("map",
+                                     "Build an object's occupancy grid from touches at known "
+                                     "poses, or with --unposed from presses "
+                                     "at unknown poses");
   const auto flags = std::make_shared<MapFlags>();
   add_map_flags(*command, *flags);
   command->callback([flags, command] {

@@ -1,7 +1,11 @@
 #include "cli/map_flags.hpp"
 
+#include <algorithm>
+#include <limits>
 #include <map>
+#include <sstream>
 
+#include <fmt/ranges.h>
 #include <CLI/CLI.hpp>
 
 #include "cli/options.hpp"
@@ -9,6 +13,7 @@
 #include "io/command_files.hpp"
 #include "model/number_text.hpp"
 #include "model/printable.hpp"
+#include "recognition/option_text.hpp"
 #include "recognition/recordings.hpp"
 
 namespace palpate::cli {
@@ -85,11 +90,16 @@ void add_map_flags(CLI::App& command, MapFlags& flags) {
                      "pressure at each cell");
   add_frames_flag(command, flags.frames,
                   "Use the touches A to B - 1 of every recording, counted from 0, as A:B");
-  command
-      .add_option("--symmetry", flags.symmetry,
-                  "n-fold rotational symmetry of the object; 1: none, 0: any rotation")
-      ->check(require_whole_number)
-      ->capture_default_str();
+  command.add_option("--symmetry", flags.symmetry,
+                     "n-fold rotational symmetry, 1: none, 0: any rotation; of all objects, or of "
+                     "some, such as nut=6,key=1 [default: 1; where the map looks the same after "
+                     "turns, recognition takes them as equal once touches cannot tell them apart]");
+  command.add_option(
+      "--origin", flags.origin,
+      "Where the object's frame lies in the robot frame of the touches: robot, at "
+      "its origin; centroid, at the middle of the occupied cells; X,Y,DEG, in mm and "
+      "degrees; auto, at the robot's origin where the map covers it, else at the "
+      "centroid [default: auto]");
   command.add_flag("--mirror", flags.mirror,
                    "The object is flat and may lie on its other side; with --unposed, presses of "
                    "that side join the maps mirrored");
@@ -190,8 +200,79 @@ std::optional<double> given_prior(const MapFlags& flags,
   return prior;
 }
 
+namespace {
+
+/// --symmetry as LABEL=N, by label; a number alone stands under "".
+std::map<std::string, int> symmetries_of(const MapFlags& flags) {
+  std::map<std::string, int> result;
+  std::istringstream items(flags.symmetry);
+  for (std::string item; std::getline(items, item, ',');) {
+    const std::size_t equals = item.rfind('=');
+    const std::string label = equals == std::string::npos ? "" : item.substr(0, equals);
+    const std::string n = equals == std::string::npos ? item : item.substr(equals + 1);
+    const auto whole = number_of(n);
+    if (!require_whole_number(n).empty() || !whole || *whole > std::numeric_limits<int>::max() ||
+        (label.empty() && item != flags.symmetry) || !result.emplace(label, *whole).second) {
+      refuse_flag(
+          "--symmetry", flags.symmetry,
+          "give a whole number from 0, or one for each of some labels, such as nut=6,key=1");
+    }
+  }
+  return result;
+}
+
+/// Throws Error where --symmetry names a label that no object has.
+void require_known_symmetries(const MapFlags& flags, std::span<const ObjectTouches> objects) {
+  std::vector<std::string> labels;
+  for (const ObjectTouches& object : objects) {
+    labels.push_back(object.label);
+  }
+  for (const auto& [label, n] : symmetries_of(flags)) {
+    if (!label.empty() && std::ranges::find(labels, label) == labels.end()) {
+      refuse_flag("--symmetry", flags.symmetry, "no object is named {}; there {} {}", label,
+                  labels.size() == 1 ? "is" : "are", fmt::format("{}", fmt::join(labels, ", ")));
+    }
+  }
+}
+
+}  // namespace
+
+std::optional<RotationalSymmetry> settle_symmetry(const MapFlags& flags, OccupancyGrid& map) {
+  const std::map<std::string, int> given = symmetries_of(flags);
+  const auto own = given.contains(map.label) ? given.find(map.label) : given.find("");
+  const bool none = own != given.end() && own->second == 1;
+  map.symmetry = own == given.end() ? 1 : own->second;
+  const std::optional<RotationalSymmetry> measured = measure_symmetry(map);
+  if (measured && !none) {
+    map.suggested_symmetry = measured->suggested;
+  }
+  return measured;
+}
+
+ObjectOrigin object_origin(const MapFlags& flags) {
+  using Kind = ObjectOrigin::Kind;
+  if (flags.unposed && !flags.origin.empty()) {
+    refuse_flag("--origin", flags.origin,
+                "presses at unknown poses tell of no robot frame; leave it out");
+  }
+  const std::map<std::string, Kind> kinds{{"", Kind::automatic},
+                                          {"auto", Kind::automatic},
+                                          {"centroid", Kind::centroid},
+                                          {"robot", Kind::robot}};
+  if (const auto known = kinds.find(flags.origin); known != kinds.end()) {
+    return {known->second};
+  }
+  if (std::ranges::count(flags.origin, ',') != 2) {
+    refuse_flag("--origin", flags.origin,
+                "give auto, centroid, robot, or the frame's pose X,Y,DEG in the robot frame, mm "
+                "and degrees");
+  }
+  return {Kind::given, parse_pose("--origin", flags.origin)};
+}
+
 GroupedTouches group_by_label(const MapFlags& flags, const std::vector<Recording>& recordings,
                               const ContactClassifier& classifier) {
+  const Pose T_object_robot = inverse(object_origin(flags).T_learned_robot_object);
   struct Group {
     std::vector<Touch> touches;
     std::vector<TouchSource> sources;
@@ -204,9 +285,7 @@ GroupedTouches group_by_label(const MapFlags& flags, const std::vector<Recording
     Group& group = groups[label];
     for (std::size_t i = begin; i < end; ++i) {
       Touch touch = recording.touch(i);
-      if (flags.unposed) {
-        touch.T_robot_sensor = {};
-      }
+      touch.T_robot_sensor = flags.unposed ? Pose{} : T_object_robot * touch.T_robot_sensor;
       if (const auto fault = fault_of(known_readings(touch, classifier))) {
         refuse(recording.path, "sensor_pose[{}]: {}", i, *fault);
       }
@@ -225,6 +304,7 @@ GroupedTouches group_by_label(const MapFlags& flags, const std::vector<Recording
     result.objects.push_back({label, std::move(group.touches)});
     result.sources.push_back(std::move(group.sources));
   }
+  require_known_symmetries(flags, result.objects);
   return result;
 }
 

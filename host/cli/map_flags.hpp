@@ -8,6 +8,7 @@
 
 #include "palpate/learned_sensor.hpp"
 #include "palpate/map_builder.hpp"
+#include "palpate/rotational_symmetry.hpp"
 #include "palpate/touch.hpp"
 #include "recognition/request.hpp"
 
@@ -33,7 +34,8 @@ struct MapFlags {
   std::optional<double> ratio;
   std::string sensor_model;
   std::optional<Frames> frames;
-  int symmetry = 1;
+  std::string origin;
+  std::string symmetry;
   bool mirror = false;
   std::string label;
   bool unposed = false;
@@ -61,6 +63,18 @@ MapOptions map_options(const MapFlags& flags, const std::vector<Recording>& reco
 std::optional<double> given_prior(const MapFlags& flags,
                                   const std::optional<LearnedSensor>& sensor);
 
+/// Gives the map the symmetry of --symmetry, and what it shows itself, which recognition is not to
+/// take where --symmetry says 1. Returns the measured symmetry, see measure_symmetry().
+std::optional<RotationalSymmetry> settle_symmetry(const MapFlags& flags, OccupancyGrid& map);
+/// Which point of the robot frame of the touches is the object frame's origin; by --origin.
+struct ObjectOrigin {
+  /// The robot's own; the object's middle; or the robot's, where that lies on the map.
+  enum class Kind { robot, centroid, automatic, given } kind = Kind::automatic;
+  Pose T_learned_robot_object{};  ///< where it is given
+};
+/// Throws Error on a text that is none of these.
+ObjectOrigin object_origin(const MapFlags& flags);
+
 /// Where in the files a touch stands.
 struct TouchSource {
   std::string path;
@@ -72,8 +86,9 @@ struct GroupedTouches {
   std::vector<ObjectTouches> objects;
   std::vector<std::vector<TouchSource>> sources;  ///< [object][touch]
 };
-/// Throws Error on a label that no map can bear, and on several labels but for a folder. With
-/// --unposed all touches are at the origin.
+/// Throws Error on a label that no map can bear, on several labels but for a folder, and where
+/// --symmetry names another. Touches are in the robot frame, or in that of --origin X,Y,DEG; with
+/// --unposed all are at the origin.
 GroupedTouches group_by_label(const MapFlags& flags, const std::vector<Recording>& recordings,
                               const ContactClassifier& classifier);
 

@@ -16,7 +16,6 @@
 #include "learning/unposed_maps.hpp"
 #include "model/touch_evidence.hpp"
 #include "palpate/files.hpp"
-#include "palpate/rotational_symmetry.hpp"
 #include "recognition/recordings.hpp"
 
 namespace palpate::cli {
@@ -268,10 +267,7 @@ void build_unposed_maps(const MapFlags& flags) {
       objects.push_back({&object, &grouped.sources[k],
                          unposed_maps(object.touches, object.label, options, show)});
       for (UnposedMap& map : objects.back().maps.maps) {
-        map.map.symmetry = flags.symmetry;
-        if (const auto measured = measure_symmetry(map.map)) {
-          map.map.suggested_symmetry = measured->suggested;
-        }
+        settle_symmetry(flags, map.map);
       }
     }
   }

@@ -106,6 +106,27 @@ std::string summary(const std::vector<RecognitionRecord>& records) {
   return text + "\n";
 }
 
+/// Within which angles theta of symmetric objects is given, once for each label.
+std::string symmetries(const std::vector<RecognitionRecord>& records, const RecognitionTask& task) {
+  std::map<std::string, int> symmetric;
+  for (const RecognitionRecord& record : records) {
+    const RecognitionStep& step = record.last();
+    if (step.symmetry != 1) {
+      symmetric.emplace(task.labels[task.label_of[step.mode.object]], step.symmetry);
+    }
+  }
+  std::string text;
+  for (const auto& [label, n] : symmetric) {
+    text += n == 0 ? fmt::format("{} looks the same after any turn: its theta is given as 0\n",
+                                 printable(label))
+                   : fmt::format(
+                         "{} looks the same after every 1/{} of a turn: its theta is given "
+                         "from {:.4g} to {:.4g} deg\n",
+                         printable(label), n, -180.0 / n, 180.0 / n);
+  }
+  return text;
+}
+
 }  // namespace
 
 std::string name_of(const RecognitionRecord& record) {
@@ -136,7 +157,7 @@ std::string trace_table(const RecognitionRecord& record, const RecognitionTask& 
                particles ? fmt::format("{:.1f}", *particles) : "", surprise_text(step),
                fit_words(step)});
   }
-  const std::string truth = truth_words(record.last(), task);
+  const std::string truth = truth_words(record.last());
   return printable_name(record) + "\n" + table.text(columns) +
          (truth.empty() ? "" : "  " + truth + "\n");
 }
@@ -200,14 +221,14 @@ std::string result_table(const std::vector<RecognitionRecord>& records, const Re
     if (step.refined) {
       add_pose("  mode", mode_words(step, task), step.mode_T_robot_object(), step.error_mm);
     }
-    if (const std::optional<Pose> truth = step.true_T_robot_object(task)) {
+    if (const std::optional<Pose> truth = step.true_T_robot_object()) {
       add_pose("  truth", step.truth.label, *truth, step.pose_error_mm());
     } else if (step.right == false) {
       table.add({"  truth", "", step.truth.label, "", "", "", "", "", "wrong object"});
     }
   }
-  return table.text(columns) + complaints(records, task) + summary(records) +
-         confusions(records, task);
+  return table.text(columns) + complaints(records, task) + symmetries(records, task) +
+         summary(records) + confusions(records, task);
 }
 
 }  // namespace palpate::cli

@@ -34,7 +34,7 @@ std::vector<RecognitionSheet::Caption> captions(const RecognitionRecord& record,
       lines.push_back({words, alarm});
     }
   };
-  add(printed(truth_words(last, task)), last.right == false);
+  add(printed(truth_words(last)), last.right == false);
   if (last.refined) {
     std::string mode = "most probable bin: " + pose_words(pose_text(last.mode_T_robot_object()));
     mode += last.error_mm ? "; error " + error_text(last.error_mm) + " mm" : "";
@@ -85,6 +85,7 @@ RecognitionSheet sheet_of(const RecognitionRecord& record, const Unknown& unknow
                  printed(pose_words(pose_text(last))) + " in the robot frame";
   sheet.captions = captions(record, task);
   sheet.map = task.hypotheses[last.mode.object].map;
+  sheet.map.symmetry = last.symmetry;
   sheet.element_mm = element_edge_mm(unknown.touches.front().elements_mm);
   sheet.T_object_robot = last.pose();
   if (last.error_mm) {

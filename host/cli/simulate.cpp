@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <memory>
+#include <numbers>
 #include <optional>
 #include <random>
 #include <string>
@@ -103,8 +104,10 @@ void simulate(const SimulateArguments& options) {
   write_recording(options.output, recording);
   fmt::print("{}: {} touches of {}", options.output, recording.size(), shape.label);
   if (unknown) {
-    fmt::print(" at x {:.2f} mm, y {:.2f} mm, theta {:.1f} deg", T_object_robot.translation_mm.x,
-               T_object_robot.translation_mm.y, degrees(T_object_robot.theta_rad));
+    const Pose T_robot_object = inverse(T_object_robot);
+    fmt::print(" at x {:.2f} mm, y {:.2f} mm, theta {:.1f} deg in the robot frame",
+               T_robot_object.translation_mm.x, T_robot_object.translation_mm.y,
+               degrees(wrap_angle(T_robot_object.theta_rad, 2.0 * std::numbers::pi)));
   }
   fmt::print("\n");
 }

@@ -77,12 +77,12 @@ std::string result_words(const RecognitionStep& step, const RecognitionTask& tas
   return identity_words(step, task) + ": " + pose_words(pose_text(step));
 }
 
-std::string truth_words(const RecognitionStep& step, const RecognitionTask& task) {
+std::string truth_words(const RecognitionStep& step) {
   if (step.truth.label.empty()) {
     return "";
   }
   std::string words = "truth: " + printable(step.truth.label);
-  if (const std::optional<Pose> truth = step.true_T_robot_object(task)) {
+  if (const std::optional<Pose> truth = step.true_T_robot_object()) {
     words += fmt::format(" at {}; error {} mm", pose_words(pose_text(*truth)),
                          error_text(step.pose_error_mm()));
   }

@@ -38,7 +38,7 @@ std::string identity_words(const RecognitionStep& step, const RecognitionTask& t
 std::string result_words(const RecognitionStep& step, const RecognitionTask& task);
 /// The true object and its pose, as far as the step can be compared with them, and the error of the
 /// step's pose; "" where nothing is known.
-std::string truth_words(const RecognitionStep& step, const RecognitionTask& task);
+std::string truth_words(const RecognitionStep& step);
 
 /// What a table says of the fit: "fits", "doubtful", "no fit" or "contradicted", and the
 /// probability that the object was learned where a touch tells it: "fits, known 0.83"; "" without a

@@ -51,6 +51,18 @@ Grid arrange(std::span<const OccupancyGrid> maps) {
   return grid;
 }
 
+/// Draws the x and y axis of the object frame, where its origin lies on the map.
+void draw_frame(Canvas& canvas, const View& view) {
+  constexpr double axis_px = 36.0;
+  const Canvas::Clip clip(canvas, view.box);
+  const glm::dvec2 origin = view.pixel({0.0, 0.0});
+  const Pen pen{.width_px = 3.0, .halo_px = 2.0};
+  canvas.segment(origin, origin + glm::dvec2(axis_px, 0.0), pen);
+  canvas.segment(origin, origin - glm::dvec2(0.0, axis_px), pen);
+  canvas.text("x", origin + glm::dvec2(axis_px + 4.0, 6.0), body);
+  canvas.text("y", origin - glm::dvec2(6.0, axis_px + 6.0), body);
+}
+
 void draw_tile(Canvas& canvas, const Box& tile, double px_per_mm, const OccupancyGrid& map,
                const EvidenceScale& scale) {
   const glm::dvec2 size = glm::round(px_per_mm * map.cell_mm * glm::dvec2(map.nx, map.ny));
@@ -59,6 +71,7 @@ void draw_tile(Canvas& canvas, const Box& tile, double px_per_mm, const Occupanc
                   .lower = lower_edge_mm(map),
                   .upper = upper_edge_mm(map)};
   draw_cells(canvas, view, map, scale);
+  draw_frame(canvas, view);
   canvas.frame(view.box, {.colour = grey, .width_px = 1.0});
   canvas.text(canvas.fit(map.label, tile.width, heading),
               {tile.left + tile.width / 2, tile.top - 10.0}, heading, Align::centre);

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <functional>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <span>
 
@@ -15,6 +16,7 @@
 #include "io/input_file.hpp"
 #include "io/recording_rules.hpp"
 #include "palpate/files.hpp"
+#include "palpate/map_builder.hpp"
 
 namespace palpate {
 
@@ -30,8 +32,10 @@ void require_sound(const std::filesystem::path& path, const std::optional<std::s
 Hdf5Contents open_map(const std::filesystem::path& path) {
   return {path,
           {"format", "version", "label", "cell_mm", "origin_mm", "prior", "symmetry", "spread_mm",
-           "suggested_symmetry", "mirror"},
-          {"log_odds", "observations", "mean_level"}};
+           "suggested_symmetry", "mirror", "T_learned_robot_object", "centred_mm", "pressure_unit",
+           "threshold", "ratio", "peak"},
+          {"log_odds", "observations", "mean_level", "touch_pressure", "touch_pose",
+           "touch_elements", "touch_valid"}};
 }
 
 /// Reads and checks an open map file, holding a few MB of it at a time.
@@ -53,6 +57,14 @@ void scan(const std::filesystem::path& path, Hdf5Contents& file,
   }
   if (file.has_attribute("suggested_symmetry")) {
     map.suggested_symmetry = file.integer("suggested_symmetry", 0);
+  }
+  if (file.has_attribute("T_learned_robot_object")) {
+    const std::vector<double> pose = file.numbers("T_learned_robot_object", 3);
+    map.T_learned_robot_object = {{pose[0], pose[1]}, pose[2]};
+  }
+  if (file.has_attribute("centred_mm")) {
+    const std::vector<double> moved = file.numbers("centred_mm", 2);
+    map.centred_mm = {moved[0], moved[1]};
   }
   map.mirror = file.has_attribute("mirror") && file.integer("mirror", 0) != 0;
   const std::vector<std::uint64_t>& shape = file.shape("log_odds", 2);
@@ -92,6 +104,84 @@ std::vector<float> read_layer(Hdf5Contents& file, const char* name, const Occupa
   return numbers;
 }
 
+/// All numbers of a dataset of this shape.
+std::vector<double> read_all(Hdf5Contents& file, const char* name,
+                             const std::vector<std::uint64_t>& shape) {
+  if (file.shape(name) != shape) {
+    file.refuse("dataset '{}' has the shape {}, not {}; build the map anew", name, file.shape(name),
+                shape);
+  }
+  std::vector<double> numbers;
+  file.read(name, [&](std::uint64_t, std::span<const double> part) {
+    numbers.insert(numbers.end(), part.begin(), part.end());
+  });
+  return numbers;
+}
+
+/// Reads what the map was built from, where the file has it.
+std::shared_ptr<const MapSource> read_source(const std::filesystem::path& path, Hdf5Contents& file,
+                                             const OccupancyGrid& map) {
+  if (!file.has_dataset("touch_pressure") || !map.spread_mm) {
+    return {};
+  }
+  auto source = std::make_shared<MapSource>();
+  source->options = {
+      .cell_mm = map.cell_mm,
+      .sensor = {.spread_mm = *map.spread_mm, .peak = file.number("peak"), .prior = map.prior},
+      .classifier = {.threshold = file.number("threshold"), .ratio = file.number("ratio")}};
+  Recording& touches = source->touches;
+  touches.path = path.string();
+  touches.object = map.label;
+  touches.pressure_unit = file.text("pressure_unit");
+  const std::uint64_t n = file.shape("touch_pressure", 2)[0];
+  const std::uint64_t e = file.shape("touch_pressure", 2)[1];
+  require_memory(path, fmt::format("{} touches of {} elements", n, e),
+                 file.count("touch_pressure") * 4 * sizeof(double));
+  touches.pressure = read_all(file, "touch_pressure", {n, e});
+  const std::vector<double> poses = read_all(file, "touch_pose", {n, 3});
+  for (std::size_t i = 0; i < n; ++i) {
+    touches.T_robot_sensor.push_back({{poses[3 * i], poses[3 * i + 1]}, poses[3 * i + 2]});
+  }
+  const bool changes = file.shape("touch_elements").size() == 3;
+  const std::vector<double> elements = changes ? read_all(file, "touch_elements", {n, e, 2})
+                                               : read_all(file, "touch_elements", {e, 2});
+  for (std::size_t k = 0; k < elements.size(); k += 2) {
+    touches.elements_mm.emplace_back(elements[k], elements[k + 1]);
+  }
+  if (file.has_dataset("touch_valid")) {
+    const std::vector<double> valid = read_all(file, "touch_valid", {n, e});
+    touches.valid.assign(valid.begin(), valid.end());
+  }
+  return source;
+}
+
+void write_source(Hdf5Writer& file, const MapSource& source) {
+  const Recording& touches = source.touches;
+  const std::size_t n = touches.size();
+  const std::size_t e = touches.elements();
+  file.attribute("pressure_unit", touches.pressure_unit);
+  file.attribute("threshold", source.options.classifier.threshold);
+  file.attribute("ratio", source.options.classifier.ratio);
+  file.attribute("peak", source.options.sensor.peak);
+  constexpr auto compressed = Hdf5Writer::Storage::compressed;
+  file.dataset("touch_pressure", {n, e}, touches.pressure, compressed);
+  std::vector<double> poses;
+  for (const Pose& pose : touches.T_robot_sensor) {
+    poses.insert(poses.end(), {pose.translation_mm.x, pose.translation_mm.y, pose.theta_rad});
+  }
+  file.dataset("touch_pose", {n, 3}, poses);
+  std::vector<double> elements;
+  for (const glm::dvec2& element : touches.elements_mm) {
+    elements.insert(elements.end(), {element.x, element.y});
+  }
+  const bool changes = touches.elements_mm.size() != e;
+  file.dataset("touch_elements", changes ? Hdf5Writer::Shape{n, e, 2} : Hdf5Writer::Shape{e, 2},
+               elements, changes ? compressed : Hdf5Writer::Storage::plain);
+  if (!touches.valid.empty()) {
+    file.dataset("touch_valid", {n, e}, touches.valid, compressed);
+  }
+}
+
 }  // namespace
 
 MapSummary summarize_map(const std::filesystem::path& path) {
@@ -127,6 +217,7 @@ OccupancyGrid read_map(const std::filesystem::path& path) {
       });
   map.observations = read_layer(file, "observations", map);
   map.mean_level = read_layer(file, "mean_level", map);
+  map.source = read_source(path, file, map);
   require_sound(path, fault_of(map));
   return map;
 }
@@ -151,6 +242,12 @@ void write_map(const std::filesystem::path& path, const OccupancyGrid& map) {
   if (map.suggested_symmetry) {
     file.attribute("suggested_symmetry", *map.suggested_symmetry);
   }
+  const Pose& learned = map.T_learned_robot_object;
+  file.attribute("T_learned_robot_object",
+                 {learned.translation_mm.x, learned.translation_mm.y, learned.theta_rad});
+  if (map.centred_mm != glm::dvec2(0.0)) {
+    file.attribute("centred_mm", {map.centred_mm.x, map.centred_mm.y});
+  }
   file.dataset("log_odds", {static_cast<std::size_t>(map.ny), static_cast<std::size_t>(map.nx)},
                map.log_odds);
   const std::vector<std::size_t> shape{static_cast<std::size_t>(map.ny),
@@ -160,6 +257,9 @@ void write_map(const std::filesystem::path& path, const OccupancyGrid& map) {
     if (!numbers->empty()) {
       file.dataset(name, shape, *numbers);
     }
+  }
+  if (map.source) {
+    write_source(file, *map.source);
   }
   file.save();
 }

@@ -9,6 +9,7 @@ namespace palpate {
 
 OccupancyGrid mirror_image(const OccupancyGrid& map) {
   OccupancyGrid image = map;
+  image.source.reset();  // its touches are of the side that was learned
   image.origin_mm.x = 0.0 - map.centre_mm(map.nx - 1, 0).x;
   for (std::vector<float>* cells : {&image.log_odds, &image.observations, &image.mean_level}) {
     for (auto row = cells->begin(); row != cells->end(); row += map.nx) {

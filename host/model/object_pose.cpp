@@ -6,8 +6,29 @@
 #include <glm/matrix.hpp>
 
 #include "palpate/estimate.hpp"
+#include "palpate/pose_error.hpp"
 
 namespace palpate {
+
+namespace {
+
+/// The covariance of what depends so on (x, y, theta), row by row, to first order.
+std::array<double, 9> carried_over(const std::array<double, 9>& covariance,
+                                   const glm::dmat3& jacobian) {
+  glm::dmat3 columns{0.0};
+  for (int i = 0; i < 9; ++i) {
+    columns[i % 3][i / 3] = covariance[i];
+  }
+  const glm::dmat3 carried = jacobian * columns * glm::transpose(jacobian);
+  std::array<double, 9> result{};
+  for (int i = 0; i < 9; ++i) {
+    // Rounding must not leave it unsymmetric.
+    result[i] = (carried[i % 3][i / 3] + carried[i / 3][i % 3]) / 2.0;
+  }
+  return result;
+}
+
+}  // namespace
 
 std::array<double, 3> ObjectPose::sd() const {
   // Rounding may leave a variance of nothing below zero.
@@ -17,28 +38,25 @@ std::array<double, 3> ObjectPose::sd() const {
 
 ObjectPose inverse(const RefinedPose& refined) {
   const double theta_rad = refined.T_object_robot.theta_rad;
-  ObjectPose result{.T_robot_object = inverse(refined.T_object_robot)};
+  const Pose T_robot_object = inverse(refined.T_object_robot);
   // t' = -R(-theta) t and theta' = -theta, so dt' = -R(-theta) dt + R(pi/2 - theta) t dtheta, whose
   // last term is -R(pi/2) t' dtheta.
-  const glm::dvec2 slope = -rotate(std::numbers::pi / 2.0, result.T_robot_object.translation_mm);
+  const glm::dvec2 slope = -rotate(std::numbers::pi / 2.0, T_robot_object.translation_mm);
   glm::dmat3 jacobian{0.0};  // by columns
   jacobian[0] = {-rotate(-theta_rad, {1.0, 0.0}), 0.0};
   jacobian[1] = {-rotate(-theta_rad, {0.0, 1.0}), 0.0};
   jacobian[2] = {slope, -1.0};
-  glm::dmat3 covariance{0.0};
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column) {
-      covariance[column][row] = refined.covariance[3 * row + column];
-    }
-  }
-  const glm::dmat3 carried = jacobian * covariance * glm::transpose(jacobian);
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column) {
-      // Rounding must not leave it unsymmetric.
-      result.covariance[3 * row + column] = (carried[column][row] + carried[row][column]) / 2.0;
-    }
-  }
-  return result;
+  return {T_robot_object, carried_over(refined.covariance, jacobian)};
+}
+
+RefinedPose least_turned(const std::optional<Body>& body, int symmetry,
+                         const RefinedPose& refined) {
+  const Pose turned = least_turned(body, symmetry, refined.T_object_robot);
+  const double turn_rad = turned.theta_rad - refined.T_object_robot.theta_rad;
+  glm::dmat3 jacobian{1.0};  // by columns
+  jacobian[0] = {rotate(turn_rad, {1.0, 0.0}), 0.0};
+  jacobian[1] = {rotate(turn_rad, {0.0, 1.0}), 0.0};
+  return {turned, carried_over(refined.covariance, jacobian)};
 }
 
 }  // namespace palpate

@@ -87,6 +87,15 @@ std::optional<std::string> fault_without_cells(const OccupancyGrid& map) {
         "object frame's origin",
         map.origin_mm.x, map.origin_mm.y, map.nx, map.ny, farthest_mm);
   }
+  const Pose& learned = map.T_learned_robot_object;
+  if (!is_near(learned.translation_mm) || !std::isfinite(learned.theta_rad)) {
+    return fmt::format("'T_learned_robot_object' = [{}, {}, {}]; give x and y in mm and radians",
+                       learned.translation_mm.x, learned.translation_mm.y, learned.theta_rad);
+  }
+  if (!is_near(map.centred_mm)) {
+    return fmt::format("'centred_mm' = [{}, {}]; give x and y in mm", map.centred_mm.x,
+                       map.centred_mm.y);
+  }
   if (!(map.prior > 0.0 && map.prior < 1.0)) {
     return fmt::format("'prior' = {}; make it a probability between 0 and 1", map.prior);
   }

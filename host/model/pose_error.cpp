@@ -67,4 +67,23 @@ double pose_error_mm(const Body& body, int symmetry, const Pose& T_object_robot_
   return std::hypot(shift.x, shift.y, 2.0 * std::sqrt(body.inertia_mm2) * s);
 }
 
+namespace {
+
+/// The turn about the body's centroid, in the object frame, that least_turned() makes.
+Pose least_turn(const std::optional<Body>& body, int symmetry, const Pose& T_object_robot) {
+  if (!body || symmetry == 1) {
+    return {};
+  }
+  const double period_rad = 2.0 * std::numbers::pi / symmetry;
+  const double theta_rad = symmetry == 0 ? 0.0 : wrap_angle(-T_object_robot.theta_rad, period_rad);
+  const double turn_rad = -theta_rad - T_object_robot.theta_rad;
+  return {body->centroid_mm - rotate(turn_rad, body->centroid_mm), turn_rad};
+}
+
+}  // namespace
+
+Pose least_turned(const std::optional<Body>& body, int symmetry, const Pose& T_object_robot) {
+  return least_turn(body, symmetry, T_object_robot) * T_object_robot;
+}
+
 }  // namespace palpate

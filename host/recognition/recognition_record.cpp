@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "palpate/error.hpp"
+#include "palpate/object_frame.hpp"
 #include "palpate/pose_error.hpp"
 #include "recognition/label_probability.hpp"
 #include "recognition/nearby_fit.hpp"
@@ -18,16 +19,30 @@ namespace palpate {
 
 namespace {
 
-/// Pose error (Eq. 17-20) of a hypothesis that has the true label, where the true pose is known.
-std::optional<double> error_mm(const RecognitionTask& task, int object, const Pose& T_object_robot,
-                               const GroundTruth& truth) {
-  const OccupancyGrid& map = task.hypotheses[object].map;
-  const std::optional<Body>& body = task.bodies[object];
-  if (task.hypotheses[object].mirrored || !truth.T_object_robot || map.label != truth.label ||
-      !body) {
-    return {};
+/// Pose errors (Eq. 17-20), where the mode's object has the true label and the true pose is known.
+void measure_errors(const RecognitionTask& task, RecognitionStep& step) {
+  const Hypothesis& object = task.hypotheses[step.mode.object];
+  if (object.mirrored || !step.truth.T_object_robot || object.map.label != step.truth.label ||
+      !step.body) {
+    return;
   }
-  return pose_error_mm(*body, map.symmetry, T_object_robot, *truth.T_object_robot);
+  const auto error_mm = [&](const Pose& T_object_robot) {
+    return pose_error_mm(*step.body, step.symmetry, T_object_robot, *step.truth.T_object_robot);
+  };
+  step.error_mm = error_mm(step.mode.T_object_robot);
+  if (step.refined) {
+    step.refined_error_mm = error_mm(step.refined->T_object_robot);
+  }
+}
+
+/// The truth in the object frame of its label's map.
+GroundTruth in_frame_of_map(const RecognitionTask& task, GroundTruth truth) {
+  const auto object = std::ranges::find(task.hypotheses, truth.label,
+                                        [](const Hypothesis& one) { return one.map.label; });
+  if (truth.T_object_robot && object != task.hypotheses.end()) {
+    truth.T_object_robot = in_centred_frame(object->map, *truth.T_object_robot);
+  }
+  return truth;
 }
 
 using Clock = std::chrono::steady_clock;
@@ -129,21 +144,24 @@ Pose robot_pose(const Pose& T_object_robot) {
 
 }  // namespace
 
-Pose RecognitionStep::T_robot_object() const { return robot_pose(pose()); }
-
-Pose RecognitionStep::mode_T_robot_object() const { return robot_pose(mode.T_object_robot); }
-
-std::optional<std::array<double, 3>> RecognitionStep::sd() const {
-  return refined ? std::optional(inverse(*refined).sd()) : std::nullopt;
+Pose RecognitionStep::T_robot_object() const {
+  return robot_pose(least_turned(body, symmetry, pose()));
 }
 
-std::optional<Pose> RecognitionStep::true_T_robot_object(const RecognitionTask& task) const {
-  if (!error_mm) {
-    return {};
-  }
-  const OccupancyGrid& map = task.hypotheses[mode.object].map;
-  return robot_pose(nearest_equal_pose(task.bodies[mode.object].value(), map.symmetry, pose(),
-                                       *truth.T_object_robot));
+Pose RecognitionStep::mode_T_robot_object() const {
+  return robot_pose(least_turned(body, symmetry, mode.T_object_robot));
+}
+
+std::optional<std::array<double, 3>> RecognitionStep::sd() const {
+  return refined ? std::optional(inverse(least_turned(body, symmetry, *refined)).sd())
+                 : std::nullopt;
+}
+
+std::optional<Pose> RecognitionStep::true_T_robot_object() const {
+  return error_mm ? std::optional(robot_pose(nearest_equal_pose(
+                        body.value(), symmetry, least_turned(body, symmetry, pose()),
+                        *truth.T_object_robot)))
+                  : std::nullopt;
 }
 
 GroundTruth ground_truth(const std::string& object, const std::optional<Truth>& truth) {
@@ -182,7 +200,9 @@ RecognitionStep judge(const Estimate& estimate, const GroundTruth& truth,
                        .mode = estimate.mode,
                        .refined = {},
                        .contradicted = estimate.contradicted,
-                       .truth = truth,
+                       .truth = in_frame_of_map(task, truth),
+                       .symmetry = task.hypotheses[estimate.mode.object].map.symmetry,
+                       .body = task.bodies[estimate.mode.object],
                        .known = known};
   if (estimate.certificate) {
     step.identity_bounds = label_bounds(estimate, step.identity, tempering, task, known);
@@ -194,7 +214,7 @@ RecognitionStep judge(const Estimate& estimate, const GroundTruth& truth,
     const bool learned = std::find(labels.begin(), labels.end(), truth.label) != labels.end();
     step.right = labels[step.best] == (learned ? truth.label : none_label);
   }
-  step.error_mm = error_mm(task, step.mode.object, step.mode.T_object_robot, truth);
+  measure_errors(task, step);
   return step;
 }
 
@@ -212,14 +232,13 @@ RecognitionStep take_step(Recogniser& recogniser, const RecognitionTask& task,
   const Clock::time_point estimated = Clock::now();
   step.refined = recogniser.refine(step.mode);
   step.refine_seconds = seconds_since(estimated);
-  if (step.refined) {
-    step.refined_error_mm = error_mm(task, step.mode.object, step.refined->T_object_robot, truth);
-  }
+  step.symmetry = symmetry_told(recogniser, task, step);
+  measure_errors(task, step);
   step.effective_sample_size = recogniser.effective_sample_size();
   step.fit = fit_of(step, evidence, task);
   step.warnings = warnings_about(evidence, task, recogniser.lattice(), step);
   if (step.warnings.empty()) {
-    for (auto warning : {turned_alike(recogniser, task, step, truth),
+    for (auto warning : {turned_alike(task, step),
                          touches_contradict(evidence, task, step, recogniser.surprises())}) {
       if (warning) {
         step.warnings.push_back(*std::move(warning));

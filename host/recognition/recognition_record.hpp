@@ -50,7 +50,12 @@ struct RecognitionStep {
   Mode mode;
   std::optional<RefinedPose> refined;  ///< empty for particles
   bool contradicted = false;           ///< see Estimate
-  GroundTruth truth = {};
+  GroundTruth truth = {};              ///< in the object frame of the label's map
+  /// n-fold symmetry of the mode's object: its map's, or what the map shows
+  /// (OccupancyGrid::suggested_symmetry) where touches do not tell such turns apart. Turned poses
+  /// are equal, and pose errors ignore such turns.
+  int symmetry = 1;
+  std::optional<Body> body = {};  ///< of the mode's map; none where no cell is occupied
   /// Whether `best` is the true label, where that label is known. "(none)" is right where no map
   /// has the true label.
   std::optional<bool> right;
@@ -81,15 +86,15 @@ struct RecognitionStep {
   const Pose& pose() const { return refined ? refined->T_object_robot : mode.T_object_robot; }
   /// The error of pose(), mm.
   std::optional<double> pose_error_mm() const { return refined ? refined_error_mm : error_mm; }
-  /// The inverse of pose(), for a robot to act on; theta in [-pi, pi).
+  /// The inverse of pose(), for a robot to act on, turned by least_turned(); theta in [-pi, pi).
   Pose T_robot_object() const;
-  /// The inverse of the mode's pose; theta in [-pi, pi).
+  /// The inverse of the mode's pose, turned by least_turned(); theta in [-pi, pi).
   Pose mode_T_robot_object() const;
   /// Standard deviations of T_robot_object(), in mm, mm and rad; empty for particles.
   std::optional<std::array<double, 3>> sd() const;
   /// The true T_robot_object, of those that the object's symmetry makes equal the nearest to
   /// T_robot_object(); theta in [-pi, pi). Only where there is an error.
-  std::optional<Pose> true_T_robot_object(const RecognitionTask& task) const;
+  std::optional<Pose> true_T_robot_object() const;
 };
 
 /// The result for one unknown: its steps, or the error that prevented them.

@@ -93,6 +93,9 @@ nlohmann::ordered_json to_json(const RecognitionStep& step, const RecognitionTas
     json["mode"]["mirrored"] = hypothesis.mirrored;
   }
   json["T_robot_object"] = to_json(step.mode_T_robot_object());
+  if (step.symmetry != 1) {
+    json["symmetry"] = step.symmetry;
+  }
   if (step.right) {
     json["right"] = *step.right;
     json["error_mm"] = to_json(step.error_mm);

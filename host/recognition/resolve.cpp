@@ -8,7 +8,9 @@
 
 #include "estimation/displacement_check.hpp"
 #include "io/file_identity.hpp"
+#include "model/printable.hpp"
 #include "palpate/files.hpp"
+#include "palpate/map_builder.hpp"
 #include "recognition/filter_choice.hpp"
 #include "recognition/recordings.hpp"
 #include "recognition/refused_option.hpp"
@@ -47,21 +49,43 @@ std::vector<Hypothesis> hypotheses_of(const Request& request,
   return hypotheses;
 }
 
-/// The prior that was given, if any. Throws Error where none was and the maps' own differ.
-std::optional<double> prior_of(const std::vector<Scene::Object>& objects,
-                               const std::vector<Hypothesis>& hypotheses,
-                               std::optional<double> given) {
+/// The prior that was given, if any.
+std::optional<double> given_prior(std::optional<double> given) {
   if (given && !(*given > 0.0 && *given < 1.0)) {
     refuse_option("prior", *given, "give a probability between 0 and 1");
   }
-  if (const auto other = given ? std::nullopt : differing_prior(hypotheses)) {
-    refuse(objects[*other].map,
-           "prior {} differs from {} of {}; build the maps in one call of palpate map, or say "
-           "which prior to use with `prior`",
-           hypotheses[*other].map.prior, hypotheses.front().map.prior,
-           objects.front().map.string());
-  }
   return given;
+}
+
+/// Brings maps of unlike priors to the one that all of their touches together tell.
+void bring_to_one_prior(const Circumstances& of, const std::vector<Scene::Object>& objects,
+                        std::vector<Hypothesis>& hypotheses, std::vector<std::string>& remarks) {
+  const std::optional<std::size_t> other = differing_prior(hypotheses);
+  if (!other) {
+    return;
+  }
+  std::vector<OccupancyGrid> maps;
+  for (std::size_t i = 0; i < hypotheses.size(); ++i) {
+    maps.push_back(hypotheses[i].map);
+    if (!maps.back().source) {
+      refuse(
+          objects[*other].map,
+          "prior {} differs from {} of {}, and {} holds no touches to build it from again; build "
+          "the maps anew, or say which prior to use with `prior`",
+          hypotheses[*other].map.prior, maps.front().prior, objects.front().map.string(),
+          objects[i].map.string());
+    }
+  }
+  Device& device = of.device();
+  const double prior = pooled_prior(device, maps);
+  for (Hypothesis& hypothesis : hypotheses) {
+    hypothesis.map = with_prior(device, hypothesis.map, prior);
+  }
+  remarks.push_back(fmt::format(
+      "the maps' priors differ, {:.3g} of {} and {:.3g} of {}: all were built again with {:.3g}, "
+      "which their touches tell together",
+      maps.front().prior, printable(maps.front().label), maps[*other].prior,
+      printable(maps[*other].label), prior));
 }
 
 /// The file of every hypothesis's map; a mirror image has that of the object before it.
@@ -175,8 +199,12 @@ RecognitionTask resolve(const Request& request, const Circumstances& of) {
   const auto [classifier, gamma] = contact_rules(request, of, sensor);
   const std::vector<Scene::Object> objects = objects_of(request);
   std::vector<Hypothesis> hypotheses = hypotheses_of(request, objects);
+  std::vector<std::string> remarks;
   if (!sensor || !sensor->table) {
-    contact.prior = prior_of(objects, hypotheses, request.prior);
+    contact.prior = given_prior(request.prior);
+    if (!contact.prior) {
+      bring_to_one_prior(of, objects, hypotheses, remarks);
+    }
   }
   add_mirror_images(hypotheses);
   if (sensor) {
@@ -186,7 +214,6 @@ RecognitionTask resolve(const Request& request, const Circumstances& of) {
   }
   contact.classifier = classifier;
   contact.gamma = gamma;
-  std::vector<std::string> remarks;
   const bool inferred = infers_region(request);
   histogram.lattice =
       inferred ? automatic_lattice(hypotheses, of.reach_mm, remarks) : given_lattice(request);

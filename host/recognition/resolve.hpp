@@ -25,8 +25,9 @@ struct Circumstances {
   bool still_array = false;   ///< HistogramOptions::still_array
   HistogramNeed need = {};
   std::function<void()> cancel_point = {};  ///< RecognitionTask::cancel_point
-  /// Gives the device that recognises. Called where counts of bins follow from its memory.
-  std::function<const Device&()> device = {};
+  /// Gives the device that recognises. Called where counts of bins follow from its memory, and
+  /// where maps of unlike priors are built again.
+  std::function<Device&()> device = {};
   /// Counts of x, y and theta that were settled before, in the place of those that the request
   /// leaves open.
   std::optional<std::array<int, 3>> counts = {};

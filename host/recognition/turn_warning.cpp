@@ -32,36 +32,47 @@ double share_at_other_turns(const Marginals& marginals, double mode_rad, int n) 
 
 }  // namespace
 
-std::optional<std::string> turned_alike(const Recogniser& recogniser, const RecognitionTask& task,
-                                        const RecognitionStep& step, const GroundTruth& truth) {
+int symmetry_told(const Recogniser& recogniser, const RecognitionTask& task,
+                  const RecognitionStep& step) {
   constexpr double least_share = 0.05;
+  const OccupancyGrid& map = task.hypotheses[step.mode.object].map;
+  const int n = map.suggested_symmetry.value_or(1);
+  if (map.symmetry != 1 || n == 1) {
+    return map.symmetry;
+  }
+  const double share = share_at_other_turns(recogniser.marginals(step.mode.object),
+                                            step.mode.T_object_robot.theta_rad, n);
+  return share < least_share ? map.symmetry : n;
+}
+
+std::optional<std::string> turned_alike(const RecognitionTask& task, const RecognitionStep& step) {
   constexpr double least_error_mm = 1.0;
   const OccupancyGrid& map = task.hypotheses[step.mode.object].map;
   const int n = map.suggested_symmetry.value_or(1);
   if (map.symmetry != 1 || n == 1) {
     return {};
   }
-  std::string evidence;
-  if (const std::optional<double> error_mm = step.pose_error_mm()) {
-    const double ignored_mm =
-        pose_error_mm(task.bodies[step.mode.object].value(), n, step.pose(), *truth.T_object_robot);
-    if (*error_mm - ignored_mm > least_error_mm) {
-      evidence =
-          fmt::format("the pose error of {:.2f} mm is {:.2f} mm where such turns do not count",
-                      *error_mm, ignored_mm);
-    }
+  const std::string alike =
+      fmt::format("{} looks the same after {}", map.label,
+                  n == 0 ? "any turn" : fmt::format("every 1/{} of a turn", n));
+  if (step.symmetry == n) {
+    return fmt::format(
+        "{}, and the touches do not tell such turns apart: they count as equal; build its map with "
+        "`symmetry {}` where they always are, with `symmetry 1` where they never are",
+        alike, n);
   }
-  if (evidence.empty()) {
-    const double share = share_at_other_turns(recogniser.marginals(step.mode.object),
-                                              step.mode.T_object_robot.theta_rad, n);
-    if (share < least_share) {
-      return {};
-    }
-    evidence = fmt::format("{:.0f} % of its belief lies at other such turns", 100.0 * share);
+  const std::optional<double> error_mm = step.pose_error_mm();
+  if (!error_mm) {
+    return {};
   }
-  return fmt::format("{} looks the same after {}, and {}; build its map with `symmetry {}`",
-                     map.label, n == 0 ? "any turn" : fmt::format("every 1/{} of a turn", n),
-                     evidence, n);
+  const double ignored_mm =
+      pose_error_mm(step.body.value(), n, step.pose(), *step.truth.T_object_robot);
+  return *error_mm - ignored_mm > least_error_mm
+             ? std::optional(
+                   fmt::format("{}, and the pose error of {:.2f} mm is {:.2f} mm where "
+                               "such turns do not count; build its map with `symmetry {}`",
+                               alike, *error_mm, ignored_mm, n))
+             : std::nullopt;
 }
 
 }  // namespace palpate

@@ -43,10 +43,13 @@ std::optional<std::string> touches_contradict(std::span<const TouchEvidence> tou
 /// and 59 of 60 and 15 of 15 misplaced by 2 mm and 0.1 rad.
 inline constexpr double surprising_from = 1.5;
 
-/// A warning where the best object looks the same after turns (OccupancyGrid::suggested_symmetry)
-/// that its map's symmetry of 1 does not know, and the belief spreads over such turns or a known
+/// The n-fold symmetry of the mode's object as far as touches tell: its map's, or where that is 1
+/// and the belief spreads over turns after which the map looks the same, the one that the map shows
+/// (OccupancyGrid::suggested_symmetry).
+int symmetry_told(const Recogniser& recogniser, const RecognitionTask& task,
+                  const RecognitionStep& step);
+/// What to say where symmetry_told() takes turns as equal that the map does not, or where a known
 /// pose error is such a turn; else none.
-std::optional<std::string> turned_alike(const Recogniser& recogniser, const RecognitionTask& task,
-                                        const RecognitionStep& step, const GroundTruth& truth);
+std::optional<std::string> turned_alike(const RecognitionTask& task, const RecognitionStep& step);
 
 }  // namespace palpate

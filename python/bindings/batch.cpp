@@ -57,7 +57,7 @@ std::tuple<nb::bytes, Entries, Sentences> settle(const std::vector<std::string>&
     settled.inferred = infer(settled.inputs, completed);
     hash_files(settled, completed);
     const RecognitionTask recognition =
-        resolve_batch(settled, completed, [&]() -> const Device& { return lock.device(); });
+        resolve_batch(settled, completed, [&]() -> Device& { return lock.device(); });
     return std::pair(std::move(settled), in_python(recognition.remarks));
   });
   Entries entries;
@@ -89,7 +89,7 @@ OpenBatch open_batch(const std::string& head, const Session& session, Device& de
                             difference));
   }
   RecognitionTask recognition = resolve_batch(
-      task, request, [&device]() -> const Device& { return device; },
+      task, request, [&device]() -> Device& { return device; },
       // The open batch keeps the session.
       [&session] { session.check(); });
   take_threads(recognition, threads);

@@ -44,7 +44,7 @@ Planned plan_next(const Subject& subject, const PlanRequest& wanted, Device& dev
                                 .reach_mm = largest_reach_mm(unknown.touches),
                                 .need = {.why = plan_needs},
                                 .cancel_point = [&call] { call.check(); },
-                                .device = [&]() -> const Device& { return device; }});
+                                .device = [&]() -> Device& { return device; }});
   require_histogram(task);
   Recogniser recogniser = open_recogniser(device, task);
   planned.told = task.remarks;

@@ -206,7 +206,7 @@ Subject subject_of(const GivenRecordings& recordings, const Request& given) {
   return subject;
 }
 
-RecognitionTask task_of(const Subject& subject, const Device& device, const Call& call,
+RecognitionTask task_of(const Subject& subject, Device& device, const Call& call,
                         const HistogramNeed& need) {
   const Recording& first = subject.recordings.front();
   return resolve(subject.request, {.pressure_unit = first.pressure_unit,
@@ -215,7 +215,7 @@ RecognitionTask task_of(const Subject& subject, const Device& device, const Call
                                    .still_array = array_is_still(subject.unknowns),
                                    .need = need,
                                    .cancel_point = [&call] { call.check(); },
-                                   .device = [&device]() -> const Device& { return device; }});
+                                   .device = [&device]() -> Device& { return device; }});
 }
 
 Sentences in_python(Sentences sentences) {

@@ -199,7 +199,7 @@ INSTANTIATE_TEST_SUITE_P(
         map_with("certain_prior", [](auto& file) { file.attribute("prior", 1.0); },
                  {"'prior' = 1", "between 0 and 1"}),
         map_with("other_prior", [](auto& file) { file.attribute("prior", 0.4); },
-                 {"prior 0.4 differs", "A.map.h5", "--prior"})),
+                 {"prior 0.4 differs", "holds no touches", "A.map.h5", "--prior"})),
     [](const auto& test) { return test.param.name; });
 
 TEST_F(BadInput, FolderMayNameNoMapEither) {

@@ -18,7 +18,7 @@ class InfoCommand : public ProgramTest {
 TEST_F(InfoCommand, Recording) {
   write_recording(folder_ / "u.h5", sample_unknown("A", {{2.0, -3.0}, 1.0}, 6));
   expect_info("u.h5", {"u.h5: recording of an unknown object", "touches           6",
-                       "elements          36", "kPa", "A at x 2.000 mm, y -3.000 mm"});
+                       "elements          36", "kPa", "A at x 1.444 mm, y 3.304 mm"});
   write_recording(folder_ / "A.h5", sample_training("A", 2));
   expect_info("A.h5", {"recording of A"});
 }

@@ -43,14 +43,15 @@ TEST_F(MapCommand, SaysAndStoresTheSymmetryThatTheMapsShow) {
   EXPECT_NE(out.find("A looks different after every turn, by "), std::string::npos) << out;
   EXPECT_NE(out.find("I looks the same after every 1/2 of a turn, within 0."), std::string::npos)
       << out;
-  EXPECT_NE(out.find("; --symmetry 2 lets pose errors ignore such turns\n"), std::string::npos)
-      << out;
+  EXPECT_NE(out.find("--symmetry 2 always, --symmetry 1 never\n"), std::string::npos) << out;
   const OccupancyGrid i = read_map(folder_ / "maps/I.map.h5");
   EXPECT_EQ(i.suggested_symmetry, 2);
   EXPECT_EQ(i.symmetry, 1) << "as given";
   EXPECT_EQ(read_map(folder_ / "maps/A.map.h5").suggested_symmetry, 1);
   const std::string given = done({"map", "I.h5", "-o", "I.map.h5", "--symmetry", "2"});
   EXPECT_EQ(given.find("--symmetry"), std::string::npos) << given;
+  done({"map", "I.h5", "-o", "I.map.h5", "--symmetry", "1"});
+  EXPECT_FALSE(read_map(folder_ / "I.map.h5").suggested_symmetry) << "not to be taken";
 }
 
 TEST_F(MapCommand, FolderThatExistsNeedsNoSlash) {
@@ -70,9 +71,9 @@ TEST_F(MapCommand, FileSaysWhatItIs) {
 TEST_F(MapCommand, DefaultsAreTheDocumentedOnes) {
   map_of_a({});
   const std::string bare = bytes_of(folder_ / "A.map.h5");
-  map_of_a({"--cell-mm", "0.5",     "--psf-mm",   "1.0",         "--spread-mm", "0.5",     "--peak",
-            "0.9",       "--prior", "auto",       "--threshold", "2",           "--ratio", "0.3",
-            "--frames",  "0:48",    "--symmetry", "1",           "--label",     "A"});
+  map_of_a({"--cell-mm", "0.5",     "--psf-mm", "1.0",         "--spread-mm", "0.5",     "--peak",
+            "0.9",       "--prior", "auto",     "--threshold", "2",           "--ratio", "0.3",
+            "--frames",  "0:48",    "--origin", "auto",        "--label",     "A"});
   EXPECT_TRUE(bytes_of(folder_ / "A.map.h5") == bare) << "the same input gives the same file";
 }
 

@@ -56,6 +56,7 @@ RecognitionRecord sample_trial(const std::string& name, const RecognitionTask& t
   record.true_label = "A";
   step.truth = {.label = "A", .T_object_robot = truth};
   step.right = true;
+  step.body = body;
   step.error_mm = pose_error_mm(body, 1, step.mode.T_object_robot, truth);
   step.refined_error_mm = pose_error_mm(body, 1, step.refined->T_object_robot, truth);
   return record;
@@ -92,9 +93,9 @@ TEST(ResultTable, SaysTheModeAndTheTruthBelow) {
 }
 
 TEST(ResultTable, ShowsOfEqualTruthsTheNearest) {
-  RecognitionTask task = sample_task();
-  task.hypotheses[0].map.symmetry = 2;
+  const RecognitionTask task = sample_task();
   RecognitionRecord record = sample_trial("mug.h5", task);
+  record.trace.back().symmetry = 2;
   const glm::dvec2 c = body_of(task.hypotheses[0].map).centroid_mm;
   std::optional<Pose>& truth = record.trace.back().truth.T_object_robot;
   truth = Pose{2.0 * c, std::numbers::pi} * *truth;  // half a turn about the centroid

@@ -137,7 +137,7 @@ TEST(Mirror, FindsTheObjectOnItsOtherSide) {
       EXPECT_EQ(task.hypotheses[step.mode.object].mirrored, mirrored);
       EXPECT_EQ(step.error_mm.has_value(), !mirrored) << "the truth is of the object as learned";
       EXPECT_EQ(step.refined_error_mm.has_value(), !mirrored);
-      EXPECT_EQ(step.true_T_robot_object(task).has_value(), !mirrored);
+      EXPECT_EQ(step.true_T_robot_object().has_value(), !mirrored);
       EXPECT_EQ(step.fit.value().verdict, Verdict::fits);
       // Bins of 0.5 mm and 22.5 degrees; the image's frame is where the mirrored letter's was.
       EXPECT_LT(glm::distance(step.pose().translation_mm, T_object_robot.translation_mm), 1.0);

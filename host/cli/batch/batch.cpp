@@ -134,8 +134,8 @@ SettledBatch settle_batch(const ResultsFolder& folder, const FolderLock& lock, B
     now.bins = before->bins;
   }
   std::optional<Device> device;
-  RecognitionTask recognition =
-      resolve_batch(now, request, [&]() -> const Device& { return device.emplace(open()); });
+  RecognitionTask recognition = resolve_batch(
+      now, request, [&]() -> Device& { return device ? *device : device.emplace(open()); });
   if (!same_task) {
     std::ranges::for_each(recognition.remarks, tell_on_stderr);
   }

@@ -63,6 +63,24 @@ struct ObjectTouches {
   std::vector<Touch> touches;
 };
 
+/// What a map was built from: enough to build it again with another prior.
+struct MapSource {
+  /// Their poses are those of the sensor in the frame in which the object was learned, see
+  /// centre_frame().
+  Recording touches;
+  MapOptions options;
+};
+
+/// Returns the map as its `source` makes it with another prior; its frame, its layers and all else
+/// stay.
+/// @throws Error where it has no source, or its cells are not those of its source, and as
+/// MapBuilder does
+PALPATE_API OccupancyGrid with_prior(Device& device, const OccupancyGrid& map, double prior);
+
+/// Estimates p(m) as estimate_prior() does, from the sources of maps.
+/// @throws Error where a map has no source, and as MapBuilder does
+PALPATE_API double pooled_prior(Device& device, std::span<const OccupancyGrid> maps);
+
 /// Estimates p(m) as in the paper: occupied area over modelled area, pooled over all objects. The
 /// areas are counted on maps built with a prior of 0.5: a cell is occupied where its log odds
 /// exceed 1e-3 nats, and modelled where |log odds| does.

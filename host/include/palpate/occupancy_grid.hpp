@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -10,6 +11,7 @@
 #include <glm/vec2.hpp>
 
 #include "palpate/api.hpp"
+#include "palpate/pose.hpp"
 
 namespace palpate {
 
@@ -33,6 +35,8 @@ inline constexpr std::int64_t most_cells = std::int64_t{1} << 30;
 /// Largest magnitude of a cell's log odds, in nats: float32 holds sums of 1e8 such values.
 inline constexpr double most_log_odds = 1e30;
 
+struct MapSource;
+
 /// The map of one object: log odds of occupancy on a regular grid in the object frame. Cell
 /// (row j, column i) is centred at origin_mm + cell_mm * (i, j). Everything beyond the grid holds
 /// the prior, and interpolation across the border fades to it.
@@ -51,6 +55,10 @@ struct OccupancyGrid {
   /// The object may lie on its other side: its mirror image, x to -x, is an object of its own under
   /// the same label; see add_mirror_images().
   bool mirror = false;
+  /// The object frame in the robot frame of the touches that the map was learned from.
+  Pose T_learned_robot_object{};
+  /// How far centre_frame() has moved the object frame's origin, in mm in that frame.
+  glm::dvec2 centred_mm{0.0, 0.0};
   int nx = 0;
   int ny = 0;
   std::vector<float> log_odds;  ///< [ny, nx], row-major
@@ -59,6 +67,8 @@ struct OccupancyGrid {
   /// Mean pressure at each cell, in the recordings' unit, [ny, nx]; 0 where nothing sensed it.
   /// Empty where pressures were not averaged.
   std::vector<float> mean_level = {};
+  /// What the map was built from, for with_prior(); null where that is not known.
+  std::shared_ptr<const MapSource> source = {};
 
   float at(int i, int j) const { return log_odds[static_cast<std::size_t>(j) * nx + i]; }
   glm::dvec2 centre_mm(int i, int j) const { return origin_mm + cell_mm * glm::dvec2(i, j); }

@@ -25,6 +25,7 @@
 #include "palpate/learned_sensor.hpp"
 #include "palpate/log.hpp"
 #include "palpate/map_builder.hpp"
+#include "palpate/object_frame.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/particle_filter.hpp"
 #include "palpate/plan.hpp"

@@ -1,8 +1,11 @@
 #pragma once
 
+#include <optional>
+
 #include <glm/vec2.hpp>
 
 #include "palpate/api.hpp"
+#include "palpate/estimate.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/pose.hpp"
 
@@ -30,5 +33,14 @@ PALPATE_API double pose_error_mm(const Body& body, int symmetry,
 PALPATE_API Pose nearest_equal_pose(const Body& body, int symmetry,
                                     const Pose& T_object_robot_estimate,
                                     const Pose& T_object_robot_truth);
+
+/// Returns the pose among those that the symmetry makes equal whose inverse, T_robot_object, has
+/// theta within [-pi/n, pi/n); with n = 0, theta = 0. The turn is about the body's centroid; where
+/// there is no body, or n = 1, the pose is returned as it is.
+PALPATE_API Pose least_turned(const std::optional<Body>& body, int symmetry,
+                              const Pose& T_object_robot);
+/// least_turned() of a pose whose covariance turns with it.
+PALPATE_API RefinedPose least_turned(const std::optional<Body>& body, int symmetry,
+                                     const RefinedPose& refined);
 
 }  // namespace palpate

@@ -39,7 +39,7 @@ void hash_files(BatchTask& task, const Request& request) {
 }
 
 RecognitionTask resolve_batch(BatchTask& task, const Request& request,
-                              const std::function<const Device&()>& device,
+                              const std::function<Device&()>& device,
                               const std::function<void()>& cancel_point) {
   const BatchInference& inferred = task.inferred;
   const bool settled = task.bins != std::array<int, 3>{};

@@ -32,7 +32,7 @@ void hash_files(BatchTask& task, const Request& request);
 /// @param cancel_point as RecognitionTask::cancel_point
 /// @throws Error
 RecognitionTask resolve_batch(BatchTask& task, const Request& request,
-                              const std::function<const Device&()>& device,
+                              const std::function<Device&()>& device,
                               const std::function<void()>& cancel_point = {});
 
 /// Whether the filter computes on a device. Bounds do not: a GPU would take their bins over at a
