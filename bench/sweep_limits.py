@@ -12,7 +12,7 @@ from palpate._statistics import Errors, errors_over
 from palpate._tables import count_text
 
 from .measures import differences
-from .report import Json
+from .program import Json
 from .trials import (
     EXACT,
     VOWELS,
@@ -23,7 +23,7 @@ from .trials import (
     make_trials,
     training_recordings,
 )
-from .windows import estimate_in_window
+from .windows import poses_in_window
 
 
 class Variant(NamedTuple):
@@ -87,8 +87,8 @@ def measure_limits(
         trials = make_trials(VOWELS, each, touches, seed, variant.touching)
         against = unchanged
         for bins in lattices if variant.all_lattices else lattices[:1]:
-            lattice = lattice_of(*bins)
-            steps = [estimate_in_window(device, maps, trial, lattice) for trial in trials]
+            lattice = lattice_of(bins)
+            steps = [poses_in_window(device, maps, trial, lattice) for trial in trials]
             modes, refined = [s.error_mm for s in steps], [s.refined_error_mm for s in steps]
             limits.append(
                 {
