@@ -10,12 +10,10 @@ struct RunOptions {
   std::string device;  ///< a device's name or index; empty for the best
   std::string json;    ///< file for the results; none where it is empty
   bool quick = false;  ///< small sizes and few trials, in less than a minute
+  std::string part;    ///< the only part to measure, of a command that has parts; empty for all
 };
 
-struct BoundedRunOptions : RunOptions {
-  std::string part;  ///< the only part to measure; empty for all
-};
-/// Names of the parts, in order.
+/// Names of the parts of `bounded`, in order.
 inline constexpr const char* bounded_parts[] = {"speed", "mode",   "streaming",
                                                 "large", "growth", "search"};
 
@@ -33,6 +31,6 @@ void compare_paths(const RunOptions& options, std::span<char* const> command_lin
 
 /// The posterior by bounds: its time for nine touches at rising numbers of bins, touch by touch and
 /// in large scenes, its memory, and where it searches.
-void measure_bounded(const BoundedRunOptions& options, std::span<char* const> command_line);
+void measure_bounded(const RunOptions& options, std::span<char* const> command_line);
 
 }  // namespace palpate::bench
