@@ -10,12 +10,13 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 import palpate
+from palpate._tables import column
 
 from . import charts
 from .belief_touches import MISPLACED_SEED, Inputs
 from .measures import turning
 from .program import Json
-from .trials import VOWELS, Floats, Touching, column, make_trials, poses_of, truth_of
+from .trials import VOWELS, Floats, Touching, make_trials, poses_of, truth_of
 
 
 def plot(axes: Axes, records: list[Json], path: str, label: str, **look: Any) -> None:

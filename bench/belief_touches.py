@@ -1,11 +1,6 @@
 """Misplaced touches, and "none of these"."""
 
-import json
 import math
-import os
-import pathlib
-import subprocess
-import tempfile
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -13,7 +8,7 @@ import numpy
 
 import palpate
 from palpate._statistics import present, quantile
-from palpate._tables import Column, number, plain, print_head, print_row
+from palpate._tables import Column, column, number, plain, print_head, print_row
 
 from .measures import bootstrap_record, normalised_error, share_record, told_apart, with_interval
 from .program import Json
@@ -22,7 +17,6 @@ from .trials import (
     VOWELS,
     Bins,
     Touching,
-    column,
     lattice_of,
     make_trials,
     map_of,
@@ -151,31 +145,11 @@ TOUCH_SD: list[Column] = [
 ]
 
 
-def fit_touch_sd(inputs: Inputs, trials: Sequence[palpate.Recording], bins: str) -> Json:
-    """What `palpate recognize --fit-touch-sd` finds for unknowns of which it is told nothing."""
-    command = os.environ.get("PALPATE_COMMAND", "build/palpate")
-    with tempfile.TemporaryDirectory() as folder:
-        files = []
-        for i, trial in enumerate(trials):
-            files.append(pathlib.Path(folder, f"{i:03}.h5"))
-            trial.save(files[-1])
-        for grid in inputs.maps:
-            grid.save(pathlib.Path(folder, f"{grid.label}.map.h5"))
-        answer = pathlib.Path(folder, "answer.json")
-        subprocess.run(
-            [command, "recognize", *files, "--maps", *pathlib.Path(folder).glob("*.map.h5"),
-             "--bins", bins, "--x-mm=-10:10", "--y-mm=-10:10", "--fit-touch-sd", "--json", answer,
-             "--device", inputs.device.name],
-            check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-        )  # fmt: skip
-        fit: Json = json.loads(answer.read_text())
-        return fit
-
-
 def measure_touch_sd(inputs: Inputs) -> list[Json]:
     """Every misplacement has unknowns of its own."""
     records = []
-    touches, bins = (6, "13x13x55") if inputs.quick else (12, "20x20x64")
+    touches = 6 if inputs.quick else 12
+    bins: Bins = (13, 13, 55) if inputs.quick else (20, 20, 64)
     print_head(TOUCH_SD)
     for i, mm in enumerate((0.3, 0.5, 1.0, 2.0, 0.0)):
         if inputs.quick and mm != 1.0:
@@ -184,21 +158,19 @@ def measure_touch_sd(inputs: Inputs) -> list[Json]:
         touching = Touching(at_random_poses=True, noise=(true["mm"], true["rad"]))
         seed = TOUCH_SD_SEED + i * 5_000_000
         trials = make_trials(VOWELS, inputs.each(10, 2), touches, seed, touching)
-        fit = fit_touch_sd(inputs, trials, bins)
-        found, error = (
-            {"mm": fit[name]["mm"], "rad": math.radians(fit[name]["deg"])}
-            for name in ("touch_sd", "standard_error")
+        fit = palpate.fit_touch_sd(
+            trials, inputs.maps, bins=bins, x_mm=(-10.0, 10.0), y_mm=(-10.0, 10.0), device=inputs.device
         )
+        found, error = ({"mm": sd.mm, "rad": sd.rad} for sd in (fit.sd, fit.standard_error))
         records.append(
             {
                 "true": true,
+                "unknowns": len(trials),
+                "touches": touches,
                 "fitted": found,
                 "standard_error": error,
                 "share": {of: found[of] / true[of] for of in true} if mm > 0.0 else None,
-                "gain_nats": fit["log_evidence_gain"],
-                "unknowns": len(trials),
-                "touches": touches,
-                "warnings": fit.get("warnings", []),
+                "gain_nats": fit.evidence_gain,
             }
         )
         print_row(TOUCH_SD, records[-1])
@@ -216,28 +188,21 @@ NONE: list[Column] = [
 ]
 
 
-class NoneSetting(NamedTuple):
-    """How unknowns are touched and believed."""
+def none_settings(quick: bool) -> list[tuple[str, Bins, float, Touching, Sd]]:
+    """How unknowns are touched and believed: a name, bins, the region's extent, touching and touch_sd.
 
-    name: str
-    bins: Bins
-    extent_mm: float = 10.0
-    touching: Touching = Touching()
-    touch_sd: Sd = (0.0, 0.0)
-
-
-def none_settings(quick: bool) -> list[NoneSetting]:
-    """Exact touches over growing regions, and misplaced touches."""
-    settings = [NoneSetting("exact, ±10 mm", (13, 13, 55))]
-    if not quick:
-        settings.append(NoneSetting("exact, ±20 mm", (26, 26, 55), 20.0))
-        settings.append(NoneSetting("exact, ±40 mm", (52, 52, 55), 40.0))
-    bins, sd = (13, 13, 55) if quick else (20, 20, 75), (1.0, 0.05)
+    Exact touches over growing regions, and misplaced touches.
+    """
+    bins, exact, sd = (13, 13, 55) if quick else (20, 20, 75), Touching(), (1.0, 0.05)
     off = Touching(at_random_poses=True, noise=sd)
     return [
-        *settings,
-        NoneSetting("misplaced, averaged", bins, touching=off, touch_sd=sd),
-        NoneSetting("misplaced, as if exact", bins, touching=off),
+        ("exact, ±10 mm", (13, 13, 55), 10.0, exact, (0.0, 0.0)),
+        *(
+            (f"exact, ±{10 * times} mm", (13 * times, 13 * times, 55), 10.0 * times, exact, (0.0, 0.0))
+            for times in (() if quick else (2, 4))
+        ),
+        ("misplaced, averaged", bins, 10.0, off, sd),
+        ("misplaced, as if exact", bins, 10.0, off, (0.0, 0.0)),
     ]
 
 

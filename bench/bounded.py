@@ -21,6 +21,7 @@ import palpate
 from palpate._sweep_runs import counts_of
 from palpate._tables import (
     Column,
+    column,
     count_text,
     number,
     plain,
@@ -34,7 +35,7 @@ from . import charts
 from .certificates import check_certificate, dense_posterior
 from .measures import share_record, with_interval
 from .program import Json, begin, main, parser, write
-from .trials import TABLE_1, VOWELS, Bins, column, lattice_of, letter_maps, make_trials
+from .trials import TABLE_1, VOWELS, Bins, lattice_of, letter_maps, make_trials
 
 SEED = 1_404_000_000
 _MASS, _PERCENT = number(".1e"), with_interval(".1f", 100.0)
@@ -88,8 +89,7 @@ def measure_accuracy(device: palpate.Device, quick: bool) -> list[Json]:
                     belief.update(trial[done:until])
                 done = until
                 dense = dense_posterior(histogram, maps, trial[:until])
-                check = check_certificate(bounded, dense)
-                of_touch.append(check._asdict() | {"holds": check.holds})
+                of_touch.append(check_certificate(bounded, dense))
         for after, of_touch in checks.items():
             record: Json = {"bins": plain(bins), "touches": after, "posteriors": len(of_touch)}
             record |= {name: [check[name] for check in of_touch] for name in of_touch[0]}

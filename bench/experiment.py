@@ -13,7 +13,7 @@ import numpy
 
 import palpate
 from palpate._statistics import errors_over, present
-from palpate._tables import Column, number, plain, print_head, print_row, print_table, value_of
+from palpate._tables import Column, column, number, plain, print_head, print_row, print_table, value_of
 
 from . import charts
 from .experiment_charts import MOST_PARTICLES, as_many, draw
@@ -25,7 +25,6 @@ from .trials import (
     Bins,
     Floats,
     Touching,
-    column,
     letter_maps,
     make_trials,
     recognized,

@@ -5,9 +5,10 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from palpate._tables import column
+
 from . import charts
 from .program import Json
-from .trials import column
 
 # What the paper reports of letters that it touched with a real sensor.
 PUBLISHED_BINS_KNOW_AFTER = {1_000: 46, 10_000: 9}  # touches to an accuracy of 100 %

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy
 
 import palpate
-from palpate._tables import Column, number, plain, print_head, print_row
+from palpate._tables import Column, column, number, plain, print_head, print_row
 
 from .measures import share_record, told_apart, with_interval
 from .program import Json, begin, main, parser, write
@@ -14,7 +14,6 @@ from .trials import (
     VOWELS,
     Bins,
     Touching,
-    column,
     letter_maps,
     make_trials,
     recognized,

@@ -10,13 +10,13 @@ import numpy
 from numpy.typing import NDArray
 
 from palpate._statistics import LEAST_GAIN
-from palpate._tables import Column, count_text, mean_text, seconds_text, texts, value_of
+from palpate._tables import Column, column, count_text, mean_text, seconds_text, texts, value_of
 
 from . import charts
 from .program import Json
 from .sweep_runs import AUTO_RULE, SAMPLED
 from .sweep_tables import BOUNDS, LIMITS, PRECISIONS, RUNS, STEPS, VERDICTS
-from .trials import Floats, column
+from .trials import Floats
 from .windows import REACH_MM
 
 

@@ -9,7 +9,6 @@ from numpy.typing import ArrayLike, NDArray
 
 import palpate
 from palpate._palpate import Random, Stream
-from palpate._tables import value_of
 
 from .program import Json
 
@@ -171,18 +170,6 @@ def recognized(
     for step in (step for of_trial in steps for step in of_trial):
         step["confidence"] = step["identity"][step["best"]]
     return steps
-
-
-def column(records: Any, path: str) -> Floats:
-    """A field of records by its path, such as "error_mm/mean", in an array as the records lie.
-
-    NaN where a record has none.
-    """
-
-    def values(of: Any) -> Any:
-        return value_of(of, path) if isinstance(of, dict) else [values(each) for each in of]
-
-    return numpy.array(values(records), numpy.float64)
 
 
 class Body(NamedTuple):

@@ -3,6 +3,9 @@
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
+import numpy
+from numpy.typing import NDArray
+
 Text = Callable[[Any], str]
 
 
@@ -54,6 +57,15 @@ def value_of(record: Any, path: str) -> Any:
     for name in path.split("/"):
         record = None if record is None else record.get(name)
     return record
+
+
+def column(records: Any, path: str) -> NDArray[numpy.float64]:
+    """A field of records, in an array as the records lie in lists; NaN where a record has none."""
+
+    def values(of: Any) -> Any:
+        return value_of(of, path) if isinstance(of, dict) else [values(each) for each in of]
+
+    return numpy.array(values(records), numpy.float64)
 
 
 def texts(columns: Sequence[Column], record: Any) -> list[str]:

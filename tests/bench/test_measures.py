@@ -21,10 +21,11 @@ from bench.measures import (
     with_interval,
 )
 from bench.sweep_page import front_of
-from bench.trials import Body, Touching, column, lattice_of, letter_maps, make_trials, map_of, truth_of
+from bench.trials import Body, Touching, lattice_of, letter_maps, make_trials, map_of, truth_of
 from bench.windows import nearest_bin_mm, poses_in_window, windows_about
 from palpate._palpate import Random, Stream
 from palpate._statistics import errors_over, quantile
+from palpate._tables import column
 
 
 def test_random_numbers_are_those_of_their_purpose() -> None:
