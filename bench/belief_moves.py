@@ -11,7 +11,7 @@ import numpy
 import palpate
 from palpate._palpate import Random, Stream
 from palpate._statistics import present
-from palpate._tables import Column, number, plain, print_head, print_row, print_table
+from palpate._tables import Column, Table, number, plain, print_table
 
 from .belief_touches import Inputs, Sd
 from .measures import bootstrap_record, student_record, with_interval
@@ -70,8 +70,7 @@ def measure_slip(inputs: Inputs) -> list[Json]:
         slipping(trial, Body.of(grid).centroid_mm, step, WALK_SEED + i)
         for i, (trial, grid) in enumerate(zip(trials, grids, strict=True))
     ]
-    records = []
-    print_head(SLIP)
+    records = Table(SLIP)
     for name, (mm, rad) in (("with slip_sd", step), ("without", (0.0, 0.0))):
         options = {"extent_mm": 8.0, "slip_sd_mm": mm, "slip_sd_deg": math.degrees(rad)}
         believed = inputs.believed([walk for walk, _ in walks], bins, (0.0, 0.0), **options)
@@ -94,7 +93,6 @@ def measure_slip(inputs: Inputs) -> list[Json]:
         for field_of, some in (("error_mm", errors), ("late_error_mm", late)):
             means = [float(there.mean()) for of in some if len(there := present(of))]
             record[field_of] = student_record(means)
-        print_row(SLIP, record)
         records.append(record)
     return records
 
@@ -134,15 +132,14 @@ def measure_plan(inputs: Inputs) -> list[Json]:
                     following = int(numpy.argmax(gains.both))
                 belief.update(unknown[left.pop(following)])
                 entropy[order][i, touch] = belief.entropy()
-    records: list[Json] = []
-    print_head(PLAN)
+    records, table = [], Table(PLAN)
     for order, nats in entropy.items():
         curve = [
             {"touches": touch, "entropy": bootstrap_record(of)} for touch, of in enumerate(nats.T, 1)
         ]
         records.append({"order": order, "unknowns": len(unknowns), "bins": bins, "curve": curve})
         for point in curve:
-            print_row(PLAN, {"order": order} | point)
+            table.append({"order": order} | point)
     leads = [
         {"planned": planned, "random": random, "entropy": bootstrap_record(
             entropy["planned"][:, planned - 1] - entropy["random"][:, random - 1])}
@@ -179,13 +176,11 @@ def times_ms(calls: Sequence[Callable[[], object]], repeats: int) -> list[float]
 
 def measure_costs(inputs: Inputs) -> list[Json]:
     """Contenders meet the same touches in the same order, in turn."""
-    records: list[Json] = []
-    print_head(COSTS)
+    records = Table(COSTS)
 
     def add(bins: Bins, name: str, value: float, unit: str, at_most: float | None = None) -> None:
-        record = {"bins": bins, "name": name, "value": value, "unit": unit, "at_most": at_most}
-        print_row(COSTS, record)
-        records.append(record)
+        cells = {"bins": bins, "name": name, "value": value, "unit": unit, "at_most": at_most}
+        records.append(cells)
 
     unknowns = make_trials(VOWELS, 1, 9, COST_SEED, Touching(at_random_poses=True))
     touches = [touch for unknown in unknowns for touch in unknown]

@@ -8,7 +8,7 @@ import numpy
 
 import palpate
 from palpate._statistics import present, quantile
-from palpate._tables import Column, column, number, plain, print_head, print_row
+from palpate._tables import Column, Table, column, number, plain
 
 from .measures import bootstrap_record, normalised_error, share_record, told_apart, with_interval
 from .program import Json
@@ -93,9 +93,8 @@ def normalised_errors(
 
 def measure_misplaced(inputs: Inputs) -> list[Json]:
     """Both beliefs get the same touches, at random poses beside the reported ones."""
-    records = []
+    records = Table(MISPLACED)
     bins, counts = (13, 13, 55) if inputs.quick else (30, 30, 113), (3, 5, 9, 12)
-    print_head(MISPLACED)
     for noise in ((1.0, 0.05), (2.0, 0.1)):
         touching = Touching(at_random_poses=True, noise=noise)
         trials = make_trials(VOWELS, inputs.each(40, 2), counts[-1], MISPLACED_SEED, touching)
@@ -112,22 +111,22 @@ def measure_misplaced(inputs: Inputs) -> list[Json]:
                 nees = normalised_errors(inputs, after, trials)
                 refined_mm = column(after, "refined_error_mm")
                 both = ~numpy.isnan(refined_mm + exact_mm)
-                record = {
-                    "noise_mm": noise[0],
-                    "noise_rad": noise[1],
-                    "off_by": f"{noise[0]:g} mm, {noise[1]:g} rad",
-                    "touches": touches,
-                    "belief": name,
-                    "unknowns": len(trials),
-                    "right": share_record(column(after, "right").sum(), len(trials)),
-                    "log_loss": bootstrap_record(losses),
-                    "refined_mm": bootstrap_record(present(refined_mm)),
-                    "ratio": bootstrap_record(refined_mm[both], exact_mm[both]),
-                    "normalised_error": bootstrap_record(nees),
-                    "median_normalised_error": quantile(nees, 0.5),
-                }
-                print_row(MISPLACED, record)
-                records.append(record)
+                records.append(
+                    {
+                        "noise_mm": noise[0],
+                        "noise_rad": noise[1],
+                        "off_by": f"{noise[0]:g} mm, {noise[1]:g} rad",
+                        "touches": touches,
+                        "belief": name,
+                        "unknowns": len(trials),
+                        "right": share_record(column(after, "right").sum(), len(trials)),
+                        "log_loss": bootstrap_record(losses),
+                        "refined_mm": bootstrap_record(present(refined_mm)),
+                        "ratio": bootstrap_record(refined_mm[both], exact_mm[both]),
+                        "normalised_error": bootstrap_record(nees),
+                        "median_normalised_error": quantile(nees, 0.5),
+                    }
+                )
     return records
 
 
@@ -147,10 +146,9 @@ TOUCH_SD: list[Column] = [
 
 def measure_touch_sd(inputs: Inputs) -> list[Json]:
     """Every misplacement has unknowns of its own."""
-    records = []
+    records = Table(TOUCH_SD)
     touches = 6 if inputs.quick else 12
     bins: Bins = (13, 13, 55) if inputs.quick else (20, 20, 64)
-    print_head(TOUCH_SD)
     for i, mm in enumerate((0.3, 0.5, 1.0, 2.0, 0.0)):
         if inputs.quick and mm != 1.0:
             continue
@@ -173,7 +171,6 @@ def measure_touch_sd(inputs: Inputs) -> list[Json]:
                 "gain_nats": fit.evidence_gain,
             }
         )
-        print_row(TOUCH_SD, records[-1])
     return records
 
 
@@ -216,9 +213,7 @@ def log_odds_of_none(step: Json) -> float:
 
 def measure_none(inputs: Inputs) -> list[Json]:
     """Learned and unlearned unknowns, with none as likely before the first touch as all letters."""
-    counts = (1, 3, 5, 9, 15)
-    records = []
-    print_head(NONE)
+    records, counts = Table(NONE), (1, 3, 5, 9, 15)
     for name, bins, extent_mm, touching, touch_sd in none_settings(inputs.quick):
         each = inputs.each(40, 4)
         if math.prod(bins) > 100_000:  # too many for all unknowns
@@ -243,6 +238,5 @@ def measure_none(inputs: Inputs) -> list[Json]:
             record["told_apart"] = told_apart(
                 record["learned_log_odds"], record["unlearned_log_odds"]
             )
-            print_row(NONE, record)
             records.append(record)
     return records

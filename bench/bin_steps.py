@@ -9,17 +9,16 @@ from palpate._statistics import errors_over
 from palpate._sweep_runs import counts_of
 from palpate._tables import (
     Column,
+    Table,
     count_text,
     difference_text,
     mean_text,
     number,
     plain,
-    print_head,
-    print_row,
 )
 
 from .measures import differences
-from .program import Json, begin, main, parser, write
+from .program import begin, main, parser, write
 from .trials import VOWELS, Touching, letter_maps, make_trials
 from .windows import poses_in_window
 
@@ -68,8 +67,7 @@ def program() -> None:
     each = options.trials or (1 if options.quick else 20)
     trials = make_trials(VOWELS, each, max(touches), SEED, Touching(at_random_poses=True))
     reach_mm = float(numpy.hypot(*trials[0].elements_mm.T).max())
-    runs: list[Json] = []
-    print_head(COLUMNS)
+    runs = Table(COLUMNS)
     for cell_mm in cells_mm:
         maps = letter_maps(device, cell_mm=cell_mm)
         lattices = [in_steps(palpate.touch_region(maps, reach_mm), maps, mm) for mm in steps_mm]
@@ -97,7 +95,6 @@ def program() -> None:
                     }
                 )
                 finest = finest or errors
-                print_row(COLUMNS, runs[-1])
     write(options.json, facts | {"runs": runs})
 
 

@@ -18,7 +18,6 @@ Estimate BoundedAnswers::ask(BoundedPosterior& posterior, std::span<const Touch>
                          }));
   const Certificate& certificate = *estimate.certificate;
   bins_evaluated.push_back(static_cast<double>(certificate.bins_evaluated));
-  blocks_bounded.push_back(static_cast<std::int64_t>(certificate.blocks_bounded));
   dropped_mass.push_back(certificate.dropped_mass);
   mode_certain += certificate.mode_certain ? 1 : 0;
   modes.push_back(estimate.mode);
@@ -31,7 +30,6 @@ void BoundedAnswers::add(const BoundedAnswers& others) {
   };
   append(milliseconds, others.milliseconds);
   append(bins_evaluated, others.bins_evaluated);
-  append(blocks_bounded, others.blocks_bounded);
   append(dropped_mass, others.dropped_mass);
   append(modes, others.modes);
   mode_certain += others.mode_certain;
@@ -40,7 +38,6 @@ void BoundedAnswers::add(const BoundedAnswers& others) {
 Json BoundedAnswers::record() const {
   return {{"milliseconds", milliseconds},
           {"bins_evaluated", bins_evaluated},
-          {"blocks_bounded", blocks_bounded},
           {"dropped_mass", dropped_mass},
           {"mode_certain", mode_certain}};
 }

@@ -16,7 +16,6 @@ namespace palpate::bench {
 struct BoundedAnswers {
   std::vector<double> milliseconds = {};  ///< of update() and estimate()
   std::vector<double> bins_evaluated = {};
-  std::vector<std::int64_t> blocks_bounded = {};
   std::vector<double> dropped_mass = {};
   std::vector<Mode> modes = {};
   int mode_certain = 0;

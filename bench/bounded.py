@@ -3,7 +3,6 @@
 Times are measured in C++, by `palpate-bench bounded`.
 """
 
-import argparse
 import json
 import math
 import pathlib
@@ -21,12 +20,11 @@ import palpate
 from palpate._sweep_runs import counts_of
 from palpate._tables import (
     Column,
+    Table,
     column,
     count_text,
     number,
     plain,
-    print_head,
-    print_row,
     print_table,
     seconds_text,
 )
@@ -74,8 +72,7 @@ def measure_accuracy(device: palpate.Device, quick: bool) -> list[Json]:
     sizes: list[Bins] = [*TABLE_1[:2]] if quick else [*TABLE_1, (44, 44, 52), (100, 100, 100)]
     maps = letter_maps(device)
     trials = make_trials(VOWELS, 1 if quick else 10, 9, SEED)
-    records = []
-    print_head(ACCURACY)
+    records = Table(ACCURACY)
     for bins in sizes:
         bounded = palpate.BoundedPosterior(device, maps, lattice_of(bins))
         histogram = palpate.PoseHistogram(device, maps, lattice_of(bins))
@@ -99,7 +96,6 @@ def measure_accuracy(device: palpate.Device, quick: bool) -> list[Json]:
             }
             record["broken"] = record["holds"].count(False)
             record["same_modes"] = record["same_mode"].count(True)
-            print_row(ACCURACY, record)
             records.append(record)
     return records
 
@@ -189,7 +185,7 @@ def _answer(belief: Any, touches: palpate.Recording) -> Json:
     estimate = belief.estimate()
     answer: Json = {"seconds": time.perf_counter() - start, "best": int(numpy.argmax(estimate.identity))}
     if certificate := estimate.certificate:
-        names = ("bins_evaluated", "blocks_bounded", "dropped_mass", "mode_certain")
+        names = ("bins_evaluated", "dropped_mass", "mode_certain")
         answer |= {name: getattr(certificate, name) for name in names}
     return answer
 
@@ -272,24 +268,8 @@ def read_times(path: str) -> Json:
     return times
 
 
-def measure(options: argparse.Namespace) -> None:
-    """Measures the parts, and draws the charts of times where they are given."""
-    times = read_times(options.times) if options.times else None
-    device, document = begin(options)
-    if options.part in (None, "accuracy"):
-        document["accuracy"] = measure_accuracy(device, options.quick)
-    if options.presses:
-        document["presses"] = measure_presses(device, options.presses, options.quick)
-    write(options.json, document)
-    if times:
-        charts.save({"bounded_growth": draw_growth(times["growth"])}, options.plots)
-        picture = draw_search(times["search"], letter_maps(device)[0])
-        path = pathlib.Path(options.plots, "bounded_search.png")
-        write(path, charts.image(picture, "png", dpi=100))
-
-
 def program() -> None:
-    """Reads the flags and measures."""
+    """Measures the parts, and draws the charts of times where they are given."""
     flags = parser(
         "bounded",
         "Holds the certificates of the posterior by bounds against all bins in float64, in some "
@@ -307,7 +287,18 @@ def program() -> None:
         flags.error("--part presses: give the folder of recordings by --presses FOLDER")
     if bool(options.plots) != bool(options.times):
         flags.error("--plots and --times: give both, or neither")
-    measure(options)
+    times = read_times(options.times) if options.times else None
+    device, document = begin(options)
+    if options.part in (None, "accuracy"):
+        document["accuracy"] = measure_accuracy(device, options.quick)
+    if options.presses:
+        document["presses"] = measure_presses(device, options.presses, options.quick)
+    write(options.json, document)
+    if times:
+        charts.save({"bounded_growth": draw_growth(times["growth"])}, options.plots)
+        picture = draw_search(times["search"], letter_maps(device)[0])
+        path = pathlib.Path(options.plots, "bounded_search.png")
+        write(path, charts.image(picture, "png", dpi=100))
 
 
 if __name__ == "__main__":

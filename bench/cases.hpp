@@ -29,6 +29,9 @@ ErrorStatistics likelihood_errors(
     std::span<const Touch> touches, int bins_per_object,
     const std::function<std::vector<double>(int object)>& log_likelihood);
 
+/// Whether identity and mode are the same to the last digit.
+bool same(const Estimate& a, const Estimate& b);
+
 /// An empty histogram of the letters.
 PoseHistogram letter_histogram(const Inputs& inputs, const PoseLattice& lattice);
 

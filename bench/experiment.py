@@ -13,7 +13,7 @@ import numpy
 
 import palpate
 from palpate._statistics import errors_over, present
-from palpate._tables import Column, column, number, plain, print_head, print_row, print_table, value_of
+from palpate._tables import Column, Table, column, number, plain, print_table, value_of
 
 from . import charts
 from .experiment_charts import MOST_PARTICLES, as_many, draw
@@ -259,8 +259,7 @@ def measure(options: argparse.Namespace) -> None:
     kinds: list[tuple[str, Bins | int]] = [("histogram", bins) for bins in (*TABLE_1, BALANCED)]
     kinds += [(kind, count) for kind in ("particles", "augmented") for count in particles]
     of_noise = [*kinds[1:3], ("particles", MOST_PARTICLES)]
-    levels, comparisons = [], []
-    print_head(RUNS)
+    levels, comparisons, table = [], [], Table(RUNS)
     for mm, rad in NOISE:
         exact, off_by = mm == 0.0, f"{mm:g} mm, {rad:g} rad"
         most = touches if exact else min(touches, 20)
@@ -268,7 +267,7 @@ def measure(options: argparse.Namespace) -> None:
         runs = []
         for kind, size in kinds if exact else of_noise:
             runs.append(run_filter(device, maps, trials, kind, size))
-            print_row(RUNS, row_of(runs[-1], off_by))
+            table.append(row_of(runs[-1], off_by))
         comparisons += comparisons_of(runs, off_by)
         levels.append((mm, rad, runs))
     print_table(COMPARISONS, comparisons)

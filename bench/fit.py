@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy
 
 import palpate
-from palpate._tables import Column, column, number, plain, print_head, print_row
+from palpate._tables import Column, Table, column, number, plain
 
 from .measures import share_record, told_apart, with_interval
 from .program import Json, begin, main, parser, write
@@ -72,8 +72,7 @@ def program() -> None:
     options = flags.parse_args()
     each = options.trials or (2 if options.quick else 20)
     device, facts = begin(options)
-    fits: list[Json] = []
-    print_head(FITS)
+    fits = Table(FITS)
     for name, usual, touching in SETTINGS[: 2 if options.quick else None]:  # the two arrays
         bins = (13, 13, 55) if options.quick else usual
         maps = letter_maps(device, training_recordings(touching))
@@ -85,7 +84,6 @@ def program() -> None:
             record: Json = {"name": name, "touches": touches, "unknowns": each}
             record |= {who: fits_of([of[touches - 1] for of in all_of]) for who, all_of in traces.items()}
             record["told_apart"] = told_apart(record["never learned"]["z"], record["learned"]["z"])
-            print_row(FITS, record)
             fits.append(record)
     write(options.json, facts | {"fits": fits})
 

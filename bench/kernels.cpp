@@ -3,6 +3,8 @@
 #include <random>
 #include <span>
 #include <thread>
+#include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -34,6 +36,11 @@ ErrorStatistics likelihood_errors(
     }
   }
   return errors;
+}
+
+bool same(const Estimate& a, const Estimate& b) {
+  return a.identity == b.identity && a.mode.object == b.mode.object && a.mode.bin == b.mode.bin &&
+         a.mode.log_likelihood == b.mode.log_likelihood;
 }
 
 PoseHistogram letter_histogram(const Inputs& inputs, const PoseLattice& lattice) {
@@ -165,37 +172,22 @@ Case accuracy_case(const Inputs& inputs, const PoseLattice& lattice) {
 constexpr double goal_reduction_ms = 80.0;
 constexpr double goal_with_marginals_ms = 160.0;
 
-struct Answers {
-  Estimate estimate;
-  std::vector<Marginals> marginals;
-};
-
-bool same_bits(const std::vector<double>& a, const std::vector<double>& b) {
-  return std::ranges::equal(std::as_bytes(std::span(a)), std::as_bytes(std::span(b)));
-}
-
-bool same_bits(const Answers& a, const Answers& b) {
-  return same_bits(a.estimate.identity, b.estimate.identity) &&
-         a.estimate.mode.object == b.estimate.mode.object &&
-         a.estimate.mode.bin == b.estimate.mode.bin &&
-         same_bits({a.estimate.mode.log_likelihood}, {b.estimate.mode.log_likelihood}) &&
-         std::ranges::equal(a.marginals, b.marginals, [](const Marginals& m, const Marginals& n) {
-           return same_bits(m.xy, n.xy) && same_bits(m.theta, n.theta);
-         });
-}
-
 /// Times identity, mode and marginals of a belief.
 Case reduction_case(const Inputs& inputs, PoseHistogram& histogram) {
   const int objects = static_cast<int>(inputs.letters.size());
   const auto ask = [&](bool marginals) {
     histogram.update(std::span<const Touch>());  // forgets the sums that it has
-    Answers answers{.estimate = histogram.estimate(), .marginals = {}};
+    std::pair<Estimate, std::vector<std::vector<double>>> answers{histogram.estimate(), {}};
     for (int object = 0; marginals && object < objects; ++object) {
-      answers.marginals.push_back(histogram.marginals(object));
+      Marginals of_object = histogram.marginals(object);
+      answers.second.push_back(std::move(of_object.xy));
+      answers.second.push_back(std::move(of_object.theta));
     }
     return answers;
   };
-  const bool repeatable = same_bits(ask(true), ask(true));
+  const auto [first, first_marginals] = ask(true);
+  const auto [second, second_marginals] = ask(true);
+  const bool repeatable = same(first, second) && first_marginals == second_marginals;
   const int repeats = inputs.quick ? 3 : 15;
   const PoseLattice& lattice = histogram.lattice();
   const bool large = objects * lattice.bins() > 10'000'000;

@@ -12,14 +12,19 @@ from collections.abc import Sequence
 
 import palpate
 from palpate._sweep_runs import counts_of
-from palpate._tables import count_text, plain, print_head, print_row, print_table
+from palpate._tables import Table, count_text, plain, print_table
 
 from . import charts
 from .measures import differences, knee_of
 from .program import Json, begin, main, parser, write
-from .sweep_limits import measure_limits
 from .sweep_page import charts_of, page_of
-from .sweep_runs import first_each, measure_bounds, measure_histogram, measure_particles
+from .sweep_runs import (
+    first_each,
+    measure_bounds,
+    measure_histogram,
+    measure_limits,
+    measure_particles,
+)
 from .sweep_tables import BOUNDS, LIMITS, PRECISIONS, PRINTED, STEPS, VERDICTS
 from .trials import TABLE_1, VOWELS, Bins, lattice_of, letter_maps, make_trials
 
@@ -132,15 +137,10 @@ def measure(device: palpate.Device, options: argparse.Namespace) -> Json:
     counts = [1e2, 1e3, 1e4] if quick else [1e2, 1e3, 1e4, 3e4, 1e5, 3e5, 1e6, 3e6, 1e7]
     particles = [1_000, 10_000] if quick else [100, 1_000, 10_000, 100_000, 1_000_000]
     bounded = [1e2, 1e3, 1e4, 3e4] if quick else [1e3, 3e3, 1e4, 2e4, 3e4, 1e5, 1e6, 1e7]
-    points: list[Json] = []
+    points = Table(PRINTED)
     bounds: list[Json] = []
     knees: list[Json] = []
 
-    def add(point: Json) -> None:
-        print_row(PRINTED, point)
-        points.append(point)
-
-    print_head(PRINTED)
     for cell_mm in (1.0, GOAL_CELL_MM) if quick else (1.0, GOAL_CELL_MM, 0.25):
         maps = letter_maps(device, cell_mm=cell_mm)
         goal = cell_mm == GOAL_CELL_MM
@@ -149,11 +149,11 @@ def measure(device: palpate.Device, options: argparse.Namespace) -> Json:
             size = math.prod(bins)
             few = 2 if size <= most_twice else 1
             full = len(trials) if size <= most_full or (goal and bins == GOAL_BINS) else few
-            add(measure_histogram(device, maps, trials, full, bins))
+            points.append(measure_histogram(device, maps, trials, full, bins))
         for kind in ("particles", "systematic", "augmented") if goal else ():
             for count in particles:
                 some = first_each(trials, 1) if count > 300_000 else trials
-                add(measure_particles(device, maps, some, kind, count))
+                points.append(measure_particles(device, maps, some, kind, count))
         for bins in map(scaled, bounded) if goal else ():
             some = first_each(trials, 1 if quick or math.prod(bins) > 1_200_000 else 4)
             bounds.append(measure_bounds(device, maps, some, bins))

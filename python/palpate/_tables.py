@@ -1,6 +1,6 @@
 """Markdown tables of records, and how their values are written."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy
@@ -74,21 +74,21 @@ def texts(columns: Sequence[Column], record: Any) -> list[str]:
     return ["–" if v is None else text(v) for v, (_, _, text) in zip(values, columns, strict=True)]
 
 
-def print_head(columns: Sequence[Column]) -> None:
-    """The head of a table, after an empty line."""
-    print(f"\n| {' | '.join(head for head, _, _ in columns)} |")
-    print("|:--|" + "--:|" * (len(columns) - 1))
+class Table(list[Any]):
+    """Records that are printed as they are added: rows of a table, after an empty line and its head."""
+
+    def __init__(self, columns: Sequence[Column]) -> None:
+        self._columns = columns
+        print(f"\n| {' | '.join(head for head, _, _ in columns)} |")
+        print("|:--|" + "--:|" * (len(columns) - 1))
+
+    def append(self, record: Any) -> None:
+        print(f"| {' | '.join(texts(self._columns, record))} |", flush=True)
+        super().append(record)
 
 
-def print_row(columns: Sequence[Column], record: Any) -> None:
-    """One of its rows."""
-    print(f"| {' | '.join(texts(columns, record))} |", flush=True)
-
-
-def print_table(columns: Sequence[Column], records: Iterable[Any]) -> None:
+def print_table(columns: Sequence[Column], records: Sequence[Any]) -> None:
     """A whole table; nothing where there are no records."""
-    rows = list(records)
-    if rows:
-        print_head(columns)
-    for record in rows:
-        print_row(columns, record)
+    table = Table(columns) if records else []
+    for record in records:
+        table.append(record)

@@ -25,12 +25,11 @@ from ._sweep_charts import draw
 from ._sweep_runs import Data, Document, Run, counts_of, lattices_of, measure
 from ._tables import (
     Column,
+    Table,
     count_text,
     mean_text,
     number,
     plain,
-    print_head,
-    print_row,
     seconds_text,
 )
 _LEAST_TRUE_POSES = 3  # by which errors are judged
@@ -75,20 +74,18 @@ def sweep(
     true_poses = sum(
         record.get("truth", {}).get("T_robot_object") is not None for record in finest.records
     )
-    columns = _columns(true_poses > 0)
-    print_head(columns)
-    runs = []
+    table, runs = Table(_columns(true_poses > 0)), []
     for lattice in lattices:
         run = finest if lattice is lattices[-1] else measure(data, lattice, dense)
         run.compare_with(finest, data)
-        print_row(columns, run.point)
+        table.append(run.point)
         runs.append(run)
     mode, refined = (_first_that_suffices(runs, kind) for kind in ("mode", "refined"))
     return {
         "maps": len(data.maps),
         "recordings": len(finest.records),
         "true_poses": true_poses,
-        "points": [run.point for run in runs],
+        "points": table,
         "auto_count": automatic.bins,
         "fine_count": fine.bins,
         "mode_count": mode and mode.point["count"],
