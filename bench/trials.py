@@ -143,10 +143,10 @@ def truth_of(trial: palpate.Recording) -> palpate.Truth:
     return trial.truth
 
 
-def lattice_of(bins: Bins, extent_mm: float = 10.0) -> palpate.PoseLattice:
-    """Bins over x and y within the extent and the full circle (Sec. IV: 10 mm)."""
-    reach, (x, y, theta) = (-extent_mm, extent_mm), bins
-    return palpate.PoseLattice((*reach, x), (*reach, y), (0.0, 2.0 * numpy.pi, theta))
+def lattice_of(bins: Bins) -> palpate.PoseLattice:
+    """Bins over x and y in [-10, 10] mm and the full circle (Sec. IV)."""
+    x, y, theta = bins
+    return palpate.PoseLattice((-10.0, 10.0, x), (-10.0, 10.0, y), (0.0, 2.0 * numpy.pi, theta))
 
 
 def recognized(
@@ -160,7 +160,8 @@ def recognized(
     """What is believed of every unknown after each of its touches, [trial][touch].
 
     Records as of `palpate recognize --trace`, and `confidence`, the probability of the best answer.
-    The region is lattice_of()'s; options: those of palpate.recognize().
+    The region is the extent about 0 along x and y, and the full circle; options: those of
+    palpate.recognize().
     """
     reach = (-extent_mm, extent_mm)
     records = palpate.recognize(
