@@ -85,7 +85,7 @@ def sweep(
         "maps": len(data.maps),
         "recordings": len(finest.records),
         "true_poses": true_poses,
-        "points": table,
+        "points": [run.point for run in runs],
         "auto_count": automatic.bins,
         "fine_count": fine.bins,
         "mode_count": mode and mode.point["count"],
