@@ -7,7 +7,7 @@ import pathlib
 import time
 from collections.abc import Sequence
 from itertools import groupby
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy
 
@@ -68,25 +68,17 @@ COMPARISONS: list[Column] = [
 ]
 
 
-class FilterRun(NamedTuple):
-    """What one filter made of all trials."""
-
-    #: As it stands in the document: filter, "histogram", "particles" or "augmented"; name, with its
-    #: size; count of bins per object or of particles in all; seconds; curve; calibration.
-    record: Json
-    steps: list[list[Json]]  #: [trial][touch] as of recognized()
-
-
 def run_filter(
     device: palpate.Device,
     maps: list[palpate.OccupancyGrid],
     trials: Sequence[palpate.Recording],
     kind: str,
     size: Bins | int,
-) -> FilterRun:
+) -> Json:
     """One filter over the trials: so many bins of a histogram, or particles, or of "augmented" MCL.
 
-    Each trial has particles of a seed of its own, from 1 on.
+    Each trial has particles of a seed of its own, from 1 on. `count` is of bins per object or of
+    particles in all, `steps` is what recognized() gives.
     """
     start = time.perf_counter()
     if isinstance(size, tuple):
@@ -97,15 +89,15 @@ def run_filter(
             recognized(device, maps, [trial], seed=seed, **options)[0]
             for seed, trial in enumerate(trials, start=1)
         ]
-    record = {
+    return {
         "filter": kind,
         "name": f"{'augmented MCL' if kind == 'augmented' else kind} {plain(size)}",
         "count": int(numpy.prod(size)),
         "seconds": time.perf_counter() - start,
         "curve": [point_of(touch, of) for touch, of in enumerate(zip(*steps, strict=True), 1)],
         "calibration": calibration(column(steps, "confidence").ravel(), column(steps, "right").ravel()),
+        "steps": steps,
     }
-    return FilterRun(record, steps)
 
 
 def point_of(touches: int, steps: Sequence[Json]) -> Json:
@@ -124,9 +116,9 @@ def point_of(touches: int, steps: Sequence[Json]) -> Json:
     }
 
 
-def row_of(run: FilterRun, off_by: str) -> Json:
+def row_of(run: Json, off_by: str) -> Json:
     """A run's row of RUNS."""
-    curve, last = run.record["curve"], run.record["curve"][-1]
+    curve, last = run["curve"], run["curve"][-1]
 
     def from_touch(holds: Any) -> int | None:
         """From which touch on something holds to the end, where it does at the end."""
@@ -135,9 +127,9 @@ def row_of(run: FilterRun, off_by: str) -> Json:
         return touch if touch <= len(curve) else None
 
     less = column(curve, "refined_error_mm/mean") < column(curve, "error_mm/mean")
-    return run.record | {
+    return run | {
         "off_by": off_by,
-        "trials": len(run.steps),
+        "trials": len(run["steps"]),
         "last": last,
         "right": {"mean": last["accuracy"], "low": last["accuracy_low"], "high": last["accuracy_high"]},
         "all_right_from": from_touch(column(curve, "accuracy") == 1.0),
@@ -161,7 +153,7 @@ def standing(leads: Floats) -> str:
     return "; ".join(told)
 
 
-def comparisons_of(runs: Sequence[FilterRun], off_by: str) -> list[Json]:
+def comparisons_of(runs: Sequence[Json], off_by: str) -> list[Json]:
     """Each histogram against each particle filter of as many particles as it has bins per object.
 
     Trials that the histogram has right, minus those of the particles; and the particles' error minus the
@@ -169,11 +161,11 @@ def comparisons_of(runs: Sequence[FilterRun], off_by: str) -> list[Json]:
     that loses the hard ones.
     """
     rows = []
-    for particles in (run for run in runs if run.record["filter"] != "histogram"):
-        for histogram in (run for run in runs if run.record["filter"] == "histogram"):
-            if as_many(histogram.record["count"], particles.record["count"]):
+    for particles in (run for run in runs if run["filter"] != "histogram"):
+        for histogram in (run for run in runs if run["filter"] == "histogram"):
+            if as_many(histogram["count"], particles["count"]):
                 right, leads_mm = (
-                    sign * (column(histogram.steps, path) - column(particles.steps, path))
+                    sign * (column(histogram["steps"], path) - column(particles["steps"], path))
                     for sign, path in ((1.0, "right"), (-1.0, "error_mm"))
                 )  # [trial, touch]
                 ahead = right.mean(axis=0)
@@ -181,8 +173,8 @@ def comparisons_of(runs: Sequence[FilterRun], off_by: str) -> list[Json]:
                 ahead_mm = numpy.array([of.mean() if len(of) else numpy.nan for of in located])
                 rows.append(
                     {
-                        "histogram": histogram.record["name"],
-                        "particles": particles.record["name"],
+                        "histogram": histogram["name"],
+                        "particles": particles["name"],
                         "off_by": off_by,
                         "identity": standing(ahead),
                         "right_lead": float(ahead.mean()),
@@ -221,7 +213,7 @@ def curve_rows(runs: Sequence[Json]) -> list[Json]:
     ]
 
 
-def write_tables(folder: str, document: Json, runs: Sequence[FilterRun], labels: Sequence[str]) -> None:
+def write_tables(folder: str, document: Json, runs: Sequence[Json], labels: Sequence[str]) -> None:
     """Writes the curves, the calibrations, and every touch of every trial; labels: the true objects."""
     bins = [
         {"filter": run["filter"], "count": run["count"]}
@@ -236,11 +228,11 @@ def write_tables(folder: str, document: Json, runs: Sequence[FilterRun], labels:
         for row in curve_rows(level["filters"])
     ]
     trials = [
-        {"filter": run.record["filter"], "count": run.record["count"]}
+        {"filter": run["filter"], "count": run["count"]}
         | {"trial": trial, "object": labels[trial], "touches": touches, "right": int(step["right"])}
         | {of: step.get(of) for of in ("confidence", "error_mm", "refined_error_mm")}
         for run in runs
-        for trial, steps in enumerate(run.steps)
+        for trial, steps in enumerate(run["steps"])
         for touches, step in enumerate(steps, start=1)
     ]
     curves = curve_rows(document["filters"])
@@ -259,7 +251,8 @@ def measure(options: argparse.Namespace) -> None:
     kinds: list[tuple[str, Bins | int]] = [("histogram", bins) for bins in (*TABLE_1, BALANCED)]
     kinds += [(kind, count) for kind in ("particles", "augmented") for count in particles]
     of_noise = [*kinds[1:3], ("particles", MOST_PARTICLES)]
-    levels, comparisons, table = [], [], Table(RUNS)
+    comparisons: list[Json] = []
+    levels, every, table = [], [], Table(RUNS)
     for mm, rad in NOISE:
         exact, off_by = mm == 0.0, f"{mm:g} mm, {rad:g} rad"
         most = touches if exact else min(touches, 20)
@@ -269,21 +262,19 @@ def measure(options: argparse.Namespace) -> None:
             runs.append(run_filter(device, maps, trials, kind, size))
             table.append(row_of(runs[-1], off_by))
         comparisons += comparisons_of(runs, off_by)
-        levels.append((mm, rad, runs))
+        every += runs
+        without = [{name: of for name, of in run.items() if name != "steps"} for run in runs]
+        levels.append({"translation_mm": mm, "rotation_rad": rad, "filters": without})
     print_table(COMPARISONS, comparisons)
     document = facts | {
-        "filters": [run.record for run in levels[0][2]],
+        "filters": levels[0]["filters"],
         "comparisons": comparisons,
-        "pose_noise": [
-            {"translation_mm": mm, "rotation_rad": rad, "filters": [run.record for run in runs]}
-            for mm, rad, runs in levels[1:]
-        ],
+        "pose_noise": levels[1:],
     }
     write(options.json, document)
     if options.csv:
-        write_tables(
-            options.csv, document, levels[0][2], [truth_of(trial).object for trial in trials]
-        )
+        labels = [truth_of(trial).object for trial in trials]
+        write_tables(options.csv, document, every[: len(kinds)], labels)
     if options.plots:
         charts.save(draw(document), options.plots)
 
