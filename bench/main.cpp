@@ -8,9 +8,9 @@
 
 #include <CLI/CLI.hpp>
 
-#include "commands.hpp"
 #include "io/standard_streams.hpp"
 #include "palpate/error.hpp"
+#include "report.hpp"
 
 int main(int argc, char** argv) try {
   using namespace palpate::bench;
