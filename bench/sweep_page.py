@@ -119,9 +119,10 @@ def pose_chart(document: Json) -> Chart:
         best += [
             (point["seconds"], point[of]["mean"])
             for point in points
-            if point["accuracy"] == 1.0 and point[of]["trials"] == document["trials"]
+            if point["accuracy"] == 1.0 and point[of] and point[of]["trials"] == document["trials"]
         ]
-    chart.add_front(*numpy.transpose(best))
+    if best:
+        chart.add_front(*numpy.transpose(best))
     return chart.finish()
 
 
