@@ -1,96 +1,98 @@
 """The charts of the beliefs' parts, and a picture of one misplaced unknown."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable
 from typing import Any
 
 import numpy
+from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 import palpate
+from palpate._tables import column
 
 from . import charts
-from .measures import EXPECTED_NORMALISED_ERROR, turning
-from .report import Json
-from .trials import VOWELS, Floats, Touching, judged, lattice_of, make_trials, truth_of
-
-#: By part, the files of its charts, without their endings.
-FIGURES = {
-    "misplaced": ("misplaced", "sureness"),
-    "none": ("none",),
-    "slip": ("slip",),
-    "plan": ("plan",),
-}
-PICTURE = "misplaced_unknown.png"
+from .belief_touches import MISPLACED_SEED, Inputs
+from .measures import turning
+from .program import Json
+from .trials import VOWELS, Floats, Touching, make_trials, poses_of, truth_of
 
 
-def draw(part: str, records: list[Json]) -> dict[str, Figure]:
-    """A part's charts from its records; none of a part without charts."""
-    drawers = {"misplaced": _misplaced, "none": _none, "slip": _slip, "plan": _plan}
-    drawn = drawers[part](records) if part in drawers else []
-    return dict(zip(FIGURES.get(part, ()), map(charts.legend, drawn), strict=True))
+def plot(axes: Axes, records: list[Json], path: str, label: str, **look: Any) -> None:
+    """Means over touches, with their intervals."""
+    touches, mean = column(records, "touches"), column(records, f"{path}/mean")
+    (line,) = axes.plot(touches, mean, label=label, **look)
+    low, high = (column(records, f"{path}/{of}") for of in ("low", "high"))
+    axes.vlines(touches, low, high, color=line.get_color(), linewidth=1.0)
 
 
-def _misplaced(records: list[Json]) -> list[Figure]:
-    """Means with intervals over touches: colours tell the noise apart, dashes the beliefs."""
-    figures = []
-    levels = sorted({(record["noise_mm"], record["noise_rad"]) for record in records})
-    for field, y in (
-        ("refined_mm", "mean error of refined poses with the right letter (mm)"),
-        ("normalised_error", "squared pose error over covariance (NEES)"),
+def draw_misplaced(records: list[Json]) -> dict[str, Figure]:
+    """Colours tell the noise apart, dashes the beliefs."""
+    figures = {}
+    levels = sorted({record["off_by"] for record in records})
+    for name, path, y in (
+        ("misplaced", "refined_mm", "mean error of refined poses with the right letter (mm)"),
+        ("sureness", "normalised_error", "squared pose error over covariance (NEES)"),
     ):
         title = "standard deviation of the error of the reported sensor pose"
-        figure, axes = charts.chart("touches", y, title=title, log="y")
-        ends = (f"{field}/low", f"{field}/high")
-        for colour, (mm, rad) in zip(charts.COLOURS, levels, strict=False):
+        axes = charts.chart("touches", y, title, yscale="log")
+        for colour, off_by in zip(charts.COLOURS, levels, strict=False):
             for belief, look in (("as if exact", charts.DASHED), ("averaged", charts.SOLID)):
-                look = look | {"color": colour, "label": f"{mm:g} mm, {rad:g} rad, {belief}"}
-                where = {"noise_mm": mm, "belief": belief}
-                charts.line(
-                    axes, records, "touches", f"{field}/mean", where=where, interval=ends, **look
-                )
-        figures.append(figure)
-    charts.rule(axes, EXPECTED_NORMALISED_ERROR, "3 where covariances are right")
+                some = [of for of in records if (of["off_by"], of["belief"]) == (off_by, belief)]
+                plot(axes, some, path, f"{off_by}, {belief}", color=colour, **look)
+        if name == "sureness":
+            charts.rule(axes, 3.0, "3 where covariances are right")
+        figures[name] = charts.finished(axes)
     return figures
 
 
-def _none(records: list[Json]) -> list[Figure]:
+def draw_none(records: list[Json]) -> dict[str, Figure]:
     """Shares called none: colours tell the settings apart, dashes who was learned.
 
     Larger regions are left to the tables.
     """
-    figure, axes = charts.chart("touches", "called none (%)")
+    axes = charts.chart("touches", "called none (%)")
     names = list(dict.fromkeys(record["name"] for record in records))
     shown = [name for name in names if name == names[0] or not name.startswith("exact")]
     for colour, name in zip(charts.COLOURS, shown, strict=False):
-        for who, field, look in (
-            ("never learned", "unlearned_called_none", charts.SOLID),
-            ("learned", "learned_called_none", charts.DASHED),
+        own = [record for record in records if record["name"] == name]
+        for who, path, look in (
+            ("never learned", "unlearned_called_none/mean", charts.SOLID),
+            ("learned", "learned_called_none/mean", charts.DASHED),
         ):
-            look = look | {"color": colour, "label": f"{name}: {who}", "scale": 100.0}
-            charts.line(axes, records, "touches", field, where={"name": name}, **look)
+            label = f"{name}: {who}"
+            axes.plot(column(own, "touches"), 100.0 * column(own, path), label=label, color=colour, **look)
     axes.set_ylim(0.0, 105.0)
-    return [figure]
+    return {"none": charts.finished(axes)}
 
 
-def _slip(records: list[Json]) -> list[Figure]:
+def draw_slip(records: list[Json]) -> dict[str, Figure]:
+    """Mean errors over touches."""
     y = "mean error of modes with the right letter (mm)"
-    figure, axes = charts.chart("touches", y, log="y")
-    for i, record in enumerate(records):
-        look = charts.like(i) | {"label": record["belief"], "markevery": 5}
-        charts.line(axes, record["curve"], "touches", "mode_mm", **look)
-    return [figure]
+    axes = charts.chart("touches", y, yscale="log")
+    for record in records:
+        touches, error_mm = (column(record["curve"], of) for of in ("touches", "mode_mm"))
+        axes.plot(touches, error_mm, label=record["belief"], markevery=5)
+    return {"slip": charts.finished(axes)}
 
 
-def _plan(records: list[Json]) -> list[Figure]:
-    figure, axes = charts.chart("touches", "entropy of the belief (nats)")
-    for i, record in enumerate(records):
-        look = charts.like(i) | {"label": record["order"]}
-        ends = ("entropy/low", "entropy/high")
-        charts.line(axes, record["curve"], "touches", "entropy/mean", interval=ends, **look)
+def draw_plan(records: list[Json]) -> dict[str, Figure]:
+    """Mean entropies over touches."""
+    axes = charts.chart("touches", "entropy of the belief (nats)")
+    for record in records:
+        plot(axes, record["curve"], "entropy", record["order"])
     axes.set_ylim(bottom=0.0)
-    return [figure]
+    return {"plan": charts.finished(axes)}
+
+
+#: By part, what draws its charts from its records.
+DRAWERS: dict[str, Callable[[list[Json]], dict[str, Figure]]] = {
+    "misplaced": draw_misplaced,
+    "none": draw_none,
+    "slip": draw_slip,
+    "plan": draw_plan,
+}
 
 
 def _place(refined: palpate.RefinedPose, pivot_mm: Floats) -> tuple[Floats, Floats]:
@@ -101,9 +103,7 @@ def _place(refined: palpate.RefinedPose, pivot_mm: Floats) -> tuple[Floats, Floa
     return turn @ pivot_mm + (x, y), jacobian @ refined.covariance @ jacobian.T
 
 
-def draw_misplaced_unknown(
-    device: palpate.Device, maps: Sequence[palpate.OccupancyGrid], seed: int
-) -> bytes:
+def draw_misplaced_unknown(inputs: Inputs) -> bytes:
     """The belief about one U, touched five times 1 mm and 0.05 rad beside the reported places.
 
     Its plain belief is too sure of the position; in others it is too sure of the angle. As if touches
@@ -111,10 +111,12 @@ def draw_misplaced_unknown(
     the refined pose with the ellipse that holds it up to two standard deviations. Returns a PNG file.
     """
     noise = (1.0, 0.05)
-    trial = make_trials(VOWELS, 1, 5, seed, Touching(at_random_poses=True, noise=noise))[4]
-    pivot_mm = trial.T_robot_sensor[
-        0, :2
-    ]  # as --pivot-mm auto: x and y then hardly depend on the angle
+    touching = Touching(at_random_poses=True, noise=noise)
+    trial = make_trials(VOWELS, 1, 5, MISPLACED_SEED, touching)[4]
+    # As --pivot-mm auto: x and y then hardly depend on the angle.
+    pivot_mm = trial.T_robot_sensor[0, :2]
+    axis = (-10.0, 10.0, 60)
+    lattice = palpate.PoseLattice(axis, axis, (0.0, 2.0 * math.pi, 113), pivot_mm)
     true_mm = palpate.transform(truth_of(trial).T_object_robot, [pivot_mm])[0]
     figure = Figure(figsize=(12.0, 6.4))
     panels: Any = figure.subplots(1, 2)
@@ -122,13 +124,11 @@ def draw_misplaced_unknown(
         (panels[0], (0.0, 0.0), "Five touches taken as exact"),
         (panels[1], noise, "The same, each known to 1 mm and 3°"),
     ):
-        belief = palpate.PoseHistogram(
-            device, maps, lattice_of(60, 60, 113, pivot_mm=pivot_mm), touch_sd=touch_sd
-        )
+        belief = palpate.PoseHistogram(inputs.device, inputs.maps, lattice, touch_sd=touch_sd)
         belief.update(trial)
-        step = judged(belief, maps, truth_of(trial))
-        shown = belief.marginals(step.mode.object).xy
-        place_mm, covariance = _place(step.refined, pivot_mm)
+        poses = poses_of(belief, inputs.maps, truth_of(trial))
+        shown = belief.marginals(poses.mode.object).xy
+        place_mm, covariance = _place(poses.refined, pivot_mm)
         image = axes.imshow(
             numpy.maximum(shown / shown.max(), 1e-9),
             origin="lower",
@@ -139,13 +139,13 @@ def draw_misplaced_unknown(
         # The Cholesky factor carries the circle to the ellipse.
         unit = numpy.stack([numpy.cos(circle), numpy.sin(circle)], 1)
         ellipse = place_mm + 2.0 * unit @ numpy.linalg.cholesky(covariance).T
-        axes.plot(*ellipse.T, color="white", linewidth=3.5)
+        axes.plot(*ellipse.T, "-", marker="", color="white", linewidth=3.5)
         name = "refined pose, two standard deviations"
-        axes.plot(*ellipse.T, color="black", linewidth=1.8, label=name)
-        look = {"color": "#d55e00", "markersize": 12, "markeredgewidth": 3, "label": "true"}
-        axes.plot(*true_mm, "x", **look)
+        axes.plot(*ellipse.T, "-", marker="", color="black", linewidth=1.8, label=name)
+        look: Json = {"markersize": 12, "markeredgewidth": 3, "markeredgecolor": "#d55e00"}
+        axes.plot(*true_mm, "x", linestyle="", label="true", **look)
         sd = numpy.sqrt(numpy.diag(covariance))
-        error = f"error {step.refined_error_mm:.1f} mm; "
+        error = f"error {poses.refined_error_mm:.1f} mm; "
         error += f"standard deviations {sd[0]:.1f} and {sd[1]:.1f} mm"
         axes.set_title(f"{title}\n{error}", fontsize=12)
         axes.set(xlim=true_mm[0] + (-4.0, 4.0), ylim=true_mm[1] + (-4.0, 4.0))

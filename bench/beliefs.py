@@ -5,14 +5,8 @@ from collections.abc import Callable
 
 from . import belief_charts, charts
 from .belief_moves import measure_costs, measure_plan, measure_slip
-from .belief_touches import (
-    MISPLACED_SEED,
-    Inputs,
-    measure_misplaced,
-    measure_none,
-    measure_touch_sd,
-)
-from .report import Json, Report, Run, main, parser, write, write_json
+from .belief_touches import Inputs, measure_misplaced, measure_none, measure_touch_sd
+from .program import Json, begin, main, parser, write
 from .trials import letter_maps
 
 PARTS: dict[str, Callable[[Inputs], list[Json]]] = {
@@ -37,21 +31,17 @@ def program() -> None:
     )
     flags.add_argument("--part", choices=PARTS, help="measure only this part")
     options = flags.parse_args()
-    parts = [options.part] if options.part else list(PARTS)
-    names = [name for part in parts for name in belief_charts.FIGURES.get(part, ())]
-    pictures = [belief_charts.PICTURE] if "misplaced" in parts else []
-    run = Run(options, {"plots": [*charts.files(names), *pictures]})
-    inputs = Inputs(
-        run.device, letter_maps(run.device), options.quick, options.trials, Report(run.facts)
-    )
-    records: dict[str, list[Json]] = {}
-    for part in parts:
-        records[part] = PARTS[part](inputs)
-        charts.save(belief_charts.draw(part, records[part]), options.plots)
-    if options.plots and pictures:
-        picture = belief_charts.draw_misplaced_unknown(run.device, inputs.maps, MISPLACED_SEED)
-        write(pathlib.Path(options.plots, belief_charts.PICTURE), picture)
-    write_json(options.json, inputs.report.document() | records)
+    device, document = begin(options)
+    inputs = Inputs(device, letter_maps(device), options.quick, options.trials)
+    for part, measure in PARTS.items():
+        if options.part in (None, part):
+            document[part] = measure(inputs)
+            if part in belief_charts.DRAWERS:
+                charts.save(belief_charts.DRAWERS[part](document[part]), options.plots)
+            if part == "misplaced" and options.plots:
+                picture = belief_charts.draw_misplaced_unknown(inputs)
+                write(pathlib.Path(options.plots, "misplaced_unknown.png"), picture)
+    write(options.json, document)
 
 
 if __name__ == "__main__":

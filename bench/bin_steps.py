@@ -1,28 +1,26 @@
 """The refined pose's error against the step of the bins, by which `--bins auto` was chosen."""
 
-import argparse
 import math
 
 import numpy
 
 import palpate
-from palpate._statistics import Errors, errors_over
+from palpate._statistics import errors_over
 from palpate._sweep_runs import counts_of
 from palpate._tables import (
     Column,
+    Table,
     count_text,
     difference_text,
     mean_text,
     number,
     plain,
-    print_head,
-    print_row,
 )
 
 from .measures import differences
-from .report import Json, Run, main, parser, write_json
+from .program import begin, main, parser, write
 from .trials import VOWELS, Touching, letter_maps, make_trials
-from .windows import estimate_in_window
+from .windows import poses_in_window
 
 SEED = 70_000  # unknowns of their own: the sweep's and the experiment's chose other constants
 
@@ -53,41 +51,35 @@ def in_steps(
     )
 
 
-def refined_errors(
-    device: palpate.Device,
-    maps: list[palpate.OccupancyGrid],
-    trials: list[palpate.Recording],
-    lattice: palpate.PoseLattice,
-    touches: int,
-) -> Errors:
-    """Errors of each trial after its first touches, on bins about the first of them."""
-    errors = []
-    for trial in trials:
-        about = palpate.PoseLattice(
-            lattice.x_mm, lattice.y_mm, lattice.theta_rad, trial.T_robot_sensor[0, :2]
-        )
-        errors.append(estimate_in_window(device, maps, trial[:touches], about).refined_error_mm)
-    return errors
-
-
-def measure(device: palpate.Device, options: argparse.Namespace) -> list[Json]:
+def program() -> None:
     """Prints every run once it is known; the finest step is what the others are compared with."""
+    flags = parser(
+        "bin-steps",
+        "Measures the refined pose's error against the step of the bins, after 3, 5 and 9 touches at "
+        "random poses, over windows about the truth.",
+        trials="trials per letter [20, or 1 with --quick]",
+    )
+    options = flags.parse_args()
+    device, facts = begin(options)
     cells_mm, touches, steps_mm = [0.5, 1.0], [9, 5, 3], [0.3, 0.45, 0.6, 0.75, 0.9, 1.2]
     if options.quick:
         cells_mm, touches, steps_mm = [0.5], [5], [0.3, 0.6]
     each = options.trials or (1 if options.quick else 20)
     trials = make_trials(VOWELS, each, max(touches), SEED, Touching(at_random_poses=True))
     reach_mm = float(numpy.hypot(*trials[0].elements_mm.T).max())
-    runs: list[Json] = []
-    print_head(COLUMNS)
+    runs = Table(COLUMNS)
     for cell_mm in cells_mm:
         maps = letter_maps(device, cell_mm=cell_mm)
-        region = palpate.touch_region(maps, reach_mm)
+        lattices = [in_steps(palpate.touch_region(maps, reach_mm), maps, mm) for mm in steps_mm]
         for count in touches:
-            finest: Errors | None = None
-            for step_mm in steps_mm:
-                lattice = in_steps(region, maps, step_mm)
-                errors = refined_errors(device, maps, trials, lattice, count)
+            finest: list[float | None] = []
+            for step_mm, lattice in zip(steps_mm, lattices, strict=True):
+                x, y, theta = lattice.x_mm, lattice.y_mm, lattice.theta_rad
+                errors = []
+                for trial in trials:  # on bins about its first touch
+                    about = palpate.PoseLattice(x, y, theta, trial.T_robot_sensor[0, :2])
+                    poses = poses_in_window(device, maps, trial[:count], about)
+                    errors.append(poses.refined_error_mm)
                 paired = differences(errors, finest or errors)
                 assert paired is not None  # a window is of the right letter
                 runs.append(
@@ -99,25 +91,11 @@ def measure(device: palpate.Device, options: argparse.Namespace) -> list[Json]:
                         "touches": count,
                         "refined_error_mm": errors_over(errors, 20),
                         "excess": paired["to"] / paired["from"] - 1.0,
-                        "difference_mm": finest and paired,
+                        "difference_mm": paired if finest else None,
                     }
                 )
                 finest = finest or errors
-                print_row(COLUMNS, runs[-1])
-    return runs
-
-
-def program() -> None:
-    """Reads the flags and measures."""
-    flags = parser(
-        "bin-steps",
-        "Measures the refined pose's error against the step of the bins, after 3, 5 and 9 touches at "
-        "random poses, over windows about the truth.",
-        trials="trials per letter [20, or 1 with --quick]",
-    )
-    options = flags.parse_args()
-    run = Run(options)
-    write_json(options.json, run.facts | {"runs": measure(run.device, options)})
+    write(options.json, facts | {"runs": runs})
 
 
 if __name__ == "__main__":

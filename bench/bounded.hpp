@@ -16,7 +16,6 @@ namespace palpate::bench {
 struct BoundedAnswers {
   std::vector<double> milliseconds = {};  ///< of update() and estimate()
   std::vector<double> bins_evaluated = {};
-  std::vector<std::int64_t> blocks_bounded = {};
   std::vector<double> dropped_mass = {};
   std::vector<Mode> modes = {};
   int mode_certain = 0;
@@ -59,12 +58,6 @@ struct BoundedInputs {
 
 // Each part adds its cases to the report and returns a record of every run.
 
-/// Nine touches in one update on lattices of 10^4 to 10^7 bins per object, beside the dense engine.
-Json measure_bounded_speed(const BoundedInputs& inputs, Report& report);
-/// The mode over the poses that scan matchers search, tables included and not.
-Json measure_bounded_mode(const BoundedInputs& inputs, Report& report);
-/// Touch after touch, each with an estimate, the first within a budget.
-Json measure_bounded_streaming(const BoundedInputs& inputs, Report& report);
 /// Many objects, far away: time and memory.
 Json measure_bounded_large(const BoundedInputs& inputs, Report& report);
 /// Time over bins, from 10^4 to 10^9 in all, beside the dense engine.

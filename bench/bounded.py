@@ -3,7 +3,6 @@
 Times are measured in C++, by `palpate-bench bounded`.
 """
 
-import argparse
 import json
 import math
 import pathlib
@@ -19,33 +18,65 @@ from matplotlib.patches import Patch, Rectangle
 
 import palpate
 from palpate._sweep_runs import counts_of
-from palpate._tables import count_text, seconds_text
+from palpate._tables import (
+    Column,
+    Table,
+    column,
+    count_text,
+    number,
+    plain,
+    print_table,
+    seconds_text,
+)
 
 from . import charts
-from .certificates import CertificateCheck, check_certificate, dense_posterior
-from .report import Json, Report, Run, main, parser, share_of, write, write_json
-from .trials import VOWELS, lattice_of, letter_maps, make_trials, size_of
+from .certificates import check_certificate, dense_posterior
+from .measures import share_record, with_interval
+from .program import Json, begin, main, parser, write
+from .trials import TABLE_1, VOWELS, Bins, lattice_of, letter_maps, make_trials
 
 SEED = 1_404_000_000
-TOLERANCE = 1e-6  # BoundedPosterior's
-CHART, PICTURE = "bounded_growth", "bounded_search.png"
+_MASS, _PERCENT = number(".1e"), with_interval(".1f", 100.0)
+ACCURACY: list[Column] = [
+    ("bins per object", "bins", plain),
+    ("touches", "touches", plain),
+    ("posteriors", "posteriors", plain),
+    ("certificates broken", "broken", plain),
+    ("largest certificate", "largest_promised", _MASS),
+    ("mass not counted", "largest_mass_outside", _MASS),
+    ("total variation of marginals", "largest_total_variation", _MASS),
+    ("identity error", "largest_identity_error", _MASS),
+    ("the dense posterior's mode", "same_modes", plain),
+]
+PRESSES: list[Column] = [
+    ("frames", "frames", plain),
+    ("objects", "objects", plain),
+    ("bins in all", "bins_in_all", count_text),
+    ("a frame, median", "median_s", seconds_text),
+    ("least", "least_s", seconds_text),
+    ("most", "most_s", seconds_text),
+    ("bins evaluated, median", "median_bins", count_text),
+    ("largest certificate", "largest_dropped", _MASS),
+    ("mode certain, %", "mode_certain", _PERCENT),
+    ("dense engine, array at rest, median", "dense_s", seconds_text),
+    ("its best label, %", "same_best", _PERCENT),
+    ("label right, %", "right", _PERCENT),
+]
 #: How large blocks, smaller ones that a search goes into, and evaluated bins are drawn: the colour, and
 #: its opacity at the fewest and at all thetas.
 LEVELS = (("#a8ccf0", 0.05, 0.26), ("#1a66b8", 0.05, 0.26), ("#e65c0d", 0.4, 0.95))
 
 
-def measure_accuracy(run: Run, quick: bool, report: Report) -> list[Json]:
+def measure_accuracy(device: palpate.Device, quick: bool) -> list[Json]:
     """Certificates beside the distances from the posterior over all bins, after 3 and 9 touches."""
-    sizes = [(5, 5, 4), (10, 10, 10)]
-    if not quick:
-        sizes += [(25, 25, 16), (44, 44, 52), (100, 100, 100)]
-    maps = letter_maps(run.device)
+    sizes: list[Bins] = [*TABLE_1[:2]] if quick else [*TABLE_1, (44, 44, 52), (100, 100, 100)]
+    maps = letter_maps(device)
     trials = make_trials(VOWELS, 1 if quick else 10, 9, SEED)
-    records = []
-    for lattice in (lattice_of(*size) for size in sizes):
-        bounded = palpate.BoundedPosterior(run.device, maps, lattice)
-        histogram = palpate.PoseHistogram(run.device, maps, lattice)
-        checks: dict[int, list[CertificateCheck]] = {3: [], 9: []}
+    records = Table(ACCURACY)
+    for bins in sizes:
+        bounded = palpate.BoundedPosterior(device, maps, lattice_of(bins))
+        histogram = palpate.PoseHistogram(device, maps, lattice_of(bins))
+        checks: dict[int, list[Json]] = {3: [], 9: []}
         for trial in trials:
             bounded.reset()
             histogram.reset()
@@ -57,38 +88,21 @@ def measure_accuracy(run: Run, quick: bool, report: Report) -> list[Json]:
                 dense = dense_posterior(histogram, maps, trial[:until])
                 of_touch.append(check_certificate(bounded, dense))
         for after, of_touch in checks.items():
-            add_checks(report, f"accuracy {size_of(lattice)}, touch {after}", of_touch)
-            record: Json = {"bins": size_of(lattice), "touches": after}
-            for name in ("promised", "mass_outside", "total_variation", "identity_error", "same_mode",
-                         "holds"):  # fmt: skip
-                record[name] = [getattr(check, name) for check in of_touch]
+            record: Json = {"bins": plain(bins), "touches": after, "posteriors": len(of_touch)}
+            record |= {name: [check[name] for check in of_touch] for name in of_touch[0]}
+            record |= {
+                f"largest_{name}": max(record[name])
+                for name in ("promised", "mass_outside", "total_variation", "identity_error")
+            }
+            record["broken"] = record["holds"].count(False)
+            record["same_modes"] = record["same_mode"].count(True)
             records.append(record)
     return records
-
-
-def add_checks(report: Report, name: str, checks: list[CertificateCheck]) -> None:
-    """What certificates promised and what was measured, over posteriors."""
-    broken = sum(not check.holds for check in checks)
-    promised, outside, variation, identity = (
-        max(getattr(check, field) for check in checks)
-        for field in ("promised", "mass_outside", "total_variation", "identity_error")
-    )
-    same = sum(check.same_mode for check in checks)
-    rows: list[tuple[Any, ...]] = [
-        ("certificates broken", broken, "posteriors", 0.0),
-        ("certificate, largest", promised, "mass", TOLERANCE),
-        ("mass not counted, largest", outside, "mass"),
-        ("total variation of marginals, largest", variation, "mass"),
-        ("identity error, largest", identity, "probability", TOLERANCE),
-        share_of("the dense posterior's mode", same, len(checks), at_least=100.0),
-    ]
-    report.add(name, {"posteriors": len(checks)}, rows)
 
 
 # Everyday objects: raw pressure, and a map from one press.
 CLASSIFIER = palpate.ContactClassifier(threshold=15.0, ratio=0.15)
 CONTACT = palpate.ContactModel(CLASSIFIER, gamma=0.2, prior=0.1)
-MOST_MS = 500.0
 DENSE_FRAMES = (1, 13)  # of every object that the dense engine answers, too, besides the map's
 
 
@@ -107,13 +121,13 @@ def read_presses(folder: str) -> list[palpate.Recording]:
     return recordings
 
 
-def measure_presses(run: Run, options: argparse.Namespace, report: Report) -> Json:
+def measure_presses(device: palpate.Device, folder: str, quick: bool) -> Json:
     """Everyday objects from one press each, in a folder of recordings."""
-    recordings = read_presses(options.presses)
+    recordings = read_presses(folder)
     elements_mm = recordings[0].elements_mm
     pitch_mm = float(numpy.hypot(*(elements_mm[1:] - elements_mm[0]).T).min())
     builder = palpate.MapBuilder(
-        run.device,
+        device,
         cell_mm=0.5 * pitch_mm,
         sensor=palpate.InverseSensorModel(spread_mm=0.6 * pitch_mm, prior=0.1),
         classifier=CLASSIFIER,
@@ -124,88 +138,78 @@ def measure_presses(run: Run, options: argparse.Namespace, report: Report) -> Js
         builder.add(recording[:1])
         maps.append(builder.build(recording.object))
     # Steps of half a pitch and 2.5 degrees.
-    step_mm = pitch_mm / 2.0 * (10.0 if options.quick else 1.0)
+    step_mm = pitch_mm / 2.0 * (10.0 if quick else 1.0)
     x, y = (
         palpate.Axis(-extent, extent, math.floor(2.0 * extent / step_mm + 0.5))
         for extent in (50.0, 31.0)
     )
-    lattice = palpate.PoseLattice(x, y, (0.0, 2.0 * math.pi, 4 if options.quick else 144))
-    bounded = palpate.BoundedPosterior(run.device, maps, lattice, contact=CONTACT)
+    lattice = palpate.PoseLattice(x, y, (0.0, 2.0 * math.pi, 4 if quick else 144))
+    bounded = palpate.BoundedPosterior(device, maps, lattice, contact=CONTACT)
     # All frames lie at one place: the dense engine evaluates what is in contact, and the rest once.
-    histogram = palpate.PoseHistogram(run.device, maps, lattice, contact=CONTACT, still_array=True)
-    answers: Json = {
-        name: [] for name in ("best", "milliseconds", "bins_evaluated", "blocks_bounded",
-                              "dropped_mass", "dense_ms")
-    }  # fmt: skip
-    right, certain, same = 0, 0, 0
+    histogram = palpate.PoseHistogram(device, maps, lattice, contact=CONTACT, still_array=True)
+    answers: list[Json] = []
+    dense: list[Json] = []
     for i, recording in enumerate(recordings):
-        for frame in range(1, min(len(recording), 2) if options.quick else len(recording)):
-            estimate, ms = _answer(bounded, recording[frame : frame + 1])
-            best = int(numpy.argmax(estimate.identity))
-            right += best == i
-            certificate = estimate.certificate
-            certain += certificate.mode_certain
-            answers["best"].append(maps[best].label)
-            answers["milliseconds"].append(ms)
-            for name in ("bins_evaluated", "blocks_bounded", "dropped_mass"):
-                answers[name].append(getattr(certificate, name))
+        for frame in range(1, min(len(recording), 2) if quick else len(recording)):
+            answers.append(_answer(bounded, recording[frame : frame + 1]) | {"label": i})
             if frame in DENSE_FRAMES:
-                dense, ms = _answer(histogram, recording[frame : frame + 1])
-                answers["dense_ms"].append(ms)
-                same += int(numpy.argmax(dense.identity)) == best
-    in_all = lattice.bins * len(maps)
-    frames, all_ms = len(answers["best"]), answers["milliseconds"]
-    evaluated, dense_ms = median_low(answers["bins_evaluated"]), answers["dense_ms"]
-    facts = {"objects": len(maps), "elements": len(elements_mm), "bins in all": in_all}
-    rows: list[tuple[Any, ...]] = [
-        ("a frame, median", median_low(all_ms), "ms", MOST_MS),
-        ("a frame, least", min(all_ms), "ms"),
-        ("a frame, most", max(all_ms), "ms"),
-        ("bins evaluated, median", evaluated, "bins"),
-        ("of all bins", 100.0 * evaluated / in_all, "%"),
-        ("certificate, largest", max(answers["dropped_mass"]), "mass"),
-        share_of("mode certain", certain, frames),
-        ("dense engine, array at rest, median", median_low(dense_ms), "ms"),
-        share_of("the dense engine's best label", same, len(dense_ms), at_least=100.0),
-        share_of("label right", right, frames),
-    ]
-    report.add(f"presses {size_of(lattice)}", facts | {"frames": frames}, rows)
-    return {
+                dense.append(_answer(histogram, recording[frame : frame + 1]))
+                dense[-1]["same"] = dense[-1]["best"] == answers[-1]["best"]
+    seconds, evaluated = (column(answers, of) for of in ("seconds", "bins_evaluated"))
+    frames = len(answers)
+    record: Json = {
         "bins": counts_of(lattice),
-        "bins_in_all": in_all,
+        "bins_in_all": lattice.bins * len(maps),
+        "objects": len(maps),
+        "frames": frames,
         "host_bytes": bounded.host_bytes,
-    } | answers
+        "median_s": median_low(seconds),
+        "least_s": min(seconds),
+        "most_s": max(seconds),
+        "median_bins": median_low(evaluated),
+        "largest_dropped": max(column(answers, "dropped_mass")),
+        "mode_certain": share_record(sum(of["mode_certain"] for of in answers), frames),
+        "dense_s": median_low(column(dense, "seconds")),
+        "same_best": share_record(sum(of["same"] for of in dense), len(dense)),
+        "right": share_record(sum(of["best"] == of["label"] for of in answers), frames),
+    }
+    print_table(PRESSES, [record])
+    return record | {"answers": answers, "dense": dense}
 
 
-def _answer(belief: Any, touches: palpate.Recording) -> tuple[Any, float]:
-    """The belief in one unknown, and its milliseconds."""
+def _answer(belief: Any, touches: palpate.Recording) -> Json:
+    """The belief in one unknown: its best object, what a certificate says, and the seconds."""
     belief.reset()
     start = time.perf_counter()
     belief.update(touches)
     estimate = belief.estimate()
-    return estimate, 1e3 * (time.perf_counter() - start)
+    answer: Json = {"seconds": time.perf_counter() - start, "best": int(numpy.argmax(estimate.identity))}
+    if certificate := estimate.certificate:
+        names = ("bins_evaluated", "dropped_mass", "mode_certain")
+        answer |= {name: getattr(certificate, name) for name in names}
+    return answer
 
 
 def draw_growth(records: list[Json]) -> Figure:
     """Time against bins, by what `palpate-bench bounded` measured in its part "growth"."""
-    figure, axes = charts.chart(
-        "bins in all, five objects", "time of nine touches, to the posterior", log="xy"
-    )
-    for i, (name, label) in enumerate(
-        (
-            ("dense", "dense, every bin"),
-            ("bounded", "by bounds, proven to 1e-6"),
-            ("one_thread", "by bounds, on one thread"),
-        )
+    axes = charts.chart(
+        "bins in all, five objects", "time of nine touches, to the posterior",
+        xscale="log", yscale="log",
+    )  # fmt: skip
+    for name, label in (
+        ("dense", "dense, every bin"),
+        ("bounded", "by bounds, proven to 1e-6"),
+        ("one_thread", "by bounds, on one thread"),
     ):
-        ends = (f"{name}/least", f"{name}/most")
-        look = charts.like(i) | {"linestyle": "-"}
-        charts.line(
-            axes, records, "bins_in_all", f"{name}/median", interval=ends, label=label, **look
+        bins, median, least, most = (
+            column(records, of)
+            for of in ("bins_in_all", f"{name}/median", f"{name}/least", f"{name}/most")
         )
-    charts.log_ticks(axes, "x", count_text)
-    charts.log_ticks(axes, "y", seconds_text)
-    return charts.legend(figure)
+        (line,) = axes.plot(bins, median, linestyle="-", label=label)
+        axes.vlines(bins, least, most, color=line.get_color(), linewidth=1.0)
+    charts.ticks(axes.xaxis, count_text)
+    charts.ticks(axes.yaxis, seconds_text)
+    return charts.finished(axes)
 
 
 def draw_search(search: Json, grid: palpate.OccupancyGrid) -> Figure:
@@ -235,7 +239,7 @@ def draw_search(search: Json, grid: palpate.OccupancyGrid) -> Figure:
             faces = [(colour, alpha) for alpha in least + (most - least) * full]
             edges = "none" if level == last else colour
             axes.add_collection(PatchCollection(boxes, facecolors=faces, edgecolors=edges))
-        axes.plot(*search["place_mm"], "P", color="black", markersize=12, markeredgecolor="white")
+        axes.plot(*search["place_mm"], "P", linestyle="", color="black", markersize=12)
         touches, count, in_all = stage["touches"], stage["bins_evaluated"], search["bins_in_all"]
         share = f"{count_text(count)} of {count_text(in_all)} bins: {100.0 * count / in_all:.2g} %"
         axes.set_title(f"After {touches} touch{'es' if touches > 1 else ''}\n{share}", fontsize=14)
@@ -247,7 +251,7 @@ def draw_search(search: Json, grid: palpate.OccupancyGrid) -> Figure:
         Patch(facecolor=(colour, most), edgecolor=colour, label=name)
         for (colour, _, most), name in zip(LEVELS, names, strict=True)
     ]
-    marks += axes.plot([], [], "P", color="black", label="where the first touch truly was")
+    marks += axes.plot([], [], "P", linestyle="", color="black", label="where the first touch truly was")
     figure.legend(handles=marks, loc="outside lower left", ncols=4)
     return figure
 
@@ -264,24 +268,8 @@ def read_times(path: str) -> Json:
     return times
 
 
-def measure(run: Run, options: argparse.Namespace) -> None:
-    """Measures the parts, and draws the charts of times where they are given."""
-    times = read_times(options.times) if options.times else None
-    report = Report(run.facts)
-    records: Json = {}
-    if options.part in (None, "accuracy"):
-        records["accuracy"] = measure_accuracy(run, options.quick, report)
-    if options.presses:
-        records["presses"] = measure_presses(run, options, report)
-    write_json(options.json, report.document() | records)
-    if times:
-        charts.save({CHART: draw_growth(times["growth"])}, options.plots)
-        picture = draw_search(times["search"], letter_maps(run.device)[0])
-        write(pathlib.Path(options.plots, PICTURE), charts.image(picture, "png", dpi=100))
-
-
 def program() -> None:
-    """Reads the flags and measures."""
+    """Measures the parts, and draws the charts of times where they are given."""
     flags = parser(
         "bounded",
         "Holds the certificates of the posterior by bounds against all bins in float64, in some "
@@ -299,7 +287,18 @@ def program() -> None:
         flags.error("--part presses: give the folder of recordings by --presses FOLDER")
     if bool(options.plots) != bool(options.times):
         flags.error("--plots and --times: give both, or neither")
-    measure(Run(options, {"plots": [*charts.files([CHART]), PICTURE]}), options)
+    times = read_times(options.times) if options.times else None
+    device, document = begin(options)
+    if options.part in (None, "accuracy"):
+        document["accuracy"] = measure_accuracy(device, options.quick)
+    if options.presses:
+        document["presses"] = measure_presses(device, options.presses, options.quick)
+    write(options.json, document)
+    if times:
+        charts.save({"bounded_growth": draw_growth(times["growth"])}, options.plots)
+        picture = draw_search(times["search"], letter_maps(device)[0])
+        path = pathlib.Path(options.plots, "bounded_search.png")
+        write(path, charts.image(picture, "png", dpi=100))
 
 
 if __name__ == "__main__":

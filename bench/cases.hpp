@@ -29,18 +29,11 @@ ErrorStatistics likelihood_errors(
     std::span<const Touch> touches, int bins_per_object,
     const std::function<std::vector<double>(int object)>& log_likelihood);
 
+/// Whether identity and mode are the same to the last digit.
+bool same(const Estimate& a, const Estimate& b);
+
 /// An empty histogram of the letters.
 PoseHistogram letter_histogram(const Inputs& inputs, const PoseLattice& lattice);
-
-/// Times the likelihood of an unknown's touches beside two baselines, the one-bin kernel and the
-/// CPU loop, with the error of each. Leaves some touches in the histogram.
-Case likelihood_case(const Inputs& inputs, PoseHistogram& histogram, double goal_ns);
-
-/// Measures the error of the log-likelihood after 1, 50 and 1,000 touches.
-Case accuracy_case(const Inputs& inputs, const PoseLattice& lattice);
-
-/// Times identity, mode and marginals of a belief.
-Case reduction_case(const Inputs& inputs, PoseHistogram& histogram);
 
 /// Times the letters' maps at cells of 0.1 mm, with their error.
 Case fine_map_case(const Inputs& inputs);
@@ -51,8 +44,5 @@ Case map_stream_case(const Inputs& inputs, bool one_spot);
 
 /// Times the recognition of many unknown objects in turn, in one process and in a process each.
 Case many_unknowns_case(const Inputs& inputs);
-
-/// Times an estimate from the moment of its touch, in all and step by step.
-Case latency_case(const Inputs& inputs);
 
 }  // namespace palpate::bench

@@ -9,6 +9,7 @@ import numpy
 import palpate
 from palpate import reference
 
+from .program import Json
 from .trials import Floats
 
 #: Mass, relative to the object's best bin, that bins may hold together and keep float32 values. Those
@@ -69,51 +70,44 @@ def dense_posterior(
     return DensePosterior(evidence, numpy.exp(evidence - total), xy, theta, mode)
 
 
-class CertificateCheck(NamedTuple):
-    """What a certificate promised and how far the answer really was from the dense posterior."""
+def check_certificate(bounded: palpate.BoundedPosterior, dense: DensePosterior) -> Json:
+    """Holds the posterior's estimate and marginals against all bins of the same lattice.
 
-    promised: float  #: dropped_mass
-    mass_outside: float  #: of the dense posterior, in bins that were not counted
-    total_variation: float  #: largest between marginals; at most that of the posteriors
-    identity_error: float  #: largest of any object's probability
-    same_mode: bool  #: the same bin, or one of the same likelihood
-    bounds_hold: bool  #: evidence and identity of every object lie in their intervals
-
-    @property
-    def measured(self) -> float:
-        """The largest of the measured errors, which the certificate bounds."""
-        return max(self.mass_outside, self.total_variation, self.identity_error)
-
-    @property
-    def holds(self) -> bool:
-        """Whether everything is as the certificate says."""
-        return self.bounds_hold and self.measured <= self.promised + SUMMING_ERROR
-
-
-def check_certificate(bounded: palpate.BoundedPosterior, dense: DensePosterior) -> CertificateCheck:
-    """Holds the posterior's estimate and marginals against all bins of the same lattice."""
+    What the certificate `promised`, and what was `measured`, the largest of the dense posterior's mass in
+    bins that were not counted, of the total variation between marginals, which is at most that of the
+    posteriors, and of any object's error in probability; whether evidence and identity of every object
+    lie in their intervals, too, so that it `holds`; and whether the mode is the `same_mode`, or one of
+    the same likelihood.
+    """
     estimate = bounded.estimate()
-    certificate = estimate.certificate
+    mode, certificate = estimate.mode, estimate.certificate
     assert certificate is not None
-    mode = estimate.mode
-    # Two bins of one likelihood up to rounding are both modes.
-    same = (mode.object, mode.bin) == dense.mode[:2]
-    same = same or abs(mode.log_likelihood - dense.mode[2]) <= SUMMING_ERROR
-    bounds_hold, xy, theta = True, 0.0, 0.0
-    for i, (evidence, probability) in enumerate(
-        zip(certificate.log_evidence, estimate.identity_bounds, strict=True)
-    ):
-        for value, (low, high) in (
-            (dense.log_evidence[i], evidence),
-            (dense.identity[i], probability),
-        ):
-            bounds_hold &= bool(low - SUMMING_ERROR <= value <= high + SUMMING_ERROR)
-        marginals = bounded.marginals(i)
-        xy += float(numpy.abs(marginals.xy - dense.xy[i]).sum()) / 2.0
-        theta += float(numpy.abs(marginals.theta - dense.theta[i]).sum()) / 2.0
-    counted = log_sum_exp(numpy.array([low for low, _ in certificate.log_evidence]))
-    outside = max(0.0, -math.expm1(counted - log_sum_exp(dense.log_evidence)))
-    identity = float(numpy.abs(numpy.array(estimate.identity) - dense.identity).max())
-    return CertificateCheck(
-        certificate.dropped_mass, outside, max(xy, theta), identity, same, bounds_hold
+    evidence_low, evidence_high = numpy.array(certificate.log_evidence).T
+    low, high = numpy.array(estimate.identity_bounds).T
+    holds = numpy.all(
+        (evidence_low - SUMMING_ERROR <= dense.log_evidence)
+        & (dense.log_evidence <= evidence_high + SUMMING_ERROR)
+        & (low - SUMMING_ERROR <= dense.identity)
+        & (dense.identity <= high + SUMMING_ERROR)
     )
+    marginals = [bounded.marginals(i) for i in range(len(low))]
+    counted, total = log_sum_exp(evidence_low), log_sum_exp(dense.log_evidence)
+    errors = {
+        "mass_outside": max(0.0, -math.expm1(counted - total)),
+        "total_variation": max(
+            sum(float(numpy.abs(a - b).sum()) for a, b in zip(ours, theirs, strict=True)) / 2.0
+            for ours, theirs in (
+                ([of.xy for of in marginals], dense.xy),
+                ([of.theta for of in marginals], dense.theta),
+            )
+        ),
+        "identity_error": float(numpy.abs(numpy.array(estimate.identity) - dense.identity).max()),
+    }
+    promised, measured = certificate.dropped_mass, max(errors.values())
+    same = (mode.object, mode.bin) == dense.mode[:2]
+    return errors | {
+        "promised": promised,
+        "measured": measured,
+        "holds": bool(holds) and measured <= promised + SUMMING_ERROR,
+        "same_mode": same or abs(mode.log_likelihood - dense.mode[2]) <= SUMMING_ERROR,
+    }

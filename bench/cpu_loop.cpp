@@ -1,4 +1,4 @@
-#include "cpu_loop.hpp"
+#include "baselines.hpp"
 
 #include <algorithm>
 #include <atomic>

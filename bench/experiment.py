@@ -3,346 +3,278 @@
 import argparse
 import csv
 import io
-import math
 import pathlib
 import time
-from collections.abc import Callable, Sequence
-from statistics import fmean
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from itertools import groupby
+from typing import Any
+
+import numpy
 
 import palpate
-from palpate._statistics import errors_over
-from palpate._tables import plain, value_of
+from palpate._statistics import errors_over, present
+from palpate._tables import Column, Table, column, number, plain, print_table, value_of
 
 from . import charts
-from .experiment_charts import (
-    FIGURES,
-    MOST_PARTICLES,
-    PUBLISHED_BINS_KNOW_AFTER,
-    PUBLISHED_ERROR_MM,
-    as_many,
-    draw,
+from .experiment_charts import MOST_PARTICLES, as_many, draw
+from .measures import calibration, share_record, student_record, with_interval
+from .program import Json, at_least_1, begin, main, parser, write
+from .trials import (
+    TABLE_1,
+    VOWELS,
+    Bins,
+    Floats,
+    Touching,
+    letter_maps,
+    make_trials,
+    recognized,
+    truth_of,
 )
-from .measures import calibration, mean_interval, wilson_interval
-from .report import Json, Measurement, Report, Run, at_least, main, parser, write, write_json
-from .trials import TABLE_1, VOWELS, Bins, Touching, letter_maps, make_trials, truth_of
 
 SEED = 1_000
-PARTICLE_SEED = 1
 #: Nearly as many bins as Table I's, balanced so that a turn by a bin moves a letter as far as a shift
 #: by one.
 BALANCED: Bins = (13, 13, 55)
-TABLES = ("curves.csv", "calibration.csv", "pose_noise.csv", "trials.csv")
+#: What the robot reports of the array's pose is off by these standard deviations, in mm and rad.
+NOISE = ((0.0, 0.0), (1.0, 0.05), (2.0, 0.1))
+
+_MM = number(".3f")
+RUNS: list[Column] = [
+    ("filter", "name", plain),
+    ("array off by", "off_by", plain),
+    ("trials", "trials", plain),
+    ("touches", "last/touches", plain),
+    ("time, s", "seconds", number(".1f")),
+    ("right at the end, %", "right", with_interval(".1f", 100.0)),
+    ("all right from touch", "all_right_from", plain),
+    ("mean error, mm", "last/error_mm/mean", _MM),
+    ("median", "last/error_mm/median", _MM),
+    ("95 %", "last/error_mm/p95", _MM),
+    ("refined: mean error, mm", "last/refined_error_mm/mean", _MM),
+    ("95 %", "last/refined_error_mm/p95", _MM),
+    ("errs less than the mode from touch", "refined_less_from", plain),
+    ("calibration error, %", "calibration/expected_error", number(".1f", 100.0)),
+]
+COMPARISONS: list[Column] = [
+    ("histogram", "histogram", plain),
+    ("against", "particles", plain),
+    ("array off by", "off_by", plain),
+    ("identity: histogram", "identity", plain),
+    ("more right over touches, %", "right_lead", number("+.1f", 100.0)),
+    ("at the end", "last_right_lead", number("+.1f", 100.0)),
+    ("pose, where both locate", "pose", plain),
+    ("less error over touches, mm", "lead_mm", number("+.2f")),
+    ("at the end", "last_lead_mm", with_interval("+.2f")),
+]
 
 
-class FilterRun(NamedTuple):
-    """What one filter made of all trials."""
+def run_filter(
+    device: palpate.Device,
+    maps: list[palpate.OccupancyGrid],
+    trials: Sequence[palpate.Recording],
+    kind: str,
+    size: Bins | int,
+) -> Json:
+    """One filter over the trials: so many bins of a histogram, or particles, or of "augmented" MCL.
 
-    #: As it stands in the document: filter, "histogram", "particles" or "augmented"; name, with its
-    #: size; count of bins per object or of particles in all; seconds; curve; calibration.
-    record: Json
-    steps: list[list[Json]]  #: [trial][touch] records as of `palpate recognize --trace`
-
-    @property
-    def name(self) -> str:
-        """Filter and size, such as "histogram 25x25x16"."""
-        return str(self.record["name"])
-
-
-def confidence(step: Json) -> float:
-    """Probability of the most probable object."""
-    return float(step["identity"][step["best"]])
-
-
-class Filters(NamedTuple):
-    """What the filters work on."""
-
-    device: palpate.Device
-    maps: list[palpate.OccupancyGrid]
-
-    def histogram(self, bins: Bins, trials: Sequence[palpate.Recording]) -> FilterRun:
-        """The histogram filter over the trials, with a step after every touch."""
-        start = time.perf_counter()
-        records = self._recognize(trials, bins=bins, filter="histogram")
-        return _run("histogram", plain(bins), math.prod(bins), records, start)
-
-    def particles(
-        self, count: int, trials: Sequence[palpate.Recording], kind: str = "particles"
-    ) -> FilterRun:
-        """The particle filter, or "augmented" MCL, over the trials; each has a seed of its own."""
-        start = time.perf_counter()
-        options = {"filter": "particles", "particles": count, "augmented": kind == "augmented"}
-        records = [
-            self._recognize([trial], seed=seed, **options)[0]
-            for seed, trial in enumerate(trials, start=PARTICLE_SEED)
+    Each trial has particles of a seed of its own, from 1 on. `count` is of bins per object or of
+    particles in all, `steps` is what recognized() gives.
+    """
+    start = time.perf_counter()
+    if isinstance(size, tuple):
+        steps = recognized(device, maps, trials, bins=size, filter=kind)
+    else:
+        options: Json = {"filter": "particles", "augmented": kind == "augmented", "particles": size}
+        steps = [
+            recognized(device, maps, [trial], seed=seed, **options)[0]
+            for seed, trial in enumerate(trials, start=1)
         ]
-        return _run(kind, str(count), count, records, start)
-
-    def _recognize(self, trials: Sequence[palpate.Recording], **options: Any) -> list[Any]:
-        region: Any = {"x_mm": (-10, 10), "y_mm": (-10, 10), "pivot_mm": (0, 0)}
-        return palpate.recognize(
-            trials, self.maps, trace=True, device=self.device, **region, **options
-        )
-
-
-def _run(
-    kind: str, size: str, count: int, records: Sequence[palpate.Record], start: float
-) -> FilterRun:
-    """The run whose filter, with its size, gave the records of all trials since the start."""
-    steps: list[list[Json]] = [record["trace"] for record in records]
-    every = [step for of_trial in steps for step in of_trial]
-    record = {
+    return {
         "filter": kind,
-        "name": f"{'augmented MCL' if kind == 'augmented' else kind} {size}",
-        "count": count,
+        "name": f"{'augmented MCL' if kind == 'augmented' else kind} {plain(size)}",
+        "count": int(numpy.prod(size)),
         "seconds": time.perf_counter() - start,
         "curve": [point_of(touch, of) for touch, of in enumerate(zip(*steps, strict=True), 1)],
-        "calibration": calibration([*map(confidence, every)], [step["right"] for step in every]),
+        "calibration": calibration(column(steps, "confidence").ravel(), column(steps, "right").ravel()),
+        "steps": steps,
     }
-    return FilterRun(record, steps)
 
 
 def point_of(touches: int, steps: Sequence[Json]) -> Json:
     """After some touches: accuracy, confidence, and errors of modes and refined poses."""
-    right = sum(step["right"] for step in steps)
-    low, high = wilson_interval(right, len(steps))
-    errors = errors_over([step.get("error_mm") for step in steps])
+    right = share_record(sum(step["right"] for step in steps), len(steps))
+    errors = errors_over(column(steps, "error_mm"))
     return {
         "touches": touches,
-        "accuracy": right / len(steps),
-        "accuracy_low": low,
-        "accuracy_high": high,
-        "mean_confidence": fmean(map(confidence, steps)),
+        "accuracy": right["mean"],
+        "accuracy_low": right["low"],
+        "accuracy_high": right["high"],
+        "mean_confidence": float(column(steps, "confidence").mean()),
         "located": errors["trials"] if errors else 0,
         "error_mm": errors,
-        "refined_error_mm": errors_over([step.get("refined_error_mm") for step in steps]),
+        "refined_error_mm": errors_over(column(steps, "refined_error_mm")),
     }
 
 
-def equal_counts(runs: Sequence[FilterRun]) -> list[tuple[FilterRun, FilterRun]]:
-    """All pairs of a histogram and a particle filter with as many particles as bins per object."""
-    return [
-        (histogram, particles)
-        for particles in runs
-        for histogram in runs
-        if particles.record["filter"] != "histogram" and histogram.record["filter"] == "histogram"
-        if as_many(histogram.record["count"], particles.record["count"])
-    ]
+def row_of(run: Json, off_by: str) -> Json:
+    """A run's row of RUNS."""
+    curve, last = run["curve"], run["curve"][-1]
 
+    def from_touch(holds: Any) -> int | None:
+        """From which touch on something holds to the end, where it does at the end."""
+        fails = numpy.flatnonzero(~holds)
+        touch = 1 + (fails[-1] + 1 if len(fails) else 0)
+        return touch if touch <= len(curve) else None
 
-def compare(first: FilterRun, second: FilterRun) -> list[tuple[int, list[float]]]:
-    """One filter against another over the same trials, after 1, 2, ... touches.
-
-    Trials that the first has right, minus those of the second, and second minus first error of the
-    trials that both locate: errors over its own trials would flatter the filter that loses the hard
-    ones.
-    """
-    points = []
-    for steps in zip(zip(*first.steps, strict=True), zip(*second.steps, strict=True), strict=True):
-        pairs = list(zip(*steps, strict=True))
-        leads_mm = [
-            b["error_mm"] - a["error_mm"]
-            for a, b in pairs
-            if None not in (a["error_mm"], b["error_mm"])
-        ]
-        points.append((sum(a["right"] - b["right"] for a, b in pairs), leads_mm))
-    return points
-
-
-def lead_of(name: str, leads_mm: Sequence[float]) -> list[Measurement]:
-    """The mean lead in error; nothing where both locate no trial."""
-    if not leads_mm:
-        return []
-    return [Measurement(name, fmean(leads_mm), "mm", interval=mean_interval(leads_mm))]
+    less = column(curve, "refined_error_mm/mean") < column(curve, "error_mm/mean")
+    return run | {
+        "off_by": off_by,
+        "trials": len(run["steps"]),
+        "last": last,
+        "right": {"mean": last["accuracy"], "low": last["accuracy_low"], "high": last["accuracy_high"]},
+        "all_right_from": from_touch(column(curve, "accuracy") == 1.0),
+        "refined_less_from": from_touch(less),
+    }
 
 
 def ranges_of(touches: Sequence[int]) -> str:
     """Rising touch counts, such as "1-4, 8"."""
-    ranges: list[list[int]] = []
-    for touch in touches:
-        if ranges and ranges[-1][-1] == touch - 1:
-            ranges[-1] = [ranges[-1][0], touch]
-        else:
-            ranges.append([touch])
-    return ", ".join("-".join(map(str, ends)) for ends in ranges)
+    runs = groupby(enumerate(touches), lambda pair: pair[1] - pair[0])
+    ends = [[touch for _, touch in run] for _, run in runs]
+    return ", ".join(f"{of[0]}-{of[-1]}" if len(of) > 1 else f"{of[0]}" for of in ends)
 
 
-def standing(leads: Sequence[tuple[int, float]]) -> str:
-    """Which of two is ahead after how many touches, by (touches, lead)."""
+def standing(leads: Floats) -> str:
+    """Which of two is ahead after 1, 2, ... touches, by their leads; nothing where one is NaN."""
     told = []
     for word, sign in (("ahead", 1), ("tied", 0), ("behind", -1)):
-        if touches := [touches for touches, lead in leads if (lead > 0) - (lead < 0) == sign]:
-            told.append(f"{word} at touch {ranges_of(touches)}")
+        if len(at := numpy.flatnonzero(numpy.sign(leads) == sign)):
+            told.append(f"{word} at touch {ranges_of((at + 1).tolist())}")
     return "; ".join(told)
 
 
-def accuracy_of(name: str, point: Json, at_least: float | None = None) -> Measurement:
-    """A curve's accuracy in percent, with its interval."""
-    interval = (100.0 * point["accuracy_low"], 100.0 * point["accuracy_high"])
-    return Measurement(name, 100.0 * point["accuracy"], "%", at_least=at_least, interval=interval)
+def comparisons_of(runs: Sequence[Json], off_by: str) -> list[Json]:
+    """Each histogram against each particle filter of as many particles as it has bins per object.
+
+    Trials that the histogram has right, minus those of the particles; and the particles' error minus the
+    histogram's over the trials that both locate: errors over its own trials would flatter the filter
+    that loses the hard ones.
+    """
+    rows = []
+    for particles in (run for run in runs if run["filter"] != "histogram"):
+        for histogram in (run for run in runs if run["filter"] == "histogram"):
+            if as_many(histogram["count"], particles["count"]):
+                right, leads_mm = (
+                    sign * (column(histogram["steps"], path) - column(particles["steps"], path))
+                    for sign, path in ((1.0, "right"), (-1.0, "error_mm"))
+                )  # [trial, touch]
+                ahead = right.mean(axis=0)
+                located = [present(of) for of in leads_mm.T]
+                ahead_mm = numpy.array([of.mean() if len(of) else numpy.nan for of in located])
+                rows.append(
+                    {
+                        "histogram": histogram["name"],
+                        "particles": particles["name"],
+                        "off_by": off_by,
+                        "identity": standing(ahead),
+                        "right_lead": float(ahead.mean()),
+                        "last_right_lead": float(ahead[-1]),
+                        "pose": standing(ahead_mm),
+                        "lead_mm": float(numpy.nanmean(ahead_mm)),
+                        "last_lead_mm": student_record(located[-1]) if len(located[-1]) else None,
+                    }
+                )
+    return rows
 
 
-def holds_from(
-    name: str, curve: Sequence[Json], holds: Callable[[Json], bool]
-) -> list[Measurement]:
-    """The number of touches from which something holds to the end, where there is one."""
-    fails = [point["touches"] for point in curve if not holds(point)]
-    touches = max(fails, default=0) + 1
-    return [Measurement(name, touches, "touches on")] if touches <= len(curve) else []
+def write_csv(path: pathlib.Path, rows: Sequence[Json]) -> None:
+    """Writes a table, numbers to six digits."""
+    text = io.StringIO()
+    table = csv.DictWriter(text, rows[0], lineterminator="\n")
+    table.writeheader()
+    for row in rows:
+        table.writerow({k: f"{v:.6g}" if isinstance(v, float) else v for k, v in row.items()})
+    write(path, text.getvalue())
 
 
-def refined_errs_less(point: Json) -> bool:
-    """Whether refined poses err less than modes."""
-    refined = point["refined_error_mm"]
-    return bool(refined and refined["mean"] < point["error_mm"]["mean"])
-
-
-def add_run(report: Report, run: FilterRun) -> None:
-    """What a run reached beside what the paper reports of its filter."""
-    record, curve = run.record, run.record["curve"]
-    histogram, count, last = record["filter"] == "histogram", record["count"], curve[-1]
-    rows: list[tuple[Any, ...]] = [accuracy_of("accuracy at the end", last)]
-    rows += holds_from("right in every trial from", curve, lambda point: point["accuracy"] == 1.0)
-    known_after = PUBLISHED_BINS_KNOW_AFTER.get(count, 0) if histogram else 0
-    if 0 < known_after <= len(curve):
-        least = min(curve[known_after - 1 :], key=lambda point: float(point["accuracy"]))
-        rows.append(accuracy_of(f"least accuracy from touch {known_after} on", least, 100.0))
-    if error := last["error_mm"]:
-        most = PUBLISHED_ERROR_MM if histogram and count == 10_000 else None
-        rows.append(("mean error at the end", error["mean"], "mm", most))
-        rows.append(("median error at the end", error["median"], "mm"))
-        rows.append(("95th percentile of the error at the end", error["p95"], "mm"))
-    if refined := last["refined_error_mm"]:
-        rows.append(("mean error at the end, refined", refined["mean"], "mm"))
-        rows.append(("95th percentile at the end, refined", refined["p95"], "mm"))
-        rows += holds_from("refined poses err less than modes from", curve, refined_errs_less)
-    expected = 100.0 * record["calibration"]["expected_error"]
-    rows.append(("expected calibration error", expected, "%"))
-    facts = {
-        "trials": len(run.steps),
-        "touches": len(curve),
-        "seconds": round(record["seconds"], 1),
-    }
-    report.add(run.name, facts, rows)
-
-
-def add_comparison(report: Report, histogram: FilterRun, particles: FilterRun) -> None:
-    """A histogram against particles over the same trials, over all touches and at the end."""
-    points = compare(histogram, particles)
-    right = [(touches, lead) for touches, (lead, _) in enumerate(points, start=1)]
-    located = [(touches, fmean(of)) for touches, (_, of) in enumerate(points, start=1) if of]
-    per_cent = 100.0 / len(histogram.steps)
-    ahead = per_cent * fmean(lead for _, lead in right)
-    rows: list[tuple[Any, ...]] = [
-        ("accuracy ahead, mean over touches", ahead, "% points"),
-        ("accuracy ahead at the end", per_cent * right[-1][1], "% points"),
-    ]
-    if located:
-        over = fmean(lead for _, lead in located)
-        rows.append(("error less where both locate, over touches", over, "mm"))
-    rows += lead_of("error less where both locate, at the end", points[-1][1])
-    facts = {
-        "equal count": f"{histogram.record['count']} bins for every object; "
-        f"{particles.record['count']} particles over all",
-        "identity": standing(right),
-        "pose, where both locate": standing(located),
-    }
-    report.add(f"{histogram.name} against {particles.name}", facts, rows)
-
-
-def add_noise(report: Report, noise: tuple[float, float], runs: Sequence[FilterRun]) -> None:
-    """Filters over trials in which the array is not quite where the robot reports it."""
-    rows: list[tuple[Any, ...]] = []
-    for run in runs:
-        last = run.record["curve"][-1]
-        rows.append(accuracy_of(f"{run.name}: accuracy at the end", last))
-        if error := last["error_mm"]:
-            rows.append((f"{run.name}: mean error at the end", error["mean"], "mm"))
-    for histogram, particles in equal_counts(runs):
-        name = (
-            f"{histogram.name}: error less than of {particles.name}, where both locate, at the end"
-        )
-        rows += lead_of(name, compare(histogram, particles)[-1][1])
-    facts = {"trials": len(runs[0].steps), "touches": len(runs[0].record["curve"])}
-    report.add(f"array off by {noise[0]:g} mm, {noise[1]:g} rad", facts, rows)
-
-
-def write_tables(
-    folder: str, document: Json, runs: Sequence[FilterRun], labels: Sequence[str]
-) -> None:
-    """Writes TABLES, the last with a line for every touch of every trial; labels: the true objects."""
-    filters, levels = document["filters"], document["pose_noise"]
-    points = [{"run": run, "point": point} for run in filters for point in run["curve"]]
-    bins = [{"run": run, "bin": bin_} for run in filters for bin_ in run["calibration"]["bins"]]
-    noisy = [
-        {"noise": level, "run": run, "point": point}
-        for level in levels
-        for run in level["filters"]
+def curve_rows(runs: Sequence[Json]) -> list[Json]:
+    """A row for every point of the curves of filters."""
+    names = ("touches", "accuracy", "accuracy_low", "accuracy_high", "mean_confidence", "located")
+    return [
+        {"filter": run["filter"], "count": run["count"]}
+        | {name: point[name] for name in names}
+        | {
+            f"{kind}_{of}_mm": value_of(point, f"{errors}/{of}")
+            for kind, errors in (("error", "error_mm"), ("refined", "refined_error_mm"))
+            for of in ("mean", "median", "p95")
+        }
+        for run in runs
         for point in run["curve"]
     ]
+
+
+def write_tables(folder: str, document: Json, runs: Sequence[Json], labels: Sequence[str]) -> None:
+    """Writes the curves, the calibrations, and every touch of every trial; labels: the true objects."""
+    bins = [
+        {"filter": run["filter"], "count": run["count"]}
+        | {"confidence_from": part["lower"], "estimates": part["count"]}
+        | {of: part[of] for of in ("mean_confidence", "fraction_right")}
+        for run in document["filters"]
+        for part in run["calibration"]["bins"]
+    ]
+    noisy = [
+        {"noise_mm": level["translation_mm"], "noise_rad": level["rotation_rad"]} | row
+        for level in document["pose_noise"]
+        for row in curve_rows(level["filters"])
+    ]
     trials = [
-        {
-            "run": run.record,
-            "trial": trial,
-            "object": labels[trial],
-            "touches": touches,
-            "step": step,
-        }
-        | {"right": int(step["right"]), "confidence": confidence(step)}
+        {"filter": run["filter"], "count": run["count"]}
+        | {"trial": trial, "object": labels[trial], "touches": touches, "right": int(step["right"])}
+        | {of: step.get(of) for of in ("confidence", "error_mm", "refined_error_mm")}
         for run in runs
-        for trial, steps in enumerate(run.steps)
+        for trial, steps in enumerate(run["steps"])
         for touches, step in enumerate(steps, start=1)
     ]
-    of_run = {"filter": "run/filter", "count": "run/count"}
-    shares = ("touches", "accuracy", "accuracy_low", "accuracy_high", "mean_confidence", "located")
-    curve = of_run | {name: f"point/{name}" for name in shares}
-    for kind, field in (("error", "error_mm"), ("refined", "refined_error_mm")):
-        curve |= {f"{kind}_{of}_mm": f"point/{field}/{of}" for of in ("mean", "median", "p95")}
-    of_bin = {"confidence_from": "bin/lower", "estimates": "bin/count"}
-    of_bin |= {name: f"bin/{name}" for name in ("mean_confidence", "fraction_right")}
-    of_noise = {"noise_mm": "noise/translation_mm", "noise_rad": "noise/rotation_rad"}
-    of_trial = {of: of for of in ("trial", "object", "touches", "right", "confidence")}
-    of_trial |= {of: f"step/{of}" for of in ("error_mm", "refined_error_mm")}
-    columns_of = (curve, of_run | of_bin, of_noise | curve, of_run | of_trial)
-    for name, columns, rows in zip(TABLES, columns_of, (points, bins, noisy, trials), strict=True):
-        text = io.StringIO()
-        table = csv.writer(text, lineterminator="\n")
-        table.writerow(columns)
-        for row in rows:
-            values = [value_of(row, path) for path in columns.values()]
-            table.writerow([f"{v:.6g}" if isinstance(v, float) else v for v in values])
-        write(pathlib.Path(folder, name), text.getvalue())
+    curves = curve_rows(document["filters"])
+    for name, rows in (
+        ("curves", curves), ("calibration", bins), ("pose_noise", noisy), ("trials", trials),
+    ):  # fmt: skip
+        write_csv(pathlib.Path(folder, f"{name}.csv"), rows)
 
 
-def measure(run: Run, options: argparse.Namespace) -> None:
-    """Runs all filters, prints their cases, and writes what the options name."""
-    trials_each = options.trials or (4 if options.quick else 10)
-    touches = options.touches or (12 if options.quick else 50)
-    trials = make_trials(VOWELS, trials_each, touches, SEED)
-    filters = Filters(run.device, letter_maps(run.device))
-    report = Report(run.facts)
-    runs: list[FilterRun] = []
-    for bins in (*TABLE_1, BALANCED):
-        runs.append(filters.histogram(bins, trials))
-        add_run(report, runs[-1])
-    for kind in ("particles", "augmented"):
-        for count in (1_000, MOST_PARTICLES) if options.quick else (100, 1_000, MOST_PARTICLES):
-            runs.append(filters.particles(count, trials, kind))
-            add_run(report, runs[-1])
-    for pair in equal_counts(runs):
-        add_comparison(report, *pair)
-    levels = []
-    for noise in ((1.0, 0.05), (2.0, 0.1)):
-        noisy = make_trials(VOWELS, trials_each, min(touches, 20), SEED, Touching(noise=noise))
-        of_level = [filters.histogram(bins, noisy) for bins in TABLE_1[1:]]
-        of_level.append(filters.particles(MOST_PARTICLES, noisy))
-        add_noise(report, noise, of_level)
-        level = {"translation_mm": noise[0], "rotation_rad": noise[1]}
-        levels.append(level | {"filters": [one.record for one in of_level]})
-    document = report.document() | {"filters": [one.record for one in runs], "pose_noise": levels}
-    write_json(options.json, document)
+def measure(options: argparse.Namespace) -> None:
+    """Runs all filters, prints their rows, and writes what the options name."""
+    device, facts = begin(options)
+    maps, quick = letter_maps(device), options.quick
+    each, touches = options.trials or (4 if quick else 10), options.touches or (12 if quick else 50)
+    particles = (1_000, MOST_PARTICLES) if quick else (100, 1_000, MOST_PARTICLES)
+    kinds: list[tuple[str, Bins | int]] = [("histogram", bins) for bins in (*TABLE_1, BALANCED)]
+    kinds += [(kind, count) for kind in ("particles", "augmented") for count in particles]
+    of_noise = [*kinds[1:3], ("particles", MOST_PARTICLES)]
+    comparisons: list[Json] = []
+    levels, every, table = [], [], Table(RUNS)
+    for mm, rad in NOISE:
+        exact, off_by = mm == 0.0, f"{mm:g} mm, {rad:g} rad"
+        most = touches if exact else min(touches, 20)
+        trials = make_trials(VOWELS, each, most, SEED, Touching(noise=(mm, rad)))
+        runs = []
+        for kind, size in kinds if exact else of_noise:
+            runs.append(run_filter(device, maps, trials, kind, size))
+            table.append(row_of(runs[-1], off_by))
+        comparisons += comparisons_of(runs, off_by)
+        every += runs
+        without = [{name: of for name, of in run.items() if name != "steps"} for run in runs]
+        levels.append({"translation_mm": mm, "rotation_rad": rad, "filters": without})
+    print_table(COMPARISONS, comparisons)
+    document = facts | {
+        "filters": levels[0]["filters"],
+        "comparisons": comparisons,
+        "pose_noise": levels[1:],
+    }
+    write(options.json, document)
     if options.csv:
-        write_tables(options.csv, document, runs, [truth_of(trial).object for trial in trials])
+        labels = [truth_of(trial).object for trial in trials]
+        write_tables(options.csv, document, every[: len(kinds)], labels)
     if options.plots:
         charts.save(draw(document), options.plots)
 
@@ -357,14 +289,11 @@ def program() -> None:
         plots="draw the paper's figures in this folder",
         trials="trials per letter [10, or 4 with --quick]",
     )
-    flags.add_argument(
-        "--touches",
-        type=at_least(1),
-        help="touches per trial, at most 192 [50, or 12 with --quick]",
-    )
-    flags.add_argument("--csv", metavar="FOLDER", help="write tables to this folder")
-    options = flags.parse_args()
-    measure(Run(options, {"csv": TABLES, "plots": charts.files(FIGURES)}), options)
+    add = flags.add_argument
+    add("--touches", type=at_least_1, metavar="N",
+        help="touches per trial, at most 192 [50, or 12 with --quick]")  # fmt: skip
+    add("--csv", metavar="FOLDER", help="write tables to this folder")
+    measure(flags.parse_args())
 
 
 if __name__ == "__main__":

@@ -1,21 +1,20 @@
-"""The paper's figures, drawn from the experiment's document."""
+"""The paper's figures, and what goes beyond the paper, drawn from the experiment's document."""
 
 from typing import Any
 
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from palpate._tables import column
+
 from . import charts
-from .report import Json
+from .program import Json
 
 # What the paper reports of letters that it touched with a real sensor.
 PUBLISHED_BINS_KNOW_AFTER = {1_000: 46, 10_000: 9}  # touches to an accuracy of 100 %
 PUBLISHED_ERROR_MM = 1.3  # mean, of the histogram
 PUBLISHED_PARTICLE_ACCURACY = 74.0  # %, where 10,000 particles level out
 MOST_PARTICLES = 10_000
-
-FIGURES = (
-    "fig6a", "fig6b", "fig7a", "fig7b", "augmented", "errors", "refined", "pose_noise", "calibration",
-)  # fmt: skip
 MEAN_ERROR = "mean pose error of trials with the right letter (mm)"
 
 
@@ -27,83 +26,42 @@ def as_many(a: int, b: int) -> bool:
     return 10 * abs(a - b) <= max(a, b)
 
 
-def _curve(axes: Any, run: Json, path: str, label: str, **look: Any) -> None:
-    """A field over touches, with a mark at every fifth, so that the dashes show between."""
-    charts.line(axes, run["curve"], "touches", path, label=label, markevery=5, **look)
+def plot(axes: Axes, run: Json, path: str, label: str, scale: float = 1.0, **look: Any) -> str:
+    """A field over touches, with a mark at every fifth, so that the dashes show between: the colour."""
+    curve = run["curve"]
+    touches, values = column(curve, "touches"), scale * column(curve, path)
+    (line,) = axes.plot(touches, values, label=label, markevery=5, **look)
+    return str(line.get_color())
 
 
-def _accuracy(runs: list[Json]) -> tuple[Figure, Any]:
-    figure, axes = charts.chart("touches", "trials with the right letter, and 95 % interval (%)")
-    axes.set_ylim(0.0, 105.0)
-    ends = ("accuracy_low", "accuracy_high")
-    for i, run in enumerate(runs):
-        look = {"scale": 100.0, "band": True, "interval": ends} | charts.like(i)
-        _curve(axes, run, "accuracy", run["name"], **look)
-    return figure, axes
-
-
-def _errors(runs: list[Json], published_mm: float | None = None) -> Figure:
-    figure, axes = charts.chart("touches", MEAN_ERROR)
-    for i, run in enumerate(runs):
-        _curve(axes, run, "error_mm/mean", run["name"], **charts.like(i))
-    axes.set_ylim(bottom=0.0)
-    if published_mm is not None:
-        charts.rule(axes, published_mm, f"paper: {published_mm} mm")
-    return figure
-
-
-def draw(document: Json) -> dict[str, Figure]:
-    """Fig. 6a, 6b, 7a and 7b with the paper's headline numbers, and what goes beyond the paper."""
-    runs: dict[str, list[Json]] = {}
-    for run in document["filters"]:
-        runs.setdefault(run["filter"], []).append(run)
-    fig6a, axes = _accuracy(runs["particles"])
-    charts.rule(axes, PUBLISHED_PARTICLE_ACCURACY, "paper: 10,000 particles level out")
-    fig7a, axes = _accuracy(runs["histogram"])
-    for mark, (count, touches) in zip("PD", PUBLISHED_BINS_KNOW_AFTER.items(), strict=True):
-        look: dict[str, Any] = {"color": charts.GREY, "markersize": 8} | charts.EDGE
-        axes.plot(touches, 100.0, mark, label=f"paper: {count:,} bins reach 100 %", **look)
-
-    augmented, axes = charts.chart("touches", "trials with the right letter (%)")
-    axes.set_ylim(0.0, 105.0)
-    for kind, dash in (("particles", "-"), ("augmented", "--")):
-        for i, run in enumerate(runs[kind]):
-            look = charts.like(i) | {"linestyle": dash, "scale": 100.0}
-            _curve(axes, run, "accuracy", run["name"], **look)
-
-    most = max(run["count"] for run in runs["histogram"])
-    largest = [run for run in runs["histogram"] if as_many(run["count"], most)]
-    finest = next(run for run in largest if run["count"] == most)
-    y = "pose error of trials with the right letter (mm)"
-    errors, axes = charts.chart("touches", y, title=finest["name"], log="y")
-    for i, (label, path) in enumerate(
-        (
-            ("mode, mean", "error_mm/mean"),
-            ("mode, 95th percentile", "error_mm/p95"),
-            ("mode, median", "error_mm/median"),
-            ("refined, 95th percentile", "refined_error_mm/p95"),
-            ("refined, mean", "refined_error_mm/mean"),
+def draw_accuracy(runs: list[Json]) -> Axes:
+    """With 95 % intervals as shades."""
+    axes = charts.chart("touches", "trials with the right letter, and 95 % interval (%)")
+    for run in runs:
+        colour = plot(axes, run, "accuracy", run["name"], 100.0)
+        touches, *ends = (
+            column(run["curve"], of) for of in ("touches", "accuracy_low", "accuracy_high")
         )
-    ):
-        _curve(axes, finest, path, label, **charts.like(i))
-
-    refined, axes = charts.chart("touches", MEAN_ERROR, log="y")
-    for i, run in enumerate(largest):
-        _curve(axes, run, "error_mm/mean", f"{run['name']}, mode", **charts.like(2 * i))
-        path, name = "refined_error_mm/mean", f"{run['name']}, refined"
-        _curve(axes, run, path, name, **charts.like(2 * i + 1))
-
-    fig6b = _errors(runs["particles"])
-    fig7b = _errors(runs["histogram"], PUBLISHED_ERROR_MM)
-    noise, calibrated = _noise(document, most), _calibration(runs)
-    figures = (fig6a, fig6b, fig7a, fig7b, augmented, errors, refined, noise, calibrated)
-    return dict(zip(FIGURES, map(charts.legend, figures), strict=True))
+        axes.fill_between(
+            touches, 100.0 * ends[0], 100.0 * ends[1], color=colour, alpha=0.12, linewidth=0
+        )
+    axes.set_ylim(0.0, 105.0)
+    return axes
 
 
-def _noise(document: Json, most: int) -> Figure:
+def draw_errors(runs: list[Json]) -> Axes:
+    """Mean errors of modes."""
+    axes = charts.chart("touches", MEAN_ERROR)
+    for run in runs:
+        plot(axes, run, "error_mm/mean", run["name"])
+    axes.set_ylim(bottom=0.0)
+    return axes
+
+
+def draw_noise(document: Json, most: int) -> Axes:
     """Colours tell the noise apart, dashes the filters, each with its largest count."""
     title = "standard deviation of the error of the reported sensor pose"
-    figure, axes = charts.chart("touches", MEAN_ERROR, title=title, log="y")
+    axes = charts.chart("touches", MEAN_ERROR, title, yscale="log")
     exact = {"translation_mm": 0.0, "rotation_rad": 0.0, "filters": document["filters"]}
     for kind, count, look in (
         ("histogram", most, charts.SOLID),
@@ -113,28 +71,69 @@ def _noise(document: Json, most: int) -> Figure:
             for run in level["filters"]:
                 if run["filter"] == kind and run["count"] == count:
                     off = f"{level['translation_mm']:g} mm, {level['rotation_rad']:g} rad"
-                    name = f"{run['name']}, {off}"
-                    _curve(axes, run, "error_mm/mean", name, color=colour, **look)
+                    plot(axes, run, "error_mm/mean", f"{run['name']}, {off}", color=colour, **look)
     axes.set_xlim(right=len(document["pose_noise"][0]["filters"][0]["curve"]) + 0.5)
-    return figure
+    return axes
 
 
-def _calibration(runs: dict[str, list[Json]]) -> Figure:
+def draw_calibration(runs: list[Json]) -> Axes:
+    """The share that is right against the probability that was told."""
     fewest = 10  # estimates of which a fraction says something
-    figure, axes = charts.chart(
+    axes = charts.chart(
         "confidence: probability of the most probable letter (%)",
         "estimates that are right (%)",
-        title=f"expected calibration error in brackets; at least {fewest} estimates per point",
+        f"expected calibration error in brackets; at least {fewest} estimates per point",
     )
-    axes.plot([0, 100], [0, 100], ":", color=charts.GREY, label="perfectly calibrated")
-    # All particle filters would hide more than they show.
-    for i, run in enumerate([*runs["histogram"], runs["particles"][-1]]):
+    for run in runs:
         bins = [part for part in run["calibration"]["bins"] if part["count"] >= fewest]
-        axes.plot(
-            [100.0 * part["mean_confidence"] for part in bins],
-            [100.0 * part["fraction_right"] for part in bins],
-            label=f"{run['name']} ({100.0 * run['calibration']['expected_error']:.1f} %)",
-            **charts.like(i),
-        )
+        told, right = (100.0 * column(bins, of) for of in ("mean_confidence", "fraction_right"))
+        error = 100.0 * run["calibration"]["expected_error"]
+        axes.plot(told, right, label=f"{run['name']} ({error:.1f} %)")
+    axes.plot([0, 100], [0, 100], ":", marker="", color=charts.GREY, label="perfectly calibrated")
     axes.set(xlim=(0.0, 100.0), ylim=(0.0, 105.0))
-    return figure
+    return axes
+
+
+def draw(document: Json) -> dict[str, Figure]:
+    """Fig. 6a, 6b, 7a and 7b with the paper's headline numbers, and what goes beyond the paper."""
+    histograms, particles, augmented = (
+        [run for run in document["filters"] if run["filter"] == kind]
+        for kind in ("histogram", "particles", "augmented")
+    )
+    drawn = {"fig6a": draw_accuracy(particles), "fig7a": draw_accuracy(histograms)}
+    charts.rule(drawn["fig6a"], PUBLISHED_PARTICLE_ACCURACY, "paper: 10,000 particles level out")
+    for mark, (count, touches) in zip("PD", PUBLISHED_BINS_KNOW_AFTER.items(), strict=True):
+        look: Json = {"color": charts.GREY, "markersize": 8, "linestyle": ""}
+        label = f"paper: {count:,} bins reach 100 %"
+        drawn["fig7a"].plot(touches, 100.0, marker=mark, label=label, **look)
+    drawn |= {"fig6b": draw_errors(particles), "fig7b": draw_errors(histograms)}
+    charts.rule(drawn["fig7b"], PUBLISHED_ERROR_MM, f"paper: {PUBLISHED_ERROR_MM} mm")
+
+    drawn["augmented"] = charts.chart("touches", "trials with the right letter (%)")
+    for runs, dash in ((particles, "-"), (augmented, "--")):
+        for colour, run in zip(charts.COLOURS, runs, strict=False):
+            look = {"color": colour, "linestyle": dash}
+            plot(drawn["augmented"], run, "accuracy", run["name"], 100.0, **look)
+    drawn["augmented"].set_ylim(0.0, 105.0)
+
+    most = max(run["count"] for run in histograms)
+    largest = [run for run in histograms if as_many(run["count"], most)]
+    finest = next(run for run in largest if run["count"] == most)
+    y = "pose error of trials with the right letter (mm)"
+    drawn["errors"] = charts.chart("touches", y, finest["name"], yscale="log")
+    for label, path in (
+        ("mode, mean", "error_mm/mean"),
+        ("mode, 95th percentile", "error_mm/p95"),
+        ("mode, median", "error_mm/median"),
+        ("refined, 95th percentile", "refined_error_mm/p95"),
+        ("refined, mean", "refined_error_mm/mean"),
+    ):
+        plot(drawn["errors"], finest, path, label)
+    drawn["refined"] = charts.chart("touches", MEAN_ERROR, yscale="log")
+    for run in largest:
+        plot(drawn["refined"], run, "error_mm/mean", f"{run['name']}, mode")
+        plot(drawn["refined"], run, "refined_error_mm/mean", f"{run['name']}, refined")
+    drawn["pose_noise"] = draw_noise(document, most)
+    # All particle filters would hide more than they show.
+    drawn["calibration"] = draw_calibration([*histograms, particles[-1]])
+    return {name: charts.finished(axes) for name, axes in drawn.items()}

@@ -1,8 +1,6 @@
-#include <spawn.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
-#include <fcntl.h>
+#include <cstdlib>
 #include <filesystem>
 #include <string>
 #include <utility>
@@ -12,7 +10,6 @@
 
 #include "cases.hpp"
 #include "letters.hpp"
-#include "measurement.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
 
@@ -25,108 +22,74 @@ constexpr double goal_rate_over_processes = 4.0;
 constexpr double goal_batch_rate = 1000.0;
 constexpr int batch_runs = 5;
 
-/// A folder that goes when it is no longer needed.
-class ScratchFolder {
- public:
-  ScratchFolder() {
-    std::string name = std::filesystem::temp_directory_path() / "palpate-bench-XXXXXX";
-    if (::mkdtemp(name.data()) == nullptr) {
-      throw Error(Fault::system, fmt::format("{}: cannot be made; is TMPDIR writable?", name));
-    }
-    path_ = name;
-  }
-  ~ScratchFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  ScratchFolder(const ScratchFolder&) = delete;
-  ScratchFolder& operator=(const ScratchFolder&) = delete;
-
-  const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
-
-/// Runs a program to its end, in silence.
-void run_process(std::vector<std::string> arguments) {
-  std::vector<char*> argv;
-  for (std::string& argument : arguments) {
-    argv.push_back(argument.data());
-  }
-  argv.push_back(nullptr);
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
-  pid_t process = 0;
-  const int refused = posix_spawn(&process, argv.front(), &actions, nullptr, argv.data(), environ);
-  posix_spawn_file_actions_destroy(&actions);
-  int status = 0;
-  if (refused != 0 || waitpid(process, &status, 0) != process || status != 0) {
-    throw Error(Fault::system, fmt::format("{}: failed; run it by hand", arguments.front()));
-  }
-}
-
 /// The program `palpate` beside this one, with the letters' maps and the unknowns' recordings in a
 /// folder.
 class ProgramWithFiles {
  public:
   ProgramWithFiles(const Inputs& inputs, std::filesystem::path program)
       : program_(std::move(program)), device_name_(inputs.device_name) {
-    std::filesystem::create_directory(maps_);
+    std::filesystem::create_directories(maps_);
     for (const Hypothesis& letter : inputs.letters) {
       write_map(maps_ / (letter.map.label + ".map.h5"), letter.map);
     }
-    std::filesystem::create_directory(unknowns_);
+    std::filesystem::create_directories(unknowns_);
     for (const Recording& unknown : inputs.unknowns) {
       recordings_.push_back(unknowns_ / fmt::format("{:04}.h5", recordings_.size()));
       write_recording(recordings_.back(), unknown);
     }
   }
+  ~ProgramWithFiles() {
+    std::error_code ignored;
+    std::filesystem::remove_all(folder_, ignored);
+  }
+  ProgramWithFiles(const ProgramWithFiles&) = delete;
+  ProgramWithFiles& operator=(const ProgramWithFiles&) = delete;
 
   /// Median seconds that `palpate recognize` takes for an unknown, start and end included.
   double seconds_per_process(std::size_t processes) const {
     std::vector<double> seconds;
     for (std::size_t i = 0; i < processes; ++i) {
-      seconds.push_back(seconds_of({"recognize", recordings_[i]}));
+      seconds.push_back(seconds_of(fmt::format("recognize '{}'", recordings_[i].string())));
     }
     return median(seconds);
   }
 
   /// Median seconds that `palpate batch` takes for all unknowns by bounds, start and end included.
   double batch_seconds() const {
-    const std::filesystem::path results = folder_.path() / "results";
+    const std::filesystem::path results = folder_ / "results";
     std::vector<double> seconds;
     for (int run = 0; run < batch_runs; ++run) {
       std::filesystem::remove_all(results);
-      seconds.push_back(seconds_of({"batch", unknowns_, "-o", results, "--filter", "bounded"}));
+      seconds.push_back(seconds_of(fmt::format("batch '{}' -o '{}' --filter bounded",
+                                               unknowns_.string(), results.string())));
     }
     return median(seconds);
   }
 
  private:
-  double seconds_of(std::vector<std::string> arguments) const {
-    arguments.insert(arguments.begin(), program_);
-    arguments.insert(arguments.end(),
-                     {"--maps", maps_, "--bins", "25x25x16", "--x-mm=-10:10", "--y-mm=-10:10"});
+  /// Runs a command of the program to its end, in silence.
+  double seconds_of(const std::string& arguments) const {
+    std::string command =
+        fmt::format("'{}' {} --maps '{}' --bins 25x25x16 --x-mm=-10:10 --y-mm=-10:10 >/dev/null",
+                    program_.string(), arguments, maps_.string());
     if (!device_name_.empty()) {
-      arguments.insert(arguments.end(), {"--device", device_name_});
+      command += fmt::format(" --device '{}'", device_name_);
     }
-    return bench::seconds_of([&] { run_process(arguments); });
+    return bench::seconds_of([&] {
+      if (std::system(command.c_str()) != 0) {
+        throw Error(Fault::system, fmt::format("{}: failed; run it by hand", command));
+      }
+    });
   }
 
   std::filesystem::path program_;
   std::string device_name_;
-  ScratchFolder folder_;
-  std::filesystem::path maps_ = folder_.path() / "maps";
-  std::filesystem::path unknowns_ = folder_.path() / "unknowns";
+  std::filesystem::path folder_ =
+      std::filesystem::temp_directory_path() / fmt::format("palpate-bench-{}", ::getpid());
+  std::filesystem::path maps_ = folder_ / "maps";
+  std::filesystem::path unknowns_ = folder_ / "unknowns";
   std::vector<std::filesystem::path> recordings_;
 };
-
-bool equal(const Estimate& a, const Estimate& b) {
-  return a.identity == b.identity && a.mode.object == b.mode.object && a.mode.bin == b.mode.bin &&
-         a.mode.log_likelihood == b.mode.log_likelihood;
-}
 
 }  // namespace
 
@@ -168,12 +131,12 @@ Case many_unknowns_case(const Inputs& inputs) {
   const std::size_t last = inputs.unknowns.size() - 1;
   for (const std::size_t i : {std::size_t{0}, last / 2, last}) {
     PoseHistogram alone = letter_histogram(inputs, lattice);
-    bool same = equal(recognise(alone, inputs.unknowns[i]), estimates[i]);
+    bool alike = same(recognise(alone, inputs.unknowns[i]), estimates[i]);
     recognise(histogram, inputs.unknowns[i]);
     for (int object = 0; object < static_cast<int>(inputs.letters.size()); ++object) {
-      same = same && alone.log_likelihood(object) == histogram.log_likelihood(object);
+      alike = alike && alone.log_likelihood(object) == histogram.log_likelihood(object);
     }
-    different += same ? 0 : 1;
+    different += alike ? 0 : 1;
   }
 
   Case result{.name = "many unknowns",

@@ -6,7 +6,6 @@
 
 #include "cases.hpp"
 #include "letters.hpp"
-#include "measurement.hpp"
 #include "reference/reference.hpp"
 
 namespace palpate::bench {

@@ -1,7 +1,7 @@
-"""Statistics over trials: intervals, errors, calibration, and what two runs gain on each other."""
+"""Statistics over trials: intervals, calibration, and errors of poses over their covariances."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from statistics import fmean
 from typing import Any
 
@@ -9,36 +9,39 @@ import numpy
 from numpy.typing import ArrayLike, NDArray
 
 import palpate
+from palpate._palpate import Random, Stream
 from palpate._statistics import LEAST_GAIN, Errors, quantile, standard_error
+from palpate._tables import Text
 
-from .random_numbers import Random, Stream
+from .program import Json
 from .trials import Body
-
-Interval = tuple[float, float]
 
 _Z = 1.959964  # the standard normal's 97.5th percentile
 
+#: A mean, or a share, as `mean`, with the ends `low` and `high` of its 95 % interval.
+Mean = dict[str, float]
 
-def wilson_interval(successes: float, trials: int) -> Interval:
-    """The 95 % score interval of a share (Wilson 1927)."""
+
+def share_record(successes: float, trials: int) -> Mean:
+    """A share, with its score interval (Wilson 1927)."""
     share = successes / trials
     shrink = 1.0 + _Z * _Z / trials
     centre = (share + _Z * _Z / (2.0 * trials)) / shrink
     half = _Z / shrink * math.sqrt(share * (1.0 - share) / trials + (_Z / trials) ** 2 / 4.0)
     # Rounding must not leave the ends at 0 and 1 outside.
     low = 0.0 if successes == 0 else centre - half
-    return low, 1.0 if successes == trials else centre + half
+    return {"mean": share, "low": low, "high": 1.0 if successes == trials else centre + half}
 
 
-def mean_interval(values: Sequence[float]) -> Interval | None:
-    """The 95 % interval of the mean of what the values are drawn from, by Student's t.
+def student_record(values: Any) -> Mean:
+    """The mean of what the values are drawn from, with its interval by Student's t.
 
-    None for fewer than three values. Student's t is Cornish and Fisher's expansion (Abramowitz and
-    Stegun 26.7.5): 3 % off for two degrees of freedom, 1 % for three.
+    Without an interval for fewer than three values. Student's t is Cornish and Fisher's expansion
+    (Abramowitz and Stegun 26.7.5): 3 % off for two degrees of freedom, 1 % for three.
     """
-    v, z = len(values) - 1.0, _Z
+    mean, v, z = fmean(values), len(values) - 1.0, _Z
     if v < 2.0:
-        return None
+        return {"mean": mean}
     t = (
         z
         + (z**3 + z) / (4 * v)
@@ -46,10 +49,10 @@ def mean_interval(values: Sequence[float]) -> Interval | None:
         + (3 * z**7 + 19 * z**5 + 17 * z**3 - 15 * z) / (384 * v**3)
     )
     half = t * standard_error(values)
-    return fmean(values) - half, fmean(values) + half
+    return {"mean": mean, "low": mean - half, "high": mean + half}
 
 
-def told_apart(lower: ArrayLike, higher: ArrayLike) -> tuple[float, Interval]:
+def told_apart(lower: ArrayLike, higher: ArrayLike) -> Mean:
     """Share of the pairs of both kinds in which the lower kind's value is lower; ties count half.
 
     Its 95 % interval is Wilson's for as many trials as the rarer kind has values: the estimate varies
@@ -58,100 +61,35 @@ def told_apart(lower: ArrayLike, higher: ArrayLike) -> tuple[float, Interval]:
     low, high = numpy.asarray(lower)[:, None], numpy.asarray(higher)
     share = float(numpy.mean(low < high) + numpy.mean(low == high) / 2.0)
     rarer = min(len(low), len(high))
-    return share, wilson_interval(share * rarer, rarer)
+    return share_record(share * rarer, rarer)
 
 
-def bootstrap_interval(
-    trials: int, statistic: Callable[[NDArray[numpy.int64]], NDArray[numpy.float64]]
-) -> Interval:
-    """The 95 % interval of a statistic of trials: percentiles over 2,000 samples (Efron 1979).
+def bootstrap_record(values: ArrayLike, over: ArrayLike = 1.0) -> Mean:
+    """mean(values) / mean(over), paired by index, with its interval by bootstrap (Efron 1979).
 
-    statistic takes the samples as indices [2000, trials] and gives its values [2000]. The same input
-    gives the same interval.
+    Of at least one value, by percentiles over 2,000 samples. The same input gives the same interval.
     """
-    samples = 2_000
-    uniforms = Random(20_260_101, Stream.TOUCH_ORDER).uniforms(samples * trials)
-    drawn = (uniforms * trials).astype(numpy.int64).reshape(samples, trials)
-    values = statistic(drawn).tolist()
-    return quantile(values, 0.025), quantile(values, 0.975)
+    samples, above = 2_000, numpy.asarray(values)
+    below = numpy.broadcast_to(over, above.shape)
+    uniforms = Random(20_260_101, Stream.touch_order).uniforms(samples * len(above))
+    drawn = (uniforms * len(above)).astype(numpy.int64).reshape(samples, len(above))
+    ratios = (above[drawn].sum(axis=1) / below[drawn].sum(axis=1)).tolist()
+    low, high = quantile(ratios, 0.025), quantile(ratios, 0.975)
+    return {"mean": float(above.mean() / below.mean()), "low": low, "high": high}
 
 
-def bootstrap_mean_interval(values: ArrayLike) -> Interval:
-    """The 95 % interval of the mean of at least one value, by bootstrap."""
-    all_values = numpy.asarray(values)
-    return bootstrap_interval(len(all_values), lambda drawn: all_values[drawn].mean(axis=1))
+def with_interval(form: str, factor: float = 1.0) -> Text:
+    """Writes `factor` times such a record, as in "0.041 (0.018 to 0.072)"."""
+
+    def text(record: Mean) -> str:
+        told = {of: format(factor * value, form) for of, value in record.items()}
+        ends = f" ({told['low']} to {told['high']})" if "low" in told else ""
+        return told["mean"] + ends
+
+    return text
 
 
-def bootstrap_ratio_interval(numerators: ArrayLike, denominators: ArrayLike) -> Interval:
-    """The 95 % interval of mean(numerators) / mean(denominators), paired by index, by bootstrap."""
-    above, below = numpy.asarray(numerators), numpy.asarray(denominators)
-    return bootstrap_interval(
-        len(above), lambda drawn: above[drawn].sum(axis=1) / below[drawn].sum(axis=1)
-    )
-
-
-def mean_record(values: Sequence[float]) -> dict[str, float]:
-    """The mean and its bootstrap interval."""
-    low, high = bootstrap_mean_interval(values)
-    return {"mean": fmean(values), "low": low, "high": high}
-
-
-def differences(first: Errors, second: Errors) -> dict[str, float] | None:
-    """By how much the first run errs more than the second, over the trials that have an error in both.
-
-    Trial i of one run is trial i of the other. `to` and `from` are the mean errors of the first and the
-    second run in mm, `mean` is their difference, with its standard error. None where no trial has both.
-    """
-    pairs = [(a, b) for a, b in zip(first, second, strict=True) if a is not None and b is not None]
-    if not pairs:
-        return None
-    to, from_ = (fmean(errors) for errors in zip(*pairs, strict=True))
-    error = standard_error([a - b for a, b in pairs])
-    return {
-        "trials": len(pairs),
-        "from": from_,
-        "to": to,
-        "mean": to - from_,
-        "standard_error": error,
-    }
-
-
-def gains(first: Errors, second: Errors) -> bool:
-    """Whether the second run errs less by more than LEAST_GAIN and two standard errors.
-
-    One trial never tells.
-    """
-    paired = differences(first, second)
-    if paired is None or paired["trials"] < 2:
-        return False
-    return paired["mean"] > max(LEAST_GAIN * paired["to"], 2.0 * paired["standard_error"])
-
-
-def knee_of(runs: Sequence[Errors]) -> int | None:
-    """Where more bins stop helping: the first of the runs that suffices, by rising count.
-
-    It locates every trial, and no finer run gains over it. None where only the last run would do,
-    which no finer run confirms, or where a finer run has no errors.
-    """
-    for i, run in enumerate(runs[:-1]):
-        finer = runs[i + 1 :]
-        if None not in run and not any(
-            gains(run, to) or differences(run, to) is None for to in finer
-        ):
-            return i
-    return None
-
-
-def pareto_front(entries: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """The entries on the Pareto front of `cost` and `error`, by rising cost; of equals the first."""
-    front: list[dict[str, Any]] = []
-    for entry in sorted(entries, key=lambda entry: (entry["cost"], entry["error"])):
-        if not front or entry["error"] < front[-1]["error"]:
-            front.append(entry)
-    return front
-
-
-def calibration(confidences: Sequence[float], right: Sequence[bool]) -> dict[str, Any]:
+def calibration(confidences: ArrayLike, right: ArrayLike) -> Json:
     """How far the probability of the most probable object can be taken at its word.
 
     Ten bins of equal width over [0, 1], the empty ones left out, and the expected error: the mean
@@ -173,12 +111,8 @@ def calibration(confidences: Sequence[float], right: Sequence[bool]) -> dict[str
     return {"expected_error": sum(off) / len(told), "bins": bins}
 
 
-#: What normalised_error() is on average where covariances are right: one for every coordinate.
-EXPECTED_NORMALISED_ERROR = 3.0
-
-
 def normalised_error(
-    grid: palpate.OccupancyGrid, refined: palpate.RefinedPose, truth: ArrayLike
+    grid: palpate.OccupancyGrid, estimate: ArrayLike, covariance: Any, truth: ArrayLike
 ) -> float:
     """The squared error of a refined pose over its covariance C, e' C^-1 e.
 
@@ -188,26 +122,23 @@ def normalised_error(
     difference of x and y of the object's centroid in the robot frame, C is carried over to it by the
     Jacobian, and the result is taken times 3/2. So it is 3 on average for every object.
     """
-    estimate, true = refined.T_object_robot, numpy.asarray(truth)
+    pose, true = numpy.asarray(estimate), numpy.asarray(truth)
     centroid_mm = Body.of(grid).centroid_mm
     if grid.symmetry == 0:
-        places = [
-            palpate.transform(palpate.inverse(pose), [centroid_mm])[0] for pose in (estimate, true)
-        ]
-        turn = turning(-estimate[2])
-        x, y = centroid_mm - estimate[:2]
-        jacobian = numpy.column_stack([-turn, turn @ (y, -x)])
-        error = places[0] - places[1]
-        covariance = jacobian @ refined.covariance @ jacobian.T
-        return (
-            EXPECTED_NORMALISED_ERROR / 2.0 * float(error @ numpy.linalg.solve(covariance, error))
+        here, there = (
+            palpate.transform(palpate.inverse(of), [centroid_mm])[0] for of in (pose, true)
         )
-    turn_rad = estimate[2] - true[2]
+        turn = turning(-pose[2])
+        x, y = centroid_mm - pose[:2]
+        jacobian = numpy.column_stack([-turn, turn @ (y, -x)])
+        of_centroid = jacobian @ covariance @ jacobian.T
+        return 1.5 * float((here - there) @ numpy.linalg.solve(of_centroid, here - there))
+    turn_rad = pose[2] - true[2]
     turn_rad -= wrapped(turn_rad, 2.0 * math.pi / grid.symmetry)
     about = centroid_mm - turning(turn_rad) @ centroid_mm
-    error = estimate - palpate.compose([*about, turn_rad], true)
+    error = pose - palpate.compose([*about, turn_rad], true)
     error[2] = wrapped(error[2], 2.0 * math.pi)
-    return float(error @ numpy.linalg.solve(refined.covariance, error))
+    return float(error @ numpy.linalg.solve(covariance, error))
 
 
 def turning(angle_rad: float) -> NDArray[numpy.float64]:
@@ -216,6 +147,49 @@ def turning(angle_rad: float) -> NDArray[numpy.float64]:
     return numpy.array([[c, -s], [s, c]])
 
 
-def wrapped(angle_rad: float, period_rad: float) -> float:
-    """The angle in [-period/2, period/2)."""
-    return (angle_rad + period_rad / 2.0) % period_rad - period_rad / 2.0
+def wrapped(angles_rad: Any, period_rad: float) -> Any:
+    """Angles in [-period/2, period/2)."""
+    return (angles_rad + period_rad / 2.0) % period_rad - period_rad / 2.0
+
+
+def differences(first: Errors, second: Errors) -> Json | None:
+    """By how much the first run errs more than the second, over the trials that have an error in both.
+
+    Trial i of one run is trial i of the other. `to` and `from` are the mean errors of the first and the
+    second run in mm, `mean` is their difference, with its standard error. None where no trial has both.
+    """
+    pairs = numpy.array([first, second], numpy.float64)
+    to, from_ = pairs[:, ~numpy.isnan(pairs).any(axis=0)]
+    if not len(to):
+        return None
+    return {
+        "trials": len(to),
+        "from": float(from_.mean()),
+        "to": float(to.mean()),
+        "mean": float(to.mean() - from_.mean()),
+        "standard_error": standard_error(to - from_),
+    }
+
+
+def gains(first: Errors, second: Errors) -> bool:
+    """Whether the second run errs less by more than LEAST_GAIN and two standard errors.
+
+    One trial never tells.
+    """
+    paired = differences(first, second)
+    if paired is None or paired["trials"] < 2:
+        return False
+    return bool(paired["mean"] > max(LEAST_GAIN * paired["to"], 2.0 * paired["standard_error"]))
+
+
+def knee_of(runs: Sequence[Errors]) -> int | None:
+    """Where more bins stop helping: the first of the runs that suffices, by rising count.
+
+    It locates every trial, and no finer run gains over it. None where only the last run would do,
+    which no finer run confirms, or where a finer run has no errors.
+    """
+    for i, run in enumerate(runs[:-1]):
+        finer = runs[i + 1 :]
+        if None not in run and not any(gains(run, to) or differences(run, to) is None for to in finer):
+            return i
+    return None

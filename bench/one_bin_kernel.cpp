@@ -1,4 +1,4 @@
-#include "one_bin_kernel.hpp"
+#include "baselines.hpp"
 
 #include <bit>
 

@@ -3,10 +3,9 @@
 
 #include <fmt/format.h>
 
+#include "baselines.hpp"
 #include "cases.hpp"
-#include "cpu_loop.hpp"
 #include "letters.hpp"
-#include "one_bin_kernel.hpp"
 #include "palpate/error.hpp"
 #include "palpate/pose_histogram.hpp"
 

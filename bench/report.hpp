@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -7,12 +9,56 @@
 
 #include <nlohmann/json.hpp>
 
-#include "commands.hpp"
 #include "io/atomic_file.hpp"
-#include "measurement.hpp"
 #include "palpate/device.hpp"
+#include "recognition/proportion.hpp"
 
 namespace palpate::bench {
+
+/// What all commands take.
+struct RunOptions {
+  std::string device;  ///< a device's name or index; empty for the best
+  std::string json;    ///< file for the results; none where it is empty
+  bool quick = false;  ///< small sizes and few trials, in less than a minute
+  std::string part;    ///< the only part to measure, of a command that has parts; empty for all
+};
+
+/// Seconds that the call takes.
+double seconds_of(const std::function<void()>& call);
+
+/// Runs all contenders in turn, `repeats` times: whatever else the machine does meanwhile meets
+/// them alike. Returns their seconds, [contender][repeat]. Warm them up before.
+std::vector<std::vector<double>> interleave(std::span<const std::function<void()>> contenders,
+                                            int repeats);
+
+/// Median seconds of `repeats` calls, after one that is not counted.
+double median_seconds(const std::function<void()>& call, int repeats);
+
+double median(std::span<const double> values);
+/// The smallest value that at least this fraction of the values does not exceed.
+double quantile(std::span<const double> values, double fraction);
+
+/// Resident memory of the process. The peak is since the last restart_peak_memory(), or since the
+/// process began where the kernel does not allow that. restart_peak_memory() first gives memory
+/// that the process has freed back to the system: what is taken afterwards then shows.
+std::uint64_t resident_bytes();
+std::uint64_t peak_resident_bytes();
+void restart_peak_memory();
+
+/// Largest and root mean square of what was added.
+class ErrorStatistics {
+ public:
+  /// Counts one error; one that is not a number makes the largest so, too.
+  void add(double error);
+  double largest() const { return largest_; }
+  double rms() const;
+  std::uint64_t count() const { return count_; }
+
+ private:
+  double largest_ = 0.0;
+  double squares_ = 0.0;
+  std::uint64_t count_ = 0;
+};
 
 using Json = nlohmann::ordered_json;
 
@@ -69,5 +115,27 @@ class Report {
   Device device_;
   Json document_;
 };
+
+// The commands.
+
+/// Names of the parts of `bounded`, in order.
+inline constexpr const char* bounded_parts[] = {"speed", "mode",   "streaming",
+                                                "large", "growth", "search"};
+
+// Each prints its results as Markdown tables and writes them to the file that its options name.
+// They throw Error where the device or the file cannot be opened.
+
+/// Speed, memory and error of every kernel, beside two baselines and float64.
+void measure_kernels(const RunOptions& options, std::span<char* const> command_line);
+
+/// Every way to evaluate the likelihood, in turn on the same lattices: its time, and its error
+/// against float64. The sweep's tables and charts show them.
+/// @throws Error unless some touch has at least half its elements in No Contact, which an array at
+/// rest needs to gain anything
+void compare_paths(const RunOptions& options, std::span<char* const> command_line);
+
+/// The posterior by bounds: its time for nine touches at rising numbers of bins, touch by touch and
+/// in large scenes, its memory, and where it searches.
+void measure_bounded(const RunOptions& options, std::span<char* const> command_line);
 
 }  // namespace palpate::bench

@@ -3,86 +3,90 @@
 import html
 import string
 import urllib.parse
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
-from matplotlib.figure import Figure
+import numpy
+from numpy.typing import NDArray
 
 from palpate._statistics import LEAST_GAIN
-from palpate._tables import Column, count_text, mean_text, seconds_text, texts, value_of
+from palpate._tables import Column, column, count_text, mean_text, seconds_text, texts, value_of
 
 from . import charts
-from .report import Json
-from .sweep_runs import SAMPLED
-from .sweep_tables import BOUNDS, LIMITS, PRECISIONS, RUNS, STEPS, VERDICTS, steps_of
+from .program import Json
+from .sweep_runs import AUTO_RULE, SAMPLED
+from .sweep_tables import BOUNDS, LIMITS, PRECISIONS, RUNS, STEPS, VERDICTS
+from .trials import Floats
 from .windows import REACH_MM
 
-#: The files of the charts, without their endings.
-CHARTS = ("sweep_front", "sweep_precision", "sweep_bins", "sweep_bounds")
-#: Under the pointer: where a mark stands in the chart, as shares of its width and height from the
-#: upper left, and what is told.
-Spots = list[tuple[float, float, str]]
+
+def front_of(costs: Floats, errors: Floats) -> NDArray[numpy.intp]:
+    """Which are on the Pareto front of costs and errors, by rising cost; of equals the first."""
+    rising = numpy.lexsort((errors, costs))
+    least = numpy.minimum.accumulate(errors[rising])
+    return numpy.compress(numpy.diff(least, prepend=numpy.inf) < 0.0, rising)
 
 
-class _Chart:
+class Chart:
     """A chart with logarithmic axes that knows where its marks stand."""
 
     def __init__(self, x: str, y: str) -> None:
-        self.figure, self.axes = charts.chart(x, y, log="xy")
-        self._marks: list[tuple[float, float, str]] = []
+        self.axes = charts.chart(x, y, xscale="log", yscale="log")
+        #: x, y, and what is told under the pointer.
+        self.marks: list[tuple[float, float, str]] = []
 
     def add(
         self,
-        records: Iterable[Json],
+        records: Sequence[Json],
         x: str,
         y: str,
         label: str,
         columns: Sequence[Column] = (),
-        *,
         counted: bool = False,
         **look: Any,
     ) -> None:
-        """A series of what paths find in records that have it, if there are any.
+        """A series of what paths find in records, if any has it.
 
         columns: what stands under the pointer; counted: whether marks have their counts beside them.
         """
         records = [record for record in records if value_of(record, y) is not None]
-        if records:
-            charts.line(self.axes, records, x, y, label=label, **look)
-        for record in records:
-            place = (value_of(record, x), value_of(record, y))
+        if not records:
+            return
+        places = column(records, x), column(records, y)
+        self.axes.plot(*places, label=label, **({"markeredgecolor": "auto"} | look))
+        for record, place in zip(records, numpy.transpose(places).tolist(), strict=True):
             if counted:
+                look_of_text: Json = {"fontsize": 8, "color": look["color"]}
                 self.axes.annotate(
-                    count_text(record["count"]),
-                    place,
-                    (6, 3),
-                    textcoords="offset points",
-                    fontsize=8,
-                    color=look["color"],
+                    count_text(record["count"]), place, (6, 3), textcoords="offset points", **look_of_text
                 )
             cells = zip(columns, texts(columns, record), strict=True)
             told = "\n".join(f"{head}: {text}" for (head, _, _), text in cells if text != "–")
-            self._marks += [(*place, told)] if told else []
+            self.marks += [(*place, told)] if told else []
 
-    def done(self) -> tuple[Figure, Spots]:
-        """The chart with its legend, and its spots."""
-        charts.legend(self.figure).draw_without_rendering()  # lays it out
-        to_share = self.axes.transData + self.figure.transFigure.inverted()
-        shares = [to_share.transform(mark[:2]).tolist() for mark in self._marks]
-        told = [mark[2] for mark in self._marks]
-        return self.figure, [(x, 1.0 - y, of) for (x, y), of in zip(shares, told, strict=True)]
+    def add_front(self, costs: Floats, errors: Floats) -> None:
+        """The Pareto front of what costs and errs so much."""
+        front = front_of(costs, errors)
+        look: Json = {"color": charts.GREY, "linestyle": "-", "marker": "", "zorder": 1}
+        self.axes.plot(costs[front], errors[front], label="Pareto front", **look)
+
+    def finish(self) -> "Chart":
+        """Adds the legend and lays the chart out."""
+        self.figure = charts.finished(self.axes)
+        self.figure.draw_without_rendering()
+        return self
 
 
-def _pose_chart(document: Json) -> tuple[Figure, Spots]:
-    chart = _Chart(
+def pose_chart(document: Json) -> Chart:
+    """The front is over runs that recognise and locate all trials, as errors over some would flatter."""
+    chart = Chart(
         f"time per unknown of {document['touches']} touches, an estimate after each",
         "mean pose error (mm)",
     )
-    charts.log_ticks(chart.axes, "x", seconds_text)
-    front = document["fronts"]["seconds per unknown, mean error in mm"]
-    chart.add(front, "cost", "error", "Pareto front", color=charts.GREY, zorder=1)
-    fills = {0.25: {"alpha": 0.4}, 0.5: {}, 1.0: charts.HOLLOW}
-    for i, (kind, field, name, mark, counted) in enumerate(
+    charts.ticks(chart.axes.xaxis, seconds_text)
+    fills: dict[float, Json] = {0.25: {"alpha": 0.4}, 0.5: {}, 1.0: charts.HOLLOW}
+    best = []
+    for i, (kind, of, name, mark, counted) in enumerate(
         (
             # The refined pose stands right below its mode, and particles by their like.
             ("histogram", "error_mm", "histogram, mode", "o", False),
@@ -96,76 +100,90 @@ def _pose_chart(document: Json) -> tuple[Figure, Spots]:
             point | {"pose": name, "seconds": point["seconds_per_unknown"] + refine_s}
             for point in document["points"]
             if point["filter"] == kind
-            for refine_s in [point["seconds_refine"] if field == "refined_error_mm" else 0.0]
+            for refine_s in [point["seconds_refine"] if of == "refined_error_mm" else 0.0]
         ]
         for cell_mm, fill in fills.items():
             usual = cell_mm == 0.5
             chart.add(
                 [point for point in points if point["cell_mm"] == cell_mm],
                 "seconds",
-                f"{field}/mean",
+                f"{of}/mean",
                 name if usual else "",
                 [("pose", "pose", str), *RUNS],
-                counted=counted and usual,
+                counted and usual,
                 linestyle="",
                 marker=mark,
                 color=charts.COLOURS[i],
                 **fill,
             )
-    return chart.done()
+        best += [
+            (point["seconds"], point[of]["mean"])
+            for point in points
+            if point["accuracy"] == 1.0 and point[of] and point[of]["trials"] == document["trials"]
+        ]
+    if best:
+        chart.add_front(*numpy.transpose(best))
+    return chart.finish()
 
 
-def _precision_chart(document: Json) -> tuple[Figure, Spots]:
-    chart = _Chart("time per pose, element and touch (ns)", "largest deviation from float64 (nats)")
-    charts.log_ticks(chart.axes, "y", "{:.0e}".format, (1.0, 2.0, 5.0))
-    front = document["fronts"]["ns per pose, element and touch, largest deviation in nats"]
-    chart.add(front, "cost", "error", "Pareto front", color=charts.GREY, zorder=1)
-    families = (
-        ("register tiles", "register tiles", "s"),
-        ("runs", "runs of bins", "o"),
-        ("in logs", "in logs (gamma = 0)", "o"),
-        ("array at rest", "array at rest", "s"),
-        ("one-bin", "one-bin kernel", "^"),
-        ("CPU loop", "CPU loop", "D"),
-    )
-    for colour, (path, name, mark) in zip(charts.COLOURS, families, strict=False):
-        own = [of for of in document["precisions"] if of["path"].startswith(path)]
-        y, look = "deviation_nats/largest", {"linestyle": "", "marker": mark, "color": colour}
-        chart.add(own, "nanoseconds", y, name, PRECISIONS, counted=True, **look)
-    return chart.done()
+def precision_chart(document: Json) -> Chart:
+    """Times and deviations of the ways to evaluate the likelihood."""
+    chart = Chart("time per pose, element and touch (ns)", "largest deviation from float64 (nats)")
+    charts.ticks(chart.axes.yaxis, "{:.0e}".format, (1.0, 2.0, 5.0))
+    precisions, x, y = document["precisions"], "nanoseconds", "deviation_nats/largest"
+    chart.add_front(column(precisions, x), column(precisions, y))
+    for colour, (path, name, mark) in zip(
+        charts.COLOURS,
+        (
+            ("register tiles", "register tiles", "s"),
+            ("runs", "runs of bins", "o"),
+            ("in logs", "in logs (gamma = 0)", "o"),
+            ("array at rest", "array at rest", "s"),
+            ("one-bin", "one-bin kernel", "^"),
+            ("CPU loop", "CPU loop", "D"),
+        ),
+        strict=False,
+    ):
+        own = [of for of in precisions if of["path"].startswith(path)]
+        chart.add(own, x, y, name, PRECISIONS, True, linestyle="", marker=mark, color=colour)
+    return chart.finish()
 
 
-def _knee_chart(document: Json) -> tuple[Figure, Spots]:
-    chart = _Chart("bins per object", "mean pose error (mm)")
-    charts.log_ticks(chart.axes, "x", count_text)
+def knee_chart(document: Json) -> Chart:
+    """Errors over balanced bins, by colours for map cells."""
+    chart = Chart("bins per object", "mean pose error (mm)")
+    charts.ticks(chart.axes.xaxis, count_text)
     balanced = [point for point in document["points"] if point["balanced"]]
-    finest = max((point["count"] for point in balanced), default=0)
+    finest = max(point["count"] for point in balanced)
     for colour, knee in zip(charts.COLOURS, document["knees"], strict=False):
         cell_mm = knee["cell_mm"]
         own = [point for point in balanced if point["cell_mm"] == cell_mm]
-        mode, refined = f"{cell_mm:g} mm cells, mode", f"{cell_mm:g} mm, refined"
-        chart.add(own, "count", "error_mm/mean", mode, RUNS, color=colour, marker="o")
-        look = {"color": colour, "marker": "s"} | charts.HOLLOW
-        chart.add(own, "count", "refined_error_mm/mean", refined, RUNS, **look)
+        for path, label, look in (
+            ("error_mm/mean", f"{cell_mm:g} mm cells, mode", charts.SOLID),
+            ("refined_error_mm/mean", f"{cell_mm:g} mm, refined", charts.DASHED | {"linestyle": "-"}),
+        ):
+            chart.add(own, "count", path, label, RUNS, color=colour, **look)
         if knee["balanced_count"] <= 2.0 * finest:
             fine = f"fine, {cell_mm:g} mm"
             charts.rule(chart.axes, knee["balanced_count"], fine, vertical=True, colour=colour)
         if cell_mm == 0.5:
-            look = {"color": charts.GREY, "linestyle": "--"}
+            look = {"color": charts.GREY, "linestyle": "--", "marker": ""}
             chart.add(own, "count", "nearest_bin_mm", "nearest bin", **look)
     floors = [knee["floor_mm"] for knee in document["knees"] if knee["floor_mm"]]
     for least in sorted(floors, key=lambda floor: float(floor["mean"]))[:1]:
         words = f"least error {mean_text(least)} mm, {least['trials']} trials"
         charts.rule(chart.axes, least["mean"], words)
-    return chart.done()
+    return chart.finish()
 
 
-def _bounds_chart(document: Json) -> tuple[Figure, Spots]:
-    chart = _Chart("bins in all", f"time per unknown of {document['touches']} touches")
-    charts.log_ticks(chart.axes, "x", count_text)
-    charts.log_ticks(chart.axes, "y", seconds_text)
-    for colour, kind, name in zip(
-        charts.COLOURS, ("histogram", "bounded"), ("histogram", "by bounds"), strict=False
+def bounds_chart(document: Json) -> Chart:
+    """Times of histogram and bounds over bins."""
+    chart = Chart("bins in all", f"time per unknown of {document['touches']} touches")
+    charts.ticks(chart.axes.xaxis, count_text)
+    charts.ticks(chart.axes.yaxis, seconds_text)
+    for colour, kind, name in (
+        (charts.COLOURS[0], "histogram", "histogram"),
+        (charts.COLOURS[1], "bounded", "by bounds"),
     ):
         for asked, words, look in (
             ("once", "asked once", charts.SOLID),
@@ -173,25 +191,30 @@ def _bounds_chart(document: Json) -> tuple[Figure, Spots]:
         ):
             y, label = f"{kind}/{asked}", f"{name}, {words}"
             chart.add(document["bounds"], "bins_in_all", y, label, BOUNDS, color=colour, **look)
-    charts.rule(chart.axes, document["auto_rule"]["rule"], "--filter auto", vertical=True)
-    return chart.done()
+    charts.rule(chart.axes, AUTO_RULE, "--filter auto", vertical=True)
+    return chart.finish()
 
 
-def charts_of(document: Json) -> dict[str, tuple[Figure, Spots]]:
-    """All charts, each with what stands under the pointer."""
-    drawn = (_pose_chart, _precision_chart, _knee_chart, _bounds_chart)
-    return {name: draw(document) for name, draw in zip(CHARTS, drawn, strict=True)}
+def charts_of(document: Json) -> dict[str, Chart]:
+    """All charts, by the names of their files."""
+    return {
+        "sweep_front": pose_chart(document),
+        "sweep_precision": precision_chart(document),
+        "sweep_bins": knee_chart(document),
+        "sweep_bounds": bounds_chart(document),
+    }
 
 
-def _figure(figure: Figure, spots: Spots) -> str:
+def _picture(chart: Chart) -> str:
     """The chart as a picture in the page; invisible discs over its marks show their titles."""
+    figure, axes = chart.figure, chart.axes
     width, height = 1000.0, 1000.0 * figure.get_figheight() / figure.get_figwidth()
-    discs = "".join(
-        f'<circle cx="{width * x:.0f}" cy="{height * y:.0f}" r="8"><title>{html.escape(title)}'
-        "</title></circle>\n"
-        for x, y, title in spots
-    )
-    axes = figure.axes[0]
+    to_share = axes.transData + figure.transFigure.inverted()
+    discs = ""
+    for *place, told in chart.marks:
+        x, y = to_share.transform(place)
+        discs += f'<circle cx="{width * x:.0f}" cy="{height * (1.0 - y):.0f}" r="8"><title>'
+        discs += f"{html.escape(told)}</title></circle>\n"
     alt = html.escape(f"{axes.get_ylabel()} against {axes.get_xlabel()}")
     picture = urllib.parse.quote(charts.image(figure, "svg"), safe=" -.,;:/()")
     return (
@@ -200,21 +223,21 @@ def _figure(figure: Figure, spots: Spots) -> str:
     )
 
 
-def _table(columns: Sequence[Column], records: Iterable[Json]) -> str:
+def _table(columns: Sequence[Column], records: Sequence[Json]) -> str:
     """A table that sorts by its cells' data-value: a number, the mean of a record, or the text."""
-    rows = []
+    rows = ""
     for record in records:
         cells = ""
         for (_, path, _), text in zip(columns, texts(columns, record), strict=True):
             value = value_of(record, path)
-            key = (
-                value["mean"] if isinstance(value, dict) else "Infinity" if value is None else value
-            )
-            key = html.escape(text if isinstance(value, (bool, list)) else str(key))
-            cells += f'<td data-value="{key}">{html.escape(text)}</td>'
-        rows.append(f"<tr>{cells}</tr>\n")
+            if isinstance(value, dict):
+                value = value["mean"]
+            number = isinstance(value, (int, float)) and not isinstance(value, bool)
+            key = value if number else "Infinity" if value is None else text
+            cells += f'<td data-value="{html.escape(str(key))}">{html.escape(text)}</td>'
+        rows += f"<tr>{cells}</tr>\n"
     heads = "".join(f"<th>{html.escape(head)}</th>" for head, _, _ in columns)
-    return f"<table>\n<thead><tr>{heads}</tr></thead>\n<tbody>\n{''.join(rows)}</tbody></table>\n"
+    return f"<table>\n<thead><tr>{heads}</tr></thead>\n<tbody>\n{rows}</tbody></table>\n"
 
 
 _PAGE = string.Template("""<!DOCTYPE html>
@@ -251,7 +274,6 @@ $sweep_bins
 --bins fine takes.</p>
 <h2>By bounds</h2>
 $sweep_bounds
-<p>$auto_rule</p>
 $bounds<h2>Where more bins stop helping</h2>
 <p>Bins suffice where every trial is located and no finer lattice lowers the mean error by more than
 $least_gain % and by more than two standard errors of the paired differences.</p>
@@ -281,21 +303,20 @@ document.querySelectorAll("th").forEach(function (head) {
 """)
 
 
-def page_of(document: Json, figures: dict[str, tuple[Figure, Spots]]) -> str:
+def page_of(document: Json, drawn: dict[str, Chart]) -> str:
     """The document as one self-contained page."""
     facts = ("device", "host threads", "python", "data", "date", "command line", "seconds in all")
-    verdicts = document["verdicts"]
+    verdicts, knees = document["verdicts"], document["knees"]
     return _PAGE.substitute(
-        {name: _figure(*figure) for name, figure in figures.items()},
+        {name: _picture(chart) for name, chart in drawn.items()},
         facts="<br/>\n".join(html.escape(f"{fact}: {document[fact]}") for fact in facts),
         goals="<h2>Goals</h2>\n" + _table(VERDICTS, verdicts) if verdicts else "",
         trials=document["trials"],
         precisions=_table(PRECISIONS, document["precisions"]),
-        auto_rule=html.escape(document["auto_rule"]["sentence"]),
         bounds=_table(BOUNDS, document["bounds"]),
         least_gain=f"{100.0 * LEAST_GAIN:.0f}",
-        knees="".join(f"<li>{html.escape(knee['sentence'])}</li>\n" for knee in document["knees"]),
-        steps=_table(STEPS, steps_of(document)),
+        knees="".join(f"<li>{html.escape(knee['sentence'])}</li>\n" for knee in knees),
+        steps=_table(STEPS, [step for knee in knees for step in knee["steps"]]),
         limits=_table(LIMITS, document["limits"]),
         reach=f"{REACH_MM:g}",
         windows=html.escape(document["windows"]),

@@ -1,22 +1,37 @@
-"""What the sweep measures of one lattice or one number of particles."""
+"""What the sweep measures of one lattice or one number of particles, and of what bounds the errors."""
 
 import math
 import time
-from collections.abc import Sequence
-from statistics import fmean, median_low
-from typing import Any, TypeVar
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple, TypeVar
 
 import numpy
 
 import palpate
 from palpate import reference
-from palpate._statistics import errors_over
+from palpate._statistics import Errors, errors_over, quantile
+from palpate._tables import column, count_text
 
 from .certificates import check_certificate, dense_posterior
-from .measures import calibration
-from .report import Json
-from .trials import TABLE_1, VOWELS, Bins, error_of, lattice_of, truth_of
-from .windows import estimate_in_window, map_of, nearest_bin_mm, placed
+from .measures import calibration, differences
+from .program import Json
+from .trials import (
+    EXACT,
+    TABLE_1,
+    VOWELS,
+    Bins,
+    Body,
+    Touching,
+    error_of,
+    lattice_of,
+    letter_maps,
+    make_trials,
+    map_of,
+    training_recordings,
+    truth_of,
+)
+from .windows import nearest_bin_mm, poses_in_window
 
 Maps = Sequence[palpate.OccupancyGrid]
 Trials = Sequence[palpate.Recording]
@@ -34,55 +49,68 @@ def first_each(of_trials: Sequence[T], each: int) -> list[T]:
     return [of_trial for i, of_trial in enumerate(of_trials) if i % of_letter < each]
 
 
+def seconds_of(call: Callable[[], T]) -> tuple[float, T]:
+    """How long a call takes, and what it gives."""
+    start = time.perf_counter()
+    value = call()
+    return time.perf_counter() - start, value
+
+
+def asked_after(belief: Any, touches: palpate.Recording | palpate.Touch) -> tuple[float, Any]:
+    """Seconds of taking in touches and of an estimate, and the estimate."""
+
+    def ask() -> Any:
+        belief.update(touches)
+        return belief.estimate()
+
+    return seconds_of(ask)
+
+
 def follow(belief: Any, maps: Maps, trial: palpate.Recording) -> Json:
     """Asks a belief after each touch of a trial: times in s, what it says, its poses in the end."""
-    asked: Json = {"touch_s": [], "refine_s": [], "confidence": [], "right": [], "refined": None}
-    truth = truth_of(trial)
-    for touch in trial:
-        start = time.perf_counter()
-        belief.update(touch)
-        estimate = belief.estimate()
-        asked["touch_s"].append(time.perf_counter() - start)
-        best = int(numpy.argmax(estimate.identity))
-        asked["confidence"].append(float(estimate.identity[best]))
-        asked["right"].append(maps[best].label == truth.object)
-    grid, asked["mode"] = maps[estimate.mode.object], estimate.mode
+    truth, refined, refine_s = truth_of(trial), None, None
+    touch_s, estimates = zip(*[asked_after(belief, touch) for touch in trial], strict=True)
+    best = [int(numpy.argmax(estimate.identity)) for estimate in estimates]
+    mode = estimates[-1].mode
     if isinstance(belief, palpate.PoseHistogram):
-        start = time.perf_counter()
-        asked["refined"] = belief.refine(estimate.mode)
-        asked["refine_s"].append(time.perf_counter() - start)
-    asked["error_mm"] = error_of(grid, truth, asked["mode"])
-    asked["refined_error_mm"] = error_of(grid, truth, asked["refined"])
-    return asked
-
-
-def costs_record(kind: str, cell_mm: float, count: int, device_bytes: int, of: list[Json]) -> Json:
-    """What a run over some trials cost, as medians, and how well it knows the objects."""
-    touch_s, refine_s, confidence, right = (
-        [value for asked in of for value in asked[name]]
-        for name in ("touch_s", "refine_s", "confidence", "right")
-    )
+        refine_s, refined = seconds_of(lambda: belief.refine(mode))
+    grid = maps[mode.object]
     return {
-        "filter": kind,
-        "cell_mm": cell_mm,
-        "count": count,
-        "bins": None,
-        "balanced": False,
-        "full_trials": len(of),
-        "seconds_per_touch": median_low(touch_s),
-        "seconds_per_unknown": median_low([sum(asked["touch_s"]) for asked in of]),
-        "seconds_refine": median_low(refine_s) if refine_s else None,
-        "device_bytes": device_bytes,
-        "accuracy": fmean(asked["right"][-1] for asked in of),
-        "least_confidence": min(asked["confidence"][-1] for asked in of),
-        "expected_calibration_error": calibration(confidence, right)["expected_error"],
-        "windows": None,
+        "touch_s": touch_s,
+        "refine_s": refine_s,
+        "confidence": [max(estimate.identity) for estimate in estimates],
+        "right": [maps[i].label == truth.object for i in best],
+        "mode": mode,
+        "refined": refined,
+        "error_mm": error_of(grid, truth, mode),
+        "refined_error_mm": error_of(grid, truth, refined),
     }
 
 
-def errors_of(steps: Sequence[Json]) -> Json:
-    """Pose errors in the record of a run: those of each trial, and what they are over all."""
-    record: Json = {"trials": len(steps)}
+def record_of(
+    kind: str, maps: Maps, count: int, device_bytes: int, ends: Sequence[Json], steps: Sequence[Json]
+) -> Json:
+    """What a run cost, as medians, and how well it knows the objects, by follow(); its pose errors."""
+    touch_s, confidence, right = (column(ends, of) for of in ("touch_s", "confidence", "right"))
+    refine_s = column(ends, "refine_s")
+    record: Json = {
+        "filter": kind,
+        "cell_mm": maps[0].cell_mm,
+        "count": count,
+        "bins": None,
+        "balanced": False,
+        "trials": len(steps),
+        "full_trials": len(ends),
+        "seconds_per_touch": quantile(touch_s, 0.5),
+        "seconds_per_unknown": quantile(touch_s.sum(axis=1), 0.5),
+        "seconds_refine": None if numpy.isnan(refine_s).any() else quantile(refine_s, 0.5),
+        "device_bytes": device_bytes,
+        "accuracy": float(right[:, -1].mean()),
+        "least_confidence": float(confidence[:, -1].min()),
+        "expected_calibration_error": calibration(confidence.ravel(), right.ravel())["expected_error"],
+        "windows": None,
+        "nearest_bin_mm": None,
+    }
     for name in ("error", "refined_error"):
         errors = [step[f"{name}_mm"] for step in steps]
         record |= {f"{name}_mm": errors_over(errors, 20), f"{name}s_mm": errors}
@@ -103,35 +131,46 @@ def measure_histogram(
 
     Where these are not all, the errors are those of all trials in windows.
     """
-    lattice = lattice_of(*bins)
+    lattice = lattice_of(bins)
     belief = palpate.PoseHistogram(device, maps, lattice)
-    full = first_each(trials, full_each)
-    ends = []
+    full, ends = first_each(trials, full_each), []
     for trial in full:
         belief.reset()
         ends.append(follow(belief, maps, trial))
-    record = costs_record("histogram", maps[0].cell_mm, lattice.bins, belief.device_bytes, ends)
-    record |= {"bins": list(bins), "balanced": bins not in TABLE_1}
-    steps = ends
+    steps, windows = ends, None
     if len(full) < len(trials):
-        found = [estimate_in_window(device, maps, trial, lattice) for trial in trials]
-        steps = [step._asdict() for step in found]
-        record["windows"] = windows_record(maps, full, ends, first_each(steps, full_each))
-    record |= errors_of(steps)
-    nearest_mm = [nearest_bin_mm(lattice, placed(maps, trial)) for trial in trials]
-    record["nearest_bin_mm"] = fmean(nearest_mm)
+        steps = [poses_in_window(device, maps, trial, lattice)._asdict() for trial in trials]
+        windows = windows_record(maps, full, ends, first_each(steps, full_each))
+    nearest_mm = [
+        nearest_bin_mm(lattice, Body.of(map_of(maps, trial)), truth_of(trial).T_object_robot)
+        for trial in trials
+    ]
+    touch = trials[0][0]
     belief.reset()
-    belief.update(trials[0][0])
-    record["deviation_nats"] = deviation_record(bin_deviations(belief, maps, trials[0][0]))
-    return record
+    belief.update(touch)
+    contact, random = palpate.ContactModel(prior=maps[0].prior), numpy.random.default_rng(7)
+    deviations = []
+    for i, grid in enumerate(maps):
+        logs = belief.log_likelihood(i).reshape(-1)
+        for bin_ in random.integers(len(logs), size=SAMPLED).tolist():
+            pose = lattice.T_object_robot(bin_)
+            expected = reference.log_likelihood(touch, pose, grid, contact)
+            deviations.append(float(logs[bin_]) - expected)
+    return record_of("histogram", maps, lattice.bins, belief.device_bytes, ends, steps) | {
+        "bins": list(bins),
+        "balanced": bins not in TABLE_1,
+        "windows": windows,
+        "nearest_bin_mm": float(numpy.mean(nearest_mm)),
+        "deviation_nats": deviation_record(deviations),
+    }
 
 
 def windows_record(maps: Maps, full: Trials, ends: Sequence[Json], steps: Sequence[Json]) -> Json:
     """How far apart the two poses of a trial lie at the most, by the full posterior and in a window."""
     apart: dict[str, list[float]] = {"mode": [], "refined": []}
     for trial, end, step in zip(full, ends, steps, strict=True):
-        grid = map_of(maps, trial)
         if end["error_mm"] is not None:
+            grid = map_of(maps, trial)
             whole = palpate.OccupancyGrid(
                 grid.label, grid.log_odds, cell_mm=grid.cell_mm, origin_mm=grid.origin_mm
             )  # without symmetry
@@ -145,49 +184,28 @@ def windows_record(maps: Maps, full: Trials, ends: Sequence[Json], steps: Sequen
     }
 
 
-def bin_deviations(belief: palpate.PoseHistogram, maps: Maps, touch: palpate.Touch) -> list[float]:
-    """The log-likelihood of some bins of every object beside the float64 reference, in nats."""
-    contact = palpate.ContactModel(prior=maps[0].prior)
-    random = numpy.random.default_rng(7)
-    deviations = []
-    for i, grid in enumerate(maps):
-        logs = belief.log_likelihood(i).reshape(-1)
-        for bin_ in random.integers(len(logs), size=SAMPLED).tolist():
-            pose = belief.lattice.T_object_robot(bin_)
-            expected = reference.log_likelihood(touch, pose, grid, contact)
-            deviations.append(float(logs[bin_]) - expected)
-    return deviations
-
-
 def measure_particles(
     device: palpate.Device, maps: Maps, trials: Trials, kind: str, particles: int
 ) -> Json:
     """What a particle filter costs and what it is worth over all trials; trial i has the seed 1 + i.
 
-    kind: "particles", "systematic" or "augmented". The deviation is that of the weights after one
-    touch, which nothing has resampled yet. Weights are relative, so both sides are taken relative to
+    kind: "particles", "systematic" or "augmented". Log-likelihoods after one touch are taken relative to
     the heaviest particle.
     """
-    resampling = "systematic" if kind == "systematic" else "multinomial"
+
+    resampling = palpate.Resampling["systematic" if kind == "systematic" else "multinomial"]
 
     def filter_of(seed: int) -> palpate.ParticleFilter:
         return palpate.ParticleFilter(
-            device,
-            maps,
-            lattice_of(1, 1, 1),
-            seed=seed,
-            particles=particles,
-            resampling=palpate.Resampling[resampling],
-            augmented=kind == "augmented",
-        )
+            device, maps, lattice_of((1, 1, 1)), seed=seed, particles=particles,
+            resampling=resampling, augmented=kind == "augmented",
+        )  # fmt: skip
 
     ends, most_bytes = [], 0
     for seed, trial in enumerate(trials, start=1):
         belief = filter_of(seed)
         ends.append(follow(belief, maps, trial))
         most_bytes = max(most_bytes, belief.device_bytes)
-    record = costs_record(kind, maps[0].cell_mm, particles, most_bytes, ends)
-    record |= errors_of(ends) | {"nearest_bin_mm": None}
     touch, belief = trials[0][0], filter_of(len(trials) + 1)
     belief.update(touch)
     objects, poses, weights = belief.particles()
@@ -199,10 +217,11 @@ def measure_particles(
     heaviest = int(numpy.argmax(weights))
     expected = log_likelihood(heaviest)
     drawn = numpy.random.default_rng(7).integers(len(weights), size=SAMPLED * len(maps)).tolist()
-    record["deviation_nats"] = deviation_record(
-        [math.log(weights[i] / weights[heaviest]) - (log_likelihood(i) - expected) for i in drawn]
-    )
-    return record
+    deviations = [
+        math.log(weights[i] / weights[heaviest]) - (log_likelihood(i) - expected) for i in drawn
+    ]
+    record = record_of(kind, maps, particles, most_bytes, ends, ends)
+    return record | {"deviation_nats": deviation_record(deviations)}
 
 
 def measure_bounds(device: palpate.Device, maps: Maps, trials: Trials, bins: Bins) -> Json:
@@ -212,34 +231,28 @@ def measure_bounds(device: palpate.Device, maps: Maps, trials: Trials, bins: Bin
     histogram's bins in float64, and says what --filter auto takes and whether it is the faster of the
     two where they are asked once.
     """
-    lattice = lattice_of(*bins)
+    lattice = lattice_of(bins)
     bounded = palpate.BoundedPosterior(device, maps, lattice)
     histogram = palpate.PoseHistogram(device, maps, lattice)
-
-    def ask(belief: Any, parts: Sequence[palpate.Recording]) -> float:
-        belief.reset()
-        start = time.perf_counter()
-        for part in parts:
-            belief.update(part)
-            belief.estimate()
-        return time.perf_counter() - start
-
-    beliefs = {"bounded": bounded, "histogram": histogram}
-    seconds: dict[str, Json] = {name: {"once": [], "each_touch": []} for name in beliefs}
+    beliefs: dict[str, Any] = {"bounded": bounded, "histogram": histogram}
+    seconds: dict[str, dict[str, list[float]]] = {
+        name: {"once": [], "each_touch": []} for name in beliefs
+    }
     checks, evaluated = [], []
     for belief in beliefs.values():
-        ask(belief, [trials[0]])  # warms up
+        asked_after(belief, trials[0])  # warms up
     for trial in trials:
-        one_by_one = [trial[i : i + 1] for i in range(len(trial))]
         for name, belief in beliefs.items():
-            seconds[name]["each_touch"].append(ask(belief, one_by_one))
-            seconds[name]["once"].append(ask(belief, [trial]))
+            belief.reset()
+            seconds[name]["each_touch"].append(sum(asked_after(belief, touch)[0] for touch in trial))
+            belief.reset()
+            seconds[name]["once"].append(asked_after(belief, trial)[0])
         checks.append(check_certificate(bounded, dense_posterior(histogram, maps, trial)))
         certificate = bounded.estimate().certificate
         assert certificate is not None
         evaluated.append(certificate.bins_evaluated)
     times = {
-        name: {asked: median_low(of) for asked, of in both.items()}
+        name: {asked: quantile(of, 0.5) for asked, of in both.items()}
         for name, both in seconds.items()
     }
     in_all = lattice.bins * len(maps)
@@ -251,13 +264,89 @@ def measure_bounds(device: palpate.Device, maps: Maps, trials: Trials, bins: Bin
         "bins_in_all": in_all,
         "trials": len(trials),
         **times,
-        "bins_evaluated": median_low(evaluated),
-        "share_evaluated": median_low(evaluated) / in_all,
-        "certificate": max(check.promised for check in checks),
-        "measured_error": max(check.measured for check in checks),
-        "certificates_hold": sum(check.holds for check in checks),
-        "same_modes": sum(check.same_mode for check in checks),
+        "bins_evaluated": int(quantile(evaluated, 0.5)),
+        "share_evaluated": quantile(evaluated, 0.5) / in_all,
+        "certificate": max(check["promised"] for check in checks),
+        "measured_error": max(check["measured"] for check in checks),
+        "certificates_hold": sum(check["holds"] for check in checks),
+        "same_modes": sum(check["same_mode"] for check in checks),
         "host_bytes": bounded.host_bytes,
         "auto": "bounded" if in_all > AUTO_RULE else "histogram",
         "auto_is_faster": (in_all > AUTO_RULE) == faster,
     }
+
+
+# Where the errors come from that more bins do not mend.
+
+
+class Variant(NamedTuple):
+    """What is changed. The sensor holds for training and trials alike."""
+
+    name: str
+    touching: Touching = EXACT
+    cell_mm: float = 0.5
+    spread_mm: float = 0.5
+    more_training: bool = False
+    all_lattices: bool = False
+
+
+def sensor(**changed: float) -> Touching:
+    """Touches by a sensor of which this is changed."""
+    return Touching(sensor=palpate.SensorModel(**changed))
+
+
+SHARP, SPARSE = sensor(psf_mm=0.25), Touching(palpate.grid_array(3, 3, 3.8))
+#: One thing at a time; the first changes nothing.
+VARIANTS = (
+    Variant("as it is", all_lattices=True),
+    Variant("a sensor without noise", sensor(noise_kpa=0.0)),
+    Variant("equal gains and press forces", sensor(force_spread=0.0, gain_spread=0.0)),
+    Variant("a point spread of 0.25 mm", SHARP),
+    Variant("a point spread of 0.25 mm, and maps of that spread and cells", SHARP, 0.25, 0.125),
+    Variant("maps of 0.25 mm cells", cell_mm=0.25),
+    Variant("8 times the training touches", more_training=True),
+    Variant("touches at random poses", Touching(at_random_poses=True)),
+    Variant("touches displaced by 1 mm and 0.05 rad", Touching(noise=(1.0, 0.05))),
+    Variant("an array of 16 x 16", Touching(palpate.grid_array(16, 16, 1.9)), all_lattices=True),
+    Variant("a sparse array of 3 x 3, twice the pitch", SPARSE, all_lattices=True),
+)
+
+
+def measure_limits(
+    device: palpate.Device, quick: bool, lattices: Sequence[Bins], each: int, touches: int, seed: int
+) -> list[Json]:
+    """Where the errors come from that more bins do not mend, in windows.
+
+    Every variant is compared with the first on the first of the lattices; arrays also run on the
+    others, each compared with the same array on the first.
+    """
+    limits: list[Json] = []
+    unchanged: tuple[str, Errors, Errors] | None = None
+    for variant in VARIANTS[: 2 if quick else None]:
+        poses = palpate.training_grid()
+        if variant.more_training:
+            poses = numpy.concatenate([poses, palpate.random_poses(7 * len(poses), 12)])
+        training = training_recordings(replace(variant.touching, noise=(0.0, 0.0)), poses)
+        maps = letter_maps(device, training, cell_mm=variant.cell_mm, spread_mm=variant.spread_mm)
+        trials = make_trials(VOWELS, each, touches, seed, variant.touching)
+        against = unchanged
+        for bins in lattices if variant.all_lattices else lattices[:1]:
+            lattice = lattice_of(bins)
+            steps = [poses_in_window(device, maps, trial, lattice) for trial in trials]
+            modes, refined = [s.error_mm for s in steps], [s.refined_error_mm for s in steps]
+            limits.append(
+                {
+                    "name": variant.name,
+                    "count": math.prod(bins),
+                    "elements": len(numpy.asarray(variant.touching.elements_mm)),
+                    "error_mm": errors_over(modes, 20),
+                    "refined_error_mm": errors_over(refined, 20),
+                    "against": against and against[0],
+                    "difference_mm": against and differences(modes, against[1]),
+                    "refined_difference_mm": against and differences(refined, against[2]),
+                }
+            )
+            unchanged = unchanged or (variant.name, modes, refined)
+            if bins == lattices[0]:
+                against = (f"{count_text(math.prod(bins))} bins", modes, refined)
+    return limits

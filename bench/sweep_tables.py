@@ -7,11 +7,8 @@ from palpate._tables import (
     mean_text,
     number,
     plain,
-    print_table,
     seconds_text,
 )
-
-from .report import Json
 
 _MIB = number(".1f", 1.0 / (1 << 20))
 _MM = number(".3f")
@@ -102,22 +99,3 @@ VERDICTS: list[Column] = [
     ("at most", "at_most", plain),
     ("reached", "reached", plain),
 ]
-
-
-def steps_of(document: Json) -> list[Json]:
-    """What every doubling of the bins changed, of all knees."""
-    return [step for knee in document["knees"] for step in knee["steps"]]
-
-
-def print_document(document: Json) -> None:
-    """What follows the runs."""
-    print_table(PRECISIONS, document["precisions"])
-    print_table(BOUNDS, document["bounds"])
-    print(f"\n{document['auto_rule']['sentence']}")
-    print_table(LIMITS, document["limits"])
-    print()
-    for knee in document["knees"]:
-        print(f"- {knee['sentence']}")
-    print_table(STEPS, steps_of(document))
-    print(f"\n{document['windows']}")
-    print_table(VERDICTS, document["verdicts"])

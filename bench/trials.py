@@ -8,10 +8,9 @@ import numpy
 from numpy.typing import ArrayLike, NDArray
 
 import palpate
-from palpate._sweep_runs import counts_of
-from palpate._tables import plain
+from palpate._palpate import Random, Stream
 
-from .random_numbers import Random, Stream
+from .program import Json
 
 #: The objects of Sec. IV.
 VOWELS = ("A", "E", "I", "O", "U")
@@ -112,10 +111,10 @@ def _trial(
     test_set: palpate.Recording, touches: int, seed: int, noise: tuple[float, float]
 ) -> palpate.Recording:
     """Touches of an object whose frame was the robot's, as a robot meets them at T_object_robot."""
-    order = Random(seed, Stream.TOUCH_ORDER).order(len(test_set))[:touches]
+    order = _order(len(test_set), Random(seed, Stream.touch_order))[:touches]
     T_object_robot = palpate.random_object_pose(seed)
     T_robot_object = palpate.inverse(T_object_robot)
-    off = Random(seed, Stream.POSE_NOISE).normals(3 * touches).reshape(touches, 3)
+    off = Random(seed, Stream.pose_noise).normals(3 * touches).reshape(touches, 3)
     off *= (noise[0], noise[0], noise[1])
     poses = [
         palpate.compose(palpate.compose(T_robot_object, test_set.T_robot_sensor[i]), off[k])
@@ -129,27 +128,49 @@ def _trial(
     )
 
 
+def _order(n: int, random: Random) -> list[int]:
+    """0 to n - 1 in a random order (Fisher and Yates)."""
+    order = list(range(n))
+    for i, u in enumerate(random.uniforms(n - 1).tolist()):
+        j = i + int((n - i) * u)
+        order[i], order[j] = order[j], order[i]
+    return order
+
+
 def truth_of(trial: palpate.Recording) -> palpate.Truth:
     """The truth, which a trial has."""
     assert trial.truth is not None
     return trial.truth
 
 
-def lattice_of(
-    nx: int, ny: int, ntheta: int, extent_mm: float = 10.0, pivot_mm: ArrayLike = (0.0, 0.0)
-) -> palpate.PoseLattice:
-    """Bins over x and y within the extent and the full circle (Sec. IV: 10 mm)."""
-    return palpate.PoseLattice(
-        (-extent_mm, extent_mm, nx),
-        (-extent_mm, extent_mm, ny),
-        (0.0, 2.0 * numpy.pi, ntheta),
-        pivot_mm,
+def lattice_of(bins: Bins) -> palpate.PoseLattice:
+    """Bins over x and y in [-10, 10] mm and the full circle (Sec. IV)."""
+    x, y, theta = bins
+    return palpate.PoseLattice((-10.0, 10.0, x), (-10.0, 10.0, y), (0.0, 2.0 * numpy.pi, theta))
+
+
+def recognized(
+    device: palpate.Device,
+    maps: Sequence[palpate.OccupancyGrid],
+    trials: Sequence[palpate.Recording],
+    *,
+    extent_mm: float = 10.0,
+    **options: Any,
+) -> list[list[Json]]:
+    """What is believed of every unknown after each of its touches, [trial][touch].
+
+    Records as of `palpate recognize --trace`, and `confidence`, the probability of the best answer.
+    The region is the extent about 0 along x and y, and the full circle; options: those of
+    palpate.recognize().
+    """
+    reach = (-extent_mm, extent_mm)
+    records = palpate.recognize(
+        trials, maps, x_mm=reach, y_mm=reach, pivot_mm=(0.0, 0.0), trace=True, device=device, **options
     )
-
-
-def size_of(lattice: palpate.PoseLattice) -> str:
-    """Its numbers of bins, such as "25x25x16"."""
-    return plain(counts_of(lattice))
+    steps = [record["trace"] for record in records]
+    for step in (step for of_trial in steps for step in of_trial):
+        step["confidence"] = step["identity"][step["best"]]
+    return steps
 
 
 class Body(NamedTuple):
@@ -157,27 +178,31 @@ class Body(NamedTuple):
 
     centroid_mm: Floats  #: [2] in the object frame
     inertia_mm2: float  #: mean squared distance from the centroid
+    symmetry: int  #: as OccupancyGrid has it
 
     @staticmethod
     def of(grid: palpate.OccupancyGrid) -> "Body":
         j, i = numpy.nonzero(grid.log_odds > 0)
         cells_mm = grid.origin_mm + grid.cell_mm * numpy.stack([i, j], axis=1)
         centroid_mm = cells_mm.mean(axis=0)
-        return Body(centroid_mm, float(((cells_mm - centroid_mm) ** 2).sum(axis=1).mean()))
+        inertia_mm2 = float(((cells_mm - centroid_mm) ** 2).sum(axis=1).mean())
+        return Body(centroid_mm, inertia_mm2, grid.symmetry)
 
 
-class Step(NamedTuple):
-    """What a belief says of an unknown whose truth is known."""
+class Poses(NamedTuple):
+    """What a histogram says of the pose of an unknown whose truth is known."""
 
-    #: Probability of every map.
-    identity: Floats
-    #: Probability of "none of these"; 0 where it was not asked for.
-    none: float
-    right: bool  #: whether the most probable answer is the true object
     mode: palpate.Mode
     refined: palpate.RefinedPose
     error_mm: float | None  #: None where the mode has the wrong object
     refined_error_mm: float | None
+
+
+def map_of(
+    maps: Sequence[palpate.OccupancyGrid], trial: palpate.Recording
+) -> palpate.OccupancyGrid:
+    """The map of the letter that a trial is of."""
+    return next(grid for grid in maps if grid.label == truth_of(trial).object)
 
 
 def error_of(grid: palpate.OccupancyGrid, truth: palpate.Truth, pose: Any) -> float | None:
@@ -187,30 +212,10 @@ def error_of(grid: palpate.OccupancyGrid, truth: palpate.Truth, pose: Any) -> fl
     return palpate.pose_error_mm(grid, pose.T_object_robot, truth.T_object_robot)
 
 
-def judged(
+def poses_of(
     belief: palpate.PoseHistogram, maps: Sequence[palpate.OccupancyGrid], truth: palpate.Truth
-) -> Step:
-    """Estimate and refined pose of a belief beside the truth."""
-    estimate = belief.estimate()
-    mode, refined = estimate.mode, belief.refine(estimate.mode)
-    none = estimate.none or 0.0
-    best = int(numpy.argmax(estimate.identity))
-    right = bool(maps[best].label == truth.object and estimate.identity[best] >= none)
-    errors = [error_of(maps[mode.object], truth, pose) for pose in (mode, refined)]
-    return Step(numpy.array(estimate.identity), none, right, mode, refined, *errors)
-
-
-def steps_after(
-    belief: palpate.PoseHistogram,
-    maps: Sequence[palpate.OccupancyGrid],
-    trial: palpate.Recording,
-    touches: Iterable[int],
-) -> list[Step]:
-    """The belief in one unknown after each of these rising numbers of touches, from uniform on."""
-    belief.reset()
-    steps, done = [], 0
-    for until in touches:
-        belief.update(trial[done:until])
-        done = until
-        steps.append(judged(belief, maps, truth_of(trial)))
-    return steps
+) -> Poses:
+    """Mode and refined pose of a belief beside the truth."""
+    mode = belief.estimate().mode
+    refined, grid = belief.refine(mode), maps[mode.object]
+    return Poses(mode, refined, error_of(grid, truth, mode), error_of(grid, truth, refined))

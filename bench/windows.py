@@ -3,14 +3,13 @@
 import math
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy
 
 import palpate
 
 from .measures import wrapped
-from .trials import Body, Floats, Step, judged, truth_of
+from .trials import Body, Floats, Poses, map_of, poses_of, truth_of
 
 #: How far from the truth a mode is looked for.
 REACH_MM = 3.0
@@ -21,34 +20,17 @@ _REFINED_REACH_MM = 4.0
 _SECTORS = 8
 
 
-class Placed(NamedTuple):
-    """An object and where it is."""
-
-    body: Body
-    symmetry: int  #: as OccupancyGrid has it
-    T_object_robot: Floats
-
-
-def map_of(
-    maps: Sequence[palpate.OccupancyGrid], trial: palpate.Recording
-) -> palpate.OccupancyGrid:
-    """The map of the letter that a trial is of."""
-    return next(grid for grid in maps if grid.label == truth_of(trial).object)
-
-
-def placed(maps: Sequence[palpate.OccupancyGrid], trial: palpate.Recording) -> Placed:
-    """The body of the letter that a trial is of, where the trial has it."""
-    grid = map_of(maps, trial)
-    return Placed(Body.of(grid), grid.symmetry, truth_of(trial).T_object_robot)
-
-
-def _places(lattice: palpate.PoseLattice, at: Placed, thetas: Floats) -> Floats:
+def _places(lattice: palpate.PoseLattice, body: Body, pose: Floats, thetas: Floats) -> Floats:
     """x and y of the lattice at which poses of these thetas leave the body's centroid where it is."""
-    centroid_mm = at.body.centroid_mm
-    p = palpate.transform(palpate.inverse(at.T_object_robot), [centroid_mm])[0] - lattice.pivot_mm
+    centroid_mm = body.centroid_mm
+    p = palpate.transform(palpate.inverse(pose), [centroid_mm])[0] - lattice.pivot_mm
     c, s = numpy.cos(thetas), numpy.sin(thetas)
     turned: Floats = numpy.stack([c * p[0] - s * p[1], s * p[0] + c * p[1]], axis=1)
     return centroid_mm - turned
+
+
+def _thetas(axis: palpate.Axis, first: int, end: int) -> Floats:
+    return numpy.array([axis.centre(k) for k in range(first, end)])
 
 
 def _index(axis: palpate.Axis, value: float) -> int:
@@ -65,85 +47,83 @@ def _part(axis: palpate.Axis, first: int, end: int) -> palpate.Axis:
     return palpate.Axis(lower, lower + (end - first) * axis.step, end - first)
 
 
-def _window(
-    lattice: palpate.PoseLattice, at: Placed, first: int, end: int, reach_mm: float
-) -> palpate.PoseLattice:
-    theta = lattice.theta_rad
-    places = _places(lattice, at, numpy.array([theta.centre(k) for k in range(first, end)]))
-    axes = []
-    for axis, values in ((lattice.x_mm, places[:, 0]), (lattice.y_mm, places[:, 1])):
-        low, high = float(values.min()) - reach_mm, float(values.max()) + reach_mm
-        axes.append(_part(axis, _nearest(axis, low), _nearest(axis, high) + 1))
-    x, y = axes
-    return palpate.PoseLattice(x, y, _part(theta, first, end), lattice.pivot_mm)
-
-
 def windows_about(
-    lattice: palpate.PoseLattice, at: Placed, reach_mm: float
+    lattice: palpate.PoseLattice, body: Body, pose: Floats, reach_mm: float
 ) -> list[palpate.PoseLattice]:
-    """Parts of a lattice, of the same bins, with every bin within `reach_mm` of the body.
+    """Parts of a lattice, of the same bins, with every bin within `reach_mm` of a body at a pose.
 
     By the pose error; there is one part for each of the body's places of equal error or, for a body of
     full symmetry, for each sector of the circle. The lattice's theta is to cover the circle; a part's
     may go on beyond its ends. Parts are boxes and may hold other bins besides.
     """
     theta = lattice.theta_rad
-    if at.symmetry == 0:
+
+    def window(first: int, end: int) -> palpate.PoseLattice:
+        places = _places(lattice, body, pose, _thetas(theta, first, end))
+        x, y = (
+            _part(axis, _nearest(axis, low - reach_mm), _nearest(axis, high + reach_mm) + 1)
+            for axis, low, high in zip(
+                (lattice.x_mm, lattice.y_mm), places.min(axis=0), places.max(axis=0), strict=True
+            )
+        )
+        return palpate.PoseLattice(x, y, _part(theta, first, end), lattice.pivot_mm)
+
+    if body.symmetry == 0:
         parts = min(_SECTORS, theta.count)
         ends = [theta.count * part // parts for part in range(parts + 1)]
-        return [_window(lattice, at, first, end, reach_mm) for first, end in pairwise(ends)]
+        return [window(first, end) for first, end in pairwise(ends)]
     # The error of a turn about the centroid is 2 sqrt(J) sin(turn / 2).
-    turn = 2.0 * math.asin(min(1.0, reach_mm / (2.0 * math.sqrt(at.body.inertia_mm2))))
+    turn = 2.0 * math.asin(min(1.0, reach_mm / (2.0 * math.sqrt(body.inertia_mm2))))
     windows = []
-    for i in range(at.symmetry):
-        middle = at.T_object_robot[2] + i * 2.0 * math.pi / at.symmetry
+    for i in range(body.symmetry):
+        middle = pose[2] + i * 2.0 * math.pi / body.symmetry
         first = _index(theta, middle - turn)
-        end = min(_index(theta, middle + turn) + 1, first + theta.count)
-        windows.append(_window(lattice, at, first, end, reach_mm))
+        windows.append(window(first, min(_index(theta, middle + turn) + 1, first + theta.count)))
     return windows
 
 
-def nearest_bin_mm(lattice: palpate.PoseLattice, at: Placed) -> float:
-    """Least error that a bin of the lattice has: what the lattice alone costs.
+def nearest_bin_mm(lattice: palpate.PoseLattice, body: Body, pose: Floats) -> float:
+    """Least error that a bin of the lattice has for a body at a pose: what the lattice alone costs.
 
     At a given theta the error grows with the distance from the place, whatever its direction, so that
     the nearest bin is that of x and y by themselves.
     """
-    theta = lattice.theta_rad
-    thetas = numpy.array([theta.centre(k) for k in range(theta.count)])
-    places = _places(lattice, at, thetas)
-    off = [
-        numpy.array([axis.centre(_nearest(axis, value)) - value for value in places[:, i].tolist()])
-        for i, axis in enumerate((lattice.x_mm, lattice.y_mm))
-    ]
-    turns: Floats = numpy.zeros(theta.count)
-    if at.symmetry > 0:
-        period = 2.0 * math.pi / at.symmetry
-        turns = numpy.array([wrapped(angle - at.T_object_robot[2], period) for angle in thetas])
-    spin = 2.0 * math.sqrt(at.body.inertia_mm2) * numpy.sin(turns / 2.0)
-    return float(numpy.sqrt(off[0] ** 2 + off[1] ** 2 + spin**2).min())
+    thetas = _thetas(lattice.theta_rad, 0, lattice.theta_rad.count)
+    places = _places(lattice, body, pose, thetas)
+    x, y = (
+        numpy.array([axis.centre(_nearest(axis, value)) - value for value in values])
+        for axis, values in zip((lattice.x_mm, lattice.y_mm), places.T.tolist(), strict=True)
+    )
+    turns = 0.0 * thetas
+    if body.symmetry > 0:
+        turns = wrapped(thetas - pose[2], 2.0 * math.pi / body.symmetry)
+    spin = 2.0 * math.sqrt(body.inertia_mm2) * numpy.sin(turns / 2.0)
+    return float(numpy.sqrt(x**2 + y**2 + spin**2).min())
 
 
-def estimate_in_window(
+def poses_in_window(
     device: palpate.Device,
     maps: Sequence[palpate.OccupancyGrid],
     trial: palpate.Recording,
     lattice: palpate.PoseLattice,
-) -> Step:
-    """Recognises a trial among the bins of its true object within REACH_MM of the truth.
+) -> Poses:
+    """Locates a trial among the bins of its true object within REACH_MM of the truth.
 
     Where the full posterior has its mode there, mode and refined pose are the same but for rounding,
-    since no bin's likelihood depends on other bins; the identity is that of one object alone.
+    since no bin's likelihood depends on other bins.
     """
-    grid, truth = map_of(maps, trial), placed(maps, trial)
+    grid, truth = map_of(maps, trial), truth_of(trial)
+    body = Body.of(grid)
 
-    def step_in(window: palpate.PoseLattice) -> Step:
+    def poses_in(window: palpate.PoseLattice) -> Poses:
         belief = palpate.PoseHistogram(device, [grid], window)
         belief.update(trial)
-        return judged(belief, [grid], truth_of(trial))
+        return poses_of(belief, [grid], truth)
 
-    steps = [step_in(window) for window in windows_about(lattice, truth, REACH_MM)]
-    best = max(steps, key=lambda step: step.mode.log_likelihood).mode
+    found = [poses_in(part) for part in windows_about(lattice, body, truth.T_object_robot, REACH_MM)]
+    best = max(found, key=lambda poses: poses.mode.log_likelihood).mode
     # About the mode, so that no edge of a window cuts off what the refined pose is made of.
-    found = Placed(truth.body, 1, best.T_object_robot)
-    return step_in(windows_about(lattice, found, _REFINED_REACH_MM)[0])
+    (window,) = windows_about(
+        lattice, body._replace(symmetry=1), best.T_object_robot, _REFINED_REACH_MM
+    )
+    return poses_in(window)

@@ -1,7 +1,10 @@
+#include <algorithm>
+
 #include <nanobind/stl/optional.h>
 
 #include "bindings.hpp"
 #include "call.hpp"
+#include "model/random.hpp"
 #include "palpate/simulation.hpp"
 #include "touches.hpp"
 
@@ -36,6 +39,14 @@ ArrayRecording simulate(const PathLike& letter_or_file,
     }
     return recording;
   }));
+}
+
+/// The next n numbers, each by one call.
+template <double (Random::*draw)()>
+Result<double, 1> drawn(Random& random, std::size_t n) {
+  std::vector<double> numbers(n);
+  std::ranges::generate(numbers, [&] { return (random.*draw)(); });
+  return owned(std::move(numbers));
 }
 
 }  // namespace
@@ -88,6 +99,15 @@ void bind_simulation(nb::module_& module) {
       "columns"_a, "rows"_a, "pitch_mm"_a,
       "Element centres of a grid about the sensor's origin, [columns * rows, 2] in mm; x varies\n"
       "fastest.");
+  // The benchmarks draw their trials from the library's random numbers.
+  nb::enum_<Stream>(module, "Stream", "Purpose of random numbers.")
+      .value("object_pose", Stream::object_pose)
+      .value("touch_order", Stream::touch_order)
+      .value("pose_noise", Stream::pose_noise);
+  nb::class_<Random>(module, "Random", "Random numbers of a seed and a purpose.")
+      .def(nb::init<std::uint64_t, Stream>(), "seed"_a, "stream"_a)
+      .def("uniforms", &drawn<&Random::uniform>, "n"_a, "The next n, uniform over [0, 1): [n].")
+      .def("normals", &drawn<&Random::normal>, "n"_a, "The next n, standard normal: [n].");
 }
 
 }  // namespace palpate::python

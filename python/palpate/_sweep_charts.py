@@ -2,10 +2,8 @@
 
 from typing import TYPE_CHECKING, Any
 
-import numpy
-
 from ._error import Error
-from ._tables import count_text, seconds_text
+from ._tables import column, count_text, seconds_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -35,13 +33,7 @@ def draw(document: dict[str, Any]) -> "dict[str, Figure]":
         return figure, axes
 
     def line(axes: Any, path: str, label: str, **look: Any) -> None:
-        first, _, then = path.partition("/")
-        values = [
-            point[first] and (point[first][then] if then else point[first]) for point in points
-        ]
-        axes.plot(
-            counts, [numpy.nan if value is None else value for value in values], label=label, **look
-        )
+        axes.plot(counts, column(points, path), label=label, **look)
 
     blue: Any = {"color": "#0072b2", "marker": "o"}
     red: Any = {"color": "#d55e00", "marker": "s", "linestyle": "--"}

@@ -1,7 +1,10 @@
 """Markdown tables of records, and how their values are written."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
+
+import numpy
+from numpy.typing import NDArray
 
 Text = Callable[[Any], str]
 
@@ -56,27 +59,36 @@ def value_of(record: Any, path: str) -> Any:
     return record
 
 
+def column(records: Any, path: str) -> NDArray[numpy.float64]:
+    """A field of records, in an array as the records lie in lists; NaN where a record has none."""
+
+    def values(of: Any) -> Any:
+        return value_of(of, path) if isinstance(of, dict) else [values(each) for each in of]
+
+    return numpy.array(values(records), numpy.float64)
+
+
 def texts(columns: Sequence[Column], record: Any) -> list[str]:
     """The cells of a row; a dash where there is nothing."""
     values = [value_of(record, path) for _, path, _ in columns]
     return ["–" if v is None else text(v) for v, (_, _, text) in zip(values, columns, strict=True)]
 
 
-def print_head(columns: Sequence[Column]) -> None:
-    """The head of a table, after an empty line."""
-    print(f"\n| {' | '.join(head for head, _, _ in columns)} |")
-    print("|:--|" + "--:|" * (len(columns) - 1))
+class Table(list[Any]):
+    """Records that are printed as they are added: rows of a table, after an empty line and its head."""
+
+    def __init__(self, columns: Sequence[Column]) -> None:
+        self._columns = columns
+        print(f"\n| {' | '.join(head for head, _, _ in columns)} |")
+        print("|:--|" + "--:|" * (len(columns) - 1))
+
+    def append(self, record: Any) -> None:
+        print(f"| {' | '.join(texts(self._columns, record))} |", flush=True)
+        super().append(record)
 
 
-def print_row(columns: Sequence[Column], record: Any) -> None:
-    """One of its rows."""
-    print(f"| {' | '.join(texts(columns, record))} |", flush=True)
-
-
-def print_table(columns: Sequence[Column], records: Iterable[Any]) -> None:
+def print_table(columns: Sequence[Column], records: Sequence[Any]) -> None:
     """A whole table; nothing where there are no records."""
-    rows = list(records)
-    if rows:
-        print_head(columns)
-    for record in rows:
-        print_row(columns, record)
+    table = Table(columns) if records else []
+    for record in records:
+        table.append(record)

@@ -15,6 +15,8 @@ import time
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+import numpy
+
 from . import __version__
 from ._error import Error
 from ._palpate import Device, PoseLattice
@@ -23,16 +25,13 @@ from ._sweep_charts import draw
 from ._sweep_runs import Data, Document, Run, counts_of, lattices_of, measure
 from ._tables import (
     Column,
+    Table,
     count_text,
     mean_text,
     number,
     plain,
-    print_head,
-    print_row,
     seconds_text,
 )
-from .recognition import Record
-
 _LEAST_TRUE_POSES = 3  # by which errors are judged
 
 
@@ -72,22 +71,20 @@ def sweep(
     lattices = lattices_of(fine, max_bins or (100_000 if quick else 10_000_000))
     dense = 1 if quick else 3
     finest = measure(data, lattices[-1], dense)
-    truth_known = any(
-        "truth" in record and record["truth"].get("T_robot_object") for record in finest.records
+    true_poses = sum(
+        record.get("truth", {}).get("T_robot_object") is not None for record in finest.records
     )
-    columns = _columns(truth_known)
-    print_head(columns)
-    runs = []
+    table, runs = Table(_columns(true_poses > 0)), []
     for lattice in lattices:
         run = finest if lattice is lattices[-1] else measure(data, lattice, dense)
         run.compare_with(finest, data)
-        print_row(columns, run.point)
+        table.append(run.point)
         runs.append(run)
     mode, refined = (_first_that_suffices(runs, kind) for kind in ("mode", "refined"))
     return {
         "maps": len(data.maps),
         "recordings": len(finest.records),
-        "true_poses": len([record for record in finest.records if _true_pose(record)]),
+        "true_poses": true_poses,
         "points": [run.point for run in runs],
         "auto_count": automatic.bins,
         "fine_count": fine.bins,
@@ -95,10 +92,6 @@ def sweep(
         "refined_count": refined and refined.point["count"],
         "advice": _advice(mode, refined, runs[-1], data, automatic, fine),
     }
-
-
-def _true_pose(record: Record) -> bool:
-    return record.get("truth", {}).get("T_robot_object") is not None
 
 
 def _columns(truth_known: bool) -> list[Column]:
@@ -135,17 +128,15 @@ def _rests(run: Run, finest: Run, kind: str) -> bool:
     An error e and a distance d make sqrt(e^2 + d^2) together; e is the finest run's error by the truth
     or, where too few true poses are known, its standard deviation.
     """
-    by_truth = len(present(finest.point["errors_mm"])) >= _LEAST_TRUE_POSES
     errors_mm = finest.point["errors_mm" if kind == "mode" else "refined_errors_mm"]
-    distances = errors = 0.0
-    for i, record in enumerate(finest.records):
-        distance, error = run.from_finest_mm[kind][i], errors_mm[i]
-        if not by_truth:
-            error = math.hypot(*record["refined"]["sd"][:2]) if "refined" in record else None
-        if distance is not None and error is not None:
-            distances += distance**2
-            errors += error**2
-    return errors > 0.0 and math.sqrt(errors + distances) <= (1.0 + LEAST_GAIN) * math.sqrt(errors)
+    if len(present(finest.point["errors_mm"])) < _LEAST_TRUE_POSES:
+        errors_mm = [
+            math.hypot(*record["refined"]["sd"][:2]) if "refined" in record else None
+            for record in finest.records
+        ]
+    pairs = numpy.array([run.from_finest_mm[kind], errors_mm], numpy.float64)
+    distance, error = numpy.linalg.norm(pairs[:, ~numpy.isnan(pairs).any(axis=0)], axis=1)
+    return bool(error > 0.0 and math.hypot(error, distance) <= (1.0 + LEAST_GAIN) * error)
 
 
 def _first_that_suffices(runs: Sequence[Run], kind: str) -> Run | None:
@@ -189,9 +180,7 @@ def _advice(
     advised = refined or finest
     count, flags = count_text(advised.point["count"]), _flags(advised.lattice, data.auto_pivot)
     if refined:
-        needs = (
-            f"needs {count_text(mode.point['count'])}" if mode else "gains up to the finest bins"
-        )
+        needs = f"needs {count_text(mode.point['count'])}" if mode else "gains up to the finest bins"
         words = (
             f"Beyond {count} bins per object ({flags}) neither recognition nor the refined pose "
             f"improves; the mode {needs}."
@@ -232,13 +221,8 @@ def _flag_parser() -> argparse.ArgumentParser:
         "objects need, and what bins cost on this device.",
     )
     add = flags.add_argument
-    add(
-        "--maps",
-        nargs="+",
-        default=[],
-        metavar="MAP",
-        help="maps of your objects, or folders of maps",
-    )
+    add("--maps", nargs="+", default=[], metavar="MAP",
+        help="maps of your objects, or folders of maps")  # fmt: skip
     add("--recordings", nargs="+", required=True, metavar="RECORDING",
         help="recordings of unknowns, folders of them, or manifests as of palpate batch; where they know "
         "the object or its pose, the sweep tells accuracy and errors")  # fmt: skip
@@ -251,12 +235,8 @@ def _flag_parser() -> argparse.ArgumentParser:
     add("--pivot-mm", metavar="X,Y|auto", help="point about which theta turns")
     add("--threshold", type=float, help="contact threshold, in the recordings' unit")
     add("--ratio", type=float, help="threshold as a fraction of the largest pressure")
-    add(
-        "--max-bins",
-        type=int,
-        metavar="N",
-        help="most bins per object [10000000, or 100000 with --quick]",
-    )
+    add("--max-bins", type=int, metavar="N",
+        help="most bins per object [10000000, or 100000 with --quick]")  # fmt: skip
     add("--quick", action="store_true", help="at most 100,000 bins per object")
     add("--device", default="", help="Vulkan device, by a part of its name or index")
     add("--json", metavar="FILE", help="write the results to this file")

@@ -1,5 +1,6 @@
 """The statistics of the programs beside known values, and the trials beside those of C++."""
 
+import functools
 import math
 
 import numpy
@@ -8,45 +9,40 @@ import pytest
 import palpate
 from bench.certificates import log_sum_exp
 from bench.measures import (
-    bootstrap_mean_interval,
-    bootstrap_ratio_interval,
+    bootstrap_record,
     calibration,
     differences,
     gains,
     knee_of,
-    mean_interval,
     normalised_error,
-    pareto_front,
+    share_record,
+    student_record,
     told_apart,
-    wilson_interval,
+    with_interval,
 )
-from bench.random_numbers import MersenneTwister, Random, Stream, seed_sequence
-from bench.trials import Body, Touching, lattice_of, letter_maps, make_trials, truth_of
-from bench.windows import estimate_in_window, nearest_bin_mm, placed, windows_about
+from bench.sweep_page import front_of
+from bench.trials import Body, Touching, lattice_of, letter_maps, make_trials, map_of, truth_of
+from bench.windows import nearest_bin_mm, poses_in_window, windows_about
+from palpate._palpate import Random, Stream
 from palpate._statistics import errors_over, quantile
+from palpate._tables import column
 
 
-def test_random_numbers_are_those_of_cpp() -> None:
-    # The C++ standard: the 10,000th number of std::mt19937_64, which is seeded with 5489.
-    state = [5489]
-    for i in range(1, 312):
-        state.append(6364136223846793005 * (state[-1] ^ state[-1] >> 62) + i & 2**64 - 1)
-    assert MersenneTwister(numpy.array(state, numpy.uint64)).draw(10_000)[-1] == 9981545732273789042
+def test_random_numbers_are_those_of_their_purpose() -> None:
     # Any number of draws at once gives the same numbers.
-    together, apart = Random(7, Stream.POSE_NOISE), Random(7, Stream.POSE_NOISE)
+    together, apart = Random(7, Stream.pose_noise), Random(7, Stream.pose_noise)
     whole = together.uniforms(1_000)
     assert (whole == numpy.concatenate([apart.uniforms(n) for n in (1, 311, 312, 376)])).all()
     assert 0.0 <= whole.min() and whole.max() < 1.0
-    assert len(set(seed_sequence([1, 2, 3], 624))) > 600
-    assert sorted(Random(3, Stream.TOUCH_ORDER).order(192)) == list(range(192))
-    normals = Random(5, Stream.POSE_NOISE).normals(4_000)
+    assert not (whole == Random(7, Stream.touch_order).uniforms(1_000)).any()
+    normals = Random(5, Stream.pose_noise).normals(4_000)
     assert abs(normals.mean()) < 4 / math.sqrt(4_000)
     assert normals.std() == pytest.approx(1.0, abs=0.05)
 
 
 def test_object_poses_are_those_of_the_module() -> None:
     # The module draws x, y and theta from the same stream.
-    x, y, turn = Random(42, Stream.OBJECT_POSE).uniforms(3)
+    x, y, turn = Random(42, Stream.object_pose).uniforms(3)
     expected = (20.0 * x - 10.0, 20.0 * y - 10.0, 2.0 * math.pi * turn)
     assert palpate.random_object_pose(42) == pytest.approx(expected, abs=1e-12)
 
@@ -77,30 +73,33 @@ def test_quantiles_and_errors() -> None:
 
 def test_intervals() -> None:
     # Wilson's by hand: of 50 of 50, 1 / (1 + z^2 / n).
-    assert wilson_interval(50, 50) == pytest.approx((0.92865, 1.0), abs=1e-5)
-    assert wilson_interval(0, 10) == pytest.approx((0.0, 0.27753), abs=1e-5)
+    assert share_record(50, 50) == pytest.approx({"mean": 1.0, "low": 0.92865, "high": 1.0}, abs=1e-5)
+    assert share_record(0, 10) == pytest.approx({"mean": 0.0, "low": 0.0, "high": 0.27753}, abs=1e-5)
     # Student's t for nine degrees of freedom is 2.262.
-    values = [float(i) for i in range(10)]
-    interval = mean_interval(values)
-    assert interval is not None and mean_interval([1.0, 2.0]) is None
-    low, high = interval
-    assert (high - low) / 2 == pytest.approx(2.262 * math.sqrt(82.5 / 9 / 10), rel=1e-3)
-    assert (low + high) / 2 == pytest.approx(4.5)
+    told = student_record([float(i) for i in range(10)])
+    assert told["high"] - told["mean"] == pytest.approx(2.262 * math.sqrt(82.5 / 9 / 10), rel=1e-3)
+    assert (told["low"] + told["high"]) / 2 == pytest.approx(told["mean"]) == 4.5
+    assert student_record([1.0, 2.0]) == {"mean": 1.5}, "two tell no interval"
     # Of many values the bootstrap's interval is the normal one.
-    many = Random(1, Stream.POSE_NOISE).normals(400)
-    low, high = bootstrap_mean_interval(many)
-    assert high - low == pytest.approx(2 * 1.96 * many.std() / 20, rel=0.1)
-    assert low < many.mean() < high
-    assert bootstrap_ratio_interval(2.0 * numpy.abs(many), numpy.abs(many)) == pytest.approx(
-        (2.0, 2.0)
-    )
+    many = Random(1, Stream.pose_noise).normals(400)
+    told = bootstrap_record(many)
+    assert told["high"] - told["low"] == pytest.approx(2 * 1.96 * many.std() / 20, rel=0.1)
+    assert told["low"] < many.mean() < told["high"]
+    ratio = bootstrap_record(2.0 * numpy.abs(many), numpy.abs(many))
+    assert ratio == pytest.approx({"mean": 2.0, "low": 2.0, "high": 2.0})
+    assert with_interval(".1f", 100.0)(share_record(5, 10)) == "50.0 (23.7 to 76.3)"
 
 
 def test_pairs_told_apart() -> None:
-    assert told_apart([0.0, 1.0], [2.0, 3.0])[0] == 1.0
-    assert told_apart([1.0], [1.0])[0] == 0.5
-    assert told_apart([0.0, 2.0], [1.0])[0] == 0.5
-    assert told_apart([0.0] * 50, [1.0] * 90) == (1.0, wilson_interval(50, 50))
+    assert told_apart([0.0, 1.0], [2.0, 3.0])["mean"] == 1.0
+    assert told_apart([1.0], [1.0])["mean"] == 0.5
+    assert told_apart([0.0, 2.0], [1.0])["mean"] == 0.5
+    assert told_apart([0.0] * 50, [1.0] * 90) == share_record(50, 50)
+
+
+def test_fields_are_arrays_as_records_lie() -> None:
+    found = column([[{"a": {"b": 1}}, {"a": {"b": 2}}], [{"a": None}, {}]], "a/b")
+    assert numpy.array_equal(found, [[1.0, 2.0], [numpy.nan, numpy.nan]], equal_nan=True)
 
 
 def test_calibration_weighs_bins_by_their_counts() -> None:
@@ -121,11 +120,8 @@ def test_knees_and_fronts() -> None:
     assert (paired["from"], paired["to"]) == pytest.approx((0.9, 0.6))
     assert paired["mean"] == pytest.approx(-0.3)
     assert differences([None], [1.0]) is None
-    entries = [
-        {"cost": cost, "error": error}
-        for cost, error in ((3.0, 1.0), (1.0, 3.0), (2.0, 3.0), (2.0, 2.0))
-    ]
-    assert pareto_front(entries) == [entries[1], entries[3], entries[0]]
+    costs, errors = numpy.array([3.0, 1.0, 2.0, 2.0]), numpy.array([1.0, 3.0, 3.0, 2.0])
+    assert front_of(costs, errors).tolist() == [1, 3, 0]
 
 
 def test_log_sum_exp_neither_overflows_nor_loses() -> None:
@@ -140,7 +136,7 @@ def maps(device: palpate.Device) -> list[palpate.OccupancyGrid]:
 def test_the_normalised_error_is_the_error_in_standard_deviations(
     device: palpate.Device, maps: list[palpate.OccupancyGrid]
 ) -> None:
-    belief = palpate.PoseHistogram(device, maps, lattice_of(20, 20, 75))
+    belief = palpate.PoseHistogram(device, maps, lattice_of((20, 20, 75)))
     trials = {truth_of(trial).object: trial for trial in make_trials("AIO", 1, 9, 11)}
     for index, label in ((0, "A"), (2, "I"), (3, "O")):
         belief.reset()
@@ -149,33 +145,34 @@ def test_the_normalised_error_is_the_error_in_standard_deviations(
         assert maps[mode.object].label == label
         refined = belief.refine(mode)
         pose, grid = refined.T_object_robot, maps[index]
-        assert normalised_error(grid, refined, pose) == pytest.approx(0.0, abs=1e-9)
+        nees = functools.partial(normalised_error, grid, pose, refined.covariance)
+        assert nees(pose) == pytest.approx(0.0, abs=1e-9)
         turn = {"A": 2.0 * math.pi, "I": math.pi, "O": 1.0}[label]
         s, c = math.sin(turn), math.cos(turn)
         centroid = Body.of(grid).centroid_mm
         about = centroid - numpy.array([[c, -s], [s, c]]) @ centroid
         equal = palpate.compose([*about, turn], pose)
-        assert normalised_error(grid, refined, equal) == pytest.approx(0.0, abs=1e-9), label
+        assert nees(equal) == pytest.approx(0.0, abs=1e-9), label
         if label == "A":
             off = 2.0 * math.sqrt(1.0 / numpy.linalg.inv(refined.covariance)[0, 0])
-            assert normalised_error(grid, refined, pose + (off, 0.0, 0.0)) == pytest.approx(4.0)
+            assert nees(pose + (off, 0.0, 0.0)) == pytest.approx(4.0)
 
 
 def test_windows_give_the_full_posteriors_poses(
     device: palpate.Device, maps: list[palpate.OccupancyGrid]
 ) -> None:
-    lattice = lattice_of(30, 30, 113)
+    lattice = lattice_of((30, 30, 113))
     full = palpate.PoseHistogram(device, maps, lattice)
     for trial in make_trials("AIO", 1, 9, 1_000):
-        truth = placed(maps, trial)
+        body, truth = Body.of(map_of(maps, trial)), truth_of(trial).T_object_robot
         full.reset()
         full.update(trial)
         mode = full.estimate().mode
-        step = estimate_in_window(device, maps, trial, lattice)
+        step = poses_in_window(device, maps, trial, lattice)
         assert step.mode.T_object_robot[:2] == pytest.approx(mode.T_object_robot[:2], abs=1e-9)
         refined = full.refine(mode).T_object_robot
         assert step.refined.T_object_robot[:2] == pytest.approx(refined[:2], abs=1e-5)
         assert step.error_mm is not None
-        assert nearest_bin_mm(lattice, truth) <= step.error_mm
-        bins = sum(window.bins for window in windows_about(lattice, truth, 3.0))
+        assert nearest_bin_mm(lattice, body, truth) <= step.error_mm
+        bins = sum(window.bins for window in windows_about(lattice, body, truth, 3.0))
         assert bins < lattice.bins / 2, "a window is a part"

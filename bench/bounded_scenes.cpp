@@ -1,0 +1,251 @@
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <optional>
+#include <tuple>
+
+#include <fmt/format.h>
+
+#include "bounded.hpp"
+#include "letters.hpp"
+
+namespace palpate::bench {
+
+namespace {
+
+constexpr std::uint64_t large_seed = 1'402'000'000;
+
+double mib(std::uint64_t bytes) { return static_cast<double>(bytes) / (1 << 20); }
+
+struct LargeScene {
+  int objects = 0;
+  double most_ms = 0.0;
+  std::optional<double> most_mib = {};
+};
+
+/// The region about the pivot, in steps of 0.5 mm and 2 degrees.
+PoseLattice lattice_over(double extent_mm, bool quick) {
+  const int count = quick ? 20 : static_cast<int>(4.0 * extent_mm);
+  const Axis axis{-extent_mm, extent_mm, count};
+  return {.x_mm = axis, .y_mm = axis, .theta_rad = {0.0, 2.0 * std::numbers::pi, quick ? 12 : 180}};
+}
+
+/// `about_touches` turns theta about the first touch, as --pivot-mm auto; else about the robot
+/// frame's origin, which then lies as far away as the region reaches.
+Json measure_scene(const BoundedInputs& inputs, const LargeScene& scene, bool about_touches,
+                   const std::vector<Hypothesis>& objects, Report& report) {
+  const double extent_mm = inputs.quick ? 20.0 : 100.0;
+  const PoseLattice lattice = lattice_over(extent_mm, inputs.quick);
+  const std::vector<Recording> unknowns =
+      glyph_unknowns(scene.objects, inputs.unknowns(), touches_per_unknown, extent_mm, large_seed);
+  const auto bins = lattice.bins() * static_cast<std::int64_t>(objects.size());
+  restart_peak_memory();
+  const std::uint64_t before = resident_bytes();
+  std::optional<BoundedPosterior> posterior;
+  const double seconds =
+      seconds_of([&] { posterior.emplace(objects, BoundedOptions{.lattice = lattice}); });
+  BoundedAnswers answers;
+  int right = 0;
+  for (const Recording& unknown : unknowns) {
+    posterior->reset();
+    if (about_touches) {
+      posterior->move_pivot(unknown.T_robot_sensor.front().translation_mm);
+    }
+    const std::vector<double> identity = answers.ask(*posterior, all_touches(unknown)).identity;
+    const auto best = std::ranges::max_element(identity) - identity.begin();
+    right += objects[static_cast<std::size_t>(best)].map.label == unknown.object ? 1 : 0;
+  }
+  const std::uint64_t peak = peak_resident_bytes() - before;
+  const std::string pivot = about_touches ? "the first touch" : "the robot's origin";
+  Case measured{
+      .name = fmt::format("large, {} objects, pivot at {}", objects.size(), pivot),
+      .facts = {{"region", fmt::format("±{} mm, all angles", extent_mm)},
+                {"bins", size_of(lattice)},
+                {"bins in all", bins},
+                {"touches", touches_per_unknown},
+                {"unknowns", unknowns.size()}},
+      .measurements = measurements_of(answers, "all threads", bins, at_most(scene.most_ms))};
+  const auto most_mib = scene.most_mib ? std::optional(at_most(*scene.most_mib)) : std::nullopt;
+  measured.measurements.push_back({"construction", 1e3 * seconds, "ms"});
+  measured.measurements.push_back(
+      {"held by the posterior", mib(posterior->host_bytes()), "MiB", most_mib});
+  measured.measurements.push_back({"peak of the process above before", mib(peak), "MiB", most_mib});
+  measured.measurements.push_back(share_of("object right", right, unknowns.size()));
+  report.add(measured);
+  return {{"objects", objects.size()}, {"pivot", pivot},
+          {"bins_in_all", bins},       {"host_bytes", posterior->host_bytes()},
+          {"peak_bytes", peak},        {"answers", answers.record()}};
+}
+
+constexpr std::uint64_t growth_seed = 1'403'000'000;
+constexpr double most_growth = 10.0;       ///< in time, for a thousand times the bins
+constexpr double most_memory_mib = 256.0;  ///< of 10^9 bins
+
+/// A lattice of some number of bins, in the proportions of 200 x 200 x 250.
+PoseLattice lattice_of_bins(double count) {
+  const double factor = std::cbrt(count / (4.0 * 4.0 * 5.0));
+  const auto times = [factor](double n) {
+    return std::max(1, static_cast<int>(std::lround(n * factor)));
+  };
+  return lattice_of(times(4.0), times(4.0), times(5.0));
+}
+
+/// Unknowns that the dense engine can answer in the time of a benchmark.
+int dense_unknowns(double bins_in_all, int unknowns) {
+  return bins_in_all <= 2e6   ? unknowns
+         : bins_in_all <= 2e7 ? std::min(unknowns, 5)
+         : bins_in_all <= 2e8 ? 1
+                              : 0;
+}
+
+/// Median, least and most of some times in seconds; `unit` is the seconds that a 1 stands for.
+Json times_of(const std::vector<double>& times, double unit) {
+  return times.empty() ? Json(nullptr)
+                       : Json{{"median", unit * median(times)},
+                              {"least", unit * std::ranges::min(times)},
+                              {"most", unit * std::ranges::max(times)},
+                              {"unknowns", times.size()}};
+}
+
+Json measure_bins(const BoundedInputs& inputs, double bins_in_all,
+                  const std::vector<Recording>& unknowns, Report& report) {
+  const PoseLattice lattice =
+      lattice_of_bins(bins_in_all / static_cast<double>(inputs.letters.size()));
+  const std::int64_t bins = inputs.bins_in_all(lattice);
+  BoundedOptions options{.lattice = lattice};
+  restart_peak_memory();
+  const std::uint64_t before = resident_bytes();
+  std::optional<BoundedPosterior> posterior(std::in_place, inputs.letters, options);
+  const BoundedAnswers all = answer_each(*posterior, unknowns);
+  const std::uint64_t peak = peak_resident_bytes() - before;
+  const std::uint64_t held = posterior->host_bytes();
+  options.threads = 1;
+  posterior.emplace(inputs.letters, options);
+  const BoundedAnswers one = answer_each(*posterior, unknowns);
+  posterior.reset();
+  DenseAnswers dense;
+  if (const int count = dense_unknowns(bins_in_all, static_cast<int>(unknowns.size())); count > 0) {
+    PoseHistogram histogram(inputs.device, inputs.letters, {.lattice = lattice});
+    histogram.update(unknowns.front().touch(0));  // warms up
+    dense = answer_each(histogram, std::span(unknowns).first(static_cast<std::size_t>(count)));
+  }
+
+  const double peak_mib = static_cast<double>(peak) / (1 << 20);
+  const bool largest = bins_in_all > 5e8;
+  Case measured{.name = fmt::format("growth, {} bins in all", count_text(bins_in_all)),
+                .facts = {{"bins", size_of(lattice)},
+                          {"objects", inputs.letters.size()},
+                          {"touches", touches_per_unknown},
+                          {"unknowns", unknowns.size()}},
+                .measurements = measurements_of(all, "all threads", bins)};
+  measured.measurements.push_back({"one thread, median", median(one.milliseconds), "ms"});
+  measured.measurements.push_back(
+      {"peak of the process above before", peak_mib, "MiB",
+       largest ? std::optional(at_most(most_memory_mib)) : std::nullopt});
+  if (!dense.seconds.empty()) {
+    measured.measurements.push_back(
+        {fmt::format("dense engine, median of {}", dense.seconds.size()),
+         1e3 * median(dense.seconds), "ms"});
+  }
+  report.add(measured);
+  return {{"bins_in_all", bins},
+          {"bins", size_of(lattice)},
+          {"bounded", times_of(all.milliseconds, 1e-3)},
+          {"one_thread", times_of(one.milliseconds, 1e-3)},
+          {"dense", times_of(dense.seconds, 1.0)},
+          {"bins_evaluated", median(all.bins_evaluated)},
+          {"dropped_mass", std::ranges::max(all.dropped_mass)},
+          {"host_bytes", held},
+          {"peak_bytes", peak}};
+}
+
+/// Time for a thousand times the bins, from every lattice that has such a finer one.
+void add_growth(const Json& records, Report& report) {
+  Case measured{.name = "growth, a thousand times the bins"};
+  for (std::size_t i = 0; i + 3 < records.size(); ++i) {
+    const Json& few = records[i];
+    const Json& many = records[i + 3];
+    const auto ratio = [&](const char* threads) {
+      return many.at(threads).at("median").get<double>() /
+             few.at(threads).at("median").get<double>();
+    };
+    const std::string name = fmt::format("{} to {} bins", count_text(few.at("bins_in_all")),
+                                         count_text(many.at("bins_in_all")));
+    measured.measurements.push_back(
+        {name + ", all threads", ratio("bounded"), "times", at_most(most_growth)});
+    measured.measurements.push_back({name + ", one thread", ratio("one_thread"), "times"});
+  }
+  report.add(measured);
+}
+
+}  // namespace
+
+Json measure_bounded_large(const BoundedInputs& inputs, Report& report) {
+  const std::vector<LargeScene> scenes =
+      inputs.quick ? std::vector<LargeScene>{{3, 120.0, 200.0}}
+                   : std::vector<LargeScene>{{20, 120.0, 200.0}, {100, 600.0}};
+  Json records = Json::array();
+  for (const LargeScene& scene : scenes) {
+    const std::vector<Hypothesis> objects =
+        letter_maps(inputs.device, glyph_recordings(scene.objects));
+    for (const bool about_touches : {false, true}) {
+      records.push_back(measure_scene(inputs, scene, about_touches, objects, report));
+    }
+  }
+  return records;
+}
+
+Json measure_bounded_growth(const BoundedInputs& inputs, Report& report) {
+  const std::vector<double> totals =
+      inputs.quick ? std::vector{10.0, 1e2, 1e3, 1e4} : std::vector{1e4, 1e5, 1e6, 1e7, 1e8, 1e9};
+  const std::vector<Recording> unknowns =
+      unknown_recordings(inputs.unknowns(), touches_per_unknown, growth_seed);
+  Json records = Json::array();
+  for (const double total : totals) {
+    records.push_back(measure_bins(inputs, total, unknowns, report));
+  }
+  add_growth(records, report);
+  return records;
+}
+
+Json measure_bounded_search(const BoundedInputs& inputs, Report& /*report*/) {
+  // An A, whose first touch meets an edge of the letter, on bins all over the letters.
+  constexpr std::uint64_t seed = 1'405'000'018;
+  constexpr double extent_mm = 15.0;
+  const Recording unknown = unknown_recordings(1, touches_per_unknown, seed).front();
+  PoseLattice lattice = inputs.quick ? lattice_of(20, 20, 16) : lattice_of(200, 200, 250);
+  lattice.x_mm = {-extent_mm, extent_mm, lattice.x_mm.count};
+  lattice.y_mm = lattice.x_mm;
+  // As --pivot-mm auto: x and y are where the first touch lies on the letter.
+  lattice.pivot_mm = unknown.T_robot_sensor.front().translation_mm;
+  const glm::dvec2 place_mm = unknown.truth->T_object_robot * lattice.pivot_mm;
+  BoundedPosterior posterior(inputs.letters, {.lattice = lattice});
+  Json stages = Json::array();
+  std::size_t done = 0;
+  for (const std::size_t touches : {std::size_t{1}, std::size_t{3}, std::size_t{9}}) {
+    posterior.update(unknown.touches(done, touches));
+    done = touches;
+    std::map<std::tuple<int, int, int, int, int>, int> thetas;  // by level and place
+    for (const PoseBlock& b : posterior.refined_blocks()) {
+      if (b.object == 0) {
+        ++thetas[{b.level, b.x_first, b.x_count, b.y_first, b.y_count}];
+      }
+    }
+    Json blocks = Json::array();
+    for (const auto& [at, count] : thetas) {
+      const auto& [level, x, nx, y, ny] = at;
+      blocks.push_back({level, x, nx, y, ny, count});
+    }
+    stages.push_back({{"touches", touches},
+                      {"bins_evaluated", posterior.estimate().certificate->bins_evaluated},
+                      {"blocks", blocks}});
+  }
+  return {{"bins", {lattice.x_mm.count, lattice.y_mm.count, lattice.theta_rad.count}},
+          {"bins_in_all", inputs.bins_in_all(lattice)},
+          {"extent_mm", extent_mm},
+          {"place_mm", {place_mm.x, place_mm.y}},
+          {"stages", stages}};
+}
+
+}  // namespace palpate::bench
