@@ -241,21 +241,14 @@ void Hdf5Writer::require(bool done, std::string_view what) const {
 }
 
 std::string hdf5_failure() {
-  std::string reason = "HDF5 failed";
-  H5Ewalk2(
-      H5E_DEFAULT, H5E_WALK_UPWARD,
-      [](unsigned, const H5E_error2_t* error, void* text) -> herr_t {
-        const std::string_view said = error->desc == nullptr ? "" : error->desc;
-        const std::string_view key = "error message = '";
-        if (const std::size_t at = said.find(key); at != std::string_view::npos) {
-          const std::string_view rest = said.substr(at + key.size());
-          *static_cast<std::string*>(text) = rest.substr(0, rest.find('\''));
-          return 1;
-        }
-        return 0;
-      },
-      &reason);
-  return reason;
+  const std::string key = "error message = '";
+  for (const std::string& said : hdf5_errors()) {
+    if (const std::size_t at = said.find(key); at != std::string::npos) {
+      const std::string rest = said.substr(at + key.size());
+      return rest.substr(0, rest.find('\''));
+    }
+  }
+  return "HDF5 failed";
 }
 
 void give_up_hdf5_file(hid_t file) {

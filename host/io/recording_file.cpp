@@ -79,6 +79,10 @@ void require_agreement(const std::filesystem::path& path, const Recording& recor
 }  // namespace
 
 Recording read_recording(const std::filesystem::path& path) {
+  return read_recording(path, nullptr);
+}
+
+Recording read_recording(const std::filesystem::path& path, Hdf5Child* child) {
   Recording recording;
   scan_recording(path,
                  {.head =
@@ -91,7 +95,8 @@ Recording read_recording(const std::filesystem::path& path) {
                   .elements_mm = [&](auto places) { append(recording.elements_mm, places); },
                   .time_s = [&](auto times) { append(recording.time_s, times); },
                   .device_time_s = [&](auto times) { append(recording.device_time_s, times); },
-                  .lost_before = [&](auto counts) { append(recording.lost_before, counts); }});
+                  .lost_before = [&](auto counts) { append(recording.lost_before, counts); }},
+                 child);
   return recording;
 }
 

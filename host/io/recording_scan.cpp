@@ -50,6 +50,14 @@ std::uint64_t whole_rows(Hdf5Contents& file) {
   return rows;
 }
 
+const std::vector<std::string> attribute_names = {
+    "format",      "version", "object",      "pressure_unit",
+    "length_unit", "rows",    "true_object", "true_T_object_robot",
+    "sensor",      "serial"};
+const std::vector<std::string> dataset_names = {"pressure",    "sensor_pose", "elements",
+                                                "valid",       "time",        "baseline",
+                                                "device_time", "lost_before"};
+
 std::optional<Truth> read_truth(const Hdf5Contents& file) {
   if (!file.has_attribute("true_object") && !file.has_attribute("true_T_object_robot")) {
     return {};
@@ -60,14 +68,8 @@ std::optional<Truth> read_truth(const Hdf5Contents& file) {
 
 class Scan {
  public:
-  Scan(const std::filesystem::path& path, const RecordingTakers& takers)
-      : path_(path),
-        takers_(takers),
-        file_(path,
-              {"format", "version", "object", "pressure_unit", "length_unit", "rows", "true_object",
-               "true_T_object_robot", "sensor", "serial"},
-              {"pressure", "sensor_pose", "elements", "valid", "time", "baseline", "device_time",
-               "lost_before"}) {}
+  Scan(const std::filesystem::path& path, const RecordingTakers& takers, Hdf5Child* child)
+      : path_(path), takers_(takers), file_(path, attribute_names, dataset_names, child) {}
 
   void run() {
     read_texts();
@@ -276,8 +278,13 @@ class Scan {
 
 }  // namespace
 
-void scan_recording(const std::filesystem::path& path, const RecordingTakers& takers) {
-  Scan(path, takers).run();
+std::shared_ptr<Hdf5Child> recording_child(std::uint64_t file_bytes) {
+  return std::make_shared<Hdf5Child>(attribute_names, dataset_names, file_bytes);
+}
+
+void scan_recording(const std::filesystem::path& path, const RecordingTakers& takers,
+                    Hdf5Child* child) {
+  Scan(path, takers, child).run();
 }
 
 }  // namespace palpate
