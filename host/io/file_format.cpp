@@ -56,6 +56,31 @@ void require_format(const Hdf5Contents& file, std::string_view format) {
   }
 }
 
+void write_format(Hdf5Writer& file, std::string_view format) {
+  file.attribute("format", format);
+  file.attribute("version", format_version);
+}
+
+void write_head(Hdf5Writer& file, const Recording& head) {
+  write_format(file, recording_format);
+  file.attribute("object", head.object);
+  file.attribute("pressure_unit", head.pressure_unit);
+  file.attribute("length_unit", "mm");
+  file.attribute("rows", head.rows);
+  if (head.truth) {
+    const Pose& pose = head.truth->T_object_robot;
+    file.attribute("true_object", head.truth->object);
+    file.attribute("true_T_object_robot",
+                   {pose.translation_mm.x, pose.translation_mm.y, pose.theta_rad});
+  }
+  if (!head.sensor.empty()) {
+    file.attribute("sensor", head.sensor);
+  }
+  if (!head.serial.empty()) {
+    file.attribute("serial", head.serial);
+  }
+}
+
 std::string read_format(const std::filesystem::path& path) {
   return format_of(Hdf5Contents(path, {"format"}, {}));
 }

@@ -3,6 +3,8 @@
 #include <string_view>
 
 #include "io/hdf5_contents.hpp"
+#include "io/hdf5_writer.hpp"
+#include "palpate/touch.hpp"
 
 namespace palpate {
 
@@ -14,5 +16,10 @@ inline constexpr int format_version = 1;
 
 /// Throws Error unless the attributes `format` and `version` name this format.
 void require_format(const Hdf5Contents& file, std::string_view format);
+/// Writes these attributes.
+void write_format(Hdf5Writer& file, std::string_view format);
+
+/// Writes the attributes of a recording: its format, texts and truth.
+void write_head(Hdf5Writer& file, const Recording& head);
 
 }  // namespace palpate

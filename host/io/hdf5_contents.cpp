@@ -335,8 +335,11 @@ void Hdf5Contents::read_from_child(const std::string& name, std::uint64_t rows, 
   if (!child_->process.write(&request, sizeof request)) {
     refuse_damaged();
   }
+  const std::vector<std::uint64_t>& shape = dataset(name).shape;
+  const std::uint64_t row = shape.size() < 2 || shape.back() > hdf5_piece ? 1 : shape.back();
   for (std::uint64_t first = 0; first < total; first += piece.size()) {
-    if (!child_->process.list(piece, std::min(hdf5_piece, total - first) * sizeof(double))) {
+    if (!child_->process.list(piece, std::min(hdf5_piece, total - first) * sizeof(double)) ||
+        piece.size() % row != 0) {
       refuse_damaged();
     }
     child_->in_step = piece.empty() || first + piece.size() == total;

@@ -41,7 +41,8 @@ struct Hdf5Child {
 /// a libhdf5 call while an object of this class is made. Without a child, soft links are refused.
 class Hdf5Contents {
  public:
-  /// Takes a piece of a dataset's numbers in row-major order; `first` is the index of its first.
+  /// Takes a piece of a dataset's numbers in row-major order; `first` is the index of its first. A
+  /// piece holds whole rows of the last axis, unless such a row has more than hdf5_piece numbers.
   /// Must not use HDF5.
   using Take = std::function<void(std::uint64_t first, std::span<const double> numbers)>;
 

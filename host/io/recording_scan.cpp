@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -159,13 +160,11 @@ class Scan {
       takers_.pressure(values);
     });
     read_poses();
-    std::size_t elements = 0;
-    read_tuples<2, glm::dvec2>(
-        "elements", [](const double* v) { return glm::dvec2(v[0], v[1]); },
-        [&](std::span<const glm::dvec2> some) {
-          require_elements(path_, std::exchange(elements, elements + some.size()), some);
-          takers_.elements_mm(some);
-        });
+    read_tuples<glm::dvec2>("elements", head_.array_changes ? head_.rows : head_.elements,
+                            [&](std::size_t first, std::span<const glm::dvec2> some) {
+                              require_elements(path_, first, some);
+                              takers_.elements_mm(some);
+                            });
     read_list("time", [&](std::uint64_t first, std::span<const double> values) {
       require_times(path_, first, values);
       takers_.time_s(values);
@@ -174,10 +173,8 @@ class Scan {
       require_device_times(path_, first, values);
       takers_.device_time_s(values);
     });
-    read_list("lost_before", [&](std::uint64_t first, std::span<const double> values) {
-      const std::vector<std::uint64_t> counts = counts_of(values);
-      require_lost_counts(path_, first, counts);
-      takers_.lost_before(counts);
+    read_list("lost_before", [&](std::uint64_t, std::span<const double> values) {
+      takers_.lost_before(counts_of(values));
     });
   }
 
@@ -190,16 +187,11 @@ class Scan {
       }
       return;
     }
-    std::size_t poses = 0;
-    read_tuples<3, Pose>(
-        "sensor_pose",
-        [](const double* v) {
-          return Pose{{v[0], v[1]}, v[2]};
-        },
-        [&](std::span<const Pose> some) {
-          require_poses(path_, head_.recording, std::exchange(poses, poses + some.size()), some);
-          takers_.T_robot_sensor(some);
-        });
+    read_tuples<Pose>("sensor_pose", head_.rows,
+                      [&](std::size_t first, std::span<const Pose> some) {
+                        require_poses(path_, head_.recording, first, some);
+                        takers_.T_robot_sensor(some);
+                      });
   }
 
   void read_list(const char* name, const Hdf5Contents::Take& take) {
@@ -208,24 +200,17 @@ class Scan {
     }
   }
 
-  // Pieces end anywhere; the rest of a tuple waits for the next piece.
-  template <std::size_t width, typename Tuple, typename Make, typename Take>
-  void read_tuples(const char* name, const Make& make, const Take& take) {
-    std::vector<double> numbers;
+  /// Hands on tuples of numbers, with the index of the first.
+  template <typename Tuple, typename Take>
+  void read_tuples(const char* name, std::uint64_t rows, const Take& take) {
     std::vector<Tuple> tuples;
-    const auto take_whole = [&](std::uint64_t, std::span<const double> values) {
-      numbers.insert(numbers.end(), values.begin(), values.end());
-      tuples.clear();
-      std::size_t at = 0;
-      for (; at + width <= numbers.size(); at += width) {
-        tuples.push_back(make(&numbers[at]));
-      }
-      numbers.erase(numbers.begin(), numbers.begin() + static_cast<std::ptrdiff_t>(at));
-      take(std::span<const Tuple>(tuples));
+    const auto take_tuples = [&](std::uint64_t first, std::span<const double> numbers) {
+      constexpr std::size_t width = sizeof(Tuple) / sizeof(double);
+      tuples.resize(numbers.size() / width);
+      std::memcpy(static_cast<void*>(tuples.data()), numbers.data(), numbers.size_bytes());
+      take(first / width, std::span<const Tuple>(tuples));
     };
-    // An array that does not change has a row per element.
-    const bool by_row = std::string_view(name) != "elements" || head_.array_changes;
-    file_.read(name, take_whole, by_row ? head_.rows : head_.elements);
+    file_.read(name, take_tuples, rows);
   }
 
   std::vector<std::uint64_t> counts_of(std::span<const double> values) const {
