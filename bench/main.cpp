@@ -9,7 +9,7 @@
 #include <CLI/CLI.hpp>
 
 #include "commands.hpp"
-#include "io/standard_streams.hpp"
+#include "io/descriptor.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate::bench {
