@@ -14,6 +14,10 @@ inline constexpr std::string_view posterior_format = "palpate.posterior";
 /// Version of every format; readers refuse a higher version.
 inline constexpr int format_version = 1;
 
+/// Datasets of a recording with a row for each touch or frame. `time` is last: see FrameRecorder.
+inline constexpr const char* row_names[] = {"pressure", "sensor_pose", "device_time", "lost_before",
+                                            "time"};
+
 /// Throws Error unless the attributes `format` and `version` name this format.
 void require_format(const Hdf5Contents& file, std::string_view format);
 /// Writes these attributes.

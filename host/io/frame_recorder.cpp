@@ -160,7 +160,7 @@ struct FrameRecorder::Impl {
       mark_as_being_recorded(*static_cast<int*>(descriptor));
     }
     bool open = file.valid();
-    for (const char* name : {"pressure", "sensor_pose", "device_time", "lost_before", "time"}) {
+    for (const char* name : row_names) {
       if (has_device_time || std::string_view(name) != "device_time") {
         Hdf5Handle dataset(H5Dopen2(file.get(), name, H5P_DEFAULT), H5Dclose);
         open = open && dataset.valid();

@@ -8,7 +8,6 @@
 
 #include <fmt/format.h>
 
-#include "io/available_memory.hpp"
 #include "io/hdf5_handle.hpp"
 #include "io/recording_state.hpp"
 #include "model/printable.hpp"
@@ -237,7 +236,7 @@ void Hdf5Contents::refuse_damaged() const {
 }
 
 std::string Hdf5Contents::text(const std::string& name) const {
-  const Hdf5Value& value = attribute(name);
+  const Hdf5Value& value = find(attributes_, "attribute", name);
   if (value.strings.empty() && value.numbers.empty()) {
     return "";
   }
@@ -249,7 +248,7 @@ std::string Hdf5Contents::text(const std::string& name) const {
 }
 
 std::vector<std::string> Hdf5Contents::texts(const std::string& name) const {
-  const Hdf5Value& value = attribute(name);
+  const Hdf5Value& value = find(attributes_, "attribute", name);
   if (value.strings.empty()) {
     refuse("attribute '{}' holds no string; store one", name);
   }
@@ -264,7 +263,7 @@ std::vector<std::string> Hdf5Contents::texts(const std::string& name) const {
 double Hdf5Contents::number(const std::string& name) const { return numbers(name, 1).front(); }
 
 std::vector<double> Hdf5Contents::numbers(const std::string& name, std::size_t count) const {
-  const Hdf5Value& value = attribute(name);
+  const Hdf5Value& value = find(attributes_, "attribute", name);
   if (value.numbers.size() != count) {
     refuse("attribute '{}' holds {} numbers; store {}", name, value.numbers.size(), count);
   }
@@ -286,19 +285,15 @@ int Hdf5Contents::integer(const std::string& name, int least) const {
 
 const std::vector<std::uint64_t>& Hdf5Contents::shape(const std::string& name,
                                                       std::optional<std::size_t> rank) const {
-  const Hdf5Value& value = dataset(name);
+  const Hdf5Value& value = find(datasets_, "dataset", name);
   if (rank && value.shape.size() != *rank) {
     refuse("dataset '{}' has {} dimensions; give it {}", name, value.shape.size(), *rank);
   }
   return value.shape;
 }
 
-std::uint64_t Hdf5Contents::count(const std::string& name) const {
-  return stored_bytes(shape(name), 1);
-}
-
 void Hdf5Contents::read(const std::string& name, const Take& take, std::uint64_t rows) {
-  const std::vector<std::uint64_t>& shape = dataset(name).shape;
+  const std::vector<std::uint64_t>& shape = Hdf5Contents::shape(name);
   std::uint64_t total = 1;
   for (std::size_t axis = 0; axis < shape.size(); ++axis) {
     total *= axis == 0 ? std::min(rows, shape[0]) : shape[axis];
@@ -335,7 +330,7 @@ void Hdf5Contents::read_from_child(const std::string& name, std::uint64_t rows, 
   if (!child_->process.write(&request, sizeof request)) {
     refuse_damaged();
   }
-  const std::vector<std::uint64_t>& shape = dataset(name).shape;
+  const std::vector<std::uint64_t>& shape = Hdf5Contents::shape(name);
   const std::uint64_t row = shape.size() < 2 || shape.back() > hdf5_piece ? 1 : shape.back();
   for (std::uint64_t first = 0; first < total; first += piece.size()) {
     if (!child_->process.list(piece, std::min(hdf5_piece, total - first) * sizeof(double)) ||
@@ -360,14 +355,6 @@ const Hdf5Value& Hdf5Contents::find(const std::map<std::string, Hdf5Value>& fiel
     refuse("{} '{}' {}", kind, name, found->second.problem);
   }
   return found->second;
-}
-
-const Hdf5Value& Hdf5Contents::attribute(const std::string& name) const {
-  return find(attributes_, "attribute", name);
-}
-
-const Hdf5Value& Hdf5Contents::dataset(const std::string& name) const {
-  return find(datasets_, "dataset", name);
 }
 
 }  // namespace palpate

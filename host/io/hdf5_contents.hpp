@@ -71,8 +71,6 @@ class Hdf5Contents {
   /// Returns the shape of a dataset of numbers; throws Error where it has not `rank` dimensions.
   const std::vector<std::uint64_t>& shape(const std::string& dataset,
                                           std::optional<std::size_t> rank = {}) const;
-  /// Returns how many numbers the shape of a dataset makes; UINT64_MAX on overflow.
-  std::uint64_t count(const std::string& dataset) const;
   /// Reads the dataset's first rows, or all.
   void read(const std::string& dataset, const Take& take, std::uint64_t rows = UINT64_MAX);
 
@@ -91,8 +89,6 @@ class Hdf5Contents {
   void read_from_child(const std::string& dataset, std::uint64_t rows, std::uint64_t total,
                        const Take& take);
   [[noreturn]] void refuse_damaged() const;
-  const Hdf5Value& attribute(const std::string& name) const;
-  const Hdf5Value& dataset(const std::string& name) const;
   const Hdf5Value& find(const std::map<std::string, Hdf5Value>& fields, const char* kind,
                         const std::string& name) const;
 

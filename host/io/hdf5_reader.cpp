@@ -306,7 +306,9 @@ bool Hdf5Reader::read(const std::string& name, std::uint64_t rows, const Take& t
   const std::uint64_t block =
       std::max<std::uint64_t>(1, hdf5_piece / std::max<std::uint64_t>(inner, 1));
   std::vector<double> values;
-  confinement_.memory_bytes(base_bytes + dataset.needed_bytes);
+  if (dataset.needed_bytes > 0) {
+    confinement_.memory_bytes(base_bytes + dataset.needed_bytes);
+  }
   const auto end = [&](std::size_t k) { return k == 0 ? rows : shape[k]; };
   for (bool more = true; more;) {
     box[axis] = std::min<hsize_t>(block, end(axis) - begin[axis]);

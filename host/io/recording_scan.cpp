@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <iterator>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -19,15 +20,11 @@ namespace {
 
 using Shape = std::vector<std::uint64_t>;
 
-// Datasets with a row for each touch or frame, `time` last: see FrameRecorder.
-const std::vector<std::string> row_names = {"pressure", "sensor_pose", "device_time", "lost_before",
-                                            "time"};
-
 // Returns the complete rows of a stream that is being recorded or was cut off: the rows that all
 // datasets have and whose time, which is written last, is not NaN.
 std::uint64_t whole_rows(Hdf5Contents& file) {
   std::uint64_t rows = UINT64_MAX;
-  for (const std::string& name : row_names) {
+  for (const char* name : row_names) {
     if (file.has_dataset(name)) {
       const Shape& shape = file.shape(name);
       rows = std::min(rows, shape.empty() ? 0 : shape[0]);
@@ -127,7 +124,7 @@ class Scan {
     Recording& r = head_.recording;
     const auto [n, e] = std::pair{head_.rows, head_.elements};
     if (has("valid", {{e}, {n, e}})) {
-      const std::uint64_t count = file_.count("valid");
+      const std::uint64_t count = stored_bytes(file_.shape("valid"), 1);
       require_memory(path_, fmt::format("dataset 'valid' of {} numbers", count), count);
       r.valid.reserve(count);
       file_.read("valid", [&](std::uint64_t, std::span<const double> values) {
@@ -230,7 +227,7 @@ class Scan {
   /// Returns the shape without incomplete rows.
   Shape cut(std::string_view name, Shape shape) const {
     const bool has_rows =
-        std::find(row_names.begin(), row_names.end(), name) != row_names.end() && !shape.empty();
+        std::ranges::find(row_names, name) != std::end(row_names) && !shape.empty();
     if (has_rows) {
       shape[0] = std::min(shape[0], rows_);
     }
