@@ -1,5 +1,8 @@
 #include "io/file_format.hpp"
 
+#include <algorithm>
+#include <iterator>
+
 #include "palpate/files.hpp"
 
 namespace palpate {
@@ -29,12 +32,8 @@ std::string format_of(const Hdf5Contents& file) {
 }
 
 const Kind* find_kind(std::string_view format) {
-  for (const Kind& kind : kinds) {
-    if (kind.format == format) {
-      return &kind;
-    }
-  }
-  return nullptr;
+  const Kind* const kind = std::ranges::find(kinds, format, &Kind::format);
+  return kind == std::end(kinds) ? nullptr : kind;
 }
 
 }  // namespace
