@@ -8,7 +8,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "io/standard_streams.hpp"
+#include "io/descriptor.hpp"
 #include "palpate/error.hpp"
 #include "report.hpp"
 

@@ -227,14 +227,6 @@ std::unique_ptr<Board> make_board(const std::string& name) {
   if (name == takktile_kind) {
     return std::make_unique<TakktileBoard>();
   }
-  std::vector<std::string> known = shipped_profiles();
-  if (!is_profile_path(name) && std::ranges::find(known, name) == known.end()) {
-    known.insert(known.begin(), takktile_kind);
-    throw Error(Fault::input,
-                fmt::format("sensor '{}': no such board; give one of {}, or the path of a profile "
-                            "that ends in .yaml",
-                            name, fmt::join(known, ", ")));
-  }
   return std::make_unique<SerialBoard>(name, read_serial_profile(name));
 }
 

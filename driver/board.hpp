@@ -50,9 +50,6 @@ class Board {
                               std::vector<ParsedFrame>& frames);
 };
 
-/// The name of the board that has no profile.
-inline const std::string takktile_kind = "takktile";
-
 /// Makes the board of a name without serial number: "takktile", a shipped profile's name, or the
 /// path of a profile. @throws Error (Fault::input)
 std::unique_ptr<Board> make_board(const std::string& name);

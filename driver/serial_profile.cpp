@@ -22,6 +22,10 @@ using Entry = YamlEntry;
 constexpr const char* suffix = ".yaml";
 constexpr std::size_t most_elements = 16384;
 
+bool is_profile_path(const std::string& name) {
+  return name.find('/') != std::string::npos || name.ends_with(suffix);
+}
+
 std::filesystem::path profile_folder() { return data_folder() / "profiles"; }
 
 [[noreturn]] void refuse(const std::filesystem::path& path, const std::string& message) {
@@ -184,23 +188,19 @@ std::vector<std::string> shipped_profiles() {
   return names;
 }
 
-bool is_profile_path(const std::string& name) {
-  return name.find('/') != std::string::npos || name.ends_with(suffix);
-}
-
 std::filesystem::path profile_path(const std::string& name_or_path) {
   return is_profile_path(name_or_path) ? std::filesystem::path(name_or_path)
                                        : profile_folder() / (name_or_path + suffix);
 }
 
 SerialProfile read_serial_profile(const std::string& name_or_path) {
-  if (!is_profile_path(name_or_path)) {
-    const std::vector<std::string> names = shipped_profiles();
-    if (std::find(names.begin(), names.end(), name_or_path) == names.end()) {
-      refuse(name_or_path, fmt::format("no such board; give one of {}, or the path of a profile "
-                                       "that ends in {}",
-                                       fmt::join(names, ", "), suffix));
-    }
+  std::vector<std::string> known = shipped_profiles();
+  if (!is_profile_path(name_or_path) && std::ranges::find(known, name_or_path) == known.end()) {
+    known.insert(known.begin(), takktile_kind);
+    throw Error(Fault::input,
+                fmt::format("sensor '{}': no such board; give one of {}, or the path of a profile "
+                            "that ends in {}",
+                            name_or_path, fmt::join(known, ", "), suffix));
   }
   const std::filesystem::path path = profile_path(name_or_path);
   return parse_serial_profile(text_of(path), path);

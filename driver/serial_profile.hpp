@@ -43,13 +43,14 @@ struct SerialProfile {
   PacketFormat packet;
 };
 
+/// The name of the board that has no profile.
+inline const std::string takktile_kind = "takktile";
+
 /// Names of the profiles that Palpate ships, in alphabetical order.
 std::vector<std::string> shipped_profiles();
 
-/// Whether a name is a path: it holds a '/' or ends in ".yaml", unlike a shipped profile's name.
-bool is_profile_path(const std::string& name);
-
-/// The file of the profile with this name or path; it need not exist.
+/// The file of the profile with this name or path; it need not exist. A path holds a '/' or ends in
+/// ".yaml", unlike a shipped profile's name.
 std::filesystem::path profile_path(const std::string& name_or_path);
 
 /// Reads a profile: a shipped profile by its name ("tsf85"), any other profile by its path.

@@ -195,7 +195,7 @@ std::string draw_table(const LearnedSensor& sensor) {
   comparison.colour = comparison_grey;
   comparison.line = Line::dotted;
   chart.series.push_back(std::move(comparison));
-  chart.rules.push_back({.at = -9.0, .colour = comparison_grey});
+  chart.rule = -9.0;
   return draw_chart(chart);
 }
 

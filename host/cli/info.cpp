@@ -118,19 +118,19 @@ void print_array(const RecordingSurvey& s) {
 void print_pressures(const RecordingSurvey& s) {
   const Recording& r = s.head.recording;
   const PressureSurvey& pressure = s.pressure;
-  if (const std::optional<Extremes>& range = pressure.range()) {
+  if (const std::optional<Extremes>& range = pressure.range) {
     fmt::print("  pressure          {:.3g} to {:.3g} {}, median {:.3g}, 99th percentile {:.3g}\n",
-               range->least, range->most, r.pressure_unit, pressure.readings().quantile(0.5),
-               pressure.readings().quantile(0.99));
+               range->least, range->most, r.pressure_unit, pressure.readings.quantile(0.5),
+               pressure.readings.quantile(0.99));
   }
   if (s.threshold) {
-    fmt::print("  in contact        {} {}, more than {} {} above {}\n", pressure.in_contact(),
-               r.rows, *s.threshold, r.pressure_unit, r.baseline.empty() ? "0" : "the baseline");
+    fmt::print("  in contact        {} {}, more than {} {} above {}\n", pressure.in_contact, r.rows,
+               *s.threshold, r.pressure_unit, r.baseline.empty() ? "0" : "the baseline");
   } else {
     fmt::print("  in contact        not known: raw pressure has no default threshold\n");
   }
-  if (pressure.unknown() > 0) {
-    fmt::print("  unknown readings  {} of {}\n", pressure.unknown(), s.head.rows * s.head.elements);
+  if (pressure.unknown > 0) {
+    fmt::print("  unknown readings  {} of {}\n", pressure.unknown, s.head.rows * s.head.elements);
   }
   if (!r.valid.empty()) {
     fmt::print("  dead readings     {} of {}\n", std::count(r.valid.begin(), r.valid.end(), 0),

@@ -12,8 +12,8 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/commands.hpp"
+#include "io/descriptor.hpp"
 #include "io/hdf5_process.hpp"
-#include "io/standard_streams.hpp"
 #include "model/option_words.hpp"
 #include "palpate/error.hpp"
 

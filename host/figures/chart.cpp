@@ -115,6 +115,15 @@ class Plot {
 
   const View& view() const { return view_; }
 
+  /// Draws a line through the whole plot.
+  void rule(double place, bool vertical, const Pen& pen) {
+    const Box& box = view_.box;
+    const glm::dvec2 at = view_.pixel({place, place});
+    canvas_.line(vertical ? std::array{glm::dvec2(at.x, box.top), glm::dvec2(at.x, box.bottom())}
+                          : std::array{glm::dvec2(box.left, at.y), glm::dvec2(box.right(), at.y)},
+                 pen);
+  }
+
   void grid() {
     const Pen pen{.colour = {0.84, 0.84, 0.84}, .width_px = 1.5};
     for (const Tick& tick : x_.ticks) {
@@ -122,12 +131,6 @@ class Plot {
     }
     for (const Tick& tick : y_.ticks) {
       rule(tick.value, false, pen);
-    }
-  }
-
-  void rules(const std::vector<ChartRule>& rules) {
-    for (const ChartRule& each : rules) {
-      rule(each.at, true, {.colour = each.colour, .width_px = 2.2, .dotted = true});
     }
   }
 
@@ -191,14 +194,6 @@ class Plot {
   }
   glm::dvec2 pixel(const ChartPoint& point) const { return view_.pixel({point.x, point.y}); }
 
-  void rule(double place, bool vertical, const Pen& pen) {
-    const Box& box = view_.box;
-    const glm::dvec2 at = view_.pixel({place, place});
-    canvas_.line(vertical ? std::array{glm::dvec2(at.x, box.top), glm::dvec2(at.x, box.bottom())}
-                          : std::array{glm::dvec2(box.left, at.y), glm::dvec2(box.right(), at.y)},
-                 pen);
-  }
-
   /// Writes the text beside the point where it covers no mark and no other label, or not at all.
   void label(const std::string& text, glm::dvec2 at, const Colour& colour) {
     const double w = canvas_.text_width(text, small);
@@ -259,10 +254,8 @@ AxisSpan span_of_axis(const Chart& chart, bool along_x) {
       }
     }
   }
-  for (const ChartRule& rule : chart.rules) {
-    if (along_x) {
-      values.push_back(rule.at);
-    }
+  if (along_x && chart.rule) {
+    values.push_back(*chart.rule);
   }
   return span_of(along_x ? chart.x : chart.y, values);
 }
@@ -325,7 +318,9 @@ std::string draw_chart(const Chart& chart) {
   for (const ChartSeries& series : chart.series) {
     plot.marks(series);
   }
-  plot.rules(chart.rules);
+  if (chart.rule) {
+    plot.rule(*chart.rule, true, {.colour = comparison_grey, .width_px = 2.2, .dotted = true});
+  }
   for (const ChartSeries& series : chart.series) {
     plot.labels(series);
   }

@@ -42,11 +42,8 @@ struct ChartSeries {
   std::vector<ChartPoint> points = {};
 };
 
-/// A dotted vertical line through the chart.
-struct ChartRule {
-  double at = 0.0;  ///< along x
-  Colour colour = ink;
-};
+/// Grey for a series that others are compared with.
+inline constexpr Colour comparison_grey{0.38, 0.38, 0.38};
 
 /// Series of points in one pair of axes, with a legend above.
 struct Chart {
@@ -54,14 +51,11 @@ struct Chart {
   ChartAxis x;
   ChartAxis y;
   std::vector<ChartSeries> series = {};
-  std::vector<ChartRule> rules = {};
+  std::optional<double> rule = {};  ///< x of a dotted vertical line, in comparison_grey
 };
 
 /// Draws the chart. Returns the bytes of a PNG file.
 /// @throws Error (Fault::system) where Cairo fails
 std::string draw_chart(const Chart& chart);
-
-/// Grey for a series that others are compared with.
-inline constexpr Colour comparison_grey{0.38, 0.38, 0.38};
 
 }  // namespace palpate

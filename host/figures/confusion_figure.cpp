@@ -85,9 +85,6 @@ struct Layout {
   }
 };
 
-/// Blue for the right answer, red for others; white for a share of 0.
-double place_of(double share, bool right) { return right ? -share : share; }
-
 void draw_labels(Canvas& canvas, const Layout& layout, const ConfusionFigure& figure) {
   for (std::size_t j = 0; j < figure.rows.size(); j += layout.every) {
     const std::string text = canvas.fit(figure.rows[j].name, longest_label_px, layout.label);
@@ -125,7 +122,8 @@ void draw_cells(Canvas& canvas, const Layout& layout, const ConfusionFigure& fig
   canvas.cells(layout.box, static_cast<int>(figure.columns.size()), rows, [&](int i, int j) {
     const auto row = static_cast<std::size_t>(rows - 1 - j);
     const auto column = static_cast<std::size_t>(i);
-    return diverging(place_of(share(row, column), right(row, column)));
+    // Blue for the right answer, red for others; white for a share of 0.
+    return diverging(right(row, column) ? -share(row, column) : share(row, column));
   });
   constexpr Pen grid{.colour = {0.85, 0.85, 0.85}, .width_px = 1.0};
   for (std::size_t j = 0; j < figure.rows.size() && layout.has_numbers(); ++j) {

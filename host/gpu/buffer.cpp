@@ -61,7 +61,7 @@ Buffer::Buffer(Context& context, VkDeviceSize bytes, Memory memory, std::string_
                     VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT
           : memory == Memory::upload ? VK_BUFFER_USAGE_TRANSFER_SRC_BIT
                                      : VK_BUFFER_USAGE_TRANSFER_DST_BIT)};
-  buffer_ = make_owned(vkCreateBuffer, device, info, doing);
+  buffer_ = make_owned(vkCreateBuffer, vkDestroyBuffer, device, info, doing);
   VkMemoryRequirements needs;
   vkGetBufferMemoryRequirements(device, buffer_.get(), &needs);
   constexpr VkMemoryPropertyFlags mapped =
@@ -75,7 +75,7 @@ Buffer::Buffer(Context& context, VkDeviceSize bytes, Memory memory, std::string_
   const VkMemoryAllocateInfo allocation{.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO,
                                         .allocationSize = needs.size,
                                         .memoryTypeIndex = type};
-  memory_ = make_owned(vkAllocateMemory, device, allocation, doing);
+  memory_ = make_owned(vkAllocateMemory, vkFreeMemory, device, allocation, doing);
   context.take_memory(needs.size);
   counted_ = {&context, {needs.size}};
   check(vkBindBufferMemory(device, buffer_.get(), memory_.get(), 0), doing);
@@ -84,7 +84,7 @@ Buffer::Buffer(Context& context, VkDeviceSize bytes, Memory memory, std::string_
                                       .buffer = buffer_.get(),
                                       .format = texel,
                                       .range = VK_WHOLE_SIZE};
-    table_ = make_owned(vkCreateBufferView, device, view, doing);
+    table_ = make_owned(vkCreateBufferView, vkDestroyBufferView, device, view, doing);
   }
   if (memory != Memory::device) {
     void* mapping = nullptr;

@@ -95,8 +95,8 @@ VkDescriptorSet CommandStream::descriptor_set(const Kernel& kernel,
                                           .maxSets = sets_per_pool,
                                           .poolSizeCount = 2,
                                           .pPoolSizes = sizes};
-    descriptor_pools_.push_back(
-        make_owned(vkCreateDescriptorPool, device, info, "creating a descriptor pool"));
+    descriptor_pools_.push_back(make_owned(vkCreateDescriptorPool, vkDestroyDescriptorPool, device,
+                                           info, "creating a descriptor pool"));
   }
   const VkDescriptorSetLayout layout = kernel.set_layout();
   const VkDescriptorSetAllocateInfo info{

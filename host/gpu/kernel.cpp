@@ -33,7 +33,8 @@ Kernel::Kernel(Context& context, const KernelInfo& info)
       .sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO,
       .bindingCount = static_cast<std::uint32_t>(bindings.size()),
       .pBindings = bindings.data()};
-  set_layout_ = make_owned(vkCreateDescriptorSetLayout, device, set_info, doing);
+  set_layout_ = make_owned(vkCreateDescriptorSetLayout, vkDestroyDescriptorSetLayout, device,
+                           set_info, doing);
   const VkDescriptorSetLayout set_layout = set_layout_.get();
 
   const VkPushConstantRange push{.stageFlags = VK_SHADER_STAGE_COMPUTE_BIT,
@@ -44,7 +45,7 @@ Kernel::Kernel(Context& context, const KernelInfo& info)
       .pSetLayouts = &set_layout,
       .pushConstantRangeCount = info.push_bytes > 0 ? 1U : 0U,
       .pPushConstantRanges = &push};
-  layout_ = make_owned(vkCreatePipelineLayout, device, layout_info, doing);
+  layout_ = make_owned(vkCreatePipelineLayout, vkDestroyPipelineLayout, device, layout_info, doing);
 
   std::vector<VkSpecializationMapEntry> entries;
   for (std::uint32_t i = 0; i < info.constants.size(); ++i) {
@@ -58,7 +59,8 @@ Kernel::Kernel(Context& context, const KernelInfo& info)
   const VkShaderModuleCreateInfo module_info{.sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO,
                                              .codeSize = info.spirv.size_bytes(),
                                              .pCode = info.spirv.data()};
-  const auto module = make_owned(vkCreateShaderModule, device, module_info, doing);
+  const auto module =
+      make_owned(vkCreateShaderModule, vkDestroyShaderModule, device, module_info, doing);
   const VkComputePipelineCreateInfo pipeline_info{
       .sType = VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO,
       .stage = {.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO,
@@ -70,7 +72,7 @@ Kernel::Kernel(Context& context, const KernelInfo& info)
   VkPipeline pipeline = VK_NULL_HANDLE;
   check(vkCreateComputePipelines(device, VK_NULL_HANDLE, 1, &pipeline_info, nullptr, &pipeline),
         doing);
-  pipeline_ = {pipeline, {device}};
+  pipeline_ = {pipeline, {device, vkDestroyPipeline}};
   context.validation().throw_if_any();
 }
 

@@ -12,41 +12,32 @@ namespace palpate::gpu {
 /// @throws Error (Fault::system) unless the result is VK_SUCCESS
 void check(VkResult result, std::string_view doing);
 
-void destroy(VkDevice device, VkBuffer object);
-void destroy(VkDevice device, VkBufferView object);
-void destroy(VkDevice device, VkCommandPool object);
-void destroy(VkDevice device, VkDescriptorPool object);
-void destroy(VkDevice device, VkDescriptorSetLayout object);
-void destroy(VkDevice device, VkDeviceMemory object);
-void destroy(VkDevice device, VkFence object);
-void destroy(VkDevice device, VkPipeline object);
-void destroy(VkDevice device, VkPipelineLayout object);
-void destroy(VkDevice device, VkQueryPool object);
-void destroy(VkDevice device, VkShaderModule object);
+/// A function such as vkDestroyBuffer or vkFreeMemory.
+template <class Handle>
+using Destroy = void (*)(VkDevice, Handle, const VkAllocationCallbacks*);
 
-struct Destroy {
+template <class Handle>
+struct DestroyObject {
   VkDevice device = VK_NULL_HANDLE;
+  Destroy<Handle> destroy = nullptr;
 
-  template <class Object>
-  void operator()(Object* object) const {
-    destroy(device, object);
-  }
+  void operator()(Handle object) const { destroy(device, object, nullptr); }
 };
 
 /// Owns an object of a device. Vulkan's handles are pointers on 64-bit machines.
 template <class Handle>
-using Owned = std::unique_ptr<std::remove_pointer_t<Handle>, Destroy>;
+using Owned = std::unique_ptr<std::remove_pointer_t<Handle>, DestroyObject<Handle>>;
 
-/// Calls vkCreate... or vkAllocate... for an object.
+/// Calls vkCreate... or vkAllocate... for an object that `destroy` ends.
 /// @throws Error (Fault::system) where that fails; `doing` says what was tried
 template <class Info, class Handle>
 Owned<Handle> make_owned(VkResult (*make)(VkDevice, const Info*, const VkAllocationCallbacks*,
                                           Handle*),
-                         VkDevice device, const std::type_identity_t<Info>& info,
-                         std::string_view doing) {
+                         std::type_identity_t<Destroy<Handle>> destroy, VkDevice device,
+                         const std::type_identity_t<Info>& info, std::string_view doing) {
   Handle handle = VK_NULL_HANDLE;
   check(make(device, &info, nullptr, &handle), doing);
-  return {handle, {device}};
+  return {handle, {device, destroy}};
 }
 
 }  // namespace palpate::gpu

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cctype>
-#include <charconv>
 #include <cstdlib>
 #include <optional>
 
@@ -10,6 +9,7 @@
 
 #include "gpu/owned.hpp"
 #include "gpu/vulkan.hpp"
+#include "model/number_text.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate::gpu {
@@ -104,11 +104,8 @@ std::string lower(std::string_view text) {
 }
 
 bool matches(const DeviceInfo& info, std::string_view name_or_index) {
-  int index = 0;
-  const char* end = name_or_index.data() + name_or_index.size();
-  const auto [rest, error] = std::from_chars(name_or_index.data(), end, index);
-  if (error == std::errc{} && rest == end) {
-    return info.index == index;
+  if (const auto index = whole_number_of(name_or_index)) {
+    return info.index == *index;
   }
   return lower(info.name).find(lower(name_or_index)) != std::string::npos;
 }

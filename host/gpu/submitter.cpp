@@ -39,7 +39,8 @@ Submitter::Submitter(Context& context) : context_(context) {
   const VkDevice device = context.device();
   const VkCommandPoolCreateInfo pool_info{.sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO,
                                           .queueFamilyIndex = context.queue_family()};
-  pool_ = make_owned(vkCreateCommandPool, device, pool_info, "creating a command pool");
+  pool_ = make_owned(vkCreateCommandPool, vkDestroyCommandPool, device, pool_info,
+                     "creating a command pool");
   const VkCommandBufferAllocateInfo buffer_info{
       .sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO,
       .commandPool = pool_.get(),
@@ -47,12 +48,13 @@ Submitter::Submitter(Context& context) : context_(context) {
       .commandBufferCount = 1};
   check(vkAllocateCommandBuffers(device, &buffer_info, &commands_), "creating commands");
   const VkFenceCreateInfo fence_info{.sType = VK_STRUCTURE_TYPE_FENCE_CREATE_INFO};
-  fence_ = make_owned(vkCreateFence, device, fence_info, "creating a fence");
+  fence_ = make_owned(vkCreateFence, vkDestroyFence, device, fence_info, "creating a fence");
   if (context.limits().timestamp_ns > 0.0F) {
     const VkQueryPoolCreateInfo query_info{.sType = VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO,
                                            .queryType = VK_QUERY_TYPE_TIMESTAMP,
                                            .queryCount = 2};
-    timestamps_ = make_owned(vkCreateQueryPool, device, query_info, "creating timestamps");
+    timestamps_ = make_owned(vkCreateQueryPool, vkDestroyQueryPool, device, query_info,
+                             "creating timestamps");
   }
 }
 

@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <charconv>
-#include <optional>
 #include <string>
 
 #include "io/descriptor.hpp"
@@ -71,14 +70,18 @@ std::uint64_t control_group_bytes() {
   return UINT64_MAX;
 }
 
+std::optional<std::uint64_t> status_bytes(const char* key) {
+  const auto held = number_after(text_of("/proc/self/status"), key);
+  return held ? std::optional(*held * kib) : std::nullopt;
+}
+
 /// Memory that a limit of this process leaves; the field of its status says how much is used.
 std::uint64_t limit_bytes(__rlimit_resource resource, const char* status_key) {
   rlimit present{};
   if (::getrlimit(resource, &present) != 0 || present.rlim_cur == RLIM_INFINITY) {
     return UINT64_MAX;
   }
-  const auto held = number_after(text_of("/proc/self/status"), status_key);
-  return left_of(present.rlim_cur, held.value_or(0) * kib);
+  return left_of(present.rlim_cur, status_bytes(status_key).value_or(0));
 }
 
 }  // namespace
@@ -87,6 +90,8 @@ std::uint64_t available_memory_bytes() {
   return std::min({machine_bytes(), control_group_bytes(), limit_bytes(RLIMIT_AS, "VmSize:"),
                    limit_bytes(RLIMIT_DATA, "VmData:")});
 }
+
+std::optional<std::uint64_t> data_bytes() { return status_bytes("VmData:"); }
 
 std::uint64_t stored_bytes(std::span<const std::uint64_t> shape, std::uint64_t width) {
   std::uint64_t bytes = width;

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <span>
 #include <string_view>
 
@@ -10,6 +11,10 @@ namespace palpate {
 /// Returns the memory in bytes that this process can still get: the least of what the machine (swap
 /// included), its control group and its own limits leave.
 std::uint64_t available_memory_bytes();
+
+/// Returns the private writable memory of this process in bytes, as RLIMIT_DATA counts it; none
+/// where the system does not tell.
+std::optional<std::uint64_t> data_bytes();
 
 /// Returns the bytes of values of this shape and width; UINT64_MAX on overflow.
 std::uint64_t stored_bytes(std::span<const std::uint64_t> shape, std::uint64_t width);

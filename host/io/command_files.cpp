@@ -8,9 +8,9 @@
 #include <system_error>
 #include <utility>
 
+#include "io/descriptor.hpp"
 #include "io/file_identity.hpp"
 #include "io/input_file.hpp"
-#include "io/standard_streams.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {

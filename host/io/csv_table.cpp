@@ -102,7 +102,7 @@ CsvTable::CsvTable(std::filesystem::path path) : path_(std::move(path)) {
   require_readable(path_);
   file_ = Descriptor(path_, O_RDONLY);
   if (!next_line()) {
-    palpate::refuse(path_, "holds no row; write one row of numbers for each reading");
+    palpate::refuse(path_, "holds no row; write at least one");
   }
   separator_ = separator_of(line_);
   split(line_);

@@ -10,6 +10,8 @@ namespace {
 
 constexpr int first_own = 3;  // after standard input, output and error
 
+std::array<bool, first_own> closed_streams{};
+
 int above_standard(int descriptor) {
   if (descriptor < 0 || descriptor >= first_own) {
     return descriptor;
@@ -52,5 +54,21 @@ StandardDescriptorsTaken::~StandardDescriptorsTaken() {
     }
   }
 }
+
+void open_closed_streams() {
+  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (::fcntl(stream, F_GETFD) != -1) {
+      continue;
+    }
+    closed_streams[static_cast<std::size_t>(stream)] = true;
+    // open() takes the lowest free number, which is this stream's. Without /dev, a folder takes it,
+    // and printing fails.
+    if (::open("/dev/null", O_RDWR) < 0) {
+      ::open("/", O_RDONLY | O_DIRECTORY);
+    }
+  }
+}
+
+bool was_closed(int stream) { return closed_streams.at(static_cast<std::size_t>(stream)); }
 
 }  // namespace palpate

@@ -1,5 +1,8 @@
 #include "io/file_format.hpp"
 
+#include <algorithm>
+#include <iterator>
+
 #include "palpate/files.hpp"
 
 namespace palpate {
@@ -29,12 +32,8 @@ std::string format_of(const Hdf5Contents& file) {
 }
 
 const Kind* find_kind(std::string_view format) {
-  for (const Kind& kind : kinds) {
-    if (kind.format == format) {
-      return &kind;
-    }
-  }
-  return nullptr;
+  const Kind* const kind = std::ranges::find(kinds, format, &Kind::format);
+  return kind == std::end(kinds) ? nullptr : kind;
 }
 
 }  // namespace
@@ -53,6 +52,31 @@ void require_format(const Hdf5Contents& file, std::string_view format) {
     file.refuse(
         "attribute 'version' = {} is newer than this program, which reads {}; update Palpate",
         version, format_version);
+  }
+}
+
+void write_format(Hdf5Writer& file, std::string_view format) {
+  file.attribute("format", format);
+  file.attribute("version", format_version);
+}
+
+void write_head(Hdf5Writer& file, const Recording& head) {
+  write_format(file, recording_format);
+  file.attribute("object", head.object);
+  file.attribute("pressure_unit", head.pressure_unit);
+  file.attribute("length_unit", "mm");
+  file.attribute("rows", head.rows);
+  if (head.truth) {
+    const Pose& pose = head.truth->T_object_robot;
+    file.attribute("true_object", head.truth->object);
+    file.attribute("true_T_object_robot",
+                   {pose.translation_mm.x, pose.translation_mm.y, pose.theta_rad});
+  }
+  if (!head.sensor.empty()) {
+    file.attribute("sensor", head.sensor);
+  }
+  if (!head.serial.empty()) {
+    file.attribute("serial", head.serial);
   }
 }
 

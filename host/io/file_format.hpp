@@ -3,6 +3,8 @@
 #include <string_view>
 
 #include "io/hdf5_contents.hpp"
+#include "io/hdf5_writer.hpp"
+#include "palpate/touch.hpp"
 
 namespace palpate {
 
@@ -12,7 +14,16 @@ inline constexpr std::string_view posterior_format = "palpate.posterior";
 /// Version of every format; readers refuse a higher version.
 inline constexpr int format_version = 1;
 
+/// Datasets of a recording with a row for each touch or frame. `time` is last: see FrameRecorder.
+inline constexpr const char* row_names[] = {"pressure", "sensor_pose", "device_time", "lost_before",
+                                            "time"};
+
 /// Throws Error unless the attributes `format` and `version` name this format.
 void require_format(const Hdf5Contents& file, std::string_view format);
+/// Writes these attributes.
+void write_format(Hdf5Writer& file, std::string_view format);
+
+/// Writes the attributes of a recording: its format, texts and truth.
+void write_head(Hdf5Writer& file, const Recording& head);
 
 }  // namespace palpate

@@ -10,12 +10,12 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <charconv>
 #include <csignal>
 #include <cstring>
 #include <optional>
 #include <system_error>
 
+#include "io/available_memory.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
@@ -33,26 +33,6 @@ using namespace std::chrono_literals;
 
 /// An answer has many small parts: together so many bytes cost one system call.
 constexpr std::size_t together = 1 << 14;
-
-/// Returns the private writable memory of this process, as RLIMIT_DATA counts it; none where the
-/// system does not tell.
-std::optional<std::uint64_t> data_bytes() {
-  char text[256] = {};
-  const Descriptor statm("/proc/self/statm", O_RDONLY);
-  const ssize_t size = ::read(statm.get(), text, sizeof text - 1);
-  const char* at = text;
-  const char* const end = text + std::max<ssize_t>(size, 0);
-  std::uint64_t pages[6] = {};  // size, resident, shared, text, library, data
-  for (std::uint64_t& field : pages) {
-    at = std::find_if(at, end, [](char c) { return c != ' '; });
-    const auto [rest, error] = std::from_chars(at, end, field);
-    if (error != std::errc{}) {
-      return {};
-    }
-    at = rest;
-  }
-  return pages[5] * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
-}
 
 /// Sets a soft limit, which the child raises as it learns what it has to read.
 void limit(__rlimit_resource resource, std::uint64_t most) {

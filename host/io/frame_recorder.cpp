@@ -38,8 +38,8 @@ constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 
 // Rows that wait to be saved.
 struct Rows {
-  std::vector<float> pressure;        // [n, e]
-  std::vector<double> sensor_pose;    // [n, 3]
+  std::vector<float> pressure;  // [n, e]
+  std::vector<Pose> sensor_pose;
   std::vector<double> device_time_s;  // [n]
   std::vector<std::uint64_t> lost_before;
   std::vector<double> time_s;
@@ -114,26 +114,8 @@ struct FrameRecorder::Impl {
     has_device_time = std::isfinite(pending.device_time_s.front());
     {
       Hdf5Writer out(path, Hdf5Writer::Layout::appendable);
-      out.attribute("format", recording_format);
-      out.attribute("version", format_version);
-      out.attribute("object", sensor.object);
-      out.attribute("pressure_unit", sensor.pressure_unit);
-      out.attribute("length_unit", "mm");
-      out.attribute("rows", "frames");
-      const Recording head = head_of(sensor);
-      out.attribute("sensor", head.sensor);
-      out.attribute("serial", head.serial);
-      if (sensor.truth) {
-        const Pose& T = sensor.truth->T_object_robot;
-        out.attribute("true_object", sensor.truth->object);
-        out.attribute("true_T_object_robot",
-                      std::vector<double>{T.translation_mm.x, T.translation_mm.y, T.theta_rad});
-      }
-      std::vector<double> elements;
-      for (const glm::dvec2& element : sensor.elements_mm) {
-        elements.insert(elements.end(), {element.x, element.y});
-      }
-      out.dataset("elements", {e, 2}, elements);
+      write_head(out, head_of(sensor));
+      out.dataset("elements", {e, 2}, sensor.elements_mm);
       if (!sensor.valid.empty()) {
         out.dataset("valid", {e}, sensor.valid);
       }
@@ -178,7 +160,7 @@ struct FrameRecorder::Impl {
       mark_as_being_recorded(*static_cast<int*>(descriptor));
     }
     bool open = file.valid();
-    for (const char* name : {"pressure", "sensor_pose", "device_time", "lost_before", "time"}) {
+    for (const char* name : row_names) {
       if (has_device_time || std::string_view(name) != "device_time") {
         Hdf5Handle dataset(H5Dopen2(file.get(), name, H5P_DEFAULT), H5Dclose);
         open = open && dataset.valid();
@@ -336,9 +318,7 @@ void FrameRecorder::add(const Frame& frame) {
   }
   // A pose that is not finite is dropped; its frame is kept.
   const bool posed = frame.T_robot_sensor && is_finite(*frame.T_robot_sensor);
-  const Pose pose = posed ? *frame.T_robot_sensor : Pose{{unknown, unknown}, unknown};
-  rows.sensor_pose.insert(rows.sensor_pose.end(),
-                          {pose.translation_mm.x, pose.translation_mm.y, pose.theta_rad});
+  rows.sensor_pose.push_back(posed ? *frame.T_robot_sensor : unknown_pose);
   const double device_time_s = frame.device_time_s.value_or(unknown);
   rows.device_time_s.push_back(std::isfinite(device_time_s) ? device_time_s : unknown);
   rows.lost_before.push_back(std::exchange(r.lost_since, 0));

@@ -4,10 +4,10 @@
 #include <atomic>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include <fmt/format.h>
 
-#include "io/available_memory.hpp"
 #include "io/hdf5_handle.hpp"
 #include "io/recording_state.hpp"
 #include "model/printable.hpp"
@@ -46,10 +46,13 @@ class ConfinedSession {
 /// Kinds of records in the first answer of serve_hdf5().
 enum class Hdf5Record : char { attribute = 'a', dataset = 'd', refused = 'r', end = 'e' };
 
-/// Asks for the first rows of a dataset.
+/// Asks for the first rows of a dataset, or for another file.
 struct Hdf5Request {
-  std::uint64_t dataset;  ///< its index among the names
-  std::uint64_t rows;     ///< along the first axis
+  static constexpr std::uint64_t open = UINT64_MAX;
+
+  std::uint64_t dataset;  ///< its index among the names; or `open`
+  /// Rows along the first axis; or the length of the path that follows, 0 to open none.
+  std::uint64_t size;
 };
 
 void send(ForkedSender& sender, Hdf5Record kind, const std::string& name, const Hdf5Value& value) {
@@ -64,50 +67,59 @@ void send(ForkedSender& sender, Hdf5Record kind, const std::string& name, const 
   }
 }
 
-/// Opens the file and answers on the socket, in a child of ForkedChild.
+/// Answers requests, in a child of ForkedChild.
 ///
-/// First it sends one record for each named attribute and dataset that exists: its kind, then name,
-/// problem, shape, numbers and strings of Hdf5Value, each after its length as a 64-bit integer.
-/// Numbers of datasets are left out. A file that cannot be opened gives one record `refused`, whose
-/// problem says why. The last record, `end`, has a kind alone.
+/// To Hdf5Request::open, it first sends one record for each named attribute and dataset that
+/// exists: its kind, then name, problem, shape, numbers and strings of Hdf5Value, each after its
+/// length as a 64-bit integer. Numbers of datasets are left out. A file that cannot be opened gives
+/// one record `refused`, whose problem says why. The last record, `end`, has a kind alone.
 ///
-/// Then it answers each Hdf5Request with the rows' numbers in row-major order, in pieces: a 64-bit
+/// It answers every other request with the rows' numbers in row-major order, in pieces: a 64-bit
 /// count from 1 to hdf5_piece and as many doubles. A count of 0 means that the rows cannot be read.
 ///
 /// It opens no other file, whatever links and storage this file names.
-void serve_hdf5(int socket, const std::filesystem::path& path, std::uint64_t file_bytes,
-                const std::vector<std::string>& attributes,
+void serve_hdf5(int socket, const std::vector<std::string>& attributes,
                 const std::vector<std::string>& datasets) {
   ForkedSender sender(socket);
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
   H5PLset_loading_state(0);          // a file's filters must not load code
   H5Lunregister(H5L_TYPE_EXTERNAL);  // nor its links open other files, which may be FIFOs
-  Hdf5Reader reader(path, file_bytes, attributes, datasets,
-                    {.follows_links = true,
-                     .memory_bytes = allow_memory_bytes,
-                     .cpu_seconds = allow_cpu_seconds});
-  if (!reader.problem().empty()) {
-    Hdf5Value refused;
-    refused.problem = reader.problem();
-    send(sender, Hdf5Record::refused, "", refused);
+  std::optional<Hdf5Reader> reader;
+  const auto open = [&](const std::string& path) {
+    allow_cpu_seconds(opening_cpu_seconds);
+    allow_memory_bytes(memory_bytes);
+    reader.emplace(path, attributes, datasets,
+                   Hdf5Confinement{.follows_links = true,
+                                   .memory_bytes = allow_memory_bytes,
+                                   .cpu_seconds = allow_cpu_seconds});
+    if (!reader->problem().empty()) {
+      Hdf5Value refused;
+      refused.problem = reader->problem();
+      send(sender, Hdf5Record::refused, "", refused);
+    }
+    for (const auto& [name, value] : reader->attributes()) {
+      send(sender, Hdf5Record::attribute, name, value);
+    }
+    for (const auto& [name, value] : reader->datasets()) {
+      send(sender, Hdf5Record::dataset, name, value);
+    }
     sender.value(Hdf5Record::end);
-    sender.flush();
-    return;
-  }
-  for (const auto& [name, value] : reader.attributes()) {
-    send(sender, Hdf5Record::attribute, name, value);
-  }
-  for (const auto& [name, value] : reader.datasets()) {
-    send(sender, Hdf5Record::dataset, name, value);
-  }
-  sender.value(Hdf5Record::end);
-  sender.flush();
+  };
   for (;;) {
     Hdf5Request request{};
     forked_read(socket, &request, sizeof request);  // ends the child after the last request
-    const auto send_rows = [&](std::span<const double> numbers) { sender.list(numbers); };
-    if (!reader.read(datasets.at(request.dataset), request.rows, send_rows)) {
-      send_rows({});
+    if (request.dataset == Hdf5Request::open) {
+      std::string path(request.size, '\0');
+      forked_read(socket, path.data(), path.size());
+      reader.reset();
+      if (!path.empty()) {
+        open(path);
+      }
+    } else {
+      const auto send_rows = [&](std::span<const double> numbers) { sender.list(numbers); };
+      if (!reader->read(datasets.at(request.dataset), request.size, send_rows)) {
+        send_rows({});
+      }
     }
     sender.flush();
   }
@@ -130,10 +142,18 @@ bool receive(ForkedChild& child, Hdf5Value& value) {
 void read_hdf5_in_children(bool wanted) { in_children = wanted; }
 bool reads_hdf5_in_children() { return in_children; }
 
+Hdf5Child::Hdf5Child(const std::vector<std::string>& attributes,
+                     const std::vector<std::string>& datasets, std::uint64_t file_bytes)
+    : process((initialise_hdf5(), [&](int socket) { serve_hdf5(socket, attributes, datasets); }),
+              ForkedLimits{.cpu_seconds = opening_cpu_seconds,
+                           .memory_bytes = memory_bytes,
+                           .silence = 1min + std::chrono::seconds(file_bytes / bytes_per_second)},
+              hdf5_mutex) {}
+
 Hdf5Contents::Hdf5Contents(const std::filesystem::path& path,
                            const std::vector<std::string>& attributes,
-                           const std::vector<std::string>& datasets)
-    : path_(path), dataset_names_(datasets) {
+                           const std::vector<std::string>& datasets, Hdf5Child* child)
+    : path_(path), dataset_names_(datasets), child_(child) {
   const std::uint64_t file_bytes = require_readable(path);
   if (file_bytes == 0) {
     refuse("is empty; copy or record it again");
@@ -141,70 +161,72 @@ Hdf5Contents::Hdf5Contents(const std::filesystem::path& path,
   // Checked before the file is opened: a file closed by now is read as a whole.
   closed_ = !is_marked_open(path);
   if (!in_children) {
-    open_here(file_bytes, attributes, datasets);
+    open_here(attributes, datasets);
     return;
   }
-  initialise_hdf5();
-  child_.emplace(
-      [&](int socket) { serve_hdf5(socket, path, file_bytes, attributes, datasets); },
-      ForkedLimits{.cpu_seconds = opening_cpu_seconds,
-                   .memory_bytes = memory_bytes,
-                   .silence = 1min + std::chrono::seconds(file_bytes / bytes_per_second)},
-      hdf5_mutex);
-  receive();
+  if (child_ == nullptr) {
+    child_ = &own_child_.emplace(attributes, datasets, file_bytes);
+  }
+  open_in_child();
 }
 
 Hdf5Contents::~Hdf5Contents() {
   if (reader_) {
     const ConfinedSession session;
     reader_.reset();
+  } else if (!own_child_ && child_->in_step) {
+    const Hdf5Request close{Hdf5Request::open, 0};
+    child_->process.write(&close, sizeof close);
   }
 }
 
-void Hdf5Contents::open_here(std::uint64_t file_bytes, const std::vector<std::string>& attributes,
+void Hdf5Contents::open_here(const std::vector<std::string>& attributes,
                              const std::vector<std::string>& datasets) {
+  const ConfinedSession session;
+  reader_ = std::make_unique<Hdf5Reader>(path_, attributes, datasets, Hdf5Confinement{});
+  if (!reader_->problem().empty()) {
+    refuse("{}", std::exchange(reader_, nullptr)->problem());
+  }
+  attributes_ = reader_->attributes();
+  datasets_.insert(reader_->datasets().begin(), reader_->datasets().end());
+}
+
+void Hdf5Contents::open_in_child() {
+  child_->in_step = false;
+  const std::string& name = path_.native();
+  const Hdf5Request request{Hdf5Request::open, name.size()};
+  if (!child_->process.write(&request, sizeof request) ||
+      !child_->process.write(name.data(), name.size())) {
+    refuse_damaged();
+  }
   std::string problem;
-  {
-    const ConfinedSession session;
-    reader_ =
-        std::make_unique<Hdf5Reader>(path_, file_bytes, attributes, datasets, Hdf5Confinement{});
-    problem = reader_->problem();
-    attributes_ = reader_->attributes();
-    for (const auto& [name, value] : reader_->datasets()) {
-      datasets_[name] = value;
+  for (;;) {
+    Hdf5Record kind{};
+    std::string field;
+    Hdf5Value value;
+    if (!child_->process.read(&kind, sizeof kind)) {
+      refuse_damaged();
     }
-    if (!problem.empty()) {
-      reader_.reset();
+    if (kind == Hdf5Record::end) {
+      break;
+    }
+    if (!child_->process.list(field, memory_bytes) || !receive(child_->process, value)) {
+      refuse_damaged();
+    }
+    if (kind == Hdf5Record::refused) {
+      problem = value.problem;
+    } else {
+      (kind == Hdf5Record::attribute ? attributes_ : datasets_)[field] = std::move(value);
     }
   }
+  child_->in_step = true;
   if (!problem.empty()) {
     refuse("{}", problem);
   }
 }
 
-void Hdf5Contents::receive() {
-  for (;;) {
-    Hdf5Record kind{};
-    std::string name;
-    Hdf5Value value;
-    if (!child_->read(&kind, sizeof kind)) {
-      refuse_damaged();
-    }
-    if (kind == Hdf5Record::end) {
-      return;
-    }
-    if (!child_->list(name, memory_bytes) || !palpate::receive(*child_, value)) {
-      refuse_damaged();
-    }
-    if (kind == Hdf5Record::refused) {
-      refuse("{}", value.problem);
-    }
-    (kind == Hdf5Record::attribute ? attributes_ : datasets_)[name] = std::move(value);
-  }
-}
-
 void Hdf5Contents::refuse_damaged() const {
-  if (child_->fell_silent()) {
+  if (child_->process.fell_silent()) {
     throw Error(Fault::system,
                 fmt::format("{}: cannot be read: its disk does not answer; copy it to "
                             "another disk",
@@ -214,7 +236,7 @@ void Hdf5Contents::refuse_damaged() const {
 }
 
 std::string Hdf5Contents::text(const std::string& name) const {
-  const Hdf5Value& value = attribute(name);
+  const Hdf5Value& value = find(attributes_, "attribute", name);
   if (value.strings.empty() && value.numbers.empty()) {
     return "";
   }
@@ -226,7 +248,7 @@ std::string Hdf5Contents::text(const std::string& name) const {
 }
 
 std::vector<std::string> Hdf5Contents::texts(const std::string& name) const {
-  const Hdf5Value& value = attribute(name);
+  const Hdf5Value& value = find(attributes_, "attribute", name);
   if (value.strings.empty()) {
     refuse("attribute '{}' holds no string; store one", name);
   }
@@ -241,7 +263,7 @@ std::vector<std::string> Hdf5Contents::texts(const std::string& name) const {
 double Hdf5Contents::number(const std::string& name) const { return numbers(name, 1).front(); }
 
 std::vector<double> Hdf5Contents::numbers(const std::string& name, std::size_t count) const {
-  const Hdf5Value& value = attribute(name);
+  const Hdf5Value& value = find(attributes_, "attribute", name);
   if (value.numbers.size() != count) {
     refuse("attribute '{}' holds {} numbers; store {}", name, value.numbers.size(), count);
   }
@@ -263,19 +285,15 @@ int Hdf5Contents::integer(const std::string& name, int least) const {
 
 const std::vector<std::uint64_t>& Hdf5Contents::shape(const std::string& name,
                                                       std::optional<std::size_t> rank) const {
-  const Hdf5Value& value = dataset(name);
+  const Hdf5Value& value = find(datasets_, "dataset", name);
   if (rank && value.shape.size() != *rank) {
     refuse("dataset '{}' has {} dimensions; give it {}", name, value.shape.size(), *rank);
   }
   return value.shape;
 }
 
-std::uint64_t Hdf5Contents::count(const std::string& name) const {
-  return stored_bytes(shape(name), 1);
-}
-
 void Hdf5Contents::read(const std::string& name, const Take& take, std::uint64_t rows) {
-  const std::vector<std::uint64_t>& shape = dataset(name).shape;
+  const std::vector<std::uint64_t>& shape = Hdf5Contents::shape(name);
   std::uint64_t total = 1;
   for (std::size_t axis = 0; axis < shape.size(); ++axis) {
     total *= axis == 0 ? std::min(rows, shape[0]) : shape[axis];
@@ -308,22 +326,22 @@ void Hdf5Contents::read_from_child(const std::string& name, std::uint64_t rows, 
   const auto index = std::ranges::find(dataset_names_, name) - dataset_names_.begin();
   const Hdf5Request request{static_cast<std::uint64_t>(index), rows};
   std::vector<double> piece;
-  bool intact = child_->write(&request, sizeof request);
-  for (std::uint64_t first = 0; intact && first < total; first += piece.size()) {
-    std::uint64_t count = 0;
-    intact = child_->read(&count, sizeof count);
-    if (intact && count == 0) {
+  child_->in_step = false;
+  if (!child_->process.write(&request, sizeof request)) {
+    refuse_damaged();
+  }
+  const std::vector<std::uint64_t>& shape = Hdf5Contents::shape(name);
+  const std::uint64_t row = shape.size() < 2 || shape.back() > hdf5_piece ? 1 : shape.back();
+  for (std::uint64_t first = 0; first < total; first += piece.size()) {
+    if (!child_->process.list(piece, std::min(hdf5_piece, total - first) * sizeof(double)) ||
+        piece.size() % row != 0) {
+      refuse_damaged();
+    }
+    child_->in_step = piece.empty() || first + piece.size() == total;
+    if (piece.empty()) {
       refuse("dataset '{}' {}", name, hdf5_damaged);
     }
-    intact = intact && count <= std::min(hdf5_piece, total - first);
-    piece.resize(intact ? count : 0);
-    intact = intact && child_->read(piece.data(), piece.size() * sizeof(double));
-    if (intact) {
-      take(first, piece);
-    }
-  }
-  if (!intact) {
-    refuse_damaged();
+    take(first, piece);
   }
 }
 
@@ -337,14 +355,6 @@ const Hdf5Value& Hdf5Contents::find(const std::map<std::string, Hdf5Value>& fiel
     refuse("{} '{}' {}", kind, name, found->second.problem);
   }
   return found->second;
-}
-
-const Hdf5Value& Hdf5Contents::attribute(const std::string& name) const {
-  return find(attributes_, "attribute", name);
-}
-
-const Hdf5Value& Hdf5Contents::dataset(const std::string& name) const {
-  return find(datasets_, "dataset", name);
 }
 
 }  // namespace palpate

@@ -17,6 +17,17 @@
 
 namespace palpate {
 
+/// A forked child that reads one HDF5 file after the other, of each the same fields.
+struct Hdf5Child {
+  /// @param file_bytes most of a file; its disk has to deliver them at 1 MB/s
+  /// @throws Error (Fault::system) where the system refuses another process
+  Hdf5Child(const std::vector<std::string>& attributes, const std::vector<std::string>& datasets,
+            std::uint64_t file_bytes);
+
+  ForkedChild process;
+  bool in_step = true;  ///< false while the child has to answer, and for ever where it fails
+};
+
 /// The named attributes and datasets that exist in an HDF5 file's root group.
 ///
 /// What a file claims is checked before memory is taken for it. Numbers of datasets come in pieces,
@@ -30,13 +41,16 @@ namespace palpate {
 /// a libhdf5 call while an object of this class is made. Without a child, soft links are refused.
 class Hdf5Contents {
  public:
-  /// Takes a piece of a dataset's numbers in row-major order; `first` is the index of its first.
+  /// Takes a piece of a dataset's numbers in row-major order; `first` is the index of its first. A
+  /// piece holds whole rows of the last axis, unless such a row has more than hdf5_piece numbers.
   /// Must not use HDF5.
   using Take = std::function<void(std::uint64_t first, std::span<const double> numbers)>;
 
+  /// @param child that has been forked for these fields, is in step and reads no other file; none:
+  /// a child of this object's own, where children read
   /// @throws Error where the file is missing, unreadable, no HDF5 file, truncated or damaged.
   Hdf5Contents(const std::filesystem::path& path, const std::vector<std::string>& attributes,
-               const std::vector<std::string>& datasets);
+               const std::vector<std::string>& datasets, Hdf5Child* child = nullptr);
 
   /// False for a file that is being recorded or whose recorder was killed: see FrameRecorder.
   bool closed() const { return closed_; }
@@ -57,8 +71,6 @@ class Hdf5Contents {
   /// Returns the shape of a dataset of numbers; throws Error where it has not `rank` dimensions.
   const std::vector<std::uint64_t>& shape(const std::string& dataset,
                                           std::optional<std::size_t> rank = {}) const;
-  /// Returns how many numbers the shape of a dataset makes; UINT64_MAX on overflow.
-  std::uint64_t count(const std::string& dataset) const;
   /// Reads the dataset's first rows, or all.
   void read(const std::string& dataset, const Take& take, std::uint64_t rows = UINT64_MAX);
 
@@ -70,15 +82,13 @@ class Hdf5Contents {
   }
 
  private:
-  void open_here(std::uint64_t file_bytes, const std::vector<std::string>& attributes,
+  void open_here(const std::vector<std::string>& attributes,
                  const std::vector<std::string>& datasets);
-  void receive();
+  void open_in_child();
   void read_here(const std::string& dataset, std::uint64_t rows, const Take& take);
   void read_from_child(const std::string& dataset, std::uint64_t rows, std::uint64_t total,
                        const Take& take);
   [[noreturn]] void refuse_damaged() const;
-  const Hdf5Value& attribute(const std::string& name) const;
-  const Hdf5Value& dataset(const std::string& name) const;
   const Hdf5Value& find(const std::map<std::string, Hdf5Value>& fields, const char* kind,
                         const std::string& name) const;
 
@@ -88,8 +98,9 @@ class Hdf5Contents {
   std::map<std::string, Hdf5Value> attributes_;
   std::map<std::string, Hdf5Value> datasets_;
   // One of the two reads the file.
-  std::optional<ForkedChild> child_;
+  Hdf5Child* child_;
   std::unique_ptr<Hdf5Reader> reader_;
+  std::optional<Hdf5Child> own_child_;
 };
 
 }  // namespace palpate

@@ -3,7 +3,9 @@
 #include <hdf5.h>
 
 #include <mutex>
+#include <string>
 #include <utility>
+#include <vector>
 
 namespace palpate {
 
@@ -58,5 +60,19 @@ class Hdf5Handle {
   hid_t id_;
   herr_t (*close_)(hid_t);
 };
+
+/// Returns HDF5's account of the last failure on this thread, the innermost error first.
+inline std::vector<std::string> hdf5_errors() {
+  std::vector<std::string> errors;
+  H5Ewalk2(
+      H5E_DEFAULT, H5E_WALK_UPWARD,
+      [](unsigned, const H5E_error2_t* error, void* all) -> herr_t {
+        static_cast<std::vector<std::string>*>(all)->emplace_back(
+            error->desc == nullptr ? "" : error->desc);
+        return 0;
+      },
+      &errors);
+  return errors;
+}
 
 }  // namespace palpate

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <functional>
 #include <numeric>
+#include <system_error>
+#include <utility>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -14,24 +16,38 @@ namespace palpate {
 
 namespace {
 
-void read_strings(hid_t attribute, hid_t type, hid_t space, std::size_t count, Hdf5Value& value) {
+/// Reads the shape of a dataspace, which may be invalid; false where the file is damaged.
+bool read_shape(hid_t space, std::vector<std::uint64_t>& shape) {
+  const int rank = space >= 0 ? H5Sget_simple_extent_ndims(space) : -1;
+  if (rank < 0) {
+    return false;
+  }
+  std::vector<hsize_t> extents(static_cast<std::size_t>(rank));
+  H5Sget_simple_extent_dims(space, extents.data(), nullptr);
+  shape.assign(extents.begin(), extents.end());
+  if (H5Sget_simple_extent_type(space) == H5S_NULL) {
+    shape = {0};  // h5py's Empty, its form of an empty fixed-length string
+  }
+  return true;
+}
+
+bool read_strings(hid_t attribute, hid_t type, hid_t space, std::size_t count,
+                  std::vector<std::string>& strings) {
   if (H5Tis_variable_str(type) > 0) {
     std::vector<char*> texts(count, nullptr);
     if (H5Aread(attribute, type, texts.data()) < 0) {
-      value.problem = hdf5_damaged;
-      return;
+      return false;
     }
     for (const char* text : texts) {
-      value.strings.emplace_back(text == nullptr ? "" : text);
+      strings.emplace_back(text == nullptr ? "" : text);
     }
     H5Dvlen_reclaim(type, space, H5P_DEFAULT, texts.data());
-    return;
+    return true;
   }
   const std::size_t width = H5Tget_size(type);
   std::string texts(count * width, '\0');
   if (H5Aread(attribute, type, texts.data()) < 0) {
-    value.problem = hdf5_damaged;
-    return;
+    return false;
   }
   for (std::size_t i = 0; i < count; ++i) {
     std::string text = texts.substr(i * width, width);
@@ -39,57 +55,34 @@ void read_strings(hid_t attribute, hid_t type, hid_t space, std::size_t count, H
     if (H5Tget_strpad(type) == H5T_STR_SPACEPAD) {
       text.resize(text.find_last_not_of(' ') + 1);
     }
-    value.strings.push_back(std::move(text));
+    strings.push_back(std::move(text));
   }
+  return true;
 }
 
-Hdf5Value read_attribute(hid_t attribute, std::uint64_t file_bytes) {
-  Hdf5Value value;
+// Returns the value's problem.
+std::string read_attribute(hid_t attribute, std::uint64_t file_bytes, Hdf5Value& value) {
   const Hdf5Handle type(attribute >= 0 ? H5Aget_type(attribute) : -1, H5Tclose);
   const Hdf5Handle space(attribute >= 0 ? H5Aget_space(attribute) : -1, H5Sclose);
   const std::size_t width = type.valid() ? H5Tget_size(type.get()) : 0;
-  if (!hdf5_shape(space.get(), value.shape) || width == 0) {
-    value.problem = hdf5_damaged;
-    return value;
+  if (!read_shape(space.get(), value.shape) || width == 0) {
+    return hdf5_damaged;
   }
   const H5T_class_t kind = H5Tget_class(type.get());
   if (kind != H5T_STRING && kind != H5T_INTEGER && kind != H5T_FLOAT && kind != H5T_ENUM) {
-    value.problem = "has a type that Palpate does not read; store numbers or strings";
-    return value;
+    return "has a type that Palpate does not read; store numbers or strings";
   }
   const std::uint64_t bytes = stored_bytes(value.shape, width);
   if (bytes > file_bytes) {
-    value.problem = hdf5_damaged;
-    return value;
+    return hdf5_damaged;
   }
   const std::size_t count = bytes / width;
-  if (count == 0) {
-    return value;
-  }
-  if (kind == H5T_STRING) {
-    read_strings(attribute, type.get(), space.get(), count, value);
-    return value;
-  }
-  value.numbers.resize(count);
-  if (H5Aread(attribute, H5T_NATIVE_DOUBLE, value.numbers.data()) < 0) {
-    value.problem = hdf5_damaged;
-  }
-  return value;
-}
-
-// Returns HDF5's innermost account of the last failure.
-std::string innermost_reason() {
-  std::string reason;
-  H5Ewalk2(
-      H5E_DEFAULT, H5E_WALK_UPWARD,
-      [](unsigned index, const H5E_error2_t* error, void* text) -> herr_t {
-        if (index == 0 && error->desc != nullptr) {
-          *static_cast<std::string*>(text) = error->desc;
-        }
-        return 0;
-      },
-      &reason);
-  return reason;
+  value.numbers.resize(kind == H5T_STRING ? 0 : count);
+  const bool read =
+      count == 0 ||
+      (kind == H5T_STRING ? read_strings(attribute, type.get(), space.get(), count, value.strings)
+                          : H5Aread(attribute, H5T_NATIVE_DOUBLE, value.numbers.data()) >= 0);
+  return read ? "" : hdf5_damaged;
 }
 
 std::string open_problem(const std::string& reason) {
@@ -108,7 +101,8 @@ Hdf5Handle open_file(const std::filesystem::path& path, std::string& reason) {
   H5Pset_file_locking(access.get(), true, true);  // some network file systems have no locks
   Hdf5Handle file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, access.get()), H5Fclose);
   if (!file.valid()) {
-    reason = innermost_reason();
+    const std::vector<std::string> errors = hdf5_errors();
+    reason = errors.empty() ? "" : errors.front();
     // SWMR opens a stream that is being recorded, or whose recorder was killed.
     file = {H5Fopen(path.c_str(), H5F_ACC_RDONLY | H5F_ACC_SWMR_READ, access.get()), H5Fclose};
   }
@@ -126,12 +120,6 @@ constexpr std::uint64_t copies_of_a_chunk = 5;
 
 // Largest compression ratio of HDF5's own filters: deflate turns at most 258 bytes into 2 bits.
 constexpr std::uint64_t largest_compression = 1032;
-
-// Returns the type of the dataset's link; H5L_TYPE_ERROR where the file is damaged.
-H5L_type_t link_type(hid_t file, const std::string& name) {
-  H5L_info_t link{};
-  return H5Lget_info(file, name.c_str(), &link, H5P_DEFAULT) < 0 ? H5L_TYPE_ERROR : link.type;
-}
 
 // Checked before the shape: for a virtual dataset's shape, HDF5 reads other files.
 std::string storage_problem(hid_t creation) {
@@ -158,12 +146,33 @@ std::uint64_t product(std::span<const std::uint64_t> factors) {
   return std::accumulate(factors.begin(), factors.end(), std::uint64_t{1}, std::multiplies<>());
 }
 
+bool read_box(hid_t dataset, const std::vector<hsize_t>& begin, const std::vector<hsize_t>& count,
+              std::span<double> values) {
+  const Hdf5Handle there(H5Dget_space(dataset), H5Sclose);
+  const hsize_t size = values.size();
+  const Hdf5Handle here(H5Screate_simple(1, &size, nullptr), H5Sclose);
+  return there.valid() &&
+         (H5Sget_simple_extent_ndims(there.get()) == 0 ||  // one number, which needs no selection
+          H5Sselect_hyperslab(there.get(), H5S_SELECT_SET, begin.data(), nullptr, count.data(),
+                              nullptr) >= 0) &&
+         H5Dread(dataset, H5T_NATIVE_DOUBLE, here.get(), there.get(), H5P_DEFAULT, values.data()) >=
+             0;
+}
+
+/// The file's size in bytes, which bounds what a damaged shape may claim. A file that is being
+/// recorded grows.
+std::uint64_t size_of(const std::filesystem::path& path) {
+  std::error_code failure;
+  const std::uintmax_t bytes = std::filesystem::file_size(path, failure);
+  return failure ? 0 : bytes;
+}
+
 }  // namespace
 
-Hdf5Reader::Hdf5Reader(const std::filesystem::path& path, std::uint64_t file_bytes,
+Hdf5Reader::Hdf5Reader(const std::filesystem::path& path,
                        const std::vector<std::string>& attributes,
-                       const std::vector<std::string>& datasets, const Hdf5Confinement& confinement)
-    : file_(H5I_INVALID_HID, H5Fclose) {
+                       const std::vector<std::string>& datasets, Hdf5Confinement confinement)
+    : confinement_(std::move(confinement)) {
   if (H5Fis_hdf5(path.c_str()) <= 0) {
     problem_ = "is not an HDF5 file; give a file that Palpate or h5py wrote";
     return;
@@ -177,161 +186,141 @@ Hdf5Reader::Hdf5Reader(const std::filesystem::path& path, std::uint64_t file_byt
   for (const std::string& name : attributes) {
     if (const htri_t there = H5Aexists(file_.get(), name.c_str()); there != 0) {
       const Hdf5Handle attribute(H5Aopen(file_.get(), name.c_str(), H5P_DEFAULT), H5Aclose);
-      attributes_[name] = read_attribute(attribute.get(), file_bytes);
+      Hdf5Value& value = attributes_[name];
+      value.problem = read_attribute(attribute.get(), size_of(path), value);
     }
   }
   for (const std::string& name : datasets) {
     if (const htri_t there = H5Lexists(file_.get(), name.c_str(), H5P_DEFAULT); there != 0) {
-      // A file that is being recorded grows.
-      file_bytes = std::max<std::uint64_t>(file_bytes, std::filesystem::file_size(path));
-      const Hdf5Rows& rows =
-          rows_.try_emplace(name, file_.get(), name, file_bytes, confinement).first->second;
-      Hdf5Value& value = datasets_[name];
-      value.problem = rows.problem();
-      value.shape = rows.shape();
+      Dataset& dataset = datasets_[name];
+      dataset.problem = open(name, size_of(path), dataset);
     }
   }
 }
 
-bool Hdf5Reader::read(const std::string& dataset, std::uint64_t rows, const Hdf5Rows::Take& take) {
-  return rows_.at(dataset).read(rows, take);
-}
-
-bool hdf5_shape(hid_t space, std::vector<std::uint64_t>& shape) {
-  const int rank = space >= 0 ? H5Sget_simple_extent_ndims(space) : -1;
-  if (rank < 0) {
-    return false;
-  }
-  std::vector<hsize_t> extents(static_cast<std::size_t>(rank));
-  H5Sget_simple_extent_dims(space, extents.data(), nullptr);
-  shape.assign(extents.begin(), extents.end());
-  if (H5Sget_simple_extent_type(space) == H5S_NULL) {
-    shape = {0};  // h5py's Empty, its form of an empty fixed-length string
-  }
-  return true;
-}
-
-Hdf5Rows::Hdf5Rows(hid_t file, const std::string& name, std::uint64_t file_bytes,
-                   const Hdf5Confinement& confinement)
-    : confinement_(confinement) {
-  const H5L_type_t link = link_type(file, name);
+// Returns why the dataset cannot be read.
+std::string Hdf5Reader::open(const std::string& name, std::uint64_t file_bytes,
+                             Dataset& dataset) const {
+  H5L_info_t info{};
+  const H5L_type_t link = H5Lget_info(file_.get(), name.c_str(), &info, H5P_DEFAULT) < 0
+                              ? H5L_TYPE_ERROR  // the file is damaged
+                              : info.type;
   if (link != H5L_TYPE_HARD && link != H5L_TYPE_SOFT && link != H5L_TYPE_ERROR) {
-    problem_ = "is a link to another file, which is not followed; copy the dataset into this file";
-    return;
+    return "is a link to another file, which is not followed; copy the dataset into this file";
   }
   if (link == H5L_TYPE_SOFT && !confinement_.follows_links) {
-    problem_ = "is a link, which may lead to another file; store the dataset itself";
-    return;
+    return "is a link, which may lead to another file; store the dataset itself";
   }
-  dataset_ = Hdf5Handle(H5Dopen2(file, name.c_str(), H5P_DEFAULT), H5Dclose);
-  const Hdf5Handle creation(dataset_.valid() ? H5Dget_create_plist(dataset_.get()) : -1, H5Pclose);
+  Hdf5Handle& handle = dataset.handle;
+  handle = Hdf5Handle(H5Dopen2(file_.get(), name.c_str(), H5P_DEFAULT), H5Dclose);
+  const Hdf5Handle creation(handle.valid() ? H5Dget_create_plist(handle.get()) : -1, H5Pclose);
   if (!creation.valid()) {
-    problem_ = link == H5L_TYPE_SOFT
-                   ? "is a link that leads to no dataset of this file; store the dataset itself"
-                   : hdf5_damaged;
-    return;
+    return link == H5L_TYPE_SOFT
+               ? "is a link that leads to no dataset of this file; store the dataset itself"
+               : hdf5_damaged;
   }
-  if (problem_ = storage_problem(creation.get()); !problem_.empty()) {
-    return;
+  if (std::string problem = storage_problem(creation.get()); !problem.empty()) {
+    return problem;
   }
-  const Hdf5Handle type(H5Dget_type(dataset_.get()), H5Tclose);
-  const Hdf5Handle space(H5Dget_space(dataset_.get()), H5Sclose);
+  const Hdf5Handle type(H5Dget_type(handle.get()), H5Tclose);
+  const Hdf5Handle space(H5Dget_space(handle.get()), H5Sclose);
   const std::size_t width = type.valid() ? H5Tget_size(type.get()) : 0;
-  if (!hdf5_shape(space.get(), shape_) || width == 0) {
-    problem_ = hdf5_damaged;
-    return;
+  if (!read_shape(space.get(), dataset.shape) || width == 0) {
+    return hdf5_damaged;
   }
   const H5T_class_t kind = H5Tget_class(type.get());
   if (kind == H5T_STRING) {
-    problem_ = "holds strings; store numbers";
-  } else if (kind != H5T_INTEGER && kind != H5T_FLOAT && kind != H5T_ENUM) {
-    problem_ = "has a type that Palpate does not read; store numbers";
-  } else if (stored_bytes(shape_, width) >
-             largest_dataset(dataset_.get(), creation.get(), file_bytes)) {
-    problem_ = fmt::format(
+    return "holds strings; store numbers";
+  }
+  if (kind != H5T_INTEGER && kind != H5T_FLOAT && kind != H5T_ENUM) {
+    return "has a type that Palpate does not read; store numbers";
+  }
+  if (stored_bytes(dataset.shape, width) >
+      largest_dataset(handle.get(), creation.get(), file_bytes)) {
+    return fmt::format(
         "has the shape {}, more than is stored of it: it is damaged or was never written; copy or "
         "record it again",
-        shape_);
-  } else if (!reopen_with_cache(file, name, creation.get(), width)) {
-    problem_ = hdf5_damaged;
+        dataset.shape);
   }
+  return reopen_with_cache(name, creation.get(), width, dataset);
 }
 
 // A pass over the rows meets each of their chunks again and again. All these chunks stay in HDF5's
 // cache; else each would be inflated once for every piece.
-bool Hdf5Rows::reopen_with_cache(hid_t file, const std::string& name, hid_t creation,
-                                 std::size_t width) {
+std::string Hdf5Reader::reopen_with_cache(const std::string& name, hid_t creation,
+                                          std::size_t width, Dataset& dataset) const {
   if (H5Pget_layout(creation) != H5D_CHUNKED) {
-    return true;
+    return "";
   }
-  std::vector<hsize_t> chunk(shape_.size());
+  std::vector<hsize_t> chunk(dataset.shape.size());
   const int rank = static_cast<int>(chunk.size());
   if (rank == 0 || H5Pget_chunk(creation, rank, chunk.data()) != rank ||
       std::count(chunk.begin(), chunk.end(), 0) > 0) {
-    return false;
+    return hdf5_damaged;
   }
   const auto deep = static_cast<std::size_t>(
       std::find_if(chunk.begin(), chunk.end() - 1, [](hsize_t extent) { return extent > 1; }) -
       chunk.begin());
   std::uint64_t chunks = 1;
   for (std::size_t axis = deep + 1; axis < chunk.size(); ++axis) {
-    chunks *= shape_[axis] / chunk[axis] + 1;
+    chunks *= dataset.shape[axis] / chunk[axis] + 1;
   }
   const std::uint64_t chunk_bytes =
       stored_bytes(std::vector<std::uint64_t>(chunk.begin(), chunk.end()), width);
-  if (__builtin_mul_overflow(chunk_bytes, chunks, &band_bytes_)) {
-    return false;
+  if (__builtin_mul_overflow(chunk_bytes, chunks, &dataset.band_bytes)) {
+    return hdf5_damaged;
   }
-  const std::uint64_t needed = band_bytes_ + copies_of_a_chunk * chunk_bytes;
+  dataset.needed_bytes = dataset.band_bytes + copies_of_a_chunk * chunk_bytes;
   // Otherwise a child's own limit would count as what is available.
   confinement_.memory_bytes(UINT64_MAX);
   const std::uint64_t available = available_memory_bytes();
   confinement_.memory_bytes(base_bytes);
-  if (needed > available) {
-    problem_ = fmt::format(
+  if (dataset.needed_bytes > available) {
+    return fmt::format(
         "is stored in chunks of {}, of which {:.1f} GB have to be held at a time; {:.1f} GB of "
         "memory are available: store it in smaller chunks",
-        chunk, static_cast<double>(needed) * 1e-9, static_cast<double>(available) * 1e-9);
-    return true;
+        chunk, static_cast<double>(dataset.needed_bytes) * 1e-9,
+        static_cast<double>(available) * 1e-9);
   }
-  needed_bytes_ = needed;
   const Hdf5Handle access(H5Pcreate(H5P_DATASET_ACCESS), H5Pclose);
   // HDF5 hashes chunks to slots: ten slots a chunk, and an odd number, make collisions rare.
   const std::size_t slots = std::min<std::size_t>(10 * chunks + 521, 1'000'003);
-  H5Pset_chunk_cache(access.get(), slots, std::max<std::size_t>(band_bytes_, 1 << 20), 1.0);
-  dataset_ = Hdf5Handle(H5I_INVALID_HID, H5Dclose);  // an open dataset would keep its cache
-  dataset_ = Hdf5Handle(H5Dopen2(file, name.c_str(), access.get()), H5Dclose);
-  return dataset_.valid();
+  H5Pset_chunk_cache(access.get(), slots, std::max<std::size_t>(dataset.band_bytes, 1 << 20), 1.0);
+  dataset.handle = Hdf5Handle(H5I_INVALID_HID, H5Dclose);  // an open dataset would keep its cache
+  dataset.handle = Hdf5Handle(H5Dopen2(file_.get(), name.c_str(), access.get()), H5Dclose);
+  return dataset.handle.valid() ? "" : hdf5_damaged;
 }
 
-bool Hdf5Rows::read(std::uint64_t rows, const Take& take) {
-  const std::size_t rank = shape_.size();
-  std::vector<hsize_t> begin(rank, 0);
-  std::vector<hsize_t> box(shape_.begin(), shape_.end());
+bool Hdf5Reader::read(const std::string& name, std::uint64_t rows, const Take& take) {
+  const Dataset& dataset = datasets_.at(name);
+  const std::vector<std::uint64_t> shape =
+      dataset.shape.empty() ? std::vector<std::uint64_t>{1} : dataset.shape;
+  std::vector<hsize_t> begin(shape.size(), 0);
+  std::vector<hsize_t> box(shape.begin(), shape.end());
   // A piece is a block along one axis: all of the axes after it, a single index of those before it.
   std::size_t axis = 0;
-  while (axis + 1 < rank && product(std::span(shape_).subspan(axis + 1)) > hdf5_piece) {
+  while (axis + 1 < shape.size() && product(std::span(shape).subspan(axis + 1)) > hdf5_piece) {
     box[axis++] = 1;
   }
-  const std::uint64_t inner = rank == 0 ? 1 : product(std::span(shape_).subspan(axis + 1));
+  const std::uint64_t inner = product(std::span(shape).subspan(axis + 1));
   const std::uint64_t block =
       std::max<std::uint64_t>(1, hdf5_piece / std::max<std::uint64_t>(inner, 1));
   std::vector<double> values;
-  confinement_.memory_bytes(base_bytes + needed_bytes_);
-  const auto end = [&](std::size_t k) { return k == 0 ? rows : shape_[k]; };
+  if (dataset.needed_bytes > 0) {
+    confinement_.memory_bytes(base_bytes + dataset.needed_bytes);
+  }
+  const auto end = [&](std::size_t k) { return k == 0 ? rows : shape[k]; };
   for (bool more = true; more;) {
-    if (rank > 0) {
-      box[axis] = std::min<hsize_t>(block, end(axis) - begin[axis]);
-    }
-    values.resize((rank == 0 ? 1 : box[axis]) * inner);
+    box[axis] = std::min<hsize_t>(block, end(axis) - begin[axis]);
+    values.resize(box[axis] * inner);
     // The time limit follows what a piece reads: the chunks of a pass, at most.
-    confinement_.cpu_seconds(piece_cpu_seconds + band_bytes_ / cpu_bytes_per_second);
-    if (values.empty() || !read_box(begin, box, values)) {
+    confinement_.cpu_seconds(piece_cpu_seconds + dataset.band_bytes / cpu_bytes_per_second);
+    if (values.empty() || !read_box(dataset.handle.get(), begin, box, values)) {
       return false;
     }
     take(values);
     more = false;
-    for (std::size_t k = rank == 0 ? 0 : axis + 1; k-- > 0 && !more;) {
+    for (std::size_t k = axis + 1; k-- > 0 && !more;) {
       begin[k] += box[k];
       more = begin[k] < end(k);
       if (!more && k > 0) {
@@ -340,22 +329,6 @@ bool Hdf5Rows::read(std::uint64_t rows, const Take& take) {
     }
   }
   return true;
-}
-
-bool Hdf5Rows::read_box(const std::vector<hsize_t>& begin, const std::vector<hsize_t>& count,
-                        std::span<double> values) const {
-  if (begin.empty()) {
-    return H5Dread(dataset_.get(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT,
-                   values.data()) >= 0;
-  }
-  const Hdf5Handle there(H5Dget_space(dataset_.get()), H5Sclose);
-  const hsize_t size = values.size();
-  const Hdf5Handle here(H5Screate_simple(1, &size, nullptr), H5Sclose);
-  return there.valid() &&
-         H5Sselect_hyperslab(there.get(), H5S_SELECT_SET, begin.data(), nullptr, count.data(),
-                             nullptr) >= 0 &&
-         H5Dread(dataset_.get(), H5T_NATIVE_DOUBLE, here.get(), there.get(), H5P_DEFAULT,
-                 values.data()) >= 0;
 }
 
 }  // namespace palpate

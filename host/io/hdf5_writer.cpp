@@ -15,6 +15,8 @@
 
 namespace palpate {
 
+static_assert(sizeof(Pose) == 3 * sizeof(double) && sizeof(glm::dvec2) == 2 * sizeof(double));
+
 namespace {
 
 // Callbacks by which HDF5 manages a file's memory.
@@ -186,17 +188,10 @@ void Hdf5Writer::add_attribute(const char* name, hid_t type, hid_t space, const 
   require(attribute.valid() && H5Awrite(attribute.get(), type, values) >= 0, name);
 }
 
-void Hdf5Writer::narrow_dataset(const char* name, const Shape& shape,
-                                const std::vector<double>& values) {
-  const Hdf5Handle dataset = create_dataset(name, shape, H5T_NATIVE_FLOAT, Storage::plain);
-  require(
-      H5Dwrite(dataset.get(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) >= 0,
-      name);
-}
-
 void Hdf5Writer::add_dataset(const char* name, const Shape& shape, hid_t type, const void* values,
                              Storage storage) {
-  const Hdf5Handle dataset = create_dataset(name, shape, type, storage);
+  const hid_t stored = storage == Storage::narrow ? H5T_NATIVE_FLOAT : type;
+  const Hdf5Handle dataset = create_dataset(name, shape, stored, storage);
   require(H5Dwrite(dataset.get(), type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0, name);
 }
 
@@ -241,21 +236,14 @@ void Hdf5Writer::require(bool done, std::string_view what) const {
 }
 
 std::string hdf5_failure() {
-  std::string reason = "HDF5 failed";
-  H5Ewalk2(
-      H5E_DEFAULT, H5E_WALK_UPWARD,
-      [](unsigned, const H5E_error2_t* error, void* text) -> herr_t {
-        const std::string_view said = error->desc == nullptr ? "" : error->desc;
-        const std::string_view key = "error message = '";
-        if (const std::size_t at = said.find(key); at != std::string_view::npos) {
-          const std::string_view rest = said.substr(at + key.size());
-          *static_cast<std::string*>(text) = rest.substr(0, rest.find('\''));
-          return 1;
-        }
-        return 0;
-      },
-      &reason);
-  return reason;
+  const std::string key = "error message = '";
+  for (const std::string& said : hdf5_errors()) {
+    if (const std::size_t at = said.find(key); at != std::string::npos) {
+      const std::string rest = said.substr(at + key.size());
+      return rest.substr(0, rest.find('\''));
+    }
+  }
+  return "HDF5 failed";
 }
 
 void give_up_hdf5_file(hid_t file) {

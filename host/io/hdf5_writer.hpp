@@ -12,8 +12,10 @@
 #include <vector>
 
 #include <hdf5.h>
+#include <glm/vec2.hpp>
 
 #include "io/hdf5_handle.hpp"
+#include "palpate/pose.hpp"
 
 namespace palpate {
 
@@ -36,8 +38,9 @@ struct Hdf5Image {
 class Hdf5Writer {
  public:
   using Shape = std::vector<std::size_t>;
-  /// Storage of a dataset; a `growing` one can be extended along the first axis.
-  enum class Storage { plain, compressed, growing };
+  /// Storage of a dataset; a `narrow` one holds float32, and a `growing` one can be extended along
+  /// the first axis.
+  enum class Storage { plain, narrow, compressed, growing };
   /// What HDF5 can do with the file after save(): an `appendable` one can be open in one writer and
   /// many readers at a time (SWMR), which takes HDF5 1.10.
   enum class Layout { closed, appendable };
@@ -53,13 +56,12 @@ class Hdf5Writer {
   void attribute(const char* name, int number);
   void attribute(const char* name, const std::vector<double>& numbers);
 
+  /// Poses take three numbers each, points two.
   template <typename Value>
   void dataset(const char* name, const Shape& shape, const std::vector<Value>& values,
                Storage storage = Storage::plain) {
     add_dataset(name, shape, native_type(Value{}), values.data(), storage);
   }
-  /// Writes the values as float32, without a copy of them.
-  void narrow_dataset(const char* name, const Shape& shape, const std::vector<double>& values);
   /// Writes a dataset in parts, each one step along the first axis, in order.
   void dataset(const char* name, const Shape& shape,
                const std::function<std::vector<double>(std::size_t)>& part, Storage storage);
@@ -71,6 +73,8 @@ class Hdf5Writer {
 
  private:
   static hid_t native_type(double) { return H5T_NATIVE_DOUBLE; }
+  static hid_t native_type(const glm::dvec2&) { return H5T_NATIVE_DOUBLE; }
+  static hid_t native_type(const Pose&) { return H5T_NATIVE_DOUBLE; }
   static hid_t native_type(float) { return H5T_NATIVE_FLOAT; }
   static hid_t native_type(std::uint8_t) { return H5T_NATIVE_UINT8; }
   static hid_t native_type(std::uint64_t) { return H5T_NATIVE_UINT64; }

@@ -226,8 +226,7 @@ void write_map(const std::filesystem::path& path, const OccupancyGrid& map) {
   require_text(path, "attribute 'label'", map.label);
   require_sound(path, fault_of(map));
   Hdf5Writer file(path);
-  file.attribute("format", map_format);
-  file.attribute("version", format_version);
+  write_format(file, map_format);
   file.attribute("label", map.label);
   file.attribute("cell_mm", map.cell_mm);
   file.attribute("origin_mm", {map.origin_mm.x, map.origin_mm.y});

@@ -45,25 +45,18 @@ void write_map_server(const std::filesystem::path& yaml_path, const OccupancyGri
   constexpr double metres_per_mm = 1e-3;
   // The origin is the corner, not the centre, of the lower left pixel.
   const glm::dvec2 corner_mm = map.origin_mm - 0.5 * map.cell_mm;
-  // Numbers are written as text: an Emitter writes them with the locale's decimal commas.
-  const auto number = [](double value) { return fmt::format("{:.12g}", value); };
-  YAML::Emitter yaml;
-  yaml << YAML::BeginMap;
-  yaml << YAML::Key << "image" << YAML::Value << image_path.filename().string();
-  yaml << YAML::Key << "mode" << YAML::Value << "trinary";
-  yaml << YAML::Key << "resolution" << YAML::Value << number(map.cell_mm * metres_per_mm);
-  yaml << YAML::Key << "origin" << YAML::Value << YAML::Flow
-       << std::vector<std::string>{number(corner_mm.x * metres_per_mm),
-                                   number(corner_mm.y * metres_per_mm), number(0.0)};
-  yaml << YAML::Key << "negate" << YAML::Value << number(0.0);
-  yaml << YAML::Key << "occupied_thresh" << YAML::Value << number(occupied_threshold);
-  yaml << YAML::Key << "free_thresh" << YAML::Value << number(free_threshold);
-  yaml << YAML::EndMap << YAML::Newline;
+  YAML::Emitter image_name;  // in quotes where YAML wants them
+  image_name << image_path.filename().string();
+  const std::string yaml = fmt::format(
+      "image: {}\nmode: trinary\nresolution: {:.12g}\norigin: [{:.12g}, {:.12g}, 0]\nnegate: 0\n"
+      "occupied_thresh: {:.12g}\nfree_thresh: {:.12g}\n",
+      image_name.c_str(), map.cell_mm * metres_per_mm, corner_mm.x * metres_per_mm,
+      corner_mm.y * metres_per_mm, occupied_threshold, free_threshold);
 
   AtomicFile image_file(image_path);
   AtomicFile yaml_file(yaml_path);
   image_file.write(image_of(map));
-  yaml_file.write(yaml.c_str());
+  yaml_file.write(yaml);
   // The image first: the YAML that names it must not appear without it.
   image_file.commit();
   yaml_file.commit();

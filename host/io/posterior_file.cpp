@@ -139,8 +139,7 @@ void write_posterior(const std::filesystem::path& path, const std::vector<std::s
                      const std::function<std::vector<double>(std::size_t object)>& log_likelihood) {
   validate(path, objects, lattice);
   Hdf5Writer file(path);
-  file.attribute("format", posterior_format);
-  file.attribute("version", format_version);
+  write_format(file, posterior_format);
   file.attribute("objects", objects);
   file.attribute("bins_x", lattice.x_mm.count);
   file.attribute("bins_y", lattice.y_mm.count);

@@ -4,9 +4,9 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "io/available_memory.hpp"
-#include "io/table_columns.hpp"
 #include "model/lost_count.hpp"
 #include "model/number_text.hpp"
 #include "model/printable.hpp"
@@ -115,188 +115,158 @@ std::vector<std::size_t> columns_named(const CsvTable& table, const std::string&
   return columns;
 }
 
-/// A table with a row for each frame.
-class WideTable {
- public:
-  WideTable(CsvTable& table, std::size_t elements, const TableOptions& options) : table_(table) {
-    time_ = find_time(table, options);
-    if (!table.has_header() && !time_ && options.pressure_columns.empty() &&
-        table.columns().size() == elements + 1) {
-      time_ = UnitColumn{.index = 0, .unit = options.time_unit.value_or(time_units.front())};
+/// The columns that have a name and are not taken. A column without a name is the index that pandas
+/// writes.
+std::vector<std::size_t> columns_left(const CsvTable& table,
+                                      const std::vector<std::size_t>& taken) {
+  std::vector<std::size_t> left;
+  for (std::size_t i = 0; i < table.columns().size(); ++i) {
+    if (!table.columns()[i].empty() && std::ranges::find(taken, i) == taken.end()) {
+      left.push_back(i);
     }
-    device_time_ = table.find("device_time");
-    lost_before_ = table.find("lost_before");
-    pose_ = find_pose(table, options);
-    const std::vector<std::size_t> taken = columns_taken();
-    columns_ = options.pressure_columns.empty()
-                   ? columns_left(taken)
-                   : columns_named(table, options.pressure_columns, taken);
-    if (columns_.size() != elements) {
-      table.refuse(
-          "{} columns of pressure{} for an array of {} elements; correct `array`, or name "
-          "the columns by `pressure-columns`",
-          columns_.size(), span_of_names(), elements);
-    }
-    require_counting_names(table, columns_);
   }
+  return left;
+}
 
-  PressureTable read() {
-    PressureTable all;
-    all.holds_poses = !pose_.empty();
-    reserve(table_, "rows", table_.count_lines(), columns_.size(), all);
-    double last_s = before_all;
-    while (table_.next()) {
-      for (const std::size_t column : columns_) {
-        all.pressure.push_back(table_.number(column).value_or(unknown));
-      }
-      if (time_) {
-        last_s = time_in(table_, *time_, last_s, false);
-        all.time_s.push_back(last_s);
-      }
-      if (device_time_) {
-        all.device_time_s.push_back(table_.number(*device_time_).value_or(unknown));
-      }
-      if (lost_before_) {
-        all.lost_before.push_back(
-            count_in(table_, *lost_before_, largest_count, "is no count of lost frames"));
-      }
-    }
-    return all;
+/// Reads a table with a row for each frame.
+PressureTable read_wide(CsvTable& table, std::size_t elements, const TableOptions& options) {
+  std::optional<UnitColumn> time = find_time(table, options);
+  if (!table.has_header() && !time && options.pressure_columns.empty() &&
+      table.columns().size() == elements + 1) {
+    time = UnitColumn{.index = 0, .unit = options.time_unit.value_or(time_units.front())};
   }
+  const auto device_time = table.find("device_time");
+  const auto lost_before = table.find("lost_before");
+  const std::vector<UnitColumn> pose = find_pose(table, options);
+  std::vector<std::size_t> taken;
+  for (const auto& column : {device_time, lost_before}) {
+    if (column) {
+      taken.push_back(*column);
+    }
+  }
+  if (time) {
+    taken.push_back(time->index);
+  }
+  for (const UnitColumn& column : pose) {
+    taken.push_back(column.index);
+  }
+  const std::vector<std::size_t> columns =
+      options.pressure_columns.empty() ? columns_left(table, taken)
+                                       : columns_named(table, options.pressure_columns, taken);
+  if (columns.size() != elements) {
+    const std::string span =
+        columns.empty() || !table.has_header()
+            ? ""
+            : fmt::format(" ('{}' to '{}')", printable(table.columns()[columns.front()]),
+                          printable(table.columns()[columns.back()]));
+    table.refuse(
+        "{} columns of pressure{} for an array of {} elements; correct `array`, or name "
+        "the columns by `pressure-columns`",
+        columns.size(), span, elements);
+  }
+  require_counting_names(table, columns);
 
- private:
-  std::vector<std::size_t> columns_taken() const {
-    std::vector<std::size_t> taken;
-    for (const auto& column : {device_time_, lost_before_}) {
-      if (column) {
-        taken.push_back(*column);
+  PressureTable all;
+  all.holds_poses = !pose.empty();
+  reserve(table, "rows", table.count_lines(), elements, all);
+  double last_s = before_all;
+  while (table.next()) {
+    for (const std::size_t column : columns) {
+      all.pressure.push_back(table.number(column).value_or(unknown));
+    }
+    if (time) {
+      last_s = time_in(table, *time, last_s, false);
+      all.time_s.push_back(last_s);
+    }
+    if (device_time) {
+      all.device_time_s.push_back(table.number(*device_time).value_or(unknown));
+    }
+    if (lost_before) {
+      all.lost_before.push_back(
+          count_in(table, *lost_before, largest_count, "is no count of lost frames"));
+    }
+  }
+  return all;
+}
+
+/// At least the number of runs of rows with the same cell in a column: a number may be written in
+/// two ways.
+std::uint64_t count_runs(const std::filesystem::path& path, std::size_t column) {
+  CsvTable rows(path);
+  std::string last;
+  std::uint64_t runs = 0;
+  while (rows.next()) {
+    if (runs == 0 || rows.text(column) != last) {
+      last = rows.text(column);
+      ++runs;
+    }
+  }
+  return runs;
+}
+
+double frame_in(const CsvTable& table, std::size_t column, double last) {
+  const double frame = table.require_number(column);
+  if (frame < last) {
+    table.refuse("column '{}': {} comes after {}; sort the rows by it",
+                 printable(table.columns()[column]), frame, last);
+  }
+  return frame;
+}
+
+/// Reads a table with a row for each reading; none where it has no columns of elements and their
+/// pressures.
+std::optional<PressureTable> read_long(CsvTable& table, std::size_t elements,
+                                       const TableOptions& options) {
+  const auto element_column = find_one_of(table, {"element", "taxel"});
+  const auto pressure_column = find_one_of(table, {"pressure", "pressure_kpa", "value"});
+  const auto frame_column = find_one_of(table, {"frame", "touch"});
+  const auto time = find_time(table, options);
+  if (!element_column || !pressure_column) {
+    return {};
+  }
+  if (!time && !frame_column) {
+    table.refuse(
+        "a table with a row for each reading needs a column 'time' or 'frame'; add it, "
+        "or name it by `time-column`");
+  }
+  PressureTable all;
+  reserve(table, time ? "frames, one for each time," : "frames",
+          count_runs(table.path(), time ? time->index : *frame_column), elements, all);
+  const std::string remedy =
+      fmt::format("is no element; the array has {}, counted from 0", elements);
+  double last = before_all;
+  std::vector<bool> read(elements);
+  while (table.next()) {
+    const double key =
+        time ? time_in(table, *time, last, false) : frame_in(table, *frame_column, last);
+    if (key != last) {
+      all.pressure.insert(all.pressure.end(), elements, unknown);
+      read.assign(elements, false);
+      if (time) {
+        all.time_s.push_back(key);
       }
+      last = key;
     }
-    if (time_) {
-      taken.push_back(time_->index);
+    const auto element = count_in(table, *element_column, elements - 1, remedy.c_str());
+    if (read[element]) {
+      table.refuse("element {} has two readings {}; leave one out", element,
+                   time ? "at one time" : "in one frame");
     }
-    for (const UnitColumn& column : pose_) {
-      taken.push_back(column.index);
-    }
-    return taken;
+    read[element] = true;
+    all.pressure[all.pressure.size() - elements + element] =
+        table.number(*pressure_column).value_or(unknown);
   }
-
-  std::vector<std::size_t> columns_left(const std::vector<std::size_t>& taken) const {
-    std::vector<std::size_t> left;
-    for (std::size_t i = 0; i < table_.columns().size(); ++i) {
-      // A column without a name is the index that pandas writes.
-      if (!table_.columns()[i].empty() && std::ranges::find(taken, i) == taken.end()) {
-        left.push_back(i);
-      }
-    }
-    return left;
-  }
-
-  std::string span_of_names() const {
-    return columns_.empty() || !table_.has_header()
-               ? ""
-               : fmt::format(" ('{}' to '{}')", printable(table_.columns()[columns_.front()]),
-                             printable(table_.columns()[columns_.back()]));
-  }
-
-  CsvTable& table_;
-  std::optional<UnitColumn> time_;
-  std::optional<std::size_t> device_time_;
-  std::optional<std::size_t> lost_before_;
-  std::vector<UnitColumn> pose_;
-  std::vector<std::size_t> columns_;  ///< [e]
-};
-
-/// A table with a row for each reading.
-class LongTable {
- public:
-  LongTable(CsvTable& table, std::size_t elements, const TableOptions& options)
-      : table_(table), elements_(elements), time_(find_time(table, options)) {
-    element_ = find_one_of(table, {"element", "taxel"});
-    pressure_ = find_one_of(table, {"pressure", "pressure_kpa", "value"});
-    frame_ = find_one_of(table, {"frame", "touch"});
-  }
-
-  bool is_one() const { return element_ && pressure_; }
-
-  PressureTable read() {
-    if (!time_ && !frame_) {
-      table_.refuse(
-          "a table with a row for each reading needs a column 'time' or 'frame'; add it, "
-          "or name it by `time-column`");
-    }
-    PressureTable all;
-    reserve(table_, time_ ? "frames, one for each time," : "frames", count_frames(), elements_,
-            all);
-    double last = before_all;
-    std::vector<bool> read(elements_);
-    while (table_.next()) {
-      const double key = time_ ? time_in(table_, *time_, last, false) : frame_in(last);
-      if (key != last) {
-        all.pressure.insert(all.pressure.end(), elements_, unknown);
-        read.assign(elements_, false);
-        if (time_) {
-          all.time_s.push_back(key);
-        }
-        last = key;
-      }
-      const std::string remedy =
-          fmt::format("is no element; the array has {}, counted from 0", elements_);
-      const auto element = count_in(table_, *element_, elements_ - 1, remedy.c_str());
-      if (read[element]) {
-        table_.refuse("element {} has two readings {}; leave one out", element,
-                      time_ ? "at one time" : "in one frame");
-      }
-      read[element] = true;
-      all.pressure[all.pressure.size() - elements_ + element] =
-          table_.number(*pressure_).value_or(unknown);
-    }
-    return all;
-  }
-
- private:
-  /// At least the number of frames: a number may be written in two ways.
-  std::uint64_t count_frames() const {
-    const std::size_t key = time_ ? time_->index : *frame_;
-    CsvTable rows(table_.path());
-    std::string last;
-    std::uint64_t frames = 0;
-    for (bool first = true; rows.next(); first = false) {
-      if (first || rows.text(key) != last) {
-        last = rows.text(key);
-        ++frames;
-      }
-    }
-    return frames;
-  }
-
-  double frame_in(double last) const {
-    const double frame = table_.require_number(*frame_);
-    if (frame < last) {
-      table_.refuse("column '{}': {} comes after {}; sort the rows by it",
-                    printable(table_.columns()[*frame_]), frame, last);
-    }
-    return frame;
-  }
-
-  CsvTable& table_;
-  std::size_t elements_;
-  std::optional<UnitColumn> time_;
-  std::optional<std::size_t> element_;
-  std::optional<std::size_t> pressure_;
-  std::optional<std::size_t> frame_;
-};
-
-constexpr std::string_view axis_names[][1] = {{"x"}, {"y"}};
+  return all;
+}
 
 UnitColumn find_axis(const CsvTable& table, std::size_t axis) {
   if (!table.has_header() && table.columns().size() == 2) {
     return {.index = axis, .unit = length_units.front()};
   }
-  const auto column = find_column(table, {axis_names[axis], length_units, "array"}, "", {});
+  const char* const name = axis == 0 ? "x" : "y";
+  const auto column = find_column(table, {name, length_units, "array"}, "", {});
   if (!column) {
-    table.refuse("no column is called '{}'; write a row 'x y' in mm for each element",
-                 axis_names[axis][0]);
+    table.refuse("no column is called '{}'; write a row 'x y' in mm for each element", name);
   }
   return *column;
 }
@@ -315,13 +285,14 @@ double coordinate(const CsvTable& table, const UnitColumn& column) {
 PressureTable read_pressures(const std::filesystem::path& path, std::size_t elements,
                              const TableOptions& options) {
   CsvTable table(path);
-  LongTable as_long(table, elements, options);
-  PressureTable pressures =
-      as_long.is_one() ? as_long.read() : WideTable(table, elements, options).read();
-  if (pressures.pressure.empty()) {
+  std::optional<PressureTable> pressures = read_long(table, elements, options);
+  if (!pressures) {
+    pressures = read_wide(table, elements, options);
+  }
+  if (pressures->pressure.empty()) {
     refuse(path, "holds a header and no row; write a row for each frame");
   }
-  return pressures;
+  return *std::move(pressures);
 }
 
 ArrayTable read_array(const std::filesystem::path& path) {

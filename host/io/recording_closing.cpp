@@ -4,6 +4,7 @@
 #include <cerrno>
 #include <cstring>
 
+#include "io/file_format.hpp"
 #include "io/forked_child.hpp"
 #include "io/hdf5_handle.hpp"
 #include "io/hdf5_process.hpp"
@@ -22,7 +23,7 @@ using namespace std::chrono_literals;
 
 // Cuts every growing dataset to the complete rows.
 bool cut_rows(hid_t file, std::uint64_t rows) {
-  for (const char* name : {"pressure", "sensor_pose", "device_time", "lost_before", "time"}) {
+  for (const char* name : row_names) {
     if (H5Lexists(file, name, H5P_DEFAULT) <= 0) {
       continue;
     }

@@ -38,24 +38,6 @@ void reserve(const std::filesystem::path& path, const RecordingHead& head, Recor
   recording.elements_mm.reserve(places);
 }
 
-void write_stream(Hdf5Writer& file, const Recording& recording) {
-  if (!recording.sensor.empty()) {
-    file.attribute("sensor", recording.sensor);
-  }
-  if (!recording.serial.empty()) {
-    file.attribute("serial", recording.serial);
-  }
-  if (!recording.baseline.empty()) {
-    file.dataset("baseline", {recording.baseline.size()}, recording.baseline);
-  }
-  if (!recording.device_time_s.empty()) {
-    file.dataset("device_time", {recording.size()}, recording.device_time_s);
-  }
-  if (!recording.lost_before.empty()) {
-    file.dataset("lost_before", {recording.size()}, recording.lost_before);
-  }
-}
-
 // Checks the sizes of a recording that is about to be written.
 void require_agreement(const std::filesystem::path& path, const Recording& recording) {
   const std::size_t n = recording.size();
@@ -79,6 +61,10 @@ void require_agreement(const std::filesystem::path& path, const Recording& recor
 }  // namespace
 
 Recording read_recording(const std::filesystem::path& path) {
+  return read_recording(path, nullptr);
+}
+
+Recording read_recording(const std::filesystem::path& path, Hdf5Child* child) {
   Recording recording;
   scan_recording(path,
                  {.head =
@@ -91,7 +77,8 @@ Recording read_recording(const std::filesystem::path& path) {
                   .elements_mm = [&](auto places) { append(recording.elements_mm, places); },
                   .time_s = [&](auto times) { append(recording.time_s, times); },
                   .device_time_s = [&](auto times) { append(recording.device_time_s, times); },
-                  .lost_before = [&](auto counts) { append(recording.lost_before, counts); }});
+                  .lost_before = [&](auto counts) { append(recording.lost_before, counts); }},
+                 child);
   return recording;
 }
 
@@ -113,48 +100,30 @@ void write_recording(const std::filesystem::path& path, const Recording& recordi
   require_memory(path, fmt::format("the file of {} rows by {} elements", n, e),
                  n * e * (narrow ? sizeof(float) : sizeof(double)));
   Hdf5Writer file(path);
-  file.attribute("format", recording_format);
-  file.attribute("version", format_version);
-  file.attribute("object", recording.object);
-  file.attribute("pressure_unit", recording.pressure_unit);
-  file.attribute("length_unit", "mm");
-  file.attribute("rows", recording.rows);
-  if (recording.truth) {
-    const Pose& pose = recording.truth->T_object_robot;
-    file.attribute("true_object", recording.truth->object);
-    file.attribute("true_T_object_robot",
-                   {pose.translation_mm.x, pose.translation_mm.y, pose.theta_rad});
-  }
-  if (narrow) {
-    file.narrow_dataset("pressure", {n, e}, recording.pressure);
-  } else {
-    file.dataset("pressure", {n, e}, recording.pressure);
-  }
+  write_head(file, recording);
+  file.dataset("pressure", {n, e}, recording.pressure,
+               narrow ? Hdf5Writer::Storage::narrow : Hdf5Writer::Storage::plain);
   if (recording.rows != "frames" ||
       std::any_of(recording.T_robot_sensor.begin(), recording.T_robot_sensor.end(), is_finite)) {
-    std::vector<double> poses;
-    poses.reserve(3 * n);
-    for (const Pose& pose : recording.T_robot_sensor) {
-      poses.insert(poses.end(), {pose.translation_mm.x, pose.translation_mm.y, pose.theta_rad});
-    }
-    file.dataset("sensor_pose", {n, 3}, poses);
-  }
-  std::vector<double> elements;
-  for (const glm::dvec2& element : recording.elements_mm) {
-    elements.insert(elements.end(), {element.x, element.y});
+    file.dataset("sensor_pose", {n, 3}, recording.T_robot_sensor);
   }
   const bool constant_array = recording.elements_mm.size() == e;
   file.dataset("elements", constant_array ? Hdf5Writer::Shape{e, 2} : Hdf5Writer::Shape{n, e, 2},
-               elements);
+               recording.elements_mm);
   if (!recording.valid.empty()) {
     const bool constant_valid = recording.valid.size() == e;
     file.dataset("valid", constant_valid ? Hdf5Writer::Shape{e} : Hdf5Writer::Shape{n, e},
                  recording.valid);
   }
-  if (!recording.time_s.empty()) {
-    file.dataset("time", {n}, recording.time_s);
-  }
-  write_stream(file, recording);
+  const auto write_list = [&](const char* name, const auto& values) {
+    if (!values.empty()) {
+      file.dataset(name, {values.size()}, values);
+    }
+  };
+  write_list("time", recording.time_s);
+  write_list("baseline", recording.baseline);
+  write_list("device_time", recording.device_time_s);
+  write_list("lost_before", recording.lost_before);
   file.save();
 }
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
+#include <iterator>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -18,15 +20,11 @@ namespace {
 
 using Shape = std::vector<std::uint64_t>;
 
-// Datasets with a row for each touch or frame, `time` last: see FrameRecorder.
-const std::vector<std::string> row_names = {"pressure", "sensor_pose", "device_time", "lost_before",
-                                            "time"};
-
 // Returns the complete rows of a stream that is being recorded or was cut off: the rows that all
 // datasets have and whose time, which is written last, is not NaN.
 std::uint64_t whole_rows(Hdf5Contents& file) {
   std::uint64_t rows = UINT64_MAX;
-  for (const std::string& name : row_names) {
+  for (const char* name : row_names) {
     if (file.has_dataset(name)) {
       const Shape& shape = file.shape(name);
       rows = std::min(rows, shape.empty() ? 0 : shape[0]);
@@ -50,6 +48,14 @@ std::uint64_t whole_rows(Hdf5Contents& file) {
   return rows;
 }
 
+const std::vector<std::string> attribute_names = {
+    "format",      "version", "object",      "pressure_unit",
+    "length_unit", "rows",    "true_object", "true_T_object_robot",
+    "sensor",      "serial"};
+const std::vector<std::string> dataset_names = {"pressure",    "sensor_pose", "elements",
+                                                "valid",       "time",        "baseline",
+                                                "device_time", "lost_before"};
+
 std::optional<Truth> read_truth(const Hdf5Contents& file) {
   if (!file.has_attribute("true_object") && !file.has_attribute("true_T_object_robot")) {
     return {};
@@ -60,14 +66,8 @@ std::optional<Truth> read_truth(const Hdf5Contents& file) {
 
 class Scan {
  public:
-  Scan(const std::filesystem::path& path, const RecordingTakers& takers)
-      : path_(path),
-        takers_(takers),
-        file_(path,
-              {"format", "version", "object", "pressure_unit", "length_unit", "rows", "true_object",
-               "true_T_object_robot", "sensor", "serial"},
-              {"pressure", "sensor_pose", "elements", "valid", "time", "baseline", "device_time",
-               "lost_before"}) {}
+  Scan(const std::filesystem::path& path, const RecordingTakers& takers, Hdf5Child* child)
+      : path_(path), takers_(takers), file_(path, attribute_names, dataset_names, child) {}
 
   void run() {
     read_texts();
@@ -124,7 +124,7 @@ class Scan {
     Recording& r = head_.recording;
     const auto [n, e] = std::pair{head_.rows, head_.elements};
     if (has("valid", {{e}, {n, e}})) {
-      const std::uint64_t count = file_.count("valid");
+      const std::uint64_t count = stored_bytes(file_.shape("valid"), 1);
       require_memory(path_, fmt::format("dataset 'valid' of {} numbers", count), count);
       r.valid.reserve(count);
       file_.read("valid", [&](std::uint64_t, std::span<const double> values) {
@@ -157,13 +157,11 @@ class Scan {
       takers_.pressure(values);
     });
     read_poses();
-    std::size_t elements = 0;
-    read_tuples<2, glm::dvec2>(
-        "elements", [](const double* v) { return glm::dvec2(v[0], v[1]); },
-        [&](std::span<const glm::dvec2> some) {
-          require_elements(path_, std::exchange(elements, elements + some.size()), some);
-          takers_.elements_mm(some);
-        });
+    read_tuples<glm::dvec2>("elements", head_.array_changes ? head_.rows : head_.elements,
+                            [&](std::size_t first, std::span<const glm::dvec2> some) {
+                              require_elements(path_, first, some);
+                              takers_.elements_mm(some);
+                            });
     read_list("time", [&](std::uint64_t first, std::span<const double> values) {
       require_times(path_, first, values);
       takers_.time_s(values);
@@ -172,10 +170,8 @@ class Scan {
       require_device_times(path_, first, values);
       takers_.device_time_s(values);
     });
-    read_list("lost_before", [&](std::uint64_t first, std::span<const double> values) {
-      const std::vector<std::uint64_t> counts = counts_of(values);
-      require_lost_counts(path_, first, counts);
-      takers_.lost_before(counts);
+    read_list("lost_before", [&](std::uint64_t, std::span<const double> values) {
+      takers_.lost_before(counts_of(values));
     });
   }
 
@@ -188,16 +184,11 @@ class Scan {
       }
       return;
     }
-    std::size_t poses = 0;
-    read_tuples<3, Pose>(
-        "sensor_pose",
-        [](const double* v) {
-          return Pose{{v[0], v[1]}, v[2]};
-        },
-        [&](std::span<const Pose> some) {
-          require_poses(path_, head_.recording, std::exchange(poses, poses + some.size()), some);
-          takers_.T_robot_sensor(some);
-        });
+    read_tuples<Pose>("sensor_pose", head_.rows,
+                      [&](std::size_t first, std::span<const Pose> some) {
+                        require_poses(path_, head_.recording, first, some);
+                        takers_.T_robot_sensor(some);
+                      });
   }
 
   void read_list(const char* name, const Hdf5Contents::Take& take) {
@@ -206,24 +197,17 @@ class Scan {
     }
   }
 
-  // Pieces end anywhere; the rest of a tuple waits for the next piece.
-  template <std::size_t width, typename Tuple, typename Make, typename Take>
-  void read_tuples(const char* name, const Make& make, const Take& take) {
-    std::vector<double> numbers;
+  /// Hands on tuples of numbers, with the index of the first.
+  template <typename Tuple, typename Take>
+  void read_tuples(const char* name, std::uint64_t rows, const Take& take) {
     std::vector<Tuple> tuples;
-    const auto take_whole = [&](std::uint64_t, std::span<const double> values) {
-      numbers.insert(numbers.end(), values.begin(), values.end());
-      tuples.clear();
-      std::size_t at = 0;
-      for (; at + width <= numbers.size(); at += width) {
-        tuples.push_back(make(&numbers[at]));
-      }
-      numbers.erase(numbers.begin(), numbers.begin() + static_cast<std::ptrdiff_t>(at));
-      take(std::span<const Tuple>(tuples));
+    const auto take_tuples = [&](std::uint64_t first, std::span<const double> numbers) {
+      constexpr std::size_t width = sizeof(Tuple) / sizeof(double);
+      tuples.resize(numbers.size() / width);
+      std::memcpy(static_cast<void*>(tuples.data()), numbers.data(), numbers.size_bytes());
+      take(first / width, std::span<const Tuple>(tuples));
     };
-    // An array that does not change has a row per element.
-    const bool by_row = std::string_view(name) != "elements" || head_.array_changes;
-    file_.read(name, take_whole, by_row ? head_.rows : head_.elements);
+    file_.read(name, take_tuples, rows);
   }
 
   std::vector<std::uint64_t> counts_of(std::span<const double> values) const {
@@ -243,7 +227,7 @@ class Scan {
   /// Returns the shape without incomplete rows.
   Shape cut(std::string_view name, Shape shape) const {
     const bool has_rows =
-        std::find(row_names.begin(), row_names.end(), name) != row_names.end() && !shape.empty();
+        std::ranges::find(row_names, name) != std::end(row_names) && !shape.empty();
     if (has_rows) {
       shape[0] = std::min(shape[0], rows_);
     }
@@ -276,8 +260,13 @@ class Scan {
 
 }  // namespace
 
-void scan_recording(const std::filesystem::path& path, const RecordingTakers& takers) {
-  Scan(path, takers).run();
+std::shared_ptr<Hdf5Child> recording_child(std::uint64_t file_bytes) {
+  return std::make_shared<Hdf5Child>(attribute_names, dataset_names, file_bytes);
+}
+
+void scan_recording(const std::filesystem::path& path, const RecordingTakers& takers,
+                    Hdf5Child* child) {
+  Scan(path, takers, child).run();
 }
 
 }  // namespace palpate

@@ -32,21 +32,19 @@ class Survey {
         take(value);
       }
     };
-    scan_recording(
-        path_,
-        {.head = [&](const RecordingHead& head) { begin(head); },
-         .pressure = [&](auto values) { result_.pressure.add(result_.head.recording, values); },
-         .T_robot_sensor = each,
-         .elements_mm = each,
-         .time_s = each,
-         .device_time_s = [](std::span<const double>) {},
-         .lost_before =
-             [&](auto counts) {
-               result_.lost = result_.lost.value_or(0);
-               for (const std::uint64_t count : counts) {
-                 count_lost(*result_.lost, count);
-               }
-             }});
+    scan_recording(path_, {.head = [&](const RecordingHead& head) { begin(head); },
+                           .pressure = [&](auto values) { take_pressures(values); },
+                           .T_robot_sensor = each,
+                           .elements_mm = each,
+                           .time_s = each,
+                           .device_time_s = [](std::span<const double>) {},
+                           .lost_before =
+                               [&](auto counts) {
+                                 result_.lost = result_.lost.value_or(0);
+                                 for (const std::uint64_t count : counts) {
+                                   count_lost(*result_.lost, count);
+                                 }
+                               }});
     result_.spacing = spacing_of(places_mm_);
     if (result_.spacing) {
       for (std::size_t& element : result_.spacing->closest) {
@@ -67,7 +65,70 @@ class Survey {
     if (head.recording.pressure_unit == "kPa") {
       result_.threshold = ContactClassifier{}.threshold;
     }
-    result_.pressure.begin(head.elements, result_.threshold);
+    result_.pressure.elements.resize(head.elements);
+  }
+
+  void take_pressures(std::span<const double> pressures) {
+    const std::vector<std::uint8_t>& valid = result_.head.recording.valid;
+    const std::size_t e = result_.head.elements;
+    const bool valid_by_row = valid.size() > e;
+    for (const double pressure : pressures) {
+      if (valid.empty() || valid[(valid_by_row ? pressure_row_ * e : 0) + element_] != 0) {
+        take_reading(pressure);
+      }
+      if (++element_ == e) {
+        end_row();
+      }
+    }
+  }
+
+  void take_reading(double reading) {
+    PressureSurvey& all = result_.pressure;
+    ElementSurvey& element = all.elements[element_];
+    ++element.alive;
+    if (std::isnan(reading)) {
+      ++all.unknown;
+      return;
+    }
+    element.changes += element.known > 0 && reading != element.last ? 1 : 0;
+    ++element.known;
+    element.zeros += reading == 0.0 ? 1 : 0;
+    element.last = reading;
+    all.readings.add(reading);
+    if (!all.range || reading > all.range->most) {
+      all.at_most = 0;
+      all.times_at_most = 0;
+    }
+    widen(all.range, reading);
+    if (reading == all.range->most) {
+      const std::uint64_t apart = result_.head.recording.rows == "frames" ? 2 : 1;
+      if (all.at_most == 0 || pressure_row_ >= last_at_most_ + apart) {
+        ++all.times_at_most;
+      }
+      ++all.at_most;
+      last_at_most_ = pressure_row_;
+    }
+    const std::vector<double>& baseline = result_.head.recording.baseline;
+    const double pressure = baseline.empty() ? reading : reading - baseline[element_];
+    element.contacts += in_contact(pressure) && result_.threshold ? 1 : 0;
+    if (!strongest_ || pressure > *strongest_) {
+      strongest_ = pressure;
+      strongest_element_ = element_;
+    }
+  }
+
+  bool in_contact(double pressure) const {
+    return !result_.threshold || pressure > *result_.threshold;
+  }
+
+  void end_row() {
+    if (strongest_ && in_contact(*strongest_)) {
+      ++result_.pressure.in_contact;
+      ++result_.pressure.elements[strongest_element_].strongest;
+    }
+    strongest_.reset();
+    element_ = 0;
+    ++pressure_row_;
   }
 
   void take(const Pose& T_robot_sensor) {
@@ -115,6 +176,11 @@ class Survey {
 
   const std::filesystem::path& path_;
   RecordingSurvey result_;
+  std::uint64_t pressure_row_ = 0;     ///< row of the next pressure
+  std::size_t element_ = 0;            ///< its element
+  std::optional<double> strongest_;    ///< largest pressure above the baseline in this row
+  std::size_t strongest_element_ = 0;  ///< the element that reads it
+  std::uint64_t last_at_most_ = 0;     ///< last row with the largest reading
   std::vector<glm::dvec2> places_mm_;  ///< of the living elements in the first row
   std::vector<std::size_t> placed_;    ///< their indices in the array
   std::uint64_t place_ = 0;            ///< index of the next place
@@ -168,69 +234,6 @@ std::uint64_t ReadingHistogram::occupied(double low, double high) const {
     bins += counts_[bin] > 0 ? 1 : 0;
   }
   return bins;
-}
-
-void PressureSurvey::begin(std::size_t elements, std::optional<double> threshold) {
-  threshold_ = threshold;
-  elements_.resize(elements);
-}
-
-void PressureSurvey::add(const Recording& head, std::span<const double> pressures) {
-  const std::vector<std::uint8_t>& valid = head.valid;
-  const std::size_t e = elements_.size();
-  const bool valid_by_row = valid.size() > e;
-  for (const double pressure : pressures) {
-    if (valid.empty() || valid[(valid_by_row ? row_ * e : 0) + element_] != 0) {
-      take(head, pressure);
-    }
-    if (++element_ == e) {
-      end_row();
-    }
-  }
-}
-
-void PressureSurvey::take(const Recording& head, double reading) {
-  ElementSurvey& element = elements_[element_];
-  ++element.alive;
-  if (std::isnan(reading)) {
-    ++unknown_;
-    return;
-  }
-  element.changes += element.known > 0 && reading != element.last ? 1 : 0;
-  ++element.known;
-  element.zeros += reading == 0.0 ? 1 : 0;
-  element.last = reading;
-  readings_.add(reading);
-  if (!range_ || reading > range_->most) {
-    at_most_ = 0;
-    times_at_most_ = 0;
-  }
-  widen(range_, reading);
-  if (reading == range_->most) {
-    const std::uint64_t apart = head.rows == "frames" ? 2 : 1;
-    if (at_most_ == 0 || row_ >= last_at_most_ + apart) {
-      ++times_at_most_;
-    }
-    ++at_most_;
-    last_at_most_ = row_;
-  }
-  const std::vector<double>& baseline = head.baseline;
-  const double pressure = baseline.empty() ? reading : reading - baseline[element_];
-  element.contacts += threshold_ && pressure > *threshold_ ? 1 : 0;
-  if (!strongest_ || pressure > *strongest_) {
-    strongest_ = pressure;
-    strongest_element_ = element_;
-  }
-}
-
-void PressureSurvey::end_row() {
-  if (strongest_ && (!threshold_ || *strongest_ > *threshold_)) {
-    ++in_contact_;
-    ++elements_[strongest_element_].strongest;
-  }
-  strongest_.reset();
-  element_ = 0;
-  ++row_;
 }
 
 RecordingSurvey survey_recording(const std::filesystem::path& path) { return Survey(path).run(); }

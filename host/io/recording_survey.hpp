@@ -52,45 +52,18 @@ struct ElementSurvey {
   bool constant() const { return known > 0 && changes == 0; }
 };
 
-/// Surveys the pressures of a recording, which come row by row in pieces that may end anywhere.
-/// Holds some tens of bytes for each element, and nothing for a row.
-class PressureSurvey {
- public:
-  /// @param threshold a reading further above the baseline counts as contact; none where no
-  /// threshold is known: every row then counts as in contact
-  void begin(std::size_t elements, std::optional<double> threshold);
-  /// Takes the next pressures of [n, e].
-  /// @param head the recording's, with its `rows`, `valid` and `baseline`
-  void add(const Recording& head, std::span<const double> pressures);
-
-  const std::vector<ElementSurvey>& elements() const { return elements_; }  ///< [e]
-  const ReadingHistogram& readings() const { return readings_; }
+/// What the pressures of a recording hold.
+struct PressureSurvey {
+  std::vector<ElementSurvey> elements;  ///< [e]
+  ReadingHistogram readings;
   /// Extremes of the known readings of living elements; none where there are no such readings.
-  const std::optional<Extremes>& range() const { return range_; }
-  std::uint64_t unknown() const { return unknown_; }        ///< NaN readings of living elements
-  std::uint64_t in_contact() const { return in_contact_; }  ///< rows in contact
-  std::uint64_t at_most() const { return at_most_; }  ///< readings equal to the largest reading
+  std::optional<Extremes> range;
+  std::uint64_t unknown = 0;     ///< NaN readings of living elements
+  std::uint64_t in_contact = 0;  ///< rows in contact: all, where no threshold is known
+  std::uint64_t at_most = 0;     ///< readings equal to the largest reading
   /// Separate times at which the array reads the largest reading. Frames that follow each other are
   /// one time; each touch is a time of its own.
-  std::uint64_t times_at_most() const { return times_at_most_; }
-
- private:
-  void take(const Recording& head, double reading);
-  void end_row();
-
-  std::optional<double> threshold_;
-  std::vector<ElementSurvey> elements_;
-  ReadingHistogram readings_;
-  std::optional<Extremes> range_;
-  std::uint64_t unknown_ = 0;
-  std::uint64_t in_contact_ = 0;
-  std::uint64_t at_most_ = 0;
-  std::uint64_t times_at_most_ = 0;
-  std::uint64_t last_at_most_ = 0;  ///< last row with the largest reading
-  std::uint64_t row_ = 0;
-  std::size_t element_ = 0;            ///< index of the next pressure in its row
-  std::optional<double> strongest_;    ///< largest pressure above the baseline in this row
-  std::size_t strongest_element_ = 0;  ///< the element that reads it
+  std::uint64_t times_at_most = 0;
 };
 
 /// What a recording holds.

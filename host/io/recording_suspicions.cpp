@@ -45,8 +45,8 @@ class Suspicions {
   std::vector<std::size_t> elements_where(
       const std::function<bool(const ElementSurvey&)>& holds) const {
     std::vector<std::size_t> elements;
-    for (std::size_t i = 0; i < p_.elements().size(); ++i) {
-      if (holds(p_.elements()[i])) {
+    for (std::size_t i = 0; i < p_.elements.size(); ++i) {
+      if (holds(p_.elements[i])) {
         elements.push_back(i);
       }
     }
@@ -117,10 +117,10 @@ class Suspicions {
     // A sensor that presses the same place again and again mostly feels it with one element.
     constexpr std::uint64_t least_touches = 5;
     std::uint64_t most = 0;
-    for (const ElementSurvey& element : p_.elements()) {
+    for (const ElementSurvey& element : p_.elements) {
       most = std::max(most, element.strongest);
     }
-    return p_.in_contact() >= least_touches && 2 * most < p_.in_contact();
+    return p_.in_contact >= least_touches && 2 * most < p_.in_contact;
   }
 
   void look_at_times() {
@@ -135,18 +135,18 @@ class Suspicions {
   }
 
   void look_at_pressures() {
-    if (!p_.range()) {
+    if (!p_.range) {
       return;
     }
     const std::string& unit = s_.head.recording.pressure_unit;
-    if (s_.threshold && p_.in_contact() == 0) {
+    if (s_.threshold && p_.in_contact == 0) {
       say("No element is ever in contact: no reading is more than {} {} above {}; is "
           "'pressure_unit' right?",
           *s_.threshold, unit, s_.head.recording.baseline.empty() ? "0" : "the baseline");
     }
     // 10 MPa. Contacts seldom give fewer than 1 % of the readings, glitches hardly ever as many.
     constexpr double most_kpa = 1e4;
-    if (unit == "kPa" && p_.readings().quantile(0.99) > most_kpa) {
+    if (unit == "kPa" && p_.readings.quantile(0.99) > most_kpa) {
       say("One in a hundred readings is above {} kPa; are these pascals or raw readings?",
           most_kpa);
     }
@@ -159,14 +159,14 @@ class Suspicions {
     constexpr std::uint64_t least_times = 5;
     constexpr std::uint64_t least_bins = 8;  // fewer: a switch, or noise of a few steps
     constexpr double much = 4.0;
-    const double most = p_.range()->most;
-    const double near = most - 0.25 * (most - p_.readings().quantile(0.5));
-    const std::uint64_t bins = p_.readings().occupied(near, most);
-    const auto others = static_cast<double>(p_.readings().count(near, most) - p_.at_most());
-    if (p_.times_at_most() >= least_times && bins >= least_bins &&
-        static_cast<double>(p_.at_most()) > much * others / static_cast<double>(bins)) {
-      say("{} readings are exactly the largest, {:.4g} {}: the sensor saturates there.",
-          p_.at_most(), most, unit);
+    const double most = p_.range->most;
+    const double near = most - 0.25 * (most - p_.readings.quantile(0.5));
+    const std::uint64_t bins = p_.readings.occupied(near, most);
+    const auto others = static_cast<double>(p_.readings.count(near, most) - p_.at_most);
+    if (p_.times_at_most >= least_times && bins >= least_bins &&
+        static_cast<double>(p_.at_most) > much * others / static_cast<double>(bins)) {
+      say("{} readings are exactly the largest, {:.4g} {}: the sensor saturates there.", p_.at_most,
+          most, unit);
     }
   }
 
@@ -191,14 +191,14 @@ class Suspicions {
   void look_for_constant_elements() {
     std::vector<double> changes;  // of the other elements: part of their readings
     double zeros = 0.5;           // largest part of another element's readings that are 0
-    for (const ElementSurvey& e : p_.elements()) {
+    for (const ElementSurvey& e : p_.elements) {
       if (e.changes > 0) {
         changes.push_back(static_cast<double>(e.changes) / static_cast<double>(e.known));
         zeros = std::max(zeros, static_cast<double>(e.zeros) / static_cast<double>(e.known));
       }
     }
     if (changes.empty()) {
-      if (s_.head.rows >= least_rows && p_.range()) {
+      if (s_.head.rows >= least_rows && p_.range) {
         say("No element's reading ever changes.");
       }
       return;
@@ -216,9 +216,9 @@ class Suspicions {
              static_cast<double>(e.known) * -std::log(e.last == 0.0 ? zeros : 0.5) > sure_nats;
     });
     if (!constant.empty()) {
-      const double first = p_.elements()[constant.front()].last;
+      const double first = p_.elements[constant.front()].last;
       const bool same = std::all_of(constant.begin(), constant.end(),
-                                    [&](std::size_t i) { return p_.elements()[i].last == first; });
+                                    [&](std::size_t i) { return p_.elements[i].last == first; });
       say("{} {} in every row while the others change; mark broken elements dead in 'valid'.",
           elements_that(constant, "reads", "read"),
           same ? fmt::format("{:.4g} {}", first, s_.head.recording.pressure_unit)

@@ -10,7 +10,7 @@
 #include <fmt/format.h>
 
 #include "io/input_file.hpp"
-#include "model/number_text.hpp"
+#include "io/pressure_table.hpp"
 #include "palpate/lattice.hpp"
 #include "palpate/touch.hpp"
 #include "yaml/yaml_entry.hpp"
@@ -51,31 +51,6 @@ glm::dvec2 read_point(const Entry& entry) {
   return {xy[0], xy[1]};
 }
 
-/// Reads the element centres of an array, in mm, from a text file: a line "x y" for each; '#'
-/// starts a comment.
-/// @throws Error naming the file and the line.
-std::vector<glm::dvec2> read_elements(const std::filesystem::path& path) {
-  require_readable(path);
-  std::ifstream file(path);
-  std::vector<glm::dvec2> elements;
-  std::string line;
-  for (int number = 1; std::getline(file, line); ++number) {
-    line.resize(std::min(line.find('#'), line.size()));
-    if (line.find_first_not_of(" \t\r\v\f") == std::string::npos) {
-      continue;
-    }
-    const auto xy = two_numbers_of(line);
-    if (!xy) {
-      refuse(path, "line {} is not a position; write 'x y' in mm", number);
-    }
-    elements.emplace_back((*xy)[0], (*xy)[1]);
-  }
-  if (elements.empty()) {
-    refuse(path, "holds no element; write a line 'x y' in mm for each");
-  }
-  return elements;
-}
-
 void read_array(const Entry& array, Scene& scene) {
   if (array.node.IsScalar()) {
     const std::string name = array.text();
@@ -83,7 +58,7 @@ void read_array(const Entry& array, Scene& scene) {
       scene.array_mm = digitacts_array();
     } else {
       scene.array_file = array.file.parent_path() / name;
-      scene.array_mm = read_elements(*scene.array_file);
+      scene.array_mm = palpate::read_array(*scene.array_file).elements_mm;
     }
     return;
   }

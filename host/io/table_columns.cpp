@@ -4,35 +4,25 @@
 #include <cctype>
 #include <cmath>
 
+#include "model/number_text.hpp"
 #include "model/printable.hpp"
 
 namespace palpate {
 
 namespace {
 
-// rostopic echo -p names its times %time.
-constexpr std::string_view time_names[] = {"time", "timestamp", "stamp", "t", "%time"};
-constexpr std::string_view x_names[] = {"x"};
-constexpr std::string_view y_names[] = {"y"};
-constexpr std::string_view theta_names[] = {"theta", "yaw"};
-constexpr std::string_view tx_names[] = {"tx", "x"};
-constexpr std::string_view ty_names[] = {"ty", "y"};
-constexpr std::string_view tz_names[] = {"tz", "z"};
-constexpr std::string_view qx_names[] = {"qx"};
-constexpr std::string_view qy_names[] = {"qy"};
-constexpr std::string_view qz_names[] = {"qz"};
-constexpr std::string_view qw_names[] = {"qw"};
 constexpr Unit no_unit[] = {{""}};
 
-constexpr Quantity time{time_names, time_units, "time-unit"};
-constexpr Quantity pose[] = {{x_names, length_units, "pose-unit"},
-                             {y_names, length_units, "pose-unit"},
-                             {theta_names, angle_units, "pose-unit"}};
+// rostopic echo -p names its times %time.
+constexpr Quantity time{"time timestamp stamp t %time", time_units, "time-unit"};
+constexpr Quantity pose[] = {{"x", length_units, "pose-unit"},
+                             {"y", length_units, "pose-unit"},
+                             {"theta yaw", angle_units, "pose-unit"}};
 constexpr Quantity spatial_pose[] = {
-    {tx_names, length_units, "pose-unit"}, {ty_names, length_units, "pose-unit"},
-    {tz_names, length_units, "pose-unit"}, {qx_names, no_unit, "pose-unit"},
-    {qy_names, no_unit, "pose-unit"},      {qz_names, no_unit, "pose-unit"},
-    {qw_names, no_unit, "pose-unit"}};
+    {"tx x", length_units, "pose-unit"}, {"ty y", length_units, "pose-unit"},
+    {"tz z", length_units, "pose-unit"}, {"qx", no_unit, "pose-unit"},
+    {"qy", no_unit, "pose-unit"},        {"qz", no_unit, "pose-unit"},
+    {"qw", no_unit, "pose-unit"}};
 
 // The year 5138; a time in ms is larger.
 constexpr double latest_s = 1e11;
@@ -49,7 +39,7 @@ std::optional<Unit> unit_of(std::string name, std::span<const Unit> units) {
 }
 
 std::optional<std::size_t> find_usual(const CsvTable& table, const Quantity& quantity) {
-  for (const std::string_view name : quantity.names) {
+  for (const std::string_view name : split_text(quantity.names, ' ')) {
     if (const auto found = table.find(name);
         found && (name != "t" || table.columns()[*found] == name)) {  // T is a temperature
       return found;

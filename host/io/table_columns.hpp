@@ -51,7 +51,7 @@ struct UnitColumn {
 
 /// A quantity that columns hold, with its usual names and its units.
 struct Quantity {
-  std::span<const std::string_view> names;
+  std::string_view names;  ///< separated by blanks
   std::span<const Unit> units;
   const char* option;  ///< that gives its unit
 };

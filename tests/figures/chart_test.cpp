@@ -99,14 +99,17 @@ TEST(Chart, LabelsDoNotCoverEachOther) {
   EXPECT_LE(many, 6.2 * one) << "there are six places around a point";
 }
 
-TEST(Chart, DrawsRulesFromBottomToTop) {
+TEST(Chart, DrawsItsRuleFromBottomToTop) {
   Chart chart = chart_of({.name = "", .points = {}});
-  chart.rules = {{.at = 2.5, .colour = red}, {.at = 7.5, .colour = blue}};
-  const Picture picture = drawn(chart);
+  const Picture without = drawn(chart);
+  chart.rule = 2.5;
+  const Picture left = drawn(chart);
+  chart.rule = 7.5;
+  const Picture right = drawn(chart);
   // Dots of a third of the way, less their blurred ends.
-  EXPECT_GT(count_of(picture, red), 100);
-  EXPECT_GT(count_of(picture, blue), 100);
-  EXPECT_LT(middle_of(picture, red).x, middle_of(picture, blue).x);
+  EXPECT_GT(count_of(left, comparison_grey), count_of(without, comparison_grey) + 100);
+  EXPECT_GT(count_of(right, comparison_grey), count_of(without, comparison_grey) + 100);
+  EXPECT_LT(middle_of(left, comparison_grey).x, middle_of(right, comparison_grey).x);
 }
 
 TEST(Chart, WithoutAnythingToShowHasAxes) {

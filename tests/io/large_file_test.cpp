@@ -163,7 +163,7 @@ TEST_F(LargeFile, RecordingIsSurveyedInPieces) {
   save_frames(path_, chunks);
   const std::string message = with_memory(20 * mib, [&] {
     const RecordingSurvey survey = survey_recording(path_);
-    if (survey.head.rows != 4096 * chunks || survey.pressure.in_contact() != chunks ||
+    if (survey.head.rows != 4096 * chunks || survey.pressure.in_contact != chunks ||
         survey.with_pose != 4096 * chunks || suspicions_of(survey).size() != 0) {
       throw std::runtime_error("wrong survey");
     }

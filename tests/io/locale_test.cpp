@@ -90,7 +90,7 @@ TEST_F(HostWithDecimalCommas, DecimalCommasAreRefused) {
   }
   put_bytes(folder_ / "e.txt", "1,5 2\n");
   put_bytes(folder_ / "s.yaml", "array: e.txt\n");
-  expect_named(input_error([&] { read_scene(folder_ / "s.yaml"); }), {"e.txt", "line 1"});
+  expect_named(input_error([&] { read_scene(folder_ / "s.yaml"); }), {"e.txt:1:"});
 }
 
 }  // namespace palpate::locale_test

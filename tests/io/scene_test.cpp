@@ -106,10 +106,10 @@ TEST_F(SceneFile, TakesTheArrayFromAFileBesideIt) {
   const std::string pads = (folder_ / "pads.txt").string();
   for (const char* text : {"1 2\n3\n", "1 2\n3 4 5\n", "1 2\nnan 1\n", "1 2\n3,4\n"}) {
     put_bytes(pads, text);
-    expect_named(input_error([&] { read("array: pads.txt"); }), {pads.c_str(), "line 2"});
+    expect_named(input_error([&] { read("array: pads.txt"); }), {pads.c_str(), ":2:"});
   }
   put_bytes(pads, "# none\n");
-  expect_named(input_error([&] { read("array: pads.txt"); }), {pads.c_str(), "no element"});
+  expect_named(input_error([&] { read("array: pads.txt"); }), {pads.c_str(), "holds no row"});
   expect_named(input_error([&] { read("array: digitact"); }), {"digitact", "no such file"});
 }
 
