@@ -135,8 +135,11 @@ std::shared_ptr<const MapSource> read_source(const std::filesystem::path& path, 
   touches.pressure_unit = file.text("pressure_unit");
   const std::uint64_t n = file.shape("touch_pressure", 2)[0];
   const std::uint64_t e = file.shape("touch_pressure", 2)[1];
-  require_memory(path, fmt::format("{} touches of {} elements", n, e),
-                 file.count("touch_pressure") * 4 * sizeof(double));
+  constexpr std::uint64_t most = std::uint64_t{1} << 40;
+  if (n == 0 || e == 0 || n > most / e) {
+    file.refuse("dataset 'touch_pressure' has the shape [{}, {}]; build the map anew", n, e);
+  }
+  require_memory(path, fmt::format("{} touches of {} elements", n, e), n * e * 4 * sizeof(double));
   touches.pressure = read_all(file, "touch_pressure", {n, e});
   const std::vector<double> poses = read_all(file, "touch_pose", {n, 3});
   for (std::size_t i = 0; i < n; ++i) {
@@ -165,18 +168,10 @@ void write_source(Hdf5Writer& file, const MapSource& source) {
   file.attribute("peak", source.options.sensor.peak);
   constexpr auto compressed = Hdf5Writer::Storage::compressed;
   file.dataset("touch_pressure", {n, e}, touches.pressure, compressed);
-  std::vector<double> poses;
-  for (const Pose& pose : touches.T_robot_sensor) {
-    poses.insert(poses.end(), {pose.translation_mm.x, pose.translation_mm.y, pose.theta_rad});
-  }
-  file.dataset("touch_pose", {n, 3}, poses);
-  std::vector<double> elements;
-  for (const glm::dvec2& element : touches.elements_mm) {
-    elements.insert(elements.end(), {element.x, element.y});
-  }
+  file.dataset("touch_pose", {n, 3}, touches.T_robot_sensor);
   const bool changes = touches.elements_mm.size() != e;
   file.dataset("touch_elements", changes ? Hdf5Writer::Shape{n, e, 2} : Hdf5Writer::Shape{e, 2},
-               elements, changes ? compressed : Hdf5Writer::Storage::plain);
+               touches.elements_mm, changes ? compressed : Hdf5Writer::Storage::plain);
   if (!touches.valid.empty()) {
     file.dataset("touch_valid", {n, e}, touches.valid, compressed);
   }
