@@ -34,18 +34,52 @@ class BeliefDraws {
   /// prior weight
   /// @param log_total log of the summed likelihood of all bins to come, with prior weights
   BeliefDraws(std::size_t count, std::uint64_t seed, const PoseLattice& lattice,
-              std::span<const double> log_weight, double log_total);
+              std::span<const double> log_weight, double log_total)
+      : lattice_(lattice),
+        log_weight_(log_weight),
+        log_total_(log_total),
+        random_(seed, Stream::belief),
+        targets_(one_in_each_part(count, random_)) {
+    draws_.reserve(count);
+  }
 
   /// See BinVisitor.
-  void add(const BinBox& box, std::span<const double> log_likelihood);
+  void add(const BinBox& box, std::span<const double> log_likelihood) {
+    const double weight = log_weight_[box.object] - log_total_;
+    const std::int64_t bins = box.bins();
+    if (log_likelihood.size() == 1) {
+      const double p = std::exp(weight + log_likelihood[0]);
+      const double after = reached_ + p * static_cast<double>(bins);
+      while (is_due(after)) {
+        const auto i = static_cast<std::int64_t>((targets_[draws_.size()] - reached_) / p);
+        draws_.push_back({box.object, box.bin(std::min(i, bins - 1), lattice_)});
+      }
+      reached_ = after;
+    } else {
+      for (std::int64_t i = 0; i < bins; ++i) {
+        reached_ += std::exp(weight + log_likelihood[static_cast<std::size_t>(i)]);
+        while (is_due(reached_)) {
+          draws_.push_back({box.object, box.bin(i, lattice_)});
+        }
+      }
+    }
+    last_ = {box.object, box.bin(bins - 1, lattice_)};
+  }
+
   /// The draws, uniform within their bins, in the order of objects and bins.
-  std::vector<PoseSample> take();
+  std::vector<PoseSample> take() {
+    draws_.resize(targets_.size(), last_);  // rounding may leave the last draw out
+    std::ranges::sort(draws_);
+    std::vector<PoseSample> samples;
+    samples.reserve(draws_.size());
+    for (const auto& [object, bin] : draws_) {
+      samples.push_back({object, draw_within(bin, lattice_, random_)});
+    }
+    return samples;
+  }
 
  private:
-  struct Draw {
-    std::int32_t object = 0;
-    std::int64_t bin = 0;
-  };
+  using Draw = std::pair<std::int32_t, std::int64_t>;  // object and bin
 
   /// Whether a draw is due before the belief has reached so much.
   bool is_due(double reached) const {
@@ -61,51 +95,6 @@ class BeliefDraws {
   double reached_ = 0.0;  ///< part of the belief that has come
   Draw last_;             ///< the last bin that has come
 };
-
-BeliefDraws::BeliefDraws(std::size_t count, std::uint64_t seed, const PoseLattice& lattice,
-                         std::span<const double> log_weight, double log_total)
-    : lattice_(lattice),
-      log_weight_(log_weight),
-      log_total_(log_total),
-      random_(seed, Stream::belief),
-      targets_(one_in_each_part(count, random_)) {
-  draws_.reserve(count);
-}
-
-void BeliefDraws::add(const BinBox& box, std::span<const double> log_likelihood) {
-  const double weight = log_weight_[box.object] - log_total_;
-  const std::int64_t bins = box.bins();
-  if (log_likelihood.size() == 1) {
-    const double p = std::exp(weight + log_likelihood[0]);
-    const double after = reached_ + p * static_cast<double>(bins);
-    while (is_due(after)) {
-      const auto i = static_cast<std::int64_t>((targets_[draws_.size()] - reached_) / p);
-      draws_.push_back({box.object, box.bin(std::min(i, bins - 1), lattice_)});
-    }
-    reached_ = after;
-  } else {
-    for (std::int64_t i = 0; i < bins; ++i) {
-      reached_ += std::exp(weight + log_likelihood[static_cast<std::size_t>(i)]);
-      while (is_due(reached_)) {
-        draws_.push_back({box.object, box.bin(i, lattice_)});
-      }
-    }
-  }
-  last_ = {box.object, box.bin(bins - 1, lattice_)};
-}
-
-std::vector<PoseSample> BeliefDraws::take() {
-  draws_.resize(targets_.size(), last_);  // rounding may leave the last draw out
-  std::sort(draws_.begin(), draws_.end(), [](const Draw& a, const Draw& b) {
-    return std::tie(a.object, a.bin) < std::tie(b.object, b.bin);
-  });
-  std::vector<PoseSample> samples;
-  samples.reserve(draws_.size());
-  for (const Draw& draw : draws_) {
-    samples.push_back({draw.object, draw_within(draw.bin, lattice_, random_)});
-  }
-  return samples;
-}
 
 /// Tolerance that a search with a budget reaches before it goes on, and enough to draw samples.
 constexpr double soon = 1e-2;
@@ -140,7 +129,6 @@ void BoundedBelief::reset() {
   touches_.clear();
   elements_ = {};
   search_.largest().reset();
-  searched_ = 0;
   found_.reset();
   followed_.reset();
   if (none_) {
@@ -168,8 +156,7 @@ void BoundedBelief::take_in() {
   change_.change([&] {
     if (found_ && found_->bins.complete() &&
         found_->bins.values().size() <= FollowedBins::most_bins) {
-      followed_.emplace(found_->bins, found_->result, space_.log_weight);
-      followed_touches_ = touches_.size();
+      followed_.emplace(found_->bins, found_->result, space_.log_weight, touches_.size());
     }
     found_.reset();
     const std::vector<ArrayReadings> touches = kept_.all();
@@ -219,7 +206,7 @@ SearchGoal BoundedBelief::rough_goal() const {
 
 const SearchResult& BoundedBelief::found() {
   const Deadline deadline = until(options_.budget_s);
-  if (!found_ || found_->rough) {
+  if (!found_ || !found_->goal.exact) {
     found_.reset();
     found_ = search();
   }
@@ -262,15 +249,14 @@ BoundedBelief::Found BoundedBelief::run(const SearchGoal& goal, Deadline& deadli
           deadline.end();
         }
       });
-  return {std::move(result), std::move(bins)};
+  return {std::move(result), std::move(bins), goal};
 }
 
 SearchResult BoundedBelief::run(const SearchGoal& goal, const Deadline& deadline,
                                 const BinVisitor& visitor, std::vector<PoseBlock>* refined) {
   return arena_.execute([&] {
-    if (searched_ < touches_.size()) {
-      change_.change([&] { search_.largest().add(std::span(touches_).subspan(searched_)); });
-      searched_ = touches_.size();
+    if (LargestTiles& largest = search_.largest(); largest.touches() < touches_.size()) {
+      change_.change([&] { largest.add(std::span(touches_).subspan(largest.touches())); });
     }
     return search_.run(elements_, goal, deadline, visitor, refined);
   });
@@ -280,16 +266,16 @@ void BoundedBelief::visit(const BinVisitor& visitor) {
   if (found_->bins.complete()) {
     found_->bins.visit(visitor);
   } else {
-    run(found_->rough ? rough_goal() : goal(), until({}), visitor);
+    run(found_->goal, until({}), visitor);
   }
 }
 
-const FollowedBins* BoundedBelief::followed_bins() {
-  if (found_ || !followed_) {
-    return nullptr;
+bool BoundedBelief::follow() {
+  if (!followed_) {
+    return false;
   }
-  for (; followed_touches_ < touches_.size(); ++followed_touches_) {
-    const KnownElements touch = known_elements(touches_[followed_touches_]);
+  while (followed_->touches() < touches_.size()) {
+    const KnownElements touch = known_elements(touches_[followed_->touches()]);
     std::vector<double> most;
     for (const TileBounds& bounds : space_.bounds) {
       most.push_back(bounds.best(bounds.levels().size() - 1, touch));
@@ -298,25 +284,23 @@ const FollowedBins* BoundedBelief::followed_bins() {
   }
   if (!(followed_->share_outside() <= soon)) {
     followed_.reset();
-    return nullptr;
   }
-  return &*followed_;
+  return followed_.has_value();
 }
 
 std::vector<PoseSample> BoundedBelief::sample(std::size_t count, std::uint64_t seed) {
-  const FollowedBins* followed = followed_bins();
-  if (followed == nullptr && !found_) {
+  const bool followed = !found_ && follow();
+  if (!followed && !found_) {
     Deadline deadline = until(options_.budget_s);
     found_ = run(rough_goal(), deadline);
-    found_->rough = true;
   }
   BeliefDraws draws(count, seed, options_.lattice, space_.log_weight,
-                    followed != nullptr ? followed->log_total() : log_total());
+                    followed ? followed_->log_total() : log_total());
   const auto add = [&](const BinBox& box, std::span<const double> log_likelihood) {
     draws.add(box, log_likelihood);
   };
-  if (followed != nullptr) {
-    followed->visit(add);
+  if (followed) {
+    followed_->visit(add);
   } else {
     visit(add);
   }

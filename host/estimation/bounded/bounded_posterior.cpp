@@ -10,7 +10,6 @@
 #include "estimation/bounded/bounded_belief.hpp"
 #include "estimation/bounded/log_sum.hpp"
 #include "estimation/bounded/marginal_sums.hpp"
-#include "estimation/bounded/parallel_for.hpp"
 #include "estimation/bounded/search/search_memory.hpp"
 #include "estimation/bounded/thinned_lattice.hpp"
 #include "estimation/hypotheses.hpp"
@@ -201,17 +200,13 @@ RefinedPose BoundedPosterior::refine(const Mode& mode) const {
   }
   const BinLikelihood& likelihood = thin ? *of_thin : belief.likelihood();
   const auto log_likelihood = [&](std::span<const BinBox> boxes) {
-    std::vector<std::size_t> firsts{0};  // each box's first bin, and the end
+    std::size_t bins = 0;
     for (const BinBox& box : boxes) {
-      firsts.push_back(firsts.back() + static_cast<std::size_t>(box.bins()));
+      bins += static_cast<std::size_t>(box.bins());
     }
-    std::vector<float> logs(firsts.back());
-    belief.on_threads([&] {
-      parallel_for(boxes.size(), [&](std::size_t i) {
-        likelihood.evaluate(std::span(&boxes[i], 1), belief.elements(),
-                            std::span(logs).subspan(firsts[i], firsts[i + 1] - firsts[i]));
-      });
-    });
+    std::vector<float> logs(bins);
+    belief.on_threads(
+        [&] { likelihood.evaluate_on_threads(boxes, belief.elements(), std::span(logs)); });
     return std::vector<double>(logs.begin(), logs.end());
   };
   return palpate::refine(log_likelihood, fit, posterior.bodies[mode.object], start);

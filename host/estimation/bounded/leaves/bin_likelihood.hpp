@@ -54,9 +54,10 @@ class BinLikelihood {
                 std::span<float> log_likelihood) const;
   void evaluate(std::span<const BinBox> boxes, const KnownElements& elements,
                 std::span<double> log_likelihood) const;
-  /// Float32 as above, of many boxes, on the threads of the TBB arena that it is called in.
+  /// The same of many boxes, on the threads of the TBB arena that it is called in.
+  template <typename Result>
   void evaluate_on_threads(std::span<const BinBox> boxes, const KnownElements& elements,
-                           std::span<float> log_likelihood) const;
+                           std::span<Result> log_likelihood) const;
 
   /// Proven bound, in nats, of the error of evaluate() at any bin of an object.
   double float32_error(std::size_t object, const KnownElements& elements) const;

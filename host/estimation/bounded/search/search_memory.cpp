@@ -10,7 +10,7 @@
 #include <fmt/format.h>
 
 #include "estimation/bounded/leaves/map_patches.hpp"
-#include "estimation/bounded/search/leaf_pass.hpp"
+#include "estimation/bounded/search/leaves.hpp"
 #include "estimation/bounded/tables/tile_levels.hpp"
 #include "estimation/bounded/tables/window_table.hpp"
 #include "estimation/bounded/touch_overlap.hpp"
