@@ -2,13 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
-#include <cstdint>
 #include <limits>
-#include <span>
-#include <tuple>
 #include <utility>
-#include <vector>
 
 #include <fmt/format.h>
 #include <tbb/info.h>
@@ -102,7 +97,7 @@ constexpr double soon = 1e-2;
 constexpr double closely_drawn_bins = 1e6;
 /// Bounds of "none of these" need not be so close that identities move by less.
 constexpr double least_identity_change = 1e-6;
-constexpr double unbounded = std::numeric_limits<double>::infinity();
+constexpr double unlimited = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
@@ -118,8 +113,7 @@ BoundedBelief::BoundedBelief(std::span<const Hypothesis> hypotheses, const Bound
       search_(space_, options_, likelihood_) {
   if (options_.none_weight) {
     none_.emplace(space_, options_, likelihood_);
-    none_log_weight_ = std::log(*options_.none_weight) - log_total_weight(hypotheses_) +
-                       std::log(static_cast<double>(options_.lattice.bins()));
+    none_log_weight_ = none_log_weight(*options_.none_weight, hypotheses_, options_.lattice);
   }
 }
 
@@ -159,7 +153,7 @@ void BoundedBelief::take_in() {
       followed_.emplace(found_->bins, found_->result, space_.log_weight, touches_.size());
     }
     found_.reset();
-    const std::vector<ArrayReadings> touches = kept_.all();
+    const std::span<const ArrayReadings> touches = kept_.all();
     std::vector<KnownElements> all;
     for (const ArrayReadings& touch : touches) {
       all.push_back(known_elements(touch));
@@ -330,7 +324,7 @@ double BoundedBelief::allowed_none_width(const LogInterval& none) const {
   const double low = probability(none.low);
   const double high = probability(none.high);
   if (high - low <= allowed) {
-    return unbounded;
+    return unlimited;
   }
   // The probability changes by at most so much a nat.
   const double p = std::clamp(0.5, low, high);
@@ -338,8 +332,8 @@ double BoundedBelief::allowed_none_width(const LogInterval& none) const {
 }
 
 LogInterval BoundedBelief::bound_none(const Deadline& deadline) {
-  double width = goal().evidence_nats.value_or(unbounded);
-  for (LogInterval last{-unbounded, unbounded};;) {
+  double width = goal().evidence_nats.value_or(unlimited);
+  for (LogInterval last{-unlimited, unlimited};;) {
     const LogInterval bounds = arena_.execute([&] { return none_->bounds(width, deadline); });
     const LogInterval weighted{none_log_weight_ + bounds.low, none_log_weight_ + bounds.high};
     width = std::min(width, allowed_none_width(weighted));
@@ -352,7 +346,7 @@ LogInterval BoundedBelief::bound_none(const Deadline& deadline) {
 }
 
 LogInterval BoundedBelief::none_log_evidence() const {
-  return found_ && found_->none ? *found_->none : LogInterval{-unbounded, -unbounded};
+  return found_ && found_->none ? *found_->none : LogInterval{-unlimited, -unlimited};
 }
 
 }  // namespace palpate

@@ -1,8 +1,6 @@
 #include "palpate/bounded_posterior.hpp"
 
-#include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 #include <utility>
 
@@ -11,7 +9,6 @@
 #include "estimation/bounded/log_sum.hpp"
 #include "estimation/bounded/marginal_sums.hpp"
 #include "estimation/bounded/search/search_memory.hpp"
-#include "estimation/bounded/thinned_lattice.hpp"
 #include "estimation/hypotheses.hpp"
 #include "estimation/lattice/refinement.hpp"
 #include "model/interpolated_map.hpp"
@@ -72,13 +69,6 @@ struct BoundedPosterior::Impl {
       : belief(hypotheses, options) {
     for (const Hypothesis& hypothesis : hypotheses) {
       bodies.push_back(displaced_body(hypothesis.map));
-    }
-  }
-
-  void require_object(int object) const {
-    if (object < 0 || static_cast<std::size_t>(object) >= bodies.size()) {
-      throw Error(Fault::input,
-                  fmt::format("object {}: there are {}, counted from 0", object, bodies.size()));
     }
   }
 
@@ -185,7 +175,7 @@ Estimate BoundedPosterior::estimate() const {
 
 RefinedPose BoundedPosterior::refine(const Mode& mode) const {
   Impl& posterior = whole();
-  posterior.require_object(mode.object);
+  require_object(mode.object, posterior.bodies.size());
   const BoundedBelief& belief = posterior.belief;
   // Where bins are very fine, a few of them tell the peak, and all would take long.
   const PoseLattice fit = thinned(lattice());
@@ -216,7 +206,7 @@ Marginals BoundedPosterior::marginals(int object) const { return marginals(objec
 
 Marginals BoundedPosterior::marginals(int object, const PoseLattice& grid) const {
   Impl& posterior = whole();
-  posterior.require_object(object);
+  require_object(object, posterior.bodies.size());
   PoseLattice onto = grid;
   onto.collapse_fixed().validate();
   BoundedBelief& belief = posterior.belief;
@@ -234,7 +224,7 @@ Marginals BoundedPosterior::marginals(int object, const PoseLattice& grid) const
 
 double BoundedPosterior::log_likelihood(int object, const Pose& T_object_robot) const {
   Impl& posterior = whole();
-  posterior.require_object(object);
+  require_object(object, posterior.bodies.size());
   const auto& [translation_mm, theta_rad] = T_object_robot;
   if (!std::isfinite(translation_mm.x) || !std::isfinite(translation_mm.y) ||
       !std::isfinite(theta_rad)) {

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "estimation/bounded/log_sum.hpp"
 #include "estimation/bounded/touch_overlap.hpp"

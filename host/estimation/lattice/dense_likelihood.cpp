@@ -1,7 +1,6 @@
 #include "estimation/lattice/dense_likelihood.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include <fmt/format.h>

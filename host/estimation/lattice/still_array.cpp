@@ -47,18 +47,14 @@ const DenseBelief& StillArray::no_contact_at(const Touch& touch, DenseLikelihood
   if (!no_contact_) {
     no_contact_.emplace(belief.uniform());
   }
-  if (!evaluated_ || pivot_mm_ != lattice_.pivot_mm ||
-      !same_placement(touch, {T_robot_sensor_, elements_mm_, {}})) {
-    evaluated_ = false;  // a device that fails leaves it half-way
+  readings_.assign(touch.elements_mm.size(), Reading::no_contact);
+  everywhere_ = gather_evidence(touch, readings_, Reading::unknown, lattice_.pivot_mm,
+                                likelihood.segment_elements(), std::move(everywhere_));
+  if (evaluated_ != everywhere_) {
+    evaluated_ = {};  // a device that fails leaves it half-way
     no_contact_->clear();
-    readings_.assign(touch.elements_mm.size(), Reading::no_contact);
-    everywhere_ = gather_evidence(touch, readings_, Reading::unknown, lattice_.pivot_mm,
-                                  likelihood.segment_elements(), std::move(everywhere_));
     likelihood.accumulate(everywhere_, *no_contact_, {});
-    T_robot_sensor_ = touch.T_robot_sensor;
-    elements_mm_.assign(touch.elements_mm.begin(), touch.elements_mm.end());
-    pivot_mm_ = lattice_.pivot_mm;
-    evaluated_ = true;
+    evaluated_ = everywhere_;
   }
   return *no_contact_;
 }

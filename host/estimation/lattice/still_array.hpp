@@ -51,10 +51,7 @@ class StillArray {
   ContactModel contact_;
   const PoseLattice& lattice_;
   std::optional<DenseBelief> no_contact_;  ///< log-likelihood of No Contact everywhere
-  bool evaluated_ = false;                 ///< for the place below
-  Pose T_robot_sensor_;
-  std::vector<glm::dvec2> elements_mm_;
-  glm::dvec2 pivot_mm_{0.0, 0.0};
+  ContactEvidence evaluated_;              ///< that it holds
   // Memory that updates share.
   std::vector<StillTouch> gathered_;  ///< of the most touches so far
   std::vector<Reading> readings_;

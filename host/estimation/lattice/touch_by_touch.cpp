@@ -3,11 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <utility>
 
 #include "estimation/kernel_sizes.hpp"
-#include "estimation/lattice/blur_tables.hpp"
 #include "estimation/lattice/refinement.hpp"
 #include "shaders/sum_overlap.hpp"
 
@@ -106,19 +104,19 @@ TouchByTouch::TouchByTouch(gpu::Context& context, gpu::CommandStream& stream,
       log_weight_(log_weight),
       objects_(hypotheses.size()),
       scratch_(belief.uniform()),
-      touch_blur_(context, stream, options.lattice, objects_, options.touch_sd,
-                  DisplacementBlur::Of::touch, options.none_weight.has_value()),
+      touch_blur_(context, stream, options.lattice, objects_, options.touch_sd, {},
+                  options.none_weight.has_value()),
       lost_mass_(objects_, 0.0),
       references_(objects_) {
-  for (const Hypothesis& hypothesis : hypotheses) {
-    centroids_mm_.push_back(displaced_body(hypothesis.map).centroid_mm);
-  }
   touch_blur_.warm_up(scratch_, belief);
   if (!options.slip_sd.none()) {
-    slip_blur_.emplace(context, stream, options.lattice, objects_, options.slip_sd,
-                       DisplacementBlur::Of::belief, false);
+    std::vector<glm::dvec2> centroids_mm;
+    for (const Hypothesis& hypothesis : hypotheses) {
+      centroids_mm.push_back(displaced_body(hypothesis.map).centroid_mm);
+    }
+    slip_blur_.emplace(context, stream, options.lattice, objects_, options.slip_sd, centroids_mm,
+                       false);
     slip_blur_->warm_up(scratch_, belief);
-    slip_turns_ = slip_turns(options.lattice, centroids_mm_, slip_blur_->theta_steps());
     before_slip_ = belief.summarise();
     after_slip_ = before_slip_;
     largest_.reserve(objects_);
@@ -164,10 +162,8 @@ void TouchByTouch::update(const Touch& touch, const ContactEvidence& evidence,
   if (!is_prepared) {
     evaluate_planes(evaluate);
   }
-  touch_turns_ =
-      touch_turns(options_.lattice, touch.T_robot_sensor.translation_mm - options_.lattice.pivot_mm,
-                  touch_blur_.theta_steps(), std::move(touch_turns_));
-  touch_blur_.sum_turns(scratch_, touch_turns_, belief);
+  touch_blur_.turn_for(touch.T_robot_sensor.translation_mm - options_.lattice.pivot_mm);
+  touch_blur_.sum_turns(scratch_, belief);
   // A touch without a known element says nothing, not even where the array was.
   if (overlap_ && !evidence.segments.empty()) {
     add_to_none(touch);
@@ -183,7 +179,7 @@ void TouchByTouch::slip(DenseBelief& belief) {
     largest_.push_back(summary.max);
   }
   slip_blur_->blur_planes(belief, scratch_, largest_);
-  slip_blur_->sum_turns(scratch_, slip_turns_, belief);
+  slip_blur_->sum_turns(scratch_, belief);
   after_slip_ = belief.summarise(std::move(after_slip_));
   for (std::size_t i = 0; i < objects_; ++i) {
     const BeliefSummary& before = before_slip_[i];

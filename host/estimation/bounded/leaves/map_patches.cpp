@@ -1,6 +1,5 @@
 #include "estimation/bounded/leaves/map_patches.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <unordered_set>

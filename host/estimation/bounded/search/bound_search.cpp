@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <tuple>
 
 #include "estimation/bounded/search/leaves.hpp"
 #include "estimation/bounded/search/mass_account.hpp"

@@ -5,7 +5,6 @@
 #include <numeric>
 
 #include "estimation/bounded/parallel_for.hpp"
-#include "estimation/bounded/search/largest_tiles.hpp"
 
 namespace palpate {
 
