@@ -100,6 +100,19 @@ void require_object(int object, std::size_t objects) {
   }
 }
 
+PoseLattice with_pivot(PoseLattice lattice, const glm::dvec2& pivot_mm, const char* filter,
+                       bool touched) {
+  if (touched) {
+    throw Error(Fault::input,
+                fmt::format("{}: its touches are about the pivot {}, {} mm; call reset() before "
+                            "the pivot moves",
+                            filter, lattice.pivot_mm.x, lattice.pivot_mm.y));
+  }
+  lattice.pivot_mm = pivot_mm;
+  lattice.validate();
+  return lattice;
+}
+
 std::vector<double> normalised(std::vector<double> logs) {
   const double most = *std::max_element(logs.begin(), logs.end());
   double total = 0.0;

@@ -28,6 +28,12 @@ double none_log_weight(double none_weight, std::span<const Hypothesis> hypothese
 /// @throws Error where there is no such object of this many
 void require_object(int object, std::size_t objects);
 
+/// The lattice about another pivot.
+/// @param filter name of the filter for messages; `touched` says that it has taken in a touch
+/// @throws Error where the filter is touched, or on a pivot out of range
+PoseLattice with_pivot(PoseLattice lattice, const glm::dvec2& pivot_mm, const char* filter,
+                       bool touched);
+
 /// exp(logs) over their sum, by a log-sum-exp: probabilities from log evidence (Eq. 14).
 std::vector<double> normalised(std::vector<double> logs);
 

@@ -11,7 +11,6 @@
 #include "estimation/bin_box.hpp"
 #include "estimation/bounded/log_sum.hpp"
 #include "estimation/hypotheses.hpp"
-#include "estimation/moved_pivot.hpp"
 #include "estimation/pose_draws.hpp"
 #include "model/random.hpp"
 #include "palpate/estimate.hpp"

@@ -58,7 +58,9 @@ BoundedOptions checked(const BoundedOptions& options, std::span<const Hypothesis
   BoundedOptions all = options;
   all.lattice.collapse_fixed().validate();
   all.contact = resolve(options.contact, hypotheses);
-  require_room(hypotheses, all, memory_for_search());
+  if (const std::string why = why_no_room(hypotheses, all, memory_for_search()); !why.empty()) {
+    throw Error(Fault::input, why);
+  }
   return all;
 }
 
@@ -121,8 +123,7 @@ Estimate BoundedPosterior::estimate() const {
   std::vector<LogInterval> bounds;
   for (const HypothesisMass& mass : found.mass) {
     logs.push_back(mass.evaluated);
-    bounds.push_back({log_subtract(mass.evaluated, mass.rounding),
-                      log_add(log_add(mass.evaluated, mass.rounding), mass.dropped)});
+    bounds.push_back(mass.bounds());
   }
   // Dropped and rounding mass over the whole that they are part of.
   const double dropped = found.uncertain();

@@ -24,8 +24,6 @@ struct ReadingRun {
 struct KnownElements {
   std::vector<glm::dvec2> from_pivot_mm;
   std::vector<ReadingRun> runs;  ///< ascending by reading
-
-  bool empty() const { return from_pivot_mm.empty(); }
 };
 
 /// All elements of a touch in the array's order, Unknown ones too: in the robot frame and relative

@@ -6,7 +6,6 @@
 
 #include <fmt/format.h>
 
-#include "estimation/kernel_sizes.hpp"
 #include "palpate/error.hpp"
 #include "palpate/pose.hpp"
 #include "shaders/blur_axis.hpp"

@@ -4,8 +4,8 @@
 #include <span>
 #include <vector>
 
+#include "estimation/kernel_sizes.hpp"
 #include "estimation/lattice/dense_belief.hpp"
-#include "estimation/two_float.hpp"
 #include "gpu/command_stream.hpp"
 #include "palpate/displacement.hpp"
 #include "palpate/lattice.hpp"

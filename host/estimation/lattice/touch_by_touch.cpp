@@ -5,6 +5,7 @@
 #include <limits>
 #include <utility>
 
+#include "estimation/bounded/touch_overlap.hpp"
 #include "estimation/kernel_sizes.hpp"
 #include "estimation/lattice/refinement.hpp"
 #include "shaders/sum_overlap.hpp"
@@ -53,27 +54,17 @@ std::vector<shaders::ObjectBox> boxes_of(std::span<const Hypothesis> hypotheses)
   return boxes;
 }
 
-/// A length or place as a float of which sums of a few stay finite. No region reaches so far.
-float within_floats(double mm) {
-  constexpr double far_mm = 1e30;
-  return std::isnan(mm) ? static_cast<float>(far_mm)
-                        : static_cast<float>(std::clamp(mm, -far_mm, far_mm));
-}
-
 /// @param reuse memory for the result
-std::vector<shaders::ArrayAtTheta> arrays_of(const Touch& touch, const PoseLattice& lattice,
-                                             const glm::dvec2& pivot_mm,
+std::vector<shaders::ArrayAtTheta> arrays_of(const ArrayRectangle& array,
+                                             const PoseLattice& lattice,
                                              std::vector<shaders::ArrayAtTheta> reuse) {
-  const glm::dvec2 from_pivot =
-      touch.T_robot_sensor * bounding_box(touch.elements_mm).middle() - pivot_mm;
   std::vector<shaders::ArrayAtTheta> arrays = std::move(reuse);
   arrays.clear();
   for (int t = 0; t < lattice.theta_rad.count; ++t) {
     const double theta = lattice.theta_rad.centre(t);
-    const glm::dvec2 turned = rotate(theta, from_pivot);
-    const double direction = theta + touch.T_robot_sensor.theta_rad;
-    arrays.push_back({within_floats(turned.x), within_floats(turned.y),
-                      static_cast<float>(std::cos(direction)),
+    const glm::vec2 turned = rotate(theta, array.from_pivot_mm);
+    const double direction = theta + array.direction_rad;
+    arrays.push_back({turned.x, turned.y, static_cast<float>(std::cos(direction)),
                       static_cast<float>(std::sin(direction))});
   }
   return arrays;
@@ -245,11 +236,12 @@ std::uint64_t OverlapMean::device_bytes() const {
 
 std::span<const OverlapSum> OverlapMean::sums(const DenseBelief& scratch, const Touch& touch,
                                               const glm::dvec2& pivot_mm, bool everywhere) {
-  placed_ = arrays_of(touch, lattice_, pivot_mm, std::move(placed_));
+  const ArrayRectangle array = array_rectangle(touch, pivot_mm);
+  placed_ = arrays_of(array, lattice_, std::move(placed_));
   stream_.upload(arrays_, placed_);
   // Half a float's largest: sums of two stay finite.
   constexpr float unbounded = std::numeric_limits<float>::max() / 8.0F;
-  const glm::dvec2 half = bounding_box(touch.elements_mm).extent() / 2.0;
+  const glm::vec2 half = everywhere ? glm::vec2(unbounded) : glm::vec2(array.half_mm);
   std::uint32_t first = 0;
   for (const Slab& slab : scratch.slabs()) {
     const shaders::OverlapPush push{.slab = planes_of(slab, lattice_.theta_rad.count),
@@ -258,8 +250,8 @@ std::span<const OverlapSum> OverlapMean::sums(const DenseBelief& scratch, const 
                                     .first_y_mm = static_cast<float>(lattice_.y_mm.centre(0)),
                                     .step_x_mm = static_cast<float>(lattice_.x_mm.step()),
                                     .step_y_mm = static_cast<float>(lattice_.y_mm.step()),
-                                    .half_x_mm = everywhere ? unbounded : within_floats(half.x),
-                                    .half_y_mm = everywhere ? unbounded : within_floats(half.y)};
+                                    .half_x_mm = half.x,
+                                    .half_y_mm = half.y};
     stream_.dispatch(kernel_, {&slab.log_likelihood, &arrays_, &boxes_, &partials_}, push,
                      {slab.theta_count, slab.object_count, 1},
                      static_cast<double>(slab.object_count * slab.bins()));

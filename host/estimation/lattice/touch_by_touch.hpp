@@ -10,7 +10,6 @@
 #include "estimation/lattice/dense_belief.hpp"
 #include "estimation/lattice/dense_likelihood.hpp"
 #include "estimation/lattice/displacement_blur.hpp"
-#include "estimation/lattice/still_array.hpp"
 #include "gpu/command_stream.hpp"
 #include "model/bounding_box.hpp"
 #include "palpate/estimate.hpp"

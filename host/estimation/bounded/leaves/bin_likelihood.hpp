@@ -9,8 +9,6 @@
 #include "estimation/bin_box.hpp"
 #include "estimation/bounded/known_elements.hpp"
 #include "estimation/bounded/leaves/bin_kernel.hpp"
-#include "estimation/bounded/leaves/map_patches.hpp"
-#include "estimation/bounded/leaves/reading_form.hpp"
 #include "palpate/contact_model.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"

@@ -18,9 +18,7 @@
 #include <hwy/highway.h>
 
 #include "estimation/bounded/leaves/bin_kernel.hpp"
-#include "estimation/bounded/leaves/map_patches.hpp"
 #include "estimation/bounded/leaves/patch_interpolation-inl.hpp"
-#include "estimation/bounded/leaves/reading_form.hpp"
 #include "model/vector_math-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();

@@ -8,7 +8,7 @@
 
 #include "estimation/bounded/known_elements.hpp"
 #include "estimation/bounded/search/search_space.hpp"
-#include "estimation/bounded/tables/tile_levels.hpp"
+#include "estimation/bounded/tables/tile_bounds.hpp"
 #include "model/bounding_box.hpp"
 #include "palpate/occupancy_grid.hpp"
 
