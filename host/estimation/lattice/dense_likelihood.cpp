@@ -296,7 +296,7 @@ const DenseBelief& StillArray::no_contact_at(const Touch& touch, DenseLikelihood
   everywhere_ = gather_evidence(touch, readings_, Reading::unknown, lattice_.pivot_mm,
                                 likelihood.segment_elements(), std::move(everywhere_));
   if (evaluated_ != everywhere_) {
-    evaluated_ = {};  // a device that fails leaves it half-way
+    evaluated_.segments.clear();  // a device that fails leaves it half-way
     no_contact_->clear();
     likelihood.accumulate(everywhere_, *no_contact_, {});
     evaluated_ = everywhere_;
