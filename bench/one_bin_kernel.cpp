@@ -4,7 +4,7 @@
 
 #include "estimation/bordered_map.hpp"
 #include "estimation/contact_evidence.hpp"
-#include "estimation/two_float.hpp"
+#include "estimation/kernel_sizes.hpp"
 #include "one_bin.hpp"
 #include "one_bin_push.h"
 

@@ -9,6 +9,21 @@
 
 namespace palpate {
 
+namespace {
+
+/// log of the sum of the prior weights.
+double log_total_weight(std::span<const Hypothesis> hypotheses) {
+  // Relative to the largest, for the sum of the weights themselves may be infinite.
+  const double largest = std::ranges::max(hypotheses, {}, &Hypothesis::weight).weight;
+  double total = 0.0;
+  for (const Hypothesis& hypothesis : hypotheses) {
+    total += hypothesis.weight / largest;
+  }
+  return std::log(largest) + std::log(total);
+}
+
+}  // namespace
+
 void validate_hypotheses(std::span<const Hypothesis> hypotheses) {
   if (hypotheses.empty()) {
     throw Error(Fault::input, "no objects: give at least one map");
@@ -63,16 +78,6 @@ ContactModel resolve(const ContactModel& contact, std::span<const Hypothesis> hy
   return resolved;
 }
 
-double log_total_weight(std::span<const Hypothesis> hypotheses) {
-  // Relative to the largest, for the sum of the weights themselves may be infinite.
-  const double largest = std::ranges::max(hypotheses, {}, &Hypothesis::weight).weight;
-  double total = 0.0;
-  for (const Hypothesis& hypothesis : hypotheses) {
-    total += hypothesis.weight / largest;
-  }
-  return std::log(largest) + std::log(total);
-}
-
 std::vector<double> log_weights(std::span<const Hypothesis> hypotheses) {
   const double log_total = log_total_weight(hypotheses);
   std::vector<double> logs;
@@ -80,6 +85,32 @@ std::vector<double> log_weights(std::span<const Hypothesis> hypotheses) {
     logs.push_back(std::log(hypothesis.weight) - log_total);
   }
   return logs;
+}
+
+double none_log_weight(double none_weight, std::span<const Hypothesis> hypotheses,
+                       const PoseLattice& lattice) {
+  return std::log(none_weight) - log_total_weight(hypotheses) +
+         std::log(static_cast<double>(lattice.bins()));
+}
+
+void require_object(int object, std::size_t objects) {
+  if (object < 0 || static_cast<std::size_t>(object) >= objects) {
+    throw Error(Fault::input,
+                fmt::format("object {}: there are {}, counted from 0", object, objects));
+  }
+}
+
+PoseLattice with_pivot(PoseLattice lattice, const glm::dvec2& pivot_mm, const char* filter,
+                       bool touched) {
+  if (touched) {
+    throw Error(Fault::input,
+                fmt::format("{}: its touches are about the pivot {}, {} mm; call reset() before "
+                            "the pivot moves",
+                            filter, lattice.pivot_mm.x, lattice.pivot_mm.y));
+  }
+  lattice.pivot_mm = pivot_mm;
+  lattice.validate();
+  return lattice;
 }
 
 std::vector<double> normalised(std::vector<double> logs) {

@@ -1,11 +1,9 @@
 #include "palpate/learned_sensor.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <optional>
 #include <utility>
 
 #include <fmt/format.h>

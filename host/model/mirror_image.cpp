@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <cstddef>
 #include <utility>
 
 #include "palpate/estimate.hpp"

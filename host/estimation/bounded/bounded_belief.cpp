@@ -2,13 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
-#include <cstdint>
 #include <limits>
-#include <span>
-#include <tuple>
 #include <utility>
-#include <vector>
 
 #include <fmt/format.h>
 #include <tbb/info.h>
@@ -16,7 +11,6 @@
 #include "estimation/bin_box.hpp"
 #include "estimation/bounded/log_sum.hpp"
 #include "estimation/hypotheses.hpp"
-#include "estimation/moved_pivot.hpp"
 #include "estimation/pose_draws.hpp"
 #include "model/random.hpp"
 #include "palpate/estimate.hpp"
@@ -34,18 +28,52 @@ class BeliefDraws {
   /// prior weight
   /// @param log_total log of the summed likelihood of all bins to come, with prior weights
   BeliefDraws(std::size_t count, std::uint64_t seed, const PoseLattice& lattice,
-              std::span<const double> log_weight, double log_total);
+              std::span<const double> log_weight, double log_total)
+      : lattice_(lattice),
+        log_weight_(log_weight),
+        log_total_(log_total),
+        random_(seed, Stream::belief),
+        targets_(one_in_each_part(count, random_)) {
+    draws_.reserve(count);
+  }
 
   /// See BinVisitor.
-  void add(const BinBox& box, std::span<const double> log_likelihood);
+  void add(const BinBox& box, std::span<const double> log_likelihood) {
+    const double weight = log_weight_[box.object] - log_total_;
+    const std::int64_t bins = box.bins();
+    if (log_likelihood.size() == 1) {
+      const double p = std::exp(weight + log_likelihood[0]);
+      const double after = reached_ + p * static_cast<double>(bins);
+      while (is_due(after)) {
+        const auto i = static_cast<std::int64_t>((targets_[draws_.size()] - reached_) / p);
+        draws_.push_back({box.object, box.bin(std::min(i, bins - 1), lattice_)});
+      }
+      reached_ = after;
+    } else {
+      for (std::int64_t i = 0; i < bins; ++i) {
+        reached_ += std::exp(weight + log_likelihood[static_cast<std::size_t>(i)]);
+        while (is_due(reached_)) {
+          draws_.push_back({box.object, box.bin(i, lattice_)});
+        }
+      }
+    }
+    last_ = {box.object, box.bin(bins - 1, lattice_)};
+  }
+
   /// The draws, uniform within their bins, in the order of objects and bins.
-  std::vector<PoseSample> take();
+  std::vector<PoseSample> take() {
+    draws_.resize(targets_.size(), last_);  // rounding may leave the last draw out
+    std::ranges::sort(draws_);
+    std::vector<PoseSample> samples;
+    samples.reserve(draws_.size());
+    for (const auto& [object, bin] : draws_) {
+      samples.push_back({object, draw_within(bin, lattice_, random_)});
+    }
+    return samples;
+  }
 
  private:
-  struct Draw {
-    std::int32_t object = 0;
-    std::int64_t bin = 0;
-  };
+  using Draw = std::pair<std::int32_t, std::int64_t>;  // object and bin
 
   /// Whether a draw is due before the belief has reached so much.
   bool is_due(double reached) const {
@@ -62,58 +90,13 @@ class BeliefDraws {
   Draw last_;             ///< the last bin that has come
 };
 
-BeliefDraws::BeliefDraws(std::size_t count, std::uint64_t seed, const PoseLattice& lattice,
-                         std::span<const double> log_weight, double log_total)
-    : lattice_(lattice),
-      log_weight_(log_weight),
-      log_total_(log_total),
-      random_(seed, Stream::belief),
-      targets_(one_in_each_part(count, random_)) {
-  draws_.reserve(count);
-}
-
-void BeliefDraws::add(const BinBox& box, std::span<const double> log_likelihood) {
-  const double weight = log_weight_[box.object] - log_total_;
-  const std::int64_t bins = box.bins();
-  if (log_likelihood.size() == 1) {
-    const double p = std::exp(weight + log_likelihood[0]);
-    const double after = reached_ + p * static_cast<double>(bins);
-    while (is_due(after)) {
-      const auto i = static_cast<std::int64_t>((targets_[draws_.size()] - reached_) / p);
-      draws_.push_back({box.object, box.bin(std::min(i, bins - 1), lattice_)});
-    }
-    reached_ = after;
-  } else {
-    for (std::int64_t i = 0; i < bins; ++i) {
-      reached_ += std::exp(weight + log_likelihood[static_cast<std::size_t>(i)]);
-      while (is_due(reached_)) {
-        draws_.push_back({box.object, box.bin(i, lattice_)});
-      }
-    }
-  }
-  last_ = {box.object, box.bin(bins - 1, lattice_)};
-}
-
-std::vector<PoseSample> BeliefDraws::take() {
-  draws_.resize(targets_.size(), last_);  // rounding may leave the last draw out
-  std::sort(draws_.begin(), draws_.end(), [](const Draw& a, const Draw& b) {
-    return std::tie(a.object, a.bin) < std::tie(b.object, b.bin);
-  });
-  std::vector<PoseSample> samples;
-  samples.reserve(draws_.size());
-  for (const Draw& draw : draws_) {
-    samples.push_back({draw.object, draw_within(draw.bin, lattice_, random_)});
-  }
-  return samples;
-}
-
 /// Tolerance that a search with a budget reaches before it goes on, and enough to draw samples.
 constexpr double soon = 1e-2;
 /// Bins of all hypotheses together up to which samples are drawn at the full tolerance.
 constexpr double closely_drawn_bins = 1e6;
 /// Bounds of "none of these" need not be so close that identities move by less.
 constexpr double least_identity_change = 1e-6;
-constexpr double unbounded = std::numeric_limits<double>::infinity();
+constexpr double unlimited = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
@@ -129,8 +112,7 @@ BoundedBelief::BoundedBelief(std::span<const Hypothesis> hypotheses, const Bound
       search_(space_, options_, likelihood_) {
   if (options_.none_weight) {
     none_.emplace(space_, options_, likelihood_);
-    none_log_weight_ = std::log(*options_.none_weight) - log_total_weight(hypotheses_) +
-                       std::log(static_cast<double>(options_.lattice.bins()));
+    none_log_weight_ = none_log_weight(*options_.none_weight, hypotheses_, options_.lattice);
   }
 }
 
@@ -140,7 +122,6 @@ void BoundedBelief::reset() {
   touches_.clear();
   elements_ = {};
   search_.largest().reset();
-  searched_ = 0;
   found_.reset();
   followed_.reset();
   if (none_) {
@@ -168,11 +149,10 @@ void BoundedBelief::take_in() {
   change_.change([&] {
     if (found_ && found_->bins.complete() &&
         found_->bins.values().size() <= FollowedBins::most_bins) {
-      followed_.emplace(found_->bins, found_->result, space_.log_weight);
-      followed_touches_ = touches_.size();
+      followed_.emplace(found_->bins, found_->result, space_.log_weight, touches_.size());
     }
     found_.reset();
-    const std::vector<ArrayReadings> touches = kept_.all();
+    const std::span<const ArrayReadings> touches = kept_.all();
     std::vector<KnownElements> all;
     for (const ArrayReadings& touch : touches) {
       all.push_back(known_elements(touch));
@@ -219,7 +199,7 @@ SearchGoal BoundedBelief::rough_goal() const {
 
 const SearchResult& BoundedBelief::found() {
   const Deadline deadline = until(options_.budget_s);
-  if (!found_ || found_->rough) {
+  if (!found_ || !found_->goal.exact) {
     found_.reset();
     found_ = search();
   }
@@ -262,15 +242,14 @@ BoundedBelief::Found BoundedBelief::run(const SearchGoal& goal, Deadline& deadli
           deadline.end();
         }
       });
-  return {std::move(result), std::move(bins)};
+  return {std::move(result), std::move(bins), goal};
 }
 
 SearchResult BoundedBelief::run(const SearchGoal& goal, const Deadline& deadline,
                                 const BinVisitor& visitor, std::vector<PoseBlock>* refined) {
   return arena_.execute([&] {
-    if (searched_ < touches_.size()) {
-      change_.change([&] { search_.largest().add(std::span(touches_).subspan(searched_)); });
-      searched_ = touches_.size();
+    if (LargestTiles& largest = search_.largest(); largest.touches() < touches_.size()) {
+      change_.change([&] { largest.add(std::span(touches_).subspan(largest.touches())); });
     }
     return search_.run(elements_, goal, deadline, visitor, refined);
   });
@@ -280,16 +259,16 @@ void BoundedBelief::visit(const BinVisitor& visitor) {
   if (found_->bins.complete()) {
     found_->bins.visit(visitor);
   } else {
-    run(found_->rough ? rough_goal() : goal(), until({}), visitor);
+    run(found_->goal, until({}), visitor);
   }
 }
 
-const FollowedBins* BoundedBelief::followed_bins() {
-  if (found_ || !followed_) {
-    return nullptr;
+bool BoundedBelief::follow() {
+  if (!followed_) {
+    return false;
   }
-  for (; followed_touches_ < touches_.size(); ++followed_touches_) {
-    const KnownElements touch = known_elements(touches_[followed_touches_]);
+  while (followed_->touches() < touches_.size()) {
+    const KnownElements touch = known_elements(touches_[followed_->touches()]);
     std::vector<double> most;
     for (const TileBounds& bounds : space_.bounds) {
       most.push_back(bounds.best(bounds.levels().size() - 1, touch));
@@ -298,25 +277,23 @@ const FollowedBins* BoundedBelief::followed_bins() {
   }
   if (!(followed_->share_outside() <= soon)) {
     followed_.reset();
-    return nullptr;
   }
-  return &*followed_;
+  return followed_.has_value();
 }
 
 std::vector<PoseSample> BoundedBelief::sample(std::size_t count, std::uint64_t seed) {
-  const FollowedBins* followed = followed_bins();
-  if (followed == nullptr && !found_) {
+  const bool followed = !found_ && follow();
+  if (!followed && !found_) {
     Deadline deadline = until(options_.budget_s);
     found_ = run(rough_goal(), deadline);
-    found_->rough = true;
   }
   BeliefDraws draws(count, seed, options_.lattice, space_.log_weight,
-                    followed != nullptr ? followed->log_total() : log_total());
+                    followed ? followed_->log_total() : log_total());
   const auto add = [&](const BinBox& box, std::span<const double> log_likelihood) {
     draws.add(box, log_likelihood);
   };
-  if (followed != nullptr) {
-    followed->visit(add);
+  if (followed) {
+    followed_->visit(add);
   } else {
     visit(add);
   }
@@ -346,7 +323,7 @@ double BoundedBelief::allowed_none_width(const LogInterval& none) const {
   const double low = probability(none.low);
   const double high = probability(none.high);
   if (high - low <= allowed) {
-    return unbounded;
+    return unlimited;
   }
   // The probability changes by at most so much a nat.
   const double p = std::clamp(0.5, low, high);
@@ -354,8 +331,8 @@ double BoundedBelief::allowed_none_width(const LogInterval& none) const {
 }
 
 LogInterval BoundedBelief::bound_none(const Deadline& deadline) {
-  double width = goal().evidence_nats.value_or(unbounded);
-  for (LogInterval last{-unbounded, unbounded};;) {
+  double width = goal().evidence_nats.value_or(unlimited);
+  for (LogInterval last{-unlimited, unlimited};;) {
     const LogInterval bounds = arena_.execute([&] { return none_->bounds(width, deadline); });
     const LogInterval weighted{none_log_weight_ + bounds.low, none_log_weight_ + bounds.high};
     width = std::min(width, allowed_none_width(weighted));
@@ -368,7 +345,7 @@ LogInterval BoundedBelief::bound_none(const Deadline& deadline) {
 }
 
 LogInterval BoundedBelief::none_log_evidence() const {
-  return found_ && found_->none ? *found_->none : LogInterval{-unbounded, -unbounded};
+  return found_ && found_->none ? *found_->none : LogInterval{-unlimited, -unlimited};
 }
 
 }  // namespace palpate

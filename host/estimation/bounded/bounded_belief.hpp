@@ -76,24 +76,27 @@ class BoundedBelief {
   struct Found {
     SearchResult result;
     EvaluatedBins bins;
-    bool rough = false;                    ///< only good enough to draw samples
+    SearchGoal goal;                       ///< that the search reached
     std::optional<LogInterval> none = {};  ///< none_log_evidence(), once it is bounded
   };
 
+  /// The goal that the options set.
   SearchGoal goal() const;
   /// What a search for samples is to reach.
   SearchGoal rough_goal() const;
   /// What found() returns.
   Found search();
+  /// Ends the deadline where there is no room for more bins.
   Found run(const SearchGoal& goal, Deadline& deadline);
   SearchResult run(const SearchGoal& goal, const Deadline& deadline, const BinVisitor& visitor,
                    std::vector<PoseBlock>* refined = nullptr);
+  /// Follows the bins of an earlier search through the touches since.
+  /// @returns whether they hold enough to draw samples from; forgets them otherwise
+  bool follow();
   /// Narrows the bounds of "none of these" as far as needed beside what was found.
   LogInterval bound_none(const Deadline& deadline);
   /// How wide these may be, given what they are.
   double allowed_none_width(const LogInterval& none) const;
-  /// The followed bins after all touches; nullptr where they may not hold enough to draw samples.
-  const FollowedBins* followed_bins();
   Deadline until(const std::optional<double>& budget_s) const {
     return Deadline(budget_s, &options_.cancel_point);
   }
@@ -104,16 +107,14 @@ class BoundedBelief {
   mutable tbb::task_arena arena_;
   BinLikelihood likelihood_;
   SearchSpace space_;
-  KeptTouches kept_;                    ///< before take_in()
-  std::vector<ArrayReadings> touches_;  ///< that were taken in
-  KnownElements elements_;              ///< of all these
-  BoundSearch search_;
-  std::size_t searched_ = 0;              ///< touches that search_ has taken in
-  std::optional<Found> found_;            ///< nothing where a touch came after the search
-  std::optional<FollowedBins> followed_;  ///< through the touches since an earlier search
-  std::size_t followed_touches_ = 0;      ///< that followed_ has taken in
-  std::optional<NoneEvidence> none_;      ///< where the options ask for it
   double none_log_weight_ = 0.0;          ///< log of its prior weight times the number of bins
+  KeptTouches kept_;                      ///< before take_in()
+  std::vector<ArrayReadings> touches_;    ///< that were taken in
+  KnownElements elements_;                ///< of all these
+  BoundSearch search_;                    ///< whose largest tiles count those that they took in
+  std::optional<NoneEvidence> none_;      ///< of all these, where the options ask for it
+  std::optional<Found> found_;            ///< of all these; nothing before a search
+  std::optional<FollowedBins> followed_;  ///< of the last search before, through some of these
   ChangeInSteps change_{"bounded posterior: memory ended in the middle of an update; call reset()"};
 };
 

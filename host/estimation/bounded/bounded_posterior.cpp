@@ -1,8 +1,6 @@
 #include "palpate/bounded_posterior.hpp"
 
-#include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 #include <utility>
 
@@ -10,9 +8,7 @@
 #include "estimation/bounded/bounded_belief.hpp"
 #include "estimation/bounded/log_sum.hpp"
 #include "estimation/bounded/marginal_sums.hpp"
-#include "estimation/bounded/parallel_for.hpp"
 #include "estimation/bounded/search/search_memory.hpp"
-#include "estimation/bounded/thinned_lattice.hpp"
 #include "estimation/hypotheses.hpp"
 #include "estimation/lattice/refinement.hpp"
 #include "model/interpolated_map.hpp"
@@ -62,7 +58,9 @@ BoundedOptions checked(const BoundedOptions& options, std::span<const Hypothesis
   BoundedOptions all = options;
   all.lattice.collapse_fixed().validate();
   all.contact = resolve(options.contact, hypotheses);
-  require_room(hypotheses, all, memory_for_search());
+  if (const std::string why = why_no_room(hypotheses, all, memory_for_search()); !why.empty()) {
+    throw Error(Fault::input, why);
+  }
   return all;
 }
 
@@ -73,13 +71,6 @@ struct BoundedPosterior::Impl {
       : belief(hypotheses, options) {
     for (const Hypothesis& hypothesis : hypotheses) {
       bodies.push_back(displaced_body(hypothesis.map));
-    }
-  }
-
-  void require_object(int object) const {
-    if (object < 0 || static_cast<std::size_t>(object) >= bodies.size()) {
-      throw Error(Fault::input,
-                  fmt::format("object {}: there are {}, counted from 0", object, bodies.size()));
     }
   }
 
@@ -132,8 +123,7 @@ Estimate BoundedPosterior::estimate() const {
   std::vector<LogInterval> bounds;
   for (const HypothesisMass& mass : found.mass) {
     logs.push_back(mass.evaluated);
-    bounds.push_back({log_subtract(mass.evaluated, mass.rounding),
-                      log_add(log_add(mass.evaluated, mass.rounding), mass.dropped)});
+    bounds.push_back(mass.bounds());
   }
   // Dropped and rounding mass over the whole that they are part of.
   const double dropped = found.uncertain();
@@ -186,7 +176,7 @@ Estimate BoundedPosterior::estimate() const {
 
 RefinedPose BoundedPosterior::refine(const Mode& mode) const {
   Impl& posterior = whole();
-  posterior.require_object(mode.object);
+  require_object(mode.object, posterior.bodies.size());
   const BoundedBelief& belief = posterior.belief;
   // Where bins are very fine, a few of them tell the peak, and all would take long.
   const PoseLattice fit = thinned(lattice());
@@ -201,17 +191,13 @@ RefinedPose BoundedPosterior::refine(const Mode& mode) const {
   }
   const BinLikelihood& likelihood = thin ? *of_thin : belief.likelihood();
   const auto log_likelihood = [&](std::span<const BinBox> boxes) {
-    std::vector<std::size_t> firsts{0};  // each box's first bin, and the end
+    std::size_t bins = 0;
     for (const BinBox& box : boxes) {
-      firsts.push_back(firsts.back() + static_cast<std::size_t>(box.bins()));
+      bins += static_cast<std::size_t>(box.bins());
     }
-    std::vector<float> logs(firsts.back());
-    belief.on_threads([&] {
-      parallel_for(boxes.size(), [&](std::size_t i) {
-        likelihood.evaluate(std::span(&boxes[i], 1), belief.elements(),
-                            std::span(logs).subspan(firsts[i], firsts[i + 1] - firsts[i]));
-      });
-    });
+    std::vector<float> logs(bins);
+    belief.on_threads(
+        [&] { likelihood.evaluate_on_threads(boxes, belief.elements(), std::span(logs)); });
     return std::vector<double>(logs.begin(), logs.end());
   };
   return palpate::refine(log_likelihood, fit, posterior.bodies[mode.object], start);
@@ -221,7 +207,7 @@ Marginals BoundedPosterior::marginals(int object) const { return marginals(objec
 
 Marginals BoundedPosterior::marginals(int object, const PoseLattice& grid) const {
   Impl& posterior = whole();
-  posterior.require_object(object);
+  require_object(object, posterior.bodies.size());
   PoseLattice onto = grid;
   onto.collapse_fixed().validate();
   BoundedBelief& belief = posterior.belief;
@@ -239,7 +225,7 @@ Marginals BoundedPosterior::marginals(int object, const PoseLattice& grid) const
 
 double BoundedPosterior::log_likelihood(int object, const Pose& T_object_robot) const {
   Impl& posterior = whole();
-  posterior.require_object(object);
+  require_object(object, posterior.bodies.size());
   const auto& [translation_mm, theta_rad] = T_object_robot;
   if (!std::isfinite(translation_mm.x) || !std::isfinite(translation_mm.y) ||
       !std::isfinite(theta_rad)) {

@@ -29,8 +29,8 @@ void EvaluatedBins::visit(const BinVisitor& visit) const {
 }
 
 FollowedBins::FollowedBins(const EvaluatedBins& bins, const SearchResult& found,
-                           std::span<const double> log_weight)
-    : log_weight_(log_weight.begin(), log_weight.end()) {
+                           std::span<const double> log_weight, std::size_t touches)
+    : log_weight_(log_weight.begin(), log_weight.end()), touches_(touches) {
   std::vector<LogSum> outside(log_weight.size());
   for (std::size_t i = 0; i < outside.size(); ++i) {
     outside[i].add(found.mass[i].dropped);
@@ -61,6 +61,7 @@ void FollowedBins::add(const KnownElements& elements, const BinLikelihood& likel
   for (std::size_t i = 0; i < outside_.size(); ++i) {
     outside_[i] += most[i];
   }
+  ++touches_;
   add_up();
 }
 

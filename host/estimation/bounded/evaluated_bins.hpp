@@ -58,10 +58,13 @@ class FollowedBins {
 
   /// @param bins,found of one search; all bins that it evaluated
   /// @param log_weight [hypothesis] log of its prior weight
+  /// @param touches that the search took in
   FollowedBins(const EvaluatedBins& bins, const SearchResult& found,
-               std::span<const double> log_weight);
+               std::span<const double> log_weight, std::size_t touches);
 
-  /// Takes in the elements of more touches.
+  /// Touches that were taken in.
+  std::size_t touches() const { return touches_; }
+  /// Takes in the elements of one more touch.
   /// @param most [hypothesis] log-likelihood that no pose exceeds, in nats
   void add(const KnownElements& elements, const BinLikelihood& likelihood,
            std::span<const double> most);
@@ -76,6 +79,7 @@ class FollowedBins {
   void add_up();
 
   std::vector<double> log_weight_;
+  std::size_t touches_;
   EvaluatedBins bins_{true};
   std::vector<double> outside_;  ///< [hypothesis] log of the bound, with the prior weight
   double log_total_ = 0.0;

@@ -77,60 +77,37 @@ KnownElements merged(std::span<const KnownElements> lists) {
 
 void KeptTouches::add(std::span<const Touch> touches, const ContactModel& model,
                       const glm::dvec2& pivot_mm) {
-  const std::size_t before = ends_.size();
+  const std::size_t before = count_;
   try {
     for (const Touch& touch : touches) {
-      add(touch, model, pivot_mm);
+      if (touches_.empty()) {
+        make_room(touch.elements_mm.size());
+      } else if (count_ == touches_.size()) {
+        touches_.emplace_back();
+      }
+      ArrayReadings& kept = touches_[count_];
+      kept.readings = classify(touch, model, std::move(kept.readings));
+      kept.from_pivot_mm.clear();
+      for (const glm::dvec2& element_mm : touch.elements_mm) {
+        kept.from_pivot_mm.push_back(touch.T_robot_sensor * element_mm - pivot_mm);
+      }
+      kept.rectangle = array_rectangle(touch, pivot_mm);
+      ++count_;
     }
   } catch (...) {
-    shrink(before);
+    count_ = before;
     throw;
   }
 }
 
-void KeptTouches::add(const Touch& touch, const ContactModel& model, const glm::dvec2& pivot_mm) {
-  of_touch_ = classify(touch, model, std::move(of_touch_));
-  const std::size_t n = of_touch_.size();
-  if (ends_.capacity() == 0) {
-    constexpr std::size_t of_element = sizeof(glm::dvec2) + sizeof(Reading);
-    const std::size_t touches = std::clamp<std::size_t>(
-        most_bytes / (of_element * std::max<std::size_t>(n, 1)), 1, room_for);
-    from_pivot_mm_.reserve(touches * n);
-    readings_.reserve(touches * n);
-    ends_.reserve(room_for);
-    rectangles_.reserve(room_for);
+void KeptTouches::make_room(std::size_t elements) {
+  const std::size_t bytes =
+      (sizeof(glm::dvec2) + sizeof(Reading)) * std::max<std::size_t>(elements, 1);
+  touches_.resize(std::clamp<std::size_t>(most_bytes / bytes, 1, room_for));
+  for (ArrayReadings& touch : touches_) {
+    touch.from_pivot_mm.reserve(elements);
+    touch.readings.reserve(elements);
   }
-  for (const glm::dvec2& element_mm : touch.elements_mm) {
-    from_pivot_mm_.push_back(touch.T_robot_sensor * element_mm - pivot_mm);
-  }
-  readings_.insert(readings_.end(), of_touch_.begin(), of_touch_.end());
-  rectangles_.push_back(array_rectangle(touch, pivot_mm));
-  ends_.push_back(readings_.size());
-}
-
-std::vector<ArrayReadings> KeptTouches::all() const {
-  std::vector<ArrayReadings> touches;
-  std::size_t begin = 0;
-  for (std::size_t i = 0; i < ends_.size(); ++i) {
-    const auto from = static_cast<std::ptrdiff_t>(begin);
-    const auto to = static_cast<std::ptrdiff_t>(ends_[i]);
-    touches.push_back(
-        {.from_pivot_mm = {from_pivot_mm_.begin() + from, from_pivot_mm_.begin() + to},
-         .readings = {readings_.begin() + from, readings_.begin() + to},
-         .rectangle = rectangles_[i]});
-    begin = ends_[i];
-  }
-  return touches;
-}
-
-void KeptTouches::clear() { shrink(0); }
-
-void KeptTouches::shrink(std::size_t touches) {
-  const std::size_t elements = touches == 0 ? 0 : ends_[touches - 1];
-  from_pivot_mm_.resize(elements);
-  readings_.resize(elements);
-  rectangles_.resize(touches);
-  ends_.resize(touches);
 }
 
 }  // namespace palpate

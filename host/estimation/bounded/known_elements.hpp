@@ -24,8 +24,6 @@ struct ReadingRun {
 struct KnownElements {
   std::vector<glm::dvec2> from_pivot_mm;
   std::vector<ReadingRun> runs;  ///< ascending by reading
-
-  bool empty() const { return from_pivot_mm.empty(); }
 };
 
 /// All elements of a touch in the array's order, Unknown ones too: in the robot frame and relative
@@ -56,21 +54,17 @@ class KeptTouches {
   /// Classifies the touches' elements (Eq. 3) and keeps them.
   /// @throws Error on a touch that is not sound, and keeps none of these
   void add(std::span<const Touch> touches, const ContactModel& model, const glm::dvec2& pivot_mm);
-  bool empty() const { return ends_.empty(); }
-  /// In the order in which they came.
-  std::vector<ArrayReadings> all() const;
+  bool empty() const { return count_ == 0; }
+  /// In the order in which they came; until the next call.
+  std::span<const ArrayReadings> all() const { return std::span(touches_).first(count_); }
   /// Keeps the room.
-  void clear();
+  void clear() { count_ = 0; }
 
  private:
-  void add(const Touch& touch, const ContactModel& model, const glm::dvec2& pivot_mm);
-  void shrink(std::size_t touches);
+  void make_room(std::size_t elements);
 
-  std::vector<glm::dvec2> from_pivot_mm_;   ///< of all touches' elements
-  std::vector<Reading> readings_;           ///< of the same
-  std::vector<std::size_t> ends_;           ///< [touch] of its elements
-  std::vector<ArrayRectangle> rectangles_;  ///< [touch]
-  std::vector<Reading> of_touch_;           ///< the last one's, for its memory
+  std::vector<ArrayReadings> touches_;  ///< those from count_ on are room
+  std::size_t count_ = 0;
 };
 
 }  // namespace palpate

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "estimation/bounded/log_sum.hpp"
 #include "estimation/bounded/touch_overlap.hpp"
@@ -52,59 +53,56 @@ LogInterval NoneEvidence::search(TouchMean& mean, double tolerance, const Deadli
   const SearchResult found = search_.run(
       elements, {.tolerance = tolerance, .mode = false, .counted = everywhere ? nullptr : &overlap},
       deadline, [](const BinBox& /*box*/, std::span<const double> /*log_likelihood*/) {});
-  const HypothesisMass all = found.all();
+  const LogInterval all = found.all().bounds();
   const double log_bins = std::log(bins);
   mean.log_share = log_bins - std::log(static_cast<double>(options_.lattice.bins()));
-  return {log_subtract(all.evaluated, all.rounding) - log_bins,
-          log_add(log_add(all.evaluated, all.rounding), all.dropped) - log_bins};
+  return {all.low - log_bins, all.high - log_bins};
 }
 
-void NoneEvidence::narrow(TouchMean& mean, double width_nats, const Deadline& deadline) {
+LogInterval NoneEvidence::narrow(TouchMean& mean, double width_nats, const Deadline& deadline) {
+  constexpr double infinity = std::numeric_limits<double>::infinity();
   // What an earlier call found finer does not count: bounds depend on what is asked for.
-  mean.log_mean = {-infinity, infinity};
+  LogInterval log_mean{-infinity, infinity};
   for (std::size_t i = 0; i < tolerances.size();) {
     if (!mean.found[i]) {
       const LogInterval found = search(mean, tolerances[i], deadline);
       if (deadline.passed()) {
-        mean.log_mean = width(found) < width(mean.log_mean) ? found : mean.log_mean;
-        return;
+        return width(found) < width(log_mean) ? found : log_mean;
       }
       mean.found[i] = found;
     }
-    const double before = width(mean.log_mean);
-    mean.log_mean = *mean.found[i];
-    if (width(mean.log_mean) <= width_nats || width(mean.log_mean) > least_gain * before) {
-      return;
+    const double before = width(log_mean);
+    log_mean = *mean.found[i];
+    if (width(log_mean) <= width_nats || width(log_mean) > least_gain * before) {
+      break;
     }
     // The first search tells little of what is needed; the others come close to their tolerance.
     for (++i; i + 1 < tolerances.size() && width_of_tolerance * tolerances[i] > width_nats;) {
       ++i;
     }
   }
+  return log_mean;
 }
 
 LogInterval NoneEvidence::bounds(double width_nats, const Deadline& deadline) {
   if (means_.empty()) {
     return {};
   }
+  std::vector<double> low;
+  std::vector<double> high;
   for (TouchMean& mean : means_) {
-    narrow(mean, width_nats / static_cast<double>(means_.size()), deadline);
+    const LogInterval log_mean =
+        narrow(mean, width_nats / static_cast<double>(means_.size()), deadline);
+    low.push_back(log_mean.low);
+    high.push_back(log_mean.high);
   }
   // Added in an order of their own, so that the order of touches shows in no bit.
-  const auto sum_of = [&](double LogInterval::*side) {
-    std::vector<double> logs;
-    for (const TouchMean& mean : means_) {
-      logs.push_back(mean.log_mean.*side);
-    }
+  const auto sum_of = [](std::vector<double>& logs) {
     std::ranges::sort(logs);
-    double sum = 0.0;
-    for (const double log : logs) {
-      sum += log;
-    }
-    return sum;
+    return std::accumulate(logs.begin(), logs.end(), 0.0);
   };
   const double log_share = means_.front().log_share;
-  return {log_share + sum_of(&LogInterval::low), log_share + sum_of(&LogInterval::high)};
+  return {log_share + sum_of(low), log_share + sum_of(high)};
 }
 
 }  // namespace palpate

@@ -1,9 +1,7 @@
 #pragma once
 
 #include <array>
-#include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <optional>
 #include <span>
 #include <vector>
@@ -46,7 +44,6 @@ class NoneEvidence {
   std::uint64_t bytes() const { return search_.largest().bytes(); }
 
  private:
-  static constexpr double infinity = std::numeric_limits<double>::infinity();
   /// Searches to these parts of a touch's sum that may be left out, the last where rounding of
   /// float64 is not far below. Most touches' bins have likelihoods of many magnitudes, so that a
   /// coarser search than the first would save little.
@@ -58,10 +55,10 @@ class NoneEvidence {
     double log_share = 0.0;  ///< of the bins that count among all, by prior weight, in nats
     /// [tolerance] bounds of the log of the mean, from searches that no deadline ended.
     std::array<std::optional<LogInterval>, tolerances.size()> found = {};
-    LogInterval log_mean = {-infinity, infinity};  ///< those that bounds() takes
   };
 
-  void narrow(TouchMean& mean, double width_nats, const Deadline& deadline);
+  /// Bounds of the log of a touch's mean likelihood, so wide at most where that can be had.
+  LogInterval narrow(TouchMean& mean, double width_nats, const Deadline& deadline);
   LogInterval search(TouchMean& mean, double tolerance, const Deadline& deadline);
 
   SearchSpace& space_;

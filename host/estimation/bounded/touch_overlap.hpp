@@ -36,9 +36,6 @@ class OverlapPlane {
   OverlapPlane(const ArrayRectangle& array, const BoundingBox& object, const PoseLattice& lattice,
                int theta);
 
-  /// The rows and the columns that may hold overlapping bins.
-  Bins rows() const { return rows_; }
-  Bins columns() const { return columns_; }
   /// The overlapping bins of any row.
   Bins row(int y) const;
   /// Number of overlapping bins.
@@ -54,7 +51,7 @@ class OverlapPlane {
   glm::dvec2 turned_reach_mm_{};  ///< of |apart| along the array's axes
   double cos_ = 1.0;              ///< of the array's direction in the object frame
   double sin_ = 0.0;
-  Bins rows_;
+  Bins rows_;  ///< that may hold overlapping bins, as the columns
   Bins columns_;
 };
 

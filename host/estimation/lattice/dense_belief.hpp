@@ -6,8 +6,6 @@
 
 #include "estimation/bin_box.hpp"
 #include "estimation/kernel_sizes.hpp"
-#include "estimation/lattice/slab.hpp"
-#include "estimation/two_float.hpp"
 #include "gpu/command_stream.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 
 #include <fmt/format.h>
 
-#include "estimation/kernel_sizes.hpp"
-#include "estimation/lattice/blur_tables.hpp"
 #include "palpate/error.hpp"
+#include "palpate/pose.hpp"
 #include "shaders/blur_axis.hpp"
 #include "shaders/max_planes.hpp"
 #include "shaders/sum_turns.hpp"
@@ -19,9 +19,90 @@ namespace {
 using gpu::Access;
 
 constexpr std::uint32_t rows_of_a_turn = 4;  // of an invocation of sum_turns
+/// A Gaussian is cut off at as many standard deviations.
+constexpr double reach = 4.0;
 
-std::uint32_t source_of(DisplacementBlur::Of of) {
-  return of == DisplacementBlur::Of::touch ? shaders::BLUR_TOUCH : shaders::BLUR_BELIEF;
+void set_two_floats(double value, float& high, float& low) {
+  high = static_cast<float>(value);
+  low = static_cast<float>(value - high);
+}
+
+/// A distance along an axis in whole bins and the rest. An axis of one bin keeps its place.
+void set_shift(double distance_mm, const Axis& axis, float& whole, float& fraction,
+               float& fraction_low) {
+  // Farther than any lattice has bins, yet whole numbers are exact. So far is what is no number:
+  // the difference of places beyond float64.
+  constexpr double farthest = 1 << 23;
+  const double bins = axis.count == 1 ? 0.0
+                      : std::isnan(distance_mm)
+                          ? farthest
+                          : std::clamp(distance_mm / axis.step(), -farthest, farthest);
+  whole = static_cast<float>(std::floor(bins));
+  set_two_floats(bins - std::floor(bins), fraction, fraction_low);
+}
+
+/// Bins to either side that a Gaussian of this standard deviation reaches. 0 for an axis of one
+/// bin, which is not blurred.
+int blur_steps(double sd, const Axis& axis) {
+  return axis.count > 1 ? static_cast<int>(std::ceil(reach * sd / axis.step())) : 0;
+}
+
+/// The weights of a Gaussian by distance in bins, the first is 1; `steps` + 1 numbers.
+std::vector<float> blur_weights(double sd, const Axis& axis, int steps) {
+  std::vector<float> weights{1.0F};
+  for (int k = 1; k <= steps; ++k) {
+    const double deviations = k * axis.step() / sd;
+    weights.push_back(static_cast<float>(std::exp(-deviations * deviations / 2.0)));
+  }
+  return weights;
+}
+
+/// For every bin of the axis 1 over the sum of the weights whose bins lie inside.
+std::vector<float> blur_norms(const std::vector<float>& weights, const Axis& axis) {
+  const int steps = static_cast<int>(weights.size()) - 1;
+  std::vector<float> norms;
+  for (int i = 0; i < axis.count; ++i) {
+    double sum = 0.0;
+    for (int k = std::max(-steps, -i); k <= std::min(steps, axis.count - 1 - i); ++k) {
+      sum += weights[static_cast<std::size_t>(std::abs(k))];
+    }
+    norms.push_back(static_cast<float>(1.0 / sum));
+  }
+  return norms;
+}
+
+/// Where a slip takes the belief of a bin from as theta grows by k steps: g + R(alpha) (t - g),
+/// [object, k].
+/// @param centroids_mm g of every object, in its frame
+std::vector<shaders::Turn> slip_turns(const PoseLattice& lattice,
+                                      std::span<const glm::dvec2> centroids_mm, int steps) {
+  const Axis& x = lattice.x_mm;
+  const Axis& y = lattice.y_mm;
+  std::vector<shaders::Turn> turns;
+  for (const glm::dvec2& centroid : centroids_mm) {
+    const glm::dvec2 first_mm = glm::dvec2(x.centre(0), y.centre(0)) - centroid;
+    for (int k = -steps; k <= steps; ++k) {
+      const double alpha = k * lattice.theta_rad.step();
+      // R(alpha) - 1, applied to the first bin and to one bin more along each axis.
+      const double c = -2.0 * std::sin(alpha / 2.0) * std::sin(alpha / 2.0);
+      const double s = std::sin(alpha);
+      shaders::Turn turn{};
+      set_shift(c * first_mm.x - s * first_mm.y, x, turn.whole_x, turn.fraction_x,
+                turn.fraction_x_low);
+      set_shift(s * first_mm.x + c * first_mm.y, y, turn.whole_y, turn.fraction_y,
+                turn.fraction_y_low);
+      if (x.count > 1) {
+        set_two_floats(c, turn.xx, turn.xx_low);
+        set_two_floats(-s * y.step() / x.step(), turn.xy, turn.xy_low);
+      }
+      if (y.count > 1) {
+        set_two_floats(s * x.step() / y.step(), turn.yx, turn.yx_low);
+        set_two_floats(c, turn.yy, turn.yy_low);
+      }
+      turns.push_back(turn);
+    }
+  }
+  return turns;
 }
 
 /// The slab that holds an object's theta.
@@ -109,29 +190,31 @@ void require_whole_planes(const gpu::Context& context, const PoseLattice& lattic
 
 DisplacementBlur::DisplacementBlur(gpu::Context& context, gpu::CommandStream& stream,
                                    const PoseLattice& lattice, std::size_t objects,
-                                   const DisplacementSd& sd, Of of, bool keep_touch)
+                                   const DisplacementSd& sd,
+                                   std::span<const glm::dvec2> slip_centroids_mm, bool keep_touch)
     : context_(context),
       stream_(stream),
       lattice_(lattice),
       objects_(objects),
       sd_(sd),
-      of_(of),
+      slips_(!slip_centroids_mm.empty()),
       theta_steps_(blur_steps(sd.rad, lattice.theta_rad)),
       lanes_(independent_lanes(context.limits())),
       max_planes_(context, {.name = "max_planes",
                             .spirv = shaders::max_planes,
                             .bindings = {Access::table, Access::table, Access::storage},
                             .push_bytes = sizeof(shaders::PlanesPush),
-                            .constants = {lanes_, source_of(of)}}),
+                            .constants = {lanes_, source()}}),
       along_y_(make_pass(lattice.y_mm, false)),
       along_x_(make_pass(lattice.x_mm, true)),
       // A slip takes each bin from a place of its own: neighbours share no reads.
-      turn_rows_(of == Of::belief ? 1 : rows_of_a_turn),
-      turn_columns_(of == Of::belief ? 1 : 2),
+      turn_rows_(slips_ ? 1 : rows_of_a_turn),
+      turn_columns_(slips_ ? 1 : 2),
       turns_(turn_buffer(context, turns_of(lattice, objects, theta_steps_))),
       plane_max_(maxima_buffer(context, planes() + static_cast<std::size_t>(theta_steps_) + 1)),
       references_(context, objects * sizeof(TwoFloat), gpu::Memory::device, "maxima of objects",
-                  VK_FORMAT_R32G32_SFLOAT) {
+                  VK_FORMAT_R32G32_SFLOAT),
+      host_turns_(slip_turns(lattice, slip_centroids_mm, theta_steps_)) {
   require_whole_planes(context, lattice, objects, lanes_, theta_steps_);
   for (const Axis& axis : {lattice.x_mm, lattice.y_mm}) {
     // A loop over the bins of a strip and over the steps, and other loops.
@@ -149,7 +232,7 @@ DisplacementBlur::DisplacementBlur(gpu::Context& context, gpu::CommandStream& st
                              Access::table, Access::storage, Access::table, Access::storage,
                              Access::storage, Access::storage},
                 .push_bytes = sizeof(shaders::TurnPush),
-                .constants = {lanes_, of == Of::belief ? 1U : 0U, turn_rows_, keep_touch ? 1U : 0U,
+                .constants = {lanes_, slips_ ? 1U : 0U, turn_rows_, keep_touch ? 1U : 0U,
                               blurs_planes() ? shaders::BLUR_ALONG_X : shaders::BLUR_TOUCH,
                               objects_in_one_slab(context, lattice, objects) ? 1U : 0U,
                               turns_.is_table() ? 1U : 0U, plane_max_.is_table() ? 1U : 0U}});
@@ -160,7 +243,7 @@ DisplacementBlur::DisplacementBlur(gpu::Context& context, gpu::CommandStream& st
 DisplacementBlur::Pass DisplacementBlur::make_pass(const Axis& axis, bool along_x) {
   const int steps = plane_steps(sd_.mm, axis);
   const std::vector<float> table = blur_weights(sd_.mm, axis, steps);
-  std::vector<std::uint32_t> constants{lanes_, along_x ? shaders::BLUR_ALONG_Y : source_of(of_),
+  std::vector<std::uint32_t> constants{lanes_, along_x ? shaders::BLUR_ALONG_Y : source(),
                                        static_cast<std::uint32_t>(steps),
                                        lattice_.x_mm.count % 2 == 0 ? 1U : 0U};
   for (std::size_t k = 0; k <= shaders::BLUR_CONSTANT_STEPS; ++k) {
@@ -217,8 +300,8 @@ void DisplacementBlur::run_pass(const Pass& pass, const DenseBelief& from,
   }
 }
 
-void DisplacementBlur::record_planes(const DenseBelief& from, const DenseBelief& scratch,
-                                     std::span<const TwoFloat> references, bool few_groups) {
+void DisplacementBlur::blur_planes(const DenseBelief& from, const DenseBelief& scratch,
+                                   std::span<const TwoFloat> references, bool few_groups) {
   stream_.upload(references_, references);
   for (std::size_t i = 0; i < scratch.slabs().size(); ++i) {
     const Slab& slab = scratch.slabs()[i];
@@ -235,10 +318,26 @@ void DisplacementBlur::record_planes(const DenseBelief& from, const DenseBelief&
   }
 }
 
-void DisplacementBlur::record_turns(const DenseBelief& scratch,
-                                    std::span<const shaders::Turn> turns, const DenseBelief& belief,
-                                    bool few_groups) {
-  stream_.upload(turns_, turns);
+void DisplacementBlur::turn_for(const glm::dvec2& sensor_from_pivot_mm) {
+  host_turns_.clear();
+  for (int t = 0; t < lattice_.theta_rad.count; ++t) {
+    const double theta = lattice_.theta_rad.centre(t);
+    for (int k = -theta_steps_; k <= theta_steps_; ++k) {
+      const double turned = theta + k * lattice_.theta_rad.step();
+      // Without a turn the place is the same, even one beyond float64.
+      const glm::dvec2 shift_mm =
+          k == 0 ? glm::dvec2(0.0)
+                 : rotate(theta, sensor_from_pivot_mm) - rotate(turned, sensor_from_pivot_mm);
+      shaders::Turn& turn = host_turns_.emplace_back();
+      set_shift(shift_mm.x, lattice_.x_mm, turn.whole_x, turn.fraction_x, turn.fraction_x_low);
+      set_shift(shift_mm.y, lattice_.y_mm, turn.whole_y, turn.fraction_y, turn.fraction_y_low);
+    }
+  }
+}
+
+void DisplacementBlur::sum_turns(const DenseBelief& scratch, const DenseBelief& belief,
+                                 bool few_groups) {
+  stream_.upload(turns_, host_turns_);
   const auto thetas = static_cast<std::uint32_t>(lattice_.theta_rad.count);
   const std::span<const Slab> slabs = scratch.slabs();
   for (std::size_t i = 0; i < slabs.size(); ++i) {
@@ -269,21 +368,13 @@ void DisplacementBlur::record_turns(const DenseBelief& scratch,
   }
 }
 
-void DisplacementBlur::blur_planes(const DenseBelief& from, const DenseBelief& scratch,
-                                   std::span<const TwoFloat> references) {
-  record_planes(from, scratch, references, false);
-}
-
-void DisplacementBlur::sum_turns(const DenseBelief& scratch, std::span<const shaders::Turn> turns,
-                                 const DenseBelief& belief) {
-  record_turns(scratch, turns, belief, false);
-}
-
 void DisplacementBlur::warm_up(const DenseBelief& scratch, const DenseBelief& belief) {
   const std::vector<TwoFloat> references(objects_);
-  const std::vector<shaders::Turn> turns(turns_of(lattice_, objects_, theta_steps_));
-  record_planes(of_ == Of::touch ? scratch : belief, scratch, references, true);
-  record_turns(scratch, turns, belief, true);
+  if (!slips_) {
+    turn_for({});
+  }
+  blur_planes(slips_ ? belief : scratch, scratch, references, true);
+  sum_turns(scratch, belief, true);
 }
 
 }  // namespace palpate

@@ -1,12 +1,11 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
 
+#include "estimation/kernel_sizes.hpp"
 #include "estimation/lattice/dense_belief.hpp"
-#include "estimation/two_float.hpp"
 #include "gpu/command_stream.hpp"
 #include "palpate/displacement.hpp"
 #include "palpate/lattice.hpp"
@@ -21,33 +20,35 @@ namespace palpate {
 /// others divided by their sum.
 class DisplacementBlur {
  public:
-  enum class Of { touch, belief };
-
   /// Throws Error where the device cuts a plane of one theta into parts, or has too few thetas in a
   /// part of one object's bins.
+  /// @param slip_centroids_mm of a belief's blur: every object's centroid, in its frame; empty for
+  /// that of touches
   /// @param keep_touch whether sum_turns() leaves a touch's mean likelihood in the scratch belief
   DisplacementBlur(gpu::Context& context, gpu::CommandStream& stream, const PoseLattice& lattice,
-                   std::size_t objects, const DisplacementSd& sd, Of of, bool keep_touch);
+                   std::size_t objects, const DisplacementSd& sd,
+                   std::span<const glm::dvec2> slip_centroids_mm, bool keep_touch);
 
   /// Device memory in bytes that it takes, without the scratch belief.
   static std::uint64_t bytes_needed(const PoseLattice& lattice, std::size_t objects,
                                     const DisplacementSd& sd);
   std::uint64_t device_bytes() const;
 
-  int theta_steps() const { return theta_steps_; }
-
   /// Records the blur along y and x.
   /// @param from a touch's log-likelihood in `scratch` itself, or a belief
   /// @param scratch holds the result
   /// @param references a log-likelihood of every object that values are relative to: 0 for a touch,
   /// the largest of a belief
+  /// @param few_groups one workgroup of each kernel, to no use but that drivers compile it
   void blur_planes(const DenseBelief& from, const DenseBelief& scratch,
-                   std::span<const TwoFloat> references);
+                   std::span<const TwoFloat> references, bool few_groups = false);
+  /// Sets where touches are taken from as theta grows by k steps: t + (R(theta) - R(theta + alpha))
+  /// r.
+  /// @param sensor_from_pivot_mm r: the sensor's origin relative to the pivot, in the robot frame
+  void turn_for(const glm::dvec2& sensor_from_pivot_mm);
   /// Records the sum over thetas of what blur_planes() has left in `scratch`: adds it to the belief
   /// (a touch), or replaces the belief by it.
-  /// @param turns as touch_turns() or slip_turns() makes them
-  void sum_turns(const DenseBelief& scratch, std::span<const shaders::Turn> turns,
-                 const DenseBelief& belief);
+  void sum_turns(const DenseBelief& scratch, const DenseBelief& belief, bool few_groups = false);
   /// Runs every kernel once, on a workgroup each: drivers compile them then, and no touch has to
   /// wait for that. What the beliefs hold afterwards is of no use.
   void warm_up(const DenseBelief& scratch, const DenseBelief& belief);
@@ -66,21 +67,18 @@ class DisplacementBlur {
   }
   /// A touch that is not displaced along x and y stays as it is; of a belief, the difference from
   /// its largest is wanted.
-  bool blurs_planes() const { return sd_.mm > 0.0 || of_ == Of::belief; }
+  bool blurs_planes() const { return sd_.mm > 0.0 || slips_; }
+  std::uint32_t source() const { return slips_ ? shaders::BLUR_BELIEF : shaders::BLUR_TOUCH; }
   Pass make_pass(const Axis& axis, bool along_x);
   void run_pass(const Pass& pass, const DenseBelief& from, const DenseBelief& scratch,
                 bool few_groups);
-  void record_planes(const DenseBelief& from, const DenseBelief& scratch,
-                     std::span<const TwoFloat> references, bool few_groups);
-  void record_turns(const DenseBelief& scratch, std::span<const shaders::Turn> turns,
-                    const DenseBelief& belief, bool few_groups);
 
   gpu::Context& context_;
   gpu::CommandStream& stream_;
   PoseLattice lattice_;
   std::size_t objects_;
   DisplacementSd sd_;
-  Of of_;
+  bool slips_;
   int theta_steps_;
   std::uint32_t lanes_;
   gpu::Kernel max_planes_;
@@ -92,6 +90,8 @@ class DisplacementBlur {
   gpu::Buffer turns_;
   gpu::Buffer plane_max_;   ///< [object, theta], then the weights of theta
   gpu::Buffer references_;  ///< [object]
+  /// What goes to turns_: of a touch [theta, k], of a slip [object, k].
+  std::vector<shaders::Turn> host_turns_;
 };
 
 }  // namespace palpate

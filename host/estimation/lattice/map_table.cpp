@@ -4,13 +4,10 @@
 #include <bit>
 #include <cmath>
 #include <initializer_list>
-#include <span>
 
 #include <fmt/format.h>
 #include <glm/vec2.hpp>
 
-#include "estimation/bordered_map.hpp"
-#include "estimation/contact_kernel.hpp"
 #include "estimation/kernel_sizes.hpp"
 #include "palpate/error.hpp"
 #include "shaders/accumulate_rows.hpp"

@@ -2,9 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <limits>
-#include <optional>
 
 #include <fmt/format.h>
 
@@ -18,9 +16,7 @@
 #include "estimation/lattice/memory_plan.hpp"
 #include "estimation/lattice/reading_predictor.hpp"
 #include "estimation/lattice/refinement.hpp"
-#include "estimation/lattice/still_array.hpp"
 #include "estimation/lattice/touch_by_touch.hpp"
-#include "estimation/moved_pivot.hpp"
 #include "estimation/pose_draws.hpp"
 #include "gpu/command_stream.hpp"
 #include "model/own_process.hpp"
@@ -50,8 +46,7 @@ struct PoseHistogram::Impl {
       by_touch.emplace(device.context(), stream, options, hypotheses, log_weight, belief);
     }
     if (options.none_weight) {
-      none_log_weight = std::log(*options.none_weight) - log_total_weight(hypotheses) +
-                        std::log(static_cast<double>(options.lattice.bins()));
+      none_log_weight = palpate::none_log_weight(*options.none_weight, hypotheses, options.lattice);
     }
     summaries();  // runs what was recorded, and the reductions a first time
   }
@@ -175,13 +170,6 @@ struct PoseHistogram::Impl {
     return all;
   }
 
-  void require_object(int object) const {
-    if (object < 0 || static_cast<std::size_t>(object) >= log_weight.size()) {
-      throw Error(Fault::input, fmt::format("object {}: there are {}, counted from 0", object,
-                                            log_weight.size()));
-    }
-  }
-
   HistogramOptions options;
   MemoryPlan plan;
   gpu::CommandStream stream;
@@ -297,7 +285,7 @@ Estimate PoseHistogram::estimate() const {
 
 RefinedPose PoseHistogram::refine(const Mode& mode) const {
   Impl& histogram = whole();
-  histogram.require_object(mode.object);
+  require_object(mode.object, histogram.bodies.size());
   return palpate::refine(
       [&](std::span<const BinBox> boxes) { return histogram.belief.download(boxes); }, lattice(),
       histogram.bodies[mode.object], mode);
@@ -305,7 +293,7 @@ RefinedPose PoseHistogram::refine(const Mode& mode) const {
 
 Marginals PoseHistogram::marginals(int object) const {
   Impl& histogram = whole();
-  histogram.require_object(object);
+  require_object(object, histogram.bodies.size());
   const BeliefSummary& summary = histogram.summaries()[object];
   const double of_largest = histogram.identity()[object] / summary.sum;
   Marginals marginals =
@@ -316,7 +304,7 @@ Marginals PoseHistogram::marginals(int object) const {
 
 std::vector<double> PoseHistogram::log_likelihood(int object) const {
   Impl& histogram = whole();
-  histogram.require_object(object);
+  require_object(object, histogram.bodies.size());
   std::vector<BinBox> all;
   for (int theta = 0; theta < lattice().theta_rad.count; ++theta) {
     all.push_back(whole_plane(lattice(), theta, object));

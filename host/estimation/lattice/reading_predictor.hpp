@@ -20,7 +20,6 @@ class ReadingPredictor {
   /// @param contact resolved for these hypotheses: with a prior
   ReadingPredictor(std::span<const Hypothesis> hypotheses, const ContactModel& contact);
 
-  std::size_t objects() const { return maps_.size(); }
   /// Readings that are told apart, Unknown left out.
   std::size_t levels() const { return levels_; }
 

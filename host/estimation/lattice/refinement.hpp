@@ -23,6 +23,11 @@ Body displaced_body(const OccupancyGrid& map);
 RefinedPose refine(const BoxLogLikelihood& log_likelihood, const PoseLattice& lattice,
                    const Body& body, const Mode& mode);
 
+/// The lattice with every few bins along x and y where they are much finer than a pose's fit needs:
+/// steps of 0.1 mm at most, and at least three bins of an axis that has as many. Its region lies
+/// within the lattice's, and its centres are centres of the lattice.
+PoseLattice thinned(PoseLattice lattice);
+
 /// A value at a place, and its weight in the fit.
 struct WeightedValue {
   glm::dvec3 at{0.0};

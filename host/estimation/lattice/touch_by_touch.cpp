@@ -3,11 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <utility>
 
+#include "estimation/bounded/touch_overlap.hpp"
 #include "estimation/kernel_sizes.hpp"
-#include "estimation/lattice/blur_tables.hpp"
 #include "estimation/lattice/refinement.hpp"
 #include "shaders/sum_overlap.hpp"
 
@@ -55,27 +54,17 @@ std::vector<shaders::ObjectBox> boxes_of(std::span<const Hypothesis> hypotheses)
   return boxes;
 }
 
-/// A length or place as a float of which sums of a few stay finite. No region reaches so far.
-float within_floats(double mm) {
-  constexpr double far_mm = 1e30;
-  return std::isnan(mm) ? static_cast<float>(far_mm)
-                        : static_cast<float>(std::clamp(mm, -far_mm, far_mm));
-}
-
 /// @param reuse memory for the result
-std::vector<shaders::ArrayAtTheta> arrays_of(const Touch& touch, const PoseLattice& lattice,
-                                             const glm::dvec2& pivot_mm,
+std::vector<shaders::ArrayAtTheta> arrays_of(const ArrayRectangle& array,
+                                             const PoseLattice& lattice,
                                              std::vector<shaders::ArrayAtTheta> reuse) {
-  const glm::dvec2 from_pivot =
-      touch.T_robot_sensor * bounding_box(touch.elements_mm).middle() - pivot_mm;
   std::vector<shaders::ArrayAtTheta> arrays = std::move(reuse);
   arrays.clear();
   for (int t = 0; t < lattice.theta_rad.count; ++t) {
     const double theta = lattice.theta_rad.centre(t);
-    const glm::dvec2 turned = rotate(theta, from_pivot);
-    const double direction = theta + touch.T_robot_sensor.theta_rad;
-    arrays.push_back({within_floats(turned.x), within_floats(turned.y),
-                      static_cast<float>(std::cos(direction)),
+    const glm::vec2 turned = rotate(theta, array.from_pivot_mm);
+    const double direction = theta + array.direction_rad;
+    arrays.push_back({turned.x, turned.y, static_cast<float>(std::cos(direction)),
                       static_cast<float>(std::sin(direction))});
   }
   return arrays;
@@ -106,19 +95,19 @@ TouchByTouch::TouchByTouch(gpu::Context& context, gpu::CommandStream& stream,
       log_weight_(log_weight),
       objects_(hypotheses.size()),
       scratch_(belief.uniform()),
-      touch_blur_(context, stream, options.lattice, objects_, options.touch_sd,
-                  DisplacementBlur::Of::touch, options.none_weight.has_value()),
+      touch_blur_(context, stream, options.lattice, objects_, options.touch_sd, {},
+                  options.none_weight.has_value()),
       lost_mass_(objects_, 0.0),
       references_(objects_) {
-  for (const Hypothesis& hypothesis : hypotheses) {
-    centroids_mm_.push_back(displaced_body(hypothesis.map).centroid_mm);
-  }
   touch_blur_.warm_up(scratch_, belief);
   if (!options.slip_sd.none()) {
-    slip_blur_.emplace(context, stream, options.lattice, objects_, options.slip_sd,
-                       DisplacementBlur::Of::belief, false);
+    std::vector<glm::dvec2> centroids_mm;
+    for (const Hypothesis& hypothesis : hypotheses) {
+      centroids_mm.push_back(displaced_body(hypothesis.map).centroid_mm);
+    }
+    slip_blur_.emplace(context, stream, options.lattice, objects_, options.slip_sd, centroids_mm,
+                       false);
     slip_blur_->warm_up(scratch_, belief);
-    slip_turns_ = slip_turns(options.lattice, centroids_mm_, slip_blur_->theta_steps());
     before_slip_ = belief.summarise();
     after_slip_ = before_slip_;
     largest_.reserve(objects_);
@@ -164,10 +153,8 @@ void TouchByTouch::update(const Touch& touch, const ContactEvidence& evidence,
   if (!is_prepared) {
     evaluate_planes(evaluate);
   }
-  touch_turns_ =
-      touch_turns(options_.lattice, touch.T_robot_sensor.translation_mm - options_.lattice.pivot_mm,
-                  touch_blur_.theta_steps(), std::move(touch_turns_));
-  touch_blur_.sum_turns(scratch_, touch_turns_, belief);
+  touch_blur_.turn_for(touch.T_robot_sensor.translation_mm - options_.lattice.pivot_mm);
+  touch_blur_.sum_turns(scratch_, belief);
   // A touch without a known element says nothing, not even where the array was.
   if (overlap_ && !evidence.segments.empty()) {
     add_to_none(touch);
@@ -183,7 +170,7 @@ void TouchByTouch::slip(DenseBelief& belief) {
     largest_.push_back(summary.max);
   }
   slip_blur_->blur_planes(belief, scratch_, largest_);
-  slip_blur_->sum_turns(scratch_, slip_turns_, belief);
+  slip_blur_->sum_turns(scratch_, belief);
   after_slip_ = belief.summarise(std::move(after_slip_));
   for (std::size_t i = 0; i < objects_; ++i) {
     const BeliefSummary& before = before_slip_[i];
@@ -249,11 +236,12 @@ std::uint64_t OverlapMean::device_bytes() const {
 
 std::span<const OverlapSum> OverlapMean::sums(const DenseBelief& scratch, const Touch& touch,
                                               const glm::dvec2& pivot_mm, bool everywhere) {
-  placed_ = arrays_of(touch, lattice_, pivot_mm, std::move(placed_));
+  const ArrayRectangle array = array_rectangle(touch, pivot_mm);
+  placed_ = arrays_of(array, lattice_, std::move(placed_));
   stream_.upload(arrays_, placed_);
   // Half a float's largest: sums of two stay finite.
   constexpr float unbounded = std::numeric_limits<float>::max() / 8.0F;
-  const glm::dvec2 half = bounding_box(touch.elements_mm).extent() / 2.0;
+  const glm::vec2 half = everywhere ? glm::vec2(unbounded) : glm::vec2(array.half_mm);
   std::uint32_t first = 0;
   for (const Slab& slab : scratch.slabs()) {
     const shaders::OverlapPush push{.slab = planes_of(slab, lattice_.theta_rad.count),
@@ -262,8 +250,8 @@ std::span<const OverlapSum> OverlapMean::sums(const DenseBelief& scratch, const 
                                     .first_y_mm = static_cast<float>(lattice_.y_mm.centre(0)),
                                     .step_x_mm = static_cast<float>(lattice_.x_mm.step()),
                                     .step_y_mm = static_cast<float>(lattice_.y_mm.step()),
-                                    .half_x_mm = everywhere ? unbounded : within_floats(half.x),
-                                    .half_y_mm = everywhere ? unbounded : within_floats(half.y)};
+                                    .half_x_mm = half.x,
+                                    .half_y_mm = half.y};
     stream_.dispatch(kernel_, {&slab.log_likelihood, &arrays_, &boxes_, &partials_}, push,
                      {slab.theta_count, slab.object_count, 1},
                      static_cast<double>(slab.object_count * slab.bins()));

@@ -10,7 +10,6 @@
 #include "estimation/lattice/dense_belief.hpp"
 #include "estimation/lattice/dense_likelihood.hpp"
 #include "estimation/lattice/displacement_blur.hpp"
-#include "estimation/lattice/still_array.hpp"
 #include "gpu/command_stream.hpp"
 #include "model/bounding_box.hpp"
 #include "palpate/estimate.hpp"
@@ -107,7 +106,6 @@ class TouchByTouch {
   const HistogramOptions& options_;
   const std::vector<double>& log_weight_;
   std::size_t objects_;
-  std::vector<glm::dvec2> centroids_mm_;
   DenseBelief scratch_;
   DisplacementBlur touch_blur_;
   std::optional<DisplacementBlur> slip_blur_;
@@ -117,8 +115,6 @@ class TouchByTouch {
   // Memory that updates share.
   std::vector<TwoFloat> references_;  ///< all 0
   std::vector<TwoFloat> largest_;
-  std::vector<shaders::Turn> touch_turns_;
-  std::vector<shaders::Turn> slip_turns_;  ///< of every slip
   std::vector<BeliefSummary> before_slip_;
   std::vector<BeliefSummary> after_slip_;
   double none_log_evidence_ = 0.0;

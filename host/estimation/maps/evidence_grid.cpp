@@ -8,7 +8,6 @@
 #include <glm/common.hpp>
 
 #include "estimation/kernel_sizes.hpp"
-#include "estimation/two_float.hpp"
 #include "palpate/error.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "shaders/accumulate_evidence.hpp"

@@ -6,7 +6,6 @@
 
 #include <fmt/format.h>
 
-#include "estimation/bordered_map.hpp"
 #include "estimation/kernel_sizes.hpp"
 #include "palpate/error.hpp"
 #include "shaders/interface.h"

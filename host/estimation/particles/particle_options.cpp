@@ -1,12 +1,11 @@
 #include "estimation/particles/particle_options.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include <fmt/format.h>
 
-#include "estimation/two_float.hpp"
+#include "estimation/kernel_sizes.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
@@ -24,11 +23,6 @@ void require(bool sound, const char* name, double value, const char* remedy) {
 }
 
 }  // namespace
-
-shaders::uint in_words(double probability) {
-  return static_cast<shaders::uint>(
-      std::clamp(std::floor(probability * 0x1p32), 0.0, 0x1p32 - 1.0));
-}
 
 void validate(const ParticleOptions& options) {
   require(options.particles >= 1 && options.particles <= most_particles, "particles",
@@ -58,30 +52,6 @@ void require_room(const ParticleOptions& options, const gpu::Context& context) {
     throw Error(Fault::input, fmt::format("particles = {}: device '{}' takes at most {}; use fewer",
                                           options.particles, context.name(), most));
   }
-}
-
-std::vector<shaders::ObjectShare> object_shares(std::span<const Hypothesis> hypotheses,
-                                                const ParticleOptions& options) {
-  std::vector<double> weights;
-  for (const Hypothesis& hypothesis : hypotheses) {
-    weights.push_back(hypothesis.weight);
-  }
-  // Relative to the largest, for the sum of the weights themselves may be infinite.
-  const double largest = *std::max_element(weights.begin(), weights.end());
-  double total = 0.0;
-  for (double& weight : weights) {
-    weight /= largest;
-    total += weight;
-  }
-  std::vector<shaders::ObjectShare> shares;
-  double before = 0.0;
-  for (const double weight : weights) {
-    before += weight;
-    shares.push_back({.particle_end = static_cast<shaders::uint>(
-                          std::lround(before / total * options.particles)),
-                      .chance_end = in_words(before / total)});
-  }
-  return shares;
 }
 
 }  // namespace palpate

@@ -79,7 +79,7 @@ TEST(BinLikelihood, HasTheSameBitsOnThreads) {
   }
   const std::vector<float> plain = evaluated<float>(likelihood, of, boxes);
   std::vector<float> on_threads(plain.size());
-  likelihood.evaluate_on_threads(boxes, of.elements, on_threads);
+  likelihood.evaluate_on_threads(boxes, of.elements, std::span(on_threads));
   EXPECT_EQ(on_threads, plain);
 }
 

@@ -21,7 +21,7 @@ TEST(FollowedBins, BoundWhatLiesOutsideThroughFurtherTouches) {
   bins.add({.object = 1, .theta = 2, .y_count = 2, .x_count = 3}, std::array{-6.0});
   SearchResult found;
   found.mass = {{.dropped = -9.0}, {.dropped = -7.0}};
-  FollowedBins followed(bins, found, log_weight);
+  FollowedBins followed(bins, found, log_weight, 1);
   const double inside = 0.25 * (std::exp(-1.0) + std::exp(-2.0));
   const double seen_by_prior = 0.75 * 6.0 * std::exp(-6.0);
   EXPECT_NEAR(followed.log_total(), std::log(inside), 1e-12);
@@ -29,6 +29,7 @@ TEST(FollowedBins, BoundWhatLiesOutsideThroughFurtherTouches) {
               1e-12);
   // A touch without a known element leaves the bins as they are; elsewhere poses may explain it.
   followed.add({}, likelihood, std::array{2.0, -1.0});
+  EXPECT_EQ(followed.touches(), 2U);
   EXPECT_NEAR(followed.log_total(), std::log(inside), 1e-12);
   EXPECT_NEAR(followed.share_outside(),
               (std::exp(-9.0 + 2.0) + std::exp(-1.0) * (std::exp(-7.0) + seen_by_prior)) / inside,

@@ -13,7 +13,7 @@ namespace palpate::kept_touches_test {
 
 const glm::dvec2 pivot_mm{3.0, -2.0};
 
-void expect_equal(const std::vector<ArrayReadings>& kept, const std::vector<Touch>& touches) {
+void expect_equal(std::span<const ArrayReadings> kept, const std::vector<Touch>& touches) {
   ASSERT_EQ(kept.size(), touches.size());
   for (std::size_t i = 0; i < kept.size(); ++i) {
     const ArrayReadings expected = array_readings(touches[i], {}, pivot_mm);

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "estimation/bounded/tables/reading_penalties.hpp"
+#include "estimation/bounded/tables/window_table.hpp"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "estimation/bounded/tables/reading_penalties.hpp"
+#include "estimation/bounded/tables/window_table.hpp"
 
 #include <algorithm>
 #include <cmath>

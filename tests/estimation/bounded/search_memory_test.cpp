@@ -94,8 +94,8 @@ TEST(SearchMemory, IsRefusedAboveTheLimit) {
   const std::vector<Hypothesis> maps = two_shapes();
   const BoundedOptions options = options_of(square(10.0, 200, 250));
   const double total = search_memory(maps, options).total();
-  EXPECT_NO_THROW(require_room(maps, options, static_cast<std::uint64_t>(total) + 1));
-  EXPECT_THAT(refusal_of([&] { require_room(maps, options, 1'000'000); }),
+  EXPECT_EQ(why_no_room(maps, options, static_cast<std::uint64_t>(total) + 1), "");
+  EXPECT_THAT(why_no_room(maps, options, 1'000'000),
               AllOf(HasSubstr("lattice: bounds of 2 objects x 200 x 200 x 250 bins"),
                     HasSubstr("MiB"), HasSubstr("use fewer")));
 }

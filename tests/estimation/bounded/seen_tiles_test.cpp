@@ -13,7 +13,7 @@
 #include "bound_cases.hpp"
 #include "estimation/bounded/leaves/bin_likelihood.hpp"
 #include "estimation/bounded/search/bound_search.hpp"
-#include "estimation/bounded/tables/reading_penalties.hpp"
+#include "estimation/bounded/tables/window_table.hpp"
 
 namespace palpate::seen_window_test {
 

@@ -96,8 +96,19 @@ class Sums {
 
   LargestTiles* operator->() { return &*tiles_; }
   void add(const ArrayReadings& touch) { tiles_->add(std::span(&touch, 1)); }
+  /// Whole sums, [hypothesis][theta, batch y, batch x, tile].
   std::vector<std::vector<std::int64_t>> all() const {
-    return {tiles_->whole_sums(0), tiles_->whole_sums(1)};
+    std::vector<std::vector<std::int64_t>> all;
+    for (std::size_t i = 0; i < hypotheses_.size(); ++i) {
+      const TileLevel& level = space_->bounds[i].levels().front();
+      const std::int32_t* const first = tiles_->sums(i, 0);
+      all.emplace_back(first, first + space_->turns.size() * level.batches_x() * level.batches_y() *
+                                          batch_tiles);
+      for (std::int64_t& sum : all.back()) {
+        sum += tiles_->unseen(i);
+      }
+    }
+    return all;
   }
 
  private:

@@ -1,4 +1,4 @@
-#include "estimation/bounded/thinned_lattice.hpp"
+#include "estimation/lattice/refinement.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -12,7 +12,7 @@
 
 #include "bound_cases.hpp"
 #include "estimation/bounded/leaves/bin_likelihood.hpp"
-#include "estimation/bounded/tables/reading_penalties.hpp"
+#include "estimation/bounded/tables/window_table.hpp"
 #include "limits.hpp"
 
 namespace palpate::tile_bounds_test {

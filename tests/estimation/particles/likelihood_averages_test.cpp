@@ -1,4 +1,4 @@
-#include "estimation/particles/likelihood_averages.hpp"
+#include "estimation/particles/particle_draws.hpp"
 
 #include <cmath>
 

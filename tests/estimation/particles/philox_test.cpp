@@ -1,4 +1,4 @@
-#include "estimation/particles/philox.hpp"
+#include "estimation/particles/particle_draws.hpp"
 
 #include <vector>
 

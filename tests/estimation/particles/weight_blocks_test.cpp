@@ -1,4 +1,4 @@
-#include "estimation/particles/weight_blocks.hpp"
+#include "estimation/particles/particle_draws.hpp"
 
 #include <cmath>
 

@@ -12,8 +12,7 @@
 
 #include "estimation/bounded/leaves/bin_kernel.hpp"
 #include "estimation/bounded/leaves/patch_interpolation-inl.hpp"
-#include "estimation/bounded/leaves/reading_products-inl.hpp"
-#include "estimation/bounded/leaves/table_look_up-inl.hpp"
+#include "estimation/bounded/leaves/reading_likelihood-inl.hpp"
 #include "model/vector_math-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();

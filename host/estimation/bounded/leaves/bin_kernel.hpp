@@ -9,10 +9,91 @@
 #include <glm/vec2.hpp>
 
 #include "estimation/bounded/known_elements.hpp"
-#include "estimation/bounded/leaves/map_patches.hpp"
-#include "estimation/bounded/leaves/reading_form.hpp"
+#include "palpate/contact_model.hpp"
+#include "palpate/occupancy_grid.hpp"
 
 namespace palpate {
+
+/// A map's log odds for the kernels of bins: bordered by `border` nodes of the prior on every side,
+/// and stored so that the 16 floats from patch(x, y) on are the nodes of columns x to x + 3 and
+/// rows y to y + 3 of the bordered map, column by column. Every node is stored four times.
+class MapPatches {
+ public:
+  static constexpr int border = 4;
+  static constexpr int side = 4;  ///< of a patch, in nodes
+
+  /// @throws Error where the bordered map has more nodes than kernels can index
+  MapPatches(const OccupancyGrid& map, double prior);
+
+  int width() const { return width_; }
+  int height() const { return height_; }
+  /// [y, x, row of the patch]; longer by what a vector may read beyond the last patch.
+  const float* nodes() const { return nodes_.data(); }
+  std::uint64_t bytes() const { return nodes_.capacity() * sizeof(float); }
+
+  /// The number that stands for the prior in nodes(): a float near it that no cell of the map
+  /// holds, so that float64 kernels can put the exact prior in its place.
+  float marker() const { return marker_; }
+  double prior_log_odds() const { return prior_log_odds_; }
+
+ private:
+  int width_;
+  int height_;
+  double prior_log_odds_;
+  float marker_;
+  std::vector<float> nodes_;
+};
+
+/// Over all levels of a table's numbers for one object, in nats.
+struct TableExtent {
+  double largest = 0.0;   ///< magnitude
+  double steepest = 0.0;  ///< difference per nat of log odds
+  double width = 0.0;     ///< from the first node to the last, in nats of log odds
+};
+
+/// How kernels of bins evaluate Eq. 7, or the table in its place. With r = gamma m / s and
+/// s = gamma m + 1 - gamma, the likelihood of contact at log odds z (of no contact at -z) is
+///
+///     s (1 + r e) / (1 + e) for z >= 0,   s (r + e) / (1 + e) for z < 0,   e = exp(-|z|).
+///
+/// Numerators and denominators are multiplied over elements, powers of two taken out every
+/// `interval` elements, and one logarithm taken per bin. Where r is too small for products of
+/// r + e, and for gamma = 0, the kernels sum a = max(min(z, 0), log r) and multiply
+///
+///     1 + exp(-|a - log r|) e' in the place of the numerator,  e' = e for z >= 0, 1 for z < 0:
+///
+/// for z < 0, r + e = exp(max(z, log r)) (1 + exp(-|z - log r|)).
+struct ReadingForm {
+  enum class Kind { products, sums, table };
+
+  /// @param contact resolved: with its prior
+  explicit ReadingForm(const ContactModel& contact);
+
+  /// The numbers of an object's level: value and difference to the next, for each node.
+  const double* row(std::size_t object, Reading level) const {
+    return table.data() +
+           2 * nodes * ((sets == 1 ? 0 : object) * levels + static_cast<std::size_t>(level));
+  }
+
+  TableExtent table_extent(std::size_t object) const;
+  /// Largest magnitude of an element's log-likelihood by Eq. 7, for log odds of this magnitude.
+  double largest_nats(double largest_log_odds) const;
+
+  Kind kind = Kind::products;
+  double ratio = 0.0;      ///< r
+  double log_ratio = 0.0;  ///< log r, finite also for r = 0
+  double log_scale = 0.0;  ///< log s
+  int float_interval = 1;
+  int double_interval = 1;
+
+  // What a table has beside.
+  double first_log_odds = 0.0;
+  double nodes_per_nat = 0.0;
+  std::size_t nodes = 0;
+  std::size_t levels = 0;
+  std::size_t sets = 0;
+  std::vector<double> table;  ///< [set, level, node, value | difference]
+};
 
 /// Most lanes of a vector. Lists that kernels read are padded to a multiple of it.
 inline constexpr std::size_t most_lanes = 16;

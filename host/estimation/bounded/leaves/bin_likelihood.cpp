@@ -17,7 +17,8 @@ constexpr double most_block_cells = 2.0;
 /// Blocks that are evaluated together, to fill vectors.
 constexpr std::size_t blocks_together = 16;
 /// Bins of a thread's task: large beside the cost of a task, small beside many boxes.
-constexpr std::size_t task_bins = 2048;
+template <typename Result>
+constexpr std::size_t task_bins = sizeof(Result) == 4 ? 2048 : 512;
 
 /// A bin's coordinate in cells of the bordered map.
 double in_cells(const Axis& axis_mm, int bin, double origin_mm, double cell_mm) {
@@ -188,9 +189,10 @@ void BinLikelihood::evaluate(std::span<const BinBox> boxes, const KnownElements&
   evaluate_in<double>(boxes, elements, log_likelihood);
 }
 
+template <typename Result>
 void BinLikelihood::evaluate_on_threads(std::span<const BinBox> boxes,
                                         const KnownElements& elements,
-                                        std::span<float> log_likelihood) const {
+                                        std::span<Result> log_likelihood) const {
   struct Task {
     std::size_t first_box;
     std::size_t end_box;
@@ -203,14 +205,14 @@ void BinLikelihood::evaluate_on_threads(std::span<const BinBox> boxes,
   Task task{};
   for (const BinBox& box : boxes) {
     const auto rows = static_cast<std::int32_t>(
-        std::clamp<std::int64_t>(std::int64_t{task_bins} / box.x_count, 1, box.y_count));
+        std::clamp<std::int64_t>(std::int64_t{task_bins<Result>} / box.x_count, 1, box.y_count));
     for (std::int32_t row = 0; row < box.y_count; row += rows) {
       BinBox part = box;
       part.y_first += row;
       part.y_count = std::min(rows, box.y_count - row);
       parts.push_back(part);
       task.bins += static_cast<std::size_t>(part.bins());
-      if (task.bins >= task_bins) {
+      if (task.bins >= task_bins<Result>) {
         task.end_box = parts.size();
         tasks.push_back(task);
         task = {task.end_box, 0, task.first_bin + task.bins, 0};
@@ -227,6 +229,11 @@ void BinLikelihood::evaluate_on_threads(std::span<const BinBox> boxes,
              log_likelihood.subspan(of.first_bin, of.bins));
   });
 }
+
+template void BinLikelihood::evaluate_on_threads(std::span<const BinBox>, const KnownElements&,
+                                                 std::span<float>) const;
+template void BinLikelihood::evaluate_on_threads(std::span<const BinBox>, const KnownElements&,
+                                                 std::span<double>) const;
 
 std::uint64_t BinLikelihood::bytes() const {
   std::uint64_t sum = form_.table.capacity() * sizeof(double);

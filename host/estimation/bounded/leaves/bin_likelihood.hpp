@@ -9,8 +9,6 @@
 #include "estimation/bin_box.hpp"
 #include "estimation/bounded/known_elements.hpp"
 #include "estimation/bounded/leaves/bin_kernel.hpp"
-#include "estimation/bounded/leaves/map_patches.hpp"
-#include "estimation/bounded/leaves/reading_form.hpp"
 #include "palpate/contact_model.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
@@ -54,9 +52,10 @@ class BinLikelihood {
                 std::span<float> log_likelihood) const;
   void evaluate(std::span<const BinBox> boxes, const KnownElements& elements,
                 std::span<double> log_likelihood) const;
-  /// Float32 as above, of many boxes, on the threads of the TBB arena that it is called in.
+  /// The same of many boxes, on the threads of the TBB arena that it is called in.
+  template <typename Result>
   void evaluate_on_threads(std::span<const BinBox> boxes, const KnownElements& elements,
-                           std::span<float> log_likelihood) const;
+                           std::span<Result> log_likelihood) const;
 
   /// Proven bound, in nats, of the error of evaluate() at any bin of an object.
   double float32_error(std::size_t object, const KnownElements& elements) const;

@@ -10,12 +10,10 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <span>
 
 #include <hwy/highway.h>
 
 #include "estimation/bounded/leaves/bin_kernel.hpp"
-#include "estimation/bounded/leaves/map_patches.hpp"
 #include "model/vector_math-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();

@@ -3,10 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <tuple>
 
-#include "estimation/bounded/search/leaf_evaluator.hpp"
-#include "estimation/bounded/search/leaf_pass.hpp"
+#include "estimation/bounded/search/leaves.hpp"
 #include "estimation/bounded/search/mass_account.hpp"
 #include "estimation/bounded/search/tile_division.hpp"
 #include "estimation/contact_evidence.hpp"
@@ -47,32 +45,23 @@ bool is_part(const Tile& part, const Tile& of) {
 /// One run of a search, from the largest tiles to their bins.
 class SearchRun {
  public:
-  SearchRun(const SearchSpace& space, const BoundedOptions& options,
-            const BinLikelihood& likelihood, const LargestTiles& largest,
-            const KnownElements& elements, const SearchGoal& goal, const Deadline& deadline,
-            const BinVisitor& visit, std::vector<PoseBlock>* refined)
-      : space_(space),
-        contact_(options.contact),
-        likelihood_(likelihood),
-        elements_(elements),
-        goal_(goal),
-        deadline_(deadline),
-        visit_(visit),
+  SearchRun(const SearchTask& task, const LargestTiles& largest, std::vector<PoseBlock>* refined)
+      : task_(task),
+        space_(task.space),
+        goal_(task.goal),
         refined_(refined),
-        finest_(space.bounds.front().levels().size() - 1),
-        division_(space, largest, elements, goal.counted),
-        account_(space.log_weight, space.label_of, options.lattice, goal_),
-        evaluator_(likelihood, space.log_weight, goal_, elements, visit, deadline_, account_),
-        leaves_(space.bounds, space.turns.size(), elements.from_pivot_mm.size(), deadline_,
-                account_, evaluator_) {
+        finest_(space_.bounds.front().levels().size() - 1),
+        division_(task, largest),
+        account_(space_.log_weight, space_.label_of, task.options.lattice, goal_),
+        leaves_(task, account_) {
+    const ContactModel& contact = task.options.contact;
+    const MapSample prior{log_odds_from_probability(*contact.prior)};
     for (std::size_t i = 0; i < space_.bounds.size(); ++i) {
-      double prior = 0.0;
-      for (const ReadingRun& run : elements.runs) {
-        prior +=
-            static_cast<double>(run.end - run.begin) *
-            contact_.log_likelihood(run.reading, {log_odds_from_probability(*contact_.prior)}, i);
+      double& sum = prior_log_likelihoods_.emplace_back();
+      for (const ReadingRun& run : task.elements.runs) {
+        sum += static_cast<double>(run.end - run.begin) *
+               contact.log_likelihood(run.reading, prior, i);
       }
-      prior_log_likelihoods_.push_back(prior);
     }
   }
 
@@ -93,11 +82,11 @@ class SearchRun {
       divide(std::move(kept), 0, share - used_of(part, 0.0));
     }
     const bool contradicts = goal_.mode && contradicted(best);
-    evaluator_.flush();
+    leaves_.flush();
     SearchResult result = account_.result();
     result.contradicted = contradicts;
     result.blocks_bounded = division_.bounded();
-    result.bins_evaluated = evaluator_.bins();
+    result.bins_evaluated = leaves_.bins();
     return result;
   }
 
@@ -131,18 +120,18 @@ class SearchRun {
     const auto object = static_cast<std::size_t>(box.object);
     const double value = prior_log_likelihoods_[object];
     account_.settle(box.object, 1, value + std::log(static_cast<double>(bins)), value,
-                    likelihood_.float64_error(object, elements_));
+                    task_.likelihood.float64_error(object, task_.elements));
     account_.note_best(box, 0, value);
-    visit_(box, std::span(&value, 1));
+    task_.visit(box, std::span(&value, 1));
   }
 
   /// Whether the prior explains the elements far better than the best bin of every hypothesis.
   /// @param best the largest tile of the largest bound of every object and theta
   bool contradicted(const std::vector<Tile>& best) {
     double prior = 0.0;
-    for (const ReadingRun& run : elements_.runs) {
-      prior +=
-          static_cast<double>(run.end - run.begin) * prior_log_likelihood(run.reading, contact_);
+    for (const ReadingRun& run : task_.elements.runs) {
+      prior += static_cast<double>(run.end - run.begin) *
+               prior_log_likelihood(run.reading, task_.options.contact);
     }
     const double least = prior - contradiction_nats;
     const std::size_t objects = space_.bounds.size();
@@ -159,8 +148,8 @@ class SearchRun {
         std::ranges::copy_if(best, std::back_inserter(own), [&](const Tile& tile) {
           return tile.object == static_cast<std::int32_t>(i);
         });
-        for (const BinBox& box : leaves_.boxes_of(best_of_beam(std::move(own), 0, beam_tiles))) {
-          evaluator_.look(box);
+        for (const Tile& tile : best_of_beam(std::move(own), 0, beam_tiles)) {
+          leaves_.look(tile);
         }
       }
       if (explains(i)) {
@@ -193,7 +182,7 @@ class SearchRun {
   /// Follows tiles down to the smallest ones, the best of each level.
   std::vector<Tile> best_of_beam(std::vector<Tile> tiles, std::size_t level, std::size_t width) {
     for (; level < finest_; ++level) {
-      deadline_.cancel_point();
+      task_.deadline.cancel_point();
       keep_best(tiles, width);
       std::ranges::sort(tiles, stands_before);
       tiles = division_.parts_of(tiles, level);
@@ -210,7 +199,7 @@ class SearchRun {
       leaves_.evaluate(tiles, tolerance);
       return;
     }
-    if (tiles.size() > most_together && !deadline_.passed()) {
+    if (tiles.size() > most_together && !task_.deadline.passed()) {
       // Tiles are divided one lot after another: the total must be known well before the first.
       survey(tiles, level);
       tolerance -= drop(tiles, level, tolerance / static_cast<double>(finest_ - level + 1));
@@ -227,8 +216,8 @@ class SearchRun {
       }
       const std::size_t left = tiles.size() - begin;
       const auto first = tiles.begin() + static_cast<std::ptrdiff_t>(begin);
-      if (deadline_.passed()) {
-        account_.drop(unsettled({first, tiles.end()}, level, space_.bounds, account_));
+      if (task_.deadline.passed()) {
+        account_.drop(unsettled({first, tiles.end()}, level, space_, account_));
         return;
       }
       const std::size_t count = std::min(most_together, left);
@@ -272,7 +261,7 @@ class SearchRun {
     for (std::size_t begin = 0; begin < tiles.size(); begin += most_together) {
       const auto lot =
           std::span(tiles).subspan(begin, std::min(most_together, tiles.size() - begin));
-      deadline_.cancel_point();
+      task_.deadline.cancel_point();
       std::vector<Tile> parts = division_.parts_of(lot, level);
       std::size_t next = 0;
       for (Tile& tile : lot) {
@@ -293,7 +282,7 @@ class SearchRun {
   /// @returns the part of the total that was dropped
   double drop(std::vector<Tile>& tiles, std::size_t level, double tolerance) {
     const double dropped = account_.dropped_share();
-    UnsettledMass mass = unsettled(tiles, level, space_.bounds, account_);
+    UnsettledMass mass = unsettled(tiles, level, space_, account_);
     const std::vector<std::size_t> from = account_.droppable_from(mass, tolerance);
     std::erase_if(tiles,
                   [&](const Tile& tile) { return mass.slot(tile.bound) >= from[tile.object]; });
@@ -313,20 +302,15 @@ class SearchRun {
                : std::clamp(account_.dropped_share() - dropped_before, 0.0, tolerance);
   }
 
+  const SearchTask& task_;
   const SearchSpace& space_;
-  const ContactModel& contact_;
-  const BinLikelihood& likelihood_;
-  const KnownElements& elements_;
-  SearchGoal goal_;
-  const Deadline& deadline_;
-  const BinVisitor& visit_;
+  const SearchGoal& goal_;
   std::vector<PoseBlock>* refined_;
   std::size_t finest_;                         ///< level
   std::vector<double> prior_log_likelihoods_;  ///< [object] of all elements
   TileDivision division_;
   MassAccount account_;
-  LeafEvaluator evaluator_;
-  LeafPass leaves_;
+  Leaves leaves_;
 };
 
 }  // namespace
@@ -341,7 +325,7 @@ SearchResult BoundSearch::run(const KnownElements& elements, const SearchGoal& g
   }
   SearchGoal reachable = goal;
   reachable.tolerance = std::max(goal.tolerance - 1.1 * least_error, goal.tolerance / 4.0);
-  return SearchRun(space_, options_, likelihood_, largest_, elements, reachable, deadline, visit,
+  return SearchRun({space_, options_, likelihood_, elements, reachable, deadline, visit}, largest_,
                    refined)
       .result();
 }

@@ -62,6 +62,7 @@ LargestTiles::LargestTiles(SearchSpace& space) : space_(space), unseen_(space.bo
 }
 
 void LargestTiles::reset() {
+  touches_ = 0;
   for (std::vector<std::int32_t>& sums : sums_) {
     std::fill(sums.begin(), sums.end(), 0);
   }
@@ -69,6 +70,7 @@ void LargestTiles::reset() {
 }
 
 void LargestTiles::add(std::span<const ArrayReadings> touches) {
+  touches_ += touches.size();
   const TileLevel& level = space_.bounds.front().levels().front();
   // A single touch sees little of a large region; in a small one, fewer rounds are faster.
   if (touches.size() == 1 || level.batches_x() * level.batches_y() > few_batches) {
@@ -174,14 +176,6 @@ void LargestTiles::for_seen(const KnownElements& known, const KnownElements& pla
       }
     }
   });
-}
-
-std::vector<std::int64_t> LargestTiles::whole_sums(std::size_t hypothesis) const {
-  std::vector<std::int64_t> sums(sums_[hypothesis].begin(), sums_[hypothesis].end());
-  for (std::int64_t& sum : sums) {
-    sum += unseen_[hypothesis];
-  }
-  return sums;
 }
 
 std::uint64_t LargestTiles::bytes() const {

@@ -8,7 +8,7 @@
 
 #include "estimation/bounded/known_elements.hpp"
 #include "estimation/bounded/search/search_space.hpp"
-#include "estimation/bounded/tables/tile_levels.hpp"
+#include "estimation/bounded/tables/tile_bounds.hpp"
 #include "model/bounding_box.hpp"
 #include "palpate/occupancy_grid.hpp"
 
@@ -44,6 +44,8 @@ class LargestTiles {
   /// Forgets all touches.
   void reset();
   void add(std::span<const ArrayReadings> touches);
+  /// Touches that were added since reset().
+  std::size_t touches() const { return touches_; }
   /// Adds elements that may be of any touches.
   void add(const KnownElements& elements);
 
@@ -53,8 +55,6 @@ class LargestTiles {
   }
   /// The sum of a tile in which every element sees the prior.
   std::int64_t unseen(std::size_t hypothesis) const { return unseen_[hypothesis]; }
-  /// Whole sums, [theta, batch y, batch x, tile].
-  std::vector<std::int64_t> whole_sums(std::size_t hypothesis) const;
   /// Host memory, in bytes.
   std::uint64_t bytes() const;
 
@@ -82,6 +82,7 @@ class LargestTiles {
   void for_seen(const KnownElements& known, const KnownElements& placed, const Visit& visit) const;
 
   SearchSpace& space_;
+  std::size_t touches_ = 0;
   std::vector<std::vector<std::int32_t>> sums_;  ///< [hypothesis][theta, batch y, batch x, tile]
   std::vector<std::int64_t> unseen_;             ///< [hypothesis]
   StillPlace still_;

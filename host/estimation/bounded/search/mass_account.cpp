@@ -2,31 +2,9 @@
 
 #include <algorithm>
 #include <bit>
-#include <cmath>
-#include <limits>
 #include <tuple>
 
 namespace palpate {
-
-namespace {
-
-constexpr double nothing = -std::numeric_limits<double>::infinity();
-
-/// Calls visit(slot) for the slots of a set, the last one first, until it returns false.
-template <typename Set, typename Visit>
-void for_slots(const Set& set, const Visit& visit) {
-  for (std::size_t word = set.size(); word-- > 0;) {
-    for (std::uint64_t left = set[word]; left != 0;) {
-      const std::size_t bit = 63 - static_cast<std::size_t>(std::countl_zero(left));
-      left ^= std::uint64_t{1} << bit;
-      if (!visit(64 * word + bit)) {
-        return;
-      }
-    }
-  }
-}
-
-}  // namespace
 
 MassAccount::MassAccount(std::span<const double> log_weight, std::span<const std::size_t> label_of,
                          const PoseLattice& lattice, const SearchGoal& goal)
@@ -34,36 +12,28 @@ MassAccount::MassAccount(std::span<const double> log_weight, std::span<const std
       label_of_(label_of),
       lattice_(lattice),
       goal_(goal),
-      evaluated_(log_weight.size()),
-      rounding_(log_weight.size()),
-      terms_(log_weight.size()),
-      dropped_(log_weight.size()),
-      log_total_(nothing),
-      log_totals_(log_weight.size(), nothing),
-      best_(nothing),
-      best_of_(log_weight.size(), nothing),
-      largest_dropped_of_(log_weight.size(), nothing),
-      mode_value_(nothing) {}
+      of_(log_weight.size()) {}
 
 void MassAccount::settle(std::int32_t object, std::int64_t bins, double log_mass, double largest,
                          double error) {
+  Account& of = of_[object];
   const double mass = log_weight_[object] + log_mass;
-  evaluated_[object].add(mass);
-  terms_[object] += static_cast<double>(bins);
+  of.evaluated.add(mass);
+  of.terms += static_cast<double>(bins);
   // Beyond, expm1 is infinite, and the log of it is the error itself.
   constexpr double most = 700.0;
   const double rounding = mass + (error < most ? std::log(std::expm1(error)) : error);
-  rounding_[object].add(rounding);
+  of.rounding.add(rounding);
   all_rounding_.add(rounding);
   raise_best(object, largest - error);
 }
 
 void MassAccount::drop(const UnsettledMass& tiles) {
-  for (std::size_t i = 0; i < dropped_.size(); ++i) {
+  for (std::size_t i = 0; i < of_.size(); ++i) {
     const double mass = tiles.log_mass(i);
-    dropped_[i].add(mass);
+    of_[i].dropped.add(mass);
     all_dropped_.add(mass);
-    largest_dropped_of_[i] = std::max(largest_dropped_of_[i], tiles.largest(i) - log_weight_[i]);
+    of_[i].most_dropped = std::max(of_[i].most_dropped, tiles.largest(i) - log_weight_[i]);
   }
 }
 
@@ -81,11 +51,12 @@ void MassAccount::note_best(const BinBox& box, std::int64_t bin_of_box, double l
 
 void MassAccount::raise_totals(std::span<const LogSum> pending) {
   LogSum total;
-  for (std::size_t i = 0; i < evaluated_.size(); ++i) {
+  for (std::size_t i = 0; i < of_.size(); ++i) {
+    Account& of = of_[i];
     // What rounding may have added does not count.
     const double own =
-        log_add(log_subtract(evaluated_[i].log(), rounding_[i].log()), pending[i].log());
-    log_totals_[i] = std::max(log_totals_[i], own);
+        log_add(log_subtract(of.evaluated.log(), of.rounding.log()), pending[i].log());
+    of.log_total = std::max(of.log_total, own);
     total.add(own);
   }
   log_total_ = std::max(log_total_, total.log());
@@ -93,7 +64,7 @@ void MassAccount::raise_totals(std::span<const LogSum> pending) {
 
 void MassAccount::raise_best(std::int32_t object, double log_likelihood) {
   best_ = std::max(best_, log_weight_[object] + log_likelihood);
-  best_of_[object] = std::max(best_of_[object], log_likelihood);
+  of_[object].best = std::max(of_[object].best, log_likelihood);
 }
 
 std::vector<std::size_t> MassAccount::droppable_from(const UnsettledMass& tiles,
@@ -102,7 +73,7 @@ std::vector<std::size_t> MassAccount::droppable_from(const UnsettledMass& tiles,
   if (goal_.mode) {
     of_all = std::max(of_all, tiles.slot(best_) + 1);
   }
-  std::vector<std::size_t> from(evaluated_.size(), of_all);
+  std::vector<std::size_t> from(of_.size(), of_all);
   if (goal_.evidence_nats) {
     const std::vector<double> largest = droppable_evidence(tolerance);
     for (std::size_t i = 0; i < from.size(); ++i) {
@@ -122,12 +93,12 @@ double MassAccount::slot_nats(double largest) const {
   // own.
   double floor = log_total_;
   if (goal_.evidence_nats) {
-    for (const double own : log_totals_) {
-      floor = std::min(floor, own == nothing ? floor : own);
+    for (const Account& of : of_) {
+      floor = std::min(floor, of.log_total == nothing ? floor : of.log_total);
     }
     floor = std::max(floor, log_total_ - goal_.evidence_range_nats);
   }
-  const auto bins = static_cast<double>(lattice_.bins()) * static_cast<double>(evaluated_.size());
+  const auto bins = static_cast<double>(lattice_.bins()) * static_cast<double>(of_.size());
   const double part = std::min(goal_.tolerance, goal_.evidence_nats.value_or(1.0));
   constexpr double parts_of_it = 8.0;  // a level of tiles may use up a part of what may be dropped
   const double reach = largest - floor + std::log(bins / part) + parts_of_it;
@@ -141,7 +112,7 @@ std::vector<double> MassAccount::droppable_evidence(double tolerance) const {
   };
   std::vector<Label> labels(*std::ranges::max_element(label_of_) + 1);
   for (std::size_t i = 0; i < label_of_.size(); ++i) {
-    labels[label_of_[i]].total.add(log_totals_[i]);
+    labels[label_of_[i]].total.add(of_[i].log_total);
     labels[label_of_[i]].hypotheses += 1.0;
   }
   // As large a part of what may be missing as of the tolerance; the rest of the nats is for
@@ -168,15 +139,15 @@ SearchResult MassAccount::result() const {
                       .best_bin = mode_bin_,
                       .best_log_likelihood = mode_value_ - log_weight_[mode_object_],
                       .mode_certain = true};
-  for (std::size_t i = 0; i < evaluated_.size(); ++i) {
-    result.mode_certain =
-        result.mode_certain && log_weight_[i] + largest_dropped_of_[i] < mode_value_;
+  for (std::size_t i = 0; i < of_.size(); ++i) {
+    const Account& of = of_[i];
+    result.mode_certain = result.mode_certain && log_weight_[i] + of.most_dropped < mode_value_;
     // Each exponential and each addition of the sums rounds by a few units of 2^-53.
-    const double sum_error = 4.0 * (terms_[i] + 1.0) * 0x1p-53;
-    result.mass.push_back(
-        {.evaluated = evaluated_[i].log(),
-         .rounding = log_add(rounding_[i].log(), evaluated_[i].log() + std::log(sum_error)),
-         .dropped = dropped_[i].log()});
+    const double sum_error = 4.0 * (of.terms + 1.0) * 0x1p-53;
+    const double evaluated = of.evaluated.log();
+    result.mass.push_back({.evaluated = evaluated,
+                           .rounding = log_add(of.rounding.log(), evaluated + std::log(sum_error)),
+                           .dropped = of.dropped.log()});
   }
   return result;
 }
@@ -199,25 +170,43 @@ double UnsettledMass::upper_edge(std::size_t slot) const {
   return largest_ - static_cast<double>(slot) * slot_nats_;
 }
 
+template <typename Bins, typename Visit>
+UnsettledMass::Reached UnsettledMass::add_up(const SlotSet& used, const Bins& bins_in,
+                                             const Visit& visit) const {
+  Reached reached;
+  for (std::size_t word = used.size(); word-- > 0;) {
+    for (std::uint64_t left = used[word]; left != 0;) {
+      const std::size_t bit = 63 - static_cast<std::size_t>(std::countl_zero(left));
+      left ^= std::uint64_t{1} << bit;
+      const std::size_t slot = 64 * word + bit;
+      if (const std::int64_t bins = bins_in(slot); bins > 0) {
+        reached = {reached.bins * decay(reached.slot - slot) + static_cast<double>(bins), slot};
+        if (!visit(reached)) {
+          return reached;
+        }
+      }
+    }
+  }
+  return reached;
+}
+
+UnsettledMass::Reached UnsettledMass::add_up(std::size_t hypothesis) const {
+  return add_up(
+      used_[hypothesis], [&](std::size_t slot) { return bins_[hypothesis * slots + slot]; },
+      [](const Reached&) { return true; });
+}
+
 template <typename Bins>
 std::size_t UnsettledMass::droppable_from(const SlotSet& used, const Bins& bins_in,
                                           double log_allowance) const {
   // The log of any number of bins is less.
   constexpr double most_log_bins = 44.0;
-  double mass = 0.0;  // of the slots from `above` on, as so many bins at its upper edge
-  std::size_t above = slots;
   std::size_t from = 0;
-  for_slots(used, [&](std::size_t i) {
-    if (const std::int64_t bins = bins_in(i); bins > 0) {
-      mass = mass * decay(above - i) + static_cast<double>(bins);
-      above = i;
-      const double log_room = log_allowance - upper_edge(i);
-      if (log_room < most_log_bins && std::log(mass) > log_room) {
-        from = i + 1;
-        return false;
-      }
-    }
-    return true;
+  add_up(used, bins_in, [&](const Reached& reached) {
+    const double log_room = log_allowance - upper_edge(reached.slot);
+    const bool fits = !(log_room < most_log_bins && std::log(reached.bins) > log_room);
+    from = fits ? 0 : reached.slot + 1;
+    return fits;
   });
   return from;
 }
@@ -248,29 +237,13 @@ std::size_t UnsettledMass::droppable_from(std::size_t hypothesis, double log_all
 }
 
 double UnsettledMass::log_mass(std::size_t hypothesis) const {
-  double mass = 0.0;  // of the slots from `above` on, as so many bins at its upper edge
-  std::size_t above = slots;
-  for_slots(used_[hypothesis], [&](std::size_t i) {
-    if (const std::int64_t bins = bins_[hypothesis * slots + i]; bins > 0) {
-      mass = mass * decay(above - i) + static_cast<double>(bins);
-      above = i;
-    }
-    return true;
-  });
-  return upper_edge(above) + std::log(mass);
+  const Reached all = add_up(hypothesis);
+  return upper_edge(all.slot) + std::log(all.bins);
 }
 
 double UnsettledMass::largest(std::size_t hypothesis) const {
-  const SlotSet& used = used_[hypothesis];
-  for (std::size_t word = 0; word < used.size(); ++word) {
-    for (std::uint64_t left = used[word]; left != 0; left &= left - 1) {
-      const std::size_t i = 64 * word + static_cast<std::size_t>(std::countr_zero(left));
-      if (bins_[hypothesis * slots + i] > 0) {
-        return upper_edge(i);
-      }
-    }
-  }
-  return -std::numeric_limits<double>::infinity();
+  const Reached all = add_up(hypothesis);
+  return all.bins > 0.0 ? upper_edge(all.slot) : -std::numeric_limits<double>::infinity();
 }
 
 }  // namespace palpate

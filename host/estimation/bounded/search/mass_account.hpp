@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -53,12 +52,22 @@ class UnsettledMass {
   /// A bit for every slot.
   using SlotSet = std::array<std::uint64_t, slots / 64>;
 
-  /// The bound that no tile in a slot exceeds, in nats.
-  double upper_edge(std::size_t slot) const;
+  /// The summed mass of the slots from `slot` on, as so many bins at its upper edge.
+  struct Reached {
+    double bins = 0.0;
+    std::size_t slot = slots;
+  };
+
+  /// Adds up slots from the last one on, until `visit`, after each that holds bins, returns false.
   /// @param used slots that may hold bins
   /// @param bins_in(slot) their number
+  template <typename Bins, typename Visit>
+  Reached add_up(const SlotSet& used, const Bins& bins_in, const Visit& visit) const;
+  Reached add_up(std::size_t hypothesis) const;
   template <typename Bins>
   std::size_t droppable_from(const SlotSet& used, const Bins& bins_in, double log_allowance) const;
+  /// The bound that no tile in a slot exceeds, in nats.
+  double upper_edge(std::size_t slot) const;
   /// What a bin counts for, that many slots further up.
   double decay(std::size_t slots_up) const {
     return slots_up < decay_.size() ? decay_[slots_up]
@@ -119,8 +128,8 @@ class MassAccount {
   double best() const { return best_; }
   /// Log-likelihood, without the prior weight, that a hypothesis's best bin has at least, and that
   /// a bin of it that was dropped has at most.
-  double best_of(std::size_t object) const { return best_of_[object]; }
-  double largest_dropped_of(std::size_t object) const { return largest_dropped_of_[object]; }
+  double best_of(std::size_t object) const { return of_[object].best; }
+  double largest_dropped_of(std::size_t object) const { return of_[object].most_dropped; }
 
   /// Without the counts of blocks and bins.
   SearchResult result() const;
@@ -129,22 +138,28 @@ class MassAccount {
   /// [hypothesis] the largest log mass that evidence_nats lets a search drop.
   std::vector<double> droppable_evidence(double tolerance) const;
 
+  /// What is known of a hypothesis: logs in nats, with its prior weight.
+  struct Account {
+    LogSum evaluated;
+    LogSum rounding;
+    LogSum dropped;
+    double terms = 0.0;             ///< of the sums
+    double log_total = nothing;     ///< lower bound
+    double best = nothing;          ///< see best_of(), without the prior weight as the next is
+    double most_dropped = nothing;  ///< see largest_dropped_of()
+  };
+  static constexpr double nothing = -std::numeric_limits<double>::infinity();
+
   std::span<const double> log_weight_;
   std::span<const std::size_t> label_of_;
   const PoseLattice& lattice_;
   const SearchGoal& goal_;
-  std::vector<LogSum> evaluated_;  ///< [hypothesis], with the prior weight
-  std::vector<LogSum> rounding_;
-  std::vector<double> terms_;  ///< [hypothesis] of the sums
-  std::vector<LogSum> dropped_;
+  std::vector<Account> of_;  ///< [hypothesis]
   LogSum all_rounding_;
   LogSum all_dropped_;
-  double log_total_;
-  std::vector<double> log_totals_;  ///< [hypothesis] the same of each
-  double best_;                  ///< what the best bin has at least, with the prior weight, in nats
-  std::vector<double> best_of_;  ///< [hypothesis]
-  std::vector<double> largest_dropped_of_;  ///< [hypothesis]
-  double mode_value_;                       ///< of the best settled bin, with the prior weight
+  double log_total_ = nothing;
+  double best_ = nothing;        ///< what the best bin has at least, with the prior weight, in nats
+  double mode_value_ = nothing;  ///< of the best settled bin, with the prior weight
   std::int32_t mode_object_ = 0;
   std::int64_t mode_bin_ = 0;
 };

@@ -11,6 +11,7 @@
 
 #include "estimation/bin_box.hpp"
 #include "estimation/bounded/log_sum.hpp"
+#include "palpate/estimate.hpp"
 
 namespace palpate {
 
@@ -77,6 +78,11 @@ struct HypothesisMass {
   double evaluated = 0.0;  ///< of the bins that were evaluated
   double rounding = 0.0;   ///< bound of that sum's error
   double dropped = 0.0;    ///< bound of the sum over all other bins
+
+  /// Of the sum over all bins.
+  LogInterval bounds() const {
+    return {log_subtract(evaluated, rounding), log_add(log_add(evaluated, rounding), dropped)};
+  }
 };
 
 /// What a search by bounds returns.

@@ -9,9 +9,9 @@
 
 #include <fmt/format.h>
 
-#include "estimation/bounded/leaves/map_patches.hpp"
-#include "estimation/bounded/search/leaf_pass.hpp"
-#include "estimation/bounded/tables/tile_levels.hpp"
+#include "estimation/bounded/leaves/bin_kernel.hpp"
+#include "estimation/bounded/search/leaves.hpp"
+#include "estimation/bounded/tables/tile_bounds.hpp"
 #include "estimation/bounded/tables/window_table.hpp"
 #include "estimation/bounded/touch_overlap.hpp"
 #include "palpate/error.hpp"
@@ -149,13 +149,6 @@ std::string why_no_room(std::span<const Hypothesis> hypotheses, const BoundedOpt
       "{} need {:.0f} MiB of the host's memory, a quarter of which are {:.0f} MiB; {}", what,
       std::ceil(memory.total() / mib), std::floor(static_cast<double>(limit_bytes) / mib),
       largest.remedy);
-}
-
-void require_room(std::span<const Hypothesis> hypotheses, const BoundedOptions& options,
-                  std::uint64_t limit_bytes) {
-  if (const std::string why = why_no_room(hypotheses, options, limit_bytes); !why.empty()) {
-    throw Error(Fault::input, why);
-  }
 }
 
 std::uint64_t memory_for_search() {

@@ -30,9 +30,6 @@ SearchMemory search_memory(std::span<const Hypothesis> hypotheses, const Bounded
 /// @param options with a sound lattice
 std::string why_no_room(std::span<const Hypothesis> hypotheses, const BoundedOptions& options,
                         std::uint64_t limit_bytes);
-/// @throws Error with these words
-void require_room(std::span<const Hypothesis> hypotheses, const BoundedOptions& options,
-                  std::uint64_t limit_bytes);
 
 /// A quarter of the machine's memory: the rest is for its other programs, and for what the search
 /// takes while it divides tiles.

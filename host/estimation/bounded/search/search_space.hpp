@@ -7,6 +7,8 @@
 
 #include <glm/vec2.hpp>
 
+#include "estimation/bounded/known_elements.hpp"
+#include "estimation/bounded/search/search_goal.hpp"
 #include "estimation/bounded/tables/tile_bounds.hpp"
 #include "model/bounding_box.hpp"
 #include "palpate/bounded_posterior.hpp"
@@ -30,6 +32,19 @@ struct SearchSpace {
   std::vector<OccupancyGrid> maps;    ///< [hypothesis] without their cells
   std::vector<BoundingBox> boxes;     ///< [hypothesis] around its occupied cells
   std::vector<TileBounds> bounds;     ///< [hypothesis]
+};
+
+class BinLikelihood;
+
+/// What all parts of one search are given; it outlives them.
+struct SearchTask {
+  const SearchSpace& space;
+  const BoundedOptions& options;    ///< checked, with a resolved contact model
+  const BinLikelihood& likelihood;  ///< evaluates bins
+  const KnownElements& elements;
+  const SearchGoal& goal;
+  const Deadline& deadline;  ///< after which tiles are dropped unseen
+  const BinVisitor& visit;
 };
 
 }  // namespace palpate

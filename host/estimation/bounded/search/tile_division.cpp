@@ -5,7 +5,6 @@
 #include <numeric>
 
 #include "estimation/bounded/parallel_for.hpp"
-#include "estimation/bounded/search/largest_tiles.hpp"
 
 namespace palpate {
 
@@ -29,15 +28,14 @@ std::vector<Tile> joined(const std::vector<std::vector<Tile>>& lists) {
 
 }  // namespace
 
-TileDivision::TileDivision(const SearchSpace& space, const LargestTiles& largest,
-                           const KnownElements& elements, const TouchOverlap* counted)
-    : space_(space),
+TileDivision::TileDivision(const SearchTask& task, const LargestTiles& largest)
+    : space_(task.space),
       largest_(largest),
-      elements_(elements),
-      counted_(counted),
-      thetas_(space.turns.size()),
-      reaches_(reaches_of(elements, space.turns)),
-      seen_(space.bounds.size() * thetas_) {
+      elements_(task.elements),
+      counted_(task.goal.counted),
+      thetas_(space_.turns.size()),
+      reaches_(reaches_of(elements_, space_.turns)),
+      seen_(space_.bounds.size() * thetas_) {
   parallel_for(seen_.size(), [&](std::size_t row) {
     const std::size_t object = row / thetas_;
     seen_[row] = seen_tiles(reaches_[row % thetas_], space_.maps[object],
@@ -46,7 +44,7 @@ TileDivision::TileDivision(const SearchSpace& space, const LargestTiles& largest
   for (std::size_t i = 0; i < space_.bounds.size(); ++i) {
     std::vector<double>& of_level = unpenalised_.emplace_back();
     for (std::size_t level = 0; level < space_.bounds[i].levels().size(); ++level) {
-      of_level.push_back(space_.log_weight[i] + space_.bounds[i].best(level, elements));
+      of_level.push_back(space_.log_weight[i] + space_.bounds[i].best(level, elements_));
     }
   }
 }

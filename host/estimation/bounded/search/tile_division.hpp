@@ -17,10 +17,8 @@ namespace palpate {
 /// keeps, and the parts of any others.
 class TileDivision {
  public:
-  /// @param largest holds the sums of these elements
-  /// @param counted the bins that count; null where all do
-  TileDivision(const SearchSpace& space, const LargestTiles& largest, const KnownElements& elements,
-               const TouchOverlap* counted);
+  /// @param largest holds the sums of the task's elements
+  TileDivision(const SearchTask& task, const LargestTiles& largest);
 
   /// The largest tiles in which an element may see something else than the prior. In all others
   /// every bin has the same likelihood.
@@ -64,7 +62,7 @@ class TileDivision {
   const SearchSpace& space_;
   const LargestTiles& largest_;
   const KnownElements& elements_;
-  const TouchOverlap* counted_;
+  const TouchOverlap* counted_;  ///< the bins that count; null where all do
   std::size_t thetas_;
   std::vector<BoundingBox> reaches_;              ///< [theta] of the elements
   std::vector<TileRange> seen_;                   ///< [object, theta]

@@ -5,14 +5,100 @@
 #include <span>
 #include <vector>
 
+#include "estimation/bin_box.hpp"
 #include "estimation/bounded/known_elements.hpp"
-#include "estimation/bounded/tables/tile_levels.hpp"
 #include "estimation/bounded/tables/tile_penalties.hpp"
 #include "estimation/bounded/tables/window_table.hpp"
 #include "palpate/contact_model.hpp"
+#include "palpate/lattice.hpp"
 #include "palpate/occupancy_grid.hpp"
 
 namespace palpate {
+
+/// A tile of one object's poses, and the largest log-likelihood, with the prior weight, that a bin
+/// in it can have.
+struct Tile {
+  double bound = 0.0;
+  std::int32_t object = 0;
+  std::int32_t theta = 0;
+  std::int32_t x = 0;
+  std::int32_t y = 0;
+};
+
+/// Tiles [first, end) along each axis.
+struct TileRange {
+  int x_first = 0;
+  int x_end = 0;
+  int y_first = 0;
+  int y_end = 0;
+
+  bool holds(const Tile& tile) const {
+    return tile.x >= x_first && tile.x < x_end && tile.y >= y_first && tile.y < y_end;
+  }
+};
+
+/// The size of a level's tiles: `side` squares. A map's cell has `parts` squares along each axis,
+/// or a square holds `merged` cells. Or a tile is a single bin: squares then divide the lattice's
+/// steps, however large the map's cells are.
+struct TileSize {
+  int parts = 1;
+  int merged = 1;
+  int side = 1;
+  bool single_bin = false;
+
+  /// Squares along an axis that an element can see while the pose is in one tile.
+  int window() const { return single_bin ? 1 : side + 1; }
+  double square_cells() const { return static_cast<double>(merged) / parts; }
+  double cells() const { return side * square_cells(); }
+};
+
+/// Tiles along one axis of the lattice. They begin at the first bin's centre; a tile holds the bins
+/// whose centres lie in it, which may be none. A tile of a single bin begins at its centre.
+struct TileAxis {
+  double first_mm = 0.0;       ///< centre of the lattice's first bin
+  double side_mm = 0.0;        ///< of a tile
+  std::vector<int> first_bin;  ///< [tiles + 1]; tiles come in whole batches
+
+  int tiles() const { return static_cast<int>(first_bin.size()) - 1; }
+  int bins(int tile) const { return first_bin[tile + 1] - first_bin[tile]; }
+};
+
+/// One level of tiles over one object's poses, the same for every theta.
+struct TileLevel {
+  TileSize size;
+  glm::dvec2 square_mm;
+  TileAxis x;
+  TileAxis y;
+
+  int batches_x() const { return x.tiles() / 4; }
+  int batches_y() const { return y.tiles() / 4; }
+  BinBox box_of(std::int32_t object, std::int32_t theta, const TileRange& tiles) const {
+    return {.object = object,
+            .theta = theta,
+            .y_first = y.first_bin[tiles.y_first],
+            .y_count = y.first_bin[tiles.y_end] - y.first_bin[tiles.y_first],
+            .x_first = x.first_bin[tiles.x_first],
+            .x_count = x.first_bin[tiles.x_end] - x.first_bin[tiles.x_first]};
+  }
+  BinBox box_of(const Tile& tile) const {
+    return box_of(tile.object, tile.theta, {tile.x, tile.x + 1, tile.y, tile.y + 1});
+  }
+};
+
+/// Sizes of the levels, the largest tiles first. Each level's tiles have a quarter of the side of
+/// the level before, so that a batch of 4 x 4 tiles makes up one tile. Where bins are few and lie
+/// cells apart, there is one level, of single bins: larger tiles would leave out few of them, and
+/// bound them loosely.
+/// @param least_cell_mm of the maps
+std::vector<TileSize> tile_sizes(const PoseLattice& lattice, double least_cell_mm,
+                                 std::size_t maps);
+
+/// The squares of a level over a map of this cell.
+glm::dvec2 square_mm(const TileSize& size, const PoseLattice& lattice, double cell_mm);
+
+/// The levels of tiles over a lattice for a map of this cell.
+std::vector<TileLevel> tile_levels(const PoseLattice& lattice, double cell_mm,
+                                   const std::vector<TileSize>& sizes);
 
 /// What bounds the likelihood over the tiles of one object: the levels of tiles, and a window table
 /// of each level for every reading.

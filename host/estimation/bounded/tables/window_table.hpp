@@ -4,9 +4,56 @@
 #include <cstdint>
 #include <vector>
 
-#include "estimation/bounded/tables/reading_penalties.hpp"
+#include <glm/vec2.hpp>
+
+#include "palpate/contact_model.hpp"
+#include "palpate/occupancy_grid.hpp"
 
 namespace palpate {
+
+/// A map with one node of the prior around it, divided into equal rectangles, its squares. Knows
+/// the log odds, bilinear between the nodes, at every place where they may be extreme in a square:
+/// at the corners of the parts that the areas between neighbouring nodes cut it into.
+struct MapSquares {
+  std::vector<int> first_x;      ///< [nx + 1] column of the places on a square's lower border
+  std::vector<int> first_y;      ///< [ny + 1] row of these
+  std::vector<double> log_odds;  ///< [row, column] in nats
+
+  int nx() const { return static_cast<int>(first_x.size()) - 1; }
+  int ny() const { return static_cast<int>(first_y.size()) - 1; }
+  std::size_t columns() const { return static_cast<std::size_t>(first_x.back()) + 1; }
+};
+
+/// Squares of which `parts` divide the distance of two nodes.
+MapSquares squares_of_cells(const OccupancyGrid& map, double prior_log_odds, int parts);
+
+/// Squares of any size. The last of a row or column may reach beyond the map.
+MapSquares squares_of_size(const OccupancyGrid& map, double prior_log_odds,
+                           const glm::dvec2& square_mm);
+
+/// Penalties are whole multiples of 1 / penalties_per_nat nats.
+inline constexpr double penalties_per_nat = 256.0;
+/// The largest penalty of an element; larger ones count as much, which leaves bounds true.
+inline constexpr std::uint16_t largest_penalty = 32767;
+
+/// The least penalty of one reading in every square of a map: how much less likely the reading is
+/// at least, at any place within the square, than at the map's most likely place.
+struct SquarePenalties {
+  double best = 0.0;  ///< log-likelihood of the reading at the most likely place, in nats
+  int nx = 0;
+  int ny = 0;
+  std::vector<std::uint16_t> least;  ///< [ny, nx], rounded down
+  std::uint16_t beyond = 0;          ///< where the map holds only the prior
+};
+
+/// Any likelihood will do: its extremes over the range of a square's log odds are sought, and
+/// nothing is taken for monotone.
+/// @param contact resolved: with its prior
+SquarePenalties square_penalties(const MapSquares& squares, const ContactModel& contact,
+                                 Reading reading, std::size_t object);
+
+/// Squares of `count` x `count` squares each; the last of a row or column reach beyond the map.
+SquarePenalties merged(const SquarePenalties& squares, int count);
 
 /// Tiles along one axis whose bounds one vector load gives.
 inline constexpr int batch_side = 4;

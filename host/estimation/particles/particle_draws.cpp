@@ -1,7 +1,5 @@
-#include "estimation/particles/weight_blocks.hpp"
+#include "estimation/particles/particle_draws.hpp"
 
-#include <algorithm>
-#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -19,6 +17,35 @@ double scale(const shaders::WeightBlock& block, const WeightSummary& summary) {
 }
 
 }  // namespace
+
+shaders::uint in_words(double probability) {
+  return static_cast<shaders::uint>(
+      std::clamp(std::floor(probability * 0x1p32), 0.0, 0x1p32 - 1.0));
+}
+
+std::vector<shaders::ObjectShare> object_shares(std::span<const Hypothesis> hypotheses,
+                                                const ParticleOptions& options) {
+  std::vector<double> weights;
+  for (const Hypothesis& hypothesis : hypotheses) {
+    weights.push_back(hypothesis.weight);
+  }
+  // Relative to the largest, for the sum of the weights themselves may be infinite.
+  const double largest = *std::max_element(weights.begin(), weights.end());
+  double total = 0.0;
+  for (double& weight : weights) {
+    weight /= largest;
+    total += weight;
+  }
+  std::vector<shaders::ObjectShare> shares;
+  double before = 0.0;
+  for (const double weight : weights) {
+    before += weight;
+    shares.push_back({.particle_end = static_cast<shaders::uint>(
+                          std::lround(before / total * options.particles)),
+                      .chance_end = in_words(before / total)});
+  }
+  return shares;
+}
 
 WeightSummary summarise(std::span<const shaders::WeightBlock> blocks) {
   WeightSummary summary{.log_largest = -std::numeric_limits<double>::infinity()};

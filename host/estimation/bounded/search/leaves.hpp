@@ -1,0 +1,95 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "estimation/bounded/search/mass_account.hpp"
+#include "estimation/bounded/search/search_space.hpp"
+
+namespace palpate {
+
+/// Bins that are evaluated together at most, but for the last tile's: limits the memory for them.
+inline constexpr std::int64_t largest_batch = 500'000;
+
+/// The last step of a search by bounds: evaluates the bins of the smallest tiles in the order of
+/// their bounds, as boxes, the leaves. All are evaluated in float32, and those that hold most of
+/// the mass once more in float64, so that rounding stays within its part of the tolerance.
+class Leaves {
+ public:
+  /// @param task,account outlive the leaves
+  Leaves(const SearchTask& task, MassAccount& account);
+
+  /// Evaluates the bins of a few tiles ahead of the others, to learn how much mass there is at
+  /// least.
+  void probe(std::vector<Tile> tiles);
+  /// Evaluates the bins of tiles of the finest level, until those left hold at most this part of
+  /// the total; drops these.
+  void evaluate(std::span<const Tile> tiles, double tolerance);
+  /// Evaluates the bins of a tile only to learn how likely its best one is.
+  void look(const Tile& tile);
+  /// Settles all bins that were evaluated.
+  void flush() { settle(1.0); }
+  /// Number of bins that were evaluated.
+  std::int64_t bins() const { return bins_; }
+
+ private:
+  /// The parts of one tile, [first, end) of a list. Those that are needed are evaluated together,
+  /// as one box with those between them: fuller vectors.
+  struct Family {
+    std::size_t first = 0;
+    std::size_t end = 0;
+    double bound = 0.0;  ///< the largest
+  };
+  struct Leaf {
+    BinBox box;
+    std::size_t first = 0;  ///< of its values
+    double log_mass = 0.0;  ///< without the prior weight
+    double largest = 0.0;
+  };
+
+  BinBox box_of(const Tile& tile) const {
+    return task_.space.bounds[tile.object].levels().back().box_of(tile);
+  }
+  std::size_t row_of(const Tile& tile) const {
+    return static_cast<std::size_t>(tile.object) * task_.space.turns.size() + tile.theta;
+  }
+  bool probed(const Tile& tile) const;
+  void remove(const Tile& tile, UnsettledMass& left) const;
+  std::vector<Family> families_of(std::span<const Tile> tiles) const;
+  /// Takes a family's tiles before the slots `from` out of what is left, as boxes.
+  void take_family(std::span<const Tile> family, const std::vector<std::size_t>& from,
+                   UnsettledMass& left, std::vector<BinBox>& boxes) const;
+  /// Evaluates the bins of boxes. They are settled later.
+  void add(std::vector<BinBox> boxes);
+  /// Evaluates leaves whose values stand one after another, and sums those of the bins that count.
+  template <typename Value>
+  void evaluate(std::span<Leaf> leaves, std::span<Value> values) const;
+  /// Indices of the pending leaves that must be evaluated in float64: the heaviest.
+  std::vector<std::size_t> to_be_refined(double share) const;
+  /// @param share of the rounding that is left to be used up
+  void settle(double share);
+  void settle(const Leaf& leaf, std::span<const double> values, double error);
+
+  const SearchTask& task_;
+  MassAccount& account_;
+  std::vector<Tile> probed_;           ///< sorted by place
+  std::vector<bool> probed_in_row_;    ///< [object, theta]
+  std::vector<double> float32_error_;  ///< [hypothesis]
+  std::vector<double> float64_error_;
+  double least_error_ = 0.0;  ///< that evaluating all in float64 would leave
+  std::vector<Leaf> pending_;
+  std::vector<float> values_;         ///< of the pending leaves
+  std::vector<LogSum> pending_mass_;  ///< [hypothesis] lower bounds, with the prior weight
+  std::int64_t bins_ = 0;
+};
+
+/// Sorts before another by object, theta, y, x.
+bool stands_before(const Tile& a, const Tile& b);
+
+/// The bins of tiles of a level, by the tiles' bounds.
+UnsettledMass unsettled(std::span<const Tile> tiles, std::size_t level, const SearchSpace& space,
+                        const MassAccount& account);
+
+}  // namespace palpate
