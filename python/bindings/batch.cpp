@@ -123,7 +123,7 @@ Chunk recognise_entries(OpenBatch& batch, const std::vector<std::string>& entrie
             unresolved_words(batch.recognition, batch.recogniser.lattice(), unknown.touches);
       }
       const auto text = [&](OptionWords words) {
-        return text_of(
+        return palpate::text_of(
             to_json(record, batch.recognition, std::nullopt, batch.request.trace, words));
       };
       chunk.lines.push_back({text(in_flags), text(in_keywords), record.seconds});

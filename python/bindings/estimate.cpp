@@ -7,9 +7,7 @@
 #include <nanobind/stl/vector.h>
 
 #include "bindings.hpp"
-#include "model.hpp"
 #include "palpate/error.hpp"
-#include "plots.hpp"
 
 namespace palpate::python {
 
