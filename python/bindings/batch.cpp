@@ -48,12 +48,9 @@ std::tuple<nb::bytes, Entries, Sentences> settle(const std::vector<std::string>&
     const Request completed = complete(request);
     BatchTask settled{.program = PALPATE_VERSION,
                       .chunk_unknowns = 1,  // chunks are of recordings, whoever makes them
-                      .request = request};
-    for (BatchInput& input : list_inputs(inputs)) {
-      settled.inputs.push_back({std::move(input), {}, {}});
-    }
-    stamp_inputs(settled);
-    survey(settled, completed, threads, call.progress());
+                      .request = request,
+                      .inputs = list_inputs(inputs)};
+    survey_inputs(settled.inputs, completed, threads, call.progress());
     settled.inferred = infer(settled.inputs, completed);
     hash_files(settled, completed);
     const RecognitionTask recognition =
