@@ -16,7 +16,7 @@ namespace palpate {
 
 struct CrossValidationOptions {
   std::size_t folds = 5;             ///< at least 2
-  std::size_t maps_per_object = 20;  ///< most maps of an object that a press is placed on
+  std::size_t maps_per_object = 20;  ///< most maps of an object that a press is placed on, above 0
   /// For presses at known poses, which are looked for as_unknown() on these bins; none: all presses
   /// stay as they are, and are looked for on TableLearning::lattice.
   std::optional<RecognitionBins> bins = {};
@@ -48,8 +48,7 @@ inline constexpr std::size_t groups_of_press = 3;
 /// @param presses of all folds
 /// @param labels to recognise, ascending
 /// @param progress called with the fraction done, by one thread at a time
-/// @throws Error on fewer than two folds or no map per object, on bins for presses at unknown
-/// poses, and as PressPlacer does; what `progress` throws
+/// @throws Error as PressPlacer does; what `progress` throws
 CrossValidation try_fold(std::size_t fold, const std::vector<Press>& presses,
                          const std::vector<std::string>& labels, const FoldModel& model,
                          const CrossValidationOptions& options,
