@@ -171,13 +171,9 @@ void add_touch_sd(Device& device, const CalibrationTask& task, SensorCalibration
   LearnedSensor& sensor = calibration.sensor;
   std::vector<Hypothesis> hypotheses;
   std::vector<TouchedObject> unknowns = unknowns_of(task.presses);
-  const std::vector<std::size_t> fold = folds_of(task.presses, touch_sd_folds);
-  for (TrainingMap& map : maps_without_folds(task.presses, calibration.maps, touch_sd_folds)) {
-    const bool without_first =
-        std::ranges::none_of(map.presses, [&](std::size_t press) { return fold[press] == 0; });
-    if (without_first) {
-      hypotheses.push_back({.map = std::move(map.map)});
-    }
+  const std::vector<Press> others = presses_without(0, task.presses, touch_sd_folds);
+  for (TrainingMap& map : maps_of_objects(others, calibration.maps)) {
+    hypotheses.push_back({.map = std::move(map.map)});
   }
   std::erase_if(unknowns, [&](const TouchedObject& unknown) {
     return unknown.touches.size() < fewest_touches ||

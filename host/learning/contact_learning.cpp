@@ -8,7 +8,6 @@
 
 #include "io/element_spacing.hpp"
 #include "learning/golden_section.hpp"
-#include "learning/point_spread.hpp"
 #include "model/touch_evidence.hpp"
 #include "palpate/error.hpp"
 #include "palpate/occupancy_grid.hpp"

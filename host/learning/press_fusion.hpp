@@ -24,6 +24,9 @@ struct PressHome {
   std::optional<std::size_t> map;
   PressPlace place;  ///< on the map, or else on the one that it fits best
   double fit = 0.0;  ///< see PlacedPress::fit; 1 where the map is of this press alone
+  /// Its contact gains so little, even on the map of this press alone, that the best of all the
+  /// places compared may gain as much by chance. Set once all presses are placed.
+  bool says_little = false;
 
   ImagePlace image_place() const;
 };
@@ -31,12 +34,9 @@ struct PressHome {
 /// Presses on maps.
 struct FusedPresses {
   std::vector<PressHome> homes;  ///< [press]
-  /// [press] Whether its contact gains so little, even on the map of this press alone, that the
-  /// best of all the places compared may gain as much by chance.
-  std::vector<bool> says_little;
-  std::size_t maps = 0;  ///< some may be of no press
-  int rounds = 0;        ///< in which every press was placed anew
-  bool settled = true;   ///< the last round moved no press
+  std::size_t maps = 0;          ///< some may be of no press
+  int rounds = 0;                ///< in which every press was placed anew
+  bool settled = true;           ///< the last round moved no press
 };
 
 /// Assigns presses to maps and places them, as unposed_maps() says. Takes all host threads.

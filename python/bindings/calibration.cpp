@@ -22,7 +22,7 @@ namespace {
 SensorCalibration calibrate(const GivenRecordings& given, PythonRequest request,
                             const CalibrationRequest& wanted, Call& call) {
   constexpr double calibrating = 0.5;  // of the time, where touches' poses are fitted
-  const std::vector<Recording> recordings = given.read();
+  const std::vector<Recording> recordings = read_recordings(given);
   if (request.given_maps.empty()) {
     read_maps(request);
   }

@@ -207,7 +207,6 @@ class Pipeline {
       const std::lock_guard lock(mutex_);
       failure_ = failure_ ? failure_ : std::current_exception();
     }
-    failed_ = true;
     jobs_.close();
     lines_.close();
   }
@@ -238,23 +237,26 @@ class Pipeline {
   }
 
   void read(RecordingReader& reader) {
-    for (std::size_t i = next_input_++; i < first_.size() && !failed_; i = next_input_++) {
-      if (is_wanted(i)) {
-        push_unknowns(i, read_entry(reader, run_.task, run_.task.inputs[i], run_.request));
+    for (std::size_t i = next_input_++; i < first_.size(); i = next_input_++) {
+      if (is_wanted(i) &&
+          !push_unknowns(i, read_entry(reader, run_.task, run_.task.inputs[i], run_.request))) {
+        return;
       }
     }
   }
 
-  void push_unknowns(std::size_t input, ReadInput read) {
+  /// False where the queue is closed.
+  bool push_unknowns(std::size_t input, ReadInput read) {
     for (std::size_t i = 0; i < read.unknowns.size(); ++i) {
       const std::size_t index = first_[input] + i;
       if (run_.wanted[chunk_of(index)]) {
         const std::size_t bytes = bytes_of(read.unknowns[i]);
         if (!jobs_.push({index, read.recording, std::move(read.unknowns[i])}, bytes)) {
-          return;
+          return false;
         }
       }
     }
+    return true;
   }
 
   void recognise_jobs(bool first) {
@@ -340,7 +342,6 @@ class Pipeline {
   std::atomic<std::size_t> next_input_ = 0;
   std::atomic<std::size_t> readers_left_ = 0;
   std::atomic<std::size_t> recognisers_left_ = 0;
-  std::atomic<bool> failed_ = false;
   std::atomic<bool> told_ = false;
   std::mutex mutex_;
   std::exception_ptr failure_;  ///< the first one
