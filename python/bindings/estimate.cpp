@@ -167,14 +167,6 @@ std::vector<Hypothesis> hypotheses_of(nb::handle maps) {
   return hypotheses;
 }
 
-std::string name_of(const std::vector<Hypothesis>& hypotheses, const Session& session) {
-  std::vector<std::string> labels;
-  for (const Hypothesis& hypothesis : hypotheses) {
-    labels.push_back(hypothesis.map.label);
-  }
-  return fmt::format("{} on '{}'", fmt::join(labels, ", "), session.name());
-}
-
 void bind_estimate(nb::module_& module) {
   bind_mode(module);
   bind_certificate(module);

@@ -1,7 +1,12 @@
 #include <algorithm>
 #include <iterator>
+#include <memory>
+#include <string>
+#include <type_traits>
+#include <utility>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/tuple.h>
@@ -12,12 +17,59 @@
 #include "palpate/bounded_posterior.hpp"
 #include "palpate/particle_filter.hpp"
 #include "palpate/pose_histogram.hpp"
+#include "session.hpp"
+#include "touches.hpp"
 
 namespace palpate::python {
 
 using namespace nb::literals;
 
 namespace {
+
+/// A filter over object and pose.
+template <typename Filter>
+struct Named : Owned<Filter> {
+  std::string name;  ///< "A, E, I on 'llvmpipe'"
+};
+
+std::string name_of(const std::vector<Hypothesis>& hypotheses, const Session& session) {
+  std::vector<std::string> labels;
+  for (const Hypothesis& hypothesis : hypotheses) {
+    labels.push_back(hypothesis.map.label);
+  }
+  return fmt::format("{} on '{}'", fmt::join(labels, ", "), session.name());
+}
+
+template <typename Filter, typename Options>
+Named<Filter> make_filter(const std::shared_ptr<Session>& session, nb::handle maps,
+                          const Options& options) {
+  const std::vector<Hypothesis> hypotheses = hypotheses_of(maps);
+  auto filter = make_owned<Filter>(session, [hypotheses, options](Device& device) {
+    if constexpr (std::is_constructible_v<Filter, Device&, decltype(hypotheses), Options>) {
+      return Filter(device, hypotheses, options);
+    } else {
+      return Filter(hypotheses, options);
+    }
+  });
+  return {std::move(filter), name_of(hypotheses, *session)};
+}
+
+template <typename Filter>
+void update(const Named<Filter>& self, const TouchesLike& touches, const Progress& progress) {
+  TouchViews views = views_of(touches);
+  self.use(std::move(views.kept), progress,
+           [all = std::move(views.touches)](Filter& filter, Call& call) {
+             filter.update(all, call.progress());
+           });
+}
+
+/// The refined pose near a mode, by default that of estimate().
+template <typename Filter>
+RefinedPose refine(const Named<Filter>& self, const std::optional<Mode>& mode) {
+  return self.use([mode](Filter& belief, Call&) {
+    return belief.refine(mode ? *mode : belief.estimate().mode);
+  });
+}
 
 using Histogram = Named<PoseHistogram>;
 

@@ -8,12 +8,13 @@
 #include "estimate.hpp"
 #include "palpate/balanced_lattice.hpp"
 #include "palpate/error.hpp"
-#include "palpate/estimate.hpp"
 #include "palpate/files.hpp"
 #include "palpate/map_builder.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/pose_error.hpp"
 #include "palpate/rotational_symmetry.hpp"
+#include "session.hpp"
+#include "touches.hpp"
 
 namespace palpate::python {
 
