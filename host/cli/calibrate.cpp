@@ -3,7 +3,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -72,21 +71,6 @@ void check_outputs(const CalibrateArguments& options,
   }
 }
 
-/// What the flags ask for, with the bins on which unknowns will be recognised.
-CalibrationRequest request_of(const CalibrateArguments& options) {
-  const Request& bins = options.recognition;
-  if (const auto* width = bins.bins ? std::get_if<BinWidth>(&*bins.bins) : nullptr) {
-    refuse_flag("--bins", *width == BinWidth::fine ? "fine" : "auto",
-                "give counts, as 25x25x16, or leave it out");
-  }
-  CalibrationRequest request = options.request;
-  request.gives_bins = bins.bins || bins.x_mm || bins.y_mm || bins.theta_deg || bins.pivot_mm;
-  if (!infers_region(bins)) {
-    request.bins = {given_lattice(bins), has_auto_pivot(bins)};
-  }
-  return request;
-}
-
 void calibrate(const CalibrateArguments& options) {
   std::vector<std::filesystem::path> maps_read;
   for (const std::string& argument : options.maps) {
@@ -95,16 +79,17 @@ void calibrate(const CalibrateArguments& options) {
   }
   check_outputs(options, maps_read);
   const std::vector<Recording> recordings = read_touch_recordings(options.recordings);
-  std::vector<std::array<std::size_t, 2>> touches;
-  for (const Recording& recording : recordings) {
-    const auto [begin, end] = selected_touches(recording, options.recognition.frames);
-    touches.push_back({begin, end});
-  }
-  std::vector<NamedMap> maps;
+  std::vector<GivenMap> maps;
   for (const std::filesystem::path& file : maps_read) {
-    maps.push_back({file.string(), read_map(file)});
+    maps.push_back({file.string(), {.map = read_map(file)}});
   }
-  const CalibrationTask task = calibration_task(request_of(options), recordings, touches, maps);
+  const std::optional<Bins>& bins = options.recognition.bins;
+  if (const auto* width = bins ? std::get_if<BinWidth>(&*bins) : nullptr) {
+    refuse_flag("--bins", *width == BinWidth::fine ? "fine" : "auto",
+                "give counts, as 25x25x16, or leave it out");
+  }
+  const CalibrationTask task =
+      calibration_task(options.request, options.recognition, recordings, maps);
 
   SensorCalibration calibration;
   {

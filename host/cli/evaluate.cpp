@@ -47,7 +47,7 @@ void check_outputs(const EvaluateArguments& options,
     files.reads("RESULTS", file);
   }
   for (const std::string& results : options.results) {
-    if (is_results_folder(results)) {
+    if (ResultsFolder(results).has_task()) {
       files.reads("RESULTS", ResultsFolder(results).task());
     }
   }
@@ -71,7 +71,7 @@ void check_outputs(const EvaluateArguments& options,
 
 /// Says how much a folder of palpate batch still lacks.
 void tell_missing(const std::string& results) {
-  if (!is_results_folder(results)) {
+  if (!ResultsFolder(results).has_task()) {
     return;
   }
   const ResultsFolder folder(results);

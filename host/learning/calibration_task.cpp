@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "io/input_file.hpp"
+#include "recognition/recordings.hpp"
 #include "recognition/touch_sd_fit.hpp"
 
 namespace palpate {
@@ -29,15 +30,15 @@ bool all_have_poses(std::span<const Recording> recordings) {
 }
 
 std::vector<Press> presses_of(std::span<const Recording> recordings,
-                              std::span<const std::array<std::size_t, 2>> touches, bool posed) {
+                              const std::optional<Frames>& frames, bool posed) {
   std::vector<Press> presses;
-  for (std::size_t i = 0; i < recordings.size(); ++i) {
-    const Recording& recording = recordings[i];
+  for (const Recording& recording : recordings) {
     if (recording.object.empty()) {
       refuse(recording.path,
              "attribute 'object' is empty; a calibration needs to know what was touched");
     }
-    for (std::size_t touch = touches[i][0]; touch < touches[i][1]; ++touch) {
+    const auto [begin, end] = selected_touches(recording, frames);
+    for (std::size_t touch = begin; touch < end; ++touch) {
       presses.push_back(posed ? posed_press(recording, touch) : single_press(recording, touch));
     }
   }
@@ -129,24 +130,26 @@ std::vector<TouchedObject> unknowns_of(const std::vector<Press>& presses) {
 
 }  // namespace
 
-CalibrationTask calibration_task(const CalibrationRequest& request,
+CalibrationTask calibration_task(const CalibrationRequest& request, const Request& recognition,
                                  std::span<const Recording> recordings,
-                                 std::span<const std::array<std::size_t, 2>> touches,
-                                 std::span<const NamedMap> maps) {
+                                 std::span<const GivenMap> maps) {
   const bool known_poses = !request.unposed && all_have_poses(recordings);
-  CalibrationTask task{.presses = presses_of(recordings, touches, known_poses)};
+  CalibrationTask task{.presses = presses_of(recordings, recognition.frames, known_poses)};
   const bool needs_mean_level =
       request.layer == "mean_level" || (request.layer == "auto" && known_poses);
-  for (const NamedMap& given : maps) {
-    if (needs_mean_level && given.map.mean_level.empty()) {
+  for (const GivenMap& given : maps) {
+    const OccupancyGrid& map = given.hypothesis.map;
+    if (needs_mean_level && map.mean_level.empty()) {
       refuse(given.name,
              "has no mean_level; build the map with `unposed` or `sensor-model`, or give "
              "`layer log_odds`");
     }
-    task.maps.push_back(given.map);
+    task.maps.push_back(map);
   }
   check_numbers(request);
-  if (request.gives_bins && !known_poses) {
+  const bool gives_bins = recognition.bins || recognition.x_mm || recognition.y_mm ||
+                          recognition.theta_deg || recognition.pivot_mm;
+  if (gives_bins && !known_poses) {
     throw Error(
         Fault::input,
         "`bins`, `x-mm`, `y-mm`, `theta-deg` and `pivot-mm` are for touches at known poses; leave "
@@ -156,8 +159,10 @@ CalibrationTask calibration_task(const CalibrationRequest& request,
                   .threshold = request.threshold,
                   .ratio = request.ratio,
                   .tables = tables_of(request, known_poses, task.maps),
-                  .most_maps = static_cast<std::size_t>(request.max_maps),
-                  .bins = request.bins};
+                  .most_maps = static_cast<std::size_t>(request.max_maps)};
+  if (!infers_region(recognition)) {
+    task.options.bins = {given_lattice(recognition), has_auto_pivot(recognition)};
+  }
   return task;
 }
 
@@ -166,13 +171,9 @@ void add_touch_sd(Device& device, const CalibrationTask& task, SensorCalibration
   LearnedSensor& sensor = calibration.sensor;
   std::vector<Hypothesis> hypotheses;
   std::vector<TouchedObject> unknowns = unknowns_of(task.presses);
-  const std::vector<std::size_t> fold = folds_of(task.presses, touch_sd_folds);
-  for (TrainingMap& map : maps_without_folds(task.presses, calibration.maps, touch_sd_folds)) {
-    const bool without_first =
-        std::ranges::none_of(map.presses, [&](std::size_t press) { return fold[press] == 0; });
-    if (without_first) {
-      hypotheses.push_back({.map = std::move(map.map)});
-    }
+  const std::vector<Press> others = presses_without(0, task.presses, touch_sd_folds);
+  for (TrainingMap& map : maps_of_objects(others, calibration.maps)) {
+    hypotheses.push_back({.map = std::move(map.map)});
   }
   std::erase_if(unknowns, [&](const TouchedObject& unknown) {
     return unknown.touches.size() < fewest_touches ||

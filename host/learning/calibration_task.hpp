@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <functional>
 #include <optional>
@@ -11,10 +10,11 @@
 #include "learning/sensor_calibration.hpp"
 #include "palpate/device.hpp"
 #include "palpate/touch.hpp"
+#include "recognition/request.hpp"
 
 namespace palpate {
 
-/// What is asked of a calibration, as a user says it.
+/// What is asked of a calibration beside a Request's bins, region and frames, as a user says it.
 struct CalibrationRequest {
   bool unposed = false;             ///< the recordings' poses do not count
   std::optional<double> threshold;  ///< in the recordings' pressure unit; none: learned
@@ -22,14 +22,6 @@ struct CalibrationRequest {
   std::string layer = "auto";       ///< auto, mean_level or log_odds
   std::optional<int> levels;        ///< of readings; none: as default_tables() has them
   int max_maps = 5;                 ///< SensorCalibrationOptions::most_maps
-  std::optional<RecognitionBins> bins;
-  bool gives_bins = false;  ///< something was said of `bins`, though they may be none
-};
-
-/// A map to compare touches with, and its name for messages.
-struct NamedMap {
-  std::string name;
-  OccupancyGrid map;
 };
 
 /// What calibrate_sensor() takes. Presses are views into the recordings.
@@ -44,15 +36,15 @@ struct CalibrationTask {
 /// Makes the task: where all touches of each recording are at one pose, poses count as unknown.
 /// With the layer auto, touches at known poses are compared by the mean pressure; at unknown ones
 /// both layers are tried, but without a mean level of every map only log odds.
+/// @param recognition what recognize will be given; its bins, region and frames alone count
 /// @param recordings of touches of one pressure unit, at least one
-/// @param touches [recording] to use, [begin, end)
+/// @param maps to compare touches with
 /// @throws Error naming the option or the recording, where a value is out of range, a recording
 /// names no object, some recordings alone have poses, bins are given for unknown poses, or a map
 /// lacks the mean level that it needs
-CalibrationTask calibration_task(const CalibrationRequest& request,
+CalibrationTask calibration_task(const CalibrationRequest& request, const Request& recognition,
                                  std::span<const Recording> recordings,
-                                 std::span<const std::array<std::size_t, 2>> touches,
-                                 std::span<const NamedMap> maps);
+                                 std::span<const GivenMap> maps);
 
 /// Adds to the result of calibrate_sensor() how far touches at known poses lie from the poses that
 /// the robot reported: standard deviations by fit_touch_sd(), and 0 where they lie below the fit's

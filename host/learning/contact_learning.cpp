@@ -8,7 +8,6 @@
 
 #include "io/element_spacing.hpp"
 #include "learning/golden_section.hpp"
-#include "learning/point_spread.hpp"
 #include "model/touch_evidence.hpp"
 #include "palpate/error.hpp"
 #include "palpate/occupancy_grid.hpp"
@@ -39,15 +38,15 @@ double otsu_threshold(const std::vector<double>& values) {
   return threshold;
 }
 
-/// Largest pressure of the living elements; 0 where none is above.
-double peak_of(const Touch& touch) {
-  double peak = 0.0;
+/// The pressures above 0 of the living elements.
+std::vector<double> pressures_of(const Touch& touch) {
+  std::vector<double> pressures;
   for (std::size_t e = 0; e < touch.pressure.size(); ++e) {
-    if (is_living(touch, e)) {
-      peak = std::max(peak, touch.pressure[e]);
+    if (is_living(touch, e) && touch.pressure[e] > 0.0) {
+      pressures.push_back(touch.pressure[e]);
     }
   }
-  return peak;
+  return pressures;
 }
 
 /// Marks the elements that lie within `near_mm` of an element In Contact.
@@ -67,10 +66,8 @@ double learned_threshold(const std::vector<Press>& presses) {
   std::vector<double> logs;
   for (const Press& press : presses) {
     for (const Touch& touch : press.touches) {
-      for (std::size_t e = 0; e < touch.pressure.size(); ++e) {
-        if (is_living(touch, e) && touch.pressure[e] > 0.0) {
-          logs.push_back(std::log(touch.pressure[e]));
-        }
+      for (const double pressure : pressures_of(touch)) {
+        logs.push_back(std::log(pressure));
       }
     }
   }
@@ -177,11 +174,10 @@ ContactClassifier learn_classifier(const std::vector<Press>& presses,
   std::vector<double> shares;
   for (const Press& press : presses) {
     for (const Touch& touch : press.touches) {
-      const double peak = peak_of(touch);
-      for (std::size_t e = 0; peak > classifier.threshold && e < touch.pressure.size(); ++e) {
-        if (is_living(touch, e) && touch.pressure[e] > 0.0) {
-          shares.push_back(std::log(touch.pressure[e] / peak));
-        }
+      const std::vector<double> pressures = pressures_of(touch);
+      const double peak = pressures.empty() ? 0.0 : *std::ranges::max_element(pressures);
+      for (std::size_t i = 0; peak > classifier.threshold && i < pressures.size(); ++i) {
+        shares.push_back(std::log(pressures[i] / peak));
       }
     }
   }

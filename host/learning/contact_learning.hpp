@@ -59,6 +59,19 @@ ContactClassifier learn_classifier(const std::vector<Press>& presses,
 /// be cut off at 0. 0 where there are no such elements.
 double noise_floor(const std::vector<Press>& presses, const ContactClassifier& classifier);
 
+/// Standard deviation of the sensor's point spread in mm, from touches at known poses.
+///
+/// Takes every object for a flat face at one height. The face lies where the mean pressure, each
+/// touch relative to its force, exceeds half of its plateau. Blurred by a Gaussian and averaged
+/// over elements (squares of 0.95 element spacings), the face explains the pressures up to each
+/// touch's force with a least squared error, whose place is the result. Edges that are rounded or
+/// sloped count as blur.
+/// @param presses at known poses
+/// @returns none where the touches do not determine it: too few, or the least error lies at the end
+/// of what is searched, a twentieth to three times the element spacing
+std::optional<double> learn_point_spread(const std::vector<Press>& presses,
+                                         const ContactClassifier& classifier);
+
 /// Gamma of Eq. 7 under which readings are most likely where the log odds are known.
 /// @param counts of two levels over log odds; nodes of cells that nothing sensed are left out
 double fit_gamma(const LevelCounts& counts, double prior);

@@ -8,11 +8,9 @@
 #include <map>
 #include <utility>
 
-#include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
 #include "learning/host_progress.hpp"
-#include "palpate/error.hpp"
 #include "recognition/nearby_fit.hpp"
 
 namespace palpate {
@@ -44,21 +42,6 @@ struct LabelScore {
     return maps == 0 ? nothing : log_evidence_sum - std::log(static_cast<double>(maps));
   }
 };
-
-void require_sound(const std::vector<Press>& presses, const CrossValidationOptions& options) {
-  if (options.folds < 2 || options.maps_per_object < 1) {
-    throw Error(Fault::input,
-                fmt::format("cross-validation: {} folds and {} maps per object; give at least two "
-                            "folds and a map",
-                            options.folds, options.maps_per_object));
-  }
-  if (options.bins && !at_known_poses(presses)) {
-    throw Error(
-        Fault::input,
-        "cross-validation: bins are for presses at known poses; leave them out, or give the "
-        "poses");
-  }
-}
 
 void shuffle(std::span<const Press*> presses, Random& random) {
   for (std::size_t i = presses.size(); i > 1; --i) {
@@ -307,7 +290,6 @@ CrossValidation try_fold(std::size_t fold, const std::vector<Press>& presses,
                          const std::vector<std::string>& labels, const FoldModel& model,
                          const CrossValidationOptions& options,
                          const std::function<void(double)>& progress) {
-  require_sound(presses, options);
   const FoldTrial trial(labels, model, options);
   const std::vector<std::size_t> fold_of = folds_of(presses, options.folds);
   std::vector<Press> tried;

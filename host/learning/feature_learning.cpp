@@ -4,8 +4,6 @@
 #include <array>
 #include <cmath>
 
-#include "palpate/error.hpp"
-
 namespace palpate {
 
 namespace {
@@ -69,9 +67,6 @@ FeatureDistribution distribution_of(const Values& mean, const Matrix& covariance
 }  // namespace
 
 LearnedFeatures learn_features(std::span<const LabelledFeatures> presses) {
-  if (presses.empty()) {
-    throw Error(Fault::input, "press features: no presses; give at least one");
-  }
   Scatter all;
   std::map<std::string, Scatter> objects;
   for (const LabelledFeatures& press : presses) {

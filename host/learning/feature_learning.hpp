@@ -21,7 +21,7 @@ struct LabelledFeatures {
 /// mean of n presses misses, and the last term keeps presses that were all alike from being
 /// demanded alike. Where every object has one press, all presses' covariance stands for the pooled
 /// one. `any` has the mean and covariance of all presses. The weight stays 0.
-/// @throws Error on no press
+/// @param presses at least one
 LearnedFeatures learn_features(std::span<const LabelledFeatures> presses);
 /// The distributions of presses' features, each press by its first touch.
 LearnedFeatures learn_features(const std::vector<Press>& presses,

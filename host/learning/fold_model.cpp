@@ -1,11 +1,9 @@
-#include "learning/fold_model.hpp"
-
 #include <algorithm>
 #include <utility>
 
+#include "learning/cross_validation.hpp"
 #include "learning/feature_learning.hpp"
 #include "learning/host_progress.hpp"
-#include "learning/tried_bins.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {

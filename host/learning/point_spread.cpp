@@ -1,5 +1,3 @@
-#include "learning/point_spread.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -8,6 +6,7 @@
 #include <tbb/parallel_for.h>
 
 #include "io/element_spacing.hpp"
+#include "learning/contact_learning.hpp"
 #include "learning/golden_section.hpp"
 #include "model/bounding_box.hpp"
 #include "model/touch_evidence.hpp"

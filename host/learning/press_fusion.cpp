@@ -90,13 +90,10 @@ class PressFusion {
   };
 
   FusedPresses fused(int rounds, bool settled) const {
-    FusedPresses result{.homes = homes_,
-                        .says_little = {},
-                        .maps = maps_.size(),
-                        .rounds = rounds,
-                        .settled = settled};
+    FusedPresses result{
+        .homes = homes_, .maps = maps_.size(), .rounds = rounds, .settled = settled};
     for (std::size_t p = 0; p < presses_.size(); ++p) {
-      result.says_little.push_back(is_little(p, homes_[p].place));
+      result.homes[p].says_little = is_little(p, homes_[p].place);
     }
     return result;
   }

@@ -1,5 +1,3 @@
-#include "learning/press_search.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -8,6 +6,7 @@
 
 #include <glm/geometric.hpp>
 
+#include "learning/press_fusion.hpp"
 #include "learning/press_placement.hpp"
 #include "model/bounding_box.hpp"
 

@@ -25,22 +25,6 @@ constexpr double table_cost = 4.0 / 3.0;
 constexpr double minutes = 0.25;
 constexpr double minutes_at_bins = 1.0;
 
-void require_sound(const std::vector<Press>& presses, const SensorCalibrationOptions& options) {
-  if (presses.empty()) {
-    throw Error(Fault::input, "no touches; give recordings with touches");
-  }
-  for (const TableKind& kind : options.tables) {
-    if (kind.levels < 2 || kind.levels > most_reading_levels) {
-      throw Error(Fault::input,
-                  fmt::format("levels = {}: give 2 to {}", kind.levels, most_reading_levels));
-    }
-  }
-  if (options.folds < 2) {
-    throw Error(Fault::input, fmt::format("folds = {}: give at least 2", options.folds));
-  }
-  require_poses_of_one_kind(presses);
-}
-
 /// The largest spacing of the presses' arrays.
 double spacing_mm_of(const std::vector<Press>& presses) {
   double spacing_mm = 0.0;
@@ -200,19 +184,10 @@ const TriedModel& kept(const std::vector<TriedModel>& tried,
   return *best;
 }
 
-/// How right the cross-validation is.
-struct Judgement {
-  Scores before;
-  Scores table;
-  Scores after;
-  std::optional<GroupScores> groups;
-  std::optional<double> area_under_curve;
-  std::vector<std::string> warnings;
-};
-
-/// Judges each fold's presses by the table that the other folds keep.
-Judgement judge(const CrossValidation& eq7, const std::vector<TriedModel>& tried,
-                bool known_poses) {
+/// Adds how right the cross-validation is: each fold's presses are judged by the table that the
+/// other folds keep.
+void judge(const CrossValidation& eq7, const std::vector<TriedModel>& tried, bool known_poses,
+           SensorCalibration& judged) {
   const std::size_t folds = tried.front().folds.size();
   std::vector<CrossValidation> of_folds;
   TemperedPresses after;
@@ -227,9 +202,9 @@ Judgement judge(const CrossValidation& eq7, const std::vector<TriedModel>& tried
     }
   }
   const CrossValidation table = joined(of_folds);
-  Judgement judged{.before = scores_of(eq7.presses, 1.0),
-                   .table = scores_of(table.presses, 1.0),
-                   .after = scores_of(after.presses, 1.0)};
+  judged.before = scores_of(eq7.presses, 1.0);
+  judged.table = scores_of(table.presses, 1.0);
+  judged.after = scores_of(after.presses, 1.0);
   if (!areas.empty()) {
     judged.area_under_curve =
         std::accumulate(areas.begin(), areas.end(), 0.0) / static_cast<double>(areas.size());
@@ -253,9 +228,8 @@ Judgement judge(const CrossValidation& eq7, const std::vector<TriedModel>& tried
         "on touches that it has not seen, the learned table has a log-loss of {:.3f}, worse than "
         "{:.3f} by Eq. 7 with a temperature: give more touches of each object, or recognize "
         "without the sensor model",
-        judged.after.log_loss, scores_of(without, 1.0).log_loss));
+        judged.after->log_loss, scores_of(without, 1.0).log_loss));
   }
-  return judged;
 }
 
 /// Mean and standard deviation of the touches' z; none where they do not differ.
@@ -315,7 +289,10 @@ SensorCalibration calibrate_sensor(const std::vector<Press>& presses,
                                    const std::vector<OccupancyGrid>& given,
                                    const SensorCalibrationOptions& options,
                                    const std::function<void(double)>& progress) {
-  require_sound(presses, options);
+  if (presses.empty()) {
+    throw Error(Fault::input, "no touches; give recordings with touches");
+  }
+  require_poses_of_one_kind(presses);
   const bool known_poses = at_known_poses(presses);
   const std::vector<TableKind> tables =
       options.tables.empty() ? default_tables(known_poses) : options.tables;
@@ -375,13 +352,7 @@ SensorCalibration calibrate_sensor(const std::vector<Press>& presses,
   calibration.sensor.gamma = gamma_of(best.placed, best.how, learned);
   calibration.sensor = with_confidence(calibration.sensor, best.all, learned.presses);
 
-  const Judgement judged = judge(joined(validations.back()), tried, known_poses);
-  calibration.before = judged.before;
-  calibration.table = judged.table;
-  calibration.after = judged.after;
-  calibration.groups = judged.groups;
-  calibration.area_under_curve = judged.area_under_curve;
-  std::ranges::copy(judged.warnings, std::back_inserter(calibration.warnings));
+  judge(joined(validations.back()), tried, known_poses, calibration);
   return calibration;
 }
 

@@ -20,7 +20,7 @@ struct SensorCalibrationOptions {
   /// Tables to try, the simplest first; none stands for default_tables(). With one object there is
   /// nothing to compare by, and the last is taken.
   std::vector<TableKind> tables = {};
-  std::size_t folds = 5;      ///< of the cross-validation
+  std::size_t folds = 5;      ///< of the cross-validation, at least 2
   std::size_t most_maps = 5;  ///< of an object, in the cross-validation
   /// Bins on which unknowns will be recognised, for touches at known poses; none stands for bins
   /// half the elements' spacing and 5 degrees wide, about the array's centre.
@@ -94,10 +94,9 @@ struct SensorCalibration {
 /// @param presses all at known poses or all at unknown ones
 /// @param given maps to compare presses with, with their mean level where a table is over that;
 /// without: maps of other presses
-/// @throws Error where no press has a map of its object that it is no part of, on levels or folds
-/// out of range, on poses some of which are known, where presses tell no
-/// threshold or have no pressure above it, and as observed_map() and learn_table() do; what
-/// `progress` throws
+/// @throws Error where no press has a map of its object that it is no part of, on poses some of
+/// which are known, where presses tell no threshold or have no pressure above it, and as
+/// observed_map() and learn_table() do; what `progress` throws
 SensorCalibration calibrate_sensor(const std::vector<Press>& presses,
                                    const std::vector<OccupancyGrid>& given,
                                    const SensorCalibrationOptions& options,

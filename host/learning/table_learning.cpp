@@ -78,19 +78,15 @@ std::vector<OwnPlacement> place_all(const std::vector<Press>& presses,
   return placements;
 }
 
-/// The middle of the places of an object's arrays, by label.
-std::map<std::string, glm::dvec2> middles_of(const std::vector<Press>& presses) {
+/// The box around the places of an object's arrays, by label.
+std::map<std::string, BoundingBox> boxes_of(const std::vector<Press>& presses) {
   std::map<std::string, BoundingBox> boxes;
   for (const Press& press : presses) {
     if (press.T_object_robot) {
       boxes[press.label].take_in(press.T_object_robot->translation_mm);
     }
   }
-  std::map<std::string, glm::dvec2> middles;
-  for (const auto& [label, box] : boxes) {
-    middles[label] = box.middle();
-  }
-  return middles;
+  return boxes;
 }
 
 /// Where a press at a known pose is counted: at poses as far from it as the nearest bin may be. The
@@ -188,7 +184,7 @@ ObjectCounts count_placed(std::span<const OwnPlacement> placements,
     of_press[placement.press].push_back(&placement);
   }
   const ContactModel classifier = how.classifier();
-  const std::map<std::string, glm::dvec2> middles = middles_of(presses);
+  const std::map<std::string, BoundingBox> boxes = boxes_of(presses);
   ObjectCounts counts;
   for (std::size_t press = 0; press < presses.size(); ++press) {
     std::vector<const OwnPlacement*>& on = of_press[press];
@@ -200,7 +196,7 @@ ObjectCounts count_placed(std::span<const OwnPlacement> placements,
     for (const OwnPlacement* placement : on) {
       const std::vector<Pose> poses =
           presses[press].T_object_robot
-              ? counted_at(*presses[press].T_object_robot, middles.at(presses[press].label),
+              ? counted_at(*presses[press].T_object_robot, boxes.at(presses[press].label).middle(),
                            how.counted_within)
               : std::vector{placement->placement.T_object_robot};
       counts.try_emplace(presses[press].label, how.level_edges.size() + 2)

@@ -9,8 +9,6 @@
 #include <string>
 #include <utility>
 
-#include <fmt/format.h>
-
 #include "learning/golden_section.hpp"
 #include "palpate/error.hpp"
 
@@ -49,24 +47,9 @@ double loss_of(const ScoredPress& press, double temperature, double feature_weig
   return -log_probabilities(press, temperature, feature_weight)[press.truth];
 }
 
-void require_sound(std::span<const ScoredPress> presses) {
+void require_presses(std::span<const ScoredPress> presses) {
   if (presses.empty()) {
     throw Error(Fault::input, "calibration: no presses to try the model on; give more presses");
-  }
-  const std::size_t labels = presses.front().log_evidence.size();
-  const auto finite = [](double x) { return std::isfinite(x); };
-  const auto below_infinity = [](double x) { return x < std::numeric_limits<double>::infinity(); };
-  for (std::size_t i = 0; i < presses.size(); ++i) {
-    const ScoredPress& press = presses[i];
-    if (press.log_evidence.size() != labels || press.truth >= labels ||
-        (!press.log_density.empty() && press.log_density.size() != labels) ||
-        !std::ranges::all_of(press.log_evidence, below_infinity) ||
-        !std::isfinite(press.log_evidence[press.truth]) ||
-        !std::ranges::all_of(press.log_density, finite)) {
-      throw Error(Fault::input, fmt::format("calibration: press {}: give it a log evidence for "
-                                            "each of {} labels, a finite one for its own",
-                                            i, labels));
-    }
   }
 }
 
@@ -254,7 +237,7 @@ std::vector<double> label_probabilities(const ScoredPress& press, double tempera
 }
 
 Scores scores_of(std::span<const ScoredPress> presses, double temperature, double feature_weight) {
-  require_sound(presses);
+  require_presses(presses);
   std::vector<JudgedRecord> records;
   for (const ScoredPress& press : presses) {
     const std::vector<double> p = label_probabilities(press, temperature, feature_weight);
@@ -269,12 +252,7 @@ Scores scores_of(std::span<const ScoredPress> presses, double temperature, doubl
 }
 
 TemperatureFit fit_temperature(std::span<const ScoredPress> presses, const GroupHalves& groups) {
-  require_sound(presses);
-  for (const std::vector<ScoredPress>& half : groups) {
-    if (!half.empty()) {
-      require_sound(half);
-    }
-  }
+  require_presses(presses);
   const PressLoss loss(presses);
   TemperatureFit fit =
       loss.has_features() && features_help(presses) ? loss.of_both() : loss.of_evidence();

@@ -29,7 +29,7 @@ std::vector<double> label_probabilities(const ScoredPress& press, double tempera
                                         double feature_weight = 0.0);
 
 /// How right and how honest the probabilities of presses are; see evaluate().
-/// @throws Error as fit_temperature() on presses that are not sound
+/// @throws Error on no press
 Scores scores_of(std::span<const ScoredPress> presses, double temperature,
                  double feature_weight = 0.0);
 
@@ -60,9 +60,9 @@ struct TemperatureFit {
 /// presses of a fold were made at another time than the others, see folds_of().
 ///   The growth has the least log-loss of the groups; it is 0 unless what each half of them
 /// shows helps the other half, both taken together.
-/// @param presses of one touch each
-/// @throws Error on no press, on a press without a log evidence for each of the same labels, finite
-/// for its own, and where no press has two labels to choose from
+/// @param presses of one touch each, with a log evidence for each of the same labels, finite for
+/// their own
+/// @throws Error on no press, and where no press has two labels to choose from
 TemperatureFit fit_temperature(std::span<const ScoredPress> presses,
                                const GroupHalves& groups = {});
 

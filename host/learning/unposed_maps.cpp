@@ -111,7 +111,7 @@ UnposedMaps unposed_maps(std::span<const Touch> presses, const std::string& labe
     if (!home.map) {
       result.misfits.push_back(
           {.press = placeable[p].index,
-           .reason = fused.says_little[p] ? Misfit::Reason::too_little : Misfit::Reason::unlike,
+           .reason = home.says_little ? Misfit::Reason::too_little : Misfit::Reason::unlike,
            .fit = home.fit});
     }
   }

@@ -48,12 +48,9 @@ std::tuple<nb::bytes, Entries, Sentences> settle(const std::vector<std::string>&
     const Request completed = complete(request);
     BatchTask settled{.program = PALPATE_VERSION,
                       .chunk_unknowns = 1,  // chunks are of recordings, whoever makes them
-                      .request = request};
-    for (BatchInput& input : list_inputs(inputs)) {
-      settled.inputs.push_back({std::move(input), {}, {}});
-    }
-    stamp_inputs(settled);
-    survey(settled, completed, threads, call.progress());
+                      .request = request,
+                      .inputs = list_inputs(inputs)};
+    survey_inputs(settled.inputs, completed, threads, call.progress());
     settled.inferred = infer(settled.inputs, completed);
     hash_files(settled, completed);
     const RecognitionTask recognition =
@@ -103,14 +100,12 @@ struct Line {
   double seconds;
 };
 
-struct Chunk {
+/// The entries' lines, and a sentence on what is not resolved, "" where there is none.
+std::pair<std::vector<Line>, std::string> recognise_entries(OpenBatch& batch,
+                                                            const std::vector<std::string>& entries,
+                                                            const Call& call) {
   std::vector<Line> lines;
-  std::string unresolved;  ///< a sentence; "" where there is none
-};
-
-Chunk recognise_entries(OpenBatch& batch, const std::vector<std::string>& entries,
-                        const Call& call) {
-  Chunk chunk;
+  std::string unresolved;
   RecordingReader reader;
   for (const std::string& entry : entries) {
     const ReadInput read = read_entry(reader, batch.task, entry_from(entry), batch.request);
@@ -118,18 +113,18 @@ Chunk recognise_entries(OpenBatch& batch, const std::vector<std::string>& entrie
       const RecognitionRecord record =
           recognise(batch.recogniser, batch.recognition, unknown, batch.request.trace,
                     [&](double) { call.check(); });
-      if (record.error.empty() && chunk.unresolved.empty()) {
-        chunk.unresolved =
+      if (record.error.empty() && unresolved.empty()) {
+        unresolved =
             unresolved_words(batch.recognition, batch.recogniser.lattice(), unknown.touches);
       }
       const auto text = [&](OptionWords words) {
-        return text_of(
+        return palpate::text_of(
             to_json(record, batch.recognition, std::nullopt, batch.request.trace, words));
       };
-      chunk.lines.push_back({text(in_flags), text(in_keywords), record.seconds});
+      lines.push_back({text(in_flags), text(in_keywords), record.seconds});
     }
   }
-  return chunk;
+  return {std::move(lines), std::move(unresolved)};
 }
 
 using Lines = std::vector<std::tuple<nb::bytes, nb::bytes, double>>;
@@ -138,16 +133,17 @@ std::tuple<Lines, std::string> recognise_python(const Owned<OpenBatch>& batch,
                                                 const std::vector<nb::bytes>& entries) {
   std::vector<std::string> texts;
   std::ranges::transform(entries, std::back_inserter(texts), text_in);
-  const Chunk chunk = batch.use([texts = std::move(texts)](OpenBatch& open, Call& call) {
-    return recognise_entries(open, texts, call);
-  });
+  const auto [recognised, unresolved] =
+      batch.use([texts = std::move(texts)](OpenBatch& open, Call& call) {
+        return recognise_entries(open, texts, call);
+      });
   Lines lines;
-  for (const Line& line : chunk.lines) {
+  for (const Line& line : recognised) {
     lines.emplace_back(bytes_of(line.text),
                        bytes_of(line.python_text == line.text ? "" : line.python_text),
                        line.seconds);
   }
-  return {std::move(lines), in_keywords(chunk.unresolved)};
+  return {std::move(lines), in_keywords(unresolved)};
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "palpate/lattice.hpp"
 #include "types.hpp"
 
 namespace palpate::python {
@@ -11,17 +12,19 @@ void bind_touches(nb::module_& module);
 void bind_device(nb::module_& module);
 void bind_map_builder(nb::module_& module);
 void bind_estimate(nb::module_& module);
-void bind_pose_histogram(nb::module_& module);
-void bind_bounded_posterior(nb::module_& module);
-void bind_particle_filter(nb::module_& module);
+void bind_filters(nb::module_& module);
 void bind_simulation(nb::module_& module);
 void bind_sensors(nb::module_& module);
 void bind_request(nb::module_& module);
 void bind_recognition(nb::module_& module);
 void bind_batch(nb::module_& module);
-void bind_plan(nb::module_& module);
 void bind_evaluation(nb::module_& module);
 void bind_calibration(nb::module_& module);
 void bind_import(nb::module_& module);
+
+/// "PoseLattice(x_mm=(-10, 10, 25), ...)"
+std::string text_of(const PoseLattice& lattice);
+/// "x 1.00 mm, y 2.00 mm, theta 0.500 rad"
+std::string text_of(const Pose& pose);
 
 }  // namespace palpate::python

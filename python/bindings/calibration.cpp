@@ -1,4 +1,3 @@
-#include <array>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -12,7 +11,6 @@
 #include "bindings.hpp"
 #include "learning/calibration_task.hpp"
 #include "palpate/files.hpp"
-#include "recognition/recordings.hpp"
 #include "request.hpp"
 
 namespace palpate::python {
@@ -21,32 +19,14 @@ using namespace nb::literals;
 
 namespace {
 
-std::vector<NamedMap> named_maps(Request request) {
+SensorCalibration calibrate(const GivenRecordings& given, PythonRequest request,
+                            const CalibrationRequest& wanted, Call& call) {
+  constexpr double calibrating = 0.5;  // of the time, where touches' poses are fitted
+  const std::vector<Recording> recordings = read_recordings(given);
   if (request.given_maps.empty()) {
     read_maps(request);
   }
-  std::vector<NamedMap> maps;
-  for (const GivenMap& given : request.given_maps) {
-    maps.push_back({given.name, given.hypothesis.map});
-  }
-  return maps;
-}
-
-SensorCalibration calibrate(const GivenRecordings& given, const PythonRequest& request,
-                            CalibrationRequest wanted, Call& call) {
-  constexpr double calibrating = 0.5;  // of the time, where touches' poses are fitted
-  const std::vector<Recording> recordings = given.read();
-  std::vector<std::array<std::size_t, 2>> touches;
-  for (const Recording& recording : recordings) {
-    const auto [begin, end] = selected_touches(recording, request.frames);
-    touches.push_back({begin, end});
-  }
-  wanted.gives_bins =
-      request.bins || request.x_mm || request.y_mm || request.theta_deg || request.pivot_mm;
-  if (!infers_region(request)) {
-    wanted.bins = {given_lattice(request), has_auto_pivot(request)};
-  }
-  const CalibrationTask task = calibration_task(wanted, recordings, touches, named_maps(request));
+  const CalibrationTask task = calibration_task(wanted, request, recordings, request.given_maps);
   const auto report = call.progress();
   const double share = task.known_poses() ? calibrating : 1.0;
   SensorCalibration calibration = calibrate_sensor(

@@ -7,9 +7,7 @@
 #include <nanobind/stl/vector.h>
 
 #include "bindings.hpp"
-#include "model.hpp"
 #include "palpate/error.hpp"
-#include "plots.hpp"
 
 namespace palpate::python {
 
@@ -167,14 +165,6 @@ std::vector<Hypothesis> hypotheses_of(nb::handle maps) {
     hypotheses.push_back(*hypothesis);
   }
   return hypotheses;
-}
-
-std::string name_of(const std::vector<Hypothesis>& hypotheses, const Session& session) {
-  std::vector<std::string> labels;
-  for (const Hypothesis& hypothesis : hypotheses) {
-    labels.push_back(hypothesis.map.label);
-  }
-  return fmt::format("{} on '{}'", fmt::join(labels, ", "), session.name());
 }
 
 void bind_estimate(nb::module_& module) {

@@ -1,12 +1,12 @@
-#include "model.hpp"
-
 #include <fmt/format.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
+#include "arrays.hpp"
 #include "bindings.hpp"
 #include "palpate/contact_model.hpp"
+#include "palpate/displacement.hpp"
 #include "palpate/pose.hpp"
 #include "palpate/sensor_model.hpp"
 

@@ -44,15 +44,12 @@ NB_MODULE(_palpate, module) {
   bind_device(module);
   bind_map_builder(module);
   bind_estimate(module);
-  bind_pose_histogram(module);
-  bind_bounded_posterior(module);
-  bind_particle_filter(module);
+  bind_filters(module);
   bind_simulation(module);
   bind_sensors(module);
   bind_request(module);
   bind_recognition(module);
   bind_batch(module);
-  bind_plan(module);
   bind_evaluation(module);
   bind_calibration(module);
   bind_import(module);

@@ -1,11 +1,23 @@
+// `palpate recognize`, also with --fit-touch-sd, and `palpate plan`.
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <nanobind/stl/string_view.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 #include <nlohmann/json.hpp>
 
 #include "bindings.hpp"
+#include "estimate.hpp"
+#include "model/option_words.hpp"
 #include "recognition/record_json.hpp"
 #include "recognition/recordings.hpp"
 #include "recognition/resolve.hpp"
+#include "recognition/touch_plan.hpp"
+#include "recognition/touch_sd_fit.hpp"
 #include "request.hpp"
 
 namespace palpate::python {
@@ -81,7 +93,8 @@ Answer recognize(const Subject& subject, Device& device, Call& call) {
   return answer;
 }
 
-using Records = nb::typed<nb::list, nb::typed<nb::dict, nb::str, nb::any>>;
+using Fields = nb::typed<nb::dict, nb::str, nb::any>;
+using Records = nb::typed<nb::list, Fields>;
 
 std::tuple<Records, Sentences> recognize_python(nb::handle recordings, const PythonRequest& request,
                                                 const Progress& progress) {
@@ -89,11 +102,136 @@ std::tuple<Records, Sentences> recognize_python(nb::handle recordings, const Pyt
   return {nb::borrow<Records>(to_python(answer.records)), in_python(answer.sentences)};
 }
 
+/// A plan, with what is believed as JSON.
+struct Planned {
+  Plan plan;
+  std::string believed;
+  std::string device;
+  Sentences told;
+};
+
+Planned plan_next(const Subject& subject, const PlanRequest& wanted, Device& device, Call& call) {
+  Planned planned{.device = device.name()};
+  const Unknown& unknown = subject.unknowns.front();
+  const RecognitionTask task =
+      resolve(subject.request, {.pressure_unit = subject.recordings.front().pressure_unit,
+                                .source = unknown.recording,
+                                .reach_mm = largest_reach_mm(unknown.touches),
+                                .need = {.why = plan_needs},
+                                .cancel_point = [&call] { call.check(); },
+                                .device = [&]() -> Device& { return device; }});
+  require_histogram(task);
+  Recogniser recogniser = open_recogniser(device, task);
+  planned.told = task.remarks;
+  planned.plan = plan_touch(recogniser, task, unknown, wanted, call.progress());
+  if (const std::string words = unresolved_words(task, recogniser.lattice(), unknown.touches);
+      !words.empty()) {
+    planned.told.push_back(words);
+  }
+  planned.believed = palpate::text_of(to_json(planned.plan.record.last(), task, in_keywords));
+  return planned;
+}
+
+std::tuple<Fields, Sentences> plan_python(nb::handle recordings, const PythonRequest& request,
+                                          const std::string& goal, nb::handle candidates,
+                                          std::size_t samples, std::uint64_t seed,
+                                          const Progress& progress) {
+  std::string source = candidate_grid_word;  // where `poses` are given
+  std::vector<Pose> poses;                   // T_robot_sensor
+  if (is_path(candidates.ptr())) {
+    source = nb::borrow<PathLike>(candidates).text();
+  } else {
+    poses = poses_of(candidates, "candidates");
+    require_reachable("candidates", poses);
+  }
+  auto [wanted, sentences] = run([=](Call&) {
+    Sentences told;
+    PlanRequest read = plan_request(goal, source, samples, seed,
+                                    [&](const std::string& sentence) { told.push_back(sentence); });
+    return std::pair(std::move(read), std::move(told));
+  });
+  if (!poses.empty()) {
+    wanted.candidates = poses;
+  }
+  const Planned planned = run_on_subject(
+      recordings, request, progress,
+      [wanted = std::move(wanted)](const Subject& subject, Device& device, Call& call) {
+        return plan_next(subject, wanted, device, call);
+      });
+  sentences.insert(sentences.end(), planned.told.begin(), planned.told.end());
+  const Plan& plan = planned.plan;
+  TouchGains gains;
+  std::vector<std::uint64_t> index;
+  poses.clear();
+  for (const PlannedTouch& touch : plan.ranked) {
+    gains.each.push_back(touch.gain);
+    index.push_back(touch.index);
+    poses.push_back(touch.T_robot_sensor);
+  }
+  Fields result;
+  result["recording"] = plan.record.recording;
+  result["touches"] = plan.record.touches;
+  result["goal"] = goal_word(plan.goal);
+  result["believed"] = nb::bytes(planned.believed.data(), planned.believed.size());
+  result["identity_nats"] = plan.identity_nats;
+  result["pose_nats"] = plan.both_nats - plan.identity_nats;
+  result["index"] = owned(std::move(index));
+  result["T_robot_sensor"] = to_array(poses);
+  result["gains"] = nb::cast(std::move(gains));
+  result["warnings"] = in_python(warnings_of(plan));
+  result["samples"] = plan.samples.size();
+  result["seed"] = plan.seed;
+  result["seconds"] = plan.seconds;
+  result["device"] = planned.device;
+  return {result, in_python(std::move(sentences))};
+}
+
+using Fitted = std::tuple<TouchSdFit, Sentences>;
+
+Fitted fit_recordings(const Subject& subject, Device& device, Call& call) {
+  const RecognitionTask task = task_of(subject, device, call, {"fit-touch-sd", touch_sd_fit_needs});
+  require_fittable(task);
+  TouchSdFit fit =
+      fit_touch_sd(device, task, touched_objects(subject.recordings, subject.unknowns, task), {},
+                   call.progress());
+  return {std::move(fit), in_python(task.remarks)};
+}
+
+void bind_touch_sd_fit(nb::module_& module) {
+  nb::class_<TouchSdFit>(module, "TouchSdFit",
+                         "Standard deviations of the touches' poses about the poses that the robot "
+                         "reported.")
+      .def_ro("sd", &TouchSdFit::sd,
+              "For PoseHistogram(touch_sd=...); 0: not distinguishable from 0, given the maps.")
+      .def_ro("standard_error", &TouchSdFit::standard_error, "Of sd; 0 where sd is 0.")
+      .def_ro("resolution", &TouchSdFit::resolution, "Below about this, sd cannot be told from 0.")
+      .def_ro("evidence_gain", &TouchSdFit::evidence_gain,
+              "By how much the log evidence exceeds that of exact poses, nats.")
+      .def_ro("unknowns", &TouchSdFit::unknowns, "How many recordings were used.")
+      .def_ro("touches", &TouchSdFit::touches, "How many touches were used.")
+      .def_ro("warnings", &TouchSdFit::warnings, "Why the result may be far off, in sentences.")
+      .def("__repr__", [](const TouchSdFit& self) {
+        return fmt::format("TouchSdFit({:.3g} +- {:.2g} mm, {:.3g} +- {:.2g} rad)", self.sd.mm,
+                           self.standard_error.mm, self.sd.rad, self.standard_error.rad);
+      });
+}
+
 }  // namespace
 
 void bind_recognition(nb::module_& module) {
   module.def("recognize", &recognize_python, "recordings"_a, "request"_a, "progress"_a = nb::none(),
              "Records as in the JSON of `palpate recognize`, and what is worth a warning.");
+  module.def("plan", &plan_python, "recordings"_a, "request"_a, "goal"_a, "candidates"_a,
+             "samples"_a, "seed"_a, "progress"_a = nb::none(),
+             "The fields of a plan, and what is worth a warning.");
+  bind_touch_sd_fit(module);
+  module.def(
+      "fit_touch_sd",
+      [](nb::handle recordings, const PythonRequest& request, const Progress& progress) {
+        return run_on_subject(recordings, request, progress, &fit_recordings);
+      },
+      "recordings"_a, "request"_a, "progress"_a = nb::none(),
+      "The fit, and what is worth a warning.");
 }
 
 }  // namespace palpate::python

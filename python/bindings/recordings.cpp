@@ -3,7 +3,6 @@
 
 #include "bindings.hpp"
 #include "call.hpp"
-#include "model.hpp"
 #include "palpate/files.hpp"
 #include "touches.hpp"
 

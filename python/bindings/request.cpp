@@ -164,13 +164,19 @@ void read_maps(Request& request) {
   }
 }
 
-std::vector<Recording> GivenRecordings::read() const {
+std::vector<Recording> read_recordings(const GivenRecordings& given) {
+  std::vector<std::string> files;
+  for (const auto& item : given) {
+    if (const auto* file = std::get_if<std::string>(&item)) {
+      files.push_back(*file);
+    }
+  }
   std::vector<Recording> read_files = read_touch_recordings(files);
   std::vector<Recording> all;
   auto file = read_files.begin();
-  for (std::size_t i = 0; i < size; ++i) {
-    const auto given = in_memory.find(i);
-    all.push_back(given == in_memory.end() ? std::move(*file++) : given->second);
+  for (const auto& item : given) {
+    const auto* recording = std::get_if<Recording>(&item);
+    all.push_back(recording == nullptr ? std::move(*file++) : *recording);
     require_touches(all.back(), all.front());
   }
   return all;
@@ -183,22 +189,21 @@ GivenRecordings given_recordings(nb::handle given) {
     if (nb::try_cast(item, recording) && recording != nullptr) {
       Recording copy = recording->copied();
       if (copy.path.empty()) {
-        copy.path = fmt::format("recordings[{}]", recordings.size);
+        copy.path = fmt::format("recordings[{}]", recordings.size());
       }
-      recordings.in_memory.emplace(recordings.size, std::move(copy));
+      recordings.emplace_back(std::move(copy));
     } else {
-      recordings.files.push_back(nb::borrow<PathLike>(item).text());
+      recordings.emplace_back(nb::borrow<PathLike>(item).text());
     }
-    ++recordings.size;
   }
-  if (recordings.size == 0) {
+  if (recordings.empty()) {
     throw Error(Fault::input, "recordings: none; give a Recording or a file");
   }
   return recordings;
 }
 
 Subject subject_of(const GivenRecordings& recordings, const Request& given) {
-  Subject subject{complete(given), recordings.read(), {}};
+  Subject subject{complete(given), read_recordings(recordings), {}};
   for (Recording& recording : subject.recordings) {
     replace_array(subject.request, recording.path, recording.elements(), recording.elements_mm);
   }

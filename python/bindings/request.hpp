@@ -1,10 +1,10 @@
 #pragma once
 
 #include <cstddef>
-#include <map>
 #include <memory>
 #include <string>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "recognition/recognition_record.hpp"
@@ -30,16 +30,10 @@ void add_maps(nb::handle given, Request& request);
 /// Reads the maps in the request's files, after those in memory.
 void read_maps(Request& request);
 
-/// Recordings as a call from Python gives them: files, or recordings in memory by their place among
-/// all.
-struct GivenRecordings {
-  std::vector<std::string> files;
-  std::map<std::size_t, Recording> in_memory;
-  std::size_t size = 0;
-
-  /// Throws Error as read_touch_recordings() does.
-  std::vector<Recording> read() const;
-};
+/// Recordings as a call from Python gives them: files, or recordings in memory.
+using GivenRecordings = std::vector<std::variant<std::string, Recording>>;
+/// Throws Error as read_touch_recordings() does.
+std::vector<Recording> read_recordings(const GivenRecordings& given);
 /// Takes a Recording, a file, or an iterable of them. Throws Error where there are none.
 GivenRecordings given_recordings(nb::handle given);
 

@@ -7,7 +7,36 @@
 #include <nanobind/nanobind.h>
 
 #include "gil.hpp"
-#include "text.hpp"
+
+namespace nanobind::detail {
+
+/// Text as UTF-8, in the place of nanobind's own caster, which refuses all else. Names of files
+/// need not be UTF-8: in Python, a byte that is none is a lone surrogate, as in os.fsdecode().
+template <>
+struct type_caster<std::string> {
+  NB_TYPE_CASTER(std::string, const_name("str"))
+
+  bool from_python(handle source, std::uint8_t /*flags*/, cleanup_list* /*cleanup*/) noexcept {
+    if (!PyUnicode_Check(source.ptr())) {
+      return false;
+    }
+    const object bytes = steal(PyUnicode_AsEncodedString(source.ptr(), "utf-8", "surrogateescape"));
+    if (!bytes.is_valid()) {
+      PyErr_Clear();
+      return false;
+    }
+    value.assign(PyBytes_AS_STRING(bytes.ptr()),
+                 static_cast<std::size_t>(PyBytes_GET_SIZE(bytes.ptr())));
+    return true;
+  }
+  static handle from_cpp(const std::string& text, rv_policy /*policy*/,
+                         cleanup_list* /*cleanup*/) noexcept {
+    return PyUnicode_DecodeUTF8(text.data(), static_cast<Py_ssize_t>(text.size()),
+                                "surrogateescape");
+  }
+};
+
+}  // namespace nanobind::detail
 
 namespace palpate::python {
 
@@ -20,6 +49,16 @@ nb::object call(const char* module, const char* function, Arguments&&... argumen
     return nb::module_::import_(module).attr(function)(std::forward<Arguments>(arguments)...);
   });
 }
+
+// The methods `plot` and `_repr_png_`, which palpate.plots implements in Python.
+
+inline nb::object plot_method(nb::handle self, nb::handle ax) {
+  return call("palpate.plots", "plot", self, ax);
+}
+inline nb::object png_method(nb::handle self) { return call("palpate.plots", "png", self); }
+inline const nb::sig plot_signature(
+    "def plot(self, ax: matplotlib.axes.Axes | None = None) -> matplotlib.axes.Axes");
+inline const nb::sig png_signature("def _repr_png_(self) -> bytes | None");
 
 inline bool any_object(PyObject* object) { return object != nullptr; }
 inline bool is_path(PyObject* object) {

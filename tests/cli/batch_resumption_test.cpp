@@ -11,7 +11,6 @@
 
 #include "batch_folder.hpp"
 #include "cli/batch/results_folder.hpp"
-#include "cli/batch/slurm.hpp"
 
 namespace palpate::batch_resumption_test {
 

@@ -1,4 +1,4 @@
-#include "learning/point_spread.hpp"
+#include "learning/contact_learning.hpp"
 
 #include <vector>
 

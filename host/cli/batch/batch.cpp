@@ -4,6 +4,7 @@
 #include <chrono>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
@@ -15,7 +16,6 @@
 
 #include "cli/batch/batch_run.hpp"
 #include "cli/batch/results_folder.hpp"
-#include "cli/batch/slurm.hpp"
 #include "cli/commands.hpp"
 #include "cli/options.hpp"
 #include "cli/progress.hpp"
@@ -54,48 +54,10 @@ void keep_surveys(const BatchTask& before, BatchTask& now) {
   }
 }
 
-class Settling {
- public:
-  Settling(const ResultsFolder& folder, const FolderLock& lock) : folder_(folder), lock_(lock) {
-    lock_.begin_settling();
-    folder_.make();
-    if (lock_.is_alone()) {
-      folder_.remove_parts();
-    }
-  }
-  ~Settling() { lock_.end_settling(); }
-  Settling(const Settling&) = delete;
-  Settling& operator=(const Settling&) = delete;
-
-  /// Refuses what differs from the task that the folder has, unless it may be updated.
-  void require_equal(const std::string& difference, bool update, const char* remedy) const {
-    if (difference.empty()) {
-      return;
-    }
-    if (!update) {
-      refuse(folder_.path(), "{}; {}", difference, remedy);
-    }
-    if (!lock_.is_alone()) {
-      refuse(folder_.path(), "{}, but other shards are at work; wait until they have ended",
-             difference);
-    }
-  }
-
- private:
-  const ResultsFolder& folder_;
-  const FolderLock& lock_;
-};
-
-constexpr const char* recognise_all =
-    "undo that, give another folder, or recognise all again with --update";
-constexpr const char* recognise_changed =
-    "undo that, give another folder, or recognise what has changed with --update";
-
 /// Settles once for all shards what a results folder computes: by the task file that is there or,
 /// where there is none, by writing it. Everything that follows from all inputs together, or from
 /// the device at hand, is settled here, so that no chunk depends on who computes it.
-/// @param now what is asked for: program, chunk_unknowns, each_frame, flags, and inputs without
-/// stamps
+/// @param now what is asked for: program, chunk_unknowns, request and stamped inputs
 /// @param request completed
 /// @param open opens the device, where the bins follow from its memory
 /// @param update whether results of another task may be dropped, as far as they differ
@@ -103,32 +65,46 @@ constexpr const char* recognise_changed =
 SettledBatch settle_batch(const ResultsFolder& folder, const FolderLock& lock, BatchTask now,
                           const Request& request, const std::function<Device()>& open, bool update,
                           std::size_t threads) {
-  const Settling settling(folder, lock);
+  const std::lock_guard settling(lock);
+  folder.make();
+  if (lock.is_alone()) {
+    folder.remove_parts();
+  }
+  const auto require_equal = [&](const std::string& difference, const char* recognise) {
+    if (!difference.empty() && !update) {
+      refuse(folder.path(), "{}; undo that, give another folder, or recognise {} with --update",
+             difference, recognise);
+    }
+    if (!difference.empty() && !lock.is_alone()) {
+      refuse(folder.path(), "{}, but other shards are at work; wait until they have ended",
+             difference);
+    }
+  };
+  constexpr const char* all = "all again";
   std::optional<BatchTask> before;
   if (folder.has_task()) {
     before = read_batch_task(folder.task());
-    settling.require_equal(
+    require_equal(
         difference_of_tasks(
             {.program = before->program,
              .chunk_unknowns = before->chunk_unknowns,
              .request = before->request},
             {.program = now.program, .chunk_unknowns = now.chunk_unknowns, .request = now.request}),
-        update, recognise_all);
+        all);
   }
-  stamp_inputs(now);
   if (before) {
-    settling.require_equal(difference_of_inputs(*before, now), update, recognise_changed);
+    require_equal(difference_of_inputs(*before, now), "what has changed");
     keep_surveys(*before, now);
   }
   {
     Progress progress("looking through the recordings");
-    survey(now, request, threads, [&](double done) { progress.show(done); });
+    survey_inputs(now.inputs, request, threads, [&](double done) { progress.show(done); });
   }
   const bool same_inputs = before && before->inputs == now.inputs;
   now.inferred = same_inputs ? before->inferred : infer(now.inputs, request);
   hash_files(now, request);
   const std::string difference = before ? difference_of_tasks(*before, now) : "";
-  settling.require_equal(difference, update, recognise_all);
+  require_equal(difference, all);
   const bool same_task = before && difference.empty();
   if (same_task) {
     now.bins = before->bins;
@@ -210,7 +186,7 @@ double seconds_since(std::chrono::steady_clock::time_point begin) {
 }
 
 /// Recognises what is missing of the shard. Returns the counts of this run.
-BatchCounts compute(const BatchRun& run, const Chunks& chunks, SettledBatch& settled,
+BatchCounts compute(const BatchRun& run, SettledBatch& settled,
                     const std::function<Device()>& open) {
   if (!settled.device && uses_device(settled.recognition)) {
     settled.device = open();
@@ -221,7 +197,7 @@ BatchCounts compute(const BatchRun& run, const Chunks& chunks, SettledBatch& set
       run, settled.device ? &*settled.device : nullptr, [&](const BatchCounts& counts) {
         const double seconds = seconds_since(begin);
         progress.show(
-            static_cast<double>(counts.done) / static_cast<double>(chunks.to_be_done),
+            static_cast<double>(counts.done) / static_cast<double>(run.to_be_done),
             fmt::format(", {:.0f} per second{}", static_cast<double>(counts.done) / seconds,
                         counts.failed > 0 ? fmt::format(", {} failed", counts.failed) : ""));
       });
@@ -261,10 +237,8 @@ int batch(const BatchArguments& options) {
   const Request request = complete(options.request);
   BatchTask asked{.program = PALPATE_VERSION,
                   .chunk_unknowns = static_cast<std::size_t>(options.chunk),
-                  .request = options.request};
-  for (BatchInput& input : list_inputs(options.inputs)) {
-    asked.inputs.push_back({std::move(input), {}, {}});
-  }
+                  .request = options.request,
+                  .inputs = list_inputs(options.inputs)};
   const ResultsFolder folder(options.results);
   folder.require_own();
   if (folder.has_task()) {
@@ -286,9 +260,10 @@ int batch(const BatchArguments& options) {
                    .recognition = settled.recognition,
                    .request = request,
                    .wanted = chunks.wanted,
+                   .to_be_done = chunks.to_be_done,
                    .threads = threads,
                    .verbose = options.verbose},
-                  chunks, settled, open);
+                  settled, open);
   }
   fmt::print("{}", summary(options, shard, chunks, now, seconds_since(begin)));
   return chunks.finished.failed + now.failed > 0 ? some_failed : 0;

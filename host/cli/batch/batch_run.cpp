@@ -110,7 +110,7 @@ struct Job {
 };
 
 /// A record as text.
-struct Line {
+struct RecordLine {
   std::size_t index;
   std::string text;
   double seconds;
@@ -170,7 +170,7 @@ class Pipeline {
       first_.push_back(at);
       at += run.task.unknowns_of(entry);
     }
-    recognisers_ = std::min(most_at_once(task_, run.threads), wanted_unknowns());
+    recognisers_ = std::min(most_at_once(task_, run.threads), run.to_be_done);
     take_threads(task_, run.threads / recognisers_);
   }
 
@@ -201,22 +201,12 @@ class Pipeline {
  private:
   std::size_t chunk_of(std::size_t unknown) const { return unknown / run_.task.chunk_unknowns; }
 
-  std::size_t wanted_unknowns() const {
-    std::size_t count = 0;
-    for (std::size_t chunk = 0; chunk < run_.wanted.size(); ++chunk) {
-      const std::size_t first = chunk * run_.task.chunk_unknowns;
-      count += run_.wanted[chunk] ? std::min(run_.task.chunk_unknowns, unknowns_ - first) : 0;
-    }
-    return count;
-  }
-
   /// Remembers the exception at hand, if it is the first one, and ends all threads.
   void fail() {
     {
       const std::lock_guard lock(mutex_);
       failure_ = failure_ ? failure_ : std::current_exception();
     }
-    failed_ = true;
     jobs_.close();
     lines_.close();
   }
@@ -247,23 +237,26 @@ class Pipeline {
   }
 
   void read(RecordingReader& reader) {
-    for (std::size_t i = next_input_++; i < first_.size() && !failed_; i = next_input_++) {
-      if (is_wanted(i)) {
-        push_unknowns(i, read_entry(reader, run_.task, run_.task.inputs[i], run_.request));
+    for (std::size_t i = next_input_++; i < first_.size(); i = next_input_++) {
+      if (is_wanted(i) &&
+          !push_unknowns(i, read_entry(reader, run_.task, run_.task.inputs[i], run_.request))) {
+        return;
       }
     }
   }
 
-  void push_unknowns(std::size_t input, ReadInput read) {
+  /// False where the queue is closed.
+  bool push_unknowns(std::size_t input, ReadInput read) {
     for (std::size_t i = 0; i < read.unknowns.size(); ++i) {
       const std::size_t index = first_[input] + i;
       if (run_.wanted[chunk_of(index)]) {
         const std::size_t bytes = bytes_of(read.unknowns[i]);
         if (!jobs_.push({index, read.recording, std::move(read.unknowns[i])}, bytes)) {
-          return;
+          return false;
         }
       }
     }
+    return true;
   }
 
   void recognise_jobs(bool first) {
@@ -277,8 +270,8 @@ class Pipeline {
       if (record.error.empty()) {
         tell_once(unresolved_words(task_, recogniser.lattice(), job->unknown.touches));
       }
-      Line line{job->index, text_of(to_json(record, task_, std::nullopt, run_.request.trace)),
-                record.seconds, !record.error.empty()};
+      RecordLine line{job->index, text_of(to_json(record, task_, std::nullopt, run_.request.trace)),
+                      record.seconds, !record.error.empty()};
       const std::size_t bytes = line.text.size();
       if (!lines_.push(std::move(line), bytes)) {
         return;
@@ -294,14 +287,14 @@ class Pipeline {
 
   void write(const std::function<void(const BatchCounts&)>& progress) {
     while (!lines_.ended()) {
-      if (std::optional<Line> line = lines_.pop_within(pause)) {
+      if (std::optional<RecordLine> line = lines_.pop_within(pause)) {
         add(*std::move(line));
       }
       progress(counts_);
     }
   }
 
-  void add(Line line) {
+  void add(RecordLine line) {
     const std::size_t chunk = chunk_of(line.index);
     const std::size_t first = chunk * run_.task.chunk_unknowns;
     OpenChunk& open = open_[chunk];
@@ -345,11 +338,10 @@ class Pipeline {
   std::vector<std::size_t> first_;  ///< [input] index of its first unknown
   std::size_t recognisers_ = 1;
   BoundedQueue<Job> jobs_;
-  BoundedQueue<Line> lines_;
+  BoundedQueue<RecordLine> lines_;
   std::atomic<std::size_t> next_input_ = 0;
   std::atomic<std::size_t> readers_left_ = 0;
   std::atomic<std::size_t> recognisers_left_ = 0;
-  std::atomic<bool> failed_ = false;
   std::atomic<bool> told_ = false;
   std::mutex mutex_;
   std::exception_ptr failure_;  ///< the first one

@@ -25,6 +25,7 @@ struct BatchRun {
   const RecognitionTask& recognition;  ///< settled
   const Request& request;
   const std::vector<bool>& wanted;  ///< [chunk]
+  std::size_t to_be_done = 0;       ///< unknowns of these chunks
   std::size_t threads = 1;
   bool verbose = false;
 };

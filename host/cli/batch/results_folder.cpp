@@ -133,8 +133,6 @@ void ResultsFolder::remove_parts() const {
   }
 }
 
-bool is_results_folder(const fs::path& folder) { return ResultsFolder(folder).has_task(); }
-
 Chunk read_chunk(const fs::path& file, std::size_t unknowns) {
   using Json = nlohmann::json;
   std::ifstream stream(file, std::ios::binary);
@@ -258,7 +256,7 @@ std::optional<Shard> FolderLock::take() const {
   return {};
 }
 
-void FolderLock::begin_settling() const {
+void FolderLock::lock() const {
   struct flock lock = lock_of(F_WRLCK, settling, 1);
   while (::fcntl(descriptor_.get(), F_SETLKW, &lock) != 0) {
     if (errno != EINTR) {
@@ -267,7 +265,7 @@ void FolderLock::begin_settling() const {
   }
 }
 
-void FolderLock::end_settling() const {
+void FolderLock::unlock() const {
   struct flock lock = lock_of(F_UNLCK, settling, 1);
   ::fcntl(descriptor_.get(), F_SETLK, &lock);
 }

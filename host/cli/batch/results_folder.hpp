@@ -52,9 +52,6 @@ class ResultsFolder {
   std::filesystem::path folder_;
 };
 
-/// Whether an argument is a results folder.
-bool is_results_folder(const std::filesystem::path& folder);
-
 /// The records of a chunk file.
 struct Chunk {
   std::string text;        ///< a record a line
@@ -78,9 +75,9 @@ class FolderLock {
              const std::function<bool()>& wait = wait_for_a_second());
 
   /// Waits until no other process settles the folder's task, and keeps others waiting.
-  void begin_settling() const;
-  void end_settling() const;
-  /// Whether no other process works on the folder; only between begin_ and end_settling().
+  void lock() const;
+  void unlock() const;
+  /// Whether no other process works on the folder; only between lock() and unlock().
   bool is_alone() const;
 
  private:

@@ -1,10 +1,11 @@
 #include "cli/batch/shard.hpp"
 
+#include <algorithm>
 #include <charconv>
-#include <optional>
+#include <cstdlib>
 #include <string_view>
+#include <vector>
 
-#include "cli/batch/slurm.hpp"
 #include "cli/options.hpp"
 
 namespace palpate::cli {
@@ -40,6 +41,18 @@ Shard shard_of_array() {
 
 }  // namespace
 
+std::optional<std::size_t> slurm_number(const char* variable) {
+  const char* const text = std::getenv(variable);
+  if (text == nullptr || *text == '\0') {
+    return {};
+  }
+  const auto number = count_in(text);
+  if (!number) {
+    refuse_flag(variable, text, "is no whole number; unset it, or give --shard I/N");
+  }
+  return number;
+}
+
 Shard shard_of(const std::string& flag) {
   if (!flag.empty()) {
     const std::string_view text = flag;
@@ -62,6 +75,23 @@ Shard shard_of(const std::string& flag) {
                 most_shards);
   }
   return {array.index * tasks + task, array.count * tasks};
+}
+
+std::string local_device(std::span<const DeviceInfo> devices, const std::string& wished,
+                         std::size_t rank) {
+  const auto chosen = std::ranges::find_if(devices, &DeviceInfo::chosen);
+  const bool index =
+      !wished.empty() && std::ranges::all_of(wished, [](char c) { return c >= '0' && c <= '9'; });
+  if (chosen == devices.end() || index) {
+    return wished;
+  }
+  std::vector<int> alike;
+  for (const DeviceInfo& device : devices) {
+    if (device.usable && device.name == chosen->name) {
+      alike.push_back(device.index);
+    }
+  }
+  return alike.size() > 1 ? std::to_string(alike[rank % alike.size()]) : wished;
 }
 
 }  // namespace palpate::cli

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "recognition/batch/input_reading.hpp"
 #include "recognition/refused_option.hpp"
 #include "recognition/resolve.hpp"
 
@@ -13,19 +12,6 @@ void refuse_budget(const Request& request) {
     refuse_option("budget-ms", *request.budget_ms,
                   "its results depend on the clock, and a batch's are the same on every run; leave "
                   "it out, or use palpate recognize");
-  }
-}
-
-void stamp_inputs(BatchTask& task) {
-  for (BatchEntry& entry : task.inputs) {
-    entry.stamp = stamp_of(entry.input.path);
-  }
-}
-
-void survey(BatchTask& task, const Request& request, std::size_t threads,
-            const std::function<void(double)>& progress) {
-  if (request.each_frame || infers_region(request)) {
-    survey_inputs(task.inputs, request, threads, progress);
   }
 }
 

@@ -16,13 +16,6 @@ namespace palpate {
 /// Refuses budget_ms, whose results depend on the clock. @throws Error
 void refuse_budget(const Request& request);
 
-/// Stamps the inputs.
-void stamp_inputs(BatchTask& task);
-
-/// Reads the inputs that lack a survey, where the task needs surveys; see survey_inputs().
-void survey(BatchTask& task, const Request& request, std::size_t threads,
-            const std::function<void(double)>& progress);
-
 /// Puts the hashes of the files that the recognition depends on into the task. @throws Error
 void hash_files(BatchTask& task, const Request& request);
 

@@ -167,18 +167,11 @@ std::string value_of(const std::map<std::string, std::string>& texts, const std:
 /// The first key at which two maps differ; none where they are equal.
 template <typename Map>
 std::optional<std::string> first_difference(const Map& a, const Map& b) {
-  for (const auto& [key, value] : a) {
-    const auto found = b.find(key);
-    if (found == b.end() || found->second != value) {
-      return key;
-    }
+  const auto [of_a, of_b] = std::ranges::mismatch(a, b);
+  if (of_a == a.end()) {
+    return of_b == b.end() ? std::nullopt : std::optional(of_b->first);
   }
-  for (const auto& [key, value] : b) {
-    if (!a.contains(key)) {
-      return key;
-    }
-  }
-  return {};
+  return of_b == b.end() ? of_a->first : std::min(of_a->first, of_b->first);
 }
 
 /// An input within a chunk, and where the chunk begins in it.

@@ -12,9 +12,18 @@
 #include <string_view>
 #include <vector>
 
-#include "recognition/batch/batch_inputs.hpp"
+#include "recognition/request.hpp"
 
 namespace palpate {
+
+/// A recording of a batch, as its manifest or the caller names it.
+struct BatchInput {
+  std::string path;
+  std::optional<Frames> frames;  ///< of the manifest; none: as the request says
+  std::string label;             ///< of the manifest: the true label; "": the recording's own
+
+  friend bool operator==(const BatchInput&, const BatchInput&) = default;
+};
 
 /// Size and time of modification, by which a changed file is noticed.
 struct FileStamp {

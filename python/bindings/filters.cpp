@@ -1,0 +1,375 @@
+#include <algorithm>
+#include <iterator>
+#include <memory>
+#include <string>
+#include <type_traits>
+#include <utility>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/shared_ptr.h>
+#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
+
+#include "bindings.hpp"
+#include "estimate.hpp"
+#include "palpate/bounded_posterior.hpp"
+#include "palpate/particle_filter.hpp"
+#include "palpate/pose_histogram.hpp"
+#include "session.hpp"
+#include "touches.hpp"
+
+namespace palpate::python {
+
+using namespace nb::literals;
+
+namespace {
+
+/// A filter over object and pose.
+template <typename Filter>
+struct Named : Owned<Filter> {
+  std::string name;  ///< "A, E, I on 'llvmpipe'"
+};
+
+std::string name_of(const std::vector<Hypothesis>& hypotheses, const Session& session) {
+  std::vector<std::string> labels;
+  for (const Hypothesis& hypothesis : hypotheses) {
+    labels.push_back(hypothesis.map.label);
+  }
+  return fmt::format("{} on '{}'", fmt::join(labels, ", "), session.name());
+}
+
+template <typename Filter, typename Options>
+Named<Filter> make_filter(const std::shared_ptr<Session>& session, nb::handle maps,
+                          const Options& options) {
+  const std::vector<Hypothesis> hypotheses = hypotheses_of(maps);
+  auto filter = make_owned<Filter>(session, [hypotheses, options](Device& device) {
+    if constexpr (std::is_constructible_v<Filter, Device&, decltype(hypotheses), Options>) {
+      return Filter(device, hypotheses, options);
+    } else {
+      return Filter(hypotheses, options);
+    }
+  });
+  return {std::move(filter), name_of(hypotheses, *session)};
+}
+
+template <typename Filter>
+void update(const Named<Filter>& self, const TouchesLike& touches, const Progress& progress) {
+  TouchViews views = views_of(touches);
+  self.use(std::move(views.kept), progress,
+           [all = std::move(views.touches)](Filter& filter, Call& call) {
+             filter.update(all, call.progress());
+           });
+}
+
+/// The refined pose near a mode, by default that of estimate().
+template <typename Filter>
+RefinedPose refine(const Named<Filter>& self, const std::optional<Mode>& mode) {
+  return self.use([mode](Filter& belief, Call&) {
+    return belief.refine(mode ? *mode : belief.estimate().mode);
+  });
+}
+
+using Histogram = Named<PoseHistogram>;
+
+DisplacementSd sd_of(const DisplacementSdLike& sd, const char* name) {
+  return value_of<DisplacementSd>(
+      sd, fmt::format("{}: give a DisplacementSd or (mm, rad), such as (0.5, 0.02)", name));
+}
+
+/// The bins of one object, [ntheta, ny, nx].
+Result<double, 3> log_likelihood(const Histogram& self, int object) {
+  auto bins =
+      self.use([object](PoseHistogram& belief, Call&) { return belief.log_likelihood(object); });
+  return owned(std::move(bins), self.constant().lattice());
+}
+
+/// A number of every candidate, [n].
+template <typename Number>
+auto of_each(Number number) {
+  return [number](const TouchGains& gains) {
+    std::vector<double> numbers;
+    std::ranges::transform(gains.each, std::back_inserter(numbers), number);
+    return owned(std::move(numbers));
+  };
+}
+
+TouchGains expected_gain(const Histogram& self, const ArrayLike& T_robot_sensor,
+                         const ArrayLike& elements_mm, std::size_t samples, std::uint64_t seed) {
+  return {self.use([poses = poses_of(T_robot_sensor, "T_robot_sensor"),
+                    elements = points_of(elements_mm, "elements_mm"), samples,
+                    seed](PoseHistogram& belief, Call&) {
+    return belief.expected_gain(poses, elements, {.samples = samples, .seed = seed});
+  })};
+}
+
+void bind_gains(nb::module_& module) {
+  nb::class_<TouchGains>(
+      module, "TouchGains",
+      "What a touch at each of n candidate poses is expected to tell, in nats: estimates, none of\n"
+      "them below 0, with standard errors. Unpacks into (identity, pose).")
+      .def_prop_ro("identity", of_each(&TouchGain::identity), "[n] about which object it is.")
+      .def_prop_ro("pose", of_each(&TouchGain::pose), "[n] about the pose, given the object.")
+      .def_prop_ro("both", of_each(&TouchGain::both), "[n] about object and pose together.")
+      .def_prop_ro("identity_error",
+                   of_each([](const TouchGain& gain) { return gain.standard_error.identity; }),
+                   "[n] standard error of identity.")
+      .def_prop_ro("pose_error",
+                   of_each([](const TouchGain& gain) { return gain.standard_error.pose; }),
+                   "[n] standard error of pose.")
+      .def_prop_ro("both_error",
+                   of_each([](const TouchGain& gain) { return gain.standard_error.both; }),
+                   "[n] standard error of both.")
+      .def("__iter__", [](const TouchGains& self) -> nb::typed<nb::iterator, Result<double, 1>> {
+        return nb::iter(
+            nb::make_tuple(of_each(&TouchGain::identity)(self), of_each(&TouchGain::pose)(self)));
+      });
+}
+
+template <typename Filter>
+void bind_text(nb::class_<Filter> filter, const char* class_name) {
+  filter.def("__repr__", [class_name](const Filter& self) {
+    return fmt::format("{}({})", class_name, self.name);
+  });
+}
+
+/// What histogram and bounds have alike.
+template <typename Belief>
+void bind_belief(nb::class_<Named<Belief>> belief, const char* class_name) {
+  using Own = Named<Belief>;
+  belief
+      .def("refine", &refine<Belief>, "mode"_a = nb::none(),
+           "The refined pose near a mode, by default that of estimate(), and its covariance:\n"
+           "where the posterior peaks, to a fraction of a bin.")
+      .def("sample", on_device<Own>(&Belief::sample), "count"_a, "seed"_a = 0,
+           "Draws objects and poses from the belief.")
+      .def("reset", on_device<Own>(&Belief::reset),
+           "Returns to the uniform belief, for the next unknown.")
+      .def_prop_ro("lattice", on_device<Own>(&Belief::lattice), "The bins.");
+  bind_text(belief, class_name);
+}
+
+void bind_histogram(nb::module_& module) {
+  const auto belief =
+      nb::class_<Histogram>(
+          module, "PoseHistogram",
+          "Histogram filter over object identity and planar pose (Sec. III-C, Eq. 13-16), on the\n"
+          "device. The same input gives the same bits as in C++.")
+          .def(
+              "__init__",
+              [](Histogram* self, const std::shared_ptr<Session>& device, const MapsLike& maps,
+                 const PoseLattice& lattice, const ContactModel& contact, bool still_array,
+                 std::optional<double> none_weight, const DisplacementSdLike& touch_sd,
+                 const DisplacementSdLike& slip_sd,
+                 std::optional<std::uint64_t> memory_limit_bytes) {
+                const HistogramOptions options{.lattice = lattice,
+                                               .contact = contact,
+                                               .still_array = still_array,
+                                               .none_weight = none_weight,
+                                               .touch_sd = sd_of(touch_sd, "touch_sd"),
+                                               .slip_sd = sd_of(slip_sd, "slip_sd"),
+                                               .memory_limit_bytes = memory_limit_bytes};
+                new (self) Histogram(make_filter<PoseHistogram>(device, maps, options));
+              },
+              "device"_a, "maps"_a, "lattice"_a = PoseLattice{}, nb::kw_only(),
+              "contact"_a = ContactModel{}, "still_array"_a = false, "none_weight"_a = nb::none(),
+              "touch_sd"_a = DisplacementSd{}, "slip_sd"_a = DisplacementSd{},
+              "memory_limit_bytes"_a = nb::none(),
+              "Starts with a uniform belief. still_array: the array stays in one place; "
+              "none_weight:\n"
+              "prior weight of \"none of these\"; touch_sd: how far the sensor may have been from\n"
+              "where it was said to be; slip_sd: how far the object moves between touches.\n\n"
+              "Raises Error on maps that are not sound or differ in their prior, on options out "
+              "of\n"
+              "range, and where the device has too little memory.")
+          .def("update", &update<PoseHistogram>, "touches"_a, "progress"_a = nb::none(),
+               "Multiplies the belief by the likelihood of these touches (Eq. 7, 13).\n\n"
+               "progress(fraction) is called up to 50 times a second. After Ctrl-C, or where "
+               "progress\n"
+               "raises, the belief is left half-way: call reset(). Raises Error on a touch that is "
+               "not\n"
+               "sound, of which none is taken in.")
+          .def(
+              "move_pivot",
+              [](const Histogram& self, const ArrayLike& pivot_mm) {
+                self.use([pivot = point_of(pivot_mm, "pivot_mm")](PoseHistogram& belief, Call&) {
+                  belief.move_pivot(pivot);
+                });
+              },
+              "pivot_mm"_a,
+              "Turns theta about another pivot [2], in the robot frame, before any touch.")
+          .def("estimate", on_device<Histogram>(&PoseHistogram::estimate),
+               "Identity probabilities (Eq. 14) and mode (Eq. 15-16).")
+          .def("marginals", on_device<Histogram>(&PoseHistogram::marginals), "object"_a,
+               "Marginal probabilities of one object's poses, over the lattice.")
+          .def(
+              "log_likelihood", &log_likelihood, "object"_a,
+              "Log-likelihood of every bin of one object in nats, [ntheta, ny, nx], without prior\n"
+              "weights.")
+          .def("entropy", on_device<Histogram>(&PoseHistogram::entropy),
+               "Entropy of the belief over objects and bins, in nats.")
+          .def("expected_gain", &expected_gain, "T_robot_sensor"_a, "elements_mm"_a, nb::kw_only(),
+               "samples"_a = PlanOptions{}.samples, "seed"_a = 0,
+               "What one more touch at each candidate pose [n, 3] is expected to tell, in nats.\n"
+               "elements_mm [e, 2]: living elements in the sensor frame.")
+          .def_prop_ro("device_bytes", on_device<Histogram>(&PoseHistogram::device_bytes),
+                       "Device memory held.");
+  bind_belief(belief, "PoseHistogram");
+}
+
+using Particles = Named<ParticleFilter>;
+
+std::tuple<Result<std::int32_t, 1>, Result<double, 2>, Result<double, 1>> particles(
+    const Particles& self) {
+  const auto all = self.use([](ParticleFilter& filter, Call&) { return filter.particles(); });
+  std::vector<std::int32_t> objects;
+  std::vector<Pose> poses;
+  std::vector<double> weights;
+  for (const ParticleFilter::Particle& particle : all) {
+    objects.push_back(particle.object);
+    poses.push_back(particle.T_object_robot);
+    weights.push_back(particle.weight);
+  }
+  return {owned(std::move(objects)), to_array(poses), owned(std::move(weights))};
+}
+
+void bind_particles(nb::module_& module) {
+  nb::enum_<Resampling>(module, "Resampling", "How the next generation of particles is drawn.")
+      .value("multinomial", Resampling::multinomial, "n independent draws, as in the paper")
+      .value("systematic", Resampling::systematic, "one draw and n - 1 equal steps");
+
+  const auto filter =
+      nb::class_<Particles>(
+          module, "ParticleFilter",
+          "Monte Carlo localization over object identity and planar pose (Sec. III-B, Eq. 8-12).")
+          .def(
+              "__init__",
+              [](Particles* self, const std::shared_ptr<Session>& device, const MapsLike& maps,
+                 const PoseLattice& region, int count, const ContactModel& contact,
+                 double motion_mm, double motion_rad, Resampling resampling, bool augmented,
+                 double alpha_slow, double alpha_fast, std::uint64_t seed) {
+                const ParticleOptions options{.particles = count,
+                                              .region = region,
+                                              .contact = contact,
+                                              .motion_mm = motion_mm,
+                                              .motion_rad = motion_rad,
+                                              .resampling = resampling,
+                                              .augmented = augmented,
+                                              .alpha_slow = alpha_slow,
+                                              .alpha_fast = alpha_fast,
+                                              .seed = seed};
+                new (self) Particles(make_filter<ParticleFilter>(device, maps, options));
+              },
+              "device"_a, "maps"_a, "region"_a = PoseLattice{}, nb::kw_only(),
+              "particles"_a = ParticleOptions{}.particles, "contact"_a = ContactModel{},
+              "motion_mm"_a = ParticleOptions{}.motion_mm,
+              "motion_rad"_a = ParticleOptions{}.motion_rad,
+              "resampling"_a = Resampling::multinomial, "augmented"_a = false,
+              "alpha_slow"_a = ParticleOptions{}.alpha_slow,
+              "alpha_fast"_a = ParticleOptions{}.alpha_fast, "seed"_a = 0,
+              "Particles start uniformly over the region, whose bin counts are ignored. motion_mm "
+              "and\n"
+              "motion_rad: standard deviations of the noise at each touch; augmented: adds random\n"
+              "particles while touches fit worse than before (Augmented MCL).\n\n"
+              "Raises Error as PoseHistogram does.")
+          .def("update", &update<ParticleFilter>, "touches"_a, "progress"_a = nb::none(),
+               "Resamples, moves and weighs the particles by each touch in turn (Eq. 7-8).\n\n"
+               "After Ctrl-C, or where progress(fraction) raises, call reset(). Raises Error on a\n"
+               "touch that is not sound, of which none is taken in.")
+          .def("estimate", on_device<Particles>(&ParticleFilter::estimate),
+               "Identity by Eq. 9; the pose is the maximum of the Parzen estimate (Eq. 10-12).")
+          .def("reset", on_device<Particles>(&ParticleFilter::reset),
+               "Restores the initial particles for the next unknown.")
+          .def("effective_sample_size",
+               on_device<Particles>(&ParticleFilter::effective_sample_size),
+               "1 / sum of squared weights, in [1, n].")
+          .def("particles", &particles,
+               "All particles: objects [n], T_object_robot [n, 3] (x_mm, y_mm, theta_rad) and "
+               "weights\n"
+               "[n], which sum to 1.")
+          .def_prop_ro("device_bytes", on_device<Particles>(&ParticleFilter::device_bytes),
+                       "Device memory held.");
+  bind_text(filter, "ParticleFilter");
+}
+
+using Bounded = Named<BoundedPosterior>;
+
+void bind_bounded(nb::module_& module) {
+  const auto belief =
+      nb::class_<Bounded>(
+          module, "BoundedPosterior",
+          "The belief of PoseHistogram over the same bins, of which it evaluates only those that\n"
+          "matter, and proves how little the others can. Memory follows the maps, not the bins.")
+          .def(
+              "__init__",
+              [](Bounded* self, const std::shared_ptr<Session>& device, const MapsLike& maps,
+                 const PoseLattice& lattice, const ContactModel& contact, double tolerance,
+                 std::optional<double> budget_s, std::optional<double> evidence_nats,
+                 std::optional<double> none_weight, int threads) {
+                const BoundedOptions options{.lattice = lattice,
+                                             .contact = contact,
+                                             .tolerance = tolerance,
+                                             .budget_s = budget_s,
+                                             .evidence_nats = evidence_nats,
+                                             .none_weight = none_weight,
+                                             .threads = threads,
+                                             // The belief keeps the session.
+                                             .cancel_point = [on = device.get()] { on->check(); }};
+                new (self) Bounded(make_filter<BoundedPosterior>(device, maps, options));
+              },
+              "device"_a, "maps"_a, "lattice"_a = PoseLattice{}, nb::kw_only(),
+              "contact"_a = ContactModel{}, "tolerance"_a = BoundedOptions{}.tolerance,
+              "budget_s"_a = nb::none(), "evidence_nats"_a = nb::none(),
+              "none_weight"_a = nb::none(), "threads"_a = 0,
+              "tolerance: largest total variation distance from the posterior over all bins;\n"
+              "budget_s: seconds after which estimate() reports what it has proven by then;\n"
+              "evidence_nats: bounds every map's log evidence, too; threads: 0 for as many as the\n"
+              "machine has cores.\n\n"
+              "Raises Error as PoseHistogram does.")
+          .def("update", &update<BoundedPosterior>, "touches"_a, "progress"_a = nb::none(),
+               "Multiplies the belief by the likelihood of these touches (Eq. 7, 13); takes in "
+               "none of\n"
+               "them after Ctrl-C or where progress(fraction) raises. Raises Error on a touch that "
+               "is\n"
+               "not sound.")
+          .def(
+              "estimate", on_device<Bounded>(&BoundedPosterior::estimate),
+              "Identity with its bounds, mode and certificate. Searches once after each update().\n"
+              "After Ctrl-C the belief is as it was, and the next call searches anew.")
+          .def(
+              "marginals",
+              [](const Bounded& self, int object, const std::optional<PoseLattice>& grid) {
+                return self.use([object, grid](BoundedPosterior& belief, Call&) {
+                  return grid ? belief.marginals(object, *grid) : belief.marginals(object);
+                });
+              },
+              "object"_a, "grid"_a = nb::none(),
+              "Marginal probabilities of one object's poses, over the lattice or a coarser grid.")
+          .def(
+              "log_likelihood",
+              [](const Bounded& self, int object, const ArrayLike& T_object_robot) {
+                const Pose pose = pose_of(T_object_robot, "T_object_robot");
+                return self.use([object, pose](BoundedPosterior& belief, Call&) {
+                  return belief.log_likelihood(object, pose);
+                });
+              },
+              "object"_a, "T_object_robot"_a,
+              "Log-likelihood of any pose [3] of an object in nats, in float64.")
+          .def("entropy", on_device<Bounded>(&BoundedPosterior::entropy),
+               "Entropy of the belief over objects and evaluated bins, in nats.")
+          .def_prop_ro("host_bytes", on_device<Bounded>(&BoundedPosterior::host_bytes),
+                       "Memory held.");
+  bind_belief(belief, "BoundedPosterior");
+}
+
+}  // namespace
+
+void bind_filters(nb::module_& module) {
+  bind_gains(module);
+  bind_histogram(module);
+  bind_bounded(module);
+  bind_particles(module);
+}
+
+}  // namespace palpate::python
