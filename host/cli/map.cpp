@@ -17,6 +17,8 @@
 #include "figures/figures.hpp"
 #include "learning/observed_map.hpp"
 #include "learning/press.hpp"
+#include "learning/setup_check.hpp"
+#include "model/option_words.hpp"
 #include "palpate/files.hpp"
 #include "palpate/map_builder.hpp"
 #include "palpate/object_frame.hpp"
@@ -147,6 +149,10 @@ void build_maps(const MapFlags& flags) {
   warn_of_unknown_poses(recordings);
 
   Device device = Device::open(flags.device);
+  if (const auto suspicion = suspected_order(device, recordings, model)) {
+    fmt::print(stderr, "palpate: {} ({:.0f} nats; palpate check tells more)\n",
+               in_flags(suspicion->words), suspicion->nats);
+  }
   model.sensor.prior = prior ? *prior : estimate_prior(device, objects, model);
   std::vector<OccupancyGrid> maps;
   std::vector<std::optional<RotationalSymmetry>> symmetries;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <complex>
 #include <map>
 #include <numbers>
 #include <set>
@@ -11,9 +10,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <glm/geometric.hpp>
-#include <glm/mat3x3.hpp>
-#include <glm/matrix.hpp>
 
+#include "learning/array_place.hpp"
 #include "learning/setup_judge.hpp"
 #include "model/bounding_box.hpp"
 #include "palpate/error.hpp"
@@ -22,20 +20,6 @@
 namespace palpate {
 
 namespace {
-
-/// Nats that a finding needs. Of sound set-ups none came near it; see tests/learning.
-constexpr double least_nats = 12.0;
-
-/// The elements as an array at this pose in their frame has them, scaled about its middle.
-std::vector<glm::dvec2> placed(std::span<const glm::dvec2> elements_mm, const Pose& offset,
-                               double scale = 1.0) {
-  const glm::dvec2 middle = array_centre_mm(elements_mm);
-  std::vector<glm::dvec2> result;
-  for (const glm::dvec2& p : elements_mm) {
-    result.push_back(offset * (middle + scale * (p - middle)));
-  }
-  return result;
-}
 
 /// Poses in degrees or metres, where the numbers allow for it.
 void check_units(SetupJudge& judge, Setup& setup, double& nats,
@@ -130,145 +114,15 @@ void check_order(SetupJudge& judge, Setup& setup, double& nats, SetupCheck& chec
     }
   }
   if (best - nats > least_nats) {
-    check.findings.push_back({"element_order", best - nats,
-                              fmt::format("the elements are read in another order: import with "
-                                          "`{}`",
-                                          option),
-                              option});
+    std::string words = option;
+    words.replace(words.find(" --"), 3, "` and `");
+    check.findings.push_back(
+        {"element_order", best - nats,
+         fmt::format("the elements are read in another order: import with `{}`", words), option});
     setup.elements_mm = check.elements_mm;
     nats = best;
   }
   check.elements_mm = setup.elements_mm;
-}
-
-/// Length of the mean of unit vectors at the sensor's angles: 1 where all are alike.
-double likeness_of_angles(const SetupJudge& judge, double rad) {
-  std::complex<double> sum;
-  double count = 0.0;
-  for (const auto& [object, touches] : judge.touches()) {
-    for (const TriedTouch& given : touches) {
-      sum += std::polar(1.0, rad * given.touch.T_robot_sensor.theta_rad);
-      ++count;
-    }
-  }
-  return std::abs(sum) / count;
-}
-
-/// The array's offset in the tool by a pattern search, refined by a parabola through its
-/// neighbours, whose curvature gives the standard error.
-void check_offset(SetupJudge& judge, Setup& setup, double& nats, SetupCheck& check) {
-  constexpr double alike = 0.97;
-  if (likeness_of_angles(judge, setup.rad) > alike) {
-    check.remarks.emplace_back(
-        "all touches are at nearly one angle of the sensor, which tells nothing of where the array "
-        "sits in the tool: turn the sensor between the touches, by 90 degrees or so");
-    return;
-  }
-  using Place = std::array<double, 3>;
-  const auto pose_of = [](const Place& at) { return Pose{{at[0], at[1]}, at[2]}; };
-  std::map<Place, double> known{{Place{}, nats}};
-  const auto judged = [&](const Place& at) {
-    const auto found = known.find(at);
-    if (found != known.end()) {
-      return found->second;
-    }
-    Setup other = setup;
-    other.elements_mm = placed(setup.elements_mm, pose_of(at));
-    return known.emplace(at, judge.nats(other)).first->second;
-  };
-  Place best{};
-  const Place finest{0.125, 0.125, 0.0125};
-  for (double step = 8.0; step >= 1.0;) {  // in units of the finest
-    Place next = best;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      for (const double side : {-1.0, 1.0}) {
-        Place at = best;
-        at[axis] += side * step * finest[axis];
-        next = judged(at) > judged(next) ? at : next;
-      }
-    }
-    step = next == best ? step / 2.0 : step;
-    best = next;
-  }
-  // The likelihood near its maximum as a parabola, in units of twice the finest steps.
-  const double top = judged(best);
-  const auto near = [&](std::size_t a, double da, std::size_t b, double db) {
-    Place at = best;
-    at[a] += da * 2.0 * finest[a];
-    at[b] += db * 2.0 * finest[b];
-    return judged(at);
-  };
-  glm::dvec3 slope;
-  glm::dmat3 information;
-  for (int a = 0; a < 3; ++a) {
-    slope[a] = (near(a, 1, a, 0) - near(a, -1, a, 0)) / 2.0;
-    information[a][a] = std::max(2.0 * top - near(a, 1, a, 0) - near(a, -1, a, 0), 1e-3);
-    for (int b = 0; b < a; ++b) {
-      const double mixed =
-          -(near(a, 1, b, 1) - near(a, 1, b, -1) - near(a, -1, b, 1) + near(a, -1, b, -1)) / 4.0;
-      const double most = 0.9 * std::sqrt(information[a][a] * information[b][b]);
-      information[a][b] = information[b][a] = std::clamp(mixed, -most, most);
-    }
-  }
-  const glm::dmat3 covariance = glm::inverse(information);
-  const glm::dvec3 peak = glm::clamp(covariance * slope, -1.0, 1.0);
-  Place offset = best;
-  std::array<double, 3> sd{};
-  double excess = 0.0;  // of the largest part in standard deviations
-  for (int a = 0; a < 3; ++a) {
-    offset[a] += 2.0 * finest[a] * peak[a];
-    sd[a] = 2.0 * finest[a] * std::sqrt(std::max(covariance[a][a], 1e-4));
-    excess = std::max(excess, std::abs(offset[a]) / std::max(sd[a], finest[a]));
-  }
-  const double gain = std::max(judged(offset), top) - nats;
-  constexpr double least_excess = 3.0;
-  if (gain > least_nats && excess > least_excess) {
-    const Pose pose = pose_of(offset);
-    constexpr double degrees = 180.0 / std::numbers::pi;
-    check.findings.push_back(
-        {"array_offset", gain,
-         fmt::format(
-             "the array sits in the tool at x {:+.2f} +- {:.2f} mm, y {:+.2f} +- {:.2f} mm, "
-             "turned by {:+.1f} +- {:.1f} degrees, from where its elements are said to be: "
-             "import with the array that `write-array` writes",
-             offset[0], sd[0], offset[1], sd[1], degrees * offset[2], degrees * sd[2]),
-         "", pose, sd});
-    setup.elements_mm = placed(setup.elements_mm, pose);
-    nats = judge.nats(setup);
-    check.elements_mm = setup.elements_mm;
-  }
-}
-
-void check_pitch(SetupJudge& judge, Setup& setup, double& nats, SetupCheck& check) {
-  const auto scaled = [&](double scale) {
-    Setup other = setup;
-    other.elements_mm = placed(setup.elements_mm, {}, scale);
-    return other;
-  };
-  double best = 1.0;
-  double most = nats;
-  for (double step = 0.08; step >= 0.01;) {
-    double next = best;
-    for (const double tried : {best * (1.0 - step), best * (1.0 + step)}) {
-      const double other = judge.nats(scaled(tried));
-      next = other > most ? tried : next;
-      most = std::max(most, other);
-    }
-    step = next == best ? step / 2.0 : step;
-    best = next;
-  }
-  constexpr double least_change = 0.025;
-  if (most - nats > least_nats && std::abs(best - 1.0) > least_change) {
-    check.findings.push_back(
-        {"pitch", most - nats,
-         fmt::format("the elements lie {:.2f} times as far apart as they are said to: correct the "
-                     "pitch in `array`, or import with the array that `write-array` writes",
-                     best),
-         ""});
-    setup = scaled(best);
-    nats = most;
-    check.elements_mm = setup.elements_mm;
-  }
 }
 
 /// Elements that always, or never, read contact, against what their places predict.
@@ -350,7 +204,58 @@ void check_touches(SetupJudge& judge, const Setup& setup, SetupCheck& check) {
   }
 }
 
+/// Every so many touches of a recording, so that there are at most `most`.
+Recording thinned(const Recording& recording, std::size_t most) {
+  const std::size_t e = recording.elements();
+  const std::size_t every = (recording.size() + most - 1) / most;
+  Recording few{.path = recording.path,
+                .object = recording.object,
+                .pressure_unit = recording.pressure_unit,
+                .elements_mm = recording.elements_mm};
+  for (std::size_t i = 0; i < recording.size(); i += every) {
+    const Touch touch = recording.touch(i);
+    few.T_robot_sensor.push_back(touch.T_robot_sensor);
+    few.pressure.insert(few.pressure.end(), touch.pressure.begin(), touch.pressure.end());
+    few.valid.insert(few.valid.end(), touch.valid.begin(), touch.valid.end());
+  }
+  if (few.valid.size() != few.size() * e) {
+    few.valid.clear();
+  }
+  return few;
+}
+
 }  // namespace
+
+std::optional<SetupFinding> suspected_order(Device& device, std::span<const Recording> recordings,
+                                            const MapOptions& options) {
+  constexpr std::size_t most_objects = 3;
+  constexpr std::size_t least_touches = 20;
+  constexpr std::size_t most_touches = 40;
+  std::vector<Recording> few;
+  for (const Recording& recording : recordings) {
+    const bool fits = recording.size() >= least_touches &&
+                      recording.elements_mm.size() == recording.elements() &&
+                      recording.elements_mm == recordings.front().elements_mm;
+    if (fits && few.size() < most_objects) {
+      few.push_back(thinned(recording, most_touches));
+    }
+  }
+  if (few.empty()) {
+    return {};
+  }
+  SetupCheck check{.elements_mm = few.front().elements_mm};
+  Setup setup{.elements_mm = check.elements_mm};
+  try {
+    SetupJudge judge(device, few, options);
+    double nats = judge.nats(setup);
+    check_order(judge, setup, nats, check);
+  } catch (const Error& error) {
+    if (error.fault() != Fault::input) {
+      throw;
+    }
+  }
+  return check.findings.empty() ? std::nullopt : std::optional(check.findings.front());
+}
 
 SetupCheck check_setup(Device& device, std::span<const Recording> recordings,
                        const MapOptions& options, const std::function<void(double)>& progress) {

@@ -46,4 +46,10 @@ struct SetupCheck {
 SetupCheck check_setup(Device& device, std::span<const Recording> recordings,
                        const MapOptions& options, const std::function<void(double)>& progress = {});
 
+/// The finding "element_order" from a few touches of a few objects, in a fraction of a second; none
+/// where there is none, or the recordings do not allow for it.
+/// @throws Error as MapBuilder does
+std::optional<SetupFinding> suspected_order(Device& device, std::span<const Recording> recordings,
+                                            const MapOptions& options);
+
 }  // namespace palpate

@@ -10,7 +10,10 @@
 #include "arrays.hpp"
 #include "bindings.hpp"
 #include "learning/calibration_task.hpp"
+#include "learning/setup_check.hpp"
+#include "model/option_words.hpp"
 #include "palpate/files.hpp"
+#include "recognition/recordings.hpp"
 #include "request.hpp"
 
 namespace palpate::python {
@@ -38,6 +41,18 @@ SensorCalibration calibrate(const GivenRecordings& given, PythonRequest request,
                  [&](double fraction) { report(share + (1.0 - share) * fraction); });
   }
   return calibration;
+}
+
+SetupCheck check(const GivenRecordings& given, const PythonRequest& request, double cell_mm,
+                 double psf_mm, Call& call) {
+  const std::vector<Recording> recordings = read_recordings(given);
+  const Recording& first = recordings.front();
+  MapOptions options{.cell_mm = cell_mm, .sensor = {.spread_mm = psf_mm / 2.0}};
+  options.classifier =
+      make_classifier(first.pressure_unit, first.path, request.threshold, request.ratio);
+  const auto used = session_on(request.session, request.device);
+  auto lock = used->lock(call);
+  return check_setup(lock.device(), recordings, options, call.progress());
 }
 
 std::string layer_word(MapLayer layer) {
@@ -98,7 +113,52 @@ void bind_learned_sensor(nb::module_& module) {
 
 }  // namespace
 
+namespace {
+
+void bind_setup_check(nb::module_& module) {
+  nb::class_<SetupFinding>(module, "SetupFinding", "Something that is wrong with a set-up.")
+      .def_ro("what", &SetupFinding::what,
+              "\"pose_unit\", \"element_order\", \"array_offset\", \"pitch\", \"dead_elements\",\n"
+              "\"stuck_elements\" or \"contradicting\".")
+      .def_ro("nats", &SetupFinding::nats,
+              "By how much more likely the touches are once it is mended.")
+      .def_prop_ro(
+          "words", [](const SetupFinding& self) { return in_keywords(self.words); },
+          "A sentence with what mends it.")
+      .def_prop_ro(
+          "array_offset",
+          [](const SetupFinding& self) {
+            return self.array_offset ? std::optional(to_array(*self.array_offset)) : std::nullopt;
+          },
+          "[3], the array's pose in the true sensor frame, mm, mm and rad; None but for\n"
+          "\"array_offset\".")
+      .def_ro("sd", &SetupFinding::sd, "Standard deviations of array_offset, or None.")
+      .def("__repr__", [](const SetupFinding& self) {
+        return fmt::format("SetupFinding('{}', {:.0f} nats: {})", self.what, self.nats,
+                           in_keywords(self.words));
+      });
+  nb::class_<SetupCheck>(module, "SetupCheck", "What touches say about their set-up.")
+      .def_ro("findings", &SetupCheck::findings, "Empty where the set-up is sound.")
+      .def_ro("remarks", &SetupCheck::remarks, "What these touches cannot tell, in sentences.")
+      .def_prop_ro("elements_mm", array_of(&SetupCheck::elements_mm),
+                   "[e, 2], the array as the findings correct it.")
+      .def_ro("touches", &SetupCheck::touches, "How many touches were in contact.");
+  module.def(
+      "check_setup",
+      [](nb::handle recordings, const PythonRequest& request, double cell_mm, double psf_mm,
+         const Progress& progress) {
+        return run({}, progress, [=, given = given_recordings(recordings)](Call& call) {
+          return check(given, request, cell_mm, psf_mm, call);
+        });
+      },
+      "recordings"_a, "request"_a, "cell_mm"_a, "psf_mm"_a, "progress"_a = nb::none(),
+      "What the touches say; of the request count the classifier and the device.");
+}
+
+}  // namespace
+
 void bind_calibration(nb::module_& module) {
+  bind_setup_check(module);
   bind_learned_sensor(module);
   nb::class_<GroupScores>(module, "GroupScores",
                           "The cross-validation of several touches of one object at a time.")

@@ -10,6 +10,7 @@
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
 #include "palpate/map_builder.hpp"
+#include "palpate/object_frame.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/pose_error.hpp"
 #include "palpate/rotational_symmetry.hpp"
@@ -91,6 +92,13 @@ void bind_map(nb::module_& module) {
               "Of the sensor model that built the map, or None.")
       .def_ro("suggested_symmetry", &OccupancyGrid::suggested_symmetry,
               "The symmetry that the map itself shows; None where it was not measured.")
+      .def_prop_ro("T_learned_robot_object", array_of(&OccupancyGrid::T_learned_robot_object),
+                   "[3], the object frame in the robot frame of the touches that it was learned\n"
+                   "from: mm, mm, rad.")
+      .def("centre_frame", &centre_frame,
+           "Puts the object frame's origin on the cell nearest to the middle of the occupied\n"
+           "cells. Poses then tell where the object itself is; a recording's truth keeps its\n"
+           "meaning.")
       .def_rw("mirror", &OccupancyGrid::mirror, "The object may lie on its other side.")
       .def_ro("nx", &OccupancyGrid::nx, "Cells along x.")
       .def_ro("ny", &OccupancyGrid::ny, "Cells along y.")

@@ -47,6 +47,8 @@ from ._palpate import (
     Scores as Scores,
     Sensor as Sensor,
     SensorCalibration as SensorCalibration,
+    SetupCheck as SetupCheck,
+    SetupFinding as SetupFinding,
     SensorModel as SensorModel,
     Touch as Touch,
     TouchDetector as TouchDetector,
@@ -76,6 +78,7 @@ from ._bag import read_bag as read_bag
 from .commands import (
     Plan as Plan,
     calibrate as calibrate,
+    check_setup as check_setup,
     evaluate as evaluate,
     fit_touch_sd as fit_touch_sd,
     import_tables as import_tables,

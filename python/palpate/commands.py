@@ -1,4 +1,4 @@
-"""`palpate import`, `calibrate`, `plan`, `evaluate` and `recognize --fit-touch-sd` as functions.
+"""`palpate import`, `check`, `calibrate`, `plan`, `evaluate` and `recognize --fit-touch-sd` as functions.
 
 They have the commands' rules, defaults and words.
 """
@@ -15,6 +15,7 @@ from ._palpate import (
     Evaluation,
     Recording,
     SensorCalibration,
+    SetupCheck,
     TouchGains,
     TouchSdFit,
     Truth,
@@ -170,6 +171,30 @@ def calibrate(
         filled(_palpate.CalibrationRequest(), calibrate, {name: given[name] for name in learned}),
         progress,
     )
+
+
+def check_setup(
+    recordings: _Recordings,
+    *,
+    threshold: float | None = None,
+    ratio: float | None = None,
+    cell_mm: float = 0.5,
+    psf_mm: float = 1.0,
+    device: Device | str | int | None = None,
+    progress: Callable[[float], object] | None = None,
+) -> SetupCheck:
+    """Asks touches which set-up explains them best, as `palpate check` does.
+
+    recordings: of touches at known poses, of one array and of objects that stay in place: some 60 of
+    each, at several angles of the sensor. Tried are the order of the elements, where the array sits in
+    the tool, its pitch and units of the poses; elements that are dead and touches that contradict the
+    others are found. threshold, in the recordings' pressure unit, ratio, cell_mm and psf_mm are those
+    of the maps.
+
+    Raises Error where an object has fewer than four touches in contact, or the arrays differ.
+    """
+    given = {"threshold": threshold, "ratio": ratio, "device": device}
+    return _palpate.check_setup(recordings, request_of(given, ()), cell_mm, psf_mm, progress)
 
 
 def evaluate(

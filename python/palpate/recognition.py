@@ -40,8 +40,30 @@ class RecognitionOptions(TypedDict, total=False):
     touches: int
 
 
-class Record(dict[str, Any]):
-    """What was recognised, as a record in the JSON of `palpate recognize`; keys are attributes, too.
+class Fields(dict[str, Any]):
+    """A JSON object whose keys are attributes, too; lists of numbers are arrays as attributes."""
+
+    def __getattr__(self, name: str) -> Any:
+        try:
+            value = self[name]
+        except KeyError:
+            raise AttributeError(f"the record has no '{name}'; it has {', '.join(self)}") from None
+        if isinstance(value, dict) and name in ("mode", "refined", "truth", "fit"):
+            return Fields(value)
+        if isinstance(value, list) and value and isinstance(value[0], (float, int, list)):
+            import numpy
+
+            return numpy.array(value)
+        return value
+
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *(key for key in self if key.isidentifier())})
+
+
+class Record(Fields):
+    """What was recognised, as a record in the JSON of `palpate recognize`.
+
+    Keys are attributes, too: record["refined"]["sd"] is a list, record.refined.sd an array.
 
     `best` is the most probable label, `identity` {label: probability}, `mode` the most probable bin,
     `refined` the refined pose, where the posterior peaks to a fraction of a bin, with
@@ -49,12 +71,6 @@ class Record(dict[str, Any]):
     it: {"z", "verdict"}. Of a recording that recognize_many() could not recognise there are only its
     name, `touches` (0), `truth` and `error`. docs/files.md lists all keys.
     """
-
-    def __getattr__(self, name: str) -> Any:
-        try:
-            return self[name]
-        except KeyError:
-            raise AttributeError(f"the record has no '{name}'; it has {', '.join(self)}") from None
 
     def __repr__(self) -> str:
         if "error" in self:
