@@ -66,14 +66,16 @@ void settle_frame(const ObjectOrigin& origin, OccupancyGrid& map) {
   }
 }
 
+/// Where the object frame lies.
 std::string frame_words(const OccupancyGrid& map) {
   const Pose& frame = map.T_learned_robot_object;
-  return map.centred_mm == glm::dvec2(0.0) && frame.translation_mm == glm::dvec2(0.0) &&
-                 frame.theta_rad == 0.0
-             ? "the robot's"
-             : fmt::format("x {:.2f} mm, y {:.2f} mm, theta {:.2f} deg in the robot's{}",
-                           frame.translation_mm.x, frame.translation_mm.y, degrees(frame.theta_rad),
-                           map.centred_mm == glm::dvec2(0.0) ? "" : ", at the object's middle");
+  const bool centred = map.centred_mm != glm::dvec2(0.0);
+  if (!centred && frame.translation_mm == glm::dvec2(0.0) && frame.theta_rad == 0.0) {
+    return "is the robot's";
+  }
+  return fmt::format("lies at x {:.2f} mm, y {:.2f} mm, theta {:.2f} deg in the robot frame{}",
+                     frame.translation_mm.x, frame.translation_mm.y, degrees(frame.theta_rad),
+                     centred ? ", at the object's middle" : "");
 }
 
 /// The touches as one recording. Where their arrays differ, it has elements for the largest, and
@@ -190,7 +192,7 @@ void build_maps(const MapFlags& flags) {
     fmt::print("{}: {} from {} touches, {} x {} cells of {} mm, prior {:.3g}\n",
                map_paths[i].string(), map.label, objects[i].touches.size(), map.nx, map.ny,
                map.cell_mm, map.prior);
-    fmt::print("{}: the frame of {} is {}\n", map_paths[i].string(), map.label, frame_words(map));
+    fmt::print("{}: the frame of {} {}\n", map_paths[i].string(), map.label, frame_words(map));
     if (symmetries[i]) {
       fmt::print("{}: {}\n", map_paths[i].string(), symmetry_words(map, *symmetries[i]));
     }

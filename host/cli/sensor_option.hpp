@@ -18,7 +18,9 @@ inline constexpr const char* sensor_help =
 
 inline constexpr const char* poses_help =
     "File, FIFO or - (standard input) with the poses T_robot_sensor, one line of JSON each: "
-    "{\"time\": s since 1970, \"x_mm\": mm, \"y_mm\": mm, \"theta_rad\": rad}";
+    "{\"time\": s since 1970, \"x_mm\": mm, \"y_mm\": mm, \"theta_rad\": rad}; or CSV with a "
+    "header of "
+    "these names";
 
 /// A sensor; `posed` is the same sensor where --poses gives its poses, else null.
 struct OpenSensor {

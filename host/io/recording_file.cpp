@@ -61,10 +61,10 @@ void require_agreement(const std::filesystem::path& path, const Recording& recor
 }  // namespace
 
 Recording read_recording(const std::filesystem::path& path) {
-  return read_recording(path, nullptr);
+  return recording_read_by(path, nullptr);
 }
 
-Recording read_recording(const std::filesystem::path& path, Hdf5Child* child) {
+Recording recording_read_by(const std::filesystem::path& path, Hdf5Child* child) {
   Recording recording;
   scan_recording(path,
                  {.head =

@@ -32,7 +32,7 @@ Recording RecordingReader::read(const std::filesystem::path& path) {
     child_ = recording_child(most_file_bytes);
   }
   try {
-    return read_recording(path, child_.get());
+    return recording_read_by(path, child_.get());
   } catch (const Error&) {
     if (child_->in_step) {
       throw;

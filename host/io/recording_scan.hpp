@@ -41,6 +41,6 @@ std::shared_ptr<Hdf5Child> recording_child(std::uint64_t file_bytes);
 /// @throws Error as read_recording() does
 void scan_recording(const std::filesystem::path& path, const RecordingTakers& takers,
                     Hdf5Child* child = nullptr);
-Recording read_recording(const std::filesystem::path& path, Hdf5Child* child);
+Recording recording_read_by(const std::filesystem::path& path, Hdf5Child* child);
 
 }  // namespace palpate

@@ -15,11 +15,11 @@
 #include <poll.h>
 #include <sys/stat.h>
 #include <unistd.h>
-#include <nlohmann/json.hpp>
 
 #include "io/descriptor.hpp"
 #include "palpate/error.hpp"
 #include "palpate/pose_track.hpp"
+#include "streaming/pose_line.hpp"
 
 namespace palpate {
 
@@ -30,15 +30,6 @@ constexpr std::size_t longest_line = 4096;
 // One read() takes at most this many bytes, and PoseReader::read() this many blocks.
 constexpr std::size_t block_bytes = 1 << 14;
 constexpr int blocks_at_once = 4;
-
-std::optional<double> number(const nlohmann::json& line, const char* key) {
-  const auto found = line.find(key);
-  if (found == line.end() || !found->is_number()) {
-    return {};
-  }
-  const double value = found->get<double>();
-  return std::isfinite(value) ? std::optional(value) : std::nullopt;
-}
 
 /// Reads lines of poses into a track as they come: see PosedSensor.
 class PoseReader {
@@ -91,7 +82,7 @@ class PoseReader {
 
  private:
   /// What may be wrong with a line.
-  enum class Flaw { too_long, no_json, no_number, far_away, out_of_order, clock_set_back, kinds };
+  enum class Flaw { too_long, no_pose, no_number, far_away, out_of_order, clock_set_back, kinds };
 
   // Reads one block; false where there is none, or none yet.
   bool read_some() {
@@ -148,29 +139,16 @@ class PoseReader {
     if (text.find_first_not_of(" \t\r") == std::string::npos) {
       return;
     }
-    const nlohmann::json line = nlohmann::json::parse(text, nullptr, false);
-    if (!line.is_object()) {
-      refuse_line(Flaw::no_json, lines_, "is no JSON object");
-      return;
+    const auto read = format_.read(text);
+    if (const auto* problem = std::get_if<PoseLines::Problem>(&read)) {
+      using Kind = PoseLines::Problem::Kind;
+      refuse_line(problem->kind == Kind::no_pose     ? Flaw::no_pose
+                  : problem->kind == Kind::no_number ? Flaw::no_number
+                                                     : Flaw::far_away,
+                  lines_, problem->words);
+    } else if (const auto* pose = std::get_if<PoseLines::TimedPose>(&read)) {
+      add(pose->time_s, pose->T_robot_sensor);
     }
-    std::vector<double> numbers;
-    for (const char* key : {"time", "x_mm", "y_mm", "theta_rad"}) {
-      const std::optional<double> found = number(line, key);
-      if (!found) {
-        refuse_line(Flaw::no_number, lines_, fmt::format("has no number '{}'", key));
-        return;
-      }
-      numbers.push_back(*found);
-    }
-    const Pose T_robot_sensor{{numbers[1], numbers[2]}, numbers[3]};
-    if (!is_robot_pose(T_robot_sensor)) {
-      refuse_line(Flaw::far_away, lines_,
-                  fmt::format("x_mm = {}, y_mm = {}, theta_rad = {}: no robot is further away than "
-                              "1e9 mm, or has turned by more than 1e9 rad",
-                              numbers[1], numbers[2], numbers[3]));
-      return;
-    }
-    add(numbers[0], T_robot_sensor);
   }
 
   void add(double time_s, const Pose& T_robot_sensor) {
@@ -204,7 +182,9 @@ class PoseReader {
 
   void refuse_line(Flaw flaw, std::uint64_t line, std::string_view problem) {
     const std::string text = fmt::format(
-        "{}, line {}: {}; write {{\"time\": s, \"x_mm\": mm, \"y_mm\": mm, \"theta_rad\": rad}}",
+        "{}, line {}: {}; write {{\"time\": s, \"x_mm\": mm, \"y_mm\": mm, \"theta_rad\": rad}}, "
+        "or CSV "
+        "with these columns",
         name_, line, problem);
     if (is_file_) {
       throw Error(Fault::input, text);
@@ -229,6 +209,7 @@ class PoseReader {
   bool is_file_ = false;
   bool is_fifo_ = false;
   bool ended_ = false;
+  PoseLines format_;
   std::string line_;       ///< the line under way
   bool overlong_ = false;  ///< the line under way is longer than any pose
   std::uint64_t lines_ = 0;

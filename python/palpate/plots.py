@@ -1,4 +1,4 @@
-"""Pictures of maps and beliefs with Matplotlib, which the extra `palpate[plot]` installs."""
+"""Pictures of maps, beliefs, touches and records with Matplotlib, which the extra `palpate[plot]` installs."""
 
 import io
 from typing import TYPE_CHECKING
@@ -6,14 +6,17 @@ from typing import TYPE_CHECKING
 import numpy
 
 from ._error import Error
-from ._palpate import Marginals, OccupancyGrid
+from ._palpate import Marginals, OccupancyGrid, Recording, transform
+from .recognition import Record
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+_Shown = OccupancyGrid | Marginals | Recording | Record
 
-def plot(shown: OccupancyGrid | Marginals, ax: "Axes | None" = None) -> "Axes":
-    """Draws a map or a belief over position, in mm, and returns the axes."""
+
+def plot(shown: _Shown, ax: "Axes | None" = None) -> "Axes":
+    """Draws a map, a belief over position, touches or a recognised pose, in mm; returns the axes."""
     if ax is None:
         try:
             from matplotlib import pyplot
@@ -24,7 +27,7 @@ def plot(shown: OccupancyGrid | Marginals, ax: "Axes | None" = None) -> "Axes":
     return ax
 
 
-def png(shown: OccupancyGrid | Marginals) -> bytes | None:
+def png(shown: _Shown) -> bytes | None:
     """The picture that a notebook shows; None without Matplotlib, so that it shows the text."""
     try:
         from matplotlib.figure import Figure
@@ -37,9 +40,13 @@ def png(shown: OccupancyGrid | Marginals) -> bytes | None:
     return picture.getvalue()
 
 
-def _draw(shown: OccupancyGrid | Marginals, ax: "Axes") -> None:
+def _draw(shown: _Shown, ax: "Axes") -> None:
     if isinstance(shown, OccupancyGrid):
         _draw_map(shown, ax)
+    elif isinstance(shown, Recording):
+        _draw_touches(shown, ax)
+    elif isinstance(shown, Record):
+        _draw_record(shown, ax)
     else:
         _draw_belief(shown, ax)
     ax.set_aspect("equal")
@@ -63,3 +70,44 @@ def _draw_belief(marginals: Marginals, ax: "Axes") -> None:
         marginals.xy, origin="lower", extent=(x.lower, x.upper, y.lower, y.upper), cmap="Blues"
     )
     ax.figure.colorbar(image, ax=ax, label="probability")
+
+
+def _draw_touches(recording: Recording, ax: "Axes") -> None:
+    """Every reading where its element was in the robot frame; unposed ones about the origin."""
+    arrays = numpy.broadcast_to(
+        recording.elements_mm, (len(recording), *recording.elements_mm.shape[-2:])
+    )
+    poses = numpy.nan_to_num(recording.T_robot_sensor)
+    places = numpy.concatenate([transform(*one) for one in zip(poses, arrays, strict=True)])
+    pressure = recording.pressure.ravel()
+    order = numpy.argsort(pressure)  # the largest on top; NaN, which is last, is not drawn
+    x, y = places[order].T
+    points = ax.scatter(x, y, c=pressure[order], s=9, cmap="viridis")
+    ax.figure.colorbar(points, ax=ax, label=f"pressure, {recording.pressure_unit}")
+    ax.set_title(f"{len(recording)} touches of {recording.object or 'an unknown'}")
+
+
+def _draw_record(record: Record, ax: "Axes") -> None:
+    """The object's frame in the robot's, with the ellipses that hold x and y in 68 and 95 %."""
+    refined = record.get("refined")
+    x, y, theta = (refined or record)["T_robot_object"]
+    ax.plot(x, y, "o", color="black")
+    length = 10.0
+    if refined:
+        # The covariance of T_object_robot, carried over to the place of the inverse.
+        c, s = numpy.cos(refined["theta_rad"]), numpy.sin(refined["theta_rad"])
+        t_x, t_y = -c * refined["x_mm"] - s * refined["y_mm"], s * refined["x_mm"] - c * refined["y_mm"]
+        slope = numpy.array([[-c, -s, t_y], [s, -c, -t_x]])
+        covariance = slope @ numpy.array(refined["covariance"]) @ slope.T
+        widths, axes = numpy.linalg.eigh(covariance)
+        turn = numpy.linspace(0, 2 * numpy.pi, 100)
+        circle = axes @ (numpy.sqrt(numpy.maximum(widths, 0))[:, None] * [numpy.cos(turn), numpy.sin(turn)])
+        length = 2.448 * numpy.sqrt(widths[1])
+        for share, radius in ((68, 1.515), (95, 2.448)):
+            ax.plot(x + radius * circle[0], y + radius * circle[1], label=f"{share} %")
+        ax.legend()
+    for angle, name in ((theta, "x"), (theta + numpy.pi / 2, "y")):
+        end = x + length * numpy.cos(angle), y + length * numpy.sin(angle)
+        ax.plot((x, end[0]), (y, end[1]), color="black")
+        ax.annotate(name, end, xytext=(3, 3), textcoords="offset points")
+    ax.set_title(f"{record['best']}, {100 * record['identity'][record['best']]:.1f} %")

@@ -4,10 +4,13 @@ import inspect
 import os
 import warnings
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any, Literal, TypedDict, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypedDict, TypeVar
 
 from . import _palpate
 from ._palpate import Device, Hypothesis, OccupancyGrid, Recording
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 _Path = str | bytes | os.PathLike[str] | os.PathLike[bytes]
 _Pair = tuple[float, float]
@@ -48,8 +51,8 @@ class Fields(dict[str, Any]):
             value = self[name]
         except KeyError:
             raise AttributeError(f"the record has no '{name}'; it has {', '.join(self)}") from None
-        if isinstance(value, dict) and name in ("mode", "refined", "truth", "fit"):
-            return Fields(value)
+        if type(value) is dict and name in ("mode", "refined", "truth", "fit"):
+            value = self[name] = Fields(value)
         if isinstance(value, list) and value and isinstance(value[0], (float, int, list)):
             import numpy
 
@@ -71,6 +74,12 @@ class Record(Fields):
     it: {"z", "verdict"}. Of a recording that recognize_many() could not recognise there are only its
     name, `touches` (0), `truth` and `error`. docs/files.md lists all keys.
     """
+
+    def plot(self, ax: "Axes | None" = None) -> "Axes":
+        """Draws the object's frame and where x and y lie in 68 and 95 %, in the robot frame, in mm."""
+        from .plots import plot
+
+        return plot(self, ax)
 
     def __repr__(self) -> str:
         if "error" in self:

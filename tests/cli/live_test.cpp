@@ -212,7 +212,7 @@ TEST_F(Live, JoinsFramesWithPosesFromAFifo) {
   EXPECT_NE(outcome.err.find("3 lines of poses were skipped"), std::string::npos) << outcome.err;
   // When it happens, each kind once, before the lines of the end.
   EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 3) << outcome.err;
-  expect_named(outcome.err, {"palpate: poses poses, line 1: is no JSON object",
+  expect_named(outcome.err, {"palpate: poses poses, line 1: is no JSON object, and no row of CSV",
                              "palpate: poses poses, line 12: time = 1"});
   const auto records = parsed(bytes_of(folder_ / "live.jsonl"));
   ASSERT_EQ(records.size(), expected.size());

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <numbers>
 
-#include <glm/geometric.hpp>
 #include <gmock/gmock.h>
+#include <glm/geometric.hpp>
 
 #include "palpate/map_builder.hpp"
 #include "palpate/object_frame.hpp"
@@ -69,7 +69,7 @@ TEST_F(MapFrame, LiesAtTheObjectWhereTheRobotsOriginIsOffTheMap) {
   EXPECT_THAT(out_, HasSubstr("the frame of A is the robot's\n"));
   const OccupancyGrid centred = map_with("near.h5", {"--origin", "centroid"});
   EXPECT_LT(glm::length(body_of(centred).centroid_mm), 0.5);
-  EXPECT_THAT(out_, HasSubstr("mm, theta 0.00 deg in the robot's, at the object's middle\n"));
+  EXPECT_THAT(out_, HasSubstr("mm, theta 0.00 deg in the robot frame, at the object's middle\n"));
 }
 
 TEST_F(MapFrame, LiesWhereOneSays) {

@@ -52,6 +52,18 @@ def test_pictures_are_of_maps_and_beliefs(
     assert wide.plot(ax) is ax
     assert ax.get_images()[0].get_extent() == pytest.approx((-0.25, wide.nx / 2 - 0.25, -0.25, 19.75))
     ax = Figure().add_subplot()
+    assert unknown.plot(ax) is ax
+    [points] = ax.collections
+    assert len(points.get_offsets()) == unknown.pressure.size
+    ax = Figure().add_subplot()
+    [record] = palpate.recognize(unknown, maps, device=device)
+    assert record.plot(ax) is ax
+    for line, radius in zip(ax.lines[1:3], (1.515, 2.448), strict=True):
+        x, y, _ = record.refined.T_robot_object
+        sd_x, sd_y, _ = record.refined.sd
+        assert max(line.get_xdata()) - x == pytest.approx(radius * sd_x, rel=1e-2)
+        assert max(line.get_ydata()) - y == pytest.approx(radius * sd_y, rel=1e-2)
+    ax = Figure().add_subplot()
     assert maps[0].plot(ax) is ax
     left, right, bottom, top = ax.get_images()[0].get_extent()
     assert right - left == pytest.approx(maps[0].nx * maps[0].cell_mm)

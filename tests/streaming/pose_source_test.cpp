@@ -210,6 +210,36 @@ TEST_F(PoseSource, FileWithAWrongStampNamesItsLine) {
   EXPECT_EQ(open().poses().read, 2u) << "a pause before the last pose";
 }
 
+TEST_F(PoseSource, TableServesLikeLines) {
+  std::string rows;
+  std::string shuffled = "theta_rad, x_mm, time, note, y_mm\r\n";
+  for (int i = 0; i <= 10; ++i) {
+    rows += fmt::format("{},{},1,0.5\n", time_of(i), i);
+    shuffled += fmt::format("0.5, {}, {}, up, 1\r\n", i, time_of(i));
+  }
+  for (const std::string& table : {"time,x_mm,y_mm,theta_rad\n" + rows, rows, shuffled}) {
+    put_bytes(path_, table);
+    PosedSensor sensor = open();
+    sensor.start();
+    add_frames(0, 10);
+    for (int i = 0; i < 10; ++i) {
+      const Pose pose = sensor.next(0ms)->T_robot_sensor.value();
+      EXPECT_NEAR(pose.translation_mm.x, i + 0.5, 1e-4);  // of 1.7e9 s float64 resolves 2e-7
+      EXPECT_EQ(pose.translation_mm.y, 1.0);
+      EXPECT_EQ(pose.theta_rad, 0.5);
+    }
+    sensor.stop();
+  }
+  for (const auto& [table, words] :
+       {std::pair{"time,x,y,theta\n", "line 1: names no column 'x_mm'"},
+        {"1,2,3,4\n5,6,,8\n", "line 2: has no number 'y_mm'"},
+        {"1,2,3,4\n1,2,3\n", "line 2: is no JSON object, and no row"},
+        {"1,2,3,4\ntime,x_mm,y_mm,theta_rad\n", "line 2: has no number"}}) {
+    put_bytes(path_, table);
+    expect_named(input_error([&] { open(); }), {words, "or CSV with these columns"});
+  }
+}
+
 TEST_F(PoseSource, FileServesEveryStart) {
   std::string text;
   for (int i = 0; i <= 100; ++i) {

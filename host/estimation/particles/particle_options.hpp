@@ -1,6 +1,5 @@
 #pragma once
 
-
 #include "gpu/context.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/particle_filter.hpp"
