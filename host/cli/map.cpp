@@ -171,7 +171,7 @@ void build_maps(const MapFlags& flags) {
                             : build_map(builder, object, show));
       maps.back().mirror = flags.mirror;
       maps.back().source = std::make_shared<const MapSource>(
-          gathered(object, recordings.front().pressure_unit), model);
+          MapSource{gathered(object, recordings.front().pressure_unit), model});
       settle_frame(origin, maps.back());
       symmetries.push_back(settle_symmetry(flags, maps.back()));
     }

@@ -60,8 +60,8 @@ struct Scene {
 };
 
 /// Reads a YAML scene file. Its relative paths start from its folder; returned paths include it.
-/// `array` is "digitacts", a file as `palpate import --array` takes it, of which only the places are
-/// read, or a list of [x, y] in mm.
+/// `array` is "digitacts", a file as `palpate import --array` takes it, of which only the places
+/// are read, or a list of [x, y] in mm.
 /// @throws Error (Fault::input) naming the file, line, key, value and remedy, also on an unknown
 /// key or one given twice
 PALPATE_API Scene read_scene(const std::filesystem::path& path);
