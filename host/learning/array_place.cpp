@@ -29,7 +29,8 @@ std::vector<glm::dvec2> placed(std::span<const glm::dvec2> elements_mm, const Po
   return result;
 }
 
-/// Length of the mean of unit vectors at the sensor's angles: 1 where all are alike.
+}  // namespace
+
 double likeness_of_angles(const SetupJudge& judge, double rad) {
   std::complex<double> sum;
   double count = 0.0;
@@ -42,11 +43,8 @@ double likeness_of_angles(const SetupJudge& judge, double rad) {
   return std::abs(sum) / count;
 }
 
-}  // namespace
-
 void check_offset(SetupJudge& judge, Setup& setup, double& nats, SetupCheck& check) {
-  constexpr double alike = 0.97;
-  if (likeness_of_angles(judge, setup.rad) > alike) {
+  if (likeness_of_angles(judge, setup.rad) > one_angle) {
     check.remarks.emplace_back(
         "all touches are at nearly one angle of the sensor, which tells nothing of where the array "
         "sits in the tool: turn the sensor between the touches, by 90 degrees or so");

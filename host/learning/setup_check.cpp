@@ -58,6 +58,22 @@ void check_units(SetupJudge& judge, Setup& setup, double& nats,
   }
 }
 
+/// Whether the touches are, but for a part of the array's reach, at one place and angle. Any array
+/// then makes a map of its own that explains them.
+bool at_one_place(const SetupJudge& judge, const Setup& setup) {
+  constexpr double part = 0.5;
+  double widest_mm = 0.0;
+  for (const auto& [object, touches] : judge.touches()) {
+    BoundingBox places;
+    for (const TriedTouch& given : touches) {
+      places.take_in(setup.mm * given.touch.T_robot_sensor.translation_mm);
+    }
+    widest_mm = std::max(widest_mm, places.diagonal());
+  }
+  return widest_mm < part * array_reach_mm(setup.elements_mm) &&
+         likeness_of_angles(judge, setup.rad) > one_angle;
+}
+
 /// Where the elements are a full grid, the eight orders in which it may be read, each with the
 /// options of an import that say so.
 std::vector<std::pair<std::string, std::vector<glm::dvec2>>> orders_of(
@@ -113,7 +129,10 @@ void check_order(SetupJudge& judge, Setup& setup, double& nats, SetupCheck& chec
       check.elements_mm = elements_mm;
     }
   }
-  if (best - nats > least_nats) {
+  // Where touches overlap little, how the elements lie among the cells tells orders apart by a
+  // little; a wrong order costs a good part of all that the touches tell.
+  constexpr double least_share = 0.05;
+  if (best - nats > std::max(least_nats, least_share * std::abs(nats))) {
     std::string words = option;
     words.replace(words.find(" --"), 3, "` and `");
     check.findings.push_back(
@@ -247,8 +266,10 @@ std::optional<SetupFinding> suspected_order(Device& device, std::span<const Reco
   Setup setup{.elements_mm = check.elements_mm};
   try {
     SetupJudge judge(device, few, options);
-    double nats = judge.nats(setup);
-    check_order(judge, setup, nats, check);
+    if (!at_one_place(judge, setup)) {
+      double nats = judge.nats(setup);
+      check_order(judge, setup, nats, check);
+    }
   } catch (const Error& error) {
     if (error.fault() != Fault::input) {
       throw;
@@ -279,11 +300,17 @@ SetupCheck check_setup(Device& device, std::span<const Recording> recordings,
   double nats = judge.nats(setup);
   check_units(judge, setup, nats, check.findings);
   show(0.1);
-  check_order(judge, setup, nats, check);
-  show(0.3);
-  check_offset(judge, setup, nats, check);
-  show(0.7);
-  check_pitch(judge, setup, nats, check);
+  if (at_one_place(judge, setup)) {
+    check.remarks.emplace_back(
+        "all touches of an object are at nearly one place and angle of the sensor, which tells "
+        "nothing of the array: move and turn the sensor between the touches");
+  } else {
+    check_order(judge, setup, nats, check);
+    show(0.3);
+    check_offset(judge, setup, nats, check);
+    show(0.7);
+    check_pitch(judge, setup, nats, check);
+  }
   show(0.9);
   check_elements(judge, setup, check);
   check_touches(judge, setup, check);

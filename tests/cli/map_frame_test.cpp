@@ -72,6 +72,15 @@ TEST_F(MapFrame, LiesAtTheObjectWhereTheRobotsOriginIsOffTheMap) {
   EXPECT_THAT(out_, HasSubstr("mm, theta 0.00 deg in the robot frame, at the object's middle\n"));
 }
 
+TEST_F(MapFrame, LiesOnTheCellNearestToTheMiddle) {
+  for (const char* letter : {"A", "I"}) {
+    const OccupancyGrid far = map_with(std::string(letter) + ".h5", {});
+    const glm::dvec2 middle = body_of(far).centroid_mm;
+    EXPECT_LE(std::abs(middle.x), 0.25) << letter;
+    EXPECT_LE(std::abs(middle.y), 0.25) << letter;
+  }
+}
+
 TEST_F(MapFrame, LiesWhereOneSays) {
   // The frame in which the letter was made: the map is as if learned at the robot's origin.
   const OccupancyGrid given = map_with("A.h5", {"--origin", "600,100,22.918311805232928"});

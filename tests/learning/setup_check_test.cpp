@@ -107,6 +107,22 @@ TEST_F(SetupTouches, AtOneAngleTellNothingOfTheArraysPlace) {
   EXPECT_THAT(found.remarks, ElementsAre(HasSubstr("all touches are at nearly one angle")));
 }
 
+TEST_F(SetupTouches, AtOnePlaceTellNothingOfTheOrder) {
+  std::vector<Recording> recordings = touches(grid_array(16, 16, 0.73));
+  for (Recording& recording : recordings) {
+    for (Pose& pose : recording.T_robot_sensor) {
+      pose = {};
+    }
+    for (glm::dvec2& p : recording.elements_mm) {
+      p += glm::dvec2(0.13, -0.21);  // mirrored, it lies otherwise among the cells
+    }
+  }
+  const SetupCheck found = check(recordings);
+  EXPECT_THAT(found.findings, IsEmpty());
+  EXPECT_THAT(found.remarks, ElementsAre(HasSubstr("at nearly one place and angle")));
+  EXPECT_FALSE(suspected_order(device_, recordings, MapOptions()));
+}
+
 TEST_F(SetupTouches, TellThePitchAndTheUnitsOfPoses) {
   std::vector<Recording> recordings = touches(digitacts_array());
   for (Recording& recording : recordings) {
