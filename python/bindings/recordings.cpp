@@ -220,9 +220,10 @@ void bind_recording(nb::module_& module) {
           "path"_a,
           "Writes a recording file (HDF5), whole or not at all. Raises Error where the content is "
           "not sound\nor the file cannot be written.")
-      .def("plot", plot_method, "ax"_a = nb::none(), plot_signature,
-           "Draws every reading at its element's place in the robot frame, in mm, with Matplotlib.\n"
-           "Returns the axes.")
+      .def(
+          "plot", plot_method, "ax"_a = nb::none(), plot_signature,
+          "Draws every reading at its element's place in the robot frame, in mm, with Matplotlib.\n"
+          "Returns the axes.")
       .def("__repr__", [](const ArrayRecording& self) {
         return fmt::format("Recording({} {} of {} elements in {}{})", self.size(), self.rows,
                            self.elements(), self.pressure_unit,
