@@ -88,8 +88,7 @@ class PacketDeframer final : public Deframer {
     in_step_ = true;
     values_.clear();
     time_s_.reset();
-    last_ticks_.reset();
-    tick_s_ = 0.0;
+    last_ticks_.reset();  // the unit stays known
   }
 
   const DeframerCounters& counters() const override { return counters_; }

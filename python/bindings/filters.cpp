@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <cmath>
 #include <iterator>
 #include <memory>
 #include <string>
@@ -12,12 +11,9 @@
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
-#include <glm/common.hpp>
-#include <glm/geometric.hpp>
 
 #include "bindings.hpp"
 #include "estimate.hpp"
-#include "model/bounding_box.hpp"
 #include "palpate/bounded_posterior.hpp"
 #include "palpate/particle_filter.hpp"
 #include "palpate/pose_histogram.hpp"
@@ -36,42 +32,6 @@ struct Named : Owned<Filter> {
   std::string name;        ///< "A, E, I on 'llvmpipe'"
   double extent_mm = 0.0;  ///< farthest occupied place of any map from its object frame's origin
 };
-
-/// Farthest place of a box around a map's occupied cells from the object frame's origin.
-double extent_mm(const std::vector<Hypothesis>& hypotheses) {
-  double farthest = 0.0;
-  for (const Hypothesis& hypothesis : hypotheses) {
-    const BoundingBox box = occupied_box(hypothesis.map);
-    farthest = std::max(farthest, glm::length(glm::max(glm::abs(box.lower), glm::abs(box.upper))));
-  }
-  return farthest;
-}
-
-/// Throws Error where nobody said where the object may be, and the lattice taken instead, near the
-/// robot's origin, brings no object to the touch: the belief would stay as it was without a word.
-void require_reach(const PoseLattice& lattice, double extent_mm, std::span<const Touch> touches) {
-  const PoseLattice usual;
-  const auto is_usual = [&](const Axis& axis) {
-    return axis.lower == usual.x_mm.lower && axis.upper == usual.x_mm.upper;
-  };
-  if (!is_usual(lattice.x_mm) || !is_usual(lattice.y_mm) || lattice.pivot_mm != usual.pivot_mm) {
-    return;
-  }
-  for (const Touch& touch : touches) {
-    const glm::dvec2 middle = touch.T_robot_sensor * array_centre_mm(touch.elements_mm);
-    const double reach_mm = extent_mm + array_reach_mm(touch.elements_mm) +
-                            std::hypot(usual.x_mm.upper, usual.y_mm.upper);
-    if (glm::length(middle) > reach_mm) {
-      throw Error(
-          Fault::input,
-          fmt::format("lattice: missing or the default, within 10 mm of the robot's "
-                      "origin, but the array touches at ({:.1f}, {:.1f}) mm, where no object "
-                      "can be then; give one of touch_region() or balanced_lattice() and "
-                      "move_pivot() to the touch, or use recognize()",
-                      middle.x, middle.y));
-    }
-  }
-}
 
 std::string name_of(const std::vector<Hypothesis>& hypotheses, const Session& session) {
   std::vector<std::string> labels;
