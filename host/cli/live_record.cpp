@@ -70,7 +70,7 @@ std::string table_line(const LiveTouch& touch, const RecognitionTask& task) {
       touch.unknown + 1, touch.index + 1, object_words(step, task), step.confidence(),
       dropped_cell(dropped_text(step), task), pose[0], pose[1], pose[2],
       error_text(step.pose_error_mm()), touch.latency_ms, surprise.empty() ? "-" : surprise,
-      fit.empty() ? "-" : fit);
+      (fit.empty() ? "-" : fit) + (step.decision.act ? ", act" : ""));
 }
 
 std::string summary(const LiveState& state, std::vector<double> latencies_ms,
@@ -79,9 +79,9 @@ std::string summary(const LiveState& state, std::vector<double> latencies_ms,
   if (state.last) {
     const RecognitionStep& step = state.last->step;
     text += result_words(step, task) + "\n";
-    std::vector<std::string> more{truth_words(step), unproven_sentence(step, task),
-                                  misfit_sentence(step, state.touches, task),
-                                  single_touch_words(task, state.touches)};
+    std::vector<std::string> more{
+        decision_words(step), truth_words(step), unproven_sentence(step, task),
+        misfit_sentence(step, state.touches, task), single_touch_words(task, state.touches)};
     std::ranges::move(warning_words(step), std::back_inserter(more));
     for (const std::string& words : more) {
       text += words.empty() ? "" : printable(words) + "\n";

@@ -279,6 +279,9 @@ void LiveScreen::describe(const LiveState& state) {
   if (plan_) {
     view_.next = state.last->next ? next_touch_words(*state.last->next, *plan_) : "planning";
   }
+  if (const auto decision = decision_words(step); !decision.empty()) {
+    view_.notes.push_back(decision);
+  }
   if (const auto unproven = unproven_sentence(step, task_); !unproven.empty()) {
     view_.notes.push_back(unproven);
   } else if (const std::string dropped = dropped_text(step); !dropped.empty()) {

@@ -146,6 +146,14 @@ void add_recognition_flags(CLI::App& command, Request& request, bool& verbose) {
   command.add_option("--ratio", request.ratio,
                      "Threshold as a fraction of the touch's largest pressure [default: the sensor "
                      "model's, or 0.3]");
+  command.add_option(
+      "--act-below-mm", request.act_below_mm,
+      "Decide to act where 95 % of the belief lies within this distance of the pose, "
+      "mm; the distance is that of the object's points, root mean square "
+      "[default: 0.5]");
+  command.add_option("--act-above", request.act_above,
+                     "Decide to act where the best object has at least this probability "
+                     "[default: 0.99]");
   add_filter_flags(command, request);
   command.add_option("--device", request.device, "Vulkan device, by index or a part of its name");
   command.add_flag("--verbose", verbose,

@@ -54,6 +54,21 @@ std::string confusions(const std::vector<RecognitionRecord>& records, const Reco
   return text;
 }
 
+/// Whether to act on each of a few unknowns, or on how many of more.
+std::string decisions(const std::vector<RecognitionRecord>& records) {
+  constexpr std::size_t few = 3;
+  std::string text;
+  if (records.size() > few) {
+    const auto acts = std::ranges::count_if(
+        records, [](const RecognitionRecord& record) { return record.last().decision.act; });
+    return fmt::format("act on {} of {} unknowns\n", acts, records.size());
+  }
+  for (const RecognitionRecord& record : records) {
+    text += fmt::format("{}: {}\n", printable_name(record), decision_words(record.last()));
+  }
+  return text;
+}
+
 /// Every warning once, after the names of the unknowns that it is of.
 std::string warnings(const std::vector<RecognitionRecord>& records) {
   constexpr std::size_t most_names = 3;
@@ -218,8 +233,15 @@ std::string result_table(const std::vector<RecognitionRecord>& records, const Re
     table.add({name_of(record), fmt::format("{}", record.touches), object_words(step, task),
                fmt::format("{:.3f}", step.confidence()), with_dropped ? dropped_text(step) : "",
                pose[0], pose[1], pose[2], fit_words(step)});
+    for (const BeliefMode& mode : other_modes(step)) {
+      const std::array<std::string, 3> there =
+          pose_cells(pose_text(mode.pose.T_robot_object, mode.pose.sd()));
+      table.add({"  or", "", printable(mode_words(mode.object, task)),
+                 fmt::format("{:.3f}", mode.probability), "", there[0], there[1], there[2], ""});
+    }
     if (step.refined) {
-      add_pose("  mode", mode_words(step, task), step.mode_T_robot_object(), step.error_mm);
+      add_pose("  mode", mode_words(step.mode.object, task), step.mode_T_robot_object(),
+               step.error_mm);
     }
     if (const std::optional<Pose> truth = step.true_T_robot_object()) {
       add_pose("  truth", step.truth.label, *truth, step.pose_error_mm());
@@ -227,8 +249,8 @@ std::string result_table(const std::vector<RecognitionRecord>& records, const Re
       table.add({"  truth", "", step.truth.label, "", "", "", "", "", "wrong object"});
     }
   }
-  return table.text(columns) + complaints(records, task) + symmetries(records, task) +
-         summary(records) + confusions(records, task);
+  return decisions(records) + table.text(columns) + complaints(records, task) +
+         symmetries(records, task) + summary(records) + confusions(records, task);
 }
 
 }  // namespace palpate::cli

@@ -21,10 +21,12 @@ std::string trace_table(const RecognitionRecord& record, const RecognitionTask& 
 /// warning once, and that one touch cannot tell (none).
 std::string complaints(const std::vector<RecognitionRecord>& records, const RecognitionTask& task);
 
-/// For each unknown a line with its pose in the robot frame, below it a line with the mode where
-/// the pose is between the bins, and a line with the truth where it is known. Then what is wrong
-/// with which unknown and, where truths are known, how many are right, the mean pose errors and
-/// what each wrongly recognised label was taken for.
+/// First whether to act on each of up to three unknowns and why, or on how many of more. Then for
+/// each unknown a line with its pose in the robot frame, below it a line for each other mode with
+/// at least 5 % of the belief, one with the mode where the pose is between the bins, and a line
+/// with the truth where it is known. Then what is wrong with which unknown and, where truths are
+/// known, how many are right, the mean pose errors and what each wrongly recognised label was taken
+/// for.
 /// @param columns see TextTable::text()
 std::string result_table(const std::vector<RecognitionRecord>& records, const RecognitionTask& task,
                          std::optional<int> columns);

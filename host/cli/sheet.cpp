@@ -9,6 +9,7 @@
 #include "cli/record_table.hpp"
 #include "cli/step_words.hpp"
 #include "cli/text_table.hpp"
+#include "model/printable.hpp"
 #include "recognition/record_json.hpp"
 
 namespace palpate::cli {
@@ -34,12 +35,20 @@ std::vector<RecognitionSheet::Caption> captions(const RecognitionRecord& record,
       lines.push_back({words, alarm});
     }
   };
+  add(printed(last.decision.because), !last.decision.act);
   add(printed(truth_words(last)), last.right == false);
   if (last.refined) {
     std::string mode = "most probable bin: " + pose_words(pose_text(last.mode_T_robot_object()));
     mode += last.error_mm ? "; error " + error_text(last.error_mm) + " mm" : "";
     add(printed(mode), false);
   }
+  std::string others;
+  for (const BeliefMode& mode : other_modes(last)) {
+    others += fmt::format("{}{:.0f} % {} at {}", others.empty() ? "or " : "; ",
+                          100.0 * mode.probability, printable(mode_words(mode.object, task)),
+                          pose_words(pose_text(mode.pose.T_robot_object)));
+  }
+  add(printed(others), true);
   add(unproven_sentence(last, task), true);
   const std::string misfit = misfit_sentence(last, record.touches, task);
   if (last.contradicted) {
@@ -81,7 +90,8 @@ RecognitionSheet sheet_of(const RecognitionRecord& record, const Unknown& unknow
   sheet.title = name_of(record);
   // A long label must leave the pose its room.
   constexpr std::size_t longest_identity = 32;
-  sheet.result = shorten_middle(identity_words(last, task), longest_identity) + ": " +
+  sheet.result = (last.decision.act ? "Act: " : "Do not act: ") +
+                 shorten_middle(identity_words(last, task), longest_identity) + ": " +
                  printed(pose_words(pose_text(last))) + " in the robot frame";
   sheet.captions = captions(record, task);
   sheet.map = task.hypotheses[last.mode.object].map;

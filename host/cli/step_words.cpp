@@ -57,20 +57,38 @@ std::string pose_words(const PoseText& pose) {
   return fmt::format("x {} mm, y {} mm, theta {} deg", with_sd(0), with_sd(1), with_sd(2));
 }
 
-std::string mode_words(const RecognitionStep& step, const RecognitionTask& task) {
-  const bool mirrored = task.hypotheses[static_cast<std::size_t>(step.mode.object)].mirrored;
-  return posed_label(step, task) + (mirrored ? " mirrored" : "");
+std::string mode_words(int object, const RecognitionTask& task) {
+  const Hypothesis& hypothesis = task.hypotheses[static_cast<std::size_t>(object)];
+  return hypothesis.map.label + (hypothesis.mirrored ? " mirrored" : "");
 }
 
 std::string object_words(const RecognitionStep& step, const RecognitionTask& task) {
   const std::string& best = task.labels[step.best];
   const std::string& posed = posed_label(step, task);
-  return printable(best == posed ? mode_words(step, task)
-                                 : fmt::format("{}, pose of {}", best, mode_words(step, task)));
+  const std::string object = mode_words(step.mode.object, task);
+  return printable(best == posed ? object : fmt::format("{}, pose of {}", best, object));
 }
 
 std::string identity_words(const RecognitionStep& step, const RecognitionTask& task) {
-  return fmt::format("{} ({:.1f} %)", object_words(step, task), 100.0 * step.confidence());
+  const bool unlike = step.fit && step.fit->verdict == Verdict::does_not_fit;
+  return fmt::format("{}{} ({:.1f} %)", unlike ? "unlike " : "", object_words(step, task),
+                     100.0 * step.confidence());
+}
+
+std::string decision_words(const RecognitionStep& step) {
+  const auto& [act, because] = step.decision;
+  return because.empty() ? "" : printable((act ? "act: " : "do not act: ") + because);
+}
+
+std::vector<BeliefMode> other_modes(const RecognitionStep& step) {
+  constexpr double least = 0.05;
+  std::vector<BeliefMode> others;
+  for (std::size_t i = 0; i < step.places.modes.size(); ++i) {
+    if (i != step.places.own && step.places.modes[i].probability >= least) {
+      others.push_back(step.places.modes[i]);
+    }
+  }
+  return others;
 }
 
 std::string result_words(const RecognitionStep& step, const RecognitionTask& task) {

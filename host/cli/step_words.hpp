@@ -26,16 +26,20 @@ PoseText pose_text(const RecognitionStep& step);
 std::array<std::string, 3> pose_cells(const PoseText& pose);
 /// "x 9.81 +-0.05 mm, y 0.23 +-0.05 mm, theta -126.04 +-0.31 deg"
 std::string pose_words(const PoseText& pose);
-/// The object that the pose belongs to: "A", or "A mirrored" where it lies on its other side. Not
+/// An object: "A", or "A mirrored" where it lies on its other side. Not
 /// yet printable().
-std::string mode_words(const RecognitionStep& step, const RecognitionTask& task);
+std::string mode_words(int object, const RecognitionTask& task);
 /// The object of the step and, where the pose is another object's, that object: "A", "A mirrored",
 /// "(none), pose of A".
 std::string object_words(const RecognitionStep& step, const RecognitionTask& task);
-/// The object and its probability: "A (98.8 %)".
+/// The object and its probability: "A (98.8 %)", or "unlike A (98.8 %)" where it does not fit.
 std::string identity_words(const RecognitionStep& step, const RecognitionTask& task);
 /// The object, its probability and its pose in the robot frame.
 std::string result_words(const RecognitionStep& step, const RecognitionTask& task);
+/// "act: " or "do not act: " and why; "" where nothing was decided.
+std::string decision_words(const RecognitionStep& step);
+/// Modes with at least 5 % of the belief besides that of the pose.
+std::vector<BeliefMode> other_modes(const RecognitionStep& step);
 /// The true object and its pose, as far as the step can be compared with them, and the error of the
 /// step's pose; "" where nothing is known.
 std::string truth_words(const RecognitionStep& step);

@@ -160,6 +160,8 @@ Scene read_scene(const std::filesystem::path& path) {
     const auto at_least_0 = [](double value) { return value >= 0; };
     const auto rate = [](double value) { return value >= 0 && value < 1; };
     const auto inner = [](double value) { return value > 0 && value < 1; };
+    const auto above_0 = [](double value) { return value > 0; };
+    const auto probability = [](double value) { return value >= 0 && value <= 1; };
     read_keys(root,
               {{"array", [&](const Entry& e) { read_array(e, scene); }},
                {"sensor_model",
@@ -181,6 +183,8 @@ Scene read_scene(const std::filesystem::path& path) {
                                                         {"bounded", "bounded"},
                                                         {"particles", "particles"}});
                 }},
+               {"act_below_mm", number(scene.act_below_mm, above_0, "give a number above 0")},
+               {"act_above", number(scene.act_above, probability, "give a number in [0, 1]")},
                {"device", [&](const Entry& e) { scene.device = e.text(); }}});
   });
   return scene;

@@ -1,6 +1,10 @@
 #include "recognition/filter.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <numbers>
 #include <utility>
 
 #include <fmt/format.h>
@@ -42,6 +46,10 @@ class FilterInBins : public FilterOf<Own> {
   std::vector<PoseSample> sample(std::size_t count, std::uint64_t seed) const override {
     return this->own_.sample(count, seed);
   }
+  std::vector<std::vector<BinShare>> likely_bins(std::span<const int> objects, double least_share,
+                                                 PoseLattice& /*lattice*/) const override {
+    return this->own_.likely_bins(objects, least_share);
+  }
 };
 
 class HistogramFilter final : public FilterInBins<PoseHistogram> {
@@ -67,6 +75,10 @@ class BoundedFilter final : public FilterInBins<BoundedPosterior> {
   std::string path() const override { return own_.path(); }
   std::uint64_t host_bytes() const override { return own_.host_bytes(); }
 };
+
+// Steps of the grid on which the paper looks for the particles' mode (Eq. 12).
+constexpr double parzen_step_mm = 0.5;
+constexpr double parzen_step_rad = 0.04 * std::numbers::pi;
 
 class Particles final : public FilterOf<ParticleFilter> {
  public:
@@ -106,6 +118,33 @@ class Particles final : public FilterOf<ParticleFilter> {
       }
     }
     return sums;
+  }
+
+  std::vector<std::vector<BinShare>> likely_bins(std::span<const int> objects, double least_share,
+                                                 PoseLattice& lattice) const override {
+    const std::array<std::pair<Axis*, double>, 3> steps{{{&lattice.x_mm, parzen_step_mm},
+                                                         {&lattice.y_mm, parzen_step_mm},
+                                                         {&lattice.theta_rad, parzen_step_rad}}};
+    for (const auto& [axis, step] : steps) {
+      axis->count = std::max(1, static_cast<int>(std::ceil((axis->upper - axis->lower) / step)));
+    }
+    std::map<std::pair<int, std::int64_t>, double> weights;
+    std::vector<double> all(static_cast<std::size_t>(*std::ranges::max_element(objects)) + 1);
+    for (const ParticleFilter::Particle& particle : own_.particles()) {
+      if (std::ranges::find(objects, particle.object) != objects.end()) {
+        weights[{particle.object, lattice.bin_of(particle.T_object_robot)}] += particle.weight;
+        all[particle.object] += particle.weight;
+      }
+    }
+    std::vector<std::vector<BinShare>> likely(objects.size());
+    for (const auto& [at, weight] : weights) {
+      const double share = weight / all[at.first];
+      if (share >= least_share) {
+        const auto place = std::ranges::find(objects, at.first) - objects.begin();
+        likely[place].push_back({at.second, share});
+      }
+    }
+    return likely;
   }
 
   std::optional<double> effective_sample_size() const override {

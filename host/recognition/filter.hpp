@@ -55,6 +55,11 @@ class Filter {
   /// Marginal probabilities of one object's poses: a histogram's on its lattice, which is
   /// `lattice`; those of others on marginal_grid(lattice). A particle counts in the nearest bin.
   virtual Marginals marginals(int object, const PoseLattice& lattice) const = 0;
+  /// See PoseHistogram::likely_bins(). A particle counts in the nearest bin.
+  /// @param lattice of the filter; receives the particles' own, in steps of their Parzen grid
+  virtual std::vector<std::vector<BinShare>> likely_bins(std::span<const int> objects,
+                                                         double least_share,
+                                                         PoseLattice& lattice) const = 0;
   virtual std::optional<double> effective_sample_size() const { return {}; }
 
   /// How the filter computes, and why.

@@ -65,6 +65,8 @@ void visit_options(AnyRequest& request, const Visit& visit) {
   visit("tolerance", request.tolerance);
   visit("budget-ms", request.budget_ms);
   visit("evidence-nats", request.evidence_nats);
+  visit("act-below-mm", request.act_below_mm);
+  visit("act-above", request.act_above);
   visit("particles", request.particles);
   visit("resampling", request.resampling);
   visit("augmented", request.augmented);

@@ -57,6 +57,13 @@ class Recogniser {
   std::span<const double> surprises() const { return surprises_; }
   /// See Filter::marginals().
   Marginals marginals(int object) const { return filter_->marginals(object, lattice_); }
+  /// See Filter::likely_bins().
+  /// @param lattice receives the lattice that the bins are of
+  std::vector<std::vector<BinShare>> likely_bins(std::span<const int> objects, double least_share,
+                                                 PoseLattice& lattice) const {
+    lattice = lattice_;
+    return filter_->likely_bins(objects, least_share, lattice);
+  }
   /// The task's lattice about the pivot in use.
   const PoseLattice& lattice() const { return lattice_; }
   std::string path() const { return filter_->path(); }

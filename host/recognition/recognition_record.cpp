@@ -236,6 +236,8 @@ RecognitionStep take_step(Recogniser& recogniser, const RecognitionTask& task,
   measure_errors(task, step);
   step.effective_sample_size = recogniser.effective_sample_size();
   step.fit = fit_of(step, evidence, task);
+  step.places = places_of(recogniser, estimate, task, step);
+  step.decision = decide(step, task);
   step.warnings = warnings_about(evidence, task, recogniser.lattice(), step);
   if (step.warnings.empty()) {
     for (auto warning : {turned_alike(task, step),

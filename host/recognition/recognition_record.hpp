@@ -10,6 +10,7 @@
 
 #include "palpate/fit.hpp"
 #include "palpate/touch.hpp"
+#include "recognition/belief_modes.hpp"
 #include "recognition/recogniser.hpp"
 #include "recognition/recognition_task.hpp"
 
@@ -37,6 +38,26 @@ Unknown unknown_of(const Recording& recording);
 /// Whether the unknowns are single presses of one large array that stays in its place, so that
 /// HistogramOptions::still_array saves time.
 bool array_is_still(std::span<const Unknown> unknowns);
+
+/// Where a belief lies. Probabilities are those of RecognitionStep::identity, shared among a
+/// label's maps by their evidence and among an object's poses by the belief.
+struct BeliefPlaces {
+  /// At most five, the most probable first, none below 0.001. What they leave of 1 is "(none)",
+  /// less probable modes, and poses of no peak.
+  std::vector<BeliefMode> modes;
+  /// Index of the mode that RecognitionStep::mode is of, where it is among them.
+  std::optional<std::size_t> own = {};
+  double share = 0.0;  ///< probability of poses within `neighbourhood_mm` of pose()
+  /// Distance from pose() within which 95 % of the belief lies, mm; none where another object, or
+  /// what bounds have not proven, has more than the rest.
+  std::optional<double> within_mm = {};
+};
+
+/// Whether a robot is to act on a result.
+struct Decision {
+  bool act = false;
+  std::string because = {};  ///< a sentence without its full stop
+};
 
 /// What the filter believes after a touch.
 struct RecognitionStep {
@@ -77,6 +98,8 @@ struct RecognitionStep {
   /// Probability that the object was learned, where tells_known() and the unknown is a single touch
   /// with an element In Contact; "(none)" in `identity` then has the rest.
   std::optional<double> known = {};
+  BeliefPlaces places = {};           ///< where the belief lies, all objects' together
+  Decision decision = {};             ///< whether to act on pose()
   std::vector<std::string> warnings;  ///< what looks wrong with the touches, in whole sentences
   double seconds = 0.0;               ///< wall time from the touch to the estimate
   double refine_seconds = 0.0;        ///< wall time of the refined pose
@@ -117,6 +140,14 @@ struct RecognitionRecord {
 /// one touch where none are given
 RecognitionStep judge(const Estimate& estimate, const GroundTruth& truth,
                       const RecognitionTask& task, std::span<const TouchEvidence> touches = {});
+
+/// Where the belief lies about the step's pose.
+BeliefPlaces places_of(const Recogniser& recogniser, const Estimate& estimate,
+                       const RecognitionTask& task, const RecognitionStep& step);
+/// Acts where `best` is a learned object with at least the task's `act.above`, `fit` is not
+/// Verdict::does_not_fit, and 95 % of the belief lies within `act.below_mm` of pose(). By bounds it
+/// is the lower bound of the probability that counts. Else says which of them is not so.
+Decision decide(const RecognitionStep& step, const RecognitionTask& task);
 
 /// Updates the belief with more touches of the unknown, then judges the estimate and its refined
 /// pose. Of these touches a histogram takes the last three one by one, to measure their surprise;

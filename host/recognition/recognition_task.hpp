@@ -23,6 +23,12 @@ std::int64_t bins_in_all(std::size_t objects, const PoseLattice& lattice);
 /// The filter on another lattice.
 FilterOptions with_lattice(FilterOptions filter, const PoseLattice& lattice);
 
+/// When a robot acts on a result; see decide().
+struct ActWhere {
+  double below_mm = 0.5;  ///< 95 % of the belief lies within this distance of the pose
+  double above = 0.99;    ///< the best object's probability
+};
+
 /// The objects that an unknown may be, and the filter that tells which. The constructor derives the
 /// labels and bodies; neither the hypotheses nor the filter's none_weight may change afterwards.
 struct RecognitionTask {
@@ -62,6 +68,7 @@ struct RecognitionTask {
   std::optional<LearnedFeatures> features = {};
   std::optional<Familiarity> familiarity = {};
   FitScale fit_scale = {};                  ///< of RecognitionStep::fit
+  ActWhere act = {};                        ///< for RecognitionStep::decision
   std::function<void()> cancel_point = {};  ///< BoundedOptions::cancel_point, where bounds search
   std::vector<std::string> remarks = {};    ///< sentences for the user, once the filter is open
 };

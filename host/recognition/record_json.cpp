@@ -12,18 +12,36 @@ nlohmann::ordered_json to_json(const Pose& pose) {
           wrap_angle(pose.theta_rad, 2.0 * std::numbers::pi)};
 }
 
-nlohmann::ordered_json to_json(const RecognitionStep& step, const RefinedPose& refined) {
+/// [3][3]
+nlohmann::ordered_json to_json(const std::array<double, 9>& covariance) {
   auto rows = nlohmann::ordered_json::array();
   for (std::size_t row = 0; row < 3; ++row) {
-    const double* values = &refined.covariance[3 * row];
+    const double* values = &covariance[3 * row];
     rows.push_back({values[0], values[1], values[2]});
   }
+  return rows;
+}
+
+nlohmann::ordered_json to_json(const RecognitionStep& step, const RefinedPose& refined) {
   return {{"T_robot_object", to_json(step.T_robot_object())},
           {"sd", *step.sd()},
+          {"share", step.places.share},
           {"x_mm", refined.T_object_robot.translation_mm.x},
           {"y_mm", refined.T_object_robot.translation_mm.y},
           {"theta_rad", refined.T_object_robot.theta_rad},
-          {"covariance", rows}};
+          {"covariance", to_json(refined.covariance)}};
+}
+
+nlohmann::ordered_json to_json(const BeliefMode& mode, const RecognitionTask& task) {
+  const Hypothesis& hypothesis = task.hypotheses[static_cast<std::size_t>(mode.object)];
+  nlohmann::ordered_json json{{"object", hypothesis.map.label},
+                              {"probability", mode.probability},
+                              {"T_robot_object", to_json(mode.pose.T_robot_object)},
+                              {"covariance", to_json(mode.pose.covariance)}};
+  if (hypothesis.map.mirror) {
+    json["mirrored"] = hypothesis.mirrored;
+  }
+  return json;
 }
 
 nlohmann::ordered_json to_json(std::optional<double> error_mm) {
@@ -68,7 +86,14 @@ nlohmann::ordered_json truth_to_json(const GroundTruth& truth) {
 
 nlohmann::ordered_json to_json(const RecognitionStep& step, const RecognitionTask& task,
                                OptionWords words) {
-  nlohmann::ordered_json json{{"best", task.labels[step.best]}};
+  nlohmann::ordered_json json;
+  if (!step.decision.because.empty()) {
+    json["decision"] = {{"act", step.decision.act}, {"because", step.decision.because}};
+    if (step.places.within_mm) {
+      json["decision"]["within_mm"] = *step.places.within_mm;
+    }
+  }
+  json["best"] = task.labels[step.best];
   if (step.refined) {
     json["refined"] = to_json(step, *step.refined);
   }
@@ -93,6 +118,12 @@ nlohmann::ordered_json to_json(const RecognitionStep& step, const RecognitionTas
     json["mode"]["mirrored"] = hypothesis.mirrored;
   }
   json["T_robot_object"] = to_json(step.mode_T_robot_object());
+  if (!step.decision.because.empty()) {
+    json["modes"] = nlohmann::ordered_json::array();
+    for (const BeliefMode& each : step.places.modes) {
+      json["modes"].push_back(to_json(each, task));
+    }
+  }
   if (step.symmetry != 1) {
     json["symmetry"] = step.symmetry;
   }

@@ -83,6 +83,8 @@ Request complete(Request request) {
   take("touch-sd-deg", request.touch_sd_deg, scene.touch_sd.deg, "touch_sd deg");
   take("slip-sd-mm", request.slip_sd_mm, scene.slip_sd.mm, "slip_sd mm");
   take("slip-sd-deg", request.slip_sd_deg, scene.slip_sd.deg, "slip_sd deg");
+  take("act-below-mm", request.act_below_mm, scene.act_below_mm, "act_below_mm");
+  take("act-above", request.act_above, scene.act_above, "act_above");
   const auto automatic = [](bool given) {
     return given ? std::optional(Automatic{}) : std::nullopt;
   };

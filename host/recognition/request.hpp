@@ -72,6 +72,8 @@ struct Request {
   std::optional<double> tolerance;
   std::optional<double> budget_ms;
   std::optional<double> evidence_nats;
+  std::optional<double> act_below_mm;
+  std::optional<double> act_above;
   std::optional<int> particles;
   std::optional<Resampling> resampling;
   bool augmented = false;

@@ -99,6 +99,19 @@ std::vector<std::string> paths_of(const std::vector<Scene::Object>& objects,
   return paths;
 }
 
+ActWhere act_where(const Request& request) {
+  ActWhere act;
+  act.below_mm = request.act_below_mm.value_or(act.below_mm);
+  act.above = request.act_above.value_or(act.above);
+  if (!(act.below_mm > 0.0)) {
+    refuse_option("act-below-mm", act.below_mm, "give a number above 0");
+  }
+  if (!(act.above >= 0.0 && act.above <= 1.0)) {
+    refuse_option("act-above", act.above, "give a probability, 0 to 1");
+  }
+  return act;
+}
+
 std::optional<LearnedSensor> sensor_of(const Request& request, const Circumstances& of) {
   const std::string& file = request.sensor_model;
   if (file.empty()) {
@@ -234,6 +247,7 @@ RecognitionTask resolve(const Request& request, const Circumstances& of) {
   task.auto_filter = filter.automatic;
   task.filter_asked_for_by = filter.asked_for_by;
   task.auto_pivot = inferred || has_auto_pivot(request);
+  task.act = act_where(request);
   task.cancel_point = of.cancel_point;
   if (std::string wider = wider_bins_sentence(task); !wider.empty()) {
     remarks.push_back(std::move(wider));

@@ -75,6 +75,22 @@ RefinedPose refine(const Named<Filter>& self, const std::optional<Mode>& mode) {
   });
 }
 
+/// The bins of one object with their shares.
+template <typename Filter>
+std::tuple<Result<std::int64_t, 1>, Result<double, 1>> likely_bins(const Named<Filter>& self,
+                                                                   int object, double least_share) {
+  const auto likely = self.use([object, least_share](Filter& belief, Call&) {
+    return belief.likely_bins(std::span(&object, 1), least_share).front();
+  });
+  std::vector<std::int64_t> bins;
+  std::vector<double> shares;
+  for (const BinShare& bin : likely) {
+    bins.push_back(bin.bin);
+    shares.push_back(bin.share);
+  }
+  return {owned(std::move(bins)), owned(std::move(shares))};
+}
+
 using Histogram = Named<PoseHistogram>;
 
 DisplacementSd sd_of(const DisplacementSdLike& sd, const char* name) {
@@ -146,6 +162,9 @@ void bind_belief(nb::class_<Named<Belief>> belief, const char* class_name) {
       .def("refine", &refine<Belief>, "mode"_a = nb::none(),
            "The refined pose near a mode, by default that of estimate(), and its covariance:\n"
            "where the posterior peaks, to a fraction of a bin.")
+      .def("likely_bins", &likely_bins<Belief>, "object"_a, "least_share"_a = 1e-6,
+           "The bins that hold at least least_share of the object's belief: indices [n] into the\n"
+           "lattice, theta, y, x, x fastest, and the shares [n].")
       .def("sample", on_device<Own>(&Belief::sample), "count"_a, "seed"_a = 0,
            "Draws objects and poses from the belief.")
       .def("reset", on_device<Own>(&Belief::reset),

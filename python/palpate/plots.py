@@ -88,7 +88,8 @@ def _draw_touches(recording: Recording, ax: "Axes") -> None:
 
 
 def _draw_record(record: Record, ax: "Axes") -> None:
-    """The object's frame in the robot's, with the ellipses that hold x and y in 68 and 95 %."""
+    """The object's frame in the robot's, with the ellipses that hold x and y in 68 and 95 % about
+    the refined pose, and the modes with 5 % and more where there are several."""
     refined = record.get("refined")
     x, y, theta = (refined or record)["T_robot_object"]
     ax.plot(x, y, "o", color="black")
@@ -106,6 +107,12 @@ def _draw_record(record: Record, ax: "Axes") -> None:
         for share, radius in ((68, 1.515), (95, 2.448)):
             ax.plot(x + radius * circle[0], y + radius * circle[1], label=f"{share} %")
         ax.legend()
+    modes = [mode for mode in record["modes"] if mode["probability"] >= 0.05]
+    for mode in modes if len(modes) > 1 else []:
+        place = mode["T_robot_object"][:2]
+        ax.plot(*place, "o", color="0.6", zorder=0)
+        words = f"{mode['object']} {100 * mode['probability']:.0f} %"
+        ax.annotate(words, place, xytext=(3, -9), textcoords="offset points", color="0.4")
     for angle, name in ((theta, "x"), (theta + numpy.pi / 2, "y")):
         end = x + length * numpy.cos(angle), y + length * numpy.sin(angle)
         ax.plot((x, end[0]), (y, end[1]), color="black")

@@ -38,6 +38,8 @@ class RecognitionOptions(TypedDict, total=False):
     slip_sd_mm: float
     slip_sd_deg: float
     none: float | Literal["auto"]
+    act_below_mm: float
+    act_above: float
     memory_mib: int
     frames: tuple[int, int]
     touches: int
@@ -51,9 +53,11 @@ class Fields(dict[str, Any]):
             value = self[name]
         except KeyError:
             raise AttributeError(f"the record has no '{name}'; it has {', '.join(self)}") from None
-        if type(value) is dict and name in ("mode", "refined", "truth", "fit"):
+        if type(value) is dict and name in ("mode", "refined", "truth", "fit", "decision"):
             value = self[name] = Fields(value)
-        if isinstance(value, list) and value and isinstance(value[0], (float, int, list)):
+        if name == "modes":
+            value = self[name] = [Fields(mode) for mode in value]
+        elif isinstance(value, list) and value and isinstance(value[0], (float, int, list)):
             import numpy
 
             return numpy.array(value)
@@ -69,7 +73,9 @@ class Record(Fields):
     Keys are attributes, too: record["refined"]["sd"] is a list, record.refined.sd an array.
 
     `best` is the most probable label, `identity` {label: probability}, `mode` the most probable bin,
-    `refined` the refined pose, where the posterior peaks to a fraction of a bin, with
+    `decision` whether to act, and why: {"act", "because"}, `modes` where the belief lies: a list of
+    {"object", "probability", "T_robot_object", "covariance"}, the most probable first, `refined` the
+    refined pose, where the posterior peaks to a fraction of a bin, with
     `T_robot_object` [x_mm, y_mm, theta_rad], `sd` and `covariance`, `fit` how well the touches fit
     it: {"z", "verdict"}. Of a recording that recognize_many() could not recognise there are only its
     name, `touches` (0), `truth` and `error`. docs/files.md lists all keys.
@@ -86,9 +92,11 @@ class Record(Fields):
             return f"Record(error: {self['error']})"
         probability = self["identity"][self["best"]]
         pose = self.get("refined", self)["T_robot_object"]
+        acts = self["decision"]["act"]
         return (
-            f"Record('{self['best']}' with probability {probability:.3f}, T_robot_object "
-            f"x {pose[0]:.2f} mm, y {pose[1]:.2f} mm, theta {pose[2]:.3f} rad)"
+            f"Record({'act' if acts else 'do not act'}: '{self['best']}' with probability "
+            f"{probability:.3f}, T_robot_object x {pose[0]:.2f} mm, y {pose[1]:.2f} mm, "
+            f"theta {pose[2]:.3f} rad)"
         )
 
 
@@ -116,6 +124,8 @@ def recognize(
     tolerance: float | None = None,
     budget_ms: float | None = None,
     evidence_nats: float | None = None,
+    act_below_mm: float | None = None,
+    act_above: float | None = None,
     particles: int | None = None,
     resampling: Literal["multinomial", "systematic"] | None = None,
     augmented: bool = False,

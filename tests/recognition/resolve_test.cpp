@@ -129,6 +129,8 @@ TEST(Request, ValuesThatCannotBeMeantAreRefused) {
   EXPECT_THAT(refused([](Request& r) { r.none = 0.0; }), HasSubstr("`none 0`"));
   EXPECT_THAT(refused([](Request& r) { r.touch_sd_mm = 500.0; }),
               HasSubstr("`touch-sd-mm 500`: wider than the region, 20 mm"));
+  EXPECT_THAT(refused([](Request& r) { r.act_below_mm = 0.0; }), HasSubstr("`act-below-mm 0`"));
+  EXPECT_THAT(refused([](Request& r) { r.act_above = 1.5; }), HasSubstr("`act-above 1.5`"));
   EXPECT_THAT(refused([](Request& r) { r.particles = 10; }), HasSubstr("add `filter particles`"));
   EXPECT_THAT(refused([](Request& r) { r.given_maps.clear(); }), HasSubstr("`maps`: missing"));
 }
@@ -155,6 +157,8 @@ TEST(OptionText, EveryOptionIsReadAsItWasWritten) {
                                                  {"tolerance", "1e-06"},
                                                  {"budget-ms", "5"},
                                                  {"evidence-nats", "0.01"},
+                                                 {"act-below-mm", "0.3"},
+                                                 {"act-above", "0.9"},
                                                  {"particles", "100"},
                                                  {"augmented", "true"},
                                                  {"seed", "18446744073709551615"},

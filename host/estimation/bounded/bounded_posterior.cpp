@@ -223,6 +223,43 @@ Marginals BoundedPosterior::marginals(int object, const PoseLattice& grid) const
   return sums.take();
 }
 
+std::vector<std::vector<BinShare>> BoundedPosterior::likely_bins(std::span<const int> objects,
+                                                                 double least_share) const {
+  Impl& posterior = whole();
+  for (const int object : objects) {
+    require_object(object, posterior.bodies.size());
+  }
+  BoundedBelief& belief = posterior.belief;
+  const SearchResult& found = belief.found();
+  std::vector<std::vector<BinShare>> likely(posterior.bodies.size());
+  std::vector<std::uint8_t> asked(likely.size());
+  for (const int object : objects) {
+    asked[object] = 1;
+  }
+  belief.visit([&](const BinBox& box, std::span<const double> log_likelihood) {
+    if (asked[box.object] == 0) {
+      return;
+    }
+    const double log_total = found.mass[box.object].evaluated - belief.log_weight()[box.object];
+    const double least = log_total + std::log(least_share);
+    const auto all_alike = log_likelihood.size() == 1;
+    if (all_alike && log_likelihood[0] < least) {
+      return;
+    }
+    for (std::int64_t i = 0; i < box.bins(); ++i) {
+      const double log_share = log_likelihood[all_alike ? 0 : static_cast<std::size_t>(i)];
+      if (log_share >= least) {
+        likely[box.object].push_back({box.bin(i, lattice()), std::exp(log_share - log_total)});
+      }
+    }
+  });
+  std::vector<std::vector<BinShare>> of_objects;
+  for (const int object : objects) {
+    of_objects.push_back(likely[object]);
+  }
+  return of_objects;
+}
+
 double BoundedPosterior::log_likelihood(int object, const Pose& T_object_robot) const {
   Impl& posterior = whole();
   require_object(object, posterior.bodies.size());

@@ -251,40 +251,75 @@ std::vector<std::int64_t> DenseBelief::bins_at(std::size_t object, const BeliefS
   return found;
 }
 
-double DenseBelief::entropy(std::size_t object, const BeliefSummary& summary) const {
-  constexpr double negligible = 1e-5;                      // nats, of all blocks left out together
+template <typename Wanted, typename Visit>
+void DenseBelief::read_blocks(std::size_t object, const BeliefSummary& summary,
+                              const Wanted& wanted, const Visit& visit) const {
   constexpr std::size_t most_bins = std::size_t{1} << 20;  // read at once
-  double below_max = 0.0;                                  // mean of max - log-likelihood
-  std::vector<std::vector<TwoFloat>> read;
+  std::vector<std::pair<const BeliefBlock*, std::vector<TwoFloat>>> read;
   std::size_t bins = 0;
   const auto take_in = [&] {
     stream_.run();
-    for (const std::vector<TwoFloat>& block : read) {
-      for (const TwoFloat& bin : block) {
-        const double below = summary.max.value() - bin.value();
-        below_max += std::exp(-below) / summary.sum * below;
-      }
+    for (const auto& [block, of_block] : read) {
+      visit(*block, of_block);
     }
     read.clear();
     bins = 0;
   };
   for (const BeliefBlock& block : summary.blocks) {
-    // The largest that n bins of a summed probability p can add: p log(n / p).
-    const double p = block.sum / summary.sum;
-    const double most = p * (std::log(static_cast<double>(block.bins)) - std::log(p));
-    if (!(most > negligible / static_cast<double>(summary.blocks.size()))) {
+    if (!wanted(block)) {
       continue;
     }
     const Slab& slab = slabs_[block.slab];
-    stream_.download(slab.log_likelihood, read.emplace_back(block.bins),
+    std::vector<TwoFloat>& of_block =
+        read.emplace_back(&block, std::vector<TwoFloat>(block.bins)).second;
+    stream_.download(slab.log_likelihood, of_block,
                      (slab.first_bin(object) + block.first) * sizeof(TwoFloat));
-    bins += read.back().size();
+    bins += of_block.size();
     if (bins >= most_bins) {
       take_in();
     }
   }
   take_in();
+}
+
+double DenseBelief::entropy(std::size_t object, const BeliefSummary& summary) const {
+  constexpr double negligible = 1e-5;  // nats, of all blocks left out together
+  double below_max = 0.0;              // mean of max - log-likelihood
+  const auto counts = [&](const BeliefBlock& block) {
+    // The largest that n bins of a summed probability p can add: p log(n / p).
+    const double p = block.sum / summary.sum;
+    const double most = p * (std::log(static_cast<double>(block.bins)) - std::log(p));
+    return most > negligible / static_cast<double>(summary.blocks.size());
+  };
+  read_blocks(object, summary, counts,
+              [&](const BeliefBlock& /*block*/, std::span<const TwoFloat> bins) {
+                for (const TwoFloat& bin : bins) {
+                  const double below = summary.max.value() - bin.value();
+                  below_max += std::exp(-below) / summary.sum * below;
+                }
+              });
   return below_max + std::log(summary.sum);
+}
+
+std::vector<BinShare> DenseBelief::likely_bins(std::size_t object, const BeliefSummary& summary,
+                                               double least_share) const {
+  std::vector<BinShare> likely;
+  const auto may_hold = [&](const BeliefBlock& block) {
+    constexpr double rounding = 1e-5;  // of the block's sum
+    return block.sum * (1.0 + rounding) >= least_share * summary.sum;
+  };
+  read_blocks(
+      object, summary, may_hold, [&](const BeliefBlock& block, std::span<const TwoFloat> bins) {
+        for (std::size_t i = 0; i < bins.size(); ++i) {
+          const double share = std::exp(bins[i].value() - summary.max.value()) / summary.sum;
+          if (share >= least_share) {
+            likely.push_back({lattice_index(lattice_, slabs_[block.slab],
+                                            block.first + static_cast<std::int64_t>(i)),
+                              share});
+          }
+        }
+      });
+  return likely;
 }
 
 Marginals DenseBelief::marginals(std::size_t object, TwoFloat max, double of_largest) const {

@@ -66,10 +66,20 @@ class DenseBelief {
   /// Entropy of one object's bins by themselves, in nats, within 1e-4. Reads only the blocks that
   /// hold a part of it.
   double entropy(std::size_t object, const BeliefSummary& summary) const;
+  /// The bins that hold at least this share of one object's belief. Reads only the blocks that may
+  /// have such a bin.
+  std::vector<BinShare> likely_bins(std::size_t object, const BeliefSummary& summary,
+                                    double least_share) const;
   /// The log-likelihoods of boxes of bins, one after another, each [y, x].
   std::vector<double> download(std::span<const BinBox> boxes) const;
 
  private:
+  /// Calls visit(block, bins) with the bins of each of the object's blocks that is wanted(block),
+  /// some million bins at a time.
+  template <typename Wanted, typename Visit>
+  void read_blocks(std::size_t object, const BeliefSummary& summary, const Wanted& wanted,
+                   const Visit& visit) const;
+
   gpu::Context& context_;
   gpu::CommandStream& stream_;
   PoseLattice lattice_;

@@ -302,6 +302,18 @@ Marginals PoseHistogram::marginals(int object) const {
   return marginals;
 }
 
+std::vector<std::vector<BinShare>> PoseHistogram::likely_bins(std::span<const int> objects,
+                                                              double least_share) const {
+  Impl& histogram = whole();
+  std::vector<std::vector<BinShare>> likely;
+  for (const int object : objects) {
+    require_object(object, histogram.bodies.size());
+    likely.push_back(histogram.belief.likely_bins(static_cast<std::size_t>(object),
+                                                  histogram.summaries()[object], least_share));
+  }
+  return likely;
+}
+
 std::vector<double> PoseHistogram::log_likelihood(int object) const {
   Impl& histogram = whole();
   require_object(object, histogram.bodies.size());

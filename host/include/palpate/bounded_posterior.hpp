@@ -116,6 +116,12 @@ class PALPATE_API BoundedPosterior {
   /// Marginal probabilities of one object's poses on another grid; a bin counts in the grid's
   /// nearest bin (PoseLattice::bin_of()).
   Marginals marginals(int object, const PoseLattice& grid) const;
+  /// The bins that hold at least `least_share` of their object's belief, [object], each with its
+  /// share, for every one of the given objects; at most 1 / least_share bins of each. Shares are
+  /// those of the evaluated bins.
+  /// @throws Error if there is no such object
+  std::vector<std::vector<BinShare>> likely_bins(std::span<const int> objects,
+                                                 double least_share) const;
   /// Log-likelihood of any pose of an object in nats, in float64, without prior weights.
   /// @throws Error if there is no such object or the pose is not finite
   double log_likelihood(int object, const Pose& T_object_robot) const;

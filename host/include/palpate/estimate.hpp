@@ -79,6 +79,12 @@ struct PoseSample {
   Pose T_object_robot;
 };
 
+/// A bin of the lattice, and what share of its object's belief it holds.
+struct BinShare {
+  std::int64_t bin = 0;  ///< index into the lattice
+  double share = 0.0;    ///< all bins of the object together sum to 1
+};
+
 /// What the belief says about the unknown object, after any number of touches.
 struct Estimate {
   std::vector<double> identity;  ///< probability of every hypothesis, Eq. 14; with `none` sums to 1

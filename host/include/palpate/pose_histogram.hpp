@@ -118,6 +118,11 @@ class PALPATE_API PoseHistogram {
   /// `none` together sum to 1.
   /// @throws Error if there is no such object, or the device fails
   Marginals marginals(int object) const;
+  /// The bins that hold at least `least_share` of their object's belief, [object], each with its
+  /// share, for every one of the given objects; at most 1 / least_share bins of each.
+  /// @throws Error if there is no such object, or the device fails
+  std::vector<std::vector<BinShare>> likely_bins(std::span<const int> objects,
+                                                 double least_share) const;
   /// Log-likelihood of every bin of one object in nats, [theta, y, x], without prior weights.
   /// @throws Error if there is no such object, or the device fails
   std::vector<double> log_likelihood(int object) const;

@@ -56,6 +56,8 @@ struct Scene {
   bool auto_bins = false;                  ///< counts by balanced_lattice()
   bool fine_bins = false;                  ///< the same with BinWidth::fine
   std::optional<std::string> filter;       ///< "auto", "histogram", "bounded" or "particles"
+  std::optional<double> act_below_mm;      ///< see "decision" in docs/how_sure.md
+  std::optional<double> act_above;         ///< a probability
   std::optional<std::string> device;       ///< a device's name or index
 };
 

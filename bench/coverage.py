@@ -1,0 +1,156 @@
+"""How often the regions that a belief calls 68 and 95 % probable hold the truth, over all its modes."""
+
+import math
+import pathlib
+import tempfile
+from collections.abc import Sequence
+
+import numpy
+
+import palpate
+from palpate._tables import Column, Table, plain, print_table
+
+from .measures import share_record, with_interval, wrapped
+from .program import Json, begin, main, parser, write
+from .trials import Floats, Touching, letter_maps, make_trials, training_recordings, truth_of
+
+SEED = 400_000_000
+LETTERS = ("A", "E", "U")
+TOUCHES = (1, 3, 5, 9)
+SHARES = (0.68, 0.95)
+SAMPLES = 4_000  # of a mixture of modes: standard error of a level at most 0.008
+EXACT = Touching(at_random_poses=True)
+
+_PERCENT = with_interval(".1f", 100.0)
+COLUMNS: list[Column] = [
+    ("sensor", "sensor", plain),
+    ("region", "region", plain),
+    ("touches", "touches", plain),
+    ("unknowns", "unknowns", plain),
+    *((f"{100 * share:.0f} % region holds, %", f"{share}", _PERCENT) for share in SHARES),
+]
+DECISIONS: list[Column] = [
+    ("sensor", "sensor", plain),
+    ("touches", "touches", plain),
+    ("acts, %", "acts", _PERCENT),
+    ("acted and right, %", "right", _PERCENT),
+    ("acted and within 0.5 mm, %", "within", _PERCENT),
+]
+
+
+def densities(modes: Sequence[Json], label: str, poses: Floats) -> Floats:
+    """Density of a record's modes at an object's poses T_robot_object [n, 3], per mm^2 rad."""
+    sum_of = numpy.zeros(len(poses))
+    for mode in modes:
+        if mode["object"] != label:
+            continue
+        d = poses - mode["T_robot_object"]
+        d[:, 2] = wrapped(d[:, 2], 2.0 * math.pi)
+        covariance = numpy.array(mode["covariance"])
+        squared = numpy.einsum("ni,ij,nj->n", d, numpy.linalg.inv(covariance), d)
+        height = mode["probability"] / math.sqrt((2.0 * math.pi) ** 3 * numpy.linalg.det(covariance))
+        sum_of += height * numpy.exp(-0.5 * squared)
+    return sum_of
+
+
+def level_in_modes(modes: Sequence[Json], truth: palpate.Truth, random: numpy.random.Generator) -> float:
+    """Probability of all that is denser than the truth, by the modes as Gaussians.
+
+    What the modes leave of 1 is spread over everything else and comes last.
+    """
+    pose = palpate.inverse(truth.T_object_robot)
+    at_truth = densities(modes, truth.object, pose[None])[0]
+    level = 0.0
+    for mode in modes:
+        count = math.ceil(SAMPLES * mode["probability"])
+        samples = random.multivariate_normal(mode["T_robot_object"], mode["covariance"], count)
+        denser = densities(modes, mode["object"], samples) > at_truth
+        level += mode["probability"] * float(numpy.mean(denser))
+    return level
+
+
+def level_in_bins(
+    belief: palpate.BoundedPosterior, maps: Sequence[palpate.OccupancyGrid], truth: palpate.Truth
+) -> float:
+    """Probability of all bins that are likelier than the truth."""
+    labels = [grid.label for grid in maps]
+    identity = belief.estimate().identity
+    own = labels.index(truth.object)
+    # Logs of a bin's probability, but for the evidence that all share.
+    top = belief.estimate().mode
+    log_truth = belief.log_likelihood(own, truth.T_object_robot)
+    log_top = belief.log_likelihood(top.object, top.T_object_robot)
+    _, top_shares = belief.likely_bins(top.object)
+    p_truth = identity[top.object] * top_shares.max() * math.exp(min(log_truth - log_top, 0.0))
+    level = 0.0
+    for object_, p in enumerate(identity):
+        _, shares = belief.likely_bins(object_)
+        level += p * shares[p * shares > p_truth].sum()
+    return float(level)
+
+
+def covered(levels: Sequence[float]) -> Json:
+    """How often the truth lies within the region of each share."""
+    return {
+        f"{share}": share_record(sum(level < share for level in levels), len(levels))
+        for share in SHARES
+    }
+
+
+def program() -> None:
+    """Letters touched at exact poses, by Eq. 7 and by a sensor that was learned from their maps' touches."""
+    flags = parser(
+        "coverage",
+        "Measures how often the 68 and 95 % regions of the belief, over all its modes, hold the truth, and "
+        "how right decisions are, in some minutes on two CPU cores.",
+        trials="unknowns per letter [34, or 2 with --quick]",
+    )
+    options = flags.parse_args()
+    device, facts = begin(options)
+    training = [one for one in training_recordings(EXACT) if one.object in LETTERS]
+    maps = letter_maps(device, training)
+    each = options.trials or (2 if options.quick else 34)
+    trials = make_trials(LETTERS, each, max(TOUCHES), SEED, EXACT)
+    random = numpy.random.default_rng(SEED)
+    coverage, decisions = Table(COLUMNS), []
+    with tempfile.TemporaryDirectory() as folder:
+        learned = pathlib.Path(folder, "sensor.yaml")
+        palpate.calibrate(training, device=device).sensor.save(learned)
+        for sensor, given in (("Eq. 7", {}), ("learned", {"sensor_model": learned})):
+            records = palpate.recognize(trials, maps, trace=True, device=device, **given)
+            for touches in TOUCHES:
+                steps = [record["trace"][touches - 1] for record in records]
+                row: Json = {"sensor": sensor, "touches": touches, "unknowns": len(trials)}
+                levels = [
+                    level_in_modes(step["modes"], truth_of(trial), random)
+                    for step, trial in zip(steps, trials, strict=True)
+                ]
+                coverage.append(row | {"region": "modes"} | covered(levels))
+                acted = [step for step in steps if step["decision"]["act"]]
+                errors = [step["refined_error_mm"] for step in acted if step["right"]]
+                within = sum(error is not None and error <= 0.5 for error in errors)
+                decisions.append(
+                    row
+                    | {"acts": share_record(len(acted), len(steps))}
+                    | {"right": share_record(len(errors), max(len(acted), 1))}
+                    | {"within": share_record(within, max(len(acted), 1))}
+                )
+    reach_mm = float(numpy.hypot(*trials[0].elements_mm.T).max())
+    region = palpate.touch_region(maps, reach_mm)
+    bins = palpate.balanced_lattice(region, maps, "auto", 10**15)
+    for touches in TOUCHES:
+        levels = []
+        for trial in trials:
+            pivot = trial.T_robot_sensor[0, :2]
+            about = palpate.PoseLattice(bins.x_mm, bins.y_mm, bins.theta_rad, pivot)
+            belief = palpate.BoundedPosterior(device, maps, about)
+            belief.update(trial[:touches])
+            levels.append(level_in_bins(belief, maps, truth_of(trial)))
+        row = {"sensor": "Eq. 7", "touches": touches, "unknowns": len(trials), "region": "bins"}
+        coverage.append(row | covered(levels))
+    print_table(DECISIONS, decisions)
+    write(options.json, facts | {"coverage": coverage, "decisions": decisions})
+
+
+if __name__ == "__main__":
+    main(program)

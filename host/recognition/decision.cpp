@@ -1,0 +1,157 @@
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <fmt/format.h>
+
+#include "estimation/lattice/refinement.hpp"
+#include "palpate/learned_sensor.hpp"
+#include "recognition/label_probability.hpp"
+#include "recognition/recognition_record.hpp"
+
+namespace palpate {
+
+namespace {
+
+constexpr double least_probability = 1e-3;  ///< of a mode, and of an object to look for modes in
+constexpr std::size_t most_modes = 5;
+constexpr double held = 0.95;  ///< share of the belief that is to lie near the pose
+
+/// [hypothesis] what the task makes of its evidence: the identity of its label, shared among the
+/// label's maps.
+std::vector<double> probabilities(const Estimate& estimate, const RecognitionTask& task,
+                                  const RecognitionStep& step) {
+  const std::vector<double> of_label = label_log_evidence(estimate, task);
+  std::vector<double> probabilities;
+  for (std::size_t i = 0; i < estimate.log_evidence.size(); ++i) {
+    const std::size_t label = task.label_of[i];
+    probabilities.push_back(of_label[label] == log_zero
+                                ? 0.0
+                                : step.identity[label] *
+                                      std::exp(estimate.log_evidence[i] - of_label[label]));
+  }
+  return probabilities;
+}
+
+BinnedObject binned(const PoseLattice& lattice, const RecognitionTask& task,
+                    const RecognitionStep& step, int object) {
+  const OccupancyGrid& map = task.hypotheses[object].map;
+  return {lattice, displaced_body(map), object == step.mode.object ? step.symmetry : map.symmetry};
+}
+
+std::string percent(double probability) {
+  // Rounds down: what is not quite certain is not called so.
+  return fmt::format("{:.{}f} %", std::floor(1000.0 * probability) / 10.0,
+                     probability >= 0.9 ? 1 : 0);
+}
+
+}  // namespace
+
+BeliefPlaces places_of(const Recogniser& recogniser, const Estimate& estimate,
+                       const RecognitionTask& task, const RecognitionStep& step) {
+  // Bins below it hold a thousandth of an object's belief, or of uncommonly many bins more: these
+  // say little of peaks.
+  const double least_share = std::max(1e-3 / static_cast<double>(task.lattice().bins()), 1e-7);
+  const std::vector<double> probability = probabilities(estimate, task, step);
+  std::vector<int> objects;
+  for (std::size_t i = 0; i < probability.size(); ++i) {
+    const auto object = static_cast<int>(i);
+    if (probability[i] >= least_probability || object == step.mode.object) {
+      objects.push_back(object);
+    }
+  }
+  PoseLattice lattice;
+  const auto likely = recogniser.likely_bins(objects, least_share, lattice);
+  BeliefPlaces places;
+  for (std::size_t k = 0; k < objects.size(); ++k) {
+    const int object = objects[k];
+    const BinnedObject of = binned(lattice, task, step, object);
+    for (BeliefMode& mode : find_modes(of, likely[k])) {
+      mode.object = object;
+      mode.probability *= probability[object];
+      if (mode.probability >= least_probability) {
+        places.modes.push_back(mode);
+      }
+    }
+    if (object != step.mode.object) {
+      continue;
+    }
+    const std::vector<PartAway> parts = parts_away(of, likely[k], step.pose());
+    places.share = probability[object] * share_within(parts, neighbourhood_mm);
+    const double proven = step.certificate ? 1.0 - step.certificate->dropped_mass : 1.0;
+    double sum = 0.0;
+    for (const PartAway& part : parts) {
+      sum += part.share;
+      if (sum * probability[object] * proven >= held) {
+        places.within_mm = part.mm;
+        break;
+      }
+    }
+  }
+  std::ranges::stable_sort(places.modes, std::greater<>(), &BeliefMode::probability);
+  places.modes.resize(std::min(places.modes.size(), most_modes));
+  const BinnedObject posed = binned(lattice, task, step, step.mode.object);
+  double nearest_mm = neighbourhood_mm;
+  for (std::size_t i = 0; i < places.modes.size(); ++i) {
+    const BeliefMode& mode = places.modes[i];
+    const double mm =
+        mode.object == step.mode.object
+            ? pose_error_mm(posed.body, posed.symmetry, mode.best, step.mode.T_object_robot)
+            : 2.0 * neighbourhood_mm;
+    if (mm <= nearest_mm) {
+      nearest_mm = mm;
+      places.own = i;
+    }
+  }
+  return places;
+}
+
+Decision decide(const RecognitionStep& step, const RecognitionTask& task) {
+  const std::string& best = task.labels[step.best];
+  const std::string& posed = task.labels[task.label_of[step.mode.object]];
+  if (best == none_label) {
+    return {false, fmt::format("{} has {}: the object was probably never learned", best,
+                               percent(step.confidence()))};
+  }
+  if (step.fit && step.fit->verdict == Verdict::does_not_fit) {
+    return {false, fmt::format("the touches do not fit {}, {:.0f} standard deviations worse than "
+                               "its own do",
+                               posed, -step.fit->z)};
+  }
+  const bool bounded = !step.identity_bounds.empty();
+  const double proven = bounded ? step.identity_bounds[step.best].low : step.confidence();
+  if (!(proven >= task.act.above)) {
+    // The sentence names the bound where the probability itself is enough.
+    return {false, fmt::format("{} has {}{}, less than {:g} %", best,
+                               step.confidence() >= task.act.above ? "been proven only " : "",
+                               percent(proven), 100.0 * task.act.above)};
+  }
+  const BeliefPlaces& places = step.places;
+  if (places.within_mm && *places.within_mm <= task.act.below_mm) {
+    return {true, fmt::format("{} has {}, and 95 % of the belief lies within {:.2f} mm of its pose",
+                              best, percent(proven), *places.within_mm)};
+  }
+  for (std::size_t i = 0; i < places.modes.size(); ++i) {
+    const auto& [object, probability, at, pose] = places.modes[i];
+    if (i != places.own && probability >= 1.0 - held) {
+      const Pose& there = pose.T_robot_object;
+      return {false,
+              fmt::format(
+                  "{:.0f} % of the belief lies elsewhere: {} at x {:.2f} mm, y {:.2f} mm, "
+                  "theta {:.2f} deg",
+                  100.0 * probability, task.labels[task.label_of[object]], there.translation_mm.x,
+                  there.translation_mm.y,
+                  180.0 / std::numbers::pi * wrap_angle(there.theta_rad, 2.0 * std::numbers::pi))};
+    }
+  }
+  if (!places.within_mm) {
+    return {false,
+            fmt::format("less than 95 % of the belief is known to lie near the pose of {}", posed)};
+  }
+  return {false,
+          fmt::format("95 % of the belief lies within {:.2f} mm of the pose, not within {:g} "
+                      "mm",
+                      *places.within_mm, task.act.below_mm)};
+}
+
+}  // namespace palpate
