@@ -115,7 +115,7 @@ def program() -> None:
     coverage, decisions = Table(COLUMNS), []
     with tempfile.TemporaryDirectory() as folder:
         learned = pathlib.Path(folder, "sensor.yaml")
-        palpate.calibrate(training, device=device).sensor.save(learned)
+        palpate.calibrate(training, layer="log_odds", device=device).sensor.save(learned)
         for sensor, given in (("Eq. 7", {}), ("learned", {"sensor_model": learned})):
             records = palpate.recognize(trials, maps, trace=True, device=device, **given)
             for touches in TOUCHES:

@@ -58,15 +58,16 @@ std::string confusions(const std::vector<RecognitionRecord>& records, const Reco
 std::string decisions(const std::vector<RecognitionRecord>& records) {
   constexpr std::size_t few = 3;
   std::string text;
-  if (records.size() > few) {
-    const auto acts = std::ranges::count_if(
-        records, [](const RecognitionRecord& record) { return record.last().decision.act; });
-    return fmt::format("act on {} of {} unknowns\n", acts, records.size());
-  }
+  std::size_t decided = 0;
+  std::size_t acts = 0;
   for (const RecognitionRecord& record : records) {
-    text += fmt::format("{}: {}\n", printable_name(record), decision_words(record.last()));
+    if (const std::string words = decision_words(record.last()); !words.empty()) {
+      text += fmt::format("{}: {}\n", printable_name(record), words);
+      ++decided;
+      acts += record.last().decision.act ? 1 : 0;
+    }
   }
-  return text;
+  return decided > few ? fmt::format("act on {} of {} unknowns\n", acts, decided) : text;
 }
 
 /// Every warning once, after the names of the unknowns that it is of.

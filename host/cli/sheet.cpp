@@ -90,7 +90,10 @@ RecognitionSheet sheet_of(const RecognitionRecord& record, const Unknown& unknow
   sheet.title = name_of(record);
   // A long label must leave the pose its room.
   constexpr std::size_t longest_identity = 32;
-  sheet.result = (last.decision.act ? "Act: " : "Do not act: ") +
+  const bool decided = !last.decision.because.empty();
+  sheet.result = std::string(!decided            ? ""
+                             : last.decision.act ? "Act: "
+                                                 : "Do not act: ") +
                  shorten_middle(identity_words(last, task), longest_identity) + ": " +
                  printed(pose_words(pose_text(last))) + " in the robot frame";
   sheet.captions = captions(record, task);

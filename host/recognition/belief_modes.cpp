@@ -4,40 +4,25 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <numbers>
-#include <numeric>
-#include <optional>
-#include <unordered_map>
 
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 
+#include "recognition/belief_cells.hpp"
+
 namespace palpate {
 
 namespace {
 
-constexpr double cell_mm = 1.0;
-constexpr double saddle_nats = 1.0;   ///< a peak's least height above the saddle to a higher one
-constexpr double foot_nats = 7.0;     ///< how far below its peak a mode reaches
 constexpr double least_share = 1e-4;  ///< of a mode; peaks of less are not compared
-constexpr std::int64_t most_cells = std::int64_t{1} << 22;
 constexpr double circle_rad = 2.0 * std::numbers::pi;
 
-double spin_mm(const Body& body) { return std::sqrt(std::max(body.inertia_mm2, 1e-12)); }
-
-/// Indices along x, y and theta.
-using Index = std::array<int, 3>;
-
-std::array<const Axis*, 3> axes_of(const PoseLattice& lattice) {
-  return {&lattice.x_mm, &lattice.y_mm, &lattice.theta_rad};
-}
-
-Index index_of(const PoseLattice& lattice, std::int64_t bin) {
-  const auto in_plane = static_cast<int>(bin % lattice.plane());
-  return {in_plane % lattice.x_mm.count, in_plane / lattice.x_mm.count,
-          static_cast<int>(bin / lattice.plane())};
+glm::dvec3 step_of(const PoseLattice& lattice) {
+  return {lattice.x_mm.step(), lattice.y_mm.step(), lattice.theta_rad.step()};
 }
 
 /// The body at poses of a lattice, in the robot frame.
@@ -45,13 +30,16 @@ class PlacedBody {
  public:
   struct Place {
     glm::dvec2 centroid_mm{0.0};
-    double theta_rad = 0.0;  ///< of T_robot_object, of any number of turns
+    glm::dvec2 origin_mm{0.0};  ///< of the object frame
+    double theta_rad = 0.0;     ///< of T_robot_object, of any number of turns
   };
 
   explicit PlacedBody(const BinnedObject& of) : of_(of) {}
 
   Place at(const Pose& T_object_robot) const {
-    return {inverse(T_object_robot) * of_.body.centroid_mm, -T_object_robot.theta_rad};
+    const Pose T_robot_object = inverse(T_object_robot);
+    return {T_robot_object * of_.body.centroid_mm, T_robot_object.translation_mm,
+            T_robot_object.theta_rad};
   }
   Place at(double x_mm, double y_mm, double theta_rad) {
     if (theta_rad != theta_rad_) {  // bins mostly come theta by theta
@@ -59,11 +47,13 @@ class PlacedBody {
       cos_ = std::cos(theta_rad);
       sin_ = std::sin(theta_rad);
     }
-    const glm::dvec2 d = of_.body.centroid_mm - glm::dvec2(x_mm, y_mm);
-    return {of_.lattice.pivot_mm + glm::dvec2(cos_ * d.x + sin_ * d.y, cos_ * d.y - sin_ * d.x),
-            -theta_rad};
+    const auto turned_back = [&](const glm::dvec2& v) {
+      return glm::dvec2(cos_ * v.x + sin_ * v.y, cos_ * v.y - sin_ * v.x);
+    };
+    const glm::dvec2 origin_mm = of_.lattice.pivot_mm - turned_back({x_mm, y_mm});
+    return {origin_mm + turned_back(of_.body.centroid_mm), origin_mm, -theta_rad};
   }
-  Place at(const Index& bin) {
+  Place at(const AxisIndices& bin) {
     return at(of_.lattice.x_mm.centre(bin[0]), of_.lattice.y_mm.centre(bin[1]),
               of_.lattice.theta_rad.centre(bin[2]));
   }
@@ -84,7 +74,9 @@ class PlacedBody {
   /// within half a turn of its.
   Pose T_robot_object(const Place& place, const Place& like) const {
     const double theta_rad = like.theta_rad + turn_rad(like, place);
-    return {place.centroid_mm - rotate(theta_rad, of_.body.centroid_mm), theta_rad};
+    return {of_.symmetry == 1 ? place.origin_mm
+                              : place.centroid_mm - rotate(theta_rad, of_.body.centroid_mm),
+            theta_rad};
   }
 
  private:
@@ -92,169 +84,6 @@ class PlacedBody {
   double theta_rad_ = std::numeric_limits<double>::quiet_NaN();
   double cos_ = 1.0;
   double sin_ = 0.0;
-};
-
-/// The lattice in cells of some bins each, as far as bins reach.
-class Cells {
- public:
-  static constexpr int outside = -2;  ///< label of a cell of no mode
-  static constexpr int unseen = -1;
-
-  Cells(const BinnedObject& of, std::span<const BinShare> bins) : lattice_(of.lattice) {
-    const std::array width{cell_mm, cell_mm, cell_mm / spin_mm(of.body)};
-    Index low = {lattice_.x_mm.count, lattice_.y_mm.count, lattice_.theta_rad.count};
-    Index high = {0, 0, 0};
-    for (const BinShare& bin : bins) {
-      const Index at = index_of(lattice_, bin.bin);
-      for (int i = 0; i < 3; ++i) {
-        low[i] = std::min(low[i], at[i]);
-        high[i] = std::max(high[i], at[i]);
-      }
-    }
-    if (lattice_.full_circle()) {
-      low[2] = 0;
-      high[2] = lattice_.theta_rad.count - 1;
-    }
-    for (double wider = 1.0;; wider *= 2.0) {
-      for (int i = 0; i < 3; ++i) {
-        const Axis& axis = *axes_of(lattice_)[i];
-        const double bins_wide = axis.step() > 0.0 ? wider * width[i] / axis.step() : 1.0;
-        every_[i] = static_cast<int>(std::lround(std::clamp(bins_wide, 1.0, 1.0 * axis.count)));
-        first_[i] = low[i] / every_[i];
-        count_[i] = high[i] / every_[i] - first_[i] + 1;
-      }
-      if (std::int64_t{count_[0]} * count_[1] * count_[2] <= most_cells) {
-        break;
-      }
-    }
-    density_.resize(static_cast<std::size_t>(count_[0]) * count_[1] * count_[2]);
-    for (const BinShare& bin : bins) {
-      density_[cell_of(bin.bin)] += bin.share;
-    }
-    for (std::size_t cell = 0; cell < density_.size(); ++cell) {
-      if (density_[cell] > 0.0) {
-        density_[cell] /= bins_in(cell);
-        seen_.push_back(cell);
-      }
-    }
-    label_.resize(density_.size(), unseen);
-  }
-
-  std::size_t cell_of(std::int64_t bin) const {
-    const Index at = index_of(lattice_, bin);
-    std::size_t cell = 0;
-    for (const int i : {2, 1, 0}) {
-      cell = cell * count_[i] + (at[i] / every_[i] - first_[i]);
-    }
-    return cell;
-  }
-
-  /// Labels every cell with the peak that it belongs to; peaks are counted from 0.
-  void climb() {
-    std::ranges::sort(seen_, [&](std::size_t a, std::size_t b) {
-      return density_[a] != density_[b] ? density_[a] > density_[b] : a < b;
-    });
-    std::array<std::size_t, 26> denser{};
-    for (const std::size_t cell : seen_) {
-      const std::span near(denser.data(), neighbours(cell, denser));
-      if (near.empty()) {
-        label_[cell] = static_cast<int>(peaks_.size());
-        peaks_.push_back({density_[cell], label_[cell]});
-        continue;
-      }
-      const std::size_t up = *std::ranges::max_element(
-          near, [&](std::size_t a, std::size_t b) { return density_[a] < density_[b]; });
-      label_[cell] = label_[up] == outside ? outside : root(label_[up]);
-      if (label_[cell] == outside ||
-          density_[cell] < peaks_[label_[cell]].density * std::exp(-foot_nats)) {
-        label_[cell] = outside;
-        continue;
-      }
-      for (const std::size_t other : near) {
-        if (label_[other] != outside) {
-          join(root(label_[cell]), root(label_[other]), density_[cell]);
-        }
-      }
-    }
-  }
-
-  /// The peak of a bin's cell, after climb(); none where the cell is of no mode.
-  std::optional<int> peak_of(std::int64_t bin) {
-    const int label = label_[cell_of(bin)];
-    return label == outside ? std::nullopt : std::optional(root(label));
-  }
-
- private:
-  struct Peak {
-    double density = 0.0;
-    int parent = 0;  ///< the higher peak that this one is part of, or itself
-  };
-
-  /// The number of bins that a cell holds: fewer at the end of an axis.
-  double bins_in(std::size_t cell) const {
-    double bins = 1.0;
-    for (int i = 0; i < 3; ++i) {
-      const int at = static_cast<int>(cell % count_[i]) + first_[i];
-      bins *= std::min(every_[i], axes_of(lattice_)[i]->count - at * every_[i]);
-      cell /= count_[i];
-    }
-    return bins;
-  }
-
-  /// Writes the neighbours that have a label; returns how many there are.
-  std::size_t neighbours(std::size_t cell, std::array<std::size_t, 26>& near) const {
-    Index at{};
-    for (int i = 0; i < 3; ++i) {
-      at[i] = static_cast<int>(cell % count_[i]);
-      cell /= count_[i];
-    }
-    std::size_t n = 0;
-    for (int dt = -1; dt <= 1; ++dt) {
-      int theta = at[2] + dt;
-      if (lattice_.full_circle()) {
-        theta = (theta + count_[2]) % count_[2];
-      }
-      for (int y = std::max(at[1] - 1, 0); y <= std::min(at[1] + 1, count_[1] - 1); ++y) {
-        for (int x = std::max(at[0] - 1, 0); x <= std::min(at[0] + 1, count_[0] - 1); ++x) {
-          const bool same = x == at[0] && y == at[1] && theta == at[2];
-          if (theta < 0 || theta >= count_[2] || same) {
-            continue;
-          }
-          const std::size_t other =
-              (static_cast<std::size_t>(theta) * count_[1] + y) * count_[0] + x;
-          if (label_[other] != unseen) {
-            near[n++] = other;
-          }
-        }
-      }
-    }
-    return n;
-  }
-
-  int root(int peak) {
-    while (peaks_[peak].parent != peak) {
-      peak = peaks_[peak].parent = peaks_[peaks_[peak].parent].parent;
-    }
-    return peak;
-  }
-
-  /// Makes the lower of two peaks part of the higher where it hardly stands above their saddle.
-  void join(int a, int b, double saddle) {
-    const int low = peaks_[a].density < peaks_[b].density ? a : b;
-    const int high = low == a ? b : a;
-    if (low != high && peaks_[low].density * std::exp(-saddle_nats) < saddle) {
-      peaks_[low].parent = high;
-    }
-  }
-
-  const PoseLattice& lattice_;
-  Index every_{};  ///< bins of a cell
-  Index first_{};  ///< cell
-  Index count_{};
-  std::vector<double> density_;    ///< [theta, y, x] mean share of a cell's bins
-  std::vector<std::size_t> seen_;  ///< cells that have bins
-  std::vector<int> label_;
-  std::vector<Peak> peaks_;
 };
 
 /// Sums over the bins of a mode, of T_robot_object less that of its best bin.
@@ -276,18 +105,17 @@ glm::dmat3 spread_in_bin(const PoseLattice& lattice, const Pose& T_robot_object)
   jacobian[0] = {-rotate(theta_rad, {1.0, 0.0}), 0.0};
   jacobian[1] = {-rotate(theta_rad, {0.0, 1.0}), 0.0};
   jacobian[2] = {-lever.y, lever.x, 1.0};
+  const glm::dvec3 step = step_of(lattice);
   glm::dmat3 variance{0.0};
   for (int i = 0; i < 3; ++i) {
-    const double step = axes_of(lattice)[i]->step();
-    variance[i][i] = step * step / 12.0;
+    variance[i][i] = step[i] * step[i] / 12.0;
   }
   return jacobian * variance * glm::transpose(jacobian);
 }
 
-ObjectPose pose_of(const Moments& moments, const PlacedBody& body, const BinnedObject& of) {
+ObjectPose pose_of(const Moments& moments, const BinnedObject& of) {
   const glm::dvec3 mean = moments.sum / moments.share;
-  const Pose best = body.T_robot_object(moments.best, moments.best);
-  RefinedPose at{{best.translation_mm + glm::dvec2(mean), best.theta_rad + mean.z}, {}};
+  RefinedPose at{{moments.best.origin_mm + glm::dvec2(mean), moments.best.theta_rad + mean.z}, {}};
   const glm::dmat3 covariance = moments.squares / moments.share - glm::outerProduct(mean, mean) +
                                 spread_in_bin(of.lattice, at.T_object_robot);
   for (int i = 0; i < 9; ++i) {
@@ -295,37 +123,36 @@ ObjectPose pose_of(const Moments& moments, const PlacedBody& body, const BinnedO
   }
   // The inverse of the inverse: least_turned() is of T_object_robot.
   const ObjectPose inverted = inverse(at);
-  return inverse(
-      least_turned(of.body, of.symmetry, {inverted.T_robot_object, inverted.covariance}));
+  ObjectPose pose =
+      inverse(least_turned(of.body, of.symmetry, {inverted.T_robot_object, inverted.covariance}));
+  pose.T_robot_object.theta_rad = wrap_angle(pose.T_robot_object.theta_rad, circle_rad);
+  return pose;
 }
 
-/// The bins' peaks, each with its best bin and share, those of equal places made one: [peak] the
-/// mode that it is of, or none.
-std::unordered_map<int, std::size_t> join_near(const std::unordered_map<int, Moments>& peaks,
-                                               const PlacedBody& body,
-                                               std::vector<Moments>& modes) {
-  std::vector<int> order;
-  for (const auto& [peak, moments] : peaks) {
-    if (moments.share >= least_share) {
+/// Makes modes of the peaks; a peak near a higher one is of that one's mode. Their sums are empty.
+/// @param peaks each with its best bin and share
+/// @param mode_of [peak] receives the mode that each peak is of; stays where it is of none
+std::vector<Moments> modes_of(std::span<const Moments> peaks, const PlacedBody& body,
+                              std::vector<std::size_t>& mode_of) {
+  std::vector<std::size_t> order;
+  for (std::size_t peak = 0; peak < peaks.size(); ++peak) {
+    if (peaks[peak].share >= least_share) {
       order.push_back(peak);
     }
   }
-  std::ranges::sort(order, [&](int a, int b) {
-    const double of_a = peaks.at(a).best_share;
-    const double of_b = peaks.at(b).best_share;
-    return of_a != of_b ? of_a > of_b : a < b;
-  });
-  std::unordered_map<int, std::size_t> mode_of;
-  for (const int peak : order) {
+  std::ranges::stable_sort(order, std::greater<>(),
+                           [&](std::size_t peak) { return peaks[peak].best_share; });
+  std::vector<Moments> modes;
+  for (const std::size_t peak : order) {
     const auto near = std::ranges::find_if(modes, [&](const Moments& mode) {
-      return body.apart_mm(mode.best, peaks.at(peak).best) <= neighbourhood_mm;
+      return body.apart_mm(mode.best, peaks[peak].best) <= neighbourhood_mm;
     });
     mode_of[peak] = static_cast<std::size_t>(near - modes.begin());
     if (near == modes.end()) {
-      modes.push_back({.best = peaks.at(peak).best, .best_bin = peaks.at(peak).best_bin});
+      modes.push_back({.best = peaks[peak].best, .best_bin = peaks[peak].best_bin});
     }
   }
-  return mode_of;
+  return modes;
 }
 
 }  // namespace
@@ -334,36 +161,39 @@ std::vector<BeliefMode> find_modes(const BinnedObject& of, std::span<const BinSh
   if (bins.empty()) {
     return {};
   }
-  Cells cells(of, bins);
+  std::vector<AxisIndices> at;
+  at.reserve(bins.size());
+  for (const BinShare& bin : bins) {
+    at.push_back(indices_of(of.lattice, bin.bin));
+  }
+  BeliefCells cells(of, bins, at);
   cells.climb();
   PlacedBody body(of);
-  std::unordered_map<int, Moments> peaks;
-  std::vector<std::optional<int>> peak_of;
-  for (const BinShare& bin : bins) {
-    peak_of.push_back(cells.peak_of(bin.bin));
-    if (peak_of.back()) {
-      Moments& peak = peaks[*peak_of.back()];
-      peak.share += bin.share;
-      if (bin.share > peak.best_share) {
-        peak.best_share = bin.share;
-        peak.best_bin = bin.bin;
-        peak.best = body.at(index_of(of.lattice, bin.bin));
-      }
-    }
-  }
-  std::vector<Moments> moments;
-  const auto mode_of = join_near(peaks, body, moments);
+  std::vector<Moments> peaks(cells.peaks());
   for (std::size_t i = 0; i < bins.size(); ++i) {
-    const auto mode = peak_of[i] ? mode_of.find(*peak_of[i]) : mode_of.end();
-    if (mode == mode_of.end()) {
+    const int peak = cells.peak_of(at[i]);
+    if (peak == BeliefCells::outside) {
       continue;
     }
-    Moments& sums = moments[mode->second];
-    const Pose best = body.T_robot_object(sums.best, sums.best);
-    const Pose T_robot_object =
-        body.T_robot_object(body.at(index_of(of.lattice, bins[i].bin)), sums.best);
-    const glm::dvec3 d(T_robot_object.translation_mm - best.translation_mm,
-                       T_robot_object.theta_rad - best.theta_rad);
+    Moments& sums = peaks[peak];
+    sums.share += bins[i].share;
+    if (bins[i].share > sums.best_share) {
+      sums.best_share = bins[i].share;
+      sums.best_bin = bins[i].bin;
+      sums.best = body.at(at[i]);
+    }
+  }
+  std::vector<std::size_t> mode_of(peaks.size(), peaks.size());
+  std::vector<Moments> moments = modes_of(peaks, body, mode_of);
+  for (std::size_t i = 0; i < bins.size(); ++i) {
+    const int peak = cells.peak_of(at[i]);
+    if (peak == BeliefCells::outside || mode_of[peak] == peaks.size()) {
+      continue;
+    }
+    Moments& sums = moments[mode_of[peak]];
+    const Pose T_robot_object = body.T_robot_object(body.at(at[i]), sums.best);
+    const glm::dvec3 d(T_robot_object.translation_mm - sums.best.origin_mm,
+                       T_robot_object.theta_rad - sums.best.theta_rad);
     sums.share += bins[i].share;
     sums.sum += bins[i].share * d;
     sums.squares += bins[i].share * glm::outerProduct(d, d);
@@ -372,7 +202,7 @@ std::vector<BeliefMode> find_modes(const BinnedObject& of, std::span<const BinSh
   for (const Moments& sums : moments) {
     modes.push_back({.probability = sums.share,
                      .best = of.lattice.T_object_robot(sums.best_bin),
-                     .pose = pose_of(sums, body, of)});
+                     .pose = pose_of(sums, of)});
   }
   return modes;
 }
@@ -380,18 +210,18 @@ std::vector<BeliefMode> find_modes(const BinnedObject& of, std::span<const BinSh
 std::vector<PartAway> parts_away(const BinnedObject& of, std::span<const BinShare> bins,
                                  const Pose& T_object_robot) {
   constexpr double near_in_bins = 5.0;
+  constexpr double counts = 1e-3;  // a bin of less tells little of how far the belief reaches
   constexpr std::array thirds{-1.0 / 3.0, 0.0, 1.0 / 3.0};
-  const glm::dvec3 step(of.lattice.x_mm.step(), of.lattice.y_mm.step(),
-                        of.lattice.theta_rad.step());
+  const glm::dvec3 step = step_of(of.lattice);
   const double bin_mm = glm::length(step * glm::dvec3(1.0, 1.0, spin_mm(of.body)));
   PlacedBody body(of);
   const PlacedBody::Place from = body.at(T_object_robot);
   std::vector<PartAway> parts;
   parts.reserve(bins.size());
   for (const BinShare& bin : bins) {
-    const Index at = index_of(of.lattice, bin.bin);
+    const AxisIndices at = indices_of(of.lattice, bin.bin);
     const double mm = body.apart_mm(from, body.at(at));
-    if (mm > near_in_bins * bin_mm) {
+    if (mm > near_in_bins * bin_mm || bin.share < counts) {
       parts.push_back({mm, bin.share});
       continue;
     }
@@ -406,16 +236,27 @@ std::vector<PartAway> parts_away(const BinnedObject& of, std::span<const BinShar
       }
     }
   }
-  std::ranges::sort(parts, {}, &PartAway::mm);
   return parts;
 }
 
 double share_within(std::span<const PartAway> parts, double mm) {
   double share = 0.0;
-  for (auto part = parts.begin(); part != parts.end() && part->mm <= mm; ++part) {
-    share += part->share;
+  for (const PartAway& part : parts) {
+    share += part.mm <= mm ? part.share : 0.0;
   }
   return share;
+}
+
+std::optional<double> distance_holding(std::vector<PartAway> parts, double share) {
+  if (share_within(parts, std::numeric_limits<double>::infinity()) < share) {
+    return {};
+  }
+  std::ranges::sort(parts, {}, &PartAway::mm);
+  auto part = parts.begin();
+  for (double held = part->share; held < share && part + 1 != parts.end(); held += part->share) {
+    ++part;
+  }
+  return part->mm;
 }
 
 }  // namespace palpate

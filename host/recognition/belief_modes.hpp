@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -46,11 +47,14 @@ struct PartAway {
   double share = 0.0;
 };
 
-/// How far the bins lie from a pose, the nearest first. A bin that is near for its width is divided
-/// into 27 equal parts, since it stands for all of its poses.
+/// How far the bins lie from a pose. A bin that is near for its width, and has at least a
+/// thousandth of the object's belief, is divided into 27 equal parts, since it stands for all of
+/// its poses.
 std::vector<PartAway> parts_away(const BinnedObject& of, std::span<const BinShare> bins,
                                  const Pose& T_object_robot);
 /// The share that lies within this distance.
 double share_within(std::span<const PartAway> parts, double mm);
+/// The least distance within which this share lies, mm; none where the parts hold less.
+std::optional<double> distance_holding(std::vector<PartAway> parts, double share);
 
 }  // namespace palpate

@@ -76,17 +76,12 @@ BeliefPlaces places_of(const Recogniser& recogniser, const Estimate& estimate,
     if (object != step.mode.object) {
       continue;
     }
-    const std::vector<PartAway> parts = parts_away(of, likely[k], step.pose());
+    std::vector<PartAway> parts = parts_away(of, likely[k], step.pose());
     places.share = probability[object] * share_within(parts, neighbourhood_mm);
     const double proven = step.certificate ? 1.0 - step.certificate->dropped_mass : 1.0;
-    double sum = 0.0;
-    for (const PartAway& part : parts) {
-      sum += part.share;
-      if (sum * probability[object] * proven >= held) {
-        places.within_mm = part.mm;
-        break;
-      }
-    }
+    // Above 1 where the object has less than all that is to lie near.
+    const double share = held / (probability[object] * proven);
+    places.within_mm = share <= 1.0 ? distance_holding(std::move(parts), share) : std::nullopt;
   }
   std::ranges::stable_sort(places.modes, std::greater<>(), &BeliefMode::probability);
   places.modes.resize(std::min(places.modes.size(), most_modes));

@@ -25,7 +25,6 @@ nlohmann::ordered_json to_json(const std::array<double, 9>& covariance) {
 nlohmann::ordered_json to_json(const RecognitionStep& step, const RefinedPose& refined) {
   return {{"T_robot_object", to_json(step.T_robot_object())},
           {"sd", *step.sd()},
-          {"share", step.places.share},
           {"x_mm", refined.T_object_robot.translation_mm.x},
           {"y_mm", refined.T_object_robot.translation_mm.y},
           {"theta_rad", refined.T_object_robot.theta_rad},
@@ -119,6 +118,9 @@ nlohmann::ordered_json to_json(const RecognitionStep& step, const RecognitionTas
   }
   json["T_robot_object"] = to_json(step.mode_T_robot_object());
   if (!step.decision.because.empty()) {
+    if (step.refined) {
+      json["refined"]["share"] = step.places.share;
+    }
     json["modes"] = nlohmann::ordered_json::array();
     for (const BeliefMode& each : step.places.modes) {
       json["modes"].push_back(to_json(each, task));

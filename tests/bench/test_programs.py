@@ -200,3 +200,14 @@ def test_the_page_needs_no_network(sweep: Program) -> None:
     assert page.counts["circle"] > len(document["points"])
     assert "{{" not in text
     sweep.expect_charts("sweep_front", "sweep_precision", "sweep_bins", "sweep_bounds")
+
+
+def test_regions_hold_the_truth_as_often_as_can_be(tmp_path: pathlib.Path) -> None:
+    document = Program(tmp_path, "bench.coverage", "--quick", "--trials", 1).document
+    rows = {(row["sensor"], row["region"], row["touches"]): row for row in document["coverage"]}
+    assert len(rows) == 3 * 4, "modes by both sensors and bins, after four numbers of touches"
+    for row in rows.values():
+        assert row["unknowns"] == 3
+        assert row["0.68"]["mean"] <= row["0.95"]["mean"], "the larger region holds the smaller"
+    assert rows["Eq. 7", "modes", 1]["0.95"]["mean"] > 0.5
+    assert len(document["decisions"]) == 2 * 4

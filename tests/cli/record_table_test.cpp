@@ -70,6 +70,36 @@ TEST(ResultTable, SaysThePoseInTheRobotFrameWithItsDeviation) {
             "  mode              A                  399.00        -20.00        31.51\n");
 }
 
+TEST(ResultTable, SaysFirstWhetherToActAndBelowWhereElseTheObjectMayBe) {
+  RecognitionRecord record = sample_record("mug.h5");
+  RecognitionStep& step = record.trace.back();
+  step.decision = {.act = false, .because = "11 % of the belief lies elsewhere"};
+  step.places.own = 0;
+  step.places.modes = {
+      {.object = 0, .probability = 0.8},
+      {.object = 1, .probability = 0.11, .pose = {{{1.0, -2.0}, 0.5}, {0.04, 0.0, 0.0, 0.0, 0.09}}},
+      {.object = 1, .probability = 0.04}};
+  EXPECT_EQ(result_table({record}, sample_task(), {}),
+            "mug.h5: do not act: 11 % of the belief lies elsewhere\n"
+            "recording  touches  best  prob.          x mm          y mm    theta deg\n"
+            "mug.h5           9  A     0.988  398.76+-0.05  -20.50+-0.10  28.65+-0.57\n"
+            "  or                I     0.110    1.00+-0.20   -2.00+-0.30  28.65+-0.00\n"
+            "  mode              A                  399.00        -20.00        31.51\n");
+  EXPECT_THAT(result_table({record, record, record, record}, sample_task(), {}),
+              testing::StartsWith("act on 0 of 4 unknowns\nrecording"));
+  const nlohmann::ordered_json json = to_json(step, sample_task());
+  EXPECT_EQ(json.begin().key(), "decision");
+  EXPECT_EQ(json["modes"].size(), 3U);
+  EXPECT_EQ(json["modes"][1]["object"], "I");
+  EXPECT_EQ(json["modes"][1]["covariance"][1][1], 0.09);
+}
+
+TEST(Words, OfAnObjectThatDoesNotFitDoNotCallItSo) {
+  RecognitionRecord record = sample_record("mug.h5");
+  record.trace.back().fit = Fit{.z = -6.0, .verdict = Verdict::does_not_fit};
+  EXPECT_EQ(identity_words(record.last(), sample_task()), "unlike A (98.8 %)");
+}
+
 TEST(ResultTable, SaysTheModeAndTheTruthBelow) {
   const RecognitionTask task = sample_task();
   const RecognitionRecord record = sample_trial("mug.h5", task);

@@ -67,3 +67,25 @@ def test_recordings_of_different_units_are_not_recognised_together(
     )
     with pytest.raises(palpate.Error, match="raw"):
         palpate.recognize([unknown, raw], maps, bins=(5, 5, 4), device=device)
+
+
+def test_likely_bins_and_modes_are_the_belief(
+    device: palpate.Device, maps: list[palpate.OccupancyGrid], unknown: palpate.Recording
+) -> None:
+    belief = palpate.PoseHistogram(device, maps)
+    belief.update(unknown)
+    bins, shares = belief.likely_bins(1, 1e-7)
+    logs = belief.log_likelihood(1).ravel()
+    expected = numpy.exp(logs - logs.max())
+    assert shares == pytest.approx(expected[bins] / expected.sum(), rel=1e-3)
+    assert shares.sum() == pytest.approx(1.0, abs=1e-3)
+    (record,) = palpate.recognize(unknown, maps, device=device)
+    first = record.modes[0]
+    assert first.object == record.best and first.covariance.shape == (3, 3)
+    assert sum(mode.probability for mode in record.modes) <= 1.0 + 1e-9
+    assert 0.0 < record.refined.share <= 1.0
+    assert "act" in repr(record) and record.decision.because
+    (lenient,) = palpate.recognize(unknown, maps, device=device, act_below_mm=20.0, act_above=0.5)
+    assert lenient.decision.act and lenient.decision.within_mm <= 20.0
+    with pytest.raises(palpate.Error, match="act_above=2"):
+        palpate.recognize(unknown, maps, device=device, act_above=2.0)

@@ -199,87 +199,80 @@ std::vector<BeliefSummary> DenseBelief::summarise(std::vector<BeliefSummary> reu
   return summaries;
 }
 
-std::vector<std::int64_t> DenseBelief::bins_at(std::size_t object, const BeliefSummary& summary,
-                                               std::span<const double> parts) const {
-  /// A block with some of the parts in it.
-  struct Hit {
-    const BeliefBlock* block;
-    double before;  ///< summed probability before the block
-    std::vector<TwoFloat> bins;
-  };
-  std::vector<Hit> hits;
-  std::vector<std::size_t> hit_of;  // [part]
-  auto block = summary.blocks.begin();
-  double before = 0.0;
-  for (const double part : parts) {
-    while (block + 1 != summary.blocks.end() && before + block->sum <= part * summary.sum) {
-      before += block->sum;
-      ++block;
-    }
-    if (hits.empty() || hits.back().block != &*block) {
-      hits.push_back({&*block, before, std::vector<TwoFloat>(block->bins)});
-    }
-    hit_of.push_back(hits.size() - 1);
-  }
-  for (Hit& hit : hits) {
-    const Slab& slab = slabs_[hit.block->slab];
-    stream_.download(slab.log_likelihood, hit.bins,
-                     (slab.first_bin(object) + hit.block->first) * sizeof(TwoFloat));
-  }
-  stream_.run();
-
-  std::vector<std::int64_t> found;
-  std::size_t hit = hits.size();
-  std::size_t bin = 0;
-  double reached = 0.0;  // up to and with `bin`
-  const auto mass = [&] { return std::exp(hits[hit].bins[bin].value() - summary.max.value()); };
-  for (std::size_t i = 0; i < parts.size(); ++i) {
-    if (hit_of[i] != hit) {
-      hit = hit_of[i];
-      bin = 0;
-      reached = hits[hit].before + mass();
-    }
-    // Rounding must not lead past the block's last bin.
-    while (bin + 1 < hits[hit].bins.size() && reached <= parts[i] * summary.sum) {
-      ++bin;
-      reached += mass();
-    }
-    const BeliefBlock& from = *hits[hit].block;
-    found.push_back(
-        lattice_index(lattice_, slabs_[from.slab], from.first + static_cast<std::int64_t>(bin)));
-  }
-  return found;
-}
-
 template <typename Wanted, typename Visit>
 void DenseBelief::read_blocks(std::size_t object, const BeliefSummary& summary,
                               const Wanted& wanted, const Visit& visit) const {
   constexpr std::size_t most_bins = std::size_t{1} << 20;  // read at once
   std::vector<std::pair<const BeliefBlock*, std::vector<TwoFloat>>> read;
-  std::size_t bins = 0;
   const auto take_in = [&] {
     stream_.run();
-    for (const auto& [block, of_block] : read) {
-      visit(*block, of_block);
+    for (const auto& [block, bins] : read) {
+      visit(*block, bins);
     }
     read.clear();
-    bins = 0;
   };
   for (const BeliefBlock& block : summary.blocks) {
     if (!wanted(block)) {
       continue;
     }
     const Slab& slab = slabs_[block.slab];
-    std::vector<TwoFloat>& of_block =
-        read.emplace_back(&block, std::vector<TwoFloat>(block.bins)).second;
-    stream_.download(slab.log_likelihood, of_block,
+    read.emplace_back(&block, std::vector<TwoFloat>(block.bins));
+    stream_.download(slab.log_likelihood, read.back().second,
                      (slab.first_bin(object) + block.first) * sizeof(TwoFloat));
-    bins += of_block.size();
-    if (bins >= most_bins) {
+    if (read.size() * reduction_.bins() >= most_bins) {
       take_in();
     }
   }
   take_in();
+}
+
+std::vector<std::int64_t> DenseBelief::bins_at(std::size_t object, const BeliefSummary& summary,
+                                               std::span<const double> parts) const {
+  /// A block with some of the parts in it.
+  struct Hit {
+    const BeliefBlock* block;
+    double before;          ///< summed probability before the block
+    std::size_t parts_end;  ///< in `parts`
+  };
+  std::vector<Hit> hits;
+  auto block = summary.blocks.begin();
+  double before = 0.0;
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    while (block + 1 != summary.blocks.end() && before + block->sum <= parts[i] * summary.sum) {
+      before += block->sum;
+      ++block;
+    }
+    if (hits.empty() || hits.back().block != &*block) {
+      hits.push_back({&*block, before, i});
+    }
+    hits.back().parts_end = i + 1;
+  }
+  std::vector<std::int64_t> found;
+  auto wanted = hits.begin();
+  auto hit = hits.begin();
+  read_blocks(
+      object, summary,
+      [&](const BeliefBlock& next) {
+        const bool is_hit = wanted != hits.end() && wanted->block == &next;
+        wanted += is_hit ? 1 : 0;
+        return is_hit;
+      },
+      [&](const BeliefBlock& from, std::span<const TwoFloat> bins) {
+        std::size_t bin = 0;
+        const auto mass = [&] { return std::exp(bins[bin].value() - summary.max.value()); };
+        double reached = hit->before + mass();  // up to and with `bin`
+        while (found.size() < hit->parts_end) {
+          // Rounding must not lead past the block's last bin.
+          while (bin + 1 < bins.size() && reached <= parts[found.size()] * summary.sum) {
+            ++bin;
+            reached += mass();
+          }
+          found.push_back(lattice_index(lattice_, slabs_[from.slab],
+                                        from.first + static_cast<std::int64_t>(bin)));
+        }
+        ++hit;
+      });
+  return found;
 }
 
 double DenseBelief::entropy(std::size_t object, const BeliefSummary& summary) const {
