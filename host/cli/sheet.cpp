@@ -35,19 +35,18 @@ std::vector<RecognitionSheet::Caption> captions(const RecognitionRecord& record,
       lines.push_back({words, alarm});
     }
   };
-  add(printed(last.decision.because), !last.decision.act);
+  add(printed(printable(last.decision.because)), !last.decision.act);
   add(printed(truth_words(last)), last.right == false);
-  if (last.refined) {
-    std::string mode = "most probable bin: " + pose_words(pose_text(last.mode_T_robot_object()));
-    mode += last.error_mm ? "; error " + error_text(last.error_mm) + " mm" : "";
-    add(printed(mode), false);
-  }
+  constexpr std::size_t shown = 2;
+  const std::vector<BeliefMode> other = other_modes(last);
   std::string others;
-  for (const BeliefMode& mode : other_modes(last)) {
-    others += fmt::format("{}{:.0f} % {} at {}", others.empty() ? "or " : "; ",
-                          100.0 * mode.probability, printable(mode_words(mode.object, task)),
-                          pose_words(pose_text(mode.pose.T_robot_object)));
+  for (std::size_t k = 0; k < std::min(other.size(), shown); ++k) {
+    others +=
+        fmt::format("{}{:.0f} % {} at {}", k == 0 ? "or " : ", ", 100.0 * other[k].probability,
+                    printable(mode_words(other[k].object, task)),
+                    pose_words(pose_text(other[k].pose.T_robot_object)));
   }
+  others += other.size() > shown ? fmt::format(", and {} more", other.size() - shown) : "";
   add(printed(others), true);
   add(unproven_sentence(last, task), true);
   const std::string misfit = misfit_sentence(last, record.touches, task);
@@ -68,6 +67,11 @@ std::vector<RecognitionSheet::Caption> captions(const RecognitionRecord& record,
   if (const std::vector<std::string> warnings = warning_words(last); !warnings.empty()) {
     const std::size_t more = warnings.size() - 1;
     add((more > 0 ? fmt::format("(1 of {}) ", more + 1) : "") + warnings.front(), true);
+  }
+  if (last.refined) {
+    std::string mode = "most probable bin: " + pose_words(pose_text(last.mode_T_robot_object()));
+    mode += last.error_mm ? "; error " + error_text(last.error_mm) + " mm" : "";
+    add(printed(mode), false);
   }
   return lines;
 }
@@ -95,7 +99,7 @@ RecognitionSheet sheet_of(const RecognitionRecord& record, const Unknown& unknow
                              : last.decision.act ? "Act: "
                                                  : "Do not act: ") +
                  shorten_middle(identity_words(last, task), longest_identity) + ": " +
-                 printed(pose_words(pose_text(last))) + " in the robot frame";
+                 printed(pose_words(pose_text(last)));
   sheet.captions = captions(record, task);
   sheet.map = task.hypotheses[last.mode.object].map;
   sheet.map.symmetry = last.symmetry;
