@@ -78,7 +78,8 @@ std::string summary(const LiveState& state, std::vector<double> latencies_ms,
   std::string text;
   if (state.last) {
     const RecognitionStep& step = state.last->step;
-    text += result_words(step, task) + "\n";
+    const std::string decision = decision_words(step);
+    text += (decision.empty() ? "" : decision + "\n") + result_words(step, task) + "\n";
     std::vector<std::string> more{
         decision_words(step), truth_words(step), unproven_sentence(step, task),
         misfit_sentence(step, state.touches, task), single_touch_words(task, state.touches)};

@@ -92,11 +92,10 @@ class Record(Fields):
             return f"Record(error: {self['error']})"
         probability = self["identity"][self["best"]]
         pose = self.get("refined", self)["T_robot_object"]
-        acts = self["decision"]["act"]
         return (
-            f"Record({'act' if acts else 'do not act'}: '{self['best']}' with probability "
-            f"{probability:.3f}, T_robot_object x {pose[0]:.2f} mm, y {pose[1]:.2f} mm, "
-            f"theta {pose[2]:.3f} rad)"
+            f"Record('{self['best']}' with probability {probability:.3f}, T_robot_object "
+            f"x {pose[0]:.2f} mm, y {pose[1]:.2f} mm, theta {pose[2]:.3f} rad: "
+            f"{'act' if self['decision']['act'] else 'do not act'})"
         )
 
 

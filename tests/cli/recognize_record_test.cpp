@@ -43,13 +43,28 @@ std::vector<std::string> keys_of(const json& object) {
 TEST_F(RecognizeRecord, HasTheDocumentedKeysAndTypes) {
   const json r = record({"u.h5", "--maps", "A.map.h5", "I.map.h5"});
   // By bounds, as the automatic bins are many.
-  EXPECT_EQ(keys_of(r), (std::vector<std::string>{"T_robot_object",  "best",    "bins_evaluated",
-                                                  "blocks_bounded",  "device",  "dropped_mass",
-                                                  "error_mm",        "fit",     "identity",
-                                                  "identity_bounds", "mode",    "mode_certain",
-                                                  "recording",       "refined", "refined_error_mm",
-                                                  "right",           "seconds", "surprise",
-                                                  "touches",         "truth"}));
+  EXPECT_EQ(keys_of(r), (std::vector<std::string>{"T_robot_object",
+                                                  "best",
+                                                  "bins_evaluated",
+                                                  "blocks_bounded",
+                                                  "decision",
+                                                  "device",
+                                                  "dropped_mass",
+                                                  "error_mm",
+                                                  "fit",
+                                                  "identity",
+                                                  "identity_bounds",
+                                                  "mode",
+                                                  "mode_certain",
+                                                  "modes",
+                                                  "recording",
+                                                  "refined",
+                                                  "refined_error_mm",
+                                                  "right",
+                                                  "seconds",
+                                                  "surprise",
+                                                  "touches",
+                                                  "truth"}));
   EXPECT_EQ(r["recording"], "u.h5");
   EXPECT_EQ(r["touches"], 6);
   EXPECT_TRUE(r["touches"].is_number_integer());
@@ -228,6 +243,7 @@ TEST_F(RecognizeRecord, TraceTellsTheSameAfterEveryTouch) {
                                   "best",
                                   "bins_evaluated",
                                   "blocks_bounded",
+                                  "decision",
                                   "dropped_mass",
                                   "error_mm",
                                   "fit",
@@ -235,6 +251,7 @@ TEST_F(RecognizeRecord, TraceTellsTheSameAfterEveryTouch) {
                                   "identity_bounds",
                                   "mode",
                                   "mode_certain",
+                                  "modes",
                                   "refined",
                                   "refined_error_mm",
                                   "right"};
