@@ -85,7 +85,7 @@ TEST_F(RecognizeRecord, HasTheDocumentedKeysAndTypes) {
   EXPECT_TRUE(r["refined_error_mm"].is_number());
   const json& refined = r["refined"];
   EXPECT_EQ(keys_of(refined), (std::vector<std::string>{"T_robot_object", "covariance", "sd",
-                                                        "theta_rad", "x_mm", "y_mm"}));
+                                                        "share", "theta_rad", "x_mm", "y_mm"}));
   EXPECT_EQ(refined["T_robot_object"].size(), 3u);
   EXPECT_EQ(refined["sd"].size(), 3u);
   EXPECT_EQ(keys_of(r["truth"]), (std::vector<std::string>{"T_robot_object", "object"}));
