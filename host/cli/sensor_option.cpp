@@ -31,6 +31,10 @@ constexpr const char* poses_help =
     "header of "
     "these names";
 
+/// Of add_array_flags().
+constexpr const char* array_flags[] = {"--array", "--first-element", "--order", "--dead",
+                                       "--pressure-unit"};
+
 /// Standard input as a sensor.
 std::unique_ptr<LineSensor> open_lines(const SensorArguments& arguments,
                                        const PosedSensor::Complaint& complain) {
@@ -59,14 +63,13 @@ std::unique_ptr<LineSensor> open_lines(const SensorArguments& arguments,
 void require_no_array(const SensorArguments& arguments) {
   const ImportOptions& given = arguments.lines;
   const ImportOptions unset;
-  for (const auto& [flag, is_unset] :
-       {std::pair{"--array", given.array == unset.array},
-        std::pair{"--first-element", given.first_element == unset.first_element},
-        std::pair{"--order", given.order == unset.order},
-        std::pair{"--dead", given.dead == unset.dead},
-        std::pair{"--pressure-unit", given.pressure_unit == unset.pressure_unit}}) {
-    if (!is_unset) {
-      refuse(flag, "is for --sensor -, frames on standard input; sensor {} has an array of its own",
+  const bool is_set[] = {given.array != unset.array, given.first_element != unset.first_element,
+                         given.order != unset.order, given.dead != unset.dead,
+                         given.pressure_unit != unset.pressure_unit};
+  for (std::size_t i = 0; i < std::size(array_flags); ++i) {
+    if (is_set[i]) {
+      refuse(array_flags[i],
+             "is for --sensor -, frames on standard input; sensor {} has an array of its own",
              arguments.sensor);
     }
   }
@@ -133,6 +136,9 @@ void add_sensor_flags(CLI::App& command, SensorArguments& arguments,
   command.add_option("--sensor", arguments.sensor, sensor_help)->required();
   command.add_option("--poses", arguments.poses, std::string(poses_help) + poses_default);
   add_array_flags(command, arguments.lines);
+  for (const char* flag : array_flags) {
+    command.get_option(flag)->group("Of --sensor -");
+  }
 }
 
 CLI::Option* add_array_flags(CLI::App& command, ImportOptions& options) {

@@ -89,4 +89,6 @@ def test_the_first_page_runs(tmp_path: pathlib.Path) -> None:
     numpy.testing.assert_allclose(bag.pressure, tables.pressure, rtol=1e-6)
     known = ~numpy.isnan(bag.T_robot_sensor[:, 0])  # the last frame may be a rounding after the last pose
     assert known[:-1].all()
-    numpy.testing.assert_allclose(bag.T_robot_sensor[known], tables.T_robot_sensor[known], atol=1e-2)
+    off = (bag.T_robot_sensor - tables.T_robot_sensor)[known]
+    off[:, 2] = numpy.sin(off[:, 2])  # a quaternion knows no full turns
+    assert numpy.abs(off).max() < 0.01

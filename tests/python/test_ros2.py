@@ -5,7 +5,9 @@ import importlib
 import math
 import pathlib
 import sys
+from types import SimpleNamespace
 from typing import Any
+from unittest.mock import MagicMock
 
 import numpy
 import pytest
@@ -214,6 +216,101 @@ def test_a_session_recognises_a_stream(device: palpate.Device) -> None:
             touched.add(0.01 * k, frame.values)
     with pytest.raises(palpate.Error, match="has no list of numbers sensors.values"):
         readings(new("std_msgs/msg/Float32MultiArray"), "tactile_msgs/msg/TactileState")
+
+
+class StandIns:
+    """What node.py takes from ROS, which is not there: a node that keeps what it publishes."""
+
+    def __init__(self, parameters: dict[str, Any], frames: list[palpate.Frame]) -> None:
+        self.published: dict[str, list[Any]] = {"~/pose": [], "~/map": [], "~/markers": []}
+        self.said: list[str] = []
+        self.asked: list[tuple[str, str]] = []
+        outer = self
+
+        class Node:
+            def __init__(self, name: str) -> None:
+                assert name == "recognise"
+
+            def declare_parameter(self, name: str, default: Any) -> Any:
+                return SimpleNamespace(value=parameters.get(name, default))
+
+            def create_publisher(self, kind: Any, topic: str, _: Any) -> Any:
+                return SimpleNamespace(publish=lambda message: outer.publish(kind, topic, message))
+
+            def create_subscription(self, *_: Any) -> None: ...
+
+            def create_service(self, *_: Any) -> None: ...
+
+            def get_clock(self) -> Any:
+                return SimpleNamespace(now=lambda: SimpleNamespace(nanoseconds=round(1e9 * outer.now_s)))
+
+            def get_logger(self) -> Any:
+                return SimpleNamespace(info=outer.said.append, warning=lambda text, **_: outer.said.append(text))
+
+        class Buffer:
+            def lookup_transform(self, target: str, source: str, at: Any, _: Any) -> Any:
+                outer.asked.append((target, source))
+                times = numpy.array([frame.host_time_s for frame in frames])
+                frame = frames[int(numpy.abs(times - 1e-9 * at.nanoseconds).argmin())]
+                x, y, theta = frame.T_robot_sensor
+                transform = new("geometry_msgs/msg/TransformStamped")
+                transform.transform.translation = TYPES.types["geometry_msgs/msg/Vector3"](x / 1000, y / 1000, 0.1)
+                transform.transform.rotation = TYPES.types["geometry_msgs/msg/Quaternion"](*about_z(theta))
+                return transform
+
+        def named(**values: Any) -> Any:
+            return SimpleNamespace(**values)
+
+        self.now_s = 0.0
+        anything: Any = MagicMock()
+        self.modules = {
+            "rclpy": anything, "rclpy.duration": anything, "rclpy.qos": anything, "std_srvs": anything,
+            "rclpy.executors": named(ExternalShutdownException=OSError, MultiThreadedExecutor=anything),
+            "rclpy.node": named(Node=Node), "rclpy.time": named(Time=named),
+            "rosidl_runtime_py": anything, "std_srvs.srv": anything,
+            "rosidl_runtime_py.utilities": named(get_message=lambda kind: lambda: new(kind)),
+            "tf2_ros": named(Buffer=Buffer, TransformException=KeyError, TransformListener=lambda *_: None),
+        }  # fmt: skip
+
+    def publish(self, kind: Any, topic: str, message: Any) -> None:
+        assert message.__msgtype__ == kind().__msgtype__
+        self.published[topic].append(message)
+
+
+def test_the_node_publishes_what_it_finds(
+    device: palpate.Device, tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for letter in "AE":
+        builder = palpate.MapBuilder(device)
+        builder.add(palpate.simulate(letter))
+        builder.build(letter).save(tmp_path / f"{letter}.map.h5")
+    palpate.simulate("A", palpate.random_poses(2, seed=1)).save(tmp_path / "A.h5")
+    with palpate.open_sensor("simulate:E,object=5:3:40,touches=4,seed=3,speed=max") as sensor:
+        frames = list(sensor)
+    parameters = {"maps": str(tmp_path), "recording": str(tmp_path / "A.h5"), "base_frame": "base"}
+    ros = StandIns(parameters, frames)
+    for name, module in ros.modules.items():
+        monkeypatch.setitem(sys.modules, name, module)
+    monkeypatch.delitem(sys.modules, "palpate_ros2.node", raising=False)
+    node = importlib.import_module("palpate_ros2.node").Recognise()
+    for frame in frames:
+        message = new("std_msgs/msg/Float32MultiArray")
+        message.data = numpy.array(frame.values, dtype=numpy.float32)
+        ros.now_s = frame.host_time_s
+        node.take(message)
+    assert ros.asked == [("base", "array")] * 4
+    assert [text for text in ros.said if text.startswith("touch 4: E with probability 1.000, fits")]
+    # Each message where something was found; the pose where it is sure.
+    assert len(ros.published["~/map"]) == len(ros.published["~/markers"]) >= len(ros.published["~/pose"]) >= 1
+    pose = sent(ros.published["~/pose"][-1])
+    truth = palpate.inverse((5.0, 3.0, math.radians(40)))
+    assert pose.header.frame_id == "base"
+    assert (pose.pose.pose.position.x, pose.pose.pose.position.y) == pytest.approx(truth[:2] / 1000, abs=1e-3)
+    assert pose.pose.pose.position.z == pytest.approx(0.1)
+    assert node.next_unknown(None, SimpleNamespace()).message == "forgot 4 touches"
+    message.data = message.data[:35]
+    node.take(message)
+    assert "35 readings for an array of 36 elements" in ros.said[-1]
 
 
 def test_the_launch_file_has_the_nodes_parameters() -> None:
