@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "model/number_text.hpp"
+#include "model/printable.hpp"
 
 namespace palpate {
 
@@ -23,10 +24,10 @@ constexpr std::size_t left_out = reading + 1;
 constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 
 /// Adds the numbers of a list, or of lists in it; false where it holds anything else.
-bool add_readings(const nlohmann::json& list, std::vector<double>& values) {
+bool add_readings(const nlohmann::json& list, std::vector<double>& values, bool nested = false) {
   return std::ranges::all_of(list, [&](const nlohmann::json& item) {
-    if (item.is_array()) {
-      return add_readings(item, values);
+    if (item.is_array() && !nested) {
+      return add_readings(item, values, true);
     }
     if (item.is_number() || item.is_null()) {
       values.push_back(item.is_null() ? unknown : item.get<double>());
@@ -146,7 +147,10 @@ std::variant<Frame, FrameLines::Problem, FrameLines::Header> FrameLines::read_cs
     }
     const std::optional<double> number = reading_in(cells[i]);
     if (!number || (column == 0 && !std::isfinite(*number))) {
-      return Problem{Kind::no_number, fmt::format("'{}' in column {} is no {}", cells[i], i + 1,
+      // A message stays one short line whatever the cell holds.
+      const bool shown = cells[i].size() <= 60 && is_printable(cells[i]);
+      return Problem{Kind::no_number, fmt::format("column {}{} is no {}", i + 1,
+                                                  shown ? fmt::format(" = '{}'", cells[i]) : "",
                                                   column == 0 ? "time" : "number")};
     }
     if (column == reading) {

@@ -12,9 +12,9 @@ namespace palpate {
 
 /// Reads lines with frames, and perhaps the pose at which each was read.
 ///
-/// JSON: an object with `pressure`, a list of the array's readings or lists of them, and where they
-/// are known `time` (s) and x_mm, y_mm and theta_rad of T_robot_sensor; or the list alone. null is
-/// an Unknown reading.
+/// JSON: an object with `pressure`, a list of the array's readings or a list of such lists, and
+/// where they are known `time` (s) and x_mm, y_mm and theta_rad of T_robot_sensor; or the list
+/// alone. null is an Unknown reading.
 ///
 /// CSV, its cells separated by tabs, semicolons, commas or blanks: with a header, columns of the
 /// names above and one for each reading (`device_time` and `lost_before` are left out); without
