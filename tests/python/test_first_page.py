@@ -21,8 +21,8 @@ LOGS = [("cup", "A", 24, (0, 0, 0)), ("key", "E", 24, (0, 0, 0)), ("unknown", "E
 
 def frames_of(shape: str, touches: int, seed: int, pose: tuple[int, int, int]) -> list[palpate.Frame]:
     x, y, deg = pose
-    name = f"simulate:{shape},array=8:8:1.9,rate=50,touches={touches},seed={seed},object={x}:{y}:{deg},speed=max"
-    with palpate.open_sensor(name) as sensor:
+    name = f"simulate:{shape},array=8:8:1.9,rate=50,touches={touches},seed={seed}"
+    with palpate.open_sensor(f"{name},object={x}:{y}:{deg},speed=max") as sensor:
         return list(sensor)
 
 
@@ -75,7 +75,8 @@ def test_the_first_page_runs(tmp_path: pathlib.Path) -> None:
 
     out = said(blocks[0])
     assert "48 touches: nothing is wrong with the set-up" in out
-    [found] = re.findall(r"unknown\.h5 +5 +key +1\.000 .*?([-0-9.]+)\+-\S+ +([-0-9.]+)\+-\S+ +([-0-9.]+)\+-\S+ +fits", out)
+    number = r" +([-0-9.]+)\+-\S+"
+    [found] = re.findall(rf"unknown\.h5 +5 +key +1\.000 .*?{number}{number}{number} +fits", out)
     truth = palpate.inverse((20, -10, numpy.radians(40)))
     assert [float(text) for text in found[:2]] == pytest.approx(truth[:2], abs=1.0)
     assert float(found[2]) == pytest.approx(numpy.degrees(truth[2]), abs=4.0)

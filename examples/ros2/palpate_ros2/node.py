@@ -31,7 +31,8 @@ class Recognise(Node):  # type: ignore[misc]  # of rclpy, which mypy may not fin
         super().__init__("recognise")
         text, number = self._text, self._number
         self.base, self.sensor_frame = text("base_frame", "base_link"), text("array_frame", "array")
-        self.type, self.field = text("pressure_type", "std_msgs/msg/Float32MultiArray"), text("pressure_field", "")
+        self.type = text("pressure_type", "std_msgs/msg/Float32MultiArray")
+        self.field = text("pressure_field", "")
         self.least_probability = number("least_probability", 0.99)
         maps = sorted(pathlib.Path(text("maps", "maps")).glob("*.map.h5"))
         if not maps:
@@ -49,13 +50,17 @@ class Recognise(Node):  # type: ignore[misc]  # of rclpy, which mypy may not fin
         self.tf = Buffer()
         self.listener = TransformListener(self.tf, self)
         latest = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        self.pose = self.create_publisher(get_message("geometry_msgs/msg/PoseWithCovarianceStamped"), "~/pose", 10)
-        self.map = self.create_publisher(get_message("nav_msgs/msg/OccupancyGrid"), "~/map", latest)
-        self.markers = self.create_publisher(get_message("visualization_msgs/msg/MarkerArray"), "~/markers", latest)
+        self.pose = self._publisher("geometry_msgs/msg/PoseWithCovarianceStamped", "~/pose", 10)
+        self.map = self._publisher("nav_msgs/msg/OccupancyGrid", "~/map", latest)
+        self.markers = self._publisher("visualization_msgs/msg/MarkerArray", "~/markers", latest)
         # Frames wait here while an estimate is under way.
         waiting = QoSProfile(depth=2000, reliability=ReliabilityPolicy.BEST_EFFORT)
-        self.create_subscription(get_message(self.type), text("pressure_topic", "pressure"), self.take, waiting)
+        topic = text("pressure_topic", "pressure")
+        self.create_subscription(get_message(self.type), topic, self.take, waiting)
         self.create_service(Trigger, "~/next_unknown", self.next_unknown)
+
+    def _publisher(self, kind: str, topic: str, qos: Any) -> Any:
+        return self.create_publisher(get_message(kind), topic, qos)
 
     def _text(self, name: str, default: str) -> str:
         return str(self.declare_parameter(name, default).value)
@@ -90,7 +95,8 @@ class Recognise(Node):  # type: ignore[misc]  # of rclpy, which mypy may not fin
         record = self.session.recognise(touch, T_robot_sensor)
         probability = record.identity[record.best]
         self.get_logger().info(
-            f"touch {self.session.touches}: {record.best} with probability {probability:.3f}, {record.fit.verdict}"
+            f"touch {self.session.touches}: {record.best} with probability {probability:.3f}, "
+            f"{record.fit.verdict}"
         )
         for warning in record.get("warnings", ()):
             self.get_logger().warning(warning)
