@@ -12,6 +12,7 @@ import palpate
 
 ROOT = pathlib.Path(__file__).parents[2]
 EXAMPLES = sorted((ROOT / "examples" / "python").glob("*.py"))
+NODE = sorted((ROOT / "examples" / "ros2" / "palpate_ros2").glob("*.py"))
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
@@ -38,10 +39,10 @@ def test_types_are_strict() -> None:
     assert (package / "_palpate.pyi").exists()
     assert (package / "reference.pyi").exists()
     assert (package / "py.typed").exists()
-    assert len(EXAMPLES) == 3
+    assert (len(EXAMPLES), len(NODE)) == (3, 4)
     # Of the package, the type stubs of the extension modules too.
     command = ROOT / "python" / "palpate_command.py"
-    for checked in ([*EXAMPLES, command], ["-p", "palpate"], ["-p", "bench"]):
+    for checked in ([*EXAMPLES, *NODE, command], ["-p", "palpate"], ["-p", "bench"]):
         run = subprocess.run(
             [sys.executable, "-m", "mypy", "--strict", "--cache-dir", os.devnull, *checked],
             cwd=ROOT, capture_output=True, text=True, timeout=300,
