@@ -10,9 +10,9 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 import palpate
+from palpate import _charts as charts
 from palpate._tables import column
 
-from . import charts
 from .belief_touches import MISPLACED_SEED, Inputs
 from .measures import turning
 from .program import Json

@@ -11,10 +11,10 @@ import time
 from collections.abc import Sequence
 
 import palpate
+from palpate import _charts as charts
 from palpate._sweep_runs import counts_of
 from palpate._tables import Table, count_text, plain, print_table
 
-from . import charts
 from .measures import differences, knee_of
 from .program import Json, begin, main, parser, write
 from .sweep_page import charts_of, page_of

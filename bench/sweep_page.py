@@ -9,10 +9,10 @@ from typing import Any
 import numpy
 from numpy.typing import NDArray
 
+from palpate import _charts as charts
 from palpate._statistics import LEAST_GAIN
 from palpate._tables import Column, column, count_text, mean_text, seconds_text, texts, value_of
 
-from . import charts
 from .program import Json
 from .sweep_runs import AUTO_RULE, SAMPLED
 from .sweep_tables import BOUNDS, LIMITS, PRECISIONS, RUNS, STEPS, VERDICTS
