@@ -104,7 +104,8 @@ void CommandFiles::prepare() const {
     const std::filesystem::path folder = output.file.parent_path();
     const bool later = output.in_own_folder && !std::filesystem::exists(folder);
     if (output.in_own_folder && !later && !std::filesystem::is_directory(folder)) {
-      refuse(folder, "the folder cannot be made, a file has its name; choose another name");
+      refuse(folder, "the folder cannot be made ({}); choose another name",
+             std::make_error_code(std::errc::not_a_directory).message());
     }
     if (!output.is_stream && !later) {
       const AtomicFile probe(output.file);
