@@ -161,8 +161,7 @@ void record(const RecordArguments& options) {
   CommandFiles files;
   add_sensor_files(options, files);
   files.writes("-o", options.output);
-  files.require_distinct();
-  require_writable(options.output);
+  files.prepare();
   if (options.seconds) {
     require_above("--seconds", *options.seconds, 0.0);
   } else if (is_endless_flood(options.sensor)) {
