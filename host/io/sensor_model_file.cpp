@@ -262,7 +262,8 @@ LearnedSensor read_sensor_model(const std::filesystem::path& path) {
           }},
          {"fit_scale", [&](const Entry& e) {
             FitScale& scale = sensor.fit_scale.emplace();
-            read_section(e, {{"mean", &scale.mean}, {"sd", &scale.sd}});
+            read_section(
+                e, {{"mean", &scale.mean}, {"sd", &scale.sd}, {"shared_sd", &scale.shared_sd}});
           }}});
   });
   if (!has_format) {
@@ -310,7 +311,9 @@ void write_sensor_model(const std::filesystem::path& path, const LearnedSensor& 
                   {"lead_slope", familiarity->lead_slope}});
   }
   if (const auto& scale = sensor.fit_scale) {
-    emit_section(out, "fit_scale", {{"mean", scale->mean}, {"sd", scale->sd}});
+    emit_section(
+        out, "fit_scale",
+        {{"mean", scale->mean}, {"sd", scale->sd}, {"shared_sd", scale->shared_sd}});
   }
   if (sensor.features) {
     emit_features(out, *sensor.features);

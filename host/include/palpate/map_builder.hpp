@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -8,6 +9,7 @@
 #include "palpate/api.hpp"
 #include "palpate/contact.hpp"
 #include "palpate/device.hpp"
+#include "palpate/fit.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/sensor_model.hpp"
 
@@ -69,6 +71,9 @@ struct MapSource {
   /// centre_frame().
   Recording touches;
   MapOptions options;
+  /// What the z of single touches is like by Eq. 7 with gamma 0.1, each at its pose on a map of the
+  /// others: mean and sd alone. None where too few touches tell.
+  std::optional<FitScale> left_out = {};
 };
 
 /// Returns the map as its `source` makes it with another prior; its frame, its layers and all else
