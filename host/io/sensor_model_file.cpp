@@ -311,9 +311,8 @@ void write_sensor_model(const std::filesystem::path& path, const LearnedSensor& 
                   {"lead_slope", familiarity->lead_slope}});
   }
   if (const auto& scale = sensor.fit_scale) {
-    emit_section(
-        out, "fit_scale",
-        {{"mean", scale->mean}, {"sd", scale->sd}, {"shared_sd", scale->shared_sd}});
+    emit_section(out, "fit_scale",
+                 {{"mean", scale->mean}, {"sd", scale->sd}, {"shared_sd", scale->shared_sd}});
   }
   if (sensor.features) {
     emit_features(out, *sensor.features);

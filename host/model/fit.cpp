@@ -58,9 +58,9 @@ Fit FitScale::of(const Fit& fit, std::size_t touches) const {
     return fit;
   }
   const auto n = static_cast<double>(touches);
-  const double z = std::clamp(
-      (fit.z - mean * std::sqrt(n)) / std::sqrt(sd * sd + n * shared_sd * shared_sd),
-      -largest_fit_z, largest_fit_z);
+  const double z =
+      std::clamp((fit.z - mean * std::sqrt(n)) / std::sqrt(sd * sd + n * shared_sd * shared_sd),
+                 -largest_fit_z, largest_fit_z);
   return {.z = z, .verdict = verdict_on(z, scaled_fits_from_z, scaled_doubtful_from_z)};
 }
 

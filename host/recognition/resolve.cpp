@@ -193,8 +193,7 @@ FitScale left_out_scale(const RecognitionTask& task) {
     }
     scales.push_back(*source->left_out);
   }
-  return scales.empty() || !resolves(task.lattice(), task.hypotheses) ? FitScale{}
-                                                                       : pooled(scales);
+  return scales.empty() || !resolves(task.lattice(), task.hypotheses) ? FitScale{} : pooled(scales);
 }
 
 PoseLattice with_counts(PoseLattice lattice, const std::array<int, 3>& counts) {

@@ -105,7 +105,8 @@ Request request_of_learned() {
   Request request = request_of_shapes();
   request.bins = std::array{40, 40, 200};
   for (std::size_t i = 0; i < 2; ++i) {
-    const MapSource source{.touches = {}, .options = {}, .left_out = FitScale{0.5 + double(i), 0.5}};
+    const MapSource source{
+        .touches = {}, .options = {}, .left_out = FitScale{0.5 + double(i), 0.5}};
     request.given_maps[i].hypothesis.map.source = std::make_shared<const MapSource>(source);
   }
   return request;
