@@ -49,7 +49,11 @@ FITS: list[Column] = [
 
 
 def fits_of(steps: list[Json]) -> Json:
-    """The fits of unknowns after some number of touches: z, and the share of each verdict."""
+    """The fits of unknowns after some number of touches: z, and the share of each verdict.
+
+    Of the unknowns that a touch was in contact with.
+    """
+    steps = [step for step in steps if "fit" in step]
     z, verdicts = column(steps, "fit/z"), [step["fit"]["verdict"] for step in steps]
     shares = {
         verdict: share_record(verdicts.count(verdict), len(steps))

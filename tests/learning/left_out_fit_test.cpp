@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -13,7 +14,6 @@
 
 #include "palpate/files.hpp"
 #include "palpate/simulation.hpp"
-#include "scratch_folder.hpp"
 
 namespace palpate::left_out_fit_test {
 
@@ -66,7 +66,8 @@ TEST_F(LeftOutFit, NeedsSixteenTouchesInContact) {
 }
 
 TEST_F(LeftOutFit, IsKeptInTheMapsFile) {
-  const ScratchFolder folder;
+  const std::filesystem::path file =
+      std::filesystem::path(testing::TempDir()) / "left_out_fit_test.map.h5";
   const Recording learned = touches(40, 1);
   MapBuilder builder(device_, MapOptions());
   builder.add(learned.touches(0, learned.size()));
@@ -74,12 +75,13 @@ TEST_F(LeftOutFit, IsKeptInTheMapsFile) {
   for (const auto& left_out : {std::optional<FitScale>{}, left_out_fit(device_, {learned, {}})}) {
     MapSource source{learned, MapOptions(), left_out};
     map.source = std::make_shared<const MapSource>(std::move(source));
-    write_map(folder / "E.map.h5", map);
-    const auto read = read_map(folder / "E.map.h5").source->left_out;
+    write_map(file, map);
+    const auto read = read_map(file).source->left_out;
     ASSERT_EQ(read.has_value(), left_out.has_value());
     EXPECT_TRUE(!read || (read->mean == left_out->mean && read->sd == left_out->sd));
     EXPECT_EQ(with_prior(device_, map, 0.3).source->left_out.has_value(), left_out.has_value());
   }
+  std::filesystem::remove(file);
 }
 
 }  // namespace palpate::left_out_fit_test

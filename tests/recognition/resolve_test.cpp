@@ -180,7 +180,7 @@ TEST(Request, ValuesThatCannotBeMeantAreRefused) {
   EXPECT_THAT(refused([](Request& r) { r.pivot_mm = glm::dvec2(1e10, 0.0); }),
               HasSubstr("`pivot-mm 1"));
   EXPECT_THAT(refused([](Request& r) { r.gamma = 1.0; }), HasSubstr("`gamma 1`"));
-  EXPECT_THAT(refused([](Request& r) { r.none = 0.0; }), HasSubstr("`none 0`"));
+  EXPECT_THAT(refused([](Request& r) { r.none = -1.0; }), HasSubstr("`none -1`"));
   EXPECT_THAT(refused([](Request& r) { r.touch_sd_mm = 500.0; }),
               HasSubstr("`touch-sd-mm 500`: wider than the region, 20 mm"));
   EXPECT_THAT(refused([](Request& r) { r.particles = 10; }), HasSubstr("add `filter particles`"));
