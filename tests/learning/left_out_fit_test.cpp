@@ -39,7 +39,8 @@ TEST_F(LeftOutFit, IsThatOfTouchesToCome) {
   builder.add(learned.touches(0, learned.size()));
   const OccupancyGrid map = builder.build("E");
   std::vector<double> z;
-  for (const Touch& touch : touches(100, 2).touches(0, 100)) {
+  const Recording others = touches(100, 2);
+  for (const Touch& touch : others.touches(0, 100)) {
     z.push_back(fit_of(std::span(&touch, 1), Pose{}, map, ContactModel{})->z);
   }
   const FitScale to_come = scale_of(z).value();
