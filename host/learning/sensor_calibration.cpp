@@ -9,10 +9,10 @@
 
 #include <fmt/format.h>
 
+#include "estimation/maps/left_out_fit.hpp"
 #include "io/element_spacing.hpp"
 #include "learning/feature_learning.hpp"
 #include "learning/host_progress.hpp"
-#include "learning/left_out_fit.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {

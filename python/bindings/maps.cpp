@@ -6,7 +6,7 @@
 
 #include "bindings.hpp"
 #include "estimate.hpp"
-#include "learning/left_out_fit.hpp"
+#include "estimation/maps/left_out_fit.hpp"
 #include "palpate/balanced_lattice.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"

@@ -1,6 +1,6 @@
 // What touches that a map has not seen are like.
 
-#include "learning/left_out_fit.hpp"
+#include "estimation/maps/left_out_fit.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -76,8 +76,8 @@ struct MapSource {
   std::optional<FitScale> left_out = {};
 };
 
-/// Returns the map as its `source` makes it with another prior; its frame, its layers and all else
-/// stay.
+/// Returns the map as its `source` makes it with another prior, and what its touches are like where
+/// they are left out; its frame, its layers and all else stay.
 /// @throws Error where it has no source, or its cells are not those of its source, and as
 /// MapBuilder does
 PALPATE_API OccupancyGrid with_prior(Device& device, const OccupancyGrid& map, double prior);

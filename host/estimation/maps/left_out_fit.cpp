@@ -1,4 +1,4 @@
-#include "learning/left_out_fit.hpp"
+#include "estimation/maps/left_out_fit.hpp"
 
 #include <algorithm>
 #include <cmath>
