@@ -2,8 +2,6 @@
 
 from dataclasses import replace
 
-import numpy
-
 import palpate
 from palpate._tables import Column, Table, column, number, plain
 
@@ -22,7 +20,7 @@ from .trials import (
 
 SEEDS = {"learned": 200_000_000, "never learned": 300_000_000}
 SHAPES = {"learned": VOWELS, "never learned": MISFITS}
-TOUCHES = (1, 3, 5, 9)
+TOUCHES = (1, 3, 5, 9, 15)
 
 EXACT = Touching(at_random_poses=True)
 #: What touches the unknowns, and how finely they are recognised.
@@ -44,20 +42,24 @@ FITS: list[Column] = [
         for who in SHAPES
         for verdict in ("fits", "doubtful", "does not fit")
     ),
-    ("learned: median z", "learned/median_z", number(".1f")),
+    ("learned: mean z", "learned/mean_z", number(".2f")),
+    ("standard deviation", "learned/sd_z", number(".2f")),
     ("lowest", "learned/least_z", number(".1f")),
-    ("standard deviation", "learned/sd_z", number(".1f")),
 ]
 
 
 def fits_of(steps: list[Json]) -> Json:
-    """The fits of unknowns after some number of touches: z, and the share of each verdict."""
+    """The fits of unknowns after some number of touches: z, and the share of each verdict.
+
+    Of the unknowns that a touch was in contact with.
+    """
+    steps = [step for step in steps if "fit" in step]
     z, verdicts = column(steps, "fit/z"), [step["fit"]["verdict"] for step in steps]
     shares = {
         verdict: share_record(verdicts.count(verdict), len(steps))
         for verdict in ("fits", "doubtful", "does not fit")
     }
-    some = {"median_z": float(numpy.median(z)), "least_z": float(z.min()), "sd_z": float(z.std())}
+    some = {"mean_z": float(z.mean()), "least_z": float(z.min()), "sd_z": float(z.std())}
     return {"z": z.tolist()} | shares | some
 
 
@@ -79,7 +81,7 @@ def program() -> None:
         traces = {}
         for who, shapes in SHAPES.items():
             trials = make_trials(shapes, each, max(TOUCHES), SEEDS[who], touching)
-            traces[who] = recognized(device, maps, trials, bins=bins, filter="histogram")
+            traces[who] = recognized(device, maps, trials, bins=bins, filter="bounded")
         for touches in TOUCHES:
             record: Json = {"name": name, "touches": touches, "unknowns": each}
             record |= {who: fits_of([of[touches - 1] for of in all_of]) for who, all_of in traces.items()}

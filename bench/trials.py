@@ -63,17 +63,19 @@ def letter_maps(
 ) -> list[palpate.OccupancyGrid]:
     """The letters' maps, which share the prior that their touches give, with their symmetries."""
     training = training_recordings() if training is None else training
-    touches = {recording.object: list(recording) for recording in training}
     sensor = palpate.InverseSensorModel(spread_mm=spread_mm)
-    prior = palpate.estimate_prior(device, touches, cell_mm=cell_mm, sensor=sensor)
+    prior = palpate.estimate_prior(
+        device, {recording.object: recording for recording in training}, cell_mm=cell_mm, sensor=sensor
+    )
     sensor = palpate.InverseSensorModel(spread_mm=spread_mm, prior=prior)
     builder = palpate.MapBuilder(device, cell_mm=cell_mm, sensor=sensor)
     maps = []
-    for label, of_letter in touches.items():
+    for recording in training:
         builder.clear()
-        builder.add(of_letter)
-        maps.append(builder.build(label))
-        maps[-1].symmetry = SYMMETRY.get(label, 1)
+        builder.add(recording)
+        maps.append(builder.build(recording.object))
+        maps[-1].symmetry = SYMMETRY.get(recording.object, 1)
+        palpate.keep_touches(device, maps[-1], recording, sensor=sensor)
     return maps
 
 

@@ -14,6 +14,7 @@
 #include "cli/map_flags.hpp"
 #include "cli/options.hpp"
 #include "cli/progress.hpp"
+#include "estimation/maps/left_out_fit.hpp"
 #include "figures/figures.hpp"
 #include "learning/observed_map.hpp"
 #include "learning/press.hpp"
@@ -170,8 +171,9 @@ void build_maps(const MapFlags& flags) {
       maps.push_back(sensor ? observed_map(object.touches, model, object.label)
                             : build_map(builder, object, show));
       maps.back().mirror = flags.mirror;
-      maps.back().source = std::make_shared<const MapSource>(
-          MapSource{gathered(object, recordings.front().pressure_unit), model});
+      MapSource source{gathered(object, recordings.front().pressure_unit), model};
+      source.left_out = left_out_fit(device, source);
+      maps.back().source = std::make_shared<const MapSource>(std::move(source));
       settle_frame(origin, maps.back());
       symmetries.push_back(settle_symmetry(flags, maps.back()));
     }

@@ -33,7 +33,7 @@ Hdf5Contents open_map(const std::filesystem::path& path) {
   return {path,
           {"format", "version", "label", "cell_mm", "origin_mm", "prior", "symmetry", "spread_mm",
            "suggested_symmetry", "mirror", "T_learned_robot_object", "centred_mm", "pressure_unit",
-           "threshold", "ratio", "peak"},
+           "threshold", "ratio", "peak", "left_out_fit"},
           {"log_odds", "observations", "mean_level", "touch_pressure", "touch_pose",
            "touch_elements", "touch_valid"}};
 }
@@ -151,6 +151,14 @@ std::shared_ptr<const MapSource> read_source(const std::filesystem::path& path, 
   for (std::size_t k = 0; k < elements.size(); k += 2) {
     touches.elements_mm.emplace_back(elements[k], elements[k + 1]);
   }
+  if (file.has_attribute("left_out_fit")) {
+    const std::vector<double> z = file.numbers("left_out_fit", 2);
+    if (!(z[1] > 0.0)) {
+      file.refuse("attribute 'left_out_fit' has the standard deviation {}; build the map anew",
+                  z[1]);
+    }
+    source->left_out = FitScale{.mean = z[0], .sd = z[1]};
+  }
   if (file.has_dataset("touch_valid")) {
     const std::vector<double> valid = read_all(file, "touch_valid", {n, e});
     touches.valid.assign(valid.begin(), valid.end());
@@ -166,6 +174,9 @@ void write_source(Hdf5Writer& file, const MapSource& source) {
   file.attribute("threshold", source.options.classifier.threshold);
   file.attribute("ratio", source.options.classifier.ratio);
   file.attribute("peak", source.options.sensor.peak);
+  if (source.left_out) {
+    file.attribute("left_out_fit", {source.left_out->mean, source.left_out->sd});
+  }
   constexpr auto compressed = Hdf5Writer::Storage::compressed;
   file.dataset("touch_pressure", {n, e}, touches.pressure, compressed);
   file.dataset("touch_pose", {n, 3}, touches.T_robot_sensor);

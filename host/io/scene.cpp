@@ -130,7 +130,7 @@ void read_none(const Entry& entry, Scene& scene) {
   scene.auto_none = entry.node.IsScalar() && entry.node.Scalar() == "auto";
   if (!scene.auto_none) {
     scene.none =
-        entry.number([](double weight) { return weight > 0; }, "give a number above 0, or auto");
+        entry.number([](double weight) { return weight >= 0; }, "give a number from 0, or auto");
   }
 }
 

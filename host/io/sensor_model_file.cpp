@@ -50,6 +50,7 @@ template <typename Keys>
 void describe(Keys& keys, FitScale& scale) {
   keys("mean", scale.mean);
   keys("sd", scale.sd);
+  keys("shared_sd", scale.shared_sd, scale.shared_sd > 0.0);
 }
 
 template <typename Keys>

@@ -152,9 +152,9 @@ class FoldTrial {
       // A press of which nothing is In Contact says nothing of its object.
       if (evidence[i].front().in_contact()) {
         add_familiarity(evidence[i].front(), scores[i], scored, result.familiarity.front());
-        if (const auto fit = fit_at_best(evidence[i], scores[i], scored.truth,
-                                         asked.presses[i].T_object_robot)) {
-          result.fit_z.push_back(fit->z);
+        if (const auto fit =
+                fit_of(evidence[i], scores[i], scored.truth, asked.presses[i].T_object_robot)) {
+          result.fit_z[asked.presses[i].label].push_back(fit->z);
         }
       }
       result.presses.push_back(std::move(scored));
@@ -244,22 +244,20 @@ class FoldTrial {
     familiarity.unknown.push_back(score_without(scored.truth));
   }
 
-  /// How a press fits the best object.
-  std::optional<Fit> fit_at_best(std::span<const TouchEvidence> press,
-                                 const std::vector<LabelScore>& scores, std::size_t truth,
-                                 const std::optional<Pose>& T_object_robot) const {
+  /// How a press fits its object at its pose, or where that is unknown, the best object.
+  std::optional<Fit> fit_of(std::span<const TouchEvidence> press,
+                            const std::vector<LabelScore>& scores, std::size_t truth,
+                            const std::optional<Pose>& T_object_robot) const {
     std::size_t label = truth;
-    for (std::size_t other = 0; other < labels_.size(); ++other) {
+    for (std::size_t other = 0; !T_object_robot && other < labels_.size(); ++other) {
       if (scores[other].best_log_likelihood > scores[label].best_log_likelihood) {
         label = other;
       }
     }
     const LabelScore& at = scores[label];
     const OccupancyGrid& map = model_.table ? layers_[at.best_map] : model_.maps[at.best_map].map;
-    // Recognition judges the fit at a refined pose, which lies near the true one, whatever the
-    // bins.
-    const Pose& near = T_object_robot && label == truth ? *T_object_robot : at.best_pose;
-    return best_fit_near(press, near, map, contact_for(label), 0);
+    return T_object_robot ? evidence_fit(press, *T_object_robot, map, contact_for(label), 0)
+                          : best_fit_near(press, at.best_pose, map, contact_for(label), 0);
   }
 
   const std::vector<std::string>& labels_;
@@ -281,7 +279,9 @@ CrossValidation joined(std::span<const CrossValidation> folds) {
     append(fold.groups[0], all.groups[0]);
     append(fold.groups[1], all.groups[1]);
     append(fold.familiarity, all.familiarity);
-    append(fold.fit_z, all.fit_z);
+    for (const auto& [label, z] : fold.fit_z) {
+      append(z, all.fit_z[label]);
+    }
   }
   return all;
 }

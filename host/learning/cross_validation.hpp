@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <map>
 #include <optional>
 #include <set>
 #include <span>
@@ -90,8 +91,9 @@ struct CrossValidation {
   /// [fold] Scores of presses with an element In Contact: known with the maps of their own object
   /// and all others but one, each left out in turn; unknown with the maps of all others.
   std::vector<FamiliarityScores> familiarity;
-  /// Fit::z of presses with an element In Contact, on the best map at about the best pose.
-  std::vector<double> fit_z;
+  /// [label] Fit::z of presses with an element In Contact: at their pose where it is known, or else
+  /// on the best map at about the best pose.
+  std::map<std::string, std::vector<double>> fit_z;
 };
 /// The cross-validation of several folds, each of which has one FamiliarityScores.
 CrossValidation joined(std::span<const CrossValidation> folds);

@@ -1,7 +1,6 @@
 #include "learning/sensor_calibration.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <iterator>
 #include <map>
 #include <numeric>
@@ -10,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "estimation/maps/left_out_fit.hpp"
 #include "io/element_spacing.hpp"
 #include "learning/feature_learning.hpp"
 #include "learning/host_progress.hpp"
@@ -232,18 +232,15 @@ void judge(const CrossValidation& eq7, const std::vector<TriedModel>& tried, boo
   }
 }
 
-/// Mean and standard deviation of the touches' z; none where they do not differ.
-std::optional<FitScale> fit_scale_of(const std::vector<double>& z) {
-  const auto n = static_cast<double>(z.size());
-  FitScale scale{.mean = 0.0, .sd = 0.0};
-  for (const double one : z) {
-    scale.mean += one / n;
+/// The scale of the objects' z together; none where no object's differ.
+std::optional<FitScale> fit_scale_of(const std::map<std::string, std::vector<double>>& objects) {
+  std::vector<FitScale> scales;
+  for (const auto& [label, z] : objects) {
+    if (const std::optional<FitScale> scale = scale_of(z)) {
+      scales.push_back(*scale);
+    }
   }
-  for (const double one : z) {
-    scale.sd += (one - scale.mean) * (one - scale.mean) / (n - 1.0);
-  }
-  scale.sd = std::sqrt(scale.sd);
-  return z.size() > 1 && scale.sd > 0.0 ? std::optional(scale) : std::nullopt;
+  return scales.empty() ? std::nullopt : std::optional(pooled(scales));
 }
 
 /// The sensor with how sure to be of what its table says.

@@ -31,10 +31,11 @@ struct Sums {
   }
 };
 
-Verdict verdict_on(double z) {
-  return z >= fits_from_z       ? Verdict::fits
-         : z >= doubtful_from_z ? Verdict::doubtful
-                                : Verdict::does_not_fit;
+Verdict verdict_on(double z, double fits_from = fits_from_z,
+                   double doubtful_from = doubtful_from_z) {
+  return z >= fits_from       ? Verdict::fits
+         : z >= doubtful_from ? Verdict::doubtful
+                              : Verdict::does_not_fit;
 }
 
 /// What the object says about these elements where each of the displacements may be the sensor's.
@@ -53,9 +54,35 @@ ReadingMixture mixture_of(std::span<const glm::dvec2> elements_mm, const Pose& T
 }  // namespace
 
 Fit FitScale::of(const Fit& fit, std::size_t touches) const {
-  const double z = std::clamp((fit.z - mean * std::sqrt(static_cast<double>(touches))) / sd,
-                              -largest_fit_z, largest_fit_z);
-  return {.z = z, .verdict = verdict_on(z)};
+  if (mean == 0.0 && sd == 1.0 && shared_sd == 0.0) {
+    return fit;
+  }
+  const auto n = static_cast<double>(touches);
+  const double z =
+      std::clamp((fit.z - mean * std::sqrt(n)) / std::sqrt(sd * sd + n * shared_sd * shared_sd),
+                 -largest_fit_z, largest_fit_z);
+  return {.z = z, .verdict = verdict_on(z, scaled_fits_from_z, scaled_doubtful_from_z)};
+}
+
+FitScale pooled(std::span<const FitScale> objects) {
+  constexpr double least_sd = 0.25;
+  constexpr double least_shared_sd = 0.03;
+  const auto k = static_cast<double>(objects.size());
+  double mean = 0.0;
+  double within = 0.0;
+  for (const FitScale& object : objects) {
+    mean += object.mean / k;
+    within += object.sd * object.sd / k;
+  }
+  double between = 0.0;
+  for (const FitScale& object : objects) {
+    between += (object.mean - mean) * (object.mean - mean) / k;
+  }
+  const double of_objects = objects.size() > 1 ? between * k / (k - 1.0) : 0.0;
+  const double shared = std::max(0.5 * std::sqrt(of_objects), least_shared_sd);
+  // All touches, one of each at a time, vary by `within + between`.
+  const double own = within + between - shared * shared;
+  return {.mean = mean, .sd = std::sqrt(std::max(own, least_sd * least_sd)), .shared_sd = shared};
 }
 
 std::optional<Fit> fit_of(std::span<const Touch> touches, const Pose& T_object_robot,

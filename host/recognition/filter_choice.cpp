@@ -66,17 +66,18 @@ std::optional<double> none_weight(const Request& request, std::span<const Hypoth
     return {};
   }
   if (const auto* weight = std::get_if<double>(&*request.none)) {
-    if (!(*weight > 0.0 && std::isfinite(*weight))) {
+    if (!(*weight >= 0.0 && std::isfinite(*weight))) {
       refuse_option("none", *weight,
-                    "give a weight above 0, or no value; recordings stand before the flags");
+                    "give a weight from 0, or no value; recordings stand before the flags");
     }
-    return *weight;
+    return *weight > 0.0 ? std::optional(*weight) : std::nullopt;
   }
+  constexpr double odds = 1.0 / 9.0;  // against all objects together: one in ten
   double sum = 0.0;
   for (const Hypothesis& hypothesis : hypotheses) {
     sum += hypothesis.weight;
   }
-  return sum;
+  return odds * sum;
 }
 
 /// What bounds refuse and the histogram does not; each giver as a sentence names it.
@@ -155,7 +156,7 @@ ParticleOptions asked_particles(const Request& request, const HistogramOptions& 
                    "`slip-sd-mm` and `slip-sd-deg`, their motion noise");
     }
   }
-  if (request.none) {
+  if (none_weight(request, {})) {
     refuse_given(request, "none",
                  "particles have no mean over all poses, which (none) needs; use `filter "
                  "histogram`");

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <variant>
 
 namespace palpate {
 
@@ -65,9 +66,26 @@ Tempering tempering_of(std::span<const TouchEvidence> touches, const Recognition
           feature_nats(touches, task)};
 }
 
+double weighed(double known, const RecognitionTask& task) {
+  const auto weight_of = [](const auto& one) {
+    if constexpr (requires { one.none_weight; }) {
+      return one.none_weight.value_or(0.0);
+    } else {
+      return 0.0;
+    }
+  };
+  double maps = 0.0;
+  for (const Hypothesis& hypothesis : task.hypotheses) {
+    maps += hypothesis.weight;
+  }
+  const double none = std::visit(weight_of, task.filter);
+  return known * maps / (known * maps + (1.0 - known) * none);
+}
+
 std::vector<double> label_probabilities(const Estimate& estimate, const Tempering& tempering,
                                         const RecognitionTask& task, std::optional<double> known) {
   const bool learned_none = known && task.labels.back() == none_label;
+  known = learned_none ? std::optional(weighed(*known, task)) : known;
   if (tempering.temperature == 1.0 && !task.features && !learned_none) {
     return sums_by_label(estimate, task);
   }
@@ -99,7 +117,7 @@ std::vector<ProbabilityInterval> label_bounds(const Estimate& estimate,
                                               const RecognitionTask& task,
                                               std::optional<double> known) {
   const bool learned_none = known && task.labels.back() == none_label;
-  const double times = learned_none ? *known : 1.0;
+  const double times = learned_none ? weighed(*known, task) : 1.0;
   const Certificate& certificate = *estimate.certificate;
   const std::vector<LogInterval>& evidence = certificate.log_evidence;
   std::vector<LogInterval> of_label(task.labels.size(), {log_zero, log_zero});

@@ -41,9 +41,12 @@ struct Tempering {
 /// @throws Error as feature_nats()
 Tempering tempering_of(std::span<const TouchEvidence> touches, const RecognitionTask& task);
 
+/// `known`, which is learned at even odds, at those of the maps' weights against that of "(none)".
+double weighed(double known, const RecognitionTask& task);
+
 /// The probability of every label: E^(1 / temperature) exp(features), normalised; by
 /// sums_by_label() where nothing changes them. Where the task has none_label and `known` is given,
-/// the maps' labels share `known` among themselves and none_label has the rest: touches that
+/// the maps' labels share weighed(known) among themselves and none_label has the rest: touches that
 /// disagree, of which the evidence of none_label is made, take at least two.
 /// @param known probability that the object is one of the maps'; see RecognitionStep::known
 std::vector<double> label_probabilities(const Estimate& estimate, const Tempering& tempering,

@@ -30,7 +30,7 @@ Resampling resampling_named(const std::string& name);
 
 using Bins = std::variant<std::array<int, 3>, BinWidth>;  ///< counts of x, y and theta
 using Pivot = std::variant<glm::dvec2, Automatic>;        ///< in the robot frame, mm
-using NoneWeight = std::variant<double, Automatic>;       ///< automatic: of all maps together
+using NoneWeight = std::variant<double, Automatic>;       ///< automatic: one in ten
 
 /// Touches [begin, end) of a recording.
 struct Frames {

@@ -1,5 +1,7 @@
 #include "recognition/resolve.hpp"
 
+#include <cstdint>
+#include <limits>
 #include <set>
 #include <utility>
 #include <vector>
@@ -134,7 +136,6 @@ std::optional<LearnedSensor> sensor_of(const Request& request, const Circumstanc
 /// The classifier of Eq. 3 and gamma of Eq. 7: the request overrides what the sensor model learned.
 std::pair<ContactClassifier, double> contact_rules(const Request& request, const Circumstances& of,
                                                    const std::optional<LearnedSensor>& sensor) {
-  constexpr double usual_gamma = 0.1;
   std::optional<double> threshold = request.threshold;
   std::optional<double> ratio = request.ratio;
   if (sensor) {
@@ -170,6 +171,42 @@ std::optional<BinWidth> bin_width_of(const Request& request) {
     return *width;
   }
   return infers_region(request) ? std::optional(BinWidth::automatic) : std::nullopt;
+}
+
+/// Whether no axis has much fewer bins than the maps resolve: a pose between wide bins fits worse.
+bool resolves(const PoseLattice& lattice, std::span<const Hypothesis> hypotheses) {
+  constexpr double wider = 2.0;
+  const PoseLattice balanced =
+      balanced_lattice(lattice, hypotheses, std::numeric_limits<std::int64_t>::max()).lattice;
+  const auto holds = [](const Axis& axis, const Axis& fine) {
+    return wider * axis.count >= fine.count;
+  };
+  return holds(lattice.x_mm, balanced.x_mm) && holds(lattice.y_mm, balanced.y_mm) &&
+         holds(lattice.theta_rad, balanced.theta_rad);
+}
+
+/// The scale of the maps' own touches, where recognition judges as it did: by Eq. 7 with the same
+/// numbers, at poses that are exact, on bins that resolve the maps.
+FitScale left_out_scale(const RecognitionTask& task) {
+  const ContactModel& contact = task.contact();
+  if (contact.table || contact.gamma != usual_gamma || !task.touch_sd().none() ||
+      !task.slip_sd().none() || !traits_of(task.filter).bins) {
+    return {};
+  }
+  std::vector<FitScale> scales;
+  for (const Hypothesis& hypothesis : task.hypotheses) {
+    const auto& source = hypothesis.map.source;
+    if (!source || !source->left_out) {
+      continue;
+    }
+    const ContactClassifier& own = source->options.classifier;
+    if (own.threshold != contact.classifier.threshold || own.ratio != contact.classifier.ratio ||
+        contact.prior.value_or(hypothesis.map.prior) != hypothesis.map.prior) {
+      return {};
+    }
+    scales.push_back(*source->left_out);
+  }
+  return scales.empty() || !resolves(task.lattice(), task.hypotheses) ? FitScale{} : pooled(scales);
 }
 
 PoseLattice with_counts(PoseLattice lattice, const std::array<int, 3>& counts) {
@@ -242,6 +279,8 @@ RecognitionTask resolve(const Request& request, const Circumstances& of) {
     task.features = sensor->features;
     task.familiarity = sensor->familiarity;
     task.fit_scale = sensor->fit_scale.value_or(FitScale{});
+  } else {
+    task.fit_scale = left_out_scale(task);
   }
   task.bin_width = bin_width;
   task.auto_filter = filter.automatic;

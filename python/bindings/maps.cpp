@@ -6,6 +6,7 @@
 
 #include "bindings.hpp"
 #include "estimate.hpp"
+#include "estimation/maps/left_out_fit.hpp"
 #include "palpate/balanced_lattice.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
@@ -283,6 +284,23 @@ void bind_map_builder(nb::module_& module) {
       "sensor"_a = InverseSensorModel{}, "classifier"_a = ContactClassifier{},
       "p(m) as in the paper: occupied area over modelled area, pooled over all objects, which are\n"
       "touches by label.");
+  module.def(
+      "keep_touches",
+      [](const std::shared_ptr<Session>& session, OccupancyGrid& map,
+         const ArrayRecording& recording, const InverseSensorModel& sensor,
+         const ContactClassifier& classifier) {
+        MapSource source{recording.copied(), options_of(map.cell_mm, sensor, classifier)};
+        map.source = run({}, Progress(), [session, source = std::move(source)](Call& call) mutable {
+          auto lock = session->lock(call);
+          source.left_out = left_out_fit(lock.device(), source);
+          return std::make_shared<const MapSource>(std::move(source));
+        });
+      },
+      "device"_a, "map"_a, "recording"_a, nb::kw_only(), "sensor"_a = InverseSensorModel{},
+      "classifier"_a = ContactClassifier{},
+      "Keeps in the map the touches that it was built from, as `palpate map` does: maps of unlike\n"
+      "priors can be built again, and fits are on the scale of touches that maps had not seen.\n"
+      "sensor, classifier: the builder's.");
 }
 
 }  // namespace palpate::python

@@ -62,6 +62,7 @@ from ._palpate import (
     estimate_prior as estimate_prior,
     grid_array as grid_array,
     inverse as inverse,
+    keep_touches as keep_touches,
     measure_symmetry as measure_symmetry,
     open_sensor as open_sensor,
     pose_error_mm as pose_error_mm,

@@ -84,7 +84,7 @@ def test_costs_are_counted(tmp_path: pathlib.Path) -> None:
 
 def test_unlearned_shapes_fit_worse(tmp_path: pathlib.Path) -> None:
     fits = Program(tmp_path, "bench.fit", "--quick", "--trials", 1).document["fits"]
-    assert len(fits) == 8, "two arrays after 1, 3, 5 and 9 touches"
+    assert len(fits) == 10, "two arrays after 1, 3, 5, 9 and 15 touches"
     for fit in fits:
         assert fit["learned"]["fits"]["mean"] == 1.0, fit["name"]
     by = {(fit["name"], fit["touches"]): fit for fit in fits}

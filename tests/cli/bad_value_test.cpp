@@ -140,7 +140,7 @@ INSTANTIATE_TEST_SUITE_P(
               {"'theta_deg'", "wider than the full circle", "at most 360 degrees"}},
         Scene{"no_bins", "bins: [0, 5, 5]\n", {"bins[0]", "whole number from 1"}},
         Scene{"bins_in_a_word", "bins: many\n", {"'bins' = 'many'", "or auto"}},
-        Scene{"none_of_nothing", "none: 0\n", {"'none' = '0'", "above 0"}},
+        Scene{"none_of_less", "none: -1\n", {"'none' = '-1'", "from 0"}},
         Scene{"two_bins", "bins: [5, 5]\n", {"'bins'", "[x, y, theta]"}},
         Scene{"no_weight", "objects: [{map: A.map.h5, weight: 0}]\n", {"weight", "above 0"}},
         Scene{"unknown_filter", "filter: kalman\n", {"filter", "kalman", "histogram"}},

@@ -165,6 +165,7 @@ TEST_F(MapFrame, TouchesOfUnlikeArraysAreKept) {
   const OccupancyGrid map = read_map(folder_ / "both.map.h5");
   ASSERT_TRUE(map.source);
   EXPECT_EQ(map.source->touches.size(), 52u);
+  EXPECT_GT(map.source->left_out.value().sd, 0.0);
   Device device = Device::open();
   EXPECT_EQ(with_prior(device, map, map.prior).log_odds, map.log_odds);
   OccupancyGrid bare = map;

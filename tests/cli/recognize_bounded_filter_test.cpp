@@ -172,7 +172,19 @@ TEST_F(BoundedFilter, KnowsNoneOfThese) {
     }
     EXPECT_EQ(r["best"], dense["best"]);
   }
-  refused({"--filter", "bounded", "--none", "0"}, {"--none 0", "above 0"});
+  refused({"--filter", "bounded", "--none=-1"}, {"--none -1", "from 0"});
+}
+
+TEST_F(BoundedFilter, AWeightOfNoneOf0LeavesItOut) {
+  for (const char* filter : {"bounded", "histogram"}) {
+    json without = u({"--filter", filter});
+    json with = u({"--filter", filter, "--none", "0"});
+    for (json* r : {&without, &with}) {
+      r->erase("seconds");
+    }
+    EXPECT_EQ(with, without) << "bit for bit";
+    EXPECT_FALSE(with.contains("none"));
+  }
 }
 
 TEST_F(BoundedFilter, AutoKeepsNoneOfThese) {

@@ -171,8 +171,13 @@ TEST(CrossValidation, JudgesTheFitOfPressesAtKnownPosesWhereTheyAre) {
                                                    .y_mm = {-12.0, 12.0, bins},
                                                    .theta_rad = {0.0, two_pi, theta_bins}},
                                        .auto_pivot = false}});
-    return std::accumulate(found.fit_z.begin(), found.fit_z.end(), 0.0) /
-           static_cast<double>(found.fit_z.size());
+    double sum = 0.0;
+    double count = 0.0;
+    for (const auto& [label, z] : found.fit_z) {
+      sum = std::accumulate(z.begin(), z.end(), sum);
+      count += static_cast<double>(z.size());
+    }
+    return sum / count;
   };
   // At the nearest bin, up to 4 mm off, touches would fit worse by standard deviations.
   EXPECT_NEAR(mean_z(3, 4), mean_z(24, 48), 1e-6);

@@ -189,6 +189,8 @@ TEST(Fit, OfTouchesAsPredictedHasMeanZeroAndVarianceOne) {
     double squares = 0.0;
     int fitting = 0;
     int not_fitting = 0;
+    int false_alarms = 0;
+    int grave_ones = 0;
     for (int i = 0; i < draws; ++i) {
       const Recording touch = drawn_touch(map, model, random);
       const Fit fit = fit_of(all_touches(touch), T_object_robot, map, model).value();
@@ -196,6 +198,8 @@ TEST(Fit, OfTouchesAsPredictedHasMeanZeroAndVarianceOne) {
       squares += fit.z * fit.z;
       fitting += fit.verdict == Verdict::fits ? 1 : 0;
       not_fitting += fit.verdict == Verdict::does_not_fit ? 1 : 0;
+      false_alarms += fit.z < scaled_fits_from_z ? 1 : 0;
+      grave_ones += fit.z < scaled_doubtful_from_z ? 1 : 0;
     }
     // Four standard errors: 1 / sqrt(n) of the mean; of the variance at most 2 / sqrt(n), for a
     // kurtosis of 5, which one surprise among 36 elements has.
@@ -204,6 +208,9 @@ TEST(Fit, OfTouchesAsPredictedHasMeanZeroAndVarianceOne) {
     // What the header promises, less three standard errors.
     EXPECT_GE(fitting, (0.98 - 0.007) * draws);
     EXPECT_LE(not_fitting, (0.005 + 0.0034) * draws);
+    // The limits on a scale: 1 % and 0.1 %, and three standard errors.
+    EXPECT_LE(false_alarms, (0.01 + 0.0047) * draws);
+    EXPECT_LE(grave_ones, (0.001 + 0.0015) * draws);
   }
 }
 
@@ -288,10 +295,32 @@ TEST(FitScale, IsWhatTouchesOfTheirOwnObjectShow) {
   EXPECT_EQ(scale.of({.z = -6.0}, 1).z, 0.0);
   EXPECT_EQ(scale.of({.z = -14.0}, 1).z, -2.0);
   EXPECT_EQ(scale.of({.z = -14.0, .verdict = Verdict::does_not_fit}, 1).verdict, Verdict::fits);
-  EXPECT_EQ(scale.of({.z = -20.0}, 1).verdict, Verdict::doubtful);
-  EXPECT_EQ(scale.of({.z = -23.0}, 1).verdict, Verdict::does_not_fit);
+  EXPECT_EQ(scale.of({.z = -20.0}, 1).verdict, Verdict::fits);
+  EXPECT_EQ(scale.of({.z = -20.5}, 1).verdict, Verdict::doubtful);
+  EXPECT_EQ(scale.of({.z = -26.5}, 1).verdict, Verdict::does_not_fit);
   EXPECT_EQ(scale.of({.z = -20.0}, 4).z, -2.0) << "four touches are 2 times 6 below 0";
-  EXPECT_EQ(FitScale{}.of({.z = -3.5}, 9).z, -3.5);
+  const FitScale shared{.mean = -6.0, .sd = 3.0, .shared_sd = 2.0};
+  EXPECT_EQ(shared.of({.z = -17.0}, 4).z, -1.0) << "variances of 9 and 4 times 4";
+}
+
+TEST(FitScale, OfMeanZeroAndSdOneChangesNothing) {
+  for (const Fit fit : {Fit{.z = -2.9}, Fit{.z = -3.2, .verdict = Verdict::doubtful},
+                        Fit{.z = -4.2, .verdict = Verdict::does_not_fit}}) {
+    EXPECT_EQ(FitScale{}.of(fit, 9).z, fit.z);
+    EXPECT_EQ(FitScale{}.of(fit, 9).verdict, fit.verdict);
+  }
+}
+
+TEST(FitScale, ObjectsTogetherVaryAsTheirTouchesDo) {
+  // Of one touch of each, z varies by 0.25 within the objects and by 0.25 between them.
+  const std::vector<FitScale> objects{{.mean = 0.5, .sd = 0.5}, {.mean = 1.5, .sd = 0.5}};
+  const FitScale all = pooled(objects);
+  EXPECT_DOUBLE_EQ(all.mean, 1.0);
+  EXPECT_DOUBLE_EQ(all.shared_sd, 0.5 * std::sqrt(0.5));
+  EXPECT_DOUBLE_EQ(all.sd * all.sd + all.shared_sd * all.shared_sd, 0.5);
+  const FitScale one = pooled(std::vector{FitScale{.mean = 0.9, .sd = 0.02}});
+  EXPECT_EQ(one.sd, 0.25) << "as new places spread at least";
+  EXPECT_EQ(one.shared_sd, 0.03);
 }
 
 }  // namespace palpate::fit_test

@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "palpate/error.hpp"
 #include "recognition/recognition_record.hpp"
@@ -157,7 +158,7 @@ const double of_known = 1.0 / (1.0 + std::exp(2.0));
 double by_frequency_and_1() { return 2.0 * std::log(2.0 / 3.0) + std::log(1.0 / 3.0) - 1.0; }
 
 TEST(LabelProbability, GivesNoneOfTheseWhatASinglePressLeaves) {
-  const RecognitionTask task = with_known(HistogramOptions{.none_weight = 1.0});
+  const RecognitionTask task = with_known(HistogramOptions{.none_weight = 3.0});
   Estimate estimate = four_to_one();
   estimate.none_log_evidence = 1e4;  // which all else is 0 beside
   estimate.mode.log_likelihood = by_frequency_and_1();
@@ -177,8 +178,18 @@ TEST(LabelProbability, GivesNoneOfTheseWhatASinglePressLeaves) {
   EXPECT_NEAR(without.identity[0], 2.0 / 3.0, 1e-15) << "without (none), known stands aside";
 }
 
+TEST(LabelProbability, TakesKnownAtTheOddsOfTheWeights) {
+  // Three maps of weight 1 each.
+  for (const auto& [none, odds] : {std::pair(3.0, 1.0), std::pair(1.0 / 3.0, 1.0 / 9.0)}) {
+    const RecognitionTask task = with_known(HistogramOptions{.none_weight = none});
+    EXPECT_DOUBLE_EQ(weighed(0.5, task), 1.0 / (1.0 + odds));
+    EXPECT_DOUBLE_EQ(weighed(0.9, task), 0.9 / (0.9 + 0.1 * odds));
+    EXPECT_EQ(weighed(0.0, task), 0.0);
+  }
+}
+
 TEST(LabelBounds, ShareWhatASinglePressLeaves) {
-  const RecognitionTask task = with_known(BoundedOptions{.none_weight = 1.0});
+  const RecognitionTask task = with_known(BoundedOptions{.none_weight = 3.0});
   Estimate estimate = four_to_one();
   estimate.mode.log_likelihood = by_frequency_and_1();
   estimate.none_log_evidence = 0.0;

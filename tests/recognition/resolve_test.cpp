@@ -4,11 +4,15 @@
 
 #include <filesystem>
 #include <fstream>
+#include <memory>
+#include <utility>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "palpate/error.hpp"
+#include "palpate/map_builder.hpp"
 #include "recognition/option_text.hpp"
 #include "shapes.hpp"
 
@@ -83,6 +87,56 @@ TEST(Resolve, CountsThatWereSettledBeforeStand) {
   EXPECT_EQ(task.lattice().theta_rad.count, 9);
 }
 
+TEST(Resolve, AWeightOfNoneOf0LeavesItOut) {
+  Request request = request_of_shapes();
+  request.none = 0.0;
+  for (const FilterKind filter : {FilterKind::automatic, FilterKind::particles}) {
+    request.filter = filter;
+    EXPECT_EQ(task_of(request).labels.size(), 2u);
+  }
+  const SceneFile scene("none: 0");
+  request.none = {};
+  request.scene = scene.path();
+  EXPECT_EQ(task_of(complete(request)).labels.size(), 2u);
+}
+
+/// The shapes, learned from touches that had these z on maps of the others.
+Request request_of_learned() {
+  Request request = request_of_shapes();
+  request.bins = std::array{40, 40, 200};
+  for (std::size_t i = 0; i < 2; ++i) {
+    const MapSource source{
+        .touches = {}, .options = {}, .left_out = FitScale{0.5 + double(i), 0.5}};
+    request.given_maps[i].hypothesis.map.source = std::make_shared<const MapSource>(source);
+  }
+  return request;
+}
+
+TEST(Resolve, TheFitsScaleIsOfTouchesThatMapsHadNotSeen) {
+  Request request = request_of_learned();
+  EXPECT_EQ(task_of(request).fit_scale.mean, 1.0);
+  EXPECT_GT(task_of(request).fit_scale.shared_sd, 0.3);
+  request.given_maps[0].hypothesis.map.source.reset();
+  EXPECT_EQ(task_of(request).fit_scale.mean, 1.5) << "of the maps that have one";
+}
+
+TEST(Resolve, TouchesThatAreJudgedOtherwiseHaveNoScale) {
+  const Request learned = request_of_learned();
+  std::vector<Request> others(8, learned);
+  others[0].gamma = 0.2;
+  others[1].prior = 0.4;
+  others[2].threshold = 3.0;
+  others[3].ratio = 0.2;
+  others[4].touch_sd_mm = 1.0;
+  others[5].slip_sd_deg = 1.0;
+  others[6].filter = FilterKind::particles;
+  others[7].bins = std::array{6, 5, 4};
+  for (std::size_t i = 0; i < others.size(); ++i) {
+    const FitScale scale = task_of(others[i]).fit_scale;
+    EXPECT_EQ(std::pair(scale.mean, scale.sd), std::pair(0.0, 1.0)) << i;
+  }
+}
+
 TEST(Request, ASceneGivesWhatIsNotAsked) {
   const SceneFile scene("{gamma: 0.2, ratio: 0.4, bins: [3, 3, 3], none: auto, slip_sd: {mm: 1}}");
   Request request = request_of_shapes();
@@ -94,7 +148,7 @@ TEST(Request, ASceneGivesWhatIsNotAsked) {
   EXPECT_EQ(histogram.contact.classifier.ratio, 0.4) << "as in the scene";
   EXPECT_EQ(task.lattice().x_mm.count, 6) << "as asked";
   EXPECT_EQ(histogram.slip_sd.mm, 1.0);
-  EXPECT_EQ(histogram.none_weight, 2.0) << "the weights of both maps";
+  EXPECT_EQ(histogram.none_weight, 2.0 / 9.0) << "one in ten, beside both maps";
 }
 
 TEST(Request, ARefusalNamesTheOptionOrTheScenesKey) {
@@ -126,7 +180,7 @@ TEST(Request, ValuesThatCannotBeMeantAreRefused) {
   EXPECT_THAT(refused([](Request& r) { r.pivot_mm = glm::dvec2(1e10, 0.0); }),
               HasSubstr("`pivot-mm 1"));
   EXPECT_THAT(refused([](Request& r) { r.gamma = 1.0; }), HasSubstr("`gamma 1`"));
-  EXPECT_THAT(refused([](Request& r) { r.none = 0.0; }), HasSubstr("`none 0`"));
+  EXPECT_THAT(refused([](Request& r) { r.none = -1.0; }), HasSubstr("`none -1`"));
   EXPECT_THAT(refused([](Request& r) { r.touch_sd_mm = 500.0; }),
               HasSubstr("`touch-sd-mm 500`: wider than the region, 20 mm"));
   EXPECT_THAT(refused([](Request& r) { r.act_below_mm = 0.0; }), HasSubstr("`act-below-mm 0`"));

@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <fmt/format.h>
 #include <glm/common.hpp>
 
 #include "estimation/change_in_steps.hpp"
 #include "estimation/maps/evidence_grid.hpp"
+#include "estimation/maps/left_out_fit.hpp"
 #include "model/own_process.hpp"
 #include "palpate/error.hpp"
 
@@ -196,6 +198,10 @@ OccupancyGrid with_prior(Device& device, const OccupancyGrid& map, double prior)
   OccupancyGrid result = map;
   result.prior = prior;
   result.log_odds = other.log_odds;
+  auto source = std::make_shared<MapSource>(*map.source);
+  source->options.sensor.prior = prior;
+  source->left_out = map.source->left_out ? left_out_fit(device, *source) : std::nullopt;
+  result.source = std::move(source);
   return result;
 }
 

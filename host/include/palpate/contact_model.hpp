@@ -39,11 +39,14 @@ struct PALPATE_API LikelihoodTable {
   void validate() const;
 };
 
+/// gamma of Eq. 7 unless it is given, or learned.
+inline constexpr double usual_gamma = 0.1;
+
 /// What the sensor says about a place: the class of every reading (Eq. 3), and how likely a reading
 /// is, given what the map says there (Eq. 7, or a table).
 struct PALPATE_API ContactModel {
   ContactClassifier classifier = {};
-  double gamma = 0.1;  ///< of Eq. 7: how often the classifier answers at random, in [0, 1)
+  double gamma = usual_gamma;  ///< of Eq. 7: how often the classifier answers at random, in [0, 1)
   /// m: of Eq. 7, and of the space beyond the maps. By default the maps' own, which must then be
   /// the same for all: unequal priors would favour the emptier or the fuller map in unseen space.
   std::optional<double> prior = {};

@@ -31,18 +31,34 @@ inline constexpr double doubtful_from_z = -4.0;
 /// z is cut off here, for readings that the object holds to be impossible.
 inline constexpr double largest_fit_z = 1e6;
 
-/// What z is like for touches of an object at their best pose on a map that had not seen them.
-/// Neighbouring elements of a large array are far from independent, as z takes them to be, and maps
-/// are not perfect: z then has a mean below 0 and a standard deviation of many times 1.
-struct PALPATE_API FitScale {
-  double mean = 0.0;  ///< of the z of single touches
-  double sd = 1.0;    ///< their standard deviation
+/// On a FitScale that was learned the touches fit from this z on: of touches of learned objects
+/// about 1 % do not, ...
+inline constexpr double scaled_fits_from_z = -3.5;
+/// ... and about 0.1 % are below this z.
+inline constexpr double scaled_doubtful_from_z = -5.0;
 
-  /// The fit on this scale: (z - mean sqrt(n)) / sd, within +-`largest_fit_z`, with its verdict.
-  /// The deviations of n independent touches add up, and so do their variances.
+/// What z is like for touches of an object on a map that had not seen them. Neighbouring elements
+/// of a large array are far from independent, as z takes them to be, maps are not perfect, and a
+/// sensor may err more or less often than Eq. 7 says.
+struct PALPATE_API FitScale {
+  double mean = 0.0;       ///< of the z of single touches
+  double sd = 1.0;         ///< their standard deviation, but for what all touches share
+  double shared_sd = 0.0;  ///< of what all touches of an object share, such as its map's errors
+
+  /// The fit on this scale: (z - mean sqrt(n)) / sqrt(sd^2 + n shared_sd^2), within
+  /// +-`largest_fit_z`, with its verdict. The deviations of n independent touches add up, and so do
+  /// their variances; what they share counts n times. The scale of mean 0 and sd 1 leaves the fit
+  /// as it is.
   /// @param touches n, those with an element In Contact
   Fit of(const Fit& fit, std::size_t touches) const;
 };
+
+/// The scale of objects together, each with the mean and the sd of its own touches' z. Half of what
+/// the objects' means differ by is `shared_sd`: an object's touches elsewhere than it was learned
+/// from resemble those of all objects as much as its own. `sd` is at least 0.25 and `shared_sd`
+/// 0.03, as far as touches of learned letters at new places spread.
+/// @param objects one or more
+PALPATE_API FitScale pooled(std::span<const FitScale> objects);
 
 /// Compares the log-likelihood of the touches' known elements with what the object at this pose
 /// predicts for them. An element at log odds l of the map reads r with probability

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -8,6 +9,7 @@
 #include "palpate/api.hpp"
 #include "palpate/contact.hpp"
 #include "palpate/device.hpp"
+#include "palpate/fit.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/sensor_model.hpp"
 
@@ -69,10 +71,13 @@ struct MapSource {
   /// centre_frame().
   Recording touches;
   MapOptions options;
+  /// What the z of single touches is like by Eq. 7 with gamma 0.1, each at its pose on a map of the
+  /// others: mean and sd alone. None where too few touches tell.
+  std::optional<FitScale> left_out = {};
 };
 
-/// Returns the map as its `source` makes it with another prior; its frame, its layers and all else
-/// stay.
+/// Returns the map as its `source` makes it with another prior, and what its touches are like where
+/// they are left out; its frame, its layers and all else stay.
 /// @throws Error where it has no source, or its cells are not those of its source, and as
 /// MapBuilder does
 PALPATE_API OccupancyGrid with_prior(Device& device, const OccupancyGrid& map, double prior);

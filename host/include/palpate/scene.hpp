@@ -49,7 +49,7 @@ struct Scene {
   std::vector<Object> objects;
   Region region;
   std::optional<double> none;              ///< prior weight of "none of these"
-  bool auto_none = false;                  ///< the weight is "auto": the sum of the maps' weights
+  bool auto_none = false;                  ///< the weight is "auto": a ninth of all maps' weights
   Displacement touch_sd;                   ///< HistogramOptions::touch_sd
   Displacement slip_sd;                    ///< HistogramOptions::slip_sd
   std::optional<std::array<int, 3>> bins;  ///< of x, y, theta
