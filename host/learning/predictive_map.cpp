@@ -13,19 +13,25 @@ PredictiveMap::PredictiveMap(std::span<const Touch> touches, const MapOptions& o
     : options_(options) {
   contact_.prior = options.sensor.prior;
   BoundingBox box;
-  std::size_t readings = 0;
   for (const Touch& touch : touches) {
     Touch in_sensor_frame = touch;
     in_sensor_frame.T_robot_sensor = {};
     Part& part = touches_.emplace_back();
     part.known = known_readings(in_sensor_frame, options.classifier);
-    readings += part.known.size();
     for (const ElementReading& element : part.known) {
       box.take_in(touch.T_robot_sensor * element.position_mm);
     }
   }
-  radius_mm_ = support_radius_mm(options.sensor, readings);
-  if (readings > 0) {
+  constexpr double tolerance = 1e-3;  // nats
+  constexpr int nodes = 1024;         // increments between them are linear within 1e-4 nats
+  radius_mm_ = options.sensor.support_radius_mm(1, tolerance);
+  for (const Reading reading : {Reading::no_contact, Reading::in_contact}) {
+    for (int node = 0; node <= nodes + 1; ++node) {
+      increments_[is_contact(reading) ? 1 : 0].push_back(
+          options.sensor.increment(reading, radius_mm_ * std::sqrt(node / double{nodes})));
+    }
+  }
+  if (!box.empty()) {
     cells_ = cover(box.lower, box.upper, radius_mm_, options.cell_mm);
   }
   log_odds_.assign(static_cast<std::size_t>(cells_.nx * cells_.ny),
@@ -47,12 +53,19 @@ void PredictiveMap::put_in(std::size_t touch, const Pose& T_robot_sensor) {
   for (const ElementReading& element : part.known) {
     visit_near(cells_, options_.cell_mm, T_robot_sensor * element.position_mm, radius_mm_,
                [&](std::size_t cell, double squared) {
-                 const double increment =
-                     options_.sensor.increment(element.reading, std::sqrt(squared));
-                 log_odds_[cell] += increment;
-                 part.added.emplace_back(cell, increment);
+                 const double nats = increment(element.reading, squared);
+                 log_odds_[cell] += nats;
+                 part.added.emplace_back(cell, nats);
                });
   }
+}
+
+double PredictiveMap::increment(Reading reading, double squared_mm) const {
+  const std::vector<double>& of_class = increments_[is_contact(reading) ? 1 : 0];
+  const double place =
+      squared_mm / (radius_mm_ * radius_mm_) * static_cast<double>(of_class.size() - 2);
+  const auto node = static_cast<std::size_t>(place);
+  return std::lerp(of_class[node], of_class[node + 1], place - static_cast<double>(node));
 }
 
 double PredictiveMap::log_likelihood(std::size_t touch, const Pose& T_robot_sensor) const {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <span>
 #include <utility>
@@ -12,8 +13,8 @@
 
 namespace palpate {
 
-/// The log odds of an object's touches (Eq. 4-6) in float64. A touch can be taken out, so that the
-/// map of the others predicts it, and be put back, there or elsewhere.
+/// The log odds of an object's touches (Eq. 4-6), each reading's within 1e-3 nats. A touch can be
+/// taken out, so that the map of the others predicts it, and be put back, there or elsewhere.
 class PredictiveMap {
  public:
   /// The map of all touches. It covers what they sense; what a touch that is put elsewhere senses
@@ -34,12 +35,15 @@ class PredictiveMap {
     std::vector<std::pair<std::size_t, double>> added;  ///< to these cells, in nats
   };
 
+  double increment(Reading reading, double squared_mm) const;
   double log_odds(const glm::dvec2& p_robot_mm) const;
 
   MapOptions options_;
   ContactModel contact_;
   std::vector<Part> touches_;
   double radius_mm_ = 0.0;
+  /// Of contact and of none, in nats, at equally spaced squares of the distance up to the radius's.
+  std::array<std::vector<double>, 2> increments_;
   CellRange cells_;
   std::vector<double> log_odds_;  ///< of cells_, [ny, nx]
 };
