@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <numbers>
 #include <numeric>
+#include <optional>
 #include <vector>
 
 #include <tbb/parallel_for.h>
@@ -15,16 +15,43 @@ namespace palpate {
 
 namespace {
 
-/// Of every touch on the map of the others, object by object.
-std::vector<double> left_out_nats(std::span<const ObjectTouches> objects,
-                                  const MapOptions& options) {
+/// What the map of the others says of a left-out touch, in nats.
+using Score = double (*)(const PredictiveMap& map, std::size_t touch, const Pose& T_robot_sensor);
+
+double likelihood(const PredictiveMap& map, std::size_t touch, const Pose& T_robot_sensor) {
+  return map.log_likelihood(touch, T_robot_sensor);
+}
+
+/// The log probability of the touch's own place among those around it.
+double place(const PredictiveMap& map, std::size_t touch, const Pose& T_robot_sensor) {
+  constexpr int steps = 3;  // to either side
+  constexpr double step_mm = 0.5;
+  constexpr double step_rad = 0.1;
+  constexpr double farthest = 600.0;  // nats; exp() is finite
+  const double own = map.log_likelihood(touch, T_robot_sensor);
+  double sum = 0.0;  // relative to the own place's
+  for (int a = -2; a <= 2; ++a) {
+    for (int y = -steps; y <= steps; ++y) {
+      for (int x = -steps; x <= steps; ++x) {
+        const Pose beside{{step_mm * x, step_mm * y}, step_rad * a};
+        const double nats = map.log_likelihood(touch, T_robot_sensor * beside) - own;
+        sum += std::exp(std::min(nats, farthest));
+      }
+    }
+  }
+  return -std::log(sum);
+}
+
+/// A score of every touch, object by object.
+std::vector<double> left_out(std::span<const ObjectTouches> objects, const MapOptions& options,
+                             Score score) {
   std::vector<std::vector<double>> of_object(objects.size());
   tbb::parallel_for(std::size_t{0}, objects.size(), [&](std::size_t k) {
     const std::vector<Touch>& touches = objects[k].touches;
     PredictiveMap map(touches, options);
     for (std::size_t i = 0; i < touches.size(); ++i) {
       map.take_out(i);
-      of_object[k].push_back(map.log_likelihood(i, touches[i].T_robot_sensor));
+      of_object[k].push_back(score(map, i, touches[i].T_robot_sensor));
       map.put_in(i, touches[i].T_robot_sensor);
     }
   });
@@ -35,52 +62,64 @@ std::vector<double> left_out_nats(std::span<const ObjectTouches> objects,
   return all;
 }
 
-double mean(std::span<const double> values) {
-  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
-}
-
-/// Whether the touches are more likely beyond chance, and by enough to matter.
-bool clearly_better(std::span<const double> nats, std::span<const double> before) {
+/// The mean gain of a score over another's; none where chance may explain it.
+std::optional<double> gain_of(std::span<const double> scores, std::span<const double> before) {
   constexpr double standard_errors = 3.0;
-  constexpr double share = 0.1;
-  const double gain = mean(nats) - mean(before);
+  const auto count = static_cast<double>(scores.size());
+  double sum = 0.0;
   double squares = 0.0;
-  for (std::size_t i = 0; i < nats.size(); ++i) {
-    squares += std::pow(nats[i] - before[i] - gain, 2.0);
+  for (std::size_t i = 0; i < scores.size(); ++i) {
+    const double gain = scores[i] - before[i];
+    sum += gain;
+    squares += gain * gain;
   }
-  const double error = std::sqrt(squares) / static_cast<double>(nats.size());
-  return gain > standard_errors * error && gain > share * std::abs(mean(before));
+  const double gain = sum / count;
+  const double error = std::sqrt((squares / count - gain * gain) / count);
+  return gain > standard_errors * error ? std::optional(gain) : std::nullopt;
 }
 
 }  // namespace
 
 SpreadChoice choose_spread(std::span<const ObjectTouches> objects, const MapOptions& options) {
-  constexpr int most_steps = 6;  // to an eighth and to eight times the default
-  const auto spread = [&](int step) {
-    return options.sensor.spread_mm * std::pow(std::numbers::sqrt2, step);
-  };
-  std::map<int, std::vector<double>> tried;
-  const auto nats_at = [&](int step) -> const std::vector<double>& {
-    const auto [place, is_new] = tried.try_emplace(step);
-    if (is_new) {
-      MapOptions other = options;
-      other.sensor.spread_mm = spread(step);
-      place->second = left_out_nats(objects, other);
-    }
-    return place->second;
-  };
-  int best = 0;
-  for (const int direction : {-1, 1}) {
-    while (std::abs(best + direction) <= most_steps && !nats_at(best).empty() &&
-           mean(nats_at(best + direction)) > mean(nats_at(best))) {
-      best += direction;
-    }
+  constexpr int most_steps = 6;  // to eight times the default, and to an eighth
+  SpreadChoice choice{.spread_mm = options.sensor.spread_mm};
+  const std::size_t touches = std::accumulate(
+      objects.begin(), objects.end(), std::size_t{0},
+      [](std::size_t sum, const ObjectTouches& object) { return sum + object.touches.size(); });
+  if (touches < least_spread_touches) {
+    return choice;
   }
-  SpreadChoice choice{options.sensor.spread_mm, 0.0, spread(tried.begin()->first),
-                      spread(tried.rbegin()->first)};
-  if (clearly_better(nats_at(best), nats_at(0))) {
-    choice.spread_mm = spread(best);
-    choice.gain_nats = mean(nats_at(best)) - mean(nats_at(0));
+  const std::vector<double> likelihoods = left_out(objects, options, likelihood);
+  for (const double factor : {1.0 / std::numbers::sqrt2, std::numbers::sqrt2}) {
+    MapOptions now = options;
+    std::vector<double> best = likelihoods;
+    std::vector<double> best_places;  // while they are empty, no other spread was more likely
+    for (int step = 0; step < most_steps; ++step) {
+      MapOptions next = now;
+      next.sensor.spread_mm *= factor;
+      const std::vector<double> nats = left_out(objects, next, likelihood);
+      const std::optional<double> more_likely = gain_of(nats, best);
+      if (!more_likely) {
+        break;
+      }
+      if (best_places.empty()) {
+        best_places = left_out(objects, now, place);
+      }
+      const std::vector<double> places = left_out(objects, next, place);
+      const std::optional<double> better_placed = gain_of(places, best_places);
+      if (!better_placed) {
+        break;
+      }
+      choice.spread_mm = next.sensor.spread_mm;
+      choice.likelihood_gain += *more_likely;
+      choice.place_gain += *better_placed;
+      now = next;
+      best = nats;
+      best_places = places;
+    }
+    if (choice.likelihood_gain > 0.0) {
+      break;
+    }
   }
   return choice;
 }

@@ -4,9 +4,13 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
+#include <vector>
 
+#include <tbb/parallel_for.h>
 #include <glm/geometric.hpp>
 
+#include "learning/host_progress.hpp"
 #include "learning/predictive_map.hpp"
 
 namespace palpate {
@@ -65,8 +69,7 @@ Moments moments(const Grid& grid, const Axes& prior_sd, const LogLikelihood& log
   }
   for (std::size_t k = 0; k < 3; ++k) {
     result.mean[k] /= sum;
-    result.variance[k] =
-        std::max(0.0, result.variance[k] / sum - result.mean[k] * result.mean[k]);
+    result.variance[k] = std::max(0.0, result.variance[k] / sum - result.mean[k] * result.mean[k]);
   }
   return result;
 }
@@ -85,8 +88,7 @@ Moments posterior(const DisplacementSd& sd, const LogLikelihood& log_likelihood)
   Grid near{.centre = rough.mean, .steps = 3};
   for (std::size_t k = 0; k < 3; ++k) {
     const double step = wide.half[k] / wide.steps;
-    near.half[k] =
-        std::max(2.0 * std::sqrt(rough.variance[k]), near.steps * least_step * step);
+    near.half[k] = std::max(2.0 * std::sqrt(rough.variance[k]), near.steps * least_step * step);
   }
   return moments(near, prior_sd, log_likelihood);
 }
@@ -115,8 +117,8 @@ void keep_together(std::vector<Pose>& poses, std::span<const Pose> reported,
   turn = sd.mm > 0.0 && sd.rad > 0.0 ? turn / weight : 0.0;
   shift = sd.mm > 0.0 ? shift : glm::dvec2(0.0);
   for (Pose& pose : poses) {
-    pose.translation_mm += shift + rotate(turn, pose.translation_mm - middle) -
-                           (pose.translation_mm - middle);
+    pose.translation_mm +=
+        shift + rotate(turn, pose.translation_mm - middle) - (pose.translation_mm - middle);
     pose.theta_rad += turn;
   }
 }
@@ -133,29 +135,25 @@ DisplacementSd apart(std::span<const Pose> poses, std::span<const Pose> others) 
   return {std::sqrt(squares.mm / count), std::sqrt(squares.rad / count)};
 }
 
-}  // namespace
+constexpr int most_rounds = 8;
 
-AlignedTouches align_touches(std::span<const Touch> touches, const DisplacementSd& sd,
-                             MapOptions options, const std::function<void(double)>& progress) {
-  constexpr int most_rounds = 8;
+/// Aligns the touches of one object.
+/// @param done is called for every touch of a round
+TouchAlignment align(ObjectTouches& object, const DisplacementSd& sd, const MapOptions& options,
+                     const std::function<void()>& done) {
   constexpr double settled = 0.05;  // in standard deviations
-  options.sensor.prior = 0.5;
-  options.validate();
-  std::vector<Touch> placed(touches.begin(), touches.end());
+  std::vector<Touch>& touches = object.touches;
   std::vector<Pose> reported;
   for (const Touch& touch : touches) {
     reported.push_back(touch.T_robot_sensor);
   }
-  AlignedTouches result{.T_robot_sensor = reported};
-  if (sd.none() || touches.empty()) {
-    return result;
-  }
-  std::vector<Pose>& poses = result.T_robot_sensor;
+  std::vector<Pose> poses = reported;
   const auto count = static_cast<double>(touches.size());
+  TouchAlignment result;
   for (bool moving = true; moving && result.rounds < most_rounds; ++result.rounds) {
     const std::vector<Pose> before = poses;
     DisplacementSd variance;
-    PredictiveMap map(placed, options);
+    PredictiveMap map(touches, options);
     for (std::size_t i = 0; i < touches.size(); ++i) {
       map.take_out(i);
       const Moments found = posterior(sd, [&](const Pose& displacement) {
@@ -165,19 +163,59 @@ AlignedTouches align_touches(std::span<const Touch> touches, const DisplacementS
       map.put_in(i, poses[i]);
       variance.mm += (found.variance[0] + found.variance[1]) / (2.0 * count);
       variance.rad += found.variance[2] / count;
-      if (progress) {
-        progress((result.rounds + static_cast<double>(i) / count) / most_rounds);
-      }
+      done();
     }
     keep_together(poses, reported, sd);
     for (std::size_t i = 0; i < touches.size(); ++i) {
-      placed[i].T_robot_sensor = poses[i];
+      touches[i].T_robot_sensor = poses[i];
     }
     const DisplacementSd step = apart(poses, before);
     moving = step.mm > settled * sd.mm || step.rad > settled * sd.rad;
     result.moved = apart(poses, reported);
-    result.displaced = {std::sqrt(result.moved.mm * result.moved.mm + variance.mm),
-                        std::sqrt(result.moved.rad * result.moved.rad + variance.rad)};
+    result.displaced = {std::hypot(result.moved.mm, std::sqrt(variance.mm)),
+                        std::hypot(result.moved.rad, std::sqrt(variance.rad))};
+  }
+  return result;
+}
+
+/// The root mean square over the touches of all objects.
+DisplacementSd pooled(std::span<const ObjectTouches> objects,
+                      std::span<const TouchAlignment> alignments,
+                      DisplacementSd TouchAlignment::*of) {
+  DisplacementSd squares;
+  double count = 0.0;
+  for (std::size_t k = 0; k < objects.size(); ++k) {
+    const auto touches = static_cast<double>(objects[k].touches.size());
+    const DisplacementSd& own = alignments[k].*of;
+    squares.mm += touches * own.mm * own.mm;
+    squares.rad += touches * own.rad * own.rad;
+    count += touches;
+  }
+  return {std::sqrt(squares.mm / count), std::sqrt(squares.rad / count)};
+}
+
+}  // namespace
+
+TouchAlignment align_touches(std::span<ObjectTouches> objects, const DisplacementSd& sd,
+                             MapOptions options, const std::function<void(double)>& progress) {
+  options.sensor.prior = 0.5;
+  options.validate();
+  std::size_t touches = 0;
+  for (const ObjectTouches& object : objects) {
+    touches += object.touches.size();
+  }
+  if (sd.none() || touches == 0) {
+    return {};
+  }
+  HostProgress shown(touches * most_rounds, progress);
+  std::vector<TouchAlignment> alignments(objects.size());
+  tbb::parallel_for(std::size_t{0}, objects.size(), [&](std::size_t k) {
+    alignments[k] = align(objects[k], sd, options, [&] { shown.add(); });
+  });
+  TouchAlignment result{.moved = pooled(objects, alignments, &TouchAlignment::moved),
+                        .displaced = pooled(objects, alignments, &TouchAlignment::displaced)};
+  for (const TouchAlignment& own : alignments) {
+    result.rounds = std::max(result.rounds, own.rounds);
   }
   return result;
 }

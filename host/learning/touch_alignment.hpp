@@ -2,29 +2,29 @@
 
 #include <functional>
 #include <span>
-#include <vector>
 
 #include "palpate/displacement.hpp"
 #include "palpate/map_builder.hpp"
 
 namespace palpate {
 
-/// An object's touches where the map that they make has them.
-struct AlignedTouches {
-  std::vector<Pose> T_robot_sensor;  ///< [touch]
-  DisplacementSd moved;  ///< how far from the reported poses, root mean square of each axis
-  /// How far the sensor was from its reported poses, by the touches: root mean square over the
-  /// posterior of each axis. About the standard deviations that were given where these are right.
+/// How far the touches of an alignment lie from their reported poses: root mean squares of each
+/// axis, over all touches.
+struct TouchAlignment {
+  DisplacementSd moved;  ///< of the aligned poses
+  /// Of the true poses, by what the touches tell of them: the aligned poses with the posterior's
+  /// variance. About the standard deviations that were given where these are right.
   DisplacementSd displaced;
-  int rounds = 0;
+  int rounds = 0;  ///< of the object that took most
 };
 
-/// Aligns the touches of an object, whose sensor really was at T_robot_sensor * displacement, to
-/// the map that they make. In a round each touch in turn is taken out of the map, put at the
-/// posterior mean of its pose (the displacements' prior times Eq. 7 on the map of the others), and
-/// added to the map there. The rounds end when touches move by less than a twentieth of a standard
-/// deviation (root mean square), after eight at most. After each, the touches are moved together so
-/// that no rigid motion of all would bring them nearer to their reported poses.
+/// Aligns the touches of each object, whose sensor really was at T_robot_sensor * displacement, to
+/// the map that they make, and writes their poses. In a round each touch in turn is taken out of
+/// the map, put at the posterior mean of its pose (the displacements' prior times Eq. 7 on the map
+/// of the others), and added to the map there. The rounds end when touches move by less than a
+/// twentieth of a standard deviation (root mean square), after eight at most. After each, the
+/// touches are moved together so that no rigid motion of all would bring them nearer to their
+/// reported poses. Takes all host threads.
 ///
 /// The map is of a prior of 0.5, which weighs contact and none alike. With a lower one contact
 /// weighs more: the map of misplaced touches is wider than the object, and touches that each see
@@ -32,8 +32,7 @@ struct AlignedTouches {
 /// @param sd of the displacements; where both are 0, no pose changes by a bit
 /// @param options of the map; the prior is ignored
 /// @throws Error on a touch that is not sound, and as cover() does; what `progress` throws
-AlignedTouches align_touches(std::span<const Touch> touches, const DisplacementSd& sd,
-                             MapOptions options,
-                             const std::function<void(double)>& progress = {});
+TouchAlignment align_touches(std::span<ObjectTouches> objects, const DisplacementSd& sd,
+                             MapOptions options, const std::function<void(double)>& progress = {});
 
 }  // namespace palpate
