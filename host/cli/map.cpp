@@ -204,8 +204,8 @@ bool settle_spread(const MapFlags& flags, const std::vector<std::filesystem::pat
       fmt::print(
           "spread {:.3g} mm: left-out touches are {:.2f} nats each more likely than with {:.3g} "
           "mm, "
-          "and their places {:.2f} nats; --spread-mm {:.3g} keeps the default\n",
-          choice.spread_mm, choice.likelihood_gain, usual_mm, choice.place_gain, usual_mm);
+          "and found {:.2g} mm nearer to their places; --spread-mm {:.3g} keeps the default\n",
+          choice.spread_mm, choice.likelihood_gain, usual_mm, choice.place_gain_mm, usual_mm);
     }
   }
   return model.sensor.spread_mm != usual_mm;
