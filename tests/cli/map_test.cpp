@@ -72,10 +72,10 @@ TEST_F(MapCommand, SaysWhichSpreadItTook) {
 
 TEST_F(MapCommand, ChoosesTheSpreadOfAFineArray) {
   for (const char* letter : {"A", "E", "U"}) {
-    Simulator simulator(make_shape(letter), {.psf_mm = 0.5, .element_mm = 0.95},
-                        grid_array(12, 12, 1.0), 4);
+    Simulator simulator(make_shape(letter), {.psf_mm = 0.3, .element_mm = 0.95},
+                        grid_array(16, 16, 1.0), 4);
     write_recording(folder_ / (std::string("fine.") + letter + ".h5"),
-                    simulator.touch(random_poses(60, 7), {}));
+                    simulator.touch(random_poses(40, 7), {}));
   }
   const std::string out = done({"map", "fine.A.h5", "fine.E.h5", "fine.U.h5", "-o", "fine/"});
   EXPECT_NE(out.find("nats each more likely than with 0.5 mm"), std::string::npos) << out;

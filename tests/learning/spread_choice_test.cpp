@@ -42,7 +42,7 @@ TEST(SpreadChoice, KeepsTheDefaultOnTheLettersOfThePaper) {
 
 TEST(SpreadChoice, IsNarrowerForAFineSharpArray) {
   const SpreadChoice choice =
-      Touched(grid_array(12, 12, 1.0), 0.95, 0.5, random_poses(60, 7)).choice();
+      Touched(grid_array(16, 16, 1.0), 0.95, 0.3, random_poses(40, 7)).choice();
   EXPECT_LT(choice.spread_mm, 0.4);
   EXPECT_GT(choice.likelihood_gain, 0.1);
   EXPECT_GT(choice.place_gain_mm, 0.01);
