@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -19,7 +20,10 @@
 #include "learning/observed_map.hpp"
 #include "learning/press.hpp"
 #include "learning/setup_check.hpp"
+#include "learning/spread_choice.hpp"
+#include "learning/touch_alignment.hpp"
 #include "model/option_words.hpp"
+#include "palpate/error.hpp"
 #include "palpate/files.hpp"
 #include "palpate/map_builder.hpp"
 #include "palpate/object_frame.hpp"
@@ -119,6 +123,95 @@ OccupancyGrid build_map(MapBuilder& builder, const ObjectTouches& object,
   return builder.build(object.label);
 }
 
+/// Aligns the touches by --touch-sd-mm and --touch-sd-deg, and says how far they moved.
+void align(const MapFlags& flags, const MapOptions& model, std::vector<ObjectTouches>& objects) {
+  const DisplacementSd sd = touch_sd(flags);
+  if (sd.none()) {
+    return;
+  }
+  TouchAlignment found;
+  {
+    Progress progress("aligning touches");
+    found = align_touches(objects, sd, model, [&](double done) { progress.show(done); });
+  }
+  fmt::print(
+      "touches moved by {:.2f} mm along x and y and by {:.2f} degrees, root mean square, to "
+      "the map of the others in {} rounds\n",
+      found.moved.mm, degrees(found.moved.rad), found.rounds);
+  const auto compare = [](const char* flag, const char* unit, double given, double told) {
+    constexpr double least = 0.75;
+    constexpr double most = 1.1;  // the posterior keeps what it finds near a given that is too low
+    if (given > 0.0 && !(told > least * given && told < most * given)) {
+      fmt::print(
+          stderr,
+          "palpate: by the touches the sensor was {:.2g} {} off where {} says {:g}: give {}\n",
+          told, unit, flag, given, told < given ? "less" : "more");
+    }
+  };
+  compare("--touch-sd-mm", "mm", sd.mm, found.displaced.mm);
+  compare("--touch-sd-deg", "degrees", degrees(sd.rad), degrees(found.displaced.rad));
+}
+
+/// The spread of the folder's maps that are not written anew, where all have the same.
+std::optional<double> spread_of_others(const MapFlags& flags,
+                                       const std::vector<std::filesystem::path>& written) {
+  std::error_code none;
+  std::optional<double> spread;
+  if (!std::filesystem::is_directory(flags.output, none)) {
+    return {};
+  }
+  for (const auto& entry : std::filesystem::directory_iterator(flags.output, none)) {
+    const std::filesystem::path& path = entry.path();
+    if (!path.filename().string().ends_with(".map.h5") ||
+        std::ranges::find(written, path.lexically_normal(), [](const std::filesystem::path& own) {
+          return own.lexically_normal();
+        }) != written.end()) {
+      continue;
+    }
+    try {
+      const std::optional<double> own = summarize_map(path).head.spread_mm;
+      if (!own || (spread && *spread != *own)) {
+        return {};
+      }
+      spread = own;
+    } catch (const Error& error) {
+      if (error.fault() != Fault::input) {  // what is no map says nothing
+        throw;
+      }
+    }
+  }
+  return spread;
+}
+
+/// Settles the spread where no flag decides on it, and says why in a line.
+/// @param model with the prior
+/// @returns whether another than the default was taken
+bool settle_spread(const MapFlags& flags, const std::vector<std::filesystem::path>& written,
+                   std::span<const ObjectTouches> objects, MapOptions& model) {
+  if (spread_given(flags)) {
+    return false;
+  }
+  const double usual_mm = model.sensor.spread_mm;
+  if (const auto others_mm = spread_of_others(flags, written)) {
+    model.sensor.spread_mm = *others_mm;
+    fmt::print("spread {:.3g} mm, as the other maps of {} have it\n", *others_mm, flags.output);
+  } else {
+    const SpreadChoice choice = choose_spread(objects, model);
+    model.sensor.spread_mm = choice.spread_mm;
+    if (choice.spread_mm == usual_mm) {
+      fmt::print("spread {:.3g} mm: no other predicts left-out touches better beyond chance\n",
+                 usual_mm);
+    } else {
+      fmt::print(
+          "spread {:.3g} mm: left-out touches are {:.2f} nats each more likely than with {:.3g} "
+          "mm, "
+          "and found {:.2g} mm nearer to their places; --spread-mm {:.3g} keeps the default\n",
+          choice.spread_mm, choice.likelihood_gain, usual_mm, choice.place_gain_mm, usual_mm);
+    }
+  }
+  return model.sensor.spread_mm != usual_mm;
+}
+
 /// Says where poses are unknown: touches that are no touches of one place would make a blur.
 void warn_of_unknown_poses(const std::vector<Recording>& recordings) {
   for (const Recording& recording : recordings) {
@@ -138,8 +231,7 @@ void build_maps(const MapFlags& flags) {
   MapOptions model = map_options(flags, recordings, sensor);
   const std::optional<double> prior = given_prior(flags, sensor);
   const ObjectOrigin origin = object_origin(flags);
-  const std::vector<ObjectTouches> objects =
-      group_by_label(flags, recordings, model.classifier).objects;
+  std::vector<ObjectTouches> objects = group_by_label(flags, recordings, model.classifier).objects;
 
   std::vector<std::filesystem::path> map_paths;
   std::vector<std::string> names;
@@ -156,7 +248,14 @@ void build_maps(const MapFlags& flags) {
     fmt::print(stderr, "palpate: {} ({:.0f} nats; palpate check tells more)\n",
                in_flags(suspicion->words), suspicion->nats);
   }
-  model.sensor.prior = prior ? *prior : estimate_prior(device, objects, model);
+  align(flags, model, objects);
+  const auto settle_prior = [&] {
+    model.sensor.prior = prior ? *prior : estimate_prior(device, objects, model);
+  };
+  settle_prior();
+  if (settle_spread(flags, map_paths, objects, model)) {
+    settle_prior();
+  }
   std::vector<OccupancyGrid> maps;
   std::vector<std::optional<RotationalSymmetry>> symmetries;
   {

@@ -4,6 +4,7 @@
 #include <limits>
 #include <map>
 #include <sstream>
+#include <tuple>
 
 #include <fmt/ranges.h>
 #include <CLI/CLI.hpp>
@@ -68,7 +69,9 @@ void add_map_flags(CLI::App& command, MapFlags& flags) {
       ->capture_default_str();
   command.add_option("--spread-mm", flags.spread_mm,
                      "Standard deviation of the inverse sensor model, mm [default: half of "
-                     "--psf-mm; with --unposed 0.6 times the distance of neighbouring elements]");
+                     "--psf-mm where that is given; else that of the FOLDER's other maps, or 0.5 "
+                     "unless another predicts left-out touches better; with --unposed 0.6 times "
+                     "the distance of neighbouring elements]");
   command
       .add_option("--peak", flags.peak, "Peak of the inverse sensor model, a probability below 1")
       ->capture_default_str();
@@ -88,6 +91,12 @@ void add_map_flags(CLI::App& command, MapFlags& flags) {
                      "Sensor model (YAML) whose threshold, ratio, spread and prior are the "
                      "defaults; the maps then also hold the number of touches and the mean "
                      "pressure at each cell");
+  command.add_option("--touch-sd-mm", flags.touch_sd_mm,
+                     "How exact the robot's poses are: standard deviation of the sensor's true "
+                     "position about the reported one, along x and along y, mm. The touches are "
+                     "aligned to the map that they make [default: 0, exact]");
+  command.add_option("--touch-sd-deg", flags.touch_sd_deg,
+                     "The same of the sensor's angle, degrees [default: 0]");
   add_frames_flag(command, flags.frames,
                   "Use the touches A to B - 1 of every recording, counted from 0, as A:B");
   command.add_option("--symmetry", flags.symmetry,
@@ -137,6 +146,16 @@ void finish_map_flags(const CLI::App& command, MapFlags& flags) {
     refuse_flag("--label", none_label,
                 "stands for objects that were never learned; choose another label");
   }
+  for (const auto& [flag, sd, most] :
+       {std::tuple{"--touch-sd-mm", flags.touch_sd_mm, most_length_mm},
+        {"--touch-sd-deg", flags.touch_sd_deg, 180.0}}) {
+    if (sd && !(*sd >= 0.0 && *sd <= most)) {
+      refuse_flag(flag, *sd, "give 0 to {:g}", most);
+    }
+    if (sd && flags.unposed) {
+      refuse_flag(flag, *sd, "presses at unknown poses are placed anyway; leave it out");
+    }
+  }
   if (flags.max_maps && !flags.unposed) {
     refuse_flag("--max-maps", *flags.max_maps,
                 "only presses at unknown poses make several maps; give --unposed, or leave it out");
@@ -183,6 +202,14 @@ MapOptions map_options(const MapFlags& flags, const std::vector<Recording>& reco
   const Recording& first = recordings.front();
   result.classifier = make_classifier(first.pressure_unit, first.path, threshold, ratio);
   return result;
+}
+
+bool spread_given(const MapFlags& flags) {
+  return flags.spread_mm || flags.psf_given || !flags.sensor_model.empty();
+}
+
+DisplacementSd touch_sd(const MapFlags& flags) {
+  return {flags.touch_sd_mm.value_or(0.0), radians(flags.touch_sd_deg.value_or(0.0))};
 }
 
 std::optional<double> given_prior(const MapFlags& flags,

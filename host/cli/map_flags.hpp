@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "palpate/displacement.hpp"
 #include "palpate/learned_sensor.hpp"
 #include "palpate/map_builder.hpp"
 #include "palpate/rotational_symmetry.hpp"
@@ -27,6 +28,8 @@ struct MapFlags {
   double psf_mm = 1.0;
   bool psf_given = false;
   std::optional<double> spread_mm;
+  std::optional<double> touch_sd_mm;
+  std::optional<double> touch_sd_deg;
   double peak = 0.9;
   std::string prior = "auto";
   bool prior_given = false;
@@ -49,7 +52,8 @@ struct MapFlags {
 };
 
 void add_map_flags(CLI::App& command, MapFlags& flags);
-/// Notes which flags were given. Throws Error on a label that no map can bear.
+/// Notes which flags were given. Throws Error on a label that no map can bear, on deviations out of
+/// range, and where flags do not go with --unposed.
 void finish_map_flags(const CLI::App& command, MapFlags& flags);
 
 /// The file of --sensor-model, if given. Throws Error where its pressure unit is not the
@@ -59,6 +63,10 @@ std::optional<LearnedSensor> sensor_of(const MapFlags& flags,
 /// The map's options but for the prior. A flag overrides the sensor model.
 MapOptions map_options(const MapFlags& flags, const std::vector<Recording>& recordings,
                        const std::optional<LearnedSensor>& sensor);
+/// Whether --spread-mm, --psf-mm or a sensor model decides on the spread of maps.
+bool spread_given(const MapFlags& flags);
+/// By --touch-sd-mm and --touch-sd-deg.
+DisplacementSd touch_sd(const MapFlags& flags);
 /// The prior by --prior, or else the sensor model's; none where it is to be estimated.
 std::optional<double> given_prior(const MapFlags& flags,
                                   const std::optional<LearnedSensor>& sensor);

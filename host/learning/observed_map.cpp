@@ -18,28 +18,6 @@ namespace palpate {
 
 namespace {
 
-/// Calls visit(index in the range, squared distance in mm^2) for every cell of a range whose centre
-/// lies within `radius_mm` of a place.
-template <typename Visit>
-void visit_near(const CellRange& cells, double cell_mm, const glm::dvec2& place_mm,
-                double radius_mm, const Visit& visit) {
-  const auto from = [&](double mm, std::int64_t first) {
-    return std::max(first, static_cast<std::int64_t>(std::ceil((mm - radius_mm) / cell_mm)));
-  };
-  const auto to = [&](double mm, std::int64_t end) {
-    return std::min(end - 1, static_cast<std::int64_t>(std::floor((mm + radius_mm) / cell_mm)));
-  };
-  for (std::int64_t j = from(place_mm.y, cells.y); j <= to(place_mm.y, cells.y + cells.ny); ++j) {
-    const double dy = cell_mm * static_cast<double>(j) - place_mm.y;
-    for (std::int64_t i = from(place_mm.x, cells.x); i <= to(place_mm.x, cells.x + cells.nx); ++i) {
-      const double dx = cell_mm * static_cast<double>(i) - place_mm.x;
-      if (const double squared = dx * dx + dy * dy; squared <= radius_mm * radius_mm) {
-        visit(cells.index(i, j), squared);
-      }
-    }
-  }
-}
-
 std::size_t count(const CellRange& cells) { return static_cast<std::size_t>(cells.nx * cells.ny); }
 
 /// A touch's known elements, in the robot frame.

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -35,6 +37,28 @@ CellRange common(const CellRange& a, const CellRange& b);
 /// @throws Error where these are more than most_cells
 CellRange cover(const glm::dvec2& lowest_mm, const glm::dvec2& highest_mm, double margin_mm,
                 double cell_mm);
+
+/// Calls visit(index in the range, squared distance in mm^2) for every cell of a range whose centre
+/// lies within `radius_mm` of a place.
+template <typename Visit>
+void visit_near(const CellRange& cells, double cell_mm, const glm::dvec2& place_mm,
+                double radius_mm, const Visit& visit) {
+  const auto from = [&](double mm, std::int64_t first) {
+    return std::max(first, static_cast<std::int64_t>(std::ceil((mm - radius_mm) / cell_mm)));
+  };
+  const auto to = [&](double mm, std::int64_t end) {
+    return std::min(end - 1, static_cast<std::int64_t>(std::floor((mm + radius_mm) / cell_mm)));
+  };
+  for (std::int64_t j = from(place_mm.y, cells.y); j <= to(place_mm.y, cells.y + cells.ny); ++j) {
+    const double dy = cell_mm * static_cast<double>(j) - place_mm.y;
+    for (std::int64_t i = from(place_mm.x, cells.x); i <= to(place_mm.x, cells.x + cells.nx); ++i) {
+      const double dx = cell_mm * static_cast<double>(i) - place_mm.x;
+      if (const double squared = dx * dx + dy * dy; squared <= radius_mm * radius_mm) {
+        visit(cells.index(i, j), squared);
+      }
+    }
+  }
+}
 
 /// Radius in mm at which the Gaussian of readings is cut off. Reading i may lose
 /// map_cut_tolerance / (16 max(i, 8192)) nats: together below the tolerance for up to 10^10

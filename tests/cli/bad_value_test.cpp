@@ -68,6 +68,8 @@ INSTANTIATE_TEST_SUITE_P(
         Flag{"map", "cell-mm", {"x", "1x", "nan", "inf", "0", "-1"}},
         Flag{"map", "psf-mm", {"x", "1x", "nan", "inf", "0", "-1"}},
         Flag{"map", "spread-mm", {"x", "1x", "nan", "inf", "0", "-1"}},
+        Flag{"map", "touch-sd-mm", {"x", "nan", "inf", "-1"}},
+        Flag{"map", "touch-sd-deg", {"x", "nan", "-1", "181"}},
         Flag{"map", "peak", {"x", "nan", "0", "-1", "1", "1.5"}},
         Flag{"map", "prior", {"x", "0.2x", "nan", "0", "-1", "1", "1.5"}},
         Flag{"map", "threshold", {"x", "1x", "nan", "inf", "-1"}},

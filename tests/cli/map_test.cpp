@@ -2,6 +2,8 @@
 #include <cmath>
 
 #include "io/hdf5_contents.hpp"
+#include "palpate/map_builder.hpp"
+#include "palpate/simulation.hpp"
 #include "program.hpp"
 #include "sample_files.hpp"
 
@@ -52,6 +54,50 @@ TEST_F(MapCommand, SaysAndStoresTheSymmetryThatTheMapsShow) {
   EXPECT_EQ(given.find("--symmetry"), std::string::npos) << given;
   done({"map", "I.h5", "-o", "I.map.h5", "--symmetry", "1"});
   EXPECT_FALSE(read_map(folder_ / "I.map.h5").suggested_symmetry) << "not to be taken";
+}
+
+TEST_F(MapCommand, SaysWhichSpreadItTook) {
+  const std::string usual = done({"map", "A.h5", "-o", "maps/"});
+  EXPECT_NE(usual.find("spread 0.5 mm: no other predicts left-out touches"), std::string::npos)
+      << usual;
+  const std::string given = done({"map", "A.h5", "-o", "maps/", "--spread-mm", "0.8"});
+  EXPECT_EQ(given.find("spread"), std::string::npos) << given;
+  const std::string joined = done({"map", "I.h5", "-o", "maps/"});
+  EXPECT_NE(joined.find("spread 0.8 mm, as the other maps of maps/ have it\n"), std::string::npos)
+      << joined;
+  EXPECT_EQ(read_map(folder_ / "maps/I.map.h5").spread_mm, 0.8);
+  const std::string anew = done({"map", "A.h5", "I.h5", "-o", "maps/"});
+  EXPECT_NE(anew.find("spread 0.5 mm: "), std::string::npos) << "all are written anew: " << anew;
+}
+
+TEST_F(MapCommand, ChoosesTheSpreadOfAFineArray) {
+  for (const char* letter : {"A", "E", "U"}) {
+    Simulator simulator(make_shape(letter), {.psf_mm = 0.3, .element_mm = 0.95},
+                        grid_array(16, 16, 1.0), 4);
+    write_recording(folder_ / (std::string("fine.") + letter + ".h5"),
+                    simulator.touch(random_poses(40, 7), {}));
+  }
+  const std::string out = done({"map", "fine.A.h5", "fine.E.h5", "fine.U.h5", "-o", "fine/"});
+  EXPECT_NE(out.find("nats each more likely than with 0.5 mm"), std::string::npos) << out;
+  EXPECT_LT(*read_map(folder_ / "fine/A.map.h5").spread_mm, 0.4);
+  EXPECT_LT(*read_map(folder_ / "fine/U.map.h5").spread_mm, 0.4) << "one spread for all";
+}
+
+TEST_F(MapCommand, AlignsTouchesOfAnUncertainRobot) {
+  const OccupancyGrid exact = map_of_a({});
+  EXPECT_EQ(map_of_a({"--touch-sd-mm", "0", "--touch-sd-deg", "0"}).log_odds, exact.log_odds);
+  const Outcome run =
+      palpate({"map", "A.h5", "-o", "A.map.h5", "--touch-sd-mm", "1", "--touch-sd-deg", "2.9"});
+  EXPECT_EQ(run.status, 0);
+  EXPECT_NE(run.out.find("touches moved by 0."), std::string::npos) << run.out;
+  EXPECT_NE(run.err.find("--touch-sd-mm says 1: give less"), std::string::npos) << run.err;
+  const OccupancyGrid aligned = read_map(folder_ / "A.map.h5");
+  EXPECT_NE(aligned.log_odds, exact.log_odds);
+  // It is built from the aligned touches that it keeps.
+  Device device = Device::open();
+  EXPECT_EQ(with_prior(device, aligned, aligned.prior).log_odds, aligned.log_odds);
+  expect_refused({"map", "A.h5", "-o", "new/", "--touch-sd-mm", "1", "--unposed"},
+                 {"--touch-sd-mm 1", "leave it out"});
 }
 
 TEST_F(MapCommand, FolderThatExistsNeedsNoSlash) {
