@@ -10,13 +10,13 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 import palpate
+from palpate import _charts as charts
 from palpate._tables import column
 
-from . import charts
 from .belief_touches import MISPLACED_SEED, Inputs
 from .measures import turning
 from .program import Json
-from .trials import VOWELS, Floats, Touching, make_trials, poses_of, truth_of
+from .trials import VOWELS, Floats, Touching, error_of, make_trials, truth_of
 
 
 def plot(axes: Axes, records: list[Json], path: str, label: str, **look: Any) -> None:
@@ -126,9 +126,10 @@ def draw_misplaced_unknown(inputs: Inputs) -> bytes:
     ):
         belief = palpate.PoseHistogram(inputs.device, inputs.maps, lattice, touch_sd=touch_sd)
         belief.update(trial)
-        poses = poses_of(belief, inputs.maps, truth_of(trial))
-        shown = belief.marginals(poses.mode.object).xy
-        place_mm, covariance = _place(poses.refined, pivot_mm)
+        mode = belief.estimate().mode
+        refined = belief.refine(mode)
+        shown = belief.marginals(mode.object).xy
+        place_mm, covariance = _place(refined, pivot_mm)
         image = axes.imshow(
             numpy.maximum(shown / shown.max(), 1e-9),
             origin="lower",
@@ -145,7 +146,8 @@ def draw_misplaced_unknown(inputs: Inputs) -> bytes:
         look: Json = {"markersize": 12, "markeredgewidth": 3, "markeredgecolor": "#d55e00"}
         axes.plot(*true_mm, "x", linestyle="", label="true", **look)
         sd = numpy.sqrt(numpy.diag(covariance))
-        error = f"error {poses.refined_error_mm:.1f} mm; "
+        error_mm = error_of(inputs.maps[mode.object], truth_of(trial), refined)
+        error = f"error {error_mm:.1f} mm; "
         error += f"standard deviations {sd[0]:.1f} and {sd[1]:.1f} mm"
         axes.set_title(f"{title}\n{error}", fontsize=12)
         axes.set(xlim=true_mm[0] + (-4.0, 4.0), ylim=true_mm[1] + (-4.0, 4.0))

@@ -3,7 +3,9 @@
 import pathlib
 from collections.abc import Callable
 
-from . import belief_charts, charts
+from palpate import _charts as charts
+
+from . import belief_charts
 from .belief_moves import measure_costs, measure_plan, measure_slip
 from .belief_touches import Inputs, measure_misplaced, measure_none, measure_touch_sd
 from .program import Json, begin, main, parser, write

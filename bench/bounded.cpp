@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <optional>
 
 #include <fmt/format.h>
@@ -10,73 +11,46 @@
 
 namespace palpate::bench {
 
-Estimate BoundedAnswers::ask(BoundedPosterior& posterior, std::span<const Touch> touches) {
-  Estimate estimate;
-  milliseconds.push_back(1e3 * seconds_of([&] {
-                           posterior.update(touches);
-                           estimate = posterior.estimate();
-                         }));
-  const Certificate& certificate = *estimate.certificate;
-  bins_evaluated.push_back(static_cast<double>(certificate.bins_evaluated));
-  dropped_mass.push_back(certificate.dropped_mass);
-  mode_certain += certificate.mode_certain ? 1 : 0;
+void Answers::note(const Estimate& estimate) {
   modes.push_back(estimate.mode);
-  return estimate;
+  if (const auto& certificate = estimate.certificate) {
+    bins_evaluated.push_back(static_cast<double>(certificate->bins_evaluated));
+    dropped_mass.push_back(certificate->dropped_mass);
+    mode_certain += certificate->mode_certain ? 1 : 0;
+  }
 }
 
-void BoundedAnswers::add(const BoundedAnswers& others) {
+void Answers::add(const Answers& others) {
   const auto append = [](auto& to, const auto& from) {
     to.insert(to.end(), from.begin(), from.end());
   };
-  append(milliseconds, others.milliseconds);
+  append(seconds, others.seconds);
+  append(modes, others.modes);
   append(bins_evaluated, others.bins_evaluated);
   append(dropped_mass, others.dropped_mass);
-  append(modes, others.modes);
   mode_certain += others.mode_certain;
 }
 
-Json BoundedAnswers::record() const {
+Json Answers::record() const {
+  std::vector<double> milliseconds;
+  std::ranges::transform(seconds, std::back_inserter(milliseconds),
+                         [](double s) { return 1e3 * s; });
   return {{"milliseconds", milliseconds},
           {"bins_evaluated", bins_evaluated},
           {"dropped_mass", dropped_mass},
           {"mode_certain", mode_certain}};
 }
 
-BoundedAnswers answer_each(BoundedPosterior& posterior, std::span<const Recording> unknowns) {
-  posterior.reset();
-  BoundedAnswers().ask(posterior, all_touches(unknowns.front()));
-  BoundedAnswers answers;
-  for (const Recording& unknown : unknowns) {
-    posterior.reset();
-    answers.ask(posterior, all_touches(unknown));
-  }
-  return answers;
-}
-
-DenseAnswers answer_each(PoseHistogram& histogram, std::span<const Recording> unknowns) {
-  DenseAnswers answers;
-  for (const Recording& unknown : unknowns) {
-    const std::vector<Touch> touches = all_touches(unknown);
-    histogram.reset();
-    answers.seconds.push_back(seconds_of([&] {
-      histogram.update(touches);
-      answers.modes.push_back(histogram.estimate().mode);
-    }));
-  }
-  return answers;
-}
-
-std::vector<Measurement> measurements_of(const BoundedAnswers& answers, const std::string& name,
+std::vector<Measurement> measurements_of(const Answers& answers, const std::string& name,
                                          std::int64_t bins_in_all, std::optional<Goal> median_ms) {
-  const std::vector<double>& ms = answers.milliseconds;
   const double evaluated = median(answers.bins_evaluated);
-  return {{name + ", median", median(ms), "ms", median_ms},
-          {name + ", least", std::ranges::min(ms), "ms"},
-          {name + ", most", std::ranges::max(ms), "ms"},
+  return {{name + ", median", answers.median_ms(), "ms", median_ms},
+          {name + ", least", 1e3 * std::ranges::min(answers.seconds), "ms"},
+          {name + ", most", 1e3 * std::ranges::max(answers.seconds), "ms"},
           {"bins evaluated, median", evaluated, "bins"},
           {"of all bins", 100.0 * evaluated / static_cast<double>(bins_in_all), "%"},
           {"certificate, largest", std::ranges::max(answers.dropped_mass), "mass"},
-          share_of("mode certain", answers.mode_certain, ms.size())};
+          share_of("mode certain", answers.mode_certain, answers.modes.size())};
 }
 
 namespace {
@@ -92,7 +66,7 @@ struct Size {
 
 /// How many of the dense modes the bounded answers have too, by bin or by likelihood up to 1e-3
 /// nats, by which the histogram's float32 may order two bins otherwise.
-int same_modes(const BoundedAnswers& bounded, const DenseAnswers& dense) {
+int same_modes(const Answers& bounded, const Answers& dense) {
   constexpr double one_likelihood = 1e-3;
   int same = 0;
   for (std::size_t i = 0; i < dense.modes.size(); ++i) {
@@ -113,14 +87,14 @@ double table_ms(const BoundedInputs& inputs, const BoundedOptions& options,
   std::vector<double> ms;
   for (int i = 0; i < repeats; ++i) {
     std::optional<BoundedPosterior> posterior;
-    BoundedAnswers answers;
+    Answers answers;
     const double first_ms = 1e3 * seconds_of([&] {
                               posterior.emplace(inputs.letters, options);
                               answers.ask(*posterior, touches);
                             });
     posterior->reset();
     answers.ask(*posterior, touches);
-    ms.push_back(first_ms - answers.milliseconds.back());
+    ms.push_back(first_ms - 1e3 * answers.seconds.back());
   }
   return median(ms);
 }
@@ -144,17 +118,16 @@ Json measure_size(const BoundedInputs& inputs, const Size& size,
   const double tables_ms = table_ms(inputs, options, unknowns.front());
   BoundedPosterior threaded(inputs.letters, options);
   BoundedPosterior single(inputs.letters, one_thread);
-  const BoundedAnswers all = answer_each(threaded, unknowns);
-  const BoundedAnswers one = answer_each(single, unknowns);
+  const Answers all = answer_each(threaded, unknowns, true);
+  const Answers one = answer_each(single, unknowns, true);
   PoseHistogram histogram(inputs.device, inputs.letters, {.lattice = size.lattice});
-  const DenseAnswers dense =
-      answer_each(histogram, std::span(unknowns).first(static_cast<std::size_t>(size.dense)));
+  const Answers dense = answer_each(
+      histogram, std::span(unknowns).first(static_cast<std::size_t>(size.dense)), false);
 
   const auto goal = [&](bool on_one) {
     return size.most_ms && on_one == size.on_one_thread ? std::optional(at_most(*size.most_ms))
                                                         : std::nullopt;
   };
-  const double dense_ms = 1e3 * median(dense.seconds);
   Case measured{.name = fmt::format("speed {}", size_of(size.lattice)),
                 .facts = {{"objects", inputs.letters.size()},
                           {"touches", touches_per_unknown},
@@ -162,10 +135,10 @@ Json measure_size(const BoundedInputs& inputs, const Size& size,
                           {"path", threaded.path()}},
                 .measurements = measurements_of(all, "all threads", bins, goal(false))};
   std::vector<Measurement>& rows = measured.measurements;
-  rows.push_back({"one thread, median", median(one.milliseconds), "ms", goal(true)});
+  rows.push_back({"one thread, median", one.median_ms(), "ms", goal(true)});
   rows.push_back({"tables, once", tables_ms, "ms", at_most(most_table_ms)});
-  rows.push_back({"dense engine, median", dense_ms, "ms"});
-  rows.push_back({"dense over bounded, all threads", dense_ms / median(all.milliseconds), "times"});
+  rows.push_back({"dense engine, median", dense.median_ms(), "ms"});
+  rows.push_back({"dense over bounded, all threads", dense.median_ms() / all.median_ms(), "times"});
   rows.push_back(share_of("the dense engine's mode", same_modes(all, dense), dense.modes.size()));
   report.add(measured);
   return {{"bins", size_of(size.lattice)}, {"bins_in_all", bins},
@@ -181,7 +154,7 @@ constexpr double most_dropped_first = 1e-2;
 /// Least share of the first touches whose dropped mass is small, in percent: 16 of 20.
 constexpr double least_share_first = 80.0;
 
-void add_case(const BoundedAnswers& answers, const std::string& touches, std::int64_t bins,
+void add_case(const Answers& answers, const std::string& touches, std::int64_t bins,
               const std::optional<Goal>& median_ms, bool first, Report& report) {
   const std::vector<double>& dropped = answers.dropped_mass;
   Case measured{
@@ -225,16 +198,15 @@ Json measure_bounded_mode(const BoundedInputs& inputs, Report& report) {
   for (const double tolerance : {BoundedOptions{}.tolerance, 0.1}) {
     const BoundedOptions options{.lattice = lattice, .tolerance = tolerance};
     BoundedPosterior posterior(inputs.letters, options);
-    const BoundedAnswers answers = answer_each(posterior, unknowns);
+    const Answers answers = answer_each(posterior, unknowns, true);
     const double tables_ms = table_ms(inputs, options, unknowns.front());
-    const double ms = median(answers.milliseconds);
     Case measured{.name = fmt::format("mode {}, tolerance {}", size_of(lattice), tolerance),
                   .facts = {{"objects", inputs.letters.size()},
                             {"touches", touches_per_unknown},
                             {"unknowns", unknowns.size()}},
                   .measurements = measurements_of(answers, "to the mode", bins, at_most(most_ms))};
-    measured.measurements.push_back(
-        {"tables included, median", ms + tables_ms, "ms", at_most(most_with_tables_ms)});
+    measured.measurements.push_back({"tables included, median", answers.median_ms() + tables_ms,
+                                     "ms", at_most(most_with_tables_ms)});
     report.add(measured);
     records.push_back({{"bins", size_of(lattice)},
                        {"tolerance", tolerance},
@@ -249,17 +221,17 @@ Json measure_bounded_streaming(const BoundedInputs& inputs, Report& report) {
   const PoseLattice lattice = inputs.quick ? lattice_of(10, 10, 8) : lattice_of(200, 200, 250);
   const std::int64_t bins = inputs.bins_in_all(lattice);
   BoundedPosterior posterior(inputs.letters, {.lattice = lattice, .budget_s = budget_s});
-  std::vector<BoundedAnswers> after(touches_per_unknown);  // [touch]
+  std::vector<Answers> after(touches_per_unknown);  // [touch]
   const std::vector<Recording> unknowns =
       unknown_recordings(inputs.unknowns(), touches_per_unknown, streaming_seed);
-  BoundedAnswers().ask(posterior, all_touches(unknowns.front()));  // warms up
+  Answers().ask(posterior, all_touches(unknowns.front()));  // warms up
   for (const Recording& unknown : unknowns) {
     posterior.reset();
     for (std::size_t i = 0; i < after.size(); ++i) {
       after[i].ask(posterior, unknown.touches(i, i + 1));
     }
   }
-  BoundedAnswers later;
+  Answers later;
   for (std::size_t i = 2; i < after.size(); ++i) {
     later.add(after[i]);
   }

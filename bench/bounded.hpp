@@ -6,41 +6,61 @@
 #include <string>
 #include <vector>
 
+#include "letters.hpp"
 #include "palpate/bounded_posterior.hpp"
 #include "palpate/pose_histogram.hpp"
 #include "report.hpp"
 
 namespace palpate::bench {
 
-/// Answers of the bounded posterior, [unknown], and what they took.
-struct BoundedAnswers {
-  std::vector<double> milliseconds = {};  ///< of update() and estimate()
+/// Answers of a belief, [unknown], and what they took.
+struct Answers {
+  std::vector<double> seconds = {};  ///< of update() and estimate()
+  std::vector<Mode> modes = {};
+  // Of bounds alone:
   std::vector<double> bins_evaluated = {};
   std::vector<double> dropped_mass = {};
-  std::vector<Mode> modes = {};
   int mode_certain = 0;
 
   /// Takes in the touches and asks once; what was known before counts too.
-  Estimate ask(BoundedPosterior& posterior, std::span<const Touch> touches);
+  template <typename Belief>
+  Estimate ask(Belief& belief, std::span<const Touch> touches) {
+    Estimate estimate;
+    seconds.push_back(seconds_of([&] {
+      belief.update(touches);
+      estimate = belief.estimate();
+    }));
+    note(estimate);
+    return estimate;
+  }
   /// Adds other answers to these.
-  void add(const BoundedAnswers& others);
-  /// Every answer's figures, [unknown] each.
+  void add(const Answers& others);
+  double median_ms() const { return 1e3 * median(seconds); }
+  /// The figures of every answer by bounds, [unknown] each.
   Json record() const;
+
+ private:
+  void note(const Estimate& estimate);
 };
 
-/// Asks once about each unknown after all of its touches, from the uniform belief on. The first
-/// unknown is asked about once more before, which does not count.
-BoundedAnswers answer_each(BoundedPosterior& posterior, std::span<const Recording> unknowns);
-
-/// Seconds of update() and estimate() of a dense histogram over each unknown, and its modes.
-struct DenseAnswers {
-  std::vector<double> seconds = {};
-  std::vector<Mode> modes = {};
-};
-DenseAnswers answer_each(PoseHistogram& histogram, std::span<const Recording> unknowns);
+/// Asks once about each unknown after all of its touches, from the uniform belief on.
+/// @param warm_up asks about the first unknown once more before, which does not count
+template <typename Belief>
+Answers answer_each(Belief& belief, std::span<const Recording> unknowns, bool warm_up) {
+  belief.reset();
+  if (warm_up) {
+    Answers().ask(belief, all_touches(unknowns.front()));
+  }
+  Answers answers;
+  for (const Recording& unknown : unknowns) {
+    belief.reset();
+    answers.ask(belief, all_touches(unknown));
+  }
+  return answers;
+}
 
 /// Rows of times, bins evaluated and certificate. `name` begins the names of the times.
-std::vector<Measurement> measurements_of(const BoundedAnswers& answers, const std::string& name,
+std::vector<Measurement> measurements_of(const Answers& answers, const std::string& name,
                                          std::int64_t bins_in_all,
                                          std::optional<Goal> median_ms = {});
 

@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Rectangle
 
 import palpate
+from palpate import _charts as charts
 from palpate._sweep_runs import counts_of
 from palpate._tables import (
     Column,
@@ -29,7 +30,6 @@ from palpate._tables import (
     seconds_text,
 )
 
-from . import charts
 from .certificates import check_certificate, dense_posterior
 from .measures import share_record, with_interval
 from .program import Json, begin, main, parser, write

@@ -45,7 +45,7 @@ Json measure_scene(const BoundedInputs& inputs, const LargeScene& scene, bool ab
   std::optional<BoundedPosterior> posterior;
   const double seconds =
       seconds_of([&] { posterior.emplace(objects, BoundedOptions{.lattice = lattice}); });
-  BoundedAnswers answers;
+  Answers answers;
   int right = 0;
   for (const Recording& unknown : unknowns) {
     posterior->reset();
@@ -99,13 +99,14 @@ int dense_unknowns(double bins_in_all, int unknowns) {
                               : 0;
 }
 
-/// Median, least and most of some times in seconds; `unit` is the seconds that a 1 stands for.
-Json times_of(const std::vector<double>& times, double unit) {
-  return times.empty() ? Json(nullptr)
-                       : Json{{"median", unit * median(times)},
-                              {"least", unit * std::ranges::min(times)},
-                              {"most", unit * std::ranges::max(times)},
-                              {"unknowns", times.size()}};
+/// Median, least and most of the seconds.
+Json times_of(const Answers& answers) {
+  const std::vector<double>& seconds = answers.seconds;
+  return seconds.empty() ? Json(nullptr)
+                         : Json{{"median", median(seconds)},
+                                {"least", std::ranges::min(seconds)},
+                                {"most", std::ranges::max(seconds)},
+                                {"unknowns", seconds.size()}};
 }
 
 Json measure_bins(const BoundedInputs& inputs, double bins_in_all,
@@ -117,18 +118,19 @@ Json measure_bins(const BoundedInputs& inputs, double bins_in_all,
   restart_peak_memory();
   const std::uint64_t before = resident_bytes();
   std::optional<BoundedPosterior> posterior(std::in_place, inputs.letters, options);
-  const BoundedAnswers all = answer_each(*posterior, unknowns);
+  const Answers all = answer_each(*posterior, unknowns, true);
   const std::uint64_t peak = peak_resident_bytes() - before;
   const std::uint64_t held = posterior->host_bytes();
   options.threads = 1;
   posterior.emplace(inputs.letters, options);
-  const BoundedAnswers one = answer_each(*posterior, unknowns);
+  const Answers one = answer_each(*posterior, unknowns, true);
   posterior.reset();
-  DenseAnswers dense;
+  Answers dense;
   if (const int count = dense_unknowns(bins_in_all, static_cast<int>(unknowns.size())); count > 0) {
     PoseHistogram histogram(inputs.device, inputs.letters, {.lattice = lattice});
     histogram.update(unknowns.front().touch(0));  // warms up
-    dense = answer_each(histogram, std::span(unknowns).first(static_cast<std::size_t>(count)));
+    dense =
+        answer_each(histogram, std::span(unknowns).first(static_cast<std::size_t>(count)), false);
   }
 
   const double peak_mib = static_cast<double>(peak) / (1 << 20);
@@ -139,21 +141,20 @@ Json measure_bins(const BoundedInputs& inputs, double bins_in_all,
                           {"touches", touches_per_unknown},
                           {"unknowns", unknowns.size()}},
                 .measurements = measurements_of(all, "all threads", bins)};
-  measured.measurements.push_back({"one thread, median", median(one.milliseconds), "ms"});
+  measured.measurements.push_back({"one thread, median", one.median_ms(), "ms"});
   measured.measurements.push_back(
       {"peak of the process above before", peak_mib, "MiB",
        largest ? std::optional(at_most(most_memory_mib)) : std::nullopt});
   if (!dense.seconds.empty()) {
     measured.measurements.push_back(
-        {fmt::format("dense engine, median of {}", dense.seconds.size()),
-         1e3 * median(dense.seconds), "ms"});
+        {fmt::format("dense engine, median of {}", dense.seconds.size()), dense.median_ms(), "ms"});
   }
   report.add(measured);
   return {{"bins_in_all", bins},
           {"bins", size_of(lattice)},
-          {"bounded", times_of(all.milliseconds, 1e-3)},
-          {"one_thread", times_of(one.milliseconds, 1e-3)},
-          {"dense", times_of(dense.seconds, 1.0)},
+          {"bounded", times_of(all)},
+          {"one_thread", times_of(one)},
+          {"dense", times_of(dense)},
           {"bins_evaluated", median(all.bins_evaluated)},
           {"dropped_mass", std::ranges::max(all.dropped_mass)},
           {"host_bytes", held},

@@ -12,10 +12,10 @@ from typing import Any
 import numpy
 
 import palpate
+from palpate import _charts as charts
 from palpate._statistics import errors_over, present
 from palpate._tables import Column, Table, column, number, plain, print_table, value_of
 
-from . import charts
 from .experiment_charts import MOST_PARTICLES, as_many, draw
 from .measures import calibration, share_record, student_record, with_interval
 from .program import Json, at_least_1, begin, main, parser, write

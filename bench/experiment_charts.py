@@ -5,9 +5,9 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from palpate import _charts as charts
 from palpate._tables import column
 
-from . import charts
 from .program import Json
 
 # What the paper reports of letters that it touched with a real sensor.

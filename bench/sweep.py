@@ -11,10 +11,10 @@ import time
 from collections.abc import Sequence
 
 import palpate
+from palpate import _charts as charts
 from palpate._sweep_runs import counts_of
 from palpate._tables import Table, count_text, plain, print_table
 
-from . import charts
 from .measures import differences, knee_of
 from .program import Json, begin, main, parser, write
 from .sweep_page import charts_of, page_of
@@ -94,15 +94,15 @@ def compare_paths(options: argparse.Namespace) -> list[Json]:
         return paths
 
 
-def window_sentence(points: Sequence[Json]) -> str:
-    """How well windows agree with the full posterior."""
-    windows = [point["windows"] for point in points if point["windows"]]
-    trials = sum(of["compared_trials"] for of in windows)
-    mode_mm = max((of["mode_difference_mm"] for of in windows), default=0.0)
-    refined_mm = max((of["refined_difference_mm"] for of in windows), default=0.0)
+def bounds_sentence(points: Sequence[Json]) -> str:
+    """How well bounds agree with the histogram."""
+    compared = [point["by_bounds"] for point in points if point["by_bounds"]]
+    trials = sum(of["compared_trials"] for of in compared)
+    mode_mm = max((of["mode_difference_mm"] for of in compared), default=0.0)
+    refined_mm = max((of["refined_difference_mm"] for of in compared), default=0.0)
     return (
         f"Of {trials} trials with the full posterior on the same lattices, modes lie within "
-        f"{mode_mm:.1e} mm of the windows', and refined poses within {refined_mm:.1e} mm."
+        f"{mode_mm:.1e} mm of those by bounds, and refined poses within {refined_mm:.1e} mm."
     )
 
 
@@ -168,14 +168,14 @@ def measure(device: palpate.Device, options: argparse.Namespace) -> Json:
     print_table(LIMITS, limits)
     print("", *(f"- {knee['sentence']}" for knee in knees), sep="\n")
     print_table(STEPS, [step for knee in knees for step in knee["steps"]])
-    windows, verdicts = window_sentence(points), verdicts_of(points)
-    print(f"\n{windows}")
+    agreement, verdicts = bounds_sentence(points), verdicts_of(points)
+    print(f"\n{agreement}")
     print_table(VERDICTS, verdicts)
     return {
         "touches": TOUCHES,
         "trials": len(trials),
         "points": points,
-        "windows": windows,
+        "agreement": agreement,
         "precisions": precisions,
         "bounds": bounds,
         "knees": knees,

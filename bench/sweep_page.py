@@ -9,15 +9,14 @@ from typing import Any
 import numpy
 from numpy.typing import NDArray
 
+from palpate import _charts as charts
 from palpate._statistics import LEAST_GAIN
 from palpate._tables import Column, column, count_text, mean_text, seconds_text, texts, value_of
 
-from . import charts
 from .program import Json
 from .sweep_runs import AUTO_RULE, SAMPLED
 from .sweep_tables import BOUNDS, LIMITS, PRECISIONS, RUNS, STEPS, VERDICTS
 from .trials import Floats
-from .windows import REACH_MM
 
 
 def front_of(costs: Floats, errors: Floats) -> NDArray[numpy.intp]:
@@ -281,9 +280,8 @@ $least_gain % and by more than two standard errors of the paired differences.</p
 $knees</ul>
 $steps<h2>What bounds the error</h2>
 $limits<h2>All runs</h2>
-<p>Trials "in full" get the full posterior. A run with fewer of them than trials has its pose errors from
-windows: the bins within $reach mm of the truth. $windows Deviations are of $sampled bins per object or
-as many particles.</p>
+<p>Trials "in full" get the full posterior. A run with fewer of them than trials has its pose errors by
+bounds. $agreement Deviations are of $sampled bins per object or as many particles.</p>
 $runs<script>
 document.querySelectorAll("th").forEach(function (head) {
   var sign = -1;
@@ -318,8 +316,7 @@ def page_of(document: Json, drawn: dict[str, Chart]) -> str:
         knees="".join(f"<li>{html.escape(knee['sentence'])}</li>\n" for knee in knees),
         steps=_table(STEPS, [step for knee in knees for step in knee["steps"]]),
         limits=_table(LIMITS, document["limits"]),
-        reach=f"{REACH_MM:g}",
-        windows=html.escape(document["windows"]),
+        agreement=html.escape(document["agreement"]),
         sampled=SAMPLED,
         runs=_table(RUNS, document["points"]),
     )

@@ -14,7 +14,7 @@ from palpate._statistics import Errors, errors_over, quantile
 from palpate._tables import column, count_text
 
 from .certificates import check_certificate, dense_posterior
-from .measures import calibration, differences
+from .measures import calibration, differences, wrapped
 from .program import Json
 from .trials import (
     EXACT,
@@ -22,16 +22,17 @@ from .trials import (
     VOWELS,
     Bins,
     Body,
+    Floats,
     Touching,
     error_of,
     lattice_of,
     letter_maps,
     make_trials,
     map_of,
+    recognized,
     training_recordings,
     truth_of,
 )
-from .windows import nearest_bin_mm, poses_in_window
 
 Maps = Sequence[palpate.OccupancyGrid]
 Trials = Sequence[palpate.Recording]
@@ -108,11 +109,11 @@ def record_of(
         "accuracy": float(right[:, -1].mean()),
         "least_confidence": float(confidence[:, -1].min()),
         "expected_calibration_error": calibration(confidence.ravel(), right.ravel())["expected_error"],
-        "windows": None,
+        "by_bounds": None,
         "nearest_bin_mm": None,
     }
     for name in ("error", "refined_error"):
-        errors = [step[f"{name}_mm"] for step in steps]
+        errors = [step.get(f"{name}_mm") for step in steps]
         record |= {f"{name}_mm": errors_over(errors, 20), f"{name}s_mm": errors}
     return record
 
@@ -124,12 +125,41 @@ def deviation_record(deviations: Sequence[float]) -> Json:
     return {"largest": float(off.max()), "rms": rms, "samples": len(off)}
 
 
+def nearest_bin_mm(
+    lattice: palpate.PoseLattice, body: Body, pose: Floats
+) -> float:
+    """Least error that a bin of the lattice has for a body at a pose: what the lattice alone costs.
+
+    At a given theta the error grows with the distance between the places of the body's centroid, so that
+    the nearest bin is that of x and y by themselves.
+    """
+    theta = lattice.theta_rad
+    thetas = numpy.array([theta.centre(k) for k in range(theta.count)])
+    p = palpate.transform(palpate.inverse(pose), [body.centroid_mm])[0] - lattice.pivot_mm
+    c, s = numpy.cos(thetas), numpy.sin(thetas)
+    places = body.centroid_mm[:, None] - numpy.stack([c * p[0] - s * p[1], s * p[0] + c * p[1]])
+    squared = numpy.zeros(theta.count)
+    for axis, place in zip((lattice.x_mm, lattice.y_mm), places, strict=True):
+        nearest = numpy.clip(numpy.floor((place - axis.lower) / axis.step), 0, axis.count - 1)
+        squared += (axis.lower + (nearest + 0.5) * axis.step - place) ** 2
+    if body.symmetry > 0:
+        turns = wrapped(thetas - pose[2], 2.0 * math.pi / body.symmetry)
+        squared += 4.0 * body.inertia_mm2 * numpy.sin(turns / 2.0) ** 2
+    return float(numpy.sqrt(squared.min()))
+
+
+def by_bounds(device: palpate.Device, maps: Maps, trials: Trials, bins: Bins) -> list[Json]:
+    """The records of trials after their last touch: the full posterior without the time for all bins."""
+    steps = recognized(device, maps, trials, bins=bins, filter="bounded", trace=False)
+    return [of_trial[-1] for of_trial in steps]
+
+
 def measure_histogram(
     device: palpate.Device, maps: Maps, trials: Trials, full_each: int, bins: Bins
 ) -> Json:
     """What the histogram costs and what it is worth over the first `full_each` trials of every letter.
 
-    Where these are not all, the errors are those of all trials in windows.
+    Where these are not all, the errors are those of all trials by bounds.
     """
     lattice = lattice_of(bins)
     belief = palpate.PoseHistogram(device, maps, lattice)
@@ -137,10 +167,10 @@ def measure_histogram(
     for trial in full:
         belief.reset()
         ends.append(follow(belief, maps, trial))
-    steps, windows = ends, None
+    steps, compared = ends, None
     if len(full) < len(trials):
-        steps = [poses_in_window(device, maps, trial, lattice)._asdict() for trial in trials]
-        windows = windows_record(maps, full, ends, first_each(steps, full_each))
+        steps = by_bounds(device, maps, trials, bins)
+        compared = comparison_of(maps, full, ends, first_each(steps, full_each))
     nearest_mm = [
         nearest_bin_mm(lattice, Body.of(map_of(maps, trial)), truth_of(trial).T_object_robot)
         for trial in trials
@@ -159,24 +189,21 @@ def measure_histogram(
     return record_of("histogram", maps, lattice.bins, belief.device_bytes, ends, steps) | {
         "bins": list(bins),
         "balanced": bins not in TABLE_1,
-        "windows": windows,
+        "by_bounds": compared,
         "nearest_bin_mm": float(numpy.mean(nearest_mm)),
         "deviation_nats": deviation_record(deviations),
     }
 
 
-def windows_record(maps: Maps, full: Trials, ends: Sequence[Json], steps: Sequence[Json]) -> Json:
-    """How far apart the two poses of a trial lie at the most, by the full posterior and in a window."""
+def comparison_of(maps: Maps, full: Trials, ends: Sequence[Json], records: Sequence[Json]) -> Json:
+    """How far apart the poses of a trial lie at the most, by the histogram and by bounds."""
     apart: dict[str, list[float]] = {"mode": [], "refined": []}
-    for trial, end, step in zip(full, ends, steps, strict=True):
+    for trial, end, record in zip(full, ends, records, strict=True):
         if end["error_mm"] is not None:
-            grid = map_of(maps, trial)
-            whole = palpate.OccupancyGrid(
-                grid.label, grid.log_odds, cell_mm=grid.cell_mm, origin_mm=grid.origin_mm
-            )  # without symmetry
-            for pose, distances in apart.items():
-                a, b = end[pose].T_object_robot, step[pose].T_object_robot
-                distances.append(palpate.pose_error_mm(whole, a, b))
+            for kind, distances in apart.items():
+                pose = [record[kind][of] for of in ("x_mm", "y_mm", "theta_rad")]
+                grid = map_of(maps, trial)
+                distances.append(palpate.pose_error_mm(grid, end[kind].T_object_robot, pose))
     return {
         "compared_trials": len(apart["mode"]),
         "mode_difference_mm": max(apart["mode"], default=0.0),
@@ -315,7 +342,7 @@ VARIANTS = (
 def measure_limits(
     device: palpate.Device, quick: bool, lattices: Sequence[Bins], each: int, touches: int, seed: int
 ) -> list[Json]:
-    """Where the errors come from that more bins do not mend, in windows.
+    """Where the errors come from that more bins do not mend, by bounds.
 
     Every variant is compared with the first on the first of the lattices; arrays also run on the
     others, each compared with the same array on the first.
@@ -331,9 +358,10 @@ def measure_limits(
         trials = make_trials(VOWELS, each, touches, seed, variant.touching)
         against = unchanged
         for bins in lattices if variant.all_lattices else lattices[:1]:
-            lattice = lattice_of(bins)
-            steps = [poses_in_window(device, maps, trial, lattice) for trial in trials]
-            modes, refined = [s.error_mm for s in steps], [s.refined_error_mm for s in steps]
+            records = by_bounds(device, maps, trials, bins)
+            modes, refined = (
+                [record.get(f"{name}_mm") for record in records] for name in ("error", "refined_error")
+            )
             limits.append(
                 {
                     "name": variant.name,

@@ -155,19 +155,19 @@ def recognized(
     trials: Sequence[palpate.Recording],
     *,
     extent_mm: float = 10.0,
+    trace: bool = True,
     **options: Any,
 ) -> list[list[Json]]:
     """What is believed of every unknown after each of its touches, [trial][touch].
 
-    Records as of `palpate recognize --trace`, and `confidence`, the probability of the best answer.
-    The region is the extent about 0 along x and y, and the full circle; options: those of
-    palpate.recognize().
+    Records as of `palpate recognize --trace`, and `confidence`, the probability of the best answer;
+    without `trace` that after the last touch alone, [trial][0]. The region is the extent about 0 along x
+    and y, and the full circle; options: those of palpate.recognize().
     """
     reach = (-extent_mm, extent_mm)
-    records = palpate.recognize(
-        trials, maps, x_mm=reach, y_mm=reach, pivot_mm=(0.0, 0.0), trace=True, device=device, **options
-    )
-    steps = [record["trace"] for record in records]
+    region: Json = {"x_mm": reach, "y_mm": reach, "pivot_mm": (0.0, 0.0)}
+    records = palpate.recognize(trials, maps, **region, trace=trace, device=device, **options)
+    steps = [record.get("trace", [record]) for record in records]
     for step in (step for of_trial in steps for step in of_trial):
         step["confidence"] = step["identity"][step["best"]]
     return steps
@@ -189,15 +189,6 @@ class Body(NamedTuple):
         return Body(centroid_mm, inertia_mm2, grid.symmetry)
 
 
-class Poses(NamedTuple):
-    """What a histogram says of the pose of an unknown whose truth is known."""
-
-    mode: palpate.Mode
-    refined: palpate.RefinedPose
-    error_mm: float | None  #: None where the mode has the wrong object
-    refined_error_mm: float | None
-
-
 def map_of(
     maps: Sequence[palpate.OccupancyGrid], trial: palpate.Recording
 ) -> palpate.OccupancyGrid:
@@ -210,12 +201,3 @@ def error_of(grid: palpate.OccupancyGrid, truth: palpate.Truth, pose: Any) -> fl
     if pose is None or grid.label != truth.object:
         return None
     return palpate.pose_error_mm(grid, pose.T_object_robot, truth.T_object_robot)
-
-
-def poses_of(
-    belief: palpate.PoseHistogram, maps: Sequence[palpate.OccupancyGrid], truth: palpate.Truth
-) -> Poses:
-    """Mode and refined pose of a belief beside the truth."""
-    mode = belief.estimate().mode
-    refined, grid = belief.refine(mode), maps[mode.object]
-    return Poses(mode, refined, error_of(grid, truth, mode), error_of(grid, truth, refined))

@@ -2,50 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <set>
 #include <tuple>
 #include <utility>
 
 #include <glm/common.hpp>
 
+#include "io/element_spacing.hpp"
+
 namespace palpate::cli {
-
-namespace {
-
-/// The smallest distance of two elements that exceeds `tiny_mm`; infinite where there is none.
-/// A sweep along x compares each element with the elements behind it within the distance found so
-/// far.
-double least_distance_mm(std::vector<glm::dvec2> elements_mm, double tiny_mm) {
-  const auto before = [](const glm::dvec2& a, const glm::dvec2& b) {
-    return std::tie(a.x, a.y) < std::tie(b.x, b.y);
-  };
-  std::ranges::sort(elements_mm, before);
-  double least = std::numeric_limits<double>::infinity();
-  std::set<std::pair<double, double>> near;  // y and x
-  auto last = elements_mm.begin();
-  for (const glm::dvec2& p : elements_mm) {
-    for (; p.x - last->x > least; ++last) {
-      near.erase({last->y, last->x});
-    }
-    bool coincides = false;
-    for (auto q = near.lower_bound({p.y - least, -std::numeric_limits<double>::infinity()});
-         q != near.end() && q->first - p.y <= least; ++q) {
-      const double distance = std::hypot(p.x - q->second, p.y - q->first);
-      if (distance <= tiny_mm) {
-        coincides = true;
-      } else {
-        least = std::min(least, distance);
-      }
-    }
-    if (!coincides) {
-      near.emplace(p.y, p.x);
-    }
-  }
-  return least;
-}
-
-}  // namespace
 
 ArrayPicture::ArrayPicture(const std::vector<glm::dvec2>& elements_mm) {
   if (elements_mm.empty()) {
@@ -60,8 +24,9 @@ ArrayPicture::ArrayPicture(const std::vector<glm::dvec2>& elements_mm) {
   // 1e-16 of a coordinate.
   const glm::dvec2 largest_mm = glm::max(glm::abs(lower_mm_), glm::abs(upper_mm_));
   const double tiny_mm = 1e-9 * std::max(largest_mm.x, largest_mm.y);
-  const double least_mm = least_distance_mm(elements_mm, tiny_mm);
-  half_mm_ = std::isfinite(least_mm) ? 0.5 * least_mm : 1.0;
+  const std::optional<ElementSpacing> spacing = spacing_of(elements_mm, tiny_mm);
+  const bool apart = spacing && std::isfinite(spacing->nearest_mm.least);
+  half_mm_ = apart ? 0.5 * spacing->nearest_mm.least : 1.0;
   lower_mm_ -= half_mm_;
   upper_mm_ += half_mm_;
   placed_.reserve(elements_mm.size());

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -27,6 +28,9 @@ namespace palpate::cli {
 
 namespace {
 
+constexpr const char* table_name = "table.png";
+constexpr const char* reliability_name = "reliability.png";
+
 struct CalibrateArguments {
   std::vector<std::string> recordings;
   std::string output;
@@ -36,16 +40,6 @@ struct CalibrateArguments {
   std::string png;
   std::string device;
 };
-
-struct CalibrationPictures {
-  std::filesystem::path table;
-  std::filesystem::path reliability;
-};
-
-CalibrationPictures pictures_of(const CalibrateArguments& options) {
-  const std::filesystem::path folder = options.png;
-  return {folder / "table.png", folder / "reliability.png"};
-}
 
 void check_outputs(const CalibrateArguments& options,
                    const std::vector<std::filesystem::path>& maps) {
@@ -57,18 +51,9 @@ void check_outputs(const CalibrateArguments& options,
     files.reads("--maps", map);
   }
   files.writes("-o", options.output);
-  const auto [table, reliability] = pictures_of(options);
-  if (!options.png.empty()) {
-    files.writes("--png", table);
-    files.writes("--png", reliability);
-  }
-  files.require_distinct();
-  require_writable(options.output);
-  if (std::filesystem::exists(options.png)) {
-    make_folder(options.png);
-    require_writable(table);
-    require_writable(reliability);
-  }
+  files.writes_in("--png", options.png, table_name);
+  files.writes_in("--png", options.png, reliability_name);
+  files.prepare();
 }
 
 void calibrate(const CalibrateArguments& options) {
@@ -102,26 +87,24 @@ void calibrate(const CalibrateArguments& options) {
     Progress progress("fitting the touches' poses");
     add_touch_sd(device, task, calibration, [&](double fraction) { progress.show(fraction); });
   }
-  const CalibrationPictures pictures = pictures_of(options);
-  std::string table;
-  std::string reliability;
+  std::vector<std::pair<std::filesystem::path, std::string>> pictures;
   if (!options.png.empty()) {
-    table = draw_table(calibration.sensor);
-    reliability = calibration.before ? draw_reliability(reliability_of(calibration)) : "";
-    make_folder(options.png);
+    const std::filesystem::path folder = options.png;
+    pictures.emplace_back(folder / table_name, draw_table(calibration.sensor));
+    if (calibration.before) {
+      pictures.emplace_back(folder / reliability_name,
+                            draw_reliability(reliability_of(calibration)));
+    }
+    make_folder(folder);
   }
   write_sensor_model(options.output, calibration.sensor);
   fmt::print("{}",
              calibration_text(calibration, task.presses.size(), terminal_columns(STDOUT_FILENO)));
   std::ranges::for_each(calibration.warnings, tell_on_stderr);
   fmt::print("{}\n", options.output);
-  if (!options.png.empty()) {
-    write_file(pictures.table, table);
-    fmt::print("{}\n", pictures.table.string());
-    if (!reliability.empty()) {
-      write_file(pictures.reliability, reliability);
-      fmt::print("{}\n", pictures.reliability.string());
-    }
+  for (const auto& [file, picture] : pictures) {
+    write_file(file, picture);
+    fmt::print("{}\n", file.string());
   }
 }
 

@@ -23,21 +23,14 @@ namespace palpate::cli {
 
 namespace {
 
+constexpr const char* confusion_name = "confusion.png";
+constexpr const char* reliability_name = "reliability.png";
+
 struct EvaluateArguments {
   std::vector<std::string> results;
   std::string json;
   std::string png;
 };
-
-struct EvaluationPictures {
-  std::filesystem::path confusion;
-  std::filesystem::path reliability;
-};
-
-EvaluationPictures pictures_of(const EvaluateArguments& options) {
-  const std::filesystem::path folder = options.png;
-  return {folder / "confusion.png", folder / "reliability.png"};
-}
 
 /// Throws Error where an output cannot be written, before any file is.
 void check_outputs(const EvaluateArguments& options,
@@ -51,22 +44,10 @@ void check_outputs(const EvaluateArguments& options,
       files.reads("RESULTS", ResultsFolder(results).task());
     }
   }
-  if (!options.json.empty()) {
-    files.writes("--json", options.json, CommandFiles::Dash::stream);
-  }
-  const auto [confusion, reliability] = pictures_of(options);
-  if (!options.png.empty()) {
-    files.writes("--png", confusion);
-    files.writes("--png", reliability);
-  }
-  files.require_distinct();
-  if (!options.json.empty() && options.json != "-") {
-    require_writable(options.json);
-  }
-  if (std::filesystem::is_directory(options.png)) {
-    require_writable(confusion);
-    require_writable(reliability);
-  }
+  files.writes("--json", options.json, CommandFiles::Dash::stream);
+  files.writes_in("--png", options.png, confusion_name);
+  files.writes_in("--png", options.png, reliability_name);
+  files.prepare();
 }
 
 /// Says how much a folder of palpate batch still lacks.
@@ -100,22 +81,14 @@ void evaluate_results(const EvaluateArguments& options) {
       to_json(evaluation, results.without_truth)
           .dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) +
       "\n";
-  // Files come first: printing fails where the reader of standard output has ended.
   if (!options.png.empty()) {
-    make_folder(options.png);
-    const auto [confusion, reliability] = pictures_of(options);
-    write_file(confusion, draw_confusion(confusion_of(evaluation)));
-    write_file(reliability, draw_reliability(reliability_of(evaluation)));
+    const std::filesystem::path folder = options.png;
+    make_folder(folder);
+    write_file(folder / confusion_name, draw_confusion(confusion_of(evaluation)));
+    write_file(folder / reliability_name, draw_reliability(reliability_of(evaluation)));
   }
-  if (options.json == "-") {
-    fmt::print("{}", json);
-    return;
-  }
-  if (!options.json.empty()) {
-    write_file(options.json, json);
-  }
-  fmt::print("{}",
-             evaluation_text(evaluation, results.without_truth, terminal_columns(STDOUT_FILENO)));
+  give_result(options.json, json,
+              evaluation_text(evaluation, results.without_truth, terminal_columns(STDOUT_FILENO)));
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include "cli/commands.hpp"
 #include "cli/options.hpp"
 #include "cli/recognition_flags.hpp"
+#include "cli/sensor_option.hpp"
 #include "io/command_files.hpp"
 #include "io/recording_rules.hpp"
 #include "palpate/files.hpp"
@@ -130,35 +131,13 @@ void add_import(CLI::App& app) {
       "The sensor's poses are unknown: write rows that are touches at the pose 0, for "
       "'palpate map --unposed', 'palpate calibrate --unposed' and 'palpate recognize "
       "--each-frame'; frames stay without poses");
-  command
-      ->add_option("--array", options->array,
-                   "COLUMNS:ROWS:PITCH, a grid with its pitch in mm, centred about the sensor's "
-                   "origin; or a CSV file with a row 'x y' in mm for each element. Elements are "
-                   "counted in the order of their readings: of a grid row by row, where x grows "
-                   "along a row and y from row to row, unless the next two flags say otherwise")
-      ->required();
-  command
-      ->add_option("--first-element", options->first_element,
-                   "Corner of the grid whose element is read first, seen with x to the right and y "
-                   "upwards: bottom-left, bottom-right, top-left or top-right")
-      ->capture_default_str();
-  command
-      ->add_option("--order", options->order,
-                   "How the grid's elements follow each other: rows (along x first) or columns")
-      ->capture_default_str();
-  command->add_option("--dead", options->dead,
-                      "Elements that do not read, counted from 0 in the order of their readings, "
-                      "as 13,42 [default: those without any reading]");
+  add_array_flags(*command, *options)->required();
   command->add_option("-o,--output", options->output, "Recording to write (HDF5)")->required();
   command->add_option(
       "--rows", options->rows,
       "What a row of the pressures is: frames (a stream, of which 'palpate touches' "
       "finds the touches) or touches (single presses, each with a pose or --unposed) [default: "
       "frames where there are times, else touches]");
-  command
-      ->add_option("--pressure-unit", options->pressure_unit,
-                   "Unit of the pressures: kPa, or raw for readings of another unit")
-      ->capture_default_str();
   command->add_option(
       "--pose-unit", options->pose_unit,
       "Units of the poses: mm,rad or mm,deg or m,rad or m,deg [default: by the columns' names, as "

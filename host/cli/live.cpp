@@ -33,9 +33,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-struct LiveArguments {
-  std::string sensor;
-  std::string poses;
+struct LiveArguments : SensorArguments {
   Request request;
   bool verbose = false;
   DetectorFlags detector;
@@ -103,7 +101,7 @@ void live(const LiveArguments& options) {
   }
   require_above("--tare", options.tare_s, 0.0, true);
   const Request request = complete(options.request);
-  if (options.poses.empty() && !is_virtual_sensor(options.sensor)) {
+  if (options.poses.empty() && options.sensor != "-" && !is_virtual_sensor(options.sensor)) {
     refuse(
         "--poses",
         "missing; sensor {} does not know where it is: give a file, a FIFO or - with the robot's "
@@ -112,8 +110,7 @@ void live(const LiveArguments& options) {
   }
   Complaints complaints;
   const OpenSensor opened =
-      open_sensor(options.sensor, options.poses,
-                  [&complaints](const std::string& problem) { complaints.add(problem); });
+      open_sensor(options, [&complaints](const std::string& problem) { complaints.add(problem); });
   const SensorDescription& description = opened.sensor->description();
   std::vector<glm::dvec2> elements_mm = description.elements_mm;
   const std::string source = "sensor " + options.sensor;
@@ -131,7 +128,7 @@ void live(const LiveArguments& options) {
     refuse_flag("--plan", options.plan, "{}; use --filter histogram, or leave it out", plan_needs);
   }
   CommandFiles files;
-  add_sensor_files(options.sensor, options.poses, files);
+  add_sensor_files(options, files);
   add_recognition_files(request, files);
   if (!options.json.empty()) {
     files.writes("--json", options.json, CommandFiles::Dash::stream);
@@ -209,7 +206,8 @@ void live(const LiveArguments& options) {
 
   const LiveState state = recognition.state();
   if (state.all_touches == 0 && state.without_pose > 0 && !interruption.requested()) {
-    refuse(source, "none of its {} touches has a pose; give --poses", state.without_pose);
+    refuse(source, "none of its {} touches has a pose; give --poses{}", state.without_pose,
+           opened.lines != nullptr ? ", or x_mm, y_mm and theta_rad in its lines" : "");
   }
   fmt::print(people, "{}", summary(state, recognition.latencies_ms(), task));
   if (!to_program) {
@@ -228,10 +226,8 @@ void add_live(CLI::App& app) {
       "identity and the array on the object's map; "
       "key r begins the next unknown object");
   const auto options = std::make_shared<LiveArguments>();
-  command->add_option("--sensor", options->sensor, sensor_help)->required();
-  command->add_option(
-      "--poses", options->poses,
-      std::string(poses_help) + " [default: the poses of the replay or simulation]");
+  add_sensor_flags(*command, *options,
+                   " [default: the poses of the replay, of the simulation or of the lines]");
   add_recognition_flags(*command, options->request, options->verbose);
   add_detector_flags(*command, options->detector);
   command

@@ -33,6 +33,14 @@ void write_file(const std::filesystem::path& file, std::string_view bytes,
   target.commit();
 }
 
+void give_result(const std::string& json_file, const std::string& json, const std::string& text) {
+  // The file comes first: printing fails where the reader of standard output has ended.
+  if (!json_file.empty() && json_file != "-") {
+    write_file(json_file, json);
+  }
+  fmt::print("{}", json_file == "-" ? json : text);
+}
+
 void make_folder(const std::filesystem::path& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);

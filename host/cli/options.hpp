@@ -28,6 +28,9 @@ void require_writable(const std::filesystem::path& file);
 /// Writes a file that appears whole or not at all. Throws Error.
 void write_file(const std::filesystem::path& file, std::string_view bytes,
                 AtomicFile::Links links = AtomicFile::Links::followed);
+/// Gives a result to its readers: as JSON to a file or, where it is "-", to standard output, unless
+/// it is ""; and as text to standard output, unless the JSON stands there. Throws Error.
+void give_result(const std::string& json_file, const std::string& json, const std::string& text);
 /// Makes the folder if it does not exist. Throws Error.
 void make_folder(const std::filesystem::path& folder);
 

@@ -170,36 +170,9 @@ void check_outputs(const PlanArguments& options, const Request& request) {
     files.reads("--candidates", options.candidates);
   }
   add_recognition_files(request, files);
-  if (!options.json.empty()) {
-    files.writes("--json", options.json, CommandFiles::Dash::stream);
-  }
-  if (!options.png.empty()) {
-    files.writes("--png", options.png);
-  }
-  files.require_distinct();
-  for (const std::string& file : {options.json, options.png}) {
-    if (!file.empty() && file != "-") {
-      require_writable(file);
-    }
-  }
-}
-
-void write_results(const PlanArguments& options, const Plan& plan, const RecognitionTask& task,
-                   std::span<const Touch> touches, const Device& device) {
-  const std::string json = text_of(plan_json(plan, task, device.name()), 2);
-  // Files come first: printing fails where the reader of standard output has ended.
-  if (!options.png.empty()) {
-    write_file(options.png, draw_plan(figure_of(plan, task, touches)));
-  }
-  if (options.json == "-") {
-    fmt::print("{}", json);
-    return;
-  }
-  if (!options.json.empty()) {
-    write_file(options.json, json);
-  }
-  fmt::print("{}{}\n", plan_text(plan, task, terminal_columns(STDOUT_FILENO)),
-             setup_words(device, task));
+  files.writes("--json", options.json, CommandFiles::Dash::stream);
+  files.writes("--png", options.png);
+  files.prepare();
 }
 
 void plan_touches(const PlanArguments& options) {
@@ -225,7 +198,12 @@ void plan_touches(const PlanArguments& options) {
       !words.empty()) {
     tell_on_stderr(words);
   }
-  write_results(options, plan, task, unknown.touches, device);
+  if (!options.png.empty()) {
+    write_file(options.png, draw_plan(figure_of(plan, task, unknown.touches)));
+  }
+  give_result(
+      options.json, text_of(plan_json(plan, task, device.name()), 2),
+      plan_text(plan, task, terminal_columns(STDOUT_FILENO)) + setup_words(device, task) + "\n");
   if (options.verbose) {
     print_engine(&device, recogniser, task);
   }

@@ -29,11 +29,9 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using namespace std::chrono_literals;
 
-struct RecordArguments {
-  std::string sensor;
+struct RecordArguments : SensorArguments {
   std::string output;
   std::optional<double> seconds;
-  std::string poses;
   double tare_s = 0.5;
   std::string object;
 };
@@ -161,10 +159,9 @@ class RecordingUnderWay {
 
 void record(const RecordArguments& options) {
   CommandFiles files;
-  add_sensor_files(options.sensor, options.poses, files);
+  add_sensor_files(options, files);
   files.writes("-o", options.output);
-  files.require_distinct();
-  require_writable(options.output);
+  files.prepare();
   if (options.seconds) {
     require_above("--seconds", *options.seconds, 0.0);
   } else if (is_endless_flood(options.sensor)) {
@@ -176,9 +173,8 @@ void record(const RecordArguments& options) {
   if (!is_printable(options.object)) {
     refuse("--object", "give printable text, in UTF-8");
   }
-  const OpenSensor opened =
-      open_sensor(options.sensor, options.poses,
-                  [](const std::string& problem) { fmt::print(stderr, "palpate: {}\n", problem); });
+  const OpenSensor opened = open_sensor(
+      options, [](const std::string& problem) { fmt::print(stderr, "palpate: {}\n", problem); });
   Sensor& sensor = *opened.sensor;
   SensorDescription description = sensor.description();
   if (!options.object.empty()) {
@@ -210,7 +206,7 @@ void add_record(CLI::App& app) {
       "Record the frames of a sensor until Ctrl-C; 'palpate touches' finds the touches in them. A "
       "kill, a crash or a full disk costs at most the last second of the recording");
   const auto options = std::make_shared<RecordArguments>();
-  command->add_option("--sensor", options->sensor, sensor_help)->required();
+  add_sensor_flags(*command, *options, "");
   command
       ->add_option("-o,--output", options->output,
                    "Recording of frames to write (HDF5); replaces an older file")
@@ -219,7 +215,6 @@ void add_record(CLI::App& app) {
       "--seconds", options->seconds,
       "Stop after this time, s [default: at Ctrl-C]. Required for a simulation of more than "
       "10 MB/s without touches=N");
-  command->add_option("--poses", options->poses, poses_help);
   command
       ->add_option("--tare", options->tare_s,
                    "Duration of the tare at the start, s: nothing may touch the array, and the "

@@ -4,45 +4,168 @@
 
 #include <fmt/format.h>
 
+#include "cli/options.hpp"
 #include "palpate/driver.hpp"
 #include "palpate/virtual_sensor.hpp"
+#include "streaming/import_array.hpp"
 
 namespace palpate::cli {
 
-OpenSensor open_sensor(const std::string& name, const std::string& poses,
-                       PosedSensor::Complaint complain) {
-  auto sensor = is_virtual_sensor(name) ? open_virtual_sensor(name) : open_board(name);
-  if (poses.empty()) {
-    return {std::move(sensor)};
+namespace {
+
+constexpr const char* sensor_help =
+    "A board, by its name in 'palpate sensors' or the path of its profile; "
+    "- for frames that another program writes to standard input, of the array --array, a line "
+    "each: "
+    "{\"time\": s since 1970, \"pressure\": [...]}, or CSV with the readings behind their time; "
+    "the "
+    "time may be left out, and x_mm, y_mm and theta_rad of T_robot_sensor may stand beside it; "
+    "replay:FILE[,speed=F|max], which plays a recording of frames; or "
+    "simulate:SHAPE[,rate=HZ][,array=COLUMNS:ROWS:PITCH_MM][,seed=N][,touches=N][,noise=KPA]"
+    "[,object=random|X_MM:Y_MM:DEG][,speed=F|max], which simulates a robot that presses an array "
+    "onto a shape";
+
+constexpr const char* poses_help =
+    "File, FIFO or - (standard input) with the poses T_robot_sensor, one line of JSON each: "
+    "{\"time\": s since 1970, \"x_mm\": mm, \"y_mm\": mm, \"theta_rad\": rad}; or CSV with a "
+    "header of "
+    "these names";
+
+/// Of add_array_flags().
+constexpr const char* array_flags[] = {"--array", "--first-element", "--order", "--dead",
+                                       "--pressure-unit"};
+
+/// Standard input as a sensor.
+std::unique_ptr<LineSensor> open_lines(const SensorArguments& arguments,
+                                       const PosedSensor::Complaint& complain) {
+  if (arguments.lines.array.empty()) {
+    refuse("--array",
+           "missing; frames on standard input do not say where their elements lie: give "
+           "COLUMNS:ROWS:PITCH or a file");
   }
-  auto posed = std::make_unique<PosedSensor>(std::move(sensor), poses, PosedSensor::usual_gap_s,
-                                             std::move(complain));
-  const PosedSensor* const same = posed.get();
-  return {std::move(posed), same};
+  if (arguments.poses == "-") {
+    refuse("--poses -",
+           "standard input holds the frames of --sensor -; give the poses as a file or a FIFO, or "
+           "x_mm, y_mm and theta_rad in the lines of the frames");
+  }
+  ImportArray array = import_array(arguments.lines);
+  return std::make_unique<LineSensor>(
+      SensorDescription{.name = "standard input",
+                        .serial = {},
+                        .pressure_unit = arguments.lines.pressure_unit,
+                        .elements_mm = std::move(array.elements_mm),
+                        .valid = std::move(array.valid),
+                        .baseline = std::move(array.baseline)},
+      complain);
 }
 
-void add_sensor_files(const std::string& name, const std::string& poses, CommandFiles& files) {
-  if (const auto file = is_virtual_sensor(name) ? virtual_sensor_file(name) : board_file(name)) {
+/// Requires that the flags of an array are left out where the sensor has one.
+void require_no_array(const SensorArguments& arguments) {
+  const ImportOptions& given = arguments.lines;
+  const ImportOptions unset;
+  const bool is_set[] = {given.array != unset.array, given.first_element != unset.first_element,
+                         given.order != unset.order, given.dead != unset.dead,
+                         given.pressure_unit != unset.pressure_unit};
+  for (std::size_t i = 0; i < std::size(array_flags); ++i) {
+    if (is_set[i]) {
+      refuse(array_flags[i],
+             "is for --sensor -, frames on standard input; sensor {} has an array of its own",
+             arguments.sensor);
+    }
+  }
+}
+
+}  // namespace
+
+OpenSensor open_sensor(const SensorArguments& arguments, const PosedSensor::Complaint& complain) {
+  const std::string& name = arguments.sensor;
+  OpenSensor opened;
+  if (name == "-") {
+    auto lines = open_lines(arguments, complain);
+    opened.lines = lines.get();
+    opened.sensor = std::move(lines);
+  } else {
+    require_no_array(arguments);
+    opened.sensor = is_virtual_sensor(name) ? open_virtual_sensor(name) : open_board(name);
+  }
+  if (!arguments.poses.empty()) {
+    auto posed = std::make_unique<PosedSensor>(std::move(opened.sensor), arguments.poses,
+                                               PosedSensor::usual_gap_s, complain);
+    opened.posed = posed.get();
+    opened.sensor = std::move(posed);
+  }
+  return opened;
+}
+
+void add_sensor_files(const SensorArguments& arguments, CommandFiles& files) {
+  const std::string& name = arguments.sensor;
+  if (name == "-") {
+    files.reads("--sensor", name, CommandFiles::Dash::stream);
+    files.reads("--array", arguments.lines.array);
+  } else if (const auto file =
+                 is_virtual_sensor(name) ? virtual_sensor_file(name) : board_file(name)) {
     files.reads("--sensor", *file);
   }
-  if (!poses.empty()) {
-    files.reads("--poses", poses, CommandFiles::Dash::stream);
+  if (!arguments.poses.empty()) {
+    files.reads("--poses", arguments.poses, CommandFiles::Dash::stream);
   }
 }
 
 void report_refused(const OpenSensor& opened) {
+  const auto report = [](std::uint64_t lines, const char* of, const std::string& first) {
+    if (lines > 0) {
+      fmt::print(stderr, "palpate: {} lines of {} were skipped; the first: {}\n", lines, of, first);
+    }
+  };
+  if (opened.lines != nullptr) {
+    report(opened.lines->refused(), "frames", opened.lines->first_refused());
+  }
   if (opened.posed == nullptr) {
     return;
   }
   const PosedSensor::Poses poses = opened.posed->poses();
-  if (poses.refused > 0) {
-    fmt::print(stderr, "palpate: {} lines of poses were skipped; the first: {}\n", poses.refused,
-               poses.first_refused);
-  }
+  report(poses.refused, "poses", poses.first_refused);
   if (poses.set_back > 0) {
     fmt::print(stderr, "palpate: the clock of the poses was set back {}\n",
                poses.set_back == 1 ? "once" : fmt::format("{} times", poses.set_back));
   }
+}
+
+void add_sensor_flags(CLI::App& command, SensorArguments& arguments,
+                      const std::string& poses_default) {
+  command.add_option("--sensor", arguments.sensor, sensor_help)->required();
+  command.add_option("--poses", arguments.poses, std::string(poses_help) + poses_default);
+  add_array_flags(command, arguments.lines);
+  for (const char* flag : array_flags) {
+    command.get_option(flag)->group("Of --sensor -");
+  }
+}
+
+CLI::Option* add_array_flags(CLI::App& command, ImportOptions& options) {
+  auto* array = command.add_option(
+      "--array", options.array,
+      "COLUMNS:ROWS:PITCH, a grid with its pitch in mm, centred about the sensor's origin; or a "
+      "CSV "
+      "file with a row 'x y' in mm for each element. Elements are counted in the order of their "
+      "readings: of a grid row by row, where x grows along a row and y from row to row, unless the "
+      "next two flags say otherwise");
+  command
+      .add_option("--first-element", options.first_element,
+                  "Corner of the grid whose element is read first, seen with x to the right and y "
+                  "upwards: bottom-left, bottom-right, top-left or top-right")
+      ->capture_default_str();
+  command
+      .add_option("--order", options.order,
+                  "How the grid's elements follow each other: rows (along x first) or columns")
+      ->capture_default_str();
+  command.add_option("--dead", options.dead,
+                     "Elements that do not read, counted from 0 in the order of their readings, as "
+                     "13,42 [default: those without any reading]");
+  command
+      .add_option("--pressure-unit", options.pressure_unit,
+                  "Unit of the pressures: kPa, or raw for readings of another unit")
+      ->capture_default_str();
+  return array;
 }
 
 }  // namespace palpate::cli

@@ -66,8 +66,7 @@ void check_output(const SimulateArguments& options) {
     files.reads("SHAPE", options.shape);
   }
   files.writes("-o", options.output);
-  files.require_distinct();
-  require_writable(options.output);
+  files.prepare();
 }
 
 void simulate(const SimulateArguments& options) {

@@ -215,8 +215,7 @@ void find_touches(const TouchesArguments& options) {
   CommandFiles files;
   files.reads("FRAMES", options.frames);
   files.writes("-o", options.output);
-  files.require_distinct();
-  require_writable(options.output);
+  files.prepare();
   if (options.tare_s) {
     require_above("--tare", *options.tare_s, 0.0, true);
   }

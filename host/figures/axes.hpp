@@ -43,19 +43,6 @@ std::string number(double value);
 /// of ten and at least `smallest_step`.
 std::vector<Tick> even_ticks(double lower, double upper, int count, double smallest_step = 0.0);
 
-struct ChartAxis;
-
-/// Extent and ticks of an axis.
-struct AxisSpan {
-  double lower = 0.0;
-  double upper = 1.0;
-  std::vector<Tick> ticks = {};
-};
-
-/// Fits an axis to the data.
-/// @param values values to show, of which those that are not finite are ignored; may be empty
-AxisSpan span_of(const ChartAxis& axis, std::span<const double> values);
-
 /// Draws a frame around the view, with ticks and axis labels on its left and below it. They take 60
 /// pixels below, and on the left 84 or as many as the widest tick label needs.
 void draw_axes(Canvas& canvas, const View& view, const std::vector<Tick>& x_ticks,

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
-#include <limits>
 
 #include "figures/axes.hpp"
 #include "figures/canvas.hpp"
@@ -20,32 +18,16 @@ constexpr double row_px = 32.0;  // of the legend
 constexpr double sample_px = 64.0;
 constexpr double radius_px = 7.5;
 
-/// Returns the corners of a mark's outline; none for a circle.
-std::vector<glm::dvec2> corners_of(Mark mark, glm::dvec2 at) {
-  const double r = radius_px;
-  switch (mark) {
-    case Mark::square:
-      return {at + glm::dvec2(-r, -r), at + glm::dvec2(r, -r), at + glm::dvec2(r, r),
-              at + glm::dvec2(-r, r)};
-    case Mark::triangle:
-      return {at + glm::dvec2(0.0, -1.2 * r), at + glm::dvec2(1.2 * r, 0.9 * r),
-              at + glm::dvec2(-1.2 * r, 0.9 * r)};
-    case Mark::diamond:
-      return {at + glm::dvec2(0.0, -1.3 * r), at + glm::dvec2(1.3 * r, 0.0),
-              at + glm::dvec2(0.0, 1.3 * r), at + glm::dvec2(-1.3 * r, 0.0)};
-    default:
-      return {};
-  }
-}
-
 void draw_mark(Canvas& canvas, const ChartSeries& series, glm::dvec2 at) {
   // A white edge separates marks that overlap.
   const Pen edge{.colour = white, .width_px = 1.5};
   if (series.mark == Mark::circle) {
     canvas.disc(at, radius_px, series.colour);
     canvas.circle(at, radius_px, edge);
-  } else if (series.mark != Mark::none) {
-    const std::vector<glm::dvec2> corners = corners_of(series.mark, at);
+  } else if (series.mark == Mark::square) {
+    const double r = radius_px;
+    const std::array corners{at + glm::dvec2(-r, -r), at + glm::dvec2(r, -r), at + glm::dvec2(r, r),
+                             at + glm::dvec2(-r, r)};
     canvas.fill(corners, series.colour);
     canvas.polygon(corners, edge);
   }
@@ -107,13 +89,7 @@ struct Legend {
 /// Draws the contents of the frame of the axes.
 class Plot {
  public:
-  Plot(Canvas& canvas, const AxisSpan& x, const AxisSpan& y, const Box& box)
-      : canvas_(canvas),
-        x_(x),
-        y_(y),
-        view_{.box = box, .lower = {x.lower, y.lower}, .upper = {x.upper, y.upper}} {}
-
-  const View& view() const { return view_; }
+  Plot(Canvas& canvas, const View& view) : canvas_(canvas), view_(view) {}
 
   /// Draws a line through the whole plot.
   void rule(double place, bool vertical, const Pen& pen) {
@@ -124,21 +100,11 @@ class Plot {
                  pen);
   }
 
-  void grid() {
-    const Pen pen{.colour = {0.84, 0.84, 0.84}, .width_px = 1.5};
-    for (const Tick& tick : x_.ticks) {
-      rule(tick.value, true, pen);
-    }
-    for (const Tick& tick : y_.ticks) {
-      rule(tick.value, false, pen);
-    }
-  }
-
   void intervals(const ChartSeries& series) {
     const Pen pen{.colour = series.colour, .width_px = 2.0};
     constexpr glm::dvec2 half_cap(5.0, 0.0);
     for (const ChartPoint& point : series.points) {
-      if (drawn(point) && point.low <= point.high) {
+      if (point.low <= point.high) {
         const std::array ends{view_.pixel({point.x, point.low}),
                               view_.pixel({point.x, point.high})};
         canvas_.line(ends, pen);
@@ -150,28 +116,17 @@ class Plot {
   }
 
   void line(const ChartSeries& series) {
-    std::vector<glm::dvec2> run;
-    const auto draw = [&] {
-      if (series.line != Line::none && run.size() > 1) {
-        canvas_.line(run, pen_of(series));
-      }
-      run.clear();
-    };
+    std::vector<glm::dvec2> points;
     for (const ChartPoint& point : series.points) {
-      if (drawn(point)) {
-        run.push_back(pixel(point));
-      } else {
-        draw();
-      }
+      points.push_back(pixel(point));
     }
-    draw();
+    if (series.line != Line::none && points.size() > 1) {
+      canvas_.line(points, pen_of(series));
+    }
   }
 
   void marks(const ChartSeries& series) {
     for (const ChartPoint& point : series.points) {
-      if (!drawn(point) || !view_.contains({point.x, point.y})) {
-        continue;
-      }
       const glm::dvec2 at = pixel(point);
       draw_mark(canvas_, series, at);
       if (series.mark != Mark::none) {
@@ -182,16 +137,13 @@ class Plot {
 
   void labels(const ChartSeries& series) {
     for (const ChartPoint& point : series.points) {
-      if (drawn(point) && !point.label.empty()) {
+      if (!point.label.empty()) {
         label(point.label, pixel(point), series.colour);
       }
     }
   }
 
  private:
-  static bool drawn(const ChartPoint& point) {
-    return std::isfinite(point.x) && std::isfinite(point.y);
-  }
   glm::dvec2 pixel(const ChartPoint& point) const { return view_.pixel({point.x, point.y}); }
 
   /// Writes the text beside the point where it covers no mark and no other label, or not at all.
@@ -218,77 +170,27 @@ class Plot {
   }
 
   Canvas& canvas_;
-  const AxisSpan& x_;
-  const AxisSpan& y_;
-  View view_;
+  const View& view_;
   std::vector<Box> taken_;  ///< boxes of marks and text
 };
 
-constexpr int most_ticks = 7;
-
-std::string text_of(const ChartAxis& axis, double value) {
-  return axis.text ? axis.text(value) : number(value);
-}
-
-/// Ends the axis at whole ticks, so that no curve meets the frame between two ticks.
-void set_ticks(const ChartAxis& axis, AxisSpan& span) {
-  const std::vector<Tick> within = even_ticks(span.lower, span.upper, most_ticks);
-  const double step = within.size() > 1 ? within[1].value - within[0].value : 0.0;
-  if (step > 0.0) {
-    span.lower = axis.lower.value_or(step * std::floor(span.lower / step + 1e-9));
-    span.upper = axis.upper.value_or(step * std::ceil(span.upper / step - 1e-9));
+std::vector<Tick> ticks_of(const ChartAxis& axis) {
+  constexpr int most_ticks = 7;
+  std::vector<Tick> ticks = even_ticks(axis.lower, axis.upper, most_ticks);
+  for (Tick& tick : ticks) {
+    tick.label = axis.text ? axis.text(tick.value) : tick.label;
   }
-  for (const Tick& tick : even_ticks(span.lower, span.upper, most_ticks + 2, step)) {
-    span.ticks.push_back({tick.value, text_of(axis, tick.value)});
-  }
-}
-
-AxisSpan span_of_axis(const Chart& chart, bool along_x) {
-  std::vector<double> values;
-  for (const ChartSeries& series : chart.series) {
-    for (const ChartPoint& point : series.points) {
-      if (along_x) {
-        values.push_back(point.x);
-      } else {
-        values.insert(values.end(), {point.y, point.low, point.high});
-      }
-    }
-  }
-  if (along_x && chart.rule) {
-    values.push_back(*chart.rule);
-  }
-  return span_of(along_x ? chart.x : chart.y, values);
+  return ticks;
 }
 
 }  // namespace
 
-AxisSpan span_of(const ChartAxis& axis, std::span<const double> values) {
-  AxisSpan span{.lower = std::numeric_limits<double>::infinity(),
-                .upper = -std::numeric_limits<double>::infinity()};
-  for (const double value : values) {
-    if (std::isfinite(value)) {
-      span.lower = std::min(span.lower, value);
-      span.upper = std::max(span.upper, value);
-    }
-  }
-  if (span.lower > span.upper) {
-    span.lower = span.upper = 0.0;
-  }
-  span.lower = axis.lower.value_or(span.lower);
-  span.upper = axis.upper.value_or(span.upper);
-  if (!(span.lower < span.upper)) {
-    span.upper = span.lower + 1.0;
-  }
-  set_ticks(axis, span);
-  return span;
-}
-
 std::string draw_chart(const Chart& chart) {
-  const AxisSpan x = span_of_axis(chart, true);
-  const AxisSpan y = span_of_axis(chart, false);
+  const std::vector<Tick> x_ticks = ticks_of(chart.x);
+  const std::vector<Tick> y_ticks = ticks_of(chart.y);
   Canvas ruler(1, 1);  // measures text before the picture's size is known
   double widest_px = 0.0;
-  for (const Tick& tick : y.ticks) {
+  for (const Tick& tick : y_ticks) {
     widest_px = std::max(widest_px, ruler.text_width(tick.label, small));
   }
   const double left_px = std::max(92.0, widest_px + 50.0);
@@ -303,10 +205,19 @@ std::string draw_chart(const Chart& chart) {
     canvas.text(chart.title, {left_px, 16.0 + heading.size_px}, heading);
   }
   legend.draw(canvas, {left_px, 16.0 + title_px});
-  Plot plot(canvas, x, y, {left_px, top_px, plot_px, plot_height_px});
-  plot.grid();
+  const View view{.box = {left_px, top_px, plot_px, plot_height_px},
+                  .lower = {chart.x.lower, chart.y.lower},
+                  .upper = {chart.x.upper, chart.y.upper}};
+  Plot plot(canvas, view);
+  const Pen grid{.colour = {0.84, 0.84, 0.84}, .width_px = 1.5};
+  for (const Tick& tick : x_ticks) {
+    plot.rule(tick.value, true, grid);
+  }
+  for (const Tick& tick : y_ticks) {
+    plot.rule(tick.value, false, grid);
+  }
   {
-    const Canvas::Clip inside(canvas, plot.view().box);
+    const Canvas::Clip inside(canvas, view.box);
     for (const ChartSeries& series : chart.series) {
       plot.intervals(series);
     }
@@ -314,7 +225,7 @@ std::string draw_chart(const Chart& chart) {
       plot.line(series);
     }
   }
-  draw_axes(canvas, plot.view(), x.ticks, y.ticks, chart.x.label, chart.y.label);
+  draw_axes(canvas, view, x_ticks, y_ticks, chart.x.label, chart.y.label);
   for (const ChartSeries& series : chart.series) {
     plot.marks(series);
   }

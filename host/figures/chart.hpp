@@ -14,18 +14,16 @@ namespace palpate {
 
 struct ChartAxis {
   std::string label;
-  /// Ends of the axis. An end that is not given follows the data, with room for the marks.
-  std::optional<double> lower = {};
-  std::optional<double> upper = {};
+  double lower = 0.0;
+  double upper = 1.0;
   /// Writes the label of a tick; empty: the number in its shortest form.
   std::function<std::string(double)> text = {};
 };
 
-enum class Mark { none, circle, square, triangle, diamond };
+enum class Mark { none, circle, square };
 enum class Line { none, solid, dotted };
 
-/// A point, drawn where both coordinates are finite. A point that is not drawn leaves a gap in its
-/// line; a point beyond the ends of an axis has no mark.
+/// A point within the axes.
 struct ChartPoint {
   double x = 0.0;
   double y = 0.0;

@@ -20,7 +20,7 @@ std::string draw_reliability(const ReliabilityFigure& figure) {
                           .mark = Mark::none,
                           .line = Line::dotted,
                           .points = {{.x = 0.0, .y = 0.0}, {.x = 1.0, .y = 1.0}}});
-  constexpr std::array marks{Mark::circle, Mark::square, Mark::triangle, Mark::diamond};
+  constexpr std::array marks{Mark::circle, Mark::square};
   for (std::size_t k = 0; k < figure.curves.size(); ++k) {
     ChartSeries series{.name = figure.curves[k].name,
                        .colour = palpate::series(k),

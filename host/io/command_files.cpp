@@ -8,6 +8,7 @@
 #include <system_error>
 #include <utility>
 
+#include "io/atomic_file.hpp"
 #include "io/descriptor.hpp"
 #include "io/file_identity.hpp"
 #include "io/input_file.hpp"
@@ -50,7 +51,9 @@ void CommandFiles::reads(const std::string& flag, const std::filesystem::path& f
   if (is_stream) {
     require_open(flag, STDIN_FILENO, "input");
   }
-  read_.push_back({flag, file, is_stream});
+  if (!file.empty()) {
+    read_.push_back({flag, file, is_stream});
+  }
 }
 
 void CommandFiles::writes(const std::string& flag, const std::filesystem::path& file, Dash dash) {
@@ -58,7 +61,16 @@ void CommandFiles::writes(const std::string& flag, const std::filesystem::path& 
   if (is_stream) {
     require_open(flag, STDOUT_FILENO, "output");
   }
-  written_.push_back({flag, file, is_stream});
+  if (!file.empty()) {
+    written_.push_back({flag, file, is_stream});
+  }
+}
+
+void CommandFiles::writes_in(const std::string& flag, const std::filesystem::path& folder,
+                             const std::string& name) {
+  if (!folder.empty()) {
+    written_.push_back({flag, folder / name, false, true});
+  }
 }
 
 void CommandFiles::require_distinct() const {
@@ -82,6 +94,21 @@ void CommandFiles::require_distinct() const {
       refuse(output.flag + " " + output.file.string(),
              "would overwrite {}, which {} {}; choose another name", named->file.string(),
              named->flag, verb);
+    }
+  }
+}
+
+void CommandFiles::prepare() const {
+  require_distinct();
+  for (const Named& output : written_) {
+    const std::filesystem::path folder = output.file.parent_path();
+    const bool later = output.in_own_folder && !std::filesystem::exists(folder);
+    if (output.in_own_folder && !later && !std::filesystem::is_directory(folder)) {
+      refuse(folder, "the folder cannot be made ({}); choose another name",
+             std::make_error_code(std::errc::not_a_directory).message());
+    }
+    if (!output.is_stream && !later) {
+      const AtomicFile probe(output.file);
     }
   }
 }

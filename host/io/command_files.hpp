@@ -13,24 +13,31 @@ class CommandFiles {
   /// Whether "-" names a file called "-", or standard input or output.
   enum class Dash { file, stream };
 
-  /// Adds a file that the command reads.
+  /// Adds a file that the command reads, unless its name is "".
   /// @throws Error (Fault::input) where it is standard input, which is closed
   void reads(const std::string& flag, const std::filesystem::path& file, Dash dash = Dash::file);
-  /// Adds a file that the command writes, which need not exist.
+  /// Adds a file that the command writes, which need not exist, unless its name is "".
   /// @throws Error (Fault::input) where it is standard output, which is closed
   void writes(const std::string& flag, const std::filesystem::path& file, Dash dash = Dash::file);
+  /// Adds a file in a folder that the command makes where it is missing, unless the folder is "".
+  void writes_in(const std::string& flag, const std::filesystem::path& folder,
+                 const std::string& name);
 
   /// Compares existing regular files and FIFOs by device and inode, others by their paths.
   /// Terminals and other devices may be both read and written. Call it before the work, which may
   /// take hours, and before anything is written.
   /// @throws Error (Fault::input) naming both flags and both files
   void require_distinct() const;
+  /// Requires distinct files, and that each output can be written.
+  /// @throws Error
+  void prepare() const;
 
  private:
   struct Named {
     std::string flag;
     std::filesystem::path file;
     bool is_stream = false;
+    bool in_own_folder = false;  ///< which the command makes
   };
   std::vector<Named> read_;
   std::vector<Named> written_;

@@ -10,7 +10,7 @@
 
 namespace palpate {
 
-std::optional<ElementSpacing> spacing_of(std::span<const glm::dvec2> elements_mm) {
+std::optional<ElementSpacing> spacing_of(std::span<const glm::dvec2> elements_mm, double alike_mm) {
   if (elements_mm.size() < 2) {
     return {};
   }
@@ -36,7 +36,7 @@ std::optional<ElementSpacing> spacing_of(std::span<const glm::dvec2> elements_mm
       }
       if (const double distance =
               std::hypot(elements_mm[i].x - elements_mm[j].x, elements_mm[i].y - elements_mm[j].y);
-          distance < nearest_mm) {
+          distance > alike_mm && distance < nearest_mm) {
         nearest_mm = distance;
         nearest = j;
       }

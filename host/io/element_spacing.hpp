@@ -18,6 +18,9 @@ struct ElementSpacing {
 };
 
 /// None for fewer than two elements. Takes n sqrt(n) steps for n elements spread over an area.
-std::optional<ElementSpacing> spacing_of(std::span<const glm::dvec2> elements_mm);
+/// @param alike_mm elements at most so far apart do not count as neighbours; where none has another
+/// neighbour, the distances are infinite
+std::optional<ElementSpacing> spacing_of(std::span<const glm::dvec2> elements_mm,
+                                         double alike_mm = -1.0);
 
 }  // namespace palpate

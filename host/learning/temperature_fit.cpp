@@ -227,7 +227,7 @@ std::vector<ScoredPress> both(const GroupHalves& groups) {
   return all;
 }
 
-std::vector<double> label_probabilities(const ScoredPress& press, double temperature,
+std::vector<double> press_probabilities(const ScoredPress& press, double temperature,
                                         double feature_weight) {
   std::vector<double> p = log_probabilities(press, temperature, feature_weight);
   for (double& x : p) {
@@ -240,7 +240,7 @@ Scores scores_of(std::span<const ScoredPress> presses, double temperature, doubl
   require_presses(presses);
   std::vector<JudgedRecord> records;
   for (const ScoredPress& press : presses) {
-    const std::vector<double> p = label_probabilities(press, temperature, feature_weight);
+    const std::vector<double> p = press_probabilities(press, temperature, feature_weight);
     JudgedRecord record{.truth = std::to_string(press.truth)};
     for (std::size_t label = 0; label < p.size(); ++label) {
       record.identity[std::to_string(label)] = p[label];

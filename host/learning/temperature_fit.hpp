@@ -25,7 +25,7 @@ std::vector<ScoredPress> of_fold(std::span<const ScoredPress> presses, std::size
                                  bool inside);
 
 /// Probabilities of the labels: proportional to evidence^(1 / temperature) * density^weight.
-std::vector<double> label_probabilities(const ScoredPress& press, double temperature,
+std::vector<double> press_probabilities(const ScoredPress& press, double temperature,
                                         double feature_weight = 0.0);
 
 /// How right and how honest the probabilities of presses are; see evaluate().

@@ -51,12 +51,6 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-/// Whether bounds search beliefs that nobody asks for, to measure surprises. In very many bins the
-/// search after the first touches takes long, while that after all of them is quick.
-bool searches_for_surprise(const RecognitionTask& task) {
-  return task.bins_in_all() <= most_balanced_bins;
-}
-
 struct Updated {
   std::optional<double> surprise;  ///< of the last touch
   double seconds = 0.0;            ///< wall time without that of the surprises
@@ -67,12 +61,11 @@ Updated update(Recogniser& recogniser, const RecognitionTask& task, std::span<co
                const std::function<void(double)>& progress) {
   constexpr std::uint64_t seed = 0;
   const FilterTraits traits = traits_of(task.filter);
-  const bool measures = traits.bins && (traits.every_bin || searches_for_surprise(task) ||
-                                        (recogniser.touched() && touches.size() == 1));
   // Nothing but the prior comes before the first touch.
   const std::size_t before = recogniser.touched() ? 0 : 1;
   const std::size_t one_by_one =
-      measures ? std::min(surprises_judged, touches.size() - std::min(before, touches.size())) : 0;
+      traits.bins ? std::min(surprises_judged, touches.size() - std::min(before, touches.size()))
+                  : 0;
   Updated updated;
   const auto take = [&](std::size_t begin, std::size_t end) {
     const Clock::time_point start = Clock::now();

@@ -71,8 +71,7 @@ struct RecognitionStep {
   std::optional<Fit> fit;
   /// How much the last touch surprised the belief before it; see surprise_of(). Empty for
   /// particles, for a touch without a known element, and for an unknown's first touch (so for all
-  /// of `--each-frame`), before which there is no belief but the prior. By bounds over more than
-  /// most_balanced_bins in all also where several touches come at once.
+  /// of `--each-frame`), before which there is no belief but the prior.
   std::optional<double> surprise;
   /// Probability that the object was learned, where tells_known() and the unknown is a single touch
   /// with an element In Contact; "(none)" in `identity` then has the rest.

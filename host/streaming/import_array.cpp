@@ -103,6 +103,9 @@ void mark_dead(const std::string& dead, ArrayTable& array) {
 }  // namespace
 
 ImportArray import_array(const ImportOptions& options) {
+  if (options.pressure_unit != "kPa" && options.pressure_unit != "raw") {
+    refuse(fmt::format("`pressure-unit {}`", options.pressure_unit), "give kPa or raw");
+  }
   ImportArray array;
   const std::optional<Grid> grid = options.elements_mm ? std::nullopt : grid_of(options.array);
   if (grid) {

@@ -14,7 +14,8 @@ struct ImportArray : ArrayTable {
       0;  ///< readings of one row, or of one column where these come first; 0: no grid
 };
 
-/// Reads `array` as a grid or as a file, or takes the elements of a program.
+/// Reads `array` as a grid or as a file, or takes the elements of a program; checks
+/// `pressure-unit`.
 /// @throws Error naming the option, or the file's line and column
 ImportArray import_array(const ImportOptions& options);
 

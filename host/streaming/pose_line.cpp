@@ -15,19 +15,17 @@ namespace palpate {
 
 namespace {
 
-constexpr std::array<const char*, 4> names{"time", "x_mm", "y_mm", "theta_rad"};
-
 std::optional<double> finite(std::optional<double> number) {
   return number && std::isfinite(*number) ? number : std::nullopt;
 }
+
+}  // namespace
 
 std::string_view trimmed(std::string_view text) {
   constexpr const char* blanks = " \t\r";
   const std::size_t begin = std::min(text.find_first_not_of(blanks), text.size());
   return text.substr(begin, text.find_last_not_of(blanks) + 1 - begin);
 }
-
-}  // namespace
 
 std::variant<PoseLines::TimedPose, PoseLines::Problem, PoseLines::Header> PoseLines::read(
     std::string_view line) {
@@ -37,7 +35,7 @@ std::variant<PoseLines::TimedPose, PoseLines::Problem, PoseLines::Header> PoseLi
   }
   const nlohmann::json json = nlohmann::json::parse(line, nullptr, false);
   if (!json.is_object()) {
-    return Problem{Problem::Kind::no_pose, "is no JSON object"};
+    return Problem{Problem::Kind::malformed, "is no JSON object"};
   }
   Numbers numbers;
   for (std::size_t k = 0; k < names.size(); ++k) {
@@ -54,14 +52,14 @@ std::variant<PoseLines::TimedPose, PoseLines::Problem, PoseLines::Header> PoseLi
   std::vector<std::string_view> fields = split_text(line, ',');
   std::ranges::transform(fields, fields.begin(), trimmed);
   if (fields.size() < names.size()) {
-    return Problem{Problem::Kind::no_pose,
+    return Problem{Problem::Kind::malformed,
                    "is no JSON object, and no row of CSV with four numbers"};
   }
   if (first && !number_of(fields.front())) {
     for (std::size_t k = 0; k < names.size(); ++k) {
       const auto found = std::ranges::find(fields, names[k]);
       if (found == fields.end()) {
-        return Problem{Problem::Kind::no_pose, fmt::format("names no column '{}'", names[k])};
+        return Problem{Problem::Kind::malformed, fmt::format("names no column '{}'", names[k])};
       }
       columns_[k] = static_cast<std::size_t>(found - fields.begin());
     }

@@ -1,10 +1,8 @@
 #include <algorithm>
 #include <bitset>
-#include <cerrno>
 #include <chrono>
 #include <cmath>
 #include <cstdint>
-#include <cstring>
 #include <deque>
 #include <string>
 #include <string_view>
@@ -12,23 +10,19 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <poll.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
-#include "io/descriptor.hpp"
 #include "palpate/error.hpp"
 #include "palpate/pose_track.hpp"
+#include "streaming/line_reader.hpp"
 #include "streaming/pose_line.hpp"
 
 namespace palpate {
 
 namespace {
 
-// No pose has so long a line; a stream that never ends its line must not fill the memory.
+// No pose has so long a line.
 constexpr std::size_t longest_line = 4096;
-// One read() takes at most this many bytes, and PoseReader::read() this many blocks.
-constexpr std::size_t block_bytes = 1 << 14;
+// PoseReader::read() takes at most so many blocks of the lines' reader.
 constexpr int blocks_at_once = 4;
 
 /// Reads lines of poses into a track as they come: see PosedSensor.
@@ -38,25 +32,10 @@ class PoseReader {
   /// @param complain called for the first refused line of each kind; may be empty
   /// @throws Error where `name` cannot be read, or a line of a file is refused
   PoseReader(const std::string& name, PoseTrack& track, PosedSensor::Complaint complain)
-      : name_(name == "-" ? "standard input" : name),
-        track_(track),
-        complain_(std::move(complain)) {
-    if (name != "-") {
-      file_ = Descriptor(name, O_RDONLY | O_NONBLOCK);  // not waiting for the writer of a FIFO
-    }
-    descriptor_ = name == "-" ? STDIN_FILENO : file_.get();
-    struct stat status {};
-    if (descriptor_ < 0 || ::fstat(descriptor_, &status) != 0) {
-      throw Error(Fault::input, fmt::format("poses {}: cannot be read: {}; give a file, a FIFO or "
-                                            "- for standard input",
-                                            name, std::strerror(errno)));
-    }
-    if (S_ISDIR(status.st_mode)) {
-      throw Error(Fault::input, fmt::format("poses {}: is a folder; name a file in it", name));
-    }
-    is_file_ = S_ISREG(status.st_mode);
-    is_fifo_ = S_ISFIFO(status.st_mode) && descriptor_ != STDIN_FILENO;
-    while (is_file_ && read_some()) {
+      : track_(track),
+        complain_(std::move(complain)),
+        lines_("poses", name, longest_line, [this](const LineReader::Line& line) { take(line); }) {
+    while (is_file() && read_some()) {
     }
   }
 
@@ -73,7 +52,7 @@ class PoseReader {
   /// True where no more poses will come.
   bool ended() const { return ended_; }
   /// True where the poses come from a file; all of them are then in the track.
-  bool is_file() const { return is_file_; }
+  bool is_file() const { return lines_.is_file(); }
   /// Poses that joined the track.
   std::uint64_t poses() const { return poses_ - track_.dropped() - track_.set_aside(); }
   /// Lines that were refused.
@@ -86,66 +65,28 @@ class PoseReader {
 
   // Reads one block; false where there is none, or none yet.
   bool read_some() {
-    char bytes[block_bytes];
-    pollfd ready{.fd = descriptor_, .events = POLLIN, .revents = 0};
-    if (ended_ || (!is_file_ && ::poll(&ready, 1, 0) <= 0)) {
-      return false;
-    }
-    const ssize_t got = ::read(descriptor_, bytes, sizeof bytes);
-    if (got > 0) {
-      take({bytes, static_cast<std::size_t>(got)});
-      return true;
-    }
-    if (got < 0 && is_file_) {
-      throw Error(Fault::input, fmt::format("poses {}: cannot be read: {}; copy or record it again",
-                                            name_, std::strerror(errno)));
-    }
-    if (got == 0 && !is_fifo_) {  // a FIFO may get another writer
-      ended_ = true;
-      if (!line_.empty() || overlong_) {
-        end_line();
-      }
+    const bool some = lines_.read_some();
+    if (lines_.ended() && !std::exchange(ended_, true)) {
       const std::uint64_t dropped = track_.dropped();
       track_.end();
       judge_order(dropped, track_.set_back());
     }
-    return false;
+    return some;
   }
 
-  void take(std::string_view bytes) {
-    while (!bytes.empty()) {
-      const std::size_t end = bytes.find('\n');
-      const std::string_view part = bytes.substr(0, end);
-      if (line_.size() + part.size() > longest_line) {
-        overlong_ = true;
-      } else {
-        line_ += part;
-      }
-      if (end == std::string_view::npos) {
-        return;
-      }
-      end_line();
-      bytes.remove_prefix(end + 1);
-    }
-  }
-
-  void end_line() {
-    ++lines_;
-    const std::string text = std::exchange(line_, {});
-    if (std::exchange(overlong_, false)) {
-      refuse_line(Flaw::too_long, lines_, "is longer than any pose");
+  void take(const LineReader::Line& line) {
+    line_ = line.number;
+    if (line.too_long) {
+      refuse_line(Flaw::too_long, line_, "is longer than any pose");
       return;
     }
-    if (text.find_first_not_of(" \t\r") == std::string::npos) {
-      return;
-    }
-    const auto read = format_.read(text);
+    const auto read = format_.read(line.text);
     if (const auto* problem = std::get_if<PoseLines::Problem>(&read)) {
       using Kind = PoseLines::Problem::Kind;
-      refuse_line(problem->kind == Kind::no_pose     ? Flaw::no_pose
+      refuse_line(problem->kind == Kind::malformed   ? Flaw::no_pose
                   : problem->kind == Kind::no_number ? Flaw::no_number
                                                      : Flaw::far_away,
-                  lines_, problem->words);
+                  line_, problem->words);
     } else if (const auto* pose = std::get_if<PoseLines::TimedPose>(&read)) {
       add(pose->time_s, pose->T_robot_sensor);
     }
@@ -159,7 +100,7 @@ class PoseReader {
     track_.add(time_s, T_robot_sensor);
     judge_order(dropped, set_back);
     if (track_.set_aside() == 1) {
-      aside_ = {.line = lines_, .time_s = time_s, .before_s = before_s};
+      aside_ = {.line = line_, .time_s = time_s, .before_s = before_s};
     }
   }
 
@@ -185,8 +126,8 @@ class PoseReader {
         "{}, line {}: {}; write {{\"time\": s, \"x_mm\": mm, \"y_mm\": mm, \"theta_rad\": rad}}, "
         "or CSV "
         "with these columns",
-        name_, line, problem);
-    if (is_file_) {
+        lines_.name(), line, problem);
+    if (is_file()) {
       throw Error(Fault::input, text);
     }
     malformed_ += flaw < Flaw::out_of_order ? 1 : 0;  // the track counts the others
@@ -201,18 +142,12 @@ class PoseReader {
     told_[kind] = true;
   }
 
-  std::string name_;
   PoseTrack& track_;
   PosedSensor::Complaint complain_;
-  Descriptor file_;      ///< none for standard input
-  int descriptor_ = -1;  ///< its number
-  bool is_file_ = false;
-  bool is_fifo_ = false;
-  bool ended_ = false;
   PoseLines format_;
-  std::string line_;       ///< the line under way
-  bool overlong_ = false;  ///< the line under way is longer than any pose
-  std::uint64_t lines_ = 0;
+  LineReader lines_;
+  bool ended_ = false;
+  std::uint64_t line_ = 0;       ///< the last line that was taken
   std::uint64_t poses_ = 0;      ///< lines handed to the track
   std::uint64_t malformed_ = 0;  ///< lines that hold no pose
   std::string first_refused_;

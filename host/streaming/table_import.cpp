@@ -164,9 +164,6 @@ void check_numbers(const ImportOptions& options) {
   if (options.rate_hz && !(*options.rate_hz >= slowest_hz && *options.rate_hz <= fastest_hz)) {
     refuse(fmt::format("`rate {}`", *options.rate_hz), "give {} to {} Hz", slowest_hz, fastest_hz);
   }
-  if (options.pressure_unit != "kPa" && options.pressure_unit != "raw") {
-    refuse(fmt::format("`pressure-unit {}`", options.pressure_unit), "give kPa or raw");
-  }
   if (!std::isfinite(options.pose_delay_s)) {
     refuse(fmt::format("`pose-delay {}`", options.pose_delay_s), "give seconds");
   }

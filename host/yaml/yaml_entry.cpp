@@ -58,7 +58,7 @@ void read_document(std::istream&& yaml, const std::filesystem::path& file, const
     read({file, key, document});
   } catch (const YAML::Exception& error) {
     throw Error(Fault::input, fmt::format("{}: line {}: {}; correct the YAML", file.string(),
-                                          line_of(error.mark), error.msg));
+                                          line_of(error.mark), printable(error.msg)));
   }
 }
 

@@ -10,8 +10,23 @@ from contextlib import closing
 from typing import Any
 
 from ._bag import read_frames, topics
+from ._bag_messages import _PRESSURES, _at, _flat
+from ._bag_transforms import stamp_s as stamp_s
 from ._error import Error
 from .recognition import warn
+
+
+def readings(message: Any, msgtype: str, field: str = "") -> list[float]:
+    """The readings of the array in a message of ROS: in a dotted field such as "sensors.taxels.z", by
+    default the one that is known for the message's type, as "tactile_msgs/msg/TactileState", else `data`.
+
+    Raises Error where the message has no such field, or the field holds no numbers.
+    """
+    path = field or _PRESSURES.get(msgtype, "data")
+    try:
+        return _flat(_at(message, path))
+    except (AttributeError, TypeError, ValueError):
+        raise Error(f"{msgtype}: has no list of numbers {path}; give the field of the readings") from None
 
 
 def _flag_parser() -> argparse.ArgumentParser:

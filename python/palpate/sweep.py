@@ -5,12 +5,8 @@ improves, and what bins cost. docs/bins.md explains its tables.
 """
 
 import argparse
-import datetime
-import json
 import math
 import os
-import shlex
-import sys
 import time
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -20,8 +16,8 @@ import numpy
 from . import __version__
 from ._error import Error
 from ._palpate import Device, PoseLattice
+from ._program import begin, main, write
 from ._statistics import LEAST_GAIN, present
-from ._sweep_charts import draw
 from ._sweep_runs import Data, Document, Run, counts_of, lattices_of, measure
 from ._tables import (
     Column,
@@ -244,28 +240,20 @@ def _flag_parser() -> argparse.ArgumentParser:
     return flags
 
 
-def _run(arguments: argparse.Namespace) -> None:
+def _run() -> None:
+    arguments = _flag_parser().parse_args()
     if arguments.max_bins is not None and arguments.max_bins < 1_000:
         raise Error(f"--max-bins = {arguments.max_bins}: give 1000 or more")
     given = vars(arguments)
     options = {name: given[name] for name in ("scene", "sensor_model", "threshold", "ratio")}
     for name in ("x_mm", "y_mm", "theta_deg", "pivot_mm"):
         options[name] = _pair("--" + name.replace("_", "-"), given[name])
-    # What cannot be written is known before the minutes of work.
     if arguments.plots:
-        os.makedirs(arguments.plots, exist_ok=True)
-    if arguments.json:
-        open(arguments.json + ".part", "w").close()
-    device = Device.open(arguments.device)
-    facts: Document = {
-        "device": device.name,
-        "host threads": os.cpu_count(),
-        "palpate": __version__,
-        "date": datetime.datetime.now(datetime.timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ"),
-        "command line": shlex.join(["python", "-m", "palpate.sweep", *sys.argv[1:]]),
-    }
-    for name, value in facts.items():
-        print(f"{name}: {value}  ")
+        try:
+            from . import _charts, _sweep_charts
+        except ImportError as missing:
+            raise Error("--plots: Matplotlib is missing; pip install 'palpate[plot]'") from missing
+    device, facts = begin(arguments, palpate=__version__)
     start = time.perf_counter()
     document = facts | sweep(
         arguments.recordings,
@@ -278,27 +266,9 @@ def _run(arguments: argparse.Namespace) -> None:
     document["seconds in all"] = round(time.perf_counter() - start, 1)
     print(f"\n{document['advice']}")
     if arguments.plots:
-        for name, figure in draw(document).items():
-            for end in ("png", "svg"):
-                figure.savefig(os.path.join(arguments.plots, f"{name}.{end}"), dpi=150)
-    if arguments.json:
-        with open(arguments.json + ".part", "w", encoding="utf-8") as file:
-            file.write(json.dumps(document, indent=2, ensure_ascii=False) + "\n")
-        os.replace(arguments.json + ".part", arguments.json)
-
-
-def main() -> int:
-    """The command; returns its exit status, 2 where the input is wrong."""
-    arguments = _flag_parser().parse_args()
-    try:
-        _run(arguments)
-    except (Error, OSError) as error:
-        if arguments.json and os.path.exists(arguments.json + ".part"):
-            os.remove(arguments.json + ".part")
-        print(f"palpate.sweep: {error}", file=sys.stderr)
-        return 1 if getattr(error, "fault", "input") == "system" else 2
-    return 0
+        _charts.save(_sweep_charts.draw(document), arguments.plots)
+    write(arguments.json, document)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main(_run, "palpate.sweep")

@@ -68,24 +68,12 @@ constexpr const char* fine = "likelihood 200x200x250";
 constexpr const char* middle = "likelihood 100x100x100";
 constexpr const char* coarse = "likelihood 25x25x16";
 constexpr const char* per_bin = "per bin, element and touch";
-constexpr const char* one_bin = "one-bin kernel's time over this";
 
 const Quoted quoted[] = {
     {readme, "| log-likelihood against", "accuracy 100x100x1", "largest error at touch 1",
      " {:.1e} nats per touch"},
     {readme, "| log-likelihood against", "accuracy 100x100x1", "largest error at touch 1000",
      " {:.1e} after 1,000"},
-    {readme, "| likelihood, per bin", fine, per_bin, " {:.2f} ns at a step of 0.1"},
-    {readme, "| likelihood, per bin", middle, per_bin, " {:.2f} at 0.2 mm"},
-    {readme, "| likelihood, per bin", coarse, per_bin, " {:.1f} at 0.8 mm"},
-    {readme, "| a kernel with one bin", fine, one_bin, " {:.1f}, "},
-    {readme, "| a kernel with one bin", middle, one_bin, ", {:.1f} and"},
-    {readme, "| a kernel with one bin", coarse, one_bin, "and {:.1f} times"},
-    {readme, "| identity and mode of 50", "reductions 200x200x250", "identity and mode",
-     " {:.0f} ms"},
-    {readme, "| identity and mode of 50", fine, "device memory", " {:.1f} bytes"},
-    {readme, "| one touch of 5 x 10,000", "latency 25x25x16", "touch to estimate, median",
-     " {:.1f} ms"},
     {results, "| likelihood 200x200x250 ≤", fine, per_bin, " {:.2f} ns |"},
     {results, "| likelihood 100x100x100 ≤", middle, per_bin, " {:.2f} ns |"},
     {results, "| coarse lattice, 25x25x16", coarse, per_bin, " {:.2f} ns |"},

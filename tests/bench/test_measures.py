@@ -21,8 +21,8 @@ from bench.measures import (
     with_interval,
 )
 from bench.sweep_page import front_of
+from bench.sweep_runs import by_bounds, comparison_of, follow, nearest_bin_mm
 from bench.trials import Body, Touching, lattice_of, letter_maps, make_trials, map_of, truth_of
-from bench.windows import nearest_bin_mm, poses_in_window, windows_about
 from palpate._palpate import Random, Stream
 from palpate._statistics import errors_over, quantile
 from palpate._tables import column
@@ -158,21 +158,19 @@ def test_the_normalised_error_is_the_error_in_standard_deviations(
             assert nees(pose + (off, 0.0, 0.0)) == pytest.approx(4.0)
 
 
-def test_windows_give_the_full_posteriors_poses(
+def test_bounds_give_the_histograms_poses(
     device: palpate.Device, maps: list[palpate.OccupancyGrid]
 ) -> None:
-    lattice = lattice_of((30, 30, 113))
-    full = palpate.PoseHistogram(device, maps, lattice)
-    for trial in make_trials("AIO", 1, 9, 1_000):
-        body, truth = Body.of(map_of(maps, trial)), truth_of(trial).T_object_robot
+    bins = (30, 30, 113)
+    lattice, trials = lattice_of(bins), make_trials("AIO", 1, 9, 1_000)
+    full, ends = palpate.PoseHistogram(device, maps, lattice), []
+    for trial in trials:
         full.reset()
-        full.update(trial)
-        mode = full.estimate().mode
-        step = poses_in_window(device, maps, trial, lattice)
-        assert step.mode.T_object_robot[:2] == pytest.approx(mode.T_object_robot[:2], abs=1e-9)
-        refined = full.refine(mode).T_object_robot
-        assert step.refined.T_object_robot[:2] == pytest.approx(refined[:2], abs=1e-5)
-        assert step.error_mm is not None
-        assert nearest_bin_mm(lattice, body, truth) <= step.error_mm
-        bins = sum(window.bins for window in windows_about(lattice, body, truth, 3.0))
-        assert bins < lattice.bins / 2, "a window is a part"
+        ends.append(follow(full, maps, trial))
+    records = by_bounds(device, maps, trials, bins)
+    compared = comparison_of(maps, trials, ends, records)
+    assert compared["compared_trials"] == 3
+    assert compared["mode_difference_mm"] == 0.0 and compared["refined_difference_mm"] < 1e-5
+    for trial, record in zip(trials, records, strict=True):
+        body, truth = Body.of(map_of(maps, trial)), truth_of(trial).T_object_robot
+        assert 0.0 < nearest_bin_mm(lattice, body, truth) <= record["error_mm"]

@@ -6,52 +6,22 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <csignal>
-#include <fstream>
 #include <numbers>
-#include <sstream>
-#include <thread>
 
 #include <fmt/format.h>
 
+#include "live_command.hpp"
 #include "palpate/frame_recorder.hpp"
 #include "palpate/virtual_sensor.hpp"
-#include "program.hpp"
-#include "sample_files.hpp"
 
 namespace palpate::live_test {
 
 using Arguments = std::vector<std::string>;
 
-// At full speed, so that a test of seconds of touching takes none.
-constexpr const char* unknown_e = "simulate:E,rate=100,seed=3,object=random,touches=4,speed=max";
-
-class Live : public ProgramTest {
+class Live : public LiveTest {
  protected:
-  Live() {
-    write_map(folder_ / "A.map.h5", sample_map("A"));
-    write_map(folder_ / "E.map.h5", sample_map("E"));
-  }
-
-  static Arguments live(const std::string& sensor, const Arguments& more = {}) {
-    Arguments arguments{"live",     "--sensor", sensor,   "--maps",
-                        "A.map.h5", "E.map.h5", "--bins", "20x20x24"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return arguments;
-  }
-
-  /// Every line of JSON.
-  static std::vector<nlohmann::json> parsed(const std::string& lines) {
-    std::vector<nlohmann::json> records;
-    std::istringstream stream(lines);
-    for (std::string line; std::getline(stream, line);) {
-      records.push_back(nlohmann::json::parse(line));
-    }
-    return records;
-  }
-
   /// What is believed after each touch of a recording of frames is what `touches` and `recognize`
   /// find in it afterwards.
   void expect_agreement(const std::string& frames, std::size_t touches) const {
@@ -72,25 +42,6 @@ class Live : public ProgramTest {
         EXPECT_EQ(live[i].at(key), value) << key << " after touch " << i;
       }
     }
-  }
-
-  /// The program while it recognises, once its table has begun.
-  pid_t start(const Arguments& arguments) const {
-    const pid_t pid = ProgramTest::start(arguments);
-    while (bytes_of(folder_ / "said").find("latency ms") == std::string::npos) {
-      if (::waitpid(pid, nullptr, WNOHANG) != 0) {
-        ADD_FAILURE() << "it has ended: " << bytes_of(folder_ / "complained");
-        return -1;
-      }
-      std::this_thread::sleep_for(std::chrono::milliseconds(5));
-    }
-    return pid;
-  }
-
-  std::vector<nlohmann::json> records_of(const std::string& sensor, Arguments more = {}) const {
-    more.insert(more.end(), {"--json", "live.jsonl"});
-    done(live(sensor, more));
-    return parsed(bytes_of(folder_ / "live.jsonl"));
   }
 };
 

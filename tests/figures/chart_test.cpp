@@ -1,7 +1,6 @@
 #include "figures/chart.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include <gtest/gtest.h>
 
@@ -37,7 +36,7 @@ glm::dvec2 middle_of(const Picture& picture, const Colour& colour) {
 }
 
 TEST(Chart, DrawsMarksOfEveryShapeAtTheirPoints) {
-  for (const Mark mark : {Mark::circle, Mark::square, Mark::triangle, Mark::diamond}) {
+  for (const Mark mark : {Mark::circle, Mark::square}) {
     Chart chart = chart_of({.colour = red, .mark = mark, .points = {{.x = 2.0, .y = 8.0}}});
     chart.series.push_back({.colour = blue, .mark = mark, .points = {{.x = 9.0, .y = 1.0}}});
     const Picture picture = drawn(chart);
@@ -46,27 +45,6 @@ TEST(Chart, DrawsMarksOfEveryShapeAtTheirPoints) {
     EXPECT_LT(middle_of(picture, red).x, middle_of(picture, blue).x);
     EXPECT_LT(middle_of(picture, red).y, middle_of(picture, blue).y) << "y points up";
   }
-}
-
-TEST(Chart, LeavesOutWhatItsAxisDoesNotHold) {
-  for (const ChartPoint& point :
-       {ChartPoint{.x = NAN, .y = 1.0}, ChartPoint{.x = 1.0, .y = INFINITY},
-        ChartPoint{.x = 5.0, .y = 10.5}, ChartPoint{.x = -0.5, .y = 5.0}}) {
-    EXPECT_EQ(count_of(drawn(chart_of({.colour = red, .points = {point}})), red), 0);
-  }
-  const ChartPoint corner{.x = 10.0, .y = 10.0};
-  EXPECT_GT(count_of(drawn(chart_of({.colour = red, .points = {corner}})), red), 50);
-}
-
-TEST(Chart, LineHasAGapWhereAPointIsMissing) {
-  ChartSeries series{.name = "", .colour = red, .mark = Mark::none, .line = Line::solid};
-  for (double x = 0.0; x <= 10.0; ++x) {
-    series.points.push_back({.x = x, .y = 5.0});
-  }
-  const int whole = count_of(drawn(chart_of(series)), red);
-  series.points[4].y = NAN;
-  const int broken = count_of(drawn(chart_of(series)), red);
-  EXPECT_NEAR(static_cast<double>(broken) / whole, 0.8, 0.02) << "two of ten segments";
 }
 
 TEST(Chart, DrawsIntervalsAsBars) {

@@ -27,7 +27,7 @@ std::vector<ScoredPress> drawn_presses(std::size_t count, double temperature, do
       press.log_evidence.push_back(-900.0 + 2.0 * temperature * normal(random));
       press.log_density.push_back(3.0 * normal(random));
     }
-    const std::vector<double> p = label_probabilities(press, temperature, weight);
+    const std::vector<double> p = press_probabilities(press, temperature, weight);
     double at = random(0.0, 1.0);
     while (press.truth + 1 < p.size() && at >= p[press.truth]) {
       at -= p[press.truth++];
@@ -89,7 +89,7 @@ TEST(TemperatureFit, LeavesTheEvidenceItsSayWhereFeaturesTellAllPressesApart) {
   // Lighter presses turn the features round twice as far; the shape still tells.
   const ScoredPress lighter{
       .truth = 0, .log_evidence = {-100.0, -300.0}, .log_density = {-154.0, -54.0}};
-  EXPECT_GT(label_probabilities(lighter, fit.temperature, fit.feature_weight)[0], 0.5);
+  EXPECT_GT(press_probabilities(lighter, fit.temperature, fit.feature_weight)[0], 0.5);
 }
 
 TEST(TemperatureFit, GivesFeaturesNoWeightThatOtherTimesDoNotBearOut) {
@@ -187,7 +187,7 @@ TEST(TemperatureFit, TakesLabelsWithoutAMap) {
   std::vector<ScoredPress> presses(
       20, {.truth = 0, .log_evidence = {-100.0, -300.0, -INFINITY}, .log_density = {}});
   EXPECT_NEAR(fit_temperature(presses).temperature, 200.0 / std::log(41.0), 2.0);
-  EXPECT_EQ(label_probabilities(presses[0], 30.0)[2], 0.0);
+  EXPECT_EQ(press_probabilities(presses[0], 30.0)[2], 0.0);
   EXPECT_LT(scores_of(presses, 30.0).log_loss, 0.01);
 }
 
@@ -217,7 +217,7 @@ TEST(TemperedByFolds, GivesEachFoldTheTemperatureOfTheOthers) {
   for (std::size_t i = 0; i < presses.size(); ++i) {
     const TemperatureFit& other = fits[i % 3];
     const std::vector<double> p =
-        label_probabilities(presses[i], other.temperature, other.feature_weight);
+        press_probabilities(presses[i], other.temperature, other.feature_weight);
     EXPECT_EQ(tempered[i].truth, presses[i].truth);
     EXPECT_EQ(tempered[i].fold, presses[i].fold);
     EXPECT_TRUE(tempered[i].log_density.empty()) << "the weight counts already";
@@ -250,7 +250,7 @@ TEST(TemperedByFolds, GivesGroupsTheGrowthOfTheOtherHalf) {
   // The second half is told apart and shows no growth; the first half's temperature is about 20.
   const double temperature = fit_temperature(odd).temperature;
   EXPECT_NEAR(tempered.groups[7].log_evidence[1],
-              std::log(label_probabilities(groups[0][7], temperature)[1]), 1e-9);
+              std::log(press_probabilities(groups[0][7], temperature)[1]), 1e-9);
   EXPECT_NEAR(tempered.groups[400].log_evidence[1], -300.0 / 20.0, 2.0);
 }
 

@@ -1,6 +1,5 @@
 """The examples run, draw the pictures that stand next to them, and pass mypy --strict."""
 
-import os
 import pathlib
 import subprocess
 import sys
@@ -12,6 +11,7 @@ import palpate
 
 ROOT = pathlib.Path(__file__).parents[2]
 EXAMPLES = sorted((ROOT / "examples" / "python").glob("*.py"))
+NODE = sorted((ROOT / "examples" / "ros2" / "palpate_ros2").glob("*.py"))
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
@@ -33,17 +33,17 @@ def test_an_example_runs_and_draws_its_picture(example: pathlib.Path, tmp_path: 
     assert difference < 0.005, f"look at {made} and {stored}; copy the first if it is right"
 
 
-def test_types_are_strict() -> None:
+def test_types_are_strict(tmp_path: pathlib.Path) -> None:
     package = pathlib.Path(palpate.__file__).parent
     assert (package / "_palpate.pyi").exists()
     assert (package / "reference.pyi").exists()
     assert (package / "py.typed").exists()
-    assert len(EXAMPLES) == 3
+    assert (len(EXAMPLES), len(NODE)) == (3, 4)
     # Of the package, the type stubs of the extension modules too.
     command = ROOT / "python" / "palpate_command.py"
-    for checked in ([*EXAMPLES, command], ["-p", "palpate"], ["-p", "bench"]):
+    for checked in ([*EXAMPLES, *NODE, command], ["-p", "palpate"], ["-p", "bench"]):
         run = subprocess.run(
-            [sys.executable, "-m", "mypy", "--strict", "--cache-dir", os.devnull, *checked],
+            [sys.executable, "-m", "mypy", "--strict", "--cache-dir", str(tmp_path), *checked],
             cwd=ROOT, capture_output=True, text=True, timeout=300,
         )  # fmt: skip
         assert run.returncode == 0, run.stdout

@@ -42,9 +42,9 @@ PALPATE_API std::optional<std::filesystem::path> board_file(const std::string& n
 /// Opens a board and reads its geometry and calibration. Sensor::start() begins the stream.
 ///
 /// @param name KIND or KIND:WHICH. KIND is "takktile", a shipped profile of a serial board
-/// ("tsf85", "wts", "flexitac", "anyskin"), or the path of a profile that ends in .yaml. WHICH is
-/// the serial number or the port (such as 1-2.3) of one device; it is needed where several such
-/// boards are plugged in and where the profile lists no USB id.
+/// ("tsf85", "wts", "flexitac", "flexitac12", "anyskin"), or the path of a profile that ends in
+/// .yaml. WHICH is the serial number or the port (such as 1-2.3) of one device; it is needed where
+/// several such boards are plugged in and where the profile lists no USB id.
 ///
 /// While its board is unplugged, a started sensor is gone(). When a board with the same serial
 /// number is back (or, if no serial number tells boards apart, a board on the same port), the

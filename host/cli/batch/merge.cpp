@@ -45,15 +45,15 @@ std::string missing_unknowns(const std::vector<std::size_t>& there, const BatchT
 }
 
 /// Refuses to write over what is merged, or beside the chunks, where evaluate would read it too.
-void require_distinct(const MergeArguments& options, const ResultsFolder& folder,
-                      const std::vector<std::size_t>& there) {
+void check_output(const MergeArguments& options, const ResultsFolder& folder,
+                  const std::vector<std::size_t>& there) {
   CommandFiles files;
   files.reads("RESULTS", folder.task());
   for (const std::size_t chunk : there) {
     files.reads("RESULTS", folder.chunk(chunk));
   }
   files.writes("-o", options.output, CommandFiles::Dash::stream);
-  files.require_distinct();
+  files.prepare();
   const auto place = identity_of(std::filesystem::absolute(options.output).parent_path());
   if (options.output != "-" && place && place == identity_of(folder.chunks())) {
     refuse_flag("-o", options.output, "lies among the chunks that are merged; choose another name");
@@ -69,10 +69,7 @@ void merge(const MergeArguments& options) {
   const std::size_t chunks = task.chunks();
   const std::size_t unknowns = task.unknowns();
   const std::vector<std::size_t> there = folder.finished_chunks(chunks);
-  require_distinct(options, folder, there);
-  if (options.output != "-") {
-    require_writable(options.output);
-  }
+  check_output(options, folder, there);
   const std::string missing = missing_unknowns(there, task);
   if (!missing.empty() && !options.partial) {
     refuse(folder.path(),

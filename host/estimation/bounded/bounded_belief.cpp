@@ -20,21 +20,20 @@ namespace palpate {
 
 namespace {
 
-/// Draws poses from a belief whose bins come box by box, one in each of `count` equal parts of the
-/// belief.
+/// Draws bins from a belief whose bins come box by box, one in each of equal parts of the belief.
 class BeliefDraws {
  public:
+  /// @param targets ascending, as parts of the belief
   /// @param lattice,log_weight outlive this object; log_weight is [hypothesis], the log of its
   /// prior weight
   /// @param log_total log of the summed likelihood of all bins to come, with prior weights
-  BeliefDraws(std::size_t count, std::uint64_t seed, const PoseLattice& lattice,
+  BeliefDraws(std::vector<double> targets, const PoseLattice& lattice,
               std::span<const double> log_weight, double log_total)
       : lattice_(lattice),
         log_weight_(log_weight),
         log_total_(log_total),
-        random_(seed, Stream::belief),
-        targets_(one_in_each_part(count, random_)) {
-    draws_.reserve(count);
+        targets_(std::move(targets)) {
+    draws_.reserve(targets_.size());
   }
 
   /// See BinVisitor.
@@ -60,21 +59,14 @@ class BeliefDraws {
     last_ = {box.object, box.bin(bins - 1, lattice_)};
   }
 
-  /// The draws, uniform within their bins, in the order of objects and bins.
-  std::vector<PoseSample> take() {
+  /// The draws, in the order of objects and bins.
+  std::vector<DrawnBin> take() {
     draws_.resize(targets_.size(), last_);  // rounding may leave the last draw out
-    std::ranges::sort(draws_);
-    std::vector<PoseSample> samples;
-    samples.reserve(draws_.size());
-    for (const auto& [object, bin] : draws_) {
-      samples.push_back({object, draw_within(bin, lattice_, random_)});
-    }
-    return samples;
+    std::ranges::sort(draws_, {}, &DrawnBin::place);
+    return std::move(draws_);
   }
 
  private:
-  using Draw = std::pair<std::int32_t, std::int64_t>;  // object and bin
-
   /// Whether a draw is due before the belief has reached so much.
   bool is_due(double reached) const {
     return draws_.size() < targets_.size() && targets_[draws_.size()] < reached;
@@ -83,17 +75,20 @@ class BeliefDraws {
   const PoseLattice& lattice_;
   std::span<const double> log_weight_;
   double log_total_;
-  Random random_;
   std::vector<double> targets_;  ///< ascending, as parts of the belief
-  std::vector<Draw> draws_;
+  std::vector<DrawnBin> draws_;
   double reached_ = 0.0;  ///< part of the belief that has come
-  Draw last_;             ///< the last bin that has come
+  DrawnBin last_;         ///< the last bin that has come
 };
 
-/// Tolerance that a search with a budget reaches before it goes on, and enough to draw samples.
-constexpr double soon = 1e-2;
-/// Bins of all hypotheses together up to which samples are drawn at the full tolerance.
+/// After no more touches a belief is wide: a few draws need few of its bins.
+constexpr std::size_t wide_touches = 2;
+/// Bins of all hypotheses together up to which narrower beliefs are searched for draws.
+constexpr double most_searched_bins = 1e8;
+/// Bins of all hypotheses together up to which such a search has the full tolerance.
 constexpr double closely_drawn_bins = 1e6;
+/// Tolerance that a search with a budget reaches before it goes on, and enough for draws.
+constexpr double soon = 1e-2;
 /// Bounds of "none of these" need not be so close that identities move by less.
 constexpr double least_identity_change = 1e-6;
 constexpr double unlimited = std::numeric_limits<double>::infinity();
@@ -187,13 +182,15 @@ SearchGoal BoundedBelief::goal() const {
   return goal;
 }
 
+double BoundedBelief::bins_in_all() const {
+  return static_cast<double>(options_.lattice.bins()) * static_cast<double>(hypotheses_.size());
+}
+
 SearchGoal BoundedBelief::rough_goal() const {
   // Few bins take as long whatever the tolerance, and a close search lets those that are found be
   // followed through the next touches.
-  const double all =
-      static_cast<double>(options_.lattice.bins()) * static_cast<double>(hypotheses_.size());
-  return {.tolerance =
-              all <= closely_drawn_bins ? options_.tolerance : std::max(options_.tolerance, soon),
+  return {.tolerance = bins_in_all() <= closely_drawn_bins ? options_.tolerance
+                                                           : std::max(options_.tolerance, soon),
           .exact = false};
 }
 
@@ -247,12 +244,15 @@ BoundedBelief::Found BoundedBelief::run(const SearchGoal& goal, Deadline& deadli
 
 SearchResult BoundedBelief::run(const SearchGoal& goal, const Deadline& deadline,
                                 const BinVisitor& visitor, std::vector<PoseBlock>* refined) {
-  return arena_.execute([&] {
-    if (LargestTiles& largest = search_.largest(); largest.touches() < touches_.size()) {
-      change_.change([&] { largest.add(std::span(touches_).subspan(largest.touches())); });
-    }
-    return search_.run(elements_, goal, deadline, visitor, refined);
-  });
+  return arena_.execute(
+      [&] { return searched_with().run(elements_, goal, deadline, visitor, refined); });
+}
+
+const BoundSearch& BoundedBelief::searched_with() {
+  if (LargestTiles& largest = search_.largest(); largest.touches() < touches_.size()) {
+    change_.change([&] { largest.add(std::span(touches_).subspan(largest.touches())); });
+  }
+  return search_;
 }
 
 void BoundedBelief::visit(const BinVisitor& visitor) {
@@ -271,7 +271,7 @@ bool BoundedBelief::follow() {
     const KnownElements touch = known_elements(touches_[followed_->touches()]);
     std::vector<double> most;
     for (const TileBounds& bounds : space_.bounds) {
-      most.push_back(bounds.best(bounds.levels().size() - 1, touch));
+      most.push_back(bounds.best(space_.finest_level(), touch));
     }
     followed_->add(touch, likelihood_, most);
   }
@@ -281,13 +281,17 @@ bool BoundedBelief::follow() {
   return followed_.has_value();
 }
 
-std::vector<PoseSample> BoundedBelief::sample(std::size_t count, std::uint64_t seed) {
+std::vector<DrawnBin> BoundedBelief::draw(std::size_t count, Random& random) {
   const bool followed = !found_ && follow();
   if (!followed && !found_) {
     Deadline deadline = until(options_.budget_s);
+    if (touches_.size() <= wide_touches || bins_in_all() > most_searched_bins) {
+      return arena_.execute(
+          [&] { return searched_with().draw(elements_, count, random, deadline); });
+    }
     found_ = run(rough_goal(), deadline);
   }
-  BeliefDraws draws(count, seed, options_.lattice, space_.log_weight,
+  BeliefDraws draws(one_in_each_part(count, random), options_.lattice, space_.log_weight,
                     followed ? followed_->log_total() : log_total());
   const auto add = [&](const BinBox& box, std::span<const double> log_likelihood) {
     draws.add(box, log_likelihood);
@@ -300,8 +304,18 @@ std::vector<PoseSample> BoundedBelief::sample(std::size_t count, std::uint64_t s
   return draws.take();
 }
 
+std::vector<PoseSample> BoundedBelief::sample(std::size_t count, std::uint64_t seed) {
+  Random random(seed, Stream::belief);
+  std::vector<PoseSample> samples;
+  samples.reserve(count);
+  for (const DrawnBin& drawn : draw(count, random)) {
+    samples.push_back({drawn.object, draw_within(drawn.bin, options_.lattice, random)});
+  }
+  return samples;
+}
+
 std::vector<PoseBlock> BoundedBelief::refined_blocks() {
-  const std::size_t finest = space_.bounds.front().levels().size() - 1;
+  const std::size_t finest = space_.finest_level();
   std::vector<PoseBlock> blocks;
   std::vector<PoseBlock> evaluated;
   const auto note = [&](const BinBox& box, std::span<const double> log_likelihoods) {

@@ -58,7 +58,8 @@ class BoundedBelief {
   void visit(const BinVisitor& visitor);
   /// Log of the summed likelihood of these bins, with prior weights.
   double log_total() const { return found_->result.all().evaluated; }
-  /// Draws from bins that hold nearly all of the belief.
+  /// Draws from the bins of the last search, or without one from bins that hold nearly all of the
+  /// belief.
   std::vector<PoseSample> sample(std::size_t count, std::uint64_t seed);
   /// The blocks that a search divides or evaluates.
   std::vector<PoseBlock> refined_blocks();
@@ -82,17 +83,22 @@ class BoundedBelief {
 
   /// The goal that the options set.
   SearchGoal goal() const;
-  /// What a search for samples is to reach.
+  double bins_in_all() const;
+  /// What a search for draws is to reach.
   SearchGoal rough_goal() const;
   /// What found() returns.
   Found search();
+  /// Draws bins: those of a search where there is one or it is quick.
+  std::vector<DrawnBin> draw(std::size_t count, Random& random);
+  /// Follows the bins of an earlier search through the touches since.
+  /// @returns whether they hold enough to draw from; forgets them otherwise
+  bool follow();
+  /// The search, whose largest tiles have taken in all touches.
+  const BoundSearch& searched_with();
   /// Ends the deadline where there is no room for more bins.
   Found run(const SearchGoal& goal, Deadline& deadline);
   SearchResult run(const SearchGoal& goal, const Deadline& deadline, const BinVisitor& visitor,
                    std::vector<PoseBlock>* refined = nullptr);
-  /// Follows the bins of an earlier search through the touches since.
-  /// @returns whether they hold enough to draw samples from; forgets them otherwise
-  bool follow();
   /// Narrows the bounds of "none of these" as far as needed beside what was found.
   LogInterval bound_none(const Deadline& deadline);
   /// How wide these may be, given what they are.

@@ -100,6 +100,17 @@ TEST(Wts, CommandsCarryRightChecksums) {
   EXPECT_EQ(profile.stop, wts_packet(0x22, {}));
 }
 
+// Packets that the tests of wts-ft list (CNCR-NTU/wts-ft, src/wts_ft/wts_ft_interface.py).
+TEST(Wts, PacketsEndInThePublishedChecksums) {
+  const std::vector<std::pair<Bytes, std::uint16_t>> published = {
+      {wts_packet(0x01, {0x12, 0x34}), 0x666d},
+      {wts_packet(0x01, {}), 0x10e8},
+      {wts_packet(0x06, {}), 0x2697}};
+  for (const auto& [packet, checksum] : published) {
+    EXPECT_EQ(packet[packet.size() - 2] | packet.back() << 8, checksum);
+  }
+}
+
 /// A FlexiTac frame of zeros except for these bytes of the payload.
 Bytes flexitac(std::initializer_list<std::pair<std::size_t, std::uint8_t>> set) {
   Bytes bytes(514, 0);

@@ -134,7 +134,8 @@ TEST_P(ShippedBoard, ForgetsItsPartOfAFrameAtReset) {
   EXPECT_EQ(receiver.garbage(), 0u);
 }
 
-INSTANTIATE_TEST_SUITE_P(All, ShippedBoard, testing::Values("tsf85", "wts", "flexitac", "anyskin"),
+INSTANTIATE_TEST_SUITE_P(All, ShippedBoard,
+                         testing::Values("tsf85", "wts", "flexitac", "flexitac12", "anyskin"),
                          [](const auto& board) { return std::string(board.param); });
 
 }  // namespace palpate::packet_deframer_test

@@ -46,9 +46,9 @@ SentFrame wts_frame(std::mt19937& random) {
   return frame;
 }
 
-SentFrame flexitac_frame(std::mt19937& random) {
+SentFrame flexitac_frame(std::size_t rows, std::mt19937& random) {
   SentFrame frame{.bytes = {0xaa, 0x55}, .values = {}};
-  append(frame.bytes, random_bytes(16 * 32, random));
+  append(frame.bytes, random_bytes(rows * 32, random));
   frame.values.assign(frame.bytes.begin() + 2, frame.bytes.end());
   return frame;
 }
@@ -80,8 +80,8 @@ SentFrame random_frame(const std::string& board, std::mt19937& random) {
   if (board == "wts") {
     return wts_frame(random);
   }
-  if (board == "flexitac") {
-    return flexitac_frame(random);
+  if (board == "flexitac" || board == "flexitac12") {
+    return flexitac_frame(board == "flexitac" ? 16 : 12, random);
   }
   if (board == "anyskin") {
     return anyskin_frame(random);

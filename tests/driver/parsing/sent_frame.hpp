@@ -17,8 +17,8 @@ struct SentFrame {
   std::vector<double> values;
 };
 
-/// A frame with random readings of "wts", "tsf85", "flexitac" or "anyskin", written byte by byte
-/// after the board's protocol, without the profile.
+/// A frame with random readings of "wts", "tsf85", "flexitac", "flexitac12" or "anyskin", written
+/// byte by byte after the board's protocol, without the profile.
 SentFrame random_frame(const std::string& board, std::mt19937& random);
 
 /// Weiss Robotics' checksum, bit by bit.

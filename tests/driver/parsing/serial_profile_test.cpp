@@ -8,7 +8,8 @@
 namespace palpate::serial_profile_test {
 
 TEST(ShippedProfiles, AreFoundByName) {
-  EXPECT_EQ(shipped_profiles(), (std::vector<std::string>{"anyskin", "flexitac", "tsf85", "wts"}));
+  EXPECT_EQ(shipped_profiles(),
+            (std::vector<std::string>{"anyskin", "flexitac", "flexitac12", "tsf85", "wts"}));
   for (const std::string& name : shipped_profiles()) {
     const SerialProfile profile = read_serial_profile(name);
     EXPECT_EQ(profile.pressure_unit, "raw") << name;
@@ -25,13 +26,16 @@ TEST(ShippedProfiles, SayWhatTheBoardsAre) {
   EXPECT_EQ(tsf85.elements_mm.size(), 56u);
   EXPECT_EQ(read_serial_profile("wts").elements_mm.size(), 84u);
   EXPECT_EQ(read_serial_profile("flexitac").elements_mm.size(), 512u);
-  EXPECT_EQ(read_serial_profile("flexitac").line.baud, 2000000u);
+  EXPECT_EQ(read_serial_profile("flexitac12").elements_mm.size(), 384u);
+  for (const char* name : {"flexitac", "flexitac12"}) {
+    EXPECT_EQ(read_serial_profile(name).line.baud, 2000000u);
+  }
   EXPECT_EQ(read_serial_profile("anyskin").elements_mm.size(), 5u);
 }
 
 TEST(ShippedProfiles, AreNamedWhereAnotherWasAskedFor) {
   expect_named(input_error([] { read_serial_profile("digitacts"); }),
-               {"digitacts", "anyskin, flexitac, tsf85, wts", ".yaml"});
+               {"digitacts", "anyskin, flexitac, flexitac12, tsf85, wts", ".yaml"});
 }
 
 class ProfileFile : public testing::Test {
@@ -202,7 +206,7 @@ TEST_F(ProfileFile, HostProgramWithDecimalCommasReadsTheSame) {
   EXPECT_EQ(profile.packet.offset, -0.25);
   EXPECT_EQ(profile.rate_hz, 1000.5);
   expect_refused(with("gain: 1,5"), {"line 3", "gain", "give a number"});
-  EXPECT_EQ(shipped_profiles().size(), 4u);
+  EXPECT_EQ(shipped_profiles().size(), 5u);
   for (const std::string& name : shipped_profiles()) {
     EXPECT_NO_THROW(read_serial_profile(name));
   }

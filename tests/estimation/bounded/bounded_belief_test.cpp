@@ -1,6 +1,7 @@
 // What a bounded posterior tells of its belief: entropy, draws, memory; and beliefs that are flat.
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <vector>
@@ -240,11 +241,52 @@ TEST(BoundedBelief, DrawsOfManyBinsLeaveOutAHundredthAtMost) {
   touch.valid = valid;
   belief.add(std::span(&touch, 1));
   belief.take_in();
-  belief.sample(1, 0);
-  const double drawn_from = belief.log_total();
+  constexpr std::size_t count = 4000;
+  const std::vector<PoseSample> without_a_search = belief.sample(count, 831);
   belief.found();
-  EXPECT_GE(std::exp(drawn_from - belief.log_total()), 0.99);
-  EXPECT_LT(drawn_from, belief.log_total() - 1e-5) << "or the test sees nothing";
+  const std::vector<PoseSample> found = belief.sample(count, 832);
+  std::array<std::vector<double>, 2> counts;  // [search][object, theta, part of x, part of y]
+  for (const bool searched : {false, true}) {
+    std::vector<double>& counted = counts[searched ? 1 : 0];
+    counted.resize(2 * 8 * 4 * 4);
+    for (const PoseSample& draw : searched ? found : without_a_search) {
+      const std::int64_t bin = options.lattice.bin_of(draw.T_object_robot);
+      const std::int64_t theta = bin / options.lattice.plane() / 5;
+      const std::int64_t y = bin % options.lattice.plane() / 120 / 30;
+      const std::int64_t x = bin % 120 / 30;
+      counted[static_cast<std::size_t>(((draw.object * 8 + theta) * 4 + y) * 4 + x)] += 1.0;
+    }
+  }
+  for (std::size_t i = 0; i < counts[0].size(); ++i) {
+    const double sum = counts[0][i] + counts[1][i];
+    EXPECT_NEAR(counts[0][i], counts[1][i], 0.01 * count + 4.5 * std::sqrt(sum) + 1.0) << i;
+  }
+}
+
+// Penalties of thousands of elements lie thousands of nats apart: more than weights hold.
+TEST(BoundedBelief, IsDrawnFromWhateverTheNumberOfElements) {
+  BoundedOptions options = small_options();
+  const Recording recording = touches_of_l(6, 833);
+  std::vector<glm::dvec2> elements_mm;
+  std::vector<double> pressure;
+  for (int copies = 0; copies < 60; ++copies) {  // each element is read again and again
+    const Touch touch = recording.touch(0);
+    elements_mm.insert(elements_mm.end(), touch.elements_mm.begin(), touch.elements_mm.end());
+    pressure.insert(pressure.end(), touch.pressure.begin(), touch.pressure.end());
+  }
+  BoundedPosterior posterior(two_shapes(), options);
+  for (int i = 0; i < 3; ++i) {
+    posterior.update({.T_robot_sensor = recording.touch(0).T_robot_sensor,
+                      .elements_mm = elements_mm,
+                      .pressure = pressure});
+  }
+  const std::vector<PoseSample> draws = posterior.sample(64, 834);
+  const Mode mode = posterior.estimate().mode;
+  ASSERT_EQ(draws.size(), 64U);
+  for (const PoseSample& draw : draws) {
+    EXPECT_EQ(draw.object, mode.object);
+    EXPECT_EQ(options.lattice.bin_of(draw.T_object_robot), mode.bin);
+  }
 }
 
 TEST(BoundedBelief, OfAHundredMillionBinsBeforeAnyTouchIsFlat) {

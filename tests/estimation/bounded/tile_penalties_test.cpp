@@ -78,7 +78,7 @@ std::vector<std::uint32_t> sums_by_definition(const BatchCase& of) {
 std::vector<std::uint32_t> summed(const BatchCase& of, const WindowTable& table,
                                   std::size_t split = 0) {
   WindowPlaces placed;
-  place_elements(of.elements, of.place, table, placed);
+  place_windows(of.elements, of.place, table, placed);
   std::vector<std::uint32_t> sums(static_cast<std::size_t>(of.batches) * batch_tiles, of.before);
   for (const auto& [begin, end] :
        {std::pair(std::size_t{0}, split), std::pair(split, of.elements.from_pivot_mm.size())}) {

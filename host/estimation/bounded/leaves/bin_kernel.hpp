@@ -44,7 +44,7 @@ class MapPatches {
   std::vector<float> nodes_;
 };
 
-/// Over all levels of a table's numbers for one object, in nats.
+/// Extremes of a table over all readings of one object, in nats.
 struct TableExtent {
   double largest = 0.0;   ///< magnitude
   double steepest = 0.0;  ///< difference per nat of log odds
@@ -69,10 +69,10 @@ struct ReadingForm {
   /// @param contact resolved: with its prior
   explicit ReadingForm(const ContactModel& contact);
 
-  /// The numbers of an object's level: value and difference to the next, for each node.
-  const double* row(std::size_t object, Reading level) const {
+  /// The numbers of an object's reading: value and difference to the next, for each node.
+  const double* row(std::size_t object, Reading reading) const {
     return table.data() +
-           2 * nodes * ((sets == 1 ? 0 : object) * levels + static_cast<std::size_t>(level));
+           2 * nodes * ((sets == 1 ? 0 : object) * readings + static_cast<std::size_t>(reading));
   }
 
   TableExtent table_extent(std::size_t object) const;
@@ -90,9 +90,9 @@ struct ReadingForm {
   double first_log_odds = 0.0;
   double nodes_per_nat = 0.0;
   std::size_t nodes = 0;
-  std::size_t levels = 0;
+  std::size_t readings = 0;
   std::size_t sets = 0;
-  std::vector<double> table;  ///< [set, level, node, value | difference]
+  std::vector<double> table;  ///< [set, reading, node, value | difference]
 };
 
 /// Most lanes of a vector. Lists that kernels read are padded to a multiple of it.

@@ -86,7 +86,7 @@ ReadingForm::ReadingForm(const ContactModel& contact) {
     const LikelihoodTable& from = *contact.table;
     kind = Kind::table;
     nodes = from.nodes;
-    levels = from.levels();
+    readings = from.levels();
     sets = from.sets();
     first_log_odds = from.first_log_odds;
     nodes_per_nat = static_cast<double>(nodes - 1) / (from.last_log_odds - from.first_log_odds);
@@ -120,7 +120,7 @@ ReadingForm::ReadingForm(const ContactModel& contact) {
 TableExtent ReadingForm::table_extent(std::size_t object) const {
   TableExtent extent{.width = static_cast<double>(nodes - 1) / nodes_per_nat};
   const double* from = row(object, Reading::no_contact);
-  for (std::size_t i = 0; i < levels * nodes; ++i) {
+  for (std::size_t i = 0; i < readings * nodes; ++i) {
     extent.largest = std::max(extent.largest, std::abs(from[2 * i]));
     extent.steepest = std::max(extent.steepest, std::abs(from[2 * i + 1]) * nodes_per_nat);
   }

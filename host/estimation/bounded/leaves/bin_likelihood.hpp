@@ -52,7 +52,7 @@ class BinLikelihood {
                 std::span<float> log_likelihood) const;
   void evaluate(std::span<const BinBox> boxes, const KnownElements& elements,
                 std::span<double> log_likelihood) const;
-  /// The same of many boxes, on the threads of the TBB arena that it is called in.
+  /// Evaluates many boxes as evaluate() does, on the threads of the caller's TBB arena.
   template <typename Result>
   void evaluate_on_threads(std::span<const BinBox> boxes, const KnownElements& elements,
                            std::span<Result> log_likelihood) const;

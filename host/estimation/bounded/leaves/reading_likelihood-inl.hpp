@@ -159,12 +159,12 @@ void evaluate_lanes(D d, const LogOddsAt& log_odds_at, std::span<const ReadingRu
   store_logs(d, product, sums, static_cast<double>(count) * form.log_scale, log_likelihood);
 }
 
-/// A level of a table of log-likelihoods.
+/// The log-likelihoods of one reading in a table.
 template <class D>
 class TableRow {
  public:
-  TableRow(D d, const ReadingForm& form, std::size_t object, Reading level)
-      : row_(form.row(object, level)),
+  TableRow(D d, const ReadingForm& form, std::size_t object, Reading reading)
+      : row_(form.row(object, reading)),
         first_(hn::Set(d, form.first_log_odds)),
         scale_(hn::Set(d, form.nodes_per_nat)),
         last_(hn::Set(d, static_cast<double>(form.nodes - 1))),

@@ -15,32 +15,10 @@ namespace {
 
 /// Part of the tolerance that dropped tiles may use up; the rest is for rounding.
 constexpr double search_share = 0.75;
-/// Tiles that are followed down to the bins, to know early how much mass there is at least.
-constexpr std::size_t beam_tiles = 64;
 /// Beam width during survey(), where all tiles of a level are looked at first.
 constexpr std::size_t surveyed_tiles = 1024;
-/// So many of the smallest surveyed tiles have their bins evaluated.
-constexpr std::size_t probed_tiles = 16;
 /// Tiles that are divided together: bounds the memory for their parts.
 constexpr std::size_t most_together = 16384;
-
-bool larger_first(const Tile& a, const Tile& b) {
-  return a.bound != b.bound ? a.bound > b.bound : stands_before(a, b);
-}
-
-/// Keeps the tiles of the largest bounds.
-void keep_best(std::vector<Tile>& tiles, std::size_t count) {
-  if (tiles.size() > count) {
-    std::nth_element(tiles.begin(), tiles.begin() + static_cast<std::ptrdiff_t>(count), tiles.end(),
-                     larger_first);
-    tiles.resize(count);
-  }
-}
-
-bool is_part(const Tile& part, const Tile& of) {
-  return part.object == of.object && part.theta == of.theta && part.x / batch_side == of.x &&
-         part.y / batch_side == of.y;
-}
 
 /// One run of a search, from the largest tiles to their bins.
 class SearchRun {
@@ -50,20 +28,10 @@ class SearchRun {
         space_(task.space),
         goal_(task.goal),
         refined_(refined),
-        finest_(space_.bounds.front().levels().size() - 1),
+        finest_(space_.finest_level()),
         division_(task, largest),
         account_(space_.log_weight, space_.label_of, task.options.lattice, goal_),
-        leaves_(task, account_) {
-    const ContactModel& contact = task.options.contact;
-    const MapSample prior{log_odds_from_probability(*contact.prior)};
-    for (std::size_t i = 0; i < space_.bounds.size(); ++i) {
-      double& sum = prior_log_likelihoods_.emplace_back();
-      for (const ReadingRun& run : task.elements.runs) {
-        sum += static_cast<double>(run.end - run.begin) *
-               contact.log_likelihood(run.reading, prior, i);
-      }
-    }
-  }
+        leaves_(task, account_) {}
 
   SearchResult result() {
     settle_unseen();
@@ -93,21 +61,7 @@ class SearchRun {
  private:
   /// Settles the bins of all largest tiles in which every element sees the prior.
   void settle_unseen() {
-    const std::size_t thetas = space_.turns.size();
-    for (std::size_t row = 0; row < space_.bounds.size() * thetas; ++row) {
-      const std::size_t object = row / thetas;
-      const std::size_t theta = row % thetas;
-      const TileLevel& level = space_.bounds[object].levels().front();
-      const TileRange& seen = division_.seen(object, theta);
-      const int nx = level.x.tiles();
-      for (const TileRange& unseen :
-           {TileRange{0, nx, 0, seen.y_first}, TileRange{0, seen.x_first, seen.y_first, seen.y_end},
-            TileRange{seen.x_end, nx, seen.y_first, seen.y_end},
-            TileRange{0, nx, seen.y_end, level.y.tiles()}}) {
-        settle_unseen(level.box_of(static_cast<std::int32_t>(object),
-                                   static_cast<std::int32_t>(theta), unseen));
-      }
-    }
+    division_.for_unseen([&](const BinBox& box) { settle_unseen(box); });
     account_.raise_totals(std::vector<LogSum>(space_.bounds.size()));
   }
 
@@ -118,7 +72,7 @@ class SearchRun {
       return;
     }
     const auto object = static_cast<std::size_t>(box.object);
-    const double value = prior_log_likelihoods_[object];
+    const double value = division_.prior_log_likelihood(box.object);
     account_.settle(box.object, 1, value + std::log(static_cast<double>(bins)), value,
                     task_.likelihood.float64_error(object, task_.elements));
     account_.note_best(box, 0, value);
@@ -148,7 +102,7 @@ class SearchRun {
         std::ranges::copy_if(best, std::back_inserter(own), [&](const Tile& tile) {
           return tile.object == static_cast<std::int32_t>(i);
         });
-        for (const Tile& tile : best_of_beam(std::move(own), 0, beam_tiles)) {
+        for (const Tile& tile : division_.best_smallest(std::move(own), 0)) {
           leaves_.look(tile);
         }
       }
@@ -163,7 +117,7 @@ class SearchRun {
   /// @param width so many tiles at first
   void raise(std::vector<Tile> tiles, std::size_t level, std::size_t width = beam_tiles) {
     if (!goal_.evidence_nats) {
-      leaves_.probe(best_of_beam(std::move(tiles), level, width));
+      leaves_.probe(division_.best_smallest(std::move(tiles), level, width));
       return;
     }
     // Every label's own total is wanted, too.
@@ -173,23 +127,10 @@ class SearchRun {
     }
     std::vector<Tile> best;
     for (std::vector<Tile>& of_label : own) {
-      const std::vector<Tile> found = best_of_beam(std::move(of_label), level, width);
+      const std::vector<Tile> found = division_.best_smallest(std::move(of_label), level, width);
       best.insert(best.end(), found.begin(), found.end());
     }
     leaves_.probe(std::move(best));
-  }
-
-  /// Follows tiles down to the smallest ones, the best of each level.
-  std::vector<Tile> best_of_beam(std::vector<Tile> tiles, std::size_t level, std::size_t width) {
-    for (; level < finest_; ++level) {
-      task_.deadline.cancel_point();
-      keep_best(tiles, width);
-      std::ranges::sort(tiles, stands_before);
-      tiles = division_.parts_of(tiles, level);
-      width = beam_tiles;
-    }
-    keep_best(tiles, probed_tiles);
-    return tiles;
   }
 
   /// Divides tiles of a level until their bins are evaluated or dropped.
@@ -265,7 +206,8 @@ class SearchRun {
       std::vector<Tile> parts = division_.parts_of(lot, level);
       std::size_t next = 0;
       for (Tile& tile : lot) {
-        double largest = space_.log_weight[tile.object] + prior_log_likelihoods_[tile.object];
+        double largest =
+            space_.log_weight[tile.object] + division_.prior_log_likelihood(tile.object);
         for (; next < parts.size() && is_part(parts[next], tile); ++next) {
           largest = std::max(largest, parts[next].bound);
         }
@@ -306,8 +248,7 @@ class SearchRun {
   const SearchSpace& space_;
   const SearchGoal& goal_;
   std::vector<PoseBlock>* refined_;
-  std::size_t finest_;                         ///< level
-  std::vector<double> prior_log_likelihoods_;  ///< [object] of all elements
+  std::size_t finest_;  ///< level
   TileDivision division_;
   MassAccount account_;
   Leaves leaves_;
@@ -328,6 +269,12 @@ SearchResult BoundSearch::run(const KnownElements& elements, const SearchGoal& g
   return SearchRun({space_, options_, likelihood_, elements, reachable, deadline, visit}, largest_,
                    refined)
       .result();
+}
+
+std::vector<DrawnBin> BoundSearch::draw(const KnownElements& elements, std::size_t count,
+                                        Random& random, const Deadline& deadline) const {
+  return draw_bins({space_, options_, likelihood_, elements, {}, deadline, {}}, largest_, count,
+                   random);
 }
 
 PoseBlock block_of(const BinBox& box, std::size_t level) {

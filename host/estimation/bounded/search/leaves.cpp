@@ -11,6 +11,7 @@
 
 #include "estimation/bounded/leaves/bin_likelihood.hpp"
 #include "estimation/bounded/parallel_for.hpp"
+#include "estimation/bounded/search/tile_division.hpp"
 #include "estimation/bounded/touch_overlap.hpp"
 
 namespace palpate {
@@ -31,10 +32,6 @@ constexpr double rounding_part = 0.2;
 constexpr double refined_together = 2e6;
 
 }  // namespace
-
-bool stands_before(const Tile& a, const Tile& b) {
-  return std::tie(a.object, a.theta, a.y, a.x) < std::tie(b.object, b.theta, b.y, b.x);
-}
 
 UnsettledMass unsettled(std::span<const Tile> tiles, std::size_t level, const SearchSpace& space,
                         const MassAccount& account) {
@@ -144,8 +141,7 @@ void Leaves::evaluate(std::span<const Tile> tiles, double tolerance) {
   if (tiles.empty()) {
     return;
   }
-  const std::size_t finest = task_.space.bounds.front().levels().size() - 1;
-  UnsettledMass left = unsettled(tiles, finest, task_.space, account_);
+  UnsettledMass left = unsettled(tiles, task_.space.finest_level(), task_.space, account_);
   for (const Tile& tile : tiles) {
     if (probed(tile)) {
       remove(tile, left);

@@ -85,9 +85,6 @@ class Leaves {
   std::int64_t bins_ = 0;
 };
 
-/// Sorts before another by object, theta, y, x.
-bool stands_before(const Tile& a, const Tile& b);
-
 /// The bins of tiles of a level, by the tiles' bounds.
 UnsettledMass unsettled(std::span<const Tile> tiles, std::size_t level, const SearchSpace& space,
                         const MassAccount& account);

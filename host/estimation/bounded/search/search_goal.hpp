@@ -79,7 +79,7 @@ struct HypothesisMass {
   double rounding = 0.0;   ///< bound of that sum's error
   double dropped = 0.0;    ///< bound of the sum over all other bins
 
-  /// Of the sum over all bins.
+  /// Bounds of the log of the sum over all bins.
   LogInterval bounds() const {
     return {log_subtract(evaluated, rounding), log_add(log_add(evaluated, rounding), dropped)};
   }

@@ -13,7 +13,7 @@ namespace palpate {
 struct SearchMemory {
   double tables = 0.0;  ///< of the maps: penalties of windows, nodes
   double tiles = 0.0;   ///< the largest tiles: their sums, and their places in a search
-  double still = 0.0;   ///< of an array at rest: its sums, and how readings change them
+  double still = 0.0;   ///< of a still array: its sums, and how readings change them
   double thetas = 0.0;  ///< what every theta of the lattice has
   double leaves = 0.0;  ///< bins that are evaluated together
 

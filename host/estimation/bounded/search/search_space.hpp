@@ -25,6 +25,8 @@ struct SearchSpace {
 
   /// Host memory, in bytes.
   std::uint64_t bytes() const;
+  /// Index of the level of the smallest tiles.
+  std::size_t finest_level() const { return bounds.front().levels().size() - 1; }
 
   std::vector<double> log_weight;     ///< [hypothesis] log of its prior weight, over their sum
   std::vector<std::size_t> label_of;  ///< [hypothesis] index of its label

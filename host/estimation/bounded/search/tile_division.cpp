@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 #include <numeric>
+#include <tuple>
 
 #include "estimation/bounded/parallel_for.hpp"
 
@@ -12,6 +13,8 @@ namespace {
 
 /// Tiles of one theta that a task divides.
 constexpr std::size_t tiles_per_task = 64;
+/// More than any sum of a largest tile.
+constexpr std::int64_t every_sum = std::int64_t{std::numeric_limits<std::int32_t>::max()} + 1;
 
 std::vector<Tile> joined(const std::vector<std::vector<Tile>>& lists) {
   std::vector<Tile> all;
@@ -28,53 +31,90 @@ std::vector<Tile> joined(const std::vector<std::vector<Tile>>& lists) {
 
 }  // namespace
 
+bool larger_first(const Tile& a, const Tile& b) {
+  return a.bound != b.bound ? a.bound > b.bound : stands_before(a, b);
+}
+
+bool stands_before(const Tile& a, const Tile& b) {
+  return std::tie(a.object, a.theta, a.y, a.x) < std::tie(b.object, b.theta, b.y, b.x);
+}
+
+void keep_best(std::vector<Tile>& tiles, std::size_t count) {
+  if (tiles.size() > count) {
+    std::nth_element(tiles.begin(), tiles.begin() + static_cast<std::ptrdiff_t>(count), tiles.end(),
+                     larger_first);
+    tiles.resize(count);
+  }
+}
+
+bool is_part(const Tile& part, const Tile& of) {
+  return part.object == of.object && part.theta == of.theta && part.x / batch_side == of.x &&
+         part.y / batch_side == of.y;
+}
+
 TileDivision::TileDivision(const SearchTask& task, const LargestTiles& largest)
-    : space_(task.space),
+    : task_(task),
+      space_(task.space),
       largest_(largest),
-      elements_(task.elements),
-      counted_(task.goal.counted),
       thetas_(space_.turns.size()),
-      reaches_(reaches_of(elements_, space_.turns)),
+      reaches_(reaches_of(task.elements, space_.turns)),
       seen_(space_.bounds.size() * thetas_) {
   parallel_for(seen_.size(), [&](std::size_t row) {
     const std::size_t object = row / thetas_;
     seen_[row] = seen_tiles(reaches_[row % thetas_], space_.maps[object],
                             space_.bounds[object].levels().front());
   });
+  const ContactModel& contact = task.options.contact;
+  const MapSample prior{log_odds_from_probability(*contact.prior)};
   for (std::size_t i = 0; i < space_.bounds.size(); ++i) {
     std::vector<double>& of_level = unpenalised_.emplace_back();
     for (std::size_t level = 0; level < space_.bounds[i].levels().size(); ++level) {
-      of_level.push_back(space_.log_weight[i] + space_.bounds[i].best(level, elements_));
+      of_level.push_back(space_.log_weight[i] + space_.bounds[i].best(level, task.elements));
+    }
+    double& sum = prior_log_likelihoods_.emplace_back();
+    for (const ReadingRun& run : task.elements.runs) {
+      sum +=
+          static_cast<double>(run.end - run.begin) * contact.log_likelihood(run.reading, prior, i);
     }
   }
 }
 
 template <typename Visit>
-void TileDivision::for_largest(std::size_t row, const Visit& visit) const {
-  const std::size_t object = row / thetas_;
-  const std::size_t theta = row % thetas_;
+void TileDivision::for_largest(std::size_t row, const std::int64_t& end_sum,
+                               const Visit& visit) const {
+  const auto object = static_cast<std::int32_t>(row / thetas_);
+  const auto theta = static_cast<std::int32_t>(row % thetas_);
   const TileLevel& level = space_.bounds[object].levels().front();
   const TileRange& seen = seen_[row];
-  const std::int32_t* sums = largest_.sums(object, theta);
-  for (int y = seen.y_first; y < seen.y_end; ++y) {
-    const std::int64_t rows = level.y.bins(y);
-    const std::int32_t* of_y =
-        sums + std::ptrdiff_t{y / batch_side} * level.batches_x() * batch_tiles + y % batch_side;
-    for (int x = seen.x_first; x < seen.x_end; ++x) {
-      const std::int64_t bins = rows * level.x.bins(x);
-      if (bins > 0 && may_count(level, {.object = static_cast<std::int32_t>(object),
-                                        .theta = static_cast<std::int32_t>(theta),
-                                        .x = x,
-                                        .y = y})) {
-        visit(of_y[std::ptrdiff_t{batch_side} * x], x, y, bins);
+  const std::ptrdiff_t stride = std::ptrdiff_t{level.batches_x()} * batch_tiles;
+  for (int y = seen.y_first; y < seen.y_end;) {
+    // The sums of a batch's rows stand together, [x, y]. Most hold none that is small enough.
+    const std::int32_t* sums = largest_.sums(object, theta) + y / batch_side * stride;
+    std::int32_t least = std::numeric_limits<std::int32_t>::max();
+    for (int i = batch_side * seen.x_first; i < batch_side * seen.x_end; ++i) {
+      least = std::min(least, sums[i]);
+    }
+    const int y_end = std::min(seen.y_end, (y / batch_side + 1) * batch_side);
+    for (; least < end_sum && y < y_end; ++y) {
+      const std::int64_t rows = level.y.bins(y);
+      for (int x = seen.x_first; x < seen.x_end; ++x) {
+        const std::int32_t sum = sums[batch_side * x + y % batch_side];
+        const std::int64_t bins = rows * level.x.bins(x);
+        if (sum < end_sum && bins > 0 && may_count(level, {0.0, object, theta, x, y})) {
+          visit(sum, x, y, bins);
+        }
       }
     }
+    y = y_end;
   }
 }
 
-double TileDivision::bound_of(std::size_t object, std::int32_t sum) const {
-  return unpenalised_[object][0] -
-         static_cast<double>(largest_.unseen(object) + sum) / penalties_per_nat;
+double TileDivision::bound_of(std::size_t object, std::size_t level, std::int64_t penalties) const {
+  return unpenalised_[object][level] - static_cast<double>(penalties) / penalties_per_nat;
+}
+
+double TileDivision::bound_of_largest(std::size_t object, std::int32_t sum) const {
+  return bound_of(object, 0, largest_.unseen(object) + sum);
 }
 
 std::vector<Tile> TileDivision::best_of_largest() {
@@ -82,23 +122,20 @@ std::vector<Tile> TileDivision::best_of_largest() {
   std::vector<Tile> best(seen_.size(), {.bound = nothing});
   std::vector<std::int64_t> counts(seen_.size());
   parallel_for(best.size(), [&](std::size_t row) {
-    std::int32_t least = std::numeric_limits<std::int32_t>::max();  // more than any sum
+    std::int64_t least = every_sum;
     Tile at{.object = static_cast<std::int32_t>(row / thetas_),
             .theta = static_cast<std::int32_t>(row % thetas_)};
-    std::int64_t count = 0;
-    for_largest(row, [&](std::int32_t sum, int x, int y, std::int64_t /*bins*/) {
-      ++count;
-      if (sum < least) {
-        least = sum;
-        at.x = x;
-        at.y = y;
-      }
-    });
-    counts[row] = count;
-    if (count > 0) {
-      at.bound = bound_of(row / thetas_, least);
+    for_largest(row, least, [&](std::int32_t sum, int x, int y, std::int64_t /*bins*/) {
+      least = sum;
+      at.x = x;
+      at.y = y;
+      at.bound = bound_of_largest(row / thetas_, sum);
       best[row] = at;
-    }
+    });
+    const TileLevel& level = space_.bounds[row / thetas_].levels().front();
+    const TileRange& seen = seen_[row];
+    counts[row] = level.x.tiles_with_bins(seen.x_first, seen.x_end) *
+                  level.y.tiles_with_bins(seen.y_first, seen.y_end);
   });
   bounded_ += std::accumulate(counts.begin(), counts.end(), std::int64_t{0});
   std::erase_if(best, [](const Tile& tile) { return tile.bound == nothing; });
@@ -108,9 +145,9 @@ std::vector<Tile> TileDivision::best_of_largest() {
 void TileDivision::count_largest(UnsettledMass& unsettled) const {
   parallel_for(space_.bounds.size(), [&](std::size_t object) {
     for (std::size_t theta = 0; theta < thetas_; ++theta) {
-      for_largest(object * thetas_ + theta,
+      for_largest(object * thetas_ + theta, every_sum,
                   [&](std::int32_t sum, int /*x*/, int /*y*/, std::int64_t bins) {
-                    unsettled.add(object, bound_of(object, sum), bins);
+                    unsettled.add(object, bound_of_largest(object, sum), bins);
                   });
     }
   });
@@ -122,7 +159,7 @@ std::int64_t TileDivision::least_sum(const UnsettledMass& unsettled, std::size_t
   std::int64_t high = std::int64_t{std::numeric_limits<std::int32_t>::max()} + 1;
   while (low < high) {
     const std::int64_t middle = low + (high - low) / 2;
-    if (unsettled.slot(bound_of(object, static_cast<std::int32_t>(middle))) < slot) {
+    if (unsettled.slot(bound_of_largest(object, static_cast<std::int32_t>(middle))) < slot) {
       low = middle + 1;
     } else {
       high = middle;
@@ -137,17 +174,46 @@ std::vector<Tile> TileDivision::take_largest(std::span<const std::size_t> end,
   parallel_for(taken.size(), [&](std::size_t object) {
     const std::int64_t end_sum = least_sum(unsettled, object, end[object]);
     for (std::size_t theta = 0; theta < thetas_; ++theta) {
-      for_largest(object * thetas_ + theta, [&](std::int32_t sum, int x, int y, std::int64_t bins) {
-        if (sum < end_sum) {
-          const double bound = bound_of(object, sum);
-          unsettled.remove(object, bound, bins);
-          taken[object].push_back(
-              {bound, static_cast<std::int32_t>(object), static_cast<std::int32_t>(theta), x, y});
-        }
-      });
+      for_largest(object * thetas_ + theta, end_sum,
+                  [&](std::int32_t sum, int x, int y, std::int64_t bins) {
+                    const double bound = bound_of_largest(object, sum);
+                    unsettled.remove(object, bound, bins);
+                    taken[object].push_back({bound, static_cast<std::int32_t>(object),
+                                             static_cast<std::int32_t>(theta), x, y});
+                  });
     }
   });
   return joined(taken);
+}
+
+std::vector<Tile> TileDivision::largest_above(double bound) const {
+  std::vector<std::vector<Tile>> above(seen_.size());
+  parallel_for(above.size(), [&](std::size_t row) {
+    const std::size_t object = row / thetas_;
+    const double end = (unpenalised_[object][0] - bound) * penalties_per_nat -
+                       static_cast<double>(largest_.unseen(object));
+    const auto end_sum = static_cast<std::int64_t>(
+        std::clamp<double>(end, std::numeric_limits<std::int32_t>::min(), every_sum));
+    for_largest(row, end_sum, [&](std::int32_t sum, int x, int y, std::int64_t /*bins*/) {
+      above[row].push_back({bound_of_largest(object, sum), static_cast<std::int32_t>(object),
+                            static_cast<std::int32_t>(row % thetas_), x, y});
+    });
+  });
+  return joined(above);
+}
+
+std::vector<Tile> TileDivision::best_smallest(std::vector<Tile> tiles, std::size_t level,
+                                              std::size_t width) {
+  constexpr std::size_t returned = 16;
+  for (; level < space_.finest_level(); ++level) {
+    task_.deadline.cancel_point();
+    keep_best(tiles, width);
+    std::ranges::sort(tiles, stands_before);
+    tiles = parts_of(tiles, level);
+    width = beam_tiles;
+  }
+  keep_best(tiles, returned);
+  return tiles;
 }
 
 std::vector<Tile> TileDivision::parts_of(std::span<const Tile> tiles, std::size_t level,
@@ -168,13 +234,13 @@ std::vector<Tile> TileDivision::parts_of(std::span<const Tile> tiles, std::size_
     const TileBounds& bounds = space_.bounds[first.object];
     const TileRange seen =
         seen_tiles(reaches_[first.theta], space_.maps[first.object], bounds.levels()[level + 1]);
-    bounds.place(level + 1, space_.turns[first.theta], elements_, placed);
+    bounds.place(level + 1, space_.turns[first.theta], task_.elements, placed);
     parts[task].reserve((end - begins[task]) * batch_tiles);
     for (std::size_t i = begins[task]; i < end; ++i) {
       std::uint32_t sums[batch_tiles] = {};
       const int x = tiles[i].x * batch_side;
       const int y = tiles[i].y * batch_side;
-      bounds.add(level + 1, elements_, placed, x, y, sums);
+      bounds.add(level + 1, task_.elements, placed, x, y, sums);
       append_batch(first, level + 1, x, y, sums, parts[task]);
     }
     const auto begin_unseen = std::stable_partition(
@@ -200,8 +266,8 @@ void TileDivision::append_batch(const Tile& of, std::size_t level, int first_x, 
       continue;
     }
     for (int i = 0; i < batch_side; ++i) {
-      const Tile tile{unpenalised_[of.object][level] - sums[batch_side * i + j] / penalties_per_nat,
-                      of.object, of.theta, first_x + i, first_y + j};
+      const Tile tile{bound_of(of.object, level, sums[batch_side * i + j]), of.object, of.theta,
+                      first_x + i, first_y + j};
       if (tiling.x.bins(tile.x) > 0 && may_count(tiling, tile)) {
         tiles.push_back(tile);
       }

@@ -168,9 +168,9 @@ TileBounds::TileBounds(const OccupancyGrid& map, const ContactModel& contact, st
 
 void TileBounds::place(std::size_t level, const glm::dvec2& turn, const KnownElements& elements,
                        WindowPlaces& placed) const {
-  place_elements(elements,
-                 {.turn = turn, .corner_mm = corner_mm_, .square_mm = levels_[level].square_mm},
-                 tables_[level].front(), placed);
+  place_windows(elements,
+                {.turn = turn, .corner_mm = corner_mm_, .square_mm = levels_[level].square_mm},
+                tables_[level].front(), placed);
 }
 
 void TileBounds::add(std::size_t level, const KnownElements& elements, const WindowPlaces& placed,

@@ -61,6 +61,14 @@ struct TileAxis {
 
   int tiles() const { return static_cast<int>(first_bin.size()) - 1; }
   int bins(int tile) const { return first_bin[tile + 1] - first_bin[tile]; }
+  /// Number of tiles in [first, end) that hold bins.
+  std::int64_t tiles_with_bins(int first, int end) const {
+    std::int64_t count = 0;
+    for (int tile = first; tile < end; ++tile) {
+      count += bins(tile) > 0 ? 1 : 0;
+    }
+    return count;
+  }
 };
 
 /// One level of tiles over one object's poses, the same for every theta.

@@ -198,8 +198,8 @@ constexpr int least_strip = 4;
 
 }  // namespace
 
-void place_elements(const KnownElements& elements, const TilePlace& place, const WindowTable& shape,
-                    WindowPlaces& placed) {
+void place_windows(const KnownElements& elements, const TilePlace& place, const WindowTable& shape,
+                   WindowPlaces& placed) {
   const std::size_t count = elements.from_pivot_mm.size();
   for (std::vector<std::int32_t>* list : {&placed.plane, &placed.column, &placed.row}) {
     list->resize(count + slack);

@@ -25,8 +25,8 @@ struct TilePlace {
 };
 
 /// Rotates the elements and finds their places in tables of this shape.
-void place_elements(const KnownElements& elements, const TilePlace& place, const WindowTable& shape,
-                    WindowPlaces& placed);
+void place_windows(const KnownElements& elements, const TilePlace& place, const WindowTable& shape,
+                   WindowPlaces& placed);
 
 /// Sums of penalties do not grow beyond: so large a sum says all that there is to say.
 inline constexpr std::uint32_t largest_sum = std::uint32_t{1} << 30;

@@ -1,0 +1,184 @@
+#include "streaming/frame_line.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "model/number_text.hpp"
+#include "model/printable.hpp"
+
+namespace palpate {
+
+namespace {
+
+using Kind = PoseLines::Problem::Kind;
+
+constexpr std::size_t reading = PoseLines::names.size();
+constexpr std::size_t left_out = reading + 1;
+constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+
+/// Adds the numbers of a list, or of lists in it; false where it holds anything else.
+bool add_readings(const nlohmann::json& list, std::vector<double>& values, bool nested = false) {
+  return std::ranges::all_of(list, [&](const nlohmann::json& item) {
+    if (item.is_array() && !nested) {
+      return add_readings(item, values, true);
+    }
+    if (item.is_number() || item.is_null()) {
+      values.push_back(item.is_null() ? unknown : item.get<double>());
+    }
+    return item.is_number() || item.is_null();
+  });
+}
+
+std::vector<std::string_view> cells_of(std::string_view line) {
+  constexpr std::string_view separators = "\t;, ";
+  const auto used = std::ranges::find_if(
+      separators, [&](char separator) { return line.find(separator) != line.npos; });
+  const char separator = used == separators.end() ? ',' : *used;
+  std::vector<std::string_view> cells = split_text(line, separator);
+  std::ranges::transform(cells, cells.begin(), trimmed);
+  if (separator == ' ') {
+    std::erase(cells, "");
+  }
+  return cells;
+}
+
+/// The reading in a cell, NaN where it is Unknown; none where the cell holds no number.
+std::optional<double> reading_in(std::string_view cell) {
+  return cell.empty() ? unknown : detail::all_of<double>(cell);
+}
+
+}  // namespace
+
+std::variant<Frame, FrameLines::Problem, FrameLines::Header> FrameLines::read(std::string_view line,
+                                                                              double now_s) {
+  constexpr std::string_view byte_order_mark = "\xef\xbb\xbf";
+  if (line.starts_with(byte_order_mark)) {
+    line.remove_prefix(byte_order_mark.size());
+  }
+  const std::string_view text = trimmed(line);
+  return text.starts_with('{') || text.starts_with('[') ? read_json(text, now_s)
+                                                        : read_csv(line, now_s);
+}
+
+std::variant<Frame, FrameLines::Problem, FrameLines::Header> FrameLines::read_json(
+    std::string_view line, double now_s) const {
+  const nlohmann::json json = nlohmann::json::parse(line, nullptr, false);
+  if (json.is_discarded()) {
+    return Problem{Kind::malformed, "is no whole JSON"};
+  }
+  const nlohmann::json* list = &json;
+  PoseLines::Numbers numbers;
+  if (json.is_object()) {
+    const auto found = json.find("pressure");
+    if (found == json.end() || !found->is_array()) {
+      return Problem{Kind::malformed, "has no list 'pressure'"};
+    }
+    list = &*found;
+    for (std::size_t k = 0; k < numbers.size(); ++k) {
+      const auto number = json.find(PoseLines::names[k]);
+      if (number == json.end() || number->is_null()) {
+        continue;
+      }
+      if (!number->is_number()) {
+        return Problem{Kind::no_number, fmt::format("'{}' is no number", PoseLines::names[k])};
+      }
+      numbers[k] = number->get<double>();
+    }
+  }
+  std::vector<double> values;
+  if (!add_readings(*list, values)) {
+    return Problem{Kind::no_number, "'pressure' holds something else than numbers and null"};
+  }
+  return frame_of(numbers, std::move(values), now_s);
+}
+
+std::variant<Frame, FrameLines::Problem, FrameLines::Header> FrameLines::read_header(
+    const std::vector<std::string_view>& cells) {
+  std::vector<std::size_t> columns;
+  for (const std::string_view name : cells) {
+    const auto found = std::ranges::find(PoseLines::names, name);
+    columns.push_back(name.empty() || name == "device_time" || name == "lost_before"
+                          ? left_out
+                          : static_cast<std::size_t>(found - PoseLines::names.begin()));
+  }
+  const auto readings = static_cast<std::size_t>(std::ranges::count(columns, reading));
+  if (readings != elements_) {
+    return Problem{Kind::malformed, fmt::format("names {} readings for an array of {} elements",
+                                                readings, elements_)};
+  }
+  columns_ = std::move(columns);
+  return Header{};
+}
+
+std::variant<Frame, FrameLines::Problem, FrameLines::Header> FrameLines::read_csv(
+    std::string_view line, double now_s) {
+  const std::vector<std::string_view> cells = cells_of(line);
+  if (columns_.empty()) {
+    if (!reading_in(cells.front())) {
+      return read_header(cells);
+    }
+    const std::size_t filled = cells.size() - (cells.back().empty() ? 1 : 0);
+    const std::size_t before = filled - std::min(filled, elements_);
+    if (filled < elements_ || (before > 1 && before != reading)) {
+      return Problem{Kind::malformed,
+                     fmt::format("has {} numbers for an array of {} elements", filled, elements_)};
+    }
+    for (std::size_t i = 0; i < cells.size(); ++i) {
+      columns_.push_back(i < before ? i : i < filled ? reading : left_out);
+    }
+  }
+  if (cells.size() != columns_.size()) {
+    return Problem{Kind::malformed,
+                   fmt::format("has {} cells, the first line {}", cells.size(), columns_.size())};
+  }
+  PoseLines::Numbers numbers;
+  std::vector<double> values;
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    const std::size_t column = columns_[i];
+    if (column == left_out) {
+      continue;
+    }
+    const std::optional<double> number = reading_in(cells[i]);
+    if (!number || (column == 0 && !std::isfinite(*number))) {
+      // A message stays one short line whatever the cell holds.
+      const bool shown = cells[i].size() <= 60 && is_printable(cells[i]);
+      return Problem{Kind::no_number, fmt::format("column {}{} is no {}", i + 1,
+                                                  shown ? fmt::format(" = '{}'", cells[i]) : "",
+                                                  column == 0 ? "time" : "number")};
+    }
+    if (column == reading) {
+      values.push_back(*number);
+    } else if (!std::isnan(*number)) {
+      numbers[column] = *number;
+    }
+  }
+  return frame_of(numbers, std::move(values), now_s);
+}
+
+std::variant<Frame, FrameLines::Problem, FrameLines::Header> FrameLines::frame_of(
+    PoseLines::Numbers numbers, std::vector<double> values, double now_s) const {
+  if (values.size() != elements_) {
+    return Problem{Kind::malformed, fmt::format("has {} readings for an array of {} elements",
+                                                values.size(), elements_)};
+  }
+  const auto [time_s, x_mm, y_mm, theta_rad] = numbers;
+  Frame frame{.host_time_s = time_s.value_or(now_s), .values = std::move(values)};
+  if (x_mm || y_mm || theta_rad) {
+    numbers[0] = frame.host_time_s;
+    const auto pose = PoseLines::pose_of(numbers);
+    if (const auto* problem = std::get_if<Problem>(&pose)) {
+      return *problem;
+    }
+    frame.T_robot_sensor = std::get<PoseLines::TimedPose>(pose).T_robot_sensor;
+  }
+  return frame;
+}
+
+}  // namespace palpate

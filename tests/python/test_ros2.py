@@ -1,0 +1,331 @@
+"""The example node's work without ROS: touches are found and recognised, messages say what was found."""
+
+import ast
+import importlib
+import math
+import pathlib
+import sys
+from types import SimpleNamespace
+from typing import Any
+from unittest.mock import MagicMock
+
+import numpy
+import pytest
+from rosbags.typesys import Stores, get_typestore
+
+import palpate
+from palpate import read_bag
+from palpate.bag import readings
+
+from ros_bag import START_S, Bag, about_z, pointing_down
+
+ROOT = pathlib.Path(__file__).parents[2] / "examples" / "ros2"
+sys.path.insert(0, str(ROOT))
+conversion = importlib.import_module("palpate_ros2.conversion")
+session = importlib.import_module("palpate_ros2.session")
+
+TYPES = get_typestore(Stores.ROS2_HUMBLE)
+#: Where the touched object was moved to, from where it was learned, in the robot's frame.
+MOVED = (300.0, -200.0, 2.0)
+
+
+def new(name: str) -> Any:
+    """An empty message, as ROS makes them."""
+
+    def empty(kind: int, what: Any) -> Any:
+        if kind == 1:
+            return {"string": "", "bool": False}.get(what[0], 0)
+        if kind == 2:
+            return new(what)
+        return numpy.zeros(what[1] if kind == 3 else 0) if what[0][0] == 1 else []
+
+    fields = TYPES.fielddefs[name][1]
+    return TYPES.types[name](**{field: empty(*kind) for field, kind in fields})
+
+
+def sent(message: Any) -> Any:
+    """The message as a subscriber gets it; fails where a field's type or size is wrong."""
+    name = message.__msgtype__
+    if name == "nav_msgs/msg/OccupancyGrid":
+        message.data = numpy.array(message.data, dtype=numpy.int8)
+    return TYPES.deserialize_cdr(TYPES.serialize_cdr(message, name), name)
+
+
+@pytest.fixture(scope="module")
+def records(device: palpate.Device) -> dict[str, tuple[palpate.OccupancyGrid, palpate.Record]]:
+    """What is recognised of an E, an I and an O that lie at MOVED."""
+    grids = []
+    for letter in "EIO":
+        builder = palpate.MapBuilder(device)
+        builder.add(palpate.simulate(letter))
+        grids.append(builder.build(letter))
+        grids[-1].symmetry = {"E": 1, "I": 2, "O": 0}[letter]
+    found = {}
+    for grid in grids:
+        touched = palpate.simulate(
+            grid.label, palpate.random_poses(8, seed=4), T_object_robot=palpate.inverse(MOVED), seed=5
+        )
+        [record] = palpate.recognize(touched, grids, device=device)
+        assert record.best == grid.label
+        found[grid.label] = grid, record
+    return found
+
+
+@pytest.mark.parametrize("letter", "EIO")
+def test_the_pose_is_that_of_the_record(records: Any, letter: str) -> None:
+    _, record = records[letter]
+    message = sent(conversion.pose_message(new, record, "base", START_S + 0.25, 0.05))
+    assert message.header.frame_id == "base"
+    assert (message.header.stamp.sec, message.header.stamp.nanosec) == (int(START_S), 250_000_000)
+    pose, expected = message.pose.pose, record.refined.T_robot_object
+    assert (pose.position.x, pose.position.y, pose.position.z) == pytest.approx((*expected[:2] / 1000, 0.05))
+    q = pose.orientation
+    assert (q.x, q.y, 2 * math.atan2(q.z, q.w)) == pytest.approx((0, 0, expected[2]), abs=1e-9)
+    covariance = message.pose.covariance.reshape(6, 6)
+    assert numpy.allclose(covariance, covariance.T, rtol=1e-9)
+    assert not covariance[2:5].any(), "z, roll and pitch"
+    sd = numpy.sqrt(covariance.diagonal()[[0, 1, 5]]) * (1000, 1000, 1)
+    assert sd == pytest.approx(record.refined.sd, rel=1e-6)
+
+
+def test_the_covariance_is_carried_over_to_the_object_in_the_robots_frame(records: Any) -> None:
+    # Draws of T_object_robot, inverted and turned as the record's pose is; 1 % of 200,000 draws.
+    _, record = records["I"]
+    refined = record.refined
+    mean = numpy.array([refined.x_mm, refined.y_mm, refined.theta_rad])
+    turned = palpate.compose(mean, refined.T_robot_object)
+    draws = numpy.random.default_rng(1).multivariate_normal(mean, 1e-4 * numpy.array(refined.covariance), 200_000)
+    c, s = numpy.cos(draws[:, 2]), numpy.sin(draws[:, 2])
+    x, y = turned[0] - draws[:, 0], turned[1] - draws[:, 1]
+    found = numpy.cov(numpy.array([c * x + s * y, c * y - s * x, -draws[:, 2]])) * 1e4
+    expected = session.covariance_of(record)
+    scale = numpy.sqrt(numpy.outer(expected.diagonal(), expected.diagonal()))
+    assert numpy.abs((found - expected) / scale).max() < 0.01
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_the_map_lies_where_the_object_lies(records: Any, mirrored: bool) -> None:
+    _, record = records["E"]
+    # Two rows of three cells, 2 mm wide, the first centred at (10, 20) mm: one occupied, one empty.
+    log_odds = numpy.full((2, 3), math.log(0.2 / 0.8))
+    log_odds[0, 2], log_odds[1, 0] = math.log(9), -math.log(9)
+    grid = palpate.OccupancyGrid("E", log_odds, cell_mm=2, origin_mm=(10, 20), prior=0.2)
+    record = palpate.Record({**record, "mode": {**record.mode, "mirrored": mirrored}})
+    message = sent(conversion.map_message(new, grid, record, "base", START_S, 0.05))
+    info = message.info
+    assert (message.header.frame_id, info.width, info.height) == ("base", 3, 2)
+    assert info.resolution == pytest.approx(0.002)
+    assert message.data.tolist() == ([90, -1, -1, -1, -1, 10] if mirrored else [-1, -1, 90, 10, -1, -1])
+    # The middle of the occupied cell, seen from the grid's origin as subscribers see it.
+    theta = 2 * math.atan2(info.origin.orientation.z, info.origin.orientation.w)
+    corner = (info.origin.position.x, info.origin.position.y, theta)
+    at = palpate.transform(corner, [(0.001 if mirrored else 0.005, 0.001)])[0]
+    middle = (-14, 20) if mirrored else (14, 20)
+    assert at == pytest.approx(palpate.transform(record.refined.T_robot_object, [middle])[0] / 1000)
+    assert info.origin.position.z == 0.05
+
+
+def test_the_map_of_an_object_covers_it(records: Any) -> None:
+    grid, record = records["E"]
+    message = sent(conversion.map_message(new, grid, record, "base", START_S, 0.0))
+    cells = message.data.reshape(message.info.height, message.info.width)
+    assert cells.shape == grid.log_odds.shape
+    assert cells.min() >= -1 and cells.max() <= 100
+    assert numpy.array_equal(cells > 50, grid.log_odds > math.log(50.5 / 49.5))
+
+
+def test_markers_show_array_uncertainty_and_label(records: Any) -> None:
+    _, record = records["E"]
+    elements_mm = palpate.grid_array(3, 2, 2.0)
+    message = conversion.marker_messages(new, record, elements_mm, (10.0, 20.0, math.pi / 2), "base", START_S, 0.05)
+    outline, ellipse, label = sent(message).markers
+    assert [marker.id for marker in (outline, ellipse, label)] == [0, 1, 2]
+    assert {marker.header.frame_id for marker in (outline, ellipse, label)} == {"base"}
+    # The array is 4 x 2 mm between its outer centres, turned by a right angle.
+    corners = [(point.x, point.y) for point in outline.points]
+    expected = [(0.011, 0.018), (0.011, 0.022), (0.009, 0.022), (0.009, 0.018), (0.011, 0.018)]
+    numpy.testing.assert_allclose(corners, expected, atol=1e-9)
+    covariance = session.covariance_of(record)[:2, :2]
+    theta = 2 * math.atan2(ellipse.pose.orientation.z, ellipse.pose.orientation.w)
+    axis = numpy.array([math.cos(theta), math.sin(theta)])
+    # Half the long axis is 2.448 deviations in its direction, which is the direction of the largest.
+    assert (ellipse.scale.x / 2 * 1000 / 2.4477) ** 2 == pytest.approx(axis @ covariance @ axis, rel=1e-3)
+    assert axis @ covariance @ axis == pytest.approx(numpy.linalg.eigvalsh(covariance)[-1], rel=1e-6)
+    assert ellipse.scale.y <= ellipse.scale.x
+    assert ellipse.pose.position.x == pytest.approx(record.refined.T_robot_object[0] / 1000)
+    assert label.text.startswith("E ") and "fits" in label.text
+
+
+def test_planar_poses_are_those_of_a_bag(tmp_path: pathlib.Path) -> None:
+    bag = Bag(tmp_path, "mcap")
+    poses = []
+    for k, theta in enumerate((0.4, -2.5, 1.0, 1.0)):
+        arm = bag.pose("Transform", 0.6, 0.01 * k, 0.3, pointing_down(theta))
+        at = START_S + 0.05 * k
+        edge = bag.of("geometry_msgs/msg/TransformStamped", bag.header(at, "base"), "array", arm)
+        bag.write("/tf", bag.of("tf2_msgs/msg/TFMessage", [edge]), at)
+        if k == 3:
+            break  # the transform after the last frame
+        poses.append(session.planar_pose(arm)[0])
+        layout = bag.of("std_msgs/msg/MultiArrayLayout", [], 0)
+        values = numpy.array([9.5, 0, 0, 1], dtype=numpy.float32)
+        bag.write("/p", bag.of("std_msgs/msg/Float32MultiArray", layout, values), at)
+    with pytest.warns(UserWarning):
+        recording = read_bag(bag.close(), pressure_topic="/p", tf=("base", "array"), array=(2, 2, 2))
+    # Times since 1970 resolve 0.2 us, in which this arm moves 5e-5 mm.
+    numpy.testing.assert_allclose(recording.T_robot_sensor, poses, atol=1e-3)
+    assert session.planar_pose(bag.pose("Transform", 0, 0, 0.3, about_z(3.0))) == (
+        pytest.approx((0, 0, 3.0)), 0.3,
+    )  # fmt: skip
+
+
+def test_a_session_recognises_a_stream(device: palpate.Device) -> None:
+    grids = []
+    for letter in "AE":
+        builder = palpate.MapBuilder(device)
+        builder.add(palpate.simulate(letter))
+        grids.append(builder.build(letter))
+    with palpate.open_sensor("simulate:E,object=5:3:40,touches=4,seed=3,speed=max") as sensor:
+        frames = list(sensor)
+        elements_mm = sensor.elements_mm
+    valid = numpy.ones((2, 36), dtype=numpy.uint8)
+    valid[:, 7] = 0
+    array = palpate.Recording(numpy.zeros((2, 36)), [(0, 0, 0)] * 2, elements_mm, valid=valid)
+    stream = session.Session(array, grids, options={"device": device})
+    records = []
+    for frame in frames:
+        message = new("std_msgs/msg/Float32MultiArray")
+        message.data = numpy.array(frame.values, dtype=numpy.float32)
+        message.data[7] = 1e3 * len(records)  # of the dead element
+        touch = stream.add(frame.host_time_s, readings(message, message.__msgtype__))
+        if touch is not None:
+            middle = (touch.begin_s + touch.end_s) / 2
+            [pose] = [f.T_robot_sensor for f in frames if abs(f.host_time_s - middle) < 0.0051][:1]
+            records.append(stream.recognise(touch, pose))
+    assert [record.touches for record in records] == [1, 2, 3, 4]
+    assert records[-1].best == "E" and stream.map_of("E") is grids[1] and stream.map_of("(none)") is None
+    truth = palpate.inverse((5.0, 3.0, math.radians(40)))
+    assert records[-1].refined.T_robot_object[:2] == pytest.approx(truth[:2], abs=1.0)
+    stream.next_unknown()
+    assert stream.touches == 0
+    with pytest.raises(palpate.Error, match="3 readings for an array of 36 elements"):
+        stream.add(0.0, [1.0, 2.0, 3.0])
+    touched = session.Session(array, grids)
+    with pytest.raises(palpate.Error, match="touched while its baseline is taken"):
+        for k, frame in enumerate(frames[120:200]):
+            touched.add(0.01 * k, frame.values)
+    with pytest.raises(palpate.Error, match="has no list of numbers sensors.values"):
+        readings(new("std_msgs/msg/Float32MultiArray"), "tactile_msgs/msg/TactileState")
+
+
+class StandIns:
+    """What node.py takes from ROS, which is not there: a node that keeps what it publishes."""
+
+    def __init__(self, parameters: dict[str, Any], frames: list[palpate.Frame]) -> None:
+        self.published: dict[str, list[Any]] = {"~/pose": [], "~/map": [], "~/markers": []}
+        self.said: list[str] = []
+        self.asked: list[tuple[str, str]] = []
+        outer = self
+
+        class Node:
+            def __init__(self, name: str) -> None:
+                assert name == "recognise"
+
+            def declare_parameter(self, name: str, default: Any) -> Any:
+                return SimpleNamespace(value=parameters.get(name, default))
+
+            def create_publisher(self, kind: Any, topic: str, _: Any) -> Any:
+                return SimpleNamespace(publish=lambda message: outer.publish(kind, topic, message))
+
+            def create_subscription(self, *_: Any) -> None: ...
+
+            def create_service(self, *_: Any) -> None: ...
+
+            def get_clock(self) -> Any:
+                return SimpleNamespace(now=lambda: SimpleNamespace(nanoseconds=round(1e9 * outer.now_s)))
+
+            def get_logger(self) -> Any:
+                return SimpleNamespace(info=outer.said.append, warning=lambda text, **_: outer.said.append(text))
+
+        class Buffer:
+            def lookup_transform(self, target: str, source: str, at: Any, _: Any) -> Any:
+                outer.asked.append((target, source))
+                times = numpy.array([frame.host_time_s for frame in frames])
+                frame = frames[int(numpy.abs(times - 1e-9 * at.nanoseconds).argmin())]
+                x, y, theta = frame.T_robot_sensor
+                transform = new("geometry_msgs/msg/TransformStamped")
+                transform.transform.translation = TYPES.types["geometry_msgs/msg/Vector3"](x / 1000, y / 1000, 0.1)
+                transform.transform.rotation = TYPES.types["geometry_msgs/msg/Quaternion"](*about_z(theta))
+                return transform
+
+        def named(**values: Any) -> Any:
+            return SimpleNamespace(**values)
+
+        self.now_s = 0.0
+        anything: Any = MagicMock()
+        self.modules = {
+            "rclpy": anything, "rclpy.duration": anything, "rclpy.qos": anything, "std_srvs": anything,
+            "rclpy.executors": named(ExternalShutdownException=OSError, MultiThreadedExecutor=anything),
+            "rclpy.node": named(Node=Node), "rclpy.time": named(Time=named),
+            "rosidl_runtime_py": anything, "std_srvs.srv": anything,
+            "rosidl_runtime_py.utilities": named(get_message=lambda kind: lambda: new(kind)),
+            "tf2_ros": named(Buffer=Buffer, TransformException=KeyError, TransformListener=lambda *_: None),
+        }  # fmt: skip
+
+    def publish(self, kind: Any, topic: str, message: Any) -> None:
+        assert message.__msgtype__ == kind().__msgtype__
+        self.published[topic].append(message)
+
+
+def test_the_node_publishes_what_it_finds(
+    device: palpate.Device, tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for letter in "AE":
+        builder = palpate.MapBuilder(device)
+        builder.add(palpate.simulate(letter))
+        builder.build(letter).save(tmp_path / f"{letter}.map.h5")
+    palpate.simulate("A", palpate.random_poses(2, seed=1)).save(tmp_path / "A.h5")
+    with palpate.open_sensor("simulate:E,object=5:3:40,touches=4,seed=3,speed=max") as sensor:
+        frames = list(sensor)
+    parameters = {"maps": str(tmp_path), "recording": str(tmp_path / "A.h5"), "base_frame": "base"}
+    ros = StandIns(parameters, frames)
+    for name, module in ros.modules.items():
+        monkeypatch.setitem(sys.modules, name, module)
+    monkeypatch.delitem(sys.modules, "palpate_ros2.node", raising=False)
+    node = importlib.import_module("palpate_ros2.node").Recognise()
+    for frame in frames:
+        message = new("std_msgs/msg/Float32MultiArray")
+        message.data = numpy.array(frame.values, dtype=numpy.float32)
+        ros.now_s = frame.host_time_s
+        node.take(message)
+    assert ros.asked == [("base", "array")] * 4
+    assert [text for text in ros.said if text.startswith("touch 4: E with probability 1.000, fits")]
+    # Each message where something was found; the pose where it is sure.
+    assert len(ros.published["~/map"]) == len(ros.published["~/markers"]) >= len(ros.published["~/pose"]) >= 1
+    pose = sent(ros.published["~/pose"][-1])
+    truth = palpate.inverse((5.0, 3.0, math.radians(40)))
+    assert pose.header.frame_id == "base"
+    assert (pose.pose.pose.position.x, pose.pose.pose.position.y) == pytest.approx(truth[:2] / 1000, abs=1e-3)
+    assert pose.pose.pose.position.z == pytest.approx(0.1)
+    assert node.next_unknown(None, SimpleNamespace()).message == "forgot 4 touches"
+    message.data = message.data[:35]
+    node.take(message)
+    assert "35 readings for an array of 36 elements" in ros.said[-1]
+
+
+def test_the_launch_file_has_the_nodes_parameters() -> None:
+    node = ast.parse((ROOT / "palpate_ros2" / "node.py").read_text())
+    declared = {
+        call.args[0].value: call.args[1].value
+        for call in ast.walk(node)
+        if isinstance(call, ast.Call) and getattr(call.func, "id", "") in ("text", "number")
+    }
+    launch = ast.parse((ROOT / "launch" / "recognise.launch.py").read_text())
+    given = {
+        target.id: ast.literal_eval(step.value)
+        for step in launch.body
+        if isinstance(step, ast.Assign)
+        for target in step.targets
+    }
+    numbers = {name: float(value) for name, value in given["NUMBERS"].items()}
+    assert {**given["TEXTS"], **numbers} == declared
