@@ -15,6 +15,7 @@
 #include "cli/map_flags.hpp"
 #include "cli/options.hpp"
 #include "cli/progress.hpp"
+#include "cli/recognition_flags.hpp"
 #include "estimation/maps/left_out_fit.hpp"
 #include "figures/figures.hpp"
 #include "learning/observed_map.hpp"
@@ -242,6 +243,11 @@ void build_maps(const MapFlags& flags) {
   }
   prepare_outputs(flags, map_paths, names);
   warn_of_unknown_poses(recordings);
+  for (const Recording& recording : recordings) {
+    for (const SetupFinding& finding : recording.findings) {
+      tell_on_stderr(fmt::format("{}: {}", recording.path, finding.words));
+    }
+  }
 
   Device device = Device::open(flags.device);
   if (const auto suspicion = suspected_order(device, recordings, model)) {

@@ -2,11 +2,13 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <CLI/CLI.hpp>
 
 #include "cli/commands.hpp"
@@ -16,6 +18,7 @@
 #include "io/recording_state.hpp"
 #include "model/elements_that.hpp"
 #include "model/lost_count.hpp"
+#include "model/option_words.hpp"
 #include "model/stream_time.hpp"
 #include "palpate/baseline.hpp"
 #include "palpate/error.hpp"
@@ -146,6 +149,41 @@ bool append(const DetectedTouch& touch, bool unposed, Recording& recording) {
   return true;
 }
 
+/// Counts of a stream's presses, and why some make no touch.
+struct Presses {
+  std::size_t all = 0;
+  std::size_t without_pose = 0;
+  std::size_t unsteady = 0;
+};
+
+std::optional<SetupFinding> clock_of(std::span<const SetupFinding> findings) {
+  const auto clock = std::ranges::find(findings, "clock", &SetupFinding::what);
+  return clock == findings.end() ? std::nullopt : std::optional(*clock);
+}
+
+/// The finding "dropped", where a good part of the presses make no touch.
+std::optional<SetupFinding> dropped(const Presses& presses,
+                                    const std::optional<SetupFinding>& clock) {
+  const std::size_t lost = presses.without_pose + presses.unsteady;
+  if (10 * lost <= presses.all) {
+    return {};
+  }
+  std::vector<std::string> reasons;
+  if (presses.without_pose > 0) {
+    reasons.push_back(fmt::format("{} without a pose", presses.without_pose));
+  }
+  if (presses.unsteady > 0) {
+    reasons.push_back(
+        fmt::format("{} that move or are steady for less than `min-steady-s`", presses.unsteady));
+  }
+  return SetupFinding{
+      "dropped", 0.0,
+      fmt::format("{} of {} presses were left out: {}{}", lost, presses.all,
+                  fmt::join(reasons, ", "),
+                  clock ? fmt::format("; the clocks differ: import with `{}`", clock->option) : ""),
+      clock ? clock->option : ""};
+}
+
 /// Where every touch has the same elements dead, keeps one list for all touches: `dead`, which may
 /// be empty.
 void shorten_valid(Recording& recording, const std::vector<std::uint8_t>& dead) {
@@ -195,12 +233,16 @@ void find_touches(const TouchesArguments& options) {
   recording.truth = sensor.truth;
   recording.sensor = sensor.name;
   recording.serial = sensor.serial;
+  recording.findings = sensor.findings;
 
   std::uint64_t unknown = 0;
   std::uint64_t unreadable = 0;
-  std::size_t without_pose = 0;
+  Presses presses;
+  bool touching = false;
   const auto take = [&](const std::optional<DetectedTouch>& touch) {
-    without_pose += touch && !append(*touch, options.unposed, recording) ? 1 : 0;
+    const bool was_touching = std::exchange(touching, detector.touching());
+    presses.unsteady += was_touching && !touching && !touch ? 1 : 0;
+    presses.without_pose += touch && !append(*touch, options.unposed, recording) ? 1 : 0;
   };
   stream->start();
   while (!stream->ended()) {
@@ -212,19 +254,27 @@ void find_touches(const TouchesArguments& options) {
     }
   }
   take(detector.finish());
+  presses.all = recording.size() + presses.without_pose + presses.unsteady;
+  const std::optional<SetupFinding> clock = clock_of(sensor.findings);
+  if (const auto finding = dropped(presses, clock)) {
+    recording.findings.push_back(*finding);
+  }
   const bool tared = options.tare_s.value_or(sensor.baseline.empty() ? usual_tare_s : 0.0) > 0.0;
   const std::string complaint = endless.complaint(
       sensor.pressure_unit, tared ? "raise --onset" : "give --tare, or raise --onset");
 
   if (recording.size() == 0) {
-    if (without_pose > 0) {
+    if (presses.without_pose > 0) {
       refuse(options.frames,
-             "none of its {} touches has a pose; record again with --poses, or keep them for "
-             "'palpate map --unposed' with --unposed",
-             without_pose);
+             "none of its {} touches has a pose; {}, or keep them for 'palpate map --unposed' with "
+             "--unposed",
+             presses.without_pose,
+             clock ? fmt::format("import again with --{}", clock->option)
+                   : "record again with --poses");
     }
-    if (!complaint.empty()) {
-      refuse(options.frames, "no touch in its {} frames: {}", stream->counters().frames, complaint);
+    if (!complaint.empty() || clock) {
+      refuse(options.frames, "no touch in its {} frames: {}", stream->counters().frames,
+             complaint.empty() ? in_flags(clock->words) : complaint);
     }
     refuse(options.frames, "no touch in its {} frames; lower --onset or --min-steady-s{}",
            stream->counters().frames,
@@ -234,8 +284,14 @@ void find_touches(const TouchesArguments& options) {
   write_recording(options.output, recording);
   fmt::print("{}: {} touches in {} frames of {}", options.output, recording.size(),
              stream->counters().frames, options.frames);
-  if (without_pose > 0) {
-    fmt::print(", {} without a pose left out", without_pose);
+  if (presses.without_pose > 0) {
+    fmt::print(", {} without a pose left out", presses.without_pose);
+  }
+  if (presses.unsteady > 0) {
+    fmt::print(", {} left out as not steady", presses.unsteady);
+  }
+  if (clock) {
+    fmt::print(", clocks differ (palpate import --{})", clock->option);
   }
   std::uint64_t lost = stream->counters().lost;
   count_lost(lost, unreadable);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <iterator>
 
+#include <nlohmann/json.hpp>
+
 #include "palpate/files.hpp"
 
 namespace palpate {
@@ -71,6 +73,16 @@ void write_head(Hdf5Writer& file, const Recording& head) {
     file.attribute("true_object", head.truth->object);
     file.attribute("true_T_object_robot",
                    {pose.translation_mm.x, pose.translation_mm.y, pose.theta_rad});
+  }
+  if (!head.findings.empty()) {
+    auto findings = nlohmann::ordered_json::array();
+    for (const SetupFinding& finding : head.findings) {
+      findings.push_back({{"what", finding.what},
+                          {"nats", finding.nats},
+                          {"words", finding.words},
+                          {"option", finding.option}});
+    }
+    file.attribute("findings", findings.dump());
   }
   if (!head.sensor.empty()) {
     file.attribute("sensor", head.sensor);

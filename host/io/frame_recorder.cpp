@@ -58,6 +58,7 @@ Recording head_of(const SensorDescription& sensor) {
   head.valid = sensor.valid;
   head.baseline = sensor.baseline;
   head.truth = sensor.truth;
+  head.findings = sensor.findings;
   // A board may send any bytes; readers refuse those that are not printable.
   head.sensor = printable(sensor.name);
   head.serial = printable(sensor.serial);

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cstdlib>
 #include <cstring>
+#include <functional>
 #include <limits>
+#include <numeric>
 #include <string_view>
 
 #include <fmt/format.h>
@@ -30,14 +32,16 @@ void* copy(void* to, const void* from, std::size_t size, H5FD_file_image_op_t, v
   return std::memcpy(to, from, size);
 }
 
-void* grow(void* memory, std::size_t size, H5FD_file_image_op_t, void* user) {
+void* grow(void* memory, std::size_t needed, H5FD_file_image_op_t, void* user) {
   auto& image = *static_cast<Hdf5Image*>(user);
+  if (memory != nullptr && needed <= image.capacity) {
+    return memory;
+  }
+  const std::size_t size = std::max(needed, image.expected);
   char* grown = static_cast<char*>(std::realloc(memory, size));
   if (grown != nullptr) {
-    if (size > image.capacity) {
-      // Zeros, so that the same content gives the same bytes.
-      std::memset(grown + image.capacity, 0, size - image.capacity);
-    }
+    // Zeros, so that the same content gives the same bytes.
+    std::memset(grown + image.capacity, 0, size - image.capacity);
     image.capacity = size;
   }
   return grown;
@@ -118,8 +122,10 @@ void set_appendable(hid_t access) {
   H5Pset_alignment(access, 1, page);
 }
 
-Hdf5Writer::Hdf5Writer(std::filesystem::path path, Layout layout)
-    : path_(std::move(path)), file_(file_in_memory(image_, layout)) {
+Hdf5Writer::Hdf5Writer(std::filesystem::path path, Layout layout, std::size_t expected_bytes)
+    : path_(std::move(path)),
+      image_{.expected = expected_bytes},
+      file_(file_in_memory(image_, layout)) {
   require(file_.valid(), "the file");
 }
 
@@ -155,14 +161,17 @@ void Hdf5Writer::dataset(const char* name, const Shape& shape,
   const Hdf5Handle dataset = create_dataset(name, shape, H5T_NATIVE_DOUBLE, storage);
   std::vector<hsize_t> first(shape.size(), 0);
   std::vector<hsize_t> extent(shape.begin(), shape.end());
-  extent[0] = 1;
-  const Hdf5Handle memory(H5Screate_simple(static_cast<int>(extent.size()), extent.data(), nullptr),
-                          H5Sclose);
   const Hdf5Handle space = extents(shape);
-  for (; first[0] < shape[0]; ++first[0]) {
+  const std::size_t step =
+      std::accumulate(shape.begin() + 1, shape.end(), std::size_t{1}, std::multiplies());
+  for (; first[0] < shape[0]; first[0] += extent[0]) {
     const std::vector<double> values = part(first[0]);
-    require(H5Sselect_hyperslab(space.get(), H5S_SELECT_SET, first.data(), nullptr, extent.data(),
-                                nullptr) >= 0 &&
+    extent[0] = values.size() / step;
+    const Hdf5Handle memory(
+        H5Screate_simple(static_cast<int>(extent.size()), extent.data(), nullptr), H5Sclose);
+    require(extent[0] > 0 &&
+                H5Sselect_hyperslab(space.get(), H5S_SELECT_SET, first.data(), nullptr,
+                                    extent.data(), nullptr) >= 0 &&
                 H5Dwrite(dataset.get(), H5T_NATIVE_DOUBLE, memory.get(), space.get(), H5P_DEFAULT,
                          values.data()) >= 0,
             name);
@@ -190,14 +199,14 @@ void Hdf5Writer::add_attribute(const char* name, hid_t type, hid_t space, const 
 
 void Hdf5Writer::add_dataset(const char* name, const Shape& shape, hid_t type, const void* values,
                              Storage storage) {
-  const hid_t stored = storage == Storage::narrow ? H5T_NATIVE_FLOAT : type;
-  const Hdf5Handle dataset = create_dataset(name, shape, stored, storage);
+  const Hdf5Handle dataset = create_dataset(name, shape, type, storage);
   require(H5Dwrite(dataset.get(), type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0, name);
 }
 
 Hdf5Handle Hdf5Writer::create_dataset(const char* name, const Shape& shape, hid_t type,
                                       Storage storage) {
   const Hdf5Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
+  type = storage == Storage::narrow ? H5T_NATIVE_FLOAT : type;
   bool ready = H5Pset_obj_track_times(creation.get(), false) >= 0;
   if (storage == Storage::compressed) {
     const std::vector<hsize_t> chunk = chunk_of(shape);

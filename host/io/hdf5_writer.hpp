@@ -30,6 +30,7 @@ struct Hdf5Image {
   };
   std::unique_ptr<char, Free> bytes;  ///< HDF5's own, once the file is closed
   std::size_t capacity = 0;           ///< in bytes; free space follows the file's end
+  std::size_t expected = 0;           ///< bytes that are taken at once: growth may copy them all
 };
 
 /// Builds an HDF5 file in memory and saves it in one piece, so that a failing disk is met by
@@ -46,7 +47,9 @@ class Hdf5Writer {
   enum class Layout { closed, appendable };
 
   /// @param path target of save(), which is not touched before
-  explicit Hdf5Writer(std::filesystem::path path, Layout layout = Layout::closed);
+  /// @param expected_bytes of the file, if known
+  explicit Hdf5Writer(std::filesystem::path path, Layout layout = Layout::closed,
+                      std::size_t expected_bytes = 0);
   Hdf5Writer(const Hdf5Writer&) = delete;
   Hdf5Writer& operator=(const Hdf5Writer&) = delete;
 
@@ -62,7 +65,8 @@ class Hdf5Writer {
                Storage storage = Storage::plain) {
     add_dataset(name, shape, native_type(Value{}), values.data(), storage);
   }
-  /// Writes a dataset in parts, each one step along the first axis, in order.
+  /// Writes a dataset in parts, in order: `part` returns one or more steps along the first axis,
+  /// from the one that it is given on.
   void dataset(const char* name, const Shape& shape,
                const std::function<std::vector<double>(std::size_t)>& part, Storage storage);
 

@@ -26,6 +26,7 @@ struct PoseTable {
   /// [n] in the place of T_robot_sensor, where the table has poses in space; none where the row's
   /// cells are empty.
   std::vector<std::optional<SpatialPose>> spatial;
+  std::vector<double> height_mm;  ///< [n] above the plane of the touches, of poses in space
   std::array<Unit, 3> units{length_units[0], length_units[0], angle_units[0]};  ///< of x, y, theta
   bool assumed_units = false;  ///< neither names nor options give them: mm and rad
 };

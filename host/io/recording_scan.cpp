@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <nlohmann/json.hpp>
 
 #include "io/available_memory.hpp"
 #include "io/file_format.hpp"
@@ -51,7 +52,7 @@ std::uint64_t whole_rows(Hdf5Contents& file) {
 const std::vector<std::string> attribute_names = {
     "format",      "version", "object",      "pressure_unit",
     "length_unit", "rows",    "true_object", "true_T_object_robot",
-    "sensor",      "serial"};
+    "sensor",      "serial",  "findings"};
 const std::vector<std::string> dataset_names = {"pressure",    "sensor_pose", "elements",
                                                 "valid",       "time",        "baseline",
                                                 "device_time", "lost_before"};
@@ -62,6 +63,22 @@ std::optional<Truth> read_truth(const Hdf5Contents& file) {
   }
   const std::vector<double> pose = file.numbers("true_T_object_robot", 3);
   return Truth{file.text("true_object"), {{pose[0], pose[1]}, pose[2]}};
+}
+
+std::vector<SetupFinding> read_findings(const Hdf5Contents& file) {
+  if (!file.has_attribute("findings")) {
+    return {};
+  }
+  std::vector<SetupFinding> findings;
+  const auto all = nlohmann::json::parse(file.text("findings"), nullptr, false);
+  try {
+    for (const nlohmann::json& one : all.get<nlohmann::json::array_t>()) {
+      findings.push_back({one.at("what"), one.at("nats"), one.at("words"), one.at("option")});
+    }
+  } catch (const nlohmann::json::exception&) {
+    file.refuse("attribute 'findings' is no JSON array of what, nats, words and option; delete it");
+  }
+  return findings;
 }
 
 class Scan {
@@ -96,6 +113,7 @@ class Scan {
       }
     }
     r.truth = read_truth(file_);
+    r.findings = read_findings(file_);
   }
 
   void read_extents() {

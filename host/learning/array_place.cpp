@@ -104,7 +104,7 @@ void check_offset(SetupJudge& judge, Setup& setup, double& nats, SetupCheck& che
   for (int a = 0; a < 3; ++a) {
     offset[a] += 2.0 * finest[a] * peak[a];
     sd[a] = 2.0 * finest[a] * std::sqrt(std::max(covariance[a][a], 1e-4));
-    excess = std::max(excess, std::abs(offset[a]) / std::max(sd[a], finest[a]));
+    excess = std::max(excess, std::abs(offset[a]) / std::max(sd[a], finest[a] / 2.0));
   }
   const double gain = std::max(judged(offset), top) - nats;
   constexpr double least_excess = 3.0;

@@ -152,18 +152,17 @@ void check_elements(SetupJudge& judge, Setup& setup, SetupCheck& check) {
     double surprise = 0.0;  ///< above what is expected, in nats
   };
   std::vector<Element> elements(setup.elements_mm.size());
-  judge.visit(setup, [&](const TriedTouch&, const Touch& touch, const OccupancyGrid& map) {
+  judge.visit(setup, [&](const TriedTouch& given, const Touch& touch, const OccupancyGrid& map) {
     const InterpolatedMap field(map, map.prior);
-    const std::vector<Reading> readings = judge.contact().classify(touch);
-    for (std::size_t e = 0; e < readings.size(); ++e) {
-      if (readings[e] == Reading::unknown) {
+    for (std::size_t e = 0; e < given.readings.size(); ++e) {
+      if (given.readings[e] == Reading::unknown) {
         continue;
       }
       const glm::dvec2 p = touch.T_robot_sensor * touch.elements_mm[e];
       const double yes = judge.log_likelihood(Reading::in_contact, field, p);
       const double no = judge.log_likelihood(Reading::no_contact, field, p);
       const double share = 1.0 / (1.0 + std::exp(no - yes));
-      const bool contact = is_contact(readings[e]);
+      const bool contact = is_contact(given.readings[e]);
       elements[e].contacts += contact ? 1 : 0;
       ++elements[e].known;
       elements[e].surprise += share * yes + (1.0 - share) * no - (contact ? yes : no);
@@ -243,6 +242,18 @@ Recording thinned(const Recording& recording, std::size_t most) {
   return few;
 }
 
+/// What the recordings' logs showed.
+std::vector<SetupFinding> findings_of_logs(std::span<const Recording> recordings) {
+  std::vector<SetupFinding> findings;
+  for (const Recording& recording : recordings) {
+    for (const SetupFinding& finding : recording.findings) {
+      findings.push_back(finding);
+      findings.back().words = fmt::format("{}: {}", recording.path, finding.words);
+    }
+  }
+  return findings;
+}
+
 }  // namespace
 
 std::optional<SetupFinding> suspected_order(Device& device, std::span<const Recording> recordings,
@@ -294,8 +305,21 @@ SetupCheck check_setup(Device& device, std::span<const Recording> recordings,
       progress(fraction);
     }
   };
-  SetupJudge judge(device, recordings, options);
   SetupCheck check{.elements_mm = recordings.front().elements_mm};
+  const std::vector<SetupFinding> logged = findings_of_logs(recordings);
+  std::optional<SetupJudge> some_judge;
+  try {
+    some_judge.emplace(device, recordings, options);
+  } catch (const Error& error) {
+    if (error.fault() != Fault::input || logged.empty()) {
+      throw;
+    }
+    // What is wrong with the logs may be why there are few touches.
+    check.findings = logged;
+    check.remarks.emplace_back(error.what());
+    return check;
+  }
+  SetupJudge& judge = *some_judge;
   Setup setup{.elements_mm = check.elements_mm};
   double nats = judge.nats(setup);
   check_units(judge, setup, nats, check.findings);
@@ -314,6 +338,7 @@ SetupCheck check_setup(Device& device, std::span<const Recording> recordings,
   show(0.9);
   check_elements(judge, setup, check);
   check_touches(judge, setup, check);
+  check.findings.insert(check.findings.end(), logged.begin(), logged.end());
   return check;
 }
 

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <list>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -29,8 +30,10 @@ SetupJudge::SetupJudge(Device& device, std::span<const Recording> recordings,
   for (const Recording& recording : recordings) {
     for (std::size_t i = 0; i < recording.size(); ++i) {
       const Touch touch = recording.touch(i);
-      if (TouchEvidence(touch, {.classifier = options.classifier}).in_contact()) {
-        touches_[recording.object].push_back({touch, recording.path, i});
+      TouchEvidence evidence(touch, {.classifier = options.classifier});
+      if (evidence.in_contact()) {
+        touches_[recording.object].push_back(
+            {touch, std::move(evidence.readings), recording.path, i});
       }
     }
   }
@@ -48,11 +51,11 @@ SetupJudge::SetupJudge(Device& device, std::span<const Recording> recordings,
 double SetupJudge::nats(const Setup& setup) {
   double sum = 0.0;
   try {
-    visit(setup, [&](const TriedTouch&, const Touch& touch, const OccupancyGrid& map) {
+    visit(setup, [&](const TriedTouch& given, const Touch& touch, const OccupancyGrid& map) {
       const InterpolatedMap field(map, map.prior);
-      const std::vector<Reading> readings = contact_.classify(touch);
-      for (std::size_t e = 0; e < readings.size(); ++e) {
-        sum += log_likelihood(readings[e], field, touch.T_robot_sensor * touch.elements_mm[e]);
+      for (std::size_t e = 0; e < given.readings.size(); ++e) {
+        sum +=
+            log_likelihood(given.readings[e], field, touch.T_robot_sensor * touch.elements_mm[e]);
       }
     });
   } catch (const Error& error) {

@@ -27,6 +27,7 @@ struct Setup {
 /// A touch in contact, and where it stands.
 struct TriedTouch {
   Touch touch;
+  std::vector<Reading> readings;  ///< [e] whatever the set-up is
   std::string recording;
   std::size_t index = 0;  ///< in the recording
 };

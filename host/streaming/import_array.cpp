@@ -155,24 +155,21 @@ PressureTable read_npy_pressures(const std::string& path, const ImportArray& arr
   return {.pressure = std::move(npy.values)};
 }
 
-void mark_unknown(const std::string& path, Recording& recording) {
-  const std::size_t e = recording.elements_mm.size();
-  std::vector<std::uint8_t> read(e, 0);
-  bool some_unknown = false;
-  for (std::size_t k = 0; k < recording.pressure.size(); ++k) {
-    read[k % e] |= std::isnan(recording.pressure[k]) ? 0 : 1;
+void mark_unknown(const std::string& path, const PressureSurvey& survey, Recording& recording) {
+  const std::size_t e = survey.elements();
+  std::vector<std::uint8_t> read = survey.read();
+  for (std::size_t i = 0; i < recording.valid.size(); ++i) {
+    read[i] &= recording.valid[i];
   }
-  for (std::size_t i = 0; i < e; ++i) {
-    read[i] = recording.valid.empty() ? read[i] : read[i] & recording.valid[i];
-  }
-  if (e == 0 || std::ranges::count(read, 0) == static_cast<std::ptrdiff_t>(e)) {
+  if (std::ranges::count(read, 0) == static_cast<std::ptrdiff_t>(e)) {
     refuse(path, "holds no reading of a living element; write the pressures");
-  }
-  for (std::size_t k = 0; k < recording.pressure.size(); ++k) {
-    some_unknown = some_unknown || (read[k % e] != 0 && std::isnan(recording.pressure[k]));
   }
   if (!recording.valid.empty() || std::ranges::count(read, 0) > 0) {
     recording.valid = read;
+  }
+  bool some_unknown = false;
+  for (std::size_t k = 0; k < recording.pressure.size(); ++k) {
+    some_unknown = some_unknown || (read[k % e] != 0 && std::isnan(recording.pressure[k]));
   }
   if (some_unknown && recording.rows == "touches") {
     recording.valid.resize(recording.pressure.size());

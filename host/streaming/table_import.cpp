@@ -3,14 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
 #include <utility>
 #include <vector>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "io/file_identity.hpp"
 #include "io/npy_file.hpp"
 #include "io/pose_table.hpp"
 #include "io/pressure_table.hpp"
@@ -18,6 +16,7 @@
 #include "io/table_columns.hpp"
 #include "model/number_text.hpp"
 #include "streaming/import_array.hpp"
+#include "streaming/pose_join.hpp"
 #include "streaming/touch_plane.hpp"
 
 namespace palpate {
@@ -79,115 +78,6 @@ TableOptions table_options(const ImportOptions& options) {
   return table;
 }
 
-/// ImportedRecording::whole_up_to
-std::optional<double> whole_numbers_as_kpa(const Recording& recording) {
-  constexpr double least = 100.0;  // thresholded pressures may be small whole numbers
-  double largest = 0.0;
-  for (const double p : recording.pressure) {
-    if (std::isnan(p)) {
-      continue;
-    }
-    if (p != std::floor(p)) {
-      return {};
-    }
-    largest = std::max(largest, p);
-  }
-  return recording.pressure_unit == "kPa" && largest >= least ? std::optional(largest)
-                                                              : std::nullopt;
-}
-
-/// Drops the poses that are unknown.
-void keep_known(PoseTable& poses) {
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < poses.time_s.size(); ++i) {
-    if (is_finite(poses.T_robot_sensor[i])) {
-      poses.time_s[kept] = poses.time_s[i];
-      poses.T_robot_sensor[kept++] = poses.T_robot_sensor[i];
-    }
-  }
-  poses.time_s.resize(kept);
-  poses.T_robot_sensor.resize(kept);
-}
-
-/// A gap that a regular log does not reach when its steps jitter or a single pose is lost.
-double usual_gap_s(const std::vector<double>& time_s) {
-  constexpr double steps = 2.5;
-  if (time_s.size() < 2) {
-    return PosedSensor::usual_gap_s;
-  }
-  std::vector<double> step_s(time_s.size());
-  std::adjacent_difference(time_s.begin(), time_s.end(), step_s.begin());
-  step_s.erase(step_s.begin());
-  const auto median = step_s.begin() + static_cast<std::ptrdiff_t>(step_s.size() / 2);
-  std::ranges::nth_element(step_s, median);
-  return std::max(PosedSensor::usual_gap_s, steps * *median);
-}
-
-/// Gives every frame the pose interpolated at its time.
-void join_by_time(const PoseTable& poses, ImportedRecording& imported) {
-  Recording& recording = imported.recording;
-  PoseTrack track(imported.largest_gap_s);
-  for (std::size_t i = 0; i < poses.time_s.size(); ++i) {
-    track.add(poses.time_s[i], poses.T_robot_sensor[i]);
-  }
-  track.end();
-  recording.T_robot_sensor.reserve(recording.time_s.size());
-  for (const double time_s : recording.time_s) {
-    const std::optional<Pose> pose = track.at(time_s);
-    recording.T_robot_sensor.push_back(pose.value_or(unknown_pose));
-    imported.in_gaps +=
-        !pose && time_s > poses.time_s.front() && time_s < poses.time_s.back() ? 1 : 0;
-  }
-}
-
-/// True where `poses` is the table of the pressures, under this or another path.
-bool in_one_file(const ImportOptions& options) {
-  return identity_of(std::filesystem::path(options.poses)) ==
-         identity_of(std::filesystem::path(options.pressures));
-}
-
-/// Gives every row its pose, by time or row by row.
-void join(PoseTable poses, const ImportOptions& options, ImportedRecording& imported) {
-  Recording& recording = imported.recording;
-  const std::size_t n = recording.pressure.size() / recording.elements_mm.size();
-  const bool same_rows = poses.time_s.empty();
-  if (!same_rows && recording.time_s.empty()) {
-    refuse(options.poses,
-           "has times, {} has none; give both a column 'time' or neither, or give the frames' "
-           "`rate`",
-           options.pressures);
-  }
-  if (!same_rows) {
-    keep_known(poses);
-    if (poses.time_s.empty()) {
-      refuse(options.poses, "holds no pose; write x, y and theta where they are known");
-    }
-    imported.largest_gap_s = options.largest_gap_s.value_or(usual_gap_s(poses.time_s));
-    join_by_time(poses, imported);
-    if (std::ranges::none_of(recording.T_robot_sensor, is_finite)) {
-      refuse(options.poses,
-             "no row of {} finds a pose: its times are {} to {} s, the poses' are {} to {} s; "
-             "check clocks and units, or raise `largest-gap-s`",
-             options.pressures, recording.time_s.front(), recording.time_s.back(),
-             poses.time_s.front(), poses.time_s.back());
-    }
-    return;
-  }
-  if (poses.T_robot_sensor.size() != n && in_one_file(options)) {
-    refuse(options.poses,
-           "has {} rows of readings for {} frames or touches; give the poses in a table of their "
-           "own, with a row for each",
-           poses.T_robot_sensor.size(), n);
-  }
-  if (poses.T_robot_sensor.size() != n) {
-    refuse(options.poses,
-           "holds {} poses without a time for {} rows of {}; write one for each row, or give both "
-           "a column 'time'",
-           poses.T_robot_sensor.size(), n, options.pressures);
-  }
-  recording.T_robot_sensor = std::move(poses.T_robot_sensor);
-}
-
 /// Requires a pose of every touch.
 void require_touch_poses(const ImportOptions& options, const ImportedRecording& imported) {
   const Recording& recording = imported.recording;
@@ -213,8 +103,8 @@ bool has_column(const std::string& path, const std::string& name) {
   return !path.empty() && !is_npy(path) && CsvTable(path).find(name);
 }
 
-void choose_rows(const ImportOptions& options, Recording& recording) {
-  const std::size_t n = recording.pressure.size() / recording.elements_mm.size();
+/// @param n rows
+void choose_rows(const ImportOptions& options, std::size_t n, Recording& recording) {
   if (options.rate_hz) {
     if (!recording.time_s.empty()) {
       refuse(fmt::format("`rate {}`", *options.rate_hz), "{} has times; leave the flag out",
@@ -274,6 +164,9 @@ void check_numbers(const ImportOptions& options) {
   if (options.rate_hz && !(*options.rate_hz >= slowest_hz && *options.rate_hz <= fastest_hz)) {
     refuse(fmt::format("`rate {}`", *options.rate_hz), "give {} to {} Hz", slowest_hz, fastest_hz);
   }
+  if (!std::isfinite(options.pose_delay_s)) {
+    refuse(fmt::format("`pose-delay {}`", options.pose_delay_s), "give seconds");
+  }
   if (options.unposed && !options.poses.empty()) {
     refuse("`unposed`", "{} holds the poses; leave one of the flags out", options.poses);
   }
@@ -282,7 +175,7 @@ void check_numbers(const ImportOptions& options) {
 /// The recording of rows that are read.
 ImportedRecording recording_of(const ImportOptions& options, ImportArray array, ImportRows rows) {
   const std::optional<glm::dvec3> normal = plane_normal(options.plane);
-  auto& [pressures, poses, T_robot_object] = rows;
+  auto& [pressures, poses, T_robot_object, survey] = rows;
   ImportedRecording imported;
   imported.holds_poses = pressures.holds_poses;
   Recording& recording = imported.recording;
@@ -295,27 +188,33 @@ ImportedRecording recording_of(const ImportOptions& options, ImportArray array, 
   recording.time_s = std::move(pressures.time_s);
   recording.device_time_s = std::move(pressures.device_time_s);
   recording.lost_before = std::move(pressures.lost_before);
-  imported.whole_up_to = whole_numbers_as_kpa(recording);
-  choose_rows(options, recording);
-  mark_unknown(options.pressures, recording);
+  if (!survey) {
+    survey.emplace(recording.elements_mm.size(), recording.valid);
+    survey->add(recording.pressure);
+  }
+  imported.whole_up_to = recording.pressure_unit == "kPa" ? survey->whole_up_to() : std::nullopt;
+  choose_rows(options, survey->rows(), recording);
+  mark_unknown(options.pressures, *survey, recording);
   if (poses) {
     if (poses->spatial.empty() && normal) {
       refuse(fmt::format("`plane {}`", options.plane),
              "is for poses in space; {} has x, y and theta", options.poses);
     }
+    for (double& time_s : poses->time_s) {
+      time_s -= options.pose_delay_s;  // to the clock of the frames
+    }
     if (!poses->spatial.empty()) {
       const TouchPlane plane = touch_plane(poses->spatial, normal);
-      imported.of_poses = take_into_plane(plane, *poses, recording);
+      imported.of_poses = take_into_plane(plane, *survey, *poses, recording);
       if (T_robot_object) {
         recording.truth = Truth{options.object, inverse(plane.project(*T_robot_object))};
       }
     }
     imported.assumed_units = poses->assumed_units;
-    join(std::move(*poses), options, imported);
+    join(std::move(*poses), *survey, options, imported);
   } else {
     const bool at_zero = options.unposed && recording.rows == "touches";
-    recording.T_robot_sensor.assign(recording.pressure.size() / recording.elements_mm.size(),
-                                    at_zero ? Pose{} : unknown_pose);
+    recording.T_robot_sensor.assign(survey->rows(), at_zero ? Pose{} : unknown_pose);
   }
   if (recording.rows == "touches" && !options.unposed) {
     require_touch_poses(options, imported);
@@ -345,6 +244,14 @@ ImportedRecording import_tables(const ImportOptions& options) {
   if (!options.poses.empty()) {
     // The rows of one file belong together, even where their times are equal.
     rows.poses = read_poses(options.poses, columns, !in_one_file(options));
+    if (in_one_file(options) && options.pose_delay_s != 0.0 &&
+        rows.pressures.time_s.size() == rows.poses->T_robot_sensor.size()) {
+      rows.poses->time_s = rows.pressures.time_s;
+    }
+    if (rows.poses->time_s.empty() && options.pose_delay_s != 0.0) {
+      refuse(fmt::format("`pose-delay {}`", options.pose_delay_s),
+             "{} has no times; leave the flag out", options.poses);
+    }
     pose_units = rows.poses->units;
   }
   ImportedRecording imported = recording_of(options, std::move(array), std::move(rows));
@@ -357,15 +264,17 @@ ImportedRecording import_tables(const ImportOptions& options) {
 
 ImportedRecording import_rows(const ImportOptions& options, ImportRows rows) {
   check_numbers(options);
+  return recording_of(options, import_array(options), std::move(rows));
+}
+
+PressureSurvey survey_for(const ImportOptions& options, std::size_t elements) {
   ImportArray array = import_array(options);
-  const std::size_t elements = array.elements_mm.size();
-  if (const std::size_t n = rows.pressures.time_s.size();
-      rows.pressures.pressure.size() != n * elements) {
+  if (array.elements_mm.size() != elements) {
     refuse(options.pressures,
-           "has {} readings a frame for an array of {} elements; correct `array`",
-           rows.pressures.pressure.size() / std::max<std::size_t>(n, 1), elements);
+           "has {} readings a frame for an array of {} elements; correct `array`", elements,
+           array.elements_mm.size());
   }
-  return recording_of(options, std::move(array), std::move(rows));
+  return PressureSurvey(elements, std::move(array.valid));
 }
 
 }  // namespace palpate

@@ -11,6 +11,7 @@
 #include "io/pressure_table.hpp"
 #include "palpate/pose_track.hpp"
 #include "palpate/touch.hpp"
+#include "streaming/pressure_survey.hpp"
 
 namespace palpate {
 
@@ -35,6 +36,7 @@ struct ImportOptions {
   std::string pose_columns;
   std::string plane = "auto";           ///< of poses in space: auto, or its normal "NX,NY,NZ"
   std::optional<double> largest_gap_s;  ///< none: by the times of the poses
+  double pose_delay_s = 0.0;  ///< by how much later the poses' clock reads than the frames'
   std::optional<double> rate_hz;
   std::string rows;
   std::string object;
@@ -64,9 +66,16 @@ struct ImportRows {
   PressureTable pressures;
   std::optional<PoseTable> poses;             ///< in space, in mm
   std::optional<SpatialPose> T_robot_object;  ///< true pose of the object, in space
+  /// Of pressures that are not held, in the place of theirs: the recording then has none.
+  std::optional<PressureSurvey> survey;
 };
-/// As import_tables() of tables that hold this. The options' files name what the rows came from.
+/// As import_tables() of tables that hold this. The options' files name what the rows came from;
+/// poses without times are by the clock of the frames.
 /// @throws Error as import_tables()
 ImportedRecording import_rows(const ImportOptions& options, ImportRows rows);
+
+/// What takes the pressures of rows that are not held. @throws Error where the array is of other
+/// elements, or cannot be read
+PressureSurvey survey_for(const ImportOptions& options, std::size_t elements);
 
 }  // namespace palpate

@@ -57,33 +57,11 @@ glm::dvec3 normal_across(const glm::dvec3& looks) {
                                                                   : towards;
 }
 
-/// [row] whether the array is pressed: some element reads at least half as far above its least
-/// reading as any reading lies above its own.
-std::vector<bool> pressed_rows(const Recording& recording) {
-  const std::size_t e = recording.elements_mm.size();
-  const std::size_t n = recording.pressure.size() / e;
-  if (recording.rows == "touches") {
-    return std::vector<bool>(n, true);
-  }
-  std::vector<double> least(e, std::numeric_limits<double>::infinity());
-  for (std::size_t k = 0; k < recording.pressure.size(); ++k) {
-    least[k % e] = std::fmin(least[k % e], recording.pressure[k]);
-  }
-  std::vector<double> above(n);
-  for (std::size_t k = 0; k < recording.pressure.size(); ++k) {
-    above[k / e] = std::fmax(above[k / e], recording.pressure[k] - least[k % e]);
-  }
-  const double most = *std::ranges::max_element(above);
-  std::vector<bool> pressed;
-  for (const double one : above) {
-    pressed.push_back(one > 0.0 && one >= 0.5 * most);
-  }
-  return pressed;
-}
-
 /// [pose] whether the array is pressed in the row of the pose, or in the one nearest in time.
-std::vector<bool> pressed_poses(const PoseTable& poses, const Recording& recording) {
-  const std::vector<bool> rows = pressed_rows(recording);
+std::vector<bool> pressed_poses(const PoseTable& poses, const Recording& recording,
+                                const PressureSurvey& survey) {
+  const std::vector<bool> rows =
+      recording.rows == "touches" ? std::vector<bool>(survey.rows(), true) : survey.pressed();
   const std::vector<double>& time_s = recording.time_s;
   std::vector<bool> pressed(poses.spatial.size());
   for (std::size_t i = 0; i < pressed.size(); ++i) {
@@ -129,9 +107,7 @@ TouchPlane touch_plane(const std::vector<std::optional<SpatialPose>>& poses,
   return plane;
 }
 
-std::vector<std::string> words_about(const TouchPlane& plane,
-                                     const std::vector<std::optional<SpatialPose>>& poses,
-                                     const std::vector<bool>& pressed) {
+std::vector<std::string> words_about(const TouchPlane& plane) {
   std::vector<std::string> words;
   const auto text = [](const glm::dvec3& v) {
     const glm::dvec3 r = glm::round(100.0 * v) / 100.0 + 0.0;  // without the sign of -0.00
@@ -148,6 +124,13 @@ std::vector<std::string> words_about(const TouchPlane& plane,
         "the array looks against the plane's normal, as under a tool that points down: its y is "
         "turned over");
   }
+  return words;
+}
+
+std::vector<SetupFinding> tilt_of(const TouchPlane& plane,
+                                  const std::vector<std::optional<SpatialPose>>& poses,
+                                  const std::vector<bool>& pressed) {
+  std::vector<SetupFinding> found;
   std::size_t tilted = 0;
   double most_rad = 0.0;
   double low = std::numeric_limits<double>::infinity();
@@ -165,16 +148,21 @@ std::vector<std::string> words_about(const TouchPlane& plane,
     high = std::max(high, plane.height_mm(*poses[i]));
   }
   if (tilted > 0) {
-    words.push_back(fmt::format(
-        "{} of {} poses under load are tilted by more than {:.0f} degrees, {:.1f} at most: press "
-        "the array flat, or give the `plane`",
-        tilted, rows, much_tilt_rad * degrees, most_rad * degrees));
+    found.push_back(
+        {"tilt", 0.0,
+         fmt::format("{} of {} poses under load are tilted by more than {:.0f} degrees, {:.1f} at "
+                     "most: press the array flat, or give the `plane`",
+                     tilted, rows, much_tilt_rad * degrees, most_rad * degrees),
+         ""});
   }
   if (high - low > much_height_mm) {
-    words.push_back(fmt::format(
-        "the height under load varies by {:.1f} mm: do all touches lie in one plane?", high - low));
+    found.push_back({"tilt", 0.0,
+                     fmt::format("the height under load varies by {:.1f} mm: do all touches lie in "
+                                 "one plane?",
+                                 high - low),
+                     ""});
   }
-  return words;
+  return found;
 }
 
 std::optional<glm::dvec3> plane_normal(const std::string& plane) {
@@ -194,19 +182,22 @@ std::optional<glm::dvec3> plane_normal(const std::string& plane) {
   return normal;
 }
 
-std::vector<std::string> take_into_plane(const TouchPlane& plane, PoseTable& poses,
-                                         Recording& recording) {
-  std::vector<std::string> words =
-      words_about(plane, poses.spatial, pressed_poses(poses, recording));
+std::vector<std::string> take_into_plane(const TouchPlane& plane, const PressureSurvey& survey,
+                                         PoseTable& poses, Recording& recording) {
+  recording.findings = tilt_of(plane, poses.spatial, pressed_poses(poses, recording, survey));
+  poses.T_robot_sensor.reserve(poses.spatial.size());
+  poses.height_mm.reserve(poses.spatial.size());
   for (const auto& pose : poses.spatial) {
     poses.T_robot_sensor.push_back(pose ? plane.project(*pose) : unknown_pose);
+    poses.height_mm.push_back(pose ? plane.height_mm(*pose) : unknown_pose.theta_rad);
   }
+  poses.spatial = std::vector<std::optional<SpatialPose>>();  // frees the memory of a long log
   if (plane.faces_down) {
     for (glm::dvec2& p : recording.elements_mm) {
       p.y = -p.y;
     }
   }
-  return words;
+  return words_about(plane);
 }
 
 }  // namespace palpate

@@ -68,6 +68,7 @@ class ReplayedSensor : public Sensor {
     description_.baseline = r.baseline;
     description_.object = r.object;
     description_.truth = r.truth;
+    description_.findings = r.findings;
     StreamTime time;
     for (const double time_s : r.time_s) {
       time.advance(time_s);

@@ -119,9 +119,11 @@ void bind_setup_check(nb::module_& module) {
   nb::class_<SetupFinding>(module, "SetupFinding", "Something that is wrong with a set-up.")
       .def_ro("what", &SetupFinding::what,
               "\"pose_unit\", \"element_order\", \"array_offset\", \"pitch\", \"dead_elements\",\n"
-              "\"stuck_elements\" or \"contradicting\".")
-      .def_ro("nats", &SetupFinding::nats,
-              "By how much more likely the touches are once it is mended.")
+              "\"stuck_elements\", \"contradicting\", \"tilt\", \"clock\" or \"dropped\".")
+      .def_ro(
+          "nats", &SetupFinding::nats,
+          "By how much more likely the touches are once it is mended; of \"clock\", log 19 for\n"
+          "each press that it explains; 0 of \"tilt\" and \"dropped\".")
       .def_prop_ro(
           "words", [](const SetupFinding& self) { return in_keywords(self.words); },
           "A sentence with what mends it.")

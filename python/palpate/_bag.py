@@ -2,19 +2,18 @@
 
 import os
 from collections.abc import Sequence
+from contextlib import closing
 from typing import TYPE_CHECKING, Any, Literal
 
 from . import _palpate
-from ._bag_messages import Progress, Topic, opened
-from ._bag_transforms import Row
+from ._bag_messages import Pressures, Progress, Topic, opened
 from ._error import Error
 from ._palpate import Recording
 from .recognition import _Path, array_option, filled, warn
 
 # The build writes the stubs by importing the package, where there is no NumPy.
 if TYPE_CHECKING:
-    import numpy
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
 
 def read_bag(
@@ -32,6 +31,7 @@ def read_bag(
     pressure_unit: Literal["kPa", "raw"] = "kPa",
     plane: tuple[float, float, float] | Literal["auto"] = "auto",
     largest_gap_s: float | None = None,
+    pose_delay: float = 0.0,
     object: str = "",
     progress: Progress | None = None,
 ) -> Recording:
@@ -48,65 +48,78 @@ def read_bag(
     Raises Error naming log and topic. What import_tables() warns of, and messages without a header,
     become a UserWarning.
     """
+    frames, imported = read_frames(**locals())
+    with closing(frames.file):
+        recording = imported.recording(frames.rows)
+    warn(imported.remarks)
+    return recording
+
+
+def read_frames(
+    log: _Path,
+    *,
+    pressure_topic: str,
+    array: Any,
+    pressure_field: str | None,
+    pose_topic: str | None,
+    tf: tuple[str, str] | None,
+    truth_tf: tuple[str, str] | None,
+    pose_delay: float,
+    progress: Progress | None,
+    **options: Any,
+) -> "tuple[Pressures, _palpate.ImportedFrames]":
+    """What read_bag() reads: the pressures, which lie in a temporary file, and all else."""
     if pose_topic is not None and tf is not None:
         raise Error("pose_topic and tf: both say where the sensor is; leave one of them out")
     if truth_tf is not None and pose_topic is None and tf is None:
         raise Error("truth_tf: needs the sensor's poses in the same frame; give pose_topic or tf")
     name = os.fsdecode(log)
+    text, elements_mm = array_option(array)
+    plane = options["plane"]
+    source = pose_topic or (":".join(tf) if tf else "")
+    options |= {
+        "array": text,
+        "pressures": f"{name}: {pressure_topic}",
+        "poses": f"{name}: {source}" if source else "",
+        "dead": ",".join(map(str, options["dead"])),
+        "plane": plane if isinstance(plane, str) else ",".join(map(str, plane)),
+        "pose_delay": pose_delay,
+    }
+    request = filled(_palpate.ImportOptions(), read_bag, options)
     with opened(name) as bag:
-        frames = bag.pressures(pressure_topic, pressure_field)
+        frames = bag.pressures(
+            pressure_topic,
+            pressure_field,
+            lambda elements: _palpate.PressureSurvey(request, elements, elements_mm),
+        )
         poses = bag.poses(pose_topic) if pose_topic is not None else None
         wanted = [chain for chain in (tf, truth_tf) if chain is not None]
         tree = bag.transforms(wanted) if wanted else None
         bag.read([part for part in (frames, poses, tree) if part is not None], progress)
-    frames.require_some(name)
-    pressure, time_s = frames.arrays(name)
+    survey = frames.finish(name)
+    time_s = frames.in_order()
+    remarks = frames.remarks(name)
     pose_time_s: ArrayLike = ()
     rows: ArrayLike | None = None
-    truth: Row | None = None
-    remarks = frames.remarks(name)
+    truth: ArrayLike | None = None
     if poses is not None:
         poses.require_some(name)
         pose_time_s, rows = poses.in_order()
         remarks += poses.remarks(name)
-    if tf is not None and tree is not None:
-        rows = tree.chain(name, *tf, time_s.tolist(), largest_gap_s)  # one for each frame
-        remarks += tree.remarks(name, tf, rows)
     if truth_tf is not None and tree is not None:
-        truth = tree.still(name, *truth_tf, time_s.tolist())
-    text, elements_mm = array_option(array)
-    options = {
-        "array": text,
-        "pressures": f"{name}: {pressure_topic}",
-        "poses": f"{name}: {pose_topic or (':'.join(tf) if tf else '')}" if rows is not None else "",
-        "first_element": first_element,
-        "order": order,
-        "dead": ",".join(map(str, dead)),
-        "pressure_unit": pressure_unit,
-        "plane": plane if isinstance(plane, str) else ",".join(map(str, plane)),
-        "largest_gap_s": largest_gap_s,
-        "object": object,
-    }
-    recording, sentences = _palpate.import_rows(
-        filled(_palpate.ImportOptions(), read_bag, options),
-        pressure,
-        time_s,
-        _array(pose_time_s, (-1,)),
-        elements_mm,
-        None if rows is None else _array(rows, (-1, 7)),
-        None if truth is None else _array(truth, (7,)),
+        truth = tree.still(name, *truth_tf, time_s + pose_delay)
+    if tf is not None and tree is not None:
+        rows = tree.chain(name, *tf, time_s + pose_delay, options["largest_gap_s"])
+        remarks += tree.remarks(name, tf, rows)
+    del poses, tree  # the memory of a long log
+    imported = _palpate.import_frames(
+        request, survey, time_s, pose_time_s, elements_mm, rows, truth
     )
-    warn([*sentences, *remarks])
-    return recording
+    imported.remarks += remarks
+    return frames, imported
 
 
 def topics(log: _Path) -> "list[Topic]":
     """The topics of a log, by name. Raises Error where it cannot be read."""
     with opened(os.fsdecode(log)) as bag:
         return bag.topics()
-
-
-def _array(values: "ArrayLike", shape: tuple[int, ...]) -> "NDArray[numpy.float64]":
-    import numpy
-
-    return numpy.asarray(values, dtype=numpy.float64).reshape(shape)

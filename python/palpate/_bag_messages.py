@@ -1,5 +1,7 @@
 """The messages of a log of ROS: which topics it has, and the pressures and poses of one of them."""
 
+import os
+import tempfile
 from array import array as numbers
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -9,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from ._bag_transforms import Transforms, row_of, stamp_s
 from ._error import Error
+from ._palpate import PressureSurvey
 
 # The build writes the stubs by importing the package, where there is no NumPy.
 if TYPE_CHECKING:
@@ -16,6 +19,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 Progress = Callable[[float], object]
+#: Makes what takes the blocks of an array of so many elements.
+SurveyFor = Callable[[int], PressureSurvey]
 
 #: Where the pressures of known types lie; of another type, the only list of numbers is taken.
 _PRESSURES = {
@@ -101,37 +106,87 @@ class _Timed:
 
 
 class Pressures(_Timed):
-    """The readings of a topic, one frame behind the other."""
+    """The readings of a topic, which lie in a temporary file: a long log's need no memory."""
 
-    def __init__(self, topic: str, has_header: bool, path: str) -> None:
+    BLOCK = 4096  #: frames that are held
+
+    def __init__(self, topic: str, has_header: bool, path: str, survey_for: SurveyFor) -> None:
         super().__init__(topic, has_header)
         self.path = path
-        self.elements: int | None = None
-        self.values = numbers("d")
+        self.survey_for = survey_for
+        self.survey: PressureSurvey | None = None
+        self.elements = 0
+        self.narrow = True  #: float32 holds all readings
+        self.held = 0  #: frames of the block that are not in the file yet
+        self.file = tempfile.TemporaryFile()
+        self.order: NDArray[numpy.int64] | None = None  #: of the frames in the file, by time
 
     def add(self, topic: str, message: Any, received_s: float) -> None:
         values = _at(message, self.path)
         row = values if hasattr(values, "dtype") and values.ndim == 1 else _flat(values)
-        if self.elements is None:
-            self.elements = len(row)
-        elif len(row) != self.elements:
+        if self.survey is None:
+            self._begin(row)
+        if len(row) != self.elements:
             raise Error(
                 f"{self.topic}: {self.path}: {len(row)} readings in message {len(self.time_s)}, counted "
                 f"from 0, but {self.elements} before; give a topic or a field of one length"
             )
-        self.values.extend(row)
+        self.block[self.held] = row
+        self.held += 1
         self.time_s.append(self.time_of(message, received_s))
+        if self.held == self.BLOCK:
+            self._keep()
 
-    def arrays(self, log: str) -> "tuple[NDArray[numpy.float64], NDArray[numpy.float64]]":
-        """Readings [n, e] and times [n], sorted by time."""
+    def _begin(self, row: Any) -> None:
+        import numpy
+
+        self.elements = len(row)
+        if not self.elements:
+            raise Error(f"{self.topic}: {self.path}: holds no reading; give another field")
+        self.survey = self.survey_for(self.elements)
+        small = numpy.can_cast(getattr(row, "dtype", numpy.float64), numpy.float32)
+        kind = numpy.float32 if small else numpy.float64
+        self.block = numpy.empty((self.BLOCK, self.elements), kind)
+
+    def _keep(self) -> None:
+        import numpy
+
+        rows = self.block[: self.held]
+        assert self.survey is not None
+        self.survey.add(rows)
+        self.narrow &= bool(numpy.all((rows == rows.astype(numpy.float32)) | numpy.isnan(rows)))
+        self.file.write(rows.tobytes())
+        self.held = 0
+
+    def finish(self, log: str) -> PressureSurvey:
+        """What is known of all readings."""
+        self.require_some(log)
+        assert self.survey is not None
+        self._keep()
+        self.file.flush()
+        return self.survey
+
+    def in_order(self) -> "NDArray[numpy.float64]":
+        """The frames' times [n], ascending."""
         import numpy
 
         time_s = numpy.frombuffer(self.time_s)
-        if not self.elements:
-            raise Error(f"{log}: {self.topic}: {self.path}: holds no reading; give another field")
-        values = numpy.frombuffer(self.values).reshape(-1, self.elements)
-        order = numpy.argsort(time_s, kind="stable")
-        return values[order], time_s[order]
+        if numpy.any(time_s[1:] < time_s[:-1]):
+            self.order = numpy.argsort(time_s, kind="stable")
+            time_s = time_s[self.order]
+        return time_s
+
+    def rows(self, first: int) -> "NDArray[numpy.float64]":
+        """Readings [k, e] from a frame on, in the order of time."""
+        import numpy
+
+        end = min(first + self.BLOCK, len(self.time_s))
+        wanted = numpy.arange(first, end) if self.order is None else self.order[first:end]
+        low, high = int(wanted.min()), int(wanted.max()) + 1
+        row_bytes = self.elements * self.block.itemsize
+        data = os.pread(self.file.fileno(), (high - low) * row_bytes, low * row_bytes)
+        rows = numpy.frombuffer(data, self.block.dtype).reshape(-1, self.elements)
+        return rows[wanted - low].astype(numpy.float64)
 
 
 class Poses(_Timed):
@@ -202,7 +257,7 @@ class Bag:
         known = _PRESSURES.get(msgtype)
         return known if known in found else found[0] if len(found) == 1 else None
 
-    def pressures(self, topic: str, path: str | None) -> Pressures:
+    def pressures(self, topic: str, path: str | None, survey_for: SurveyFor) -> Pressures:
         msgtype = self.connections(topic)[0].msgtype
         if path is None:
             path = self.pressure_path(msgtype)
@@ -217,7 +272,7 @@ class Bag:
                 f"{self.name}: {topic}: {msgtype} has no list of numbers"
                 + (f" {path}; it has {', '.join(found)}" if path and found else "; give another topic")
             )
-        return Pressures(topic, self.has_header(msgtype), path)
+        return Pressures(topic, self.has_header(msgtype), path, survey_for)
 
     def poses(self, topic: str) -> Poses:
         msgtype = self.connections(topic)[0].msgtype
@@ -235,7 +290,8 @@ class Bag:
                 f"{self.name}: tf {':'.join(wanted[0])}: the log has no topic of transforms; give "
                 "pose_topic"
             )
-        return Transforms(topics, {topic for topic in topics if topic.endswith("tf_static")})
+        static = {topic for topic in topics if topic.endswith("tf_static")}
+        return Transforms(topics, static, wanted)
 
     def read(
         self, parts: Sequence[Pressures | Poses | Transforms], progress: Progress | None

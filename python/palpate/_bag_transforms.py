@@ -1,28 +1,32 @@
 """Poses in space over time, and the tree of frames that /tf and /tf_static give."""
 
-import bisect
-import itertools
 import math
 from array import array as numbers
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ._error import Error
 
-Row = tuple[float, float, float, float, float, float, float]  #: mm, and a quaternion x, y, z, w
-UNKNOWN: Row = (math.nan,) * 7
-_IDENTITY: Row = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+# The build writes the stubs by importing the package, where there is no NumPy.
+if TYPE_CHECKING:
+    import numpy
+    from numpy.typing import NDArray
+
+    Rows = NDArray[numpy.float64]  #: [n, 7] mm, and a quaternion x, y, z, w; NaN where unknown
+
+_UNKNOWN = (math.nan,) * 7
 _USUAL_GAP_S = 0.1
+_BLOCK = 1 << 14  #: rows of a chain at a time
 
 
-def row_of(pose: Any) -> Row:
+def row_of(pose: Any) -> tuple[float, ...]:
     """A Pose or a Transform, m, as a row of mm and a quaternion; NaN where it is no rotation."""
     p = pose.position if hasattr(pose, "position") else pose.translation
     q = pose.orientation if hasattr(pose, "orientation") else pose.rotation
     length = math.sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w)
     if not length > 0.0:
-        return UNKNOWN
+        return _UNKNOWN
     x, y, z, w = q.x / length, q.y / length, q.z / length, q.w / length
     return (1e3 * p.x, 1e3 * p.y, 1e3 * p.z, x, y, z, w)
 
@@ -40,92 +44,96 @@ class _Edge:
     time_s: "numbers[float]" = field(default_factory=lambda: numbers("d"))
     rows: "numbers[float]" = field(default_factory=lambda: numbers("d"))  #: one behind the other
 
-    def row(self, index: int) -> Row:
-        return tuple(self.rows[7 * index : 7 * index + 7])  # type: ignore[return-value]
+    def log(self) -> "tuple[Rows, Rows]":
+        """Times, ascending, and rows."""
+        import numpy
 
-    def sort(self) -> None:
-        if self.static or all(a <= b for a, b in itertools.pairwise(self.time_s)):
-            return
-        order = sorted(range(len(self.time_s)), key=self.time_s.__getitem__)
-        rows = numbers("d")
-        for i in order:
-            rows.extend(self.row(i))
-        self.time_s = numbers("d", (self.time_s[i] for i in order))
-        self.rows = rows
-
-    def gap_s(self) -> float:
-        """The longest step that a regular log takes when its steps jitter or a message is lost."""
-        steps = sorted(b - a for a, b in itertools.pairwise(self.time_s))
-        return max(_USUAL_GAP_S, 2.5 * steps[len(steps) // 2]) if steps else _USUAL_GAP_S
-
-    def at(self, time_s: float, gap_s: float) -> Row | None:
-        """Interpolated; None outside the log or between rows further apart than the gap."""
-        if self.static:
-            return self.row(0)
-        after = bisect.bisect_left(self.time_s, time_s)
-        if after < len(self.time_s) and self.time_s[after] == time_s:
-            return self.row(after)
-        if after in (0, len(self.time_s)) or self.time_s[after] - self.time_s[after - 1] > gap_s:
-            return None
-        before_s, after_s = self.time_s[after - 1], self.time_s[after]
-        return _between(self.row(after - 1), self.row(after), (time_s - before_s) / (after_s - before_s))
+        time_s: Rows = numpy.frombuffer(self.time_s)
+        rows: Rows = numpy.frombuffer(self.rows).reshape(-1, 7)
+        if numpy.any(time_s[1:] < time_s[:-1]):
+            order = numpy.argsort(time_s, kind="stable")
+            time_s, rows = time_s[order], rows[order]
+        return time_s, rows
 
 
-def _between(a: Row, b: Row, part: float) -> Row:
-    """The position on the line and the rotation on the shorter arc from a to b."""
-    p = [x + part * (y - x) for x, y in zip(a[:3], b[:3], strict=True)]
-    cosine = sum(x * y for x, y in zip(a[3:], b[3:], strict=True))
-    sign = -1.0 if cosine < 0.0 else 1.0
-    angle = math.acos(min(1.0, abs(cosine)))
-    if angle < 1e-6:
-        u, v = 1.0 - part, part
-    else:
-        u, v = (math.sin(x * angle) / math.sin(angle) for x in (1.0 - part, part))
-    q = [u * x + sign * v * y for x, y in zip(a[3:], b[3:], strict=True)]
-    length = math.sqrt(sum(x * x for x in q))
-    return (p[0], p[1], p[2], q[0] / length, q[1] / length, q[2] / length, q[3] / length)
+def _gap_s(time_s: "Rows") -> float:
+    """The longest step that a regular log takes when its steps jitter or a message is lost."""
+    import numpy
+
+    steps = numpy.sort(numpy.diff(time_s))
+    return max(_USUAL_GAP_S, 2.5 * float(steps[len(steps) // 2])) if len(steps) else _USUAL_GAP_S
 
 
-def _turned(row: Row, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """The vector turned by the row's rotation."""
-    qx, qy, qz, qw = row[3:]
-    tx, ty, tz = 2 * (qy * z - qz * y), 2 * (qz * x - qx * z), 2 * (qx * y - qy * x)
-    return (
-        x + qw * tx + qy * tz - qz * ty,
-        y + qw * ty + qz * tx - qx * tz,
-        z + qw * tz + qx * ty - qy * tx,
-    )
+def _interpolated(log: "tuple[Rows, Rows]", at_s: "Rows", gap_s: float) -> "Rows":
+    """Rows at times; NaN outside the log or between rows further apart than the gap.
+
+    The position is on the line and the rotation on the shorter arc between two rows.
+    """
+    import numpy
+
+    time_s, rows = log
+    if len(time_s) == 0:
+        return numpy.full((len(at_s), 7), math.nan)
+    after = numpy.searchsorted(time_s, at_s).clip(max=len(time_s) - 1)
+    before = numpy.where(time_s[after] == at_s, after, (after - 1).clip(min=0))
+    step_s = time_s[after] - time_s[before]
+    known = (time_s[before] <= at_s) & (at_s <= time_s[after]) & (step_s <= gap_s)
+    part = (at_s - time_s[before]) / numpy.where(step_s > 0.0, step_s, 1.0)
+    a, b = rows[before], rows[after]
+    cosine = numpy.sum(a[:, 3:] * b[:, 3:], axis=1)
+    angle = numpy.arccos(numpy.minimum(1.0, numpy.abs(cosine)))
+    small = angle < 1e-6
+    sine = numpy.where(small, 1.0, numpy.sin(angle))
+    u = numpy.where(small, 1.0 - part, numpy.sin((1.0 - part) * angle) / sine)
+    v = numpy.where(small, part, numpy.sin(part * angle) / sine)
+    v = numpy.where(cosine < 0.0, -v, v)
+    q = u[:, None] * a[:, 3:] + v[:, None] * b[:, 3:]
+    q /= numpy.linalg.norm(q, axis=1, keepdims=True)
+    p = a[:, :3] + part[:, None] * (b[:, :3] - a[:, :3])
+    return numpy.where(known[:, None], numpy.hstack([p, q]), math.nan)
 
 
-def _product(a: Row, b: Row) -> Row:
+def _turned(rotation: "Rows", vector: "Rows") -> "Rows":
+    """Vectors [n, 3] turned by rotations [n, 4]."""
+    import numpy
+
+    q, w = rotation[:, :3], rotation[:, 3:]
+    t = 2.0 * numpy.cross(q, vector)
+    return vector + w * t + numpy.cross(q, t)
+
+
+def _product(a: "Rows", b: "Rows") -> "Rows":
     """T_a_c from T_a_b and T_b_c."""
-    x, y, z = _turned(a, *b[:3])
-    ax, ay, az, aw = a[3:]
-    bx, by, bz, bw = b[3:]
-    return (
-        a[0] + x,
-        a[1] + y,
-        a[2] + z,
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-        aw * bw - ax * bx - ay * by - az * bz,
-    )
+    import numpy
+
+    p, q, w = a[:, :3], a[:, 3:6], a[:, 6:]
+    r, z = b[:, 3:6], b[:, 6:]
+    position = p + _turned(a[:, 3:], b[:, :3])
+    scalar = w * z - numpy.sum(q * r, axis=1, keepdims=True)
+    return numpy.hstack([position, w * r + z * q + numpy.cross(q, r), scalar])
 
 
-def _inverse(a: Row) -> Row:
-    back: Row = (0.0, 0.0, 0.0, -a[3], -a[4], -a[5], a[6])
-    x, y, z = _turned(back, *a[:3])
-    return (-x, -y, -z, *back[3:])
+def _inverse(a: "Rows") -> "Rows":
+    import numpy
+
+    back = a[:, 3:] * (-1.0, -1.0, -1.0, 1.0)
+    return numpy.hstack([-_turned(back, a[:, :3]), back])
 
 
 class Transforms:
-    """The frames of /tf and /tf_static, by their names without a leading slash."""
+    """The frames of /tf and /tf_static, by their names without a leading slash.
 
-    def __init__(self, topics: set[str], static: set[str]) -> None:
+    Once the wanted chains are complete, other frames' transforms are not kept.
+    """
+
+    def __init__(
+        self, topics: set[str], static: set[str], wanted: Sequence[tuple[str, str]]
+    ) -> None:
         self.topics = topics
         self.static = static
+        self.wanted = [(target.lstrip("/"), source.lstrip("/")) for target, source in wanted]
         self.edges: dict[str, _Edge] = {}  #: by child
+        self.kept: set[str] | None = None  #: children of the wanted chains; None: not all are known
 
     def add(self, topic: str, message: Any, received_s: float) -> None:
         for transform in message.transforms:
@@ -134,76 +142,93 @@ class Transforms:
             edge = self.edges.get(child)
             if edge is None or edge.parent != parent:
                 edge = self.edges[child] = _Edge(parent, topic in self.static)
-            row = row_of(transform.transform)
+                self._keep_chains()
             if edge.static:
-                edge.rows = numbers("d", row)
-            elif not math.isnan(row[3]):
-                edge.time_s.append(stamp_s(transform.header.stamp) or received_s)
-                edge.rows.extend(row)
+                edge.rows = numbers("d", row_of(transform.transform))
+            elif self.kept is None or child in self.kept:
+                row = row_of(transform.transform)
+                if not math.isnan(row[3]):
+                    edge.time_s.append(stamp_s(transform.header.stamp) or received_s)
+                    edge.rows.extend(row)
 
-    def path(self, log: str, target: str, source: str) -> tuple[list[_Edge], list[_Edge]]:
-        """The edges from the source up to the common ancestor, and from the target up to it."""
+    def _keep_chains(self) -> None:
+        """Forgets what the wanted chains do not need, now that a frame has a parent."""
+        chains = [self._path(*chain) for chain in self.wanted]
+        if any(chain is None for chain in chains):
+            self.kept = None
+            return
+        self.kept = {child for chain in chains if chain for up in chain for child in up}
+        for child in self.edges.keys() - self.kept:
+            edge = self.edges[child]
+            self.edges[child] = edge if edge.static else _Edge(edge.parent, False)
+
+    def _path(self, target: str, source: str) -> tuple[list[str], list[str]] | None:
+        """Frames from the source up to below the common ancestor, and from the target."""
         ups = []
-        for frame in (source.lstrip("/"), target.lstrip("/")):
+        for frame in (source, target):
             up = [frame]
             while up[-1] in self.edges and len(up) <= len(self.edges):
                 up.append(self.edges[up[-1]].parent)
             ups.append(up)
         common = next((frame for frame in ups[0] if frame in ups[1]), None)
         if common is None:
+            return None
+        return ups[0][: ups[0].index(common)], ups[1][: ups[1].index(common)]
+
+    def chain(
+        self, log: str, target: str, source: str, time_s: "Rows", gap_s: float | None
+    ) -> "Rows":
+        """T_target_source at each time, [n, 7]; NaN where it is not known."""
+        import numpy
+
+        path = self._path(target.lstrip("/"), source.lstrip("/"))
+        if path is None:
             known = sorted({*self.edges, *(edge.parent for edge in self.edges.values())})
             raise Error(
                 f"{log}: tf {target}:{source}: no chain of transforms joins these frames; the log has "
                 f"{', '.join(known) or 'none'}"
             )
-        source_up, target_up = (
-            [self.edges[frame] for frame in up[: up.index(common)]] for up in ups
-        )
-        return source_up, target_up
+        logs = {child: self.edges[child].log() for up in path for child in up}
+        gaps = {child: _gap_s(at_s) if gap_s is None else gap_s for child, (at_s, _) in logs.items()}
 
-    def chain(
-        self, log: str, target: str, source: str, time_s: Sequence[float], gap_s: float | None
-    ) -> "numbers[float]":
-        """Rows T_target_source, one behind the other, at each time; NaN where it is not known."""
-        source_up, target_up = self.path(log, target, source)
-        gaps: dict[int, float] = {}
-        for edge in (*source_up, *target_up):
-            edge.sort()
-            gaps[id(edge)] = edge.gap_s() if gap_s is None else gap_s
-
-        def up_to_common(edges: list[_Edge], at_s: float) -> Row | None:
-            product = _IDENTITY
-            for edge in edges:
-                row = edge.at(at_s, gaps[id(edge)])
-                if row is None:
-                    return None
-                product = _product(row, product)
+        def up_to_common(up: list[str], at_s: "Rows") -> "Rows":
+            product = numpy.tile((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0), (len(at_s), 1))
+            for child in up:
+                if self.edges[child].static:
+                    rows = numpy.broadcast_to(logs[child][1], (len(at_s), 7))
+                else:
+                    rows = _interpolated(logs[child], at_s, gaps[child])
+                product = _product(rows, product)
             return product
 
-        rows = numbers("d")
-        for at_s in time_s:
-            a, b = up_to_common(target_up, at_s), up_to_common(source_up, at_s)
-            rows.extend(UNKNOWN if a is None or b is None else _product(_inverse(a), b))
-        if all(map(math.isnan, rows[::7])):
+        rows = numpy.empty((len(time_s), 7))
+        for begin in range(0, len(time_s), _BLOCK):
+            at_s = time_s[begin : begin + _BLOCK]
+            source_up, target_up = (up_to_common(up, at_s) for up in path)
+            rows[begin : begin + _BLOCK] = _product(_inverse(target_up), source_up)
+        if numpy.isnan(rows[:, 0]).all():
             raise Error(
                 f"{log}: tf {target}:{source}: is not known at any frame's time; check the clocks"
             )
         return rows
 
-    def still(self, log: str, target: str, source: str, time_s: Sequence[float]) -> Row:
+    def still(self, log: str, target: str, source: str, time_s: "Rows") -> "Rows":
         """T_target_source of a frame that does not move: at the middle of the times when it is known."""
-        times = sorted(set(time_s))
-        rows = self.chain(log, target, source, times, None)
-        known = [i for i in range(len(times)) if not math.isnan(rows[7 * i])]
-        middle = 7 * known[len(known) // 2]
-        return tuple(rows[middle : middle + 7])  # type: ignore[return-value]
+        import numpy
 
-    def remarks(self, log: str, chain: tuple[str, str], rows: Sequence[float]) -> list[str]:
+        rows = self.chain(log, target, source, numpy.unique(time_s), None)
+        known = numpy.flatnonzero(~numpy.isnan(rows[:, 0]))
+        middle: Rows = rows[known[len(known) // 2]].copy()
+        return middle
+
+    def remarks(self, log: str, chain: tuple[str, str], rows: "Rows") -> list[str]:
         """What is worth saying of rows that chain() gave."""
-        unknown = sum(map(math.isnan, rows[::7]))
+        import numpy
+
+        unknown = int(numpy.isnan(rows[:, 0]).sum())
         if not unknown:
             return []
         return [
-            f"{log}: tf {':'.join(chain)}: {unknown} of {len(rows) // 7} frames have no pose, as a "
+            f"{log}: tf {':'.join(chain)}: {unknown} of {len(rows)} frames have no pose, as a "
             "transform is missing, or the ones around them are too far apart (largest_gap_s)"
         ]

@@ -6,12 +6,14 @@
 import argparse
 import sys
 import warnings
+from contextlib import closing
 from typing import Any
 
-from ._bag import read_bag, topics
+from ._bag import read_frames, topics
 from ._bag_messages import _PRESSURES, _at, _flat
 from ._bag_transforms import stamp_s as stamp_s
 from ._error import Error
+from .recognition import warn
 
 
 def readings(message: Any, msgtype: str, field: str = "") -> list[float]:
@@ -49,6 +51,8 @@ def _flag_parser() -> argparse.ArgumentParser:
     add("--pressure-unit", default="kPa", help="kPa or raw [kPa]")
     add("--plane", default="auto", metavar="NX,NY,NZ", help="normal of the touches' plane [auto]")
     add("--largest-gap-s", type=float, metavar="S", help="poses further apart are not interpolated")
+    add("--pose-delay", type=float, default=0.0, metavar="S",
+        help="by how much later the poses' clock reads than the readings' [0]")  # fmt: skip
     add("--object", default="", metavar="LABEL", help="what was touched")
     add("-o", "--output", metavar="FILE", help="recording to write (HDF5)")
     return parser
@@ -89,8 +93,8 @@ def _run(arguments: argparse.Namespace) -> None:
         except ValueError:
             raise Error(f"--plane {arguments.plane}: give auto, or a normal such as 0,0,1") from None
     shown = sys.stderr.isatty()
-    recording = read_bag(
-        arguments.log,
+    frames, imported = read_frames(
+        log=arguments.log,
         pressure_topic=arguments.pressure_topic,
         array=arguments.array,
         pressure_field=arguments.pressure_field,
@@ -103,21 +107,17 @@ def _run(arguments: argparse.Namespace) -> None:
         pressure_unit=arguments.pressure_unit,
         plane=plane,
         largest_gap_s=arguments.largest_gap_s,
+        pose_delay=arguments.pose_delay,
         object=arguments.object,
         progress=_show_progress if shown else None,
     )
     if shown:
         print("\r" + " " * 16 + "\r", end="", file=sys.stderr)
-    recording.save(arguments.output)
-    posed = int((~_isnan(recording.T_robot_sensor[:, 2])).sum())
-    print(f"{arguments.output}: {len(recording)} frames of {recording.elements_mm.shape[0]} elements, "
-          f"{posed} with a pose; next: palpate touches {arguments.output} -o TOUCHES.h5")  # fmt: skip
-
-
-def _isnan(values: Any) -> Any:
-    import numpy
-
-    return numpy.isnan(values)
+    with closing(frames.file):
+        imported.write(arguments.output, frames.narrow, frames.rows)
+    warn(imported.remarks)
+    print(f"{arguments.output}: {len(frames.time_s)} frames of {frames.elements} elements, "
+          f"{imported.posed} with a pose; next: palpate touches {arguments.output} -o TOUCHES.h5")  # fmt: skip
 
 
 def main() -> int:

@@ -244,6 +244,7 @@ def import_tables(
     pose_columns: tuple[str, str, str] | tuple[str, str, str, str, str, str, str] | None = None,
     plane: tuple[float, float, float] | Literal["auto"] = "auto",
     largest_gap_s: float | None = None,
+    pose_delay: float = 0.0,
     rate: float | None = None,
     object: str = "",
     truth: Truth | None = None,
@@ -256,12 +257,13 @@ def import_tables(
     the right and y upwards, and which follow it; dead: elements that do not read, from 0; poses: a CSV
     file of T_robot_sensor, in mm and rad where neither its columns' names nor pose_unit say otherwise;
     plane: of the touches, where poses are in space: found from them, or its normal in the robot frame;
-    rate: frames per second of pressures without times, Hz; object: label of what was touched; truth:
+    pose_delay: by how much later the poses' clock reads than the readings', s; rate: frames per second
+    of pressures without times, Hz; object: label of what was touched; truth:
     its true identity and pose. Other options are the flags of the command, with its defaults.
 
     Raises Error in the words of the command, naming file and line or row. Frames without a pose
-    between two poses, columns of poses that were left out, and units that nothing gives become a
-    UserWarning.
+    between two poses, columns of poses that were left out, units that nothing gives, and clocks that
+    differ become a UserWarning.
     """
     options = dict(locals())
     del options["truth"]

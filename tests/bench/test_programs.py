@@ -174,6 +174,14 @@ def test_a_sweep_is_whole_and_in_order(sweep: Program) -> None:
     assert document["limits"][1]["against"] == document["limits"][0]["name"]
 
 
+def test_set_ups_are_checked(tmp_path: pathlib.Path) -> None:
+    # Takes some six seconds: a set of three objects is checked four times.
+    document = Program(tmp_path, "bench.check", "--quick", "--trials", 1).document
+    (row,) = document["check"]
+    assert (row["elements"], row["sets"], row["sound"], row["order"], row["one_angle"]) == (36, 1, 1, 1, 1)
+    assert row["least_order_nats"] > 100 and row["most_mm"] < 0.5 and row["most_rad"] < 0.05
+
+
 class Page(html.parser.HTMLParser):
     """Counts a page's elements, and what it would load."""
 

@@ -81,11 +81,19 @@ TEST_F(ImportCommand, TiltAndHeightUnderLoadAreSaid) {
                   "at most: press the array flat, or give the --plane"),
       std::string::npos)
       << tilted;
+  const std::vector<SetupFinding> findings = read_recording(folder_ / "o.h5").findings;
+  ASSERT_EQ(findings.size(), 1u);
+  EXPECT_EQ(findings[0].what, "tilt");
+  EXPECT_EQ(findings[0].nats, 0.0);
   // Only the last two frames are pressed: the first pose's height does not count.
   std::string table = spatial_poses(poses, none, 0.0);
   table.replace(table.find("100"), 3, "190");
   put("poses.csv", table);
   EXPECT_EQ(palpate(command({"--poses", "poses.csv"})).err, "");
+  put("log.csv", "time,p0,p1\n-0.05,1,2\n0,3,4\n0.05,5,6\n");  // its clock is 0.05 s behind
+  EXPECT_NE(palpate(command({"--poses", "poses.csv"})).err, "");
+  EXPECT_EQ(palpate(command({"--poses", "poses.csv", "--pose-delay", "0.05"})).err, "");
+  put("log.csv", frames);
   table.replace(table.rfind("100"), 3, "103");
   put("poses.csv", table);
   EXPECT_EQ(palpate(command({"--poses", "poses.csv"})).err,

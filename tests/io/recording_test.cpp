@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "file_parts.hpp"
+#include "io/recording_parts.hpp"
 #include "limits.hpp"
 #include "palpate/files.hpp"
 #include "scratch_folder.hpp"
@@ -60,6 +61,40 @@ TEST_F(RecordingFile, ComesBackAsItWasWritten) {
   expect_same(read, written);
   EXPECT_EQ(read.path, path_.string());
   EXPECT_FALSE(read.truth);
+}
+
+TEST_F(RecordingFile, IsTheSameWhereItsPressuresComeInParts) {
+  Recording recording = small_recording();
+  recording.T_robot_sensor.push_back({{5.0, 6.0}, 0.5});
+  recording.pressure.insert(recording.pressure.end(), {7.0, 0.1, 9.0});
+  write_recording(path_, recording);
+  const std::vector<double> pressure = std::exchange(recording.pressure, {});
+  for (const std::size_t rows : {1, 2, 3}) {
+    write_recording(folder_ / "parts.h5", recording, false, [&](std::size_t first) {
+      const std::size_t end = std::min<std::size_t>(first + rows, 3);
+      return std::vector(pressure.begin() + static_cast<std::ptrdiff_t>(3 * first),
+                         pressure.begin() + static_cast<std::ptrdiff_t>(3 * end));
+    });
+    EXPECT_EQ(bytes_of(folder_ / "parts.h5"), bytes_of(path_)) << rows;
+  }
+}
+
+TEST_F(RecordingFile, KeepsWhatItsLogsShowed) {
+  Recording written = small_recording();
+  written.findings = {{"clock", 8.8, "ahead; `pose-delay 0.62`", "pose-delay 0.62"},
+                      {"tilt", 0.0, "t", ""}};
+  write_recording(path_, written);
+  const Recording read = read_recording(path_);
+  ASSERT_EQ(read.findings.size(), 2u);
+  EXPECT_EQ(read.findings[0].what, "clock");
+  EXPECT_EQ(read.findings[0].nats, 8.8);
+  EXPECT_EQ(read.findings[0].words, written.findings[0].words);
+  EXPECT_EQ(read.findings[0].option, "pose-delay 0.62");
+  for (const char* spoilt : {"[", "{}", "[1]", "[{\"what\": 2}]"}) {
+    SCOPED_TRACE(spoilt);
+    expect_named(message(recording_parts().attribute("findings", std::string(spoilt))),
+                 {"attribute 'findings' is no JSON array"});
+  }
 }
 
 TEST_F(RecordingFile, KeepsEverythingOptional) {

@@ -77,22 +77,24 @@ TEST_F(SetupTouches, TellTheOrderInWhichElementsAreRead) {
 }
 
 TEST_F(SetupTouches, TellWhereTheArraySitsInTheTool) {
-  const Pose offset{{2.1, -1.4}, 0.07};  // of the array that the recording has, in the true frame
-  std::vector<Recording> recordings = touches(digitacts_array());
-  for (Recording& recording : recordings) {
-    for (Pose& pose : recording.T_robot_sensor) {
-      pose = pose * inverse(offset);
+  // Of the array that the recording has, in the true frame.
+  for (const Pose& offset : {Pose{{2.1, -1.4}, 0.07}, Pose{{0.0, 0.32}, -0.03}}) {
+    std::vector<Recording> recordings = touches(digitacts_array());
+    for (Recording& recording : recordings) {
+      for (Pose& pose : recording.T_robot_sensor) {
+        pose = pose * inverse(offset);
+      }
     }
+    const SetupCheck found = check(recordings);
+    ASSERT_EQ(found.findings.size(), 1u);
+    const SetupFinding& finding = found.findings[0];
+    EXPECT_EQ(finding.what, "array_offset");
+    EXPECT_NEAR(finding.array_offset->translation_mm.x, offset.translation_mm.x, 0.2);
+    EXPECT_NEAR(finding.array_offset->translation_mm.y, offset.translation_mm.y, 0.2);
+    EXPECT_NEAR(finding.array_offset->theta_rad, offset.theta_rad, 0.02);
+    EXPECT_LT(finding.sd->at(0), 0.2);
+    EXPECT_EQ(found.elements_mm[0], *finding.array_offset * digitacts_array()[0]);
   }
-  const SetupCheck found = check(recordings);
-  ASSERT_EQ(found.findings.size(), 1u);
-  const SetupFinding& finding = found.findings[0];
-  EXPECT_EQ(finding.what, "array_offset");
-  EXPECT_NEAR(finding.array_offset->translation_mm.x, offset.translation_mm.x, 0.2);
-  EXPECT_NEAR(finding.array_offset->translation_mm.y, offset.translation_mm.y, 0.2);
-  EXPECT_NEAR(finding.array_offset->theta_rad, offset.theta_rad, 0.02);
-  EXPECT_LT(finding.sd->at(0), 0.2);
-  EXPECT_EQ(found.elements_mm[0], *finding.array_offset * digitacts_array()[0]);
 }
 
 TEST_F(SetupTouches, AtOneAngleTellNothingOfTheArraysPlace) {
@@ -155,6 +157,19 @@ TEST_F(SetupTouches, TellDeadAndStuckElementsAndTouchesOfAnotherPlace) {
       ElementsAre(
           Field(&SetupFinding::option, "dead 14"), Field(&SetupFinding::option, "dead 21"),
           Field(&SetupFinding::words, HasSubstr("E.h5: touches that contradict the others: 7;"))));
+}
+
+TEST_F(SetupTouches, BringWhatTheirLogsShowed) {
+  std::vector<Recording> recordings = touches(digitacts_array());
+  recordings[1].findings = {{"dropped", 0.0, "6 of 60 presses were left out", ""}};
+  EXPECT_THAT(check(recordings).findings,
+              ElementsAre(Field(&SetupFinding::words, "E.h5: 6 of 60 presses were left out")));
+  Recording few = recordings[1];
+  few.T_robot_sensor.resize(3);
+  few.pressure.resize(3 * few.elements_mm.size());
+  const SetupCheck found = check({&few, 1});
+  EXPECT_EQ(found.findings.size(), 1u) << "it may be why there are few touches";
+  EXPECT_THAT(found.remarks, ElementsAre(HasSubstr("object 'E': 3 touches in contact")));
 }
 
 TEST_F(SetupTouches, AreRefusedWhereTheyCannotBeJudged) {

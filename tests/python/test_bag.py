@@ -3,6 +3,7 @@
 import math
 import os
 import pathlib
+import re
 import subprocess
 import sys
 import warnings
@@ -12,7 +13,7 @@ import numpy
 import pytest
 
 import palpate
-from palpate import read_bag
+from palpate import _bag_messages, _bag_transforms, read_bag
 from palpate.bag import topics
 
 from ros_bag import START_S, Bag, about_z, pointing_down
@@ -213,6 +214,85 @@ def test_frames_in_a_gap_of_transforms_have_no_pose(tmp_path: pathlib.Path) -> N
     numpy.testing.assert_allclose(wide.T_robot_sensor[:, 0], [200 * i for i in range(6)], atol=1e-3)
     with pytest.raises(palpate.Error, match="tf array:cup: no chain"):
         read_bag(log, pressure_topic="/plain", tf=("array", "cup"), array=(2, 2, 2))
+
+
+def test_blocks_join(log: pathlib.Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    given: dict[str, Any] = {"pressure_topic": "/hand", "pressure_field": "fingers.taxels", "array": (2, 2, 2)}
+    given |= {"tf": ("base", "array"), "truth_tf": ("base", "cup"), "pressure_unit": "raw"}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        whole = read_bag(log, **given)
+        monkeypatch.setattr(_bag_messages.Pressures, "BLOCK", 3)
+        monkeypatch.setattr(_bag_transforms, "_BLOCK", 4)
+        joined = read_bag(log, **given)
+    for name in ("pressure", "time_s", "T_robot_sensor"):
+        assert numpy.array_equal(getattr(whole, name), getattr(joined, name)), name
+
+
+def test_frames_come_in_the_order_of_their_times(
+    tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(_bag_messages.Pressures, "BLOCK", 3)
+    bag = Bag(tmp_path, "mcap")
+    for i, k in enumerate([3, 0, 7, 1, 2, 9, 4, 8, 5, 6]):
+        finger = bag.of("lab_msgs/msg/Finger", "a", numpy.full(4, k, dtype=numpy.uint16))
+        serial = numpy.array([7, 8], dtype=numpy.int32)
+        bag.write("/hand", bag.of("lab_msgs/msg/Hand", bag.header(START_S + k), serial, [finger]), START_S + i)
+    recording = read_bag(
+        bag.close(), pressure_topic="/hand", pressure_field="fingers.taxels", array=(2, 2, 2), pressure_unit="raw"
+    )
+    assert recording.pressure.tolist() == [[float(k)] * 4 for k in range(10)]
+
+
+def test_only_wanted_transforms_are_kept(tmp_path: pathlib.Path) -> None:
+    log = write_log(tmp_path, "mcap")
+
+    def kept(target: str, source: str) -> dict[str, int]:
+        with _bag_messages.opened(str(log)) as bag:
+            tree = bag.transforms([(target, source)])
+            bag.read([tree], None)
+        return {name: len(edge.rows) // 7 for name, edge in tree.edges.items()}
+
+    assert kept("base", "array") == {"array": 1, "arm": 11, "cup": 1}
+    # What came before the chain was complete is forgotten, what came later not kept.
+    assert kept("base", "cup") == {"array": 1, "arm": 0, "cup": 1}
+
+
+@pytest.mark.parametrize("from_tf", [True, False])
+def test_a_delay_of_the_poses_is_taken_from_their_times(log: pathlib.Path, from_tf: bool) -> None:
+    poses: dict[str, Any] = {"tf": ("base", "array")} if from_tf else {"pose_topic": "/pose"}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        recording = read_bag(log, pressure_topic="/plain", array=(2, 2, 2), pose_delay=0.02, **poses)
+    # The arm moves by 10 mm in 0.1 s.
+    numpy.testing.assert_allclose(
+        recording.T_robot_sensor[1:9, 0], [602 + 10 * i for i in range(1, 9)], atol=0.01
+    )
+
+
+def test_clocks_that_differ_are_said(tmp_path: pathlib.Path) -> None:
+    """Ten presses of 0.4 to 0.6 s each, and 0.5 s to the next place; poses are stamped 0.4 s late."""
+    bag = Bag(tmp_path, "mcap")
+    layout = bag.of("std_msgs/msg/MultiArrayLayout", [], 0)
+    at, place = START_S, 0.0
+    for k in range(10):
+        for i in range(45 + 3 * (k * k % 5)):
+            pressed = i >= 25
+            place += 0.0 if pressed else 0.0003
+            values = numpy.array([9.5 * pressed, 0, 0, 0.5], dtype=numpy.float32)
+            bag.write("/plain", bag.of("std_msgs/msg/Float32MultiArray", layout, values), at)
+            arm = bag.pose("Pose", 0.6 + place, 0.1, 0.28, pointing_down(0))
+            bag.write("/pose", bag.of("geometry_msgs/msg/PoseStamped", bag.header(at + 0.4, "base"), arm), at)
+            at += 0.02
+    log = bag.close()
+
+    def said(**options: Any) -> str:
+        with pytest.warns(UserWarning) as warned:
+            read_bag(log, pressure_topic="/plain", array=(2, 2, 2), pose_topic="/pose", **options)
+        return " ".join(str(warning.message) for warning in warned)
+
+    assert re.search(r"/pose: the poses' clock seems 0\.(3|4)\d s ahead: .*pose_delay=0\.(3|4)", said()), said()
+    assert "clock seems" not in said(pose_delay=0.4)
 
 
 def test_what_a_callback_raises_is_not_the_logs_fault(tmp_path: pathlib.Path) -> None:

@@ -62,15 +62,16 @@ inline std::size_t unknown_readings(const Frame& frame, std::span<const std::uin
 
 /// Identity, geometry and units of a sensor.
 struct SensorDescription {
-  std::string name;                      ///< for people, such as "TakkTile"
-  std::string serial;                    ///< "" if none
-  std::string pressure_unit = "kPa";     ///< "kPa" or "raw"
-  std::vector<glm::dvec2> elements_mm;   ///< [e] element centres in the sensor frame
-  std::vector<std::uint8_t> valid = {};  ///< empty or [e]; 0 = dead element
-  double rate_hz = 0.0;                  ///< frames per second, 0 if unknown
-  std::vector<double> baseline = {};     ///< empty or [e]: untouched readings
-  std::string object = {};               ///< label of what it touches, "" if unknown
-  std::optional<Truth> truth = {};       ///< known in simulations and their replays
+  std::string name;                         ///< for people, such as "TakkTile"
+  std::string serial;                       ///< "" if none
+  std::string pressure_unit = "kPa";        ///< "kPa" or "raw"
+  std::vector<glm::dvec2> elements_mm;      ///< [e] element centres in the sensor frame
+  std::vector<std::uint8_t> valid = {};     ///< empty or [e]; 0 = dead element
+  double rate_hz = 0.0;                     ///< frames per second, 0 if unknown
+  std::vector<double> baseline = {};        ///< empty or [e]: untouched readings
+  std::string object = {};                  ///< label of what it touches, "" if unknown
+  std::optional<Truth> truth = {};          ///< known in simulations and their replays
+  std::vector<SetupFinding> findings = {};  ///< of the recording that is replayed
 };
 
 /// Counts of what arrived and failed since start().

@@ -11,6 +11,7 @@
 
 #include "palpate/api.hpp"
 #include "palpate/pose.hpp"
+#include "palpate/setup_finding.hpp"
 
 namespace palpate {
 
@@ -68,6 +69,8 @@ struct PALPATE_API Recording {
   std::vector<std::uint8_t> valid;      ///< empty, [e] or [n, e]; 0 = dead element
   std::vector<double> time_s;           ///< empty or [n], since the Unix epoch
   std::optional<Truth> truth;
+  /// What the logs that it was made of showed: "tilt", "clock" and "dropped".
+  std::vector<SetupFinding> findings;
 
   // Fields of a stream of frames. In a stream, a pose may be NaN (unknown at that time), and so may
   // a pressure (Unknown).

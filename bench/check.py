@@ -1,0 +1,191 @@
+"""How well `check` finds what is wrong with a set-up, and that it finds nothing where it is sound."""
+
+import math
+import pathlib
+import tempfile
+
+import numpy
+from numpy.typing import NDArray
+
+import palpate
+from palpate._palpate import Random, Stream
+from palpate._tables import Column, Table, number, plain
+
+from .program import Json, begin, main, parser, write
+
+SEED = 400_000_000
+TOUCHES = 60
+OBJECTS = 3  # in a set
+LETTERS = ("A", "E", "U", "I", "O", "B", "K", "4", "7", "S", "ring", "bar")
+#: Shapes of one's own, mm.
+POLYGONS = {
+    "bracket": "-12 -12\n12 -12\n12 -5\n-5 -5\n-5 12\n-12 12\n",
+    "wedge": "-13 -8\n13 -8\n13 -3\n-13 9\n",
+    "cross": "-4 -12\n4 -12\n4 -2\n11 -2\n11 5\n4 5\n4 12\n-4 12\n-4 5\n-9 5\n-9 -2\n-4 -2\n",
+}
+ARRAYS = {36: palpate.digitacts_array(), 64: palpate.grid_array(8, 8, 1.9)}
+#: How the readings of a grid [row, column] come, by the options that put them right.
+ORDERS = {
+    f"{row}-{side} --order {order}": (row == "top", side == "right", order == "columns")
+    for row in ("bottom", "top")
+    for side in ("left", "right")
+    for order in ("rows", "columns")
+}
+OFFSET_MM, OFFSET_RAD = 3.0, 0.09
+NEAR_MM, NEAR_RAD = 0.2, 0.02
+
+COLUMNS: list[Column] = [
+    ("elements", "elements", plain),
+    ("sets", "sets", plain),
+    ("sound, without a finding", "sound", plain),
+    ("orders right", "order", plain),
+    ("least nats of an order", "least_order_nats", number(".0f")),
+    ("offsets within 0.2 mm, 0.02 rad", "offset", plain),
+    ("offsets: median error, mm", "median_mm", number(".3f")),
+    ("rad", "median_rad", number(".4f")),
+    ("90 % within, mm", "most_mm", number(".3f")),
+    ("rad", "most_rad", number(".4f")),
+    ("at one angle, said", "one_angle", plain),
+]
+
+Floats = NDArray[numpy.float64]
+Touches = list[palpate.Recording]
+
+
+def misread(pressure: Floats, option: str) -> Floats:
+    """Readings in the order in which an array gives them that the option's import puts right."""
+    top, right, columns = ORDERS[option]
+    side = math.isqrt(pressure.shape[1])
+    grid = pressure.reshape(-1, side, side)
+    grid = grid[:, ::-1] if top else grid
+    grid = grid[:, :, ::-1] if right else grid
+    return (grid.transpose(0, 2, 1) if columns else grid).reshape(pressure.shape)
+
+
+def with_poses(touches: Touches, poses: list[Floats]) -> Touches:
+    return [
+        palpate.Recording(one.pressure, pose, one.elements_mm, object=one.object)
+        for one, pose in zip(touches, poses, strict=True)
+    ]
+
+
+class Set:
+    """Touches of three objects, and what is done to them."""
+
+    def __init__(self, shapes: list[str], elements_mm: Floats, seed: int) -> None:
+        self.random = Random(seed, Stream.touch_order)
+        left, self.seed, self.elements_mm = list(shapes), seed, elements_mm
+        self.shapes = [left.pop(int(u * len(left))) for u in self.random.uniforms(OBJECTS)]
+        self.touches = self.at([palpate.random_poses(TOUCHES, seed + k) for k in range(OBJECTS)])
+
+    def at(self, poses: list[Floats]) -> Touches:
+        return [
+            palpate.simulate(shape, pose, elements_mm=self.elements_mm, seed=self.seed + k)
+            for k, (shape, pose) in enumerate(zip(self.shapes, poses, strict=True))
+        ]
+
+    def misread(self) -> tuple[str, Touches]:
+        """Touches whose elements are read in another order, and the options that say so."""
+        option = list(ORDERS)[1 + int(self.random.uniforms(1)[0] * (len(ORDERS) - 1))]
+        return option, [
+            palpate.Recording(
+                misread(one.pressure, option), one.T_robot_sensor, one.elements_mm, object=one.object
+            )
+            for one in self.touches
+        ]
+
+    def misplaced(self) -> tuple[Floats, Touches]:
+        """Touches whose array sits elsewhere in the tool than their poses say, and where."""
+        offset = (2 * self.random.uniforms(3) - 1) * (OFFSET_MM, OFFSET_MM, OFFSET_RAD)
+        back = palpate.inverse(offset)
+        poses = [
+            numpy.array([palpate.compose(pose, back) for pose in one.T_robot_sensor])
+            for one in self.touches
+        ]
+        return offset, with_poses(self.touches, poses)
+
+    def at_one_angle(self) -> Touches:
+        angle = 2 * math.pi * self.random.uniforms(1)[0]
+        poses = [one.T_robot_sensor * (1, 1, 0) + (0, 0, angle) for one in self.touches]
+        return self.at(poses)
+
+
+def checked(device: palpate.Device, one: Set) -> Json:
+    """What is found in a set as it is, misread, misplaced, and touched at one angle."""
+
+    def found(touches: Touches) -> palpate.SetupCheck:
+        return palpate.check_setup(touches, device=device)
+
+    record: Json = {"objects": [pathlib.Path(shape).stem for shape in one.shapes]}
+    record["sound"] = [finding.words for finding in found(one.touches).findings]
+    option, touches = one.misread()
+    findings = found(touches).findings
+    words = option.replace(" --", "' and ").replace("order ", "order='")
+    record["order"] = {
+        "right": len(findings) == 1 and f"first_element='{words}'" in findings[0].words,
+        "option": option,
+        "nats": findings[0].nats if findings else 0.0,
+        "words": [finding.words for finding in findings],
+    }
+    offset, touches = one.misplaced()
+    findings = found(touches).findings
+    record["offset"] = {"true": offset.tolist(), "words": [finding.words for finding in findings]}
+    pose = findings[0].array_offset if len(findings) == 1 else None
+    off = offset if pose is None else pose - offset
+    record["offset"] |= {"error_mm": math.hypot(off[0], off[1]), "error_rad": abs(off[2])}
+    if findings and findings[0].sd is not None:
+        record["offset"]["sd"] = findings[0].sd
+    at_one = found(one.at_one_angle())
+    said = [remark for remark in at_one.remarks if "at nearly one angle" in remark]
+    record["one_angle"] = bool(said) and not at_one.findings
+    return record
+
+
+def summary(elements: int, records: list[Json]) -> Json:
+    mm = numpy.array([record["offset"]["error_mm"] for record in records])
+    rad = numpy.array([record["offset"]["error_rad"] for record in records])
+    return {
+        "elements": elements,
+        "sets": len(records),
+        "sound": sum(not record["sound"] for record in records),
+        "order": sum(record["order"]["right"] for record in records),
+        "least_order_nats": min(record["order"]["nats"] for record in records),
+        "offset": int(numpy.sum((mm <= NEAR_MM) & (rad <= NEAR_RAD))),
+        "median_mm": float(numpy.median(mm)),
+        "median_rad": float(numpy.median(rad)),
+        "most_mm": float(numpy.quantile(mm, 0.9)),
+        "most_rad": float(numpy.quantile(rad, 0.9)),
+        "one_angle": sum(record["one_angle"] for record in records),
+    }
+
+
+def program() -> None:
+    """Both arrays, set by set."""
+    flags = parser(
+        "check",
+        "Checks set-ups by sixty touches of each of three objects, in half an hour on a CPU core: "
+        "sound ones, with the elements in another order, with the array elsewhere in the tool, and "
+        "touched at one angle; with arrays of 36 and 64 elements, or of 36 with --quick.",
+        trials="sets [100, or 2 with --quick]",
+    )
+    options = flags.parse_args()
+    sets = options.trials or (2 if options.quick else 100)
+    device, facts = begin(options)
+    all_of: Json = {}
+    with tempfile.TemporaryDirectory() as folder:
+        shapes = list(LETTERS)
+        for name, text in POLYGONS.items():
+            shapes.append(f"{folder}/{name}.txt")
+            pathlib.Path(shapes[-1]).write_text(text)
+        table = Table(COLUMNS)
+        for elements, elements_mm in list(ARRAYS.items())[: 1 if options.quick else None]:
+            records = [
+                checked(device, Set(shapes, elements_mm, SEED + 1000 * k)) for k in range(sets)
+            ]
+            all_of[str(elements)] = records
+            table.append(summary(elements, records))
+    write(options.json, facts | {"check": table, "sets": all_of})
+
+
+if __name__ == "__main__":
+    main(program)

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+
+#include "palpate/pose.hpp"
+
+namespace palpate {
+
+/// Something that is wrong with the set-up of a robot and its array.
+struct SetupFinding {
+  /// "pose_unit", "element_order", "array_offset", "pitch", "dead_elements", "stuck_elements" or
+  /// "contradicting", as the touches say; "tilt", "clock" or "dropped", as their logs do.
+  std::string what;
+  /// By how much more likely the touches are once it is mended; of "clock", log 19 for each press
+  /// that it explains; 0 of "tilt" and "dropped", which are counted or measured.
+  double nats = 0.0;
+  std::string words;   ///< a sentence, options between `quotes`
+  std::string option;  ///< that mends it, such as "dead 13,42"; "" where none does
+  /// Pose of the recordings' array in the true sensor frame, to be applied to the elements, with
+  /// its standard deviations in mm, mm and rad.
+  std::optional<Pose> array_offset = {};
+  std::optional<std::array<double, 3>> sd = {};
+};
+
+}  // namespace palpate

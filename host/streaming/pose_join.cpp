@@ -1,0 +1,147 @@
+#include "streaming/pose_join.hpp"
+
+#include <algorithm>
+#include <filesystem>
+#include <numeric>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "io/file_identity.hpp"
+#include "io/input_file.hpp"
+#include "io/recording_rules.hpp"
+#include "palpate/pose_track.hpp"
+#include "streaming/press_clock.hpp"
+
+namespace palpate {
+
+namespace {
+
+/// Drops the poses that are unknown.
+void keep_known(PoseTable& poses) {
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < poses.time_s.size(); ++i) {
+    if (is_finite(poses.T_robot_sensor[i])) {
+      poses.time_s[kept] = poses.time_s[i];
+      if (!poses.height_mm.empty()) {
+        poses.height_mm[kept] = poses.height_mm[i];
+      }
+      poses.T_robot_sensor[kept++] = poses.T_robot_sensor[i];
+    }
+  }
+  poses.time_s.resize(kept);
+  poses.T_robot_sensor.resize(kept);
+  poses.height_mm.resize(std::min(kept, poses.height_mm.size()));
+}
+
+/// A gap that a regular log does not reach when its steps jitter or a single pose is lost.
+double usual_gap_s(const std::vector<double>& time_s) {
+  constexpr double steps = 2.5;
+  if (time_s.size() < 2) {
+    return PosedSensor::usual_gap_s;
+  }
+  std::vector<double> step_s(time_s.size());
+  std::adjacent_difference(time_s.begin(), time_s.end(), step_s.begin());
+  step_s.erase(step_s.begin());
+  const auto median = step_s.begin() + static_cast<std::ptrdiff_t>(step_s.size() / 2);
+  std::ranges::nth_element(step_s, median);
+  return std::max(PosedSensor::usual_gap_s, steps * *median);
+}
+
+/// Gives every frame the pose interpolated at its time.
+void join_by_time(const PoseTable& poses, ImportedRecording& imported) {
+  Recording& recording = imported.recording;
+  PoseTrack track(imported.largest_gap_s);
+  for (std::size_t i = 0; i < poses.time_s.size(); ++i) {
+    track.add(poses.time_s[i], poses.T_robot_sensor[i]);
+  }
+  track.end();
+  recording.T_robot_sensor.reserve(recording.time_s.size());
+  for (const double time_s : recording.time_s) {
+    const std::optional<Pose> pose = track.at(time_s);
+    recording.T_robot_sensor.push_back(pose.value_or(unknown_pose));
+    imported.in_gaps +=
+        !pose && time_s > poses.time_s.front() && time_s < poses.time_s.back() ? 1 : 0;
+  }
+}
+
+/// Adds the finding "clock" where presses and poses show it.
+void find_clock(const PoseTable& poses, const PressureSurvey& survey, const ImportOptions& options,
+                ImportedRecording& imported) {
+  Recording& recording = imported.recording;
+  if (recording.rows != "frames") {
+    return;
+  }
+  const std::vector<double>& time_s = poses.time_s.empty() ? recording.time_s : poses.time_s;
+  const PoseLog log{.time_s = time_s,
+                    .T_robot_sensor = poses.T_robot_sensor,
+                    .height_mm = poses.height_mm,
+                    .largest_gap_s = options.largest_gap_s.value_or(usual_gap_s(time_s))};
+  if (const auto offset = clock_offset(recording.time_s, survey.load(), log,
+                                       array_reach_mm(recording.elements_mm))) {
+    recording.findings.push_back(clock_finding(*offset, options.pose_delay_s));
+  }
+}
+
+/// Drops the poses that are unknown, where they have times.
+void require_times(const ImportOptions& options, const Recording& recording, PoseTable& poses) {
+  if (poses.time_s.empty()) {
+    return;
+  }
+  if (recording.time_s.empty()) {
+    refuse(options.poses,
+           "has times, {} has none; give both a column 'time' or neither, or give the frames' "
+           "`rate`",
+           options.pressures);
+  }
+  keep_known(poses);
+  if (poses.time_s.empty()) {
+    refuse(options.poses, "holds no pose; write x, y and theta where they are known");
+  }
+}
+
+}  // namespace
+
+bool in_one_file(const ImportOptions& options) {
+  return identity_of(std::filesystem::path(options.poses)) ==
+         identity_of(std::filesystem::path(options.pressures));
+}
+
+void join(PoseTable poses, const PressureSurvey& survey, const ImportOptions& options,
+          ImportedRecording& imported) {
+  Recording& recording = imported.recording;
+  const std::size_t n = survey.rows();
+  require_times(options, recording, poses);
+  if (!poses.time_s.empty()) {
+    find_clock(poses, survey, options, imported);
+    imported.largest_gap_s = options.largest_gap_s.value_or(usual_gap_s(poses.time_s));
+    join_by_time(poses, imported);
+    if (std::ranges::none_of(recording.T_robot_sensor, is_finite)) {
+      const auto clock = std::ranges::find(recording.findings, "clock", &SetupFinding::what);
+      refuse(options.poses,
+             "no row of {} finds a pose: its times are {} to {} s, the poses' are {} to {} s; {}",
+             options.pressures, recording.time_s.front(), recording.time_s.back(),
+             poses.time_s.front(), poses.time_s.back(),
+             clock == recording.findings.end() ? "check clocks and units, or raise `largest-gap-s`"
+                                               : clock->words);
+    }
+    return;
+  }
+  if (poses.T_robot_sensor.size() != n && in_one_file(options)) {
+    refuse(options.poses,
+           "has {} rows of readings for {} frames or touches; give the poses in a table of their "
+           "own, with a row for each",
+           poses.T_robot_sensor.size(), n);
+  }
+  if (poses.T_robot_sensor.size() != n) {
+    refuse(options.poses,
+           "holds {} poses without a time for {} rows of {}; write one for each row, or give both "
+           "a column 'time'",
+           poses.T_robot_sensor.size(), n, options.pressures);
+  }
+  find_clock(poses, survey, options, imported);
+  recording.T_robot_sensor = std::move(poses.T_robot_sensor);
+}
+
+}  // namespace palpate
