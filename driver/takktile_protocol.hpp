@@ -13,7 +13,8 @@
 namespace palpate::takktile {
 
 // Vendor requests of the published firmware, TakkTile-usb: firmware/main.c, and TakkTile.py for the
-// calibration. All are IN requests to the device, also the request that starts and stops the stream.
+// calibration. All are IN requests to the device, also the request that starts and stops the
+// stream.
 inline constexpr std::uint16_t vendor_id = 0x59e3;
 inline constexpr std::uint16_t product_id = 0x74c7;
 inline constexpr std::uint8_t request_type = 0xc0;
