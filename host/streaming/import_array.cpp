@@ -155,7 +155,7 @@ PressureTable read_npy_pressures(const std::string& path, const ImportArray& arr
   return {.pressure = std::move(npy.values)};
 }
 
-void mark_unknown(const std::string& path, const PressureSurvey& survey, Recording& recording) {
+void mark_unknown(const std::string& path, const ImportSurvey& survey, Recording& recording) {
   const std::size_t e = survey.elements();
   std::vector<std::uint8_t> read = survey.read();
   for (std::size_t i = 0; i < recording.valid.size(); ++i) {

@@ -26,6 +26,6 @@ PressureTable read_npy_pressures(const std::string& path, const ImportArray& arr
 /// Marks as dead the elements without any reading. In touches, which have no unknown readings, it
 /// also marks single readings.
 /// @throws Error naming `path` where no element has any
-void mark_unknown(const std::string& path, const PressureSurvey& survey, Recording& recording);
+void mark_unknown(const std::string& path, const ImportSurvey& survey, Recording& recording);
 
 }  // namespace palpate

@@ -67,7 +67,7 @@ void join_by_time(const PoseTable& poses, ImportedRecording& imported) {
 }
 
 /// Adds the finding "clock" where presses and poses show it.
-void find_clock(const PoseTable& poses, const PressureSurvey& survey, const ImportOptions& options,
+void find_clock(const PoseTable& poses, const ImportSurvey& survey, const ImportOptions& options,
                 ImportedRecording& imported) {
   Recording& recording = imported.recording;
   if (recording.rows != "frames") {
@@ -108,7 +108,7 @@ bool in_one_file(const ImportOptions& options) {
          identity_of(std::filesystem::path(options.pressures));
 }
 
-void join(PoseTable poses, const PressureSurvey& survey, const ImportOptions& options,
+void join(PoseTable poses, const ImportSurvey& survey, const ImportOptions& options,
           ImportedRecording& imported) {
   Recording& recording = imported.recording;
   const std::size_t n = survey.rows();

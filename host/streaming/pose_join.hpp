@@ -1,7 +1,7 @@
 #pragma once
 
 #include "io/pose_table.hpp"
-#include "streaming/pressure_survey.hpp"
+#include "streaming/import_survey.hpp"
 #include "streaming/table_import.hpp"
 
 namespace palpate {
@@ -12,7 +12,7 @@ bool in_one_file(const ImportOptions& options);
 /// Gives every row of the recording its pose, by time or row by row, and adds the finding "clock"
 /// where presses and poses show it.
 /// @throws Error where no row finds a pose
-void join(PoseTable poses, const PressureSurvey& survey, const ImportOptions& options,
+void join(PoseTable poses, const ImportSurvey& survey, const ImportOptions& options,
           ImportedRecording& imported);
 
 }  // namespace palpate

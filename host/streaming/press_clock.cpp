@@ -21,7 +21,6 @@ constexpr std::size_t least_presses = 5;
 constexpr int samples = 5;  // of the poses in a press
 // A press during which the array moves so far counts in full as one against the clocks.
 constexpr double much_motion_mm = 2.0;
-constexpr double much_height_mm = 2.0;
 
 /// The middle half of a press, in the frames' time.
 struct Press {
@@ -144,7 +143,7 @@ class Comparison {
       return 1.0;
     }
     const double lift_mm = highest_mm_ - lowest_mm_;
-    const double lifted = lift_mm > much_height_mm ? (stay.height_mm - lowest_mm_) / lift_mm : 0.0;
+    const double lifted = lift_mm > much_motion_mm ? (stay.height_mm - lowest_mm_) / lift_mm : 0.0;
     return std::clamp(std::max(lifted, stay.motion_mm / much_motion_mm), 0.0, 1.0);
   }
 

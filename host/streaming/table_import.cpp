@@ -267,14 +267,14 @@ ImportedRecording import_rows(const ImportOptions& options, ImportRows rows) {
   return recording_of(options, import_array(options), std::move(rows));
 }
 
-PressureSurvey survey_for(const ImportOptions& options, std::size_t elements) {
+ImportSurvey survey_for(const ImportOptions& options, std::size_t elements) {
   ImportArray array = import_array(options);
   if (array.elements_mm.size() != elements) {
     refuse(options.pressures,
            "has {} readings a frame for an array of {} elements; correct `array`", elements,
            array.elements_mm.size());
   }
-  return PressureSurvey(elements, std::move(array.valid));
+  return ImportSurvey(elements, std::move(array.valid));
 }
 
 }  // namespace palpate

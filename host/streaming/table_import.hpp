@@ -11,7 +11,7 @@
 #include "io/pressure_table.hpp"
 #include "palpate/pose_track.hpp"
 #include "palpate/touch.hpp"
-#include "streaming/pressure_survey.hpp"
+#include "streaming/import_survey.hpp"
 
 namespace palpate {
 
@@ -67,7 +67,7 @@ struct ImportRows {
   std::optional<PoseTable> poses;             ///< in space, in mm
   std::optional<SpatialPose> T_robot_object;  ///< true pose of the object, in space
   /// Of pressures that are not held, in the place of theirs: the recording then has none.
-  std::optional<PressureSurvey> survey;
+  std::optional<ImportSurvey> survey;
 };
 /// As import_tables() of tables that hold this. The options' files name what the rows came from;
 /// poses without times are by the clock of the frames.
@@ -76,6 +76,6 @@ ImportedRecording import_rows(const ImportOptions& options, ImportRows rows);
 
 /// What takes the pressures of rows that are not held. @throws Error where the array is of other
 /// elements, or cannot be read
-PressureSurvey survey_for(const ImportOptions& options, std::size_t elements);
+ImportSurvey survey_for(const ImportOptions& options, std::size_t elements);
 
 }  // namespace palpate

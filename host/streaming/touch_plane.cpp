@@ -59,7 +59,7 @@ glm::dvec3 normal_across(const glm::dvec3& looks) {
 
 /// [pose] whether the array is pressed in the row of the pose, or in the one nearest in time.
 std::vector<bool> pressed_poses(const PoseTable& poses, const Recording& recording,
-                                const PressureSurvey& survey) {
+                                const ImportSurvey& survey) {
   const std::vector<bool> rows =
       recording.rows == "touches" ? std::vector<bool>(survey.rows(), true) : survey.pressed();
   const std::vector<double>& time_s = recording.time_s;
@@ -182,7 +182,7 @@ std::optional<glm::dvec3> plane_normal(const std::string& plane) {
   return normal;
 }
 
-std::vector<std::string> take_into_plane(const TouchPlane& plane, const PressureSurvey& survey,
+std::vector<std::string> take_into_plane(const TouchPlane& plane, const ImportSurvey& survey,
                                          PoseTable& poses, Recording& recording) {
   recording.findings = tilt_of(plane, poses.spatial, pressed_poses(poses, recording, survey));
   poses.T_robot_sensor.reserve(poses.spatial.size());

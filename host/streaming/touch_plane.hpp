@@ -8,7 +8,7 @@
 
 #include "io/pose_table.hpp"
 #include "palpate/touch.hpp"
-#include "streaming/pressure_survey.hpp"
+#include "streaming/import_survey.hpp"
 
 namespace palpate {
 
@@ -52,7 +52,7 @@ std::optional<glm::dvec3> plane_normal(const std::string& plane);
 /// Takes a table's poses in space into the plane of the touches, with their heights above it, turns
 /// the recording's array over where it faces down, and gives it its findings "tilt".
 /// @returns what words_about() says
-std::vector<std::string> take_into_plane(const TouchPlane& plane, const PressureSurvey& survey,
+std::vector<std::string> take_into_plane(const TouchPlane& plane, const ImportSurvey& survey,
                                          PoseTable& poses, Recording& recording);
 
 }  // namespace palpate

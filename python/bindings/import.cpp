@@ -99,7 +99,7 @@ std::optional<SpatialPose> spatial_pose(std::span<const double> row) {
                      glm::normalize(glm::dquat(row[6], row[3], row[4], row[5]))};
 }
 
-ImportedFrames import_frames(const ImportOptions& given, const PressureSurvey& survey,
+ImportedFrames import_frames(const ImportOptions& given, const ImportSurvey& survey,
                              const ArrayLike& time_s, const ArrayLike& pose_time_s,
                              const std::optional<ArrayLike>& elements_mm,
                              const std::optional<ArrayLike>& poses,
@@ -146,17 +146,17 @@ ArrayRecording with_pressures(const ImportedFrames& frames, const Rows& rows) {
 }
 
 void bind_frames(nb::module_& module) {
-  nb::class_<PressureSurvey>(module, "PressureSurvey", "Takes the frames of a log, block by block.")
+  nb::class_<ImportSurvey>(module, "ImportSurvey", "Takes the frames of a log, block by block.")
       .def(
           "__init__",
-          [](PressureSurvey* self, const ImportOptions& given, std::size_t elements,
+          [](ImportSurvey* self, const ImportOptions& given, std::size_t elements,
              const std::optional<ArrayLike>& elements_mm) {
-            new (self) PressureSurvey(survey_for(with_elements(given, elements_mm), elements));
+            new (self) ImportSurvey(survey_for(with_elements(given, elements_mm), elements));
           },
           "options"_a, "elements"_a, "elements_mm"_a = nb::none())
       .def(
           "add",
-          [](PressureSurvey& self, const ArrayLike& rows) {
+          [](ImportSurvey& self, const ArrayLike& rows) {
             const Floats block = ArrayReader().floats(rows, "rows", {"k", "e"});
             self.add(block.values());
           },

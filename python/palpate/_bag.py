@@ -90,7 +90,7 @@ def read_frames(
         frames = bag.pressures(
             pressure_topic,
             pressure_field,
-            lambda elements: _palpate.PressureSurvey(request, elements, elements_mm),
+            lambda elements: _palpate.ImportSurvey(request, elements, elements_mm),
         )
         poses = bag.poses(pose_topic) if pose_topic is not None else None
         wanted = [chain for chain in (tf, truth_tf) if chain is not None]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from ._bag_transforms import Transforms, row_of, stamp_s
 from ._error import Error
-from ._palpate import PressureSurvey
+from ._palpate import ImportSurvey
 
 # The build writes the stubs by importing the package, where there is no NumPy.
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 Progress = Callable[[float], object]
 #: Makes what takes the blocks of an array of so many elements.
-SurveyFor = Callable[[int], PressureSurvey]
+SurveyFor = Callable[[int], ImportSurvey]
 
 #: Where the pressures of known types lie; of another type, the only list of numbers is taken.
 _PRESSURES = {
@@ -114,7 +114,7 @@ class Pressures(_Timed):
         super().__init__(topic, has_header)
         self.path = path
         self.survey_for = survey_for
-        self.survey: PressureSurvey | None = None
+        self.survey: ImportSurvey | None = None
         self.elements = 0
         self.narrow = True  #: float32 holds all readings
         self.held = 0  #: frames of the block that are not in the file yet
@@ -158,7 +158,7 @@ class Pressures(_Timed):
         self.file.write(rows.tobytes())
         self.held = 0
 
-    def finish(self, log: str) -> PressureSurvey:
+    def finish(self, log: str) -> ImportSurvey:
         """What is known of all readings."""
         self.require_some(log)
         assert self.survey is not None

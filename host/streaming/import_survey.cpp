@@ -1,4 +1,4 @@
-#include "streaming/pressure_survey.hpp"
+#include "streaming/import_survey.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,14 +6,14 @@
 
 namespace palpate {
 
-PressureSurvey::PressureSurvey(std::size_t elements, std::vector<std::uint8_t> valid)
+ImportSurvey::ImportSurvey(std::size_t elements, std::vector<std::uint8_t> valid)
     : valid_(std::move(valid)),
       read_(elements, 0),
       least_(elements, std::numeric_limits<double>::infinity()) {
   valid_.resize(elements, 1);
 }
 
-void PressureSurvey::add(std::span<const double> pressure) {
+void ImportSurvey::add(std::span<const double> pressure) {
   const std::size_t e = elements();
   for (std::size_t k = 0; k < pressure.size(); ++k) {
     const double p = pressure[k];
@@ -34,7 +34,7 @@ void PressureSurvey::add(std::span<const double> pressure) {
   }
 }
 
-std::vector<bool> PressureSurvey::pressed() const {
+std::vector<bool> ImportSurvey::pressed() const {
   const float most = load_.empty() ? 0.0F : *std::ranges::max_element(load_);
   std::vector<bool> pressed;
   for (const float load : load_) {
@@ -43,7 +43,7 @@ std::vector<bool> PressureSurvey::pressed() const {
   return pressed;
 }
 
-std::optional<double> PressureSurvey::whole_up_to() const {
+std::optional<double> ImportSurvey::whole_up_to() const {
   constexpr double least = 100.0;  // thresholded pressures may be small whole numbers
   return whole_ && largest_ >= least ? std::optional(largest_) : std::nullopt;
 }

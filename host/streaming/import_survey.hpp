@@ -9,10 +9,10 @@
 namespace palpate {
 
 /// What an import has to know of all readings; it needs no readings but those of the next rows.
-class PressureSurvey {
+class ImportSurvey {
  public:
   /// @param valid [e] or empty; 0 = dead element
-  explicit PressureSurvey(std::size_t elements, std::vector<std::uint8_t> valid = {});
+  explicit ImportSurvey(std::size_t elements, std::vector<std::uint8_t> valid = {});
 
   /// Takes the next rows, [k, e]; NaN: Unknown.
   void add(std::span<const double> pressure);
