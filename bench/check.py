@@ -56,7 +56,7 @@ def misread(pressure: Floats, option: str) -> Floats:
     """Readings in the order in which an array gives them that the option's import puts right."""
     top, right, columns = ORDERS[option]
     side = math.isqrt(pressure.shape[1])
-    grid = pressure.reshape(-1, side, side)
+    grid: Floats = pressure.reshape(-1, side, side)
     grid = grid[:, ::-1] if top else grid
     grid = grid[:, :, ::-1] if right else grid
     return (grid.transpose(0, 2, 1) if columns else grid).reshape(pressure.shape)

@@ -116,8 +116,8 @@ def program() -> None:
     with tempfile.TemporaryDirectory() as folder:
         learned = pathlib.Path(folder, "sensor.yaml")
         palpate.calibrate(training, layer="log_odds", device=device).sensor.save(learned)
-        for sensor, given in (("Eq. 7", {}), ("learned", {"sensor_model": learned})):
-            records = palpate.recognize(trials, maps, trace=True, device=device, **given)
+        for sensor, model in (("Eq. 7", None), ("learned", learned)):
+            records = palpate.recognize(trials, maps, trace=True, device=device, sensor_model=model)
             for touches in TOUCHES:
                 steps = [record["trace"][touches - 1] for record in records]
                 row: Json = {"sensor": sensor, "touches": touches, "unknowns": len(trials)}

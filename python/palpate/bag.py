@@ -4,6 +4,8 @@
 """
 
 import argparse
+import os
+import re
 import sys
 import warnings
 from contextlib import closing
@@ -67,6 +69,19 @@ def _frames(flag: str, text: str | None) -> tuple[str, str] | None:
     return target, source
 
 
+def _in_flags(message: str, parser: argparse.ArgumentParser) -> str:
+    """The message with options as flags, where it has Python's keywords: "tf=", "pressure_field"."""
+    for action in parser._actions:
+        if not action.option_strings:
+            continue
+        name, flag = action.dest, action.option_strings[-1]
+        # Some keywords are words of their own, too.
+        ends = r"\b=?" if "_" in name or name == "tf" else r"(?:=|(?=:))"
+        message = re.sub(rf"(?<![\w/:-]){name}=(?=[\w('])", flag + " ", message)
+        message = re.sub(rf"(?<![\w/:-]){name}{ends}", flag, message)
+    return message
+
+
 def _show_progress(fraction: float) -> None:
     print(f"\rreading {100.0 * fraction:3.0f} %", end="", file=sys.stderr, flush=True)
 
@@ -82,6 +97,9 @@ def _run(arguments: argparse.Namespace) -> None:
     for flag in ("pressure_topic", "array", "output"):
         if getattr(arguments, flag) is None:
             raise Error(f"--{flag.replace('_', '-')}: missing; --list shows the topics of the log")
+    folder = os.path.dirname(arguments.output) or "."
+    if os.path.isdir(arguments.output) or not os.access(folder, os.W_OK):
+        raise Error(f"-o {arguments.output}: cannot be written; give a file in a folder that exists")
     try:
         dead = [int(text) for text in arguments.dead.split(",") if arguments.dead]
     except ValueError:
@@ -116,17 +134,25 @@ def _run(arguments: argparse.Namespace) -> None:
     with closing(frames.file):
         imported.write(arguments.output, frames.narrow, frames.rows)
     warn(imported.remarks)
+    posed = f"{imported.posed} with a pose"
+    if arguments.tf is None and arguments.pose_topic is None:
+        posed = "none with a pose, as neither --tf nor --pose-topic is given"
     print(f"{arguments.output}: {len(frames.time_s)} frames of {frames.elements} elements, "
-          f"{imported.posed} with a pose; next: palpate touches {arguments.output} -o TOUCHES.h5")  # fmt: skip
+          f"{posed}; next: palpate touches {arguments.output} -o TOUCHES.h5")  # fmt: skip
 
 
 def main() -> int:
     """The command; returns its exit status, 2 where the input is wrong."""
-    warnings.showwarning = lambda message, *_: print(f"palpate.bag: {message}", file=sys.stderr)
+    parser = _flag_parser()
+
+    def say(message: object) -> None:
+        print(f"palpate.bag: {_in_flags(str(message), parser)}", file=sys.stderr)
+
+    warnings.showwarning = lambda message, *_: say(message)
     try:
-        _run(_flag_parser().parse_args())
+        _run(parser.parse_args())
     except (Error, OSError) as error:
-        print(f"palpate.bag: {error}", file=sys.stderr)
+        say(error)
         return 1 if getattr(error, "fault", "input") == "system" else 2
     return 0
 

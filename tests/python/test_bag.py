@@ -340,11 +340,21 @@ def test_the_program_writes_what_the_function_returns(tmp_path: pathlib.Path) ->
     assert "10 frames of 4 elements, 10 with a pose; next: palpate touches" in done.stdout
     assert "palpate.bag: " in done.stderr
     expect_poses(palpate.read_recording(file))
+    unposed = run(log, *flags[:4], "-o", tmp_path / "unposed.h5")
+    assert "none with a pose, as neither --tf nor --pose-topic is given" in unposed.stdout
     for arguments, words in (
         ((log,), "--pressure-topic: missing; --list shows"),
         ((log, *flags), "--output: missing"),
         ((log, *flags, "--tf", "base", "-o", file), "--tf base: give two frames, TARGET:SOURCE"),
         ((tmp_path / "none.bag", "--list"), "none.bag: no such file"),
+        ((log, *flags, "-o", tmp_path), ": cannot be written; give a file in a folder that exists"),
+        ((log, *flags, "-o", tmp_path / "none" / "f.h5"), ": cannot be written; give a file"),
+        ((log, *flags, "--array", "2:3:2", "-o", file), "array of 6 elements; correct --array\n"),
+        ((log, *flags, "--tf", "base:head", "-o", file), ": --tf base:head: no chain of transforms"),
+        (
+            (log, "--pressure-topic", "/hand", *flags[2:], "-o", file),
+            "name one by --pressure-field\n",
+        ),
     ):
         wrong = run(*arguments)
         assert wrong.returncode == 2 and words in wrong.stderr, wrong.stderr
