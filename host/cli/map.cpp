@@ -18,6 +18,7 @@
 #include "cli/recognition_flags.hpp"
 #include "estimation/maps/left_out_fit.hpp"
 #include "figures/figures.hpp"
+#include "io/file_summary.hpp"
 #include "learning/observed_map.hpp"
 #include "learning/press.hpp"
 #include "learning/setup_check.hpp"

@@ -349,24 +349,25 @@ void prepare_outputs(const MapFlags& flags, const std::vector<std::filesystem::p
     files.reads("--sensor-model", flags.sensor_model);
   }
   for (const std::filesystem::path& path : map_paths) {
-    files.writes("-o", path);
+    if (flags.to_folder()) {
+      files.writes_in("-o", path.parent_path(), path.filename().string());
+    } else {
+      files.writes("-o", path);
+    }
   }
   if (!flags.png.empty()) {
     files.writes("--png", flags.png);
   }
   if (!flags.ros.empty()) {
     for (const std::string& name : names) {
-      files.writes("--ros", ros_path(flags, name));
-      files.writes("--ros", ros_path(flags, name).replace_extension(".pgm"));
+      const std::filesystem::path yaml = ros_path(flags, name);
+      for (std::filesystem::path file :
+           {yaml, std::filesystem::path(yaml).replace_extension(".pgm")}) {
+        files.writes_in("--ros", file.parent_path(), file.filename().string());
+      }
     }
   }
-  files.require_distinct();
-  if (!flags.to_folder()) {
-    require_writable(flags.output);
-  }
-  if (!flags.png.empty()) {
-    require_writable(flags.png);
-  }
+  files.prepare();
 }
 
 }  // namespace palpate::cli

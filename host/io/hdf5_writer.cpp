@@ -34,7 +34,10 @@ void* copy(void* to, const void* from, std::size_t size, H5FD_file_image_op_t, v
 
 void* grow(void* memory, std::size_t needed, H5FD_file_image_op_t, void* user) {
   auto& image = *static_cast<Hdf5Image*>(user);
-  if (memory != nullptr && needed <= image.capacity) {
+  if (memory == nullptr) {
+    image.capacity = 0;  // HDF5 first loads a file of its name that lies in the working folder
+  }
+  if (needed <= image.capacity) {
     return memory;
   }
   const std::size_t size = std::max(needed, image.expected);

@@ -143,8 +143,8 @@ void write_recording(const std::filesystem::path& path, const Recording& recordi
   });
 }
 
-void write_recording(const std::filesystem::path& path, const Recording& recording, bool narrow,
-                     const PressureRows& rows) {
+void write_recording_in_parts(const std::filesystem::path& path, const Recording& recording,
+                              bool narrow, const PressureRows& rows) {
   const std::size_t e = recording.elements_mm.size();
   write_whole(path, recording, e, narrow, [&](Hdf5Writer& file) {
     const auto part = [&](std::size_t first) {

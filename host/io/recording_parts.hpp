@@ -15,7 +15,7 @@ using PressureRows = std::function<std::vector<double>(std::size_t first)>;
 /// Writes a recording of a constant array that holds no pressures: they come in parts.
 /// @param narrow float32 holds the pressures
 /// @throws Error as write_recording()
-void write_recording(const std::filesystem::path& path, const Recording& recording, bool narrow,
-                     const PressureRows& rows);
+void write_recording_in_parts(const std::filesystem::path& path, const Recording& recording,
+                              bool narrow, const PressureRows& rows);
 
 }  // namespace palpate

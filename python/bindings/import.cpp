@@ -173,7 +173,7 @@ void bind_frames(nb::module_& module) {
       .def(
           "write",
           [](const ImportedFrames& self, const PathLike& file, bool narrow, const Rows& rows) {
-            write_recording(file.path(), self.imported.recording, narrow, rows_of(rows));
+            write_recording_in_parts(file.path(), self.imported.recording, narrow, rows_of(rows));
           },
           "path"_a, "narrow"_a, "rows"_a,
           "Writes the recording, as recording(rows).save(path). narrow: float32 holds the "

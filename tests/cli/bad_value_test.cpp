@@ -85,7 +85,7 @@ INSTANTIATE_TEST_SUITE_P(
         Flag{"recognize", "pivot-mm", {"x", "1", "1,2,3", "nan,1", "1:2"}},
         Flag{"recognize", "prior", {"x", "0.2x", "nan", "0", "-1", "1", "1.5"}},
         Flag{"recognize", "gamma", {"x", "nan", "-0.1", "1", "1.5"}},
-        Flag{"recognize", "none", {"x", "1x", "nan", "inf", "0", "-1"}},
+        Flag{"recognize", "none", {"x", "1x", "nan", "inf", "-1"}},
         Flag{"recognize", "threshold", {"x", "1x", "nan", "inf", "-1"}},
         Flag{"recognize", "ratio", {"x", "nan", "-1", "1", "2"}},
         Flag{"recognize", "frames", {"x", "1", "1:2:3", "3:3", "2:1", "-1:3", "0:4", "1.5:3"}},

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include <fmt/format.h>
+
 #include "program.hpp"
 #include "sample_files.hpp"
 
@@ -124,26 +126,28 @@ TEST_F(UncertaintyFlags, ParticlesRefuseTheOthers) {
   expect_scene_refused("filter: particles\ntouch_sd: {mm: 1}\n", {"scene.yaml", "touch_sd mm"});
 }
 
-TEST_F(UncertaintyFlags, NoneWithoutANumberIsAsLikelyAsAllMaps) {
-  const json even = record_with({"--none"});
-  EXPECT_EQ(even, record_with({"--none", "2"})) << "two maps of weight 1";
-  EXPECT_EQ(even, record_in_scene("none: auto\n"));
-  EXPECT_EQ(even, record_with({"--none", "--gamma", "0.1"})) << "a flag is no number";
-  EXPECT_EQ(even, record_with({"--none=auto"}));
+TEST_F(UncertaintyFlags, NoneWithoutANumberIsOneInTen) {
+  const json usual = record_with({"--none"});
+  EXPECT_EQ(usual, record_with({"--none", fmt::format("{:.17g}", 2.0 / 9.0)}))
+      << "two maps of weight 1";
+  EXPECT_EQ(usual, record_in_scene("none: auto\n"));
+  EXPECT_EQ(usual, record_with({"--none", "--gamma", "0.1"})) << "a flag is no number";
+  EXPECT_EQ(usual, record_with({"--none=auto"}));
   put_bytes(folder_ / "scene.yaml",
             "none: auto\nobjects: [{map: maps/A.map.h5, weight: 3}, {map: maps/I.map.h5}]\n");
   const json heavy = record({"u.h5", "--scene", "scene.yaml"});
-  const json four = record({"u.h5", "--scene", "scene.yaml", "--none", "4"});
-  EXPECT_EQ(heavy["identity"], four["identity"]);
+  const json ninth =
+      record({"u.h5", "--scene", "scene.yaml", "--none", fmt::format("{:.17g}", 4.0 / 9.0)});
+  EXPECT_EQ(heavy["identity"], ninth["identity"]);
 }
 
 TEST_F(UncertaintyFlags, NoneTakesNoFileForItsNumber) {
   EXPECT_EQ(palpate({"recognize", "--maps", "maps", "--none", "u.h5"}).status, 0)
       << "the recording that every call needs";
   expect_refused({"recognize", "u.h5", "--maps", "maps", "--none", "v.h5"},
-                 {"--none v.h5", "above 0", "recordings stand before"});
-  for (const char* wrong : {"nan", "inf", "0", "-1", "x"}) {
-    expect_refused(with({std::string("--none=") + wrong}), {"--none", wrong, "above 0"});
+                 {"--none v.h5", "from 0", "recordings stand before"});
+  for (const char* wrong : {"nan", "inf", "-1", "x"}) {
+    expect_refused(with({std::string("--none=") + wrong}), {"--none", wrong, "from 0"});
   }
   expect_refused(with({"--none", ""}), {"--none", "give a"});
 }
