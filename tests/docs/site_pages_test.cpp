@@ -88,17 +88,17 @@ TEST_F(SitePages, HowSureTellsTheStranger) {
   const nlohmann::json compared = json("result.json");
   EXPECT_EQ(compared[0]["best"], "E");
   EXPECT_FALSE(compared[0].contains("warnings"));
-  // The T passes as a letter that was learned, with a probability near 1 and a warning.
+  // The T is taken for a letter that was learned, with a probability near 1; it does not fit.
   EXPECT_EQ(compared[1]["best"], "U");
   EXPECT_GT(compared[1]["identity"]["U"].get<double>(), 0.9);
-  EXPECT_EQ(compared[1]["fit"]["verdict"], "fits");
-  expect_quoted("how_sure.md", compared[1]["warnings"].dump(),
-                {"the touches contradict each other"});
+  EXPECT_EQ(compared[1]["fit"]["verdict"], "does not fit");
+  expect_quoted("how_sure.md", said, {"stranger.h5: do not act: the touches do not fit U, 20"});
   const nlohmann::json with_none = json("none.json");
   EXPECT_EQ(with_none[0]["best"], "E");
   EXPECT_EQ(with_none[1]["best"], "(none)");
   expect_quoted("how_sure.md", said,
-                {"unknown.h5: E at 9.4", "stranger.h5: do not act: probably never learned"});
+                {"unknown.h5: touch again: 95 % of the belief lies within 0.87 mm",
+                 "stranger.h5: touch again: (none) has 100.0 %"});
   expect_named(said, {"% of the belief unproven"});  // the budget of 1 ms
 }
 
