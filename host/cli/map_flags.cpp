@@ -361,7 +361,7 @@ void prepare_outputs(const MapFlags& flags, const std::vector<std::filesystem::p
   if (!flags.ros.empty()) {
     for (const std::string& name : names) {
       const std::filesystem::path yaml = ros_path(flags, name);
-      for (std::filesystem::path file :
+      for (const std::filesystem::path& file :
            {yaml, std::filesystem::path(yaml).replace_extension(".pgm")}) {
         files.writes_in("--ros", file.parent_path(), file.filename().string());
       }
