@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "file_parts.hpp"
-#include "io/recording_parts.hpp"
 #include "limits.hpp"
 #include "palpate/files.hpp"
 #include "scratch_folder.hpp"
@@ -61,33 +60,6 @@ TEST_F(RecordingFile, ComesBackAsItWasWritten) {
   expect_same(read, written);
   EXPECT_EQ(read.path, path_.string());
   EXPECT_FALSE(read.truth);
-}
-
-// HDF5 loads a file of the name that it is given for the one in memory, and frees it again.
-TEST_F(RecordingFile, IsTheSameBesideAFileOfTheNameInMemory) {
-  const std::filesystem::path here = std::filesystem::current_path();
-  put_bytes(folder_ / "palpate", std::string(4 << 20, '?'));
-  write_recording(path_, small_recording());
-  std::filesystem::current_path(folder_.path());
-  write_recording(folder_ / "beside.h5", small_recording());
-  std::filesystem::current_path(here);
-  EXPECT_EQ(bytes_of(folder_ / "beside.h5"), bytes_of(path_));
-}
-
-TEST_F(RecordingFile, IsTheSameWhereItsPressuresComeInParts) {
-  Recording recording = small_recording();
-  recording.T_robot_sensor.push_back({{5.0, 6.0}, 0.5});
-  recording.pressure.insert(recording.pressure.end(), {7.0, 0.1, 9.0});
-  write_recording(path_, recording);
-  const std::vector<double> pressure = std::exchange(recording.pressure, {});
-  for (const std::size_t rows : {1, 2, 3}) {
-    write_recording_in_parts(folder_ / "parts.h5", recording, false, [&](std::size_t first) {
-      const std::size_t end = std::min<std::size_t>(first + rows, 3);
-      return std::vector(pressure.begin() + static_cast<std::ptrdiff_t>(3 * first),
-                         pressure.begin() + static_cast<std::ptrdiff_t>(3 * end));
-    });
-    EXPECT_EQ(bytes_of(folder_ / "parts.h5"), bytes_of(path_)) << rows;
-  }
 }
 
 TEST_F(RecordingFile, KeepsWhatItsLogsShowed) {

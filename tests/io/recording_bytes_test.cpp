@@ -1,0 +1,55 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "io/recording_parts.hpp"
+#include "palpate/files.hpp"
+#include "scratch_folder.hpp"
+
+namespace palpate::recording_bytes_test {
+
+class RecordingBytes : public testing::Test {
+ protected:
+  RecordingBytes() {
+    recording_.T_robot_sensor = {{{1.0, 2.0}, 3.0}, {{-4.0, 0.1}, -70.0}, {{5.0, 6.0}, 0.5}};
+    recording_.pressure = {0.0, -1.5, 2.25, 1e6, 0.5, 3.0, 7.0, 0.1, 9.0};
+    recording_.elements_mm = {{-1.0, 0.1}, {0.0, 0.2}, {1.0, 0.3}};
+    write_recording(folder_ / "whole.h5", recording_);
+  }
+
+  void expect_whole(const char* file) const {
+    EXPECT_EQ(bytes_of(folder_ / file), bytes_of(folder_ / "whole.h5"));
+  }
+
+  ScratchFolder folder_;
+  Recording recording_;
+};
+
+// HDF5 loads a file of the name that it is given for the one in memory, and frees it again.
+TEST_F(RecordingBytes, AreTheSameBesideAFileOfTheNameInMemory) {
+  const std::filesystem::path here = std::filesystem::current_path();
+  put_bytes(folder_ / "palpate", std::string(4 << 20, '?'));
+  std::filesystem::current_path(folder_.path());
+  write_recording(folder_ / "beside.h5", recording_);
+  std::filesystem::current_path(here);
+  expect_whole("beside.h5");
+}
+
+TEST_F(RecordingBytes, AreTheSameWherePressuresComeInParts) {
+  const std::vector<double> pressure = std::exchange(recording_.pressure, {});
+  for (const std::size_t rows : {1, 2, 3}) {
+    SCOPED_TRACE(rows);
+    write_recording_in_parts(folder_ / "parts.h5", recording_, false, [&](std::size_t first) {
+      const std::size_t end = std::min<std::size_t>(first + rows, 3);
+      return std::vector(pressure.begin() + static_cast<std::ptrdiff_t>(3 * first),
+                         pressure.begin() + static_cast<std::ptrdiff_t>(3 * end));
+    });
+    expect_whole("parts.h5");
+  }
+}
+
+}  // namespace palpate::recording_bytes_test
