@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <string>
@@ -42,13 +43,7 @@ void check_outputs(const CheckArguments& options) {
   if (!options.write_array.empty()) {
     files.writes("--write-array", options.write_array);
   }
-  files.require_distinct();
-  if (!options.json.empty() && options.json != "-") {
-    require_writable(options.json);
-  }
-  if (!options.write_array.empty()) {
-    require_writable(options.write_array);
-  }
+  files.prepare();
 }
 
 std::string json_of(const SetupCheck& check) {
@@ -103,6 +98,12 @@ void check(const CheckArguments& options) {
   }
   for (const SetupFinding& finding : found.findings) {
     fmt::print("{} ({:.0f} nats)\n", in_flags(finding.words), finding.nats);
+  }
+  const auto moves_elements = [](const SetupFinding& finding) {
+    return finding.what == "array_offset" || finding.what == "pitch";
+  };
+  if (options.write_array.empty() && std::ranges::any_of(found.findings, moves_elements)) {
+    fmt::print("palpate check --write-array FILE writes the corrected array\n");
   }
   for (const std::string& remark : found.remarks) {
     fmt::print("{}\n", in_flags(remark));

@@ -81,7 +81,6 @@ std::string summary(const LiveState& state, std::vector<double> latencies_ms,
     const std::string decision = decision_words(step);
     text += (decision.empty() ? "" : decision + "\n") + result_words(step, task) + "\n";
     std::vector<std::string> more{truth_words(step), unproven_sentence(step, task),
-                                  misfit_sentence(step, state.touches, task),
                                   single_touch_words(task, state.touches)};
     std::ranges::move(warning_words(step), std::back_inserter(more));
     for (const std::string& words : more) {

@@ -15,11 +15,9 @@ namespace {
 
 constexpr const char* sensor_help =
     "A board, by its name in 'palpate sensors' or the path of its profile; "
-    "- for frames that another program writes to standard input, of the array --array, a line "
-    "each: "
-    "{\"time\": s since 1970, \"pressure\": [...]}, or CSV with the readings behind their time; "
-    "the "
-    "time may be left out, and x_mm, y_mm and theta_rad of T_robot_sensor may stand beside it; "
+    "- for frames of the array --array that another program writes to standard input, a line each: "
+    "JSON as {\"time\": s since 1970, \"pressure\": [...]}, or CSV with the time before the "
+    "readings; the time may be left out, and x_mm, y_mm and theta_rad of T_robot_sensor added; "
     "replay:FILE[,speed=F|max], which plays a recording of frames; or "
     "simulate:SHAPE[,rate=HZ][,array=COLUMNS:ROWS:PITCH_MM][,seed=N][,touches=N][,noise=KPA]"
     "[,object=random|X_MM:Y_MM:DEG][,speed=F|max], which simulates a robot that presses an array "
@@ -27,9 +25,8 @@ constexpr const char* sensor_help =
 
 constexpr const char* poses_help =
     "File, FIFO or - (standard input) with the poses T_robot_sensor, one line of JSON each: "
-    "{\"time\": s since 1970, \"x_mm\": mm, \"y_mm\": mm, \"theta_rad\": rad}; or CSV with a "
-    "header of "
-    "these names";
+    "{\"time\": s since 1970, \"x_mm\": mm, \"y_mm\": mm, \"theta_rad\": rad}; or CSV whose "
+    "header has these names";
 
 /// Of add_array_flags().
 constexpr const char* array_flags[] = {"--array", "--first-element", "--order", "--dead",
@@ -145,10 +142,9 @@ CLI::Option* add_array_flags(CLI::App& command, ImportOptions& options) {
   auto* array = command.add_option(
       "--array", options.array,
       "COLUMNS:ROWS:PITCH, a grid with its pitch in mm, centred about the sensor's origin; or a "
-      "CSV "
-      "file with a row 'x y' in mm for each element. Elements are counted in the order of their "
-      "readings: of a grid row by row, where x grows along a row and y from row to row, unless the "
-      "next two flags say otherwise");
+      "CSV file with a row 'x y' in mm for each element. Elements are counted in the order of "
+      "their readings: of a grid row by row, where x grows along a row and y from row to row, "
+      "unless the next two flags say otherwise");
   command
       .add_option("--first-element", options.first_element,
                   "Corner of the grid whose element is read first, seen with x to the right and y "

@@ -49,16 +49,11 @@ std::vector<RecognitionSheet::Caption> captions(const RecognitionRecord& record,
   others += other.size() > shown ? fmt::format(", and {} more", other.size() - shown) : "";
   add(printed(others), true);
   add(unproven_sentence(last, task), true);
-  const std::string misfit = misfit_sentence(last, record.touches, task);
   if (last.contradicted) {
     add("contradicted: no map explains these touches at any pose tried", true);
-  } else if (misfit.empty()) {
-    const bool doubtful = last.fit && last.fit->verdict == Verdict::doubtful;
-    add(last.fit ? fmt::format("fit: {} (z {:.1f})", verdict_text(last.fit->verdict), last.fit->z)
-                 : "",
-        doubtful);
-  } else {
-    add(misfit, true);
+  } else if (last.fit) {
+    add(fmt::format("fit: {} (z {:.1f})", verdict_text(last.fit->verdict), last.fit->z),
+        last.fit->verdict != Verdict::fits);
   }
   if (last.known) {
     add(fmt::format("known {:.2f}: the probability that the object was learned", *last.known),

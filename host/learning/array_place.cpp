@@ -116,7 +116,7 @@ void check_offset(SetupJudge& judge, Setup& setup, double& nats, SetupCheck& che
          fmt::format(
              "the array sits in the tool at x {:+.2f} +- {:.2f} mm, y {:+.2f} +- {:.2f} mm, "
              "turned by {:+.1f} +- {:.1f} degrees, from where its elements are said to be: "
-             "import with the array that `write-array` writes",
+             "import with the corrected array",
              offset[0], sd[0], offset[1], sd[1], degrees * offset[2], degrees * sd[2]),
          "", pose, sd});
     setup.elements_mm = placed(setup.elements_mm, pose);
@@ -149,7 +149,7 @@ void check_pitch(SetupJudge& judge, Setup& setup, double& nats, SetupCheck& chec
     check.findings.push_back(
         {"pitch", most - nats,
          fmt::format("the elements lie {:.2f} times as far apart as they are said to: correct the "
-                     "pitch in `array`, or import with the array that `write-array` writes",
+                     "pitch in `array`, or import with the corrected array",
                      best),
          ""});
     setup = scaled(best);

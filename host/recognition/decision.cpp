@@ -40,7 +40,10 @@ BinnedObject binned(const PoseLattice& lattice, const RecognitionTask& task,
 }
 
 std::string percent(double probability) {
-  // Rounds down: what is not quite certain is not called so.
+  // What is not quite certain is not called so.
+  if (probability >= 0.999) {
+    return "more than 99.9 %";
+  }
   return fmt::format("{:.{}f} %", std::floor(1000.0 * probability) / 10.0,
                      probability >= 0.9 ? 1 : 0);
 }
@@ -117,9 +120,9 @@ Decision decide(const RecognitionStep& step, const RecognitionTask& task) {
   const double proven = bounded ? step.identity_bounds[step.best].low : step.confidence();
   if (!(proven >= task.act.above)) {
     // The sentence names the bound where the probability itself is enough.
-    return {false, fmt::format("{} has {}{}, less than {:g} %", best,
-                               step.confidence() >= task.act.above ? "been proven only " : "",
-                               percent(proven), 100.0 * task.act.above)};
+    return {false, fmt::format("{} has {}{}, less than {:g} %", best, percent(proven),
+                               step.confidence() >= task.act.above ? " for certain" : "",
+                               100.0 * task.act.above)};
   }
   const BeliefPlaces& places = step.places;
   if (places.within_mm && *places.within_mm <= task.act.below_mm) {

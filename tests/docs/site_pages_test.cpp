@@ -98,7 +98,7 @@ TEST_F(SitePages, HowSureTellsTheStranger) {
   EXPECT_EQ(with_none[1]["best"], "(none)");
   expect_quoted("how_sure.md", said,
                 {"unknown.h5: touch again: 95 % of the belief lies within 0.87 mm",
-                 "stranger.h5: touch again: (none) has 100.0 %"});
+                 "stranger.h5: touch again: (none) has more than 99.9 %"});
   expect_named(said, {"% of the belief unproven"});  // the budget of 1 ms
 }
 

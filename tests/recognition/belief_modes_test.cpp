@@ -313,7 +313,7 @@ TEST(Decision, IsToActWhereAllIsWell) {
   const Decision decision = decide(good_step(), task);
   EXPECT_TRUE(decision.act);
   EXPECT_EQ(decision.because,
-            "L has 99.9 %, and 95 % of the belief lies within 0.40 mm of its pose");
+            "L has more than 99.9 %, and 95 % of the belief lies within 0.40 mm of its pose");
 }
 
 TEST(Decision, SaysWhatSpeaksAgainst) {
@@ -341,7 +341,7 @@ TEST(Decision, SaysWhatSpeaksAgainst) {
 
   step = good_step();
   step.identity_bounds = {{0.5, 1.0}, {0.0, 0.5}};
-  EXPECT_EQ(refused(step), "L has been proven only 50 %, less than 99 %");
+  EXPECT_EQ(refused(step), "L has 50 % for certain, less than 99 %");
 
   step = good_step();
   step.places.modes.push_back({.object = 0, .probability = 0.11, .pose = {{{1.0, -2.0}, 0.5}, {}}});
