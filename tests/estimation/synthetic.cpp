@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <numbers>
 
@@ -80,8 +81,22 @@ reference::Posterior reference_posterior(std::span<const Hypothesis> hypotheses,
   reference::Posterior posterior{.lattice = options.lattice, .log_likelihood = {}, .weight = {}};
   for (std::size_t object = 0; object < hypotheses.size(); ++object) {
     const Hypothesis& hypothesis = hypotheses[object];
-    posterior.log_likelihood.push_back(reference::log_likelihoods(
-        touches, options.lattice, hypothesis.compared(), options.contact, object));
+    const auto of_touches = [&](std::span<const Touch> some) {
+      return reference::log_likelihoods(some, options.lattice, hypothesis.compared(),
+                                        options.contact, object);
+    };
+    std::vector<double>& logs = posterior.log_likelihood.emplace_back();
+    if (options.touch_sd.none()) {
+      logs = of_touches(touches);
+    } else {
+      logs.resize(static_cast<std::size_t>(options.lattice.bins()));
+      for (const Touch& touch : touches) {
+        const std::vector<double> mean =
+            reference::displaced_touch(of_touches(std::span(&touch, 1)), options.lattice,
+                                       options.touch_sd, touch.T_robot_sensor);
+        std::ranges::transform(logs, mean, logs.begin(), std::plus());
+      }
+    }
     posterior.weight.push_back(hypothesis.weight);
   }
   return posterior;

@@ -102,8 +102,9 @@ BoundedBelief::BoundedBelief(std::span<const Hypothesis> hypotheses, const Bound
       threads_(options.threads > 0 ? std::min(options.threads, tbb::info::default_concurrency())
                                    : tbb::info::default_concurrency()),
       arena_(threads_),
-      likelihood_(hypotheses_, options_.contact, options_.lattice),
+      likelihood_(hypotheses_, options_.contact, options_.lattice, options_.touch_sd),
       space_(arena_.execute([&] { return SearchSpace(hypotheses_, options_); })),
+      kept_(!options_.touch_sd.none()),
       search_(space_, options_, likelihood_) {
   if (options_.none_weight) {
     none_.emplace(space_, options_, likelihood_);

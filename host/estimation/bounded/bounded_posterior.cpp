@@ -1,5 +1,6 @@
 #include "palpate/bounded_posterior.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <utility>
@@ -9,6 +10,7 @@
 #include "estimation/bounded/log_sum.hpp"
 #include "estimation/bounded/marginal_sums.hpp"
 #include "estimation/bounded/search/search_memory.hpp"
+#include "estimation/displacement_check.hpp"
 #include "estimation/hypotheses.hpp"
 #include "estimation/lattice/refinement.hpp"
 #include "model/interpolated_map.hpp"
@@ -57,6 +59,7 @@ BoundedOptions checked(const BoundedOptions& options, std::span<const Hypothesis
   validate(options);
   BoundedOptions all = options;
   all.lattice.collapse_fixed().validate();
+  validate_displacement(all.touch_sd, all.lattice, "touch_sd");
   all.contact = resolve(options.contact, hypotheses);
   if (const std::string why = why_no_room(hypotheses, all, memory_for_search()); !why.empty()) {
     throw Error(Fault::input, why);
@@ -161,9 +164,11 @@ Estimate BoundedPosterior::estimate() const {
         others_high.add(bounds[other].high);
       }
     }
+    // Rounding must not leave out what lies between them.
+    const double p = estimate.identity[i];
     estimate.identity_bounds.push_back(
-        {probability(bounds[i].low, others_high.log()).value_or(0.0),
-         probability(bounds[i].high, others_low.log()).value_or(1.0)});
+        {std::min(p, probability(bounds[i].low, others_high.log()).value_or(0.0)),
+         std::max(p, probability(bounds[i].high, others_low.log()).value_or(1.0))});
   }
   estimate.certificate = std::move(certificate);
   estimate.mode = {.object = found.best_object,
@@ -178,8 +183,10 @@ RefinedPose BoundedPosterior::refine(const Mode& mode) const {
   Impl& posterior = whole();
   require_object(mode.object, posterior.bodies.size());
   const BoundedBelief& belief = posterior.belief;
-  // Where bins are very fine, a few of them tell the peak, and all would take long.
-  const PoseLattice fit = thinned(lattice());
+  // Where bins are very fine, a few of them tell the peak, and all would take long. A mean over
+  // displacements takes the others all the same.
+  const PoseLattice fit =
+      belief.options().touch_sd.none() ? thinned(lattice()) : lattice();
   const bool thin = fit.plane() != lattice().plane();
   std::optional<BinLikelihood> of_thin;
   Mode start = mode;
@@ -271,6 +278,19 @@ double BoundedPosterior::log_likelihood(int object, const Pose& T_object_robot) 
   }
   const BoundedBelief& belief = posterior.belief;
   const KnownElements& elements = belief.elements();
+  if (!belief.options().touch_sd.none()) {
+    const std::int64_t bin = lattice().bin_of(T_object_robot);
+    const auto row = static_cast<std::int32_t>(bin / lattice().x_mm.count);
+    const BinBox box{.object = object,
+                     .theta = row / lattice().y_mm.count,
+                     .y_first = row % lattice().y_mm.count,
+                     .y_count = 1,
+                     .x_first = static_cast<std::int32_t>(bin % lattice().x_mm.count),
+                     .x_count = 1};
+    double value = 0.0;
+    belief.likelihood().evaluate(std::span(&box, 1), elements, std::span(&value, 1));
+    return value;
+  }
   const ContactModel& contact = belief.options().contact;
   const InterpolatedMap map(belief.hypotheses()[object].compared(), *contact.prior);
   double sum = 0.0;

@@ -43,6 +43,19 @@ void append(const KnownElements& known, std::vector<KnownElement>& elements) {
   }
 }
 
+/// An order of touches that does not depend on when they came.
+bool touched_before(const KnownElements& a, const KnownElements& b) {
+  const auto place = [](const glm::dvec2& mm) { return std::pair(mm.x, mm.y); };
+  const auto key = [](const ReadingRun& run) { return std::tuple(run.reading, run.end); };
+  if (a.sensor_from_pivot_mm != b.sensor_from_pivot_mm) {
+    return place(a.sensor_from_pivot_mm) < place(b.sensor_from_pivot_mm);
+  }
+  if (!std::ranges::equal(a.runs, b.runs, {}, key, key)) {
+    return std::ranges::lexicographical_compare(a.runs, b.runs, {}, key, key);
+  }
+  return std::ranges::lexicographical_compare(a.from_pivot_mm, b.from_pivot_mm, {}, place, place);
+}
+
 /// The elements that have any reading but this one.
 KnownElements all_but(Reading reading, const ArrayReadings& array) {
   std::vector<KnownElement> elements;
@@ -58,7 +71,13 @@ KnownElements all_but(Reading reading, const ArrayReadings& array) {
 }  // namespace
 
 KnownElements known_elements(const ArrayReadings& array) {
-  return all_but(Reading::unknown, array);
+  KnownElements known = all_but(Reading::unknown, array);
+  if (array.sensor_from_pivot_mm && !known.runs.empty()) {
+    KnownElements touch = known;
+    touch.sensor_from_pivot_mm = *array.sensor_from_pivot_mm;
+    known.touches.push_back(std::move(touch));
+  }
+  return known;
 }
 
 KnownElements changed_elements(const ArrayReadings& array) {
@@ -72,7 +91,12 @@ KnownElements merged(std::span<const KnownElements> lists) {
     append(list, elements);
     std::inplace_merge(elements.begin(), elements.begin() + merged, elements.end(), before);
   }
-  return in_runs(elements);
+  KnownElements all = in_runs(elements);
+  for (const KnownElements& list : lists) {
+    all.touches.insert(all.touches.end(), list.touches.begin(), list.touches.end());
+  }
+  std::sort(all.touches.begin(), all.touches.end(), touched_before);
+  return all;
 }
 
 void KeptTouches::add(std::span<const Touch> touches, const ContactModel& model,
@@ -92,6 +116,9 @@ void KeptTouches::add(std::span<const Touch> touches, const ContactModel& model,
         kept.from_pivot_mm.push_back(touch.T_robot_sensor * element_mm - pivot_mm);
       }
       kept.rectangle = array_rectangle(touch, pivot_mm);
+      if (uncertain_) {
+        kept.sensor_from_pivot_mm = touch.T_robot_sensor.translation_mm - pivot_mm;
+      }
       ++count_;
     }
   } catch (...) {

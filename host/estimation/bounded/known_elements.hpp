@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -24,6 +25,11 @@ struct ReadingRun {
 struct KnownElements {
   std::vector<glm::dvec2> from_pivot_mm;
   std::vector<ReadingRun> runs;  ///< ascending by reading
+
+  // Touches of uncertain pose are averaged each by itself: their elements do not multiply with
+  // those of others.
+  std::vector<KnownElements> touches = {};    ///< each by itself; empty where all are exact
+  glm::dvec2 sensor_from_pivot_mm = {};       ///< of one touch: the sensor's origin
 };
 
 /// All elements of a touch in the array's order, Unknown ones too: in the robot frame and relative
@@ -32,6 +38,8 @@ struct ArrayReadings {
   std::vector<glm::dvec2> from_pivot_mm;
   std::vector<Reading> readings;
   ArrayRectangle rectangle{};
+  /// The sensor's origin where the touch's pose is uncertain.
+  std::optional<glm::dvec2> sensor_from_pivot_mm = {};
 };
 
 /// The elements that are not Unknown.
@@ -51,6 +59,9 @@ class KeptTouches {
   static constexpr std::size_t room_for = 64;
   static constexpr std::size_t most_bytes = std::size_t{1} << 22;
 
+  /// @param uncertain whether the sensor may have been displaced
+  explicit KeptTouches(bool uncertain = false) : uncertain_(uncertain) {}
+
   /// Classifies the touches' elements (Eq. 3) and keeps them.
   /// @throws Error on a touch that is not sound, and keeps none of these
   void add(std::span<const Touch> touches, const ContactModel& model, const glm::dvec2& pivot_mm);
@@ -65,6 +76,7 @@ class KeptTouches {
 
   std::vector<ArrayReadings> touches_;  ///< those from count_ on are room
   std::size_t count_ = 0;
+  bool uncertain_;
 };
 
 }  // namespace palpate

@@ -12,6 +12,7 @@
 
 #include "palpate/api.hpp"
 #include "palpate/contact_model.hpp"
+#include "palpate/displacement.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
 
@@ -20,6 +21,9 @@ namespace palpate {
 struct BoundedOptions {
   PoseLattice lattice;
   ContactModel contact = {};  ///< what the sensor says about a place (Eq. 3, 7)
+  /// How far every touch's sensor may have been from where the robot says, as
+  /// HistogramOptions::touch_sd: each touch's likelihood is its mean over these places.
+  DisplacementSd touch_sd = {};
   /// Largest total variation distance from the posterior over all bins, in (0, 1). Each estimate()
   /// evaluates as many bins as the tolerance needs. The certificate counts the rounding of float64,
   /// which alone may exceed a tolerance below about 1e-8, or any where there are many hundred
@@ -122,7 +126,8 @@ class PALPATE_API BoundedPosterior {
   /// @throws Error if there is no such object
   std::vector<std::vector<BinShare>> likely_bins(std::span<const int> objects,
                                                  double least_share) const;
-  /// Log-likelihood of any pose of an object in nats, in float64, without prior weights.
+  /// Log-likelihood of any pose of an object in nats, in float64, without prior weights. With
+  /// touch_sd, of the bin that the pose lies in.
   /// @throws Error if there is no such object or the pose is not finite
   double log_likelihood(int object, const Pose& T_object_robot) const;
 

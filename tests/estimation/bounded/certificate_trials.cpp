@@ -54,13 +54,38 @@ Trial make_trial(const std::array<int, 3>& bins, std::uint64_t seed) {
   return trial;
 }
 
-void expect_trials(const std::array<int, 3>& bins, int trials, std::uint64_t seed) {
+Trial make_displaced_trial(const std::array<int, 3>& bins, std::uint64_t seed) {
+  Trial trial = make_trial(bins, seed);
+  Uniform random(seed + 1);
+  const auto one_of = [&](const auto& choices) {
+    return choices[static_cast<std::size_t>(random(0.0, static_cast<double>(std::size(choices))))];
+  };
+  PoseLattice& lattice = trial.options.lattice;
+  lattice.pivot_mm *= one_of(std::array{1.0, 1.0, 10.0});
+  Axis* const fixed =
+      one_of(std::array<Axis*, 8>{&lattice.x_mm, &lattice.y_mm, &lattice.theta_rad});
+  if (fixed != nullptr) {
+    fixed->count = 1;
+  }
+  if (random(0.0, 4.0) < 1.0) {
+    lattice.collapse_fixed();
+  }
+  trial.options.touch_sd = {.mm = one_of(std::array{0.0, 0.3, 1.0, 1.0, 2.5, 6.0}),
+                            .rad = one_of(std::array{0.0, 0.05, 0.05, 0.3, 1.5})};
+  if (trial.options.touch_sd.none()) {
+    trial.options.touch_sd.mm = 1.0;
+  }
+  return trial;
+}
+
+void expect_trials(const std::array<int, 3>& bins, int trials, std::uint64_t seed,
+                   const decltype(make_trial)& make) {
   double variation = 0.0;
   double dropped = 0.0;
   double evaluated = 0.0;
   for (int i = 0; i < trials; ++i) {
     SCOPED_TRACE(::testing::Message() << "trial " << i);
-    const Trial trial = make_trial(bins, 1000 * seed + static_cast<std::uint64_t>(i));
+    const Trial trial = make(bins, 1000 * seed + static_cast<std::uint64_t>(i));
     // Log odds of 12 at gamma = 0 sum to some thousand nats, and float64 keeps 16 digits of them.
     const Certified seen =
         expect_certified(trial.objects, trial.options, all_touches(trial.recording), 1e-9);

@@ -19,9 +19,15 @@ struct Trial {
 /// made-up maps in turn, of unequal weights and cells, under 1 to 9 touches.
 Trial make_trial(const std::array<int, 3>& bins, std::uint64_t seed);
 
+/// The same where touches are uncertain: of standard deviations from 0 to beyond half the region,
+/// about pivots near and far, on lattices some of which have an axis of one bin.
+Trial make_displaced_trial(const std::array<int, 3>& bins, std::uint64_t seed);
+
 Recording first_touches(const Recording& recording, std::size_t touches);
 
 /// Runs trials and expects their certificates to hold; prints the largest error and certificate.
-void expect_trials(const std::array<int, 3>& bins, int trials, std::uint64_t seed);
+/// @param make what makes a trial
+void expect_trials(const std::array<int, 3>& bins, int trials, std::uint64_t seed,
+                   const decltype(make_trial)& make = make_trial);
 
 }  // namespace palpate

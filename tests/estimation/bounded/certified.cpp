@@ -61,7 +61,11 @@ reference::Posterior reference_posterior(std::span<const Hypothesis> objects,
                                          const BoundedOptions& options,
                                          std::span<const Touch> touches) {
   return reference_posterior(
-      objects, HistogramOptions{.lattice = options.lattice, .contact = options.contact}, touches);
+      objects,
+      HistogramOptions{.lattice = options.lattice,
+                       .contact = options.contact,
+                       .touch_sd = options.touch_sd},
+      touches);
 }
 
 namespace {

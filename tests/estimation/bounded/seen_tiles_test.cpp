@@ -138,7 +138,7 @@ TEST(TileBounds, AreThePriorsWhereNoElementSeesTheMap) {
             const Tile tile{.x = first_x + i / batch_side, .y = first_y + i % batch_side};
             if (!seen.holds(tile)) {
               SCOPED_TRACE(fmt::format("level {}, tile {}, {}", l, tile.x, tile.y));
-              if (level.size.single_bin) {
+              if (level.size.bins == 1) {
                 ASSERT_LE(sums[i], beyond) << "its last squares reach beyond the map";
               } else {
                 ASSERT_EQ(sums[i], beyond);

@@ -97,7 +97,7 @@ void expect_bounds(std::int64_t tiles, std::uint64_t seed) {
       sizes = {{.side = 32}, {.side = 8}, {.side = 2}, {.parts = 2, .side = 1}};
     } else if (std::min(of.lattice.x_mm.step(), of.lattice.y_mm.step()) > 0.5 * of.map.cell_mm) {
       // Also where other tiles are better, and with squares of several cells.
-      sizes = {{.side = random(0.0, 2.0) < 1.0 ? 1 : 4, .single_bin = true}};
+      sizes = {{.side = random(0.0, 2.0) < 1.0 ? 1 : 4, .bins = 1}};
     }
     check_case(of, object, sizes, checked);
     if (testing::Test::HasFatalFailure()) {
@@ -238,15 +238,15 @@ TEST(TileLevels, AreOfSingleBinsWhereTheseAreSparseAndFew) {
   };
   // Squares as large as a cell or a little smaller.
   ASSERT_EQ(sizes_of(3.33, 3.44, 20, 110).size(), 1);
-  EXPECT_TRUE(sizes_of(3.33, 3.44, 20, 110).front().single_bin);
+  EXPECT_TRUE(sizes_of(3.33, 3.44, 20, 110).front().bins == 1);
   EXPECT_EQ(sizes_of(3.33, 3.44, 20, 110).front().side, 4);
   EXPECT_EQ(sizes_of(2.0, 2.0, 20, 1).front().side, 4);
   EXPECT_EQ(sizes_of(2.0, 60.0, 20, 1).front().side, 16) << "their area counts";
   EXPECT_EQ(sizes_of(1e3, 1e3, 20, 1).front().side, 16) << "so that tables stay small";
   // Bins that lie closer, along one axis, and more of them than are kept.
-  EXPECT_FALSE(sizes_of(1.8, 3.44, 20, 110).front().single_bin);
-  EXPECT_FALSE(sizes_of(3.33, 1.8, 20, 110).front().single_bin);
-  EXPECT_FALSE(sizes_of(3.33, 3.44, 50, 110).front().single_bin);
+  EXPECT_FALSE(sizes_of(1.8, 3.44, 20, 110).front().bins == 1);
+  EXPECT_FALSE(sizes_of(3.33, 1.8, 20, 110).front().bins == 1);
+  EXPECT_FALSE(sizes_of(3.33, 3.44, 50, 110).front().bins == 1);
 }
 
 TEST(TileLevels, AreNotDividedWhereTheyHoldFewBins) {

@@ -75,8 +75,12 @@ int bins_per_part(int count, double step_cells) {
 }  // namespace
 
 BinLikelihood::BinLikelihood(std::span<const Hypothesis> hypotheses, const ContactModel& contact,
-                             const PoseLattice& lattice)
+                             const PoseLattice& lattice, const DisplacementSd& touch_sd)
     : form_(contact), lattice_(lattice) {
+  if (!touch_sd.none()) {
+    displacement_ = std::make_unique<DisplacementWeights>(lattice, touch_sd);
+    displaced_.emplace(*displacement_, 1);
+  }
   for (const Hypothesis& hypothesis : hypotheses) {
     placements_.push_back(placement_of(hypothesis.compared(), *contact.prior, lattice));
   }
@@ -175,24 +179,42 @@ void BinLikelihood::evaluate_in(std::span<const BinBox> boxes, const KnownElemen
   }
 }
 
-void BinLikelihood::evaluate(std::span<const BinBox> boxes, const KnownElements& elements,
-                             std::span<float> log_likelihood) const {
-  if (form_.kind == ReadingForm::Kind::table) {
-    evaluate_in<double>(boxes, elements, log_likelihood);
+template <typename Result>
+void BinLikelihood::evaluate_all(std::span<const BinBox> boxes, const KnownElements& elements,
+                                 std::span<Result> log_likelihood, std::span<double> errors) const {
+  const auto with = [&]<typename Lane>(Lane /*of the kernel*/) {
+    if (displaced_) {
+      evaluate_displaced<Lane>(boxes, elements, log_likelihood, errors);
+    } else {
+      evaluate_in<Lane>(boxes, elements, log_likelihood);
+    }
+  };
+  if (sizeof(Result) == 8 || form_.kind == ReadingForm::Kind::table) {
+    with(double());
   } else {
-    evaluate_in<float>(boxes, elements, log_likelihood);
+    with(float());
   }
 }
 
 void BinLikelihood::evaluate(std::span<const BinBox> boxes, const KnownElements& elements,
+                             std::span<float> log_likelihood) const {
+  evaluate_all(boxes, elements, log_likelihood, {});
+}
+
+void BinLikelihood::evaluate(std::span<const BinBox> boxes, const KnownElements& elements,
                              std::span<double> log_likelihood) const {
-  evaluate_in<double>(boxes, elements, log_likelihood);
+  evaluate_all(boxes, elements, log_likelihood, {});
 }
 
 template <typename Result>
 void BinLikelihood::evaluate_on_threads(std::span<const BinBox> boxes,
                                         const KnownElements& elements,
-                                        std::span<Result> log_likelihood) const {
+                                        std::span<Result> log_likelihood,
+                                        std::span<double> errors) const {
+  if (displaced_) {
+    evaluate_all(boxes, elements, log_likelihood, errors);
+    return;
+  }
   struct Task {
     std::size_t first_box;
     std::size_t end_box;
@@ -231,8 +253,12 @@ void BinLikelihood::evaluate_on_threads(std::span<const BinBox> boxes,
 }
 
 template void BinLikelihood::evaluate_on_threads(std::span<const BinBox>, const KnownElements&,
-                                                 std::span<float>) const;
+                                                 std::span<float>, std::span<double>) const;
 template void BinLikelihood::evaluate_on_threads(std::span<const BinBox>, const KnownElements&,
+                                                 std::span<double>, std::span<double>) const;
+template void BinLikelihood::evaluate_in<float>(std::span<const BinBox>, const KnownElements&,
+                                                std::span<double>) const;
+template void BinLikelihood::evaluate_in<double>(std::span<const BinBox>, const KnownElements&,
                                                  std::span<double>) const;
 
 std::uint64_t BinLikelihood::bytes() const {

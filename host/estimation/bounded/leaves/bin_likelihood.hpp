@@ -2,11 +2,14 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "estimation/bin_box.hpp"
+#include "estimation/bounded/displaced/displacement_mean.hpp"
 #include "estimation/bounded/known_elements.hpp"
 #include "estimation/bounded/leaves/bin_kernel.hpp"
 #include "palpate/contact_model.hpp"
@@ -36,13 +39,15 @@ struct MapExtent {
 
 /// Evaluates the log-likelihood (Eq. 7, 13) of bins on the host, by vector instructions chosen at
 /// run time. A bin has the same bits with every set of instructions and in every box. Calls from
-/// several threads may run at once.
+/// several threads may run at once. Touches of uncertain pose have their mean likelihoods: all bins
+/// within reach of a bin are evaluated, too, and boxes that lie together share them.
 class BinLikelihood {
  public:
   /// @param contact resolved: with its prior
+  /// @param touch_sd how far touches may be displaced
   /// @throws Error where a map has too many cells
   BinLikelihood(std::span<const Hypothesis> hypotheses, const ContactModel& contact,
-                const PoseLattice& lattice);
+                const PoseLattice& lattice, const DisplacementSd& touch_sd = {});
   void move_pivot(const glm::dvec2& pivot_mm);
 
   /// Log-likelihood of the elements at every bin in nats, boxes one after another, [y, x] in each.
@@ -53,14 +58,18 @@ class BinLikelihood {
   void evaluate(std::span<const BinBox> boxes, const KnownElements& elements,
                 std::span<double> log_likelihood) const;
   /// Evaluates many boxes as evaluate() does, on the threads of the caller's TBB arena.
+  /// @param errors where not empty and touches are uncertain, [bin] receives error: the likelihood
+  /// may be wrong by e^error - 1 of itself beside the bounds below
   template <typename Result>
   void evaluate_on_threads(std::span<const BinBox> boxes, const KnownElements& elements,
-                           std::span<Result> log_likelihood) const;
+                           std::span<Result> log_likelihood, std::span<double> errors = {}) const;
 
   /// Proven bound, in nats, of the error of evaluate() at any bin of an object.
   double float32_error(std::size_t object, const KnownElements& elements) const;
   double float64_error(std::size_t object, const KnownElements& elements) const;
 
+  /// Whether touches are uncertain.
+  bool displaces() const { return displaced_.has_value(); }
   /// Host memory that the maps' nodes and the table hold.
   std::uint64_t bytes() const;
   /// The vector instructions in use, such as "AVX3".
@@ -82,12 +91,23 @@ class BinLikelihood {
   template <typename Lane, typename Result>
   void evaluate_in(std::span<const BinBox> boxes, const KnownElements& elements,
                    std::span<Result> log_likelihood) const;
+  template <typename Result>
+  void evaluate_all(std::span<const BinBox> boxes, const KnownElements& elements,
+                    std::span<Result> log_likelihood, std::span<double> errors) const;
+  /// Bins of touches of uncertain pose; see evaluate_on_threads().
+  template <typename Lane, typename Result>
+  void evaluate_displaced(std::span<const BinBox> boxes, const KnownElements& elements,
+                          std::span<Result> log_likelihood, std::span<double> errors) const;
+  /// Of the means of touches of uncertain pose, beside what they are taken of.
+  double mean_error(const KnownElements& elements) const;
   template <typename Lane>
   double error(std::size_t object, const KnownElements& elements) const;
 
   std::vector<Placement> placements_;  ///< [object]
   ReadingForm form_;
   PoseLattice lattice_;
+  std::unique_ptr<const DisplacementWeights> displacement_;  ///< null where touches are exact
+  std::optional<DisplacementMean> displaced_;                ///< of bins
 };
 
 }  // namespace palpate

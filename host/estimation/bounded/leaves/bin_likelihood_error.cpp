@@ -117,19 +117,23 @@ double BinLikelihood::error(std::size_t object, const KnownElements& elements) c
          (form_.kind == ReadingForm::Kind::sums ? v * count * count * nats : 0.0);
 }
 
+double BinLikelihood::mean_error(const KnownElements& elements) const {
+  return displaced_ ? static_cast<double>(elements.touches.size()) * displaced_->mean_error() : 0.0;
+}
+
 double BinLikelihood::float64_error(std::size_t object, const KnownElements& elements) const {
-  return error<double>(object, elements);
+  return error<double>(object, elements) + mean_error(elements);
 }
 
 double BinLikelihood::float32_error(std::size_t object, const KnownElements& elements) const {
   // The result is rounded to float32.
   const auto count = static_cast<double>(elements.from_pivot_mm.size());
   if (form_.kind == ReadingForm::Kind::table) {
-    return error<double>(object, elements) +
+    return float64_error(object, elements) +
            second_order * unit<float> * count * form_.table_extent(object).largest;
   }
   const double nats = form_.largest_nats(placements_[object].extent.largest);
-  return error<float>(object, elements) + second_order * unit<float> * count * nats;
+  return error<float>(object, elements) + mean_error(elements) + second_order * unit<float> * count * nats;
 }
 
 }  // namespace palpate

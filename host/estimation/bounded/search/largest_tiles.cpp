@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "estimation/bounded/displaced/displaced_tiles.hpp"
 #include "estimation/bounded/parallel_for.hpp"
 
 namespace palpate {
@@ -41,7 +42,7 @@ StillPlace::Seen StillPlace::look(const ArrayReadings& touch) {
   if (!stays) {
     last_ = touch.from_pivot_mm;
   }
-  if (touch.readings.size() > most_still_elements || !mostly_no_contact(touch)) {
+  if (touch.sensor_from_pivot_mm || touch.readings.size() > most_still_elements || !mostly_no_contact(touch)) {
     return Seen::moving;
   }
   if (touch.from_pivot_mm == kept_) {
@@ -107,9 +108,44 @@ void LargestTiles::add_touch(const ArrayReadings& touch) {
 }
 
 void LargestTiles::add(const KnownElements& elements) {
+  if (space_.displacement) {
+    for (const KnownElements& touch : elements.touches) {
+      add_displaced(touch);
+    }
+    return;
+  }
   add_sums(elements, elements, [&](const Strip& of, std::uint32_t* sums) {
     space_.bounds[of.object].add(0, elements, of.placed, of.x, of.y, sums, of.batches);
   });
+}
+
+void LargestTiles::add_displaced(const KnownElements& touch) {
+  const std::vector<std::int64_t> offsets = offsets_of(touch);
+  const std::vector<BoundingBox> reaches = displaced_reaches(space_, std::span(&touch, 1));
+  for (std::size_t object = 0; object < space_.bounds.size(); ++object) {
+    const TileLevel& level = space_.bounds[object].levels().front();
+    std::vector<BlockRun> seen;
+    for (std::size_t theta = 0; theta < space_.turns.size(); ++theta) {
+      const TileRange tiles = seen_tiles(reaches[theta], space_.maps[object], level);
+      const int x = tiles.x_first / batch_side;
+      const int x_end = (tiles.x_end + batch_side - 1) / batch_side;
+      for (int y = tiles.y_first / batch_side; x < x_end && y * batch_side < tiles.y_end; ++y) {
+        seen.push_back({static_cast<int>(theta), y, x, x_end - x});
+      }
+    }
+    const std::vector<std::int32_t> added = displaced_penalties(space_, object, 0, touch, seen);
+    auto from = added.begin();
+    for (const BlockRun& run : seen) {
+      const auto place = static_cast<std::size_t>(
+          (std::int64_t{run.theta} * level.batches_y() + run.y) * level.batches_x() + run.x);
+      std::int32_t* sums = sums_[object].data() + place * batch_tiles;
+      for (int i = 0; i < run.count * batch_tiles; ++i) {
+        const std::int64_t sum = std::int64_t{sums[i]} + *from++ - offsets[object];
+        sums[i] = static_cast<std::int32_t>(std::min<std::int64_t>(sum, largest_sum));
+      }
+    }
+  }
+  raise_unseen(offsets);
 }
 
 void LargestTiles::keep_still(const KnownElements& no_contact) {
@@ -128,12 +164,7 @@ void LargestTiles::keep_still(const KnownElements& no_contact) {
 template <typename Sum>
 void LargestTiles::add_sums(const KnownElements& known, const KnownElements& placed,
                             const Sum& sum_of) {
-  // Most tiles of a large region do not see the map: sums count from what such a tile would have.
-  std::vector<std::int64_t> offsets;
-  for (std::size_t i = 0; i < space_.bounds.size(); ++i) {
-    offsets.push_back(std::min<std::int64_t>(space_.bounds[i].penalty_beyond(0, known),
-                                             largest_sum - unseen_[i]));
-  }
+  const std::vector<std::int64_t> offsets = offsets_of(known);
   for_seen(known, placed, [&](const Strip& of) {
     std::uint32_t added[most_strip * batch_tiles] = {};
     sum_of(of, added);
@@ -143,6 +174,19 @@ void LargestTiles::add_sums(const KnownElements& known, const KnownElements& pla
       sums[i] = static_cast<std::int32_t>(std::min<std::int64_t>(sum, largest_sum));
     }
   });
+  raise_unseen(offsets);
+}
+
+std::vector<std::int64_t> LargestTiles::offsets_of(const KnownElements& known) const {
+  std::vector<std::int64_t> offsets;
+  for (std::size_t i = 0; i < space_.bounds.size(); ++i) {
+    offsets.push_back(std::min<std::int64_t>(space_.bounds[i].penalty_beyond(0, known),
+                                             largest_sum - unseen_[i]));
+  }
+  return offsets;
+}
+
+void LargestTiles::raise_unseen(const std::vector<std::int64_t>& offsets) {
   for (std::size_t i = 0; i < offsets.size(); ++i) {
     unseen_[i] += offsets[i];
   }

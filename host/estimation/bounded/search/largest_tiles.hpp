@@ -70,6 +70,12 @@ class LargestTiles {
   };
 
   void add_touch(const ArrayReadings& touch);
+  /// Adds what one touch of uncertain pose adds.
+  void add_displaced(const KnownElements& touch);
+  /// [hypothesis] what the elements add to unseen(). Most tiles of a large region do not see the
+  /// map: sums count from what such a tile would have.
+  std::vector<std::int64_t> offsets_of(const KnownElements& known) const;
+  void raise_unseen(const std::vector<std::int64_t>& offsets);
   /// Keeps the sums of an array that stays and is wholly in No Contact.
   void keep_still(const KnownElements& no_contact);
   /// Adds what sum_of(strip, sums) finds for the batches that see the map.

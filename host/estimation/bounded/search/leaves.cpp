@@ -24,6 +24,7 @@ constexpr std::int64_t first_batch = 1024;
 /// Products of bins and elements, where a budget must not be overdrawn by much: a few ms.
 constexpr std::int64_t budgeted_work = 5'000'000;
 constexpr std::size_t leaves_per_task = 16;
+constexpr double infinity = std::numeric_limits<double>::infinity();
 /// Memory for leaves that are not settled.
 constexpr std::size_t most_pending_bytes = std::size_t{32} << 20;
 /// Part of the tolerance that rounding may use up.
@@ -83,7 +84,7 @@ void Leaves::probe(std::vector<Tile> tiles) {
 std::vector<Leaves::Family> Leaves::families_of(std::span<const Tile> tiles) const {
   std::vector<Family> families;
   // Single bins lie too far apart to be evaluated together.
-  const int shift = task_.space.bounds.front().levels().back().size.single_bin
+  const int shift = task_.space.bounds.front().levels().back().size.bins > 0
                         ? 0
                         : std::countr_zero(unsigned{batch_side});
   for (std::size_t i = 0; i < tiles.size(); ++i) {
@@ -216,10 +217,10 @@ void Leaves::add(std::vector<BinBox> boxes) {
   const std::span<Leaf> added = std::span(pending_).subspan(first);
   evaluate(added, std::span(values_));
   for (const Leaf& leaf : added) {
-    const double error = float32_error_[leaf.box.object];
+    const double error = float32_error_[leaf.box.object] + leaf.error;
     pending_mass_[leaf.box.object].add(task_.space.log_weight[leaf.box.object] - error +
                                        leaf.log_mass);
-    account_.raise_best(leaf.box.object, leaf.largest - error);
+    account_.raise_best(leaf.box.object, leaf.least - error);
   }
   account_.raise_totals(pending_mass_);
   if (pending_.size() * sizeof(Leaf) + values_.size() * sizeof(float) > most_pending_bytes) {
@@ -233,7 +234,12 @@ void Leaves::evaluate(std::span<Leaf> leaves, std::span<Value> values) const {
   for (const Leaf& leaf : leaves) {
     boxes.push_back(leaf.box);
   }
-  task_.likelihood.evaluate_on_threads(boxes, task_.elements, values.subspan(leaves.front().first));
+  std::vector<double> errors(task_.likelihood.displaces() ? values.size() : 0);
+  task_.likelihood.evaluate_on_threads(boxes, task_.elements, values.subspan(leaves.front().first),
+                                       errors);
+  // An error of half a nat may be that of a likelihood of 0.
+  constexpr double most_error = 0.45;
+  const std::size_t first_value = leaves.front().first;
   parallel_for((leaves.size() + leaves_per_task - 1) / leaves_per_task, [&](std::size_t part) {
     const std::size_t end = std::min((part + 1) * leaves_per_task, leaves.size());
     for (std::size_t i = part * leaves_per_task; i < end; ++i) {
@@ -248,6 +254,22 @@ void Leaves::evaluate(std::span<Leaf> leaves, std::span<Value> values) const {
         sum += std::exp(static_cast<double>(log_likelihood) - leaf.largest);
       }
       leaf.log_mass = leaf.largest + std::log(sum);
+      leaf.least = leaf.largest;
+      if (!errors.empty()) {
+        double wrong = 0.0;
+        double of_best = 0.0;
+        const double* error = errors.data() + (leaf.first - first_value);
+        for (const Value log_likelihood : own) {
+          const double nats = static_cast<double>(log_likelihood);
+          // Large errors are those of very small likelihoods.
+          wrong += *error < 1.0 ? std::exp(nats - leaf.largest) * std::expm1(*error)
+                                : std::exp(nats - leaf.largest + *error);
+          of_best = nats == leaf.largest ? std::max(of_best, *error) : of_best;
+          ++error;
+        }
+        leaf.error = std::log1p(wrong / sum);
+        leaf.least = of_best < most_error ? leaf.largest - 2.0 * of_best : -infinity;
+      }
     }
   });
 }
@@ -318,14 +340,14 @@ void Leaves::settle(double share) {
     evaluate(std::span(exact), std::span(values));
     for (const Leaf& leaf : exact) {
       settle(leaf, std::span(values).subspan(leaf.first, static_cast<std::size_t>(leaf.box.bins())),
-             float64_error_[leaf.box.object]);
+             float64_error_[leaf.box.object] + leaf.error);
     }
   }
   for (const Leaf& leaf : pending_) {
     if (const std::int64_t bins = leaf.box.bins(); bins > 0) {
       const auto from = values_.begin() + static_cast<std::ptrdiff_t>(leaf.first);
       values.assign(from, from + bins);
-      settle(leaf, values, float32_error_[leaf.box.object]);
+      settle(leaf, values, float32_error_[leaf.box.object] + leaf.error);
     }
   }
   pending_.clear();
@@ -335,7 +357,7 @@ void Leaves::settle(double share) {
 }
 
 void Leaves::settle(const Leaf& leaf, std::span<const double> values, double error) {
-  account_.settle(leaf.box.object, leaf.box.bins(), leaf.log_mass, leaf.largest, error);
+  account_.settle(leaf.box.object, leaf.box.bins(), leaf.log_mass, leaf.least, error);
   account_.note_best(leaf.box, std::ranges::max_element(values) - values.begin(), leaf.largest);
   task_.visit(leaf.box, values);
 }

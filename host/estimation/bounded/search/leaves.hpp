@@ -47,6 +47,8 @@ class Leaves {
     std::size_t first = 0;  ///< of its values
     double log_mass = 0.0;  ///< without the prior weight
     double largest = 0.0;
+    double error = 0.0;  ///< of the mass, beside that of every bin of the object
+    double least = 0.0;  ///< lower bound of the largest, but for that error
   };
 
   BinBox box_of(const Tile& tile) const {

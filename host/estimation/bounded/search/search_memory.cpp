@@ -28,8 +28,8 @@ constexpr double most_bins = 4e18;
 /// Tiles along an axis, as tile_levels() counts them.
 double tiles_along(const Axis& axis, const TileSize& size, double side_mm) {
   const double batches =
-      size.single_bin ? std::ceil(static_cast<double>(axis.count) / batch_side)
-                      : std::floor(axis.step() * (axis.count - 1) / (batch_side * side_mm)) + 1.0;
+      size.bins > 0 ? std::ceil(static_cast<double>(axis.count) / (batch_side * size.bins))
+                    : std::floor(axis.step() * (axis.count - 1) / (batch_side * side_mm)) + 1.0;
   return batch_side * batches;
 }
 
@@ -70,7 +70,7 @@ SearchMemory search_memory(std::span<const Hypothesis> hypotheses, const Bounded
   for (const Hypothesis& hypothesis : hypotheses) {
     least_cell_mm = std::min(least_cell_mm, hypothesis.compared().cell_mm);
   }
-  const std::vector<TileSize> sizes = tile_sizes(lattice, least_cell_mm, hypotheses.size());
+  const std::vector<TileSize> sizes = tile_sizes(lattice, least_cell_mm, hypotheses.size(), options.touch_sd);
   SearchMemory memory;
   for (const Hypothesis& hypothesis : hypotheses) {
     const OccupancyGrid& map = hypothesis.compared();
@@ -95,9 +95,9 @@ SearchMemory search_memory(std::span<const Hypothesis> hypotheses, const Bounded
     memory.still += tables_of(sizes.front()) + sizeof(std::uint32_t) * largest_tiles;
     const double family_mm = batch_side * sizes.back().cells() * map.cell_mm;
     memory.largest_family = std::max(
-        memory.largest_family, sizes.back().single_bin ? 1.0
-                                                       : bins_within(lattice.x_mm, family_mm) *
-                                                             bins_within(lattice.y_mm, family_mm));
+        memory.largest_family, sizes.back().bins > 0 ? std::pow(sizes.back().bins, 2.0)
+                                                     : bins_within(lattice.x_mm, family_mm) *
+                                                           bins_within(lattice.y_mm, family_mm));
   }
   // A cosine and a sine; and of every object the tiles that see the map, and the best of them.
   memory.thetas = thetas * (sizeof(glm::dvec2) + static_cast<double>(hypotheses.size()) *

@@ -2,11 +2,14 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
 #include <glm/vec2.hpp>
 
+#include "estimation/bounded/displaced/displacement_mean.hpp"
+#include "estimation/bounded/displaced/displacement_weights.hpp"
 #include "estimation/bounded/known_elements.hpp"
 #include "estimation/bounded/search/search_goal.hpp"
 #include "estimation/bounded/tables/tile_bounds.hpp"
@@ -34,6 +37,9 @@ struct SearchSpace {
   std::vector<OccupancyGrid> maps;    ///< [hypothesis] without their cells
   std::vector<BoundingBox> boxes;     ///< [hypothesis] around its occupied cells
   std::vector<TileBounds> bounds;     ///< [hypothesis]
+
+  std::unique_ptr<const DisplacementWeights> displacement;  ///< null where touches are exact
+  std::vector<DisplacementMean> displaced;                  ///< [level] of tiles' bounds
 };
 
 class BinLikelihood;

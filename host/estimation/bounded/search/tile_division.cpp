@@ -1,10 +1,12 @@
 #include "estimation/bounded/search/tile_division.hpp"
 
 #include <algorithm>
+#include <functional>
 #include <limits>
 #include <numeric>
 #include <tuple>
 
+#include "estimation/bounded/displaced/displaced_tiles.hpp"
 #include "estimation/bounded/parallel_for.hpp"
 
 namespace palpate {
@@ -57,7 +59,8 @@ TileDivision::TileDivision(const SearchTask& task, const LargestTiles& largest)
       space_(task.space),
       largest_(largest),
       thetas_(space_.turns.size()),
-      reaches_(reaches_of(task.elements, space_.turns)),
+      reaches_(space_.displacement ? displaced_reaches(space_, task.elements.touches)
+                                   : reaches_of(task.elements, space_.turns)),
       seen_(space_.bounds.size() * thetas_) {
   parallel_for(seen_.size(), [&](std::size_t row) {
     const std::size_t object = row / thetas_;
@@ -218,6 +221,7 @@ std::vector<Tile> TileDivision::best_smallest(std::vector<Tile> tiles, std::size
 
 std::vector<Tile> TileDivision::parts_of(std::span<const Tile> tiles, std::size_t level,
                                          std::vector<Tile>* unseen) {
+  const std::vector<std::int64_t> displaced = displaced_sums(tiles, level + 1);
   std::vector<std::size_t> begins;  // of tasks: tiles of one object and theta
   for (std::size_t i = 0; i < tiles.size(); ++i) {
     if (i == 0 || tiles[i].object != tiles[i - 1].object || tiles[i].theta != tiles[i - 1].theta ||
@@ -234,14 +238,20 @@ std::vector<Tile> TileDivision::parts_of(std::span<const Tile> tiles, std::size_
     const TileBounds& bounds = space_.bounds[first.object];
     const TileRange seen =
         seen_tiles(reaches_[first.theta], space_.maps[first.object], bounds.levels()[level + 1]);
-    bounds.place(level + 1, space_.turns[first.theta], task_.elements, placed);
+    if (displaced.empty()) {
+      bounds.place(level + 1, space_.turns[first.theta], task_.elements, placed);
+    }
     parts[task].reserve((end - begins[task]) * batch_tiles);
     for (std::size_t i = begins[task]; i < end; ++i) {
       std::uint32_t sums[batch_tiles] = {};
       const int x = tiles[i].x * batch_side;
       const int y = tiles[i].y * batch_side;
-      bounds.add(level + 1, task_.elements, placed, x, y, sums);
-      append_batch(first, level + 1, x, y, sums, parts[task]);
+      if (displaced.empty()) {
+        bounds.add(level + 1, task_.elements, placed, x, y, sums);
+        append_batch(first, level + 1, x, y, sums, parts[task]);
+      } else {
+        append_batch(first, level + 1, x, y, displaced.data() + i * batch_tiles, parts[task]);
+      }
     }
     const auto begin_unseen = std::stable_partition(
         parts[task].begin(), parts[task].end(), [&](const Tile& tile) { return seen.holds(tile); });
@@ -258,8 +268,32 @@ std::vector<Tile> TileDivision::parts_of(std::span<const Tile> tiles, std::size_
   return all;
 }
 
+std::vector<std::int64_t> TileDivision::displaced_sums(std::span<const Tile> tiles,
+                                                       std::size_t level) const {
+  if (!space_.displacement) {
+    return {};
+  }
+  std::vector<std::int64_t> sums(tiles.size() * batch_tiles);
+  for (std::size_t first = 0, end = 0; first < tiles.size(); first = end) {
+    std::vector<BlockRun> batches;
+    for (; end < tiles.size() && tiles[end].object == tiles[first].object; ++end) {
+      append_block(tiles[end].theta, tiles[end].y, tiles[end].x, batches);
+    }
+    for (const KnownElements& touch : task_.elements.touches) {
+      task_.deadline.cancel_point();
+      const std::vector<std::int32_t> added =
+          displaced_penalties(space_, static_cast<std::size_t>(tiles[first].object), level, touch,
+                              batches);
+      std::transform(added.begin(), added.end(), sums.begin() + first * batch_tiles,
+                     sums.begin() + first * batch_tiles, std::plus<std::int64_t>());
+    }
+  }
+  return sums;
+}
+
+template <typename Sum>
 void TileDivision::append_batch(const Tile& of, std::size_t level, int first_x, int first_y,
-                                const std::uint32_t* sums, std::vector<Tile>& tiles) const {
+                                const Sum* sums, std::vector<Tile>& tiles) const {
   const TileLevel& tiling = space_.bounds[of.object].levels()[level];
   for (int j = 0; j < batch_side; ++j) {
     if (tiling.y.bins(first_y + j) == 0) {

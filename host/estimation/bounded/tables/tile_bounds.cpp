@@ -24,6 +24,23 @@ constexpr double most_single_bins = 8e6;
 /// Most squares along a single bin's side: tables grow with their number.
 constexpr int most_side = 16;
 
+/// Tiles, of all maps, up to which larger ones would save less than they cost where touches are
+/// uncertain; and the side from which on larger tiles leave out too little, in standard deviations.
+constexpr double enough_tiles = 3e5;
+constexpr double widest_sd = 2.0;
+/// Side of the smallest tiles where touches are uncertain, in standard deviations and in cells.
+constexpr double smallest_sd = 0.6;
+constexpr double smallest_cells = 0.5;
+
+/// Squares along the side of a tile of whole bins, about as large as a cell.
+int side_of_bins(double x_cells, double y_cells) {
+  int side = 2;
+  while (side < most_side && x_cells * y_cells > side * side) {
+    side *= 2;
+  }
+  return side;
+}
+
 /// Tiles of single bins where these are sparse and few, and their squares about as large as a cell.
 std::optional<TileSize> single_bins(const PoseLattice& lattice, double least_cell_mm,
                                     std::size_t maps) {
@@ -34,18 +51,48 @@ std::optional<TileSize> single_bins(const PoseLattice& lattice, double least_cel
   if (std::min(x_cells, y_cells) < sparse_cells || bins > most_single_bins) {
     return {};
   }
-  TileSize size{.side = 2, .single_bin = true};
-  while (size.side < most_side && x_cells * y_cells > size.side * size.side) {
-    size.side *= 2;
-  }
-  return size;
+  return TileSize{.side = side_of_bins(x_cells, y_cells), .bins = 1};
 }
 
-TileAxis axis_of_bins(const Axis& axis) {
-  TileAxis tiles{.first_mm = axis.centre(0), .side_mm = axis.step(), .first_bin = {}};
-  const int batches = (axis.count - 1) / batch_side + 1;
+/// Tiles of whole bins, where touches are uncertain.
+std::vector<TileSize> sizes_in_bins(const PoseLattice& lattice, double least_cell_mm,
+                                    std::size_t maps, const DisplacementSd& touch_sd) {
+  const auto step_mm = [&](const Axis& axis) { return axis.count > 1 ? axis.step() : 0.0; };
+  const double step = std::max(step_mm(lattice.x_mm), step_mm(lattice.y_mm));
+  const auto size_of = [&](int bins) {
+    const double x_cells = bins * step_mm(lattice.x_mm) / least_cell_mm;
+    const double y_cells = bins * step_mm(lattice.y_mm) / least_cell_mm;
+    return TileSize{.side = side_of_bins(std::max(x_cells, 1.0), std::max(y_cells, 1.0)),
+                    .bins = bins};
+  };
+  const double smallest_mm = std::max(smallest_sd * touch_sd.mm, smallest_cells * least_cell_mm);
+  int bins = 1;
+  while (2 * bins * step <= smallest_mm && bins < std::max(lattice.x_mm.count, lattice.y_mm.count)) {
+    bins *= 2;
+  }
+  std::vector<TileSize> sizes{size_of(bins)};
+  const double widest_mm = widest_sd * std::max(touch_sd.mm, least_cell_mm);
+  const auto tiles = [&] {
+    const auto along = [&](const Axis& axis) { return (axis.count - 1) / bins + 1; };
+    return static_cast<double>(along(lattice.x_mm)) * along(lattice.y_mm) *
+           lattice.theta_rad.count * static_cast<double>(maps);
+  };
+  while ((tiles() > enough_tiles && bins * step < widest_mm) || tiles() > most_largest_tiles) {
+    if (bins >= std::max(lattice.x_mm.count, lattice.y_mm.count)) {
+      break;
+    }
+    bins *= batch_side;
+    sizes.insert(sizes.begin(), size_of(bins));
+  }
+  return sizes;
+}
+
+TileAxis axis_of_bins(const Axis& axis, int bins, double side_mm) {
+  TileAxis tiles{.first_mm = axis.centre(0), .side_mm = side_mm, .first_bin = {}};
+  const int batches = (axis.count - 1) / (bins * batch_side) + 1;
   for (int tile = 0; tile <= batch_side * batches; ++tile) {
-    tiles.first_bin.push_back(std::min(tile, axis.count));
+    tiles.first_bin.push_back(
+        static_cast<int>(std::min(std::int64_t{tile} * bins, std::int64_t{axis.count})));
   }
   return tiles;
 }
@@ -79,7 +126,10 @@ TileAxis tile_axis(const Axis& axis, double side_mm) {
 }  // namespace
 
 std::vector<TileSize> tile_sizes(const PoseLattice& lattice, double least_cell_mm,
-                                 std::size_t maps) {
+                                 std::size_t maps, const DisplacementSd& touch_sd) {
+  if (!touch_sd.none()) {
+    return sizes_in_bins(lattice, least_cell_mm, maps, touch_sd);
+  }
   if (const std::optional<TileSize> size = single_bins(lattice, least_cell_mm, maps)) {
     return {*size};
   }
@@ -110,23 +160,29 @@ std::vector<TileSize> tile_sizes(const PoseLattice& lattice, double least_cell_m
 }
 
 glm::dvec2 square_mm(const TileSize& size, const PoseLattice& lattice, double cell_mm) {
-  return size.single_bin
-             ? glm::dvec2(lattice.x_mm.step(), lattice.y_mm.step()) / static_cast<double>(size.side)
-             : glm::dvec2(size.square_cells() * cell_mm);
+  if (size.bins == 0) {
+    return glm::dvec2(size.square_cells() * cell_mm);
+  }
+  const auto along = [&](const Axis& axis) {
+    // The only bin of an axis stays at its place.
+    return (axis.count > 1 ? size.bins * axis.step() : 2.0 * cell_mm) / size.side;
+  };
+  return {along(lattice.x_mm), along(lattice.y_mm)};
 }
 
 std::vector<TileLevel> tile_levels(const PoseLattice& lattice, double cell_mm,
                                    const std::vector<TileSize>& sizes) {
   std::vector<TileLevel> levels;
   for (const TileSize& size : sizes) {
-    const double side_mm = size.cells() * cell_mm;
-    const auto along = [&](const Axis& axis) {
-      return size.single_bin ? axis_of_bins(axis) : tile_axis(axis, side_mm);
+    const glm::dvec2 square = square_mm(size, lattice, cell_mm);
+    const auto along = [&](const Axis& axis, double square_side_mm) {
+      return size.bins > 0 ? axis_of_bins(axis, size.bins, size.side * square_side_mm)
+                           : tile_axis(axis, size.cells() * cell_mm);
     };
     levels.push_back({.size = size,
-                      .square_mm = square_mm(size, lattice, cell_mm),
-                      .x = along(lattice.x_mm),
-                      .y = along(lattice.y_mm)});
+                      .square_mm = square,
+                      .x = along(lattice.x_mm, square.x),
+                      .y = along(lattice.y_mm, square.y)});
   }
   return levels;
 }
@@ -142,7 +198,7 @@ TileBounds::TileBounds(const OccupancyGrid& map, const ContactModel& contact, st
   std::vector<std::size_t> squares_of;  // [level]
   for (std::size_t level = 0; level < levels_.size(); ++level) {
     const TileSize& size = levels_[level].size;
-    if (size.single_bin) {
+    if (size.bins > 0) {
       squares.push_back(squares_of_size(map, prior_log_odds, levels_[level].square_mm));
     } else if (level == 0 || size.parts != levels_[level - 1].size.parts) {
       squares.push_back(squares_of_cells(map, prior_log_odds, size.parts));

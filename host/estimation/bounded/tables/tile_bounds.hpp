@@ -10,6 +10,7 @@
 #include "estimation/bounded/tables/tile_penalties.hpp"
 #include "estimation/bounded/tables/window_table.hpp"
 #include "palpate/contact_model.hpp"
+#include "palpate/displacement.hpp"
 #include "palpate/lattice.hpp"
 #include "palpate/occupancy_grid.hpp"
 
@@ -38,22 +39,25 @@ struct TileRange {
 };
 
 /// The size of a level's tiles: `side` squares. A map's cell has `parts` squares along each axis,
-/// or a square holds `merged` cells. Or a tile is a single bin: squares then divide the lattice's
-/// steps, however large the map's cells are.
+/// or a square holds `merged` cells. Or a tile has as many `bins` along each axis: squares then
+/// divide the lattice's steps, however large the map's cells are.
 struct TileSize {
   int parts = 1;
   int merged = 1;
   int side = 1;
-  bool single_bin = false;
+  int bins = 0;  ///< 0: as the map's cells have it
 
-  /// Squares along an axis that an element can see while the pose is in one tile.
-  int window() const { return single_bin ? 1 : side + 1; }
+  /// Squares along an axis that an element can see while the pose is in one tile, or at one of its
+  /// bins' centres.
+  int window() const {
+    return bins == 0 ? side + 1 : ((bins - 1) * side + bins - 1) / bins + 1;
+  }
   double square_cells() const { return static_cast<double>(merged) / parts; }
   double cells() const { return side * square_cells(); }
 };
 
 /// Tiles along one axis of the lattice. They begin at the first bin's centre; a tile holds the bins
-/// whose centres lie in it, which may be none. A tile of a single bin begins at its centre.
+/// whose centres lie in it, which may be none.
 struct TileAxis {
   double first_mm = 0.0;       ///< centre of the lattice's first bin
   double side_mm = 0.0;        ///< of a tile
@@ -96,10 +100,12 @@ struct TileLevel {
 /// Sizes of the levels, the largest tiles first. Each level's tiles have a quarter of the side of
 /// the level before, so that a batch of 4 x 4 tiles makes up one tile. Where bins are few and lie
 /// cells apart, there is one level, of single bins: larger tiles would leave out few of them, and
-/// bound them loosely.
+/// bound them loosely. Where touches are uncertain, all tiles have whole bins, and the smallest are
+/// about half as wide as the standard deviation.
 /// @param least_cell_mm of the maps
+/// @param touch_sd how far touches may be displaced
 std::vector<TileSize> tile_sizes(const PoseLattice& lattice, double least_cell_mm,
-                                 std::size_t maps);
+                                 std::size_t maps, const DisplacementSd& touch_sd = {});
 
 /// The squares of a level over a map of this cell.
 glm::dvec2 square_mm(const TileSize& size, const PoseLattice& lattice, double cell_mm);

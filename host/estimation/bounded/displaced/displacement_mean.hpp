@@ -1,0 +1,87 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include <glm/vec2.hpp>
+
+#include "estimation/bounded/displaced/displacement_weights.hpp"
+
+namespace palpate {
+
+/// Neighbouring blocks of 4 x 4 places along x, at one theta. A place is a bin or a tile of bins.
+struct BlockRun {
+  static constexpr int side = 4;
+  static constexpr int places = side * side;
+
+  int theta = 0;
+  int y = 0;  ///< of the blocks, counted in blocks
+  int x = 0;  ///< of the first block
+  int count = 0;
+};
+
+/// Appends a block behind those that stand before it by theta, y and x.
+void append_block(int theta, int y, int x, std::vector<BlockRun>& runs);
+
+/// A part of one theta's places, in rows.
+template <typename Value>
+struct PlaceRows {
+  Value* first = nullptr;  ///< the place at (x, y)
+  std::ptrdiff_t pitch = 0;
+  int x = 0;
+  int y = 0;
+
+  Value* at(int place_x, int place_y) const {
+    return first + (place_y - y) * pitch + (place_x - x);
+  }
+};
+
+/// A touch's log-likelihoods, before they are averaged: sets those of the runs' places, all of one
+/// theta, in nats. Places without bins keep what they hold. Is called on several threads.
+template <typename Value>
+using PlaceSource = std::function<void(std::span<const BlockRun>, const PlaceRows<Value>&)>;
+
+/// A touch's log-likelihoods averaged over where its sensor may have been, [run, block, y, x].
+struct DisplacedMeans {
+  std::vector<double> log_mean;  ///< in nats; -infinity where a place holds no bin
+  /// Of bins: a mean may be wrong by e^error - 1 of itself, since the places to which turns move a
+  /// bin are rounded.
+  std::vector<double> error;
+};
+
+/// The weights of displacements between places.
+struct PlaceWeights {
+  const DisplacementWeights& touch;
+  int bins;  ///< of a place along each axis
+  AxisBlur x;
+  AxisBlur y;
+};
+
+/// Averages a touch's likelihoods over where its sensor may have been, at the places that are asked
+/// for. Each theta is blurred along y and then along x; then neighbouring thetas are added up at the
+/// places to which the turns move a bin. From upper bounds of the likelihoods of tiles, this gives
+/// upper bounds of the means.
+class DisplacementMean {
+ public:
+  /// @param weights outlive this object
+  /// @param bins of a place along each axis
+  DisplacementMean(const DisplacementWeights& weights, int bins);
+
+  /// Bounds for tiles, in float32 arithmetic and rounded up.
+  /// @param targets sorted by theta, y, x
+  std::vector<double> bounds(const glm::dvec2& sensor_from_pivot_mm,
+                             std::span<const BlockRun> targets,
+                             const PlaceSource<float>& source) const;
+  /// Means of bins, in float64 arithmetic.
+  DisplacedMeans means(const glm::dvec2& sensor_from_pivot_mm, std::span<const BlockRun> targets,
+                       const PlaceSource<double>& source) const;
+  /// Bound of the error of means(), in nats, beside DisplacedMeans::error and the source's own.
+  double mean_error() const;
+
+ private:
+  PlaceWeights weights_;
+};
+
+}  // namespace palpate

@@ -1,0 +1,128 @@
+#include "estimation/bounded/displaced/displacement_weights.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <glm/geometric.hpp>
+
+#include "palpate/pose.hpp"
+
+namespace palpate {
+
+namespace {
+
+/// A Gaussian is cut off at as many standard deviations.
+constexpr double reach_sd = 4.0;
+
+/// Bins to either side that a Gaussian reaches. An axis of one bin is not blurred.
+int steps_of(const Axis& axis, double sd) {
+  return axis.count > 1 ? static_cast<int>(std::ceil(reach_sd * sd / axis.step())) : 0;
+}
+
+double weight_at(int steps, const Axis& axis, double sd) {
+  const double deviations = steps == 0 ? 0.0 : steps * axis.step() / sd;
+  return std::exp(-deviations * deviations / 2.0);
+}
+
+}  // namespace
+
+AxisBlur::AxisBlur(const Axis& axis, double sd, int bins)
+    : steps(std::min(steps_of(axis, sd), axis.count - 1)) {
+  std::vector<double> of_bins;
+  for (int k = 0; k <= steps; ++k) {
+    of_bins.push_back(weight_at(k, axis, sd));
+  }
+  const auto between = [&](int from, int to) {
+    const int distance = std::abs(to - from);
+    return distance <= steps ? of_bins[distance] : 0.0;
+  };
+  for (int tile = 0; tile * bins - (bins - 1) <= steps; ++tile) {
+    double most = 0.0;
+    for (int from = 0; from < bins; ++from) {
+      double sum = 0.0;
+      for (int to = tile * bins; to < (tile + 1) * bins; ++to) {
+        sum += between(from, to);
+      }
+      most = std::max(most, sum);
+    }
+    weight.push_back(most);
+  }
+  for (int first = 0; first < axis.count; first += bins) {
+    double most = 0.0;
+    for (int bin = first; bin < std::min(first + bins, axis.count); ++bin) {
+      double inside = 0.0;
+      for (int to = std::max(0, bin - steps); to <= std::min(axis.count - 1, bin + steps); ++to) {
+        inside += between(bin, to);
+      }
+      most = std::max(most, 1.0 / inside);
+    }
+    scale.push_back(most);
+  }
+}
+
+DisplacementWeights::DisplacementWeights(const PoseLattice& lattice, const DisplacementSd& sd)
+    : lattice_(lattice), sd_(sd), theta_steps_(steps_of(lattice.theta_rad, sd.rad)) {}
+
+std::vector<Tap> DisplacementWeights::taps(int theta,
+                                           const glm::dvec2& sensor_from_pivot_mm) const {
+  const Axis& angles = lattice_.theta_rad;
+  const double theta_rad = angles.centre(theta);
+  const double error = fraction_error(sensor_from_pivot_mm);
+  std::vector<Tap> taps;
+  for (int k = -theta_steps_; k <= theta_steps_; ++k) {
+    if (!lattice_.full_circle() && (theta + k < 0 || theta + k >= angles.count)) {
+      continue;
+    }
+    Tap tap{.theta = ((theta + k) % angles.count + angles.count) % angles.count,
+            .weight = weight_at(k, angles, sd_.rad)};
+    const glm::dvec2 shift_mm =
+        k == 0 ? glm::dvec2(0.0)
+               : rotate(theta_rad, sensor_from_pivot_mm) -
+                     rotate(theta_rad + k * angles.step(), sensor_from_pivot_mm);
+    bool inside = true;
+    const auto split = [&](const Axis& axis, double mm, int& bins, double& fraction) {
+      const double steps = axis.count == 1 ? 0.0 : mm / axis.step();
+      // Written so that what is no number lies outside.
+      if (!(std::abs(steps) < axis.count + 1.0)) {
+        inside = false;
+        return;
+      }
+      bins = static_cast<int>(std::floor(steps));
+      fraction = steps - bins;
+      if (fraction > 1.0 - error) {
+        ++bins;
+        fraction = 0.0;
+      }
+    };
+    split(lattice_.x_mm, shift_mm.x, tap.bins.x, tap.fraction.x);
+    split(lattice_.y_mm, shift_mm.y, tap.bins.y, tap.fraction.y);
+    if (inside) {
+      taps.push_back(tap);
+    }
+  }
+  return taps;
+}
+
+double DisplacementWeights::fraction_error(const glm::dvec2& sensor_from_pivot_mm) const {
+  // Two angles with their sines and cosines, two rotations, a difference and a quotient.
+  const Axis& angles = lattice_.theta_rad;
+  const double farthest = std::max(std::abs(angles.lower), std::abs(angles.upper));
+  double most = 0.0;
+  for (const Axis& axis : {lattice_.x_mm, lattice_.y_mm}) {
+    if (axis.count > 1) {
+      most = std::max(most, 16.0 * (1.0 + farthest) * glm::length(sensor_from_pivot_mm) /
+                                axis.step());
+    }
+  }
+  return theta_steps_ == 0 ? 0.0 : std::min(most * 0x1p-53, 0.5);
+}
+
+glm::dvec2 DisplacementWeights::reach_mm() const {
+  const auto along = [&](const Axis& axis) {
+    // A step more for the bins about a tap's place.
+    return axis.count == 1 ? 0.0 : (std::min(steps_of(axis, sd_.mm), axis.count) + 1) * axis.step();
+  };
+  return {along(lattice_.x_mm), along(lattice_.y_mm)};
+}
+
+}  // namespace palpate

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <vector>
+
+#include <glm/vec2.hpp>
+
+#include "palpate/displacement.hpp"
+#include "palpate/lattice.hpp"
+
+namespace palpate {
+
+/// A Gaussian along x or y, between tiles of bins. Of tiles of one bin, these are the weights of the
+/// definition; of larger tiles, no bin of a tile gives another tile's bins together more than this.
+struct AxisBlur {
+  /// @param bins of a tile along the axis
+  AxisBlur(const Axis& axis, double sd, int bins);
+
+  int reach() const { return static_cast<int>(weight.size()) - 1; }
+
+  int steps = 0;               ///< bins to either side that the Gaussian reaches
+  std::vector<double> weight;  ///< [distance in tiles]
+  std::vector<double> scale;   ///< [tile] 1 over the sum of the weights inside the region
+};
+
+/// What a touch's mean takes from one theta: the likelihoods of bins that lie `bins` + `fraction`
+/// away along x and y.
+struct Tap {
+  int theta = 0;
+  double weight = 0.0;
+  glm::ivec2 bins{0};
+  glm::dvec2 fraction{0.0};
+};
+
+/// The displacements of a touch on a lattice, as docs/uncertainty.md defines them.
+class DisplacementWeights {
+ public:
+  DisplacementWeights(const PoseLattice& lattice, const DisplacementSd& sd);
+
+  const PoseLattice& lattice() const { return lattice_; }
+  const DisplacementSd& sd() const { return sd_; }
+  int theta_steps() const { return theta_steps_; }
+  /// The thetas that a mean at this theta takes likelihoods from, as far as the region reaches.
+  /// @param sensor_from_pivot_mm the sensor's origin, in the robot frame
+  std::vector<Tap> taps(int theta, const glm::dvec2& sensor_from_pivot_mm) const;
+  /// Bound of the error of a tap's fraction.
+  double fraction_error(const glm::dvec2& sensor_from_pivot_mm) const;
+  /// How far the bins that a mean takes lie from a tap's place, in mm along x and y, at most.
+  glm::dvec2 reach_mm() const;
+
+ private:
+  PoseLattice lattice_;
+  DisplacementSd sd_;
+  int theta_steps_;
+};
+
+}  // namespace palpate

@@ -1,0 +1,145 @@
+#include <algorithm>
+#include <tuple>
+
+#include "estimation/bounded/leaves/bin_likelihood.hpp"
+
+// Bins of touches of uncertain pose: the logs of each touch's mean likelihood, added up.
+
+namespace palpate {
+
+namespace {
+
+constexpr int side = BlockRun::side;
+
+/// The blocks of 4 x 4 bins that boxes of one object lie in, and sums for all of their bins.
+class BlockSums {
+ public:
+  explicit BlockSums(std::span<const BinBox> boxes) {
+    std::vector<std::tuple<int, int, int>> blocks;
+    for (const BinBox& box : boxes) {
+      for (int y = box.y_first / side; side * y < box.y_first + box.y_count; ++y) {
+        for (int x = box.x_first / side; side * x < box.x_first + box.x_count; ++x) {
+          blocks.emplace_back(box.theta, y, x);
+        }
+      }
+    }
+    std::ranges::sort(blocks);
+    const auto repeated = std::ranges::unique(blocks);
+    blocks.erase(repeated.begin(), repeated.end());
+    for (const auto& [theta, y, x] : blocks) {
+      const std::size_t runs = runs_.size();
+      append_block(theta, y, x, runs_);
+      if (runs_.size() > runs) {
+        first_.push_back(log_likelihood_.size());
+      }
+      log_likelihood_.resize(log_likelihood_.size() + BlockRun::places);
+    }
+    error_.resize(log_likelihood_.size());
+  }
+
+  std::span<const BlockRun> runs() const { return runs_; }
+  void add(const DisplacedMeans& touch) {
+    for (std::size_t i = 0; i < error_.size(); ++i) {
+      log_likelihood_[i] += touch.log_mean[i];
+      error_[i] += touch.error[i];
+    }
+  }
+  /// Copies the sums of a box's bins, [y, x].
+  /// @param errors may be null
+  template <typename Result>
+  void copy(const BinBox& box, Result* to, double* errors) const {
+    for_bins(box, [&](std::size_t bin) {
+      *to++ = static_cast<Result>(log_likelihood_[bin]);
+      if (errors != nullptr) {
+        *errors++ = error_[bin];
+      }
+    });
+  }
+
+ private:
+  template <typename Visit>
+  void for_bins(const BinBox& box, const Visit& visit) const {
+    const auto after = [](const BlockRun& run) { return std::tuple(run.theta, run.y, run.x); };
+    for (int y = box.y_first; y < box.y_first + box.y_count; ++y) {
+      // A box's bins of a row lie in one run.
+      const auto run = std::ranges::upper_bound(
+                           runs_, std::tuple(box.theta, y / side, box.x_first / side), {}, after) -
+                       1;
+      const std::size_t first = first_[static_cast<std::size_t>(run - runs_.begin())];
+      for (int x = box.x_first; x < box.x_first + box.x_count; ++x) {
+        const auto block = static_cast<std::size_t>(x / side - run->x);
+        visit(first + block * BlockRun::places +
+              static_cast<std::size_t>(side * (y % side) + x % side));
+      }
+    }
+  }
+
+  std::vector<BlockRun> runs_;
+  std::vector<std::size_t> first_;  ///< [run] its first bin's place in what follows
+  std::vector<double> log_likelihood_;
+  std::vector<double> error_;
+};
+
+}  // namespace
+
+template <typename Lane, typename Result>
+void BinLikelihood::evaluate_displaced(std::span<const BinBox> boxes,
+                                       const KnownElements& elements,
+                                       std::span<Result> log_likelihood,
+                                       std::span<double> errors) const {
+  Result* to = log_likelihood.data();
+  double* to_errors = errors.empty() ? nullptr : errors.data();
+  for (std::size_t first = 0, end = 0; first < boxes.size(); first = end) {
+    while (end < boxes.size() && boxes[end].object == boxes[first].object) {
+      ++end;
+    }
+    const std::span<const BinBox> of_object = boxes.subspan(first, end - first);
+    BlockSums sums(of_object);
+    for (const KnownElements& touch : elements.touches) {
+      const auto source = [&](std::span<const BlockRun> runs, const PlaceRows<double>& rows) {
+        std::vector<BinBox> parts;
+        std::size_t bins = 0;
+        for (const BlockRun& run : runs) {
+          BinBox& part = parts.emplace_back(
+              BinBox{.object = of_object.front().object,
+                     .theta = run.theta,
+                     .y_first = side * run.y,
+                     .y_count = std::min(side, lattice_.y_mm.count - side * run.y),
+                     .x_first = side * run.x,
+                     .x_count = std::min(side * run.count, lattice_.x_mm.count - side * run.x)});
+          bins += static_cast<std::size_t>(part.bins());
+        }
+        std::vector<double> values(bins);
+        evaluate_in<Lane>(parts, touch, std::span(values));
+        auto value = values.begin();
+        for (const BinBox& part : parts) {
+          for (int y = part.y_first; y < part.y_first + part.y_count; ++y) {
+            std::copy(value, value + part.x_count, rows.at(part.x_first, y));
+            value += part.x_count;
+          }
+        }
+      };
+      sums.add(displaced_->means(touch.sensor_from_pivot_mm, sums.runs(), source));
+    }
+    for (const BinBox& box : of_object) {
+      sums.copy(box, to, to_errors);
+      to += box.bins();
+      to_errors += errors.empty() ? 0 : box.bins();
+    }
+  }
+}
+
+template void BinLikelihood::evaluate_displaced<float>(std::span<const BinBox>,
+                                                       const KnownElements&, std::span<float>,
+                                                       std::span<double>) const;
+template void BinLikelihood::evaluate_displaced<float>(std::span<const BinBox>,
+                                                       const KnownElements&, std::span<double>,
+                                                       std::span<double>) const;
+template void BinLikelihood::evaluate_displaced<double>(std::span<const BinBox>,
+                                                        const KnownElements&, std::span<float>,
+                                                        std::span<double>) const;
+template void BinLikelihood::evaluate_displaced<double>(std::span<const BinBox>,
+                                                        const KnownElements&, std::span<double>,
+                                                        std::span<double>) const;
+
+}  // namespace palpate
