@@ -81,8 +81,7 @@ std::optional<double> none_weight(const Request& request, std::span<const Hypoth
 }
 
 /// What bounds refuse and the histogram does not; each giver as a sentence names it.
-std::vector<HistogramNeed> all_needs(const Request& request, const HistogramNeed& of_caller,
-                                     const HistogramOptions& histogram) {
+std::vector<HistogramNeed> all_needs(const Request& request, const HistogramNeed& of_caller) {
   std::vector<HistogramNeed> needs;
   if (!of_caller.why.empty()) {
     needs.push_back(
@@ -91,11 +90,6 @@ std::vector<HistogramNeed> all_needs(const Request& request, const HistogramNeed
   if (const std::string slip = giver_of(request, {slip_mm(request), slip_deg(request)});
       !slip.empty()) {
     needs.push_back({slip, "bounds take the object to rest between touches"});
-  }
-  if (const std::string touch = giver_of(request, {touch_mm(request), touch_deg(request)});
-      !touch.empty() || !histogram.touch_sd.none()) {
-    needs.push_back({touch.empty() ? "touch_sd in " + request.sensor_model : touch,
-                     "bounds take every touch's pose to be exact"});
   }
   if (request.memory_mib) {
     needs.push_back({"`memory-mib`", "has no effect on bounds, whose memory is the host's"});
@@ -219,7 +213,7 @@ ChosenFilter choose_filter(const FilterWish& wish, const Request& request,
   set_displacement(slip_mm(request), slip_deg(request), histogram.slip_sd.mm,
                    histogram.slip_sd.rad);
   histogram.none_weight = none_weight(request, hypotheses);
-  std::vector<HistogramNeed> needs = all_needs(request, of_caller, histogram);
+  std::vector<HistogramNeed> needs = all_needs(request, of_caller);
   if (wish.kind == FilterKind::bounded) {
     if (!needs.empty()) {
       const auto& [giver, why] = needs.front();
@@ -254,11 +248,12 @@ void require_within_region(const Request& request, const PoseLattice& lattice) {
 }
 
 std::optional<BoundedOptions> bounded_instead(const HistogramOptions& histogram) {
-  if (!histogram.touch_sd.none() || !histogram.slip_sd.none() || histogram.memory_limit_bytes) {
+  if (!histogram.slip_sd.none() || histogram.memory_limit_bytes) {
     return {};
   }
   return BoundedOptions{.lattice = histogram.lattice,
                         .contact = histogram.contact,
+                        .touch_sd = histogram.touch_sd,
                         .none_weight = histogram.none_weight};
 }
 
@@ -283,16 +278,14 @@ FilterOptions filter_for_bins(std::span<const Hypothesis> hypotheses,
                               const HistogramOptions& histogram) {
   if (bins_in_all(hypotheses.size(), histogram.lattice) > most_histogram_bins) {
     const std::optional<BoundedOptions> bounded = bounded_instead(histogram);
-    if (bounded && bounds_have_room(hypotheses, histogram.lattice, histogram.contact)) {
+    if (bounded && bounds_have_room(hypotheses, *bounded)) {
       return *bounded;
     }
   }
   return histogram;
 }
 
-bool bounds_have_room(std::span<const Hypothesis> hypotheses, const PoseLattice& lattice,
-                      const ContactModel& contact) {
-  BoundedOptions options{.lattice = lattice, .contact = contact};
+bool bounds_have_room(std::span<const Hypothesis> hypotheses, BoundedOptions options) {
   options.lattice.collapse_fixed().validate();
   return why_no_room(hypotheses, options, memory_for_search()).empty();
 }

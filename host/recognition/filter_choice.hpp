@@ -49,8 +49,7 @@ inline constexpr std::int64_t most_histogram_bins = 100'000;
 inline constexpr std::int64_t most_bounded_bins = 1'000'000'000;
 
 /// The options of a bounded posterior of the same bins; none where the histogram allows for
-/// something that bounds do not: touch_sd, slip_sd, a limit of its memory, or none_weight with
-/// gamma 0.
+/// something that bounds do not: slip_sd, or a limit of its memory.
 std::optional<BoundedOptions> bounded_instead(const HistogramOptions& histogram);
 
 /// Bins that balanced_lattice() chose.
@@ -70,9 +69,8 @@ ChosenBins chosen_bins(const Device& device, std::span<const Hypothesis> hypothe
 FilterOptions filter_for_bins(std::span<const Hypothesis> hypotheses,
                               const HistogramOptions& histogram);
 
-/// Whether the machine has room for so many bins by bounds.
+/// Whether the machine has room for a bounded posterior.
 /// @throws Error on a lattice out of range
-bool bounds_have_room(std::span<const Hypothesis> hypotheses, const PoseLattice& lattice,
-                      const ContactModel& contact);
+bool bounds_have_room(std::span<const Hypothesis> hypotheses, BoundedOptions options);
 
 }  // namespace palpate

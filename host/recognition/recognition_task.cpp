@@ -70,8 +70,15 @@ const ContactModel& RecognitionTask::contact() const {
 }
 
 DisplacementSd RecognitionTask::touch_sd() const {
-  const auto* histogram = std::get_if<HistogramOptions>(&filter);
-  return histogram != nullptr ? histogram->touch_sd : DisplacementSd{};
+  return std::visit(
+      [](const auto& one) {
+        if constexpr (requires { one.touch_sd; }) {
+          return one.touch_sd;
+        } else {
+          return DisplacementSd{};
+        }
+      },
+      filter);
 }
 
 DisplacementSd RecognitionTask::slip_sd() const {

@@ -37,7 +37,7 @@ struct RecognitionTask {
   /// See lattice_of().
   const PoseLattice& lattice() const { return lattice_of(filter); }
   const ContactModel& contact() const;
-  /// How far a touch may be displaced; only a histogram allows for it.
+  /// How far a touch may be displaced; particles do not allow for it.
   DisplacementSd touch_sd() const;
   /// How far the object may move between two touches; only a histogram allows for it (the motion
   /// noise of particles is not meant).
