@@ -185,8 +185,7 @@ RefinedPose BoundedPosterior::refine(const Mode& mode) const {
   const BoundedBelief& belief = posterior.belief;
   // Where bins are very fine, a few of them tell the peak, and all would take long. A mean over
   // displacements takes the others all the same.
-  const PoseLattice fit =
-      belief.options().touch_sd.none() ? thinned(lattice()) : lattice();
+  const PoseLattice fit = belief.options().touch_sd.none() ? thinned(lattice()) : lattice();
   const bool thin = fit.plane() != lattice().plane();
   std::optional<BinLikelihood> of_thin;
   Mode start = mode;

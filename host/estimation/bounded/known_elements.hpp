@@ -28,8 +28,8 @@ struct KnownElements {
 
   // Touches of uncertain pose are averaged each by itself: their elements do not multiply with
   // those of others.
-  std::vector<KnownElements> touches = {};    ///< each by itself; empty where all are exact
-  glm::dvec2 sensor_from_pivot_mm = {};       ///< of one touch: the sensor's origin
+  std::vector<KnownElements> touches = {};  ///< each by itself; empty where all are exact
+  glm::dvec2 sensor_from_pivot_mm = {};     ///< of one touch: the sensor's origin
 };
 
 /// All elements of a touch in the array's order, Unknown ones too: in the robot frame and relative

@@ -62,9 +62,8 @@ reference::Posterior reference_posterior(std::span<const Hypothesis> objects,
                                          std::span<const Touch> touches) {
   return reference_posterior(
       objects,
-      HistogramOptions{.lattice = options.lattice,
-                       .contact = options.contact,
-                       .touch_sd = options.touch_sd},
+      HistogramOptions{
+          .lattice = options.lattice, .contact = options.contact, .touch_sd = options.touch_sd},
       touches);
 }
 

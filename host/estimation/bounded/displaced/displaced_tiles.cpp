@@ -10,7 +10,7 @@ namespace palpate {
 namespace {
 
 /// Penalties that float32 holds exactly; larger ones count as much, which leaves bounds true.
-constexpr std::uint32_t most_exact = std::uint32_t{1} << 24;
+constexpr std::uint32_t exact_penalties = std::uint32_t{1} << 24;
 
 }  // namespace
 
@@ -33,7 +33,7 @@ std::vector<std::int32_t> displaced_penalties(const SearchSpace& space, std::siz
           float* const row = rows.at(first_x, first_y + j);
           for (int i = 0; i < batch_side * batches; ++i) {
             if (tiling.x.bins(first_x + i) > 0 && tiling.y.bins(first_y + j) > 0) {
-              row[i] = static_cast<float>(std::min(sums[batch_side * i + j], most_exact)) *
+              row[i] = static_cast<float>(std::min(sums[batch_side * i + j], exact_penalties)) *
                        static_cast<float>(-1.0 / penalties_per_nat);
             }
           }
@@ -48,8 +48,8 @@ std::vector<std::int32_t> displaced_penalties(const SearchSpace& space, std::siz
     for (std::size_t i = 0; i < batch_side; ++i) {
       for (std::size_t j = 0; j < batch_side; ++j) {
         const double penalty = std::floor(-penalties_per_nat * logs[batch + batch_side * j + i]);
-        penalties[batch + batch_side * i + j] = static_cast<std::int32_t>(
-            std::min(penalty, static_cast<double>(largest_sum)));
+        penalties[batch + batch_side * i + j] =
+            static_cast<std::int32_t>(std::min(penalty, static_cast<double>(largest_sum)));
       }
     }
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -27,7 +28,19 @@ struct TileLikelihoods {
   /// More than all that vanishes in float32 adds up to, as a part of the weights.
   static constexpr Value vanished = 1e-30F;
 
-  static Value of_log(Value nats) { return nats > -80.0F ? std::exp(nats) : std::exp(-80.0F); }
+  /// exp(nats) for nats <= 0, within 1e-6 of itself, at least exp(-80): by powers of two and a
+  /// polynomial, which compilers turn into vectors.
+  static Value of_log(Value nats) {
+    const Value exponent = std::max(nats, -80.0F) * 1.44269504F;
+    const auto whole = static_cast<std::int32_t>(exponent - 0.5F);
+    const Value f = exponent - static_cast<Value>(whole);
+    Value p = 0.001112550962716341F;
+    for (const Value term : {0.009666282683610916F, 0.05557400360703468F, 0.24022351205348969F,
+                             0.693142831325531F, 1.0F}) {
+      p = p * f + term;
+    }
+    return std::bit_cast<Value>(std::bit_cast<std::int32_t>(p) + (whole << 23));
+  }
   static Value weight(double weight) { return static_cast<Value>(weight); }
   static void add(Value& sum, Value weight, Value likelihood) { sum += weight * likelihood; }
   static void widen(Value& widest, Value likelihood) { widest = std::max(widest, likelihood); }
@@ -83,9 +96,7 @@ struct BlockRange {
   }
 };
 
-int floor_quotient(int value, int by) {
-  return value >= 0 ? value / by : -((by - 1 - value) / by);
-}
+int floor_quotient(int value, int by) { return value >= 0 ? value / by : -((by - 1 - value) / by); }
 
 /// Blocks of places along an axis.
 int blocks_of(const AxisBlur& axis) {
@@ -158,14 +169,25 @@ class BlockSet {
   std::vector<std::uint8_t> in_;  ///< [y, x]
 };
 
+/// An AxisBlur in a domain's numbers.
 template <typename Domain>
-std::vector<typename Domain::Value> weights_in(const std::vector<double>& weights) {
-  std::vector<typename Domain::Value> converted;
-  for (const double weight : weights) {
-    converted.push_back(Domain::weight(weight));
+struct BlurIn {
+  explicit BlurIn(const AxisBlur& axis) : reach((axis.reach() + side - 1) / side) {
+    for (const double of : axis.weight) {
+      weight.push_back(Domain::weight(of));
+    }
+    for (const double of : axis.scale) {
+      scale.push_back(Domain::weight(of));
+    }
   }
-  return converted;
-}
+
+  int places() const { return static_cast<int>(scale.size()); }
+  int blocks() const { return (places() + side - 1) / side; }
+
+  int reach;  ///< in blocks
+  std::vector<typename Domain::Value> weight;
+  std::vector<typename Domain::Value> scale;
+};
 
 /// Adds up neighbours by their distance's weight.
 template <typename Domain, typename Value = typename Domain::Value>
@@ -225,24 +247,21 @@ std::vector<typename Domain::Value> widened(const std::vector<typename Domain::V
 /// @param range around the asked blocks
 template <typename Domain>
 Plane<Domain> blurred_plane(int theta, const BlockRange& range, std::span<const BlockRange> asked,
-                            const PlaceWeights& weights,
+                            const BlurIn<Domain>& blur_x, const BlurIn<Domain>& blur_y, bool wide,
                             const PlaceSource<typename Domain::Value>& source) {
   using Value = typename Domain::Value;
-  const auto reach = [](const AxisBlur& axis) { return (axis.reach() + side - 1) / side; };
   // A block more on every side, since taps lie between places.
-  const int x_margin = std::max(1, reach(weights.x));
-  const int y_margin = std::max(1, reach(weights.y));
+  const int x_margin = std::max(1, blur_x.reach);
+  const int y_margin = std::max(1, blur_y.reach);
   const BlockRange window{range.x_first - x_margin, range.x_end + x_margin,
                           range.y_first - y_margin, range.y_end + y_margin};
   BlockSet wanted(window);
   for (const BlockRange& blocks : asked) {
     wanted.add(blocks);
   }
-  const int x_blocks = blocks_of(weights.x);
-  const int y_blocks = blocks_of(weights.y);
-  const BlockSet along_x = wanted.widened(reach(weights.x), 0, x_blocks, y_blocks);
+  const BlockSet along_x = wanted.widened(blur_x.reach, 0, blur_x.blocks(), blur_y.blocks());
   const std::vector<BlockRun> sources =
-      along_x.widened(0, reach(weights.y), x_blocks, y_blocks).runs(theta);
+      along_x.widened(0, blur_y.reach, blur_x.blocks(), blur_y.blocks()).runs(theta);
 
   Plane<Domain> plane{.pitch = side * (window.x_end - window.x_first),
                       .x = side * window.x_first,
@@ -273,32 +292,28 @@ Plane<Domain> blurred_plane(int theta, const BlockRange& range, std::span<const 
     }
   });
 
-  const std::vector<Value> x_scale = weights_in<Domain>(weights.x.scale);
-  const std::vector<Value> y_scale = weights_in<Domain>(weights.y.scale);
   std::vector<Value> along_y(likelihood.size(), Domain::nothing);
   const PlaceRows<Value> middle = plane.rows(along_y);
-  const std::vector<Value> y_weights = weights_in<Domain>(weights.y.weight);
   for_rows(along_x.runs(theta), [&](int x, int y, int count) {
-    if (y < static_cast<int>(y_scale.size())) {
+    if (y < blur_y.places()) {
       Value* const row = middle.at(x, y);
-      blur<Domain>(rows.at(x, y), row, count, plane.pitch, y_weights);
+      blur<Domain>(rows.at(x, y), row, count, plane.pitch, blur_y.weight);
       for (int i = 0; i < count; ++i) {
-        row[i] = Domain::scaled(row[i], y_scale[y]);
+        row[i] = Domain::scaled(row[i], blur_y.scale[y]);
       }
     }
   });
   plane.blurred.assign(likelihood.size(), Domain::nothing);
   const PlaceRows<Value> result = plane.rows(plane.blurred);
-  const std::vector<Value> x_weights = weights_in<Domain>(weights.x.weight);
   for_rows(wanted.runs(theta), [&](int x, int y, int count) {
     Value* const row = result.at(x, y);
-    const int inside = std::min(count, static_cast<int>(x_scale.size()) - x);
-    blur<Domain>(middle.at(x, y), row, inside, 1, x_weights);
+    const int inside = std::min(count, blur_x.places() - x);
+    blur<Domain>(middle.at(x, y), row, inside, 1, blur_x.weight);
     for (int i = 0; i < inside; ++i) {
-      row[i] = Domain::scaled(row[i], x_scale[x + i]);
+      row[i] = Domain::scaled(row[i], blur_x.scale[x + i]);
     }
   });
-  if (!Domain::bounds || weights.bins > 1) {
+  if (wide) {
     plane.wide = widened<Domain>(widened<Domain>(plane.blurred, 1), plane.pitch);
   }
   return plane;
@@ -306,13 +321,13 @@ Plane<Domain> blurred_plane(int theta, const BlockRange& range, std::span<const 
 
 /// The least part of a tap's bilinear weights that lies inside the region, for any bin of a place.
 double weight_inside(int place, int bins, const Axis& axis, int moved, double fraction) {
-  double least = 1.0;
-  for (int bin = place * bins; bin < std::min((place + 1) * bins, axis.count); ++bin) {
-    const auto inside = [&](int at) { return at >= 0 && at < axis.count; };
-    least = std::min(least, (inside(bin + moved) ? 1.0 - fraction : 0.0) +
-                                (inside(bin + moved + 1) ? fraction : 0.0));
-  }
-  return least;
+  const auto inside = [&](int at) { return at >= 0 && at < axis.count; };
+  const auto of_bin = [&](int bin) {
+    return (inside(bin + moved) ? 1.0 - fraction : 0.0) +
+           (inside(bin + moved + 1) ? fraction : 0.0);
+  };
+  // It grows and then falls along the axis: least is that of the first or of the last.
+  return std::min(of_bin(place * bins), of_bin(std::min((place + 1) * bins, axis.count) - 1));
 }
 
 /// Adds up the planes of a run's taps.
@@ -403,21 +418,17 @@ class TapSum {
       wholly_inside_ += tap.weight;
       return;
     }
-    const auto along = [&](int first, int count, const Axis& axis, int moved, double fraction) {
-      std::vector<double> parts;
-      for (int i = 0; i < count; ++i) {
-        parts.push_back(weight_inside(first + i, weights_.bins, axis, moved, fraction));
-      }
-      return parts;
-    };
-    const std::vector<double> x =
-        along(side * run.x, width_, lattice.x_mm, tap.bins.x, tap.fraction.x);
-    const std::vector<double> y =
-        along(side * run.y, side, lattice.y_mm, tap.bins.y, tap.fraction.y);
-    double* to = inside_.data();
-    for (const double of_row : y) {
-      for (const double of_column : x) {
-        *to++ += tap.weight * of_row * of_column;
+    of_columns_.clear();
+    for (int i = 0; i < width_; ++i) {
+      of_columns_.push_back(
+          weight_inside(side * run.x + i, weights_.bins, lattice.x_mm, tap.bins.x, tap.fraction.x));
+    }
+    for (int j = 0; j < side; ++j) {
+      const double of_row = tap.weight * weight_inside(side * run.y + j, weights_.bins,
+                                                       lattice.y_mm, tap.bins.y, tap.fraction.y);
+      double* const __restrict to = inside_.data() + std::ptrdiff_t{j} * width_;
+      for (int i = 0; i < width_; ++i) {
+        to[i] += of_row * of_columns_[i];
       }
     }
   }
@@ -425,6 +436,7 @@ class TapSum {
   bool take(const BlockRun& run, double* log_mean, double* error) const {
     const int columns = static_cast<int>(weights_.x.scale.size()) - side * run.x;
     const int rows = static_cast<int>(weights_.y.scale.size()) - side * run.y;
+    const double log_wholly_inside = std::log(wholly_inside_);
     for (int block = 0; block < run.count; ++block) {
       for (int j = 0; j < side; ++j) {
         for (int i = side * block; i < side * (block + 1); ++i, ++log_mean, ++error) {
@@ -438,12 +450,12 @@ class TapSum {
           }
           const double inside = inside_[place] + wholly_inside_;
           const double log_sum = Domain::log(sums_[place], inside);
-          *log_mean = log_sum - std::log(inside) + reference_;
+          const double log_inside = inside_[place] == 0.0 ? log_wholly_inside : std::log(inside);
+          *log_mean = log_sum - log_inside + reference_;
           if (!Domain::bounds && fraction_error_ > 0.0) {
             // Each of two fractions may change a neighbour's weight by so much.
             const double log_part = std::log(2.0 * fraction_error_) +
-                                    Domain::log(wide_[place], 0.0) -
-                                    Domain::log(sums_[place], 0.0);
+                                    Domain::log(wide_[place], 0.0) - Domain::log(sums_[place], 0.0);
             *error = log_add(0.0, log_part);
           }
         }
@@ -461,6 +473,7 @@ class TapSum {
   std::vector<Value> sums_;       ///< [y, x] of the run
   std::vector<Value> wide_;
   std::vector<double> inside_;  ///< [y, x] weights of taps that lie partly inside the region
+  std::vector<double> of_columns_;
   double wholly_inside_ = 0.0;  ///< of those that lie inside for all of the run's places
 };
 
@@ -498,10 +511,13 @@ bool average(const PlaceWeights& weights, const glm::dvec2& sensor_from_pivot_mm
   means.log_mean.resize(places);
   means.error.resize(places);
   std::vector<Plane<Domain>> planes(thetas);
+  const BlurIn<Domain> blur_x(weights.x);
+  const BlurIn<Domain> blur_y(weights.y);
   parallel_for(thetas, [&](std::size_t theta) {
     if (!asked[theta].empty()) {
-      planes[theta] = blurred_plane<Domain>(static_cast<int>(theta), ranges[theta], asked[theta],
-                                            weights, source);
+      planes[theta] =
+          blurred_plane<Domain>(static_cast<int>(theta), ranges[theta], asked[theta], blur_x,
+                                blur_y, !Domain::bounds || weights.bins > 1, source);
     }
   });
   std::atomic<bool> holds = true;
@@ -523,7 +539,8 @@ bool average(const PlaceWeights& weights, const glm::dvec2& sensor_from_pivot_mm
 
 /// Terms of the sums that make up a mean.
 double terms_of(const PlaceWeights& weights) {
-  return 2.0 * (weights.x.steps + weights.y.steps) + 4.0 * (2.0 * weights.touch.theta_steps() + 1.0);
+  return 2.0 * (weights.x.steps + weights.y.steps) +
+         4.0 * (2.0 * weights.touch.theta_steps() + 1.0);
 }
 
 }  // namespace

@@ -60,9 +60,9 @@ struct PlaceWeights {
 };
 
 /// Averages a touch's likelihoods over where its sensor may have been, at the places that are asked
-/// for. Each theta is blurred along y and then along x; then neighbouring thetas are added up at the
-/// places to which the turns move a bin. From upper bounds of the likelihoods of tiles, this gives
-/// upper bounds of the means.
+/// for. Each theta is blurred along y and then along x; then neighbouring thetas are added up at
+/// the places to which the turns move a bin. From upper bounds of the likelihoods of tiles, this
+/// gives upper bounds of the means.
 class DisplacementMean {
  public:
   /// @param weights outlive this object

@@ -110,8 +110,8 @@ double DisplacementWeights::fraction_error(const glm::dvec2& sensor_from_pivot_m
   double most = 0.0;
   for (const Axis& axis : {lattice_.x_mm, lattice_.y_mm}) {
     if (axis.count > 1) {
-      most = std::max(most, 16.0 * (1.0 + farthest) * glm::length(sensor_from_pivot_mm) /
-                                axis.step());
+      most =
+          std::max(most, 16.0 * (1.0 + farthest) * glm::length(sensor_from_pivot_mm) / axis.step());
     }
   }
   return theta_steps_ == 0 ? 0.0 : std::min(most * 0x1p-53, 0.5);

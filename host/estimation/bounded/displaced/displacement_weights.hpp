@@ -9,8 +9,9 @@
 
 namespace palpate {
 
-/// A Gaussian along x or y, between tiles of bins. Of tiles of one bin, these are the weights of the
-/// definition; of larger tiles, no bin of a tile gives another tile's bins together more than this.
+/// A Gaussian along x or y, between tiles of bins. Of tiles of one bin, these are the weights of
+/// the definition; of larger tiles, no bin of a tile gives another tile's bins together more than
+/// this.
 struct AxisBlur {
   /// @param bins of a tile along the axis
   AxisBlur(const Axis& axis, double sd, int bins);

@@ -133,7 +133,8 @@ double BinLikelihood::float32_error(std::size_t object, const KnownElements& ele
            second_order * unit<float> * count * form_.table_extent(object).largest;
   }
   const double nats = form_.largest_nats(placements_[object].extent.largest);
-  return error<float>(object, elements) + mean_error(elements) + second_order * unit<float> * count * nats;
+  return error<float>(object, elements) + mean_error(elements) +
+         second_order * unit<float> * count * nats;
 }
 
 }  // namespace palpate

@@ -83,8 +83,7 @@ class BlockSums {
 }  // namespace
 
 template <typename Lane, typename Result>
-void BinLikelihood::evaluate_displaced(std::span<const BinBox> boxes,
-                                       const KnownElements& elements,
+void BinLikelihood::evaluate_displaced(std::span<const BinBox> boxes, const KnownElements& elements,
                                        std::span<Result> log_likelihood,
                                        std::span<double> errors) const {
   Result* to = log_likelihood.data();

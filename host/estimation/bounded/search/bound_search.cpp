@@ -17,8 +17,10 @@ namespace {
 constexpr double search_share = 0.75;
 /// Beam width during survey(), where all tiles of a level are looked at first.
 constexpr std::size_t surveyed_tiles = 1024;
-/// Tiles that are divided together: bounds the memory for their parts.
-constexpr std::size_t most_together = 16384;
+/// Tiles that are divided together: bounds the memory for their parts. More where touches are
+/// uncertain, since the parts of tiles that lie together share all within reach of them.
+constexpr std::size_t most_exact = 16384;
+constexpr std::size_t most_uncertain = 65536;
 
 /// One run of a search, from the largest tiles to their bins.
 class SearchRun {
@@ -29,6 +31,7 @@ class SearchRun {
         goal_(task.goal),
         refined_(refined),
         finest_(space_.finest_level()),
+        most_together_(space_.displacement ? most_uncertain : most_exact),
         division_(task, largest),
         account_(space_.log_weight, space_.label_of, task.options.lattice, goal_),
         leaves_(task, account_) {}
@@ -140,11 +143,13 @@ class SearchRun {
       leaves_.evaluate(tiles, tolerance);
       return;
     }
-    if (tiles.size() > most_together && !task_.deadline.passed()) {
+    if (tiles.size() > most_together_ && !task_.deadline.passed()) {
       // Tiles are divided one lot after another: the total must be known well before the first.
       survey(tiles, level);
       tolerance -= drop(tiles, level, tolerance / static_cast<double>(finest_ - level + 1));
-      std::ranges::sort(tiles, larger_first);
+      // Tiles that lie together share all within reach of displaced touches.
+      std::ranges::sort(
+          tiles, space_.displacement && !task_.deadline.exists() ? stands_before : larger_first);
     }
     double known_total = account_.log_total();
     for (std::size_t begin = 0; begin < tiles.size();) {
@@ -161,7 +166,7 @@ class SearchRun {
         account_.drop(unsettled({first, tiles.end()}, level, space_, account_));
         return;
       }
-      const std::size_t count = std::min(most_together, left);
+      const std::size_t count = std::min(most_together_, left);
       // What tiles do not use up is left for those after them.
       tolerance -= divide_lot({first, first + static_cast<std::ptrdiff_t>(count)}, level,
                               tolerance * static_cast<double>(count) / static_cast<double>(left));
@@ -199,9 +204,9 @@ class SearchRun {
   void survey(std::vector<Tile>& tiles, std::size_t level) {
     std::ranges::sort(tiles, stands_before);
     std::vector<Tile> best;
-    for (std::size_t begin = 0; begin < tiles.size(); begin += most_together) {
+    for (std::size_t begin = 0; begin < tiles.size(); begin += most_together_) {
       const auto lot =
-          std::span(tiles).subspan(begin, std::min(most_together, tiles.size() - begin));
+          std::span(tiles).subspan(begin, std::min(most_together_, tiles.size() - begin));
       task_.deadline.cancel_point();
       std::vector<Tile> parts = division_.parts_of(lot, level);
       std::size_t next = 0;
@@ -248,7 +253,8 @@ class SearchRun {
   const SearchSpace& space_;
   const SearchGoal& goal_;
   std::vector<PoseBlock>* refined_;
-  std::size_t finest_;  ///< level
+  std::size_t finest_;         ///< level
+  std::size_t most_together_;  ///< tiles that are divided
   TileDivision division_;
   MassAccount account_;
   Leaves leaves_;

@@ -42,7 +42,8 @@ StillPlace::Seen StillPlace::look(const ArrayReadings& touch) {
   if (!stays) {
     last_ = touch.from_pivot_mm;
   }
-  if (touch.sensor_from_pivot_mm || touch.readings.size() > most_still_elements || !mostly_no_contact(touch)) {
+  if (touch.sensor_from_pivot_mm || touch.readings.size() > most_still_elements ||
+      !mostly_no_contact(touch)) {
     return Seen::moving;
   }
   if (touch.from_pivot_mm == kept_) {

@@ -21,6 +21,8 @@ namespace {
 /// Bins that are evaluated before the total is looked at again: few at first, for the best ones
 /// raise it most.
 constexpr std::int64_t first_batch = 1024;
+/// As many where touches are uncertain: then most work lies in the bins within reach of a batch's.
+constexpr std::int64_t first_displaced = 16384;
 /// Products of bins and elements, where a budget must not be overdrawn by much: a few ms.
 constexpr std::int64_t budgeted_work = 5'000'000;
 constexpr std::size_t leaves_per_task = 16;
@@ -51,6 +53,7 @@ UnsettledMass unsettled(std::span<const Tile> tiles, std::size_t level, const Se
 Leaves::Leaves(const SearchTask& task, MassAccount& account)
     : task_(task),
       account_(account),
+      displaced_(task.likelihood.displaces()),
       probed_in_row_(task.space.bounds.size() * task.space.turns.size()),
       pending_mass_(task.space.bounds.size()) {
   for (std::size_t i = 0; i < pending_mass_.size(); ++i) {
@@ -83,10 +86,10 @@ void Leaves::probe(std::vector<Tile> tiles) {
 
 std::vector<Leaves::Family> Leaves::families_of(std::span<const Tile> tiles) const {
   std::vector<Family> families;
-  // Single bins lie too far apart to be evaluated together.
-  const int shift = task_.space.bounds.front().levels().back().size.bins > 0
-                        ? 0
-                        : std::countr_zero(unsigned{batch_side});
+  // Single bins lie too far apart to be evaluated together, but where touches are uncertain: those
+  // between them are evaluated all the same.
+  const bool alone = task_.space.bounds.front().levels().back().size.bins > 0 && !displaced_;
+  const int shift = alone ? 0 : std::countr_zero(unsigned{batch_side});
   for (std::size_t i = 0; i < tiles.size(); ++i) {
     const Tile& tile = tiles[i];
     if (i == 0 || tile.object != tiles[i - 1].object || tile.theta != tiles[i - 1].theta ||
@@ -166,7 +169,7 @@ void Leaves::evaluate(std::span<const Tile> tiles, double tolerance) {
   const auto elements = static_cast<std::int64_t>(task_.elements.from_pivot_mm.size()) + 1;
   const std::int64_t most =
       task_.deadline.exists() ? std::max(first_batch, budgeted_work / elements) : largest_batch;
-  std::int64_t size = first_batch;
+  std::int64_t size = displaced_ ? first_displaced : first_batch;
   for (std::size_t next = 0; next < ordered.size() && !task_.deadline.passed();) {
     std::vector<BinBox> boxes;
     std::int64_t bins = 0;
@@ -181,6 +184,12 @@ void Leaves::evaluate(std::span<const Tile> tiles, double tolerance) {
     add(std::move(boxes));
     from = account_.droppable_from(left, tolerance);
     size = std::min(2 * size, most);
+    if (displaced_ && !task_.deadline.exists()) {
+      // The best have told the total. Bins that lie together share all within reach of them.
+      size = most;
+      std::ranges::sort(ordered.begin() + static_cast<std::ptrdiff_t>(next), ordered.end(), {},
+                        &Family::first);
+    }
   }
   account_.drop(left);
 }
@@ -234,7 +243,7 @@ void Leaves::evaluate(std::span<Leaf> leaves, std::span<Value> values) const {
   for (const Leaf& leaf : leaves) {
     boxes.push_back(leaf.box);
   }
-  std::vector<double> errors(task_.likelihood.displaces() ? values.size() : 0);
+  std::vector<double> errors(displaced_ ? values.size() : 0);
   task_.likelihood.evaluate_on_threads(boxes, task_.elements, values.subspan(leaves.front().first),
                                        errors);
   // An error of half a nat may be that of a likelihood of 0.
@@ -322,8 +331,11 @@ std::vector<std::size_t> Leaves::to_be_refined(double share) const {
 void Leaves::settle(double share) {
   const std::vector<std::size_t> refined =
       task_.goal.exact ? to_be_refined(share) : std::vector<std::size_t>();
-  const auto most = static_cast<std::size_t>(
-      refined_together / static_cast<double>(task_.elements.from_pivot_mm.size() + 1));
+  const std::size_t most =
+      displaced_
+          ? largest_batch
+          : static_cast<std::size_t>(refined_together /
+                                     static_cast<double>(task_.elements.from_pivot_mm.size() + 1));
   std::vector<Leaf> exact;
   std::vector<double> values;
   for (std::size_t done = 0; done < refined.size() && (done == 0 || !task_.deadline.passed());) {

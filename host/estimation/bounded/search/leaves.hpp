@@ -76,6 +76,7 @@ class Leaves {
 
   const SearchTask& task_;
   MassAccount& account_;
+  bool displaced_;                     ///< touches are uncertain
   std::vector<Tile> probed_;           ///< sorted by place
   std::vector<bool> probed_in_row_;    ///< [object, theta]
   std::vector<double> float32_error_;  ///< [hypothesis]

@@ -70,7 +70,8 @@ SearchMemory search_memory(std::span<const Hypothesis> hypotheses, const Bounded
   for (const Hypothesis& hypothesis : hypotheses) {
     least_cell_mm = std::min(least_cell_mm, hypothesis.compared().cell_mm);
   }
-  const std::vector<TileSize> sizes = tile_sizes(lattice, least_cell_mm, hypotheses.size(), options.touch_sd);
+  const std::vector<TileSize> sizes =
+      tile_sizes(lattice, least_cell_mm, hypotheses.size(), options.touch_sd);
   SearchMemory memory;
   for (const Hypothesis& hypothesis : hypotheses) {
     const OccupancyGrid& map = hypothesis.compared();
@@ -95,7 +96,7 @@ SearchMemory search_memory(std::span<const Hypothesis> hypotheses, const Bounded
     memory.still += tables_of(sizes.front()) + sizeof(std::uint32_t) * largest_tiles;
     const double family_mm = batch_side * sizes.back().cells() * map.cell_mm;
     memory.largest_family = std::max(
-        memory.largest_family, sizes.back().bins > 0 ? std::pow(sizes.back().bins, 2.0)
+        memory.largest_family, sizes.back().bins > 0 ? std::pow(batch_side * sizes.back().bins, 2.0)
                                                      : bins_within(lattice.x_mm, family_mm) *
                                                            bins_within(lattice.y_mm, family_mm));
   }

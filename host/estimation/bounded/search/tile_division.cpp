@@ -281,9 +281,8 @@ std::vector<std::int64_t> TileDivision::displaced_sums(std::span<const Tile> til
     }
     for (const KnownElements& touch : task_.elements.touches) {
       task_.deadline.cancel_point();
-      const std::vector<std::int32_t> added =
-          displaced_penalties(space_, static_cast<std::size_t>(tiles[first].object), level, touch,
-                              batches);
+      const std::vector<std::int32_t> added = displaced_penalties(
+          space_, static_cast<std::size_t>(tiles[first].object), level, touch, batches);
       std::transform(added.begin(), added.end(), sums.begin() + first * batch_tiles,
                      sums.begin() + first * batch_tiles, std::plus<std::int64_t>());
     }

@@ -84,8 +84,8 @@ class TileDivision {
     const TouchOverlap* counted = task_.goal.counted;
     return counted == nullptr || counted->may_hold(level.box_of(tile));
   }
-  /// Where touches are uncertain, the sums of their penalties over the parts of tiles, [tile, part],
-  /// which are tiles of this level; else empty.
+  /// Where touches are uncertain, the sums of their penalties over the parts of tiles, [tile,
+  /// part], which are tiles of this level; else empty.
   std::vector<std::int64_t> displaced_sums(std::span<const Tile> tiles, std::size_t level) const;
   /// Appends the tiles of a batch, at the object and theta of `of`, that hold bins.
   template <typename Sum>

@@ -67,7 +67,8 @@ std::vector<TileSize> sizes_in_bins(const PoseLattice& lattice, double least_cel
   };
   const double smallest_mm = std::max(smallest_sd * touch_sd.mm, smallest_cells * least_cell_mm);
   int bins = 1;
-  while (2 * bins * step <= smallest_mm && bins < std::max(lattice.x_mm.count, lattice.y_mm.count)) {
+  while (2 * bins * step <= smallest_mm &&
+         bins < std::max(lattice.x_mm.count, lattice.y_mm.count)) {
     bins *= 2;
   }
   std::vector<TileSize> sizes{size_of(bins)};
@@ -125,8 +126,8 @@ TileAxis tile_axis(const Axis& axis, double side_mm) {
 
 }  // namespace
 
-std::vector<TileSize> tile_sizes(const PoseLattice& lattice, double least_cell_mm,
-                                 std::size_t maps, const DisplacementSd& touch_sd) {
+std::vector<TileSize> tile_sizes(const PoseLattice& lattice, double least_cell_mm, std::size_t maps,
+                                 const DisplacementSd& touch_sd) {
   if (!touch_sd.none()) {
     return sizes_in_bins(lattice, least_cell_mm, maps, touch_sd);
   }

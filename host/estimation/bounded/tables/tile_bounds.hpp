@@ -49,9 +49,7 @@ struct TileSize {
 
   /// Squares along an axis that an element can see while the pose is in one tile, or at one of its
   /// bins' centres.
-  int window() const {
-    return bins == 0 ? side + 1 : ((bins - 1) * side + bins - 1) / bins + 1;
-  }
+  int window() const { return bins == 0 ? side + 1 : ((bins - 1) * side + bins - 1) / bins + 1; }
   double square_cells() const { return static_cast<double>(merged) / parts; }
   double cells() const { return side * square_cells(); }
 };
@@ -104,8 +102,8 @@ struct TileLevel {
 /// about half as wide as the standard deviation.
 /// @param least_cell_mm of the maps
 /// @param touch_sd how far touches may be displaced
-std::vector<TileSize> tile_sizes(const PoseLattice& lattice, double least_cell_mm,
-                                 std::size_t maps, const DisplacementSd& touch_sd = {});
+std::vector<TileSize> tile_sizes(const PoseLattice& lattice, double least_cell_mm, std::size_t maps,
+                                 const DisplacementSd& touch_sd = {});
 
 /// The squares of a level over a map of this cell.
 glm::dvec2 square_mm(const TileSize& size, const PoseLattice& lattice, double cell_mm);
