@@ -149,11 +149,10 @@ void BoundedBelief::take_in() {
     }
     found_.reset();
     const std::span<const ArrayReadings> touches = kept_.all();
-    std::vector<KnownElements> all;
+    std::vector<KnownElements> all{std::move(elements_)};
     for (const ArrayReadings& touch : touches) {
       all.push_back(known_elements(touch));
     }
-    all.push_back(std::move(elements_));
     elements_ = merged(all);
     touches_.insert(touches_.end(), touches.begin(), touches.end());
     if (none_) {

@@ -43,19 +43,6 @@ void append(const KnownElements& known, std::vector<KnownElement>& elements) {
   }
 }
 
-/// An order of touches that does not depend on when they came.
-bool touched_before(const KnownElements& a, const KnownElements& b) {
-  const auto place = [](const glm::dvec2& mm) { return std::pair(mm.x, mm.y); };
-  const auto key = [](const ReadingRun& run) { return std::tuple(run.reading, run.end); };
-  if (a.sensor_from_pivot_mm != b.sensor_from_pivot_mm) {
-    return place(a.sensor_from_pivot_mm) < place(b.sensor_from_pivot_mm);
-  }
-  if (!std::ranges::equal(a.runs, b.runs, {}, key, key)) {
-    return std::ranges::lexicographical_compare(a.runs, b.runs, {}, key, key);
-  }
-  return std::ranges::lexicographical_compare(a.from_pivot_mm, b.from_pivot_mm, {}, place, place);
-}
-
 /// The elements that have any reading but this one.
 KnownElements all_but(Reading reading, const ArrayReadings& array) {
   std::vector<KnownElement> elements;
@@ -69,6 +56,18 @@ KnownElements all_but(Reading reading, const ArrayReadings& array) {
 }
 
 }  // namespace
+
+bool before_in_any_order(const KnownElements& a, const KnownElements& b) {
+  const auto place = [](const glm::dvec2& mm) { return std::pair(mm.x, mm.y); };
+  const auto key = [](const ReadingRun& run) { return std::tuple(run.reading, run.end); };
+  if (a.sensor_from_pivot_mm != b.sensor_from_pivot_mm) {
+    return place(a.sensor_from_pivot_mm) < place(b.sensor_from_pivot_mm);
+  }
+  if (!std::ranges::equal(a.runs, b.runs, {}, key, key)) {
+    return std::ranges::lexicographical_compare(a.runs, b.runs, {}, key, key);
+  }
+  return std::ranges::lexicographical_compare(a.from_pivot_mm, b.from_pivot_mm, {}, place, place);
+}
 
 KnownElements known_elements(const ArrayReadings& array) {
   KnownElements known = all_but(Reading::unknown, array);
@@ -95,7 +94,6 @@ KnownElements merged(std::span<const KnownElements> lists) {
   for (const KnownElements& list : lists) {
     all.touches.insert(all.touches.end(), list.touches.begin(), list.touches.end());
   }
-  std::sort(all.touches.begin(), all.touches.end(), touched_before);
   return all;
 }
 

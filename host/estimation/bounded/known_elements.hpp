@@ -47,7 +47,10 @@ KnownElements known_elements(const ArrayReadings& array);
 /// The elements that are not in No Contact, Unknown ones as one more reading.
 KnownElements changed_elements(const ArrayReadings& array);
 
-/// The elements of all.
+/// An order of touches of uncertain pose that does not depend on when they came.
+bool before_in_any_order(const KnownElements& a, const KnownElements& b);
+
+/// The elements of all. Touches of uncertain pose stay in the order of the lists.
 KnownElements merged(std::span<const KnownElements> lists);
 
 /// Touches that wait until a filter is asked about its belief. The first one makes room for some

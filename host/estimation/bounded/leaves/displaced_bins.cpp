@@ -86,6 +86,13 @@ template <typename Lane, typename Result>
 void BinLikelihood::evaluate_displaced(std::span<const BinBox> boxes, const KnownElements& elements,
                                        std::span<Result> log_likelihood,
                                        std::span<double> errors) const {
+  std::vector<const KnownElements*> touches;
+  for (const KnownElements& touch : elements.touches) {
+    touches.push_back(&touch);
+  }
+  // The order in which touches came must show in no bit.
+  std::ranges::sort(
+      touches, before_in_any_order, [](const KnownElements* of) -> const auto& { return *of; });
   Result* to = log_likelihood.data();
   double* to_errors = errors.empty() ? nullptr : errors.data();
   for (std::size_t first = 0, end = 0; first < boxes.size(); first = end) {
@@ -94,7 +101,7 @@ void BinLikelihood::evaluate_displaced(std::span<const BinBox> boxes, const Know
     }
     const std::span<const BinBox> of_object = boxes.subspan(first, end - first);
     BlockSums sums(of_object);
-    for (const KnownElements& touch : elements.touches) {
+    for (const KnownElements* touch : touches) {
       const auto source = [&](std::span<const BlockRun> runs, const PlaceRows<double>& rows) {
         std::vector<BinBox> parts;
         std::size_t bins = 0;
@@ -109,7 +116,7 @@ void BinLikelihood::evaluate_displaced(std::span<const BinBox> boxes, const Know
           bins += static_cast<std::size_t>(part.bins());
         }
         std::vector<double> values(bins);
-        evaluate_in<Lane>(parts, touch, std::span(values));
+        evaluate_in<Lane>(parts, *touch, std::span(values));
         auto value = values.begin();
         for (const BinBox& part : parts) {
           for (int y = part.y_first; y < part.y_first + part.y_count; ++y) {
@@ -118,7 +125,7 @@ void BinLikelihood::evaluate_displaced(std::span<const BinBox> boxes, const Know
           }
         }
       };
-      sums.add(displaced_->means(touch.sensor_from_pivot_mm, sums.runs(), source));
+      sums.add(displaced_->means(touch->sensor_from_pivot_mm, sums.runs(), source));
     }
     for (const BinBox& box : of_object) {
       sums.copy(box, to, to_errors);

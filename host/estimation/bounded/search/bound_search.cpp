@@ -185,6 +185,7 @@ class SearchRun {
     }
     std::ranges::sort(tiles, stands_before);
     std::vector<Tile> unseen;
+    set_negligible();
     std::vector<Tile> parts = division_.parts_of(tiles, level, &unseen);
     for (const Tile& tile : unseen) {
       settle_unseen(space_.bounds[tile.object].levels()[level + 1].box_of(tile));
@@ -199,6 +200,18 @@ class SearchRun {
     return used_of(tolerance, dropped);
   }
 
+  /// Lets the division stop at bounds of which those of all bins together are nothing beside the
+  /// tolerance.
+  void set_negligible() {
+    constexpr double part = 1e-3;
+    const double bins = static_cast<double>(task_.options.lattice.bins()) *
+                        static_cast<double>(space_.bounds.size());
+    if (!goal_.evidence_nats) {
+      division_.set_negligible(std::min(
+          account_.log_total() + std::log(part * goal_.tolerance / bins), account_.best()));
+    }
+  }
+
   /// Lowers the bounds of tiles to those of their parts, and follows the best parts down to their
   /// bins.
   void survey(std::vector<Tile>& tiles, std::size_t level) {
@@ -208,6 +221,7 @@ class SearchRun {
       const auto lot =
           std::span(tiles).subspan(begin, std::min(most_together_, tiles.size() - begin));
       task_.deadline.cancel_point();
+      set_negligible();
       std::vector<Tile> parts = division_.parts_of(lot, level);
       std::size_t next = 0;
       for (Tile& tile : lot) {

@@ -69,6 +69,7 @@ void LargestTiles::reset() {
     std::fill(sums.begin(), sums.end(), 0);
   }
   std::fill(unseen_.begin(), unseen_.end(), 0);
+  most_.clear();
 }
 
 void LargestTiles::add(std::span<const ArrayReadings> touches) {
@@ -123,6 +124,7 @@ void LargestTiles::add(const KnownElements& elements) {
 void LargestTiles::add_displaced(const KnownElements& touch) {
   const std::vector<std::int64_t> offsets = offsets_of(touch);
   const std::vector<BoundingBox> reaches = displaced_reaches(space_, std::span(&touch, 1));
+  std::vector<double>& most = most_.emplace_back();
   for (std::size_t object = 0; object < space_.bounds.size(); ++object) {
     const TileLevel& level = space_.bounds[object].levels().front();
     std::vector<BlockRun> seen;
@@ -135,6 +137,11 @@ void LargestTiles::add_displaced(const KnownElements& touch) {
       }
     }
     const std::vector<std::int32_t> added = displaced_penalties(space_, object, 0, touch, seen);
+    auto least = static_cast<std::int32_t>(space_.bounds[object].penalty_beyond(0, touch));
+    if (!added.empty()) {
+      least = std::min(least, std::ranges::min(added));
+    }
+    most.push_back(space_.bounds[object].best(0, touch) - least / penalties_per_nat);
     auto from = added.begin();
     for (const BlockRun& run : seen) {
       const auto place = static_cast<std::size_t>(

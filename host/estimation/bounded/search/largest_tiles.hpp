@@ -55,6 +55,9 @@ class LargestTiles {
   }
   /// The sum of a tile in which every element sees the prior.
   std::int64_t unseen(std::size_t hypothesis) const { return unseen_[hypothesis]; }
+  /// The largest log-likelihood that a touch of uncertain pose can have anywhere, in nats.
+  /// @param touch in the order in which they were added
+  double most(std::size_t touch, std::size_t hypothesis) const { return most_[touch][hypothesis]; }
   /// Host memory, in bytes.
   std::uint64_t bytes() const;
 
@@ -91,6 +94,7 @@ class LargestTiles {
   std::size_t touches_ = 0;
   std::vector<std::vector<std::int32_t>> sums_;  ///< [hypothesis][theta, batch y, batch x, tile]
   std::vector<std::int64_t> unseen_;             ///< [hypothesis]
+  std::vector<std::vector<double>> most_;        ///< see most()
   StillPlace still_;
   /// Whole sums of a still array in No Contact, [hypothesis], as sums_.
   std::vector<std::vector<std::uint32_t>> still_sums_;

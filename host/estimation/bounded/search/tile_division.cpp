@@ -1,6 +1,7 @@
 #include "estimation/bounded/search/tile_division.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <limits>
 #include <numeric>
@@ -275,19 +276,52 @@ std::vector<std::int64_t> TileDivision::displaced_sums(std::span<const Tile> til
   }
   std::vector<std::int64_t> sums(tiles.size() * batch_tiles);
   for (std::size_t first = 0, end = 0; first < tiles.size(); first = end) {
-    std::vector<BlockRun> batches;
-    for (; end < tiles.size() && tiles[end].object == tiles[first].object; ++end) {
-      append_block(tiles[end].theta, tiles[end].y, tiles[end].x, batches);
+    while (end < tiles.size() && tiles[end].object == tiles[first].object) {
+      ++end;
     }
-    for (const KnownElements& touch : task_.elements.touches) {
-      task_.deadline.cancel_point();
-      const std::vector<std::int32_t> added = displaced_penalties(
-          space_, static_cast<std::size_t>(tiles[first].object), level, touch, batches);
-      std::transform(added.begin(), added.end(), sums.begin() + first * batch_tiles,
-                     sums.begin() + first * batch_tiles, std::plus<std::int64_t>());
-    }
+    add_displaced(tiles.subspan(first, end - first), level,
+                  std::span(sums).subspan(first * batch_tiles, (end - first) * batch_tiles));
   }
   return sums;
+}
+
+void TileDivision::add_displaced(std::span<const Tile> tiles, std::size_t level,
+                                 std::span<std::int64_t> sums) const {
+  const auto object = static_cast<std::size_t>(tiles.front().object);
+  const std::vector<KnownElements>& touches = task_.elements.touches;
+  // Penalties that every touch has at least, wherever it is.
+  std::vector<std::int64_t> least;
+  for (std::size_t i = 0; i < touches.size(); ++i) {
+    const double nats = space_.bounds[object].best(level, touches[i]) - largest_.most(i, object);
+    least.push_back(static_cast<std::int64_t>(std::floor(nats * penalties_per_nat)));
+  }
+  std::int64_t rest = std::accumulate(least.begin(), least.end(), std::int64_t{0});
+  std::vector<std::size_t> open(tiles.size());
+  std::iota(open.begin(), open.end(), std::size_t{0});
+  for (std::size_t i = 0; i < touches.size(); ++i) {
+    task_.deadline.cancel_point();
+    std::vector<BlockRun> batches;
+    for (const std::size_t tile : open) {
+      append_block(tiles[tile].theta, tiles[tile].y, tiles[tile].x, batches);
+    }
+    const std::vector<std::int32_t> added =
+        displaced_penalties(space_, object, level, touches[i], batches);
+    rest -= least[i];
+    auto from = added.begin();
+    std::erase_if(open, [&](std::size_t tile) {
+      const auto of_tile = sums.subspan(tile * batch_tiles, batch_tiles);
+      std::transform(of_tile.begin(), of_tile.end(), from, of_tile.begin(), std::plus());
+      from += batch_tiles;
+      const std::int64_t best = rest + std::ranges::min(of_tile);
+      const bool closed = bound_of(object, level, best) < negligible_;
+      if (closed) {
+        for (std::int64_t& sum : of_tile) {
+          sum += rest;
+        }
+      }
+      return closed;
+    });
+  }
 }
 
 template <typename Sum>

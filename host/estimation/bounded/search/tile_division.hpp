@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -57,6 +58,9 @@ class TileDivision {
   /// @param unseen where not null, takes these
   std::vector<Tile> parts_of(std::span<const Tile> tiles, std::size_t level,
                              std::vector<Tile>* unseen = nullptr);
+  /// Tiles whose bounds are below are not looked at more closely than to know that: where touches
+  /// are uncertain, the last touches may be left out.
+  void set_negligible(double bound) { negligible_ = bound; }
 
   /// Follows tiles of a level down to the smallest ones, the best of each level.
   /// @param width so many tiles at first
@@ -87,6 +91,9 @@ class TileDivision {
   /// Where touches are uncertain, the sums of their penalties over the parts of tiles, [tile,
   /// part], which are tiles of this level; else empty.
   std::vector<std::int64_t> displaced_sums(std::span<const Tile> tiles, std::size_t level) const;
+  /// Those of one object's tiles.
+  void add_displaced(std::span<const Tile> tiles, std::size_t level,
+                     std::span<std::int64_t> sums) const;
   /// Appends the tiles of a batch, at the object and theta of `of`, that hold bins.
   template <typename Sum>
   void append_batch(const Tile& of, std::size_t level, int first_x, int first_y, const Sum* sums,
@@ -100,6 +107,7 @@ class TileDivision {
   std::vector<TileRange> seen_;                   ///< [object, theta]
   std::vector<std::vector<double>> unpenalised_;  ///< [object][level], with the prior weight
   std::vector<double> prior_log_likelihoods_;     ///< [object]
+  double negligible_ = -std::numeric_limits<double>::infinity();
   std::int64_t bounded_ = 0;
 };
 
