@@ -285,7 +285,9 @@ std::vector<DrawnBin> BoundedBelief::draw(std::size_t count, Random& random) {
   const bool followed = !found_ && follow();
   if (!followed && !found_) {
     Deadline deadline = until(options_.budget_s);
-    if (touches_.size() <= wide_touches || bins_in_all() > most_searched_bins) {
+    // Rejection looks at tiles here and there, which share little of what uncertain touches reach.
+    const bool many_bins = bins_in_all() > most_searched_bins && options_.touch_sd.none();
+    if (touches_.size() <= wide_touches || many_bins) {
       return arena_.execute(
           [&] { return searched_with().draw(elements_, count, random, deadline); });
     }
