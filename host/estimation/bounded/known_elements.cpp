@@ -1,6 +1,7 @@
 #include "estimation/bounded/known_elements.hpp"
 
 #include <algorithm>
+#include <numeric>
 #include <tuple>
 #include <utility>
 
@@ -43,6 +44,19 @@ void append(const KnownElements& known, std::vector<KnownElement>& elements) {
   }
 }
 
+/// An order of touches that does not depend on when they came.
+bool touched_before(const KnownElements& a, const KnownElements& b) {
+  const auto place = [](const glm::dvec2& mm) { return std::pair(mm.x, mm.y); };
+  const auto key = [](const ReadingRun& run) { return std::tuple(run.reading, run.end); };
+  if (a.sensor_from_pivot_mm != b.sensor_from_pivot_mm) {
+    return place(a.sensor_from_pivot_mm) < place(b.sensor_from_pivot_mm);
+  }
+  if (!std::ranges::equal(a.runs, b.runs, {}, key, key)) {
+    return std::ranges::lexicographical_compare(a.runs, b.runs, {}, key, key);
+  }
+  return std::ranges::lexicographical_compare(a.from_pivot_mm, b.from_pivot_mm, {}, place, place);
+}
+
 /// The elements that have any reading but this one.
 KnownElements all_but(Reading reading, const ArrayReadings& array) {
   std::vector<KnownElement> elements;
@@ -57,16 +71,12 @@ KnownElements all_but(Reading reading, const ArrayReadings& array) {
 
 }  // namespace
 
-bool before_in_any_order(const KnownElements& a, const KnownElements& b) {
-  const auto place = [](const glm::dvec2& mm) { return std::pair(mm.x, mm.y); };
-  const auto key = [](const ReadingRun& run) { return std::tuple(run.reading, run.end); };
-  if (a.sensor_from_pivot_mm != b.sensor_from_pivot_mm) {
-    return place(a.sensor_from_pivot_mm) < place(b.sensor_from_pivot_mm);
-  }
-  if (!std::ranges::equal(a.runs, b.runs, {}, key, key)) {
-    return std::ranges::lexicographical_compare(a.runs, b.runs, {}, key, key);
-  }
-  return std::ranges::lexicographical_compare(a.from_pivot_mm, b.from_pivot_mm, {}, place, place);
+std::vector<std::size_t> sorted_touches(std::span<const KnownElements> touches) {
+  std::vector<std::size_t> order(touches.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::sort(
+      order, [&](std::size_t i, std::size_t j) { return touched_before(touches[i], touches[j]); });
+  return order;
 }
 
 KnownElements known_elements(const ArrayReadings& array) {

@@ -47,8 +47,8 @@ KnownElements known_elements(const ArrayReadings& array);
 /// The elements that are not in No Contact, Unknown ones as one more reading.
 KnownElements changed_elements(const ArrayReadings& array);
 
-/// An order of touches of uncertain pose that does not depend on when they came.
-bool before_in_any_order(const KnownElements& a, const KnownElements& b);
+/// Indices of touches in an order that does not depend on when they came.
+std::vector<std::size_t> sorted_touches(std::span<const KnownElements> touches);
 
 /// The elements of all. Touches of uncertain pose stay in the order of the lists.
 KnownElements merged(std::span<const KnownElements> lists);

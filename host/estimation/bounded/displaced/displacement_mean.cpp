@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <utility>
 
 #include "estimation/bounded/log_sum.hpp"
 #include "estimation/bounded/parallel_for.hpp"
@@ -42,6 +43,7 @@ struct TileLikelihoods {
     return std::bit_cast<Value>(std::bit_cast<std::int32_t>(p) + (whole << 23));
   }
   static Value weight(double weight) { return static_cast<Value>(weight); }
+  static Value factor(double nats) { return static_cast<Value>(std::exp(nats)); }
   static void add(Value& sum, Value weight, Value likelihood) { sum += weight * likelihood; }
   static void widen(Value& widest, Value likelihood) { widest = std::max(widest, likelihood); }
   static Value scaled(Value likelihood, Value scale) { return likelihood * scale; }
@@ -59,6 +61,7 @@ struct BinLikelihoods {
 
   static Value of_log(Value nats) { return std::exp(nats); }
   static Value weight(double weight) { return weight; }
+  static Value factor(double nats) { return std::exp(nats); }
   static void add(Value& sum, Value weight, Value likelihood) { sum += weight * likelihood; }
   static void widen(Value& sum, Value likelihood) { sum += likelihood; }
   static Value scaled(Value likelihood, Value scale) { return likelihood * scale; }
@@ -74,6 +77,7 @@ struct BinLogs {
 
   static Value of_log(Value nats) { return nats; }
   static Value weight(double weight) { return std::log(weight); }
+  static Value factor(double nats) { return nats; }
   static void add(Value& sum, Value weight, Value log) { sum = log_add(sum, weight + log); }
   static void widen(Value& sum, Value log) { sum = log_add(sum, log); }
   static Value scaled(Value log, Value scale) { return log + scale; }
@@ -360,21 +364,21 @@ class TapSum {
       if (plane.reference == -infinity) {
         continue;
       }
-      const double weight = tap.weight * std::exp(plane.reference - reference_);
       const glm::ivec2 moved = places_of(tap, bins);
       if (bins > 1) {
-        add(plane, plane.wide, run, moved, weight, -1, sums_);
+        add(plane, plane.wide, run, moved, tap.weight, -1, sums_);
         continue;
       }
-      const glm::dvec2& f = tap.fraction;
-      add(plane, plane.blurred, run, moved, weight * (1.0 - f.x) * (1.0 - f.y), 0, sums_);
-      add(plane, plane.blurred, run, moved + glm::ivec2(1, 0), weight * f.x * (1.0 - f.y), 0,
-          sums_);
-      add(plane, plane.blurred, run, moved + glm::ivec2(0, 1), weight * (1.0 - f.x) * f.y, 0,
-          sums_);
-      add(plane, plane.blurred, run, moved + 1, weight * f.x * f.y, 0, sums_);
+      const glm::dvec2 behind = tap.fraction;
+      const glm::dvec2 before = 1.0 - behind;
+      for (const auto& [corner, part] : {std::pair{glm::ivec2(0, 0), before.x * before.y},
+                                         {{1, 0}, behind.x * before.y},
+                                         {{0, 1}, before.x * behind.y},
+                                         {{1, 1}, behind.x * behind.y}}) {
+        add(plane, plane.blurred, run, moved + corner, tap.weight * part, 0, sums_);
+      }
       if (!Domain::bounds && fraction_error_ > 0.0) {
-        add(plane, plane.wide, run, moved, weight, -1, wide_);
+        add(plane, plane.wide, run, moved, tap.weight, -1, wide_);
       }
     }
     return take(run, log_mean, error);
@@ -387,7 +391,8 @@ class TapSum {
     if (weight == 0.0) {
       return;
     }
-    const Value of_tap = Domain::weight(weight);
+    const Value of_tap =
+        Domain::scaled(Domain::weight(weight), Domain::factor(plane.reference - reference_));
     const int x = side * run.x + moved.x;
     const int begin = std::max({0, first - x, plane.x - x});
     const int end = std::min({width_, static_cast<int>(weights_.x.scale.size()) - x,

@@ -86,13 +86,8 @@ template <typename Lane, typename Result>
 void BinLikelihood::evaluate_displaced(std::span<const BinBox> boxes, const KnownElements& elements,
                                        std::span<Result> log_likelihood,
                                        std::span<double> errors) const {
-  std::vector<const KnownElements*> touches;
-  for (const KnownElements& touch : elements.touches) {
-    touches.push_back(&touch);
-  }
   // The order in which touches came must show in no bit.
-  std::ranges::sort(
-      touches, before_in_any_order, [](const KnownElements* of) -> const auto& { return *of; });
+  const std::vector<std::size_t> order = sorted_touches(elements.touches);
   Result* to = log_likelihood.data();
   double* to_errors = errors.empty() ? nullptr : errors.data();
   for (std::size_t first = 0, end = 0; first < boxes.size(); first = end) {
@@ -101,7 +96,8 @@ void BinLikelihood::evaluate_displaced(std::span<const BinBox> boxes, const Know
     }
     const std::span<const BinBox> of_object = boxes.subspan(first, end - first);
     BlockSums sums(of_object);
-    for (const KnownElements* touch : touches) {
+    for (const std::size_t i : order) {
+      const KnownElements& touch = elements.touches[i];
       const auto source = [&](std::span<const BlockRun> runs, const PlaceRows<double>& rows) {
         std::vector<BinBox> parts;
         std::size_t bins = 0;
@@ -116,7 +112,7 @@ void BinLikelihood::evaluate_displaced(std::span<const BinBox> boxes, const Know
           bins += static_cast<std::size_t>(part.bins());
         }
         std::vector<double> values(bins);
-        evaluate_in<Lane>(parts, *touch, std::span(values));
+        evaluate_in<Lane>(parts, touch, std::span(values));
         auto value = values.begin();
         for (const BinBox& part : parts) {
           for (int y = part.y_first; y < part.y_first + part.y_count; ++y) {
@@ -125,7 +121,7 @@ void BinLikelihood::evaluate_displaced(std::span<const BinBox> boxes, const Know
           }
         }
       };
-      sums.add(displaced_->means(touch->sensor_from_pivot_mm, sums.runs(), source));
+      sums.add(displaced_->means(touch.sensor_from_pivot_mm, sums.runs(), source));
     }
     for (const BinBox& box : of_object) {
       sums.copy(box, to, to_errors);

@@ -298,7 +298,7 @@ void TileDivision::add_displaced(std::span<const Tile> tiles, std::size_t level,
   std::int64_t rest = std::accumulate(least.begin(), least.end(), std::int64_t{0});
   std::vector<std::size_t> open(tiles.size());
   std::iota(open.begin(), open.end(), std::size_t{0});
-  for (std::size_t i = 0; i < touches.size(); ++i) {
+  for (const std::size_t i : sorted_touches(touches)) {
     task_.deadline.cancel_point();
     std::vector<BlockRun> batches;
     for (const std::size_t tile : open) {
