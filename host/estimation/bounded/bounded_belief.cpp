@@ -92,6 +92,10 @@ constexpr double soon = 1e-2;
 /// Bounds of "none of these" need not be so close that identities move by less.
 constexpr double least_identity_change = 1e-6;
 constexpr double unlimited = std::numeric_limits<double>::infinity();
+/// Bounds so many nats apart do not tell how closely they are needed; those that are closer, in nats
+/// for each touch, do.
+constexpr double far_apart = 2.0;
+constexpr double closer = 0.02;
 
 }  // namespace
 
@@ -352,6 +356,9 @@ LogInterval BoundedBelief::bound_none(const Deadline& deadline) {
     const LogInterval bounds = arena_.execute([&] { return none_->bounds(width, deadline); });
     const LogInterval weighted{none_log_weight_ + bounds.low, none_log_weight_ + bounds.high};
     width = std::min(width, allowed_none_width(weighted));
+    if (bounds.high - bounds.low > far_apart && !goal().evidence_nats) {
+      width = std::max(width, closer * static_cast<double>(touches_.size()));
+    }
     const bool narrowed = bounds.high - bounds.low < last.high - last.low;
     last = bounds;
     if (bounds.high - bounds.low <= width || !narrowed || deadline.passed()) {

@@ -63,7 +63,7 @@ LogInterval NoneEvidence::narrow(TouchMean& mean, double width_nats, const Deadl
   constexpr double infinity = std::numeric_limits<double>::infinity();
   // What an earlier call found finer does not count: bounds depend on what is asked for.
   LogInterval log_mean{-infinity, infinity};
-  for (std::size_t i = 0; i < tolerances.size();) {
+  for (std::size_t i = space_.displacement ? 0 : 1; i < tolerances.size();) {
     if (!mean.found[i]) {
       const LogInterval found = search(mean, tolerances[i], deadline);
       if (deadline.passed()) {
@@ -76,8 +76,9 @@ LogInterval NoneEvidence::narrow(TouchMean& mean, double width_nats, const Deadl
     if (width(log_mean) <= width_nats || width(log_mean) > least_gain * before) {
       break;
     }
-    // The first search tells little of what is needed; the others come close to their tolerance.
-    for (++i; i + 1 < tolerances.size() && width_of_tolerance * tolerances[i] > width_nats;) {
+    // Bounds and the first search tell little of what is needed; the others come close to their
+    // tolerance.
+    for (++i; i > 1 && i + 1 < tolerances.size() && width_of_tolerance * tolerances[i] > width_nats;) {
       ++i;
     }
   }

@@ -26,7 +26,7 @@ struct TileLikelihoods {
   static constexpr Value nothing = 0.0F;
   static constexpr bool bounds = true;
   static constexpr double least = 0.0;  // a sum that is smaller is too inexact
-  /// More than all that vanishes in float32 adds up to, as a part of the weights.
+  /// More than all that vanishes in float32 adds to a mean.
   static constexpr Value vanished = 1e-30F;
 
   /// exp(nats) for nats <= 0, within 1e-6 of itself, at least exp(-80): by powers of two and a
@@ -47,9 +47,11 @@ struct TileLikelihoods {
   static void add(Value& sum, Value weight, Value likelihood) { sum += weight * likelihood; }
   static void widen(Value& widest, Value likelihood) { widest = std::max(widest, likelihood); }
   static Value scaled(Value likelihood, Value scale) { return likelihood * scale; }
-  static double log(Value sum, double weights) {
-    return std::log(sum + vanished * static_cast<Value>(weights));
+  /// Log of the sum over the weights of its terms.
+  static double log_mean(Value sum, double weights) {
+    return std::log(sum / static_cast<Value>(weights) + vanished);
   }
+  static double log(Value sum) { return std::log(sum); }
 };
 
 /// Likelihoods of bins, as float64.
@@ -65,7 +67,8 @@ struct BinLikelihoods {
   static void add(Value& sum, Value weight, Value likelihood) { sum += weight * likelihood; }
   static void widen(Value& sum, Value likelihood) { sum += likelihood; }
   static Value scaled(Value likelihood, Value scale) { return likelihood * scale; }
-  static double log(Value sum, double /*weights*/) { return std::log(sum); }
+  static double log_mean(Value sum, double weights) { return std::log(sum / weights); }
+  static double log(Value sum) { return std::log(sum); }
 };
 
 /// Likelihoods of bins by their logs, for those that float64 does not hold.
@@ -81,7 +84,8 @@ struct BinLogs {
   static void add(Value& sum, Value weight, Value log) { sum = log_add(sum, weight + log); }
   static void widen(Value& sum, Value log) { sum = log_add(sum, log); }
   static Value scaled(Value log, Value scale) { return log + scale; }
-  static double log(Value sum, double /*weights*/) { return sum; }
+  static double log_mean(Value sum, double weights) { return sum - std::log(weights); }
+  static double log(Value sum) { return sum; }
 };
 
 /// Blocks [first, end) along each axis.
@@ -441,7 +445,6 @@ class TapSum {
   bool take(const BlockRun& run, double* log_mean, double* error) const {
     const int columns = static_cast<int>(weights_.x.scale.size()) - side * run.x;
     const int rows = static_cast<int>(weights_.y.scale.size()) - side * run.y;
-    const double log_wholly_inside = std::log(wholly_inside_);
     for (int block = 0; block < run.count; ++block) {
       for (int j = 0; j < side; ++j) {
         for (int i = side * block; i < side * (block + 1); ++i, ++log_mean, ++error) {
@@ -453,14 +456,11 @@ class TapSum {
           if (sums_[place] < Domain::least) {
             return false;
           }
-          const double inside = inside_[place] + wholly_inside_;
-          const double log_sum = Domain::log(sums_[place], inside);
-          const double log_inside = inside_[place] == 0.0 ? log_wholly_inside : std::log(inside);
-          *log_mean = log_sum - log_inside + reference_;
+          *log_mean = Domain::log_mean(sums_[place], inside_[place] + wholly_inside_) + reference_;
           if (!Domain::bounds && fraction_error_ > 0.0) {
             // Each of two fractions may change a neighbour's weight by so much.
-            const double log_part = std::log(2.0 * fraction_error_) +
-                                    Domain::log(wide_[place], 0.0) - Domain::log(sums_[place], 0.0);
+            const double log_part = std::log(2.0 * fraction_error_) + Domain::log(wide_[place]) -
+                                    Domain::log(sums_[place]);
             *error = log_add(0.0, log_part);
           }
         }
