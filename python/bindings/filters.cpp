@@ -329,9 +329,11 @@ void bind_bounded(nb::module_& module) {
               [](Bounded* self, const std::shared_ptr<Session>& device, const MapsLike& maps,
                  const PoseLattice& lattice, const ContactModel& contact, double tolerance,
                  std::optional<double> budget_s, std::optional<double> evidence_nats,
-                 std::optional<double> none_weight, int threads) {
+                 std::optional<double> none_weight, const DisplacementSdLike& touch_sd,
+                 int threads) {
                 const BoundedOptions options{.lattice = lattice,
                                              .contact = contact,
+                                             .touch_sd = sd_of(touch_sd, "touch_sd"),
                                              .tolerance = tolerance,
                                              .budget_s = budget_s,
                                              .evidence_nats = evidence_nats,
@@ -344,11 +346,13 @@ void bind_bounded(nb::module_& module) {
               "device"_a, "maps"_a, "lattice"_a = PoseLattice{}, nb::kw_only(),
               "contact"_a = ContactModel{}, "tolerance"_a = BoundedOptions{}.tolerance,
               "budget_s"_a = nb::none(), "evidence_nats"_a = nb::none(),
-              "none_weight"_a = nb::none(), "threads"_a = 0,
+              "none_weight"_a = nb::none(), "touch_sd"_a = DisplacementSd{}, "threads"_a = 0,
               "tolerance: largest total variation distance from the posterior over all bins;\n"
               "budget_s: seconds after which estimate() reports what it has proven by then;\n"
-              "evidence_nats: bounds every map's log evidence, too; threads: 0 for as many as the\n"
-              "machine has cores.\n\n"
+              "evidence_nats: bounds every map's log evidence, too; touch_sd: how far the sensor "
+              "may\n"
+              "have been from where it was said to be; threads: 0 for as many as the machine has\n"
+              "cores.\n\n"
               "Raises Error as PoseHistogram does.")
           .def("update", &update<BoundedPosterior>, "touches"_a, "progress"_a = nb::none(),
                "Multiplies the belief by the likelihood of these touches (Eq. 7, 13); takes in "

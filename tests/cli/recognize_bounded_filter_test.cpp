@@ -80,33 +80,39 @@ void expect_lawful(const json& step) {
 }
 
 TEST_F(BoundedFilter, AgreesWithTheHistogram) {
-  const json dense = u({"--filter", "histogram", "--trace"});
-  const json r = bounded({"--trace"});
-  ASSERT_EQ(r["trace"].size(), dense["trace"].size());
-  for (std::size_t i = 0; i < r["trace"].size(); ++i) {
-    const json& step = r["trace"][i];
-    const json& other = dense["trace"][i];
-    EXPECT_EQ(step["best"], other["best"]);
-    EXPECT_EQ(step["mode"]["object"], other["mode"]["object"]);
-    for (const char* field : {"x_mm", "y_mm", "theta_rad"}) {
-      // The same bin: the device's angles are in float32.
-      EXPECT_NEAR(step["mode"][field].get<double>(), other["mode"][field].get<double>(), 1e-6);
-      // Fitted to logs that differ by the histogram's rounding, some 1e-5 nats.
-      EXPECT_NEAR(step["refined"][field].get<double>(), other["refined"][field].get<double>(),
-                  1e-3);
+  for (const Arguments& flags :
+       {Arguments{"--trace"}, Arguments{"--trace", "--touch-sd-mm=1", "--touch-sd-deg=12"}}) {
+    SCOPED_TRACE(flags.size());
+    Arguments densely = flags;
+    densely.insert(densely.end(), {"--filter", "histogram"});
+    const json dense = u(densely);
+    const json r = bounded(flags);
+    ASSERT_EQ(r["trace"].size(), dense["trace"].size());
+    for (std::size_t i = 0; i < r["trace"].size(); ++i) {
+      const json& step = r["trace"][i];
+      const json& other = dense["trace"][i];
+      EXPECT_EQ(step["best"], other["best"]);
+      EXPECT_EQ(step["mode"]["object"], other["mode"]["object"]);
+      for (const char* field : {"x_mm", "y_mm", "theta_rad"}) {
+        // The same bin: the device's angles are in float32.
+        EXPECT_NEAR(step["mode"][field].get<double>(), other["mode"][field].get<double>(), 1e-6);
+        // Fitted to logs that differ by the histogram's rounding, some 1e-5 nats.
+        EXPECT_NEAR(step["refined"][field].get<double>(), other["refined"][field].get<double>(),
+                    1e-3);
+      }
+      for (const char* label : {"A", "I"}) {
+        // The tolerance, and the histogram's float32.
+        EXPECT_NEAR(step["identity"][label].get<double>(), other["identity"][label].get<double>(),
+                    3e-5);
+      }
+      EXPECT_EQ(step.contains("fit"), other.contains("fit"));
+      EXPECT_EQ(step.contains("surprise"), other.contains("surprise"));
+      EXPECT_FALSE(other.contains("dropped_mass")) << "exact";
+      EXPECT_FALSE(other.contains("identity_bounds"));
     }
-    for (const char* label : {"A", "I"}) {
-      // The tolerance, and the histogram's float32.
-      EXPECT_NEAR(step["identity"][label].get<double>(), other["identity"][label].get<double>(),
-                  3e-5);
-    }
-    EXPECT_EQ(step.contains("fit"), other.contains("fit"));
-    EXPECT_EQ(step.contains("surprise"), other.contains("surprise"));
-    EXPECT_FALSE(other.contains("dropped_mass")) << "exact";
-    EXPECT_FALSE(other.contains("identity_bounds"));
+    EXPECT_EQ(r["right"], true);
+    EXPECT_TRUE(r["device"].is_string());
   }
-  EXPECT_EQ(r["right"], true);
-  EXPECT_TRUE(r["device"].is_string());
 }
 
 TEST_F(BoundedFilter, SaysWhatItProves) {
@@ -223,11 +229,11 @@ TEST_F(BoundedFilter, IsAskedForByASceneToo) {
   EXPECT_FALSE(u({"--scene", "scene.yaml", "--filter", "auto"}).contains("dropped_mass"));
   scene("filter: auto\n");
   EXPECT_FALSE(u({"--scene", "scene.yaml"}).contains("dropped_mass"));
-  scene("filter: bounded\ntouch_sd: {mm: 1}\n");
+  scene("filter: bounded\nslip_sd: {mm: 1}\n");
   refused({"--scene", "scene.yaml"},
-          {"touch_sd mm in scene.yaml", "exact", "leave it out", "filter: bounded in scene.yaml"});
-  EXPECT_TRUE(u({"--scene", "scene.yaml", "--touch-sd-mm", "0"}).contains("dropped_mass"))
-      << "exact after all";
+          {"slip_sd mm in scene.yaml", "rest", "leave it out", "filter: bounded in scene.yaml"});
+  EXPECT_TRUE(u({"--scene", "scene.yaml", "--slip-sd-mm", "0"}).contains("dropped_mass"))
+      << "at rest after all";
   scene("filter: histogram\n");
   refused({"--scene", "scene.yaml", "--tolerance", "0.1"}, {"--tolerance", "has no effect"});
 }
@@ -238,8 +244,6 @@ TEST_F(BoundedFilter, RefusesWhatNeedsTheHistogram) {
     const std::string by = asks.front() == "--filter" ? "--filter bounded" : asks.front();
     for (const auto& [flag, value, why] : {std::tuple{"--slip-sd-mm", "0.5", "at rest"},
                                            {"--slip-sd-deg", "3", "at rest"},
-                                           {"--touch-sd-mm", "0.5", "exact"},
-                                           {"--touch-sd-deg", "3", "exact"},
                                            {"--posterior", "p.h5", "every bin"},
                                            {"--memory-mib", "100", "has no effect"}}) {
       Arguments flags = asks;

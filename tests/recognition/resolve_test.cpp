@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <numbers>
 #include <utility>
 #include <vector>
 
@@ -72,8 +73,12 @@ TEST(Resolve, AnOptionOfBoundsAsksForBounds) {
   EXPECT_EQ(std::get<BoundedOptions>(task.filter).tolerance, 1e-3);
   EXPECT_EQ(task.filter_asked_for_by, "`tolerance`");
   request.touch_sd_deg = 2.0;
-  EXPECT_THAT(refusal(request), HasSubstr("`touch-sd-deg`: bounds take every touch's pose to be "
-                                          "exact; leave it out, or `tolerance`"));
+  EXPECT_DOUBLE_EQ(std::get<BoundedOptions>(task_of(request).filter).touch_sd.rad,
+                   2.0 * std::numbers::pi / 180.0);
+  EXPECT_DOUBLE_EQ(task_of(request).touch_sd().rad, 2.0 * std::numbers::pi / 180.0);
+  request.slip_sd_deg = 2.0;
+  EXPECT_THAT(refusal(request), HasSubstr("`slip-sd-deg`: bounds take the object to rest between "
+                                          "touches; leave it out, or `tolerance`"));
 }
 
 TEST(Resolve, CountsThatWereSettledBeforeStand) {

@@ -75,6 +75,8 @@ Trial make_displaced_trial(const std::array<int, 3>& bins, std::uint64_t seed) {
   if (trial.options.touch_sd.none()) {
     trial.options.touch_sd.mm = 1.0;
   }
+  // Where a far pivot turns a bin to is known to 1e-14 of a step, which may count for as much.
+  trial.options.tolerance = std::max(trial.options.tolerance, 1e-7);
   return trial;
 }
 

@@ -32,7 +32,7 @@ struct Tap {
   glm::dvec2 fraction{0.0};
 };
 
-/// The displacements of a touch on a lattice, as docs/uncertainty.md defines them.
+/// The displacements of a touch on a lattice: weights and turns as PoseHistogram has them.
 class DisplacementWeights {
  public:
   DisplacementWeights(const PoseLattice& lattice, const DisplacementSd& sd);
