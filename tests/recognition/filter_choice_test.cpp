@@ -46,9 +46,9 @@ TEST(ChosenBins, AreNotLimitedByTheDeviceWhereBoundsMayTakeThem) {
     EXPECT_LE(all, most_bounded_bins);
     EXPECT_GT(all, most_balanced_bins) << "more than any histogram gets";
   }
-  histogram.touch_sd = {.mm = 1.0};
+  histogram.slip_sd = {.mm = 1.0};
   EXPECT_EQ(chosen(device, histogram, true).most_bins, most_bins_on(device, false))
-      << "bounds refuse touches of uncertain pose";
+      << "bounds take the object to rest";
 }
 
 /// A histogram of so many bins of each object.
@@ -84,7 +84,7 @@ TEST(FilterForBins, IsBoundsForMoreBinsThanAnyHistogramHolds) {
   histogram.lattice.y_mm.count = 1000;
   histogram.lattice.theta_rad.count = 540;
   ASSERT_GT(bins_in_all(2, histogram.lattice), most_bounded_bins) << "which bounds have room for";
-  EXPECT_TRUE(bounds_have_room(shapes(), histogram.lattice, histogram.contact));
+  EXPECT_TRUE(bounds_have_room(shapes(), *bounded_instead(histogram)));
   EXPECT_TRUE(takes_bounds(histogram));
 }
 
@@ -100,7 +100,7 @@ TEST(FilterForBins, IsTheHistogramForWhatBoundsRefuse) {
       << "the rule is the same for a still array";
   EXPECT_FALSE(takes([](Options& options) { options.lattice.y_mm.count = 100'000; }))
       << "too large for both; the histogram says so";
-  EXPECT_FALSE(takes([](Options& options) { options.touch_sd.rad = 0.1; }));
+  EXPECT_TRUE(takes([](Options& options) { options.touch_sd.rad = 0.1; }));
   EXPECT_FALSE(takes([](Options& options) { options.slip_sd.mm = 0.1; }));
   EXPECT_FALSE(takes([](Options& options) { options.memory_limit_bytes = 1; }));
 }

@@ -94,11 +94,14 @@ SearchMemory search_memory(std::span<const Hypothesis> hypotheses, const Bounded
     const double sums = options.none_weight ? 2.0 : 1.0;
     memory.tiles += (sums * sizeof(std::int32_t) + sizeof(Tile)) * largest_tiles;
     memory.still += tables_of(sizes.front()) + sizeof(std::uint32_t) * largest_tiles;
-    const double family_mm = batch_side * sizes.back().cells() * map.cell_mm;
-    memory.largest_family = std::max(
-        memory.largest_family, sizes.back().bins > 0 ? std::pow(batch_side * sizes.back().bins, 2.0)
-                                                     : bins_within(lattice.x_mm, family_mm) *
-                                                           bins_within(lattice.y_mm, family_mm));
+    const TileSize& smallest = sizes.back();
+    const double family_mm = batch_side * smallest.cells() * map.cell_mm;
+    const auto in_family = [&](const Axis& axis) {
+      return smallest.bins > 0 ? std::min<double>(axis.count, batch_side * smallest.bins)
+                               : bins_within(axis, family_mm);
+    };
+    memory.largest_family =
+        std::max(memory.largest_family, in_family(lattice.x_mm) * in_family(lattice.y_mm));
   }
   // A cosine and a sine; and of every object the tiles that see the map, and the best of them.
   memory.thetas = thetas * (sizeof(glm::dvec2) + static_cast<double>(hypotheses.size()) *
