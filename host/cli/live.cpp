@@ -8,6 +8,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <thread>
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
@@ -19,6 +20,7 @@
 #include "cli/live_record.hpp"
 #include "cli/live_screen.hpp"
 #include "cli/options.hpp"
+#include "cli/page/live_page.hpp"
 #include "cli/planned_touch.hpp"
 #include "cli/recognition_flags.hpp"
 #include "cli/sensor_option.hpp"
@@ -41,6 +43,7 @@ struct LiveArguments : SensorArguments {
   std::optional<double> reset_after_s;
   std::string plan;
   std::string json;
+  PageAddress page;
 };
 
 /// Tells what is wrong with the poses or the lattice as it happens: on standard error, or on the
@@ -157,6 +160,12 @@ void live(const LiveArguments& options) {
     fmt::print("{}\n", table_heading(task));
     std::fflush(stdout);
   }
+  std::optional<LivePage> page;
+  if (options.page.port) {
+    page.emplace(options.page, description, elements_mm, task, recogniser, goal);
+    fmt::print(people, "{}\n", page->words());
+    std::fflush(people);
+  }
   bool resolved = true;  // nothing was said yet
   complaints.show(on_terminal && isatty(STDERR_FILENO) != 0);
   LiveRecognition recognition(
@@ -169,6 +178,9 @@ void live(const LiveArguments& options) {
            [&](const LiveTouch& touch) {
              if (json) {
                json->add(plan_line(touch));
+             }
+             if (page) {
+               page->plan(touch);
              }
              if (!to_program && !on_terminal) {
                fmt::print("         {}\n", next_touch_words(*touch.next, *goal));
@@ -186,6 +198,9 @@ void live(const LiveArguments& options) {
         if (json) {
           json->add(json_line(touch, task));
         }
+        if (page) {
+          page->add(touch);
+        }
         if (!to_program && !on_terminal) {
           fmt::print("{}\n", table_line(touch, task));
           std::fflush(stdout);
@@ -196,10 +211,26 @@ void live(const LiveArguments& options) {
     if (on_terminal) {
       screen.emplace(people, description, elements_mm, task, goal);
     }
-    while (!recognition.wait_for_end(50ms) && !interruption.requested()) {
+    if (page) {
+      page->serve(&recognition);
+    }
+    // A page stays to be looked at.
+    while (!interruption.requested() && !recognition.failed()) {
+      if (recognition.wait_for_end(40ms)) {
+        if (!page) {
+          break;
+        }
+        std::this_thread::sleep_for(40ms);
+      }
       if (screen && screen->update(recognition.state(), complaints.last())) {
         recognition.reset();
       }
+      if (page) {
+        page->update(recognition.state(), complaints.last());
+      }
+    }
+    if (page) {
+      page->serve(nullptr);
     }
     recognition.finish();
   }
@@ -249,6 +280,7 @@ void add_live(CLI::App& app) {
       "--json", options->json,
       "Write a line of JSON for each touch as it comes, and with --plan a line with "
       "\"next\" as soon as its plan is there; - is standard output");
+  add_page_flags(*command, options->page);
   command->callback([options] { live(*options); });
 }
 

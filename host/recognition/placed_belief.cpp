@@ -1,0 +1,79 @@
+#include "recognition/placed_belief.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "model/bounding_box.hpp"
+#include "recognition/belief_cells.hpp"
+
+namespace palpate {
+
+namespace {
+
+constexpr double divided = 1e-4;  ///< share of a bin that is drawn in parts
+constexpr double shown = 1e-4;    ///< of the likeliest bin's share
+constexpr int cells_across = 160;
+constexpr double least_window_mm = 4.0;
+
+/// The origin of T_robot_object at a place within a bin, as a fraction of it from -0.5 to 0.5.
+glm::dvec2 origin_mm(const PoseLattice& lattice, const AxisIndices& bin, double u, double v,
+                     double w) {
+  const auto at = [](const Axis& axis, int i, double part) {
+    return axis.centre(i) + part * axis.step();
+  };
+  return inverse(lattice.T_object_robot(at(lattice.x_mm, bin[0], u), at(lattice.y_mm, bin[1], v),
+                                        at(lattice.theta_rad, bin[2], w)))
+      .translation_mm;
+}
+
+}  // namespace
+
+PlacedBelief placed_belief(const PoseLattice& lattice, std::span<const BinShare> bins) {
+  const double largest = std::ranges::max(bins, {}, &BinShare::share).share;
+  BoundingBox box;
+  for (const BinShare& bin : bins) {
+    if (bin.share >= shown * largest) {
+      box.take_in(origin_mm(lattice, indices_of(lattice, bin.bin), 0.0, 0.0, 0.0));
+    }
+  }
+  const double step = std::max({lattice.x_mm.step(), lattice.y_mm.step(), 1e-3});
+  const double side =
+      std::max({box.extent().x, box.extent().y, least_window_mm}) + 4.0 * step;
+  PlacedBelief belief;
+  belief.cell_mm = std::max(step, side / cells_across);
+  belief.cells = static_cast<int>(std::ceil(side / belief.cell_mm));
+  belief.lower_mm = box.middle() - glm::dvec2(0.5 * belief.cells * belief.cell_mm);
+  belief.xy.assign(static_cast<std::size_t>(belief.cells) * belief.cells, 0.0);
+  const auto add = [&belief](const glm::dvec2& p_mm, double share) {
+    const glm::dvec2 cell = (p_mm - belief.lower_mm) / belief.cell_mm;
+    const int i = static_cast<int>(std::floor(cell.x));
+    const int j = static_cast<int>(std::floor(cell.y));
+    if (i >= 0 && j >= 0 && i < belief.cells && j < belief.cells) {
+      belief.xy[static_cast<std::size_t>(j) * belief.cells + i] += share;
+    }
+  };
+  std::vector<double> turns(static_cast<std::size_t>(lattice.theta_rad.count), 0.0);
+  constexpr double third = 1.0 / 3.0;
+  for (const BinShare& bin : bins) {
+    const AxisIndices at = indices_of(lattice, bin.bin);
+    turns[static_cast<std::size_t>(at[2])] += bin.share;
+    if (bin.share < divided) {
+      add(origin_mm(lattice, at, 0.0, 0.0, 0.0), bin.share);
+      continue;
+    }
+    for (int part = 0; part < 27; ++part) {
+      add(origin_mm(lattice, at, third * (part % 3 - 1), third * (part / 3 % 3 - 1),
+                    third * (part / 9 - 1)),
+          bin.share / 27.0);
+    }
+  }
+  for (int k = 0; k < lattice.theta_rad.count; ++k) {
+    double theta_rad = wrap_angle(-lattice.theta_rad.centre(k), 2.0 * std::numbers::pi);
+    belief.theta.push_back({theta_rad, turns[static_cast<std::size_t>(k)]});
+  }
+  std::ranges::sort(belief.theta, {}, &PlacedBelief::Turn::theta_rad);
+  return belief;
+}
+
+}  // namespace palpate
