@@ -156,15 +156,15 @@ void live(const LiveArguments& options) {
   std::FILE* const people = to_program ? stderr : stdout;
   const bool on_terminal =
       isatty(fileno(people)) != 0 && !(to_program && isatty(STDOUT_FILENO) != 0);
-  if (!to_program && !on_terminal) {
-    fmt::print("{}\n", table_heading(task));
-    std::fflush(stdout);
-  }
   std::optional<LivePage> page;
   if (options.page.port) {
     page.emplace(options.page, description, elements_mm, task, recogniser, goal);
     fmt::print(people, "{}\n", page->words());
     std::fflush(people);
+  }
+  if (!to_program && !on_terminal) {
+    fmt::print("{}\n", table_heading(task));
+    std::fflush(stdout);
   }
   bool resolved = true;  // nothing was said yet
   complaints.show(on_terminal && isatty(STDERR_FILENO) != 0);
@@ -185,6 +185,12 @@ void live(const LiveArguments& options) {
              if (!to_program && !on_terminal) {
                fmt::print("         {}\n", next_touch_words(*touch.next, *goal));
                std::fflush(stdout);
+             }
+           },
+       .on_unknown =
+           [&] {
+             if (page) {
+               page->begin_unknown();
              }
            }},
       [&](const LiveTouch& touch) {
@@ -209,7 +215,8 @@ void live(const LiveArguments& options) {
   {
     std::optional<LiveScreen> screen;
     if (on_terminal) {
-      screen.emplace(people, description, elements_mm, task, goal);
+      screen.emplace(people, description, elements_mm, task, goal,
+                     page ? page->words() : std::string());
     }
     if (page) {
       page->serve(&recognition);

@@ -295,11 +295,17 @@ Touch LiveRecognition::view_of(const DetectedTouch& touch) const {
 void LiveRecognition::begin_unknown() {
   recogniser_.reset();
   used_.clear();
-  const std::lock_guard lock(mutex_);
-  if (state_.touches > 0) {  // one that was never touched is the same still
+  {
+    const std::lock_guard lock(mutex_);
+    if (state_.touches == 0) {  // one that was never touched is the same still
+      return;
+    }
     ++state_.unknown;
     state_.touches = 0;
     state_.last.reset();
+  }
+  if (options_.on_unknown) {
+    options_.on_unknown();
   }
 }
 

@@ -58,6 +58,8 @@ struct LiveOptions {
   std::optional<PlanGoal> plan = {};
   /// Called with a touch and its plan as soon as the plan is there, on the thread of on_touch.
   std::function<void(const LiveTouch&)> on_plan = {};
+  /// Called when another unknown comes, on the thread of on_touch.
+  std::function<void()> on_unknown = {};
 };
 
 /// Recognises what a sensor's stream touches, from construction on. One thread reads frames and

@@ -117,13 +117,15 @@ void LivePage::act(const nlohmann::json& request) {
   }
 }
 
-void LivePage::add(const LiveTouch& touch) {
-  if (unknown_ != touch.unknown) {
-    unknown_ = touch.unknown;
-    feed_.forget("touch");
-    feed_.forget("next");
-    feed_.set("unknown", fmt::format("{}", touch.unknown));
+void LivePage::begin_unknown() {
+  last_.reset();
+  for (const char* event : {"touch", "next", "belief"}) {
+    feed_.forget(event);
   }
+  feed_.set("unknown", "{}");
+}
+
+void LivePage::add(const LiveTouch& touch) {
   last_ = touch.step;
   nlohmann::ordered_json json = to_json(touch, task_);
   const RecognitionStep& step = touch.step;

@@ -28,6 +28,8 @@ class LivePage {
   void serve(LiveRecognition* recognition);
   /// Shows a touch and the belief after it. For the thread that uses the recogniser.
   void add(const LiveTouch& touch);
+  /// Shows that another unknown comes. For the same thread.
+  void begin_unknown();
   /// Shows what is planned after a touch.
   void plan(const LiveTouch& touch);
   /// Shows what the array feels now, at most 25 times a second.
@@ -48,9 +50,7 @@ class LivePage {
   std::vector<std::uint8_t> valid_;
   std::vector<glm::dvec2> elements_mm_;
 
-  // Only the thread that uses the recogniser reads and writes these.
-  std::optional<RecognitionStep> last_;
-  std::optional<std::size_t> unknown_;
+  std::optional<RecognitionStep> last_;  ///< of the thread that uses the recogniser alone
 
   std::atomic<int> looked_at_ = -1;  ///< the hypothesis that was chosen; -1: the mode's
   std::mutex mutex_;

@@ -177,6 +177,7 @@ PageServer::PageServer(const PageAddress& address, PageFeed& feed, PageAnswers a
   server.set_read_timeout(2s);
   server.set_write_timeout(5s);
   server.set_keep_alive_timeout(1);
+  server.set_keep_alive_max_count(100);
   // The page loads nothing from elsewhere. Notebooks of this machine may hold it in a frame.
   server.set_default_headers(
       {{"Content-Security-Policy",
