@@ -97,6 +97,7 @@ int run(int argc, char** argv) {
   palpate::cli::add_plan(app);
   palpate::cli::add_evaluate(app);
   palpate::cli::add_info(app);
+  palpate::cli::add_view(app);
   palpate::cli::add_export(app);
   refuse_empty_values(app);
   try {

@@ -352,8 +352,7 @@ void LiveRecognition::leave_out_now(std::size_t touch, bool out) {
 }
 
 void LiveRecognition::tell(const Job& job, RecognitionStep step) {
-  LiveTouch result{
-      .touch = *job.touch, .step = std::move(step), .frames_lost = job.frames_lost};
+  LiveTouch result{.touch = *job.touch, .step = std::move(step), .frames_lost = job.frames_lost};
   for (std::size_t i = 0; i < used_.size(); ++i) {
     if (used_[i].left_out) {
       result.left_out.push_back(i);

@@ -29,7 +29,7 @@ struct LiveTouch {
   double latency_ms = 0.0;        ///< from taking the frame that ended the touch to its estimate
   std::uint64_t frames_lost = 0;  ///< up to that frame
   std::vector<std::size_t> left_out = {};  ///< touches of the unknown that the belief leaves out
-  std::optional<PlannedTouch> next = {};  ///< the best of a grid, where the options ask for it
+  std::optional<PlannedTouch> next = {};   ///< the best of a grid, where the options ask for it
 };
 
 /// What is known of a stream at one moment.
@@ -91,12 +91,12 @@ class LiveRecognition {
   bool failed() const;
   /// The touches to come are of another unknown.
   void reset();
-  /// Leaves a touch of this unknown out of the belief, or takes it in again, and calls on_touch with
-  /// the belief of the others, as it was after the last touch. Does nothing where there is no such
-  /// touch, or no other is left.
+  /// Leaves a touch of this unknown out of the belief, or takes it in again, and calls on_touch
+  /// with the belief of the others, as it was after the last touch. Does nothing where there is no
+  /// such touch, or no other is left.
   void leave_out(std::size_t touch, bool out);
-  /// Calls this on the thread of on_touch, before the touch that comes next, also after the stream's
-  /// end.
+  /// Calls this on the thread of on_touch, before the touch that comes next, also after the
+  /// stream's end.
   void between_touches(std::function<void()> work);
   /// Stops reading and uses the touches that were read, the touch under way included.
   /// @throws Error if the sensor or the device has failed; what `on_touch` has thrown

@@ -38,8 +38,7 @@ PlacedBelief placed_belief(const PoseLattice& lattice, std::span<const BinShare>
     }
   }
   const double step = std::max({lattice.x_mm.step(), lattice.y_mm.step(), 1e-3});
-  const double side =
-      std::max({box.extent().x, box.extent().y, least_window_mm}) + 4.0 * step;
+  const double side = std::max({box.extent().x, box.extent().y, least_window_mm}) + 4.0 * step;
   PlacedBelief belief;
   belief.cell_mm = std::max(step, side / cells_across);
   belief.cells = static_cast<int>(std::ceil(side / belief.cell_mm));

@@ -22,20 +22,20 @@ import palpate
 STREAM = "simulate:E,seed=8,touches=4,speed=10,object=random"
 
 
-class Live:
-    """The command, with a page at a free port or at `port`."""
+class Paged:
+    """A command with a page."""
 
-    def __init__(self, folder: pathlib.Path, *options: str, port: int = 0, sensor: str = STREAM):
-        arguments = ["live", "--sensor", sensor, "--maps", str(folder / "maps"), *options]
+    def __init__(self, folder: pathlib.Path, *arguments: str):
         self.process = subprocess.Popen(
-            [os.environ["PALPATE_COMMAND"], *arguments, "--page", str(port)],
+            [os.environ["PALPATE_COMMAND"], *arguments],
+            cwd=folder,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
         )
         assert self.process.stdout is not None
         first = self.process.stdout.readline()
-        match = re.fullmatch(r"the page is at (http://127\.0\.0\.1:(\d+)/)\n", first)
+        match = re.fullmatch(r"the page is at (http://127\.0\.0\.1:(\d+)/).*\n", first)
         assert match, first + self.process.stdout.read()
         self.url, self.port = match[1], int(match[2])
 
@@ -76,18 +76,29 @@ def browser() -> Iterator[webdriver.Chrome]:
 
 
 @pytest.fixture
-def live(folder: pathlib.Path) -> Iterator[Callable[..., Live]]:
+def paged(folder: pathlib.Path) -> Iterator[Callable[..., Paged]]:
     """Starts commands, which end with the test."""
-    started: list[Live] = []
+    started: list[Paged] = []
 
-    def start(*options: str, **others: object) -> Live:
-        started.append(Live(folder, "--bins", "20x20x24", *options, **others))  # type: ignore[arg-type]
+    def start(*arguments: str) -> Paged:
+        started.append(Paged(folder, *arguments))
         return started[-1]
 
     yield start
     for one in started:
         one.process.kill()
         one.process.wait()
+
+
+@pytest.fixture
+def live(paged: Callable[..., Paged]) -> Callable[..., Paged]:
+    """Starts `palpate live`, with a page at a free port or at `port`."""
+
+    def start(*options: str, port: int = 0, sensor: str = STREAM) -> Paged:
+        arguments = ["--sensor", sensor, "--maps", "maps", "--bins", "20x20x24", *options]
+        return paged("live", *arguments, "--page", str(port))
+
+    return start
 
 
 def text(browser: webdriver.Chrome, name: str) -> str:
@@ -108,12 +119,12 @@ def picture(browser: webdriver.Chrome, canvas: str) -> str:
     return str(browser.execute_script(script))
 
 
-def visit(browser: webdriver.Chrome, command: Live) -> None:
+def visit(browser: webdriver.Chrome, command: Paged, last: int = 4) -> None:
     """Opens the command's page, and waits for its last touch."""
-    browser.get("about:blank")  # whose own errors are not the next page's
+    browser.get("about:blank")  # the page before would complain that its server is gone
     complaints(browser)
     browser.get(command.url)
-    wait(browser, lambda: touches(browser) == 4)
+    wait(browser, lambda: touches(browser) == last)
 
 
 def complaints(browser: webdriver.Chrome) -> list[str]:
@@ -121,7 +132,7 @@ def complaints(browser: webdriver.Chrome) -> list[str]:
 
 
 def test_the_page_shows_the_right_object(
-    browser: webdriver.Chrome, live: Callable[..., Live]
+    browser: webdriver.Chrome, live: Callable[..., Paged]
 ) -> None:
     command = live("--plan", "both", "--filter", "histogram", "--act-below-mm", "5")
     visit(browser, command)
@@ -154,7 +165,7 @@ def test_the_page_shows_the_right_object(
 
 
 def test_buttons_do_what_they_say(
-    browser: webdriver.Chrome, live: Callable[..., Live], tmp_path: pathlib.Path
+    browser: webdriver.Chrome, live: Callable[..., Paged], tmp_path: pathlib.Path
 ) -> None:
     command = live("--json", str(tmp_path / "live.jsonl"))
     visit(browser, command)
@@ -190,7 +201,7 @@ def test_buttons_do_what_they_say(
 
 
 def test_a_page_comes_back_after_a_break(
-    browser: webdriver.Chrome, live: Callable[..., Live]
+    browser: webdriver.Chrome, live: Callable[..., Paged]
 ) -> None:
     command = live()
     visit(browser, command)
@@ -216,7 +227,7 @@ def request(port: int, method: str, path: str, **headers: str) -> tuple[int, byt
     return answer.status, content
 
 
-def test_other_sites_and_bad_requests_are_refused(live: Callable[..., Live]) -> None:
+def test_other_sites_and_bad_requests_are_refused(live: Callable[..., Paged]) -> None:
     port = live().port
     for host in ("evil.example", f"evil.example:{port}", "", "localhost.evil.example"):
         assert request(port, "GET", "/events", Host=host)[0] == 403, host
@@ -272,7 +283,7 @@ def memory_mib(pid: int) -> float:
     return int(match[1]) / 1024
 
 
-def test_hostile_requests_do_no_harm(live: Callable[..., Live]) -> None:
+def test_hostile_requests_do_no_harm(live: Callable[..., Paged]) -> None:
     # More by hand: PALPATE_HOSTILE=100000.
     requests = int(os.environ.get("PALPATE_HOSTILE", "1000"))
     command = live()
@@ -285,7 +296,7 @@ def test_hostile_requests_do_no_harm(live: Callable[..., Live]) -> None:
     assert " frames, 0 lost" in command.end()
 
 
-def test_pages_are_capped(live: Callable[..., Live]) -> None:
+def test_pages_are_capped(live: Callable[..., Paged]) -> None:
     port = live().port
     looking = []
     for _ in range(16):
@@ -300,7 +311,7 @@ def test_pages_are_capped(live: Callable[..., Live]) -> None:
         connection.close()
 
 
-def test_a_port_in_use_is_refused(live: Callable[..., Live], folder: pathlib.Path) -> None:
+def test_a_port_in_use_is_refused(live: Callable[..., Paged], folder: pathlib.Path) -> None:
     port = live().port
     arguments = ["live", "--sensor", STREAM, "--maps", str(folder / "maps"), "--page", str(port)]
     run = subprocess.run(
@@ -308,3 +319,60 @@ def test_a_port_in_use_is_refused(live: Callable[..., Live], folder: pathlib.Pat
     )
     assert run.returncode == 2 and run.stdout == ""
     assert f"--page {port}: cannot be had at 127.0.0.1: another program may use it" in run.stderr
+
+
+def test_saved_files_are_shown(
+    browser: webdriver.Chrome,
+    paged: Callable[..., Paged],
+    folder: pathlib.Path,
+    unknown: palpate.Recording,
+) -> None:
+    unknown.save(folder / "unknown.h5")
+    arguments = ["--maps", "maps", "--bins", "20x20x24", "--json"]
+    run(folder, "recognize", "unknown.h5", *arguments, "records.json", "--trace")
+    run(folder, "live", "--sensor", STREAM.replace("=10", "=max"), *arguments, "live.jsonl")
+    run(folder, "record", "--sensor", STREAM.replace("=10", "=max"), "-o", "frames.h5")
+    run(folder, "batch", *3 * ["unknown.h5"], *arguments[:-1], "-o", "batch")
+    files = ["records.json", "live.jsonl", "frames.h5", "maps/A.map.h5", "unknown.h5", "batch"]
+    visit(browser, paged("view", *files, "--page", "0"), 9)
+    choice = Select(browser.find_element(By.ID, "file"))
+    assert len(choice.options) == 6
+    assert browser.title.startswith("E ") and "E (" in text(browser, "headline")
+    blank = picture(browser, "robot")
+
+    def scrub(to: int) -> None:
+        script = "const r = document.getElementById('row'); r.value = arguments[0]; r.oninput()"
+        browser.execute_script(script, to)
+
+    scrub(2)
+    wait(browser, lambda: touches(browser) == 3 and "touch 3 of 9" in text(browser, "scrub"))
+
+    choice.select_by_index(1)
+    wait(browser, lambda: touches(browser) == 4 and "unknown 1" in text(browser, "records"))
+    assert "truth: E; error" in text(browser, "words")
+
+    choice.select_by_index(2)
+    wait(browser, lambda: "frame 1 of" in text(browser, "scrub"))
+    untouched = picture(browser, "array")
+    scrub(150)
+    wait(browser, lambda: "frame 151 of" in text(browser, "scrub"))
+    wait(browser, lambda: picture(browser, "array") != untouched)
+
+    choice.select_by_index(3)
+    wait(browser, lambda: browser.title == "maps/A.map.h5")
+    wait(browser, lambda: picture(browser, "robot") != blank)
+
+    choice.select_by_index(4)
+    wait(browser, lambda: "touch 1 of 9" in text(browser, "scrub"))
+
+    choice.select_by_index(5)
+    wait(browser, lambda: "3 of 3 records" in text(browser, "records"))
+    browser.find_element(By.ID, "filter").send_keys("nothing such")
+    wait(browser, lambda: "0 of 3 records" in text(browser, "records"))
+    assert complaints(browser) == []
+
+
+def run(folder: pathlib.Path, *arguments: str) -> None:
+    """Runs the command in the folder."""
+    command = [os.environ["PALPATE_COMMAND"], *arguments]
+    subprocess.run(command, cwd=folder, check=True, capture_output=True, timeout=120)

@@ -128,12 +128,8 @@ void LivePage::begin_unknown() {
 void LivePage::add(const LiveTouch& touch) {
   last_ = touch.step;
   nlohmann::ordered_json json = to_json(touch, task_);
-  const RecognitionStep& step = touch.step;
-  json["headline"] = identity_words(step, task_);
-  json["pose_words"] = pose_words(pose_text(step));
   json["words"] = sentences(touch, task_);
-  json["map"] = step.mode.object;
-  json["T_robot_object"] = pose_json(step.T_robot_object());
+  json["map"] = touch.step.mode.object;
   json["readings"] = readings_text(touch, elements_mm_, task_);
   feed_.add("touch", line_of(json));
   show_belief();

@@ -56,10 +56,9 @@ nlohmann::ordered_json places_json(std::span<const glm::dvec2> places_mm) {
 nlohmann::ordered_json pressure_json(std::span<const double> pressure) {
   auto json = nlohmann::ordered_json::array();
   for (const double value : pressure) {
-    json.push_back(std::isfinite(value)
-                       ? nlohmann::ordered_json(std::strtod(fmt::format("{:.4g}", value).c_str(),
-                                                            nullptr))
-                       : nullptr);
+    json.push_back(std::isfinite(value) ? nlohmann::ordered_json(std::strtod(
+                                              fmt::format("{:.4g}", value).c_str(), nullptr))
+                                        : nullptr);
   }
   return json;
 }

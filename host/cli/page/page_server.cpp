@@ -24,9 +24,8 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr int default_port = 8080;
-constexpr int most_pages = 16;       ///< that take events at a time
-constexpr int other_requests = 4;    ///< threads that are left to answer while all of them look
+constexpr int most_pages = 16;     ///< that take events at a time
+constexpr int other_requests = 4;  ///< threads that are left to answer while all of them look
 constexpr std::size_t most_asked = 4096;  ///< bytes of a request's body
 
 bool is_ip(const std::string& host) {
@@ -83,7 +82,7 @@ void add_page_flags(CLI::App& command, PageAddress& address) {
       .add_option_function<std::string>(
           "--page",
           [&address](const std::string& port) {
-            address.port = port.empty() ? default_port : std::stoi(port);
+            address.port = port.empty() ? default_page_port : std::stoi(port);
           },
           "Serve a page for a browser, at this port of this machine: the array, the object and its "
           "pose in the robot frame, the belief, the decision; 0 takes a free port [default: 8080 "
@@ -92,11 +91,11 @@ void add_page_flags(CLI::App& command, PageAddress& address) {
       ->type_name("PORT")
       ->check(CLI::Range(0, 65535));
   command
-      .add_option("--page-address", address.host,
-                  "Address at which the page is served; 0.0.0.0 shows it to everybody who can reach "
-                  "this machine, and lets them press its buttons")
-      ->capture_default_str()
-      ->needs("--page");
+      .add_option(
+          "--page-address", address.host,
+          "Address at which the page is served; 0.0.0.0 shows it to everybody who can reach "
+          "this machine, and lets them press its buttons")
+      ->capture_default_str();
 }
 
 struct PageServer::Impl {
@@ -202,9 +201,9 @@ PageServer::PageServer(const PageAddress& address, PageFeed& feed, PageAnswers a
     impl_->act(request, response);
   });
   const int asked = *address.port;
-  impl_->port = asked == 0                                    ? server.bind_to_any_port(address.host)
+  impl_->port = asked == 0                                 ? server.bind_to_any_port(address.host)
                 : server.bind_to_port(address.host, asked) ? asked
-                                                              : -1;
+                                                           : -1;
   if (impl_->port < 0) {
     refuse_flag("--page", asked,
                 "cannot be had at {}: another program may use it; give another port, or 0 for a "

@@ -15,6 +15,7 @@ namespace palpate::cli {
 
 class PageFeed;
 
+inline constexpr int default_page_port = 8080;
 /// Where a page is served.
 struct PageAddress {
   std::string host = "127.0.0.1";

@@ -1,10 +1,13 @@
 // Keeps what the server tells, and draws it: at most once for each picture of the screen.
 
 import { Plane } from "./plane.js";
-import { drawArray, drawBelief, drawIdentity, drawRobot, numbersOfTouch } from "./panels.js";
+import { drawArray, drawBelief, drawIdentity, drawRobot, headline, numbersOfTouch, poseWords,
+         truthWords } from "./panels.js";
+import { view } from "./view.js";
 
 const element = (id) => document.getElementById(id);
-const state = { setup: null, frame: null, touches: [], belief: null, next: null, maps: {} };
+const state = { setup: null, frame: null, touches: [], belief: null, next: null, maps: {},
+                name: "Palpate" };
 let paused = false;
 let due = false;
 
@@ -47,11 +50,13 @@ function tellTouch() {
   decision.className = last ? (last.decision?.act ? "act" : "wait") : "";
   decision.textContent =
     last ? (last.decision?.act ? "Act" : "Touch again") : "waiting for the first touch";
-  element("headline").textContent = last?.headline ?? "";
-  element("pose").textContent = (last?.pose_words ?? "").replaceAll("+-", "± ").replace(" deg", "°");
+  element("headline").textContent = last ? headline(last) : "";
+  element("pose").textContent = last ? poseWords(last) : "";
   element("because").textContent = last?.decision?.because ?? "";
-  document.title = last ? `${last.best} ${Math.round(100 * last.identity[last.best])} %` : "Palpate";
-  fill(element("words"), [...(state.next ? [state.next.words] : []), ...(last?.words ?? [])]);
+  document.title = last ? `${last.best} ${Math.round(100 * last.identity[last.best])} %` : state.name;
+  const next = state.next?.words ? [state.next.words] : [];
+  const words = last ? (last.words ?? [truthWords(last), ...(last.warnings ?? [])]) : [];
+  fill(element("words"), [...next, ...words.filter(Boolean)]);
   element("numbers").replaceChildren(...(last ? numbersOfTouch(last) : []).flatMap((row) =>
     row.map((text, i) => {
       const part = document.createElement(i ? "dd" : "dt");
@@ -67,6 +72,7 @@ function tellTouches(last) {
     const out = last.left_out?.includes(i) ?? false;
     item.className = out ? "out" : "";
     item.append(`${touch.best} ${(100 * touch.identity[touch.best]).toFixed(0)} % `);
+    if (!state.setup.live) return item;
     const button = document.createElement("button");
     button.textContent = out ? "take in again" : "mark as bad";
     button.setAttribute("aria-label", `touch ${i + 1}: ${button.textContent}`);
@@ -110,6 +116,12 @@ const on = {
   hello() {
     Object.assign(state, { frame: null, touches: [], belief: null, next: null });
     tellTouch();
+  },
+  files(files) {
+    view(files, state, () => {
+      tellTouch();
+      redraw();
+    });
   },
   setup(setup) {
     state.setup = setup;
@@ -178,7 +190,7 @@ element("pause").onclick = pause;
 element("fit-views").onclick = showAll;
 document.addEventListener("keydown", (event) => {
   const keys = { n: nextUnknown, p: pause, 0: showAll };
-  if (!event.ctrlKey && !event.metaKey && event.target.tagName !== "SELECT") {
+  if (!event.ctrlKey && !event.metaKey && !["SELECT", "INPUT"].includes(event.target.tagName)) {
     keys[event.key]?.();
   }
 });

@@ -13,13 +13,36 @@ export const percent = (p) => `${(100 * p).toFixed(p > 0.9995 || p < 0.0005 ? 0 
 export const colourOf = (state, label) =>
   label === "(none)" ? noneColour : series[state.setup.labels.indexOf(label) % series.length];
 
+/** T_robot_object to act on, [x, y, theta]. */
+export const poseOfObject = (touch) => touch.refined?.T_robot_object ?? touch.T_robot_object;
+
+export function headline(touch) {
+  const unlike = touch.fit?.verdict === "does not fit" && touch.best !== "(none)" ? "unlike " : "";
+  return `${unlike}${touch.best} (${percent(touch.identity[touch.best])})`;
+}
+
+export function poseWords(touch) {
+  const pose = poseOfObject(touch);
+  const sd = touch.refined?.sd;
+  const value = (i, scale) =>
+    (scale * pose[i]).toFixed(2) + (sd ? ` ± ${(scale * sd[i]).toFixed(2)}` : "");
+  const turn = degrees(1);
+  return `x ${value(0, 1)} mm, y ${value(1, 1)} mm, theta ${value(2, turn)}°`;
+}
+
+export function truthWords(touch) {
+  const error = touch.refined_error_mm ?? touch.error_mm;
+  return touch.truth?.object
+    ? `truth: ${touch.truth.object}${error == null ? "" : `; error ${error.toFixed(2)} mm`}` : "";
+}
+
 function numbersOf(text) {
   return text.split(",").map(Number);
 }
 
 /** The edge of an element's square: nine tenths of the way to the nearest other element. */
 export function elementEdge(elements) {
-  const [first, ...others] = elements;
+  const [first, ...others] = elements.length ? elements : [[0, 0]];
   const nearest = Math.min(2, ...others.map((e) => Math.hypot(e[0] - first[0], e[1] - first[1])));
   return 0.9 * nearest;
 }
@@ -35,14 +58,19 @@ function boundsOf(places, margin) {
   return { lower, upper };
 }
 
-/** The largest pressure that has a colour of its own: five thresholds, or a touch's largest. */
+/** The largest pressure that has a colour of its own: of a recording's, or five thresholds. */
 function fullScale(state) {
-  const touched = state.touches.flatMap((touch) => touch.largest ?? []);
-  return Math.max(5 * state.setup.threshold, 1e-6, ...touched);
+  return state.setup.largest ?? Math.max(5 * state.setup.threshold, 1e-6);
 }
 
 export function drawArray(state, plane, caption) {
   const { setup, frame } = state;
+  if (!setup.elements_mm.length) {
+    plane.begin();
+    plane.end();
+    caption.textContent = "no array is known";
+    return;
+  }
   const edge = elementEdge(setup.elements_mm);
   const { lower, upper } = boundsOf(setup.elements_mm, 0.7 * edge);
   plane.fit(lower, upper);
@@ -71,7 +99,7 @@ export function drawArray(state, plane, caption) {
     } else if (value > 0) {
       context.fillStyle = rgba("--pressure", Math.min(1, value / scale));
       context.fill();
-      if (value > setup.threshold) {
+      if (value > (setup.threshold ?? Infinity)) {
         context.strokeStyle = theme("--contact");
         context.lineWidth = 1.5;
         context.stroke();
@@ -81,8 +109,9 @@ export function drawArray(state, plane, caption) {
   });
   plane.end();
   caption.textContent =
-    `strongest colour ${Number(scale.toPrecision(3))} ${setup.pressure_unit}; framed: above the ` +
-    `threshold of ${setup.threshold} ${setup.pressure_unit}` +
+    `strongest colour ${Number(scale.toPrecision(3))} ${setup.pressure_unit}` +
+    (setup.threshold ? `; framed: above the threshold of ${setup.threshold} ${setup.pressure_unit}`
+                     : "") +
     (dead ? `; crossed: ${dead} dead` : "");
 }
 
@@ -124,20 +153,26 @@ function drawFootprint(state, plane, pose, { readings, dashed, colour }) {
 }
 
 const poseOf = (touch) => [touch.pose.x_mm, touch.pose.y_mm, touch.pose.theta_rad];
+const known = (pose) => pose && pose.every((value) => value !== null);
 
 export function drawRobot(state, plane) {
   const last = state.touches.at(-1);
-  const now = state.frame?.pose;
-  const map = last && state.maps[last.map];
+  const now = known(state.frame?.pose) && state.frame.pose;
+  const map = state.maps[last ? last.map : "alone"];
+  const at = last ? poseOfObject(last) : [0, 0, 0];
+  const touches = state.setup.elements_mm.length ? state.touches.filter((t) => t.pose) : [];
   const places = [];
   const edge = elementEdge(state.setup.elements_mm);
   const reach = (pose) => places.push(...footprint(state, pose, edge).flat());
-  state.touches.forEach((touch) => reach(poseOf(touch)));
+  touches.forEach((touch) => reach(poseOf(touch)));
+  (state.setup.reach ?? []).forEach(reach);
   if (map) {
     const [w, h] = [map.nx * map.cell_mm, map.ny * map.cell_mm];
     for (const corner of [[0, 0], [w, 0], [w, h], [0, h]]) {
-      places.push(placed(last.T_robot_object, corner.map((c, i) => c + map.lower_mm[i])));
+      places.push(placed(at, corner.map((c, i) => c + map.lower_mm[i])));
     }
+  } else if (last) {
+    (last.modes ?? []).forEach((mode) => places.push(mode.T_robot_object));
   } else if (now) {
     reach(now);
   }
@@ -147,11 +182,11 @@ export function drawRobot(state, plane) {
   }
   const context = plane.begin();
   if (map) {
-    plane.cells(imageOfMap(map), map.lower_mm, map.cell_mm, last.T_robot_object);
+    plane.cells(imageOfMap(map), map.lower_mm, map.cell_mm, at);
   }
-  state.touches.forEach((touch, i) => {
+  touches.forEach((touch, i) => {
     const out = last.left_out?.includes(i);
-    context.globalAlpha = out ? 0.15 : i === state.touches.length - 1 ? 0.9 : 0.35;
+    context.globalAlpha = out ? 0.15 : i === touches.length - 1 ? 0.9 : 0.35;
     drawFootprint(state, plane, poseOf(touch),
                   { readings: touch.readings, colour: theme("--contact"), dashed: out });
   });
