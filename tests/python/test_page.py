@@ -9,6 +9,7 @@ import re
 import signal
 import socket
 import subprocess
+import urllib.request
 from collections.abc import Callable, Iterator
 
 import pytest
@@ -370,6 +371,22 @@ def test_saved_files_are_shown(
     browser.find_element(By.ID, "filter").send_keys("nothing such")
     wait(browser, lambda: "0 of 3 records" in text(browser, "records"))
     assert complaints(browser) == []
+
+
+def test_show_serves_files_and_draws_what_is_in_memory(
+    folder: pathlib.Path, maps: list[palpate.OccupancyGrid]
+) -> None:
+    command = os.environ["PALPATE_COMMAND"]
+    page = palpate.show(folder / "maps" / "A.map.h5", command=command)
+    assert isinstance(page, palpate.Page)
+    with urllib.request.urlopen(page.url + "file/0") as answer:
+        assert json.load(answer)["label"] == "A"
+    assert f'<iframe src="{page.url}"' in page._repr_html_()
+    page.close()
+    with pytest.raises(palpate.Error, match="nothing.h5: no such file"):
+        palpate.show(folder / "nothing.h5", command=command)
+    axes = palpate.show(maps[0])
+    assert not isinstance(axes, palpate.Page) and axes.get_xlabel() == "x, mm"
 
 
 def run(folder: pathlib.Path, *arguments: str) -> None:
