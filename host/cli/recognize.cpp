@@ -305,10 +305,8 @@ void recognize(const RecognizeArguments& options) {
       json.push_back(to_json(records.back(), task, device.name(), request.trace));
     }
     if (!options.png.empty()) {
-      write_file(
-          png_path(options, unknown),
-          draw_recognition(sheet_of(records.back(), unknown, task,
-                                    recogniser.marginals(records.back().last().mode.object))));
+      write_file(png_path(options, unknown),
+                 draw_recognition(sheet_of(records.back(), unknown, task, recogniser)));
     }
     progress->next();
   }

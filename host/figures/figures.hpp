@@ -8,6 +8,7 @@
 
 #include <glm/vec2.hpp>
 
+#include "figures/placed_belief.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/pose.hpp"
@@ -33,15 +34,23 @@ struct RecognitionSheet {
   std::vector<std::vector<glm::dvec2>> footprints_mm;  ///< [touch][element] in the robot frame
   double element_mm = 1.8;                             ///< edge at which an element is drawn
   Pose T_object_robot;                                 ///< estimated
-  std::optional<Pose> truth;        ///< T_object_robot, if known and the identity is right
-  Marginals belief;                 ///< of the estimated object
-  std::vector<std::string> labels;  ///< [object]; equal labels are drawn as one, summed
+  std::optional<Pose> truth;  ///< T_object_robot, if known and the identity is right
+  PlacedBelief belief;        ///< of the estimated object
+  /// Where the belief lies, of any object.
+  struct Mode {
+    std::string name;  ///< such as "E 97.9 %"
+    ObjectPose pose;
+    bool own = false;  ///< of the estimated pose
+  };
+  std::vector<Mode> modes = {};
+  std::vector<std::string> labels;            ///< [object]; equal labels are drawn as one, summed
   std::vector<std::vector<double>> identity;  ///< [touch][object] probability after each touch
 };
 
-/// Draws a sheet and returns the bytes of a PNG file: the map with the sensor's footprints at the
-/// estimated and at the true pose, the belief over (x, y), and the identity probabilities over the
-/// touches. For a symmetric object, the true pose drawn is the one nearest to the estimate. The
+/// Draws a sheet and returns the bytes of a PNG file: in the robot frame, the map at the estimated
+/// pose, the sensor's footprints and the modes with the ellipses that hold 68 and 95 % of their x
+/// and y; the belief over where T_robot_object's origin lies; and the identity probabilities over
+/// the touches. For a symmetric object, the true pose drawn is the one nearest to the estimate. The
 /// same sheet gives the same bytes.
 /// @throws Error on a map without cells, arrays of the wrong size, a symmetric object with a truth
 /// but without an occupied cell, or lack of memory

@@ -59,7 +59,7 @@ def show(
     paths: list[_Path] = [what] if isinstance(what, str | os.PathLike) else list(what)
     program = command or _program()
     process = subprocess.Popen(
-        [program, "view", *map(os.fspath, paths), "--page", "0"],
+        [program, "view", *(os.fspath(path) for path in paths), "--page", "0"],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

@@ -8,9 +8,9 @@
 #include "cli/live_record.hpp"
 #include "cli/page/page_json.hpp"
 #include "cli/planned_touch.hpp"
+#include "cli/sheet.hpp"
 #include "cli/step_words.hpp"
 #include "model/option_words.hpp"
-#include "recognition/placed_belief.hpp"
 #include "recognition/record_json.hpp"
 
 namespace palpate::cli {
@@ -140,12 +140,10 @@ void LivePage::show_belief() {
     return;
   }
   const int object = looked_at_ < 0 ? last_->mode.object : looked_at_.load();
-  constexpr double least_share = 1e-6;
-  PoseLattice lattice;
-  const auto bins = recogniser_.likely_bins(std::span(&object, 1), least_share, lattice);
+  const PlacedBelief belief = belief_of(recogniser_, object);
   nlohmann::ordered_json json{{"map", object}, {"chosen", looked_at_ >= 0}};
-  if (!bins.front().empty()) {
-    json.update(belief_json(placed_belief(lattice, bins.front())));
+  if (belief.cells > 0) {
+    json.update(belief_json(belief));
   }
   feed_.set("belief", line_of(json));
 }

@@ -8,7 +8,7 @@
 
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/pose.hpp"
-#include "recognition/placed_belief.hpp"
+#include "figures/placed_belief.hpp"
 
 // What the page draws, as JSON. Pictures are base64 of a byte for each cell, row by row, the lowest
 // row first.

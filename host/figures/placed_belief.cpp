@@ -1,11 +1,11 @@
-#include "recognition/placed_belief.hpp"
+#include "figures/placed_belief.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
 #include "model/bounding_box.hpp"
-#include "recognition/belief_cells.hpp"
 
 namespace palpate {
 
@@ -15,6 +15,15 @@ constexpr double divided = 1e-4;  ///< share of a bin that is drawn in parts
 constexpr double shown = 1e-4;    ///< of the likeliest bin's share
 constexpr int cells_across = 160;
 constexpr double least_window_mm = 4.0;
+
+/// Indices of a bin along x, y and theta.
+using AxisIndices = std::array<int, 3>;
+
+AxisIndices indices_of(const PoseLattice& lattice, std::int64_t bin) {
+  const std::int64_t row = bin / lattice.x_mm.count;
+  return {static_cast<int>(bin % lattice.x_mm.count), static_cast<int>(row % lattice.y_mm.count),
+          static_cast<int>(row / lattice.y_mm.count)};
+}
 
 /// The origin of T_robot_object at a place within a bin, as a fraction of it from -0.5 to 0.5.
 glm::dvec2 origin_mm(const PoseLattice& lattice, const AxisIndices& bin, double u, double v,
