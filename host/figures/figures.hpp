@@ -17,7 +17,7 @@ namespace palpate {
 
 /// Draws maps side by side at one scale and returns the bytes of a PNG file. Colours show log odds
 /// relative to each map's prior (white = prior, blue = empty, red = occupied); one colour bar in
-/// nats and one scale bar in mm serve all. y points up. The same maps give the same bytes.
+/// nats serves all, and each has axes in mm. y points up. The same maps give the same bytes.
 /// @throws Error on an empty list, a map without cells, or lack of memory
 std::string draw_maps(std::span<const OccupancyGrid> maps);
 

@@ -25,15 +25,25 @@ AxisIndices indices_of(const PoseLattice& lattice, std::int64_t bin) {
           static_cast<int>(row / lattice.y_mm.count)};
 }
 
-/// The origin of T_robot_object at a place within a bin, as a fraction of it from -0.5 to 0.5.
-glm::dvec2 origin_mm(const PoseLattice& lattice, const AxisIndices& bin, double u, double v,
-                     double w) {
-  const auto at = [](const Axis& axis, int i, double part) {
-    return axis.centre(i) + part * axis.step();
+/// Calls see(p_mm, share) with the origin of T_robot_object at the bin's centre, or of each of its
+/// parts at theirs.
+template <typename See>
+void for_parts(const PoseLattice& lattice, const BinShare& bin, const See& see) {
+  const AxisIndices at = indices_of(lattice, bin.bin);
+  const auto place = [](const Axis& axis, int i, int part) {
+    return axis.centre(i) + part * axis.step() / 3.0;
   };
-  return inverse(lattice.T_object_robot(at(lattice.x_mm, bin[0], u), at(lattice.y_mm, bin[1], v),
-                                        at(lattice.theta_rad, bin[2], w)))
-      .translation_mm;
+  const int reach = bin.share < divided ? 0 : 1;
+  for (int w = -reach; w <= reach; ++w) {
+    for (int v = -reach; v <= reach; ++v) {
+      for (int u = -reach; u <= reach; ++u) {
+        const Pose T_object_robot =
+            lattice.T_object_robot(place(lattice.x_mm, at[0], u), place(lattice.y_mm, at[1], v),
+                                   place(lattice.theta_rad, at[2], w));
+        see(inverse(T_object_robot).translation_mm, reach == 0 ? bin.share : bin.share / 27.0);
+      }
+    }
+  }
 }
 
 }  // namespace
@@ -43,7 +53,7 @@ PlacedBelief placed_belief(const PoseLattice& lattice, std::span<const BinShare>
   BoundingBox box;
   for (const BinShare& bin : bins) {
     if (bin.share >= shown * largest) {
-      box.take_in(origin_mm(lattice, indices_of(lattice, bin.bin), 0.0, 0.0, 0.0));
+      for_parts(lattice, bin, [&box](const glm::dvec2& p_mm, double) { box.take_in(p_mm); });
     }
   }
   const double step = std::max({lattice.x_mm.step(), lattice.y_mm.step(), 1e-3});
@@ -62,19 +72,9 @@ PlacedBelief placed_belief(const PoseLattice& lattice, std::span<const BinShare>
     }
   };
   std::vector<double> turns(static_cast<std::size_t>(lattice.theta_rad.count), 0.0);
-  constexpr double third = 1.0 / 3.0;
   for (const BinShare& bin : bins) {
-    const AxisIndices at = indices_of(lattice, bin.bin);
-    turns[static_cast<std::size_t>(at[2])] += bin.share;
-    if (bin.share < divided) {
-      add(origin_mm(lattice, at, 0.0, 0.0, 0.0), bin.share);
-      continue;
-    }
-    for (int part = 0; part < 27; ++part) {
-      add(origin_mm(lattice, at, third * (part % 3 - 1), third * (part / 3 % 3 - 1),
-                    third * (part / 9 - 1)),
-          bin.share / 27.0);
-    }
+    turns[static_cast<std::size_t>(indices_of(lattice, bin.bin)[2])] += bin.share;
+    for_parts(lattice, bin, add);
   }
   for (int k = 0; k < lattice.theta_rad.count; ++k) {
     double theta_rad = wrap_angle(-lattice.theta_rad.centre(k), 2.0 * std::numbers::pi);
