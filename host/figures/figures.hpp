@@ -122,8 +122,8 @@ struct ConfusionFigure {
 
 /// Draws the matrix and returns the bytes of a PNG file: the first row on top, every count in its
 /// cell, the right ones on blue and the wrong ones on red, the darker the larger the share of its
-/// row. Where there are too many classes for numbers, the cells have only their colours. The same
-/// contents give the same bytes.
+/// row. Where there are too many classes for numbers, the cells have only
+/// their colours. The same contents give the same bytes.
 /// @throws Error without a row or a column, where a row has not one count for each column, or for
 /// lack of memory
 std::string draw_confusion(const ConfusionFigure& figure);
