@@ -305,8 +305,10 @@ void recognize(const RecognizeArguments& options) {
       json.push_back(to_json(records.back(), task, device.name(), request.trace));
     }
     if (!options.png.empty()) {
-      write_file(png_path(options, unknown),
-                 draw_recognition(sheet_of(records.back(), unknown, task, recogniser)));
+      write_file(
+          png_path(options, unknown),
+          draw_recognition(sheet_of(records.back(), unknown, task,
+                                    belief_of(recogniser, records.back().last().mode.object))));
     }
     progress->next();
   }

@@ -86,11 +86,12 @@ PlacedBelief belief_of(const Recogniser& recogniser, int object) {
   constexpr double least_share = 1e-6;
   PoseLattice lattice;
   const auto bins = recogniser.likely_bins(std::span(&object, 1), least_share, lattice);
-  return bins.front().empty() ? PlacedBelief() : placed_belief(lattice, bins.front());
+  return bins.front().empty() ? PlacedBelief{.cells = 1, .xy = {0.0}}
+                              : placed_belief(lattice, bins.front());
 }
 
 RecognitionSheet sheet_of(const RecognitionRecord& record, const Unknown& unknown,
-                          const RecognitionTask& task, const Recogniser& recogniser) {
+                          const RecognitionTask& task, PlacedBelief belief) {
   const RecognitionStep& last = record.last();
   RecognitionSheet sheet;
   sheet.title = name_of(record);
@@ -110,7 +111,7 @@ RecognitionSheet sheet_of(const RecognitionRecord& record, const Unknown& unknow
   if (last.error_mm) {
     sheet.truth = last.truth.T_object_robot;
   }
-  sheet.belief = belief_of(recogniser, last.mode.object);
+  sheet.belief = std::move(belief);
   for (std::size_t i = 0; i < last.places.modes.size(); ++i) {
     const BeliefMode& mode = last.places.modes[i];
     sheet.modes.push_back({fmt::format("{} {:.1f} %", printable(mode_words(mode.object, task)),

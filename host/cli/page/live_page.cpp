@@ -141,10 +141,9 @@ void LivePage::show_belief() {
   }
   const int object = looked_at_ < 0 ? last_->mode.object : looked_at_.load();
   const PlacedBelief belief = belief_of(recogniser_, object);
-  nlohmann::ordered_json json{{"map", object}, {"chosen", looked_at_ >= 0}};
-  if (belief.cells > 0) {
-    json.update(belief_json(belief));
-  }
+  nlohmann::ordered_json json = belief_json(belief);
+  json["map"] = object;
+  json["chosen"] = looked_at_ >= 0;
   feed_.set("belief", line_of(json));
 }
 
