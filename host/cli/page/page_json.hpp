@@ -6,9 +6,9 @@
 
 #include <nlohmann/json.hpp>
 
+#include "figures/placed_belief.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/pose.hpp"
-#include "figures/placed_belief.hpp"
 
 // What the page draws, as JSON. Pictures are base64 of a byte for each cell, row by row, the lowest
 // row first.
