@@ -81,7 +81,7 @@ void expect_lawful(const json& step) {
 
 TEST_F(BoundedFilter, AgreesWithTheHistogram) {
   for (const Arguments& flags :
-       {Arguments{"--trace"}, Arguments{"--trace", "--touch-sd-mm=1", "--touch-sd-deg=12"}}) {
+       {Arguments{"--trace"}, Arguments{"--trace", "--touch-sd-mm=2", "--touch-sd-deg=12"}}) {
     SCOPED_TRACE(flags.size());
     Arguments densely = flags;
     densely.insert(densely.end(), {"--filter", "histogram"});
@@ -293,9 +293,8 @@ TEST_F(BoundedFilter, AutoTakesItForManyBins) {
   EXPECT_THAT(engine(many), HasSubstr("100352 bins in all, more than 100000"));
   EXPECT_THAT(engine(few), HasSubstr("filter: histogram in "));
   EXPECT_THAT(engine(few), HasSubstr("99904 bins in all, at most 100000"));
-  for (const Arguments& needs :
-       {Arguments{"--touch-sd-mm", "0.5"}, Arguments{"--slip-sd-mm", "0.5"},
-        Arguments{"--memory-mib", "500"}, Arguments{"--posterior", "p.h5"}}) {
+  for (const Arguments& needs : {Arguments{"--slip-sd-mm", "0.5"}, Arguments{"--memory-mib", "500"},
+                                 Arguments{"--posterior", "p.h5"}}) {
     Arguments flags = many;
     flags.insert(flags.end(), needs.begin(), needs.end());
     EXPECT_THAT(engine(flags), HasSubstr("filter: histogram in "));
@@ -312,9 +311,8 @@ TEST_F(BoundedFilter, AutoTakesItForManyBins) {
 }
 
 TEST_F(BoundedFilter, AutoNamesTheFlagThatKeepsALargeLatticeFromIt) {
-  for (const Arguments& flags :
-       {Arguments{"--touch-sd-mm=0.5"}, Arguments{"--slip-sd-deg=2"}, Arguments{"--memory-mib=9"},
-        Arguments{"--posterior=p.h5"}, Arguments{"--filter=histogram"}}) {
+  for (const Arguments& flags : {Arguments{"--slip-sd-deg=2"}, Arguments{"--memory-mib=9"},
+                                 Arguments{"--posterior=p.h5"}, Arguments{"--filter=histogram"}}) {
     const std::string name = flags[0].starts_with("--filter")
                                  ? "--filter histogram"
                                  : flags[0].substr(0, flags[0].find('='));
@@ -322,6 +320,9 @@ TEST_F(BoundedFilter, AutoNamesTheFlagThatKeepsALargeLatticeFromIt) {
     call.insert(call.end(), flags.begin(), flags.end());
     expect_refused(call, {"MiB", "or leave out " + name + ": --filter bounded"});
   }
+  expect_refused({"recognize", "u.h5", "--maps", "maps", "--bins=4000x4000x300", "--filter=bounded",
+                  "--touch-sd-mm=0.5"},
+                 {"MiB", "use fewer bins"});
   expect_refused({"recognize", "u.h5", "--maps", "maps", "--bins=4000x4000x300",
                   "--filter=histogram", "--slip-sd-deg=2"},
                  {"leave out --slip-sd-deg and --filter histogram"});

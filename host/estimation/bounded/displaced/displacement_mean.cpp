@@ -2,12 +2,11 @@
 
 #include <algorithm>
 #include <atomic>
-#include <bit>
 #include <cmath>
-#include <cstdint>
 #include <limits>
 #include <utility>
 
+#include "estimation/bounded/displaced/blurred_plane.hpp"
 #include "estimation/bounded/log_sum.hpp"
 #include "estimation/bounded/parallel_for.hpp"
 
@@ -17,92 +16,6 @@ namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr int side = BlockRun::side;
-
-// How likelihoods are kept and added up. Of a plane, they are relative to its largest.
-
-/// Bounds of tiles, as float32. None is so small that it could vanish.
-struct TileLikelihoods {
-  using Value = float;
-  static constexpr Value nothing = 0.0F;
-  static constexpr bool bounds = true;
-  static constexpr double least = 0.0;  // a sum that is smaller is too inexact
-  /// More than all that vanishes in float32 adds to a mean.
-  static constexpr Value vanished = 1e-30F;
-
-  /// exp(nats) for nats <= 0, within 1e-6 of itself, at least exp(-80): by powers of two and a
-  /// polynomial, which compilers turn into vectors.
-  static Value of_log(Value nats) {
-    const Value exponent = std::max(nats, -80.0F) * 1.44269504F;
-    const auto whole = static_cast<std::int32_t>(exponent - 0.5F);
-    const Value f = exponent - static_cast<Value>(whole);
-    Value p = 0.001112550962716341F;
-    for (const Value term : {0.009666282683610916F, 0.05557400360703468F, 0.24022351205348969F,
-                             0.693142831325531F, 1.0F}) {
-      p = p * f + term;
-    }
-    return std::bit_cast<Value>(std::bit_cast<std::int32_t>(p) + (whole << 23));
-  }
-  static Value weight(double weight) { return static_cast<Value>(weight); }
-  static Value factor(double nats) { return static_cast<Value>(std::exp(nats)); }
-  static void add(Value& sum, Value weight, Value likelihood) { sum += weight * likelihood; }
-  static void widen(Value& widest, Value likelihood) { widest = std::max(widest, likelihood); }
-  static Value scaled(Value likelihood, Value scale) { return likelihood * scale; }
-  /// Log of the sum over the weights of its terms.
-  static double log_mean(Value sum, double weights) {
-    return std::log(sum / static_cast<Value>(weights) + vanished);
-  }
-  static double log(Value sum) { return std::log(sum); }
-};
-
-/// Likelihoods of bins, as float64.
-struct BinLikelihoods {
-  using Value = double;
-  static constexpr Value nothing = 0.0;
-  static constexpr bool bounds = false;
-  static constexpr double least = 1e-250;
-
-  static Value of_log(Value nats) { return std::exp(nats); }
-  static Value weight(double weight) { return weight; }
-  static Value factor(double nats) { return std::exp(nats); }
-  static void add(Value& sum, Value weight, Value likelihood) { sum += weight * likelihood; }
-  static void widen(Value& sum, Value likelihood) { sum += likelihood; }
-  static Value scaled(Value likelihood, Value scale) { return likelihood * scale; }
-  static double log_mean(Value sum, double weights) { return std::log(sum / weights); }
-  static double log(Value sum) { return std::log(sum); }
-};
-
-/// Likelihoods of bins by their logs, for those that float64 does not hold.
-struct BinLogs {
-  using Value = double;
-  static constexpr Value nothing = -infinity;
-  static constexpr bool bounds = false;
-  static constexpr double least = -infinity;
-
-  static Value of_log(Value nats) { return nats; }
-  static Value weight(double weight) { return std::log(weight); }
-  static Value factor(double nats) { return nats; }
-  static void add(Value& sum, Value weight, Value log) { sum = log_add(sum, weight + log); }
-  static void widen(Value& sum, Value log) { sum = log_add(sum, log); }
-  static Value scaled(Value log, Value scale) { return log + scale; }
-  static double log_mean(Value sum, double weights) { return sum - std::log(weights); }
-  static double log(Value sum) { return sum; }
-};
-
-/// Blocks [first, end) along each axis.
-struct BlockRange {
-  int x_first = std::numeric_limits<int>::max();
-  int x_end = 0;
-  int y_first = std::numeric_limits<int>::max();
-  int y_end = 0;
-
-  bool empty() const { return x_first >= x_end || y_first >= y_end; }
-  void take_in(const BlockRange& other) {
-    x_first = std::min(x_first, other.x_first);
-    x_end = std::max(x_end, other.x_end);
-    y_first = std::min(y_first, other.y_first);
-    y_end = std::max(y_end, other.y_end);
-  }
-};
 
 int floor_quotient(int value, int by) { return value >= 0 ? value / by : -((by - 1 - value) / by); }
 
@@ -128,205 +41,6 @@ BlockRange blocks_taken(const Tap& tap, const BlockRun& run, const PlaceWeights&
                             floor_quotient(side * (run.y + 1) + moved.y, side) + 1)};
 }
 
-/// A part of one theta's blocks.
-class BlockSet {
- public:
-  explicit BlockSet(const BlockRange& range)
-      : range_(range),
-        width_(range.x_end - range.x_first),
-        in_(static_cast<std::size_t>(width_) * (range.y_end - range.y_first)) {}
-
-  void add(const BlockRange& blocks) {
-    for (int y = blocks.y_first; y < blocks.y_end; ++y) {
-      std::fill(at(blocks.x_first, y), at(blocks.x_first, y) + (blocks.x_end - blocks.x_first), 1);
-    }
-  }
-  /// All blocks within so many of these, as far as this set's range and the axes reach.
-  BlockSet widened(int x_blocks, int y_blocks, int x_count, int y_count) const {
-    BlockSet wide(range_);
-    for (const BlockRun& run : runs(0)) {
-      wide.add({.x_first = std::max({range_.x_first, 0, run.x - x_blocks}),
-                .x_end = std::min({range_.x_end, x_count, run.x + run.count + x_blocks}),
-                .y_first = std::max({range_.y_first, 0, run.y - y_blocks}),
-                .y_end = std::min({range_.y_end, y_count, run.y + 1 + y_blocks})});
-    }
-    return wide;
-  }
-  std::vector<BlockRun> runs(int theta) const {
-    std::vector<BlockRun> runs;
-    for (int y = range_.y_first; y < range_.y_end; ++y) {
-      for (int x = range_.x_first; x < range_.x_end; ++x) {
-        if (*at(x, y) != 0) {
-          append_block(theta, y, x, runs);
-        }
-      }
-    }
-    return runs;
-  }
-
- private:
-  std::vector<std::uint8_t>::const_iterator at(int x, int y) const {
-    return in_.begin() + std::ptrdiff_t{y - range_.y_first} * width_ + (x - range_.x_first);
-  }
-  std::vector<std::uint8_t>::iterator at(int x, int y) {
-    return in_.begin() + std::ptrdiff_t{y - range_.y_first} * width_ + (x - range_.x_first);
-  }
-
-  BlockRange range_;
-  int width_;
-  std::vector<std::uint8_t> in_;  ///< [y, x]
-};
-
-/// An AxisBlur in a domain's numbers.
-template <typename Domain>
-struct BlurIn {
-  explicit BlurIn(const AxisBlur& axis) : reach((axis.reach() + side - 1) / side) {
-    for (const double of : axis.weight) {
-      weight.push_back(Domain::weight(of));
-    }
-    for (const double of : axis.scale) {
-      scale.push_back(Domain::weight(of));
-    }
-  }
-
-  int places() const { return static_cast<int>(scale.size()); }
-  int blocks() const { return (places() + side - 1) / side; }
-
-  int reach;  ///< in blocks
-  std::vector<typename Domain::Value> weight;
-  std::vector<typename Domain::Value> scale;
-};
-
-/// Adds up neighbours by their distance's weight.
-template <typename Domain, typename Value = typename Domain::Value>
-void blur(const Value* from, Value* __restrict to, int count, std::ptrdiff_t stride,
-          const std::vector<Value>& weights) {
-  for (int i = 0; i < count; ++i) {
-    to[i] = Domain::scaled(from[i], weights[0]);
-  }
-  for (std::size_t k = 1; k < weights.size(); ++k) {
-    const Value weight = weights[k];
-    const Value* const below = from - static_cast<std::ptrdiff_t>(k) * stride;
-    const Value* const above = from + static_cast<std::ptrdiff_t>(k) * stride;
-    for (int i = 0; i < count; ++i) {
-      Domain::add(to[i], weight, below[i]);
-      Domain::add(to[i], weight, above[i]);
-    }
-  }
-}
-
-/// One theta's likelihoods, blurred along y and x at the blocks that were asked for.
-template <typename Domain>
-struct Plane {
-  using Value = typename Domain::Value;
-
-  double reference = -infinity;  ///< log of the largest before the blur, in nats
-  std::ptrdiff_t pitch = 0;
-  int x = 0;  ///< of the first place
-  int y = 0;
-  int height = 0;
-  std::vector<Value> blurred;  ///< [y, x] relative to the reference; nothing outside the region
-  /// Of tiles the largest of a place, the next one along x, and those above both; of bins the sum
-  /// of a place and its eight neighbours.
-  std::vector<Value> wide;
-
-  PlaceRows<Value> rows(std::vector<Value>& values) const { return {values.data(), pitch, x, y}; }
-};
-
-template <typename Domain>
-std::vector<typename Domain::Value> widened(const std::vector<typename Domain::Value>& from,
-                                            std::ptrdiff_t stride) {
-  std::vector<typename Domain::Value> wide = from;
-  const auto size = static_cast<std::ptrdiff_t>(from.size());
-  const auto take = [&](std::ptrdiff_t distance) {
-    const std::ptrdiff_t first = std::max<std::ptrdiff_t>(0, -distance);
-    const std::ptrdiff_t end = std::min(size, size - distance);
-    for (std::ptrdiff_t i = first; i < end; ++i) {
-      Domain::widen(wide[i], from[i + distance]);
-    }
-  };
-  take(stride);
-  if (!Domain::bounds) {
-    take(-stride);
-  }
-  return wide;
-}
-
-/// @param range around the asked blocks
-template <typename Domain>
-Plane<Domain> blurred_plane(int theta, const BlockRange& range, std::span<const BlockRange> asked,
-                            const BlurIn<Domain>& blur_x, const BlurIn<Domain>& blur_y, bool wide,
-                            const PlaceSource<typename Domain::Value>& source) {
-  using Value = typename Domain::Value;
-  // A block more on every side, since taps lie between places.
-  const int x_margin = std::max(1, blur_x.reach);
-  const int y_margin = std::max(1, blur_y.reach);
-  const BlockRange window{range.x_first - x_margin, range.x_end + x_margin,
-                          range.y_first - y_margin, range.y_end + y_margin};
-  BlockSet wanted(window);
-  for (const BlockRange& blocks : asked) {
-    wanted.add(blocks);
-  }
-  const BlockSet along_x = wanted.widened(blur_x.reach, 0, blur_x.blocks(), blur_y.blocks());
-  const std::vector<BlockRun> sources =
-      along_x.widened(0, blur_y.reach, blur_x.blocks(), blur_y.blocks()).runs(theta);
-
-  Plane<Domain> plane{.pitch = side * (window.x_end - window.x_first),
-                      .x = side * window.x_first,
-                      .y = side * window.y_first,
-                      .height = side * (window.y_end - window.y_first)};
-  std::vector<Value> likelihood(static_cast<std::size_t>(plane.pitch * plane.height),
-                                Domain::nothing);
-  const PlaceRows<Value> rows = plane.rows(likelihood);
-  const auto for_rows = [](std::span<const BlockRun> runs, const auto& visit) {
-    for (const BlockRun& run : runs) {
-      for (int y = side * run.y; y < side * (run.y + 1); ++y) {
-        visit(side * run.x, y, side * run.count);
-      }
-    }
-  };
-  constexpr auto no_bin = static_cast<Value>(-infinity);
-  for_rows(sources, [&](int x, int y, int count) { std::fill_n(rows.at(x, y), count, no_bin); });
-  source(sources, rows);
-  Value largest = no_bin;
-  for_rows(sources, [&](int x, int y, int count) {
-    largest = std::max(largest, *std::max_element(rows.at(x, y), rows.at(x, y) + count));
-  });
-  plane.reference = largest;
-  for_rows(sources, [&](int x, int y, int count) {
-    Value* const row = rows.at(x, y);
-    for (int i = 0; i < count; ++i) {
-      row[i] = row[i] == no_bin ? Domain::nothing : Domain::of_log(row[i] - largest);
-    }
-  });
-
-  std::vector<Value> along_y(likelihood.size(), Domain::nothing);
-  const PlaceRows<Value> middle = plane.rows(along_y);
-  for_rows(along_x.runs(theta), [&](int x, int y, int count) {
-    if (y < blur_y.places()) {
-      Value* const row = middle.at(x, y);
-      blur<Domain>(rows.at(x, y), row, count, plane.pitch, blur_y.weight);
-      for (int i = 0; i < count; ++i) {
-        row[i] = Domain::scaled(row[i], blur_y.scale[y]);
-      }
-    }
-  });
-  plane.blurred.assign(likelihood.size(), Domain::nothing);
-  const PlaceRows<Value> result = plane.rows(plane.blurred);
-  for_rows(wanted.runs(theta), [&](int x, int y, int count) {
-    Value* const row = result.at(x, y);
-    const int inside = std::min(count, blur_x.places() - x);
-    blur<Domain>(middle.at(x, y), row, inside, 1, blur_x.weight);
-    for (int i = 0; i < inside; ++i) {
-      row[i] = Domain::scaled(row[i], blur_x.scale[x + i]);
-    }
-  });
-  if (wide) {
-    plane.wide = widened<Domain>(widened<Domain>(plane.blurred, 1), plane.pitch);
-  }
-  return plane;
-}
-
 /// The least part of a tap's bilinear weights that lies inside the region, for any bin of a place.
 double weight_inside(int place, int bins, const Axis& axis, int moved, double fraction) {
   const auto inside = [&](int at) { return at >= 0 && at < axis.count; };
@@ -344,7 +58,7 @@ class TapSum {
  public:
   using Value = typename Domain::Value;
 
-  TapSum(std::span<const Tap> taps, const std::vector<Plane<Domain>>& planes,
+  TapSum(std::span<const Tap> taps, const std::vector<BlurredPlane<Domain>>& planes,
          const PlaceWeights& weights, double fraction_error)
       : taps_(taps), planes_(planes), weights_(weights), fraction_error_(fraction_error) {
     for (const Tap& tap : taps) {
@@ -364,7 +78,7 @@ class TapSum {
     const int bins = weights_.bins;
     for (const Tap& tap : taps_) {
       add_weights_inside(tap, run);
-      const Plane<Domain>& plane = planes_[tap.theta];
+      const BlurredPlane<Domain>& plane = planes_[tap.theta];
       if (plane.reference == -infinity) {
         continue;
       }
@@ -390,7 +104,7 @@ class TapSum {
 
  private:
   /// Adds values that lie `moved` away, as far as they lie behind `first` in the region.
-  void add(const Plane<Domain>& plane, const std::vector<Value>& values, const BlockRun& run,
+  void add(const BlurredPlane<Domain>& plane, const std::vector<Value>& values, const BlockRun& run,
            const glm::ivec2& moved, double weight, int first, std::vector<Value>& sums) const {
     if (weight == 0.0) {
       return;
@@ -470,7 +184,7 @@ class TapSum {
   }
 
   std::span<const Tap> taps_;
-  const std::vector<Plane<Domain>>& planes_;  ///< [theta]
+  const std::vector<BlurredPlane<Domain>>& planes_;  ///< [theta]
   const PlaceWeights& weights_;
   double fraction_error_;
   double reference_ = -infinity;  ///< of the sums, in nats
@@ -515,7 +229,7 @@ bool average(const PlaceWeights& weights, const glm::dvec2& sensor_from_pivot_mm
   }
   means.log_mean.resize(places);
   means.error.resize(places);
-  std::vector<Plane<Domain>> planes(thetas);
+  std::vector<BlurredPlane<Domain>> planes(thetas);
   const BlurIn<Domain> blur_x(weights.x);
   const BlurIn<Domain> blur_y(weights.y);
   parallel_for(thetas, [&](std::size_t theta) {
@@ -549,15 +263,6 @@ double terms_of(const PlaceWeights& weights) {
 }
 
 }  // namespace
-
-void append_block(int theta, int y, int x, std::vector<BlockRun>& runs) {
-  if (!runs.empty() && runs.back().theta == theta && runs.back().y == y &&
-      runs.back().x + runs.back().count == x) {
-    ++runs.back().count;
-  } else {
-    runs.push_back({theta, y, x, 1});
-  }
-}
 
 DisplacementMean::DisplacementMean(const DisplacementWeights& weights, int bins)
     : weights_{weights, bins, AxisBlur(weights.lattice().x_mm, weights.sd().mm, bins),

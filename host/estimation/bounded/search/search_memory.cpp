@@ -115,6 +115,10 @@ SearchMemory search_memory(std::span<const Hypothesis> hypotheses, const Bounded
   memory.leaves =
       bytes_per_bin * std::min(static_cast<double>(largest_batch) + memory.largest_family,
                                bins_in_all(hypotheses, lattice));
+  if (!options.touch_sd.none()) {
+    // Every plane's mean, and its neighbours' sums.
+    memory.means = 2.0 * sizeof(double) * bins_in_all(hypotheses.first(1), lattice);
+  }
   return memory;
 }
 
@@ -141,11 +145,12 @@ std::string why_no_room(std::span<const Hypothesis> hypotheses, const BoundedOpt
     double bytes;
     const char* remedy;
   };
-  const std::array<Part, 4> parts{
+  const std::array<Part, 5> parts{
       {{memory.tables, "use fewer maps, maps of fewer cells, or a narrower region"},
        {memory.tiles + memory.still, "use fewer thetas or maps, or narrow the region"},
        {memory.thetas, "use fewer thetas or maps"},
-       {memory.leaves, "use fewer bins along x and y"}}};
+       {memory.leaves, "use fewer bins along x and y"},
+       {memory.means, "use fewer bins"}}};
   const Part& largest = *std::max_element(
       parts.begin(), parts.end(), [](const Part& a, const Part& b) { return a.bytes < b.bytes; });
   constexpr double mib = 1 << 20;
