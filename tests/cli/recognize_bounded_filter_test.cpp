@@ -81,7 +81,7 @@ void expect_lawful(const json& step) {
 
 TEST_F(BoundedFilter, AgreesWithTheHistogram) {
   for (const Arguments& flags :
-       {Arguments{"--trace"}, Arguments{"--trace", "--touch-sd-mm=2", "--touch-sd-deg=12"}}) {
+       {Arguments{"--trace"}, Arguments{"--trace", "--touch-sd-mm=3", "--touch-sd-deg=12"}}) {
     SCOPED_TRACE(flags.size());
     Arguments densely = flags;
     densely.insert(densely.end(), {"--filter", "histogram"});
