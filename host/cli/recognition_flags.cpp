@@ -67,7 +67,7 @@ void add_uncertainty_flags(CLI::App& command, Request& request) {
   command.add_option("--touch-sd-mm", request.touch_sd_mm,
                      "The robot's repeatability: standard deviation of the sensor's true position "
                      "about the reported one, along x and along y, mm. Independent from touch to "
-                     "touch [default: the sensor model's, with the histogram; else 0, exact]");
+                     "touch [default: the sensor model's, but not with particles; else 0, exact]");
   command.add_option("--touch-sd-deg", request.touch_sd_deg,
                      "The same of the sensor's angle, degrees [default: as for --touch-sd-mm]");
   command.add_option("--slip-sd-mm", request.slip_sd_mm,

@@ -259,8 +259,8 @@ RecognitionTask resolve(const Request& request, const Circumstances& of) {
   add_mirror_images(hypotheses);
   if (sensor) {
     apply(*sensor, hypotheses, contact);
-    const bool exact = wish.kind == FilterKind::bounded || wish.kind == FilterKind::particles;
-    histogram.touch_sd = exact ? DisplacementSd{} : sensor->touch_sd;
+    // Particles take touches to be exact.
+    histogram.touch_sd = wish.kind == FilterKind::particles ? DisplacementSd{} : sensor->touch_sd;
   }
   contact.classifier = classifier;
   contact.gamma = gamma;
