@@ -13,13 +13,11 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/commands.hpp"
-#include "cli/detector_flags.hpp"
-#include "cli/engine_words.hpp"
 #include "cli/interruption.hpp"
 #include "cli/live_record.hpp"
 #include "cli/live_screen.hpp"
 #include "cli/options.hpp"
-#include "cli/planned_touch.hpp"
+#include "cli/step_words.hpp"
 #include "cli/recognition_flags.hpp"
 #include "cli/sensor_option.hpp"
 #include "io/command_files.hpp"

@@ -15,9 +15,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.hpp"
-#include "cli/engine_words.hpp"
 #include "cli/options.hpp"
-#include "cli/planned_touch.hpp"
 #include "cli/recognition_flags.hpp"
 #include "cli/record_table.hpp"
 #include "cli/sheet.hpp"

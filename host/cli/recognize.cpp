@@ -15,7 +15,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.hpp"
-#include "cli/engine_words.hpp"
+#include "cli/step_words.hpp"
 #include "cli/options.hpp"
 #include "cli/progress.hpp"
 #include "cli/recognition_flags.hpp"

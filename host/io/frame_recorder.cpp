@@ -19,7 +19,7 @@
 #include "io/recording_rules.hpp"
 #include "io/recording_state.hpp"
 #include "model/log_message.hpp"
-#include "model/lost_count.hpp"
+#include "model/stream_time.hpp"
 #include "model/printable.hpp"
 #include "palpate/error.hpp"
 

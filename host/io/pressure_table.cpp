@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "io/available_memory.hpp"
-#include "model/lost_count.hpp"
+#include "model/stream_time.hpp"
 #include "model/number_text.hpp"
 #include "model/printable.hpp"
 #include "palpate/pose.hpp"

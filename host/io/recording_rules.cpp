@@ -5,7 +5,7 @@
 #include <fmt/format.h>
 
 #include "io/input_file.hpp"
-#include "model/lost_count.hpp"
+#include "model/stream_time.hpp"
 #include "model/printable.hpp"
 
 namespace palpate {

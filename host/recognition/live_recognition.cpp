@@ -5,7 +5,7 @@
 #include <limits>
 #include <utility>
 
-#include "model/lost_count.hpp"
+#include "model/stream_time.hpp"
 #include "palpate/baseline.hpp"
 #include "palpate/pose_track.hpp"
 

@@ -14,7 +14,7 @@
 #include "palpate/error.hpp"
 #include "palpate/pose_track.hpp"
 #include "streaming/line_reader.hpp"
-#include "streaming/pose_line.hpp"
+#include "streaming/frame_line.hpp"
 
 namespace palpate {
 

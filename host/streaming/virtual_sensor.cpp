@@ -16,7 +16,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "model/lost_count.hpp"
 #include "model/stream_time.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"

@@ -21,7 +21,6 @@
 #include "model/option_words.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
-#include "recognition/map_files.hpp"
 #include "recognition/option_text.hpp"
 #include "recognition/recordings.hpp"
 #include "recognition/refused_option.hpp"

@@ -16,7 +16,7 @@
 #include <thread>
 #include <utility>
 
-#include "cli/engine_words.hpp"
+#include "cli/step_words.hpp"
 #include "cli/options.hpp"
 #include "cli/recognition_flags.hpp"
 #include "io/input_file.hpp"
