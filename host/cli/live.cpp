@@ -1,6 +1,5 @@
 #include <unistd.h>
 
-#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <functional>
@@ -128,9 +127,7 @@ void live(const LiveArguments& options) {
   CommandFiles files;
   add_sensor_files(options, files);
   add_recognition_files(request, files);
-  if (!options.json.empty()) {
-    files.writes("--json", options.json, CommandFiles::Dash::stream);
-  }
+  files.writes("--json", options.json, CommandFiles::Dash::stream);
   files.require_distinct();
   Device& device = device_in_waiting();
   Recogniser recogniser = open_telling(device, task);

@@ -3,7 +3,6 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <CLI/CLI.hpp>
 
 #include "cli/options.hpp"
 #include "io/input_file.hpp"
@@ -143,9 +142,7 @@ void add_sensor_files(const SensorArguments& arguments, CommandFiles& files) {
                  is_virtual_sensor(name) ? virtual_sensor_file(name) : board_file(name)) {
     files.reads("--sensor", *file);
   }
-  if (!arguments.poses.empty()) {
-    files.reads("--poses", arguments.poses, CommandFiles::Dash::stream);
-  }
+  files.reads("--poses", arguments.poses, CommandFiles::Dash::stream);
 }
 
 void report_refused(const OpenSensor& opened) {

@@ -3,7 +3,6 @@
 #include <cmath>
 #include <cstdlib>
 #include <initializer_list>
-#include <numbers>
 #include <optional>
 #include <span>
 #include <string>

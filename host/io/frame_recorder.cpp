@@ -10,7 +10,6 @@
 #include <string>
 #include <string_view>
 #include <utility>
-#include <vector>
 
 #include "io/descriptor.hpp"
 #include "io/file_format.hpp"

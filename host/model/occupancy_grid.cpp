@@ -10,7 +10,6 @@
 
 #include "palpate/estimate.hpp"
 #include "palpate/object_frame.hpp"
-#include "palpate/pose.hpp"
 #include "palpate/pose_error.hpp"
 
 namespace palpate {

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <set>
 #include <utility>
-#include <vector>
 
 #include "palpate/occupancy_grid.hpp"
 

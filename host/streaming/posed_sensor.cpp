@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <bitset>
 #include <chrono>
-#include <cmath>
 #include <cstdint>
 #include <deque>
 #include <string>

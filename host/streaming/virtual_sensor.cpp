@@ -7,9 +7,7 @@
 #include <limits>
 #include <map>
 #include <numbers>
-#include <optional>
 #include <span>
-#include <string>
 #include <utility>
 #include <vector>
 
@@ -19,7 +17,6 @@
 #include "model/stream_time.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
-#include "palpate/sensor.hpp"
 #include "palpate/simulation.hpp"
 #include "palpate/touch.hpp"
 #include "streaming/pace.hpp"

@@ -3,11 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <initializer_list>
-#include <memory>
-#include <string>
 #include <string_view>
-#include <utility>
-#include <variant>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

@@ -7,7 +7,6 @@
 #include <chrono>
 #include <climits>
 #include <condition_variable>
-#include <cstddef>
 #include <deque>
 #include <exception>
 #include <map>
@@ -20,7 +19,6 @@
 #include "cli/options.hpp"
 #include "cli/recognition_flags.hpp"
 #include "io/input_file.hpp"
-#include "palpate/error.hpp"
 #include "recognition/batch/batch_resolution.hpp"
 #include "recognition/record_json.hpp"
 #include "recognition/resolve.hpp"
