@@ -6,7 +6,6 @@
 
 #include <fmt/format.h>
 
-
 namespace palpate::bench {
 
 void Answers::note(const Estimate& estimate) {

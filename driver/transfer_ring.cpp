@@ -5,7 +5,6 @@
 #include <new>
 #include <utility>
 
-
 namespace palpate {
 
 namespace {

@@ -12,8 +12,8 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/commands.hpp"
-#include "cli/sensor_option.hpp"
 #include "cli/options.hpp"
+#include "cli/sensor_option.hpp"
 #include "io/command_files.hpp"
 #include "io/recording_state.hpp"
 #include "model/elements_that.hpp"

@@ -18,8 +18,8 @@
 #include "io/recording_rules.hpp"
 #include "io/recording_state.hpp"
 #include "model/log_message.hpp"
-#include "model/stream_time.hpp"
 #include "model/printable.hpp"
+#include "model/stream_time.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {

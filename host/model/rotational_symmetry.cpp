@@ -9,7 +9,6 @@
 
 #include <glm/vec2.hpp>
 
-
 namespace palpate {
 
 namespace {

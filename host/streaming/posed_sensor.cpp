@@ -12,8 +12,8 @@
 
 #include "palpate/error.hpp"
 #include "palpate/pose_track.hpp"
-#include "streaming/line_reader.hpp"
 #include "streaming/frame_line.hpp"
+#include "streaming/line_reader.hpp"
 
 namespace palpate {
 

@@ -15,9 +15,9 @@
 #include <thread>
 #include <utility>
 
-#include "cli/step_words.hpp"
 #include "cli/options.hpp"
 #include "cli/recognition_flags.hpp"
+#include "cli/step_words.hpp"
 #include "io/input_file.hpp"
 #include "recognition/batch/batch_resolution.hpp"
 #include "recognition/record_json.hpp"
