@@ -95,6 +95,7 @@ void describe(Keys& keys, LearnedSensor& sensor) {
   keys("bins", sensor.bins);
   keys("familiarity", sensor.familiarity);
   keys("fit_scale", sensor.fit_scale);
+  keys("place_sd_mm", sensor.place_sd_mm);
   keys("features", sensor.features);
   keys("table", sensor.table);
 }

@@ -7,6 +7,8 @@
 
 #include <fmt/format.h>
 
+#include "estimation/lattice/refinement.hpp"
+#include "model/body_spread.hpp"
 #include "palpate/error.hpp"
 #include "palpate/object_frame.hpp"
 #include "palpate/pose_error.hpp"
@@ -224,6 +226,10 @@ RecognitionStep take_step(Recogniser& recogniser, const RecognitionTask& task,
   step.seconds = seconds;
   const Clock::time_point estimated = Clock::now();
   step.refined = recogniser.refine(step.mode);
+  if (step.refined) {
+    step.refined = displaced(displaced_body(task.hypotheses[step.mode.object].map), *step.refined,
+                             task.place_sd_mm);
+  }
   step.refine_seconds = seconds_since(estimated);
   step.symmetry = symmetry_told(recogniser, task, step);
   measure_errors(task, step);

@@ -1,5 +1,6 @@
 #include "recognition/resolve.hpp"
 
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <set>
@@ -209,6 +210,19 @@ FitScale left_out_scale(const RecognitionTask& task) {
   return scales.empty() || !resolves(task.lattice(), task.hypotheses) ? FitScale{} : pooled(scales);
 }
 
+/// The root mean square of the maps that know theirs.
+double place_sd_mm(const RecognitionTask& task) {
+  double squares = 0.0;
+  int known = 0;
+  for (const Hypothesis& hypothesis : task.hypotheses) {
+    if (const auto& source = hypothesis.map.source; source && source->place_sd_mm) {
+      squares += *source->place_sd_mm * *source->place_sd_mm;
+      ++known;
+    }
+  }
+  return known > 0 ? std::sqrt(squares / known) : 0.0;
+}
+
 PoseLattice with_counts(PoseLattice lattice, const std::array<int, 3>& counts) {
   lattice.x_mm.count = counts[0];
   lattice.y_mm.count = counts[1];
@@ -282,6 +296,7 @@ RecognitionTask resolve(const Request& request, const Circumstances& of) {
   } else {
     task.fit_scale = left_out_scale(task);
   }
+  task.place_sd_mm = sensor && sensor->table ? sensor->place_sd_mm.value_or(0.0) : place_sd_mm(task);
   task.bin_width = bin_width;
   task.auto_filter = filter.automatic;
   task.filter_asked_for_by = filter.asked_for_by;

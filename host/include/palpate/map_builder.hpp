@@ -74,6 +74,9 @@ struct MapSource {
   /// What the z of single touches is like by Eq. 7 with gamma 0.1, each at its pose on a map of the
   /// others: mean and sd alone. None where too few touches tell.
   std::optional<FitScale> left_out = {};
+  /// How far the place of an object that the map finds is off, for all touches alike: along each
+  /// axis of its motion, mm. By maps of a part of the touches; none where too few touches tell.
+  std::optional<double> place_sd_mm = {};
 };
 
 /// Returns the map as its `source` makes it with another prior, and what its touches are like where
