@@ -254,7 +254,7 @@ LearnedSensor with_confidence(LearnedSensor sensor, const CrossValidation& valid
     sensor.features->weight = fit.feature_weight;
   }
   sensor.fit_scale = fit_scale_of(validation.fit_z);
-  sensor.place_sd_mm = place_sd_of(validation.place_errors);
+  sensor.pose_scale = pose_scale_of(validation.place_errors);
   const FamiliarityScores scores = all_of(validation.familiarity);
   if (!scores.known.empty()) {
     sensor.familiarity = fit_familiarity(scores);

@@ -35,20 +35,22 @@ double spread_mm(const Body& body, const ObjectPose& pose) {
   return std::sqrt(std::max(0.0, covariance[0][0] + covariance[1][1] + covariance[2][2]));
 }
 
-ObjectPose displaced(const Body& body, ObjectPose pose, double sd_mm) {
+ObjectPose scaled(const Body& body, ObjectPose pose, const PoseScale& scale) {
+  const double sd_mm = scale.map_sd_mm;
   const double turn_rad = sd_mm / spin_mm(body);
   // The centroid rests, so the frame's origin moves.
   const glm::dvec3 turn(-turn_rad * arm_mm(body, pose), turn_rad);
   for (int i = 0; i < 9; ++i) {
-    pose.covariance[i] += turn[i / 3] * turn[i % 3] + (i == 0 || i == 4 ? sd_mm * sd_mm : 0.0);
+    pose.covariance[i] = scale.factor * pose.covariance[i] + turn[i / 3] * turn[i % 3] +
+                         (i == 0 || i == 4 ? sd_mm * sd_mm : 0.0);
   }
   return pose;
 }
 
-RefinedPose displaced(const Body& body, const RefinedPose& pose, double sd_mm) {
-  const ObjectPose moved = displaced(body, inverse(pose), sd_mm);
-  const ObjectPose back = inverse(RefinedPose{moved.T_robot_object, moved.covariance});
-  return {pose.T_object_robot, back.covariance};
+RefinedPose scaled(const Body& body, const RefinedPose& pose, const PoseScale& scale) {
+  const ObjectPose of_robot = scaled(body, inverse(pose), scale);
+  return {pose.T_object_robot,
+          inverse(RefinedPose{of_robot.T_robot_object, of_robot.covariance}).covariance};
 }
 
 }  // namespace palpate

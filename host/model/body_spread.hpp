@@ -13,10 +13,8 @@ glm::dmat3 motion_covariance(const Body& body, const ObjectPose& pose);
 /// Root mean square displacement of the body by the pose's deviations, mm.
 double spread_mm(const Body& body, const ObjectPose& pose);
 
-/// The pose of a body whose place is uncertain besides: by `sd_mm` along each axis, and by a turn
-/// about its centroid that moves it as far.
-ObjectPose displaced(const Body& body, ObjectPose pose, double sd_mm);
-/// As above, of T_object_robot.
-RefinedPose displaced(const Body& body, const RefinedPose& pose, double sd_mm);
+/// The pose with the covariance that the scale makes of it.
+ObjectPose scaled(const Body& body, ObjectPose pose, const PoseScale& scale);
+RefinedPose scaled(const Body& body, const RefinedPose& pose, const PoseScale& scale);
 
 }  // namespace palpate

@@ -41,7 +41,7 @@ BinnedObject binned(const PoseLattice& lattice, const RecognitionTask& task,
 }
 
 /// The mode's mean and covariance: those of the refined pose there where the mode is narrow, as the
-/// bins are too wide to tell them, and with the place of the map.
+/// bins are too wide to tell them; on the task's scale.
 ObjectPose between_bins(const Recogniser& recogniser, const RecognitionTask& task,
                         const BeliefMode& mode, const BinnedObject& of) {
   constexpr double narrow_mm = 1.0;
@@ -54,7 +54,7 @@ ObjectPose between_bins(const Recogniser& recogniser, const RecognitionTask& tas
           wrap_angle(pose.T_robot_object.theta_rad, 2.0 * std::numbers::pi);
     }
   }
-  return displaced(of.body, pose, task.place_sd_mm);
+  return scaled(of.body, pose, task.pose_scale);
 }
 
 std::string percent(double probability) {

@@ -68,8 +68,7 @@ struct RecognitionTask {
   std::optional<LearnedFeatures> features = {};
   std::optional<Familiarity> familiarity = {};
   FitScale fit_scale = {};                  ///< of RecognitionStep::fit
-  /// How far the maps' places are off, for all touches alike; see MapSource::place_sd_mm.
-  double place_sd_mm = 0.0;
+  PoseScale pose_scale = {};                ///< of RecognitionStep::refined and of modes
   ActWhere act = {};                        ///< for RecognitionStep::decision
   std::function<void()> cancel_point = {};  ///< BoundedOptions::cancel_point, where bounds search
   std::vector<std::string> remarks = {};    ///< sentences for the user, once the filter is open

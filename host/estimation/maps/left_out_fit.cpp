@@ -1,6 +1,7 @@
 #include "estimation/maps/left_out_fit.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -53,26 +54,27 @@ std::optional<FitScale> scale_of(std::span<const double> z) {
 
 std::vector<PlaceError> place_errors(std::span<const TouchEvidence> touches, const Hypothesis& of,
                                      const ContactModel& contact, std::size_t object) {
-  constexpr std::size_t in_group = 9;
-  constexpr std::size_t most_groups = 8;
+  constexpr std::array<std::size_t, 3> in_group{3, 9, 27};
+  constexpr std::size_t most_groups = 6;
+  constexpr double another_peak_mm = 1.5;
+  constexpr double wide_mm = 0.8;
   const Body body = displaced_body(of.map);
   const InterpolatedMap map(of.compared(), *contact.prior);
   const PoseLattice lattice = lattice_about(body);
-  const std::size_t groups = touches.size() / in_group;
   std::vector<PlaceError> errors;
-  for (std::size_t group = 0; group < std::min(groups, most_groups); ++group) {
+  const auto add_group = [&](std::size_t first, std::size_t every, std::size_t count) {
     const auto log_likelihood = [&](std::span<const BinBox> boxes) {
       std::vector<double> logs;
       for (const BinBox& box : boxes) {
         for (std::int64_t i = 0; i < box.bins(); ++i) {
           const Pose T_object_robot = lattice.T_object_robot(box.bin(i, lattice));
           double& sum = logs.emplace_back(0.0);
-          // Neighbours of a scan are in groups of their own.
-          for (std::size_t k = group; k < touches.size(); k += groups) {
-            const Pose T_object_sensor = T_object_robot * touches[k].T_robot_sensor;
-            for (std::size_t e = 0; e < touches[k].readings.size(); ++e) {
-              const glm::dvec2 at_mm = T_object_sensor * touches[k].elements_mm[e];
-              sum += contact.log_likelihood(touches[k].readings[e], {map.log_odds(at_mm)}, object);
+          for (std::size_t k = 0; k < count; ++k) {
+            const TouchEvidence& touch = touches[first + k * every];
+            const Pose T_object_sensor = T_object_robot * touch.T_robot_sensor;
+            for (std::size_t e = 0; e < touch.readings.size(); ++e) {
+              const glm::dvec2 at_mm = T_object_sensor * touch.elements_mm[e];
+              sum += contact.log_likelihood(touch.readings[e], {map.log_odds(at_mm)}, object);
             }
           }
         }
@@ -84,34 +86,43 @@ std::vector<PlaceError> place_errors(std::span<const TouchEvidence> touches, con
     const Pose& at = found.T_robot_object;
     const glm::dvec3 moved_mm(at * body.centroid_mm - body.centroid_mm,
                               at.theta_rad * std::sqrt(body.inertia_mm2));
-    constexpr double another_peak_mm = 1.5;
-    if (glm::length(moved_mm) < another_peak_mm) {
+    if (glm::length(moved_mm) < another_peak_mm && spread_mm(body, found) < wide_mm) {
       errors.push_back({moved_mm, motion_covariance(body, found)});
+    }
+  };
+  for (const std::size_t count : in_group) {
+    // Neighbours of a scan are in groups of their own.
+    const std::size_t groups = touches.size() / count;
+    for (std::size_t group = 0; group < std::min(groups, most_groups); ++group) {
+      add_group(group, groups, count);
     }
   }
   return errors;
 }
 
-std::optional<double> place_sd_of(std::span<const PlaceError> errors) {
-  constexpr std::size_t enough_errors = 8;
-  constexpr int halvings = 30;
+std::optional<PoseScale> pose_scale_of(std::span<const PlaceError> errors) {
+  constexpr std::size_t enough_errors = 16;
+  constexpr double most_factor = 4.0;
+  constexpr double most_mm = 0.3;
   if (errors.size() < enough_errors) {
     return {};
   }
-  const auto too_far = [&](double variance) {
-    double squared = 0.0;
-    for (const auto& [moved_mm, covariance] : errors) {
-      squared += glm::dot(moved_mm, glm::inverse(covariance + glm::dmat3(variance)) * moved_mm);
+  std::optional<PoseScale> best;
+  double least_cost = 0.0;
+  for (double factor = most_factor / 64.0; factor <= most_factor; factor *= 1.1) {
+    for (double sd_mm = 0.0; sd_mm <= most_mm; sd_mm += 0.01) {
+      double cost = 0.0;
+      for (const auto& [moved_mm, covariance] : errors) {
+        const glm::dmat3 all = factor * covariance + glm::dmat3(sd_mm * sd_mm);
+        cost += std::log(glm::determinant(all)) + glm::dot(moved_mm, glm::inverse(all) * moved_mm);
+      }
+      if (!best || cost < least_cost) {
+        best = {factor, sd_mm};
+        least_cost = cost;
+      }
     }
-    return squared > 3.0 * static_cast<double>(errors.size());
-  };
-  double low = 0.0;
-  double high = 1.0;
-  for (int i = 0; i < halvings && too_far(0.0); ++i) {
-    const double middle = 0.5 * (low + high);
-    (too_far(middle) ? low : high) = middle;
   }
-  return std::sqrt(low);
+  return best;
 }
 
 void judge_left_out(Device& device, MapSource& source) {
@@ -121,7 +132,7 @@ void judge_left_out(Device& device, MapSource& source) {
                              .prior = source.options.sensor.prior};
   const std::vector<TouchEvidence> evidence = evidence_of(touches, contact);
   source.left_out.reset();
-  source.place_sd_mm.reset();
+  source.pose_scale.reset();
   if (std::cmp_less(std::ranges::count_if(evidence, &TouchEvidence::in_contact), least)) {
     return;
   }
@@ -153,7 +164,7 @@ void judge_left_out(Device& device, MapSource& source) {
     std::ranges::move(place_errors(judged, of, contact, 0), std::back_inserter(errors));
   }
   source.left_out = scale_of(z);
-  source.place_sd_mm = place_sd_of(errors);
+  source.pose_scale = pose_scale_of(errors);
 }
 
 }  // namespace palpate

@@ -24,19 +24,18 @@ struct PlaceError {
   glm::dvec3 moved_mm{0.0};
   glm::dmat3 covariance{0.0};
 };
-/// The errors of groups of about nine touches, at most eight groups; those that lie more than 1.5 mm
-/// away, at another peak, are left out.
+/// The errors of groups of 3, 9 and 27 touches, at most six groups of each. Left out are
+/// groups that lie more than 1.5 mm away, at another peak, and those of a belief 0.8 mm wide.
 /// @param touches T_robot_sensor is of the sensor in the object frame
 /// @param contact with a prior, by which the touches are classified
 /// @param object index of the object whose numbers of a table are used
 std::vector<PlaceError> place_errors(std::span<const TouchEvidence> touches, const Hypothesis& of,
                                      const ContactModel& contact, std::size_t object);
-/// MapSource::place_sd_mm: the deviation along each axis that the errors have beside their own
-/// covariance, so that the squared error over the covariance is 3 in the mean; 0 where it is less
-/// without. None of fewer than 8 errors.
-std::optional<double> place_sd_of(std::span<const PlaceError> errors);
+/// The scale by which the errors are likeliest, as normal ones: what of them falls as touches add up
+/// is the factor's, what remains the map's. None of fewer than 16 errors.
+std::optional<PoseScale> pose_scale_of(std::span<const PlaceError> errors);
 
-/// Sets MapSource::left_out and place_sd_mm. Builds maps of random three quarters of the touches,
+/// Sets MapSource::left_out and pose_scale. Builds maps of random three quarters of the touches,
 /// and judges the others at their poses, until about 200 are judged, or each touch once. Both are
 /// none where fewer than 16 touches are in contact.
 /// @throws Error as MapBuilder does

@@ -123,7 +123,7 @@ struct PALPATE_API LearnedSensor {
   std::optional<LearnedFeatures> features;
   std::optional<Familiarity> familiarity;
   std::optional<FitScale> fit_scale;  ///< of the z of Fit; without one, z stays as it is
-  std::optional<double> place_sd_mm;  ///< MapSource::place_sd_mm, by the table
+  std::optional<PoseScale> pose_scale;  ///< of the table
 
   /// Throws Error on a value out of range.
   void validate() const;
