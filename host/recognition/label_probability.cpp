@@ -61,10 +61,10 @@ std::vector<double> label_log_evidence(const Estimate& estimate, const Recogniti
 }
 
 double misfit_nats(const Fit& fit, std::size_t touches) {
-  // Fits of learned objects on their scale: one in a hundred has a wider spread. A stranger's fit
-  // spreads the more, the more touches have to share a pose.
-  constexpr double odd_share = 0.01;
-  constexpr double odd_sd = 3.0;
+  // Fits of learned objects on their scale: one in ten has a wider spread. A stranger's fit spreads
+  // the more, the more touches have to share a pose.
+  constexpr double odd_share = 0.1;
+  constexpr double odd_sd = 5.0;
   constexpr double stranger_sd = 4.0;  // for every touch after the first
   const auto normal = [&](double sd) { return std::exp(-0.5 * fit.z * fit.z / (sd * sd)) / sd; };
   constexpr double farthest = 30.0;  // no density is 0

@@ -57,6 +57,7 @@ TEST_F(RecognizeRecord, HasTheDocumentedKeysAndTypes) {
                                                   "mode",
                                                   "mode_certain",
                                                   "modes",
+                                                  "none",
                                                   "recording",
                                                   "refined",
                                                   "refined_error_mm",
@@ -69,9 +70,10 @@ TEST_F(RecognizeRecord, HasTheDocumentedKeysAndTypes) {
   EXPECT_EQ(r["touches"], 6);
   EXPECT_TRUE(r["touches"].is_number_integer());
   EXPECT_EQ(r["best"], "A");
-  EXPECT_EQ(keys_of(r["identity"]), (std::vector<std::string>{"A", "I"}));
-  EXPECT_NEAR(r["identity"]["A"].get<double>() + r["identity"]["I"].get<double>(), 1.0,
-              1e-12);  // rounding of two doubles
+  EXPECT_EQ(keys_of(r["identity"]), (std::vector<std::string>{"(none)", "A", "I"}));
+  EXPECT_NEAR(r["identity"]["A"].get<double>() + r["identity"]["I"].get<double>() +
+                  r["none"].get<double>(),
+              1.0, 1e-12);  // rounding of three doubles
   const json& mode = r["mode"];
   EXPECT_EQ(keys_of(mode), (std::vector<std::string>{"log_likelihood", "map", "object", "theta_rad",
                                                      "x_mm", "y_mm"}));
