@@ -106,7 +106,7 @@ BoundedBelief::BoundedBelief(std::span<const Hypothesis> hypotheses, const Bound
       space_(arena_.execute([&] { return SearchSpace(hypotheses_, options_); })),
       search_(space_, options_, likelihood_) {
   if (options_.none_weight) {
-    arena_.execute([&] { none_.emplace(hypotheses_, options_); });
+    none_.emplace(space_, options_, likelihood_);
     none_log_weight_ = none_log_weight(*options_.none_weight, hypotheses_, options_.lattice);
   }
 }
@@ -127,9 +127,6 @@ void BoundedBelief::reset() {
 void BoundedBelief::move_pivot(const glm::dvec2& pivot_mm) {
   options_.lattice = with_pivot(options_.lattice, pivot_mm, "bounded posterior", !touches_.empty());
   likelihood_.move_pivot(pivot_mm);
-  if (none_) {
-    none_->move_pivot(pivot_mm);
-  }
   found_.reset();
   followed_.reset();
 }

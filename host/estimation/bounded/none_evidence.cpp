@@ -19,29 +19,11 @@ constexpr double least_gain = 0.9;
 
 double width(const LogInterval& of) { return of.high - of.low; }
 
-BoundedOptions with_wide_bins(BoundedOptions options) {
-  constexpr std::int64_t many = 100'000;
-  PoseLattice& lattice = options.lattice;
-  if (lattice.bins() > many) {
-    for (Axis* axis : {&lattice.x_mm, &lattice.y_mm, &lattice.theta_rad}) {
-      axis->count = (axis->count + 1) / 2;
-    }
-  }
-  return options;
-}
-
 }  // namespace
 
-NoneEvidence::NoneEvidence(std::span<const Hypothesis> hypotheses, const BoundedOptions& options)
-    : options_(with_wide_bins(options)),
-      likelihood_(hypotheses, options_.contact, options_.lattice),
-      space_(hypotheses, options_),
-      search_(space_, options_, likelihood_) {}
-
-void NoneEvidence::move_pivot(const glm::dvec2& pivot_mm) {
-  options_.lattice.pivot_mm = pivot_mm;
-  likelihood_.move_pivot(pivot_mm);
-}
+NoneEvidence::NoneEvidence(SearchSpace& space, const BoundedOptions& options,
+                           const BinLikelihood& likelihood)
+    : space_(space), options_(options), search_(space, options, likelihood) {}
 
 void NoneEvidence::add(std::span<const ArrayReadings> touches) {
   std::vector<TouchMean> added;

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "estimation/bounded/known_elements.hpp"
-#include "estimation/bounded/leaves/bin_likelihood.hpp"
 #include "estimation/bounded/search/bound_search.hpp"
 #include "estimation/bounded/search/search_space.hpp"
 #include "palpate/estimate.hpp"
@@ -18,21 +17,17 @@ namespace palpate {
 ///   log s + sum over the touches of log (mean of the touch's likelihood),
 /// where the mean is over the bins at which the array overlaps the object (over all bins where
 /// there is no such bin) and s is the share of such bins at the first touch with a known element.
-/// Of more than 100,000 bins an object the means are over bins twice as wide: a mean over all poses
-/// needs no fine steps, and takes an eighth of the time.
 ///
 /// The bins of s are counted exactly. Each mean comes from a search of its own over the touch's
 /// elements: what was evaluated bounds it from below, and the bounds of what was dropped from
 /// above.
 class NoneEvidence {
  public:
-  /// @param hypotheses outlive this object
   /// @param options checked, with a resolved contact model
-  NoneEvidence(std::span<const Hypothesis> hypotheses, const BoundedOptions& options);
+  /// @param likelihood evaluates bins; all of these outlive this object
+  NoneEvidence(SearchSpace& space, const BoundedOptions& options, const BinLikelihood& likelihood);
 
   void reset() { means_.clear(); }
-  /// For the touches to come.
-  void move_pivot(const glm::dvec2& pivot_mm);
   /// Takes in touches; those without a known element say nothing. All of them, or none where memory
   /// ends.
   void add(std::span<const ArrayReadings> touches);
@@ -46,7 +41,7 @@ class NoneEvidence {
   LogInterval bounds(double width_nats, const Deadline& deadline);
 
   /// Host memory, in bytes.
-  std::uint64_t bytes() const { return space_.bytes() + search_.largest().bytes(); }
+  std::uint64_t bytes() const { return search_.largest().bytes(); }
 
  private:
   /// Searches to these parts of a touch's sum that may be left out, the last where rounding of
@@ -66,9 +61,8 @@ class NoneEvidence {
   LogInterval narrow(TouchMean& mean, double width_nats, const Deadline& deadline);
   LogInterval search(TouchMean& mean, double tolerance, const Deadline& deadline);
 
-  BoundedOptions options_;
-  BinLikelihood likelihood_;
-  SearchSpace space_;
+  SearchSpace& space_;
+  const BoundedOptions& options_;
   BoundSearch search_;
   std::vector<TouchMean> means_;
 };
