@@ -7,8 +7,8 @@
 
 namespace palpate {
 
-/// The covariance of how far the pose's deviations move the body, in mm^2: the shift of its centroid
-/// along x and y, and its turn, as the root mean square displacement about the centroid.
+/// The covariance of how far the pose's deviations move the body, in mm^2: the shift of its
+/// centroid along x and y, and its turn, as the root mean square displacement about the centroid.
 glm::dmat3 motion_covariance(const Body& body, const ObjectPose& pose);
 /// Root mean square displacement of the body by the pose's deviations, mm.
 double spread_mm(const Body& body, const ObjectPose& pose);

@@ -223,10 +223,10 @@ ChosenFilter choose_filter(const FilterWish& wish, const Request& request,
   if (wish.kind == FilterKind::bounded) {
     if (!needs.empty()) {
       const HistogramNeed& need = needs.front();
-      throw Error(Fault::input, need.option.empty()
-                                    ? fmt::format("{}: {}; leave it out", wish.by, need.why)
-                                    : fmt::format("{}: {}; leave it out, or {}", need.option,
-                                                  need.why, wish.by));
+      throw Error(Fault::input,
+                  need.option.empty()
+                      ? fmt::format("{}: {}; leave it out", wish.by, need.why)
+                      : fmt::format("{}: {}; leave it out, or {}", need.option, need.why, wish.by));
     }
     return {asked_bounds(request, histogram), false, wish.by};
   }

@@ -47,7 +47,8 @@ class NoneEvidence {
   /// Searches to these parts of a touch's sum that may be left out, the last where rounding of
   /// float64 is not far below. Most touches' bins have likelihoods of many magnitudes, so that a
   /// coarser search than the first would save little.
-  static constexpr std::array<double, 9> tolerances{0.5, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9};
+  static constexpr std::array<double, 9> tolerances{0.5,  1e-2, 1e-3, 1e-4, 1e-5,
+                                                    1e-6, 1e-7, 1e-8, 1e-9};
 
   /// What is known of one touch.
   struct TouchMean {

@@ -31,8 +31,8 @@ struct PlaceError {
 /// @param object index of the object whose numbers of a table are used
 std::vector<PlaceError> place_errors(std::span<const TouchEvidence> touches, const Hypothesis& of,
                                      const ContactModel& contact, std::size_t object);
-/// The scale by which the errors are likeliest, as normal ones: what of them falls as touches add up
-/// is the factor's, what remains the map's. None of fewer than 16 errors.
+/// The scale by which the errors are likeliest, as normal ones: what of them falls as touches add
+/// up is the factor's, what remains the map's. None of fewer than 16 errors.
 std::optional<PoseScale> pose_scale_of(std::span<const PlaceError> errors);
 
 /// Sets MapSource::left_out and pose_scale. Builds maps of random three quarters of the touches,

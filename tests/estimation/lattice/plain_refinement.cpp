@@ -78,8 +78,8 @@ double plain_root(const std::vector<Moved>& window) {
   return root * std::pow(2.0, (wanted - narrow) / (wide - narrow));
 }
 
-/// A quadratic's peak, relative to the mean of the bins, and where there is one, the inverse of minus
-/// its second derivatives.
+/// A quadratic's peak, relative to the mean of the bins, and where there is one, the inverse of
+/// minus its second derivatives.
 struct PlainPeak {
   std::array<double, 3> at{};
   double covariance[3][3] = {};
@@ -88,8 +88,7 @@ struct PlainPeak {
 
 /// The peak of a quadratic over the axes that vary, by elimination with pivots; the mean where
 /// there is none.
-PlainPeak plain_peak(const std::vector<Moved>& window, double root,
-                                 const bool (&varies)[3]) {
+PlainPeak plain_peak(const std::vector<Moved>& window, double root, const bool (&varies)[3]) {
   std::vector<int> axes;
   for (int a = 0; a < 3; ++a) {
     if (varies[a]) {
