@@ -4,7 +4,6 @@
 #include <cmath>
 #include <fstream>
 #include <iterator>
-#include <numeric>
 #include <optional>
 #include <set>
 #include <string_view>
@@ -260,6 +259,17 @@ void add_records(const fs::path& file, const std::string& text, JudgedResults& r
       ++results.without_truth;
     }
   }
+}
+
+std::vector<Json> records_in(const fs::path& file) {
+  const Json records = parse(file, read_bytes(file));
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    const RecordReader reader(file, i, records[i]);
+    if (!reader.failed() && !records[i].contains("next")) {
+      reader.read();
+    }
+  }
+  return records;
 }
 
 JudgedResults read_results(std::span<const fs::path> files) {
