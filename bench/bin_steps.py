@@ -83,7 +83,7 @@ def program() -> None:
                 x, y = ((axis.lower, axis.upper) for axis in (lattice.x_mm, lattice.y_mm))
                 records = palpate.recognize(
                     [trial[:count] for trial in trials], maps, bins=counts_of(lattice), x_mm=x, y_mm=y,
-                    pivot_mm="auto", filter="bounded", device=device,
+                    pivot_mm="auto", filter="bounded", none=0.0, device=device,
                 )  # fmt: skip
                 errors = [near(record.get("refined_error_mm")) for record in records]
                 paired = differences(errors, finest or errors)

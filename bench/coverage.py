@@ -117,7 +117,10 @@ def program() -> None:
         learned = pathlib.Path(folder, "sensor.yaml")
         palpate.calibrate(training, layer="log_odds", device=device).sensor.save(learned)
         for sensor, model in (("Eq. 7", None), ("learned", learned)):
-            records = palpate.recognize(trials, maps, trace=True, device=device, sensor_model=model)
+            # Nobody is a stranger: what "(none)" has would count against every region.
+            records = palpate.recognize(
+                trials, maps, trace=True, device=device, sensor_model=model, none=0.0
+            )
             for touches in TOUCHES:
                 steps = [record["trace"][touches - 1] for record in records]
                 row: Json = {"sensor": sensor, "touches": touches, "unknowns": len(trials)}

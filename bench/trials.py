@@ -164,8 +164,10 @@ def recognized(
 
     Records as of `palpate recognize --trace`, and `confidence`, the probability of the best answer;
     without `trace` that after the last touch alone, [trial][0]. The region is the extent about 0 along x
-    and y, and the full circle; options: those of palpate.recognize().
+    and y, and the full circle; options: those of palpate.recognize(), but that "(none)" has no weight
+    unless it is given one.
     """
+    options = {"none": 0.0} | options
     reach = (-extent_mm, extent_mm)
     region: Json = {"x_mm": reach, "y_mm": reach, "pivot_mm": (0.0, 0.0)}
     records = palpate.recognize(trials, maps, **region, trace=trace, device=device, **options)

@@ -278,7 +278,7 @@ void build_maps(const MapFlags& flags) {
                             : build_map(builder, object, show));
       maps.back().mirror = flags.mirror;
       MapSource source{gathered(object, recordings.front().pressure_unit), model};
-      source.left_out = left_out_fit(device, source);
+      judge_left_out(device, source);
       maps.back().source = std::make_shared<const MapSource>(std::move(source));
       settle_frame(origin, maps.back());
       symmetries.push_back(settle_symmetry(flags, maps.back()));

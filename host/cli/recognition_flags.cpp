@@ -77,13 +77,13 @@ void add_uncertainty_flags(CLI::App& command, Request& request) {
                      "particles: 5.73, which is 0.1 rad]");
   add_text_flag(
       command, "--none", request.none,
-      "Adds \"(none)\", an object that was never learned, with prior weight W; a map "
-      "has the weight 1. Without W, (none) has a ninth of the sum of the maps' weights: a "
-      "probability of one in ten before the first touch; 0 leaves (none) out. (none) explains each "
+      "Prior weight of \"(none)\", an object that was never learned; a map has the weight 1. "
+      "Without W it is a ninth of the sum of the maps' weights: a probability of one in ten before "
+      "the first touch. 0 leaves (none) out, as particles do. (none) explains each "
       "touch by a piece of some known "
       "object; the pieces need not belong to one pose. One touch cannot tell: after it, "
       "the odds are about the prior's, unless a sensor model has learned what a touch of no "
-      "known object is like [default: no (none)]")
+      "known object is like [default: as without W]")
       ->type_name("W")
       ->expected(0, 1)
       ->default_str("auto");

@@ -33,7 +33,7 @@ Hdf5Contents open_map(const std::filesystem::path& path) {
   return {path,
           {"format", "version", "label", "cell_mm", "origin_mm", "prior", "symmetry", "spread_mm",
            "suggested_symmetry", "mirror", "T_learned_robot_object", "centred_mm", "pressure_unit",
-           "threshold", "ratio", "peak", "left_out_fit"},
+           "threshold", "ratio", "peak", "left_out_fit", "pose_scale"},
           {"log_odds", "observations", "mean_level", "touch_pressure", "touch_pose",
            "touch_elements", "touch_valid"}};
 }
@@ -159,6 +159,13 @@ std::shared_ptr<const MapSource> read_source(const std::filesystem::path& path, 
     }
     source->left_out = FitScale{.mean = z[0], .sd = z[1]};
   }
+  if (file.has_attribute("pose_scale")) {
+    const std::vector<double> scale = file.numbers("pose_scale", 2);
+    if (!(scale[0] > 0.0 && scale[1] >= 0.0)) {
+      file.refuse("attribute 'pose_scale' is {}, {}; build the map anew", scale[0], scale[1]);
+    }
+    source->pose_scale = PoseScale{.factor = scale[0], .map_sd_mm = scale[1]};
+  }
   if (file.has_dataset("touch_valid")) {
     const std::vector<double> valid = read_all(file, "touch_valid", {n, e});
     touches.valid.assign(valid.begin(), valid.end());
@@ -176,6 +183,9 @@ void write_source(Hdf5Writer& file, const MapSource& source) {
   file.attribute("peak", source.options.sensor.peak);
   if (source.left_out) {
     file.attribute("left_out_fit", {source.left_out->mean, source.left_out->sd});
+  }
+  if (source.pose_scale) {
+    file.attribute("pose_scale", {source.pose_scale->factor, source.pose_scale->map_sd_mm});
   }
   constexpr auto compressed = Hdf5Writer::Storage::compressed;
   file.dataset("touch_pressure", {n, e}, touches.pressure, compressed);

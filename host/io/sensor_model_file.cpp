@@ -54,6 +54,12 @@ void describe(Keys& keys, FitScale& scale) {
 }
 
 template <typename Keys>
+void describe(Keys& keys, PoseScale& scale) {
+  keys("factor", scale.factor);
+  keys("map_sd_mm", scale.map_sd_mm);
+}
+
+template <typename Keys>
 void describe(Keys& keys, FeatureDistribution& distribution) {
   keys("mean", distribution.mean);
   keys("sd", distribution.sd);
@@ -95,6 +101,7 @@ void describe(Keys& keys, LearnedSensor& sensor) {
   keys("bins", sensor.bins);
   keys("familiarity", sensor.familiarity);
   keys("fit_scale", sensor.fit_scale);
+  keys("pose_scale", sensor.pose_scale);
   keys("features", sensor.features);
   keys("table", sensor.table);
 }

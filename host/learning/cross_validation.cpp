@@ -159,6 +159,9 @@ class FoldTrial {
       }
       result.presses.push_back(std::move(scored));
     }
+    if (options_.bins) {
+      result.place_errors = errors_of(tried);
+    }
     return result;
   }
 
@@ -260,6 +263,33 @@ class FoldTrial {
                           : best_fit_near(press, at.best_pose, map, contact_for(label), 0);
   }
 
+  /// Of presses at known poses.
+  std::vector<PlaceError> errors_of(const std::vector<Press>& presses) const {
+    std::vector<PlaceError> errors;
+    for (std::size_t label = 0; label < labels_.size(); ++label) {
+      ContactModel contact = contact_for(label);
+      std::vector<TouchEvidence> touches;
+      for (const Press& press : presses) {
+        TouchEvidence touch(press.touches.front(), contact);
+        touch.T_robot_sensor = press.T_object_robot.value() * touch.T_robot_sensor;
+        if (press.label == labels_[label] && touch.in_contact()) {
+          touches.push_back(std::move(touch));
+        }
+      }
+      if (touches.empty()) {
+        continue;
+      }
+      const std::size_t map = maps_of_[label].front();
+      Hypothesis of{.map = model_.maps[map].map};
+      if (model_.table) {
+        of.layer = layers_[map];
+      }
+      contact.prior = contact.prior.value_or(of.compared().prior);
+      std::ranges::move(place_errors(touches, of, contact, 0), std::back_inserter(errors));
+    }
+    return errors;
+  }
+
   const std::vector<std::string>& labels_;
   const FoldModel& model_;
   const CrossValidationOptions& options_;
@@ -279,6 +309,7 @@ CrossValidation joined(std::span<const CrossValidation> folds) {
     append(fold.groups[0], all.groups[0]);
     append(fold.groups[1], all.groups[1]);
     append(fold.familiarity, all.familiarity);
+    append(fold.place_errors, all.place_errors);
     for (const auto& [label, z] : fold.fit_z) {
       append(z, all.fit_z[label]);
     }

@@ -254,6 +254,7 @@ LearnedSensor with_confidence(LearnedSensor sensor, const CrossValidation& valid
     sensor.features->weight = fit.feature_weight;
   }
   sensor.fit_scale = fit_scale_of(validation.fit_z);
+  sensor.pose_scale = pose_scale_of(validation.place_errors);
   const FamiliarityScores scores = all_of(validation.familiarity);
   if (!scores.known.empty()) {
     sensor.familiarity = fit_familiarity(scores);

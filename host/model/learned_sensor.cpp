@@ -235,6 +235,12 @@ void LearnedSensor::validate() const {
   if (fit_scale && !is_positive(fit_scale->sd)) {
     refuse("fit_scale: sd", fit_scale->sd, "give a positive number");
   }
+  if (pose_scale && !is_positive(pose_scale->factor)) {
+    refuse("pose_scale: factor", pose_scale->factor, "give a positive number");
+  }
+  if (pose_scale && !from_0(pose_scale->map_sd_mm)) {
+    refuse("pose_scale: map_sd_mm", pose_scale->map_sd_mm, "give a number from 0");
+  }
   if (fit_scale && !from_0(fit_scale->shared_sd)) {
     refuse("fit_scale: shared_sd", fit_scale->shared_sd, "give a number from 0");
   }

@@ -47,11 +47,13 @@ struct PartAway {
   double share = 0.0;
 };
 
-/// How far the bins lie from a pose. A bin that is near for its width, and has at least a
-/// thousandth of the object's belief, is divided into 27 equal parts, since it stands for all of
-/// its poses.
+/// How far the bins lie from a pose.
 std::vector<PartAway> parts_away(const BinnedObject& of, std::span<const BinShare> bins,
                                  const Pose& T_object_robot);
+/// The parts with those of the neighbourhood spread as the refined pose's covariance says, which
+/// bins are too wide to tell.
+std::vector<PartAway> spread_between_bins(const BinnedObject& of, std::vector<PartAway> parts,
+                                          const RefinedPose& refined);
 /// The share that lies within this distance.
 double share_within(std::span<const PartAway> parts, double mm);
 /// The least distance within which this share lies, mm; none where the parts hold less.

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "estimation/lattice/refinement.hpp"
+#include "model/body_spread.hpp"
 #include "palpate/learned_sensor.hpp"
 #include "recognition/label_probability.hpp"
 #include "recognition/recognition_record.hpp"
@@ -37,6 +38,23 @@ BinnedObject binned(const PoseLattice& lattice, const RecognitionTask& task,
                     const RecognitionStep& step, int object) {
   const OccupancyGrid& map = task.hypotheses[object].map;
   return {lattice, displaced_body(map), object == step.mode.object ? step.symmetry : map.symmetry};
+}
+
+/// The mode's mean and covariance: those of the refined pose there where the mode is narrow, as the
+/// bins are too wide to tell them; on the task's scale.
+ObjectPose between_bins(const Recogniser& recogniser, const RecognitionTask& task,
+                        const BeliefMode& mode, const BinnedObject& of) {
+  constexpr double narrow_mm = 1.0;
+  ObjectPose pose = mode.pose;
+  if (spread_mm(of.body, pose) < narrow_mm) {
+    const Mode at{.object = mode.object, .T_object_robot = mode.best};
+    if (const std::optional<RefinedPose> refined = recogniser.refine(at)) {
+      pose = inverse(least_turned(of.body, of.symmetry, *refined));
+      pose.T_robot_object.theta_rad =
+          wrap_angle(pose.T_robot_object.theta_rad, 2.0 * std::numbers::pi);
+    }
+  }
+  return scaled(of.body, pose, task.pose_scale);
 }
 
 std::string percent(double probability) {
@@ -81,6 +99,9 @@ BeliefPlaces places_of(const Recogniser& recogniser, const Estimate& estimate,
     }
     std::vector<PartAway> parts = parts_away(of, likely[k], step.pose());
     places.share = probability[object] * share_within(parts, neighbourhood_mm);
+    if (step.refined) {
+      parts = spread_between_bins(of, std::move(parts), *step.refined);
+    }
     const double proven = step.certificate ? 1.0 - step.certificate->dropped_mass : 1.0;
     // Above 1 where the object has less than all that is to lie near.
     const double share = held / (probability[object] * proven);
@@ -100,6 +121,9 @@ BeliefPlaces places_of(const Recogniser& recogniser, const Estimate& estimate,
       nearest_mm = mm;
       places.own = i;
     }
+  }
+  for (BeliefMode& mode : places.modes) {
+    mode.pose = between_bins(recogniser, task, mode, binned(lattice, task, step, mode.object));
   }
   return places;
 }

@@ -62,10 +62,8 @@ std::string giver_of(const Request& request, std::initializer_list<AskedSd> all)
 }
 
 std::optional<double> none_weight(const Request& request, std::span<const Hypothesis> hypotheses) {
-  if (!request.none) {
-    return {};
-  }
-  if (const auto* weight = std::get_if<double>(&*request.none)) {
+  const NoneWeight given = request.none.value_or(Automatic{});
+  if (const auto* weight = std::get_if<double>(&given)) {
     if (!(*weight >= 0.0 && std::isfinite(*weight))) {
       refuse_option("none", *weight,
                     "give a weight from 0, or no value; recordings stand before the flags");
@@ -150,7 +148,7 @@ ParticleOptions asked_particles(const Request& request, const HistogramOptions& 
                    "`slip-sd-mm` and `slip-sd-deg`, their motion noise");
     }
   }
-  if (none_weight(request, {})) {
+  if (request.none && none_weight(request, {})) {
     refuse_given(request, "none",
                  "particles have no mean over all poses, which (none) needs; use `filter "
                  "histogram`");
@@ -212,14 +210,17 @@ ChosenFilter choose_filter(const FilterWish& wish, const Request& request,
                    histogram.touch_sd.rad);
   set_displacement(slip_mm(request), slip_deg(request), histogram.slip_sd.mm,
                    histogram.slip_sd.rad);
-  histogram.none_weight = none_weight(request, hypotheses);
+  if (request.none || !of_caller.learned_only) {
+    histogram.none_weight = none_weight(request, hypotheses);
+  }
   std::vector<HistogramNeed> needs = all_needs(request, of_caller);
   if (wish.kind == FilterKind::bounded) {
     if (!needs.empty()) {
-      const auto& [giver, why] = needs.front();
+      const HistogramNeed& need = needs.front();
       throw Error(Fault::input,
-                  giver.empty() ? fmt::format("{}: {}; leave it out", wish.by, why)
-                                : fmt::format("{}: {}; leave it out, or {}", giver, why, wish.by));
+                  need.option.empty()
+                      ? fmt::format("{}: {}; leave it out", wish.by, need.why)
+                      : fmt::format("{}: {}; leave it out, or {}", need.option, need.why, wish.by));
     }
     return {asked_bounds(request, histogram), false, wish.by};
   }

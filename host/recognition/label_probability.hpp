@@ -30,7 +30,7 @@ std::vector<double> label_log_evidence(const Estimate& estimate, const Recogniti
 /// What the task's sensor model makes of the evidence of labels after some touches.
 struct Tempering {
   double temperature = 1.0;      ///< of so many touches
-  std::vector<double> features;  ///< [label] feature_nats() of the touches
+  std::vector<double> features;  ///< [label] feature_nats() of the touches, and misfit_nats()
 
   /// log of E^(1 / temperature) exp(features), but for a constant.
   /// @param log_evidence log E, E being the sum over the label's maps of weight times evidence
@@ -38,8 +38,18 @@ struct Tempering {
     return log_evidence / temperature + features[label];
   }
 };
+/// @param fit of the best object, on the task's scale; adds misfit_nats() to none_label where that
+/// scale was learned
 /// @throws Error as feature_nats()
-Tempering tempering_of(std::span<const TouchEvidence> touches, const RecognitionTask& task);
+Tempering tempering_of(std::span<const TouchEvidence> touches, const RecognitionTask& task,
+                       const std::optional<Fit>& fit = {});
+
+/// What the fit of the best object says for none_label: the log of how likely a stranger fits so,
+/// over how likely a learned object does. After one touch it says nothing: a stranger's single
+/// touch fits as well as a learned object's.
+/// @param fit on a scale that was learned
+/// @param touches with an element In Contact
+double misfit_nats(const Fit& fit, std::size_t touches);
 
 /// `known`, which is learned at even odds, at those of the maps' weights against that of "(none)".
 double weighed(double known, const RecognitionTask& task);

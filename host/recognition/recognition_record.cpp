@@ -7,6 +7,8 @@
 
 #include <fmt/format.h>
 
+#include "estimation/lattice/refinement.hpp"
+#include "model/body_spread.hpp"
 #include "palpate/error.hpp"
 #include "palpate/object_frame.hpp"
 #include "palpate/pose_error.hpp"
@@ -113,18 +115,18 @@ std::optional<double> known_of(const Estimate& estimate, std::span<const TouchEv
 }
 
 /// RecognitionStep::fit
-std::optional<Fit> fit_of(const RecognitionStep& step, std::span<const TouchEvidence> touches,
-                          const RecognitionTask& task) {
+std::optional<Fit> fit_of(const Mode& mode, const std::optional<RefinedPose>& refined,
+                          std::span<const TouchEvidence> touches, const RecognitionTask& task) {
   const auto in_contact = std::ranges::count_if(touches, &TouchEvidence::in_contact);
   if (in_contact == 0) {
     return {};
   }
-  const auto object = static_cast<std::size_t>(step.mode.object);
+  const auto object = static_cast<std::size_t>(mode.object);
   const OccupancyGrid& map = task.hypotheses[object].compared();
   const std::optional<Fit> fit =
-      step.refined
-          ? evidence_fit(touches, step.pose(), map, task.contact(), task.touch_sd(), object)
-          : best_fit_near(touches, step.pose(), map, task.contact(), object);
+      refined ? evidence_fit(touches, refined->T_object_robot, map, task.contact(), task.touch_sd(),
+                             object)
+              : best_fit_near(touches, mode.T_object_robot, map, task.contact(), object);
   return task.fit_scale.of(fit.value(), static_cast<std::size_t>(in_contact));
 }
 
@@ -185,17 +187,20 @@ void RecognitionRecord::require_steps() const {
 }
 
 RecognitionStep judge(const Estimate& estimate, const GroundTruth& truth,
-                      const RecognitionTask& task, std::span<const TouchEvidence> touches) {
+                      const RecognitionTask& task, std::span<const TouchEvidence> touches,
+                      const std::optional<RefinedPose>& refined) {
   const std::vector<std::string>& labels = task.labels;
-  const Tempering tempering = tempering_of(touches, task);
+  const std::optional<Fit> fit = fit_of(estimate.mode, refined, touches, task);
+  const Tempering tempering = tempering_of(touches, task, fit);
   const std::optional<double> known = known_of(estimate, touches, task);
   RecognitionStep step{.identity = label_probabilities(estimate, tempering, task, known),
                        .mode = estimate.mode,
-                       .refined = {},
+                       .refined = refined,
                        .contradicted = estimate.contradicted,
                        .truth = in_frame_of_map(task, truth),
                        .symmetry = task.hypotheses[estimate.mode.object].map.symmetry,
                        .body = task.bodies[estimate.mode.object],
+                       .fit = fit,
                        .known = known};
   if (estimate.certificate) {
     step.identity_bounds = label_bounds(estimate, step.identity, tempering, task, known);
@@ -219,16 +224,20 @@ RecognitionStep take_step(Recogniser& recogniser, const RecognitionTask& task,
   const Estimate estimate = recogniser.estimate();
   const double seconds = updated.seconds + seconds_since(start);
   const std::span<const TouchEvidence> evidence = recogniser.evidence();
-  RecognitionStep step = judge(estimate, truth, task, evidence);
+  const Clock::time_point estimated = Clock::now();
+  std::optional<RefinedPose> refined = recogniser.refine(estimate.mode);
+  if (refined) {
+    refined = scaled(displaced_body(task.hypotheses[estimate.mode.object].map), *refined,
+                     task.pose_scale);
+  }
+  const double refine_seconds = seconds_since(estimated);
+  RecognitionStep step = judge(estimate, truth, task, evidence, refined);
   step.surprise = updated.surprise;
   step.seconds = seconds;
-  const Clock::time_point estimated = Clock::now();
-  step.refined = recogniser.refine(step.mode);
-  step.refine_seconds = seconds_since(estimated);
+  step.refine_seconds = refine_seconds;
   step.symmetry = symmetry_told(recogniser, task, step);
   measure_errors(task, step);
   step.effective_sample_size = recogniser.effective_sample_size();
-  step.fit = fit_of(step, evidence, task);
   step.places = places_of(recogniser, estimate, task, step);
   step.decision = decide(step, task);
   step.warnings = warnings_about(evidence, task, recogniser.lattice(), step);

@@ -137,8 +137,10 @@ struct RecognitionRecord {
 /// Sums an estimate by label and compares it with the truth, as far as the truth is known.
 /// @param touches of the unknown so far, for the task's features and temperature, which is that of
 /// one touch where none are given
+/// @param refined the refined pose near the estimate's mode
 RecognitionStep judge(const Estimate& estimate, const GroundTruth& truth,
-                      const RecognitionTask& task, std::span<const TouchEvidence> touches = {});
+                      const RecognitionTask& task, std::span<const TouchEvidence> touches = {},
+                      const std::optional<RefinedPose>& refined = {});
 
 /// Where the belief lies about the step's pose.
 BeliefPlaces places_of(const Recogniser& recogniser, const Estimate& estimate,

@@ -68,6 +68,7 @@ struct RecognitionTask {
   std::optional<LearnedFeatures> features = {};
   std::optional<Familiarity> familiarity = {};
   FitScale fit_scale = {};                  ///< of RecognitionStep::fit
+  PoseScale pose_scale = {};                ///< of RecognitionStep::refined and of modes
   ActWhere act = {};                        ///< for RecognitionStep::decision
   std::function<void()> cancel_point = {};  ///< BoundedOptions::cancel_point, where bounds search
   std::vector<std::string> remarks = {};    ///< sentences for the user, once the filter is open

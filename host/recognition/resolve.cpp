@@ -1,5 +1,7 @@
 #include "recognition/resolve.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <set>
@@ -185,28 +187,49 @@ bool resolves(const PoseLattice& lattice, std::span<const Hypothesis> hypotheses
          holds(lattice.theta_rad, balanced.theta_rad);
 }
 
-/// The scale of the maps' own touches, where recognition judges as it did: by Eq. 7 with the same
-/// numbers, at poses that are exact, on bins that resolve the maps.
-FitScale left_out_scale(const RecognitionTask& task) {
+/// Whether recognition judges touches as `map` did: by Eq. 7 with the same numbers, at poses that
+/// are exact, on bins that resolve the maps.
+bool judges_as_map(const RecognitionTask& task) {
   const ContactModel& contact = task.contact();
-  if (contact.table || contact.gamma != usual_gamma || !task.touch_sd().none() ||
-      !task.slip_sd().none() || !traits_of(task.filter).bins) {
-    return {};
-  }
-  std::vector<FitScale> scales;
-  for (const Hypothesis& hypothesis : task.hypotheses) {
+  const auto alike = [&](const Hypothesis& hypothesis) {
     const auto& source = hypothesis.map.source;
     if (!source || !source->left_out) {
-      continue;
+      return true;
     }
     const ContactClassifier& own = source->options.classifier;
-    if (own.threshold != contact.classifier.threshold || own.ratio != contact.classifier.ratio ||
-        contact.prior.value_or(hypothesis.map.prior) != hypothesis.map.prior) {
-      return {};
+    return own.threshold == contact.classifier.threshold && own.ratio == contact.classifier.ratio &&
+           contact.prior.value_or(hypothesis.map.prior) == hypothesis.map.prior;
+  };
+  return !contact.table && contact.gamma == usual_gamma && task.touch_sd().none() &&
+         task.slip_sd().none() && traits_of(task.filter).bins &&
+         std::ranges::all_of(task.hypotheses, alike) && resolves(task.lattice(), task.hypotheses);
+}
+
+/// Sets the scales of what recognition says to those of the maps' own touches that were left out.
+/// That maps are off counts whatever judges.
+void take_scales_of_maps(RecognitionTask& task) {
+  std::vector<FitScale> fits;
+  double logs = 0.0;
+  double squares = 0.0;
+  double poses = 0.0;
+  for (const Hypothesis& hypothesis : task.hypotheses) {
+    const auto& source = hypothesis.map.source;
+    if (source && source->left_out) {
+      fits.push_back(*source->left_out);
     }
-    scales.push_back(*source->left_out);
+    if (source && source->pose_scale) {
+      logs += std::log(source->pose_scale->factor);
+      squares += source->pose_scale->map_sd_mm * source->pose_scale->map_sd_mm;
+      poses += 1.0;
+    }
   }
-  return scales.empty() || !resolves(task.lattice(), task.hypotheses) ? FitScale{} : pooled(scales);
+  const bool as_map = judges_as_map(task);
+  if (!fits.empty() && as_map) {
+    task.fit_scale = pooled(fits);
+  }
+  if (poses > 0.0) {
+    task.pose_scale = {as_map ? std::exp(logs / poses) : 1.0, std::sqrt(squares / poses)};
+  }
 }
 
 PoseLattice with_counts(PoseLattice lattice, const std::array<int, 3>& counts) {
@@ -279,8 +302,9 @@ RecognitionTask resolve(const Request& request, const Circumstances& of) {
     task.features = sensor->features;
     task.familiarity = sensor->familiarity;
     task.fit_scale = sensor->fit_scale.value_or(FitScale{});
+    task.pose_scale = sensor->pose_scale.value_or(PoseScale{});
   } else {
-    task.fit_scale = left_out_scale(task);
+    take_scales_of_maps(task);
   }
   task.bin_width = bin_width;
   task.auto_filter = filter.automatic;

@@ -292,7 +292,7 @@ void bind_map_builder(nb::module_& module) {
         MapSource source{recording.copied(), options_of(map.cell_mm, sensor, classifier)};
         map.source = run({}, Progress(), [session, source = std::move(source)](Call& call) mutable {
           auto lock = session->lock(call);
-          source.left_out = left_out_fit(lock.device(), source);
+          judge_left_out(lock.device(), source);
           return std::make_shared<const MapSource>(std::move(source));
         });
       },

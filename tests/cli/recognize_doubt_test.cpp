@@ -34,8 +34,9 @@ class RecognizeDoubt : public ProgramTest {
   }
 };
 
-TEST_F(RecognizeDoubt, NoneIsOneOfTheIdentitiesOnlyWhereAskedFor) {
-  EXPECT_FALSE(with("a.h5", {})["identity"].contains("(none)"));
+TEST_F(RecognizeDoubt, NoneIsOneOfTheIdentitiesUnlessItIsTakenOut) {
+  EXPECT_TRUE(with("a.h5", {})["identity"].contains("(none)"));
+  EXPECT_FALSE(with("a.h5", {"--none", "0"})["identity"].contains("(none)"));
   const json r = with("a.h5", {"--none", "0.5", "--bins", "25x25x48"});
   EXPECT_EQ(r["identity"].size(), 3u);
   double sum = 0.0;

@@ -57,6 +57,7 @@ TEST_F(RecognizeRecord, HasTheDocumentedKeysAndTypes) {
                                                   "mode",
                                                   "mode_certain",
                                                   "modes",
+                                                  "none",
                                                   "recording",
                                                   "refined",
                                                   "refined_error_mm",
@@ -69,9 +70,10 @@ TEST_F(RecognizeRecord, HasTheDocumentedKeysAndTypes) {
   EXPECT_EQ(r["touches"], 6);
   EXPECT_TRUE(r["touches"].is_number_integer());
   EXPECT_EQ(r["best"], "A");
-  EXPECT_EQ(keys_of(r["identity"]), (std::vector<std::string>{"A", "I"}));
-  EXPECT_NEAR(r["identity"]["A"].get<double>() + r["identity"]["I"].get<double>(), 1.0,
-              1e-12);  // rounding of two doubles
+  EXPECT_EQ(keys_of(r["identity"]), (std::vector<std::string>{"(none)", "A", "I"}));
+  EXPECT_NEAR(
+      r["identity"]["A"].get<double>() + r["identity"]["I"].get<double>() + r["none"].get<double>(),
+      1.0, 1e-12);  // rounding of three doubles
   const json& mode = r["mode"];
   EXPECT_EQ(keys_of(mode), (std::vector<std::string>{"log_likelihood", "map", "object", "theta_rad",
                                                      "x_mm", "y_mm"}));
@@ -215,7 +217,7 @@ TEST_F(RecognizeRecord, WithoutATruthNothingIsRight) {
 }
 
 TEST_F(RecognizeRecord, AWrongObjectHasNoPoseError) {
-  const json r = record({"u.h5", "--maps", "I.map.h5"});
+  const json r = record({"u.h5", "--maps", "I.map.h5", "--none", "0"});
   EXPECT_EQ(r["right"], false);
   EXPECT_TRUE(r["error_mm"].is_null());
   EXPECT_TRUE(r["refined_error_mm"].is_null());
@@ -241,22 +243,10 @@ TEST_F(RecognizeRecord, TraceTellsTheSameAfterEveryTouch) {
   ASSERT_EQ(whole["trace"].size(), 6u);
   for (std::size_t i = 0; i < 6; ++i) {
     const json& step = whole["trace"][i];
-    std::vector<std::string> keys{"T_robot_object",
-                                  "best",
-                                  "bins_evaluated",
-                                  "blocks_bounded",
-                                  "decision",
-                                  "dropped_mass",
-                                  "error_mm",
-                                  "fit",
-                                  "identity",
-                                  "identity_bounds",
-                                  "mode",
-                                  "mode_certain",
-                                  "modes",
-                                  "refined",
-                                  "refined_error_mm",
-                                  "right"};
+    std::vector<std::string> keys{
+        "T_robot_object", "best", "bins_evaluated", "blocks_bounded",   "decision", "dropped_mass",
+        "error_mm",       "fit",  "identity",       "identity_bounds",  "mode",     "mode_certain",
+        "modes",          "none", "refined",        "refined_error_mm", "right"};
     if (i > 0) {  // only the prior comes before the first touch
       keys.push_back("surprise");
     }
@@ -292,7 +282,7 @@ TEST_F(RecognizeRecord, EachFrameIsAnUnknownOfItsOwn) {
 
 TEST_F(RecognizeRecord, RecordingsAreUnknownsOfTheirOwnInTheirOrder) {
   write_recording(folder_ / "i.h5", sample_unknown("I", true_pose, 6));
-  const json all = records({"i.h5", "u.h5", "--maps", "A.map.h5", "I.map.h5"});
+  const json all = records({"i.h5", "u.h5", "--maps", "A.map.h5", "I.map.h5", "--none", "0"});
   ASSERT_EQ(all.size(), 2u);
   EXPECT_EQ(all[0]["recording"], "i.h5");
   EXPECT_EQ(all[0]["best"], "I");
@@ -315,7 +305,7 @@ TEST_F(RecognizeRecord, MapsOfOneLabelAddUp) {
   second.label = "A";
   write_map(folder_ / "E.map.h5", second);
   const json together = recognized({"A.map.h5", "E.map.h5", "I.map.h5"});
-  EXPECT_EQ(keys_of(together), (std::vector<std::string>{"A", "I"}));
+  EXPECT_EQ(keys_of(together), (std::vector<std::string>{"(none)", "A", "I"}));
   EXPECT_GT(apart["E"].get<double>(), 1e-3) << "one touch leaves all three possible";
   EXPECT_NEAR(together["A"].get<double>(), apart["A"].get<double>() + apart["E"].get<double>(),
               1e-12);  // rounding
@@ -328,7 +318,7 @@ TEST_F(RecognizeRecord, BestIsTheLargestSumThoughTheModeBeAnother) {
     copy.label = "B";
     write_map(folder_ / name, copy);
   }
-  const json r = record({"u.h5", "--maps", "A.map.h5", "b1.map.h5", "b2.map.h5"});
+  const json r = record({"u.h5", "--maps", "A.map.h5", "b1.map.h5", "b2.map.h5", "--none", "0"});
   EXPECT_NEAR(r["identity"]["B"].get<double>(), 2.0 / 3.0, 1e-9);  // rounding
   EXPECT_EQ(r["best"], "B");
   EXPECT_EQ(r["mode"]["object"], "A") << "ties go to the first object";
@@ -355,7 +345,7 @@ TEST_F(RecognizeRecord, AFileNameThatIsNotUtf8StillGivesJson) {
 
 TEST_F(RecognizeRecord, PosteriorIsTheRecordsSource) {
   const json r = record({"u.h5", "--maps", "I.map.h5", "A.map.h5", "--touches", "2", "--bins",
-                         "7x6x5", "--posterior", "p.h5"});
+                         "7x6x5", "--posterior", "p.h5", "--none", "0"});
   const Posterior p = read_posterior(folder_ / "p.h5");
   EXPECT_EQ(p.objects, (std::vector<std::string>{"I", "A"}));
   EXPECT_EQ(p.lattice.x_mm.count, 7);

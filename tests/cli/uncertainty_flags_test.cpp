@@ -159,7 +159,9 @@ TEST_F(UncertaintyFlags, TheProbabilityOfNoneStandsBesideTheIdentity) {
   for (const json& step : r["trace"]) {
     EXPECT_EQ(step.at("none"), step["identity"].at("(none)"));
   }
-  EXPECT_FALSE(record_with({}).contains("none"));
+  EXPECT_EQ(record_with({}), record_with({"--none"})) << "the default";
+  EXPECT_FALSE(record_with({"--none", "0"}).contains("none"));
+  EXPECT_FALSE(record_with({"--filter", "particles"}).contains("none"));
 }
 
 TEST_F(UncertaintyFlags, OneTouchCannotTell) {
@@ -169,7 +171,7 @@ TEST_F(UncertaintyFlags, OneTouchCannotTell) {
   EXPECT_NE(frames.find(note), std::string::npos);
   EXPECT_EQ(frames.find(note), frames.rfind(note)) << "once";
   EXPECT_EQ(done(with({"--none"})).find(note), std::string::npos);
-  EXPECT_EQ(done(with({"--touches", "1"})).find(note), std::string::npos);
+  EXPECT_EQ(done(with({"--touches", "1", "--none", "0"})).find(note), std::string::npos);
 }
 
 TEST_F(UncertaintyFlags, SayOnceWhatTheLatticeDoesNotResolve) {

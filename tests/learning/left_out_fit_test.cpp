@@ -7,11 +7,12 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
-#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "model/body_spread.hpp"
+#include "model/random.hpp"
 #include "palpate/files.hpp"
 #include "palpate/simulation.hpp"
 
@@ -26,9 +27,13 @@ class LeftOutFit : public testing::Test {
     return recording;
   }
 
-  FitScale scale(const Recording& recording) {
-    return left_out_fit(device_, {recording, MapOptions()}).value();
+  /// The source of a map of these touches, with what they are like where they are left out.
+  MapSource judged(const Recording& recording) {
+    MapSource source{recording, MapOptions()};
+    judge_left_out(device_, source);
+    return source;
   }
+  FitScale scale(const Recording& recording) { return judged(recording).left_out.value(); }
 
   Device device_ = Device::open();
 };
@@ -63,7 +68,8 @@ TEST_F(LeftOutFit, IsWorseWhereTouchesContradict) {
 TEST_F(LeftOutFit, NeedsSixteenTouchesInContact) {
   Recording few = touches(40, 1);
   std::fill_n(few.pressure.begin(), 25 * few.elements(), 0.0);
-  EXPECT_FALSE(left_out_fit(device_, {few, MapOptions()}));
+  EXPECT_FALSE(judged(few).left_out);
+  EXPECT_FALSE(judged(few).pose_scale);
 }
 
 TEST_F(LeftOutFit, IsKeptInTheMapsFile) {
@@ -73,16 +79,65 @@ TEST_F(LeftOutFit, IsKeptInTheMapsFile) {
   MapBuilder builder(device_, MapOptions());
   builder.add(learned.touches(0, learned.size()));
   OccupancyGrid map = builder.build("E");
-  for (const auto& left_out : {std::optional<FitScale>{}, left_out_fit(device_, {learned, {}})}) {
-    MapSource source{learned, MapOptions(), left_out};
-    map.source = std::make_shared<const MapSource>(std::move(source));
+  for (const MapSource& source : {MapSource{learned, MapOptions()}, judged(learned)}) {
+    map.source = std::make_shared<const MapSource>(source);
     write_map(file, map);
-    const auto read = read_map(file).source->left_out;
-    ASSERT_EQ(read.has_value(), left_out.has_value());
-    EXPECT_TRUE(!read || (read->mean == left_out->mean && read->sd == left_out->sd));
-    EXPECT_EQ(with_prior(device_, map, 0.3).source->left_out.has_value(), left_out.has_value());
+    const OccupancyGrid back = read_map(file);
+    const auto& [touches, options, fit, pose] = *back.source;
+    ASSERT_EQ(fit.has_value(), source.left_out.has_value());
+    EXPECT_TRUE(!fit || (fit->mean == source.left_out->mean && fit->sd == source.left_out->sd));
+    ASSERT_EQ(pose.has_value(), source.pose_scale.has_value());
+    EXPECT_TRUE(!pose || (pose->factor == source.pose_scale->factor &&
+                          pose->map_sd_mm == source.pose_scale->map_sd_mm));
+    EXPECT_EQ(with_prior(device_, map, 0.3).source->left_out.has_value(), fit.has_value());
   }
   std::filesystem::remove(file);
+}
+
+/// Errors of groups whose belief is some 0.5 or 0.1 mm wide along each axis, and really spread by
+/// the factor, with the map's own part.
+std::vector<PlaceError> drawn(const PoseScale& truth, int count) {
+  Random random(7, Stream::readings);
+  std::vector<PlaceError> errors;
+  for (int i = 0; i < count; ++i) {
+    const double sd = i % 2 == 0 ? 0.5 : 0.1;
+    PlaceError error{.covariance = glm::dmat3(sd * sd)};
+    for (int axis = 0; axis < 3; ++axis) {
+      error.moved_mm[axis] =
+          std::hypot(std::sqrt(truth.factor) * sd, truth.map_sd_mm) * random.normal();
+    }
+    errors.push_back(error);
+  }
+  return errors;
+}
+
+TEST(PoseScale, TellsWhatTouchesShareFromWhatFallsAsTheyAddUp) {
+  for (const PoseScale& truth : {PoseScale{0.4, 0.0}, PoseScale{1.0, 0.08}, PoseScale{2.0, 0.2}}) {
+    const PoseScale found = pose_scale_of(drawn(truth, 400)).value();
+    // 600 squares tell a variance to 6 %.
+    EXPECT_NEAR(found.factor / truth.factor, 1.0, 0.2);
+    EXPECT_NEAR(found.map_sd_mm, truth.map_sd_mm, 0.025);
+  }
+  EXPECT_FALSE(pose_scale_of(drawn({}, 15))) << "too few";
+}
+
+TEST(PoseScale, MovesTheBodyAsFarAlongEveryAxis) {
+  const Body body{.centroid_mm = {3.0, -2.0}, .inertia_mm2 = 49.0};
+  const ObjectPose pose{{{5.0, 1.0}, 0.7}, {0.2, 0.05, 0.01, 0.05, 0.3, -0.02, 0.01, -0.02, 0.004}};
+  const glm::dmat3 before = motion_covariance(body, pose);
+  const glm::dmat3 after = motion_covariance(body, scaled(body, pose, {0.5, 0.1}));
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      EXPECT_NEAR(after[i][k], 0.5 * before[i][k] + (i == k ? 0.01 : 0.0), 1e-12);
+    }
+  }
+}
+
+TEST_F(LeftOutFit, Eq7IsLessSureOfPosesThanThisSensorDeserves) {
+  const PoseScale scale = judged(touches(120, 3)).pose_scale.value();
+  EXPECT_LT(scale.factor, 0.7);
+  EXPECT_GT(scale.factor, 0.1);
+  EXPECT_LT(scale.map_sd_mm, 0.15);
 }
 
 }  // namespace palpate::left_out_fit_test

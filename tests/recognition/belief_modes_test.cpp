@@ -182,16 +182,25 @@ TEST(PartsAway, AreAsFarAsThePoseErrorSays) {
   const Pose pose = of.lattice.T_object_robot(3.0, -1.0, 5.0);
   for (const std::int64_t bin : {0, 1234, 50'000, 115'199}) {
     const auto parts = parts_away(of, std::vector<BinShare>{{bin, 0.5}}, pose);
-    double mean = 0.0;
-    for (const PartAway& part : parts) {
-      mean += part.mm * part.share / 0.5;
-    }
-    // Parts of a bin differ by less than a tenth of it in the mean.
-    EXPECT_NEAR(mean, pose_error_mm(of.body, 2, pose, of.lattice.T_object_robot(bin)), 0.1);
-    EXPECT_NEAR(share_within(parts, 1e3), 0.5, 1e-12);
-    const double farthest = std::ranges::max(parts, {}, &PartAway::mm).mm;
-    EXPECT_EQ(distance_holding(parts, 0.4999), farthest);
+    ASSERT_EQ(parts.size(), 1U);
+    EXPECT_NEAR(parts.front().mm, pose_error_mm(of.body, 2, pose, of.lattice.T_object_robot(bin)),
+                1e-9);
+    EXPECT_EQ(distance_holding(parts, 0.4999), parts.front().mm);
     EXPECT_FALSE(distance_holding(parts, 0.6));
+  }
+}
+
+TEST(PartsAway, NearThePoseLieAsItsCovarianceSaysWhateverTheBin) {
+  const BinnedObject of = letter();
+  const RefinedPose refined{of.lattice.T_object_robot(3.0, -1.0, 2.0),
+                            {0.04, 0.0, 0.0, 0.0, 0.04, 0.0, 0.0, 0.0, 1e-8}};
+  const auto parts = spread_between_bins(of, {{0.4, 0.9}, {7.0, 0.1}}, refined);
+  EXPECT_NEAR(share_within(parts, 1e3), 1.0, 1e-9);
+  EXPECT_NEAR(share_within(parts, 2.0), 0.9, 1e-9) << "what is far stays";
+  // Two independent axes of 0.2 mm: Rayleigh.
+  for (const double share : {0.5, 0.8}) {
+    EXPECT_NEAR(distance_holding(parts, 0.9 * share).value(),
+                0.2 * std::sqrt(-2.0 * std::log(1.0 - share)), 0.01);
   }
 }
 

@@ -284,4 +284,27 @@ TEST(WiderBins, AreToldOfWhereTheSensorModelWasLearnedOnNarrowerOnes) {
   EXPECT_EQ(wider_bins_sentence(task), "") << "particles have none";
 }
 
+TEST(Misfit, SpeaksForNoneTheMoreTouchesThereAre) {
+  EXPECT_EQ(misfit_nats({.z = -4.0}, 1), 0.0) << "a stranger's single touch fits as well";
+  EXPECT_LT(misfit_nats({.z = 0.0}, 3), -1.5);
+  EXPECT_LT(misfit_nats({.z = 0.0}, 9), misfit_nats({.z = 0.0}, 3));
+  EXPECT_GT(misfit_nats({.z = -4.0}, 3), 0.0);
+  EXPECT_GT(misfit_nats({.z = -8.0}, 5), 2.0);
+  EXPECT_TRUE(std::isfinite(misfit_nats({.z = -largest_fit_z}, 2)));
+}
+
+TEST(Misfit, CountsForNoneAloneWhereTheScaleWasLearned) {
+  HistogramOptions with_none;
+  with_none.none_weight = 0.2;
+  RecognitionTask task = three_maps(with_none);
+  const Press press;
+  const std::vector<TouchEvidence> touches(3, TouchEvidence(press.touch(), task.contact()));
+  const Fit fit{.z = -8.0};
+  EXPECT_EQ(tempering_of(touches, task, fit).features.back(), 0.0);
+  task.fit_scale = {.mean = 0.1, .sd = 0.9, .shared_sd = 0.1};
+  const std::vector<double> nats = tempering_of(touches, task, fit).features;
+  EXPECT_EQ(nats.back(), misfit_nats(fit, 3));
+  EXPECT_EQ(nats.front(), 0.0);
+}
+
 }  // namespace palpate::label_probability_test

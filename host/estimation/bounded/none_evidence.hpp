@@ -48,8 +48,8 @@ class NoneEvidence {
   /// float64 is not far below. Most touches' bins have likelihoods of many magnitudes, so that a
   /// coarser search than the second would save little; where touches are uncertain, the bounds of
   /// large tiles alone, which the first asks for, come within a few nats of the mean.
-  static constexpr std::array<double, 9> tolerances{20.0, 1e-2, 1e-3, 1e-4, 1e-5,
-                                                    1e-6, 1e-7, 1e-8, 1e-9};
+  static constexpr std::array<double, 10> tolerances{20.0, 0.5,  1e-2, 1e-3, 1e-4,
+                                                     1e-5, 1e-6, 1e-7, 1e-8, 1e-9};
 
   /// What is known of one touch.
   struct TouchMean {

@@ -55,17 +55,6 @@ BinIndex bin_at(const PoseLattice& lattice, const BinIndex& from, const glm::dve
           .theta = (index(from.theta, offset.z, lattice.theta_rad) % thetas + thetas) % thetas};
 }
 
-/// The n of the weights belief^(1/n).
-double root_of(const BodyWindow& window) {
-  std::vector<DisplacedBin> bins;
-  for (const BodyWindow::Bin& bin : window.bins) {
-    if (bin.within_radius) {
-      bins.push_back({bin.moved_mm, bin.log_likelihood});
-    }
-  }
-  return flattening_root(bins, least_root);
-}
-
 /// Mean offset from the centre bin under weights belief^(1/root).
 glm::dvec3 weighted_mean(const BodyWindow& window, double root) {
   glm::dvec3 sum{0.0};
@@ -78,11 +67,27 @@ glm::dvec3 weighted_mean(const BodyWindow& window, double root) {
   return sum / total;
 }
 
-/// Peak of the quadratic in the body's motion that fits the log-belief around the mean; as an
-/// offset from the centre bin, like the mean. Nothing where the fit has no peak nearby and within
-/// the region.
-std::optional<glm::dvec3> peak_near(const BodyWindow& window, const PoseLattice& lattice,
-                                    const Body& body, const glm::dvec3& mean, double root) {
+/// A place in (x_mm, y_mm, theta_rad), as an offset from the centre bin, and its covariance.
+struct Peak {
+  glm::dvec3 offset{0.0};
+  glm::dmat3 covariance{0.0};
+};
+
+/// The bins within the window's radius.
+std::vector<DisplacedBin> displaced_bins(const BodyWindow& window) {
+  std::vector<DisplacedBin> bins;
+  for (const BodyWindow::Bin& bin : window.bins) {
+    if (bin.within_radius) {
+      bins.push_back({bin.moved_mm, bin.log_likelihood});
+    }
+  }
+  return bins;
+}
+
+/// Peak of the quadratic in the body's motion that fits the log-belief around the mean. Nothing
+/// where the fit has no peak nearby and within the region.
+std::optional<Peak> peak_near(const BodyWindow& window, const PoseLattice& lattice,
+                              const Body& body, const glm::dvec3& mean, double root) {
   const BodyMotion motion(body, window.centre + mean);
   std::vector<WeightedValue> values;
   double farthest_rad = 0.0;
@@ -100,26 +105,37 @@ std::optional<glm::dvec3> peak_near(const BodyWindow& window, const PoseLattice&
   }
   const std::array<const Axis*, 3> axes{&lattice.x_mm, &lattice.y_mm, &lattice.theta_rad};
   const std::array varies{axes[0]->count > 1, axes[1]->count > 1, axes[2]->count > 1};
-  const std::optional<glm::dvec3> moved_mm = quadratic_peak(values, varies, least_curvature);
-  if (!moved_mm || glm::dot(*moved_mm, *moved_mm) > farthest_peak_mm * farthest_peak_mm) {
+  const std::optional<QuadraticPeak> fitted = quadratic_peak(values, varies, least_curvature);
+  if (!fitted || glm::dot(fitted->at, fitted->at) > farthest_peak_mm * farthest_peak_mm) {
     return {};
   }
-  const glm::dvec3 change = motion.change_for(*moved_mm);
+  const glm::dvec3 change = motion.change_for(fitted->at);
   // A small body turns far within a millimetre.
   if (std::abs(change.z) > farthest_rad) {
     return {};
   }
-  glm::dvec3 peak = mean;
+  Peak peak{.offset = mean};
+  glm::dmat3 slope{0.0};  // of the change in the motion, by columns
   for (int i = 0; i < 3; ++i) {
     if (varies[i]) {
-      peak[i] += change[i];
+      peak.offset[i] += change[i];
       const double at = window.centre[i] + mean[i] + change[i];
       const bool around = i == 2 && lattice.full_circle();
       if (!around && (at < axes[i]->lower || at > axes[i]->upper)) {
         return {};
       }
+      constexpr double little_mm = 1e-4;
+      glm::dvec3 moved_mm{0.0};
+      moved_mm[i] = little_mm;
+      slope[i] = motion.change_for(moved_mm) / little_mm;
     }
   }
+  for (int i = 0; i < 3; ++i) {  // a turn's lever is nothing to an axis that is fixed
+    for (int k = 0; k < 3 && !varies[i]; ++k) {
+      slope[k][i] = 0.0;
+    }
+  }
+  peak.covariance = slope * fitted->covariance * glm::transpose(slope);
   return peak;
 }
 
@@ -238,7 +254,7 @@ RefinedPose refine(const BoxLogLikelihood& log_likelihood, const PoseLattice& la
   BinIndex centre = bin_of(lattice, mode);
   for (int pass = 1; pass <= passes; ++pass) {
     window = body_window(log_likelihood, lattice, mode.object, body, centre, radius_mm);
-    root = root_of(window);
+    root = flattening_root(displaced_bins(window), least_root);
     mean = weighted_mean(window, root);
     const BinIndex nearest = bin_at(lattice, centre, mean);
     if (nearest == centre) {
@@ -246,13 +262,18 @@ RefinedPose refine(const BoxLogLikelihood& log_likelihood, const PoseLattice& la
     }
     centre = nearest;
   }
-  const glm::dvec3 offset = peak_near(window, lattice, body, mean, root).value_or(mean);
-  glm::dvec3 place = window.centre + offset;
+  Peak peak = peak_near(window, lattice, body, mean, root).value_or(Peak{.offset = mean});
+  // The quadratic's weights reach so far: what spreads more has another shape there.
+  if (peak.covariance == glm::dmat3(0.0) ||
+      spread_mm(displaced_bins(window), window.largest, 1.0) > peak_sd_mm) {
+    peak.covariance = second_moment(window, lattice, peak.offset);
+  }
+  glm::dvec3 place = window.centre + peak.offset;
   if (lattice.full_circle()) {
     place.z = on_circle(lattice.theta_rad, place.z);
   }
   return {.T_object_robot = lattice.T_object_robot(place.x, place.y, place.z),
-          .covariance = pose_covariance(second_moment(window, lattice, offset), lattice, place.z)};
+          .covariance = pose_covariance(peak.covariance, lattice, place.z)};
 }
 
 PoseLattice thinned(PoseLattice lattice) {
@@ -272,9 +293,9 @@ PoseLattice thinned(PoseLattice lattice) {
   return lattice;
 }
 
-std::optional<glm::dvec3> quadratic_peak(std::span<const WeightedValue> values,
-                                         const std::array<bool, 3>& varies,
-                                         double least_curvature) {
+std::optional<QuadraticPeak> quadratic_peak(std::span<const WeightedValue> values,
+                                            const std::array<bool, 3>& varies,
+                                            double least_curvature) {
   std::vector<int> axes;
   for (int axis = 0; axis < 3; ++axis) {
     if (varies[axis]) {
@@ -324,14 +345,20 @@ std::optional<glm::dvec3> quadratic_peak(std::span<const WeightedValue> values,
       return {};
     }
   }
-  if (!solve(std::move(curvature), peak)) {
+  if (!solve(curvature, peak)) {
     return {};
   }
-  glm::dvec3 at{0.0};
+  QuadraticPeak result;
   for (std::size_t a = 0; a < d; ++a) {
-    at[axes[a]] = peak[a];
+    result.at[axes[a]] = peak[a];
+    std::vector<double> column(d);
+    column[a] = 1.0;
+    solve(curvature, column);
+    for (std::size_t b = 0; b < d; ++b) {
+      result.covariance[axes[a]][axes[b]] = column[b];
+    }
   }
-  return at;
+  return result;
 }
 
 double flattening_root(std::span<const DisplacedBin> bins, double least) {

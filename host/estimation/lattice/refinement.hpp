@@ -4,6 +4,7 @@
 #include <optional>
 #include <span>
 
+#include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 
 #include "estimation/bin_box.hpp"
@@ -35,12 +36,21 @@ struct WeightedValue {
   double weight = 0.0;
 };
 
-/// The place of the maximum of the quadratic that fits the values in weighted least squares.
-/// Coordinates that do not vary stay at 0. Returns nothing where there are fewer than two values
-/// per coefficient, too few different places, or no maximum.
+/// The maximum of a quadratic.
+struct QuadraticPeak {
+  glm::dvec3 at{0.0};
+  /// Inverse of minus the second derivatives: the covariance, where the quadratic is the log of a
+  /// density.
+  glm::dmat3 covariance{0.0};
+};
+
+/// The maximum of the quadratic that fits the values in weighted least squares. Coordinates that do
+/// not vary stay at 0, without variance. Returns nothing where there are fewer than two values per
+/// coefficient, too few different places, or no maximum.
 /// @param least_curvature of a maximum, along each coordinate: values per coordinate squared
-std::optional<glm::dvec3> quadratic_peak(std::span<const WeightedValue> values,
-                                         const std::array<bool, 3>& varies, double least_curvature);
+std::optional<QuadraticPeak> quadratic_peak(std::span<const WeightedValue> values,
+                                            const std::array<bool, 3>& varies,
+                                            double least_curvature);
 
 /// A bin of a window.
 struct DisplacedBin {

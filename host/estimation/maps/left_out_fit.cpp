@@ -1,14 +1,21 @@
 #include "estimation/maps/left_out_fit.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
 #include <utility>
 #include <vector>
 
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+#include "estimation/lattice/refinement.hpp"
+#include "model/body_spread.hpp"
+#include "model/interpolated_map.hpp"
 #include "model/random.hpp"
-#include "model/touch_evidence.hpp"
 
 namespace palpate {
 
@@ -17,6 +24,18 @@ namespace {
 constexpr std::size_t parts = 4;
 constexpr std::size_t enough = 200;  // that are judged
 constexpr std::size_t least = 16;    // fewer would tell the sd to no more than a fifth of it
+
+/// Bins of T_object_robot about the identity, wide enough for refine() to move its window.
+PoseLattice lattice_about(const Body& body) {
+  constexpr double step_mm = 0.6;
+  constexpr int steps = 15;
+  const auto axis = [](double middle, double step) {
+    return Axis{middle - 0.5 * steps * step, middle + 0.5 * steps * step, steps};
+  };
+  const double spin_mm = std::sqrt(std::max(body.inertia_mm2, step_mm * step_mm));
+  return {axis(body.centroid_mm.x, step_mm), axis(body.centroid_mm.y, step_mm),
+          axis(0.0, step_mm / spin_mm), body.centroid_mm};
+}
 
 }  // namespace
 
@@ -33,12 +52,89 @@ std::optional<FitScale> scale_of(std::span<const double> z) {
   return z.size() > 1 && scale.sd > 0.0 ? std::optional(scale) : std::nullopt;
 }
 
-std::optional<FitScale> left_out_fit(Device& device, const MapSource& source) {
-  const std::vector<Touch> touches = source.touches.touches(0, source.touches.size());
-  const ContactModel contact{.classifier = source.options.classifier, .gamma = usual_gamma};
-  const std::vector<TouchEvidence> evidence = evidence_of(touches, contact);
-  if (std::cmp_less(std::ranges::count_if(evidence, &TouchEvidence::in_contact), least)) {
+std::vector<PlaceError> place_errors(std::span<const TouchEvidence> touches, const Hypothesis& of,
+                                     const ContactModel& contact, std::size_t object) {
+  constexpr std::array<std::size_t, 3> in_group{3, 9, 27};
+  constexpr std::size_t most_groups = 6;
+  constexpr double another_peak_mm = 1.5;
+  constexpr double wide_mm = 0.8;
+  const Body body = displaced_body(of.map);
+  const InterpolatedMap map(of.compared(), *contact.prior);
+  const PoseLattice lattice = lattice_about(body);
+  std::vector<PlaceError> errors;
+  const auto add_group = [&](std::size_t first, std::size_t every, std::size_t count) {
+    const auto log_likelihood = [&](std::span<const BinBox> boxes) {
+      std::vector<double> logs;
+      for (const BinBox& box : boxes) {
+        for (std::int64_t i = 0; i < box.bins(); ++i) {
+          const Pose T_object_robot = lattice.T_object_robot(box.bin(i, lattice));
+          double& sum = logs.emplace_back(0.0);
+          for (std::size_t k = 0; k < count; ++k) {
+            const TouchEvidence& touch = touches[first + k * every];
+            const Pose T_object_sensor = T_object_robot * touch.T_robot_sensor;
+            for (std::size_t e = 0; e < touch.readings.size(); ++e) {
+              const glm::dvec2 at_mm = T_object_sensor * touch.elements_mm[e];
+              sum += contact.log_likelihood(touch.readings[e], {map.log_odds(at_mm)}, object);
+            }
+          }
+        }
+      }
+      return logs;
+    };
+    const Mode own{.T_object_robot = Pose{}};
+    const ObjectPose found = inverse(refine(log_likelihood, lattice, body, own));
+    const Pose& at = found.T_robot_object;
+    const glm::dvec3 moved_mm(at * body.centroid_mm - body.centroid_mm,
+                              at.theta_rad * std::sqrt(body.inertia_mm2));
+    if (glm::length(moved_mm) < another_peak_mm && spread_mm(body, found) < wide_mm) {
+      errors.push_back({moved_mm, motion_covariance(body, found)});
+    }
+  };
+  for (const std::size_t count : in_group) {
+    // Neighbours of a scan are in groups of their own.
+    const std::size_t groups = touches.size() / count;
+    for (std::size_t group = 0; group < std::min(groups, most_groups); ++group) {
+      add_group(group, groups, count);
+    }
+  }
+  return errors;
+}
+
+std::optional<PoseScale> pose_scale_of(std::span<const PlaceError> errors) {
+  constexpr std::size_t enough_errors = 16;
+  constexpr double most_factor = 4.0;
+  constexpr double most_mm = 0.3;
+  if (errors.size() < enough_errors) {
     return {};
+  }
+  std::optional<PoseScale> best;
+  double least_cost = 0.0;
+  for (double factor = most_factor / 64.0; factor <= most_factor; factor *= 1.1) {
+    for (double sd_mm = 0.0; sd_mm <= most_mm; sd_mm += 0.01) {
+      double cost = 0.0;
+      for (const auto& [moved_mm, covariance] : errors) {
+        const glm::dmat3 all = factor * covariance + glm::dmat3(sd_mm * sd_mm);
+        cost += std::log(glm::determinant(all)) + glm::dot(moved_mm, glm::inverse(all) * moved_mm);
+      }
+      if (!best || cost < least_cost) {
+        best = {factor, sd_mm};
+        least_cost = cost;
+      }
+    }
+  }
+  return best;
+}
+
+void judge_left_out(Device& device, MapSource& source) {
+  const std::vector<Touch> touches = source.touches.touches(0, source.touches.size());
+  const ContactModel contact{.classifier = source.options.classifier,
+                             .gamma = usual_gamma,
+                             .prior = source.options.sensor.prior};
+  const std::vector<TouchEvidence> evidence = evidence_of(touches, contact);
+  source.left_out.reset();
+  source.pose_scale.reset();
+  if (std::cmp_less(std::ranges::count_if(evidence, &TouchEvidence::in_contact), least)) {
+    return;
   }
   constexpr std::uint64_t seed = 0;
   Random random(seed, Stream::touch_order);
@@ -48,23 +144,27 @@ std::optional<FitScale> left_out_fit(Device& device, const MapSource& source) {
   }
   MapBuilder builder(device, source.options);
   std::vector<double> z;
+  std::vector<PlaceError> errors;
   for (std::size_t left_out = 0; left_out < parts && z.size() < enough; ++left_out) {
     std::vector<Touch> others;
+    std::vector<TouchEvidence> judged;
     for (std::size_t i = 0; i < touches.size(); ++i) {
       if (part[i] != left_out) {
         others.push_back(touches[i]);
+      } else if (evidence[i].in_contact()) {
+        judged.push_back(evidence[i]);
       }
     }
     builder.clear();
     builder.add(others);
-    const OccupancyGrid map = builder.build(source.touches.object);
-    for (std::size_t i = 0; i < touches.size(); ++i) {
-      if (part[i] == left_out && evidence[i].in_contact()) {
-        z.push_back(evidence_fit(std::span(&evidence[i], 1), Pose{}, map, contact, 0)->z);
-      }
+    const Hypothesis of{.map = builder.build(source.touches.object)};
+    for (const TouchEvidence& touch : judged) {
+      z.push_back(evidence_fit(std::span(&touch, 1), Pose{}, of.map, contact, 0)->z);
     }
+    std::ranges::move(place_errors(judged, of, contact, 0), std::back_inserter(errors));
   }
-  return scale_of(z);
+  source.left_out = scale_of(z);
+  source.pose_scale = pose_scale_of(errors);
 }
 
 }  // namespace palpate

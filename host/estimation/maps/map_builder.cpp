@@ -200,7 +200,9 @@ OccupancyGrid with_prior(Device& device, const OccupancyGrid& map, double prior)
   result.log_odds = other.log_odds;
   auto source = std::make_shared<MapSource>(*map.source);
   source->options.sensor.prior = prior;
-  source->left_out = map.source->left_out ? left_out_fit(device, *source) : std::nullopt;
+  if (map.source->left_out) {
+    judge_left_out(device, *source);
+  }
   result.source = std::move(source);
   return result;
 }

@@ -123,6 +123,16 @@ struct RefinedPose {
   std::array<double, 9> covariance{};
 };
 
+/// How far poses are off where a belief is sure of them, as left-out touches show it.
+struct PoseScale {
+  /// Of the covariance. Eq. 7 is surer of a reading, or less, than the sensor deserves, and
+  /// readings of neighbouring elements are no news to each other.
+  double factor = 1.0;
+  /// What all touches share, since it is the map that is off: the standard deviation along each
+  /// axis of the body's motion (its centroid's shift, and its turn as a displacement), mm.
+  double map_sd_mm = 0.0;
+};
+
 /// A refined pose as a robot acts on it: the object's frame in the robot's.
 struct PALPATE_API ObjectPose {
   Pose T_robot_object;

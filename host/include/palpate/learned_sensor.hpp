@@ -122,7 +122,8 @@ struct PALPATE_API LearnedSensor {
   std::optional<BinSteps> bins;
   std::optional<LearnedFeatures> features;
   std::optional<Familiarity> familiarity;
-  std::optional<FitScale> fit_scale;  ///< of the z of Fit; without one, z stays as it is
+  std::optional<FitScale> fit_scale;    ///< of the z of Fit; without one, z stays as it is
+  std::optional<PoseScale> pose_scale;  ///< of the table
 
   /// Throws Error on a value out of range.
   void validate() const;

@@ -9,6 +9,7 @@
 #include "palpate/api.hpp"
 #include "palpate/contact.hpp"
 #include "palpate/device.hpp"
+#include "palpate/estimate.hpp"
 #include "palpate/fit.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/sensor_model.hpp"
@@ -74,6 +75,8 @@ struct MapSource {
   /// What the z of single touches is like by Eq. 7 with gamma 0.1, each at its pose on a map of the
   /// others: mean and sd alone. None where too few touches tell.
   std::optional<FitScale> left_out = {};
+  /// How far the poses of some of the touches are off on a map of the others, by Eq. 7 as above.
+  std::optional<PoseScale> pose_scale = {};
 };
 
 /// Returns the map as its `source` makes it with another prior, and what its touches are like where

@@ -78,10 +78,17 @@ double plain_root(const std::vector<Moved>& window) {
   return root * std::pow(2.0, (wanted - narrow) / (wide - narrow));
 }
 
+/// A quadratic's peak, relative to the mean of the bins, and where there is one, the inverse of
+/// minus its second derivatives.
+struct PlainPeak {
+  std::array<double, 3> at{};
+  double covariance[3][3] = {};
+  bool found = false;
+};
+
 /// The peak of a quadratic over the axes that vary, by elimination with pivots; the mean where
-/// there is none. Both relative to the mean.
-std::array<double, 3> plain_peak(const std::vector<Moved>& window, double root,
-                                 const bool (&varies)[3]) {
+/// there is none.
+PlainPeak plain_peak(const std::vector<Moved>& window, double root, const bool (&varies)[3]) {
   std::vector<int> axes;
   for (int a = 0; a < 3; ++a) {
     if (varies[a]) {
@@ -167,10 +174,22 @@ std::array<double, 3> plain_peak(const std::vector<Moved>& window, double root,
   }
   std::array<double, 3> peak{};
   eliminate(newton);
+  PlainPeak result;
   for (int a = 0; a < d; ++a) {
     peak[axes[a]] = newton[a][d] / newton[a][a];
+    std::vector<std::vector<double>> column;
+    for (int b = 0; b < d; ++b) {
+      column.emplace_back(h[b], h[b] + d);
+      column.back().push_back(a == b ? 1.0 : 0.0);
+    }
+    eliminate(column);
+    for (int b = 0; b < d; ++b) {
+      result.covariance[axes[a]][axes[b]] = column[b][d] / column[b][b];
+    }
   }
-  return std::hypot(peak[0], peak[1], peak[2]) > 1.0 ? std::array<double, 3>{} : peak;
+  result.at = peak;
+  result.found = std::hypot(peak[0], peak[1], peak[2]) <= 1.0;
+  return result.found ? result : PlainPeak{};
 }
 
 }  // namespace
@@ -261,7 +280,8 @@ RefinedPose plain_refinement(const std::vector<double>& logs, const PoseLattice&
       moved_bins.push_back({{by.x, by.y, spin_mm * (in.d[2] - offset[2])}, in.log});
     }
   }
-  const auto peak = plain_peak(moved_bins, 3.0 * root, {nx > 1, ny > 1, nt > 1});
+  const PlainPeak fitted = plain_peak(moved_bins, 3.0 * root, {nx > 1, ny > 1, nt > 1});
+  const std::array<double, 3>& peak = fitted.at;
   // The place at which the object has moved by that much.
   const double turn = peak[2] / spin_mm;
   const glm::dvec2 lever =
@@ -301,6 +321,22 @@ RefinedPose plain_refinement(const std::vector<double>& logs, const PoseLattice&
   for (int a = 0; a < 3; ++a) {
     for (int b = 0; b < 3; ++b) {
       moment[a][b] = moment[a][b] / own + (a == b ? step[a] * step[a] / 12.0 : 0.0);
+    }
+  }
+  if (fitted.found && inside && plain_spread_mm(moved_bins, 1.0) <= 0.8) {
+    // (x, y, theta) of a small motion of the body about the mean; fixed axes do not move.
+    const double arm[] = {lever.y / spin_mm, -lever.x / spin_mm, 1.0 / spin_mm};
+    const bool varies[] = {nx > 1, ny > 1, nt > 1};
+    double slope[3][3] = {{1.0, 0.0, arm[0]}, {0.0, 1.0, arm[1]}, {0.0, 0.0, arm[2]}};
+    for (int a = 0; a < 3; ++a) {
+      for (int b = 0; b < 3; ++b) {
+        moment[a][b] = 0.0;
+        for (int k = 0; k < 9; ++k) {
+          moment[a][b] += varies[a] && varies[b] && varies[k / 3] && varies[k % 3]
+                              ? slope[a][k / 3] * fitted.covariance[k / 3][k % 3] * slope[b][k % 3]
+                              : 0.0;
+        }
+      }
     }
   }
   double jacobian[3][3];
