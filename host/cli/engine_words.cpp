@@ -7,6 +7,7 @@
 
 #include "cli/options.hpp"
 #include "model/option_words.hpp"
+#include "model/printable.hpp"
 #include "recognition/filter_choice.hpp"
 
 namespace palpate::cli {
@@ -33,8 +34,9 @@ std::string setup_words(const Device& device, const RecognitionTask& task) {
   const auto mirrored =
       static_cast<std::size_t>(std::ranges::count_if(task.hypotheses, &Hypothesis::mirrored));
   const std::size_t maps = task.hypotheses.size() - mirrored;
-  return fmt::format("{} map{}{}, {} on {}", maps, maps == 1 ? "" : "s",
+  return fmt::format("{} map{}{}{}, {} on {}", maps, maps == 1 ? "" : "s",
                      mirrored > 0 ? fmt::format(" and {} mirrored", mirrored) : "",
+                     task.sensor_model.empty() ? "" : " with " + printable(task.sensor_model),
                      particles != nullptr
                          ? fmt::format("{} particles", particles->particles)
                          : fmt::format("{} x {} x {} bins each{},", lattice.x_mm.count,

@@ -112,7 +112,7 @@ struct RecognizeArguments {
 
 HistogramNeed histogram_need(const RecognizeArguments& options) {
   if (options.fit_touch_sd) {
-    return {"fit-touch-sd", touch_sd_fit_needs};
+    return {"fit-touch-sd", touch_sd_fit_needs, true};
   }
   if (!options.posterior.empty()) {
     return {"posterior", "holds the log-likelihood of every bin, and bounds evaluate few"};

@@ -10,7 +10,9 @@
 
 #include <tbb/parallel_for.h>
 
+#include "estimation/lattice/refinement.hpp"
 #include "learning/host_progress.hpp"
+#include "palpate/pose_error.hpp"
 #include "recognition/nearby_fit.hpp"
 
 namespace palpate {
@@ -114,6 +116,8 @@ class FoldTrial {
     if (model.table) {
       layers_ = layers_of(model.maps, model.how.layer);
     }
+    std::ranges::transform(model.maps, std::back_inserter(bodies_),
+                           [](const TrainingMap& map) { return displaced_body(map.map); });
   }
 
   bool has_map(const std::string& label) const {
@@ -146,7 +150,12 @@ class FoldTrial {
       std::ranges::transform(scores[i], std::back_inserter(scored.log_evidence),
                              &LabelScore::log_evidence);
       if (i >= tried.size()) {
-        result.groups[asked.half_of_group[i - tried.size()]].push_back(std::move(scored));
+        const std::size_t half = asked.half_of_group[i - tried.size()];
+        if (half == 0) {
+          scored.error_mm =
+              pose_error_of(evidence[i], scored.truth, *asked.presses[i].T_object_robot);
+        }
+        result.groups[half].push_back(std::move(scored));
         continue;
       }
       // A press of which nothing is In Contact says nothing of its object.
@@ -199,6 +208,46 @@ class FoldTrial {
       counter.add();
     });
     return scores;
+  }
+
+  /// See CrossValidation::groups.
+  double pose_error_of(std::span<const TouchEvidence> press, std::size_t label,
+                       const Pose& T_object_robot) const {
+    // To either side: a window that ended nearer would draw wide beliefs to its middle.
+    constexpr int steps_mm = 4;
+    constexpr int steps_rad = 3;
+    constexpr double of_spacing = 0.3;
+    constexpr double step_rad = 0.06;
+    const std::size_t map = maps_of_[label].front();
+    Hypothesis hypothesis{.map = model_.maps[map].map};
+    if (model_.table) {
+      hypothesis.layer = layers_[map];
+    }
+    const PressPlacer placer(hypothesis, contact_for(label), options_.bins->lattice);
+    const double step_mm = of_spacing * options_.spacing_mm;
+    std::vector<std::pair<double, Pose>> beside;
+    double most = nothing;
+    for (int a = -steps_rad; a <= steps_rad; ++a) {
+      for (int y = -steps_mm; y <= steps_mm; ++y) {
+        for (int x = -steps_mm; x <= steps_mm; ++x) {
+          const Pose pose{T_object_robot.translation_mm + step_mm * glm::dvec2(x, y),
+                          T_object_robot.theta_rad + step_rad * a};
+          beside.emplace_back(placer.log_likelihood(press, pose), pose);
+          most = std::max(most, beside.back().first);
+        }
+      }
+    }
+    Pose mean{{0.0, 0.0}, 0.0};
+    double sum = 0.0;
+    for (const auto& [log_likelihood, pose] : beside) {
+      const double weight = std::exp(log_likelihood - most);
+      mean.translation_mm += weight * pose.translation_mm;
+      mean.theta_rad += weight * pose.theta_rad;
+      sum += weight;
+    }
+    mean.translation_mm /= sum;
+    mean.theta_rad /= sum;
+    return pose_error_mm(bodies_[map], 1, mean, T_object_robot);
   }
 
   /// Log density of a touch's features under every label; empty without features.
@@ -265,6 +314,7 @@ class FoldTrial {
   const CrossValidationOptions& options_;
   std::vector<std::vector<std::size_t>> maps_of_;  ///< [label]
   std::vector<OccupancyGrid> layers_;              ///< [map] with a table
+  std::vector<Body> bodies_;                       ///< [map]
 };
 
 }  // namespace

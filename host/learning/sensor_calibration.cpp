@@ -1,6 +1,7 @@
 #include "learning/sensor_calibration.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <map>
 #include <numeric>
@@ -83,7 +84,7 @@ std::vector<std::string> labels_of(const std::vector<TrainingMap>& maps) {
 std::vector<std::string> warnings_about(const LearnedPresses& learned) {
   std::vector<std::string> warnings = stuck_elements(
       learned.presses, learned.readings.classifier.threshold, learned.readings.pressures);
-  if (at_known_poses(learned.presses) && !learned.readings.psf_mm) {
+  if (at_known_poses(learned.presses) && !learned.readings.psf_mm && !learned.readings.given_maps) {
     warnings.emplace_back(
         "the touches do not tell the point spread: too few of an object, or no edges; the "
         "maps' spread is 0.6 element spacings");
@@ -184,6 +185,41 @@ const TriedModel& kept(const std::vector<TriedModel>& tried,
   return *best;
 }
 
+/// The pose errors of a cross-validation's groups.
+std::vector<double> errors_of(const CrossValidation& validation) {
+  std::vector<double> errors;
+  for (const ScoredPress& group : validation.groups[0]) {
+    errors.push_back(group.error_mm.value());
+  }
+  return errors;
+}
+
+double mean_of(std::span<const double> numbers) {
+  return std::accumulate(numbers.begin(), numbers.end(), 0.0) / static_cast<double>(numbers.size());
+}
+
+/// @param after the presses of `table` with the temperature
+SensorGain gain_of(const CrossValidation& eq7, const CrossValidation& table,
+                   const std::vector<ScoredPress>& after) {
+  std::vector<double> losses_before;
+  for (const ScoredPress& press : eq7.presses) {
+    const double p = press_probabilities(press, 1.0)[press.truth];
+    losses_before.push_back(-std::log(std::max(p, least_answer_probability)));
+  }
+  const std::vector<double> losses = losses_of(after);
+  const std::vector<double> errors_before = errors_of(eq7);
+  const std::vector<double> errors = errors_of(table);
+  const bool gains =
+      is_clearly_less(losses, losses_before) || is_clearly_less(errors, errors_before);
+  const bool costs =
+      is_clearly_less(losses_before, losses) || is_clearly_less(errors_before, errors);
+  return {.log_loss_before = mean_of(losses_before),
+          .log_loss = mean_of(losses),
+          .error_mm_before = mean_of(errors_before),
+          .error_mm = mean_of(errors),
+          .better = gains && !costs};
+}
+
 /// Adds how right the cross-validation is: each fold's presses are judged by the table that the
 /// other folds keep.
 void judge(const CrossValidation& eq7, const std::vector<TriedModel>& tried, bool known_poses,
@@ -214,6 +250,9 @@ void judge(const CrossValidation& eq7, const std::vector<TriedModel>& tried, boo
                                 .before = scores_of(both(eq7.groups), 1.0),
                                 .table = scores_of(both(table.groups), 1.0),
                                 .after = scores_of(after.groups, 1.0)};
+    if (!eq7.groups[0].empty()) {
+      judged.gain = gain_of(eq7, table, after.presses);
+    }
   } else if (known_poses) {
     judged.warnings.push_back(
         fmt::format("too few touches to try {} of an object together on maps without them, so "
@@ -296,7 +335,8 @@ SensorCalibration calibrate_sensor(const std::vector<Press>& presses,
   ModelLearning how{.readings = {.pressure_unit = options.pressure_unit,
                                  .threshold = options.threshold,
                                  .ratio = options.ratio,
-                                 .spacing_mm = spacing_mm_of(presses)},
+                                 .spacing_mm = spacing_mm_of(presses),
+                                 .maps = options.maps},
                     .folds = options.folds};
   for (const OccupancyGrid& map : given) {
     how.given.push_back({map});
@@ -334,9 +374,13 @@ SensorCalibration calibrate_sensor(const std::vector<Press>& presses,
     one.how = table_learning(kind, learned, how);
     one.placed = learn_table(learned.presses, learned.maps, one.how, work.part(table_cost));
   }
-  const std::vector<std::vector<CrossValidation>> validations = cross_validate(
-      learned.presses, labels, tables, how,
-      {.folds = options.folds, .maps_per_object = options.most_maps, .bins = bins}, work);
+  const std::vector<std::vector<CrossValidation>> validations =
+      cross_validate(learned.presses, labels, tables, how,
+                     {.folds = options.folds,
+                      .maps_per_object = options.most_maps,
+                      .bins = bins,
+                      .spacing_mm = readings.spacing_mm},
+                     work);
   for (std::size_t i = 0; i < tables.size(); ++i) {
     TriedModel& one = tried[i];
     one.folds = validations[i];

@@ -25,6 +25,8 @@ struct SensorCalibrationOptions {
   /// Bins on which unknowns will be recognised, for touches at known poses; none stands for bins
   /// half the elements' spacing and 5 degrees wide, about the array's centre.
   std::optional<RecognitionBins> bins = {};
+  /// How the maps are built that unknowns will be recognised with; none: as ReadingOptions::maps.
+  std::optional<MapOptions> maps = {};
 };
 
 /// Touches at known poses have a table of seven levels over the mean pressure, which also tells
@@ -47,6 +49,16 @@ struct GroupScores {
   Scores after;
 };
 
+/// What recognition gains by a learned sensor over Eq. 7 on touches that neither has seen.
+struct SensorGain {
+  double log_loss_before = 0.0;  ///< of single touches by Eq. 7 with gamma 0.1, in nats
+  double log_loss = 0.0;         ///< of single touches by the table and the temperature
+  double error_mm_before = 0.0;  ///< mean of CrossValidation::groups by Eq. 7
+  double error_mm = 0.0;         ///< the same by the table
+  /// Of the losses and the errors, at least one is less beyond chance, and neither is more.
+  bool better = false;
+};
+
 /// A learned sensor and how good it is on presses that it has not seen.
 struct SensorCalibration {
   LearnedSensor sensor;
@@ -59,6 +71,7 @@ struct SensorCalibration {
   std::optional<Scores> table;        ///< the table, temperature 1
   std::optional<Scores> after;        ///< the table, temperature and features
   std::optional<GroupScores> groups;  ///< none for presses at unknown poses, or few touches
+  std::optional<SensorGain> gain;     ///< none where there are no groups
   /// Mean over the folds of the area under the curve of presses whose object is known against those
   /// whose object is left out, see FamiliarityScores: about one half where presses say nothing;
   /// none with one object.

@@ -94,7 +94,7 @@ std::vector<HistogramNeed> all_needs(const Request& request, const HistogramNeed
   }
   if (const std::string touch = giver_of(request, {touch_mm(request), touch_deg(request)});
       !touch.empty() || !histogram.touch_sd.none()) {
-    needs.push_back({touch.empty() ? "touch_sd in " + request.sensor_model : touch,
+    needs.push_back({touch.empty() ? "touch_sd in the sensor model" : touch,
                      "bounds take every touch's pose to be exact"});
   }
   if (request.memory_mib) {
@@ -222,10 +222,11 @@ ChosenFilter choose_filter(const FilterWish& wish, const Request& request,
   std::vector<HistogramNeed> needs = all_needs(request, of_caller, histogram);
   if (wish.kind == FilterKind::bounded) {
     if (!needs.empty()) {
-      const auto& [giver, why] = needs.front();
-      throw Error(Fault::input,
-                  giver.empty() ? fmt::format("{}: {}; leave it out", wish.by, why)
-                                : fmt::format("{}: {}; leave it out, or {}", giver, why, wish.by));
+      const HistogramNeed& need = needs.front();
+      throw Error(Fault::input, need.option.empty()
+                                    ? fmt::format("{}: {}; leave it out", wish.by, need.why)
+                                    : fmt::format("{}: {}; leave it out, or {}", need.option,
+                                                  need.why, wish.by));
     }
     return {asked_bounds(request, histogram), false, wish.by};
   }

@@ -69,6 +69,7 @@ struct RecognitionTask {
   std::optional<Familiarity> familiarity = {};
   FitScale fit_scale = {};                  ///< of RecognitionStep::fit
   ActWhere act = {};                        ///< for RecognitionStep::decision
+  std::string sensor_model = {};            ///< file of what was learned; "" by Eq. 7
   std::function<void()> cancel_point = {};  ///< BoundedOptions::cancel_point, where bounds search
   std::vector<std::string> remarks = {};    ///< sentences for the user, once the filter is open
 };

@@ -15,6 +15,7 @@ namespace palpate {
 struct HistogramNeed {
   std::string option = {};  ///< that asks for what needs it; "" where the caller always does
   std::string why = {};     ///< "" where every filter will do
+  bool eq7 = false;         ///< the sensor model of the maps' folder is not taken
 };
 
 /// What a task follows from beside its request.
