@@ -9,6 +9,7 @@
 #include <utility>
 
 #include <tbb/parallel_for.h>
+#include <glm/vec3.hpp>
 
 #include "estimation/lattice/refinement.hpp"
 #include "learning/host_progress.hpp"
@@ -213,41 +214,55 @@ class FoldTrial {
   /// See CrossValidation::groups.
   double pose_error_of(std::span<const TouchEvidence> press, std::size_t label,
                        const Pose& T_object_robot) const {
-    // To either side: a window that ended nearer would draw wide beliefs to its middle.
-    constexpr int steps_mm = 4;
-    constexpr int steps_rad = 3;
-    constexpr double of_spacing = 0.3;
-    constexpr double step_rad = 0.06;
+    constexpr int steps = 3;  // to either side
+    constexpr int most_rounds = 6;
+    constexpr double enough = 0.6;  // of a step: a standard deviation that the steps resolve
     const std::size_t map = maps_of_[label].front();
     Hypothesis hypothesis{.map = model_.maps[map].map};
     if (model_.table) {
       hypothesis.layer = layers_[map];
     }
     const PressPlacer placer(hypothesis, contact_for(label), options_.bins->lattice);
-    const double step_mm = of_spacing * options_.spacing_mm;
-    std::vector<std::pair<double, Pose>> beside;
-    double most = nothing;
-    for (int a = -steps_rad; a <= steps_rad; ++a) {
-      for (int y = -steps_mm; y <= steps_mm; ++y) {
-        for (int x = -steps_mm; x <= steps_mm; ++x) {
-          const Pose pose{T_object_robot.translation_mm + step_mm * glm::dvec2(x, y),
-                          T_object_robot.theta_rad + step_rad * a};
-          beside.emplace_back(placer.log_likelihood(press, pose), pose);
-          most = std::max(most, beside.back().first);
+    // The first window is wide: one that ended near the truth would draw beliefs to it.
+    glm::dvec3 step{0.3 * options_.spacing_mm, 0.3 * options_.spacing_mm, 0.06};
+    glm::dvec3 middle{T_object_robot.translation_mm, T_object_robot.theta_rad};
+    const auto pose_at = [](const glm::dvec3& at) { return Pose{{at.x, at.y}, at.z}; };
+    for (int round = 0; round < most_rounds; ++round) {
+      double most = nothing;
+      std::vector<std::pair<double, glm::dvec3>> about;
+      for (int a = -steps; a <= steps; ++a) {
+        for (int y = -steps; y <= steps; ++y) {
+          for (int x = -steps; x <= steps; ++x) {
+            const glm::dvec3 at = middle + step * glm::dvec3(x, y, a);
+            about.emplace_back(placer.log_likelihood(press, pose_at(at)), at);
+            most = std::max(most, about.back().first);
+          }
         }
       }
+      double sum = 0.0;
+      glm::dvec3 mean{0.0};
+      glm::dvec3 squares{0.0};
+      for (const auto& [log_likelihood, at] : about) {
+        const double weight = std::exp(log_likelihood - most);
+        sum += weight;
+        mean += weight * (at - middle);
+        squares += weight * (at - middle) * (at - middle);
+      }
+      mean /= sum;
+      const glm::dvec3 variance = squares / sum - mean * mean;
+      middle += mean;
+      bool resolved = true;
+      for (int axis = 0; axis < 3; ++axis) {
+        if (!(variance[axis] > enough * enough * step[axis] * step[axis])) {
+          step[axis] /= 2.0;
+          resolved = false;
+        }
+      }
+      if (resolved) {
+        break;
+      }
     }
-    Pose mean{{0.0, 0.0}, 0.0};
-    double sum = 0.0;
-    for (const auto& [log_likelihood, pose] : beside) {
-      const double weight = std::exp(log_likelihood - most);
-      mean.translation_mm += weight * pose.translation_mm;
-      mean.theta_rad += weight * pose.theta_rad;
-      sum += weight;
-    }
-    mean.translation_mm /= sum;
-    mean.theta_rad /= sum;
-    return pose_error_mm(bodies_[map], 1, mean, T_object_robot);
+    return pose_error_mm(bodies_[map], 1, pose_at(middle), T_object_robot);
   }
 
   /// Log density of a touch's features under every label; empty without features.

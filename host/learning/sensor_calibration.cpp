@@ -209,15 +209,20 @@ SensorGain gain_of(const CrossValidation& eq7, const CrossValidation& table,
   const std::vector<double> losses = losses_of(after);
   const std::vector<double> errors_before = errors_of(eq7);
   const std::vector<double> errors = errors_of(table);
+  constexpr double small_nats = 0.02;
+  constexpr double small_share = 0.1;
+  SensorGain gain{.log_loss_before = mean_of(losses_before),
+                  .log_loss = mean_of(losses),
+                  .error_mm_before = mean_of(errors_before),
+                  .error_mm = mean_of(errors)};
   const bool gains =
       is_clearly_less(losses, losses_before) || is_clearly_less(errors, errors_before);
-  const bool costs =
-      is_clearly_less(losses_before, losses) || is_clearly_less(errors_before, errors);
-  return {.log_loss_before = mean_of(losses_before),
-          .log_loss = mean_of(losses),
-          .error_mm_before = mean_of(errors_before),
-          .error_mm = mean_of(errors),
-          .better = gains && !costs};
+  const bool costs_nats =
+      is_clearly_less(losses_before, losses) && gain.log_loss > gain.log_loss_before + small_nats;
+  const bool costs_mm = is_clearly_less(errors_before, errors) &&
+                        gain.error_mm > (1.0 + small_share) * gain.error_mm_before;
+  gain.better = gains && !costs_nats && !costs_mm;
+  return gain;
 }
 
 /// Adds how right the cross-validation is: each fold's presses are judged by the table that the
