@@ -25,5 +25,6 @@ void add_evaluate(CLI::App& app);
 void add_export(CLI::App& app);
 void add_import(CLI::App& app);
 void add_info(CLI::App& app);
+void add_view(CLI::App& app);
 
 }  // namespace palpate::cli

@@ -8,6 +8,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <thread>
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
@@ -19,6 +20,7 @@
 #include "cli/live_record.hpp"
 #include "cli/live_screen.hpp"
 #include "cli/options.hpp"
+#include "cli/page/live_page.hpp"
 #include "cli/planned_touch.hpp"
 #include "cli/recognition_flags.hpp"
 #include "cli/sensor_option.hpp"
@@ -41,6 +43,7 @@ struct LiveArguments : SensorArguments {
   std::optional<double> reset_after_s;
   std::string plan;
   std::string json;
+  PageAddress page;
 };
 
 /// Tells what is wrong with the poses or the lattice as it happens: on standard error, or on the
@@ -153,6 +156,12 @@ void live(const LiveArguments& options) {
   std::FILE* const people = to_program ? stderr : stdout;
   const bool on_terminal =
       isatty(fileno(people)) != 0 && !(to_program && isatty(STDOUT_FILENO) != 0);
+  std::optional<LivePage> page;
+  if (options.page.port) {
+    page.emplace(options.page, description, elements_mm, task, recogniser, goal);
+    fmt::print(people, "{}\n", page->words());
+    std::fflush(people);
+  }
   if (!to_program && !on_terminal) {
     fmt::print("{}\n", table_heading(task));
     std::fflush(stdout);
@@ -170,9 +179,18 @@ void live(const LiveArguments& options) {
              if (json) {
                json->add(plan_line(touch));
              }
+             if (page) {
+               page->plan(touch);
+             }
              if (!to_program && !on_terminal) {
                fmt::print("         {}\n", next_touch_words(*touch.next, *goal));
                std::fflush(stdout);
+             }
+           },
+       .on_unknown =
+           [&] {
+             if (page) {
+               page->begin_unknown();
              }
            }},
       [&](const LiveTouch& touch) {
@@ -186,6 +204,9 @@ void live(const LiveArguments& options) {
         if (json) {
           json->add(json_line(touch, task));
         }
+        if (page) {
+          page->add(touch);
+        }
         if (!to_program && !on_terminal) {
           fmt::print("{}\n", table_line(touch, task));
           std::fflush(stdout);
@@ -194,12 +215,29 @@ void live(const LiveArguments& options) {
   {
     std::optional<LiveScreen> screen;
     if (on_terminal) {
-      screen.emplace(people, description, elements_mm, task, goal);
+      screen.emplace(people, description, elements_mm, task, goal,
+                     page ? page->words() : std::string());
     }
-    while (!recognition.wait_for_end(50ms) && !interruption.requested()) {
+    if (page) {
+      page->serve(&recognition);
+    }
+    // A page stays to be looked at.
+    while (!interruption.requested() && !recognition.failed()) {
+      if (recognition.wait_for_end(40ms)) {
+        if (!page) {
+          break;
+        }
+        std::this_thread::sleep_for(40ms);
+      }
       if (screen && screen->update(recognition.state(), complaints.last())) {
         recognition.reset();
       }
+      if (page) {
+        page->update(recognition.state(), complaints.last());
+      }
+    }
+    if (page) {
+      page->serve(nullptr);
     }
     recognition.finish();
   }
@@ -249,6 +287,7 @@ void add_live(CLI::App& app) {
       "--json", options->json,
       "Write a line of JSON for each touch as it comes, and with --plan a line with "
       "\"next\" as soon as its plan is there; - is standard output");
+  add_page_flags(*command, options->page);
   command->callback([options] { live(*options); });
 }
 

@@ -26,7 +26,7 @@ std::string dropped_cell(const std::string& text, const RecognitionTask& task) {
 
 }  // namespace
 
-std::string json_line(const LiveTouch& touch, const RecognitionTask& task) {
+nlohmann::ordered_json to_json(const LiveTouch& touch, const RecognitionTask& task) {
   const Pose& pose = *touch.touch.T_robot_sensor;
   nlohmann::ordered_json json{{"time", time_s(touch)},
                               {"unknown", touch.unknown},
@@ -41,8 +41,16 @@ std::string json_line(const LiveTouch& touch, const RecognitionTask& task) {
   }
   json["latency_ms"] = touch.latency_ms;
   json["frames_lost"] = touch.frames_lost;
+  if (!touch.left_out.empty()) {
+    json["left_out"] = touch.left_out;
+  }
+  return json;
+}
+
+std::string json_line(const LiveTouch& touch, const RecognitionTask& task) {
   // A label need not be UTF-8, as JSON must.
-  return json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+  return to_json(touch, task)
+      .dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
 }
 
 std::string plan_line(const LiveTouch& touch) {

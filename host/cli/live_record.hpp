@@ -4,13 +4,17 @@
 #include <memory>
 #include <string>
 
+#include <nlohmann/json.hpp>
+
 #include "recognition/live_recognition.hpp"
 
 namespace palpate::cli {
 
-/// A line of JSON for one touch: time (the middle of the steady phase, seconds since the Unix
+/// One touch as JSON: time (the middle of the steady phase, seconds since the Unix
 /// epoch), unknown and touch (counted from 0), pose (T_robot_sensor), the fields that `recognize`
-/// writes of an estimate, latency_ms and frames_lost.
+/// writes of an estimate, latency_ms, frames_lost and, where touches were left out, left_out.
+nlohmann::ordered_json to_json(const LiveTouch& touch, const RecognitionTask& task);
+/// to_json() in a line.
 std::string json_line(const LiveTouch& touch, const RecognitionTask& task);
 /// A line of JSON for the plan that follows a touch: unknown and touch as above, and next.
 std::string plan_line(const LiveTouch& touch);

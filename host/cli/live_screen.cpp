@@ -196,7 +196,7 @@ using namespace std::chrono_literals;
 
 LiveScreen::LiveScreen(std::FILE* output, const SensorDescription& sensor,
                        const std::vector<glm::dvec2>& elements_mm, const RecognitionTask& task,
-                       std::optional<PlanGoal> plan)
+                       std::optional<PlanGoal> plan, const std::string& page)
     : output_(output), task_(task), plan_(plan) {
   view_.sensor = sensor.serial.empty() ? sensor.name : sensor.name + " " + sensor.serial;
   view_.elements_mm = elements_mm;
@@ -211,6 +211,7 @@ LiveScreen::LiveScreen(std::FILE* output, const SensorDescription& sensor,
   if (terminal_moves_cursor()) {
     terminal_.emplace(fileno(output), STDIN_FILENO);
     view_.keys = terminal_->has_keys() ? "r: next unknown   Ctrl-C: end" : "Ctrl-C: end";
+    view_.keys += page.empty() ? "" : "   " + page;
   }
 }
 

@@ -61,9 +61,10 @@ std::vector<std::string> draw(const LiveView& view, int columns, int rows, Termi
 class LiveScreen {
  public:
   /// @param output the terminal; keys are read from standard input
+  /// @param page where else to look; "": nowhere
   LiveScreen(std::FILE* output, const SensorDescription& sensor,
              const std::vector<glm::dvec2>& elements_mm, const RecognitionTask& task,
-             std::optional<PlanGoal> plan = {});
+             std::optional<PlanGoal> plan = {}, const std::string& page = "");
 
   /// Shows the state, and beside it the warning unless it is "". Returns true if the key for the
   /// next unknown was pressed.

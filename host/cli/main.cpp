@@ -12,6 +12,7 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/commands.hpp"
+#include "cli/help.hpp"
 #include "io/descriptor.hpp"
 #include "io/hdf5_process.hpp"
 #include "model/option_words.hpp"
@@ -97,8 +98,10 @@ int run(int argc, char** argv) {
   palpate::cli::add_plan(app);
   palpate::cli::add_evaluate(app);
   palpate::cli::add_info(app);
+  palpate::cli::add_view(app);
   palpate::cli::add_export(app);
   refuse_empty_values(app);
+  palpate::cli::arrange_help(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -108,17 +111,24 @@ int run(int argc, char** argv) {
       return finish();
     }
     const auto commands = app.get_subcommands();
-    const auto unexpected = app.remaining();
-    if (commands.empty() && !unexpected.empty()) {
-      // CLI11 would only say that a command is missing.
-      return complain(wrong_input, fmt::format("'{}' is no command or flag; see palpate --help",
-                                               unexpected.front()));
+    const CLI::App* command = commands.empty() ? nullptr : commands.front();
+    const auto unexpected = app.remaining(true);
+    const bool unknown = error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError);
+    const bool flag = !unexpected.empty() && unexpected.front().starts_with('-');
+    if (!unexpected.empty() && (command == nullptr || unknown || flag)) {
+      const std::string& typed = unexpected.front();
+      return complain(wrong_input,
+                      fmt::format("'{}' is {}{}; see palpate {}--help", typed,
+                                  command == nullptr ? "no command or flag"
+                                  : flag             ? "no flag of palpate " + command->get_name()
+                                                     : "one argument too many",
+                                  palpate::cli::suggestion(app, command, typed),
+                                  command == nullptr ? "" : command->get_name() + " "));
     }
     const bool number = error.get_name() == "ConversionError";  // all values but texts are numbers
-    return complain(
-        wrong_input,
-        fmt::format("{}{}; see palpate {}--help", error.what(), number ? ": give a number" : "",
-                    commands.empty() ? "" : commands.front()->get_name() + " "));
+    return complain(wrong_input, fmt::format("{}{}; see palpate {}--help", error.what(),
+                                             number ? ": give a number" : "",
+                                             command == nullptr ? "" : command->get_name() + " "));
   }
   const int finished = finish();
   return finished != 0 ? finished : status;

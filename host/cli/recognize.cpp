@@ -308,7 +308,7 @@ void recognize(const RecognizeArguments& options) {
       write_file(
           png_path(options, unknown),
           draw_recognition(sheet_of(records.back(), unknown, task,
-                                    recogniser.marginals(records.back().last().mode.object))));
+                                    belief_of(recogniser, records.back().last().mode.object))));
     }
     progress->next();
   }

@@ -82,8 +82,16 @@ double element_edge_mm(std::span<const glm::dvec2> elements_mm) {
   return 0.9 * nearest;
 }
 
+PlacedBelief belief_of(const Recogniser& recogniser, int object) {
+  constexpr double least_share = 1e-6;
+  PoseLattice lattice;
+  const auto bins = recogniser.likely_bins(std::span(&object, 1), least_share, lattice);
+  return bins.front().empty() ? PlacedBelief{.cells = 1, .xy = {0.0}}
+                              : placed_belief(lattice, bins.front());
+}
+
 RecognitionSheet sheet_of(const RecognitionRecord& record, const Unknown& unknown,
-                          const RecognitionTask& task, Marginals belief) {
+                          const RecognitionTask& task, PlacedBelief belief) {
   const RecognitionStep& last = record.last();
   RecognitionSheet sheet;
   sheet.title = name_of(record);
@@ -104,6 +112,12 @@ RecognitionSheet sheet_of(const RecognitionRecord& record, const Unknown& unknow
     sheet.truth = last.truth.T_object_robot;
   }
   sheet.belief = std::move(belief);
+  for (std::size_t i = 0; i < last.places.modes.size(); ++i) {
+    const BeliefMode& mode = last.places.modes[i];
+    sheet.modes.push_back({fmt::format("{} {:.1f} %", printable(mode_words(mode.object, task)),
+                                       100.0 * mode.probability),
+                           mode.pose, i == last.places.own});
+  }
   sheet.labels = task.labels;
   for (const Touch& touch : unknown.touches) {
     auto& footprint = sheet.footprints_mm.emplace_back();

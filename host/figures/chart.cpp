@@ -18,14 +18,14 @@ constexpr double row_px = 32.0;  // of the legend
 constexpr double sample_px = 64.0;
 constexpr double radius_px = 7.5;
 
-void draw_mark(Canvas& canvas, const ChartSeries& series, glm::dvec2 at) {
+void draw_mark(Canvas& canvas, const ChartSeries& series, glm::dvec2 at, double size = 1.0) {
   // A white edge separates marks that overlap.
   const Pen edge{.colour = white, .width_px = 1.5};
   if (series.mark == Mark::circle) {
-    canvas.disc(at, radius_px, series.colour);
-    canvas.circle(at, radius_px, edge);
+    canvas.disc(at, size * radius_px, series.colour);
+    canvas.circle(at, size * radius_px, edge);
   } else if (series.mark == Mark::square) {
-    const double r = radius_px;
+    const double r = size * radius_px;
     const std::array corners{at + glm::dvec2(-r, -r), at + glm::dvec2(r, -r), at + glm::dvec2(r, r),
                              at + glm::dvec2(-r, r)};
     canvas.fill(corners, series.colour);
@@ -101,9 +101,10 @@ class Plot {
   }
 
   void intervals(const ChartSeries& series) {
-    const Pen pen{.colour = series.colour, .width_px = 2.0};
+    Pen pen{.colour = series.colour, .width_px = 2.0};
     constexpr glm::dvec2 half_cap(5.0, 0.0);
     for (const ChartPoint& point : series.points) {
+      pen.colour.alpha = point.size;
       if (point.low <= point.high) {
         const std::array ends{view_.pixel({point.x, point.low}),
                               view_.pixel({point.x, point.high})};
@@ -128,7 +129,7 @@ class Plot {
   void marks(const ChartSeries& series) {
     for (const ChartPoint& point : series.points) {
       const glm::dvec2 at = pixel(point);
-      draw_mark(canvas_, series, at);
+      draw_mark(canvas_, series, at, point.size);
       if (series.mark != Mark::none) {
         taken_.push_back({at.x - radius_px, at.y - radius_px, 2.0 * radius_px, 2.0 * radius_px});
       }

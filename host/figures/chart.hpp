@@ -30,6 +30,7 @@ struct ChartPoint {
   double low = std::numeric_limits<double>::quiet_NaN();  ///< of y; NaN: no interval
   double high = std::numeric_limits<double>::quiet_NaN();
   std::string label = {};  ///< text beside the point, where there is room
+  double size = 1.0;       ///< of its mark, above 0; the interval is as faint as the mark is small
 };
 
 struct ChartSeries {

@@ -8,6 +8,7 @@
 
 #include <glm/vec2.hpp>
 
+#include "figures/placed_belief.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/pose.hpp"
@@ -16,7 +17,7 @@ namespace palpate {
 
 /// Draws maps side by side at one scale and returns the bytes of a PNG file. Colours show log odds
 /// relative to each map's prior (white = prior, blue = empty, red = occupied); one colour bar in
-/// nats and one scale bar in mm serve all. y points up. The same maps give the same bytes.
+/// nats serves all, and each has axes in mm. y points up. The same maps give the same bytes.
 /// @throws Error on an empty list, a map without cells, or lack of memory
 std::string draw_maps(std::span<const OccupancyGrid> maps);
 
@@ -33,15 +34,23 @@ struct RecognitionSheet {
   std::vector<std::vector<glm::dvec2>> footprints_mm;  ///< [touch][element] in the robot frame
   double element_mm = 1.8;                             ///< edge at which an element is drawn
   Pose T_object_robot;                                 ///< estimated
-  std::optional<Pose> truth;        ///< T_object_robot, if known and the identity is right
-  Marginals belief;                 ///< of the estimated object
-  std::vector<std::string> labels;  ///< [object]; equal labels are drawn as one, summed
+  std::optional<Pose> truth;  ///< T_object_robot, if known and the identity is right
+  PlacedBelief belief;        ///< of the estimated object
+  /// Where the belief lies, of any object.
+  struct Mode {
+    std::string name;  ///< such as "E 97.9 %"
+    ObjectPose pose;
+    bool own = false;  ///< of the estimated pose
+  };
+  std::vector<Mode> modes = {};
+  std::vector<std::string> labels;            ///< [object]; equal labels are drawn as one, summed
   std::vector<std::vector<double>> identity;  ///< [touch][object] probability after each touch
 };
 
-/// Draws a sheet and returns the bytes of a PNG file: the map with the sensor's footprints at the
-/// estimated and at the true pose, the belief over (x, y), and the identity probabilities over the
-/// touches. For a symmetric object, the true pose drawn is the one nearest to the estimate. The
+/// Draws a sheet and returns the bytes of a PNG file: in the robot frame, the map at the estimated
+/// pose, the sensor's footprints and the modes with the ellipses that hold 68 and 95 % of their x
+/// and y; the belief over where T_robot_object's origin lies; and the identity probabilities over
+/// the touches. For a symmetric object, the true pose drawn is the one nearest to the estimate. The
 /// same sheet gives the same bytes.
 /// @throws Error on a map without cells, arrays of the wrong size, a symmetric object with a truth
 /// but without an occupied cell, or lack of memory
@@ -113,8 +122,8 @@ struct ConfusionFigure {
 
 /// Draws the matrix and returns the bytes of a PNG file: the first row on top, every count in its
 /// cell, the right ones on blue and the wrong ones on red, the darker the larger the share of its
-/// row. Where there are too many classes for numbers, the cells have only their colours. The same
-/// contents give the same bytes.
+/// row. Where there are too many classes for numbers, the cells have only
+/// their colours. The same contents give the same bytes.
 /// @throws Error without a row or a column, where a row has not one count for each column, or for
 /// lack of memory
 std::string draw_confusion(const ConfusionFigure& figure);

@@ -14,6 +14,8 @@ namespace {
 
 constexpr double margin_px = 40.0;
 constexpr double gap_px = 24.0;
+constexpr double axis_px = 84.0;     ///< to the left of each map
+constexpr double below_px = 60.0;    ///< below each map, for its axis
 constexpr double title_px = 60.0;    ///< above the maps
 constexpr double label_px = 34.0;    ///< above each map
 constexpr double legend_px = 150.0;  ///< below the maps
@@ -22,7 +24,6 @@ constexpr double largest_tile_px = 600.0;
 constexpr double smallest_tile_px = 60.0;
 constexpr double bar_px = 440.0;
 constexpr double bar_inset_px = 30.0;  ///< room for the last tick's label
-constexpr double longest_scale_bar_px = 240.0;
 
 /// Layout of the maps: rows of tiles as large as the largest map, at one scale.
 struct Grid {
@@ -44,7 +45,7 @@ Grid arrange(std::span<const OccupancyGrid> maps) {
     extent_mm = glm::max(extent_mm, map.cell_mm * glm::dvec2(map.nx, map.ny));
   }
   const double side_px =
-      std::clamp(tiles_px / grid.columns - gap_px, smallest_tile_px, largest_tile_px);
+      std::clamp(tiles_px / grid.columns - axis_px - gap_px, smallest_tile_px, largest_tile_px);
   grid.px_per_mm = side_px / std::max(extent_mm.x, extent_mm.y);
   // A narrow map still needs width for its label.
   grid.tile_px = glm::max(glm::ceil(grid.px_per_mm * extent_mm), glm::dvec2(smallest_tile_px, 1.0));
@@ -53,14 +54,14 @@ Grid arrange(std::span<const OccupancyGrid> maps) {
 
 /// Draws the x and y axis of the object frame, where its origin lies on the map.
 void draw_frame(Canvas& canvas, const View& view) {
-  constexpr double axis_px = 36.0;
+  constexpr double arm_px = 36.0;
   const Canvas::Clip clip(canvas, view.box);
   const glm::dvec2 origin = view.pixel({0.0, 0.0});
   const Pen pen{.width_px = 3.0, .halo_px = 2.0};
-  canvas.segment(origin, origin + glm::dvec2(axis_px, 0.0), pen);
-  canvas.segment(origin, origin - glm::dvec2(0.0, axis_px), pen);
-  canvas.text("x", origin + glm::dvec2(axis_px + 4.0, 6.0), body);
-  canvas.text("y", origin - glm::dvec2(6.0, axis_px + 6.0), body);
+  canvas.segment(origin, origin + glm::dvec2(arm_px, 0.0), pen);
+  canvas.segment(origin, origin - glm::dvec2(0.0, arm_px), pen);
+  canvas.text("x", origin + glm::dvec2(arm_px + 4.0, 6.0), body);
+  canvas.text("y", origin - glm::dvec2(6.0, arm_px + 6.0), body);
 }
 
 void draw_tile(Canvas& canvas, const Box& tile, double px_per_mm, const OccupancyGrid& map,
@@ -72,17 +73,14 @@ void draw_tile(Canvas& canvas, const Box& tile, double px_per_mm, const Occupanc
                   .upper = upper_edge_mm(map)};
   draw_cells(canvas, view, map, scale);
   draw_frame(canvas, view);
-  canvas.frame(view.box, {.colour = grey, .width_px = 1.0});
+  // A label of a tick takes some 80 pixels along x and 40 along y.
+  const auto ticks = [](double lower, double upper, double room) {
+    return even_ticks(lower, upper, std::clamp(static_cast<int>(room), 1, 6));
+  };
+  draw_axes(canvas, view, ticks(view.lower.x, view.upper.x, view.box.width / 80.0),
+            ticks(view.lower.y, view.upper.y, view.box.height / 40.0), "x, mm", "y, mm");
   canvas.text(canvas.fit(map.label, tile.width, heading),
               {tile.left + tile.width / 2, tile.top - 10.0}, heading, Align::centre);
-}
-
-/// Draws a bar of the largest power of ten in mm that fits.
-void draw_scale_bar(Canvas& canvas, glm::dvec2 left_px, double px_per_mm) {
-  const double length_mm = std::pow(10.0, std::floor(std::log10(longest_scale_bar_px / px_per_mm)));
-  const double length_px = length_mm * px_per_mm;
-  canvas.segment(left_px, left_px + glm::dvec2(length_px, 0.0), {.width_px = 5.0});
-  canvas.text(number(length_mm) + " mm", left_px + glm::dvec2(0.0, 28.0), body);
 }
 
 }  // namespace
@@ -97,9 +95,10 @@ std::string draw_maps(std::span<const OccupancyGrid> maps) {
   const EvidenceScale scale = evidence_scale(maps);
   const Grid grid = arrange(maps);
 
-  const double tiles_width = grid.columns * (grid.tile_px.x + gap_px) - gap_px;
-  const double content = std::max(tiles_width, longest_scale_bar_px + bar_px + 3 * bar_inset_px);
-  const double row_px = label_px + grid.tile_px.y + gap_px;
+  const double column_px = axis_px + grid.tile_px.x + gap_px;
+  const double tiles_width = grid.columns * column_px - gap_px;
+  const double content = std::max(tiles_width, bar_px + 2 * bar_inset_px);
+  const double row_px = label_px + grid.tile_px.y + below_px + gap_px;
   const double legend_top = title_px + margin_px + grid.rows * row_px;
   Canvas canvas(static_cast<int>(content + 2 * margin_px),
                 static_cast<int>(legend_top + legend_px));
@@ -111,11 +110,10 @@ std::string draw_maps(std::span<const OccupancyGrid> maps) {
     const double column = static_cast<double>(k % grid.columns);
     const std::size_t row_index = k / grid.columns;
     const auto row = static_cast<double>(row_index);
-    const Box tile{left + column * (grid.tile_px.x + gap_px),
+    const Box tile{left + column * column_px + axis_px,
                    title_px + margin_px + row * row_px + label_px, grid.tile_px.x, grid.tile_px.y};
     draw_tile(canvas, tile, grid.px_per_mm, maps[k], scale);
   }
-  draw_scale_bar(canvas, {margin_px, legend_top + 46.0}, grid.px_per_mm);
   draw_evidence_bar(canvas,
                     {margin_px + content - bar_px - bar_inset_px, legend_top + 36.0, bar_px, 20.0},
                     scale);

@@ -1,5 +1,8 @@
 #include "figures/map_layer.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 #include <fmt/format.h>
 
 #include "palpate/error.hpp"
@@ -20,6 +23,23 @@ void draw_cells(Canvas& canvas, const View& view, const OccupancyGrid& map,
   const double prior = map.prior_log_odds();
   canvas.cells(view.pixels(lower_edge_mm(map), upper_edge_mm(map)), map.nx, map.ny,
                [&](int i, int j) { return scale.colour(map.at(i, j) - prior); });
+}
+
+void draw_cells(Canvas& canvas, const View& view, const OccupancyGrid& map,
+                const EvidenceScale& scale, const Pose& T_map_view) {
+  const auto across = static_cast<int>(view.box.width);
+  const auto up = static_cast<int>(view.box.height);
+  const double prior = map.prior_log_odds();
+  canvas.cells(view.box, across, up, [&](int u, int v) {
+    const glm::dvec2 part{(u + 0.5) / across, (v + 0.5) / up};
+    const glm::dvec2 cell =
+        (T_map_view * (view.lower + part * (view.upper - view.lower)) - map.origin_mm) /
+        map.cell_mm;
+    const auto i = static_cast<int>(std::lround(std::clamp(cell.x, -1.0, 1.0 * map.nx)));
+    const auto j = static_cast<int>(std::lround(std::clamp(cell.y, -1.0, 1.0 * map.ny)));
+    const bool inside = i >= 0 && j >= 0 && i < map.nx && j < map.ny;
+    return inside ? scale.colour(map.at(i, j) - prior) : white;
+  });
 }
 
 void draw_evidence_bar(Canvas& canvas, const Box& box, const EvidenceScale& scale) {

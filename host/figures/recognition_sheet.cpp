@@ -2,7 +2,6 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
-#include <initializer_list>
 #include <numbers>
 #include <optional>
 #include <span>
@@ -42,7 +41,10 @@ constexpr double smallest_element_px = 4.0;
 constexpr double decades = 6.0;
 
 constexpr Colour alarm{0.75, 0.1, 0.1};
-constexpr Pen estimate_pen{.colour = {0.0, 0.0, 0.0}, .width_px = 2.5, .halo_px = 1.5};
+constexpr Pen touch_pen{.colour = {0.0, 0.0, 0.0}, .width_px = 2.5, .halo_px = 1.5};
+constexpr Pen mode_pen{.colour = {0.8, 0.475, 0.655}, .width_px = 2.5, .halo_px = 1.5};
+constexpr Pen other_pen{
+    .colour = {0.45, 0.2, 0.45}, .width_px = 2.0, .dashed = true, .halo_px = 1.5};
 constexpr Pen truth_pen{
     .colour = {0.0, 0.55, 0.35}, .width_px = 2.5, .dashed = true, .halo_px = 1.5};
 
@@ -54,12 +56,12 @@ Box bar(int panel) { return {plot(panel).left, bar_top_px, side_px, bar_height_p
 
 void validate(const RecognitionSheet& sheet) {
   require_cells(sheet.map);
-  sheet.belief.grid.validate();
-  const auto plane = static_cast<std::size_t>(sheet.belief.grid.plane());
-  if (sheet.belief.xy.size() != plane) {
-    throw Error(Fault::input, fmt::format("sheet '{}': belief.xy has {} values: give {}, one per "
-                                          "x and y of its grid",
-                                          sheet.title, sheet.belief.xy.size(), plane));
+  const auto cells = static_cast<std::size_t>(sheet.belief.cells) * sheet.belief.cells;
+  if (cells == 0 || sheet.belief.xy.size() != cells) {
+    throw Error(Fault::input, fmt::format("sheet '{}': belief.xy has {} values: give {} x {}, one "
+                                          "for each cell",
+                                          sheet.title, sheet.belief.xy.size(), sheet.belief.cells,
+                                          sheet.belief.cells));
   }
   for (const std::vector<double>& probabilities : sheet.identity) {
     if (probabilities.size() != sheet.labels.size()) {
@@ -129,78 +131,117 @@ std::string meaning_of_truth(const RecognitionSheet& sheet, const std::string& m
   return sheet.map.symmetry == 1 ? meaning : meaning + ", by symmetry";
 }
 
-/// Returns the touches' footprints in the object frame, given T_object_robot.
-std::vector<Footprint> footprints(const RecognitionSheet& sheet, const Pose& T_object_robot) {
-  std::vector<Footprint> result;
-  for (const std::vector<glm::dvec2>& elements : sheet.footprints_mm) {
-    std::vector<glm::dvec2> centres;
-    for (const glm::dvec2& p_robot : elements) {
-      centres.push_back(T_object_robot * p_robot);
-    }
-    result.push_back(footprint(centres, sheet.element_mm));
-  }
-  return result;
+/// The corners of a box that a pose T_object_robot places, in the robot frame.
+std::array<glm::dvec2, 4> placed(const BoundingBox& box, const Pose& T_object_robot) {
+  const Pose T_robot_object = inverse(T_object_robot);
+  return {T_robot_object * box.lower, T_robot_object * glm::dvec2(box.upper.x, box.lower.y),
+          T_robot_object * box.upper, T_robot_object * glm::dvec2(box.lower.x, box.upper.y)};
 }
 
-/// Returns the view of a square of the object frame that holds the map and all touches.
-View view_around(const Box& box, const OccupancyGrid& map,
-                 std::initializer_list<const std::vector<Footprint>*> touches) {
-  BoundingBox part{lower_edge_mm(map), upper_edge_mm(map)};
-  for (const std::vector<Footprint>* footprints : touches) {
-    for (const Footprint& f : *footprints) {
-      for (const glm::dvec2& corner : f.outline) {
-        part.take_in(corner);
-      }
-    }
+/// Returns the view of a square of the robot frame that holds the map and all touches.
+View view_around(const Box& box, const RecognitionSheet& sheet,
+                 std::span<const Footprint> footprints, std::span<const glm::dvec2> truth) {
+  BoundingBox part = bounding_box(
+      placed({lower_edge_mm(sheet.map), upper_edge_mm(sheet.map)}, sheet.T_object_robot));
+  for (const Footprint& f : footprints) {
+    std::ranges::for_each(f.outline, [&](const glm::dvec2& corner) { part.take_in(corner); });
   }
+  std::ranges::for_each(truth, [&](const glm::dvec2& corner) { part.take_in(corner); });
   const glm::dvec2 half(0.51 * std::max(part.extent().x, part.extent().y));
   return {.box = box, .lower = part.middle() - half, .upper = part.middle() + half};
 }
 
+/// Draws the ellipses that hold 68 and 95 % of a mode's x and y.
+void draw_ellipses(Canvas& canvas, const View& view, const ObjectPose& pose, const Pen& pen) {
+  const double xx = pose.covariance[0];
+  const double xy = pose.covariance[1];
+  const double yy = pose.covariance[4];
+  const double middle = (xx + yy) / 2.0;
+  const double spread = std::hypot((xx - yy) / 2.0, xy);
+  const double turn = 0.5 * std::atan2(2.0 * xy, xx - yy);
+  for (const double held : {0.68, 0.95}) {
+    const double radius = std::sqrt(-2.0 * std::log(1.0 - held));
+    const glm::dvec2 axes =
+        radius * glm::dvec2(std::sqrt(middle + spread), std::sqrt(std::max(middle - spread, 0.0)));
+    std::vector<glm::dvec2> outline;
+    constexpr int corners = 64;
+    for (int k = 0; k < corners; ++k) {
+      const double angle = 2.0 * std::numbers::pi * k / corners;
+      outline.push_back(pose.T_robot_object.translation_mm +
+                        rotate(turn, axes * glm::dvec2(std::cos(angle), std::sin(angle))));
+    }
+    canvas.polygon(view.pixels(outline), pen);
+  }
+}
+
+/// Draws the modes, each with its name beside it where it is not the estimate's.
+void draw_modes(Canvas& canvas, const View& view, const RecognitionSheet& sheet) {
+  for (const RecognitionSheet::Mode& mode : sheet.modes) {
+    draw_ellipses(canvas, view, mode.pose, mode.own ? mode_pen : other_pen);
+    const glm::dvec2 at = mode.pose.T_robot_object.translation_mm;
+    if (!mode.own && view.contains(at)) {
+      const glm::dvec2 words = view.pixel(at) + glm::dvec2(14.0, -10.0);
+      const glm::dvec2 right{canvas.text_width(mode.name, small), 0.0};
+      const glm::dvec2 up{0.0, -small.size_px};
+      const std::array ground{words, words + right, words + right + up, words + up};
+      canvas.fill(ground, {1.0, 1.0, 1.0, 0.8});
+      canvas.text(mode.name, words, small, Align::left, other_pen.colour);
+    }
+  }
+}
+
 void draw_touches(Canvas& canvas, const RecognitionSheet& sheet) {
-  const std::vector<Footprint> estimated = footprints(sheet, sheet.T_object_robot);
-  const std::optional<Pose> truth = nearest_truth(sheet);
-  const std::vector<Footprint> actual =
-      truth ? footprints(sheet, *truth) : std::vector<Footprint>{};
-  const View view = view_around(plot(0), sheet.map, {&estimated, &actual});
+  std::vector<Footprint> footprints;
+  for (const std::vector<glm::dvec2>& elements : sheet.footprints_mm) {
+    footprints.push_back(footprint(elements, sheet.element_mm));
+  }
+  const BoundingBox body = occupied_box(sheet.map);
+  std::vector<glm::dvec2> actual;
+  if (const std::optional<Pose> truth = nearest_truth(sheet)) {
+    const auto corners = placed(body, *truth);
+    actual.assign(corners.begin(), corners.end());
+  }
+  const View view = view_around(plot(0), sheet, footprints, actual);
   const EvidenceScale scale = evidence_scale(std::span(&sheet.map, 1));
   {
     const Canvas::Clip clip(canvas, view.box);
-    draw_cells(canvas, view, sheet.map, scale);
+    draw_cells(canvas, view, sheet.map, scale, sheet.T_object_robot);
     const double element_px = sheet.element_mm * view.box.width / (view.upper.x - view.lower.x);
     const double alpha = std::min(element_px / opaque_element_px, 0.25);
-    for (const Footprint& f : estimated) {
+    for (const Footprint& f : footprints) {
       if (element_px >= smallest_element_px) {
         for (const auto& square : f.elements) {
           canvas.polygon(view.pixels(square), {.colour = {0.0, 0.0, 0.0, alpha}, .width_px = 0.75});
         }
       }
     }
-    for (const Footprint& f : estimated) {
-      canvas.polygon(view.pixels(f.outline), estimate_pen);
+    for (const Footprint& f : footprints) {
+      canvas.polygon(view.pixels(f.outline), touch_pen);
     }
-    for (const Footprint& f : actual) {
-      canvas.polygon(view.pixels(f.outline), truth_pen);
+    draw_modes(canvas, view, sheet);
+    if (!actual.empty()) {
+      canvas.polygon(view.pixels(actual), truth_pen);
     }
   }
   draw_axes(canvas, view, even_ticks(view.lower.x, view.upper.x, 7),
-            even_ticks(view.lower.y, view.upper.y, 7), "x in the object frame, mm", "y, mm");
+            even_ticks(view.lower.y, view.upper.y, 7), "x in the robot frame, mm", "y, mm");
   draw_evidence_bar(canvas, bar(0), scale);
 
-  draw_title(canvas, view.box, "Touches on the map of " + sheet.map.label);
+  draw_title(canvas, view.box, "Map of " + sheet.map.label + " in the robot frame");
   Legend legend(canvas, view.box);
   const auto sample = [&](const Pen& pen) {
     return [&canvas, &pen](glm::dvec2 at) {
       canvas.segment(at - glm::dvec2(18.0, 0.0), at + glm::dvec2(18.0, 0.0), pen);
     };
   };
-  legend.add(36.0, sample(estimate_pen), "estimated pose");
-  if (truth) {
-    legend.add(36.0, sample(truth_pen), meaning_of_truth(sheet, "true pose"));
+  legend.add(36.0, sample(touch_pen), "touches");
+  legend.add(36.0, sample(mode_pen), "68, 95 %");
+  if (!actual.empty()) {
+    legend.add(36.0, sample(truth_pen), meaning_of_truth(sheet, "true outline"));
   }
 }
 
-void draw_ring(Canvas& canvas, glm::dvec2 at) { canvas.circle(at, 11.0, estimate_pen); }
+void draw_ring(Canvas& canvas, glm::dvec2 at) { canvas.circle(at, 11.0, touch_pen); }
 
 void draw_cross(Canvas& canvas, glm::dvec2 at) {
   Pen pen = truth_pen;
@@ -208,12 +249,6 @@ void draw_cross(Canvas& canvas, glm::dvec2 at) {
   for (const glm::dvec2& arm : {glm::dvec2(7.0, 7.0), glm::dvec2(7.0, -7.0)}) {
     canvas.segment(at - arm, at + arm, pen);
   }
-}
-
-/// Returns the axis's range as drawn: an axis of zero extent gets a width.
-glm::dvec2 shown_range(const Axis& axis) {
-  const double half = axis.upper > axis.lower ? 0.0 : 0.5;
-  return {axis.lower - half, axis.upper + half};
 }
 
 std::string power_of_ten(int exponent) {
@@ -226,36 +261,44 @@ std::string power_of_ten(int exponent) {
 }
 
 void draw_belief(Canvas& canvas, const RecognitionSheet& sheet) {
-  const PoseLattice& grid = sheet.belief.grid;
-  const std::vector<double>& belief_xy = sheet.belief.xy;
-  const glm::dvec2 x = shown_range(grid.x_mm);
-  const glm::dvec2 y = shown_range(grid.y_mm);
-  const View view{.box = plot(1), .lower = {x[0], y[0]}, .upper = {x[1], y[1]}};
+  const PlacedBelief& belief = sheet.belief;
+  const View view{.box = plot(1),
+                  .lower = belief.lower_mm,
+                  .upper = belief.lower_mm + glm::dvec2(belief.cells * belief.cell_mm)};
 
-  const double largest = *std::ranges::max_element(belief_xy);
+  const double largest = *std::ranges::max_element(belief.xy);
   const double top = largest > 0.0 ? std::ceil(std::log10(largest)) : 0.0;
   const auto colour = [&](double log10_p) {
     return sequential((log10_p - top + decades) / decades);
   };
-  canvas.cells(view.box, grid.x_mm.count, grid.y_mm.count, [&](int i, int j) {
-    return colour(std::log10(belief_xy[static_cast<std::size_t>(j) * grid.x_mm.count + i]));
+  canvas.cells(view.box, belief.cells, belief.cells, [&](int i, int j) {
+    return colour(std::log10(belief.xy[static_cast<std::size_t>(j) * belief.cells + i]));
   });
-  draw_axes(canvas, view, even_ticks(x[0], x[1], 7), even_ticks(y[0], y[1], 7),
-            "x of the pivot in the object frame, mm", "y, mm");
+  {
+    const Canvas::Clip clip(canvas, view.box);
+    for (const RecognitionSheet::Mode& mode : sheet.modes) {
+      if (mode.own) {
+        draw_ellipses(canvas, view, mode.pose, mode_pen);
+      }
+    }
+  }
+  draw_axes(canvas, view, even_ticks(view.lower.x, view.upper.x, 7),
+            even_ticks(view.lower.y, view.upper.y, 7), "x of the object in the robot frame, mm",
+            "y, mm");
   std::vector<Tick> ticks;
   for (double exponent = top - decades; exponent <= top; exponent += 2.0) {
     ticks.push_back({exponent, power_of_ten(static_cast<int>(exponent))});
   }
   ticks.front().label = "≤ " + ticks.front().label;
   draw_colour_bar(canvas, bar(1), top - decades, top, colour, ticks,
-                  "probability per bin, all angles");
+                  "probability per cell, all angles");
 
   draw_title(canvas, view.box, "Where is it? Belief over position");
   Legend legend(canvas, view.box);
   const auto mark = [&](const Pose& T_object_robot, auto draw, std::string meaning) {
-    const glm::dvec2 pivot = T_object_robot * grid.pivot_mm;
-    if (view.contains(pivot)) {
-      draw(canvas, view.pixel(pivot));
+    const glm::dvec2 origin = inverse(T_object_robot).translation_mm;
+    if (view.contains(origin)) {
+      draw(canvas, view.pixel(origin));
     } else {
       meaning += " (outside)";
     }

@@ -1,4 +1,6 @@
+#include <algorithm>
 #include <array>
+#include <cmath>
 
 #include <fmt/format.h>
 
@@ -25,12 +27,18 @@ std::string draw_reliability(const ReliabilityFigure& figure) {
     ChartSeries series{.name = figure.curves[k].name,
                        .colour = palpate::series(k),
                        .mark = marks[k % marks.size()]};
-    for (const ReliabilityFigure::Point& point : figure.curves[k].points) {
+    // Few records say little: their marks are small, and their long intervals faint.
+    const auto& points = figure.curves[k].points;
+    const auto most = std::ranges::max_element(points, {}, &ReliabilityFigure::Point::records);
+    for (const ReliabilityFigure::Point& point : points) {
+      const double part = static_cast<double>(point.records) /
+                          static_cast<double>(std::max<std::size_t>(most->records, 1));
       series.points.push_back({.x = point.confidence,
                                .y = point.accuracy,
                                .low = point.low,
                                .high = point.high,
-                               .label = fmt::format("{}", point.records)});
+                               .label = fmt::format("{}", point.records),
+                               .size = std::clamp(2.0 * std::sqrt(part), 0.3, 1.0)});
     }
     chart.series.push_back(std::move(series));
   }

@@ -262,6 +262,17 @@ void add_records(const fs::path& file, const std::string& text, JudgedResults& r
   }
 }
 
+std::vector<Json> records_in(const fs::path& file) {
+  const Json records = parse(file, read_bytes(file));
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    const RecordReader reader(file, i, records[i]);
+    if (!reader.failed() && !records[i].contains("next")) {
+      reader.read();
+    }
+  }
+  return records;
+}
+
 JudgedResults read_results(std::span<const fs::path> files) {
   JudgedResults results;
   for (const fs::path& file : files) {

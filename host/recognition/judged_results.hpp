@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include <nlohmann/json.hpp>
+
 #include "recognition/evaluation.hpp"
 
 namespace palpate {
@@ -28,6 +30,9 @@ std::vector<std::filesystem::path> result_files(std::span<const std::string> arg
 /// field, where a file cannot be read, is not JSON or holds anything but records, where a value is
 /// of the wrong type or out of range, and where a record's probabilities do not sum to 1 +- 0.01
 JudgedResults read_results(std::span<const std::filesystem::path> files);
+/// The records of one such file as they stand in it, and the plans between those of `live`. Throws
+/// Error as read_results().
+std::vector<nlohmann::json> records_in(const std::filesystem::path& file);
 /// Adds the records of such a file's text.
 /// @param file names the text in messages
 /// @throws Error as read_results()

@@ -93,7 +93,22 @@ bool LiveRecognition::wait_for_end(std::chrono::milliseconds timeout) {
   return changed_.wait_for(lock, timeout, [&] { return ended_ || failure_; });
 }
 
-void LiveRecognition::reset() { push({}); }
+bool LiveRecognition::failed() const {
+  const std::lock_guard lock(mutex_);
+  return failure_ != nullptr;
+}
+
+void LiveRecognition::reset() {
+  between_touches([this] { begin_unknown(); });
+}
+
+void LiveRecognition::leave_out(std::size_t touch, bool out) {
+  between_touches([this, touch, out] { leave_out_now(touch, out); });
+}
+
+void LiveRecognition::between_touches(std::function<void()> work) {
+  push({.work = std::move(work)});
+}
 
 void LiveRecognition::push(Job job) {
   {
@@ -251,9 +266,15 @@ void LiveRecognition::hand_ahead(const std::optional<DetectedTouch>& candidate) 
 void LiveRecognition::believe() {
   std::unique_lock lock(mutex_);
   for (;;) {
-    changed_.wait(lock, [&] { return !jobs_.empty() || all_read_; });
+    // Work may be asked for after the stream's end, until finish().
+    changed_.wait(lock, [&] { return !jobs_.empty() || (all_read_ && (stop_ || !ended_)); });
     if (jobs_.empty()) {
-      break;
+      ended_ = true;
+      changed_.notify_all();
+      if (stop_) {
+        break;
+      }
+      continue;
     }
     const Job job = std::move(jobs_.front());
     jobs_.pop_front();
@@ -262,7 +283,6 @@ void LiveRecognition::believe() {
     use(job);
     lock.lock();
   }
-  ended_ = true;
 }
 
 Touch LiveRecognition::view_of(const DetectedTouch& touch) const {
@@ -272,15 +292,26 @@ Touch LiveRecognition::view_of(const DetectedTouch& touch) const {
           .valid = touch.valid};
 }
 
-void LiveRecognition::use(const Job& job) {
-  if (!job.touch) {
-    recogniser_.reset();
+void LiveRecognition::begin_unknown() {
+  recogniser_.reset();
+  used_.clear();
+  {
     const std::lock_guard lock(mutex_);
-    if (state_.touches > 0) {  // one that was never touched is the same still
-      ++state_.unknown;
-      state_.touches = 0;
-      state_.last.reset();
+    if (state_.touches == 0) {  // one that was never touched is the same still
+      return;
     }
+    ++state_.unknown;
+    state_.touches = 0;
+    state_.last.reset();
+  }
+  if (options_.on_unknown) {
+    options_.on_unknown();
+  }
+}
+
+void LiveRecognition::use(const Job& job) {
+  if (job.work) {
+    job.work();
     return;
   }
   if (job.under_way) {
@@ -289,17 +320,49 @@ void LiveRecognition::use(const Job& job) {
   }
   const Touch touch = view_of(*job.touch);
   const GroundTruth truth = ground_truth(description_.object, description_.truth);
-  LiveTouch result{.touch = *job.touch,
-                   .step = take_step(recogniser_, task_, std::span(&touch, 1), truth),
-                   .frames_lost = job.frames_lost};
-  result.latency_ms = std::chrono::duration<double, std::milli>(Clock::now() - job.taken).count();
+  RecognitionStep step = take_step(recogniser_, task_, std::span(&touch, 1), truth);
+  used_.push_back({job});
+  const double latency_ms =
+      std::chrono::duration<double, std::milli>(Clock::now() - job.taken).count();
+  {
+    const std::lock_guard lock(mutex_);
+    ++state_.touches;
+    ++state_.all_touches;
+    state_.worst_latency_ms = std::max(state_.worst_latency_ms, latency_ms);
+    latencies_ms_.push_back(latency_ms);
+  }
+  tell(job, std::move(step));
+}
+
+void LiveRecognition::leave_out_now(std::size_t touch, bool out) {
+  const auto others = std::ranges::count(used_, false, &UsedTouch::left_out);
+  if (touch >= used_.size() || used_[touch].left_out == out || (out && others == 1)) {
+    return;
+  }
+  used_[touch].left_out = out;
+  std::vector<Touch> touches;
+  for (const UsedTouch& used : used_) {
+    if (!used.left_out) {
+      touches.push_back(view_of(*used.job.touch));
+    }
+  }
+  recogniser_.reset();
+  tell(used_.back().job, take_step(recogniser_, task_, touches,
+                                   ground_truth(description_.object, description_.truth)));
+}
+
+void LiveRecognition::tell(const Job& job, RecognitionStep step) {
+  LiveTouch result{.touch = *job.touch, .step = std::move(step), .frames_lost = job.frames_lost};
+  for (std::size_t i = 0; i < used_.size(); ++i) {
+    if (used_[i].left_out) {
+      result.left_out.push_back(i);
+    }
+  }
   {
     const std::lock_guard lock(mutex_);
     result.unknown = state_.unknown;
-    result.index = state_.touches++;
-    ++state_.all_touches;
-    state_.worst_latency_ms = std::max(state_.worst_latency_ms, result.latency_ms);
-    latencies_ms_.push_back(result.latency_ms);
+    result.index = state_.touches - 1;
+    result.latency_ms = latencies_ms_.back();
     state_.last = result;
   }
   on_touch_(result);

@@ -28,7 +28,8 @@ struct LiveTouch {
   RecognitionStep step;
   double latency_ms = 0.0;        ///< from taking the frame that ended the touch to its estimate
   std::uint64_t frames_lost = 0;  ///< up to that frame
-  std::optional<PlannedTouch> next = {};  ///< the best of a grid, where the options ask for it
+  std::vector<std::size_t> left_out = {};  ///< touches of the unknown that the belief leaves out
+  std::optional<PlannedTouch> next = {};   ///< the best of a grid, where the options ask for it
 };
 
 /// What is known of a stream at one moment.
@@ -57,6 +58,8 @@ struct LiveOptions {
   std::optional<PlanGoal> plan = {};
   /// Called with a touch and its plan as soon as the plan is there, on the thread of on_touch.
   std::function<void(const LiveTouch&)> on_plan = {};
+  /// Called when another unknown comes, on the thread of on_touch.
+  std::function<void()> on_unknown = {};
 };
 
 /// Recognises what a sensor's stream touches, from construction on. One thread reads frames and
@@ -84,20 +87,35 @@ class LiveRecognition {
   /// Waits for at most `timeout`. Returns true once the stream has ended and all its touches are
   /// used, or something has failed.
   bool wait_for_end(std::chrono::milliseconds timeout);
+  /// Whether finish() will throw.
+  bool failed() const;
   /// The touches to come are of another unknown.
   void reset();
+  /// Leaves a touch of this unknown out of the belief, or takes it in again, and calls on_touch
+  /// with the belief of the others, as it was after the last touch. Does nothing where there is no
+  /// such touch, or no other is left.
+  void leave_out(std::size_t touch, bool out);
+  /// Calls this on the thread of on_touch, before the touch that comes next, also after the
+  /// stream's end.
+  void between_touches(std::function<void()> work);
   /// Stops reading and uses the touches that were read, the touch under way included.
   /// @throws Error if the sensor or the device has failed; what `on_touch` has thrown
   void finish();
 
  private:
   using Clock = std::chrono::steady_clock;
-  /// A touch for the belief, now or in all likelihood, or the end of an unknown.
+  /// A touch for the belief, now or in all likelihood, or other work between touches.
   struct Job {
-    std::optional<DetectedTouch> touch;
+    std::optional<DetectedTouch> touch = {};
     bool under_way = false;
-    Clock::time_point taken;
+    Clock::time_point taken = {};
     std::uint64_t frames_lost = 0;
+    std::function<void()> work = {};
+  };
+  /// A touch of the unknown, which people may take for a bad one.
+  struct UsedTouch {
+    Job job;
+    bool left_out = false;
   };
 
   void read();
@@ -111,6 +129,10 @@ class LiveRecognition {
   bool wait_for_room();
   void believe();
   void use(const Job& job);
+  void begin_unknown();
+  void leave_out_now(std::size_t touch, bool out);
+  /// Takes the result after the touch to whoever waits for it, and plans the next.
+  void tell(const Job& job, RecognitionStep step);
   /// The best next touch of a grid about the belief, with the array of this touch.
   PlannedTouch plan(const DetectedTouch& touch) const;
   Touch view_of(const DetectedTouch& touch) const;
@@ -143,6 +165,8 @@ class LiveRecognition {
   std::optional<double> last_contact_s_;  ///< of time_
   bool was_touching_ = false;
   std::optional<double> candidate_begin_s_;
+
+  std::vector<UsedTouch> used_;  ///< of the unknown; of the believing thread alone
 
   std::thread reader_;
   std::thread believer_;

@@ -95,6 +95,7 @@ from .recognition import (
     Record as Record,
     recognize as recognize,
 )
+from .show import Page as Page, show as show
 from .streams import touches as touches
 
 try:

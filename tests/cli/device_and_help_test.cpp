@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <set>
+#include <sstream>
 
 #include "program.hpp"
 
@@ -63,7 +64,7 @@ struct Help {
 class CommandHelp : public ProgramTest, public testing::WithParamInterface<Help> {};
 
 TEST_P(CommandHelp, MentionsEveryFlagWithDefaultAndUnit) {
-  const std::string help = done({GetParam().command, "--help"});
+  const std::string help = done({GetParam().command, "--help-all"});
   for (const char* part : GetParam().mentions) {
     EXPECT_NE(help.find(part), std::string::npos) << "'" << part << "' not in\n" << help;
   }
@@ -160,7 +161,8 @@ INSTANTIATE_TEST_SUITE_P(
               "--rate",
               "--object",
               "--truth"}},
-        Help{"export", {"FILE", "-o,", "Folder"}}, Help{"info", {"FILE"}}),
+        Help{"export", {"FILE", "-o,", "Folder"}}, Help{"info", {"FILE"}},
+        Help{"view", {"PATH", "--page", "8080", "--page-address", "127.0.0.1"}}),
     [](const auto& test) { return std::string(test.param.command); });
 
 using ProgramHelp = ProgramTest;
@@ -169,9 +171,40 @@ TEST_F(ProgramHelp, ListsTheCommands) {
   const std::string help = done({"--help"});
   for (const char* command :
        {"devices", "sensors", "record", "touches", "simulate", "map", "recognize", "live", "batch",
-        "merge", "evaluate", "calibrate", "plan", "info", "import", "export"}) {
+        "merge", "evaluate", "calibrate", "plan", "info", "import", "export", "view"}) {
     EXPECT_NE(help.find(std::string("\n  ") + command), std::string::npos) << help;
   }
+}
+
+TEST_F(ProgramHelp, ShortHelpNamesEveryFlagAndExplainsTheCommonOnes) {
+  const std::string help = done({"recognize", "--help"});
+  EXPECT_LE(std::ranges::count(help, '\n'), 40) << help;
+  EXPECT_NE(help.find("\n  --maps "), std::string::npos) << help;
+  EXPECT_NE(help.find("Bins and region: --bins, --x-mm,"), std::string::npos) << help;
+  EXPECT_EQ(help.find("as 25x25x16"), std::string::npos) << help;
+  EXPECT_NE(help.find("--help-all explains all flags"), std::string::npos) << help;
+}
+
+TEST_F(ProgramHelp, FitsTheTerminal) {
+  for (const int columns : {60, 100}) {
+    ProgramOnTerminal terminal(folder_.path(), {"recognize", "--help-all"}, {}, columns, 40);
+    std::istringstream lines(terminal.finish().out);
+    std::size_t longest = 0;
+    for (std::string line; std::getline(lines, line);) {
+      longest = std::max(longest, line.size());
+    }
+    EXPECT_GT(longest, columns - 15);
+    EXPECT_LE(longest, columns + 1);  // the terminal ends lines with CR LF
+  }
+}
+
+TEST_F(ProgramHelp, ANearMissIsSuggested) {
+  expect_refused({"recognise", "a.h5"}, {"'recognise' is no command", "did you mean recognize?"});
+  expect_refused({"recognize", "a.h5", "--treshold=3"},
+                 {"'--treshold=3' is no flag of palpate recognize", "did you mean --threshold?"});
+  expect_refused({"map", "--spread"}, {"'--spread' is no flag", "see palpate map --help"});
+  EXPECT_EQ(palpate({"touch-the-moon"}).err,
+            "palpate: 'touch-the-moon' is no command or flag; see palpate --help\n");
 }
 
 TEST_F(ProgramHelp, VersionIsTheProjects) { EXPECT_EQ(done({"--version"}), PALPATE_VERSION "\n"); }

@@ -37,7 +37,7 @@ class PlanCommand : public ProgramTest {
 };
 
 TEST_F(PlanCommand, ItsHelpListsNoFlagThatItRefuses) {
-  const std::string help = done({"plan", "--help"});
+  const std::string help = done({"plan", "--help-all"});
   for (const std::string flag : {"--tolerance", "--budget-ms", "--evidence-nats", "--particles",
                                  "--resampling", "--augmented", "--seed"}) {
     EXPECT_EQ(help.find("  " + flag + " "), std::string::npos) << flag;

@@ -26,9 +26,8 @@ RecognitionSheet example() {
       sheet.map.log_odds.push_back(on ? 8.0F : -4.0F);
     }
   }
-  sheet.belief.grid.pivot_mm = {200.0, -50.0};
-  sheet.T_object_robot = sheet.belief.grid.T_object_robot(2.0, 1.0, 0.3);
-  sheet.truth = sheet.belief.grid.T_object_robot(2.4, 0.7, 0.35);
+  sheet.T_object_robot = inverse(Pose{{200.0, -50.0}, -0.3});
+  sheet.truth = inverse(Pose{{200.4, -50.3}, -0.35});
   for (const Pose& T_robot_sensor : {Pose{{198.0, -49.0}, 0.1}, Pose{{204.0, -52.0}, 1.0}}) {
     std::vector<glm::dvec2> elements = digitacts_array();
     for (glm::dvec2& p : elements) {
@@ -36,8 +35,12 @@ RecognitionSheet example() {
     }
     sheet.footprints_mm.push_back(elements);
   }
-  sheet.belief.xy.assign(static_cast<std::size_t>(sheet.belief.grid.plane()), 1e-9);
+  sheet.belief = {.lower_mm = {195.0, -55.0}, .cell_mm = 0.4, .cells = 25};
+  sheet.belief.xy.assign(25 * 25, 1e-9);
   sheet.belief.xy[15 * 25 + 4] = 0.8;
+  sheet.modes = {
+      {"bar 90.0 %", {{{200.0, -50.0}, -0.3}, {0.04, 0, 0, 0, 0.09, 0, 0, 0, 1e-3}}, true},
+      {"ring 8.0 %", {{{190.0, -45.0}, 0.0}, {0.5, 0.2, 0, 0.2, 0.5, 0, 0, 0, 1e-3}}}};
   sheet.labels = {"bar", "ring"};
   sheet.identity = {{0.6, 0.4}, {0.9, 0.1}};
   return sheet;
@@ -69,8 +72,9 @@ TEST(RecognitionSheet, GivesTheSameBytesAgain) {
 
 TEST(RecognitionSheet, ShowsTheBeliefsLargestBinInTheBrightestColours) {
   RecognitionSheet sheet = example();
-  sheet.T_object_robot = sheet.belief.grid.T_object_robot(-5.0, -5.0, 0.3);
+  sheet.T_object_robot = inverse(Pose{{204.0, -46.0}, 0.3});
   sheet.truth.reset();
+  sheet.modes.clear();
   // log10 0.8 = -0.097 on the scale of six powers of ten below 1.
   const Colour peak = sequential((std::log10(0.8) + 6.0) / 6.0);
   const int with = count(decode(draw_recognition(sheet)), peak);
@@ -81,16 +85,17 @@ TEST(RecognitionSheet, ShowsTheBeliefsLargestBinInTheBrightestColours) {
   EXPECT_NEAR(with - without, 19.2 * 19.2, 2 * 19.2);
 }
 
-TEST(RecognitionSheet, MarksThePivotAtTheEstimateWhateverTheAngle) {
-  // The same pivot, a different angle: the belief's panel stays as it is.
+TEST(RecognitionSheet, DrawsEveryMode) {
   RecognitionSheet sheet = example();
-  sheet.truth.reset();
-  sheet.footprints_mm.clear();
-  const Picture a = decode(draw_recognition(sheet));
-  sheet.T_object_robot = sheet.belief.grid.T_object_robot(2.0, 1.0, 2.8);
-  EXPECT_LE(difference(a, decode(draw_recognition(sheet))).pixels, 4) << "antialiasing alone";
-  sheet.T_object_robot = sheet.belief.grid.T_object_robot(3.0, 1.0, 0.3);
-  EXPECT_GT(difference(a, decode(draw_recognition(sheet))).pixels, 100);
+  const Picture both = decode(draw_recognition(sheet));
+  sheet.modes.pop_back();
+  const Picture own = decode(draw_recognition(sheet));
+  sheet.modes.clear();
+  const Picture none = decode(draw_recognition(sheet));
+  const Difference other = difference(both, own);
+  EXPECT_GT(other.pixels, 100);
+  EXPECT_LT(other.right, both.width / 3) << "the belief is of the estimated object";
+  EXPECT_GT(difference(own, none).right, both.width / 3);
 }
 
 TEST(RecognitionSheet, DrawsTheTruthNearestToTheEstimateUnderTheSymmetry) {
@@ -157,11 +162,9 @@ TEST(RecognitionSheet, AddsUpObjectsOfEqualLabel) {
   EXPECT_EQ(draw_recognition(sheet), two);
 }
 
-TEST(RecognitionSheet, DrawsALatticeOfOneBin) {
+TEST(RecognitionSheet, DrawsABeliefOfOneCell) {
   RecognitionSheet sheet = example();
-  sheet.belief.grid.x_mm = {3.0, 3.0, 1};
-  sheet.belief.grid.y_mm = {-10.0, 10.0, 1};
-  sheet.belief.xy = {1.0};
+  sheet.belief = {.cells = 1, .xy = {1.0}};
   decode(draw_recognition(sheet));
 }
 
@@ -199,10 +202,10 @@ TEST(RecognitionSheet, DrawsManyLabelsAndTouches) {
   }
 }
 
-TEST(RecognitionSheet, DrawsPosesOutsideOfTheLattice) {
+TEST(RecognitionSheet, DrawsPosesOutsideOfTheBelief) {
   RecognitionSheet sheet = example();
-  sheet.T_object_robot = sheet.belief.grid.T_object_robot(500.0, -3.0, 0.0);
-  sheet.truth = sheet.belief.grid.T_object_robot(0.0, -2000.0, 0.0);
+  sheet.T_object_robot = inverse(Pose{{-300.0, -3.0}, 0.0});
+  sheet.truth = inverse(Pose{{0.0, 2000.0}, 0.0});
   decode(draw_recognition(sheet));
 }
 

@@ -1,0 +1,188 @@
+#include "cli/page/live_page.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "cli/live_record.hpp"
+#include "cli/page/page_json.hpp"
+#include "cli/planned_touch.hpp"
+#include "cli/sheet.hpp"
+#include "cli/step_words.hpp"
+#include "model/option_words.hpp"
+#include "recognition/record_json.hpp"
+
+namespace palpate::cli {
+
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr auto between_frames = 40ms;
+
+nlohmann::ordered_json setup(const SensorDescription& sensor,
+                             const std::vector<glm::dvec2>& elements_mm,
+                             const RecognitionTask& task, std::optional<PlanGoal> plan) {
+  nlohmann::ordered_json json{
+      {"sensor", sensor.serial.empty() ? sensor.name : sensor.name + " " + sensor.serial},
+      {"pressure_unit", sensor.pressure_unit},
+      {"threshold", task.classifier().threshold},
+      {"elements_mm", places_json(elements_mm)},
+      {"valid", sensor.valid},
+      {"labels", task.labels},
+      {"live", true}};
+  for (int i = 0; i < static_cast<int>(task.hypotheses.size()); ++i) {
+    json["maps"].push_back(mode_words(i, task));
+  }
+  if (plan) {
+    json["plan"] = goal_word(*plan);
+  }
+  return json;
+}
+
+/// What the step says besides its numbers, the most important first.
+std::vector<std::string> sentences(const LiveTouch& touch, const RecognitionTask& task) {
+  std::vector<std::string> words{truth_words(touch.step), unproven_sentence(touch.step, task),
+                                 misfit_sentence(touch.step, touch.index + 1, task),
+                                 single_touch_words(task, touch.index + 1)};
+  std::ranges::move(warning_words(touch.step), std::back_inserter(words));
+  std::erase(words, "");
+  return words;
+}
+
+/// What the elements said of a touch: "C" In Contact, "n" No Contact, "?" Unknown.
+std::string readings_text(const LiveTouch& touch, const std::vector<glm::dvec2>& elements_mm,
+                          const RecognitionTask& task) {
+  const Touch view{.T_robot_sensor = *touch.touch.T_robot_sensor,
+                   .elements_mm = elements_mm,
+                   .pressure = touch.touch.pressure,
+                   .valid = touch.touch.valid};
+  std::string text;
+  for (const Reading reading : TouchEvidence(view, {.classifier = task.classifier()}).readings) {
+    text += is_contact(reading) ? 'C' : reading == Reading::unknown ? '?' : 'n';
+  }
+  return text;
+}
+
+}  // namespace
+
+LivePage::LivePage(const PageAddress& address, const SensorDescription& sensor,
+                   const std::vector<glm::dvec2>& elements_mm, const RecognitionTask& task,
+                   const Recogniser& recogniser, std::optional<PlanGoal> plan)
+    : task_(task),
+      recogniser_(recogniser),
+      plan_(plan),
+      valid_(sensor.valid),
+      elements_mm_(elements_mm),
+      server_(address, feed_,
+              {.get = [this](const std::string& path) { return get(path); },
+               .act = [this](const nlohmann::json& request) { act(request); }}) {
+  feed_.set("setup", line_of(setup(sensor, elements_mm, task, plan)));
+}
+
+void LivePage::serve(LiveRecognition* recognition) {
+  const std::lock_guard lock(mutex_);
+  recognition_ = recognition;
+}
+
+std::optional<std::string> LivePage::get(const std::string& path) const {
+  for (std::size_t i = 0; i < task_.hypotheses.size(); ++i) {
+    if (path == fmt::format("/map/{}", i)) {
+      return line_of(map_json(task_.hypotheses[i].map));
+    }
+  }
+  return {};
+}
+
+void LivePage::act(const nlohmann::json& request) {
+  const std::lock_guard lock(mutex_);
+  if (recognition_ == nullptr) {
+    throw Error(Fault::input, "the stream has not begun, or it is over");
+  }
+  const std::string what = request.at("do");
+  if (what == "next unknown") {
+    recognition_->reset();
+  } else if (what == "leave out") {
+    recognition_->leave_out(request.at("touch").get<std::size_t>(), request.value("out", true));
+  } else if (what == "look at") {
+    const int object = request.at("object");
+    if (object >= static_cast<int>(task_.hypotheses.size())) {
+      throw Error(Fault::input, fmt::format("object {}: there is none", object));
+    }
+    looked_at_ = std::max(object, -1);
+    recognition_->between_touches([this] { show_belief(); });
+  } else {
+    throw Error(Fault::input, fmt::format("'{}' is not one of the page's requests", what));
+  }
+}
+
+void LivePage::begin_unknown() {
+  last_.reset();
+  for (const char* event : {"touch", "next", "belief"}) {
+    feed_.forget(event);
+  }
+  feed_.set("unknown", "{}");
+}
+
+void LivePage::add(const LiveTouch& touch) {
+  last_ = touch.step;
+  nlohmann::ordered_json json = to_json(touch, task_);
+  json["words"] = sentences(touch, task_);
+  json["map"] = touch.step.mode.object;
+  json["readings"] = readings_text(touch, elements_mm_, task_);
+  feed_.add("touch", line_of(json));
+  show_belief();
+}
+
+void LivePage::show_belief() {
+  if (!last_) {
+    return;
+  }
+  const int object = looked_at_ < 0 ? last_->mode.object : looked_at_.load();
+  const PlacedBelief belief = belief_of(recogniser_, object);
+  nlohmann::ordered_json json = belief_json(belief);
+  json["map"] = object;
+  json["chosen"] = looked_at_ >= 0;
+  feed_.set("belief", line_of(json));
+}
+
+void LivePage::plan(const LiveTouch& touch) {
+  nlohmann::ordered_json json = to_json(*touch.next);
+  json["words"] = next_touch_words(*touch.next, *plan_);
+  feed_.set("next", line_of(json));
+}
+
+void LivePage::update(const LiveState& state, const std::string& warning) {
+  const auto now = Clock::now();
+  if (now - shown_ < between_frames) {
+    return;
+  }
+  shown_ = now;
+  const double elapsed_s = std::chrono::duration<double>(now - rated_).count();
+  if (elapsed_s >= 1.0) {
+    rate_hz_ = static_cast<double>(state.counters.frames - rated_frames_) / elapsed_s;
+    rated_frames_ = state.counters.frames;
+    rated_ = now;
+  }
+  nlohmann::ordered_json json{{"pressure", pressure_json(state.pressure)},
+                              {"touching", state.touching},
+                              {"taring", state.taring},
+                              {"gone", state.gone},
+                              {"unknown", state.unknown},
+                              {"touches", state.touches},
+                              {"frames", state.counters.frames},
+                              {"lost", state.counters.lost},
+                              {"without_pose", state.without_pose},
+                              {"rate_hz", std::round(rate_hz_)},
+                              {"worst_latency_ms", state.worst_latency_ms}};
+  if (state.T_robot_sensor) {
+    json["pose"] = pose_json(*state.T_robot_sensor);
+  }
+  if (!warning.empty()) {
+    json["warning"] = in_flags(warning);
+  }
+  feed_.set("frame", line_of(json));
+}
+
+}  // namespace palpate::cli

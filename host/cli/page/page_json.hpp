@@ -1,0 +1,34 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "figures/placed_belief.hpp"
+#include "palpate/occupancy_grid.hpp"
+#include "palpate/pose.hpp"
+
+// What the page draws, as JSON. Pictures are base64 of a byte for each cell, row by row, the lowest
+// row first.
+
+namespace palpate::cli {
+
+/// One line, as an event needs it; what is not UTF-8 is replaced.
+std::string line_of(const nlohmann::ordered_json& json);
+/// [x, y, theta] in mm and rad.
+nlohmann::ordered_json pose_json(const Pose& pose);
+/// [[x, y], ...] in mm.
+nlohmann::ordered_json places_json(std::span<const glm::dvec2> places_mm);
+/// Four digits of each; null where nothing is known.
+nlohmann::ordered_json pressure_json(std::span<const double> pressure);
+/// label, lower_mm (the outer corner of the first cell, in the object frame), cell_mm, nx, ny, nats
+/// (the evidence of the strongest colour), and evidence: 128 + 127 x log odds above the prior over
+/// nats.
+nlohmann::ordered_json map_json(const OccupancyGrid& map);
+/// lower_mm, cell_mm, cells, peak (the likeliest cell's probability), xy: 255 for the peak, less by
+/// 42.5 for each power of ten below it; theta [[rad, probability], ...].
+nlohmann::ordered_json belief_json(const PlacedBelief& belief);
+
+}  // namespace palpate::cli

@@ -1,0 +1,246 @@
+#include "cli/page/viewed_files.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+#include <limits>
+#include <set>
+
+#include "cli/page/page_json.hpp"
+#include "io/input_file.hpp"
+#include "palpate/files.hpp"
+#include "recognition/judged_results.hpp"
+
+namespace palpate::cli {
+
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+constexpr std::size_t rows_at_once = 500;
+constexpr const char* kinds[] = {"recording", "map", "records"};
+
+bool is_hdf5(const fs::path& path) {
+  const std::string extension = path.extension();
+  return extension == ".h5" || extension == ".hdf5";
+}
+
+nlohmann::ordered_json described(const Recording& recording) {
+  const std::size_t e = recording.elements();
+  nlohmann::ordered_json json{
+      {"kind", kinds[0]},
+      {"rows", recording.rows},
+      {"count", recording.size()},
+      {"object", recording.object},
+      {"pressure_unit", recording.pressure_unit},
+      {"elements_mm", places_json(std::span(recording.elements_mm).first(e))},
+      {"valid", recording.valid.size() >= e
+                    ? std::vector(recording.valid.begin(), recording.valid.begin() + e)
+                    : std::vector<std::uint8_t>()}};
+  // A sound array's strongest readings show the scale; one reading of 1e38 shall not.
+  std::vector<double> known;
+  std::ranges::copy_if(recording.pressure, std::back_inserter(known),
+                       [](double value) { return value > 0.0 && value < 1e30; });
+  if (!known.empty()) {
+    const auto high =
+        known.begin() + static_cast<std::ptrdiff_t>(known.size() - 1 - known.size() / 1000);
+    std::ranges::nth_element(known, high);
+    json["largest"] = *high;
+  }
+  return json;
+}
+
+nlohmann::ordered_json rows_of(const Recording& recording, std::size_t first) {
+  const std::size_t last = std::min(recording.size(), first + rows_at_once);
+  const std::size_t e = recording.elements();
+  auto pressure = nlohmann::ordered_json::array();
+  auto pose = nlohmann::ordered_json::array();
+  for (std::size_t i = first; i < last; ++i) {
+    pressure.push_back(pressure_json(std::span(recording.pressure).subspan(i * e, e)));
+    pose.push_back(pose_json(recording.T_robot_sensor[i]));  // NaN becomes null
+  }
+  nlohmann::ordered_json json{{"first", first}, {"pressure", pressure}, {"pose", pose}};
+  if (!recording.time_s.empty()) {
+    json["time"] = std::vector(recording.time_s.begin() + static_cast<std::ptrdiff_t>(first),
+                               recording.time_s.begin() + static_cast<std::ptrdiff_t>(last));
+  }
+  return json;
+}
+
+/// What `live --json` wrote is of touches, one a line.
+bool is_live(const Json& record) { return record.contains("unknown") && record.contains("touch"); }
+
+}  // namespace
+
+void ViewedFiles::Records::add(const Json& record) {
+  const std::string best = record.value("best", "");
+  nlohmann::ordered_json row{record.value("recording", ""), record.value("touches", 0)};
+  if (record.contains("frame")) {
+    row[0] = row[0].get<std::string>() + " frame " + record["frame"].dump();
+  }
+  const auto inner = [&record](const char* key, const char* of) -> nlohmann::ordered_json {
+    return record.contains(key) && record[key].contains(of)
+               ? nlohmann::ordered_json(record[key][of])
+               : nullptr;
+  };
+  row.push_back(record.contains("error") ? record["error"].get<std::string>() : best);
+  row.push_back(inner("identity", best.c_str()));
+  row.push_back(inner("truth", "object"));
+  const char* error = record.contains("refined_error_mm") ? "refined_error_mm" : "error_mm";
+  row.push_back(record.contains(error) ? nlohmann::ordered_json(record[error]) : nullptr);
+  row.push_back(inner("fit", "verdict"));
+  row.push_back(inner("decision", "act"));
+  rows.push_back(row);
+  text.push_back(line_of(record));
+}
+
+ViewedFiles::Records ViewedFiles::records_of(const fs::path& results) {
+  Records records;
+  std::vector<Json> lines;  // of the unknown that live told of last
+  const auto end_unknown = [&] {
+    if (!lines.empty()) {
+      Json record = lines.back();
+      record["recording"] = "unknown " + std::to_string(record["unknown"].get<int>() + 1);
+      record["touches"] = record["touch"].get<int>() + 1;
+      record["trace"] = lines;
+      records.add(record);
+      lines.clear();
+    }
+  };
+  for (const fs::path& file : result_files(std::vector<std::string>{results.string()})) {
+    for (Json& record : records_in(file)) {
+      if (!is_live(record)) {
+        records.add(record);
+        continue;
+      }
+      if (record.contains("next")) {
+        if (!lines.empty()) {
+          lines.back()["next"] = record["next"];
+        }
+        continue;
+      }
+      if (!lines.empty() && lines.back()["unknown"] != record["unknown"]) {
+        end_unknown();
+      }
+      lines.push_back(std::move(record));
+    }
+    end_unknown();
+  }
+  return records;
+}
+
+ViewedFiles::ViewedFiles(std::span<const std::string> paths) {
+  for (const std::string& path : paths) {
+    std::error_code error;
+    if (!fs::is_directory(path, error) || fs::exists(fs::path(path) / "task.ndjson", error)) {
+      add(path);
+      continue;
+    }
+    std::set<fs::path> inside;
+    for (const auto& entry : fs::directory_iterator(path, error)) {
+      if (is_hdf5(entry.path()) || entry.path().extension() == ".json" ||
+          entry.path().extension() == ".jsonl") {
+        inside.insert(entry.path());
+      }
+    }
+    if (inside.empty()) {
+      refuse(path, "a folder without *.h5 or *.json; give recordings, maps or results");
+    }
+    for (const fs::path& file : inside) {
+      add(file);
+    }
+  }
+}
+
+void ViewedFiles::add(const fs::path& path) {
+  if (!is_hdf5(path)) {
+    files_.push_back({path, records_of(path)});
+    return;
+  }
+  require_readable(path);
+  const std::string format = read_format(path);
+  if (format == "palpate.recording") {
+    files_.push_back({path, read_recording(path)});
+  } else if (format == "palpate.map") {
+    files_.push_back({path, read_map(path)});
+  } else {
+    refuse(path,
+           "attribute 'format' = '{}'; give recordings, maps or results of recognize, live or "
+           "batch",
+           format);
+  }
+}
+
+std::string ViewedFiles::list() const {
+  auto json = nlohmann::ordered_json::array();
+  for (const File& file : files_) {
+    json.push_back({{"name", file.path.string()}, {"kind", kinds[file.content.index()]}});
+  }
+  return line_of(json);
+}
+
+std::optional<nlohmann::ordered_json> ViewedFiles::answer(const File& file) const {
+  if (const auto* map = std::get_if<OccupancyGrid>(&file.content)) {
+    nlohmann::ordered_json json = map_json(*map);
+    json["kind"] = kinds[1];
+    return json;
+  }
+  if (const auto* records = std::get_if<Records>(&file.content)) {
+    return nlohmann::ordered_json{{"kind", kinds[2]}, {"rows", records->rows}};
+  }
+  return described(std::get<Recording>(file.content));
+}
+
+std::optional<nlohmann::ordered_json> ViewedFiles::answer(const File& file, const std::string& what,
+                                                          std::size_t index) const {
+  if (const auto* recording = std::get_if<Recording>(&file.content)) {
+    return what == "rows" && index < recording->size() ? std::optional(rows_of(*recording, index))
+                                                       : std::nullopt;
+  }
+  const auto* records = std::get_if<Records>(&file.content);
+  if (records == nullptr || index >= records->text.size()) {
+    return {};
+  }
+  nlohmann::ordered_json record = nlohmann::ordered_json::parse(records->text[index]);
+  if (what == "record") {
+    return record;
+  }
+  if (what != "map" || !record.contains("mode") || !record["mode"].contains("map")) {
+    return {};
+  }
+  // Relative to where recognize ran, which may be where this runs, or beside the results.
+  const fs::path named = record["mode"]["map"].get<std::string>();
+  for (const fs::path& path : {named, file.path.parent_path() / named}) {
+    try {
+      OccupancyGrid map = read_map(path);
+      return map_json(record["mode"].value("mirrored", false) ? mirror_image(map) : map);
+    } catch (const Error&) {
+      // A map that is elsewhere now is not shown.
+    }
+  }
+  return {};
+}
+
+std::optional<std::string> ViewedFiles::get(const std::string& path) const {
+  std::vector<std::string> parts;
+  for (std::size_t at = 0; at < path.size();) {
+    const std::size_t next = std::min(path.find('/', at + 1), path.size());
+    parts.push_back(path.substr(at + 1, next - at - 1));
+    at = next;
+  }
+  const auto number = [&parts](std::size_t i) {
+    const bool whole = !parts[i].empty() && parts[i].size() < 10 &&
+                       parts[i].find_first_not_of("0123456789") == std::string::npos;
+    return whole ? std::strtoul(parts[i].c_str(), nullptr, 10)
+                 : std::numeric_limits<unsigned long>::max();
+  };
+  if ((parts.size() != 2 && parts.size() != 4) || parts[0] != "file" ||
+      number(1) >= files_.size()) {
+    return {};
+  }
+  const File& file = files_[number(1)];
+  const auto json = parts.size() == 2 ? answer(file) : answer(file, parts[2], number(3));
+  return json ? std::optional(line_of(*json)) : std::nullopt;
+}
+
+}  // namespace palpate::cli
