@@ -8,7 +8,7 @@ import tempfile
 import numpy
 
 import palpate
-from palpate._tables import Column, Table, number, plain
+from palpate._tables import Column, number, plain, print_table
 
 from .measures import share_record, with_interval
 from .program import Json, begin, main, parser, write
@@ -65,7 +65,7 @@ def program() -> None:
     options = flags.parse_args()
     _, facts = begin(options)
     each = options.trials or (2 if options.quick else 20)
-    table = Table(DEFAULTS)
+    rows: list[Json] = []
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         for scene, (learned, strangers) in SCENES.items():
@@ -93,8 +93,9 @@ def program() -> None:
                 for sensor, of_all in steps.items():
                     after = [trace[touches - 1] for trace in of_all]
                     scores = scores_of(after[:known], after[known:])
-                    table.append({"scene": scene, "touches": touches, "sensor": sensor} | scores)
-    write(options.json, facts | {"defaults": table})
+                    rows.append({"scene": scene, "touches": touches, "sensor": sensor} | scores)
+    print_table(DEFAULTS, rows)
+    write(options.json, facts | {"defaults": rows})
 
 
 if __name__ == "__main__":
