@@ -9,6 +9,7 @@
 #include "cli/progress.hpp"
 #include "cli/recognition_flags.hpp"
 #include "learning/calibration_task.hpp"
+#include "model/option_words.hpp"
 #include "palpate/files.hpp"
 #include "recognition/folder_sensor.hpp"
 #include "recognition/map_files.hpp"
