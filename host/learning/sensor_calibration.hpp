@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "learning/cross_validation.hpp"
+#include "learning/sensor_gain.hpp"
 #include "palpate/learned_sensor.hpp"
 #include "palpate/occupancy_grid.hpp"
 
@@ -47,18 +48,6 @@ struct GroupScores {
   Scores before;            ///< see SensorCalibration::before
   Scores table;
   Scores after;
-};
-
-/// What recognition gains by a learned sensor over Eq. 7 on touches that neither has seen.
-struct SensorGain {
-  double log_loss_before = 0.0;  ///< of single touches by Eq. 7 with gamma 0.1, in nats
-  double log_loss = 0.0;         ///< of single touches by the table and the temperature
-  double error_mm_before = 0.0;  ///< mean of CrossValidation::groups by Eq. 7
-  double error_mm = 0.0;         ///< the same by the table
-  /// Of the losses and the errors, one is less beyond chance, and neither is more beyond chance by
-  /// over 0.02 nats, or a tenth of the error: touches that are all told apart have next to no loss,
-  /// with a temperature a little more.
-  bool better = false;
 };
 
 /// A learned sensor and how good it is on presses that it has not seen.
