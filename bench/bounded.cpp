@@ -3,11 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <optional>
 
 #include <fmt/format.h>
-
-#include "letters.hpp"
 
 namespace palpate::bench {
 

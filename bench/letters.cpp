@@ -2,7 +2,6 @@
 
 #include <array>
 #include <numbers>
-#include <string>
 
 #include <fmt/format.h>
 

@@ -11,7 +11,7 @@
 
 #include "io/atomic_file.hpp"
 #include "palpate/device.hpp"
-#include "recognition/proportion.hpp"
+#include "recognition/evaluation.hpp"
 
 namespace palpate::bench {
 

@@ -3,18 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <iterator>
-#include <memory>
-#include <optional>
 #include <span>
-#include <string>
 #include <utility>
-#include <vector>
 
 #include <fmt/format.h>
 
 #include "driver/serial_profile.hpp"
 #include "driver/takktile_protocol.hpp"
-#include "driver/usb_device.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {

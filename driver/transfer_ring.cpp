@@ -5,8 +5,6 @@
 #include <new>
 #include <utility>
 
-#include "driver/usb_device.hpp"
-
 namespace palpate {
 
 namespace {

@@ -4,17 +4,13 @@
 #include <array>
 #include <filesystem>
 #include <fstream>
-#include <memory>
-#include <span>
 #include <tuple>
 #include <utility>
-#include <vector>
 
 #include <fmt/format.h>
 #include <unistd.h>
 
 #include "driver/data_folder.hpp"
-#include "palpate/error.hpp"
 
 namespace palpate {
 

@@ -21,7 +21,6 @@
 #include "io/command_files.hpp"
 #include "learning/calibration_task.hpp"
 #include "palpate/files.hpp"
-#include "recognition/map_files.hpp"
 #include "recognition/recordings.hpp"
 
 namespace palpate::cli {

@@ -37,12 +37,8 @@ void check_outputs(const CheckArguments& options) {
   for (const std::string& recording : options.recordings) {
     files.reads("RECORDING", recording);
   }
-  if (!options.json.empty()) {
-    files.writes("--json", options.json, CommandFiles::Dash::stream);
-  }
-  if (!options.write_array.empty()) {
-    files.writes("--write-array", options.write_array);
-  }
+  files.writes("--json", options.json, CommandFiles::Dash::stream);
+  files.writes("--write-array", options.write_array);
   files.prepare();
 }
 

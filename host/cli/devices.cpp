@@ -1,7 +1,6 @@
 #include "cli/commands.hpp"
 
 #include <memory>
-#include <string>
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>

@@ -144,7 +144,7 @@ class Help : public CLI::Formatter {
       if (name.size() < column) {
         text += wrapped(fmt::format("{:<{}}{}", name, column, explained), column);
       } else {
-        text += name + "\n" + wrapped(std::string(column, ' ') + explained, column);
+        text += wrapped(name, 4) + "\n" + wrapped(std::string(column, ' ') + explained, column);
       }
       text += "\n";
     }

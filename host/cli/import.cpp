@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <optional>
 #include <string>
 
 #include <fmt/format.h>
@@ -91,9 +90,7 @@ void print_summary(const ImportArguments& options, const ImportedRecording& impo
 void import_tables(const ImportArguments& options) {
   CommandFiles files;
   files.reads("PRESSURES", options.pressures);
-  if (!options.poses.empty()) {
-    files.reads("--poses", options.poses);
-  }
+  files.reads("--poses", options.poses);
   files.reads("--array", options.array);
   files.writes("-o", options.output);
   files.require_distinct();

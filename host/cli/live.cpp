@@ -1,6 +1,5 @@
 #include <unistd.h>
 
-#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <functional>
@@ -14,16 +13,14 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/commands.hpp"
-#include "cli/detector_flags.hpp"
-#include "cli/engine_words.hpp"
 #include "cli/interruption.hpp"
 #include "cli/live_record.hpp"
 #include "cli/live_screen.hpp"
 #include "cli/options.hpp"
 #include "cli/page/live_page.hpp"
-#include "cli/planned_touch.hpp"
 #include "cli/recognition_flags.hpp"
 #include "cli/sensor_option.hpp"
+#include "cli/step_words.hpp"
 #include "io/command_files.hpp"
 #include "palpate/pose_track.hpp"
 #include "palpate/virtual_sensor.hpp"
@@ -133,9 +130,7 @@ void live(const LiveArguments& options) {
   CommandFiles files;
   add_sensor_files(options, files);
   add_recognition_files(request, files);
-  if (!options.json.empty()) {
-    files.writes("--json", options.json, CommandFiles::Dash::stream);
-  }
+  files.writes("--json", options.json, CommandFiles::Dash::stream);
   files.require_distinct();
   Device& device = device_in_waiting();
   Recogniser recogniser = open_telling(device, task);

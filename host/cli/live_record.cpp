@@ -7,7 +7,6 @@
 #include <fmt/format.h>
 
 #include "cli/options.hpp"
-#include "cli/planned_touch.hpp"
 #include "cli/step_words.hpp"
 #include "model/printable.hpp"
 #include "palpate/error.hpp"

@@ -9,7 +9,6 @@
 #include <fmt/format.h>
 
 #include "cli/array_picture.hpp"
-#include "cli/planned_touch.hpp"
 #include "cli/step_words.hpp"
 #include "cli/text_table.hpp"
 #include "figures/evidence_scale.hpp"

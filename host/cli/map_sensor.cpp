@@ -12,7 +12,7 @@
 #include "model/option_words.hpp"
 #include "palpate/files.hpp"
 #include "recognition/folder_sensor.hpp"
-#include "recognition/map_files.hpp"
+#include "recognition/recordings.hpp"
 
 namespace palpate::cli {
 

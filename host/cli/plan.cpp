@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -15,9 +14,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.hpp"
-#include "cli/engine_words.hpp"
 #include "cli/options.hpp"
-#include "cli/planned_touch.hpp"
 #include "cli/recognition_flags.hpp"
 #include "cli/record_table.hpp"
 #include "cli/sheet.hpp"

@@ -1,8 +1,6 @@
 #include "cli/recognition_flags.hpp"
 
 #include <algorithm>
-#include <utility>
-#include <variant>
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>

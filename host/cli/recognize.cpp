@@ -1,7 +1,5 @@
 #include <unistd.h>
 
-#include <algorithm>
-#include <array>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -15,12 +13,12 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.hpp"
-#include "cli/engine_words.hpp"
 #include "cli/options.hpp"
 #include "cli/progress.hpp"
 #include "cli/recognition_flags.hpp"
 #include "cli/record_table.hpp"
 #include "cli/sheet.hpp"
+#include "cli/step_words.hpp"
 #include "cli/terminal.hpp"
 #include "cli/text_table.hpp"
 #include "io/atomic_file.hpp"
@@ -34,28 +32,12 @@ namespace palpate::cli {
 
 namespace {
 
-/// A flag that --fit-touch-sd cannot stand beside, and whether it was given.
-struct OtherFlag {
-  const char* name;
-  bool given = false;
-};
-
 std::string flags_of(const TouchSdFit& fit) {
   return fmt::format("--touch-sd-mm {:.3g} --touch-sd-deg {:.3g}", fit.sd.mm, degrees(fit.sd.rad));
 }
 
 std::string number_of(std::size_t count, const char* one, const char* more) {
   return fmt::format("{} {}", count, count == 1 ? one : more);
-}
-
-/// Throws Error where one of the flags was given, and as require_fittable().
-void refuse_beside_fit(std::span<const OtherFlag> flags, const RecognitionTask& task) {
-  for (const OtherFlag& flag : flags) {
-    if (flag.given) {
-      refuse(flag.name, "has no meaning with --fit-touch-sd; leave one of them out");
-    }
-  }
-  require_fittable(task);
 }
 
 /// The result as a table and the flags to paste.
@@ -146,9 +128,7 @@ void check_outputs(const RecognizeArguments& options, const Request& request,
     }
     files.writes("--posterior", options.posterior);
   }
-  if (!options.json.empty()) {
-    files.writes("--json", options.json, CommandFiles::Dash::stream);
-  }
+  files.writes("--json", options.json, CommandFiles::Dash::stream);
   if (!options.png.empty()) {
     std::set<std::filesystem::path> pictures;
     for (const Unknown& unknown : unknowns) {
@@ -157,20 +137,10 @@ void check_outputs(const RecognizeArguments& options, const Request& request,
                "its picture would overwrite the picture of another recording of the same name; "
                "rename one of them");
       }
-      files.writes("--png", png_path(options, unknown));
+      files.writes_in("--png", options.png, png_path(options, unknown).filename());
     }
   }
-  files.require_distinct();
-  for (const std::string& file : {options.posterior, options.json}) {
-    if (!file.empty() && file != "-") {
-      require_writable(file);
-    }
-  }
-  if (std::filesystem::is_directory(options.png)) {
-    for (const Unknown& unknown : unknowns) {
-      require_writable(png_path(options, unknown));
-    }
-  }
+  files.prepare();
 }
 
 void export_posterior(const std::filesystem::path& path, const RecognitionTask& task,
@@ -209,11 +179,7 @@ void fit_touch_sd(const RecognizeArguments& options, Device& device, const Recog
     fit = palpate::fit_touch_sd(device, task, touched_objects(recordings, unknowns, task), {},
                                 [&](double fraction) { progress.show(fraction); });
   }
-  const std::string json = text_of(to_json(fit, device.name()), 2);
-  if (!options.json.empty() && options.json != "-") {
-    write_file(options.json, json);
-  }
-  fmt::print("{}", options.json == "-" ? json : touch_sd_text(fit));
+  give_result(options.json, text_of(to_json(fit, device.name()), 2), touch_sd_text(fit));
 }
 
 /// The line that shows how far the recognition of several unknowns is.
@@ -271,11 +237,7 @@ void recognize(const RecognizeArguments& options) {
                                                      },
                                                  .device = std::ref(device_in_waiting)});
   if (options.fit_touch_sd) {
-    refuse_beside_fit(std::array<OtherFlag, 4>{{{"--each-frame", request.each_frame},
-                                                {"--trace", request.trace},
-                                                {"--posterior", !options.posterior.empty()},
-                                                {"--png", !options.png.empty()}}},
-                      task);
+    require_fittable(task);
   }
   check_outputs(options, request, task, unknowns);
   Device& device = device_in_waiting();
@@ -363,12 +325,15 @@ void add_recognize(CLI::App& app) {
       "--png", options->png,
       "Folder for a picture of each unknown: the touches on the map, the belief over x and y, "
       "the identity after every touch");
-  command->add_flag(
+  auto* fit = command->add_flag(
       "--fit-touch-sd", options->fit_touch_sd,
       "Instead of recognising, find how far the touches lie from where the robot reports them: the "
       "standard deviations for --touch-sd-mm and --touch-sd-deg under which all RECORDINGs have "
       "the largest evidence. Give about 50 objects, each touched 5 times or more. Deviations "
       "of the angle below about 2 degrees are not told by an array 10 mm wide");
+  for (const char* other : {"--each-frame", "--trace", "--posterior", "--png"}) {
+    fit->excludes(other);
+  }
   command->callback([options] { recognize(*options); });
 }
 

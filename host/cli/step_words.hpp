@@ -2,11 +2,14 @@
 
 #include <array>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
+#include <nlohmann/json.hpp>
+
+#include "recognition/recogniser.hpp"
 #include "recognition/recognition_record.hpp"
+#include "recognition/touch_plan.hpp"
 
 // What a step says, in the words and digits that the tables, `live` and the recognition sheet
 // share.
@@ -72,5 +75,23 @@ std::string surprise_text(const RecognitionStep& step);
 
 /// A pose error in mm, "-" where there is none.
 std::string error_text(std::optional<double> error_mm);
+
+/// index, x_mm, y_mm, theta_rad, and the gain in nats: identity, pose, both, and the standard_error
+/// of each.
+nlohmann::ordered_json to_json(const PlannedTouch& touch);
+
+/// The part of a gain that the goal asks for, with its standard error: "2.31+-0.07".
+std::string gain_text(const TouchGain& gain, PlanGoal goal);
+
+/// "touch next at x 1.20 mm, y 3.40 mm, theta 45.00 deg: 2.31+-0.07 nats expected", or that even
+/// this touch, the best, tells nothing.
+std::string next_touch_words(const PlannedTouch& touch, PlanGoal goal);
+
+/// Maps, bins or particles, and device in a short line.
+std::string setup_words(const Device& device, const RecognitionTask& task);
+/// Prints on standard error how the device works: its memory, the filter with its paths through the
+/// likelihood, the lattice.
+/// @param device null where none is used
+void print_engine(const Device* device, const Recogniser& recogniser, const RecognitionTask& task);
 
 }  // namespace palpate::cli

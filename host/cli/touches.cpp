@@ -12,12 +12,11 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/commands.hpp"
-#include "cli/detector_flags.hpp"
 #include "cli/options.hpp"
+#include "cli/sensor_option.hpp"
 #include "io/command_files.hpp"
 #include "io/recording_state.hpp"
 #include "model/elements_that.hpp"
-#include "model/lost_count.hpp"
 #include "model/option_words.hpp"
 #include "model/stream_time.hpp"
 #include "palpate/baseline.hpp"

@@ -1,6 +1,5 @@
 #include "figures/canvas.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <new>

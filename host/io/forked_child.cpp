@@ -13,7 +13,6 @@
 #include <csignal>
 #include <cstring>
 #include <optional>
-#include <system_error>
 
 #include "io/available_memory.hpp"
 #include "palpate/error.hpp"

@@ -10,7 +10,6 @@
 #include <string>
 #include <string_view>
 #include <utility>
-#include <vector>
 
 #include "io/descriptor.hpp"
 #include "io/file_format.hpp"
@@ -19,8 +18,8 @@
 #include "io/recording_rules.hpp"
 #include "io/recording_state.hpp"
 #include "model/log_message.hpp"
-#include "model/lost_count.hpp"
 #include "model/printable.hpp"
+#include "model/stream_time.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {

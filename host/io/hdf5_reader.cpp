@@ -1,7 +1,6 @@
 #include "io/hdf5_reader.hpp"
 
 #include <algorithm>
-#include <functional>
 #include <numeric>
 #include <system_error>
 #include <utility>
@@ -10,7 +9,6 @@
 #include <fmt/ranges.h>
 
 #include "io/available_memory.hpp"
-#include "io/hdf5_handle.hpp"
 
 namespace palpate {
 

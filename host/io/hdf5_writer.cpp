@@ -1,12 +1,9 @@
 #include "io/hdf5_writer.hpp"
 
 #include <algorithm>
-#include <cstdlib>
 #include <cstring>
-#include <functional>
 #include <limits>
 #include <numeric>
-#include <string_view>
 
 #include <fmt/format.h>
 #include <unistd.h>

@@ -7,9 +7,9 @@
 #include <utility>
 
 #include "io/available_memory.hpp"
-#include "model/lost_count.hpp"
 #include "model/number_text.hpp"
 #include "model/printable.hpp"
+#include "model/stream_time.hpp"
 #include "palpate/pose.hpp"
 
 namespace palpate {

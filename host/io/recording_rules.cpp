@@ -5,8 +5,8 @@
 #include <fmt/format.h>
 
 #include "io/input_file.hpp"
-#include "model/lost_count.hpp"
 #include "model/printable.hpp"
+#include "model/stream_time.hpp"
 
 namespace palpate {
 

@@ -13,7 +13,7 @@
 #include "io/file_format.hpp"
 #include "io/hdf5_contents.hpp"
 #include "io/recording_rules.hpp"
-#include "model/lost_count.hpp"
+#include "model/stream_time.hpp"
 
 namespace palpate {
 

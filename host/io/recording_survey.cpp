@@ -6,12 +6,10 @@
 #include <limits>
 #include <numeric>
 #include <utility>
-#include <vector>
 
 #include <fmt/format.h>
 
 #include "io/available_memory.hpp"
-#include "model/lost_count.hpp"
 #include "model/stream_time.hpp"
 #include "palpate/contact.hpp"
 #include "palpate/touch_detector.hpp"

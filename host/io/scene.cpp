@@ -1,10 +1,8 @@
 #include "palpate/scene.hpp"
 
 #include <algorithm>
-#include <array>
 #include <fstream>
 #include <numbers>
-#include <string>
 #include <utility>
 
 #include <fmt/format.h>

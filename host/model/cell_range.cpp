@@ -1,8 +1,5 @@
 #include "model/cell_range.hpp"
 
-#include <algorithm>
-#include <cmath>
-
 #include <fmt/format.h>
 
 #include "palpate/error.hpp"

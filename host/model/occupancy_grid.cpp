@@ -5,8 +5,12 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <glm/common.hpp>
+#include <glm/vector_relational.hpp>
 
-#include "palpate/pose.hpp"
+#include "palpate/estimate.hpp"
+#include "palpate/object_frame.hpp"
+#include "palpate/pose_error.hpp"
 
 namespace palpate {
 
@@ -130,6 +134,58 @@ std::optional<std::string> fault_of_cells(const OccupancyGrid& map, std::size_t 
                        k / nx, k % nx, *wrong, most_log_odds);
   }
   return {};
+}
+
+OccupancyGrid mirror_image(const OccupancyGrid& map) {
+  OccupancyGrid image = map;
+  image.source.reset();  // its touches are of the side that was learned
+  image.origin_mm.x = 0.0 - map.centre_mm(map.nx - 1, 0).x;
+  for (std::vector<float>* cells : {&image.log_odds, &image.observations, &image.mean_level}) {
+    for (auto row = cells->begin(); row != cells->end(); row += map.nx) {
+      std::reverse(row, row + map.nx);
+    }
+  }
+  return image;
+}
+
+void add_mirror_images(std::vector<Hypothesis>& hypotheses) {
+  std::vector<Hypothesis> all;
+  for (Hypothesis& hypothesis : hypotheses) {
+    const bool mirror = hypothesis.map.mirror;
+    all.push_back(std::move(hypothesis));
+    if (mirror) {
+      all.back().weight /= 2.0;
+      Hypothesis image = all.back();
+      image.map = mirror_image(image.map);
+      if (image.layer) {
+        image.layer = mirror_image(*image.layer);
+      }
+      image.mirrored = true;
+      all.push_back(std::move(image));
+    }
+  }
+  hypotheses = std::move(all);
+}
+
+bool holds_origin(const OccupancyGrid& map) {
+  const glm::dvec2 cell = -map.origin_mm / map.cell_mm;  // column and row, with fractions
+  return glm::all(glm::greaterThanEqual(cell, glm::dvec2(-0.5))) &&
+         glm::all(glm::lessThanEqual(cell, glm::dvec2(map.nx, map.ny) - 0.5));
+}
+
+void centre_frame(OccupancyGrid& map) {
+  if (std::ranges::none_of(map.log_odds, [](float l) { return l > 0.0F; })) {
+    return;
+  }
+  // Origins are whole multiples of the cell; the difference of two must be one again.
+  const glm::dvec2 middle = glm::round(body_of(map).centroid_mm / map.cell_mm);
+  map.origin_mm = map.cell_mm * (glm::round(map.origin_mm / map.cell_mm) - middle);
+  map.T_learned_robot_object = map.T_learned_robot_object * Pose{map.cell_mm * middle, 0.0};
+  map.centred_mm += map.cell_mm * middle;
+}
+
+Pose in_centred_frame(const OccupancyGrid& map, const Pose& T_object_robot) {
+  return inverse(Pose{map.centred_mm, 0.0}) * T_object_robot;
 }
 
 }  // namespace palpate

@@ -9,8 +9,6 @@
 
 #include <glm/vec2.hpp>
 
-#include "palpate/pose.hpp"
-
 namespace palpate {
 
 namespace {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cstdint>
 #include <optional>
 
 namespace palpate {
@@ -23,5 +24,14 @@ class StreamTime {
   std::optional<double> last_s_;
   double elapsed_s_ = 0.0;
 };
+
+/// Largest count that float64, the type in which datasets are read, holds exactly.
+inline constexpr std::uint64_t largest_count = std::uint64_t{1} << 53;
+
+/// Adds `more` to a count of lost frames and stops at largest_count: a board or a file may claim
+/// any loss.
+inline void count_lost(std::uint64_t& count, std::uint64_t more) {
+  count = more < largest_count - count ? count + more : largest_count;
+}
 
 }  // namespace palpate

@@ -5,7 +5,6 @@
 #include <limits>
 #include <utility>
 
-#include "model/lost_count.hpp"
 #include "palpate/baseline.hpp"
 #include "palpate/pose_track.hpp"
 

@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 
 #include "recognition/folder_sensor.hpp"
-#include "recognition/map_files.hpp"
+#include "recognition/recordings.hpp"
 #include "recognition/refused_option.hpp"
 
 namespace palpate {

@@ -1,7 +1,6 @@
 #include "recognition/touch_plan.hpp"
 
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cmath>
 #include <filesystem>

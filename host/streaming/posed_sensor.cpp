@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <bitset>
 #include <chrono>
-#include <cmath>
 #include <cstdint>
 #include <deque>
 #include <string>
@@ -13,8 +12,8 @@
 
 #include "palpate/error.hpp"
 #include "palpate/pose_track.hpp"
+#include "streaming/frame_line.hpp"
 #include "streaming/line_reader.hpp"
-#include "streaming/pose_line.hpp"
 
 namespace palpate {
 

@@ -2,10 +2,8 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <numbers>
 #include <utility>
-#include <vector>
 
 #include "model/random.hpp"
 #include "palpate/simulation.hpp"

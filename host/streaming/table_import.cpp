@@ -4,14 +4,11 @@
 #include <array>
 #include <cmath>
 #include <utility>
-#include <vector>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include "io/npy_file.hpp"
-#include "io/pose_table.hpp"
-#include "io/pressure_table.hpp"
 #include "io/recording_rules.hpp"
 #include "io/table_columns.hpp"
 #include "model/number_text.hpp"

@@ -7,20 +7,16 @@
 #include <limits>
 #include <map>
 #include <numbers>
-#include <optional>
 #include <span>
-#include <string>
 #include <utility>
 #include <vector>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "model/lost_count.hpp"
 #include "model/stream_time.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
-#include "palpate/sensor.hpp"
 #include "palpate/simulation.hpp"
 #include "palpate/touch.hpp"
 #include "streaming/pace.hpp"

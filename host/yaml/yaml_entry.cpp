@@ -1,7 +1,6 @@
 #include "yaml/yaml_entry.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <optional>
 #include <set>
 #include <sstream>

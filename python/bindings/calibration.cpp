@@ -12,7 +12,6 @@
 #include "learning/calibration_task.hpp"
 #include "learning/setup_check.hpp"
 #include "model/option_words.hpp"
-#include "palpate/files.hpp"
 #include "recognition/recordings.hpp"
 #include "request.hpp"
 

@@ -3,11 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <initializer_list>
-#include <memory>
-#include <string>
 #include <string_view>
-#include <utility>
-#include <variant>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -21,7 +17,6 @@
 #include "model/option_words.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
-#include "recognition/map_files.hpp"
 #include "recognition/option_text.hpp"
 #include "recognition/recordings.hpp"
 #include "recognition/refused_option.hpp"

@@ -10,7 +10,7 @@
 
 #include "io/recording_rules.hpp"
 #include "limits.hpp"
-#include "model/lost_count.hpp"
+#include "model/stream_time.hpp"
 #include "palpate/files.hpp"
 #include "palpate/frame_recorder.hpp"
 #include "scratch_folder.hpp"

@@ -1,4 +1,4 @@
-#include "recognition/proportion.hpp"
+#include "recognition/evaluation.hpp"
 
 #include <cmath>
 #include <vector>

@@ -7,7 +7,6 @@
 #include <chrono>
 #include <climits>
 #include <condition_variable>
-#include <cstddef>
 #include <deque>
 #include <exception>
 #include <map>
@@ -16,11 +15,10 @@
 #include <thread>
 #include <utility>
 
-#include "cli/engine_words.hpp"
 #include "cli/options.hpp"
 #include "cli/recognition_flags.hpp"
+#include "cli/step_words.hpp"
 #include "io/input_file.hpp"
-#include "palpate/error.hpp"
 #include "recognition/batch/batch_resolution.hpp"
 #include "recognition/record_json.hpp"
 #include "recognition/resolve.hpp"

@@ -7,7 +7,6 @@
 
 #include "cli/live_record.hpp"
 #include "cli/page/page_json.hpp"
-#include "cli/planned_touch.hpp"
 #include "cli/sheet.hpp"
 #include "cli/step_words.hpp"
 #include "model/option_words.hpp"

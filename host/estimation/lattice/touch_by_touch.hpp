@@ -11,7 +11,6 @@
 #include "estimation/lattice/dense_likelihood.hpp"
 #include "estimation/lattice/displacement_blur.hpp"
 #include "gpu/command_stream.hpp"
-#include "model/bounding_box.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
 #include "palpate/pose_histogram.hpp"

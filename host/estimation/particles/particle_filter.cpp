@@ -17,7 +17,6 @@
 #include "estimation/particles/parzen_mode.hpp"
 #include "gpu/command_stream.hpp"
 #include "model/own_process.hpp"
-#include "palpate/error.hpp"
 #include "shaders/draw_particles.hpp"
 #include "shaders/sum_weights.hpp"
 

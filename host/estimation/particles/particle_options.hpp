@@ -1,7 +1,6 @@
 #pragma once
 
 #include "gpu/context.hpp"
-#include "palpate/estimate.hpp"
 #include "palpate/particle_filter.hpp"
 #include "shaders/interface.h"
 

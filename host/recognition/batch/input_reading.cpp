@@ -4,20 +4,16 @@
 
 #include <algorithm>
 #include <atomic>
-#include <chrono>
 #include <exception>
 #include <filesystem>
-#include <functional>
 #include <mutex>
 #include <system_error>
 #include <thread>
-#include <vector>
 
 #include "io/csv_table.hpp"
 #include "io/input_file.hpp"
 #include "model/printable.hpp"
 #include "recognition/option_text.hpp"
-#include "recognition/recordings.hpp"
 
 namespace palpate {
 
