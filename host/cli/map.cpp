@@ -13,6 +13,7 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/map_flags.hpp"
+#include "cli/map_sensor.hpp"
 #include "cli/options.hpp"
 #include "cli/progress.hpp"
 #include "cli/recognition_flags.hpp"
@@ -157,19 +158,8 @@ void align(const MapFlags& flags, const MapOptions& model, std::vector<ObjectTou
 /// The spread of the folder's maps that are not written anew, where all have the same.
 std::optional<double> spread_of_others(const MapFlags& flags,
                                        const std::vector<std::filesystem::path>& written) {
-  std::error_code none;
   std::optional<double> spread;
-  if (!std::filesystem::is_directory(flags.output, none)) {
-    return {};
-  }
-  for (const auto& entry : std::filesystem::directory_iterator(flags.output, none)) {
-    const std::filesystem::path& path = entry.path();
-    if (!path.filename().string().ends_with(".map.h5") ||
-        std::ranges::find(written, path.lexically_normal(), [](const std::filesystem::path& own) {
-          return own.lexically_normal();
-        }) != written.end()) {
-      continue;
-    }
+  for (const std::filesystem::path& path : other_maps(flags, written)) {
     try {
       const std::optional<double> own = summarize_map(path).head.spread_mm;
       if (!own || (spread && *spread != *own)) {
@@ -242,7 +232,12 @@ void build_maps(const MapFlags& flags) {
     map_paths.push_back(folder ? std::filesystem::path(flags.output) / (object.label + ".map.h5")
                                : std::filesystem::path(flags.output));
   }
-  prepare_outputs(flags, map_paths, names);
+  const bool learns = learns_sensor(flags);
+  std::vector<std::filesystem::path> outputs = map_paths;
+  if (learns) {
+    outputs.push_back(sensor_file(flags));
+  }
+  prepare_outputs(flags, outputs, names);
   warn_of_unknown_poses(recordings);
   for (const Recording& recording : recordings) {
     for (const SetupFinding& finding : recording.findings) {
@@ -276,6 +271,11 @@ void build_maps(const MapFlags& flags) {
       // What was learned is compared with more than log odds.
       maps.push_back(sensor ? observed_map(object.touches, model, object.label)
                             : build_map(builder, object, show));
+      if (learns) {
+        OccupancyGrid observed = observed_map(object.touches, model, object.label);
+        maps.back().observations = std::move(observed.observations);
+        maps.back().mean_level = std::move(observed.mean_level);
+      }
       maps.back().mirror = flags.mirror;
       MapSource source{gathered(object, recordings.front().pressure_unit), model};
       judge_left_out(device, source);
@@ -285,6 +285,8 @@ void build_maps(const MapFlags& flags) {
     }
   }
 
+  const std::optional<MapSensor> learned =
+      learns ? std::optional(learn_sensor(flags, maps, map_paths, model)) : std::nullopt;
   const std::string picture = flags.png.empty() ? "" : draw_maps(maps);
 
   // Nothing is written before all maps are built, so that a failure leaves nothing behind.
@@ -304,6 +306,9 @@ void build_maps(const MapFlags& flags) {
     if (symmetries[i]) {
       fmt::print("{}: {}\n", map_paths[i].string(), symmetry_words(map, *symmetries[i]));
     }
+  }
+  if (learned) {
+    write_sensor(flags, *learned);
   }
   if (!flags.ros.empty()) {
     for (const OccupancyGrid& map : maps) {

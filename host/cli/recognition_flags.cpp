@@ -100,12 +100,12 @@ void add_recognition_flags(CLI::App& command, Request& request, bool& verbose) {
       "key");
   command.add_option(
       "--sensor-model", request.sensor_model,
-      "What 'palpate calibrate' learned about the sensor (YAML): the threshold, the ratio, gamma "
+      "What was learned about the sensor (YAML): the threshold, the ratio, gamma "
       "and the touches' standard deviations, which flags and scene keys override; a likelihood "
       "table in the place of gamma and prior; and how sure to be: the temperature, press features, "
       "and whether the object was learned at all. Without an own --filter, standard deviations "
       "above 0 take the histogram; --filter bounded and particles leave them out "
-      "[default: no model]");
+      "[default: the sensor.yaml that 'palpate map' wrote beside the maps; none: Eq. 7]");
   add_bins_flag(
       command, request,
       "Pose bins per object along x, y and theta, as 25x25x16; auto: as many as the refined pose "

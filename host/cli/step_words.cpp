@@ -169,14 +169,16 @@ std::string unproven_sentence(const RecognitionStep& step, const RecognitionTask
   }
   const auto [low, high] = step.identity_bounds[step.best];
   const double unproven = 100.0 * step.certificate->dropped_mass;
+  constexpr double poor_fits = 0.01;  // rounding leaves less
   // Bounds round outwards.
   return fmt::format(
       "{} {:.1f} % (at least {:.1f} %, at most {:.1f} %): {} left {} % of the belief "
       "unproven",
       object_words(step, task), 100.0 * step.confidence(), std::floor(1000.0 * low) / 10.0,
       std::ceil(1000.0 * high) / 10.0,
-      bounded->budget_s ? fmt::format("the budget of {:g} ms", 1e3 * *bounded->budget_s)
-                        : fmt::format("rounding"),
+      bounded->budget_s       ? fmt::format("the budget of {:g} ms", 1e3 * *bounded->budget_s)
+      : unproven >= poor_fits ? "the search, which met nothing but poor fits,"
+                              : "rounding",
       unproven >= 9.95 ? fmt::format("{:.0f}", unproven) : fmt::format("{:.2g}", unproven));
 }
 
@@ -242,8 +244,9 @@ std::string setup_words(const Device& device, const RecognitionTask& task) {
   const auto mirrored =
       static_cast<std::size_t>(std::ranges::count_if(task.hypotheses, &Hypothesis::mirrored));
   const std::size_t maps = task.hypotheses.size() - mirrored;
-  return fmt::format("{} map{}{}, {} on {}", maps, maps == 1 ? "" : "s",
+  return fmt::format("{} map{}{}{}, {} on {}", maps, maps == 1 ? "" : "s",
                      mirrored > 0 ? fmt::format(" and {} mirrored", mirrored) : "",
+                     task.sensor_model.empty() ? "" : " with " + printable(task.sensor_model),
                      particles != nullptr
                          ? fmt::format("{} particles", particles->particles)
                          : fmt::format("{} x {} x {} bins each{},", lattice.x_mm.count,

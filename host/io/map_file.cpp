@@ -223,6 +223,7 @@ OccupancyGrid read_map(const std::filesystem::path& path) {
       path, file,
       [&](const OccupancyGrid& head) {
         map = head;
+        map.file = path.string();
         const auto count = static_cast<std::size_t>(map.nx) * static_cast<std::size_t>(map.ny);
         require_memory(path, fmt::format("a map of {} x {} cells", map.nx, map.ny),
                        count * sizeof(float));

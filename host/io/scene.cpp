@@ -143,6 +143,12 @@ void read_bins(const Entry& entry, Scene& scene) {
   scene.bins = {counts[0].integer(1), counts[1].integer(1), counts[2].integer(1)};
 }
 
+/// A file, relative to the scene's, or "none".
+std::filesystem::path sensor_model_in(const Entry& entry) {
+  const std::string name = entry.text();
+  return name == "none" ? std::filesystem::path(name) : entry.file.parent_path() / name;
+}
+
 }  // namespace
 
 Scene read_scene(const std::filesystem::path& path) {
@@ -162,8 +168,7 @@ Scene read_scene(const std::filesystem::path& path) {
     const auto probability = [](double value) { return value >= 0 && value <= 1; };
     read_keys(root,
               {{"array", [&](const Entry& e) { read_array(e, scene); }},
-               {"sensor_model",
-                [&](const Entry& e) { scene.sensor_model = e.file.parent_path() / e.text(); }},
+               {"sensor_model", [&](const Entry& e) { scene.sensor_model = sensor_model_in(e); }},
                {"threshold", number(scene.threshold, at_least_0, "give a number from 0")},
                {"ratio", number(scene.ratio, rate, "give a number in [0, 1)")},
                {"gamma", number(scene.gamma, rate, "give a number in [0, 1)")},

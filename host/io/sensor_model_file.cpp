@@ -87,6 +87,7 @@ void describe(Keys& keys, LearnedTable& table) {
 
 template <typename Keys>
 void describe(Keys& keys, LearnedSensor& sensor) {
+  keys("maps", sensor.maps, !sensor.maps.empty());
   keys("pressure_unit", sensor.pressure_unit);
   keys("noise", sensor.noise);
   keys("threshold", sensor.classifier.threshold);

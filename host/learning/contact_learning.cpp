@@ -114,6 +114,9 @@ std::vector<double> contact_pressures(std::span<const Touch> touches,
 }  // namespace
 
 MapOptions LearnedReadings::maps() const {
+  if (given_maps) {
+    return *given_maps;
+  }
   return {.cell_mm = 0.5 * spacing_mm,
           .sensor = {.spread_mm = spread_mm, .prior = prior},
           .classifier = classifier};
@@ -131,7 +134,7 @@ std::vector<double> LearnedReadings::level_edges(std::size_t levels) const {
 }
 
 LearnedReadings learn_readings(const std::vector<Press>& presses, const ReadingOptions& options) {
-  LearnedReadings readings{.spacing_mm = options.spacing_mm};
+  LearnedReadings readings{.spacing_mm = options.spacing_mm, .given_maps = options.maps};
   if (options.threshold && options.ratio) {
     readings.classifier = {.threshold = *options.threshold, .ratio = *options.ratio};
   } else {
@@ -157,6 +160,11 @@ LearnedReadings learn_readings(const std::vector<Press>& presses, const ReadingO
                 fmt::format("no pressure is above the contact threshold, {:g} {}; give a lower "
                             "`threshold`",
                             readings.classifier.threshold, options.pressure_unit));
+  }
+  if (options.maps) {
+    readings.prior = options.maps->sensor.prior;
+    readings.spread_mm = options.maps->sensor.spread_mm;
+    return readings;
   }
   readings.prior = share_in_contact(evidence);
   if (at_known_poses(presses)) {

@@ -19,6 +19,8 @@ struct ReadingOptions {
   std::optional<double> threshold;  ///< learned where there is none
   std::optional<double> ratio;      ///< learned where there is none
   double spacing_mm = 0.0;          ///< between the elements
+  /// How the maps are built that readings are compared with; none: as the readings say.
+  std::optional<MapOptions> maps = {};
 };
 
 /// What presses say of a sensor's readings, whatever objects they are of.
@@ -30,8 +32,9 @@ struct LearnedReadings {
   std::optional<double> psf_mm;   ///< where presses at known poses tell the point spread
   double spread_mm = 0.5;         ///< of maps
   double spacing_mm = 0.0;        ///< between the elements
+  std::optional<MapOptions> given_maps = {};  ///< ReadingOptions::maps
 
-  /// Options of maps with cells of half a spacing.
+  /// The given options of maps, or else those of maps with cells of half a spacing.
   MapOptions maps() const;
   /// Pressures that part the elements In Contact into `levels` - 1 levels of about as many elements
   /// each; fewer where pressures are the same.
@@ -40,7 +43,8 @@ struct LearnedReadings {
 
 /// Learns the classifier, then what it makes of the presses. A learned threshold is at least three
 /// standard deviations of the noise. The maps' spread is half of the point spread's, or 0.6
-/// spacings.
+/// spacings. Where their options are given, spread and prior are theirs, and no point spread is
+/// learned.
 /// @throws Error as learn_classifier(), on a classifier out of range, and where no pressure is
 /// above the threshold
 LearnedReadings learn_readings(const std::vector<Press>& presses, const ReadingOptions& options);

@@ -9,8 +9,11 @@
 #include <utility>
 
 #include <tbb/parallel_for.h>
+#include <glm/vec3.hpp>
 
+#include "estimation/lattice/refinement.hpp"
 #include "learning/host_progress.hpp"
+#include "palpate/pose_error.hpp"
 #include "recognition/nearby_fit.hpp"
 
 namespace palpate {
@@ -114,6 +117,8 @@ class FoldTrial {
     if (model.table) {
       layers_ = layers_of(model.maps, model.how.layer);
     }
+    std::ranges::transform(model.maps, std::back_inserter(bodies_),
+                           [](const TrainingMap& map) { return displaced_body(map.map); });
   }
 
   bool has_map(const std::string& label) const {
@@ -146,7 +151,12 @@ class FoldTrial {
       std::ranges::transform(scores[i], std::back_inserter(scored.log_evidence),
                              &LabelScore::log_evidence);
       if (i >= tried.size()) {
-        result.groups[asked.half_of_group[i - tried.size()]].push_back(std::move(scored));
+        const std::size_t half = asked.half_of_group[i - tried.size()];
+        if (half == 0) {
+          scored.error_mm =
+              pose_error_of(evidence[i], scored.truth, *asked.presses[i].T_object_robot);
+        }
+        result.groups[half].push_back(std::move(scored));
         continue;
       }
       // A press of which nothing is In Contact says nothing of its object.
@@ -202,6 +212,60 @@ class FoldTrial {
       counter.add();
     });
     return scores;
+  }
+
+  /// See CrossValidation::groups.
+  double pose_error_of(std::span<const TouchEvidence> press, std::size_t label,
+                       const Pose& T_object_robot) const {
+    constexpr int steps = 3;  // to either side
+    constexpr int most_rounds = 6;
+    constexpr double enough = 0.6;  // of a step: a standard deviation that the steps resolve
+    const std::size_t map = maps_of_[label].front();
+    Hypothesis hypothesis{.map = model_.maps[map].map};
+    if (model_.table) {
+      hypothesis.layer = layers_[map];
+    }
+    const PressPlacer placer(hypothesis, contact_for(label), options_.bins->lattice);
+    // The first window is wide: one that ended near the truth would draw beliefs to it.
+    glm::dvec3 step{0.3 * options_.spacing_mm, 0.3 * options_.spacing_mm, 0.06};
+    glm::dvec3 middle{T_object_robot.translation_mm, T_object_robot.theta_rad};
+    const auto pose_at = [](const glm::dvec3& at) { return Pose{{at.x, at.y}, at.z}; };
+    for (int round = 0; round < most_rounds; ++round) {
+      double most = nothing;
+      std::vector<std::pair<double, glm::dvec3>> about;
+      for (int a = -steps; a <= steps; ++a) {
+        for (int y = -steps; y <= steps; ++y) {
+          for (int x = -steps; x <= steps; ++x) {
+            const glm::dvec3 at = middle + step * glm::dvec3(x, y, a);
+            about.emplace_back(placer.log_likelihood(press, pose_at(at)), at);
+            most = std::max(most, about.back().first);
+          }
+        }
+      }
+      double sum = 0.0;
+      glm::dvec3 mean{0.0};
+      glm::dvec3 squares{0.0};
+      for (const auto& [log_likelihood, at] : about) {
+        const double weight = std::exp(log_likelihood - most);
+        sum += weight;
+        mean += weight * (at - middle);
+        squares += weight * (at - middle) * (at - middle);
+      }
+      mean /= sum;
+      const glm::dvec3 variance = squares / sum - mean * mean;
+      middle += mean;
+      bool resolved = true;
+      for (int axis = 0; axis < 3; ++axis) {
+        if (!(variance[axis] > enough * enough * step[axis] * step[axis])) {
+          step[axis] /= 2.0;
+          resolved = false;
+        }
+      }
+      if (resolved) {
+        break;
+      }
+    }
+    return pose_error_mm(bodies_[map], 1, pose_at(middle), T_object_robot);
   }
 
   /// Log density of a touch's features under every label; empty without features.
@@ -295,6 +359,7 @@ class FoldTrial {
   const CrossValidationOptions& options_;
   std::vector<std::vector<std::size_t>> maps_of_;  ///< [label]
   std::vector<OccupancyGrid> layers_;              ///< [map] with a table
+  std::vector<Body> bodies_;                       ///< [map]
 };
 
 }  // namespace

@@ -80,6 +80,7 @@ struct CrossValidationOptions {
   /// For presses at known poses, which are looked for as_unknown() on these bins; none: all presses
   /// stay as they are, and are looked for on TableLearning::lattice.
   std::optional<RecognitionBins> bins = {};
+  double spacing_mm = 0.0;  ///< between the elements
 };
 
 /// What models that had not seen the presses said of them.
@@ -87,7 +88,8 @@ struct CrossValidation {
   std::vector<ScoredPress> presses;  ///< with a map of their object in the other folds
   /// Several presses at known poses of one object and fold together, with
   /// CrossValidationOptions::bins. A press is in groups of one half only. None where a fold has
-  /// fewer presses of each object.
+  /// fewer presses of each object. Those of the first half have the pose error (Eq. 17-20), in mm,
+  /// of the mean by their likelihood over poses about their own, on their object's map.
   GroupHalves groups;
   /// [fold] Scores of presses with an element In Contact: known with the maps of their own object
   /// and all others but one, each left out in turn; unknown with the maps of all others.

@@ -13,6 +13,7 @@ namespace {
 /// What presses say of presses that are not among them by Eq. 7.
 FoldModel eq7_model(const LearnedPresses& learned, const ModelLearning& how) {
   FoldModel model{.maps = learned.maps, .how = table_learning({}, learned, how)};
+  model.how.contact.classifier = learned.readings.maps().classifier;
   if (how.bins && how.given.empty()) {
     // Touches at known poses are tried on maps of all others, as unknowns will be.
     model.maps = maps_of_objects(learned.presses, learned.readings.maps());

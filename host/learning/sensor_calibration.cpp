@@ -83,7 +83,7 @@ std::vector<std::string> labels_of(const std::vector<TrainingMap>& maps) {
 std::vector<std::string> warnings_about(const LearnedPresses& learned) {
   std::vector<std::string> warnings = stuck_elements(
       learned.presses, learned.readings.classifier.threshold, learned.readings.pressures);
-  if (at_known_poses(learned.presses) && !learned.readings.psf_mm) {
+  if (at_known_poses(learned.presses) && !learned.readings.psf_mm && !learned.readings.given_maps) {
     warnings.emplace_back(
         "the touches do not tell the point spread: too few of an object, or no edges; the "
         "maps' spread is 0.6 element spacings");
@@ -162,15 +162,6 @@ struct TriedModel {
   TemperedPresses after;  ///< the folds together, with temperature and features
 };
 
-/// The losses of presses with their labels' log probabilities, in nats.
-std::vector<double> losses_of(const std::vector<ScoredPress>& presses) {
-  std::vector<double> of_each;
-  for (const ScoredPress& press : presses) {
-    of_each.push_back(-press.log_evidence[press.truth]);
-  }
-  return of_each;
-}
-
 /// The first table, unless a later one is clearly better about presses, without those of a fold.
 const TriedModel& kept(const std::vector<TriedModel>& tried,
                        std::optional<std::size_t> without = {}) {
@@ -214,6 +205,7 @@ void judge(const CrossValidation& eq7, const std::vector<TriedModel>& tried, boo
                                 .before = scores_of(both(eq7.groups), 1.0),
                                 .table = scores_of(both(table.groups), 1.0),
                                 .after = scores_of(after.groups, 1.0)};
+    judged.gain = gain_of(eq7, table, after.presses);
   } else if (known_poses) {
     judged.warnings.push_back(
         fmt::format("too few touches to try {} of an object together on maps without them, so "
@@ -297,7 +289,8 @@ SensorCalibration calibrate_sensor(const std::vector<Press>& presses,
   ModelLearning how{.readings = {.pressure_unit = options.pressure_unit,
                                  .threshold = options.threshold,
                                  .ratio = options.ratio,
-                                 .spacing_mm = spacing_mm_of(presses)},
+                                 .spacing_mm = spacing_mm_of(presses),
+                                 .maps = options.maps},
                     .folds = options.folds};
   for (const OccupancyGrid& map : given) {
     how.given.push_back({map});
@@ -335,9 +328,13 @@ SensorCalibration calibrate_sensor(const std::vector<Press>& presses,
     one.how = table_learning(kind, learned, how);
     one.placed = learn_table(learned.presses, learned.maps, one.how, work.part(table_cost));
   }
-  const std::vector<std::vector<CrossValidation>> validations = cross_validate(
-      learned.presses, labels, tables, how,
-      {.folds = options.folds, .maps_per_object = options.most_maps, .bins = bins}, work);
+  const std::vector<std::vector<CrossValidation>> validations =
+      cross_validate(learned.presses, labels, tables, how,
+                     {.folds = options.folds,
+                      .maps_per_object = options.most_maps,
+                      .bins = bins,
+                      .spacing_mm = readings.spacing_mm},
+                     work);
   for (std::size_t i = 0; i < tables.size(); ++i) {
     TriedModel& one = tried[i];
     one.folds = validations[i];

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "learning/cross_validation.hpp"
+#include "learning/sensor_gain.hpp"
 #include "palpate/learned_sensor.hpp"
 #include "palpate/occupancy_grid.hpp"
 
@@ -25,6 +26,8 @@ struct SensorCalibrationOptions {
   /// Bins on which unknowns will be recognised, for touches at known poses; none stands for bins
   /// half the elements' spacing and 5 degrees wide, about the array's centre.
   std::optional<RecognitionBins> bins = {};
+  /// How the maps are built that unknowns will be recognised with; none: as ReadingOptions::maps.
+  std::optional<MapOptions> maps = {};
 };
 
 /// Touches at known poses have a table of seven levels over the mean pressure, which also tells
@@ -59,6 +62,7 @@ struct SensorCalibration {
   std::optional<Scores> table;        ///< the table, temperature 1
   std::optional<Scores> after;        ///< the table, temperature and features
   std::optional<GroupScores> groups;  ///< none for presses at unknown poses, or few touches
+  std::optional<SensorGain> gain;     ///< none where there are no groups
   /// Mean over the folds of the area under the curve of presses whose object is known against those
   /// whose object is left out, see FamiliarityScores: about one half where presses say nothing;
   /// none with one object.

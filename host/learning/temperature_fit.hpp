@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -18,6 +19,7 @@ struct ScoredPress {
   std::vector<double> log_evidence;  ///< of every label, in nats; -infinity: without a map
   /// Log density of the press's features under every label, in nats; empty without features.
   std::vector<double> log_density;
+  std::optional<double> error_mm = {};  ///< see CrossValidation::groups
 };
 
 /// The presses of a fold (inside) or of all other folds.

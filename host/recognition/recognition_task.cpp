@@ -89,6 +89,7 @@ DisplacementSd RecognitionTask::slip_sd() const {
 FilterOptions opened_filter(const RecognitionTask& task) {
   constexpr double share = 0.05;
   constexpr double negligible = 1e-4;
+  constexpr std::int64_t poor_bins = 20'000;  // about as many as Eq. 7 needs of such touches
   FilterOptions filter = task.filter;
   auto* bounded = std::get_if<BoundedOptions>(&filter);
   if (bounded == nullptr) {
@@ -97,12 +98,15 @@ FilterOptions opened_filter(const RecognitionTask& task) {
   if (task.cancel_point) {
     bounded->cancel_point = task.cancel_point;
   }
+  if (task.contact().table) {
+    bounded->poor_bins = poor_bins;
+  }
   const bool tempered = task.temperature > 1.0 || task.temperature_growth > 0.0;
   if ((tempered || task.features || task.familiarity) && !bounded->evidence_nats) {
     bounded->evidence_nats = share * task.temperature;
-    bounded->evidence_range_nats =
-        std::max(-std::log(negligible) * task.temperature,
-                 task.familiarity ? FamiliarityScore::most_lead_nats : 0.0);
+    bounded->evidence_range_nats = -std::log(negligible) * task.temperature;
+    // Familiarity is told of a single touch.
+    bounded->single_touch_range_nats = task.familiarity ? FamiliarityScore::most_lead_nats : 0.0;
     bounded->evidence_growth = task.temperature_growth / task.temperature;
   }
   return filter;

@@ -70,6 +70,7 @@ struct RecognitionTask {
   FitScale fit_scale = {};                  ///< of RecognitionStep::fit
   PoseScale pose_scale = {};                ///< of RecognitionStep::refined and of modes
   ActWhere act = {};                        ///< for RecognitionStep::decision
+  std::string sensor_model = {};            ///< file of what was learned; "" by Eq. 7
   std::function<void()> cancel_point = {};  ///< BoundedOptions::cancel_point, where bounds search
   std::vector<std::string> remarks = {};    ///< sentences for the user, once the filter is open
 };

@@ -176,6 +176,9 @@ nlohmann::ordered_json to_json(const RecognitionRecord& record, const Recognitio
   if (!record.true_label.empty()) {
     json["truth"] = truth_to_json(record.last().truth);
   }
+  if (!task.sensor_model.empty()) {
+    json["sensor_model"] = task.sensor_model;
+  }
   if (device) {
     json["seconds"] = record.seconds;
     json["device"] = *device;

@@ -130,15 +130,12 @@ double largest_reach_mm(std::span<const Recording> recordings) {
   return reach;
 }
 
-std::vector<std::filesystem::path> map_files(const std::filesystem::path& argument) {
+std::vector<std::filesystem::path> maps_in(const std::filesystem::path& folder) {
   std::error_code error;
-  if (!std::filesystem::is_directory(argument, error)) {
-    return {argument};
-  }
   std::vector<std::filesystem::path> files;
-  const std::filesystem::directory_iterator entries(argument, error);
+  const std::filesystem::directory_iterator entries(folder, error);
   if (error) {
-    refuse(argument, "cannot be read: {}; check its permissions", error.message());
+    refuse(folder, "cannot be read: {}; check its permissions", error.message());
   }
   for (const auto& entry : entries) {
     // A look into each file would take as long as reading it.
@@ -147,11 +144,20 @@ std::vector<std::filesystem::path> map_files(const std::filesystem::path& argume
       files.push_back(entry.path());
     }
   }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+std::vector<std::filesystem::path> map_files(const std::filesystem::path& argument) {
+  std::error_code error;
+  if (!std::filesystem::is_directory(argument, error)) {
+    return {argument};
+  }
+  std::vector<std::filesystem::path> files = maps_in(argument);
   if (files.empty()) {
     refuse(argument, "a folder without maps; build some with palpate map RECORDING... -o {}",
            (argument / "").string());
   }
-  std::sort(files.begin(), files.end());
   return files;
 }
 

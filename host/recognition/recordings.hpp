@@ -44,8 +44,12 @@ std::vector<Unknown> list_unknowns(const Request& request, std::span<const Recor
 double largest_reach_mm(std::span<const Touch> touches);
 double largest_reach_mm(std::span<const Recording> recordings);
 
-/// The map files that an argument of --maps stands for: itself or, of a folder, its *.map.h5 and
-/// what else is a map among its *.h5. @throws Error where a folder has none
+/// The maps in a folder: its *.map.h5 and what else is a map among its *.h5, in order.
+/// @throws Error where the folder cannot be read
+std::vector<std::filesystem::path> maps_in(const std::filesystem::path& folder);
+
+/// The map files that an argument of --maps stands for: itself or, of a folder, maps_in().
+/// @throws Error where a folder has none
 std::vector<std::filesystem::path> map_files(const std::filesystem::path& argument);
 
 }  // namespace palpate

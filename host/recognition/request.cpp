@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "recognition/folder_sensor.hpp"
 #include "recognition/recordings.hpp"
 #include "recognition/refused_option.hpp"
 
@@ -148,12 +149,20 @@ std::vector<std::pair<std::string, std::filesystem::path>> files_of(const Reques
   if (request.array_file) {
     files.emplace_back("scene", *request.array_file);
   }
-  if (!request.sensor_model.empty()) {
+  if (!request.sensor_model.empty() && request.sensor_model != no_sensor_model) {
     files.emplace_back(request.keys.contains("sensor-model") ? "scene" : "sensor-model",
                        request.sensor_model);
   }
+  const char* of_maps = request.maps.empty() ? "scene" : "maps";
+  std::set<std::filesystem::path> beside;
   for (const Scene::Object& object : objects_of(request)) {
-    files.emplace_back(request.maps.empty() ? "scene" : "maps", object.map);
+    files.emplace_back(of_maps, object.map);
+    if (const auto sensor = sensor_beside(object.map); sensor && request.sensor_model.empty()) {
+      beside.insert(*sensor);
+    }
+  }
+  for (const std::filesystem::path& sensor : beside) {
+    files.emplace_back(of_maps, sensor);
   }
   return files;
 }

@@ -46,6 +46,9 @@ struct GivenMap {
   Hypothesis hypothesis;
 };
 
+/// Request::sensor_model that stands for Eq. 7.
+inline constexpr const char* no_sensor_model = "none";
+
 /// What is asked of a recognition, by the command line, a scene file or a program; what is left out
 /// is empty. resolve() makes it a task and throws Error where a value cannot be meant. Messages
 /// name an option by its member here, with dashes: `x-mm`.
@@ -53,7 +56,7 @@ struct Request {
   std::vector<std::string> maps;     ///< files, and folders of them
   std::vector<GivenMap> given_maps;  ///< in the place of `maps`
   std::string scene;                 ///< a file; complete() reads it
-  std::string sensor_model;          ///< a file
+  std::string sensor_model;          ///< a file, or no_sensor_model; "": that of the maps' folder
   std::optional<Bins> bins;
   std::optional<std::array<double, 2>> x_mm;  ///< range
   std::optional<std::array<double, 2>> y_mm;
@@ -102,7 +105,7 @@ Request complete(Request request);
 std::vector<Scene::Object> objects_of(const Request& request);
 
 /// The files that the task depends on, after the options that name them: the scene, its array, the
-/// sensor model, the maps. @throws Error as objects_of() does
+/// sensor model, the maps with the sensor models beside them. @throws Error as objects_of() does
 std::vector<std::pair<std::string, std::filesystem::path>> files_of(const Request& request);
 
 /// Whether neither bins nor any part of a region are given: the region then follows from the maps

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 #include <set>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -16,6 +17,7 @@
 #include "palpate/files.hpp"
 #include "palpate/map_builder.hpp"
 #include "recognition/filter_choice.hpp"
+#include "recognition/folder_sensor.hpp"
 #include "recognition/recordings.hpp"
 #include "recognition/refused_option.hpp"
 
@@ -116,10 +118,49 @@ ActWhere act_where(const Request& request) {
   return act;
 }
 
-std::optional<LearnedSensor> sensor_of(const Request& request, const Circumstances& of) {
-  const std::string& file = request.sensor_model;
-  if (file.empty()) {
+/// The model of the maps' folder, unless it does not go with what is asked or touched.
+std::optional<SensorFromFile> usual_sensor(const Request& request, const Circumstances& of,
+                                           std::span<const Hypothesis> hypotheses,
+                                           std::vector<std::string>& remarks) {
+  std::optional<SensorFromFile> usual = folder_sensor(hypotheses, remarks);
+  if (!usual) {
     return {};
+  }
+  const auto& [file, sensor] = *usual;
+  const auto left_out = [&](const std::string& why) {
+    remarks.push_back(fmt::format("{} is left out: {}; `sensor-model none` says so", file, why));
+    return std::nullopt;
+  };
+  if (sensor.pressure_unit != of.pressure_unit) {
+    return left_out(fmt::format("it is for pressures in {}, and those of {} are in {}",
+                                sensor.pressure_unit, of.source, of.pressure_unit));
+  }
+  for (const auto& [option, given] :
+       {std::pair{"gamma", request.gamma}, std::pair{"prior", request.prior}}) {
+    if (given) {
+      return left_out(fmt::format("`{}` is for Eq. 7", option));
+    }
+  }
+  for (const auto& [option, given, learned] :
+       {std::tuple{"threshold", request.threshold, sensor.classifier.threshold},
+        std::tuple{"ratio", request.ratio, sensor.classifier.ratio}}) {
+    if (given && *given != learned) {
+      return left_out(
+          fmt::format("its {} is {:.4g}, not `{} {:g}`", option, learned, option, *given));
+    }
+  }
+  return usual;
+}
+
+std::optional<SensorFromFile> sensor_of(const Request& request, const Circumstances& of,
+                                        std::span<const Hypothesis> hypotheses,
+                                        std::vector<std::string>& remarks) {
+  const std::string& file = request.sensor_model;
+  if (file == no_sensor_model || (file.empty() && of.need.eq7)) {
+    return {};
+  }
+  if (file.empty()) {
+    return usual_sensor(request, of, hypotheses, remarks);
   }
   LearnedSensor sensor = read_sensor_model(file);
   if (sensor.pressure_unit != of.pressure_unit) {
@@ -132,19 +173,19 @@ std::optional<LearnedSensor> sensor_of(const Request& request, const Circumstanc
       refuse_given(request, option, "the table of {} takes its place; leave it out", file);
     }
   }
-  return sensor;
+  return SensorFromFile{file, std::move(sensor)};
 }
 
 /// The classifier of Eq. 3 and gamma of Eq. 7: the request overrides what the sensor model learned.
 std::pair<ContactClassifier, double> contact_rules(const Request& request, const Circumstances& of,
-                                                   const std::optional<LearnedSensor>& sensor) {
+                                                   const LearnedSensor* sensor) {
   std::optional<double> threshold = request.threshold;
   std::optional<double> ratio = request.ratio;
-  if (sensor) {
+  if (sensor != nullptr) {
     threshold = threshold.value_or(sensor->classifier.threshold);
     ratio = ratio.value_or(sensor->classifier.ratio);
   }
-  const double gamma = request.gamma.value_or(sensor ? sensor->gamma : usual_gamma);
+  const double gamma = request.gamma.value_or(sensor != nullptr ? sensor->gamma : usual_gamma);
   if (!(gamma >= 0.0 && gamma < 1.0)) {
     refuse_option("gamma", gamma, "must be at least 0 and below 1");
   }
@@ -266,21 +307,22 @@ FilterOptions settled_filter(const Request& request, const Circumstances& of, Ch
 
 RecognitionTask resolve(const Request& request, const Circumstances& of) {
   const FilterWish wish = filter_wish(request);
-  const std::optional<LearnedSensor> sensor = sensor_of(request, of);
-  HistogramOptions histogram{.still_array = of.still_array};
-  ContactModel& contact = histogram.contact;
-  const auto [classifier, gamma] = contact_rules(request, of, sensor);
   const std::vector<Scene::Object> objects = objects_of(request);
   std::vector<Hypothesis> hypotheses = hypotheses_of(request, objects);
   std::vector<std::string> remarks;
-  if (!sensor || !sensor->table) {
+  const std::optional<SensorFromFile> learned = sensor_of(request, of, hypotheses, remarks);
+  const LearnedSensor* sensor = learned ? &learned->sensor : nullptr;
+  HistogramOptions histogram{.still_array = of.still_array};
+  ContactModel& contact = histogram.contact;
+  const auto [classifier, gamma] = contact_rules(request, of, sensor);
+  if (sensor == nullptr || !sensor->table) {
     contact.prior = given_prior(request.prior);
     if (!contact.prior) {
       bring_to_one_prior(of, objects, hypotheses, remarks);
     }
   }
   add_mirror_images(hypotheses);
-  if (sensor) {
+  if (sensor != nullptr) {
     apply(*sensor, hypotheses, contact);
     // Particles take touches to be exact.
     histogram.touch_sd = wish.kind == FilterKind::particles ? DisplacementSd{} : sensor->touch_sd;
@@ -295,7 +337,8 @@ RecognitionTask resolve(const Request& request, const Circumstances& of) {
   const FilterOptions settled = settled_filter(request, of, filter, hypotheses, bin_width, remarks);
   RecognitionTask task(std::move(hypotheses), settled);
   task.map_paths = paths_of(objects, task.hypotheses);
-  if (sensor) {
+  if (sensor != nullptr) {
+    task.sensor_model = learned->file;
     task.temperature = sensor->temperature;
     task.temperature_growth = sensor->temperature_growth;
     task.learned_bins = sensor->bins;

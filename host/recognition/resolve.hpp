@@ -17,6 +17,7 @@ struct HistogramNeed {
   std::string why = {};     ///< "" where every filter will do
   /// Every unknown is one of the maps' objects: "(none)" has no weight unless it is given one.
   bool learned_only = false;
+  bool eq7 = false;  ///< the sensor model of the maps' folder is not taken
 };
 
 /// What a task follows from beside its request.

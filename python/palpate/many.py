@@ -148,7 +148,8 @@ def _asked(recordings: list[str], task: Task) -> _Asked:
     if isinstance(options.get("device"), Device):
         raise TypeError("device: each worker opens its own; give a name or an index")
     files = [*recordings, *_paths(options.get("maps", ()))]
-    files += [os.fsdecode(options[name]) for name in ("scene", "sensor_model") if options.get(name)]
+    given = [options.get(name) for name in ("scene", "sensor_model")]
+    files += [os.fsdecode(file) for file in given if file and file != "none"]
     relative = [path for path in files if not os.path.isabs(path)]
     return _Asked(options, os.getcwd(), relative[0] if relative else "")
 

@@ -28,7 +28,7 @@ class RecognitionOptions(TypedDict, total=False):
     theta_deg: _Pair
     pivot_mm: _Pair | Literal["auto"]
     scene: _Path
-    sensor_model: _Path
+    sensor_model: _Path | Literal["none"]
     prior: float
     gamma: float
     threshold: float
@@ -109,7 +109,7 @@ def recognize(
     theta_deg: _Pair | None = None,
     pivot_mm: _Pair | Literal["auto"] | None = None,
     scene: _Path | None = None,
-    sensor_model: _Path | None = None,
+    sensor_model: _Path | Literal["none"] | None = None,
     prior: float | None = None,
     gamma: float | None = None,
     threshold: float | None = None,
@@ -143,7 +143,8 @@ def recognize(
     explains them. Records are those of its JSON, number for number.
 
     recordings: Recording objects or files; maps: OccupancyGrid or Hypothesis objects, files, or
-    folders of maps; none where the scene has them. bins: counts of x, y and theta; x_mm, y_mm,
+    folders of maps; none where the scene has them. sensor_model: a file; "none" is Eq. 7; by default
+    the sensor.yaml that `palpate map` wrote beside the files of the maps. bins: counts of x, y and theta; x_mm, y_mm,
     theta_deg: ranges (lower, upper); pivot_mm (x, y) in the robot frame; frames (a, b): the touches a
     to b - 1; device: an open Device, or a name or index as for Device.open(). progress(fraction) is
     called up to 50 times a second.

@@ -25,7 +25,7 @@ class MapCommand : public ProgramTest {
 };
 
 TEST_F(MapCommand, FolderGetsAMapPerLabel) {
-  done({"map", "A.h5", "I.h5", "-o", "new/maps/"});
+  done({"map", "A.h5", "I.h5", "-o", "new/maps/", "--sensor-model", "none"});
   const auto content = content_of(folder_ / "new/maps");
   ASSERT_EQ(content.size(), 2u);
   const OccupancyGrid a = read_map(folder_ / "new/maps/A.map.h5");

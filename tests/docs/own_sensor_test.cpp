@@ -18,8 +18,7 @@ TEST_F(OwnSensorDocument, ItsCommandsFindTheUnknown) {
   EXPECT_EQ(said.find("Suspicious"), said.npos);
   expect_named(said, {"with a pose       4161 frames", "E.h5: 40 touches in 4161 frames",
                       "A looks different after every turn"});  // as the page quotes
-  expect_written(
-      {"maps.png", "sheets/unknown.png", "calibration/table.png", "calibration/reliability.png"});
+  expect_written({"maps.png", "maps/sensor.yaml", "sheets/unknown.png"});
 
   const nlohmann::json records = json("result.json");
   ASSERT_EQ(records.size(), 1u);

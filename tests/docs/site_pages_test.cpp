@@ -64,7 +64,7 @@ TEST_F(SitePages, StartRecognisesAnE) {
   const auto [said, complained] = run("start.md");
   EXPECT_EQ(complained, "");
   expect_tables("start.md", said, {"  touch  best", "recording   touches"});
-  expect_quoted("start.md", said, {"U, pose of E", "fits"});
+  expect_quoted("start.md", said, {"known 0.47", "fits"});
   expect_written({"maps.png", "sheets/unknown.png"});
   const nlohmann::json record = json("result.json")[0];
   EXPECT_EQ(record["best"], "E");

@@ -87,7 +87,8 @@ class Files:
         for seed, letter in enumerate("AE", start=1):
             train.append(folder / f"{letter}.train.h5")
             command("simulate", letter, "-o", train[-1], "--seed", seed)
-        command("map", *train, "-o", f"{self.maps}/", "--prior", "0.2")
+        flags = ("--prior", "0.2", "--sensor-model", "none")
+        command("map", *train, "-o", f"{self.maps}/", *flags)
         self.train = train
         command(
             "simulate", "E", "-o", self.unknown, "--object-pose", "random", "--touches", 9,

@@ -20,6 +20,8 @@ from conftest import Files, command, comparable
 
 TASK: palpate.Task = {"bins": (12, 12, 12), "x_mm": (-12, 12), "y_mm": (-12, 12), "filter": "bounded"}
 FLAGS = ["--bins", "12x12x12", "--x-mm=-12:12", "--y-mm=-12:12", "--filter", "bounded"]
+#: Maps that bring no sensor model.
+EQ_7 = ("--sensor-model", "none")
 
 
 @pytest.fixture(scope="module")
@@ -120,7 +122,7 @@ def test_what_all_recordings_tell_together_is_settled_once(
         wide.pressure, wide.T_robot_sensor, wide.elements_mm * 1.5
     ).save(tmp_path / "wide.h5")
     maps = tmp_path / "maps"  # of large cells, for which few bins do
-    command("map", *files.train, "-o", f"{maps}/", "--prior", "0.2", "--cell-mm", 2)
+    command("map", *files.train, "-o", f"{maps}/", "--prior", "0.2", "--cell-mm", 2, *EQ_7)
     table = tmp_path / "list.csv"
     table.write_text(
         f"path,frames,label\n{recordings}/00.h5,0:2,A\n{recordings}/01.h5,,E\n"
@@ -220,7 +222,7 @@ def test_errors_of_workers_arrive(
     for map in files.maps.iterdir():
         (maps / map.name).write_bytes(map.read_bytes())
     results = palpate.recognize_many(recordings, {**TASK, "maps": maps}, client=client)
-    command("map", *files.train, "-o", f"{maps}/", "--prior", "0.3")
+    command("map", *files.train, "-o", f"{maps}/", "--prior", "0.3", *EQ_7)
     with pytest.raises(palpate.Error, match="map.h5 has changed; give all workers the same"):
         list(results)
     monkeypatch.chdir(tmp_path)
@@ -359,7 +361,7 @@ def test_the_program_of_the_guide_runs(
     (tmp_path / "unknowns").mkdir()
     for name in ("00.h5", "01.h5", "02.h5"):
         (tmp_path / "unknowns" / name).write_bytes((recordings / name).read_bytes())
-    command("map", *files.train, "-o", f"{tmp_path}/maps/", "--prior", "0.2", "--cell-mm", 2)
+    command("map", *files.train, "-o", f"{tmp_path}/maps/", "--prior", "0.2", "--cell-mm", 2, *EQ_7)
 
     distributed_client = type(client)
 

@@ -1,5 +1,6 @@
 """The module gives the numbers of the command, bit for bit."""
 
+import json
 import pathlib
 from typing import Any
 
@@ -47,6 +48,28 @@ def test_recordings_and_maps_in_memory_give_the_same_record(files: Files) -> Non
     assert given.mode.pop("map") == "map 'E'"
     expected["mode"].pop("map")
     assert comparable(given) == comparable(expected)
+
+
+def test_a_folder_brings_the_sensor_that_was_learned_with_it(
+    files: Files, tmp_path: pathlib.Path
+) -> None:
+    maps = tmp_path / "maps"
+    command("simulate", "U", "-o", tmp_path / "U.h5", "--seed", 3)
+    command("map", files.train[0], tmp_path / "U.h5", "-o", f"{maps}/")
+    [expected] = json.loads(
+        command("recognize", files.unknown, "--maps", maps, "--json", "-", *SMALL)
+    )
+    assert expected["sensor_model"] == str(maps / "sensor.yaml")
+    [given] = palpate.recognize(files.unknown, maps, bins=(10, 10, 8))
+    assert comparable(given) == comparable(expected)
+    read = [palpate.read_map(path) for path in sorted(maps.glob("*.map.h5"))]
+    [of_read] = palpate.recognize(files.unknown, read, bins=(10, 10, 8))
+    assert of_read.sensor_model == given.sensor_model
+    [by_eq7] = palpate.recognize(files.unknown, read, bins=(10, 10, 8), sensor_model="none")
+    assert "sensor_model" not in by_eq7
+    others = [*read, palpate.read_map(files.maps / "A.map.h5")]
+    with pytest.warns(UserWarning, match="was not learned for"):
+        palpate.recognize(files.unknown, others, bins=(10, 10, 8))
 
 
 def test_a_map_has_the_cells_of_the_command(files: Files, device: palpate.Device) -> None:

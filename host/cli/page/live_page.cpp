@@ -10,6 +10,7 @@
 #include "cli/sheet.hpp"
 #include "cli/step_words.hpp"
 #include "model/option_words.hpp"
+#include "palpate/error.hpp"
 #include "recognition/record_json.hpp"
 
 namespace palpate::cli {

@@ -178,6 +178,10 @@ std::uint64_t BoundedBelief::bytes() const {
 
 SearchGoal BoundedBelief::goal() const {
   SearchGoal goal{options_.tolerance, options_.evidence_nats, options_.evidence_range_nats};
+  goal.poor_bins = options_.poor_bins;
+  if (touches_.size() == 1) {
+    goal.evidence_range_nats = std::max(goal.evidence_range_nats, options_.single_touch_range_nats);
+  }
   if (goal.evidence_nats && touches_.size() > 1) {
     const double grown = 1.0 + options_.evidence_growth * static_cast<double>(touches_.size() - 1);
     *goal.evidence_nats *= grown;
@@ -195,7 +199,8 @@ SearchGoal BoundedBelief::rough_goal() const {
   // followed through the next touches.
   return {.tolerance = bins_in_all() <= closely_drawn_bins ? options_.tolerance
                                                            : std::max(options_.tolerance, soon),
-          .exact = false};
+          .exact = false,
+          .poor_bins = options_.poor_bins};
 }
 
 const SearchResult& BoundedBelief::found() {

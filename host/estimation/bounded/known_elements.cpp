@@ -5,6 +5,7 @@
 #include <tuple>
 #include <utility>
 
+#include "estimation/contact_evidence.hpp"
 #include "model/contact_readings.hpp"
 
 namespace palpate {
@@ -105,6 +106,14 @@ KnownElements merged(std::span<const KnownElements> lists) {
     all.touches.insert(all.touches.end(), list.touches.begin(), list.touches.end());
   }
   return all;
+}
+
+double prior_log_likelihood(const KnownElements& elements, const ContactModel& contact) {
+  double sum = 0.0;
+  for (const ReadingRun& run : elements.runs) {
+    sum += static_cast<double>(run.end - run.begin) * prior_log_likelihood(run.reading, contact);
+  }
+  return sum;
 }
 
 void KeptTouches::add(std::span<const Touch> touches, const ContactModel& model,

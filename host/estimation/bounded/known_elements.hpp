@@ -53,6 +53,9 @@ std::vector<std::size_t> sorted_touches(std::span<const KnownElements> touches);
 /// The elements of all. Touches of uncertain pose stay in the order of the lists.
 KnownElements merged(std::span<const KnownElements> lists);
 
+/// The log-likelihood of the elements where nothing was sensed, in nats.
+double prior_log_likelihood(const KnownElements& elements, const ContactModel& contact);
+
 /// Touches that wait until a filter is asked about its belief. The first one makes room for some
 /// more of its size, so that keeping these allocates no memory.
 class KeptTouches {

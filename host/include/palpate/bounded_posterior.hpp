@@ -39,9 +39,16 @@ struct BoundedOptions {
   /// With evidence_nats: labels whose log evidence lies more nats than this below the largest are
   /// only known to lie there.
   double evidence_range_nats = std::numeric_limits<double>::infinity();
+  /// The same after a single touch, where it is wider.
+  double single_touch_range_nats = 0.0;
   /// Both grow by this part of themselves with every touch after the first, as a temperature does
   /// that suits several touches. From 0.
   double evidence_growth = 0.0;
+  /// Bins to evaluate before a search ends with what it has proven, where no bin of these explains
+  /// the touches: where the best costs more than three quarters of the nats that they cost in
+  /// unseen space. By default such a search goes on, too. Where nothing fits, many bins fit about
+  /// as badly.
+  std::optional<std::int64_t> poor_bins = {};
   /// Prior weight W of "none of these", as HistogramOptions::none_weight. Each touch's mean
   /// likelihood is bounded by a search of its own, so closely that no identity can move by more
   /// than the tolerance or 1e-6, whichever is larger. Where "none of these" is neither nearly

@@ -101,7 +101,8 @@ struct BinSteps {
   double theta_rad = 0.0;
 };
 
-/// What `palpate calibrate` learned about a sensor and the objects that it touched.
+/// What `palpate calibrate` or `palpate map` learned about a sensor and the objects that it
+/// touched.
 struct PALPATE_API LearnedSensor {
   std::string pressure_unit = "kPa";
   double noise = 0.0;  ///< standard deviation of an untouched element, in the pressure unit
@@ -124,6 +125,8 @@ struct PALPATE_API LearnedSensor {
   std::optional<Familiarity> familiarity;
   std::optional<FitScale> fit_scale;    ///< of the z of Fit; without one, z stays as it is
   std::optional<PoseScale> pose_scale;  ///< of the table
+  /// [file] digests of the maps of its folder that it was learned for; empty where it is for any.
+  std::map<std::string, std::string> maps;
 
   /// Throws Error on a value out of range.
   void validate() const;

@@ -69,6 +69,7 @@ struct OccupancyGrid {
   std::vector<float> mean_level = {};
   /// What the map was built from, for with_prior(); null where that is not known.
   std::shared_ptr<const MapSource> source = {};
+  std::string file = {};  ///< that read_map() read it from; "" of any other map
 
   float at(int i, int j) const { return log_odds[static_cast<std::size_t>(j) * nx + i]; }
   glm::dvec2 centre_mm(int i, int j) const { return origin_mm + cell_mm * glm::dvec2(i, j); }

@@ -41,7 +41,7 @@ struct Scene {
 
   std::optional<std::vector<glm::dvec2>> array_mm;    ///< element centres in the sensor frame
   std::optional<std::filesystem::path> array_file;    ///< file of `array_mm`, if any
-  std::optional<std::filesystem::path> sensor_model;  ///< file of a LearnedSensor
+  std::optional<std::filesystem::path> sensor_model;  ///< file of a LearnedSensor, or "none"
   std::optional<double> threshold;                    ///< in the recording's pressure unit
   std::optional<double> ratio;                        ///< of Eq. 3
   std::optional<double> gamma;                        ///< of Eq. 7

@@ -1,6 +1,7 @@
 #include "estimation/bounded/tables/tile_penalties.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 
@@ -80,11 +81,9 @@ std::vector<std::uint32_t> summed(const BatchCase& of, const WindowTable& table,
   WindowPlaces placed;
   place_windows(of.elements, of.place, table, placed);
   std::vector<std::uint32_t> sums(static_cast<std::size_t>(of.batches) * batch_tiles, of.before);
-  for (const auto& [begin, end] :
-       {std::pair(std::size_t{0}, split), std::pair(split, of.elements.from_pivot_mm.size())}) {
-    add_penalties(placed, {Reading::in_contact, begin, end}, table, of.first_x, of.first_y,
-                  of.batches, sums.data());
-  }
+  const std::array<TableRun, 2> runs{
+      {{&table, 0, split}, {&table, split, of.elements.from_pivot_mm.size()}}};
+  add_penalties(placed, runs, of.first_x, of.first_y, of.batches, sums.data());
   return sums;
 }
 

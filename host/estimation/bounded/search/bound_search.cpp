@@ -85,12 +85,8 @@ class SearchRun {
   /// Whether the prior explains the elements far better than the best bin of every hypothesis.
   /// @param best the largest tile of the largest bound of every object and theta
   bool contradicted(const std::vector<Tile>& best) {
-    double prior = 0.0;
-    for (const ReadingRun& run : task_.elements.runs) {
-      prior += static_cast<double>(run.end - run.begin) *
-               prior_log_likelihood(run.reading, task_.options.contact);
-    }
-    const double least = prior - contradiction_nats;
+    const double least =
+        prior_log_likelihood(task_.elements, task_.options.contact) - contradiction_nats;
     const std::size_t objects = space_.bounds.size();
     const auto explains = [&](std::size_t i) { return account_.best_of(i) >= least; };
     for (std::size_t i = 0; i < objects; ++i) {
@@ -143,7 +139,7 @@ class SearchRun {
       leaves_.evaluate(tiles, tolerance);
       return;
     }
-    if (tiles.size() > most_together_ && !task_.deadline.passed()) {
+    if (tiles.size() > most_together_ && !leaves_.ended()) {
       // Tiles are divided one lot after another: the total must be known well before the first.
       survey(tiles, level);
       tolerance -= drop(tiles, level, tolerance / static_cast<double>(finest_ - level + 1));
@@ -162,7 +158,7 @@ class SearchRun {
       }
       const std::size_t left = tiles.size() - begin;
       const auto first = tiles.begin() + static_cast<std::ptrdiff_t>(begin);
-      if (task_.deadline.passed()) {
+      if (leaves_.ended()) {
         account_.drop(unsettled({first, tiles.end()}, level, space_, account_));
         return;
       }

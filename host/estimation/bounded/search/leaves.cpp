@@ -33,6 +33,8 @@ constexpr std::size_t most_pending_bytes = std::size_t{32} << 20;
 constexpr double rounding_part = 0.2;
 /// Products of bins and elements that are evaluated in float64 before the clock is looked at again.
 constexpr double refined_together = 2e6;
+/// See BoundedOptions::poor_bins.
+constexpr double poor_share = 0.75;
 
 }  // namespace
 
@@ -55,6 +57,7 @@ Leaves::Leaves(const SearchTask& task, MassAccount& account)
       account_(account),
       displaced_(task.likelihood.displaces()),
       probed_in_row_(task.space.bounds.size() * task.space.turns.size()),
+      poor_below_(poor_share * prior_log_likelihood(task.elements, task.options.contact)),
       pending_mass_(task.space.bounds.size()) {
   for (std::size_t i = 0; i < pending_mass_.size(); ++i) {
     float32_error_.push_back(task.likelihood.float32_error(i, task.elements));
@@ -170,7 +173,7 @@ void Leaves::evaluate(std::span<const Tile> tiles, double tolerance) {
   const std::int64_t most =
       task_.deadline.exists() ? std::max(first_batch, budgeted_work / elements) : largest_batch;
   std::int64_t size = displaced_ ? first_displaced : first_batch;
-  for (std::size_t next = 0; next < ordered.size() && !task_.deadline.passed();) {
+  for (std::size_t next = 0; next < ordered.size() && !ended();) {
     std::vector<BinBox> boxes;
     std::int64_t bins = 0;
     for (; next < ordered.size() && bins < size; ++next) {

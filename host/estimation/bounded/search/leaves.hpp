@@ -33,6 +33,11 @@ class Leaves {
   void flush() { settle(1.0); }
   /// Number of bins that were evaluated.
   std::int64_t bins() const { return bins_; }
+  /// Whether the search is to end with what it has proven.
+  bool ended() const {
+    return task_.deadline.passed() || (task_.goal.poor_bins && bins_ >= *task_.goal.poor_bins &&
+                                       account_.best() < poor_below_);
+  }
 
  private:
   /// The parts of one tile, [first, end) of a list. Those that are needed are evaluated together,
@@ -81,6 +86,7 @@ class Leaves {
   std::vector<bool> probed_in_row_;    ///< [object, theta]
   std::vector<double> float32_error_;  ///< [hypothesis]
   std::vector<double> float64_error_;
+  double poor_below_;         ///< see BoundedOptions::poor_bins
   double least_error_ = 0.0;  ///< that evaluating all in float64 would leave
   std::vector<Leaf> pending_;
   std::vector<float> values_;         ///< of the pending leaves

@@ -32,6 +32,8 @@ struct SearchGoal {
   bool mode = true;
   /// The bins that count; null where all do.
   const TouchOverlap* counted = nullptr;
+  /// See BoundedOptions::poor_bins.
+  std::optional<std::int64_t> poor_bins = {};
 };
 
 /// When a search must end; never, where there is no budget. Whoever looks at it also gives the

@@ -1,6 +1,7 @@
 #include "estimation/bounded/tables/tile_bounds.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 
@@ -232,9 +233,12 @@ void TileBounds::place(std::size_t level, const glm::dvec2& turn, const KnownEle
 
 void TileBounds::add(std::size_t level, const KnownElements& elements, const WindowPlaces& placed,
                      int first_x, int first_y, std::uint32_t* sums, int batches) const {
+  std::array<TableRun, most_reading_levels + 1> runs;
+  std::size_t count = 0;
   for (const ReadingRun& run : elements.runs) {
-    add_penalties(placed, run, table(level, run.reading), first_x, first_y, batches, sums);
+    runs.at(count++) = {&table(level, run.reading), run.begin, run.end};
   }
+  add_penalties(placed, std::span(runs).first(count), first_x, first_y, batches, sums);
 }
 
 void TileBounds::make_change_tables() {
@@ -250,7 +254,8 @@ void TileBounds::add_changes(const KnownElements& changed, const WindowPlaces& p
   std::uint32_t offsets = 0;
   for (const ReadingRun& run : changed.runs) {
     const ChangeTable& to = change(run.reading);
-    add_penalties(placed, run, to.table, first_x, first_y, batches, added);
+    const TableRun of_table{&to.table, run.begin, run.end};
+    add_penalties(placed, std::span(&of_table, 1), first_x, first_y, batches, added);
     offsets += static_cast<std::uint32_t>(run.end - run.begin) * to.offset;
   }
   for (int i = 0; i < batches * batch_tiles; ++i) {

@@ -57,9 +57,12 @@ void PlaceElements(const glm::dvec2* from_pivot_mm, std::size_t count, const Til
   }
 }
 
+/// What 16 bits hold of a sum.
+constexpr std::size_t largest_part = 65535;
+
 /// Elements of a run whose penalties 16 bits hold for certain.
 HWY_INLINE std::size_t most_elements(const WindowTable& table, std::size_t count) {
-  return table.largest == 0 ? count : std::size_t{65535} / std::size_t{table.largest};
+  return table.largest == 0 ? count : largest_part / std::size_t{table.largest};
 }
 
 /// Adds penalties of 16 bits to sums.
@@ -73,11 +76,14 @@ HWY_INLINE void add_part(const std::uint16_t* part, std::size_t count, std::uint
   }
 }
 
-/// Sums the penalties of one run over one batch.
-/// @param entry scratch of at least `count` rounded up to whole vectors
-void AddRun(const WindowTable& table, const std::int32_t* plane, const std::int32_t* column,
-            const std::int32_t* row, std::size_t count, int first_x, int first_y,
-            std::int32_t* entry, std::uint32_t* sums) {
+/// Sums the penalties of runs over one batch.
+/// @param plane, column, row of the first run's first element
+/// @param entry scratch of at least as many elements, rounded up to whole vectors
+void AddRuns(const TableRun* runs, std::size_t run_count, const std::int32_t* plane,
+             const std::int32_t* column, const std::int32_t* row, int first_x, int first_y,
+             std::int32_t* entry, std::uint32_t* sums) {
+  const WindowTable& table = *runs->table;  // as all others in shape
+  const std::size_t count = runs[run_count - 1].end - runs->begin;
   const hn::ScalableTag<std::int32_t> di;
   const auto zero = hn::Zero(di);
   const auto x = hn::Set(di, first_x);
@@ -95,26 +101,39 @@ void AddRun(const WindowTable& table, const std::int32_t* plane, const std::int3
   const hn::CappedTag<std::uint16_t, batch_tiles> d16;
   constexpr std::size_t lanes = hn::MaxLanes(d16);
   constexpr std::size_t vectors = batch_tiles / lanes;
-  const std::size_t most = most_elements(table, count);
-  const std::uint16_t* entries = table.entries.data();
-  HWY_ALIGN std::uint16_t part[batch_tiles];
-  for (std::size_t begin = 0; begin < count; begin += most) {
-    const std::size_t end = std::min(begin + most, count);
-    for (std::size_t v = 0; v < vectors; ++v) {
-      auto sum = hn::Zero(d16);
-      auto other = hn::Zero(d16);
-      std::size_t i = begin;
-      for (; i + 2 <= end; i += 2) {
-        sum = hn::Add(sum, hn::LoadU(d16, entries + entry[i] + v * lanes));
-        other = hn::Add(other, hn::LoadU(d16, entries + entry[i + 1] + v * lanes));
+  HWY_ALIGN std::uint16_t part[batch_tiles] = {};
+  std::size_t room = largest_part;
+  for (const TableRun* run = runs; run != runs + run_count; ++run) {
+    const std::size_t largest = run->table->largest;
+    const std::uint16_t* entries = run->table->entries.data();
+    for (std::size_t begin = run->begin - runs->begin; begin < run->end - runs->begin;) {
+      const std::size_t left = run->end - runs->begin - begin;
+      const std::size_t some = largest == 0 ? left : std::min(left, room / largest);
+      if (some == 0) {
+        add_part(part, batch_tiles, sums);
+        std::fill(part, part + batch_tiles, std::uint16_t{0});
+        room = largest_part;
+        continue;
       }
-      if (i < end) {
-        sum = hn::Add(sum, hn::LoadU(d16, entries + entry[i] + v * lanes));
+      const std::size_t end = begin + some;
+      for (std::size_t v = 0; v < vectors; ++v) {
+        auto sum = hn::Load(d16, part + v * lanes);
+        auto other = hn::Zero(d16);
+        std::size_t i = begin;
+        for (; i + 2 <= end; i += 2) {
+          sum = hn::Add(sum, hn::LoadU(d16, entries + entry[i] + v * lanes));
+          other = hn::Add(other, hn::LoadU(d16, entries + entry[i + 1] + v * lanes));
+        }
+        if (i < end) {
+          sum = hn::Add(sum, hn::LoadU(d16, entries + entry[i] + v * lanes));
+        }
+        hn::Store(hn::Add(sum, other), d16, part + v * lanes);
       }
-      hn::Store(hn::Add(sum, other), d16, part + v * lanes);
+      room -= some * largest;
+      begin = end;
     }
-    add_part(part, batch_tiles, sums);
   }
+  add_part(part, batch_tiles, sums);
 }
 
 /// Adds over several batches as above: an element's entries for neighbouring batches stand
@@ -186,7 +205,7 @@ HWY_AFTER_NAMESPACE();
 namespace palpate {
 
 HWY_EXPORT(PlaceElements);
-HWY_EXPORT(AddRun);
+HWY_EXPORT(AddRuns);
 HWY_EXPORT(AddStrip);
 
 namespace {
@@ -209,23 +228,31 @@ void place_windows(const KnownElements& elements, const TilePlace& place, const 
    placed.row.data());
 }
 
-void add_penalties(const WindowPlaces& placed, const ReadingRun& run, const WindowTable& table,
-                   int first_x, int first_y, int batches, std::uint32_t* sums) {
+void add_penalties(const WindowPlaces& placed, std::span<const TableRun> runs, int first_x,
+                   int first_y, int batches, std::uint32_t* sums) {
+  if (runs.empty()) {
+    return;
+  }
   thread_local std::vector<std::int32_t> scratch;
-  const std::size_t count = run.end - run.begin;
-  scratch.resize(std::max(scratch.size(), 3 * (count + slack)));
-  const std::int32_t* plane = placed.plane.data() + run.begin;
-  const std::int32_t* column = placed.column.data() + run.begin;
-  const std::int32_t* row = placed.row.data() + run.begin;
+  const std::size_t all = runs.back().end - runs.front().begin;
+  scratch.resize(std::max(scratch.size(), 3 * (all + slack)));
+  const auto from = [&](const std::vector<std::int32_t>& places, const TableRun& run) {
+    return places.data() + run.begin;
+  };
   if (batches < least_strip) {
+    const TableRun& first = runs.front();
     for (int i = 0; i < batches; ++i) {
-      HWY_DYNAMIC_DISPATCH(AddRun)
-      (table, plane, column, row, count, first_x + i * batch_side, first_y, scratch.data(),
+      HWY_DYNAMIC_DISPATCH(AddRuns)
+      (runs.data(), runs.size(), from(placed.plane, first), from(placed.column, first),
+       from(placed.row, first), first_x + i * batch_side, first_y, scratch.data(),
        sums + std::ptrdiff_t{i} * batch_tiles);
     }
-  } else {
+    return;
+  }
+  for (const TableRun& run : runs) {
     HWY_DYNAMIC_DISPATCH(AddStrip)
-    (table, plane, column, row, count, first_x, first_y, batches, scratch.data(), sums);
+    (*run.table, from(placed.plane, run), from(placed.column, run), from(placed.row, run),
+     run.end - run.begin, first_x, first_y, batches, scratch.data(), sums);
   }
 }
 

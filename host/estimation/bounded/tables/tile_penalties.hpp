@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "estimation/bounded/known_elements.hpp"
@@ -34,12 +36,20 @@ inline constexpr std::uint32_t largest_sum = std::uint32_t{1} << 30;
 /// Most batches whose sums add_penalties() finds together.
 inline constexpr int most_strip = 16;
 
-/// Sums the penalties of one run of elements over the 4 x 4 tiles of neighbouring batches along x,
-/// and adds them to `sums`, where the sum of tile (i, j) of a batch stands at 4 i + j.
+/// Elements [begin, end) of a list, and the table of their reading.
+struct TableRun {
+  const WindowTable* table = nullptr;
+  std::size_t begin = 0;
+  std::size_t end = 0;
+};
+
+/// Sums the penalties of runs of elements over the 4 x 4 tiles of neighbouring batches along x, and
+/// adds them to `sums`, where the sum of tile (i, j) of a batch stands at 4 i + j.
+/// @param runs one after another, of tables of one shape
 /// @param first_x, first_y tile at the first batch's corner
 /// @param batches up to most_strip
 /// @param sums [batch, tile]
-void add_penalties(const WindowPlaces& placed, const ReadingRun& run, const WindowTable& table,
-                   int first_x, int first_y, int batches, std::uint32_t* sums);
+void add_penalties(const WindowPlaces& placed, std::span<const TableRun> runs, int first_x,
+                   int first_y, int batches, std::uint32_t* sums);
 
 }  // namespace palpate

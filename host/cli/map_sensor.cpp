@@ -1,0 +1,187 @@
+#include "cli/map_sensor.hpp"
+
+#include <algorithm>
+#include <map>
+
+#include <fmt/format.h>
+
+#include "cli/options.hpp"
+#include "cli/progress.hpp"
+#include "cli/recognition_flags.hpp"
+#include "learning/calibration_task.hpp"
+#include "model/option_words.hpp"
+#include "palpate/files.hpp"
+#include "recognition/folder_sensor.hpp"
+#include "recognition/recordings.hpp"
+
+namespace palpate::cli {
+
+namespace {
+
+/// Touches of each of two objects that it takes to learn how sure to be of several.
+constexpr std::size_t least_touches = 15;
+
+/// A map of the folder and its file.
+struct FolderMap {
+  std::filesystem::path file;
+  OccupancyGrid map;
+};
+
+/// The maps of the folder as they will be. Throws Error where a map that stays does not tell what
+/// learning needs.
+std::vector<FolderMap> folder_maps(const MapFlags& flags, const std::vector<OccupancyGrid>& maps,
+                                   const std::vector<std::filesystem::path>& written) {
+  std::vector<FolderMap> all;
+  for (std::size_t i = 0; i < maps.size(); ++i) {
+    all.push_back({written[i], maps[i]});
+  }
+  for (const std::filesystem::path& file : other_maps(flags, written)) {
+    all.push_back({file, read_map(file)});
+    const OccupancyGrid& map = all.back().map;
+    if (!map.source || map.mean_level.empty()) {
+      refuse(file, "holds no {}; build it anew from its recordings with palpate map -o {}",
+             map.source ? "mean pressures" : "touches at known poses", flags.output);
+    }
+    const std::string& unit = map.source->touches.pressure_unit;
+    if (unit != maps.front().source->touches.pressure_unit) {
+      refuse(file, "its touches are in {}, others in {}; keep them in folders of their own", unit,
+             maps.front().source->touches.pressure_unit);
+    }
+  }
+  return all;
+}
+
+/// The touches of the maps, in the frames of these.
+std::vector<Recording> touches_of(const std::vector<FolderMap>& maps) {
+  std::vector<Recording> touches;
+  for (const auto& [file, map] : maps) {
+    Recording& own = touches.emplace_back(map.source->touches);
+    own.path = file.string();
+    own.object = map.label;
+    for (Pose& pose : own.T_robot_sensor) {
+      pose.translation_mm -= map.centred_mm;
+    }
+  }
+  return touches;
+}
+
+/// Throws Error where so few touches do not tell how sure to be of several.
+void require_enough(const std::vector<Recording>& touches) {
+  std::map<std::string, std::size_t> counts;
+  for (const Recording& own : touches) {
+    counts[own.object] += own.size();
+  }
+  if (std::ranges::count_if(counts, [](const auto& of) { return of.second >= least_touches; }) <
+      2) {
+    throw Error(Fault::input,
+                fmt::format("it takes {} touches or more of each of two objects", least_touches));
+  }
+}
+
+std::string words_of(const SensorGain& gain, const std::string& file, std::size_t touches) {
+  const std::string scores = fmt::format(
+      "touches that are left out have a log-loss of {:.3f} nats, {:.3f} by Eq. 7, and {} of them "
+      "together a pose error of {:.2f} mm, {:.2f} by Eq. 7",
+      gain.log_loss, gain.log_loss_before, presses_in_group, gain.error_mm, gain.error_mm_before);
+  return gain.better ? fmt::format(
+                           "{}: learned from {} touches: {}\n"
+                           "{}: recognition with this folder takes it, unless --sensor-model none "
+                           "is given",
+                           file, touches, scores, file)
+                     : "no sensor model, as none is better beyond chance: " + scores;
+}
+
+/// Whether the folder's sensor model is one that `palpate map` wrote.
+bool is_own(const std::filesystem::path& file) {
+  try {
+    return !read_sensor_model(file).maps.empty();
+  } catch (const Error& error) {
+    if (error.fault() != Fault::input) {
+      throw;
+    }
+    return false;
+  }
+}
+
+}  // namespace
+
+std::filesystem::path sensor_file(const MapFlags& flags) {
+  return std::filesystem::path(flags.output) / folder_sensor_name;
+}
+
+bool learns_sensor(const MapFlags& flags) {
+  if (!flags.to_folder() || !flags.sensor_model.empty()) {
+    return false;
+  }
+  const std::filesystem::path file = sensor_file(flags);
+  std::error_code ignored;
+  if (std::filesystem::exists(file, ignored) && !is_own(file)) {
+    fmt::print(stderr,
+               "palpate: {}: was not written by palpate map, and stays; no sensor is learned\n",
+               file.string());
+    return false;
+  }
+  return true;
+}
+
+std::vector<std::filesystem::path> other_maps(const MapFlags& flags,
+                                              const std::vector<std::filesystem::path>& written) {
+  std::vector<std::filesystem::path> others;
+  std::error_code none;
+  if (std::filesystem::is_directory(flags.output, none)) {
+    for (const std::filesystem::path& file : maps_in(flags.output)) {
+      if (std::ranges::none_of(written, [&](const std::filesystem::path& own) {
+            return own.lexically_normal() == file.lexically_normal();
+          })) {
+        others.push_back(file);
+      }
+    }
+  }
+  return others;
+}
+
+MapSensor learn_sensor(const MapFlags& flags, const std::vector<OccupancyGrid>& maps,
+                       const std::vector<std::filesystem::path>& written, const MapOptions& model) {
+  try {
+    const std::vector<FolderMap> all = folder_maps(flags, maps, written);
+    const std::vector<Recording> touches = touches_of(all);
+    require_enough(touches);
+    CalibrationTask task =
+        calibration_task({.threshold = flags.threshold, .ratio = flags.ratio}, {}, touches, {});
+    task.options.maps = model;
+    Progress progress("learning the sensor");
+    SensorCalibration calibration = calibrate_sensor(
+        task.presses, task.maps, task.options, [&](double fraction) { progress.show(fraction); });
+    if (!calibration.gain) {
+      throw Error(Fault::input, "the touches do not tell how much better it is; give more of them");
+    }
+    MapSensor learned{
+        .words = words_of(*calibration.gain, sensor_file(flags).string(), task.presses.size())};
+    if (calibration.gain->better) {
+      learned.sensor = std::move(calibration.sensor);
+      learned.sensor->touch_sd = touch_sd(flags);
+      for (const auto& [file, map] : all) {
+        learned.sensor->maps[file.filename().string()] = digest_of(map);
+      }
+    }
+    return learned;
+  } catch (const Error& error) {
+    if (error.fault() != Fault::input) {
+      throw;
+    }
+    return {.words = fmt::format("no sensor model: {}", in_flags(error.what()))};
+  }
+}
+
+void write_sensor(const MapFlags& flags, const MapSensor& learned) {
+  const std::filesystem::path file = sensor_file(flags);
+  std::error_code ignored;
+  if (learned.sensor) {
+    write_sensor_model(file, *learned.sensor);
+  } else if (std::filesystem::remove(file, ignored)) {
+    fmt::print("{}: removed, as it was learned for other maps\n", file.string());
+  }
+  fmt::print("{}\n", learned.words);
+}
+
+}  // namespace palpate::cli

@@ -1,0 +1,63 @@
+#include "learning/sensor_gain.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace palpate {
+
+namespace {
+
+/// The pose errors of a cross-validation's groups.
+std::vector<double> errors_of(const CrossValidation& validation) {
+  std::vector<double> errors;
+  for (const ScoredPress& group : validation.groups[0]) {
+    errors.push_back(group.error_mm.value());
+  }
+  return errors;
+}
+
+double mean_of(std::span<const double> numbers) {
+  return std::accumulate(numbers.begin(), numbers.end(), 0.0) / static_cast<double>(numbers.size());
+}
+
+}  // namespace
+
+std::vector<double> losses_of(std::span<const ScoredPress> presses) {
+  std::vector<double> of_each;
+  for (const ScoredPress& press : presses) {
+    of_each.push_back(-press.log_evidence[press.truth]);
+  }
+  return of_each;
+}
+
+std::optional<SensorGain> gain_of(const CrossValidation& eq7, const CrossValidation& table,
+                                  std::span<const ScoredPress> after) {
+  if (eq7.groups[0].empty()) {
+    return {};
+  }
+  std::vector<double> losses_before;
+  for (const ScoredPress& press : eq7.presses) {
+    const double p = press_probabilities(press, 1.0)[press.truth];
+    losses_before.push_back(-std::log(std::max(p, least_answer_probability)));
+  }
+  const std::vector<double> losses = losses_of(after);
+  const std::vector<double> errors_before = errors_of(eq7);
+  const std::vector<double> errors = errors_of(table);
+  constexpr double small_nats = 0.02;
+  constexpr double small_share = 0.1;
+  SensorGain gain{.log_loss_before = mean_of(losses_before),
+                  .log_loss = mean_of(losses),
+                  .error_mm_before = mean_of(errors_before),
+                  .error_mm = mean_of(errors)};
+  const bool gains =
+      is_clearly_less(losses, losses_before) || is_clearly_less(errors, errors_before);
+  const bool costs_nats =
+      is_clearly_less(losses_before, losses) && gain.log_loss > gain.log_loss_before + small_nats;
+  const bool costs_mm = is_clearly_less(errors_before, errors) &&
+                        gain.error_mm > (1.0 + small_share) * gain.error_mm_before;
+  gain.better = gains && !costs_nats && !costs_mm;
+  return gain;
+}
+
+}  // namespace palpate

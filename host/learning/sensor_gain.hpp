@@ -1,0 +1,31 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "learning/cross_validation.hpp"
+
+namespace palpate {
+
+/// What recognition gains by a learned sensor over Eq. 7 on touches that neither has seen.
+struct SensorGain {
+  double log_loss_before = 0.0;  ///< of single touches by Eq. 7 with gamma 0.1, in nats
+  double log_loss = 0.0;         ///< of single touches by the table and the temperature
+  double error_mm_before = 0.0;  ///< mean of CrossValidation::groups by Eq. 7
+  double error_mm = 0.0;         ///< the same by the table
+  /// Of the losses and the errors, one is less beyond chance, and neither is more beyond chance by
+  /// over 0.02 nats, or a tenth of the error: touches that are all told apart have next to no loss,
+  /// with a temperature a little more.
+  bool better = false;
+};
+
+/// @param after the presses of `table` with the temperature
+/// @returns none where there are no groups with an error
+std::optional<SensorGain> gain_of(const CrossValidation& eq7, const CrossValidation& table,
+                                  std::span<const ScoredPress> after);
+
+/// The losses of presses with their labels' log probabilities, in nats.
+std::vector<double> losses_of(std::span<const ScoredPress> presses);
+
+}  // namespace palpate

@@ -1,0 +1,130 @@
+// The sensor model that `palpate map` writes beside the maps of a folder, and who takes it.
+
+#include <filesystem>
+
+#include "palpate/learned_sensor.hpp"
+#include "program.hpp"
+#include "sample_files.hpp"
+
+namespace palpate::map_sensor_test {
+
+using nlohmann::json;
+using Arguments = std::vector<std::string>;
+
+class MapSensor : public ProgramTest {
+ protected:
+  MapSensor() {
+    for (const char* letter : {"A", "U"}) {
+      write_recording(folder_ / (std::string(letter) + ".h5"), sample_training(letter, 60));
+    }
+    write_recording(folder_ / "u.h5", sample_unknown("A", {{2.0, -3.0}, 1.0}, 4));
+  }
+
+  /// What recognize prints on standard error, and its record.
+  std::pair<std::string, json> recognised(Arguments flags) const {
+    flags.insert(flags.begin(), {"recognize", "u.h5", "--json", "r.json", "--maps"});
+    const Outcome outcome = palpate(flags);
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    json r = json::parse(bytes_of(folder_ / "r.json"))[0];
+    r.erase("seconds");
+    return {outcome.err, r};
+  }
+
+  std::filesystem::path sensor(const std::string& folder) const {
+    return folder_ / folder / "sensor.yaml";
+  }
+};
+
+TEST_F(MapSensor, IsWrittenWithTheMapsAndTakenWithThem) {
+  const std::string out = done({"map", "A.h5", "U.h5", "-o", "maps/"});
+  EXPECT_NE(out.find("maps/sensor.yaml: learned from 120 touches: "), std::string::npos) << out;
+  const LearnedSensor learned = read_sensor_model(sensor("maps"));
+  EXPECT_EQ(learned.maps.size(), 2u);
+  EXPECT_TRUE(learned.table);
+
+  const auto [said, by_default] = recognised({"maps"});
+  EXPECT_EQ(said, "");
+  EXPECT_EQ(by_default["sensor_model"], "maps/sensor.yaml");
+  const auto [nothing, given] = recognised({"maps", "--sensor-model", "maps/sensor.yaml"});
+  EXPECT_EQ(given, by_default);
+  EXPECT_EQ(recognised({"maps/A.map.h5"}).second["sensor_model"], "maps/sensor.yaml")
+      << "a map named singly";
+
+  // Without it, maps and results are those of Eq. 7.
+  const json none = recognised({"maps", "--sensor-model", "none"}).second;
+  EXPECT_FALSE(none.contains("sensor_model"));
+  done({"map", "A.h5", "U.h5", "-o", "plain/", "--sensor-model", "none"});
+  EXPECT_FALSE(std::filesystem::exists(sensor("plain")));
+  json plain = recognised({"plain"}).second;
+  plain["mode"]["map"] = none["mode"]["map"];
+  EXPECT_EQ(plain, none);
+  const OccupancyGrid map = read_map(folder_ / "plain/A.map.h5");
+  EXPECT_EQ(map.log_odds, read_map(folder_ / "maps/A.map.h5").log_odds);
+  EXPECT_TRUE(map.mean_level.empty());
+
+  EXPECT_EQ(palpate({"batch", "u.h5", "--maps", "maps", "-o", "results"}).status, 0);
+  EXPECT_EQ(palpate({"merge", "results", "-o", "results.ndjson"}).status, 0);
+  EXPECT_EQ(json::parse(bytes_of(folder_ / "results.ndjson"))["sensor_model"], "maps/sensor.yaml");
+}
+
+TEST_F(MapSensor, IsLeftOutWhereItDoesNotGoWithWhatIsAsked) {
+  done({"map", "A.h5", "U.h5", "-o", "maps/"});
+  const auto said_without = [&](const Arguments& flags) {
+    const auto [said, r] = recognised(flags);
+    EXPECT_FALSE(r.contains("sensor_model"));
+    return said;
+  };
+  EXPECT_NE(said_without({"maps", "--gamma", "0.1"}).find("maps/sensor.yaml is left out: --gamma"),
+            std::string::npos);
+  EXPECT_NE(said_without({"maps", "--threshold", "1.5"}).find("is left out: its threshold is"),
+            std::string::npos);
+  const Outcome fit =
+      palpate({"recognize", "u.h5", "--maps", "maps", "--fit-touch-sd", "--bins=15x15x12"});
+  EXPECT_EQ(fit.status, 0) << "learns a model of its own: " << fit.err;
+
+  done({"map", "A.h5", "-o", "single.map.h5"});
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "sensor.yaml"));
+  std::filesystem::copy(folder_ / "single.map.h5", folder_ / "maps/other.map.h5");
+  EXPECT_NE(said_without({"maps"}).find("was not learned for maps/other.map.h5, and is left out"),
+            std::string::npos);
+  std::filesystem::remove(folder_ / "maps/other.map.h5");
+
+  done({"map", "A.h5", "U.h5", "-o", "fewer/", "--frames", "0:56"});
+  const Outcome unlike =
+      palpate({"recognize", "u.h5", "--maps", "maps/A.map.h5", "fewer/U.map.h5"});
+  EXPECT_EQ(unlike.status, 2);
+  EXPECT_NE(unlike.err.find("fewer/sensor.yaml: differs from maps/sensor.yaml"), std::string::npos)
+      << unlike.err;
+}
+
+TEST_F(MapSensor, IsLearnedAnewFromTheTouchesOfTheOtherMaps) {
+  const std::string alone = done({"map", "A.h5", "-o", "maps/"});
+  EXPECT_NE(alone.find("no sensor model: it takes 15 touches or more of each of two objects"),
+            std::string::npos)
+      << alone;
+  EXPECT_FALSE(std::filesystem::exists(sensor("maps")));
+  const std::string joined = done({"map", "U.h5", "-o", "maps/"});
+  EXPECT_NE(joined.find("maps/sensor.yaml: learned from 120 touches"), std::string::npos) << joined;
+  EXPECT_EQ(read_sensor_model(sensor("maps")).maps.size(), 2u);
+
+  // Maps that no longer are what it was learned for take it along.
+  const std::string few = done({"map", "A.h5", "-o", "maps/", "--frames", "0:10"});
+  EXPECT_NE(few.find("maps/sensor.yaml: removed"), std::string::npos) << few;
+  EXPECT_FALSE(std::filesystem::exists(sensor("maps")));
+}
+
+TEST_F(MapSensor, OfAnotherHandStays) {
+  std::filesystem::create_directory(folder_ / "maps");
+  for (const std::string& text :
+       {std::string("format: palpate.sensor_model\n"), std::string("x")}) {
+    put_bytes(sensor("maps"), text);
+    const Outcome outcome = palpate({"map", "A.h5", "U.h5", "-o", "maps/"});
+    EXPECT_EQ(outcome.status, 0);
+    EXPECT_NE(outcome.err.find("maps/sensor.yaml: was not written by palpate map, and stays"),
+              std::string::npos)
+        << outcome.err;
+    EXPECT_EQ(bytes_of(sensor("maps")), text);
+  }
+}
+
+}  // namespace palpate::map_sensor_test
