@@ -79,7 +79,7 @@ TEST_F(SensorModelFlag, GivesTheDefaultsOfFlags) {
 }
 
 TEST_F(SensorModelFlag, TakesTouchesForExactWhereTheFilterCannotDisplaceThem) {
-  write({.touch_sd = {.mm = 1.0, .rad = 0.05}});
+  write({.touch_sd = {.mm = 1.0, .rad = 0.0}});
   const Arguments particles{"--filter=particles", "--particles=2000"};
   EXPECT_EQ(learned(particles), plain(particles));
   EXPECT_NE(learned({"--filter=bounded"}), plain({"--filter=bounded"}));

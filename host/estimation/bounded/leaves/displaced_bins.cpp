@@ -24,8 +24,7 @@ class BlockSums {
       }
     }
     std::ranges::sort(blocks);
-    const auto repeated = std::ranges::unique(blocks);
-    blocks.erase(repeated.begin(), repeated.end());
+    blocks.erase(std::unique(blocks.begin(), blocks.end()), blocks.end());
     for (const auto& [theta, y, x] : blocks) {
       const std::size_t runs = runs_.size();
       append_block(theta, y, x, runs_);
