@@ -103,13 +103,14 @@ class PALPATE_API PoseHistogram {
   /// mm (root mean square over its occupied cells), and at least the neighbouring bins; it is
   /// re-centred on the mean up to twice. Returns the weighted mean instead where the window holds
   /// fewer than two bins per coefficient or the quadratic has no peak within 1 mm and the region.
-  /// The covariance is the second moment of the belief in the window about the returned pose, plus
-  /// the variance of a uniform distribution over one bin.
+  /// The covariance is the inverse of minus the quadratic's second derivatives. Where the belief in
+  /// the window spreads by more than 0.8 mm, or there is no quadratic, it is the belief's second
+  /// moment about the returned pose, plus the variance of a uniform distribution over one bin.
   ///
   /// Modes outside the window do not show in the result. The window continues at theta's first bin
   /// after its last where theta covers the full circle, and ends at the region's edges. An axis of
-  /// zero extent keeps its value. The covariance is too small on bins much wider than the belief
-  /// and where touches lie elsewhere than reported. docs/refinement.md says how large the errors
+  /// zero extent keeps its value. The covariance is too small where touches lie elsewhere than
+  /// reported, and knows nothing of errors of the map. docs/refinement.md says how large the errors
   /// are.
   /// @throws Error if there is no such object or bin, the pose is not finite, or the device fails
   RefinedPose refine(const Mode& mode) const;
