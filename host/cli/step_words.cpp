@@ -176,9 +176,10 @@ std::string unproven_sentence(const RecognitionStep& step, const RecognitionTask
       "unproven",
       object_words(step, task), 100.0 * step.confidence(), std::floor(1000.0 * low) / 10.0,
       std::ceil(1000.0 * high) / 10.0,
-      bounded->budget_s       ? fmt::format("the budget of {:g} ms", 1e3 * *bounded->budget_s)
-      : unproven >= poor_fits ? "the search, which met nothing but poor fits,"
-                              : "rounding",
+      bounded->budget_s ? fmt::format("the budget of {:g} ms", 1e3 * *bounded->budget_s)
+      : task.contact().table && unproven >= poor_fits
+          ? "the search, which met nothing but poor fits,"
+          : "rounding",
       unproven >= 9.95 ? fmt::format("{:.0f}", unproven) : fmt::format("{:.2g}", unproven));
 }
 
