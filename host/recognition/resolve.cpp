@@ -20,6 +20,7 @@
 #include "recognition/folder_sensor.hpp"
 #include "recognition/recordings.hpp"
 #include "recognition/refused_option.hpp"
+#include "recognition/scales_of_maps.hpp"
 
 namespace palpate {
 
@@ -216,63 +217,6 @@ std::optional<BinWidth> bin_width_of(const Request& request) {
   return infers_region(request) ? std::optional(BinWidth::automatic) : std::nullopt;
 }
 
-/// Whether no axis has much fewer bins than the maps resolve: a pose between wide bins fits worse.
-bool resolves(const PoseLattice& lattice, std::span<const Hypothesis> hypotheses) {
-  constexpr double wider = 2.0;
-  const PoseLattice balanced =
-      balanced_lattice(lattice, hypotheses, std::numeric_limits<std::int64_t>::max()).lattice;
-  const auto holds = [](const Axis& axis, const Axis& fine) {
-    return wider * axis.count >= fine.count;
-  };
-  return holds(lattice.x_mm, balanced.x_mm) && holds(lattice.y_mm, balanced.y_mm) &&
-         holds(lattice.theta_rad, balanced.theta_rad);
-}
-
-/// Whether recognition judges touches as `map` did: by Eq. 7 with the same numbers, at poses that
-/// are exact, on bins that resolve the maps.
-bool judges_as_map(const RecognitionTask& task) {
-  const ContactModel& contact = task.contact();
-  const auto alike = [&](const Hypothesis& hypothesis) {
-    const auto& source = hypothesis.map.source;
-    if (!source || !source->left_out) {
-      return true;
-    }
-    const ContactClassifier& own = source->options.classifier;
-    return own.threshold == contact.classifier.threshold && own.ratio == contact.classifier.ratio &&
-           contact.prior.value_or(hypothesis.map.prior) == hypothesis.map.prior;
-  };
-  return !contact.table && contact.gamma == usual_gamma && task.touch_sd().none() &&
-         task.slip_sd().none() && traits_of(task.filter).bins &&
-         std::ranges::all_of(task.hypotheses, alike) && resolves(task.lattice(), task.hypotheses);
-}
-
-/// Sets the scales of what recognition says to those of the maps' own touches that were left out.
-/// That maps are off counts whatever judges.
-void take_scales_of_maps(RecognitionTask& task) {
-  std::vector<FitScale> fits;
-  double logs = 0.0;
-  double squares = 0.0;
-  double poses = 0.0;
-  for (const Hypothesis& hypothesis : task.hypotheses) {
-    const auto& source = hypothesis.map.source;
-    if (source && source->left_out) {
-      fits.push_back(*source->left_out);
-    }
-    if (source && source->pose_scale) {
-      logs += std::log(source->pose_scale->factor);
-      squares += source->pose_scale->map_sd_mm * source->pose_scale->map_sd_mm;
-      poses += 1.0;
-    }
-  }
-  const bool as_map = judges_as_map(task);
-  if (!fits.empty() && as_map) {
-    task.fit_scale = pooled(fits);
-  }
-  if (poses > 0.0) {
-    task.pose_scale = {as_map ? std::exp(logs / poses) : 1.0, std::sqrt(squares / poses)};
-  }
-}
-
 PoseLattice with_counts(PoseLattice lattice, const std::array<int, 3>& counts) {
   lattice.x_mm.count = counts[0];
   lattice.y_mm.count = counts[1];
@@ -333,7 +277,11 @@ RecognitionTask resolve(const Request& request, const Circumstances& of) {
   histogram.lattice =
       inferred ? automatic_lattice(hypotheses, of.reach_mm, remarks) : given_lattice(request);
   const std::optional<BinWidth> bin_width = bin_width_of(request);
-  const ChosenFilter filter = choose_filter(wish, request, of.need, hypotheses, histogram);
+  HistogramNeed need = of.need;
+  // An object between such bins fits none of them, and would be taken for a stranger.
+  constexpr double far_wider = 8.0;
+  need.learned_only |= !bin_width && !resolves(histogram.lattice, hypotheses, far_wider);
+  const ChosenFilter filter = choose_filter(wish, request, need, hypotheses, histogram);
   const FilterOptions settled = settled_filter(request, of, filter, hypotheses, bin_width, remarks);
   RecognitionTask task(std::move(hypotheses), settled);
   task.map_paths = paths_of(objects, task.hypotheses);

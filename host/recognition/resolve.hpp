@@ -15,7 +15,8 @@ namespace palpate {
 struct HistogramNeed {
   std::string option = {};  ///< that asks for what needs it; "" where the caller always does
   std::string why = {};     ///< "" where every filter will do
-  /// Every unknown is one of the maps' objects: "(none)" has no weight unless it is given one.
+  /// Every unknown is one of the maps' objects, or cannot be told from "(none)", which then has no
+  /// weight unless it is given one.
   bool learned_only = false;
   bool eq7 = false;  ///< the sensor model of the maps' folder is not taken
 };

@@ -90,7 +90,7 @@ constexpr double closely_drawn_bins = 1e6;
 /// Tolerance that a search with a budget reaches before it goes on, and enough for draws.
 constexpr double soon = 1e-2;
 /// Bounds of "none of these" need not be so close that identities move by less.
-constexpr double least_identity_change = 1e-3;
+constexpr double least_identity_change = 1e-6;
 constexpr double unlimited = std::numeric_limits<double>::infinity();
 /// Bounds so many nats apart do not tell how closely they are needed; those that are closer, in nats
 /// for each touch, do.

@@ -73,12 +73,15 @@ LogInterval NoneEvidence::narrow(TouchMean& mean, double width_nats, const Deadl
     }
     const double before = width(log_mean);
     log_mean = *mean.found[i];
-    if (width(log_mean) <= width_nats || width(log_mean) > least_gain * before) {
+    // The first searches may do the same work.
+    const bool comparable = i > 2;
+    if (width(log_mean) <= width_nats || (comparable && width(log_mean) > least_gain * before)) {
       break;
     }
     // Bounds and the first search tell little of what is needed; the others come close to their
     // tolerance.
-    for (++i; i > 1 && i + 1 < tolerances.size() && width_of_tolerance * tolerances[i] > width_nats;) {
+    for (++i;
+         i > 1 && i + 1 < tolerances.size() && width_of_tolerance * tolerances[i] > width_nats;) {
       ++i;
     }
   }

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <span>
+
+#include "palpate/estimate.hpp"
+#include "palpate/lattice.hpp"
+#include "recognition/recognition_task.hpp"
+
+namespace palpate {
+
+/// Whether no axis of the lattice has bins more than `wider` times as wide as the maps resolve.
+bool resolves(const PoseLattice& lattice, std::span<const Hypothesis> hypotheses, double wider);
+
+/// Sets the scales of what recognition says to those of the maps' own touches that were left out.
+/// That maps are off counts whatever judges.
+void take_scales_of_maps(RecognitionTask& task);
+
+}  // namespace palpate
