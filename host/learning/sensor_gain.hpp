@@ -12,7 +12,7 @@ namespace palpate {
 struct SensorGain {
   double log_loss_before = 0.0;  ///< of single touches by Eq. 7 with gamma 0.1, in nats
   double log_loss = 0.0;         ///< of single touches by the table and the temperature
-  double error_mm_before = 0.0;  ///< mean of CrossValidation::groups by Eq. 7
+  double error_mm_before = 0.0;  ///< geometric mean of CrossValidation::groups by Eq. 7
   double error_mm = 0.0;         ///< the same by the table
   /// Of the losses and the errors, one is less beyond chance, and neither is more beyond chance by
   /// over 0.02 nats, or a tenth of the error: touches that are all told apart have next to no loss,
