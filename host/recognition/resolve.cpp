@@ -278,9 +278,12 @@ RecognitionTask resolve(const Request& request, const Circumstances& of) {
       inferred ? automatic_lattice(hypotheses, of.reach_mm, remarks) : given_lattice(request);
   const std::optional<BinWidth> bin_width = bin_width_of(request);
   HistogramNeed need = of.need;
-  // An object between such bins fits none of them, and would be taken for a stranger.
+  // An object between such bins fits none of them, and would be taken for a stranger. Where
+  // elements are so far from independent, the tempered evidence leaves "(none)" its prior.
   constexpr double far_wider = 8.0;
-  need.learned_only |= !bin_width && !resolves(histogram.lattice, hypotheses, far_wider);
+  constexpr double far_from_independent = 5.0;
+  need.learned_only |= (!bin_width && !resolves(histogram.lattice, hypotheses, far_wider)) ||
+                       (sensor != nullptr && sensor->temperature > far_from_independent);
   const ChosenFilter filter = choose_filter(wish, request, need, hypotheses, histogram);
   const FilterOptions settled = settled_filter(request, of, filter, hypotheses, bin_width, remarks);
   RecognitionTask task(std::move(hypotheses), settled);

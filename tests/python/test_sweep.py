@@ -95,7 +95,7 @@ def test_the_histogram_answers_where_bounds_refuse(
     files: Files, unknowns: pathlib.Path, tmp_path: pathlib.Path
 ) -> None:
     scene = tmp_path / "scene.yaml"
-    scene.write_text("touch_sd: {mm: 0.5, deg: 1}\n")
+    scene.write_text("slip_sd: {mm: 0.5, deg: 1}\n")
     document = run(
         tmp_path, "--maps", files.maps, "--recordings", unknowns / "21.h5", "--scene", scene,
         "--x-mm=-10:10", "--y-mm=-10:10", "--max-bins", 3_000,
