@@ -33,7 +33,8 @@ class Data:
 
     def open(self, **options: Any) -> "_palpate.OpenBatch":
         """The batch of all recordings, as `palpate batch` settles it."""
-        request = request_of(self.options | options)
+        # What bins are worth shows among learned objects; wide ones would take them for strangers.
+        request = request_of({"none": 0} | self.options | options)
         threads = len(os.sched_getaffinity(0))
         head, self.entries, _ = _palpate.settle_batch(
             self.paths, self.map_paths, request, self.device, threads
