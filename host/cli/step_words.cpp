@@ -72,7 +72,9 @@ std::string object_words(const RecognitionStep& step, const RecognitionTask& tas
 }
 
 std::string identity_words(const RecognitionStep& step, const RecognitionTask& task) {
-  const bool unlike = step.fit && step.fit->verdict == Verdict::does_not_fit;
+  // "(none)" itself says that the touches are unlike the object.
+  const bool unlike = step.fit && step.fit->verdict == Verdict::does_not_fit &&
+                      task.labels[step.best] != none_label;
   return fmt::format("{}{} ({:.1f} %)", unlike ? "unlike " : "", object_words(step, task),
                      100.0 * step.confidence());
 }

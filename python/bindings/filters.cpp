@@ -349,10 +349,8 @@ void bind_bounded(nb::module_& module) {
               "none_weight"_a = nb::none(), "touch_sd"_a = DisplacementSd{}, "threads"_a = 0,
               "tolerance: largest total variation distance from the posterior over all bins;\n"
               "budget_s: seconds after which estimate() reports what it has proven by then;\n"
-              "evidence_nats: bounds every map's log evidence, too; touch_sd: how far the sensor "
-              "may\n"
-              "have been from where it was said to be; threads: 0 for as many as the machine has\n"
-              "cores.\n\n"
+              "evidence_nats: bounds every map's log evidence, too; touch_sd: how far off the\n"
+              "sensor's poses may be; threads: 0 for as many as the machine has cores.\n\n"
               "Raises Error as PoseHistogram does.")
           .def("update", &update<BoundedPosterior>, "touches"_a, "progress"_a = nb::none(),
                "Multiplies the belief by the likelihood of these touches (Eq. 7, 13); takes in "

@@ -367,12 +367,6 @@ TEST_F(BoundedFilter, PeopleReadTheCertificate) {
   EXPECT_THAT(dense.out, Not(HasSubstr("by bounds")));
 }
 
-TEST_F(BoundedFilter, IsDrawn) {
-  bounded({"--png", "sheets"});
-  EXPECT_GT(std::filesystem::file_size(folder_ / "sheets/u.png"), 10'000U)
-      << "a picture of three panels";
-}
-
 TEST_F(BoundedFilter, RecognisesLive) {
   done({"record", "--sensor", "simulate:A,rate=100,seed=3,object=random,touches=4,speed=max", "-o",
         "frames.h5"});

@@ -92,8 +92,8 @@ constexpr double soon = 1e-2;
 /// Bounds of "none of these" need not be so close that identities move by less.
 constexpr double least_identity_change = 1e-6;
 constexpr double unlimited = std::numeric_limits<double>::infinity();
-/// Bounds so many nats apart do not tell how closely they are needed; those that are closer, in nats
-/// for each touch, do.
+/// Bounds so many nats apart do not tell how closely they are needed; those that are closer, in
+/// nats for each touch, do.
 constexpr double far_apart = 2.0;
 constexpr double closer = 0.02;
 
