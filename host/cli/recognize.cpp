@@ -94,7 +94,7 @@ struct RecognizeArguments {
 
 HistogramNeed histogram_need(const RecognizeArguments& options) {
   if (options.fit_touch_sd) {
-    return {"fit-touch-sd", touch_sd_fit_needs, true};
+    return {.option = "fit-touch-sd", .why = touch_sd_fit_needs, .learned_only = true, .eq7 = true};
   }
   if (!options.posterior.empty()) {
     return {"posterior", "holds the log-likelihood of every bin, and bounds evaluate few"};

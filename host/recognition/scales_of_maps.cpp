@@ -6,6 +6,8 @@
 #include <limits>
 #include <vector>
 
+#include "palpate/map_builder.hpp"
+
 namespace palpate {
 
 namespace {
