@@ -127,7 +127,8 @@ std::optional<SensorFromFile> usual_sensor(const Request& request, const Circums
   if (!usual) {
     return {};
   }
-  const auto& [file, sensor] = *usual;
+  const std::string& file = usual->file;
+  const LearnedSensor& sensor = usual->sensor;
   const auto left_out = [&](const std::string& why) {
     remarks.push_back(fmt::format("{} is left out: {}; `sensor-model none` says so", file, why));
     return std::nullopt;

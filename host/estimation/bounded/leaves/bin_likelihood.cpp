@@ -191,9 +191,9 @@ void BinLikelihood::evaluate_all(std::span<const BinBox> boxes, const KnownEleme
   };
   if (sizeof(Result) == 8 || form_.kind == ReadingForm::Kind::table) {
     with(double());
-  } else {
-    with(float());
+    return;
   }
+  with(float());
 }
 
 void BinLikelihood::evaluate(std::span<const BinBox> boxes, const KnownElements& elements,
