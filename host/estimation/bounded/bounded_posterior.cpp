@@ -201,10 +201,10 @@ RefinedPose BoundedPosterior::refine(const Mode& mode) const {
     for (const BinBox& box : boxes) {
       bins += static_cast<std::size_t>(box.bins());
     }
-    std::vector<float> logs(bins);
+    std::vector<double> logs(bins);
     belief.on_threads(
-        [&] { likelihood.evaluate_on_threads(boxes, belief.elements(), std::span(logs)); });
-    return std::vector<double>(logs.begin(), logs.end());
+        [&] { likelihood.evaluate(boxes, belief.elements(), Arithmetic::float32, logs); });
+    return logs;
   };
   return palpate::refine(log_likelihood, fit, posterior.bodies[mode.object], start);
 }
@@ -287,7 +287,10 @@ double BoundedPosterior::log_likelihood(int object, const Pose& T_object_robot) 
                      .x_first = static_cast<std::int32_t>(bin % lattice().x_mm.count),
                      .x_count = 1};
     double value = 0.0;
-    belief.likelihood().evaluate(std::span(&box, 1), elements, std::span(&value, 1));
+    belief.on_threads([&] {
+      belief.likelihood().evaluate(std::span(&box, 1), elements, Arithmetic::float64,
+                                   std::span(&value, 1));
+    });
     return value;
   }
   const ContactModel& contact = belief.options().contact;

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <tbb/task_arena.h>
 
 #include "bins_by_definition.hpp"
 #include "every_set_of_instructions.hpp"
@@ -22,21 +23,19 @@ BinLikelihood likelihood_of(const BinCase& of) {
   return {std::span(&hypothesis, 1), of.contact, of.lattice};
 }
 
-template <typename Result>
-std::vector<Result> evaluated(const BinLikelihood& likelihood, const BinCase& of,
-                              const std::vector<BinBox>& boxes) {
+std::vector<double> evaluated(const BinLikelihood& likelihood, const BinCase& of,
+                              const std::vector<BinBox>& boxes, Arithmetic arithmetic) {
   std::size_t bins = 0;
   for (const BinBox& box : boxes) {
     bins += static_cast<std::size_t>(box.bins());
   }
-  std::vector<Result> logs(bins, Result{-7});
-  likelihood.evaluate(boxes, of.elements, std::span(logs));
+  std::vector<double> logs(bins, -7.0);
+  likelihood.evaluate(boxes, of.elements, arithmetic, logs);
   return logs;
 }
 
 /// Largest error of the results in nats; infinite where one of them is not finite.
-template <typename Result>
-double largest_error(const std::vector<Result>& got, const std::vector<long double>& expected) {
+double largest_error(const std::vector<double>& got, const std::vector<long double>& expected) {
   double largest = got.size() == expected.size() ? 0.0 : HUGE_VAL;
   for (std::size_t i = 0; i < std::min(got.size(), expected.size()); ++i) {
     const auto error = static_cast<double>(std::abs(got[i] - expected[i]));
@@ -50,13 +49,12 @@ double expect_within_bounds(const BinCase& of, const std::vector<BinBox>& boxes,
                             const std::string& name) {
   const BinLikelihood likelihood = likelihood_of(of);
   const std::vector<long double> expected = by_definition(of, boxes);
-  const double float32_error = likelihood.float32_error(0, of.elements);
-  const double float64_error = likelihood.float64_error(0, of.elements);
-  EXPECT_LE(largest_error(evaluated<float>(likelihood, of, boxes), expected), float32_error)
-      << name;
-  EXPECT_LE(largest_error(evaluated<double>(likelihood, of, boxes), expected), float64_error)
-      << name;
-  return float32_error;
+  for (const Arithmetic arithmetic : {Arithmetic::float32, Arithmetic::float64}) {
+    EXPECT_LE(largest_error(evaluated(likelihood, of, boxes, arithmetic), expected),
+              likelihood.error(0, of.elements, arithmetic))
+        << name;
+  }
+  return likelihood.error(0, of.elements, Arithmetic::float32);
 }
 
 std::vector<BinBox> planes(const PoseLattice& lattice) {
@@ -77,10 +75,11 @@ TEST(BinLikelihood, HasTheSameBitsOnThreads) {
         .theta = i % 3, .y_first = i % 24, .y_count = 1 + i % 7, .x_first = i % 58, .x_count = 5};
     boxes.insert(boxes.end() - 1, small);
   }
-  const std::vector<float> plain = evaluated<float>(likelihood, of, boxes);
-  std::vector<float> on_threads(plain.size());
-  likelihood.evaluate_on_threads(boxes, of.elements, std::span(on_threads));
-  EXPECT_EQ(on_threads, plain);
+  const auto on_threads = [&](int threads) {
+    return tbb::task_arena(threads).execute(
+        [&] { return evaluated(likelihood, of, boxes, Arithmetic::float32); });
+  };
+  EXPECT_EQ(on_threads(4), on_threads(1));
 }
 
 class BinsAlongAxes : public testing::TestWithParam<int> {};
@@ -110,14 +109,14 @@ TEST(BinLikelihood, HasATightBoundOnALetter) {
   const BinCase of = letter_case();
   // Errors of 1e-2 nats would leave a posterior's masses uncertain by one in a hundred.
   EXPECT_LT(expect_within_bounds(of, planes(of.lattice), "letter"), 1e-2);
-  EXPECT_LT(likelihood_of(of).float64_error(0, of.elements), 1e-9);
+  EXPECT_LT(likelihood_of(of).error(0, of.elements, Arithmetic::float64), 1e-9);
 }
 
 TEST(BinLikelihood, IsTheContactModelsAtTheInterpolatedLogOdds) {
   const BinCase of = letter_case();
   const InterpolatedMap map(of.map, *of.contact.prior);
   const BinBox plane = whole_plane(of.lattice, 1);
-  const std::vector<double> logs = evaluated<double>(likelihood_of(of), of, {plane});
+  const std::vector<double> logs = evaluated(likelihood_of(of), of, {plane}, Arithmetic::float64);
   for (int k = 0; k < plane.bins(); k += 17) {
     const glm::dvec2 at(of.lattice.x_mm.centre(k % plane.x_count),
                         of.lattice.y_mm.centre(k / plane.x_count));
@@ -217,14 +216,14 @@ TEST(BinLikelihood, TakesEachObjectsRowsOfATable) {
   const std::vector<Hypothesis> hypotheses{{of.map, 1.0}, {of.map, 1.0}};
   const BinLikelihood both(hypotheses, of.contact, of.lattice);
   const BinBox box{.object = 1, .y_count = 4, .x_count = 6};
-  const std::vector<double> got = evaluated<double>(both, of, {box});
+  const std::vector<double> got = evaluated(both, of, {box}, Arithmetic::float64);
   of.contact.table = second;
-  EXPECT_LE(largest_error(got, by_definition(of, {box})), both.float64_error(1, of.elements));
+  EXPECT_LE(largest_error(got, by_definition(of, {box})),
+            both.error(1, of.elements, Arithmetic::float64));
 }
 
-template <typename Result>
-std::vector<unsigned char> bits(const std::vector<Result>& logs) {
-  std::vector<unsigned char> bytes(logs.size() * sizeof(Result));
+std::vector<unsigned char> bits(const std::vector<double>& logs) {
+  std::vector<unsigned char> bytes(logs.size() * sizeof(double));
   std::memcpy(bytes.data(), logs.data(), bytes.size());
   return bytes;
 }
@@ -237,17 +236,14 @@ TEST(BinLikelihood, HasTheSameBitsWithEverySetOfInstructions) {
   for (std::size_t c = 0; c < cases.size(); ++c) {
     const BinCase& of = cases[c];
     const BinLikelihood likelihood = likelihood_of(of);
-    std::optional<std::vector<unsigned char>> in_float32;
-    std::optional<std::vector<unsigned char>> in_float64;
-    with_every_set_of_instructions([&](const std::string& name) {
-      SCOPED_TRACE(fmt::format("case {}, {}", c, name));
-      const auto narrow = bits(evaluated<float>(likelihood, of, planes(of.lattice)));
-      const auto wide = bits(evaluated<double>(likelihood, of, planes(of.lattice)));
-      EXPECT_EQ(narrow, in_float32.value_or(narrow));
-      EXPECT_EQ(wide, in_float64.value_or(wide));
-      in_float32 = narrow;
-      in_float64 = wide;
-    });
+    for (const Arithmetic arithmetic : {Arithmetic::float32, Arithmetic::float64}) {
+      std::optional<std::vector<unsigned char>> first;
+      with_every_set_of_instructions([&](const std::string& name) {
+        const auto own = bits(evaluated(likelihood, of, planes(of.lattice), arithmetic));
+        EXPECT_EQ(own, first.value_or(own)) << fmt::format("case {}, {}", c, name);
+        first = own;
+      });
+    }
   }
 }
 
@@ -279,12 +275,12 @@ std::vector<BinBox> parts_of(const BinBox& box, Uniform& random) {
   return parts;
 }
 
-template <typename Result>
-void expect_same_in_parts(const BinCase& of, const BinBox& plane, Uniform& random) {
+void expect_same_in_parts(const BinCase& of, const BinBox& plane, Arithmetic arithmetic,
+                          Uniform& random) {
   const BinLikelihood likelihood = likelihood_of(of);
-  const std::vector<Result> whole = evaluated<Result>(likelihood, of, {plane});
+  const std::vector<double> whole = evaluated(likelihood, of, {plane}, arithmetic);
   const std::vector<BinBox> parts = parts_of(plane, random);
-  const std::vector<Result> in_parts = evaluated<Result>(likelihood, of, parts);
+  const std::vector<double> in_parts = evaluated(likelihood, of, parts, arithmetic);
   ASSERT_GT(parts.size(), 1U);
   std::size_t k = 0;
   for (const BinBox& part : parts) {
@@ -303,11 +299,11 @@ TEST(BinLikelihood, HasTheSameBitsInEveryBox) {
   for (const double cell_mm : {0.03, 0.5, 4.0}) {
     BinCase of = letter_case();
     of.map = random_map(31, 27, cell_mm, 12.0, 82);
-    expect_same_in_parts<float>(of, whole_plane(of.lattice, 1), random);
-    expect_same_in_parts<double>(of, whole_plane(of.lattice, 1), random);
+    expect_same_in_parts(of, whole_plane(of.lattice, 1), Arithmetic::float32, random);
+    expect_same_in_parts(of, whole_plane(of.lattice, 1), Arithmetic::float64, random);
     of.contact.table = crooked_table();
     of.elements = random_elements(41, 6.0, of.contact.table->levels(), 86);
-    expect_same_in_parts<double>(of, whole_plane(of.lattice, 1), random);
+    expect_same_in_parts(of, whole_plane(of.lattice, 1), Arithmetic::float64, random);
   }
 }
 
@@ -329,8 +325,8 @@ TEST(BinLikelihood, HasTheSameBitsInABoxOfItsOwn) {
       }
       with_every_set_of_instructions([&](const std::string& name) {
         const BinLikelihood likelihood = likelihood_of(of);
-        EXPECT_EQ(evaluated<double>(likelihood, of, bins),
-                  evaluated<double>(likelihood, of, {plane}))
+        EXPECT_EQ(evaluated(likelihood, of, bins, Arithmetic::float64),
+                  evaluated(likelihood, of, {plane}, Arithmetic::float64))
             << name << ", " << elements << " elements, cells of " << cell_mm << " mm";
       });
     }
@@ -346,13 +342,13 @@ TEST(BinLikelihood, KeepsObjectsAndThetasApart) {
                                   {.object = 0, .theta = 2, .y_count = 3, .x_count = 3},
                                   {.object = 0, .theta = 1, .y_count = 3, .x_count = 3},
                                   {.object = 1, .theta = 1, .y_count = 3, .x_count = 3}};
-  const std::vector<double> got = evaluated<double>(both, of, boxes);
+  const std::vector<double> got = evaluated(both, of, boxes, Arithmetic::float64);
   for (std::size_t b = 0; b < boxes.size(); ++b) {
     BinCase one = of;
     one.map = hypotheses[boxes[b].object].map;
     const auto first = got.begin() + static_cast<std::ptrdiff_t>(9 * b);
     EXPECT_LE(largest_error(std::vector<double>(first, first + 9), by_definition(one, {boxes[b]})),
-              both.float64_error(boxes[b].object, of.elements))
+              both.error(boxes[b].object, of.elements, Arithmetic::float64))
         << "box " << b;
   }
 }

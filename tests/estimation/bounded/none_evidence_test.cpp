@@ -116,8 +116,8 @@ TEST(NoneEvidence, HoldsItsDefinition) {
         for (const Touch& touch : touches) {
           const KnownElements known = known_elements(
               array_readings(touch, none.options.contact, none.options.lattice.pivot_mm));
-          error += std::max(none.likelihood.float64_error(0, known),
-                            none.likelihood.float64_error(1, known));
+          error += std::max(none.likelihood.error(0, known, Arithmetic::float64),
+                            none.likelihood.error(1, known, Arithmetic::float64));
         }
         expect_holds(none.bounds(1e-6), expected, std::max(1e-6, 2.5 * error));
       }

@@ -104,19 +104,23 @@ void evaluate_vector(D d, const LogOddsAt& log_odds_at, const BinTask<hn::TFromD
                      double* log_likelihood) {
   const ReadingForm& form = task.form;
   if (form.kind == ReadingForm::Kind::products) {
-    evaluate_lanes<ReadingForm::Kind::products>(d, log_odds_at, task.runs, form, log_likelihood);
-  } else if (form.kind == ReadingForm::Kind::sums) {
-    evaluate_lanes<ReadingForm::Kind::sums>(d, log_odds_at, task.runs, form, log_likelihood);
+    multiply_elements(d, log_odds_at, task.runs, form, log_likelihood);
   } else if constexpr (sizeof(hn::TFromD<D>) == 8) {
-    look_up_lanes(d, log_odds_at, task.object, task.runs, form, log_likelihood);
+    const auto add_up = [&](const auto& reading_logs) HWY_ATTR {
+      add_elements(d, log_odds_at, task.runs, reading_logs, log_likelihood);
+    };
+    if (form.kind == ReadingForm::Kind::table) {
+      add_up([&](Reading reading) HWY_ATTR { return TableRow(d, form, task.object, reading); });
+    } else {
+      add_up([&](Reading reading) HWY_ATTR { return LogisticFloor(d, form, reading); });
+    }
   }
 }
 
 /// Fills vectors with the bins of as many blocks as fit wholly, or with a part of one block's.
 /// @param patches [block] memory
 template <typename Lane>
-void evaluate(const BinTask<Lane>& task, std::vector<ElementPatches<Lane>>& patches,
-              double* log_likelihood) {
+void evaluate(const BinTask<Lane>& task, std::vector<ElementPatches<Lane>>& patches) {
   const BinList<Lane>& bins = task.bins;
   const std::vector<BinBlock>& blocks = bins.blocks;
   for (std::size_t i = 0; i < blocks.size(); ++i) {
@@ -125,19 +129,9 @@ void evaluate(const BinTask<Lane>& task, std::vector<ElementPatches<Lane>>& patc
   using D = hn::ScalableTag<Lane>;
   const D d;
   const std::size_t lanes = hn::Lanes(d);
-  if constexpr (sizeof(Lane) == 8) {
-    // Bins that stand alone share no element's patch: vectors hold the elements of each.
-    if (task.form.kind == ReadingForm::Kind::table && blocks.size() == bins.bins()) {
-      for (std::size_t i = 0; i < blocks.size(); ++i) {
-        look_up_elements(d, task.map, task.object, patches[i], task.runs, task.form,
-                         log_likelihood + i);
-      }
-      return;
-    }
-  }
   HWY_ALIGN Lane x_offset[most_lanes] = {};
   HWY_ALIGN Lane y_offset[most_lanes] = {};
-  HWY_ALIGN double out[most_lanes];
+  HWY_ALIGN double out[most_lanes] = {};
   LanesOfBlock<D> parts[most_lanes];
   std::size_t block = 0;
   for (std::size_t first = 0, end = 0; first < bins.bins(); first = end) {
@@ -168,18 +162,18 @@ void evaluate(const BinTask<Lane>& task, std::vector<ElementPatches<Lane>>& patc
     } else {
       fill(count);
     }
-    std::copy(out, out + (end - first), log_likelihood + first);
+    for (std::size_t i = first; i < end; ++i) {
+      *bins.result[i] = out[i - first];
+    }
   }
 }
 
-void EvaluateFloat(const BinTask<float>& task, std::vector<ElementPatches<float>>& patches,
-                   double* log_likelihood) {
-  evaluate(task, patches, log_likelihood);
+void EvaluateFloat(const BinTask<float>& task, std::vector<ElementPatches<float>>& patches) {
+  evaluate(task, patches);
 }
 
-void EvaluateDouble(const BinTask<double>& task, std::vector<ElementPatches<double>>& patches,
-                    double* log_likelihood) {
-  evaluate(task, patches, log_likelihood);
+void EvaluateDouble(const BinTask<double>& task, std::vector<ElementPatches<double>>& patches) {
+  evaluate(task, patches);
 }
 
 std::int64_t Target() { return HWY_TARGET; }
@@ -214,8 +208,7 @@ void place_elements(std::span<const glm::dvec2> from_pivot_mm, double theta_rad,
 }
 
 template <typename Lane>
-void evaluate_bins(const BinTask<Lane>& task, std::vector<ElementPatches<Lane>>& scratch,
-                   std::span<double> log_likelihood) {
+void evaluate_bins(const BinTask<Lane>& task, std::vector<ElementPatches<Lane>>& scratch) {
   const std::size_t elements = task.placed.x.size();
   scratch.resize(std::max(scratch.size(), task.bins.blocks.size()));
   for (ElementPatches<Lane>& patches : scratch) {
@@ -224,16 +217,14 @@ void evaluate_bins(const BinTask<Lane>& task, std::vector<ElementPatches<Lane>>&
     patches.y.resize(elements);
   }
   if constexpr (sizeof(Lane) == 4) {
-    HWY_DYNAMIC_DISPATCH(EvaluateFloat)(task, scratch, log_likelihood.data());
+    HWY_DYNAMIC_DISPATCH(EvaluateFloat)(task, scratch);
   } else {
-    HWY_DYNAMIC_DISPATCH(EvaluateDouble)(task, scratch, log_likelihood.data());
+    HWY_DYNAMIC_DISPATCH(EvaluateDouble)(task, scratch);
   }
 }
 
-template void evaluate_bins(const BinTask<float>&, std::vector<ElementPatches<float>>&,
-                            std::span<double>);
-template void evaluate_bins(const BinTask<double>&, std::vector<ElementPatches<double>>&,
-                            std::span<double>);
+template void evaluate_bins(const BinTask<float>&, std::vector<ElementPatches<float>>&);
+template void evaluate_bins(const BinTask<double>&, std::vector<ElementPatches<double>>&);
 
 std::string vector_instructions() { return hwy::TargetName(HWY_DYNAMIC_DISPATCH(Target)()); }
 

@@ -58,13 +58,11 @@ struct TableExtent {
 ///
 /// Numerators and denominators are multiplied over elements, powers of two taken out every
 /// `interval` elements, and one logarithm taken per bin. Where r is too small for products of
-/// r + e, and for gamma = 0, the kernels sum a = max(min(z, 0), log r) and multiply
+/// r + e, and for gamma = 0, float64 adds up the elements' logs instead, each with
 ///
-///     1 + exp(-|a - log r|) e' in the place of the numerator,  e' = e for z >= 0, 1 for z < 0:
-///
-/// for z < 0, r + e = exp(max(z, log r)) (1 + exp(-|z - log r|)).
+///     r + e = exp(a) (1 + exp(-|z - log r|)),   a = max(z, log r), for z < 0.
 struct ReadingForm {
-  enum class Kind { products, sums, table };
+  enum class Kind { products, logs, table };
 
   /// @param contact resolved: with its prior
   explicit ReadingForm(const ContactModel& contact);
@@ -79,10 +77,10 @@ struct ReadingForm {
   /// Largest magnitude of an element's log-likelihood by Eq. 7, for log odds of this magnitude.
   double largest_nats(double largest_log_odds) const;
 
-  Kind kind = Kind::products;
-  double ratio = 0.0;      ///< r
-  double log_ratio = 0.0;  ///< log r, finite also for r = 0
-  double log_scale = 0.0;  ///< log s
+  Kind kind = Kind::products;  ///< float32 takes products only
+  double ratio = 0.0;          ///< r
+  double log_ratio = 0.0;      ///< log r, finite also for r = 0
+  double log_scale = 0.0;      ///< log s
   int float_interval = 1;
   int double_interval = 1;
 
@@ -146,12 +144,14 @@ struct BinList {
   std::vector<BinBlock> blocks;
   std::vector<Lane> x_offset;  ///< [bin] from the first of its block, in [0, 2] cells
   std::vector<Lane> y_offset;
+  std::vector<double*> result;  ///< [bin] where its log-likelihood goes
 
   std::size_t bins() const { return x_offset.size(); }
   void clear() {
     blocks.clear();
     x_offset.clear();
     y_offset.clear();
+    result.clear();
   }
 };
 
@@ -167,16 +167,14 @@ struct BinTask {
   std::size_t object = 0;
   const PlacedElements& placed;
   std::span<const ReadingRun> runs;  ///< of the placed elements
-  const ReadingForm& form;           ///< a table only for Lane = double
+  const ReadingForm& form;           ///< any but products only for Lane = double
 };
 
-/// Log-likelihood of the elements at bins, with vectors of `Lane`. Vectors are filled with bins of
-/// several blocks. Each bin's bits depend neither on the others nor on the processor.
+/// Log-likelihood of the elements at bins, in nats, with vectors of `Lane`. Vectors are filled with
+/// bins of several blocks. Each bin's bits depend neither on the others nor on the processor.
 /// @param scratch memory to be used again
-/// @param log_likelihood out: [bin] in nats
 template <typename Lane>
-void evaluate_bins(const BinTask<Lane>& task, std::vector<ElementPatches<Lane>>& scratch,
-                   std::span<double> log_likelihood);
+void evaluate_bins(const BinTask<Lane>& task, std::vector<ElementPatches<Lane>>& scratch);
 
 /// The vector instructions that kernels use on this processor, such as "AVX3".
 std::string vector_instructions();

@@ -35,7 +35,7 @@ float unused_float(const OccupancyGrid& map, double log_odds) {
 
 /// Below it float32 would have to take out powers of two at every third element or oftener.
 constexpr double least_ratio = 0x1p-30;
-/// Stands for log 0: below all sums of log odds, and within float32.
+/// Stands for log 0: below all log odds.
 constexpr double log_zero = -1e38;
 
 /// Elements whose numerators, in [ratio, 2], and denominators, in [1, 2], a product takes before it
@@ -102,19 +102,16 @@ ReadingForm::ReadingForm(const ContactModel& contact) {
   const double scale = floor + (1.0 - contact.gamma);
   log_scale = std::log(scale);
   ratio = floor / scale;
-  kind = ratio >= least_ratio ? Kind::products : Kind::sums;
-  if (kind == Kind::products) {
+  if (ratio >= least_ratio) {
     log_ratio = std::log(ratio);
     float_interval = interval_within(120.0, ratio);
     double_interval = interval_within(1000.0, ratio);
-  } else {
-    log_ratio = contact.gamma > 0.0
-                    ? std::log(contact.gamma) + std::log(contact.prior.value()) - log_scale
-                    : log_zero;
-    // Short, so that float32 sums stay close.
-    float_interval = 8;
-    double_interval = 64;
+    return;
   }
+  kind = Kind::logs;
+  log_ratio = contact.gamma > 0.0
+                  ? std::log(contact.gamma) + std::log(contact.prior.value()) - log_scale
+                  : log_zero;
 }
 
 TableExtent ReadingForm::table_extent(std::size_t object) const {

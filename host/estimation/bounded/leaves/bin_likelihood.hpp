@@ -18,29 +18,43 @@
 
 namespace palpate {
 
-/// What bounds the rounding of log odds that are interpolated on a map under a lattice's bins.
-struct MapExtent {
-  MapExtent(const OccupancyGrid& map, double prior_log_odds, const PoseLattice& lattice);
+/// The numbers in which bins are evaluated. What is no product of Eq. 7 (ReadingForm) takes float64
+/// in both.
+enum class Arithmetic { float32, float64 };
+
+/// A map, how a lattice's bins lie on it, and what bounds the rounding of log odds there.
+struct PlacedMap {
+  /// @throws Error where the map has too many cells
+  PlacedMap(const OccupancyGrid& map, double prior, const PoseLattice& lattice);
+
+  template <typename Lane>
+  const PositionGrid& grid() const {
+    return sizeof(Lane) == 4 ? float_grid : double_grid;
+  }
+  /// Bound, in cells along an axis, of the float64 rounding of an element's place at a bin.
+  double place_error(const KnownElements& elements) const;
+  /// Bound of the change of log odds where a place is wrong by so many cells along both axes.
+  double change(double place_cells) const;
+
+  MapPatches nodes;
+  double cell_mm;
+  glm::dvec2 origin_mm;
+  double lattice_cells;  ///< no bin nor node is farther from the frames' origins
+  double reach_cells;    ///< no bin's position is larger; from farther elements all bins are off
+  PositionGrid float_grid;
+  PositionGrid double_grid;
 
   // Over all nodes of the map and the prior beyond.
   double largest = 0.0;   ///< magnitude
   double range = 0.0;     ///< largest less smallest
   double steepest = 0.0;  ///< difference between neighbours along an axis
-
-  double cell_mm = 0.0;
-  double lattice_cells = 0.0;  ///< no bin nor node is farther from the frames' origins
-  double reach_cells = 0.0;    ///< elements farther from the pivot are off the map at every bin
-
-  /// Bound, in cells along an axis, of the float64 rounding of an element's place at a bin.
-  double place_error(const KnownElements& elements) const;
-  /// Bound of the change of log odds where a place is wrong by so many cells along both axes.
-  double change(double place_cells) const;
 };
 
 /// Evaluates the log-likelihood (Eq. 7, 13) of bins on the host, by vector instructions chosen at
-/// run time. A bin has the same bits with every set of instructions and in every box. Calls from
-/// several threads may run at once. Touches of uncertain pose have their mean likelihoods: all bins
-/// within reach of a bin are evaluated, too, and boxes that lie together share them.
+/// run time. A bin has the same bits with every set of instructions, on every number of threads and
+/// in every box. Calls from several threads may run at once. Touches of uncertain pose have their
+/// mean likelihoods: all bins within reach of a bin are evaluated, too, and boxes that lie together
+/// share them.
 class BinLikelihood {
  public:
   /// @param contact resolved: with its prior
@@ -51,22 +65,14 @@ class BinLikelihood {
   void move_pivot(const glm::dvec2& pivot_mm);
 
   /// Log-likelihood of the elements at every bin in nats, boxes one after another, [y, x] in each.
-  /// In float32 arithmetic, and in float64. Fastest where boxes of one object and theta stand
-  /// together. A table (ContactModel::table) takes float64 arithmetic in both.
-  void evaluate(std::span<const BinBox> boxes, const KnownElements& elements,
-                std::span<float> log_likelihood) const;
-  void evaluate(std::span<const BinBox> boxes, const KnownElements& elements,
-                std::span<double> log_likelihood) const;
-  /// Evaluates many boxes as evaluate() does, on the threads of the caller's TBB arena.
+  /// On the threads of the caller's TBB arena. Fastest where boxes of one object and theta stand
+  /// together.
   /// @param errors where not empty and touches are uncertain, [bin] receives error: the likelihood
-  /// may be wrong by e^error - 1 of itself beside the bounds below
-  template <typename Result>
-  void evaluate_on_threads(std::span<const BinBox> boxes, const KnownElements& elements,
-                           std::span<Result> log_likelihood, std::span<double> errors = {}) const;
-
+  /// may be wrong by e^error - 1 of itself beside error()
+  void evaluate(std::span<const BinBox> boxes, const KnownElements& elements, Arithmetic arithmetic,
+                std::span<double> log_likelihood, std::span<double> errors = {}) const;
   /// Proven bound, in nats, of the error of evaluate() at any bin of an object.
-  double float32_error(std::size_t object, const KnownElements& elements) const;
-  double float64_error(std::size_t object, const KnownElements& elements) const;
+  double error(std::size_t object, const KnownElements& elements, Arithmetic arithmetic) const;
 
   /// Whether touches are uncertain.
   bool displaces() const { return displaced_.has_value(); }
@@ -76,34 +82,23 @@ class BinLikelihood {
   static std::string instructions() { return vector_instructions(); }
 
  private:
-  /// A map, and how the lattice's bins lie on it.
-  struct Placement {
-    MapPatches nodes;
-    MapExtent extent;
-    double cell_mm;
-    glm::dvec2 origin_mm;
-    double reach_cells;  ///< no bin's position is larger; from farther elements all bins are off
-    PositionGrid float_grid;
-    PositionGrid double_grid;
-  };
-
-  static Placement placement_of(const OccupancyGrid& map, double prior, const PoseLattice& lattice);
-  template <typename Lane, typename Result>
-  void evaluate_in(std::span<const BinBox> boxes, const KnownElements& elements,
-                   std::span<Result> log_likelihood) const;
-  template <typename Result>
-  void evaluate_all(std::span<const BinBox> boxes, const KnownElements& elements,
-                    std::span<Result> log_likelihood, std::span<double> errors) const;
-  /// Bins of touches of uncertain pose; see evaluate_on_threads().
-  template <typename Lane, typename Result>
-  void evaluate_displaced(std::span<const BinBox> boxes, const KnownElements& elements,
-                          std::span<Result> log_likelihood, std::span<double> errors) const;
-  /// Of the means of touches of uncertain pose, beside what they are taken of.
-  double mean_error(const KnownElements& elements) const;
+  bool in_float32(Arithmetic arithmetic) const {
+    return arithmetic == Arithmetic::float32 && form_.kind == ReadingForm::Kind::products;
+  }
+  /// Bins as if all touches were exact, on the caller's thread.
   template <typename Lane>
-  double error(std::size_t object, const KnownElements& elements) const;
+  void evaluate_alone(std::span<const BinBox> boxes, const KnownElements& elements,
+                      double* log_likelihood) const;
+  template <typename Lane>
+  void evaluate_exact(std::span<const BinBox> boxes, const KnownElements& elements,
+                      std::span<double> log_likelihood) const;
+  template <typename Lane>
+  void evaluate_displaced(std::span<const BinBox> boxes, const KnownElements& elements,
+                          std::span<double> log_likelihood, std::span<double> errors) const;
+  template <typename Lane>
+  double exact_error(std::size_t object, const KnownElements& elements) const;
 
-  std::vector<Placement> placements_;  ///< [object]
+  std::vector<PlacedMap> maps_;  ///< [object]
   ReadingForm form_;
   PoseLattice lattice_;
   std::unique_ptr<const DisplacementWeights> displacement_;  ///< null where touches are exact

@@ -30,7 +30,7 @@ double farthest(const Axis& axis) { return std::max(std::abs(axis.lower), std::a
 
 }  // namespace
 
-double MapExtent::place_error(const KnownElements& elements) const {
+double PlacedMap::place_error(const KnownElements& elements) const {
   double norm_cells = 0.0;
   for (const glm::dvec2& p_mm : elements.from_pivot_mm) {
     norm_cells = std::max(norm_cells, (std::abs(p_mm.x) + std::abs(p_mm.y)) / cell_mm);
@@ -41,50 +41,53 @@ double MapExtent::place_error(const KnownElements& elements) const {
          4.0 * v * (lattice_cells + reach_cells);
 }
 
-double MapExtent::change(double place_cells) const {
+double PlacedMap::change(double place_cells) const {
   return std::min(2.0 * place_cells * steepest, range);
 }
 
-MapExtent::MapExtent(const OccupancyGrid& map, double prior_log_odds, const PoseLattice& lattice)
-    : cell_mm(map.cell_mm) {
-  double least = prior_log_odds;
-  double most = prior_log_odds;
-  for (const float cell : map.log_odds) {
-    least = std::min(least, double{cell});
-    most = std::max(most, double{cell});
-  }
-  largest = std::max(std::abs(least), std::abs(most));
-  range = most - least;
-  const auto cell = [&](int i, int j) {
-    return i >= 0 && i < map.nx && j >= 0 && j < map.ny ? double{map.at(i, j)} : prior_log_odds;
+PlacedMap::PlacedMap(const OccupancyGrid& map, double prior, const PoseLattice& lattice)
+    : nodes(map, prior),
+      cell_mm(map.cell_mm),
+      origin_mm(map.origin_mm),
+      lattice_cells((std::max(farthest(lattice.x_mm), farthest(lattice.y_mm)) +
+                     std::max(std::abs(map.origin_mm.x), std::abs(map.origin_mm.y))) /
+                    map.cell_mm),
+      reach_cells(lattice_cells + std::max(map.nx, map.ny) + 20.0),
+      // Places within a patch are below 4 cells: these steps leave them exact in 24 and 53 bits.
+      float_grid(reach_cells, 0x1p-22),
+      double_grid(reach_cells, 0x1p-51) {
+  const double beyond = nodes.prior_log_odds();
+  double least = beyond;
+  double most = beyond;
+  const auto node = [&](int i, int j) {
+    return i >= 0 && i < map.nx && j >= 0 && j < map.ny ? double{map.at(i, j)} : beyond;
   };
   for (int j = -1; j < map.ny; ++j) {
     for (int i = -1; i < map.nx; ++i) {
-      const double here = cell(i, j);
+      const double here = node(i, j);
+      least = std::min(least, here);
+      most = std::max(most, here);
       steepest =
-          std::max({steepest, std::abs(cell(i + 1, j) - here), std::abs(cell(i, j + 1) - here)});
+          std::max({steepest, std::abs(node(i + 1, j) - here), std::abs(node(i, j + 1) - here)});
     }
   }
-  lattice_cells = (std::max(farthest(lattice.x_mm), farthest(lattice.y_mm)) +
-                   std::max(std::abs(map.origin_mm.x), std::abs(map.origin_mm.y))) /
-                  map.cell_mm;
-  reach_cells = lattice_cells + std::max(map.nx, map.ny) + 20.0;
+  largest = std::max(std::abs(least), std::abs(most));
+  range = most - least;
 }
 
 template <typename Lane>
-double BinLikelihood::error(std::size_t object, const KnownElements& elements) const {
+double BinLikelihood::exact_error(std::size_t object, const KnownElements& elements) const {
   constexpr double u = unit<Lane>;
-  const Placement& at = placements_[object];
+  const PlacedMap& map = maps_[object];
   const auto count = static_cast<double>(elements.from_pivot_mm.size());
 
   // Bins and elements are rounded to the grid, half a step each. Interpolation along an axis rounds
   // a difference, a product and a sum, and does so along y and then along x. Float32 has the marker
   // in the place of the prior.
-  const PositionGrid& grid = sizeof(Lane) == 4 ? at.float_grid : at.double_grid;
-  const double moved = at.extent.change(at.extent.place_error(elements) + grid.step());
-  const double interpolated = u * (4.0 * at.extent.steepest + 2.0 * at.extent.largest);
+  const double moved = map.change(map.place_error(elements) + map.grid<Lane>().step());
+  const double interpolated = u * (4.0 * map.steepest + 2.0 * map.largest);
   const double marker =
-      sizeof(Lane) == 4 ? std::abs(double{at.nodes.marker()} - at.nodes.prior_log_odds()) : 0.0;
+      sizeof(Lane) == 4 ? std::abs(double{map.nodes.marker()} - map.nodes.prior_log_odds()) : 0.0;
   const double log_odds = moved + interpolated + marker;
 
   if (form_.kind == ReadingForm::Kind::table) {
@@ -92,7 +95,7 @@ double BinLikelihood::error(std::size_t object, const KnownElements& elements) c
     // product and two sums, and the sum over elements.
     const TableExtent table = form_.table_extent(object);
     const double argument =
-        log_odds + v * (at.extent.largest + std::abs(form_.first_log_odds) + 4.0 * table.width);
+        log_odds + v * (map.largest + std::abs(form_.first_log_odds) + 4.0 * table.width);
     const double each = std::min(table.steepest * argument, 2.0 * table.largest) +
                         8.0 * v * table.largest + v * count * table.largest;
     return second_order * count * each;
@@ -100,41 +103,27 @@ double BinLikelihood::error(std::size_t object, const KnownElements& elements) c
 
   // Eq. 7 changes by at most 1 nat per nat of log odds, so that a relative error of e = exp(-|z|)
   // changes it by no more than that error. e: the product by log2(e), itself rounded, and 2^f.
-  const double exponential =
-      2.0 * u * std::min(at.extent.largest, most_exponent<Lane>) + exp_error<Lane>;
-  // Numerator: r, a product, a sum; denominator: a sum; two products over the elements.
-  double each = log_odds + exponential + 6.0 * u;
-  if (form_.kind == ReadingForm::Kind::sums) {
-    // Sums over an interval of numbers that do not exceed `depth`; log r twice; its own
-    // exponential, of a difference, t exp(-t) of whose relative error counts.
-    const double depth = std::min(at.extent.largest, std::abs(form_.log_ratio));
-    const double interval = sizeof(Lane) == 4 ? form_.float_interval : form_.double_interval;
-    each += u * depth * (interval + 2.0) + exp_error<Lane> + 3.0 * u;
+  const double exponential = 2.0 * u * std::min(map.largest, most_exponent<Lane>) + exp_error<Lane>;
+  const double nats = form_.largest_nats(map.largest);
+  if (form_.kind == ReadingForm::Kind::logs) {
+    // Two exponentials, t exp(-t) of the relative error of the second one's argument counts; log r
+    // twice; 4 roundings each of numerator, denominator, quotient and its logarithm. Then two sums,
+    // and the sum over elements.
+    const double each = log_odds + exponential + exp_error<Lane> + 16.0 * v + 4.0 * v * nats;
+    return second_order * count * (each + v * count * nats);
   }
-  // In float64, the powers of two, the logarithm and the scale; no partial sum exceeds `nats`.
-  const double nats = form_.largest_nats(at.extent.largest);
-  return second_order * count * each + 16.0 * v * (count * nats + 1.0) +
-         (form_.kind == ReadingForm::Kind::sums ? v * count * count * nats : 0.0);
+  // Numerator: r, a product, a sum; denominator: a sum; two products over the elements. In float64,
+  // the powers of two, the logarithm and the scale.
+  return second_order * count * (log_odds + exponential + 6.0 * u) +
+         16.0 * v * (count * nats + 1.0);
 }
 
-double BinLikelihood::mean_error(const KnownElements& elements) const {
-  return displaced_ ? static_cast<double>(elements.touches.size()) * displaced_->mean_error() : 0.0;
-}
-
-double BinLikelihood::float64_error(std::size_t object, const KnownElements& elements) const {
-  return error<double>(object, elements) + mean_error(elements);
-}
-
-double BinLikelihood::float32_error(std::size_t object, const KnownElements& elements) const {
-  // The result is rounded to float32.
-  const auto count = static_cast<double>(elements.from_pivot_mm.size());
-  if (form_.kind == ReadingForm::Kind::table) {
-    return float64_error(object, elements) +
-           second_order * unit<float> * count * form_.table_extent(object).largest;
-  }
-  const double nats = form_.largest_nats(placements_[object].extent.largest);
-  return error<float>(object, elements) + mean_error(elements) +
-         second_order * unit<float> * count * nats;
+double BinLikelihood::error(std::size_t object, const KnownElements& elements,
+                            Arithmetic arithmetic) const {
+  const double of_means =
+      displaced_ ? static_cast<double>(elements.touches.size()) * displaced_->mean_error() : 0.0;
+  return of_means + (in_float32(arithmetic) ? exact_error<float>(object, elements)
+                                            : exact_error<double>(object, elements));
 }
 
 }  // namespace palpate

@@ -45,19 +45,7 @@ class BlockSums {
   }
   /// Copies the sums of a box's bins, [y, x].
   /// @param errors may be null
-  template <typename Result>
-  void copy(const BinBox& box, Result* to, double* errors) const {
-    for_bins(box, [&](std::size_t bin) {
-      *to++ = static_cast<Result>(log_likelihood_[bin]);
-      if (errors != nullptr) {
-        *errors++ = error_[bin];
-      }
-    });
-  }
-
- private:
-  template <typename Visit>
-  void for_bins(const BinBox& box, const Visit& visit) const {
+  void copy(const BinBox& box, double* to, double* errors) const {
     const auto after = [](const BlockRun& run) { return std::tuple(run.theta, run.y, run.x); };
     for (int y = box.y_first; y < box.y_first + box.y_count; ++y) {
       // A box's bins of a row lie in one run.
@@ -67,12 +55,17 @@ class BlockSums {
       const std::size_t first = first_[static_cast<std::size_t>(run - runs_.begin())];
       for (int x = box.x_first; x < box.x_first + box.x_count; ++x) {
         const auto block = static_cast<std::size_t>(x / side - run->x);
-        visit(first + block * BlockRun::places +
-              static_cast<std::size_t>(side * (y % side) + x % side));
+        const std::size_t bin = first + block * BlockRun::places +
+                                static_cast<std::size_t>(side * (y % side) + x % side);
+        *to++ = log_likelihood_[bin];
+        if (errors != nullptr) {
+          *errors++ = error_[bin];
+        }
       }
     }
   }
 
+ private:
   std::vector<BlockRun> runs_;
   std::vector<std::size_t> first_;  ///< [run] its first bin's place in what follows
   std::vector<double> log_likelihood_;
@@ -81,13 +74,13 @@ class BlockSums {
 
 }  // namespace
 
-template <typename Lane, typename Result>
+template <typename Lane>
 void BinLikelihood::evaluate_displaced(std::span<const BinBox> boxes, const KnownElements& elements,
-                                       std::span<Result> log_likelihood,
+                                       std::span<double> log_likelihood,
                                        std::span<double> errors) const {
   // The order in which touches came must show in no bit.
   const std::vector<std::size_t> order = sorted_touches(elements.touches);
-  Result* to = log_likelihood.data();
+  double* to = log_likelihood.data();
   double* to_errors = errors.empty() ? nullptr : errors.data();
   for (std::size_t first = 0, end = 0; first < boxes.size(); first = end) {
     while (end < boxes.size() && boxes[end].object == boxes[first].object) {
@@ -111,7 +104,7 @@ void BinLikelihood::evaluate_displaced(std::span<const BinBox> boxes, const Know
           bins += static_cast<std::size_t>(part.bins());
         }
         std::vector<double> values(bins);
-        evaluate_in<Lane>(parts, touch, std::span(values));
+        evaluate_alone<Lane>(parts, touch, values.data());
         auto value = values.begin();
         for (const BinBox& part : parts) {
           for (int y = part.y_first; y < part.y_first + part.y_count; ++y) {
@@ -131,14 +124,8 @@ void BinLikelihood::evaluate_displaced(std::span<const BinBox> boxes, const Know
 }
 
 template void BinLikelihood::evaluate_displaced<float>(std::span<const BinBox>,
-                                                       const KnownElements&, std::span<float>,
-                                                       std::span<double>) const;
-template void BinLikelihood::evaluate_displaced<float>(std::span<const BinBox>,
                                                        const KnownElements&, std::span<double>,
                                                        std::span<double>) const;
-template void BinLikelihood::evaluate_displaced<double>(std::span<const BinBox>,
-                                                        const KnownElements&, std::span<float>,
-                                                        std::span<double>) const;
 template void BinLikelihood::evaluate_displaced<double>(std::span<const BinBox>,
                                                         const KnownElements&, std::span<double>,
                                                         std::span<double>) const;

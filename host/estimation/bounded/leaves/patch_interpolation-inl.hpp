@@ -92,31 +92,7 @@ HWY_INLINE PatchNodes::PatchNodes(const float* patch) : patch_(patch) {}
 
 template <class DF, class VI>
 HWY_INLINE hn::Vec<DF> PatchNodes::at(DF df, VI index, int offset) const {
-  const float* const from = patch_ + offset;
-#if HWY_TARGET == HWY_SCALAR
-  return hn::GatherIndex(df, from, index);
-#else
-  // A vector holds a column's nodes; an index is that of one of the first three columns.
-  const hn::Full128<float> whole;
-  const hn::Full128<std::int32_t> whole_index;
-  const auto of_all = [&](auto wide) HWY_ATTR {
-    const auto lane = hn::IndicesFromVec(whole, hn::And(wide, hn::Set(whole_index, 3)));
-    const auto in_column = [&](int column) HWY_ATTR {
-      return hn::TableLookupLanes(hn::LoadU(whole, from + MapPatches::side * column), lane);
-    };
-    // Whole masks: IfNegativeThenElse() of Highway 1.0.3 needs them too with SSSE3.
-    const auto second =
-        hn::RebindMask(whole, hn::TestBit(wide, hn::Set(whole_index, MapPatches::side)));
-    const auto third =
-        hn::RebindMask(whole, hn::TestBit(wide, hn::Set(whole_index, 2 * MapPatches::side)));
-    return hn::IfThenElse(third, in_column(2), hn::IfThenElse(second, in_column(1), in_column(0)));
-  };
-  if constexpr (hn::MaxLanes(DF()) == 4) {
-    return of_all(index);
-  } else {
-    return hn::LowerHalf(df, of_all(hn::Combine(whole_index, index, index)));
-  }
-#endif
+  return hn::GatherIndex(df, patch_ + offset, index);
 }
 
 #endif

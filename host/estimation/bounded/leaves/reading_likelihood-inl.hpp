@@ -1,5 +1,5 @@
-// The likelihood of bins: by Eq. 7 as products over the elements (ReadingForm), or by a table over
-// log odds. For files that are compiled once for every set of instructions.
+// The likelihood of bins: by Eq. 7 as products over the elements (ReadingForm), or as sums of the
+// elements' logs. For files that are compiled once for every set of instructions.
 
 #if defined(PALPATE_READING_LIKELIHOOD_INL) == defined(HWY_TARGET_TOGGLE)
 #ifdef PALPATE_READING_LIKELIHOOD_INL
@@ -8,10 +8,8 @@
 #define PALPATE_READING_LIKELIHOOD_INL
 #endif
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <numeric>
 #include <span>
 #include <type_traits>
 
@@ -31,13 +29,11 @@ struct Products {
   hn::Vec<D> numerator;
   hn::Vec<D> denominator;
   hn::Vec<hn::RebindToUnsigned<D>> exponent;  ///< taken out, modulo the lane's range
-  hn::Vec<D> sum;                             ///< of a, since it was last taken out
 
   explicit Products(D d)
       : numerator(hn::Set(d, hn::TFromD<D>{1})),
         denominator(hn::Set(d, hn::TFromD<D>{1})),
-        exponent(hn::Zero(hn::RebindToUnsigned<D>())),
-        sum(hn::Zero(d)) {}
+        exponent(hn::Zero(hn::RebindToUnsigned<D>())) {}
 };
 
 template <class D>
@@ -52,23 +48,9 @@ HWY_INLINE void multiply(D d, hn::Vec<D> l, hn::Vec<D> at_negative, hn::Vec<D> a
   product.denominator = hn::Mul(product.denominator, hn::Add(one, e));
 }
 
-/// Multiplies as multiply() does, with a sum beside the product, for log odds `z` of the reading.
+/// Takes powers of two out of the product.
 template <class D>
-HWY_INLINE void multiply_and_add(D d, hn::Vec<D> z, hn::Vec<D> log_ratio, Products<D>& product) {
-  const auto one = hn::Set(d, hn::TFromD<D>{1});
-  const auto zero = hn::Zero(d);
-  const auto e = exp_of_minus(d, hn::Abs(z));
-  const auto a = hn::Max(hn::Min(z, zero), log_ratio);
-  const auto other = exp_of_minus(d, hn::Abs(hn::Sub(hn::Min(z, zero), log_ratio)));
-  const auto factor = hn::IfThenElse(hn::Lt(z, zero), one, e);
-  product.numerator = hn::Mul(product.numerator, hn::Add(one, hn::Mul(other, factor)));
-  product.denominator = hn::Mul(product.denominator, hn::Add(one, e));
-  product.sum = hn::Add(product.sum, a);
-}
-
-/// Takes powers of two, and the sum, out of the product.
-template <class D>
-HWY_INLINE void take_out(D d, Products<D>& product, double* sums) {
+HWY_INLINE void take_out(D d, Products<D>& product) {
   using Lane = hn::TFromD<D>;
   const hn::RebindToUnsigned<D> du;
   const auto mantissa = hn::Set(du, VectorMath<Lane>::mantissa_mask);
@@ -80,20 +62,11 @@ HWY_INLINE void take_out(D d, Products<D>& product, double* sums) {
       hn::Add(product.exponent, hn::Sub(hn::ShiftRight<shift>(n), hn::ShiftRight<shift>(m)));
   product.numerator = hn::BitCast(d, hn::Or(hn::And(n, mantissa), one));
   product.denominator = hn::BitCast(d, hn::Or(hn::And(m, mantissa), one));
-  if (sums != nullptr) {
-    HWY_ALIGN Lane sum[most_lanes];
-    hn::Store(product.sum, d, sum);
-    for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
-      sums[i] += static_cast<double>(sum[i]);
-    }
-    product.sum = hn::Zero(d);
-  }
 }
 
 /// Sum of the logarithms of all lanes' factors.
 template <class D>
-void store_logs(D d, const Products<D>& product, const double* sums, double constant,
-                double* log_likelihood) {
+void store_logs(D d, const Products<D>& product, double constant, double* log_likelihood) {
   using Lane = hn::TFromD<D>;
   const hn::RebindToUnsigned<D> du;
   const hn::ScalableTag<double> dd;
@@ -117,47 +90,79 @@ void store_logs(D d, const Products<D>& product, const double* sums, double cons
     const auto logs =
         hn::Add(hn::Mul(hn::Load(dd, power + i), hn::Set(dd, VectorMath<double>::ln2)),
                 log_near_one(dd, x));
-    const auto rest = hn::Add(hn::LoadU(dd, sums + i), hn::Set(dd, constant));
-    hn::StoreU(hn::Add(logs, rest), dd, log_likelihood + i);
+    hn::StoreU(hn::Add(logs, hn::Set(dd, constant)), dd, log_likelihood + i);
   }
 }
 
-/// The bins of one vector, by Eq. 7.
+/// The bins of one vector, as products over the elements.
 /// @param log_odds_at (element): in every lane
-template <ReadingForm::Kind kind, class D, class LogOddsAt>
-void evaluate_lanes(D d, const LogOddsAt& log_odds_at, std::span<const ReadingRun> runs,
-                    const ReadingForm& form, double* log_likelihood) {
+template <class D, class LogOddsAt>
+void multiply_elements(D d, const LogOddsAt& log_odds_at, std::span<const ReadingRun> runs,
+                       const ReadingForm& form, double* log_likelihood) {
   using Lane = hn::TFromD<D>;
-  constexpr bool in_sums = kind == ReadingForm::Kind::sums;
   const int interval = sizeof(Lane) == 4 ? form.float_interval : form.double_interval;
   const auto ratio = hn::Set(d, static_cast<Lane>(form.ratio));
-  const auto log_ratio = hn::Set(d, static_cast<Lane>(form.log_ratio));
   const auto one = hn::Set(d, Lane{1});
   Products<D> product(d);
-  HWY_ALIGN double sums[most_lanes] = {};
-  std::size_t count = 0;
   int since = 0;
   for (const ReadingRun& run : runs) {
     const bool contact = run.reading != Reading::no_contact;
     const auto at_negative = contact ? ratio : one;
     const auto at_positive = contact ? one : ratio;
-    count += run.end - run.begin;
     for (std::size_t e = run.begin; e < run.end; ++e) {
-      const auto l = log_odds_at(e);
-      if constexpr (in_sums) {
-        multiply_and_add(d, contact ? l : hn::Neg(l), log_ratio, product);
-      } else {
-        multiply(d, l, at_negative, at_positive, product);
-      }
+      multiply(d, log_odds_at(e), at_negative, at_positive, product);
       if (++since == interval) {
-        take_out(d, product, in_sums ? sums : nullptr);
+        take_out(d, product);
         since = 0;
       }
     }
   }
-  take_out(d, product, in_sums ? sums : nullptr);
-  store_logs(d, product, sums, static_cast<double>(count) * form.log_scale, log_likelihood);
+  take_out(d, product);
+  const std::size_t count = runs.empty() ? 0 : runs.back().end;
+  store_logs(d, product, static_cast<double>(count) * form.log_scale, log_likelihood);
 }
+
+/// The bins of one vector, as sums of the elements' log-likelihoods.
+/// @param log_odds_at (element): in every lane
+/// @param logs_of (reading): its log-likelihoods, at(d, log odds)
+template <class D, class LogOddsAt, class LogsOf>
+void add_elements(D d, const LogOddsAt& log_odds_at, std::span<const ReadingRun> runs,
+                  const LogsOf& logs_of, double* log_likelihood) {
+  auto sum = hn::Zero(d);
+  for (const ReadingRun& run : runs) {
+    const auto logs = logs_of(run.reading);
+    for (std::size_t e = run.begin; e < run.end; ++e) {
+      sum = hn::Add(sum, logs.at(d, log_odds_at(e)));
+    }
+  }
+  hn::StoreU(sum, d, log_likelihood);
+}
+
+/// The log-likelihoods of one reading by Eq. 7, where r is small; see ReadingForm.
+template <class D>
+class LogisticFloor {
+ public:
+  LogisticFloor(D d, const ReadingForm& form, Reading reading)
+      : sign_(hn::Set(d, reading == Reading::no_contact ? -1.0 : 1.0)),
+        log_ratio_(hn::Set(d, form.log_ratio)),
+        log_scale_(hn::Set(d, form.log_scale)) {}
+
+  HWY_INLINE hn::Vec<D> at(D d, hn::Vec<D> l) const {
+    const auto one = hn::Set(d, 1.0);
+    const auto z = hn::Mul(l, sign_);
+    const auto e = exp_of_minus(d, hn::Abs(z));
+    const auto falling = hn::Min(z, hn::Zero(d));
+    const auto other = exp_of_minus(d, hn::Abs(hn::Sub(falling, log_ratio_)));
+    const auto factor = hn::IfThenElse(hn::Lt(z, hn::Zero(d)), one, e);
+    const auto x = hn::Div(hn::Add(one, hn::Mul(other, factor)), hn::Add(one, e));
+    return hn::Add(hn::Add(hn::Max(falling, log_ratio_), log_scale_), log_near_one(d, x));
+  }
+
+ private:
+  hn::Vec<D> sign_;
+  hn::Vec<D> log_ratio_;
+  hn::Vec<D> log_scale_;
+};
 
 /// The log-likelihoods of one reading in a table.
 template <class D>
@@ -187,65 +192,6 @@ class TableRow {
   hn::Vec<D> last_;
   hn::Vec<D> last_segment_;
 };
-
-/// The bins of one vector, by a table of log-likelihoods.
-/// @param log_odds_at (element): in every lane
-template <class D, class LogOddsAt>
-void look_up_lanes(D d, const LogOddsAt& log_odds_at, std::size_t object,
-                   std::span<const ReadingRun> runs, const ReadingForm& form,
-                   double* log_likelihood) {
-  auto sum = hn::Zero(d);
-  for (const ReadingRun& run : runs) {
-    const TableRow table(d, form, object, run.reading);
-    for (std::size_t e = run.begin; e < run.end; ++e) {
-      sum = hn::Add(sum, table.at(d, log_odds_at(e)));
-    }
-  }
-  hn::StoreU(sum, d, log_likelihood);
-}
-
-/// The only bin of a block, by a table: a vector holds elements. The bits are look_up_lanes()'s.
-/// @param elements padded; x is overwritten
-template <class D>
-void look_up_elements(D d, const MapPatches& map, std::size_t object,
-                      ElementPatches<double>& elements, std::span<const ReadingRun> runs,
-                      const ReadingForm& form, double* log_likelihood) {
-  const hn::Rebind<std::int32_t, D> di;
-  const hn::Rebind<float, D> df;
-  const auto marker = hn::Set(d, static_cast<double>(map.marker()));
-  const auto prior = hn::Set(d, map.prior_log_odds());
-  double* const values = elements.x.data();
-  for (std::size_t e = 0; e < elements.x.size(); e += hn::Lanes(d)) {
-    const auto stored = hn::LoadU(di, elements.patch.data() + e);
-    const auto patch = hn::IfThenElse(hn::Lt(stored, hn::Zero(di)), hn::Not(stored), stored);
-    static_assert(MapPatches::side == 4);
-    const auto first = hn::ShiftLeft<2>(patch);
-    const auto node = [&](int index) HWY_ATTR {
-      const auto of_map = hn::PromoteTo(d, hn::GatherIndex(df, map.nodes() + index, first));
-      return hn::IfThenElse(hn::Eq(of_map, marker), prior, of_map);
-    };
-    const auto l =
-        bilinear(node(0), node(1), node(MapPatches::side), node(MapPatches::side + 1),
-                 hn::LoadU(d, elements.x.data() + e), hn::LoadU(d, elements.y.data() + e));
-    hn::StoreU(l, d, values + e);
-  }
-  double sum = 0.0;
-  for (const ReadingRun& run : runs) {
-    const TableRow table(d, form, object, run.reading);
-    std::size_t e = run.begin;
-    for (; e + hn::Lanes(d) <= run.end; e += hn::Lanes(d)) {
-      hn::StoreU(table.at(d, hn::LoadU(d, values + e)), d, values + e);
-    }
-    if (e < run.end) {
-      HWY_ALIGN double rest[most_lanes] = {};
-      std::copy(values + e, values + run.end, rest);
-      hn::Store(table.at(d, hn::Load(d, rest)), d, rest);
-      std::copy(rest, rest + (run.end - e), values + e);
-    }
-    sum = std::accumulate(values + run.begin, values + run.end, sum);
-  }
-  *log_likelihood = sum;
-}
 
 }  // namespace HWY_NAMESPACE
 }  // namespace palpate

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <limits>
 
 #include "estimation/bounded/search/leaves.hpp"
 #include "estimation/bounded/search/mass_account.hpp"
@@ -41,16 +42,13 @@ class SearchRun {
     const std::vector<Tile> best = division_.best_of_largest();
     if (!best.empty()) {
       raise(best, 0);
-      const double largest = std::ranges::min_element(best, larger_first)->bound;
-      UnsettledMass unsettled(space_.bounds.size(), largest, account_.slot_nats(largest));
-      division_.count_largest(unsettled);
+      std::vector<Tile> tiles = division_.largest_above(negligible());
+      drop_negligible();
       const double share = goal_.tolerance * search_share;
       // One part for every level that drops tiles, and one for the bins.
-      const double part = share / static_cast<double>(std::max<std::size_t>(finest_, 1) + 1);
-      std::vector<Tile> kept =
-          division_.take_largest(account_.droppable_from(unsettled, part), unsettled);
-      account_.drop(unsettled);
-      divide(std::move(kept), 0, share - used_of(part, 0.0));
+      const double used =
+          drop(tiles, 0, share / static_cast<double>(std::max<std::size_t>(finest_, 1) + 1));
+      divide(std::move(tiles), 0, share - used);
     }
     const bool contradicts = goal_.mode && contradicted(best);
     leaves_.flush();
@@ -64,7 +62,9 @@ class SearchRun {
  private:
   /// Settles the bins of all largest tiles in which every element sees the prior.
   void settle_unseen() {
-    division_.for_unseen([&](const BinBox& box) { settle_unseen(box); });
+    for (const BinBox& box : division_.unseen()) {
+      settle_unseen(box);
+    }
     account_.raise_totals(std::vector<LogSum>(space_.bounds.size()));
   }
 
@@ -77,7 +77,7 @@ class SearchRun {
     const auto object = static_cast<std::size_t>(box.object);
     const double value = division_.prior_log_likelihood(box.object);
     account_.settle(box.object, 1, value + std::log(static_cast<double>(bins)), value,
-                    task_.likelihood.float64_error(object, task_.elements));
+                    task_.likelihood.error(object, task_.elements, Arithmetic::float64));
     account_.note_best(box, 0, value);
     task_.visit(box, std::span(&value, 1));
   }
@@ -101,9 +101,7 @@ class SearchRun {
         std::ranges::copy_if(best, std::back_inserter(own), [&](const Tile& tile) {
           return tile.object == static_cast<std::int32_t>(i);
         });
-        for (const Tile& tile : division_.best_smallest(std::move(own), 0)) {
-          leaves_.look(tile);
-        }
+        leaves_.look(division_.best_smallest(std::move(own), 0));
       }
       if (explains(i)) {
         return false;
@@ -181,7 +179,7 @@ class SearchRun {
     }
     std::ranges::sort(tiles, stands_before);
     std::vector<Tile> unseen;
-    set_negligible();
+    division_.set_negligible(negligible());
     std::vector<Tile> parts = division_.parts_of(tiles, level, &unseen);
     for (const Tile& tile : unseen) {
       settle_unseen(space_.bounds[tile.object].levels()[level + 1].box_of(tile));
@@ -196,15 +194,27 @@ class SearchRun {
     return used_of(tolerance, dropped);
   }
 
-  /// Lets the division stop at bounds of which those of all bins together are nothing beside the
+  /// A bound, in nats: all bins together, if none exceeded it, would hold nothing beside the
   /// tolerance.
-  void set_negligible() {
+  double negligible() const {
     constexpr double part = 1e-3;
     const double bins = static_cast<double>(task_.options.lattice.bins()) *
                         static_cast<double>(space_.bounds.size());
-    if (!goal_.evidence_nats) {
-      division_.set_negligible(std::min(
-          account_.log_total() + std::log(part * goal_.tolerance / bins), account_.best()));
+    // Where every label's own total is wanted, none is negligible beside all.
+    return goal_.evidence_nats
+               ? -std::numeric_limits<double>::infinity()
+               : std::min(account_.log_total() + std::log(part * goal_.tolerance / bins),
+                          account_.best());
+  }
+
+  /// Drops the largest tiles of negligible bounds, as if all bins were there.
+  void drop_negligible() {
+    if (const double bound = negligible(); std::isfinite(bound)) {
+      UnsettledMass mass(space_.bounds.size(), bound);
+      for (std::size_t i = 0; i < space_.bounds.size(); ++i) {
+        mass.add(i, bound, task_.options.lattice.bins());
+      }
+      account_.drop(mass);
     }
   }
 
@@ -217,7 +227,7 @@ class SearchRun {
       const auto lot =
           std::span(tiles).subspan(begin, std::min(most_together_, tiles.size() - begin));
       task_.deadline.cancel_point();
-      set_negligible();
+      division_.set_negligible(negligible());
       std::vector<Tile> parts = division_.parts_of(lot, level);
       std::size_t next = 0;
       for (Tile& tile : lot) {
@@ -278,7 +288,7 @@ SearchResult BoundSearch::run(const KnownElements& elements, const SearchGoal& g
   // Evaluating all in float64 would leave so much rounding; the rest may be used up.
   double least_error = 0.0;
   for (std::size_t i = 0; i < space_.bounds.size(); ++i) {
-    least_error = std::max(least_error, likelihood_.float64_error(i, elements));
+    least_error = std::max(least_error, likelihood_.error(i, elements, Arithmetic::float64));
   }
   SearchGoal reachable = goal;
   reachable.tolerance = std::max(goal.tolerance - 1.1 * least_error, goal.tolerance / 4.0);

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "estimation/bounded/leaves/bin_likelihood.hpp"
 #include "estimation/bounded/search/mass_account.hpp"
 #include "estimation/bounded/search/search_space.hpp"
 
@@ -24,11 +25,11 @@ class Leaves {
   /// Evaluates the bins of a few tiles ahead of the others, to learn how much mass there is at
   /// least.
   void probe(std::vector<Tile> tiles);
+  /// Evaluates the bins of a few tiles only to learn how likely the best one is.
+  void look(std::span<const Tile> tiles);
   /// Evaluates the bins of tiles of the finest level, until those left hold at most this part of
   /// the total; drops these.
   void evaluate(std::span<const Tile> tiles, double tolerance);
-  /// Evaluates the bins of a tile only to learn how likely its best one is.
-  void look(const Tile& tile);
   /// Settles all bins that were evaluated.
   void flush() { settle(1.0); }
   /// Number of bins that were evaluated.
@@ -45,7 +46,8 @@ class Leaves {
   struct Family {
     std::size_t first = 0;
     std::size_t end = 0;
-    double bound = 0.0;  ///< the largest
+    std::size_t slot = 0;  ///< of the largest bound
+    bool probed = false;   ///< one of them was evaluated
   };
   struct Leaf {
     BinBox box;
@@ -59,20 +61,22 @@ class Leaves {
   BinBox box_of(const Tile& tile) const {
     return task_.space.bounds[tile.object].levels().back().box_of(tile);
   }
-  std::size_t row_of(const Tile& tile) const {
-    return static_cast<std::size_t>(tile.object) * task_.space.turns.size() + tile.theta;
-  }
+  std::vector<BinBox> boxes_of(std::span<const Tile> tiles) const;
   bool probed(const Tile& tile) const;
-  void remove(const Tile& tile, UnsettledMass& left) const;
-  std::vector<Family> families_of(std::span<const Tile> tiles) const;
+  void remove(const Tile& tile, UnsettledMass& left) const {
+    left.remove(static_cast<std::size_t>(tile.object), tile.bound, box_of(tile).bins());
+  }
+  /// Removes those that were probed from what is left.
+  std::vector<Family> families_of(std::span<const Tile> tiles, UnsettledMass& left) const;
   /// Takes a family's tiles before the slots `from` out of what is left, as boxes.
-  void take_family(std::span<const Tile> family, const std::vector<std::size_t>& from,
-                   UnsettledMass& left, std::vector<BinBox>& boxes) const;
+  void take(const Family& family, std::span<const Tile> tiles, const std::vector<std::size_t>& from,
+            UnsettledMass& left, std::vector<BinBox>& boxes) const;
+  /// Evaluates the bins of boxes, appends their values, and sums those of the bins that count.
+  std::vector<Leaf> evaluated(std::vector<BinBox> boxes, Arithmetic arithmetic,
+                              std::vector<double>& values) const;
+  void add_up(Leaf& leaf, std::span<const double> values, std::span<const double> errors) const;
   /// Evaluates the bins of boxes. They are settled later.
   void add(std::vector<BinBox> boxes);
-  /// Evaluates leaves whose values stand one after another, and sums those of the bins that count.
-  template <typename Value>
-  void evaluate(std::span<Leaf> leaves, std::span<Value> values) const;
   /// Indices of the pending leaves that must be evaluated in float64: the heaviest.
   std::vector<std::size_t> to_be_refined(double share) const;
   /// @param share of the rounding that is left to be used up
@@ -83,13 +87,12 @@ class Leaves {
   MassAccount& account_;
   bool displaced_;                     ///< touches are uncertain
   std::vector<Tile> probed_;           ///< sorted by place
-  std::vector<bool> probed_in_row_;    ///< [object, theta]
   std::vector<double> float32_error_;  ///< [hypothesis]
   std::vector<double> float64_error_;
   double poor_below_;         ///< see BoundedOptions::poor_bins
   double least_error_ = 0.0;  ///< that evaluating all in float64 would leave
   std::vector<Leaf> pending_;
-  std::vector<float> values_;         ///< of the pending leaves
+  std::vector<double> values_;        ///< of the pending leaves
   std::vector<LogSum> pending_mass_;  ///< [hypothesis] lower bounds, with the prior weight
   std::int64_t bins_ = 0;
 };

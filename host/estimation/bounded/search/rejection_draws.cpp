@@ -27,7 +27,9 @@ class RejectionDraws {
  public:
   RejectionDraws(const SearchTask& task, const LargestTiles& largest)
       : task_(task), division_(task, largest), tiles_(task.space.finest_level() + 1) {
-    division_.for_unseen([&](const BinBox& box) { add_unseen(box); });
+    for (const BinBox& box : division_.unseen()) {
+      add_unseen(box);
+    }
     const std::size_t unseen = added_.size();
     add_bins_of(division_.best_smallest(division_.best_of_largest(), 0));
     LogSum known;
@@ -108,8 +110,8 @@ class RejectionDraws {
       boxes.push_back(box_of(tile, task_.space.finest_level()));
       count += static_cast<std::size_t>(boxes.back().bins());
     }
-    std::vector<float> values(count);
-    task_.likelihood.evaluate_on_threads(boxes, task_.elements, std::span(values));
+    std::vector<double> values(count);
+    task_.likelihood.evaluate(boxes, task_.elements, Arithmetic::float32, values);
     std::vector<Parts> parts;
     auto value = values.begin();
     for (const BinBox& box : boxes) {
@@ -117,7 +119,7 @@ class RejectionDraws {
       for (int y = 0; y < box.y_count; ++y) {
         for (int x = 0; x < box.x_count; ++x) {
           added_.push_back({{box.object, box.theta, box.y_first + y, 1, box.x_first + x, 1},
-                            task_.space.log_weight[box.object] + static_cast<double>(*value++)});
+                            task_.space.log_weight[box.object] + *value++});
         }
       }
       parts.push_back({.first_bins = first, .end_bins = bins_.size() + added_.size()});

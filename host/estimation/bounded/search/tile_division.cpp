@@ -1,6 +1,7 @@
 #include "estimation/bounded/search/tile_division.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -16,8 +17,6 @@ namespace {
 
 /// Tiles of one theta that a task divides.
 constexpr std::size_t tiles_per_task = 64;
-/// More than any sum of a largest tile.
-constexpr std::int64_t every_sum = std::int64_t{std::numeric_limits<std::int32_t>::max()} + 1;
 
 std::vector<Tile> joined(const std::vector<std::vector<Tile>>& lists) {
   std::vector<Tile> all;
@@ -100,12 +99,11 @@ void TileDivision::for_largest(std::size_t row, const std::int64_t& end_sum,
     }
     const int y_end = std::min(seen.y_end, (y / batch_side + 1) * batch_side);
     for (; least < end_sum && y < y_end; ++y) {
-      const std::int64_t rows = level.y.bins(y);
-      for (int x = seen.x_first; x < seen.x_end; ++x) {
+      for (int x = seen.x_first; x < seen.x_end && level.y.bins(y) > 0; ++x) {
         const std::int32_t sum = sums[batch_side * x + y % batch_side];
-        const std::int64_t bins = rows * level.x.bins(x);
-        if (sum < end_sum && bins > 0 && may_count(level, {0.0, object, theta, x, y})) {
-          visit(sum, x, y, bins);
+        const Tile tile{.object = object, .theta = theta, .x = x, .y = y};
+        if (sum < end_sum && level.x.bins(x) > 0 && may_count(level, tile)) {
+          visit(sum, tile);
         }
       }
     }
@@ -121,20 +119,35 @@ double TileDivision::bound_of_largest(std::size_t object, std::int32_t sum) cons
   return bound_of(object, 0, largest_.unseen(object) + sum);
 }
 
+std::vector<BinBox> TileDivision::unseen() const {
+  std::vector<BinBox> boxes;
+  for (std::size_t row = 0; row < seen_.size(); ++row) {
+    const auto object = static_cast<std::int32_t>(row / thetas_);
+    const auto theta = static_cast<std::int32_t>(row % thetas_);
+    const TileLevel& level = space_.bounds[object].levels().front();
+    const TileRange& seen = seen_[row];
+    const int nx = level.x.tiles();
+    for (const TileRange& tiles :
+         {TileRange{0, nx, 0, seen.y_first}, TileRange{0, seen.x_first, seen.y_first, seen.y_end},
+          TileRange{seen.x_end, nx, seen.y_first, seen.y_end},
+          TileRange{0, nx, seen.y_end, level.y.tiles()}}) {
+      boxes.push_back(level.box_of(object, theta, tiles));
+    }
+  }
+  std::erase_if(boxes, [](const BinBox& box) { return box.bins() == 0; });
+  return boxes;
+}
+
 std::vector<Tile> TileDivision::best_of_largest() {
-  constexpr double nothing = -std::numeric_limits<double>::infinity();
-  std::vector<Tile> best(seen_.size(), {.bound = nothing});
+  constexpr std::int64_t every_sum = std::numeric_limits<std::int64_t>::max();
+  std::vector<Tile> best(seen_.size(), {.bound = -std::numeric_limits<double>::infinity()});
   std::vector<std::int64_t> counts(seen_.size());
   parallel_for(best.size(), [&](std::size_t row) {
     std::int64_t least = every_sum;
-    Tile at{.object = static_cast<std::int32_t>(row / thetas_),
-            .theta = static_cast<std::int32_t>(row % thetas_)};
-    for_largest(row, least, [&](std::int32_t sum, int x, int y, std::int64_t /*bins*/) {
+    for_largest(row, least, [&](std::int32_t sum, const Tile& tile) {
       least = sum;
-      at.x = x;
-      at.y = y;
-      at.bound = bound_of_largest(row / thetas_, sum);
-      best[row] = at;
+      best[row] = tile;
+      best[row].bound = bound_of_largest(row / thetas_, sum);
     });
     const TileLevel& level = space_.bounds[row / thetas_].levels().front();
     const TileRange& seen = seen_[row];
@@ -142,52 +155,8 @@ std::vector<Tile> TileDivision::best_of_largest() {
                   level.y.tiles_with_bins(seen.y_first, seen.y_end);
   });
   bounded_ += std::accumulate(counts.begin(), counts.end(), std::int64_t{0});
-  std::erase_if(best, [](const Tile& tile) { return tile.bound == nothing; });
+  std::erase_if(best, [](const Tile& tile) { return std::isinf(tile.bound); });
   return best;
-}
-
-void TileDivision::count_largest(UnsettledMass& unsettled) const {
-  parallel_for(space_.bounds.size(), [&](std::size_t object) {
-    for (std::size_t theta = 0; theta < thetas_; ++theta) {
-      for_largest(object * thetas_ + theta, every_sum,
-                  [&](std::int32_t sum, int /*x*/, int /*y*/, std::int64_t bins) {
-                    unsettled.add(object, bound_of_largest(object, sum), bins);
-                  });
-    }
-  });
-}
-
-std::int64_t TileDivision::least_sum(const UnsettledMass& unsettled, std::size_t object,
-                                     std::size_t slot) const {
-  std::int64_t low = std::numeric_limits<std::int32_t>::min();
-  std::int64_t high = std::int64_t{std::numeric_limits<std::int32_t>::max()} + 1;
-  while (low < high) {
-    const std::int64_t middle = low + (high - low) / 2;
-    if (unsettled.slot(bound_of_largest(object, static_cast<std::int32_t>(middle))) < slot) {
-      low = middle + 1;
-    } else {
-      high = middle;
-    }
-  }
-  return low;
-}
-
-std::vector<Tile> TileDivision::take_largest(std::span<const std::size_t> end,
-                                             UnsettledMass& unsettled) const {
-  std::vector<std::vector<Tile>> taken(space_.bounds.size());
-  parallel_for(taken.size(), [&](std::size_t object) {
-    const std::int64_t end_sum = least_sum(unsettled, object, end[object]);
-    for (std::size_t theta = 0; theta < thetas_; ++theta) {
-      for_largest(object * thetas_ + theta, end_sum,
-                  [&](std::int32_t sum, int x, int y, std::int64_t bins) {
-                    const double bound = bound_of_largest(object, sum);
-                    unsettled.remove(object, bound, bins);
-                    taken[object].push_back({bound, static_cast<std::int32_t>(object),
-                                             static_cast<std::int32_t>(theta), x, y});
-                  });
-    }
-  });
-  return joined(taken);
 }
 
 std::vector<Tile> TileDivision::largest_above(double bound) const {
@@ -196,11 +165,11 @@ std::vector<Tile> TileDivision::largest_above(double bound) const {
     const std::size_t object = row / thetas_;
     const double end = (unpenalised_[object][0] - bound) * penalties_per_nat -
                        static_cast<double>(largest_.unseen(object));
-    const auto end_sum = static_cast<std::int64_t>(
-        std::clamp<double>(end, std::numeric_limits<std::int32_t>::min(), every_sum));
-    for_largest(row, end_sum, [&](std::int32_t sum, int x, int y, std::int64_t /*bins*/) {
-      above[row].push_back({bound_of_largest(object, sum), static_cast<std::int32_t>(object),
-                            static_cast<std::int32_t>(row % thetas_), x, y});
+    constexpr double most_sum = std::numeric_limits<std::int32_t>::max();
+    const auto end_sum = static_cast<std::int64_t>(std::clamp(end, -most_sum, most_sum)) + 1;
+    for_largest(row, end_sum, [&](std::int32_t sum, Tile tile) {
+      tile.bound = bound_of_largest(object, sum);
+      above[row].push_back(tile);
     });
   });
   return joined(above);
@@ -244,15 +213,17 @@ std::vector<Tile> TileDivision::parts_of(std::span<const Tile> tiles, std::size_
     }
     parts[task].reserve((end - begins[task]) * batch_tiles);
     for (std::size_t i = begins[task]; i < end; ++i) {
-      std::uint32_t sums[batch_tiles] = {};
-      const int x = tiles[i].x * batch_side;
-      const int y = tiles[i].y * batch_side;
+      std::array<std::int64_t, batch_tiles> sums{};
       if (displaced.empty()) {
-        bounds.add(level + 1, task_.elements, placed, x, y, sums);
-        append_batch(first, level + 1, x, y, sums, parts[task]);
+        std::uint32_t penalties[batch_tiles] = {};
+        bounds.add(level + 1, task_.elements, placed, tiles[i].x * batch_side,
+                   tiles[i].y * batch_side, penalties);
+        std::ranges::copy(penalties, sums.begin());
       } else {
-        append_batch(first, level + 1, x, y, displaced.data() + i * batch_tiles, parts[task]);
+        std::copy_n(displaced.begin() + static_cast<std::ptrdiff_t>(i * batch_tiles), batch_tiles,
+                    sums.begin());
       }
+      append_parts(tiles[i], level + 1, sums, parts[task]);
     }
     const auto begin_unseen = std::stable_partition(
         parts[task].begin(), parts[task].end(), [&](const Tile& tile) { return seen.holds(tile); });
@@ -324,19 +295,19 @@ void TileDivision::add_displaced(std::span<const Tile> tiles, std::size_t level,
   }
 }
 
-template <typename Sum>
-void TileDivision::append_batch(const Tile& of, std::size_t level, int first_x, int first_y,
-                                const Sum* sums, std::vector<Tile>& tiles) const {
+void TileDivision::append_parts(const Tile& of, std::size_t level,
+                                std::span<const std::int64_t> sums,
+                                std::vector<Tile>& parts) const {
   const TileLevel& tiling = space_.bounds[of.object].levels()[level];
+  const double unpenalised = unpenalised_[of.object][level];
   for (int j = 0; j < batch_side; ++j) {
-    if (tiling.y.bins(first_y + j) == 0) {
-      continue;
-    }
-    for (int i = 0; i < batch_side; ++i) {
-      const Tile tile{bound_of(of.object, level, sums[batch_side * i + j]), of.object, of.theta,
-                      first_x + i, first_y + j};
-      if (tiling.x.bins(tile.x) > 0 && may_count(tiling, tile)) {
-        tiles.push_back(tile);
+    const int y = batch_side * of.y + j;
+    for (int i = 0; i < batch_side && tiling.y.bins(y) > 0; ++i) {
+      const auto penalties = static_cast<double>(sums[batch_side * i + j]);
+      const Tile part{unpenalised - penalties / penalties_per_nat, of.object, of.theta,
+                      batch_side * of.x + i, y};
+      if (tiling.x.bins(part.x) > 0 && may_count(tiling, part)) {
+        parts.push_back(part);
       }
     }
   }

@@ -32,26 +32,18 @@ class TileDivision {
   /// @param largest holds the sums of the task's elements
   TileDivision(const SearchTask& task, const LargestTiles& largest);
 
-  /// The largest tiles in which an element may see something else than the prior. In all others
-  /// every bin has the same likelihood.
-  const TileRange& seen(std::size_t object, std::size_t theta) const {
-    return seen_[object * thetas_ + theta];
-  }
-  /// Calls visit(box) for the bins of all largest tiles in which every element sees the prior.
-  template <typename Visit>
-  void for_unseen(const Visit& visit) const;
+  /// The bins of all largest tiles in which every element sees the prior: all have the same
+  /// likelihood. The others are seen.
+  std::vector<BinBox> unseen() const;
   /// Log-likelihood of the elements where all of them see the prior, in nats.
   double prior_log_likelihood(std::int32_t object) const {
     return prior_log_likelihoods_[static_cast<std::size_t>(object)];
   }
-  /// The seen tile of the largest bound of every object and theta.
+
+  /// The seen largest tile of the largest bound of every object and theta.
   std::vector<Tile> best_of_largest();
-  /// The seen largest tiles of a larger bound than this.
+  /// The seen largest tiles of at least this bound, sorted by place.
   std::vector<Tile> largest_above(double bound) const;
-  /// Counts the bins of the largest tiles.
-  void count_largest(UnsettledMass& unsettled) const;
-  /// Takes those that lie before the slots `end`, [object], out of the unsettled ones.
-  std::vector<Tile> take_largest(std::span<const std::size_t> end, UnsettledMass& unsettled) const;
 
   /// The parts, one level down, of tiles that are sorted by place. Leaves out those in which every
   /// element sees the prior.
@@ -72,17 +64,14 @@ class TileDivision {
   std::int64_t bounded() const { return bounded_; }
 
  private:
-  /// Calls visit(sum, x, y, bins) for the largest tiles of an object and theta that hold bins, see
-  /// the map and have a smaller sum than `end_sum`, which visits may lower.
+  /// Calls visit(sum, tile) for the largest tiles of an object and theta that hold bins, see the
+  /// map and have a smaller sum than `end_sum`, which visits may lower.
   template <typename Visit>
   void for_largest(std::size_t row, const std::int64_t& end_sum, const Visit& visit) const;
   /// The bound of a tile, from the sum of its elements' penalties.
   double bound_of(std::size_t object, std::size_t level, std::int64_t penalties) const;
   /// The bound of a largest tile, from the sum that LargestTiles keeps.
   double bound_of_largest(std::size_t object, std::int32_t sum) const;
-  /// The least sum of a largest tile whose slot is not before this one: slots ascend with sums.
-  std::int64_t least_sum(const UnsettledMass& unsettled, std::size_t object,
-                         std::size_t slot) const;
   /// Whether any bin of a tile may count.
   bool may_count(const TileLevel& level, const Tile& tile) const {
     const TouchOverlap* counted = task_.goal.counted;
@@ -94,10 +83,10 @@ class TileDivision {
   /// Those of one object's tiles.
   void add_displaced(std::span<const Tile> tiles, std::size_t level,
                      std::span<std::int64_t> sums) const;
-  /// Appends the tiles of a batch, at the object and theta of `of`, that hold bins.
-  template <typename Sum>
-  void append_batch(const Tile& of, std::size_t level, int first_x, int first_y, const Sum* sums,
-                    std::vector<Tile>& tiles) const;
+  /// Appends those parts of a tile, which are tiles of this level, that hold bins.
+  /// @param sums of their penalties, [x, y]
+  void append_parts(const Tile& of, std::size_t level, std::span<const std::int64_t> sums,
+                    std::vector<Tile>& parts) const;
 
   const SearchTask& task_;
   const SearchSpace& space_;
@@ -110,25 +99,5 @@ class TileDivision {
   double negligible_ = -std::numeric_limits<double>::infinity();
   std::int64_t bounded_ = 0;
 };
-
-template <typename Visit>
-void TileDivision::for_unseen(const Visit& visit) const {
-  for (std::size_t row = 0; row < seen_.size(); ++row) {
-    const std::size_t object = row / thetas_;
-    const TileLevel& level = space_.bounds[object].levels().front();
-    const TileRange& seen = seen_[row];
-    const int nx = level.x.tiles();
-    for (const TileRange& unseen :
-         {TileRange{0, nx, 0, seen.y_first}, TileRange{0, seen.x_first, seen.y_first, seen.y_end},
-          TileRange{seen.x_end, nx, seen.y_first, seen.y_end},
-          TileRange{0, nx, seen.y_end, level.y.tiles()}}) {
-      const BinBox box = level.box_of(static_cast<std::int32_t>(object),
-                                      static_cast<std::int32_t>(row % thetas_), unseen);
-      if (box.bins() > 0) {
-        visit(box);
-      }
-    }
-  }
-}
 
 }  // namespace palpate
