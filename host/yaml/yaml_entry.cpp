@@ -1,6 +1,7 @@
 #include "yaml/yaml_entry.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <optional>
 #include <set>
 #include <sstream>
@@ -41,14 +42,16 @@ struct DocumentStart : YAML::EventHandler {
 
 void read_document(std::istream&& yaml, const std::filesystem::path& file, const std::string& key,
                    const std::function<void(const YamlEntry&)>& read) {
-  std::stringstream text;
-  text << yaml.rdbuf();
+  const std::string text(std::istreambuf_iterator<char>(yaml), {});
   try {
-    const YAML::Node document = YAML::Load(text.str());
+    const YAML::Node document = YAML::Load(text);
     // YAML::LoadAll() finds documents without end in some text that is no YAML.
     DocumentStart second;
-    YAML::Parser parser(text);
-    if (parser.HandleNextDocument(second) && parser.HandleNextDocument(second)) {
+    std::istringstream again(text);
+    YAML::Parser parser(again);
+    const bool may_have_two =
+        text.find("---") != std::string::npos || text.find("...") != std::string::npos;
+    if (may_have_two && parser.HandleNextDocument(second) && parser.HandleNextDocument(second)) {
       throw Error(Fault::input,
                   fmt::format("{}: line {}: a second document, of which nothing would "
                               "be read; leave one, without --- after it",

@@ -71,21 +71,13 @@ double largest_in(const OccupancyGrid& grid, const InterpolatedMap& map,
   return largest;
 }
 
-/// How a map is divided: a cell into parts, or, with no parts, the map into squares of any size.
-struct Division {
-  int parts = 0;
-  glm::dvec2 cells{0.0};
-};
-
+/// @param cells of a square along each axis
 void expect_floors(const OccupancyGrid& grid, const ContactModel& contact, Reading reading,
-                   std::size_t object, const Division& division) {
+                   std::size_t object, const glm::dvec2& cells) {
   const InterpolatedMap map(grid, *contact.prior);
   const double prior_log_odds = log_odds_from_probability(*contact.prior);
-  const glm::dvec2 side_mm = division.parts > 0 ? glm::dvec2(grid.cell_mm / division.parts)
-                                                : grid.cell_mm * division.cells;
-  const MapSquares squares = division.parts > 0
-                                 ? squares_of_cells(grid, prior_log_odds, division.parts)
-                                 : squares_of_size(grid, prior_log_odds, side_mm);
+  const glm::dvec2 side_mm = grid.cell_mm * cells;
+  const MapSquares squares = map_squares(grid, prior_log_odds, side_mm);
   const SquarePenalties penalties = square_penalties(squares, contact, reading, object);
   // No square lies beyond the map, and no part of the map beyond the squares.
   const glm::dvec2 map_mm = grid.cell_mm * glm::dvec2(grid.nx + 1, grid.ny + 1);
@@ -124,7 +116,7 @@ void expect_floors(const OccupancyGrid& grid, const ContactModel& contact, Readi
   EXPECT_NEAR(penalties.best, best, 1e-9 * (1.0 + std::abs(best))) << "rounding of places";
 }
 
-class PartsOfCells : public testing::TestWithParam<Division> {};
+class PartsOfCells : public testing::TestWithParam<glm::dvec2> {};
 
 TEST_P(PartsOfCells, HaveTheirLeastPenaltyByEquationSeven) {
   for (const double gamma : {0.1, 0.0}) {
@@ -173,10 +165,9 @@ TEST_P(PartsOfCells, OfMapsOfAnyShapeAndCellHaveTheirLeastPenalty) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Parts, PartsOfCells,
-                         testing::Values(Division{1}, Division{2}, Division{4},
-                                         Division{.cells = {0.83, 0.86}},
-                                         Division{.cells = {1.0, 2.5}},
-                                         Division{.cells = {0.31, 40.0}}));
+                         testing::Values(glm::dvec2(1.0), glm::dvec2(0.5), glm::dvec2(0.25),
+                                         glm::dvec2(8.0), glm::dvec2(0.83, 0.86),
+                                         glm::dvec2(1.0, 2.5), glm::dvec2(0.31, 40.0)));
 
 TEST(ReadingPenalties, StopAtTheLargestPenalty) {
   ContactModel contact;
@@ -185,8 +176,9 @@ TEST(ReadingPenalties, StopAtTheLargestPenalty) {
   OccupancyGrid map = random_map(6, 6, 0.5, 1.0, 204);
   std::fill(map.log_odds.begin(), map.log_odds.begin() + 18, 40.0F);
   std::fill(map.log_odds.begin() + 18, map.log_odds.end(), -1000.0F);
-  const SquarePenalties penalties = square_penalties(
-      squares_of_cells(map, log_odds_from_probability(0.2), 1), contact, Reading::in_contact, 0);
+  const SquarePenalties penalties =
+      square_penalties(map_squares(map, log_odds_from_probability(0.2), glm::dvec2(0.5)), contact,
+                       Reading::in_contact, 0);
   // The rows between the last two nodes cost some 1000 nats, the first ones nothing.
   EXPECT_EQ(penalties.least[5 * penalties.nx + 3], largest_penalty);
   EXPECT_EQ(penalties.least[2 * penalties.nx + 3], 0);
@@ -198,8 +190,9 @@ TEST(ReadingPenalties, OfAMapOfThePriorAreNone) {
   OccupancyGrid map = random_map(6, 6, 0.5, 1.0, 205);
   std::fill(map.log_odds.begin(), map.log_odds.end(),
             static_cast<float>(log_odds_from_probability(0.2)));
-  const SquarePenalties penalties = square_penalties(
-      squares_of_cells(map, log_odds_from_probability(0.2), 2), contact, Reading::no_contact, 0);
+  const SquarePenalties penalties =
+      square_penalties(map_squares(map, log_odds_from_probability(0.2), glm::dvec2(0.25)), contact,
+                       Reading::no_contact, 0);
   EXPECT_EQ(penalties.beyond, 0);
   EXPECT_EQ(std::count(penalties.least.begin(), penalties.least.end(), 0), 14 * 14);
 }

@@ -76,9 +76,10 @@ void check_case(const BinCase& of, std::size_t object, const std::vector<TileSiz
     BinBox box = whole_plane(of.lattice, theta);
     box.object = static_cast<std::int32_t>(object);
     std::vector<double> plane(static_cast<std::size_t>(box.bins()));
-    likelihood.evaluate(std::span(&box, 1), of.elements, std::span(plane));
+    likelihood.evaluate(std::span(&box, 1), of.elements, Arithmetic::float64, plane);
     // Where no element has a penalty, bound and likelihood are the same sum in two orders.
-    const double rounding = std::min(1e-9, likelihood.float64_error(object, of.elements));
+    const double rounding =
+        std::min(1e-9, likelihood.error(object, of.elements, Arithmetic::float64));
     check_tiles(of, bounds, theta, plane, rounding, checked);
   }
 }
@@ -94,7 +95,7 @@ void expect_bounds(std::int64_t tiles, std::uint64_t seed) {
     std::vector<TileSize> sizes = tile_sizes(of.lattice, of.map.cell_mm, 1);
     if (random(0.0, 8.0) < 1.0) {
       // As in very large regions.
-      sizes = {{.side = 32}, {.side = 8}, {.side = 2}, {.parts = 2, .side = 1}};
+      sizes = {{.side = 32}, {.side = 8}, {.side = 2}, {.square_cells = 0.5, .side = 1}};
     } else if (std::min(of.lattice.x_mm.step(), of.lattice.y_mm.step()) > 0.5 * of.map.cell_mm) {
       // Also where other tiles are better, and with squares of several cells.
       sizes = {{.side = random(0.0, 2.0) < 1.0 ? 1 : 4, .bins = 1}};

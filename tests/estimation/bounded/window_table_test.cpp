@@ -45,35 +45,6 @@ TEST(WindowTable, HoldsTheLeastPenaltyOfEveryWindow) {
   }
 }
 
-TEST(ChangeTable, HoldsTheDifferenceOfPenalties) {
-  const WindowTable from = window_table(random_penalties(13, 11, 8192, 93), 4, 1);
-  const WindowTable other = window_table(random_penalties(13, 11, 900, 94), 4, 1);
-  for (const WindowTable* to : {&other, static_cast<const WindowTable*>(nullptr)}) {
-    const ChangeTable change = change_table(to, from);
-    ASSERT_EQ(change.table.entries.size(), from.entries.size());
-    ASSERT_EQ(change.table.columns, from.columns);
-    for (std::size_t i = 0; i < from.entries.size(); ++i) {
-      const int difference = (to == nullptr ? 0 : to->entries[i]) - from.entries[i];
-      ASSERT_EQ(change.table.entries[i], difference + change.offset) << "entry " << i;
-      ASSERT_LE(change.table.entries[i], change.table.largest) << "entry " << i;
-    }
-  }
-}
-
-TEST(ChangeTable, HoldsTheLargestDifferences) {
-  SquarePenalties all = random_penalties(5, 5, largest_penalty, 95);
-  SquarePenalties none = all;
-  for (int i = 0; i < 25; ++i) {
-    all.least[i] = i % 2 == 0 ? largest_penalty : 0;
-    none.least[i] = i % 2 == 0 ? 0 : largest_penalty;
-  }
-  const WindowTable from = window_table(all, 1, 1);
-  const WindowTable to = window_table(none, 1, 1);
-  const ChangeTable change = change_table(&to, from);
-  EXPECT_EQ(change.offset, largest_penalty);
-  EXPECT_EQ(change.table.largest, 2 * largest_penalty);
-}
-
 TEST(WindowTable, EndsInBatchesThatSeeOnlyThePrior) {
   // Farther batches take the entries of these.
   for (const int side : {1, 2, 8}) {

@@ -143,7 +143,7 @@ std::vector<TileSize> tile_sizes(const PoseLattice& lattice, double least_cell_m
     return count(lattice.x_mm) * count(lattice.y_mm) * lattice.theta_rad.count *
            static_cast<double>(maps);
   };
-  std::vector<TileSize> sizes{{.side = 8}, {.side = 2}, {.parts = 2, .side = 1}};
+  std::vector<TileSize> sizes{{.side = 8}, {.side = 2}, {.square_cells = 0.5, .side = 1}};
   const auto bins = [&](const TileSize& size) {
     const auto along = [&](const Axis& axis) {
       return std::clamp(size.cells() * least_cell_mm / axis.step(), 1.0,
@@ -156,14 +156,14 @@ std::vector<TileSize> tile_sizes(const PoseLattice& lattice, double least_cell_m
   }
   while (tiles(sizes.front()) > most_largest_tiles && sizes.front().cells() < largest_cells) {
     // As many squares, each of more cells: tables shrink, and windows widen by little.
-    sizes.insert(sizes.begin(), {.merged = 4 * sizes.front().merged, .side = 8});
+    sizes.insert(sizes.begin(), {.square_cells = 4.0 * sizes.front().square_cells, .side = 8});
   }
   return sizes;
 }
 
 glm::dvec2 square_mm(const TileSize& size, const PoseLattice& lattice, double cell_mm) {
   if (size.bins == 0) {
-    return glm::dvec2(size.square_cells() * cell_mm);
+    return glm::dvec2(size.square_cells * cell_mm);
   }
   const auto along = [&](const Axis& axis) {
     // The only bin of an axis stays at its place.
@@ -196,16 +196,15 @@ TileBounds::TileBounds(const OccupancyGrid& map, const ContactModel& contact, st
       corner_mm_(glm::dvec2(lattice.x_mm.centre(0), lattice.y_mm.centre(0)) - map.origin_mm +
                  map.cell_mm) {
   const double prior_log_odds = log_odds_from_probability(*contact.prior);
-  std::vector<MapSquares> squares;
-  std::vector<std::size_t> squares_of;  // [level]
+  // Levels may divide the map alike.
+  const auto as_before = [&](std::size_t level) {
+    return level > 0 && levels_[level].square_mm == levels_[level - 1].square_mm;
+  };
+  std::vector<MapSquares> squares;  // [level]
   for (std::size_t level = 0; level < levels_.size(); ++level) {
-    const TileSize& size = levels_[level].size;
-    if (size.bins > 0) {
-      squares.push_back(squares_of_size(map, prior_log_odds, levels_[level].square_mm));
-    } else if (level == 0 || size.parts != levels_[level - 1].size.parts) {
-      squares.push_back(squares_of_cells(map, prior_log_odds, size.parts));
-    }
-    squares_of.push_back(squares.size() - 1);
+    squares.push_back(as_before(level)
+                          ? MapSquares()
+                          : map_squares(map, prior_log_odds, levels_[level].square_mm));
   }
   const std::size_t readings = contact.table ? contact.table->levels() : 2;
   tables_.assign(levels_.size(), std::vector<WindowTable>(readings));
@@ -213,13 +212,11 @@ TileBounds::TileBounds(const OccupancyGrid& map, const ContactModel& contact, st
     SquarePenalties penalties;
     for (std::size_t level = 0; level < levels_.size(); ++level) {
       const TileSize& size = levels_[level].size;
-      if (level == 0 || squares_of[level] != squares_of[level - 1]) {
-        penalties = square_penalties(squares[squares_of[level]], contact,
-                                     static_cast<Reading>(reading), object);
+      if (!as_before(level)) {
+        penalties =
+            square_penalties(squares[level], contact, static_cast<Reading>(reading), object);
       }
-      tables_[level][reading] =
-          size.merged == 1 ? window_table(penalties, size.side, size.window())
-                           : window_table(merged(penalties, size.merged), size.side, size.window());
+      tables_[level][reading] = window_table(penalties, size.side, size.window());
     }
   });
 }
@@ -239,28 +236,6 @@ void TileBounds::add(std::size_t level, const KnownElements& elements, const Win
     runs.at(count++) = {&table(level, run.reading), run.begin, run.end};
   }
   add_penalties(placed, std::span(runs).first(count), first_x, first_y, batches, sums);
-}
-
-void TileBounds::make_change_tables() {
-  const std::vector<WindowTable>& tables = tables_.front();
-  for (std::size_t reading = changes_.size(); reading < tables.size(); ++reading) {
-    changes_.push_back(change_table(reading == 0 ? nullptr : &tables[reading], tables.front()));
-  }
-}
-
-void TileBounds::add_changes(const KnownElements& changed, const WindowPlaces& placed, int first_x,
-                             int first_y, std::uint32_t* sums, int batches) const {
-  std::uint32_t added[most_strip * batch_tiles] = {};
-  std::uint32_t offsets = 0;
-  for (const ReadingRun& run : changed.runs) {
-    const ChangeTable& to = change(run.reading);
-    const TableRun of_table{&to.table, run.begin, run.end};
-    add_penalties(placed, std::span(&of_table, 1), first_x, first_y, batches, added);
-    offsets += static_cast<std::uint32_t>(run.end - run.begin) * to.offset;
-  }
-  for (int i = 0; i < batches * batch_tiles; ++i) {
-    sums[i] += added[i] - offsets;  // modulo 2^32, which the result is within
-  }
 }
 
 std::uint32_t TileBounds::penalty_beyond(std::size_t level, const KnownElements& elements) const {
@@ -285,9 +260,6 @@ std::size_t TileBounds::bytes() const {
     for (const WindowTable& table : level) {
       bytes += table.bytes();
     }
-  }
-  for (const ChangeTable& change : changes_) {
-    bytes += change.table.bytes();
   }
   return bytes;
 }

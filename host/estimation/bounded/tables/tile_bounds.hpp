@@ -38,20 +38,18 @@ struct TileRange {
   }
 };
 
-/// The size of a level's tiles: `side` squares. A map's cell has `parts` squares along each axis,
-/// or a square holds `merged` cells. Or a tile has as many `bins` along each axis: squares then
-/// divide the lattice's steps, however large the map's cells are.
+/// The size of a level's tiles: `side` squares, each of so many cells of the map along an axis. Or
+/// a tile has as many `bins` along each axis: squares then divide the lattice's steps, however
+/// large the map's cells are.
 struct TileSize {
-  int parts = 1;
-  int merged = 1;
+  double square_cells = 1.0;
   int side = 1;
   int bins = 0;  ///< 0: as the map's cells have it
 
   /// Squares along an axis that an element can see while the pose is in one tile, or at one of its
   /// bins' centres.
   int window() const { return bins == 0 ? side + 1 : ((bins - 1) * side + bins - 1) / bins + 1; }
-  double square_cells() const { return static_cast<double>(merged) / parts; }
-  double cells() const { return side * square_cells(); }
+  double cells() const { return side * square_cells; }
 };
 
 /// Tiles along one axis of the lattice. They begin at the first bin's centre; a tile holds the bins
@@ -133,13 +131,6 @@ class TileBounds {
   /// of its neighbours along x; see add_penalties().
   void add(std::size_t level, const KnownElements& elements, const WindowPlaces& placed,
            int first_x, int first_y, std::uint32_t* sums, int batches = 1) const;
-  /// Makes add_changes() possible.
-  void make_change_tables();
-  /// What add() adds for known_elements() of a touch, given what it adds, in `sums`, where all of
-  /// the touch's elements are in No Contact. Where the sums stay below largest_sum, bit for bit.
-  /// @param changed changed_elements() of the touch, placed for the largest tiles
-  void add_changes(const KnownElements& changed, const WindowPlaces& placed, int first_x,
-                   int first_y, std::uint32_t* sums, int batches = 1) const;
   /// The sum of the elements' penalties where all of them see the prior.
   std::uint32_t penalty_beyond(std::size_t level, const KnownElements& elements) const;
   /// Log-likelihood of the elements without any penalty, in nats.
@@ -148,19 +139,13 @@ class TileBounds {
   std::size_t bytes() const;
 
  private:
-  const ChangeTable& change(Reading reading) const {
-    return changes_[reading == Reading::unknown ? 0 : static_cast<std::size_t>(reading)];
-  }
   const WindowTable& table(std::size_t level, Reading reading) const {
     return tables_[level][static_cast<std::size_t>(reading)];
   }
 
   std::vector<TileLevel> levels_;
   std::vector<std::vector<WindowTable>> tables_;  ///< [level][reading]
-  /// How the largest tiles' bounds change from No Contact: to Unknown, which stands in the place of
-  /// No Contact, and to the other readings. Empty before make_change_tables().
-  std::vector<ChangeTable> changes_;
-  glm::dvec2 corner_mm_;  ///< of the first tile, from the map's square 0
+  glm::dvec2 corner_mm_;                          ///< of the first tile, from the map's square 0
 };
 
 }  // namespace palpate

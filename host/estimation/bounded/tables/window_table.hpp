@@ -1,7 +1,9 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include <glm/vec2.hpp>
@@ -11,25 +13,27 @@
 
 namespace palpate {
 
-/// A map with one node of the prior around it, divided into equal rectangles, its squares. Knows
-/// the log odds, bilinear between the nodes, at every place where they may be extreme in a square:
-/// at the corners of the parts that the areas between neighbouring nodes cut it into.
+/// A map with one node of the prior around it, divided into equal rectangles, its squares: the
+/// range of the log odds, bilinear between the nodes, in each.
 struct MapSquares {
-  std::vector<int> first_x;      ///< [nx + 1] column of the places on a square's lower border
-  std::vector<int> first_y;      ///< [ny + 1] row of these
-  std::vector<double> log_odds;  ///< [row, column] in nats
+  struct Range {
+    double low = std::numeric_limits<double>::infinity();  ///< nats
+    double high = -std::numeric_limits<double>::infinity();
 
-  int nx() const { return static_cast<int>(first_x.size()) - 1; }
-  int ny() const { return static_cast<int>(first_y.size()) - 1; }
-  std::size_t columns() const { return static_cast<std::size_t>(first_x.back()) + 1; }
+    void take_in(double log_odds) {
+      low = std::min(low, log_odds);
+      high = std::max(high, log_odds);
+    }
+  };
+
+  int nx = 0;
+  int ny = 0;
+  std::vector<Range> ranges;  ///< [ny, nx]
 };
 
-/// Squares of which `parts` divide the distance of two nodes.
-MapSquares squares_of_cells(const OccupancyGrid& map, double prior_log_odds, int parts);
-
 /// Squares of any size. The last of a row or column may reach beyond the map.
-MapSquares squares_of_size(const OccupancyGrid& map, double prior_log_odds,
-                           const glm::dvec2& square_mm);
+MapSquares map_squares(const OccupancyGrid& map, double prior_log_odds,
+                       const glm::dvec2& square_mm);
 
 /// Penalties are whole multiples of 1 / penalties_per_nat nats.
 inline constexpr double penalties_per_nat = 256.0;
@@ -51,9 +55,6 @@ struct SquarePenalties {
 /// @param contact resolved: with its prior
 SquarePenalties square_penalties(const MapSquares& squares, const ContactModel& contact,
                                  Reading reading, std::size_t object);
-
-/// Squares of `count` x `count` squares each; the last of a row or column reach beyond the map.
-SquarePenalties merged(const SquarePenalties& squares, int count);
 
 /// Tiles along one axis whose bounds one vector load gives.
 inline constexpr int batch_side = 4;
@@ -87,16 +88,5 @@ struct WindowTable {
 /// @param window squares along each axis that an element can see: side + 1, or 1 where the pose
 /// stays at the tile's corner
 WindowTable window_table(const SquarePenalties& penalties, int side, int window);
-
-/// What elements add to sums of penalties where they have one reading instead of another: the
-/// difference of the penalties, and the same `offset` at all entries, which makes it positive.
-struct ChangeTable {
-  WindowTable table;
-  std::uint16_t offset = 0;
-};
-
-/// @param to null for Unknown, which has no penalty
-/// @param from a table of the same shape
-ChangeTable change_table(const WindowTable* to, const WindowTable& from);
 
 }  // namespace palpate
