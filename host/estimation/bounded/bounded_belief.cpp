@@ -108,7 +108,7 @@ BoundedBelief::BoundedBelief(std::span<const Hypothesis> hypotheses, const Bound
       arena_(threads_),
       likelihood_(hypotheses_, options_.contact, options_.lattice, options_.touch_sd),
       space_(arena_.execute([&] { return SearchSpace(hypotheses_, options_); })),
-      kept_(!options_.touch_sd.none()),
+      touches_(!options_.touch_sd.none()),
       search_(space_, options_, likelihood_) {
   if (options_.none_weight) {
     none_.emplace(space_, options_, likelihood_);
@@ -118,8 +118,8 @@ BoundedBelief::BoundedBelief(std::span<const Hypothesis> hypotheses, const Bound
 
 void BoundedBelief::reset() {
   change_.forget();
-  kept_.clear();
   touches_.clear();
+  taken_in_ = 0;
   elements_ = {};
   search_.largest().reset();
   found_.reset();
@@ -130,7 +130,7 @@ void BoundedBelief::reset() {
 }
 
 void BoundedBelief::move_pivot(const glm::dvec2& pivot_mm) {
-  options_.lattice = with_pivot(options_.lattice, pivot_mm, "bounded posterior", !touches_.empty());
+  options_.lattice = with_pivot(options_.lattice, pivot_mm, "bounded posterior", taken_in_ > 0);
   likelihood_.move_pivot(pivot_mm);
   found_.reset();
   followed_.reset();
@@ -138,31 +138,32 @@ void BoundedBelief::move_pivot(const glm::dvec2& pivot_mm) {
 
 void BoundedBelief::add(std::span<const Touch> touches) {
   change_.refuse();
-  kept_.add(touches, options_.contact, options_.lattice.pivot_mm);
+  touches_.add(touches, options_.contact, options_.lattice.pivot_mm);
 }
 
 void BoundedBelief::take_in() {
   change_.refuse();
-  if (kept_.empty()) {
+  if (taken_in_ == touches_.size()) {
     return;
   }
   change_.change([&] {
     if (found_ && found_->bins.complete() &&
         found_->bins.values().size() <= FollowedBins::most_bins) {
-      followed_.emplace(found_->bins, found_->result, space_.log_weight, touches_.size());
+      followed_.emplace(found_->bins, found_->result, space_.log_weight, taken_in_);
     }
     found_.reset();
-    const std::span<const ArrayReadings> touches = kept_.all();
-    std::vector<KnownElements> all{std::move(elements_)};
-    for (const ArrayReadings& touch : touches) {
-      all.push_back(known_elements(touch));
+    const std::span<const ArrayReadings> added = touches_.all().subspan(taken_in_);
+    std::vector<KnownElements> known;
+    for (const ArrayReadings& touch : added) {
+      known.push_back(known_elements(touch));
     }
-    elements_ = merged(all);
-    touches_.insert(touches_.end(), touches.begin(), touches.end());
+    arena_.execute([&] { search_.largest().add(known); });
+    known.insert(known.begin(), std::move(elements_));
+    elements_ = merged(known);
     if (none_) {
-      none_->add(touches);
+      none_->add(added);
     }
-    kept_.clear();
+    taken_in_ = touches_.size();
   });
 }
 
@@ -179,11 +180,11 @@ std::uint64_t BoundedBelief::bytes() const {
 SearchGoal BoundedBelief::goal() const {
   SearchGoal goal{options_.tolerance, options_.evidence_nats, options_.evidence_range_nats};
   goal.poor_bins = options_.poor_bins;
-  if (touches_.size() == 1) {
+  if (taken_in_ == 1) {
     goal.evidence_range_nats = std::max(goal.evidence_range_nats, options_.single_touch_range_nats);
   }
-  if (goal.evidence_nats && touches_.size() > 1) {
-    const double grown = 1.0 + options_.evidence_growth * static_cast<double>(touches_.size() - 1);
+  if (goal.evidence_nats && taken_in_ > 1) {
+    const double grown = 1.0 + options_.evidence_growth * static_cast<double>(taken_in_ - 1);
     *goal.evidence_nats *= grown;
     goal.evidence_range_nats *= grown;
   }
@@ -253,15 +254,7 @@ BoundedBelief::Found BoundedBelief::run(const SearchGoal& goal, Deadline& deadli
 
 SearchResult BoundedBelief::run(const SearchGoal& goal, const Deadline& deadline,
                                 const BinVisitor& visitor, std::vector<PoseBlock>* refined) {
-  return arena_.execute(
-      [&] { return searched_with().run(elements_, goal, deadline, visitor, refined); });
-}
-
-const BoundSearch& BoundedBelief::searched_with() {
-  if (LargestTiles& largest = search_.largest(); largest.touches() < touches_.size()) {
-    change_.change([&] { largest.add(std::span(touches_).subspan(largest.touches())); });
-  }
-  return search_;
+  return arena_.execute([&] { return search_.run(elements_, goal, deadline, visitor, refined); });
 }
 
 void BoundedBelief::visit(const BinVisitor& visitor) {
@@ -276,13 +269,13 @@ bool BoundedBelief::follow() {
   if (!followed_) {
     return false;
   }
-  while (followed_->touches() < touches_.size()) {
-    const KnownElements touch = known_elements(touches_[followed_->touches()]);
+  while (followed_->touches() < taken_in_) {
+    const KnownElements touch = known_elements(touches_.all()[followed_->touches()]);
     std::vector<double> most;
     for (const TileBounds& bounds : space_.bounds) {
       most.push_back(bounds.best(space_.finest_level(), touch));
     }
-    followed_->add(touch, likelihood_, most);
+    arena_.execute([&] { followed_->add(touch, likelihood_, most); });
   }
   if (!(followed_->share_outside() <= soon)) {
     followed_.reset();
@@ -296,9 +289,8 @@ std::vector<DrawnBin> BoundedBelief::draw(std::size_t count, Random& random) {
     Deadline deadline = until(options_.budget_s);
     // Rejection looks at tiles here and there, which share little of what uncertain touches reach.
     const bool many_bins = bins_in_all() > most_searched_bins && options_.touch_sd.none();
-    if (touches_.size() <= wide_touches || many_bins) {
-      return arena_.execute(
-          [&] { return searched_with().draw(elements_, count, random, deadline); });
+    if (taken_in_ <= wide_touches || many_bins) {
+      return arena_.execute([&] { return search_.draw(elements_, count, random, deadline); });
     }
     found_ = run(rough_goal(), deadline);
   }
@@ -362,7 +354,7 @@ LogInterval BoundedBelief::bound_none(const Deadline& deadline) {
     const LogInterval weighted{none_log_weight_ + bounds.low, none_log_weight_ + bounds.high};
     width = std::min(width, allowed_none_width(weighted));
     if (bounds.high - bounds.low > far_apart && !goal().evidence_nats) {
-      width = std::max(width, closer * static_cast<double>(touches_.size()));
+      width = std::max(width, closer * static_cast<double>(taken_in_));
     }
     const bool narrowed = bounds.high - bounds.low < last.high - last.low;
     last = bounds;

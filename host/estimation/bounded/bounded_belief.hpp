@@ -20,9 +20,9 @@
 
 namespace palpate {
 
-/// What a BoundedPosterior believes: the touches so far, and what searches have found of them. All
-/// touches stand in one list, and each part of the belief knows how many of them it has taken in:
-/// it takes in the others once it is asked.
+/// What a BoundedPosterior believes: the touches so far, and what searches have found of them.
+/// add() only keeps touches; take_in() brings all that follows from them in step, but for what is
+/// found, which waits until it is asked for.
 class BoundedBelief {
  public:
   /// @param options checked, with a resolved contact model
@@ -93,8 +93,6 @@ class BoundedBelief {
   /// Follows the bins of an earlier search through the touches since.
   /// @returns whether they hold enough to draw from; forgets them otherwise
   bool follow();
-  /// The search, whose largest tiles have taken in all touches.
-  const BoundSearch& searched_with();
   /// Ends the deadline where there is no room for more bins.
   Found run(const SearchGoal& goal, Deadline& deadline);
   SearchResult run(const SearchGoal& goal, const Deadline& deadline, const BinVisitor& visitor,
@@ -113,11 +111,11 @@ class BoundedBelief {
   mutable tbb::task_arena arena_;
   BinLikelihood likelihood_;
   SearchSpace space_;
-  double none_log_weight_ = 0.0;          ///< log of its prior weight times the number of bins
-  KeptTouches kept_;                      ///< before take_in()
-  std::vector<ArrayReadings> touches_;    ///< that were taken in
+  double none_log_weight_ = 0.0;  ///< log of its prior weight times the number of bins
+  KeptTouches touches_;
+  std::size_t taken_in_ = 0;              ///< of the touches
   KnownElements elements_;                ///< of all these
-  BoundSearch search_;                    ///< whose largest tiles count those that they took in
+  BoundSearch search_;                    ///< through all these
   std::optional<NoneEvidence> none_;      ///< of all these, where the options ask for it
   std::optional<Found> found_;            ///< of all these; nothing before a search
   std::optional<FollowedBins> followed_;  ///< of the last search before, through some of these

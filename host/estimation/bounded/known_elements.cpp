@@ -58,18 +58,6 @@ bool touched_before(const KnownElements& a, const KnownElements& b) {
   return std::ranges::lexicographical_compare(a.from_pivot_mm, b.from_pivot_mm, {}, place, place);
 }
 
-/// The elements that have any reading but this one.
-KnownElements all_but(Reading reading, const ArrayReadings& array) {
-  std::vector<KnownElement> elements;
-  for (std::size_t i = 0; i < array.readings.size(); ++i) {
-    if (array.readings[i] != reading) {
-      elements.push_back({array.readings[i], array.from_pivot_mm[i]});
-    }
-  }
-  std::sort(elements.begin(), elements.end(), before);
-  return in_runs(elements);
-}
-
 }  // namespace
 
 std::vector<std::size_t> sorted_touches(std::span<const KnownElements> touches) {
@@ -81,17 +69,20 @@ std::vector<std::size_t> sorted_touches(std::span<const KnownElements> touches) 
 }
 
 KnownElements known_elements(const ArrayReadings& array) {
-  KnownElements known = all_but(Reading::unknown, array);
+  std::vector<KnownElement> elements;
+  for (std::size_t i = 0; i < array.readings.size(); ++i) {
+    if (array.readings[i] != Reading::unknown) {
+      elements.push_back({array.readings[i], array.from_pivot_mm[i]});
+    }
+  }
+  std::sort(elements.begin(), elements.end(), before);
+  KnownElements known = in_runs(elements);
   if (array.sensor_from_pivot_mm && !known.runs.empty()) {
     KnownElements touch = known;
     touch.sensor_from_pivot_mm = *array.sensor_from_pivot_mm;
     known.touches.push_back(std::move(touch));
   }
   return known;
-}
-
-KnownElements changed_elements(const ArrayReadings& array) {
-  return all_but(Reading::no_contact, array);
 }
 
 KnownElements merged(std::span<const KnownElements> lists) {

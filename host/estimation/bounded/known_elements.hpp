@@ -44,8 +44,6 @@ struct ArrayReadings {
 
 /// The elements that are not Unknown.
 KnownElements known_elements(const ArrayReadings& array);
-/// The elements that are not in No Contact, Unknown ones as one more reading.
-KnownElements changed_elements(const ArrayReadings& array);
 
 /// Indices of touches in an order that does not depend on when they came.
 std::vector<std::size_t> sorted_touches(std::span<const KnownElements> touches);
@@ -56,8 +54,8 @@ KnownElements merged(std::span<const KnownElements> lists);
 /// The log-likelihood of the elements where nothing was sensed, in nats.
 double prior_log_likelihood(const KnownElements& elements, const ContactModel& contact);
 
-/// Touches that wait until a filter is asked about its belief. The first one makes room for some
-/// more of its size, so that keeping these allocates no memory.
+/// Touches in the order in which they came. The first one makes room for some more of its size, so
+/// that keeping these allocates no memory.
 class KeptTouches {
  public:
   /// So many touches of the first one's size have room; fewer where they would take more than
@@ -71,10 +69,10 @@ class KeptTouches {
   /// Classifies the touches' elements (Eq. 3) and keeps them.
   /// @throws Error on a touch that is not sound, and keeps none of these
   void add(std::span<const Touch> touches, const ContactModel& model, const glm::dvec2& pivot_mm);
-  bool empty() const { return count_ == 0; }
-  /// In the order in which they came; until the next call.
+  std::size_t size() const { return count_; }
+  /// Until the next call.
   std::span<const ArrayReadings> all() const { return std::span(touches_).first(count_); }
-  /// Keeps the room.
+  /// Forgets them, and keeps the room.
   void clear() { count_ = 0; }
 
  private:

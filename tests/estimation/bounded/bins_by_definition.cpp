@@ -84,14 +84,6 @@ KnownElements random_elements(std::size_t count, double half_mm, std::size_t lev
   return elements;
 }
 
-ArrayReadings readings_of(const KnownElements& elements) {
-  ArrayReadings array{.from_pivot_mm = elements.from_pivot_mm, .readings = {}};
-  for (const ReadingRun& run : elements.runs) {
-    array.readings.insert(array.readings.end(), run.end - run.begin, run.reading);
-  }
-  return array;
-}
-
 LikelihoodTable crooked_table() {
   LikelihoodTable table{.first_log_odds = -7.0, .last_log_odds = 9.0, .nodes = 13};
   table.level_edges = {5.0, 8.0};

@@ -24,9 +24,6 @@ BinCase letter_case();
 KnownElements random_elements(std::size_t count, double half_mm, std::size_t levels,
                               std::uint64_t seed);
 
-/// The touch that has these elements and no others.
-ArrayReadings readings_of(const KnownElements& elements);
-
 /// A table of four levels that is not monotone, the last level steeper than any map.
 LikelihoodTable crooked_table();
 

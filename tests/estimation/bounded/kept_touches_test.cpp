@@ -29,14 +29,14 @@ TEST(KeptTouches, GivesThemBackInTheirOrder) {
   const Recording recording = random_recording(100, 8, 720);
   const std::vector<Touch> touches = all_touches(recording);
   KeptTouches kept;
-  EXPECT_TRUE(kept.empty());
+  EXPECT_EQ(kept.size(), 0U);
   kept.add(std::span<const Touch>(), {}, pivot_mm);
-  EXPECT_TRUE(kept.empty());
+  EXPECT_EQ(kept.size(), 0U);
   kept.add(std::span(touches).first(1), {}, pivot_mm);
   kept.add(std::span(touches).subspan(1), {}, pivot_mm);
   expect_equal(kept.all(), touches);
   kept.clear();
-  EXPECT_TRUE(kept.empty());
+  EXPECT_EQ(kept.size(), 0U);
   EXPECT_TRUE(kept.all().empty());
   kept.add(std::span(touches).last(2), {}, pivot_mm);
   expect_equal(kept.all(), {touches[98], touches[99]});

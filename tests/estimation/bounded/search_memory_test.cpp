@@ -53,27 +53,6 @@ TEST(SearchMemory, IsWhatTheSearchHolds) {
   }
 }
 
-TEST(SearchMemory, IsWhatAnArrayAtRestHolds) {
-  const std::vector<Hypothesis> maps = two_shapes();
-  const std::vector<glm::dvec2> elements = grid_array(20, 20, 1.0);
-  std::vector<double> pressure(elements.size(), 0.1);
-  pressure[37] = 9.0;
-  const Touch touch{.T_robot_sensor = {}, .elements_mm = elements, .pressure = pressure};
-  for (const PoseLattice& lattice : {square(50.0, 60, 36), square(10.0, 200, 250)}) {
-    const BoundedOptions options = options_of(lattice);
-    BoundedPosterior posterior(maps, options);
-    const auto before = static_cast<double>(posterior.host_bytes());
-    for (int i = 0; i < 2; ++i) {
-      posterior.update(touch);
-      posterior.refined_blocks();  // searches, and keeps no bins
-    }
-    const double held = static_cast<double>(posterior.host_bytes()) - before;
-    const double still = search_memory(maps, options).still;
-    EXPECT_LE(held, still);
-    EXPECT_GE(1.01 * held + 0.1 * mib, still);
-  }
-}
-
 TEST(SearchMemory, GrowsWithWhatIsAskedFor) {
   const std::vector<Hypothesis> maps = two_shapes();
   const SearchMemory few = search_memory(maps, options_of(square(10.0, 200, 100)));

@@ -199,8 +199,7 @@ std::int64_t expect_sound_search(const BinCase& of, double tolerance) {
   const BinLikelihood likelihood(hypotheses, of.contact, of.lattice);
   SearchSpace space(hypotheses, options);
   BoundSearch search(space, options, likelihood);
-  const ArrayReadings touch = readings_of(of.elements);
-  search.largest().add(std::span(&touch, 1));
+  search.largest().add(of.elements);
   Visited visited(of, 2);
   std::int64_t together = 0;
   bool once = true;
@@ -210,20 +209,21 @@ std::int64_t expect_sound_search(const BinCase& of, double tolerance) {
         once = once && visited.take(box, values);
         if (values.size() == 1 && box.bins() > 1) {
           EXPECT_NEAR(values[0], prior_log_likelihood(of, static_cast<std::size_t>(box.object)),
-                      likelihood.float64_error(static_cast<std::size_t>(box.object), of.elements));
+                      likelihood.error(static_cast<std::size_t>(box.object), of.elements,
+                                       Arithmetic::float64));
           together += box.bins();
         }
       });
   EXPECT_TRUE(once) << "a bin was visited twice, or is none";
   for (std::size_t object = 0; object < 2; ++object) {
-    const double rounding = likelihood.float32_error(object, of.elements) +
-                            likelihood.float64_error(object, of.elements);
+    const double rounding = likelihood.error(object, of.elements, Arithmetic::float32) +
+                            likelihood.error(object, of.elements, Arithmetic::float64);
     LogSum dropped;
     for (int theta = 0; theta < of.lattice.theta_rad.count; ++theta) {
       BinBox plane = whole_plane(of.lattice, theta);
       plane.object = static_cast<std::int32_t>(object);
       std::vector<double> exact(static_cast<std::size_t>(plane.bins()));
-      likelihood.evaluate(std::span(&plane, 1), of.elements, std::span(exact));
+      likelihood.evaluate(std::span(&plane, 1), of.elements, Arithmetic::float64, exact);
       for (std::size_t i = 0; i < exact.size(); ++i) {
         const double value = visited.at(object, static_cast<std::size_t>(theta) * exact.size() + i);
         if (value == Visited::not_visited) {

@@ -20,7 +20,8 @@ class BoundSearch {
  public:
   /// @param options checked, with a resolved contact model
   /// @param likelihood evaluates bins; all of these outlive the search
-  BoundSearch(SearchSpace& space, const BoundedOptions& options, const BinLikelihood& likelihood)
+  BoundSearch(const SearchSpace& space, const BoundedOptions& options,
+              const BinLikelihood& likelihood)
       : space_(space), options_(options), likelihood_(likelihood), largest_(space) {}
 
   /// The largest tiles, which take in the touches.
@@ -37,7 +38,7 @@ class BoundSearch {
                              const Deadline& deadline) const;
 
  private:
-  SearchSpace& space_;
+  const SearchSpace& space_;
   const BoundedOptions& options_;
   const BinLikelihood& likelihood_;
   LargestTiles largest_;

@@ -76,24 +76,20 @@ SearchMemory search_memory(std::span<const Hypothesis> hypotheses, const Bounded
   for (const Hypothesis& hypothesis : hypotheses) {
     const OccupancyGrid& map = hypothesis.compared();
     memory.tables += node_bytes(map);
-    const auto tables_of = [&](const TileSize& size) {
-      return static_cast<double>(readings) *
-             table_bytes(map, size, square_mm(size, lattice, map.cell_mm));
-    };
     const auto along = [&](const TileSize& size) {
       const double side_mm = size.cells() * map.cell_mm;
       return glm::dvec2(tiles_along(lattice.x_mm, size, side_mm),
                         tiles_along(lattice.y_mm, size, side_mm));
     };
     for (const TileSize& size : sizes) {
-      memory.tables += tables_of(size);
+      memory.tables += static_cast<double>(readings) *
+                       table_bytes(map, size, square_mm(size, lattice, map.cell_mm));
       memory.tiles += sizeof(int) * (along(size).x + along(size).y);
     }
     const double largest_tiles = thetas * along(sizes.front()).x * along(sizes.front()).y;
     // "None of these" searches on sums of its own.
     const double sums = options.none_weight ? 2.0 : 1.0;
     memory.tiles += (sums * sizeof(std::int32_t) + sizeof(Tile)) * largest_tiles;
-    memory.still += tables_of(sizes.front()) + sizeof(std::uint32_t) * largest_tiles;
     const TileSize& smallest = sizes.back();
     const double family_mm = batch_side * smallest.cells() * map.cell_mm;
     const auto in_family = [&](const Axis& axis) {
@@ -147,7 +143,7 @@ std::string why_no_room(std::span<const Hypothesis> hypotheses, const BoundedOpt
   };
   const std::array<Part, 5> parts{
       {{memory.tables, "use fewer maps, maps of fewer cells, or a narrower region"},
-       {memory.tiles + memory.still, "use fewer thetas or maps, or narrow the region"},
+       {memory.tiles, "use fewer thetas or maps, or narrow the region"},
        {memory.thetas, "use fewer thetas or maps"},
        {memory.leaves, "use fewer bins along x and y"},
        {memory.means, "use fewer bins"}}};

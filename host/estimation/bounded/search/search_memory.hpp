@@ -13,13 +13,12 @@ namespace palpate {
 struct SearchMemory {
   double tables = 0.0;  ///< of the maps: penalties of windows, nodes
   double tiles = 0.0;   ///< the largest tiles: their sums, and their places in a search
-  double still = 0.0;   ///< of a still array: its sums, and how readings change them
   double thetas = 0.0;  ///< what every theta of the lattice has
   double leaves = 0.0;  ///< bins that are evaluated together
   double means = 0.0;   ///< uncertain touches: all bins of one object within reach of some bins
 
   double largest_family = 0.0;  ///< bins that the smallest tiles of one larger tile hold
-  double total() const { return tables + tiles + still + thetas + leaves + means; }
+  double total() const { return tables + tiles + thetas + leaves + means; }
 };
 
 /// Allocates nothing. What the search takes while it divides tiles is not foreseen.
