@@ -38,25 +38,19 @@ class BeliefDraws {
 
   /// See BinVisitor.
   void add(const BinBox& box, std::span<const double> log_likelihood) {
-    const double weight = log_weight_[box.object] - log_total_;
-    const std::int64_t bins = box.bins();
-    if (log_likelihood.size() == 1) {
-      const double p = std::exp(weight + log_likelihood[0]);
+    const bool alike = log_likelihood.size() == 1;
+    for (std::size_t i = 0; i < log_likelihood.size(); ++i) {
+      const std::int64_t bins = alike ? box.bins() : 1;
+      const double p = std::exp(log_weight_[box.object] - log_total_ + log_likelihood[i]);
       const double after = reached_ + p * static_cast<double>(bins);
-      while (is_due(after)) {
-        const auto i = static_cast<std::int64_t>((targets_[draws_.size()] - reached_) / p);
-        draws_.push_back({box.object, box.bin(std::min(i, bins - 1), lattice_)});
+      last_ = {box.object, box.bin(static_cast<std::int64_t>(i) + bins - 1, lattice_)};
+      for (; draws_.size() < targets_.size() && targets_[draws_.size()] < after;) {
+        const auto within = static_cast<std::int64_t>((targets_[draws_.size()] - reached_) / p);
+        const std::int64_t bin = static_cast<std::int64_t>(i) + std::min(within, bins - 1);
+        draws_.push_back({box.object, box.bin(bin, lattice_)});
       }
       reached_ = after;
-    } else {
-      for (std::int64_t i = 0; i < bins; ++i) {
-        reached_ += std::exp(weight + log_likelihood[static_cast<std::size_t>(i)]);
-        while (is_due(reached_)) {
-          draws_.push_back({box.object, box.bin(i, lattice_)});
-        }
-      }
     }
-    last_ = {box.object, box.bin(bins - 1, lattice_)};
   }
 
   /// The draws, in the order of objects and bins.
@@ -67,11 +61,6 @@ class BeliefDraws {
   }
 
  private:
-  /// Whether a draw is due before the belief has reached so much.
-  bool is_due(double reached) const {
-    return draws_.size() < targets_.size() && targets_[draws_.size()] < reached;
-  }
-
   const PoseLattice& lattice_;
   std::span<const double> log_weight_;
   double log_total_;

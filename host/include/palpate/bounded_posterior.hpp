@@ -79,12 +79,10 @@ struct PoseBlock {
 /// and proves how little the others can. Its bins are those of PoseHistogram. Blocks of bins are
 /// bounded from above by tables of the smallest penalty within a window of the map; blocks that
 /// cannot matter are dropped, and the bins of the others are evaluated. Memory follows the maps and
-/// the region, or, where bins lie two cells of a map or more apart, the bins. An array that stays
-/// at its place from touch to touch, also across reset(), costs less from the third touch on: only
-/// elements that are not in No Contact are looked up. The result does not depend on the order of
-/// touches (but that "none of these" counts the first one's place), on the number of threads or on
-/// the processor's vector width, unless a budget ends the search. An object that was moved from
-/// throws Error on every call.
+/// the region, or, where bins lie two cells of a map or more apart, the bins. The result does not
+/// depend on the order of touches (but that "none of these" counts the first one's place), on the
+/// number of threads or on the processor's vector width, unless a budget ends the search. An object
+/// that was moved from throws Error on every call.
 class PALPATE_API BoundedPosterior {
  public:
   /// Builds the window tables of the maps.

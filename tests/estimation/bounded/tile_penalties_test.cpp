@@ -83,7 +83,10 @@ std::vector<std::uint32_t> summed(const BatchCase& of, const WindowTable& table,
   std::vector<std::uint32_t> sums(static_cast<std::size_t>(of.batches) * batch_tiles, of.before);
   const std::array<TableRun, 2> runs{
       {{&table, 0, split}, {&table, split, of.elements.from_pivot_mm.size()}}};
-  add_penalties(placed, runs, of.first_x, of.first_y, of.batches, sums.data());
+  for (int i = 0; i < of.batches; ++i) {
+    add_penalties(placed, runs, of.first_x + batch_side * i, of.first_y,
+                  sums.data() + std::ptrdiff_t{i} * batch_tiles);
+  }
   return sums;
 }
 
@@ -119,7 +122,7 @@ TEST(TilePenalties, OfNeighbouringBatchesAreThoseOfEach) {
     const int side = 1 << static_cast<int>(random(0.0, 4.0));
     BatchCase of =
         random_batch(static_cast<std::size_t>(random(0.0, 70.0)), side, 900, 1000 + trial);
-    of.batches = static_cast<int>(random(1.0, most_strip + 1.0));
+    of.batches = static_cast<int>(random(1.0, 9.0));
     of.first_x -= static_cast<int>(random(0.0, 40.0));
     of.first_y -= static_cast<int>(random(0.0, 20.0));
     of.penalties.beyond = static_cast<std::uint16_t>(random(0.0, 901.0));

@@ -23,19 +23,15 @@ std::vector<std::int32_t> displaced_penalties(const SearchSpace& space, std::siz
     thread_local WindowPlaces placed;
     bounds.place(level, space.turns[static_cast<std::size_t>(runs.front().theta)], touch, placed);
     for (const BlockRun& run : runs) {
-      for (int done = 0; done < run.count; done += most_strip) {
-        std::uint32_t sums[most_strip * batch_tiles] = {};
-        const int batches = std::min(most_strip, run.count - done);
-        const int first_x = batch_side * (run.x + done);
-        const int first_y = batch_side * run.y;
-        bounds.add(level, touch, placed, first_x, first_y, sums, batches);
-        for (int j = 0; j < batch_side; ++j) {
-          float* const row = rows.at(first_x, first_y + j);
-          for (int i = 0; i < batch_side * batches; ++i) {
-            if (tiling.x.bins(first_x + i) > 0 && tiling.y.bins(first_y + j) > 0) {
-              row[i] = static_cast<float>(std::min(sums[batch_side * i + j], exact_penalties)) *
-                       static_cast<float>(-1.0 / penalties_per_nat);
-            }
+      const int y = batch_side * run.y;
+      for (int x = batch_side * run.x; x < batch_side * (run.x + run.count); x += batch_side) {
+        std::uint32_t sums[batch_tiles] = {};
+        bounds.add(level, touch, placed, x, y, sums);
+        for (int j = 0; j < batch_side && tiling.y.bins(y + j) > 0; ++j) {
+          float* const row = rows.at(x, y + j);
+          for (int i = 0; i < batch_side && tiling.x.bins(x + i) > 0; ++i) {
+            row[i] = static_cast<float>(std::min(sums[batch_side * i + j], exact_penalties)) *
+                     static_cast<float>(-1.0 / penalties_per_nat);
           }
         }
       }

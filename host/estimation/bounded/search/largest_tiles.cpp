@@ -95,9 +95,9 @@ void LargestTiles::with_offsets(const KnownElements& known, const Add& add) {
 template <typename Penalty>
 void LargestTiles::raise(std::int32_t* sums, std::span<const Penalty> added,
                          std::int64_t offset) const {
-  for (const Penalty penalty : added) {
-    const std::int64_t sum = std::int64_t{*sums} + penalty - offset;
-    *sums++ = static_cast<std::int32_t>(std::min<std::int64_t>(sum, largest_sum));
+  for (std::size_t i = 0; i < added.size(); ++i) {
+    const std::int64_t sum = std::int64_t{sums[i]} + added[i] - offset;
+    sums[i] = static_cast<std::int32_t>(std::min<std::int64_t>(sum, largest_sum));
   }
 }
 
@@ -113,12 +113,11 @@ void LargestTiles::add_exact(const KnownElements& known, const std::vector<std::
     const BlockRange seen = seen_batches(reaches[theta], space_.maps[object], level);
     bounds.place(0, space_.turns[theta], known, placed);
     for (int y = seen.y_first; y < seen.y_end; ++y) {
-      for (int x = seen.x_first; x < seen.x_end; x += most_strip) {
-        const int batches = std::min(most_strip, seen.x_end - x);
-        std::uint32_t added[most_strip * batch_tiles] = {};
-        bounds.add(0, known, placed, x * batch_side, y * batch_side, added, batches);
+      for (int x = seen.x_first; x < seen.x_end; ++x) {
+        std::uint32_t added[batch_tiles] = {};
+        bounds.add(0, known, placed, x * batch_side, y * batch_side, added);
         raise(sums_[object].data() + first_tile(level, theta, y, x),
-              std::span<const std::uint32_t>(added).first(batches * batch_tiles), offsets[object]);
+              std::span<const std::uint32_t>(added), offsets[object]);
       }
     }
   });

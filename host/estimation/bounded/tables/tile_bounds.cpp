@@ -229,13 +229,13 @@ void TileBounds::place(std::size_t level, const glm::dvec2& turn, const KnownEle
 }
 
 void TileBounds::add(std::size_t level, const KnownElements& elements, const WindowPlaces& placed,
-                     int first_x, int first_y, std::uint32_t* sums, int batches) const {
+                     int first_x, int first_y, std::uint32_t* sums) const {
   std::array<TableRun, most_reading_levels + 1> runs;
   std::size_t count = 0;
   for (const ReadingRun& run : elements.runs) {
     runs.at(count++) = {&table(level, run.reading), run.begin, run.end};
   }
-  add_penalties(placed, std::span(runs).first(count), first_x, first_y, batches, sums);
+  add_penalties(placed, std::span(runs).first(count), first_x, first_y, sums);
 }
 
 std::uint32_t TileBounds::penalty_beyond(std::size_t level, const KnownElements& elements) const {

@@ -127,10 +127,10 @@ class TileBounds {
   /// @param turn cosine and sine of theta
   void place(std::size_t level, const glm::dvec2& turn, const KnownElements& elements,
              WindowPlaces& placed) const;
-  /// Adds the elements' penalties to the sums of the batch of tiles whose first tile this is, and
-  /// of its neighbours along x; see add_penalties().
+  /// Adds the elements' penalties to the sums of the batch of tiles whose first tile this is; see
+  /// add_penalties().
   void add(std::size_t level, const KnownElements& elements, const WindowPlaces& placed,
-           int first_x, int first_y, std::uint32_t* sums, int batches = 1) const;
+           int first_x, int first_y, std::uint32_t* sums) const;
   /// The sum of the elements' penalties where all of them see the prior.
   std::uint32_t penalty_beyond(std::size_t level, const KnownElements& elements) const;
   /// Log-likelihood of the elements without any penalty, in nats.

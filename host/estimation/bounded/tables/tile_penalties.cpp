@@ -60,11 +60,6 @@ void PlaceElements(const glm::dvec2* from_pivot_mm, std::size_t count, const Til
 /// What 16 bits hold of a sum.
 constexpr std::size_t largest_part = 65535;
 
-/// Elements of a run whose penalties 16 bits hold for certain.
-HWY_INLINE std::size_t most_elements(const WindowTable& table, std::size_t count) {
-  return table.largest == 0 ? count : largest_part / std::size_t{table.largest};
-}
-
 /// Adds penalties of 16 bits to sums.
 HWY_INLINE void add_part(const std::uint16_t* part, std::size_t count, std::uint32_t* sums) {
   const hn::CappedTag<std::uint32_t, batch_tiles> d32;
@@ -136,68 +131,6 @@ void AddRuns(const TableRun* runs, std::size_t run_count, const std::int32_t* pl
   add_part(part, batch_tiles, sums);
 }
 
-/// Adds over several batches as above: an element's entries for neighbouring batches stand
-/// together, and batches that see only the prior have a constant.
-/// @param scratch three times as long
-void AddStrip(const WindowTable& table, const std::int32_t* plane, const std::int32_t* column,
-              const std::int32_t* row, std::size_t count, int first_x, int first_y, int batches,
-              std::int32_t* scratch, std::uint32_t* sums) {
-  const hn::ScalableTag<std::int32_t> di;
-  const std::size_t padded = count + hn::Lanes(di);
-  std::int32_t* const entry = scratch;  // of the first batch that sees the map
-  std::int32_t* const first = scratch + padded;
-  std::int32_t* const batches_seen = first + padded;
-  const auto zero = hn::Zero(di);
-  const auto one = hn::Set(di, 1);
-  const auto x = hn::Set(di, first_x);
-  const auto y = hn::Set(di, first_y);
-  const auto last_column = hn::Set(di, table.columns - batch_side);
-  const auto last_row = hn::Set(di, table.rows - batch_side);
-  const auto columns = hn::Set(di, table.columns);
-  const auto all = hn::Set(di, batches);
-  for (std::size_t i = 0; i < count; i += hn::Lanes(di)) {
-    const auto at_column = hn::Add(hn::LoadU(di, column + i), x);
-    const auto at_row = hn::Add(hn::LoadU(di, row + i), y);
-    const auto begin = hn::IfThenZeroElse(hn::Gt(at_column, zero),
-                                          hn::Add(hn::ShiftRight<2>(hn::Neg(at_column)), one));
-    const auto end = hn::Min(
-        all, hn::Add(hn::ShiftRight<2>(hn::Sub(hn::Sub(last_column, one), at_column)), one));
-    const auto on_map = hn::And(hn::Gt(at_row, zero), hn::Lt(at_row, last_row));
-    const auto of_plane =
-        hn::Add(hn::Add(hn::Mul(at_row, columns), at_column), hn::ShiftLeft<2>(begin));
-    hn::StoreU(hn::Add(hn::ShiftLeft<2>(of_plane), hn::LoadU(di, plane + i)), di, entry + i);
-    hn::StoreU(begin, di, first + i);
-    hn::StoreU(hn::IfThenElseZero(on_map, hn::Sub(end, begin)), di, batches_seen + i);
-  }
-  const hn::CappedTag<std::uint16_t, 2 * batch_tiles> d16;
-  constexpr std::size_t lanes = hn::MaxLanes(d16);
-  const auto beyond = hn::Set(d16, table.beyond);
-  const std::uint16_t* entries = table.entries.data();
-  const std::size_t tiles = static_cast<std::size_t>(batches) * batch_tiles;
-  // A vector may reach a batch further: into what is not read, or into entries of the prior.
-  HWY_ALIGN std::uint16_t part[(most_strip + 1) * batch_tiles];
-  const std::size_t most = most_elements(table, count);
-  for (std::size_t begin = 0; begin < count; begin += most) {
-    const std::size_t end = std::min(begin + most, count);
-    // Modulo 2^16, which the sums are below.
-    const auto of_prior = static_cast<std::uint16_t>((end - begin) * table.beyond);
-    std::fill(part, part + tiles, of_prior);
-    for (std::size_t i = begin; i < end; ++i) {
-      if (batches_seen[i] <= 0) {
-        continue;
-      }
-      const std::uint16_t* from = entries + entry[i];
-      std::uint16_t* to = part + first[i] * batch_tiles;
-      const std::uint16_t* const to_end = to + batches_seen[i] * batch_tiles;
-      for (; to < to_end; to += lanes, from += lanes) {
-        const auto more = hn::Sub(hn::LoadU(d16, from), beyond);
-        hn::StoreU(hn::Add(hn::LoadU(d16, to), more), d16, to);
-      }
-    }
-    add_part(part, tiles, sums);
-  }
-}
-
 }  // namespace palpate::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -206,14 +139,11 @@ namespace palpate {
 
 HWY_EXPORT(PlaceElements);
 HWY_EXPORT(AddRuns);
-HWY_EXPORT(AddStrip);
 
 namespace {
 
 /// Room for the last vector of a list.
 constexpr std::size_t slack = 64;
-/// Batches from which on sums in memory are faster than a batch's after another's in registers.
-constexpr int least_strip = 4;
 
 }  // namespace
 
@@ -229,31 +159,16 @@ void place_windows(const KnownElements& elements, const TilePlace& place, const 
 }
 
 void add_penalties(const WindowPlaces& placed, std::span<const TableRun> runs, int first_x,
-                   int first_y, int batches, std::uint32_t* sums) {
+                   int first_y, std::uint32_t* sums) {
   if (runs.empty()) {
     return;
   }
   thread_local std::vector<std::int32_t> scratch;
-  const std::size_t all = runs.back().end - runs.front().begin;
-  scratch.resize(std::max(scratch.size(), 3 * (all + slack)));
-  const auto from = [&](const std::vector<std::int32_t>& places, const TableRun& run) {
-    return places.data() + run.begin;
-  };
-  if (batches < least_strip) {
-    const TableRun& first = runs.front();
-    for (int i = 0; i < batches; ++i) {
-      HWY_DYNAMIC_DISPATCH(AddRuns)
-      (runs.data(), runs.size(), from(placed.plane, first), from(placed.column, first),
-       from(placed.row, first), first_x + i * batch_side, first_y, scratch.data(),
-       sums + std::ptrdiff_t{i} * batch_tiles);
-    }
-    return;
-  }
-  for (const TableRun& run : runs) {
-    HWY_DYNAMIC_DISPATCH(AddStrip)
-    (*run.table, from(placed.plane, run), from(placed.column, run), from(placed.row, run),
-     run.end - run.begin, first_x, first_y, batches, scratch.data(), sums);
-  }
+  const std::size_t first = runs.front().begin;
+  scratch.resize(std::max(scratch.size(), runs.back().end - first + slack));
+  HWY_DYNAMIC_DISPATCH(AddRuns)
+  (runs.data(), runs.size(), placed.plane.data() + first, placed.column.data() + first,
+   placed.row.data() + first, first_x, first_y, scratch.data(), sums);
 }
 
 }  // namespace palpate

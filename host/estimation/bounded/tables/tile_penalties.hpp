@@ -33,9 +33,6 @@ void place_windows(const KnownElements& elements, const TilePlace& place, const 
 /// Sums of penalties do not grow beyond: so large a sum says all that there is to say.
 inline constexpr std::uint32_t largest_sum = std::uint32_t{1} << 30;
 
-/// Most batches whose sums add_penalties() finds together.
-inline constexpr int most_strip = 16;
-
 /// Elements [begin, end) of a list, and the table of their reading.
 struct TableRun {
   const WindowTable* table = nullptr;
@@ -43,13 +40,11 @@ struct TableRun {
   std::size_t end = 0;
 };
 
-/// Sums the penalties of runs of elements over the 4 x 4 tiles of neighbouring batches along x, and
-/// adds them to `sums`, where the sum of tile (i, j) of a batch stands at 4 i + j.
+/// Sums the penalties of runs of elements over the 4 x 4 tiles of a batch, and adds them to `sums`,
+/// where the sum of tile (i, j) stands at 4 i + j.
 /// @param runs one after another, of tables of one shape
-/// @param first_x, first_y tile at the first batch's corner
-/// @param batches up to most_strip
-/// @param sums [batch, tile]
+/// @param first_x, first_y tile at the batch's corner
 void add_penalties(const WindowPlaces& placed, std::span<const TableRun> runs, int first_x,
-                   int first_y, int batches, std::uint32_t* sums);
+                   int first_y, std::uint32_t* sums);
 
 }  // namespace palpate
