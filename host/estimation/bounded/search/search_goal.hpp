@@ -99,17 +99,6 @@ struct SearchResult {
   std::int64_t blocks_bounded = 0;
   std::int64_t bins_evaluated = 0;
 
-  /// Bound of the mass that is not known, relative to that which is.
-  double uncertain() const {
-    LogSum evaluated;
-    LogSum unknown;
-    for (const HypothesisMass& of : mass) {
-      evaluated.add(of.evaluated);
-      unknown.add(of.rounding);
-      unknown.add(of.dropped);
-    }
-    return std::exp(unknown.log() - evaluated.log());
-  }
   /// The masses of all hypotheses together.
   HypothesisMass all() const {
     LogSum evaluated;
@@ -121,6 +110,11 @@ struct SearchResult {
       dropped.add(of.dropped);
     }
     return {evaluated.log(), rounding.log(), dropped.log()};
+  }
+  /// Bound of the mass that is not known, relative to that which is.
+  double uncertain() const {
+    const HypothesisMass of = all();
+    return std::exp(log_add(of.rounding, of.dropped) - of.evaluated);
   }
 };
 
