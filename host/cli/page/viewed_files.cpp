@@ -22,7 +22,7 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
-constexpr std::size_t rows_at_once = 500;
+constexpr std::size_t rows_at_once = 64;
 constexpr const char* kinds[] = {"recording", "map", "records"};
 
 bool is_hdf5(const fs::path& path) {

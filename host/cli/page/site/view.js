@@ -3,8 +3,8 @@
 const element = (id) => document.getElementById(id);
 const columns = ["recording", "touches", "best", "probability", "truth", "error, mm", "fit", "act"];
 const mostRows = 500; // of a table are drawn; the filter finds the others
-const rowsAtOnce = 500; // as the server sends them
-const partsKept = 20; // of a recording: 10,000 rows
+const rowsAtOnce = 64; // as the server sends them
+const partsKept = 100; // of a recording: 6,400 rows
 
 async function json(path) {
   const answer = await fetch(path);
