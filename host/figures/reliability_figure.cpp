@@ -41,7 +41,7 @@ std::string draw_reliability(const ReliabilityFigure& figure) {
                                .low = point.low,
                                .high = point.high,
                                .label = fmt::format("{}", point.records),
-                               .size = std::clamp(2.0 * std::sqrt(part), 0.3, 1.0)});
+                               .size = std::clamp(2.0 * std::sqrt(part), 0.45, 1.0)});
     }
     chart.series.push_back(std::move(series));
   }
