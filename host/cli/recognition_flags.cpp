@@ -29,9 +29,8 @@ void add_filter_flags(CLI::App& command, Request& request) {
           "histogram: evaluates every pose bin; bounded: the same bins, but evaluates only those "
           "that matter and proves how little the others can; particles: the paper's particle "
           "filter; auto: bounded for more than {} bins of all objects together, else histogram. "
-          "Bounded refuses --touch-sd-*, --slip-sd-*, --posterior, --memory-mib, --none with "
-          "--gamma "
-          "0, and plans; auto then takes the histogram [default: auto]",
+          "Bounded refuses --slip-sd-*, --posterior, --memory-mib and plans; auto then takes the "
+          "histogram [default: auto]",
           most_histogram_bins));
   command.add_option("--tolerance", request.tolerance,
                      "With --filter bounded: largest share of the belief that may be left "
@@ -79,11 +78,12 @@ void add_uncertainty_flags(CLI::App& command, Request& request) {
       command, "--none", request.none,
       "Prior weight of \"(none)\", an object that was never learned; a map has the weight 1. "
       "Without W it is a ninth of the sum of the maps' weights: a probability of one in ten before "
-      "the first touch. 0 leaves (none) out, as particles do. (none) explains each "
-      "touch by a piece of some known "
-      "object; the pieces need not belong to one pose. One touch cannot tell: after it, "
-      "the odds are about the prior's, unless a sensor model has learned what a touch of no "
-      "known object is like [default: as without W]")
+      "the first touch. (none) explains each touch by a piece of some known object; the pieces "
+      "need not belong to one pose. One touch cannot tell: after it, the odds are about the "
+      "prior's, unless a sensor model has learned what a touch of no known object is like. 0 "
+      "leaves (none) out, as particles do. By default it is also left out where the bins are too "
+      "wide to tell it, or where the learned sensor trusts no touch enough "
+      "[default: as without W]")
       ->type_name("W")
       ->expected(0, 1)
       ->default_str("auto");
@@ -103,8 +103,7 @@ void add_recognition_flags(CLI::App& command, Request& request, bool& verbose) {
       "What was learned about the sensor (YAML): the threshold, the ratio, gamma "
       "and the touches' standard deviations, which flags and scene keys override; a likelihood "
       "table in the place of gamma and prior; and how sure to be: the temperature, press features, "
-      "and whether the object was learned at all. Without an own --filter, standard deviations "
-      "above 0 take the histogram; --filter bounded and particles leave them out "
+      "and whether the object was learned at all. Particles leave the standard deviations out "
       "[default: the sensor.yaml that 'palpate map' wrote beside the maps; none: Eq. 7]");
   add_bins_flag(
       command, request,

@@ -322,6 +322,15 @@ def test_a_port_in_use_is_refused(live: Callable[..., Paged], folder: pathlib.Pa
     assert f"--page {port}: cannot be had at 127.0.0.1: another program may use it" in run.stderr
 
 
+def test_an_address_without_a_page_is_refused(folder: pathlib.Path) -> None:
+    arguments = ["live", "--sensor", STREAM, "--maps", str(folder / "maps")]
+    run = subprocess.run(
+        [os.environ["PALPATE_COMMAND"], *arguments, "--page-address", "0.0.0.0"],
+        capture_output=True, text=True, timeout=60,
+    )  # fmt: skip
+    assert run.returncode == 2 and "--page-address requires --page" in run.stderr
+
+
 def test_saved_files_are_shown(
     browser: webdriver.Chrome,
     paged: Callable[..., Paged],
@@ -358,6 +367,12 @@ def test_saved_files_are_shown(
     scrub(150)
     wait(browser, lambda: "frame 151 of" in text(browser, "scrub"))
     wait(browser, lambda: picture(browser, "array") != untouched)
+    # Whoever drags ends where the slider is, whatever the order of the answers.
+    browser.execute_script(
+        "const r = document.getElementById('row');"
+        "for (const to of [300, 0, 400, 120]) { r.value = to; r.oninput(); }"
+    )
+    wait(browser, lambda: "frame 121 of" in text(browser, "scrub"))
 
     choice.select_by_index(3)
     wait(browser, lambda: browser.title == "maps/A.map.h5")
