@@ -5,6 +5,7 @@
 #include <optional>
 #include <set>
 #include <sstream>
+#include <string_view>
 
 #include <fmt/format.h>
 #include <yaml-cpp/eventhandler.h>
@@ -45,13 +46,14 @@ void read_document(std::istream&& yaml, const std::filesystem::path& file, const
   const std::string text(std::istreambuf_iterator<char>(yaml), {});
   try {
     const YAML::Node document = YAML::Load(text);
-    // YAML::LoadAll() finds documents without end in some text that is no YAML.
+    // YAML::LoadAll() finds documents without end in some text that is no YAML. Most text has no
+    // marker between documents, which UTF-16 would hide, and is not parsed again.
+    const auto holds = [&](std::string_view part) { return text.find(part) != std::string::npos; };
     DocumentStart second;
     std::istringstream again(text);
     YAML::Parser parser(again);
-    const bool may_have_two =
-        text.find("---") != std::string::npos || text.find("...") != std::string::npos;
-    if (may_have_two && parser.HandleNextDocument(second) && parser.HandleNextDocument(second)) {
+    if ((holds("---") || holds("...") || holds({"\0", 1})) && parser.HandleNextDocument(second) &&
+        parser.HandleNextDocument(second)) {
       throw Error(Fault::input,
                   fmt::format("{}: line {}: a second document, of which nothing would "
                               "be read; leave one, without --- after it",
