@@ -44,7 +44,7 @@ class BeliefDraws {
       const double p = std::exp(log_weight_[box.object] - log_total_ + log_likelihood[i]);
       const double after = reached_ + p * static_cast<double>(bins);
       last_ = {box.object, box.bin(static_cast<std::int64_t>(i) + bins - 1, lattice_)};
-      for (; draws_.size() < targets_.size() && targets_[draws_.size()] < after;) {
+      while (draws_.size() < targets_.size() && targets_[draws_.size()] < after) {
         const auto within = static_cast<std::int64_t>((targets_[draws_.size()] - reached_) / p);
         const std::int64_t bin = static_cast<std::int64_t>(i) + std::min(within, bins - 1);
         draws_.push_back({box.object, box.bin(bin, lattice_)});

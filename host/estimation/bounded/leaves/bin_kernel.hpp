@@ -167,7 +167,7 @@ struct BinTask {
   std::size_t object = 0;
   const PlacedElements& placed;
   std::span<const ReadingRun> runs;  ///< of the placed elements
-  const ReadingForm& form;           ///< any but products only for Lane = double
+  const ReadingForm& form;           ///< kinds other than products only for Lane = double
 };
 
 /// Log-likelihood of the elements at bins, in nats, with vectors of `Lane`. Vectors are filled with

@@ -224,8 +224,7 @@ std::vector<Leaves::Leaf> Leaves::evaluated(std::vector<BinBox> boxes, Arithmeti
   return leaves;
 }
 
-void Leaves::add_up(Leaf& leaf, std::span<const double> values,
-                    std::span<const double> errors) const {
+void Leaves::add_up(Leaf& leaf, std::span<const double> values, std::span<const double> errors) {
   // An error of half a nat may be that of a likelihood of 0.
   constexpr double most_error = 0.45;
   leaf.largest = std::ranges::max(values);
@@ -295,7 +294,7 @@ std::vector<std::size_t> Leaves::to_be_refined(double share) const {
     }
   }
   // Bins that may be the mode come first: it is told in float64 whatever the budget.
-  std::ranges::stable_partition(refined, may_be_best);
+  std::stable_partition(refined.begin(), refined.end(), may_be_best);
   return refined;
 }
 

@@ -71,10 +71,12 @@ class Leaves {
   /// Takes a family's tiles before the slots `from` out of what is left, as boxes.
   void take(const Family& family, std::span<const Tile> tiles, const std::vector<std::size_t>& from,
             UnsettledMass& left, std::vector<BinBox>& boxes) const;
-  /// Evaluates the bins of boxes, appends their values, and sums those of the bins that count.
+  /// Evaluates the bins of boxes, as far as they count, and appends their values.
+  /// @returns the leaves, sorted by place, with the sums of their bins
   std::vector<Leaf> evaluated(std::vector<BinBox> boxes, Arithmetic arithmetic,
                               std::vector<double>& values) const;
-  void add_up(Leaf& leaf, std::span<const double> values, std::span<const double> errors) const;
+  /// @param errors of the values, see BinLikelihood::evaluate(); empty where touches are exact
+  static void add_up(Leaf& leaf, std::span<const double> values, std::span<const double> errors);
   /// Evaluates the bins of boxes. They are settled later.
   void add(std::vector<BinBox> boxes);
   /// Indices of the pending leaves that must be evaluated in float64: the heaviest.
