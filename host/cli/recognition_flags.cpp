@@ -29,9 +29,8 @@ void add_filter_flags(CLI::App& command, Request& request) {
           "histogram: evaluates every pose bin; bounded: the same bins, but evaluates only those "
           "that matter and proves how little the others can; particles: the paper's particle "
           "filter; auto: bounded for more than {} bins of all objects together, else histogram. "
-          "Bounded refuses --touch-sd-*, --slip-sd-*, --posterior, --memory-mib, --none with "
-          "--gamma "
-          "0, and plans; auto then takes the histogram [default: auto]",
+          "Bounded refuses --slip-sd-*, --memory-mib and --fit-touch-sd; auto then takes the "
+          "histogram [default: auto]",
           most_histogram_bins));
   command.add_option("--tolerance", request.tolerance,
                      "With --filter bounded: largest share of the belief that may be left "
@@ -103,8 +102,7 @@ void add_recognition_flags(CLI::App& command, Request& request, bool& verbose) {
       "What was learned about the sensor (YAML): the threshold, the ratio, gamma "
       "and the touches' standard deviations, which flags and scene keys override; a likelihood "
       "table in the place of gamma and prior; and how sure to be: the temperature, press features, "
-      "and whether the object was learned at all. Without an own --filter, standard deviations "
-      "above 0 take the histogram; --filter bounded and particles leave them out "
+      "and whether the object was learned at all. Particles leave the standard deviations out "
       "[default: the sensor.yaml that 'palpate map' wrote beside the maps; none: Eq. 7]");
   add_bins_flag(
       command, request,
@@ -160,9 +158,8 @@ void add_recognition_flags(CLI::App& command, Request& request, bool& verbose) {
                    "the lattice, the seconds it took");
 }
 
-void hide_other_filters(CLI::App& command) {
-  for (const char* flag : {"--filter", "--tolerance", "--budget-ms", "--evidence-nats",
-                           "--particles", "--resampling", "--augmented", "--seed"}) {
+void hide_particle_flags(CLI::App& command) {
+  for (const char* flag : {"--particles", "--resampling", "--augmented", "--seed"}) {
     command.get_option(flag)->group("");
   }
 }

@@ -251,12 +251,6 @@ TEST_F(BoundedFilter, RefusesWhatNeedsTheHistogram) {
     Arguments fit = asks;
     fit.emplace_back("--fit-touch-sd");
     refused(fit, {"--fit-touch-sd", "leave it out, or " + by});
-    Arguments plan{"plan", "u.h5", "--maps", "maps", "--candidates", "grid"};
-    plan.insert(plan.end(), asks.begin(), asks.end());
-    expect_refused(plan, {by + ": ", "a plan needs the belief of all poses", "leave it out"});
-    Arguments live{"live", "--sensor", "simulate:A", "--maps", "maps", "--plan", "both"};
-    live.insert(live.end(), asks.begin(), asks.end());
-    expect_refused(live, {"--plan: ", "a plan needs the belief of all poses", by});
   }
   refused({"--filter", "bounded", "--particles", "9"}, {"--particles", "--filter particles"});
 }

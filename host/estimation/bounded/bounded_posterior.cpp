@@ -12,6 +12,8 @@
 #include "estimation/bounded/search/search_memory.hpp"
 #include "estimation/displacement_check.hpp"
 #include "estimation/hypotheses.hpp"
+#include "estimation/lattice/expected_gain.hpp"
+#include "estimation/lattice/reading_predictor.hpp"
 #include "estimation/lattice/refinement.hpp"
 #include "model/interpolated_map.hpp"
 #include "model/own_process.hpp"
@@ -78,7 +80,8 @@ struct BoundedPosterior::Impl {
   }
 
   BoundedBelief belief;
-  std::vector<Body> bodies;  ///< [hypothesis]
+  std::optional<ReadingPredictor> predictor;  ///< once a gain is asked for
+  std::vector<Body> bodies;                   ///< [hypothesis]
   OwnProcess process;
 };
 
@@ -321,6 +324,19 @@ double BoundedPosterior::entropy() const {
 
 std::vector<PoseSample> BoundedPosterior::sample(std::size_t count, std::uint64_t seed) const {
   return whole().belief.sample(count, seed);
+}
+
+std::vector<TouchGain> BoundedPosterior::expected_gain(std::span<const Pose> T_robot_sensor,
+                                                       std::span<const glm::dvec2> elements_mm,
+                                                       const PlanOptions& plan) const {
+  Impl& posterior = whole();
+  BoundedBelief& belief = posterior.belief;
+  require_plan(T_robot_sensor, elements_mm, plan, posterior.bodies.size());
+  if (!posterior.predictor) {
+    posterior.predictor.emplace(belief.hypotheses(), belief.options().contact);
+  }
+  return palpate::expected_gain(*posterior.predictor, belief.sample(plan.samples, plan.seed),
+                                T_robot_sensor, elements_mm, belief.options().touch_sd, plan);
 }
 
 std::vector<PoseBlock> BoundedPosterior::refined_blocks() const {

@@ -15,6 +15,7 @@
 #include "palpate/displacement.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
+#include "palpate/plan.hpp"
 
 namespace palpate {
 
@@ -143,6 +144,11 @@ class PALPATE_API BoundedPosterior {
   /// Draws objects and poses; see PoseHistogram::sample(). Before the first estimate() since an
   /// update, bins that hold up to 1 % of the mass may stay out.
   std::vector<PoseSample> sample(std::size_t count, std::uint64_t seed) const;
+  /// What one more touch at each candidate pose T_robot_sensor is expected to tell; see
+  /// PoseHistogram::expected_gain().
+  std::vector<TouchGain> expected_gain(std::span<const Pose> T_robot_sensor,
+                                       std::span<const glm::dvec2> elements_mm,
+                                       const PlanOptions& plan = {}) const;
 
   /// The blocks that the search divides or evaluates, for a picture of it. Searches again.
   std::vector<PoseBlock> refined_blocks() const;
