@@ -78,6 +78,7 @@ class BoundedFilter final : public FilterInBins<BoundedPosterior> {
   Marginals marginals(int object, const PoseLattice& lattice) const override {
     return own_.marginals(object, marginal_grid(lattice));
   }
+  std::optional<EvaluatedBelief> evaluated_bins() const override { return own_.evaluated_bins(); }
   std::string path() const override { return own_.path(); }
   std::uint64_t host_bytes() const override { return own_.host_bytes(); }
 };

@@ -25,8 +25,8 @@ struct FilterTraits {
   /// Believes in bins of a lattice, and so has a refined pose, a log-likelihood of the mode, plans,
   /// and beliefs that a touch may surprise. Particles have none: motion noise comes between.
   bool bins = false;
-  /// Evaluates every bin, in the device's memory, as soon as a touch comes. Displacements that are
-  /// to be fitted need it.
+  /// Evaluates every bin, in the device's memory, as soon as a touch comes. Posteriors of every bin
+  /// and displacements that are to be fitted need it.
   bool every_bin = false;
   /// Keeps touches, searches on the host once it is asked about the belief, and proves what it left
   /// out (Certificate).
@@ -76,6 +76,8 @@ class Filter {
   virtual std::uint64_t host_bytes() const { return 0; }
   /// The belief over every bin; nullptr where FilterTraits::every_bin is false.
   virtual const PoseHistogram* histogram() const { return nullptr; }
+  /// BoundedPosterior::evaluated_bins(); nothing where FilterTraits::certificate is false.
+  virtual std::optional<EvaluatedBelief> evaluated_bins() const { return {}; }
 };
 
 /// The filter that the options name.

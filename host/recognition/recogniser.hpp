@@ -79,6 +79,8 @@ class Recogniser {
   std::uint64_t host_bytes() const { return filter_->host_bytes(); }
   /// See Filter::histogram().
   const PoseHistogram* histogram() const { return filter_->histogram(); }
+  /// See Filter::evaluated_bins().
+  std::optional<EvaluatedBelief> evaluated_bins() const { return filter_->evaluated_bins(); }
 
  private:
   /// A copy of a touch that waits for the pivot.

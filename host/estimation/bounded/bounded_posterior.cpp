@@ -269,6 +269,45 @@ std::vector<std::vector<BinShare>> BoundedPosterior::likely_bins(std::span<const
   return of_objects;
 }
 
+EvaluatedBelief BoundedPosterior::evaluated_bins() const {
+  BoundedBelief& belief = whole().belief;
+  const SearchResult& found = belief.found();
+  struct Bin {
+    std::int64_t place;
+    double log_likelihood;
+  };
+  const double list_bytes = 2.0 * sizeof(Bin) * static_cast<double>(found.bins_evaluated);
+  if (list_bytes > static_cast<double>(memory_for_search())) {
+    throw Error(
+        Fault::input,
+        fmt::format("the list of {} evaluated bins takes {:.0f} MiB, more than a quarter of "
+                    "the machine's memory: use fewer bins, more touches or a budget",
+                    found.bins_evaluated, list_bytes / (1 << 20)));
+  }
+  std::vector<Bin> bins;
+  LogSum unseen;
+  belief.visit([&](const BinBox& box, std::span<const double> log_likelihood) {
+    if (static_cast<std::int64_t>(log_likelihood.size()) != box.bins()) {
+      unseen.add(belief.log_weight()[box.object] + log_likelihood[0] +
+                 std::log(static_cast<double>(box.bins())));
+      return;
+    }
+    const std::int64_t first = box.object * lattice().bins();
+    for (std::int64_t i = 0; i < box.bins(); ++i) {
+      bins.push_back({first + box.bin(i, lattice()), log_likelihood[static_cast<std::size_t>(i)]});
+    }
+  });
+  std::ranges::sort(bins, {}, &Bin::place);
+  EvaluatedBelief evaluated;
+  for (const Bin& bin : bins) {
+    evaluated.index.push_back(bin.place);
+    evaluated.log_likelihood.push_back(bin.log_likelihood);
+  }
+  const double rest = std::exp(unseen.log() - belief.log_total()) + found.uncertain();
+  evaluated.rest_mass_bound = rest < 1.0 ? rest : 1.0;
+  return evaluated;
+}
+
 double BoundedPosterior::log_likelihood(int object, const Pose& T_object_robot) const {
   Impl& posterior = whole();
   require_object(object, posterior.bodies.size());
