@@ -319,6 +319,13 @@ void bind_particles(nb::module_& module) {
 
 using Bounded = Named<BoundedPosterior>;
 
+std::tuple<Result<std::int64_t, 1>, Result<double, 1>, double> evaluated_bins(const Bounded& self) {
+  EvaluatedBelief bins =
+      self.use([](BoundedPosterior& belief, Call&) { return belief.evaluated_bins(); });
+  return {owned(std::move(bins.index)), owned(std::move(bins.log_likelihood)),
+          bins.rest_mass_bound};
+}
+
 void bind_bounded(nb::module_& module) {
   const auto belief =
       nb::class_<Bounded>(
@@ -382,6 +389,10 @@ void bind_bounded(nb::module_& module) {
               },
               "object"_a, "T_object_robot"_a,
               "Log-likelihood of any pose [3] of an object in nats, in float64.")
+          .def("evaluated_bins", &evaluated_bins,
+               "The bins that the search evaluated: indices [n] into [object, theta, y, x], x\n"
+               "fastest, log-likelihoods [n] in nats, without prior weights, and a bound of the\n"
+               "share of the belief that all other bins hold together.")
           .def("entropy", on_device<Bounded>(&BoundedPosterior::entropy),
                "Entropy of the belief over objects and evaluated bins, in nats.")
           .def_prop_ro("host_bytes", on_device<Bounded>(&BoundedPosterior::host_bytes),

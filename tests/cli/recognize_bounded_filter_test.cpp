@@ -241,7 +241,6 @@ TEST_F(BoundedFilter, RefusesWhatNeedsTheHistogram) {
     const std::string by = asks.front() == "--filter" ? "--filter bounded" : asks.front();
     for (const auto& [flag, value, why] : {std::tuple{"--slip-sd-mm", "0.5", "at rest"},
                                            {"--slip-sd-deg", "3", "at rest"},
-                                           {"--posterior", "p.h5", "every bin"},
                                            {"--memory-mib", "100", "has no effect"}}) {
       Arguments flags = asks;
       flags.insert(flags.end(), {flag, value});
@@ -253,6 +252,29 @@ TEST_F(BoundedFilter, RefusesWhatNeedsTheHistogram) {
     refused(fit, {"--fit-touch-sd", "leave it out, or " + by});
   }
   refused({"--filter", "bounded", "--particles", "9"}, {"--particles", "--filter particles"});
+}
+
+TEST_F(BoundedFilter, WritesThePosteriorOfTheBinsThatItEvaluated) {
+  u({"--posterior", "all.h5"});
+  const Posterior all = read_posterior(folder_ / "all.h5");
+  EXPECT_FALSE(all.rest_mass_bound) << "auto writes every bin";
+  for (const Arguments& asks :
+       {Arguments{"--filter", "bounded"}, Arguments{"--tolerance", "1e-3"}}) {
+    Arguments flags = asks;
+    flags.insert(flags.end(), {"--posterior", "some.h5"});
+    const json record = u(flags);
+    const Posterior some = read_posterior(folder_ / "some.h5");
+    EXPECT_EQ(some.objects, all.objects);
+    EXPECT_EQ(some.lattice.bins(), all.lattice.bins());
+    EXPECT_EQ(some.index.size(), record["bins_evaluated"]);
+    ASSERT_TRUE(some.rest_mass_bound);
+    EXPECT_GE(*some.rest_mass_bound, record["dropped_mass"].get<double>());
+    EXPECT_LT(*some.rest_mass_bound, 1e-3);
+    for (std::size_t i = 0; i < some.index.size(); ++i) {
+      EXPECT_NEAR(some.log_likelihood[i],
+                  all.log_likelihood[static_cast<std::size_t>(some.index[i])], 1e-3);
+    }
+  }
 }
 
 TEST_F(BoundedFilter, ItsFlagsAreRefusedBesideOtherFilters) {

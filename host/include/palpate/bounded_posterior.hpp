@@ -144,8 +144,8 @@ class PALPATE_API BoundedPosterior {
   /// @throws Error if there is no such object
   std::vector<std::vector<BinShare>> likely_bins(std::span<const int> objects,
                                                  double least_share) const;
-  /// The bins that the last search evaluated one by one. Bins at which every element sees the
-  /// prior, beyond the maps, are alike and belong to the others.
+  /// The bins that the search evaluated. Blocks of bins at which every element sees the prior, beyond
+  /// the maps, are evaluated at once and belong to the others.
   /// @throws Error where the list would take more than a quarter of the machine's memory
   EvaluatedBelief evaluated_bins() const;
   /// Log-likelihood of any pose of an object in nats, in float64, without prior weights. With
