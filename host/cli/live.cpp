@@ -281,6 +281,7 @@ void add_live(CLI::App& app) {
       "Write a line of JSON for each touch as it comes, and with --plan a line with "
       "\"next\" as soon as its plan is there; - is standard output");
   add_page_flags(*command, options->page);
+  command->get_option("--page-address")->needs("--page");
   command->callback([options] { live(*options); });
 }
 

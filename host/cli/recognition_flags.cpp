@@ -30,7 +30,7 @@ void add_filter_flags(CLI::App& command, Request& request) {
           "that matter and proves how little the others can; particles: the paper's particle "
           "filter; auto: bounded for more than {} bins of all objects together, else histogram. "
           "Bounded refuses --slip-sd-*, --memory-mib and --fit-touch-sd; auto then takes the "
-          "histogram [default: auto]",
+          "histogram, as it does for --posterior [default: auto]",
           most_histogram_bins));
   command.add_option("--tolerance", request.tolerance,
                      "With --filter bounded: largest share of the belief that may be left "
@@ -78,11 +78,12 @@ void add_uncertainty_flags(CLI::App& command, Request& request) {
       command, "--none", request.none,
       "Prior weight of \"(none)\", an object that was never learned; a map has the weight 1. "
       "Without W it is a ninth of the sum of the maps' weights: a probability of one in ten before "
-      "the first touch. 0 leaves (none) out, as particles do. (none) explains each "
-      "touch by a piece of some known "
-      "object; the pieces need not belong to one pose. One touch cannot tell: after it, "
-      "the odds are about the prior's, unless a sensor model has learned what a touch of no "
-      "known object is like [default: as without W]")
+      "the first touch. (none) explains each touch by a piece of some known object; the pieces "
+      "need not belong to one pose. One touch cannot tell: after it, the odds are about the "
+      "prior's, unless a sensor model has learned what a touch of no known object is like. 0 "
+      "leaves (none) out, as particles do. By default it is also left out where the bins are too "
+      "wide to tell it, or where the learned sensor trusts no touch enough "
+      "[default: as without W]")
       ->type_name("W")
       ->expected(0, 1)
       ->default_str("auto");

@@ -302,7 +302,8 @@ bool is_clearly_less(std::span<const double> losses, std::span<const double> oth
     const double apart = others[i] - losses[i] - mean;
     variance += apart * apart / std::max(1.0, n - 1.0);
   }
-  return mean > 2.0 * std::sqrt(variance / n);
+  constexpr double rounding = 1e-9;
+  return mean > std::max(rounding, 2.0 * std::sqrt(variance / n));
 }
 
 }  // namespace palpate

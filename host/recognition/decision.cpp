@@ -40,21 +40,26 @@ BinnedObject binned(const PoseLattice& lattice, const RecognitionTask& task,
   return {lattice, displaced_body(map), object == step.mode.object ? step.symmetry : map.symmetry};
 }
 
-/// The mode's mean and covariance: those of the refined pose there where the mode is narrow, as the
-/// bins are too wide to tell them; on the task's scale.
+/// The mode's mean and covariance, on the task's scale: those of the refined pose there where the
+/// mode is narrow, as the bins are too wide to tell them.
+/// @param refined the step's, on that scale, where the mode is that of its pose
 ObjectPose between_bins(const Recogniser& recogniser, const RecognitionTask& task,
-                        const BeliefMode& mode, const BinnedObject& of) {
+                        const BeliefMode& mode, const BinnedObject& of,
+                        std::optional<RefinedPose> refined) {
   constexpr double narrow_mm = 1.0;
-  ObjectPose pose = mode.pose;
-  if (spread_mm(of.body, pose) < narrow_mm) {
-    const Mode at{.object = mode.object, .T_object_robot = mode.best};
-    if (const std::optional<RefinedPose> refined = recogniser.refine(at)) {
-      pose = inverse(least_turned(of.body, of.symmetry, *refined));
-      pose.T_robot_object.theta_rad =
-          wrap_angle(pose.T_robot_object.theta_rad, 2.0 * std::numbers::pi);
-    }
+  const bool on_scale = refined.has_value();
+  if (spread_mm(of.body, mode.pose) >= narrow_mm) {
+    return scaled(of.body, mode.pose, task.pose_scale);
   }
-  return scaled(of.body, pose, task.pose_scale);
+  if (!on_scale) {
+    refined = recogniser.refine({.object = mode.object, .T_object_robot = mode.best});
+  }
+  if (!refined) {
+    return scaled(of.body, mode.pose, task.pose_scale);
+  }
+  ObjectPose pose = inverse(least_turned(of.body, of.symmetry, *refined));
+  pose.T_robot_object.theta_rad = wrap_angle(pose.T_robot_object.theta_rad, 2.0 * std::numbers::pi);
+  return on_scale ? pose : scaled(of.body, pose, task.pose_scale);
 }
 
 std::string percent(double probability) {
@@ -122,8 +127,10 @@ BeliefPlaces places_of(const Recogniser& recogniser, const Estimate& estimate,
       places.own = i;
     }
   }
-  for (BeliefMode& mode : places.modes) {
-    mode.pose = between_bins(recogniser, task, mode, binned(lattice, task, step, mode.object));
+  for (std::size_t i = 0; i < places.modes.size(); ++i) {
+    BeliefMode& mode = places.modes[i];
+    mode.pose = between_bins(recogniser, task, mode, binned(lattice, task, step, mode.object),
+                             i == places.own ? step.refined : std::nullopt);
   }
   return places;
 }

@@ -322,6 +322,15 @@ def test_a_port_in_use_is_refused(live: Callable[..., Paged], folder: pathlib.Pa
     assert f"--page {port}: cannot be had at 127.0.0.1: another program may use it" in run.stderr
 
 
+def test_an_address_without_a_page_is_refused(folder: pathlib.Path) -> None:
+    arguments = ["live", "--sensor", STREAM, "--maps", str(folder / "maps")]
+    run = subprocess.run(
+        [os.environ["PALPATE_COMMAND"], *arguments, "--page-address", "0.0.0.0"],
+        capture_output=True, text=True, timeout=60,
+    )  # fmt: skip
+    assert run.returncode == 2 and "--page-address requires --page" in run.stderr
+
+
 def test_saved_files_are_shown(
     browser: webdriver.Chrome,
     paged: Callable[..., Paged],

@@ -67,7 +67,8 @@ function tellTouch() {
 }
 
 function tellTouches(last) {
-  element("touches").replaceChildren(...state.touches.map((touch, i) => {
+  element("touches").replaceChildren(...Array.from(state.touches, (touch, i) => {
+    if (!touch) return ""; // of so many touches the server keeps the last
     const item = document.createElement("li");
     const out = last.left_out?.includes(i) ?? false;
     item.className = out ? "out" : "";
@@ -112,11 +113,14 @@ async function ask(request) {
   }
 }
 
+function forget() {
+  Object.assign(state, { touches: [], belief: null, next: null });
+  tellTouch();
+}
+
 const on = {
-  hello() {
-    Object.assign(state, { frame: null, touches: [], belief: null, next: null });
-    tellTouch();
-  },
+  hello: forget, // a server that was started again tells all it has
+  unknown: forget,
   files(files) {
     view(files, state, () => {
       tellTouch();
@@ -132,10 +136,6 @@ const on = {
       return option;
     });
     element("object").replaceChildren(...choices);
-  },
-  unknown() {
-    Object.assign(state, { touches: [], belief: null, next: null });
-    tellTouch();
   },
   frame(frame) {
     state.frame = frame;

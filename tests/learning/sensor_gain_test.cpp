@@ -1,0 +1,61 @@
+#include "learning/sensor_gain.hpp"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+namespace palpate::sensor_gain_test {
+
+/// Presses whose label has this loss, and groups with these pose errors.
+CrossValidation validation(const std::vector<double>& losses,
+                           const std::vector<double>& errors_mm) {
+  CrossValidation made;
+  for (const double loss : losses) {
+    const double right = std::exp(-loss);
+    made.presses.push_back({.log_evidence = {-loss, std::log(1.0 - right)}});
+  }
+  for (const double error_mm : errors_mm) {
+    made.groups[0].push_back({.log_evidence = {0.0, -1.0}, .error_mm = error_mm});
+  }
+  return made;
+}
+
+/// 100 values near this one.
+std::vector<double> about(double value) {
+  std::vector<double> values;
+  for (int k = 0; k < 100; ++k) {
+    values.push_back(value * (1.0 + 0.01 * (k % 7)));
+  }
+  return values;
+}
+
+std::optional<SensorGain> gain(const CrossValidation& eq7, const CrossValidation& table) {
+  return gain_of(eq7, table, table.presses);
+}
+
+TEST(SensorGain, IsBetterWhereTouchesAreToldApartAndPlacedNearer) {
+  const auto found = gain(validation(about(0.9), about(0.3)), validation(about(0.7), about(0.2)));
+  EXPECT_TRUE(found->better);
+  EXPECT_NEAR(found->log_loss_before / found->log_loss, 9.0 / 7.0, 1e-9);
+  EXPECT_NEAR(found->error_mm_before / found->error_mm, 1.5, 1e-9);
+}
+
+TEST(SensorGain, IsNotBetterWhereNothingOrTheOneIsGainedForTheOther) {
+  const CrossValidation eq7 = validation(about(0.9), about(0.3));
+  EXPECT_FALSE(gain(eq7, eq7)->better);
+  EXPECT_FALSE(gain(eq7, validation(about(0.7), about(0.4)))->better) << "places";
+  EXPECT_FALSE(gain(eq7, validation(about(1.0), about(0.2)))->better) << "identities";
+  EXPECT_TRUE(gain(eq7, validation(about(0.91), about(0.2)))->better) << "hardly a loss";
+}
+
+TEST(SensorGain, OneGroupAtAnotherPlaceOutweighsNoTenBetterOnes) {
+  std::vector<double> errors_mm = about(0.2);
+  errors_mm[5] = 20.0;  // more than all the others gain together
+  EXPECT_TRUE(gain(validation(about(0.9), about(0.3)), validation(about(0.7), errors_mm))->better);
+}
+
+TEST(SensorGain, IsNotToldWithoutGroups) {
+  EXPECT_FALSE(gain(validation(about(0.9), {}), validation(about(0.7), {})));
+}
+
+}  // namespace palpate::sensor_gain_test
