@@ -266,7 +266,9 @@ ChosenBins chosen_bins(const Device& device, std::span<const Hypothesis> hypothe
       most = std::max(most, static_cast<std::int64_t>(hypotheses.size()));
     }
   }
-  return {balanced_lattice(lattice_of(filter.options), hypotheses, most, width), most};
+  return {balanced_lattice(lattice_of(filter.options), hypotheses, most, width,
+                           touch_sd_of(filter.options)),
+          most};
 }
 
 FilterOptions filter_for_bins(std::span<const Hypothesis> hypotheses,

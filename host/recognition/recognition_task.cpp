@@ -40,6 +40,18 @@ FilterOptions with_lattice(FilterOptions filter, const PoseLattice& lattice) {
   return filter;
 }
 
+DisplacementSd touch_sd_of(const FilterOptions& filter) {
+  return std::visit(
+      [](const auto& one) {
+        if constexpr (requires { one.touch_sd; }) {
+          return one.touch_sd;
+        } else {
+          return DisplacementSd{};
+        }
+      },
+      filter);
+}
+
 RecognitionTask::RecognitionTask(std::vector<Hypothesis> objects, const FilterOptions& options)
     : hypotheses(std::move(objects)), filter(options) {
   for (const Hypothesis& hypothesis : hypotheses) {
@@ -67,18 +79,6 @@ RecognitionTask::RecognitionTask(std::vector<Hypothesis> objects, const FilterOp
 
 const ContactModel& RecognitionTask::contact() const {
   return std::visit([](const auto& one) -> const ContactModel& { return one.contact; }, filter);
-}
-
-DisplacementSd RecognitionTask::touch_sd() const {
-  return std::visit(
-      [](const auto& one) {
-        if constexpr (requires { one.touch_sd; }) {
-          return one.touch_sd;
-        } else {
-          return DisplacementSd{};
-        }
-      },
-      filter);
 }
 
 DisplacementSd RecognitionTask::slip_sd() const {
