@@ -8,17 +8,9 @@ import sys
 import foxglove
 from foxglove.channels import SceneUpdateChannel
 from foxglove.messages import (
-    ArrowPrimitive,
-    Color,
-    CylinderPrimitive,
-    Duration,
-    Pose,
-    Quaternion,
-    SceneEntity,
-    SceneUpdate,
-    Timestamp,
-    Vector3,
-)
+    ArrowPrimitive, Color, CylinderPrimitive, Duration, Pose, Quaternion, SceneEntity, SceneUpdate,
+    Timestamp, Vector3,
+)  # fmt: skip
 
 parser = argparse.ArgumentParser(description=__doc__)
 parser.add_argument("--save", metavar="FILE.mcap", help="write a file instead of serving")

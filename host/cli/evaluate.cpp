@@ -24,7 +24,7 @@ namespace palpate::cli {
 namespace {
 
 constexpr const char* confusion_name = "confusion.png";
-constexpr const char* reliability_name = "reliability.png";
+constexpr const char* picture_name = "reliability.png";
 
 struct EvaluateArguments {
   std::vector<std::string> results;
@@ -46,7 +46,7 @@ void check_outputs(const EvaluateArguments& options,
   }
   files.writes("--json", options.json, CommandFiles::Dash::stream);
   files.writes_in("--png", options.png, confusion_name);
-  files.writes_in("--png", options.png, reliability_name);
+  files.writes_in("--png", options.png, picture_name);
   files.prepare();
 }
 
@@ -85,7 +85,7 @@ void evaluate_results(const EvaluateArguments& options) {
     const std::filesystem::path folder = options.png;
     make_folder(folder);
     write_file(folder / confusion_name, draw_confusion(confusion_of(evaluation)));
-    write_file(folder / reliability_name, draw_reliability(reliability_of(evaluation)));
+    write_file(folder / picture_name, draw_reliability(reliability_of(evaluation)));
   }
   give_result(options.json, json,
               evaluation_text(evaluation, results.without_truth, terminal_columns(STDOUT_FILENO)));

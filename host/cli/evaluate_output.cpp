@@ -217,7 +217,11 @@ ConfusionFigure confusion_of(const Evaluation& evaluation) {
   figure.columns = evaluation.answers;
   for (const ClassScores& scores : evaluation.classes) {
     const std::string right = scores.known ? scores.label : std::string(none_label);
-    figure.rows.push_back({class_name(scores), right, scores.taken});
+    ConfusionFigure::Row row{class_name(scores), right, scores.taken, {}};
+    for (const std::size_t taken : scores.taken) {
+      row.proven.push_back(wilson_interval(static_cast<double>(taken), scores.records).low);
+    }
+    figure.rows.push_back(std::move(row));
   }
   return figure;
 }

@@ -31,17 +31,23 @@ const std::vector<Group>& groups() {
        {"--touch-sd-mm", "--touch-sd-deg", "--slip-sd-mm", "--slip-sd-deg", "--fit-touch-sd"}},
       {"Filter",
        {"--filter", "--tolerance", "--budget-ms", "--evidence-nats", "--particles", "--resampling",
-        "--augmented", "--seed", "--memory-mib", "--device"}},
+        "--augmented", "--seed", "--memory-mib", "--device", "--verbose"}},
       {"Touches in a stream",
        {"--onset", "--release", "--steady", "--min-steady-s", "--smooth-s", "--drift-s", "--tare",
         "--reset-after"}},
+      {"Columns and times of tables",
+       {"--rows", "--pose-unit", "--time-unit", "--time-column", "--pressure-columns",
+        "--pose-columns", "--plane", "--largest-gap-s", "--pose-delay", "--rate"}},
+      {"Of --sensor -", {}},  // as the command groups them
+      {"Work", {"--chunk", "--threads"}},
+      {"Samples of the belief", {"--samples", "--plan-seed"}},
   };
   return all;
 }
 
 /// An explanation's beginning up to one of these ends.
 std::string beginning(const std::string& words, std::initializer_list<const char*> ends) {
-  constexpr std::size_t least = 20;  // an abbreviation or a list's head is no sentence
+  constexpr std::size_t least = 17;  // an abbreviation or a list's head is no sentence
   std::size_t end = words.size();
   for (const char* each : ends) {
     end = std::min(end, words.find(each, least));
@@ -137,8 +143,10 @@ class Help : public CLI::Formatter {
     constexpr std::size_t column = 26;
     text += "\n" + title + ":\n";
     for (const CLI::Option* option : options) {
-      const std::string name =
-          "  " + make_option_name(option, positional) + make_option_opts(option);
+      const std::string opts = make_option_opts(option);
+      const std::size_t kept =
+          full ? opts.npos : std::min(opts.find(" Excludes:"), opts.find(" Needs:"));
+      const std::string name = "  " + make_option_name(option, positional) + opts.substr(0, kept);
       const std::string words = make_option_desc(option);
       const std::string explained = full ? words : first_sentence(words);
       if (name.size() < column) {

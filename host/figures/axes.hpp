@@ -9,6 +9,7 @@
 #include <glm/vec2.hpp>
 
 #include "figures/canvas.hpp"
+#include "figures/ticks.hpp"
 
 namespace palpate {
 
@@ -26,22 +27,9 @@ struct View {
   bool contains(glm::dvec2 data) const;
 };
 
-/// A labelled value on an axis.
-struct Tick {
-  double value = 0.0;
-  std::string label;
-};
-
 inline constexpr Font body{20.0};
 inline constexpr Font small{18.0};
 inline constexpr Font heading{24.0, true};
-
-/// Returns the number in its shortest form, to six digits, with a true minus sign.
-std::string number(double value);
-
-/// Returns at most `count` + 1 ticks within [lower, upper]. Their step is 1, 2 or 5 times a power
-/// of ten and at least `smallest_step`.
-std::vector<Tick> even_ticks(double lower, double upper, int count, double smallest_step = 0.0);
 
 /// Draws a frame around the view, with ticks and axis labels on its left and below it. They take 60
 /// pixels below, and on the left 84 or as many as the widest tick label needs.

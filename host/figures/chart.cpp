@@ -177,11 +177,7 @@ class Plot {
 
 std::vector<Tick> ticks_of(const ChartAxis& axis) {
   constexpr int most_ticks = 7;
-  std::vector<Tick> ticks = even_ticks(axis.lower, axis.upper, most_ticks);
-  for (Tick& tick : ticks) {
-    tick.label = axis.text ? axis.text(tick.value) : tick.label;
-  }
-  return ticks;
+  return axis.ticks.empty() ? even_ticks(axis.lower, axis.upper, most_ticks) : axis.ticks;
 }
 
 }  // namespace
@@ -226,7 +222,16 @@ std::string draw_chart(const Chart& chart) {
       plot.line(series);
     }
   }
-  draw_axes(canvas, view, x_ticks, y_ticks, chart.x.label, chart.y.label);
+  const bool two_parts = chart.rule && !chart.left_of_rule.empty();
+  draw_axes(canvas, view, x_ticks, y_ticks, two_parts ? "" : chart.x.label, chart.y.label);
+  if (two_parts) {
+    const auto name = [&](const std::string& part, double lower, double upper) {
+      canvas.text(part, {view.pixel({0.5 * (lower + upper), 0.0}).x, view.box.bottom() + 54.0},
+                  body, Align::centre);
+    };
+    name(chart.left_of_rule, chart.x.lower, *chart.rule);
+    name(chart.x.label, *chart.rule, chart.x.upper);
+  }
   for (const ChartSeries& series : chart.series) {
     plot.marks(series);
   }

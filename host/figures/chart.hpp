@@ -1,6 +1,5 @@
 #pragma once
 
-#include <functional>
 #include <limits>
 #include <optional>
 #include <string>
@@ -9,6 +8,7 @@
 #include <glm/vec2.hpp>
 
 #include "figures/palette.hpp"
+#include "figures/ticks.hpp"
 
 namespace palpate {
 
@@ -16,8 +16,7 @@ struct ChartAxis {
   std::string label;
   double lower = 0.0;
   double upper = 1.0;
-  /// Writes the label of a tick; empty: the number in its shortest form.
-  std::function<std::string(double)> text = {};
+  std::vector<Tick> ticks = {};  ///< empty: round numbers
 };
 
 enum class Mark { none, circle, square };
@@ -51,6 +50,7 @@ struct Chart {
   ChartAxis y;
   std::vector<ChartSeries> series = {};
   std::optional<double> rule = {};  ///< x of a dotted vertical line, in comparison_grey
+  std::string left_of_rule = {};    ///< label of the x axis on that side, where it has another
 };
 
 /// Draws the chart. Returns the bytes of a PNG file.

@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include <fmt/format.h>
 
@@ -29,10 +28,11 @@ void validate(const ConfusionFigure& figure) {
                                           figure.rows.size(), figure.columns.size()));
   }
   for (const ConfusionFigure::Row& row : figure.rows) {
-    if (row.counts.size() != figure.columns.size()) {
-      throw Error(Fault::input, fmt::format("picture of a confusion: {} counts for {} columns; "
-                                            "give one for each",
-                                            row.counts.size(), figure.columns.size()));
+    if (row.counts.size() != figure.columns.size() || row.proven.size() != row.counts.size()) {
+      throw Error(Fault::input,
+                  fmt::format("picture of a confusion: {} counts and {} shares for "
+                              "{} columns; give one for each",
+                              row.counts.size(), row.proven.size(), figure.columns.size()));
     }
   }
 }
@@ -111,9 +111,7 @@ void draw_labels(Canvas& canvas, const Layout& layout, const ConfusionFigure& fi
 
 void draw_cells(Canvas& canvas, const Layout& layout, const ConfusionFigure& figure) {
   const auto share = [&](std::size_t row, std::size_t column) {
-    const std::vector<std::size_t>& counts = figure.rows[row].counts;
-    const std::size_t all = std::accumulate(counts.begin(), counts.end(), std::size_t{0});
-    return static_cast<double>(counts[column]) / static_cast<double>(std::max<std::size_t>(all, 1));
+    return figure.rows[row].proven[column];
   };
   const auto right = [&](std::size_t row, std::size_t column) {
     return figure.rows[row].right == figure.columns[column];
@@ -160,7 +158,7 @@ std::string draw_confusion(const ConfusionFigure& figure) {
   const std::vector<Tick> ticks{
       {-1.0, "100 %"}, {-0.5, "50 %"}, {0.0, "0"}, {0.5, "50 %"}, {1.0, "100 %"}};
   draw_colour_bar(canvas, {layout.box.left, bar_top, bar_px, bar_height_px}, -1.0, 1.0, diverging,
-                  ticks, "share of the true class: right (blue), wrong (red)");
+                  ticks, "share of its row, lower 95 % bound; blue: right");
   return canvas.encode();
 }
 

@@ -103,7 +103,7 @@ std::optional<std::vector<double>> numbers_in(const CsvTable& table,
   return values;
 }
 
-SpatialPose spatial_pose(const CsvTable& table, std::span<const double> v) {
+SpatialPose pose_in_space(const CsvTable& table, std::span<const double> v) {
   const glm::dquat rotation(v[6], v[3], v[4], v[5]);
   const double length = glm::length(rotation);
   constexpr double rounding = 1e-2;  // three decimals of a log leave less
@@ -136,7 +136,7 @@ PoseTable read_poses(const std::filesystem::path& path, const TableOptions& opti
     }
     const auto numbers = numbers_in(table, columns.pose);
     if (spatial) {
-      poses.spatial.push_back(numbers ? std::optional(spatial_pose(table, *numbers))
+      poses.spatial.push_back(numbers ? std::optional(pose_in_space(table, *numbers))
                                       : std::nullopt);
     } else {
       poses.T_robot_sensor.push_back(numbers ? Pose{{(*numbers)[0], (*numbers)[1]}, (*numbers)[2]}

@@ -169,7 +169,7 @@ class FoldTrial {
       }
       result.presses.push_back(std::move(scored));
     }
-    if (options_.bins) {
+    if (options_.bins && model_.table) {
       result.place_errors = errors_of(tried);
     }
     return result;

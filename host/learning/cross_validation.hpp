@@ -97,7 +97,7 @@ struct CrossValidation {
   /// [label] Fit::z of presses with an element In Contact: at their pose where it is known, or else
   /// on the best map at about the best pose.
   std::map<std::string, std::vector<double>> fit_z;
-  std::vector<PlaceError> place_errors;  ///< of presses at known poses
+  std::vector<PlaceError> place_errors;  ///< of presses at known poses, by a table
 };
 /// The cross-validation of several folds, each of which has one FamiliarityScores.
 CrossValidation joined(std::span<const CrossValidation> folds);

@@ -75,6 +75,9 @@ std::string percent(double probability) {
 
 BeliefPlaces places_of(const Recogniser& recogniser, const Estimate& estimate,
                        const RecognitionTask& task, const RecognitionStep& step) {
+  if (!recogniser.touched()) {
+    return {};  // every bin is as likely: no place is a mode, and all bins would be looked at
+  }
   // Bins below it hold a thousandth of an object's belief, or of uncommonly many bins more: these
   // say little of peaks.
   const double least_share = std::max(1e-3 / static_cast<double>(task.lattice().bins()), 1e-7);

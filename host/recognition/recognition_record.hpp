@@ -43,7 +43,7 @@ bool array_is_still(std::span<const Unknown> unknowns);
 /// label's maps by their evidence and among an object's poses by the belief.
 struct BeliefPlaces {
   /// At most five, the most probable first, none below 0.001. What they leave of 1 is "(none)",
-  /// less probable modes, and poses of no peak.
+  /// less probable modes, and poses of no peak. None before the first touch is taken in.
   std::vector<BeliefMode> modes;
   /// Index of the mode that RecognitionStep::mode is of, where it is among them.
   std::optional<std::size_t> own = {};

@@ -13,7 +13,7 @@ namespace palpate {
 
 namespace {
 
-constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+constexpr double not_known = std::numeric_limits<double>::quiet_NaN();
 constexpr double search_s = 10.0;
 constexpr std::size_t most_presses = 200;
 constexpr std::size_t most_offsets = 8000;
@@ -60,8 +60,8 @@ std::vector<Press> presses_of(std::span<const double> time_s, std::span<const fl
 
 /// What the poses do during a press.
 struct Stay {
-  double motion_mm = unknown;  ///< in the plane
-  double height_mm = unknown;  ///< at most
+  double motion_mm = not_known;  ///< in the plane
+  double height_mm = not_known;  ///< at most
 };
 
 Stay stay_of(const PoseLog& poses, const Press& press, double offset_s, double reach_mm) {

@@ -92,20 +92,21 @@ TEST_F(CalibrateCommand, LearnsWhatRecognizeAndMapTake) {
   EXPECT_TRUE(known > 0.0 && known < 1.0) << known;
 
   // The maps serve to calibrate, too.
-  const LearnedSensor by_maps = learned({"--maps", "maps"});
+  const LearnedSensor by_maps = learned({"--maps", "maps", "--bins", "15x15x12"});
   EXPECT_EQ(by_maps.classifier.threshold, sensor.classifier.threshold);
   EXPECT_NE(by_maps.table->shared, sensor.table->shared);
 }
 
 TEST_F(CalibrateCommand, TakesItsFlags) {
-  const LearnedSensor sensor = learned({"--threshold", "3.5", "--ratio", "0.25", "--levels", "3",
-                                        "--layer", "log_odds", "--frames", "2:20"});
+  const LearnedSensor sensor =
+      learned({"--threshold", "3.5", "--ratio", "0.25", "--levels", "3", "--layer", "log_odds",
+               "--frames", "2:20", "--bins", "9x9x8"});
   EXPECT_EQ(sensor.classifier.threshold, 3.5);
   EXPECT_EQ(sensor.classifier.ratio, 0.25);
   EXPECT_EQ(sensor.table->levels(), 3U);
   EXPECT_EQ(sensor.table->layer.of, MapLayer::log_odds);
-  EXPECT_EQ(learned({"--levels", "2"}).table->levels(), 2U);
-  EXPECT_THAT(done(with({"--frames", "2:20"})), HasSubstr("36 touches"));
+  EXPECT_EQ(learned({"--levels", "2", "--bins", "9x9x8"}).table->levels(), 2U);
+  EXPECT_THAT(done(with({"--frames", "2:20", "--bins", "9x9x8"})), HasSubstr("36 touches"));
 }
 
 TEST_F(CalibrateCommand, LearnsForTheBinsThatRecognizeWillHave) {

@@ -144,14 +144,15 @@ TEST_F(Defaults, AreWhatAutoAsksFor) {
 }
 
 TEST_F(Defaults, FineBinsAreHalfAsWide) {
-  const PoseLattice usual = posterior_of("u.h5");
-  const PoseLattice fine = posterior_of("u.h5", {"--bins", "fine"});
+  const PoseLattice usual = posterior_of("u.h5", {"--touches", "1"});
+  const PoseLattice fine = posterior_of("u.h5", {"--touches", "1", "--bins", "fine"});
   EXPECT_EQ(fine.x_mm.lower, usual.x_mm.lower);
   EXPECT_EQ(fine.pivot_mm, usual.pivot_mm);
   // Counts round up.
   EXPECT_NEAR(fine.x_mm.count, 2 * usual.x_mm.count, 2);
   EXPECT_NEAR(fine.theta_rad.count, 2 * usual.theta_rad.count, 2);
-  expect_same(in_scene("bins: fine\n"), u({"--bins", "fine"}));
+  expect_same(in_scene("bins: fine\n", {"--touches", "3"}),
+              u({"--touches", "3", "--bins", "fine"}));
 }
 
 TEST_F(Defaults, GiveWayTogetherToAnyPartOfALattice) {

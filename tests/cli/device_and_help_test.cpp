@@ -177,6 +177,11 @@ TEST_F(ProgramHelp, ListsTheCommands) {
 }
 
 TEST_F(ProgramHelp, ShortHelpNamesEveryFlagAndExplainsTheCommonOnes) {
+  for (const char* command : {"live", "batch", "plan", "map", "import"}) {
+    const std::string help = done({command, "--help"});
+    EXPECT_LE(std::ranges::count(help, '\n'), 40) << help;
+    EXPECT_EQ(help.find("Needs:"), std::string::npos) << help;
+  }
   const std::string help = done({"recognize", "--help"});
   EXPECT_LE(std::ranges::count(help, '\n'), 40) << help;
   EXPECT_NE(help.find("\n  --maps "), std::string::npos) << help;

@@ -99,7 +99,7 @@ TEST_F(MapFrame, LiesWhereOneSays) {
 }
 
 TEST_F(MapFrame, TellsWhereTheObjectIsToTheRobot) {
-  done({"map", "A.h5", "I.h5", "-o", "maps/"});
+  done({"map", "A.h5", "I.h5", "-o", "maps/", "--sensor-model", "none"});
   for (const std::string letter : {"A", "I"}) {
     SCOPED_TRACE(letter);
     const json r = record({"u" + letter + ".h5", "--maps", "maps"});
@@ -118,7 +118,7 @@ TEST_F(MapFrame, TellsWhereTheObjectIsToTheRobot) {
 }
 
 TEST_F(MapFrame, SymmetryIsOfEveryObjectOrOfSome) {
-  done({"map", "A.h5", "I.h5", "-o", "maps/", "--symmetry", "I=2"});
+  done({"map", "A.h5", "I.h5", "-o", "maps/", "--sensor-model", "none", "--symmetry", "I=2"});
   EXPECT_EQ(read_map(folder_ / "maps/I.map.h5").symmetry, 2);
   EXPECT_EQ(read_map(folder_ / "maps/A.map.h5").symmetry, 1);
   const json r = record({"uI.h5", "--maps", "maps"});
@@ -137,9 +137,9 @@ TEST_F(MapFrame, SymmetryIsOfEveryObjectOrOfSome) {
 }
 
 TEST_F(MapFrame, MapsOfDifferentDaysAreRecognisedAsIfLearnedTogether) {
-  done({"map", "A.h5", "-o", "maps/"});
-  done({"map", "I.h5", "-o", "maps/"});
-  done({"map", "A.h5", "I.h5", "-o", "together/"});
+  done({"map", "A.h5", "-o", "maps/", "--sensor-model", "none"});
+  done({"map", "I.h5", "-o", "maps/", "--sensor-model", "none"});
+  done({"map", "A.h5", "I.h5", "-o", "together/", "--sensor-model", "none"});
   ASSERT_NE(read_map(folder_ / "maps/A.map.h5").prior, read_map(folder_ / "maps/I.map.h5").prior);
   const Outcome outcome = palpate({"recognize", "uA.h5", "--maps", "maps", "--json", "-"});
   EXPECT_EQ(outcome.status, 0) << outcome.err;

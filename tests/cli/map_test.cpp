@@ -41,7 +41,7 @@ TEST_F(MapCommand, FolderGetsAMapPerLabel) {
 }
 
 TEST_F(MapCommand, SaysAndStoresTheSymmetryThatTheMapsShow) {
-  const std::string out = done({"map", "A.h5", "I.h5", "-o", "maps/"});
+  const std::string out = done({"map", "A.h5", "I.h5", "-o", "maps/", "--sensor-model", "none"});
   EXPECT_NE(out.find("A looks different after every turn, by "), std::string::npos) << out;
   EXPECT_NE(out.find("I looks the same after every 1/2 of a turn, within 0."), std::string::npos)
       << out;
@@ -62,11 +62,11 @@ TEST_F(MapCommand, SaysWhichSpreadItTook) {
       << usual;
   const std::string given = done({"map", "A.h5", "-o", "maps/", "--spread-mm", "0.8"});
   EXPECT_EQ(given.find("spread"), std::string::npos) << given;
-  const std::string joined = done({"map", "I.h5", "-o", "maps/"});
+  const std::string joined = done({"map", "I.h5", "-o", "maps/", "--sensor-model", "none"});
   EXPECT_NE(joined.find("spread 0.8 mm, as the other maps of maps/ have it\n"), std::string::npos)
       << joined;
   EXPECT_EQ(read_map(folder_ / "maps/I.map.h5").spread_mm, 0.8);
-  const std::string anew = done({"map", "A.h5", "I.h5", "-o", "maps/"});
+  const std::string anew = done({"map", "A.h5", "I.h5", "-o", "maps/", "--sensor-model", "none"});
   EXPECT_NE(anew.find("spread 0.5 mm: "), std::string::npos) << "all are written anew: " << anew;
 }
 
@@ -77,7 +77,8 @@ TEST_F(MapCommand, ChoosesTheSpreadOfAFineArray) {
     write_recording(folder_ / (std::string("fine.") + letter + ".h5"),
                     simulator.touch(random_poses(40, 7), {}));
   }
-  const std::string out = done({"map", "fine.A.h5", "fine.E.h5", "fine.U.h5", "-o", "fine/"});
+  const std::string out =
+      done({"map", "fine.A.h5", "fine.E.h5", "fine.U.h5", "-o", "fine/", "--sensor-model", "none"});
   EXPECT_NE(out.find("nats each more likely than with 0.5 mm"), std::string::npos) << out;
   EXPECT_LT(*read_map(folder_ / "fine/A.map.h5").spread_mm, 0.4);
   EXPECT_LT(*read_map(folder_ / "fine/U.map.h5").spread_mm, 0.4) << "one spread for all";
@@ -193,7 +194,8 @@ TEST_F(MapCommand, DeadElementsChangeNothing) {
 }
 
 TEST_F(MapCommand, DrawsAndExports) {
-  done({"map", "A.h5", "I.h5", "-o", "maps/", "--png", "maps.png", "--ros", "ros"});
+  done({"map", "A.h5", "I.h5", "-o", "maps/", "--sensor-model", "none", "--png", "maps.png",
+        "--ros", "ros"});
   EXPECT_TRUE(bytes_of(folder_ / "maps.png").starts_with("\x89PNG"));
   const auto exported = content_of(folder_ / "ros");
   EXPECT_EQ(exported.size(), 4u);

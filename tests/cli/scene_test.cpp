@@ -69,9 +69,13 @@ INSTANTIATE_TEST_SUITE_P(
                     Setting{"none", "none: 0.5", "--none=0.5"},
                     Setting{"auto_none", "none: auto", "--none"},
                     Setting{"touch_sd", "touch_sd: {mm: 1}", "--touch-sd-mm=1"},
-                    Setting{"slip_sd", "slip_sd: {deg: 9}", "--slip-sd-deg=9"},
                     Setting{"filter", "filter: histogram", "--filter=histogram"}),
     [](const auto& test) { return std::string(test.param.name); });
+
+TEST_F(SceneFile, ObjectsSlipAsByTheFlags) {
+  expect_same(with_scene(both_maps + "slip_sd: {deg: 9}\nbins: [9, 9, 8]\n"),
+              with_flags({"--slip-sd-deg=9", "--bins=9x9x8"}));
+}
 
 class SceneOverride : public SceneFile, public testing::WithParamInterface<Setting> {};
 

@@ -87,7 +87,7 @@ TEST_F(TouchesCommand, LettersAreRecognisedByWhatTheyFound) {
   for (const std::string letter : {"A", "E", "I"}) {
     EXPECT_EQ(touches_of(letter, "simulate:" + letter + ",touches=150").object, letter);
   }
-  done({"map", "A.h5", "E.h5", "I.h5", "-o", "maps/"});
+  done({"map", "A.h5", "E.h5", "I.h5", "-o", "maps/", "--sensor-model", "none"});
   std::vector<std::string> arguments;
   for (const std::string letter : {"A", "E", "I"}) {
     touches_of("u" + letter, "simulate:" + letter + ",touches=10,seed=77,object=random");

@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "lattice/touch_by_touch_data.hpp"
 #include "limits.hpp"
 #include "palpate/error.hpp"
 #include "palpate/particle_filter.hpp"
@@ -60,12 +61,6 @@ TEST(NoneOfThese, SumsToOneWithTheObjectsAndTheirPoses) {
       }
     }
   }
-}
-
-/// Odds of "none of these" against the objects together, in nats.
-double log_odds_of_none(const PoseHistogram& histogram) {
-  const Estimate estimate = histogram.estimate();
-  return std::log(estimate.none / sum(estimate.identity));
 }
 
 TEST(NoneOfThese, KeepsTheOddsOfTheWeightsAfterOneTouch) {

@@ -90,6 +90,19 @@ TEST(Chart, DrawsItsRuleFromBottomToTop) {
   EXPECT_LT(middle_of(left, comparison_grey).x, middle_of(right, comparison_grey).x);
 }
 
+TEST(Chart, HasTicksOfItsOwnAndALabelForEachSideOfItsRule) {
+  Chart chart = chart_of({.name = "", .points = {}});
+  chart.rule = 2.5;
+  const Picture one_label = drawn(chart);
+  chart.left_of_rule = "left";
+  const Difference labels = difference(one_label, drawn(chart));
+  EXPECT_LT(labels.left, one_label.width / 4) << "the left part's";
+  EXPECT_GT(labels.right, one_label.width / 2) << "the label of x moves into its own part";
+  const Picture round = drawn(chart);
+  chart.x.ticks = {{5.0, "half"}};
+  EXPECT_GT(difference(round, drawn(chart)).pixels, 500) << "ten lines go, and their numbers";
+}
+
 TEST(Chart, WithoutAnythingToShowHasAxes) {
   EXPECT_GT(count_of(drawn({.x = {.label = "x"}, .y = {.label = "y"}}), ink), 100);
 }

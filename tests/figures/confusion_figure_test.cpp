@@ -11,10 +11,11 @@
 namespace palpate::confusion_figure_test {
 
 ConfusionFigure example() {
-  return {
-      .title = "7 of 12 right",
-      .columns = {"A", "B", "(none)"},
-      .rows = {{"A", "A", {4, 0, 0}}, {"B", "B", {3, 1, 0}}, {"M (unknown)", "(none)", {2, 0, 2}}}};
+  return {.title = "7 of 12 right",
+          .columns = {"A", "B", "(none)"},
+          .rows = {{"A", "A", {4, 0, 0}, {1.0, 0.0, 0.0}},
+                   {"B", "B", {3, 1, 0}, {0.75, 0.25, 0.0}},
+                   {"M (unknown)", "(none)", {2, 0, 2}, {0.5, 0.0, 0.4}}}};
 }
 
 /// As many classes, all right.
@@ -23,8 +24,10 @@ ConfusionFigure diagonal(std::size_t classes) {
   for (std::size_t k = 0; k < classes; ++k) {
     const std::string label = "class_" + std::to_string(k);
     figure.columns.push_back(label);
-    figure.rows.push_back({label, label, std::vector<std::size_t>(classes, 0)});
+    figure.rows.push_back(
+        {label, label, std::vector<std::size_t>(classes, 0), std::vector<double>(classes, 0.0)});
     figure.rows.back().counts[k] = 25;
+    figure.rows.back().proven[k] = 1.0;
   }
   return figure;
 }
@@ -37,7 +40,7 @@ TEST(ConfusionFigure, GivesTheSameBytesAgain) {
   EXPECT_EQ(draw_confusion(example()), draw_confusion(example()));
 }
 
-TEST(ConfusionFigure, ColoursEveryCellByItsShareOfTheRow) {
+TEST(ConfusionFigure, ColoursEveryCellByItsProvenShare) {
   const Picture picture = decode(draw_confusion(example()));
   // Cells of 84 pixels; numbers and frames cover some, and the colour bar adds a few.
   constexpr int cell = 84 * 84;
@@ -45,7 +48,7 @@ TEST(ConfusionFigure, ColoursEveryCellByItsShareOfTheRow) {
   EXPECT_NEAR(count(picture, diverging(0.75)), cell, 0.1 * cell) << "B, taken for A";
   EXPECT_NEAR(count(picture, diverging(-0.25)), cell, 0.1 * cell) << "B";
   EXPECT_NEAR(count(picture, diverging(0.5)), cell, 0.1 * cell) << "M, taken for A";
-  EXPECT_NEAR(count(picture, diverging(-0.5)), cell, 0.1 * cell) << "M, called (none)";
+  EXPECT_NEAR(count(picture, diverging(-0.4)), cell, 0.1 * cell) << "M, called (none)";
 }
 
 TEST(ConfusionFigure, WritesCountsInTheirCells) {
@@ -72,6 +75,9 @@ TEST(ConfusionFigure, RefusesWhatItCannotDraw) {
   ConfusionFigure counts = example();
   counts.rows[1].counts.pop_back();
   EXPECT_THROW(draw_confusion(counts), Error);
+  ConfusionFigure shares = example();
+  shares.rows[1].proven.pop_back();
+  EXPECT_THROW(draw_confusion(shares), Error);
 }
 
 }  // namespace palpate::confusion_figure_test

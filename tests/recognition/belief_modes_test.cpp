@@ -291,6 +291,17 @@ TEST_F(Places, AreTheSameByBoundsAsByTheHistogram) {
   }
 }
 
+TEST_F(Places, AreNoneBeforeATouchReachesTheBelief) {
+  std::ranges::fill(recording.pressure, 0.0);
+  RecognitionTask task(shapes(), every_filter()[2]);
+  task.auto_pivot = true;
+  Recogniser recogniser(device, task);
+  const RecognitionStep step = take_step(recogniser, task, all_touches(recording, 2), {});
+  EXPECT_TRUE(step.places.modes.empty());
+  EXPECT_FALSE(step.places.within_mm);
+  EXPECT_FALSE(step.decision.act);
+}
+
 TEST_F(Places, OfParticlesAreWhereTheHistogramsAre) {
   const RecognitionStep dense = step_by(0, 6);
   const RecognitionStep particles = step_by(1, 6);

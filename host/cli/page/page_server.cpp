@@ -172,6 +172,7 @@ PageServer::PageServer(const PageAddress& address, PageFeed& feed, PageAnswers a
   httplib::Server& server = impl_->server;
   server.new_task_queue = [] { return new httplib::ThreadPool(most_pages + other_requests); };
   server.set_socket_options(own_port_alone);
+  server.set_tcp_nodelay(true);  // a body shall not wait 40 ms for the head's acknowledgement
   server.set_payload_max_length(most_asked);
   server.set_read_timeout(2s);
   server.set_write_timeout(5s);

@@ -1,12 +1,17 @@
 #include "cli/page/viewed_files.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstdlib>
 #include <limits>
 #include <set>
 
 #include "cli/page/page_json.hpp"
+#include "io/available_memory.hpp"
 #include "io/input_file.hpp"
+#include "io/recording_rules.hpp"
+#include "io/recording_survey.hpp"
 #include "palpate/files.hpp"
 #include "recognition/judged_results.hpp"
 
@@ -17,7 +22,7 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
-constexpr std::size_t rows_at_once = 500;
+constexpr std::size_t rows_at_once = 64;
 constexpr const char* kinds[] = {"recording", "map", "records"};
 
 bool is_hdf5(const fs::path& path) {
@@ -25,38 +30,112 @@ bool is_hdf5(const fs::path& path) {
   return extension == ".h5" || extension == ".hdf5";
 }
 
-nlohmann::ordered_json described(const Recording& recording) {
-  const std::size_t e = recording.elements();
+/// The known poses whose x or y is the least or the largest.
+nlohmann::ordered_json reach_of(std::span<const Pose> poses) {
+  std::array<const Pose*, 4> ends{};
+  for (const Pose& pose : poses) {
+    const glm::dvec2& p = pose.translation_mm;
+    if (!is_finite(pose)) {
+      continue;
+    }
+    const std::array beyond{p.x<(ends[0] ? ends[0]->translation_mm.x : HUGE_VAL), p.x>(
+                                ends[1] ? ends[1]->translation_mm.x : -HUGE_VAL),
+                            p.y<(ends[2] ? ends[2]->translation_mm.y : HUGE_VAL), p.y>(
+                                ends[3] ? ends[3]->translation_mm.y : -HUGE_VAL)};
+    for (std::size_t i = 0; i < ends.size(); ++i) {
+      ends[i] = beyond[i] ? &pose : ends[i];
+    }
+  }
+  auto json = nlohmann::ordered_json::array();
+  for (const Pose* pose : ends) {
+    if (pose != nullptr) {
+      json.push_back(pose_json(*pose));
+    }
+  }
+  return json;
+}
+
+/// What `live --json` wrote is of touches, one a line.
+bool is_live(const Json& record) { return record.contains("unknown") && record.contains("touch"); }
+
+}  // namespace
+
+ViewedFiles::Rows ViewedFiles::rows_of(const fs::path& path) {
+  Rows rows;
+  ReadingHistogram readings;
+  std::size_t known = 0;
+  Recording& recording = rows.recording;
+  const auto append = [](auto& list) {
+    return [&list](auto values) { list.insert(list.end(), values.begin(), values.end()); };
+  };
+  scan_recording(path,
+                 {.head =
+                      [&](const RecordingHead& head) {
+                        recording = head.recording;
+                        rows.elements = head.elements;
+                        require_memory(
+                            path, "the recording's rows",
+                            stored_bytes(std::array{head.rows, head.elements + 8}, sizeof(float)));
+                        rows.pressure.reserve(head.rows * head.elements);
+                        recording.T_robot_sensor.reserve(head.rows);
+                      },
+                  .pressure =
+                      [&](std::span<const double> values) {
+                        append(rows.pressure)(values);
+                        for (const double value : values) {
+                          // One reading of 1e38 shall not be the scale.
+                          if (value > 0.0 && value < 1e30) {
+                            readings.add(value);
+                            ++known;
+                          }
+                        }
+                      },
+                  .T_robot_sensor = append(recording.T_robot_sensor),
+                  .elements_mm =
+                      [&](std::span<const glm::dvec2> places) {
+                        // A changing array is drawn as it begins.
+                        const std::size_t left = rows.elements - recording.elements_mm.size();
+                        append(recording.elements_mm)(places.first(std::min(left, places.size())));
+                      },
+                  .time_s = append(recording.time_s),
+                  .device_time_s = [](auto) {},
+                  .lost_before = [](auto) {}});
+  rows.largest = known == 0 ? 0.0 : readings.quantile(0.999);
+  return rows;
+}
+
+nlohmann::ordered_json ViewedFiles::described(const Rows& rows) {
+  const Recording& recording = rows.recording;
+  const std::size_t e = rows.elements;
   nlohmann::ordered_json json{
       {"kind", kinds[0]},
       {"rows", recording.rows},
       {"count", recording.size()},
       {"object", recording.object},
       {"pressure_unit", recording.pressure_unit},
-      {"elements_mm", places_json(std::span(recording.elements_mm).first(e))},
+      {"elements_mm", places_json(recording.elements_mm)},
+      {"reach", reach_of(recording.T_robot_sensor)},
       {"valid", recording.valid.size() >= e
                     ? std::vector(recording.valid.begin(), recording.valid.begin() + e)
                     : std::vector<std::uint8_t>()}};
-  // A sound array's strongest readings show the scale; one reading of 1e38 shall not.
-  std::vector<double> known;
-  std::ranges::copy_if(recording.pressure, std::back_inserter(known),
-                       [](double value) { return value > 0.0 && value < 1e30; });
-  if (!known.empty()) {
-    const auto high =
-        known.begin() + static_cast<std::ptrdiff_t>(known.size() - 1 - known.size() / 1000);
-    std::ranges::nth_element(known, high);
-    json["largest"] = *high;
+  if (rows.largest > 0.0) {
+    json["largest"] = rows.largest;
+  }
+  if (!recording.time_s.empty()) {
+    json["begin_s"] = recording.time_s.front();
   }
   return json;
 }
 
-nlohmann::ordered_json rows_of(const Recording& recording, std::size_t first) {
+nlohmann::ordered_json ViewedFiles::some_of(const Rows& rows, std::size_t first) {
+  const Recording& recording = rows.recording;
   const std::size_t last = std::min(recording.size(), first + rows_at_once);
-  const std::size_t e = recording.elements();
+  std::vector<double> row(rows.elements);
   auto pressure = nlohmann::ordered_json::array();
   auto pose = nlohmann::ordered_json::array();
   for (std::size_t i = first; i < last; ++i) {
-    pressure.push_back(pressure_json(std::span(recording.pressure).subspan(i * e, e)));
+    std::copy_n(&rows.pressure[i * row.size()], row.size(), row.begin());
+    pressure.push_back(pressure_json(row));
     pose.push_back(pose_json(recording.T_robot_sensor[i]));  // NaN becomes null
   }
   nlohmann::ordered_json json{{"first", first}, {"pressure", pressure}, {"pose", pose}};
@@ -66,11 +145,6 @@ nlohmann::ordered_json rows_of(const Recording& recording, std::size_t first) {
   }
   return json;
 }
-
-/// What `live --json` wrote is of touches, one a line.
-bool is_live(const Json& record) { return record.contains("unknown") && record.contains("touch"); }
-
-}  // namespace
 
 void ViewedFiles::Records::add(const Json& record) {
   const std::string best = record.value("best", "");
@@ -160,7 +234,7 @@ void ViewedFiles::add(const fs::path& path) {
   require_readable(path);
   const std::string format = read_format(path);
   if (format == "palpate.recording") {
-    files_.push_back({path, read_recording(path)});
+    files_.push_back({path, rows_of(path)});
   } else if (format == "palpate.map") {
     files_.push_back({path, read_map(path)});
   } else {
@@ -188,14 +262,14 @@ std::optional<nlohmann::ordered_json> ViewedFiles::answer(const File& file) cons
   if (const auto* records = std::get_if<Records>(&file.content)) {
     return nlohmann::ordered_json{{"kind", kinds[2]}, {"rows", records->rows}};
   }
-  return described(std::get<Recording>(file.content));
+  return described(std::get<Rows>(file.content));
 }
 
 std::optional<nlohmann::ordered_json> ViewedFiles::answer(const File& file, const std::string& what,
                                                           std::size_t index) const {
-  if (const auto* recording = std::get_if<Recording>(&file.content)) {
-    return what == "rows" && index < recording->size() ? std::optional(rows_of(*recording, index))
-                                                       : std::nullopt;
+  if (const auto* rows = std::get_if<Rows>(&file.content)) {
+    return what == "rows" && index < rows->recording.size() ? std::optional(some_of(*rows, index))
+                                                            : std::nullopt;
   }
   const auto* records = std::get_if<Records>(&file.content);
   if (records == nullptr || index >= records->text.size()) {

@@ -25,9 +25,9 @@ class ViewedFiles {
   /// [{name, kind}], kind "recording", "map" or "records", as the event "files".
   std::string list() const;
   /// The JSON behind a path, none where there is nothing:
-  /// /file/I: a recording's array, or a map as map_json(), or of records a row for each: recording,
-  /// touches, best, probability, truth, error_mm, fit and act;
-  /// /file/I/rows/A: at most 500 of a recording's rows from A on: pressure, pose and time;
+  /// /file/I: a recording's array and the poses at the ends of its reach, or a map as map_json(),
+  /// or of records a row for each: recording, touches, best, probability, truth, error_mm, fit and
+  /// act; /file/I/rows/A: at most 64 of a recording's rows from A on: pressure, pose and time;
   /// /file/I/record/K: a record as it was written; of `live`, an unknown's lines as its trace;
   /// /file/I/map/K: the map of that record's pose, where the record names a file that is there.
   std::optional<std::string> get(const std::string& path) const;
@@ -39,13 +39,23 @@ class ViewedFiles {
 
     void add(const nlohmann::json& record);
   };
+  /// Rows to look at: four digits of a pressure are shown, so float holds it.
+  struct Rows {
+    Recording recording;  ///< without pressures
+    std::size_t elements = 0;
+    std::vector<float> pressure;  ///< [n, e]
+    double largest = 0.0;         ///< of the pressures but for the last in a thousand; 0: none
+  };
   struct File {
     std::filesystem::path path;
-    std::variant<Recording, OccupancyGrid, Records> content;
+    std::variant<Rows, OccupancyGrid, Records> content;
   };
 
   void add(const std::filesystem::path& path);
+  static Rows rows_of(const std::filesystem::path& recording);
   static Records records_of(const std::filesystem::path& results);
+  static nlohmann::ordered_json described(const Rows& rows);
+  static nlohmann::ordered_json some_of(const Rows& rows, std::size_t first);
   std::optional<nlohmann::ordered_json> answer(const File& file) const;
   std::optional<nlohmann::ordered_json> answer(const File& file, const std::string& what,
                                                std::size_t index) const;

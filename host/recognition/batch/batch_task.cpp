@@ -18,7 +18,7 @@ namespace palpate {
 
 namespace {
 
-using Json = nlohmann::ordered_json;
+using OrderedJson = nlohmann::ordered_json;
 namespace fs = std::filesystem;
 
 constexpr const char* format = "palpate.batch";
@@ -56,13 +56,15 @@ std::string from_utf8(const std::string& text) {
   return bytes;
 }
 
-/// A whole number from 0. @throws Json::exception where it is none
-std::size_t count_of(const Json& json) { return json.get_ref<const Json::number_unsigned_t&>(); }
+/// A whole number from 0. @throws OrderedJson::exception where it is none
+std::size_t count_of(const OrderedJson& json) {
+  return json.get_ref<const OrderedJson::number_unsigned_t&>();
+}
 
-Json to_json(const BatchEntry& entry) {
-  Json json{{"path", to_utf8(entry.input.path)}};
+OrderedJson to_json(const BatchEntry& entry) {
+  OrderedJson json{{"path", to_utf8(entry.input.path)}};
   if (entry.input.frames) {
-    json["frames"] = Json::array({entry.input.frames->begin, entry.input.frames->end});
+    json["frames"] = OrderedJson::array({entry.input.frames->begin, entry.input.frames->end});
   }
   if (!entry.input.label.empty()) {
     json["label"] = to_utf8(entry.input.label);
@@ -77,7 +79,7 @@ Json to_json(const BatchEntry& entry) {
   return json;
 }
 
-BatchEntry entry_of(const Json& json) {
+BatchEntry entry_of(const OrderedJson& json) {
   BatchEntry entry;
   entry.input.path = from_utf8(json.at("path"));
   if (json.contains("frames")) {
@@ -89,22 +91,22 @@ BatchEntry entry_of(const Json& json) {
     entry.stamp = FileStamp{count_of(json.at("bytes")), json.at("modified_ns")};
   }
   if (json.contains("survey")) {
-    const Json& survey = json.at("survey");
+    const OrderedJson& survey = json.at("survey");
     entry.survey = InputSurvey{count_of(survey.at(0)), survey.at(1), survey.at(2), survey.at(3)};
   }
   return entry;
 }
 
-Json head_to_json(const BatchTask& task) {
-  Json maps = Json::array();
+OrderedJson head_to_json(const BatchTask& task) {
+  OrderedJson maps = OrderedJson::array();
   for (const std::string& map : task.request.maps) {
     maps.push_back(to_utf8(map));
   }
-  Json options = Json::object();
+  OrderedJson options = OrderedJson::object();
   for (const auto& [option, text] : option_texts(task.request)) {
     options[option] = to_utf8(text);
   }
-  Json files = Json::object();
+  OrderedJson files = OrderedJson::object();
   for (const auto& [file, hash] : task.files) {
     files[to_utf8(file)] = hash;
   }
@@ -125,7 +127,7 @@ Json head_to_json(const BatchTask& task) {
           {"bins", task.bins}};
 }
 
-BatchTask head_of(const Json& json) {
+BatchTask head_of(const OrderedJson& json) {
   BatchTask task;
   task.program = json.at("program");
   task.chunk_unknowns = std::max<std::size_t>(count_of(json.at("chunk_unknowns")), 1);
@@ -136,9 +138,9 @@ BatchTask head_of(const Json& json) {
   try {
     task.request = request_with(options);
   } catch (const Error& error) {
-    throw Json::other_error::create(501, error.what(), nullptr);
+    throw OrderedJson::other_error::create(501, error.what(), nullptr);
   }
-  for (const Json& map : json.at("maps")) {
+  for (const OrderedJson& map : json.at("maps")) {
     task.request.maps.push_back(from_utf8(map));
   }
   for (const auto& [file, hash] : json.at("files").items()) {
@@ -203,11 +205,11 @@ std::vector<std::vector<Part>> parts_of_chunks(const BatchTask& task) {
 }
 
 /// Reads the first line of a task file. @throws Error where it is of no task, or of another version
-Json read_head(const fs::path& file, std::istream& stream) {
+OrderedJson read_head(const fs::path& file, std::istream& stream) {
   std::string line;
   std::getline(stream, line);
-  Json head = Json::parse(line, nullptr, false);
-  if (!head.is_object() || head.value("format", Json()) != format) {
+  OrderedJson head = OrderedJson::parse(line, nullptr, false);
+  if (!head.is_object() || head.value("format", OrderedJson()) != format) {
     refuse(file, "is no task of palpate batch; give another folder");
   }
   if (head.value("version", version) > version) {
@@ -266,16 +268,16 @@ std::string head_text(const BatchTask& task) { return head_to_json(task).dump() 
 
 std::string entry_text(const BatchEntry& entry) { return to_json(entry).dump() + "\n"; }
 
-BatchTask head_from(std::string_view text) { return head_of(Json::parse(text)); }
+BatchTask head_from(std::string_view text) { return head_of(OrderedJson::parse(text)); }
 
-BatchEntry entry_from(std::string_view text) { return entry_of(Json::parse(text)); }
+BatchEntry entry_from(std::string_view text) { return entry_of(OrderedJson::parse(text)); }
 
 BatchTask read_batch_task(const fs::path& file) {
   require_readable(file);
   std::ifstream stream(file, std::ios::binary);
   std::string line;
   try {
-    const Json head = read_head(file, stream);
+    const OrderedJson head = read_head(file, stream);
     BatchTask task = head_of(head);
     while (std::getline(stream, line)) {
       task.inputs.push_back(entry_from(line));
@@ -285,7 +287,7 @@ BatchTask read_batch_task(const fs::path& file) {
     }
     require_countable(file, task);
     return task;
-  } catch (const Json::exception&) {
+  } catch (const OrderedJson::exception&) {
     refuse(file, "is damaged; remove the folder, or copy it again");
   }
 }

@@ -182,7 +182,7 @@ function pause() {
 function showAll() {
   Object.values(planes).forEach((plane) => plane.showAll());
 }
-const nextUnknown = () => ask({ do: "next unknown" });
+const nextUnknown = () => state.setup?.live && ask({ do: "next unknown" });
 
 element("object").onchange = (event) => ask({ do: "look at", object: Number(event.target.value) });
 element("next-unknown").onclick = nextUnknown;

@@ -27,7 +27,9 @@ export function poseWords(touch) {
   const value = (i, scale) =>
     (scale * pose[i]).toFixed(2) + (sd ? ` ± ${(scale * sd[i]).toFixed(2)}` : "");
   const turn = degrees(1);
-  return `x ${value(0, 1)} mm, y ${value(1, 1)} mm, theta ${value(2, turn)}°`;
+  const of = touch.mode?.object ?? touch.best;
+  const whose = of === touch.best ? "" : `pose of ${of}: `;
+  return `${whose}x ${value(0, 1)} mm, y ${value(1, 1)} mm, theta ${value(2, turn)}°`;
 }
 
 export function truthWords(touch) {
@@ -110,7 +112,8 @@ export function drawArray(state, plane, caption) {
   plane.end();
   caption.textContent =
     `strongest colour ${Number(scale.toPrecision(3))} ${setup.pressure_unit}` +
-    (setup.threshold ? `; framed: above the threshold of ${setup.threshold} ${setup.pressure_unit}`
+    (setup.threshold ? `; framed: above the threshold of ${Number(setup.threshold.toPrecision(3))} ` +
+                         setup.pressure_unit
                      : "") +
     (dead ? `; crossed: ${dead} dead` : "");
 }

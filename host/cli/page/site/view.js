@@ -3,7 +3,8 @@
 const element = (id) => document.getElementById(id);
 const columns = ["recording", "touches", "best", "probability", "truth", "error, mm", "fit", "act"];
 const mostRows = 500; // of a table are drawn; the filter finds the others
-const rowsAtOnce = 500; // as the server sends them
+const rowsAtOnce = 64; // as the server sends them
+const partsKept = 100; // of a recording: 6,400 rows
 
 async function json(path) {
   const answer = await fetch(path);
@@ -53,27 +54,37 @@ async function scrub(count, first, show) {
   element("scrub").hidden = false;
   row.max = count - 1;
   row.value = first;
-  const move = async () => { element("row-words").textContent = await show(Number(row.value)); };
+  // Whoever drags sees the row where the slider is, and none that it has left meanwhile.
+  let shown = null;
+  let moving = false;
+  const move = async () => {
+    if (moving) return;
+    moving = true;
+    try {
+      while (row.oninput === move && shown !== row.value) {
+        shown = row.value;
+        element("row-words").textContent = await show(Number(shown));
+      }
+    } finally {
+      moving = false;
+    }
+  };
   row.oninput = move;
   await move();
 }
 
 async function openRecording({ index, file, state, tell }) {
   Object.assign(state.setup, { ...file, maps: [] });
-  const parts = new Map();
+  const parts = new Map(); // the one that was looked at last stands last
   const rowAt = async (i) => {
     const first = i - (i % rowsAtOnce);
-    if (!parts.has(first)) parts.set(first, json(`file/${index}/rows/${first}`));
-    const part = await parts.get(first);
+    const part = parts.get(first) ?? await json(`file/${index}/rows/${first}`);
+    parts.delete(first);
+    parts.set(first, part);
+    if (parts.size > partsKept) parts.delete(parts.keys().next().value);
     return { pressure: part.pressure[i - first], pose: part.pose[i - first],
-             time: part.time && part.time[i - first] - (await timeOf(0)) };
+             time: part.time && part.time[i - first] - file.begin_s };
   };
-  const timeOf = async (first) => {
-    if (!parts.has(first)) parts.set(first, json(`file/${index}/rows/${first}`));
-    return (await parts.get(first)).time[0];
-  };
-  state.setup.reach = (await json(`file/${index}/rows/0`)).pose.filter(
-    (pose) => pose.every((value) => value !== null));
   await scrub(file.count, 0, async (i) => {
     const row = await rowAt(i);
     state.frame = { ...row, touching: true };
