@@ -123,8 +123,13 @@ std::string wider_bins_sentence(const RecognitionTask& task) {
   const double x_mm = lattice.x_mm.step();
   const double y_mm = lattice.y_mm.step();
   const double theta_rad = lattice.theta_rad.step();
-  if (!(x_mm > much * learned.x_mm || y_mm > much * learned.y_mm ||
-        theta_rad > much * learned.theta_rad)) {
+  // Bins are narrow beside a belief that is smooth over so much of a standard deviation: a little
+  // more than balanced_lattice() takes.
+  constexpr double of_sd = 0.51;
+  const DisplacementSd sd = task.touch_sd();
+  if (!(x_mm > std::max(much * learned.x_mm, of_sd * sd.mm) ||
+        y_mm > std::max(much * learned.y_mm, of_sd * sd.mm) ||
+        theta_rad > std::max(much * learned.theta_rad, of_sd * sd.rad))) {
     return "";
   }
   constexpr double degrees = 180.0 / std::numbers::pi;
