@@ -107,7 +107,8 @@ def program() -> None:
     )
     options = flags.parse_args()
     device, facts = begin(options)
-    training = [one for one in training_recordings(EXACT) if one.object in LETTERS]
+    most = 64 if options.quick else None
+    training = [one[:most] for one in training_recordings(EXACT) if one.object in LETTERS]
     maps = letter_maps(device, training)
     each = options.trials or (2 if options.quick else 34)
     trials = make_trials(LETTERS, each, max(TOUCHES), SEED, EXACT)

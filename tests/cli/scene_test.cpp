@@ -73,8 +73,8 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& test) { return std::string(test.param.name); });
 
 TEST_F(SceneFile, ObjectsSlipAsByTheFlags) {
-  expect_same(with_scene(both_maps + "slip_sd: {deg: 9}\nbins: [9, 9, 8]\n"),
-              with_flags({"--slip-sd-deg=9", "--bins=9x9x8"}));
+  expect_same(with_scene(both_maps + "slip_sd: {deg: 9}\nbins: [9, 9, 40]\n"),
+              with_flags({"--slip-sd-deg=9", "--bins=9x9x40"}));
 }
 
 class SceneOverride : public SceneFile, public testing::WithParamInterface<Setting> {};

@@ -2,10 +2,11 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdlib>
 #include <limits>
 #include <set>
+
+#include <glm/vec3.hpp>
 
 #include "cli/page/page_json.hpp"
 #include "io/available_memory.hpp"
@@ -32,24 +33,20 @@ bool is_hdf5(const fs::path& path) {
 
 /// The known poses whose x or y is the least or the largest.
 nlohmann::ordered_json reach_of(std::span<const Pose> poses) {
-  std::array<const Pose*, 4> ends{};
+  std::vector<glm::dvec3> known;
   for (const Pose& pose : poses) {
-    const glm::dvec2& p = pose.translation_mm;
-    if (!is_finite(pose)) {
-      continue;
-    }
-    const std::array beyond{p.x<(ends[0] ? ends[0]->translation_mm.x : HUGE_VAL), p.x>(
-                                ends[1] ? ends[1]->translation_mm.x : -HUGE_VAL),
-                            p.y<(ends[2] ? ends[2]->translation_mm.y : HUGE_VAL), p.y>(
-                                ends[3] ? ends[3]->translation_mm.y : -HUGE_VAL)};
-    for (std::size_t i = 0; i < ends.size(); ++i) {
-      ends[i] = beyond[i] ? &pose : ends[i];
+    if (is_finite(pose)) {
+      known.emplace_back(pose.translation_mm, pose.theta_rad);
     }
   }
   auto json = nlohmann::ordered_json::array();
-  for (const Pose* pose : ends) {
-    if (pose != nullptr) {
-      json.push_back(pose_json(*pose));
+  for (const int axis : {0, 1}) {
+    const auto [least, most] =
+        std::ranges::minmax_element(known, {}, [axis](const glm::dvec3& p) { return p[axis]; });
+    for (const auto end : {least, most}) {
+      if (end != known.end()) {
+        json.push_back({end->x, end->y, end->z});
+      }
     }
   }
   return json;
