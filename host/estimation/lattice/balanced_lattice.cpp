@@ -69,7 +69,7 @@ BalancedLattice balanced_lattice(const PoseLattice& region, std::span<const Hypo
   }
   const DisplacementSd sd = width == BinWidth::fine ? DisplacementSd{} : touch_sd;
   const double wider = widening(sd.mm, wanted_mm);
-  // In units of the step.
+  // Shorter by as much as their steps are wider.
   const double extents_mm[] = {(lattice.x_mm.upper - lattice.x_mm.lower) / wider,
                                (lattice.y_mm.upper - lattice.y_mm.lower) / wider,
                                (lattice.theta_rad.upper - lattice.theta_rad.lower) * longest_mm /
