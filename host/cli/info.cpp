@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <numbers>
@@ -241,6 +242,10 @@ void print_posterior(const std::string& path) {
   fmt::print("{}: posterior over {}\n", path, fmt::join(p.objects, ", "));
   fmt::print("  bins              {} x {} x {} (x, y, theta) per object\n", lattice.x_mm.count,
              lattice.y_mm.count, lattice.theta_rad.count);
+  if (p.rest_mass_bound) {
+    fmt::print("  evaluated         {} bins; all others hold at most {:.1g} of the belief\n",
+               p.index.size(), *p.rest_mass_bound);
+  }
   fmt::print("  x, y              {} to {} mm, {} to {} mm\n", lattice.x_mm.lower,
              lattice.x_mm.upper, lattice.y_mm.lower, lattice.y_mm.upper);
   fmt::print("  theta             {:.1f} to {:.1f} deg\n", degrees(lattice.theta_rad.lower),
@@ -248,6 +253,10 @@ void print_posterior(const std::string& path) {
   fmt::print("  pivot             {}, {} mm\n", lattice.pivot_mm.x, lattice.pivot_mm.y);
   for (std::size_t i = 0; i < p.objects.size(); ++i) {
     const auto& [log_likelihood, bin] = s.peaks[i];
+    if (p.rest_mass_bound && std::isinf(log_likelihood)) {
+      fmt::print("  {:16}  no bin was evaluated\n", p.objects[i]);
+      continue;
+    }
     const Pose T = lattice.T_object_robot(bin);
     fmt::print("  {:16}  largest {:.3f} nats at x {:.2f} mm, y {:.2f} mm, theta {:.1f} deg\n",
                p.objects[i], log_likelihood, T.translation_mm.x, T.translation_mm.y,

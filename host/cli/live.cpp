@@ -118,13 +118,11 @@ void live(const LiveArguments& options) {
   const TouchDetectorOptions detector =
       detector_options(options.detector, description.pressure_unit, source);
   DeviceInWaiting device_in_waiting(request.device);
-  const RecognitionTask task =
-      resolve(request, {.pressure_unit = description.pressure_unit,
-                        .source = source,
-                        .reach_mm = array_reach_mm(elements_mm),
-                        .need = goal ? HistogramNeed{"plan", plan_needs} : HistogramNeed{},
-                        .device = std::ref(device_in_waiting)});
-  if (goal && !traits_of(task.filter).every_bin) {
+  const RecognitionTask task = resolve(request, {.pressure_unit = description.pressure_unit,
+                                                 .source = source,
+                                                 .reach_mm = array_reach_mm(elements_mm),
+                                                 .device = std::ref(device_in_waiting)});
+  if (goal && !traits_of(task.filter).bins) {
     refuse_flag("--plan", options.plan, "{}; use --filter histogram, or leave it out", plan_needs);
   }
   CommandFiles files;

@@ -184,9 +184,8 @@ void plan_touches(const PlanArguments& options) {
   const RecognitionTask task = resolve(request, {.pressure_unit = recording.pressure_unit,
                                                  .source = recording.path,
                                                  .reach_mm = largest_reach_mm(unknown.touches),
-                                                 .need = {.why = plan_needs},
                                                  .device = std::ref(device_in_waiting)});
-  require_histogram(task);
+  require_plannable(task);
   check_outputs(options, request);
   Device& device = device_in_waiting();
   Recogniser recogniser = open_telling(device, task);
@@ -218,7 +217,7 @@ void add_plan(CLI::App& app) {
   command->add_option("RECORDING", options->recording, "Recording of the touches so far (HDF5)")
       ->required();
   add_recognition_flags(*command, options->request, options->verbose);
-  hide_other_filters(*command);
+  hide_particle_flags(*command);
   command
       ->add_option(
           "--candidates", options->candidates,

@@ -29,8 +29,8 @@ void add_filter_flags(CLI::App& command, Request& request) {
           "histogram: evaluates every pose bin; bounded: the same bins, but evaluates only those "
           "that matter and proves how little the others can; particles: the paper's particle "
           "filter; auto: bounded for more than {} bins of all objects together, else histogram. "
-          "Bounded refuses --slip-sd-*, --posterior, --memory-mib and plans; auto then takes the "
-          "histogram [default: auto]",
+          "Bounded refuses --slip-sd-*, --memory-mib and --fit-touch-sd; auto then takes the "
+          "histogram, as it does for --posterior [default: auto]",
           most_histogram_bins));
   command.add_option("--tolerance", request.tolerance,
                      "With --filter bounded: largest share of the belief that may be left "
@@ -109,12 +109,10 @@ void add_recognition_flags(CLI::App& command, Request& request, bool& verbose) {
       command, request,
       "Pose bins per object along x, y and theta, as 25x25x16; auto: as many as the refined pose "
       "needs, in steps of 0.6 times the maps' cell or 1.2 times the sensor's spread, whichever is "
-      "larger; fine: also as the mode needs, in steps of 0.6 times the larger of both. Auto and "
-      "fine take wider steps where the histogram's device memory is short; the region about an "
-      "automatic "
-      "pivot "
-      "fits the largest array of all RECORDINGs [default: auto, or 25x25x16 where "
-      "a range or a pivot is given]");
+      "larger, or up to twice as wide, as far as half of --touch-sd-*; fine: also as the mode "
+      "needs, in steps of 0.6 times the larger of both. Auto and fine take wider steps where the "
+      "histogram's device memory is short; the region about an automatic pivot fits the largest "
+      "array of all RECORDINGs [default: auto, or 25x25x16 where a range or a pivot is given]");
   add_range_flag(command, "--x-mm", request.x_mm,
                  "Range of the pivot's x in the object frame, mm, as --x-mm=-10:10 [default: "
                  "every place of an array that touches an object of the maps, or -10:10 where "
@@ -159,9 +157,8 @@ void add_recognition_flags(CLI::App& command, Request& request, bool& verbose) {
                    "the lattice, the seconds it took");
 }
 
-void hide_other_filters(CLI::App& command) {
-  for (const char* flag : {"--filter", "--tolerance", "--budget-ms", "--evidence-nats",
-                           "--particles", "--resampling", "--augmented", "--seed"}) {
+void hide_particle_flags(CLI::App& command) {
+  for (const char* flag : {"--particles", "--resampling", "--augmented", "--seed"}) {
     command.get_option(flag)->group("");
   }
 }

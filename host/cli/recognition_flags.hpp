@@ -18,9 +18,9 @@ namespace palpate::cli {
 /// Adds the flags of maps, sensor, lattice and filter, and --verbose.
 void add_recognition_flags(CLI::App& command, Request& request, bool& verbose);
 
-/// Leaves the flags of other filters than the histogram out of the help of a command that needs the
-/// histogram. They are read still, so that the command refuses them with its reason.
-void hide_other_filters(CLI::App& command);
+/// Leaves the flags of particles out of the help of a command that needs a belief over bins. They
+/// are read still, so that the command refuses them with its reason.
+void hide_particle_flags(CLI::App& command);
 
 /// Adds the flags that select unknowns from recordings.
 void add_unknown_flags(CLI::App& command, Request& request);

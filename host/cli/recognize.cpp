@@ -7,6 +7,7 @@
 #include <set>
 #include <span>
 #include <string>
+#include <utility>
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
@@ -24,6 +25,7 @@
 #include "io/atomic_file.hpp"
 #include "io/command_files.hpp"
 #include "palpate/files.hpp"
+#include "recognition/filter_choice.hpp"
 #include "recognition/record_json.hpp"
 #include "recognition/recordings.hpp"
 #include "recognition/touch_sd_fit.hpp"
@@ -92,12 +94,12 @@ struct RecognizeArguments {
   bool fit_touch_sd = false;
 };
 
-HistogramNeed histogram_need(const RecognizeArguments& options) {
+HistogramNeed histogram_need(const RecognizeArguments& options, const Request& request) {
   if (options.fit_touch_sd) {
     return {.option = "fit-touch-sd", .why = touch_sd_fit_needs, .learned_only = true, .eq7 = true};
   }
-  if (!options.posterior.empty()) {
-    return {"posterior", "holds the log-likelihood of every bin, and bounds evaluate few"};
+  if (!options.posterior.empty() && filter_wish(request).kind != FilterKind::bounded) {
+    return {"posterior", "holds the log-likelihood of every bin"};
   }
   return {};
 }
@@ -117,7 +119,7 @@ void check_outputs(const RecognizeArguments& options, const Request& request,
   }
   add_recognition_files(request, files);
   if (!options.posterior.empty()) {
-    if (!traits_of(task.filter).every_bin) {
+    if (!traits_of(task.filter).bins) {
       refuse_flag("--posterior", options.posterior,
                   "particles have no bins; use --filter histogram");
     }
@@ -144,11 +146,20 @@ void check_outputs(const RecognizeArguments& options, const Request& request,
 }
 
 void export_posterior(const std::filesystem::path& path, const RecognitionTask& task,
-                      const PoseHistogram& histogram) {
+                      const Recogniser& recogniser) {
   std::vector<std::string> labels;
   for (const Hypothesis& hypothesis : task.hypotheses) {
     labels.push_back(hypothesis.map.label);
   }
+  if (std::optional<EvaluatedBelief> evaluated = recogniser.evaluated_bins()) {
+    write_posterior(path, {.objects = std::move(labels),
+                           .lattice = recogniser.lattice(),
+                           .log_likelihood = std::move(evaluated->log_likelihood),
+                           .rest_mass_bound = evaluated->rest_mass_bound,
+                           .index = std::move(evaluated->index)});
+    return;
+  }
+  const PoseHistogram& histogram = *recogniser.histogram();
   write_posterior(path, labels, histogram.lattice(), [&](std::size_t object) {
     return histogram.log_likelihood(static_cast<int>(object));
   });
@@ -163,7 +174,7 @@ void write_results(const RecognizeArguments& options, const RecognitionTask& tas
     json_file->write(json);
   }
   if (!options.posterior.empty()) {
-    export_posterior(options.posterior, task, *recogniser.histogram());
+    export_posterior(options.posterior, task, recogniser);
   }
   if (json_file) {
     json_file->commit();
@@ -226,7 +237,7 @@ void recognize(const RecognizeArguments& options) {
                                                  .source = first.path,
                                                  .reach_mm = largest_reach_mm(recordings),
                                                  .still_array = array_is_still(unknowns),
-                                                 .need = histogram_need(options),
+                                                 .need = histogram_need(options, request),
                                                  // Between the steps of bounds' searches, which may
                                                  // take minutes.
                                                  .cancel_point =
@@ -319,8 +330,10 @@ void add_recognize(CLI::App& app) {
   add_unknown_flags(*command, options->request);
   command->add_flag("--trace", options->request.trace, "Show the estimate after every touch");
   command->add_option("--json", options->json, "Write the records as JSON; - is standard output");
-  command->add_option("--posterior", options->posterior,
-                      "Write the log-likelihood of every bin (HDF5); for one recording or frame");
+  command->add_option(
+      "--posterior", options->posterior,
+      "Write the log-likelihood of every bin (HDF5), with --filter bounded of those "
+      "that it evaluated; for one recording or frame");
   command->add_option(
       "--png", options->png,
       "Folder for a picture of each unknown: the touches on the map, the belief over x and y, "

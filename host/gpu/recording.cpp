@@ -21,7 +21,14 @@ void Recording::clear() {
 }
 
 void Recording::encode(std::size_t command, VkCommandBuffer to) const {
-  std::visit([&](const auto& recorded) { encode(recorded, to); }, commands_[command]);
+  // A visitor may throw, as far as its signature tells, and nothing may be thrown here.
+  if (const auto* copy = std::get_if<Copy>(&commands_[command])) {
+    encode(*copy, to);
+  } else if (const auto* fill = std::get_if<Fill>(&commands_[command])) {
+    encode(*fill, to);
+  } else {
+    encode(*std::get_if<Dispatch>(&commands_[command]), to);
+  }
 }
 
 void Recording::encode(const Copy& copy, VkCommandBuffer to) {

@@ -40,7 +40,7 @@ const Kind* find_kind(std::string_view format) {
 
 }  // namespace
 
-void require_format(const Hdf5Contents& file, std::string_view format) {
+int require_format(const Hdf5Contents& file, std::string_view format, int newest) {
   const std::string found = format_of(file);
   if (found != format) {
     const char* wanted = find_kind(format)->name;
@@ -50,16 +50,18 @@ void require_format(const Hdf5Contents& file, std::string_view format) {
     }
     file.refuse("attribute 'format' = '{}' is unknown; give a {} ('{}')", found, wanted, format);
   }
-  if (const int version = file.integer("version", 1); version > format_version) {
+  const int version = file.integer("version", 1);
+  if (version > newest) {
     file.refuse(
         "attribute 'version' = {} is newer than this program, which reads {}; update Palpate",
-        version, format_version);
+        version, newest);
   }
+  return version;
 }
 
-void write_format(Hdf5Writer& file, std::string_view format) {
+void write_format(Hdf5Writer& file, std::string_view format, int version) {
   file.attribute("format", format);
-  file.attribute("version", format_version);
+  file.attribute("version", version);
 }
 
 void write_head(Hdf5Writer& file, const Recording& head) {

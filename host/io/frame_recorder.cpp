@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <exception>
 #include <limits>
 #include <map>
 #include <string>
@@ -259,7 +260,7 @@ FrameRecorder::~FrameRecorder() {
   }
   try {
     close();
-  } catch (const Error& error) {
+  } catch (const std::exception& error) {
     log_message(LogLevel::error, error.what());  // callers who want to know call close()
   }
 }

@@ -80,6 +80,7 @@ class Hdf5Writer {
   static hid_t native_type(const glm::dvec2&) { return H5T_NATIVE_DOUBLE; }
   static hid_t native_type(const Pose&) { return H5T_NATIVE_DOUBLE; }
   static hid_t native_type(float) { return H5T_NATIVE_FLOAT; }
+  static hid_t native_type(std::int32_t) { return H5T_NATIVE_INT32; }
   static hid_t native_type(std::uint8_t) { return H5T_NATIVE_UINT8; }
   static hid_t native_type(std::uint64_t) { return H5T_NATIVE_UINT64; }
 

@@ -1,7 +1,9 @@
+#include <array>
 #include <cmath>
 #include <functional>
 #include <limits>
 #include <span>
+#include <utility>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -58,17 +60,67 @@ std::vector<std::uint64_t> shape_of(std::size_t objects, const PoseLattice& latt
           static_cast<std::uint64_t>(lattice.x_mm.count)};
 }
 
-/// Reads and checks a posterior's file, holding a few MB of it at a time.
+void require_share(const std::filesystem::path& path, double rest_mass_bound) {
+  if (!(rest_mass_bound >= 0.0 && rest_mass_bound <= 1.0)) {
+    refuse(path, "attribute 'rest_mass_bound' = {}; store a share from 0 to 1", rest_mass_bound);
+  }
+}
+
+/// All bins of all objects. @throws Error where they are too many to be numbered
+std::int64_t numbered_bins(const std::filesystem::path& path, const Posterior& posterior) {
+  const std::vector<std::uint64_t> shape = shape_of(posterior.objects.size(), posterior.lattice);
+  const std::uint64_t bins = stored_bytes(shape, 1);
+  if (bins > std::numeric_limits<std::int64_t>::max()) {
+    refuse(path, "{} bins are too many to be numbered; store fewer", shape);
+  }
+  return static_cast<std::int64_t>(bins);
+}
+
+/// The rows of `index`, [n, 4] of object, theta, y and x, as places among all bins.
+std::vector<std::int64_t> read_index(const std::filesystem::path& path, Hdf5Contents& file,
+                                     const Posterior& posterior) {
+  numbered_bins(path, posterior);
+  const std::uint64_t rows = file.shape("log_likelihood", 1)[0];
+  if (const auto& shape = file.shape("index", 2); shape != std::vector<std::uint64_t>{rows, 4}) {
+    file.refuse("dataset 'index' has the shape {}; 'log_likelihood' makes it [{}, 4]", shape, rows);
+  }
+  require_memory(path, fmt::format("a posterior of {} bins", rows),
+                 stored_bytes(std::array{rows}, sizeof(std::int64_t) + sizeof(double)));
+  const std::vector<std::uint64_t> counts = shape_of(posterior.objects.size(), posterior.lattice);
+  std::vector<std::int64_t> index;
+  index.reserve(rows);
+  std::size_t column = 0;
+  std::int64_t place = 0;
+  file.read("index", [&](std::uint64_t, std::span<const double> values) {
+    for (const double value : values) {
+      const std::uint64_t count = counts[column];
+      if (!(value >= 0.0 && value < static_cast<double>(count) && value == std::floor(value))) {
+        refuse(path,
+               "dataset 'index' holds {} in column {}; store object, theta, y and x, counted "
+               "from 0, each below its number of bins, here {}",
+               value, column, count);
+      }
+      place = place * static_cast<std::int64_t>(count) + static_cast<std::int64_t>(value);
+      if (++column == counts.size()) {
+        index.push_back(place);
+        column = 0;
+        place = 0;
+      }
+    }
+  });
+  return index;
+}
+
+/// Reads and checks a posterior's file, holding a few MB of it and `index` at a time.
 /// @param head called with the posterior without log-likelihoods
-/// @param log_likelihood called with the log-likelihoods, object by object, in pieces
-void scan_posterior(const std::filesystem::path& path,
-                    const std::function<void(const Posterior&)>& head,
+/// @param log_likelihood called with the log-likelihoods, in their order, in pieces
+void scan_posterior(const std::filesystem::path& path, const std::function<void(Posterior)>& head,
                     const std::function<void(std::span<const double>)>& log_likelihood) {
   Hdf5Contents file(path,
                     {"format", "version", "objects", "bins_x", "bins_y", "bins_theta", "x_mm",
-                     "y_mm", "theta_rad", "pivot_mm"},
-                    {"log_likelihood"});
-  require_format(file, posterior_format);
+                     "y_mm", "theta_rad", "pivot_mm", "rest_mass_bound"},
+                    {"log_likelihood", "index"});
+  const int version = require_format(file, posterior_format, evaluated_version);
   Posterior posterior;
   posterior.objects = file.texts("objects");
   PoseLattice& lattice = posterior.lattice;
@@ -79,35 +131,89 @@ void scan_posterior(const std::filesystem::path& path,
   lattice.pivot_mm = {pivot[0], pivot[1]};
   validate(path, posterior.objects, lattice);
   const std::vector<std::uint64_t> expected = shape_of(posterior.objects.size(), lattice);
-  if (const auto& shape = file.shape("log_likelihood", 4); shape != expected) {
+  if (version == evaluated_version) {
+    posterior.rest_mass_bound = file.number("rest_mass_bound");
+    require_share(path, *posterior.rest_mass_bound);
+    posterior.index = read_index(path, file, posterior);
+  } else if (const auto& shape = file.shape("log_likelihood", 4); shape != expected) {
     file.refuse("dataset 'log_likelihood' has the shape {}; its attributes make it {}", shape,
                 expected);
   }
-  head(posterior);
+  head(std::move(posterior));
   file.read("log_likelihood", [&](std::uint64_t, std::span<const double> values) {
     require_log_likelihoods(path, values);
     log_likelihood(values);
   });
 }
 
+void write_posterior_head(Hdf5Writer& file, int version, const std::vector<std::string>& objects,
+                          const PoseLattice& lattice) {
+  write_format(file, posterior_format, version);
+  file.attribute("objects", objects);
+  file.attribute("bins_x", lattice.x_mm.count);
+  file.attribute("bins_y", lattice.y_mm.count);
+  file.attribute("bins_theta", lattice.theta_rad.count);
+  file.attribute("x_mm", {lattice.x_mm.lower, lattice.x_mm.upper});
+  file.attribute("y_mm", {lattice.y_mm.lower, lattice.y_mm.upper});
+  file.attribute("theta_rad", {lattice.theta_rad.lower, lattice.theta_rad.upper});
+  file.attribute("pivot_mm", {lattice.pivot_mm.x, lattice.pivot_mm.y});
+}
+
+void write_evaluated(const std::filesystem::path& path, const Posterior& posterior) {
+  const PoseLattice& lattice = posterior.lattice;
+  const std::size_t rows = posterior.index.size();
+  if (posterior.log_likelihood.size() != rows) {
+    refuse(path, "an index of {} bins and {} log-likelihoods cannot be written; make them agree",
+           rows, posterior.log_likelihood.size());
+  }
+  require_log_likelihoods(path, posterior.log_likelihood);
+  require_share(path, *posterior.rest_mass_bound);
+  const std::int64_t bins = numbered_bins(path, posterior);
+  std::vector<std::int32_t> index;
+  index.reserve(4 * rows);
+  for (const std::int64_t place : posterior.index) {
+    if (place < 0 || place >= bins) {
+      refuse(path, "index: {} is no bin of {}; number them from 0", place, bins);
+    }
+    const std::int64_t bin = place % lattice.bins();
+    const std::int64_t in_plane = bin % lattice.plane();
+    for (const std::int64_t part : {place / lattice.bins(), bin / lattice.plane(),
+                                    in_plane / lattice.x_mm.count, in_plane % lattice.x_mm.count}) {
+      index.push_back(static_cast<std::int32_t>(part));
+    }
+  }
+  // HDF5 has no chunks of nothing.
+  const Hdf5Writer::Storage storage =
+      rows > 0 ? Hdf5Writer::Storage::compressed : Hdf5Writer::Storage::plain;
+  Hdf5Writer file(path);
+  write_posterior_head(file, evaluated_version, posterior.objects, lattice);
+  file.attribute("rest_mass_bound", *posterior.rest_mass_bound);
+  file.dataset("index", {rows, 4}, index, storage);
+  file.dataset("log_likelihood", {rows}, posterior.log_likelihood, storage);
+  file.save();
+}
+
 }  // namespace
 
 PosteriorSummary summarize_posterior(const std::filesystem::path& path) {
   PosteriorSummary summary;
-  std::size_t bins = 0;
-  std::size_t k = 0;
+  std::int64_t bins = 0;
+  std::int64_t k = 0;
   scan_posterior(
       path,
-      [&](const Posterior& head) {
-        summary.head = head;
-        bins = static_cast<std::size_t>(head.lattice.bins());
+      [&](Posterior head) {
+        bins = head.lattice.bins();
         summary.peaks.assign(head.objects.size(), {-std::numeric_limits<double>::infinity(), 0});
+        summary.head = std::move(head);
       },
       [&](std::span<const double> values) {
+        const bool every_bin = !summary.head.rest_mass_bound;
         for (const double value : values) {
-          PosteriorSummary::Peak& peak = summary.peaks[k / bins];
+          const std::int64_t place =
+              every_bin ? k : summary.head.index[static_cast<std::size_t>(k)];
+          PosteriorSummary::Peak& peak = summary.peaks[static_cast<std::size_t>(place / bins)];
           if (value > peak.log_likelihood) {
-            peak = {value, static_cast<std::int64_t>(k % bins)};
+            peak = {value, place % bins};
           }
           ++k;
         }
@@ -119,8 +225,12 @@ Posterior read_posterior(const std::filesystem::path& path) {
   Posterior posterior;
   scan_posterior(
       path,
-      [&](const Posterior& head) {
-        posterior = head;
+      [&](Posterior head) {
+        posterior = std::move(head);
+        if (posterior.rest_mass_bound) {
+          posterior.log_likelihood.reserve(posterior.index.size());
+          return;
+        }
         const std::vector<std::uint64_t> shape =
             shape_of(posterior.objects.size(), posterior.lattice);
         require_memory(path, fmt::format("a posterior of {} bins", fmt::join(shape, " x ")),
@@ -139,15 +249,7 @@ void write_posterior(const std::filesystem::path& path, const std::vector<std::s
                      const std::function<std::vector<double>(std::size_t object)>& log_likelihood) {
   validate(path, objects, lattice);
   Hdf5Writer file(path);
-  write_format(file, posterior_format);
-  file.attribute("objects", objects);
-  file.attribute("bins_x", lattice.x_mm.count);
-  file.attribute("bins_y", lattice.y_mm.count);
-  file.attribute("bins_theta", lattice.theta_rad.count);
-  file.attribute("x_mm", {lattice.x_mm.lower, lattice.x_mm.upper});
-  file.attribute("y_mm", {lattice.y_mm.lower, lattice.y_mm.upper});
-  file.attribute("theta_rad", {lattice.theta_rad.lower, lattice.theta_rad.upper});
-  file.attribute("pivot_mm", {lattice.pivot_mm.x, lattice.pivot_mm.y});
+  write_posterior_head(file, format_version, objects, lattice);
   const std::vector<std::uint64_t> shape = shape_of(objects.size(), lattice);
   const std::uint64_t bins = stored_bytes(shape_of(1, lattice), 1);
   file.dataset(
@@ -166,8 +268,14 @@ void write_posterior(const std::filesystem::path& path, const std::vector<std::s
 }
 
 void write_posterior(const std::filesystem::path& path, const Posterior& posterior) {
-  const auto& [objects, lattice, logs] = posterior;
+  const std::vector<std::string>& objects = posterior.objects;
+  const PoseLattice& lattice = posterior.lattice;
+  const std::vector<double>& logs = posterior.log_likelihood;
   validate(path, objects, lattice);
+  if (posterior.rest_mass_bound) {
+    write_evaluated(path, posterior);
+    return;
+  }
   if (logs.size() != stored_bytes(shape_of(objects.size(), lattice), 1)) {
     refuse(path, "a posterior of {} bins and {} log-likelihoods cannot be written; make them agree",
            fmt::format("{}", fmt::join(shape_of(objects.size(), lattice), " x ")), logs.size());

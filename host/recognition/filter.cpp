@@ -50,6 +50,12 @@ class FilterInBins : public FilterOf<Own> {
                                                  PoseLattice& /*lattice*/) const override {
     return this->own_.likely_bins(objects, least_share);
   }
+  std::optional<double> entropy() const override { return this->own_.entropy(); }
+  std::vector<TouchGain> expected_gain(std::span<const Pose> T_robot_sensor,
+                                       std::span<const glm::dvec2> elements_mm,
+                                       const PlanOptions& plan) const override {
+    return this->own_.expected_gain(T_robot_sensor, elements_mm, plan);
+  }
 };
 
 class HistogramFilter final : public FilterInBins<PoseHistogram> {
@@ -72,6 +78,7 @@ class BoundedFilter final : public FilterInBins<BoundedPosterior> {
   Marginals marginals(int object, const PoseLattice& lattice) const override {
     return own_.marginals(object, marginal_grid(lattice));
   }
+  std::optional<EvaluatedBelief> evaluated_bins() const override { return own_.evaluated_bins(); }
   std::string path() const override { return own_.path(); }
   std::uint64_t host_bytes() const override { return own_.host_bytes(); }
 };

@@ -22,11 +22,11 @@ using FilterOptions = std::variant<HistogramOptions, BoundedOptions, ParticleOpt
 
 /// What a filter can tell, whatever its options' numbers.
 struct FilterTraits {
-  /// Believes in bins of a lattice, and so has a refined pose, a log-likelihood of the mode, and
-  /// beliefs that a touch may surprise. Particles have none: motion noise comes between.
+  /// Believes in bins of a lattice, and so has a refined pose, a log-likelihood of the mode, plans,
+  /// and beliefs that a touch may surprise. Particles have none: motion noise comes between.
   bool bins = false;
-  /// Evaluates every bin, in the device's memory, as soon as a touch comes. Plans, posteriors and
-  /// displacements that are to be fitted need it.
+  /// Evaluates every bin, in the device's memory, as soon as a touch comes. Posteriors of every bin
+  /// and displacements that are to be fitted need it.
   bool every_bin = false;
   /// Keeps touches, searches on the host once it is asked about the belief, and proves what it left
   /// out (Certificate).
@@ -60,6 +60,14 @@ class Filter {
   virtual std::vector<std::vector<BinShare>> likely_bins(std::span<const int> objects,
                                                          double least_share,
                                                          PoseLattice& lattice) const = 0;
+  /// Entropy over objects and bins in nats.
+  virtual std::optional<double> entropy() const { return {}; }
+  /// See PoseHistogram::expected_gain().
+  virtual std::vector<TouchGain> expected_gain(std::span<const Pose> /*T_robot_sensor*/,
+                                               std::span<const glm::dvec2> /*elements_mm*/,
+                                               const PlanOptions& /*plan*/) const {
+    return {};
+  }
   virtual std::optional<double> effective_sample_size() const { return {}; }
 
   /// How the filter computes, and why.
@@ -68,6 +76,8 @@ class Filter {
   virtual std::uint64_t host_bytes() const { return 0; }
   /// The belief over every bin; nullptr where FilterTraits::every_bin is false.
   virtual const PoseHistogram* histogram() const { return nullptr; }
+  /// BoundedPosterior::evaluated_bins(); nothing where FilterTraits::certificate is false.
+  virtual std::optional<EvaluatedBelief> evaluated_bins() const { return {}; }
 };
 
 /// The filter that the options name.

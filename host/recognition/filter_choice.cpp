@@ -82,8 +82,7 @@ std::optional<double> none_weight(const Request& request, std::span<const Hypoth
 std::vector<HistogramNeed> all_needs(const Request& request, const HistogramNeed& of_caller) {
   std::vector<HistogramNeed> needs;
   if (!of_caller.why.empty()) {
-    needs.push_back(
-        {of_caller.option.empty() ? "" : fmt::format("`{}`", of_caller.option), of_caller.why});
+    needs.push_back({fmt::format("`{}`", of_caller.option), of_caller.why});
   }
   if (const std::string slip = giver_of(request, {slip_mm(request), slip_deg(request)});
       !slip.empty()) {
@@ -95,13 +94,10 @@ std::vector<HistogramNeed> all_needs(const Request& request, const HistogramNeed
   return needs;
 }
 
-/// What would have to go for bounds to take the bins: "`a` and `b`"; "" where there is no way.
+/// What would have to go for bounds to take the bins: "`a` and `b`".
 std::string names_of(std::span<const HistogramNeed> needs) {
   std::vector<std::string> names;
   for (const HistogramNeed& need : needs) {
-    if (need.option.empty()) {
-      return "";
-    }
     names.push_back(need.option);
   }
   return fmt::format("{}", fmt::join(names, " and "));
@@ -218,9 +214,7 @@ ChosenFilter choose_filter(const FilterWish& wish, const Request& request,
     if (!needs.empty()) {
       const HistogramNeed& need = needs.front();
       throw Error(Fault::input,
-                  need.option.empty()
-                      ? fmt::format("{}: {}; leave it out", wish.by, need.why)
-                      : fmt::format("{}: {}; leave it out, or {}", need.option, need.why, wish.by));
+                  fmt::format("{}: {}; leave it out, or {}", need.option, need.why, wish.by));
     }
     return {asked_bounds(request, histogram), false, wish.by};
   }
@@ -272,7 +266,9 @@ ChosenBins chosen_bins(const Device& device, std::span<const Hypothesis> hypothe
       most = std::max(most, static_cast<std::int64_t>(hypotheses.size()));
     }
   }
-  return {balanced_lattice(lattice_of(filter.options), hypotheses, most, width), most};
+  return {balanced_lattice(lattice_of(filter.options), hypotheses, most, width,
+                           touch_sd_of(filter.options)),
+          most};
 }
 
 FilterOptions filter_for_bins(std::span<const Hypothesis> hypotheses,

@@ -389,9 +389,7 @@ PlannedTouch LiveRecognition::plan(const DetectedTouch& touch) const {
   const std::vector<PoseSample> samples = recogniser_.sample(options.samples, options.seed);
   const std::vector<Pose> candidates =
       candidate_grid(samples, task_, living_mm, touch.T_robot_sensor->theta_rad);
-  return rank_touches(*recogniser_.histogram(), task_, candidates, living_mm, *options_.plan,
-                      options)
-      .front();
+  return rank_touches(recogniser_, task_, candidates, living_mm, *options_.plan, options).front();
 }
 
 }  // namespace palpate

@@ -44,6 +44,14 @@ class Recogniser {
   std::vector<PoseSample> sample(std::size_t count, std::uint64_t seed) const {
     return filter_->sample(count, seed);
   }
+  /// Filter::entropy(); empty for particles.
+  std::optional<double> entropy() const { return filter_->entropy(); }
+  /// See PoseHistogram::expected_gain(); empty for particles.
+  std::vector<TouchGain> expected_gain(std::span<const Pose> T_robot_sensor,
+                                       std::span<const glm::dvec2> elements_mm,
+                                       const PlanOptions& plan) const {
+    return filter_->expected_gain(T_robot_sensor, elements_mm, plan);
+  }
   /// Whether the belief has taken in a touch since reset(). Touches that wait for an automatic
   /// pivot do not count.
   bool touched() const { return touched_; }
@@ -71,6 +79,8 @@ class Recogniser {
   std::uint64_t host_bytes() const { return filter_->host_bytes(); }
   /// See Filter::histogram().
   const PoseHistogram* histogram() const { return filter_->histogram(); }
+  /// See Filter::evaluated_bins().
+  std::optional<EvaluatedBelief> evaluated_bins() const { return filter_->evaluated_bins(); }
 
  private:
   /// A copy of a touch that waits for the pivot.

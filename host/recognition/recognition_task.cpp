@@ -40,6 +40,18 @@ FilterOptions with_lattice(FilterOptions filter, const PoseLattice& lattice) {
   return filter;
 }
 
+DisplacementSd touch_sd_of(const FilterOptions& filter) {
+  return std::visit(
+      [](const auto& one) {
+        if constexpr (requires { one.touch_sd; }) {
+          return one.touch_sd;
+        } else {
+          return DisplacementSd{};
+        }
+      },
+      filter);
+}
+
 RecognitionTask::RecognitionTask(std::vector<Hypothesis> objects, const FilterOptions& options)
     : hypotheses(std::move(objects)), filter(options) {
   for (const Hypothesis& hypothesis : hypotheses) {
@@ -67,18 +79,6 @@ RecognitionTask::RecognitionTask(std::vector<Hypothesis> objects, const FilterOp
 
 const ContactModel& RecognitionTask::contact() const {
   return std::visit([](const auto& one) -> const ContactModel& { return one.contact; }, filter);
-}
-
-DisplacementSd RecognitionTask::touch_sd() const {
-  return std::visit(
-      [](const auto& one) {
-        if constexpr (requires { one.touch_sd; }) {
-          return one.touch_sd;
-        } else {
-          return DisplacementSd{};
-        }
-      },
-      filter);
 }
 
 DisplacementSd RecognitionTask::slip_sd() const {
@@ -123,8 +123,13 @@ std::string wider_bins_sentence(const RecognitionTask& task) {
   const double x_mm = lattice.x_mm.step();
   const double y_mm = lattice.y_mm.step();
   const double theta_rad = lattice.theta_rad.step();
-  if (!(x_mm > much * learned.x_mm || y_mm > much * learned.y_mm ||
-        theta_rad > much * learned.theta_rad)) {
+  // Bins are narrow beside a belief that is smooth over so much of a standard deviation: a little
+  // more than balanced_lattice() takes.
+  constexpr double of_sd = 0.51;
+  const DisplacementSd sd = task.touch_sd();
+  if (!(x_mm > std::max(much * learned.x_mm, of_sd * sd.mm) ||
+        y_mm > std::max(much * learned.y_mm, of_sd * sd.mm) ||
+        theta_rad > std::max(much * learned.theta_rad, of_sd * sd.rad))) {
     return "";
   }
   constexpr double degrees = 180.0 / std::numbers::pi;

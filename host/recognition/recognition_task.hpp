@@ -18,6 +18,8 @@ namespace palpate {
 /// The lattice of a histogram or of a bounded posterior, or the particles' region, whose bins only
 /// marginals have.
 const PoseLattice& lattice_of(const FilterOptions& filter);
+/// How far a touch may be displaced; particles do not allow for it.
+DisplacementSd touch_sd_of(const FilterOptions& filter);
 /// Bins of so many objects together.
 std::int64_t bins_in_all(std::size_t objects, const PoseLattice& lattice);
 /// The filter on another lattice.
@@ -37,8 +39,8 @@ struct RecognitionTask {
   /// See lattice_of().
   const PoseLattice& lattice() const { return lattice_of(filter); }
   const ContactModel& contact() const;
-  /// How far a touch may be displaced; particles do not allow for it.
-  DisplacementSd touch_sd() const;
+  /// See touch_sd_of().
+  DisplacementSd touch_sd() const { return touch_sd_of(filter); }
   /// How far the object may move between two touches; only a histogram allows for it (the motion
   /// noise of particles is not meant).
   DisplacementSd slip_sd() const;

@@ -13,7 +13,7 @@ namespace palpate {
 
 /// Why a caller needs the histogram, beside what the request says.
 struct HistogramNeed {
-  std::string option = {};  ///< that asks for what needs it; "" where the caller always does
+  std::string option = {};  ///< that asks for what needs it
   std::string why = {};     ///< "" where every filter will do
   /// Every unknown is one of the maps' objects, or cannot be told from "(none)", which then has no
   /// weight unless it is given one.

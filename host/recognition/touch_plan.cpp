@@ -157,14 +157,14 @@ double gain_for(const TouchGain& gain, PlanGoal goal) {
                                     : gain.both();
 }
 
-std::vector<PlannedTouch> rank_touches(const PoseHistogram& histogram, const RecognitionTask& task,
+std::vector<PlannedTouch> rank_touches(const Recogniser& recogniser, const RecognitionTask& task,
                                        std::span<const Pose> T_robot_sensor,
                                        std::span<const glm::dvec2> elements_mm, PlanGoal goal,
                                        const PlanOptions& options) {
   PlanOptions by_label = options;
   by_label.label_of = task.label_of;
   const std::vector<TouchGain> gains =
-      histogram.expected_gain(T_robot_sensor, elements_mm, by_label);
+      recogniser.expected_gain(T_robot_sensor, elements_mm, by_label);
   std::vector<PlannedTouch> ranked;
   for (std::size_t i = 0; i < gains.size(); ++i) {
     ranked.push_back({i, T_robot_sensor[i], gains[i]});
@@ -243,8 +243,8 @@ PlanRequest plan_request(const std::string& goal, const std::string& candidates,
   return request;
 }
 
-void require_histogram(const RecognitionTask& task) {
-  if (!traits_of(task.filter).every_bin) {
+void require_plannable(const RecognitionTask& task) {
+  if (!traits_of(task.filter).bins) {
     refuse_option("filter", "particles", "{}; use `filter histogram`, or leave it out", plan_needs);
   }
 }
@@ -265,12 +265,12 @@ Plan plan_touch(Recogniser& recogniser, const RecognitionTask& task, const Unkno
       request.candidates.empty() ? candidate_grid(plan.samples, task, plan.elements_mm,
                                                   unknown.touches.front().T_robot_sensor.theta_rad)
                                  : request.candidates;
-  plan.ranked = rank_touches(*recogniser.histogram(), task, candidates, plan.elements_mm,
-                             request.goal, request.options);
+  plan.ranked =
+      rank_touches(recogniser, task, candidates, plan.elements_mm, request.goal, request.options);
   plan.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   // Gains are of the belief before temperature and features.
   plan.identity_nats = label_entropy(sums_by_label(recogniser.estimate(), task), task);
-  plan.both_nats = recogniser.histogram()->entropy();
+  plan.both_nats = recogniser.entropy().value();
   return plan;
 }
 

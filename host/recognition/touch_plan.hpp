@@ -13,7 +13,6 @@
 #include "palpate/estimate.hpp"
 #include "palpate/plan.hpp"
 #include "palpate/pose.hpp"
-#include "palpate/pose_histogram.hpp"
 #include "recognition/recognition_record.hpp"
 #include "recognition/recognition_task.hpp"
 
@@ -40,11 +39,11 @@ struct PlannedTouch {
 };
 
 /// Ranks candidate touches by what each is expected to tell; see PoseHistogram::expected_gain().
-/// Maps of one label count as one object. The largest gain comes first. Gains below least_gain_nats
-/// count as equal; of equal gains comes first the one that tells most about object and pose
-/// together, then the lower index.
+/// Not for particles. Maps of one label count as one object. The largest gain comes first. Gains
+/// below least_gain_nats count as equal; of equal gains comes first the one that tells most about
+/// object and pose together, then the lower index.
 /// @param elements_mm [e] living elements, in the sensor frame
-std::vector<PlannedTouch> rank_touches(const PoseHistogram& histogram, const RecognitionTask& task,
+std::vector<PlannedTouch> rank_touches(const Recogniser& recogniser, const RecognitionTask& task,
                                        std::span<const Pose> T_robot_sensor,
                                        std::span<const glm::dvec2> elements_mm, PlanGoal goal,
                                        const PlanOptions& options = {});
@@ -80,10 +79,10 @@ PlanRequest plan_request(const std::string& goal, const std::string& candidates,
 /// @throws Error naming their source
 void require_reachable(const std::string& source, std::span<const Pose> candidates);
 
-/// Why a plan has no other filter than the histogram.
-inline constexpr const char* plan_needs = "a plan needs the belief of all poses";
-/// Refuses a task with particles, which `plan_needs`.
-void require_histogram(const RecognitionTask& task);
+/// Why particles cannot plan.
+inline constexpr const char* plan_needs = "a plan needs a belief over bins";
+/// @throws Error where the task has particles
+void require_plannable(const RecognitionTask& task);
 
 /// What was planned, and what is believed before the touch.
 struct Plan {
@@ -98,7 +97,7 @@ struct Plan {
   double seconds = 0.0;  ///< wall time after the recognition
 };
 /// Recognises the unknown and ranks the touches that may come next.
-/// @param recogniser of the task, a histogram without touches
+/// @param recogniser of the task, without touches; see require_plannable()
 /// @throws Error where the unknown has no touches or no living element, and as recognise() and
 /// PoseHistogram::expected_gain() do; what `progress` throws
 Plan plan_touch(Recogniser& recogniser, const RecognitionTask& task, const Unknown& unknown,

@@ -91,6 +91,16 @@ std::tuple<Result<std::int64_t, 1>, Result<double, 1>> likely_bins(const Named<F
   return {owned(std::move(bins)), owned(std::move(shares))};
 }
 
+template <typename Filter>
+TouchGains expected_gain(const Named<Filter>& self, const ArrayLike& T_robot_sensor,
+                         const ArrayLike& elements_mm, std::size_t samples, std::uint64_t seed) {
+  return {self.use([poses = poses_of(T_robot_sensor, "T_robot_sensor"),
+                    elements = points_of(elements_mm, "elements_mm"), samples,
+                    seed](Filter& belief, Call&) {
+    return belief.expected_gain(poses, elements, {.samples = samples, .seed = seed});
+  })};
+}
+
 using Histogram = Named<PoseHistogram>;
 
 DisplacementSd sd_of(const DisplacementSdLike& sd, const char* name) {
@@ -113,15 +123,6 @@ auto of_each(Number number) {
     std::ranges::transform(gains.each, std::back_inserter(numbers), number);
     return owned(std::move(numbers));
   };
-}
-
-TouchGains expected_gain(const Histogram& self, const ArrayLike& T_robot_sensor,
-                         const ArrayLike& elements_mm, std::size_t samples, std::uint64_t seed) {
-  return {self.use([poses = poses_of(T_robot_sensor, "T_robot_sensor"),
-                    elements = points_of(elements_mm, "elements_mm"), samples,
-                    seed](PoseHistogram& belief, Call&) {
-    return belief.expected_gain(poses, elements, {.samples = samples, .seed = seed});
-  })};
 }
 
 void bind_gains(nb::module_& module) {
@@ -167,6 +168,10 @@ void bind_belief(nb::class_<Named<Belief>> belief, const char* class_name) {
            "lattice, theta, y, x, x fastest, and the shares [n].")
       .def("sample", on_device<Own>(&Belief::sample), "count"_a, "seed"_a = 0,
            "Draws objects and poses from the belief.")
+      .def("expected_gain", &expected_gain<Belief>, "T_robot_sensor"_a, "elements_mm"_a,
+           nb::kw_only(), "samples"_a = PlanOptions{}.samples, "seed"_a = 0,
+           "What one more touch at each candidate pose [n, 3] is expected to tell, in nats.\n"
+           "elements_mm [e, 2]: living elements in the sensor frame.")
       .def("reset", on_device<Own>(&Belief::reset),
            "Returns to the uniform belief, for the next unknown.")
       .def_prop_ro("lattice", on_device<Own>(&Belief::lattice), "The bins.");
@@ -232,10 +237,6 @@ void bind_histogram(nb::module_& module) {
               "weights.")
           .def("entropy", on_device<Histogram>(&PoseHistogram::entropy),
                "Entropy of the belief over objects and bins, in nats.")
-          .def("expected_gain", &expected_gain, "T_robot_sensor"_a, "elements_mm"_a, nb::kw_only(),
-               "samples"_a = PlanOptions{}.samples, "seed"_a = 0,
-               "What one more touch at each candidate pose [n, 3] is expected to tell, in nats.\n"
-               "elements_mm [e, 2]: living elements in the sensor frame.")
           .def_prop_ro("device_bytes", on_device<Histogram>(&PoseHistogram::device_bytes),
                        "Device memory held.");
   bind_belief(belief, "PoseHistogram");
@@ -318,6 +319,13 @@ void bind_particles(nb::module_& module) {
 
 using Bounded = Named<BoundedPosterior>;
 
+std::tuple<Result<std::int64_t, 1>, Result<double, 1>, double> evaluated_bins(const Bounded& self) {
+  EvaluatedBelief bins =
+      self.use([](BoundedPosterior& belief, Call&) { return belief.evaluated_bins(); });
+  return {owned(std::move(bins.index)), owned(std::move(bins.log_likelihood)),
+          bins.rest_mass_bound};
+}
+
 void bind_bounded(nb::module_& module) {
   const auto belief =
       nb::class_<Bounded>(
@@ -381,6 +389,10 @@ void bind_bounded(nb::module_& module) {
               },
               "object"_a, "T_object_robot"_a,
               "Log-likelihood of any pose [3] of an object in nats, in float64.")
+          .def("evaluated_bins", &evaluated_bins,
+               "The bins that the search evaluated: indices [n] into [object, theta, y, x], x\n"
+               "fastest, log-likelihoods [n] in nats, without prior weights, and a bound of the\n"
+               "share of the belief that all other bins hold together.")
           .def("entropy", on_device<Bounded>(&BoundedPosterior::entropy),
                "Entropy of the belief over objects and evaluated bins, in nats.")
           .def_prop_ro("host_bytes", on_device<Bounded>(&BoundedPosterior::host_bytes),

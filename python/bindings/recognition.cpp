@@ -117,10 +117,9 @@ Planned plan_next(const Subject& subject, const PlanRequest& wanted, Device& dev
       resolve(subject.request, {.pressure_unit = subject.recordings.front().pressure_unit,
                                 .source = unknown.recording,
                                 .reach_mm = largest_reach_mm(unknown.touches),
-                                .need = {.why = plan_needs},
                                 .cancel_point = [&call] { call.check(); },
                                 .device = [&]() -> Device& { return device; }});
-  require_histogram(task);
+  require_plannable(task);
   Recogniser recogniser = open_recogniser(device, task);
   planned.told = task.remarks;
   planned.plan = plan_touch(recogniser, task, unknown, wanted, call.progress());

@@ -119,15 +119,16 @@ TEST_F(CalibrateCommand, LearnsForTheBinsThatRecognizeWillHave) {
   EXPECT_NEAR(sensor.bins->theta_rad, std::numbers::pi / 12.0, 1e-9);
   done({"map", "A.h5", "-o", "maps/", "--sensor-model", "s.yaml"});
   write_recording(folder_ / "u.h5", sample_unknown("A", {{2.0, -3.0}, 1.0}, 1));
-  const auto said = [&](const char* bins) {
-    return palpate(
-               {"recognize", "u.h5", "--maps", "maps", "--bins", bins, "--sensor-model", "s.yaml"})
+  const auto said = [&](const char* bins, const char* touch_sd_mm = "0") {
+    return palpate({"recognize", "u.h5", "--maps", "maps", "--bins", bins, "--sensor-model",
+                    "s.yaml", "--touch-sd-mm", touch_sd_mm})
         .err;
   };
   EXPECT_EQ(said("20x20x24"), "");
   EXPECT_THAT(
       said("10x10x24"),
       HasSubstr("bins are 2 x 2 mm x 15 degrees wide, wider than the 1 x 1 mm x 15 degrees"));
+  EXPECT_EQ(said("10x10x24", "4"), "") << "the belief is as smooth";
 }
 
 TEST_F(CalibrateCommand, RefusesBinsThatSayNothing) {

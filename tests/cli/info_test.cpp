@@ -121,6 +121,12 @@ TEST_F(InfoCommand, Posterior) {
   write_posterior(folder_ / "p.h5", posterior);
   expect_info("p.h5", {"posterior over A, I", "2 x 1 x 1", "-5.000 nats at x -5.00 mm",
                        "-8.000 nats at x 5.00 mm"});
+  posterior.log_likelihood = {-7.0, -4.0};
+  posterior.rest_mass_bound = 3e-4;
+  posterior.index = {2, 3};
+  write_posterior(folder_ / "p.h5", posterior);
+  expect_info("p.h5", {"2 bins; all others hold at most 0.0003 of the belief",
+                       "A                 no bin was evaluated", "-4.000 nats at x 5.00 mm"});
 }
 
 TEST_F(InfoCommand, SensorModel) {

@@ -241,7 +241,6 @@ TEST_F(BoundedFilter, RefusesWhatNeedsTheHistogram) {
     const std::string by = asks.front() == "--filter" ? "--filter bounded" : asks.front();
     for (const auto& [flag, value, why] : {std::tuple{"--slip-sd-mm", "0.5", "at rest"},
                                            {"--slip-sd-deg", "3", "at rest"},
-                                           {"--posterior", "p.h5", "every bin"},
                                            {"--memory-mib", "100", "has no effect"}}) {
       Arguments flags = asks;
       flags.insert(flags.end(), {flag, value});
@@ -251,14 +250,31 @@ TEST_F(BoundedFilter, RefusesWhatNeedsTheHistogram) {
     Arguments fit = asks;
     fit.emplace_back("--fit-touch-sd");
     refused(fit, {"--fit-touch-sd", "leave it out, or " + by});
-    Arguments plan{"plan", "u.h5", "--maps", "maps", "--candidates", "grid"};
-    plan.insert(plan.end(), asks.begin(), asks.end());
-    expect_refused(plan, {by + ": ", "a plan needs the belief of all poses", "leave it out"});
-    Arguments live{"live", "--sensor", "simulate:A", "--maps", "maps", "--plan", "both"};
-    live.insert(live.end(), asks.begin(), asks.end());
-    expect_refused(live, {"--plan: ", "a plan needs the belief of all poses", by});
   }
   refused({"--filter", "bounded", "--particles", "9"}, {"--particles", "--filter particles"});
+}
+
+TEST_F(BoundedFilter, WritesThePosteriorOfTheBinsThatItEvaluated) {
+  u({"--posterior", "all.h5"});
+  const Posterior all = read_posterior(folder_ / "all.h5");
+  EXPECT_FALSE(all.rest_mass_bound) << "auto writes every bin";
+  for (const Arguments& asks :
+       {Arguments{"--filter", "bounded"}, Arguments{"--tolerance", "1e-3"}}) {
+    Arguments flags = asks;
+    flags.insert(flags.end(), {"--posterior", "some.h5"});
+    const json record = u(flags);
+    const Posterior some = read_posterior(folder_ / "some.h5");
+    EXPECT_EQ(some.objects, all.objects);
+    EXPECT_EQ(some.lattice.bins(), all.lattice.bins());
+    EXPECT_EQ(some.index.size(), record["bins_evaluated"]);
+    ASSERT_TRUE(some.rest_mass_bound);
+    EXPECT_GE(*some.rest_mass_bound, record["dropped_mass"].get<double>());
+    EXPECT_LT(*some.rest_mass_bound, 1e-3);
+    for (std::size_t i = 0; i < some.index.size(); ++i) {
+      EXPECT_NEAR(some.log_likelihood[i],
+                  all.log_likelihood[static_cast<std::size_t>(some.index[i])], 1e-3);
+    }
+  }
 }
 
 TEST_F(BoundedFilter, ItsFlagsAreRefusedBesideOtherFilters) {

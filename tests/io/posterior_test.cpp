@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 #include <limits>
 
 #include "file_parts.hpp"
@@ -46,6 +47,80 @@ TEST_F(PosteriorFile, ComesBackAsItWasWritten) {
   EXPECT_EQ(read.lattice.theta_rad.count, 40);
   EXPECT_EQ(read.lattice.pivot_mm, glm::dvec2(100, -3));
   EXPECT_LT(std::filesystem::file_size(path_), written.log_likelihood.size() * sizeof(double));
+}
+
+Posterior of_some_bins() {
+  return {.objects = {"A", "B"},
+          .lattice = {.x_mm = {-10, 10, 20}, .y_mm = {-5, 5, 10}, .theta_rad = {0, 6, 5}},
+          .log_likelihood = {-3.0, -std::numeric_limits<double>::infinity(), -1.5},
+          .rest_mass_bound = 1e-7,
+          .index = {0, 999, 1234}};
+}
+
+TEST_F(PosteriorFile, OfSomeBinsComesBackAsItWasWritten) {
+  Posterior written = of_some_bins();
+  for (int run = 0; run < 2; ++run) {
+    write_posterior(path_, written);
+    const Posterior read = read_posterior(path_);
+    EXPECT_EQ(read.objects, written.objects);
+    EXPECT_EQ(read.lattice.bins(), 1000);
+    EXPECT_EQ(read.index, written.index);
+    EXPECT_EQ(read.log_likelihood, written.log_likelihood);
+    EXPECT_EQ(read.rest_mass_bound, written.rest_mass_bound);
+    // Where every bin is alike, none is evaluated by itself.
+    written.index.clear();
+    written.log_likelihood.clear();
+    written.rest_mass_bound = 1.0;
+  }
+}
+
+TEST_F(PosteriorFile, OfSomeBinsThatIsNotSoundIsNeverWritten) {
+  const auto refusal = [&](const std::function<void(Posterior&)>& spoil) {
+    Posterior posterior = of_some_bins();
+    spoil(posterior);
+    const std::string text = input_error([&] { write_posterior(path_, posterior); });
+    expect_named(text, {path_.c_str()});
+    return text;
+  };
+  expect_named(refusal([](Posterior& p) { p.index.pop_back(); }), {"2 bins", "3 log-likelihoods"});
+  expect_named(refusal([](Posterior& p) { p.index[1] = 2000; }), {"2000 is no bin of 2000"});
+  expect_named(refusal([](Posterior& p) { p.index[0] = -1; }), {"-1 is no bin"});
+  expect_named(refusal([](Posterior& p) { p.log_likelihood[0] = NAN; }), {"nan"});
+  for (const double share : {-0.1, 1.1, static_cast<double>(NAN)}) {
+    expect_named(refusal([&](Posterior& p) { p.rest_mass_bound = share; }), {"rest_mass_bound"});
+  }
+  constexpr int most = std::numeric_limits<int>::max();
+  expect_named(refusal([](Posterior& p) {
+                 p.lattice.x_mm.count = p.lattice.y_mm.count = p.lattice.theta_rad.count = most;
+               }),
+               {"too many to be numbered"});
+  EXPECT_FALSE(std::filesystem::exists(path_));
+}
+
+TEST_F(PosteriorFile, OfSomeBinsNamesWhatItCannotTake) {
+  const auto parts = [] {
+    return posterior_parts()
+        .attribute("version", 2)
+        .attribute("rest_mass_bound", 0.25)
+        .dataset("log_likelihood", {2}, -1.0)
+        .dataset("index", {2, 4}, std::vector<double>{0, 3, 2, 1, 1, 0, 0, 0});
+  };
+  parts().save(path_);
+  // 4 thetas of 3 x 2 bins.
+  EXPECT_EQ(read_posterior(path_).index, (std::vector<std::int64_t>{23, 24}));
+  const auto with_index = [&](const std::vector<double>& index) {
+    return message(parts().dataset("index", {index.size() / 4, 4}, index));
+  };
+  expect_named(with_index({0, 3, 2, 2, 1, 0, 0, 0}), {"'index'", "2 in column 3", "here 2"});
+  expect_named(with_index({0, 3, 2, 1, 2, 0, 0, 0}), {"2 in column 0"});
+  expect_named(with_index({0, -1, 2, 1, 1, 0, 0, 0}), {"-1 in column 1"});
+  expect_named(with_index({0, 0.5, 2, 1, 1, 0, 0, 0}), {"0.5 in column 1"});
+  expect_named(with_index({0, 3, 2, 1}), {"'index'", "[1, 4]", "[2, 4]"});
+  expect_named(message(parts().attribute("rest_mass_bound", 1.5)), {"'rest_mass_bound' = 1.5"});
+  expect_named(message(parts().attribute("version", 3)), {"'version' = 3", "reads 2"});
+  for (const char* name : {"index", "rest_mass_bound", "log_likelihood"}) {
+    expect_named(message(parts().without(name)), {name, "missing"});
+  }
 }
 
 TEST_F(PosteriorFile, WrittenObjectByObjectIsTheSameFile) {

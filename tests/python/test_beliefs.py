@@ -89,3 +89,20 @@ def test_likely_bins_and_modes_are_the_belief(
     assert lenient.decision.act and lenient.decision.within_mm <= 20.0
     with pytest.raises(palpate.Error, match="act_above=2"):
         palpate.recognize(unknown, maps, device=device, act_above=2.0)
+
+
+def test_evaluated_bins_are_those_of_the_histogram(
+    device: palpate.Device, maps: list[palpate.OccupancyGrid], unknown: palpate.Recording
+) -> None:
+    lattice = palpate.PoseLattice((-10, 10, 12), (-10, 10, 11), (0, 6.28, 16))
+    dense = palpate.PoseHistogram(device, maps, lattice)
+    bounded = palpate.BoundedPosterior(device, maps, lattice)
+    for belief in (dense, bounded):
+        belief.update(unknown)
+    index, values, rest = bounded.evaluated_bins()
+    bins = numpy.stack([dense.log_likelihood(i) for i in range(len(maps))])
+    where = numpy.unravel_index(index, bins.shape)
+    assert 0 < len(index) < bins.size
+    assert values == pytest.approx(bins[where], abs=1e-3)
+    mass = numpy.exp(bins - bins.max())
+    assert 1 - mass[where].sum() / mass.sum() <= rest + 1e-9 < 1e-5

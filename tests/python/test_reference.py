@@ -37,10 +37,14 @@ def test_the_reference_has_the_belief_of_the_histogram(
     assert set(reference.classify(unknown[0]).tolist()) <= {0, 1, 8}
 
 
+@pytest.mark.parametrize("kind", [palpate.PoseHistogram, palpate.BoundedPosterior])
 def test_gains_are_never_below_zero_and_have_standard_errors(
-    device: palpate.Device, maps: list[palpate.OccupancyGrid], unknown: palpate.Recording
+    device: palpate.Device,
+    maps: list[palpate.OccupancyGrid],
+    unknown: palpate.Recording,
+    kind: type[palpate.PoseHistogram] | type[palpate.BoundedPosterior],
 ) -> None:
-    belief = palpate.PoseHistogram(device, maps, palpate.PoseLattice((-5, 5, 8), (-5, 5, 8)))
+    belief = kind(device, maps, palpate.PoseLattice((-5, 5, 8), (-5, 5, 8)))
     belief.update(unknown[0])
     poses = [[0, 0, 0], [3, -2, 1], [500, 0, 0]]
     gains = belief.expected_gain(poses, palpate.digitacts_array(), samples=16)

@@ -25,6 +25,18 @@ TEST(ChosenBins, AreThoseOfTheMapsWhereTheDeviceHoldsSoMany) {
   }
 }
 
+TEST(ChosenBins, FollowUncertainTouches) {
+  const Device device = Device::open();
+  const DisplacementSd sd{.mm = 2.0, .rad = 0.2};
+  const auto step_mm = [&](const FilterOptions& filter) {
+    return chosen_bins(device, shapes(), {filter, false, ""}, BinWidth::automatic).balanced.step_mm;
+  };
+  const double exact = step_mm(BoundedOptions{});
+  EXPECT_GT(step_mm(BoundedOptions{.touch_sd = sd}), 1.2 * exact);
+  EXPECT_EQ(step_mm(HistogramOptions{.touch_sd = sd}), step_mm(BoundedOptions{.touch_sd = sd}));
+  EXPECT_EQ(step_mm(ParticleOptions{}), exact);
+}
+
 TEST(ChosenBins, AreCoarserWhereTheDeviceHoldsFewer) {
   const Device device = Device::open();
   const ChosenBins bins =

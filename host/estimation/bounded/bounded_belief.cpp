@@ -290,11 +290,12 @@ bool BoundedBelief::follow() {
 
 std::vector<DrawnBin> BoundedBelief::draw(std::size_t count, Random& random) {
   const bool followed = !found_ && follow();
-  if (!followed && !found_) {
+  if (!followed && !(found_ && found_->bins.complete())) {
     Deadline deadline = until(options_.budget_s);
     // Rejection looks at tiles here and there, which share little of what uncertain touches reach.
     const bool many_bins = bins_in_all() > most_searched_bins && options_.touch_sd.none();
-    if (touches_.size() <= wide_touches || many_bins) {
+    // Where a search had no room for its bins, another one would take as long.
+    if (found_ || touches_.size() <= wide_touches || many_bins) {
       return arena_.execute(
           [&] { return searched_with().draw(elements_, count, random, deadline); });
     }

@@ -58,8 +58,8 @@ class BoundedBelief {
   void visit(const BinVisitor& visitor);
   /// Log of the summed likelihood of these bins, with prior weights.
   double log_total() const { return found_->result.all().evaluated; }
-  /// Draws from the bins of the last search, or without one from bins that hold nearly all of the
-  /// belief.
+  /// Draws from the bins of the last search, or where there are none, or too many to keep, from
+  /// bins that hold nearly all of the belief.
   std::vector<PoseSample> sample(std::size_t count, std::uint64_t seed);
   /// The blocks that a search divides or evaluates.
   std::vector<PoseBlock> refined_blocks();
@@ -89,7 +89,7 @@ class BoundedBelief {
   SearchGoal rough_goal() const;
   /// What found() returns.
   Found search();
-  /// Draws bins: those of a search where there is one or it is quick.
+  /// Draws bins: those of a search where it kept them or is quick.
   std::vector<DrawnBin> draw(std::size_t count, Random& random);
   /// Follows the bins of an earlier search through the touches since.
   /// @returns whether they hold enough to draw from; forgets them otherwise

@@ -12,6 +12,8 @@
 #include "estimation/bounded/search/search_memory.hpp"
 #include "estimation/displacement_check.hpp"
 #include "estimation/hypotheses.hpp"
+#include "estimation/lattice/expected_gain.hpp"
+#include "estimation/lattice/reading_predictor.hpp"
 #include "estimation/lattice/refinement.hpp"
 #include "model/interpolated_map.hpp"
 #include "model/own_process.hpp"
@@ -78,7 +80,8 @@ struct BoundedPosterior::Impl {
   }
 
   BoundedBelief belief;
-  std::vector<Body> bodies;  ///< [hypothesis]
+  std::optional<ReadingPredictor> predictor;  ///< once a gain is asked for
+  std::vector<Body> bodies;                   ///< [hypothesis]
   OwnProcess process;
 };
 
@@ -266,6 +269,45 @@ std::vector<std::vector<BinShare>> BoundedPosterior::likely_bins(std::span<const
   return of_objects;
 }
 
+EvaluatedBelief BoundedPosterior::evaluated_bins() const {
+  BoundedBelief& belief = whole().belief;
+  const SearchResult& found = belief.found();
+  struct Bin {
+    std::int64_t place;
+    double log_likelihood;
+  };
+  const double list_bytes = 2.0 * sizeof(Bin) * static_cast<double>(found.bins_evaluated);
+  if (list_bytes > static_cast<double>(memory_for_search())) {
+    throw Error(
+        Fault::input,
+        fmt::format("the list of {} evaluated bins takes {:.0f} MiB, more than a quarter of "
+                    "the machine's memory: use fewer bins, more touches or a budget",
+                    found.bins_evaluated, list_bytes / (1 << 20)));
+  }
+  std::vector<Bin> bins;
+  LogSum unseen;
+  belief.visit([&](const BinBox& box, std::span<const double> log_likelihood) {
+    if (static_cast<std::int64_t>(log_likelihood.size()) != box.bins()) {
+      unseen.add(belief.log_weight()[box.object] + log_likelihood[0] +
+                 std::log(static_cast<double>(box.bins())));
+      return;
+    }
+    const std::int64_t first = box.object * lattice().bins();
+    for (std::int64_t i = 0; i < box.bins(); ++i) {
+      bins.push_back({first + box.bin(i, lattice()), log_likelihood[static_cast<std::size_t>(i)]});
+    }
+  });
+  std::ranges::sort(bins, {}, &Bin::place);
+  EvaluatedBelief evaluated;
+  for (const Bin& bin : bins) {
+    evaluated.index.push_back(bin.place);
+    evaluated.log_likelihood.push_back(bin.log_likelihood);
+  }
+  const double rest = std::exp(unseen.log() - belief.log_total()) + found.uncertain();
+  evaluated.rest_mass_bound = rest < 1.0 ? rest : 1.0;
+  return evaluated;
+}
+
 double BoundedPosterior::log_likelihood(int object, const Pose& T_object_robot) const {
   Impl& posterior = whole();
   require_object(object, posterior.bodies.size());
@@ -321,6 +363,19 @@ double BoundedPosterior::entropy() const {
 
 std::vector<PoseSample> BoundedPosterior::sample(std::size_t count, std::uint64_t seed) const {
   return whole().belief.sample(count, seed);
+}
+
+std::vector<TouchGain> BoundedPosterior::expected_gain(std::span<const Pose> T_robot_sensor,
+                                                       std::span<const glm::dvec2> elements_mm,
+                                                       const PlanOptions& plan) const {
+  Impl& posterior = whole();
+  BoundedBelief& belief = posterior.belief;
+  require_plan(T_robot_sensor, elements_mm, plan, posterior.bodies.size());
+  if (!posterior.predictor) {
+    posterior.predictor.emplace(belief.hypotheses(), belief.options().contact);
+  }
+  return palpate::expected_gain(*posterior.predictor, belief.sample(plan.samples, plan.seed),
+                                T_robot_sensor, elements_mm, belief.options().touch_sd, plan);
 }
 
 std::vector<PoseBlock> BoundedPosterior::refined_blocks() const {

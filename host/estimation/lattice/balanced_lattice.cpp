@@ -40,12 +40,21 @@ double lever_mm(const OccupancyGrid& map, const PoseLattice& region) {
                    (width_mm * width_mm + height_mm * height_mm) / 12.0);
 }
 
+/// How much wider the steps may be where touches are uncertain by sd, of the same unit as the step.
+double widening(double sd, double step) {
+  // docs/refinement.md holds the measurements behind these numbers.
+  constexpr double of_sd = 0.5;
+  constexpr double most = 2.0;
+  return std::clamp(of_sd * sd / step, 1.0, most);
+}
+
 double count_of(double extent, double step) { return std::max(1.0, std::ceil(extent / step)); }
 
 }  // namespace
 
 BalancedLattice balanced_lattice(const PoseLattice& region, std::span<const Hypothesis> hypotheses,
-                                 std::int64_t most_bins, BinWidth width) {
+                                 std::int64_t most_bins, BinWidth width,
+                                 const DisplacementSd& touch_sd) {
   validate_hypotheses(hypotheses);
   PoseLattice lattice = region;
   for (Axis* axis : {&lattice.x_mm, &lattice.y_mm, &lattice.theta_rad}) {
@@ -58,9 +67,13 @@ BalancedLattice balanced_lattice(const PoseLattice& region, std::span<const Hypo
     wanted_mm = std::min(wanted_mm, step_for(hypothesis.map, width));
     longest_mm = std::max(longest_mm, lever_mm(hypothesis.map, region));
   }
-  const double extents_mm[] = {lattice.x_mm.upper - lattice.x_mm.lower,
-                               lattice.y_mm.upper - lattice.y_mm.lower,
-                               (lattice.theta_rad.upper - lattice.theta_rad.lower) * longest_mm};
+  const DisplacementSd sd = width == BinWidth::fine ? DisplacementSd{} : touch_sd;
+  const double wider = widening(sd.mm, wanted_mm);
+  // Shorter by as much as their steps are wider.
+  const double extents_mm[] = {(lattice.x_mm.upper - lattice.x_mm.lower) / wider,
+                               (lattice.y_mm.upper - lattice.y_mm.lower) / wider,
+                               (lattice.theta_rad.upper - lattice.theta_rad.lower) * longest_mm /
+                                   widening(sd.rad * longest_mm, wanted_mm)};
   const auto bins = [&](double step_mm) {
     double product = static_cast<double>(hypotheses.size());
     for (const double extent_mm : extents_mm) {
@@ -83,7 +96,7 @@ BalancedLattice balanced_lattice(const PoseLattice& region, std::span<const Hypo
   lattice.x_mm.count = static_cast<int>(count_of(extents_mm[0], step_mm));
   lattice.y_mm.count = static_cast<int>(count_of(extents_mm[1], step_mm));
   lattice.theta_rad.count = static_cast<int>(count_of(extents_mm[2], step_mm));
-  return {.lattice = lattice, .step_mm = step_mm, .coarsened = step_mm > wanted_mm};
+  return {.lattice = lattice, .step_mm = step_mm * wider, .coarsened = step_mm > wanted_mm};
 }
 
 TouchRegion touch_region(std::span<const Hypothesis> hypotheses, double reach_mm) {

@@ -15,6 +15,7 @@
 #include "palpate/displacement.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
+#include "palpate/plan.hpp"
 
 namespace palpate {
 
@@ -76,6 +77,16 @@ struct PoseBlock {
   int y_count = 0;
 };
 
+/// What a search evaluated, bin by bin.
+struct EvaluatedBelief {
+  /// [n] ascending: places of the bins among all of [object, theta, y, x], x fastest.
+  std::vector<std::int64_t> index;
+  std::vector<double> log_likelihood;  ///< [n] in nats, without prior weights
+  /// Bound of the share of the belief that all other bins hold together, by prior weights and
+  /// without "none of these". Counts the rounding of the bins here.
+  double rest_mass_bound = 0.0;
+};
+
 /// Histogram filter over object identity and planar pose that evaluates only the bins that matter
 /// and proves how little the others can. Its bins are those of PoseHistogram. Blocks of bins are
 /// bounded from above by tables of the smallest penalty within a window of the map; blocks that
@@ -134,6 +145,10 @@ class PALPATE_API BoundedPosterior {
   /// @throws Error if there is no such object
   std::vector<std::vector<BinShare>> likely_bins(std::span<const int> objects,
                                                  double least_share) const;
+  /// The bins that the search evaluated. Blocks of bins at which every element sees the prior, beyond
+  /// the maps, are evaluated at once and belong to the others.
+  /// @throws Error where the list would take more than a quarter of the machine's memory
+  EvaluatedBelief evaluated_bins() const;
   /// Log-likelihood of any pose of an object in nats, in float64, without prior weights. With
   /// touch_sd, of the bin that the pose lies in.
   /// @throws Error if there is no such object or the pose is not finite
@@ -144,6 +159,11 @@ class PALPATE_API BoundedPosterior {
   /// Draws objects and poses; see PoseHistogram::sample(). Before the first estimate() since an
   /// update, bins that hold up to 1 % of the mass may stay out.
   std::vector<PoseSample> sample(std::size_t count, std::uint64_t seed) const;
+  /// What one more touch at each candidate pose T_robot_sensor is expected to tell; see
+  /// PoseHistogram::expected_gain().
+  std::vector<TouchGain> expected_gain(std::span<const Pose> T_robot_sensor,
+                                       std::span<const glm::dvec2> elements_mm,
+                                       const PlanOptions& plan = {}) const;
 
   /// The blocks that the search divides or evaluates, for a picture of it. Searches again.
   std::vector<PoseBlock> refined_blocks() const;

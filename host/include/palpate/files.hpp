@@ -1,7 +1,9 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -38,11 +40,16 @@ PALPATE_API void write_map(const std::filesystem::path& path, const OccupancyGri
 /// black; resolution and origin are in metres; the first image row has the largest y.
 PALPATE_API void write_map_server(const std::filesystem::path& yaml_path, const OccupancyGrid& map);
 
-/// The posterior of one recording, the contents of a "palpate.posterior" HDF5 file.
+/// The posterior of one recording, the contents of a "palpate.posterior" HDF5 file: of every bin,
+/// or of those that a search by bounds evaluated.
 struct Posterior {
   std::vector<std::string> objects;
   PoseLattice lattice;
-  std::vector<double> log_likelihood;  ///< [object, theta, y, x] in nats, without prior weights
+  /// In nats, without prior weights: [object, theta, y, x], or [n] of the bins in `index`.
+  std::vector<double> log_likelihood;
+  /// See EvaluatedBelief; nothing where the posterior is of every bin.
+  std::optional<double> rest_mass_bound = {};
+  std::vector<std::int64_t> index = {};  ///< [n] see EvaluatedBelief; empty for every bin
 };
 PALPATE_API Posterior read_posterior(const std::filesystem::path& path);
 PALPATE_API void write_posterior(const std::filesystem::path& path, const Posterior& posterior);

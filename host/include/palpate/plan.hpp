@@ -26,7 +26,7 @@ struct TouchGain {
   double both() const { return identity + pose; }
 };
 
-/// How PoseHistogram::expected_gain() estimates.
+/// How expected_gain() of PoseHistogram and BoundedPosterior estimates.
 struct PlanOptions {
   /// Objects and poses that stand for the belief. No gain exceeds the log of their number. The
   /// time grows with the square of the number.

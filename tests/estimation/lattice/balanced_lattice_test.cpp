@@ -123,6 +123,31 @@ TEST(BalancedLattice, ForTheRefinedPoseSkipsWhatItEvensOut) {
   EXPECT_NEAR(lattice.theta_rad.count, fine.theta_rad.count / 2.0, 1.0);
 }
 
+TEST(BalancedLattice, FollowsUncertainTouchesUpToTwiceTheStep) {
+  const auto lattice = [](const DisplacementSd& sd, BinWidth width = BinWidth::automatic) {
+    return balanced_lattice({}, letters(), most_balanced_bins, width, sd);
+  };
+  const BalancedLattice exact = lattice({});
+  const double step_rad = exact.lattice.theta_rad.step();
+  ASSERT_DOUBLE_EQ(exact.step_mm, 0.6);
+  const auto step_mm = [&](double sd_mm) {
+    const BalancedLattice with = lattice({.mm = sd_mm, .rad = 0.0});
+    EXPECT_EQ(with.lattice.theta_rad.count, exact.lattice.theta_rad.count) << sd_mm;
+    EXPECT_EQ(with.lattice.x_mm.count, std::ceil(20.0 / with.step_mm)) << sd_mm;
+    EXPECT_FALSE(with.coarsened);
+    return with.step_mm;
+  };
+  EXPECT_DOUBLE_EQ(step_mm(1.0), 0.6) << "half of it is less";
+  EXPECT_DOUBLE_EQ(step_mm(1.5), 0.75);
+  EXPECT_DOUBLE_EQ(step_mm(2.0), 1.0);
+  EXPECT_DOUBLE_EQ(step_mm(9.0), 1.2) << "twice the step";
+  const BalancedLattice turned = lattice({.mm = 0.0, .rad = 3.0 * step_rad});
+  EXPECT_DOUBLE_EQ(turned.step_mm, 0.6);
+  EXPECT_NEAR(turned.lattice.theta_rad.step(), 1.5 * step_rad, 0.02 * step_rad);
+  const BalancedLattice fine = lattice({.mm = 9.0, .rad = 1.0}, BinWidth::fine);
+  EXPECT_EQ(fine.lattice.bins(), fine_lattice({}, letters()).lattice.bins()) << "for the mode";
+}
+
 TEST(BalancedLattice, FollowsTheRegionAndCollapsesWhatIsFixed) {
   PoseLattice region;
   region.x_mm = {3.0, 3.0, 9};
