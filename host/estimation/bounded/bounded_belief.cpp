@@ -78,13 +78,11 @@ constexpr double most_searched_bins = 1e8;
 constexpr double closely_drawn_bins = 1e6;
 /// Tolerance that a search with a budget reaches before it goes on, and enough for draws.
 constexpr double soon = 1e-2;
-/// Bounds of "none of these" need not be so close that identities move by less.
-constexpr double least_identity_change = 1e-6;
+/// How closely the log odds of "none of these" are known, in nats, unless this or the tolerance is
+/// more than it, or the hypotheses, may have.
+constexpr double none_nats = 0.05;
+constexpr double negligible = 1e-4;
 constexpr double unlimited = std::numeric_limits<double>::infinity();
-/// Bounds so many nats apart do not tell how closely they are needed; those that are closer, in
-/// nats for each touch, do.
-constexpr double far_apart = 2.0;
-constexpr double closer = 0.02;
 
 }  // namespace
 
@@ -321,37 +319,22 @@ std::vector<PoseBlock> BoundedBelief::refined_blocks() {
   return blocks;
 }
 
-double BoundedBelief::allowed_none_width(const LogInterval& none) const {
-  const double objects = log_total();
-  const auto probability = [&](double log_evidence) {
-    return 1.0 / (1.0 + std::exp(objects - log_evidence));
-  };
-  const double allowed = std::max(options_.tolerance, least_identity_change);
-  const double low = probability(none.low);
-  const double high = probability(none.high);
-  if (high - low <= allowed) {
-    return unlimited;
-  }
-  // The probability changes by at most so much a nat.
-  const double p = std::clamp(0.5, low, high);
-  return allowed / (p * (1.0 - p));
+bool BoundedBelief::tells_enough(const LogInterval& none) const {
+  const SearchGoal asked = goal();
+  const double range = asked.evidence_nats ? asked.evidence_range_nats
+                                           : -std::log(std::max(asked.tolerance, negligible));
+  return none.high - none.low <= asked.evidence_nats.value_or(none_nats) ||
+         none.high < log_total() - range || none.low > log_total() + range;
 }
 
 LogInterval BoundedBelief::bound_none(const Deadline& deadline) {
-  double width = goal().evidence_nats.value_or(unlimited);
-  for (LogInterval last{-unlimited, unlimited};;) {
-    const LogInterval bounds = arena_.execute([&] { return none_->bounds(width, deadline); });
-    const LogInterval weighted{none_log_weight_ + bounds.low, none_log_weight_ + bounds.high};
-    width = std::min(width, allowed_none_width(weighted));
-    if (bounds.high - bounds.low > far_apart && !goal().evidence_nats) {
-      width = std::max(width, closer * static_cast<double>(taken_in_));
-    }
-    const bool narrowed = bounds.high - bounds.low < last.high - last.low;
-    last = bounds;
-    if (bounds.high - bounds.low <= width || !narrowed || deadline.passed()) {
-      return weighted;
-    }
-  }
+  const auto weighted = [&](const LogInterval& bounds) {
+    return LogInterval{none_log_weight_ + bounds.low, none_log_weight_ + bounds.high};
+  };
+  return arena_.execute([&] {
+    return weighted(none_->bounds(
+        [&](const LogInterval& bounds) { return tells_enough(weighted(bounds)); }, deadline));
+  });
 }
 
 LogInterval BoundedBelief::none_log_evidence() const {

@@ -67,9 +67,10 @@ class BoundedBelief {
   /// Whether the options ask for "none of these".
   bool has_none() const { return none_.has_value(); }
   /// Bounds of the log evidence of "none of these" with its prior weight, as SearchResult::mass
-  /// has that of the hypotheses: so close that no identity can move by more than the tolerance or
-  /// 1e-6, whichever is larger, or as far as the budget reaches. -infinity where it is left out.
-  /// To be asked for after found().
+  /// has that of the hypotheses: within 0.05 nats, or known to lie so far from the evidence of the
+  /// hypotheses that the tolerance leaves one of them out, or as far as the budget reaches; within
+  /// evidence_nats or beyond evidence_range_nats where the options ask for these. -infinity where
+  /// it is left out. To be asked for after found().
   LogInterval none_log_evidence() const;
 
  private:
@@ -99,8 +100,8 @@ class BoundedBelief {
                    std::vector<PoseBlock>* refined = nullptr);
   /// Narrows the bounds of "none of these" as far as needed beside what was found.
   LogInterval bound_none(const Deadline& deadline);
-  /// How wide these may be, given what they are.
-  double allowed_none_width(const LogInterval& none) const;
+  /// Whether they are known as closely as the options ask for.
+  bool tells_enough(const LogInterval& none) const;
   Deadline until(const std::optional<double>& budget_s) const {
     return Deadline(budget_s, &options_.cancel_point);
   }

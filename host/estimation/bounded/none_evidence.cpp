@@ -1,9 +1,12 @@
 #include "estimation/bounded/none_evidence.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <tuple>
+#include <utility>
 
 #include "estimation/bounded/log_sum.hpp"
 #include "estimation/bounded/touch_overlap.hpp"
@@ -12,10 +15,25 @@ namespace palpate {
 
 namespace {
 
-/// A search's bounds are about so many times as wide as its tolerance.
-constexpr double width_of_tolerance = 1.5;
-/// Bounds that a search for a tenth of the tolerance narrows by less are rounding.
+constexpr double infinity = std::numeric_limits<double>::infinity();
+/// Bounds that a closer search narrows by less are rounding.
 constexpr double least_gain = 0.9;
+
+/// What the searches of an exact touch leave out at most, in nats above a lower bound of its mean,
+/// once that comes near: from the first exact one on they evaluate bins in float64.
+constexpr std::array<double, 7> left_out_nats{0.0, -3.0, -6.5, -10.0, -14.0, -18.0, -22.0};
+constexpr std::size_t first_exact = 3;
+/// The mean lies below the bounds of the largest tiles by about so large a part of these, in nats.
+/// That is where the second search looks first.
+constexpr double usual_gap = 0.6;
+constexpr double least_gap_nats = 2.0;
+constexpr double most_gap_nats = 20.0;
+
+/// Parts of its sum that the searches of a displaced touch leave out. Its bins have likelihoods of
+/// few magnitudes: the bounds of large tiles alone, which the first asks for, come within a few
+/// nats of the mean.
+constexpr std::array<double, 10> left_out_parts{20.0, 0.5,  1e-2, 1e-3, 1e-4,
+                                                1e-5, 1e-6, 1e-7, 1e-8, 1e-9};
 
 double width(const LogInterval& of) { return of.high - of.low; }
 
@@ -23,21 +41,35 @@ double width(const LogInterval& of) { return of.high - of.low; }
 
 NoneEvidence::NoneEvidence(SearchSpace& space, const BoundedOptions& options,
                            const BinLikelihood& likelihood)
-    : space_(space), options_(options), search_(space, options, likelihood) {}
+    : space_(space), options_(options), likelihood_(likelihood) {
+  if (space.displacement) {
+    search_.emplace(space, options, likelihood);
+  }
+}
 
 void NoneEvidence::add(std::span<const ArrayReadings> touches) {
   std::vector<TouchMean> added;
   for (const ArrayReadings& touch : touches) {
     // A touch without a known element does not even tell where the array was.
     if (std::ranges::any_of(touch.readings, [](Reading r) { return r != Reading::unknown; })) {
-      added.push_back({.touch = touch});
+      TouchMean& mean = added.emplace_back(TouchMean{.touch = touch});
+      const KnownElements known = known_elements(touch);
+      for (const TileBounds& of : space_.bounds) {
+        mean.before.high = std::max(mean.before.high, of.best(0, known));
+      }
+      if (!space_.displacement) {
+        mean.search.emplace(space_, options_, likelihood_, touch);
+      }
     }
   }
-  means_.insert(means_.end(), std::make_move_iterator(added.begin()),
-                std::make_move_iterator(added.end()));
+  means_.reserve(means_.size() + added.size());
+  for (TouchMean& mean : added) {
+    means_.push_back(std::move(mean));
+  }
 }
 
-LogInterval NoneEvidence::search(TouchMean& mean, double tolerance, const Deadline& deadline) {
+std::optional<LogInterval> NoneEvidence::search_displaced(TouchMean& mean,
+                                                          const Deadline& deadline) {
   const TouchOverlap overlap(mean.touch.rectangle, space_.boxes, options_.lattice);
   double bins = overlap.weighted_bins(space_.log_weight);
   // Where no pose of the region brings the array to an object, all poses are alike.
@@ -48,65 +80,102 @@ LogInterval NoneEvidence::search(TouchMean& mean, double tolerance, const Deadli
     }
   }
   const KnownElements elements = known_elements(mean.touch);
-  search_.largest().reset();
-  search_.largest().add(elements);
-  const SearchResult found = search_.run(
-      elements, {.tolerance = tolerance, .mode = false, .counted = everywhere ? nullptr : &overlap},
+  search_->largest().reset();
+  search_->largest().add(elements);
+  const SearchResult found = search_->run(
+      elements,
+      {.tolerance = left_out_parts.at(mean.found.size()),
+       .mode = false,
+       .counted = everywhere ? nullptr : &overlap},
       deadline, [](const BinBox& /*box*/, std::span<const double> /*log_likelihood*/) {});
   const LogInterval all = found.all().bounds();
   const double log_bins = std::log(bins);
   mean.log_share = log_bins - std::log(static_cast<double>(options_.lattice.bins()));
-  return {all.low - log_bins, all.high - log_bins};
-}
-
-LogInterval NoneEvidence::narrow(TouchMean& mean, double width_nats, const Deadline& deadline) {
-  constexpr double infinity = std::numeric_limits<double>::infinity();
-  // What an earlier call found finer does not count: bounds depend on what is asked for.
-  LogInterval log_mean{-infinity, infinity};
-  for (std::size_t i = space_.displacement ? 0 : 1; i < tolerances.size();) {
-    if (!mean.found[i]) {
-      const LogInterval found = search(mean, tolerances[i], deadline);
-      if (deadline.passed()) {
-        return width(found) < width(log_mean) ? found : log_mean;
-      }
-      mean.found[i] = found;
-    }
-    const double before = width(log_mean);
-    log_mean = *mean.found[i];
-    // The first searches may do the same work.
-    const bool comparable = i > 2;
-    if (width(log_mean) <= width_nats || (comparable && width(log_mean) > least_gain * before)) {
-      break;
-    }
-    // Bounds and the first search tell little of what is needed; the others come close to their
-    // tolerance.
-    for (++i;
-         i > 1 && i + 1 < tolerances.size() && width_of_tolerance * tolerances[i] > width_nats;) {
-      ++i;
-    }
+  if (deadline.passed()) {
+    return {};
   }
-  return log_mean;
+  mean.closest = mean.found.size() + 1 == left_out_parts.size();
+  mean.rounding_counts = mean.found.size() > 2;  // the first searches may do the same work
+  return LogInterval{all.low - log_bins, all.high - log_bins};
 }
 
-LogInterval NoneEvidence::bounds(double width_nats, const Deadline& deadline) {
+std::optional<LogInterval> NoneEvidence::search_exact(TouchMean& mean, const Deadline& deadline) {
+  double least = infinity;
+  bool close = false;
+  if (!mean.found.empty()) {
+    // Where bounds are far from the mean, it is looked for twice as far below each time.
+    const double gap =
+        std::clamp(-usual_gap * mean.found.front().high, least_gap_nats, most_gap_nats);
+    const LogInterval& last = mean.found.back();
+    const double by_low = last.low + left_out_nats.at(mean.close_searches);
+    const double by_high = last.high - std::ldexp(gap, static_cast<int>(mean.found.size()) - 1);
+    close = by_low >= by_high;
+    least = close ? by_low : by_high;
+  }
+  const bool exact = close && mean.close_searches >= first_exact;
+  const std::optional<LogInterval> found = mean.search->bounds(least, exact, deadline);
+  if (found) {
+    mean.log_share = mean.search->log_share();
+    mean.close_searches += close ? 1 : 0;
+    mean.closest = mean.close_searches == left_out_nats.size();
+    mean.rounding_counts = exact;
+  }
+  return found;
+}
+
+bool NoneEvidence::search(TouchMean& mean, const Deadline& deadline) {
+  const LogInterval last = mean.found.empty() ? mean.before : mean.found.back();
+  const std::optional<LogInterval> found =
+      mean.search ? search_exact(mean, deadline) : search_displaced(mean, deadline);
+  if (found) {
+    mean.found.push_back({std::max(last.low, found->low), std::min(last.high, found->high)});
+    mean.closest |= mean.rounding_counts && width(mean.found.back()) > least_gain * width(last);
+  }
+  return found.has_value();
+}
+
+LogInterval NoneEvidence::bounds(const Enough& enough, const Deadline& deadline) {
   if (means_.empty()) {
     return {};
   }
-  std::vector<double> low;
-  std::vector<double> high;
-  for (TouchMean& mean : means_) {
-    const LogInterval log_mean =
-        narrow(mean, width_nats / static_cast<double>(means_.size()), deadline);
-    low.push_back(log_mean.low);
-    high.push_back(log_mean.high);
-  }
-  // Added in an order of their own, so that the order of touches shows in no bit.
-  const auto sum_of = [](std::vector<double>& logs) {
-    std::ranges::sort(logs);
-    return std::accumulate(logs.begin(), logs.end(), 0.0);
+  // What an earlier call found closer does not count: bounds depend on what is asked for.
+  std::vector<std::size_t> searches(means_.size());
+  const auto of = [&](std::size_t i) {
+    return searches[i] == 0 ? means_[i].before : means_[i].found[searches[i] - 1];
   };
-  const double log_share = means_.front().log_share;
-  return {log_share + sum_of(low), log_share + sum_of(high)};
+  const auto sum = [&] {
+    // Added in an order of their own, so that the order of touches shows in no bit.
+    std::vector<double> low;
+    std::vector<double> high;
+    for (std::size_t i = 0; i < means_.size(); ++i) {
+      low.push_back(of(i).low);
+      high.push_back(of(i).high);
+    }
+    std::ranges::sort(low);
+    std::ranges::sort(high);
+    const double log_share = means_.front().log_share;
+    return LogInterval{std::accumulate(low.begin(), low.end(), log_share),
+                       std::accumulate(high.begin(), high.end(), log_share)};
+  };
+  for (;;) {
+    // Of touches of which nothing is known from below, the one that tells most costs least.
+    std::optional<std::size_t> worst;
+    const auto badness = [&](std::size_t i) {
+      return std::tuple(searches[i] == 0, width(of(i)), -of(i).high);
+    };
+    for (std::size_t i = 0; i < means_.size(); ++i) {
+      const bool closest = means_[i].closest && searches[i] == means_[i].found.size();
+      if (!closest && (!worst || badness(i) > badness(*worst))) {
+        worst = i;
+      }
+    }
+    const LogInterval all = sum();
+    if (!worst || enough(all) ||
+        (searches[*worst] == means_[*worst].found.size() && !search(means_[*worst], deadline))) {
+      return all;
+    }
+    ++searches[*worst];
+  }
 }
 
 }  // namespace palpate

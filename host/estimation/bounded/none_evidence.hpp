@@ -1,12 +1,15 @@
 #pragma once
 
-#include <array>
+#include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <limits>
 #include <optional>
 #include <span>
 #include <vector>
 
 #include "estimation/bounded/known_elements.hpp"
+#include "estimation/bounded/mean_search.hpp"
 #include "estimation/bounded/search/bound_search.hpp"
 #include "estimation/bounded/search/search_space.hpp"
 #include "palpate/estimate.hpp"
@@ -18,11 +21,14 @@ namespace palpate {
 /// where the mean is over the bins at which the array overlaps the object (over all bins where
 /// there is no such bin) and s is the share of such bins at the first touch with a known element.
 ///
-/// The bins of s are counted exactly. Each mean comes from a search of its own over the touch's
-/// elements: what was evaluated bounds it from below, and the bounds of what was dropped from
+/// The bins of s are counted exactly. Each mean comes from searches of its own over the touch's
+/// elements: what was evaluated bounds it from below, and the bounds of what was left out from
 /// above.
 class NoneEvidence {
  public:
+  /// Whether bounds are close enough.
+  using Enough = std::function<bool(const LogInterval&)>;
+
   /// @param options checked, with a resolved contact model
   /// @param likelihood evaluates bins; all of these outlive this object
   NoneEvidence(SearchSpace& space, const BoundedOptions& options, const BinLikelihood& likelihood);
@@ -33,39 +39,40 @@ class NoneEvidence {
   void add(std::span<const ArrayReadings> touches);
 
   /// Bounds of the log of the product of s and the touches' mean likelihoods, in nats; 0 before any
-  /// touch. Searches until they are at most so wide and each touch's at most some 0.01 nats, or
-  /// rounding allows no less, or the deadline has passed. Unless a deadline passed, they depend on
-  /// the touches and the width alone. On the threads of the caller's arena; the bits do not depend
-  /// on their number.
+  /// touch. Searches on, for the touch whose mean is known worst, until they are enough, or
+  /// rounding allows no closer ones, or the deadline has passed. Unless a deadline passed, they
+  /// depend on the touches and on what is enough alone. On the threads of the caller's arena; the
+  /// bits do not depend on their number.
   /// @throws what the deadline's cancel point throws
-  LogInterval bounds(double width_nats, const Deadline& deadline);
+  LogInterval bounds(const Enough& enough, const Deadline& deadline);
 
   /// Host memory, in bytes.
-  std::uint64_t bytes() const { return search_.largest().bytes(); }
+  std::uint64_t bytes() const { return search_ ? search_->largest().bytes() : 0; }
 
  private:
-  /// Searches to these parts of a touch's sum that may be left out, the last where rounding of
-  /// float64 is not far below. Most touches' bins have likelihoods of many magnitudes, so that a
-  /// coarser search than the second would save little; where touches are uncertain, the bounds of
-  /// large tiles alone, which the first asks for, come within a few nats of the mean.
-  static constexpr std::array<double, 10> tolerances{20.0, 0.5,  1e-2, 1e-3, 1e-4,
-                                                     1e-5, 1e-6, 1e-7, 1e-8, 1e-9};
-
   /// What is known of one touch.
   struct TouchMean {
     ArrayReadings touch;
+    std::optional<MeanSearch> search = {};  ///< of a touch whose pose is exact
     double log_share = 0.0;  ///< of the bins that count among all, by prior weight, in nats
-    /// [tolerance] bounds of the log of the mean, from searches that no deadline ended.
-    std::array<std::optional<LogInterval>, tolerances.size()> found = {};
+    /// Bounds of the log of the mean before any search, and after each that no deadline ended.
+    LogInterval before{-std::numeric_limits<double>::infinity(),
+                       -std::numeric_limits<double>::infinity()};
+    std::vector<LogInterval> found = {};
+    std::size_t close_searches = 0;  ///< of an exact touch: see left_out_nats
+    bool rounding_counts = false;    ///< the last search left out too little to be told from it
+    bool closest = false;            ///< the last search came as close as any
   };
 
-  /// Bounds of the log of a touch's mean likelihood, so wide at most where that can be had.
-  LogInterval narrow(TouchMean& mean, double width_nats, const Deadline& deadline);
-  LogInterval search(TouchMean& mean, double tolerance, const Deadline& deadline);
+  /// Searches a touch once more. @returns false where the deadline passed
+  bool search(TouchMean& mean, const Deadline& deadline);
+  std::optional<LogInterval> search_exact(TouchMean& mean, const Deadline& deadline);
+  std::optional<LogInterval> search_displaced(TouchMean& mean, const Deadline& deadline);
 
   SearchSpace& space_;
   const BoundedOptions& options_;
-  BoundSearch search_;
+  const BinLikelihood& likelihood_;
+  std::optional<BoundSearch> search_;  ///< of touches of uncertain pose
   std::vector<TouchMean> means_;
 };
 

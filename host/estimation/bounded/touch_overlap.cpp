@@ -37,27 +37,14 @@ struct Interval {
 };
 
 /// The u with |slope u + offset| <= reach.
-Interval within(double slope, double offset, double reach) {
+/// @param per_slope 1 / slope
+Interval within(double slope, double per_slope, double offset, double reach) {
   if (slope == 0.0) {
     return std::abs(offset) <= reach ? Interval{} : Interval{unbounded, -unbounded};
   }
-  const double a = (-reach - offset) / slope;
-  const double b = (reach - offset) / slope;
+  const double a = (-reach - offset) * per_slope;
+  const double b = (reach - offset) * per_slope;
   return {std::min(a, b), std::max(a, b)};
-}
-
-/// The bins of an axis whose centres lie in an interval.
-OverlapPlane::Bins bins_within(const Axis& axis, const Interval& interval) {
-  const double step = axis.step();
-  const double first_centre = axis.centre(0);
-  if (!(step > 0.0)) {
-    return {0, interval.low <= first_centre && first_centre <= interval.high ? axis.count : 0};
-  }
-  const double last = axis.count - 1.0;
-  const double from = std::max(0.0, std::ceil((interval.low - first_centre) / step));
-  const double to = std::min(last, std::floor((interval.high - first_centre) / step));
-  return from <= to ? OverlapPlane::Bins{static_cast<int>(from), static_cast<int>(to - from) + 1}
-                    : OverlapPlane::Bins{};
 }
 
 /// Bins of a box's row y that a plane holds, counted from the box's first.
@@ -77,6 +64,25 @@ ArrayRectangle array_rectangle(const Touch& touch, const glm::dvec2& pivot_mm) {
           .direction_rad = touch.T_robot_sensor.theta_rad};
 }
 
+OverlapPlane::Line::Line(const Axis& axis)
+    : first_mm(axis.centre(0)), step_mm(axis.step()), per_mm(1.0 / step_mm), last(axis.count - 1) {}
+
+OverlapPlane::Bins OverlapPlane::Line::within(double low_mm, double high_mm) const {
+  if (!(step_mm > 0.0)) {
+    return {0, low_mm <= first_mm && first_mm <= high_mm ? last + 1 : 0};
+  }
+  const double low = (low_mm - first_mm) * per_mm;
+  const double high = (high_mm - first_mm) * per_mm;
+  if (!(low <= last && high >= 0.0)) {
+    return {};
+  }
+  // Casts round towards 0, and are faster than std::ceil.
+  const int from = low > 0.0 ? static_cast<int>(low) : 0;
+  const int first = from + (from < low ? 1 : 0);
+  const int end = high < last ? static_cast<int>(high) + 1 : last + 1;
+  return first < end ? Bins{first, end - first} : Bins{};
+}
+
 OverlapPlane::OverlapPlane(const ArrayRectangle& array, const BoundingBox& object,
                            const PoseLattice& lattice, int theta)
     : x_mm_(lattice.x_mm), y_mm_(lattice.y_mm) {
@@ -84,6 +90,8 @@ OverlapPlane::OverlapPlane(const ArrayRectangle& array, const BoundingBox& objec
   apart_mm_ = rotate(theta_rad, array.from_pivot_mm) - object.middle();
   cos_ = std::cos(theta_rad + array.direction_rad);
   sin_ = std::sin(theta_rad + array.direction_rad);
+  per_cos_ = 1.0 / cos_;
+  per_sin_ = 1.0 / sin_;
   const double c = std::abs(cos_);
   const double s = std::abs(sin_);
   const glm::dvec2 half = object.extent() / 2.0;
@@ -97,8 +105,9 @@ OverlapPlane::OverlapPlane(const ArrayRectangle& array, const BoundingBox& objec
   constexpr double rounding = 1.0 + 1e-9;
   const glm::dvec2 turned = rounding * glm::dvec2(c * turned_reach_mm_.x + s * turned_reach_mm_.y,
                                                   s * turned_reach_mm_.x + c * turned_reach_mm_.y);
-  columns_ = bins_within(x_mm_, within(1.0, apart_mm_.x, std::min(reach_mm_.x, turned.x)));
-  rows_ = bins_within(y_mm_, within(1.0, apart_mm_.y, std::min(reach_mm_.y, turned.y)));
+  const glm::dvec2 reach = glm::min(reach_mm_, turned);
+  columns_ = x_mm_.within(-reach.x - apart_mm_.x, reach.x - apart_mm_.x);
+  rows_ = y_mm_.within(-reach.y - apart_mm_.y, reach.y - apart_mm_.y);
 }
 
 OverlapPlane::Bins OverlapPlane::row(int y) const {
@@ -107,14 +116,14 @@ OverlapPlane::Bins OverlapPlane::row(int y) const {
   }
   const double apart_y = apart_mm_.y + y_mm_.centre(y);
   Interval apart_x{-reach_mm_.x, reach_mm_.x};
-  apart_x.cut(within(cos_, sin_ * apart_y, turned_reach_mm_.x));
-  apart_x.cut(within(-sin_, cos_ * apart_y, turned_reach_mm_.y));
-  return bins_within(x_mm_, {apart_x.low - apart_mm_.x, apart_x.high - apart_mm_.x});
+  apart_x.cut(within(cos_, per_cos_, sin_ * apart_y, turned_reach_mm_.x));
+  apart_x.cut(within(-sin_, -per_sin_, cos_ * apart_y, turned_reach_mm_.y));
+  return x_mm_.within(apart_x.low - apart_mm_.x, apart_x.high - apart_mm_.x);
 }
 
 bool OverlapPlane::may_overlap(const Bins& x, const Bins& y) const {
   // The box of offsets, cut to what overlaps along the object's axes, against the turned rectangle.
-  const auto cut = [](const Axis& axis, const Bins& bins, const Bins& to) {
+  const auto cut = [](const Line& axis, const Bins& bins, const Bins& to) {
     const int first = std::max(bins.first, to.first);
     const int last = std::min(bins.first + bins.count, to.first + to.count) - 1;
     return first <= last ? Interval{axis.centre(first), axis.centre(last)}

@@ -44,13 +44,27 @@ class OverlapPlane {
   bool may_overlap(const Bins& x, const Bins& y) const;
 
  private:
-  Axis x_mm_;
-  Axis y_mm_;
+  /// The centres of an axis's bins.
+  struct Line {
+    explicit Line(const Axis& axis);
+    double centre(int i) const { return first_mm + i * step_mm; }
+    Bins within(double low_mm, double high_mm) const;
+
+    double first_mm;
+    double step_mm;
+    double per_mm;  ///< 1 / step_mm
+    int last;       ///< bin
+  };
+
+  Line x_mm_;
+  Line y_mm_;
   glm::dvec2 apart_mm_{};         ///< from the object's middle to the array's, at x = y = 0
   glm::dvec2 reach_mm_{};         ///< of |apart| along the object's axes
   glm::dvec2 turned_reach_mm_{};  ///< of |apart| along the array's axes
   double cos_ = 1.0;              ///< of the array's direction in the object frame
   double sin_ = 0.0;
+  double per_cos_ = 1.0;  ///< 1 / cos_
+  double per_sin_ = 0.0;
   Bins rows_;  ///< that may hold overlapping bins, as the columns
   Bins columns_;
 };

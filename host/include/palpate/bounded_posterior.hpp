@@ -51,10 +51,11 @@ struct BoundedOptions {
   /// as badly.
   std::optional<std::int64_t> poor_bins = {};
   /// Prior weight W of "none of these", as HistogramOptions::none_weight. Each touch's mean
-  /// likelihood is bounded by a search of its own, so closely that no identity can move by more
-  /// than the tolerance or 1e-6, whichever is larger. Where "none of these" is neither nearly
-  /// certain nor nearly impossible, this evaluates most bins at which the touch's array meets an
-  /// object.
+  /// likelihood is bounded by searches of its own, until the log odds of "none of these" against
+  /// the objects are known within 0.05 nats, or it or the objects are known to have less than the
+  /// tolerance or 1e-4, whichever is larger. With evidence_nats, it is known as closely as the
+  /// labels are. Certificate::none_log_evidence holds its bounds; Certificate::dropped_mass is of the
+  /// objects' bins alone.
   std::optional<double> none_weight = {};
   /// Host threads; 0 takes as many as the machine has cores.
   int threads = 0;

@@ -19,7 +19,7 @@ namespace palpate::none_evidence_test {
 
 /// Rounding of the definition's float64 sums over some 100,000 bins of some hundred nats.
 constexpr double rounding = 1e-9;
-/// Width of a touch's first bounds in nats: half of the sum may be left out.
+/// In nats: as wide as the bounds after a few searches.
 constexpr double first_width = 0.7;
 
 std::vector<Hypothesis> two_objects() {
@@ -43,8 +43,12 @@ class NoneByBounds {
     }
     none.add(arrays);
   }
-  LogInterval bounds(double width_nats = infinity) { return none.bounds(width_nats, Deadline({})); }
-  LogInterval bounds_of(std::span<const Touch> touches, double width_nats = infinity) {
+  LogInterval bounds(double width_nats = first_width) {
+    return none.bounds(
+        [&](const LogInterval& found) { return found.high - found.low <= width_nats; },
+        Deadline({}));
+  }
+  LogInterval bounds_of(std::span<const Touch> touches, double width_nats = first_width) {
     none.reset();
     add(touches);
     return bounds(width_nats);
@@ -195,7 +199,7 @@ TEST(NoneEvidence, DoesNotDependOnTheOrderButForTheFirstShare) {
   EXPECT_EQ(forth.low, back.low);
   EXPECT_EQ(forth.high, back.high);
   std::swap(reversed.back(), reversed.front());
-  expect_holds(none.bounds_of(reversed), none.expected(reversed), 5.0 * first_width);
+  expect_holds(none.bounds_of(reversed), none.expected(reversed), first_width);
 }
 
 TEST(NoneEvidence, HasTheSameBitsOnAnyNumberOfThreads) {
@@ -218,7 +222,8 @@ TEST(NoneEvidence, HoldsItsDefinitionWhereverADeadlineEndsIt) {
   const Recording recording = random_recording(2, 36, 711);
   const std::vector<Touch> touches = all_touches(recording);
   none.add(touches);
-  const LogInterval bounds = none.none.bounds(1e-6, Deadline(1e-9));
+  const LogInterval bounds =
+      none.none.bounds([](const LogInterval& /*found*/) { return false; }, Deadline(1e-9));
   expect_holds(bounds, none.expected(touches), infinity);
   EXPECT_GT(bounds.high - bounds.low, 1e-3) << "there was no time";
   expect_holds(none.bounds(1e-6), none.expected(touches), 1e-6);

@@ -1,0 +1,319 @@
+#pragma once
+
+// What mean_search.cpp does with the tiles of a few planes.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "estimation/bounded/leaves/bin_likelihood.hpp"
+#include "estimation/bounded/log_sum.hpp"
+#include "estimation/bounded/mean_search.hpp"
+#include "estimation/bounded/search/largest_tiles.hpp"
+#include "estimation/bounded/touch_overlap.hpp"
+
+namespace palpate {
+
+/// A sum of many e^-penalty, from below a least one: each rounded up to whole sixteenths of a nat,
+/// and what lies 64 nats below the least to e^-64 of it.
+class PenaltySum {
+ public:
+  explicit PenaltySum(std::int64_t least) : least_(least) {}
+
+  void add(std::int64_t penalty, std::int64_t times) {
+    const auto slot =
+        static_cast<std::size_t>(std::max<std::int64_t>(penalty - least_, 0) / per_slot);
+    sum_ += static_cast<double>(times) * shares()[std::min(slot, slots - 1)];
+  }
+  /// Log of the sum, in nats.
+  double log() const { return std::log(sum_) - static_cast<double>(least_) / penalties_per_nat; }
+
+ private:
+  static constexpr std::int64_t per_slot = 16;
+  static constexpr std::size_t slots = 1025;
+
+  static const std::array<double, slots>& shares() {
+    static const auto all = [] {
+      std::array<double, slots> of{};
+      for (std::size_t i = 0; i < slots; ++i) {
+        of[i] = std::exp(-static_cast<double>(per_slot * i) / penalties_per_nat);
+      }
+      return of;
+    }();
+    return all;
+  }
+
+  std::int64_t least_;
+  double sum_ = 0.0;
+};
+
+/// So much closer are the bounds of the smallest tiles: they may be left out sooner.
+inline constexpr double closer_nats = 2.0;
+
+/// The tiles of an axis that hold these bins.
+inline std::pair<int, int> tiles_of(const TileAxis& axis, int first_bin, int end_bin) {
+  const auto tile_of = [&](int bin) {
+    return static_cast<int>(std::ranges::upper_bound(axis.first_bin, bin) -
+                            axis.first_bin.begin()) -
+           1;
+  };
+  return {tile_of(first_bin), tile_of(end_bin - 1) + 1};
+}
+
+/// Neighbouring planes of one object, and the bins to be evaluated in them.
+class MeanSearch::Planes {
+ public:
+  /// @param object of all planes to come
+  Planes(const MeanSearch& of, std::size_t object)
+      : of_(of),
+        object_(object),
+        bounds_(of.space_.bounds[object]),
+        levels_(bounds_.levels()),
+        places_(levels_.size()),
+        placed_at_(levels_.size(), -1) {}
+
+  /// What the largest tiles of a plane tell.
+  Survey survey(int theta) {
+    enter(theta);
+    Survey found{.bins = bins_, .unseen = bins_ - seen_bins_};
+    if (sum_largest(); !sums_.empty()) {
+      const std::uint32_t least = std::ranges::min(sums_);
+      PenaltySum all(least);
+      for_batches([&](int x, int y, const std::uint32_t* sums) { leave_out(0, x, y, sums, all); });
+      found.best = most(0) - least / penalties_per_nat;
+      found.left_out = most(0) + all.log();
+    }
+    return found;
+  }
+
+  /// Divides a plane's tiles down to bins, which are evaluated later, but for those whose bounds,
+  /// with the prior weight, are below `least`.
+  /// @returns log of what these hold at most
+  double divide(int theta, double least) {
+    enter(theta);
+    sum_largest();
+    last_divided_.clear();
+    left_out_.clear();
+    for (std::size_t level = 0; level < levels_.size(); ++level) {
+      const double of_level = level + 1 == levels_.size() ? least + closer_nats : least;
+      const double room = std::floor((most(level) - of_level) * penalties_per_nat);
+      last_divided_.push_back(
+          static_cast<std::int64_t>(std::clamp(room, -1.0, static_cast<double>(largest_sum))));
+      left_out_.emplace_back(std::max<std::int64_t>(last_divided_.back(), 0));
+    }
+    for_batches([&](int x, int y, const std::uint32_t* sums) { take_batch(0, x, y, sums); });
+    LogSum left_out;
+    for (std::size_t level = 0; level < levels_.size(); ++level) {
+      left_out.add(most(level) + left_out_[level].log());
+    }
+    return left_out.log();
+  }
+
+  /// Log of the summed likelihood of the bins that count in what was divided.
+  double evaluated(Arithmetic arithmetic) const {
+    std::int64_t bins = 0;
+    for (const BinBox& box : boxes_) {
+      bins += box.bins();
+    }
+    std::vector<double> values(static_cast<std::size_t>(bins));
+    of_.likelihood_.evaluate(boxes_, of_.elements_, arithmetic, values);
+    LogSum sum;
+    const double* value = values.data();
+    auto row = counted_.begin();
+    for (const BinBox& box : boxes_) {
+      for (int y = 0; y < box.y_count; ++y, value += box.x_count, ++row) {
+        for (int x = 0; x < row->count; ++x) {
+          sum.add(value[row->first - box.x_first + x]);
+        }
+      }
+    }
+    return of_.space_.log_weight[object_] + sum.log();
+  }
+
+ private:
+  double most(std::size_t level) const { return of_.most_[object_][level]; }
+
+  /// Finds the plane's bins that count, and the largest tiles that hold them and see the map.
+  void enter(int theta) {
+    theta_ = theta;
+    const PoseLattice& lattice = of_.options_.lattice;
+    const OverlapPlane overlap(of_.rectangle_, of_.space_.boxes[object_], lattice, theta);
+    OverlapPlane::Bins columns{lattice.x_mm.count, 0};  // [first, end)
+    OverlapPlane::Bins lines{lattice.y_mm.count, 0};
+    bins_ = 0;
+    rows_.clear();
+    for (int y = 0; y < lattice.y_mm.count; ++y) {
+      const OverlapPlane::Bins row =
+          of_.everywhere_ ? OverlapPlane::Bins{0, lattice.x_mm.count} : overlap.row(y);
+      rows_.push_back(row);
+      if (row.count > 0) {
+        bins_ += row.count;
+        columns = {std::min(columns.first, row.first),
+                   std::max(columns.count, row.first + row.count)};
+        lines = {std::min(lines.first, y), y + 1};
+      }
+    }
+    largest_ = {};
+    seen_bins_ = 0;
+    if (bins_ == 0) {
+      return;
+    }
+    const TileLevel& level = levels_.front();
+    const auto [x_tile, x_tile_end] = tiles_of(level.x, columns.first, columns.count);
+    const auto [y_tile, y_tile_end] = tiles_of(level.y, lines.first, lines.count);
+    const TileRange seen =
+        seen_tiles(of_.reaches_[static_cast<std::size_t>(theta)], of_.space_.maps[object_], level);
+    const auto down = [](int tile) { return tile - tile % batch_side; };
+    const TileRange batches{down(std::max(x_tile, seen.x_first)),
+                            down(std::min(x_tile_end, seen.x_end) + batch_side - 1),
+                            down(std::max(y_tile, seen.y_first)),
+                            down(std::min(y_tile_end, seen.y_end) + batch_side - 1)};
+    if (batches.x_first < batches.x_end && batches.y_first < batches.y_end) {
+      largest_ = batches;
+      const BinBox box = box_of(0, batches);
+      const bool all = box.x_first <= columns.first && box.y_first <= lines.first &&
+                       box.x_first + box.x_count >= columns.count &&
+                       box.y_first + box.y_count >= lines.count;
+      seen_bins_ = all ? bins_ : 0;
+      for (int y = box.y_first; !all && y < box.y_first + box.y_count; ++y) {
+        seen_bins_ += in_row(box, y).count;
+      }
+    }
+  }
+
+  BinBox box_of(std::size_t level, const TileRange& tiles) const {
+    return levels_[level].box_of(static_cast<std::int32_t>(object_), theta_, tiles);
+  }
+  /// The bins of a box's row that count.
+  OverlapPlane::Bins in_row(const BinBox& box, int y) const {
+    const OverlapPlane::Bins& row = rows_[static_cast<std::size_t>(y)];
+    const int first = std::max(box.x_first, row.first);
+    return {first, std::max(0, std::min(box.x_first + box.x_count, row.first + row.count) - first)};
+  }
+  bool counts(const BinBox& box) const {
+    for (int y = box.y_first; y < box.y_first + box.y_count; ++y) {
+      if (in_row(box, y).count > 0) {
+        return true;
+      }
+    }
+    return false;
+  }
+
+  const WindowPlaces& places(std::size_t level) {
+    if (placed_at_[level] != theta_) {
+      bounds_.place(level, of_.space_.turns[static_cast<std::size_t>(theta_)], of_.elements_,
+                    places_[level]);
+      placed_at_[level] = theta_;
+    }
+    return places_[level];
+  }
+
+  /// Sums the penalties of the largest tiles.
+  void sum_largest() {
+    const int batches = (largest_.x_end - largest_.x_first) / batch_side;
+    const int rows = (largest_.y_end - largest_.y_first) / batch_side;
+    sums_.assign(static_cast<std::size_t>(batches) * static_cast<std::size_t>(rows) * batch_tiles,
+                 0);
+    std::uint32_t* sums = sums_.data();
+    for (int y = largest_.y_first; y < largest_.y_end; y += batch_side) {
+      for (int x = largest_.x_first; x < largest_.x_end; x += batch_side, sums += batch_tiles) {
+        bounds_.add(0, of_.elements_, places(0), x, y, sums);
+      }
+    }
+  }
+  /// Calls visit(x, y, sums) for the batches of the largest tiles.
+  template <typename Visit>
+  void for_batches(const Visit& visit) const {
+    const std::uint32_t* sums = sums_.data();
+    for (int y = largest_.y_first; y < largest_.y_end; y += batch_side) {
+      for (int x = largest_.x_first; x < largest_.x_end; x += batch_side, sums += batch_tiles) {
+        visit(x, y, sums);
+      }
+    }
+  }
+
+  /// Leaves out the tiles of a batch.
+  /// @param but those that are not
+  void leave_out(std::size_t level, int x, int y, const std::uint32_t* sums, PenaltySum& to,
+                 const TileRange& but = {}) const {
+    const TileLevel& tiles = levels_[level];
+    for (int i = 0; i < batch_side; ++i) {
+      const std::int64_t columns = tiles.x.bins(x + i);
+      for (int j = 0; j < batch_side; ++j, ++sums) {
+        if (!but.holds({.x = x + i, .y = y + j})) {
+          to.add(*sums, columns * tiles.y.bins(y + j));
+        }
+      }
+    }
+  }
+
+  /// Leaves out the tiles of a batch whose bounds are low, and divides the others.
+  void take_batch(std::size_t level, int x, int y, const std::uint32_t* sums) {
+    const std::int64_t last_divided = last_divided_[level];
+    if (*std::min_element(sums, sums + batch_tiles) > last_divided) {
+      leave_out(level, x, y, sums, left_out_[level]);
+      return;
+    }
+    const bool finest = level + 1 == levels_.size();
+    TileRange needed{x + batch_side, x, y + batch_side, y};
+    for (int i = 0; i < batch_side; ++i) {
+      for (int j = 0; j < batch_side; ++j) {
+        const std::uint32_t sum = sums[batch_side * i + j];
+        const TileRange tile{x + i, x + i + 1, y + j, y + j + 1};
+        const BinBox box = box_of(level, tile);
+        if (sum > last_divided) {
+          if (!finest) {
+            left_out_[level].add(sum, box.bins());
+          }
+        } else if (!counts(box)) {
+          continue;
+        } else if (finest) {
+          needed = {std::min(needed.x_first, tile.x_first), std::max(needed.x_end, tile.x_end),
+                    std::min(needed.y_first, tile.y_first), std::max(needed.y_end, tile.y_end)};
+        } else {
+          std::uint32_t parts[batch_tiles] = {};
+          const int first_x = tile.x_first * batch_side;
+          const int first_y = tile.y_first * batch_side;
+          bounds_.add(level + 1, of_.elements_, places(level + 1), first_x, first_y, parts);
+          take_batch(level + 1, first_x, first_y, parts);
+        }
+      }
+    }
+    if (finest) {
+      leave_out(level, x, y, sums, left_out_[level], needed);
+    }
+    if (needed.x_first < needed.x_end) {
+      // The smallest tiles of a batch are evaluated as one box, with those between them.
+      const BinBox box = boxes_.emplace_back(box_of(level, needed));
+      for (int row = box.y_first; row < box.y_first + box.y_count; ++row) {
+        counted_.push_back(in_row(box, row));
+      }
+    }
+  }
+
+  const MeanSearch& of_;
+  std::size_t object_;
+  const TileBounds& bounds_;
+  std::span<const TileLevel> levels_;
+  std::vector<WindowPlaces> places_;         ///< [level] of the elements
+  std::vector<int> placed_at_;               ///< [level] theta
+  std::vector<BinBox> boxes_;                ///< to be evaluated
+  std::vector<OverlapPlane::Bins> counted_;  ///< [box, row]
+
+  // Of the plane.
+  int theta_ = 0;
+  std::vector<OverlapPlane::Bins> rows_;  ///< [y] bins that count
+  std::int64_t bins_ = 0;                 ///< that count
+  std::int64_t seen_bins_ = 0;            ///< of these, in tiles that see the map
+  TileRange largest_;  ///< whole batches of the largest tiles, about those that hold seen bins
+  std::vector<std::uint32_t> sums_;         ///< [batch, tile] of these
+  std::vector<std::int64_t> last_divided_;  ///< [level] the largest sum of a tile that is divided
+  std::vector<PenaltySum> left_out_;        ///< [level]
+};
+
+}  // namespace palpate

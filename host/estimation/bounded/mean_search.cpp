@@ -1,0 +1,132 @@
+#include "estimation/bounded/mean_search.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimation/bounded/log_sum.hpp"
+#include "estimation/bounded/mean_planes.hpp"
+#include "estimation/bounded/parallel_for.hpp"
+
+namespace palpate {
+
+MeanSearch::MeanSearch(const SearchSpace& space, const BoundedOptions& options,
+                       const BinLikelihood& likelihood, const ArrayReadings& touch)
+    : space_(space),
+      options_(options),
+      likelihood_(likelihood),
+      elements_(known_elements(touch)),
+      rectangle_(touch.rectangle),
+      reaches_(reaches_of(elements_, space.turns)) {
+  const MapSample prior{log_odds_from_probability(*options.contact.prior)};
+  for (std::size_t i = 0; i < space.bounds.size(); ++i) {
+    std::vector<double>& of_level = most_.emplace_back();
+    for (std::size_t level = 0; level < space.bounds[i].levels().size(); ++level) {
+      of_level.push_back(space.log_weight[i] + space.bounds[i].best(level, elements_));
+    }
+    double& sum = prior_log_likelihood_.emplace_back();
+    for (const ReadingRun& run : elements_.runs) {
+      sum += static_cast<double>(run.end - run.begin) *
+             options.contact.log_likelihood(run.reading, prior, i);
+    }
+    sum += space.log_weight[i];
+    errors_.push_back({likelihood.error(i, elements_, Arithmetic::float32),
+                       likelihood.error(i, elements_, Arithmetic::float64)});
+  }
+}
+
+template <typename Work>
+bool MeanSearch::for_planes(const Deadline& deadline, const Work& work) const {
+  constexpr std::size_t together = 8;
+  constexpr std::size_t tasks_between_deadlines = 1024;
+  const std::size_t thetas = space_.turns.size();
+  const std::size_t of_object = (thetas + together - 1) / together;
+  const std::size_t tasks = of_object * space_.bounds.size();
+  for (std::size_t begin = 0; begin < tasks; begin += tasks_between_deadlines) {
+    if (deadline.passed()) {
+      return false;
+    }
+    parallel_for(std::min(tasks_between_deadlines, tasks - begin), [&](std::size_t i) {
+      const std::size_t task = begin + i;
+      const std::size_t first = task % of_object * together;
+      work(task / of_object, first, std::min(first + together, thetas));
+    });
+  }
+  return true;
+}
+
+bool MeanSearch::survey(const Deadline& deadline) {
+  const std::size_t thetas = space_.turns.size();
+  std::vector<Survey> surveys(space_.bounds.size() * thetas);
+  if (!for_planes(deadline, [&](std::size_t object, std::size_t first, std::size_t end) {
+        Planes planes(*this, object);
+        for (std::size_t theta = first; theta < end; ++theta) {
+          surveys[object * thetas + theta] = planes.survey(static_cast<int>(theta));
+        }
+      })) {
+    return false;
+  }
+  std::int64_t bins = 0;
+  double weighted = 0.0;
+  for (std::size_t i = 0; i < surveys.size(); ++i) {
+    bins += surveys[i].bins;
+    weighted += std::exp(space_.log_weight[i / thetas]) * static_cast<double>(surveys[i].bins);
+  }
+  if (bins == 0 && !everywhere_) {
+    // Where no pose of the region brings the array to an object, all poses are alike.
+    everywhere_ = true;
+    return survey(deadline);
+  }
+  surveys_ = std::move(surveys);
+  log_bins_ = std::log(static_cast<double>(bins));
+  log_weighted_bins_ = std::log(weighted);
+  log_share_ = log_weighted_bins_ - std::log(static_cast<double>(options_.lattice.bins()));
+  return true;
+}
+
+std::optional<LogInterval> MeanSearch::bounds(double least, bool exact, const Deadline& deadline) {
+  if (surveys_.empty() && !survey(deadline)) {
+    return {};
+  }
+  // The mean is of so many bins, each with its object's weight.
+  const double least_of_bin = least + log_weighted_bins_ - log_bins_;
+  const std::size_t thetas = space_.turns.size();
+  std::vector<double> left_out(surveys_.size());
+  std::vector<double> evaluated(surveys_.size(), nothing);
+  if (!for_planes(deadline, [&](std::size_t object, std::size_t first, std::size_t end) {
+        Planes planes(*this, object);
+        for (std::size_t theta = first; theta < end; ++theta) {
+          const std::size_t i = object * thetas + theta;
+          left_out[i] = surveys_[i].best < least_of_bin
+                            ? surveys_[i].left_out
+                            : planes.divide(static_cast<int>(theta), least_of_bin);
+        }
+        evaluated[object * thetas + first] =
+            planes.evaluated(exact ? Arithmetic::float64 : Arithmetic::float32);
+      })) {
+    return {};
+  }
+  LogSum low;
+  LogSum high;
+  for (std::size_t i = 0; i < surveys_.size(); ++i) {
+    const std::size_t object = i / thetas;
+    const double error = errors_[object][exact ? 1 : 0];
+    low.add(evaluated[i] - error);
+    high.add(evaluated[i] + error);
+    high.add(left_out[i]);
+    if (surveys_[i].unseen > 0) {
+      // Where every element sees the prior, all bins have the same likelihood.
+      const double mass =
+          prior_log_likelihood_[object] + std::log(static_cast<double>(surveys_[i].unseen));
+      low.add(mass - errors_[object][1]);
+      high.add(mass + errors_[object][1]);
+    }
+  }
+  const double log_low = low.log() - log_weighted_bins_;
+  const double log_high = high.log() - log_weighted_bins_;
+  // Each exponential and each addition of the sums rounds by a few units of 2^-53, as logs do.
+  const double terms = std::exp(log_bins_) + static_cast<double>(surveys_.size());
+  const double rounding = 4.0 * (terms + std::abs(log_high)) * 0x1p-53;
+  return LogInterval{log_low - rounding, log_high + rounding};
+}
+
+}  // namespace palpate

@@ -1,0 +1,79 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "estimation/bounded/known_elements.hpp"
+#include "estimation/bounded/search/search_space.hpp"
+#include "model/bounding_box.hpp"
+#include "palpate/bounded_posterior.hpp"
+#include "palpate/estimate.hpp"
+
+namespace palpate {
+
+/// Bounds one touch's mean likelihood over the bins at which its array overlaps an object, or over
+/// all bins where there is no such bin, by prior weight. The touch's pose is exact.
+///
+/// A mean is wide: thousands of bins hold it, and no order of tiles is worth keeping. So every
+/// object and theta is searched by itself, from the largest tiles down. Tiles whose bounds lie
+/// below a threshold are left out and counted by their bounds; all others are divided, and the bins
+/// of the smallest ones evaluated.
+class MeanSearch {
+ public:
+  /// @param options checked, with a resolved contact model; all but the touch outlive this object
+  MeanSearch(const SearchSpace& space, const BoundedOptions& options,
+             const BinLikelihood& likelihood, const ArrayReadings& touch);
+
+  /// Bounds of the log of the mean.
+  /// @param least log of a mean: tiles are left out where their bins would have less than it on
+  /// average, and the smallest tiles a little above. Infinity leaves all to the bounds of the
+  /// largest tiles.
+  /// @param exact evaluates bins in float64 instead of float32
+  /// @returns nothing where the deadline passed. On the threads of the caller's arena; the bits do
+  /// not depend on their number.
+  std::optional<LogInterval> bounds(double least, bool exact, const Deadline& deadline);
+  /// Log of the share of the bins that count among all, by prior weight. To be asked for after
+  /// bounds().
+  double log_share() const { return log_share_; }
+
+ private:
+  /// What the largest tiles of a plane, one object at one theta, tell.
+  struct Survey {
+    std::int64_t bins = 0;      ///< that count
+    std::int64_t unseen = 0;    ///< of these, at which every element sees the prior
+    double best = nothing;      ///< the largest bound, in nats, with the prior weight
+    double left_out = nothing;  ///< log of what the tiles that see the map hold at most, the same
+  };
+  class Planes;
+
+  static constexpr double nothing = -std::numeric_limits<double>::infinity();
+
+  /// Calls work(object, first theta, end) for all planes, in parallel, a few of them together.
+  /// @returns false where the deadline passed
+  template <typename Work>
+  bool for_planes(const Deadline& deadline, const Work& work) const;
+  /// Looks at the largest tiles of all planes. @returns false where the deadline passed
+  bool survey(const Deadline& deadline);
+
+  const SearchSpace& space_;
+  const BoundedOptions& options_;
+  const BinLikelihood& likelihood_;
+  KnownElements elements_;
+  ArrayRectangle rectangle_;
+  std::vector<BoundingBox> reaches_;       ///< [theta] of the elements
+  std::vector<std::vector<double>> most_;  ///< [object][level] without penalties, with the weight
+  std::vector<double> prior_log_likelihood_;  ///< [object] with the weight
+  std::vector<std::array<double, 2>>
+      errors_;                      ///< [object] of a bin in float32 and float64, in nats
+  std::vector<Survey> surveys_;     ///< [object, theta]; empty before the first bounds()
+  bool everywhere_ = false;         ///< all bins count
+  double log_bins_ = 0.0;           ///< that count
+  double log_weighted_bins_ = 0.0;  ///< the same by prior weight
+  double log_share_ = 0.0;
+};
+
+}  // namespace palpate
