@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -146,6 +147,39 @@ void bind_marginals(nb::module_& module) {
       });
 }
 
+/// A number of every candidate, [n].
+template <typename Number>
+auto of_each(Number number) {
+  return [number](const TouchGains& gains) {
+    std::vector<double> numbers;
+    std::ranges::transform(gains.each, std::back_inserter(numbers), number);
+    return owned(std::move(numbers));
+  };
+}
+
+void bind_gains(nb::module_& module) {
+  nb::class_<TouchGains>(
+      module, "TouchGains",
+      "What a touch at each of n candidate poses is expected to tell, in nats: estimates, none of\n"
+      "them below 0, with standard errors. Unpacks into (identity, pose).")
+      .def_prop_ro("identity", of_each(&TouchGain::identity), "[n] about which object it is.")
+      .def_prop_ro("pose", of_each(&TouchGain::pose), "[n] about the pose, given the object.")
+      .def_prop_ro("both", of_each(&TouchGain::both), "[n] about object and pose together.")
+      .def_prop_ro("identity_error",
+                   of_each([](const TouchGain& gain) { return gain.standard_error.identity; }),
+                   "[n] standard error of identity.")
+      .def_prop_ro("pose_error",
+                   of_each([](const TouchGain& gain) { return gain.standard_error.pose; }),
+                   "[n] standard error of pose.")
+      .def_prop_ro("both_error",
+                   of_each([](const TouchGain& gain) { return gain.standard_error.both; }),
+                   "[n] standard error of both.")
+      .def("__iter__", [](const TouchGains& self) -> nb::typed<nb::iterator, Result<double, 1>> {
+        return nb::iter(
+            nb::make_tuple(of_each(&TouchGain::identity)(self), of_each(&TouchGain::pose)(self)));
+      });
+}
+
 }  // namespace
 
 std::optional<Hypothesis> hypothesis_in(nb::handle item) {
@@ -178,6 +212,7 @@ void bind_estimate(nb::module_& module) {
   bind_certificate(module);
   bind_estimate_class(module);
   bind_marginals(module);
+  bind_gains(module);
 }
 
 double extent_mm(const std::vector<Hypothesis>& hypotheses) {

@@ -22,8 +22,8 @@ namespace palpate {
 namespace {
 
 constexpr std::size_t parts = 4;
-constexpr std::size_t enough = 200;  // that are judged
-constexpr std::size_t least = 16;    // fewer would tell the sd to no more than a fifth of it
+constexpr std::size_t enough = 200;       // that are judged
+constexpr std::size_t least_judged = 16;  // fewer would tell the sd to no more than a fifth of it
 
 /// Bins of T_object_robot about the identity, wide enough for refine() to move its window.
 PoseLattice lattice_about(const Body& body) {
@@ -133,7 +133,7 @@ void judge_left_out(Device& device, MapSource& source) {
   const std::vector<TouchEvidence> evidence = evidence_of(touches, contact);
   source.left_out.reset();
   source.pose_scale.reset();
-  if (std::cmp_less(std::ranges::count_if(evidence, &TouchEvidence::in_contact), least)) {
+  if (std::cmp_less(std::ranges::count_if(evidence, &TouchEvidence::in_contact), least_judged)) {
     return;
   }
   constexpr std::uint64_t seed = 0;
