@@ -4,8 +4,8 @@
 execute_process(COMMAND ${NM} --demangle --undefined-only ${LIBRARY}
                 OUTPUT_VARIABLE called COMMAND_ERROR_IS_FATAL ANY)
 string(REGEX MATCHALL " U [^\n]*" called "${called}")
-if(NOT called MATCHES "palpate::reference::")
-  message(FATAL_ERROR "${NM} shows no calls between the reference's own files")
+if(NOT called MATCHES " U log1p")
+  message(FATAL_ERROR "${NM} does not show what the reference calls")
 endif()
 list(FILTER called INCLUDE REGEX "palpate::| vk[A-Z]")
 list(FILTER called EXCLUDE REGEX " U palpate::reference::")
