@@ -54,8 +54,8 @@ struct BoundedOptions {
   /// likelihood is bounded by searches of its own, until the log odds of "none of these" against
   /// the objects are known within 0.05 nats, or it or the objects are known to have less than the
   /// tolerance or 1e-4, whichever is larger. With evidence_nats, it is known as closely as the
-  /// labels are. Certificate::none_log_evidence holds its bounds; Certificate::dropped_mass is of the
-  /// objects' bins alone.
+  /// labels are. Certificate::none_log_evidence holds its bounds; Certificate::dropped_mass is of
+  /// the objects' bins alone.
   std::optional<double> none_weight = {};
   /// Host threads; 0 takes as many as the machine has cores.
   int threads = 0;
@@ -143,8 +143,8 @@ class PALPATE_API BoundedPosterior {
   /// @throws Error if there is no such object
   std::vector<std::vector<BinShare>> likely_bins(std::span<const int> objects,
                                                  double least_share) const;
-  /// The bins that the search evaluated. Blocks of bins at which every element sees the prior, beyond
-  /// the maps, are evaluated at once and belong to the others.
+  /// The bins that the search evaluated. Blocks of bins at which every element sees the prior,
+  /// beyond the maps, are evaluated at once and belong to the others.
   /// @throws Error where the list would take more than a quarter of the machine's memory
   EvaluatedBelief evaluated_bins() const;
   /// Log-likelihood of any pose of an object in nats, in float64, without prior weights. With
