@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """The list of sources to lint holds what changed within a day of the newest commit, and what includes
-it. The argument is the program that prints the list."""
+it; what is compiled of them is found. The argument is the program that prints the list."""
 
+import json
 import os
 import pathlib
 import subprocess
@@ -90,6 +91,33 @@ class ChangedSources(unittest.TestCase):
         self.write(".clang-tidy", "Checks: performance-*\n")
         self.commit(2 * DAY_S)
         self.assertEqual(self.listed(), everything)
+
+
+class UnitsOf(unittest.TestCase):
+    def test_sources_are_found_where_they_are_joined_or_alone(self) -> None:
+        with tempfile.TemporaryDirectory() as folder:
+            root = pathlib.Path(folder).resolve()
+            units = [root / name for name in ("joined_0.cxx", "joined_1.cxx", "alone.cpp")]
+            units[0].write_text(f'#include "{root}/a.cpp"\n#include "{root}/b.cpp"\n')
+            units[1].write_text(f'#include "{root}/c.cpp"\n')
+            units[2].write_text('#include "a.cpp"\n')
+            commands = [{"file": str(unit)} for unit in units]
+            (root / "compile_commands.json").write_text(json.dumps(commands))
+
+            def asked(*names: str) -> subprocess.CompletedProcess[str]:
+                return subprocess.run(
+                    [PROGRAM.parent / "units_of", root], cwd=root, text=True, capture_output=True,
+                    input="".join(name + "\n" for name in names),
+                )  # fmt: skip
+
+            self.assertEqual(asked("b.cpp").stdout.split(), [str(units[0])])
+            both = asked("c.cpp", "alone.cpp")
+            self.assertEqual(both.stdout.split(), [str(units[2]), str(units[1])])
+            self.assertEqual((both.returncode, both.stderr), (0, ""))
+            self.assertEqual(asked().stdout, "")
+            lost = asked("b.cpp", "lost.cpp")
+            self.assertEqual(lost.returncode, 1)
+            self.assertIn("lost.cpp: compiled nowhere", lost.stderr)
 
 
 if __name__ == "__main__":

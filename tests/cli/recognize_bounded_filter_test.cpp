@@ -1,13 +1,9 @@
-// recognize and live by bounds: --filter bounded, its flags and refusals, and how --filter auto
-// chooses.
-
-#include <gmock/gmock.h>
+// recognize and live by bounds: --filter bounded, what it finds and what it says of it.
 
 #include <cmath>
 #include <sstream>
 
-#include "program.hpp"
-#include "sample_files.hpp"
+#include "bounded_filter.hpp"
 
 namespace palpate::recognize_bounded_filter_test {
 
@@ -15,40 +11,6 @@ using nlohmann::json;
 using testing::HasSubstr;
 using testing::Not;
 using Arguments = std::vector<std::string>;
-
-class BoundedFilter : public ProgramTest {
- protected:
-  BoundedFilter() {
-    std::filesystem::create_directory(folder_ / "maps");
-    write_map(folder_ / "maps/A.map.h5", sample_map("A"));
-    write_map(folder_ / "maps/I.map.h5", sample_map("I"));
-    write_recording(folder_ / "u.h5", sample_unknown("A", {{2.0, -3.0}, 1.0}, 6));
-  }
-
-  static Arguments with(Arguments flags) {
-    flags.insert(flags.begin(), {"u.h5", "--maps", "maps", "--bins=12x12x16"});
-    return flags;
-  }
-  /// The record of u.h5 on a small lattice.
-  json u(const Arguments& flags) const { return record(with(flags)); }
-  json bounded(Arguments flags = {}) const {
-    flags.insert(flags.end(), {"--filter", "bounded"});
-    return u(flags);
-  }
-  void refused(Arguments flags, const Arguments& named) const {
-    flags = with(flags);
-    flags.insert(flags.begin(), "recognize");
-    expect_refused(flags, named);
-  }
-  void scene(const std::string& yaml) const { put_bytes(folder_ / "scene.yaml", yaml); }
-  /// What --verbose says of u.h5.
-  std::string engine(Arguments flags) const {
-    flags.insert(flags.begin(), {"recognize", "u.h5", "--maps", "maps", "--verbose"});
-    const Outcome outcome = palpate(flags);
-    EXPECT_EQ(outcome.status, 0) << outcome.err;
-    return outcome.err;
-  }
-};
 
 /// The laws of what bounds say of a step.
 void expect_lawful(const json& step) {
@@ -214,46 +176,6 @@ TEST_F(BoundedFilter, TakesEachFrameByItself) {
   }
 }
 
-TEST_F(BoundedFilter, IsAskedForByASceneToo) {
-  const auto comparable = [](json r) {
-    r.erase("seconds");
-    return r;
-  };
-  const json wanted = comparable(bounded());
-  scene("filter: bounded\n");
-  EXPECT_EQ(comparable(u({"--scene", "scene.yaml"})), wanted);
-  EXPECT_FALSE(u({"--scene", "scene.yaml", "--filter", "histogram"}).contains("dropped_mass"));
-  EXPECT_FALSE(u({"--scene", "scene.yaml", "--filter", "auto"}).contains("dropped_mass"));
-  scene("filter: auto\n");
-  EXPECT_FALSE(u({"--scene", "scene.yaml"}).contains("dropped_mass"));
-  scene("filter: bounded\nslip_sd: {mm: 1}\n");
-  refused({"--scene", "scene.yaml"},
-          {"slip_sd mm in scene.yaml", "rest", "leave it out", "filter: bounded in scene.yaml"});
-  EXPECT_TRUE(u({"--scene", "scene.yaml", "--slip-sd-mm", "0"}).contains("dropped_mass"))
-      << "at rest after all";
-  scene("filter: histogram\n");
-  refused({"--scene", "scene.yaml", "--tolerance", "0.1"}, {"--tolerance", "has no effect"});
-}
-
-TEST_F(BoundedFilter, RefusesWhatNeedsTheHistogram) {
-  for (const Arguments& asks : {Arguments{"--filter", "bounded"}, Arguments{"--tolerance", "1e-3"},
-                                Arguments{"--budget-ms", "9"}, Arguments{"--evidence-nats", "1"}}) {
-    const std::string by = asks.front() == "--filter" ? "--filter bounded" : asks.front();
-    for (const auto& [flag, value, why] : {std::tuple{"--slip-sd-mm", "0.5", "at rest"},
-                                           {"--slip-sd-deg", "3", "at rest"},
-                                           {"--memory-mib", "100", "has no effect"}}) {
-      Arguments flags = asks;
-      flags.insert(flags.end(), {flag, value});
-      refused(flags, {std::string(flag) + ": ", std::string(why) == "at rest" ? "rest" : why,
-                      "leave it out, or " + by});
-    }
-    Arguments fit = asks;
-    fit.emplace_back("--fit-touch-sd");
-    refused(fit, {"--fit-touch-sd", "leave it out, or " + by});
-  }
-  refused({"--filter", "bounded", "--particles", "9"}, {"--particles", "--filter particles"});
-}
-
 TEST_F(BoundedFilter, WritesThePosteriorOfTheBinsThatItEvaluated) {
   u({"--posterior", "all.h5"});
   const Posterior all = read_posterior(folder_ / "all.h5");
@@ -274,93 +196,6 @@ TEST_F(BoundedFilter, WritesThePosteriorOfTheBinsThatItEvaluated) {
       EXPECT_NEAR(some.log_likelihood[i],
                   all.log_likelihood[static_cast<std::size_t>(some.index[i])], 1e-3);
     }
-  }
-}
-
-TEST_F(BoundedFilter, ItsFlagsAreRefusedBesideOtherFilters) {
-  for (const char* flag : {"--tolerance=0.1", "--budget-ms=5", "--evidence-nats=1"}) {
-    const std::string name = std::string(flag).substr(0, std::string(flag).find('='));
-    for (const char* filter : {"histogram", "particles"}) {
-      refused({flag, "--filter", filter}, {name + ": has no effect on --filter " + filter,
-                                           "use --filter bounded, or leave it out"});
-    }
-  }
-}
-
-TEST_F(BoundedFilter, RefusesValuesOutOfRange) {
-  for (const char* value : {"0", "1", "-1e-3", "2", "nan"}) {
-    refused({"--tolerance", value}, {"--tolerance", "between 0 and 1"});
-  }
-  for (const char* flag : {"--budget-ms", "--evidence-nats"}) {
-    for (const char* value : {"0", "-1", "nan", "inf"}) {
-      refused({std::string(flag) + "=" + value}, {flag, "above 0"});
-    }
-  }
-}
-
-// Two maps: 224 x 224 bins of each are 100,352, more than the rule's 100,000.
-TEST_F(BoundedFilter, AutoTakesItForManyBins) {
-  const Arguments many{"--bins=224x224x1"};
-  const Arguments few{"--bins=223x224x1"};
-  EXPECT_THAT(engine(many), HasSubstr("filter: bounded, "));
-  EXPECT_THAT(engine(many), HasSubstr("100352 bins in all, more than 100000"));
-  EXPECT_THAT(engine(few), HasSubstr("filter: histogram in "));
-  EXPECT_THAT(engine(few), HasSubstr("99904 bins in all, at most 100000"));
-  for (const Arguments& needs : {Arguments{"--slip-sd-mm", "0.5"}, Arguments{"--memory-mib", "500"},
-                                 Arguments{"--posterior", "p.h5"}}) {
-    Arguments flags = many;
-    flags.insert(flags.end(), needs.begin(), needs.end());
-    EXPECT_THAT(engine(flags), HasSubstr("filter: histogram in "));
-    EXPECT_THAT(engine(flags), HasSubstr("asked for by " + needs.front()));
-  }
-  Arguments explicitly = many;
-  explicitly.insert(explicitly.end(), {"--filter", "histogram"});
-  EXPECT_THAT(engine(explicitly), HasSubstr("filter: histogram in "));
-  Arguments proven = few;
-  proven.insert(proven.end(), {"--tolerance", "1e-3", "--budget-ms", "60000"});
-  EXPECT_THAT(engine(proven), HasSubstr("filter: bounded, "));
-  EXPECT_THAT(engine(proven), HasSubstr("tolerance 0.001, budget 60000 ms"));
-  EXPECT_THAT(engine(proven), HasSubstr("asked for by --tolerance"));
-}
-
-TEST_F(BoundedFilter, AutoNamesTheFlagThatKeepsALargeLatticeFromIt) {
-  for (const Arguments& flags : {Arguments{"--slip-sd-deg=2"}, Arguments{"--memory-mib=9"},
-                                 Arguments{"--posterior=p.h5"}, Arguments{"--filter=histogram"}}) {
-    const std::string name = flags[0].starts_with("--filter")
-                                 ? "--filter histogram"
-                                 : flags[0].substr(0, flags[0].find('='));
-    Arguments call{"recognize", "u.h5", "--maps", "maps", "--bins=4000x4000x300"};
-    call.insert(call.end(), flags.begin(), flags.end());
-    expect_refused(call, {"MiB", "or leave out " + name + ": --filter bounded"});
-  }
-  expect_refused({"recognize", "u.h5", "--maps", "maps", "--bins=4000x4000x300", "--filter=bounded",
-                  "--touch-sd-mm=0.5"},
-                 {"MiB", "use fewer bins"});
-  expect_refused({"recognize", "u.h5", "--maps", "maps", "--bins=4000x4000x300",
-                  "--filter=histogram", "--slip-sd-deg=2"},
-                 {"leave out --slip-sd-deg and --filter histogram"});
-}
-
-TEST_F(BoundedFilter, IsRefusedWhereTheMachineHasNoRoomForIt) {
-  const auto with_filter = [](const std::string& filter, Arguments flags) {
-    flags.insert(flags.begin(), {"recognize", "u.h5", "--maps", "maps", "--filter=" + filter});
-    return flags;
-  };
-  const Arguments fine{"--bins=2000000000x2000000000x1"};
-  const Arguments turning{"--bins=4x4x2000000000"};
-  const Arguments wide{"--bins=1000x1000x1000", "--x-mm=-1e9:1e9", "--y-mm=-1e9:1e9"};
-  const Arguments dense{"--bins=300000x300000x2"};
-  const Arguments absurd{"--bins=2000000000x2000000000x2000000000"};
-  expect_refused(with_filter("bounded", fine), {"lattice", "too many", "use fewer bins"});
-  expect_refused(with_filter("bounded", dense), {"lattice", "fewer bins along x and y"});
-  expect_refused(with_filter("bounded", turning), {"lattice", "MiB", "fewer thetas"});
-  expect_refused(with_filter("bounded", wide), {"lattice", "MiB", "narrow the region"});
-  expect_refused(with_filter("bounded", absurd), {"lattice", "use fewer bins"});
-  // Nothing to ask for: bounds would refuse as well.
-  for (const Arguments& flags : {fine, turning, dense, absurd}) {
-    const Outcome outcome = palpate(with_filter("histogram", flags));
-    EXPECT_EQ(outcome.status, 2);
-    EXPECT_THAT(outcome.err, Not(HasSubstr("bounded")));
   }
 }
 

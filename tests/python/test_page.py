@@ -1,63 +1,22 @@
-"""`palpate live --page` in a real browser, and before hostile clients."""
+"""`palpate live --page` and `palpate view` in a real browser."""
 
-import http.client
 import json
 import os
 import pathlib
-import random
 import re
-import signal
-import socket
 import subprocess
 import urllib.request
 from collections.abc import Callable, Iterator
 
 import pytest
+from paged import STREAM, Paged, folder, live, paged
 from selenium import webdriver
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import Select, WebDriverWait
 
 import palpate
 
-#: Four touches of an E, at ten times the speed of a robot; what was touched is known.
-STREAM = "simulate:E,seed=8,touches=4,speed=10,object=random"
-
-
-class Paged:
-    """A command with a page."""
-
-    def __init__(self, folder: pathlib.Path, *arguments: str):
-        self.process = subprocess.Popen(
-            [os.environ["PALPATE_COMMAND"], *arguments],
-            cwd=folder,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-        )
-        assert self.process.stdout is not None
-        first = self.process.stdout.readline()
-        match = re.fullmatch(r"the page is at (http://127\.0\.0\.1:(\d+)/).*\n", first)
-        assert match, first + self.process.stdout.read()
-        self.url, self.port = match[1], int(match[2])
-
-    def end(self) -> str:
-        """Ends the command as Ctrl-C does, and returns what it has said."""
-        self.process.send_signal(signal.SIGINT)
-        said, _ = self.process.communicate(timeout=60)
-        assert self.process.returncode == 0, said
-        return said
-
-
-@pytest.fixture(scope="module")
-def folder(
-    tmp_path_factory: pytest.TempPathFactory, maps: list[palpate.OccupancyGrid]
-) -> pathlib.Path:
-    """A folder with maps of A, E and I."""
-    folder = tmp_path_factory.mktemp("page")
-    (folder / "maps").mkdir()
-    for one in maps:
-        one.save(folder / "maps" / f"{one.label}.map.h5")
-    return folder
+__all__ = ["folder", "live", "paged"]  # fixtures
 
 
 @pytest.fixture(scope="module")
@@ -74,32 +33,6 @@ def browser() -> Iterator[webdriver.Chrome]:
     driver.set_window_size(1280, 1000)
     yield driver
     driver.quit()
-
-
-@pytest.fixture
-def paged(folder: pathlib.Path) -> Iterator[Callable[..., Paged]]:
-    """Starts commands, which end with the test."""
-    started: list[Paged] = []
-
-    def start(*arguments: str) -> Paged:
-        started.append(Paged(folder, *arguments))
-        return started[-1]
-
-    yield start
-    for one in started:
-        one.process.kill()
-        one.process.wait()
-
-
-@pytest.fixture
-def live(paged: Callable[..., Paged]) -> Callable[..., Paged]:
-    """Starts `palpate live`, with a page at a free port or at `port`."""
-
-    def start(*options: str, port: int = 0, sensor: str = STREAM) -> Paged:
-        arguments = ["--sensor", sensor, "--maps", "maps", "--bins", "20x20x24", *options]
-        return paged("live", *arguments, "--page", str(port))
-
-    return start
 
 
 def text(browser: webdriver.Chrome, name: str) -> str:
@@ -212,123 +145,6 @@ def test_a_page_comes_back_after_a_break(
     wait(browser, lambda: browser.title.startswith("A ") and touches(browser) == 3)
     assert text(browser, "connection") == "connected"
     complaints(browser)  # of the break
-
-
-def request(port: int, method: str, path: str, **headers: str) -> tuple[int, bytes]:
-    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=20)
-    connection.putrequest(method, path, skip_host="Host" in headers, skip_accept_encoding=True)
-    body = headers.pop("body", "").encode()
-    for name, value in headers.items():
-        connection.putheader(name, value)
-    connection.putheader("Content-Length", str(len(body)))
-    connection.endheaders(body)
-    answer = connection.getresponse()
-    content = answer.read()
-    connection.close()
-    return answer.status, content
-
-
-def test_other_sites_and_bad_requests_are_refused(live: Callable[..., Paged]) -> None:
-    port = live().port
-    for host in ("evil.example", f"evil.example:{port}", "", "localhost.evil.example"):
-        assert request(port, "GET", "/events", Host=host)[0] == 403, host
-        assert request(port, "POST", "/do", Host=host, body='{"do": "next unknown"}')[0] == 403
-    for origin in ("http://evil.example", "null", f"https://127.0.0.1:{port}"):
-        assert request(port, "GET", "/events", Origin=origin)[0] == 403, origin
-    own = f"localhost:{port}"
-    assert request(port, "GET", "/", Host=own, Origin="http://" + own)[0] == 200
-    for path in ("/page.cpp", "/../page.js", "//etc/passwd", "/map/9", "/map/-1", "/events/x"):
-        assert request(port, "GET", path)[0] == 404, path
-    for body, words in (
-        ("", b"object of JSON"),
-        ("[1]", b"object of JSON"),
-        ("{}", b"names what it asks for"),
-        ('{"do": "look at"}', b"names what it asks for"),
-        ('{"do": "look at", "object": 99}', b"object 99: there is none"),
-        ('{"do": "leave out", "touch": "x"}', b"names what it asks for"),
-        ('{"do": "format the disk"}', b"is not one of the page's requests"),
-    ):
-        status, said = request(port, "POST", "/do", body=body)
-        assert status in (400, 409) and words in said, (body, said)
-    assert request(port, "POST", "/do", body='{"do": "' + 5000 * "x" + '"}')[0] == 413
-
-
-def hostile(port: int, requests: int, seed: int) -> None:
-    """Sends so many requests of random bytes, and reads what comes back."""
-    generator = random.Random(seed)
-    methods = ["GET", "POST", "PUT", "HEAD", "OPTIONS", "DELETE", "TRACE", "G\0T", "", 300 * "M"]
-    paths = ["/", "/events", "/do", "/map/0", "/%2e%2e/", "/%", "/" + 9000 * "a", "*", "http://x/"]
-    names = ["Range", "Content-Length", "Transfer-Encoding", "Content-Encoding", "Host", "Expect"]
-    values = ["bytes=0-1,2-3,-", "-1", "chunked", "gzip", "99999999999999999999", 9000 * "v", ""]
-    for _ in range(requests):
-        path = generator.choice([*paths, "/" + generator.randbytes(20).decode("latin-1")])
-        head = f"{generator.choice(methods)} {path} HTTP/1.{generator.randrange(3)}\r\n"
-        if generator.random() < 0.9:
-            head += f"Host: 127.0.0.1:{port}\r\n"
-        for _ in range(generator.randrange(4)):
-            head += f"{generator.choice(names)}: {generator.choice(values)}\r\n"
-        body = generator.randbytes(generator.randrange(100))
-        with socket.create_connection(("127.0.0.1", port), timeout=20) as connection:
-            try:
-                connection.sendall(head.encode("latin-1") + b"\r\n" + body)
-                connection.shutdown(socket.SHUT_WR)
-                connection.recv(4096)
-            except (ConnectionError, BrokenPipeError):
-                pass  # hung up on, and rightly
-
-
-def memory_mib(pid: int) -> float:
-    status = pathlib.Path(f"/proc/{pid}/status").read_text()
-    match = re.search(r"VmRSS:\s+(\d+) kB", status)
-    assert match
-    return int(match[1]) / 1024
-
-
-def test_hostile_requests_do_no_harm(live: Callable[..., Paged]) -> None:
-    # More by hand: PALPATE_HOSTILE=100000.
-    requests = int(os.environ.get("PALPATE_HOSTILE", "1000"))
-    command = live()
-    hostile(command.port, 300, seed=1)
-    before = memory_mib(command.process.pid)
-    hostile(command.port, requests, seed=2)
-    assert memory_mib(command.process.pid) < before + 30
-    status, page = request(command.port, "GET", "/")
-    assert status == 200 and b"<title>Palpate</title>" in page
-    assert " frames, 0 lost" in command.end()
-
-
-def test_pages_are_capped(live: Callable[..., Paged]) -> None:
-    port = live().port
-    looking = []
-    for _ in range(16):
-        connection = socket.create_connection(("127.0.0.1", port), timeout=20)
-        connection.sendall(f"GET /events HTTP/1.1\r\nHost: localhost:{port}\r\n\r\n".encode())
-        assert b" 200 " in connection.recv(4096)
-        looking.append(connection)
-    status, said = request(port, "GET", "/events")
-    assert status == 503 and b"16 pages look already" in said
-    assert request(port, "GET", "/")[0] == 200
-    for connection in looking:
-        connection.close()
-
-
-def test_a_port_in_use_is_refused(live: Callable[..., Paged], folder: pathlib.Path) -> None:
-    port = live().port
-    arguments = ["live", "--sensor", STREAM, "--maps", str(folder / "maps"), "--page", str(port)]
-    run = subprocess.run(
-        [os.environ["PALPATE_COMMAND"], *arguments], capture_output=True, text=True, timeout=60
-    )
-    assert run.returncode == 2 and run.stdout == ""
-    assert f"--page {port}: cannot be had at 127.0.0.1: another program may use it" in run.stderr
-
-
-def test_an_address_without_a_page_is_refused(folder: pathlib.Path) -> None:
-    arguments = ["live", "--sensor", STREAM, "--maps", str(folder / "maps")]
-    run = subprocess.run(
-        [os.environ["PALPATE_COMMAND"], *arguments, "--page-address", "0.0.0.0"],
-        capture_output=True, text=True, timeout=60,
-    )  # fmt: skip
-    assert run.returncode == 2 and "--page-address requires --page" in run.stderr
 
 
 def test_saved_files_are_shown(
