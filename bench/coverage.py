@@ -66,7 +66,9 @@ def level_in_modes(modes: Sequence[Json], truth: palpate.Truth, random: numpy.ra
         samples = random.multivariate_normal(mode["T_robot_object"], mode["covariance"], count)
         denser = densities(modes, mode["object"], samples) > at_truth
         level += mode["probability"] * float(numpy.mean(denser))
-    return level
+    held = sum(mode["probability"] for mode in modes)
+    # A truth outside all modes is anywhere in the rest.
+    return level if level < held else held + (1.0 - held) * random.uniform()
 
 
 def level_in_bins(
@@ -111,7 +113,8 @@ def program() -> None:
     training = [one[:most] for one in training_recordings(EXACT) if one.object in LETTERS]
     maps = letter_maps(device, training)
     each = options.trials or (2 if options.quick else 34)
-    trials = make_trials(LETTERS, each, max(TOUCHES), SEED, EXACT)
+    # Each unknown is touched by a sensor of its own, whose gains all of its touches share.
+    trials = make_trials(LETTERS * each, 1, max(TOUCHES), SEED, EXACT)
     random = numpy.random.default_rng(SEED)
     coverage, decisions = Table(COLUMNS), []
     with tempfile.TemporaryDirectory() as folder:

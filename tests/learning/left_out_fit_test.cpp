@@ -133,6 +133,22 @@ TEST(PoseScale, MovesTheBodyAsFarAlongEveryAxis) {
   }
 }
 
+TEST_F(LeftOutFit, PosesAreNoSurerWhereEachTouchHasATwin) {
+  const Recording once = touches(80, 3);
+  Recording twice = once;
+  twice.T_robot_sensor.insert(twice.T_robot_sensor.end(), once.T_robot_sensor.begin(),
+                              once.T_robot_sensor.end());
+  twice.pressure.insert(twice.pressure.end(), once.pressure.begin(), once.pressure.end());
+  twice.time_s.insert(twice.time_s.end(), once.time_s.begin(), once.time_s.end());
+  const auto variance_mm2 = [](const PoseScale& scale) {
+    constexpr double belief_sd_mm = 0.25;  // of some five touches
+    return scale.factor * belief_sd_mm * belief_sd_mm + scale.map_sd_mm * scale.map_sd_mm;
+  };
+  const double of_once = variance_mm2(judged(once).pose_scale.value());
+  const double of_twice = variance_mm2(judged(twice).pose_scale.value());
+  EXPECT_GT(of_twice, 0.7 * of_once);
+}
+
 TEST_F(LeftOutFit, Eq7IsLessSureOfPosesThanThisSensorDeserves) {
   const PoseScale scale = judged(touches(120, 3)).pose_scale.value();
   EXPECT_LT(scale.factor, 0.7);

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <iterator>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -35,6 +36,29 @@ PoseLattice lattice_about(const Body& body) {
   const double spin_mm = std::sqrt(std::max(body.inertia_mm2, step_mm * step_mm));
   return {axis(body.centroid_mm.x, step_mm), axis(body.centroid_mm.y, step_mm),
           axis(0.0, step_mm / spin_mm), body.centroid_mm};
+}
+
+/// [touch] the index of its place: touches less than a millimetre from the first touch at a place
+/// are there, however the array is turned. Where the places are fewer than the parts, each touch is
+/// a place.
+std::vector<std::size_t> places_of(std::span<const TouchEvidence> touches) {
+  constexpr double near_mm = 1.0;
+  std::vector<std::size_t> place;
+  std::vector<glm::dvec2> places_mm;
+  for (const TouchEvidence& touch : touches) {
+    const glm::dvec2 middle_mm = touch.middle_mm();
+    const auto at = std::ranges::find_if(places_mm, [&](const glm::dvec2& place_mm) {
+      return glm::distance(place_mm, middle_mm) < near_mm;
+    });
+    place.push_back(static_cast<std::size_t>(at - places_mm.begin()));
+    if (at == places_mm.end()) {
+      places_mm.push_back(middle_mm);
+    }
+  }
+  if (places_mm.size() < parts) {
+    std::iota(place.begin(), place.end(), std::size_t{0});
+  }
+  return place;
 }
 
 }  // namespace
@@ -136,33 +160,44 @@ void judge_left_out(Device& device, MapSource& source) {
   if (std::cmp_less(std::ranges::count_if(evidence, &TouchEvidence::in_contact), least_judged)) {
     return;
   }
-  constexpr std::uint64_t seed = 0;
-  Random random(seed, Stream::touch_order);
-  std::vector<std::size_t> part(touches.size());
-  for (std::size_t& one : part) {
-    one = static_cast<std::size_t>(random.uniform(0.0, static_cast<double>(parts)));
-  }
   MapBuilder builder(device, source.options);
-  std::vector<double> z;
-  std::vector<PlaceError> errors;
-  for (std::size_t left_out = 0; left_out < parts && z.size() < enough; ++left_out) {
-    std::vector<Touch> others;
-    std::vector<TouchEvidence> judged;
-    for (std::size_t i = 0; i < touches.size(); ++i) {
-      if (part[i] != left_out) {
-        others.push_back(touches[i]);
-      } else if (evidence[i].in_contact()) {
-        judged.push_back(evidence[i]);
-      }
+  // Judges touches on maps of the others; touches of one unit are left out together.
+  const auto leave_out = [&](std::span<const std::size_t> unit_of, const auto& judge) {
+    constexpr std::uint64_t seed = 0;
+    Random random(seed, Stream::touch_order);
+    std::vector<std::size_t> part(touches.size());  // [unit]
+    for (std::size_t& one : part) {
+      one = static_cast<std::size_t>(random.uniform(0.0, static_cast<double>(parts)));
     }
-    builder.clear();
-    builder.add(others);
-    const Hypothesis of{.map = builder.build(source.touches.object)};
+    std::size_t all_judged = 0;
+    for (std::size_t left_out = 0; left_out < parts && all_judged < enough; ++left_out) {
+      std::vector<Touch> others;
+      std::vector<TouchEvidence> judged;
+      for (std::size_t i = 0; i < touches.size(); ++i) {
+        if (part[unit_of[i]] != left_out) {
+          others.push_back(touches[i]);
+        } else if (evidence[i].in_contact()) {
+          judged.push_back(evidence[i]);
+        }
+      }
+      builder.clear();
+      builder.add(others);
+      judge(Hypothesis{.map = builder.build(source.touches.object)}, judged);
+      all_judged += judged.size();
+    }
+  };
+  std::vector<std::size_t> each(touches.size());
+  std::iota(each.begin(), each.end(), std::size_t{0});
+  std::vector<double> z;
+  leave_out(each, [&](const Hypothesis& of, std::span<const TouchEvidence> judged) {
     for (const TouchEvidence& touch : judged) {
       z.push_back(evidence_fit(std::span(&touch, 1), Pose{}, of.map, contact, 0)->z);
     }
+  });
+  std::vector<PlaceError> errors;
+  leave_out(places_of(evidence), [&](const Hypothesis& of, std::span<const TouchEvidence> judged) {
     std::ranges::move(place_errors(judged, of, contact, 0), std::back_inserter(errors));
-  }
+  });
   source.left_out = scale_of(z);
   source.pose_scale = pose_scale_of(errors);
 }

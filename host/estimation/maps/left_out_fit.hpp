@@ -36,7 +36,9 @@ std::vector<PlaceError> place_errors(std::span<const TouchEvidence> touches, con
 std::optional<PoseScale> pose_scale_of(std::span<const PlaceError> errors);
 
 /// Sets MapSource::left_out and pose_scale. Builds maps of random three quarters of the touches,
-/// and judges the others at their poses, until about 200 are judged, or each touch once. Both are
+/// and judges the others at their poses, until about 200 are judged, or each touch once. For
+/// pose_scale, touches at one place are left out together: turned about one point by half a turn,
+/// an array has elements where it had others, and a map with these places it too well. Both are
 /// none where fewer than 16 touches are in contact.
 /// @throws Error as MapBuilder does
 void judge_left_out(Device& device, MapSource& source);
