@@ -38,29 +38,6 @@ PoseLattice lattice_about(const Body& body) {
           axis(0.0, step_mm / spin_mm), body.centroid_mm};
 }
 
-/// [touch] the index of its place: touches less than a millimetre from the first touch at a place
-/// are there, however the array is turned. Where the places are fewer than the parts, each touch is
-/// a place.
-std::vector<std::size_t> places_of(std::span<const TouchEvidence> touches) {
-  constexpr double near_mm = 1.0;
-  std::vector<std::size_t> place;
-  std::vector<glm::dvec2> places_mm;
-  for (const TouchEvidence& touch : touches) {
-    const glm::dvec2 middle_mm = touch.middle_mm();
-    const auto at = std::ranges::find_if(places_mm, [&](const glm::dvec2& place_mm) {
-      return glm::distance(place_mm, middle_mm) < near_mm;
-    });
-    place.push_back(static_cast<std::size_t>(at - places_mm.begin()));
-    if (at == places_mm.end()) {
-      places_mm.push_back(middle_mm);
-    }
-  }
-  if (places_mm.size() < parts) {
-    std::iota(place.begin(), place.end(), std::size_t{0});
-  }
-  return place;
-}
-
 }  // namespace
 
 std::optional<FitScale> scale_of(std::span<const double> z) {
@@ -149,6 +126,26 @@ std::optional<PoseScale> pose_scale_of(std::span<const PlaceError> errors) {
   return best;
 }
 
+std::vector<std::size_t> places_of(std::span<const TouchEvidence> touches, std::size_t least) {
+  constexpr double near_mm = 1.0;
+  std::vector<std::size_t> place;
+  std::vector<glm::dvec2> places_mm;
+  for (const TouchEvidence& touch : touches) {
+    const glm::dvec2 middle_mm = touch.middle_mm();
+    const auto at = std::ranges::find_if(places_mm, [&](const glm::dvec2& place_mm) {
+      return glm::distance(place_mm, middle_mm) < near_mm;
+    });
+    place.push_back(static_cast<std::size_t>(at - places_mm.begin()));
+    if (at == places_mm.end()) {
+      places_mm.push_back(middle_mm);
+    }
+  }
+  if (places_mm.size() < least) {
+    std::iota(place.begin(), place.end(), std::size_t{0});
+  }
+  return place;
+}
+
 void judge_left_out(Device& device, MapSource& source) {
   const std::vector<Touch> touches = source.touches.touches(0, source.touches.size());
   const ContactModel contact{.classifier = source.options.classifier,
@@ -195,9 +192,10 @@ void judge_left_out(Device& device, MapSource& source) {
     }
   });
   std::vector<PlaceError> errors;
-  leave_out(places_of(evidence), [&](const Hypothesis& of, std::span<const TouchEvidence> judged) {
-    std::ranges::move(place_errors(judged, of, contact, 0), std::back_inserter(errors));
-  });
+  leave_out(places_of(evidence, parts),
+            [&](const Hypothesis& of, std::span<const TouchEvidence> judged) {
+              std::ranges::move(place_errors(judged, of, contact, 0), std::back_inserter(errors));
+            });
   source.left_out = scale_of(z);
   source.pose_scale = pose_scale_of(errors);
 }
