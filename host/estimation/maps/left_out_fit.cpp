@@ -57,7 +57,7 @@ std::optional<FitScale> scale_of(std::span<const double> z) {
 std::vector<PlaceError> place_errors(std::span<const TouchEvidence> touches, const Hypothesis& of,
                                      const ContactModel& model, std::size_t object) {
   constexpr std::array<std::size_t, 3> in_group{3, 9, 27};
-  constexpr std::size_t most_groups = 6;
+  constexpr std::size_t most_touches = 54;  // in all groups of a size
   constexpr double another_peak_mm = 1.5;
   constexpr double wide_mm = 0.8;
   const ContactModel contact = tabulated(model);
@@ -100,7 +100,7 @@ std::vector<PlaceError> place_errors(std::span<const TouchEvidence> touches, con
   for (const std::size_t count : in_group) {
     // Neighbours of a scan are in groups of their own.
     const std::size_t groups = touches.size() / count;
-    for (std::size_t group = 0; group < std::min(groups, most_groups); ++group) {
+    for (std::size_t group = 0; group < std::min(groups, most_touches / count); ++group) {
       add_group(group, groups, count);
     }
   }

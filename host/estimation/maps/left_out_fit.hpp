@@ -24,8 +24,8 @@ struct PlaceError {
   glm::dvec3 moved_mm{0.0};
   glm::dmat3 covariance{0.0};
 };
-/// The errors of groups of 3, 9 and 27 touches, at most six groups of each. Left out are
-/// groups that lie more than 1.5 mm away, at another peak, and those of a belief 0.8 mm wide.
+/// The errors of groups of 3, 9 and 27 touches, of each size as many as 54 touches make. Left out
+/// are groups that lie more than 1.5 mm away, at another peak, and those of a belief 0.8 mm wide.
 /// @param touches T_robot_sensor is of the sensor in the object frame
 /// @param contact with a prior, by which the touches are classified
 /// @param object index of the object whose numbers of a table are used
