@@ -80,6 +80,16 @@ Trial make_displaced_trial(const std::array<int, 3>& bins, std::uint64_t seed) {
   return trial;
 }
 
+Trial make_slipping_trial(const std::array<int, 3>& bins, std::uint64_t seed) {
+  Trial trial = make_displaced_trial(bins, seed);
+  trial.options.slip_sd = trial.options.touch_sd;
+  Uniform random(seed + 2);
+  if (random(0.0, 3.0) < 2.0) {
+    trial.options.touch_sd = {};
+  }
+  return trial;
+}
+
 void expect_trials(const std::array<int, 3>& bins, int trials, std::uint64_t seed,
                    const decltype(make_trial)& make) {
   double variation = 0.0;

@@ -1,0 +1,390 @@
+#include "estimation/bounded/moving/slip_mean.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <mutex>
+
+#include <glm/geometric.hpp>
+
+#include "estimation/bounded/displaced/blurred_plane.hpp"
+#include "estimation/bounded/log_sum.hpp"
+#include "estimation/bounded/parallel_for.hpp"
+
+namespace palpate {
+
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr int side = BlockRun::side;
+/// Blocks of a run whose sources are taken together.
+constexpr int blocks_together = 4;
+
+int floor_quotient(int value, int by) { return value >= 0 ? value / by : -((by - 1 - value) / by); }
+
+/// The part of a place's two neighbours along an axis that lies inside the region.
+double weight_inside(double place, int count) {
+  return std::clamp(std::min(place + 1.0, count - place), 0.0, 1.0);
+}
+
+/// A bin's place, moved by so many bins, in whole bins and the rest.
+struct MovedPlace {
+  int bin;
+  double fraction;
+
+  MovedPlace(int from, double bins, int count, double fraction_error) {
+    const double moved = std::floor(bins);
+    fraction = bins - moved;
+    // Farther than any lattice reaches, all places are outside.
+    bin = from + static_cast<int>(std::clamp<double>(moved, -count - 1, count + 1));
+    if (fraction > 1.0 - fraction_error) {
+      ++bin;
+      fraction = 0.0;
+    }
+  }
+  bool beyond(int count) const { return bin < -1 || bin >= count; }
+  double inside(int count) const {
+    return (bin >= 0 ? 1.0 - fraction : 0.0) + (bin + 1 < count ? fraction : 0.0);
+  }
+};
+
+}  // namespace
+
+SlipMean::SlipMean(const DisplacementWeights& weights, const glm::dvec2& centroid_mm, int bins)
+    : weights_(weights),
+      bins_(bins),
+      x_(weights.lattice().x_mm, weights.sd().mm, bins),
+      y_(weights.lattice().y_mm, weights.sd().mm, bins) {
+  const PoseLattice& lattice = weights.lattice();
+  const Axis& x = lattice.x_mm;
+  const Axis& y = lattice.y_mm;
+  first_mm_ = glm::dvec2(x.centre(0), y.centre(0)) - centroid_mm;
+  step_mm_ = {x.count > 1 ? x.step() : 0.0, y.count > 1 ? y.step() : 0.0};
+  double widest = 0.0;
+  for (int k = -weights.theta_steps(); k <= weights.theta_steps(); ++k) {
+    const double alpha = k * lattice.theta_rad.step();
+    // R(alpha) - 1.
+    const double c = -2.0 * std::sin(alpha / 2.0) * std::sin(alpha / 2.0);
+    const double s = std::sin(alpha);
+    Turn& turn = turns_.emplace_back();
+    if (x.count > 1) {
+      turn.x = glm::dvec2(c, -s) / x.step();
+    }
+    if (y.count > 1) {
+      turn.y = glm::dvec2(s, c) / y.step();
+    }
+    widest = std::max({widest, std::abs(turn.x.x) + std::abs(turn.x.y),
+                       std::abs(turn.y.x) + std::abs(turn.y.y)});
+  }
+  // Sines of angles, their quotients by steps, the distance from the centroid, two products and two
+  // sums: each within a unit or two of the largest terms.
+  double farthest = 0.0;
+  for (const double mm : {x.lower, x.upper, y.lower, y.upper, centroid_mm.x, centroid_mm.y}) {
+    farthest = std::max(farthest, std::abs(mm));
+  }
+  fraction_error_ = std::min(32.0 * 0x1p-53 * widest * farthest, 0.5);
+  for (int theta = 0; theta < lattice.theta_rad.count; ++theta) {
+    taps_.push_back(weights.taps(theta, {0.0, 0.0}));
+  }
+}
+
+BlockRange SlipMean::blocks_taken(const Turn& turn, const BlockRun& run) const {
+  const auto along = [&](const glm::dvec2& bins_per_mm, bool x) {
+    const PoseLattice& lattice = weights_.lattice();
+    const int count = (x ? lattice.x_mm : lattice.y_mm).count;
+    double least = infinity;
+    double most = -infinity;
+    for (const int i : {side * run.x * bins_, side * (run.x + run.count) * bins_ - 1}) {
+      for (const int j : {side * run.y * bins_, side * (run.y + 1) * bins_ - 1}) {
+        const double moved =
+            (x ? i : j) + glm::dot(bins_per_mm, first_mm_ + step_mm_ * glm::dvec2(i, j));
+        least = std::min(least, moved);
+        most = std::max(most, moved);
+      }
+    }
+    // A little more, for rounding; and the bin behind.
+    const auto block = [&](double bin) {
+      const auto whole = static_cast<int>(std::clamp(std::floor(bin), -2.0 * count, 3.0 * count));
+      return floor_quotient(floor_quotient(whole, bins_), side);
+    };
+    const int blocks = ((x ? columns() : rows()) + side - 1) / side;
+    return glm::ivec2(std::max(0, block(least - 1e-3)), std::min(blocks, block(most + 1.001) + 1));
+  };
+  const glm::ivec2 x = along(turn.x, true);
+  const glm::ivec2 y = along(turn.y, false);
+  return {.x_first = x.x, .x_end = x.y, .y_first = y.x, .y_end = y.y};
+}
+
+template <typename Domain, typename Value>
+std::vector<BlurredPlane<Domain>> SlipMean::blurred(std::span<const BlockRun> targets,
+                                                    std::span<const Value> logs) const {
+  std::vector<BlockRange> ranges(taps_.size());
+  std::vector<std::vector<BlockRange>> asked(taps_.size());
+  for (const BlockRun& run : targets) {
+    for (int first = 0; first < run.count; first += blocks_together) {
+      const BlockRun part{run.theta, run.y, run.x + first,
+                          std::min(blocks_together, run.count - first)};
+      for (const Tap& tap : taps_[run.theta]) {
+        const BlockRange taken = blocks_taken(turn(tap), part);
+        if (!taken.empty()) {
+          ranges[tap.theta].take_in(taken);
+          asked[tap.theta].push_back(taken);
+        }
+      }
+    }
+  }
+  const int width = columns();
+  const int height = rows();
+  const auto source = [&](std::span<const BlockRun> runs, const PlaceRows<Value>& to) {
+    for (const BlockRun& run : runs) {
+      const int x = side * run.x;
+      for (int y = side * run.y; y < std::min(side * (run.y + 1), height); ++y) {
+        const Value* const from =
+            logs.data() + (std::ptrdiff_t{run.theta} * height + y) * width + x;
+        std::copy_n(from, std::min(side * run.count, width - x), to.at(x, y));
+      }
+    }
+  };
+  std::vector<BlurredPlane<Domain>> planes(taps_.size());
+  const BlurIn<Domain> blur_x(x_);
+  const BlurIn<Domain> blur_y(y_);
+  const bool wide = !Domain::bounds && fraction_error_ > 0.0;
+  parallel_for(planes.size(), [&](std::size_t theta) {
+    if (!asked[theta].empty()) {
+      planes[theta] = blurred_plane<Domain>(static_cast<int>(theta), ranges[theta], asked[theta],
+                                            blur_x, blur_y, wide, source);
+    }
+  });
+  return planes;
+}
+
+std::vector<double> SlipMean::bounds(std::span<const double> log_bounds) const {
+  const int width = columns();
+  const int height = rows();
+  std::vector<BlockRun> targets;
+  for (int theta = 0; theta < static_cast<int>(taps_.size()); ++theta) {
+    for (int y = 0; side * y < height; ++y) {
+      targets.push_back({theta, y, 0, (width + side - 1) / side});
+    }
+  }
+  const double largest = *std::ranges::max_element(log_bounds);
+  std::vector<float> relative;
+  for (const double log : log_bounds) {
+    relative.push_back(
+        std::nextafter(static_cast<float>(std::max(log - largest, -1e30)), 1.0F));
+  }
+  const std::vector<BlurredPlane<TileLikelihoods>> planes =
+      blurred<TileLikelihoods, float>(targets, relative);
+  const PoseLattice& lattice = weights_.lattice();
+  // Each term rounds by a few units, and so do exponentials and the logarithm.
+  const double rounding = 2e-3;
+  std::vector<double> means(log_bounds.size());
+  parallel_for(taps_.size(), [&](std::size_t theta) {
+    double reference = -infinity;
+    for (const Tap& tap : taps_[theta]) {
+      reference = std::max(reference, planes[tap.theta].reference);
+    }
+    double* mean = means.data() + theta * static_cast<std::size_t>(width) * height;
+    for (int py = 0; py < height; ++py) {
+      for (int px = 0; px < width; ++px, ++mean) {
+        float sum = 0.0F;
+        double inside = 0.0;
+        for (const Tap& tap : taps_[theta]) {
+          const BlurredPlane<TileLikelihoods>& plane = planes[tap.theta];
+          const Turn& turned = turn(tap);
+          if (tap.steps == 0) {
+            inside += tap.weight * (1.0 - 1e-6);
+            if (plane.reference > -infinity) {
+              sum += static_cast<float>(tap.weight * std::exp(plane.reference - reference)) *
+                     plane.blurred[(py - plane.y) * plane.pitch + px - plane.x];
+            }
+            continue;
+          }
+          // A tile's bins come from within the box around where its corners come from.
+          glm::dvec2 least(infinity);
+          glm::dvec2 most(-infinity);
+          for (const int i : {px * bins_, std::min((px + 1) * bins_, lattice.x_mm.count) - 1}) {
+            for (const int j : {py * bins_, std::min((py + 1) * bins_, lattice.y_mm.count) - 1}) {
+              const glm::dvec2 mm = first_mm_ + step_mm_ * glm::dvec2(i, j);
+              const glm::dvec2 place(i + glm::dot(turned.x, mm), j + glm::dot(turned.y, mm));
+              least = glm::min(least, place);
+              most = glm::max(most, place);
+            }
+          }
+          const auto least_inside = [](double low, double high, int count) {
+            return std::min(weight_inside(low, count), weight_inside(high, count));
+          };
+          inside += tap.weight * least_inside(least.x, most.x, lattice.x_mm.count) *
+                    least_inside(least.y, most.y, lattice.y_mm.count) * (1.0 - 1e-6);
+          if (plane.reference == -infinity) {
+            continue;
+          }
+          const auto tile = [&](double bin, int tiles) {
+            const auto whole = std::floor(bin / bins_);
+            return static_cast<int>(std::clamp<double>(whole, -1, tiles));
+          };
+          float largest_there = 0.0F;
+          for (int y = std::max(0, tile(std::floor(least.y - 1e-9), height));
+               y <= std::min(height - 1, tile(std::ceil(most.y + 1e-9), height)); ++y) {
+            const float* const row =
+                plane.blurred.data() + (y - plane.y) * plane.pitch - plane.x;
+            for (int x = std::max(0, tile(std::floor(least.x - 1e-9), width));
+                 x <= std::min(width - 1, tile(std::ceil(most.x + 1e-9), width)); ++x) {
+              largest_there = std::max(largest_there, row[x]);
+            }
+          }
+          sum += static_cast<float>(tap.weight * std::exp(plane.reference - reference)) *
+                 largest_there;
+        }
+        *mean = TileLikelihoods::log_mean(sum, inside) + reference + largest + rounding;
+      }
+    }
+  });
+  return means;
+}
+
+template <typename Domain>
+bool SlipMean::sum_turns(std::span<const BlockRun> targets, std::span<const double> log_belief,
+                         std::span<double> log_mean, std::span<double> error, double& lost) const {
+  const std::vector<BlurredPlane<Domain>> planes = blurred<Domain, double>(targets, log_belief);
+  const int nx = columns();
+  const int ny = rows();
+  bool holds = true;
+  std::mutex mutex;
+  parallel_for(targets.size(), [&](std::size_t i) {
+    const BlockRun& run = targets[i];
+    const std::vector<Tap>& taps = taps_[run.theta];
+    double reference = -infinity;
+    for (const Tap& tap : taps) {
+      reference = std::max(reference, planes[tap.theta].reference);
+    }
+    const int first = side * run.x;
+    const int width = std::min(side * run.count, nx - first);
+    std::vector<double> sums(width);
+    std::vector<double> wide(width);
+    std::vector<double> inside(width);
+    double lost_here = -infinity;
+    for (int y = side * run.y; y < std::min(side * (run.y + 1), ny); ++y) {
+      std::ranges::fill(sums, Domain::nothing);
+      std::ranges::fill(wide, Domain::nothing);
+      std::ranges::fill(inside, 0.0);
+      for (const Tap& tap : taps) {
+        const BlurredPlane<Domain>& plane = planes[tap.theta];
+        const bool empty = plane.reference == -infinity;
+        const double of_tap = empty ? Domain::nothing
+                                    : Domain::scaled(Domain::weight(tap.weight),
+                                                     Domain::factor(plane.reference - reference));
+        const double* const blurred = plane.blurred.data() - plane.y * plane.pitch - plane.x;
+        if (tap.steps == 0) {
+          for (int x = 0; x < width; ++x) {
+            inside[x] += tap.weight;
+            if (!empty) {
+              Domain::add(sums[x], of_tap, blurred[y * plane.pitch + first + x]);
+            }
+          }
+          continue;
+        }
+        const double* const around = plane.wide.data() - plane.y * plane.pitch - plane.x;
+        const Turn& turned = turn(tap);
+        for (int x = 0; x < width; ++x) {
+          const glm::dvec2 mm = first_mm_ + step_mm_ * glm::dvec2(first + x, y);
+          const MovedPlace u(first + x, glm::dot(turned.x, mm), nx, fraction_error_);
+          const MovedPlace v(y, glm::dot(turned.y, mm), ny, fraction_error_);
+          if (u.beyond(nx) || v.beyond(ny)) {
+            continue;
+          }
+          inside[x] += tap.weight * u.inside(nx) * v.inside(ny);
+          if (empty) {
+            continue;
+          }
+          const std::ptrdiff_t at = v.bin * plane.pitch + u.bin;
+          const auto add = [&](double part, std::ptrdiff_t corner) {
+            if (part > 0.0) {
+              Domain::add(sums[x], Domain::scaled(of_tap, Domain::weight(part)),
+                          blurred[at + corner]);
+            }
+          };
+          add((1.0 - u.fraction) * (1.0 - v.fraction), 0);
+          add(u.fraction * (1.0 - v.fraction), 1);
+          add((1.0 - u.fraction) * v.fraction, plane.pitch);
+          add(u.fraction * v.fraction, plane.pitch + 1);
+          if (fraction_error_ > 0.0) {
+            Domain::add(wide[x], of_tap, around[at]);
+          }
+        }
+      }
+      const std::ptrdiff_t row = (std::ptrdiff_t{run.theta} * ny + y) * nx + first;
+      for (int x = 0; x < width; ++x) {
+        double& mean = log_mean[static_cast<std::size_t>(row + x)];
+        double& wrong = error[static_cast<std::size_t>(row + x)];
+        wrong = 0.0;
+        if (!(sums[x] > Domain::least)) {
+          mean = -infinity;
+          if (Domain::least > 0.0) {
+            lost_here = std::max(lost_here, std::log(Domain::least / inside[x]) + reference + 1e-6);
+          }
+          continue;
+        }
+        mean = Domain::log_mean(sums[x], inside[x]) + reference;
+        if (fraction_error_ > 0.0) {
+          // Each of two fractions may change a neighbour's weight by so much.
+          wrong = std::log1p(2.0 * fraction_error_ *
+                             std::exp(Domain::log(wide[x]) - Domain::log(sums[x])));
+        }
+      }
+    }
+    if (lost_here > -infinity) {
+      const std::scoped_lock lock(mutex);
+      lost = std::max(lost, lost_here);
+      holds = false;
+    }
+  });
+  return holds;
+}
+
+double SlipMean::means(std::span<const BlockRun> targets, std::span<const double> log_belief,
+                       std::span<double> log_mean, std::span<double> error, bool by_logs) const {
+  double lost = -infinity;
+  if (!sum_turns<BinLikelihoods>(targets, log_belief, log_mean, error, lost) && by_logs) {
+    lost = -infinity;
+    sum_turns<BinLogs>(targets, log_belief, log_mean, error, lost);
+  }
+  return lost;
+}
+
+double SlipMean::mean_error() const {
+  // Weights of three Gaussians: exp(-d^2 / 2), d^2 / 2 at most some 8, rounds by 40 units; then
+  // norms, exponentials and the logarithm; and a unit for each term of the sums.
+  constexpr double of_weights = 256.0;
+  const double terms = 2.0 * (x_.steps + y_.steps) + 4.0 * static_cast<double>(turns_.size());
+  return (of_weights + 2.0 * terms) * 0x1p-53;
+}
+
+double SlipMean::log_least_kept() const {
+  const auto along = [](const AxisBlur& axis) {
+    double least = infinity;
+    const int count = static_cast<int>(axis.scale.size());
+    for (int from = 0; from < count; ++from) {
+      double kept = 0.0;
+      for (int to = std::max(0, from - axis.steps); to <= std::min(count - 1, from + axis.steps);
+           ++to) {
+        kept += axis.weight[static_cast<std::size_t>(std::abs(to - from))] *
+                axis.scale[static_cast<std::size_t>(to)];
+      }
+      least = std::min(least, kept);
+    }
+    return least;
+  };
+  // A bin keeps at least the part that does not turn.
+  double weights = 0.0;
+  for (const std::vector<Tap>& taps : taps_) {
+    double of_theta = 0.0;
+    for (const Tap& tap : taps) {
+      of_theta += tap.weight;
+    }
+    weights = std::max(weights, of_theta);
+  }
+  return std::log(along(x_) * along(y_) / weights * (1.0 - 1e-9));
+}
+
+}  // namespace palpate
