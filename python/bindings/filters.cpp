@@ -325,7 +325,8 @@ void bind_bounded(nb::module_& module) {
               "tolerance: largest total variation distance from the posterior over all bins;\n"
               "budget_s: seconds after which estimate() reports what it has proven by then;\n"
               "evidence_nats: bounds every map's log evidence, too; touch_sd: how far off the\n"
-              "sensor's poses may be; slip_sd: how far the object moves between touches; memory then\n"
+              "sensor's poses may be; slip_sd: how far the object moves between touches; memory "
+              "then\n"
               "follows the bins; threads: 0 for as many as the machine has cores.\n\n"
               "Raises Error as PoseHistogram does.")
           .def("update", &update<BoundedPosterior>, "touches"_a, "progress"_a = nb::none(),

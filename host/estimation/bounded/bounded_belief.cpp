@@ -150,15 +150,11 @@ void BoundedBelief::take_in() {
     for (const ArrayReadings& touch : added) {
       known.push_back(known_elements(touch));
     }
-    arena_.execute([&] {
-      if (!moving_) {
-        search_.largest().add(known);
-        return;
-      }
-      for (const KnownElements& touch : known) {
-        moving_->add(touch);
-      }
-    });
+    if (moving_) {
+      std::ranges::for_each(known, [&](const KnownElements& touch) { moving_->add(touch); });
+    } else {
+      arena_.execute([&] { search_.largest().add(known); });
+    }
     known.insert(known.begin(), std::move(elements_));
     elements_ = merged(known);
     if (none_) {
@@ -175,7 +171,8 @@ std::string BoundedBelief::path() const {
 
 std::uint64_t BoundedBelief::bytes() const {
   return likelihood_.bytes() + space_.bytes() + search_.largest().bytes() +
-         (moving_ ? moving_->bytes() : 0) + (found_ ? found_->bins.bytes() : 0) + (none_ ? none_->bytes() : 0);
+         (moving_ ? moving_->bytes() : 0) + (found_ ? found_->bins.bytes() : 0) +
+         (none_ ? none_->bytes() : 0);
 }
 
 SearchGoal BoundedBelief::goal() const {
@@ -262,8 +259,9 @@ SearchResult BoundedBelief::run(const SearchGoal& goal, const Deadline& deadline
 }
 
 std::vector<double> BoundedBelief::log_likelihood(std::span<const BinBox> boxes,
-                                                  Arithmetic arithmetic) const {
+                                                  Arithmetic arithmetic) {
   if (moving_) {
+    arena_.execute([&] { moving_->take_in(until({})); });
     return moving_->log_likelihood(boxes);
   }
   std::size_t bins = 0;

@@ -43,7 +43,7 @@ class BoundedBelief {
   const BinLikelihood& likelihood() const { return likelihood_; }
   /// Log-likelihood of bins, box after box, [y, x] in each, in nats; see MovingBelief where objects
   /// slip.
-  std::vector<double> log_likelihood(std::span<const BinBox> boxes, Arithmetic arithmetic) const;
+  std::vector<double> log_likelihood(std::span<const BinBox> boxes, Arithmetic arithmetic);
   /// Whether touches were taken in.
   bool touched() const { return taken_in_ > 0; }
   /// [hypothesis] log of its prior weight.

@@ -192,7 +192,7 @@ Estimate BoundedPosterior::estimate() const {
 RefinedPose BoundedPosterior::refine(const Mode& mode) const {
   Impl& posterior = whole();
   require_object(mode.object, posterior.bodies.size());
-  const BoundedBelief& belief = posterior.belief;
+  BoundedBelief& belief = posterior.belief;
   // Where bins are very fine, a few of them tell the peak, and all would take long. A mean over
   // displacements takes the others all the same, and a belief that slips has them.
   const BoundedOptions& options = belief.options();
@@ -328,7 +328,7 @@ double BoundedPosterior::log_likelihood(int object, const Pose& T_object_robot) 
     throw Error(Fault::input, fmt::format("pose {}, {}, {}: give finite numbers", translation_mm.x,
                                           translation_mm.y, theta_rad));
   }
-  const BoundedBelief& belief = posterior.belief;
+  BoundedBelief& belief = posterior.belief;
   const KnownElements& elements = belief.elements();
   if (!belief.options().touch_sd.none() || !belief.options().slip_sd.none()) {
     const std::int64_t bin = lattice().bin_of(T_object_robot);

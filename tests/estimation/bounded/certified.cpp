@@ -60,13 +60,12 @@ double mass_of_zeros(std::span<const double> truth, std::span<const double> esti
 reference::Posterior reference_posterior(std::span<const Hypothesis> objects,
                                          const BoundedOptions& options,
                                          std::span<const Touch> touches) {
-  return reference_posterior(
-      objects,
-      HistogramOptions{.lattice = options.lattice,
-                       .contact = options.contact,
-                       .touch_sd = options.touch_sd,
-                       .slip_sd = options.slip_sd},
-      touches);
+  return reference_posterior(objects,
+                             HistogramOptions{.lattice = options.lattice,
+                                              .contact = options.contact,
+                                              .touch_sd = options.touch_sd,
+                                              .slip_sd = options.slip_sd},
+                             touches);
 }
 
 namespace {

@@ -41,9 +41,8 @@ PlaceSource<float> exact_penalties(const SearchSpace& space, std::size_t object,
 std::vector<std::int32_t> displaced_penalties(const SearchSpace& space, std::size_t object,
                                               std::size_t level, const KnownElements& touch,
                                               std::span<const BlockRun> targets) {
-  const std::vector<double> logs =
-      space.displaced[level].bounds(touch.sensor_from_pivot_mm, targets,
-                                    exact_penalties(space, object, level, touch));
+  const std::vector<double> logs = space.displaced[level].bounds(
+      touch.sensor_from_pivot_mm, targets, exact_penalties(space, object, level, touch));
   std::vector<std::int32_t> penalties(logs.size());
   for (std::size_t batch = 0; batch < logs.size(); batch += batch_tiles) {
     for (std::size_t i = 0; i < batch_side; ++i) {

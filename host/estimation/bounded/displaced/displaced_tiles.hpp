@@ -11,8 +11,8 @@
 
 namespace palpate {
 
-/// Gives the negative of lower bounds of a touch's penalties over tiles of one level, in nats, as if
-/// the touch's pose were exact: relative to TileBounds::best().
+/// Gives the negative of lower bounds of a touch's penalties over tiles of one level, in nats, as
+/// if the touch's pose were exact: relative to TileBounds::best().
 /// @param space,touch outlive the result
 PlaceSource<float> exact_penalties(const SearchSpace& space, std::size_t object, std::size_t level,
                                    const KnownElements& touch);

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <tuple>
 #include <utility>
 
 #include "estimation/bounded/displaced/displaced_tiles.hpp"
@@ -61,6 +60,17 @@ MovingBelief::MovingBelief(const SearchSpace& space, const BoundedOptions& optio
   }
   columns_ = of_tiles_.front().columns();
   rows_ = of_tiles_.front().rows();
+  for (const SlipMean& mean : of_bins_) {
+    Kept& kept = kept_.emplace_back(Kept{.part = mean.kept()});
+    kept.least = *std::ranges::min_element(kept.part);
+    kept.most = *std::ranges::max_element(kept.part);
+  }
+  for (int y = 0; y < rows_; ++y) {
+    for (int x = 0; x < columns_; ++x) {
+      log_bins_.push_back(std::log(std::min(side, options.lattice.x_mm.count - side * x) *
+                                   std::min(side, options.lattice.y_mm.count - side * y)));
+    }
+  }
   const auto bins = static_cast<std::size_t>(options.lattice.bins());
   log_mean_.resize(bins);
   log_rest_mean_.resize(bins);
@@ -69,9 +79,9 @@ MovingBelief::MovingBelief(const SearchSpace& space, const BoundedOptions& optio
 }
 
 double MovingBelief::bytes_needed(const PoseLattice& lattice, std::size_t objects) {
-  // Mass and rest of every object's bins; means of one object's, and its planes: as they are, blurred
-  // along y, blurred, and their neighbours' sums.
-  const double numbers = 2.0 * static_cast<double>(objects) + 3.0 + 4.0;
+  // Mass and rest of every object's bins; means of one object's, and its planes: as they are,
+  // blurred along y, blurred, and their neighbours' sums. With the parts that all bins keep.
+  const double numbers = 3.0 * static_cast<double>(objects) + 3.0 + 4.0;
   return numbers * sizeof(double) * static_cast<double>(lattice.bins());
 }
 
@@ -104,17 +114,23 @@ void MovingBelief::start() {
     moving.log_rest.assign(bins, -infinity);
     moving.followed.assign(tiles, 1);
     moving.bins_followed = static_cast<std::int64_t>(bins);
-    moving.mass = std::log(static_cast<double>(bins));
-    moving.rest = -infinity;
+    moving.sums = {};
     moving.rounding = moving.scale = moving.over = moving.under = 0.0;
   }
   stepped_ = 0;
   prior_log_likelihood_ = 0.0;
 }
 
-void MovingBelief::add(const KnownElements& touch) {
-  touches_.push_back(touch);
-  step(touch);
+void MovingBelief::take_in(const Deadline& deadline) {
+  try {
+    while (stepped_ < touches_.size()) {
+      deadline.cancel_point();
+      step(touches_[stepped_]);
+    }
+  } catch (...) {
+    start();
+    throw;
+  }
 }
 
 void MovingBelief::step(const KnownElements& touch) {
@@ -127,13 +143,14 @@ void MovingBelief::step(const KnownElements& touch) {
     Moving& moving = moving_[i];
     const std::vector<BlockRun> runs = runs_of(moving);
     if (stepped_ > 0) {
-      slip(i, tiles[i].slipped, runs);
+      slip(i, runs);
+      restore(i);
     }
     if (!touch.runs.empty()) {
       touch_bins(i, touch, runs);
     }
     leave_others(moving, tiles[i].touched);
-    std::tie(moving.mass, moving.rest) = add_up(moving, runs, tiles[i].touched);
+    moving.sums = add_up(i, runs, tiles[i].touched);
   }
   prior_log_likelihood_ += prior_log_likelihood(touch, options_.contact);
   ++stepped_;
@@ -219,7 +236,8 @@ void MovingBelief::add_touch_bounds(std::size_t object, const KnownElements& tou
     }
     for (int y = 0; y < rows_; ++y) {
       for (int x = 0; x < columns_; ++x) {
-        logs[(theta * rows_ + y) * columns_ + x] += best + nats[static_cast<std::size_t>(y) * width + x];
+        logs[(theta * rows_ + y) * columns_ + x] +=
+            best + nats[static_cast<std::size_t>(y) * width + x];
       }
     }
   });
@@ -231,9 +249,7 @@ void MovingBelief::choose(std::span<const TileMasses> tiles) {
   };
   const auto for_tiles = [&](std::size_t object, const auto& visit) {
     for (std::size_t i = 0; i < tiles[object].touched.size(); ++i) {
-      const auto x = static_cast<int>(i % static_cast<std::size_t>(columns_));
-      const auto y = static_cast<int>(i / columns_ % rows_);
-      visit(i, scaled(object) + tiles[object].touched[i] + std::log(bins_of_tile(x, y)));
+      visit(i, scaled(object) + tiles[object].touched[i] + log_bins_[i % log_bins_.size()]);
     }
   };
   LogSum total;
@@ -257,19 +273,17 @@ void MovingBelief::choose(std::span<const TileMasses> tiles) {
       // What is no number is followed.
       const bool follow = !(mass < whole - depth_);
       moving.followed[tile] = follow ? 1 : 0;
-      const auto x = static_cast<int>(tile % static_cast<std::size_t>(columns_));
-      const auto y = static_cast<int>(tile / columns_ % rows_);
-      moving.bins_followed += follow ? bins_of_tile(x, y) : 0;
+      moving.bins_followed +=
+          follow ? std::lround(std::exp(log_bins_[tile % log_bins_.size()])) : 0;
     });
   }
 }
 
-void MovingBelief::slip(std::size_t object, std::span<const double> tiles,
-                        std::span<const BlockRun> runs) {
+void MovingBelief::slip(std::size_t object, std::span<const BlockRun> runs) {
   Moving& moving = moving_[object];
   const SlipMean& mean = of_bins_[object];
   double lost_rest = -infinity;
-  const bool has_rest = moving.rest > -infinity;
+  const bool has_rest = moving.sums.rest > -infinity;
   if (has_rest) {
     lost_rest = mean.means(runs, moving.log_rest, log_rest_mean_, error_, false);
     for_bins(runs, [&](std::size_t bin) {
@@ -277,9 +291,7 @@ void MovingBelief::slip(std::size_t object, std::span<const double> tiles,
           log_rest_mean_[bin] == -infinity ? lost_rest : log_rest_mean_[bin] + error_[bin] + 1e-12;
     });
   }
-  const double lost =
-      mean.means(runs, moving.log_mass, log_mean_, error_, depth_ == infinity);
-  const double before = moving.rounding;
+  const double lost = mean.means(runs, moving.log_mass, log_mean_, error_, depth_ == infinity);
   moving.rounding += mean.mean_error();
   settle_bins(moving, runs, [&](std::size_t bin, double& log_mass, double& log_rest, double& most) {
     log_mass = log_mean_[bin];
@@ -290,15 +302,28 @@ void MovingBelief::slip(std::size_t object, std::span<const double> tiles,
       settle(error_[bin], log_mass, log_rest, most);
     }
   });
-  // What restores the object's mass: the sum before the slip over that after it.
-  const auto [mass, rest] = add_up(moving, runs, tiles);
-  const double most = std::min(log_add(moving.mass + before, moving.rest) - (mass - moving.rounding),
-                               -mean.log_least_kept());
-  const double least = moving.mass - before - log_add(mass + moving.rounding, rest);
-  const double step = std::isfinite(moving.mass) && std::isfinite(mass) ? moving.mass - mass : 0.0;
-  moving.scale += step;
-  moving.over += std::max(0.0, most - step) + sum_error(runs);
-  moving.under += std::max(0.0, step - least) + sum_error(runs);
+}
+
+void MovingBelief::restore(std::size_t object) {
+  Moving& moving = moving_[object];
+  const Sums& sums = moving.sums;
+  const Kept& kept = kept_[object];
+  // The mass is that of the bins' true parts r, e^-rounding <= r <= e^rounding, and of what is
+  // missing. These parts change the mean of what is kept by its spread alone.
+  const double spread =
+      std::exp(sums.off - sums.kept) + std::abs(std::expm1(sums.mass - sums.kept));
+  const double parts = std::log1p(std::expm1(2.0 * moving.rounding) * spread);
+  const bool known = std::isfinite(sums.mass);
+  const double ratio = known ? sums.mass - sums.kept : 0.0;
+  const double most =
+      known ? parts + std::log1p(std::exp(sums.rest - sums.mass + moving.rounding)) : infinity;
+  const double least =
+      known ? parts + std::log1p(kept.most * std::exp(sums.rest - sums.kept + moving.rounding))
+            : infinity;
+  const double error = of_bins_[object].kept_error() + 1e-12;
+  moving.scale += ratio;
+  moving.over += std::max(0.0, std::min(most, -std::log(kept.least) - ratio)) + error;
+  moving.under += std::max(0.0, std::min(least, std::log(kept.most) + ratio)) + error;
 }
 
 void MovingBelief::touch_bins(std::size_t object, const KnownElements& touch,
@@ -367,47 +392,67 @@ void MovingBelief::leave_others(Moving& moving, std::span<const double> tiles) c
   });
 }
 
-std::pair<double, double> MovingBelief::add_up(const Moving& moving, std::span<const BlockRun> runs,
-                                               std::span<const double> tiles) const {
-  std::vector<std::pair<LogSum, LogSum>> of_run(runs.size());
+MovingBelief::Sums MovingBelief::add_up(std::size_t object, std::span<const BlockRun> runs,
+                                        std::span<const double> tiles) const {
+  const Moving& moving = moving_[object];
+  const std::vector<double>& part = kept_[object].part;
+  std::vector<Sums> of_run(runs.size());
   parallel_for(runs.size(), [&](std::size_t i) {
-    for_bins(runs.subspan(i, 1), [&](std::size_t bin) {
-      of_run[i].first.add(moving.log_mass[bin]);
-      of_run[i].second.add(moving.log_rest[bin]);
+    const std::span<const BlockRun> run = runs.subspan(i, 1);
+    double largest = -infinity;
+    double largest_rest = -infinity;
+    for_bins(run, [&](std::size_t bin) {
+      largest = std::max(largest, moving.log_mass[bin]);
+      largest_rest = std::max(largest_rest, moving.log_rest[bin]);
     });
+    Sums sums;
+    for_bins(run, [&](std::size_t bin) {
+      if (const double log = moving.log_mass[bin]; log > -infinity) {
+        const double mass = std::exp(log - largest);
+        const double kept = part[bin % part.size()];
+        sums.mass += mass;
+        sums.kept += kept * mass;
+        sums.off += std::abs(kept - 1.0) * mass;
+      }
+      if (const double log = moving.log_rest[bin]; log > -infinity) {
+        sums.rest += std::exp(log - largest_rest);
+      }
+    });
+    of_run[i] = {largest + std::log(sums.mass), largest_rest + std::log(sums.rest),
+                 largest + std::log(sums.kept), largest + std::log(sums.off)};
   });
   LogSum mass;
   LogSum rest;
-  for (const auto& [of_mass, of_rest] : of_run) {
-    mass.add(of_mass.log());
-    rest.add(of_rest.log());
+  LogSum kept;
+  LogSum off;
+  for (const Sums& of : of_run) {
+    mass.add(of.mass);
+    rest.add(of.rest);
+    kept.add(of.kept);
+    off.add(of.off);
   }
   for (std::size_t i = 0; i < tiles.size(); ++i) {
     if (moving.followed[i] == 0) {
-      const auto x = static_cast<int>(i % static_cast<std::size_t>(columns_));
-      const auto y = static_cast<int>(i / columns_ % rows_);
-      rest.add(tiles[i] + std::log(bins_of_tile(x, y)));
+      rest.add(tiles[i] + log_bins_[i % log_bins_.size()]);
     }
   }
-  return {mass.log(), rest.log() + sum_error(runs) + 1e-9};
+  return {mass.log(), rest.log() + 1e-9, kept.log(), off.log()};
 }
 
 double MovingBelief::sum_error(std::span<const BlockRun> runs) const {
-  const auto terms = static_cast<double>(side * options_.lattice.x_mm.count) +
-                     static_cast<double>(runs.size());
+  const auto terms =
+      static_cast<double>(side * options_.lattice.x_mm.count) + static_cast<double>(runs.size());
   return 4.0 * 0x1p-53 * terms;
 }
 
 SearchResult MovingBelief::find(const SearchGoal& goal, const Deadline& deadline,
                                 const BinVisitor& visit) {
+  take_in(deadline);
   SearchResult found = result();
   while (depth_ < infinity && !reaches(found, goal)) {
     depth_ = depth_ < last_depth ? 2.0 * depth_ : infinity;
     start();
-    for (const KnownElements& touch : touches_) {
-      deadline.cancel_point();
-      step(touch);
-    }
+    take_in(deadline);
     found = result();
   }
   std::vector<double> logs;
@@ -433,12 +478,12 @@ SearchResult MovingBelief::result() const {
     const std::vector<BlockRun> runs = runs_of(moving);
     const double most = moving.rounding + moving.over + sum_error(runs);
     const double least = moving.rounding + moving.under + sum_error(runs);
-    found.mass.push_back({.evaluated = scale + moving.mass,
-                          .rounding = scale + moving.mass +
+    found.mass.push_back({.evaluated = scale + moving.sums.mass,
+                          .rounding = scale + moving.sums.mass +
                                       std::log(std::max(std::expm1(most), -std::expm1(-least))),
-                          .dropped = scale + moving.over + moving.rest});
-    best_missing = std::max(best_missing,
-                            scale + moving.over + *std::ranges::max_element(moving.log_rest));
+                          .dropped = scale + moving.over + moving.sums.rest});
+    best_missing =
+        std::max(best_missing, scale + moving.over + *std::ranges::max_element(moving.log_rest));
     for_bins(runs, [&](std::size_t bin) {
       if (scale + moving.log_mass[bin] > best) {
         best = scale + moving.log_mass[bin];
@@ -515,11 +560,6 @@ BinBox MovingBelief::box_of(std::size_t object, const BlockRun& run) const {
           .y_count = std::min(side, lattice.y_mm.count - side * run.y),
           .x_first = side * run.x,
           .x_count = std::min(side * run.count, lattice.x_mm.count - side * run.x)};
-}
-
-int MovingBelief::bins_of_tile(int x, int y) const {
-  return std::min(side, options_.lattice.x_mm.count - side * x) *
-         std::min(side, options_.lattice.y_mm.count - side * y);
 }
 
 }  // namespace palpate

@@ -35,17 +35,35 @@ class MovingBelief {
   static double bytes_needed(const PoseLattice& lattice, std::size_t objects);
 
   void reset();
-  /// Takes in one more touch, after a slip unless it is the first.
-  void add(const KnownElements& touch);
-  /// Follows more bins, from the first touch on, until the goal is reached or all are followed.
+  /// Keeps one more touch for take_in().
+  void add(KnownElements touch) { touches_.push_back(std::move(touch)); }
+  /// Takes in the touches that were kept, each after a slip unless it is the first. Begins anew the
+  /// next time where the deadline's cancel point throws.
+  void take_in(const Deadline& deadline);
+  /// Takes them in, and follows more bins, from the first touch on, until the goal is reached or
+  /// all are followed.
   SearchResult find(const SearchGoal& goal, const Deadline& deadline, const BinVisitor& visit);
 
-  /// Upper bounds of the log-likelihood of bins in nats, box after box, [y, x] in each: close where
-  /// the belief is, and loose where a bin is not followed.
+  /// After take_in(): upper bounds of the log-likelihood of bins in nats, box after box, [y, x] in
+  /// each: close where the belief is, and loose where a bin is not followed.
   std::vector<double> log_likelihood(std::span<const BinBox> boxes) const;
   std::uint64_t bytes() const;
 
  private:
+  /// Logs of sums over an object's bins.
+  struct Sums {
+    double mass = 0.0;  ///< of what is followed
+    double rest = 0.0;  ///< of what may be missing
+    double kept = 0.0;  ///< of the mass that all bins have after a slip, before it is restored
+    double off = 0.0;   ///< of that mass's differences from the mass, bin by bin
+  };
+  /// What all bins have of an object's bin after a slip; see SlipMean::kept().
+  struct Kept {
+    std::vector<double> part;
+    double least = 1.0;
+    double most = 1.0;
+  };
+
   /// One object's belief but for its scale: every bin's belief b is within
   /// [e^-rounding log_mass, e^rounding log_mass + log_rest] times the scale.
   struct Moving {
@@ -53,8 +71,7 @@ class MovingBelief {
     std::vector<double> log_rest;        ///< [bin] what may be missing
     std::vector<std::uint8_t> followed;  ///< [theta, y, x] of tiles
     std::int64_t bins_followed = 0;
-    double mass = 0.0;  ///< log of the sum of log_mass
-    double rest = 0.0;
+    Sums sums;
     double rounding = 0.0;
     // The scale makes up for what slips took from the object's mass; it lies between
     // e^(scale - under) and e^(scale + over).
@@ -76,18 +93,18 @@ class MovingBelief {
                         std::vector<double>& logs) const;
   /// Which tiles to follow through the touch.
   void choose(std::span<const TileMasses> tiles);
-  /// @param tiles,runs TileMasses::slipped; the tiles that are followed
-  void slip(std::size_t object, std::span<const double> tiles, std::span<const BlockRun> runs);
+  void slip(std::size_t object, std::span<const BlockRun> runs);
+  /// What restores the object's mass after a slip.
+  void restore(std::size_t object);
   void touch_bins(std::size_t object, const KnownElements& touch, std::span<const BlockRun> runs);
   /// @param set takes a bin, its log_mass and log_rest, and the largest error that no rest has
   void settle_bins(Moving& moving, std::span<const BlockRun> runs,
                    const std::function<void(std::size_t, double&, double&, double&)>& set);
   /// Leaves their upper bounds to tiles that are not followed.
   void leave_others(Moving& moving, std::span<const double> tiles) const;
-  /// Logs of the sums of mass and rest.
   /// @param tiles upper bounds of a bin of each tile that is not followed
-  std::pair<double, double> add_up(const Moving& moving, std::span<const BlockRun> runs,
-                                   std::span<const double> tiles) const;
+  Sums add_up(std::size_t object, std::span<const BlockRun> runs,
+              std::span<const double> tiles) const;
   /// Bound of the error of the sums, in nats.
   double sum_error(std::span<const BlockRun> runs) const;
   SearchResult result() const;
@@ -96,7 +113,6 @@ class MovingBelief {
   void for_bins(std::span<const BlockRun> runs, const Visit& visit) const;
   std::vector<BlockRun> runs_of(const Moving& moving) const;
   BinBox box_of(std::size_t object, const BlockRun& run) const;
-  int bins_of_tile(int x, int y) const;
 
   const SearchSpace& space_;
   const BoundedOptions& options_;
@@ -104,12 +120,14 @@ class MovingBelief {
   DisplacementWeights weights_;
   std::vector<SlipMean> of_bins_;   ///< [object]
   std::vector<SlipMean> of_tiles_;  ///< [object]
+  std::vector<Kept> kept_;          ///< [object]
   int columns_;                     ///< of tiles
   int rows_;
+  std::vector<double> log_bins_;  ///< [y, x] of a plane's tiles: log of their number of bins
   std::vector<KnownElements> touches_;
   /// Nats below all of the belief at which a tile is not followed.
   double depth_ = 0.0;
-  std::size_t stepped_ = 0;  ///< touches that the belief has taken in
+  std::size_t stepped_ = 0;            ///< touches that the belief has taken in
   double prior_log_likelihood_ = 0.0;  ///< of these
   std::vector<Moving> moving_;
   // Memory that slips share.

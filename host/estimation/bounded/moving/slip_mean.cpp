@@ -73,8 +73,8 @@ SlipMean::SlipMean(const DisplacementWeights& weights, const glm::dvec2& centroi
     if (y.count > 1) {
       turn.y = glm::dvec2(s, c) / y.step();
     }
-    widest = std::max({widest, std::abs(turn.x.x) + std::abs(turn.x.y),
-                       std::abs(turn.y.x) + std::abs(turn.y.y)});
+    widest = std::max(
+        {widest, std::abs(turn.x.x) + std::abs(turn.x.y), std::abs(turn.y.x) + std::abs(turn.y.y)});
   }
   // Sines of angles, their quotients by steps, the distance from the centroid, two products and two
   // sums: each within a unit or two of the largest terms.
@@ -170,8 +170,7 @@ std::vector<double> SlipMean::bounds(std::span<const double> log_bounds) const {
   const double largest = *std::ranges::max_element(log_bounds);
   std::vector<float> relative;
   for (const double log : log_bounds) {
-    relative.push_back(
-        std::nextafter(static_cast<float>(std::max(log - largest, -1e30)), 1.0F));
+    relative.push_back(std::nextafter(static_cast<float>(std::max(log - largest, -1e30)), 1.0F));
   }
   const std::vector<BlurredPlane<TileLikelihoods>> planes =
       blurred<TileLikelihoods, float>(targets, relative);
@@ -226,8 +225,7 @@ std::vector<double> SlipMean::bounds(std::span<const double> log_bounds) const {
           float largest_there = 0.0F;
           for (int y = std::max(0, tile(std::floor(least.y - 1e-9), height));
                y <= std::min(height - 1, tile(std::ceil(most.y + 1e-9), height)); ++y) {
-            const float* const row =
-                plane.blurred.data() + (y - plane.y) * plane.pitch - plane.x;
+            const float* const row = plane.blurred.data() + (y - plane.y) * plane.pitch - plane.x;
             for (int x = std::max(0, tile(std::floor(least.x - 1e-9), width));
                  x <= std::min(width - 1, tile(std::ceil(most.x + 1e-9), width)); ++x) {
               largest_there = std::max(largest_there, row[x]);
@@ -360,31 +358,59 @@ double SlipMean::mean_error() const {
   return (of_weights + 2.0 * terms) * 0x1p-53;
 }
 
-double SlipMean::log_least_kept() const {
-  const auto along = [](const AxisBlur& axis) {
-    double least = infinity;
-    const int count = static_cast<int>(axis.scale.size());
-    for (int from = 0; from < count; ++from) {
-      double kept = 0.0;
-      for (int to = std::max(0, from - axis.steps); to <= std::min(count - 1, from + axis.steps);
-           ++to) {
-        kept += axis.weight[static_cast<std::size_t>(std::abs(to - from))] *
-                axis.scale[static_cast<std::size_t>(to)];
+std::vector<double> SlipMean::kept() const {
+  const int nx = columns();
+  const int ny = rows();
+  const bool around = weights_.lattice().full_circle();
+  std::vector<double> turned((around ? 1 : taps_.size()) * static_cast<std::size_t>(nx) * ny);
+  for (std::size_t theta = 0; theta < (around ? 1 : taps_.size()); ++theta) {
+    for (int y = 0; y < ny; ++y) {
+      for (int x = 0; x < nx; ++x) {
+        const glm::dvec2 mm = first_mm_ + step_mm_ * glm::dvec2(x, y);
+        const auto for_taps = [&](const auto& visit) {
+          for (const Tap& tap : taps_[theta]) {
+            const MovedPlace u(x, glm::dot(turn(tap).x, mm), nx, fraction_error_);
+            const MovedPlace v(y, glm::dot(turn(tap).y, mm), ny, fraction_error_);
+            if (!u.beyond(nx) && !v.beyond(ny)) {
+              visit(tap, u, v);
+            }
+          }
+        };
+        double inside = 0.0;
+        for_taps([&](const Tap& tap, const MovedPlace& u, const MovedPlace& v) {
+          inside += tap.weight * u.inside(nx) * v.inside(ny);
+        });
+        for_taps([&](const Tap& tap, const MovedPlace& u, const MovedPlace& v) {
+          double* const plane = turned.data() + (around ? 0 : std::ptrdiff_t{tap.theta} * ny * nx);
+          for (const int j : {0, 1}) {
+            for (const int i : {0, 1}) {
+              if (u.bin + i >= 0 && u.bin + i < nx && v.bin + j >= 0 && v.bin + j < ny) {
+                plane[(v.bin + j) * nx + u.bin + i] += tap.weight / inside *
+                                                       (i == 0 ? 1.0 - u.fraction : u.fraction) *
+                                                       (j == 0 ? 1.0 - v.fraction : v.fraction);
+              }
+            }
+          }
+        });
       }
-      least = std::min(least, kept);
     }
-    return least;
-  };
-  // A bin keeps at least the part that does not turn.
-  double weights = 0.0;
-  for (const std::vector<Tap>& taps : taps_) {
-    double of_theta = 0.0;
-    for (const Tap& tap : taps) {
-      of_theta += tap.weight;
-    }
-    weights = std::max(weights, of_theta);
   }
-  return std::log(along(x_) * along(y_) / weights * (1.0 - 1e-9));
+  // What the blurs along x and along y spread is collected again.
+  const auto collect = [&](const std::vector<double>& from, const AxisBlur& axis,
+                           std::ptrdiff_t stride) {
+    const int count = static_cast<int>(axis.scale.size());
+    std::vector<double> to(from.size());
+    for (std::size_t bin = 0; bin < from.size(); ++bin) {
+      const auto at = static_cast<int>(static_cast<std::ptrdiff_t>(bin) / stride % count);
+      for (int k = std::max(-axis.steps, -at); k <= std::min(axis.steps, count - 1 - at); ++k) {
+        to[bin] += axis.weight[static_cast<std::size_t>(std::abs(k))] *
+                   axis.scale[static_cast<std::size_t>(at + k)] *
+                   from[static_cast<std::size_t>(static_cast<std::ptrdiff_t>(bin) + k * stride)];
+      }
+    }
+    return to;
+  };
+  return collect(collect(turned, x_, 1), y_, nx);
 }
 
 }  // namespace palpate

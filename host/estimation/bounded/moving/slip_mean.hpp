@@ -34,8 +34,8 @@ class SlipMean {
   /// @param targets sorted by theta, y, x
   /// @param log_belief of all bins, in nats
   /// @param log_mean of the targets' bins; others keep what they hold
-  /// @param error the same: a mean may be wrong by e^error - 1 of itself, beside mean_error(), since
-  /// the places to which turns move a bin are rounded
+  /// @param error the same: a mean may be wrong by e^error - 1 of itself, beside mean_error(),
+  /// since the places to which turns move a bin are rounded
   /// @param by_logs also where a mean lies so far below its surroundings that float64 does not hold
   /// it
   /// @returns log of what float64 does not hold at any bin; its log_mean is -infinity then
@@ -43,9 +43,11 @@ class SlipMean {
                std::span<double> log_mean, std::span<double> error, bool by_logs) const;
   /// Bound of the error of means(), in nats.
   double mean_error() const;
-  /// Log of the least part of a bin's belief that all bins have after a slip, before the mass is
-  /// restored.
-  double log_least_kept() const;
+  /// What all bins together have of a bin's belief after the slip, [theta, y, x], or [y, x] where
+  /// theta covers the circle: 1 away from the region's ends. Within kept_error().
+  std::vector<double> kept() const;
+  /// Bound of the error of kept(), in nats.
+  double kept_error() const { return mean_error() + 64.0 * fraction_error_; }
 
  private:
   /// Where a bin's belief comes from as theta grows by some steps, in bins from the bin, by the
