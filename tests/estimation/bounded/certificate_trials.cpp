@@ -99,6 +99,7 @@ Trial make_long_slipping_trial(const std::array<int, 3>& bins, std::uint64_t see
   trial.recording =
       touches_of(on_letter_l, {{random(-3.0, 3.0), random(-3.0, 3.0)}, 1.0}, 20, seed);
   trial.options.contact.gamma = 0.1;
+  trial.options.tolerance = 1e-6;
   trial.options.slip_sd = {.mm = random(0.3, 1.0), .rad = random(0.0, 0.2)};
   return trial;
 }

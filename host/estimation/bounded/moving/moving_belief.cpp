@@ -501,7 +501,12 @@ SearchResult MovingBelief::result() const {
 }
 
 bool MovingBelief::reaches(const SearchResult& found, const SearchGoal& goal) const {
-  if (!(found.uncertain() <= goal.tolerance)) {
+  // What rounds cannot be followed further.
+  double rounding = 0.0;
+  for (const Moving& moving : moving_) {
+    rounding = std::max(rounding, moving.rounding);
+  }
+  if (!(found.uncertain() <= std::max(goal.tolerance, 4.0 * rounding))) {
     return false;
   }
   if (!goal.evidence_nats) {

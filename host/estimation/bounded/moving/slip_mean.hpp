@@ -56,9 +56,20 @@ class SlipMean {
     glm::dvec2 x{0.0};
     glm::dvec2 y{0.0};
   };
-  const Turn& turn(const Tap& tap) const {
-    return turns_[static_cast<std::size_t>(tap.steps + weights_.theta_steps())];
+  /// The tiles [first, end) that a tile's bins come from by a turn, and the least weight of these
+  /// that lies inside the region for any of the bins.
+  struct TileSource {
+    int x_first = 0;
+    int x_end = 0;
+    int y_first = 0;
+    int y_end = 0;
+    double inside = 0.0;
+  };
+  std::size_t index_of(const Tap& tap) const {
+    return static_cast<std::size_t>(tap.steps + weights_.theta_steps());
   }
+  const Turn& turn(const Tap& tap) const { return turns_[index_of(tap)]; }
+  TileSource source_of(int px, int py, const Turn& turned) const;
   BlockRange blocks_taken(const Turn& turn, const BlockRun& run) const;
   template <typename Domain, typename Value>
   std::vector<BlurredPlane<Domain>> blurred(std::span<const BlockRun> targets,
@@ -71,10 +82,11 @@ class SlipMean {
   int bins_;
   AxisBlur x_;
   AxisBlur y_;
-  glm::dvec2 first_mm_;                 ///< the first bin from the centroid
-  glm::dvec2 step_mm_;                  ///< 0 along an axis of one bin
-  std::vector<Turn> turns_;             ///< [steps of theta, from the least]
-  std::vector<std::vector<Tap>> taps_;  ///< [theta]
+  glm::dvec2 first_mm_;                           ///< the first bin from the centroid
+  glm::dvec2 step_mm_;                            ///< 0 along an axis of one bin
+  std::vector<Turn> turns_;                       ///< [steps of theta, from the least]
+  std::vector<std::vector<Tap>> taps_;            ///< [theta]
+  std::vector<std::vector<TileSource>> sources_;  ///< [steps of theta][tile]; of tiles alone
   double fraction_error_;
 };
 
