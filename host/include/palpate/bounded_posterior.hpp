@@ -34,8 +34,8 @@ struct BoundedOptions {
   /// touches or the region lies more than 10 m away.
   double tolerance = 1e-6;
   /// Seconds after which estimate() stops and reports what it has proven by then, also where that
-  /// is less than the tolerance asks for. By default it takes the time that the tolerance needs. Not
-  /// with slip_sd.
+  /// is less than the tolerance asks for. By default it takes the time that the tolerance needs.
+  /// Not with slip_sd.
   std::optional<double> budget_s = {};
   /// Also bounds each label's log evidence (of all hypotheses that bear it) within this many nats,
   /// however unlikely the label is: for a temperature that is applied later. By default only the
@@ -96,9 +96,9 @@ struct EvaluatedBelief {
 /// bounded from above by tables of the smallest penalty within a window of the map; blocks that
 /// cannot matter are dropped, and the bins of the others are evaluated. Memory follows the maps and
 /// the region, or, where bins lie two cells of a map or more apart, the bins. The result does not
-/// depend on the order of touches (but that "none of these" counts the first one's place), on the
-/// number of threads or on the processor's vector width, unless a budget ends the search. An object
-/// that was moved from throws Error on every call.
+/// depend on the order of touches (but where objects slip, and that "none of these" counts the
+/// first one's place), on the number of threads or on the processor's vector width, unless a budget
+/// ends the search. An object that was moved from throws Error on every call.
 class PALPATE_API BoundedPosterior {
  public:
   /// Builds the window tables of the maps.

@@ -1,4 +1,5 @@
-// The bounded posterior of objects that slip: what it has in common with the histogram, and its laws.
+// The bounded posterior of objects that slip: what it has in common with the histogram, and its
+// laws.
 
 #include <cmath>
 #include <stdexcept>

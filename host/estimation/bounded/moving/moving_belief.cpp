@@ -472,18 +472,29 @@ SearchResult MovingBelief::result() const {
   SearchResult found;
   double best = -infinity;
   double best_missing = -infinity;
+  // The scale of the heaviest object is a factor that all share, as far as it is not known.
+  std::size_t heaviest = 0;
+  const auto mass_of = [&](std::size_t i) {
+    return space_.log_weight[i] + moving_[i].scale + moving_[i].sums.mass;
+  };
+  for (std::size_t i = 1; i < moving_.size(); ++i) {
+    heaviest = mass_of(i) > mass_of(heaviest) ? i : heaviest;
+  }
+  found.shared_nats = std::max(moving_[heaviest].over, moving_[heaviest].under);
   for (std::size_t i = 0; i < moving_.size(); ++i) {
     const Moving& moving = moving_[i];
     const double scale = space_.log_weight[i] + moving.scale;
     const std::vector<BlockRun> runs = runs_of(moving);
-    const double most = moving.rounding + moving.over + sum_error(runs);
-    const double least = moving.rounding + moving.under + sum_error(runs);
+    const double over = i == heaviest ? 0.0 : moving.over + moving_[heaviest].under;
+    const double under = i == heaviest ? 0.0 : moving.under + moving_[heaviest].over;
+    const double most = moving.rounding + over + sum_error(runs);
+    const double least = moving.rounding + under + sum_error(runs);
     found.mass.push_back({.evaluated = scale + moving.sums.mass,
                           .rounding = scale + moving.sums.mass +
                                       std::log(std::max(std::expm1(most), -std::expm1(-least))),
-                          .dropped = scale + moving.over + moving.sums.rest});
+                          .dropped = scale + over + moving.sums.rest});
     best_missing =
-        std::max(best_missing, scale + moving.over + *std::ranges::max_element(moving.log_rest));
+        std::max(best_missing, scale + over + *std::ranges::max_element(moving.log_rest));
     for_bins(runs, [&](std::size_t bin) {
       if (scale + moving.log_mass[bin] > best) {
         best = scale + moving.log_mass[bin];
@@ -501,12 +512,9 @@ SearchResult MovingBelief::result() const {
 }
 
 bool MovingBelief::reaches(const SearchResult& found, const SearchGoal& goal) const {
-  // What rounds cannot be followed further.
-  double rounding = 0.0;
-  for (const Moving& moving : moving_) {
-    rounding = std::max(rounding, moving.rounding);
-  }
-  if (!(found.uncertain() <= std::max(goal.tolerance, 4.0 * rounding))) {
+  // Rounding stays, however many bins are followed.
+  const double rounding = std::ranges::max_element(moving_, {}, &Moving::rounding)->rounding;
+  if (!(found.uncertain() <= std::max(goal.tolerance, 2.0 * rounding))) {
     return false;
   }
   if (!goal.evidence_nats) {
