@@ -171,8 +171,9 @@ std::string BoundedBelief::path() const {
 
 std::uint64_t BoundedBelief::bytes() const {
   return likelihood_.bytes() + space_.bytes() + search_.largest().bytes() +
-         (moving_ ? moving_->bytes() : 0) + (found_ ? found_->bins.bytes() : 0) +
-         (none_ ? none_->bytes() : 0);
+         static_cast<std::uint64_t>(
+             moving_ ? MovingBelief::bytes_needed(options_.lattice, hypotheses_.size()) : 0.0) +
+         (found_ ? found_->bins.bytes() : 0) + (none_ ? none_->bytes() : 0);
 }
 
 SearchGoal BoundedBelief::goal() const {

@@ -69,6 +69,7 @@ class SlipMean {
     return static_cast<std::size_t>(tap.steps + weights_.theta_steps());
   }
   const Turn& turn(const Tap& tap) const { return turns_[index_of(tap)]; }
+  void find_sources();
   TileSource source_of(int px, int py, const Turn& turned) const;
   BlockRange blocks_taken(const Turn& turn, const BlockRun& run) const;
   template <typename Domain, typename Value>
