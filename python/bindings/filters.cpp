@@ -296,7 +296,8 @@ void bind_bounded(nb::module_& module) {
       nb::class_<Bounded>(
           module, "BoundedPosterior",
           "The belief of PoseHistogram over the same bins, of which it evaluates only those that\n"
-          "matter, and proves how little the others can. Memory follows the maps, not the bins.")
+          "matter, and proves how little the others can. Memory follows the maps, and\n"
+          "the bins where objects slip.")
           .def(
               "__init__",
               [](Bounded* self, const std::shared_ptr<Session>& device, const MapsLike& maps,

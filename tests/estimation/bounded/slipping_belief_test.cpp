@@ -1,12 +1,14 @@
 // The bounded posterior of objects that slip: what it has in common with the histogram, and its
 // laws.
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "bins_by_definition.hpp"
 #include "bounded/certified.hpp"
 #include "bounded_set_up.hpp"
 #include "palpate/bounded_posterior.hpp"
@@ -98,6 +100,21 @@ TEST(SlippingBelief, IsTheSameTouchByTouch) {
   one_by_one.reset();
   one_by_one.update(touches);
   EXPECT_EQ(told_by(one_by_one, 2), expected);
+}
+
+TEST(SlippingBelief, IsCertifiedByATableAndForEveryLabel) {
+  BoundedOptions options = slipping_options();
+  options.evidence_nats = 1e-3;
+  options.evidence_range_nats = 60.0;
+  const Recording recording = random_recording(5, 20, 966);
+  const std::vector<Touch> touches = all_touches(recording);
+  expect_certified(two_made_up(), options, touches);
+  options.contact.table = crooked_table();
+  // Between likelihoods that lie thousands of nats apart, the place of a turned bin is not certain.
+  for (double& nats : options.contact.table->log_likelihood) {
+    nats = std::clamp(nats, -9.0, 0.0);
+  }
+  expect_certified(two_made_up(), options, touches);
 }
 
 TEST(SlippingBelief, SlipsByLittleAsIfAtRest) {

@@ -2,9 +2,6 @@
 #include <cmath>
 #include <limits>
 
-#include <glm/common.hpp>
-#include <glm/geometric.hpp>
-
 #include "estimation/bounded/displaced/blurred_plane.hpp"
 #include "estimation/bounded/moving/slip_mean.hpp"
 #include "estimation/bounded/parallel_for.hpp"
@@ -93,17 +90,9 @@ std::vector<double> SlipMean::bounds(std::span<const double> log_bounds) const {
 SlipMean::TileSource SlipMean::source_of(int px, int py, const Turn& turned) const {
   const Axis& x_mm = weights_.lattice().x_mm;
   const Axis& y_mm = weights_.lattice().y_mm;
-  // A tile's bins come from within the box around where its corners come from.
-  glm::dvec2 least(infinity);
-  glm::dvec2 most(-infinity);
-  for (const int i : {px * bins_, std::min((px + 1) * bins_, x_mm.count) - 1}) {
-    for (const int j : {py * bins_, std::min((py + 1) * bins_, y_mm.count) - 1}) {
-      const glm::dvec2 mm = first_mm_ + step_mm_ * glm::dvec2(i, j);
-      const glm::dvec2 place(i + glm::dot(turned.x, mm), j + glm::dot(turned.y, mm));
-      least = glm::min(least, place);
-      most = glm::max(most, place);
-    }
-  }
+  const auto [least, most] = moved(
+      turned, {px * bins_, py * bins_},
+      {std::min((px + 1) * bins_, x_mm.count) - 1, std::min((py + 1) * bins_, y_mm.count) - 1});
   const auto least_inside = [](double low, double high, int count) {
     return std::min(weight_inside(low, count), weight_inside(high, count));
   };

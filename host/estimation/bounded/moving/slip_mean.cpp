@@ -5,6 +5,7 @@
 #include <limits>
 #include <mutex>
 
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 #include "estimation/bounded/displaced/blurred_plane.hpp"
@@ -19,8 +20,6 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr int side = BlockRun::side;
 /// Blocks of a run whose sources are taken together.
 constexpr int blocks_together = 4;
-
-int floor_quotient(int value, int by) { return value >= 0 ? value / by : -((by - 1 - value) / by); }
 
 /// A bin's place, moved by so many bins, in whole bins and the rest.
 struct MovedPlace {
@@ -86,31 +85,33 @@ SlipMean::SlipMean(const DisplacementWeights& weights, const glm::dvec2& centroi
   }
 }
 
-BlockRange SlipMean::blocks_taken(const Turn& turn, const BlockRun& run) const {
-  const auto along = [&](const glm::dvec2& bins_per_mm, bool x) {
-    const PoseLattice& lattice = weights_.lattice();
-    const int count = (x ? lattice.x_mm : lattice.y_mm).count;
-    double least = infinity;
-    double most = -infinity;
-    for (const int i : {side * run.x * bins_, side * (run.x + run.count) * bins_ - 1}) {
-      for (const int j : {side * run.y * bins_, side * (run.y + 1) * bins_ - 1}) {
-        const double moved =
-            (x ? i : j) + glm::dot(bins_per_mm, first_mm_ + step_mm_ * glm::dvec2(i, j));
-        least = std::min(least, moved);
-        most = std::max(most, moved);
-      }
+SlipMean::PlaceBox SlipMean::moved(const Turn& turn, const glm::ivec2& first,
+                                   const glm::ivec2& last) const {
+  PlaceBox box{.least = glm::dvec2(infinity), .most = glm::dvec2(-infinity)};
+  for (const int i : {first.x, last.x}) {
+    for (const int j : {first.y, last.y}) {
+      const glm::dvec2 mm = first_mm_ + step_mm_ * glm::dvec2(i, j);
+      const glm::dvec2 place(i + glm::dot(turn.x, mm), j + glm::dot(turn.y, mm));
+      box.least = glm::min(box.least, place);
+      box.most = glm::max(box.most, place);
     }
-    // A little more, for rounding; and the bin behind.
-    const auto block = [&](double bin) {
-      const auto whole = static_cast<int>(std::clamp(std::floor(bin), -2.0 * count, 3.0 * count));
-      return floor_quotient(floor_quotient(whole, bins_), side);
-    };
-    const int blocks = ((x ? columns() : rows()) + side - 1) / side;
-    return glm::ivec2(std::max(0, block(least - 1e-3)), std::min(blocks, block(most + 1.001) + 1));
+  }
+  return box;
+}
+
+BlockRange SlipMean::blocks_taken(const Turn& turn, const BlockRun& run) const {
+  const int bins = side * bins_;
+  const PlaceBox box = moved(turn, {bins * run.x, bins * run.y},
+                             {bins * (run.x + run.count) - 1, bins * (run.y + 1) - 1});
+  const auto block = [&](double bin, int places) {
+    return static_cast<int>(std::clamp<double>(std::floor(std::floor(bin) / bins), -1, places));
   };
-  const glm::ivec2 x = along(turn.x, true);
-  const glm::ivec2 y = along(turn.y, false);
-  return {.x_first = x.x, .x_end = x.y, .y_first = y.x, .y_end = y.y};
+  const auto blocks = [](int places) { return (places + side - 1) / side; };
+  // A little more, for rounding; and the bin behind.
+  return {.x_first = std::max(0, block(box.least.x - 1e-3, columns())),
+          .x_end = std::min(blocks(columns()), block(box.most.x + 1.001, columns()) + 1),
+          .y_first = std::max(0, block(box.least.y - 1e-3, rows())),
+          .y_end = std::min(blocks(rows()), block(box.most.y + 1.001, rows()) + 1)};
 }
 
 template <typename Domain, typename Value>

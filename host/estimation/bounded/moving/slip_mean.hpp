@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <span>
 #include <vector>
 
@@ -66,11 +67,17 @@ class SlipMean {
     double inside = 0.0;
   };
   std::size_t index_of(const Tap& tap) const {
-    return static_cast<std::size_t>(tap.steps + weights_.theta_steps());
+    return static_cast<std::size_t>(std::ptrdiff_t{tap.steps} + weights_.theta_steps());
   }
   const Turn& turn(const Tap& tap) const { return turns_[index_of(tap)]; }
   void find_sources();
   TileSource source_of(int px, int py, const Turn& turned) const;
+  /// The box around the places, in bins, that the bins [first, last] come from.
+  struct PlaceBox {
+    glm::dvec2 least;
+    glm::dvec2 most;
+  };
+  PlaceBox moved(const Turn& turn, const glm::ivec2& first, const glm::ivec2& last) const;
   BlockRange blocks_taken(const Turn& turn, const BlockRun& run) const;
   template <typename Domain, typename Value>
   std::vector<BlurredPlane<Domain>> blurred(std::span<const BlockRun> targets,
