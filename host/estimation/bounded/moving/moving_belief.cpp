@@ -16,7 +16,7 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 /// Nats below all of the belief at which a tile is not followed, at first; and from which on all
 /// tiles are.
 constexpr double first_depth = 40.0;
-constexpr double last_depth = 200.0;
+constexpr double last_depth = 160.0;
 /// The log of no mass, as a number.
 constexpr double no_mass = -1e9;
 
