@@ -85,7 +85,7 @@ void MovingObject::add_touch_bounds(const KnownElements& touch, std::vector<doub
         for (int x = 0; x < width; x += side) {
           for (int i = 0; i < side; ++i) {
             for (int j = 0; j < side; ++j) {
-              nats[static_cast<std::size_t>((y + j) * width + x + i)] =
+              nats[std::ptrdiff_t{y + j} * width + x + i] =
                   static_cast<float>(*penalty++ * (-1.0 / penalties_per_nat) + 1e-3);
             }
           }

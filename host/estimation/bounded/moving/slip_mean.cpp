@@ -315,21 +315,25 @@ std::vector<double> SlipMean::kept() const {
     }
   }
   // What the blurs along x and along y spread is collected again.
-  const auto collect = [&](const std::vector<double>& from, const AxisBlur& axis,
-                           std::ptrdiff_t stride) {
-    const int count = static_cast<int>(axis.scale.size());
+  const auto collect = [&](const std::vector<double>& from, bool along_x) {
+    const AxisBlur& axis = along_x ? x_ : y_;
+    const int count = along_x ? nx : ny;
+    const std::ptrdiff_t stride = along_x ? 1 : nx;
     std::vector<double> to(from.size());
-    for (std::size_t bin = 0; bin < from.size(); ++bin) {
-      const auto at = static_cast<int>(static_cast<std::ptrdiff_t>(bin) / stride % count);
-      for (int k = std::max(-axis.steps, -at); k <= std::min(axis.steps, count - 1 - at); ++k) {
-        to[bin] += axis.weight[static_cast<std::size_t>(std::abs(k))] *
-                   axis.scale[static_cast<std::size_t>(at + k)] *
-                   from[static_cast<std::size_t>(static_cast<std::ptrdiff_t>(bin) + k * stride)];
+    std::ptrdiff_t bin = 0;
+    while (bin < static_cast<std::ptrdiff_t>(from.size())) {
+      for (int y = 0; y < ny; ++y) {
+        for (int x = 0; x < nx; ++x, ++bin) {
+          const int at = along_x ? x : y;
+          for (int k = std::max(-axis.steps, -at); k <= std::min(axis.steps, count - 1 - at); ++k) {
+            to[bin] += axis.weight[std::abs(k)] * axis.scale[at + k] * from[bin + k * stride];
+          }
+        }
       }
     }
     return to;
   };
-  return collect(collect(turned, x_, 1), y_, nx);
+  return collect(collect(turned, true), false);
 }
 
 }  // namespace palpate
