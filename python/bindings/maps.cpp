@@ -40,8 +40,7 @@ nb::object cells_or_none(const OccupancyGrid& map, const std::vector<float>& cel
   return cells.empty() ? nb::none() : nb::object(view_cells(map, cells));
 }
 
-/// Rounds a mask's pixels finer than cells; a tenth of a cell moves no edge by more than a
-/// twentieth.
+/// Pixels of a mask along a cell: they move no edge by more than a twentieth of a cell.
 constexpr double pixels_of_cell = 10.0;
 
 /// The polygons of one array [n, 2], or of several.
@@ -64,22 +63,13 @@ std::vector<std::vector<glm::dvec2>> polygons_of(const ArrayLike& object) {
   return polygons;
 }
 
-MapOptions drawn_options_of(double cell_mm, double spread_mm, double peak, double prior) {
-  MapOptions options;
-  options.cell_mm = cell_mm;
-  options.sensor = {.spread_mm = spread_mm, .peak = peak, .prior = prior};
-  options.validate();
-  return options;
-}
-
 void bind_drawn_maps(nb::class_<OccupancyGrid>& grid) {
-  const InverseSensorModel sensor = drawn_options().sensor;
-  const double cell_mm = drawn_options().cell_mm;
+  const DrawnMapOptions usual;
   grid.def_static(
       "from_mask",
       [](const std::string& label, const ArrayLike& mask, double pixel_mm,
-         const ArrayLike& origin_mm, double cell, double spread_mm, double peak, double prior,
-         double reach) {
+         const ArrayLike& origin_mm, double cell_mm, double spread_mm, double peak, double prior,
+         double felt_share, double reach_mm) {
         ArrayReader reader;
         Mask drawn{.pixel_mm = pixel_mm, .origin_mm = point_of(origin_mm, "origin_mm")};
         drawn.occupied =
@@ -87,39 +77,42 @@ void bind_drawn_maps(nb::class_<OccupancyGrid>& grid) {
                 .copied<std::uint8_t>();
         drawn.rows = reader.extent("rows");
         drawn.columns = reader.extent("columns");
-        return run([=, drawn = std::move(drawn)](Call&) {
-          return drawn_map(label, drawn, drawn_options_of(cell, spread_mm, peak, prior), reach);
-        });
+        const DrawnMapOptions options{cell_mm, spread_mm, peak, prior, felt_share, reach_mm};
+        return run(
+            [=, drawn = std::move(drawn)](Call&) { return drawn_map(label, drawn, options); });
       },
-      "label"_a, "mask"_a, nb::kw_only(), "pixel_mm"_a, "origin_mm"_a, "cell_mm"_a = cell_mm,
-      "spread_mm"_a = sensor.spread_mm, "peak"_a = sensor.peak, "prior"_a = sensor.prior,
-      "reach_mm"_a = drawn_reach_mm,
+      "label"_a, "mask"_a, nb::kw_only(), "pixel_mm"_a, "origin_mm"_a, "cell_mm"_a = usual.cell_mm,
+      "spread_mm"_a = usual.spread_mm, "peak"_a = usual.peak, "prior"_a = usual.prior,
+      "felt_share"_a = usual.felt_share, "reach_mm"_a = usual.reach_mm,
       "The map of an object from a drawing of it, without touches.\n\n"
       "mask [rows, columns]: booleans, True where the object is. Pixel (j, i) is a square of\n"
       "pixel_mm centred at origin_mm + pixel_mm * (i, j) in the object frame: rows lie along +y,\n"
       "so that a picture, whose first row is its top, is given as picture[::-1]. origin_mm [2]:\n"
-      "the centre of pixel (0, 0). cell_mm: edge of the map's cells; spread_mm: how soft edges\n"
-      "are, the standard deviation of a Gaussian, by default that of touched maps. peak: the\n"
-      "probability of being occupied far inside, and of being empty far outside; log odds lie\n"
-      "within log(peak / (1 - peak)). prior: that of places beyond the map. reach_mm: largest\n"
-      "distance of an element from the array's centre, by default that of the 6 x 6 DigiTacts\n"
-      "region; the map ends 2 reach_mm + 4 spread_mm around the object.\n\n"
+      "the centre of pixel (0, 0). cell_mm: edge of the map's cells. spread_mm: how soft edges\n"
+      "are, half the standard deviation of the sensor's point spread, by default that of touched\n"
+      "maps. peak: how sure the drawing is: log odds lie within log(peak / (1 - peak)), by\n"
+      "default 6.9 nats. prior: probability that a place beyond the map is occupied. felt_share:\n"
+      "share of an element's point spread on the object from which on it feels the object; by\n"
+      "default 0.2, so that the object is 1.7 spreads larger all around, as touched maps have it;\n"
+      "0.5 leaves outlines where they are drawn. reach_mm: largest distance of an element from\n"
+      "the array's centre, by default the 6 x 6 DigiTacts region's; the map ends\n"
+      "2 reach_mm + 4 spread_mm around the object.\n\n"
       "Raises Error on a mask that is not two-dimensional and of booleans, a mask without an\n"
       "occupied pixel, and numbers out of range.");
   grid.def_static(
       "from_polygon",
-      [](const std::string& label, const ArrayLike& polygon, double cell, double spread_mm,
-         double peak, double prior, double reach) {
-        return run(
-            [=, shape =
-                    Shape{.label = label, .strokes = {}, .polygons = polygons_of(polygon)}](Call&) {
-              const MapOptions options = drawn_options_of(cell, spread_mm, peak, prior);
-              return drawn_map(label, mask_of(shape, cell / pixels_of_cell), options, reach);
-            });
+      [](const std::string& label, const ArrayLike& polygon, double cell_mm, double spread_mm,
+         double peak, double prior, double felt_share, double reach_mm) {
+        const DrawnMapOptions options{cell_mm, spread_mm, peak, prior, felt_share, reach_mm};
+        Shape shape{.label = label, .strokes = {}, .polygons = polygons_of(polygon)};
+        return run([=, shape = std::move(shape)](Call&) {
+          options.validate();
+          return drawn_map(label, mask_of(shape, options.cell_mm / pixels_of_cell), options);
+        });
       },
-      "label"_a, "polygon"_a, nb::kw_only(), "cell_mm"_a = cell_mm,
-      "spread_mm"_a = sensor.spread_mm, "peak"_a = sensor.peak, "prior"_a = sensor.prior,
-      "reach_mm"_a = drawn_reach_mm,
+      "label"_a, "polygon"_a, nb::kw_only(), "cell_mm"_a = usual.cell_mm,
+      "spread_mm"_a = usual.spread_mm, "peak"_a = usual.peak, "prior"_a = usual.prior,
+      "felt_share"_a = usual.felt_share, "reach_mm"_a = usual.reach_mm,
       "The map of an object from its outline, without touches.\n\n"
       "polygon [n, 2]: vertices in mm in the object frame, n at least 3, or a sequence of such\n"
       "arrays, which the even-odd rule fills: a polygon within another is a hole. The others as\n"
@@ -182,6 +175,7 @@ void bind_map(nb::module_& module) {
               "Of the sensor model that built the map, or None.")
       .def_ro("suggested_symmetry", &OccupancyGrid::suggested_symmetry,
               "The symmetry that the map itself shows; None where it was not measured.")
+      .def_ro("drawn", &OccupancyGrid::drawn, "It is of a drawing, not of touches.")
       .def_prop_ro("T_learned_robot_object", array_of(&OccupancyGrid::T_learned_robot_object),
                    "[3], the object frame in the robot frame of the touches that it was learned\n"
                    "from: mm, mm, rad.")

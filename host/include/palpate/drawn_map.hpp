@@ -7,7 +7,6 @@
 #include <glm/vec2.hpp>
 
 #include "palpate/api.hpp"
-#include "palpate/map_builder.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/simulation.hpp"
 
@@ -29,28 +28,36 @@ inline constexpr double most_pixels = 1e8;
 /// @throws Error on a shape without area, a point beyond 1 km, and more than `most_pixels`
 PALPATE_API Mask mask_of(const Shape& shape, double pixel_mm);
 
-/// How sure a drawing is, as OccupancyGrid's probability of a cell far inside the part; see
-/// drawn_map().
-inline constexpr double drawn_peak = 0.99;
+/// How a map is made of a drawing.
+struct PALPATE_API DrawnMapOptions {
+  double cell_mm = 0.5;    ///< edge of a cell
+  double spread_mm = 0.5;  ///< half the standard deviation of the sensor's point spread
+  /// How sure a drawing is: log odds lie within log(peak / (1 - peak)) of 0, by default 6.9 nats.
+  /// Touched maps reach more than that, but more changes Eq. 7 by less than 1 %.
+  double peak = 0.999;
+  double prior = 0.2;  ///< of what lies beyond the map
+  /// Share of an element's point spread on the object from which on it feels the object: by default
+  /// midway between No Contact, below 2 of 20 kPa, and In Contact, above 0.3 of the largest
+  /// pressure. 0.5 leaves outlines where they are drawn.
+  double felt_share = 0.2;
+  double reach_mm = 7.0;  ///< of the array, see array_reach_mm(); by default the 6 x 6 DigiTacts'
 
-/// Reach of the default array, the 6 x 6 DigiTacts region, rounded up; see array_reach_mm().
-inline constexpr double drawn_reach_mm = 7.0;
+  /// Throws Error on a peak not above 0.5, a share that is not between 0 and 1, a negative reach,
+  /// and as MapOptions::validate()
+  void validate() const;
+};
 
-/// The sensor model of a drawn map whose options say nothing else.
-inline MapOptions drawn_options() { return {.sensor = {.peak = drawn_peak}}; }
-
-/// The map of an object of which there is a drawing. A cell's probability of being occupied is
-///   p = (1 - peak) + (2 peak - 1) c,
-/// where c is the mask's share of a Gaussian of `spread_mm` about the cell's centre: edges are as
-/// soft as the sensor's spread leaves them, and log odds lie within log(peak / (1 - peak)) of 0.
-/// The map covers the occupied pixels and all that an array about their outline senses: twice the
-/// array's reach, and four spreads. It has the symmetry 1 and suggests the one that it shows, see
-/// measure_symmetry().
-/// @param options of which the classifier does not count
-/// @param reach_mm see array_reach_mm()
-/// @throws Error on options or a reach out of range, a peak below 0.5, a mask whose numbers do not
-/// agree or that has no occupied pixel, a mask beyond `farthest_mm`, and more than `most_cells`
+/// The map of an object of which there is a drawing. Where c is the share of the point spread, a
+/// Gaussian of twice `spread_mm`, about a cell's centre that lies on the object, and f
+/// `felt_share`, the cell is occupied with the probability
+///   p = (1 - peak) + (2 peak - 1) o^2 / (1 + o^2), o = c (1 - f) / ((1 - c) f):
+/// as touched maps have it, the object is as large as elements feel it, with edges about a spread
+/// wide. The map covers all that an array senses which feels the object with one element: twice the
+/// array's reach and four spreads about the occupied pixels. It has the symmetry 1 and suggests the
+/// one that it shows, see measure_symmetry().
+/// @throws Error on options out of range, a mask whose numbers do not agree or that has no occupied
+/// pixel or lies beyond `farthest_mm`, and more than `most_cells`
 PALPATE_API OccupancyGrid drawn_map(const std::string& label, const Mask& mask,
-                                    const MapOptions& options, double reach_mm);
+                                    const DrawnMapOptions& options = {});
 
 }  // namespace palpate
