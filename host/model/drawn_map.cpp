@@ -187,6 +187,12 @@ OccupancyGrid drawn_map(const std::string& label, const Mask& mask,
     const double p = (1.0 - peak) + (2.0 * peak - 1.0) * odds / (1.0 + odds);
     cell = static_cast<float>(log_odds_from_probability(p));
   }
+  if (std::ranges::none_of(map.log_odds, [](float cell) { return cell > 0.0F; })) {
+    throw Error(Fault::input,
+                fmt::format("mask of '{}': no cell would be occupied, so small or thin "
+                            "is the object; give a smaller spread, felt share or cell",
+                            label));
+  }
   if (const auto fault = fault_of(map)) {
     throw Error(Fault::input, fmt::format("map '{}': {}", label, *fault));
   }
