@@ -117,7 +117,7 @@ void add_drawing_flags(CLI::App& command, MapFlags& flags) {
   command.add_option("--array", flags.array,
                      "Of a drawing, the array that will touch the object, COLUMNS:ROWS:PITCH or a "
                      "file as of import: the map covers what it senses about the outline [default: "
-                     "6:6:1.9]");
+                     "the 6 x 6 DigiTacts region]");
 }
 
 void require_no_drawing_flags(const MapFlags& flags) {

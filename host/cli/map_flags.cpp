@@ -102,12 +102,14 @@ void add_map_flags(CLI::App& command, MapFlags& flags) {
       "Where the object's frame lies in the robot frame of the touches: robot, at "
       "its origin; centroid, at the middle of the occupied cells; X,Y,DEG, in mm and "
       "degrees; auto, at the robot's origin where the map covers it, else at the "
+      "centroid. Of a drawing, in the frame of the picture's lower left corner, auto: at the "
       "centroid [default: auto]");
   command.add_flag("--mirror", flags.mirror,
                    "The object is flat and may lie on its other side; with --unposed, presses of "
                    "that side join the maps mirrored");
   command.add_option("--label", flags.label,
-                     "Label of the map [default: the object that the recording names]");
+                     "Label of the map [default: the object that the recording names, "
+                     "or a drawing's file]");
   command.add_flag("--unposed", flags.unposed,
                    "The sensor's poses are unknown: find how the presses of an object lie beside "
                    "each other, and build its maps from their means. For arrays so large that a "
