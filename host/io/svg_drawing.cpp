@@ -139,8 +139,16 @@ glm::dvec2 size_of(const std::filesystem::path& path, RsvgHandle* handle,
   RsvgRectangle box{};
   rsvg_handle_get_intrinsic_dimensions(handle, &has_width, &width, &has_height, &height, &has_box,
                                        &box);
-  const auto width_mm = mm_of(width.unit);
-  const auto height_mm = mm_of(height.unit);
+  std::optional<double> width_mm = mm_of(width.unit);
+  std::optional<double> height_mm = mm_of(height.unit);
+  if (has_box != FALSE && width_mm.has_value() != height_mm.has_value()) {
+    // The other side follows from the shape of the box.
+    const double box_mm =
+        width_mm ? width.length * *width_mm / box.width : height.length * *height_mm / box.height;
+    width = {box.width, RSVG_UNIT_MM};
+    height = {box.height, RSVG_UNIT_MM};
+    width_mm = height_mm = box_mm;
+  }
   const bool physical = width_mm && height_mm;
   const bool in_pixels = width.unit == RSVG_UNIT_PX && height.unit == RSVG_UNIT_PX;
   if (!physical && !in_pixels && has_box == FALSE) {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <utility>
+#include <string>
 
 #include <fmt/format.h>
 
@@ -90,7 +90,6 @@ class Shares {
     }
   }
 
-  std::size_t cells() const { return cells_.size(); }
   float sum(std::size_t cell, const std::uint8_t* pixels) const {
     const Cell& one = cells_[cell];
     float sum = 0.0F;

@@ -75,8 +75,9 @@ class MapDrawing : public ProgramTest {
 
 TEST_F(MapDrawing, IsAtItsPhysicalSize) {
   const std::string box = " viewBox='0 0 30 20'";
-  for (const char* size : {"width='30mm' height='20mm'", "width='3cm' height='20mm'",
-                           "width='1.18110236in' height='56.6929134pt'"}) {
+  for (const char* size :
+       {"width='30mm' height='20mm'", "height='20mm'", "width='3cm' height='20mm'",
+        "width='1.18110236in' height='56.6929134pt'"}) {
     SCOPED_TRACE(size);
     write_svg("part.svg", size + box, part);
     expect_part(map_of("part.svg"));

@@ -36,7 +36,7 @@ struct PALPATE_API DrawnMapOptions {
   double cell_mm = 0.5;    ///< edge of a cell
   double spread_mm = 0.5;  ///< half the standard deviation of the sensor's point spread
   /// How sure a drawing is: log odds lie within log(peak / (1 - peak)) of 0, by default 6.9 nats.
-  /// Touched maps reach more than that, but more changes Eq. 7 by less than 1 %.
+  /// Touched maps reach more, but more changes Eq. 7 by less than 0.05 nats at a prior of 0.2.
   double peak = 0.999;
   double prior = 0.2;  ///< of what lies beyond the map
   /// Share of an element's point spread on the object from which on it feels the object: by default
