@@ -74,7 +74,7 @@ void bring_to_one_prior(const Circumstances& of, const std::vector<Scene::Object
   std::vector<OccupancyGrid> maps;
   for (std::size_t i = 0; i < hypotheses.size(); ++i) {
     maps.push_back(hypotheses[i].map);
-    if (!maps.back().source) {
+    if (!maps.back().source && !maps.back().drawn) {
       refuse(
           objects[*other].map,
           "prior {} differs from {} of {}, and {} holds no touches to build it from again; build "
