@@ -33,7 +33,7 @@ Hdf5Contents open_map(const std::filesystem::path& path) {
   return {path,
           {"format", "version", "label", "cell_mm", "origin_mm", "prior", "symmetry", "spread_mm",
            "suggested_symmetry", "mirror", "T_learned_robot_object", "centred_mm", "pressure_unit",
-           "threshold", "ratio", "peak", "left_out_fit", "pose_scale"},
+           "threshold", "ratio", "peak", "left_out_fit", "pose_scale", "drawn"},
           {"log_odds", "observations", "mean_level", "touch_pressure", "touch_pose",
            "touch_elements", "touch_valid"}};
 }
@@ -67,6 +67,7 @@ void scan(const std::filesystem::path& path, Hdf5Contents& file,
     map.centred_mm = {moved[0], moved[1]};
   }
   map.mirror = file.has_attribute("mirror") && file.integer("mirror", 0) != 0;
+  map.drawn = file.has_attribute("drawn") && file.integer("drawn", 0) != 0;
   const std::vector<std::uint64_t>& shape = file.shape("log_odds", 2);
   const auto [least, most] = std::minmax(shape[0], shape[1]);
   if (least < 1 || most > std::numeric_limits<int>::max()) {
@@ -254,6 +255,9 @@ void write_map(const std::filesystem::path& path, const OccupancyGrid& map) {
   }
   if (map.mirror) {
     file.attribute("mirror", 1);
+  }
+  if (map.drawn) {
+    file.attribute("drawn", 1);
   }
   if (map.suggested_symmetry) {
     file.attribute("suggested_symmetry", *map.suggested_symmetry);

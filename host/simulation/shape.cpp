@@ -141,19 +141,6 @@ std::vector<Shape::Stroke> glyph_strokes(char character) {
   throw Error(Fault::input, fmt::format("{}:{}: {}", path.string(), line, why));
 }
 
-/// True where some triangle of the first vertex and an edge has an area. Otherwise all edges lie on
-/// rays from the first vertex, and the polygon encloses nothing.
-bool encloses_area(const std::vector<glm::dvec2>& polygon) {
-  for (std::size_t i = 2; i < polygon.size(); ++i) {
-    const glm::dvec2 a = polygon[i - 1] - polygon[0];
-    const glm::dvec2 b = polygon[i] - polygon[0];
-    if (a.x * b.y != a.y * b.x) {
-      return true;
-    }
-  }
-  return false;
-}
-
 /// The polygons of a text file in mm, in the format that make_shape() describes.
 /// @throws Error naming the file and line
 std::vector<std::vector<glm::dvec2>> read_polygons(const std::filesystem::path& path) {

@@ -24,36 +24,6 @@ namespace {
 /// Radius at which the point spread is cut off, in standard deviations: 6e-7 of it lies beyond.
 constexpr double reach = 5.0;
 
-BoundingBox bounds(const Shape& shape) {
-  // 1 km: far beyond any object, yet rounding does not swallow a cell there.
-  constexpr double farthest_mm = 1e6;
-  BoundingBox box;
-  const auto include = [&](const glm::dvec2& p, double width_mm) {
-    // Written so that NaN is refused.
-    if (!(std::abs(p.x) <= farthest_mm && std::abs(p.y) <= farthest_mm && width_mm >= 0.0 &&
-          width_mm <= farthest_mm)) {
-      throw Error(
-          Fault::input,
-          fmt::format("shape '{}': point {},{} of a line {} mm wide: give coordinates within "
-                      "{} mm of 0 and a width that is not negative",
-                      shape.label, p.x, p.y, width_mm, farthest_mm));
-    }
-    box.take_in(p - width_mm / 2.0);
-    box.take_in(p + width_mm / 2.0);
-  };
-  for (const Shape::Stroke& stroke : shape.strokes) {
-    for (const glm::dvec2& p : stroke.points_mm) {
-      include(p, stroke.width_mm);
-    }
-  }
-  for (const std::vector<glm::dvec2>& polygon : shape.polygons) {
-    for (const glm::dvec2& p : polygon) {
-      include(p, 0.0);
-    }
-  }
-  return box;
-}
-
 /// A shape's displacement map convolved with a Gaussian point spread: 1 deep inside the shape, 0
 /// far from it, on a grid in the object frame.
 class DisplacementField {
@@ -62,11 +32,7 @@ class DisplacementField {
   /// @throws Error on a point that is not finite or more than 1 km from the origin, or a shape
   /// without area
   DisplacementField(const Shape& shape, double psf_mm) {
-    const BoundingBox box = bounds(shape);
-    if (!(box.lower.x < box.upper.x && box.lower.y < box.upper.y)) {
-      throw Error(Fault::input,
-                  fmt::format("shape '{}': covers no area, so it cannot be touched", shape.label));
-    }
+    const BoundingBox box = bounds_of(shape);
     const glm::dvec2 extent = box.extent() + 2.0 * reach * psf_mm;
     // Cells of 0.1 mm suffice for this sensor. They are larger where a large shape would need more
     // than 2000 x 2000 cells, or where the point spread hides smaller ones.

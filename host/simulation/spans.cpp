@@ -4,7 +4,10 @@
 #include <cmath>
 #include <limits>
 
+#include <fmt/format.h>
 #include <glm/geometric.hpp>
+
+#include "palpate/error.hpp"
 
 namespace palpate {
 
@@ -68,6 +71,51 @@ void add_polygons(const std::vector<std::vector<glm::dvec2>>& polygons, double y
 }
 
 }  // namespace
+
+bool encloses_area(const std::vector<glm::dvec2>& polygon) {
+  for (std::size_t i = 2; i < polygon.size(); ++i) {
+    const glm::dvec2 a = polygon[i - 1] - polygon[0];
+    const glm::dvec2 b = polygon[i] - polygon[0];
+    if (a.x * b.y != a.y * b.x) {
+      return true;
+    }
+  }
+  return false;
+}
+
+BoundingBox bounds_of(const Shape& shape) {
+  BoundingBox box;
+  const auto include = [&](const glm::dvec2& p, double width_mm) {
+    // Written so that NaN is refused. 1 km is far beyond any object, yet rounding does not swallow
+    // a cell there.
+    if (!(std::abs(p.x) <= most_length_mm && std::abs(p.y) <= most_length_mm && width_mm >= 0.0 &&
+          width_mm <= most_length_mm)) {
+      throw Error(
+          Fault::input,
+          fmt::format("shape '{}': point {},{} of a line {} mm wide: give coordinates within "
+                      "{} mm of 0 and a width that is not negative",
+                      shape.label, p.x, p.y, width_mm, most_length_mm));
+    }
+    box.take_in(p - width_mm / 2.0);
+    box.take_in(p + width_mm / 2.0);
+  };
+  for (const Shape::Stroke& stroke : shape.strokes) {
+    for (const glm::dvec2& p : stroke.points_mm) {
+      include(p, stroke.width_mm);
+    }
+  }
+  for (const std::vector<glm::dvec2>& polygon : shape.polygons) {
+    for (const glm::dvec2& p : polygon) {
+      include(p, 0.0);
+    }
+  }
+  if (!(box.lower.x < box.upper.x && box.lower.y < box.upper.y) ||
+      (shape.strokes.empty() && std::ranges::none_of(shape.polygons, encloses_area))) {
+    throw Error(Fault::input,
+                fmt::format("shape '{}': covers no area, so it cannot be touched", shape.label));
+  }
+  return box;
+}
 
 std::vector<Span> spans(const Shape& shape, double y_mm) {
   std::vector<Span> found;

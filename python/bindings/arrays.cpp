@@ -153,9 +153,10 @@ std::optional<Bytes> ArrayReader::valid(nb::handle readings, const std::optional
   return flags(given ? call("numpy", "logical_and", given->object, known) : known, "valid", shape);
 }
 
-Bytes ArrayReader::flags(nb::handle object, const char* name, Shape shape, Shape longer) {
+Bytes ArrayReader::flags(nb::handle object, const char* name, Shape shape, Shape longer,
+                         const char* wanted) {
   refuse_masked(object, name);
-  const nb::object array = as_array(object, name, "biu", "booleans, False for a dead element");
+  const nb::object array = as_array(object, name, "biu", wanted);
   const bool bytes = nb::cast<std::string>(array.attr("dtype").attr("name")) == "uint8";
   return checked<std::uint8_t>(with_layout(array, bytes ? "uint8" : "bool").attr("view")("uint8"),
                                name, shape, longer);

@@ -76,7 +76,9 @@ class ArrayReader {
   std::optional<Bytes> valid(nb::handle readings, const std::optional<ArrayLike>& valid,
                              Shape shape);
   /// Booleans, or integers that are 0 or not.
-  Bytes flags(nb::handle object, const char* name, Shape shape, Shape longer = {});
+  /// @param wanted what the message asks for where the array holds anything else
+  Bytes flags(nb::handle object, const char* name, Shape shape, Shape longer = {},
+              const char* wanted = "booleans, False for a dead element");
   Counts counts(nb::handle object, const char* name, Shape shape);
   /// What a letter stands for by now.
   std::size_t extent(const std::string& letter) const { return extents_.at(letter).value; }

@@ -8,6 +8,7 @@
 #include "estimate.hpp"
 #include "estimation/maps/left_out_fit.hpp"
 #include "palpate/balanced_lattice.hpp"
+#include "palpate/drawn_map.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
 #include "palpate/map_builder.hpp"
@@ -39,13 +40,91 @@ nb::object cells_or_none(const OccupancyGrid& map, const std::vector<float>& cel
   return cells.empty() ? nb::none() : nb::object(view_cells(map, cells));
 }
 
+/// The polygons of one array [n, 2], or of several.
+std::vector<std::vector<glm::dvec2>> polygons_of(const ArrayLike& object) {
+  const bool several = nb::isinstance<nb::sequence>(object) && nb::len(object) > 0 &&
+                       nb::cast<int>(call("numpy", "ndim", object[0])) == 2;
+  std::vector<std::vector<glm::dvec2>> polygons;
+  if (!several) {
+    polygons.push_back(points_of(object, "polygon"));
+  }
+  for (std::size_t i = 0; several && i < nb::len(object); ++i) {
+    polygons.push_back(points_of(object[i], fmt::format("polygon[{}]", i).c_str()));
+  }
+  for (std::size_t i = 0; i < polygons.size(); ++i) {
+    if (polygons[i].size() < 3) {
+      throw Error(Fault::input,
+                  fmt::format("polygon {} of {} vertices: give at least 3", i, polygons[i].size()));
+    }
+  }
+  return polygons;
+}
+
+void bind_drawn_maps(nb::class_<OccupancyGrid>& grid) {
+  const DrawnMapOptions usual;
+  grid.def_static(
+      "from_mask",
+      [](const std::string& label, const ArrayLike& mask, double pixel_mm,
+         const ArrayLike& origin_mm, double cell_mm, double spread_mm, double peak, double prior,
+         double felt_share, double reach_mm) {
+        ArrayReader reader;
+        Mask drawn{.pixel_mm = pixel_mm, .origin_mm = point_of(origin_mm, "origin_mm")};
+        drawn.occupied =
+            reader.flags(mask, "mask", {"rows", "columns"}, {}, "booleans, True where occupied")
+                .copied<std::uint8_t>();
+        drawn.rows = reader.extent("rows");
+        drawn.columns = reader.extent("columns");
+        const DrawnMapOptions options{cell_mm, spread_mm, peak, prior, felt_share, reach_mm};
+        return run(
+            [=, drawn = std::move(drawn)](Call&) { return drawn_map(label, drawn, options); });
+      },
+      "label"_a, "mask"_a, nb::kw_only(), "pixel_mm"_a, "origin_mm"_a, "cell_mm"_a = usual.cell_mm,
+      "spread_mm"_a = usual.spread_mm, "peak"_a = usual.peak, "prior"_a = usual.prior,
+      "felt_share"_a = usual.felt_share, "reach_mm"_a = usual.reach_mm,
+      "The map of an object from a drawing of it, without touches.\n\n"
+      "mask [rows, columns]: booleans, True where the object is. Pixel (j, i) is a square of\n"
+      "pixel_mm centred at origin_mm + pixel_mm * (i, j) in the object frame: rows lie along +y,\n"
+      "so that a picture, whose first row is its top, is given as picture[::-1]. origin_mm [2]:\n"
+      "the centre of pixel (0, 0). cell_mm: edge of the map's cells. spread_mm: how soft edges\n"
+      "are, half the standard deviation of the sensor's point spread, by default that of touched\n"
+      "maps. peak: how sure the drawing is: log odds lie within log(peak / (1 - peak)), by\n"
+      "default 6.9 nats. prior: probability that a place beyond the map is occupied. felt_share:\n"
+      "share of an element's point spread on the object from which on it feels the object; by\n"
+      "default 0.2, so that the object is 1.7 spreads larger all around, as touched maps have it;\n"
+      "0.5 leaves outlines where they are drawn. reach_mm: largest distance of an element from\n"
+      "the array's centre, by default the 6 x 6 DigiTacts region's; the map ends\n"
+      "2 reach_mm + 4 spread_mm around the object.\n\n"
+      "Raises Error on a mask that is not two-dimensional and of booleans, a mask without an\n"
+      "occupied pixel, and numbers out of range.");
+  grid.def_static(
+      "from_polygon",
+      [](const std::string& label, const ArrayLike& polygon, double cell_mm, double spread_mm,
+         double peak, double prior, double felt_share, double reach_mm) {
+        const DrawnMapOptions options{cell_mm, spread_mm, peak, prior, felt_share, reach_mm};
+        Shape shape{.label = label, .strokes = {}, .polygons = polygons_of(polygon)};
+        return run([=, shape = std::move(shape)](Call&) {
+          options.validate();
+          return drawn_map(label, mask_of(shape, options.cell_mm / pixels_of_cell), options);
+        });
+      },
+      "label"_a, "polygon"_a, nb::kw_only(), "cell_mm"_a = usual.cell_mm,
+      "spread_mm"_a = usual.spread_mm, "peak"_a = usual.peak, "prior"_a = usual.prior,
+      "felt_share"_a = usual.felt_share, "reach_mm"_a = usual.reach_mm,
+      "The map of an object from its outline, without touches.\n\n"
+      "polygon [n, 2]: vertices in mm in the object frame, n at least 3, or a sequence of such\n"
+      "arrays, which the even-odd rule fills: a polygon within another is a hole. The others as\n"
+      "from_mask() has them.\n\n"
+      "Raises Error on a polygon that is not [n, 2], has fewer than 3 vertices or covers no area,\n"
+      "and on numbers out of range.");
+}
+
 void bind_map(nb::module_& module) {
-  nb::class_<OccupancyGrid>(
+  nb::class_<OccupancyGrid> grid(
       module, "OccupancyGrid",
       "The map of one object: log odds of occupancy, in nats, on a grid in the object frame. Cell\n"
       "(j, i) is centred at origin_mm + cell_mm * (i, j). Beyond the grid everything holds the\n"
-      "prior.")
-      .def(
+      "prior.");
+  grid.def(
           "__init__",
           [](OccupancyGrid* self, const std::string& label, const ArrayLike& log_odds,
              double cell_mm, const ArrayLike& origin_mm, double prior, int symmetry,
@@ -93,6 +172,7 @@ void bind_map(nb::module_& module) {
               "Of the sensor model that built the map, or None.")
       .def_ro("suggested_symmetry", &OccupancyGrid::suggested_symmetry,
               "The symmetry that the map itself shows; None where it was not measured.")
+      .def_ro("drawn", &OccupancyGrid::drawn, "It is of a drawing, not of touches.")
       .def_prop_ro("T_learned_robot_object", array_of(&OccupancyGrid::T_learned_robot_object),
                    "[3], the object frame in the robot frame of the touches that it was learned\n"
                    "from: mm, mm, rad.")
@@ -129,6 +209,7 @@ void bind_map(nb::module_& module) {
         return fmt::format("OccupancyGrid('{}', {} x {} cells of {:g} mm, prior {:.3g})",
                            self.label, self.nx, self.ny, self.cell_mm, self.prior);
       });
+  bind_drawn_maps(grid);
   module.def(
       "read_map",
       [](const PathLike& file) {

@@ -68,7 +68,7 @@ in_root cmake -S /source -B /build -G Ninja -DCMAKE_BUILD_TYPE=Release -DCMAKE_U
   -DCMAKE_C_COMPILER=aarch64-linux-gnu-gcc -DCMAKE_CXX_COMPILER=aarch64-linux-gnu-g++ \
   -DCMAKE_LIBRARY_ARCHITECTURE=aarch64-linux-gnu \
   -DCMAKE_CROSSCOMPILING_EMULATOR=/usr/bin/qemu-aarch64-static \
-  -DPALPATE_BENCH=OFF -DPALPATE_WERROR=ON -DPALPATE_TESTS=ON --log-level=WARNING
+  -DPALPATE_BENCH=OFF -DPALPATE_SVG=OFF -DPALPATE_WERROR=ON -DPALPATE_TESTS=ON --log-level=WARNING
 in_root cmake --build /build --target "${programs[@]}"
 # Validation would check the same calls as it does on the machine's own processor.
 in_root env GTEST_BRIEF=1 PALPATE_VALIDATION=0 \

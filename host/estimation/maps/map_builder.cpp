@@ -171,6 +171,11 @@ class AreaShare {
 };
 
 OccupancyGrid built(Device& device, const OccupancyGrid& map, double prior) {
+  if (map.drawn) {
+    OccupancyGrid same = map;
+    same.prior = prior;
+    return same;
+  }
   if (!map.source) {
     throw Error(Fault::input,
                 fmt::format("map '{}': it holds no touches to build it from again; build it anew",
@@ -188,6 +193,9 @@ OccupancyGrid built(Device& device, const OccupancyGrid& map, double prior) {
 
 OccupancyGrid with_prior(Device& device, const OccupancyGrid& map, double prior) {
   const OccupancyGrid other = built(device, map, prior);
+  if (map.drawn) {
+    return other;
+  }
   if (other.nx != map.nx || other.ny != map.ny) {
     throw Error(
         Fault::input,

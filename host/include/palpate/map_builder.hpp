@@ -85,8 +85,8 @@ struct MapSource {
 /// MapBuilder does
 PALPATE_API OccupancyGrid with_prior(Device& device, const OccupancyGrid& map, double prior);
 
-/// Estimates p(m) as estimate_prior() does, from the sources of maps.
-/// @throws Error where a map has no source, and as MapBuilder does
+/// Estimates p(m) as estimate_prior() does, from the sources of maps and the cells of drawn ones.
+/// @throws Error where a map that is not drawn has no source, and as MapBuilder does
 PALPATE_API double pooled_prior(Device& device, std::span<const OccupancyGrid> maps);
 
 /// Estimates p(m) as in the paper: occupied area over modelled area, pooled over all objects. The

@@ -16,6 +16,7 @@
 #include "palpate/contact_model.hpp"
 #include "palpate/device.hpp"
 #include "palpate/displacement.hpp"
+#include "palpate/drawn_map.hpp"
 #include "palpate/error.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/files.hpp"
