@@ -6,7 +6,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <iterator>
+#include <map>
 #include <numeric>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -136,15 +138,29 @@ std::vector<std::size_t> places_of(std::span<const TouchEvidence> touches, std::
   constexpr double near_mm = 1.0;
   std::vector<std::size_t> place;
   std::vector<glm::dvec2> places_mm;
+  std::map<std::pair<std::int64_t, std::int64_t>, std::vector<std::size_t>> in_cell;
   for (const TouchEvidence& touch : touches) {
     const glm::dvec2 middle_mm = touch.middle_mm();
-    const auto at = std::ranges::find_if(places_mm, [&](const glm::dvec2& place_mm) {
-      return glm::distance(place_mm, middle_mm) < near_mm;
-    });
-    place.push_back(static_cast<std::size_t>(at - places_mm.begin()));
-    if (at == places_mm.end()) {
-      places_mm.push_back(middle_mm);
+    const auto column = static_cast<std::int64_t>(std::floor(middle_mm.x / near_mm));
+    const auto row = static_cast<std::int64_t>(std::floor(middle_mm.y / near_mm));
+    std::optional<std::size_t> at;
+    for (std::int64_t i = 0; i < 9; ++i) {  // the cell's own places, and its neighbours'
+      const auto found = in_cell.find({column + i / 3 - 1, row + i % 3 - 1});
+      if (found == in_cell.end()) {
+        continue;
+      }
+      for (const std::size_t one : found->second) {
+        if (glm::distance(places_mm[one], middle_mm) < near_mm && (!at || one < *at)) {
+          at = one;
+        }
+      }
     }
+    if (!at) {
+      at = places_mm.size();
+      places_mm.push_back(middle_mm);
+      in_cell[{column, row}].push_back(*at);
+    }
+    place.push_back(*at);
   }
   if (places_mm.size() < least) {
     std::iota(place.begin(), place.end(), std::size_t{0});
