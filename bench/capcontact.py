@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import palpate
@@ -32,7 +33,7 @@ from .program import Json, begin, main, parser, write
 from .trials import Floats, truth_of
 
 SEED = 700_000_000
-OBJECTS = 12  # of a round
+OBJECTS, QUICK_OBJECTS = 12, 4  # of a round
 WINDOWS = (1, 2, 3, 5)
 ROUNDS = 20
 SENSORS = {"eq7": "Eq. 7", "learned": "learned"}
@@ -89,10 +90,11 @@ class Trial(NamedTuple):
     T_robot_object: Floats
 
     def touches(self, registration: Registration) -> palpate.Recording:
-        return touched(self.press, self.windows, registration, self.T_robot_object, self.label)  # type: ignore[arg-type]
+        pose = self.T_robot_object.tolist()
+        return touched(self.press, self.windows, registration, pose, self.label)
 
 
-def draw_round(presses: Sequence[Press], random: numpy.random.Generator) -> list[Trial]:
+def draw_round(presses: Sequence[Press], objects: int, random: numpy.random.Generator) -> list[Trial]:
     """Presses that differ, at random poses in the plane."""
     return [
         Trial(
@@ -101,7 +103,7 @@ def draw_round(presses: Sequence[Press], random: numpy.random.Generator) -> list
             presses[k].windows(random, max(WINDOWS)),
             random.uniform((-10.0, -10.0, -math.pi), (10.0, 10.0, math.pi)),
         )
-        for k in random.permutation(len(presses))[:OBJECTS]
+        for k in random.permutation(len(presses))[:objects]
     ]
 
 
@@ -160,7 +162,7 @@ def summary(scores: Sequence[Json]) -> Json:
     return record
 
 
-def draw_errors(scores: Json, axes: Any) -> None:
+def draw_errors(scores: Json, axes: Axes) -> None:
     """Median errors of the place against windows, with bands that hold the middle 80 %."""
     for name, colour in zip(SENSORS, charts.COLOURS, strict=False):
         errors = [[one["error_mm"] for one in scores[name][n] if one["right"]] for n in WINDOWS]
@@ -175,29 +177,28 @@ def draw_errors(scores: Json, axes: Any) -> None:
     axes.legend(loc="upper right")
 
 
-def draw_press(trial: Trial, steps: Sequence[Json], windows: int, presses: Json, axes: Any) -> None:
+def draw_press(trial: Trial, step: Json, windows: int, presses: dict[str, Press], axes: Axes) -> None:
     """The readings of some windows where they lie, the true contact, and the modes of the belief."""
-    touches = trial.touches(AS_BUILT)[:windows]
-    for touch in touches:
-        places = palpate.transform(touch.T_robot_sensor, touch.elements_mm)
-        drawn = axes.scatter(*places.T, c=touch.pressure, s=9, marker="s", cmap="viridis", vmin=0.0, vmax=500.0)
-        drawn.set_rasterized(True)
 
     def outline(press: Press, pose: Any, **style: Any) -> None:
-        x, y = (PIXEL_MM * numpy.arange(n) - c for n, c in zip(press.contact.shape[::-1], press.centroid_mm, strict=True))
-        grid = numpy.stack(numpy.meshgrid(x, y), axis=-1)
-        moved = palpate.transform(pose, grid.reshape(-1, 2)).reshape(grid.shape)
-        axes.contour(moved[..., 0], moved[..., 1], press.contact, levels=[0.5], **style)
+        rows, columns = press.contact.shape
+        pixels = numpy.stack(numpy.meshgrid(numpy.arange(columns), numpy.arange(rows)), axis=-1)
+        in_object = PIXEL_MM * pixels.reshape(-1, 2) - press.centroid_mm
+        x, y = palpate.transform(pose, in_object).T.reshape(2, rows, columns)
+        axes.contour(x, y, press.contact, levels=[0.5], **style)
 
-    for mode in reversed(steps[windows - 1]["modes"]):
-        style = {"colors": [charts.COLOURS[1]], "alpha": max(mode["probability"], 0.08), "linewidths": 2.0}
-        outline(presses[mode["object"]], mode["T_robot_object"], **style)
+    touches = trial.touches(AS_BUILT)[:windows]
+    places = [palpate.transform(pose, touches.elements_mm) for pose in touches.T_robot_sensor]
+    x, y = numpy.concatenate(places).T
+    axes.scatter(x, y, c=touches.pressure.ravel(), s=12, marker="s", cmap="Blues", vmin=-100.0, vmax=600.0)
+    for mode in reversed(step["modes"]):
+        style: Json = {"colors": [charts.COLOURS[1]], "linewidths": 2.0}
+        outline(
+            presses[mode["object"]], mode["T_robot_object"], alpha=max(mode["probability"], 0.1), **style
+        )
     outline(trial.press, trial.T_robot_object, colors="black", linewidths=1.0, linestyles="dashed")
-    named = "window" if windows == 1 else "windows"
-    axes.set_title(f"After {windows} {named}: contact (dashed), modes (orange)")
-    axes.set(xlabel="x, mm", ylabel="y, mm", aspect="equal")
-    reach = 1.2 * numpy.abs(palpate.transform(trial.T_robot_object, PIXEL_MM * numpy.argwhere(trial.press.contact)[:, ::-1] - trial.press.centroid_mm)).max() + 15.0
-    axes.set(xlim=(-reach, reach), ylim=(-reach, reach))
+    axes.set_title(f"{windows} of 5 windows: readings (blue), contact (dashed), modes (orange)")
+    axes.set(xlabel="x, mm", ylabel="y, mm", aspect="equal", xlim=(-130, 130), ylim=(-130, 130))
     axes.grid(visible=False)
 
 
@@ -217,32 +218,39 @@ def program() -> None:
     held_out = folder / "held_out.npz"
     training = read_presses(folder / "presses.npz")
     tried = read_presses(held_out) if held_out.exists() else training
-    if len(tried) < OBJECTS:
-        raise palpate.Error(f"--data {folder}: {len(tried)} presses; give {OBJECTS} or more")
+    objects = QUICK_OBJECTS if options.quick else OBJECTS
+    if len(tried) < objects:
+        raise palpate.Error(f"--data {folder}: {len(tried)} presses; give {objects} or more")
     device, facts = begin(options, f"{len(tried)} presses of fingers on a capacitive array")
     rounds = options.trials or (1 if options.quick else ROUNDS)
     random = numpy.random.default_rng(SEED)
-    shifts = find_shifts(device, training, random, 2 if options.quick else 6)
+    shifts = find_shifts(device, training, random, 6)
     scores: dict[str, dict[int, list[Json]]] = {name: {n: [] for n in WINDOWS} for name in SENSORS}
     example: Any = None
     with tempfile.TemporaryDirectory() as name:
-        people = {None} if tried is not training else {press.person for press in tried}
+        # Of people whose presses are held out, nothing was learned.
+        without = {press.person: None if held_out.exists() else press.person for press in tried}
         learned = {
             person: learn(
                 device, training, shifts, person, pathlib.Path(name, f"{person}.yaml"), quick=options.quick
             )
-            for person in sorted(people, key=str)
+            for person in set(without.values())
         }
         for _ in range(rounds):
-            trials = draw_round(tried, random)
+            trials = draw_round(tried, objects, random)
             grids = [trial.press.grid(trial.label) for trial in trials]
             for trial in trials:
-                own = learned[trial.press.person if None not in learned else None]
+                own = learned[without[trial.press.person]]
                 for sensor in SENSORS:
-                    eq7 = sensor == "eq7"
-                    model: Json = {"threshold": THRESHOLD, "ratio": RATIO} if eq7 else {"sensor_model": own.sensor}
-                    touches = trial.touches(AS_BUILT if eq7 else own.registration)
-                    (record,) = palpate.recognize(touches, grids, trace=True, none=0.0, device=device, **model)
+                    if sensor == "eq7":
+                        touches = trial.touches(AS_BUILT)
+                        model: Any = {"threshold": THRESHOLD, "ratio": RATIO}
+                    else:
+                        touches = trial.touches(own.registration)
+                        model = {"sensor_model": own.sensor}
+                    (record,) = palpate.recognize(
+                        touches, grids, trace=True, none=0.0, device=device, **model
+                    )
                     for n in WINDOWS:
                         scores[sensor][n].append(score(record["trace"][n - 1], trial, random))
                 if example is None and scores["learned"][5][-1]["right"]:
@@ -264,7 +272,7 @@ def program() -> None:
         first, *others = figure.subplots(1, 3)
         draw_errors(scores, first)
         for windows, axes in zip((1, 5), others, strict=True):
-            draw_press(example[0], example[1], windows, example[2], axes)
+            draw_press(example[0], example[1][windows - 1], windows, example[2], axes)
         write(pathlib.Path(options.plots, "capcontact.png"), charts.image(figure, "png", dpi=100))
 
 

@@ -61,7 +61,7 @@ class Press(NamedTuple):
         )
 
     def windows(self, random: numpy.random.Generator, count: int) -> Ints:
-        """The first elements (row, column) [count, 2] of windows that lie over the contact and in the sheet."""
+        """The first elements (row, column) [count, 2] of windows over the contact, in the sheet."""
         points = numpy.argwhere(self.contact)
         drawn: list[Ints] = []
         while len(drawn) < count:
@@ -74,7 +74,11 @@ class Press(NamedTuple):
 
 def read_presses(path: pathlib.Path) -> list[Press]:
     """The presses of a file of numpy.savez: `capacitance`, `mask_bits` and `participant`."""
-    shapes = {"capacitance": (ROWS, COLUMNS), "mask_bits": (ROWS * COLUMNS * PIXELS**2 // 8,), "participant": ()}
+    shapes: dict[str, tuple[int, ...]] = {
+        "capacitance": (ROWS, COLUMNS),
+        "mask_bits": (ROWS * COLUMNS * PIXELS**2 // 8,),
+        "participant": (),
+    }
     try:
         with numpy.load(path) as file:
             arrays = {name: file[name] for name in shapes}
@@ -88,9 +92,11 @@ def read_presses(path: pathlib.Path) -> list[Press]:
                 f"{path}: {name} has the shape {arrays[name].shape}; give {('n', *shape)}"
             )
     contact = numpy.unpackbits(arrays["mask_bits"], axis=1).astype(bool)
+    masks = contact.reshape(-1, ROWS * PIXELS, COLUMNS * PIXELS)
+    of_presses = zip(arrays["capacitance"], masks, arrays["participant"], strict=True)
     return [
-        Press(readings.astype(float), mask.reshape(ROWS * PIXELS, COLUMNS * PIXELS), int(person))
-        for readings, mask, person in zip(arrays["capacitance"], contact, arrays["participant"], strict=True)
+        Press(readings.astype(float), mask, int(person))
+        for readings, mask, person in of_presses
         if mask.any()
     ]
 
@@ -113,10 +119,10 @@ class Registration(NamedTuple):
     def poses(self, windows: Ints) -> Floats:
         """Poses of windows in the sheet [n, 3]: the middle's, turned as the shift turns about it."""
         middles = windows[:, ::-1] + (WINDOW - 1) / 2.0
-        places_mm = PITCH_MM * middles + (PIXELS - 1) / 2.0 * PIXEL_MM
+        places_mm: Floats = PITCH_MM * middles + (PIXELS - 1) / 2.0 * PIXEL_MM
         x, y = (
-            self.shift_mm(places_mm + step) - self.shift_mm(places_mm - step)
-            for step in (numpy.array([0.5, 0.0]), numpy.array([0.0, 0.5]))
+            self.shift_mm(numpy.add(places_mm, step)) - self.shift_mm(numpy.subtract(places_mm, step))
+            for step in ((0.5, 0.0), (0.0, 0.5))
         )
         return numpy.column_stack([places_mm - self.shift_mm(places_mm), (y[:, 0] - x[:, 1]) / 2.0])
 
@@ -144,10 +150,13 @@ def touched(
 
 
 def placed(
-    device: palpate.Device, touches: palpate.Recording, grid: palpate.OccupancyGrid, sensor: pathlib.Path | None
+    device: palpate.Device,
+    touches: palpate.Recording,
+    grid: palpate.OccupancyGrid,
+    sensor: pathlib.Path | None,
 ) -> palpate.Record:
     """Where touches of an object that is at the robot's origin are found, within 8 mm and 8 degrees."""
-    model = {"threshold": THRESHOLD, "ratio": RATIO} if sensor is None else {"sensor_model": sensor}
+    model: Any = {"threshold": THRESHOLD, "ratio": RATIO} if sensor is None else {"sensor_model": sensor}
     (record,) = palpate.recognize(
         touches, grid, bins=(25, 25, 13), x_mm=(-8.0, 8.0), y_mm=(-8.0, 8.0), theta_deg=(-8.0, 8.0),
         none=0.0, device=device, **model,
@@ -203,15 +212,15 @@ def learn_sensor(
 ) -> None:
     """Writes the sensor that ten of the presses tell, 15 windows each, on their drawn maps.
 
-    Its `pose_scale` is that of the errors of 2 and of 5 windows of all presses. quick: with three presses,
-    and sure of poses nearby alone.
+    Its `pose_scale` is that of the errors of 2 and of 5 windows of all presses. quick: from six windows of
+    three presses, tried at poses nearby alone.
     """
-    most = 3 if quick else 10
+    most, each = (3, 6) if quick else (10, 15)
     near: Any = {"bins": (8, 8, 8), "x_mm": (-8.0, 8.0), "y_mm": (-8.0, 8.0), "theta_deg": (-8.0, 8.0)}
     chosen = random.permutation(len(presses))[:most]
     grids = [presses[k].grid(f"learned {k}") for k in chosen]
     touches = [
-        touched(presses[k], presses[k].windows(random, 15), registration, label=grid.label)
+        touched(presses[k], presses[k].windows(random, each), registration, label=grid.label)
         for k, grid in zip(chosen, grids, strict=True)
     ]
     calibration = palpate.calibrate(

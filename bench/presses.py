@@ -31,8 +31,10 @@ COLUMNS: list[Column] = [
 def together(records: Sequence[Json]) -> dict[str, float]:
     """What presses of one object say of its label: each lies at a pose of its own."""
     labels = list(records[0]["identity"])
-    logs = sum(numpy.log([max(record["identity"][label], LEAST) for label in labels]) for record in records)
-    p = numpy.exp(logs - numpy.max(logs))
+    logs = numpy.log(
+        [[max(record["identity"][label], LEAST) for label in labels] for record in records]
+    ).sum(axis=0)
+    p = numpy.exp(logs - logs.max())
     return dict(zip(labels, (p / p.sum()).tolist(), strict=True))
 
 
@@ -75,7 +77,8 @@ def program() -> None:
     rows: list[Json] = []
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
-        learned, tried = [], []
+        learned: list[str] = []
+        tried: list[str] = []
         for recording in recordings:
             label = recording.object
             pose = recording.T_robot_sensor

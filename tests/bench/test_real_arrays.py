@@ -35,7 +35,8 @@ def write_presses(path: pathlib.Path, people: int, each: int) -> None:
     turns = numpy.linspace(0.0, 2.0 * math.pi, 24, endpoint=False)
     sheet_mm = numpy.stack(numpy.meshgrid(numpy.arange(COLUMNS), numpy.arange(ROWS)), axis=-1)
     places_mm = PITCH_MM * sheet_mm.reshape(-1, 2) + 3.5 * PIXEL_MM
-    pixels_mm = PIXEL_MM * numpy.stack(numpy.meshgrid(numpy.arange(8 * COLUMNS), numpy.arange(8 * ROWS)), axis=-1)
+    pixels = numpy.meshgrid(numpy.arange(8 * COLUMNS), numpy.arange(8 * ROWS))
+    pixels_mm = PIXEL_MM * numpy.stack(pixels, axis=-1)
     readings = numpy.zeros((count, ROWS * COLUMNS))
     contact = numpy.zeros((count, 8 * ROWS, 8 * COLUMNS), bool)
     for finger, axes_mm in enumerate(((7.0, 4.0), (5.0, 5.0), (9.0, 4.0))):
@@ -53,7 +54,7 @@ def write_presses(path: pathlib.Path, people: int, each: int) -> None:
             seed=finger + 1,
             sensor=palpate.SensorModel(psf_mm=3.0, element_mm=4.7),
         )
-        readings += 25.0 * touches.pressure
+        readings += 45.0 * touches.pressure
         for press, pose in enumerate(fingers):
             inside = palpate.transform(palpate.inverse(pose), pixels_mm.reshape(-1, 2)) / axes_mm
             contact[press] |= (numpy.hypot(*inside.T) < 1.0).reshape(contact[press].shape)
@@ -114,15 +115,15 @@ def test_the_scale_of_poses_is_what_errors_have() -> None:
 
 
 def test_presses_are_recognised(data: pathlib.Path, tmp_path: pathlib.Path) -> None:
-    # Takes some twenty seconds: a sensor is learned without each of the two people.
+    # Takes longer than most: a sensor is learned without each of the two people.
     plots = tmp_path / "plots"
     program = Program(tmp_path, "bench.capcontact", "--quick", "--data", data, "--plots", plots)
     eq7, learned = (program.document[name]["windows"] for name in ("eq7", "learned"))
     assert set(eq7) == set(learned) == {"1", "2", "3", "5"}
     assert learned["5"]["recognised"] > 0.7
     assert learned["5"]["median_mm"] < 1.0 and learned["5"]["median_deg"] < 1.5
-    assert max(map(abs, learned["5"]["bias_mm"])) < 0.5
-    assert eq7["5"]["bias_mm"] == pytest.approx(SHIFT_MM, abs=0.5)
+    assert math.hypot(*learned["5"]["bias_mm"]) < 0.7
+    assert math.hypot(*eq7["5"]["bias_mm"]) > 1.0, "the readings lie beside the contact"
     assert 0.0 <= learned["5"]["coverage_68"] <= learned["5"]["coverage_95"] <= 1.0
     assert (plots / "capcontact.png").stat().st_size > 10_000
 
