@@ -162,19 +162,18 @@ def summary(scores: Sequence[Json]) -> Json:
     return record
 
 
-def draw_errors(scores: Json, axes: Axes) -> None:
+def draw_errors(scores: Json) -> Figure:
     """Median errors of the place against windows, with bands that hold the middle 80 %."""
+    axes = charts.chart("windows", "error of the place of recognised unknowns, mm", yscale="log")
     for name, colour in zip(SENSORS, charts.COLOURS, strict=False):
         errors = [[one["error_mm"] for one in scores[name][n] if one["right"]] for n in WINDOWS]
-        low, median, high = numpy.array(
-            [numpy.quantile(of, (0.1, 0.5, 0.9)) if of else [math.nan] * 3 for of in errors]
-        ).T
+        bands = [numpy.quantile(of, (0.1, 0.5, 0.9)) if of else [math.nan] * 3 for of in errors]
+        low, median, high = numpy.array(bands).T
         axes.fill_between(WINDOWS, low, high, color=colour, alpha=0.15, linewidth=0)
-        axes.plot(WINDOWS, median, color=colour, label=SENSORS[name])
-    axes.axhline(2.0, color=charts.GREY, linestyle=":", linewidth=1.0)
-    axes.set(xlabel="windows", ylabel="error of the place, mm", yscale="log", xticks=WINDOWS)
-    axes.set_title("Recognised unknowns: median, and the middle 80 %")
-    axes.legend(loc="upper right")
+        axes.plot(WINDOWS, median, color=colour, label=f"{SENSORS[name]}: median, middle 80 %")
+    axes.set_xticks(WINDOWS)
+    charts.rule(axes, 2.0, "2 mm")
+    return charts.finished(axes)
 
 
 def draw_press(trial: Trial, step: Json, windows: int, presses: dict[str, Press], axes: Axes) -> None:
@@ -209,7 +208,7 @@ def program() -> None:
         "Recognises presses of several fingers on a real array among twelve, at random poses in the plane, "
         "from windows of 9 x 9 elements, in some twenty minutes on two CPU cores. Sensor and the array's "
         "place are learned without the person who is tried, or on presses.npz where there is held_out.npz.",
-        plots="draw the errors and a press with its belief in this folder",
+        plots="draw the errors, and a press with its belief, in this folder",
         trials="rounds of twelve presses [20, or 1 with --quick]",
     )
     flags.add_argument("--data", metavar="FOLDER", required=True, help="folder of presses.npz")
@@ -267,13 +266,13 @@ def program() -> None:
         ],
     )
     write(options.json, facts | document | {"unknowns": scores})
+    charts.save({"capcontact": draw_errors(scores)}, options.plots)
     if options.plots and example:
-        figure = Figure(figsize=(17.0, 5.4))
-        first, *others = figure.subplots(1, 3)
-        draw_errors(scores, first)
-        for windows, axes in zip((1, 5), others, strict=True):
-            draw_press(example[0], example[1][windows - 1], windows, example[2], axes)
-        write(pathlib.Path(options.plots, "capcontact.png"), charts.image(figure, "png", dpi=100))
+        trial, trace, presses = example
+        figure = Figure(figsize=(11.4, 5.4))
+        for windows, axes in zip((1, 5), figure.subplots(1, 2), strict=True):
+            draw_press(trial, trace[windows - 1], windows, presses, axes)
+        write(pathlib.Path(options.plots, "capcontact_press.png"), charts.image(figure, "png", dpi=100))
 
 
 if __name__ == "__main__":

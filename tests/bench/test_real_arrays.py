@@ -125,7 +125,8 @@ def test_presses_are_recognised(data: pathlib.Path, tmp_path: pathlib.Path) -> N
     assert math.hypot(*learned["5"]["bias_mm"]) < 0.7
     assert math.hypot(*eq7["5"]["bias_mm"]) > 1.0, "the readings lie beside the contact"
     assert 0.0 <= learned["5"]["coverage_68"] <= learned["5"]["coverage_95"] <= 1.0
-    assert (plots / "capcontact.png").stat().st_size > 10_000
+    program.expect_charts("capcontact")
+    assert (plots / "capcontact_press.png").stat().st_size > 10_000
 
 
 def test_what_is_no_data_is_refused(tmp_path: pathlib.Path) -> None:
