@@ -37,6 +37,7 @@ struct CalibrateArguments {
   CalibrationRequest request;
   Request recognition;  ///< bins, region and frames alone
   std::string png;
+  std::string write_array;
   std::string device;
 };
 
@@ -50,9 +51,29 @@ void check_outputs(const CalibrateArguments& options,
     files.reads("--maps", map);
   }
   files.writes("-o", options.output);
+  files.writes("--write-array", options.write_array);
   files.writes_in("--png", options.png, table_name);
   files.writes_in("--png", options.png, reliability_name);
   files.prepare();
+}
+
+/// The array of all recordings, where it sits in the tool. Throws Error where it changes.
+std::vector<glm::dvec2> corrected_array(const std::vector<Recording>& recordings,
+                                        const SensorCalibration& calibration) {
+  std::vector<glm::dvec2> elements_mm = recordings.front().elements_mm;
+  for (const Recording& recording : recordings) {
+    if (recording.elements_mm != elements_mm || elements_mm.size() != recording.elements()) {
+      refuse(recording.path,
+             "its array is not that of all touches; leave --write-array out, or calibrate from "
+             "recordings of one array");
+    }
+  }
+  if (calibration.array_offset) {
+    for (glm::dvec2& p : elements_mm) {
+      p = *calibration.array_offset->array_offset * p;
+    }
+  }
+  return elements_mm;
 }
 
 void calibrate(const CalibrateArguments& options) {
@@ -97,9 +118,15 @@ void calibrate(const CalibrateArguments& options) {
     make_folder(folder);
   }
   write_sensor_model(options.output, calibration.sensor);
+  if (!options.write_array.empty()) {
+    write_file(options.write_array, array_table(corrected_array(recordings, calibration)));
+  }
   fmt::print("{}",
              calibration_text(calibration, task.presses.size(), terminal_columns(STDOUT_FILENO)));
   std::ranges::for_each(calibration.warnings, tell_on_stderr);
+  if (calibration.array_offset && options.write_array.empty()) {
+    fmt::print("palpate calibrate --write-array FILE writes the corrected array\n");
+  }
   fmt::print("{}\n", options.output);
   for (const auto& [file, picture] : pictures) {
     write_file(file, picture);
@@ -124,8 +151,10 @@ void add_calibrate(CLI::App& app) {
       ->required();
   command->add_option("-o,--output", options->output, "Sensor model to write (YAML)")->required();
   command->add_option("--maps", options->maps,
-                      "Maps, or folders of maps, of the objects, built from other touches than "
-                      "these [default: maps of the touches themselves, each compared with maps "
+                      "Maps, or folders of maps, of the objects, from drawings, which also tell "
+                      "where the array sits in the tool, or built from other touches than "
+                      "these; the objects lie where the recordings' truth says, or where they were "
+                      "learned [default: maps of the touches themselves, each compared with maps "
                       "that were built without it]");
   command->add_flag("--unposed", options->request.unposed,
                     "The sensor's poses are unknown: find where each touch lies on the others. For "
@@ -169,6 +198,9 @@ void add_calibrate(CLI::App& app) {
                  "[default: 0,0 beside --bins]");
   add_frames_flag(*command, options->recognition.frames,
                   "Use the touches A to B - 1 of every recording, counted from 0, as A:B");
+  command->add_option("--write-array", options->write_array,
+                      "File for the array (CSV: x, y in mm), where drawn maps say that it sits in "
+                      "the tool, for --array of palpate import");
   command->add_option("--png", options->png,
                       "Folder for pictures: table.png, what elements read, and reliability.png, "
                       "accuracy over confidence before and after");

@@ -15,6 +15,7 @@
 #include "figures/palette.hpp"
 #include "figures/ticks.hpp"
 #include "learning/level_counts.hpp"
+#include "model/option_words.hpp"
 
 namespace palpate::cli {
 
@@ -210,6 +211,10 @@ std::string calibration_text(const SensorCalibration& calibration, std::size_t t
     text +=
         fmt::format("area under the curve of touches of known against left-out objects: {:.3f}\n",
                     *calibration.area_under_curve);
+  }
+  if (calibration.array_offset) {
+    text += in_flags(calibration.array_offset->words) +
+            fmt::format(" ({:.0f} nats)\n", calibration.array_offset->nats);
   }
   return text;
 }

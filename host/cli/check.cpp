@@ -60,14 +60,6 @@ std::string json_of(const SetupCheck& check) {
   return all.dump(2) + "\n";
 }
 
-std::string array_table(const SetupCheck& check) {
-  std::string text = "x,y\n";
-  for (const glm::dvec2& p : check.elements_mm) {
-    text += fmt::format("{},{}\n", p.x, p.y);
-  }
-  return text;
-}
-
 void check(const CheckArguments& options) {
   check_outputs(options);
   const std::vector<Recording> recordings = read_touch_recordings(options.recordings);
@@ -83,7 +75,7 @@ void check(const CheckArguments& options) {
     found = check_setup(device, recordings, maps, [&](double done) { progress.show(done); });
   }
   if (!options.write_array.empty()) {
-    write_file(options.write_array, array_table(found));
+    write_file(options.write_array, array_table(found.elements_mm));
   }
   if (options.json == "-") {
     fmt::print("{}", json_of(found));

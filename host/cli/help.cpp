@@ -26,7 +26,8 @@ struct Group {
 const std::vector<Group>& groups() {
   static const std::vector<Group> all{
       {"Bins and region", {"--bins", "--x-mm", "--y-mm", "--theta-deg", "--pivot-mm"}},
-      {"Likelihood", {"--prior", "--gamma", "--ratio", "--spread-mm", "--psf-mm", "--peak"}},
+      {"Likelihood",
+       {"--prior", "--gamma", "--ratio", "--spread-mm", "--psf-mm", "--peak", "--felt-share"}},
       {"Misplaced touches and slip",
        {"--touch-sd-mm", "--touch-sd-deg", "--slip-sd-mm", "--slip-sd-deg", "--fit-touch-sd"}},
       {"Filter",

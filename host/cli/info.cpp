@@ -213,9 +213,9 @@ void print_map(const std::string& path) {
   fmt::print("  origin            {:.3f}, {:.3f} mm, centre of cell (0, 0)\n", m.origin_mm.x,
              m.origin_mm.y);
   const Pose& frame = m.T_learned_robot_object;
-  fmt::print(
-      "  frame             {:.3f}, {:.3f} mm, {:.2f} deg in the robot frame of the touches\n",
-      frame.translation_mm.x, frame.translation_mm.y, degrees(frame.theta_rad));
+  fmt::print("  frame             {:.3f}, {:.3f} mm, {:.2f} deg in the {}\n",
+             frame.translation_mm.x, frame.translation_mm.y, degrees(frame.theta_rad),
+             m.drawn ? "drawing's frame" : "robot frame of the touches");
   if (m.spread_mm) {
     fmt::print("  spread            {} mm, standard deviation of the inverse sensor model\n",
                *m.spread_mm);

@@ -12,13 +12,14 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include "cli/map_drawing.hpp"
 #include "cli/map_flags.hpp"
+#include "cli/map_output.hpp"
 #include "cli/map_sensor.hpp"
 #include "cli/options.hpp"
 #include "cli/progress.hpp"
 #include "cli/recognition_flags.hpp"
 #include "estimation/maps/left_out_fit.hpp"
-#include "figures/figures.hpp"
 #include "io/file_summary.hpp"
 #include "learning/observed_map.hpp"
 #include "learning/press.hpp"
@@ -27,9 +28,7 @@
 #include "learning/touch_alignment.hpp"
 #include "model/option_words.hpp"
 #include "palpate/error.hpp"
-#include "palpate/files.hpp"
 #include "palpate/map_builder.hpp"
-#include "palpate/object_frame.hpp"
 #include "recognition/recordings.hpp"
 
 namespace palpate::cli {
@@ -43,47 +42,6 @@ void add_in_batches(MapBuilder& builder, std::span<const Touch> touches,
     builder.add(touches.subspan(begin, std::min(batch, touches.size() - begin)));
     progress(static_cast<double>(begin) / static_cast<double>(touches.size()));
   }
-}
-
-/// What the map says about the object's symmetry, and what --symmetry to give.
-std::string symmetry_words(const OccupancyGrid& map, const RotationalSymmetry& measured) {
-  const int n = measured.suggested;
-  const std::string given =
-      n == map.symmetry || (map.symmetry == 1 && !map.suggested_symmetry) ? ""
-      : n == 1 || map.symmetry != 1
-          ? fmt::format("; --symmetry {} was given", map.symmetry)
-          : fmt::format(
-                "; where touches do not tell them apart, recognition takes such turns as equal: "
-                "--symmetry {} always, --symmetry 1 never",
-                n);
-  if (n == 1) {
-    return fmt::format("{} looks different after every turn, by {:.2f} mm or more{}", map.label,
-                       measured.apart_mm[measured.nearest()], given);
-  }
-  return fmt::format("{} looks the same after {}, within {:.2f} mm{}", map.label,
-                     n == 0 ? "any turn" : fmt::format("every 1/{} of a turn", n),
-                     measured.apart_mm[n], given);
-}
-
-/// Settles the object's frame of a map that was learned in the robot's, or in a given one.
-void settle_frame(const ObjectOrigin& origin, OccupancyGrid& map) {
-  using Kind = ObjectOrigin::Kind;
-  map.T_learned_robot_object = origin.T_learned_robot_object;
-  if (origin.kind == Kind::centroid || (origin.kind == Kind::automatic && !holds_origin(map))) {
-    centre_frame(map);
-  }
-}
-
-/// Where the object frame lies.
-std::string frame_words(const OccupancyGrid& map) {
-  const Pose& frame = map.T_learned_robot_object;
-  const bool centred = map.centred_mm != glm::dvec2(0.0);
-  if (!centred && frame.translation_mm == glm::dvec2(0.0) && frame.theta_rad == 0.0) {
-    return "is the robot's";
-  }
-  return fmt::format("lies at x {:.2f} mm, y {:.2f} mm, theta {:.2f} deg in the robot frame{}",
-                     frame.translation_mm.x, frame.translation_mm.y, degrees(frame.theta_rad),
-                     centred ? ", at the object's middle" : "");
 }
 
 /// The touches as one recording. Where their arrays differ, it has elements for the largest, and
@@ -287,40 +245,16 @@ void build_maps(const MapFlags& flags) {
 
   const std::optional<MapSensor> learned =
       learns ? std::optional(learn_sensor(flags, maps, map_paths, model)) : std::nullopt;
-  const std::string picture = flags.png.empty() ? "" : draw_maps(maps);
-
-  // Nothing is written before all maps are built, so that a failure leaves nothing behind.
-  if (!flags.ros.empty()) {
-    make_folder(flags.ros);
-  }
-  if (folder) {
-    make_folder(flags.output);
-  }
+  std::vector<WrittenMap> written;
   for (std::size_t i = 0; i < maps.size(); ++i) {
-    const OccupancyGrid& map = maps[i];
-    write_map(map_paths[i], map);
-    fmt::print("{}: {} from {} touches, {} x {} cells of {} mm, prior {:.3g}\n",
-               map_paths[i].string(), map.label, objects[i].touches.size(), map.nx, map.ny,
-               map.cell_mm, map.prior);
-    fmt::print("{}: the frame of {} {}\n", map_paths[i].string(), map.label, frame_words(map));
-    if (symmetries[i]) {
-      fmt::print("{}: {}\n", map_paths[i].string(), symmetry_words(map, *symmetries[i]));
+    written.push_back(
+        {map_paths[i], fmt::format("{} touches", objects[i].touches.size()), symmetries[i]});
+  }
+  write_maps(flags, maps, written, [&] {
+    if (learned) {
+      write_sensor(flags, *learned);
     }
-  }
-  if (learned) {
-    write_sensor(flags, *learned);
-  }
-  if (!flags.ros.empty()) {
-    for (const OccupancyGrid& map : maps) {
-      const std::filesystem::path yaml = ros_path(flags, map.label);
-      write_map_server(yaml, map);
-      fmt::print("{}\n", yaml.string());
-    }
-  }
-  if (!flags.png.empty()) {
-    write_file(flags.png, picture);
-    fmt::print("{}\n", flags.png);
-  }
+  });
 }
 
 }  // namespace
@@ -328,13 +262,16 @@ void build_maps(const MapFlags& flags) {
 void add_map(CLI::App& app) {
   auto* command = app.add_subcommand("map",
                                      "Build an object's occupancy grid from touches at known "
-                                     "poses, or with --unposed from presses "
-                                     "at unknown poses");
+                                     "poses, with --unposed from presses at unknown poses, or "
+                                     "from a drawing");
   const auto flags = std::make_shared<MapFlags>();
   add_map_flags(*command, *flags);
+  add_drawing_flags(*command, *flags);
   command->callback([flags, command] {
     finish_map_flags(*command, *flags);
-    if (flags->unposed) {
+    if (flags->of_drawings()) {
+      build_drawn_maps(*flags);
+    } else if (flags->unposed) {
       build_unposed_maps(*flags);
     } else {
       build_maps(*flags);

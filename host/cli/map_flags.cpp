@@ -9,6 +9,7 @@
 #include <fmt/ranges.h>
 #include <CLI/CLI.hpp>
 
+#include "cli/map_drawing.hpp"
 #include "cli/options.hpp"
 #include "cli/recognition_flags.hpp"
 #include "io/command_files.hpp"
@@ -30,22 +31,6 @@ double require_length(const std::string& flag, double mm) {
   return mm;
 }
 
-void require_name(const std::string& path, const std::string& label) {
-  if (label.empty()) {
-    refuse(path, "attribute 'object' is empty; name the object with --label");
-  }
-  if (label == none_label) {
-    refuse(path,
-           "object '{}' stands for objects that were never learned; choose another name with "
-           "--label",
-           label);
-  }
-  if (label.find('/') != std::string::npos) {
-    refuse(path, "object '{}' holds a '/' and cannot name a file; choose another name with --label",
-           label);
-  }
-}
-
 /// Whether --sensor-model names a file.
 bool has_sensor_model(const MapFlags& flags) {
   return !flags.sensor_model.empty() && flags.sensor_model != no_sensor_model;
@@ -59,7 +44,10 @@ bool MapFlags::to_folder() const {
 }
 
 void add_map_flags(CLI::App& command, MapFlags& flags) {
-  command.add_option("RECORDING", flags.recordings, "Recordings of touches (HDF5)")->required();
+  command
+      .add_option("RECORDING", flags.recordings,
+                  "Recordings of touches (HDF5), or drawings (SVG, PNG), each of one object")
+      ->required();
   command
       .add_option("-o,--output", flags.output,
                   "Map to write (HDF5), or FOLDER/ for one map of each object, or several with "
@@ -77,9 +65,9 @@ void add_map_flags(CLI::App& command, MapFlags& flags) {
                      "--psf-mm where that is given; else that of the FOLDER's other maps, or 0.5 "
                      "unless another predicts left-out touches better; with --unposed 0.6 times "
                      "the distance of neighbouring elements]");
-  command
-      .add_option("--peak", flags.peak, "Peak of the inverse sensor model, a probability below 1")
-      ->capture_default_str();
+  command.add_option("--peak", flags.peak,
+                     "Peak of the inverse sensor model, a probability below 1 [default: 0.9]; how "
+                     "sure a drawing is: log odds lie within log(A / (1 - A)) [default: 0.999]");
   command
       .add_option("--prior", flags.prior,
                   "Probability that an unseen cell is occupied; auto: the area of all objects "
@@ -114,12 +102,14 @@ void add_map_flags(CLI::App& command, MapFlags& flags) {
       "Where the object's frame lies in the robot frame of the touches: robot, at "
       "its origin; centroid, at the middle of the occupied cells; X,Y,DEG, in mm and "
       "degrees; auto, at the robot's origin where the map covers it, else at the "
+      "centroid. Of a drawing, in the frame of the picture's lower left corner, auto: at the "
       "centroid [default: auto]");
   command.add_flag("--mirror", flags.mirror,
                    "The object is flat and may lie on its other side; with --unposed, presses of "
                    "that side join the maps mirrored");
   command.add_option("--label", flags.label,
-                     "Label of the map [default: the object that the recording names]");
+                     "Label of the map [default: the object that the recording names, "
+                     "or a drawing's file]");
   command.add_flag("--unposed", flags.unposed,
                    "The sensor's poses are unknown: find how the presses of an object lie beside "
                    "each other, and build its maps from their means. For arrays so large that a "
@@ -162,6 +152,9 @@ void finish_map_flags(const CLI::App& command, MapFlags& flags) {
       refuse_flag(flag, *sd, "presses at unknown poses are placed anyway; leave it out");
     }
   }
+  if (!flags.of_drawings()) {
+    require_no_drawing_flags(flags);
+  }
   if (flags.max_maps && !flags.unposed) {
     refuse_flag("--max-maps", *flags.max_maps,
                 "only presses at unknown poses make several maps; give --unposed, or leave it out");
@@ -195,9 +188,10 @@ MapOptions map_options(const MapFlags& flags, const std::vector<Recording>& reco
   if (flags.spread_mm) {
     result.sensor.spread_mm = require_length("--spread-mm", *flags.spread_mm);
   }
-  result.sensor.peak = require_above("--peak", flags.peak, 0.0);
-  if (flags.peak >= 1.0) {
-    refuse_flag("--peak", flags.peak, "must be below 1, or one reading would make a cell certain");
+  result.sensor.peak = require_above("--peak", flags.peak.value_or(result.sensor.peak), 0.0);
+  if (result.sensor.peak >= 1.0) {
+    refuse_flag("--peak", result.sensor.peak,
+                "must be below 1, or one reading would make a cell certain");
   }
   std::optional<double> threshold = flags.threshold;
   std::optional<double> ratio = flags.ratio;
@@ -254,12 +248,25 @@ std::map<std::string, int> symmetries_of(const MapFlags& flags) {
   return result;
 }
 
-/// Throws Error where --symmetry names a label that no object has.
-void require_known_symmetries(const MapFlags& flags, std::span<const ObjectTouches> objects) {
-  std::vector<std::string> labels;
-  for (const ObjectTouches& object : objects) {
-    labels.push_back(object.label);
+}  // namespace
+
+void require_name(const std::string& path, const std::string& label) {
+  if (label.empty()) {
+    refuse(path, "attribute 'object' is empty; name the object with --label");
   }
+  if (label == none_label) {
+    refuse(path,
+           "object '{}' stands for objects that were never learned; choose another name with "
+           "--label",
+           label);
+  }
+  if (label.find('/') != std::string::npos) {
+    refuse(path, "object '{}' holds a '/' and cannot name a file; choose another name with --label",
+           label);
+  }
+}
+
+void require_known_symmetries(const MapFlags& flags, const std::vector<std::string>& labels) {
   for (const auto& [label, n] : symmetries_of(flags)) {
     if (!label.empty() && std::ranges::find(labels, label) == labels.end()) {
       refuse_flag("--symmetry", flags.symmetry, "no object is named {}; there {} {}", label,
@@ -268,17 +275,13 @@ void require_known_symmetries(const MapFlags& flags, std::span<const ObjectTouch
   }
 }
 
-}  // namespace
-
 std::optional<RotationalSymmetry> settle_symmetry(const MapFlags& flags, OccupancyGrid& map) {
   const std::map<std::string, int> given = symmetries_of(flags);
   const auto own = given.contains(map.label) ? given.find(map.label) : given.find("");
   const bool none = own != given.end() && own->second == 1;
   map.symmetry = own == given.end() ? 1 : own->second;
   const std::optional<RotationalSymmetry> measured = measure_symmetry(map);
-  if (measured && !none) {
-    map.suggested_symmetry = measured->suggested;
-  }
+  map.suggested_symmetry = measured && !none ? std::optional(measured->suggested) : std::nullopt;
   return measured;
 }
 
@@ -333,11 +336,13 @@ GroupedTouches group_by_label(const MapFlags& flags, const std::vector<Recording
     }
   }
   GroupedTouches result;
+  std::vector<std::string> labels;
   for (auto& [label, group] : groups) {
+    labels.push_back(label);
     result.objects.push_back({label, std::move(group.touches)});
     result.sources.push_back(std::move(group.sources));
   }
-  require_known_symmetries(flags, result.objects);
+  require_known_symmetries(flags, labels);
   return result;
 }
 

@@ -21,7 +21,7 @@ namespace palpate::cli {
 
 /// The flags of `palpate map`.
 struct MapFlags {
-  std::vector<std::string> recordings;
+  std::vector<std::string> recordings;  ///< or drawings
   std::string output;
   double cell_mm = 0.5;
   bool cell_given = false;
@@ -30,7 +30,7 @@ struct MapFlags {
   std::optional<double> spread_mm;
   std::optional<double> touch_sd_mm;
   std::optional<double> touch_sd_deg;
-  double peak = 0.9;
+  std::optional<double> peak;
   std::string prior = "auto";
   bool prior_given = false;
   std::optional<double> threshold;
@@ -43,10 +43,16 @@ struct MapFlags {
   std::string label;
   bool unposed = false;
   std::optional<int> max_maps;
+  std::optional<double> mm_per_pixel;
+  std::string occupied;
+  std::optional<double> felt_share;
+  std::string array;
   std::string png;
   std::string ros;
   std::string device;
 
+  /// Whether drawings are mapped.
+  bool of_drawings() const;
   /// Whether `output` is a folder, for one map of each object or more.
   bool to_folder() const;
 };
@@ -99,6 +105,11 @@ struct GroupedTouches {
 /// --unposed all are at the origin.
 GroupedTouches group_by_label(const MapFlags& flags, const std::vector<Recording>& recordings,
                               const ContactClassifier& classifier);
+
+/// Throws Error on a label that no map can bear. `path` is named.
+void require_name(const std::string& path, const std::string& label);
+/// Throws Error where --symmetry names a label that no object has.
+void require_known_symmetries(const MapFlags& flags, const std::vector<std::string>& labels);
 
 /// The file for ROS beside the map of this name in the folder of --ros.
 std::filesystem::path ros_path(const MapFlags& flags, const std::string& name);

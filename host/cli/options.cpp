@@ -49,6 +49,14 @@ void make_folder(const std::filesystem::path& folder) {
   }
 }
 
+std::string array_table(std::span<const glm::dvec2> elements_mm) {
+  std::string text = "x,y\n";
+  for (const glm::dvec2& p : elements_mm) {
+    text += fmt::format("{},{}\n", p.x, p.y);
+  }
+  return text;
+}
+
 double degrees(double rad) { return rad * 180.0 / std::numbers::pi; }
 double radians(double deg) { return deg * std::numbers::pi / 180.0; }
 

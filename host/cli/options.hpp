@@ -1,8 +1,11 @@
 #pragma once
 
 #include <filesystem>
+#include <span>
 #include <string>
 #include <string_view>
+
+#include <glm/vec2.hpp>
 
 #include "io/atomic_file.hpp"
 #include "io/input_file.hpp"
@@ -33,6 +36,9 @@ void write_file(const std::filesystem::path& file, std::string_view bytes,
 void give_result(const std::string& json_file, const std::string& json, const std::string& text);
 /// Makes the folder if it does not exist. Throws Error.
 void make_folder(const std::filesystem::path& folder);
+
+/// An array as a table (CSV: x, y in mm) that palpate import takes as --array.
+std::string array_table(std::span<const glm::dvec2> elements_mm);
 
 double degrees(double rad);
 double radians(double deg);

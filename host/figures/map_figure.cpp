@@ -103,7 +103,8 @@ std::string draw_maps(std::span<const OccupancyGrid> maps) {
   Canvas canvas(static_cast<int>(content + 2 * margin_px),
                 static_cast<int>(legend_top + legend_px));
 
-  canvas.text("Maps built from touch", {margin_px, margin_px + 20.0},
+  const bool drawn = std::ranges::all_of(maps, &OccupancyGrid::drawn);
+  canvas.text(drawn ? "Maps from drawings" : "Maps built from touch", {margin_px, margin_px + 20.0},
               {.size_px = 28.0, .bold = true});
   const double left = margin_px + std::floor((content - tiles_width) / 2);
   for (std::size_t k = 0; k < maps.size(); ++k) {

@@ -33,7 +33,7 @@ Hdf5Contents open_map(const std::filesystem::path& path) {
   return {path,
           {"format", "version", "label", "cell_mm", "origin_mm", "prior", "symmetry", "spread_mm",
            "suggested_symmetry", "mirror", "T_learned_robot_object", "centred_mm", "pressure_unit",
-           "threshold", "ratio", "peak", "left_out_fit", "pose_scale"},
+           "threshold", "ratio", "peak", "left_out_fit", "pose_scale", "drawn"},
           {"log_odds", "observations", "mean_level", "touch_pressure", "touch_pose",
            "touch_elements", "touch_valid"}};
 }

@@ -4,15 +4,21 @@
 #include <array>
 #include <cmath>
 #include <complex>
+#include <list>
 #include <map>
 #include <numbers>
+#include <numeric>
 #include <span>
 #include <vector>
 
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
 #include <glm/common.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
+
+#include "model/interpolated_map.hpp"
+#include "model/touch_evidence.hpp"
 
 namespace palpate {
 
@@ -43,24 +49,16 @@ double likeness_of_angles(const SetupJudge& judge, double rad) {
   return std::abs(sum) / count;
 }
 
-void check_offset(SetupJudge& judge, Setup& setup, double& nats, SetupCheck& check) {
-  if (likeness_of_angles(judge, setup.rad) > one_angle) {
-    check.remarks.emplace_back(
-        "all touches are at nearly one angle of the sensor, which tells nothing of where the array "
-        "sits in the tool: turn the sensor between the touches, by 90 degrees or so");
-    return;
-  }
+std::optional<SetupFinding> offset_of(const std::function<double(const Pose&)>& nats) {
   using Place = std::array<double, 3>;
   const auto pose_of = [](const Place& at) { return Pose{{at[0], at[1]}, at[2]}; };
-  std::map<Place, double> known{{Place{}, nats}};
+  std::map<Place, double> known;
   const auto judged = [&](const Place& at) {
     const auto found = known.find(at);
     if (found != known.end()) {
       return found->second;
     }
-    Setup other = setup;
-    other.elements_mm = placed(setup.elements_mm, pose_of(at));
-    return known.emplace(at, judge.nats(other)).first->second;
+    return known.emplace(at, nats(pose_of(at))).first->second;
   };
   Place best{};
   const Place finest{0.125, 0.125, 0.0125};
@@ -106,20 +104,88 @@ void check_offset(SetupJudge& judge, Setup& setup, double& nats, SetupCheck& che
     sd[a] = 2.0 * finest[a] * std::sqrt(std::max(covariance[a][a], 1e-4));
     excess = std::max(excess, std::abs(offset[a]) / std::max(sd[a], finest[a] / 2.0));
   }
-  const double gain = std::max(judged(offset), top) - nats;
+  const double gain = std::max(judged(offset), top) - judged({});
   constexpr double least_excess = 3.0;
-  if (gain > least_nats && excess > least_excess) {
-    const Pose pose = pose_of(offset);
-    constexpr double degrees = 180.0 / std::numbers::pi;
-    check.findings.push_back(
-        {"array_offset", gain,
-         fmt::format(
-             "the array sits in the tool at x {:+.2f} +- {:.2f} mm, y {:+.2f} +- {:.2f} mm, "
-             "turned by {:+.1f} +- {:.1f} degrees, from where its elements are said to be: "
-             "import with the corrected array",
-             offset[0], sd[0], offset[1], sd[1], degrees * offset[2], degrees * sd[2]),
-         "", pose, sd});
-    setup.elements_mm = placed(setup.elements_mm, pose);
+  if (!(gain > least_nats && excess > least_excess)) {
+    return {};
+  }
+  constexpr double degrees = 180.0 / std::numbers::pi;
+  return SetupFinding{
+      "array_offset",
+      gain,
+      fmt::format("the array sits in the tool at x {:+.2f} +- {:.2f} mm, y {:+.2f} +- {:.2f} mm, "
+                  "turned by {:+.1f} +- {:.1f} degrees, from where its elements are said to be: "
+                  "import with the corrected array",
+                  offset[0], sd[0], offset[1], sd[1], degrees * offset[2], degrees * sd[2]),
+      "",
+      pose_of(offset),
+      sd};
+}
+
+std::optional<SetupFinding> offset_on_drawings(const std::vector<Press>& presses,
+                                               const std::vector<OccupancyGrid>& maps,
+                                               const ContactClassifier& classifier) {
+  struct Tried {
+    TouchEvidence evidence;
+    Pose T_object_sensor;
+    const InterpolatedMap* field;
+    ContactModel contact;
+  };
+  std::list<InterpolatedMap> fields;
+  std::vector<Tried> tried;
+  for (const OccupancyGrid& map : maps) {
+    const InterpolatedMap* field = map.drawn ? &fields.emplace_back(map, map.prior) : nullptr;
+    for (const Press& press : presses) {
+      if (field != nullptr && press.label == map.label) {
+        const Touch& touch = press.touches.front();
+        const ContactModel contact{.classifier = classifier, .prior = map.prior};
+        tried.push_back({TouchEvidence(touch, contact),
+                         *press.T_object_robot * touch.T_robot_sensor, field, contact});
+      }
+    }
+  }
+  if (tried.empty()) {
+    return {};
+  }
+  return offset_of([&](const Pose& offset) {
+    std::vector<double> nats(tried.size());
+    tbb::parallel_for(std::size_t{0}, tried.size(), [&](std::size_t i) {
+      const auto& [evidence, T_object_sensor, field, contact] = tried[i];
+      const Pose T_object_array = T_object_sensor * offset;
+      for (std::size_t e = 0; e < evidence.readings.size(); ++e) {
+        const double log_odds = field->log_odds(T_object_array * evidence.elements_mm[e]);
+        nats[i] += contact.log_likelihood(evidence.readings[e], MapSample{log_odds});
+      }
+    });
+    return std::accumulate(nats.begin(), nats.end(), 0.0);
+  });
+}
+
+std::vector<Press> with_offset(std::vector<Press> presses, const Pose& offset) {
+  for (Press& press : presses) {
+    const Pose& T_robot_sensor = press.touches.front().T_robot_sensor;
+    press.T_object_robot =
+        *press.T_object_robot * T_robot_sensor * offset * inverse(T_robot_sensor);
+  }
+  return presses;
+}
+
+void check_offset(SetupJudge& judge, Setup& setup, double& nats, SetupCheck& check) {
+  if (likeness_of_angles(judge, setup.rad) > one_angle) {
+    check.remarks.emplace_back(
+        "all touches are at nearly one angle of the sensor, which tells nothing of where the array "
+        "sits in the tool: turn the sensor between the touches, by 90 degrees or so");
+    return;
+  }
+  const auto setup_at = [&](const Pose& offset) {
+    Setup other = setup;
+    other.elements_mm = placed(setup.elements_mm, offset);
+    return other;
+  };
+  const auto finding = offset_of([&](const Pose& offset) { return judge.nats(setup_at(offset)); });
+  if (finding) {
+    check.findings.push_back(*finding);
+    setup = setup_at(*finding->array_offset);
     nats = judge.nats(setup);
     check.elements_mm = setup.elements_mm;
   }

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "io/input_file.hpp"
+#include "palpate/object_frame.hpp"
 #include "recognition/recordings.hpp"
 #include "recognition/touch_sd_fit.hpp"
 
@@ -29,17 +30,32 @@ bool all_have_poses(std::span<const Recording> recordings) {
   return first;
 }
 
+/// Where the object frame of a map lay when a recording was made: where the recording's truth says,
+/// or else where it lay in the robot frame when the object was learned.
+Pose pose_of(const Recording& recording, const OccupancyGrid& map) {
+  return recording.truth ? in_centred_frame(map, recording.truth->T_object_robot)
+                         : inverse(map.T_learned_robot_object);
+}
+
 std::vector<Press> presses_of(std::span<const Recording> recordings,
-                              const std::optional<Frames>& frames, bool posed) {
+                              const std::optional<Frames>& frames, bool posed,
+                              std::span<const OccupancyGrid> given) {
   std::vector<Press> presses;
   for (const Recording& recording : recordings) {
-    if (recording.object.empty()) {
+    const bool by_truth = recording.object.empty() && recording.truth && !given.empty();
+    const std::string& label = by_truth ? recording.truth->object : recording.object;
+    if (label.empty()) {
       refuse(recording.path,
              "attribute 'object' is empty; a calibration needs to know what was touched");
     }
+    const auto map = std::ranges::find(given, label, &OccupancyGrid::label);
     const auto [begin, end] = selected_touches(recording, frames);
     for (std::size_t touch = begin; touch < end; ++touch) {
       presses.push_back(posed ? posed_press(recording, touch) : single_press(recording, touch));
+      presses.back().label = label;
+      if (posed && map != given.end()) {
+        presses.back().T_object_robot = pose_of(recording, *map) * *presses.back().T_object_robot;
+      }
     }
   }
   return presses;
@@ -67,12 +83,17 @@ void check_numbers(const CalibrationRequest& request) {
   }
 }
 
-/// The tables to try; at unknown poses, where a map lacks its mean level, the layer auto is
-/// log_odds.
+/// The tables to try. Where a map lacks its mean level, the layer auto is log_odds: by contact at
+/// unknown poses, and at known ones, on drawn maps, by as many levels as mean pressures.
 std::vector<TableKind> tables_of(const CalibrationRequest& request, bool known_poses,
                                  std::span<const OccupancyGrid> maps) {
   const bool has_mean_levels =
       std::ranges::none_of(maps, [](const OccupancyGrid& map) { return map.mean_level.empty(); });
+  if (request.layer == "auto" && known_poses && !has_mean_levels) {
+    const std::size_t usual = default_tables(true).front().levels;
+    return {{MapLayer::log_odds,
+             static_cast<std::size_t>(request.levels.value_or(static_cast<int>(usual)))}};
+  }
   std::vector<TableKind> tables;
   for (TableKind kind : default_tables(false)) {
     const bool of_pressure = kind.layer == MapLayer::mean_level;
@@ -134,18 +155,20 @@ CalibrationTask calibration_task(const CalibrationRequest& request, const Reques
                                  std::span<const Recording> recordings,
                                  std::span<const GivenMap> maps) {
   const bool known_poses = !request.unposed && all_have_poses(recordings);
-  CalibrationTask task{.presses = presses_of(recordings, recognition.frames, known_poses)};
+  CalibrationTask task;
   const bool needs_mean_level =
       request.layer == "mean_level" || (request.layer == "auto" && known_poses);
   for (const GivenMap& given : maps) {
     const OccupancyGrid& map = given.hypothesis.map;
-    if (needs_mean_level && map.mean_level.empty()) {
+    const bool has_enough = map.drawn && request.layer == "auto";
+    if (needs_mean_level && map.mean_level.empty() && !has_enough) {
       refuse(given.name,
              "has no mean_level; build the map with `unposed` or `sensor-model`, or give "
              "`layer log_odds`");
     }
     task.maps.push_back(map);
   }
+  task.presses = presses_of(recordings, recognition.frames, known_poses, task.maps);
   check_numbers(request);
   const bool gives_bins = recognition.bins || recognition.x_mm || recognition.y_mm ||
                           recognition.theta_deg || recognition.pivot_mm;

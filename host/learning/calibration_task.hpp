@@ -34,8 +34,10 @@ struct CalibrationTask {
 };
 
 /// Makes the task: where all touches of each recording are at one pose, poses count as unknown.
-/// With the layer auto, touches at known poses are compared by the mean pressure; at unknown ones
-/// both layers are tried, but without a mean level of every map only log odds.
+/// With the layer auto, touches at known poses are compared by the mean pressure, on drawn maps by
+/// log odds; at unknown ones both layers are tried, but without a mean level of every map only log
+/// odds. On given maps, touches at known poses lie where the recording's truth says, or else where
+/// the object was learned.
 /// @param recognition what recognize will be given; its bins, region and frames alone count
 /// @param recordings of touches of one pressure unit, at least one
 /// @param maps to compare touches with

@@ -9,6 +9,7 @@
 #include "learning/press_fusion.hpp"
 #include "learning/press_placement.hpp"
 #include "model/bounding_box.hpp"
+#include "model/contact_readings.hpp"
 
 namespace palpate {
 
@@ -64,29 +65,6 @@ namespace {
 
 /// A pose so far beyond every map that only the map's prior counts there.
 constexpr Pose beyond{{2.0 * farthest_mm, 0.0}, 0.0};
-
-/// Eq. 7 as a table, which is read several times faster. The table is within 1e-4 nats of Eq. 7,
-/// unless gamma is so small that log odds beyond the table matter.
-ContactModel tabulated(ContactModel contact) {
-  if (contact.table) {
-    return contact;
-  }
-  LikelihoodTable table{.first_log_odds = -16.0,
-                        .last_log_odds = 16.0,
-                        .nodes = 1025,
-                        .level_edges = {},
-                        .log_likelihood = {}};
-  const double last = static_cast<double>(table.nodes - 1);
-  for (const Reading reading : {Reading::no_contact, Reading::in_contact}) {
-    for (std::size_t node = 0; node < table.nodes; ++node) {
-      const double value =
-          std::lerp(table.first_log_odds, table.last_log_odds, static_cast<double>(node) / last);
-      table.log_likelihood.push_back(contact.log_likelihood(reading, {.log_odds = value}));
-    }
-  }
-  contact.table = std::move(table);
-  return contact;
-}
 
 /// The best bin at each angle.
 std::vector<std::size_t> best_bins(const std::vector<float>& bins, const PoseLattice& lattice) {

@@ -11,6 +11,7 @@
 
 #include "estimation/maps/left_out_fit.hpp"
 #include "io/element_spacing.hpp"
+#include "learning/array_place.hpp"
 #include "learning/feature_learning.hpp"
 #include "learning/host_progress.hpp"
 #include "palpate/error.hpp"
@@ -275,27 +276,34 @@ std::vector<TableKind> default_tables(bool known_poses) {
   return known_poses ? std::vector{of_pressure} : std::vector{of_contact, of_pressure};
 }
 
-SensorCalibration calibrate_sensor(const std::vector<Press>& presses,
+SensorCalibration calibrate_sensor(const std::vector<Press>& given_presses,
                                    const std::vector<OccupancyGrid>& given,
                                    const SensorCalibrationOptions& options,
                                    const std::function<void(double)>& progress) {
-  if (presses.empty()) {
+  if (given_presses.empty()) {
     throw Error(Fault::input, "no touches; give recordings with touches");
   }
-  require_poses_of_one_kind(presses);
-  const bool known_poses = at_known_poses(presses);
+  require_poses_of_one_kind(given_presses);
+  const bool known_poses = at_known_poses(given_presses);
   const std::vector<TableKind> tables =
       options.tables.empty() ? default_tables(known_poses) : options.tables;
   ModelLearning how{.readings = {.pressure_unit = options.pressure_unit,
                                  .threshold = options.threshold,
                                  .ratio = options.ratio,
-                                 .spacing_mm = spacing_mm_of(presses),
+                                 .spacing_mm = spacing_mm_of(given_presses),
                                  .maps = options.maps},
                     .folds = options.folds};
   for (const OccupancyGrid& map : given) {
     how.given.push_back({map});
   }
 
+  std::optional<SetupFinding> array_offset;
+  if (known_poses && std::ranges::any_of(given, &OccupancyGrid::drawn)) {
+    array_offset = offset_on_drawings(given_presses, given,
+                                      learn_readings(given_presses, how.readings).classifier);
+  }
+  const std::vector<Press> presses =
+      array_offset ? with_offset(given_presses, *array_offset->array_offset) : given_presses;
   const LearnedReadings readings = learn_readings(presses, how.readings);
   const CheckedPresses checked = without_unknown(presses, readings.classifier);
   std::optional<RecognitionBins> bins;
@@ -308,6 +316,7 @@ SensorCalibration calibrate_sensor(const std::vector<Press>& presses,
   const std::vector<std::string> labels = labels_of(learned.maps);
   SensorCalibration calibration{.sensor = sensor_of(readings, options.pressure_unit, how.bins),
                                 .maps = readings.maps(),
+                                .array_offset = std::move(array_offset),
                                 .objects = labels.size(),
                                 .warnings = checked.warnings};
   std::ranges::copy(warnings_about(learned), std::back_inserter(calibration.warnings));

@@ -10,6 +10,7 @@
 #include "learning/sensor_gain.hpp"
 #include "palpate/learned_sensor.hpp"
 #include "palpate/occupancy_grid.hpp"
+#include "palpate/setup_finding.hpp"
 
 namespace palpate {
 
@@ -53,7 +54,10 @@ struct GroupScores {
 /// A learned sensor and how good it is on presses that it has not seen.
 struct SensorCalibration {
   LearnedSensor sensor;
-  MapOptions maps;               ///< of the maps that presses were compared with
+  MapOptions maps;  ///< of the maps that presses were compared with
+  /// Where the array sits in the tool, from touches at known poses of objects whose maps are drawn;
+  /// all else is learned with the array there. None where it sits where the recordings say.
+  std::optional<SetupFinding> array_offset = {};
   bool touch_sd_fitted = false;  ///< sensor.touch_sd is the result of a fit
   std::size_t objects = 0;
   std::vector<TriedTable> tried;  ///< in the options' order; none with one object

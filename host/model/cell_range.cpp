@@ -45,7 +45,7 @@ CellRange cover(const glm::dvec2& lowest_mm, const glm::dvec2& highest_mm, doubl
   if (!(nx * ny <= static_cast<double>(most_cells))) {
     throw Error(Fault::input,
                 fmt::format("the map would have {:.3g} x {:.3g} cells of {} mm; use larger cells, "
-                            "or touches that lie closer together",
+                            "or touches or a drawing of a smaller area",
                             nx, ny, cell_mm));
   }
   return {static_cast<std::int64_t>(first(lowest_mm.x)),

@@ -136,4 +136,25 @@ double ContactModel::log_likelihood(Reading reading, const MapSample& map,
   return log_sum(std::log(gamma) + std::log(prior.value()), std::log1p(-gamma) + log_p);
 }
 
+ContactModel tabulated(ContactModel contact) {
+  if (contact.table) {
+    return contact;
+  }
+  LikelihoodTable table{.first_log_odds = -16.0,
+                        .last_log_odds = 16.0,
+                        .nodes = 1025,
+                        .level_edges = {},
+                        .log_likelihood = {}};
+  const double last = static_cast<double>(table.nodes - 1);
+  for (const Reading reading : {Reading::no_contact, Reading::in_contact}) {
+    for (std::size_t node = 0; node < table.nodes; ++node) {
+      const double value =
+          std::lerp(table.first_log_odds, table.last_log_odds, static_cast<double>(node) / last);
+      table.log_likelihood.push_back(contact.log_likelihood(reading, {.log_odds = value}));
+    }
+  }
+  contact.table = std::move(table);
+  return contact;
+}
+
 }  // namespace palpate

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <utility>
+#include <string>
 
 #include <fmt/format.h>
 
@@ -90,7 +90,6 @@ class Shares {
     }
   }
 
-  std::size_t cells() const { return cells_.size(); }
   float sum(std::size_t cell, const std::uint8_t* pixels) const {
     const Cell& one = cells_[cell];
     float sum = 0.0F;
@@ -186,6 +185,12 @@ OccupancyGrid drawn_map(const std::string& label, const Mask& mask,
     const double odds = std::pow(share / (1.0 - share) / felt_odds, 2.0);
     const double p = (1.0 - peak) + (2.0 * peak - 1.0) * odds / (1.0 + odds);
     cell = static_cast<float>(log_odds_from_probability(p));
+  }
+  if (std::ranges::none_of(map.log_odds, [](float cell) { return cell > 0.0F; })) {
+    throw Error(Fault::input,
+                fmt::format("mask of '{}': no cell would be occupied, so small or thin "
+                            "is the object; give a smaller spread, felt share or cell",
+                            label));
   }
   if (const auto fault = fault_of(map)) {
     throw Error(Fault::input, fmt::format("map '{}': {}", label, *fault));

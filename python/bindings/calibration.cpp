@@ -174,6 +174,10 @@ void bind_calibration(nb::module_& module) {
       .def_ro("sensor", &SensorCalibration::sensor, "What was learned.")
       .def_ro("touch_sd_fitted", &SensorCalibration::touch_sd_fitted,
               "Whether sensor.touch_sd is the result of a fit.")
+      .def_ro("array_offset", &SensorCalibration::array_offset,
+              "Where the array sits in the tool, a SetupFinding, from touches at known poses of\n"
+              "objects whose maps are drawn; all else is learned with the array there. None where\n"
+              "it sits where the recordings say.")
       .def_ro("objects", &SensorCalibration::objects, "Number of objects.")
       .def_prop_ro(
           "tried",

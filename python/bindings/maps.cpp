@@ -40,9 +40,6 @@ nb::object cells_or_none(const OccupancyGrid& map, const std::vector<float>& cel
   return cells.empty() ? nb::none() : nb::object(view_cells(map, cells));
 }
 
-/// Pixels of a mask along a cell: they move no edge by more than a twentieth of a cell.
-constexpr double pixels_of_cell = 10.0;
-
 /// The polygons of one array [n, 2], or of several.
 std::vector<std::vector<glm::dvec2>> polygons_of(const ArrayLike& object) {
   const bool several = nb::isinstance<nb::sequence>(object) && nb::len(object) > 0 &&

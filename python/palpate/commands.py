@@ -151,7 +151,8 @@ def calibrate(
 
     recordings: of touches, each with its `object`; where all touches of a recording are at one pose,
     or with unposed, their poses count as unknown. Touches at known poses are at poses of the sensor in
-    the object's frame. maps: to compare touches with, built from other touches; none: maps of the
+    the object's frame, on given maps those that their truth says. maps: to compare touches with, drawn,
+    which also tell where the array sits in the tool, or built from other touches; none: maps of the
     touches themselves, each compared with maps that were built without it. Other options are the flags
     of `palpate calibrate`, with its defaults: threshold, in the recordings' pressure unit, and ratio
     are learned where they are not given; bins, x_mm, y_mm, theta_deg and pivot_mm are those that

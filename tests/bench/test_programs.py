@@ -88,7 +88,7 @@ def test_unlearned_shapes_fit_worse(tmp_path: pathlib.Path) -> None:
     for fit in fits:
         assert fit["learned"]["fits"]["mean"] == 1.0, fit["name"]
     by = {(fit["name"], fit["touches"]): fit for fit in fits}
-    assert by["6x6 array", 9]["told_apart"]["mean"] > 0.9
+    assert by["6x6 array", 9]["told_apart"]["mean"] > 0.8, "of forty pairs, by maps of 96 touches"
     assert by["16x16 array", 9]["never learned"]["does not fit"]["mean"] == 1.0
 
 

@@ -17,8 +17,9 @@ TEST_F(OwnSensorDocument, ItsCommandsFindTheUnknown) {
   EXPECT_EQ(complained, "") << "the logs of the page are in order";
   EXPECT_EQ(said.find("Suspicious"), said.npos);
   expect_named(said, {"with a pose       4161 frames", "E.h5: 40 touches in 4161 frames",
-                      "A looks different after every turn"});  // as the page quotes
-  expect_written({"maps.png", "maps/sensor.yaml", "sheets/unknown.png"});
+                      "A looks different after every turn",
+                      "bracket from bracket.svg, 237 x 217 cells"});  // as the page quotes
+  expect_written({"maps.png", "drawn.png", "maps/sensor.yaml", "sheets/unknown.png"});
 
   const nlohmann::json records = json("result.json");
   ASSERT_EQ(records.size(), 1u);

@@ -14,6 +14,7 @@
 
 #include "estimation/lattice/refinement.hpp"
 #include "model/body_spread.hpp"
+#include "model/contact_readings.hpp"
 #include "model/interpolated_map.hpp"
 #include "model/random.hpp"
 
@@ -53,11 +54,12 @@ std::optional<FitScale> scale_of(std::span<const double> z) {
 }
 
 std::vector<PlaceError> place_errors(std::span<const TouchEvidence> touches, const Hypothesis& of,
-                                     const ContactModel& contact, std::size_t object) {
+                                     const ContactModel& model, std::size_t object) {
   constexpr std::array<std::size_t, 3> in_group{3, 9, 27};
   constexpr std::size_t most_groups = 6;
   constexpr double another_peak_mm = 1.5;
   constexpr double wide_mm = 0.8;
+  const ContactModel contact = tabulated(model);
   const Body body = displaced_body(of.map);
   const InterpolatedMap map(of.compared(), *contact.prior);
   const PoseLattice lattice = lattice_about(body);
@@ -72,8 +74,12 @@ std::vector<PlaceError> place_errors(std::span<const TouchEvidence> touches, con
           for (std::size_t k = 0; k < count; ++k) {
             const TouchEvidence& touch = touches[first + k * every];
             const Pose T_object_sensor = T_object_robot * touch.T_robot_sensor;
+            const glm::dvec2 along_x = rotate(T_object_sensor.theta_rad, {1.0, 0.0});
+            const glm::dvec2 along_y = rotate(T_object_sensor.theta_rad, {0.0, 1.0});
             for (std::size_t e = 0; e < touch.readings.size(); ++e) {
-              const glm::dvec2 at_mm = T_object_sensor * touch.elements_mm[e];
+              const glm::dvec2& element = touch.elements_mm[e];
+              const glm::dvec2 at_mm =
+                  T_object_sensor.translation_mm + element.x * along_x + element.y * along_y;
               sum += contact.log_likelihood(touch.readings[e], {map.log_odds(at_mm)}, object);
             }
           }

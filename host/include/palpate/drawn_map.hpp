@@ -24,6 +24,9 @@ struct Mask {
 /// Most pixels of a picture or a mask that Palpate makes itself.
 inline constexpr double most_pixels = 1e8;
 
+/// Pixels of a mask along a cell of the map: they move no edge by more than a tenth of a cell.
+inline constexpr double pixels_of_cell = 5.0;
+
 /// The mask of a shape, whose strokes and polygons cover the centres of the occupied pixels.
 /// @throws Error on a shape without area, a point beyond 1 km, and more than `most_pixels`
 PALPATE_API Mask mask_of(const Shape& shape, double pixel_mm);
@@ -33,7 +36,7 @@ struct PALPATE_API DrawnMapOptions {
   double cell_mm = 0.5;    ///< edge of a cell
   double spread_mm = 0.5;  ///< half the standard deviation of the sensor's point spread
   /// How sure a drawing is: log odds lie within log(peak / (1 - peak)) of 0, by default 6.9 nats.
-  /// Touched maps reach more than that, but more changes Eq. 7 by less than 1 %.
+  /// Touched maps reach more, but more changes Eq. 7 by less than 0.05 nats at a prior of 0.2.
   double peak = 0.999;
   double prior = 0.2;  ///< of what lies beyond the map
   /// Share of an element's point spread on the object from which on it feels the object: by default
@@ -56,7 +59,7 @@ struct PALPATE_API DrawnMapOptions {
 /// array's reach and four spreads about the occupied pixels. It has the symmetry 1 and suggests the
 /// one that it shows, see measure_symmetry().
 /// @throws Error on options out of range, a mask whose numbers do not agree or that has no occupied
-/// pixel or lies beyond `farthest_mm`, and more than `most_cells`
+/// pixel or lies beyond `farthest_mm`, an object too thin to be felt, and more than `most_cells`
 PALPATE_API OccupancyGrid drawn_map(const std::string& label, const Mask& mask,
                                     const DrawnMapOptions& options = {});
 

@@ -100,9 +100,17 @@ HWY_INLINE hn::Vec<DF> PatchNodes::at(DF df, VI index, int offset) const {
 /// The lanes of a vector whose bins belong to one block, and the elements about this block.
 template <class D>
 struct LanesOfBlock {
-  const ElementPatches<hn::TFromD<D>>* elements;
-  hn::Mask<D> lanes;
-  hn::Mask<hn::Rebind<float, D>> float_lanes;
+  using Mask = hn::Mask<D>;
+  using FloatMask = hn::Mask<hn::Rebind<float, D>>;
+
+  // GCC compiles constructors that it makes itself without the instructions that masks of NEON need.
+  HWY_ATTR LanesOfBlock() {}
+  HWY_ATTR LanesOfBlock(const ElementPatches<hn::TFromD<D>>* of, Mask all, FloatMask float_all)
+      : elements(of), lanes(all), float_lanes(float_all) {}
+
+  const ElementPatches<hn::TFromD<D>>* elements = nullptr;
+  Mask lanes;
+  FloatMask float_lanes;
 };
 
 /// Between the nodes of a cell: the first of a name is its column, the second its row.

@@ -1,0 +1,171 @@
+#include "cli/map_drawing.hpp"
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
+#include <utility>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include "cli/map_output.hpp"
+#include "cli/options.hpp"
+#include "io/drawing_file.hpp"
+#include "model/printable.hpp"
+#include "streaming/import_array.hpp"
+
+namespace palpate::cli {
+
+namespace {
+
+/// Throws Error where one of these flags is given.
+void require_none(std::initializer_list<std::pair<const char*, bool>> given, const char* why) {
+  for (const auto& [flag, is_given] : given) {
+    if (is_given) {
+      throw Error(Fault::input, fmt::format("{}: {}; leave it out", flag, why));
+    }
+  }
+}
+
+void check_flags(const MapFlags& flags) {
+  require_none({{"--threshold", flags.threshold.has_value()},
+                {"--ratio", flags.ratio.has_value()},
+                {"--sensor-model", !flags.sensor_model.empty()},
+                {"--frames", flags.frames.has_value()},
+                {"--touch-sd-mm", flags.touch_sd_mm.has_value()},
+                {"--touch-sd-deg", flags.touch_sd_deg.has_value()},
+                {"--unposed", flags.unposed}},
+               "a drawing has no touches");
+  for (const std::string& path : flags.recordings) {
+    if (!is_drawing(path)) {
+      refuse(path, "is no drawing, but {} is; map recordings and drawings one after the other",
+             *std::ranges::find_if(flags.recordings, is_drawing));
+    }
+  }
+  if (!flags.occupied.empty() && flags.occupied != "dark" && flags.occupied != "light") {
+    refuse_flag("--occupied", flags.occupied, "give dark or light");
+  }
+  if (flags.recordings.size() > 1 && !flags.label.empty()) {
+    refuse_flag("--label", flags.label,
+                "names one object, of one drawing; leave it out: several are named by their files");
+  }
+  if (flags.recordings.size() > 1 && !flags.to_folder()) {
+    refuse_flag("-o", flags.output, "{} drawings make as many maps; give a folder, -o {}/",
+                flags.recordings.size(), flags.output);
+  }
+}
+
+/// The options of maps; the prior only where it is given.
+DrawnMapOptions options_of(const MapFlags& flags) {
+  DrawnMapOptions options;
+  options.cell_mm = require_above("--cell-mm", flags.cell_mm, 0.0);
+  options.spread_mm = flags.spread_mm ? require_above("--spread-mm", *flags.spread_mm, 0.0)
+                                      : require_above("--psf-mm", flags.psf_mm, 0.0) / 2.0;
+  options.peak = flags.peak.value_or(options.peak);
+  options.prior = given_prior(flags, {}).value_or(options.prior);
+  options.felt_share = flags.felt_share.value_or(options.felt_share);
+  if (!flags.array.empty()) {
+    options.reach_mm = array_reach_mm(import_array({.array = flags.array}).elements_mm);
+  }
+  options.validate();
+  return options;
+}
+
+/// The label of every drawing, as --label or the file's name says.
+std::vector<std::string> labels_of(const MapFlags& flags) {
+  std::map<std::string, std::string> files;
+  std::vector<std::string> labels;
+  for (const std::string& path : flags.recordings) {
+    labels.push_back(flags.label.empty() ? printable(std::filesystem::path(path).stem().string())
+                                         : flags.label);
+    require_name(path, labels.back());
+    if (const auto [first, is_new] = files.emplace(labels.back(), path); !is_new) {
+      refuse(path, "would be named '{}', as {}; rename one of them", labels.back(), first->second);
+    }
+  }
+  return labels;
+}
+
+/// Occupied cells over all cells of maps of equal cells.
+double occupied_share(const std::vector<OccupancyGrid>& maps) {
+  std::size_t occupied = 0;
+  std::size_t all = 0;
+  for (const OccupancyGrid& map : maps) {
+    occupied += static_cast<std::size_t>(
+        std::ranges::count_if(map.log_odds, [](float cell) { return cell > 0.0F; }));
+    all += map.log_odds.size();
+  }
+  return static_cast<double>(occupied) / static_cast<double>(all);
+}
+
+}  // namespace
+
+bool MapFlags::of_drawings() const { return std::ranges::any_of(recordings, is_drawing); }
+
+void add_drawing_flags(CLI::App& command, MapFlags& flags) {
+  command.add_option("--mm-per-pixel", flags.mm_per_pixel,
+                     "Of a drawing, edge of a PNG's pixel, or of the unit of an SVG that has no "
+                     "size in mm, mm");
+  command.add_option("--occupied", flags.occupied,
+                     "Of a drawing, whether the object is where it is dark or light [default: "
+                     "dark]");
+  command.add_option("--felt-share", flags.felt_share,
+                     "Of a drawing, the share of an element's point spread on the object from "
+                     "which on it feels the object; 0.5 leaves outlines where they are drawn "
+                     "[default: 0.2, midway between No Contact and In Contact, 1.7 spreads "
+                     "outside]");
+  command.add_option("--array", flags.array,
+                     "Of a drawing, the array that will touch the object, COLUMNS:ROWS:PITCH or a "
+                     "file as of import: the map covers what it senses about the outline [default: "
+                     "the 6 x 6 DigiTacts region]");
+}
+
+void require_no_drawing_flags(const MapFlags& flags) {
+  require_none({{"--mm-per-pixel", flags.mm_per_pixel.has_value()},
+                {"--occupied", !flags.occupied.empty()},
+                {"--felt-share", flags.felt_share.has_value()},
+                {"--array", !flags.array.empty()}},
+               "is of drawings, SVG or PNG, alone");
+}
+
+void build_drawn_maps(const MapFlags& flags) {
+  check_flags(flags);
+  const DrawnMapOptions options = options_of(flags);
+  ObjectOrigin origin = object_origin(flags);
+  if (origin.kind == ObjectOrigin::Kind::automatic) {
+    origin.kind = ObjectOrigin::Kind::centroid;
+  }
+  if (origin.T_learned_robot_object.theta_rad != 0.0) {
+    refuse_flag("--origin", flags.origin, "a drawing is not turned; give the angle 0");
+  }
+  const std::vector<std::string> labels = labels_of(flags);
+  require_known_symmetries(flags, labels);
+  std::vector<WrittenMap> written;
+  std::vector<std::filesystem::path> paths;
+  for (std::size_t i = 0; i < labels.size(); ++i) {
+    paths.push_back(flags.to_folder()
+                        ? std::filesystem::path(flags.output) / (labels[i] + ".map.h5")
+                        : std::filesystem::path(flags.output));
+    written.push_back({paths.back(), flags.recordings[i]});
+  }
+  prepare_outputs(flags, paths, labels);
+
+  std::vector<OccupancyGrid> maps;
+  for (std::size_t i = 0; i < labels.size(); ++i) {
+    Mask mask = read_drawing(flags.recordings[i], {.mm_per_pixel = flags.mm_per_pixel,
+                                                   .light = flags.occupied == "light",
+                                                   .pixel_mm = options.cell_mm / pixels_of_cell});
+    mask.origin_mm -= origin.T_learned_robot_object.translation_mm;
+    maps.push_back(drawn_map(labels[i], mask, options));
+    settle_frame(origin, maps.back());
+    maps.back().mirror = flags.mirror;
+  }
+  const double prior = given_prior(flags, {}).value_or(occupied_share(maps));
+  for (std::size_t i = 0; i < maps.size(); ++i) {
+    maps[i].prior = prior;
+    written[i].symmetry = settle_symmetry(flags, maps[i]);
+  }
+  write_maps(flags, maps, written);
+}
+
+}  // namespace palpate::cli

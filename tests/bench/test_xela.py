@@ -1,0 +1,84 @@
+"""The reader of an XELA array's letters, on arrays that the simulator makes."""
+
+import pathlib
+import subprocess
+import sys
+from typing import Any
+
+import numpy
+import pytest
+from numpy.typing import NDArray
+
+import palpate
+from bench.xela import recording_of
+
+PITCH_MM = 4.7
+STEP_MM = 0.47
+SHARP = palpate.SensorModel(element_mm=1.0, force_spread=0, gain_spread=0, noise_kpa=0)
+
+
+def places(taxel: int, j: int, i: int, reverse: bool) -> tuple[float, float]:
+    """Where a taxel lay at a position, as the pictures of the array's authors interleave readings:
+    pixel (10 m + i, 10 n + j) of taxel (m, n), or (10 m + 9 - i, 10 n + 9 - j), rows downwards."""
+    row = 10 * (taxel // 4) + (9 - i if reverse else i)
+    column = 10 * (taxel % 4) + (9 - j if reverse else j)
+    return STEP_MM * (column - 19.5), -STEP_MM * (row - 19.5)
+
+
+def readings(letter: str, reverse: bool) -> NDArray[Any]:
+    """[10, 10, 6, 48]: presses that grow, hold with a ripple of 1 %, and end."""
+    at = [places(taxel, j, i, reverse) for j in range(10) for i in range(10) for taxel in range(16)]
+    touch = palpate.simulate(letter, [[0.0, 0.0, 0.0]], elements_mm=at, sensor=SHARP)
+    normal = numpy.reshape(touch.pressure, (10, 10, 1, 16))
+    course = numpy.array([0.0, 0.5, 1.0, 1.01, 0.99, 0.2]).reshape(6, 1)
+    array = numpy.full((10, 10, 6, 16, 3), 7.0)  # shear, which says nothing of contact
+    array[..., 2] = normal * course
+    return array.reshape(10, 10, 6, 48)
+
+
+@pytest.mark.parametrize("reverse", [False, True])
+def test_readings_lie_where_the_robot_took_them(reverse: bool) -> None:
+    array = readings("F", reverse)
+    recording = recording_of(array, PITCH_MM, reverse=reverse, object="F")
+    assert (len(recording), recording.pressure_unit, recording.object) == (100, "raw", "F")
+    elements = numpy.asarray(recording.elements_mm)
+    for k, pose in enumerate(recording.T_robot_sensor):
+        expected = [places(taxel, k // 10, k % 10, reverse) for taxel in range(16)]
+        assert numpy.allclose(palpate.transform(pose, elements), expected, atol=1e-9)
+    held = array.reshape(100, 6, 16, 3)[:, 2, :, 2]
+    assert numpy.allclose(recording.pressure, held, atol=1e-9), "the mean of the held frames"
+
+
+def test_an_unknown_is_placed_on_a_map_of_such_touches(device: palpate.Device) -> None:
+    recording = recording_of(readings("F", False), PITCH_MM, object="F")
+    builder = palpate.MapBuilder(device)
+    builder.add(recording)
+    truth = palpate.random_object_pose(seed=4)
+    unknown = palpate.simulate(
+        "F", palpate.random_poses(6, seed=3), T_object_robot=truth,
+        elements_mm=recording.elements_mm, sensor=SHARP,
+    )  # fmt: skip
+    [record] = palpate.recognize(unknown, [builder.build("F")], device=device)
+    assert record.refined_error_mm < 0.8  # elements are 4.7 mm apart
+
+
+def test_the_program_writes_a_recording_and_refuses_other_arrays(tmp_path: pathlib.Path) -> None:
+    def run(array: NDArray[Any]) -> subprocess.CompletedProcess[str]:
+        numpy.save(tmp_path / "letter.npy", array)
+        command = [sys.executable, "-m", "bench.xela", "letter.npy", "--pitch-mm", str(PITCH_MM),
+                   "--object", "F", "-o", "F.h5"]  # fmt: skip
+        root = pathlib.Path(__file__).parents[2]
+        return subprocess.run(
+            [*command[:3], *(str(tmp_path / word) if word.endswith((".npy", ".h5")) else word
+                             for word in command[3:])],
+            cwd=root, capture_output=True, text=True, timeout=60,
+        )  # fmt: skip
+
+    array = readings("F", False)
+    for wrong in (array[0], array[..., :47], array.astype(complex), array[:, :, :0]):
+        refused = run(wrong)
+        assert refused.returncode == 2
+        assert "letter.npy: shape (" in refused.stderr and refused.stderr.count("\n") == 1
+    done = run(array)
+    assert done.returncode == 0, done.stderr
+    assert len(palpate.read_recording(tmp_path / "F.h5")) == 100

@@ -1,0 +1,75 @@
+#!/usr/bin/env bash
+# Compiles Palpate for 64-bit ARM (aarch64) in a fresh Debian 12 and runs its tests there under
+# qemu-user: model, files, bounds (with NEON), streaming, driver, and the golden values on lavapipe.
+# Run by hand, as root:
+#   tests/packages/arm64.sh [PROGRAM OF TESTS...]
+# Needs debootstrap, the network, about 3 GB in $TMPDIR, and an hour of two cores. Exits with 77 where
+# the test cannot run.
+set -euo pipefail
+
+source=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
+mirror=${MIRROR:-http://deb.debian.org/debian}
+programs=("$@")
+[ $# -gt 0 ] || programs=(model_test io_test estimation_bounded_test estimation_bounded_slow_test
+  streaming_test parsing_test usb_tests golden_test)
+
+skip() {
+  echo "skipped: $*" >&2
+  exit 77
+}
+[ "$(id -u)" -eq 0 ] || skip "debootstrap needs root"
+command -v debootstrap >/dev/null || skip "debootstrap is missing: apt-get install debootstrap"
+
+root=$(mktemp -d)
+chmod 755 "$root"  # apt downloads as a user of its own
+finish() {
+  umount "$root/proc" 2>/dev/null || true
+  rm -rf --one-file-system "$root"
+}
+trap finish EXIT
+debootstrap --variant=minbase bookworm "$root" "$mirror" >"$root.log" 2>&1 || {
+  tail -n 5 "$root.log" >&2
+  rm "$root.log"
+  skip "debootstrap cannot make a root of Debian 12 here"
+}
+rm "$root.log"
+mount -t proc proc "$root/proc" || skip "cannot mount /proc in the new root"
+in_root() {
+  chroot "$root" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root DEBIAN_FRONTEND=noninteractive \
+    LC_ALL=C.UTF-8 PKG_CONFIG_LIBDIR=/usr/lib/aarch64-linux-gnu/pkgconfig:/usr/share/pkgconfig "$@"
+}
+# The machine's own way to the mirror: name servers, proxy.
+for file in /etc/resolv.conf /etc/hosts; do
+  cp -L "$file" "$root$file"
+done
+cp /etc/apt/apt.conf.d/*proxy* "$root/etc/apt/apt.conf.d/" 2>/dev/null || true
+
+echo "Installing compilers of this machine's, and libraries of ARM's"
+tools=(g++-aarch64-linux-gnu cmake ninja-build pkg-config glslang-tools spirv-tools qemu-user-static
+  python3 fonts-dejavu-core libglm-dev libcli11-dev nlohmann-json3-dev libvulkan-volk-dev)
+libraries=(libvulkan-dev libvulkan1 mesa-vulkan-drivers vulkan-validationlayers libhdf5-dev libhwy-dev
+  libtbb-dev libcpp-httplib-dev libfmt-dev libyaml-cpp-dev libcairo2-dev libfontconfig-dev
+  librsvg2-dev libusb-1.0-0-dev libgtest-dev libgmock-dev libumockdev-dev)
+{
+  in_root dpkg --add-architecture arm64
+  in_root apt-get update -qq
+  in_root apt-get install -y -qq --no-install-recommends "${tools[@]}"
+  # What a package would run of its own after it is unpacked is ARM's, and not needed here.
+  in_root apt-get install -y -qq --no-install-recommends "${libraries[@]/%/:arm64}"
+} >"$root/apt.log" 2>&1 || {
+  tail -n 5 "$root/apt.log" >&2
+  skip "packages cannot be installed"
+}
+
+mkdir "$root/source"
+git -C "$source" archive HEAD | tar -x -C "$root/source"
+in_root cmake -S /source -B /build -G Ninja -DCMAKE_BUILD_TYPE=Release -DCMAKE_UNITY_BUILD=ON \
+  -DCMAKE_SYSTEM_NAME=Linux -DCMAKE_SYSTEM_PROCESSOR=aarch64 \
+  -DCMAKE_C_COMPILER=aarch64-linux-gnu-gcc -DCMAKE_CXX_COMPILER=aarch64-linux-gnu-g++ \
+  -DCMAKE_LIBRARY_ARCHITECTURE=aarch64-linux-gnu \
+  -DCMAKE_CROSSCOMPILING_EMULATOR=/usr/bin/qemu-aarch64-static \
+  -DPALPATE_BENCH=OFF -DPALPATE_SVG=OFF -DPALPATE_WERROR=ON -DPALPATE_TESTS=ON --log-level=WARNING
+in_root cmake --build /build --target "${programs[@]}"
+# Validation would check the same calls as it does on the machine's own processor.
+in_root env GTEST_BRIEF=1 PALPATE_VALIDATION=0 \
+  ctest --test-dir /build --output-on-failure -j "$(nproc)" -R "^($(IFS='|' && echo "${programs[*]}"))"

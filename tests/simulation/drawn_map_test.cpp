@@ -1,0 +1,133 @@
+// Maps of objects of which there is a drawing.
+
+#include "palpate/drawn_map.hpp"
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include <gmock/gmock.h>
+
+#include "palpate/error.hpp"
+
+namespace palpate::drawn_map_test {
+
+using testing::AllOf;
+using testing::Each;
+using testing::Ge;
+using testing::HasSubstr;
+using testing::Le;
+
+constexpr double pixel_mm = 0.1;
+
+Mask bar_mask() { return mask_of(*built_in_shape("bar"), pixel_mm); }
+
+/// Share of a normal distribution about `centre` that lies between `from` and `to`.
+double normal_share(double centre, double sd, double from, double to) {
+  const auto below = [&](double x) {
+    return 0.5 * std::erfc((centre - x) / (sd * std::numbers::sqrt2));
+  };
+  return below(to) - below(from);
+}
+
+TEST(DrawnMap, IsTheShareOfThePointSpreadOnTheObject) {
+  for (const double spread_mm : {0.25, 0.5, 2.0}) {
+    const DrawnMapOptions options{.spread_mm = spread_mm};
+    const OccupancyGrid map = drawn_map("bar", bar_mask(), options);
+    for (int j = 0; j < map.ny; ++j) {
+      for (int i = 0; i < map.nx; ++i) {
+        const glm::dvec2 at = map.centre_mm(i, j);
+        const double share = normal_share(at.x, 2.0 * spread_mm, -10.0, 10.0) *
+                             normal_share(at.y, 2.0 * spread_mm, -4.0, 4.0);
+        const double odds = std::pow(share / (1.0 - share) * 4.0, 2.0);  // felt from 0.2 on
+        const double p = share > 1.0 - 1e-9 ? options.peak : 0.001 + 0.998 * odds / (1.0 + odds);
+        // A float32 share, which is cut off at five standard deviations.
+        ASSERT_NEAR(map.at(i, j), std::log(p / (1.0 - p)), 2e-3) << at.x << "," << at.y;
+      }
+    }
+  }
+}
+
+TEST(DrawnMap, IsAsLargeAsElementsFeelTheObject) {
+  const auto height_mm = [](double felt_share) {
+    const DrawnMapOptions options{.cell_mm = 0.1, .felt_share = felt_share};
+    const OccupancyGrid map = drawn_map("bar", bar_mask(), options);
+    int occupied = 0;
+    for (int j = 0; j < map.ny; ++j) {
+      occupied += map.at(map.nx / 2, j) > 0.0F ? 1 : 0;
+    }
+    return 0.1 * occupied;
+  };
+  constexpr double one_cell_mm = 0.11;
+  EXPECT_NEAR(height_mm(0.5), 8.0, one_cell_mm) << "where it is drawn";
+  // A fifth of a normal distribution lies 0.842 standard deviations beyond its mean.
+  EXPECT_NEAR(height_mm(0.2), 8.0 + 2.0 * 0.842, one_cell_mm);
+}
+
+TEST(DrawnMap, CoversWhatAnArrayAboutTheOutlineSensesAndIsNoSurerThanItsPeak) {
+  const OccupancyGrid map = drawn_map("bar", bar_mask(), {.peak = 0.9, .reach_mm = 5.0});
+  constexpr double margin_mm = 2.0 * 5.0 + 4.0 * 0.5;
+  EXPECT_NEAR(map.origin_mm.x, -10.0 - margin_mm, 0.5);
+  EXPECT_NEAR(map.centre_mm(map.nx - 1, map.ny - 1).y, 4.0 + margin_mm, 0.5);
+  EXPECT_EQ(std::remainder(map.origin_mm.x, map.cell_mm), 0.0) << "a whole multiple of the cell";
+  const double most = std::log(9.0) + 1e-6;
+  EXPECT_THAT(map.log_odds, Each(AllOf(Ge(-most), Le(most))));
+  EXPECT_NEAR(map.at(map.nx / 2, map.ny / 2), std::log(9.0), 1e-3);
+  EXPECT_TRUE(map.drawn);
+  EXPECT_EQ(map.symmetry, 1);
+  EXPECT_EQ(map.suggested_symmetry, 2);
+}
+
+TEST(DrawnMap, HasRowsAlongYAndColumnsAlongX) {
+  // Two pixels of 2 mm: one at the origin, one above it and to the right.
+  const Mask mask{.pixel_mm = 2.0,
+                  .origin_mm = {1.0, -3.0},
+                  .rows = 2,
+                  .columns = 3,
+                  .occupied = {1, 0, 0, 0, 0, 7}};
+  const OccupancyGrid map = drawn_map("two", mask, {.cell_mm = 1.0});
+  const auto at = [&](double x, double y) {
+    return map.at(static_cast<int>(x - map.origin_mm.x), static_cast<int>(y - map.origin_mm.y));
+  };
+  EXPECT_GT(at(1.0, -3.0), 0.0F);
+  EXPECT_GT(at(5.0, -1.0), 0.0F);
+  EXPECT_LT(at(5.0, -3.0), 0.0F);
+  EXPECT_LT(at(1.0, -1.0), 0.0F);
+}
+
+TEST(DrawnMap, RefusesWhatMakesNoMap) {
+  const auto words = [](const auto& call) {
+    try {
+      call();
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string("no error");
+  };
+  const auto with = [&](const DrawnMapOptions& options) {
+    return words([&] { drawn_map("bar", bar_mask(), options); });
+  };
+  EXPECT_THAT(with({.cell_mm = 0.0}), HasSubstr("cell size = 0 mm: give"));
+  EXPECT_THAT(with({.peak = 0.5}), HasSubstr("peak = 0.5: must be above 0.5"));
+  EXPECT_THAT(with({.felt_share = 1.0}), HasSubstr("felt share = 1: must lie between 0 and 1"));
+  EXPECT_THAT(with({.reach_mm = -1.0}), HasSubstr("reach = -1 mm: give 0 to"));
+  EXPECT_THAT(with({.spread_mm = 30.0, .felt_share = 0.9}), HasSubstr("no cell would be occupied"));
+  const auto of = [&](const Mask& mask) { return words([&] { drawn_map("bar", mask); }); };
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THAT(of({.pixel_mm = nan}), HasSubstr("a pixel = nan mm: give"));
+  EXPECT_THAT(of({.rows = 2, .columns = 2, .occupied = {1}}), HasSubstr("1 pixels in 2 rows of 2"));
+  EXPECT_THAT(of({.rows = 1, .columns = 1, .occupied = {0}}), HasSubstr("no pixel is occupied"));
+  EXPECT_THAT(of({.origin_mm = {nan, 0.0}, .rows = 1, .columns = 1, .occupied = {1}}),
+              HasSubstr("origin = nan,0 mm: give finite numbers"));
+  EXPECT_THAT(of({.origin_mm = {1e9, 0.0}, .rows = 1, .columns = 1, .occupied = {1}}),
+              HasSubstr("give an origin nearer to it"));
+  const auto shape = [&](const Shape& of_shape) {
+    return words([&] { mask_of(of_shape, pixel_mm); });
+  };
+  EXPECT_THAT(shape({.label = "line", .strokes = {}, .polygons = {{{0, 0}, {1, 1}, {2, 2}}}}),
+              HasSubstr("shape 'line': covers no area"));
+  EXPECT_THAT(shape({.label = "field", .strokes = {}, .polygons = {{{0, 0}, {9e5, 0}, {0, 9e5}}}}),
+              HasSubstr("pixels of 0.1 mm are more than 1e+08; use larger cells"));
+}
+
+}  // namespace palpate::drawn_map_test
