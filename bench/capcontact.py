@@ -77,8 +77,8 @@ def learn(
     """What the presses of all people but one tell."""
     others = [press for press in presses if press.person != person]
     registration = shifts.registration(without=person)
-    learn_sensor(device, others, registration, numpy.random.default_rng(SEED + 1), path, quick=quick)
-    return Learned(registration, path)
+    random = numpy.random.default_rng(SEED + 1)
+    return Learned(learn_sensor(device, others, registration, random, path, quick=quick), path)
 
 
 class Trial(NamedTuple):

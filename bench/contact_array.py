@@ -55,7 +55,6 @@ class Press(NamedTuple):
             pixel_mm=PIXEL_MM,
             origin_mm=-self.centroid_mm,
             cell_mm=PITCH_MM / 2.0,
-            prior=0.02,
             felt_share=0.5,
             reach_mm=float(numpy.hypot(*ELEMENTS_MM.T).max()),
         )
@@ -105,6 +104,8 @@ class Registration(NamedTuple):
     """Where elements truly lie in the sheet's picture: places, less a shift that is quadratic in x and y."""
 
     coefficients: Floats  #: [6, 2] of `terms`, mm
+    #: Where the window's elements sit beside that, [3] mm, mm and rad, as a calibration tells.
+    array_offset: Sequence[float] = (0.0, 0.0, 0.0)
 
     @staticmethod
     def terms(places_mm: Floats) -> Floats:
@@ -142,7 +143,7 @@ def touched(
     return palpate.Recording(
         [press.readings[j : j + WINDOW, i : i + WINDOW].ravel() for j, i in windows],
         numpy.array([palpate.compose(T_robot_object, pose) for pose in in_object]),
-        ELEMENTS_MM,
+        palpate.transform(registration.array_offset, ELEMENTS_MM),
         pressure_unit="raw",
         object=label,
         truth=palpate.Truth(label, palpate.inverse(T_robot_object)),
@@ -209,8 +210,10 @@ def learn_sensor(
     path: pathlib.Path,
     *,
     quick: bool,
-) -> None:
+) -> Registration:
     """Writes the sensor that ten of the presses tell, 15 windows each, on their drawn maps.
+
+    Returns the registration with the array's offset in what is left, where the calibration finds one.
 
     Its `pose_scale` is that of the errors of 2 and of 5 windows of all presses. quick: from six windows of
     three presses, tried at poses nearby alone.
@@ -227,6 +230,8 @@ def learn_sensor(
         touches, maps=grids, layer="log_odds", levels=7, device=device, **(near if quick else {})
     )
     calibration.sensor.save(path)
+    if calibration.array_offset is not None:
+        registration = registration._replace(array_offset=calibration.array_offset.array_offset)
     lines = [line for line in path.read_text().splitlines() if not line.startswith("pose_scale:")]
     path.write_text("\n".join(lines) + "\n")
     moved, covariances = [], []
@@ -250,6 +255,7 @@ def learn_sensor(
             "\ntable:", f"\npose_scale: {{factor: {factor:.4g}, map_sd_mm: {sd_mm:.4g}}}\ntable:"
         )
     )
+    return registration
 
 
 def pose_scale(moved_mm: Floats, covariances_mm2: Floats) -> tuple[float, float]:
