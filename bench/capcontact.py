@@ -37,6 +37,7 @@ OBJECTS, QUICK_OBJECTS = 12, 4  # of a round
 WINDOWS = (1, 2, 3, 5)
 ROUNDS = 20
 SENSORS = {"eq7": "Eq. 7", "learned": "learned"}
+SEEN = 0.9  # of the contact, from which on all of it counts as seen
 AMONG_MODES = 11.34  # 99 % of the squared errors over their covariance lie below, of three unknowns
 
 _PERCENT = number(".1f", 100.0)
@@ -55,6 +56,8 @@ COLUMNS: list[Column] = [
     ("68 % region holds, %", "coverage_68", _PERCENT),
     ("95 %", "coverage_95", _PERCENT),
     ("truth among modes, %", "among_modes", _PERCENT),
+    ("all contact seen, %", "seen", _PERCENT),
+    ("recognised of these, %", "recognised_where_seen", _PERCENT),
 ]
 
 
@@ -107,7 +110,7 @@ def draw_round(presses: Sequence[Press], objects: int, random: numpy.random.Gene
     ]
 
 
-def score(step: Json, trial: Trial, random: numpy.random.Generator) -> Json:
+def score(step: Json, trial: Trial, windows: int, random: numpy.random.Generator) -> Json:
     """What a belief after some windows says, beside the truth."""
     truth = truth_of(trial.touches(AS_BUILT))
     right = step["best"] == trial.label
@@ -128,6 +131,7 @@ def score(step: Json, trial: Trial, random: numpy.random.Generator) -> Json:
         "loss": -math.log(max(step["identity"].get(trial.label, 0.0), 1e-30)),
         "level": level_in_modes(step["modes"], truth, random),
         "among_modes": min(squared) < AMONG_MODES,
+        "seen": trial.press.seen(trial.windows[:windows]) > SEEN,
     }
 
 
@@ -154,6 +158,9 @@ def summary(scores: Sequence[Json]) -> Json:
         "log_loss": float(numpy.mean([one["loss"] for one in scores])),
         "among_modes": sum(one["among_modes"] for one in scores) / count,
     }
+    seen = [one["right"] for one in scores if one["seen"]]
+    record["seen"] = len(seen) / count
+    record["recognised_where_seen"] = sum(seen) / len(seen) if seen else None
     for share in (68, 95):
         record[f"coverage_{share}"] = sum(one["level"] < share / 100.0 for one in scores) / count
     for name, errors in (("mm", mm), ("deg", deg)):
@@ -251,7 +258,7 @@ def program() -> None:
                         touches, grids, trace=True, none=0.0, device=device, **model
                     )
                     for n in WINDOWS:
-                        scores[sensor][n].append(score(record["trace"][n - 1], trial, random))
+                        scores[sensor][n].append(score(record["trace"][n - 1], trial, n, random))
                 if example is None and scores["learned"][5][-1]["right"]:
                     example = trial, record["trace"], {one.label: one.press for one in trials}
     document: Json = {

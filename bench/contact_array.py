@@ -71,6 +71,14 @@ class Press(NamedTuple):
         return numpy.array(drawn)
 
 
+    def seen(self, windows: Ints) -> float:
+        """The share of the contact that lies under the windows."""
+        under = numpy.zeros_like(self.contact)
+        for j, i in PIXELS * windows:
+            under[j : j + PIXELS * WINDOW, i : i + PIXELS * WINDOW] = True
+        return float((self.contact & under).sum() / self.contact.sum())
+
+
 def read_presses(path: pathlib.Path) -> list[Press]:
     """The presses of a file of numpy.savez: `capacitance`, `mask_bits` and `participant`."""
     shapes: dict[str, tuple[int, ...]] = {
@@ -120,7 +128,7 @@ class Registration(NamedTuple):
     def poses(self, windows: Ints) -> Floats:
         """Poses of windows in the sheet [n, 3]: the middle's, turned as the shift turns about it."""
         middles = windows[:, ::-1] + (WINDOW - 1) / 2.0
-        places_mm: Floats = PITCH_MM * middles + (PIXELS - 1) / 2.0 * PIXEL_MM
+        places_mm = numpy.asarray(PITCH_MM * middles + (PIXELS - 1) / 2.0 * PIXEL_MM, float)
         x, y = (
             self.shift_mm(numpy.add(places_mm, step)) - self.shift_mm(numpy.subtract(places_mm, step))
             for step in ((0.5, 0.0), (0.0, 0.5))
