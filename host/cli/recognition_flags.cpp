@@ -29,7 +29,7 @@ void add_filter_flags(CLI::App& command, Request& request) {
           "histogram: evaluates every pose bin; bounded: the same bins, but evaluates only those "
           "that matter and proves how little the others can; particles: the paper's particle "
           "filter; auto: bounded for more than {} bins of all objects together, else histogram. "
-          "Bounded refuses --slip-sd-*, --memory-mib and --fit-touch-sd; auto then takes the "
+          "Bounded refuses --memory-mib and --fit-touch-sd; auto then takes the "
           "histogram, as it does for --posterior [default: auto]",
           most_histogram_bins));
   command.add_option("--tolerance", request.tolerance,

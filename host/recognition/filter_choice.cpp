@@ -84,10 +84,6 @@ std::vector<HistogramNeed> all_needs(const Request& request, const HistogramNeed
   if (!of_caller.why.empty()) {
     needs.push_back({fmt::format("`{}`", of_caller.option), of_caller.why});
   }
-  if (const std::string slip = giver_of(request, {slip_mm(request), slip_deg(request)});
-      !slip.empty()) {
-    needs.push_back({slip, "bounds take the object to rest between touches"});
-  }
   if (request.memory_mib) {
     needs.push_back({"`memory-mib`", "has no effect on bounds, whose memory is the host's"});
   }
@@ -119,6 +115,11 @@ BoundedOptions asked_bounds(const Request& request, const HistogramOptions& hist
     bounded.tolerance = *request.tolerance;
   }
   if (request.budget_ms) {
+    if (const std::string slip = giver_of(request, {slip_mm(request), slip_deg(request)});
+        !slip.empty()) {
+      refuse_given(request, "budget-ms",
+                   "a belief that slips cannot be cut short; leave it out, or {}", slip);
+    }
     bounded.budget_s = 1e-3 * require_above_0("budget-ms", *request.budget_ms);
   }
   if (request.evidence_nats) {
@@ -243,12 +244,13 @@ void require_within_region(const Request& request, const PoseLattice& lattice) {
 }
 
 std::optional<BoundedOptions> bounded_instead(const HistogramOptions& histogram) {
-  if (!histogram.slip_sd.none() || histogram.memory_limit_bytes) {
+  if (histogram.memory_limit_bytes) {
     return {};
   }
   return BoundedOptions{.lattice = histogram.lattice,
                         .contact = histogram.contact,
                         .touch_sd = histogram.touch_sd,
+                        .slip_sd = histogram.slip_sd,
                         .none_weight = histogram.none_weight};
 }
 

@@ -49,7 +49,7 @@ inline constexpr std::int64_t most_histogram_bins = 100'000;
 inline constexpr std::int64_t most_bounded_bins = 1'000'000'000;
 
 /// The options of a bounded posterior of the same bins; none where the histogram allows for
-/// something that bounds do not: slip_sd, or a limit of its memory.
+/// something that bounds do not: a limit of its memory.
 std::optional<BoundedOptions> bounded_instead(const HistogramOptions& histogram);
 
 /// Bins that balanced_lattice() chose.

@@ -82,8 +82,15 @@ const ContactModel& RecognitionTask::contact() const {
 }
 
 DisplacementSd RecognitionTask::slip_sd() const {
-  const auto* histogram = std::get_if<HistogramOptions>(&filter);
-  return histogram != nullptr ? histogram->slip_sd : DisplacementSd{};
+  return std::visit(
+      [](const auto& one) {
+        if constexpr (requires { one.slip_sd; }) {
+          return one.slip_sd;
+        } else {
+          return DisplacementSd{};
+        }
+      },
+      filter);
 }
 
 FilterOptions opened_filter(const RecognitionTask& task) {

@@ -84,18 +84,17 @@ bool encloses_area(const std::vector<glm::dvec2>& polygon) {
 }
 
 BoundingBox bounds_of(const Shape& shape) {
-  // 1 km: far beyond any object, yet rounding does not swallow a cell there.
-  constexpr double farthest_mm = 1e6;
   BoundingBox box;
   const auto include = [&](const glm::dvec2& p, double width_mm) {
-    // Written so that NaN is refused.
-    if (!(std::abs(p.x) <= farthest_mm && std::abs(p.y) <= farthest_mm && width_mm >= 0.0 &&
-          width_mm <= farthest_mm)) {
+    // Written so that NaN is refused. 1 km is far beyond any object, yet rounding does not swallow
+    // a cell there.
+    if (!(std::abs(p.x) <= most_length_mm && std::abs(p.y) <= most_length_mm && width_mm >= 0.0 &&
+          width_mm <= most_length_mm)) {
       throw Error(
           Fault::input,
           fmt::format("shape '{}': point {},{} of a line {} mm wide: give coordinates within "
                       "{} mm of 0 and a width that is not negative",
-                      shape.label, p.x, p.y, width_mm, farthest_mm));
+                      shape.label, p.x, p.y, width_mm, most_length_mm));
     }
     box.take_in(p - width_mm / 2.0);
     box.take_in(p + width_mm / 2.0);

@@ -24,10 +24,9 @@ TEST_F(BoundedFilter, IsAskedForByASceneToo) {
   scene("filter: auto\n");
   EXPECT_FALSE(u({"--scene", "scene.yaml"}).contains("dropped_mass"));
   scene("filter: bounded\nslip_sd: {mm: 1}\n");
-  refused({"--scene", "scene.yaml"},
-          {"slip_sd mm in scene.yaml", "rest", "leave it out", "filter: bounded in scene.yaml"});
-  EXPECT_TRUE(u({"--scene", "scene.yaml", "--slip-sd-mm", "0"}).contains("dropped_mass"))
-      << "at rest after all";
+  EXPECT_TRUE(u({"--scene", "scene.yaml"}).contains("dropped_mass"));
+  refused({"--scene", "scene.yaml", "--budget-ms", "9"},
+          {"--budget-ms", "cut short", "leave it out, or slip_sd mm in scene.yaml"});
   scene("filter: histogram\n");
   refused({"--scene", "scene.yaml", "--tolerance", "0.1"}, {"--tolerance", "has no effect"});
 }
@@ -36,14 +35,9 @@ TEST_F(BoundedFilter, RefusesWhatNeedsTheHistogram) {
   for (const Arguments& asks : {Arguments{"--filter", "bounded"}, Arguments{"--tolerance", "1e-3"},
                                 Arguments{"--budget-ms", "9"}, Arguments{"--evidence-nats", "1"}}) {
     const std::string by = asks.front() == "--filter" ? "--filter bounded" : asks.front();
-    for (const auto& [flag, value, why] : {std::tuple{"--slip-sd-mm", "0.5", "at rest"},
-                                           {"--slip-sd-deg", "3", "at rest"},
-                                           {"--memory-mib", "100", "has no effect"}}) {
-      Arguments flags = asks;
-      flags.insert(flags.end(), {flag, value});
-      refused(flags, {std::string(flag) + ": ", std::string(why) == "at rest" ? "rest" : why,
-                      "leave it out, or " + by});
-    }
+    Arguments memory = asks;
+    memory.insert(memory.end(), {"--memory-mib", "100"});
+    refused(memory, {"--memory-mib: ", "has no effect", "leave it out, or " + by});
     Arguments fit = asks;
     fit.emplace_back("--fit-touch-sd");
     refused(fit, {"--fit-touch-sd", "leave it out, or " + by});
@@ -80,8 +74,11 @@ TEST_F(BoundedFilter, AutoTakesItForManyBins) {
   EXPECT_THAT(engine(many), HasSubstr("100352 bins in all, more than 100000"));
   EXPECT_THAT(engine(few), HasSubstr("filter: histogram in "));
   EXPECT_THAT(engine(few), HasSubstr("99904 bins in all, at most 100000"));
-  for (const Arguments& needs : {Arguments{"--slip-sd-mm", "0.5"}, Arguments{"--memory-mib", "500"},
-                                 Arguments{"--posterior", "p.h5"}}) {
+  Arguments slips = many;
+  slips.insert(slips.end(), {"--slip-sd-mm", "0.5"});
+  EXPECT_THAT(engine(slips), HasSubstr("filter: bounded, "));
+  for (const Arguments& needs :
+       {Arguments{"--memory-mib", "500"}, Arguments{"--posterior", "p.h5"}}) {
     Arguments flags = many;
     flags.insert(flags.end(), needs.begin(), needs.end());
     EXPECT_THAT(engine(flags), HasSubstr("filter: histogram in "));
@@ -98,8 +95,8 @@ TEST_F(BoundedFilter, AutoTakesItForManyBins) {
 }
 
 TEST_F(BoundedFilter, AutoNamesTheFlagThatKeepsALargeLatticeFromIt) {
-  for (const Arguments& flags : {Arguments{"--slip-sd-deg=2"}, Arguments{"--memory-mib=9"},
-                                 Arguments{"--posterior=p.h5"}, Arguments{"--filter=histogram"}}) {
+  for (const Arguments& flags : {Arguments{"--memory-mib=9"}, Arguments{"--posterior=p.h5"},
+                                 Arguments{"--filter=histogram"}}) {
     const std::string name = flags[0].starts_with("--filter")
                                  ? "--filter histogram"
                                  : flags[0].substr(0, flags[0].find('='));
@@ -110,9 +107,12 @@ TEST_F(BoundedFilter, AutoNamesTheFlagThatKeepsALargeLatticeFromIt) {
   expect_refused({"recognize", "u.h5", "--maps", "maps", "--bins=4000x4000x300", "--filter=bounded",
                   "--touch-sd-mm=0.5"},
                  {"MiB", "use fewer bins"});
+  expect_refused({"recognize", "u.h5", "--maps", "maps", "--bins=4000x4000x300", "--filter=bounded",
+                  "--slip-sd-deg=2"},
+                 {"MiB", "use fewer bins"});
   expect_refused({"recognize", "u.h5", "--maps", "maps", "--bins=4000x4000x300",
-                  "--filter=histogram", "--slip-sd-deg=2"},
-                 {"leave out --slip-sd-deg and --filter histogram"});
+                  "--filter=histogram", "--memory-mib=9"},
+                 {"leave out --memory-mib and --filter histogram"});
 }
 
 TEST_F(BoundedFilter, IsRefusedWhereTheMachineHasNoRoomForIt) {

@@ -12,7 +12,6 @@
 
 namespace palpate::map_drawing_test {
 
-using testing::ElementsAre;
 using testing::HasSubstr;
 
 // A bar 20 mm wide and 4 mm high whose left end is 10 mm high: an L lying on its back.
@@ -142,6 +141,35 @@ TEST_F(MapDrawing, IsRecognisedBesideTouchedObjectsOfAnotherPrior) {
   const auto record = nlohmann::json::parse(std::ifstream(folder_ / "u.json"))[0];
   EXPECT_EQ(record["best"], "I");
   EXPECT_LT(record["refined_error_mm"].get<double>(), 1.0);
+}
+
+TEST_F(MapDrawing, TellsCalibrateWhereTheArraySitsInTheTool) {
+  write_svg("I.svg", "width='10mm' height='30mm' viewBox='0 0 10 30'",
+            "<path d='M5 4.75V25.25' stroke='#000' stroke-width='4.5' stroke-linecap='round'/>");
+  done({"map", "I.svg", "-o", "I.map.h5"});
+  Recording touches = sample_training("I", 96);
+  const std::vector<glm::dvec2> sits = touches.elements_mm;
+  for (glm::dvec2& p : touches.elements_mm) {
+    p -= glm::dvec2(2.0, -1.0);
+  }
+  for (Pose& pose : touches.T_robot_sensor) {
+    pose.translation_mm += glm::dvec2(5.0, 15.0);  // the robot's frame is the drawing's
+  }
+  write_recording(folder_ / "I.h5", touches);
+  const Outcome outcome = palpate(
+      {"calibrate", "I.h5", "--maps", "I.map.h5", "-o", "s.yaml", "--write-array", "array.csv"});
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("the array sits in the tool at x +"));
+  std::ifstream array(folder_ / "array.csv");
+  std::string line;
+  ASSERT_TRUE(std::getline(array, line) && line == "x,y");
+  for (const glm::dvec2& p : sits) {
+    glm::dvec2 found;
+    char comma = ' ';
+    ASSERT_TRUE(array >> found.x >> comma >> found.y);
+    EXPECT_NEAR(found.x, p.x, 0.25);
+    EXPECT_NEAR(found.y, p.y, 0.25);
+  }
 }
 
 TEST_F(MapDrawing, RefusesWhatIsNotInTheDrawing) {

@@ -6,6 +6,8 @@
 #include <limits>
 #include <numbers>
 
+#include "estimation/lattice/refinement.hpp"
+
 namespace palpate {
 
 double Uniform::operator()(double lower, double upper) {
@@ -86,14 +88,18 @@ reference::Posterior reference_posterior(std::span<const Hypothesis> hypotheses,
                                         options.contact, object);
     };
     std::vector<double>& logs = posterior.log_likelihood.emplace_back();
-    if (options.touch_sd.none()) {
+    if (options.touch_sd.none() && options.slip_sd.none()) {
       logs = of_touches(touches);
     } else {
       logs.resize(static_cast<std::size_t>(options.lattice.bins()));
-      for (const Touch& touch : touches) {
+      const glm::dvec2 centroid_mm = displaced_body(hypothesis.map).centroid_mm;
+      for (std::size_t i = 0; i < touches.size(); ++i) {
+        if (i > 0 && !options.slip_sd.none()) {
+          logs = reference::slipped(logs, options.lattice, options.slip_sd, centroid_mm);
+        }
         const std::vector<double> mean =
-            reference::displaced_touch(of_touches(std::span(&touch, 1)), options.lattice,
-                                       options.touch_sd, touch.T_robot_sensor);
+            reference::displaced_touch(of_touches(touches.subspan(i, 1)), options.lattice,
+                                       options.touch_sd, touches[i].T_robot_sensor);
         std::ranges::transform(logs, mean, logs.begin(), std::plus());
       }
     }

@@ -63,6 +63,8 @@ def test_an_axis_or_a_displacement_of_another_form_is_refused_by_name(
     for name in ("touch_sd", "slip_sd"):
         with pytest.raises(TypeError, match=rf"^{name}: give a DisplacementSd or \(mm, rad\)"):
             palpate.PoseHistogram(device, maps, **{name: (1,)})
+        with pytest.raises(TypeError, match=rf"^{name}: give a DisplacementSd or \(mm, rad\)"):
+            palpate.BoundedPosterior(device, maps, **{name: (1,)})
 
 
 def test_what_a_path_raises_is_raised(tmp_path: pathlib.Path) -> None:

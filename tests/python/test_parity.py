@@ -24,6 +24,8 @@ SMALL = ["--bins", "10x10x8"]
         (["--x-mm=-7.5:7.5", "--bins", "12x9x7", "--pivot-mm", "0.25,-1", "--theta-deg", "0:180"],
          {"x_mm": (-7.5, 7.5), "bins": (12, 9, 7), "pivot_mm": (0.25, -1), "theta_deg": (0, 180)}),
         (["--filter", "bounded", "--tolerance", "1e-3"], {"filter": "bounded", "tolerance": 1e-3}),
+        ([*SMALL, "--filter", "bounded", "--slip-sd-mm", "1"],
+         {"bins": (10, 10, 8), "filter": "bounded", "slip_sd_mm": 1}),
         ([*SMALL, "--filter", "bounded", "--touch-sd-mm", "1", "--touch-sd-deg", "3"],
          {"bins": (10, 10, 8), "filter": "bounded", "touch_sd_mm": 1, "touch_sd_deg": 3}),
         (["--filter", "particles", "--particles", "500", "--seed", "3"],

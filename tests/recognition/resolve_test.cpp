@@ -77,8 +77,10 @@ TEST(Resolve, AnOptionOfBoundsAsksForBounds) {
                    2.0 * std::numbers::pi / 180.0);
   EXPECT_DOUBLE_EQ(task_of(request).touch_sd().rad, 2.0 * std::numbers::pi / 180.0);
   request.slip_sd_deg = 2.0;
-  EXPECT_THAT(refusal(request), HasSubstr("`slip-sd-deg`: bounds take the object to rest between "
-                                          "touches; leave it out, or `tolerance`"));
+  EXPECT_DOUBLE_EQ(task_of(request).slip_sd().rad, 2.0 * std::numbers::pi / 180.0);
+  request.budget_ms = 10.0;
+  EXPECT_THAT(refusal(request), HasSubstr("`budget-ms`: a belief that slips cannot be cut short; "
+                                          "leave it out, or `slip-sd-deg`"));
 }
 
 TEST(Resolve, CountsThatWereSettledBeforeStand) {
@@ -160,11 +162,12 @@ TEST(Request, ARefusalNamesTheOptionOrTheScenesKey) {
   const SceneFile scene("{filter: bounded, slip_sd: {deg: 2}}");
   Request request = request_of_shapes();
   request.scene = scene.path();
+  request.memory_mib = 100;
   EXPECT_EQ(refusal(complete(request)),
-            "slip_sd deg in " + scene.path() +
-                ": bounds take the object to rest between touches; leave it out, or filter: "
-                "bounded in " +
+            "`memory-mib`: has no effect on bounds, whose memory is the host's; leave it out, or "
+            "filter: bounded in " +
                 scene.path());
+  request.memory_mib.reset();
   request.filter = FilterKind::particles;
   request.none = Automatic{};
   EXPECT_THAT(refusal(complete(request)), HasSubstr("`none`: particles have no mean"));

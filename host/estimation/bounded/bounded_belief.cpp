@@ -97,6 +97,9 @@ BoundedBelief::BoundedBelief(std::span<const Hypothesis> hypotheses, const Bound
       space_(arena_.execute([&] { return SearchSpace(hypotheses_, options_); })),
       touches_(!options_.touch_sd.none()),
       search_(space_, options_, likelihood_) {
+  if (!options_.slip_sd.none()) {
+    moving_.emplace(space_, options_, likelihood_, hypotheses_);
+  }
   if (options_.none_weight) {
     none_.emplace(space_, options_, likelihood_);
     none_log_weight_ = none_log_weight(*options_.none_weight, hypotheses_, options_.lattice);
@@ -109,6 +112,9 @@ void BoundedBelief::reset() {
   taken_in_ = 0;
   elements_ = {};
   search_.largest().reset();
+  if (moving_) {
+    moving_->reset();
+  }
   found_.reset();
   followed_.reset();
   if (none_) {
@@ -134,7 +140,7 @@ void BoundedBelief::take_in() {
     return;
   }
   change_.change([&] {
-    if (found_ && found_->bins.complete() &&
+    if (!moving_ && found_ && found_->bins.complete() &&
         found_->bins.values().size() <= FollowedBins::most_bins) {
       followed_.emplace(found_->bins, found_->result, space_.log_weight, taken_in_);
     }
@@ -144,7 +150,11 @@ void BoundedBelief::take_in() {
     for (const ArrayReadings& touch : added) {
       known.push_back(known_elements(touch));
     }
-    arena_.execute([&] { search_.largest().add(known); });
+    if (moving_) {
+      std::ranges::for_each(known, [&](const KnownElements& touch) { moving_->add(touch); });
+    } else {
+      arena_.execute([&] { search_.largest().add(known); });
+    }
     known.insert(known.begin(), std::move(elements_));
     elements_ = merged(known);
     if (none_) {
@@ -161,6 +171,8 @@ std::string BoundedBelief::path() const {
 
 std::uint64_t BoundedBelief::bytes() const {
   return likelihood_.bytes() + space_.bytes() + search_.largest().bytes() +
+         static_cast<std::uint64_t>(
+             moving_ ? MovingBelief::bytes_needed(options_.lattice, hypotheses_.size()) : 0.0) +
          (found_ ? found_->bins.bytes() : 0) + (none_ ? none_->bytes() : 0);
 }
 
@@ -241,7 +253,25 @@ BoundedBelief::Found BoundedBelief::run(const SearchGoal& goal, Deadline& deadli
 
 SearchResult BoundedBelief::run(const SearchGoal& goal, const Deadline& deadline,
                                 const BinVisitor& visitor, std::vector<PoseBlock>* refined) {
-  return arena_.execute([&] { return search_.run(elements_, goal, deadline, visitor, refined); });
+  return arena_.execute([&] {
+    return moving_ ? moving_->find(goal, deadline, visitor)
+                   : search_.run(elements_, goal, deadline, visitor, refined);
+  });
+}
+
+std::vector<double> BoundedBelief::log_likelihood(std::span<const BinBox> boxes,
+                                                  Arithmetic arithmetic) {
+  if (moving_) {
+    arena_.execute([&] { moving_->take_in(until({})); });
+    return moving_->log_likelihood(boxes);
+  }
+  std::size_t bins = 0;
+  for (const BinBox& box : boxes) {
+    bins += static_cast<std::size_t>(box.bins());
+  }
+  std::vector<double> logs(bins);
+  arena_.execute([&] { likelihood_.evaluate(boxes, elements_, arithmetic, logs); });
+  return logs;
 }
 
 void BoundedBelief::visit(const BinVisitor& visitor) {
@@ -272,7 +302,10 @@ bool BoundedBelief::follow() {
 
 std::vector<DrawnBin> BoundedBelief::draw(std::size_t count, Random& random) {
   const bool followed = !found_ && follow();
-  if (!followed && !(found_ && found_->bins.complete())) {
+  if (moving_ && !found_) {
+    Deadline never = until({});
+    found_ = run(rough_goal(), never);
+  } else if (!moving_ && !followed && !(found_ && found_->bins.complete())) {
     Deadline deadline = until(options_.budget_s);
     // Rejection looks at tiles here and there, which share little of what uncertain touches reach.
     const bool many_bins = bins_in_all() > most_searched_bins && options_.touch_sd.none();

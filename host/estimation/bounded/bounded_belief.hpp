@@ -12,6 +12,7 @@
 #include "estimation/bounded/evaluated_bins.hpp"
 #include "estimation/bounded/known_elements.hpp"
 #include "estimation/bounded/leaves/bin_likelihood.hpp"
+#include "estimation/bounded/moving/moving_belief.hpp"
 #include "estimation/bounded/none_evidence.hpp"
 #include "estimation/bounded/search/bound_search.hpp"
 #include "estimation/bounded/search/search_space.hpp"
@@ -40,6 +41,11 @@ class BoundedBelief {
   const BoundedOptions& options() const { return options_; }
   const std::vector<Hypothesis>& hypotheses() const { return hypotheses_; }
   const BinLikelihood& likelihood() const { return likelihood_; }
+  /// Log-likelihood of bins, box after box, [y, x] in each, in nats; see MovingBelief where objects
+  /// slip.
+  std::vector<double> log_likelihood(std::span<const BinBox> boxes, Arithmetic arithmetic);
+  /// Whether touches were taken in.
+  bool touched() const { return taken_in_ > 0; }
   /// [hypothesis] log of its prior weight.
   const std::vector<double>& log_weight() const { return space_.log_weight; }
   std::string path() const;
@@ -117,6 +123,7 @@ class BoundedBelief {
   std::size_t taken_in_ = 0;              ///< of the touches
   KnownElements elements_;                ///< of all these
   BoundSearch search_;                    ///< through all these
+  std::optional<MovingBelief> moving_;    ///< through all these, where objects slip
   std::optional<NoneEvidence> none_;      ///< of all these, where the options ask for it
   std::optional<Found> found_;            ///< of all these; nothing before a search
   std::optional<FollowedBins> followed_;  ///< of the last search before, through some of these

@@ -62,6 +62,13 @@ BoundedOptions checked(const BoundedOptions& options, std::span<const Hypothesis
   BoundedOptions all = options;
   all.lattice.collapse_fixed().validate();
   validate_displacement(all.touch_sd, all.lattice, "touch_sd");
+  validate_displacement(all.slip_sd, all.lattice, "slip_sd");
+  if (options.budget_s && !options.slip_sd.none()) {
+    throw Error(Fault::input,
+                fmt::format("budget_s = {}: a belief that slips cannot be cut short; leave it out, "
+                            "or leave out slip_sd",
+                            *options.budget_s));
+  }
   all.contact = resolve(options.contact, hypotheses);
   if (const std::string why = why_no_room(hypotheses, all, memory_for_search()); !why.empty()) {
     throw Error(Fault::input, why);
@@ -133,8 +140,12 @@ Estimate BoundedPosterior::estimate() const {
   }
   // Dropped and rounding mass over the whole that they are part of.
   const double dropped = found.uncertain();
+  std::vector<LogInterval> evidence = bounds;
+  for (LogInterval& of : evidence) {
+    of = {of.low - found.shared_nats, of.high + found.shared_nats};
+  }
   Certificate certificate{.dropped_mass = std::isfinite(dropped) ? dropped / (1.0 + dropped) : 1.0,
-                          .log_evidence = bounds,
+                          .log_evidence = std::move(evidence),
                           .mode_certain = found.mode_certain,
                           .blocks_bounded = found.blocks_bounded,
                           .bins_evaluated = found.bins_evaluated};
@@ -159,8 +170,8 @@ Estimate BoundedPosterior::estimate() const {
   for (std::size_t i = 0; i < bounds.size(); ++i) {
     LogSum others_low;
     LogSum others_high;
-    others_low.add(none.low);
-    others_high.add(none.high);
+    others_low.add(none.low - found.shared_nats);
+    others_high.add(none.high + found.shared_nats);
     for (std::size_t other = 0; other < bounds.size(); ++other) {
       if (other != i) {
         others_low.add(bounds[other].low);
@@ -185,10 +196,12 @@ Estimate BoundedPosterior::estimate() const {
 RefinedPose BoundedPosterior::refine(const Mode& mode) const {
   Impl& posterior = whole();
   require_object(mode.object, posterior.bodies.size());
-  const BoundedBelief& belief = posterior.belief;
+  BoundedBelief& belief = posterior.belief;
   // Where bins are very fine, a few of them tell the peak, and all would take long. A mean over
-  // displacements takes the others all the same.
-  const PoseLattice fit = belief.options().touch_sd.none() ? thinned(lattice()) : lattice();
+  // displacements takes the others all the same, and a belief that slips has them.
+  const BoundedOptions& options = belief.options();
+  const PoseLattice fit =
+      options.touch_sd.none() && options.slip_sd.none() ? thinned(lattice()) : lattice();
   const bool thin = fit.plane() != lattice().plane();
   std::optional<BinLikelihood> of_thin;
   Mode start = mode;
@@ -198,15 +211,17 @@ RefinedPose BoundedPosterior::refine(const Mode& mode) const {
       start.bin = fit.bin_of(lattice().T_object_robot(*mode.bin));
     }
   }
-  const BinLikelihood& likelihood = thin ? *of_thin : belief.likelihood();
   const auto log_likelihood = [&](std::span<const BinBox> boxes) {
+    if (!thin) {
+      return belief.log_likelihood(boxes, Arithmetic::float32);
+    }
     std::size_t bins = 0;
     for (const BinBox& box : boxes) {
       bins += static_cast<std::size_t>(box.bins());
     }
     std::vector<double> logs(bins);
     belief.on_threads(
-        [&] { likelihood.evaluate(boxes, belief.elements(), Arithmetic::float32, logs); });
+        [&] { of_thin->evaluate(boxes, belief.elements(), Arithmetic::float32, logs); });
     return logs;
   };
   return palpate::refine(log_likelihood, fit, posterior.bodies[mode.object], start);
@@ -317,9 +332,9 @@ double BoundedPosterior::log_likelihood(int object, const Pose& T_object_robot) 
     throw Error(Fault::input, fmt::format("pose {}, {}, {}: give finite numbers", translation_mm.x,
                                           translation_mm.y, theta_rad));
   }
-  const BoundedBelief& belief = posterior.belief;
+  BoundedBelief& belief = posterior.belief;
   const KnownElements& elements = belief.elements();
-  if (!belief.options().touch_sd.none()) {
+  if (!belief.options().touch_sd.none() || !belief.options().slip_sd.none()) {
     const std::int64_t bin = lattice().bin_of(T_object_robot);
     const auto row = static_cast<std::int32_t>(bin / lattice().x_mm.count);
     const BinBox box{.object = object,
@@ -328,12 +343,7 @@ double BoundedPosterior::log_likelihood(int object, const Pose& T_object_robot) 
                      .y_count = 1,
                      .x_first = static_cast<std::int32_t>(bin % lattice().x_mm.count),
                      .x_count = 1};
-    double value = 0.0;
-    belief.on_threads([&] {
-      belief.likelihood().evaluate(std::span(&box, 1), elements, Arithmetic::float64,
-                                   std::span(&value, 1));
-    });
-    return value;
+    return belief.log_likelihood(std::span(&box, 1), Arithmetic::float64).front();
   }
   const ContactModel& contact = belief.options().contact;
   const InterpolatedMap map(belief.hypotheses()[object].compared(), *contact.prior);
@@ -377,8 +387,13 @@ std::vector<TouchGain> BoundedPosterior::expected_gain(std::span<const Pose> T_r
   if (!posterior.predictor) {
     posterior.predictor.emplace(belief.hypotheses(), belief.options().contact);
   }
-  return palpate::expected_gain(*posterior.predictor, belief.sample(plan.samples, plan.seed),
-                                T_robot_sensor, elements_mm, belief.options().touch_sd, plan);
+  std::vector<PoseSample> samples = belief.sample(plan.samples, plan.seed);
+  if (belief.touched() && !belief.options().slip_sd.none()) {
+    // The object slips between touches, not before the first.
+    slip(samples, posterior.bodies, belief.options().slip_sd, plan.seed);
+  }
+  return palpate::expected_gain(*posterior.predictor, samples, T_robot_sensor, elements_mm,
+                                belief.options().touch_sd, plan);
 }
 
 std::vector<PoseBlock> BoundedPosterior::refined_blocks() const {

@@ -23,6 +23,12 @@ Trial make_trial(const std::array<int, 3>& bins, std::uint64_t seed);
 /// about pivots near and far, on lattices some of which have an axis of one bin.
 Trial make_displaced_trial(const std::array<int, 3>& bins, std::uint64_t seed);
 
+/// The same where objects slip, some of them between touches that are uncertain, too.
+Trial make_slipping_trial(const std::array<int, 3>& bins, std::uint64_t seed);
+
+/// Three objects that slip between 20 touches of the first, after which few bins matter.
+Trial make_long_slipping_trial(const std::array<int, 3>& bins, std::uint64_t seed);
+
 Recording first_touches(const Recording& recording, std::size_t touches);
 
 /// Runs trials and expects their certificates to hold; prints the largest error and certificate.

@@ -10,16 +10,15 @@ namespace palpate {
 namespace {
 
 /// Penalties that float32 holds exactly; larger ones count as much, which leaves bounds true.
-constexpr std::uint32_t exact_penalties = std::uint32_t{1} << 24;
+constexpr std::uint32_t exact_most = std::uint32_t{1} << 24;
 
 }  // namespace
 
-std::vector<std::int32_t> displaced_penalties(const SearchSpace& space, std::size_t object,
-                                              std::size_t level, const KnownElements& touch,
-                                              std::span<const BlockRun> targets) {
-  const TileBounds& bounds = space.bounds[object];
-  const TileLevel& tiling = bounds.levels()[level];
-  const auto source = [&](std::span<const BlockRun> runs, const PlaceRows<float>& rows) {
+PlaceSource<float> exact_penalties(const SearchSpace& space, std::size_t object, std::size_t level,
+                                   const KnownElements& touch) {
+  return [&, object, level](std::span<const BlockRun> runs, const PlaceRows<float>& rows) {
+    const TileBounds& bounds = space.bounds[object];
+    const TileLevel& tiling = bounds.levels()[level];
     thread_local WindowPlaces placed;
     bounds.place(level, space.turns[static_cast<std::size_t>(runs.front().theta)], touch, placed);
     for (const BlockRun& run : runs) {
@@ -30,15 +29,20 @@ std::vector<std::int32_t> displaced_penalties(const SearchSpace& space, std::siz
         for (int j = 0; j < batch_side && tiling.y.bins(y + j) > 0; ++j) {
           float* const row = rows.at(x, y + j);
           for (int i = 0; i < batch_side && tiling.x.bins(x + i) > 0; ++i) {
-            row[i] = static_cast<float>(std::min(sums[batch_side * i + j], exact_penalties)) *
+            row[i] = static_cast<float>(std::min(sums[batch_side * i + j], exact_most)) *
                      static_cast<float>(-1.0 / penalties_per_nat);
           }
         }
       }
     }
   };
-  const std::vector<double> logs =
-      space.displaced[level].bounds(touch.sensor_from_pivot_mm, targets, source);
+}
+
+std::vector<std::int32_t> displaced_penalties(const SearchSpace& space, std::size_t object,
+                                              std::size_t level, const KnownElements& touch,
+                                              std::span<const BlockRun> targets) {
+  const std::vector<double> logs = space.displaced[level].bounds(
+      touch.sensor_from_pivot_mm, targets, exact_penalties(space, object, level, touch));
   std::vector<std::int32_t> penalties(logs.size());
   for (std::size_t batch = 0; batch < logs.size(); batch += batch_tiles) {
     for (std::size_t i = 0; i < batch_side; ++i) {

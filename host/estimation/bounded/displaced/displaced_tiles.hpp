@@ -11,6 +11,12 @@
 
 namespace palpate {
 
+/// Gives the negative of lower bounds of a touch's penalties over tiles of one level, in nats, as
+/// if the touch's pose were exact: relative to TileBounds::best().
+/// @param space,touch outlive the result
+PlaceSource<float> exact_penalties(const SearchSpace& space, std::size_t object, std::size_t level,
+                                   const KnownElements& touch);
+
 /// Lower bounds of a touch's penalties over tiles of one level, where its pose is uncertain: those
 /// of its mean likelihood. Below 0 where the mean may exceed what TileBounds::best() says.
 /// @param touch one of KnownElements::touches

@@ -74,6 +74,7 @@ std::vector<Tap> DisplacementWeights::taps(int theta,
       continue;
     }
     Tap tap{.theta = ((theta + k) % angles.count + angles.count) % angles.count,
+            .steps = k,
             .weight = weight_at(k, angles, sd_.rad)};
     const glm::dvec2 shift_mm =
         k == 0 ? glm::dvec2(0.0)

@@ -27,6 +27,7 @@ struct AxisBlur {
 /// away along x and y.
 struct Tap {
   int theta = 0;
+  int steps = 0;  ///< of theta, by which it is turned
   double weight = 0.0;
   glm::ivec2 bins{0};
   glm::dvec2 fraction{0.0};

@@ -90,6 +90,8 @@ struct HypothesisMass {
 /// What a search by bounds returns.
 struct SearchResult {
   std::vector<HypothesisMass> mass;  ///< [hypothesis]
+  /// All masses may be wrong by one factor that they share, e^-shared_nats to e^shared_nats.
+  double shared_nats = 0.0;
   std::int32_t best_object = 0;
   std::int64_t best_bin = 0;
   double best_log_likelihood = 0.0;  ///< of the best bin, without prior weights

@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "estimation/bounded/leaves/bin_kernel.hpp"
+#include "estimation/bounded/moving/moving_belief.hpp"
 #include "estimation/bounded/search/leaves.hpp"
 #include "estimation/bounded/tables/tile_bounds.hpp"
 #include "estimation/bounded/tables/window_table.hpp"
@@ -70,8 +71,8 @@ SearchMemory search_memory(std::span<const Hypothesis> hypotheses, const Bounded
   for (const Hypothesis& hypothesis : hypotheses) {
     least_cell_mm = std::min(least_cell_mm, hypothesis.compared().cell_mm);
   }
-  const std::vector<TileSize> sizes =
-      tile_sizes(lattice, least_cell_mm, hypotheses.size(), options.touch_sd);
+  const std::vector<TileSize> sizes = tile_sizes(lattice, least_cell_mm, hypotheses.size(),
+                                                 options.touch_sd, !options.slip_sd.none());
   SearchMemory memory;
   for (const Hypothesis& hypothesis : hypotheses) {
     const OccupancyGrid& map = hypothesis.compared();
@@ -114,6 +115,9 @@ SearchMemory search_memory(std::span<const Hypothesis> hypotheses, const Bounded
   if (!options.touch_sd.none()) {
     // Every plane's mean, and its neighbours' sums.
     memory.means = 2.0 * sizeof(double) * bins_in_all(hypotheses.first(1), lattice);
+  }
+  if (!options.slip_sd.none()) {
+    memory.means += MovingBelief::bytes_needed(lattice, hypotheses.size());
   }
   return memory;
 }

@@ -55,17 +55,19 @@ std::optional<TileSize> single_bins(const PoseLattice& lattice, double least_cel
   return TileSize{.side = side_of_bins(x_cells, y_cells), .bins = 1};
 }
 
+double step_mm(const Axis& axis) { return axis.count > 1 ? axis.step() : 0.0; }
+
+TileSize tile_of_bins(const PoseLattice& lattice, double least_cell_mm, int bins) {
+  const double x_cells = bins * step_mm(lattice.x_mm) / least_cell_mm;
+  const double y_cells = bins * step_mm(lattice.y_mm) / least_cell_mm;
+  return {.side = side_of_bins(std::max(x_cells, 1.0), std::max(y_cells, 1.0)), .bins = bins};
+}
+
 /// Tiles of whole bins, where touches are uncertain.
 std::vector<TileSize> sizes_in_bins(const PoseLattice& lattice, double least_cell_mm,
                                     std::size_t maps, const DisplacementSd& touch_sd) {
-  const auto step_mm = [&](const Axis& axis) { return axis.count > 1 ? axis.step() : 0.0; };
   const double step = std::max(step_mm(lattice.x_mm), step_mm(lattice.y_mm));
-  const auto size_of = [&](int bins) {
-    const double x_cells = bins * step_mm(lattice.x_mm) / least_cell_mm;
-    const double y_cells = bins * step_mm(lattice.y_mm) / least_cell_mm;
-    return TileSize{.side = side_of_bins(std::max(x_cells, 1.0), std::max(y_cells, 1.0)),
-                    .bins = bins};
-  };
+  const auto size_of = [&](int bins) { return tile_of_bins(lattice, least_cell_mm, bins); };
   const double smallest_mm = std::max(smallest_sd * touch_sd.mm, smallest_cells * least_cell_mm);
   int bins = 1;
   while (2 * bins * step <= smallest_mm &&
@@ -128,7 +130,10 @@ TileAxis tile_axis(const Axis& axis, double side_mm) {
 }  // namespace
 
 std::vector<TileSize> tile_sizes(const PoseLattice& lattice, double least_cell_mm, std::size_t maps,
-                                 const DisplacementSd& touch_sd) {
+                                 const DisplacementSd& touch_sd, bool slips) {
+  if (slips) {
+    return {tile_of_bins(lattice, least_cell_mm, slip_tile_bins)};
+  }
   if (!touch_sd.none()) {
     return sizes_in_bins(lattice, least_cell_mm, maps, touch_sd);
   }

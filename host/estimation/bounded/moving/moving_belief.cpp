@@ -1,0 +1,224 @@
+#include "estimation/bounded/moving/moving_belief.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "estimation/bounded/log_sum.hpp"
+#include "estimation/contact_evidence.hpp"
+#include "estimation/lattice/refinement.hpp"
+
+namespace palpate {
+
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+/// Nats below all of the belief at which a tile is not followed, at first; and from which on all
+/// tiles are.
+constexpr double first_depth = 40.0;
+constexpr double last_depth = 160.0;
+/// The log of no mass, as a number.
+constexpr double no_mass = -1e9;
+
+}  // namespace
+
+MovingBelief::MovingBelief(const SearchSpace& space, const BoundedOptions& options,
+                           const BinLikelihood& likelihood, std::span<const Hypothesis> hypotheses)
+    : space_(space),
+      options_(options),
+      weights_(options.lattice, options.slip_sd),
+      log_mean_(static_cast<std::size_t>(options.lattice.bins())),
+      error_(log_mean_.size()) {
+  objects_.reserve(hypotheses.size());
+  for (const Hypothesis& hypothesis : hypotheses) {
+    objects_.emplace_back(SlipTask{space, options.lattice, likelihood, weights_, log_mean_, error_},
+                          objects_.size(), displaced_body(hypothesis.map).centroid_mm);
+  }
+  reset();
+}
+
+double MovingBelief::bytes_needed(const PoseLattice& lattice, std::size_t objects) {
+  // Of every object what is followed, what is missing and what all bins keep; then, of one at a
+  // time, means, errors, what will be missing, and planes: as they are, blurred along y, blurred,
+  // and their neighbours' sums.
+  const double numbers =
+      (lattice.full_circle() ? 2.0 : 3.0) * static_cast<double>(objects) + 3.0 + 4.0;
+  return numbers * sizeof(double) * static_cast<double>(lattice.bins());
+}
+
+void MovingBelief::reset() {
+  touches_.clear();
+  depth_ = first_depth;
+  start();
+}
+
+void MovingBelief::start() {
+  for (MovingObject& object : objects_) {
+    object.start();
+  }
+  stepped_ = 0;
+  prior_log_likelihood_ = 0.0;
+}
+
+void MovingBelief::take_in(const Deadline& deadline) {
+  try {
+    while (stepped_ < touches_.size()) {
+      deadline.cancel_point();
+      step(touches_[stepped_]);
+    }
+  } catch (...) {
+    start();
+    throw;
+  }
+}
+
+void MovingBelief::step(const KnownElements& touch) {
+  const bool slips = stepped_ > 0;
+  std::vector<std::vector<double>> tiles;
+  for (const MovingObject& object : objects_) {
+    tiles.push_back(object.bound_tiles(touch, slips));
+  }
+  const std::vector<double> least = least_followed(tiles);
+  for (std::size_t i = 0; i < objects_.size(); ++i) {
+    objects_[i].step(touch, slips, tiles[i], least[i], depth_ == infinity);
+  }
+  prior_log_likelihood_ += prior_log_likelihood(touch, options_.contact);
+  ++stepped_;
+}
+
+std::vector<double> MovingBelief::least_followed(std::span<const std::vector<double>> tiles) const {
+  std::vector<double> scale;
+  LogSum total;
+  std::vector<LogSum> of_label(objects_.size());
+  for (std::size_t i = 0; i < objects_.size(); ++i) {
+    scale.push_back(space_.log_weight[i] + objects_[i].scale() + objects_[i].over());
+    LogSum sum;
+    for (std::size_t tile = 0; tile < tiles[i].size(); ++tile) {
+      sum.add(tiles[i][tile] + objects_[i].log_bins_of(tile));
+    }
+    of_label[space_.label_of[i]].add(scale[i] + sum.log());
+    total.add(scale[i] + sum.log());
+  }
+  // Where every label's own total is wanted, none is negligible beside all.
+  const double range = options_.evidence_range_nats *
+                       (1.0 + options_.evidence_growth * static_cast<double>(stepped_));
+  std::vector<double> least;
+  for (std::size_t i = 0; i < objects_.size(); ++i) {
+    const double whole = options_.evidence_nats
+                             ? std::max(of_label[space_.label_of[i]].log(), total.log() - range)
+                             : total.log();
+    least.push_back(whole - depth_ - scale[i]);
+  }
+  return least;
+}
+
+SearchResult MovingBelief::find(const SearchGoal& goal, const Deadline& deadline,
+                                const BinVisitor& visit) {
+  take_in(deadline);
+  SearchResult found = result();
+  while (depth_ < infinity && !reaches(found, goal)) {
+    depth_ = depth_ < last_depth ? 2.0 * depth_ : infinity;
+    start();
+    take_in(deadline);
+    found = result();
+  }
+  std::vector<double> logs;
+  for (const MovingObject& object : objects_) {
+    for (const BlockRun& run : object.runs()) {
+      logs.clear();
+      object.for_bins(std::span(&run, 1), [&](std::size_t bin) {
+        logs.push_back(object.scale() + std::max(object.log_mass()[bin], no_mass));
+      });
+      visit(object.box_of(run), logs);
+    }
+  }
+  return found;
+}
+
+SearchResult MovingBelief::result() const {
+  SearchResult found;
+  // The scale of the heaviest object is a factor that all share, as far as it is not known.
+  std::size_t heaviest = 0;
+  const auto mass_of = [&](std::size_t i) {
+    return space_.log_weight[i] + objects_[i].scale() + objects_[i].mass();
+  };
+  for (std::size_t i = 1; i < objects_.size(); ++i) {
+    heaviest = mass_of(i) > mass_of(heaviest) ? i : heaviest;
+  }
+  const MovingObject& shared = objects_[heaviest];
+  found.shared_nats = std::max(shared.over(), shared.under());
+  double best = -infinity;
+  double best_missing = -infinity;
+  for (std::size_t i = 0; i < objects_.size(); ++i) {
+    const MovingObject& object = objects_[i];
+    const double scale = space_.log_weight[i] + object.scale();
+    const double over = i == heaviest ? 0.0 : object.over() + shared.under();
+    const double under = i == heaviest ? 0.0 : object.under() + shared.over();
+    const double part =
+        std::max(std::expm1(object.rounding() + over), -std::expm1(-object.rounding() - under));
+    found.mass.push_back({.evaluated = scale + object.mass(),
+                          .rounding = scale + object.mass() + std::log(part),
+                          .dropped = scale + over + object.rest()});
+    best_missing =
+        std::max(best_missing, scale + over + *std::ranges::max_element(object.log_rest()));
+    object.for_bins(object.runs(), [&](std::size_t bin) {
+      const double log = scale + object.log_mass()[bin];
+      if (log > best) {
+        best = log;
+        found.best_object = static_cast<std::int32_t>(i);
+        found.best_bin = static_cast<std::int64_t>(bin);
+        found.best_log_likelihood = log - space_.log_weight[i];
+      }
+    });
+    found.blocks_bounded += static_cast<std::int64_t>(object.tiles());
+    for (const BlockRun& run : object.runs()) {
+      found.bins_evaluated += object.box_of(run).bins();
+    }
+  }
+  found.mode_certain = best_missing < best;
+  found.contradicted = prior_log_likelihood_ - found.best_log_likelihood > contradiction_nats;
+  return found;
+}
+
+bool MovingBelief::reaches(const SearchResult& found, const SearchGoal& goal) const {
+  // Rounding stays, however many bins are followed.
+  double rounding = 0.0;
+  for (const MovingObject& object : objects_) {
+    rounding = std::max(rounding, object.rounding());
+  }
+  if (!(found.uncertain() <= std::max(goal.tolerance, 2.0 * rounding))) {
+    return false;
+  }
+  if (!goal.evidence_nats) {
+    return true;
+  }
+  std::vector<LogSum> low(found.mass.size());
+  std::vector<LogSum> high(found.mass.size());
+  for (std::size_t i = 0; i < found.mass.size(); ++i) {
+    const LogInterval bounds = found.mass[i].bounds();
+    low[space_.label_of[i]].add(bounds.low);
+    high[space_.label_of[i]].add(bounds.high);
+  }
+  const double least = found.all().evaluated - goal.evidence_range_nats;
+  for (std::size_t i = 0; i < low.size(); ++i) {
+    if (high[i].log() > least && high[i].log() - low[i].log() > *goal.evidence_nats) {
+      return false;
+    }
+  }
+  return true;
+}
+
+std::vector<double> MovingBelief::log_likelihood(std::span<const BinBox> boxes) const {
+  std::vector<double> logs;
+  for (const BinBox& box : boxes) {
+    const MovingObject& object = objects_[box.object];
+    for (std::int64_t i = 0; i < box.bins(); ++i) {
+      const auto bin = static_cast<std::size_t>(box.bin(i, options_.lattice));
+      logs.push_back(object.scale() + object.over() +
+                     log_add(object.log_mass()[bin] + object.rounding(), object.log_rest()[bin]));
+    }
+  }
+  return logs;
+}
+
+}  // namespace palpate

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "estimation/bounded/moving/moving_object.hpp"
+#include "estimation/bounded/search/search_goal.hpp"
+#include "palpate/bounded_posterior.hpp"
+
+namespace palpate {
+
+/// The belief about objects that slip between touches, b_n = L_n c_n W b_(n-1): W averages over
+/// slips, c_n restores the object's mass, and L_n is the touch's likelihood. Bins of the tiles that
+/// may matter are followed in float64. The others have upper bounds, which W and the tiles' bounds
+/// of L_n take from touch to touch. docs/bounds_inside.md has the bound and its proof.
+class MovingBelief {
+ public:
+  /// @param options checked, with a resolved contact model
+  /// @param space with tiles of MovingObject::tile_bins; all of these outlive the belief
+  MovingBelief(const SearchSpace& space, const BoundedOptions& options,
+               const BinLikelihood& likelihood, std::span<const Hypothesis> hypotheses);
+
+  /// Host memory in bytes that so many objects take.
+  static double bytes_needed(const PoseLattice& lattice, std::size_t objects);
+
+  void reset();
+  /// Keeps one more touch for take_in().
+  void add(KnownElements touch) { touches_.push_back(std::move(touch)); }
+  /// Takes in the touches that were kept, each after a slip unless it is the first. Begins anew the
+  /// next time where the deadline's cancel point throws.
+  void take_in(const Deadline& deadline);
+  /// Takes them in, and follows more bins, from the first touch on, until the goal is reached or
+  /// all are followed.
+  SearchResult find(const SearchGoal& goal, const Deadline& deadline, const BinVisitor& visit);
+
+  /// After take_in(): upper bounds of the log-likelihood of bins in nats, box after box, [y, x] in
+  /// each: close where the belief is, and loose where a bin is not followed.
+  std::vector<double> log_likelihood(std::span<const BinBox> boxes) const;
+
+ private:
+  void start();
+  void step(const KnownElements& touch);
+  /// [object] the least belief of a tile that is followed through the touch.
+  /// @param tiles [object] MovingObject::bound_tiles()
+  std::vector<double> least_followed(std::span<const std::vector<double>> tiles) const;
+  SearchResult result() const;
+  bool reaches(const SearchResult& found, const SearchGoal& goal) const;
+
+  const SearchSpace& space_;
+  const BoundedOptions& options_;
+  DisplacementWeights weights_;
+  std::vector<double> log_mean_;  ///< memory that slips share
+  std::vector<double> error_;
+  std::vector<MovingObject> objects_;
+  std::vector<KnownElements> touches_;
+  /// Nats below all of the belief at which a tile is not followed.
+  double depth_ = 0.0;
+  std::size_t stepped_ = 0;            ///< touches that were taken in
+  double prior_log_likelihood_ = 0.0;  ///< of these
+};
+
+}  // namespace palpate

@@ -1,0 +1,222 @@
+#include "estimation/bounded/moving/moving_object.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "estimation/bounded/log_sum.hpp"
+#include "estimation/bounded/parallel_for.hpp"
+
+namespace palpate {
+
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr int side = MovingObject::tile_bins;
+/// Error of a bin, in nats, beyond which it counts as what may be missing.
+constexpr double most_rounding = 1e-11;
+
+/// Takes an error of a bin's mass into what may be missing where it is large, and into the rounding
+/// of all bins where it is small.
+void settle(double error, double& log_mass, double& log_rest, double& rounding) {
+  if (error <= most_rounding) {
+    rounding = std::max(rounding, error);
+    return;
+  }
+  // The mass is wrong by e^error - 1 of itself.
+  if (const double least = 2.0 - std::exp(error); least > 0.0) {
+    log_rest = log_add(log_rest, log_mass + std::log(2.0 * std::expm1(error)));
+    log_mass += std::log(least);
+  } else {
+    log_rest = log_add(log_rest, log_mass + error);
+    log_mass = -infinity;
+  }
+}
+
+}  // namespace
+
+MovingObject::MovingObject(const SlipTask& task, std::size_t object, const glm::dvec2& centroid_mm)
+    : task_(task),
+      object_(object),
+      of_bins_(task.weights, centroid_mm, 1),
+      of_tiles_(task.weights, centroid_mm, side),
+      columns_(of_tiles_.columns()),
+      rows_(of_tiles_.rows()),
+      kept_(of_bins_.kept()),
+      least_kept_(*std::ranges::min_element(kept_)),
+      most_kept_(*std::ranges::max_element(kept_)) {
+  for (int y = 0; y < rows_; ++y) {
+    for (int x = 0; x < columns_; ++x) {
+      const auto bins = static_cast<double>(box_of({0, y, x, 1}).bins());
+      log_tile_bins_.push_back(std::log(bins));
+    }
+  }
+  start();
+}
+
+void MovingObject::start() {
+  const auto bins = static_cast<std::size_t>(task_.lattice.bins());
+  log_mass_.assign(bins, 0.0);
+  log_rest_.assign(bins, -infinity);
+  followed_.assign(static_cast<std::size_t>(task_.lattice.theta_rad.count) * rows_ * columns_, 1);
+  rounding_ = scale_ = over_ = under_ = 0.0;
+}
+
+void MovingObject::step(const KnownElements& touch, bool slips, std::span<const double> tiles,
+                        double least, bool by_logs) {
+  choose(tiles, least);
+  if (slips) {
+    restore();
+    slip(by_logs);
+  }
+  if (!touch.runs.empty()) {
+    multiply(touch);
+  }
+  leave_others(tiles);
+  add_up(tiles);
+}
+
+void MovingObject::slip(bool by_logs) {
+  std::vector<double>& log_mean = task_.log_mean;
+  std::vector<double>& error = task_.error;
+  if (sums_.rest > -infinity) {
+    const double lost = of_bins_.means(runs_, log_rest_, log_mean, error, false);
+    for_bins(runs_, [&](std::size_t bin) {
+      log_rest_[bin] = log_mean[bin] == -infinity ? lost : log_mean[bin] + error[bin] + 1e-12;
+    });
+  }
+  const double lost = of_bins_.means(runs_, log_mass_, log_mean, error, by_logs);
+  rounding_ += of_bins_.mean_error();
+  settle_bins([&](std::size_t bin, double& log_mass, double& rest, double& most) {
+    log_mass = log_mean[bin];
+    if (log_mass == -infinity) {
+      rest = log_add(rest, lost);
+    } else {
+      settle(error[bin], log_mass, rest, most);
+    }
+  });
+}
+
+/// The mass is that of the bins' true parts, which rounding changes by e^-rounding to e^rounding,
+/// and of what is missing. These change the mean of what is kept by its spread alone.
+void MovingObject::restore() {
+  const double spread =
+      std::exp(sums_.off - sums_.kept) + std::abs(std::expm1(sums_.mass - sums_.kept));
+  const double parts = std::log1p(std::expm1(2.0 * rounding_) * spread);
+  const bool known = std::isfinite(sums_.mass);
+  const auto missing = [&](double part) {
+    return known ? parts + std::log1p(part * std::exp(sums_.rest + rounding_)) : infinity;
+  };
+  const double ratio = known ? sums_.mass - sums_.kept : 0.0;
+  const double most = missing(std::exp(-sums_.mass));
+  const double least = missing(most_kept_ * std::exp(-sums_.kept));
+  const double error = of_bins_.kept_error() + 1e-12;
+  scale_ += ratio;
+  over_ += std::max(0.0, std::min(most, -std::log(least_kept_) - ratio)) + error;
+  under_ += std::max(0.0, std::min(least, std::log(most_kept_) + ratio)) + error;
+}
+
+void MovingObject::multiply(const KnownElements& touch) {
+  std::vector<BinBox> boxes;
+  std::size_t bins = 0;
+  for (const BlockRun& run : runs_) {
+    boxes.push_back(box_of(run));
+    bins += static_cast<std::size_t>(boxes.back().bins());
+  }
+  std::vector<double> values(bins);
+  std::vector<double> errors(bins);
+  task_.likelihood.evaluate(boxes, touch, Arithmetic::float64, values, errors);
+  std::size_t value = 0;
+  for_bins(runs_, [&](std::size_t bin) {
+    task_.log_mean[bin] = values[value];
+    task_.error[bin] = errors[value++];
+  });
+  const double rounding = task_.likelihood.error(object_, touch, Arithmetic::float64);
+  rounding_ += rounding;
+  settle_bins([&](std::size_t bin, double& log_mass, double& rest, double& most) {
+    log_mass += task_.log_mean[bin];
+    rest += task_.log_mean[bin] + task_.error[bin] + rounding;
+    settle(task_.error[bin], log_mass, rest, most);
+  });
+}
+
+template <typename Set>
+void MovingObject::settle_bins(const Set& set) {
+  std::vector<double> most(runs_.size());
+  std::vector<double> largest(runs_.size());
+  parallel_for(runs_.size(), [&](std::size_t i) {
+    for_bins(std::span(runs_).subspan(i, 1), [&](std::size_t bin) {
+      set(bin, log_mass_[bin], log_rest_[bin], most[i]);
+      if (log_mass_[bin] > -infinity) {
+        largest[i] = std::max(largest[i], std::abs(log_mass_[bin]));
+      }
+    });
+  });
+  // Logs round by a few units of the largest.
+  if (!runs_.empty()) {
+    rounding_ +=
+        *std::ranges::max_element(most) + 0x1p-51 * (1.0 + *std::ranges::max_element(largest));
+  }
+}
+
+void MovingObject::add_up(std::span<const double> tiles) {
+  std::vector<Sums> of_run(runs_.size());
+  parallel_for(runs_.size(), [&](std::size_t i) {
+    const std::span<const BlockRun> run = std::span(runs_).subspan(i, 1);
+    double largest = -infinity;
+    double largest_rest = -infinity;
+    for_bins(run, [&](std::size_t bin) {
+      largest = std::max(largest, log_mass_[bin]);
+      largest_rest = std::max(largest_rest, log_rest_[bin]);
+    });
+    Sums sums;
+    for_bins(run, [&](std::size_t bin) {
+      if (log_mass_[bin] > -infinity) {
+        const double mass = std::exp(log_mass_[bin] - largest);
+        const double kept = kept_[bin % kept_.size()];
+        sums.mass += mass;
+        sums.kept += kept * mass;
+        sums.off += std::abs(kept - 1.0) * mass;
+      }
+      if (log_rest_[bin] > -infinity) {
+        sums.rest += std::exp(log_rest_[bin] - largest_rest);
+      }
+    });
+    of_run[i] = {largest + std::log(sums.mass), largest_rest + std::log(sums.rest),
+                 largest + std::log(sums.kept), largest + std::log(sums.off)};
+  });
+  const auto sum = [&](double Sums::*part) {
+    LogSum all;
+    for (const Sums& of : of_run) {
+      all.add(of.*part);
+    }
+    return all;
+  };
+  LogSum rest = sum(&Sums::rest);
+  for (std::size_t i = 0; i < tiles.size(); ++i) {
+    if (followed_[i] == 0) {
+      rest.add(tiles[i] + log_bins_of(i));
+    }
+  }
+  sums_ = {sum(&Sums::mass).log(), rest.log() + 1e-9, sum(&Sums::kept).log(),
+           sum(&Sums::off).log()};
+}
+
+double MovingObject::rounding() const {
+  // A sum rounds by a unit or two for each of its terms.
+  const double terms =
+      static_cast<double>(side * task_.lattice.x_mm.count) + static_cast<double>(runs_.size());
+  return rounding_ + 4.0 * 0x1p-53 * terms;
+}
+
+BinBox MovingObject::box_of(const BlockRun& run) const {
+  const PoseLattice& lattice = task_.lattice;
+  return {.object = static_cast<std::int32_t>(object_),
+          .theta = run.theta,
+          .y_first = side * run.y,
+          .y_count = std::min(side, lattice.y_mm.count - side * run.y),
+          .x_first = side * run.x,
+          .x_count = std::min(side * run.count, lattice.x_mm.count - side * run.x)};
+}
+
+}  // namespace palpate

@@ -1,0 +1,131 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <glm/vec2.hpp>
+
+#include "estimation/bin_box.hpp"
+#include "estimation/bounded/known_elements.hpp"
+#include "estimation/bounded/leaves/bin_likelihood.hpp"
+#include "estimation/bounded/moving/slip_mean.hpp"
+#include "estimation/bounded/search/search_space.hpp"
+
+namespace palpate {
+
+/// What the objects of a belief that slips share; it outlives them.
+struct SlipTask {
+  const SearchSpace& space;  ///< with tiles of MovingObject::tile_bins
+  const PoseLattice& lattice;
+  const BinLikelihood& likelihood;
+  const DisplacementWeights& weights;  ///< of the slip
+  // Memory that slips share, [bin].
+  std::vector<double>& log_mean;
+  std::vector<double>& error;
+};
+
+/// The belief about one object that slips between touches, but for a factor, its scale. Bins of
+/// some tiles are followed in float64; the others have an upper bound that a tile's bins share.
+/// Every bin's belief is within [e^-rounding log_mass, e^rounding log_mass + log_rest] times the
+/// scale.
+class MovingObject {
+ public:
+  /// Bins of a tile along x and y.
+  static constexpr int tile_bins = slip_tile_bins;
+  static_assert(tile_bins == BlockRun::side);
+
+  MovingObject(const SlipTask& task, std::size_t object, const glm::dvec2& centroid_mm);
+
+  /// Returns to the uniform belief, all of it followed.
+  void start();
+  /// Upper bounds of the belief of each tile's bins, [theta, y, x], in nats: after a slip, unless
+  /// `slips` is false, and the touch.
+  std::vector<double> bound_tiles(const KnownElements& touch, bool slips) const;
+  /// Goes through the slip and the touch.
+  /// @param tiles bound_tiles() of these
+  /// @param least belief of a tile that is followed, its bins together, in nats
+  /// @param by_logs also bins whose mass float64 does not hold beside their surroundings'
+  void step(const KnownElements& touch, bool slips, std::span<const double> tiles, double least,
+            bool by_logs);
+
+  /// The tiles that are followed, in runs along x.
+  std::span<const BlockRun> runs() const { return runs_; }
+  BinBox box_of(const BlockRun& run) const;
+  /// [bin] log of the followed part; -infinity where there is none.
+  const std::vector<double>& log_mass() const { return log_mass_; }
+  /// [bin] log of what may be missing.
+  const std::vector<double>& log_rest() const { return log_rest_; }
+  /// Logs of the sums of both.
+  double mass() const { return sums_.mass; }
+  double rest() const { return sums_.rest; }
+  /// Bound of the error of log_mass() and of its sum, in nats.
+  double rounding() const;
+  /// The scale is within e^(scale - under) and e^(scale + over).
+  double scale() const { return scale_; }
+  double over() const { return over_; }
+  double under() const { return under_; }
+  std::size_t tiles() const { return followed_.size(); }
+  /// Log of a tile's number of bins.
+  double log_bins_of(std::size_t tile) const {
+    return log_tile_bins_[tile % log_tile_bins_.size()];
+  }
+
+  template <typename Visit>
+  void for_bins(std::span<const BlockRun> runs, const Visit& visit) const {
+    for (const BlockRun& run : runs) {
+      const BinBox box = box_of(run);
+      for (int y = 0; y < box.y_count; ++y) {
+        const auto first =
+            static_cast<std::size_t>(box.bin(std::int64_t{y} * box.x_count, task_.lattice));
+        for (std::size_t bin = first; bin < first + static_cast<std::size_t>(box.x_count); ++bin) {
+          visit(bin);
+        }
+      }
+    }
+  }
+
+ private:
+  /// Logs of sums over the object's bins.
+  struct Sums {
+    double mass = 0.0;
+    double rest = 0.0;
+    double kept = 0.0;  ///< of the mass that all bins have after a slip, before it is restored
+    double off = 0.0;   ///< of its differences from the mass, bin by bin
+  };
+
+  std::vector<double> largest_of_tiles() const;
+  void add_touch_bounds(const KnownElements& touch, std::vector<double>& logs) const;
+  void choose(std::span<const double> tiles, double least);
+  void slip(bool by_logs);
+  void restore();
+  void multiply(const KnownElements& touch);
+  /// @param set takes a bin, its log_mass and log_rest, and the largest error that no rest has
+  template <typename Set>
+  void settle_bins(const Set& set);
+  void leave_others(std::span<const double> tiles);
+  void add_up(std::span<const double> tiles);
+
+  SlipTask task_;
+  std::size_t object_;
+  SlipMean of_bins_;
+  SlipMean of_tiles_;
+  int columns_;  ///< of tiles
+  int rows_;
+  std::vector<double> log_tile_bins_;  ///< [y, x] log of a tile's number of bins
+  std::vector<double> kept_;           ///< SlipMean::kept()
+  double least_kept_;
+  double most_kept_;
+
+  std::vector<double> log_mass_;
+  std::vector<double> log_rest_;
+  std::vector<std::uint8_t> followed_;  ///< [theta, y, x] of tiles
+  std::vector<BlockRun> runs_;
+  Sums sums_;
+  double rounding_ = 0.0;
+  double scale_ = 0.0;
+  double over_ = 0.0;
+  double under_ = 0.0;
+};
+
+}  // namespace palpate

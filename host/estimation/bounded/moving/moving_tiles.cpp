@@ -1,0 +1,138 @@
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "estimation/bounded/displaced/displaced_tiles.hpp"
+#include "estimation/bounded/log_sum.hpp"
+#include "estimation/bounded/moving/moving_object.hpp"
+#include "estimation/bounded/parallel_for.hpp"
+
+// The tiles of an object that slips: their upper bounds, and which of them are followed.
+
+namespace palpate {
+
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr int side = MovingObject::tile_bins;
+
+}  // namespace
+
+std::vector<double> MovingObject::bound_tiles(const KnownElements& touch, bool slips) const {
+  std::vector<double> logs = largest_of_tiles();
+  if (slips) {
+    logs = of_tiles_.bounds(logs);
+  }
+  if (!touch.runs.empty()) {
+    add_touch_bounds(touch, logs);
+  }
+  return logs;
+}
+
+std::vector<double> MovingObject::largest_of_tiles() const {
+  const PoseLattice& lattice = task_.lattice;
+  std::vector<double> largest(followed_.size());
+  parallel_for(static_cast<std::size_t>(lattice.theta_rad.count), [&](std::size_t theta) {
+    std::vector<double> mass(columns_);
+    std::vector<double> rest(columns_);
+    for (int row = 0; row < rows_; ++row) {
+      std::ranges::fill(mass, -infinity);
+      std::ranges::fill(rest, -infinity);
+      for (int y = side * row; y < std::min(side * (row + 1), lattice.y_mm.count); ++y) {
+        const std::size_t bin =
+            (theta * lattice.y_mm.count + y) * static_cast<std::size_t>(lattice.x_mm.count);
+        for (int x = 0; x < lattice.x_mm.count; ++x) {
+          mass[x / side] = std::max(mass[x / side], log_mass_[bin + x]);
+          rest[x / side] = std::max(rest[x / side], log_rest_[bin + x]);
+        }
+      }
+      for (int x = 0; x < columns_; ++x) {
+        largest[(theta * rows_ + row) * columns_ + x] =
+            log_add(mass[x] + rounding_, rest[x]) + 1e-12;
+      }
+    }
+  });
+  return largest;
+}
+
+void MovingObject::add_touch_bounds(const KnownElements& touch, std::vector<double>& logs) const {
+  const TileBounds& bounds = task_.space.bounds[object_];
+  const TileLevel& tiling = bounds.levels().front();
+  const double best = bounds.best(0, touch);
+  const auto thetas = static_cast<std::size_t>(task_.lattice.theta_rad.count);
+  std::vector<BlockRun> batches;
+  for (std::size_t theta = 0; theta < thetas; ++theta) {
+    for (int y = 0; y < tiling.batches_y(); ++y) {
+      batches.push_back({static_cast<int>(theta), y, 0, tiling.batches_x()});
+    }
+  }
+  const auto of_theta = static_cast<std::size_t>(tiling.batches_y());
+  std::vector<std::int32_t> displaced;
+  PlaceSource<float> exact;
+  if (touch.touches.empty()) {
+    exact = exact_penalties(task_.space, object_, 0, touch);
+  } else {
+    displaced = displaced_penalties(task_.space, object_, 0, touch.touches.front(), batches);
+  }
+  parallel_for(thetas, [&](std::size_t theta) {
+    const int width = tiling.x.tiles();
+    std::vector<float> nats(static_cast<std::size_t>(width) * tiling.y.tiles());
+    if (touch.touches.empty()) {
+      exact(std::span(batches).subspan(theta * of_theta, of_theta), {nats.data(), width, 0, 0});
+    } else {
+      const std::int32_t* penalty = displaced.data() + theta * nats.size();
+      for (int y = 0; y < tiling.y.tiles(); y += side) {
+        for (int x = 0; x < width; x += side) {
+          for (int i = 0; i < side; ++i) {
+            for (int j = 0; j < side; ++j) {
+              nats[std::ptrdiff_t{y + j} * width + x + i] =
+                  static_cast<float>(*penalty++ * (-1.0 / penalties_per_nat) + 1e-3);
+            }
+          }
+        }
+      }
+    }
+    for (int y = 0; y < rows_; ++y) {
+      for (int x = 0; x < columns_; ++x) {
+        logs[(theta * rows_ + y) * columns_ + x] +=
+            best + nats[static_cast<std::size_t>(y) * width + x];
+      }
+    }
+  });
+}
+
+void MovingObject::choose(std::span<const double> tiles, double least) {
+  runs_.clear();
+  std::size_t tile = 0;
+  for (int theta = 0; theta < task_.lattice.theta_rad.count; ++theta) {
+    for (int y = 0; y < rows_; ++y) {
+      for (int x = 0; x < columns_; ++x, ++tile) {
+        // What is no number is followed.
+        followed_[tile] = !(tiles[tile] + log_bins_of(tile) < least) ? 1 : 0;
+        if (followed_[tile] != 0) {
+          append_block(theta, y, x, runs_);
+        }
+      }
+    }
+  }
+}
+
+/// Leaves their upper bounds to the bins of tiles that are not followed.
+void MovingObject::leave_others(std::span<const double> tiles) {
+  const PoseLattice& lattice = task_.lattice;
+  parallel_for(static_cast<std::size_t>(lattice.theta_rad.count), [&](std::size_t theta) {
+    for (int y = 0; y < lattice.y_mm.count; ++y) {
+      const std::size_t row =
+          (theta * lattice.y_mm.count + y) * static_cast<std::size_t>(lattice.x_mm.count);
+      const std::size_t first = (theta * rows_ + y / side) * columns_;
+      for (int x = 0; x < lattice.x_mm.count; ++x) {
+        if (const std::size_t tile = first + x / side; followed_[tile] == 0) {
+          log_mass_[row + x] = -infinity;
+          log_rest_[row + x] = tiles[tile];
+        }
+      }
+    }
+  });
+}
+
+}  // namespace palpate

@@ -1,0 +1,23 @@
+// The certificate of objects that slip between touches against the posterior over all bins in
+// float64.
+
+#include <gtest/gtest.h>
+
+#include "bounded/certificate_trials.hpp"
+
+namespace palpate::slip_certificate_test {
+
+TEST(SlipCertificate, HoldsOverUnknownsOfAHundredBins) {
+  expect_trials({7, 5, 3}, 150, 941, make_slipping_trial);
+}
+TEST(SlipCertificate, HoldsOverUnknownsOfTwoThousandBins) {
+  expect_trials({12, 12, 16}, 45, 942, make_slipping_trial);
+}
+TEST(SlipCertificate, HoldsOverUnknownsOfTenThousandBins) {
+  expect_trials({25, 25, 16}, 5, 943, make_slipping_trial);
+}
+TEST(SlipCertificate, HoldsAfterManyTouches) {
+  expect_trials({16, 15, 16}, 3, 944, make_long_slipping_trial);
+}
+
+}  // namespace palpate::slip_certificate_test

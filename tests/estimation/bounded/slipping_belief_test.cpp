@@ -1,0 +1,164 @@
+// The bounded posterior of objects that slip: what it has in common with the histogram, and its
+// laws.
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "bins_by_definition.hpp"
+#include "bounded/certified.hpp"
+#include "bounded_set_up.hpp"
+#include "palpate/bounded_posterior.hpp"
+#include "palpate/pose_histogram.hpp"
+
+namespace palpate::slipping_belief_test {
+
+BoundedOptions slipping_options() {
+  BoundedOptions options = small_options();
+  options.slip_sd = {.mm = 0.8, .rad = 0.3};
+  return options;
+}
+
+HistogramOptions dense_options(const BoundedOptions& options) {
+  return {.lattice = options.lattice,
+          .none_weight = options.none_weight,
+          .touch_sd = options.touch_sd,
+          .slip_sd = options.slip_sd};
+}
+
+TEST(SlippingBelief, AgreesWithTheHistogram) {
+  Device device = Device::open();
+  const Recording recording = touches_of_l(6, 961);
+  BoundedOptions options = slipping_options();
+  options.none_weight = 2.0;
+  options.evidence_nats = 1e-4;  // of "none of these", too
+  for (const DisplacementSd& touch_sd : {DisplacementSd{}, DisplacementSd{.mm = 0.5, .rad = 0.2}}) {
+    options.touch_sd = touch_sd;
+    BoundedPosterior bounded(two_shapes(), options);
+    PoseHistogram dense(device, two_shapes(), dense_options(options));
+    for (std::size_t n = 1; n <= recording.size(); ++n) {
+      bounded.update(recording.touch(n - 1));
+      dense.update(recording.touch(n - 1));
+      const Estimate ours = bounded.estimate();
+      const Estimate theirs = dense.estimate();
+      // What the method allows float32.
+      const double nats = 1e-3 * static_cast<double>(n);
+      EXPECT_NEAR(std::log(ours.none / (1.0 - ours.none)),
+                  std::log(theirs.none / (1.0 - theirs.none)), nats);
+      EXPECT_LT(largest_difference(ours.identity, theirs.identity), 1e-4);
+      EXPECT_EQ(ours.mode.object, theirs.mode.object);
+      EXPECT_EQ(ours.mode.bin, theirs.mode.bin);
+      EXPECT_NEAR(ours.mode.log_likelihood, theirs.mode.log_likelihood, nats);
+      EXPECT_NEAR(bounded.entropy(), dense.entropy(), 1e-3);
+      const RefinedPose our_pose = bounded.refine(ours.mode);
+      const RefinedPose their_pose = dense.refine(theirs.mode);
+      EXPECT_NEAR(our_pose.T_object_robot.translation_mm.x,
+                  their_pose.T_object_robot.translation_mm.x, 1e-3);
+      EXPECT_NEAR(our_pose.T_object_robot.theta_rad, their_pose.T_object_robot.theta_rad, 1e-4);
+      EXPECT_NEAR(our_pose.covariance[0], their_pose.covariance[0],
+                  1e-2 * their_pose.covariance[0]);
+      EXPECT_LT(largest_difference(bounded.marginals(0).theta, dense.marginals(0).theta), 1e-4);
+    }
+  }
+}
+
+TEST(SlippingBelief, PlansAsTheHistogram) {
+  Device device = Device::open();
+  const Recording recording = touches_of_l(3, 962);
+  const BoundedOptions options = slipping_options();
+  BoundedPosterior bounded(two_shapes(), options);
+  PoseHistogram dense(device, two_shapes(), dense_options(options));
+  bounded.update(all_touches(recording));
+  dense.update(all_touches(recording));
+  const std::vector<Pose> candidates{{{0.0, 0.0}, 0.0}, {{-4.0, 3.0}, 1.0}, {{400.0, 0.0}, 0.0}};
+  const auto ours = bounded.expected_gain(candidates, digitacts_array(), {.samples = 1024});
+  const auto theirs = dense.expected_gain(candidates, digitacts_array(), {.samples = 1024});
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    // Other draws of the same belief.
+    EXPECT_NEAR(ours[i].pose, theirs[i].pose, 0.1 + 0.1 * theirs[i].pose);
+  }
+}
+
+TEST(SlippingBelief, IsTheSameTouchByTouch) {
+  const Recording recording = touches_of_l(5, 963);
+  const std::vector<Touch> touches = all_touches(recording);
+  BoundedOptions options = slipping_options();
+  BoundedPosterior at_once(two_shapes(), options);
+  at_once.update(touches);
+  const auto expected = told_by(at_once, 2);
+  options.threads = 1;
+  BoundedPosterior one_by_one(two_shapes(), options);
+  for (const Touch& touch : touches) {
+    one_by_one.update(touch);
+    one_by_one.sample(3, 1);
+    one_by_one.estimate();
+  }
+  EXPECT_EQ(told_by(one_by_one, 2), expected);
+  one_by_one.reset();
+  one_by_one.update(touches);
+  EXPECT_EQ(told_by(one_by_one, 2), expected);
+}
+
+TEST(SlippingBelief, IsCertifiedByATableAndForEveryLabel) {
+  BoundedOptions options = slipping_options();
+  options.evidence_nats = 1e-3;
+  options.evidence_range_nats = 60.0;
+  const Recording recording = random_recording(5, 20, 966);
+  const std::vector<Touch> touches = all_touches(recording);
+  expect_certified(two_made_up(), options, touches);
+  options.contact.table = crooked_table();
+  // Between likelihoods that lie thousands of nats apart, the place of a turned bin is not certain.
+  for (double& nats : options.contact.table->log_likelihood) {
+    nats = std::clamp(nats, -9.0, 0.0);
+  }
+  expect_certified(two_made_up(), options, touches);
+}
+
+TEST(SlippingBelief, SlipsByLittleAsIfAtRest) {
+  const Recording recording = touches_of_l(4, 964);
+  const std::vector<Touch> touches = all_touches(recording);
+  BoundedOptions options = small_options();
+  BoundedPosterior at_rest(two_shapes(), options);
+  at_rest.update(touches);
+  // A neighbouring bin is 20 deviations away or more: float64 holds no weight of it.
+  options.slip_sd = {.mm = 0.01, .rad = 0.001};
+  BoundedPosterior slips(two_shapes(), options);
+  slips.update(touches);
+  const Estimate still = at_rest.estimate();
+  const Estimate slipping = slips.estimate();
+  EXPECT_EQ(still.mode.bin, slipping.mode.bin);
+  EXPECT_NEAR(still.mode.log_likelihood, slipping.mode.log_likelihood, 1e-6);
+  EXPECT_LT(largest_difference(still.identity, slipping.identity), 3e-6);
+}
+
+TEST(SlippingBelief, RefusesABudgetAndTooManyBins) {
+  BoundedOptions options = slipping_options();
+  options.budget_s = 1.0;
+  EXPECT_THROW(BoundedPosterior(two_shapes(), options), Error);
+  options.budget_s.reset();
+  options.lattice.x_mm.count = options.lattice.y_mm.count = options.lattice.theta_rad.count = 3000;
+  EXPECT_THROW(BoundedPosterior(two_shapes(), options), Error);
+}
+
+TEST(SlippingBelief, StartsAnewAfterItWasCancelled) {
+  const Recording recording = touches_of_l(4, 965);
+  const std::vector<Touch> touches = all_touches(recording);
+  BoundedOptions options = slipping_options();
+  BoundedPosterior undisturbed(two_shapes(), options);
+  undisturbed.update(touches);
+  int left = 3;
+  options.cancel_point = [&] {
+    if (--left == 0) {
+      throw std::runtime_error("enough");
+    }
+  };
+  BoundedPosterior cancelled(two_shapes(), options);
+  cancelled.update(touches);
+  EXPECT_THROW(cancelled.estimate(), std::runtime_error);
+  EXPECT_EQ(told_by(cancelled, 2), told_by(undisturbed, 2));
+}
+
+}  // namespace palpate::slipping_belief_test
