@@ -31,6 +31,9 @@ OFF_MIDDLE = 2
 # Of Eq. 7: from 300 counts on an element's middle lies over the contact about as often as beside it.
 THRESHOLD, RATIO = 300.0, 0.1
 
+#: Probability that a place beyond the map is touched: the contacts' share of what windows cover, about.
+PRIOR = 0.02
+
 Ints = NDArray[numpy.int64]
 
 
@@ -55,6 +58,7 @@ class Press(NamedTuple):
             pixel_mm=PIXEL_MM,
             origin_mm=-self.centroid_mm,
             cell_mm=PITCH_MM / 2.0,
+            prior=PRIOR,
             felt_share=0.5,
             reach_mm=float(numpy.hypot(*ELEMENTS_MM.T).max()),
         )
