@@ -272,7 +272,9 @@ def program() -> None:
             for sensor in SENSORS
         ],
     )
-    write(options.json, facts | document | {"unknowns": scores})
+    # By whom they are learned without, as Registration has them.
+    shifts_of = {str(person): one.registration.coefficients.tolist() for person, one in learned.items()}
+    write(options.json, facts | document | {"registration": shifts_of, "unknowns": scores})
     charts.save({"capcontact": draw_errors(scores)}, options.plots)
     if options.plots and example:
         trial, trace, presses = example
