@@ -69,7 +69,7 @@ def write_presses(path: pathlib.Path, people: int, each: int) -> None:
 @pytest.fixture(scope="module")
 def data(tmp_path_factory: pytest.TempPathFactory) -> pathlib.Path:
     folder = tmp_path_factory.mktemp("capcontact")
-    write_presses(folder / "presses.npz", people=2, each=6)
+    write_presses(folder / "presses.npz", people=2, each=10)
     return folder
 
 
@@ -91,11 +91,11 @@ def test_windows_become_touches_of_the_press(data: pathlib.Path) -> None:
 def test_a_registration_is_fitted_without_a_person_and_what_lies_far_off() -> None:
     random = numpy.random.default_rng(3)
     true = Registration(random.normal(0.0, 1.0, (6, 2)))
-    places_mm = random.uniform((0.0, 0.0), (345.0, 197.0), (100, 2))
-    shifts_mm = true.shift_mm(places_mm) + random.normal(0.0, 0.01, (100, 2))
-    people = numpy.repeat([1, 2], 50)
+    places_mm = random.uniform((0.0, 0.0), (345.0, 197.0), (4000, 2))
+    shifts_mm = true.shift_mm(places_mm) + random.normal(0.0, 0.01, (4000, 2))
+    people = numpy.repeat([1, 2], 2000)
     shifts_mm[people == 2] += 3.0
-    shifts_mm[:5] -= 4.0
+    shifts_mm[:50] -= 4.0
     fitted = Shifts(people, places_mm, shifts_mm).registration(without=2)
     assert fitted.coefficients == pytest.approx(true.coefficients, abs=0.05)
     windows = numpy.array([[10, 20]])
@@ -109,8 +109,8 @@ def test_a_registration_is_fitted_without_a_person_and_what_lies_far_off() -> No
 def test_the_scale_of_poses_is_what_errors_have() -> None:
     random = numpy.random.default_rng(4)
     covariance = 0.04 * numpy.eye(3)
-    errors = random.normal(0.0, math.sqrt(4.0 * 0.04), (4000, 3))
-    factor, sd_mm = pose_scale(errors, numpy.repeat(covariance[None], 4000, axis=0))
+    errors = random.normal(0.0, math.sqrt(4.0 * 0.04), (400, 3))
+    factor, sd_mm = pose_scale(errors, numpy.repeat(covariance[None], 400, axis=0))
     assert factor * 0.04 + sd_mm**2 == pytest.approx(0.16, rel=0.1)
 
 
