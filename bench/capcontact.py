@@ -81,7 +81,8 @@ def learn(
     others = [press for press in presses if press.person != person]
     registration = shifts.registration(without=person)
     random = numpy.random.default_rng(SEED + 1)
-    return Learned(learn_sensor(device, others, registration, random, path, quick=quick), path)
+    learn_sensor(device, others, registration, random, path, quick=quick)
+    return Learned(registration, path)
 
 
 class Trial(NamedTuple):

@@ -116,8 +116,6 @@ class Registration(NamedTuple):
     """Where elements truly lie in the sheet's picture: places, less a shift that is quadratic in x and y."""
 
     coefficients: Floats  #: [6, 2] of `terms`, mm
-    #: Where the window's elements sit beside that, [3] mm, mm and rad, as a calibration tells.
-    array_offset: Sequence[float] = (0.0, 0.0, 0.0)
 
     @staticmethod
     def terms(places_mm: Floats) -> Floats:
@@ -155,7 +153,7 @@ def touched(
     return palpate.Recording(
         [press.readings[j : j + WINDOW, i : i + WINDOW].ravel() for j, i in windows],
         numpy.array([palpate.compose(T_robot_object, pose) for pose in in_object]),
-        palpate.transform(registration.array_offset, ELEMENTS_MM),
+        ELEMENTS_MM,
         pressure_unit="raw",
         object=label,
         truth=palpate.Truth(label, palpate.inverse(T_robot_object)),
@@ -226,10 +224,8 @@ def learn_sensor(
     path: pathlib.Path,
     *,
     quick: bool,
-) -> Registration:
+) -> None:
     """Writes the sensor that ten of the presses tell, 15 windows each, on their drawn maps.
-
-    Returns the registration with the array's offset in what is left, where the calibration finds one.
 
     Its `pose_scale` is that of the errors of 2 and of 5 windows of all presses. quick: from six windows of
     three presses, tried at poses nearby alone.
@@ -237,7 +233,15 @@ def learn_sensor(
     most, each = (3, 6) if quick else (10, 15)
     near: Any = {"bins": (8, 8, 8), "x_mm": (-8.0, 8.0), "y_mm": (-8.0, 8.0), "theta_deg": (-8.0, 8.0)}
     chosen = random.permutation(len(presses))[:most]
-    grids = [presses[k].grid(f"learned {k}") for k in chosen]
+    drawn = [presses[k].grid(f"learned {k}") for k in chosen]
+    # A calibration on drawn maps seeks one offset of the array, from 30 counts on: it finds the fingers
+    # above the sheet beside their contact. The windows' poses are already registered by the contact.
+    grids = [
+        palpate.OccupancyGrid(
+            one.label, one.log_odds, cell_mm=one.cell_mm, origin_mm=one.origin_mm, prior=one.prior
+        )
+        for one in drawn
+    ]
     touches = [
         touched(presses[k], presses[k].windows(random, each), registration, label=grid.label)
         for k, grid in zip(chosen, grids, strict=True)
@@ -246,8 +250,6 @@ def learn_sensor(
         touches, maps=grids, layer="log_odds", levels=7, device=device, **(near if quick else {})
     )
     calibration.sensor.save(path)
-    if calibration.array_offset is not None:
-        registration = registration._replace(array_offset=calibration.array_offset.array_offset)
     lines = [line for line in path.read_text().splitlines() if not line.startswith("pose_scale:")]
     path.write_text("\n".join(lines) + "\n")
     moved, covariances = [], []
@@ -271,7 +273,6 @@ def learn_sensor(
             "\ntable:", f"\npose_scale: {{factor: {factor:.4g}, map_sd_mm: {sd_mm:.4g}}}\ntable:"
         )
     )
-    return registration
 
 
 def pose_scale(moved_mm: Floats, covariances_mm2: Floats) -> tuple[float, float]:
