@@ -38,7 +38,9 @@ def main(run: Callable[[], None]) -> None:
     _program.main(run, "bench")
 
 
-def begin(options: argparse.Namespace) -> tuple[palpate.Device, Json]:
+def begin(
+    options: argparse.Namespace,
+    data: str = "simulated letters and sensor; the paper's recordings are not public",
+) -> tuple[palpate.Device, Json]:
     """Opens the device and prints the facts. Raises palpate.Error as palpate._program.begin() does."""
-    data = "simulated letters and sensor; the paper's recordings are not public"
     return _program.begin(options, python=platform.python_version(), data=data)

@@ -1,0 +1,289 @@
+"""Which press of several fingers a real array touches, and where: against contact measured by light."""
+
+import math
+import pathlib
+import tempfile
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+import palpate
+from palpate import _charts as charts
+from palpate._tables import Column, number, plain, print_table
+
+from .contact_array import (
+    AS_BUILT,
+    PIXEL_MM,
+    RATIO,
+    THRESHOLD,
+    Press,
+    Registration,
+    Shifts,
+    find_shifts,
+    learn_sensor,
+    read_presses,
+    touched,
+)
+from .coverage import level_in_modes
+from .measures import wrapped
+from .program import Json, begin, main, parser, write
+from .trials import Floats, truth_of
+
+SEED = 700_000_000
+OBJECTS, QUICK_OBJECTS = 12, 4  # of a round
+WINDOWS = (1, 2, 3, 5)
+ROUNDS = 20
+SENSORS = {"eq7": "Eq. 7", "learned": "learned"}
+SEEN = 0.9  # of the contact, from which on all of it counts as seen
+AMONG_MODES = 11.34  # 99 % of the squared errors over their covariance lie below, of three unknowns
+
+_PERCENT = number(".1f", 100.0)
+COLUMNS: list[Column] = [
+    ("sensor", "sensor", plain),
+    ("windows", "windows", plain),
+    ("recognised, %", "recognised", _PERCENT),
+    ("error, mm: median", "median_mm", number(".2f")),
+    ("90 %", "p90_mm", number(".2f")),
+    ("error, degrees: median", "median_deg", number(".2f")),
+    ("90 %", "p90_deg", number(".2f")),
+    ("within 2 mm, %", "within_2mm", _PERCENT),
+    ("bias along x, mm", "bias_x_mm", number(".2f")),
+    ("along y", "bias_y_mm", number(".2f")),
+    ("log-loss", "log_loss", number(".3f")),
+    ("68 % region holds, %", "coverage_68", _PERCENT),
+    ("95 %", "coverage_95", _PERCENT),
+    ("truth among modes, %", "among_modes", _PERCENT),
+    ("all contact seen, %", "seen", _PERCENT),
+    ("recognised of these, %", "recognised_where_seen", _PERCENT),
+]
+
+
+class Learned(NamedTuple):
+    """What is learned of the array without a person: where its elements lie, and what they read."""
+
+    registration: Registration
+    sensor: pathlib.Path
+
+
+def learn(
+    device: palpate.Device,
+    presses: Sequence[Press],
+    shifts: Shifts,
+    person: int | None,
+    path: pathlib.Path,
+    *,
+    quick: bool,
+) -> Learned:
+    """What the presses of all people but one tell."""
+    others = [press for press in presses if press.person != person]
+    registration = shifts.registration(without=person)
+    random = numpy.random.default_rng(SEED + 1)
+    learn_sensor(device, others, registration, random, path, quick=quick)
+    return Learned(registration, path)
+
+
+class Trial(NamedTuple):
+    """One press as an unknown object: its windows and where it lies."""
+
+    press: Press
+    label: str
+    windows: Any
+    T_robot_object: Floats
+
+    def touches(self, registration: Registration) -> palpate.Recording:
+        pose = self.T_robot_object.tolist()
+        return touched(self.press, self.windows, registration, pose, self.label)
+
+
+def draw_round(presses: Sequence[Press], objects: int, random: numpy.random.Generator) -> list[Trial]:
+    """Presses that differ, at random poses in the plane."""
+    return [
+        Trial(
+            presses[k],
+            f"press {k}",
+            presses[k].windows(random, max(WINDOWS)),
+            random.uniform((-10.0, -10.0, -math.pi), (10.0, 10.0, math.pi)),
+        )
+        for k in random.permutation(len(presses))[:objects]
+    ]
+
+
+def score(step: Json, trial: Trial, windows: int, random: numpy.random.Generator) -> Json:
+    """What a belief after some windows says, beside the truth."""
+    truth = truth_of(trial.touches(AS_BUILT))
+    right = step["best"] == trial.label
+    error = numpy.array((step.get("refined") or step["mode"])["T_robot_object"]) - trial.T_robot_object
+    turn = trial.T_robot_object[2]
+    in_sheet = numpy.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
+    squared = [math.inf]
+    for mode in step["modes"]:
+        if mode["object"] == trial.label:
+            off = numpy.array(mode["T_robot_object"]) - trial.T_robot_object
+            off[2] = wrapped(off[2], 2.0 * math.pi)
+            squared.append(float(off @ numpy.linalg.solve(mode["covariance"], off)))
+    return {
+        "right": right,
+        "moved_mm": (in_sheet @ error[:2]).tolist() if right else None,
+        "error_mm": math.hypot(*error[:2]) if right else None,
+        "error_deg": abs(math.degrees(wrapped(error[2], 2.0 * math.pi))) if right else None,
+        "loss": -math.log(max(step["identity"].get(trial.label, 0.0), 1e-30)),
+        "level": level_in_modes(step["modes"], truth, random),
+        "among_modes": min(squared) < AMONG_MODES,
+        "seen": trial.press.seen(trial.windows[:windows]) > SEEN,
+    }
+
+
+def summary(scores: Sequence[Json]) -> Json:
+    """Shares are of all unknowns, errors and bias of those that are recognised.
+
+    The bias is the mean over those within 5 mm: what lies farther off is another mode.
+    """
+    count = len(scores)
+    of_right = {
+        name: numpy.array([one[name] for one in scores if one["right"]], float).reshape(-1, *shape)
+        for name, shape in {"error_mm": (), "error_deg": (), "moved_mm": (2,)}.items()
+    }
+    mm, deg = of_right["error_mm"], of_right["error_deg"]
+    near = of_right["moved_mm"][mm < 5.0]
+    bias = near.mean(axis=0).tolist() if len(near) else [None, None]
+    record: Json = {
+        "unknowns": count,
+        "recognised": len(mm) / count,
+        "within_2mm": int((mm <= 2.0).sum()) / count,
+        "bias_mm": bias,
+        "bias_x_mm": bias[0],
+        "bias_y_mm": bias[1],
+        "log_loss": float(numpy.mean([one["loss"] for one in scores])),
+        "among_modes": sum(one["among_modes"] for one in scores) / count,
+    }
+    seen = [one["right"] for one in scores if one["seen"]]
+    record["seen"] = len(seen) / count
+    record["recognised_where_seen"] = sum(seen) / len(seen) if seen else None
+    for share in (68, 95):
+        record[f"coverage_{share}"] = sum(one["level"] < share / 100.0 for one in scores) / count
+    for name, errors in (("mm", mm), ("deg", deg)):
+        for what, q in (("median", 0.5), ("p90", 0.9)):
+            record[f"{what}_{name}"] = float(numpy.quantile(errors, q)) if len(errors) else None
+    return record
+
+
+def draw_errors(scores: Json) -> Figure:
+    """Median errors of the place against windows, with bands that hold the middle 80 %."""
+    axes = charts.chart("windows", "error of the place of recognised unknowns, mm", yscale="log")
+    for name, colour in zip(SENSORS, charts.COLOURS, strict=False):
+        errors = [[one["error_mm"] for one in scores[name][n] if one["right"]] for n in WINDOWS]
+        bands = [numpy.quantile(of, (0.1, 0.5, 0.9)) if of else [math.nan] * 3 for of in errors]
+        low, median, high = numpy.array(bands).T
+        axes.fill_between(WINDOWS, low, high, color=colour, alpha=0.15, linewidth=0)
+        axes.plot(WINDOWS, median, color=colour, label=f"{SENSORS[name]}: median, middle 80 %")
+    axes.set_xticks(WINDOWS)
+    charts.rule(axes, 2.0, "2 mm")
+    return charts.finished(axes)
+
+
+def draw_press(trial: Trial, step: Json, windows: int, presses: dict[str, Press], axes: Axes) -> None:
+    """The readings of some windows where they lie, the true contact, and the modes of the belief."""
+
+    def outline(press: Press, pose: Any, **style: Any) -> None:
+        rows, columns = press.contact.shape
+        pixels = numpy.stack(numpy.meshgrid(numpy.arange(columns), numpy.arange(rows)), axis=-1)
+        in_object = PIXEL_MM * pixels.reshape(-1, 2) - press.centroid_mm
+        x, y = palpate.transform(pose, in_object).T.reshape(2, rows, columns)
+        axes.contour(x, y, press.contact, levels=[0.5], **style)
+
+    touches = trial.touches(AS_BUILT)[:windows]
+    places = [palpate.transform(pose, touches.elements_mm) for pose in touches.T_robot_sensor]
+    x, y = numpy.concatenate(places).T
+    axes.scatter(x, y, c=touches.pressure.ravel(), s=12, marker="s", cmap="Blues", vmin=-100.0, vmax=600.0)
+    for mode in reversed(step["modes"]):
+        style: Json = {"colors": [charts.COLOURS[1]], "linewidths": 2.0}
+        outline(
+            presses[mode["object"]], mode["T_robot_object"], alpha=max(mode["probability"], 0.1), **style
+        )
+    outline(trial.press, trial.T_robot_object, colors="black", linewidths=1.0, linestyles="dashed")
+    axes.set_title(f"{windows} of 5 windows: readings (blue), contact (dashed), modes (orange)")
+    axes.set(xlabel="x, mm", ylabel="y, mm", aspect="equal", xlim=(-130, 130), ylim=(-130, 130))
+    axes.grid(visible=False)
+
+
+def program() -> None:
+    """Rounds of twelve presses, by Eq. 7 as the array was built, and by what other people's presses tell."""
+    flags = parser(
+        "capcontact",
+        "Recognises presses of several fingers on a real array among twelve, at random poses in the plane, "
+        "from windows of 9 x 9 elements, in some twenty minutes on two CPU cores. Sensor and the array's "
+        "place are learned without the person who is tried, or on presses.npz where there is held_out.npz.",
+        plots="draw the errors, and a press with its belief, in this folder",
+        trials="rounds of twelve presses [20, or 1 with --quick]",
+    )
+    flags.add_argument("--data", metavar="FOLDER", required=True, help="folder of presses.npz")
+    options = flags.parse_args()
+    folder = pathlib.Path(options.data)
+    held_out = folder / "held_out.npz"
+    training = read_presses(folder / "presses.npz")
+    tried = read_presses(held_out) if held_out.exists() else training
+    objects = QUICK_OBJECTS if options.quick else OBJECTS
+    if len(tried) < objects:
+        raise palpate.Error(f"--data {folder}: {len(tried)} presses; give {objects} or more")
+    device, facts = begin(options, f"{len(tried)} presses of fingers on a capacitive array")
+    rounds = options.trials or (1 if options.quick else ROUNDS)
+    random = numpy.random.default_rng(SEED)
+    shifts = find_shifts(device, training, random, 6)
+    scores: dict[str, dict[int, list[Json]]] = {name: {n: [] for n in WINDOWS} for name in SENSORS}
+    example: Any = None
+    with tempfile.TemporaryDirectory() as name:
+        # Of people whose presses are held out, nothing was learned.
+        without = {press.person: None if held_out.exists() else press.person for press in tried}
+        learned = {
+            person: learn(
+                device, training, shifts, person, pathlib.Path(name, f"{person}.yaml"), quick=options.quick
+            )
+            for person in set(without.values())
+        }
+        for _ in range(rounds):
+            trials = draw_round(tried, objects, random)
+            grids = [trial.press.grid(trial.label) for trial in trials]
+            for trial in trials:
+                own = learned[without[trial.press.person]]
+                for sensor in SENSORS:
+                    if sensor == "eq7":
+                        touches = trial.touches(AS_BUILT)
+                        model: Any = {"threshold": THRESHOLD, "ratio": RATIO}
+                    else:
+                        touches = trial.touches(own.registration)
+                        model = {"sensor_model": own.sensor}
+                    (record,) = palpate.recognize(
+                        touches, grids, trace=True, none=0.0, device=device, **model
+                    )
+                    for n in WINDOWS:
+                        scores[sensor][n].append(score(record["trace"][n - 1], trial, n, random))
+                if example is None and scores["learned"][5][-1]["right"]:
+                    example = trial, record["trace"], {one.label: one.press for one in trials}
+    document: Json = {
+        sensor: {"windows": {str(n): summary(of) for n, of in by.items()}} for sensor, by in scores.items()
+    }
+    print_table(
+        COLUMNS,
+        [
+            {"sensor": SENSORS[sensor], "windows": n} | document[sensor]["windows"][str(n)]
+            for n in WINDOWS
+            for sensor in SENSORS
+        ],
+    )
+    # By whom they are learned without, as Registration has them.
+    shifts_of = {str(person): one.registration.coefficients.tolist() for person, one in learned.items()}
+    write(options.json, facts | document | {"registration": shifts_of, "unknowns": scores})
+    charts.save({"capcontact": draw_errors(scores)}, options.plots)
+    if options.plots and example:
+        trial, trace, presses = example
+        figure = Figure(figsize=(11.4, 5.4))
+        for windows, axes in zip((1, 5), figure.subplots(1, 2), strict=True):
+            draw_press(trial, trace[windows - 1], windows, presses, axes)
+        write(pathlib.Path(options.plots, "capcontact_press.png"), charts.image(figure, "png", dpi=100))
+
+
+if __name__ == "__main__":
+    main(program)

@@ -1,0 +1,291 @@
+"""A real array and the contact under it, measured by light: its presses, maps, windows, and what is learned.
+
+The sheet's frame is that of the array: x along its rows, y along its columns, mm. An object is the
+contact area of one press; its frame lies along the sheet's axes with its origin in the area's centroid.
+A touch is a window of the array.
+"""
+
+import math
+import pathlib
+import zipfile
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy
+from numpy.typing import NDArray
+
+import palpate
+
+from .measures import wrapped
+from .trials import Floats
+
+ROWS, COLUMNS = 41, 72
+PIXELS = 8  #: of the mask, along an element
+PIXEL_MM = 345.0 / (COLUMNS * PIXELS)
+PITCH_MM = PIXELS * PIXEL_MM
+WINDOW = 9  #: elements along a side of a window
+ELEMENTS_MM = palpate.grid_array(WINDOW, WINDOW, PITCH_MM)
+#: A random point of the contact lies this many elements from a window's middle at most, along each axis.
+OFF_MIDDLE = 2
+
+# Of Eq. 7: from 300 counts on an element's middle lies over the contact about as often as beside it.
+THRESHOLD, RATIO = 300.0, 0.1
+
+#: Probability that a place beyond the map is touched: the contacts' share of what windows cover, about.
+PRIOR = 0.02
+
+Ints = NDArray[numpy.int64]
+
+
+class Press(NamedTuple):
+    """One moment of several fingers on the sheet."""
+
+    readings: Floats  #: [41, 72] raw counts
+    contact: NDArray[numpy.bool_]  #: [328, 576] pixels
+    person: int
+
+    @property
+    def centroid_mm(self) -> Floats:
+        """Of the contact area, in the sheet."""
+        y, x = numpy.nonzero(self.contact)
+        return PIXEL_MM * numpy.array([x.mean(), y.mean()])
+
+    def grid(self, label: str) -> palpate.OccupancyGrid:
+        """The map of the contact area: cells of half a pitch, outlines where they are drawn."""
+        return palpate.OccupancyGrid.from_mask(
+            label,
+            self.contact,
+            pixel_mm=PIXEL_MM,
+            origin_mm=-self.centroid_mm,
+            cell_mm=PITCH_MM / 2.0,
+            prior=PRIOR,
+            felt_share=0.5,
+            reach_mm=float(numpy.hypot(*ELEMENTS_MM.T).max()),
+        )
+
+    def windows(self, random: numpy.random.Generator, count: int) -> Ints:
+        """The first elements (row, column) [count, 2] of windows over the contact, in the sheet."""
+        points = numpy.argwhere(self.contact)
+        drawn: list[Ints] = []
+        while len(drawn) < count:
+            element = random.choice(points) // PIXELS
+            first = element - WINDOW // 2 + random.integers(-OFF_MIDDLE, OFF_MIDDLE + 1, 2)
+            if (first >= 0).all() and (first <= (ROWS - WINDOW, COLUMNS - WINDOW)).all():
+                drawn.append(first)
+        return numpy.array(drawn)
+
+
+    def seen(self, windows: Ints) -> float:
+        """The share of the contact that lies under the windows."""
+        under = numpy.zeros_like(self.contact)
+        for j, i in PIXELS * windows:
+            under[j : j + PIXELS * WINDOW, i : i + PIXELS * WINDOW] = True
+        return float((self.contact & under).sum() / self.contact.sum())
+
+
+def read_presses(path: pathlib.Path) -> list[Press]:
+    """The presses of a file of numpy.savez: `capacitance`, `mask_bits` and `participant`."""
+    shapes: dict[str, tuple[int, ...]] = {
+        "capacitance": (ROWS, COLUMNS),
+        "mask_bits": (ROWS * COLUMNS * PIXELS**2 // 8,),
+        "participant": (),
+    }
+    try:
+        with numpy.load(path) as file:
+            arrays = {name: file[name] for name in shapes}
+    except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
+        raise palpate.Error(
+            f"{path}: {error}; give a folder with presses.npz, which holds {', '.join(shapes)}"
+        ) from error
+    for name, shape in shapes.items():
+        if arrays[name].shape != (len(arrays["participant"]), *shape):
+            raise palpate.Error(
+                f"{path}: {name} has the shape {arrays[name].shape}; give {('n', *shape)}"
+            )
+    contact = numpy.unpackbits(arrays["mask_bits"], axis=1).astype(bool)
+    masks = contact.reshape(-1, ROWS * PIXELS, COLUMNS * PIXELS)
+    of_presses = zip(arrays["capacitance"], masks, arrays["participant"], strict=True)
+    return [
+        Press(readings.astype(float), mask, int(person))
+        for readings, mask, person in of_presses
+        if mask.any()
+    ]
+
+
+class Registration(NamedTuple):
+    """Where elements truly lie in the sheet's picture: places, less a shift that is quadratic in x and y."""
+
+    coefficients: Floats  #: [6, 2] of `terms`, mm
+
+    @staticmethod
+    def terms(places_mm: Floats) -> Floats:
+        """1, x, y, x^2, x y and y^2, [n, 6], in tenths of a metre from the sheet's middle."""
+        x, y = (places_mm - PITCH_MM * numpy.array([COLUMNS, ROWS]) / 2.0).T / 100.0
+        return numpy.column_stack([numpy.ones_like(x), x, y, x * x, x * y, y * y])
+
+    def shift_mm(self, places_mm: Floats) -> Floats:
+        """By how much readings seem to lie beside the contact that they are of, [n, 2]."""
+        return self.terms(places_mm) @ self.coefficients
+
+    def poses(self, windows: Ints) -> Floats:
+        """Poses of windows in the sheet [n, 3]: the middle's, turned as the shift turns about it."""
+        middles = windows[:, ::-1] + (WINDOW - 1) / 2.0
+        places_mm = numpy.asarray(PITCH_MM * middles + (PIXELS - 1) / 2.0 * PIXEL_MM, float)
+        x, y = (
+            self.shift_mm(numpy.add(places_mm, step)) - self.shift_mm(numpy.subtract(places_mm, step))
+            for step in ((0.5, 0.0), (0.0, 0.5))
+        )
+        return numpy.column_stack([places_mm - self.shift_mm(places_mm), (y[:, 0] - x[:, 1]) / 2.0])
+
+
+AS_BUILT = Registration(numpy.zeros((6, 2)))
+
+
+def touched(
+    press: Press,
+    windows: Ints,
+    registration: Registration,
+    T_robot_object: Sequence[float] = (0.0, 0.0, 0.0),
+    label: str = "",
+) -> palpate.Recording:
+    """Windows of a press as touches of an object at a pose, of which the recording carries the truth."""
+    in_object = registration.poses(windows) - (*press.centroid_mm, 0.0)
+    return palpate.Recording(
+        [press.readings[j : j + WINDOW, i : i + WINDOW].ravel() for j, i in windows],
+        numpy.array([palpate.compose(T_robot_object, pose) for pose in in_object]),
+        ELEMENTS_MM,
+        pressure_unit="raw",
+        object=label,
+        truth=palpate.Truth(label, palpate.inverse(T_robot_object)),
+    )
+
+
+def placed(
+    device: palpate.Device,
+    touches: palpate.Recording,
+    grid: palpate.OccupancyGrid,
+    sensor: pathlib.Path | None,
+) -> palpate.Record:
+    """Where touches of an object that is at the robot's origin are found, within 8 mm and 8 degrees."""
+    model: Any = {"threshold": THRESHOLD, "ratio": RATIO} if sensor is None else {"sensor_model": sensor}
+    (record,) = palpate.recognize(
+        touches, grid, bins=(25, 25, 13), x_mm=(-8.0, 8.0), y_mm=(-8.0, 8.0), theta_deg=(-8.0, 8.0),
+        none=0.0, device=device, **model,
+    )  # fmt: skip
+    return record
+
+
+class Shifts(NamedTuple):
+    """Where single windows of presses seem to lie beside where they are, by Eq. 7."""
+
+    people: Ints  #: [n]
+    places_mm: Floats  #: [n, 2] of the windows' middles in the sheet
+    shifts_mm: Floats  #: [n, 2]
+
+    def registration(self, without: int | None) -> Registration:
+        """The least squares fit of all people but one, and twice more without what lies far off it."""
+        terms = Registration.terms(self.places_mm)
+        # All but the constant are held near 0, as four windows' places would: few windows tell no more.
+        held = numpy.diag([0.0, 4.0, 4.0, 4.0, 4.0, 4.0])
+        kept = self.people != without
+        for _ in range(3):
+            coefficients = numpy.linalg.solve(
+                terms[kept].T @ terms[kept] + held, terms[kept].T @ self.shifts_mm[kept]
+            )
+            off_mm = numpy.hypot(*(self.shifts_mm - terms @ coefficients).T)
+            kept = (self.people != without) & (off_mm < 2.5 * numpy.median(off_mm[kept]))
+        return Registration(coefficients)
+
+
+def find_shifts(
+    device: palpate.Device, presses: Sequence[Press], random: numpy.random.Generator, each: int
+) -> Shifts:
+    """Places `each` windows of every press on its map."""
+    people, places, shifts = [], [], []
+    for press in presses:
+        grid = press.grid("press")
+        windows = press.windows(random, each)
+        for i in range(each):
+            one = windows[i : i + 1]
+            record = placed(device, touched(press, one, AS_BUILT), grid, None)
+            if record["modes"]:
+                people.append(press.person)
+                places.append(AS_BUILT.poses(one)[0, :2])
+                # The object is found where its readings are.
+                shifts.append(record["modes"][0]["T_robot_object"][:2])
+    return Shifts(numpy.array(people), numpy.array(places), numpy.array(shifts))
+
+
+def learn_sensor(
+    device: palpate.Device,
+    presses: Sequence[Press],
+    registration: Registration,
+    random: numpy.random.Generator,
+    path: pathlib.Path,
+    *,
+    quick: bool,
+) -> None:
+    """Writes the sensor that ten of the presses tell, 15 windows each, on their drawn maps.
+
+    Its `pose_scale` is that of the errors of 2 and of 5 windows of all presses. quick: from six windows of
+    three presses, tried at poses nearby alone.
+    """
+    most, each = (3, 6) if quick else (10, 15)
+    near: Any = {"bins": (8, 8, 8), "x_mm": (-8.0, 8.0), "y_mm": (-8.0, 8.0), "theta_deg": (-8.0, 8.0)}
+    chosen = random.permutation(len(presses))[:most]
+    drawn = [presses[k].grid(f"learned {k}") for k in chosen]
+    # A calibration on drawn maps seeks one offset of the array, from 30 counts on: it finds the fingers
+    # above the sheet beside their contact. The windows' poses are already registered by the contact.
+    grids = [
+        palpate.OccupancyGrid(
+            one.label, one.log_odds, cell_mm=one.cell_mm, origin_mm=one.origin_mm, prior=one.prior
+        )
+        for one in drawn
+    ]
+    touches = [
+        touched(presses[k], presses[k].windows(random, each), registration, label=grid.label)
+        for k, grid in zip(chosen, grids, strict=True)
+    ]
+    calibration = palpate.calibrate(
+        touches, maps=grids, layer="log_odds", levels=7, device=device, **(near if quick else {})
+    )
+    calibration.sensor.save(path)
+    lines = [line for line in path.read_text().splitlines() if not line.startswith("pose_scale:")]
+    path.write_text("\n".join(lines) + "\n")
+    moved, covariances = [], []
+    for press in presses:
+        grid = press.grid("press")
+        radius_mm = math.sqrt(((numpy.argwhere(press.contact) * PIXEL_MM).var(axis=0)).sum())
+        for count in (2, 5):
+            record = placed(
+                device, touched(press, press.windows(random, count), registration), grid, path
+            )
+            if record["modes"]:
+                mode = record["modes"][0]
+                error = numpy.array(mode["T_robot_object"])
+                error[2] = wrapped(error[2], 2.0 * math.pi)
+                to_mm = numpy.array([1.0, 1.0, radius_mm])
+                moved.append(error * to_mm)
+                covariances.append(numpy.array(mode["covariance"]) * numpy.outer(to_mm, to_mm))
+    factor, sd_mm = pose_scale(numpy.array(moved), numpy.array(covariances))
+    path.write_text(
+        path.read_text().replace(
+            "\ntable:", f"\npose_scale: {{factor: {factor:.4g}, map_sd_mm: {sd_mm:.4g}}}\ntable:"
+        )
+    )
+
+
+def pose_scale(moved_mm: Floats, covariances_mm2: Floats) -> tuple[float, float]:
+    """The factor of the covariances and the deviation beside them by which errors [n, 3] are likeliest.
+
+    As a sensor model's `pose_scale`. Errors from 5 mm on are of another mode.
+    """
+    near = numpy.linalg.norm(moved_mm, axis=1) < 5.0
+    best = (math.inf, 1.0, 0.0)
+    for factor in numpy.geomspace(0.25, 16.0, 31):
+        for sd_mm in numpy.arange(0.0, 2.0, 0.05):
+            all_of = factor * covariances_mm2[near] + sd_mm**2 * numpy.eye(3)
+            squared = numpy.einsum("ni,nij,nj->n", moved_mm[near], numpy.linalg.inv(all_of), moved_mm[near])
+            cost = float((numpy.log(numpy.linalg.det(all_of)) + squared).sum())
+            best = min(best, (cost, float(factor), float(sd_mm)))
+    return best[1:]

@@ -1,0 +1,117 @@
+"""Everyday objects pressed at unknown poses: which is it, after one press and after several?"""
+
+import json
+import pathlib
+import tempfile
+from collections.abc import Sequence
+
+import numpy
+
+import palpate
+from palpate._tables import Column, number, plain, print_table
+
+from .bounded import CLASSIFIER, read_presses
+from .defaults import told
+from .measures import share_record, with_interval
+from .program import Json, begin, main, parser, write
+
+SEED = 800_000_000
+TOGETHER = (1, 2, 3, 5)
+LEAST = 1e-30  # probability that a label counts with
+
+COLUMNS: list[Column] = [
+    ("sensor", "sensor", plain),
+    ("presses", "presses", plain),
+    ("unknowns", "unknowns", plain),
+    ("recognised, %", "recognised", with_interval(".1f", 100.0)),
+    ("log-loss", "log_loss", number(".3f")),
+]
+
+
+def together(records: Sequence[Json]) -> dict[str, float]:
+    """What presses of one object say of its label: each lies at a pose of its own."""
+    labels = list(records[0]["identity"])
+    logs = numpy.log(
+        [[max(record["identity"][label], LEAST) for label in labels] for record in records]
+    ).sum(axis=0)
+    p = numpy.exp(logs - logs.max())
+    return dict(zip(labels, (p / p.sum()).tolist(), strict=True))
+
+
+def scores(records: Sequence[Json], presses: int, random: numpy.random.Generator) -> Json:
+    """Of as many unknowns as there are presses: each with others of its object, drawn without replacement."""
+    of_label: dict[str, list[Json]] = {}
+    for record in records:
+        of_label.setdefault(record["truth"]["object"], []).append(record)
+    right, losses = 0, []
+    for label, own in of_label.items():
+        for i, record in enumerate(own):
+            others = random.permutation([k for k in range(len(own)) if k != i])[: presses - 1]
+            identity = together([record, *(own[k] for k in others)])
+            right += max(identity, key=identity.__getitem__) == label
+            losses.append(-float(numpy.log(max(identity[label], LEAST))))
+    return {
+        "presses": presses,
+        "unknowns": len(losses),
+        "recognised": share_record(right, len(losses)),
+        "log_loss": float(numpy.mean(losses)),
+    }
+
+
+def program() -> None:
+    """Odd presses are learned from, even ones are recognised, by the commands as a user gives them."""
+    flags = parser(
+        "presses",
+        "Recognises objects pressed at unknown poses, from recordings of presses, one for each object: "
+        "every second press is learned from, the others are recognised, by Eq. 7 and by the sensor that "
+        "`palpate calibrate` learns.",
+    )
+    flags.add_argument("--data", metavar="FOLDER", required=True, help="recordings of presses")
+    flags.add_argument("--palpate", default="build/palpate", help="the command [%(default)s]")
+    options = flags.parse_args()
+    recordings = read_presses(options.data)
+    if options.quick:
+        recordings = [one[:8] for one in recordings[:3]]
+    device, facts = begin(options, f"{len(recordings)} objects, pressed at unknown poses")
+    document: Json = {}
+    rows: list[Json] = []
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        learned: list[str] = []
+        tried: list[str] = []
+        for recording in recordings:
+            label = recording.object
+            pose = recording.T_robot_sensor
+            for start, files in ((0, learned), (1, tried)):
+                files.append(str(folder / f"{label}.{start}.h5"))
+                palpate.Recording(
+                    recording.pressure[start::2],
+                    pose[start::2],
+                    recording.elements_mm,
+                    object=label,
+                    pressure_unit=recording.pressure_unit,
+                    truth=palpate.Truth(label, (0.0, 0.0, 0.0)),
+                ).save(files[-1])
+        sensor, result = str(folder / "sensor.yaml"), folder / "records.json"
+        told(options.palpate, "calibrate", *learned, "--unposed", "-o", sensor)
+        raw = recordings[0].pressure_unit == "raw"
+        contact = ["--threshold", f"{CLASSIFIER.threshold}", "--ratio", f"{CLASSIFIER.ratio}"] if raw else []
+        for key, words, making, reading in (
+            ("eq7", "Eq. 7", contact, [*contact, "--sensor-model", "none"]),
+            ("learned", "learned", ["--sensor-model", sensor], ["--sensor-model", sensor]),
+        ):
+            maps = str(folder / key) + "/"
+            told(options.palpate, "map", *learned, "--unposed", *making, "-o", maps)
+            recognize = ["recognize", *tried, "--each-frame", "--maps", maps, "--none", "0"]
+            told(options.palpate, *recognize, *reading, "--device", device.name, "--json", str(result))
+            records = json.loads(result.read_text())
+            random = numpy.random.default_rng(SEED)
+            of_sensor = [scores(records, presses, random) for presses in TOGETHER]
+            document[key] = {"presses": {str(one["presses"]): one for one in of_sensor}}
+            rows += [{"sensor": words} | one for one in of_sensor]
+    print_table(COLUMNS, rows)
+    write(options.json, facts | document)
+
+
+if __name__ == "__main__":
+    main(program)
