@@ -37,6 +37,9 @@ OBJECTS, QUICK_OBJECTS = 12, 4  # of a round
 WINDOWS = (1, 2, 3, 5)
 ROUNDS = 20
 SENSORS = {"eq7": "Eq. 7", "learned": "learned"}
+#: Where the sheet may lie in the object frame: objects lie within 10 mm of the robot's origin along x and
+#: y, at any angle.
+REGION: Any = {"bins": "auto", "x_mm": (-15.0, 15.0), "y_mm": (-15.0, 15.0)}
 SEEN = 0.9  # of the contact, from which on all of it counts as seen
 AMONG_MODES = 11.34  # 99 % of the squared errors over their covariance lie below, of three unknowns
 
@@ -256,7 +259,7 @@ def program() -> None:
                         touches = trial.touches(own.registration)
                         model = {"sensor_model": own.sensor}
                     (record,) = palpate.recognize(
-                        touches, grids, trace=True, none=0.0, device=device, **model
+                        touches, grids, trace=True, none=0.0, device=device, **REGION, **model
                     )
                     for n in WINDOWS:
                         scores[sensor][n].append(score(record["trace"][n - 1], trial, n, random))
