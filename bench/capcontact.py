@@ -217,7 +217,7 @@ def program() -> None:
     flags = parser(
         "capcontact",
         "Recognises presses of several fingers on a real array among twelve, at random poses in the plane, "
-        "from windows of 9 x 9 elements, in some twenty minutes on two CPU cores. Sensor and the array's "
+        "from windows of 9 x 9 elements, in some five minutes on two CPU cores. Sensor and the array's "
         "place are learned without the person who is tried, or on presses.npz where there is held_out.npz.",
         plots="draw the errors, and a press with its belief, in this folder",
         trials="rounds of twelve presses [20, or 1 with --quick]",

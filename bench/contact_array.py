@@ -74,7 +74,6 @@ class Press(NamedTuple):
                 drawn.append(first)
         return numpy.array(drawn)
 
-
     def seen(self, windows: Ints) -> float:
         """The share of the contact that lies under the windows."""
         under = numpy.zeros_like(self.contact)

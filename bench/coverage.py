@@ -1,7 +1,6 @@
 """How often the regions that a belief calls 68 and 95 % probable hold the truth, over all its modes."""
 
 import math
-import pathlib
 import tempfile
 from collections.abc import Sequence
 
@@ -10,21 +9,22 @@ import numpy
 import palpate
 from palpate._tables import Column, Table, plain, print_table
 
+from .defaults import told
 from .measures import share_record, with_interval, wrapped
 from .program import Json, begin, main, parser, write
-from .trials import Floats, Touching, letter_maps, make_trials, training_recordings, truth_of
+from .trials import Floats, Touching, make_trials, training_recordings, truth_of
 
 SEED = 400_000_000
 LETTERS = ("A", "E", "U")
 TOUCHES = (1, 3, 5, 9)
 SHARES = (0.68, 0.95)
+MODELS: dict[str, str | None] = {"Eq. 7": "none", "learned": None}  # of recognize()
 SAMPLES = 4_000  # of a mixture of modes: standard error of a level at most 0.008
 EXACT = Touching(at_random_poses=True)
 
 _PERCENT = with_interval(".1f", 100.0)
 COLUMNS: list[Column] = [
     ("sensor", "sensor", plain),
-    ("region", "region", plain),
     ("touches", "touches", plain),
     ("unknowns", "unknowns", plain),
     *((f"{100 * share:.0f} % region holds, %", f"{share}", _PERCENT) for share in SHARES),
@@ -71,26 +71,6 @@ def level_in_modes(modes: Sequence[Json], truth: palpate.Truth, random: numpy.ra
     return level if level < held else held + (1.0 - held) * random.uniform()
 
 
-def level_in_bins(
-    belief: palpate.BoundedPosterior, maps: Sequence[palpate.OccupancyGrid], truth: palpate.Truth
-) -> float:
-    """Probability of all bins that are likelier than the truth."""
-    labels = [grid.label for grid in maps]
-    identity = belief.estimate().identity
-    own = labels.index(truth.object)
-    # Logs of a bin's probability, but for the evidence that all share.
-    top = belief.estimate().mode
-    log_truth = belief.log_likelihood(own, truth.T_object_robot)
-    log_top = belief.log_likelihood(top.object, top.T_object_robot)
-    _, top_shares = belief.likely_bins(top.object)
-    p_truth = identity[top.object] * top_shares.max() * math.exp(min(log_truth - log_top, 0.0))
-    level = 0.0
-    for object_, p in enumerate(identity):
-        _, shares = belief.likely_bins(object_)
-        level += p * shares[p * shares > p_truth].sum()
-    return float(level)
-
-
 def covered(levels: Sequence[float]) -> Json:
     """How often the truth lies within the region of each share."""
     return {
@@ -100,30 +80,33 @@ def covered(levels: Sequence[float]) -> Json:
 
 
 def program() -> None:
-    """Letters touched at exact poses, by Eq. 7 and by a sensor that was learned from their maps' touches."""
+    """Letters touched at exact poses, by Eq. 7 and by the sensor that `palpate map` learns with their maps."""
     flags = parser(
         "coverage",
         "Measures how often the 68 and 95 % regions of the belief, over all its modes, hold the truth, and "
         "how right decisions are, in some minutes on two CPU cores.",
         trials="unknowns per letter [34, or 2 with --quick]",
     )
+    flags.add_argument("--palpate", default="build/palpate", help="the command [%(default)s]")
     options = flags.parse_args()
     device, facts = begin(options)
     most = 64 if options.quick else None
-    training = [one[:most] for one in training_recordings(EXACT) if one.object in LETTERS]
-    maps = letter_maps(device, training)
     each = options.trials or (2 if options.quick else 34)
     # Each unknown is touched by a sensor of its own, whose gains all of its touches share.
     trials = make_trials(LETTERS * each, 1, max(TOUCHES), SEED, EXACT)
     random = numpy.random.default_rng(SEED)
     coverage, decisions = Table(COLUMNS), []
     with tempfile.TemporaryDirectory() as folder:
-        learned = pathlib.Path(folder, "sensor.yaml")
-        palpate.calibrate(training, layer="log_odds", device=device).sensor.save(learned)
-        for sensor, model in (("Eq. 7", None), ("learned", learned)):
+        files = []
+        for recording in training_recordings(EXACT):
+            if recording.object in LETTERS:
+                files.append(f"{folder}/{recording.object}.h5")
+                recording[:most].save(files[-1])
+        told(options.palpate, "map", *files, "-o", f"{folder}/maps/")
+        for sensor, model in MODELS.items():
             # Nobody is a stranger: what "(none)" has would count against every region.
             records = palpate.recognize(
-                trials, maps, trace=True, device=device, sensor_model=model, none=0.0
+                trials, f"{folder}/maps", trace=True, device=device, sensor_model=model, none=0.0
             )
             for touches in TOUCHES:
                 steps = [record["trace"][touches - 1] for record in records]
@@ -132,7 +115,7 @@ def program() -> None:
                     level_in_modes(step["modes"], truth_of(trial), random)
                     for step, trial in zip(steps, trials, strict=True)
                 ]
-                coverage.append(row | {"region": "modes"} | covered(levels))
+                coverage.append(row | covered(levels))
                 acted = [step for step in steps if step["decision"]["act"]]
                 errors = [step["refined_error_mm"] for step in acted if step["right"]]
                 within = sum(error is not None and error <= 0.5 for error in errors)
@@ -142,19 +125,6 @@ def program() -> None:
                     | {"right": share_record(len(errors), max(len(acted), 1))}
                     | {"within": share_record(within, max(len(acted), 1))}
                 )
-    reach_mm = float(numpy.hypot(*trials[0].elements_mm.T).max())
-    region = palpate.touch_region(maps, reach_mm)
-    bins = palpate.balanced_lattice(region, maps, "auto", 10**15)
-    for touches in TOUCHES:
-        levels = []
-        for trial in trials:
-            pivot = trial.T_robot_sensor[0, :2]
-            about = palpate.PoseLattice(bins.x_mm, bins.y_mm, bins.theta_rad, pivot)
-            belief = palpate.BoundedPosterior(device, maps, about)
-            belief.update(trial[:touches])
-            levels.append(level_in_bins(belief, maps, truth_of(trial)))
-        row = {"sensor": "Eq. 7", "touches": touches, "unknowns": len(trials), "region": "bins"}
-        coverage.append(row | covered(levels))
     print_table(DECISIONS, decisions)
     write(options.json, facts | {"coverage": coverage, "decisions": decisions})
 

@@ -133,21 +133,6 @@ TEST(PoseScale, MovesTheBodyAsFarAlongEveryAxis) {
   }
 }
 
-TEST_F(LeftOutFit, TouchesOfATurnedArrayAreAtOnePlace) {
-  Recording recording = touches(6, 1);
-  const glm::dvec2 middle_mm = array_centre_mm(recording.elements_mm);
-  const std::vector<glm::dvec2> at_mm{{0.0, 0.0}, {6.8, 0.0}, {0.0, 0.0},
-                                      {0.9, 0.0}, {6.8, 0.0}, {6.8, 1.1}};
-  for (std::size_t i = 0; i < recording.size(); ++i) {
-    const double theta_rad = 0.5 * static_cast<double>(i);
-    recording.T_robot_sensor[i] = {at_mm[i] - rotate(theta_rad, middle_mm), theta_rad};
-  }
-  const std::vector<TouchEvidence> evidence =
-      evidence_of(recording.touches(0, recording.size()), ContactModel{});
-  EXPECT_EQ(places_of(evidence, 3), (std::vector<std::size_t>{0, 1, 0, 0, 1, 2}));
-  EXPECT_EQ(places_of(evidence, 4), (std::vector<std::size_t>{0, 1, 2, 3, 4, 5})) << "too few";
-}
-
 TEST_F(LeftOutFit, Eq7IsLessSureOfPosesThanThisSensorDeserves) {
   const PoseScale scale = judged(touches(120, 3)).pose_scale.value();
   EXPECT_LT(scale.factor, 0.7);

@@ -7,11 +7,10 @@
 
 #include <fmt/format.h>
 #include "estimation/bounded/bounded_belief.hpp"
+#include "estimation/bounded/checked_options.hpp"
 #include "estimation/bounded/log_sum.hpp"
 #include "estimation/bounded/marginal_sums.hpp"
 #include "estimation/bounded/search/search_memory.hpp"
-#include "estimation/displacement_check.hpp"
-#include "estimation/hypotheses.hpp"
 #include "estimation/lattice/expected_gain.hpp"
 #include "estimation/lattice/reading_predictor.hpp"
 #include "estimation/lattice/refinement.hpp"
@@ -26,54 +25,6 @@ namespace {
 /// The log of what is known only by its bounds, as an estimate takes it.
 double middle(const LogInterval& log) {
   return std::isfinite(log.low) ? std::midpoint(log.low, log.high) : log.high;
-}
-
-/// @throws Error on an option out of range
-void validate(const BoundedOptions& options) {
-  const auto refuse = [](const char* field, double value, const char* remedy) {
-    throw Error(Fault::input, fmt::format("{} = {}: give {}", field, value, remedy));
-  };
-  const auto positive = [](double value) { return value > 0.0 && std::isfinite(value); };
-  if (!(options.tolerance > 0.0 && options.tolerance < 1.0)) {
-    refuse("tolerance", options.tolerance, "a share of the mass between 0 and 1, such as 1e-6");
-  }
-  if (options.budget_s && !positive(*options.budget_s)) {
-    refuse("budget_s", *options.budget_s, "a positive number of seconds, or none");
-  }
-  if (options.evidence_nats && !positive(*options.evidence_nats)) {
-    refuse("evidence_nats", *options.evidence_nats, "a positive number of nats, or none");
-  }
-  if (!(options.evidence_growth >= 0.0 && std::isfinite(options.evidence_growth))) {
-    refuse("evidence_growth", options.evidence_growth, "a number from 0");
-  }
-  if (options.none_weight && !positive(*options.none_weight)) {
-    refuse("none_weight", *options.none_weight, "a positive number, or none");
-  }
-  if (options.threads < 0) {
-    refuse("threads", options.threads, "at least 1, or 0 for all cores");
-  }
-}
-
-/// The options, with what follows from them and the hypotheses. @throws Error where they are not
-/// sound
-BoundedOptions checked(const BoundedOptions& options, std::span<const Hypothesis> hypotheses) {
-  validate_hypotheses(hypotheses);
-  validate(options);
-  BoundedOptions all = options;
-  all.lattice.collapse_fixed().validate();
-  validate_displacement(all.touch_sd, all.lattice, "touch_sd");
-  validate_displacement(all.slip_sd, all.lattice, "slip_sd");
-  if (options.budget_s && !options.slip_sd.none()) {
-    throw Error(Fault::input,
-                fmt::format("budget_s = {}: a belief that slips cannot be cut short; leave it out, "
-                            "or leave out slip_sd",
-                            *options.budget_s));
-  }
-  all.contact = resolve(options.contact, hypotheses);
-  if (const std::string why = why_no_room(hypotheses, all, memory_for_search()); !why.empty()) {
-    throw Error(Fault::input, why);
-  }
-  return all;
 }
 
 }  // namespace

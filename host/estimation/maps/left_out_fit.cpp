@@ -6,9 +6,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <iterator>
-#include <map>
-#include <numeric>
-#include <optional>
 #include <utility>
 #include <vector>
 
@@ -134,40 +131,6 @@ std::optional<PoseScale> pose_scale_of(std::span<const PlaceError> errors) {
   return best;
 }
 
-std::vector<std::size_t> places_of(std::span<const TouchEvidence> touches, std::size_t least) {
-  constexpr double near_mm = 1.0;
-  std::vector<std::size_t> place;
-  std::vector<glm::dvec2> places_mm;
-  std::map<std::pair<std::int64_t, std::int64_t>, std::vector<std::size_t>> in_cell;
-  for (const TouchEvidence& touch : touches) {
-    const glm::dvec2 middle_mm = touch.middle_mm();
-    const auto column = static_cast<std::int64_t>(std::floor(middle_mm.x / near_mm));
-    const auto row = static_cast<std::int64_t>(std::floor(middle_mm.y / near_mm));
-    std::optional<std::size_t> at;
-    for (std::int64_t i = 0; i < 9; ++i) {  // the cell's own places, and its neighbours'
-      const auto found = in_cell.find({column + i / 3 - 1, row + i % 3 - 1});
-      if (found == in_cell.end()) {
-        continue;
-      }
-      for (const std::size_t one : found->second) {
-        if (glm::distance(places_mm[one], middle_mm) < near_mm && (!at || one < *at)) {
-          at = one;
-        }
-      }
-    }
-    if (!at) {
-      at = places_mm.size();
-      places_mm.push_back(middle_mm);
-      in_cell[{column, row}].push_back(*at);
-    }
-    place.push_back(*at);
-  }
-  if (places_mm.size() < least) {
-    std::iota(place.begin(), place.end(), std::size_t{0});
-  }
-  return place;
-}
-
 void judge_left_out(Device& device, MapSource& source) {
   const std::vector<Touch> touches = source.touches.touches(0, source.touches.size());
   const ContactModel contact{.classifier = source.options.classifier,
@@ -179,45 +142,33 @@ void judge_left_out(Device& device, MapSource& source) {
   if (std::cmp_less(std::ranges::count_if(evidence, &TouchEvidence::in_contact), least_judged)) {
     return;
   }
+  constexpr std::uint64_t seed = 0;
+  Random random(seed, Stream::touch_order);
+  std::vector<std::size_t> part(touches.size());
+  for (std::size_t& one : part) {
+    one = static_cast<std::size_t>(random.uniform(0.0, static_cast<double>(parts)));
+  }
   MapBuilder builder(device, source.options);
-  // Judges touches on maps of the others; touches of one unit are left out together.
-  const auto leave_out = [&](std::span<const std::size_t> unit_of, const auto& judge) {
-    constexpr std::uint64_t seed = 0;
-    Random random(seed, Stream::touch_order);
-    std::vector<std::size_t> part(touches.size());  // [unit]
-    for (std::size_t& one : part) {
-      one = static_cast<std::size_t>(random.uniform(0.0, static_cast<double>(parts)));
-    }
-    std::size_t all_judged = 0;
-    for (std::size_t left_out = 0; left_out < parts && all_judged < enough; ++left_out) {
-      std::vector<Touch> others;
-      std::vector<TouchEvidence> judged;
-      for (std::size_t i = 0; i < touches.size(); ++i) {
-        if (part[unit_of[i]] != left_out) {
-          others.push_back(touches[i]);
-        } else if (evidence[i].in_contact()) {
-          judged.push_back(evidence[i]);
-        }
-      }
-      builder.clear();
-      builder.add(others);
-      judge(Hypothesis{.map = builder.build(source.touches.object)}, judged);
-      all_judged += judged.size();
-    }
-  };
-  std::vector<std::size_t> each(touches.size());
-  std::iota(each.begin(), each.end(), std::size_t{0});
   std::vector<double> z;
-  leave_out(each, [&](const Hypothesis& of, std::span<const TouchEvidence> judged) {
+  std::vector<PlaceError> errors;
+  for (std::size_t left_out = 0; left_out < parts && z.size() < enough; ++left_out) {
+    std::vector<Touch> others;
+    std::vector<TouchEvidence> judged;
+    for (std::size_t i = 0; i < touches.size(); ++i) {
+      if (part[i] != left_out) {
+        others.push_back(touches[i]);
+      } else if (evidence[i].in_contact()) {
+        judged.push_back(evidence[i]);
+      }
+    }
+    builder.clear();
+    builder.add(others);
+    const Hypothesis of{.map = builder.build(source.touches.object)};
     for (const TouchEvidence& touch : judged) {
       z.push_back(evidence_fit(std::span(&touch, 1), Pose{}, of.map, contact, 0)->z);
     }
-  });
-  std::vector<PlaceError> errors;
-  leave_out(places_of(evidence, parts),
-            [&](const Hypothesis& of, std::span<const TouchEvidence> judged) {
-              std::ranges::move(place_errors(judged, of, contact, 0), std::back_inserter(errors));
-            });
+    std::ranges::move(place_errors(judged, of, contact, 0), std::back_inserter(errors));
+  }
   source.left_out = scale_of(z);
   source.pose_scale = pose_scale_of(errors);
 }

@@ -35,15 +35,8 @@ std::vector<PlaceError> place_errors(std::span<const TouchEvidence> touches, con
 /// up is the factor's, what remains the map's. None of fewer than 16 errors.
 std::optional<PoseScale> pose_scale_of(std::span<const PlaceError> errors);
 
-/// [touch] the index of its place: touches less than a millimetre from the first touch at a place
-/// are there, however the array is turned. Each touch is a place where these are fewer than
-/// `least`.
-std::vector<std::size_t> places_of(std::span<const TouchEvidence> touches, std::size_t least);
-
 /// Sets MapSource::left_out and pose_scale. Builds maps of random three quarters of the touches,
-/// and judges the others at their poses, until about 200 are judged, or each touch once. For
-/// pose_scale, touches at one place are left out together: turned about one point by half a turn,
-/// an array has elements where it had others, and a map with these places it too well. Both are
+/// and judges the others at their poses, until about 200 are judged, or each touch once. Both are
 /// none where fewer than 16 touches are in contact.
 /// @throws Error as MapBuilder does
 void judge_left_out(Device& device, MapSource& source);
