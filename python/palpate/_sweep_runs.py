@@ -139,7 +139,7 @@ class Run:
 def measure(data: Data, lattice: PoseLattice, dense: int) -> Run:
     """Recognises all unknowns by bounds, and some by the histogram.
 
-    All by the histogram where bounds do not allow for what the options ask.
+    All by the histogram where bounds have no room for what the options ask.
     """
     unknowns = sum(count for _, count in data.entries)
     in_all = lattice.bins * len(data.maps)

@@ -337,7 +337,7 @@ def test_the_programs_of_the_guide_run(
     page = (pathlib.Path(__file__).parents[2] / "docs" / "python.md").read_text()
     [section] = re.findall(r"\n## From tables to the next touch\n(.*?)\n## ", page, re.DOTALL)
     programs = re.findall(r"```python\n(.*?)```", section, re.DOTALL)
-    assert len(programs) == 5
+    assert len(programs) == 6
     (tmp_path / "maps").symlink_to(files.maps)
     palpate.read_recording(files.unknown)[:3].save(tmp_path / "unknown.h5")
     readings = numpy.column_stack([numpy.linspace(0, 2, 3), numpy.ones((3, 36))])
