@@ -66,6 +66,11 @@ class Press(NamedTuple):
     def windows(self, random: numpy.random.Generator, count: int) -> Ints:
         """The first elements (row, column) [count, 2] of windows over the contact, in the sheet."""
         points = numpy.argwhere(self.contact)
+        middles = points // PIXELS - WINDOW // 2
+        fits = (middles >= -OFF_MIDDLE) & (middles <= numpy.array([ROWS, COLUMNS]) - WINDOW + OFF_MIDDLE)
+        points = points[fits.all(axis=1)]
+        if not len(points):
+            raise palpate.Error("a press: no window fits over its contact; leave it out")
         drawn: list[Ints] = []
         while len(drawn) < count:
             element = random.choice(points) // PIXELS

@@ -38,7 +38,10 @@ DEFAULTS: list[Column] = [
 
 def told(command: str, *arguments: str) -> str:
     """What `palpate` prints."""
-    return subprocess.run([command, *arguments], check=True, capture_output=True, text=True).stdout
+    done = subprocess.run([command, *arguments], capture_output=True, text=True)
+    if done.returncode != 0:
+        raise palpate.Error(done.stderr.strip())
+    return done.stdout
 
 
 def scores_of(known: list[Json], strangers: list[Json]) -> Json:

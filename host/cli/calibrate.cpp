@@ -57,20 +57,14 @@ void check_outputs(const CalibrateArguments& options,
   files.prepare();
 }
 
-/// The array of all recordings, where it sits in the tool. Throws Error where it changes.
-std::vector<glm::dvec2> corrected_array(const std::vector<Recording>& recordings,
-                                        const SensorCalibration& calibration) {
-  std::vector<glm::dvec2> elements_mm = recordings.front().elements_mm;
+/// The array of all recordings. Throws Error where it changes.
+std::vector<glm::dvec2> common_array(const std::vector<Recording>& recordings) {
+  const std::vector<glm::dvec2>& elements_mm = recordings.front().elements_mm;
   for (const Recording& recording : recordings) {
     if (recording.elements_mm != elements_mm || elements_mm.size() != recording.elements()) {
       refuse(recording.path,
              "its array is not that of all touches; leave --write-array out, or calibrate from "
              "recordings of one array");
-    }
-  }
-  if (calibration.array_offset) {
-    for (glm::dvec2& p : elements_mm) {
-      p = *calibration.array_offset->array_offset * p;
     }
   }
   return elements_mm;
@@ -96,6 +90,17 @@ void calibrate(const CalibrateArguments& options) {
   const CalibrationTask task =
       calibration_task(options.request, options.recognition, recordings, maps);
 
+  std::vector<glm::dvec2> array_mm;
+  if (!options.write_array.empty()) {
+    if (!task.known_poses() ||
+        std::ranges::none_of(maps, [](const GivenMap& map) { return map.hypothesis.map.drawn; })) {
+      refuse_flag("--write-array", options.write_array,
+                  "touches at known poses on drawn maps tell where the array sits; give such maps "
+                  "by --maps, or leave it out");
+    }
+    array_mm = common_array(recordings);
+  }
+
   SensorCalibration calibration;
   {
     Progress progress("calibrating");
@@ -119,7 +124,10 @@ void calibrate(const CalibrateArguments& options) {
   }
   write_sensor_model(options.output, calibration.sensor);
   if (!options.write_array.empty()) {
-    write_file(options.write_array, array_table(corrected_array(recordings, calibration)));
+    for (glm::dvec2& p : array_mm) {
+      p = calibration.array_offset ? *calibration.array_offset->array_offset * p : p;
+    }
+    write_file(options.write_array, array_table(array_mm));
   }
   fmt::print("{}",
              calibration_text(calibration, task.presses.size(), terminal_columns(STDOUT_FILENO)));

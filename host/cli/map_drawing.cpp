@@ -104,8 +104,8 @@ bool MapFlags::of_drawings() const { return std::ranges::any_of(recordings, is_d
 
 void add_drawing_flags(CLI::App& command, MapFlags& flags) {
   command.add_option("--mm-per-pixel", flags.mm_per_pixel,
-                     "Of a drawing, edge of a PNG's pixel, or of the unit of an SVG that has no "
-                     "size in mm, mm");
+                     "Of a drawing, edge of a PNG's pixel, or of the px of an SVG that has no size "
+                     "in mm (without width and height, of its viewBox's unit), mm");
   command.add_option("--occupied", flags.occupied,
                      "Of a drawing, whether the object is where it is dark or light [default: "
                      "dark]");

@@ -65,9 +65,10 @@ void add_map_flags(CLI::App& command, MapFlags& flags) {
                      "--psf-mm where that is given; else that of the FOLDER's other maps, or 0.5 "
                      "unless another predicts left-out touches better; with --unposed 0.6 times "
                      "the distance of neighbouring elements]");
-  command.add_option("--peak", flags.peak,
-                     "Peak of the inverse sensor model, a probability below 1 [default: 0.9]; how "
-                     "sure a drawing is: log odds lie within log(A / (1 - A)) [default: 0.999]");
+  command.add_option(
+      "--peak", flags.peak,
+      "Peak of the inverse sensor model, a probability p below 1 [default: 0.9]; of a "
+      "drawing, whose log odds lie within +-log(p / (1 - p)) [default: 0.999]");
   command
       .add_option("--prior", flags.prior,
                   "Probability that an unseen cell is occupied; auto: the area of all objects "
@@ -358,6 +359,9 @@ void prepare_outputs(const MapFlags& flags, const std::vector<std::filesystem::p
   }
   if (has_sensor_model(flags)) {
     files.reads("--sensor-model", flags.sensor_model);
+  }
+  if (std::error_code none; std::filesystem::is_regular_file(flags.array, none)) {
+    files.reads("--array", flags.array);
   }
   for (const std::filesystem::path& path : map_paths) {
     if (flags.to_folder()) {

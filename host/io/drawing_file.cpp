@@ -41,12 +41,18 @@ GreyPicture read_png(const std::filesystem::path& path, const DrawingOptions& op
   }
   GreyPicture picture{
       .rows = image.height, .columns = image.width, .pixel_mm = *options.mm_per_pixel};
-  image.format = PNG_FORMAT_GRAY;
-  picture.grey.resize(PNG_IMAGE_SIZE(image));
-  const png_byte paper = options.light ? 0 : 255;
-  const png_color background{paper, paper, paper};
-  if (png_image_finish_read(&image, &background, picture.grey.data(), 0, nullptr) == 0) {
+  image.format = PNG_FORMAT_RGBA;
+  std::vector<png_byte> colours(PNG_IMAGE_SIZE(image));
+  if (png_image_finish_read(&image, nullptr, colours.data(), 0, nullptr) == 0) {
     refuse(path, "is damaged ({}); save it again as PNG", image.message);
+  }
+  // Transparent edges are as dark as an SVG's, which cairo draws: without gamma.
+  const std::uint32_t paper = options.light ? 0 : 255;
+  picture.grey.reserve(colours.size() / 4);
+  for (std::size_t i = 0; i < colours.size(); i += 4) {
+    const std::uint32_t alpha = colours[i + 3];
+    const auto over = [&](std::uint32_t c) { return (c * alpha + paper * (255 - alpha)) / 255; };
+    picture.grey.push_back(luma(over(colours[i]), over(colours[i + 1]), over(colours[i + 2])));
   }
   return picture;
 }

@@ -53,8 +53,12 @@ std::string content_of(const std::filesystem::path& path) {
 
 constexpr std::string_view blanks = " \t\r\n";
 
+/// What is looked at of a reference: a drawing of many long ones is read in linear time.
+constexpr std::size_t most_of_reference = 4096;
+
 /// The value that begins the text, after blanks and with or without quotes.
 std::string_view value_from(std::string_view text) {
+  text = text.substr(0, most_of_reference);
   const auto skip = [&](std::string_view characters) {
     text.remove_prefix(std::min(text.find_first_not_of(characters), text.size()));
   };
@@ -76,6 +80,9 @@ void require_whole(const std::filesystem::path& path, std::string_view svg) {
   };
   const auto require_inside = [&](std::string_view to) {
     to.remove_prefix(std::min(to.find_first_not_of(blanks), to.size()));
+    if (to.starts_with("data:image")) {
+      refuse(path, "holds a picture; trace it as outlines, or remove it");
+    }
     if (!to.empty() && !to.starts_with('#') && !to.starts_with("data:")) {
       refuse_reference(to);
     }
@@ -101,7 +108,8 @@ void require_whole(const std::filesystem::path& path, std::string_view svg) {
   }
   for (std::size_t at = svg.find("<!ENTITY"); at != std::string_view::npos;
        at = svg.find("<!ENTITY", at + 1)) {
-    const std::string_view entity = svg.substr(at, svg.find('>', at) - at);
+    std::string_view entity = svg.substr(at, most_of_reference);
+    entity = entity.substr(0, entity.find('>'));
     if (entity.find(" SYSTEM ") != std::string_view::npos ||
         entity.find(" PUBLIC ") != std::string_view::npos) {
       refuse_reference(entity);
@@ -220,9 +228,7 @@ GreyPicture draw_svg(const std::filesystem::path& path, const DrawingOptions& op
     const auto* line = reinterpret_cast<const std::uint32_t*>(pixels + row * stride);
     for (std::size_t column = 0; column < picture.columns; ++column) {
       const std::uint32_t rgb = line[column];
-      const std::uint32_t grey =  // luma of Rec. 709
-          (54 * (rgb >> 16 & 255) + 183 * (rgb >> 8 & 255) + 19 * (rgb & 255)) / 256;
-      picture.grey.push_back(static_cast<std::uint8_t>(grey));
+      picture.grey.push_back(luma(rgb >> 16 & 255, rgb >> 8 & 255, rgb & 255));
     }
   }
   return picture;

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <vector>
 
 #include "io/drawing_file.hpp"
 
@@ -13,6 +15,11 @@ struct GreyPicture {
   double pixel_mm = 0.0;
   std::vector<std::uint8_t> grey = {};  ///< [rows, columns], 0 is black
 };
+
+/// Grey of a colour, by Rec. 709.
+inline std::uint8_t luma(std::uint32_t red, std::uint32_t green, std::uint32_t blue) {
+  return static_cast<std::uint8_t>((54 * red + 183 * green + 19 * blue) / 256);
+}
 
 /// Throws Error where so many pixels are too many.
 /// @param remedy what to do about it

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "io/input_file.hpp"
+#include "learning/array_place.hpp"
 #include "palpate/object_frame.hpp"
 #include "recognition/recordings.hpp"
 #include "recognition/touch_sd_fit.hpp"
@@ -193,8 +194,11 @@ void add_touch_sd(Device& device, const CalibrationTask& task, SensorCalibration
                   const std::function<void(double)>& progress) {
   LearnedSensor& sensor = calibration.sensor;
   std::vector<Hypothesis> hypotheses;
-  std::vector<TouchedObject> unknowns = unknowns_of(task.presses);
-  const std::vector<Press> others = presses_without(0, task.presses, touch_sd_folds);
+  const std::vector<Press> presses =
+      calibration.array_offset ? with_offset(task.presses, *calibration.array_offset->array_offset)
+                               : task.presses;
+  std::vector<TouchedObject> unknowns = unknowns_of(presses);
+  const std::vector<Press> others = presses_without(0, presses, touch_sd_folds);
   for (TrainingMap& map : maps_of_objects(others, calibration.maps)) {
     hypotheses.push_back({.map = std::move(map.map)});
   }

@@ -258,8 +258,12 @@ ChosenBins chosen_bins(const Device& device, std::span<const Hypothesis> hypothe
                        const ChosenFilter& filter, BinWidth width) {
   const auto* histogram = std::get_if<HistogramOptions>(&filter.options);
   std::int64_t most = most_bins_on(device, false);
-  if (traits_of(filter.options).certificate ||
-      (histogram != nullptr && filter.automatic && bounded_instead(*histogram))) {
+  const auto* bounded = std::get_if<BoundedOptions>(&filter.options);
+  // The memory of a belief that slips follows the bins.
+  const bool slips = histogram != nullptr ? !histogram->slip_sd.none()
+                                          : bounded != nullptr && !bounded->slip_sd.none();
+  if (!slips && (bounded != nullptr ||
+                 (histogram != nullptr && filter.automatic && bounded_instead(*histogram)))) {
     most = most_bounded_bins;
   } else if (histogram != nullptr) {
     most = most_bins_on(device, histogram->still_array, histogram->memory_limit_bytes);

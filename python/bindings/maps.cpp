@@ -69,6 +69,13 @@ void bind_drawn_maps(nb::class_<OccupancyGrid>& grid) {
          double felt_share, double reach_mm) {
         ArrayReader reader;
         Mask drawn{.pixel_mm = pixel_mm, .origin_mm = point_of(origin_mm, "origin_mm")};
+        // A picture's 0 and 255 would be taken for False and True.
+        const nb::object type = nb::module_::import_("numpy").attr("asarray")(mask).attr("dtype");
+        if (nb::cast<std::string>(type.attr("kind")) != "b") {
+          throw Error(Fault::input,
+                      fmt::format("mask: dtype {}; give booleans, True where occupied",
+                                  nb::cast<std::string>(type.attr("name"))));
+        }
         drawn.occupied =
             reader.flags(mask, "mask", {"rows", "columns"}, {}, "booleans, True where occupied")
                 .copied<std::uint8_t>();

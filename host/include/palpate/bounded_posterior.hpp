@@ -152,8 +152,7 @@ class PALPATE_API BoundedPosterior {
   /// @throws Error where the list would take more than a quarter of the machine's memory
   EvaluatedBelief evaluated_bins() const;
   /// Log-likelihood of any pose of an object in nats, in float64, without prior weights. With
-  /// touch_sd or slip_sd, of the bin that the pose lies in; with slip_sd, an upper bound where that
-  /// bin was not evaluated.
+  /// touch_sd or slip_sd, of the bin that the pose lies in; with slip_sd, an upper bound.
   /// @throws Error if there is no such object or the pose is not finite
   double log_likelihood(int object, const Pose& T_object_robot) const;
 

@@ -103,7 +103,8 @@ struct LanesOfBlock {
   using Mask = hn::Mask<D>;
   using FloatMask = hn::Mask<hn::Rebind<float, D>>;
 
-  // GCC compiles constructors that it makes itself without the instructions that masks of NEON need.
+  // GCC compiles constructors that it makes itself without the instructions that masks of NEON
+  // need.
   HWY_ATTR LanesOfBlock() {}
   HWY_ATTR LanesOfBlock(const ElementPatches<hn::TFromD<D>>* of, Mask all, FloatMask float_all)
       : elements(of), lanes(all), float_lanes(float_all) {}

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
+#include <utility>
 
 #include "estimation/bounded/log_sum.hpp"
 #include "estimation/contact_evidence.hpp"
@@ -124,6 +126,9 @@ SearchResult MovingBelief::find(const SearchGoal& goal, const Deadline& deadline
   }
   std::vector<double> logs;
   for (const MovingObject& object : objects_) {
+    if (object.mass() == -infinity) {
+      continue;  // upper bounds alone
+    }
     for (const BlockRun& run : object.runs()) {
       logs.clear();
       object.for_bins(std::span(&run, 1), [&](std::size_t bin) {
@@ -148,7 +153,7 @@ SearchResult MovingBelief::result() const {
   const MovingObject& shared = objects_[heaviest];
   found.shared_nats = std::max(shared.over(), shared.under());
   double best = -infinity;
-  double best_missing = -infinity;
+  double least_best = -infinity;  // as far as it is known
   for (std::size_t i = 0; i < objects_.size(); ++i) {
     const MovingObject& object = objects_[i];
     const double scale = space_.log_weight[i] + object.scale();
@@ -156,15 +161,15 @@ SearchResult MovingBelief::result() const {
     const double under = i == heaviest ? 0.0 : object.under() + shared.over();
     const double part =
         std::max(std::expm1(object.rounding() + over), -std::expm1(-object.rounding() - under));
-    found.mass.push_back({.evaluated = scale + object.mass(),
-                          .rounding = scale + object.mass() + std::log(part),
-                          .dropped = scale + over + object.rest()});
-    best_missing =
-        std::max(best_missing, scale + over + *std::ranges::max_element(object.log_rest()));
+    found.mass.push_back(
+        {.evaluated = scale + object.mass(),
+         .rounding = object.mass() > -infinity ? scale + object.mass() + std::log(part) : -infinity,
+         .dropped = scale + over + object.rest()});
     object.for_bins(object.runs(), [&](std::size_t bin) {
       const double log = scale + object.log_mass()[bin];
       if (log > best) {
         best = log;
+        least_best = best - object.rounding() - under;
         found.best_object = static_cast<std::int32_t>(i);
         found.best_bin = static_cast<std::int64_t>(bin);
         found.best_log_likelihood = log - space_.log_weight[i];
@@ -175,7 +180,24 @@ SearchResult MovingBelief::result() const {
       found.bins_evaluated += object.box_of(run).bins();
     }
   }
-  found.mode_certain = best_missing < best;
+  found.mode_certain = true;
+  for (std::size_t i = 0; i < objects_.size() && found.mode_certain; ++i) {
+    const MovingObject& object = objects_[i];
+    const double most = space_.log_weight[i] + object.scale() +
+                        (i == heaviest ? 0.0 : object.over() + shared.under());
+    for (std::size_t bin = 0; bin < object.log_rest().size(); ++bin) {
+      const double mass = object.log_mass()[bin] + object.rounding();
+      const double rest = object.log_rest()[bin];
+      const bool best_itself =
+          std::cmp_equal(i, found.best_object) && std::cmp_equal(bin, found.best_bin);
+      // A sum is at most twice the larger one.
+      if (!best_itself && most + std::max(mass, rest) + std::numbers::ln2 >= least_best &&
+          most + log_add(mass, rest) >= least_best) {
+        found.mode_certain = false;
+        break;
+      }
+    }
+  }
   found.contradicted = prior_log_likelihood_ - found.best_log_likelihood > contradiction_nats;
   return found;
 }
@@ -201,7 +223,8 @@ bool MovingBelief::reaches(const SearchResult& found, const SearchGoal& goal) co
   }
   const double least = found.all().evaluated - goal.evidence_range_nats;
   for (std::size_t i = 0; i < low.size(); ++i) {
-    if (high[i].log() > least && high[i].log() - low[i].log() > *goal.evidence_nats) {
+    if (high[i].log() > least &&
+        high[i].log() - low[i].log() + 2.0 * found.shared_nats > *goal.evidence_nats) {
       return false;
     }
   }

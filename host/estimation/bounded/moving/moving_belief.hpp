@@ -21,6 +21,8 @@ class MovingBelief {
   /// @param space with tiles of MovingObject::tile_bins; all of these outlive the belief
   MovingBelief(const SearchSpace& space, const BoundedOptions& options,
                const BinLikelihood& likelihood, std::span<const Hypothesis> hypotheses);
+  MovingBelief(const MovingBelief&) = delete;  // its objects refer to it
+  MovingBelief& operator=(const MovingBelief&) = delete;
 
   /// Host memory in bytes that so many objects take.
   static double bytes_needed(const PoseLattice& lattice, std::size_t objects);

@@ -60,6 +60,10 @@ void MovingObject::start() {
   log_rest_.assign(bins, -infinity);
   followed_.assign(static_cast<std::size_t>(task_.lattice.theta_rad.count) * rows_ * columns_, 1);
   rounding_ = scale_ = over_ = under_ = 0.0;
+  choose(std::vector<double>(followed_.size()), -infinity);
+  // Nothing slips before the first touch: what slips keep is not asked for.
+  const double log_bins = std::log(static_cast<double>(bins));
+  sums_ = {.mass = log_bins, .rest = -infinity, .kept = log_bins, .off = -infinity};
 }
 
 void MovingObject::step(const KnownElements& touch, bool slips, std::span<const double> tiles,
@@ -104,16 +108,17 @@ void MovingObject::restore() {
       std::exp(sums_.off - sums_.kept) + std::abs(std::expm1(sums_.mass - sums_.kept));
   const double parts = std::log1p(std::expm1(2.0 * rounding_) * spread);
   const bool known = std::isfinite(sums_.mass);
-  const auto missing = [&](double part) {
-    return known ? parts + std::log1p(part * std::exp(sums_.rest + rounding_)) : infinity;
+  // Logs of parts, since masses of many touches are beyond float64.
+  const auto missing = [&](double log_part) {
+    return known ? parts + std::log1p(std::exp(log_part + sums_.rest + rounding_)) : infinity;
   };
   const double ratio = known ? sums_.mass - sums_.kept : 0.0;
-  const double most = missing(std::exp(-sums_.mass));
-  const double least = missing(most_kept_ * std::exp(-sums_.kept));
+  const double most = missing(-sums_.mass);
+  const double least = missing(std::log(most_kept_) - sums_.kept);
   const double error = of_bins_.kept_error() + 1e-12;
   scale_ += ratio;
-  over_ += std::max(0.0, std::min(most, -std::log(least_kept_) - ratio)) + error;
-  under_ += std::max(0.0, std::min(least, std::log(most_kept_) + ratio)) + error;
+  over_ += std::max(0.0, std::min(-std::log(least_kept_) - ratio, most)) + error;
+  under_ += std::max(0.0, std::min(std::log(most_kept_) + ratio, least)) + error;
 }
 
 void MovingObject::multiply(const KnownElements& touch) {

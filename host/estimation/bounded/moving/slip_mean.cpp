@@ -201,7 +201,8 @@ bool SlipMean::sum_turns(std::span<const BlockRun> targets, std::span<const doub
           }
           continue;
         }
-        const double* const around = plane.wide.data() - plane.y * plane.pitch - plane.x;
+        const double* const around =
+            fraction_error_ > 0.0 ? plane.wide.data() - plane.y * plane.pitch - plane.x : nullptr;
         const Turn& turned = turn(tap);
         for (int x = 0; x < width; ++x) {
           const glm::dvec2 mm = first_mm_ + step_mm_ * glm::dvec2(first + x, y);
@@ -245,8 +246,8 @@ bool SlipMean::sum_turns(std::span<const BlockRun> targets, std::span<const doub
         mean = Domain::log_mean(sums[x], inside[x]) + reference;
         if (fraction_error_ > 0.0) {
           // Each of two fractions may change a neighbour's weight by so much.
-          wrong = std::log1p(2.0 * fraction_error_ *
-                             std::exp(Domain::log(wide[x]) - Domain::log(sums[x])));
+          wrong = log_add(
+              0.0, std::log(2.0 * fraction_error_) + Domain::log(wide[x]) - Domain::log(sums[x]));
         }
       }
     }
