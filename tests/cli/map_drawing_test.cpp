@@ -101,6 +101,8 @@ TEST_F(MapDrawing, TakesPicturesOfAnyKindOfPixel) {
   expect_part(map_of("grey.png", dark));
   write_png("clear.png", PNG_FORMAT_RGBA, {20, 60, 90, 255}, {0, 0, 0, 0});
   expect_part(map_of("clear.png", dark));
+  write_png("edge.png", PNG_FORMAT_RGBA, {0, 0, 0, 130}, {0, 0, 0, 120});
+  expect_part(map_of("edge.png", dark));
   write_png("light.PNG", PNG_FORMAT_RGB, {250, 240, 200}, {60, 0, 90});
   expect_part(map_of("light.PNG", light));
   write_png("clear_light.png", PNG_FORMAT_GA, {255, 255}, {255, 0});
@@ -172,6 +174,18 @@ TEST_F(MapDrawing, TellsCalibrateWhereTheArraySitsInTheTool) {
   }
 }
 
+TEST_F(MapDrawing, AnArrayIsWrittenOnlyWhereItsPlaceIsToldAndNeverOverItself) {
+  write("array.csv", "x,y\n0,0\n5,0\n0,5\n5,5\n");
+  write_svg("part.svg", "width='30mm' height='20mm' viewBox='0 0 30 20'", part);
+  expect_refused({"map", "part.svg", "--array", "array.csv", "-o", "array.csv"}, {"array.csv"});
+  write_recording(folder_ / "A.h5", sample_training("A", 48));
+  done({"map", "A.h5", "-o", "A.map.h5"});
+  expect_refused({"calibrate", "A.h5", "--maps", "A.map.h5", "-o", "s.yaml", "--layer", "log_odds",
+                  "--write-array", "a.csv"},
+                 {"--write-array", "drawn maps"});
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "s.yaml"));
+}
+
 TEST_F(MapDrawing, RefusesWhatIsNotInTheDrawing) {
   const std::string size = "width='30mm' height='20mm'";
   for (const char* inside :
@@ -186,6 +200,9 @@ TEST_F(MapDrawing, RefusesWhatIsNotInTheDrawing) {
         "<!DOCTYPE svg [<!ENTITY a SYSTEM 'part.txt'>]><svg xmlns="
         "'http://www.w3.org/2000/svg' width='9mm' height='9mm'>&a;</svg>");
   expect_refused({"map", "part.svg", "-o", "x.map.h5"}, {"part.svg: refers to '<!ENTITY a SYSTEM"});
+  write_svg("part.svg", size,
+            "<image href='data:image/png;base64,iVBORw0KGgo=' width='9' height='9'/>");
+  expect_refused({"map", "part.svg", "-o", "x.map.h5"}, {"part.svg: holds a picture; trace it"});
   // What is within it is no reference to elsewhere.
   write_svg("part.svg", size + " viewBox='0 0 30 20'",
             "<defs><path id='a' d='M5 5V15H25V11H9V5Z'/><linearGradient id='g'/></defs>"

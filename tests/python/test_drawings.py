@@ -103,6 +103,7 @@ def test_what_is_no_drawing_is_refused() -> None:
 
     mask = numpy.ones((4, 5), bool)
     assert words(mask * 1.0) == "mask: dtype float64; give booleans, True where occupied"
+    assert words(mask * numpy.uint8(255)) == "mask: dtype uint8; give booleans, True where occupied"
     assert words(mask[0]) == "mask: shape (5,); give (rows, columns)"
     assert words(~mask) == "mask of 'a': no pixel is occupied; mark those of the object"
     assert words(mask, pixel_mm=0.0).startswith("mask of 'a': a pixel = 0 mm: give")

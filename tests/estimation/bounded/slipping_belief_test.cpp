@@ -65,6 +65,44 @@ TEST(SlippingBelief, AgreesWithTheHistogram) {
   }
 }
 
+TEST(SlippingBelief, IsUniformBeforeTheFirstTouchAndAfterAReset) {
+  const Recording recording = touches_of_l(2, 964);
+  const BoundedOptions options = slipping_options();
+  BoundedPosterior belief(two_shapes(), options);
+  const auto expect_uniform = [&] {
+    const double p = belief.estimate().identity[0];
+    EXPECT_NEAR(p, 1.0 / 3.0, 1e-9) << "as the weights say";
+    const double of_labels = -p * std::log(p) - (1.0 - p) * std::log(1.0 - p);
+    const double of_bins = std::log(static_cast<double>(options.lattice.bins()));
+    EXPECT_NEAR(belief.entropy(), of_labels + of_bins, 1e-6);
+    const std::vector<double> theta = belief.marginals(0).theta;
+    EXPECT_NEAR(*std::ranges::max_element(theta), *std::ranges::min_element(theta), 1e-9);
+    EXPECT_GT(*std::ranges::min_element(theta), 0.0);
+  };
+  expect_uniform();
+  belief.update(all_touches(recording));
+  EXPECT_LT(belief.entropy(), 7.0);
+  belief.reset();
+  expect_uniform();
+}
+
+TEST(SlippingBelief, HoldsAfterMoreTouchesThanFloat64HasRangeFor) {
+  Device device = Device::open();
+  const Recording recording = touches_of_l(6, 961);
+  const BoundedOptions options = slipping_options();
+  BoundedPosterior bounded(two_shapes(), options);
+  PoseHistogram dense(device, two_shapes(), dense_options(options));
+  for (int round = 0; round < 25; ++round) {
+    bounded.update(all_touches(recording));
+    dense.update(all_touches(recording));
+  }
+  const Estimate ours = bounded.estimate();
+  EXPECT_LT(ours.mode.log_likelihood, -800.0) << "or nothing is tested";
+  EXPECT_LE(ours.certificate->dropped_mass, options.tolerance + 1e-7);
+  EXPECT_LT(largest_difference(ours.identity, dense.estimate().identity), 1e-3);
+  EXPECT_EQ(ours.mode.bin, dense.estimate().mode.bin);
+}
+
 TEST(SlippingBelief, PlansAsTheHistogram) {
   Device device = Device::open();
   const Recording recording = touches_of_l(3, 962);
