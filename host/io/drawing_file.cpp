@@ -101,4 +101,12 @@ Mask read_drawing(const std::filesystem::path& path, const DrawingOptions& optio
   return mask;
 }
 
+#ifndef PALPATE_SVG
+
+GreyPicture draw_svg(const std::filesystem::path& path, const DrawingOptions& /*options*/) {
+  refuse(path, "this build reads no SVG; save the drawing as PNG, and give `mm-per-pixel`");
+}
+
+#endif
+
 }  // namespace palpate

@@ -11,6 +11,7 @@
 #include "estimation/bounded/log_sum.hpp"
 #include "estimation/bounded/marginal_sums.hpp"
 #include "estimation/bounded/search/search_memory.hpp"
+#include "estimation/hypotheses.hpp"
 #include "estimation/lattice/expected_gain.hpp"
 #include "estimation/lattice/reading_predictor.hpp"
 #include "estimation/lattice/refinement.hpp"

@@ -192,10 +192,10 @@ OccupancyGrid built(Device& device, const OccupancyGrid& map, double prior) {
 }  // namespace
 
 OccupancyGrid with_prior(Device& device, const OccupancyGrid& map, double prior) {
-  const OccupancyGrid other = built(device, map, prior);
   if (map.drawn) {
-    return other;
+    return built(device, map, prior);
   }
+  const OccupancyGrid other = built(device, map, prior);
   if (other.nx != map.nx || other.ny != map.ny) {
     throw Error(
         Fault::input,
