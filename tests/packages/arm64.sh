@@ -1,6 +1,8 @@
 #!/usr/bin/env bash
 # Compiles Palpate for 64-bit ARM (aarch64) in a fresh Debian 12 and runs its tests there under
-# qemu-user: model, files, bounds (with NEON), streaming, driver, and the golden values on lavapipe.
+# qemu-user: model, files, bounds (with NEON), streaming, the driver's parsing, and the golden values on
+# lavapipe. qemu limits no process's memory, and umockdev's boards are not seen under it: some tests of
+# files fail, and those of the driver are left out.
 # Run by hand, as root:
 #   tests/packages/arm64.sh [PROGRAM OF TESTS...]
 # Needs debootstrap, the network, about 3 GB in $TMPDIR, and an hour of two cores. Exits with 77 where
@@ -11,7 +13,7 @@ source=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 mirror=${MIRROR:-http://deb.debian.org/debian}
 programs=("$@")
 [ $# -gt 0 ] || programs=(model_test io_test estimation_bounded_test estimation_bounded_slow_test
-  streaming_test parsing_test usb_tests golden_test)
+  streaming_test parsing_test golden_test)
 
 skip() {
   echo "skipped: $*" >&2
@@ -70,6 +72,5 @@ in_root cmake -S /source -B /build -G Ninja -DCMAKE_BUILD_TYPE=Release -DCMAKE_U
   -DCMAKE_CROSSCOMPILING_EMULATOR=/usr/bin/qemu-aarch64-static \
   -DPALPATE_BENCH=OFF -DPALPATE_SVG=OFF -DPALPATE_WERROR=ON -DPALPATE_TESTS=ON --log-level=WARNING
 in_root cmake --build /build --target "${programs[@]}"
-# Validation would check the same calls as it does on the machine's own processor.
-in_root env GTEST_BRIEF=1 PALPATE_VALIDATION=0 \
+in_root env GTEST_BRIEF=1 \
   ctest --test-dir /build --output-on-failure -j "$(nproc)" -R "^($(IFS='|' && echo "${programs[*]}"))"
