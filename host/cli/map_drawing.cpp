@@ -34,7 +34,8 @@ void check_flags(const MapFlags& flags) {
                 {"--frames", flags.frames.has_value()},
                 {"--touch-sd-mm", flags.touch_sd_mm.has_value()},
                 {"--touch-sd-deg", flags.touch_sd_deg.has_value()},
-                {"--unposed", flags.unposed}},
+                {"--unposed", flags.unposed},
+                {"--device", !flags.device.empty()}},
                "a drawing has no touches");
   for (const std::string& path : flags.recordings) {
     if (!is_drawing(path)) {

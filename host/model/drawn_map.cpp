@@ -120,12 +120,12 @@ void DrawnMapOptions::validate() const {
   MapOptions{.cell_mm = cell_mm, .sensor = {.spread_mm = spread_mm, .peak = peak, .prior = prior}}
       .validate();
   if (!(peak > 0.5)) {
-    throw Error(Fault::input, fmt::format("peak = {}: must be above 0.5, or a drawing would say "
+    throw Error(Fault::input, fmt::format("`peak {}`: must be above 0.5, or a drawing would say "
                                           "nothing of what is occupied",
                                           peak));
   }
   if (!(felt_share > 0.0 && felt_share < 1.0)) {
-    throw Error(Fault::input, fmt::format("felt share = {}: must lie between 0 and 1", felt_share));
+    throw Error(Fault::input, fmt::format("`felt-share {}`: must lie between 0 and 1", felt_share));
   }
   if (!(reach_mm >= 0.0 && reach_mm <= most_length_mm)) {
     throw Error(Fault::input, fmt::format("reach = {} mm: give 0 to {:g} mm, the largest distance "

@@ -242,8 +242,10 @@ TEST_F(MapDrawing, RefusesBadDrawingsAndFlagsInOneLine) {
   refused({"good.svg", "--occupied", "red"}, {"--occupied red: give dark or light"});
   refused({"good.svg", "--threshold", "2"}, {"--threshold: a drawing has no touches"});
   refused({"good.svg", "--unposed"}, {"--unposed: a drawing has no touches"});
+  refused({"good.svg", "--device", "0"}, {"--device: a drawing has no touches"});
+  refused({"good.svg", "--felt-share", "2"}, {"--felt-share 2: must lie between 0 and 1"});
   refused({"good.svg", "--origin", "1,2,3"}, {"--origin 1,2,3: a drawing is not turned"});
-  refused({"good.svg", "--peak", "0.3"}, {"peak = 0.3: must be above 0.5"});
+  refused({"good.svg", "--peak", "0.3"}, {"--peak 0.3: must be above 0.5"});
   refused({"good.svg", "--label", "a/b"}, {"good.svg: object 'a/b' holds a '/'"});
   refused({"good.svg", "A.h5"}, {"A.h5: is no drawing, but good.svg is"});
   refused({"good.svg", "good.png"}, {"-o x.map.h5: 2 drawings make as many maps"});

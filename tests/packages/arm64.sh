@@ -10,41 +10,16 @@
 set -euo pipefail
 
 source=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
-mirror=${MIRROR:-http://deb.debian.org/debian}
 programs=("$@")
 [ $# -gt 0 ] || programs=(model_test io_test estimation_bounded_test estimation_bounded_slow_test
   streaming_test parsing_test golden_test)
 
-skip() {
-  echo "skipped: $*" >&2
-  exit 77
-}
-[ "$(id -u)" -eq 0 ] || skip "debootstrap needs root"
-command -v debootstrap >/dev/null || skip "debootstrap is missing: apt-get install debootstrap"
+# shellcheck source=tests/packages/root.sh
+. "$source/tests/packages/root.sh"
+require_debootstrap
 
-root=$(mktemp -d)
-chmod 755 "$root"  # apt downloads as a user of its own
-finish() {
-  umount "$root/proc" 2>/dev/null || true
-  rm -rf --one-file-system "$root"
-}
-trap finish EXIT
-debootstrap --variant=minbase bookworm "$root" "$mirror" >"$root.log" 2>&1 || {
-  tail -n 5 "$root.log" >&2
-  rm "$root.log"
-  skip "debootstrap cannot make a root of Debian 12 here"
-}
-rm "$root.log"
-mount -t proc proc "$root/proc" || skip "cannot mount /proc in the new root"
-in_root() {
-  chroot "$root" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root DEBIAN_FRONTEND=noninteractive \
-    LC_ALL=C.UTF-8 PKG_CONFIG_LIBDIR=/usr/lib/aarch64-linux-gnu/pkgconfig:/usr/share/pkgconfig "$@"
-}
-# The machine's own way to the mirror: name servers, proxy.
-for file in /etc/resolv.conf /etc/hosts; do
-  cp -L "$file" "$root$file"
-done
-cp /etc/apt/apt.conf.d/*proxy* "$root/etc/apt/apt.conf.d/" 2>/dev/null || true
+make_root --variant=minbase
+root_environment=(PKG_CONFIG_LIBDIR=/usr/lib/aarch64-linux-gnu/pkgconfig:/usr/share/pkgconfig)
 
 echo "Installing compilers of this machine's, and libraries of ARM's"
 tools=(g++-aarch64-linux-gnu cmake ninja-build pkg-config glslang-tools spirv-tools qemu-user-static

@@ -10,44 +10,17 @@
 set -euo pipefail
 
 source=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
-mirror=${MIRROR:-http://deb.debian.org/debian}
 
-skip() {
-  echo "skipped: $*" >&2
-  exit 77
-}
-[ "$(id -u)" -eq 0 ] || skip "debootstrap needs root"
-command -v debootstrap >/dev/null || skip "debootstrap is missing: apt-get install debootstrap"
+# shellcheck source=tests/packages/root.sh
+. "$source/tests/packages/root.sh"
+require_debootstrap
 wheel=${1:-$(compgen -G "$source/build-wheel/palpate-*-cp311-*manylinux*.whl" || true)}
 [ -f "$wheel" ] || {
   echo "no wheel of CPython 3.11, which Debian 12 has: run ./dev wheel" >&2
   exit 2
 }
 
-root=$(mktemp -d)
-chmod 755 "$root"  # apt downloads as a user of its own
-finish() {
-  umount "$root/proc" 2>/dev/null || true
-  rm -rf --one-file-system "$root"
-}
-trap finish EXIT
-debootstrap --variant=minbase --include=python3,python3-venv bookworm "$root" "$mirror" \
-  >"$root.log" 2>&1 || {
-  tail -n 5 "$root.log" >&2
-  rm "$root.log"
-  skip "debootstrap cannot make a root of Debian 12 here"
-}
-rm "$root.log"
-mount -t proc proc "$root/proc" || skip "cannot mount /proc in the new root"
-in_root() {
-  chroot "$root" env -i PATH=/environment/bin:/usr/sbin:/usr/bin:/sbin:/bin HOME=/root \
-    DEBIAN_FRONTEND=noninteractive LC_ALL=C.UTF-8 "$@"
-}
-# The machine's own way to the mirror: name servers, proxy.
-for file in /etc/resolv.conf /etc/hosts; do
-  cp -L "$file" "$root$file"
-done
-cp /etc/apt/apt.conf.d/*proxy* "$root/etc/apt/apt.conf.d/" 2>/dev/null || true
+make_root --variant=minbase --include=python3,python3-venv
 echo 'Dpkg::Use-Pty "0";' >"$root/etc/apt/apt.conf.d/99no-terminal"
 
 # NumPy comes from this machine's index: the root needs no certificates.

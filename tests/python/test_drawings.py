@@ -21,14 +21,15 @@ def drawing(letter: str) -> NDArray[numpy.bool_]:
     return numpy.reshape(touch.pressure, (280, 280)) > 10
 
 
+def drawn_letter(letter: str) -> palpate.OccupancyGrid:
+    return palpate.OccupancyGrid.from_mask(
+        letter, drawing(letter), pixel_mm=PIXEL_MM, origin_mm=(-13.95, -13.95)
+    )
+
+
 @pytest.fixture(scope="module")
 def drawn() -> list[palpate.OccupancyGrid]:
-    return [
-        palpate.OccupancyGrid.from_mask(
-            letter, drawing(letter), pixel_mm=PIXEL_MM, origin_mm=(-13.95, -13.95)
-        )
-        for letter in LETTERS
-    ]
+    return [drawn_letter(letter) for letter in LETTERS]
 
 
 @pytest.fixture(scope="module")
@@ -107,7 +108,7 @@ def test_what_is_no_drawing_is_refused() -> None:
     assert words(mask[0]) == "mask: shape (5,); give (rows, columns)"
     assert words(~mask) == "mask of 'a': no pixel is occupied; mark those of the object"
     assert words(mask, pixel_mm=0.0).startswith("mask of 'a': a pixel = 0 mm: give")
-    assert words(mask, felt_share=0.0) == "felt share = 0: must lie between 0 and 1"
+    assert words(mask, felt_share=0.0) == "felt_share=0: must lie between 0 and 1"
 
     def polygon(vertices: object) -> str:
         with pytest.raises(palpate.Error) as refused:
@@ -138,5 +139,29 @@ def test_a_sensor_and_its_place_in_the_tool_are_learned_on_drawn_maps(
     assert (abs(offset - (dx, dy, turn)) < (0.15, 0.15, 0.03)).all(), offset
     assert calibration.sensor.layer == "log_odds"
     assert calibration.sensor.log_likelihood.shape[0] == 7, "levels of pressure"
+
+
+def test_where_the_array_sits_counts_once(device: palpate.Device) -> None:
+    # A fifth of the touches tells how far touches are misplaced: at least five touches of each of five
+    # objects. This takes some seconds.
+    elements = numpy.asarray(palpate.digitacts_array())
+    recordings = []
+    for seed, letter in enumerate("AEIOU"):
+        poses = palpate.random_poses(30, seed=seed)
+        made = palpate.simulate(letter, poses, elements_mm=elements + (2.0, -1.0), seed=seed)
+        recordings.append(
+            palpate.Recording(
+                made.pressure, made.T_robot_sensor, elements, object=letter, truth=made.truth
+            )
+        )
+    maps = [drawn_letter(letter) for letter in "AEIOU"]
+    calibration = palpate.calibrate(recordings, maps=maps, device=device)
+    assert calibration.array_offset is not None and calibration.touch_sd_fitted
+    assert calibration.sensor.touch_sd.mm < 0.5, "2 mm off is the array, not the touches"
+
+
+def test_an_array_that_sits_right_stays_there(
+    device: palpate.Device, drawn: list[palpate.OccupancyGrid]
+) -> None:
     there = palpate.simulate("E", palpate.random_poses(30, seed=1), seed=2)
     assert palpate.calibrate(there, maps=drawn[1], device=device).array_offset is None

@@ -58,6 +58,13 @@ TEST(ChosenBins, AreNotLimitedByTheDeviceWhereBoundsMayTakeThem) {
     EXPECT_LE(all, most_bounded_bins);
     EXPECT_GT(all, most_balanced_bins) << "more than any histogram gets";
   }
+  HistogramOptions slips = histogram;
+  slips.slip_sd.mm = 1.0;
+  for (const ChosenBins& bins :
+       {chosen(device, BoundedOptions{.lattice = wide_lattice(), .slip_sd = slips.slip_sd}),
+        chosen(device, slips, true)}) {
+    EXPECT_LE(bins.most_bins, most_bins_on(device, false)) << "each bin takes memory";
+  }
   histogram.memory_limit_bytes = std::uint64_t{1} << 20;
   EXPECT_LT(chosen(device, histogram, true).most_bins, most_bins_on(device, false))
       << "bounds need none of the device's memory";

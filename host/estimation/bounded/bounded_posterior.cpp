@@ -261,7 +261,9 @@ EvaluatedBelief BoundedPosterior::evaluated_bins() const {
     }
     const std::int64_t first = box.object * lattice().bins();
     for (std::int64_t i = 0; i < box.bins(); ++i) {
-      bins.push_back({first + box.bin(i, lattice()), log_likelihood[static_cast<std::size_t>(i)]});
+      if (const double l = log_likelihood[static_cast<std::size_t>(i)]; l > no_mass / 2.0) {
+        bins.push_back({first + box.bin(i, lattice()), l});
+      }
     }
   });
   std::ranges::sort(bins, {}, &Bin::place);

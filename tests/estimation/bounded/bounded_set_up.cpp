@@ -1,5 +1,6 @@
 #include "bounded_set_up.hpp"
 
+#include <cmath>
 #include <numeric>
 
 #include <gtest/gtest.h>
@@ -36,6 +37,31 @@ Recording touches_of_l(std::size_t touches, std::uint64_t seed) {
 
 double sum(std::span<const double> values) {
   return std::accumulate(values.begin(), values.end(), 0.0);
+}
+
+HistogramOptions dense_options(const BoundedOptions& options) {
+  return {.lattice = options.lattice,
+          .none_weight = options.none_weight,
+          .touch_sd = options.touch_sd,
+          .slip_sd = options.slip_sd};
+}
+
+void expect_as_dense(BoundedPosterior& bounded, PoseHistogram& dense, std::size_t touches) {
+  const Estimate ours = bounded.estimate();
+  const Estimate theirs = dense.estimate();
+  const double nats = 1e-3 * static_cast<double>(touches);
+  EXPECT_NEAR(std::log(ours.none / (1.0 - ours.none)), std::log(theirs.none / (1.0 - theirs.none)),
+              nats);
+  EXPECT_LT(largest_difference(ours.identity, theirs.identity), 1e-4);
+  EXPECT_EQ(ours.mode.object, theirs.mode.object);
+  EXPECT_EQ(ours.mode.bin, theirs.mode.bin);
+  EXPECT_NEAR(ours.mode.log_likelihood, theirs.mode.log_likelihood, nats);
+  const Pose our_pose = bounded.refine(ours.mode).T_object_robot;
+  const Pose their_pose = dense.refine(theirs.mode).T_object_robot;
+  EXPECT_NEAR(our_pose.translation_mm.x, their_pose.translation_mm.x, 1e-3);
+  EXPECT_NEAR(our_pose.translation_mm.y, their_pose.translation_mm.y, 1e-3);
+  EXPECT_NEAR(our_pose.theta_rad, their_pose.theta_rad, 1e-4);
+  EXPECT_LT(largest_difference(bounded.marginals(0).theta, dense.marginals(0).theta), 1e-4);
 }
 
 void expect_refused(const std::function<void()>& call, const std::string& says) {

@@ -9,6 +9,7 @@
 
 #include "limits.hpp"
 #include "palpate/bounded_posterior.hpp"
+#include "palpate/pose_histogram.hpp"
 #include "synthetic.hpp"
 
 namespace palpate {
@@ -26,6 +27,13 @@ BoundedOptions small_options();
 Recording touches_of_l(std::size_t touches, std::uint64_t seed);
 
 double sum(std::span<const double> values);
+
+/// The options of a histogram over the same bins, displacements and "none of these".
+HistogramOptions dense_options(const BoundedOptions& options);
+
+/// Expects bounds to agree with the histogram about identities, "none of these", the mode, the
+/// refined pose and the marginals, by what the method allows float32 after so many touches.
+void expect_as_dense(BoundedPosterior& bounded, PoseHistogram& dense, std::size_t touches);
 
 /// Expects the call to throw an Error of the user's input, in one line that says this.
 void expect_refused(const std::function<void()>& call, const std::string& says);

@@ -28,28 +28,11 @@ TEST(DisplacedBelief, AgreesWithTheHistogram) {
   options.none_weight = 2.0;
   options.evidence_nats = 1e-4;  // of "none of these", too
   BoundedPosterior bounded(two_shapes(), options);
-  PoseHistogram dense(
-      device, two_shapes(),
-      {.lattice = options.lattice, .none_weight = 2.0, .touch_sd = options.touch_sd});
+  PoseHistogram dense(device, two_shapes(), dense_options(options));
   for (std::size_t n = 1; n <= recording.size(); ++n) {
     bounded.update(recording.touch(n - 1));
     dense.update(recording.touch(n - 1));
-    const Estimate ours = bounded.estimate();
-    const Estimate theirs = dense.estimate();
-    // What the method allows float32.
-    const double nats = 1e-3 * static_cast<double>(n);
-    EXPECT_NEAR(std::log(ours.none / (1.0 - ours.none)),
-                std::log(theirs.none / (1.0 - theirs.none)), nats);
-    EXPECT_LT(largest_difference(ours.identity, theirs.identity), 1e-4);
-    EXPECT_EQ(ours.mode.object, theirs.mode.object);
-    EXPECT_EQ(ours.mode.bin, theirs.mode.bin);
-    EXPECT_NEAR(ours.mode.log_likelihood, theirs.mode.log_likelihood, nats);
-    const Pose our_pose = bounded.refine(ours.mode).T_object_robot;
-    const Pose their_pose = dense.refine(theirs.mode).T_object_robot;
-    EXPECT_NEAR(our_pose.translation_mm.x, their_pose.translation_mm.x, 1e-3);
-    EXPECT_NEAR(our_pose.translation_mm.y, their_pose.translation_mm.y, 1e-3);
-    EXPECT_NEAR(our_pose.theta_rad, their_pose.theta_rad, 1e-4);
-    EXPECT_LT(largest_difference(bounded.marginals(0).theta, dense.marginals(0).theta), 1e-4);
+    expect_as_dense(bounded, dense, n);
   }
 }
 

@@ -19,8 +19,6 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 /// tiles are.
 constexpr double first_depth = 40.0;
 constexpr double last_depth = 160.0;
-/// The log of no mass, as a number.
-constexpr double no_mass = -1e9;
 
 }  // namespace
 
@@ -65,8 +63,7 @@ void MovingBelief::start() {
 void MovingBelief::take_in(const Deadline& deadline) {
   try {
     while (stepped_ < touches_.size()) {
-      deadline.cancel_point();
-      step(touches_[stepped_]);
+      step(touches_[stepped_], deadline);
     }
   } catch (...) {
     start();
@@ -74,14 +71,16 @@ void MovingBelief::take_in(const Deadline& deadline) {
   }
 }
 
-void MovingBelief::step(const KnownElements& touch) {
+void MovingBelief::step(const KnownElements& touch, const Deadline& deadline) {
   const bool slips = stepped_ > 0;
   std::vector<std::vector<double>> tiles;
   for (const MovingObject& object : objects_) {
+    deadline.cancel_point();
     tiles.push_back(object.bound_tiles(touch, slips));
   }
   const std::vector<double> least = least_followed(tiles);
   for (std::size_t i = 0; i < objects_.size(); ++i) {
+    deadline.cancel_point();
     objects_[i].step(touch, slips, tiles[i], least[i], depth_ == infinity);
   }
   prior_log_likelihood_ += prior_log_likelihood(touch, options_.contact);
@@ -153,7 +152,8 @@ SearchResult MovingBelief::result() const {
   const MovingObject& shared = objects_[heaviest];
   found.shared_nats = std::max(shared.over(), shared.under());
   double best = -infinity;
-  double least_best = -infinity;  // as far as it is known
+  double least_best = -infinity;       // as far as it is known
+  double most_likelihood = -infinity;  // of any object, however unlikely it was before
   for (std::size_t i = 0; i < objects_.size(); ++i) {
     const MovingObject& object = objects_[i];
     const double scale = space_.log_weight[i] + object.scale();
@@ -167,6 +167,7 @@ SearchResult MovingBelief::result() const {
          .dropped = scale + over + object.rest()});
     object.for_bins(object.runs(), [&](std::size_t bin) {
       const double log = scale + object.log_mass()[bin];
+      most_likelihood = std::max(most_likelihood, log - space_.log_weight[i]);
       if (log > best) {
         best = log;
         least_best = best - object.rounding() - under;
@@ -198,7 +199,7 @@ SearchResult MovingBelief::result() const {
       }
     }
   }
-  found.contradicted = prior_log_likelihood_ - found.best_log_likelihood > contradiction_nats;
+  found.contradicted = prior_log_likelihood_ - most_likelihood > contradiction_nats;
   return found;
 }
 

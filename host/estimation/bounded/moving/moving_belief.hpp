@@ -11,6 +11,10 @@
 
 namespace palpate {
 
+/// What MovingBelief gives for the logarithm of no mass, whose product with the mass is a number;
+/// a scale of some nats is added.
+inline constexpr double no_mass = -1e9;
+
 /// The belief about objects that slip between touches, b_n = L_n c_n W b_(n-1): W averages over
 /// slips, c_n restores the object's mass, and L_n is the touch's likelihood. Bins of the tiles that
 /// may matter are followed in float64. The others have upper bounds, which W and the tiles' bounds
@@ -43,7 +47,7 @@ class MovingBelief {
 
  private:
   void start();
-  void step(const KnownElements& touch);
+  void step(const KnownElements& touch, const Deadline& deadline);
   /// [object] the least belief of a tile that is followed through the touch.
   /// @param tiles [object] MovingObject::bound_tiles()
   std::vector<double> least_followed(std::span<const std::vector<double>> tiles) const;
