@@ -108,8 +108,8 @@ TEST(DrawnMap, RefusesWhatMakesNoMap) {
     return words([&] { drawn_map("bar", bar_mask(), options); });
   };
   EXPECT_THAT(with({.cell_mm = 0.0}), HasSubstr("cell size = 0 mm: give"));
-  EXPECT_THAT(with({.peak = 0.5}), HasSubstr("peak = 0.5: must be above 0.5"));
-  EXPECT_THAT(with({.felt_share = 1.0}), HasSubstr("felt share = 1: must lie between 0 and 1"));
+  EXPECT_THAT(with({.peak = 0.5}), HasSubstr("`peak 0.5`: must be above 0.5"));
+  EXPECT_THAT(with({.felt_share = 1.0}), HasSubstr("`felt-share 1`: must lie between 0 and 1"));
   EXPECT_THAT(with({.reach_mm = -1.0}), HasSubstr("reach = -1 mm: give 0 to"));
   EXPECT_THAT(with({.spread_mm = 30.0, .felt_share = 0.9}), HasSubstr("no cell would be occupied"));
   const auto of = [&](const Mask& mask) { return words([&] { drawn_map("bar", mask); }); };
