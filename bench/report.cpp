@@ -40,12 +40,22 @@ double seconds_of(const std::function<void()>& call) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
+/// Seconds of the last of the calls that fill a fifth of a second.
+double seconds_at_full_clock(const std::function<void()>& call) {
+  constexpr double ramp_s = 0.2;
+  double last = 0.0;
+  for (double all = 0.0; all < ramp_s; all += last) {
+    last = seconds_of(call);
+  }
+  return last;
+}
+
 std::vector<std::vector<double>> interleave(std::span<const std::function<void()>> contenders,
                                             int repeats) {
   std::vector<std::vector<double>> seconds(contenders.size());
   for (int repeat = 0; repeat < repeats; ++repeat) {
     for (std::size_t i = 0; i < contenders.size(); ++i) {
-      seconds[i].push_back(seconds_of(contenders[i]));
+      seconds[i].push_back(seconds_at_full_clock(contenders[i]));
     }
   }
   return seconds;

@@ -27,7 +27,9 @@ struct RunOptions {
 double seconds_of(const std::function<void()>& call);
 
 /// Runs all contenders in turn, `repeats` times: whatever else the machine does meanwhile meets
-/// them alike. Returns their seconds, [contender][repeat]. Warm them up before.
+/// them alike. Returns their seconds, [contender][repeat]. Warm them up before. Of calls that take
+/// less than a fifth of a second, the last of as many as fill it counts: a GPU that waited for
+/// another contender runs three times slower at first.
 std::vector<std::vector<double>> interleave(std::span<const std::function<void()>> contenders,
                                             int repeats);
 

@@ -104,7 +104,7 @@ Instance::Instance() {
     info.enabledExtensionCount = 1;
     info.ppEnabledExtensionNames = &extension;
   }
-  check(vkCreateInstance(&info, nullptr, &instance_), "starting Vulkan");
+  check(create_instance(info, instance_), "starting Vulkan");
   if (validation_wanted()) {
     const auto create = instance_function<PFN_vkCreateDebugUtilsMessengerEXT>(
         instance_, "vkCreateDebugUtilsMessengerEXT");

@@ -3,9 +3,12 @@
 
 #include <cstdlib>
 #include <mutex>
+#include <set>
+#include <string>
 
 #include <dlfcn.h>
 #include <fmt/format.h>
+#include <link.h>
 
 #include "palpate/error.hpp"
 
@@ -17,6 +20,18 @@ void* library = nullptr;  ///< stays loaded until the process ends: its function
 
 PFN_vkVoidFunction exported_function(VkInstance /*instance*/, const char* name) {
   return reinterpret_cast<PFN_vkVoidFunction>(dlsym(library, name));
+}
+
+/// The files of the libraries that the process has loaded.
+std::set<std::string> loaded_libraries() {
+  std::set<std::string> files;
+  dl_iterate_phdr(
+      [](dl_phdr_info* info, std::size_t /*size*/, void* to) {
+        static_cast<std::set<std::string>*>(to)->insert(info->dlpi_name);
+        return 0;
+      },
+      &files);
+  return files;
 }
 
 [[noreturn]] void refuse(std::string_view why) {
@@ -60,6 +75,19 @@ void load_vulkan() {
   volkInitializeCustom(exported_function);
   volkLoadInstance(VK_NULL_HANDLE);
   vkGetInstanceProcAddr = of_instance;  // finds the functions of extensions
+}
+
+VkResult create_instance(const VkInstanceCreateInfo& info, VkInstance& instance) {
+  const std::set<std::string> before = loaded_libraries();
+  const VkResult result = vkCreateInstance(&info, nullptr, &instance);
+  for (const std::string& file : loaded_libraries()) {
+    if (!before.contains(file)) {
+      if (void* again = dlopen(file.c_str(), RTLD_LAZY | RTLD_NOLOAD | RTLD_NODELETE)) {
+        dlclose(again);
+      }
+    }
+  }
+  return result;
 }
 
 }  // namespace palpate::gpu

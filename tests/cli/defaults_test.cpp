@@ -236,7 +236,8 @@ TEST_F(Defaults, LiveAndRecognizeGiveTheSameNumbers) {
 }
 
 TEST_F(Defaults, KeepToTheMemoryThatIsGiven) {
-  // 8 MiB are for copies; half of the rest holds 5e5 bins of 8 bytes, a third of the default's.
+  // 8 MiB are for copies; three eighths of the rest hold 4e5 bins of 8 bytes, a quarter of the
+  // default's.
   const Outcome outcome =
       palpate({"recognize", "u.h5", "--maps", "maps", "--memory-mib", "16", "--json", "r.json"});
   EXPECT_EQ(outcome.status, 0) << outcome.err;

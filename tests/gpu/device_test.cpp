@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cctype>
 #include <cstdlib>
+#include <optional>
 #include <string>
 #include <utility>
 
 #include <gtest/gtest.h>
+#include <link.h>
 
 #include "gpu/context.hpp"
 #include "palpate/error.hpp"
@@ -57,6 +59,23 @@ TEST(Device, OneThatDoesNotExistIsRefusedNamingThoseThatDo) {
       }
     }
   }
+}
+
+TEST(Device, LeavesItsDriverLoaded) {
+  // A driver that is loaded again for every device fails after some: NVIDIA's after 25.
+  const auto libraries = [] {
+    int count = 0;
+    const auto one_more = [](dl_phdr_info* /*info*/, std::size_t /*size*/, void* counted) {
+      ++*static_cast<int*>(counted);
+      return 0;
+    };
+    dl_iterate_phdr(one_more, &count);
+    return count;
+  };
+  std::optional<Device> device = Device::open();
+  const int while_open = libraries();
+  device.reset();
+  EXPECT_EQ(libraries(), while_open);
 }
 
 TEST(Device, AMachineWithoutADriverSaysSo) {

@@ -53,6 +53,8 @@ TEST_F(NoneEvidence, IsTheProductOfMeanLikelihoods) {
 }
 
 TEST_F(NoneEvidence, IsDeafToATouchWithoutAKnownElement) {
+  // Vulkan's exp(), which the device sums, is exact to a few units of float32's last place.
+  constexpr double exp_error = 1e-6;
   const std::vector<std::uint8_t> dead(touches[0].elements_mm.size(), 0);
   Touch silent = touches[0];
   silent.T_robot_sensor.translation_mm += glm::dvec2(100.0, 0.0);
@@ -61,13 +63,13 @@ TEST_F(NoneEvidence, IsDeafToATouchWithoutAKnownElement) {
   PoseHistogram histogram(device, two_maps(), options);
   PoseHistogram without(device, two_maps(), options);
   histogram.update(silent);
-  EXPECT_NEAR(histogram.estimate().none, 0.5, 1e-12);
+  EXPECT_NEAR(histogram.estimate().none, 0.5, exp_error);
   for (const Touch& touch : touches) {
     histogram.update(touch);
     histogram.update(silent);
     without.update(touch);
   }
-  EXPECT_NEAR(histogram.estimate().none, without.estimate().none, 1e-9);
+  EXPECT_NEAR(histogram.estimate().none, without.estimate().none, exp_error);
 }
 
 TEST_F(NoneEvidence, LeavesSamplesOfTheObjectsWhereNoneTakesAllOfTheMass) {
