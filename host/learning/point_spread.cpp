@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <string>
@@ -86,6 +87,7 @@ Field mean_field(const Readings& readings, const std::vector<double>& force, Fie
   const double deviation = smoothing * spacing_mm;
   const int reach = static_cast<int>(std::ceil(3.0 * deviation / field.cell_mm));
   std::vector<double> weights(field.values.size(), 1e-12);
+  std::vector<double> along_x;
   std::ranges::fill(field.values, 0.0);
   for (const Sample& sample : readings.samples) {
     const double f = force[sample.touch];
@@ -93,13 +95,23 @@ Field mean_field(const Readings& readings, const std::vector<double>& force, Fie
       continue;
     }
     const glm::dvec2 p = (sample.place_mm - field.origin_mm) / field.cell_mm;
-    const int i0 = static_cast<int>(std::lround(p.x));
-    const int j0 = static_cast<int>(std::lround(p.y));
-    for (int j = std::max(0, j0 - reach); j <= std::min(field.ny - 1, j0 + reach); ++j) {
-      for (int i = std::max(0, i0 - reach); i <= std::min(field.nx - 1, i0 + reach); ++i) {
-        const double d = std::hypot(i - p.x, j - p.y) * field.cell_mm / deviation;
-        // Strong touches say more about the face: their noise is a smaller share.
-        const double w = f * f * std::exp(-0.5 * d * d);
+    const int left = std::max(0, static_cast<int>(std::lround(p.x)) - reach);
+    const int right = std::min(field.nx - 1, static_cast<int>(std::lround(p.x)) + reach);
+    const int bottom = std::max(0, static_cast<int>(std::lround(p.y)) - reach);
+    const int top = std::min(field.ny - 1, static_cast<int>(std::lround(p.y)) + reach);
+    const auto gaussian = [&](double cells) {
+      const double d = cells * field.cell_mm / deviation;
+      return std::exp(-0.5 * d * d);
+    };
+    along_x.clear();
+    for (int i = left; i <= right; ++i) {
+      along_x.push_back(gaussian(i - p.x));
+    }
+    for (int j = bottom; j <= top; ++j) {
+      // Strong touches say more about the face: their noise is a smaller share.
+      const double along_y = f * f * gaussian(j - p.y);
+      for (int i = left; i <= right; ++i) {
+        const double w = along_y * along_x[static_cast<std::size_t>(i - left)];
         field.at(i, j) += w * sample.pressure / f;
         weights[static_cast<std::size_t>(j) * field.nx + i] += w;
       }
@@ -151,17 +163,17 @@ Field relative_pressure(const Readings& readings, double spacing_mm) {
   return field;
 }
 
-/// The field blurred along both axes by a Gaussian and the mean over an element.
-Field blurred(const Field& field, double sigma_mm, double edge_mm) {
+/// A face, 1 or 0, blurred along both axes by a Gaussian and the mean over an element.
+Field blurred(const Field& face, double sigma_mm, double edge_mm) {
   const double root = std::sqrt(2.0) * sigma_mm;
   const auto weight = [&](double d) {
     return std::erf((d + edge_mm / 2.0) / root) - std::erf((d - edge_mm / 2.0) / root);
   };
-  const int reach = static_cast<int>(std::ceil((4.0 * sigma_mm + edge_mm / 2.0) / field.cell_mm));
-  std::vector<double> kernel;
+  const int reach = static_cast<int>(std::ceil((4.0 * sigma_mm + edge_mm / 2.0) / face.cell_mm));
+  std::vector<double> kernel;  // symmetric
   double sum = 0.0;
   for (int k = -reach; k <= reach; ++k) {
-    kernel.push_back(weight(k * field.cell_mm));
+    kernel.push_back(weight(k * face.cell_mm));
     sum += kernel.back();
   }
   const double* middle = kernel.data() + reach;
@@ -174,26 +186,50 @@ Field blurred(const Field& field, double sigma_mm, double edge_mm) {
   const auto row = [&](auto& of, int j) {
     return of.values.data() + static_cast<std::size_t>(j) * of.nx;
   };
-  Field along = field;
-  Field result = field;
+  Field along = face;
+  Field result = face;
   std::ranges::fill(along.values, 0.0);
   std::ranges::fill(result.values, 0.0);
-  for (int j = 0; j < field.ny; ++j) {
-    for (int k = std::max(-reach, 1 - field.nx); k <= std::min(reach, field.nx - 1); ++k) {
-      add(middle[k], row(field, j) + std::max(0, k), row(along, j) + std::max(0, -k),
-          field.nx - std::abs(k));
+  // Most cells are beside the face, and cells of 0 add nothing. The columns that the face reaches:
+  int first = face.nx;
+  int end = 0;
+  std::vector<int> rows;
+  for (int j = 0; j < face.ny; ++j) {
+    bool on_face = false;
+    for (int i = 0; i < face.nx; ++i) {
+      if (face.at(i, j) > 0.0) {
+        const int from = std::max(0, i - reach);
+        const int to = std::min(face.nx, i + reach + 1);
+        add(face.at(i, j), middle + (from - i), row(along, j) + from, to - from);
+        first = std::min(first, from);
+        end = std::max(end, to);
+        on_face = true;
+      }
+    }
+    if (on_face) {
+      rows.push_back(j);
     }
   }
   for (double& value : along.values) {
     value /= sum;
   }
-  for (int j = 0; j < field.ny; ++j) {
-    for (int k = std::max(-reach, -j); k <= std::min(reach, field.ny - 1 - j); ++k) {
-      add(middle[k], row(along, j + k), row(result, j), field.nx);
+  // In strips of columns, whose sums stay in registers; the margin is wider than a strip.
+  constexpr int strip = 8;
+  for (int column = first; column < end; column += strip) {
+    const int left = std::min(column, face.nx - strip);
+    for (int j = 0; j < face.ny; ++j) {
+      std::array<double, strip> sums{};
+      const auto below = std::ranges::lower_bound(rows, j - reach);
+      for (auto from = below; from != rows.end() && *from <= j + reach; ++from) {
+        const double factor = middle[*from - j];
+        const double* cells = row(along, *from) + left;
+        for (std::size_t i = 0; i < strip; ++i) {
+          sums[i] += factor * cells[i];
+        }
+      }
+      std::ranges::transform(sums, row(result, j) + left,
+                             [&](double value) { return value / sum; });
     }
-  }
-  for (double& value : result.values) {
-    value /= sum;
   }
   return result;
 }

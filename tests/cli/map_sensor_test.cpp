@@ -15,7 +15,7 @@ class MapSensor : public ProgramTest {
  protected:
   MapSensor() {
     for (const char* letter : {"A", "U"}) {
-      write_recording(folder_ / (std::string(letter) + ".h5"), sample_training(letter, 60));
+      write_recording(folder_ / (std::string(letter) + ".h5"), sample_training(letter, 30));
     }
     write_recording(folder_ / "u.h5", sample_unknown("A", {{2.0, -3.0}, 1.0}, 4));
   }
@@ -37,7 +37,7 @@ class MapSensor : public ProgramTest {
 
 TEST_F(MapSensor, IsWrittenWithTheMapsAndTakenWithThem) {
   const std::string out = done({"map", "A.h5", "U.h5", "-o", "maps/"});
-  EXPECT_NE(out.find("maps/sensor.yaml: learned from 120 touches: "), std::string::npos) << out;
+  EXPECT_NE(out.find("maps/sensor.yaml: learned from 60 touches: "), std::string::npos) << out;
   const LearnedSensor learned = read_sensor_model(sensor("maps"));
   EXPECT_EQ(learned.maps.size(), 2u);
   EXPECT_TRUE(learned.table);
@@ -89,7 +89,7 @@ TEST_F(MapSensor, IsLeftOutWhereItDoesNotGoWithWhatIsAsked) {
             std::string::npos);
   std::filesystem::remove(folder_ / "maps/other.map.h5");
 
-  done({"map", "A.h5", "U.h5", "-o", "fewer/", "--frames", "0:56"});
+  done({"map", "A.h5", "U.h5", "-o", "fewer/", "--frames", "0:28"});
   const Outcome unlike =
       palpate({"recognize", "u.h5", "--maps", "maps/A.map.h5", "fewer/U.map.h5"});
   EXPECT_EQ(unlike.status, 2);
@@ -104,7 +104,7 @@ TEST_F(MapSensor, IsLearnedAnewFromTheTouchesOfTheOtherMaps) {
       << alone;
   EXPECT_FALSE(std::filesystem::exists(sensor("maps")));
   const std::string joined = done({"map", "U.h5", "-o", "maps/"});
-  EXPECT_NE(joined.find("maps/sensor.yaml: learned from 120 touches"), std::string::npos) << joined;
+  EXPECT_NE(joined.find("maps/sensor.yaml: learned from 60 touches"), std::string::npos) << joined;
   EXPECT_EQ(read_sensor_model(sensor("maps")).maps.size(), 2u);
 
   // Maps that no longer are what it was learned for take it along.
