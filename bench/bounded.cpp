@@ -22,6 +22,7 @@ void Answers::add(const Answers& others) {
     to.insert(to.end(), from.begin(), from.end());
   };
   append(seconds, others.seconds);
+  append(cpu_seconds, others.cpu_seconds);
   append(modes, others.modes);
   append(bins_evaluated, others.bins_evaluated);
   append(dropped_mass, others.dropped_mass);
@@ -252,8 +253,9 @@ void measure_bounded(const RunOptions& options, std::span<char* const> command_l
   const std::vector<Hypothesis> letters = letter_maps(report.device(), training_recordings());
   const BoundedInputs inputs{report.device(), letters, options.quick};
   constexpr decltype(&measure_bounded_speed) measures[] = {
-      measure_bounded_speed, measure_bounded_mode,   measure_bounded_streaming,
-      measure_bounded_large, measure_bounded_growth, measure_bounded_search};
+      measure_bounded_speed, measure_bounded_mode,      measure_bounded_streaming,
+      measure_bounded_large, measure_bounded_misplaced, measure_bounded_growth,
+      measure_bounded_search};
   static_assert(std::size(measures) == std::size(bounded_parts));
   for (std::size_t i = 0; i < std::size(measures); ++i) {
     if (options.part.empty() || options.part == bounded_parts[i]) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <ctime>
 #include <optional>
 #include <span>
 #include <string>
@@ -15,7 +16,8 @@ namespace palpate::bench {
 
 /// Answers of a belief, [unknown], and what they took.
 struct Answers {
-  std::vector<double> seconds = {};  ///< of update() and estimate()
+  std::vector<double> seconds = {};      ///< of update() and estimate()
+  std::vector<double> cpu_seconds = {};  ///< of all threads
   std::vector<Mode> modes = {};
   // Of bounds alone:
   std::vector<double> bins_evaluated = {};
@@ -26,10 +28,12 @@ struct Answers {
   template <typename Belief>
   Estimate ask(Belief& belief, std::span<const Touch> touches) {
     Estimate estimate;
+    const std::clock_t before = std::clock();
     seconds.push_back(seconds_of([&] {
       belief.update(touches);
       estimate = belief.estimate();
     }));
+    cpu_seconds.push_back(static_cast<double>(std::clock() - before) / CLOCKS_PER_SEC);
     note(estimate);
     return estimate;
   }
@@ -80,6 +84,9 @@ struct BoundedInputs {
 
 /// Many objects, far away: time and memory.
 Json measure_bounded_large(const BoundedInputs& inputs, Report& report);
+/// Touches that are not where the robot says: time and memory, beside the dense engine where it can
+/// answer.
+Json measure_bounded_misplaced(const BoundedInputs& inputs, Report& report);
 /// Time over bins, from 10^4 to 10^9 in all, beside the dense engine.
 Json measure_bounded_growth(const BoundedInputs& inputs, Report& report);
 /// The blocks of poses that one search goes into after 1, 3 and 9 touches, for a picture.

@@ -26,9 +26,11 @@ struct TileLikelihoods {
   static constexpr Value vanished = 1e-30F;
 
   /// exp(nats) for nats <= 0, within 1e-6 of itself, at least exp(-80): by powers of two and a
-  /// polynomial, which compilers turn into vectors.
+  /// polynomial. Numbers are compared by their bits, which compilers turn into vectors.
   static Value of_log(Value nats) {
-    const Value exponent = std::max(nats, -80.0F) * 1.44269504F;
+    const std::uint32_t bits =
+        std::min(std::bit_cast<std::uint32_t>(nats), std::bit_cast<std::uint32_t>(-80.0F));
+    const Value exponent = std::bit_cast<Value>(bits) * 1.44269504F;
     const auto whole = static_cast<std::int32_t>(exponent - 0.5F);
     const Value f = exponent - static_cast<Value>(whole);
     Value p = 0.001112550962716341F;
@@ -38,10 +40,21 @@ struct TileLikelihoods {
     }
     return std::bit_cast<Value>(std::bit_cast<std::int32_t>(p) + (whole << 23));
   }
+  /// Replaces logs, less the largest, by likelihoods; minus infinity, where no bin is, by nothing.
+  static void of_logs(Value* logs, int count, Value largest) {
+    constexpr auto no_bin = std::bit_cast<std::uint32_t>(-std::numeric_limits<Value>::infinity());
+    for (int i = 0; i < count; ++i) {
+      const std::int32_t any = std::bit_cast<std::uint32_t>(logs[i]) == no_bin ? 0 : -1;
+      logs[i] = std::bit_cast<Value>(std::bit_cast<std::int32_t>(of_log(logs[i] - largest)) & any);
+    }
+  }
   static Value weight(double weight) { return static_cast<Value>(weight); }
   static Value factor(double nats) { return static_cast<Value>(std::exp(nats)); }
   static void add(Value& sum, Value weight, Value likelihood) { sum += weight * likelihood; }
-  static void widen(Value& widest, Value likelihood) { widest = std::max(widest, likelihood); }
+  static void widen(Value& widest, Value likelihood) {
+    widest = std::bit_cast<Value>(
+        std::max(std::bit_cast<std::int32_t>(widest), std::bit_cast<std::int32_t>(likelihood)));
+  }
   static Value scaled(Value likelihood, Value scale) { return likelihood * scale; }
   /// Log of the sum over the weights of its terms.
   static double log_mean(Value sum, double weights) {
@@ -134,31 +147,53 @@ struct BlurredPlane {
   int x = 0;  ///< of the first place
   int y = 0;
   int height = 0;
-  std::vector<Value> blurred;  ///< [y, x] relative to the reference; nothing outside the region
-  /// Of tiles the largest of a place, the next one along x, and those above both; of bins the sum
-  /// of a place and its eight neighbours.
-  std::vector<Value> wide;
+  /// [y, x] relative to the reference; nothing outside the region. Of tiles, where asked for, the
+  /// largest of a place, the next one along x, and those above both.
+  std::vector<Value> blurred;
+  std::vector<Value> wide;  ///< of bins, where asked for: sums of a place and its eight neighbours
 
   PlaceRows<Value> rows(std::vector<Value>& values) const { return {values.data(), pitch, x, y}; }
 };
 
+/// Adds up each place and its neighbours, so far before and behind it.
 template <typename Domain>
 std::vector<typename Domain::Value> widened(const std::vector<typename Domain::Value>& from,
                                             std::ptrdiff_t stride) {
   std::vector<typename Domain::Value> wide = from;
   const auto size = static_cast<std::ptrdiff_t>(from.size());
-  const auto take = [&](std::ptrdiff_t distance) {
-    const std::ptrdiff_t first = std::max<std::ptrdiff_t>(0, -distance);
+  for (const std::ptrdiff_t distance : {stride, -stride}) {
     const std::ptrdiff_t end = std::min(size, size - distance);
-    for (std::ptrdiff_t i = first; i < end; ++i) {
+    for (std::ptrdiff_t i = std::max<std::ptrdiff_t>(0, -distance); i < end; ++i) {
       Domain::widen(wide[i], from[i + distance]);
     }
-  };
-  take(stride);
-  if (!Domain::bounds) {
-    take(-stride);
   }
   return wide;
+}
+
+/// Replaces each place by the largest of itself, the next one along x, and those above both; also
+/// the places before the first ones of the region.
+/// @param runs the places that hold something
+template <typename Domain>
+void widen(std::span<const BlockRun> runs, const PlaceRows<typename Domain::Value>& rows) {
+  using Value = typename Domain::Value;
+  const auto first = [](int block) { return block == 0 ? -1 : BlockRun::side * block; };
+  const auto take = [&](const BlockRun& run, int y, const Value* next) {
+    Value* const row = rows.at(first(run.x), y);
+    const int count = BlockRun::side * (run.x + run.count) - first(run.x);
+    for (int i = 0; i < count; ++i) {
+      Domain::widen(row[i], next[i]);
+    }
+  };
+  for (const BlockRun& run : runs) {
+    for (int y = BlockRun::side * run.y; y < BlockRun::side * (run.y + 1); ++y) {
+      take(run, y, rows.at(first(run.x) + 1, y));
+    }
+  }
+  for (const BlockRun& run : runs) {
+    for (int y = first(run.y); y < BlockRun::side * (run.y + 1); ++y) {
+      take(run, y, rows.at(first(run.x), y + 1));
+    }
+  }
 }
 
 /// @param range around the asked blocks
@@ -205,8 +240,12 @@ BlurredPlane<Domain> blurred_plane(int theta, const BlockRange& range,
   plane.reference = largest;
   for_rows(sources, [&](int x, int y, int count) {
     Value* const row = rows.at(x, y);
-    for (int i = 0; i < count; ++i) {
-      row[i] = row[i] == no_bin ? Domain::nothing : Domain::of_log(row[i] - largest);
+    if constexpr (Domain::bounds) {
+      Domain::of_logs(row, count, largest);
+    } else {
+      for (int i = 0; i < count; ++i) {
+        row[i] = row[i] == no_bin ? Domain::nothing : Domain::of_log(row[i] - largest);
+      }
     }
   });
 
@@ -223,7 +262,8 @@ BlurredPlane<Domain> blurred_plane(int theta, const BlockRange& range,
   });
   plane.blurred.assign(likelihood.size(), Domain::nothing);
   const PlaceRows<Value> result = plane.rows(plane.blurred);
-  for_rows(wanted.runs(theta), [&](int x, int y, int count) {
+  const std::vector<BlockRun> results = wanted.runs(theta);
+  for_rows(results, [&](int x, int y, int count) {
     Value* const row = result.at(x, y);
     const int inside = std::min(count, blur_x.places() - x);
     blur<Domain>(middle.at(x, y), row, inside, 1, blur_x.weight);
@@ -231,7 +271,9 @@ BlurredPlane<Domain> blurred_plane(int theta, const BlockRange& range,
       row[i] = Domain::scaled(row[i], blur_x.scale[x + i]);
     }
   });
-  if (wide) {
+  if (wide && Domain::bounds) {
+    widen<Domain>(results, result);
+  } else if (wide) {
     plane.wide = widened<Domain>(widened<Domain>(plane.blurred, 1), plane.pitch);
   }
   return plane;

@@ -64,6 +64,9 @@ class TapSum {
     for (const Tap& tap : taps) {
       reference_ = std::max(reference_, planes[tap.theta].reference);
     }
+    for (const Tap& tap : taps) {
+      factors_.push_back(Domain::factor(planes[tap.theta].reference - reference_));
+    }
   }
 
   /// @param log_mean,error [block, y, x]
@@ -76,7 +79,8 @@ class TapSum {
     inside_.assign(size, 0.0);
     wholly_inside_ = 0.0;
     const int bins = weights_.bins;
-    for (const Tap& tap : taps_) {
+    for (std::size_t i = 0; i < taps_.size(); ++i) {
+      const Tap& tap = taps_[i];
       add_weights_inside(tap, run);
       const BlurredPlane<Domain>& plane = planes_[tap.theta];
       if (plane.reference == -infinity) {
@@ -84,7 +88,7 @@ class TapSum {
       }
       const glm::ivec2 moved = places_of(tap, bins);
       if (bins > 1) {
-        add(plane, plane.wide, run, moved, tap.weight, -1, sums_);
+        add(plane, plane.blurred, run, moved, weighted(tap.weight, i), -1, sums_);
         continue;
       }
       const glm::dvec2 behind = tap.fraction;
@@ -93,24 +97,27 @@ class TapSum {
                                          {{1, 0}, behind.x * before.y},
                                          {{0, 1}, before.x * behind.y},
                                          {{1, 1}, behind.x * behind.y}}) {
-        add(plane, plane.blurred, run, moved + corner, tap.weight * part, 0, sums_);
+        add(plane, plane.blurred, run, moved + corner, weighted(tap.weight * part, i), 0, sums_);
       }
       if (!Domain::bounds && fraction_error_ > 0.0) {
-        add(plane, plane.wide, run, moved, tap.weight, -1, wide_);
+        add(plane, plane.wide, run, moved, weighted(tap.weight, i), -1, wide_);
       }
     }
     return take(run, log_mean, error);
   }
 
  private:
+  /// A weight of a tap, for what is relative to its plane's reference.
+  Value weighted(double weight, std::size_t tap) const {
+    return Domain::scaled(Domain::weight(weight), factors_[tap]);
+  }
+
   /// Adds values that lie `moved` away, as far as they lie behind `first` in the region.
   void add(const BlurredPlane<Domain>& plane, const std::vector<Value>& values, const BlockRun& run,
-           const glm::ivec2& moved, double weight, int first, std::vector<Value>& sums) const {
-    if (weight == 0.0) {
+           const glm::ivec2& moved, Value of_tap, int first, std::vector<Value>& sums) const {
+    if (of_tap == Domain::nothing) {
       return;
     }
-    const Value of_tap =
-        Domain::scaled(Domain::weight(weight), Domain::factor(plane.reference - reference_));
     const int x = side * run.x + moved.x;
     const int begin = std::max({0, first - x, plane.x - x});
     const int end = std::min({width_, static_cast<int>(weights_.x.scale.size()) - x,
@@ -189,6 +196,7 @@ class TapSum {
   double fraction_error_;
   double reference_ = -infinity;  ///< of the sums, in nats
   int width_ = 0;                 ///< of a run's rows
+  std::vector<Value> factors_;    ///< [tap] of its plane's reference
   std::vector<Value> sums_;       ///< [y, x] of the run
   std::vector<Value> wide_;
   std::vector<double> inside_;  ///< [y, x] weights of taps that lie partly inside the region

@@ -18,6 +18,9 @@ namespace {
 constexpr double search_share = 0.75;
 /// Beam width during survey(), where all tiles of a level are looked at first.
 constexpr std::size_t surveyed_tiles = 1024;
+/// Tiles that survey() looks at where touches are uncertain, those of the largest bounds: they tell
+/// the total as well as all would, and closer looks cost more the wider the tiles lie apart.
+constexpr std::size_t most_surveyed = 4096;
 /// Tiles that are divided together: bounds the memory for their parts. More where touches are
 /// uncertain, since the parts of tiles that lie together share all within reach of them.
 constexpr std::size_t most_exact = 16384;
@@ -179,7 +182,7 @@ class SearchRun {
     }
     std::ranges::sort(tiles, stands_before);
     std::vector<Tile> unseen;
-    division_.set_negligible(negligible());
+    division_.set_negligible(std::max(negligible(), droppable(tiles, level, tolerance)));
     std::vector<Tile> parts = division_.parts_of(tiles, level, &unseen);
     for (const Tile& tile : unseen) {
       settle_unseen(space_.bounds[tile.object].levels()[level + 1].box_of(tile));
@@ -207,6 +210,23 @@ class SearchRun {
                           account_.best());
   }
 
+  /// Where touches are uncertain, a bound in nats: if no part of these tiles exceeded it, all could
+  /// be dropped, and little of what may be dropped would be used up.
+  /// @param tolerance see divide_lot()
+  double droppable(std::span<const Tile> tiles, std::size_t level, double tolerance) const {
+    if (goal_.evidence_nats || !space_.displacement) {
+      return -std::numeric_limits<double>::infinity();
+    }
+    constexpr double part = 0.1;
+    std::int64_t bins = 0;
+    for (const Tile& tile : tiles) {
+      bins += space_.bounds[tile.object].bins(level, tile);
+    }
+    const double of_level = tolerance / static_cast<double>(finest_ - level);
+    return std::min(account_.log_total() + std::log(part * of_level / static_cast<double>(bins)),
+                    account_.best());
+  }
+
   /// Drops the largest tiles of negligible bounds, as if all bins were there.
   void drop_negligible() {
     if (const double bound = negligible(); std::isfinite(bound)) {
@@ -218,14 +238,20 @@ class SearchRun {
     }
   }
 
-  /// Lowers the bounds of tiles to those of their parts, and follows the best parts down to their
-  /// bins.
+  /// Lowers the bounds of tiles, or of the best of them, to those of their parts, and follows the
+  /// best parts down to their bins.
   void survey(std::vector<Tile>& tiles, std::size_t level) {
-    std::ranges::sort(tiles, stands_before);
+    const auto first = tiles.begin();
+    auto end = tiles.end();
+    if (space_.displacement && tiles.size() > most_surveyed) {
+      end = first + most_surveyed;
+      std::nth_element(first, end, tiles.end(), larger_first);
+    }
+    std::sort(first, end, stands_before);
+    const std::span<Tile> surveyed(first, end);
     std::vector<Tile> best;
-    for (std::size_t begin = 0; begin < tiles.size(); begin += most_together_) {
-      const auto lot =
-          std::span(tiles).subspan(begin, std::min(most_together_, tiles.size() - begin));
+    for (std::size_t begin = 0; begin < surveyed.size(); begin += most_together_) {
+      const auto lot = surveyed.subspan(begin, std::min(most_together_, surveyed.size() - begin));
       task_.deadline.cancel_point();
       division_.set_negligible(negligible());
       std::vector<Tile> parts = division_.parts_of(lot, level);
