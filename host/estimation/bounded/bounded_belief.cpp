@@ -195,11 +195,10 @@ double BoundedBelief::bins_in_all() const {
 }
 
 SearchGoal BoundedBelief::rough_goal() const {
-  // Few bins take as long whatever the tolerance, uncertain touches nearly so, and a close search
-  // lets those that are found be followed through the next touches.
-  const bool closely =
-      bins_in_all() <= closely_drawn_bins || (!moving_ && !options_.touch_sd.none());
-  return {.tolerance = closely ? options_.tolerance : std::max(options_.tolerance, soon),
+  // Few bins take as long whatever the tolerance, and a close search lets those that are found be
+  // followed through the next touches.
+  return {.tolerance = bins_in_all() <= closely_drawn_bins ? options_.tolerance
+                                                           : std::max(options_.tolerance, soon),
           .exact = false,
           .poor_bins = options_.poor_bins};
 }

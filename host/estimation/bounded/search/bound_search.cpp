@@ -20,7 +20,7 @@ constexpr double search_share = 0.75;
 constexpr std::size_t surveyed_tiles = 1024;
 /// Tiles that survey() looks at where touches are uncertain, those of the largest bounds: they tell
 /// the total as well as all would, and closer looks cost more the wider the tiles lie apart.
-constexpr std::size_t most_surveyed = 4096;
+constexpr std::size_t most_surveyed = 32768;
 /// Tiles that are divided together: bounds the memory for their parts. More where touches are
 /// uncertain, since the parts of tiles that lie together share all within reach of them.
 constexpr std::size_t most_exact = 16384;
