@@ -39,7 +39,7 @@ int main(int argc, char** argv) try {
       "touch), in less than a minute, with errors in nats against float64",
       compare_paths);
   add("bounded",
-      "Measure the posterior by bounds, in some 15 minutes on two CPU cores: its "
+      "Measure the posterior by bounds, in some 20 minutes on two CPU cores: its "
       "time and memory at 10,000 to 1,000,000,000 bins beside the dense engine",
       measure_bounded)
       ->add_option("--part", options.part, "Measure only this part")
