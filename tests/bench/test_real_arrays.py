@@ -119,7 +119,7 @@ def test_presses_are_recognised(data: pathlib.Path, tmp_path: pathlib.Path) -> N
     plots = tmp_path / "plots"
     program = Program(tmp_path, "bench.capcontact", "--quick", "--data", data, "--plots", plots)
     eq7, learned = (program.document[name]["windows"] for name in ("eq7", "learned"))
-    assert set(eq7) == set(learned) == {"1", "2", "3", "5"}
+    assert set(eq7) == set(learned) == {"1", "2", "3", "5", "all"}
     assert learned["5"]["recognised"] > 0.7
     assert learned["5"]["median_mm"] < 1.0 and learned["5"]["median_deg"] < 1.5
     assert math.hypot(*learned["5"]["bias_mm"]) < 0.7
