@@ -30,9 +30,13 @@ OFF_MIDDLE = 2
 
 # Of Eq. 7: from 300 counts on an element's middle lies over the contact about as often as beside it.
 THRESHOLD, RATIO = 300.0, 0.1
+FELT = 50.0  #: counts, ten standard deviations of an element that nothing is near
 
 #: Probability that a place beyond the map is touched: the contacts' share of what windows cover, about.
 PRIOR = 0.02
+#: Of maps: contact is blurred by half a pitch, so that log odds say how far an outline is within 5 mm, as
+#: far as elements feel a finger, up to the 7.8 nats that a sensor model tells apart.
+SPREAD_MM, PEAK = PITCH_MM / 4.0, 0.9996
 
 Ints = NDArray[numpy.int64]
 
@@ -51,13 +55,15 @@ class Press(NamedTuple):
         return PIXEL_MM * numpy.array([x.mean(), y.mean()])
 
     def grid(self, label: str) -> palpate.OccupancyGrid:
-        """The map of the contact area: cells of half a pitch, outlines where they are drawn."""
+        """The map of the contact area: cells of half a pitch, soft outlines where they are drawn."""
         return palpate.OccupancyGrid.from_mask(
             label,
             self.contact,
             pixel_mm=PIXEL_MM,
             origin_mm=-self.centroid_mm,
             cell_mm=PITCH_MM / 2.0,
+            spread_mm=SPREAD_MM,
+            peak=PEAK,
             prior=PRIOR,
             felt_share=0.5,
             reach_mm=float(numpy.hypot(*ELEMENTS_MM.T).max()),
@@ -78,6 +84,13 @@ class Press(NamedTuple):
             if (first >= 0).all() and (first <= (ROWS - WINDOW, COLUMNS - WINDOW)).all():
                 drawn.append(first)
         return numpy.array(drawn)
+
+    def tiles(self) -> Ints:
+        """Windows side by side over the sheet, as `windows`: those that feel a finger."""
+        rows = range((ROWS % WINDOW) // 2, ROWS - WINDOW + 1, WINDOW)
+        tiles = numpy.array([(j, i) for j in rows for i in range(0, COLUMNS - WINDOW + 1, WINDOW)])
+        felt = [self.readings[j : j + WINDOW, i : i + WINDOW].max() > FELT for j, i in tiles]
+        return tiles[felt]
 
     def seen(self, windows: Ints) -> float:
         """The share of the contact that lies under the windows."""
@@ -180,13 +193,13 @@ def placed(
 
 
 class Shifts(NamedTuple):
-    """Where single windows of presses seem to lie beside where they are, by Eq. 7."""
+    """Where single windows of presses seem to lie beside where they are."""
 
     people: Ints  #: [n]
     places_mm: Floats  #: [n, 2] of the windows' middles in the sheet
     shifts_mm: Floats  #: [n, 2]
 
-    def registration(self, without: int | None) -> Registration:
+    def registration(self, without: int | None = None) -> Registration:
         """The least squares fit of all people but one, and twice more without what lies far off it."""
         terms = Registration.terms(self.places_mm)
         # All but the constant are held near 0, as four windows' places would: few windows tell no more.
@@ -202,21 +215,25 @@ class Shifts(NamedTuple):
 
 
 def find_shifts(
-    device: palpate.Device, presses: Sequence[Press], random: numpy.random.Generator, each: int
+    device: palpate.Device,
+    presses: Sequence[Press],
+    random: numpy.random.Generator,
+    sensor: pathlib.Path | None,
 ) -> Shifts:
-    """Places `each` windows of every press on its map."""
+    """Places six windows of every press on its map, each alone, by a sensor or by Eq. 7."""
     people, places, shifts = [], [], []
     for press in presses:
         grid = press.grid("press")
-        windows = press.windows(random, each)
-        for i in range(each):
-            one = windows[i : i + 1]
-            record = placed(device, touched(press, one, AS_BUILT), grid, None)
+        for window in press.windows(random, 6):
+            record = placed(device, touched(press, window[None], AS_BUILT), grid, sensor)
             if record["modes"]:
                 people.append(press.person)
-                places.append(AS_BUILT.poses(one)[0, :2])
-                # The object is found where its readings are.
-                shifts.append(record["modes"][0]["T_robot_object"][:2])
+                places.append(AS_BUILT.poses(window[None])[0, :2])
+                # The object is found where its readings are. Its angle is hardly known, and moves the
+                # centroid of fingers that the window does not show, but not what it shows.
+                middle = places[-1] - press.centroid_mm
+                found = palpate.transform(record["modes"][0]["T_robot_object"], middle[None])[0]
+                shifts.append(found - middle)
     return Shifts(numpy.array(people), numpy.array(places), numpy.array(shifts))
 
 
@@ -231,8 +248,7 @@ def learn_sensor(
 ) -> None:
     """Writes the sensor that ten of the presses tell, 15 windows each, on their drawn maps.
 
-    Its `pose_scale` is that of the errors of 2 and of 5 windows of all presses. quick: from six windows of
-    three presses, tried at poses nearby alone.
+    It has no `pose_scale`. quick: from six windows of three presses, tried at poses nearby alone.
     """
     most, each = (3, 6) if quick else (10, 15)
     near: Any = {"bins": (8, 8, 8), "x_mm": (-8.0, 8.0), "y_mm": (-8.0, 8.0), "theta_deg": (-8.0, 8.0)}
@@ -256,6 +272,16 @@ def learn_sensor(
     calibration.sensor.save(path)
     lines = [line for line in path.read_text().splitlines() if not line.startswith("pose_scale:")]
     path.write_text("\n".join(lines) + "\n")
+
+
+def add_pose_scale(
+    device: palpate.Device,
+    presses: Sequence[Press],
+    registration: Registration,
+    random: numpy.random.Generator,
+    path: pathlib.Path,
+) -> None:
+    """Adds to a sensor the `pose_scale` of the errors of 2 and of 5 windows of all presses."""
     moved, covariances = [], []
     for press in presses:
         grid = press.grid("press")

@@ -88,6 +88,17 @@ def test_windows_become_touches_of_the_press(data: pathlib.Path) -> None:
         assert moved == pytest.approx(palpate.compose(T_robot_object, pose))
 
 
+def test_tiles_lie_side_by_side_where_a_finger_is_felt(data: pathlib.Path) -> None:
+    for press in read_presses(data / "presses.npz"):
+        covered = numpy.zeros((ROWS, COLUMNS), int)
+        for j, i in press.tiles():
+            covered[j : j + WINDOW, i : i + WINDOW] += 1
+        assert covered.max() == 1 and press.seen(press.tiles()) == 1.0
+    readings = numpy.zeros((ROWS, COLUMNS))
+    readings[12, 20] = 400.0
+    assert press._replace(readings=readings).tiles().tolist() == [[11, 18]]
+
+
 def test_a_registration_is_fitted_without_a_person_and_what_lies_far_off() -> None:
     random = numpy.random.default_rng(3)
     true = Registration(random.normal(0.0, 1.0, (6, 2)))
@@ -119,7 +130,7 @@ def test_presses_are_recognised(data: pathlib.Path, tmp_path: pathlib.Path) -> N
     plots = tmp_path / "plots"
     program = Program(tmp_path, "bench.capcontact", "--quick", "--data", data, "--plots", plots)
     eq7, learned = (program.document[name]["windows"] for name in ("eq7", "learned"))
-    assert set(eq7) == set(learned) == {"1", "2", "3", "5"}
+    assert set(eq7) == set(learned) == {"1", "2", "3", "5", "all"}
     assert learned["5"]["recognised"] > 0.7
     assert learned["5"]["median_mm"] < 1.0 and learned["5"]["median_deg"] < 1.5
     assert math.hypot(*learned["5"]["bias_mm"]) < 0.7
