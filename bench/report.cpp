@@ -40,6 +40,8 @@ double seconds_of(const std::function<void()>& call) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
+namespace {
+
 /// Seconds of the last of the calls that fill a fifth of a second.
 double seconds_at_full_clock(const std::function<void()>& call) {
   constexpr double ramp_s = 0.2;
@@ -49,6 +51,8 @@ double seconds_at_full_clock(const std::function<void()>& call) {
   }
   return last;
 }
+
+}  // namespace
 
 std::vector<std::vector<double>> interleave(std::span<const std::function<void()>> contenders,
                                             int repeats) {
