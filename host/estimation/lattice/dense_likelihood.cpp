@@ -201,9 +201,6 @@ void DenseLikelihood::accumulate(const ContactEvidence& evidence, const DenseBel
     }
   }
   stream_.run();
-  if (progress && pending > 0.0) {
-    progress((done + pending) / all_work);
-  }
 }
 
 std::vector<std::string> DenseLikelihood::paths() const {

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "gpu/context.hpp"
 #include "palpate/pose_histogram.hpp"
 #include "synthetic.hpp"
 
@@ -21,6 +22,10 @@ TEST(LargeLattice, FiveMillionBinsAreAsGoodAsTenThousand) {
   const Recording recording = random_recording(9, 36, 136);
   const std::vector<Touch> touches = all_touches(recording);
   Device device = Device::open();
+  // A GPU would be done before there is any progress.
+  gpu::Limits limits = device.context().limits();
+  limits.cpu = true;
+  device.context().lower_limits(limits);
   PoseHistogram histogram(device, objects, options);
   double done = 0.0;
   histogram.update(touches, [&](double fraction) {
