@@ -97,6 +97,8 @@ class SearchRun {
         return false;
       }
     }
+    // All touches count here, also where the last tiles could be dropped after a few.
+    division_.set_negligible(-std::numeric_limits<double>::infinity());
     for (std::size_t i = 0; i < objects; ++i) {
       if (account_.largest_dropped_of(i) >= least) {
         // Too light a hypothesis to have been looked at.
