@@ -16,7 +16,7 @@ void load_vulkan();
 /// vkCreateInstance(). The drivers and layers that the loader loads for the instance then stay in
 /// the process; it would unload them with the last instance. Loading a driver takes long, and
 /// NVIDIA's uses up something of the process each time: after some 25 times no instance could be
-/// created.
+/// created. What other threads load meanwhile stays, too.
 VkResult create_instance(const VkInstanceCreateInfo& info, VkInstance& instance);
 
 }  // namespace palpate::gpu
