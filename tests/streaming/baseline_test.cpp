@@ -14,7 +14,7 @@ SensorDescription two_elements() {
 }
 
 TEST(Baseline, IsTheMedianOfEveryElement) {
-  std::vector<Frame> frames = Stream{.noise = 0.7}.frames(1.0, [](double) {
+  std::vector<Frame> frames = PressStream{.noise = 0.7}.frames(1.0, [](double) {
     return std::vector<double>{50.0, -3.0};
   });
   frames[40].values = {1e6, nan("")};  // a spike, and a reading that is none
@@ -25,7 +25,7 @@ TEST(Baseline, IsTheMedianOfEveryElement) {
 }
 
 TEST(Baseline, RefusesATouchedArray) {
-  const auto frames = Stream{}.frames(1.0, [](double t) {
+  const auto frames = PressStream{}.frames(1.0, [](double t) {
     return std::vector<double>{3.0, 3.0 + 5.0 * press(t, 0.3, 10.0)};
   });
   expect_named(input_error([&] { baseline_of(frames, two_elements(), 2.0); }),
@@ -37,7 +37,7 @@ TEST(Baseline, RefusesATouchedArray) {
 TEST(Baseline, DeadElementsMayReadAnything) {
   SensorDescription sensor = two_elements();
   sensor.valid = {0, 1};
-  const auto frames = Stream{}.frames(1.0, [](double t) {
+  const auto frames = PressStream{}.frames(1.0, [](double t) {
     return std::vector<double>{t > 0.5 ? nan("") : 1e9, 4.0};
   });
   const std::vector<double> baseline = baseline_of(frames, sensor, 2.0);

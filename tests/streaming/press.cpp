@@ -22,7 +22,7 @@ Pressures presses_of(const std::vector<double>& pattern) {
   };
 }
 
-std::vector<Frame> Stream::frames(double seconds, const Pressures& pressures) const {
+std::vector<Frame> PressStream::frames(double seconds, const Pressures& pressures) const {
   std::mt19937_64 random(5);
   std::normal_distribution<double> normal(0.0, 1.0);
   std::vector<Frame> frames;

@@ -19,7 +19,7 @@ double press(double time_s, double begin_s, double steady_s);
 Pressures presses_of(const std::vector<double>& pattern);
 
 /// A stream of frames with Gaussian noise, from 1.7e9 s on.
-struct Stream {
+struct PressStream {
   double rate_hz = 100.0;
   double noise = 0.3;
 

@@ -34,18 +34,18 @@ void expect_pattern(const std::vector<DetectedTouch>& touches, std::size_t count
 }
 
 TEST(TouchDetector, FindsEveryPressOnce) {
-  expect_pattern(touches_in(Stream{}.frames(8.0, presses)), 8);
-  expect_pattern(touches_in(Stream{.rate_hz = 1000.0}.frames(3.0, presses)), 3);
+  expect_pattern(touches_in(PressStream{}.frames(8.0, presses)), 8);
+  expect_pattern(touches_in(PressStream{.rate_hz = 1000.0}.frames(3.0, presses)), 3);
 }
 
 TEST(TouchDetector, FindsNothingInNoise) {
   // 100 elements at the simulator's noise: hundreds of readings above the onset.
   const auto untouched = [](double) { return std::vector<double>(100, 0.0); };
-  EXPECT_TRUE(touches_in(Stream{.noise = 0.7}.frames(20.0, untouched)).empty());
+  EXPECT_TRUE(touches_in(PressStream{.noise = 0.7}.frames(20.0, untouched)).empty());
 }
 
 TEST(TouchDetector, ScalesWithTheUnit) {
-  std::vector<Frame> frames = Stream{}.frames(3.0, presses);
+  std::vector<Frame> frames = PressStream{}.frames(3.0, presses);
   const std::vector<DetectedTouch> kpa = touches_in(frames);
   constexpr double counts_per_kpa = 64.0;  // a power of two: the same digits
   for (Frame& frame : frames) {
@@ -68,7 +68,7 @@ TEST(TouchDetector, ScalesWithTheUnit) {
 }
 
 TEST(TouchDetector, SingleBadFramesChangeNothing) {
-  std::vector<Frame> frames = Stream{}.frames(8.0, presses);
+  std::vector<Frame> frames = PressStream{}.frames(8.0, presses);
   for (std::size_t i = 10; i < frames.size(); i += 13) {
     frames[i].values.assign(4, i % 2 == 0 ? 500.0 : -500.0);
   }
@@ -76,14 +76,14 @@ TEST(TouchDetector, SingleBadFramesChangeNothing) {
 }
 
 TEST(TouchDetector, LostFramesDoNoHarm) {
-  std::vector<Frame> frames = Stream{}.frames(8.0, presses);
+  std::vector<Frame> frames = PressStream{}.frames(8.0, presses);
   std::mt19937_64 random(3);
   std::erase_if(frames, [&](const Frame&) { return random() % 10 < 3; });
   expect_pattern(touches_in(frames), 8);
 }
 
 TEST(TouchDetector, PassesOverFramesThatAreNoNumbers) {
-  std::vector<Frame> frames = Stream{}.frames(3.0, presses);
+  std::vector<Frame> frames = PressStream{}.frames(3.0, presses);
   for (std::size_t i = 0; i < frames.size(); i += 7) {
     frames[i].values[i % 4] = nan;
   }
@@ -92,12 +92,12 @@ TEST(TouchDetector, PassesOverFramesThatAreNoNumbers) {
 
 TEST(TouchDetector, TapIsNoTouch) {
   const auto tap = [](double t) { return std::vector<double>{20.0 * press(t, 0.5, 0.02)}; };
-  EXPECT_TRUE(touches_in(Stream{}.frames(2.0, tap)).empty());
+  EXPECT_TRUE(touches_in(PressStream{}.frames(2.0, tap)).empty());
 }
 
 TEST(TouchDetector, LightTouchOfOneElementIsOne) {
   const auto light = [](double t) { return std::vector<double>{3.0 * press(t, 0.5, 0.5), 0.0}; };
-  const auto touches = touches_in(Stream{.noise = 0.5}.frames(2.0, light));
+  const auto touches = touches_in(PressStream{.noise = 0.5}.frames(2.0, light));
   ASSERT_EQ(touches.size(), 1u);
   EXPECT_NEAR(touches[0].pressure[0], 3.0, 0.5);  // five standard errors of 30 frames
 }
@@ -107,7 +107,7 @@ TEST(TouchDetector, BaselineIsSubtractedAndFollowsDrift) {
   const auto drifting = [](double t) {
     return std::vector<double>{50.0 + 0.02 * t + 10.0 * press(t, 300.0, 0.5)};
   };
-  const std::vector<Frame> frames = Stream{.rate_hz = 20.0}.frames(302.0, drifting);
+  const std::vector<Frame> frames = PressStream{.rate_hz = 20.0}.frames(302.0, drifting);
   const auto count = [&](double drift_s) {
     TouchDetectorOptions options;
     options.drift_s = drift_s;
@@ -131,7 +131,7 @@ TEST(TouchDetector, BaselineStaysDuringATouch) {
   const auto held = [](double t) { return std::vector<double>{8.0 * press(t, 1.0, 100.0)}; };
   TouchDetector detector({.drift_s = 5.0}, {}, {});
   std::vector<double> at_onset;
-  for (const Frame& frame : Stream{.noise = 0.0}.frames(90.0, held)) {
+  for (const Frame& frame : PressStream{.noise = 0.0}.frames(90.0, held)) {
     EXPECT_FALSE(detector.add(frame));
     if (detector.touching() && at_onset.empty()) {
       at_onset = detector.baseline();
@@ -144,7 +144,7 @@ TEST(TouchDetector, BaselineStaysDuringATouch) {
 TEST(TouchDetector, EndlessTouchKeepsABoundedPartOfAllOfIt) {
   const auto held = [](double t) { return std::vector<double>{8.0 * press(t, 1.0, 1e6)}; };
   TouchDetector detector({}, {}, {});
-  for (const Frame& frame : Stream{}.frames(600.0, held)) {
+  for (const Frame& frame : PressStream{}.frames(600.0, held)) {
     EXPECT_FALSE(detector.add(frame));
   }
   const auto touch = detector.finish();
@@ -167,7 +167,7 @@ TEST(TouchDetector, BaselineRestsAfterARelease) {
   std::optional<double> released_s;
   std::optional<double> followed_s;
   double rested = 0.0;
-  for (const Frame& frame : Stream{.noise = 0.0}.frames(3.0, creeping)) {
+  for (const Frame& frame : PressStream{.noise = 0.0}.frames(3.0, creeping)) {
     if (detector.add(frame)) {
       released_s = frame.host_time_s;
       rested = detector.baseline()[0];
@@ -185,7 +185,7 @@ TEST(TouchDetector, EndlessTouchIsTheMeanOverAllOfIt) {
     return std::vector<double>{press(t, 1.0, 1e6) * (8.0 + 0.001 * t), press(t, 1.0, 1e6) * 3.0};
   };
   TouchDetector detector({}, {}, {});
-  for (const Frame& frame : Stream{.noise = 0.0}.frames(600.0, rising)) {
+  for (const Frame& frame : PressStream{.noise = 0.0}.frames(600.0, rising)) {
     EXPECT_FALSE(detector.add(frame));
   }
   const auto touch = detector.finish();
@@ -199,7 +199,7 @@ TEST(TouchDetector, EndlessTouchIsTheMeanOverAllOfIt) {
 TEST(TouchDetector, SilenceAndAClockThatGoesBackEndATouch) {
   const auto held = [](double t) { return std::vector<double>{8.0 * press(t, 0.5, 1e6)}; };
   for (const double jump_s : {3.0, -3.0}) {
-    std::vector<Frame> frames = Stream{}.frames(4.0, held);
+    std::vector<Frame> frames = PressStream{}.frames(4.0, held);
     for (std::size_t i = 200; i < frames.size(); ++i) {
       frames[i].host_time_s += jump_s;
     }
@@ -211,7 +211,7 @@ TEST(TouchDetector, SilenceAndAClockThatGoesBackEndATouch) {
 }
 
 TEST(TouchDetector, DeadElementsTakeNoPart) {
-  std::vector<Frame> frames = Stream{}.frames(2.0, presses);
+  std::vector<Frame> frames = PressStream{}.frames(2.0, presses);
   TouchDetector detector({}, {0.0, 0.0, 5e3, 0.0}, {1, 1, 0, 1});
   std::vector<DetectedTouch> touches;
   for (Frame& frame : frames) {
@@ -225,7 +225,7 @@ TEST(TouchDetector, DeadElementsTakeNoPart) {
 }
 
 TEST(TouchDetector, PoseIsTheMeanAcrossTheTurn) {
-  std::vector<Frame> frames = Stream{}.frames(1.0, presses);
+  std::vector<Frame> frames = PressStream{}.frames(1.0, presses);
   for (std::size_t i = 0; i < frames.size(); ++i) {
     const double sign = i % 2 == 0 ? 1.0 : -1.0;
     if (i % 4 < 2) {  // half of the frames have none
@@ -243,14 +243,14 @@ TEST(TouchDetector, PoseIsTheMeanAcrossTheTurn) {
 }
 
 TEST(TouchDetector, TouchWithoutPosesHasNone) {
-  const auto touches = touches_in(Stream{}.frames(1.0, presses));
+  const auto touches = touches_in(PressStream{}.frames(1.0, presses));
   ASSERT_EQ(touches.size(), 1u);
   EXPECT_FALSE(touches[0].T_robot_sensor);
 }
 
 TEST(TouchDetector, OfASlideTheLongestRestCounts) {
   const auto held = [](double t) { return std::vector<double>{8.0 * press(t, 0.5, 3.0)}; };
-  std::vector<Frame> frames = Stream{}.frames(5.0, held);
+  std::vector<Frame> frames = PressStream{}.frames(5.0, held);
   for (Frame& frame : frames) {
     const double t = frame.host_time_s - stream_begin_s;
     // At rest at 0 for 0.5 s, then a slide of 20 mm in 0.5 s, then at rest for 2 s.
@@ -267,7 +267,7 @@ TEST(TouchDetector, KnowsTheTouchBeforeItsRelease) {
   std::optional<DetectedTouch> candidate;
   double known_s = 0.0;
   std::size_t touches = 0;
-  for (const Frame& frame : Stream{.rate_hz = 1000.0}.frames(3.0, presses)) {
+  for (const Frame& frame : PressStream{.rate_hz = 1000.0}.frames(3.0, presses)) {
     const std::optional<DetectedTouch> touch = detector.add(frame);
     if (touch) {
       ++touches;

@@ -39,7 +39,7 @@ TEST(UnknownReading, IsWhatFloat32DoesNotHold) {
 }
 
 TEST(UnknownReading, HugeReadingsLeaveNoTraceInLaterTouches) {
-  const std::vector<Frame> clean = Stream{}.frames(30.0, presses);
+  const std::vector<Frame> clean = PressStream{}.frames(30.0, presses);
   // The baseline follows an untouched array's noise, of which a glitch hides a few frames.
   for (const double drift_s : {0.0, 60.0}) {
     const TouchDetectorOptions options{.drift_s = drift_s};
@@ -71,7 +71,7 @@ TEST(UnknownReading, HugeReadingsLeaveNoTraceInLaterTouches) {
 }
 
 TEST(UnknownReading, TouchesAreFoundByTheOthers) {
-  const std::vector<Frame> clean = Stream{}.frames(8.0, presses);
+  const std::vector<Frame> clean = PressStream{}.frames(8.0, presses);
   const std::vector<DetectedTouch> expected = touches_in(clean);
   ASSERT_EQ(expected.size(), 8u);
   for (const double none : {nan, infinity, -infinity, 1e300}) {
@@ -92,7 +92,7 @@ TEST(UnknownReading, TouchesAreFoundByTheOthers) {
 }
 
 TEST(UnknownReading, AnElementWithoutReadingsIsNotValidInTheTouch) {
-  std::vector<Frame> frames = Stream{}.frames(3.0, presses);
+  std::vector<Frame> frames = PressStream{}.frames(3.0, presses);
   const auto in_second_press = [](const Frame& frame) {
     const double t = frame.host_time_s - stream_begin_s;
     return t > 1.2 && t < 2.0;
@@ -114,7 +114,7 @@ TEST(UnknownReading, AnElementWithoutReadingsIsNotValidInTheTouch) {
 // Three known readings are the fewest that one wrong reading does not decide.
 TEST(UnknownReading, ThreeReadingsAreEnough) {
   for (const std::size_t known : {2u, 3u}) {
-    std::vector<Frame> frames = Stream{.noise = 0.0}.frames(1.0, presses);
+    std::vector<Frame> frames = PressStream{.noise = 0.0}.frames(1.0, presses);
     std::size_t count = 0;
     for (Frame& frame : frames) {
       const double t = frame.host_time_s - stream_begin_s;
@@ -132,7 +132,7 @@ TEST(UnknownReading, ThreeReadingsAreEnough) {
 TEST(UnknownReading, DeadElementsAreNotValidInTouches) {
   TouchDetector detector({}, {}, {1, 0, 1, 1});
   std::optional<DetectedTouch> touch;
-  for (const Frame& frame : Stream{}.frames(1.0, presses)) {
+  for (const Frame& frame : PressStream{}.frames(1.0, presses)) {
     if (auto ended = detector.add(frame)) {
       touch = ended;
     }
@@ -150,7 +150,7 @@ TEST(UnknownReading, ATouchThatGoesDarkEnds) {
   };
   std::optional<DetectedTouch> touch;
   double ended_s = 0.0;
-  for (const Frame& frame : Stream{.noise = 0.0}.frames(4.0, held)) {
+  for (const Frame& frame : PressStream{.noise = 0.0}.frames(4.0, held)) {
     if (auto ended = detector.add(frame)) {
       touch = ended;
       ended_s = frame.host_time_s - stream_begin_s;
@@ -164,7 +164,7 @@ TEST(UnknownReading, ATouchThatGoesDarkEnds) {
 }
 
 TEST(UnknownReading, FramesThatSayNothingArePassedOver) {
-  std::vector<Frame> frames = Stream{}.frames(3.0, presses);
+  std::vector<Frame> frames = PressStream{}.frames(3.0, presses);
   const std::vector<DetectedTouch> expected = touches_in(frames);
   for (std::size_t i = 9; i < frames.size(); i += 8) {
     Frame none = frames[i];
@@ -183,7 +183,7 @@ TEST(UnknownReading, FramesThatSayNothingArePassedOver) {
 TEST(UnknownReading, PosesThatNoRobotHasAreNotKnown) {
   for (const Pose& wrong : {Pose{{nan, 0.0}, 0.0}, Pose{{0.0, 1.7e308}, 0.0},
                             Pose{{0.0, 0.0}, infinity}, Pose{{-1.7e308, 0.0}, 0.0}}) {
-    std::vector<Frame> frames = Stream{}.frames(1.0, presses);
+    std::vector<Frame> frames = PressStream{}.frames(1.0, presses);
     for (std::size_t i = 0; i < frames.size(); ++i) {
       frames[i].T_robot_sensor = i % 3 == 0 ? wrong : Pose{{4.0, 5.0}, 0.5};
     }
@@ -201,7 +201,7 @@ TEST(UnknownReading, PosesThatNoRobotHasAreNotKnown) {
 TEST(UnknownReading, BaselineFollowsWhatIsReadBelowItByTheOnsetAtMost) {
   const auto below = [](double) { return std::vector<double>{-10.0}; };
   TouchDetector detector({.onset = 2.0, .drift_s = 6.0}, {}, {});
-  for (const Frame& frame : Stream{.noise = 0.0}.frames(12.0, below)) {
+  for (const Frame& frame : PressStream{.noise = 0.0}.frames(12.0, below)) {
     detector.add(frame);
   }
   // 2 in 6 s; one step of 0.01 s less than 12 s.
@@ -212,7 +212,7 @@ TEST(UnknownReading, BaselineFollowsWhatIsReadBelowItByTheOnsetAtMost) {
 TEST(UnknownReading, BaselineFollowsInAStreamOfEarlierTimes) {
   TouchDetector detector({.drift_s = 6.0}, {}, {});
   const auto drifted = [](double) { return std::vector<double>{0.5}; };
-  std::vector<Frame> frames = Stream{.noise = 0.0}.frames(6.0, drifted);
+  std::vector<Frame> frames = PressStream{.noise = 0.0}.frames(6.0, drifted);
   for (Frame& frame : frames) {
     detector.add(frame);
   }
@@ -235,7 +235,7 @@ TEST(UnknownReading, BaselinesBeyondFloat32AreRefused) {
 TEST(UnknownReading, TareIsTakenAndJudgedByTheKnownReadings) {
   SensorDescription sensor;
   sensor.elements_mm = {{0.0, 0.0}, {1.0, 0.0}};
-  auto frames = Stream{}.frames(1.0, [](double t) {
+  auto frames = PressStream{}.frames(1.0, [](double t) {
     return std::vector<double>{3.0, 3.0 + 5.0 * press(t, 0.3, 10.0)};
   });
   for (std::size_t i = 0; i < frames.size(); i += 2) {

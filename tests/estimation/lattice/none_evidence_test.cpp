@@ -11,7 +11,7 @@
 
 namespace palpate::none_evidence_test {
 
-using NoneEvidence = TouchByTouch;
+using NoneEvidence = TouchByTouchTest;
 
 /// The share of an object's bins at which the array overlaps it.
 double share_of_overlap(const Touch& touch, const PoseLattice& lattice, const OccupancyGrid& map) {

@@ -39,7 +39,7 @@ double expected_log_odds_of_none(const HistogramOptions& options, std::span<cons
                                  const std::vector<std::vector<Logs>>& by_touch);
 double log_odds_of_none(const PoseHistogram& histogram);
 
-class TouchByTouch : public testing::Test {
+class TouchByTouchTest : public testing::Test {
  protected:
   /// Elements over [-6, 6]^2 mm, poses over [-8, 8]^2 mm.
   const Recording recording = random_recording(3, 40, 73);

@@ -56,7 +56,7 @@ std::vector<Case> cases() {
           {"no floor", near, sd, 0.0}};
 }
 
-TEST_F(TouchByTouch, AveragesATouchAsTheReferenceDoes) {
+TEST_F(TouchByTouchTest, AveragesATouchAsTheReferenceDoes) {
   for (const Case& c : cases()) {
     SCOPED_TRACE(c.name);
     HistogramOptions options{.lattice = c.lattice, .touch_sd = c.sd};
@@ -69,7 +69,7 @@ TEST_F(TouchByTouch, AveragesATouchAsTheReferenceDoes) {
   }
 }
 
-TEST_F(TouchByTouch, AveragesALargeArray) {
+TEST_F(TouchByTouchTest, AveragesALargeArray) {
   // 900 elements tell planes apart by hundreds of nats, floor or not.
   const Recording large = random_recording(1, 900, 74);
   const Touch touch = large.touch(0);
@@ -87,7 +87,7 @@ TEST_F(TouchByTouch, AveragesALargeArray) {
   }
 }
 
-TEST_F(TouchByTouch, SlipsAsTheReferenceDoes) {
+TEST_F(TouchByTouchTest, SlipsAsTheReferenceDoes) {
   for (const Case& c : cases()) {
     SCOPED_TRACE(c.name);
     HistogramOptions options{.lattice = c.lattice, .slip_sd = c.sd};
@@ -104,7 +104,7 @@ TEST_F(TouchByTouch, SlipsAsTheReferenceDoes) {
   }
 }
 
-TEST_F(TouchByTouch, SlippingSaysNothingAboutTheObject) {
+TEST_F(TouchByTouchTest, SlippingSaysNothingAboutTheObject) {
   HistogramOptions options{.lattice = small_lattice(), .slip_sd = {.mm = 1.0, .rad = 0.2}};
   PoseHistogram histogram(device, two_maps(), options);
   PoseHistogram at_rest(device, two_maps(), {.lattice = options.lattice});
@@ -121,7 +121,7 @@ TEST_F(TouchByTouch, SlippingSaysNothingAboutTheObject) {
   EXPECT_GT(largest_difference(histogram.log_likelihood(0), at_rest.log_likelihood(0)), 0.1);
 }
 
-TEST_F(TouchByTouch, TakesUncertaintySlipAndNoneTogether) {
+TEST_F(TouchByTouchTest, TakesUncertaintySlipAndNoneTogether) {
   for (const double gamma : {0.1, 0.0}) {
     HistogramOptions options{.lattice = small_lattice(),
                              .none_weight = 3.0,
@@ -136,7 +136,7 @@ TEST_F(TouchByTouch, TakesUncertaintySlipAndNoneTogether) {
   }
 }
 
-TEST_F(TouchByTouch, ForgetsAtAReset) {
+TEST_F(TouchByTouchTest, ForgetsAtAReset) {
   const HistogramOptions options{.lattice = small_lattice(),
                                  .none_weight = 1.0,
                                  .touch_sd = {.mm = 0.8, .rad = 0.1},
@@ -151,7 +151,7 @@ TEST_F(TouchByTouch, ForgetsAtAReset) {
   EXPECT_EQ(told(), first);
 }
 
-TEST_F(TouchByTouch, APreparedTouchIsTheSame) {
+TEST_F(TouchByTouchTest, APreparedTouchIsTheSame) {
   const HistogramOptions options{
       .lattice = small_lattice(), .none_weight = 1.0, .touch_sd = {.mm = 0.8, .rad = 0.1}};
   PoseHistogram plain(device, two_maps(), options);
@@ -166,7 +166,7 @@ TEST_F(TouchByTouch, APreparedTouchIsTheSame) {
   }
 }
 
-TEST_F(TouchByTouch, APreparedTouchSurvivesASlip) {
+TEST_F(TouchByTouchTest, APreparedTouchSurvivesASlip) {
   const HistogramOptions options{.lattice = small_lattice(),
                                  .touch_sd = {.mm = 0.8, .rad = 0.1},
                                  .slip_sd = {.mm = 0.5, .rad = 0.1}};
@@ -180,7 +180,7 @@ TEST_F(TouchByTouch, APreparedTouchSurvivesASlip) {
   }
 }
 
-TEST_F(TouchByTouch, TakesAStillArray) {
+TEST_F(TouchByTouchTest, TakesAStillArray) {
   Recording presses = recording;
   presses.T_robot_sensor.assign(presses.size(), presses.T_robot_sensor.front());
   for (std::size_t i = 0; i < presses.pressure.size(); ++i) {
@@ -198,7 +198,7 @@ TEST_F(TouchByTouch, TakesAStillArray) {
             per_mean * static_cast<double>(pressed.size()));
 }
 
-TEST_F(TouchByTouch, TakesAnArrayThatChanges) {
+TEST_F(TouchByTouchTest, TakesAnArrayThatChanges) {
   // Each touch with elements of its own, and fewer from touch to touch.
   std::vector<std::vector<glm::dvec2>> elements;
   std::vector<Touch> changing;
@@ -226,7 +226,7 @@ TEST_F(TouchByTouch, TakesAnArrayThatChanges) {
               allowed);
 }
 
-TEST_F(TouchByTouch, RefusesWhatALatticeDoesNotTake) {
+TEST_F(TouchByTouchTest, RefusesWhatALatticeDoesNotTake) {
   const auto refuse = [&](const DisplacementSd& sd) {
     EXPECT_THROW(PoseHistogram(device, two_maps(), {.lattice = small_lattice(), .touch_sd = sd}),
                  Error);
