@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""The list of sources to lint holds what changed within a day of the newest commit, and what includes
-it; what is compiled of them is found. The argument is the program that prints the list."""
+"""The list of sources to lint holds what changed within four hours of the newest commit, and what
+includes it; what is compiled of them is found. The argument is the program that prints the list."""
 
 import json
 import os
@@ -11,7 +11,7 @@ import tempfile
 import unittest
 
 PROGRAM = pathlib.Path(sys.argv.pop())
-DAY_S = 86400
+HOURS_S = 4 * 3600
 
 
 class ChangedSources(unittest.TestCase):
@@ -46,34 +46,38 @@ class ChangedSources(unittest.TestCase):
         self.git("add", "-A")
         self.git("commit", "-q", "-m", "a step", at_s=at_s)
 
-    def listed(self) -> list[str]:
-        run = subprocess.run([PROGRAM], cwd=self.root, check=True, capture_output=True, text=True)
+    def listed(self, *flags: str) -> list[str]:
+        command = [PROGRAM, *flags]
+        run = subprocess.run(command, cwd=self.root, check=True, capture_output=True, text=True)
         return run.stdout.split()
 
     def test_a_header_brings_what_includes_it_through_others(self) -> None:
         self.commit(0)
         self.write("host/model/pose.hpp", "// changed\n")
-        self.commit(2 * DAY_S)
+        self.commit(2 * HOURS_S)
         self.assertEqual(self.listed(), ["host/io/file.cpp"])
+        self.assertEqual(self.listed("--directly"), [])
+        self.write("host/io/file.hpp", '#include "model/pose.hpp"\n// changed, too\n')
+        self.assertEqual(self.listed("--directly"), ["host/io/file.cpp"])
 
     def test_a_public_header_brings_the_driver(self) -> None:
         self.commit(0)
         self.write("host/include/palpate/touch.hpp", "// changed\n")
-        self.commit(2 * DAY_S)
+        self.commit(2 * HOURS_S)
         self.assertEqual(self.listed(), ["driver/board.cpp"])
 
-    def test_commits_of_a_day_count_together(self) -> None:
+    def test_commits_of_four_hours_count_together(self) -> None:
         self.commit(0)
         self.write("host/io/other.cpp", "// changed\n")
-        self.commit(2 * DAY_S)
+        self.commit(2 * HOURS_S)
         self.write("README.md", "changed")
-        self.commit(2 * DAY_S + 3600)
+        self.commit(2 * HOURS_S + 3600)
         self.assertEqual(self.listed(), ["host/io/other.cpp"])
 
     def test_files_that_git_does_not_know_yet_count(self) -> None:
         self.commit(0)
         self.write("README.md", "changed")
-        self.commit(2 * DAY_S)
+        self.commit(2 * HOURS_S)
         self.assertEqual(self.listed(), [])
         self.write("host/io/new.cpp", '#include "io/file.hpp"\n')
         self.assertEqual(self.listed(), ["host/io/new.cpp"])
@@ -81,7 +85,7 @@ class ChangedSources(unittest.TestCase):
     def test_a_file_that_went_is_not_listed(self) -> None:
         self.commit(0)
         (self.root / "host/io/other.cpp").unlink()
-        self.commit(2 * DAY_S)
+        self.commit(2 * HOURS_S)
         self.assertEqual(self.listed(), [])
 
     def test_all_are_listed_where_the_rules_changed_or_all_is_young(self) -> None:
@@ -89,7 +93,7 @@ class ChangedSources(unittest.TestCase):
         self.commit(0)
         self.assertEqual(self.listed(), everything)
         self.write(".clang-tidy", "Checks: performance-*\n")
-        self.commit(2 * DAY_S)
+        self.commit(2 * HOURS_S)
         self.assertEqual(self.listed(), everything)
 
 
