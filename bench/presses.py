@@ -16,6 +16,10 @@ from .measures import share_record, with_interval
 from .program import Json, begin, main, parser, write
 
 SEED = 800_000_000
+# Where an object may lie about the place where its map was learned, and how fine that is told apart: bins
+# of one pitch, 10 degrees. Half as wide ones change what is recognised by less than its interval. Bounds
+# take longer than all bins: with presses that fit nowhere well, few bins can be ruled out.
+REACH, TURNS = 14, 36  # pitches, bins of a full turn
 TOGETHER = (1, 2, 3, 5)
 LEAST = 1e-30  # probability that a label counts with
 
@@ -94,6 +98,10 @@ def program() -> None:
                 ).save(files[-1])
         sensor, result = str(folder / "sensor.yaml"), folder / "records.json"
         told(options.palpate, "calibrate", *learned, "--unposed", "-o", sensor)
+        columns = numpy.unique(recordings[0].elements_mm[:, 0])
+        widest = (REACH + 0.5) * float(numpy.diff(columns).min())
+        region = [f"--{axis}-mm={-widest}:{widest}" for axis in "xy"]
+        bins = ["--filter", "histogram", "--bins", f"{TURNS}x{2 * REACH + 1}x{2 * REACH + 1}"]
         raw = recordings[0].pressure_unit == "raw"
         contact = ["--threshold", f"{CLASSIFIER.threshold}", "--ratio", f"{CLASSIFIER.ratio}"] if raw else []
         for key, words, making, reading in (
@@ -102,7 +110,7 @@ def program() -> None:
         ):
             maps = str(folder / key) + "/"
             told(options.palpate, "map", *learned, "--unposed", *making, "-o", maps)
-            recognize = ["recognize", *tried, "--each-frame", "--maps", maps, "--none", "0"]
+            recognize = ["recognize", *tried, "--each-frame", "--maps", maps, "--none", "0", *region, *bins]
             told(options.palpate, *recognize, *reading, "--device", device.name, "--json", str(result))
             records = json.loads(result.read_text())
             random = numpy.random.default_rng(SEED)
