@@ -21,6 +21,7 @@ SHARES = (0.68, 0.95)
 MODELS: dict[str, str | None] = {"Eq. 7": "none", "learned": None}  # of recognize()
 SAMPLES = 4_000  # of a mixture of modes: standard error of a level at most 0.008
 EXACT = Touching(at_random_poses=True)
+MISPLACED = Touching(at_random_poses=True, noise=(1.0, 0.05))  # mm, rad
 
 _PERCENT = with_interval(".1f", 100.0)
 COLUMNS: list[Column] = [
@@ -80,20 +81,23 @@ def covered(levels: Sequence[float]) -> Json:
 
 
 def program() -> None:
-    """Letters touched at exact poses, by Eq. 7 and by the sensor that `palpate map` learns with their maps."""
+    """Letters by Eq. 7 and by the sensor that `palpate map` learns with their maps, from exact touches."""
     flags = parser(
         "coverage",
         "Measures how often the 68 and 95 % regions of the belief, over all its modes, hold the truth, and "
         "how right decisions are, in some minutes on two CPU cores.",
         trials="unknowns per letter [34, or 2 with --quick]",
     )
+    flags.add_argument("--misplaced", action="store_true", help="touches are 1 mm and 0.05 rad off")
     flags.add_argument("--palpate", default="build/palpate", help="the command [%(default)s]")
     options = flags.parse_args()
     device, facts = begin(options)
+    touching = MISPLACED if options.misplaced else EXACT
+    sd_mm, sd_rad = touching.noise
     most = 64 if options.quick else None
     each = options.trials or (2 if options.quick else 34)
     # Each unknown is touched by a sensor of its own, whose gains all of its touches share.
-    trials = make_trials(LETTERS * each, 1, max(TOUCHES), SEED, EXACT)
+    trials = make_trials(LETTERS * each, 1, max(TOUCHES), SEED, touching)
     random = numpy.random.default_rng(SEED)
     coverage, decisions = Table(COLUMNS), []
     with tempfile.TemporaryDirectory() as folder:
@@ -106,8 +110,9 @@ def program() -> None:
         for sensor, model in MODELS.items():
             # Nobody is a stranger: what "(none)" has would count against every region.
             records = palpate.recognize(
-                trials, f"{folder}/maps", trace=True, device=device, sensor_model=model, none=0.0
-            )
+                trials, f"{folder}/maps", trace=True, device=device, sensor_model=model, none=0.0,
+                touch_sd_mm=sd_mm, touch_sd_deg=math.degrees(sd_rad),
+            )  # fmt: skip
             for touches in TOUCHES:
                 steps = [record["trace"][touches - 1] for record in records]
                 row: Json = {"sensor": sensor, "touches": touches, "unknowns": len(trials)}
