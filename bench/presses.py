@@ -17,8 +17,7 @@ from .program import Json, begin, main, parser, write
 
 SEED = 800_000_000
 # Where an object may lie about the place where its map was learned, and how fine that is told apart: bins
-# of one pitch, 10 degrees. Half as wide ones change what is recognised by less than its interval. Bounds
-# take longer than all bins: with presses that fit nowhere well, few bins can be ruled out.
+# of one pitch, 10 degrees. All are evaluated: of presses that fit nowhere well, bounds rule out few bins.
 REACH, TURNS = 14, 36  # pitches, bins of a full turn
 TOGETHER = (1, 2, 3, 5)
 LEAST = 1e-30  # probability that a label counts with
