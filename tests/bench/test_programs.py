@@ -11,14 +11,14 @@ from conftest import Program, run
 import palpate
 
 
-def part(tmp_path: pathlib.Path, name: str, trials: int | None = None) -> Program:
-    some = () if trials is None else ("--trials", trials)
-    plots = ("--plots", tmp_path / "plots")
-    return Program(tmp_path, "bench.beliefs", "--quick", "--part", name, *some, *plots)
+@pytest.fixture(scope="module")
+def beliefs(tmp_path_factory: pytest.TempPathFactory) -> Program:
+    # Takes some 35 seconds of a processor, for six parts and their charts; the maps are built once.
+    folder = tmp_path_factory.mktemp("beliefs")
+    return Program(folder, "bench.beliefs", "--quick", "--trials", 1, "--plots", folder / "plots")
 
 
-def test_averaging_makes_misplaced_touches_honest(tmp_path: pathlib.Path) -> None:
-    beliefs = part(tmp_path, "misplaced", trials=1)
+def test_averaging_makes_misplaced_touches_honest(beliefs: Program) -> None:
     records = beliefs.document["misplaced"]
     assert len(records) == 2 * 4 * 2, "two displacements, four numbers of touches, two beliefs"
     for level_mm in (1.0, 2.0):
@@ -32,17 +32,16 @@ def test_averaging_makes_misplaced_touches_honest(tmp_path: pathlib.Path) -> Non
         }
         assert nees["averaged"] < 0.7 * nees["as if exact"], "too sure"
     beliefs.expect_charts("misplaced", "sureness")
-    assert (tmp_path / "plots/misplaced_unknown.png").stat().st_size > 10_000
+    assert (beliefs.folder / "plots/misplaced_unknown.png").stat().st_size > 10_000
 
 
-def test_touches_tell_how_far_they_are_misplaced(tmp_path: pathlib.Path) -> None:
-    (record,) = part(tmp_path, "touch-sd", trials=1).document["touch-sd"]
+def test_touches_tell_how_far_they_are_misplaced(beliefs: Program) -> None:
+    (record,) = beliefs.document["touch-sd"]
     assert record["fitted"]["mm"] == pytest.approx(record["true"]["mm"], rel=0.4)
     assert record["gain_nats"] > 50.0, "exact poses explain such touches much worse"
 
 
-def test_none_is_found(tmp_path: pathlib.Path) -> None:
-    beliefs = part(tmp_path, "none", trials=1)
+def test_none_is_found(beliefs: Program) -> None:
     by = {(record["name"], record["touches"]): record for record in beliefs.document["none"]}
     exact = by["exact, ±10 mm", 9]
     assert exact["learned_called_none"]["mean"] == 0.0
@@ -53,16 +52,14 @@ def test_none_is_found(tmp_path: pathlib.Path) -> None:
     beliefs.expect_charts("none")
 
 
-def test_a_belief_that_allows_for_slips_follows(tmp_path: pathlib.Path) -> None:
-    beliefs = part(tmp_path, "slip")
+def test_a_belief_that_allows_for_slips_follows(beliefs: Program) -> None:
     following, plain = beliefs.document["slip"]
     assert following["late_error_mm"]["mean"] < plain["late_error_mm"]["mean"]
     assert following["located"] > 0.8
     beliefs.expect_charts("slip")
 
 
-def test_planned_touches_tell_more(tmp_path: pathlib.Path) -> None:
-    beliefs = part(tmp_path, "plan")
+def test_planned_touches_tell_more(beliefs: Program) -> None:
     entropy = {
         record["order"]: [point["entropy"]["mean"] for point in record["curve"]]
         for record in beliefs.document["plan"]
@@ -74,8 +71,8 @@ def test_planned_touches_tell_more(tmp_path: pathlib.Path) -> None:
     beliefs.expect_charts("plan")
 
 
-def test_costs_are_counted(tmp_path: pathlib.Path) -> None:
-    costs = Program(tmp_path, "bench.beliefs", "--quick", "--part", "cost").document["cost"]
+def test_costs_are_counted(beliefs: Program) -> None:
+    costs = beliefs.document["cost"]
     value = {(cost["name"], *cost["bins"]): cost["value"] for cost in costs}
     assert 1.0 < value["memory over plain: uncertain", 30, 30, 113] <= 2.0
     assert value["uncertain touch to estimate", 25, 25, 16] > 0.0
