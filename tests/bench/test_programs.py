@@ -60,6 +60,7 @@ def test_a_belief_that_allows_for_slips_follows(beliefs: Program) -> None:
 
 
 def test_planned_touches_tell_more(tmp_path: pathlib.Path) -> None:
+    # Takes some six seconds, of which the letters' maps, as of every program, take three.
     plots = ("--plots", tmp_path / "plots")
     beliefs = Program(tmp_path, "bench.beliefs", "--quick", "--part", "plan", *plots)
     assert "none" not in beliefs.document, "a part alone"
@@ -83,6 +84,7 @@ def test_costs_are_counted(beliefs: Program) -> None:
 
 
 def test_unlearned_shapes_fit_worse(tmp_path: pathlib.Path) -> None:
+    # Takes some twelve seconds, most for the maps of an array of 256 elements.
     fits = Program(tmp_path, "bench.fit", "--quick", "--trials", 1).document["fits"]
     assert len(fits) == 10, "two arrays after 1, 3, 5, 9 and 15 touches"
     for fit in fits:
@@ -137,6 +139,7 @@ def test_times_become_charts(bounded: Program) -> None:
 
 @pytest.fixture(scope="module")
 def sweep(tmp_path_factory: pytest.TempPathFactory) -> Program:
+    # Takes some 33 seconds of a processor, for every filter, lattices and their limits.
     folder = tmp_path_factory.mktemp("sweep")
     return Program(
         folder, "bench.sweep", "--quick", "--trials", 1, "--html", folder / "page.html",
@@ -181,7 +184,7 @@ def test_a_sweep_is_whole_and_in_order(sweep: Program) -> None:
 
 
 def test_set_ups_are_checked(tmp_path: pathlib.Path) -> None:
-    # Takes some six seconds: a set of three objects is checked four times.
+    # Takes some eleven seconds of a processor: a set of three objects is checked four times.
     document = Program(tmp_path, "bench.check", "--quick", "--trials", 1).document
     (row,) = document["check"]
     assert (row["elements"], row["sets"], row["sound"], row["order"], row["one_angle"]) == (36, 1, 1, 1, 1)
@@ -217,6 +220,7 @@ def test_the_page_needs_no_network(sweep: Program) -> None:
 
 
 def test_regions_hold_the_truth_as_often_as_can_be(tmp_path: pathlib.Path) -> None:
+    # Takes some eight seconds of a processor: the sensor is learned from touches of three letters.
     command = ("--palpate", os.environ["PALPATE_COMMAND"])
     document = Program(tmp_path, "bench.coverage", "--quick", "--trials", 1, *command).document
     rows = {(row["sensor"], row["touches"]): row for row in document["coverage"]}
