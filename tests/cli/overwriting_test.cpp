@@ -95,6 +95,8 @@ TEST_F(Overwriting, MapWritesEveryFileOnce) {
   expect_refused({"map", "A.h5", "-o", "a.png", "--png", "b.png"}, {"--png b.png", "-o writes"});
 }
 
+// Some eight seconds of a processor, for fifty refusals: a start of the program takes a sixth of
+// one.
 TEST_F(Overwriting, RecognizeKeepsAllThatItReads) {
   for (const char* flag : {"--json", "--posterior"}) {
     expect_kept("u.h5", flag, "RECORDING", {"recognize", "u.h5", "--maps", "maps"});
