@@ -172,6 +172,7 @@ TEST_F(Overwriting, TouchesKeepsTheFrames) {
   expect_kept("cc.h5", "-o", "FRAMES", {"touches", "cc.h5"});
 }
 
+// Some six seconds of a processor, for thirty refusals.
 TEST_F(Overwriting, LiveKeepsAllThatItReads) {
   done({"record", "--sensor", presses, "-o", "cc,1.h5"});
   const Arguments maps{"live", "--sensor", "replay:cc,1.h5,speed=max", "--maps", "maps"};
