@@ -67,10 +67,11 @@ PRESSES: list[Column] = [
 LEVELS = (("#a8ccf0", 0.05, 0.26), ("#1a66b8", 0.05, 0.26), ("#e65c0d", 0.4, 0.95))
 
 
-def measure_accuracy(device: palpate.Device, quick: bool) -> list[Json]:
+def measure_accuracy(
+    device: palpate.Device, maps: list[palpate.OccupancyGrid], quick: bool
+) -> list[Json]:
     """Certificates beside the distances from the posterior over all bins, after 3 and 9 touches."""
     sizes: list[Bins] = [*TABLE_1[:2]] if quick else [*TABLE_1, (44, 44, 52), (100, 100, 100)]
-    maps = letter_maps(device)
     trials = make_trials(VOWELS, 1 if quick else 10, 9, SEED)
     records = Table(ACCURACY)
     for bins in sizes:
@@ -289,14 +290,16 @@ def program() -> None:
         flags.error("--plots and --times: give both, or neither")
     times = read_times(options.times) if options.times else None
     device, document = begin(options)
-    if options.part in (None, "accuracy"):
-        document["accuracy"] = measure_accuracy(device, options.quick)
+    accuracy = options.part in (None, "accuracy")
+    maps = letter_maps(device) if accuracy or times else []
+    if accuracy:
+        document["accuracy"] = measure_accuracy(device, maps, options.quick)
     if options.presses:
         document["presses"] = measure_presses(device, options.presses, options.quick)
     write(options.json, document)
     if times:
         charts.save({"bounded_growth": draw_growth(times["growth"])}, options.plots)
-        picture = draw_search(times["search"], letter_maps(device)[0])
+        picture = draw_search(times["search"], maps[0])
         path = pathlib.Path(options.plots, "bounded_search.png")
         write(path, charts.image(picture, "png", dpi=100))
 

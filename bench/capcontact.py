@@ -111,16 +111,15 @@ class Trial(NamedTuple):
     ) -> dict[str, tuple["Trial", Json]]:
         """After each of SHOWN, as a trial of these windows and the belief."""
 
-        def trace(trial: Trial) -> list[Json]:
+        def record(trial: Trial, trace: bool) -> Json:
             touches = trial.touches(registration)
-            (record,) = palpate.recognize(touches, grids, trace=True, none=0.0, **REGION, **options)
-            steps: list[Json] = record["trace"]
-            return steps
+            (told,) = palpate.recognize(touches, grids, trace=trace, none=0.0, **REGION, **options)
+            return told
 
         whole = self._replace(windows=self.press.tiles())
-        steps = trace(self)
+        steps = record(self, trace=True)["trace"]
         after = {str(n): (self._replace(windows=self.windows[:n]), steps[n - 1]) for n in WINDOWS}
-        return after | {WHOLE: (whole, trace(whole)[-1])}
+        return after | {WHOLE: (whole, record(whole, trace=False))}
 
 
 def draw_round(presses: Sequence[Press], objects: int, random: numpy.random.Generator) -> list[Trial]:

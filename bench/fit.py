@@ -78,7 +78,7 @@ def program() -> None:
     for name, usual, touching in SETTINGS[: 2 if options.quick else None]:  # the two arrays
         bins = (13, 13, 55) if options.quick else usual
         training = training_recordings(touching)
-        maps = letter_maps(device, [one[:96] for one in training] if options.quick else training)
+        maps = letter_maps(device, [one[::3] for one in training] if options.quick else training)
         traces = {}
         for who, shapes in SHAPES.items():
             trials = make_trials(shapes, each, max(TOUCHES), SEEDS[who], touching)

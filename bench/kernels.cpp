@@ -55,7 +55,7 @@ Inputs make_inputs(Device& device, const RunOptions& options) {
       .device_name = options.device,
       .quick = options.quick,
       .training = training_recordings(),
-      .unknowns = unknown_recordings(options.quick ? 50 : 1000, touches_per_unknown, 100)};
+      .unknowns = unknown_recordings(options.quick ? 20 : 1000, touches_per_unknown, 100)};
   inputs.letters = letter_maps(device, inputs.training);
   inputs.model.prior = inputs.letters.front().map.prior;
   return inputs;
@@ -63,25 +63,25 @@ Inputs make_inputs(Device& device, const RunOptions& options) {
 
 constexpr double goal_bytes_per_bin = 10.0;
 constexpr double goal_nats_per_touch = 1e-4;
-// Bins per object that the baselines need about a second for.
-constexpr std::int64_t baseline_bins = 80000;
 
 /// The lattice with its x and y bins, and as many thetas of the full circle as the baselines have
-/// time for.
-PoseLattice part_of(PoseLattice lattice) {
+/// time for, about a second.
+PoseLattice part_of(PoseLattice lattice, bool quick) {
+  const std::int64_t most_bins = quick ? 10000 : 80000;  // per object
   lattice.theta_rad.count = static_cast<int>(
-      std::clamp<std::int64_t>(baseline_bins / lattice.plane(), 1, lattice.theta_rad.count));
+      std::clamp<std::int64_t>(most_bins / lattice.plane(), 1, lattice.theta_rad.count));
   return lattice;
 }
 
 /// Times the likelihood of an unknown's touches beside two baselines, the one-bin kernel and the
 /// CPU loop, with the error of each. Leaves some touches in the histogram.
 Case likelihood_case(const Inputs& inputs, PoseHistogram& histogram, double goal_ns) {
-  const std::vector<Touch> touches = all_touches(inputs.unknowns.front());
+  const std::vector<Touch> touches =
+      inputs.unknowns.front().touches(0, inputs.quick ? 3 : touches_per_unknown);
   const std::size_t elements = inputs.unknowns.front().elements();
   const std::size_t objects = inputs.letters.size();
   const PoseLattice& lattice = histogram.lattice();
-  const PoseLattice part = part_of(lattice);
+  const PoseLattice part = part_of(lattice, inputs.quick);
   const auto ns_per_ber = [&](const PoseLattice& l, double seconds) {
     return 1e9 * seconds /
            (static_cast<double>(l.bins()) *
@@ -104,7 +104,7 @@ Case likelihood_case(const Inputs& inputs, PoseHistogram& histogram, double goal
   const ErrorStatistics cpu_errors = errors_of(part, cpu_loop);
 
   const auto bins = static_cast<double>(objects) * static_cast<double>(lattice.bins());
-  const int repeats = inputs.quick ? 3 : bins > 1e7 ? 3 : bins > 1e6 ? 7 : 25;
+  const int repeats = inputs.quick ? 1 : bins > 1e7 ? 3 : bins > 1e6 ? 7 : 25;
   const std::function<void()> contenders[] = {[&] { histogram.update(touches); },
                                               [&] { one_bin.update(touches); },
                                               [&] { cpu_loop.update(touches); }};

@@ -20,7 +20,6 @@ namespace {
 constexpr double goal_lost_percent = 10.0;
 constexpr double goal_rate_over_processes = 4.0;
 constexpr double goal_batch_rate = 1000.0;
-constexpr int batch_runs = 5;
 
 /// The program `palpate` beside this one, with the letters' maps and the unknowns' recordings in a
 /// folder.
@@ -55,10 +54,10 @@ class ProgramWithFiles {
   }
 
   /// Median seconds that `palpate batch` takes for all unknowns by bounds, start and end included.
-  double batch_seconds() const {
+  double batch_seconds(int runs) const {
     const std::filesystem::path results = folder_ / "results";
     std::vector<double> seconds;
-    for (int run = 0; run < batch_runs; ++run) {
+    for (int run = 0; run < runs; ++run) {
       std::filesystem::remove_all(results);
       seconds.push_back(seconds_of(fmt::format("batch '{}' -o '{}' --filter bounded",
                                                unknowns_.string(), results.string())));
@@ -118,7 +117,7 @@ Case many_unknowns_case(const Inputs& inputs) {
 
   PoseHistogram large = letter_histogram(inputs, lattice_of(25, 25, large_thetas));
   const double large_seconds =
-      median_seconds([&] { recognise(large, inputs.unknowns.front()); }, 3);
+      median_seconds([&] { recognise(large, inputs.unknowns.front()); }, inputs.quick ? 1 : 3);
   const double large_ns =
       1e9 * large_seconds / (bins * large_thetas / lattice.theta_rad.count * per_bin);
 
@@ -161,8 +160,8 @@ Case many_unknowns_case(const Inputs& inputs) {
     return result;
   }
   const ProgramWithFiles palpate(inputs, program);
-  const double alone = palpate.seconds_per_process(10);
-  const double batch = palpate.batch_seconds();
+  const double alone = palpate.seconds_per_process(inputs.quick ? 3 : 10);
+  const double batch = palpate.batch_seconds(inputs.quick ? 1 : 5);
   result.measurements.insert(
       result.measurements.end(),
       {{"a process per unknown", 1.0 / alone, "unknowns per s"},

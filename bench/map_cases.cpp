@@ -58,7 +58,7 @@ Case fine_map_case(const Inputs& inputs) {
       maps.push_back(builder.build(inputs.training[letter].object));
     }
   };
-  const int repeats = inputs.quick ? 3 : 15;
+  const int repeats = inputs.quick ? 1 : 15;
   const double seconds = median_seconds(build_all, repeats);
 
   std::mt19937_64 random(410);

@@ -17,7 +17,6 @@ constexpr std::size_t timed_touches = 3;
 constexpr int touches_in_all = 15;  ///< of which one is as of an array at rest
 constexpr std::uint64_t seed = 1'000;
 constexpr int sampled_bins = 200;  ///< of every object, held against float64
-constexpr int repeats = 3;
 
 std::ptrdiff_t no_contacts(const Touch& touch) {
   const std::vector<Reading> readings = ContactClassifier{}.classify(touch);
@@ -50,7 +49,7 @@ struct Way {
 /// in logs (gamma = 0), an array at rest, the one-bin kernel, and the loop on the host's cores. The
 /// ways take turns.
 Json compare_ways(Device& device, std::span<const Hypothesis> letters, const Recording& unknown,
-                  const PoseLattice& lattice) {
+                  const PoseLattice& lattice, int repeats) {
   const ContactModel product{.prior = letters.front().map.prior};
   const ContactModel logs{.gamma = 0.0, .prior = product.prior};
   const std::vector<Touch> moving = unknown.touches(0, timed_touches);
@@ -114,14 +113,15 @@ void compare_paths(const RunOptions& options, std::span<char* const> command_lin
   std::vector<PoseLattice> lattices = {lattice_of(25, 25, 16), lattice_of(50, 50, 40),
                                        lattice_of(100, 100, 10), lattice_of(200, 200, 4)};
   if (options.quick) {
-    lattices = {lattice_of(25, 25, 4), lattice_of(100, 100, 2)};
+    lattices = {lattice_of(25, 25, 4), lattice_of(100, 100, 1)};
   }
+  const int repeats = options.quick ? 1 : 3;
   fmt::print(
       "\n| evaluated by | bins per object | ns per pose, element and touch | largest deviation, "
       "nats | RMS |\n|:--|--:|--:|--:|--:|\n");
   Json& precisions = report.document()["precisions"] = Json::array();
   for (const PoseLattice& lattice : lattices) {
-    for (const Json& way : compare_ways(report.device(), letters, unknown, lattice)) {
+    for (const Json& way : compare_ways(report.device(), letters, unknown, lattice, repeats)) {
       const Json& deviation = way.at("deviation_nats");
       fmt::print("| {} | {} | {:.2f} | {:.1e} | {:.1e} |\n", plain_text(way.at("path")),
                  count_text(way.at("count")), way.at("nanoseconds").get<double>(),

@@ -26,7 +26,15 @@ from .sweep_runs import (
     measure_particles,
 )
 from .sweep_tables import BOUNDS, LIMITS, PRECISIONS, PRINTED, STEPS, VERDICTS
-from .trials import TABLE_1, VOWELS, Bins, lattice_of, letter_maps, make_trials
+from .trials import (
+    TABLE_1,
+    VOWELS,
+    Bins,
+    lattice_of,
+    letter_maps,
+    make_trials,
+    training_recordings,
+)
 
 SEED = 1_000  # the experiment's
 TOUCHES = 15
@@ -137,12 +145,13 @@ def measure(device: palpate.Device, options: argparse.Namespace) -> Json:
     counts = [1e2, 1e3, 1e4] if quick else [1e2, 1e3, 1e4, 3e4, 1e5, 3e5, 1e6, 3e6, 1e7]
     particles = [1_000, 10_000] if quick else [100, 1_000, 10_000, 100_000, 1_000_000]
     bounded = [1e2, 1e3, 1e4, 3e4] if quick else [1e3, 3e3, 1e4, 2e4, 3e4, 1e5, 1e6, 1e7]
+    training = [one[:: 3 if quick else 1] for one in training_recordings()]
     points = Table(PRINTED)
     bounds: list[Json] = []
     knees: list[Json] = []
 
     for cell_mm in (1.0, GOAL_CELL_MM) if quick else (1.0, GOAL_CELL_MM, 0.25):
-        maps = letter_maps(device, cell_mm=cell_mm)
+        maps = letter_maps(device, training, cell_mm=cell_mm)
         goal = cell_mm == GOAL_CELL_MM
         lattices = sorted([*map(scaled, counts), *TABLE_1], key=math.prod)
         for bins in lattices if goal else map(scaled, decades):

@@ -353,6 +353,7 @@ def measure_limits(
         poses = palpate.training_grid()
         if variant.more_training:
             poses = numpy.concatenate([poses, palpate.random_poses(7 * len(poses), 12)])
+        poses = poses[:: 3 if quick else 1]
         training = training_recordings(replace(variant.touching, noise=(0.0, 0.0)), poses)
         maps = letter_maps(device, training, cell_mm=variant.cell_mm, spread_mm=variant.spread_mm)
         trials = make_trials(VOWELS, each, touches, seed, variant.touching)

@@ -14,6 +14,7 @@ TRIALS, TOUCHES = 10, 9
 
 @pytest.fixture(scope="module")
 def experiment(tmp_path_factory: pytest.TempPathFactory) -> Program:
+    # Takes some 22 seconds of a processor: eight filters, and three of them at two more levels of noise.
     folder = tmp_path_factory.mktemp("experiment")
     return Program(
         folder, "bench.experiment", "--quick", "--trials", TRIALS // 5, "--touches", TOUCHES,

@@ -11,14 +11,14 @@ from conftest import Program, run
 import palpate
 
 
-def part(tmp_path: pathlib.Path, name: str, trials: int | None = None) -> Program:
-    some = () if trials is None else ("--trials", trials)
-    plots = ("--plots", tmp_path / "plots")
-    return Program(tmp_path, "bench.beliefs", "--quick", "--part", name, *some, *plots)
+@pytest.fixture(scope="module")
+def beliefs(tmp_path_factory: pytest.TempPathFactory) -> Program:
+    # Takes some 40 seconds of a processor, for six parts and their charts; the maps are built once.
+    folder = tmp_path_factory.mktemp("beliefs")
+    return Program(folder, "bench.beliefs", "--quick", "--trials", 1, "--plots", folder / "plots")
 
 
-def test_averaging_makes_misplaced_touches_honest(tmp_path: pathlib.Path) -> None:
-    beliefs = part(tmp_path, "misplaced", trials=1)
+def test_averaging_makes_misplaced_touches_honest(beliefs: Program) -> None:
     records = beliefs.document["misplaced"]
     assert len(records) == 2 * 4 * 2, "two displacements, four numbers of touches, two beliefs"
     for level_mm in (1.0, 2.0):
@@ -32,17 +32,16 @@ def test_averaging_makes_misplaced_touches_honest(tmp_path: pathlib.Path) -> Non
         }
         assert nees["averaged"] < 0.7 * nees["as if exact"], "too sure"
     beliefs.expect_charts("misplaced", "sureness")
-    assert (tmp_path / "plots/misplaced_unknown.png").stat().st_size > 10_000
+    assert (beliefs.folder / "plots/misplaced_unknown.png").stat().st_size > 10_000
 
 
-def test_touches_tell_how_far_they_are_misplaced(tmp_path: pathlib.Path) -> None:
-    (record,) = part(tmp_path, "touch-sd", trials=1).document["touch-sd"]
+def test_touches_tell_how_far_they_are_misplaced(beliefs: Program) -> None:
+    (record,) = beliefs.document["touch-sd"]
     assert record["fitted"]["mm"] == pytest.approx(record["true"]["mm"], rel=0.4)
     assert record["gain_nats"] > 50.0, "exact poses explain such touches much worse"
 
 
-def test_none_is_found(tmp_path: pathlib.Path) -> None:
-    beliefs = part(tmp_path, "none", trials=1)
+def test_none_is_found(beliefs: Program) -> None:
     by = {(record["name"], record["touches"]): record for record in beliefs.document["none"]}
     exact = by["exact, ±10 mm", 9]
     assert exact["learned_called_none"]["mean"] == 0.0
@@ -53,8 +52,7 @@ def test_none_is_found(tmp_path: pathlib.Path) -> None:
     beliefs.expect_charts("none")
 
 
-def test_a_belief_that_allows_for_slips_follows(tmp_path: pathlib.Path) -> None:
-    beliefs = part(tmp_path, "slip")
+def test_a_belief_that_allows_for_slips_follows(beliefs: Program) -> None:
     following, plain = beliefs.document["slip"]
     assert following["late_error_mm"]["mean"] < plain["late_error_mm"]["mean"]
     assert following["located"] > 0.8
@@ -62,7 +60,10 @@ def test_a_belief_that_allows_for_slips_follows(tmp_path: pathlib.Path) -> None:
 
 
 def test_planned_touches_tell_more(tmp_path: pathlib.Path) -> None:
-    beliefs = part(tmp_path, "plan")
+    # Takes some six seconds, of which the letters' maps, as of every program, take three.
+    plots = ("--plots", tmp_path / "plots")
+    beliefs = Program(tmp_path, "bench.beliefs", "--quick", "--part", "plan", *plots)
+    assert "none" not in beliefs.document, "a part alone"
     entropy = {
         record["order"]: [point["entropy"]["mean"] for point in record["curve"]]
         for record in beliefs.document["plan"]
@@ -74,8 +75,8 @@ def test_planned_touches_tell_more(tmp_path: pathlib.Path) -> None:
     beliefs.expect_charts("plan")
 
 
-def test_costs_are_counted(tmp_path: pathlib.Path) -> None:
-    costs = Program(tmp_path, "bench.beliefs", "--quick", "--part", "cost").document["cost"]
+def test_costs_are_counted(beliefs: Program) -> None:
+    costs = beliefs.document["cost"]
     value = {(cost["name"], *cost["bins"]): cost["value"] for cost in costs}
     assert 1.0 < value["memory over plain: uncertain", 30, 30, 113] <= 2.0
     assert value["uncertain touch to estimate", 25, 25, 16] > 0.0
@@ -83,12 +84,13 @@ def test_costs_are_counted(tmp_path: pathlib.Path) -> None:
 
 
 def test_unlearned_shapes_fit_worse(tmp_path: pathlib.Path) -> None:
+    # Takes some twelve seconds, most for the maps of an array of 256 elements.
     fits = Program(tmp_path, "bench.fit", "--quick", "--trials", 1).document["fits"]
     assert len(fits) == 10, "two arrays after 1, 3, 5, 9 and 15 touches"
     for fit in fits:
         assert fit["learned"]["fits"]["mean"] == 1.0, fit["name"]
     by = {(fit["name"], fit["touches"]): fit for fit in fits}
-    assert by["6x6 array", 9]["told_apart"]["mean"] > 0.8, "of forty pairs, by maps of 96 touches"
+    assert by["6x6 array", 9]["told_apart"]["mean"] > 0.8, "of forty pairs, by maps of 64 touches"
     assert by["16x16 array", 9]["never learned"]["does not fit"]["mean"] == 1.0
 
 
@@ -101,8 +103,21 @@ def test_finer_steps_err_less(tmp_path: pathlib.Path) -> None:
     )
 
 
-def test_certificates_hold(tmp_path: pathlib.Path) -> None:
-    bounded = Program(tmp_path, "bench.bounded", "--quick")
+@pytest.fixture(scope="module")
+def bounded(tmp_path_factory: pytest.TempPathFactory, device: palpate.Device) -> Program:
+    # Takes some eight seconds of a processor, half of them for the letters' maps.
+    folder, times = tmp_path_factory.mktemp("bounded"), {}
+    for part in ("growth", "search"):
+        file = folder / f"{part}.json"
+        flags = ["--quick", "--part", part, "--json", str(file), "--device", device.name]
+        subprocess.run([os.environ["PALPATE_BENCH"], "bounded", *flags], check=True, timeout=300)
+        times[part] = json.loads(file.read_text())[part]
+    file = folder / "times.json"
+    file.write_text(json.dumps(times))
+    return Program(folder, "bench.bounded", "--quick", "--plots", folder / "plots", "--times", file)
+
+
+def test_certificates_hold(bounded: Program, tmp_path: pathlib.Path) -> None:
     assert len(bounded.document["accuracy"]) == 4, "two lattices after 3 and 9 touches"
     for checks in bounded.document["accuracy"]:
         assert checks["holds"] == checks["same_mode"] == [True] * 5
@@ -113,24 +128,18 @@ def test_certificates_hold(tmp_path: pathlib.Path) -> None:
     assert missing.returncode == 2 and "holds no recording" in missing.stderr
 
 
-def test_times_become_charts(tmp_path: pathlib.Path, device: palpate.Device) -> None:
-    times = {}
-    for part in ("growth", "search"):
-        file = tmp_path / f"{part}.json"
-        flags = ["--quick", "--part", part, "--json", str(file), "--device", device.name]
-        subprocess.run([os.environ["PALPATE_BENCH"], "bounded", *flags], check=True, timeout=300)
-        times[part] = json.loads(file.read_text())[part]
-    file = tmp_path / "times.json"
-    file.write_text(json.dumps(times))
-    drawn = ("--quick", "--plots", tmp_path / "plots", "--times")
-    Program(tmp_path, "bench.bounded", *drawn, file).expect_charts("bounded_growth")
-    assert (tmp_path / "plots/bounded_search.png").stat().st_size > 10_000
-    partial = run("bench.bounded", *drawn, tmp_path / "growth.json")
+def test_times_become_charts(bounded: Program) -> None:
+    plots = bounded.folder / "plots"
+    bounded.expect_charts("bounded_growth")
+    assert (plots / "bounded_search.png").stat().st_size > 10_000
+    drawn = ("--quick", "--plots", plots, "--times", bounded.folder / "growth.json")
+    partial = run("bench.bounded", *drawn)
     assert partial.returncode == 2 and "holds no search" in partial.stderr
 
 
 @pytest.fixture(scope="module")
 def sweep(tmp_path_factory: pytest.TempPathFactory) -> Program:
+    # Takes some 33 seconds of a processor, for every filter, lattices and their limits.
     folder = tmp_path_factory.mktemp("sweep")
     return Program(
         folder, "bench.sweep", "--quick", "--trials", 1, "--html", folder / "page.html",
@@ -175,7 +184,7 @@ def test_a_sweep_is_whole_and_in_order(sweep: Program) -> None:
 
 
 def test_set_ups_are_checked(tmp_path: pathlib.Path) -> None:
-    # Takes some six seconds: a set of three objects is checked four times.
+    # Takes some eleven seconds of a processor: a set of three objects is checked four times.
     document = Program(tmp_path, "bench.check", "--quick", "--trials", 1).document
     (row,) = document["check"]
     assert (row["elements"], row["sets"], row["sound"], row["order"], row["one_angle"]) == (36, 1, 1, 1, 1)
@@ -211,6 +220,7 @@ def test_the_page_needs_no_network(sweep: Program) -> None:
 
 
 def test_regions_hold_the_truth_as_often_as_can_be(tmp_path: pathlib.Path) -> None:
+    # Takes some eight seconds of a processor: the sensor is learned from touches of three letters.
     command = ("--palpate", os.environ["PALPATE_COMMAND"])
     document = Program(tmp_path, "bench.coverage", "--quick", "--trials", 1, *command).document
     rows = {(row["sensor"], row["touches"]): row for row in document["coverage"]}

@@ -126,7 +126,7 @@ def test_the_scale_of_poses_is_what_errors_have() -> None:
 
 
 def test_presses_are_recognised(data: pathlib.Path, tmp_path: pathlib.Path) -> None:
-    # Takes longer than most: a sensor is learned without each of the two people.
+    # Takes some 26 seconds of a processor: a sensor is learned without each of the two people.
     plots = tmp_path / "plots"
     program = Program(tmp_path, "bench.capcontact", "--quick", "--data", data, "--plots", plots)
     eq7, learned = (program.document[name]["windows"] for name in ("eq7", "learned"))
@@ -177,6 +177,7 @@ def test_objects_pressed_anywhere_are_recognised(tmp_path: pathlib.Path) -> None
         palpate.simulate(
             letter, palpate.random_poses(8, seed), elements_mm=palpate.grid_array(12, 12, 2.5), seed=seed
         ).save(tmp_path / f"{letter}.h5")
+    # Takes some six seconds of a processor, to learn a sensor from presses at unknown poses.
     command = ("--palpate", os.environ["PALPATE_COMMAND"])
     document = Program(tmp_path, "bench.presses", "--quick", "--data", tmp_path, *command).document
     for sensor in ("eq7", "learned"):

@@ -16,13 +16,20 @@ namespace palpate::defaults_test {
 using nlohmann::json;
 using Arguments = std::vector<std::string>;
 
+/// Of the maps, twice the usual one: automatic bins, as wide as the cells ask for, are then few.
+constexpr double cell_mm = 1.0;
+
 class Defaults : public ProgramTest {
  protected:
   Defaults() {
     std::filesystem::create_directory(folder_ / "maps");
-    write_map(folder_ / "maps/A.map.h5", sample_map("A"));
-    write_map(folder_ / "maps/I.map.h5", sample_map("I"));
+    write_maps(cell_mm);
     write_recording(folder_ / "u.h5", unknown_);
+  }
+
+  void write_maps(double of_mm) const {
+    write_map(folder_ / "maps/A.map.h5", sample_map("A", of_mm));
+    write_map(folder_ / "maps/I.map.h5", sample_map("I", of_mm));
   }
 
   Arguments with(const std::string& recording, const Arguments& flags) const {
@@ -54,7 +61,8 @@ void expect_same(const json& a, const json& b) {
 TEST_F(Defaults, FollowTheMapsTheArrayAndTheFirstTouch) {
   const PoseLattice lattice = posterior_of("u.h5");
   EXPECT_EQ(lattice.pivot_mm, unknown_.T_robot_sensor.front().translation_mm);
-  const std::vector<Hypothesis> hypotheses{{.map = sample_map("A")}, {.map = sample_map("I")}};
+  const std::vector<Hypothesis> hypotheses{{.map = sample_map("A", cell_mm)},
+                                           {.map = sample_map("I", cell_mm)}};
   const PoseLattice wanted =
       balanced_lattice(touch_region(hypotheses, array_reach_mm(digitacts_array())).lattice,
                        hypotheses)
@@ -155,6 +163,7 @@ TEST_F(Defaults, FineBinsAreHalfAsWide) {
               u({"--touches", "3", "--bins", "fine"}));
 }
 
+// Some nine seconds of a processor, for twenty runs on lattices of all kinds.
 TEST_F(Defaults, GiveWayTogetherToAnyPartOfALattice) {
   const auto old = [](Arguments flags) {
     const auto add = [&](const char* flag, const char* value) {
@@ -236,6 +245,7 @@ TEST_F(Defaults, LiveAndRecognizeGiveTheSameNumbers) {
 }
 
 TEST_F(Defaults, KeepToTheMemoryThatIsGiven) {
+  write_maps(0.5);
   // 8 MiB are for copies; three eighths of the rest hold 4e5 bins of 8 bytes, a quarter of the
   // default's.
   const Outcome outcome =
@@ -246,7 +256,7 @@ TEST_F(Defaults, KeepToTheMemoryThatIsGiven) {
 
 TEST_F(Defaults, TellOfObjectsFarApartInTheirFrames) {
   EXPECT_EQ(palpate({"recognize", "u.h5", "--maps", "maps", "--json", "r.json"}).err, "");
-  OccupancyGrid far = sample_map("I");
+  OccupancyGrid far = sample_map("I", cell_mm);
   far.origin_mm.x += 60.0;
   write_map(folder_ / "maps/I.map.h5", far);
   const Arguments call{"recognize", "u.h5", "--maps", "maps", "--json", "r.json"};

@@ -11,6 +11,7 @@ namespace palpate::map_sensor_test {
 using nlohmann::json;
 using Arguments = std::vector<std::string>;
 
+/// Every test learns a sensor, twice at most: some three seconds of a processor each time.
 class MapSensor : public ProgramTest {
  protected:
   MapSensor() {

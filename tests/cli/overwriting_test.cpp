@@ -95,6 +95,8 @@ TEST_F(Overwriting, MapWritesEveryFileOnce) {
   expect_refused({"map", "A.h5", "-o", "a.png", "--png", "b.png"}, {"--png b.png", "-o writes"});
 }
 
+// Some eight seconds of a processor, for fifty refusals: a start of the program takes a sixth of
+// one.
 TEST_F(Overwriting, RecognizeKeepsAllThatItReads) {
   for (const char* flag : {"--json", "--posterior"}) {
     expect_kept("u.h5", flag, "RECORDING", {"recognize", "u.h5", "--maps", "maps"});
@@ -170,6 +172,7 @@ TEST_F(Overwriting, TouchesKeepsTheFrames) {
   expect_kept("cc.h5", "-o", "FRAMES", {"touches", "cc.h5"});
 }
 
+// Some six seconds of a processor, for thirty refusals.
 TEST_F(Overwriting, LiveKeepsAllThatItReads) {
   done({"record", "--sensor", presses, "-o", "cc,1.h5"});
   const Arguments maps{"live", "--sensor", "replay:cc,1.h5,speed=max", "--maps", "maps"};

@@ -1,5 +1,7 @@
 #include "sample_files.hpp"
 
+#include <cmath>
+
 #include "palpate/simulation.hpp"
 
 namespace palpate {
@@ -18,13 +20,14 @@ Recording touch(const std::string& letter, const Pose& T_object_robot, int touch
 
 }  // namespace
 
-OccupancyGrid sample_map(const std::string& letter) {
+OccupancyGrid sample_map(const std::string& letter, double cell_mm) {
   const Shape shape = make_shape(letter);
   OccupancyGrid map;
   map.label = letter;
+  map.cell_mm = cell_mm;
   map.origin_mm = {-16.0, -16.0};
-  map.nx = 65;
-  map.ny = 65;
+  map.nx = 1 + static_cast<int>(std::lround(32.0 / cell_mm));
+  map.ny = map.nx;
   for (int j = 0; j < map.ny; ++j) {
     for (int i = 0; i < map.nx; ++i) {
       map.log_odds.push_back(shape.contains(map.centre_mm(i, j)) ? 4.0F : -4.0F);
