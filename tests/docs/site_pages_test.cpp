@@ -101,8 +101,8 @@ TEST_F(SitePages, HowSureTellsTheStranger) {
   expect_named(said, {"% of the belief unproven"});  // the budget of 1 ms
 }
 
-// Some 40 seconds of a processor, a third of them for the fit, which recognises twelve unknowns again
-// for every displacement that it tries.
+// Some 40 seconds of a processor, a third of them for the fit, which recognises twelve unknowns
+// again for every displacement that it tries.
 TEST_F(SitePages, MisplacedTouchesAreNoticedMeasuredAndAveraged) {
   const auto [said, complained] = run("misplaced.md");
   expect_quoted("misplaced.md", said + complained,
