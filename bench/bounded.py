@@ -33,7 +33,7 @@ from palpate._tables import (
 from .certificates import check_certificate, dense_posterior
 from .measures import share_record, with_interval
 from .program import Json, begin, main, parser, write
-from .trials import TABLE_1, VOWELS, Bins, lattice_of, letter_maps, make_trials
+from .trials import TABLE_1, VOWELS, Bins, Floats, lattice_of, letter_maps, make_trials
 
 SEED = 1_404_000_000
 _MASS, _PERCENT = number(".1e"), with_interval(".1f", 100.0)
@@ -122,11 +122,16 @@ def read_presses(folder: str) -> list[palpate.Recording]:
     return recordings
 
 
+def pitch_of(elements_mm: Floats) -> float:
+    """Distance in mm from the first element [e, 2] to its nearest neighbour."""
+    return float(numpy.hypot(*(elements_mm[1:] - elements_mm[0]).T).min())
+
+
 def measure_presses(device: palpate.Device, folder: str, quick: bool) -> Json:
     """Everyday objects from one press each, in a folder of recordings."""
     recordings = read_presses(folder)
     elements_mm = recordings[0].elements_mm
-    pitch_mm = float(numpy.hypot(*(elements_mm[1:] - elements_mm[0]).T).min())
+    pitch_mm = pitch_of(elements_mm)
     builder = palpate.MapBuilder(
         device,
         cell_mm=0.5 * pitch_mm,

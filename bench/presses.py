@@ -10,7 +10,7 @@ import numpy
 import palpate
 from palpate._tables import Column, number, plain, print_table
 
-from .bounded import CLASSIFIER, read_presses
+from .bounded import CLASSIFIER, pitch_of, read_presses
 from .defaults import told
 from .measures import share_record, with_interval
 from .program import Json, begin, main, parser, write
@@ -97,8 +97,7 @@ def program() -> None:
                 ).save(files[-1])
         sensor, result = str(folder / "sensor.yaml"), folder / "records.json"
         told(options.palpate, "calibrate", *learned, "--unposed", "-o", sensor)
-        columns = numpy.unique(recordings[0].elements_mm[:, 0])
-        widest = (REACH + 0.5) * float(numpy.diff(columns).min())
+        widest = (REACH + 0.5) * pitch_of(recordings[0].elements_mm)
         region = [f"--{axis}-mm={-widest}:{widest}" for axis in "xy"]
         bins = ["--filter", "histogram", "--bins", f"{TURNS}x{2 * REACH + 1}x{2 * REACH + 1}"]
         raw = recordings[0].pressure_unit == "raw"
