@@ -199,7 +199,7 @@ void add_touch_sd(Device& device, const CalibrationTask& task, SensorCalibration
                                : task.presses;
   std::vector<TouchedObject> unknowns = unknowns_of(presses);
   const std::vector<Press> others = presses_without(0, presses, touch_sd_folds);
-  for (TrainingMap& map : maps_of_objects(others, calibration.maps)) {
+  for (TrainingMap& map : maps_by_folds(others, calibration.maps, 1).of_objects) {
     hypotheses.push_back({.map = std::move(map.map)});
   }
   std::erase_if(unknowns, [&](const TouchedObject& unknown) {

@@ -40,7 +40,8 @@ struct ModelLearning {
 struct LearnedPresses {
   std::vector<Press> presses;
   LearnedReadings readings;
-  std::vector<TrainingMap> maps;  ///< to learn a table on
+  std::vector<TrainingMap> maps;             ///< to learn a table on
+  std::vector<TrainingMap> of_objects = {};  ///< of presses at known poses, of all of an object
 };
 
 /// The presses with maps to learn a table on: the given ones, or maps of the presses. Takes all

@@ -16,7 +16,7 @@ FoldModel eq7_model(const LearnedPresses& learned, const ModelLearning& how) {
   model.how.contact.classifier = learned.readings.maps().classifier;
   if (how.bins && how.given.empty()) {
     // Touches at known poses are tried on maps of all others, as unknowns will be.
-    model.maps = maps_of_objects(learned.presses, learned.readings.maps());
+    model.maps = learned.of_objects;
   }
   if (!how.bins) {
     model.features = learn_features(learned.presses, learned.readings.classifier);
@@ -31,8 +31,13 @@ LearnedPresses with_maps(std::vector<Press> presses, LearnedReadings readings,
   LearnedPresses learned{std::move(presses), std::move(readings), how.given};
   if (how.given.empty()) {
     const MapOptions maps = learned.readings.maps();
-    learned.maps = how.bins ? maps_without_folds(learned.presses, maps, how.folds)
-                            : maps_of_presses(learned.presses, maps);
+    if (how.bins) {
+      MapsByFolds built = maps_by_folds(learned.presses, maps, how.folds);
+      learned.maps = std::move(built.without_folds);
+      learned.of_objects = std::move(built.of_objects);
+    } else {
+      learned.maps = maps_of_presses(learned.presses, maps);
+    }
   }
   return learned;
 }

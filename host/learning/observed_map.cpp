@@ -6,6 +6,7 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
 
 #include "io/element_spacing.hpp"
 #include "model/bounding_box.hpp"
@@ -26,6 +27,19 @@ struct KnownTouch {
   std::vector<ElementReading> known;
 };
 
+/// Where touches' known elements lie, and how many there are.
+struct Extent {
+  BoundingBox box;
+  std::size_t readings = 0;
+
+  void take_in(const KnownTouch& of) {
+    for (const ElementReading& reading : of.known) {
+      box.take_in(reading.position_mm);
+    }
+    readings += of.known.size();
+  }
+};
+
 /// The sums over touches of all layers of a map.
 class Layers {
  public:
@@ -33,7 +47,7 @@ class Layers {
       : cells_(cells),
         cell_mm_(options.cell_mm),
         sensor_(options.sensor),
-        log_odds_(count(cells), log_odds_from_probability(sensor_.prior)),
+        log_odds_(count(cells), 0.0),
         observations_(count(cells), 0.0),
         level_(count(cells), 0.0) {}
 
@@ -93,13 +107,26 @@ class Layers {
     }
   }
 
-  /// The map's cells, in float32.
-  void store(OccupancyGrid& map) const {
+  Layers& operator+=(const Layers& other) {
     for (std::size_t cell = 0; cell < count(cells_); ++cell) {
-      const double touches = observations_[cell];
-      map.log_odds.push_back(static_cast<float>(log_odds_[cell]));
-      map.observations.push_back(static_cast<float>(touches));
-      map.mean_level.push_back(static_cast<float>(touches > 0.0 ? level_[cell] / touches : 0.0));
+      log_odds_[cell] += other.log_odds_[cell];
+      observations_[cell] += other.observations_[cell];
+      level_[cell] += other.level_[cell];
+    }
+    return *this;
+  }
+
+  /// The layers of some of the cells, in float32.
+  void store(const CellRange& cells, OccupancyGrid& map) const {
+    const double prior = log_odds_from_probability(sensor_.prior);
+    for (std::int64_t j = cells.y; j < cells.y + cells.ny; ++j) {
+      for (std::int64_t i = cells.x; i < cells.x + cells.nx; ++i) {
+        const std::size_t cell = cells_.index(i, j);
+        const double touches = observations_[cell];
+        map.log_odds.push_back(static_cast<float>(prior + log_odds_[cell]));
+        map.observations.push_back(static_cast<float>(touches));
+        map.mean_level.push_back(static_cast<float>(touches > 0.0 ? level_[cell] / touches : 0.0));
+      }
     }
   }
 
@@ -112,44 +139,81 @@ class Layers {
   std::vector<double> level_;  ///< sum over the touches that sensed the cell
 };
 
-}  // namespace
-
-OccupancyGrid observed_map(std::span<const Touch> touches, const MapOptions& options,
-                           const std::string& label) {
-  options.validate();
-  std::vector<KnownTouch> all;
-  std::size_t readings = 0;
-  BoundingBox box;
-  for (std::size_t i = 0; i < touches.size(); ++i) {
-    all.push_back({&touches[i], known_readings(touches[i], options.classifier)});
-    if (const auto fault = fault_of(all.back().known)) {
-      throw Error(Fault::input, fmt::format("touch {}: {}", i, *fault));
-    }
-    for (const ElementReading& reading : all.back().known) {
-      box.take_in(reading.position_mm);
-      ++readings;
-    }
-  }
-  if (readings == 0) {
+/// The map of the touches in some layers.
+/// @param of the touches
+OccupancyGrid map_of(const Layers& layers, const Extent& of, double radius_mm,
+                     const MapOptions& options, const std::string& label) {
+  if (of.readings == 0) {
     throw Error(Fault::input,
                 fmt::format("object '{}': no element of any touch is In Contact or No "
                             "Contact; check the threshold and the pressure's unit",
                             label));
   }
-  // The radius of MapBuilder, so that both make maps of the same cells.
-  const double radius_mm = support_radius_mm(options.sensor, readings);
-  const CellRange cells = cover(box.lower, box.upper, radius_mm, options.cell_mm);
-  Layers layers(cells, options);
-  for (const KnownTouch& touch : all) {
-    layers.add_evidence(touch, radius_mm);
-    layers.add_observation(touch);
-  }
+  const CellRange cells = cover(of.box.lower, of.box.upper, radius_mm, options.cell_mm);
   OccupancyGrid map = map_frame(options, label, cells);
-  layers.store(map);
+  layers.store(cells, map);
   if (const auto fault = fault_of(map)) {
     throw Error(Fault::input, fmt::format("map '{}': {}", label, *fault));
   }
   return map;
+}
+
+}  // namespace
+
+ObservedMaps observed_maps(std::span<const Touch> touches, std::span<const std::size_t> part,
+                           const MapOptions& options, const std::string& label) {
+  options.validate();
+  const std::size_t parts = part.empty() ? 1 : *std::ranges::max_element(part) + 1;
+  std::vector<std::vector<KnownTouch>> of_part(parts);
+  std::vector<Extent> without(parts);
+  Extent all;
+  for (std::size_t i = 0; i < touches.size(); ++i) {
+    const KnownTouch touch{&touches[i], known_readings(touches[i], options.classifier)};
+    if (const auto fault = fault_of(touch.known)) {
+      throw Error(Fault::input, fmt::format("touch {}: {}", i, *fault));
+    }
+    all.take_in(touch);
+    for (std::size_t other = 0; other < parts; ++other) {
+      if (other != part[i]) {
+        without[other].take_in(touch);
+      }
+    }
+    of_part[part[i]].push_back(touch);
+  }
+  // The radius of MapBuilder, so that both make maps of the same cells.
+  const double radius_mm = support_radius_mm(options.sensor, all.readings);
+  const CellRange cells = all.readings == 0
+                              ? CellRange{}
+                              : cover(all.box.lower, all.box.upper, radius_mm, options.cell_mm);
+  std::vector<Layers> layers(parts, Layers(cells, options));
+  tbb::parallel_for(std::size_t{0}, parts, [&](std::size_t own) {
+    for (const KnownTouch& touch : of_part[own]) {
+      layers[own].add_evidence(touch, radius_mm);
+      layers[own].add_observation(touch);
+    }
+  });
+  ObservedMaps maps;
+  Layers sum(cells, options);
+  for (std::size_t own = 0; own < parts; ++own) {
+    sum += layers[own];
+    Layers others(cells, options);
+    for (std::size_t other = 0; other < parts; ++other) {
+      if (other != own) {
+        others += layers[other];
+      }
+    }
+    const bool only = of_part[own].size() == touches.size();
+    maps.without.push_back(only ? OccupancyGrid{}
+                                : map_of(others, without[own], radius_mm, options, label));
+  }
+  maps.all = map_of(sum, all, radius_mm, options, label);
+  return maps;
+}
+
+OccupancyGrid observed_map(std::span<const Touch> touches, const MapOptions& options,
+                           const std::string& label) {
+  const std::vector<std::size_t> together(touches.size(), 0);
+  return observed_maps(touches, together, options, label).all;
 }
 
 }  // namespace palpate

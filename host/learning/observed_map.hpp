@@ -1,7 +1,9 @@
 #pragma once
 
+#include <cstddef>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "palpate/map_builder.hpp"
 #include "palpate/occupancy_grid.hpp"
@@ -21,5 +23,18 @@ namespace palpate {
 /// @throws Error as MapBuilder does
 OccupancyGrid observed_map(std::span<const Touch> touches, const MapOptions& options,
                            const std::string& label);
+
+/// Maps of touches that are divided into parts.
+struct ObservedMaps {
+  OccupancyGrid all;
+  /// [part] the map of the touches of all other parts; without cells where there are none
+  std::vector<OccupancyGrid> without;
+};
+/// observed_map() of all touches and without each part, in hardly more time than of all. Gaussians
+/// are cut off where they are for all touches. Takes all host threads.
+/// @param part of every touch, counted from 0
+/// @throws Error as observed_map() for any of the maps
+ObservedMaps observed_maps(std::span<const Touch> touches, std::span<const std::size_t> part,
+                           const MapOptions& options, const std::string& label);
 
 }  // namespace palpate

@@ -9,7 +9,9 @@
 #include <tbb/parallel_for.h>
 #include <glm/mat2x2.hpp>
 
+#include "learning/plane_sums.hpp"
 #include "model/bounding_box.hpp"
+#include "model/contact_readings.hpp"
 #include "model/interpolated_map.hpp"
 #include "palpate/error.hpp"
 
@@ -20,6 +22,12 @@ namespace {
 /// Bins that are evaluated at the elements' own places.
 constexpr std::size_t evaluated_bins = 8;
 
+/// The contact model with a table.
+ContactModel sound(const ContactModel& contact) {
+  contact.validate();
+  return tabulated(contact);
+}
+
 glm::dmat2 rotation(double theta_rad) {
   const glm::dvec2 along = rotate(theta_rad, {1.0, 0.0});
   return {along, {-along.y, along.x}};
@@ -28,14 +36,17 @@ glm::dmat2 rotation(double theta_rad) {
 }  // namespace
 
 int PressPlacer::Samples::nearest(double mm) const {
-  return static_cast<int>(std::lround((mm - first_mm) / step_mm));
+  return static_cast<int>((mm - first_mm) / step_mm + 0.5);  // they begin below all elements
 }
 
 PressPlacer::PressPlacer(const Hypothesis& hypothesis, const ContactModel& contact,
                          const PoseLattice& lattice)
-    : layer_(hypothesis.compared()), contact_(contact), lattice_(lattice) {
+    : layer_(hypothesis.compared()),
+      contact_(sound(contact)),
+      map_(layer_, contact.table ? layer_.prior : contact.prior.value()),
+      likelihood_(map_, contact_, 0),
+      lattice_(lattice) {
   lattice_.collapse_fixed().validate();
-  contact_.validate();
   if (const auto fault = fault_of(layer_)) {
     throw Error(Fault::input, fmt::format("map '{}': {}", layer_.label, *fault));
   }
@@ -50,23 +61,20 @@ std::vector<float> PressPlacer::log_likelihoods(std::span<const TouchEvidence> p
   cover(reach_mm);
   sum_rest(elements);
 
-  const auto plane = static_cast<std::size_t>(lattice_.plane());
   std::vector<float> bins = rest_;
   tbb::parallel_for(0, lattice_.theta_rad.count, [&](int theta) {
-    std::vector<float> of_theta(plane, 0.0F);
-    std::vector<float> unknown(plane, 0.0F);
+    std::vector<const float*> samples;
     const glm::dmat2 turn = rotation(lattice_.theta_rad.centre(theta));
     for (const Element& element : elements) {
-      if (is_contact(element.reading)) {
-        const auto level = static_cast<std::size_t>(element.reading) - 1;
-        add(of_theta, turn * element.from_pivot_mm, contact_excess_[level]);
-      } else if (element.reading == Reading::unknown) {
-        add(unknown, turn * element.from_pivot_mm, no_contact_);
+      if (element.reading != Reading::no_contact) {
+        const std::vector<float>& excess =
+            is_contact(element.reading)
+                ? contact_excess_[static_cast<std::size_t>(element.reading) - 1]
+                : unknown_excess_;
+        samples.push_back(excess.data() + first_sample(turn * element.from_pivot_mm));
       }
     }
-    for (std::size_t i = 0; i < plane; ++i) {
-      bins[static_cast<std::size_t>(theta) * plane + i] += of_theta[i] - unknown[i];
-    }
+    add(samples, bins.data() + lattice_.plane() * theta);
   });
   return bins;
 }
@@ -87,8 +95,10 @@ PressPlacement PressPlacer::place(std::span<const TouchEvidence> press) {
   }
   const auto best = std::ranges::max_element(evaluated);
   double sum = 0.0;
+  constexpr double negligible = -50.0;  // e^-50: a billion such bins are 2e-13 of the sum
   for (std::size_t i = 0; i < order.size(); ++i) {
-    sum += std::exp((i < best_count ? evaluated[i] : double{bins[order[i]]}) - *best);
+    const double nats = (i < best_count ? evaluated[i] : double{bins[order[i]]}) - *best;
+    sum += nats > negligible ? std::exp(nats) : 0.0;
   }
   return {.T_object_robot =
               lattice_.T_object_robot(order[static_cast<std::size_t>(best - evaluated.begin())]),
@@ -133,20 +143,21 @@ void PressPlacer::cover(double reach_mm) {
                             "its touches near the pivot, or use larger cells",
                             reach_mm, count));
   }
-  const InterpolatedMap map(layer_, contact_.table ? layer_.prior : contact_.prior.value());
-  const std::size_t contacts = contact_.table ? contact_.table->levels() - 1 : 1;
-  no_contact_.assign(static_cast<std::size_t>(count), 0.0F);
+  const std::size_t contacts = contact_.table->levels() - 1;
+  no_contact_.assign(static_cast<std::size_t>(count) + sum_lanes, 0.0F);
+  unknown_excess_ = no_contact_;
   contact_excess_.assign(contacts, no_contact_);
   std::size_t at = 0;
   for (int y_phase = 0; y_phase < y_.per_step; ++y_phase) {
     for (int x_phase = 0; x_phase < x_.per_step; ++x_phase) {
       for (int row = 0; row < y_.columns; ++row) {
         for (int column = 0; column < x_.columns; ++column, ++at) {
-          const MapSample sample{
-              .log_odds = map.log_odds({x_.first_mm + x_.step_mm * (column * x_.per_step + x_phase),
-                                        y_.first_mm + y_.step_mm * (row * y_.per_step + y_phase)})};
+          const MapSample sample{.log_odds = map_.log_odds(
+                                     {x_.first_mm + x_.step_mm * (column * x_.per_step + x_phase),
+                                      y_.first_mm + y_.step_mm * (row * y_.per_step + y_phase)})};
           const double none = contact_.log_likelihood(Reading::no_contact, sample);
           no_contact_[at] = static_cast<float>(none);
+          unknown_excess_[at] = -no_contact_[at];
           for (std::size_t level = 0; level < contacts; ++level) {
             contact_excess_[level][at] =
                 static_cast<float>(contact_.log_likelihood(contact_level(level), sample) - none);
@@ -165,49 +176,44 @@ void PressPlacer::sum_rest(const std::vector<Element>& elements) {
   for (const Element& element : elements) {
     resting_.push_back(element.from_pivot_mm);
   }
-  const auto plane = static_cast<std::size_t>(lattice_.plane());
   rest_.assign(static_cast<std::size_t>(lattice_.bins()), 0.0F);
   tbb::parallel_for(0, lattice_.theta_rad.count, [&](int theta) {
-    std::vector<float> of_theta(plane, 0.0F);
+    std::vector<const float*> samples;
     const glm::dmat2 turn = rotation(lattice_.theta_rad.centre(theta));
     for (const glm::dvec2& place : resting_) {
-      add(of_theta, turn * place, no_contact_);
+      samples.push_back(no_contact_.data() + first_sample(turn * place));
     }
-    std::ranges::copy(of_theta, rest_.begin() + static_cast<std::ptrdiff_t>(plane) * theta);
+    add(samples, rest_.data() + lattice_.plane() * theta);
   });
 }
 
-void PressPlacer::add(std::vector<float>& bins, const glm::dvec2& turned,
-                      const std::vector<float>& table) const {
+std::size_t PressPlacer::first_sample(const glm::dvec2& turned) const {
   const int u = x_.nearest(lattice_.x_mm.centre(0) + turned.x);
   const int v = y_.nearest(lattice_.y_mm.centre(0) + turned.y);
-  const auto width = static_cast<std::size_t>(x_.columns);
-  const std::size_t phase =
-      static_cast<std::size_t>(v % y_.per_step) * static_cast<std::size_t>(x_.per_step) +
-      static_cast<std::size_t>(u % x_.per_step);
-  const float* row = table.data() + phase * width * static_cast<std::size_t>(y_.columns) +
-                     static_cast<std::size_t>(v / y_.per_step) * width +
-                     static_cast<std::size_t>(u / x_.per_step);
-  float* bin = bins.data();
-  const int nx = lattice_.x_mm.count;
-  for (int j = 0; j < lattice_.y_mm.count; ++j, row += width, bin += nx) {
-    for (int i = 0; i < nx; ++i) {
-      bin[i] += row[i];
+  const int phase = v % y_.per_step * x_.per_step + u % x_.per_step;
+  const int row = phase * y_.columns + v / y_.per_step;
+  return static_cast<std::size_t>(row) * static_cast<std::size_t>(x_.columns) +
+         static_cast<std::size_t>(u / x_.per_step);
+}
+
+void PressPlacer::add(std::span<const float* const> elements, float* bins) const {
+  const auto nx = static_cast<std::size_t>(lattice_.x_mm.count);
+  const auto ny = static_cast<std::size_t>(lattice_.y_mm.count);
+  const std::size_t columns = (nx + sum_lanes - 1) / sum_lanes * sum_lanes;
+  std::vector<float> sums(ny * columns);
+  sum_planes(elements, static_cast<std::size_t>(x_.columns), ny, columns, sums.data());
+  for (std::size_t j = 0; j < ny; ++j) {
+    for (std::size_t i = 0; i < nx; ++i) {
+      bins[j * nx + i] += sums[j * columns + i];
     }
   }
 }
 
 double PressPlacer::log_likelihood(std::span<const TouchEvidence> press,
                                    const Pose& T_object_robot) const {
-  const InterpolatedMap map(layer_, contact_.table ? layer_.prior : contact_.prior.value());
-  const glm::dmat2 turn = rotation(T_object_robot.theta_rad);
-  const glm::dvec2 pivot_mm = T_object_robot * lattice_.pivot_mm;
   double sum = 0.0;
-  for (const Element& element : elements_of(press)) {
-    if (element.reading != Reading::unknown) {
-      const glm::dvec2 place = pivot_mm + turn * element.from_pivot_mm;
-      sum += contact_.log_likelihood(element.reading, {.log_odds = map.log_odds(place)});
-    }
+  for (const TouchEvidence& touch : press) {
+    sum += likelihood_.at(touch, T_object_robot * touch.T_robot_sensor);
   }
   return sum;
 }

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "learning/training_maps.hpp"
+#include "model/evidence_likelihood.hpp"
 #include "model/touch_evidence.hpp"
 #include "palpate/contact_model.hpp"
 #include "palpate/estimate.hpp"
@@ -26,8 +27,8 @@ struct PressPlacement {
 /// steps, so that an element adds rows of the table to rows of bins. An element takes the nearest
 /// sample, at most half a cell of the map away along each axis; the best bins by these sums are
 /// then evaluated at the elements' own places. No Contact everywhere is summed once for all presses
-/// of one array at one place. Takes all host threads; not thread-safe, but several placers may work
-/// side by side.
+/// of one array at one place. Eq. 7 is read from a table, see tabulated(). Takes all host threads;
+/// not thread-safe, but several placers may work side by side.
 class PressPlacer {
  public:
   /// @param hypothesis with a layer where the contact model has a table over one; its weight is
@@ -65,21 +66,26 @@ class PressPlacer {
   std::vector<Element> elements_of(std::span<const TouchEvidence> press) const;
   void cover(double reach_mm);
   void sum_rest(const std::vector<Element>& elements);
-  /// Adds a table to the bins of one theta, at an element's places.
+  /// Where an element's samples begin for one theta, in a table.
   /// @param turned the element relative to the pivot, in mm along the object frame's axes
-  void add(std::vector<float>& bins, const glm::dvec2& turned,
-           const std::vector<float>& table) const;
+  std::size_t first_sample(const glm::dvec2& turned) const;
+  /// Adds up elements' samples at the bins of one theta, to the bins given.
+  void add(std::span<const float* const> elements, float* bins) const;
 
   const OccupancyGrid& layer_;
-  ContactModel contact_;
+  ContactModel contact_;  ///< with a table
+  InterpolatedMap map_;
+  EvidenceLikelihood likelihood_;
   PoseLattice lattice_;
   double reach_mm_ = -1.0;  ///< the tables cover elements so far from the pivot
   Samples x_;
   Samples y_;
-  /// [y phase, x phase, row, column] in nats: the log-likelihood of No Contact, and by how much
-  /// that of each level of contact exceeds it.
+  /// [y phase, x phase, row, column] in nats, and some more to read past the end: the
+  /// log-likelihood of No Contact, by how much that of each level of contact exceeds it, and that
+  /// of Unknown.
   std::vector<float> no_contact_;
   std::vector<std::vector<float>> contact_excess_;
+  std::vector<float> unknown_excess_;
   std::vector<glm::dvec2> resting_;  ///< elements of rest_, relative to the pivot
   std::vector<float> rest_;          ///< log-likelihood of No Contact everywhere, [theta, y, x]
 };

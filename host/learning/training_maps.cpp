@@ -1,8 +1,8 @@
 #include "learning/training_maps.hpp"
 
+#include <algorithm>
+#include <iterator>
 #include <map>
-#include <set>
-#include <span>
 #include <string>
 #include <utility>
 
@@ -16,11 +16,11 @@ namespace palpate {
 
 namespace {
 
-/// observed_map(), whose errors name whose map it would have been.
-OccupancyGrid named_map(std::span<const Touch> touches, const MapOptions& options,
-                        const std::string& label, const std::string& name) {
+/// What `build` returns; its errors name whose map it would have been.
+template <typename Build>
+auto named(const std::string& name, const Build& build) {
   try {
-    return observed_map(touches, options, label);
+    return build();
   } catch (const Error& error) {
     throw Error(error.fault(), fmt::format("{}: {}", name, error.what()));
   }
@@ -39,21 +39,6 @@ std::vector<TrainingMap> objects_of(const std::vector<Press>& presses) {
   return objects;
 }
 
-/// Builds each map of its presses, which are at known poses.
-void build(std::vector<TrainingMap>& maps, const std::vector<Press>& presses,
-           const MapOptions& options) {
-  tbb::parallel_for(std::size_t{0}, maps.size(), [&](std::size_t i) {
-    std::vector<Touch> touches;
-    for (const std::size_t press : maps[i].presses) {
-      touches.push_back(presses[press].touches.front());
-      touches.back().T_robot_sensor =
-          *presses[press].T_object_robot * touches.back().T_robot_sensor;
-    }
-    const std::string label = maps[i].map.label;
-    maps[i].map = named_map(touches, options, label, label);
-  });
-}
-
 }  // namespace
 
 std::vector<TrainingMap> maps_of_presses(const std::vector<Press>& presses,
@@ -61,36 +46,41 @@ std::vector<TrainingMap> maps_of_presses(const std::vector<Press>& presses,
   std::vector<TrainingMap> maps(presses.size());
   tbb::parallel_for(std::size_t{0}, presses.size(), [&](std::size_t i) {
     const Press& press = presses[i];
-    maps[i] = {named_map(press.touches, options, press.label, press.name), {i}};
+    maps[i] = {named(press.name, [&] { return observed_map(press.touches, options, press.label); }),
+               {i}};
   });
   return maps;
 }
 
-std::vector<TrainingMap> maps_without_folds(const std::vector<Press>& presses,
-                                            const MapOptions& options, std::size_t folds) {
+MapsByFolds maps_by_folds(const std::vector<Press>& presses, const MapOptions& options,
+                          std::size_t folds) {
   const std::vector<std::size_t> fold = folds_of(presses, folds);
-  std::vector<TrainingMap> maps;
-  for (const TrainingMap& all : objects_of(presses)) {
-    std::set<std::size_t> own;
-    for (const std::size_t press : all.presses) {
-      own.insert(fold[press]);
+  MapsByFolds maps{.of_objects = objects_of(presses), .without_folds = {}};
+  std::vector<std::vector<TrainingMap>> without(maps.of_objects.size());
+  tbb::parallel_for(std::size_t{0}, maps.of_objects.size(), [&](std::size_t object) {
+    TrainingMap& whole = maps.of_objects[object];
+    std::vector<Touch> touches;
+    std::vector<std::size_t> part;
+    for (const std::size_t press : whole.presses) {
+      touches.push_back(presses[press].touches.front());
+      touches.back().T_robot_sensor =
+          *presses[press].T_object_robot * touches.back().T_robot_sensor;
+      part.push_back(fold[press]);
     }
-    for (const std::size_t without : own) {
-      TrainingMap map = all;
-      std::erase_if(map.presses, [&](std::size_t press) { return fold[press] == without; });
-      if (!map.presses.empty()) {
-        maps.push_back(std::move(map));
+    ObservedMaps built = named(
+        whole.map.label, [&] { return observed_maps(touches, part, options, whole.map.label); });
+    whole.map = std::move(built.all);
+    for (std::size_t own = 0; own < built.without.size(); ++own) {
+      if (std::ranges::find(part, own) != part.end() && !built.without[own].log_odds.empty()) {
+        TrainingMap& map =
+            without[object].emplace_back(TrainingMap{std::move(built.without[own]), whole.presses});
+        std::erase_if(map.presses, [&](std::size_t press) { return fold[press] == own; });
       }
     }
+  });
+  for (std::vector<TrainingMap>& own : without) {
+    std::ranges::move(own, std::back_inserter(maps.without_folds));
   }
-  build(maps, presses, options);
-  return maps;
-}
-
-std::vector<TrainingMap> maps_of_objects(const std::vector<Press>& presses,
-                                         const MapOptions& options) {
-  std::vector<TrainingMap> maps = objects_of(presses);
-  build(maps, presses, options);
   return maps;
 }
 

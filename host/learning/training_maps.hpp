@@ -24,17 +24,16 @@ struct TrainingMap {
 std::vector<TrainingMap> maps_of_presses(const std::vector<Press>& presses,
                                          const MapOptions& options);
 
-/// For every object and every fold, see folds_of(), the map of the object's presses of the other
-/// folds, in the object frame. Takes all host threads.
+/// Maps of presses at known poses, in the object frame.
+struct MapsByFolds {
+  std::vector<TrainingMap> of_objects;  ///< of all presses of every object
+  /// For every object and every fold, see folds_of(), of the object's presses of the other folds.
+  std::vector<TrainingMap> without_folds;
+};
+/// Takes all host threads.
 /// @param presses at known poses, of one touch each
 /// @throws Error, naming the object, as observed_map() does
-std::vector<TrainingMap> maps_without_folds(const std::vector<Press>& presses,
-                                            const MapOptions& options, std::size_t folds);
-
-/// For every object the map of all its presses, in the object frame. Takes all host threads.
-/// @param presses at known poses, of one touch each
-/// @throws Error, naming the object, as observed_map() does
-std::vector<TrainingMap> maps_of_objects(const std::vector<Press>& presses,
-                                         const MapOptions& options);
+MapsByFolds maps_by_folds(const std::vector<Press>& presses, const MapOptions& options,
+                          std::size_t folds);
 
 }  // namespace palpate

@@ -29,7 +29,7 @@ CrossValidation tried(const std::vector<Press>& presses, const std::vector<std::
   for (std::size_t fold = 0; fold < options.folds; ++fold) {
     const std::vector<Press> others = presses_without(fold, presses, options.folds);
     FoldModel model;
-    model.maps = options.bins ? maps_of_objects(others, map_options())
+    model.maps = options.bins ? maps_by_folds(others, map_options(), 1).of_objects
                               : maps_of_presses(others, map_options());
     model.how = learning(model.maps);
     if (!options.bins && !others.empty()) {

@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "model/contact_readings.hpp"
 #include "palpate/error.hpp"
 #include "palpate/reading_layer.hpp"
 #include "simulated_presses.hpp"
@@ -21,7 +22,8 @@ struct Exhaustive {
 /// What the reference says over all bins.
 Exhaustive over_all_bins(const Press& press, const OccupancyGrid& map, const ContactModel& contact,
                          const PoseLattice& lattice) {
-  const std::vector<double> nats = reference::log_likelihoods(press.touches, lattice, map, contact);
+  const std::vector<double> nats =
+      reference::log_likelihoods(press.touches, lattice, map, tabulated(contact));
   Exhaustive found{.best = *std::ranges::max_element(nats)};
   double sum = 0.0;
   for (const double x : nats) {
@@ -53,8 +55,9 @@ TEST(PressPlacer, FindsTheBestBinOfTheReference) {
     const Exhaustive expected = over_all_bins(press, map, contact, lattice);
     const PressPlacement found = placer.place(evidence_of(press.touches, contact));
     EXPECT_NEAR(found.log_likelihood, expected.best, 1e-6) << i;
-    EXPECT_NEAR(reference::log_likelihood(press.touches[0], found.T_object_robot, map, contact),
-                expected.best, 1e-6)
+    EXPECT_NEAR(
+        reference::log_likelihood(press.touches[0], found.T_object_robot, map, tabulated(contact)),
+        expected.best, 1e-6)
         << i;
     EXPECT_NEAR(found.log_evidence, expected.log_evidence, 0.05) << i;
   }

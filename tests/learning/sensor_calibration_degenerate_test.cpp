@@ -234,7 +234,7 @@ TEST(DegenerateCalibration, OfAnArrayOfOneElementIsRefused) {
 
 TEST(DegenerateCalibration, OnMapsOfOtherObjectsIsRefused) {
   const LetterPresses letters = two_letters();
-  TrainingMap other = maps_without_folds(letters.presses, {}, 2).front();
+  TrainingMap other = maps_by_folds(letters.presses, {}, 2).without_folds.front();
   other.map.label = "Z";
   try {
     calibrate_sensor(letters.presses, {other.map}, {});

@@ -182,7 +182,7 @@ TEST(SensorCalibration, OfFewTouchesAtKnownPosesSaysThatGroupsAreMissing) {
 
 TEST(SensorCalibration, ComparesWithTheMapsGiven) {
   const LetterPresses letters = three_letters(10);
-  const std::vector<TrainingMap> built = maps_without_folds(letters.presses, {}, 2);
+  const std::vector<TrainingMap> built = maps_by_folds(letters.presses, {}, 2).without_folds;
   std::vector<OccupancyGrid> maps;
   for (const TrainingMap& map : built) {
     if (map.map.label != "U") {

@@ -46,7 +46,8 @@ LevelCounts true_counts(const SimulatedPresses& simulated, const std::vector<Tra
 TEST(TableLearning, CountsPressesAtKnownPosesWithinABinOfThem) {
   LetterPresses letters;
   letters.add("A", 6, 61);
-  const std::vector<TrainingMap> maps = maps_without_folds(letters.presses, map_options(), 3);
+  const std::vector<TrainingMap> maps =
+      maps_by_folds(letters.presses, map_options(), 3).without_folds;
   TableLearning how = learning(maps);
   const std::vector<OccupancyGrid> layers = layers_of(maps, how.layer);
   const PlacedPresses placed = learn_table(letters.presses, maps, how);
@@ -232,7 +233,7 @@ TEST(TableLearning, CountsTouchesAtKnownPosesOnMapsOfTheOthers) {
   Recording recording = touches_of(on_letter_l, Pose{}, 40, 6);
   recording.object = "L";
   const std::vector<Press> presses = posed_presses(recording);
-  const std::vector<TrainingMap> maps = maps_without_folds(presses, map_options(), 5);
+  const std::vector<TrainingMap> maps = maps_by_folds(presses, map_options(), 5).without_folds;
   ASSERT_EQ(maps.size(), 5U);
   const TableLearning how{.layer = {.near_mm = 3.0, .far_mm = 9.0}, .contact = {.prior = 0.2}};
   const PlacedPresses placed = learn_table(presses, maps, how);
@@ -263,7 +264,7 @@ TEST(TableLearning, CountsTouchesAtKnownPosesOnMapsOfTheOthers) {
 TEST(TableLearning, OfOneFoldHasNoMapsOfOthers) {
   Recording recording = touches_of(on_letter_l, Pose{}, 4, 6);
   const std::vector<Press> presses = posed_presses(recording);
-  EXPECT_TRUE(maps_without_folds(presses, map_options(), 1).empty());
+  EXPECT_TRUE(maps_by_folds(presses, map_options(), 1).without_folds.empty());
   EXPECT_THROW(learn_table(presses, {}, {.contact = {.prior = 0.2}}), Error);
 }
 

@@ -25,7 +25,7 @@ TEST(TrainingMaps, HoldThePressesOfTheOtherFolds) {
   disc.object = "disc";
   std::vector<Press> presses = posed_presses(l);
   std::ranges::copy(posed_presses(disc), std::back_inserter(presses));
-  const std::vector<TrainingMap> maps = maps_without_folds(presses, map_options(), 3);
+  const std::vector<TrainingMap> maps = maps_by_folds(presses, map_options(), 3).without_folds;
   std::map<std::string, std::vector<std::vector<std::size_t>>> held;
   for (const TrainingMap& map : maps) {
     held[map.map.label].push_back(map.presses);
@@ -49,7 +49,7 @@ TEST(TrainingMaps, OfTouchesThatSayNothingAreRefusedByObject) {
   recording.object = "disc";
   recording.valid.assign(36, 0);
   try {
-    maps_without_folds(posed_presses(recording), map_options(), 2);
+    maps_by_folds(posed_presses(recording), map_options(), 2).without_folds;
     FAIL() << "touches of dead elements were mapped";
   } catch (const Error& error) {
     EXPECT_TRUE(std::string(error.what()).starts_with("disc: ")) << error.what();

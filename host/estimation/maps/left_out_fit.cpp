@@ -15,7 +15,7 @@
 #include "estimation/lattice/refinement.hpp"
 #include "model/body_spread.hpp"
 #include "model/contact_readings.hpp"
-#include "model/interpolated_map.hpp"
+#include "model/evidence_likelihood.hpp"
 #include "model/random.hpp"
 
 namespace palpate {
@@ -59,9 +59,9 @@ std::vector<PlaceError> place_errors(std::span<const TouchEvidence> touches, con
   constexpr std::size_t most_touches = 54;  // in all groups of a size
   constexpr double another_peak_mm = 1.5;
   constexpr double wide_mm = 0.8;
-  const ContactModel contact = tabulated(model);
+  const EvidenceLikelihood likelihood(InterpolatedMap(of.compared(), model.prior.value()),
+                                      tabulated(model), object);
   const Body body = displaced_body(of.map);
-  const InterpolatedMap map(of.compared(), *contact.prior);
   const PoseLattice lattice = lattice_about(body);
   std::vector<PlaceError> errors;
   const auto add_group = [&](std::size_t first, std::size_t every, std::size_t count) {
@@ -73,15 +73,7 @@ std::vector<PlaceError> place_errors(std::span<const TouchEvidence> touches, con
           double& sum = logs.emplace_back(0.0);
           for (std::size_t k = 0; k < count; ++k) {
             const TouchEvidence& touch = touches[first + k * every];
-            const Pose T_object_sensor = T_object_robot * touch.T_robot_sensor;
-            const glm::dvec2 along_x = rotate(T_object_sensor.theta_rad, {1.0, 0.0});
-            const glm::dvec2 along_y = rotate(T_object_sensor.theta_rad, {0.0, 1.0});
-            for (std::size_t e = 0; e < touch.readings.size(); ++e) {
-              const glm::dvec2& element = touch.elements_mm[e];
-              const glm::dvec2 at_mm =
-                  T_object_sensor.translation_mm + element.x * along_x + element.y * along_y;
-              sum += contact.log_likelihood(touch.readings[e], {map.log_odds(at_mm)}, object);
-            }
+            sum += likelihood.at(touch, T_object_robot * touch.T_robot_sensor);
           }
         }
       }

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "model/interpolated_map.hpp"
+#include "model/touch_evidence.hpp"
+#include "palpate/contact_model.hpp"
+
+namespace palpate {
+
+/// The log-likelihood of touches on one map, for many poses: what depends on neither touch nor pose
+/// is worked out once.
+class EvidenceLikelihood {
+ public:
+  /// @param map what readings are compared with
+  /// @param contact sound, with a table, see tabulated()
+  /// @param object whose numbers of the table are read
+  EvidenceLikelihood(const InterpolatedMap& map, const ContactModel& contact, std::size_t object);
+
+  /// Sum over the touch's known elements, in nats.
+  /// @param T_object_sensor in the place of the touch's own pose
+  double at(const TouchEvidence& touch, const Pose& T_object_sensor) const;
+
+ private:
+  InterpolatedMap map_;
+  std::vector<double> nats_;  ///< [level, node]
+  std::size_t nodes_;
+  double first_log_odds_;
+  double nodes_per_nat_;
+};
+
+}  // namespace palpate
