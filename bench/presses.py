@@ -67,14 +67,14 @@ def program() -> None:
         "presses",
         "Recognises objects pressed at unknown poses, from recordings of presses, one for each object: "
         "every second press is learned from, the others are recognised, by Eq. 7 and by the sensor that "
-        "`palpate calibrate` learns.",
+        "`palpate map` learns.",
     )
     flags.add_argument("--data", metavar="FOLDER", required=True, help="recordings of presses")
     flags.add_argument("--palpate", default="build/palpate", help="the command [%(default)s]")
     options = flags.parse_args()
     recordings = read_presses(options.data)
     if options.quick:
-        recordings = [one[:8] for one in recordings[:3]]
+        recordings = [one[:20] for one in recordings[:3]]
     device, facts = begin(options, f"{len(recordings)} objects, pressed at unknown poses")
     document: Json = {}
     rows: list[Json] = []
@@ -95,21 +95,20 @@ def program() -> None:
                     pressure_unit=recording.pressure_unit,
                     truth=palpate.Truth(label, (0.0, 0.0, 0.0)),
                 ).save(files[-1])
-        sensor, result = str(folder / "sensor.yaml"), folder / "records.json"
-        told(options.palpate, "calibrate", *learned, "--unposed", "-o", sensor)
+        result = folder / "records.json"
         widest = (REACH + 0.5) * pitch_of(recordings[0].elements_mm)
         region = [f"--{axis}-mm={-widest}:{widest}" for axis in "xy"]
         bins = ["--filter", "histogram", "--bins", f"{TURNS}x{2 * REACH + 1}x{2 * REACH + 1}"]
         raw = recordings[0].pressure_unit == "raw"
         contact = ["--threshold", f"{CLASSIFIER.threshold}", "--ratio", f"{CLASSIFIER.ratio}"] if raw else []
-        for key, words, making, reading in (
-            ("eq7", "Eq. 7", contact, [*contact, "--sensor-model", "none"]),
-            ("learned", "learned", ["--sensor-model", sensor], ["--sensor-model", sensor]),
+        for key, words, model in (
+            ("eq7", "Eq. 7", [*contact, "--sensor-model", "none"]),
+            ("learned", "learned", []),
         ):
             maps = str(folder / key) + "/"
-            told(options.palpate, "map", *learned, "--unposed", *making, "-o", maps)
+            told(options.palpate, "map", *learned, "--unposed", *model, "-o", maps)
             recognize = ["recognize", *tried, "--each-frame", "--maps", maps, "--none", "0", *region, *bins]
-            told(options.palpate, *recognize, *reading, "--device", device.name, "--json", str(result))
+            told(options.palpate, *recognize, *model, "--device", device.name, "--json", str(result))
             records = json.loads(result.read_text())
             random = numpy.random.default_rng(SEED)
             of_sensor = [scores(records, presses, random) for presses in TOGETHER]

@@ -20,6 +20,8 @@ namespace {
 
 /// Touches of each of two objects that it takes to learn how sure to be of several.
 constexpr std::size_t least_touches = 15;
+/// The same of presses at unknown poses, two in each part that is left out.
+constexpr std::size_t least_presses = 10;
 
 /// A map of the folder and its file.
 struct FolderMap {
@@ -65,30 +67,61 @@ std::vector<Recording> touches_of(const std::vector<FolderMap>& maps) {
   return touches;
 }
 
-/// Throws Error where so few touches do not tell how sure to be of several.
-void require_enough(const std::vector<Recording>& touches) {
+/// Throws Error where there are fewer than `least` touches of each of two objects.
+void require_enough(const std::vector<Press>& touches, std::size_t least) {
   std::map<std::string, std::size_t> counts;
-  for (const Recording& own : touches) {
-    counts[own.object] += own.size();
+  for (const Press& own : touches) {
+    ++counts[own.label];
   }
-  if (std::ranges::count_if(counts, [](const auto& of) { return of.second >= least_touches; }) <
-      2) {
+  if (std::ranges::count_if(counts, [&](const auto& of) { return of.second >= least; }) < 2) {
     throw Error(Fault::input,
-                fmt::format("it takes {} touches or more of each of two objects", least_touches));
+                fmt::format("it takes {} touches or more of each of two objects", least));
   }
 }
 
 std::string words_of(const SensorGain& gain, const std::string& file, std::size_t touches) {
-  const std::string scores = fmt::format(
-      "touches that are left out have a log-loss of {:.3f} nats, {:.3f} by Eq. 7, and {} of them "
-      "together a pose error of {:.2f} mm, {:.2f} by Eq. 7",
-      gain.log_loss, gain.log_loss_before, presses_in_group, gain.error_mm, gain.error_mm_before);
+  std::string scores =
+      fmt::format("touches that are left out have a log-loss of {:.3f} nats, {:.3f} by Eq. 7",
+                  gain.log_loss, gain.log_loss_before);
+  if (gain.error_mm) {
+    scores += fmt::format(", and {} of them together a pose error of {:.2f} mm, {:.2f} by Eq. 7",
+                          presses_in_group, *gain.error_mm, gain.error_mm_before.value());
+  }
   return gain.better ? fmt::format(
                            "{}: learned from {} touches: {}\n"
                            "{}: recognition with this folder takes it, unless --sensor-model none "
                            "is given",
                            file, touches, scores, file)
                      : "no sensor model, as none is better beyond chance: " + scores;
+}
+
+/// What touches say of the sensor. Throws Error where they do not tell whether it is better.
+MapSensor learned_from(const CalibrationTask& task, const MapFlags& flags) {
+  Progress progress("learning the sensor");
+  SensorCalibration calibration = calibrate_sensor(
+      task.presses, task.maps, task.options, [&](double fraction) { progress.show(fraction); });
+  if (!calibration.gain) {
+    throw Error(Fault::input, "the touches do not tell how much better it is; give more of them");
+  }
+  MapSensor learned{
+      .words = words_of(*calibration.gain, sensor_file(flags).string(), task.presses.size())};
+  if (calibration.gain->better) {
+    learned.sensor = std::move(calibration.sensor);
+  }
+  return learned;
+}
+
+/// What `learn` returns, or why no sensor can be learned.
+template <typename Learn>
+MapSensor or_why_not(const Learn& learn) {
+  try {
+    return learn();
+  } catch (const Error& error) {
+    if (error.fault() != Fault::input) {
+      throw;
+    }
+    return {.sensor = {}, .words = fmt::format("no sensor model: {}", in_flags(error.what()))};
+  }
 }
 
 /// Whether the folder's sensor model is one that `palpate map` wrote.
@@ -142,35 +175,41 @@ std::vector<std::filesystem::path> other_maps(const MapFlags& flags,
 
 MapSensor learn_sensor(const MapFlags& flags, const std::vector<OccupancyGrid>& maps,
                        const std::vector<std::filesystem::path>& written, const MapOptions& model) {
-  try {
+  return or_why_not([&] {
     const std::vector<FolderMap> all = folder_maps(flags, maps, written);
     const std::vector<Recording> touches = touches_of(all);
-    require_enough(touches);
     CalibrationTask task =
         calibration_task({.threshold = flags.threshold, .ratio = flags.ratio}, {}, touches, {});
+    require_enough(task.presses, least_touches);
     task.options.maps = model;
-    Progress progress("learning the sensor");
-    SensorCalibration calibration = calibrate_sensor(
-        task.presses, task.maps, task.options, [&](double fraction) { progress.show(fraction); });
-    if (!calibration.gain) {
-      throw Error(Fault::input, "the touches do not tell how much better it is; give more of them");
-    }
-    MapSensor learned{
-        .words = words_of(*calibration.gain, sensor_file(flags).string(), task.presses.size())};
-    if (calibration.gain->better) {
-      learned.sensor = std::move(calibration.sensor);
+    MapSensor learned = learned_from(task, flags);
+    if (learned.sensor) {
       learned.sensor->touch_sd = touch_sd(flags);
       for (const auto& [file, map] : all) {
         learned.sensor->maps[file.filename().string()] = digest_of(map);
       }
     }
     return learned;
-  } catch (const Error& error) {
-    if (error.fault() != Fault::input) {
-      throw;
+  });
+}
+
+MapSensor learn_unposed_sensor(const MapFlags& flags, const std::vector<Recording>& recordings,
+                               const std::vector<std::filesystem::path>& written) {
+  return or_why_not([&] {
+    if (const auto others = other_maps(flags, written); !others.empty()) {
+      refuse(others.front(), "stays, and its presses are not at hand; build all maps of {} at once",
+             flags.output);
     }
-    return {.words = fmt::format("no sensor model: {}", in_flags(error.what()))};
-  }
+    std::vector<Recording> labelled = recordings;
+    for (Recording& recording : labelled) {
+      recording.object = flags.label.empty() ? recording.object : flags.label;
+    }
+    const CalibrationTask task =
+        calibration_task({.unposed = true, .threshold = flags.threshold, .ratio = flags.ratio},
+                         {.frames = flags.frames}, labelled, {});
+    require_enough(task.presses, least_presses);
+    return learned_from(task, flags);
+  });
 }
 
 void write_sensor(const MapFlags& flags, const MapSensor& learned) {

@@ -32,6 +32,10 @@ struct MapSensor {
 /// @param model of these maps
 MapSensor learn_sensor(const MapFlags& flags, const std::vector<OccupancyGrid>& maps,
                        const std::vector<std::filesystem::path>& written, const MapOptions& model);
+/// Learns the sensor from presses at unknown poses, whose maps are then built with it.
+/// @param written the files that their maps may have
+MapSensor learn_unposed_sensor(const MapFlags& flags, const std::vector<Recording>& recordings,
+                               const std::vector<std::filesystem::path>& written);
 
 /// Writes the folder's sensor model, or removes one that is of older maps, and says which.
 void write_sensor(const MapFlags& flags, const MapSensor& learned);

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "cli/map_flags.hpp"
+#include "cli/map_sensor.hpp"
 #include "cli/options.hpp"
 #include "cli/progress.hpp"
 #include "figures/figures.hpp"
@@ -16,6 +17,7 @@
 #include "learning/unposed_maps.hpp"
 #include "model/touch_evidence.hpp"
 #include "palpate/files.hpp"
+#include "recognition/folder_sensor.hpp"
 #include "recognition/recordings.hpp"
 
 namespace palpate::cli {
@@ -53,8 +55,10 @@ std::filesystem::path path_of(const MapFlags& flags, const std::string& name) {
                            : std::filesystem::path(flags.output);
 }
 
-void prepare_unposed_outputs(const MapFlags& flags, const GroupedTouches& grouped,
-                             std::size_t most) {
+/// The files that the maps may have.
+std::vector<std::filesystem::path> prepare_unposed_outputs(const MapFlags& flags,
+                                                           const GroupedTouches& grouped,
+                                                           std::size_t most, bool learns) {
   std::vector<std::string> names;
   for (const ObjectTouches& object : grouped.objects) {
     names.push_back(object.label);
@@ -66,7 +70,12 @@ void prepare_unposed_outputs(const MapFlags& flags, const GroupedTouches& groupe
   for (const std::string& name : names) {
     paths.push_back(path_of(flags, name));
   }
-  prepare_outputs(flags, paths, names);
+  std::vector<std::filesystem::path> outputs = paths;
+  if (learns) {
+    outputs.push_back(sensor_file(flags));
+  }
+  prepare_outputs(flags, outputs, names);
+  return paths;
 }
 
 UnposedOptions unposed_options(const MapFlags& flags, const std::vector<Recording>& recordings,
@@ -87,7 +96,7 @@ UnposedOptions unposed_options(const MapFlags& flags, const std::vector<Recordin
   if (!flags.cell_given) {
     result.map.cell_mm = 0.5 * pitch_mm;
   }
-  if (!spread_given(flags)) {
+  if (!sensor && !spread_given(flags)) {
     constexpr double of_pitch = 0.6;  // leaves no gaps between the elements of a press
     result.map.sensor.spread_mm = of_pitch * pitch_mm;
   }
@@ -248,11 +257,20 @@ void write_object(const MapFlags& flags, const Object& object) {
 void build_unposed_maps(const MapFlags& flags) {
   const int most = most_maps(flags);
   const std::vector<Recording> recordings = read_touch_recordings(flags.recordings);
-  const std::optional<LearnedSensor> sensor = sensor_of(flags, recordings);
-  const GroupedTouches grouped =
-      group_by_label(flags, recordings, map_options(flags, recordings, sensor).classifier);
+  std::optional<LearnedSensor> sensor = sensor_of(flags, recordings);
+  const bool learns = learns_sensor(flags);
+  // What a flag may be refused for comes before what takes long.
+  const LearnedSensor any{.pressure_unit = recordings.front().pressure_unit};
+  const GroupedTouches grouped = group_by_label(
+      flags, recordings, map_options(flags, recordings, learns ? any : sensor).classifier);
+  const std::vector<std::filesystem::path> may_write =
+      prepare_unposed_outputs(flags, grouped, static_cast<std::size_t>(most), learns);
+  MapSensor learned;
+  if (learns) {
+    learned = learn_unposed_sensor(flags, recordings, may_write);
+    sensor = learned.sensor;
+  }
   UnposedOptions options = unposed_options(flags, recordings, sensor, grouped);
-  prepare_unposed_outputs(flags, grouped, static_cast<std::size_t>(most));
 
   std::vector<Object> objects;
   {
@@ -282,6 +300,14 @@ void build_unposed_maps(const MapFlags& flags) {
   }
   for (const Object& object : objects) {
     write_object(flags, object);
+    for (std::size_t m = 0; learned.sensor && m < object.maps.maps.size(); ++m) {
+      const std::string name = name_of(object.presses->label, m, object.maps.maps.size());
+      learned.sensor->maps[path_of(flags, name).filename().string()] =
+          digest_of(object.maps.maps[m].map);
+    }
+  }
+  if (learns) {
+    write_sensor(flags, learned);
   }
   if (!flags.png.empty()) {
     write_file(flags.png, picture);

@@ -2,11 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
-#include <numeric>
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
+#include <glm/geometric.hpp>
 #include <glm/mat2x2.hpp>
 
 #include "learning/plane_sums.hpp"
@@ -26,6 +27,21 @@ constexpr std::size_t evaluated_bins = 8;
 ContactModel sound(const ContactModel& contact) {
   contact.validate();
   return tabulated(contact);
+}
+
+/// The indices of the largest values, the largest and then the first one first.
+std::vector<std::size_t> largest(std::span<const float> values, std::size_t count) {
+  std::vector<std::size_t> best;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (best.size() == count && !(values[i] > values[best.back()])) {
+      continue;
+    }
+    best.resize(std::min(best.size(), count - 1));
+    const auto smaller = std::ranges::upper_bound(best, values[i], std::ranges::greater{},
+                                                  [&](std::size_t at) { return values[at]; });
+    best.insert(smaller, i);
+  }
+  return best;
 }
 
 glm::dmat2 rotation(double theta_rad) {
@@ -54,11 +70,11 @@ PressPlacer::PressPlacer(const Hypothesis& hypothesis, const ContactModel& conta
 
 std::vector<float> PressPlacer::log_likelihoods(std::span<const TouchEvidence> press) {
   const std::vector<Element> elements = elements_of(press);
-  double reach_mm = 0.0;
+  double reach_squared = 0.0;
   for (const Element& element : elements) {
-    reach_mm = std::max(reach_mm, std::hypot(element.from_pivot_mm.x, element.from_pivot_mm.y));
+    reach_squared = std::max(reach_squared, glm::dot(element.from_pivot_mm, element.from_pivot_mm));
   }
-  cover(reach_mm);
+  cover(std::sqrt(reach_squared));
   sum_rest(elements);
 
   std::vector<float> bins = rest_;
@@ -80,30 +96,28 @@ std::vector<float> PressPlacer::log_likelihoods(std::span<const TouchEvidence> p
 }
 
 PressPlacement PressPlacer::place(std::span<const TouchEvidence> press) {
-  const std::vector<float> bins = log_likelihoods(press);
-  std::vector<std::uint32_t> order(bins.size());
-  std::iota(order.begin(), order.end(), 0U);
-  const std::size_t best_count = std::min(evaluated_bins, bins.size());
-  const auto better = [&](std::uint32_t a, std::uint32_t b) {
-    return bins[a] != bins[b] ? bins[a] > bins[b] : a < b;
-  };
-  std::partial_sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(best_count),
-                    order.end(), better);
+  std::vector<float> bins = log_likelihoods(press);
+  PressPlacement found{.log_likelihood = -std::numeric_limits<double>::infinity()};
   std::vector<double> evaluated;
-  for (std::size_t i = 0; i < best_count; ++i) {
-    evaluated.push_back(log_likelihood(press, lattice_.T_object_robot(order[i])));
+  for (const std::size_t bin : largest(bins, evaluated_bins)) {
+    const Pose T_object_robot = lattice_.T_object_robot(static_cast<std::int64_t>(bin));
+    evaluated.push_back(log_likelihood(press, T_object_robot));
+    if (evaluated.back() > found.log_likelihood) {
+      found.log_likelihood = evaluated.back();
+      found.T_object_robot = T_object_robot;
+    }
+    bins[bin] = -std::numeric_limits<float>::infinity();  // counts by what it was evaluated to
   }
-  const auto best = std::ranges::max_element(evaluated);
   double sum = 0.0;
-  constexpr double negligible = -50.0;  // e^-50: a billion such bins are 2e-13 of the sum
-  for (std::size_t i = 0; i < order.size(); ++i) {
-    const double nats = (i < best_count ? evaluated[i] : double{bins[order[i]]}) - *best;
-    sum += nats > negligible ? std::exp(nats) : 0.0;
-  }
-  return {.T_object_robot =
-              lattice_.T_object_robot(order[static_cast<std::size_t>(best - evaluated.begin())]),
-          .log_likelihood = *best,
-          .log_evidence = *best + std::log(sum / static_cast<double>(bins.size()))};
+  const auto count_in = [&](double log_likelihood) {
+    constexpr double negligible = -50.0;  // e^-50: a billion such bins are 2e-13 of the sum
+    const double below = log_likelihood - found.log_likelihood;
+    sum += below > negligible ? std::exp(below) : 0.0;
+  };
+  std::ranges::for_each(evaluated, count_in);
+  std::ranges::for_each(bins, count_in);
+  found.log_evidence = found.log_likelihood + std::log(sum / static_cast<double>(bins.size()));
+  return found;
 }
 
 std::vector<PressPlacer::Element> PressPlacer::elements_of(

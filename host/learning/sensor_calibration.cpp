@@ -213,6 +213,8 @@ void judge(const CrossValidation& eq7, const std::vector<TriedModel>& tried, boo
                     "that how sure to be after several touches is not learned; give {} or more "
                     "of each object",
                     presses_in_group, presses_in_group * folds));
+  } else {
+    judged.gain = gain_of(eq7, table, after.presses);
   }
   const std::vector<ScoredPress> without = tempered_by_folds(eq7.presses).presses;
   // What few presses could show by chance is no warning.

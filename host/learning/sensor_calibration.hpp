@@ -66,7 +66,7 @@ struct SensorCalibration {
   std::optional<Scores> table;        ///< the table, temperature 1
   std::optional<Scores> after;        ///< the table, temperature and features
   std::optional<GroupScores> groups;  ///< none for presses at unknown poses, or few touches
-  std::optional<SensorGain> gain;     ///< none where there are no groups
+  std::optional<SensorGain> gain;     ///< none for few touches at known poses, or one object
   /// Mean over the folds of the area under the curve of presses whose object is known against those
   /// whose object is left out, see FamiliarityScores: about one half where presses say nothing;
   /// none with one object.

@@ -33,11 +33,8 @@ std::vector<double> losses_of(std::span<const ScoredPress> presses) {
   return of_each;
 }
 
-std::optional<SensorGain> gain_of(const CrossValidation& eq7, const CrossValidation& table,
-                                  std::span<const ScoredPress> after) {
-  if (eq7.groups[0].empty()) {
-    return {};
-  }
+SensorGain gain_of(const CrossValidation& eq7, const CrossValidation& table,
+                   std::span<const ScoredPress> after) {
   std::vector<double> losses_before;
   for (const ScoredPress& press : eq7.presses) {
     const double p = press_probabilities(press, 1.0)[press.truth];
@@ -46,19 +43,20 @@ std::optional<SensorGain> gain_of(const CrossValidation& eq7, const CrossValidat
   const std::vector<double> losses = losses_of(after);
   const std::vector<double> errors_before = log_errors_of(eq7);
   const std::vector<double> errors = log_errors_of(table);
+  SensorGain gain{.log_loss_before = mean_of(losses_before), .log_loss = mean_of(losses)};
+  bool gains = is_clearly_less(losses, losses_before);
   constexpr double small_nats = 0.02;
-  constexpr double small_share = 0.1;
-  SensorGain gain{.log_loss_before = mean_of(losses_before),
-                  .log_loss = mean_of(losses),
-                  .error_mm_before = std::exp(mean_of(errors_before)),
-                  .error_mm = std::exp(mean_of(errors))};
-  const bool gains =
-      is_clearly_less(losses, losses_before) || is_clearly_less(errors, errors_before);
-  const bool costs_nats =
+  bool costs =
       is_clearly_less(losses_before, losses) && gain.log_loss > gain.log_loss_before + small_nats;
-  const bool costs_mm = is_clearly_less(errors_before, errors) &&
-                        gain.error_mm > (1.0 + small_share) * gain.error_mm_before;
-  gain.better = gains && !costs_nats && !costs_mm;
+  if (!errors.empty()) {
+    gain.error_mm_before = std::exp(mean_of(errors_before));
+    gain.error_mm = std::exp(mean_of(errors));
+    gains = gains || is_clearly_less(errors, errors_before);
+    constexpr double small_share = 0.1;
+    costs = costs || (is_clearly_less(errors_before, errors) &&
+                      *gain.error_mm > (1.0 + small_share) * *gain.error_mm_before);
+  }
+  gain.better = gains && !costs;
   return gain;
 }
 

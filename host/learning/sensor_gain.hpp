@@ -12,8 +12,9 @@ namespace palpate {
 struct SensorGain {
   double log_loss_before = 0.0;  ///< of single touches by Eq. 7 with gamma 0.1, in nats
   double log_loss = 0.0;         ///< of single touches by the table and the temperature
-  double error_mm_before = 0.0;  ///< geometric mean of CrossValidation::groups by Eq. 7
-  double error_mm = 0.0;         ///< the same by the table
+  /// Geometric means of the pose errors of CrossValidation::groups; none where there are no groups.
+  std::optional<double> error_mm_before;  ///< by Eq. 7
+  std::optional<double> error_mm;         ///< by the table
   /// Of the losses and the errors, one is less beyond chance, and neither is more beyond chance by
   /// over 0.02 nats, or a tenth of the error: touches that are all told apart have next to no loss,
   /// with a temperature a little more.
@@ -21,9 +22,8 @@ struct SensorGain {
 };
 
 /// @param after the presses of `table` with the temperature
-/// @returns none where there are no groups with an error
-std::optional<SensorGain> gain_of(const CrossValidation& eq7, const CrossValidation& table,
-                                  std::span<const ScoredPress> after);
+SensorGain gain_of(const CrossValidation& eq7, const CrossValidation& table,
+                   std::span<const ScoredPress> after);
 
 /// The losses of presses with their labels' log probabilities, in nats.
 std::vector<double> losses_of(std::span<const ScoredPress> presses);

@@ -70,6 +70,20 @@ TEST_F(MapUnposedCommand, SaysWhichOlderMapsAreStillThere) {
   EXPECT_NE(one.err.find("maps/A.2.map.h5: an older map of 'A'"), std::string::npos) << one.err;
 }
 
+TEST_F(MapUnposedCommand, SaysWhatLearningASensorTakes) {
+  const std::vector<std::string> command{"map", "A.h5", "-o", "maps/", "--unposed"};
+  const auto with = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), command.begin(), command.end());
+    return done(more);
+  };
+  EXPECT_NE(with({}).find("no sensor model: it takes 10 touches or more of each of two objects"),
+            std::string::npos);
+  EXPECT_EQ(with({"--sensor-model", "none"}).find("no sensor model"), std::string::npos);
+  EXPECT_NE(with({"--label", "B"}).find("no sensor model: maps/A.map.h5: stays"),
+            std::string::npos);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "maps/sensor.yaml"));
+}
+
 TEST_F(MapUnposedCommand, RefusesInOneLine) {
   expect_refused({"map", "A.h5", "-o", "new/", "--unposed", "--max-maps", "0"},
                  {"--max-maps 0", "1 or more"});

@@ -70,15 +70,16 @@ TEST_F(OwnSensorDocument, PressesAtUnknownPosesMakeARecogniser) {
   const auto [said, complained] = run("own_presses.md");
   EXPECT_EQ(complained, "") << "the logs of the page are in order";
   expect_named(said, {"B.h5: 12 touches in 1361 frames of B.frames.h5", "48 touches, 4 objects",
-                      "maps/B.map.h5: B from 12 presses"});  // as the page quotes
+                      "maps/B.map.h5: B from 12 presses",
+                      "maps/sensor.yaml: learned from 48 touches"});  // as the page quotes
   expect_written({"calibration/table.png", "calibration/reliability.png", "maps.png",
                   "scores/confusion.png", "scores/reliability.png"});
 
   const nlohmann::json found = scores("results.json");
   EXPECT_EQ(found["records"], 50);
-  // The page says 38 of 40; of 200 such presses 94 % are right, so that fewer than 34 of 40 are one
+  // The page says 37 of 40; of 200 such presses 92 % are right, so that fewer than 33 of 40 are one
   // time in 100.
-  EXPECT_GE(found["known_classes"]["right"].get<int>(), 34);
+  EXPECT_GE(found["known_classes"]["right"].get<int>(), 33);
   EXPECT_LT(found["known_classes"]["log_loss"].get<double>(), 0.4);
   EXPECT_GT(found["unknown_classes"]["area_under_curve"]["area"].get<double>(), 0.85);
 }

@@ -29,33 +29,37 @@ std::vector<double> about(double value) {
   return values;
 }
 
-std::optional<SensorGain> gain(const CrossValidation& eq7, const CrossValidation& table) {
+SensorGain gain(const CrossValidation& eq7, const CrossValidation& table) {
   return gain_of(eq7, table, table.presses);
 }
 
 TEST(SensorGain, IsBetterWhereTouchesAreToldApartAndPlacedNearer) {
   const auto found = gain(validation(about(0.9), about(0.3)), validation(about(0.7), about(0.2)));
-  EXPECT_TRUE(found->better);
-  EXPECT_NEAR(found->log_loss_before / found->log_loss, 9.0 / 7.0, 1e-9);
-  EXPECT_NEAR(found->error_mm_before / found->error_mm, 1.5, 1e-9);
+  EXPECT_TRUE(found.better);
+  EXPECT_NEAR(found.log_loss_before / found.log_loss, 9.0 / 7.0, 1e-9);
+  EXPECT_NEAR(*found.error_mm_before / *found.error_mm, 1.5, 1e-9);
 }
 
 TEST(SensorGain, IsNotBetterWhereNothingOrTheOneIsGainedForTheOther) {
   const CrossValidation eq7 = validation(about(0.9), about(0.3));
-  EXPECT_FALSE(gain(eq7, eq7)->better);
-  EXPECT_FALSE(gain(eq7, validation(about(0.7), about(0.4)))->better) << "places";
-  EXPECT_FALSE(gain(eq7, validation(about(1.0), about(0.2)))->better) << "identities";
-  EXPECT_TRUE(gain(eq7, validation(about(0.91), about(0.2)))->better) << "hardly a loss";
+  EXPECT_FALSE(gain(eq7, eq7).better);
+  EXPECT_FALSE(gain(eq7, validation(about(0.7), about(0.4))).better) << "places";
+  EXPECT_FALSE(gain(eq7, validation(about(1.0), about(0.2))).better) << "identities";
+  EXPECT_TRUE(gain(eq7, validation(about(0.91), about(0.2))).better) << "hardly a loss";
 }
 
 TEST(SensorGain, OneGroupAtAnotherPlaceOutweighsNoTenBetterOnes) {
   std::vector<double> errors_mm = about(0.2);
   errors_mm[5] = 20.0;  // more than all the others gain together
-  EXPECT_TRUE(gain(validation(about(0.9), about(0.3)), validation(about(0.7), errors_mm))->better);
+  EXPECT_TRUE(gain(validation(about(0.9), about(0.3)), validation(about(0.7), errors_mm)).better);
 }
 
-TEST(SensorGain, IsNotToldWithoutGroups) {
-  EXPECT_FALSE(gain(validation(about(0.9), {}), validation(about(0.7), {})));
+TEST(SensorGain, IsToldByIdentitiesAloneWithoutGroups) {
+  const CrossValidation eq7 = validation(about(0.9), {});
+  const SensorGain found = gain(eq7, validation(about(0.7), {}));
+  EXPECT_TRUE(found.better);
+  EXPECT_FALSE(found.error_mm);
+  EXPECT_FALSE(gain(eq7, eq7).better);
 }
 
 }  // namespace palpate::sensor_gain_test
