@@ -47,7 +47,7 @@ HWY_INLINE void SumPiece(const float* const* planes, std::size_t count, std::siz
 void SumPlanes(const float* const* planes, std::size_t count, std::size_t width, std::size_t rows,
                std::size_t columns, float* sums) {
   // So many sums at once that an addition need not wait for the one before it.
-  constexpr std::size_t together = 8 * hn::MaxLanes(Numbers()) / sum_lanes;
+  constexpr std::size_t together = HWY_MAX(1, 8 * hn::MaxLanes(Numbers()) / sum_lanes);
   std::size_t row = 0;
   for (; row + together <= rows; row += together) {
     for (std::size_t i = 0; i < columns; i += sum_lanes) {

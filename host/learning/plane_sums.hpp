@@ -6,7 +6,7 @@
 namespace palpate {
 
 /// Rows are summed in pieces of so many numbers.
-inline constexpr std::size_t sum_lanes = 8;
+inline constexpr std::size_t sum_lanes = 16;
 
 /// Adds planes of rows up, in the order given: sums[j, i] = sum of planes[k][j, i]. A plane is
 /// inside a wider table.

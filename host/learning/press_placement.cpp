@@ -166,15 +166,15 @@ void PressPlacer::cover(double reach_mm) {
     for (int x_phase = 0; x_phase < x_.per_step; ++x_phase) {
       for (int row = 0; row < y_.columns; ++row) {
         for (int column = 0; column < x_.columns; ++column, ++at) {
-          const MapSample sample{.log_odds = map_.log_odds(
-                                     {x_.first_mm + x_.step_mm * (column * x_.per_step + x_phase),
-                                      y_.first_mm + y_.step_mm * (row * y_.per_step + y_phase)})};
-          const double none = contact_.log_likelihood(Reading::no_contact, sample);
+          const double log_odds =
+              map_.log_odds({x_.first_mm + x_.step_mm * (column * x_.per_step + x_phase),
+                             y_.first_mm + y_.step_mm * (row * y_.per_step + y_phase)});
+          const double none = likelihood_.of(Reading::no_contact, log_odds);
           no_contact_[at] = static_cast<float>(none);
           unknown_excess_[at] = -no_contact_[at];
           for (std::size_t level = 0; level < contacts; ++level) {
             contact_excess_[level][at] =
-                static_cast<float>(contact_.log_likelihood(contact_level(level), sample) - none);
+                static_cast<float>(likelihood_.of(contact_level(level), log_odds) - none);
           }
         }
       }
