@@ -78,6 +78,10 @@ constexpr double most_searched_bins = 1e8;
 constexpr double closely_drawn_bins = 1e6;
 /// Tolerance that a search with a budget reaches before it goes on, and enough for draws.
 constexpr double soon = 1e-2;
+/// Tolerance of a search for draws where touches are uncertain: it takes little longer than a rough
+/// one, and leaves so little out that its bins can be followed through the next touches. Two of
+/// them raise that share up to a hundred times.
+constexpr double followable = 1e-4;
 /// How closely the log odds of "none of these" are known, in nats, unless this or the tolerance is
 /// more than it, or the hypotheses, may have.
 constexpr double none_nats = 0.05;
@@ -141,7 +145,7 @@ void BoundedBelief::take_in() {
   }
   change_.change([&] {
     if (!moving_ && found_ && found_->bins.complete() &&
-        found_->bins.values().size() <= FollowedBins::most_bins) {
+        found_->bins.values().size() <= FollowedBins::most_bins(likelihood_)) {
       followed_.emplace(found_->bins, found_->result, space_.log_weight, taken_in_);
     }
     found_.reset();
@@ -197,8 +201,9 @@ double BoundedBelief::bins_in_all() const {
 SearchGoal BoundedBelief::rough_goal() const {
   // Few bins take as long whatever the tolerance, and a close search lets those that are found be
   // followed through the next touches.
+  const double rough = likelihood_.displaces() ? followable : soon;
   return {.tolerance = bins_in_all() <= closely_drawn_bins ? options_.tolerance
-                                                           : std::max(options_.tolerance, soon),
+                                                           : std::max(options_.tolerance, rough),
           .exact = false,
           .poor_bins = options_.poor_bins};
 }
@@ -287,10 +292,17 @@ bool BoundedBelief::follow() {
     return false;
   }
   while (followed_->touches() < taken_in_) {
-    const KnownElements touch = known_elements(touches_.all()[followed_->touches()]);
+    const std::size_t next = followed_->touches();
+    const KnownElements touch = known_elements(touches_.all()[next]);
+    // Of uncertain touches, those with known elements are counted.
+    const auto uncertain =
+        static_cast<std::size_t>(std::ranges::count_if(touches_.all().first(next), any_known));
     std::vector<double> most;
-    for (const TileBounds& bounds : space_.bounds) {
-      most.push_back(bounds.best(space_.finest_level(), touch));
+    for (std::size_t i = 0; i < space_.bounds.size(); ++i) {
+      most.push_back(space_.bounds[i].best(space_.finest_level(), touch));
+      if (!touch.touches.empty()) {
+        most.back() = std::min(most.back(), search_.largest().most(uncertain, i));
+      }
     }
     arena_.execute([&] { followed_->add(touch, likelihood_, most); });
   }

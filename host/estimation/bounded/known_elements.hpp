@@ -42,6 +42,9 @@ struct ArrayReadings {
   std::optional<glm::dvec2> sensor_from_pivot_mm = {};
 };
 
+/// Whether an element is not Unknown.
+bool any_known(const ArrayReadings& array);
+
 /// The elements that are not Unknown.
 KnownElements known_elements(const ArrayReadings& array);
 

@@ -51,7 +51,7 @@ void NoneEvidence::add(std::span<const ArrayReadings> touches) {
   std::vector<TouchMean> added;
   for (const ArrayReadings& touch : touches) {
     // A touch without a known element does not even tell where the array was.
-    if (std::ranges::any_of(touch.readings, [](Reading r) { return r != Reading::unknown; })) {
+    if (any_known(touch)) {
       TouchMean& mean = added.emplace_back(TouchMean{.touch = touch});
       const KnownElements known = known_elements(touch);
       for (const TileBounds& of : space_.bounds) {
