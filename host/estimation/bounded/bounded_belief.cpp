@@ -153,6 +153,10 @@ void BoundedBelief::take_in() {
     std::vector<KnownElements> known;
     for (const ArrayReadings& touch : added) {
       known.push_back(known_elements(touch));
+      for (KnownElements& uncertain : known.back().touches) {
+        uncertain.exact_bins = std::make_shared<ExactBins>(hypotheses_.size(), space_.turns.size(),
+                                                           ExactBins::most_bytes / touches_.size());
+      }
     }
     if (moving_) {
       std::ranges::for_each(known, [&](const KnownElements& touch) { moving_->add(touch); });
@@ -174,7 +178,11 @@ std::string BoundedBelief::path() const {
 }
 
 std::uint64_t BoundedBelief::bytes() const {
-  return likelihood_.bytes() + space_.bytes() + search_.largest().bytes() +
+  std::uint64_t exact_bins = 0;
+  for (const KnownElements& touch : elements_.touches) {
+    exact_bins += touch.exact_bins->bytes();
+  }
+  return exact_bins + likelihood_.bytes() + space_.bytes() + search_.largest().bytes() +
          static_cast<std::uint64_t>(
              moving_ ? MovingBelief::bytes_needed(options_.lattice, hypotheses_.size()) : 0.0) +
          (found_ ? found_->bins.bytes() : 0) + (none_ ? none_->bytes() : 0);
@@ -293,15 +301,18 @@ bool BoundedBelief::follow() {
   }
   while (followed_->touches() < taken_in_) {
     const std::size_t next = followed_->touches();
-    const KnownElements touch = known_elements(touches_.all()[next]);
-    // Of uncertain touches, those with known elements are counted.
-    const auto uncertain =
-        static_cast<std::size_t>(std::ranges::count_if(touches_.all().first(next), any_known));
+    KnownElements touch = known_elements(touches_.all()[next]);
     std::vector<double> most;
-    for (std::size_t i = 0; i < space_.bounds.size(); ++i) {
-      most.push_back(space_.bounds[i].best(space_.finest_level(), touch));
-      if (!touch.touches.empty()) {
-        most.back() = std::min(most.back(), search_.largest().most(uncertain, i));
+    for (const TileBounds& bounds : space_.bounds) {
+      most.push_back(bounds.best(space_.finest_level(), touch));
+    }
+    if (!touch.touches.empty()) {
+      // Of uncertain touches, those with known elements are counted.
+      const auto uncertain =
+          static_cast<std::size_t>(std::ranges::count_if(touches_.all().first(next), any_known));
+      touch.touches.front() = elements_.touches[uncertain];
+      for (std::size_t i = 0; i < most.size(); ++i) {
+        most[i] = std::min(most[i], search_.largest().most(uncertain, i));
       }
     }
     arena_.execute([&] { followed_->add(touch, likelihood_, most); });
