@@ -105,7 +105,7 @@ BoundedBelief::BoundedBelief(std::span<const Hypothesis> hypotheses, const Bound
     moving_.emplace(space_, options_, likelihood_, hypotheses_);
   }
   if (options_.none_weight) {
-    none_.emplace(space_, options_, likelihood_);
+    none_.emplace(space_, options_, likelihood_, search_.largest());
     none_log_weight_ = none_log_weight(*options_.none_weight, hypotheses_, options_.lattice);
   }
 }
@@ -160,7 +160,8 @@ void BoundedBelief::take_in() {
     }
     if (moving_) {
       std::ranges::for_each(known, [&](const KnownElements& touch) { moving_->add(touch); });
-    } else {
+    }
+    if (!moving_ || (none_ && !options_.touch_sd.none())) {
       arena_.execute([&] { search_.largest().add(known); });
     }
     known.insert(known.begin(), std::move(elements_));
