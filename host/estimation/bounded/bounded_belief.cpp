@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 #include <tbb/info.h>
 
-#include "estimation/bin_box.hpp"
+#include "estimation/bounded/belief_draws.hpp"
 #include "estimation/bounded/log_sum.hpp"
 #include "estimation/hypotheses.hpp"
 #include "estimation/pose_draws.hpp"
@@ -19,56 +19,6 @@
 namespace palpate {
 
 namespace {
-
-/// Draws bins from a belief whose bins come box by box, one in each of equal parts of the belief.
-class BeliefDraws {
- public:
-  /// @param targets ascending, as parts of the belief
-  /// @param lattice,log_weight outlive this object; log_weight is [hypothesis], the log of its
-  /// prior weight
-  /// @param log_total log of the summed likelihood of all bins to come, with prior weights
-  BeliefDraws(std::vector<double> targets, const PoseLattice& lattice,
-              std::span<const double> log_weight, double log_total)
-      : lattice_(lattice),
-        log_weight_(log_weight),
-        log_total_(log_total),
-        targets_(std::move(targets)) {
-    draws_.reserve(targets_.size());
-  }
-
-  /// See BinVisitor.
-  void add(const BinBox& box, std::span<const double> log_likelihood) {
-    const bool alike = log_likelihood.size() == 1;
-    for (std::size_t i = 0; i < log_likelihood.size(); ++i) {
-      const std::int64_t bins = alike ? box.bins() : 1;
-      const double p = std::exp(log_weight_[box.object] - log_total_ + log_likelihood[i]);
-      const double after = reached_ + p * static_cast<double>(bins);
-      last_ = {box.object, box.bin(static_cast<std::int64_t>(i) + bins - 1, lattice_)};
-      while (draws_.size() < targets_.size() && targets_[draws_.size()] < after) {
-        const auto within = static_cast<std::int64_t>((targets_[draws_.size()] - reached_) / p);
-        const std::int64_t bin = static_cast<std::int64_t>(i) + std::min(within, bins - 1);
-        draws_.push_back({box.object, box.bin(bin, lattice_)});
-      }
-      reached_ = after;
-    }
-  }
-
-  /// The draws, in the order of objects and bins.
-  std::vector<DrawnBin> take() {
-    draws_.resize(targets_.size(), last_);  // rounding may leave the last draw out
-    std::ranges::sort(draws_, {}, &DrawnBin::place);
-    return std::move(draws_);
-  }
-
- private:
-  const PoseLattice& lattice_;
-  std::span<const double> log_weight_;
-  double log_total_;
-  std::vector<double> targets_;  ///< ascending, as parts of the belief
-  std::vector<DrawnBin> draws_;
-  double reached_ = 0.0;  ///< part of the belief that has come
-  DrawnBin last_;         ///< the last bin that has come
-};
 
 /// After no more touches a belief is wide: a few draws need few of its bins.
 constexpr std::size_t wide_touches = 2;
@@ -210,7 +160,7 @@ double BoundedBelief::bins_in_all() const {
 SearchGoal BoundedBelief::rough_goal() const {
   // Few bins take as long whatever the tolerance, and a close search lets those that are found be
   // followed through the next touches.
-  const double rough = likelihood_.displaces() ? followable : soon;
+  const double rough = likelihood_.displaces() && !moving_ ? followable : soon;
   return {.tolerance = bins_in_all() <= closely_drawn_bins ? options_.tolerance
                                                            : std::max(options_.tolerance, rough),
           .exact = false,
