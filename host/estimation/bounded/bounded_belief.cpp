@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 #include <tbb/info.h>
 
-#include "estimation/bin_box.hpp"
+#include "estimation/bounded/belief_draws.hpp"
 #include "estimation/bounded/log_sum.hpp"
 #include "estimation/hypotheses.hpp"
 #include "estimation/pose_draws.hpp"
@@ -20,56 +20,6 @@ namespace palpate {
 
 namespace {
 
-/// Draws bins from a belief whose bins come box by box, one in each of equal parts of the belief.
-class BeliefDraws {
- public:
-  /// @param targets ascending, as parts of the belief
-  /// @param lattice,log_weight outlive this object; log_weight is [hypothesis], the log of its
-  /// prior weight
-  /// @param log_total log of the summed likelihood of all bins to come, with prior weights
-  BeliefDraws(std::vector<double> targets, const PoseLattice& lattice,
-              std::span<const double> log_weight, double log_total)
-      : lattice_(lattice),
-        log_weight_(log_weight),
-        log_total_(log_total),
-        targets_(std::move(targets)) {
-    draws_.reserve(targets_.size());
-  }
-
-  /// See BinVisitor.
-  void add(const BinBox& box, std::span<const double> log_likelihood) {
-    const bool alike = log_likelihood.size() == 1;
-    for (std::size_t i = 0; i < log_likelihood.size(); ++i) {
-      const std::int64_t bins = alike ? box.bins() : 1;
-      const double p = std::exp(log_weight_[box.object] - log_total_ + log_likelihood[i]);
-      const double after = reached_ + p * static_cast<double>(bins);
-      last_ = {box.object, box.bin(static_cast<std::int64_t>(i) + bins - 1, lattice_)};
-      while (draws_.size() < targets_.size() && targets_[draws_.size()] < after) {
-        const auto within = static_cast<std::int64_t>((targets_[draws_.size()] - reached_) / p);
-        const std::int64_t bin = static_cast<std::int64_t>(i) + std::min(within, bins - 1);
-        draws_.push_back({box.object, box.bin(bin, lattice_)});
-      }
-      reached_ = after;
-    }
-  }
-
-  /// The draws, in the order of objects and bins.
-  std::vector<DrawnBin> take() {
-    draws_.resize(targets_.size(), last_);  // rounding may leave the last draw out
-    std::ranges::sort(draws_, {}, &DrawnBin::place);
-    return std::move(draws_);
-  }
-
- private:
-  const PoseLattice& lattice_;
-  std::span<const double> log_weight_;
-  double log_total_;
-  std::vector<double> targets_;  ///< ascending, as parts of the belief
-  std::vector<DrawnBin> draws_;
-  double reached_ = 0.0;  ///< part of the belief that has come
-  DrawnBin last_;         ///< the last bin that has come
-};
-
 /// After no more touches a belief is wide: a few draws need few of its bins.
 constexpr std::size_t wide_touches = 2;
 /// Bins of all hypotheses together up to which narrower beliefs are searched for draws.
@@ -78,6 +28,10 @@ constexpr double most_searched_bins = 1e8;
 constexpr double closely_drawn_bins = 1e6;
 /// Tolerance that a search with a budget reaches before it goes on, and enough for draws.
 constexpr double soon = 1e-2;
+/// Tolerance of a search for draws where touches are uncertain: it takes little longer than a rough
+/// one, and leaves so little out that its bins can be followed through the next touches. Two of
+/// them raise that share up to a hundred times.
+constexpr double followable = 1e-4;
 /// How closely the log odds of "none of these" are known, in nats, unless this or the tolerance is
 /// more than it, or the hypotheses, may have.
 constexpr double none_nats = 0.05;
@@ -101,7 +55,7 @@ BoundedBelief::BoundedBelief(std::span<const Hypothesis> hypotheses, const Bound
     moving_.emplace(space_, options_, likelihood_, hypotheses_);
   }
   if (options_.none_weight) {
-    none_.emplace(space_, options_, likelihood_);
+    none_.emplace(space_, options_, likelihood_, search_.largest());
     none_log_weight_ = none_log_weight(*options_.none_weight, hypotheses_, options_.lattice);
   }
 }
@@ -141,7 +95,7 @@ void BoundedBelief::take_in() {
   }
   change_.change([&] {
     if (!moving_ && found_ && found_->bins.complete() &&
-        found_->bins.values().size() <= FollowedBins::most_bins) {
+        found_->bins.values().size() <= FollowedBins::most_bins(likelihood_)) {
       followed_.emplace(found_->bins, found_->result, space_.log_weight, taken_in_);
     }
     found_.reset();
@@ -149,10 +103,15 @@ void BoundedBelief::take_in() {
     std::vector<KnownElements> known;
     for (const ArrayReadings& touch : added) {
       known.push_back(known_elements(touch));
+      for (KnownElements& uncertain : known.back().touches) {
+        uncertain.exact_bins = std::make_shared<ExactBins>(hypotheses_.size(), space_.turns.size(),
+                                                           ExactBins::most_bytes / touches_.size());
+      }
     }
     if (moving_) {
       std::ranges::for_each(known, [&](const KnownElements& touch) { moving_->add(touch); });
-    } else {
+    }
+    if (!moving_ || (none_ && !options_.touch_sd.none())) {
       arena_.execute([&] { search_.largest().add(known); });
     }
     known.insert(known.begin(), std::move(elements_));
@@ -170,7 +129,11 @@ std::string BoundedBelief::path() const {
 }
 
 std::uint64_t BoundedBelief::bytes() const {
-  return likelihood_.bytes() + space_.bytes() + search_.largest().bytes() +
+  std::uint64_t exact_bins = 0;
+  for (const KnownElements& touch : elements_.touches) {
+    exact_bins += touch.exact_bins->bytes();
+  }
+  return exact_bins + likelihood_.bytes() + space_.bytes() + search_.largest().bytes() +
          static_cast<std::uint64_t>(
              moving_ ? MovingBelief::bytes_needed(options_.lattice, hypotheses_.size()) : 0.0) +
          (found_ ? found_->bins.bytes() : 0) + (none_ ? none_->bytes() : 0);
@@ -197,8 +160,9 @@ double BoundedBelief::bins_in_all() const {
 SearchGoal BoundedBelief::rough_goal() const {
   // Few bins take as long whatever the tolerance, and a close search lets those that are found be
   // followed through the next touches.
+  const double rough = likelihood_.displaces() && !moving_ ? followable : soon;
   return {.tolerance = bins_in_all() <= closely_drawn_bins ? options_.tolerance
-                                                           : std::max(options_.tolerance, soon),
+                                                           : std::max(options_.tolerance, rough),
           .exact = false,
           .poor_bins = options_.poor_bins};
 }
@@ -287,10 +251,20 @@ bool BoundedBelief::follow() {
     return false;
   }
   while (followed_->touches() < taken_in_) {
-    const KnownElements touch = known_elements(touches_.all()[followed_->touches()]);
+    const std::size_t next = followed_->touches();
+    KnownElements touch = known_elements(touches_.all()[next]);
     std::vector<double> most;
     for (const TileBounds& bounds : space_.bounds) {
       most.push_back(bounds.best(space_.finest_level(), touch));
+    }
+    if (!touch.touches.empty()) {
+      // Of uncertain touches, those with known elements are counted.
+      const auto uncertain =
+          static_cast<std::size_t>(std::ranges::count_if(touches_.all().first(next), any_known));
+      touch.touches.front() = elements_.touches[uncertain];
+      for (std::size_t i = 0; i < most.size(); ++i) {
+        most[i] = std::min(most[i], search_.largest().most(uncertain, i));
+      }
     }
     arena_.execute([&] { followed_->add(touch, likelihood_, most); });
   }

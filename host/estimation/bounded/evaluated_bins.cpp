@@ -54,7 +54,8 @@ void FollowedBins::add(const KnownElements& elements, const BinLikelihood& likel
                        std::span<const double> most) {
   const std::span<double> values = bins_.values();
   std::vector<double> added(values.size());
-  likelihood.evaluate(bins_.boxes(), elements, Arithmetic::float64, added);
+  likelihood.evaluate(bins_.boxes(), elements,
+                      likelihood.displaces() ? Arithmetic::float32 : Arithmetic::float64, added);
   for (std::size_t i = 0; i < values.size(); ++i) {
     values[i] += added[i];
   }

@@ -53,8 +53,10 @@ class EvaluatedBins {
 /// a touch that surprises nobody they still do.
 class FollowedBins {
  public:
-  /// More bins would take longer than a search.
-  static constexpr std::size_t most_bins = 1 << 14;
+  /// More bins would take longer than a search, which takes long where touches are uncertain.
+  static std::size_t most_bins(const BinLikelihood& likelihood) {
+    return likelihood.displaces() ? 1 << 16 : 1 << 14;
+  }
 
   /// @param bins,found of one search; all bins that it evaluated
   /// @param log_weight [hypothesis] log of its prior weight

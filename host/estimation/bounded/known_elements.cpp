@@ -68,6 +68,10 @@ std::vector<std::size_t> sorted_touches(std::span<const KnownElements> touches) 
   return order;
 }
 
+bool any_known(const ArrayReadings& array) {
+  return std::ranges::any_of(array.readings, [](Reading r) { return r != Reading::unknown; });
+}
+
 KnownElements known_elements(const ArrayReadings& array) {
   std::vector<KnownElement> elements;
   for (std::size_t i = 0; i < array.readings.size(); ++i) {

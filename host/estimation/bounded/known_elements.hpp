@@ -1,12 +1,14 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
 
 #include <glm/vec2.hpp>
 
+#include "estimation/bounded/displaced/exact_bins.hpp"
 #include "estimation/bounded/touch_overlap.hpp"
 #include "palpate/contact_model.hpp"
 
@@ -30,6 +32,8 @@ struct KnownElements {
   // those of others.
   std::vector<KnownElements> touches = {};  ///< each by itself; empty where all are exact
   glm::dvec2 sensor_from_pivot_mm = {};     ///< of one touch: the sensor's origin
+  /// Of one touch, where set: keeps what was evaluated of it. Copies share it.
+  std::shared_ptr<ExactBins> exact_bins = {};
 };
 
 /// All elements of a touch in the array's order, Unknown ones too: in the robot frame and relative
@@ -41,6 +45,9 @@ struct ArrayReadings {
   /// The sensor's origin where the touch's pose is uncertain.
   std::optional<glm::dvec2> sensor_from_pivot_mm = {};
 };
+
+/// Whether an element is not Unknown.
+bool any_known(const ArrayReadings& array);
 
 /// The elements that are not Unknown.
 KnownElements known_elements(const ArrayReadings& array);

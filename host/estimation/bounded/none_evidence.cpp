@@ -40,8 +40,8 @@ double width(const LogInterval& of) { return of.high - of.low; }
 }  // namespace
 
 NoneEvidence::NoneEvidence(SearchSpace& space, const BoundedOptions& options,
-                           const BinLikelihood& likelihood)
-    : space_(space), options_(options), likelihood_(likelihood) {
+                           const BinLikelihood& likelihood, const LargestTiles& largest)
+    : space_(space), options_(options), likelihood_(likelihood), largest_(largest) {
   if (space.displacement) {
     search_.emplace(space, options, likelihood);
   }
@@ -51,7 +51,7 @@ void NoneEvidence::add(std::span<const ArrayReadings> touches) {
   std::vector<TouchMean> added;
   for (const ArrayReadings& touch : touches) {
     // A touch without a known element does not even tell where the array was.
-    if (std::ranges::any_of(touch.readings, [](Reading r) { return r != Reading::unknown; })) {
+    if (any_known(touch)) {
       TouchMean& mean = added.emplace_back(TouchMean{.touch = touch});
       const KnownElements known = known_elements(touch);
       for (const TileBounds& of : space_.bounds) {
@@ -68,17 +68,25 @@ void NoneEvidence::add(std::span<const ArrayReadings> touches) {
   }
 }
 
+void NoneEvidence::survey(TouchMean& mean, std::size_t touch) const {
+  const TouchOverlap overlap(mean.touch.rectangle, space_.boxes, options_.lattice);
+  const auto all_bins = static_cast<double>(options_.lattice.bins());
+  double bins = overlap.weighted_bins(space_.log_weight);
+  // Where no pose of the region brings the array to an object, all poses are alike.
+  mean.everywhere = bins == 0.0;
+  LogSum most;
+  for (std::size_t i = 0; i < space_.bounds.size(); ++i) {
+    bins += mean.everywhere ? std::exp(space_.log_weight[i]) * all_bins : 0.0;
+    most.add(space_.log_weight[i] + largest_.most_of_all(touch, i));
+  }
+  mean.log_bins = std::log(bins);
+  mean.log_share = *mean.log_bins - std::log(all_bins);
+  mean.before.high = std::min(mean.before.high, most.log() - *mean.log_bins);
+}
+
 std::optional<LogInterval> NoneEvidence::search_displaced(TouchMean& mean,
                                                           const Deadline& deadline) {
   const TouchOverlap overlap(mean.touch.rectangle, space_.boxes, options_.lattice);
-  double bins = overlap.weighted_bins(space_.log_weight);
-  // Where no pose of the region brings the array to an object, all poses are alike.
-  const bool everywhere = bins == 0.0;
-  if (everywhere) {
-    for (const double log_weight : space_.log_weight) {
-      bins += std::exp(log_weight) * static_cast<double>(options_.lattice.bins());
-    }
-  }
   const KnownElements elements = known_elements(mean.touch);
   search_->largest().reset();
   search_->largest().add(elements);
@@ -86,17 +94,15 @@ std::optional<LogInterval> NoneEvidence::search_displaced(TouchMean& mean,
       elements,
       {.tolerance = left_out_parts.at(mean.found.size()),
        .mode = false,
-       .counted = everywhere ? nullptr : &overlap},
+       .counted = mean.everywhere ? nullptr : &overlap},
       deadline, [](const BinBox& /*box*/, std::span<const double> /*log_likelihood*/) {});
   const LogInterval all = found.all().bounds();
-  const double log_bins = std::log(bins);
-  mean.log_share = log_bins - std::log(static_cast<double>(options_.lattice.bins()));
   if (deadline.passed()) {
     return {};
   }
   mean.closest = mean.found.size() + 1 == left_out_parts.size();
   mean.rounding_counts = mean.found.size() > 2;  // the first searches may do the same work
-  return LogInterval{all.low - log_bins, all.high - log_bins};
+  return LogInterval{all.low - *mean.log_bins, all.high - *mean.log_bins};
 }
 
 std::optional<LogInterval> NoneEvidence::search_exact(TouchMean& mean, const Deadline& deadline) {
@@ -137,6 +143,11 @@ bool NoneEvidence::search(TouchMean& mean, const Deadline& deadline) {
 LogInterval NoneEvidence::bounds(const Enough& enough, const Deadline& deadline) {
   if (means_.empty()) {
     return {};
+  }
+  for (std::size_t i = 0; i < means_.size(); ++i) {
+    if (search_ && !means_[i].log_bins) {
+      survey(means_[i], i);
+    }
   }
   // What an earlier call found closer does not count: bounds depend on what is asked for.
   std::vector<std::size_t> searches(means_.size());

@@ -34,7 +34,8 @@ class NoneByBounds {
         options{.lattice = lattice, .contact = resolve(contact, objects)},
         likelihood(objects, options.contact, lattice),
         space(objects, options),
-        none(space, options, likelihood) {}
+        largest(space),
+        none(space, options, likelihood, largest) {}
 
   void add(std::span<const Touch> touches) {
     std::vector<ArrayReadings> arrays;
@@ -71,6 +72,7 @@ class NoneByBounds {
   BoundedOptions options;
   BinLikelihood likelihood;
   SearchSpace space;
+  LargestTiles largest;
   NoneEvidence none;
 };
 

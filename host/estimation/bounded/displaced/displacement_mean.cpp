@@ -42,14 +42,18 @@ BlockRange blocks_taken(const Tap& tap, const BlockRun& run, const PlaceWeights&
 }
 
 /// The least part of a tap's bilinear weights that lies inside the region, for any bin of a place.
-double weight_inside(int place, int bins, const Axis& axis, int moved, double fraction) {
+inline double weight_inside(int place, int bins, const Axis& axis, int moved, double fraction) {
+  const int end = std::min((place + 1) * bins, axis.count);
+  if (place * bins + moved >= 0 && end + moved < axis.count) {
+    return (1.0 - fraction) + fraction;  // all bins of most places lie inside
+  }
   const auto inside = [&](int at) { return at >= 0 && at < axis.count; };
   const auto of_bin = [&](int bin) {
     return (inside(bin + moved) ? 1.0 - fraction : 0.0) +
            (inside(bin + moved + 1) ? fraction : 0.0);
   };
   // It grows and then falls along the axis: least is that of the first or of the last.
-  return std::min(of_bin(place * bins), of_bin(std::min((place + 1) * bins, axis.count) - 1));
+  return std::min(of_bin(place * bins), of_bin(end - 1));
 }
 
 /// Adds up the planes of a run's taps.

@@ -68,6 +68,7 @@ std::vector<Tap> DisplacementWeights::taps(int theta,
   const Axis& angles = lattice_.theta_rad;
   const double theta_rad = angles.centre(theta);
   const double error = fraction_error(sensor_from_pivot_mm);
+  const glm::dvec2 sensor_mm = rotate(theta_rad, sensor_from_pivot_mm);
   std::vector<Tap> taps;
   for (int k = -theta_steps_; k <= theta_steps_; ++k) {
     if (!lattice_.full_circle() && (theta + k < 0 || theta + k >= angles.count)) {
@@ -78,8 +79,7 @@ std::vector<Tap> DisplacementWeights::taps(int theta,
             .weight = weight_at(k, angles, sd_.rad)};
     const glm::dvec2 shift_mm =
         k == 0 ? glm::dvec2(0.0)
-               : rotate(theta_rad, sensor_from_pivot_mm) -
-                     rotate(theta_rad + k * angles.step(), sensor_from_pivot_mm);
+               : sensor_mm - rotate(theta_rad + k * angles.step(), sensor_from_pivot_mm);
     bool inside = true;
     const auto split = [&](const Axis& axis, double mm, int& bins, double& fraction) {
       const double steps = axis.count == 1 ? 0.0 : mm / axis.step();

@@ -52,9 +52,9 @@ struct PlacedMap {
 
 /// Evaluates the log-likelihood (Eq. 7, 13) of bins on the host, by vector instructions chosen at
 /// run time. A bin has the same bits with every set of instructions, on every number of threads and
-/// in every box. Calls from several threads may run at once. Touches of uncertain pose have their
-/// mean likelihoods: all bins within reach of a bin are evaluated, too, and boxes that lie together
-/// share them.
+/// in every box. Calls from several threads may run at once, but for those about the same touches
+/// with KnownElements::exact_bins. Touches of uncertain pose have their mean likelihoods: all bins
+/// within reach of a bin are evaluated, too, and boxes that lie together share them.
 class BinLikelihood {
  public:
   /// @param contact resolved: with its prior
@@ -89,6 +89,10 @@ class BinLikelihood {
   template <typename Lane>
   void evaluate_alone(std::span<const BinBox> boxes, const KnownElements& elements,
                       double* log_likelihood) const;
+  /// Sets a touch's bins as if its pose were exact, on the caller's thread.
+  template <typename Lane>
+  void evaluate_blocks(std::size_t object, std::span<const BlockRun> runs,
+                       const KnownElements& touch, const PlaceRows<double>& rows) const;
   template <typename Lane>
   void evaluate_exact(std::span<const BinBox> boxes, const KnownElements& elements,
                       std::span<double> log_likelihood) const;

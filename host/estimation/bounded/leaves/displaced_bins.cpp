@@ -75,6 +75,33 @@ class BlockSums {
 }  // namespace
 
 template <typename Lane>
+void BinLikelihood::evaluate_blocks(std::size_t object, std::span<const BlockRun> runs,
+                                    const KnownElements& touch,
+                                    const PlaceRows<double>& rows) const {
+  std::vector<BinBox> parts;
+  std::size_t bins = 0;
+  for (const BlockRun& run : runs) {
+    BinBox& part = parts.emplace_back(
+        BinBox{.object = static_cast<std::int32_t>(object),
+               .theta = run.theta,
+               .y_first = side * run.y,
+               .y_count = std::min(side, lattice_.y_mm.count - side * run.y),
+               .x_first = side * run.x,
+               .x_count = std::min(side * run.count, lattice_.x_mm.count - side * run.x)});
+    bins += static_cast<std::size_t>(part.bins());
+  }
+  std::vector<double> values(bins);
+  evaluate_alone<Lane>(parts, touch, values.data());
+  auto value = values.begin();
+  for (const BinBox& part : parts) {
+    for (int y = part.y_first; y < part.y_first + part.y_count; ++y) {
+      std::copy(value, value + part.x_count, rows.at(part.x_first, y));
+      value += part.x_count;
+    }
+  }
+}
+
+template <typename Lane>
 void BinLikelihood::evaluate_displaced(std::span<const BinBox> boxes, const KnownElements& elements,
                                        std::span<double> log_likelihood,
                                        std::span<double> errors) const {
@@ -87,31 +114,19 @@ void BinLikelihood::evaluate_displaced(std::span<const BinBox> boxes, const Know
       ++end;
     }
     const std::span<const BinBox> of_object = boxes.subspan(first, end - first);
+    const auto object = static_cast<std::size_t>(boxes[first].object);
     BlockSums sums(of_object);
     for (const std::size_t i : order) {
       const KnownElements& touch = elements.touches[i];
       const auto source = [&](std::span<const BlockRun> runs, const PlaceRows<double>& rows) {
-        std::vector<BinBox> parts;
-        std::size_t bins = 0;
-        for (const BlockRun& run : runs) {
-          BinBox& part = parts.emplace_back(
-              BinBox{.object = of_object.front().object,
-                     .theta = run.theta,
-                     .y_first = side * run.y,
-                     .y_count = std::min(side, lattice_.y_mm.count - side * run.y),
-                     .x_first = side * run.x,
-                     .x_count = std::min(side * run.count, lattice_.x_mm.count - side * run.x)});
-          bins += static_cast<std::size_t>(part.bins());
+        // Few bins are evaluated in float64 more than once.
+        if (sizeof(Lane) == sizeof(double) || touch.exact_bins == nullptr) {
+          evaluate_blocks<Lane>(object, runs, touch, rows);
+          return;
         }
-        std::vector<double> values(bins);
-        evaluate_alone<Lane>(parts, touch, values.data());
-        auto value = values.begin();
-        for (const BinBox& part : parts) {
-          for (int y = part.y_first; y < part.y_first + part.y_count; ++y) {
-            std::copy(value, value + part.x_count, rows.at(part.x_first, y));
-            value += part.x_count;
-          }
-        }
+        const std::vector<BlockRun> others = touch.exact_bins->copy(object, runs, rows);
+        evaluate_blocks<Lane>(object, others, touch, rows);
+        touch.exact_bins->keep(object, others, rows);
       };
       sums.add(displaced_->means(touch.sensor_from_pivot_mm, sums.runs(), source));
     }

@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "estimation/bounded/displaced/exact_bins.hpp"
 #include "estimation/bounded/leaves/bin_kernel.hpp"
 #include "estimation/bounded/moving/moving_belief.hpp"
 #include "estimation/bounded/search/leaves.hpp"
@@ -113,8 +114,9 @@ SearchMemory search_memory(std::span<const Hypothesis> hypotheses, const Bounded
       bytes_per_bin * std::min(static_cast<double>(largest_batch) + memory.largest_family,
                                bins_in_all(hypotheses, lattice));
   if (!options.touch_sd.none()) {
-    // Every plane's mean, and its neighbours' sums.
-    memory.means = 2.0 * sizeof(double) * bins_in_all(hypotheses.first(1), lattice);
+    // Every plane's mean, and its neighbours' sums; and of all bins, what is kept of them.
+    memory.means = 2.0 * sizeof(double) * bins_in_all(hypotheses.first(1), lattice) +
+                   static_cast<double>(ExactBins::most_bytes);
   }
   if (!options.slip_sd.none()) {
     memory.means += MovingBelief::bytes_needed(lattice, hypotheses.size());

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "estimation/bounded/displaced/places.hpp"
+
+namespace palpate {
+
+/// Log-likelihoods of bins, in nats, as if the pose of their touch were exact. Means over
+/// displacements take the same bins again and again: for bins nearby, and for the belief after
+/// further touches. Several threads may work on planes of different thetas.
+class ExactBins {
+ public:
+  /// Memory for all touches of a belief together, if each has its part.
+  static constexpr std::size_t most_bytes = std::size_t{64} << 20;
+
+  /// @param bytes that are held at most, about: what finds no room is not kept
+  ExactBins(std::size_t objects, std::size_t thetas, std::size_t bytes)
+      : thetas_(thetas), planes_(objects * thetas), most_(bytes / block_bytes), room_(most_) {}
+
+  /// Copies those bins that are kept. @returns the others
+  /// @param runs of one theta
+  std::vector<BlockRun> copy(std::size_t object, std::span<const BlockRun> runs,
+                             const PlaceRows<double>& to) const;
+  /// Keeps bins that copy() did not find, as far as there is room.
+  /// @param runs of one theta
+  void keep(std::size_t object, std::span<const BlockRun> runs, const PlaceRows<double>& from);
+  /// Host memory of what is kept, about.
+  std::size_t bytes() const { return (most_ - room_) * block_bytes; }
+
+ private:
+  /// The bins of a block, [y, x].
+  using Block = std::array<double, BlockRun::places>;
+  /// Blocks by y and x.
+  using Plane = std::unordered_map<std::uint64_t, Block>;
+  /// With its place in the table.
+  static constexpr std::size_t block_bytes = sizeof(Plane::value_type) + 3 * sizeof(void*);
+
+  std::size_t thetas_;
+  std::vector<Plane> planes_;      ///< [object, theta]
+  std::size_t most_;               ///< blocks
+  std::atomic<std::size_t> room_;  ///< for so many blocks more
+};
+
+}  // namespace palpate
