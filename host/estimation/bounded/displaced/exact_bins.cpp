@@ -38,10 +38,10 @@ void ExactBins::keep(std::size_t object, std::span<const BlockRun> runs,
   for (const BlockRun& run : runs) {
     Plane& plane = planes_[object * thetas_ + static_cast<std::size_t>(run.theta)];
     for (int x = run.x; x < run.x + run.count; ++x) {
-      if (room_ == 0) {
+      if (--room_ < 0) {  // other threads take room, too
+        ++room_;
         return;
       }
-      --room_;
       Block& block = plane[place(run.y, x)];
       for (int j = 0; j < side; ++j) {
         std::copy_n(from.at(side * x, side * run.y + j), side, block.data() + side * j);

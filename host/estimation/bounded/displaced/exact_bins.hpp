@@ -23,7 +23,10 @@ class ExactBins {
 
   /// @param bytes that are held at most, about: what finds no room is not kept
   ExactBins(std::size_t objects, std::size_t thetas, std::size_t bytes)
-      : thetas_(thetas), planes_(objects * thetas), most_(bytes / block_bytes), room_(most_) {}
+      : thetas_(thetas),
+        planes_(objects * thetas),
+        most_(static_cast<std::int64_t>(bytes / block_bytes)),
+        room_(most_) {}
 
   /// Copies those bins that are kept. @returns the others
   /// @param runs of one theta
@@ -33,7 +36,7 @@ class ExactBins {
   /// @param runs of one theta
   void keep(std::size_t object, std::span<const BlockRun> runs, const PlaceRows<double>& from);
   /// Host memory of what is kept, about.
-  std::size_t bytes() const { return (most_ - room_) * block_bytes; }
+  std::size_t bytes() const { return static_cast<std::size_t>(most_ - room_) * block_bytes; }
 
  private:
   /// The bins of a block, [y, x].
@@ -44,9 +47,9 @@ class ExactBins {
   static constexpr std::size_t block_bytes = sizeof(Plane::value_type) + 3 * sizeof(void*);
 
   std::size_t thetas_;
-  std::vector<Plane> planes_;      ///< [object, theta]
-  std::size_t most_;               ///< blocks
-  std::atomic<std::size_t> room_;  ///< for so many blocks more
+  std::vector<Plane> planes_;       ///< [object, theta]
+  std::int64_t most_;               ///< blocks
+  std::atomic<std::int64_t> room_;  ///< for so many blocks more
 };
 
 }  // namespace palpate
