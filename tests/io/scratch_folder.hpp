@@ -5,7 +5,7 @@
 
 #include <filesystem>
 #include <fstream>
-#include <iterator>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 
@@ -35,8 +35,8 @@ class ScratchFolder {
 };
 
 inline std::string bytes_of(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
+  const std::ifstream file(path, std::ios::binary);
+  return (std::ostringstream() << file.rdbuf()).str();
 }
 
 inline void put_bytes(const std::filesystem::path& path, const std::string& bytes) {
