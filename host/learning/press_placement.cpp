@@ -52,7 +52,8 @@ glm::dmat2 rotation(double theta_rad) {
 }  // namespace
 
 int PressPlacer::Samples::nearest(double mm) const {
-  return static_cast<int>((mm - first_mm) / step_mm + 0.5);  // they begin below all elements
+  // Truncated, as they begin below all elements.
+  return static_cast<int>((mm - (first_mm - 0.5 * step_mm)) / step_mm);
 }
 
 PressPlacer::PressPlacer(const Hypothesis& hypothesis, const ContactModel& contact,
