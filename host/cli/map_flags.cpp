@@ -77,8 +77,7 @@ void add_map_flags(CLI::App& command, MapFlags& flags) {
       ->capture_default_str();
   command.add_option("--threshold", flags.threshold,
                      "Contact threshold, in the recording's pressure unit [default: learned where "
-                     "--unposed learns "
-                     "the sensor; else 2 kPa, and required for raw pressure]");
+                     "--unposed learns the sensor; else 2 kPa, and required for raw pressure]");
   command.add_option("--ratio", flags.ratio,
                      "Threshold as a fraction of the touch's largest pressure [default: 0.3]");
   command.add_option("--sensor-model", flags.sensor_model,
