@@ -55,7 +55,7 @@ BoundedBelief::BoundedBelief(std::span<const Hypothesis> hypotheses, const Bound
     moving_.emplace(space_, options_, likelihood_, hypotheses_);
   }
   if (options_.none_weight) {
-    none_.emplace(space_, options_, likelihood_, search_.largest());
+    none_.emplace(space_, options_, likelihood_);
     none_log_weight_ = none_log_weight(*options_.none_weight, hypotheses_, options_.lattice);
   }
 }
@@ -111,7 +111,7 @@ void BoundedBelief::take_in() {
     if (moving_) {
       std::ranges::for_each(known, [&](const KnownElements& touch) { moving_->add(touch); });
     }
-    if (!moving_ || (none_ && !options_.touch_sd.none())) {
+    if (!moving_) {
       arena_.execute([&] { search_.largest().add(known); });
     }
     known.insert(known.begin(), std::move(elements_));
@@ -136,7 +136,7 @@ std::uint64_t BoundedBelief::bytes() const {
   return exact_bins + likelihood_.bytes() + space_.bytes() + search_.largest().bytes() +
          static_cast<std::uint64_t>(
              moving_ ? MovingBelief::bytes_needed(options_.lattice, hypotheses_.size()) : 0.0) +
-         (found_ ? found_->bins.bytes() : 0) + (none_ ? none_->bytes() : 0);
+         (found_ ? found_->bins.bytes() : 0);
 }
 
 SearchGoal BoundedBelief::goal() const {

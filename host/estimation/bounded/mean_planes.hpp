@@ -47,7 +47,8 @@ class MeanSearch::Planes {
   /// What the largest tiles of a plane tell.
   Survey survey(int theta) {
     enter(theta);
-    Survey found{.bins = bins_, .unseen = bins_ - seen_bins_};
+    Survey found{.bins = bins_};
+    count_unseen(found);
     if (sum_largest(); !sums_.empty()) {
       const std::uint32_t least = std::ranges::min(sums_);
       PenaltySum all(least);
@@ -81,14 +82,20 @@ class MeanSearch::Planes {
     return left_out.log();
   }
 
-  /// Log of the summed likelihood of the bins that count in what was divided.
-  double evaluated(Arithmetic arithmetic) const {
+  /// Bounds of the log of the summed likelihood of the bins that count in what was divided, beside
+  /// the likelihood's own error.
+  LogInterval evaluated(Arithmetic arithmetic) {
     std::int64_t bins = 0;
     for (const BinBox& box : boxes_) {
       bins += box.bins();
     }
     std::vector<double> values(static_cast<std::size_t>(bins));
-    of_.likelihood_.evaluate(boxes_, of_.elements_, arithmetic, values);
+    of_.likelihood_.evaluate_exact(boxes_, of_.elements_, arithmetic, values);
+    const double log_weight = of_.space_.log_weight[object_];
+    if (of_.shares_) {
+      const LogInterval sum = sum_of_shares(values);
+      return {log_weight + sum.low, log_weight + sum.high};
+    }
     LogSum sum;
     const double* value = values.data();
     auto row = counted_.begin();
@@ -99,40 +106,99 @@ class MeanSearch::Planes {
         }
       }
     }
-    return of_.space_.log_weight[object_] + sum.log();
+    return {log_weight + sum.log(), log_weight + sum.log()};
   }
 
  private:
-  double most(std::size_t level) const { return of_.most_[object_][level]; }
+  /// The log of what a bin counts at most where no element has a penalty.
+  double most(std::size_t level) const { return of_.most_[object_][level] + log_most_share_; }
+
+  /// Bounds of the log of the sum of the boxes' likelihoods by their shares.
+  /// @param values log-likelihoods, box after box
+  LogInterval sum_of_shares(const std::vector<double>& values) {
+    std::vector<double> counts;
+    double error = 0.0;
+    for (std::size_t first = 0, end = 0; first < boxes_.size(); first = end) {
+      BinBox around{.object = static_cast<std::int32_t>(object_), .theta = boxes_[first].theta};
+      for (; end < boxes_.size() && boxes_[end].theta == around.theta; ++end) {
+        around = smallest_around(around, boxes_[end]);
+      }
+      const OverlapShares::Shares shares = of_.shares_->at(around, share_planes_);
+      error = std::max(error, shares.error);
+      for (const BinBox& box : std::span(boxes_).subspan(first, end - first)) {
+        auto row = shares.of_bins.begin() +
+                   std::ptrdiff_t{box.y_first - around.y_first} * around.x_count +
+                   (box.x_first - around.x_first);
+        for (int y = 0; y < box.y_count; ++y, row += around.x_count) {
+          counts.insert(counts.end(), row, row + box.x_count);
+        }
+      }
+    }
+    double largest = nothing;
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      largest = counts[i] > 0.0 ? std::max(largest, values[i]) : largest;
+    }
+    if (largest == nothing) {
+      return {nothing, nothing};
+    }
+    double sum = 0.0;
+    double all = 0.0;
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      const double likelihood = std::exp(values[i] - largest);
+      sum += counts[i] * likelihood;
+      all += likelihood;
+    }
+    const double relative = of_.shares_->relative_error();
+    return {largest + std::log(std::max(sum - error * all, 0.0)) - relative,
+            largest + std::log(sum + error * all) + relative};
+  }
+
+  /// Sets how many of the plane's bins, or what shares of them, lie outside the largest tiles.
+  void count_unseen(Survey& of) {
+    if (all_seen_) {
+      return;
+    }
+    const BinBox seen = largest_.x_first < largest_.x_end ? box_of(0, largest_) : BinBox{};
+    if (!of_.shares_) {
+      std::int64_t seen_bins = 0;
+      for (int y = seen.y_first; y < seen.y_first + seen.y_count; ++y) {
+        seen_bins += in_row(seen, y).count;
+      }
+      of.unseen = static_cast<double>(bins_ - seen_bins);
+      return;
+    }
+    const OverlapShares::Shares shares = of_.shares_->at(around_, share_planes_);
+    const double* share = shares.of_bins.data();
+    for (int y = around_.y_first; y < around_.y_first + around_.y_count; ++y) {
+      const bool row_seen = y >= seen.y_first && y < seen.y_first + seen.y_count;
+      for (int x = around_.x_first; x < around_.x_first + around_.x_count; ++x, ++share) {
+        if (!row_seen || x < seen.x_first || x >= seen.x_first + seen.x_count) {
+          of.unseen += *share;
+          of.unseen_error += shares.error;
+        }
+      }
+    }
+    of.unseen_error += of.unseen * std::expm1(of_.shares_->relative_error());
+  }
 
   /// Finds the plane's bins that count, and the largest tiles that hold them and see the map.
   void enter(int theta) {
     theta_ = theta;
-    const PoseLattice& lattice = of_.options_.lattice;
-    const OverlapPlane overlap(of_.rectangle_, of_.space_.boxes[object_], lattice, theta);
-    OverlapPlane::Bins columns{lattice.x_mm.count, 0};  // [first, end)
-    OverlapPlane::Bins lines{lattice.y_mm.count, 0};
-    bins_ = 0;
-    rows_.clear();
-    for (int y = 0; y < lattice.y_mm.count; ++y) {
-      const OverlapPlane::Bins row =
-          of_.everywhere_ ? OverlapPlane::Bins{0, lattice.x_mm.count} : overlap.row(y);
-      rows_.push_back(row);
-      if (row.count > 0) {
-        bins_ += row.count;
-        columns = {std::min(columns.first, row.first),
-                   std::max(columns.count, row.first + row.count)};
-        lines = {std::min(lines.first, y), y + 1};
-      }
+    if (of_.shares_) {
+      enter_shares();
+    } else {
+      enter_overlap();
     }
     largest_ = {};
-    seen_bins_ = 0;
-    if (bins_ == 0) {
+    all_seen_ = around_.bins() == 0;
+    if (all_seen_) {
       return;
     }
+    const int x_end = around_.x_first + around_.x_count;
+    const int y_end = around_.y_first + around_.y_count;
     const TileLevel& level = levels_.front();
-    const auto [x_tile, x_tile_end] = tiles_of(level.x, columns.first, columns.count);
-    const auto [y_tile, y_tile_end] = tiles_of(level.y, lines.first, lines.count);
+    const auto [x_tile, x_tile_end] = tiles_of(level.x, around_.x_first, x_end);
+    const auto [y_tile, y_tile_end] = tiles_of(level.y, around_.y_first, y_end);
     const TileRange seen =
         seen_tiles(of_.reaches_[static_cast<std::size_t>(theta)], of_.space_.maps[object_], level);
     const auto down = [](int tile) { return tile - tile % batch_side; };
@@ -143,14 +209,37 @@ class MeanSearch::Planes {
     if (batches.x_first < batches.x_end && batches.y_first < batches.y_end) {
       largest_ = batches;
       const BinBox box = box_of(0, batches);
-      const bool all = box.x_first <= columns.first && box.y_first <= lines.first &&
-                       box.x_first + box.x_count >= columns.count &&
-                       box.y_first + box.y_count >= lines.count;
-      seen_bins_ = all ? bins_ : 0;
-      for (int y = box.y_first; !all && y < box.y_first + box.y_count; ++y) {
-        seen_bins_ += in_row(box, y).count;
+      all_seen_ = box.x_first <= around_.x_first && box.y_first <= around_.y_first &&
+                  box.x_first + box.x_count >= x_end && box.y_first + box.y_count >= y_end;
+    }
+  }
+
+  /// Finds the bins at which the array overlaps the object.
+  void enter_overlap() {
+    const PoseLattice& lattice = of_.options_.lattice;
+    const OverlapPlane overlap(of_.rectangle_, of_.space_.boxes[object_], lattice, theta_);
+    bins_ = 0;
+    around_ = {};
+    rows_.clear();
+    for (int y = 0; y < lattice.y_mm.count; ++y) {
+      const OverlapPlane::Bins row =
+          of_.everywhere_ ? OverlapPlane::Bins{0, lattice.x_mm.count} : overlap.row(y);
+      rows_.push_back(row);
+      if (row.count > 0) {
+        bins_ += row.count;
+        around_ = smallest_around(
+            around_, {.y_first = y, .y_count = 1, .x_first = row.first, .x_count = row.count});
       }
     }
+  }
+  /// Finds the bins that have a share, or a box around them.
+  void enter_shares() {
+    bins_ = of_.shares_->overlapping(object_, theta_);
+    around_ = of_.shares_->reach(object_, theta_);
+    log_most_share_ = std::log(of_.shares_->most(object_, theta_));
+    rows_.assign(static_cast<std::size_t>(of_.options_.lattice.y_mm.count), {});
+    std::fill_n(rows_.begin() + around_.y_first, around_.y_count,
+                OverlapPlane::Bins{around_.x_first, around_.x_count});
   }
 
   BinBox box_of(std::size_t level, const TileRange& tiles) const {
@@ -271,13 +360,16 @@ class MeanSearch::Planes {
   std::vector<int> placed_at_;               ///< [level] theta
   std::vector<BinBox> boxes_;                ///< to be evaluated
   std::vector<OverlapPlane::Bins> counted_;  ///< [box, row]
+  OverlapShares::Planes share_planes_;
 
   // Of the plane.
   int theta_ = 0;
-  std::vector<OverlapPlane::Bins> rows_;  ///< [y] bins that count
-  std::int64_t bins_ = 0;                 ///< that count
-  std::int64_t seen_bins_ = 0;            ///< of these, in tiles that see the map
-  TileRange largest_;  ///< whole batches of the largest tiles, about those that hold seen bins
+  std::vector<OverlapPlane::Bins> rows_;  ///< [y] bins that count, or may have a share
+  BinBox around_;                         ///< these
+  std::int64_t bins_ = 0;                 ///< that count in the mean
+  double log_most_share_ = 0.0;           ///< of any of the plane's bins
+  TileRange largest_;      ///< whole batches of the largest tiles, about those that hold seen bins
+  bool all_seen_ = false;  ///< they hold all bins that count
   std::vector<std::uint32_t> sums_;         ///< [batch, tile] of these
   std::vector<std::int64_t> last_divided_;  ///< [level] the largest sum of a tile that is divided
   std::vector<PenaltySum> left_out_;        ///< [level]

@@ -16,6 +16,7 @@ MeanSearch::MeanSearch(const SearchSpace& space, const BoundedOptions& options,
       likelihood_(likelihood),
       elements_(known_elements(touch)),
       rectangle_(touch.rectangle),
+      sensor_from_pivot_mm_(touch.sensor_from_pivot_mm),
       reaches_(reaches_of(elements_, space.turns)) {
   const MapSample prior{log_odds_from_probability(*options.contact.prior)};
   for (std::size_t i = 0; i < space.bounds.size(); ++i) {
@@ -29,8 +30,8 @@ MeanSearch::MeanSearch(const SearchSpace& space, const BoundedOptions& options,
              options.contact.log_likelihood(run.reading, prior, i);
     }
     sum += space.log_weight[i];
-    errors_.push_back({likelihood.error(i, elements_, Arithmetic::float32),
-                       likelihood.error(i, elements_, Arithmetic::float64)});
+    errors_.push_back({likelihood.exact_error(i, elements_, Arithmetic::float32),
+                       likelihood.exact_error(i, elements_, Arithmetic::float64)});
   }
 }
 
@@ -56,6 +57,10 @@ bool MeanSearch::for_planes(const Deadline& deadline, const Work& work) const {
 
 bool MeanSearch::survey(const Deadline& deadline) {
   const std::size_t thetas = space_.turns.size();
+  if (sensor_from_pivot_mm_) {
+    shares_.emplace(*space_.displacement, rectangle_, *sensor_from_pivot_mm_, space_.boxes,
+                    everywhere_);
+  }
   std::vector<Survey> surveys(space_.bounds.size() * thetas);
   if (!for_planes(deadline, [&](std::size_t object, std::size_t first, std::size_t end) {
         Planes planes(*this, object);
@@ -91,7 +96,7 @@ std::optional<LogInterval> MeanSearch::bounds(double least, bool exact, const De
   const double least_of_bin = least + log_weighted_bins_ - log_bins_;
   const std::size_t thetas = space_.turns.size();
   std::vector<double> left_out(surveys_.size());
-  std::vector<double> evaluated(surveys_.size(), nothing);
+  std::vector<LogInterval> evaluated(surveys_.size(), {nothing, nothing});
   if (!for_planes(deadline, [&](std::size_t object, std::size_t first, std::size_t end) {
         Planes planes(*this, object);
         for (std::size_t theta = first; theta < end; ++theta) {
@@ -110,15 +115,16 @@ std::optional<LogInterval> MeanSearch::bounds(double least, bool exact, const De
   for (std::size_t i = 0; i < surveys_.size(); ++i) {
     const std::size_t object = i / thetas;
     const double error = errors_[object][exact ? 1 : 0];
-    low.add(evaluated[i] - error);
-    high.add(evaluated[i] + error);
+    low.add(evaluated[i].low - error);
+    high.add(evaluated[i].high + error);
     high.add(left_out[i]);
-    if (surveys_[i].unseen > 0) {
+    const Survey& survey = surveys_[i];
+    if (survey.unseen + survey.unseen_error > 0.0) {
       // Where every element sees the prior, all bins have the same likelihood.
-      const double mass =
-          prior_log_likelihood_[object] + std::log(static_cast<double>(surveys_[i].unseen));
-      low.add(mass - errors_[object][1]);
-      high.add(mass + errors_[object][1]);
+      const double each = prior_log_likelihood_[object];
+      low.add(each + std::log(std::max(survey.unseen - survey.unseen_error, 0.0)) -
+              errors_[object][1]);
+      high.add(each + std::log(survey.unseen + survey.unseen_error) + errors_[object][1]);
     }
   }
   const double log_low = low.log() - log_weighted_bins_;

@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "estimation/bounded/displaced/overlap_shares.hpp"
 #include "estimation/bounded/known_elements.hpp"
 #include "estimation/bounded/search/search_space.hpp"
 #include "model/bounding_box.hpp"
@@ -16,7 +17,8 @@
 namespace palpate {
 
 /// Bounds one touch's mean likelihood over the bins at which its array overlaps an object, or over
-/// all bins where there is no such bin, by prior weight. The touch's pose is exact.
+/// all bins where there is no such bin, by prior weight. Where the touch's pose is uncertain, the
+/// likelihood is an average, and exact likelihoods count in the mean by their OverlapShares.
 ///
 /// A mean is wide: thousands of bins hold it, and no order of tiles is worth keeping. So every
 /// object and theta is searched by itself, from the largest tiles down. Tiles whose bounds lie
@@ -44,7 +46,8 @@ class MeanSearch {
   /// What the largest tiles of a plane, one object at one theta, tell.
   struct Survey {
     std::int64_t bins = 0;      ///< that count
-    std::int64_t unseen = 0;    ///< of these, at which every element sees the prior
+    double unseen = 0.0;        ///< of these, or shares, at which every element sees the prior
+    double unseen_error = 0.0;  ///< of this number
     double best = nothing;      ///< the largest bound, in nats, with the prior weight
     double left_out = nothing;  ///< log of what the tiles that see the map hold at most, the same
   };
@@ -56,6 +59,10 @@ class MeanSearch {
   /// @returns false where the deadline passed
   template <typename Work>
   bool for_planes(const Deadline& deadline, const Work& work) const;
+  /// What a bin of a plane counts at most.
+  double most_share(std::size_t object, int theta) const {
+    return shares_ ? shares_->most(object, theta) : 1.0;
+  }
   /// Looks at the largest tiles of all planes. @returns false where the deadline passed
   bool survey(const Deadline& deadline);
 
@@ -64,7 +71,9 @@ class MeanSearch {
   const BinLikelihood& likelihood_;
   KnownElements elements_;
   ArrayRectangle rectangle_;
-  std::vector<BoundingBox> reaches_;       ///< [theta] of the elements
+  std::optional<glm::dvec2> sensor_from_pivot_mm_;  ///< where the touch's pose is uncertain
+  std::optional<OverlapShares> shares_;             ///< the same, from the first bounds() on
+  std::vector<BoundingBox> reaches_;                ///< [theta] of the elements
   std::vector<std::vector<double>> most_;  ///< [object][level] without penalties, with the weight
   std::vector<double> prior_log_likelihood_;  ///< [object] with the weight
   std::vector<std::array<double, 2>>

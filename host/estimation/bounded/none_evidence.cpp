@@ -8,9 +8,6 @@
 #include <tuple>
 #include <utility>
 
-#include "estimation/bounded/log_sum.hpp"
-#include "estimation/bounded/touch_overlap.hpp"
-
 namespace palpate {
 
 namespace {
@@ -19,7 +16,7 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 /// Bounds that a closer search narrows by less are rounding.
 constexpr double least_gain = 0.9;
 
-/// What the searches of an exact touch leave out at most, in nats above a lower bound of its mean,
+/// What the searches of a touch leave out at most, in nats above a lower bound of its mean,
 /// once that comes near: from the first exact one on they evaluate bins in float64.
 constexpr std::array<double, 7> left_out_nats{0.0, -3.0, -6.5, -10.0, -14.0, -18.0, -22.0};
 constexpr std::size_t first_exact = 3;
@@ -29,36 +26,20 @@ constexpr double usual_gap = 0.6;
 constexpr double least_gap_nats = 2.0;
 constexpr double most_gap_nats = 20.0;
 
-/// Parts of its sum that the searches of a displaced touch leave out. Its bins have likelihoods of
-/// few magnitudes: the bounds of large tiles alone, which the first asks for, come within a few
-/// nats of the mean.
-constexpr std::array<double, 10> left_out_parts{20.0, 0.5,  1e-2, 1e-3, 1e-4,
-                                                1e-5, 1e-6, 1e-7, 1e-8, 1e-9};
-
 double width(const LogInterval& of) { return of.high - of.low; }
 
 }  // namespace
-
-NoneEvidence::NoneEvidence(SearchSpace& space, const BoundedOptions& options,
-                           const BinLikelihood& likelihood, const LargestTiles& largest)
-    : space_(space), options_(options), likelihood_(likelihood), largest_(largest) {
-  if (space.displacement) {
-    search_.emplace(space, options, likelihood);
-  }
-}
 
 void NoneEvidence::add(std::span<const ArrayReadings> touches) {
   std::vector<TouchMean> added;
   for (const ArrayReadings& touch : touches) {
     // A touch without a known element does not even tell where the array was.
     if (any_known(touch)) {
-      TouchMean& mean = added.emplace_back(TouchMean{.touch = touch});
+      TouchMean& mean =
+          added.emplace_back(TouchMean{.search = MeanSearch(space_, options_, likelihood_, touch)});
       const KnownElements known = known_elements(touch);
       for (const TileBounds& of : space_.bounds) {
         mean.before.high = std::max(mean.before.high, of.best(0, known));
-      }
-      if (!space_.displacement) {
-        mean.search.emplace(space_, options_, likelihood_, touch);
       }
     }
   }
@@ -68,44 +49,7 @@ void NoneEvidence::add(std::span<const ArrayReadings> touches) {
   }
 }
 
-void NoneEvidence::survey(TouchMean& mean, std::size_t touch) const {
-  const TouchOverlap overlap(mean.touch.rectangle, space_.boxes, options_.lattice);
-  const auto all_bins = static_cast<double>(options_.lattice.bins());
-  double bins = overlap.weighted_bins(space_.log_weight);
-  // Where no pose of the region brings the array to an object, all poses are alike.
-  mean.everywhere = bins == 0.0;
-  LogSum most;
-  for (std::size_t i = 0; i < space_.bounds.size(); ++i) {
-    bins += mean.everywhere ? std::exp(space_.log_weight[i]) * all_bins : 0.0;
-    most.add(space_.log_weight[i] + largest_.most_of_all(touch, i));
-  }
-  mean.log_bins = std::log(bins);
-  mean.log_share = *mean.log_bins - std::log(all_bins);
-  mean.before.high = std::min(mean.before.high, most.log() - *mean.log_bins);
-}
-
-std::optional<LogInterval> NoneEvidence::search_displaced(TouchMean& mean,
-                                                          const Deadline& deadline) {
-  const TouchOverlap overlap(mean.touch.rectangle, space_.boxes, options_.lattice);
-  const KnownElements elements = known_elements(mean.touch);
-  search_->largest().reset();
-  search_->largest().add(elements);
-  const SearchResult found = search_->run(
-      elements,
-      {.tolerance = left_out_parts.at(mean.found.size()),
-       .mode = false,
-       .counted = mean.everywhere ? nullptr : &overlap},
-      deadline, [](const BinBox& /*box*/, std::span<const double> /*log_likelihood*/) {});
-  const LogInterval all = found.all().bounds();
-  if (deadline.passed()) {
-    return {};
-  }
-  mean.closest = mean.found.size() + 1 == left_out_parts.size();
-  mean.rounding_counts = mean.found.size() > 2;  // the first searches may do the same work
-  return LogInterval{all.low - *mean.log_bins, all.high - *mean.log_bins};
-}
-
-std::optional<LogInterval> NoneEvidence::search_exact(TouchMean& mean, const Deadline& deadline) {
+bool NoneEvidence::search(TouchMean& mean, const Deadline& deadline) {
   double least = infinity;
   bool close = false;
   if (!mean.found.empty()) {
@@ -119,35 +63,22 @@ std::optional<LogInterval> NoneEvidence::search_exact(TouchMean& mean, const Dea
     least = close ? by_low : by_high;
   }
   const bool exact = close && mean.close_searches >= first_exact;
-  const std::optional<LogInterval> found = mean.search->bounds(least, exact, deadline);
-  if (found) {
-    mean.log_share = mean.search->log_share();
-    mean.close_searches += close ? 1 : 0;
-    mean.closest = mean.close_searches == left_out_nats.size();
-    mean.rounding_counts = exact;
+  const std::optional<LogInterval> found = mean.search.bounds(least, exact, deadline);
+  if (!found) {
+    return false;
   }
-  return found;
-}
-
-bool NoneEvidence::search(TouchMean& mean, const Deadline& deadline) {
   const LogInterval last = mean.found.empty() ? mean.before : mean.found.back();
-  const std::optional<LogInterval> found =
-      mean.search ? search_exact(mean, deadline) : search_displaced(mean, deadline);
-  if (found) {
-    mean.found.push_back({std::max(last.low, found->low), std::min(last.high, found->high)});
-    mean.closest |= mean.rounding_counts && width(mean.found.back()) > least_gain * width(last);
-  }
-  return found.has_value();
+  mean.log_share = mean.search.log_share();
+  mean.close_searches += close ? 1 : 0;
+  mean.found.push_back({std::max(last.low, found->low), std::min(last.high, found->high)});
+  mean.closest = mean.close_searches == left_out_nats.size() ||
+                 (exact && width(mean.found.back()) > least_gain * width(last));
+  return true;
 }
 
 LogInterval NoneEvidence::bounds(const Enough& enough, const Deadline& deadline) {
   if (means_.empty()) {
     return {};
-  }
-  for (std::size_t i = 0; i < means_.size(); ++i) {
-    if (search_ && !means_[i].log_bins) {
-      survey(means_[i], i);
-    }
   }
   // What an earlier call found closer does not count: bounds depend on what is asked for.
   std::vector<std::size_t> searches(means_.size());

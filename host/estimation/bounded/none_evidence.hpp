@@ -30,11 +30,10 @@ class NoneEvidence {
   using Enough = std::function<bool(const LogInterval&)>;
 
   /// @param options checked, with a resolved contact model
-  /// @param likelihood evaluates bins
-  /// @param largest take in the same touches before add(), where their poses are uncertain; all of
-  /// these outlive this object
-  NoneEvidence(SearchSpace& space, const BoundedOptions& options, const BinLikelihood& likelihood,
-               const LargestTiles& largest);
+  /// @param likelihood evaluates bins; all of these outlive this object
+  NoneEvidence(const SearchSpace& space, const BoundedOptions& options,
+               const BinLikelihood& likelihood)
+      : space_(space), options_(options), likelihood_(likelihood) {}
 
   void reset() { means_.clear(); }
   /// Takes in touches; those without a known element say nothing. All of them, or none where memory
@@ -49,39 +48,25 @@ class NoneEvidence {
   /// @throws what the deadline's cancel point throws
   LogInterval bounds(const Enough& enough, const Deadline& deadline);
 
-  /// Host memory, in bytes.
-  std::uint64_t bytes() const { return search_ ? search_->largest().bytes() : 0; }
-
  private:
   /// What is known of one touch.
   struct TouchMean {
-    ArrayReadings touch;
-    std::optional<MeanSearch> search = {};  ///< of a touch whose pose is exact
+    MeanSearch search;
     double log_share = 0.0;  ///< of the bins that count among all, by prior weight, in nats
-    // Of a touch of uncertain pose, once it was surveyed.
-    std::optional<double> log_bins = {};  ///< log of the bins that count, by prior weight
-    bool everywhere = false;              ///< these are all bins
     /// Bounds of the log of the mean before any search, and after each that no deadline ended.
     LogInterval before{-std::numeric_limits<double>::infinity(),
                        -std::numeric_limits<double>::infinity()};
     std::vector<LogInterval> found = {};
-    std::size_t close_searches = 0;  ///< of an exact touch: see left_out_nats
-    bool rounding_counts = false;    ///< the last search left out too little to be told from it
+    std::size_t close_searches = 0;  ///< see left_out_nats
     bool closest = false;            ///< the last search came as close as any
   };
 
   /// Searches a touch once more. @returns false where the deadline passed
-  bool search(TouchMean& mean, const Deadline& deadline);
-  std::optional<LogInterval> search_exact(TouchMean& mean, const Deadline& deadline);
-  /// Counts the bins of a touch of uncertain pose, and bounds its mean by the largest tiles.
-  void survey(TouchMean& mean, std::size_t touch) const;
-  std::optional<LogInterval> search_displaced(TouchMean& mean, const Deadline& deadline);
+  static bool search(TouchMean& mean, const Deadline& deadline);
 
-  SearchSpace& space_;
+  const SearchSpace& space_;
   const BoundedOptions& options_;
   const BinLikelihood& likelihood_;
-  const LargestTiles& largest_;
-  std::optional<BoundSearch> search_;  ///< of touches of uncertain pose
   std::vector<TouchMean> means_;
 };
 

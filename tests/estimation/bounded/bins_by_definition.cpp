@@ -94,6 +94,16 @@ LikelihoodTable crooked_table() {
   return table;
 }
 
+LikelihoodTable gentle_table() {
+  LikelihoodTable table{.first_log_odds = -7.0, .last_log_odds = 9.0, .nodes = 25};
+  table.level_edges = {5.0};
+  Uniform random(82);
+  for (std::size_t i = 0; i < table.levels() * table.nodes; ++i) {
+    table.log_likelihood.push_back(random(-8.0, 0.0));
+  }
+  return table;
+}
+
 std::vector<long double> by_definition(const BinCase& of, const std::vector<BinBox>& boxes) {
   const Real prior = log_odds_from_probability(*of.contact.prior);
   std::vector<Real> logs;

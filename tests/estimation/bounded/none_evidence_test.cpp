@@ -2,7 +2,9 @@
 
 #include "estimation/bounded/none_evidence.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <string>
 #include <vector>
 
 #include <fmt/format.h>
@@ -29,18 +31,21 @@ std::vector<Hypothesis> two_objects() {
 class NoneByBounds {
  public:
   NoneByBounds(std::vector<Hypothesis> hypotheses, const PoseLattice& lattice,
-               const ContactModel& contact = {})
+               const ContactModel& contact = {}, const DisplacementSd& touch_sd = {})
       : objects(std::move(hypotheses)),
-        options{.lattice = lattice, .contact = resolve(contact, objects)},
-        likelihood(objects, options.contact, lattice),
+        options{.lattice = lattice, .contact = resolve(contact, objects), .touch_sd = touch_sd},
+        likelihood(objects, options.contact, lattice, touch_sd),
         space(objects, options),
-        largest(space),
-        none(space, options, likelihood, largest) {}
+        none(space, options, likelihood) {}
 
   void add(std::span<const Touch> touches) {
     std::vector<ArrayReadings> arrays;
     for (const Touch& touch : touches) {
       arrays.push_back(array_readings(touch, options.contact, options.lattice.pivot_mm));
+      if (!options.touch_sd.none()) {
+        arrays.back().sensor_from_pivot_mm =
+            touch.T_robot_sensor.translation_mm - options.lattice.pivot_mm;
+      }
     }
     none.add(arrays);
   }
@@ -63,6 +68,10 @@ class NoneByBounds {
       for (std::size_t object = 0; object < objects.size(); ++object) {
         logs.back().push_back(reference::log_likelihoods(
             std::span(&touch, 1), options.lattice, objects[object].map, options.contact, object));
+        if (!options.touch_sd.none()) {
+          logs.back().back() = reference::displaced_touch(logs.back().back(), options.lattice,
+                                                          options.touch_sd, touch.T_robot_sensor);
+        }
       }
     }
     return reference::none_log_evidence(touches, options.lattice, objects, logs);
@@ -72,7 +81,6 @@ class NoneByBounds {
   BoundedOptions options;
   BinLikelihood likelihood;
   SearchSpace space;
-  LargestTiles largest;
   NoneEvidence none;
 };
 
@@ -129,6 +137,64 @@ TEST(NoneEvidence, HoldsItsDefinition) {
       }
     }
   }
+}
+
+struct DisplacedCase {
+  const char* name;
+  PoseLattice lattice;
+  DisplacementSd sd;
+};
+
+class NoneOfDisplacedTouches : public testing::TestWithParam<DisplacedCase> {};
+
+TEST_P(NoneOfDisplacedTouches, HoldsItsDefinition) {
+  const auto& [name, lattice, sd] = GetParam();
+  ContactModel learned;
+  learned.prior = 0.2;
+  learned.table = gentle_table();
+  ContactModel never_wrong;
+  never_wrong.gamma = 0.0;
+  std::uint64_t seed = 720;
+  for (const ContactModel& contact : {ContactModel{}, learned, never_wrong}) {
+    NoneByBounds none(two_objects(), lattice, contact, sd);
+    for (const std::size_t elements : {8, 36}) {
+      SCOPED_TRACE(fmt::format("{}, {} elements, seed {}", name, elements, ++seed));
+      const Recording recording = random_recording(2, elements, seed);
+      const std::vector<Touch> touches = all_touches(recording);
+      const double expected = none.expected(touches);
+      expect_holds(none.bounds_of(touches), expected, first_width);
+      expect_holds(none.bounds(1e-6), expected, 1e-6);
+    }
+  }
+}
+
+// Arrays of objects some 15 mm wide meet them beyond the ends of these regions, too.
+INSTANTIATE_TEST_SUITE_P(
+    Lattices, NoneOfDisplacedTouches,
+    testing::Values(
+        DisplacedCase{"all of the circle", lattice_of(33, 29, 40), {1.0, 0.1}},
+        DisplacedCase{
+            "a wide region", {{-50, 50, 71}, {-50, 50, 70}, {0, two_pi, 24}, {3, -2}}, {1.5, 0.15}},
+        DisplacedCase{"a part of the circle",
+                      {{-6, 6, 25}, {-20, 20, 31}, {0.3, 1.2, 19}, {30, 10}},
+                      {0.8, 0.1}},
+        DisplacedCase{"a row", {{-15, 16, 62}, {1, 1, 1}, {0, two_pi, 16}, {3, -2}}, {1.0, 0.2}},
+        DisplacedCase{
+            "one angle", {{-15, 16, 40}, {-9, 9, 30}, {0.4, 0.4, 1}, {3, -2}}, {1.2, 0.3}},
+        DisplacedCase{"wider than the region", lattice_of(12, 9, 11), {9.0, 1.5}},
+        DisplacedCase{"turns alone", lattice_of(25, 25, 48), {0.0, 0.2}}),
+    [](const auto& of) {
+      std::string name = of.param.name;
+      std::ranges::replace(name, ' ', '_');
+      return name;
+    });
+
+TEST(NoneEvidence, CountsAllBinsWhereADisplacedArrayMeetsNoObject) {
+  NoneByBounds none(two_objects(), lattice_of(20, 15, 9), {}, {1.0, 0.2});
+  Recording recording = random_recording(1, 8, 731);
+  recording.T_robot_sensor[0].translation_mm += glm::dvec2(200.0, 0.0);
+  const std::vector<Touch> touches = all_touches(recording);
+  expect_holds(none.bounds_of(touches), none.expected(touches), 1e-9);
 }
 
 TEST(NoneEvidence, HearsALightObjectThatAloneExplainsTheTouch) {

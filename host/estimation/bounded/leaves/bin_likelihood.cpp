@@ -119,7 +119,7 @@ void BinLikelihood::evaluate_alone(std::span<const BinBox> boxes, const KnownEle
 }
 
 template <typename Lane>
-void BinLikelihood::evaluate_exact(std::span<const BinBox> boxes, const KnownElements& elements,
+void BinLikelihood::evaluate_parts(std::span<const BinBox> boxes, const KnownElements& elements,
                                    std::span<double> log_likelihood) const {
   std::vector<BinBox> parts;               // large boxes are cut between rows
   std::vector<std::size_t> first_bin{0};   // [part]
@@ -150,17 +150,21 @@ void BinLikelihood::evaluate_exact(std::span<const BinBox> boxes, const KnownEle
 void BinLikelihood::evaluate(std::span<const BinBox> boxes, const KnownElements& elements,
                              Arithmetic arithmetic, std::span<double> log_likelihood,
                              std::span<double> errors) const {
-  const auto with = [&]<typename Lane>(Lane /*of the kernel*/) {
-    if (displaced_) {
-      evaluate_displaced<Lane>(boxes, elements, log_likelihood, errors);
-    } else {
-      evaluate_exact<Lane>(boxes, elements, log_likelihood);
-    }
-  };
-  if (in_float32(arithmetic)) {
-    with(float());
+  if (!displaced_) {
+    evaluate_exact(boxes, elements, arithmetic, log_likelihood);
+  } else if (in_float32(arithmetic)) {
+    evaluate_displaced<float>(boxes, elements, log_likelihood, errors);
   } else {
-    with(double());
+    evaluate_displaced<double>(boxes, elements, log_likelihood, errors);
+  }
+}
+
+void BinLikelihood::evaluate_exact(std::span<const BinBox> boxes, const KnownElements& elements,
+                                   Arithmetic arithmetic, std::span<double> log_likelihood) const {
+  if (in_float32(arithmetic)) {
+    evaluate_parts<float>(boxes, elements, log_likelihood);
+  } else {
+    evaluate_parts<double>(boxes, elements, log_likelihood);
   }
 }
 

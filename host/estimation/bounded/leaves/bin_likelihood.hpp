@@ -73,6 +73,11 @@ class BinLikelihood {
                 std::span<double> log_likelihood, std::span<double> errors = {}) const;
   /// Proven bound, in nats, of the error of evaluate() at any bin of an object.
   double error(std::size_t object, const KnownElements& elements, Arithmetic arithmetic) const;
+  /// The same as if all touches were exact.
+  void evaluate_exact(std::span<const BinBox> boxes, const KnownElements& elements,
+                      Arithmetic arithmetic, std::span<double> log_likelihood) const;
+  double exact_error(std::size_t object, const KnownElements& elements,
+                     Arithmetic arithmetic) const;
 
   /// Whether touches are uncertain.
   bool displaces() const { return displaced_.has_value(); }
@@ -94,13 +99,13 @@ class BinLikelihood {
   void evaluate_blocks(std::size_t object, std::span<const BlockRun> runs,
                        const KnownElements& touch, const PlaceRows<double>& rows) const;
   template <typename Lane>
-  void evaluate_exact(std::span<const BinBox> boxes, const KnownElements& elements,
+  void evaluate_parts(std::span<const BinBox> boxes, const KnownElements& elements,
                       std::span<double> log_likelihood) const;
   template <typename Lane>
   void evaluate_displaced(std::span<const BinBox> boxes, const KnownElements& elements,
                           std::span<double> log_likelihood, std::span<double> errors) const;
   template <typename Lane>
-  double exact_error(std::size_t object, const KnownElements& elements) const;
+  double exact_error_in(std::size_t object, const KnownElements& elements) const;
 
   std::vector<PlacedMap> maps_;  ///< [object]
   ReadingForm form_;

@@ -76,7 +76,7 @@ PlacedMap::PlacedMap(const OccupancyGrid& map, double prior, const PoseLattice& 
 }
 
 template <typename Lane>
-double BinLikelihood::exact_error(std::size_t object, const KnownElements& elements) const {
+double BinLikelihood::exact_error_in(std::size_t object, const KnownElements& elements) const {
   constexpr double u = unit<Lane>;
   const PlacedMap& map = maps_[object];
   const auto count = static_cast<double>(elements.from_pivot_mm.size());
@@ -122,8 +122,13 @@ double BinLikelihood::error(std::size_t object, const KnownElements& elements,
                             Arithmetic arithmetic) const {
   const double of_means =
       displaced_ ? static_cast<double>(elements.touches.size()) * displaced_->mean_error() : 0.0;
-  return of_means + (in_float32(arithmetic) ? exact_error<float>(object, elements)
-                                            : exact_error<double>(object, elements));
+  return of_means + exact_error(object, elements, arithmetic);
+}
+
+double BinLikelihood::exact_error(std::size_t object, const KnownElements& elements,
+                                  Arithmetic arithmetic) const {
+  return in_float32(arithmetic) ? exact_error_in<float>(object, elements)
+                                : exact_error_in<double>(object, elements);
 }
 
 }  // namespace palpate

@@ -53,7 +53,7 @@ class SearchRun {
           drop(tiles, 0, share / static_cast<double>(std::max<std::size_t>(finest_, 1) + 1));
       divide(std::move(tiles), 0, share - used);
     }
-    const bool contradicts = goal_.mode && contradicted(best);
+    const bool contradicts = contradicted(best);
     leaves_.flush();
     SearchResult result = account_.result();
     result.contradicted = contradicts;
@@ -73,10 +73,7 @@ class SearchRun {
 
   /// Settles bins at which every element sees the prior.
   void settle_unseen(const BinBox& box) {
-    const std::int64_t bins = goal_.counted != nullptr ? goal_.counted->bins(box) : box.bins();
-    if (bins == 0) {
-      return;
-    }
+    const std::int64_t bins = box.bins();
     const auto object = static_cast<std::size_t>(box.object);
     const double value = division_.prior_log_likelihood(box.object);
     account_.settle(box.object, 1, value + std::log(static_cast<double>(bins)), value,

@@ -127,7 +127,7 @@ void LargestTiles::add_exact(const KnownElements& known, const std::vector<std::
 void LargestTiles::add_displaced(const KnownElements& touch,
                                  const std::vector<std::int64_t>& offsets) {
   const std::vector<BoundingBox> reaches = displaced_reaches(space_, std::span(&touch, 1));
-  std::vector<Most>& most = most_.emplace_back();
+  std::vector<double>& most = most_.emplace_back();
   for (std::size_t object = 0; object < space_.bounds.size(); ++object) {
     const TileLevel& level = space_.bounds[object].levels().front();
     std::vector<BlockRun> runs;
@@ -140,28 +140,15 @@ void LargestTiles::add_displaced(const KnownElements& touch,
     const std::vector<std::int32_t> added = displaced_penalties(space_, object, 0, touch, runs);
     const auto beyond = static_cast<std::int32_t>(space_.bounds[object].penalty_beyond(0, touch));
     const std::int32_t least = added.empty() ? beyond : std::min(beyond, std::ranges::min(added));
-    PenaltySum all(least);
-    std::int64_t bins_beyond = static_cast<std::int64_t>(space_.turns.size()) *
-                               level.x.first_bin.back() * level.y.first_bin.back();
     std::span<const std::int32_t> rest = added;
     for (const BlockRun& run : runs) {
       const std::size_t tiles = static_cast<std::size_t>(run.count) * batch_tiles;
       raise(sums_[object].data() +
                 first_tile(level, static_cast<std::size_t>(run.theta), run.y, run.x),
             rest.first(tiles), offsets[object]);
-      for (std::size_t i = 0; i < tiles; ++i) {
-        const auto column = static_cast<int>(i / batch_side);
-        const auto row = static_cast<int>(i % batch_side);
-        const std::int64_t bins = std::int64_t{level.x.bins(batch_side * run.x + column)} *
-                                  level.y.bins(batch_side * run.y + row);
-        all.add(rest[i], bins);
-        bins_beyond -= bins;
-      }
       rest = rest.subspan(tiles);
     }
-    all.add(beyond, bins_beyond);
-    const double best = space_.bounds[object].best(0, touch);
-    most.push_back({best - least / penalties_per_nat, best + all.log()});
+    most.push_back(space_.bounds[object].best(0, touch) - least / penalties_per_nat);
   }
 }
 

@@ -35,13 +35,7 @@ class LargestTiles {
   std::int64_t unseen(std::size_t hypothesis) const { return unseen_[hypothesis]; }
   /// The largest log-likelihood that a touch of uncertain pose can have anywhere, in nats.
   /// @param touch in the order in which they were added
-  double most(std::size_t touch, std::size_t hypothesis) const {
-    return most_[touch][hypothesis].anywhere;
-  }
-  /// Bound of the touch's likelihood, summed over all bins: its log in nats.
-  double most_of_all(std::size_t touch, std::size_t hypothesis) const {
-    return most_[touch][hypothesis].of_all_bins;
-  }
+  double most(std::size_t touch, std::size_t hypothesis) const { return most_[touch][hypothesis]; }
   /// Host memory, in bytes.
   std::uint64_t bytes() const;
 
@@ -61,11 +55,7 @@ class LargestTiles {
   const SearchSpace& space_;
   std::vector<std::vector<std::int32_t>> sums_;  ///< [hypothesis][theta, batch y, batch x, tile]
   std::vector<std::int64_t> unseen_;             ///< [hypothesis]
-  struct Most {
-    double anywhere = 0.0;     ///< see most()
-    double of_all_bins = 0.0;  ///< see most_of_all()
-  };
-  std::vector<std::vector<Most>> most_;  ///< [touch of uncertain pose][hypothesis]
+  std::vector<std::vector<double>> most_;        ///< [touch of uncertain pose][hypothesis]
 };
 
 /// The box around the elements, from the pivot, at every theta.

@@ -10,7 +10,6 @@
 
 #include "estimation/bounded/parallel_for.hpp"
 #include "estimation/bounded/search/tile_division.hpp"
-#include "estimation/bounded/touch_overlap.hpp"
 
 namespace palpate {
 
@@ -189,13 +188,6 @@ std::vector<Leaves::Leaf> Leaves::evaluated(std::vector<BinBox> boxes, Arithmeti
   std::ranges::sort(boxes, {}, [](const BinBox& box) {
     return std::tie(box.object, box.theta, box.y_first, box.x_first);
   });
-  const TouchOverlap* counted = task_.goal.counted;
-  if (counted != nullptr) {
-    for (BinBox& box : boxes) {
-      box = counted->cut(box);
-    }
-    std::erase_if(boxes, [](const BinBox& box) { return box.bins() == 0; });
-  }
   const std::size_t before = values.size();
   std::size_t end = before;
   std::vector<Leaf> leaves;
@@ -213,9 +205,6 @@ std::vector<Leaves::Leaf> Leaves::evaluated(std::vector<BinBox> boxes, Arithmeti
       Leaf& leaf = leaves[i];
       const auto bins = static_cast<std::size_t>(leaf.box.bins());
       const auto own = std::span(values).subspan(leaf.first, bins);
-      if (counted != nullptr) {
-        counted->leave_out_others(leaf.box, own.data());
-      }
       add_up(
           leaf, own,
           displaced_ ? std::span(errors).subspan(leaf.first - before, bins) : std::span<double>());
@@ -273,8 +262,7 @@ std::vector<std::size_t> Leaves::to_be_refined(double share) const {
   };
   const auto may_be_best = [&](std::size_t i) {
     const std::int32_t object = pending_[i].box.object;
-    return goal.mode &&
-           log_weight[object] + pending_[i].largest + float32_error_[object] >= account_.best();
+    return log_weight[object] + pending_[i].largest + float32_error_[object] >= account_.best();
   };
   const auto needs_evidence = [&](std::size_t i) {
     return goal.evidence_nats && 2.0 * std::expm1(float32_error_[pending_[i].box.object]) >

@@ -69,10 +69,9 @@ void MassAccount::raise_best(std::int32_t object, double log_likelihood) {
 
 std::vector<std::size_t> MassAccount::droppable_from(const UnsettledMass& tiles,
                                                      double tolerance) const {
-  std::size_t of_all = tiles.droppable_from(std::log(tolerance) + log_total_);
-  if (goal_.mode) {
-    of_all = std::max(of_all, tiles.slot(best_) + 1);
-  }
+  // The most probable bin is evaluated, whatever the tolerance.
+  const std::size_t of_all =
+      std::max(tiles.droppable_from(std::log(tolerance) + log_total_), tiles.slot(best_) + 1);
   std::vector<std::size_t> from(of_.size(), of_all);
   if (goal_.evidence_nats) {
     const std::vector<double> largest = droppable_evidence(tolerance);

@@ -15,8 +15,6 @@
 
 namespace palpate {
 
-class TouchOverlap;
-
 /// Takes bins that were evaluated, one box after another, with their log-likelihoods [y, x] in
 /// nats; a single number stands for all bins of its box.
 using BinVisitor = std::function<void(const BinBox&, std::span<const double>)>;
@@ -28,10 +26,6 @@ struct SearchGoal {
   double evidence_range_nats = std::numeric_limits<double>::infinity();
   /// Bins that hold much of the mass are evaluated once more in float64.
   bool exact = true;
-  /// The most probable bin is evaluated, whatever the tolerance.
-  bool mode = true;
-  /// The bins that count; null where all do.
-  const TouchOverlap* counted = nullptr;
   /// See BoundedOptions::poor_bins.
   std::optional<std::int64_t> poor_bins = {};
 };

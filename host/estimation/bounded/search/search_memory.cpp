@@ -15,7 +15,6 @@
 #include "estimation/bounded/search/leaves.hpp"
 #include "estimation/bounded/tables/tile_bounds.hpp"
 #include "estimation/bounded/tables/window_table.hpp"
-#include "estimation/bounded/touch_overlap.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
@@ -89,9 +88,7 @@ SearchMemory search_memory(std::span<const Hypothesis> hypotheses, const Bounded
       memory.tiles += sizeof(int) * (along(size).x + along(size).y);
     }
     const double largest_tiles = thetas * along(sizes.front()).x * along(sizes.front()).y;
-    // "None of these" searches on sums of its own.
-    const double sums = options.none_weight ? 2.0 : 1.0;
-    memory.tiles += (sums * sizeof(std::int32_t) + sizeof(Tile)) * largest_tiles;
+    memory.tiles += (sizeof(std::int32_t) + sizeof(Tile)) * largest_tiles;
     const TileSize& smallest = sizes.back();
     const double family_mm = batch_side * smallest.cells() * map.cell_mm;
     const auto in_family = [&](const Axis& axis) {
@@ -105,7 +102,9 @@ SearchMemory search_memory(std::span<const Hypothesis> hypotheses, const Bounded
   memory.thetas = thetas * (sizeof(glm::dvec2) + static_cast<double>(hypotheses.size()) *
                                                      (sizeof(TileRange) + sizeof(Tile)));
   if (options.none_weight) {
-    memory.thetas += thetas * static_cast<double>(hypotheses.size()) * sizeof(OverlapPlane);
+    // What the mean of a touch keeps of every plane.
+    constexpr double plane_bytes = 128.0;
+    memory.thetas += thetas * static_cast<double>(hypotheses.size()) * plane_bytes;
   }
   // The last family of a batch may exceed the batch by all of its bins.
   // Each bin's value as it is evaluated, settled and kept.

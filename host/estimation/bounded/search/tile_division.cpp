@@ -102,7 +102,7 @@ void TileDivision::for_largest(std::size_t row, const std::int64_t& end_sum,
       for (int x = seen.x_first; x < seen.x_end && level.y.bins(y) > 0; ++x) {
         const std::int32_t sum = sums[batch_side * x + y % batch_side];
         const Tile tile{.object = object, .theta = theta, .x = x, .y = y};
-        if (sum < end_sum && level.x.bins(x) > 0 && may_count(level, tile)) {
+        if (sum < end_sum && level.x.bins(x) > 0) {
           visit(sum, tile);
         }
       }
@@ -306,7 +306,7 @@ void TileDivision::append_parts(const Tile& of, std::size_t level,
       const auto penalties = static_cast<double>(sums[batch_side * i + j]);
       const Tile part{unpenalised - penalties / penalties_per_nat, of.object, of.theta,
                       batch_side * of.x + i, y};
-      if (tiling.x.bins(part.x) > 0 && may_count(tiling, part)) {
+      if (tiling.x.bins(part.x) > 0) {
         parts.push_back(part);
       }
     }

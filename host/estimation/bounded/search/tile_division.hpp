@@ -9,7 +9,6 @@
 #include "estimation/bounded/search/largest_tiles.hpp"
 #include "estimation/bounded/search/mass_account.hpp"
 #include "estimation/bounded/search/search_space.hpp"
-#include "estimation/bounded/touch_overlap.hpp"
 #include "model/bounding_box.hpp"
 
 namespace palpate {
@@ -72,11 +71,6 @@ class TileDivision {
   double bound_of(std::size_t object, std::size_t level, std::int64_t penalties) const;
   /// The bound of a largest tile, from the sum that LargestTiles keeps.
   double bound_of_largest(std::size_t object, std::int32_t sum) const;
-  /// Whether any bin of a tile may count.
-  bool may_count(const TileLevel& level, const Tile& tile) const {
-    const TouchOverlap* counted = task_.goal.counted;
-    return counted == nullptr || counted->may_hold(level.box_of(tile));
-  }
   /// Where touches are uncertain, the sums of their penalties over the parts of tiles, [tile,
   /// part], which are tiles of this level; else empty.
   std::vector<std::int64_t> displaced_sums(std::span<const Tile> tiles, std::size_t level) const;
