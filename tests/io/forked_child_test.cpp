@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "memory_limit.hpp"
 #include "scratch_folder.hpp"
 
 namespace palpate::forked_child_test {
@@ -98,6 +99,9 @@ TEST_F(Forked, ChildThatWritesWithoutEndEndsWithItsReader) {
 }
 
 TEST_F(Forked, MemoryOfTheChildIsBounded) {
+  if (!limits_memory()) {
+    GTEST_SKIP() << "memory of processes is not limited here";
+  }
   const auto take = [](int socket) {
     const std::string large(1 << 27, 'x');  // throws, and the child ends without an answer
     forked_write(socket, large.data(), 1);

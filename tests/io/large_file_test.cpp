@@ -13,6 +13,7 @@
 #include "io/hdf5_reader.hpp"
 #include "io/pressure_table.hpp"
 #include "io/recording_survey.hpp"
+#include "memory_limit.hpp"
 #include "palpate/files.hpp"
 #include "scratch_folder.hpp"
 
@@ -133,6 +134,9 @@ class LargeFile : public testing::Test {
 };
 
 TEST_F(LargeFile, IsRefusedBeforeItTakesMoreThanThereIs) {
+  if (!limits_memory()) {
+    GTEST_SKIP() << "memory of processes is not limited here";
+  }
   save_map_of_zeros(path_, 20, 20);  // 1.7 GB in 7 MB
   EXPECT_LT(std::filesystem::file_size(path_), 16 * mib);
   expect_named(with_memory(256 * mib, [&] { read_map(path_); }),
@@ -159,6 +163,9 @@ TEST_F(LargeFile, RecordingIsSurveyedInPieces) {
 #ifdef __SANITIZE_ADDRESS__
   GTEST_SKIP() << "the sanitizer holds memory of its own";
 #endif
+  if (!limits_memory()) {
+    GTEST_SKIP() << "memory of processes is not limited here";
+  }
   constexpr hsize_t chunks = 256;
   save_frames(path_, chunks);
   const std::string message = with_memory(20 * mib, [&] {
@@ -174,6 +181,9 @@ TEST_F(LargeFile, RecordingIsSurveyedInPieces) {
 
 // Each of 20,000 readings has its own time, and so a frame of 1,000 elements.
 TEST_F(LargeFile, LongTableIsRefusedBeforeItTakesMoreThanThereIs) {
+  if (!limits_memory()) {
+    GTEST_SKIP() << "memory of processes is not limited here";
+  }
   std::string text = "time,element,pressure\n";
   for (int i = 0; i < 20'000; ++i) {
     text += fmt::format("{},0,1\n", i);

@@ -2,7 +2,7 @@
 # Compiles Palpate for 64-bit ARM (aarch64) in a fresh Debian 12 and runs its tests there under
 # qemu-user: model, files, bounds (with NEON), streaming, the driver's parsing, and the golden values on
 # lavapipe. qemu limits no process's memory, and umockdev's boards are not seen under it: some tests of
-# files fail, and those of the driver are left out.
+# files skip, and those of the driver are left out.
 # Run by hand, as root:
 #   tests/packages/arm64.sh [PROGRAM OF TESTS...]
 # Needs debootstrap, the network, about 3 GB in $TMPDIR, and an hour of two cores. Exits with 77 where

@@ -288,8 +288,9 @@ OverlapShares::Shares OverlapShares::at(const BinBox& box, Planes& of_object) co
   for (int i = std::max(0, -x); i < std::min(width, lattice.x_mm.count - x); ++i) {
     scale[static_cast<std::size_t>(i)] = x_.scale[static_cast<std::size_t>(x + i)];
   }
-  std::vector<double> along_x(static_cast<std::size_t>(y_end + y_.steps - y) *
-                              static_cast<std::size_t>(box.x_count));
+  const auto height =
+      static_cast<std::size_t>(box.y_count) + 2 * static_cast<std::size_t>(y_.steps);
+  std::vector<double> along_x(height * static_cast<std::size_t>(box.x_count));
   for (int j = std::max(0, y); j < std::min(lattice.y_mm.count, y_end + y_.steps); ++j) {
     double* const sums = carried.summed(j);
     for (int i = 0; i < width; ++i) {
