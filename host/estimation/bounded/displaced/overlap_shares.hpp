@@ -21,8 +21,7 @@ namespace palpate {
 /// shares of all bins add up to the number of bins in O.
 class OverlapShares {
  public:
-  /// Bins of a row that count as much as the one before but for a first one that counts so much
-  /// more.
+  /// From bin x on, the bins of a row count so much more than those before it.
   struct Step {
     int x = 0;
     double more = 0.0;
