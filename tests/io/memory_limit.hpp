@@ -14,8 +14,10 @@ namespace palpate {
 inline bool limits_memory() {
   const pid_t pid = ::fork();
   if (pid == 0) {
-    // Linux takes 0 for no limit, as Valgrind asks for.
-    const rlimit limit{.rlim_cur = 1 << 20, .rlim_max = RLIM_INFINITY};
+    // 1 MiB, not 0: Linux does not hold a soft limit of 0.
+    rlimit limit{};
+    ::getrlimit(RLIMIT_DATA, &limit);
+    limit.rlim_cur = 1 << 20;
     ::setrlimit(RLIMIT_DATA, &limit);
     constexpr std::size_t bytes = std::size_t{1} << 26;
     const void* const taken =

@@ -64,6 +64,9 @@ class MeanSearch::Planes {
   /// @returns log of what these hold at most
   double divide(int theta, double least) {
     enter(theta);
+    if (around_.bins() == 0) {
+      return nothing;
+    }
     sum_largest();
     last_divided_.clear();
     left_out_.clear();
@@ -116,7 +119,11 @@ class MeanSearch::Planes {
   /// Bounds of the log of the sum of the boxes' likelihoods by their shares.
   /// @param values log-likelihoods, box after box
   LogInterval sum_of_shares(const std::vector<double>& values) {
+    // Of the bins that may have a share.
     std::vector<double> counts;
+    std::vector<double> logs;
+    const double* value = values.data();
+    auto counted = counted_.begin();
     double error = 0.0;
     for (std::size_t first = 0, end = 0; first < boxes_.size(); first = end) {
       BinBox around{.object = static_cast<std::int32_t>(object_), .theta = boxes_[first].theta};
@@ -129,26 +136,28 @@ class MeanSearch::Planes {
         auto row = shares.of_bins.begin() +
                    std::ptrdiff_t{box.y_first - around.y_first} * around.x_count +
                    (box.x_first - around.x_first);
-        for (int y = 0; y < box.y_count; ++y, row += around.x_count) {
-          counts.insert(counts.end(), row, row + box.x_count);
+        for (int y = 0; y < box.y_count; ++y, row += around.x_count, value += box.x_count) {
+          const std::ptrdiff_t x = counted->first - box.x_first;
+          const std::ptrdiff_t count = (counted++)->count;
+          counts.insert(counts.end(), row + x, row + x + count);
+          logs.insert(logs.end(), value + x, value + x + count);
         }
       }
     }
-    double largest = nothing;
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      largest = counts[i] > 0.0 ? std::max(largest, values[i]) : largest;
-    }
-    if (largest == nothing) {
+    if (logs.empty() || std::ranges::max(logs) == nothing) {
       return {nothing, nothing};
     }
+    const double largest = std::ranges::max(logs);
     double sum = 0.0;
     double all = 0.0;
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      const double likelihood = std::exp(values[i] - largest);
+    for (std::size_t i = 0; i < logs.size(); ++i) {
+      const double likelihood = std::exp(logs[i] - largest);
       sum += counts[i] * likelihood;
       all += likelihood;
     }
-    const double relative = of_.shares_->relative_error();
+    // Each term of the sums rounds by a unit.
+    const double relative =
+        of_.shares_->relative_error() + 4.0 * static_cast<double>(logs.size()) * 0x1p-53;
     return {largest + std::log(std::max(sum - error * all, 0.0)) - relative,
             largest + std::log(sum + error * all) + relative};
   }
@@ -178,7 +187,8 @@ class MeanSearch::Planes {
         }
       }
     }
-    of.unseen_error += of.unseen * std::expm1(of_.shares_->relative_error());
+    of.unseen_error += of.unseen * (std::expm1(of_.shares_->relative_error()) +
+                                    2.0 * static_cast<double>(around_.bins()) * 0x1p-53);
   }
 
   /// Finds the plane's bins that count, and the largest tiles that hold them and see the map.

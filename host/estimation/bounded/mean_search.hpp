@@ -45,8 +45,9 @@ class MeanSearch {
  private:
   /// What the largest tiles of a plane, one object at one theta, tell.
   struct Survey {
-    std::int64_t bins = 0;      ///< that count
-    double unseen = 0.0;        ///< of these, or shares, at which every element sees the prior
+    std::int64_t bins = 0;  ///< that count
+    /// Of these, or the sum of the shares of bins, at which every element sees the prior.
+    double unseen = 0.0;
     double unseen_error = 0.0;  ///< of this number
     double best = nothing;      ///< the largest bound, in nats, with the prior weight
     double left_out = nothing;  ///< log of what the tiles that see the map hold at most, the same
@@ -59,10 +60,6 @@ class MeanSearch {
   /// @returns false where the deadline passed
   template <typename Work>
   bool for_planes(const Deadline& deadline, const Work& work) const;
-  /// What a bin of a plane counts at most.
-  double most_share(std::size_t object, int theta) const {
-    return shares_ ? shares_->most(object, theta) : 1.0;
-  }
   /// Looks at the largest tiles of all planes. @returns false where the deadline passed
   bool survey(const Deadline& deadline);
 

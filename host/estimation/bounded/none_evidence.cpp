@@ -25,6 +25,8 @@ constexpr std::size_t first_exact = 3;
 constexpr double usual_gap = 0.6;
 constexpr double least_gap_nats = 2.0;
 constexpr double most_gap_nats = 20.0;
+/// Where so many searches found no likelihood, none is above e^-10^10: there may be none at all.
+constexpr std::size_t most_in_vain = 32;
 
 double width(const LogInterval& of) { return of.high - of.low; }
 
@@ -72,6 +74,7 @@ bool NoneEvidence::search(TouchMean& mean, const Deadline& deadline) {
   mean.close_searches += close ? 1 : 0;
   mean.found.push_back({std::max(last.low, found->low), std::min(last.high, found->high)});
   mean.closest = mean.close_searches == left_out_nats.size() ||
+                 (mean.found.size() >= most_in_vain && mean.found.back().low == -infinity) ||
                  (exact && width(mean.found.back()) > least_gain * width(last));
   return true;
 }

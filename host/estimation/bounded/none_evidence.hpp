@@ -10,7 +10,7 @@
 
 #include "estimation/bounded/known_elements.hpp"
 #include "estimation/bounded/mean_search.hpp"
-#include "estimation/bounded/search/bound_search.hpp"
+#include "estimation/bounded/search/search_goal.hpp"
 #include "estimation/bounded/search/search_space.hpp"
 #include "palpate/estimate.hpp"
 

@@ -108,12 +108,4 @@ OverlapPlane::Bins OverlapPlane::row(int y) const {
   return x_mm_.within(apart_x.low - apart_mm_.x, apart_x.high - apart_mm_.x);
 }
 
-std::int64_t OverlapPlane::bins() const {
-  std::int64_t sum = 0;
-  for (int y = rows_.first; y < rows_.first + rows_.count; ++y) {
-    sum += row(y).count;
-  }
-  return sum;
-}
-
 }  // namespace palpate

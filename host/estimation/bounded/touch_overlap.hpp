@@ -1,7 +1,5 @@
 #pragma once
 
-#include <cstdint>
-
 #include "model/bounding_box.hpp"
 #include "palpate/lattice.hpp"
 #include "palpate/touch.hpp"
@@ -35,8 +33,6 @@ class OverlapPlane {
 
   /// The overlapping bins of any row.
   Bins row(int y) const;
-  /// Number of overlapping bins.
-  std::int64_t bins() const;
 
  private:
   /// The centres of an axis's bins.

@@ -189,6 +189,24 @@ INSTANTIATE_TEST_SUITE_P(
       return name;
     });
 
+TEST(NoneEvidence, EndsWhereNeighboursOfDisplacedTouchesDifferBeyondFloat64) {
+  ContactModel steep;
+  steep.prior = 0.2;
+  steep.table = crooked_table();
+  for (const DisplacementSd& sd : {DisplacementSd{0.0, 0.2}, DisplacementSd{2.0, 0.1}}) {
+    NoneByBounds none(two_objects(), lattice_of(21, 19, 16), steep, sd);
+    for (const std::size_t elements : {1, 8, 400}) {
+      SCOPED_TRACE(fmt::format("{} elements", elements));
+      const Recording recording = random_recording(2, elements, 740);
+      const std::vector<Touch> touches = all_touches(recording);
+      const double expected = none.expected(touches);
+      const LogInterval bounds = none.bounds_of(touches, 1e-6);
+      EXPECT_LE(bounds.low, expected + 1e-6);
+      EXPECT_GE(bounds.high, expected - 1e-6);
+    }
+  }
+}
+
 TEST(NoneEvidence, CountsAllBinsWhereADisplacedArrayMeetsNoObject) {
   NoneByBounds none(two_objects(), lattice_of(20, 15, 9), {}, {1.0, 0.2});
   Recording recording = random_recording(1, 8, 731);

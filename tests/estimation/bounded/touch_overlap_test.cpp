@@ -19,7 +19,6 @@ std::int64_t expect_the_same_bins(const Touch& touch, const PoseLattice& lattice
   for (int t = 0; t < lattice.theta_rad.count; ++t) {
     const OverlapPlane plane(array_rectangle(touch, lattice.pivot_mm), occupied_box(map), lattice,
                              t);
-    std::int64_t in_plane = 0;
     for (int y = 0; y < lattice.y_mm.count; ++y) {
       const OverlapPlane::Bins row = plane.row(y);
       for (int x = 0; x < lattice.x_mm.count; ++x) {
@@ -28,11 +27,9 @@ std::int64_t expect_the_same_bins(const Touch& touch, const PoseLattice& lattice
         const bool counted = x >= row.first && x < row.first + row.count;
         EXPECT_EQ(counted, reference::overlaps(touch, reference::bin_pose(lattice, bin), map))
             << "theta " << t << ", row " << y << ", column " << x;
-        in_plane += counted ? 1 : 0;
+        total += counted ? 1 : 0;
       }
     }
-    EXPECT_EQ(plane.bins(), in_plane) << "theta " << t;
-    total += in_plane;
   }
   return total;
 }
@@ -120,7 +117,9 @@ TEST(ArrayOverlap, OfAnArrayBeyondAllMeasureIsEverywhere) {
   for (int t = 0; t < 3; ++t) {
     const OverlapPlane plane(array_rectangle(recording.touch(0), {}), occupied_box(corner_map(641)),
                              lattice, t);
-    EXPECT_EQ(plane.bins(), lattice.plane());
+    for (int y = 0; y < lattice.y_mm.count; ++y) {
+      EXPECT_EQ(plane.row(y).count, lattice.x_mm.count);
+    }
   }
 }
 

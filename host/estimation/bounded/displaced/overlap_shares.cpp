@@ -134,8 +134,9 @@ OverlapShares::OverlapShares(const DisplacementWeights& weights, const ArrayRect
       y_(weights.lattice().y_mm, weights.sd().mm, 1),
       taken_(static_cast<std::size_t>(weights.lattice().theta_rad.count)) {
   for (int theta = 0; theta < weights.lattice().theta_rad.count; ++theta) {
-    for (const Tap& tap : taps_.emplace_back(weights.taps(theta, sensor_from_pivot_mm))) {
-      taken_[static_cast<std::size_t>(tap.theta)].push_back({theta, tap});
+    taps_.push_back(weights.taps(theta, sensor_from_pivot_mm));
+    for (std::size_t i = 0; i < taps_.back().size(); ++i) {
+      taken_[static_cast<std::size_t>(taps_.back()[i].theta)].push_back({theta, i});
     }
   }
   extents_.resize(objects.size() * taps_.size());
@@ -159,6 +160,9 @@ OverlapShares::Extent OverlapShares::extent(std::size_t object, int theta) const
       box = smallest_around(box, {box.object, theta, y, 1, bins.first, bins.count});
     }
   }
+  if (box.bins() == 0) {
+    return found;
+  }
   double least = 0.0;
   for (const Tap& tap : taps_[static_cast<std::size_t>(theta)]) {
     // The part inside grows and then falls along an axis: least is that of the first or last bin.
@@ -180,15 +184,18 @@ OverlapShares::Extent OverlapShares::extent(std::size_t object, int theta) const
 BinBox OverlapShares::reach(std::size_t object, int theta) const {
   const PoseLattice& lattice = weights_.lattice();
   BinBox all{.object = static_cast<std::int32_t>(object), .theta = theta};
-  for (const auto& [from, tap] : taken_[static_cast<std::size_t>(theta)]) {
+  for (const auto& [from, index] : taken_[static_cast<std::size_t>(theta)]) {
+    const Tap& tap = taps_[static_cast<std::size_t>(from)][index];
     const BinBox& box = extent_of(object, from).box;
     if (box.bins() == 0) {
       continue;
     }
-    // A bin more, which a tap that lies between bins takes, too.
-    const auto [x, x_end] = reached(lattice.x_mm, x_, box.x_first + tap.bins.x,
+    // A bin more, which a tap that lies between bins takes, too; and one before, which a tap takes
+    // that lies at a bin but for rounding.
+    const int before = fraction_error_ > 0.0 ? 1 : 0;
+    const auto [x, x_end] = reached(lattice.x_mm, x_, box.x_first + tap.bins.x - before,
                                     box.x_first + box.x_count + tap.bins.x + 1);
-    const auto [y, y_end] = reached(lattice.y_mm, y_, box.y_first + tap.bins.y,
+    const auto [y, y_end] = reached(lattice.y_mm, y_, box.y_first + tap.bins.y - before,
                                     box.y_first + box.y_count + tap.bins.y + 1);
     if (x < x_end && y < y_end) {
       all = smallest_around(all, {all.object, theta, y, y_end - y, x, x_end - x});
@@ -199,7 +206,8 @@ BinBox OverlapShares::reach(std::size_t object, int theta) const {
 
 double OverlapShares::most(std::size_t object, int theta) const {
   double sum = 0.0;
-  for (const auto& [from, tap] : taken_[static_cast<std::size_t>(theta)]) {
+  for (const auto& [from, index] : taken_[static_cast<std::size_t>(theta)]) {
+    const Tap& tap = taps_[static_cast<std::size_t>(from)][index];
     const Extent& extent = extent_of(object, from);
     if (extent.box.bins() > 0) {
       const int x = extent.box.x_first + tap.bins.x;
@@ -208,7 +216,8 @@ double OverlapShares::most(std::size_t object, int theta) const {
              largest_scale(y_, y, y + extent.box.y_count + 1);
     }
   }
-  return sum * all_weights(x_) * all_weights(y_) * std::exp(relative_error());
+  return sum * all_weights(x_) * all_weights(y_) * std::exp(relative_error()) *
+         (1.0 + 32.0 * fraction_error_);
 }
 
 OverlapShares::Plane OverlapShares::plane(const Extent& extent) const {
@@ -267,7 +276,8 @@ OverlapShares::Shares OverlapShares::at(const BinBox& box, Planes& of_object) co
   const int y = box.y_first - y_.steps;
   const int width = x_end + x_.steps - x;
   CarriedWeights carried(x, x + width, y, y_end + y_.steps);
-  for (const auto& [from, tap] : taken_[static_cast<std::size_t>(box.theta)]) {
+  for (const auto& [from, index] : taken_[static_cast<std::size_t>(box.theta)]) {
+    const Tap& tap = taps_[static_cast<std::size_t>(from)][index];
     const Extent& extent = extent_of(object, from);
     if (extent.box.bins() == 0) {
       continue;

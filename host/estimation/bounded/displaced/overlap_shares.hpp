@@ -17,8 +17,8 @@ namespace palpate {
 /// overlapping bins, O:
 ///   sum over x in O of sum over x' of W(x, x') P(x') = sum over x' of k(x') P(x'),
 ///   k(x') = sum over x in O of W(x, x').
-/// So the mean needs no average: k, the share of x', is 1 well within O and 0 far from it. The
-/// shares of all bins add up to the number of bins in O.
+/// So the mean needs no average: k, the share of x', is 1 well within O and the region, and 0 far
+/// from O. The shares of all bins add up to the number of bins in O.
 class OverlapShares {
  public:
   /// From bin x on, the bins of a row count so much more than those before it.
@@ -26,7 +26,7 @@ class OverlapShares {
     int x = 0;
     double more = 0.0;
   };
-  /// What each bin of O at one theta counts, over the sum of its weights inside the region.
+  /// 1 over the sum of each bin's weights inside the region, at the bins of O at one theta.
   struct Plane {
     int y_first = 0;
     std::vector<std::vector<Step>> rows;
@@ -60,10 +60,10 @@ class OverlapShares {
   double relative_error() const;
 
  private:
-  /// A tap of a mean at `from` that takes likelihoods at another theta.
+  /// A tap of the means at a theta.
   struct Taken {
-    int from = 0;
-    Tap tap;
+    int from = 0;           ///< the means' theta
+    std::size_t index = 0;  ///< of that theta's taps
   };
   /// O's bins at one theta.
   struct Extent {
@@ -88,7 +88,7 @@ class OverlapShares {
   AxisBlur x_;
   AxisBlur y_;
   std::vector<std::vector<Tap>> taps_;     ///< [theta] that a mean there takes
-  std::vector<std::vector<Taken>> taken_;  ///< [theta] from there
+  std::vector<std::vector<Taken>> taken_;  ///< [theta] those that take likelihoods there
   std::vector<Extent> extents_;            ///< [object, theta]
 };
 

@@ -7,7 +7,6 @@
 
 #include "estimation/bounded/displaced/displaced_tiles.hpp"
 #include "estimation/bounded/parallel_for.hpp"
-#include "estimation/bounded/penalty_sum.hpp"
 
 namespace palpate {
 

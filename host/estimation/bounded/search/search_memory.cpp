@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "estimation/bounded/displaced/displacement_weights.hpp"
 #include "estimation/bounded/displaced/exact_bins.hpp"
 #include "estimation/bounded/leaves/bin_kernel.hpp"
 #include "estimation/bounded/moving/moving_belief.hpp"
@@ -105,6 +106,11 @@ SearchMemory search_memory(std::span<const Hypothesis> hypotheses, const Bounded
     // What the mean of a touch keeps of every plane.
     constexpr double plane_bytes = 128.0;
     memory.thetas += thetas * static_cast<double>(hypotheses.size()) * plane_bytes;
+    if (!options.touch_sd.none()) {
+      // And of every theta, the places to which turns move its bins.
+      const int steps = DisplacementWeights(lattice, options.touch_sd).theta_steps();
+      memory.thetas += thetas * (2.0 * steps + 1.0) * 2.0 * sizeof(Tap);
+    }
   }
   // The last family of a batch may exceed the batch by all of its bins.
   // Each bin's value as it is evaluated, settled and kept.
