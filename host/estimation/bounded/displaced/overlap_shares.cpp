@@ -295,9 +295,9 @@ OverlapShares::Shares OverlapShares::at(const BinBox& box, Planes& of_object) co
   }
   // Each bin's factor, nothing outside the region.
   std::vector<double> scale(static_cast<std::size_t>(width));
-  for (int i = std::max(0, -x); i < std::min(width, lattice.x_mm.count - x); ++i) {
-    scale[static_cast<std::size_t>(i)] = x_.scale[static_cast<std::size_t>(x + i)];
-  }
+  std::copy(x_.scale.begin() + std::max(x, 0),
+            x_.scale.begin() + std::min(x + width, lattice.x_mm.count),
+            scale.begin() + std::max(-x, 0));
   const auto height =
       static_cast<std::size_t>(box.y_count) + 2 * static_cast<std::size_t>(y_.steps);
   std::vector<double> along_x(height * static_cast<std::size_t>(box.x_count));
