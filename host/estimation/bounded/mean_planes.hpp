@@ -95,19 +95,20 @@ class MeanSearch::Planes {
     std::vector<double> values(static_cast<std::size_t>(bins));
     of_.likelihood_.evaluate_exact(boxes_, of_.elements_, arithmetic, values);
     const double log_weight = of_.space_.log_weight[object_];
+    std::vector<double> logs;
+    auto value = values.cbegin();
+    Rows row = counted_.cbegin();
+    for (const BinBox& box : boxes_) {
+      append_counted(box, value, box.x_count, row, logs);
+      value += box.bins();
+    }
     if (of_.shares_) {
-      const LogInterval sum = sum_of_shares(values);
+      const LogInterval sum = sum_of_shares(logs);
       return {log_weight + sum.low, log_weight + sum.high};
     }
     LogSum sum;
-    const double* value = values.data();
-    auto row = counted_.begin();
-    for (const BinBox& box : boxes_) {
-      for (int y = 0; y < box.y_count; ++y, value += box.x_count, ++row) {
-        for (int x = 0; x < row->count; ++x) {
-          sum.add(value[row->first - box.x_first + x]);
-        }
-      }
+    for (const double log : logs) {
+      sum.add(log);
     }
     return {log_weight + sum.log(), log_weight + sum.log()};
   }
@@ -116,14 +117,26 @@ class MeanSearch::Planes {
   /// The log of what a bin counts at most where no element has a penalty.
   double most(std::size_t level) const { return of_.most_[object_][level] + log_most_share_; }
 
+  using Rows = std::vector<OverlapPlane::Bins>::const_iterator;
+
+  /// Appends the values of a box's bins that count.
+  /// @param from of its first bin; rows are `pitch` apart
+  /// @param row moves on behind the box's rows
+  static void append_counted(const BinBox& box, std::vector<double>::const_iterator from,
+                             std::ptrdiff_t pitch, Rows& row, std::vector<double>& values) {
+    for (int y = 0; y < box.y_count; ++y, ++row) {
+      if (row->count > 0) {
+        const auto first = from + y * pitch + (row->first - box.x_first);
+        values.insert(values.end(), first, first + row->count);
+      }
+    }
+  }
+
   /// Bounds of the log of the sum of the boxes' likelihoods by their shares.
-  /// @param values log-likelihoods, box after box
-  LogInterval sum_of_shares(const std::vector<double>& values) {
-    // Of the bins that may have a share.
-    std::vector<double> counts;
-    std::vector<double> logs;
-    const double* value = values.data();
-    auto counted = counted_.begin();
+  /// @param logs log-likelihoods of the bins that count, box after box
+  LogInterval sum_of_shares(const std::vector<double>& logs) {
+    std::vector<double> counts;  // the bins' shares
+    Rows counted = counted_.cbegin();
     double error = 0.0;
     for (std::size_t first = 0, end = 0; first < boxes_.size(); first = end) {
       BinBox around{.object = static_cast<std::int32_t>(object_), .theta = boxes_[first].theta};
@@ -133,15 +146,10 @@ class MeanSearch::Planes {
       const OverlapShares::Shares shares = of_.shares_->at(around, share_planes_);
       error = std::max(error, shares.error);
       for (const BinBox& box : std::span(boxes_).subspan(first, end - first)) {
-        auto row = shares.of_bins.begin() +
-                   std::ptrdiff_t{box.y_first - around.y_first} * around.x_count +
-                   (box.x_first - around.x_first);
-        for (int y = 0; y < box.y_count; ++y, row += around.x_count, value += box.x_count) {
-          const std::ptrdiff_t x = counted->first - box.x_first;
-          const std::ptrdiff_t count = (counted++)->count;
-          counts.insert(counts.end(), row + x, row + x + count);
-          logs.insert(logs.end(), value + x, value + x + count);
-        }
+        const auto from = shares.of_bins.begin() +
+                          std::ptrdiff_t{box.y_first - around.y_first} * around.x_count +
+                          (box.x_first - around.x_first);
+        append_counted(box, from, around.x_count, counted, counts);
       }
     }
     if (logs.empty() || std::ranges::max(logs) == nothing) {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ostream>
 #include <string>
 #include <vector>
 
@@ -144,6 +145,8 @@ struct DisplacedCase {
   PoseLattice lattice;
   DisplacementSd sd;
 };
+
+void PrintTo(const DisplacedCase& of, std::ostream* out) { *out << of.name; }
 
 class NoneOfDisplacedTouches : public testing::TestWithParam<DisplacedCase> {};
 

@@ -47,13 +47,9 @@ inline double weight_inside(int place, int bins, const Axis& axis, int moved, do
   if (place * bins + moved >= 0 && end + moved < axis.count) {
     return (1.0 - fraction) + fraction;  // all bins of most places lie inside
   }
-  const auto inside = [&](int at) { return at >= 0 && at < axis.count; };
-  const auto of_bin = [&](int bin) {
-    return (inside(bin + moved) ? 1.0 - fraction : 0.0) +
-           (inside(bin + moved + 1) ? fraction : 0.0);
-  };
   // It grows and then falls along the axis: least is that of the first or of the last.
-  return std::min(of_bin(place * bins), of_bin(end - 1));
+  return std::min(part_inside(axis, place * bins + moved, fraction),
+                  part_inside(axis, end - 1 + moved, fraction));
 }
 
 /// Adds up the planes of a run's taps.

@@ -33,6 +33,14 @@ struct Tap {
   glm::dvec2 fraction{0.0};
 };
 
+/// The part of bilinear weights along an axis, of a bin and of the next one, that lies inside the
+/// region.
+/// @param fraction of the way from the bin to the next
+inline double part_inside(const Axis& axis, int bin, double fraction) {
+  const auto holds = [&](int at) { return at >= 0 && at < axis.count; };
+  return (holds(bin) ? 1.0 - fraction : 0.0) + (holds(bin + 1) ? fraction : 0.0);
+}
+
 /// The displacements of a touch on a lattice: weights and turns as PoseHistogram has them.
 class DisplacementWeights {
  public:

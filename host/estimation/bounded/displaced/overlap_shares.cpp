@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <utility>
 
+#include "estimation/bounded/displaced/blurred_plane.hpp"
 #include "estimation/bounded/parallel_for.hpp"
 
 namespace palpate {
@@ -12,12 +13,6 @@ namespace palpate {
 namespace {
 
 constexpr double unit = 0x1p-53;
-
-/// The part of a tap's bilinear weights along an axis that lies inside the region.
-double inside(const Axis& axis, int bin, double fraction) {
-  const auto holds = [&](int at) { return at >= 0 && at < axis.count; };
-  return (holds(bin) ? 1.0 - fraction : 0.0) + (holds(bin + 1) ? fraction : 0.0);
-}
 
 /// The largest of the factors of bins [first, end): they fall and then grow along the axis.
 double largest_scale(const AxisBlur& axis, int first, int end) {
@@ -40,20 +35,6 @@ double all_weights(const AxisBlur& axis) {
 /// The bins [first, end) of an axis that a Gaussian reaches from others, as far as there are any.
 std::pair<int, int> reached(const Axis& axis, const AxisBlur& blur, int first, int end) {
   return {std::max(0, first - blur.steps), std::min(axis.count, end + blur.steps)};
-}
-
-/// Adds up neighbours in rows by their distance's weight.
-/// @param to so much shorter along x that every sum has all of its terms
-void add_neighbours(const double* from, double* __restrict to, int count, std::ptrdiff_t stride,
-                    const AxisBlur& axis) {
-  std::fill_n(to, count, 0.0);
-  for (int k = -axis.steps; k <= axis.steps; ++k) {
-    const double weight = axis.weight[static_cast<std::size_t>(std::abs(k))];
-    const double* const term = from + k * stride;
-    for (int i = 0; i < count; ++i) {
-      to[i] += weight * term[i];
-    }
-  }
 }
 
 /// What taps carry to the bins about a box: changes along each row at first, then their sums.
@@ -168,8 +149,8 @@ OverlapShares::Extent OverlapShares::extent(std::size_t object, int theta) const
     // The part inside grows and then falls along an axis: least is that of the first or last bin.
     const auto least_inside = [](const Axis& axis, int first, int count, int moved,
                                  double fraction) {
-      return std::min(inside(axis, first + moved, fraction),
-                      inside(axis, first + count - 1 + moved, fraction));
+      return std::min(part_inside(axis, first + moved, fraction),
+                      part_inside(axis, first + count - 1 + moved, fraction));
     };
     const double part =
         least_inside(lattice.x_mm, box.x_first, box.x_count, tap.bins.x, tap.fraction.x) *
@@ -240,15 +221,16 @@ OverlapShares::Plane OverlapShares::plane(const Extent& extent) const {
       continue;
     }
     const bool inner = std::ranges::all_of(taps, [&](const Tap& tap) {
-      return inside(lattice.y_mm, y + tap.bins.y, tap.fraction.y) == 1.0;
+      return part_inside(lattice.y_mm, y + tap.bins.y, tap.fraction.y) == 1.0;
     });
     if (!inner || !of_inner_row) {
       std::ranges::fill(weights, 0.0);
       for (const Tap& tap : taps) {
-        const double of_tap = tap.weight * inside(lattice.y_mm, y + tap.bins.y, tap.fraction.y);
+        const double of_tap =
+            tap.weight * part_inside(lattice.y_mm, y + tap.bins.y, tap.fraction.y);
         for (int i = 0; i < box.x_count; ++i) {
           weights[static_cast<std::size_t>(i)] +=
-              of_tap * inside(lattice.x_mm, box.x_first + i + tap.bins.x, tap.fraction.x);
+              of_tap * part_inside(lattice.x_mm, box.x_first + i + tap.bins.x, tap.fraction.x);
         }
       }
       of_inner_row = inner;
@@ -306,14 +288,14 @@ OverlapShares::Shares OverlapShares::at(const BinBox& box, Planes& of_object) co
     for (int i = 0; i < width; ++i) {
       sums[i] *= scale[static_cast<std::size_t>(i)] * y_.scale[static_cast<std::size_t>(j)];
     }
-    add_neighbours(sums + x_.steps, along_x.data() + std::ptrdiff_t{j - y} * box.x_count,
-                   box.x_count, 1, x_);
+    blur<BinLikelihoods>(sums + x_.steps, along_x.data() + std::ptrdiff_t{j - y} * box.x_count,
+                         box.x_count, 1, x_.weight);
   }
   Shares shares{.of_bins = std::vector<double>(static_cast<std::size_t>(box.bins()))};
   for (int j = 0; j < box.y_count; ++j) {
-    add_neighbours(along_x.data() + std::ptrdiff_t{j + y_.steps} * box.x_count,
-                   shares.of_bins.data() + std::ptrdiff_t{j} * box.x_count, box.x_count,
-                   box.x_count, y_);
+    blur<BinLikelihoods>(along_x.data() + std::ptrdiff_t{j + y_.steps} * box.x_count,
+                         shares.of_bins.data() + std::ptrdiff_t{j} * box.x_count, box.x_count,
+                         box.x_count, y_.weight);
   }
   // Fractions change by their error what a tap carries to a bin, from each of four, and what lies
   // inside the region.
