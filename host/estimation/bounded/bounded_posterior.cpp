@@ -102,12 +102,12 @@ Estimate BoundedPosterior::estimate() const {
                           .blocks_bounded = found.blocks_bounded,
                           .bins_evaluated = found.bins_evaluated};
   const LogInterval none = belief.none_log_evidence();
-  if (belief.has_none()) {
+  if (belief.touches().has_none()) {
     logs.push_back(middle(none));
     certificate.none_log_evidence = none;
   }
   estimate.identity = normalised(logs);
-  if (belief.has_none()) {
+  if (belief.touches().has_none()) {
     estimate.none = estimate.identity.back();
     estimate.identity.pop_back();
     estimate.none_log_evidence = middle(none);
@@ -151,29 +151,29 @@ RefinedPose BoundedPosterior::refine(const Mode& mode) const {
   BoundedBelief& belief = posterior.belief;
   // Where bins are very fine, a few of them tell the peak, and all would take long. A mean over
   // displacements takes the others all the same, and a belief that slips has them.
-  const BoundedOptions& options = belief.options();
+  const BoundedOptions& options = belief.touches().options();
   const PoseLattice fit =
       options.touch_sd.none() && options.slip_sd.none() ? thinned(lattice()) : lattice();
   const bool thin = fit.plane() != lattice().plane();
   std::optional<BinLikelihood> of_thin;
   Mode start = mode;
   if (thin) {
-    of_thin.emplace(belief.hypotheses(), belief.options().contact, fit);
+    of_thin.emplace(belief.touches().hypotheses(), belief.touches().options().contact, fit);
     if (mode.bin && *mode.bin >= 0 && *mode.bin < lattice().bins()) {
       start.bin = fit.bin_of(lattice().T_object_robot(*mode.bin));
     }
   }
   const auto log_likelihood = [&](std::span<const BinBox> boxes) {
     if (!thin) {
-      return belief.log_likelihood(boxes, Arithmetic::float32);
+      return belief.touches().log_likelihood(boxes, Arithmetic::float32);
     }
     std::size_t bins = 0;
     for (const BinBox& box : boxes) {
       bins += static_cast<std::size_t>(box.bins());
     }
     std::vector<double> logs(bins);
-    belief.on_threads(
-        [&] { of_thin->evaluate(boxes, belief.elements(), Arithmetic::float32, logs); });
+    belief.touches().on_threads(
+        [&] { of_thin->evaluate(boxes, belief.touches().elements(), Arithmetic::float32, logs); });
     return logs;
   };
   return palpate::refine(log_likelihood, fit, posterior.bodies[mode.object], start);
@@ -188,8 +188,8 @@ Marginals BoundedPosterior::marginals(int object, const PoseLattice& grid) const
   onto.collapse_fixed().validate();
   BoundedBelief& belief = posterior.belief;
   belief.found();
-  const double log_total =
-      log_add(belief.log_total(), middle(belief.none_log_evidence())) - belief.log_weight()[object];
+  const double log_total = log_add(belief.log_total(), middle(belief.none_log_evidence())) -
+                           belief.touches().log_weight()[object];
   MarginalSums sums(lattice(), onto);
   belief.visit([&](const BinBox& box, std::span<const double> log_likelihood) {
     if (box.object == object) {
@@ -216,7 +216,8 @@ std::vector<std::vector<BinShare>> BoundedPosterior::likely_bins(std::span<const
     if (asked[box.object] == 0) {
       return;
     }
-    const double log_total = found.mass[box.object].evaluated - belief.log_weight()[box.object];
+    const double log_total =
+        found.mass[box.object].evaluated - belief.touches().log_weight()[box.object];
     const double least = log_total + std::log(least_share);
     const auto all_alike = log_likelihood.size() == 1;
     if (all_alike && log_likelihood[0] < least) {
@@ -255,7 +256,7 @@ EvaluatedBelief BoundedPosterior::evaluated_bins() const {
   LogSum unseen;
   belief.visit([&](const BinBox& box, std::span<const double> log_likelihood) {
     if (static_cast<std::int64_t>(log_likelihood.size()) != box.bins()) {
-      unseen.add(belief.log_weight()[box.object] + log_likelihood[0] +
+      unseen.add(belief.touches().log_weight()[box.object] + log_likelihood[0] +
                  std::log(static_cast<double>(box.bins())));
       return;
     }
@@ -287,8 +288,8 @@ double BoundedPosterior::log_likelihood(int object, const Pose& T_object_robot) 
                                           translation_mm.y, theta_rad));
   }
   BoundedBelief& belief = posterior.belief;
-  const KnownElements& elements = belief.elements();
-  if (!belief.options().touch_sd.none() || !belief.options().slip_sd.none()) {
+  const KnownElements& elements = belief.touches().elements();
+  if (!belief.touches().options().touch_sd.none() || !belief.touches().options().slip_sd.none()) {
     const std::int64_t bin = lattice().bin_of(T_object_robot);
     const auto row = static_cast<std::int32_t>(bin / lattice().x_mm.count);
     const BinBox box{.object = object,
@@ -297,15 +298,15 @@ double BoundedPosterior::log_likelihood(int object, const Pose& T_object_robot) 
                      .y_count = 1,
                      .x_first = static_cast<std::int32_t>(bin % lattice().x_mm.count),
                      .x_count = 1};
-    return belief.log_likelihood(std::span(&box, 1), Arithmetic::float64).front();
+    return belief.touches().log_likelihood(std::span(&box, 1), Arithmetic::float64).front();
   }
-  const ContactModel& contact = belief.options().contact;
-  const InterpolatedMap map(belief.hypotheses()[object].compared(), *contact.prior);
+  const ContactModel& contact = belief.touches().options().contact;
+  const InterpolatedMap map(belief.touches().hypotheses()[object].compared(), *contact.prior);
   double sum = 0.0;
   for (const ReadingRun& run : elements.runs) {
     for (std::size_t e = run.begin; e < run.end; ++e) {
-      const glm::dvec2 p_mm =
-          T_object_robot * (elements.from_pivot_mm[e] + belief.options().lattice.pivot_mm);
+      const glm::dvec2 p_mm = T_object_robot * (elements.from_pivot_mm[e] +
+                                                belief.touches().options().lattice.pivot_mm);
       sum += contact.log_likelihood(run.reading, {map.log_odds(p_mm)},
                                     static_cast<std::size_t>(object));
     }
@@ -321,7 +322,7 @@ double BoundedPosterior::entropy() const {
   belief.visit([&](const BinBox& box, std::span<const double> log_likelihood) {
     const double times = log_likelihood.size() == 1 ? static_cast<double>(box.bins()) : 1.0;
     for (const double l : log_likelihood) {
-      const double log_p = belief.log_weight()[box.object] + l - log_total;
+      const double log_p = belief.touches().log_weight()[box.object] + l - log_total;
       entropy -= times * std::exp(log_p) * log_p;
     }
   });
@@ -339,24 +340,26 @@ std::vector<TouchGain> BoundedPosterior::expected_gain(std::span<const Pose> T_r
   BoundedBelief& belief = posterior.belief;
   require_plan(T_robot_sensor, elements_mm, plan, posterior.bodies.size());
   if (!posterior.predictor) {
-    posterior.predictor.emplace(belief.hypotheses(), belief.options().contact);
+    posterior.predictor.emplace(belief.touches().hypotheses(), belief.touches().options().contact);
   }
   std::vector<PoseSample> samples = belief.sample(plan.samples, plan.seed);
-  if (belief.touched() && !belief.options().slip_sd.none()) {
+  if (belief.touches().taken_in() > 0 && !belief.touches().options().slip_sd.none()) {
     // The object slips between touches, not before the first.
-    slip(samples, posterior.bodies, belief.options().slip_sd, plan.seed);
+    slip(samples, posterior.bodies, belief.touches().options().slip_sd, plan.seed);
   }
   return palpate::expected_gain(*posterior.predictor, samples, T_robot_sensor, elements_mm,
-                                belief.options().touch_sd, plan);
+                                belief.touches().options().touch_sd, plan);
 }
 
 std::vector<PoseBlock> BoundedPosterior::refined_blocks() const {
   return whole().belief.refined_blocks();
 }
 
-const PoseLattice& BoundedPosterior::lattice() const { return impl().belief.options().lattice; }
+const PoseLattice& BoundedPosterior::lattice() const {
+  return impl().belief.touches().options().lattice;
+}
 
-std::string BoundedPosterior::path() const { return impl().belief.path(); }
+std::string BoundedPosterior::path() const { return impl().belief.touches().path(); }
 
 std::uint64_t BoundedPosterior::host_bytes() const { return impl().belief.bytes(); }
 

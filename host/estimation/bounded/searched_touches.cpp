@@ -1,0 +1,163 @@
+#include "estimation/bounded/searched_touches.hpp"
+
+#include <algorithm>
+#include <memory>
+#include <utility>
+
+#include <fmt/format.h>
+#include <tbb/info.h>
+
+#include "estimation/hypotheses.hpp"
+#include "palpate/lattice.hpp"
+
+namespace palpate {
+
+SearchedTouches::SearchedTouches(std::span<const Hypothesis> hypotheses,
+                                 const BoundedOptions& options)
+    : options_(options),
+      hypotheses_(hypotheses.begin(), hypotheses.end()),
+      // More threads than cores gain nothing.
+      threads_(options.threads > 0 ? std::min(options.threads, tbb::info::default_concurrency())
+                                   : tbb::info::default_concurrency()),
+      arena_(threads_),
+      likelihood_(hypotheses_, options_.contact, options_.lattice, options_.touch_sd),
+      space_(arena_.execute([&] { return SearchSpace(hypotheses_, options_); })),
+      touches_(!options_.touch_sd.none()),
+      search_(space_, options_, likelihood_) {
+  if (!options_.slip_sd.none()) {
+    moving_.emplace(space_, options_, likelihood_, hypotheses_);
+  }
+  if (options_.none_weight) {
+    none_.emplace(space_, options_, likelihood_);
+    none_log_weight_ = none_log_weight(*options_.none_weight, hypotheses_, options_.lattice);
+  }
+}
+
+void SearchedTouches::reset() {
+  change_.forget();
+  touches_.clear();
+  taken_in_ = 0;
+  elements_ = {};
+  search_.largest().reset();
+  if (moving_) {
+    moving_->reset();
+  }
+  if (none_) {
+    none_->reset();
+  }
+}
+
+void SearchedTouches::move_pivot(const glm::dvec2& pivot_mm) {
+  options_.lattice = with_pivot(options_.lattice, pivot_mm, "bounded posterior", taken_in_ > 0);
+  likelihood_.move_pivot(pivot_mm);
+}
+
+void SearchedTouches::add(std::span<const Touch> touches) {
+  change_.refuse();
+  touches_.add(touches, options_.contact, options_.lattice.pivot_mm);
+}
+
+bool SearchedTouches::waiting() const {
+  change_.refuse();
+  return taken_in_ < touches_.size();
+}
+
+void SearchedTouches::take_in() {
+  change_.change([&] {
+    const std::span<const ArrayReadings> added = touches_.all().subspan(taken_in_);
+    std::vector<KnownElements> known;
+    for (const ArrayReadings& touch : added) {
+      known.push_back(known_elements(touch));
+      for (KnownElements& uncertain : known.back().touches) {
+        uncertain.exact_bins = std::make_shared<ExactBins>(hypotheses_.size(), space_.turns.size(),
+                                                           ExactBins::most_bytes / touches_.size());
+      }
+    }
+    if (moving_) {
+      std::ranges::for_each(known, [&](const KnownElements& touch) { moving_->add(touch); });
+    } else {
+      arena_.execute([&] { search_.largest().add(known); });
+    }
+    known.insert(known.begin(), std::move(elements_));
+    elements_ = merged(known);
+    if (none_) {
+      none_->add(added);
+    }
+    taken_in_ = touches_.size();
+  });
+}
+
+std::string SearchedTouches::path() const {
+  return fmt::format("{} on {} thread{}", likelihood_.instructions(), threads_,
+                     threads_ == 1 ? "" : "s");
+}
+
+std::uint64_t SearchedTouches::bytes() const {
+  std::uint64_t exact_bins = 0;
+  for (const KnownElements& touch : elements_.touches) {
+    exact_bins += touch.exact_bins->bytes();
+  }
+  return exact_bins + likelihood_.bytes() + space_.bytes() + search_.largest().bytes() +
+         static_cast<std::uint64_t>(
+             moving_ ? MovingBelief::bytes_needed(options_.lattice, hypotheses_.size()) : 0.0);
+}
+
+SearchResult SearchedTouches::search(const SearchGoal& goal, const Deadline& deadline,
+                                     const BinVisitor& visitor, std::vector<PoseBlock>* refined) {
+  return arena_.execute([&] {
+    return moving_ ? moving_->find(goal, deadline, visitor)
+                   : search_.run(elements_, goal, deadline, visitor, refined);
+  });
+}
+
+std::vector<DrawnBin> SearchedTouches::draw(std::size_t count, Random& random,
+                                            const Deadline& deadline) const {
+  return arena_.execute([&] { return search_.draw(elements_, count, random, deadline); });
+}
+
+std::vector<double> SearchedTouches::log_likelihood(std::span<const BinBox> boxes,
+                                                    Arithmetic arithmetic) {
+  if (moving_) {
+    arena_.execute([&] { moving_->take_in(Deadline({}, &options_.cancel_point)); });
+    return moving_->log_likelihood(boxes);
+  }
+  std::size_t bins = 0;
+  for (const BinBox& box : boxes) {
+    bins += static_cast<std::size_t>(box.bins());
+  }
+  std::vector<double> logs(bins);
+  arena_.execute([&] { likelihood_.evaluate(boxes, elements_, arithmetic, logs); });
+  return logs;
+}
+
+void SearchedTouches::follow(FollowedBins& bins) const {
+  const std::size_t next = bins.touches();
+  KnownElements touch = known_elements(touches_.all()[next]);
+  std::vector<double> most;
+  for (const TileBounds& bounds : space_.bounds) {
+    most.push_back(bounds.best(space_.finest_level(), touch));
+  }
+  if (!touch.touches.empty()) {
+    // Of uncertain touches, those with known elements are counted.
+    const auto uncertain =
+        static_cast<std::size_t>(std::ranges::count_if(touches_.all().first(next), any_known));
+    touch.touches.front() = elements_.touches[uncertain];
+    for (std::size_t i = 0; i < most.size(); ++i) {
+      most[i] = std::min(most[i], search_.largest().most(uncertain, i));
+    }
+  }
+  arena_.execute([&] { bins.add(touch, likelihood_, most); });
+}
+
+LogInterval SearchedTouches::bound_none(const NoneEvidence::Enough& enough,
+                                        const Deadline& deadline) {
+  const auto weighted = [&](const LogInterval& bounds) {
+    return LogInterval{none_log_weight_ + bounds.low, none_log_weight_ + bounds.high};
+  };
+  return arena_.execute([&] {
+    return weighted(none_->bounds(
+        [&](const LogInterval& bounds) { return enough(weighted(bounds)); }, deadline));
+  });
+}
+
+}  // namespace palpate
