@@ -93,11 +93,13 @@ class DisplacementField {
       kernel.push_back((std::erf((k + 0.5) * scale) - std::erf((k - 0.5) * scale)) / 2.0);
     }
 
+    // The shape fills cells of the middle alone: the border's zeros would add nothing.
+    const int border = radius - 1;
     std::vector<double> row(nx_);
-    for (int j = 0; j < ny_; ++j) {
+    for (int j = border; j < ny_ - border; ++j) {
       std::fill(row.begin(), row.end(), 0.0);
       for (int k = -radius; k <= radius; ++k) {
-        for (int i = std::max(0, -k); i < std::min(nx_, nx_ - k); ++i) {
+        for (int i = std::max(0, border - k); i < std::min(nx_, nx_ - border - k); ++i) {
           row[i] += kernel[k + radius] * cell(i + k, j);
         }
       }
@@ -107,7 +109,8 @@ class DisplacementField {
     std::vector<double> blurred(values_.size(), 0.0);
     for (int j = 0; j < ny_; ++j) {
       double* out = &blurred[static_cast<std::size_t>(j) * nx_];
-      for (int k = std::max(-radius, -j); k <= std::min(radius, ny_ - 1 - j); ++k) {
+      for (int k = std::max(-radius, border - j); k <= std::min(radius, ny_ - border - 1 - j);
+           ++k) {
         const double* in = &cell(0, j + k);
         for (int i = 0; i < nx_; ++i) {
           out[i] += kernel[k + radius] * in[i];
