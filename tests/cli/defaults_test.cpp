@@ -203,8 +203,8 @@ TEST_F(Defaults, AnAutomaticPivotGoesWithAnyRegion) {
 }
 
 TEST_F(Defaults, EveryUnknownHasAPivotOfItsOwn) {
-  const json frames = records(with("u.h5", {"--each-frame"}));
-  ASSERT_EQ(frames.size(), 6u);
+  const json frames = records(with("u.h5", {"--each-frame", "--frames", "0:3"}));
+  ASSERT_EQ(frames.size(), 3u);
   for (std::size_t i = 0; i < frames.size(); ++i) {
     const Arguments alone{"--frames", fmt::format("{}:{}", i, i + 1)};
     expect_same(frames[i], u(alone));

@@ -51,7 +51,7 @@ TEST_F(HardCaseOnTheCommandLine, WeightsOfASceneMayDifferByThirtyOrders) {
   const auto with_weights = [&](const std::string& a, const std::string& i) {
     put_bytes(folder_ / "scene.yaml", "objects: [{map: A.map.h5, weight: " + a +
                                           "}, {map: I.map.h5, weight: " + i + "}]\n");
-    return record({"u.h5", "--scene", "scene.yaml", "--bins", "9x9x8"});
+    return record({"u.h5", "--scene", "scene.yaml", "--bins", "9x9x8", "--none", "0"});
   };
   const auto log_odds = [](const json& r) {
     return std::log(r["identity"]["A"].get<double>()) - std::log(r["identity"]["I"].get<double>());

@@ -100,7 +100,7 @@ TEST_F(InfoCommand, ClosesRecordingsOnly) {
 }
 
 TEST_F(InfoCommand, Map) {
-  OccupancyGrid map = sample_map("I");
+  OccupancyGrid map = sample_map("I", 0.5);
   map.symmetry = 2;
   map.spread_mm = 0.7;
   map.suggested_symmetry = 0;

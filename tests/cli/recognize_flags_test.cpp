@@ -59,6 +59,9 @@ TEST_F(RecognizeFlags, MemoryIsBoundedWithoutAnotherResult) {
 }
 
 TEST_F(RecognizeFlags, FineBinsAreChosenByTheMapsAndSaid) {
+  for (const char* letter : {"A", "I"}) {
+    write_map(folder_ / fmt::format("maps/{}.map.h5", letter), sample_map(letter, 0.5));
+  }
   const std::vector<std::string> region{"--x-mm=1:3", "--y-mm=-4:-2.5", "--theta-deg=40:70"};
   std::vector<std::string> chosen{"recognize", "u.h5", "--maps", "maps", "--bins", "fine"};
   chosen.insert(chosen.end(), region.begin(), region.end());
@@ -96,14 +99,15 @@ TEST_F(RecognizeFlags, FineBinsAreNotFinerThanTheSensorShows) {
 }
 
 TEST_F(RecognizeFlags, FramesAreHalfOpen) {
-  const json selected = mode({"--frames", "2:5"});
+  const json selected = mode({"--bins=25x25x16", "--frames", "2:5"});
   write_recording(folder_ / "u.h5", part_of(sample_unknown("A", {{2.0, -3.0}, 1.0}, 6), 2, 5));
-  EXPECT_EQ(mode({}), selected);
+  EXPECT_EQ(mode({"--bins=25x25x16"}), selected);
 }
 
 TEST_F(RecognizeFlags, TouchesAreTheFirstOfTheFrames) {
-  EXPECT_EQ(mode({"--touches", "4"}), mode({"--frames", "0:4"}));
-  EXPECT_EQ(mode({"--frames", "2:6", "--touches", "3"}), mode({"--frames", "2:5"}));
+  const std::string few = "--bins=25x25x16";
+  EXPECT_EQ(mode({few, "--touches", "4"}), mode({few, "--frames", "0:4"}));
+  EXPECT_EQ(mode({few, "--frames", "2:6", "--touches", "3"}), mode({few, "--frames", "2:5"}));
 }
 
 TEST_F(RecognizeFlags, AFixedAngleIsOneBin) {
@@ -176,9 +180,9 @@ TEST_F(RecognizeFlags, AnArrayMayChangeFromTouchToTouch) {
 
 TEST_F(RecognizeFlags, PicturesAreNamedAfterTheirUnknowns) {
   write_recording(folder_ / "v.h5", sample_unknown("I", {}, 3));
-  done({"recognize", "u.h5", "v.h5", "--maps", "maps", "--png", "new/sheets"});
-  done({"recognize", "u.h5", "--maps", "maps", "--png", "frames", "--each-frame", "--frames",
-        "4:6"});
+  done({"recognize", "u.h5", "v.h5", "--maps", "maps", "--png", "new/sheets", "--touches", "2"});
+  done({"recognize", "u.h5", "--maps", "maps", "--png", "frames", "--each-frame", "--frames", "4:6",
+        "--bins", "15x15x12"});
   for (const char* name :
        {"new/sheets/u.png", "new/sheets/v.png", "frames/u.4.png", "frames/u.5.png"}) {
     EXPECT_TRUE(bytes_of(folder_ / name).starts_with("\x89PNG")) << name;
@@ -187,8 +191,8 @@ TEST_F(RecognizeFlags, PicturesAreNamedAfterTheirUnknowns) {
 }
 
 TEST_F(RecognizeFlags, PicturesAndTracesLeaveTheRecordAlone) {
-  json plain = record({"u.h5", "--maps", "maps"});
-  json drawn = record({"u.h5", "--maps", "maps", "--png", "sheets"});
+  json plain = record({"u.h5", "--maps", "maps", "--bins=25x25x16"});
+  json drawn = record({"u.h5", "--maps", "maps", "--bins=25x25x16", "--png", "sheets"});
   EXPECT_FALSE(drawn.contains("trace"));
   EXPECT_EQ(drawn["best"], plain["best"]);
   EXPECT_EQ(drawn["T_robot_object"], plain["T_robot_object"]);

@@ -9,7 +9,7 @@ namespace palpate {
 /// A letter's map as it would be after very many touches, made without a device: log odds of 4
 /// nats on the letter and -4 beside it, over 32 x 32 mm from the first cell's centre to the last
 /// one's.
-OccupancyGrid sample_map(const std::string& letter, double cell_mm = 0.5);
+OccupancyGrid sample_map(const std::string& letter, double cell_mm = 1.0);
 
 /// Simulated touches of a letter at this pose T_object_robot, which is stored as the truth.
 Recording sample_unknown(const std::string& letter, const Pose& T_object_robot, int touches);

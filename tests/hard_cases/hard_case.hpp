@@ -8,16 +8,10 @@
 
 #include "palpate/map_builder.hpp"
 #include "palpate/pose_histogram.hpp"
+#include "sanitized.hpp"
 #include "synthetic.hpp"
 
 namespace palpate {
-
-// AddressSanitizer makes float64 ten times slower: with it, a few cases are smaller.
-#ifdef __SANITIZE_ADDRESS__
-inline constexpr bool sanitized = true;
-#else
-inline constexpr bool sanitized = false;
-#endif
 
 /// Differences from float64 that a case allows. They do not depend on measured errors.
 struct Allowed {

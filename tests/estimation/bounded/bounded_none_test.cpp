@@ -62,8 +62,8 @@ TEST(BoundedPosterior, KnowsNoneOfThese) {
 TEST(BoundedPosterior, BoundsNoneOfTheseBeyondAHundredThousandBins) {
   Device device = Device::open();
   BoundedOptions options = small_options();
-  options.lattice.x_mm.count = 90;
-  options.lattice.y_mm.count = 90;
+  options.lattice.x_mm.count = 60;
+  options.lattice.y_mm.count = 60;
   options.lattice.theta_rad.count = 20;
   options.none_weight = 3.0;
   for (const std::size_t elements : {36, 200}) {

@@ -3,15 +3,12 @@
 #include <gtest/gtest.h>
 
 #include "bounded/certificate_trials.hpp"
+#include "sanitized.hpp"
 
 namespace palpate::certificate_law_slow_test {
 
-// The float64 posterior of all bins is what takes long, ten times as long under sanitizers.
-#ifdef __SANITIZE_ADDRESS__
-constexpr int fewer = 5;
-#else
-constexpr int fewer = 1;
-#endif
+// The float64 posterior of all bins is what takes long.
+constexpr int fewer = sanitized ? 10 : 1;
 
 TEST(CertificateLaw, HoldsOverUnknownsOfTenThousandBins) {
   expect_trials({25, 25, 16}, 20 / fewer, 903);
