@@ -20,7 +20,7 @@ namespace {
 
 /// Touches of each of two objects that it takes to learn how sure to be of several.
 constexpr std::size_t least_touches = 15;
-/// The same of presses at unknown poses, two in each part that is left out.
+/// Presses at unknown poses that it takes, of each of two objects: two in each part left out.
 constexpr std::size_t least_presses = 10;
 
 /// A map of the folder and its file.

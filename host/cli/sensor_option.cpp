@@ -67,7 +67,7 @@ constexpr const char* poses_help =
     "{\"time\": s since 1970, \"x_mm\": mm, \"y_mm\": mm, \"theta_rad\": rad}; or CSV whose "
     "header has these names";
 
-/// Of add_array_flags().
+/// The flags that add_array_flags() adds.
 constexpr const char* array_flags[] = {"--array", "--first-element", "--order", "--dead",
                                        "--pressure-unit"};
 

@@ -327,7 +327,7 @@ class FoldTrial {
                           : best_fit_near(press, at.best_pose, map, contact_for(label), 0);
   }
 
-  /// Of presses at known poses.
+  /// Errors of the places of presses at known poses.
   std::vector<PlaceError> errors_of(const std::vector<Press>& presses) const {
     std::vector<PlaceError> errors;
     for (std::size_t label = 0; label < labels_.size(); ++label) {

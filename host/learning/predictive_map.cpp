@@ -69,7 +69,7 @@ double PredictiveMap::increment(Reading reading, double squared_mm) const {
 }
 
 double PredictiveMap::log_likelihood(std::size_t touch, const Pose& T_robot_sensor) const {
-  // Of all elements of a touch; a rotation of each would take its sine and cosine anew.
+  // The axes of all elements; rotating each would take the sine and cosine anew.
   const glm::dvec2 x = rotate(T_robot_sensor.theta_rad, {1.0, 0.0});
   const glm::dvec2 y{-x.y, x.x};
   double sum = 0.0;

@@ -42,7 +42,7 @@ class PredictiveMap {
   ContactModel contact_;
   std::vector<Part> touches_;
   double radius_mm_ = 0.0;
-  /// Of contact and of none, in nats, at equally spaced squares of the distance up to the radius's.
+  /// [contact or none] nats at equally spaced squares of the distance, up to the radius's.
   std::array<std::vector<double>, 2> increments_;
   CellRange cells_;
   std::vector<double> log_odds_;  ///< of cells_, [ny, nx]

@@ -15,9 +15,9 @@ struct SensorGain {
   /// Geometric means of the pose errors of CrossValidation::groups; none where there are no groups.
   std::optional<double> error_mm_before;  ///< by Eq. 7
   std::optional<double> error_mm;         ///< by the table
-  /// Of the losses and the errors, one is less beyond chance, and neither is more beyond chance by
-  /// over 0.02 nats, or a tenth of the error: touches that are all told apart have next to no loss,
-  /// with a temperature a little more.
+  /// Either the loss or the error is less beyond chance, and neither is more beyond chance by over
+  /// 0.02 nats, or a tenth of the error: touches that are all told apart have next to no loss, with
+  /// a temperature a little more.
   bool better = false;
 };
 

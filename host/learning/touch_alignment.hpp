@@ -12,8 +12,8 @@ namespace palpate {
 /// axis, over all touches.
 struct TouchAlignment {
   DisplacementSd moved;  ///< of the aligned poses
-  /// Of the true poses, by what the touches tell of them: the aligned poses with the posterior's
-  /// variance. About the standard deviations that were given where these are right.
+  /// Spread of the true poses by what the touches tell of them: of the aligned poses, with the
+  /// posterior's variance. About the standard deviations that were given where these are right.
   DisplacementSd displaced;
   int rounds = 0;  ///< of the object that took most
 };

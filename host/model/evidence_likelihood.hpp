@@ -19,7 +19,7 @@ class EvidenceLikelihood {
   /// @param object whose numbers of the table are read
   EvidenceLikelihood(const InterpolatedMap& map, const ContactModel& contact, std::size_t object);
 
-  /// Of a reading where the map has these log odds, in nats. Not of Unknown.
+  /// Log-likelihood of a reading where the map has these log odds, in nats. Not for Unknown.
   double of(Reading reading, double log_odds) const {
     const double place = std::clamp((log_odds - first_log_odds_) * nodes_per_nat_, 0.0, last_node_);
     const auto node = std::min(static_cast<std::size_t>(place), nodes_ - 2);

@@ -66,7 +66,7 @@ struct ImportRows {
   PressureTable pressures;
   std::optional<PoseTable> poses;             ///< in space, in mm
   std::optional<SpatialPose> T_robot_object;  ///< true pose of the object, in space
-  /// Of pressures that are not held, in the place of theirs: the recording then has none.
+  /// Survey of pressures that are not held, which the recording then has none of.
   std::optional<ImportSurvey> survey;
 };
 /// As import_tables() of tables that hold this. The options' files name what the rows came from;

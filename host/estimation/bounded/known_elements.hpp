@@ -32,7 +32,7 @@ struct KnownElements {
   // those of others.
   std::vector<KnownElements> touches = {};  ///< each by itself; empty where all are exact
   glm::dvec2 sensor_from_pivot_mm = {};     ///< of one touch: the sensor's origin
-  /// Of one touch, where set: keeps what was evaluated of it. Copies share it.
+  /// Where set, keeps what was evaluated of this one touch. Copies share it.
   std::shared_ptr<ExactBins> exact_bins = {};
 };
 

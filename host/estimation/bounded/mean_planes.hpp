@@ -380,7 +380,7 @@ class MeanSearch::Planes {
   std::vector<OverlapPlane::Bins> counted_;  ///< [box, row]
   OverlapShares::Planes share_planes_;
 
-  // Of the plane.
+  // What is known of the plane.
   int theta_ = 0;
   std::vector<OverlapPlane::Bins> rows_;  ///< [y] bins that count, or may have a share
   BinBox around_;                         ///< these

@@ -103,7 +103,7 @@ LogInterval NoneEvidence::bounds(const Enough& enough, const Deadline& deadline)
                        std::accumulate(high.begin(), high.end(), log_share)};
   };
   for (;;) {
-    // Of touches of which nothing is known from below, the one that tells most costs least.
+    // Where several touches are not known from below, the one that tells most costs least.
     std::optional<std::size_t> worst;
     const auto badness = [&](std::size_t i) {
       return std::tuple(searches[i] == 0, width(of(i)), -of(i).high);

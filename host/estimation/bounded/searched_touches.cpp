@@ -138,7 +138,7 @@ void SearchedTouches::follow(FollowedBins& bins) const {
     most.push_back(bounds.best(space_.finest_level(), touch));
   }
   if (!touch.touches.empty()) {
-    // Of uncertain touches, those with known elements are counted.
+    // Uncertain touches without known elements are not among the elements.
     const auto uncertain =
         static_cast<std::size_t>(std::ranges::count_if(touches_.all().first(next), any_known));
     touch.touches.front() = elements_.touches[uncertain];

@@ -80,8 +80,8 @@ struct ParticleFilter::Impl {
 
   /// Uniform particles of equal weight.
   void start() {
-    half_done.forget();
-    half_done.change([&] {
+    change.forget();
+    change.change([&] {
       touch = 0;
       weighed = false;
       prior_over_best = 0.0;
@@ -246,7 +246,7 @@ struct ParticleFilter::Impl {
   /// How much more likely a map of the prior alone makes all touches since the start than the best
   /// particle does, in nats.
   double prior_over_best = 0.0;
-  ChangeInSteps half_done{"particle filter: an update failed half-way; reset() the filter"};
+  ChangeInSteps change{"particle filter: an update failed half-way; reset() the filter"};
   OwnProcess process;
 };
 
@@ -272,7 +272,7 @@ ParticleFilter::Impl& ParticleFilter::impl() const { return held_here(impl_, "pa
 
 ParticleFilter::Impl& ParticleFilter::whole() const {
   Impl& held = impl();
-  held.half_done.refuse();
+  held.change.refuse();
   return held;
 }
 
@@ -295,7 +295,7 @@ void ParticleFilter::update(std::span<const Touch> touches,
     filter.gatherers[i].gather(touches.subspan(i, 1), options.contact, options.region.pivot_mm,
                                ParticleLikelihood::segment_elements());
   }
-  filter.half_done.change([&] {
+  filter.change.change([&] {
     for (std::size_t i = 0; i < touches.size(); ++i) {
       filter.update(filter.gatherers[i].evidence());
       if (progress) {

@@ -125,7 +125,7 @@ struct RefinedPose {
 
 /// How far poses are off where a belief is sure of them, as left-out touches show it.
 struct PoseScale {
-  /// Of the covariance. Eq. 7 is surer of a reading, or less, than the sensor deserves, and
+  /// Multiplies covariances. Eq. 7 is surer of a reading, or less, than the sensor deserves, and
   /// readings of neighbouring elements are no news to each other.
   double factor = 1.0;
   /// What all touches share, since it is the map that is off: the standard deviation along each

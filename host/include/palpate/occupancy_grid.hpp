@@ -55,7 +55,7 @@ struct OccupancyGrid {
   /// The object may lie on its other side: its mirror image, x to -x, is an object of its own under
   /// the same label; see add_mirror_images().
   bool mirror = false;
-  /// Of a drawing, see drawn_map(): the prior is of places beyond the grid alone.
+  /// Made from a drawing, see drawn_map(): the prior is of places beyond the grid alone.
   bool drawn = false;
   /// The object frame in the robot frame of the touches that the map was learned from.
   Pose T_learned_robot_object{};

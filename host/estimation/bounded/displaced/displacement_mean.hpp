@@ -13,7 +13,7 @@ namespace palpate {
 /// A touch's log-likelihoods averaged over where its sensor may have been, [run, block, y, x].
 struct DisplacedMeans {
   std::vector<double> log_mean;  ///< in nats; -infinity where a place holds no bin
-  /// Of bins: a mean may be wrong by e^error - 1 of itself, since the places to which turns move a
+  /// A bin's mean may be wrong by e^error - 1 of itself, since the places to which turns move the
   /// bin are rounded.
   std::vector<double> error;
 };

@@ -73,7 +73,7 @@ class BinLikelihood {
                 std::span<double> log_likelihood, std::span<double> errors = {}) const;
   /// Proven bound, in nats, of the error of evaluate() at any bin of an object.
   double error(std::size_t object, const KnownElements& elements, Arithmetic arithmetic) const;
-  /// The same as if all touches were exact.
+  /// evaluate() and its error() as if all touches were exact.
   void evaluate_exact(std::span<const BinBox> boxes, const KnownElements& elements,
                       Arithmetic arithmetic, std::span<double> log_likelihood) const;
   double exact_error(std::size_t object, const KnownElements& elements,

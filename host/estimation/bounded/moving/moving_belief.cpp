@@ -38,9 +38,9 @@ MovingBelief::MovingBelief(const SearchSpace& space, const BoundedOptions& optio
 }
 
 double MovingBelief::bytes_needed(const PoseLattice& lattice, std::size_t objects) {
-  // Of every object what is followed, what is missing and what all bins keep; then, of one at a
-  // time, means, errors, what will be missing, and planes: as they are, blurred along y, blurred,
-  // and their neighbours' sums.
+  // Every object keeps what is followed, what is missing and what all bins keep; one at a time has
+  // means, errors, what will be missing, and planes: as they are, blurred along y, blurred, and
+  // their neighbours' sums.
   const double numbers =
       (lattice.full_circle() ? 2.0 : 3.0) * static_cast<double>(objects) + 3.0 + 4.0;
   return numbers * sizeof(double) * static_cast<double>(lattice.bins());

@@ -74,7 +74,7 @@ class TileDivision {
   /// Where touches are uncertain, the sums of their penalties over the parts of tiles, [tile,
   /// part], which are tiles of this level; else empty.
   std::vector<std::int64_t> displaced_sums(std::span<const Tile> tiles, std::size_t level) const;
-  /// Those of one object's tiles.
+  /// Adds the sums of one object's tiles.
   void add_displaced(std::span<const Tile> tiles, std::size_t level,
                      std::span<std::int64_t> sums) const;
   /// Appends those parts of a tile, which are tiles of this level, that hold bins.
