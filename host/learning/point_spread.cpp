@@ -2,6 +2,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <string>
 
 #include <tbb/parallel_for.h>
@@ -341,7 +342,7 @@ std::optional<double> learn_point_spread(const std::vector<Press>& presses,
   const double lowest = std::log(least * spacing_mm);
   const double highest = std::log(most * spacing_mm);
   // The face's edges move from cell to cell, so that the error has minima besides the least one.
-  // Coarse cells, at an eighth of the time, tell which one that is.
+  // Coarse cells, at an eighth of the time, tell near which step that is.
   constexpr int steps = 10;
   const double step = (highest - lowest) / steps;
   const std::vector<Field> coarse = pressures_on(4.0);
@@ -353,10 +354,24 @@ std::optional<double> learn_point_spread(const std::vector<Press>& presses,
       best = i;
     }
   }
+  const std::vector<Field> fine = pressures_on(8.0);
+  std::array<std::optional<double>, steps + 1> known;
+  const auto error_at = [&](int i) {
+    std::optional<double>& error = known[static_cast<std::size_t>(i)];
+    if (!error) {
+      error = error_of(fine, std::exp(lowest + i * step));
+    }
+    return *error;
+  };
+  for (int from = -1; from != best;) {
+    from = best;
+    for (const int next : {std::max(from - 1, 0), std::min(from + 1, steps)}) {
+      best = error_at(next) < error_at(best) ? next : best;
+    }
+  }
   if (best == 0 || best == steps) {
     return {};
   }
-  const std::vector<Field> fine = pressures_on(8.0);
   const double found =
       least_at(lowest + (best - 1) * step, lowest + (best + 1) * step, tolerance,
                [&](double log_sigma) { return error_of(fine, std::exp(log_sigma)); });

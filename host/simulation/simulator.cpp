@@ -94,7 +94,7 @@ class DisplacementField {
     }
 
     // The shape fills cells of the middle alone: the border's zeros would add nothing.
-    const int border = radius - 1;
+    const int border = std::max(radius, 1) - 1;
     std::vector<double> row(nx_);
     for (int j = border; j < ny_ - border; ++j) {
       std::fill(row.begin(), row.end(), 0.0);

@@ -21,7 +21,7 @@ class RecognizeDoubt : public ProgramTest {
 
   /// An A with log odds of +-1000.
   void write_sure_map() const {
-    OccupancyGrid sure = sample_map("A", 0.5);  // wider cells leave an O's touches unexplained
+    OccupancyGrid sure = sample_map("A", 0.5);  // cells of 1 mm let an A explain an O's touches
     for (float& l : sure.log_odds) {
       l *= 250.0F;
     }
@@ -57,7 +57,8 @@ TEST_F(RecognizeDoubt, NonesWeightMultipliesItsOdds) {
 }
 
 TEST_F(RecognizeDoubt, AnObjectThatWasNeverLearnedIsRightlyNone) {
-  // Unsure maps excuse a lot: an A half explains most of an O's touches.
+  // Unsure maps excuse a lot: an A half explains most of an O's touches. Surer ones than a sensor
+  // deserves explain nothing, and leave "(none)".
   write_sure_map();
   const std::string out =
       done({"recognize", "o.h5", "--maps", "sure.map.h5", "--none", "1", "--gamma", "0", "--bins",

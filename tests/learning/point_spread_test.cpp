@@ -1,5 +1,6 @@
 #include "learning/contact_learning.hpp"
 
+#include <algorithm>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -19,10 +20,11 @@ TEST_P(PointSpreadOfLetters, IsRecovered) {
   letters.add("U", 80, 53, {.psf_mm = GetParam()});
   const auto found = learn_point_spread(letters.presses, classifier);
   ASSERT_TRUE(found.has_value());
-  EXPECT_NEAR(*found, GetParam(), 0.1 * GetParam());
+  // Cells of an eighth of a spacing, 0.24 mm, make a narrow one wider.
+  EXPECT_NEAR(*found, GetParam(), std::max(0.1 * GetParam(), 0.08));
 }
 
-INSTANTIATE_TEST_SUITE_P(All, PointSpreadOfLetters, testing::Values(0.7, 1.0, 1.5));
+INSTANTIATE_TEST_SUITE_P(All, PointSpreadOfLetters, testing::Values(0.4, 0.7, 1.0, 1.5));
 
 TEST(PointSpread, IsTheLeastErrorOfSeveralMinima) {
   LetterPresses letters;

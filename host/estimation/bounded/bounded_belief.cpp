@@ -6,11 +6,9 @@
 #include <utility>
 
 #include "estimation/bounded/belief_draws.hpp"
-#include "estimation/bounded/log_sum.hpp"
 #include "estimation/pose_draws.hpp"
 #include "model/random.hpp"
 #include "palpate/estimate.hpp"
-#include "palpate/lattice.hpp"
 
 namespace palpate {
 

@@ -31,8 +31,11 @@ class BoundedBelief {
   /// @throws Error where memory ended in the middle of it, until reset()
   void take_in();
 
-  SearchedTouches& touches() { return touches_; }
   const SearchedTouches& touches() const { return touches_; }
+  /// See SearchedTouches.
+  std::vector<double> log_likelihood(std::span<const BinBox> boxes, Arithmetic arithmetic) {
+    return touches_.log_likelihood(boxes, arithmetic);
+  }
   std::uint64_t bytes() const { return touches_.bytes() + (found_ ? found_->bins.bytes() : 0); }
 
   /// The result of a search to the options' tolerance, or as far as their budget reaches. Bounds

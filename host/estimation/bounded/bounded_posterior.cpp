@@ -165,7 +165,7 @@ RefinedPose BoundedPosterior::refine(const Mode& mode) const {
   }
   const auto log_likelihood = [&](std::span<const BinBox> boxes) {
     if (!thin) {
-      return belief.touches().log_likelihood(boxes, Arithmetic::float32);
+      return belief.log_likelihood(boxes, Arithmetic::float32);
     }
     std::size_t bins = 0;
     for (const BinBox& box : boxes) {
@@ -298,7 +298,7 @@ double BoundedPosterior::log_likelihood(int object, const Pose& T_object_robot) 
                      .y_count = 1,
                      .x_first = static_cast<std::int32_t>(bin % lattice().x_mm.count),
                      .x_count = 1};
-    return belief.touches().log_likelihood(std::span(&box, 1), Arithmetic::float64).front();
+    return belief.log_likelihood(std::span(&box, 1), Arithmetic::float64).front();
   }
   const ContactModel& contact = belief.touches().options().contact;
   const InterpolatedMap map(belief.touches().hypotheses()[object].compared(), *contact.prior);

@@ -46,7 +46,7 @@ class MeanSearch {
   /// What the largest tiles of a plane, one object at one theta, tell.
   struct Survey {
     std::int64_t bins = 0;  ///< that count
-    /// Number of bins, or the sum of the shares, where every element sees the prior.
+    /// How many of these, or the sum of the shares of bins, at which every element sees the prior.
     double unseen = 0.0;
     double unseen_error = 0.0;  ///< of this number
     double best = nothing;      ///< the largest bound, in nats, with the prior weight

@@ -62,6 +62,7 @@ TEST(BoundedPosterior, KnowsNoneOfThese) {
 TEST(BoundedPosterior, BoundsNoneOfTheseBeyondAHundredThousandBins) {
   Device device = Device::open();
   BoundedOptions options = small_options();
+  // Both objects together have 144,000.
   options.lattice.x_mm.count = 60;
   options.lattice.y_mm.count = 60;
   options.lattice.theta_rad.count = 20;
