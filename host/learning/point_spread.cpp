@@ -2,7 +2,6 @@
 #include <array>
 #include <cmath>
 #include <map>
-#include <optional>
 #include <string>
 
 #include <tbb/parallel_for.h>
@@ -125,7 +124,8 @@ Field mean_field(const Readings& readings, const std::vector<double>& force, Fie
 }
 
 /// Mean pressure relative to its plateau.
-Field relative_pressure(const Readings& readings, double spacing_mm, double cells_per_spacing) {
+Field relative_pressure(const Readings& readings, double spacing_mm) {
+  constexpr double cells_per_spacing = 8.0;
   constexpr double plateau_quantile = 0.9;  // among the cells above half of the largest
   BoundingBox box;
   for (const Sample& sample : readings.samples) {
@@ -307,6 +307,7 @@ std::optional<double> learn_point_spread(const std::vector<Press>& presses,
   constexpr double of_spacing = 0.95;
   double spacing_mm = 0.0;
   std::vector<Readings> objects;
+  std::vector<Field> pressures;
   for (auto& [label, own] : readings_of(presses, classifier, spacing_mm)) {
     if (own.touches >= fewest_touches) {
       objects.push_back(std::move(own));
@@ -315,15 +316,11 @@ std::optional<double> learn_point_spread(const std::vector<Press>& presses,
   if (objects.empty()) {
     return {};
   }
+  for (const Readings& object : objects) {
+    pressures.push_back(relative_pressure(object, spacing_mm));
+  }
   const double edge_mm = of_spacing * spacing_mm;
-  const auto pressures_on = [&](double cells_per_spacing) {
-    std::vector<Field> pressures;
-    for (const Readings& object : objects) {
-      pressures.push_back(relative_pressure(object, spacing_mm, cells_per_spacing));
-    }
-    return pressures;
-  };
-  const auto error_of = [&](const std::vector<Field>& pressures, double sigma_mm) {
+  const auto error_at = [&](double sigma_mm) {
     std::vector<double> errors(objects.size());
     tbb::parallel_for(std::size_t{0}, objects.size(), [&](std::size_t i) {
       const Field face = face_of(pressures[i], sigma_mm, edge_mm, spacing_mm);
@@ -341,40 +338,23 @@ std::optional<double> learn_point_spread(const std::vector<Press>& presses,
   constexpr double tolerance = 0.005;
   const double lowest = std::log(least * spacing_mm);
   const double highest = std::log(most * spacing_mm);
+  const auto error = [&](double log_sigma) { return error_at(std::exp(log_sigma)); };
   // The face's edges move from cell to cell, so that the error has minima besides the least one.
-  // Coarse cells, at an eighth of the time, tell near which step that is.
   constexpr int steps = 10;
   const double step = (highest - lowest) / steps;
-  const std::vector<Field> coarse = pressures_on(4.0);
   int best = 0;
-  double smallest = error_of(coarse, std::exp(lowest));
+  double smallest = error(lowest);
   for (int i = 1; i <= steps; ++i) {
-    if (const double here = error_of(coarse, std::exp(lowest + i * step)); here < smallest) {
+    if (const double here = error(lowest + i * step); here < smallest) {
       smallest = here;
       best = i;
-    }
-  }
-  const std::vector<Field> fine = pressures_on(8.0);
-  std::array<std::optional<double>, steps + 1> known;
-  const auto error_at = [&](int i) {
-    std::optional<double>& error = known[static_cast<std::size_t>(i)];
-    if (!error) {
-      error = error_of(fine, std::exp(lowest + i * step));
-    }
-    return *error;
-  };
-  for (int from = -1; from != best;) {
-    from = best;
-    for (const int next : {std::max(from - 1, 0), std::min(from + 1, steps)}) {
-      best = error_at(next) < error_at(best) ? next : best;
     }
   }
   if (best == 0 || best == steps) {
     return {};
   }
   const double found =
-      least_at(lowest + (best - 1) * step, lowest + (best + 1) * step, tolerance,
-               [&](double log_sigma) { return error_of(fine, std::exp(log_sigma)); });
+      least_at(lowest + (best - 1) * step, lowest + (best + 1) * step, tolerance, error);
   return std::exp(found);
 }
 

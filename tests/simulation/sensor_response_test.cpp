@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -99,15 +100,22 @@ TEST(SensorResponse, ConservesTheShapesArea) {
     }
   }
   const double ring_mm2 = std::numbers::pi * (9.0 * 9.0 - 6.0 * 6.0);
-  for (const double psf_mm : {0.0, 0.02, 1.0, 2.5}) {
-    Simulator simulator(make_shape("ring"), exact(psf_mm), tiling, 1);
-    const Recording r = simulator.touch({{{0.4, -0.3}, 0.5}}, {});
-    double area_mm2 = 0.0;
-    for (const double pressure : r.pressure) {
-      area_mm2 += pressure / 20.0 * element_mm * element_mm;
+  // All edges of the plate lie on its bounding box.
+  const Shape plate{.label = "plate",
+                    .strokes = {},
+                    .polygons = {{{-9.0, -6.0}, {9.0, -6.0}, {9.0, 6.0}, {-9.0, 6.0}}}};
+  for (const auto& [shape, shape_mm2] :
+       {std::pair{make_shape("ring"), ring_mm2}, {plate, 18.0 * 12.0}}) {
+    for (const double psf_mm : {0.0, 0.02, 1.0, 2.5}) {
+      Simulator simulator(shape, exact(psf_mm), tiling, 1);
+      const Recording r = simulator.touch({{{0.4, -0.3}, 0.5}}, {});
+      double area_mm2 = 0.0;
+      for (const double pressure : r.pressure) {
+        area_mm2 += pressure / 20.0 * element_mm * element_mm;
+      }
+      // The ring's 2-degree chords and the sampling of the elements, together below one in 500.
+      EXPECT_NEAR(area_mm2, shape_mm2, shape_mm2 / 500.0) << shape.label << ", psf " << psf_mm;
     }
-    // The ring's 2-degree chords and the sampling of the elements, together below one in 500.
-    EXPECT_NEAR(area_mm2, ring_mm2, ring_mm2 / 500.0) << "psf " << psf_mm;
   }
 }
 

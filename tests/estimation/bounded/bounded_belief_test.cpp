@@ -101,12 +101,14 @@ TEST(BoundedBelief, IsDrawnFromInProportion) {
 
 // Draws after one more touch may come from the bins that were found before it. A touch of another
 // object, after which other bins count, must not be drawn from these.
-TEST(BoundedBelief, IsDrawnFromInProportionAfterFurtherTouches) {
+void expect_drawn_in_proportion_after_further_touches(const DisplacementSd& touch_sd) {
+  BoundedOptions options = small_options();
+  options.touch_sd = touch_sd;
   const Recording of_l = touches_of_l(4, 826);
   const Recording of_disc = touches_of(on_disc, {{-2.0, 1.5}, 0.0}, 4, 827);
   for (const Recording* last : {&of_l, &of_disc}) {
     SCOPED_TRACE(last == &of_l ? "a touch like the others" : "a touch of the other object");
-    BoundedPosterior posterior(two_shapes(), small_options());
+    BoundedPosterior posterior(two_shapes(), options);
     posterior.update(of_l.touches(0, 2));
     for (std::size_t next = 2; next < 4; ++next) {
       posterior.sample(10, 1);
@@ -115,14 +117,14 @@ TEST(BoundedBelief, IsDrawnFromInProportionAfterFurtherTouches) {
       for (std::size_t i = 2; i <= next; ++i) {
         all.push_back(last->touch(i));
       }
-      BoundedPosterior fresh(two_shapes(), small_options());
+      BoundedPosterior fresh(two_shapes(), options);
       fresh.update(all);
       const Estimate exact = fresh.estimate();
       constexpr std::size_t count = 4000;
       constexpr double left_out = 0.01;  // of the belief, by draws
       std::vector<std::vector<double>> xy(2, std::vector<double>(13 * 12));
       for (const PoseSample& draw : posterior.sample(count, 828)) {
-        const std::int64_t bin = small_options().lattice.bin_of(draw.T_object_robot);
+        const std::int64_t bin = options.lattice.bin_of(draw.T_object_robot);
         xy[static_cast<std::size_t>(draw.object)][static_cast<std::size_t>(bin % (13 * 12))] +=
             1.0 / count;
       }
@@ -138,7 +140,7 @@ TEST(BoundedBelief, IsDrawnFromInProportionAfterFurtherTouches) {
     }
     // What was drawn changes nothing of what is estimated.
     posterior.update(of_l.touch(3));
-    BoundedPosterior fresh(two_shapes(), small_options());
+    BoundedPosterior fresh(two_shapes(), options);
     fresh.update(of_l.touches(0, 2));
     for (const Touch& touch : {last->touch(2), last->touch(3), of_l.touch(3)}) {
       fresh.update(touch);
@@ -150,6 +152,14 @@ TEST(BoundedBelief, IsDrawnFromInProportionAfterFurtherTouches) {
     }
     EXPECT_EQ(told.mode.bin, exact.mode.bin);
   }
+}
+
+TEST(BoundedBelief, IsDrawnFromInProportionAfterFurtherTouches) {
+  expect_drawn_in_proportion_after_further_touches({});
+}
+
+TEST(BoundedBelief, IsDrawnFromInProportionAfterFurtherUncertainTouches) {
+  expect_drawn_in_proportion_after_further_touches({.mm = 1.0, .rad = 0.2});
 }
 
 TEST(BoundedBelief, IsDrawnFromEverywhereWhereNoTouchSeesAMap) {
