@@ -16,6 +16,7 @@
 #include "bins_by_definition.hpp"
 #include "estimation/hypotheses.hpp"
 #include "limits.hpp"
+#include "sanitized.hpp"
 #include "synthetic.hpp"
 
 namespace palpate::none_evidence_test {
@@ -120,7 +121,7 @@ TEST(NoneEvidence, HoldsItsDefinition) {
          {small_lattice(), lattice_of(60, 3, 12), lattice_of(9, 80, 5)}) {
       NoneByBounds none(two_objects(), lattice, contact);
       EXPECT_EQ(none.bounds().high, 0.0);
-      for (const std::size_t elements : {8, 36, 150}) {
+      for (const std::size_t elements : sanitized ? std::vector{8, 36} : std::vector{8, 36, 150}) {
         SCOPED_TRACE(fmt::format("{} elements, seed {}", elements, ++seed));
         const Recording recording = random_recording(1, elements, seed);
         const std::vector<Touch> touches = all_touches(recording);
@@ -198,7 +199,7 @@ TEST(NoneEvidence, EndsWhereNeighboursOfDisplacedTouchesDifferBeyondFloat64) {
   steep.table = crooked_table();
   for (const DisplacementSd& sd : {DisplacementSd{0.0, 0.2}, DisplacementSd{2.0, 0.1}}) {
     NoneByBounds none(two_objects(), lattice_of(21, 19, 16), steep, sd);
-    for (const std::size_t elements : {1, 8, 150}) {
+    for (const std::size_t elements : sanitized ? std::vector{1, 150} : std::vector{1, 8, 150}) {
       SCOPED_TRACE(fmt::format("{} elements", elements));
       const Recording recording = random_recording(2, elements, 740);
       const std::vector<Touch> touches = all_touches(recording);
