@@ -130,11 +130,11 @@ void live(const LiveArguments& options) {
   add_recognition_files(request, files);
   files.writes("--json", options.json, CommandFiles::Dash::stream);
   files.require_distinct();
-  Device& device = device_in_waiting();
+  Device* device = device_in_waiting.of(task);
   Recogniser recogniser = open_telling(device, task);
   warm_up(recogniser, task, description, elements_mm);
   if (options.verbose) {
-    print_engine(&device, recogniser, task);
+    print_engine(device, recogniser, task);
   }
   std::optional<LineFile> json;
   if (!options.json.empty()) {

@@ -187,7 +187,7 @@ void plan_touches(const PlanArguments& options) {
                                                  .device = std::ref(device_in_waiting)});
   require_plannable(task);
   check_outputs(options, request);
-  Device& device = device_in_waiting();
+  Device* device = device_in_waiting.of(task);
   Recogniser recogniser = open_telling(device, task);
   const Plan plan = plan_touch(recogniser, task, unknown, wanted);
   if (const auto words = unresolved_words(task, recogniser.lattice(), unknown.touches);
@@ -198,10 +198,10 @@ void plan_touches(const PlanArguments& options) {
     write_file(options.png, draw_plan(figure_of(plan, task, unknown.touches)));
   }
   give_result(
-      options.json, text_of(plan_json(plan, task, device.name()), 2),
+      options.json, text_of(plan_json(plan, task, device_name(device)), 2),
       plan_text(plan, task, terminal_columns(STDOUT_FILENO)) + setup_words(device, task) + "\n");
   if (options.verbose) {
-    print_engine(&device, recogniser, task);
+    print_engine(device, recogniser, task);
   }
 }
 

@@ -35,7 +35,8 @@ void add_filter_flags(CLI::App& command, Request& request) {
   command.add_option("--tolerance", request.tolerance,
                      "With --filter bounded: largest share of the belief that may be left "
                      "unproven; the search goes on until it is reached. Rounding, which counts as "
-                     "unproven, may exceed a tolerance below about 1e-8 [default: 1e-6]");
+                     "unproven, may exceed a tolerance below about 1e-8 [default: 1e-6; before the "
+                     "last touch of a trace 1e-3]");
   command.add_option("--budget-ms", request.budget_ms,
                      "With --filter bounded: milliseconds after which each estimate's search ends "
                      "and reports what it has proven by then [default: none]");
@@ -195,7 +196,7 @@ void tell_on_stderr(const std::string& sentence) {
   fmt::print(stderr, "palpate: {}\n", in_flags(sentence));
 }
 
-Recogniser open_telling(Device& device, const RecognitionTask& task) {
+Recogniser open_telling(Device* device, const RecognitionTask& task) {
   Recogniser recogniser = open_recogniser(device, task);
   std::ranges::for_each(task.remarks, tell_on_stderr);
   return recogniser;

@@ -42,6 +42,10 @@ class DeviceInWaiting {
  public:
   explicit DeviceInWaiting(std::string name) : name_(std::move(name)) {}
   Device& operator()() { return device_ ? *device_ : device_.emplace(Device::open(name_)); }
+  /// The device of a task's filter; null where that uses none, unless a device was named.
+  Device* of(const RecognitionTask& task) {
+    return uses_device(task) || !name_.empty() ? &(*this)() : nullptr;
+  }
 
  private:
   std::string name_;
@@ -53,7 +57,8 @@ void tell_on_stderr(const std::string& sentence);
 
 /// Opens the task's filter, then tells the task's remarks: bins that do not fit deserve only their
 /// refusal. Throws Error.
-Recogniser open_telling(Device& device, const RecognitionTask& task);
+/// @param device may be null where uses_device() is false
+Recogniser open_telling(Device* device, const RecognitionTask& task);
 
 /// Adds the files that the task of a completed request was read from.
 void add_recognition_files(const Request& request, CommandFiles& files);

@@ -251,9 +251,9 @@ void recognize(const RecognizeArguments& options) {
     require_fittable(task);
   }
   check_outputs(options, request, task, unknowns);
-  Device& device = device_in_waiting();
+  Device* device = device_in_waiting.of(task);
   if (options.fit_touch_sd) {
-    fit_touch_sd(options, device, task, recordings, unknowns);
+    fit_touch_sd(options, *device, task, recordings, unknowns);
     return;
   }
   std::string unresolved;
@@ -275,7 +275,7 @@ void recognize(const RecognizeArguments& options) {
       unresolved = unresolved_words(task, recogniser.lattice(), unknown.touches);
     }
     if (!options.json.empty()) {
-      json.push_back(to_json(records.back(), task, device.name(), request.trace));
+      json.push_back(to_json(records.back(), task, device_name(device), request.trace));
     }
     if (!options.png.empty()) {
       write_file(
@@ -310,7 +310,7 @@ void recognize(const RecognizeArguments& options) {
     for (const RecognitionRecord& record : records) {
       seconds += record.seconds;
     }
-    print_engine(&device, recogniser, task);
+    print_engine(device, recogniser, task);
     fmt::print(stderr, "seconds: {:.3f} to recognise\n", seconds);
   }
 }

@@ -241,21 +241,25 @@ std::string reason_of_filter(const RecognitionTask& task) {
 
 }  // namespace
 
-std::string setup_words(const Device& device, const RecognitionTask& task) {
+std::string device_name(const Device* device) {
+  return device != nullptr ? device->name() : "none";
+}
+
+std::string setup_words(const Device* device, const RecognitionTask& task) {
   const auto* particles = std::get_if<ParticleOptions>(&task.filter);
   const PoseLattice& lattice = task.lattice();
   const auto mirrored =
       static_cast<std::size_t>(std::ranges::count_if(task.hypotheses, &Hypothesis::mirrored));
   const std::size_t maps = task.hypotheses.size() - mirrored;
-  return fmt::format("{} map{}{}{}, {} on {}", maps, maps == 1 ? "" : "s",
+  return fmt::format("{} map{}{}{}, {}{}", maps, maps == 1 ? "" : "s",
                      mirrored > 0 ? fmt::format(" and {} mirrored", mirrored) : "",
                      task.sensor_model.empty() ? "" : " with " + printable(task.sensor_model),
                      particles != nullptr
                          ? fmt::format("{} particles", particles->particles)
-                         : fmt::format("{} x {} x {} bins each{},", lattice.x_mm.count,
+                         : fmt::format("{} x {} x {} bins each{}", lattice.x_mm.count,
                                        lattice.y_mm.count, lattice.theta_rad.count,
                                        traits_of(task.filter).certificate ? " by bounds" : ""),
-                     device.name());
+                     device != nullptr ? ", on " + device->name() : "");
 }
 
 void print_engine(const Device* device, const Recogniser& recogniser, const RecognitionTask& task) {

@@ -87,8 +87,11 @@ std::string gain_text(const TouchGain& gain, PlanGoal goal);
 /// this touch, the best, tells nothing.
 std::string next_touch_words(const PlannedTouch& touch, PlanGoal goal);
 
+/// Name of a device; "none" where it is null.
+std::string device_name(const Device* device);
 /// Maps, bins or particles, and device in a short line.
-std::string setup_words(const Device& device, const RecognitionTask& task);
+/// @param device null where none is used
+std::string setup_words(const Device* device, const RecognitionTask& task);
 /// Prints on standard error how the device works: its memory, the filter with its paths through the
 /// likelihood, the lattice.
 /// @param device null where none is used

@@ -28,7 +28,7 @@ class FilterOf : public Filter {
               const std::function<void(double)>& progress) override {
     own_.update(touches, progress);
   }
-  Estimate estimate() const override { return own_.estimate(); }
+  Estimate estimate(std::optional<double> /*tolerance*/) const override { return own_.estimate(); }
 
  protected:
   Own own_;
@@ -75,6 +75,9 @@ class BoundedFilter final : public FilterInBins<BoundedPosterior> {
  public:
   using FilterInBins::FilterInBins;
 
+  Estimate estimate(std::optional<double> tolerance) const override {
+    return own_.estimate(tolerance);
+  }
   Marginals marginals(int object, const PoseLattice& lattice) const override {
     return own_.marginals(object, marginal_grid(lattice));
   }

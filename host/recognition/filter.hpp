@@ -48,7 +48,9 @@ class Filter {
   /// and particles cannot be weighed ahead, since weighing follows resampling and noise.
   virtual void prepare(const Touch& /*touch*/) {}
 
-  virtual Estimate estimate() const = 0;
+  /// @param tolerance see BoundedPosterior::estimate(); nothing where FilterTraits::certificate is
+  /// false
+  virtual Estimate estimate(std::optional<double> tolerance) const = 0;
   virtual std::optional<RefinedPose> refine(const Mode& /*mode*/) const { return {}; }
   /// Draws from the belief; of particles by their weights.
   virtual std::vector<PoseSample> sample(std::size_t count, std::uint64_t seed) const = 0;

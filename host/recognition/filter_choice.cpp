@@ -254,20 +254,22 @@ std::optional<BoundedOptions> bounded_instead(const HistogramOptions& histogram)
                         .none_weight = histogram.none_weight};
 }
 
-ChosenBins chosen_bins(const Device& device, std::span<const Hypothesis> hypotheses,
-                       const ChosenFilter& filter, BinWidth width) {
+ChosenBins chosen_bins(const std::function<Device&()>& device,
+                       std::span<const Hypothesis> hypotheses, const ChosenFilter& filter,
+                       BinWidth width) {
   const auto* histogram = std::get_if<HistogramOptions>(&filter.options);
-  std::int64_t most = most_bins_on(device, false);
   const auto* bounded = std::get_if<BoundedOptions>(&filter.options);
   // The memory of a belief that slips follows the bins.
   const bool slips = histogram != nullptr ? !histogram->slip_sd.none()
                                           : bounded != nullptr && !bounded->slip_sd.none();
-  if (!slips && (bounded != nullptr ||
-                 (histogram != nullptr && filter.automatic && bounded_instead(*histogram)))) {
-    most = most_bounded_bins;
-  } else if (histogram != nullptr) {
-    most = most_bins_on(device, histogram->still_array, histogram->memory_limit_bytes);
-    if (histogram->memory_limit_bytes) {
+  const bool by_bounds = bounded != nullptr ||
+                         (histogram != nullptr && filter.automatic && bounded_instead(*histogram));
+  std::int64_t most = most_bounded_bins;
+  if (slips || !by_bounds) {
+    most = histogram == nullptr
+               ? most_bins_on(device(), false)
+               : most_bins_on(device(), histogram->still_array, histogram->memory_limit_bytes);
+    if (histogram != nullptr && histogram->memory_limit_bytes) {
       // One bin an object may still exceed the limit: the histogram says how much memory it needs.
       most = std::max(most, static_cast<std::int64_t>(hypotheses.size()));
     }

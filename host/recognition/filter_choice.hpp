@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -57,11 +58,13 @@ struct ChosenBins {
   BalancedLattice balanced;
   std::int64_t most_bins = 0;  ///< limit of all objects' bins together
 };
-/// As many bins as the device's memory holds, or most_bounded_bins where bounds are or may become
-/// the filter.
+/// As many bins as the device's memory holds; most_bounded_bins where bounds are or may become the
+/// filter, unless objects slip.
+/// @param device see Circumstances::device; not called in the second case
 /// @throws Error as balanced_lattice() does
-ChosenBins chosen_bins(const Device& device, std::span<const Hypothesis> hypotheses,
-                       const ChosenFilter& filter, BinWidth width);
+ChosenBins chosen_bins(const std::function<Device&()>& device,
+                       std::span<const Hypothesis> hypotheses, const ChosenFilter& filter,
+                       BinWidth width);
 
 /// Bounds in the place of a histogram of more than most_histogram_bins bins in all, unless
 /// bounded_instead() has none or bounds have no room.

@@ -36,7 +36,10 @@ class Recogniser {
   /// with a touch that would wait for an automatic pivot, and nothing where Filter::prepare() does
   /// not.
   void prepare(const Touch& touch);
-  Estimate estimate() const { return filter_->estimate(); }
+  /// See Filter::estimate().
+  Estimate estimate(std::optional<double> tolerance = {}) const {
+    return filter_->estimate(tolerance);
+  }
   /// The refined pose near the mode; empty for particles.
   std::optional<RefinedPose> refine(const Mode& mode) const { return filter_->refine(mode); }
   /// ParticleFilter::effective_sample_size(); empty without particles.

@@ -218,10 +218,11 @@ RecognitionStep judge(const Estimate& estimate, const GroundTruth& truth,
 
 RecognitionStep take_step(Recogniser& recogniser, const RecognitionTask& task,
                           std::span<const Touch> touches, const GroundTruth& truth,
-                          const std::function<void(double)>& progress) {
+                          const std::function<void(double)>& progress,
+                          std::optional<double> tolerance) {
   const Updated updated = update(recogniser, task, touches, progress);
   const Clock::time_point start = Clock::now();
-  const Estimate estimate = recogniser.estimate();
+  const Estimate estimate = recogniser.estimate(tolerance);
   const double seconds = updated.seconds + seconds_since(start);
   const std::span<const TouchEvidence> evidence = recogniser.evidence();
   const Clock::time_point estimated = Clock::now();
@@ -280,9 +281,11 @@ RecognitionRecord recognise(Recogniser& recogniser, const RecognitionTask& task,
                  static_cast<double>(touches.size()));
         progress_threw = false;
       };
+      const bool last = done + together == touches.size();
       record.trace.push_back(
           take_step(recogniser, task, touches.subspan(done, together), unknown.truth,
-                    progress ? std::function<void(double)>(show) : std::function<void(double)>()));
+                    progress ? std::function<void(double)>(show) : std::function<void(double)>(),
+                    last ? std::nullopt : task.trace_tolerance));
       if (progress && traits_of(task.filter).certificate) {
         show(1.0);
       }

@@ -154,15 +154,18 @@ Decision decide(const RecognitionStep& step, const RecognitionTask& task);
 /// pose. Of these touches a histogram takes the last three one by one, to measure their surprise;
 /// the belief is the same, bit for bit.
 /// @param touches those that the recogniser has not yet taken
+/// @param tolerance see Recogniser::estimate()
 /// @throws Error as Recogniser::update() does
 RecognitionStep take_step(Recogniser& recogniser, const RecognitionTask& task,
                           std::span<const Touch> touches, const GroundTruth& truth,
-                          const std::function<void(double)>& progress = {});
+                          const std::function<void(double)>& progress = {},
+                          std::optional<double> tolerance = {});
 
 /// Recognises one unknown; what the recogniser believed before is forgotten. Where the unknown is
 /// at fault (it has an error or no touches, or a touch is not sound), the record holds the error,
 /// and the next unknown can follow.
-/// @param trace whether to record a step after every touch instead of only after the last touch
+/// @param trace whether to record a step after every touch instead of only after the last touch;
+/// those before the last are within RecognitionTask::trace_tolerance
 /// @param progress called now and then with the fraction done
 /// @throws Error (Fault::system) if the device fails; what `progress` throws
 RecognitionRecord recognise(Recogniser& recogniser, const RecognitionTask& task,

@@ -69,8 +69,11 @@ struct RecognitionTask {
   std::optional<BinSteps> learned_bins = {};  ///< LearnedSensor::bins
   std::optional<LearnedFeatures> features = {};
   std::optional<Familiarity> familiarity = {};
-  FitScale fit_scale = {};                  ///< of RecognitionStep::fit
-  PoseScale pose_scale = {};                ///< of RecognitionStep::refined and of modes
+  FitScale fit_scale = {};    ///< of RecognitionStep::fit
+  PoseScale pose_scale = {};  ///< of RecognitionStep::refined and of modes
+  /// Of what a trace shows before the last touch, where bounds search; the filter's where there is
+  /// none.
+  std::optional<double> trace_tolerance = {};
   ActWhere act = {};                        ///< for RecognitionStep::decision
   std::string sensor_model = {};            ///< file of what was learned; "" by Eq. 7
   std::function<void()> cancel_point = {};  ///< BoundedOptions::cancel_point, where bounds search

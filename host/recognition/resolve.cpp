@@ -234,7 +234,7 @@ FilterOptions settled_filter(const Request& request, const Circumstances& of, Ch
     filter.options =
         with_lattice(filter.options, with_counts(lattice_of(filter.options), *of.counts));
   } else if (width) {
-    const auto [bins, most] = chosen_bins(of.device(), hypotheses, filter, *width);
+    const auto [bins, most] = chosen_bins(of.device, hypotheses, filter, *width);
     filter.options = with_lattice(filter.options, bins.lattice);
     if (bins.coarsened) {
       remarks.push_back(fmt::format(
@@ -305,6 +305,10 @@ RecognitionTask resolve(const Request& request, const Circumstances& of) {
   task.auto_filter = filter.automatic;
   task.filter_asked_for_by = filter.asked_for_by;
   task.auto_pivot = inferred || has_auto_pivot(request);
+  if (!request.tolerance) {
+    // The belief after a first touch is wide, and takes three times as long to find within 1e-6.
+    task.trace_tolerance = 1e-3;
+  }
   task.act = act_where(request);
   task.cancel_point = of.cancel_point;
   if (std::string wider = wider_bins_sentence(task); !wider.empty()) {
@@ -314,9 +318,14 @@ RecognitionTask resolve(const Request& request, const Circumstances& of) {
   return task;
 }
 
-Recogniser open_recogniser(Device& device, const RecognitionTask& task) {
+bool uses_device(const RecognitionTask& task) { return !traits_of(task.filter).certificate; }
+
+Recogniser open_recogniser(Device* device, const RecognitionTask& task) {
+  if (!uses_device(task)) {
+    return Recogniser(task);
+  }
   try {
-    return {device, task};
+    return {*device, task};
   } catch (const Error& error) {
     // A resolved task is sound: only the bins' memory can be refused.
     if (error.fault() == Fault::input && traits_of(task.filter).every_bin &&

@@ -43,9 +43,14 @@ struct Circumstances {
 /// whose value cannot be meant
 RecognitionTask resolve(const Request& request, const Circumstances& circumstances);
 
-/// Opens the task's filter. @throws Error; where the device has no memory for the histogram's bins,
+/// Whether the task's filter computes on a device. Bounds search on the host.
+bool uses_device(const RecognitionTask& task);
+
+/// Opens the task's filter.
+/// @param device may be null where uses_device() is false
+/// @throws Error; where the device has no memory for the histogram's bins,
 /// it names the options without which bounds would take them
-Recogniser open_recogniser(Device& device, const RecognitionTask& task);
+Recogniser open_recogniser(Device* device, const RecognitionTask& task);
 
 /// What to say where the lattice does not resolve the task's touch_sd or slip_sd at one of these
 /// poses of the sensor; else "".

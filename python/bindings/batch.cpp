@@ -90,7 +90,7 @@ OpenBatch open_batch(const std::string& head, const Session& session, Device& de
       // The open batch keeps the session.
       [&session] { session.check(); });
   take_threads(recognition, threads);
-  Recogniser recogniser = open_batch_filter(&device, recognition);
+  Recogniser recogniser = open_recogniser(&device, recognition);
   return {std::move(task), std::move(request), std::move(recognition), std::move(recogniser)};
 }
 

@@ -338,7 +338,12 @@ void bind_bounded(nb::module_& module) {
                "not sound.")
           .def(
               "estimate", on_device<Bounded>(&BoundedPosterior::estimate),
+              "tolerance"_a = nb::none(),
               "Identity with its bounds, mode and certificate. Searches once after each update().\n"
+              "tolerance: in place of the one given to the constructor; what else is asked before\n"
+              "the next update() is about the bins that this search evaluated. Raises Error on "
+              "one\n"
+              "that is not between 0 and 1.\n"
               "After Ctrl-C the belief is as it was, and the next call searches anew.")
           .def(
               "marginals",

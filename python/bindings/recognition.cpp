@@ -73,7 +73,7 @@ Answer recognize(const Subject& subject, Device& device, Call& call) {
   const std::vector<Unknown>& unknowns = subject.unknowns;
   const bool with_trace = subject.request.trace;
   const RecognitionTask task = task_of(subject, device, call);
-  Recogniser recogniser = open_recogniser(device, task);
+  Recogniser recogniser = open_recogniser(&device, task);
   answer.sentences = task.remarks;
   std::string unresolved;
   for (std::size_t i = 0; i < unknowns.size(); ++i) {
@@ -120,7 +120,7 @@ Planned plan_next(const Subject& subject, const PlanRequest& wanted, Device& dev
                                 .cancel_point = [&call] { call.check(); },
                                 .device = [&]() -> Device& { return device; }});
   require_plannable(task);
-  Recogniser recogniser = open_recogniser(device, task);
+  Recogniser recogniser = open_recogniser(&device, task);
   planned.told = task.remarks;
   planned.plan = plan_touch(recogniser, task, unknown, wanted, call.progress());
   if (const std::string words = unresolved_words(task, recogniser.lattice(), unknown.touches);

@@ -4,6 +4,7 @@
 #include <sstream>
 
 #include "program.hpp"
+#include "sample_files.hpp"
 
 namespace palpate::device_and_help_test {
 
@@ -38,12 +39,22 @@ TEST_F(DevicesCommand, TextMarksTheChosenDevice) {
 }
 
 TEST_F(DevicesCommand, AMachineWithoutVulkanDoesAllThatNeedsNoDevice) {
-  setenv("PALPATE_VULKAN_LIBRARY", "/nonexistent/libvulkan.so.1", 1);
+  const struct NoVulkan {
+    NoVulkan() { setenv("PALPATE_VULKAN_LIBRARY", "/nonexistent/libvulkan.so.1", 1); }
+    ~NoVulkan() { unsetenv("PALPATE_VULKAN_LIBRARY"); }
+  } no_vulkan;
   done({"simulate", "A", "-o", "A.h5", "--poses", "random:3"});
   done({"info", "A.h5"});
   done({"sensors", "--json"});
+  write_map(folder_ / "A.map.h5", sample_map("A"));
+  write_recording(folder_ / "u.h5", sample_unknown("A", {}, 3));
+  EXPECT_EQ(record({"u.h5", "--maps", "A.map.h5", "--filter", "bounded"})["device"], "none");
+  put_bytes(folder_ / "c.csv", "x_mm,y_mm,theta_rad\n0,0,0\n2,1,0.5\n");
+  done({"plan", "u.h5", "--maps", "A.map.h5", "--candidates", "c.csv", "--filter", "bounded"});
   for (const std::vector<std::string>& arguments :
-       {std::vector<std::string>{"devices"}, {"map", "A.h5", "-o", "A.map.h5"}}) {
+       {std::vector<std::string>{"devices"},
+        {"map", "A.h5", "-o", "new.h5"},
+        {"recognize", "u.h5", "--maps", "A.map.h5", "--filter", "bounded", "--device", "0"}}) {
     const Outcome outcome = palpate(arguments);
     EXPECT_EQ(outcome.status, 1);
     EXPECT_EQ(outcome.out, "");
@@ -51,7 +62,6 @@ TEST_F(DevicesCommand, AMachineWithoutVulkanDoesAllThatNeedsNoDevice) {
         << outcome.err;
     EXPECT_EQ(std::ranges::count(outcome.err, '\n'), 1) << outcome.err;
   }
-  unsetenv("PALPATE_VULKAN_LIBRARY");
 }
 
 struct Help {

@@ -7,14 +7,15 @@
 namespace palpate::filter_choice_test {
 
 /// The bins of the shapes on a filter.
-ChosenBins chosen(const Device& device, const FilterOptions& filter, bool automatic = false) {
-  return chosen_bins(device, shapes(), {filter, automatic, ""}, BinWidth::fine);
+ChosenBins chosen(Device& device, const FilterOptions& filter, bool automatic = false) {
+  return chosen_bins([&]() -> Device& { return device; }, shapes(), {filter, automatic, ""},
+                     BinWidth::fine);
 }
 
 PoseLattice wide_lattice() { return {.x_mm = {-1000.0, 1000.0, 1}, .y_mm = {-1000.0, 1000.0, 1}}; }
 
 TEST(ChosenBins, AreThoseOfTheMapsWhereTheDeviceHoldsSoMany) {
-  const Device device = Device::open();
+  Device device = Device::open();
   for (const FilterOptions& filter : every_filter()) {
     const ChosenBins bins = chosen(device, filter);
     EXPECT_FALSE(bins.balanced.coarsened);
@@ -26,10 +27,12 @@ TEST(ChosenBins, AreThoseOfTheMapsWhereTheDeviceHoldsSoMany) {
 }
 
 TEST(ChosenBins, FollowUncertainTouches) {
-  const Device device = Device::open();
+  Device device = Device::open();
   const DisplacementSd sd{.mm = 2.0, .rad = 0.2};
   const auto step_mm = [&](const FilterOptions& filter) {
-    return chosen_bins(device, shapes(), {filter, false, ""}, BinWidth::automatic).balanced.step_mm;
+    return chosen_bins([&]() -> Device& { return device; }, shapes(), {filter, false, ""},
+                       BinWidth::automatic)
+        .balanced.step_mm;
   };
   const double exact = step_mm(BoundedOptions{});
   EXPECT_GT(step_mm(BoundedOptions{.touch_sd = sd}), 1.2 * exact);
@@ -38,7 +41,7 @@ TEST(ChosenBins, FollowUncertainTouches) {
 }
 
 TEST(ChosenBins, AreCoarserWhereTheDeviceHoldsFewer) {
-  const Device device = Device::open();
+  Device device = Device::open();
   const ChosenBins bins =
       chosen(device, HistogramOptions{.lattice = wide_lattice(), .still_array = true});
   ASSERT_TRUE(bins.balanced.coarsened);
@@ -48,7 +51,7 @@ TEST(ChosenBins, AreCoarserWhereTheDeviceHoldsFewer) {
 }
 
 TEST(ChosenBins, AreNotLimitedByTheDeviceWhereBoundsMayTakeThem) {
-  const Device device = Device::open();
+  Device device = Device::open();
   HistogramOptions histogram{.lattice = wide_lattice()};
   for (const ChosenBins& bins : {chosen(device, BoundedOptions{.lattice = wide_lattice()}),
                                  chosen(device, histogram, true)}) {

@@ -79,8 +79,9 @@ TEST_F(Warnings, GoodTouchesGiveNoneOnBinsThatSuitTheMaps) {
     const Recording recording = letter_touches(letter, 3, 50);
     HistogramOptions options;
     options.lattice.pivot_mm = recording.T_robot_sensor.front().translation_mm;
-    options.lattice =
-        chosen_bins(*device_, *letters_, {options, false, ""}, BinWidth::fine).balanced.lattice;
+    options.lattice = chosen_bins([]() -> Device& { return *device_; }, *letters_,
+                                  {options, false, ""}, BinWidth::fine)
+                          .balanced.lattice;
     const RecognitionTask task(*letters_, options);
     expect_silence(task, letter, 3, 50);
   }

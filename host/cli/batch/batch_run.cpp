@@ -258,7 +258,7 @@ class Pipeline {
   }
 
   void recognise_jobs(bool first) {
-    Recogniser recogniser = open_batch_filter(device_, task_);
+    Recogniser recogniser = open_recogniser(device_, task_);
     if (first && run_.verbose) {
       print_engine(device_, recogniser, task_);
     }
@@ -319,7 +319,7 @@ class Pipeline {
                         {"unknowns", chunk.lines.size()},
                         {"failed", chunk.failed},
                         {"host", host_name()},
-                        {"device", device_ != nullptr ? device_->name() : "none"},
+                        {"device", device_name(device_)},
                         {"seconds", chunk.seconds}}),
                AtomicFile::Links::replaced);
     std::string text;

@@ -36,13 +36,13 @@ constexpr double unlimited = std::numeric_limits<double>::infinity();
 
 void BoundedBelief::reset() {
   touches_.reset();
-  found_.reset();
+  forget_found();
   followed_.reset();
 }
 
 void BoundedBelief::move_pivot(const glm::dvec2& pivot_mm) {
   touches_.move_pivot(pivot_mm);
-  found_.reset();
+  forget_found();
   followed_.reset();
 }
 
@@ -54,12 +54,24 @@ void BoundedBelief::take_in() {
       found_->bins.values().size() <= FollowedBins::most_bins(touches_.likelihood())) {
     followed_.emplace(found_->bins, found_->result, touches_.log_weight(), touches_.taken_in());
   }
-  found_.reset();
+  forget_found();
   touches_.take_in();
 }
 
+void BoundedBelief::forget_found() {
+  found_.reset();
+  tolerance_ = options().tolerance;
+}
+
+void BoundedBelief::allow(double tolerance) {
+  if (!found_ || tolerance < tolerance_) {
+    found_.reset();
+    tolerance_ = tolerance;
+  }
+}
+
 SearchGoal BoundedBelief::goal() const {
-  SearchGoal goal{options().tolerance, options().evidence_nats, options().evidence_range_nats};
+  SearchGoal goal{tolerance_, options().evidence_nats, options().evidence_range_nats};
   goal.poor_bins = options().poor_bins;
   const std::size_t touches = touches_.taken_in();
   if (touches == 1) {
@@ -115,7 +127,7 @@ BoundedBelief::Found BoundedBelief::search() {
     first.tolerance = std::max(first.tolerance, soon);
   }
   Found best = search(first, deadline);
-  if (first.tolerance > options().tolerance && !deadline.passed()) {
+  if (first.tolerance > tolerance_ && !deadline.passed()) {
     Found better = search(goal(), deadline);
     if (better.result.uncertain() < best.result.uncertain()) {
       best = std::move(better);

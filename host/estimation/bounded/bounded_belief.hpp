@@ -19,7 +19,7 @@ class BoundedBelief {
  public:
   /// @param options checked, with a resolved contact model
   BoundedBelief(std::span<const Hypothesis> hypotheses, const BoundedOptions& options)
-      : touches_(hypotheses, options) {}
+      : touches_(hypotheses, options), tolerance_(options.tolerance) {}
 
   void reset();
   /// @throws Error after the first touch
@@ -38,8 +38,11 @@ class BoundedBelief {
   }
   std::uint64_t bytes() const { return touches_.bytes() + (found_ ? found_->bins.bytes() : 0); }
 
-  /// The result of a search to the options' tolerance, or as far as their budget reaches. Bounds
-  /// "none of these" beside it.
+  /// Sets the tolerance of found() until take_in() takes in more touches, which returns to that of
+  /// the options. What was found within a smaller one stays.
+  void allow(double tolerance);
+  /// The result of a search to the tolerance that is allowed, or as far as the options' budget
+  /// reaches. Bounds "none of these" beside it.
   const SearchResult& found();
   /// Visits the bins that the last search evaluated; searches again where there was no room to keep
   /// them.
@@ -67,17 +70,20 @@ class BoundedBelief {
     std::optional<LogInterval> none = {};  ///< none_log_evidence(), once it is bounded
   };
 
+  /// Forgets what was found, and the tolerance that was allowed for it.
+  void forget_found();
+
   const BoundedOptions& options() const { return touches_.options(); }
   Deadline until(const std::optional<double>& budget_s) const {
     return Deadline(budget_s, &options().cancel_point);
   }
   double bins_in_all() const;
-  /// The goal that the options set.
+  /// The goal that the options and the tolerance set.
   SearchGoal goal() const;
   /// What a search for draws is to reach.
   SearchGoal rough_goal() const;
 
-  /// Searches to the goal that the options set, or as far as their budget reaches.
+  /// Searches to goal(), or as far as the options' budget reaches.
   Found search();
   /// Ends the deadline where there is no room for more bins.
   Found search(const SearchGoal& goal, Deadline& deadline);
@@ -91,6 +97,7 @@ class BoundedBelief {
   bool follow();
 
   SearchedTouches touches_;
+  double tolerance_;                      ///< of found()
   std::optional<Found> found_;            ///< nothing before a search
   std::optional<FollowedBins> followed_;  ///< of the last search before, through some touches
 };

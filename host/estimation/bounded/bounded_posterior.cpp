@@ -80,8 +80,12 @@ void BoundedPosterior::update(std::span<const Touch> touches,
   belief.add(touches);
 }
 
-Estimate BoundedPosterior::estimate() const {
+Estimate BoundedPosterior::estimate(std::optional<double> tolerance) const {
   BoundedBelief& belief = whole().belief;
+  if (tolerance) {
+    require_tolerance(*tolerance);
+  }
+  belief.allow(tolerance.value_or(belief.touches().options().tolerance));
   const SearchResult& found = belief.found();
   Estimate estimate;
   std::vector<double> logs;

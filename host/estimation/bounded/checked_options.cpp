@@ -14,15 +14,14 @@ namespace palpate {
 
 namespace {
 
+void refuse(const char* field, double value, const char* remedy) {
+  throw Error(Fault::input, fmt::format("{} = {}: give {}", field, value, remedy));
+}
+
 /// @throws Error on an option out of range
 void validate(const BoundedOptions& options) {
-  const auto refuse = [](const char* field, double value, const char* remedy) {
-    throw Error(Fault::input, fmt::format("{} = {}: give {}", field, value, remedy));
-  };
   const auto positive = [](double value) { return value > 0.0 && std::isfinite(value); };
-  if (!(options.tolerance > 0.0 && options.tolerance < 1.0)) {
-    refuse("tolerance", options.tolerance, "a share of the mass between 0 and 1, such as 1e-6");
-  }
+  require_tolerance(options.tolerance);
   if (options.budget_s && !positive(*options.budget_s)) {
     refuse("budget_s", *options.budget_s, "a positive number of seconds, or none");
   }
@@ -41,6 +40,12 @@ void validate(const BoundedOptions& options) {
 }
 
 }  // namespace
+
+void require_tolerance(double tolerance) {
+  if (!(tolerance > 0.0 && tolerance < 1.0)) {
+    refuse("tolerance", tolerance, "a share of the mass between 0 and 1, such as 1e-6");
+  }
+}
 
 BoundedOptions checked(const BoundedOptions& options, std::span<const Hypothesis> hypotheses) {
   validate_hypotheses(hypotheses);

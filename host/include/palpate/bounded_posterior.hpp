@@ -127,7 +127,11 @@ class PALPATE_API BoundedPosterior {
 
   /// Identity probabilities (Eq. 14) with their bounds, mode (Eq. 15-16) and certificate. Searches
   /// once after each update(); further calls return the same.
-  Estimate estimate() const;
+  /// @param tolerance in place of the options', such as a wider one for a belief that is looked at
+  /// on the way to the next touch. Whatever else is asked before the next update() is then about
+  /// the bins that this search evaluated; a call with a smaller tolerance searches again.
+  /// @throws Error on a tolerance that is not between 0 and 1
+  Estimate estimate(std::optional<double> tolerance = {}) const;
 
   /// The refined pose near a mode, and its covariance; see PoseHistogram::refine().
   /// Evaluates the bins of the window that it fits.

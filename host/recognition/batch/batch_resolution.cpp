@@ -42,18 +42,10 @@ RecognitionTask resolve_batch(BatchTask& task, const Request& request,
   return recognition;
 }
 
-bool uses_device(const RecognitionTask& recognition) {
-  return !traits_of(recognition.filter).certificate;
-}
-
 void take_threads(RecognitionTask& recognition, std::size_t threads) {
   if (auto* bounded = std::get_if<BoundedOptions>(&recognition.filter)) {
     bounded->threads = static_cast<int>(std::max<std::size_t>(1, threads));
   }
-}
-
-Recogniser open_batch_filter(Device* device, const RecognitionTask& recognition) {
-  return uses_device(recognition) ? open_recogniser(*device, recognition) : Recogniser(recognition);
 }
 
 }  // namespace palpate

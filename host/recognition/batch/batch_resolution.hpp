@@ -4,7 +4,7 @@
 #include <functional>
 
 #include "recognition/batch/batch_task.hpp"
-#include "recognition/recogniser.hpp"
+#include "recognition/recognition_task.hpp"
 #include "recognition/request.hpp"
 
 namespace palpate {
@@ -28,14 +28,7 @@ RecognitionTask resolve_batch(BatchTask& task, const Request& request,
                               const std::function<Device&()>& device,
                               const std::function<void()>& cancel_point = {});
 
-/// Whether the filter computes on a device. Bounds do not: a GPU would take their bins over at a
-/// moment that depends on the clock.
-bool uses_device(const RecognitionTask& recognition);
-
 /// Has bounds take so many host threads.
 void take_threads(RecognitionTask& recognition, std::size_t threads);
-
-/// Opens the filter. @param device may be null where uses_device() is false
-Recogniser open_batch_filter(Device* device, const RecognitionTask& recognition);
 
 }  // namespace palpate

@@ -236,6 +236,40 @@ TEST(BoundedBelief, DrawnFromBeforeAnEstimateTellsTheSameAfterwards) {
   }
 }
 
+TEST(BoundedBelief, IsFoundWithinAnotherToleranceUntilTheNextTouch) {
+  BoundedPosterior posterior(two_shapes(), small_options());
+  BoundedPosterior other(two_shapes(), small_options());
+  const Recording recording = touches_of_l(2, 825);
+  posterior.update(recording.touch(0));
+  other.update(recording.touch(0));
+  const Estimate exact = other.estimate();
+  const double exact_entropy = other.entropy();
+
+  const Estimate wide = posterior.estimate(0.05);
+  EXPECT_LE(wide.certificate->dropped_mass, 0.05);
+  EXPECT_LT(wide.certificate->bins_evaluated, exact.certificate->bins_evaluated / 2);
+  EXPECT_EQ(wide.mode.bin, exact.mode.bin);
+  EXPECT_NEAR(wide.identity[0], exact.identity[0], 0.05);
+  EXPECT_NE(posterior.entropy(), exact_entropy) << "of the bins of that search";
+  // A wider one than was asked for needs no search.
+  EXPECT_EQ(posterior.estimate(0.1).certificate->bins_evaluated, wide.certificate->bins_evaluated);
+
+  EXPECT_EQ(posterior.estimate().certificate->bins_evaluated, exact.certificate->bins_evaluated);
+  EXPECT_EQ(posterior.entropy(), exact_entropy);
+  EXPECT_EQ(posterior.estimate(0.05).identity, exact.identity);
+
+  other.estimate(0.05);
+  for (BoundedPosterior* one : {&posterior, &other}) {
+    one->update(recording.touch(1));
+    EXPECT_LE(one->estimate().certificate->dropped_mass, small_options().tolerance);
+  }
+  EXPECT_EQ(posterior.entropy(), other.entropy());
+  for (const double tolerance : {0.0, 1.0, std::nan("")}) {
+    EXPECT_THROW(posterior.estimate(tolerance), Error) << tolerance;
+  }
+  EXPECT_EQ(posterior.entropy(), other.entropy());
+}
+
 TEST(BoundedBelief, DrawsOfManyBinsLeaveOutAHundredthAtMost) {
   BoundedOptions options;
   options.lattice = {
