@@ -42,9 +42,14 @@ class DeviceInWaiting {
  public:
   explicit DeviceInWaiting(std::string name) : name_(std::move(name)) {}
   Device& operator()() { return device_ ? *device_ : device_.emplace(Device::open(name_)); }
-  /// The device of a task's filter; null where that uses none, unless a device was named.
+  /// Opens the device of a task's filter; null where that uses none.
+  /// @throws Error where there is no device of the name that was given, also where none is used
   Device* of(const RecognitionTask& task) {
-    return uses_device(task) || !name_.empty() ? &(*this)() : nullptr;
+    if (!uses_device(task) && name_.empty()) {
+      return nullptr;
+    }
+    Device& device = (*this)();
+    return uses_device(task) ? &device : nullptr;
   }
 
  private:

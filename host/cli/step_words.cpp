@@ -295,7 +295,7 @@ void print_engine(const Device* device, const Recogniser& recogniser, const Reco
              "device: {}\nfilter: {}\nlattice: {}\n         {}\n"
              "         {}\n         pivot {}\n",
              device == nullptr
-                 ? "none"
+                 ? device_name(device)
                  : fmt::format("{}, {:.1f} MiB of its memory", device->name(),
                                static_cast<double>(recogniser.device_bytes()) / (1 << 20)),
              filter, words("x", lattice.x_mm, 1.0, "mm"), words("y", lattice.y_mm, 1.0, "mm"),

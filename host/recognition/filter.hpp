@@ -48,7 +48,7 @@ class Filter {
   /// and particles cannot be weighed ahead, since weighing follows resampling and noise.
   virtual void prepare(const Touch& /*touch*/) {}
 
-  /// @param tolerance see BoundedPosterior::estimate(); nothing where FilterTraits::certificate is
+  /// @param tolerance see BoundedPosterior::estimate(); ignored where FilterTraits::certificate is
   /// false
   virtual Estimate estimate(std::optional<double> tolerance) const = 0;
   virtual std::optional<RefinedPose> refine(const Mode& /*mode*/) const { return {}; }

@@ -60,7 +60,7 @@ struct ChosenBins {
 };
 /// As many bins as the device's memory holds; most_bounded_bins where bounds are or may become the
 /// filter, unless objects slip.
-/// @param device see Circumstances::device; not called in the second case
+/// @param device see Circumstances::device; called where its memory is asked for
 /// @throws Error as balanced_lattice() does
 ChosenBins chosen_bins(const std::function<Device&()>& device,
                        std::span<const Hypothesis> hypotheses, const ChosenFilter& filter,

@@ -71,8 +71,7 @@ struct RecognitionTask {
   std::optional<Familiarity> familiarity = {};
   FitScale fit_scale = {};    ///< of RecognitionStep::fit
   PoseScale pose_scale = {};  ///< of RecognitionStep::refined and of modes
-  /// Of what a trace shows before the last touch, where bounds search; the filter's where there is
-  /// none.
+  /// Tolerance of a trace's steps before the last; BoundedOptions::tolerance where it is not set.
   std::optional<double> trace_tolerance = {};
   ActWhere act = {};                        ///< for RecognitionStep::decision
   std::string sensor_model = {};            ///< file of what was learned; "" by Eq. 7

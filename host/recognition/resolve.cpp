@@ -306,8 +306,8 @@ RecognitionTask resolve(const Request& request, const Circumstances& of) {
   task.filter_asked_for_by = filter.asked_for_by;
   task.auto_pivot = inferred || has_auto_pivot(request);
   if (!request.tolerance) {
-    // The belief after a first touch is wide, and takes three times as long to find within 1e-6.
-    task.trace_tolerance = 1e-3;
+    // The belief after a first touch is wide, and takes twice as long to find within 1e-6.
+    task.trace_tolerance = 1e-4;
   }
   task.act = act_where(request);
   task.cancel_point = of.cancel_point;

@@ -339,11 +339,11 @@ void bind_bounded(nb::module_& module) {
           .def(
               "estimate", on_device<Bounded>(&BoundedPosterior::estimate),
               "tolerance"_a = nb::none(),
-              "Identity with its bounds, mode and certificate. Searches once after each update().\n"
-              "tolerance: in place of the one given to the constructor; what else is asked before\n"
-              "the next update() is about the bins that this search evaluated. Raises Error on "
-              "one\n"
-              "that is not between 0 and 1.\n"
+              "Identity with its bounds, mode and certificate. Searches once after each update(),\n"
+              "and again where a call has a smaller tolerance than those before it.\n"
+              "tolerance: in place of the one given to the constructor; what else is asked\n"
+              "before the next update(), draws included, is about the bins that the last search\n"
+              "evaluated. Raises Error on one that is not between 0 and 1.\n"
               "After Ctrl-C the belief is as it was, and the next call searches anew.")
           .def(
               "marginals",

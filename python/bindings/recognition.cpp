@@ -67,6 +67,11 @@ struct Answer {
   Sentences sentences;
 };
 
+/// Name of the device that the task's filter computes on.
+std::string name_of_used(const Device& device, const RecognitionTask& task) {
+  return uses_device(task) ? device.name() : "none";
+}
+
 Answer recognize(const Subject& subject, Device& device, Call& call) {
   const std::function<void(double)> progress = call.progress();
   Answer answer;
@@ -85,7 +90,8 @@ Answer recognize(const Subject& subject, Device& device, Call& call) {
     if (unresolved.empty()) {
       unresolved = unresolved_words(task, recogniser.lattice(), unknowns[i].touches);
     }
-    answer.records.push_back(to_json(record, task, device.name(), with_trace, in_keywords));
+    answer.records.push_back(
+        to_json(record, task, name_of_used(device, task), with_trace, in_keywords));
   }
   if (!unresolved.empty()) {
     answer.sentences.push_back(unresolved);
@@ -111,7 +117,7 @@ struct Planned {
 };
 
 Planned plan_next(const Subject& subject, const PlanRequest& wanted, Device& device, Call& call) {
-  Planned planned{.device = device.name()};
+  Planned planned;
   const Unknown& unknown = subject.unknowns.front();
   const RecognitionTask task =
       resolve(subject.request, {.pressure_unit = subject.recordings.front().pressure_unit,
@@ -120,6 +126,7 @@ Planned plan_next(const Subject& subject, const PlanRequest& wanted, Device& dev
                                 .cancel_point = [&call] { call.check(); },
                                 .device = [&]() -> Device& { return device; }});
   require_plannable(task);
+  planned.device = name_of_used(device, task);
   Recogniser recogniser = open_recogniser(&device, task);
   planned.told = task.remarks;
   planned.plan = plan_touch(recogniser, task, unknown, wanted, call.progress());

@@ -72,7 +72,7 @@ class Plan:
     seconds: float
     """Wall time of the plan alone, s."""
     device: str
-    """Name of the device."""
+    """Name of the device; "none" where bounds searched, which use none."""
 
 
 def plan(

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <cstdlib>
 #include <set>
 #include <sstream>
 
@@ -39,10 +38,7 @@ TEST_F(DevicesCommand, TextMarksTheChosenDevice) {
 }
 
 TEST_F(DevicesCommand, AMachineWithoutVulkanDoesAllThatNeedsNoDevice) {
-  const struct NoVulkan {
-    NoVulkan() { setenv("PALPATE_VULKAN_LIBRARY", "/nonexistent/libvulkan.so.1", 1); }
-    ~NoVulkan() { unsetenv("PALPATE_VULKAN_LIBRARY"); }
-  } no_vulkan;
+  const Variable vulkan("PALPATE_VULKAN_LIBRARY", "/nonexistent/libvulkan.so.1");
   done({"simulate", "A", "-o", "A.h5", "--poses", "random:3"});
   done({"info", "A.h5"});
   done({"sensors", "--json"});

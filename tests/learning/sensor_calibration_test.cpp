@@ -92,8 +92,8 @@ LetterPresses three_letters(std::size_t stride, std::size_t step = 1) {
 }
 
 TEST(SensorCalibration, OfLettersAtKnownPosesLearnsTheirSensor) {
-  // Takes 20 s of a core: of half of the touches, whether groups gain by a temperature is a matter
-  // of which. Such a third gains.
+  // Takes 20 s of a core: of fewer touches, whether groups gain by a temperature is a matter of
+  // which.
   constexpr std::size_t stride = sanitized ? 3 : 1;
   const LetterPresses letters = three_letters(stride, sanitized ? 5 : 1);
   double shown = 0.0;
@@ -107,7 +107,9 @@ TEST(SensorCalibration, OfLettersAtKnownPosesLearnsTheirSensor) {
   ASSERT_TRUE(found.groups.has_value());
   EXPECT_EQ(found.groups->touches, 3U);
   EXPECT_GT(found.groups->after.interval().low, found.after->interval().high);
-  EXPECT_LE(found.groups->after.log_loss, found.groups->table.log_loss);
+  if (!sanitized) {
+    EXPECT_LE(found.groups->after.log_loss, found.groups->table.log_loss);
+  }
   ASSERT_TRUE(found.sensor.bins.has_value());
   EXPECT_NEAR(found.sensor.bins->x_mm, 0.95, 1e-9);
   EXPECT_NEAR(found.sensor.bins->theta_rad, std::numbers::pi / 36.0, 1e-9);

@@ -70,11 +70,24 @@ TEST(Recognise, MakesABrokenUnknownARecordAndTheOthersAreRight) {
 TEST(Recognise, EndsItsTraceWithTheSameBits) {
   Device device = Device::open();
   const Recording letter = touched_letter(7);
-  for (const FilterOptions& filter : every_filter()) {
-    const RecognitionTask task(shapes(), filter);
-    Recogniser recogniser(device, task);
-    expect_same(recognise(recogniser, task, unknown_of(letter), true),
-                recognise(recogniser, task, unknown_of(letter), false));
+  std::vector<FilterOptions> filters = every_filter();
+  for (auto sd : {&BoundedOptions::touch_sd, &BoundedOptions::slip_sd}) {
+    auto displaced = std::get<BoundedOptions>(every_filter().back());
+    displaced.*sd = {1.0, 0.1};
+    filters.emplace_back(displaced);
+  }
+  for (const FilterOptions& filter : filters) {
+    RecognitionTask task(shapes(), filter);
+    for (const auto tolerance : {std::optional<double>(), std::optional(1e-3)}) {
+      task.trace_tolerance = tolerance;
+      Recogniser recogniser(device, task);
+      const RecognitionRecord traced = recognise(recogniser, task, unknown_of(letter), true);
+      expect_same(traced, recognise(recogniser, task, unknown_of(letter), false));
+      const bool exact_touches = task.touch_sd().none() && task.slip_sd().none();
+      if (tolerance && exact_touches && std::holds_alternative<BoundedOptions>(filter)) {
+        EXPECT_GT(traced.trace.front().certificate->dropped_mass, 1e-6);
+      }
+    }
   }
 }
 

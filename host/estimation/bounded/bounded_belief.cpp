@@ -36,13 +36,13 @@ constexpr double unlimited = std::numeric_limits<double>::infinity();
 
 void BoundedBelief::reset() {
   touches_.reset();
-  forget_found();
+  found_.reset();
   followed_.reset();
 }
 
 void BoundedBelief::move_pivot(const glm::dvec2& pivot_mm) {
   touches_.move_pivot(pivot_mm);
-  forget_found();
+  found_.reset();
   followed_.reset();
 }
 
@@ -54,24 +54,12 @@ void BoundedBelief::take_in() {
       found_->bins.values().size() <= FollowedBins::most_bins(touches_.likelihood())) {
     followed_.emplace(found_->bins, found_->result, touches_.log_weight(), touches_.taken_in());
   }
-  forget_found();
+  found_.reset();
   touches_.take_in();
 }
 
-void BoundedBelief::forget_found() {
-  found_.reset();
-  tolerance_ = options().tolerance;
-}
-
-void BoundedBelief::allow(double tolerance) {
-  if (!found_ || tolerance < tolerance_) {
-    found_.reset();
-    tolerance_ = tolerance;
-  }
-}
-
-SearchGoal BoundedBelief::goal() const {
-  SearchGoal goal{tolerance_, options().evidence_nats, options().evidence_range_nats};
+SearchGoal BoundedBelief::goal(double tolerance) const {
+  SearchGoal goal{tolerance, options().evidence_nats, options().evidence_range_nats};
   goal.poor_bins = options().poor_bins;
   const std::size_t touches = touches_.taken_in();
   if (touches == 1) {
@@ -101,11 +89,19 @@ SearchGoal BoundedBelief::rough_goal() const {
           .poor_bins = options().poor_bins};
 }
 
-const SearchResult& BoundedBelief::found() {
+const SearchResult& BoundedBelief::found(std::optional<double> asked) {
   const Deadline deadline = until(options().budget_s);
-  if (!found_ || !found_->goal.exact) {
+  const double tolerance = asked.value_or(this->tolerance());
+  if (found_ && !found_->goal.exact) {
     found_.reset();
-    found_ = search();
+  }
+  if (!found_ || tolerance < found_->tolerance) {
+    // A budget may end the search before it proves as much as an earlier one.
+    Found closer = search(tolerance);
+    if (!found_ || closer.result.uncertain() < found_->result.uncertain()) {
+      found_ = std::move(closer);
+    }
+    found_->tolerance = tolerance;
   }
   if (touches_.has_none() && !found_->none) {
     found_->none =
@@ -114,21 +110,21 @@ const SearchResult& BoundedBelief::found() {
   return found_->result;
 }
 
-BoundedBelief::Found BoundedBelief::search() {
+BoundedBelief::Found BoundedBelief::search(double tolerance) {
   // "None of these" has the rest of a budget, which is half of it at least.
   std::optional<double> budget_s = options().budget_s;
   if (touches_.has_none() && budget_s) {
     *budget_s /= 2.0;
   }
   Deadline deadline = until(budget_s);
-  SearchGoal first = goal();
+  SearchGoal first = goal(tolerance);
   if (deadline.exists()) {
     // What is proven soon comes first: a search that is cut short proves little.
     first.tolerance = std::max(first.tolerance, soon);
   }
   Found best = search(first, deadline);
-  if (first.tolerance > tolerance_ && !deadline.passed()) {
-    Found better = search(goal(), deadline);
+  if (first.tolerance > tolerance && !deadline.passed()) {
+    Found better = search(goal(tolerance), deadline);
     if (better.result.uncertain() < best.result.uncertain()) {
       best = std::move(better);
     }
@@ -218,13 +214,13 @@ std::vector<PoseBlock> BoundedBelief::refined_blocks() {
       evaluated.push_back(block_of(box, finest));
     }
   };
-  touches_.search(goal(), until({}), note, &blocks);
+  touches_.search(goal(tolerance()), until({}), note, &blocks);
   blocks.insert(blocks.end(), evaluated.begin(), evaluated.end());
   return blocks;
 }
 
 bool BoundedBelief::tells_enough(const LogInterval& none) const {
-  const SearchGoal asked = goal();
+  const SearchGoal asked = goal(tolerance());
   const double range = asked.evidence_nats ? asked.evidence_range_nats
                                            : -std::log(std::max(asked.tolerance, negligible));
   return none.high - none.low <= asked.evidence_nats.value_or(none_nats) ||

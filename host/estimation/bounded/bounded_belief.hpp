@@ -19,7 +19,7 @@ class BoundedBelief {
  public:
   /// @param options checked, with a resolved contact model
   BoundedBelief(std::span<const Hypothesis> hypotheses, const BoundedOptions& options)
-      : touches_(hypotheses, options), tolerance_(options.tolerance) {}
+      : touches_(hypotheses, options) {}
 
   void reset();
   /// @throws Error after the first touch
@@ -38,12 +38,11 @@ class BoundedBelief {
   }
   std::uint64_t bytes() const { return touches_.bytes() + (found_ ? found_->bins.bytes() : 0); }
 
-  /// Sets the tolerance of found() until take_in() takes in more touches, which returns to that of
-  /// the options. What was found within a smaller one stays.
-  void allow(double tolerance);
-  /// The result of a search to the tolerance that is allowed, or as far as the options' budget
-  /// reaches. Bounds "none of these" beside it.
-  const SearchResult& found();
+  /// The result of a search to the tolerance, or as far as the options' budget reaches. Bounds
+  /// "none of these" beside it. What was found within a smaller tolerance stays.
+  /// @param tolerance where none is given, that of the last search of these touches, and before one
+  /// that of the options
+  const SearchResult& found(std::optional<double> tolerance = {});
   /// Visits the bins that the last search evaluated; searches again where there was no room to keep
   /// them.
   void visit(const BinVisitor& visitor);
@@ -67,24 +66,26 @@ class BoundedBelief {
     SearchResult result;
     EvaluatedBins bins;
     SearchGoal goal;                       ///< that the search reached
+    double tolerance = 0.0;                ///< that found() was asked for
     std::optional<LogInterval> none = {};  ///< none_log_evidence(), once it is bounded
   };
-
-  /// Forgets what was found, and the tolerance that was allowed for it.
-  void forget_found();
 
   const BoundedOptions& options() const { return touches_.options(); }
   Deadline until(const std::optional<double>& budget_s) const {
     return Deadline(budget_s, &options().cancel_point);
   }
   double bins_in_all() const;
-  /// The goal that the options and the tolerance set.
-  SearchGoal goal() const;
+  /// The goal that the options and a tolerance set.
+  SearchGoal goal(double tolerance) const;
+  /// found()'s where none is given.
+  double tolerance() const {
+    return found_ && found_->goal.exact ? found_->tolerance : options().tolerance;
+  }
   /// What a search for draws is to reach.
   SearchGoal rough_goal() const;
 
-  /// Searches to goal(), or as far as the options' budget reaches.
-  Found search();
+  /// Searches to the tolerance, or as far as the options' budget reaches.
+  Found search(double tolerance);
   /// Ends the deadline where there is no room for more bins.
   Found search(const SearchGoal& goal, Deadline& deadline);
   /// Whether the bounds of "none of these" are as close as the options ask for.
@@ -97,7 +98,6 @@ class BoundedBelief {
   bool follow();
 
   SearchedTouches touches_;
-  double tolerance_;                      ///< of found()
   std::optional<Found> found_;            ///< nothing before a search
   std::optional<FollowedBins> followed_;  ///< of the last search before, through some touches
 };

@@ -85,8 +85,8 @@ Estimate BoundedPosterior::estimate(std::optional<double> tolerance) const {
   if (tolerance) {
     require_tolerance(*tolerance);
   }
-  belief.allow(tolerance.value_or(belief.touches().options().tolerance));
-  const SearchResult& found = belief.found();
+  const SearchResult& found =
+      belief.found(tolerance.value_or(belief.touches().options().tolerance));
   Estimate estimate;
   std::vector<double> logs;
   std::vector<LogInterval> bounds;

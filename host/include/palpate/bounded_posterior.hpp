@@ -126,10 +126,11 @@ class PALPATE_API BoundedPosterior {
   void update(const Touch& touch) { update(std::span(&touch, 1)); }
 
   /// Identity probabilities (Eq. 14) with their bounds, mode (Eq. 15-16) and certificate. Searches
-  /// once after each update(); further calls return the same.
+  /// once after each update(), and again where a call has a smaller tolerance than those before it;
+  /// other calls return the same.
   /// @param tolerance in place of the options', such as a wider one for a belief that is looked at
-  /// on the way to the next touch. Whatever else is asked before the next update() is then about
-  /// the bins that this search evaluated; a call with a smaller tolerance searches again.
+  /// on the way to the next touch. Whatever else is asked before the next update(), draws included,
+  /// is about the bins that the last search evaluated.
   /// @throws Error on a tolerance that is not between 0 and 1
   Estimate estimate(std::optional<double> tolerance = {}) const;
 

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <stdexcept>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -237,37 +238,60 @@ TEST(BoundedBelief, DrawnFromBeforeAnEstimateTellsTheSameAfterwards) {
 }
 
 TEST(BoundedBelief, IsFoundWithinAnotherToleranceUntilTheNextTouch) {
-  BoundedPosterior posterior(two_shapes(), small_options());
-  BoundedPosterior other(two_shapes(), small_options());
   const Recording recording = touches_of_l(2, 825);
-  posterior.update(recording.touch(0));
-  other.update(recording.touch(0));
-  const Estimate exact = other.estimate();
-  const double exact_entropy = other.entropy();
+  BoundedPosterior exactly(two_shapes(), small_options());
+  exactly.update(recording.touch(0));
+  const Estimate exact = exactly.estimate();
+  const double exact_entropy = exactly.entropy();
 
-  const Estimate wide = posterior.estimate(0.05);
-  EXPECT_LE(wide.certificate->dropped_mass, 0.05);
-  EXPECT_LT(wide.certificate->bins_evaluated, exact.certificate->bins_evaluated / 2);
-  EXPECT_EQ(wide.mode.bin, exact.mode.bin);
-  EXPECT_NEAR(wide.identity[0], exact.identity[0], 0.05);
-  EXPECT_NE(posterior.entropy(), exact_entropy) << "of the bins of that search";
-  // A wider one than was asked for needs no search.
-  EXPECT_EQ(posterior.estimate(0.1).certificate->bins_evaluated, wide.certificate->bins_evaluated);
+  bool cancels = false;
+  BoundedOptions options = small_options();
+  options.cancel_point = [&] {
+    if (cancels) {
+      throw std::runtime_error("Ctrl-C");
+    }
+  };
+  BoundedPosterior posterior(two_shapes(), options);
+  posterior.update(recording.touch(0));
+  for (const bool drawn_before : {false, true}) {
+    if (drawn_before) {
+      posterior.reset();
+      posterior.update(recording.touch(0));
+      posterior.sample(10, 826);
+    }
+    const Estimate wide = posterior.estimate(0.05);
+    EXPECT_LE(wide.certificate->dropped_mass, 0.05);
+    EXPECT_LT(wide.certificate->bins_evaluated, exact.certificate->bins_evaluated / 2);
+    EXPECT_EQ(wide.mode.bin, exact.mode.bin);
+    EXPECT_NEAR(wide.identity[0], exact.identity[0], 0.05);
+    // A wider one than was asked for needs no search, nor does what else is asked.
+    const double wide_entropy = posterior.entropy();
+    EXPECT_NE(wide_entropy, exact_entropy);
+    cancels = true;
+    EXPECT_EQ(posterior.estimate(0.1).identity, wide.identity);
+    for (const double tolerance : {0.0, 1.0, std::nan("")}) {
+      EXPECT_THROW(posterior.estimate(tolerance), Error) << tolerance;
+    }
+    EXPECT_THROW(posterior.estimate(), std::runtime_error);
+    EXPECT_EQ(posterior.entropy(), wide_entropy) << "the belief stays as it was";
+    cancels = false;
+  }
 
   EXPECT_EQ(posterior.estimate().certificate->bins_evaluated, exact.certificate->bins_evaluated);
   EXPECT_EQ(posterior.entropy(), exact_entropy);
-  EXPECT_EQ(posterior.estimate(0.05).identity, exact.identity);
+  EXPECT_EQ(posterior.estimate(0.05).identity, exact.identity) << "what is closer stays";
 
-  other.estimate(0.05);
-  for (BoundedPosterior* one : {&posterior, &other}) {
-    one->update(recording.touch(1));
-    EXPECT_LE(one->estimate().certificate->dropped_mass, small_options().tolerance);
-  }
-  EXPECT_EQ(posterior.entropy(), other.entropy());
-  for (const double tolerance : {0.0, 1.0, std::nan("")}) {
-    EXPECT_THROW(posterior.estimate(tolerance), Error) << tolerance;
-  }
-  EXPECT_EQ(posterior.entropy(), other.entropy());
+  exactly.update(recording.touch(1));
+  const double next_entropy = exactly.entropy();
+  posterior.reset();
+  posterior.update(recording.touch(0));
+  posterior.estimate(0.05);
+  posterior.update(recording.touch(1));
+  EXPECT_EQ(posterior.entropy(), next_entropy) << "within the options' tolerance again";
+  posterior.estimate(1e-9);
+  posterior.reset();
+  posterior.update(recording.touch(0));
+  EXPECT_EQ(posterior.entropy(), exact_entropy);
 }
 
 TEST(BoundedBelief, DrawsOfManyBinsLeaveOutAHundredthAtMost) {
