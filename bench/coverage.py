@@ -20,8 +20,7 @@ TOUCHES = (1, 3, 5, 9)
 SHARES = (0.68, 0.95)
 MODELS: dict[str, str | None] = {"Eq. 7": "none", "learned": None}  # of recognize()
 SAMPLES = 4_000  # of a mixture of modes: standard error of a level at most 0.008
-EXACT = Touching(at_random_poses=True)
-MISPLACED = Touching(at_random_poses=True, noise=(1.0, 0.05))  # mm, rad
+MISPLACED = (1.0, 0.05)  # standard deviations, mm and rad
 
 _PERCENT = with_interval(".1f", 100.0)
 COLUMNS: list[Column] = [
@@ -89,25 +88,30 @@ def program() -> None:
         trials="unknowns per letter [34, or 2 with --quick]",
     )
     flags.add_argument("--misplaced", action="store_true", help="touches are 1 mm and 0.05 rad off")
+    flags.add_argument(
+        "--equal-gains", action="store_true", help="all sensors' elements have the gain 1"
+    )
     flags.add_argument("--palpate", default="build/palpate", help="the command [%(default)s]")
     options = flags.parse_args()
     device, facts = begin(options)
-    touching = MISPLACED if options.misplaced else EXACT
-    sd_mm, sd_rad = touching.noise
+    sensor = palpate.SensorModel(gain_spread=0.0) if options.equal_gains else palpate.SensorModel()
+    sd_mm, sd_rad = MISPLACED if options.misplaced else (0.0, 0.0)
+    touching = Touching(sensor=sensor, at_random_poses=True, noise=(sd_mm, sd_rad))
     every = 5 if options.quick else 1
     each = options.trials or (2 if options.quick else 34)
-    # Each unknown is touched by a sensor of its own, whose gains all of its touches share.
+    # Each unknown is touched by a sensor of its own, whose gains all of its touches share, and so is
+    # each letter that is learned.
     trials = make_trials(LETTERS * each, 1, max(TOUCHES), SEED, touching)
     random = numpy.random.default_rng(SEED)
     coverage, decisions = Table(COLUMNS), []
     with tempfile.TemporaryDirectory() as folder:
         files = []
-        for recording in training_recordings(EXACT):
+        for recording in training_recordings(touching):
             if recording.object in LETTERS:
                 files.append(f"{folder}/{recording.object}.h5")
                 recording[::every].save(files[-1])
         told(options.palpate, "map", *files, "-o", f"{folder}/maps/")
-        for sensor, model in MODELS.items():
+        for name, model in MODELS.items():
             # Nobody is a stranger: what "(none)" has would count against every region.
             records = palpate.recognize(
                 trials, f"{folder}/maps", trace=True, device=device, sensor_model=model, none=0.0,
@@ -115,7 +119,7 @@ def program() -> None:
             )  # fmt: skip
             for touches in TOUCHES:
                 steps = [record["trace"][touches - 1] for record in records]
-                row: Json = {"sensor": sensor, "touches": touches, "unknowns": len(trials)}
+                row: Json = {"sensor": name, "touches": touches, "unknowns": len(trials)}
                 levels = [
                     level_in_modes(step["modes"], truth_of(trial), random)
                     for step, trial in zip(steps, trials, strict=True)
