@@ -135,6 +135,7 @@ def program() -> None:
                     | {"within": share_record(within, max(len(acted), 1))}
                 )
     print_table(DECISIONS, decisions)
+    facts |= {"gain_spread": sensor.gain_spread}
     write(options.json, facts | {"coverage": coverage, "decisions": decisions})
 
 

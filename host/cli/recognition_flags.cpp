@@ -37,7 +37,7 @@ void add_filter_flags(CLI::App& command, Request& request) {
       "With --filter bounded: largest share of the belief that may be left "
       "unproven; the search goes on until it is reached. Rounding, which counts as "
       "unproven, may exceed a tolerance below about 1e-8 [default: 1e-6, and 1e-4 for "
-      "what 'recognize' shows before the last touch]");
+      "what a trace or a picture of 'recognize' shows before the last touch]");
   command.add_option("--budget-ms", request.budget_ms,
                      "With --filter bounded: milliseconds after which each estimate's search ends "
                      "and reports what it has proven by then [default: none]");
@@ -153,8 +153,9 @@ void add_recognition_flags(CLI::App& command, Request& request, bool& verbose) {
                      "Decide to act where the best object has at least this probability "
                      "[default: 0.99]");
   add_filter_flags(command, request);
-  command.add_option("--device", request.device,
-                     "Vulkan device, by index or a part of its name. Bounds use none");
+  command.add_option(
+      "--device", request.device,
+      "Vulkan device, by index or a part of its name; a search by bounds needs none");
   command.add_flag("--verbose", verbose,
                    "Say on standard error how the device works: its memory, the likelihood's path, "
                    "the lattice, the seconds it took");

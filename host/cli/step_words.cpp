@@ -291,14 +291,16 @@ void print_engine(const Device* device, const Recogniser& recogniser, const Reco
     filter = "histogram in " + recogniser.path();
   }
   filter += reason_of_filter(task);
+  std::string memory = device_name(device);
+  if (device != nullptr) {
+    memory += fmt::format(", {:.1f} MiB of its memory",
+                          static_cast<double>(recogniser.device_bytes()) / (1 << 20));
+  }
   fmt::print(stderr,
              "device: {}\nfilter: {}\nlattice: {}\n         {}\n"
              "         {}\n         pivot {}\n",
-             device == nullptr
-                 ? device_name(device)
-                 : fmt::format("{}, {:.1f} MiB of its memory", device->name(),
-                               static_cast<double>(recogniser.device_bytes()) / (1 << 20)),
-             filter, words("x", lattice.x_mm, 1.0, "mm"), words("y", lattice.y_mm, 1.0, "mm"),
+             memory, filter, words("x", lattice.x_mm, 1.0, "mm"),
+             words("y", lattice.y_mm, 1.0, "mm"),
              words("theta", lattice.theta_rad, degrees(1.0), "deg"),
              task.auto_pivot ? "at the array's centre at the first touch in contact"
                              : fmt::format("{:g}, {:g} mm in the robot frame", lattice.pivot_mm.x,

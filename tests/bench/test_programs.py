@@ -225,6 +225,7 @@ def test_regions_hold_the_truth_as_often_as_can_be(tmp_path: pathlib.Path, flag:
     # touches are misplaced, as each answer is a sum over displacements.
     command = ("--palpate", os.environ["PALPATE_COMMAND"], flag)
     document = Program(tmp_path, "bench.coverage", "--quick", "--trials", 1, *command).document
+    assert document["gain_spread"] == (0.05 if flag == "--misplaced" else 0.0)
     rows = {(row["sensor"], row["touches"]): row for row in document["coverage"]}
     assert len(rows) == 2 * 4, "by both sensors, after four numbers of touches"
     for row in rows.values():

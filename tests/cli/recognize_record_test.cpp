@@ -100,6 +100,10 @@ TEST_F(RecognizeRecord, HasTheDocumentedKeysAndTypes) {
   }
   EXPECT_GT(r["seconds"].get<double>(), 0.0);
   EXPECT_EQ(r["device"], "none") << "bounds search on the host";
+  EXPECT_EQ(
+      record({"u.h5", "--maps", "A.map.h5", "--filter", "bounded", "--device", "0"})["device"],
+      "none")
+      << "also where one is named";
   const json named = record({"u.h5", "--maps", "A.map.h5", "--bins=5x5x4"});
   EXPECT_NE(done({"devices"}).find(named["device"].get<std::string>()), std::string::npos);
 }

@@ -7,9 +7,9 @@
 namespace palpate::filter_choice_test {
 
 /// The bins of the shapes on a filter.
-ChosenBins chosen(Device& device, const FilterOptions& filter, bool automatic = false) {
-  return chosen_bins([&]() -> Device& { return device; }, shapes(), {filter, automatic, ""},
-                     BinWidth::fine);
+ChosenBins chosen(Device& device, const FilterOptions& filter, bool automatic = false,
+                  BinWidth width = BinWidth::fine) {
+  return chosen_bins([&]() -> Device& { return device; }, shapes(), {filter, automatic, ""}, width);
 }
 
 PoseLattice wide_lattice() { return {.x_mm = {-1000.0, 1000.0, 1}, .y_mm = {-1000.0, 1000.0, 1}}; }
@@ -30,9 +30,7 @@ TEST(ChosenBins, FollowUncertainTouches) {
   Device device = Device::open();
   const DisplacementSd sd{.mm = 2.0, .rad = 0.2};
   const auto step_mm = [&](const FilterOptions& filter) {
-    return chosen_bins([&]() -> Device& { return device; }, shapes(), {filter, false, ""},
-                       BinWidth::automatic)
-        .balanced.step_mm;
+    return chosen(device, filter, false, BinWidth::automatic).balanced.step_mm;
   };
   const double exact = step_mm(BoundedOptions{});
   EXPECT_GT(step_mm(BoundedOptions{.touch_sd = sd}), 1.2 * exact);

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <stdexcept>
+#include <thread>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -292,6 +294,23 @@ TEST(BoundedBelief, IsFoundWithinAnotherToleranceUntilTheNextTouch) {
   posterior.reset();
   posterior.update(recording.touch(0));
   EXPECT_EQ(posterior.entropy(), exact_entropy);
+}
+
+TEST(BoundedBelief, IsKnownNoWorseAfterAnotherSearchThatABudgetEnds) {
+  constexpr std::chrono::milliseconds budget(100);
+  bool slow = false;
+  BoundedOptions options = small_options();
+  options.budget_s = std::chrono::duration<double>(budget).count();
+  options.cancel_point = [&] {
+    if (slow) {
+      std::this_thread::sleep_for(budget);
+    }
+  };
+  BoundedPosterior posterior(two_shapes(), options);
+  posterior.update(touches_of_l(1, 825).touch(0));
+  const double proven = posterior.estimate(0.05).certificate->dropped_mass;
+  slow = true;
+  EXPECT_LE(posterior.estimate().certificate->dropped_mass, proven);
 }
 
 TEST(BoundedBelief, DrawsOfManyBinsLeaveOutAHundredthAtMost) {
