@@ -86,6 +86,7 @@ TEST(Recognise, EndsItsTraceWithTheSameBits) {
       const bool exact_touches = task.touch_sd().none() && task.slip_sd().none();
       if (tolerance && exact_touches && std::holds_alternative<BoundedOptions>(filter)) {
         EXPECT_GT(traced.trace.front().certificate->dropped_mass, 1e-6);
+        EXPECT_LE(traced.last().certificate->dropped_mass, 1e-6);
       }
     }
   }
