@@ -94,6 +94,18 @@ def test_unlearned_shapes_fit_worse(tmp_path: pathlib.Path) -> None:
     assert by["16x16 array", 9]["never learned"]["does not fit"]["mean"] == 1.0
 
 
+def test_shapes_drawn_at_random_are_strangers(tmp_path: pathlib.Path) -> None:
+    # Takes some twelve seconds of a processor, most to search for strangers.
+    command = ("--palpate", os.environ["PALPATE_COMMAND"])
+    document = Program(tmp_path, "bench.strangers", "--quick", *command).document
+    rows = {(row["sensor"], row["touches"]): row for row in document["strangers"]}
+    assert len(rows) == 2 * 2, "by both sensors, after two numbers of touches"
+    for row in rows.values():
+        assert row["learned_called_none"]["mean"] == 0.0
+    assert rows["Eq. 7", 1]["strangers_called_none"]["mean"] == 0.0, "one touch cannot tell by Eq. 7"
+    assert rows["learned", 5]["strangers_called_none"]["mean"] > 0.5
+
+
 def test_finer_steps_err_less(tmp_path: pathlib.Path) -> None:
     fine, coarse = Program(tmp_path, "bench.bin_steps", "--quick").document["runs"]
     assert fine["count"] > 4 * coarse["count"]
