@@ -22,7 +22,7 @@ TEST_P(BinWidth, ErrorDoesNotGrowFasterThanTheTouches) {
   HistogramOptions options;
   options.lattice = {.x_mm = {-5.0, -5.0 + 9 * GetParam(), 9},
                      .y_mm = {-7.0, -7.0 + 8 * GetParam(), 8},
-                     .theta_rad = {0, two_pi, 5}};
+                     .theta_rad = {0, two_pi, 2}};
   Device device = Device::open();
   PoseHistogram histogram(device, std::span(&hypothesis, 1), options);
   std::size_t done = 0;

@@ -16,9 +16,8 @@ PoseLattice small_lattice() {
 }
 
 /// Largest error in nats per touch of one histogram over these maps and touches.
-double error_per_touch(const std::vector<OccupancyGrid>& maps, const HistogramOptions& options,
-                       const Recording& recording) {
-  Device device = Device::open();
+double error_per_touch(Device& device, const std::vector<OccupancyGrid>& maps,
+                       const HistogramOptions& options, const Recording& recording) {
   std::vector<Hypothesis> hypotheses;
   for (const OccupancyGrid& map : maps) {
     hypotheses.push_back({map, 1.0});
@@ -28,6 +27,12 @@ double error_per_touch(const std::vector<OccupancyGrid>& maps, const HistogramOp
   histogram.update(touches);
   return likelihood_error(histogram, reference_posterior(hypotheses, options, touches)) /
          static_cast<double>(touches.size());
+}
+
+double error_per_touch(const std::vector<OccupancyGrid>& maps, const HistogramOptions& options,
+                       const Recording& recording) {
+  Device device = Device::open();
+  return error_per_touch(device, maps, options, recording);
 }
 
 class BinsAlongOneAxis : public testing::TestWithParam<int> {};
@@ -86,13 +91,14 @@ TEST(Likelihood, AgreesForMapsOfDifferentCellsInOneHistogram) {
 TEST(Likelihood, AgreesForEveryGammaAndPrior) {
   const OccupancyGrid map = random_map(31, 27, 0.5, steepness, 56);
   const Recording recording = random_recording(2, 36, 57);
-  for (const double gamma : {0.0, 1e-40, 1e-9, 0.01, 0.1, 0.9}) {
-    for (const double prior : {0.01, 0.2, 0.8}) {
+  Device device = Device::open();
+  for (const double gamma : {0.0, 1e-40, 1e-9, 0.01, 0.9}) {
+    for (const double prior : {0.01, 0.8}) {
       HistogramOptions options;
       options.lattice = small_lattice();
       options.contact.gamma = gamma;
       options.contact.prior = prior;
-      EXPECT_LT(error_per_touch({map}, options, recording), per_touch)
+      EXPECT_LT(error_per_touch(device, {map}, options, recording), per_touch)
           << "gamma " << gamma << ", prior " << prior;
     }
   }

@@ -130,14 +130,14 @@ class EveryWay : public testing::Test {
 };
 
 TEST_F(EveryWay, GivesTheReferenceOfATable) {
-  for (const double gamma : {0.1, 1e-6, 0.0}) {
+  for (const double gamma : {0.1, 0.0}) {
     compare(tabled(gamma), tabled(gamma), per_touch);
   }
 }
 
 TEST_F(EveryWay, GivesEquation7FromATableOfIt) {
-  // In products, in logs, and without a floor.
-  for (const double gamma : {0.1, 1e-6, 0.0}) {
+  // With a floor and without one.
+  for (const double gamma : {0.1, 0.0}) {
     compare(tabled(gamma), {.gamma = gamma}, per_touch + 36 * interpolation_nats);
   }
 }

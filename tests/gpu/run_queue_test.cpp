@@ -128,7 +128,7 @@ TEST(Submitter, EachOfSeveralRecordingsSeesItsOwnCommandsInOrder) {
 TEST(RunQueue, EveryThreadGetsItsOwnResults) {
   Context context("");
   constexpr std::uint32_t threads = 6;
-  constexpr std::uint32_t repetitions = 40;
+  constexpr std::uint32_t repetitions = 20;
   std::vector<std::uint32_t> wrong(threads, repetitions);
   {
     std::vector<std::jthread> running;
@@ -137,7 +137,7 @@ TEST(RunQueue, EveryThreadGetsItsOwnResults) {
         CommandStream stream(context);
         const ScaleAndAdd triple(context, 3);
         // The last two are much work, which is submitted alone.
-        const std::size_t n = thread < threads - 2 ? 65 : 100'000;
+        const std::size_t n = thread < threads - 2 ? 65 : 30'000;
         const double work = thread < threads - 2 ? 65.0 : 1e9;
         const Buffer a = words_buffer(context, n);
         const Buffer b = words_buffer(context, n);

@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -15,10 +17,8 @@ bool is_finite(const Pose& pose) {
   return all_finite(std::vector{pose.translation_mm.x, pose.translation_mm.y, pose.theta_rad});
 }
 
-/// Runs both filters and expects all of their results to be finite.
-void expect_numbers(Device& device, std::span<const Hypothesis> objects, const PoseLattice& lattice,
-                    std::span<const Touch> touches) {
-  PoseHistogram histogram(device, objects, {.lattice = lattice, .none_weight = 1.0});
+void expect_numbers(PoseHistogram& histogram, std::size_t objects, std::span<const Touch> touches) {
+  histogram.reset();
   histogram.update(touches);
   const Estimate estimate = histogram.estimate();
   EXPECT_TRUE(all_finite(estimate.identity));
@@ -28,21 +28,34 @@ void expect_numbers(Device& device, std::span<const Hypothesis> objects, const P
   const RefinedPose refined = histogram.refine(estimate.mode);
   EXPECT_TRUE(is_finite(refined.T_object_robot));
   EXPECT_TRUE(all_finite(refined.covariance));
-  for (std::size_t object = 0; object < objects.size(); ++object) {
+  for (std::size_t object = 0; object < objects; ++object) {
     EXPECT_TRUE(all_finite(histogram.log_likelihood(static_cast<int>(object))));
     EXPECT_TRUE(all_finite(histogram.marginals(static_cast<int>(object)).xy));
   }
-  EXPECT_GE(balanced_lattice(lattice, objects, 10'000).lattice.bins(), 1);
+}
 
+void expect_numbers(ParticleFilter& filter, std::span<const Touch> touches) {
+  filter.reset();
+  filter.update(touches);
+  const Estimate estimate = filter.estimate();
+  EXPECT_TRUE(all_finite(estimate.identity));
+  EXPECT_NEAR(total(estimate.identity), 1.0, 1e-9);
+  EXPECT_TRUE(is_finite(estimate.mode.T_object_robot));
+}
+
+/// Runs both filters over each of the recordings and expects all of their results to be finite.
+void expect_numbers(Device& device, std::span<const Hypothesis> objects, const PoseLattice& lattice,
+                    std::span<const Recording> recordings) {
+  EXPECT_GE(balanced_lattice(lattice, objects, 10'000).lattice.bins(), 1);
+  PoseHistogram histogram(device, objects, {.lattice = lattice, .none_weight = 1.0});
   ParticleOptions options{.particles = 200, .region = lattice};
   options.region.x_mm.upper = std::min(lattice.x_mm.upper, lattice.x_mm.lower + 1e5);
   options.region.y_mm.upper = std::min(lattice.y_mm.upper, lattice.y_mm.lower + 1e5);
   ParticleFilter filter(device, objects, options);
-  filter.update(touches);
-  const Estimate of_particles = filter.estimate();
-  EXPECT_TRUE(all_finite(of_particles.identity));
-  EXPECT_NEAR(total(of_particles.identity), 1.0, 1e-9);
-  EXPECT_TRUE(is_finite(of_particles.mode.T_object_robot));
+  for (const Recording& recording : recordings) {
+    expect_numbers(histogram, objects.size(), all_touches(recording));
+    expect_numbers(filter, all_touches(recording));
+  }
 }
 
 TEST(Bounds, OfMapsLatticesAndTouchesLeaveNumbers) {
@@ -66,8 +79,7 @@ TEST(Bounds, OfMapsLatticesAndTouchesLeaveNumbers) {
       for (const PoseLattice& lattice :
            {PoseLattice{{-3, 3, 4}, {-3, 3, 3}, {0, 6, 3}, {}},
             PoseLattice{{-1e9, 1e9, 5}, {-1e9, 1e9, 3}, {1e9 - 6.0, 1e9, 3}, {1e9, -1e9}}}) {
-        expect_numbers(device, objects, lattice, all_touches(usual));
-        expect_numbers(device, objects, lattice, all_touches(far));
+        expect_numbers(device, objects, lattice, std::array{usual, far});
       }
     }
   }

@@ -244,7 +244,7 @@ TEST(DisplacedFit, IsTheReferences) {
          {usual_sd, DisplacementSd{.mm = 2.0}, DisplacementSd{.rad = 0.3}}) {
       double squares = 0.0;
       int compared = 0;
-      for (const std::uint64_t seed : {15U, 16U, 17U, 18U}) {
+      for (const std::uint64_t seed : {15U, 16U}) {
         const Recording recording = random_recording(3, 6, seed);
         const auto touches = all_touches(recording);
         const std::optional<Fit> expected =

@@ -63,13 +63,13 @@ TEST(BoundedPosterior, KnowsNoneOfThese) {
 TEST(BoundedPosterior, BoundsNoneOfTheseBeyondAHundredThousandBins) {
   Device device = Device::open();
   BoundedOptions options = small_options();
-  // Both objects together have 144,000.
-  options.lattice.x_mm.count = 60;
-  options.lattice.y_mm.count = 60;
+  // Both objects together have 110,000.
+  options.lattice.x_mm.count = 55;
+  options.lattice.y_mm.count = 50;
   options.lattice.theta_rad.count = 20;
   options.none_weight = 3.0;
   for (const std::size_t elements : sanitized ? std::vector{36} : std::vector{36, 200}) {
-    const Recording recording = random_recording(3, elements, 818);
+    const Recording recording = random_recording(2, elements, 818);
     BoundedPosterior bounded(two_made_up(), options);
     PoseHistogram dense(device, two_made_up(), {.lattice = options.lattice, .none_weight = 3.0});
     for (std::size_t n = 1; n <= recording.size(); ++n) {

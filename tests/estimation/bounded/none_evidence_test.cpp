@@ -121,7 +121,10 @@ TEST(NoneEvidence, HoldsItsDefinition) {
          {small_lattice(), lattice_of(60, 3, 12), lattice_of(9, 80, 5)}) {
       NoneByBounds none(two_objects(), lattice, contact);
       EXPECT_EQ(none.bounds().high, 0.0);
-      for (const std::size_t elements : sanitized ? std::vector{8, 36} : std::vector{8, 36, 150}) {
+      for (const std::size_t elements : {8, 36, 150}) {
+        if (elements == 150 && (sanitized || lattice.theta_rad.count != 5)) {
+          continue;  // takes long
+        }
         SCOPED_TRACE(fmt::format("{} elements, seed {}", elements, ++seed));
         const Recording recording = random_recording(1, elements, seed);
         const std::vector<Touch> touches = all_touches(recording);
@@ -178,7 +181,7 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(
         DisplacedCase{"all of the circle", lattice_of(19, 17, 20), {1.3, 0.2}},
         DisplacedCase{
-            "a wide region", {{-50, 50, 31}, {-50, 50, 30}, {0, two_pi, 12}, {3, -2}}, {2.0, 0.33}},
+            "a wide region", {{-50, 50, 23}, {-50, 50, 22}, {0, two_pi, 12}, {3, -2}}, {2.0, 0.33}},
         DisplacedCase{"a part of the circle",
                       {{-6, 6, 17}, {-20, 20, 23}, {0.3, 1.2, 13}, {30, 10}},
                       {0.8, 0.1}},
@@ -198,7 +201,7 @@ TEST(NoneEvidence, EndsWhereNeighboursOfDisplacedTouchesDifferBeyondFloat64) {
   steep.prior = 0.2;
   steep.table = crooked_table();
   for (const DisplacementSd& sd : {DisplacementSd{0.0, 0.2}, DisplacementSd{2.0, 0.1}}) {
-    NoneByBounds none(two_objects(), lattice_of(21, 19, 16), steep, sd);
+    NoneByBounds none(two_objects(), lattice_of(15, 14, 12), steep, sd);
     for (const std::size_t elements : sanitized ? std::vector{1, 150} : std::vector{1, 8, 150}) {
       SCOPED_TRACE(fmt::format("{} elements", elements));
       const Recording recording = random_recording(2, elements, 740);

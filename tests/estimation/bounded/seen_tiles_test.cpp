@@ -255,7 +255,7 @@ TEST(BoundSearch, SettlesBinsOnTheTilesCornersOnce) {
   BinCase of = letter_case();
   of.map = random_map(41, 37, 0.125, 12.0, 504);
   of.elements = random_elements(5, 2.0, 2, 505);
-  for (int count = 2; count < 200 && !HasFailure(); ++count) {
+  for (int count = 2; count < 120 && !HasFailure(); ++count) {
     for (const int parts : {40, 49, count - 1}) {
       SCOPED_TRACE(fmt::format("{} bins, {} in a tile", count, parts));
       const double width_mm = count * (1.0 / parts);

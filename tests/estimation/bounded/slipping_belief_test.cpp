@@ -24,7 +24,7 @@ BoundedOptions slipping_options() {
 
 TEST(SlippingBelief, AgreesWithTheHistogram) {
   Device device = Device::open();
-  const Recording recording = touches_of_l(6, 961);
+  const Recording recording = touches_of_l(4, 961);
   BoundedOptions options = slipping_options();
   options.none_weight = 2.0;
   options.evidence_nats = 1e-4;  // of "none of these", too

@@ -61,7 +61,7 @@ TEST(ThinnedLattice, RefinedPosesLieInTheRegion) {
     const double lower = middle + uniform(-1.5, 0.5) * width;
     return Axis{lower, lower + width, static_cast<int>(uniform(1.0, 12.0))};
   };
-  for (int trial = 0; trial < 12; ++trial) {
+  for (int trial = 0; trial < 8; ++trial) {
     const bool full = trial % 4 == 3;
     const PoseLattice region{
         .x_mm = axis(truth.translation_mm.x, 10.0),

@@ -18,10 +18,10 @@ std::vector<Hypothesis> two_objects() {
 }
 
 /// A lattice of nx x 17 x 33 bins: more than one chunk of thetas.
-PoseLattice lattice_of(double step_mm, int nx) {
+PoseLattice lattice_of(double step_mm, int nx, int thetas = 33) {
   return {.x_mm = {-2.0, -2.0 + step_mm * nx, nx},
           .y_mm = {-3.0, -3.0 + step_mm * 17, 17},
-          .theta_rad = {0.0, two_pi, 33}};
+          .theta_rad = {0.0, two_pi, thetas}};
 }
 
 class DeviceLimits : public testing::TestWithParam<MadeUpDevice> {
@@ -146,7 +146,7 @@ TEST(LargeMap, IsReadFromStorageWhereNoTableHoldsIt) {
   device.context().lower_limits(limits);
   for (const double step_mm : {0.1, 0.25, 0.8}) {
     HistogramOptions options;
-    options.lattice = lattice_of(step_mm, 19);
+    options.lattice = lattice_of(step_mm, 19, 3);
     PoseHistogram histogram(device, objects, options);
     EXPECT_EQ(histogram.paths().size(), 2U);
     histogram.update(touches);
@@ -168,7 +168,7 @@ TEST(LargeMap, ManyMapsGoIntoSeveralTables) {
   device.context().lower_limits(limits);
   for (const double step_mm : {0.1, 0.25, 0.8}) {
     HistogramOptions options;
-    options.lattice = lattice_of(step_mm, 19);
+    options.lattice = lattice_of(step_mm, 19, 3);
     PoseHistogram histogram(device, objects, options);
     EXPECT_EQ(histogram.paths().size(), 2U) << "two sizes of cells";
     histogram.update(touches);

@@ -42,7 +42,7 @@ HistogramOptions options_of(double upper_rad) {
 }
 
 TEST(DisplacementBlur, OfSeveralSlabsIsTheSame) {
-  const Recording recording = random_recording(3, 40, 83);
+  const Recording recording = random_recording(2, 40, 83);
   const std::vector<Touch> touches = all_touches(recording);
   // The circle, whose last theta neighbours its first, and a part of it, which ends.
   for (const double upper_rad : {two_pi, 4.0}) {

@@ -19,7 +19,7 @@ TEST(LargeLattice, FiveMillionBinsAreAsGoodAsTenThousand) {
   options.lattice = {.x_mm = {-10.0, 10.0, 100},
                      .y_mm = {-10.0, 10.0, 100},
                      .theta_rad = {0.0, 2.0 * std::numbers::pi, 100}};
-  const Recording recording = random_recording(9, 36, 136);
+  const Recording recording = random_recording(6, 36, 136);
   const std::vector<Touch> touches = all_touches(recording);
   Device device = Device::open();
   // A GPU would be done before there is any progress.
@@ -44,7 +44,7 @@ TEST(LargeLattice, FiveMillionBinsAreAsGoodAsTenThousand) {
     const OccupancyGrid& map = objects[static_cast<std::size_t>(object)].map;
     const std::vector<double> product = histogram.log_likelihood(object);
     best = std::max(best, *std::max_element(product.begin(), product.end()));
-    for (int sample = 0; sample < 2000; ++sample) {
+    for (int sample = 0; sample < 1000; ++sample) {
       const auto bin = static_cast<std::int64_t>(random(0.0, 1e6));
       const Pose pose = reference::bin_pose(options.lattice, bin);
       double expected = 0.0;
@@ -52,7 +52,7 @@ TEST(LargeLattice, FiveMillionBinsAreAsGoodAsTenThousand) {
         expected += reference::log_likelihood(touch, pose, map, {});
       }
       // 1e-4 nats per touch is what the method allows.
-      ASSERT_NEAR(product[static_cast<std::size_t>(bin)], expected, 9e-4)
+      ASSERT_NEAR(product[static_cast<std::size_t>(bin)], expected, 6e-4)
           << "object " << object << ", bin " << bin;
     }
     double sum = 0.0;

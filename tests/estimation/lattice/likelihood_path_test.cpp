@@ -2,6 +2,7 @@
 #include <numbers>
 #include <ostream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -28,21 +29,13 @@ struct Result {
   double error_per_touch = 0.0;
 };
 
-/// @param path_of_cpu takes the path of a CPU device: a GPU takes few bins of small lattices
-/// together
-Result run(const PoseLattice& lattice, double steepness, std::size_t elements, double gamma = 0.1,
-           bool path_of_cpu = false) {
+Result run(Device& device, const PoseLattice& lattice, double steepness, std::size_t elements,
+           double gamma = 0.1) {
   const std::vector<Hypothesis> hypotheses{{random_map(31, 27, cell_mm, steepness, 48), 1.0}};
   const Recording recording = random_recording(2, elements, 7 + elements);
   HistogramOptions options;
   options.lattice = lattice;
   options.contact.gamma = gamma;
-  Device device = Device::open();
-  if (path_of_cpu) {
-    gpu::Limits limits = device.context().limits();
-    limits.cpu = true;
-    device.context().lower_limits(limits);
-  }
   PoseHistogram histogram(device, hypotheses, options);
   const std::vector<Touch> touches = all_touches(recording);
   histogram.update(touches);
@@ -64,8 +57,13 @@ class Steps : public testing::TestWithParam<Case> {};
 
 TEST_P(Steps, TakeTheRightPathAndAgree) {
   const auto& [step_x, step_y, path] = GetParam();
+  // The path of a CPU device: a GPU takes few bins of small lattices together.
+  Device device = Device::open();
+  gpu::Limits limits = device.context().limits();
+  limits.cpu = true;
+  device.context().lower_limits(limits);
   for (const int count : {7, 23}) {
-    const Result result = run(lattice_of(step_x, step_y, count, count), 12.0, 36, 0.1, true);
+    const Result result = run(device, lattice_of(step_x, step_y, count, count), 12.0, 36);
     EXPECT_NE(result.path.find(path), std::string::npos) << result.path;
     EXPECT_LT(result.error_per_touch, per_touch) << result.path;
   }
@@ -90,9 +88,11 @@ class FineBins : public testing::TestWithParam<int> {};
 
 TEST_P(FineBins, AgreeAlongEitherAxis) {
   // Down to one bin per axis, and with counts that no tile divides.
+  Device device = Device::open();
   for (const double step : {0.2, 0.3, 0.6, 1.6}) {
-    EXPECT_LT(run(lattice_of(step, step, GetParam(), 3), 12.0, 36).error_per_touch, per_touch);
-    EXPECT_LT(run(lattice_of(step, step, 3, GetParam()), 12.0, 36).error_per_touch, per_touch);
+    for (const auto& [nx, ny] : {std::pair(GetParam(), 3), std::pair(3, GetParam())}) {
+      EXPECT_LT(run(device, lattice_of(step, step, nx, ny), 12.0, 36).error_per_touch, per_touch);
+    }
   }
 }
 
@@ -103,8 +103,9 @@ class ElementCounts : public testing::TestWithParam<std::size_t> {};
 TEST_P(ElementCounts, AgreeOnEveryPath) {
   // The tolerance is for arrays of 36; the errors of more elements add up.
   const double arrays = std::max(1.0, static_cast<double>(GetParam()) / 36.0);
+  Device device = Device::open();
   for (const double step : {0.2, 0.3, 0.6, 1.6}) {
-    EXPECT_LT(run(lattice_of(step, step, 11, 9), 12.0, GetParam()).error_per_touch,
+    EXPECT_LT(run(device, lattice_of(step, step, 11, 9), 12.0, GetParam()).error_per_touch,
               per_touch * arrays);
   }
 }
@@ -112,25 +113,29 @@ TEST_P(ElementCounts, AgreeOnEveryPath) {
 INSTANTIATE_TEST_SUITE_P(Elements, ElementCounts, testing::Values(0, 1, 36, 37, 256, 1400));
 
 TEST(LikelihoodPaths, AgreeOnSteepAndFlatMaps) {
+  Device device = Device::open();
   for (const double step : {0.2, 0.3, 0.6, 1.6}) {
     const PoseLattice lattice = lattice_of(step, step, 21, 19);
-    EXPECT_LT(run(lattice, 130.0, 36).error_per_touch, per_touch) << step;
-    EXPECT_LT(run(lattice, 0.0, 36).error_per_touch, per_touch) << step;
+    EXPECT_LT(run(device, lattice, 130.0, 36).error_per_touch, per_touch) << step;
+    EXPECT_LT(run(device, lattice, 0.0, 36).error_per_touch, per_touch) << step;
   }
 }
 
 TEST(LikelihoodPaths, AgreeWithoutAFloorUnderTheLikelihood) {
-  for (const double step : {0.2, 0.3, 0.6, 1.6}) {
-    const PoseLattice lattice = lattice_of(step, step, 21, 19);
+  Device device = Device::open();
+  // Tiles over one cell and over two, and runs.
+  for (const double step : {0.2, 0.6, 1.6}) {
+    const PoseLattice lattice = lattice_of(step, step, 11, 9);
     // No floor, one too small for products, and the least that products take.
     for (const double gamma : {0.0, 1e-6, 5e-3}) {
-      EXPECT_LT(run(lattice, 12.0, 36, gamma).error_per_touch, per_touch) << gamma;
+      EXPECT_LT(run(device, lattice, 12.0, 36, gamma).error_per_touch, per_touch) << gamma;
     }
   }
 }
 
 TEST(LikelihoodPaths, AgreeAtTheMapsEdgeAndBeyond) {
   // The map spans 15.5 x 13.5 mm about the origin; elements reach 14 mm from it.
+  Device device = Device::open();
   for (const double step : {0.2, 1.6}) {
     for (const double offset : {6.0, 18.0, 400.0}) {
       PoseLattice lattice = lattice_of(step, step, 31, 29);
@@ -138,7 +143,7 @@ TEST(LikelihoodPaths, AgreeAtTheMapsEdgeAndBeyond) {
         axis->lower += offset;
         axis->upper += offset;
       }
-      EXPECT_LT(run(lattice, 12.0, 36).error_per_touch, per_touch) << offset;
+      EXPECT_LT(run(device, lattice, 12.0, 36).error_per_touch, per_touch) << offset;
     }
   }
 }

@@ -112,7 +112,7 @@ TEST_F(PreparedTouch, ThatDoesNotComeCostsNoBit) {
 
 TEST_F(PreparedTouch, StaysWithinTheMemoryLimit) {
   HistogramOptions options = options_of(0.1);
-  options.lattice.theta_rad.count = 20'000;  // 32 MB for each belief
+  options.lattice.theta_rad.count = 8'000;  // 13 MB for each belief
   const std::uint64_t one_belief = 2 * 8 * static_cast<std::uint64_t>(options.lattice.bins());
   for (const std::uint64_t limit : {2 * one_belief, 4 * one_belief}) {
     options.memory_limit_bytes = limit;

@@ -38,8 +38,12 @@ RefinedPose refined(const PoseLattice& lattice, const glm::dvec2& centroid_mm,
     return values;
   };
   std::int64_t best = 0;
+  double most = at_bin(best);
   for (std::int64_t bin = 1; bin < lattice.bins(); ++bin) {
-    best = at_bin(bin) > at_bin(best) ? bin : best;
+    if (const double here = at_bin(bin); here > most) {
+      best = bin;
+      most = here;
+    }
   }
   return refine(in_boxes, lattice, {.centroid_mm = centroid_mm, .inertia_mm2 = spin_mm * spin_mm},
                 {.bin = best});

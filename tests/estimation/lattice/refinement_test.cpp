@@ -270,7 +270,7 @@ TEST(RefinedPose, ErrsLessThanTheModeAndKnowsByHowMuch) {
   std::vector<double> modes;
   std::vector<double> refined;
   std::vector<double> normalised;
-  for_each_unknown(device, 8, 15, [&](const Unknown& unknown) {
+  for_each_unknown(device, 4, 15, [&](const Unknown& unknown) {
     // The bins of 64 x 64 x 244 over the whole region, around the truth only.
     const PoseLattice lattice =
         around(unknown, {{-2.5, 2.5, 16}, {-2.5, 2.5, 16}, {-0.4, 0.4, 31}, {}});

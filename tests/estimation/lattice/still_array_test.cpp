@@ -41,10 +41,10 @@ TEST(StillArray, GivesTheReferencesLikelihoodOnEveryPath) {
   constexpr std::size_t elements = 300;
   const Recording recording = presses(3, elements);
   const std::vector<Touch> touches = all_touches(recording);
+  Device device = Device::open();
   for (const double step_mm : {0.1, 0.25, 0.8}) {
     for (const double gamma : {0.1, 1e-6}) {
       const HistogramOptions options = options_of(true, step_mm, gamma);
-      Device device = Device::open();
       PoseHistogram histogram(device, objects(), options);
       histogram.update(touches);
       // Some 1e-7 nats for each logarithm of eight factors, of which there are some 200: 5e-5 to

@@ -75,7 +75,7 @@ TEST_F(TouchByTouchTest, AveragesALargeArray) {
   const Touch touch = large.touch(0);
   for (const double gamma : {0.1, 1e-6}) {
     HistogramOptions options{
-        .lattice = {.x_mm = {-3.0, 3.0, 9}, .y_mm = {-3.0, 3.0, 8}, .theta_rad = {0, two_pi, 30}},
+        .lattice = {.x_mm = {-3.0, 3.0, 9}, .y_mm = {-3.0, 3.0, 8}, .theta_rad = {0, two_pi, 16}},
         .touch_sd = {.mm = 1.0, .rad = 0.2}};
     options.contact.gamma = gamma;
     options.contact.prior = 0.2;
