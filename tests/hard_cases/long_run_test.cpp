@@ -48,7 +48,7 @@ TEST(LongRun, TenThousandTouchesInARow) {
   for (const int rows : {4, 1}) {
     const Estimate estimate =
         hard.expect_posterior(device, objects, near_the_top(rows, 1), all_touches(recording),
-                              long_run(most_touches, 0.01, 1e-3));  // 2.6e-3 seen
+                              long_run(most_touches, 0.01, 1e-3));  // 2.5e-3 seen
     EXPECT_LT(estimate.mode.log_likelihood, -100.0 * most_touches) << "the case is not hard enough";
     EXPECT_GT(estimate.identity[0], 1e-6) << "no longer near the top";
     EXPECT_GT(estimate.identity[1], 1e-6) << "no longer near the top";

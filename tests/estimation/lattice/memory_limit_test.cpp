@@ -150,8 +150,8 @@ TEST_P(MemoryLimit, IsKeptAndChangesNoBit) {
 
 INSTANTIATE_TEST_SUITE_P(Sizes, MemoryLimit,
                          testing::Values(Size{1, 1, 1, 36, false}, Size{25, 25, 16, 36, false},
-                                         Size{9, 7, 1001, 300, false}, Size{60, 50, 40, 36, false},
-                                         Size{25, 25, 100, 400, true},
+                                         Size{9, 7, 1001, 300, false}, Size{60, 50, 20, 36, false},
+                                         Size{25, 25, 50, 400, true},
                                          Size{25, 25, 16, 36, false, true}));
 
 TEST(MemoryLimit, ThatIsTooLowIsRefusedWithWhatIsNeeded) {
