@@ -155,7 +155,7 @@ TEST_F(Hotplug, TwoBoardsStreamAtOnce) {
   EXPECT_EQ(r->description().elements_mm.size(), 3U);
   l->start();
   r->start();
-  constexpr int count = 100;
+  constexpr int count = 40;
   std::thread firmware([&] {
     at_rate(200.0, count, [&](int i) {
       left.send_frame(i);

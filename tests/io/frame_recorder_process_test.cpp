@@ -121,7 +121,7 @@ TEST_F(FrameRecorderProcess, KilledAtAnyMomentHoldsAllButTheLastSecond) {
   constexpr std::size_t elements = 36;
   std::mt19937_64 random(20110509);
   int appeared = 0;
-  for (int run = 0; run < 100; ++run) {
+  for (int run = 0; run < 40; ++run) {
     SCOPED_TRACE(run);
     // As fast as the machine can: most of the time goes into saving, where a kill hurts most.
     const pid_t pid = fork_recorder([&] {
@@ -150,7 +150,7 @@ TEST_F(FrameRecorderProcess, KilledAtAnyMomentHoldsAllButTheLastSecond) {
     EXPECT_LE(static_cast<double>(progress_->added - read.size()) / frame_rate_hz, 1.0);
     std::filesystem::remove(path_);
   }
-  EXPECT_GE(appeared, 80);  // the first rows are saved after 250 frames
+  EXPECT_GE(appeared, 32);  // the first rows are saved after 250 frames
 }
 
 TEST_F(FrameRecorderProcess, FullDiskIsOneErrorAndLeavesWhatWasSaved) {
@@ -159,7 +159,7 @@ TEST_F(FrameRecorderProcess, FullDiskIsOneErrorAndLeavesWhatWasSaved) {
   std::signal(SIGXFSZ, SIG_IGN);
   std::mt19937_64 random(7);
   int partial = 0;
-  for (int run = 0; run < 40; ++run) {
+  for (int run = 0; run < 20; ++run) {
     SCOPED_TRACE(run);
     const rlim_t bytes = 1000 + random() % 1500000;
     const pid_t pid = fork_recorder([&] {
@@ -193,7 +193,7 @@ TEST_F(FrameRecorderProcess, FullDiskIsOneErrorAndLeavesWhatWasSaved) {
     }
   }
   std::signal(SIGXFSZ, SIG_DFL);
-  EXPECT_GE(partial, 20);
+  EXPECT_GE(partial, 10);
 }
 
 }  // namespace palpate::frame_recorder_process_test

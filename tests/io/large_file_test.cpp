@@ -158,7 +158,7 @@ TEST_F(LargeFile, IsSummarizedInPieces) {
   EXPECT_EQ(message, "");
 }
 
-// 168 MB of pressures.
+// 42 MB of pressures.
 TEST_F(LargeFile, RecordingIsSurveyedInPieces) {
 #ifdef __SANITIZE_ADDRESS__
   GTEST_SKIP() << "the sanitizer holds memory of its own";
@@ -166,7 +166,7 @@ TEST_F(LargeFile, RecordingIsSurveyedInPieces) {
   if (!limits_memory()) {
     GTEST_SKIP() << "memory of processes is not limited here";
   }
-  constexpr hsize_t chunks = 256;
+  constexpr hsize_t chunks = 64;
   save_frames(path_, chunks);
   const std::string message = with_memory(20 * mib, [&] {
     const RecordingSurvey survey = survey_recording(path_);

@@ -147,7 +147,7 @@ class RoundTrip : public testing::Test {
 
 TEST_F(RoundTrip, Recording) {
   Hostile draw(20110509);
-  for (int run = 0; run < 200; ++run) {
+  for (int run = 0; run < 120; ++run) {
     SCOPED_TRACE(run);
     draw.set_rarity(run % 2 == 0 ? 30 : 2000);
     const std::size_t n = 1 + draw.below(5);
@@ -283,7 +283,7 @@ void expect_stored(const Recording& read, std::size_t i, const Frame& frame, std
 
 TEST_F(RoundTrip, StreamOfFrames) {
   Hostile draw(24);
-  for (int run = 0; run < 200; ++run) {
+  for (int run = 0; run < 150; ++run) {
     SCOPED_TRACE(run);
     draw.set_rarity(run % 2 == 0 ? 20 : 200);
     const std::size_t e = 1 + draw.below(4);

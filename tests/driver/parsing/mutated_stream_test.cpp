@@ -68,20 +68,25 @@ TEST_P(MutatedStream, IsInStepAgainAfterTwoFrames) {
       bytes = bytes.subspan(piece);
     }
   };
+  // To make a frame takes longer than to parse it.
+  std::vector<SentFrame> pool;
+  for (int i = 0; i < 1000; ++i) {
+    pool.push_back(random_frame(board, random));
+  }
   int missed = 0;
   std::uint64_t bytes_sent = 0;
-  constexpr int clean = 4;
-  for (int packet = 0; packet < packets; packet += 1 + clean) {
-    SentFrame damaged = random_frame(board, random);
+  constexpr std::size_t clean = 4;
+  for (int packet = 0; packet < packets; packet += 1 + int{clean}) {
+    const std::size_t first = random() % (pool.size() - clean);
+    SentFrame damaged = pool[first];
     mutate(damaged.bytes, random);
     push(damaged.bytes);
     bytes_sent += damaged.bytes.size();
     frames.clear();
-    std::vector<SentFrame> sent;
-    for (int i = 0; i < clean; ++i) {
-      sent.push_back(random_frame(board, random));
-      push(sent.back().bytes);
-      bytes_sent += sent.back().bytes.size();
+    const std::span sent = std::span(pool).subspan(first + 1, clean);
+    for (const SentFrame& frame : sent) {
+      push(frame.bytes);
+      bytes_sent += frame.bytes.size();
     }
     for (const ParsedFrame& frame : frames) {
       ASSERT_EQ(frame.values.size(), profile.elements_mm.size());
