@@ -121,8 +121,10 @@ TEST_F(Defaults, GiveTheSameNumbersInAnySensorFrame) {
     pose = pose * Pose{-offset_mm, 0.0};
   }
   write_recording(folder_ / "flange.h5", of_flange);
-  const PoseLattice lattice = posterior_of("u.h5");
-  const PoseLattice flange = posterior_of("flange.h5");
+  const json here = u({"--posterior=here.h5", "--filter=bounded"});
+  const json there = record(with("flange.h5", {"--posterior=there.h5", "--filter=bounded"}));
+  const PoseLattice lattice = read_posterior(folder_ / "here.h5").lattice;
+  const PoseLattice flange = read_posterior(folder_ / "there.h5").lattice;
   EXPECT_NEAR(flange.pivot_mm.x, lattice.pivot_mm.x, 1e-9);
   EXPECT_NEAR(flange.pivot_mm.y, lattice.pivot_mm.y, 1e-9);
   for (const auto axis : {&PoseLattice::x_mm, &PoseLattice::y_mm, &PoseLattice::theta_rad}) {
@@ -131,8 +133,6 @@ TEST_F(Defaults, GiveTheSameNumbersInAnySensorFrame) {
     EXPECT_EQ((flange.*axis).count, (lattice.*axis).count);
   }
   // Places relative to the pivot differ by the rounding of 100 mm, 1e-14 mm.
-  const json here = u({});
-  const json there = record(with("flange.h5", {}));
   EXPECT_EQ(there["best"], here["best"]);
   EXPECT_NEAR(there["identity"]["A"].get<double>(), here["identity"]["A"].get<double>(), 1e-6);
   for (const char* field : {"x_mm", "y_mm", "theta_rad"}) {
@@ -152,8 +152,8 @@ TEST_F(Defaults, AreWhatAutoAsksFor) {
 }
 
 TEST_F(Defaults, FineBinsAreHalfAsWide) {
-  const PoseLattice usual = posterior_of("u.h5", {"--touches", "1"});
-  const PoseLattice fine = posterior_of("u.h5", {"--touches", "1", "--bins", "fine"});
+  const PoseLattice usual = posterior_of("u.h5", {"--touches=1", "--filter=bounded"});
+  const PoseLattice fine = posterior_of("u.h5", {"--touches=1", "--filter=bounded", "--bins=fine"});
   EXPECT_EQ(fine.x_mm.lower, usual.x_mm.lower);
   EXPECT_EQ(fine.pivot_mm, usual.pivot_mm);
   // Counts round up.
@@ -163,8 +163,8 @@ TEST_F(Defaults, FineBinsAreHalfAsWide) {
               u({"--touches", "3", "--bins", "fine"}));
 }
 
-// Some nine seconds of a processor, for twenty runs on lattices of all kinds.
 TEST_F(Defaults, GiveWayTogetherToAnyPartOfALattice) {
+  const char* const bounded = "--filter=bounded";  // which needs no device
   const auto old = [](Arguments flags) {
     const auto add = [&](const char* flag, const char* value) {
       const std::string name = std::string(flag) + "=";
@@ -182,33 +182,37 @@ TEST_F(Defaults, GiveWayTogetherToAnyPartOfALattice) {
   for (const char* flag : {"--bins=25x25x16", "--bins=9x9x8", "--x-mm=-4:9", "--y-mm=-4:9",
                            "--theta-deg=10:80", "--pivot-mm=3,-2", "--pivot-mm=0,0"}) {
     SCOPED_TRACE(flag);
-    expect_same(u({flag}), u(old({flag})));
+    expect_same(u({flag, bounded}), u(old({flag, bounded})));
   }
   expect_same(in_scene("bins: [9, 9, 8]\n"), u(old({"--bins=9x9x8"})));
-  expect_same(in_scene("region: {x_mm: [-4, 9]}\n"), u(old({"--x-mm=-4:9"})));
-  expect_same(in_scene("region: {pivot_mm: [3, -2]}\n"), u(old({"--pivot-mm=3,-2"})));
+  expect_same(in_scene("region: {x_mm: [-4, 9]}\n", {bounded}), u(old({"--x-mm=-4:9", bounded})));
+  expect_same(in_scene("region: {pivot_mm: [3, -2]}\n", {bounded}),
+              u(old({"--pivot-mm=3,-2", bounded})));
 }
 
 TEST_F(Defaults, AnAutomaticPivotGoesWithAnyRegion) {
   const glm::dvec2 pivot_mm = unknown_.T_robot_sensor.front().translation_mm;
-  const Arguments region{"--x-mm=-15:15", "--y-mm=-15:15", "--bins=30x30x36"};
+  const Arguments region{"--x-mm=-15:15", "--y-mm=-15:15", "--bins=30x30x36", "--filter=bounded"};
   Arguments automatic = region;
   automatic.emplace_back("--pivot-mm=auto");
   Arguments given = region;
   given.push_back(fmt::format("--pivot-mm={},{}", pivot_mm.x, pivot_mm.y));
-  expect_same(u(automatic), u(given));
+  const json wanted = u(given);
+  expect_same(u(automatic), wanted);
   EXPECT_EQ(in_scene("region: {x_mm: [-15, 15], y_mm: [-15, 15], pivot_mm: auto}\n"
-                     "bins: [30, 30, 36]\n")["mode"],
-            u(given)["mode"]);
+                     "bins: [30, 30, 36]\nfilter: bounded\n")["mode"],
+            wanted["mode"]);
 }
 
 TEST_F(Defaults, EveryUnknownHasAPivotOfItsOwn) {
-  const json frames = records(with("u.h5", {"--each-frame", "--frames", "0:3"}));
+  const json frames =
+      records(with("u.h5", {"--each-frame", "--frames", "0:3", "--filter=bounded"}));
   ASSERT_EQ(frames.size(), 3u);
   for (std::size_t i = 0; i < frames.size(); ++i) {
-    const Arguments alone{"--frames", fmt::format("{}:{}", i, i + 1)};
-    expect_same(frames[i], u(alone));
-    EXPECT_EQ(posterior_of("u.h5", alone).pivot_mm, unknown_.T_robot_sensor[i].translation_mm);
+    expect_same(frames[i], u({"--frames", fmt::format("{}:{}", i, i + 1), "--filter=bounded",
+                              "--posterior=p.h5"}));
+    EXPECT_EQ(read_posterior(folder_ / "p.h5").lattice.pivot_mm,
+              unknown_.T_robot_sensor[i].translation_mm);
   }
 }
 

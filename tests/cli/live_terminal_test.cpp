@@ -19,7 +19,7 @@ class LiveTerminal : public ProgramTest {
 
   // Several times as fast as a robot, and without end.
   static std::vector<std::string> endless() {
-    return {"live",   "--sensor", "simulate:E,rate=100,object=random,speed=4",
+    return {"live",   "--sensor", "simulate:E,rate=100,object=random,speed=10",
             "--maps", "A.map.h5", "E.map.h5",
             "--bins", "8x8x8"};
   }
@@ -73,7 +73,7 @@ TEST_F(LiveTerminal, FollowsTheWindow) {
 
 TEST_F(LiveTerminal, PrintsPicturesWhereTheCursorCannotMove) {
   ProgramOnTerminal program(folder_.path(),
-                            {"live", "--sensor", "simulate:E,touches=2,speed=4", "--maps",
+                            {"live", "--sensor", "simulate:E,touches=1,speed=4", "--maps",
                              "A.map.h5", "E.map.h5", "--bins", "8x8x8"},
                             {{"TERM", "dumb"}});
   const Outcome outcome = program.finish();

@@ -90,11 +90,14 @@ TEST_F(MapSensor, IsLeftOutWhereItDoesNotGoWithWhatIsAsked) {
             std::string::npos);
   std::filesystem::remove(folder_ / "maps/other.map.h5");
 
-  done({"map", "A.h5", "U.h5", "-o", "fewer/", "--frames", "0:28"});
+  std::filesystem::copy(folder_ / "maps", folder_ / "other");
+  LearnedSensor another = read_sensor_model(sensor("other"));
+  another.temperature *= 1.5;
+  write_sensor_model(sensor("other"), another);
   const Outcome unlike =
-      palpate({"recognize", "u.h5", "--maps", "maps/A.map.h5", "fewer/U.map.h5"});
+      palpate({"recognize", "u.h5", "--maps", "maps/A.map.h5", "other/U.map.h5"});
   EXPECT_EQ(unlike.status, 2);
-  EXPECT_NE(unlike.err.find("fewer/sensor.yaml: differs from maps/sensor.yaml"), std::string::npos)
+  EXPECT_NE(unlike.err.find("other/sensor.yaml: differs from maps/sensor.yaml"), std::string::npos)
       << unlike.err;
 }
 

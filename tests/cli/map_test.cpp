@@ -70,16 +70,15 @@ TEST_F(MapCommand, SaysWhichSpreadItTook) {
   EXPECT_NE(anew.find("spread 0.5 mm: "), std::string::npos) << "all are written anew: " << anew;
 }
 
-// Some six seconds of a processor, for three maps by 256 elements.
 TEST_F(MapCommand, ChoosesTheSpreadOfAFineArray) {
-  for (const char* letter : {"A", "E", "U"}) {
+  for (const char* letter : {"A", "U"}) {
     Simulator simulator(make_shape(letter), {.psf_mm = 0.3, .element_mm = 0.95},
-                        grid_array(16, 16, 1.0), 4);
+                        grid_array(12, 12, 1.0), 4);
     write_recording(folder_ / (std::string("fine.") + letter + ".h5"),
                     simulator.touch(random_poses(40, 7), {}));
   }
   const std::string out =
-      done({"map", "fine.A.h5", "fine.E.h5", "fine.U.h5", "-o", "fine/", "--sensor-model", "none"});
+      done({"map", "fine.A.h5", "fine.U.h5", "-o", "fine/", "--sensor-model", "none"});
   EXPECT_NE(out.find("nats each more likely than with 0.5 mm"), std::string::npos) << out;
   EXPECT_LT(*read_map(folder_ / "fine/A.map.h5").spread_mm, 0.4);
   EXPECT_LT(*read_map(folder_ / "fine/U.map.h5").spread_mm, 0.4) << "one spread for all";
@@ -134,15 +133,10 @@ TEST_F(MapCommand, FlagsAreStoredInTheMap) {
   EXPECT_EQ(map.label, "other name");
 }
 
-// Some six seconds of a processor, for seven maps.
+// What --spread-mm, --psf-mm, --threshold and --frames do is in tests of their own.
 TEST_F(MapCommand, FlagsOfTheModelMatter) {
   const OccupancyGrid usual = map_of_a({"--prior", "0.2"});
-  for (const auto& [flag, value] : {std::pair{"--peak", "0.5"},
-                                    {"--spread-mm", "0.7"},
-                                    {"--psf-mm", "2"},
-                                    {"--threshold", "5"},
-                                    {"--ratio", "0.6"},
-                                    {"--frames", "0:10"}}) {
+  for (const auto& [flag, value] : {std::pair{"--peak", "0.5"}, {"--ratio", "0.6"}}) {
     EXPECT_NE(map_of_a({"--prior", "0.2", flag, value}).log_odds, usual.log_odds) << flag;
   }
 }
@@ -150,7 +144,6 @@ TEST_F(MapCommand, FlagsOfTheModelMatter) {
 TEST_F(MapCommand, SpreadIsHalfThePointSpread) {
   const OccupancyGrid by_psf = map_of_a({"--psf-mm", "1.6"});
   EXPECT_EQ(by_psf.spread_mm, 0.8) << "the map says so";
-  EXPECT_EQ(map_of_a({"--spread-mm", "0.8"}).log_odds, by_psf.log_odds);
   EXPECT_EQ(map_of_a({"--spread-mm", "0.8", "--psf-mm", "5"}).log_odds, by_psf.log_odds);
 }
 

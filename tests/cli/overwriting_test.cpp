@@ -31,7 +31,7 @@ class Overwriting : public ProgramTest {
               "{\"time\": 1, \"x_mm\": 0, \"y_mm\": 0, \"theta_rad\": 0}\n");
   }
 
-  /// The file itself by every kind of name: its own, a longer one, links of both kinds and a
+  /// The file itself by every kind of name: links of both kinds, its own, a longer one and a
   /// linked folder.
   Arguments names_of(const std::string& file) const {
     const std::filesystem::path path = folder_ / file;
@@ -46,14 +46,16 @@ class Overwriting : public ProgramTest {
          [](auto& to, auto& name) { std::filesystem::create_hard_link(to, name); });
     make(path.parent_path(), folder_ / "folder",
          [](auto& to, auto& name) { std::filesystem::create_directory_symlink(to, name); });
-    return {file, "./maps/../" + file, "link", "hard", "folder/" + path.filename().string()};
+    return {"hard", "link", file, "./maps/../" + file, "folder/" + path.filename().string()};
   }
 
-  /// Expects the command to be refused for every name of the file that follows `flag`, in a line
-  /// that names both flags.
+  /// Expects the command to be refused for names of the file that follow `flag`, in a line that
+  /// names both flags. To compare by names misses the first; the others are for one file of many.
   void expect_kept(const std::string& file, const std::string& flag, const std::string& other,
-                   const Arguments& command) const {
-    for (const std::string& name : names_of(file)) {
+                   const Arguments& command, std::size_t names = 5) const {
+    Arguments by = names_of(file);
+    by.resize(names);
+    for (const std::string& name : by) {
       Arguments arguments = command;
       arguments.insert(arguments.end(), {flag, name});
       expect_refused(arguments, {flag + " " + name, other + " reads", "overwrite", "choose"});
@@ -95,15 +97,16 @@ TEST_F(Overwriting, MapWritesEveryFileOnce) {
   expect_refused({"map", "A.h5", "-o", "a.png", "--png", "b.png"}, {"--png b.png", "-o writes"});
 }
 
-// Some eight seconds of a processor, for fifty refusals: a start of the program takes a sixth of
-// one.
 TEST_F(Overwriting, RecognizeKeepsAllThatItReads) {
+  const Arguments maps{"recognize", "u.h5", "--maps", "maps"};
+  const Arguments scene{"recognize", "u.h5", "--scene", "scene.yaml"};
+  expect_kept("u.h5", "--json", "RECORDING", maps);
+  expect_kept("u.h5", "--posterior", "RECORDING", maps, 1);
   for (const char* flag : {"--json", "--posterior"}) {
-    expect_kept("u.h5", flag, "RECORDING", {"recognize", "u.h5", "--maps", "maps"});
-    expect_kept("maps/E.map.h5", flag, "--maps", {"recognize", "u.h5", "--maps", "maps"});
-    expect_kept("scene.yaml", flag, "--scene", {"recognize", "u.h5", "--scene", "scene.yaml"});
-    expect_kept("maps/A.map.h5", flag, "--scene", {"recognize", "u.h5", "--scene", "scene.yaml"});
-    expect_kept("elements.txt", flag, "--scene", {"recognize", "u.h5", "--scene", "scene.yaml"});
+    expect_kept("maps/E.map.h5", flag, "--maps", maps, 1);
+    expect_kept("scene.yaml", flag, "--scene", scene, 1);
+    expect_kept("maps/A.map.h5", flag, "--scene", scene, 1);
+    expect_kept("elements.txt", flag, "--scene", scene, 1);
   }
 }
 
@@ -172,19 +175,18 @@ TEST_F(Overwriting, TouchesKeepsTheFrames) {
   expect_kept("cc.h5", "-o", "FRAMES", {"touches", "cc.h5"});
 }
 
-// Some six seconds of a processor, for thirty refusals.
 TEST_F(Overwriting, LiveKeepsAllThatItReads) {
   done({"record", "--sensor", presses, "-o", "cc,1.h5"});
   const Arguments maps{"live", "--sensor", "replay:cc,1.h5,speed=max", "--maps", "maps"};
   const Arguments scene{"live", "--sensor", presses, "--scene", "scene.yaml"};
   expect_kept("cc,1.h5", "--json", "--sensor", maps);
-  expect_kept("maps/E.map.h5", "--json", "--maps", maps);
-  expect_kept("scene.yaml", "--json", "--scene", scene);
-  expect_kept("maps/A.map.h5", "--json", "--scene", scene);
-  expect_kept("elements.txt", "--json", "--scene", scene);
+  expect_kept("maps/E.map.h5", "--json", "--maps", maps, 1);
+  expect_kept("scene.yaml", "--json", "--scene", scene, 1);
+  expect_kept("maps/A.map.h5", "--json", "--scene", scene, 1);
+  expect_kept("elements.txt", "--json", "--scene", scene, 1);
   Arguments posed = maps;
   posed.insert(posed.end(), {"--poses", "poses.jsonl"});
-  expect_kept("poses.jsonl", "--json", "--poses", posed);
+  expect_kept("poses.jsonl", "--json", "--poses", posed, 1);
 }
 
 // As `cat` refuses to append a file to itself.

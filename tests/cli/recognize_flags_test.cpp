@@ -37,14 +37,15 @@ TEST_F(RecognizeFlags, DefaultsAreTheDocumentedOnes) {
 }
 
 TEST_F(RecognizeFlags, EveryFlagOfTheModelMatters) {
-  const json bare = mode({"--bins=25x25x16"});
+  const char* const by = "--filter=bounded";  // which needs no device
+  const json bare = mode({"--bins=25x25x16", by});
   for (const char* flag : {"--bins=24x25x16", "--x-mm=-9:10", "--y-mm=-9:10", "--theta-deg=5:365",
                            "--pivot-mm=1.3,0"}) {
-    EXPECT_NE(mode({flag}), bare) << flag;
+    EXPECT_NE(mode({flag, by}), bare) << flag;
   }
   for (const char* flag : {"--prior=0.4", "--gamma=0.3", "--threshold=6", "--ratio=0.7",
                            "--frames=0:3", "--touches=3"}) {
-    EXPECT_NE(mode({"--bins=25x25x16", flag}), bare) << flag;
+    EXPECT_NE(mode({"--bins=25x25x16", flag, by}), bare) << flag;
   }
 }
 
@@ -62,7 +63,8 @@ TEST_F(RecognizeFlags, FineBinsAreChosenByTheMapsAndSaid) {
   for (const char* letter : {"A", "I"}) {
     write_map(folder_ / fmt::format("maps/{}.map.h5", letter), sample_map(letter, 0.5));
   }
-  const std::vector<std::string> region{"--x-mm=1:3", "--y-mm=-4:-2.5", "--theta-deg=40:70"};
+  const std::vector<std::string> region{"--x-mm=1:3", "--y-mm=-4:-2.5", "--theta-deg=40:70",
+                                        "--filter=bounded"};
   std::vector<std::string> chosen{"recognize", "u.h5", "--maps", "maps", "--bins", "fine"};
   chosen.insert(chosen.end(), region.begin(), region.end());
   const std::string out = done(chosen);
@@ -76,15 +78,16 @@ TEST_F(RecognizeFlags, FineBinsAreChosenByTheMapsAndSaid) {
   automatic.emplace_back("--bins=fine");
   std::vector<std::string> by_hand = region;
   by_hand.push_back(fmt::format("--bins=7x5x{}", angles));
-  EXPECT_EQ(mode(automatic), mode(by_hand));
+  const json wanted = mode(by_hand);
+  EXPECT_EQ(mode(automatic), wanted);
   put_bytes(folder_ / "fine.yaml",
             "bins: fine\nregion: {x_mm: [1, 3], y_mm: [-4, -2.5], theta_deg: [40, 70]}\n");
-  EXPECT_EQ(mode({"--scene=fine.yaml"}), mode(by_hand));
+  EXPECT_EQ(mode({"--scene=fine.yaml", "--filter=bounded"}), wanted);
 }
 
 TEST_F(RecognizeFlags, FineBinsAreNotFinerThanTheSensorShows) {
   write_recording(folder_ / "train.h5", sample_training("A", 48));
-  done({"map", "train.h5", "--cell-mm", "0.25", "-o", "fine.map.h5"});
+  done({"map", "train.h5", "--cell-mm", "0.25", "--spread-mm", "0.5", "-o", "fine.map.h5"});
   const std::vector<std::string> recognize{"recognize",   "u.h5",           "--maps",
                                            "fine.map.h5", "--bins",         "fine",
                                            "--x-mm=1:3",  "--y-mm=-4:-2.5", "--theta-deg=40:70"};
@@ -106,8 +109,9 @@ TEST_F(RecognizeFlags, FramesAreHalfOpen) {
 
 TEST_F(RecognizeFlags, TouchesAreTheFirstOfTheFrames) {
   const std::string few = "--bins=25x25x16";
-  EXPECT_EQ(mode({few, "--touches", "4"}), mode({few, "--frames", "0:4"}));
-  EXPECT_EQ(mode({few, "--frames", "2:6", "--touches", "3"}), mode({few, "--frames", "2:5"}));
+  const std::string by = "--filter=bounded";
+  EXPECT_EQ(mode({few, by, "--touches=4"}), mode({few, by, "--frames=0:4"}));
+  EXPECT_EQ(mode({few, by, "--frames=2:6", "--touches=3"}), mode({few, by, "--frames=2:5"}));
 }
 
 TEST_F(RecognizeFlags, AFixedAngleIsOneBin) {

@@ -85,7 +85,7 @@ TEST_F(TouchesCommand, TouchesAtUnknownPosesAreKeptAtThePoseZero) {
 
 TEST_F(TouchesCommand, LettersAreRecognisedByWhatTheyFound) {
   for (const std::string letter : {"A", "E", "I"}) {
-    EXPECT_EQ(touches_of(letter, "simulate:" + letter + ",touches=150").object, letter);
+    EXPECT_EQ(touches_of(letter, "simulate:" + letter + ",touches=60").object, letter);
   }
   done({"map", "A.h5", "E.h5", "I.h5", "-o", "maps/", "--sensor-model", "none"});
   std::vector<std::string> arguments;
