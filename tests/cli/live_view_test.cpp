@@ -157,8 +157,8 @@ TEST(LiveView, DrawsALargeArrayAtOnce) {
   const OccupancyGrid map = sample_map("E");
   LiveView view = sample_view(map);
   view.elements_mm.clear();
-  for (int i = 0; i < 90'000; ++i) {
-    view.elements_mm.emplace_back(0.04 * (i % 300) - 6.0, 0.04 * (i / 300) - 6.0);
+  for (int i = 0; i < 40'000; ++i) {
+    view.elements_mm.emplace_back(0.06 * (i % 200) - 6.0, 0.06 * (i / 200) - 6.0);
   }
   view.pressure.assign(view.elements_mm.size(), 20.0);
   view.valid.clear();

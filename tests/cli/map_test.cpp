@@ -57,9 +57,6 @@ TEST_F(MapCommand, SaysAndStoresTheSymmetryThatTheMapsShow) {
 }
 
 TEST_F(MapCommand, SaysWhichSpreadItTook) {
-  const std::string usual = done({"map", "A.h5", "-o", "maps/"});
-  EXPECT_NE(usual.find("spread 0.5 mm: no other predicts left-out touches"), std::string::npos)
-      << usual;
   const std::string given = done({"map", "A.h5", "-o", "maps/", "--spread-mm", "0.8"});
   EXPECT_EQ(given.find("spread"), std::string::npos) << given;
   const std::string joined = done({"map", "I.h5", "-o", "maps/", "--sensor-model", "none"});
@@ -67,13 +64,14 @@ TEST_F(MapCommand, SaysWhichSpreadItTook) {
       << joined;
   EXPECT_EQ(read_map(folder_ / "maps/I.map.h5").spread_mm, 0.8);
   const std::string anew = done({"map", "A.h5", "I.h5", "-o", "maps/", "--sensor-model", "none"});
-  EXPECT_NE(anew.find("spread 0.5 mm: "), std::string::npos) << "all are written anew: " << anew;
+  EXPECT_NE(anew.find("spread 0.5 mm: no other predicts left-out touches"), std::string::npos)
+      << "all are written anew: " << anew;
 }
 
 TEST_F(MapCommand, ChoosesTheSpreadOfAFineArray) {
   for (const char* letter : {"A", "U"}) {
     Simulator simulator(make_shape(letter), {.psf_mm = 0.3, .element_mm = 0.95},
-                        grid_array(12, 12, 1.0), 4);
+                        grid_array(16, 16, 1.0), 4);
     write_recording(folder_ / (std::string("fine.") + letter + ".h5"),
                     simulator.touch(random_poses(40, 7), {}));
   }

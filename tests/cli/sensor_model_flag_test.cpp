@@ -131,7 +131,7 @@ TEST_F(SensorModelFlag, SaysWhereBinsAreWiderThanItsOwn) {
     EXPECT_EQ(outcome.status, 0) << outcome.err;
     return outcome.err;
   };
-  const Arguments recognize{"recognize", "u.h5"};
+  const Arguments recognize{"recognize", "u.h5", "--filter=bounded"};
   const Arguments with_device{"batch", "u.h5", "-o", "d", "--filter=histogram"};
   const Arguments on_host{"batch", "u.h5", "-o", "h", "--filter=bounded"};
   write({.bins = BinSteps{1.0, 1.0, 0.5}});
@@ -172,9 +172,10 @@ TEST_F(SensorModelFlag, IsRefusedInOneLine) {
 }
 
 TEST_F(SensorModelFlag, MirroredObjectsAreFound) {
-  const json usual = plain({});
+  const json usual = plain({"--filter=bounded"});
   EXPECT_FALSE(usual["mode"].contains("mirrored"));
-  const Arguments region{"u.h5", "--bins", "15x15x12", "--scene", "scene.yaml", "--none", "0"};
+  const Arguments region{"u.h5",       "--bins", "15x15x12", "--scene",
+                         "scene.yaml", "--none", "0",        "--filter=bounded"};
   put_bytes(folder_ / "scene.yaml",
             "objects: [{map: maps/R.map.h5, mirror: true}, {map: maps/U.map.h5}]\n");
   const json same = record(region);
@@ -187,7 +188,7 @@ TEST_F(SensorModelFlag, MirroredObjectsAreFound) {
   OccupancyGrid map = mirror_image(sample_map("R"));
   map.mirror = true;
   write_map(folder_ / "maps/R.map.h5", map);
-  const json mirrored = plain({});
+  const json mirrored = plain({"--filter=bounded"});
   EXPECT_EQ(mirrored["mode"]["mirrored"], true);
   EXPECT_EQ(mirrored["mode"]["map"], "maps/R.map.h5");
   EXPECT_EQ(mirrored["mode"]["x_mm"], usual["mode"]["x_mm"]);

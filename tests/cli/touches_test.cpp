@@ -84,12 +84,12 @@ TEST_F(TouchesCommand, TouchesAtUnknownPosesAreKeptAtThePoseZero) {
 }
 
 TEST_F(TouchesCommand, LettersAreRecognisedByWhatTheyFound) {
-  for (const std::string letter : {"A", "E", "I"}) {
+  for (const std::string letter : {"A", "E"}) {
     EXPECT_EQ(touches_of(letter, "simulate:" + letter + ",touches=60").object, letter);
   }
-  done({"map", "A.h5", "E.h5", "I.h5", "-o", "maps/", "--sensor-model", "none"});
+  done({"map", "A.h5", "E.h5", "-o", "maps/", "--sensor-model", "none"});
   std::vector<std::string> arguments;
-  for (const std::string letter : {"A", "E", "I"}) {
+  for (const std::string letter : {"A", "E"}) {
     touches_of("u" + letter, "simulate:" + letter + ",touches=10,seed=77,object=random");
     arguments.push_back("u" + letter + ".h5");
   }

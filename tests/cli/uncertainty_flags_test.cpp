@@ -26,11 +26,15 @@ class UncertaintyFlags : public ProgramTest {
     flags.insert(flags.begin(), {"recognize", "u.h5", "--maps", "maps"});
     return flags;
   }
-  /// By a histogram of few bins, but for particles, which have none.
+  /// By bounds, which need no device, where no filter is asked for; on few bins, but for particles,
+  /// which have none.
   json record_with(Arguments flags) const {
     flags.insert(flags.begin(), {"u.h5", "--maps", "maps"});
     if (std::ranges::find(flags, "particles") == flags.end()) {
       flags.emplace_back("--bins=20x20x72");
+    }
+    if (std::ranges::none_of(flags, [](const auto& f) { return f.starts_with("--filter"); })) {
+      flags.emplace_back("--filter=bounded");
     }
     json r = record(flags);
     r.erase("seconds");
@@ -48,11 +52,13 @@ class UncertaintyFlags : public ProgramTest {
 };
 
 TEST_F(UncertaintyFlags, OfNothingChangeNothing) {
-  const json plain = record_with({});
-  EXPECT_EQ(record_with({"--touch-sd-mm", "0", "--touch-sd-deg", "0", "--slip-sd-mm", "0",
-                         "--slip-sd-deg=0"}),
-            plain);
-  EXPECT_EQ(record_in_scene("touch_sd: {mm: 0, deg: 0}\nslip_sd: {mm: 0}\n"), plain);
+  const std::string by = "--filter=histogram";
+  const json plain = record_with({by});
+  EXPECT_EQ(
+      record_with({by, "--touch-sd-mm=0", "--touch-sd-deg=0", "--slip-sd-mm=0", "--slip-sd-deg=0"}),
+      plain);
+  put_bytes(folder_ / "scene.yaml", "touch_sd: {mm: 0, deg: 0}\nslip_sd: {mm: 0}\n");
+  EXPECT_EQ(record_with({by, "--scene", "scene.yaml"}), plain);
 }
 
 TEST_F(UncertaintyFlags, ReachTheFit) {
@@ -133,18 +139,18 @@ TEST_F(UncertaintyFlags, ParticlesRefuseTheOthers) {
 }
 
 TEST_F(UncertaintyFlags, NoneWithoutANumberIsOneInTen) {
-  const std::string by = "--filter=bounded";  // which needs no device
-  const json usual = record_with({by, "--none"});
-  EXPECT_EQ(usual, record_with({by, "--none", fmt::format("{:.17g}", 2.0 / 9.0)}))
+  const json usual = record_with({"--none"});
+  EXPECT_EQ(usual, record_with({"--none", fmt::format("{:.17g}", 2.0 / 9.0)}))
       << "two maps of weight 1";
-  EXPECT_EQ(usual, record_in_scene("none: auto\nfilter: bounded\n"));
-  EXPECT_EQ(usual, record_with({by, "--none", "--gamma", "0.1"})) << "a flag is no number";
-  EXPECT_EQ(usual, record_with({by, "--none=auto"}));
+  EXPECT_EQ(usual, record_in_scene("none: auto\n"));
+  EXPECT_EQ(usual, record_with({"--none", "--gamma", "0.1"})) << "a flag is no number";
+  EXPECT_EQ(usual, record_with({"--none=auto"}));
   put_bytes(folder_ / "scene.yaml",
             "none: auto\nobjects: [{map: maps/A.map.h5, weight: 3}, {map: maps/I.map.h5}]\n");
-  const json heavy = record({"u.h5", "--scene", "scene.yaml", "--bins=20x20x72", by});
-  const json ninth = record({"u.h5", "--scene", "scene.yaml", "--bins=20x20x72", by, "--none",
-                             fmt::format("{:.17g}", 4.0 / 9.0)});
+  const json heavy =
+      record({"u.h5", "--scene", "scene.yaml", "--bins=20x20x72", "--filter=bounded"});
+  const json ninth = record({"u.h5", "--scene", "scene.yaml", "--bins=20x20x72", "--filter=bounded",
+                             "--none", fmt::format("{:.17g}", 4.0 / 9.0)});
   EXPECT_EQ(heavy["identity"], ninth["identity"]);
 }
 
@@ -174,12 +180,13 @@ TEST_F(UncertaintyFlags, TheProbabilityOfNoneStandsBesideTheIdentity) {
 TEST_F(UncertaintyFlags, OneTouchCannotTell) {
   const std::string note = "one touch cannot tell";
   const std::string few = "--bins=20x20x72";
-  EXPECT_NE(done(with({few, "--none", "--touches", "1"})).find(note), std::string::npos);
-  const std::string frames = done(with({few, "--none", "--each-frame"}));
+  const std::string by = "--filter=bounded";
+  EXPECT_NE(done(with({few, by, "--none", "--touches", "1"})).find(note), std::string::npos);
+  const std::string frames = done(with({few, by, "--none", "--each-frame"}));
   EXPECT_NE(frames.find(note), std::string::npos);
   EXPECT_EQ(frames.find(note), frames.rfind(note)) << "once";
-  EXPECT_EQ(done(with({few, "--none"})).find(note), std::string::npos);
-  EXPECT_EQ(done(with({few, "--touches", "1", "--none", "0"})).find(note), std::string::npos);
+  EXPECT_EQ(done(with({few, by, "--none"})).find(note), std::string::npos);
+  EXPECT_EQ(done(with({few, by, "--touches=1", "--none", "0"})).find(note), std::string::npos);
 }
 
 TEST_F(UncertaintyFlags, SayOnceWhatTheLatticeDoesNotResolve) {
@@ -190,25 +197,28 @@ TEST_F(UncertaintyFlags, SayOnceWhatTheLatticeDoesNotResolve) {
     EXPECT_EQ(outcome.status, 0) << outcome.err;
     return outcome.err;
   };
-  const std::string narrow = said({"--bins", "10x10x36", "--touch-sd-mm", "0.9"});
+  const std::string by = "--filter=bounded";
+  const std::string narrow = said({by, "--bins", "10x10x36", "--touch-sd-mm", "0.9"});
   expect_named(narrow, {"does not resolve touch-sd of 0.9 mm", "step of x is 2 mm", "more bins"});
   EXPECT_EQ(std::count(narrow.begin(), narrow.end(), '\n'), 1) << narrow;
   expect_named(said({"--bins", "10x10x36", "--slip-sd-deg", "1"}), {"slip-sd of 1 degrees"});
-  expect_named(said({"--bins", "10x10x36", "--pivot-mm=90,0", "--touch-sd-deg", "9"}),
+  expect_named(said({by, "--bins", "10x10x36", "--pivot-mm=90,0", "--touch-sd-deg", "9"}),
                {"touch-sd", "mm from the pivot", "move the pivot near the touches, or use more"});
-  EXPECT_EQ(said({"--bins", "25x25x48", "--touch-sd-mm", "1", "--touch-sd-deg", "5"}), "");
+  EXPECT_EQ(said({by, "--bins", "25x25x48", "--touch-sd-mm", "1", "--touch-sd-deg", "5"}), "");
 }
 
 TEST_F(UncertaintyFlags, TheSurpriseStandsInTheRecordAndInTheTrace) {
-  const json r = record_with({"--trace"});
+  const std::string by = "--filter=histogram";  // which computes the same bits with a trace
+  const json r = record_with({by, "--trace"});
   ASSERT_EQ(r["trace"].size(), 6u);
   EXPECT_FALSE(r["trace"][0].contains("surprise")) << "only the prior comes before";
   for (std::size_t i = 1; i < 6; ++i) {
     EXPECT_TRUE(r["trace"][i]["surprise"].is_number());
   }
   EXPECT_EQ(r["surprise"], r["trace"][5]["surprise"]);
-  EXPECT_EQ(record_with({})["surprise"], r["surprise"]);
-  EXPECT_NE(done(with({"--trace", "--bins=20x20x72"})).find("surprise"), std::string::npos);
+  EXPECT_EQ(record_with({by})["surprise"], r["surprise"]);
+  EXPECT_NE(done(with({"--trace", "--bins=20x20x72", "--filter=bounded"})).find("surprise"),
+            std::string::npos);
   EXPECT_FALSE(record_with({"--touches", "1"}).contains("surprise"));
 }
 
