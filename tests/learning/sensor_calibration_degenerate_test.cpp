@@ -16,8 +16,8 @@ namespace palpate::sensor_calibration_degenerate_test {
 
 constexpr std::size_t elements = 36;
 
-/// Touches of two letters.
-LetterPresses two_letters(int touches = 20) {
+/// Touches of two letters: half of them are too few for the point spread, whose search takes long.
+LetterPresses two_letters(int touches = 16) {
   LetterPresses letters;
   letters.add("A", touches, 61);
   letters.add("U", touches, 62);
@@ -100,8 +100,8 @@ TEST_P(DegeneratePresses, SomeUnknownAreLeftOut) {
   const SensorCalibration expected = [&] {
     LetterPresses without = letters;
     for (Recording& recording : without.recordings) {
-      recording.pressure.resize(18 * elements);
-      recording.T_robot_sensor.resize(18);
+      recording.pressure.resize(14 * elements);
+      recording.T_robot_sensor.resize(14);
     }
     without.make_presses(GetParam());
     return learned(without.presses);
@@ -113,10 +113,10 @@ TEST_P(DegeneratePresses, SomeUnknownAreLeftOut) {
   }
   letters.make_presses(GetParam());
   const SensorCalibration found = learned(letters.presses);
-  EXPECT_TRUE(warns(found, "A.h5, touch 18: all elements are Unknown"));
+  EXPECT_TRUE(warns(found, "A.h5, touch 14: all elements are Unknown"));
   EXPECT_TRUE(warns(found, "with 3 more such touches"));
   EXPECT_EQ(found.sensor.table->shared, expected.sensor.table->shared);
-  EXPECT_EQ(found.after->records, 36U);
+  EXPECT_EQ(found.after->records, 28U);
 }
 
 TEST_P(DegeneratePresses, OfADeadElementIgnoreIt) {
@@ -137,6 +137,7 @@ TEST_P(DegeneratePresses, OfADeadElementIgnoreIt) {
   EXPECT_EQ(found.sensor.classifier.threshold, expected.sensor.classifier.threshold);
   EXPECT_EQ(found.sensor.noise, expected.sensor.noise);
   EXPECT_EQ(found.sensor.psf_mm, expected.sensor.psf_mm);
+  EXPECT_EQ(found.sensor.psf_mm.has_value(), GetParam());
   EXPECT_EQ(found.sensor.table->shared, expected.sensor.table->shared);
   ASSERT_EQ(found.sensor.features.has_value(), !GetParam()) << "at unknown poses only";
   ASSERT_EQ(expected.sensor.features.has_value(), !GetParam());
@@ -155,7 +156,7 @@ TEST_P(DegeneratePresses, OfAStuckElementAreWarnedOf) {
   }
   letters.make_presses(GetParam());
   const SensorCalibration found = learned(letters.presses);
-  EXPECT_TRUE(warns(found, "element 8 reads the same pressure above the threshold in all 40"));
+  EXPECT_TRUE(warns(found, "element 8 reads the same pressure above the threshold in all 32"));
   EXPECT_TRUE(warns(found, "'valid' to 0"));
 }
 
@@ -166,13 +167,13 @@ TEST_P(DegeneratePresses, OfAnObjectTouchedOnceAreWarnedOf) {
   const SensorCalibration found = learned(letters.presses);
   EXPECT_TRUE(warns(found, "'R': no touch has a map of the object"));
   EXPECT_FALSE(found.sensor.table->objects.contains("R"));
-  EXPECT_EQ(found.after->records, 40U);
+  EXPECT_EQ(found.after->records, 32U);
 }
 
 TEST_P(DegeneratePresses, OfOneObjectUnderTwoLabelsMakeNoneSure) {
   LetterPresses letters;
-  letters.add("A", 40, 66);
-  letters.add("A", 40, 67);
+  letters.add("A", 18, 66);
+  letters.add("A", 18, 67);
   letters.recordings[1].object = "B";
   letters.make_presses(GetParam());
   const SensorCalibration found = learned(letters.presses);

@@ -8,7 +8,6 @@
 #include "learning/setup_check.hpp"
 #include "palpate/error.hpp"
 #include "palpate/simulation.hpp"
-#include "sanitized.hpp"
 
 namespace palpate::setup_check_test {
 
@@ -19,13 +18,13 @@ using testing::IsEmpty;
 
 class SetupTouches : public testing::Test {
  protected:
-  /// Sixty touches each of some letters at random poses.
+  /// Touches each of two letters at random poses.
   static std::vector<Recording> touches(std::vector<glm::dvec2> elements_mm,
-                                        bool at_one_angle = false) {
+                                        bool at_one_angle = false, int count = 40) {
     std::vector<Recording> recordings;
     std::uint64_t seed = 3;
-    for (const char* letter : {"A", "E", "U"}) {
-      std::vector<Pose> poses = random_poses(60, ++seed);
+    for (const char* letter : {"A", "E"}) {
+      std::vector<Pose> poses = random_poses(count, ++seed);
       for (Pose& pose : poses) {
         pose.theta_rad = at_one_angle ? 0.3 : pose.theta_rad;
       }
@@ -44,18 +43,13 @@ class SetupTouches : public testing::Test {
 };
 
 TEST_F(SetupTouches, FindNothingWhereTheSetupIsSound) {
-  std::vector<std::vector<glm::dvec2>> arrays{digitacts_array()};
-  if (!sanitized) {
-    arrays.push_back(grid_array(8, 8, 1.9));
-    arrays.push_back(grid_array(4, 7, 2.2));
-  }
-  for (const auto& elements_mm : arrays) {
+  for (const auto& elements_mm : {digitacts_array(), grid_array(4, 7, 2.2)}) {
     const std::vector<Recording> recordings = touches(elements_mm);
     const SetupCheck found = check(recordings);
     EXPECT_THAT(found.findings, IsEmpty());
     EXPECT_THAT(found.remarks, IsEmpty());
     EXPECT_EQ(found.elements_mm, elements_mm);
-    EXPECT_GT(found.touches, 150u);
+    EXPECT_GT(found.touches, 70u);
   }
 }
 
@@ -78,7 +72,7 @@ TEST_F(SetupTouches, TellTheOrderInWhichElementsAreRead) {
   for (Recording& recording : recordings) {
     recording.elements_mm = found.elements_mm;
   }
-  EXPECT_THAT(check(recordings).findings, IsEmpty()) << "as it corrects the array";
+  EXPECT_FALSE(suspected_order(device_, recordings, MapOptions())) << "as it corrects the array";
 }
 
 TEST_F(SetupTouches, TellWhereTheArraySitsInTheTool) {
@@ -148,7 +142,7 @@ TEST_F(SetupTouches, TellThePitchAndTheUnitsOfPoses) {
 }
 
 TEST_F(SetupTouches, TellDeadAndStuckElementsAndTouchesOfAnotherPlace) {
-  std::vector<Recording> recordings = touches(digitacts_array());
+  std::vector<Recording> recordings = touches(digitacts_array(), false, 60);
   for (Recording& recording : recordings) {
     for (std::size_t i = 0; i < recording.size(); ++i) {
       recording.pressure[36 * i + 14] = 0.0;
@@ -166,9 +160,9 @@ TEST_F(SetupTouches, TellDeadAndStuckElementsAndTouchesOfAnotherPlace) {
 
 TEST_F(SetupTouches, BringWhatTheirLogsShowed) {
   std::vector<Recording> recordings = touches(digitacts_array());
-  recordings[1].findings = {{"dropped", 0.0, "6 of 60 presses were left out", ""}};
+  recordings[1].findings = {{"dropped", 0.0, "6 of 40 presses were left out", ""}};
   EXPECT_THAT(check(recordings).findings,
-              ElementsAre(Field(&SetupFinding::words, "E.h5: 6 of 60 presses were left out")));
+              ElementsAre(Field(&SetupFinding::words, "E.h5: 6 of 40 presses were left out")));
   Recording few = recordings[1];
   few.T_robot_sensor.resize(3);
   few.pressure.resize(3 * few.elements_mm.size());
