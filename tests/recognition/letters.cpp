@@ -14,13 +14,17 @@ OccupancyGrid learned_map(Device& device, const std::string& shape, std::uint64_
 }
 
 std::vector<Hypothesis> learned_letters(Device& device) {
-  constexpr std::uint64_t seed = 1;
-  std::vector<Hypothesis> letters;
-  for (const auto& [letter, symmetry] : {std::pair{"A", 1}, std::pair{"E", 1}, std::pair{"I", 2},
-                                         std::pair{"O", 0}, std::pair{"U", 1}}) {
-    letters.push_back({.map = learned_map(device, letter, seed)});
-    letters.back().map.symmetry = symmetry;
-  }
+  // Learned once: a device that is opened anew is the same.
+  static const std::vector<Hypothesis> letters = [&] {
+    constexpr std::uint64_t seed = 1;
+    std::vector<Hypothesis> learned;
+    for (const auto& [letter, symmetry] : {std::pair{"A", 1}, std::pair{"E", 1}, std::pair{"I", 2},
+                                           std::pair{"O", 0}, std::pair{"U", 1}}) {
+      learned.push_back({.map = learned_map(device, letter, seed)});
+      learned.back().map.symmetry = symmetry;
+    }
+    return learned;
+  }();
   return letters;
 }
 
