@@ -17,18 +17,26 @@ double pressed(const Recording& recording) {
 }
 
 TEST(GlyphScene, HasObjectsOfDifferentNamesAndSizes) {
-  const std::vector<Recording> objects = glyph_recordings(most_glyphs);
+  constexpr std::size_t of_a_size = most_glyphs / 3;
   std::set<std::string> names;
-  for (const Recording& object : objects) {
-    names.insert(object.object);
-    EXPECT_EQ(object.size(), 192U);
+  std::vector<double> by_size(3);
+  for (const Recording& unknown : glyph_unknowns(most_glyphs, most_glyphs, 3, 10.0, 7)) {
+    by_size[names.size() / of_a_size] += pressed(unknown);
+    names.insert(unknown.truth->object);
   }
-  EXPECT_EQ(names.size(), static_cast<std::size_t>(most_glyphs));
+  ASSERT_EQ(names.size(), static_cast<std::size_t>(most_glyphs));
   EXPECT_TRUE(names.contains("A"));
   // Of an area of 0.64 and 1.44 times; parts of a large glyph lie beyond the touches.
-  constexpr std::size_t of_a_size = most_glyphs / 3;
-  EXPECT_LT(pressed(objects[of_a_size]), 0.8 * pressed(objects[0])) << "an A of 0.8 times the size";
-  EXPECT_GT(pressed(objects[2 * of_a_size]), 1.1 * pressed(objects[0])) << "of 1.2 times the size";
+  EXPECT_LT(by_size[1], 0.8 * by_size[0]) << "of 0.8 times the size";
+  EXPECT_GT(by_size[2], 1.1 * by_size[0]) << "of 1.2 times the size";
+
+  const std::vector<Recording> objects = glyph_recordings(of_a_size + 1);
+  for (const Recording& object : objects) {
+    EXPECT_EQ(object.size(), 192U);
+    EXPECT_EQ(names.erase(object.object), 1U) << object.object;
+  }
+  EXPECT_LT(pressed(objects.back()), 0.8 * pressed(objects.front()))
+      << "an A of 0.8 times the size";
 }
 
 TEST(GlyphScene, UnknownsLieAnywhereInTheRegion) {
