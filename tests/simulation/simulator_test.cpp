@@ -70,7 +70,7 @@ TEST(Simulator, MovingObjectAndRobotFrameTogetherChangesNothing) {
 }
 
 TEST(Simulator, ForceVariesPerTouchAndGainPerElement) {
-  constexpr int touches = 4000;
+  constexpr int touches = 800;
   const SensorModel model{.force_spread = 0.15, .gain_spread = 0.05, .noise_kpa = 0.0};
   Simulator simulator(plate(), model, digitacts_array(), 21);
   const Recording r = simulator.touch(std::vector<Pose>(touches), {});
@@ -103,7 +103,7 @@ TEST(Simulator, ForceVariesPerTouchAndGainPerElement) {
 TEST(Simulator, NoiseIsAdditiveAndClampedAtZero) {
   const SensorModel model{.force_spread = 0.0, .gain_spread = 0.0, .noise_kpa = 0.7};
   Simulator simulator(plate(), model, digitacts_array(), 4);
-  const std::size_t n = 2000 * 36;
+  const std::size_t n = 400 * 36;
   const auto spread = [n](const std::vector<double>& x, double mean) {
     double sum = 0.0;
     for (const double value : x) {
@@ -113,10 +113,10 @@ TEST(Simulator, NoiseIsAdditiveAndClampedAtZero) {
   };
   // Five standard errors of a standard deviation, sigma / sqrt(2 n).
   const double tolerance = 5.0 * 0.7 / std::sqrt(2.0 * static_cast<double>(n));
-  const Recording on = simulator.touch(std::vector<Pose>(2000), {});
+  const Recording on = simulator.touch(std::vector<Pose>(400), {});
   EXPECT_NEAR(spread(on.pressure, 20.0), 0.7, tolerance);
 
-  const Recording off = simulator.touch(std::vector<Pose>(2000, Pose{{500.0, 0.0}, 0.0}), {});
+  const Recording off = simulator.touch(std::vector<Pose>(400, Pose{{500.0, 0.0}, 0.0}), {});
   const auto zeros = std::count(off.pressure.begin(), off.pressure.end(), 0.0);
   EXPECT_GE(*std::min_element(off.pressure.begin(), off.pressure.end()), 0.0);
   // Half of the noise is negative; five standard errors of a proportion, 0.5 / sqrt(n).
