@@ -225,6 +225,7 @@ void Context::lower_limits(const Limits& limits) {
 
 Context::~Context() {
   // Every command stream has waited for its own commands; the program's are not ours to wait for.
+  pipelines_.clear();
   if (instance_ && device_ != VK_NULL_HANDLE) {
     vkDestroyDevice(device_, nullptr);
   }

@@ -9,6 +9,7 @@
 
 #include <vulkan/vulkan_core.h>
 
+#include "gpu/pipelines.hpp"
 #include "gpu/run_queue.hpp"
 #include "model/own_process.hpp"
 #include "palpate/device.hpp"
@@ -103,6 +104,8 @@ class Context {
   VkResult submit(const VkSubmitInfo& info, VkFence fence);
   /// The queue in which command streams wait for the device.
   RunQueue& runs() { return runs_; }
+  /// What kernels share.
+  Pipelines& pipelines() { return pipelines_; }
   std::uint32_t queue_family() const { return queue_family_; }
   const std::string& name() const { return name_; }
   const Limits& limits() const { return limits_; }
@@ -135,6 +138,7 @@ class Context {
   std::mutex own_queue_mutex_;
   std::mutex* queue_mutex_ = &own_queue_mutex_;
   RunQueue runs_;
+  Pipelines pipelines_;
   std::uint32_t queue_family_ = 0;
   std::string name_;
   Limits limits_;

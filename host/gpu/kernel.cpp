@@ -1,5 +1,8 @@
 #include "gpu/kernel.hpp"
 
+#include <string_view>
+#include <vector>
+
 #include <fmt/format.h>
 
 #include "gpu/selection.hpp"
@@ -13,15 +16,11 @@ VkDescriptorType descriptor_type(Access access) {
                                  : VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
 }
 
-Kernel::Kernel(Context& context, const KernelInfo& info)
-    : bindings_(info.bindings), push_bytes_(info.push_bytes), name_(info.name) {
+namespace {
+
+Pipeline compiled(Context& context, const KernelInfo& info, std::string_view doing) {
   const VkDevice device = context.device();
-  const auto doing = fmt::format("device '{}': kernel {}", context.name(), info.name);
-  if (info.push_bytes > context.limits().push_bytes || info.bindings.size() > max_bindings) {
-    throw Error(Fault::system, fmt::format("{}: needs {} B of push constants and {} buffers, more "
-                                           "than the device has",
-                                           doing, info.push_bytes, info.bindings.size()));
-  }
+  Pipeline made{.info = info};
   std::vector<VkDescriptorSetLayoutBinding> bindings;
   for (const Access access : info.bindings) {
     bindings.push_back({.binding = static_cast<std::uint32_t>(bindings.size()),
@@ -33,9 +32,9 @@ Kernel::Kernel(Context& context, const KernelInfo& info)
       .sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO,
       .bindingCount = static_cast<std::uint32_t>(bindings.size()),
       .pBindings = bindings.data()};
-  set_layout_ = make_owned(vkCreateDescriptorSetLayout, vkDestroyDescriptorSetLayout, device,
-                           set_info, doing);
-  const VkDescriptorSetLayout set_layout = set_layout_.get();
+  made.set_layout = make_owned(vkCreateDescriptorSetLayout, vkDestroyDescriptorSetLayout, device,
+                               set_info, doing);
+  const VkDescriptorSetLayout set_layout = made.set_layout.get();
 
   const VkPushConstantRange push{.stageFlags = VK_SHADER_STAGE_COMPUTE_BIT,
                                  .size = info.push_bytes};
@@ -45,7 +44,8 @@ Kernel::Kernel(Context& context, const KernelInfo& info)
       .pSetLayouts = &set_layout,
       .pushConstantRangeCount = info.push_bytes > 0 ? 1U : 0U,
       .pPushConstantRanges = &push};
-  layout_ = make_owned(vkCreatePipelineLayout, vkDestroyPipelineLayout, device, layout_info, doing);
+  made.layout =
+      make_owned(vkCreatePipelineLayout, vkDestroyPipelineLayout, device, layout_info, doing);
 
   std::vector<VkSpecializationMapEntry> entries;
   for (std::uint32_t i = 0; i < info.constants.size(); ++i) {
@@ -68,12 +68,25 @@ Kernel::Kernel(Context& context, const KernelInfo& info)
                 .module = module.get(),
                 .pName = "main",
                 .pSpecializationInfo = &specialization},
-      .layout = layout_.get()};
+      .layout = made.layout.get()};
   VkPipeline pipeline = VK_NULL_HANDLE;
   check(vkCreateComputePipelines(device, VK_NULL_HANDLE, 1, &pipeline_info, nullptr, &pipeline),
         doing);
-  pipeline_ = {pipeline, {device, vkDestroyPipeline}};
+  made.pipeline = {pipeline, {device, vkDestroyPipeline}};
   context.validation().throw_if_any();
+  return made;
+}
+
+}  // namespace
+
+Kernel::Kernel(Context& context, const KernelInfo& info) {
+  const auto doing = fmt::format("device '{}': kernel {}", context.name(), info.name);
+  if (info.push_bytes > context.limits().push_bytes || info.bindings.size() > max_bindings) {
+    throw Error(Fault::system, fmt::format("{}: needs {} B of push constants and {} buffers, more "
+                                           "than the device has",
+                                           doing, info.push_bytes, info.bindings.size()));
+  }
+  pipeline_ = context.pipelines().get(info, [&] { return compiled(context, info, doing); });
 }
 
 }  // namespace palpate::gpu

@@ -1,52 +1,33 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <span>
-#include <vector>
 
 #include "gpu/context.hpp"
-#include "gpu/owned.hpp"
+#include "gpu/pipelines.hpp"
 
 namespace palpate::gpu {
 
-/// How a kernel reaches a buffer.
-enum class Access {
-  table,    ///< reads it as a texel buffer, on every device the fastest way to read
-  storage,  ///< reads and writes it as a storage buffer
-};
-
 VkDescriptorType descriptor_type(Access access);
 
-/// A compiled compute shader and its interface. bindings[i] describes binding i of set 0.
-struct KernelInfo {
-  const char* name = "";
-  std::span<const std::uint32_t> spirv;
-  std::vector<Access> bindings;
-  std::uint32_t push_bytes = 0;
-  std::vector<std::uint32_t> constants = {};  ///< bits of specialization constants 0, 1, ...
-};
-
-/// A compute pipeline with its layouts. Move-only.
+/// A kernel's pipeline, which it shares with the device's other kernels of the same code, interface
+/// and constants.
 class Kernel {
  public:
   Kernel() = default;
   /// @throws Error if the device's limits do not allow the kernel
   Kernel(Context& context, const KernelInfo& info);
 
-  VkPipeline pipeline() const { return pipeline_.get(); }
-  VkPipelineLayout layout() const { return layout_.get(); }
-  VkDescriptorSetLayout set_layout() const { return set_layout_.get(); }
-  std::span<const Access> bindings() const { return bindings_; }
-  std::uint32_t push_bytes() const { return push_bytes_; }
-  const char* name() const { return name_; }
+  VkPipeline pipeline() const { return pipeline_->pipeline.get(); }
+  VkPipelineLayout layout() const { return pipeline_->layout.get(); }
+  VkDescriptorSetLayout set_layout() const { return pipeline_->set_layout.get(); }
+  std::span<const Access> bindings() const { return pipeline_->info.bindings; }
+  std::uint32_t push_bytes() const { return pipeline_->info.push_bytes; }
+  const char* name() const { return pipeline_->info.name; }
 
  private:
-  Owned<VkDescriptorSetLayout> set_layout_;
-  Owned<VkPipelineLayout> layout_;
-  Owned<VkPipeline> pipeline_;
-  std::vector<Access> bindings_;
-  std::uint32_t push_bytes_ = 0;
-  const char* name_ = "";
+  std::shared_ptr<const Pipeline> pipeline_ = std::make_shared<const Pipeline>();
 };
 
 }  // namespace palpate::gpu

@@ -1,6 +1,6 @@
 #include "gpu/kernel.hpp"
 
-#include <type_traits>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -9,11 +9,9 @@
 
 namespace palpate::gpu::kernel_test {
 
-static_assert(!std::is_copy_constructible_v<Kernel> && !std::is_copy_assignable_v<Kernel>);
-
-/// factor * i + addend for i = 0, 1, ..., n - 1, from the device.
-std::vector<std::uint32_t> scaled_count(std::size_t n, std::uint32_t factor, std::uint32_t addend) {
-  Context context("");
+/// The kernel's factor * i + addend for i = 0, 1, ..., n - 1, from the device.
+std::vector<std::uint32_t> scaled_count(Context& context, const ScaleAndAdd& kernel, std::size_t n,
+                                        std::uint32_t addend) {
   CommandStream stream(context);
   std::vector<std::uint32_t> words(n);
   for (std::size_t i = 0; i < n; ++i) {
@@ -23,11 +21,15 @@ std::vector<std::uint32_t> scaled_count(std::size_t n, std::uint32_t factor, std
   const Buffer target(context, n * 4, Memory::device, "a test");
   stream.upload(source, std::span<const std::uint32_t>(words));
   stream.fill(target, 0);
-  const ScaleAndAdd kernel(context, factor);
   kernel.dispatch(stream, source, target, addend);
   stream.download(target, std::span(words));
   stream.run();
   return words;
+}
+
+std::vector<std::uint32_t> scaled_count(std::size_t n, std::uint32_t factor, std::uint32_t addend) {
+  Context context("");
+  return scaled_count(context, ScaleAndAdd(context, factor), n, addend);
 }
 
 TEST(Kernel, TakesSpecializationAndPushConstantsAtEverySize) {
@@ -44,6 +46,30 @@ TEST(Kernel, EachHasItsOwnConstants) {
   EXPECT_EQ(scaled_count(3, 1, 0), (std::vector<std::uint32_t>{0, 1, 2}));
   EXPECT_EQ(scaled_count(3, 0xFFFFFFFF, 0), (std::vector<std::uint32_t>{0, 0xFFFFFFFF, 0xFFFFFFFE}))
       << "all 32 bits arrive";
+}
+
+TEST(Kernel, SharesThePipelineOfItsLikeAlone) {
+  Context context("");
+  Context other("");
+  const ScaleAndAdd twice(context, 2);
+  const ScaleAndAdd thrice(context, 3);
+  const ScaleAndAdd twice_too(context, 2);
+  const ScaleAndAdd elsewhere(other, 2);
+  EXPECT_EQ(twice_too.kernel().pipeline(), twice.kernel().pipeline());
+  EXPECT_NE(thrice.kernel().pipeline(), twice.kernel().pipeline());
+  EXPECT_NE(elsewhere.kernel().pipeline(), twice.kernel().pipeline()) << "a device has its own";
+}
+
+TEST(Kernel, WorksAfterMoreOthersThanAreKept) {
+  Context context("");
+  const ScaleAndAdd kernel(context, 5);
+  for (std::uint32_t factor = 6; factor < 76; ++factor) {
+    const ScaleAndAdd other(context, factor);
+  }
+  const ScaleAndAdd again(context, 5);
+  EXPECT_NE(again.kernel().pipeline(), kernel.kernel().pipeline()) << "it is no longer kept";
+  EXPECT_EQ(scaled_count(context, kernel, 3, 7), (std::vector<std::uint32_t>{7, 12, 17}));
+  EXPECT_EQ(scaled_count(context, again, 3, 7), (std::vector<std::uint32_t>{7, 12, 17}));
 }
 
 TEST(Kernel, NeedingMoreThanTheDeviceHasIsRefusedByName) {
