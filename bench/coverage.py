@@ -16,7 +16,7 @@ from .trials import Floats, Touching, make_trials, training_recordings, truth_of
 
 SEED = 400_000_000
 LETTERS = ("A", "E", "U")
-TOUCHES = (1, 3, 5, 9)
+TOUCHES, QUICK_TOUCHES = (1, 3, 5, 9), (1, 5)
 SHARES = (0.68, 0.95)
 MODELS: dict[str, str | None] = {"Eq. 7": "none", "learned": None}  # of recognize()
 SAMPLES = 4_000  # of a mixture of modes: standard error of a level at most 0.008
@@ -99,9 +99,10 @@ def program() -> None:
     touching = Touching(sensor=sensor, at_random_poses=True, noise=(sd_mm, sd_rad))
     every = 5 if options.quick else 1
     each = options.trials or (2 if options.quick else 34)
+    counts = QUICK_TOUCHES if options.quick else TOUCHES
     # Each unknown is touched by a sensor of its own, whose gains all of its touches share, and so is
     # each letter that is learned.
-    trials = make_trials(LETTERS * each, 1, max(TOUCHES), SEED, touching)
+    trials = make_trials(LETTERS * each, 1, max(counts), SEED, touching)
     random = numpy.random.default_rng(SEED)
     coverage, decisions = Table(COLUMNS), []
     with tempfile.TemporaryDirectory() as folder:
@@ -117,7 +118,7 @@ def program() -> None:
                 trials, f"{folder}/maps", trace=True, device=device, sensor_model=model, none=0.0,
                 touch_sd_mm=sd_mm, touch_sd_deg=math.degrees(sd_rad),
             )  # fmt: skip
-            for touches in TOUCHES:
+            for touches in counts:
                 steps = [record["trace"][touches - 1] for record in records]
                 row: Json = {"sensor": name, "touches": touches, "unknowns": len(trials)}
                 levels = [

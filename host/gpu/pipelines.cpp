@@ -21,17 +21,17 @@ std::shared_ptr<const Pipeline> Pipelines::get(const KernelInfo& info,
                                                const std::function<Pipeline()>& make) {
   // Whoever needs the same one at the same time waits for it.
   const std::scoped_lock lock(mutex_);
-  const auto found = std::ranges::find_if(
-      of_late_, [&](const auto& pipeline) { return same(pipeline->info, info); });
-  if (found != of_late_.end()) {
-    of_late_.splice(of_late_.begin(), of_late_, found);
+  const auto found =
+      std::ranges::find_if(kept_, [&](const auto& pipeline) { return same(pipeline->info, info); });
+  if (found != kept_.end()) {
+    kept_.splice(kept_.begin(), kept_, found);
   } else {
-    of_late_.push_front(std::make_shared<const Pipeline>(make()));
-    of_late_.resize(std::min(of_late_.size(), most_kept));
+    kept_.push_front(std::make_shared<const Pipeline>(make()));
+    kept_.resize(std::min(kept_.size(), most_kept));
   }
-  return of_late_.front();
+  return kept_.front();
 }
 
-void Pipelines::clear() { of_late_.clear(); }
+void Pipelines::clear() { kept_.clear(); }
 
 }  // namespace palpate::gpu

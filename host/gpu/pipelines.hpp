@@ -35,18 +35,18 @@ struct Pipeline {
   Owned<VkPipeline> pipeline;
 };
 
-/// A device's pipelines of late. Drivers compile for 10 to 100 ms what the next filter or map
-/// builder of the same kind needs again. Threads may use it at the same time.
+/// The pipelines that a device used last. Drivers compile for 10 to 100 ms what the next filter or
+/// map builder of the same kind needs again. Threads may use it at the same time.
 class Pipelines {
  public:
-  /// The pipeline of `info`, by make() where none of late is.
+  /// The pipeline of `info`: one that is kept, else what make() makes.
   std::shared_ptr<const Pipeline> get(const KernelInfo& info,
                                       const std::function<Pipeline()>& make);
   void clear();
 
  private:
   std::mutex mutex_;
-  std::list<std::shared_ptr<const Pipeline>> of_late_;  ///< the last used first
+  std::list<std::shared_ptr<const Pipeline>> kept_;  ///< the last used first
 };
 
 }  // namespace palpate::gpu

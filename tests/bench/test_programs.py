@@ -95,15 +95,13 @@ def test_unlearned_shapes_fit_worse(tmp_path: pathlib.Path) -> None:
 
 
 def test_shapes_drawn_at_random_are_strangers(tmp_path: pathlib.Path) -> None:
-    # Takes some twelve seconds of a processor, most to search for strangers.
+    # Takes some four seconds of a processor, to learn from five letters and to search for three strangers.
     command = ("--palpate", os.environ["PALPATE_COMMAND"])
     document = Program(tmp_path, "bench.strangers", "--quick", *command).document
-    rows = {(row["sensor"], row["touches"]): row for row in document["strangers"]}
-    assert len(rows) == 2 * 2, "by both sensors, after two numbers of touches"
-    for row in rows.values():
+    assert [row["sensor"] for row in document["strangers"]] == ["Eq. 7", "learned"]
+    for row in document["strangers"]:
         assert row["learned_called_none"]["mean"] == 0.0
-    assert rows["Eq. 7", 1]["strangers_called_none"]["mean"] == 0.0, "one touch cannot tell by Eq. 7"
-    assert rows["learned", 5]["strangers_called_none"]["mean"] > 0.5
+        assert row["strangers_called_none"]["mean"] > 0.5
 
 
 def test_finer_steps_err_less(tmp_path: pathlib.Path) -> None:
@@ -233,17 +231,17 @@ def test_the_page_needs_no_network(sweep: Program) -> None:
 
 @pytest.mark.parametrize("flag", ["--equal-gains", "--misplaced"])
 def test_regions_hold_the_truth_as_often_as_can_be(tmp_path: pathlib.Path, flag: str) -> None:
-    # Takes some eight seconds of a processor, to learn the sensor from touches of three letters; 33 where
-    # touches are misplaced, as each answer is a sum over displacements.
+    # Takes some three seconds of a processor, to learn the sensor from touches of three letters; seven
+    # where touches are misplaced, as each answer is a sum over displacements.
     command = ("--palpate", os.environ["PALPATE_COMMAND"], flag)
     document = Program(tmp_path, "bench.coverage", "--quick", "--trials", 1, *command).document
     assert document["gain_spread"] == (0.05 if flag == "--misplaced" else 0.0)
     rows = {(row["sensor"], row["touches"]): row for row in document["coverage"]}
-    assert len(rows) == 2 * 4, "by both sensors, after four numbers of touches"
+    assert len(rows) == 2 * 2, "by both sensors, after two numbers of touches"
     for row in rows.values():
         assert row["unknowns"] == 3
         assert row["0.68"]["mean"] <= row["0.95"]["mean"], "the larger region holds the smaller"
     assert rows["Eq. 7", 1]["0.95"]["mean"] > 0.5
     acts = {(row["sensor"], row["touches"]): row["acts"]["mean"] for row in document["decisions"]}
-    assert len(acts) == 2 * 4
-    assert acts["learned", 9] == (0.0 if flag == "--misplaced" else 1.0), "within half a millimetre?"
+    assert len(acts) == 2 * 2
+    assert acts["learned", 5] == (0.0 if flag == "--misplaced" else 1.0), "within half a millimetre?"
