@@ -2,6 +2,7 @@
 // beliefs that are flat.
 
 #include <chrono>
+#include <cmath>
 #include <cstdint>
 #include <stdexcept>
 #include <thread>
@@ -10,6 +11,7 @@
 
 #include "bounded/certified.hpp"
 #include "bounded_set_up.hpp"
+#include "palpate/error.hpp"
 #include "palpate/pose_histogram.hpp"
 #include "touched_shape.hpp"
 
