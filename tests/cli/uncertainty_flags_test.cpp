@@ -74,16 +74,12 @@ TEST_F(UncertaintyFlags, ReachTheFit) {
 TEST_F(UncertaintyFlags, AreRefusedWhereTheyCannotBeMeant) {
   for (const std::string flag :
        {"--touch-sd-mm", "--touch-sd-deg", "--slip-sd-mm", "--slip-sd-deg"}) {
-    expect_refused(with({flag + "=-1"}), {flag, "-1", "give a finite number from 0"});
-    const Arguments region{"--x-mm=-4:4", "--theta-deg=0:5", flag + "=9"};
-    expect_refused(with(region),
-                   {flag + " 9: wider than the region", flag.ends_with("mm") ? "8 mm;" : "5 deg;"});
+    for (const char* value : {"-1", "nan", "inf"}) {
+      expect_refused(with({flag + "=" + value}), {flag, value, "give a finite number from 0"});
+    }
+    expect_refused(with({flag, "x"}), {flag, "x", "give a number"});
+    expect_refused(with({flag, ""}), {flag, "give a value"});
   }
-  for (const std::string value : {"nan", "inf"}) {
-    expect_refused(with({"--touch-sd-mm=" + value}), {"--touch-sd-mm", value, "a finite number"});
-  }
-  expect_refused(with({"--slip-sd-deg", "x"}), {"--slip-sd-deg", "x", "give a number"});
-  expect_refused(with({"--slip-sd-deg", ""}), {"--slip-sd-deg", "give a value"});
   expect_refused(with({"--filter", "particles", "--x-mm=-4:4", "--slip-sd-mm=9"}),
                  {"--slip-sd-mm 9: wider than the region, 8 mm"});
   EXPECT_EQ(palpate(with({"--x-mm=2:2", "--touch-sd-mm=9"})).status, 0)

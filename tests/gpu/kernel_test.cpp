@@ -1,5 +1,6 @@
 #include "gpu/kernel.hpp"
 
+#include <iterator>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -49,22 +50,39 @@ TEST(Kernel, EachHasItsOwnConstants) {
 }
 
 TEST(Kernel, SharesThePipelineOfItsLikeAlone) {
+  static const std::vector<std::uint32_t> copy(std::begin(shaders::scale_and_add),
+                                               std::end(shaders::scale_and_add));
+  const KernelInfo info{.name = "scale_and_add",
+                        .spirv = shaders::scale_and_add,
+                        .bindings = {Access::storage, Access::storage},
+                        .push_bytes = sizeof(ScaleAndAdd::Push),
+                        .constants = {ScaleAndAdd::workgroup, 2}};
+  KernelInfo other_code = info;
+  other_code.spirv = copy;
+  KernelInfo more_buffers = info;
+  more_buffers.bindings.push_back(Access::storage);
+  KernelInfo more_to_push = info;
+  more_to_push.push_bytes += 4;
+  KernelInfo other_factor = info;
+  other_factor.constants.back() = 3;
   Context context("");
-  Context other("");
-  const ScaleAndAdd twice(context, 2);
-  const ScaleAndAdd thrice(context, 3);
-  const ScaleAndAdd twice_too(context, 2);
-  const ScaleAndAdd elsewhere(other, 2);
-  EXPECT_EQ(twice_too.kernel().pipeline(), twice.kernel().pipeline());
-  EXPECT_NE(thrice.kernel().pipeline(), twice.kernel().pipeline());
-  EXPECT_NE(elsewhere.kernel().pipeline(), twice.kernel().pipeline()) << "a device has its own";
+  Context other_device("");
+  const Kernel kernel(context, info);
+  for (const KernelInfo& unlike : {other_code, more_buffers, more_to_push, other_factor}) {
+    EXPECT_NE(Kernel(context, unlike).pipeline(), kernel.pipeline());
+  }
+  EXPECT_NE(Kernel(other_device, info).pipeline(), kernel.pipeline());
+  EXPECT_EQ(Kernel(context, info).pipeline(), kernel.pipeline());
 }
 
 TEST(Kernel, WorksAfterMoreOthersThanAreKept) {
   Context context("");
   const ScaleAndAdd kernel(context, 5);
+  const ScaleAndAdd used(context, 4);
   for (std::uint32_t factor = 6; factor < 76; ++factor) {
     const ScaleAndAdd other(context, factor);
+    const ScaleAndAdd used_again(context, 4);
+    ASSERT_EQ(used_again.kernel().pipeline(), used.kernel().pipeline()) << "the last used is kept";
   }
   const ScaleAndAdd again(context, 5);
   EXPECT_NE(again.kernel().pipeline(), kernel.kernel().pipeline()) << "it is no longer kept";

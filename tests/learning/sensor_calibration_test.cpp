@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "palpate/error.hpp"
+#include "sanitized.hpp"
 #include "simulated_presses.hpp"
 
 namespace palpate::sensor_calibration_test {
@@ -91,21 +92,24 @@ LetterPresses three_letters(std::size_t stride, std::size_t step = 1) {
 }
 
 TEST(SensorCalibration, OfLettersAtKnownPosesLearnsTheirSensor) {
-  const LetterPresses letters = three_letters(4, 5);
+  // Takes 20 s of a core: of fewer touches, whether groups gain by a temperature is a matter of
+  // which.
+  constexpr std::size_t stride = sanitized ? 3 : 1;
+  const LetterPresses letters = three_letters(stride, sanitized ? 5 : 1);
   double shown = 0.0;
-  const SensorCalibration found =
-      calibrate_sensor(letters.presses, {}, {.folds = 3}, [&](double fraction) {
-        EXPECT_GE(fraction, shown);
-        shown = fraction;
-      });
+  const SensorCalibration found = calibrate_sensor(letters.presses, {}, {}, [&](double fraction) {
+    EXPECT_GE(fraction, shown);
+    shown = fraction;
+  });
   EXPECT_NEAR(shown, 1.0, 1e-9);
-  expect_complete(found, 144);
+  expect_complete(found, 576 / stride);
   EXPECT_FALSE(found.sensor.features.has_value()) << "they tell where a touch was";
   ASSERT_TRUE(found.groups.has_value());
   EXPECT_EQ(found.groups->touches, 3U);
   EXPECT_GT(found.groups->after.interval().low, found.after->interval().high);
-  EXPECT_LE(found.groups->after.log_loss, found.groups->table.log_loss + 0.02)
-      << "groups that are told apart may gain nothing by a temperature";
+  if (!sanitized) {
+    EXPECT_LE(found.groups->after.log_loss, found.groups->table.log_loss);
+  }
   ASSERT_TRUE(found.sensor.bins.has_value());
   EXPECT_NEAR(found.sensor.bins->x_mm, 0.95, 1e-9);
   EXPECT_NEAR(found.sensor.bins->theta_rad, std::numbers::pi / 36.0, 1e-9);
