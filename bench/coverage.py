@@ -1,6 +1,7 @@
 """How often the regions that a belief calls 68 and 95 % probable hold the truth, over all its modes."""
 
 import math
+import pathlib
 import tempfile
 from collections.abc import Sequence
 
@@ -9,7 +10,7 @@ import numpy
 import palpate
 from palpate._tables import Column, Table, plain, print_table
 
-from .defaults import told
+from .defaults import learn
 from .measures import share_record, with_interval, wrapped
 from .program import Json, begin, main, parser, write
 from .trials import Floats, Touching, make_trials, training_recordings, truth_of
@@ -106,12 +107,8 @@ def program() -> None:
     random = numpy.random.default_rng(SEED)
     coverage, decisions = Table(COLUMNS), []
     with tempfile.TemporaryDirectory() as folder:
-        files = []
-        for recording in training_recordings(touching):
-            if recording.object in LETTERS:
-                files.append(f"{folder}/{recording.object}.h5")
-                recording[::every].save(files[-1])
-        told(options.palpate, "map", *files, "-o", f"{folder}/maps/")
+        training = [r[::every] for r in training_recordings(touching) if r.object in LETTERS]
+        learn(options.palpate, training, pathlib.Path(folder))
         for name, model in MODELS.items():
             # Nobody is a stranger: what "(none)" has would count against every region.
             records = palpate.recognize(

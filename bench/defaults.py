@@ -4,6 +4,7 @@ import json
 import pathlib
 import subprocess
 import tempfile
+from collections.abc import Iterable
 
 import numpy
 
@@ -22,7 +23,7 @@ SCENES = {
     "other shapes": (("T", "L", "ring"), ("X", "bar")),
 }
 #: Flags of the two models.
-MODELS = {"Eq. 7": ["--sensor-model", "none"], "learned": []}
+FLAGS = {"Eq. 7": ["--sensor-model", "none"], "learned": []}
 
 _PERCENT = with_interval(".1f", 100.0)
 DEFAULTS: list[Column] = [
@@ -42,6 +43,15 @@ def told(command: str, *arguments: str) -> str:
     if done.returncode != 0:
         raise palpate.Error(done.stderr.strip())
     return done.stdout
+
+
+def learn(command: str, recordings: Iterable[palpate.Recording], folder: pathlib.Path) -> str:
+    """What `palpate map` says of recordings, of which it makes `folder`/maps with the learned sensor."""
+    files = []
+    for recording in recordings:
+        files.append(str(folder / f"{recording.object}.h5"))
+        recording.save(files[-1])
+    return told(command, "map", *files, "-o", f"{folder}/maps/")
 
 
 def scores_of(known: list[Json], strangers: list[Json]) -> Json:
@@ -72,12 +82,10 @@ def program() -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         for scene, (learned, strangers) in SCENES.items():
-            files = []
-            for seed, shape in enumerate(learned, start=1):
-                files.append(str(folder / f"{shape}.h5"))
-                palpate.simulate(shape, seed=seed).save(files[-1])
-            maps = str(folder / scene) + "/"
-            print(told(options.palpate, "map", *files, "-o", maps).splitlines()[-2])
+            (folder / scene).mkdir()
+            recordings = [palpate.simulate(shape, seed=seed) for seed, shape in enumerate(learned, start=1)]
+            print(learn(options.palpate, recordings, folder / scene).splitlines()[-2])
+            maps = f"{folder}/{scene}/maps/"
             trials = make_trials(
                 [*learned, *strangers], each, max(TOUCHES), SEED, Touching(at_random_poses=True)
             )
@@ -87,7 +95,7 @@ def program() -> None:
                 trial.save(unknowns[-1])
             result = folder / "records.json"
             steps = {}
-            for sensor, model in MODELS.items():
+            for sensor, model in FLAGS.items():
                 recognize = ["recognize", *unknowns, "--maps", maps, "--trace", "--json", str(result)]
                 told(options.palpate, *recognize, *model)
                 steps[sensor] = [record["trace"] for record in json.loads(result.read_text())]

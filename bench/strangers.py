@@ -10,7 +10,8 @@ import numpy
 import palpate
 from palpate._tables import Column, Table, plain
 
-from .defaults import told
+from .coverage import MODELS
+from .defaults import learn
 from .measures import share_record, with_interval
 from .program import begin, main, parser, write
 from .trials import VOWELS, Floats, Touching, make_trials, training_recordings
@@ -19,7 +20,6 @@ OUTLINE_SEED = 800_000_000
 STRANGER_SEED = 810_000_000
 LEARNED_SEED = 820_000_000
 TOUCHES, QUICK_TOUCHES = (1, 3, 5, 9, 15), (5,)
-MODELS: dict[str, str | None] = {"Eq. 7": "none", "learned": None}  # of recognize()
 
 _PERCENT = with_interval(".1f", 100.0)
 STRANGERS: list[Column] = [
@@ -94,11 +94,9 @@ def program() -> None:
     table = Table(STRANGERS)
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
-        files, shapes = [], []
-        for recording in training_recordings():
-            files.append(str(folder / f"{recording.object}.h5"))
-            recording[:: 5 if options.quick else 1].save(files[-1])
-        told(options.palpate, "map", *files, "-o", f"{folder}/maps/")
+        every = 5 if options.quick else 1
+        learn(options.palpate, [r[::every] for r in training_recordings()], folder)
+        shapes = []
         for i in range(count):
             shapes.append(str(folder / f"stranger.{i}.txt"))
             numpy.savetxt(shapes[-1], KINDS[i % len(KINDS)](random), "%.4f")
