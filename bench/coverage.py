@@ -13,7 +13,7 @@ from palpate._tables import Column, Table, plain, print_table
 from .defaults import learn
 from .measures import share_record, with_interval, wrapped
 from .program import Json, begin, main, parser, write
-from .trials import Floats, Touching, make_trials, training_recordings, truth_of
+from .trials import VOWELS, Floats, Touching, make_trials, training_recordings, truth_of
 
 SEED = 400_000_000
 LETTERS = ("A", "E", "U")
@@ -85,8 +85,11 @@ def program() -> None:
     flags = parser(
         "coverage",
         "Measures how often the 68 and 95 % regions of the belief, over all its modes, hold the truth, and "
-        "how right decisions are, in some minutes on two CPU cores.",
-        trials="unknowns per letter [34, or 2 with --quick]",
+        "how right decisions are, in some minutes on two CPU cores for each training set.",
+        trials="unknowns per letter and training set [34, or 2 with --quick]",
+    )
+    flags.add_argument(
+        "--sets", type=int, default=1, help="training sets, each with unknowns of its own [%(default)s]"
     )
     flags.add_argument("--misplaced", action="store_true", help="touches are 1 mm and 0.05 rad off")
     flags.add_argument(
@@ -103,37 +106,43 @@ def program() -> None:
     counts = QUICK_TOUCHES if options.quick else TOUCHES
     # Each unknown is touched by a sensor of its own, whose gains all of its touches share, and so is
     # each letter that is learned.
-    trials = make_trials(LETTERS * each, 1, max(counts), SEED, touching)
+    trials = make_trials(LETTERS * each * options.sets, 1, max(counts), SEED, touching)
+    in_set = len(LETTERS) * each
+    records: dict[str, list[Json]] = {name: [] for name in MODELS}
+    for index in range(options.sets):
+        training = training_recordings(touching, first_seed=1 + index * len(VOWELS))
+        with tempfile.TemporaryDirectory() as folder:
+            known = [r[::every] for r in training if r.object in LETTERS]
+            learn(options.palpate, known, pathlib.Path(folder))
+            unknowns = trials[index * in_set : (index + 1) * in_set]
+            for name, model in MODELS.items():
+                # Nobody is a stranger: what "(none)" has would count against every region.
+                records[name] += palpate.recognize(
+                    unknowns, f"{folder}/maps", trace=True, device=device, sensor_model=model, none=0.0,
+                    touch_sd_mm=sd_mm, touch_sd_deg=math.degrees(sd_rad),
+                )  # fmt: skip
     random = numpy.random.default_rng(SEED)
     coverage, decisions = Table(COLUMNS), []
-    with tempfile.TemporaryDirectory() as folder:
-        training = [r[::every] for r in training_recordings(touching) if r.object in LETTERS]
-        learn(options.palpate, training, pathlib.Path(folder))
-        for name, model in MODELS.items():
-            # Nobody is a stranger: what "(none)" has would count against every region.
-            records = palpate.recognize(
-                trials, f"{folder}/maps", trace=True, device=device, sensor_model=model, none=0.0,
-                touch_sd_mm=sd_mm, touch_sd_deg=math.degrees(sd_rad),
-            )  # fmt: skip
-            for touches in counts:
-                steps = [record["trace"][touches - 1] for record in records]
-                row: Json = {"sensor": name, "touches": touches, "unknowns": len(trials)}
-                levels = [
-                    level_in_modes(step["modes"], truth_of(trial), random)
-                    for step, trial in zip(steps, trials, strict=True)
-                ]
-                coverage.append(row | covered(levels))
-                acted = [step for step in steps if step["decision"]["act"]]
-                errors = [step["refined_error_mm"] for step in acted if step["right"]]
-                within = sum(error is not None and error <= 0.5 for error in errors)
-                decisions.append(
-                    row
-                    | {"acts": share_record(len(acted), len(steps))}
-                    | {"right": share_record(len(errors), max(len(acted), 1))}
-                    | {"within": share_record(within, max(len(acted), 1))}
-                )
+    for name in MODELS:
+        for touches in counts:
+            steps = [record["trace"][touches - 1] for record in records[name]]
+            row: Json = {"sensor": name, "touches": touches, "unknowns": len(trials)}
+            levels = [
+                level_in_modes(step["modes"], truth_of(trial), random)
+                for step, trial in zip(steps, trials, strict=True)
+            ]
+            coverage.append(row | covered(levels))
+            acted = [step for step in steps if step["decision"]["act"]]
+            errors = [step["refined_error_mm"] for step in acted if step["right"]]
+            within = sum(error is not None and error <= 0.5 for error in errors)
+            decisions.append(
+                row
+                | {"acts": share_record(len(acted), len(steps))}
+                | {"right": share_record(len(errors), max(len(acted), 1))}
+                | {"within": share_record(within, max(len(acted), 1))}
+            )
     print_table(DECISIONS, decisions)
-    facts |= {"gain_spread": sensor.gain_spread}
+    facts |= {"gain_spread": sensor.gain_spread, "training_sets": options.sets}
     write(options.json, facts | {"coverage": coverage, "decisions": decisions})
 
 

@@ -43,14 +43,14 @@ EXACT = Touching()
 
 
 def training_recordings(
-    touching: Touching = EXACT, poses: ArrayLike | None = None
+    touching: Touching = EXACT, poses: ArrayLike | None = None, *, first_seed: int = 1
 ) -> list[palpate.Recording]:
-    """The vowels, touched at known poses T_object_sensor [n, 3], with the seeds 1 to 5."""
+    """The vowels, touched at known poses T_object_sensor [n, 3], each with a seed of its own."""
     return [
         palpate.simulate(
             name, poses, elements_mm=touching.elements_mm, seed=seed, sensor=touching.sensor
         )
-        for seed, name in enumerate(VOWELS, start=1)
+        for seed, name in enumerate(VOWELS, start=first_seed)
     ]
 
 
