@@ -165,24 +165,30 @@ std::string dropped_text(const RecognitionStep& step) {
 
 std::string unproven_sentence(const RecognitionStep& step, const RecognitionTask& task) {
   const auto* bounded = std::get_if<BoundedOptions>(&task.filter);
-  if (bounded == nullptr || !step.certificate ||
-      step.certificate->dropped_mass <= bounded->tolerance) {
+  if (bounded == nullptr || !step.certificate) {
     return "";
   }
   const auto [low, high] = step.identity_bounds[step.best];
+  const bool proven = step.certificate->dropped_mass <= bounded->tolerance;
+  // "(none)" has searches of its own, whose end a budget may not await.
+  constexpr double told = 0.05;
+  if (proven && (!bounded->budget_s || high - low <= told)) {
+    return "";
+  }
   const double unproven = 100.0 * step.certificate->dropped_mass;
   constexpr double poor_fits = 0.01;  // rounding leaves less
   // Bounds round outwards.
-  return fmt::format(
-      "{} {:.1f} % (at least {:.1f} %, at most {:.1f} %): {} left {} % of the belief "
-      "unproven",
-      object_words(step, task), 100.0 * step.confidence(), std::floor(1000.0 * low) / 10.0,
-      std::ceil(1000.0 * high) / 10.0,
-      bounded->budget_s ? fmt::format("the budget of {:g} ms", 1e3 * *bounded->budget_s)
-      : task.contact().table && unproven >= poor_fits
-          ? "the search, which met nothing but poor fits,"
-          : "rounding",
-      unproven >= 9.95 ? fmt::format("{:.0f}", unproven) : fmt::format("{:.2g}", unproven));
+  return fmt::format("{} {:.1f} % (at least {:.1f} %, at most {:.1f} %): {} left {} unproven",
+                     object_words(step, task), 100.0 * step.confidence(),
+                     std::floor(1000.0 * low) / 10.0, std::ceil(1000.0 * high) / 10.0,
+                     bounded->budget_s
+                         ? fmt::format("the budget of {:g} ms", 1e3 * *bounded->budget_s)
+                     : task.contact().table && unproven >= poor_fits
+                         ? "the search, which met nothing but poor fits,"
+                         : "rounding",
+                     proven             ? "the probability of (none)"
+                     : unproven >= 9.95 ? fmt::format("{:.0f} % of the belief", unproven)
+                                        : fmt::format("{:.2g} % of the belief", unproven));
 }
 
 std::string surprise_text(const RecognitionStep& step) {

@@ -153,9 +153,9 @@ Decision decide(const RecognitionStep& step, const RecognitionTask& task) {
   const bool bounded = !step.identity_bounds.empty();
   const double proven = bounded ? step.identity_bounds[step.best].low : step.confidence();
   if (!(proven >= task.act.above)) {
-    // The sentence names the bound where the probability itself is enough.
-    return {false, fmt::format("{} has {}{}, less than {:g} %", best, percent(proven),
-                               step.confidence() >= task.act.above ? " for certain" : "",
+    const std::string least = percent(proven);
+    return {false, fmt::format("{} has {}{}, less than {:g} %", best, least,
+                               least != percent(step.confidence()) ? " for certain" : "",
                                100.0 * task.act.above)};
   }
   const BeliefPlaces& places = step.places;

@@ -57,6 +57,9 @@ TEST(UnprovenSentence, SaysTheBoundsAndWhatEndedTheSearch) {
   EXPECT_EQ(unproven_sentence(record_of(0.0123, {{0.6, 0.65}, {0.35, 0.4}}).last(), task_with({})),
             "A 62.0 % (at least 60.0 %, at most 65.0 %): rounding left 1.2 % of the belief "
             "unproven");
+  EXPECT_EQ(unproven_sentence(record_of(1e-7, {{0.1, 0.99}, {0.0, 0.1}}).last(), task_with(0.1)),
+            "A 62.0 % (at least 10.0 %, at most 99.0 %): the budget of 100 ms left the "
+            "probability of (none) unproven");
   EXPECT_EQ(unproven_sentence(record_of(1e-4, {{}, {}}).last(), task_with(0.1)), "")
       << "the tolerance holds";
   EXPECT_EQ(unproven_sentence(wide.last(), RecognitionTask({{sample_map("A")}, {sample_map("I")}},

@@ -362,6 +362,8 @@ TEST(Decision, SaysWhatSpeaksAgainst) {
   step = good_step();
   step.identity_bounds = {{0.5, 1.0}, {0.0, 0.5}};
   EXPECT_EQ(refused(step), "L has 50 % for certain, less than 99 %");
+  step.identity = {0.9, 0.1, 0.0};
+  EXPECT_EQ(refused(step), "L has 50 % for certain, less than 99 %");
 
   step = good_step();
   step.places.modes.push_back({.object = 0, .probability = 0.11, .pose = {{{1.0, -2.0}, 0.5}, {}}});

@@ -30,6 +30,8 @@ constexpr double followable = 1e-4;
 /// more than it, or the hypotheses, may have.
 constexpr double none_nats = 0.05;
 constexpr double negligible = 1e-4;
+/// Bounds of the hypotheses' log evidence this far apart tell too little of them, in nats.
+constexpr double untold_nats = 1.0;
 constexpr double unlimited = std::numeric_limits<double>::infinity();
 
 }  // namespace
@@ -229,6 +231,21 @@ bool BoundedBelief::tells_enough(const LogInterval& none) const {
 
 LogInterval BoundedBelief::none_log_evidence() const {
   return found_ && found_->none ? *found_->none : LogInterval{-unlimited, -unlimited};
+}
+
+double BoundedBelief::none_estimate() const {
+  if (!touches_.has_none()) {
+    return -unlimited;
+  }
+  const LogInterval none = none_log_evidence();
+  const HypothesisMass all = found_->result.all();
+  const LogInterval objects = all.bounds();
+  const bool told = tells_enough(none) && objects.high - objects.low <= untold_nats;
+  if (told || !std::isfinite(all.evaluated)) {
+    return std::isfinite(none.low) ? std::midpoint(none.low, none.high) : none.high;
+  }
+  const double prior_odds = touches_.none_log_weight() - std::log(options().lattice.bins());
+  return all.evaluated + std::clamp(prior_odds, none.low - objects.high, none.high - objects.low);
 }
 
 }  // namespace palpate

@@ -59,6 +59,9 @@ class BoundedBelief {
   /// evidence_nats or beyond evidence_range_nats where the options ask for these. -infinity where
   /// it is left out. To be asked for after found().
   LogInterval none_log_evidence() const;
+  /// The log evidence of "none of these" that estimates count with: the middle of its bounds, or
+  /// where a budget left it or the hypotheses untold, its prior odds, as far as the bounds allow.
+  double none_estimate() const;
 
  private:
   /// What a search found of all touches.

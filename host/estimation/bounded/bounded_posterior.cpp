@@ -21,15 +21,6 @@
 
 namespace palpate {
 
-namespace {
-
-/// The log of what is known only by its bounds, as an estimate takes it.
-double middle(const LogInterval& log) {
-  return std::isfinite(log.low) ? std::midpoint(log.low, log.high) : log.high;
-}
-
-}  // namespace
-
 struct BoundedPosterior::Impl {
   Impl(std::span<const Hypothesis> hypotheses, const BoundedOptions& options)
       : belief(hypotheses, options) {
@@ -107,14 +98,14 @@ Estimate BoundedPosterior::estimate(std::optional<double> tolerance) const {
                           .bins_evaluated = found.bins_evaluated};
   const LogInterval none = belief.none_log_evidence();
   if (belief.touches().has_none()) {
-    logs.push_back(middle(none));
+    logs.push_back(belief.none_estimate());
     certificate.none_log_evidence = none;
   }
   estimate.identity = normalised(logs);
   if (belief.touches().has_none()) {
     estimate.none = estimate.identity.back();
     estimate.identity.pop_back();
-    estimate.none_log_evidence = middle(none);
+    estimate.none_log_evidence = belief.none_estimate();
     logs.pop_back();
   }
   estimate.log_evidence = std::move(logs);
@@ -192,8 +183,8 @@ Marginals BoundedPosterior::marginals(int object, const PoseLattice& grid) const
   onto.collapse_fixed().validate();
   BoundedBelief& belief = posterior.belief;
   belief.found();
-  const double log_total = log_add(belief.log_total(), middle(belief.none_log_evidence())) -
-                           belief.touches().log_weight()[object];
+  const double log_total =
+      log_add(belief.log_total(), belief.none_estimate()) - belief.touches().log_weight()[object];
   MarginalSums sums(lattice(), onto);
   belief.visit([&](const BinBox& box, std::span<const double> log_likelihood) {
     if (box.object == object) {

@@ -29,7 +29,8 @@ SearchedTouches::SearchedTouches(std::span<const Hypothesis> hypotheses,
   }
   if (options_.none_weight) {
     none_.emplace(space_, options_, likelihood_);
-    none_log_weight_ = none_log_weight(*options_.none_weight, hypotheses_, options_.lattice);
+    none_log_weight_ =
+        palpate::none_log_weight(*options_.none_weight, hypotheses_, options_.lattice);
   }
 }
 

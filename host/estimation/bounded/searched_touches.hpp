@@ -53,6 +53,8 @@ class SearchedTouches {
   bool moving() const { return moving_.has_value(); }
   /// Whether the options ask for "none of these".
   bool has_none() const { return none_.has_value(); }
+  /// Log of the prior weight of "none of these" times the number of bins. Only where has_none().
+  double none_log_weight() const { return none_log_weight_; }
   std::string path() const;
   std::uint64_t bytes() const;
   /// Runs work on the threads that the options ask for.

@@ -141,6 +141,21 @@ TEST(BoundedPosterior, ShowsInTheIdentitiesWhereABudgetLeftNoneOfThese) {
   }
 }
 
+TEST(BoundedPosterior, LeavesNoneOfTheseItsPriorWhereABudgetToldNothing) {
+  BoundedOptions options = small_options();
+  options.none_weight = 1.0 / 3.0;  // beside weights of 1 and 2
+  options.budget_s = 1e-9;
+  BoundedPosterior posterior(two_shapes(), options);
+  const Recording recording = touches_of_l(4, 821);
+  posterior.update(all_touches(recording));
+  const Estimate estimate = posterior.estimate();
+  EXPECT_NEAR(estimate.none, 0.1, 1e-9);
+  options.budget_s.reset();
+  BoundedPosterior whole(two_shapes(), options);
+  whole.update(all_touches(recording));
+  EXPECT_LT(whole.estimate().none, 0.01);
+}
+
 TEST(BoundedPosterior, LeavesObjectsWhereNoneTakesAllOfTheMass) {
   const Recording recording = random_recording(4, 36, 817);
   BoundedOptions options = small_options();

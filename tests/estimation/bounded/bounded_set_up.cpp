@@ -41,6 +41,7 @@ double sum(std::span<const double> values) {
 
 HistogramOptions dense_options(const BoundedOptions& options) {
   return {.lattice = options.lattice,
+          .contact = options.contact,
           .none_weight = options.none_weight,
           .touch_sd = options.touch_sd,
           .slip_sd = options.slip_sd};

@@ -38,11 +38,11 @@ MovingBelief::MovingBelief(const SearchSpace& space, const BoundedOptions& optio
 }
 
 double MovingBelief::bytes_needed(const PoseLattice& lattice, std::size_t objects) {
-  // Every object keeps what is followed, what is missing and what all bins keep; one at a time has
-  // means, errors, what will be missing, and planes: as they are, blurred along y, blurred, and
-  // their neighbours' sums.
+  // Every object keeps what is followed, also before the last touch, what is missing and what all
+  // bins keep; one at a time has means, errors, what will be missing, and planes: as they are,
+  // blurred along y, blurred, and their neighbours' sums.
   const double numbers =
-      (lattice.full_circle() ? 2.0 : 3.0) * static_cast<double>(objects) + 3.0 + 4.0;
+      (lattice.full_circle() ? 3.0 : 4.0) * static_cast<double>(objects) + 3.0 + 4.0;
   return numbers * sizeof(double) * static_cast<double>(lattice.bins());
 }
 
@@ -233,14 +233,18 @@ bool MovingBelief::reaches(const SearchResult& found, const SearchGoal& goal) co
 }
 
 std::vector<double> MovingBelief::log_likelihood(std::span<const BinBox> boxes) const {
+  const KnownElements nothing;
+  const KnownElements& last = stepped_ > 0 ? touches_[stepped_ - 1] : nothing;
   std::vector<double> logs;
-  for (const BinBox& box : boxes) {
-    const MovingObject& object = objects_[box.object];
-    for (std::int64_t i = 0; i < box.bins(); ++i) {
-      const auto bin = static_cast<std::size_t>(box.bin(i, options_.lattice));
-      logs.push_back(object.scale() + object.over() +
-                     log_add(object.log_mass()[bin] + object.rounding(), object.log_rest()[bin]));
+  for (std::size_t begin = 0; begin < boxes.size();) {
+    std::size_t end = begin;
+    while (end < boxes.size() && boxes[end].object == boxes[begin].object) {
+      ++end;
     }
+    const std::vector<double> of_object =
+        objects_[boxes[begin].object].log_belief(boxes.subspan(begin, end - begin), last);
+    logs.insert(logs.end(), of_object.begin(), of_object.end());
+    begin = end;
   }
   return logs;
 }

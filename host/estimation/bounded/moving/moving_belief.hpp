@@ -41,8 +41,7 @@ class MovingBelief {
   /// all are followed.
   SearchResult find(const SearchGoal& goal, const Deadline& deadline, const BinVisitor& visit);
 
-  /// After take_in(): upper bounds of the log-likelihood of bins in nats, box after box, [y, x] in
-  /// each: close where the belief is, and loose where a bin is not followed.
+  /// After take_in(): MovingObject::log_belief().
   std::vector<double> log_likelihood(std::span<const BinBox> boxes) const;
 
  private:

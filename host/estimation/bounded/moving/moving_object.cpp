@@ -68,6 +68,8 @@ void MovingObject::start() {
 
 void MovingObject::step(const KnownElements& touch, bool slips, std::span<const double> tiles,
                         double least, bool by_logs) {
+  before_ = log_mass_;
+  slipped_ = slips;
   choose(tiles, least);
   if (slips) {
     restore();
@@ -121,10 +123,10 @@ void MovingObject::restore() {
   under_ += std::max(0.0, std::min(std::log(most_kept_) + ratio, least)) + error;
 }
 
-void MovingObject::multiply(const KnownElements& touch) {
+void MovingObject::evaluate(const KnownElements& touch, std::span<const BlockRun> runs) const {
   std::vector<BinBox> boxes;
   std::size_t bins = 0;
-  for (const BlockRun& run : runs_) {
+  for (const BlockRun& run : runs) {
     boxes.push_back(box_of(run));
     bins += static_cast<std::size_t>(boxes.back().bins());
   }
@@ -132,10 +134,14 @@ void MovingObject::multiply(const KnownElements& touch) {
   std::vector<double> errors(bins);
   task_.likelihood.evaluate(boxes, touch, Arithmetic::float64, values, errors);
   std::size_t value = 0;
-  for_bins(runs_, [&](std::size_t bin) {
+  for_bins(runs, [&](std::size_t bin) {
     task_.log_mean[bin] = values[value];
     task_.error[bin] = errors[value++];
   });
+}
+
+void MovingObject::multiply(const KnownElements& touch) {
+  evaluate(touch, runs_);
   const double rounding = task_.likelihood.error(object_, touch, Arithmetic::float64);
   rounding_ += rounding;
   settle_bins([&](std::size_t bin, double& log_mass, double& rest, double& most) {
@@ -205,6 +211,44 @@ void MovingObject::add_up(std::span<const double> tiles) {
   }
   sums_ = {sum(&Sums::mass).log(), rest.log() + 1e-9, sum(&Sums::kept).log(),
            sum(&Sums::off).log()};
+}
+
+std::vector<BlockRun> MovingObject::others_in(std::span<const BinBox> boxes) const {
+  std::vector<std::uint8_t> wanted(followed_.size());
+  for (const BinBox& box : boxes) {
+    for (std::int64_t i = 0; i < box.bins(); ++i) {
+      const std::size_t tile = tile_of(box.bin(i, task_.lattice));
+      wanted[tile] = followed_[tile] == 0 ? 1 : 0;
+    }
+  }
+  return runs_of(wanted);
+}
+
+std::vector<double> MovingObject::log_belief(std::span<const BinBox> boxes,
+                                             const KnownElements& touch) const {
+  // [bin of tiles that are not followed] log of what became of the belief that was followed before.
+  std::vector<double> become;
+  if (const std::vector<BlockRun> others = others_in(boxes); !others.empty()) {
+    become = before_;
+    if (slipped_) {
+      of_bins_.means(others, before_, become, task_.error, true);
+    }
+    if (!touch.runs.empty()) {
+      evaluate(touch, others);
+      for_bins(others, [&](std::size_t bin) { become[bin] += task_.log_mean[bin]; });
+    }
+  }
+  std::vector<double> logs;
+  for (const BinBox& box : boxes) {
+    for (std::int64_t i = 0; i < box.bins(); ++i) {
+      const auto bin = static_cast<std::size_t>(box.bin(i, task_.lattice));
+      const double most = over_ + log_add(log_mass_[bin] + rounding(), log_rest_[bin]);
+      const bool close =
+          followed_[tile_of(static_cast<std::int64_t>(bin))] == 0 && become[bin] > -infinity;
+      logs.push_back(scale_ + (close ? std::min(most, become[bin]) : most));
+    }
+  }
+  return logs;
 }
 
 double MovingObject::rounding() const {

@@ -49,6 +49,12 @@ class MovingObject {
   void step(const KnownElements& touch, bool slips, std::span<const double> tiles, double least,
             bool by_logs);
 
+  /// Log-likelihood of the bins of some boxes of this object, box after box, [y, x] in each: an
+  /// upper bound, close where bins are followed; in the others, what the last slip and touch made
+  /// of the belief that was followed before them.
+  /// @param touch that step() went through last
+  std::vector<double> log_belief(std::span<const BinBox> boxes, const KnownElements& touch) const;
+
   /// The tiles that are followed, in runs along x.
   std::span<const BlockRun> runs() const { return runs_; }
   BinBox box_of(const BlockRun& run) const;
@@ -99,7 +105,14 @@ class MovingObject {
   void choose(std::span<const double> tiles, double least);
   void slip(bool by_logs);
   void restore();
+  /// Leaves the touch's log-likelihood at the tiles' bins, and its error, in the shared memory.
+  void evaluate(const KnownElements& touch, std::span<const BlockRun> runs) const;
   void multiply(const KnownElements& touch);
+  std::size_t tile_of(std::int64_t bin) const;
+  /// [tile] not 0 where it is to be among the runs.
+  std::vector<BlockRun> runs_of(std::span<const std::uint8_t> wanted) const;
+  /// The tiles of the boxes' bins that are not followed.
+  std::vector<BlockRun> others_in(std::span<const BinBox> boxes) const;
   /// @param set takes a bin, its log_mass and log_rest, and the largest error that no rest has
   template <typename Set>
   void settle_bins(const Set& set);
@@ -119,6 +132,8 @@ class MovingObject {
 
   std::vector<double> log_mass_;
   std::vector<double> log_rest_;
+  std::vector<double> before_;          ///< log_mass() before the last step
+  bool slipped_ = false;                ///< in the last step
   std::vector<std::uint8_t> followed_;  ///< [theta, y, x] of tiles
   std::vector<BlockRun> runs_;
   Sums sums_;

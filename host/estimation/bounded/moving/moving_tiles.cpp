@@ -101,20 +101,35 @@ void MovingObject::add_touch_bounds(const KnownElements& touch, std::vector<doub
   });
 }
 
-void MovingObject::choose(std::span<const double> tiles, double least) {
-  runs_.clear();
+std::size_t MovingObject::tile_of(std::int64_t bin) const {
+  const PoseLattice& lattice = task_.lattice;
+  const std::int64_t theta = bin / lattice.plane();
+  const std::int64_t y = bin % lattice.plane() / lattice.x_mm.count;
+  const std::int64_t x = bin % lattice.x_mm.count;
+  return static_cast<std::size_t>((theta * rows_ + y / side) * columns_ + x / side);
+}
+
+std::vector<BlockRun> MovingObject::runs_of(std::span<const std::uint8_t> wanted) const {
+  std::vector<BlockRun> runs;
   std::size_t tile = 0;
   for (int theta = 0; theta < task_.lattice.theta_rad.count; ++theta) {
     for (int y = 0; y < rows_; ++y) {
       for (int x = 0; x < columns_; ++x, ++tile) {
-        // What is no number is followed.
-        followed_[tile] = !(tiles[tile] + log_bins_of(tile) < least) ? 1 : 0;
-        if (followed_[tile] != 0) {
-          append_block(theta, y, x, runs_);
+        if (wanted[tile] != 0) {
+          append_block(theta, y, x, runs);
         }
       }
     }
   }
+  return runs;
+}
+
+void MovingObject::choose(std::span<const double> tiles, double least) {
+  for (std::size_t tile = 0; tile < tiles.size(); ++tile) {
+    // What is no number is followed.
+    followed_[tile] = !(tiles[tile] + log_bins_of(tile) < least) ? 1 : 0;
+  }
+  runs_ = runs_of(followed_);
 }
 
 /// Leaves their upper bounds to the bins of tiles that are not followed.
