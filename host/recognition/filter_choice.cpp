@@ -11,7 +11,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "estimation/bounded/search/search_memory.hpp"
+#include "estimation/bounded/search_memory.hpp"
 #include "estimation/displacement_check.hpp"
 #include "recognition/refused_option.hpp"
 

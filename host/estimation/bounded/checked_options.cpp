@@ -5,7 +5,7 @@
 
 #include <fmt/format.h>
 
-#include "estimation/bounded/search/search_memory.hpp"
+#include "estimation/bounded/search_memory.hpp"
 #include "estimation/displacement_check.hpp"
 #include "estimation/hypotheses.hpp"
 #include "palpate/error.hpp"

@@ -11,11 +11,11 @@
 #include <vector>
 
 #include "estimation/bounded/leaves/bin_likelihood.hpp"
-#include "estimation/bounded/log_sum.hpp"
 #include "estimation/bounded/mean_search.hpp"
 #include "estimation/bounded/penalty_sum.hpp"
 #include "estimation/bounded/search/largest_tiles.hpp"
-#include "estimation/bounded/touch_overlap.hpp"
+#include "estimation/log_sum.hpp"
+#include "estimation/touch_overlap.hpp"
 
 namespace palpate {
 

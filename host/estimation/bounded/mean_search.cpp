@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "estimation/bounded/log_sum.hpp"
 #include "estimation/bounded/mean_planes.hpp"
-#include "estimation/bounded/parallel_for.hpp"
+#include "estimation/log_sum.hpp"
+#include "estimation/parallel_for.hpp"
 
 namespace palpate {
 

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "estimation/bounded/displaced/overlap_shares.hpp"
-#include "estimation/bounded/known_elements.hpp"
 #include "estimation/bounded/search/search_space.hpp"
+#include "estimation/known_elements.hpp"
 #include "model/bounding_box.hpp"
 #include "palpate/bounded_posterior.hpp"
 #include "palpate/estimate.hpp"

@@ -8,10 +8,10 @@
 #include <span>
 #include <vector>
 
-#include "estimation/bounded/known_elements.hpp"
 #include "estimation/bounded/mean_search.hpp"
 #include "estimation/bounded/search/search_goal.hpp"
 #include "estimation/bounded/search/search_space.hpp"
+#include "estimation/known_elements.hpp"
 #include "palpate/estimate.hpp"
 
 namespace palpate {

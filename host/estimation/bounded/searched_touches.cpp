@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <tbb/info.h>
 
+#include "estimation/bounded/displaced/exact_bins.hpp"
 #include "estimation/hypotheses.hpp"
 #include "palpate/lattice.hpp"
 

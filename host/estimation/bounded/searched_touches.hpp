@@ -10,13 +10,13 @@
 #include <tbb/task_arena.h>
 
 #include "estimation/bounded/evaluated_bins.hpp"
-#include "estimation/bounded/known_elements.hpp"
 #include "estimation/bounded/leaves/bin_likelihood.hpp"
 #include "estimation/bounded/moving/moving_belief.hpp"
 #include "estimation/bounded/none_evidence.hpp"
 #include "estimation/bounded/search/bound_search.hpp"
 #include "estimation/bounded/search/search_space.hpp"
 #include "estimation/change_in_steps.hpp"
+#include "estimation/known_elements.hpp"
 #include "palpate/bounded_posterior.hpp"
 
 namespace palpate {

@@ -5,9 +5,9 @@
 #include <limits>
 #include <utility>
 
-#include "estimation/bounded/touch_overlap.hpp"
 #include "estimation/kernel_sizes.hpp"
 #include "estimation/lattice/refinement.hpp"
+#include "estimation/touch_overlap.hpp"
 #include "shaders/sum_overlap.hpp"
 
 namespace palpate {

@@ -1,6 +1,6 @@
 // How much memory a search by bounds takes, and lattices that no memory holds.
 
-#include "estimation/bounded/search/search_memory.hpp"
+#include "estimation/bounded/search_memory.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

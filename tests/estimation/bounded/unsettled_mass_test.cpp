@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "estimation/bounded/log_sum.hpp"
+#include "estimation/log_sum.hpp"
 #include "limits.hpp"
 #include "synthetic.hpp"
 

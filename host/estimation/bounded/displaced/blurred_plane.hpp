@@ -10,7 +10,7 @@
 
 #include "estimation/bounded/displaced/displacement_weights.hpp"
 #include "estimation/bounded/displaced/places.hpp"
-#include "estimation/bounded/log_sum.hpp"
+#include "estimation/log_sum.hpp"
 
 namespace palpate {
 

@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "estimation/bounded/displaced/blurred_plane.hpp"
-#include "estimation/bounded/log_sum.hpp"
-#include "estimation/bounded/parallel_for.hpp"
+#include "estimation/log_sum.hpp"
+#include "estimation/parallel_for.hpp"
 
 namespace palpate {
 

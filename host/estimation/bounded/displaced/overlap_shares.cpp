@@ -6,13 +6,13 @@
 #include <utility>
 
 #include "estimation/bounded/displaced/blurred_plane.hpp"
-#include "estimation/bounded/parallel_for.hpp"
+#include "estimation/parallel_for.hpp"
 
 namespace palpate {
 
 namespace {
 
-constexpr double unit = 0x1p-53;
+constexpr double double_unit = 0x1p-53;
 
 /// The largest of the factors of bins [first, end): they fall and then grow along the axis.
 double largest_scale(const AxisBlur& axis, int first, int end) {
@@ -88,7 +88,7 @@ class CarriedWeights {
     for (std::size_t y = 0; y < added_.size(); ++y) {
       most = std::max(most, static_cast<double>(steps_[y] + width_) * added_[y]);
     }
-    return 2.0 * unit * most;
+    return 2.0 * double_unit * most;
   }
 
  private:
@@ -309,7 +309,7 @@ double OverlapShares::relative_error() const {
   // As DisplacementMean::mean_error(): weights, and a unit for each term of the sums, here twice.
   constexpr double of_weights = 256.0;
   const double terms = 2.0 * (x_.steps + y_.steps) + 4.0 * (2.0 * weights_.theta_steps() + 1.0);
-  return (of_weights + 4.0 * terms) * unit;
+  return (of_weights + 4.0 * terms) * double_unit;
 }
 
 }  // namespace palpate

@@ -8,7 +8,7 @@
 
 #include "estimation/bin_box.hpp"
 #include "estimation/bounded/displaced/displacement_weights.hpp"
-#include "estimation/bounded/touch_overlap.hpp"
+#include "estimation/touch_overlap.hpp"
 #include "model/bounding_box.hpp"
 
 namespace palpate {

@@ -8,7 +8,7 @@
 
 #include <glm/vec2.hpp>
 
-#include "estimation/bounded/known_elements.hpp"
+#include "estimation/known_elements.hpp"
 #include "palpate/contact_model.hpp"
 #include "palpate/occupancy_grid.hpp"
 

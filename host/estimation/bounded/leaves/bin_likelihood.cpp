@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "estimation/bounded/parallel_for.hpp"
+#include "estimation/parallel_for.hpp"
 
 namespace palpate {
 

@@ -10,8 +10,8 @@
 
 #include "estimation/bin_box.hpp"
 #include "estimation/bounded/displaced/displacement_mean.hpp"
-#include "estimation/bounded/known_elements.hpp"
 #include "estimation/bounded/leaves/bin_kernel.hpp"
+#include "estimation/known_elements.hpp"
 #include "palpate/contact_model.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"

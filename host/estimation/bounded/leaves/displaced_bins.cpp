@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <tuple>
 
+#include "estimation/bounded/displaced/exact_bins.hpp"
 #include "estimation/bounded/leaves/bin_likelihood.hpp"
 
 // Bins of touches of uncertain pose: the logs of each touch's mean likelihood, added up.

@@ -6,9 +6,9 @@
 #include <numbers>
 #include <utility>
 
-#include "estimation/bounded/log_sum.hpp"
 #include "estimation/contact_evidence.hpp"
 #include "estimation/lattice/refinement.hpp"
+#include "estimation/log_sum.hpp"
 
 namespace palpate {
 

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <limits>
 
-#include "estimation/bounded/log_sum.hpp"
-#include "estimation/bounded/parallel_for.hpp"
+#include "estimation/log_sum.hpp"
+#include "estimation/parallel_for.hpp"
 
 namespace palpate {
 

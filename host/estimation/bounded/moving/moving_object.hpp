@@ -7,10 +7,10 @@
 #include <glm/vec2.hpp>
 
 #include "estimation/bin_box.hpp"
-#include "estimation/bounded/known_elements.hpp"
 #include "estimation/bounded/leaves/bin_likelihood.hpp"
 #include "estimation/bounded/moving/slip_mean.hpp"
 #include "estimation/bounded/search/search_space.hpp"
+#include "estimation/known_elements.hpp"
 
 namespace palpate {
 

@@ -2,10 +2,10 @@
 #include <cmath>
 #include <limits>
 
-#include "estimation/bounded/displaced/displaced_tiles.hpp"
-#include "estimation/bounded/log_sum.hpp"
 #include "estimation/bounded/moving/moving_object.hpp"
-#include "estimation/bounded/parallel_for.hpp"
+#include "estimation/bounded/search/displaced_tiles.hpp"
+#include "estimation/log_sum.hpp"
+#include "estimation/parallel_for.hpp"
 
 // The tiles of an object that slips: their upper bounds, and which of them are followed.
 

@@ -4,7 +4,7 @@
 
 #include "estimation/bounded/displaced/blurred_plane.hpp"
 #include "estimation/bounded/moving/slip_mean.hpp"
-#include "estimation/bounded/parallel_for.hpp"
+#include "estimation/parallel_for.hpp"
 
 // Upper bounds of the means of a belief that slips, over tiles.
 

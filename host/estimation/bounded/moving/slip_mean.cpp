@@ -9,8 +9,8 @@
 #include <glm/geometric.hpp>
 
 #include "estimation/bounded/displaced/blurred_plane.hpp"
-#include "estimation/bounded/log_sum.hpp"
-#include "estimation/bounded/parallel_for.hpp"
+#include "estimation/log_sum.hpp"
+#include "estimation/parallel_for.hpp"
 
 namespace palpate {
 

@@ -2,12 +2,12 @@
 
 #include <vector>
 
-#include "estimation/bounded/known_elements.hpp"
 #include "estimation/bounded/leaves/bin_likelihood.hpp"
 #include "estimation/bounded/search/largest_tiles.hpp"
 #include "estimation/bounded/search/rejection_draws.hpp"
 #include "estimation/bounded/search/search_goal.hpp"
 #include "estimation/bounded/search/search_space.hpp"
+#include "estimation/known_elements.hpp"
 #include "palpate/bounded_posterior.hpp"
 
 namespace palpate {

@@ -5,8 +5,8 @@
 #include <functional>
 #include <utility>
 
-#include "estimation/bounded/displaced/displaced_tiles.hpp"
-#include "estimation/bounded/parallel_for.hpp"
+#include "estimation/bounded/search/displaced_tiles.hpp"
+#include "estimation/parallel_for.hpp"
 
 namespace palpate {
 

@@ -6,9 +6,9 @@
 
 #include <glm/vec2.hpp>
 
-#include "estimation/bounded/known_elements.hpp"
 #include "estimation/bounded/search/search_space.hpp"
 #include "estimation/bounded/tables/tile_bounds.hpp"
+#include "estimation/known_elements.hpp"
 #include "model/bounding_box.hpp"
 #include "palpate/occupancy_grid.hpp"
 

@@ -8,8 +8,8 @@
 #include <optional>
 #include <tuple>
 
-#include "estimation/bounded/parallel_for.hpp"
 #include "estimation/bounded/search/tile_division.hpp"
+#include "estimation/parallel_for.hpp"
 
 namespace palpate {
 

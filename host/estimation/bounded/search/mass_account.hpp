@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "estimation/bin_box.hpp"
-#include "estimation/bounded/log_sum.hpp"
 #include "estimation/bounded/search/search_goal.hpp"
+#include "estimation/log_sum.hpp"
 #include "palpate/lattice.hpp"
 
 namespace palpate {

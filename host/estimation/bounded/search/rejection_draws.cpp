@@ -6,8 +6,8 @@
 #include <span>
 
 #include "estimation/bounded/leaves/bin_likelihood.hpp"
-#include "estimation/bounded/log_sum.hpp"
 #include "estimation/bounded/search/tile_division.hpp"
+#include "estimation/log_sum.hpp"
 #include "estimation/pose_draws.hpp"
 
 namespace palpate {

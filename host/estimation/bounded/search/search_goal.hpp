@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "estimation/bin_box.hpp"
-#include "estimation/bounded/log_sum.hpp"
+#include "estimation/log_sum.hpp"
 #include "palpate/estimate.hpp"
 
 namespace palpate {

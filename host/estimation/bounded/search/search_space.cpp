@@ -7,8 +7,8 @@
 #include <optional>
 #include <string>
 
-#include "estimation/bounded/parallel_for.hpp"
 #include "estimation/hypotheses.hpp"
+#include "estimation/parallel_for.hpp"
 
 namespace palpate {
 

@@ -10,9 +10,9 @@
 
 #include "estimation/bounded/displaced/displacement_mean.hpp"
 #include "estimation/bounded/displaced/displacement_weights.hpp"
-#include "estimation/bounded/known_elements.hpp"
 #include "estimation/bounded/search/search_goal.hpp"
 #include "estimation/bounded/tables/tile_bounds.hpp"
+#include "estimation/known_elements.hpp"
 #include "model/bounding_box.hpp"
 #include "palpate/bounded_posterior.hpp"
 #include "palpate/estimate.hpp"

@@ -5,10 +5,10 @@
 #include <span>
 #include <vector>
 
-#include "estimation/bounded/known_elements.hpp"
 #include "estimation/bounded/search/largest_tiles.hpp"
 #include "estimation/bounded/search/mass_account.hpp"
 #include "estimation/bounded/search/search_space.hpp"
+#include "estimation/known_elements.hpp"
 #include "model/bounding_box.hpp"
 
 namespace palpate {

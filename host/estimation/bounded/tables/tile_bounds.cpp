@@ -5,7 +5,7 @@
 #include <cmath>
 #include <optional>
 
-#include "estimation/bounded/parallel_for.hpp"
+#include "estimation/parallel_for.hpp"
 
 namespace palpate {
 

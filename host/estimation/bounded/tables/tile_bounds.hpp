@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "estimation/bin_box.hpp"
-#include "estimation/bounded/known_elements.hpp"
 #include "estimation/bounded/tables/tile_penalties.hpp"
 #include "estimation/bounded/tables/window_table.hpp"
+#include "estimation/known_elements.hpp"
 #include "palpate/contact_model.hpp"
 #include "palpate/displacement.hpp"
 #include "palpate/lattice.hpp"

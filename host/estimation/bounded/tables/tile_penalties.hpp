@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "estimation/bounded/known_elements.hpp"
 #include "estimation/bounded/tables/window_table.hpp"
+#include "estimation/known_elements.hpp"
 #include "palpate/pose.hpp"
 
 namespace palpate {

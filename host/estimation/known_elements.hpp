@@ -8,11 +8,12 @@
 
 #include <glm/vec2.hpp>
 
-#include "estimation/bounded/displaced/exact_bins.hpp"
-#include "estimation/bounded/touch_overlap.hpp"
+#include "estimation/touch_overlap.hpp"
 #include "palpate/contact_model.hpp"
 
 namespace palpate {
+
+class ExactBins;
 
 /// Elements of one reading: [begin, end) of a list.
 struct ReadingRun {

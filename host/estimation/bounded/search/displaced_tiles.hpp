@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "estimation/bounded/displaced/displacement_mean.hpp"
-#include "estimation/bounded/known_elements.hpp"
 #include "estimation/bounded/search/search_space.hpp"
+#include "estimation/known_elements.hpp"
 
 namespace palpate {
 

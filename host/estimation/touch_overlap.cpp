@@ -1,4 +1,4 @@
-#include "estimation/bounded/touch_overlap.hpp"
+#include "estimation/touch_overlap.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "estimation/bounded/search/search_memory.hpp"
+#include "estimation/bounded/search_memory.hpp"
 
 #include <unistd.h>
 

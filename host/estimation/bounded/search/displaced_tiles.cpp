@@ -1,4 +1,4 @@
-#include "estimation/bounded/displaced/displaced_tiles.hpp"
+#include "estimation/bounded/search/displaced_tiles.hpp"
 
 #include <algorithm>
 #include <cmath>

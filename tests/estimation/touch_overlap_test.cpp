@@ -1,6 +1,6 @@
 // The bins at which an array overlaps an object, counted by rows, against the reference bin by bin.
 
-#include "estimation/bounded/touch_overlap.hpp"
+#include "estimation/touch_overlap.hpp"
 
 #include <numbers>
 #include <vector>

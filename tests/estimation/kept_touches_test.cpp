@@ -1,11 +1,11 @@
-#include "estimation/bounded/known_elements.hpp"
+#include "estimation/known_elements.hpp"
 
 #include <limits>
 #include <vector>
 
 #include <gtest/gtest.h>
 
-#include "bins_by_definition.hpp"
+#include "bounded/bins_by_definition.hpp"
 #include "palpate/error.hpp"
 #include "synthetic.hpp"
 

@@ -1,4 +1,4 @@
-#include "estimation/bounded/known_elements.hpp"
+#include "estimation/known_elements.hpp"
 
 #include <algorithm>
 #include <numeric>
