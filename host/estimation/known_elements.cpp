@@ -7,6 +7,7 @@
 
 #include "estimation/contact_evidence.hpp"
 #include "model/contact_readings.hpp"
+#include "palpate/occupancy_grid.hpp"
 
 namespace palpate {
 
@@ -109,6 +110,19 @@ double prior_log_likelihood(const KnownElements& elements, const ContactModel& c
     sum += static_cast<double>(run.end - run.begin) * prior_log_likelihood(run.reading, contact);
   }
   return sum;
+}
+
+std::vector<double> prior_log_likelihoods(const KnownElements& elements,
+                                          const ContactModel& contact, std::size_t objects) {
+  const MapSample prior{log_odds_from_probability(*contact.prior)};
+  std::vector<double> sums(objects);
+  for (std::size_t i = 0; i < objects; ++i) {
+    for (const ReadingRun& run : elements.runs) {
+      sums[i] +=
+          static_cast<double>(run.end - run.begin) * contact.log_likelihood(run.reading, prior, i);
+    }
+  }
+  return sums;
 }
 
 void KeptTouches::add(std::span<const Touch> touches, const ContactModel& model,

@@ -61,6 +61,10 @@ KnownElements merged(std::span<const KnownElements> lists);
 
 /// The log-likelihood of the elements where nothing was sensed, in nats.
 double prior_log_likelihood(const KnownElements& elements, const ContactModel& contact);
+/// The log-likelihood of the elements where nothing was sensed by the numbers of each of so many
+/// objects, in nats, [object].
+std::vector<double> prior_log_likelihoods(const KnownElements& elements,
+                                          const ContactModel& contact, std::size_t objects);
 
 /// Touches in the order in which they came. The first one makes room for some more of its size, so
 /// that keeping these allocates no memory.

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <utility>
 
-#include "estimation/bounded/mean_planes.hpp"
+#include "estimation/bounded/search/largest_tiles.hpp"
 #include "estimation/log_sum.hpp"
 #include "estimation/parallel_for.hpp"
 
@@ -17,19 +19,12 @@ MeanSearch::MeanSearch(const SearchSpace& space, const BoundedOptions& options,
       elements_(known_elements(touch)),
       rectangle_(touch.rectangle),
       sensor_from_pivot_mm_(touch.sensor_from_pivot_mm),
-      reaches_(reaches_of(elements_, space.turns)) {
-  const MapSample prior{log_odds_from_probability(*options.contact.prior)};
+      reaches_(reaches_of(elements_, space.turns)),
+      unpenalised_(unpenalised(space, elements_)),
+      prior_log_likelihood_(
+          prior_log_likelihoods(elements_, options.contact, space.bounds.size())) {
   for (std::size_t i = 0; i < space.bounds.size(); ++i) {
-    std::vector<double>& of_level = most_.emplace_back();
-    for (std::size_t level = 0; level < space.bounds[i].levels().size(); ++level) {
-      of_level.push_back(space.log_weight[i] + space.bounds[i].best(level, elements_));
-    }
-    double& sum = prior_log_likelihood_.emplace_back();
-    for (const ReadingRun& run : elements_.runs) {
-      sum += static_cast<double>(run.end - run.begin) *
-             options.contact.log_likelihood(run.reading, prior, i);
-    }
-    sum += space.log_weight[i];
+    prior_log_likelihood_[i] += space.log_weight[i];
     errors_.push_back({likelihood.exact_error(i, elements_, Arithmetic::float32),
                        likelihood.exact_error(i, elements_, Arithmetic::float64)});
   }
@@ -55,15 +50,13 @@ bool MeanSearch::for_planes(const Deadline& deadline, const Work& work) const {
   return true;
 }
 
-bool MeanSearch::survey(const Deadline& deadline) {
+bool MeanSearch::survey(const Deadline& deadline, bool everywhere) {
   const std::size_t thetas = space_.turns.size();
-  if (sensor_from_pivot_mm_) {
-    shares_.emplace(*space_.displacement, rectangle_, *sensor_from_pivot_mm_, space_.boxes,
-                    everywhere_);
-  }
-  std::vector<Survey> surveys(space_.bounds.size() * thetas);
+  counted_.emplace(space_, options_.lattice, rectangle_, sensor_from_pivot_mm_, everywhere);
+  const MeanTask task = this->task();
+  std::vector<PlaneSurvey> surveys(space_.bounds.size() * thetas);
   if (!for_planes(deadline, [&](std::size_t object, std::size_t first, std::size_t end) {
-        Planes planes(*this, object);
+        PlaneDivision planes(task, object);
         for (std::size_t theta = first; theta < end; ++theta) {
           surveys[object * thetas + theta] = planes.survey(static_cast<int>(theta));
         }
@@ -76,10 +69,9 @@ bool MeanSearch::survey(const Deadline& deadline) {
     bins += surveys[i].bins;
     weighted += std::exp(space_.log_weight[i / thetas]) * static_cast<double>(surveys[i].bins);
   }
-  if (bins == 0 && !everywhere_) {
+  if (bins == 0 && !everywhere) {
     // Where no pose of the region brings the array to an object, all poses are alike.
-    everywhere_ = true;
-    return survey(deadline);
+    return survey(deadline, true);
   }
   surveys_ = std::move(surveys);
   log_bins_ = std::log(static_cast<double>(bins));
@@ -94,11 +86,12 @@ std::optional<LogInterval> MeanSearch::bounds(double least, bool exact, const De
   }
   // The mean is of so many bins, each with its object's weight.
   const double least_of_bin = least + log_weighted_bins_ - log_bins_;
+  const MeanTask task = this->task();
   const std::size_t thetas = space_.turns.size();
   std::vector<double> left_out(surveys_.size());
   std::vector<LogInterval> evaluated(surveys_.size(), {nothing, nothing});
   if (!for_planes(deadline, [&](std::size_t object, std::size_t first, std::size_t end) {
-        Planes planes(*this, object);
+        PlaneDivision planes(task, object);
         for (std::size_t theta = first; theta < end; ++theta) {
           const std::size_t i = object * thetas + theta;
           left_out[i] = surveys_[i].best < least_of_bin
@@ -118,13 +111,12 @@ std::optional<LogInterval> MeanSearch::bounds(double least, bool exact, const De
     low.add(evaluated[i].low - error);
     high.add(evaluated[i].high + error);
     high.add(left_out[i]);
-    const Survey& survey = surveys_[i];
-    if (survey.unseen + survey.unseen_error > 0.0) {
+    const CountedBins::ShareSum& unseen = surveys_[i].unseen;
+    if (unseen.shares + unseen.error > 0.0) {
       // Where every element sees the prior, all bins have the same likelihood.
       const double each = prior_log_likelihood_[object];
-      low.add(each + std::log(std::max(survey.unseen - survey.unseen_error, 0.0)) -
-              errors_[object][1]);
-      high.add(each + std::log(survey.unseen + survey.unseen_error) + errors_[object][1]);
+      low.add(each + std::log(std::max(unseen.shares - unseen.error, 0.0)) - errors_[object][1]);
+      high.add(each + std::log(unseen.shares + unseen.error) + errors_[object][1]);
     }
   }
   const double log_low = low.log() - log_weighted_bins_;

@@ -2,12 +2,15 @@
 
 #include <array>
 #include <cstddef>
-#include <cstdint>
-#include <limits>
 #include <optional>
 #include <vector>
 
-#include "estimation/bounded/displaced/overlap_shares.hpp"
+#include <glm/vec2.hpp>
+
+#include "estimation/bounded/counted_bins.hpp"
+#include "estimation/bounded/leaves/bin_likelihood.hpp"
+#include "estimation/bounded/plane_division.hpp"
+#include "estimation/bounded/search/search_goal.hpp"
 #include "estimation/bounded/search/search_space.hpp"
 #include "estimation/known_elements.hpp"
 #include "model/bounding_box.hpp"
@@ -17,7 +20,7 @@
 namespace palpate {
 
 /// Bounds one touch's mean likelihood over the bins at which its array overlaps an object, or over
-/// all bins where there is no such bin, by prior weight. Where the touch's pose is uncertain, the
+/// all bins where there is no such bin, by prior weight. Where the touch is displaced, the
 /// likelihood is an average, and exact likelihoods count in the mean by their OverlapShares.
 ///
 /// A mean is wide: thousands of bins hold it, and no order of tiles is worth keeping. So every
@@ -43,42 +46,35 @@ class MeanSearch {
   double log_share() const { return log_share_; }
 
  private:
-  /// What the largest tiles of a plane, one object at one theta, tell.
-  struct Survey {
-    std::int64_t bins = 0;  ///< that count
-    /// How many of these, or the sum of the shares of bins, at which every element sees the prior.
-    double unseen = 0.0;
-    double unseen_error = 0.0;  ///< of this number
-    double best = nothing;      ///< the largest bound, in nats, with the prior weight
-    double left_out = nothing;  ///< log of what the tiles that see the map hold at most, the same
-  };
-  class Planes;
+  static constexpr double nothing = PlaneSurvey::nothing;
 
-  static constexpr double nothing = -std::numeric_limits<double>::infinity();
-
+  /// What planes are given. To be asked for once it is known which bins count.
+  MeanTask task() const {
+    return {space_, likelihood_, elements_, reaches_, unpenalised_, *counted_};
+  }
   /// Calls work(object, first theta, end) for all planes, in parallel, a few of them together.
   /// @returns false where the deadline passed
   template <typename Work>
   bool for_planes(const Deadline& deadline, const Work& work) const;
-  /// Looks at the largest tiles of all planes. @returns false where the deadline passed
-  bool survey(const Deadline& deadline);
+  /// Finds the bins that count, and looks at the largest tiles of all planes.
+  /// @returns false where the deadline passed
+  bool survey(const Deadline& deadline, bool everywhere = false);
 
   const SearchSpace& space_;
   const BoundedOptions& options_;
   const BinLikelihood& likelihood_;
   KnownElements elements_;
   ArrayRectangle rectangle_;
-  std::optional<glm::dvec2> sensor_from_pivot_mm_;  ///< where the touch's pose is uncertain
-  std::optional<OverlapShares> shares_;             ///< the same, from the first bounds() on
+  std::optional<glm::dvec2> sensor_from_pivot_mm_;  ///< where the touch is displaced
   std::vector<BoundingBox> reaches_;                ///< [theta] of the elements
-  std::vector<std::vector<double>> most_;  ///< [object][level] without penalties, with the weight
-  std::vector<double> prior_log_likelihood_;  ///< [object] with the weight
-  std::vector<std::array<double, 2>>
-      errors_;                      ///< [object] of a bin in float32 and float64, in nats
-  std::vector<Survey> surveys_;     ///< [object, theta]; empty before the first bounds()
-  bool everywhere_ = false;         ///< all bins count
-  double log_bins_ = 0.0;           ///< that count
-  double log_weighted_bins_ = 0.0;  ///< the same by prior weight
+  std::vector<std::vector<double>> unpenalised_;    ///< [object][level]
+  std::vector<double> prior_log_likelihood_;        ///< [object] with the weight
+  /// [object] of a bin in float32 and float64, in nats
+  std::vector<std::array<double, 2>> errors_;
+  std::optional<CountedBins> counted_;  ///< empty before the first bounds()
+  std::vector<PlaneSurvey> surveys_;    ///< [object, theta]; empty before the first bounds()
+  double log_bins_ = 0.0;               ///< of the number of bins that count
+  double log_weighted_bins_ = 0.0;      ///< of the sum of their prior weights
   double log_share_ = 0.0;
 };
 

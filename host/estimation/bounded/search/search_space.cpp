@@ -53,4 +53,16 @@ std::uint64_t SearchSpace::bytes() const {
   return bytes;
 }
 
+std::vector<std::vector<double>> unpenalised(const SearchSpace& space,
+                                             const KnownElements& elements) {
+  std::vector<std::vector<double>> logs;
+  for (std::size_t i = 0; i < space.bounds.size(); ++i) {
+    std::vector<double>& of_level = logs.emplace_back();
+    for (std::size_t level = 0; level < space.bounds[i].levels().size(); ++level) {
+      of_level.push_back(space.log_weight[i] + space.bounds[i].best(level, elements));
+    }
+  }
+  return logs;
+}
+
 }  // namespace palpate

@@ -42,6 +42,11 @@ struct SearchSpace {
   std::vector<DisplacementMean> displaced;                  ///< [level] of tiles' bounds
 };
 
+/// Log-likelihood of elements without any penalty over the tiles of every level, in nats with the
+/// prior weight, [hypothesis][level].
+std::vector<std::vector<double>> unpenalised(const SearchSpace& space,
+                                             const KnownElements& elements);
+
 class BinLikelihood;
 
 /// What all parts of one search are given; it outlives them.

@@ -61,25 +61,15 @@ TileDivision::TileDivision(const SearchTask& task, const LargestTiles& largest)
       thetas_(space_.turns.size()),
       reaches_(space_.displacement ? displaced_reaches(space_, task.elements.touches)
                                    : reaches_of(task.elements, space_.turns)),
-      seen_(space_.bounds.size() * thetas_) {
+      seen_(space_.bounds.size() * thetas_),
+      unpenalised_(unpenalised(space_, task.elements)),
+      prior_log_likelihoods_(
+          prior_log_likelihoods(task.elements, task.options.contact, space_.bounds.size())) {
   parallel_for(seen_.size(), [&](std::size_t row) {
     const std::size_t object = row / thetas_;
     seen_[row] = seen_tiles(reaches_[row % thetas_], space_.maps[object],
                             space_.bounds[object].levels().front());
   });
-  const ContactModel& contact = task.options.contact;
-  const MapSample prior{log_odds_from_probability(*contact.prior)};
-  for (std::size_t i = 0; i < space_.bounds.size(); ++i) {
-    std::vector<double>& of_level = unpenalised_.emplace_back();
-    for (std::size_t level = 0; level < space_.bounds[i].levels().size(); ++level) {
-      of_level.push_back(space_.log_weight[i] + space_.bounds[i].best(level, task.elements));
-    }
-    double& sum = prior_log_likelihoods_.emplace_back();
-    for (const ReadingRun& run : task.elements.runs) {
-      sum +=
-          static_cast<double>(run.end - run.begin) * contact.log_likelihood(run.reading, prior, i);
-    }
-  }
 }
 
 template <typename Visit>

@@ -1,0 +1,105 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "estimation/bounded/counted_bins.hpp"
+#include "estimation/bounded/displaced/overlap_shares.hpp"
+#include "estimation/bounded/leaves/bin_likelihood.hpp"
+#include "estimation/bounded/search/search_space.hpp"
+#include "estimation/bounded/tables/tile_bounds.hpp"
+#include "estimation/known_elements.hpp"
+#include "model/bounding_box.hpp"
+#include "palpate/estimate.hpp"
+
+namespace palpate {
+
+/// What the search for the mean of a touch's likelihood is given; it outlives the search's parts.
+struct MeanTask {
+  const SearchSpace& space;
+  const BinLikelihood& likelihood;
+  const KnownElements& elements;
+  std::span<const BoundingBox> reaches;                 ///< [theta] of the elements
+  const std::vector<std::vector<double>>& unpenalised;  ///< [object][level]; see unpenalised()
+  const CountedBins& counted;
+};
+
+/// What the largest tiles of a plane, one object at one theta, tell.
+struct PlaneSurvey {
+  static constexpr double nothing = -std::numeric_limits<double>::infinity();
+
+  std::int64_t bins = 0;         ///< that count
+  CountedBins::ShareSum unseen;  ///< of the bins at which every element sees the prior
+  double best = nothing;         ///< the largest bound, in nats, with the prior weight
+  double left_out = nothing;     ///< log of what the tiles that see the map hold at most, with it
+};
+
+/// Divides the tiles of neighbouring planes of one object, one plane after another, and evaluates
+/// the bins of the smallest tiles of all of them together. A plane is divided depth first, in whole
+/// penalties: no list of its tiles is kept, as TileDivision keeps one to choose the best from.
+class PlaneDivision {
+ public:
+  PlaneDivision(const MeanTask& task, std::size_t object);
+
+  /// Looks at the largest tiles of a plane.
+  PlaneSurvey survey(int theta);
+  /// Divides a plane's tiles down to bins, which are evaluated later, but for those whose bounds,
+  /// with the prior weight, are below `least`.
+  /// @returns log of what these hold at most
+  double divide(int theta, double least);
+  /// Bounds of the log of the summed likelihood of the bins that count in what was divided, with
+  /// the prior weight, beside the likelihood's own error.
+  LogInterval evaluated(Arithmetic arithmetic);
+
+ private:
+  class PenaltySum;
+  /// A plane, and the largest tiles of it that are looked at.
+  struct Plane {
+    CountedPlane counted;
+    /// Whole batches, about those that see the map and hold bins that count.
+    TileRange largest;
+    bool all_seen = false;  ///< the largest tiles hold all bins that count
+  };
+  /// A plane that is being divided.
+  struct Division {
+    const Plane& plane;
+    std::vector<std::int64_t> last_divided;  ///< [level] the largest sum of a tile that is divided
+    std::vector<PenaltySum> left_out;        ///< [level]
+  };
+  /// A level's elements at the theta at which they were placed last.
+  struct Placed {
+    int theta = -1;
+    WindowPlaces places;
+  };
+
+  Plane plane(int theta) const;
+  BinBox box_of(std::size_t level, const Plane& plane, const TileRange& tiles) const {
+    return levels_[level].box_of(static_cast<std::int32_t>(object_), plane.counted.theta, tiles);
+  }
+  /// The log of what a bin counts at most where no element has a penalty.
+  double most(std::size_t level, const Plane& plane) const {
+    return task_.unpenalised[object_][level] + plane.counted.log_most_share;
+  }
+  const WindowPlaces& places(std::size_t level, int theta);
+  /// The sums of the penalties of a plane's largest tiles, [batch, tile].
+  std::vector<std::uint32_t> largest_sums(const Plane& plane);
+  /// Leaves out the tiles of a batch whose bounds are low, and divides the others.
+  /// @param x, y its first tile
+  void divide_batch(Division& division, std::size_t level, int x, int y, const std::uint32_t* sums);
+  /// Leaves out the smallest tiles of a batch whose bounds are low. The others are to be evaluated,
+  /// with those between them.
+  void take_smallest(Division& division, int x, int y, const std::uint32_t* sums);
+
+  const MeanTask& task_;
+  std::size_t object_;
+  const TileBounds& bounds_;
+  std::span<const TileLevel> levels_;
+  std::vector<Placed> placed_;  ///< [level]
+  CountedBoxes boxes_;          ///< to be evaluated
+  OverlapShares::Planes shares_looked_at_;
+};
+
+}  // namespace palpate
