@@ -5,10 +5,11 @@
 #include <limits>
 #include <utility>
 
-#include "estimation/bounded/belief_draws.hpp"
+#include "estimation/bin_box.hpp"
 #include "estimation/pose_draws.hpp"
 #include "model/random.hpp"
 #include "palpate/estimate.hpp"
+#include "palpate/lattice.hpp"
 
 namespace palpate {
 
@@ -33,6 +34,56 @@ constexpr double negligible = 1e-4;
 /// Bounds of the hypotheses' log evidence this far apart tell too little of them, in nats.
 constexpr double untold_nats = 1.0;
 constexpr double unlimited = std::numeric_limits<double>::infinity();
+
+/// Draws bins from a belief whose bins come box by box, one in each of equal parts of the belief.
+class BeliefDraws {
+ public:
+  /// @param targets ascending, as parts of the belief
+  /// @param lattice,log_weight outlive this object; log_weight is [hypothesis], the log of its
+  /// prior weight
+  /// @param log_total log of the summed likelihood of all bins to come, with prior weights
+  BeliefDraws(std::vector<double> targets, const PoseLattice& lattice,
+              std::span<const double> log_weight, double log_total)
+      : lattice_(lattice),
+        log_weight_(log_weight),
+        log_total_(log_total),
+        targets_(std::move(targets)) {
+    draws_.reserve(targets_.size());
+  }
+
+  /// See BinVisitor.
+  void add(const BinBox& box, std::span<const double> log_likelihood) {
+    const bool alike = log_likelihood.size() == 1;
+    for (std::size_t i = 0; i < log_likelihood.size(); ++i) {
+      const std::int64_t bins = alike ? box.bins() : 1;
+      const double p = std::exp(log_weight_[box.object] - log_total_ + log_likelihood[i]);
+      const double after = reached_ + p * static_cast<double>(bins);
+      last_ = {box.object, box.bin(static_cast<std::int64_t>(i) + bins - 1, lattice_)};
+      while (draws_.size() < targets_.size() && targets_[draws_.size()] < after) {
+        const auto within = static_cast<std::int64_t>((targets_[draws_.size()] - reached_) / p);
+        const std::int64_t bin = static_cast<std::int64_t>(i) + std::min(within, bins - 1);
+        draws_.push_back({box.object, box.bin(bin, lattice_)});
+      }
+      reached_ = after;
+    }
+  }
+
+  /// The draws, in the order of objects and bins.
+  std::vector<DrawnBin> take() {
+    draws_.resize(targets_.size(), last_);  // rounding may leave the last draw out
+    std::ranges::sort(draws_, {}, &DrawnBin::place);
+    return std::move(draws_);
+  }
+
+ private:
+  const PoseLattice& lattice_;
+  std::span<const double> log_weight_;
+  double log_total_;
+  std::vector<double> targets_;  ///< ascending, as parts of the belief
+  std::vector<DrawnBin> draws_;
+  double reached_ = 0.0;  ///< part of the belief that has come
+  DrawnBin last_;         ///< the last bin that has come
+};
 
 }  // namespace
 
@@ -169,21 +220,35 @@ bool BoundedBelief::follow() {
   return followed_.has_value();
 }
 
-std::vector<DrawnBin> BoundedBelief::draw(std::size_t count, Random& random) {
-  const bool followed = !found_ && follow();
-  if (touches_.moving() && !found_) {
+BoundedBelief::DrawnFrom BoundedBelief::drawable_bins() {
+  if (found_ && (touches_.moving() || found_->bins.complete())) {
+    return DrawnFrom::found;
+  }
+  if (touches_.moving()) {
     Deadline never = until({});
     found_ = search(rough_goal(), never);
-  } else if (!touches_.moving() && !followed && !(found_ && found_->bins.complete())) {
-    Deadline deadline = until(options().budget_s);
-    // Rejection looks at tiles here and there, which share little of what uncertain touches reach.
-    const bool many_bins = bins_in_all() > most_searched_bins && options().touch_sd.none();
-    // Where a search had no room for its bins, another one would take as long.
-    if (found_ || touches_.taken_in() <= wide_touches || many_bins) {
-      return touches_.draw(count, random, deadline);
-    }
-    found_ = search(rough_goal(), deadline);
+    return DrawnFrom::found;
   }
+  if (!found_ && follow()) {
+    return DrawnFrom::followed;
+  }
+  // Rejection looks at tiles here and there, which share little of what displaced touches reach.
+  const bool many_bins = bins_in_all() > most_searched_bins && options().touch_sd.none();
+  // Where a search had no room for its bins, another one would take as long.
+  if (found_ || touches_.taken_in() <= wide_touches || many_bins) {
+    return DrawnFrom::tiles;
+  }
+  Deadline deadline = until(options().budget_s);
+  found_ = search(rough_goal(), deadline);
+  return DrawnFrom::found;
+}
+
+std::vector<DrawnBin> BoundedBelief::draw(std::size_t count, Random& random) {
+  const DrawnFrom from = drawable_bins();
+  if (from == DrawnFrom::tiles) {
+    return touches_.draw(count, random, until(options().budget_s));
+  }
+  const bool followed = from == DrawnFrom::followed;
   BeliefDraws draws(one_in_each_part(count, random), options().lattice, touches_.log_weight(),
                     followed ? followed_->log_total() : log_total());
   const auto add = [&](const BinBox& box, std::span<const double> log_likelihood) {

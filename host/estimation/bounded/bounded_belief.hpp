@@ -94,7 +94,14 @@ class BoundedBelief {
   /// Whether the bounds of "none of these" are as close as the options ask for.
   bool tells_enough(const LogInterval& none) const;
 
-  /// Draws bins: those of a search where it kept them or is quick.
+  /// What draws are made from.
+  enum class DrawnFrom {
+    found,     ///< the bins of the last search
+    followed,  ///< those of an earlier one, followed through the touches since
+    tiles,     ///< tiles, by rejection, without a search
+  };
+  /// Makes sure of the bins to draw from, by a search where that is quick.
+  DrawnFrom drawable_bins();
   std::vector<DrawnBin> draw(std::size_t count, Random& random);
   /// Follows the bins of an earlier search through the touches since.
   /// @returns whether they hold enough to draw from; forgets them otherwise
