@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cmath>
-#include <thread>
+#include <cstddef>
+
+#include <tbb/parallel_for.h>
 
 namespace palpate {
 
@@ -74,7 +75,8 @@ class Search {
 
   Slope move(int sweeps) {
     std::vector<SdScore> scores(unknowns_.size());
-    each_unknown([&](std::size_t i) { scores[i] = unknowns_[i].move(sd_, sweeps); });
+    tbb::parallel_for(std::size_t{0}, unknowns_.size(),
+                      [&](std::size_t i) { scores[i] = unknowns_[i].move(sd_, sweeps); });
     Slope slope;
     for (const SdScore& score : scores) {
       slope.add(score);
@@ -116,26 +118,11 @@ class Search {
       unknown.count(counts);
     }
     readings_.learn(counts);
-    each_unknown([&](std::size_t i) { unknowns_[i].refresh(); });
+    tbb::parallel_for(std::size_t{0}, unknowns_.size(),
+                      [&](std::size_t i) { unknowns_[i].refresh(); });
   }
 
  private:
-  /// Calls work(i) for every unknown, on all cores.
-  template <typename Work>
-  void each_unknown(const Work& work) {
-    std::atomic<std::size_t> next{0};
-    const auto run = [&] {
-      for (std::size_t i = next++; i < unknowns_.size(); i = next++) {
-        work(i);
-      }
-    };
-    std::vector<std::jthread> others;
-    for (unsigned thread = 1; thread < std::thread::hardware_concurrency(); ++thread) {
-      others.emplace_back(run);
-    }
-    run();
-  }
-
   std::vector<DisplacementPopulation>& unknowns_;
   ReadingModel& readings_;
   SearchRange range_;
@@ -249,14 +236,14 @@ LargestEvidence find_largest_evidence(std::vector<DisplacementPopulation>& unkno
   }
   const std::array<double, 2> relative = standard_errors(mean);
   constexpr double at_the_end = 1.1;
-  const auto settle = [&](double log_sd, double lowest, double error, double& sd,
+  const auto set_sd = [&](double log_sd, double lowest, double error, double& sd,
                           double& standard_error) {
     const bool exact = std::exp(log_sd) < at_the_end * lowest;
     sd = exact ? 0.0 : std::exp(log_sd);
     standard_error = sd * error;
   };
-  settle(mean_log[0], least.mm, relative[0], result.sd.mm, result.standard_error.mm);
-  settle(mean_log[1], least.rad, relative[1], result.sd.rad, result.standard_error.rad);
+  set_sd(mean_log[0], least.mm, relative[0], result.sd.mm, result.standard_error.mm);
+  set_sd(mean_log[1], least.rad, relative[1], result.sd.rad, result.standard_error.rad);
 
   while (search.sd().mm > least.mm || search.sd().rad > least.rad) {
     result.gain -= search.follow({-search.longest_step(), -search.longest_step()});
