@@ -15,8 +15,9 @@ namespace palpate {
 /// Number of elements of every reading.
 using ReadingCounts = std::array<std::uint64_t, most_reading_levels + 1>;
 
-/// Elements of some touches, in the robot frame and relative to the lattice's pivot, ordered so
-/// that equal readings of a touch stand together.
+/// Elements of some touches for a device, in the robot frame and relative to the lattice's pivot,
+/// ordered so that equal readings of a touch stand together. Searches by bounds have the same
+/// elements as KnownElements, ordered over all touches.
 struct ContactEvidence {
   std::vector<glm::dvec2> from_pivot_mm;
   std::vector<shaders::Segment> segments;

@@ -142,7 +142,7 @@ void KeptTouches::add(std::span<const Touch> touches, const ContactModel& model,
         kept.from_pivot_mm.push_back(touch.T_robot_sensor * element_mm - pivot_mm);
       }
       kept.rectangle = array_rectangle(touch, pivot_mm);
-      if (uncertain_) {
+      if (displaced_) {
         kept.sensor_from_pivot_mm = touch.T_robot_sensor.translation_mm - pivot_mm;
       }
       ++count_;

@@ -24,13 +24,14 @@ struct ReadingRun {
 
 /// The elements of some touches that are not Unknown, in the robot frame and relative to the
 /// lattice's pivot. Elements multiply (Eq. 13), so that neither touches nor their order count:
-/// equal readings stand together, by their places.
+/// equal readings stand together, by their places. ContactEvidence holds the same elements for a
+/// device, touch by touch.
 struct KnownElements {
   std::vector<glm::dvec2> from_pivot_mm;
   std::vector<ReadingRun> runs;  ///< ascending by reading
 
-  // Touches of uncertain pose are averaged each by itself: their elements do not multiply with
-  // those of others.
+  // Displaced touches, whose sensors may have stood elsewhere (touch_sd), are averaged each by
+  // itself: their elements do not multiply with those of others.
   std::vector<KnownElements> touches = {};  ///< each by itself; empty where all are exact
   glm::dvec2 sensor_from_pivot_mm = {};     ///< of one touch: the sensor's origin
   /// Where set, keeps what was evaluated of this one touch. Copies share it.
@@ -43,7 +44,7 @@ struct ArrayReadings {
   std::vector<glm::dvec2> from_pivot_mm;
   std::vector<Reading> readings;
   ArrayRectangle rectangle{};
-  /// The sensor's origin where the touch's pose is uncertain.
+  /// The sensor's origin where the touch is displaced.
   std::optional<glm::dvec2> sensor_from_pivot_mm = {};
 };
 
@@ -56,7 +57,7 @@ KnownElements known_elements(const ArrayReadings& array);
 /// Indices of touches in an order that does not depend on when they came.
 std::vector<std::size_t> sorted_touches(std::span<const KnownElements> touches);
 
-/// The elements of all. Touches of uncertain pose stay in the order of the lists.
+/// The elements of all. Displaced touches stay in the order of the lists.
 KnownElements merged(std::span<const KnownElements> lists);
 
 /// The log-likelihood of the elements where nothing was sensed, in nats.
@@ -75,8 +76,8 @@ class KeptTouches {
   static constexpr std::size_t room_for = 64;
   static constexpr std::size_t most_bytes = std::size_t{1} << 22;
 
-  /// @param uncertain whether the sensor may have been displaced
-  explicit KeptTouches(bool uncertain = false) : uncertain_(uncertain) {}
+  /// @param displaced whether touches are displaced
+  explicit KeptTouches(bool displaced = false) : displaced_(displaced) {}
 
   /// Classifies the touches' elements (Eq. 3) and keeps them.
   /// @throws Error on a touch that is not sound, and keeps none of these
@@ -92,7 +93,7 @@ class KeptTouches {
 
   std::vector<ArrayReadings> touches_;  ///< those from count_ on are room
   std::size_t count_ = 0;
-  bool uncertain_;
+  bool displaced_;
 };
 
 }  // namespace palpate

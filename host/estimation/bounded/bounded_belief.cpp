@@ -23,7 +23,7 @@ constexpr double most_searched_bins = 1e8;
 constexpr double closely_drawn_bins = 1e6;
 /// Tolerance that a search with a budget reaches before it goes on, and enough for draws.
 constexpr double soon = 1e-2;
-/// Tolerance of a search for draws where touches are uncertain: it takes little longer than a rough
+/// Tolerance of a search for draws where touches are displaced: it takes little longer than a rough
 /// one, and leaves so little out that its bins can be followed through the next touches. Two of
 /// them raise that share up to a hundred times.
 constexpr double followable = 1e-4;
@@ -135,7 +135,7 @@ double BoundedBelief::bins_in_all() const {
 SearchGoal BoundedBelief::rough_goal() const {
   // Few bins take as long whatever the tolerance, and a close search lets those that are found be
   // followed through the next touches.
-  const double rough = touches_.likelihood().displaces() && !touches_.moving() ? followable : soon;
+  const double rough = touches_.likelihood().displaced() && !touches_.moving() ? followable : soon;
   return {.tolerance = bins_in_all() <= closely_drawn_bins ? options().tolerance
                                                            : std::max(options().tolerance, rough),
           .exact = false,
@@ -151,7 +151,7 @@ const SearchResult& BoundedBelief::found(std::optional<double> asked) {
   if (!found_ || tolerance < found_->tolerance) {
     // A budget may end the search before it proves as much as an earlier one.
     Found closer = search(tolerance);
-    if (!found_ || closer.result.uncertain() < found_->result.uncertain()) {
+    if (!found_ || closer.result.unproven() < found_->result.unproven()) {
       found_ = std::move(closer);
     }
     found_->tolerance = tolerance;
@@ -178,7 +178,7 @@ BoundedBelief::Found BoundedBelief::search(double tolerance) {
   Found best = search(first, deadline);
   if (first.tolerance > tolerance && !deadline.passed()) {
     Found better = search(goal(tolerance), deadline);
-    if (better.result.uncertain() < best.result.uncertain()) {
+    if (better.result.unproven() < best.result.unproven()) {
       best = std::move(better);
     }
   }

@@ -86,7 +86,7 @@ Estimate BoundedPosterior::estimate(std::optional<double> tolerance) const {
     bounds.push_back(mass.bounds());
   }
   // Dropped and rounding mass over the whole that they are part of.
-  const double dropped = found.uncertain();
+  const double dropped = found.unproven();
   std::vector<LogInterval> evidence = bounds;
   for (LogInterval& of : evidence) {
     of = {of.low - found.shared_nats, of.high + found.shared_nats};
@@ -268,7 +268,7 @@ EvaluatedBelief BoundedPosterior::evaluated_bins() const {
     evaluated.index.push_back(bin.place);
     evaluated.log_likelihood.push_back(bin.log_likelihood);
   }
-  const double rest = std::exp(unseen.log() - belief.log_total()) + found.uncertain();
+  const double rest = std::exp(unseen.log() - belief.log_total()) + found.unproven();
   evaluated.rest_mass_bound = rest < 1.0 ? rest : 1.0;
   return evaluated;
 }

@@ -55,7 +55,7 @@ void FollowedBins::add(const KnownElements& elements, const BinLikelihood& likel
   const std::span<double> values = bins_.values();
   std::vector<double> added(values.size());
   likelihood.evaluate(bins_.boxes(), elements,
-                      likelihood.displaces() ? Arithmetic::float32 : Arithmetic::float64, added);
+                      likelihood.displaced() ? Arithmetic::float32 : Arithmetic::float64, added);
   for (std::size_t i = 0; i < values.size(); ++i) {
     values[i] += added[i];
   }

@@ -53,9 +53,9 @@ class EvaluatedBins {
 /// a touch that surprises nobody they still do.
 class FollowedBins {
  public:
-  /// More bins would take longer than a search, which takes long where touches are uncertain.
+  /// More bins would take longer than a search, which takes long where touches are displaced.
   static std::size_t most_bins(const BinLikelihood& likelihood) {
-    return likelihood.displaces() ? 1 << 16 : 1 << 14;
+    return likelihood.displaced() ? 1 << 16 : 1 << 14;
   }
 
   /// @param bins,found of one search; all bins that it evaluated

@@ -70,8 +70,8 @@ void SearchedTouches::take_in() {
     std::vector<KnownElements> known;
     for (const ArrayReadings& touch : added) {
       known.push_back(known_elements(touch));
-      for (KnownElements& uncertain : known.back().touches) {
-        uncertain.exact_bins = std::make_shared<ExactBins>(hypotheses_.size(), space_.turns.size(),
+      for (KnownElements& displaced : known.back().touches) {
+        displaced.exact_bins = std::make_shared<ExactBins>(hypotheses_.size(), space_.turns.size(),
                                                            ExactBins::most_bytes / touches_.size());
       }
     }
@@ -140,12 +140,12 @@ void SearchedTouches::follow(FollowedBins& bins) const {
     most.push_back(bounds.best(space_.finest_level(), touch));
   }
   if (!touch.touches.empty()) {
-    // Uncertain touches without known elements are not among the elements.
-    const auto uncertain =
+    // Displaced touches without known elements are not among the elements.
+    const auto displaced =
         static_cast<std::size_t>(std::ranges::count_if(touches_.all().first(next), any_known));
-    touch.touches.front() = elements_.touches[uncertain];
+    touch.touches.front() = elements_.touches[displaced];
     for (std::size_t i = 0; i < most.size(); ++i) {
-      most[i] = std::min(most[i], search_.largest().most(uncertain, i));
+      most[i] = std::min(most[i], search_.largest().most(displaced, i));
     }
   }
   arena_.execute([&] { bins.add(touch, likelihood_, most); });

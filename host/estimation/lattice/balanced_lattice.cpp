@@ -40,7 +40,7 @@ double lever_mm(const OccupancyGrid& map, const PoseLattice& region) {
                    (width_mm * width_mm + height_mm * height_mm) / 12.0);
 }
 
-/// How much wider the steps may be where touches are uncertain by sd, of the same unit as the step.
+/// How much wider the steps may be where touches are displaced by sd, of the same unit as the step.
 double widening(double sd, double step) {
   // docs/refinement.md holds the measurements behind these numbers.
   constexpr double of_sd = 0.5;

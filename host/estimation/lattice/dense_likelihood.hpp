@@ -118,7 +118,7 @@ class PreparedTouch {
   std::optional<DenseBelief> log_likelihood_;
 };
 
-/// A touch as an array at rest takes it in.
+/// A touch as a still array takes it in.
 struct StillTouch {
   Touch touch;
   bool by_differences = false;  ///< the evidence holds only what differs from No Contact everywhere

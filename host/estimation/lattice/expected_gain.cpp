@@ -23,7 +23,7 @@ namespace {
 /// Columns that are summed at once: their sums stay in registers.
 constexpr std::size_t lanes = 32;
 
-/// The displacements that stand for all where touches are uncertain: means over them are those over
+/// The displacements that stand for all where touches are displaced: means over them are those over
 /// the distribution, of polynomials up to the third degree (Stroud 1957). They are the same for
 /// every sample, so that what tells displacements apart tells no samples apart.
 std::vector<Pose> few_displacements(const DisplacementSd& sd) {

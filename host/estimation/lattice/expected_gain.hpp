@@ -35,7 +35,7 @@ void slip(std::span<PoseSample> samples, std::span<const Body> bodies, const Dis
 /// bias for the belief of n equal samples; that of a wider one is too small, by up to a nat where
 /// the gain comes near log n. The standard error is that of the mean over i. All candidates share
 /// random numbers, so that their differences are less noisy than their gains. Where touches are
-/// uncertain, six displacements stand for all, and every other sample simulates readings: gains
+/// displaced, six displacements stand for all, and every other sample simulates readings: gains
 /// come out too large where the belief is narrower than the displacements, by up to 0.7 nats at 1
 /// mm and 0.05 rad, and their ranking holds (correlation 0.94 to 0.97 with 48 displacements of 600
 /// samples).

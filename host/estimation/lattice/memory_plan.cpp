@@ -48,7 +48,7 @@ MemoryPlan plan_memory(const gpu::Context& context, std::span<const Hypothesis> 
   const std::uint64_t all = context.limits().memory;
   const std::uint64_t limit = options.memory_limit_bytes.value_or(all);
   const Room room{.bytes = std::min(limit, all), .set_by_options = limit < all};
-  // The belief and, for an array at rest, No Contact everywhere.
+  // The belief and, for a still array, No Contact everywhere.
   const std::size_t beliefs = options.still_array ? 2 : 1;
   const bool by_touch = TouchByTouch::wanted_by(options);
 
@@ -74,7 +74,7 @@ MemoryPlan plan_memory(const gpu::Context& context, std::span<const Hypothesis> 
     refuse(context, lattice, objects, room, static_cast<double>(needed(std::min(most, step))));
   }
   const auto plan = [&](std::size_t elements) {
-    // An array at rest prepares no touch, and a touch by itself has memory of its own.
+    // A still array prepares no touch, and a touch by itself has memory of its own.
     const std::uint64_t with_one_more =
         needed(elements) + DenseBelief::bytes_needed(context, lattice, objects);
     return MemoryPlan{elements, !options.still_array && !by_touch && with_one_more <= room.bytes};

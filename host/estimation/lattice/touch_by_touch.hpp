@@ -61,8 +61,8 @@ class OverlapMean {
 };
 
 /// The update of a belief where each touch's likelihood is wanted by itself before it joins the
-/// belief: touches of uncertain pose, objects that slip between touches, or "none of these". Takes
-/// one more dense belief.
+/// belief: displaced touches, objects that slip between touches, or "none of these". Takes one more
+/// dense belief.
 class TouchByTouch {
  public:
   /// Whether the options ask for it.

@@ -53,8 +53,8 @@ struct PlacedMap {
 /// Evaluates the log-likelihood (Eq. 7, 13) of bins on the host, by vector instructions chosen at
 /// run time. A bin has the same bits with every set of instructions, on every number of threads and
 /// in every box. Calls from several threads may run at once, but for those about the same touches
-/// with KnownElements::exact_bins. Touches of uncertain pose have their mean likelihoods: all bins
-/// within reach of a bin are evaluated, too, and boxes that lie together share them.
+/// with KnownElements::exact_bins. Displaced touches have their mean likelihoods: all bins within
+/// reach of a bin are evaluated, too, and boxes that lie together share them.
 class BinLikelihood {
  public:
   /// @param contact resolved: with its prior
@@ -67,7 +67,7 @@ class BinLikelihood {
   /// Log-likelihood of the elements at every bin in nats, boxes one after another, [y, x] in each.
   /// On the threads of the caller's TBB arena. Fastest where boxes of one object and theta stand
   /// together.
-  /// @param errors where not empty and touches are uncertain, [bin] receives error: the likelihood
+  /// @param errors where not empty and touches are displaced, [bin] receives error: the likelihood
   /// may be wrong by e^error - 1 of itself beside error()
   void evaluate(std::span<const BinBox> boxes, const KnownElements& elements, Arithmetic arithmetic,
                 std::span<double> log_likelihood, std::span<double> errors = {}) const;
@@ -79,8 +79,8 @@ class BinLikelihood {
   double exact_error(std::size_t object, const KnownElements& elements,
                      Arithmetic arithmetic) const;
 
-  /// Whether touches are uncertain.
-  bool displaces() const { return displaced_.has_value(); }
+  /// Whether touches are displaced.
+  bool displaced() const { return displaced_.has_value(); }
   /// Host memory that the maps' nodes and the table hold.
   std::uint64_t bytes() const;
   /// The vector instructions in use, such as "AVX3".

@@ -4,7 +4,7 @@
 #include "estimation/bounded/displaced/exact_bins.hpp"
 #include "estimation/bounded/leaves/bin_likelihood.hpp"
 
-// Bins of touches of uncertain pose: the logs of each touch's mean likelihood, added up.
+// Bins of displaced touches: the logs of each touch's mean likelihood, added up.
 
 namespace palpate {
 

@@ -209,7 +209,7 @@ bool MovingBelief::reaches(const SearchResult& found, const SearchGoal& goal) co
   for (const MovingObject& object : objects_) {
     rounding = std::max(rounding, object.rounding());
   }
-  if (!(found.uncertain() <= std::max(goal.tolerance, 2.0 * rounding))) {
+  if (!(found.unproven() <= std::max(goal.tolerance, 2.0 * rounding))) {
     return false;
   }
   if (!goal.evidence_nats) {

@@ -18,7 +18,7 @@ constexpr double most_rounding = 1e-11;
 
 /// Takes an error of a bin's mass into what may be missing where it is large, and into the rounding
 /// of all bins where it is small.
-void settle(double error, double& log_mass, double& log_rest, double& rounding) {
+void take_error(double error, double& log_mass, double& log_rest, double& rounding) {
   if (error <= most_rounding) {
     rounding = std::max(rounding, error);
     return;
@@ -93,12 +93,12 @@ void MovingObject::slip(bool by_logs) {
   }
   const double lost = of_bins_.means(runs_, log_mass_, log_mean, error, by_logs);
   rounding_ += of_bins_.mean_error();
-  settle_bins([&](std::size_t bin, double& log_mass, double& rest, double& most) {
+  change_bins([&](std::size_t bin, double& log_mass, double& rest, double& most) {
     log_mass = log_mean[bin];
     if (log_mass == -infinity) {
       rest = log_add(rest, lost);
     } else {
-      settle(error[bin], log_mass, rest, most);
+      take_error(error[bin], log_mass, rest, most);
     }
   });
 }
@@ -144,15 +144,15 @@ void MovingObject::multiply(const KnownElements& touch) {
   evaluate(touch, runs_);
   const double rounding = task_.likelihood.error(object_, touch, Arithmetic::float64);
   rounding_ += rounding;
-  settle_bins([&](std::size_t bin, double& log_mass, double& rest, double& most) {
+  change_bins([&](std::size_t bin, double& log_mass, double& rest, double& most) {
     log_mass += task_.log_mean[bin];
     rest += task_.log_mean[bin] + task_.error[bin] + rounding;
-    settle(task_.error[bin], log_mass, rest, most);
+    take_error(task_.error[bin], log_mass, rest, most);
   });
 }
 
 template <typename Set>
-void MovingObject::settle_bins(const Set& set) {
+void MovingObject::change_bins(const Set& set) {
   std::vector<double> most(runs_.size());
   std::vector<double> largest(runs_.size());
   parallel_for(runs_.size(), [&](std::size_t i) {

@@ -115,7 +115,7 @@ class MovingObject {
   std::vector<BlockRun> others_in(std::span<const BinBox> boxes) const;
   /// @param set takes a bin, its log_mass and log_rest, and the largest error that no rest has
   template <typename Set>
-  void settle_bins(const Set& set);
+  void change_bins(const Set& set);
   void leave_others(std::span<const double> tiles);
   void add_up(std::span<const double> tiles);
 

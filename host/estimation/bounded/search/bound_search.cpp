@@ -18,13 +18,13 @@ namespace {
 constexpr double search_share = 0.75;
 /// Beam width during survey(), where all tiles of a level are looked at first.
 constexpr std::size_t surveyed_tiles = 1024;
-/// Tiles that survey() looks at where touches are uncertain, those of the largest bounds: they tell
+/// Tiles that survey() looks at where touches are displaced, those of the largest bounds: they tell
 /// the total as well as all would, and closer looks cost more the wider the tiles lie apart.
 constexpr std::size_t most_surveyed = 32768;
 /// Tiles that are divided together: bounds the memory for their parts. More where touches are
-/// uncertain, since the parts of tiles that lie together share all within reach of them.
+/// displaced, since the parts of tiles that lie together share all within reach of them.
 constexpr std::size_t most_exact = 16384;
-constexpr std::size_t most_uncertain = 65536;
+constexpr std::size_t most_displaced = 65536;
 
 /// One run of a search, from the largest tiles to their bins.
 class SearchRun {
@@ -35,7 +35,7 @@ class SearchRun {
         goal_(task.goal),
         refined_(refined),
         finest_(space_.finest_level()),
-        most_together_(space_.displacement ? most_uncertain : most_exact),
+        most_together_(space_.displacement ? most_displaced : most_exact),
         division_(task, largest),
         account_(space_.log_weight, space_.label_of, task.options.lattice, goal_),
         leaves_(task, account_) {}
@@ -209,7 +209,7 @@ class SearchRun {
                           account_.best());
   }
 
-  /// Where touches are uncertain, a bound in nats: if no part of these tiles exceeded it, all could
+  /// Where touches are displaced, a bound in nats: if no part of these tiles exceeded it, all could
   /// be dropped, and little of what may be dropped would be used up.
   /// @param tolerance see divide_lot()
   double droppable(std::span<const Tile> tiles, std::size_t level, double tolerance) const {

@@ -17,8 +17,8 @@ namespace palpate {
 PlaceSource<float> exact_penalties(const SearchSpace& space, std::size_t object, std::size_t level,
                                    const KnownElements& touch);
 
-/// Lower bounds of a touch's penalties over tiles of one level, where its pose is uncertain: those
-/// of its mean likelihood. Below 0 where the mean may exceed what TileBounds::best() says.
+/// Lower bounds of a touch's penalties over tiles of one level, where it is displaced: those of
+/// its mean likelihood. Below 0 where the mean may exceed what TileBounds::best() says.
 /// @param touch one of KnownElements::touches
 /// @param targets batches of the level's tiles, sorted by theta, y, x
 /// @returns [run, batch, tile] as add_penalties() orders a batch's tiles

@@ -33,7 +33,7 @@ class LargestTiles {
   }
   /// The sum of a tile in which every element sees the prior.
   std::int64_t unseen(std::size_t hypothesis) const { return unseen_[hypothesis]; }
-  /// The largest log-likelihood that a touch of uncertain pose can have anywhere, in nats.
+  /// The largest log-likelihood that a displaced touch can have anywhere, in nats.
   /// @param touch in the order in which they were added
   double most(std::size_t touch, std::size_t hypothesis) const { return most_[touch][hypothesis]; }
   /// Host memory, in bytes.
@@ -42,7 +42,7 @@ class LargestTiles {
  private:
   /// Adds elements of which none is displaced.
   void add_exact(const KnownElements& known, const std::vector<std::int64_t>& offsets);
-  /// Adds a touch of uncertain pose.
+  /// Adds a displaced touch.
   void add_displaced(const KnownElements& touch, const std::vector<std::int64_t>& offsets);
   /// Adds what tiles' elements have to their sums, less what they would have if they saw the prior.
   template <typename Penalty>
@@ -55,7 +55,7 @@ class LargestTiles {
   const SearchSpace& space_;
   std::vector<std::vector<std::int32_t>> sums_;  ///< [hypothesis][theta, batch y, batch x, tile]
   std::vector<std::int64_t> unseen_;             ///< [hypothesis]
-  std::vector<std::vector<double>> most_;        ///< [touch of uncertain pose][hypothesis]
+  std::vector<std::vector<double>> most_;        ///< [displaced touch][hypothesis]
 };
 
 /// The box around the elements, from the pivot, at every theta.

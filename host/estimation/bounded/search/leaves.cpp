@@ -18,7 +18,7 @@ namespace {
 /// Bins that are evaluated before the total is looked at again: few at first, for the best ones
 /// raise it most.
 constexpr std::int64_t first_batch = 1024;
-/// As many where touches are uncertain: then most work lies in the bins within reach of a batch's.
+/// As many where touches are displaced: then most work lies in the bins within reach of a batch's.
 constexpr std::int64_t first_displaced = 16384;
 /// Products of bins and elements, where a budget must not be overdrawn by much: a few ms.
 constexpr std::int64_t budgeted_work = 5'000'000;
@@ -52,7 +52,7 @@ UnsettledMass unsettled(std::span<const Tile> tiles, std::size_t level, const Se
 Leaves::Leaves(const SearchTask& task, MassAccount& account)
     : task_(task),
       account_(account),
-      displaced_(task.likelihood.displaces()),
+      displaced_(task.likelihood.displaced()),
       poor_below_(poor_share * prior_log_likelihood(task.elements, task.options.contact)),
       pending_mass_(task.space.bounds.size()) {
   for (std::size_t i = 0; i < pending_mass_.size(); ++i) {
@@ -92,7 +92,7 @@ void Leaves::look(std::span<const Tile> tiles) {
 std::vector<Leaves::Family> Leaves::families_of(std::span<const Tile> tiles,
                                                 UnsettledMass& left) const {
   std::vector<Family> families;
-  // Single bins lie too far apart to be evaluated together, but where touches are uncertain: those
+  // Single bins lie too far apart to be evaluated together, but where touches are displaced: those
   // between them are evaluated all the same.
   const bool alone = task_.space.bounds.front().levels().back().size.bins > 0 && !displaced_;
   const int shift = alone ? 0 : std::countr_zero(unsigned{batch_side});

@@ -87,7 +87,7 @@ class Leaves {
 
   const SearchTask& task_;
   MassAccount& account_;
-  bool displaced_;                     ///< touches are uncertain
+  bool displaced_;                     ///< touches are displaced
   std::vector<Tile> probed_;           ///< sorted by place
   std::vector<double> float32_error_;  ///< [hypothesis]
   std::vector<double> float64_error_;

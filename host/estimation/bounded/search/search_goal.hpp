@@ -107,8 +107,8 @@ struct SearchResult {
     }
     return {evaluated.log(), rounding.log(), dropped.log()};
   }
-  /// Bound of the mass that is not known, relative to that which is.
-  double uncertain() const {
+  /// Bound of the mass that is not proven, relative to that which is evaluated.
+  double unproven() const {
     const HypothesisMass of = all();
     return std::exp(log_add(of.rounding, of.dropped) - of.evaluated);
   }

@@ -50,7 +50,7 @@ class TileDivision {
   std::vector<Tile> parts_of(std::span<const Tile> tiles, std::size_t level,
                              std::vector<Tile>* unseen = nullptr);
   /// Tiles whose bounds are below are not looked at more closely than to know that: where touches
-  /// are uncertain, the last touches may be left out.
+  /// are displaced, the last touches may be left out.
   void set_negligible(double bound) { negligible_ = bound; }
 
   /// Follows tiles of a level down to the smallest ones, the best of each level.
@@ -71,7 +71,7 @@ class TileDivision {
   double bound_of(std::size_t object, std::size_t level, std::int64_t penalties) const;
   /// The bound of a largest tile, from the sum that LargestTiles keeps.
   double bound_of_largest(std::size_t object, std::int32_t sum) const;
-  /// Where touches are uncertain, the sums of their penalties over the parts of tiles, [tile,
+  /// Where touches are displaced, the sums of their penalties over the parts of tiles, [tile,
   /// part], which are tiles of this level; else empty.
   std::vector<std::int64_t> displaced_sums(std::span<const Tile> tiles, std::size_t level) const;
   /// Adds the sums of one object's tiles.

@@ -26,10 +26,10 @@ constexpr double most_single_bins = 8e6;
 constexpr int most_side = 16;
 
 /// Tiles, of all maps, up to which larger ones would save less than they cost where touches are
-/// uncertain; and the side from which on larger tiles leave out too little, in standard deviations.
+/// displaced; and the side from which on larger tiles leave out too little, in standard deviations.
 constexpr double enough_tiles = 3e5;
 constexpr double widest_sd = 2.0;
-/// Side of the smallest tiles where touches are uncertain, in standard deviations and in cells.
+/// Side of the smallest tiles where touches are displaced, in standard deviations and in cells.
 constexpr double smallest_sd = 0.6;
 constexpr double smallest_cells = 0.5;
 
@@ -63,7 +63,7 @@ TileSize tile_of_bins(const PoseLattice& lattice, double least_cell_mm, int bins
   return {.side = side_of_bins(std::max(x_cells, 1.0), std::max(y_cells, 1.0)), .bins = bins};
 }
 
-/// Tiles of whole bins, where touches are uncertain.
+/// Tiles of whole bins, where touches are displaced.
 std::vector<TileSize> sizes_in_bins(const PoseLattice& lattice, double least_cell_mm,
                                     std::size_t maps, const DisplacementSd& touch_sd) {
   const double step = std::max(step_mm(lattice.x_mm), step_mm(lattice.y_mm));

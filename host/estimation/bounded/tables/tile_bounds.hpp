@@ -96,7 +96,7 @@ struct TileLevel {
 /// Sizes of the levels, the largest tiles first. Each level's tiles have a quarter of the side of
 /// the level before, so that a batch of 4 x 4 tiles makes up one tile. Where bins are few and lie
 /// cells apart, there is one level, of single bins: larger tiles would leave out few of them, and
-/// bound them loosely. Where touches are uncertain, all tiles have whole bins, and the smallest are
+/// bound them loosely. Where touches are displaced, all tiles have whole bins, and the smallest are
 /// about half as wide as the standard deviation. Where objects slip, there is one level, of 4 x 4
 /// bins.
 /// @param least_cell_mm of the maps

@@ -16,7 +16,7 @@ namespace palpate::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-void PlaceElements(const glm::dvec2* from_pivot_mm, std::size_t count, const TilePlace& place,
+void PlaceWindows(const glm::dvec2* from_pivot_mm, std::size_t count, const TilePlace& place,
                    const WindowTable& shape, std::int32_t* plane, std::int32_t* column,
                    std::int32_t* row) {
   const hn::ScalableTag<double> d;
@@ -137,7 +137,7 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace palpate {
 
-HWY_EXPORT(PlaceElements);
+HWY_EXPORT(PlaceWindows);
 HWY_EXPORT(AddRuns);
 
 namespace {
@@ -153,7 +153,7 @@ void place_windows(const KnownElements& elements, const TilePlace& place, const 
   for (std::vector<std::int32_t>* list : {&placed.plane, &placed.column, &placed.row}) {
     list->resize(count + slack);
   }
-  HWY_DYNAMIC_DISPATCH(PlaceElements)
+  HWY_DYNAMIC_DISPATCH(PlaceWindows)
   (elements.from_pivot_mm.data(), count, place, shape, placed.plane.data(), placed.column.data(),
    placed.row.data());
 }
