@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <utility>
 
@@ -91,16 +92,34 @@ const ContactEvidence& EvidenceGatherer::gather(std::span<const Touch> touches,
                                                 const ContactModel& model,
                                                 const glm::dvec2& pivot_mm,
                                                 std::size_t segment_elements) {
+  evidence_.resize(std::max<std::size_t>(evidence_.size(), 1));
+  gather_into(evidence_.front(), touches, model, pivot_mm, segment_elements);
+  return evidence_.front();
+}
+
+std::span<const ContactEvidence> EvidenceGatherer::gather_each(std::span<const Touch> touches,
+                                                               const ContactModel& model,
+                                                               const glm::dvec2& pivot_mm,
+                                                               std::size_t segment_elements) {
+  evidence_.resize(std::max(evidence_.size(), touches.size()));
+  for (std::size_t i = 0; i < touches.size(); ++i) {
+    gather_into(evidence_[i], touches.subspan(i, 1), model, pivot_mm, segment_elements);
+  }
+  return std::span(evidence_).first(touches.size());
+}
+
+void EvidenceGatherer::gather_into(ContactEvidence& evidence, std::span<const Touch> touches,
+                                   const ContactModel& model, const glm::dvec2& pivot_mm,
+                                   std::size_t segment_elements) {
   std::size_t elements = 0;
   for (const Touch& touch : touches) {
     elements += touch.pressure.size();
   }
-  clear(evidence_, touches.size(), elements, segment_elements);
+  clear(evidence, touches.size(), elements, segment_elements);
   for (const Touch& touch : touches) {
     readings_ = classify(touch, model, std::move(readings_));
-    append(evidence_, touch, readings_, Reading::unknown, pivot_mm, segment_elements);
+    append(evidence, touch, readings_, Reading::unknown, pivot_mm, segment_elements);
   }
-  return evidence_;
 }
 
 ContactEvidence gather_evidence(const Touch& touch, std::span<const Reading> readings,
@@ -155,6 +174,14 @@ double prior_log_likelihood(const ReadingCounts& counts, const ContactModel& mod
     }
   }
   return sum;
+}
+
+double prior_log_likelihood(std::span<const ContactEvidence> evidence, const ContactModel& model) {
+  ReadingCounts counts{};
+  for (const ContactEvidence& part : evidence) {
+    std::ranges::transform(counts, part.counts, counts.begin(), std::plus());
+  }
+  return prior_log_likelihood(counts, model);
 }
 
 }  // namespace palpate

@@ -34,17 +34,26 @@ ContactEvidence gather_evidence(std::span<const Touch> touches, const ContactMod
                                 const glm::dvec2& pivot_mm, std::size_t segment_elements);
 
 /// Gathers evidence as gather_evidence() does, again and again in the same memory: touches of no
-/// more elements than before allocate nothing, whatever they read.
+/// more elements than before allocate nothing, whatever they read. What it returns stays until the
+/// next call.
 class EvidenceGatherer {
  public:
-  /// The evidence stays until the next call.
+  /// Gathers the evidence of all touches together.
   const ContactEvidence& gather(std::span<const Touch> touches, const ContactModel& model,
                                 const glm::dvec2& pivot_mm, std::size_t segment_elements);
-  const ContactEvidence& evidence() const { return evidence_; }
+  /// Gathers the evidence of each touch by itself, [touch].
+  std::span<const ContactEvidence> gather_each(std::span<const Touch> touches,
+                                               const ContactModel& model,
+                                               const glm::dvec2& pivot_mm,
+                                               std::size_t segment_elements);
 
  private:
+  void gather_into(ContactEvidence& evidence, std::span<const Touch> touches,
+                   const ContactModel& model, const glm::dvec2& pivot_mm,
+                   std::size_t segment_elements);
+
   std::vector<Reading> readings_;
-  ContactEvidence evidence_;
+  std::vector<ContactEvidence> evidence_;
 };
 
 /// Gathers the elements of a classified touch that read something else than `instead`. Each adds
@@ -79,5 +88,7 @@ inline constexpr double contradiction_nats = 700.0;
 double prior_log_likelihood(Reading reading, const ContactModel& model);
 /// Log-likelihood in nats of all readings on a map of nothing but the prior, at whatever pose.
 double prior_log_likelihood(const ReadingCounts& counts, const ContactModel& model);
+/// Log-likelihood in nats of the readings of all evidence on such a map.
+double prior_log_likelihood(std::span<const ContactEvidence> evidence, const ContactModel& model);
 
 }  // namespace palpate

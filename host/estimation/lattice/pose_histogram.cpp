@@ -51,54 +51,56 @@ struct PoseHistogram::Impl {
     summaries();  // runs what was recorded, and the reductions a first time
   }
 
-  const ContactEvidence& gather(std::span<const Touch> touches) {
-    return gatherer.gather(touches, options.contact, options.lattice.pivot_mm,
-                           likelihood.segment_elements());
+  /// Gathers touches: each by itself where updates want it so, or else all together.
+  std::span<const ContactEvidence> gather(std::span<const Touch> touches) {
+    const glm::dvec2& pivot_mm = options.lattice.pivot_mm;
+    const std::size_t most = likelihood.segment_elements();
+    return by_touch ? gatherer.gather_each(touches, options.contact, pivot_mm, most)
+                    : std::span(&gatherer.gather(touches, options.contact, pivot_mm, most), 1);
   }
 
   /// Eq. 13: the log-belief of a bin is the sum of the touches' log-likelihoods there (Eq. 7).
   void update(std::span<const Touch> touches, const std::function<void(double)>& progress) {
     // All touches are gathered before the first is added: one that is not sound refuses all.
-    std::span<const StillTouch> still_touches;
-    if (still) {
-      still_touches = still->gather(touches, likelihood.segment_elements());
-    }
-    const ContactEvidence& evidence = gather(still ? std::span<const Touch>() : touches);
-    const ReadingCounts counts = evidence.counts;  // update_by_touch() gathers anew
+    const std::span<const StillTouch> still_touches =
+        still ? still->gather(touches, likelihood.segment_elements()) : std::span<StillTouch>();
+    const std::span<const ContactEvidence> evidence =
+        by_touch || !still ? gather(touches) : std::span<ContactEvidence>();
     change.change([&] {
       touched = touched || !touches.empty();
       summarised.reset();
       if (by_touch) {
-        update_by_touch(touches, still_touches, progress);
+        update_by_touch(touches, evidence, still_touches, progress);
       } else if (still) {
         still->accumulate(still_touches, likelihood, belief, progress);
-      } else if (prepared.holds(evidence)) {
+      } else if (prepared.holds(evidence.front())) {
         prepared.accumulate(belief, progress);
       } else {
-        likelihood.accumulate(evidence, belief, progress);
+        likelihood.accumulate(evidence.front(), belief, progress);
       }
-      prior_log_likelihood += palpate::prior_log_likelihood(counts, options.contact);
-      for (const StillTouch& touch : still_touches) {
-        prior_log_likelihood +=
-            palpate::prior_log_likelihood(touch.evidence.counts, options.contact);
+      if (!still) {
+        prior_log_likelihood += palpate::prior_log_likelihood(evidence, options.contact);
+      }
+      for (const StillTouch& one : still_touches) {
+        prior_log_likelihood += palpate::prior_log_likelihood(one.evidence.counts, options.contact);
       }
     });
   }
 
   /// Updates as above where each touch's likelihood is wanted by itself.
-  void update_by_touch(std::span<const Touch> touches, std::span<const StillTouch> still_touches,
+  void update_by_touch(std::span<const Touch> touches, std::span<const ContactEvidence> evidence,
+                       std::span<const StillTouch> still_touches,
                        const std::function<void(double)>& progress) {
     for (std::size_t i = 0; i < touches.size(); ++i) {
-      const ContactEvidence& evidence = gather(touches.subspan(i, 1));
       const auto evaluate = [&](const DenseBelief& uniform) {
         if (still) {
           still->accumulate(still_touches.subspan(i, 1), likelihood, uniform, {});
         } else {
-          likelihood.accumulate(evidence, uniform, {});
+          likelihood.accumulate(evidence[i], uniform, {});
         }
       };
       // std::function would allocate a copy of it.
-      by_touch->update(touches[i], evidence, std::cref(evaluate), belief);
+      by_touch->update(touches[i], evidence[i], std::cref(evaluate), belief);
       if (progress) {
         progress(static_cast<double>(i + 1) / static_cast<double>(touches.size()));
       }
@@ -250,7 +252,7 @@ void PoseHistogram::update(std::span<const Touch> touches,
 
 void PoseHistogram::prepare(const Touch& touch) {
   Impl& histogram = whole();
-  ContactEvidence evidence = histogram.gather(std::span(&touch, 1));
+  ContactEvidence evidence = histogram.gather(std::span(&touch, 1)).front();
   if (histogram.by_touch && !histogram.still) {
     histogram.change.change([&] {
       histogram.by_touch->prepare(evidence, [&](const DenseBelief& uniform) {

@@ -237,8 +237,8 @@ struct ParticleFilter::Impl {
   gpu::Buffer shares;
   shaders::uint share_count = 0;
   std::vector<shaders::WeightBlock> sums;
-  std::vector<shaders::DrawBlock> bounds;   ///< what goes to draw_blocks
-  std::vector<EvidenceGatherer> gatherers;  ///< one for every touch of an update
+  std::vector<shaders::DrawBlock> bounds;  ///< what goes to draw_blocks
+  EvidenceGatherer gatherer;
   WeightSummary summary;
   LikelihoodAverages averages;
   shaders::uint touch = 0;  ///< counts the touches since the start
@@ -290,14 +290,11 @@ void ParticleFilter::update(std::span<const Touch> touches,
   Impl& filter = whole();
   const ParticleOptions& options = filter.options;
   // All of them before the first is taken in, for one that is not sound refuses all.
-  filter.gatherers.resize(std::max(filter.gatherers.size(), touches.size()));
-  for (std::size_t i = 0; i < touches.size(); ++i) {
-    filter.gatherers[i].gather(touches.subspan(i, 1), options.contact, options.region.pivot_mm,
-                               ParticleLikelihood::segment_elements());
-  }
+  const std::span<const ContactEvidence> evidence = filter.gatherer.gather_each(
+      touches, options.contact, options.region.pivot_mm, ParticleLikelihood::segment_elements());
   filter.change.change([&] {
     for (std::size_t i = 0; i < touches.size(); ++i) {
-      filter.update(filter.gatherers[i].evidence());
+      filter.update(evidence[i]);
       if (progress) {
         progress(static_cast<double>(i + 1) / static_cast<double>(touches.size()));
       }
