@@ -13,6 +13,21 @@ std::uint64_t cell_bytes(gpu::Access access) {
   return access == gpu::Access::table ? sizeof(shaders::Corners) : sizeof(float);
 }
 
+/// The nodes of with_border(), each with the three above and to its right: a kernel interpolates
+/// from one. Beyond the border lies the prior.
+std::vector<shaders::Corners> corners_with_border(const OccupancyGrid& map, double prior) {
+  const std::vector<float> nodes = with_border(map, prior);
+  const std::size_t width = static_cast<std::size_t>(map.nx) + 2 * shaders::MAP_BORDER;
+  // The border's last row and column are the prior, as is what lies beyond them.
+  const auto node = [&](std::size_t i) { return nodes[std::min(i, nodes.size() - 1)]; };
+  std::vector<shaders::Corners> corners;
+  corners.reserve(nodes.size());
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    corners.push_back({nodes[i], node(i + 1), node(i + width), node(i + width + 1)});
+  }
+  return corners;
+}
+
 }  // namespace
 
 std::vector<float> with_border(const OccupancyGrid& map, double prior) {
@@ -26,19 +41,6 @@ std::vector<float> with_border(const OccupancyGrid& map, double prior) {
               cells.begin() + static_cast<std::ptrdiff_t>(j + border) * width + border);
   }
   return cells;
-}
-
-std::vector<shaders::Corners> corners_with_border(const OccupancyGrid& map, double prior) {
-  const std::vector<float> nodes = with_border(map, prior);
-  const std::size_t width = static_cast<std::size_t>(map.nx) + 2 * shaders::MAP_BORDER;
-  // The border's last row and column are the prior, as is what lies beyond them.
-  const auto node = [&](std::size_t i) { return nodes[std::min(i, nodes.size() - 1)]; };
-  std::vector<shaders::Corners> corners;
-  corners.reserve(nodes.size());
-  for (std::size_t i = 0; i < nodes.size(); ++i) {
-    corners.push_back({nodes[i], node(i + 1), node(i + width), node(i + width + 1)});
-  }
-  return corners;
 }
 
 std::uint64_t bordered_cells(const OccupancyGrid& map) {

@@ -16,11 +16,6 @@ namespace palpate {
 /// on every side, so that a clamped index finds the prior.
 std::vector<float> with_border(const OccupancyGrid& map, double prior);
 
-/// The nodes of with_border(), each with the three above and to its right: a kernel interpolates
-/// from one.
-/// Beyond the border lies the prior.
-std::vector<shaders::Corners> corners_with_border(const OccupancyGrid& map, double prior);
-
 /// Cells of the map with its border.
 std::uint64_t bordered_cells(const OccupancyGrid& map);
 
@@ -32,8 +27,8 @@ std::uint64_t most_map_cells(const gpu::Limits& limits);
 /// The fastest way in which kernels can read this many cells; nothing where no buffer holds them.
 std::optional<gpu::Access> map_access(const gpu::Limits& limits, std::uint64_t cells);
 
-/// Maps on the device, one after the other in a buffer: as with_border() has them in storage, as
-/// corners_with_border() has them in a table.
+/// Maps on the device, one after the other in a buffer: in storage the nodes of with_border(), in a
+/// table each of these with the three above and to its right.
 class BorderedMaps {
  public:
   /// Device memory that this many cells take, in bytes.

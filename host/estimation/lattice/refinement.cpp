@@ -1,9 +1,11 @@
 #include "estimation/lattice/refinement.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <numbers>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -11,6 +13,7 @@
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
+#include <glm/vec3.hpp>
 
 #include "estimation/lattice/body_window.hpp"
 #include "palpate/error.hpp"
@@ -84,6 +87,121 @@ std::vector<DisplacedBin> displaced_bins(const BodyWindow& window) {
   return bins;
 }
 
+/// A value at a place, and its weight in the fit.
+struct WeightedValue {
+  glm::dvec3 at{0.0};
+  double value = 0.0;
+  double weight = 0.0;
+};
+
+/// The maximum of a quadratic.
+struct QuadraticPeak {
+  glm::dvec3 at{0.0};
+  /// Inverse of minus the second derivatives: of the log of a density, its covariance.
+  glm::dmat3 covariance{0.0};
+};
+
+/// Solves matrix x = right in place, for a symmetric matrix, [n, n]. Returns false where the matrix
+/// is not positive definite within rounding.
+bool solve(std::vector<double> matrix, std::vector<double>& right) {
+  constexpr double rounding = 1e-9;
+  const std::size_t n = right.size();
+  std::vector<double> least;
+  for (std::size_t i = 0; i < n; ++i) {
+    least.push_back(rounding * matrix[i * n + i]);
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    const double pivot = matrix[i * n + i];
+    if (!(pivot > 0.0 && pivot > least[i])) {
+      return false;
+    }
+    for (std::size_t row = i + 1; row < n; ++row) {
+      const double factor = matrix[row * n + i] / pivot;
+      for (std::size_t column = i; column < n; ++column) {
+        matrix[row * n + column] -= factor * matrix[i * n + column];
+      }
+      right[row] -= factor * right[i];
+    }
+  }
+  for (std::size_t i = n; i-- > 0;) {
+    for (std::size_t column = i + 1; column < n; ++column) {
+      right[i] -= matrix[i * n + column] * right[column];
+    }
+    right[i] /= matrix[i * n + i];
+  }
+  return true;
+}
+
+/// The maximum of the quadratic that fits the values in weighted least squares. Coordinates that do
+/// not vary stay at 0, without variance. Returns nothing where there are fewer than two values per
+/// coefficient, too few different places, or no maximum of at least `least_curvature`.
+std::optional<QuadraticPeak> quadratic_peak(std::span<const WeightedValue> values,
+                                            const std::array<bool, 3>& varies) {
+  std::vector<int> axes;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (varies[axis]) {
+      axes.push_back(axis);
+    }
+  }
+  const std::size_t d = axes.size();
+  const std::size_t unknowns = 1 + d + d * (d + 1) / 2;
+  if (d == 0 || values.size() < 2 * unknowns) {
+    return {};
+  }
+  // The normal equations in 1, the coordinates, and their products.
+  std::vector<double> matrix(unknowns * unknowns);
+  std::vector<double> fit(unknowns);
+  std::vector<double> terms(unknowns);
+  for (const WeightedValue& value : values) {
+    std::size_t k = 0;
+    terms[k++] = 1.0;
+    for (const int axis : axes) {
+      terms[k++] = value.at[axis];
+    }
+    for (std::size_t a = 0; a < d; ++a) {
+      for (std::size_t b = a; b < d; ++b) {
+        terms[k++] = value.at[axes[a]] * value.at[axes[b]];
+      }
+    }
+    for (std::size_t row = 0; row < unknowns; ++row) {
+      for (std::size_t column = 0; column < unknowns; ++column) {
+        matrix[row * unknowns + column] += value.weight * terms[row] * terms[column];
+      }
+      fit[row] += value.weight * terms[row] * value.value;
+    }
+  }
+  if (!solve(std::move(matrix), fit)) {
+    return {};
+  }
+  // The slope vanishes where -(second derivatives) x = slope at 0.
+  std::vector<double> curvature(d * d);
+  std::vector<double> peak(fit.begin() + 1, fit.begin() + 1 + static_cast<std::ptrdiff_t>(d));
+  std::size_t k = 1 + d;
+  for (std::size_t a = 0; a < d; ++a) {
+    for (std::size_t b = a; b < d; ++b, ++k) {
+      curvature[a * d + b] -= fit[k];
+      curvature[b * d + a] -= fit[k];
+    }
+    if (!(curvature[a * d + a] > least_curvature)) {
+      return {};
+    }
+  }
+  if (!solve(curvature, peak)) {
+    return {};
+  }
+  QuadraticPeak result;
+  for (std::size_t a = 0; a < d; ++a) {
+    result.at[axes[a]] = peak[a];
+    std::vector<double> column(d);
+    column[a] = 1.0;
+    solve(curvature, column);
+    for (std::size_t b = 0; b < d; ++b) {
+      result.covariance[axes[a]][axes[b]] = column[b];
+    }
+  }
+  return result;
+}
+
 /// Peak of the quadratic in the body's motion that fits the log-belief around the mean. Nothing
 /// where the fit has no peak nearby and within the region.
 std::optional<Peak> peak_near(const BodyWindow& window, const PoseLattice& lattice,
@@ -105,7 +223,7 @@ std::optional<Peak> peak_near(const BodyWindow& window, const PoseLattice& latti
   }
   const std::array<const Axis*, 3> axes{&lattice.x_mm, &lattice.y_mm, &lattice.theta_rad};
   const std::array varies{axes[0]->count > 1, axes[1]->count > 1, axes[2]->count > 1};
-  const std::optional<QuadraticPeak> fitted = quadratic_peak(values, varies, least_curvature);
+  const std::optional<QuadraticPeak> fitted = quadratic_peak(values, varies);
   if (!fitted || glm::dot(fitted->at, fitted->at) > farthest_peak_mm * farthest_peak_mm) {
     return {};
   }
@@ -180,37 +298,6 @@ std::array<double, 9> pose_covariance(const glm::dmat3& moment, const PoseLattic
 double on_circle(const Axis& theta, double theta_rad) {
   const double period_rad = theta.upper - theta.lower;
   return theta_rad - period_rad * std::floor((theta_rad - theta.lower) / period_rad);
-}
-
-/// Solves matrix x = right in place, for a symmetric matrix, [n, n]. Returns false where the matrix
-/// is not positive definite within rounding.
-bool solve(std::vector<double> matrix, std::vector<double>& right) {
-  constexpr double rounding = 1e-9;
-  const std::size_t n = right.size();
-  std::vector<double> least;
-  for (std::size_t i = 0; i < n; ++i) {
-    least.push_back(rounding * matrix[i * n + i]);
-  }
-  for (std::size_t i = 0; i < n; ++i) {
-    const double pivot = matrix[i * n + i];
-    if (!(pivot > 0.0 && pivot > least[i])) {
-      return false;
-    }
-    for (std::size_t row = i + 1; row < n; ++row) {
-      const double factor = matrix[row * n + i] / pivot;
-      for (std::size_t column = i; column < n; ++column) {
-        matrix[row * n + column] -= factor * matrix[i * n + column];
-      }
-      right[row] -= factor * right[i];
-    }
-  }
-  for (std::size_t i = n; i-- > 0;) {
-    for (std::size_t column = i + 1; column < n; ++column) {
-      right[i] -= matrix[i * n + column] * right[column];
-    }
-    right[i] /= matrix[i * n + i];
-  }
-  return true;
 }
 
 // A larger share suits coarse bins after many touches, a smaller share fine bins after few.
@@ -291,74 +378,6 @@ PoseLattice thinned(PoseLattice lattice) {
     }
   }
   return lattice;
-}
-
-std::optional<QuadraticPeak> quadratic_peak(std::span<const WeightedValue> values,
-                                            const std::array<bool, 3>& varies,
-                                            double least_curvature) {
-  std::vector<int> axes;
-  for (int axis = 0; axis < 3; ++axis) {
-    if (varies[axis]) {
-      axes.push_back(axis);
-    }
-  }
-  const std::size_t d = axes.size();
-  const std::size_t unknowns = 1 + d + d * (d + 1) / 2;
-  if (d == 0 || values.size() < 2 * unknowns) {
-    return {};
-  }
-  // The normal equations in 1, the coordinates, and their products.
-  std::vector<double> matrix(unknowns * unknowns);
-  std::vector<double> fit(unknowns);
-  std::vector<double> terms(unknowns);
-  for (const WeightedValue& value : values) {
-    std::size_t k = 0;
-    terms[k++] = 1.0;
-    for (const int axis : axes) {
-      terms[k++] = value.at[axis];
-    }
-    for (std::size_t a = 0; a < d; ++a) {
-      for (std::size_t b = a; b < d; ++b) {
-        terms[k++] = value.at[axes[a]] * value.at[axes[b]];
-      }
-    }
-    for (std::size_t row = 0; row < unknowns; ++row) {
-      for (std::size_t column = 0; column < unknowns; ++column) {
-        matrix[row * unknowns + column] += value.weight * terms[row] * terms[column];
-      }
-      fit[row] += value.weight * terms[row] * value.value;
-    }
-  }
-  if (!solve(std::move(matrix), fit)) {
-    return {};
-  }
-  // The slope vanishes where -(second derivatives) x = slope at 0.
-  std::vector<double> curvature(d * d);
-  std::vector<double> peak(fit.begin() + 1, fit.begin() + 1 + static_cast<std::ptrdiff_t>(d));
-  std::size_t k = 1 + d;
-  for (std::size_t a = 0; a < d; ++a) {
-    for (std::size_t b = a; b < d; ++b, ++k) {
-      curvature[a * d + b] -= fit[k];
-      curvature[b * d + a] -= fit[k];
-    }
-    if (!(curvature[a * d + a] > least_curvature)) {
-      return {};
-    }
-  }
-  if (!solve(curvature, peak)) {
-    return {};
-  }
-  QuadraticPeak result;
-  for (std::size_t a = 0; a < d; ++a) {
-    result.at[axes[a]] = peak[a];
-    std::vector<double> column(d);
-    column[a] = 1.0;
-    solve(curvature, column);
-    for (std::size_t b = 0; b < d; ++b) {
-      result.covariance[axes[a]][axes[b]] = column[b];
-    }
-  }
-  return result;
 }
 
 double flattening_root(std::span<const DisplacedBin> bins, double least) {

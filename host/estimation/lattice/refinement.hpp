@@ -1,10 +1,7 @@
 #pragma once
 
-#include <array>
-#include <optional>
 #include <span>
 
-#include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 
 #include "estimation/bin_box.hpp"
@@ -28,29 +25,6 @@ RefinedPose refine(const BoxLogLikelihood& log_likelihood, const PoseLattice& la
 /// steps of 0.1 mm at most, and at least three bins of an axis that has as many. Its region lies
 /// within the lattice's, and its centres are centres of the lattice.
 PoseLattice thinned(PoseLattice lattice);
-
-/// A value at a place, and its weight in the fit.
-struct WeightedValue {
-  glm::dvec3 at{0.0};
-  double value = 0.0;
-  double weight = 0.0;
-};
-
-/// The maximum of a quadratic.
-struct QuadraticPeak {
-  glm::dvec3 at{0.0};
-  /// Inverse of minus the second derivatives: the covariance, where the quadratic is the log of a
-  /// density.
-  glm::dmat3 covariance{0.0};
-};
-
-/// The maximum of the quadratic that fits the values in weighted least squares. Coordinates that do
-/// not vary stay at 0, without variance. Returns nothing where there are fewer than two values per
-/// coefficient, too few different places, or no maximum.
-/// @param least_curvature of a maximum, along each coordinate: values per coordinate squared
-std::optional<QuadraticPeak> quadratic_peak(std::span<const WeightedValue> values,
-                                            const std::array<bool, 3>& varies,
-                                            double least_curvature);
 
 /// A bin of a window.
 struct DisplacedBin {
