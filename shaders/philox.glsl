@@ -1,6 +1,6 @@
 // Philox-4x32-10 (Salmon, Moraes, Dror and Shaw 2011): four random words as a function of a counter
 // and a key. There is no state, so that the order of execution does not matter.
-// host/estimation/particles/philox.hpp computes the same words.
+// host/estimation/particles/particle_draws.hpp computes the same words.
 
 uvec4 philox(uvec4 counter, uvec2 key) {
   for (uint round = 0; round < 10; ++round) {

@@ -80,7 +80,8 @@ struct Limits {
   float timestamp_ns = 0.0F;            ///< ns per tick; 0 if the queue has no timestamps
 };
 
-/// Memory of all buffers of a device, staging included, in bytes.
+/// Memory of all buffers of a device, staging included, in bytes; tests hold it against what was
+/// planned.
 struct MemoryUse {
   VkDeviceSize now = 0;
   VkDeviceSize peak = 0;
@@ -111,10 +112,11 @@ class Context {
   const Limits& limits() const { return limits_; }
   /// Stays empty on a device that was handed in: the program gets the messages of its instance.
   ValidationLog& validation() { return instance_ ? instance_->validation() : no_messages_; }
-  /// Lowers the device's own limits to these, where they are lower, so that a test on any device
-  /// reaches the cases of much smaller devices and much larger problems.
+  /// Lowers the device's own limits to these, where they are lower. Only tests do so: on any device
+  /// they reach the cases of much smaller devices and much larger problems.
   void lower_limits(const Limits& limits);
 
+  /// What buffers take and took at most; only tests ask.
   MemoryUse memory_use() const;
   /// Counts memory; buffers call this pair when they allocate memory and when they free it.
   void take_memory(VkDeviceSize bytes);

@@ -85,8 +85,9 @@ struct LongAxis {
 class LeastLimitsOf : public LeastLimits, public testing::WithParamInterface<LongAxis> {};
 
 TEST_P(LeastLimitsOf, BlurAsTheDeviceDoes) {
-  // Of a tenth of the least, so that a tenth of the bins passes it. Four objects: their planes are
-  // more than a table's texels and a dispatch's workgroups where there are 1,700 thetas.
+  // The limits are a tenth of the least, so that a tenth of the bins passes them. There are four
+  // objects: at 1,700 thetas their planes are more than a table's texels and a dispatch's
+  // workgroups.
   Device tenth = least_device(10);
   std::vector<Hypothesis> objects = two_maps();
   objects.insert(objects.end(), two_maps().begin(), two_maps().end());

@@ -18,7 +18,7 @@ namespace palpate::likelihood_table_test {
 
 // What the method allows a log-likelihood to differ from float64, in nats per touch of 36 elements.
 constexpr double per_touch = 1e-4;
-// Of the maps' log odds: within the tables' nodes.
+// The maps' log odds, as steep as this, lie within the tables' nodes.
 constexpr double steepness = 12.0;
 constexpr double node_step = 0.05;
 // The second derivative of Eq. 7 in the log odds is at most 1, so that a straight line between two

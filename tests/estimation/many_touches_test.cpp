@@ -24,7 +24,7 @@ TEST(ManyTouches, AtOnceCountAsMuchAsOneByOne) {
 }
 
 TEST(ManyTouches, OfOneSpotAllCountInTheMap) {
-  // The same few touches over and over: their float64 sum, so many times, is that of all.
+  // A few touches are repeated over and over: the float64 sum of all is so many times theirs.
   constexpr int times = 2000;
   const Recording recording = random_recording(4, 36, 143);
   std::vector<Touch> touches;

@@ -39,7 +39,7 @@ OccupancyGrid random_map(int nx, int ny, double cell_mm, double steepness, std::
 /// Every touch of a recording.
 std::vector<Touch> all_touches(const Recording& recording);
 
-/// The same touches in a robot frame moved by T_moved_robot.
+/// A recording's touches as a robot frame moved by T_moved_robot has them.
 Recording moved(Recording recording, const Pose& T_moved_robot);
 
 /// Largest absolute difference, element by element; infinite where the sizes differ.

@@ -27,7 +27,7 @@ struct ParticleOptions {
   PoseLattice region;
   ContactModel contact = {};  ///< what the sensor says about a place (Eq. 3, 7)
   double motion_mm = 1.0;     ///< standard deviation of the noise added to x and y at each touch
-  double motion_rad = 0.1;    ///< the same for theta
+  double motion_rad = 0.1;    ///< standard deviation of the noise added to theta at each touch
   Resampling resampling = Resampling::multinomial;
   /// Augmented MCL (Thrun, Burgard and Fox 2005, Table 8.3), the paper's second variant: each new
   /// particle is a random one with probability max(0, 1 - w_fast / w_slow). Both are running

@@ -19,11 +19,12 @@ struct Trial {
 /// made-up maps in turn, of unequal weights and cells, under 1 to 9 touches.
 Trial make_trial(const std::array<int, 3>& bins, std::uint64_t seed);
 
-/// The same where touches are uncertain: of standard deviations from 0 to beyond half the region,
-/// about pivots near and far, on lattices some of which have an axis of one bin.
+/// A trial as make_trial() has it where touches are displaced: by standard deviations from 0 to
+/// beyond half the region, about pivots near and far, on lattices some of which have an axis of one
+/// bin.
 Trial make_displaced_trial(const std::array<int, 3>& bins, std::uint64_t seed);
 
-/// The same where objects slip, some of them between touches that are uncertain, too.
+/// A trial as make_trial() has it where objects slip, some of them between displaced touches.
 Trial make_slipping_trial(const std::array<int, 3>& bins, std::uint64_t seed);
 
 /// Three objects that slip between 20 touches of the first, after which few bins matter.

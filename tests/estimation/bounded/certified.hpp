@@ -34,7 +34,7 @@ Certified expect_certified(const BoundedPosterior& posterior, std::span<const Hy
                            const BoundedOptions& options, const reference::Posterior& truth,
                            double nats = 1e-9);
 
-/// The same of a new posterior after the touches.
+/// Expects all of this of a new posterior after the touches.
 Certified expect_certified(std::span<const Hypothesis> objects, const BoundedOptions& options,
                            std::span<const Touch> touches, double nats = 1e-9);
 

@@ -104,7 +104,7 @@ TEST(RefinedPose, OfAFullCircleLiesOnItWhereverItBegins) {
         return -0.5 * (at.x * at.x + at.y * at.y) / 0.16 -
                0.5 * turn_mm * turn_mm / (sd_mm * sd_mm);
       };
-      // The same bins, of which the seam is once at the peak and once opposite of it.
+      // Both lattices have the same bins. One has its seam at the peak, the other opposite.
       PoseLattice lattice = lattice_from(0.0);
       lattice.x_mm = lattice.y_mm = {-1.0, 1.0, 8};
       PoseLattice turned = lattice;

@@ -89,7 +89,7 @@ TEST(StillArray, WhoseElementsMoveIsEvaluatedAnew) {
     places.insert(places.end(), recording.elements_mm.begin(), recording.elements_mm.end());
   }
   recording.elements_mm = places;
-  // Of the second touch a single element, of the third and fourth all of them.
+  // A single element of the second touch moves, and all of the third and fourth.
   recording.elements_mm[elements + 7].y += 1.5;
   for (std::size_t i = 2 * elements; i < 4 * elements; ++i) {
     recording.elements_mm[i].x -= 1.25;

@@ -95,7 +95,7 @@ TEST(ParticleDrawing, SystematicTakesEveryParticleAsOftenAsItsWeightSays) {
 }
 
 TEST(ParticleDrawing, EveryTouchDrawsAnew) {
-  // The same weights twice: the numbers of the second touch are not those of the first.
+  // Two draws from as many weights differ where their seeds do.
   const Draw one = draw_once(Resampling::multinomial, 1000, 2, 7);
   const Draw other = draw_once(Resampling::multinomial, 1000, 2, 8);
   EXPECT_EQ(one.expected.size(), other.expected.size());
