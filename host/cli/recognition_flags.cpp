@@ -79,12 +79,12 @@ void add_uncertainty_flags(CLI::App& command, Request& request) {
   add_text_flag(
       command, "--none", request.none,
       "Prior weight of \"(none)\", an object that was never learned; a map has the weight 1. "
-      "Without W it is a ninth of the sum of the maps' weights: a probability of one in ten before "
-      "the first touch. (none) explains each touch by a piece of some known object; the pieces "
-      "need not belong to one pose. One touch cannot tell: after it, the odds are about the "
-      "prior's, unless a sensor model has learned what a touch of no known object is like. 0 "
-      "leaves (none) out, as particles do. By default it is also left out where the bins are too "
-      "wide to tell it, or where the learned sensor trusts no touch enough "
+      "Without W (recordings stand before the flag) it is a ninth of the sum of the maps' weights: "
+      "a probability of one in ten before the first touch. (none) explains each touch by a piece "
+      "of some known object; the pieces need not belong to one pose. One touch cannot tell: after "
+      "it, the odds are about the prior's, unless a sensor model has learned what a touch of no "
+      "known object is like. 0 leaves (none) out, as particles do. By default it is also left out "
+      "where the bins are too wide to tell it, or where the learned sensor trusts no touch enough "
       "[default: as without W]")
       ->type_name("W")
       ->expected(0, 1)

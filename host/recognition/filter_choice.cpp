@@ -65,8 +65,7 @@ std::optional<double> none_weight(const Request& request, std::span<const Hypoth
   const NoneWeight given = request.none.value_or(Automatic{});
   if (const auto* weight = std::get_if<double>(&given)) {
     if (!(*weight >= 0.0 && std::isfinite(*weight))) {
-      refuse_option("none", *weight,
-                    "give a weight from 0, or no value; recordings stand before the flags");
+      refuse_option("none", *weight, "give a weight from 0, or no value");
     }
     return *weight > 0.0 ? std::optional(*weight) : std::nullopt;
   }

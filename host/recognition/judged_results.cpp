@@ -21,7 +21,7 @@ namespace {
 using Json = nlohmann::json;
 namespace fs = std::filesystem;
 
-constexpr const char* remedy = "give what palpate recognize --json or palpate batch wrote";
+constexpr const char* remedy = "give what palpate recognize (`json`) or palpate batch wrote";
 
 /// One record, and the words that name it in a message.
 class RecordReader {

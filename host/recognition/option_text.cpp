@@ -137,7 +137,7 @@ void read_option(const std::string& what, const std::string& text, NoneWeight& v
   }
   const std::optional<double> weight = number_of(text);
   if (!weight || !(*weight >= 0.0)) {
-    refuse_text(what, text, "give a weight from 0, or no value; recordings stand before the flags");
+    refuse_text(what, text, "give a weight from 0, or no value");
   }
   value = *weight;
 }

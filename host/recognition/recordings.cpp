@@ -155,8 +155,7 @@ std::vector<std::filesystem::path> map_files(const std::filesystem::path& argume
   }
   std::vector<std::filesystem::path> files = maps_in(argument);
   if (files.empty()) {
-    refuse(argument, "a folder without maps; build some with palpate map RECORDING... -o {}",
-           (argument / "").string());
+    refuse(argument, "a folder without maps; build some with palpate map");
   }
   return files;
 }

@@ -154,7 +154,7 @@ TEST_F(UncertaintyFlags, NoneTakesNoFileForItsNumber) {
   EXPECT_EQ(palpate({"recognize", "--maps", "maps", "--none", "u.h5"}).status, 0)
       << "the recording that every call needs";
   expect_refused({"recognize", "u.h5", "--maps", "maps", "--none", "v.h5"},
-                 {"--none v.h5", "from 0", "recordings stand before"});
+                 {"--none v.h5", "from 0", "or no value"});
   for (const char* wrong : {"nan", "inf", "-1", "x"}) {
     expect_refused(with({std::string("--none=") + wrong}), {"--none", wrong, "from 0"});
   }
