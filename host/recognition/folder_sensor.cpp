@@ -5,8 +5,8 @@
 
 #include <fmt/format.h>
 
+#include "io/file_hash.hpp"
 #include "io/input_file.hpp"
-#include "recognition/batch/batch_task.hpp"
 
 namespace palpate {
 

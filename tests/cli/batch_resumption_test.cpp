@@ -10,7 +10,7 @@
 #include <stdexcept>
 
 #include "batch_folder.hpp"
-#include "cli/batch/results_folder.hpp"
+#include "cli/results_folder.hpp"
 
 namespace palpate::batch_resumption_test {
 

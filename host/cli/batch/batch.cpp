@@ -15,11 +15,11 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/batch/batch_run.hpp"
-#include "cli/batch/results_folder.hpp"
 #include "cli/commands.hpp"
 #include "cli/options.hpp"
 #include "cli/progress.hpp"
 #include "cli/recognition_flags.hpp"
+#include "cli/results_folder.hpp"
 #include "io/input_file.hpp"
 #include "recognition/batch/batch_resolution.hpp"
 #include "recognition/batch/batch_task.hpp"
@@ -203,8 +203,8 @@ BatchCounts compute(const BatchRun& run, SettledBatch& settled,
       });
 }
 
-std::string summary(const BatchArguments& options, const Shard& shard, const Chunks& chunks,
-                    const BatchCounts& now, double seconds) {
+std::string batch_summary(const BatchArguments& options, const Shard& shard, const Chunks& chunks,
+                          const BatchCounts& now, double seconds) {
   const std::size_t failed = chunks.finished.failed + now.failed;
   std::string text = fmt::format("{}: {} unknown{}", options.results, chunks.unknowns,
                                  chunks.unknowns == 1 ? "" : "s");
@@ -265,7 +265,7 @@ int batch(const BatchArguments& options) {
                    .verbose = options.verbose},
                   settled, open);
   }
-  fmt::print("{}", summary(options, shard, chunks, now, seconds_since(begin)));
+  fmt::print("{}", batch_summary(options, shard, chunks, now, seconds_since(begin)));
   return chunks.finished.failed + now.failed > 0 ? some_failed : 0;
 }
 

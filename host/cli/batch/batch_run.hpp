@@ -4,7 +4,7 @@
 #include <functional>
 #include <vector>
 
-#include "cli/batch/results_folder.hpp"
+#include "cli/results_folder.hpp"
 #include "recognition/batch/batch_task.hpp"
 #include "recognition/batch/input_reading.hpp"
 #include "recognition/recognition_task.hpp"

@@ -5,9 +5,9 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include "cli/batch/results_folder.hpp"
 #include "cli/commands.hpp"
 #include "cli/options.hpp"
+#include "cli/results_folder.hpp"
 #include "io/atomic_file.hpp"
 #include "io/command_files.hpp"
 #include "io/file_identity.hpp"

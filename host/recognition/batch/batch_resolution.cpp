@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "io/file_hash.hpp"
 #include "recognition/refused_option.hpp"
 #include "recognition/resolve.hpp"
 

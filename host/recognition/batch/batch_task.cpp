@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <fstream>
-#include <iterator>
 #include <utility>
 
 #include <fmt/ranges.h>
@@ -370,24 +369,6 @@ std::vector<bool> equal_chunks(const BatchTask& before, const BatchTask& now) {
     equal[i] = old[i] == parts[i];
   }
   return equal;
-}
-
-std::string hash_of(std::string_view bytes) {
-  std::uint64_t hash = 0xcbf29ce484222325;
-  for (const char c : bytes) {
-    hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3;
-  }
-  return fmt::format("{:016x}", hash);
-}
-
-std::string hash_of_file(const fs::path& file) {
-  require_readable(file);
-  std::ifstream stream(file, std::ios::binary);
-  const std::string bytes{std::istreambuf_iterator<char>(stream), {}};
-  if (!stream) {
-    refuse(file, "cannot be read; copy it again");
-  }
-  return hash_of(bytes);
 }
 
 }  // namespace palpate

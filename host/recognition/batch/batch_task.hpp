@@ -101,9 +101,4 @@ std::string difference_of_inputs(const BatchTask& before, const BatchTask& now);
 /// [chunk of `now`] whether it holds the same unknowns in `before`.
 std::vector<bool> equal_chunks(const BatchTask& before, const BatchTask& now);
 
-/// Hash of bytes, in hexadecimal (FNV-1a, 64 bits): tells files apart that nobody has forged.
-std::string hash_of(std::string_view bytes);
-/// Hash of a file's content. @throws Error
-std::string hash_of_file(const std::filesystem::path& file);
-
 }  // namespace palpate

@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "io/csv_table.hpp"
+#include "io/file_hash.hpp"
 #include "io/input_file.hpp"
 #include "model/printable.hpp"
 #include "recognition/option_text.hpp"

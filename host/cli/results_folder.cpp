@@ -1,4 +1,4 @@
-#include "cli/batch/results_folder.hpp"
+#include "cli/results_folder.hpp"
 
 #include <fcntl.h>
 
