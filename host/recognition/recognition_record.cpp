@@ -163,13 +163,6 @@ GroundTruth ground_truth(const std::string& object, const std::optional<Truth>& 
   return truth ? GroundTruth{truth->object, truth->T_object_robot} : GroundTruth{object, {}};
 }
 
-Unknown unknown_of(const Recording& recording) {
-  return {.recording = recording.path,
-          .frame = {},
-          .touches = recording.touches(0, recording.size()),
-          .truth = ground_truth(recording.object, recording.truth)};
-}
-
 bool array_is_still(std::span<const Unknown> unknowns) {
   constexpr std::size_t large = 256;
   const auto is_press = [&](const Unknown& unknown) {

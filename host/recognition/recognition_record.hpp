@@ -32,8 +32,6 @@ struct Unknown {
   GroundTruth truth;
   std::string error = {};  ///< why the touches are missing, such as a file that cannot be read
 };
-/// All touches of a recording as one unknown.
-Unknown unknown_of(const Recording& recording);
 
 /// Whether the unknowns are single presses of one large array that stays in its place, so that
 /// HistogramOptions::still_array saves time.

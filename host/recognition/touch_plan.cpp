@@ -136,6 +136,21 @@ double unknown_nats(const Plan& plan) {
                                          : plan.both_nats;
 }
 
+/// Entropy of the labels in nats, "(none)" left out.
+double label_entropy(std::span<const double> identity, const RecognitionTask& task) {
+  double total = 0.0;
+  for (std::size_t i = 0; i < identity.size(); ++i) {
+    total += task.labels[i] == none_label ? 0.0 : identity[i];
+  }
+  double entropy = 0.0;
+  for (std::size_t i = 0; i < identity.size(); ++i) {
+    if (task.labels[i] != none_label && identity[i] > 0.0) {
+      entropy -= identity[i] / total * std::log(identity[i] / total);
+    }
+  }
+  return entropy;
+}
+
 }  // namespace
 
 PlanGoal parse_goal(std::string_view option, const std::string& text) {
@@ -303,20 +318,6 @@ std::vector<std::string> warnings_of(const Plan& plan) {
     warnings.push_back(limit);
   }
   return warnings;
-}
-
-double label_entropy(std::span<const double> identity, const RecognitionTask& task) {
-  double total = 0.0;
-  for (std::size_t i = 0; i < identity.size(); ++i) {
-    total += task.labels[i] == none_label ? 0.0 : identity[i];
-  }
-  double entropy = 0.0;
-  for (std::size_t i = 0; i < identity.size(); ++i) {
-    if (task.labels[i] != none_label && identity[i] > 0.0) {
-      entropy -= identity[i] / total * std::log(identity[i] / total);
-    }
-  }
-  return entropy;
 }
 
 OccupancyField expected_occupancy(std::span<const PoseSample> samples, const RecognitionTask& task,

@@ -107,9 +107,6 @@ std::string limit_words(const Plan& plan);
 /// What looks wrong with the touches, then limit_words().
 std::vector<std::string> warnings_of(const Plan& plan);
 
-/// Entropy of the labels in nats, "(none)" left out.
-double label_entropy(std::span<const double> identity, const RecognitionTask& task);
-
 /// How probably a place is occupied by the object, [ny, nx], over places in the robot frame.
 struct OccupancyField {
   glm::dvec2 lower_mm{0.0};  ///< corner of cell (0, 0)

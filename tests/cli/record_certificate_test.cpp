@@ -9,6 +9,7 @@
 #include "cli/step_words.hpp"
 #include "recognition/record_json.hpp"
 #include "sample_files.hpp"
+#include "unknown_of.hpp"
 
 namespace palpate::cli::record_certificate_test {
 

@@ -14,6 +14,7 @@
 #include "palpate/pose_error.hpp"
 #include "recognition/record_json.hpp"
 #include "sample_files.hpp"
+#include "unknown_of.hpp"
 
 namespace palpate::cli::record_table_test {
 

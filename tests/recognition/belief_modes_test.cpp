@@ -14,6 +14,7 @@
 #include "recognition/recognition_record.hpp"
 #include "shapes.hpp"
 #include "synthetic.hpp"
+#include "unknown_of.hpp"
 
 namespace palpate::belief_modes_test {
 

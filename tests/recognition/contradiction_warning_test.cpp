@@ -8,6 +8,7 @@
 
 #include "letters.hpp"
 #include "model/displacement_points.hpp"
+#include "unknown_of.hpp"
 
 namespace palpate::contradiction_warning_test {
 

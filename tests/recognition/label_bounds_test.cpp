@@ -11,6 +11,7 @@
 #include "recognition/recognition_record.hpp"
 #include "shapes.hpp"
 #include "synthetic.hpp"
+#include "unknown_of.hpp"
 
 namespace palpate::label_bounds_test {
 

@@ -12,6 +12,7 @@
 #include "shapes.hpp"
 #include "synthetic.hpp"
 #include "touched_shape.hpp"
+#include "unknown_of.hpp"
 
 namespace palpate::learned_recognition_test {
 

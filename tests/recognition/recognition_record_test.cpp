@@ -12,6 +12,7 @@
 #include "shapes.hpp"
 #include "synthetic.hpp"
 #include "touched_shape.hpp"
+#include "unknown_of.hpp"
 
 namespace palpate::recognition_record_test {
 

@@ -14,6 +14,7 @@
 #include "palpate/pose_error.hpp"
 #include "recognition/recognition_record.hpp"
 #include "shapes.hpp"
+#include "unknown_of.hpp"
 
 namespace palpate::surprise_test {
 

@@ -7,6 +7,7 @@
 #include "letters.hpp"
 #include "palpate/rotational_symmetry.hpp"
 #include "recognition/recognition_record.hpp"
+#include "unknown_of.hpp"
 
 namespace palpate::turn_warning_test {
 

@@ -13,6 +13,7 @@
 #include "recognition/filter_choice.hpp"
 #include "recognition/recognition_record.hpp"
 #include "sanitized.hpp"
+#include "unknown_of.hpp"
 
 namespace palpate::warnings_test {
 

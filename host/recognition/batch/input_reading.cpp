@@ -117,6 +117,25 @@ std::string placement_of(std::span<const Unknown> unknowns) {
                  std::string(bytes_of(first.elements_mm)));
 }
 
+/// @param inferred whose pressure unit the recording must have; none: any unit will do
+/// @throws Error (Fault::input) where the recording is at fault
+ReadInput read_input(RecordingReader& reader, const BatchInput& input, const Request& request,
+                     const BatchInference* inferred) {
+  const auto recording = std::make_shared<Recording>(reader.read(input.path));
+  Recording like = inferred == nullptr ? Recording{} : Recording{.path = inferred->unit_from};
+  like.pressure_unit = inferred == nullptr ? recording->pressure_unit : inferred->pressure_unit;
+  require_touches(*recording, like);
+  replace_array(request, recording->path, recording->elements(), recording->elements_mm);
+  ReadInput read{recording,
+                 unknowns_in(request, input.frames ? input.frames : request.frames, *recording)};
+  for (Unknown& unknown : read.unknowns) {
+    if (!input.label.empty() && unknown.truth.label != input.label) {
+      unknown.truth = {input.label, {}};
+    }
+  }
+  return read;
+}
+
 InputSurvey survey_of(RecordingReader& reader, const BatchEntry& entry, const Request& request) {
   try {
     const ReadInput read = read_input(reader, entry.input, request, nullptr);
@@ -201,23 +220,6 @@ std::vector<BatchEntry> list_inputs(std::span<const std::string> arguments) {
     entry.stamp = stamp_of(entry.input.path);
   }
   return inputs;
-}
-
-ReadInput read_input(RecordingReader& reader, const BatchInput& input, const Request& request,
-                     const BatchInference* inferred) {
-  const auto recording = std::make_shared<Recording>(reader.read(input.path));
-  Recording like = inferred == nullptr ? Recording{} : Recording{.path = inferred->unit_from};
-  like.pressure_unit = inferred == nullptr ? recording->pressure_unit : inferred->pressure_unit;
-  require_touches(*recording, like);
-  replace_array(request, recording->path, recording->elements(), recording->elements_mm);
-  ReadInput read{recording,
-                 unknowns_in(request, input.frames ? input.frames : request.frames, *recording)};
-  for (Unknown& unknown : read.unknowns) {
-    if (!input.label.empty() && unknown.truth.label != input.label) {
-      unknown.truth = {input.label, {}};
-    }
-  }
-  return read;
 }
 
 ReadInput read_entry(RecordingReader& reader, const BatchTask& task, const BatchEntry& entry,

@@ -26,15 +26,9 @@ struct ReadInput {
   std::vector<Unknown> unknowns;
 };
 
-/// Reads an input.
-/// @param request completed
-/// @param inferred whose pressure unit the recording must have; none: any unit will do
-/// @throws Error (Fault::input) where the recording is at fault
-ReadInput read_input(RecordingReader& reader, const BatchInput& input, const Request& request,
-                     const BatchInference* inferred);
-
 /// Reads an input of a settled task: as many unknowns as the task counts, each with the error where
 /// the input is at fault.
+/// @param request completed
 /// @throws Error where the file is not as it was when the task was settled, or the machine fails
 ReadInput read_entry(RecordingReader& reader, const BatchTask& task, const BatchEntry& entry,
                      const Request& request);
