@@ -318,7 +318,7 @@ void LiveRecognition::use(const Job& job) {
     return;
   }
   const Touch touch = view_of(*job.touch);
-  const GroundTruth truth = ground_truth(description_.object, description_.truth);
+  const PartialTruth truth = partial_truth(description_.object, description_.truth);
   RecognitionStep step = take_step(recogniser_, task_, std::span(&touch, 1), truth);
   used_.push_back({job});
   const double latency_ms =
@@ -347,7 +347,7 @@ void LiveRecognition::leave_out_now(std::size_t touch, bool out) {
   }
   recogniser_.reset();
   tell(used_.back().job, take_step(recogniser_, task_, touches,
-                                   ground_truth(description_.object, description_.truth)));
+                                   partial_truth(description_.object, description_.truth)));
 }
 
 void LiveRecognition::tell(const Job& job, RecognitionStep step) {

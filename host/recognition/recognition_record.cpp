@@ -38,7 +38,7 @@ void measure_errors(const RecognitionTask& task, RecognitionStep& step) {
 }
 
 /// The truth in the object frame of its label's map.
-GroundTruth in_frame_of_map(const RecognitionTask& task, GroundTruth truth) {
+PartialTruth in_frame_of_map(const RecognitionTask& task, PartialTruth truth) {
   const auto object = std::ranges::find(task.hypotheses, truth.label,
                                         [](const Hypothesis& one) { return one.map.label; });
   if (truth.T_object_robot && object != task.hypotheses.end()) {
@@ -159,8 +159,8 @@ std::optional<Pose> RecognitionStep::true_T_robot_object() const {
                   : std::nullopt;
 }
 
-GroundTruth ground_truth(const std::string& object, const std::optional<Truth>& truth) {
-  return truth ? GroundTruth{truth->object, truth->T_object_robot} : GroundTruth{object, {}};
+PartialTruth partial_truth(const std::string& object, const std::optional<Truth>& truth) {
+  return truth ? PartialTruth{truth->object, truth->T_object_robot} : PartialTruth{object, {}};
 }
 
 bool array_is_still(std::span<const Unknown> unknowns) {
@@ -179,7 +179,7 @@ void RecognitionRecord::require_steps() const {
   }
 }
 
-RecognitionStep judge(const Estimate& estimate, const GroundTruth& truth,
+RecognitionStep judge(const Estimate& estimate, const PartialTruth& truth,
                       const RecognitionTask& task, std::span<const TouchEvidence> touches,
                       const std::optional<RefinedPose>& refined) {
   const std::vector<std::string>& labels = task.labels;
@@ -210,7 +210,7 @@ RecognitionStep judge(const Estimate& estimate, const GroundTruth& truth,
 }
 
 RecognitionStep take_step(Recogniser& recogniser, const RecognitionTask& task,
-                          std::span<const Touch> touches, const GroundTruth& truth,
+                          std::span<const Touch> touches, const PartialTruth& truth,
                           const std::function<void(double)>& progress,
                           std::optional<double> tolerance) {
   const Updated updated = update(recogniser, task, touches, progress);

@@ -16,20 +16,20 @@
 
 namespace palpate {
 
-/// What is known about an unknown object.
-struct GroundTruth {
+/// What is known of the truth about an unknown object: perhaps its label, and with it its pose.
+struct PartialTruth {
   std::string label;                   ///< "" where it is not known
   std::optional<Pose> T_object_robot;  ///< where it is known
 };
 /// The truth that a recording or a sensor has, or else the label of the object that it names.
-GroundTruth ground_truth(const std::string& object, const std::optional<Truth>& truth);
+PartialTruth partial_truth(const std::string& object, const std::optional<Truth>& truth);
 
 /// One unknown object: its touches in order, views into memory that the caller keeps alive.
 struct Unknown {
   std::string recording;             ///< file of the touches, or another name
   std::optional<std::size_t> frame;  ///< index in the file where each touch is an unknown
   std::vector<Touch> touches;
-  GroundTruth truth;
+  PartialTruth truth;
   std::string error = {};  ///< why the touches are missing, such as a file that cannot be read
 };
 
@@ -69,7 +69,7 @@ struct RecognitionStep {
   Mode mode;
   std::optional<RefinedPose> refined;  ///< empty for particles
   bool contradicted = false;           ///< see Estimate
-  GroundTruth truth = {};              ///< in the object frame of the label's map
+  PartialTruth truth = {};             ///< in the object frame of the label's map
   /// n-fold symmetry of the mode's object: its map's, or what the map shows
   /// (OccupancyGrid::suggested_symmetry) where touches do not tell such turns apart. Turned poses
   /// are equal, and pose errors ignore such turns.
@@ -136,7 +136,7 @@ struct RecognitionRecord {
 /// @param touches of the unknown so far, for the task's features and temperature, which is that of
 /// one touch where none are given
 /// @param refined the refined pose near the estimate's mode
-RecognitionStep judge(const Estimate& estimate, const GroundTruth& truth,
+RecognitionStep judge(const Estimate& estimate, const PartialTruth& truth,
                       const RecognitionTask& task, std::span<const TouchEvidence> touches = {},
                       const std::optional<RefinedPose>& refined = {});
 
@@ -149,13 +149,13 @@ BeliefPlaces places_of(const Recogniser& recogniser, const Estimate& estimate,
 Decision decide(const RecognitionStep& step, const RecognitionTask& task);
 
 /// Updates the belief with more touches of the unknown, then judges the estimate and its refined
-/// pose. Of these touches a histogram takes the last three one by one, to measure their surprise;
-/// the belief is the same, bit for bit.
+/// pose. A filter with bins takes the last three of these touches one by one, to measure their
+/// surprise; the belief is the same, bit for bit.
 /// @param touches those that the recogniser has not yet taken
 /// @param tolerance see Recogniser::estimate()
 /// @throws Error as Recogniser::update() does
 RecognitionStep take_step(Recogniser& recogniser, const RecognitionTask& task,
-                          std::span<const Touch> touches, const GroundTruth& truth,
+                          std::span<const Touch> touches, const PartialTruth& truth,
                           const std::function<void(double)>& progress = {},
                           std::optional<double> tolerance = {});
 

@@ -75,7 +75,7 @@ std::string verdict_text(Verdict verdict) {
   return "does not fit";
 }
 
-nlohmann::ordered_json truth_to_json(const GroundTruth& truth) {
+nlohmann::ordered_json truth_to_json(const PartialTruth& truth) {
   nlohmann::ordered_json json{{"object", truth.label}};
   if (truth.T_object_robot) {
     json["T_robot_object"] = to_json(inverse(*truth.T_object_robot));

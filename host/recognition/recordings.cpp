@@ -92,7 +92,7 @@ std::vector<Unknown> unknowns_in(const Request& request, const std::optional<Fra
     refuse(recording.path, "has {} touches; `touches {}` is too many", end - begin,
            *request.touches);
   }
-  const GroundTruth truth = ground_truth(recording.object, recording.truth);
+  const PartialTruth truth = partial_truth(recording.object, recording.truth);
   if (!request.each_frame) {
     end = request.touches ? begin + static_cast<std::size_t>(*request.touches) : end;
     return {{recording.path, {}, recording.touches(begin, end), truth}};

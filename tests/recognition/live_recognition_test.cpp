@@ -27,7 +27,7 @@ TEST(LiveRecognition, BelievesOfAStreamWhatRecogniseDoesOfItsTouches) {
 
   const SensorDescription& description = sensor->description();
   Unknown unknown{.recording = "stream",
-                  .truth = ground_truth(description.object, description.truth)};
+                  .truth = partial_truth(description.object, description.truth)};
   for (const LiveTouch& touch : touches) {
     unknown.touches.push_back({.T_robot_sensor = *touch.touch.T_robot_sensor,
                                .elements_mm = description.elements_mm,

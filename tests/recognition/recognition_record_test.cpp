@@ -280,11 +280,11 @@ TEST(TakeStep, JudgesTheRefinedPoseToo) {
   EXPECT_GT(step.refine_seconds, 0.0);
 }
 
-TEST(GroundTruth, IsTheTruthOrElseTheObjectThatIsNamed) {
-  const GroundTruth named = ground_truth("L", {});
+TEST(PartialTruth, IsTheTruthOrElseTheObjectThatIsNamed) {
+  const PartialTruth named = partial_truth("L", {});
   EXPECT_EQ(named.label, "L");
   EXPECT_FALSE(named.T_object_robot);
-  const GroundTruth known = ground_truth("", Truth{.object = "disc", .T_object_robot = {}});
+  const PartialTruth known = partial_truth("", Truth{.object = "disc", .T_object_robot = {}});
   EXPECT_EQ(known.label, "disc");
   EXPECT_TRUE(known.T_object_robot);
 }
