@@ -164,15 +164,15 @@ std::string dropped_text(const RecognitionStep& step) {
 }
 
 std::string unproven_sentence(const RecognitionStep& step, const RecognitionTask& task) {
-  const auto* bounded = std::get_if<BoundedOptions>(&task.filter);
-  if (bounded == nullptr || !step.certificate) {
+  const FilterTraits traits = traits_of(task.filter);
+  if (!traits.tolerance || !step.certificate) {
     return "";
   }
   const auto [low, high] = step.identity_bounds[step.best];
-  const bool proven = step.certificate->dropped_mass <= bounded->tolerance;
+  const bool proven = step.certificate->dropped_mass <= *traits.tolerance;
   // "(none)" has searches of its own, whose end a budget may not await.
   constexpr double told = 0.05;
-  if (proven && (!bounded->budget_s || high - low <= told)) {
+  if (proven && (!traits.budget_s || high - low <= told)) {
     return "";
   }
   const double unproven = 100.0 * step.certificate->dropped_mass;
@@ -181,8 +181,7 @@ std::string unproven_sentence(const RecognitionStep& step, const RecognitionTask
   return fmt::format("{} {:.1f} % (at least {:.1f} %, at most {:.1f} %): {} left {} unproven",
                      object_words(step, task), 100.0 * step.confidence(),
                      std::floor(1000.0 * low) / 10.0, std::ceil(1000.0 * high) / 10.0,
-                     bounded->budget_s
-                         ? fmt::format("the budget of {:g} ms", 1e3 * *bounded->budget_s)
+                     traits.budget_s ? fmt::format("the budget of {:g} ms", 1e3 * *traits.budget_s)
                      : task.contact().table && unproven >= poor_fits
                          ? "the search, which met nothing but poor fits,"
                          : "rounding",
@@ -233,16 +232,16 @@ std::string next_touch_words(const PlannedTouch& touch, PlanGoal goal) {
 
 namespace {
 
-/// Why the task has its filter, as a line of its own; "" where there is no more to say.
+/// Why the task has its filter; "" where there is no more to say.
 std::string reason_of_filter(const RecognitionTask& task) {
   const std::int64_t bins = task.bins_in_all();
   if (task.auto_filter) {
-    return fmt::format("\n        chosen by --filter auto: {} bins in all, {} {}", bins,
+    return fmt::format("chosen by --filter auto: {} bins in all, {} {}", bins,
                        bins > most_histogram_bins ? "more than" : "at most", most_histogram_bins);
   }
   return task.filter_asked_for_by.empty()
              ? ""
-             : fmt::format("\n        asked for by {}", in_flags(task.filter_asked_for_by));
+             : fmt::format("asked for by {}", in_flags(task.filter_asked_for_by));
 }
 
 }  // namespace
@@ -252,20 +251,13 @@ std::string device_name(const Device* device) {
 }
 
 std::string setup_words(const Device* device, const RecognitionTask& task) {
-  const auto* particles = std::get_if<ParticleOptions>(&task.filter);
-  const PoseLattice& lattice = task.lattice();
   const auto mirrored =
       static_cast<std::size_t>(std::ranges::count_if(task.hypotheses, &Hypothesis::mirrored));
   const std::size_t maps = task.hypotheses.size() - mirrored;
   return fmt::format("{} map{}{}{}, {}{}", maps, maps == 1 ? "" : "s",
                      mirrored > 0 ? fmt::format(" and {} mirrored", mirrored) : "",
                      task.sensor_model.empty() ? "" : " with " + printable(task.sensor_model),
-                     particles != nullptr
-                         ? fmt::format("{} particles", particles->particles)
-                         : fmt::format("{} x {} x {} bins each{}", lattice.x_mm.count,
-                                       lattice.y_mm.count, lattice.theta_rad.count,
-                                       traits_of(task.filter).certificate ? " by bounds" : ""),
-                     device != nullptr ? ", on " + device->name() : "");
+                     size_words(task.filter), device != nullptr ? ", on " + device->name() : "");
 }
 
 void print_engine(const Device* device, const Recogniser& recogniser, const RecognitionTask& task) {
@@ -274,29 +266,10 @@ void print_engine(const Device* device, const Recogniser& recogniser, const Reco
     return fmt::format("{} {:g} to {:g} {}, {} bins in steps of {:.4g}", name, axis.lower * unit,
                        axis.upper * unit, unit_name, axis.count, axis.step() * unit);
   };
-  const FilterOptions opened = opened_filter(task);
-  std::string filter;
-  if (const auto* particles = std::get_if<ParticleOptions>(&opened)) {
-    filter =
-        fmt::format("{} particles, {} resampling{}, seed {}", particles->particles,
-                    particles->resampling == Resampling::multinomial ? "multinomial" : "systematic",
-                    particles->augmented ? ", random particles added" : "", particles->seed);
-  } else if (const auto* bounded = std::get_if<BoundedOptions>(&opened)) {
-    filter = fmt::format(
-        "bounded, {}; {:.1f} MiB of the host's memory\n        tolerance {:g}", recogniser.path(),
-        static_cast<double>(recogniser.host_bytes()) / (1 << 20), bounded->tolerance);
-    filter += bounded->budget_s ? fmt::format(", budget {:g} ms", 1e3 * *bounded->budget_s) : "";
-    if (bounded->evidence_nats) {
-      filter += fmt::format(", evidence within {:g} nats", *bounded->evidence_nats);
-      filter += bounded->evidence_growth > 0.0
-                    ? fmt::format(", {:g} more with every further touch",
-                                  *bounded->evidence_nats * bounded->evidence_growth)
-                    : "";
-    }
-  } else {
-    filter = "histogram in " + recogniser.path();
+  std::vector<std::string> filter = recogniser.words();
+  if (std::string reason = reason_of_filter(task); !reason.empty()) {
+    filter.push_back(std::move(reason));
   }
-  filter += reason_of_filter(task);
   std::string memory = device_name(device);
   if (device != nullptr) {
     memory += fmt::format(", {:.1f} MiB of its memory",
@@ -305,7 +278,7 @@ void print_engine(const Device* device, const Recogniser& recogniser, const Reco
   fmt::print(stderr,
              "device: {}\nfilter: {}\nlattice: {}\n         {}\n"
              "         {}\n         pivot {}\n",
-             memory, filter, words("x", lattice.x_mm, 1.0, "mm"),
+             memory, fmt::join(filter, "\n        "), words("x", lattice.x_mm, 1.0, "mm"),
              words("y", lattice.y_mm, 1.0, "mm"),
              words("theta", lattice.theta_rad, degrees(1.0), "deg"),
              task.auto_pivot ? "at the array's centre at the first touch in contact"

@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "estimation/pose_draws.hpp"
 #include "model/random.hpp"
 
 namespace palpate {
@@ -66,14 +67,31 @@ class HistogramFilter final : public FilterInBins<PoseHistogram> {
   Marginals marginals(int object, const PoseLattice& /*lattice*/) const override {
     return own_.marginals(object);
   }
-  std::string path() const override { return fmt::format("{}", fmt::join(own_.paths(), "; ")); }
+  std::vector<std::string> words() const override {
+    return {fmt::format("histogram in {}", fmt::join(own_.paths(), "; "))};
+  }
   std::uint64_t device_bytes() const override { return own_.device_bytes(); }
   const PoseHistogram* histogram() const override { return &own_; }
 };
 
+/// The tolerance, the budget, and how closely evidence is found.
+std::string goal_words(const BoundedOptions& options) {
+  std::string words = fmt::format("tolerance {:g}", options.tolerance);
+  words += options.budget_s ? fmt::format(", budget {:g} ms", 1e3 * *options.budget_s) : "";
+  if (options.evidence_nats) {
+    words += fmt::format(", evidence within {:g} nats", *options.evidence_nats);
+    words += options.evidence_growth > 0.0
+                 ? fmt::format(", {:g} more with every further touch",
+                               *options.evidence_nats * options.evidence_growth)
+                 : "";
+  }
+  return words;
+}
+
 class BoundedFilter final : public FilterInBins<BoundedPosterior> {
  public:
-  using FilterInBins::FilterInBins;
+  BoundedFilter(std::span<const Hypothesis> hypotheses, const BoundedOptions& options)
+      : FilterInBins(BoundedPosterior(hypotheses, options)), goal_(goal_words(options)) {}
 
   Estimate estimate(std::optional<double> tolerance) const override {
     return own_.estimate(tolerance);
@@ -82,8 +100,15 @@ class BoundedFilter final : public FilterInBins<BoundedPosterior> {
     return own_.marginals(object, marginal_grid(lattice));
   }
   std::optional<EvaluatedBelief> evaluated_bins() const override { return own_.evaluated_bins(); }
-  std::string path() const override { return own_.path(); }
+  std::vector<std::string> words() const override {
+    return {fmt::format("bounded, {}; {:.1f} MiB of the host's memory", own_.path(),
+                        static_cast<double>(own_.host_bytes()) / (1 << 20)),
+            goal_};
+  }
   std::uint64_t host_bytes() const override { return own_.host_bytes(); }
+
+ private:
+  std::string goal_;
 };
 
 // Steps of the grid on which the paper looks for the particles' mode (Eq. 12).
@@ -92,7 +117,12 @@ constexpr double parzen_step_rad = 0.04 * std::numbers::pi;
 
 class Particles final : public FilterOf<ParticleFilter> {
  public:
-  using FilterOf::FilterOf;
+  Particles(Device& device, std::span<const Hypothesis> hypotheses, const ParticleOptions& options)
+      : FilterOf(ParticleFilter(device, hypotheses, options)),
+        words_(fmt::format(
+            "{} particles, {} resampling{}, seed {}", options.particles,
+            options.resampling == Resampling::multinomial ? "multinomial" : "systematic",
+            options.augmented ? ", random particles added" : "", options.seed)) {}
 
   std::vector<PoseSample> sample(std::size_t count, std::uint64_t seed) const override {
     const std::vector<ParticleFilter::Particle> particles = own_.particles();
@@ -104,10 +134,8 @@ class Particles final : public FilterOf<ParticleFilter> {
     std::vector<PoseSample> samples;
     auto particle = particles.begin();
     double reached = particle->weight;
-    for (std::size_t i = 0; i < count; ++i) {
-      const double at =
-          (static_cast<double>(i) + random.uniform()) / static_cast<double>(count) * all;
-      while (particle + 1 != particles.end() && reached <= at) {
+    for (const double part : one_in_each_part(count, random)) {
+      while (particle + 1 != particles.end() && reached <= part * all) {
         reached += (++particle)->weight;
       }
       samples.push_back({particle->object, particle->T_object_robot});
@@ -160,9 +188,22 @@ class Particles final : public FilterOf<ParticleFilter> {
   std::optional<double> effective_sample_size() const override {
     return own_.effective_sample_size();
   }
-  std::string path() const override { return "particles"; }
+  std::vector<std::string> words() const override { return {words_}; }
   std::uint64_t device_bytes() const override { return own_.device_bytes(); }
+
+ private:
+  std::string words_;
 };
+
+/// The lattice of a filter's options, or the region where it has no bins.
+template <typename Options>
+auto& lattice_in(Options& options) {
+  if constexpr (requires { options.lattice; }) {
+    return options.lattice;
+  } else {
+    return options.region;
+  }
+}
 
 /// By which kind of options, one function for each.
 template <typename... Functions>
@@ -189,25 +230,79 @@ Axis coarser(const Axis& axis) {
 }  // namespace
 
 FilterTraits traits_of(const FilterOptions& options) {
+  return std::visit(Each{[](const HistogramOptions& one) {
+                           return FilterTraits{.bins = true,
+                                               .every_bin = true,
+                                               .touch_sd = one.touch_sd,
+                                               .slip_sd = one.slip_sd,
+                                               .none_weight = one.none_weight,
+                                               .still_array = one.still_array,
+                                               .memory_limit_bytes = one.memory_limit_bytes};
+                         },
+                         [](const BoundedOptions& one) {
+                           return FilterTraits{.bins = true,
+                                               .certificate = true,
+                                               .touch_sd = one.touch_sd,
+                                               .slip_sd = one.slip_sd,
+                                               .none_weight = one.none_weight,
+                                               .tolerance = one.tolerance,
+                                               .budget_s = one.budget_s};
+                         },
+                         [](const ParticleOptions&) { return FilterTraits{}; }},
+                    options);
+}
+
+const PoseLattice& lattice_of(const FilterOptions& options) {
+  return std::visit([](const auto& one) -> const PoseLattice& { return lattice_in(one); }, options);
+}
+
+const ContactModel& contact_of(const FilterOptions& options) {
+  return std::visit([](const auto& one) -> const ContactModel& { return one.contact; }, options);
+}
+
+FilterOptions with_lattice(FilterOptions options, const PoseLattice& lattice) {
+  std::visit([&](auto& one) { lattice_in(one) = lattice; }, options);
+  return options;
+}
+
+std::optional<BoundedOptions> bounded_instead(const FilterOptions& options) {
+  const auto* histogram = std::get_if<HistogramOptions>(&options);
+  if (histogram == nullptr || histogram->memory_limit_bytes) {
+    return {};
+  }
+  return BoundedOptions{.lattice = histogram->lattice,
+                        .contact = histogram->contact,
+                        .touch_sd = histogram->touch_sd,
+                        .slip_sd = histogram->slip_sd,
+                        .none_weight = histogram->none_weight};
+}
+
+std::string size_words(const FilterOptions& options) {
+  const auto bins = [](const PoseLattice& lattice) {
+    return fmt::format("{} x {} x {} bins each", lattice.x_mm.count, lattice.y_mm.count,
+                       lattice.theta_rad.count);
+  };
   return std::visit(
-      Each{[](const HistogramOptions&) { return FilterTraits{.bins = true, .every_bin = true}; },
-           [](const BoundedOptions&) { return FilterTraits{.bins = true, .certificate = true}; },
-           [](const ParticleOptions&) { return FilterTraits{}; }},
+      Each{[&](const HistogramOptions& one) { return bins(one.lattice); },
+           [&](const BoundedOptions& one) { return bins(one.lattice) + " by bounds"; },
+           [](const ParticleOptions& one) { return fmt::format("{} particles", one.particles); }},
       options);
 }
 
 std::unique_ptr<Filter> make_filter(Device* device, std::span<const Hypothesis> hypotheses,
-                                    const FilterOptions& options) {
+                                    const FilterOptions& options, const SearchRun& search) {
   using Made = std::unique_ptr<Filter>;
   return std::visit(
       Each{[&](const HistogramOptions& one) -> Made {
              return std::make_unique<HistogramFilter>(PoseHistogram(*device, hypotheses, one));
            },
-           [&](const BoundedOptions& one) -> Made {
-             return std::make_unique<BoundedFilter>(BoundedPosterior(hypotheses, one));
+           [&](BoundedOptions one) -> Made {
+             one.threads = search.threads > 0 ? static_cast<int>(search.threads) : one.threads;
+             one.cancel_point = search.cancel_point ? search.cancel_point : one.cancel_point;
+             return std::make_unique<BoundedFilter>(hypotheses, one);
            },
            [&](const ParticleOptions& one) -> Made {
-             return std::make_unique<Particles>(ParticleFilter(*device, hypotheses, one));
+             return std::make_unique<Particles>(*device, hypotheses, one);
            }},
       options);
 }

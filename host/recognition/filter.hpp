@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -10,7 +11,9 @@
 #include <vector>
 
 #include "palpate/bounded_posterior.hpp"
+#include "palpate/contact_model.hpp"
 #include "palpate/device.hpp"
+#include "palpate/displacement.hpp"
 #include "palpate/lattice.hpp"
 #include "palpate/particle_filter.hpp"
 #include "palpate/pose_histogram.hpp"
@@ -20,7 +23,7 @@ namespace palpate {
 /// The filter that recognises, by its options.
 using FilterOptions = std::variant<HistogramOptions, BoundedOptions, ParticleOptions>;
 
-/// What a filter can tell, whatever its options' numbers.
+/// What a filter can tell, and what others than the filter itself ask of its options.
 struct FilterTraits {
   /// Believes in bins of a lattice, and so has a refined pose, a log-likelihood of the mode, plans,
   /// and beliefs that a touch may surprise. Particles have none: motion noise comes between.
@@ -31,8 +34,36 @@ struct FilterTraits {
   /// Keeps touches, searches on the host once it is asked about the belief, and proves what it left
   /// out (Certificate).
   bool certificate = false;
+  /// How far a touch may be displaced; none with particles, which take touches to be exact.
+  DisplacementSd touch_sd = {};
+  /// How far the object may move between two touches; none with particles, whose motion noise is
+  /// not meant.
+  DisplacementSd slip_sd = {};
+  std::optional<double> none_weight = {};  ///< of "none of these"; particles have none
+  std::optional<double> tolerance = {};    ///< of the certificate
+  std::optional<double> budget_s = {};     ///< after which a search for the certificate ends
+  bool still_array = false;                ///< HistogramOptions::still_array
+  std::optional<std::uint64_t> memory_limit_bytes = {};  ///< of the device's memory
 };
 FilterTraits traits_of(const FilterOptions& options);
+
+/// The lattice of a histogram or of a bounded posterior, or the particles' region, whose bins only
+/// marginals have.
+const PoseLattice& lattice_of(const FilterOptions& options);
+const ContactModel& contact_of(const FilterOptions& options);
+/// The filter on another lattice.
+FilterOptions with_lattice(FilterOptions options, const PoseLattice& lattice);
+/// The options of a bounded posterior of the same bins; none where the filter is no histogram, or
+/// has what bounds do not: a limit of its memory.
+std::optional<BoundedOptions> bounded_instead(const FilterOptions& options);
+/// What the belief is divided into: "25 x 25 x 16 bins each", "10000 particles".
+std::string size_words(const FilterOptions& options);
+
+/// How a search by bounds runs on the host. What it finds does not depend on it.
+struct SearchRun {
+  std::size_t threads = 0;                  ///< 0: BoundedOptions::threads
+  std::function<void()> cancel_point = {};  ///< BoundedOptions::cancel_point
+};
 
 /// A Bayes filter over object identity and pose. Functions do and throw what those of
 /// PoseHistogram, BoundedPosterior and ParticleFilter do; what a filter lacks is empty.
@@ -72,8 +103,8 @@ class Filter {
   }
   virtual std::optional<double> effective_sample_size() const { return {}; }
 
-  /// How the filter computes, and why.
-  virtual std::string path() const = 0;
+  /// How the filter computes and why, its numbers and its memory on the host, in lines.
+  virtual std::vector<std::string> words() const = 0;
   virtual std::uint64_t device_bytes() const { return 0; }
   virtual std::uint64_t host_bytes() const { return 0; }
   /// The belief over every bin; nullptr where FilterTraits::every_bin is false.
@@ -84,8 +115,9 @@ class Filter {
 
 /// The filter that the options name.
 /// @param device may be null where FilterTraits::certificate is true
+/// @param search ignored where FilterTraits::certificate is false
 std::unique_ptr<Filter> make_filter(Device* device, std::span<const Hypothesis> hypotheses,
-                                    const FilterOptions& options);
+                                    const FilterOptions& options, const SearchRun& search = {});
 
 /// The lattice, or where it is finer than a picture shows a coarser grid of the same poses: at most
 /// 400 bins along x and along y and 360 along theta. Bins along x and y are a whole number of the

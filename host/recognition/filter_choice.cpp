@@ -242,51 +242,34 @@ void require_within_region(const Request& request, const PoseLattice& lattice) {
   }
 }
 
-std::optional<BoundedOptions> bounded_instead(const HistogramOptions& histogram) {
-  if (histogram.memory_limit_bytes) {
-    return {};
-  }
-  return BoundedOptions{.lattice = histogram.lattice,
-                        .contact = histogram.contact,
-                        .touch_sd = histogram.touch_sd,
-                        .slip_sd = histogram.slip_sd,
-                        .none_weight = histogram.none_weight};
-}
-
 ChosenBins chosen_bins(const std::function<Device&()>& device,
                        std::span<const Hypothesis> hypotheses, const ChosenFilter& filter,
                        BinWidth width) {
-  const auto* histogram = std::get_if<HistogramOptions>(&filter.options);
-  const auto* bounded = std::get_if<BoundedOptions>(&filter.options);
-  // The memory of a belief that slips follows the bins.
-  const bool slips = histogram != nullptr ? !histogram->slip_sd.none()
-                                          : bounded != nullptr && !bounded->slip_sd.none();
-  const bool by_bounds = bounded != nullptr ||
-                         (histogram != nullptr && filter.automatic && bounded_instead(*histogram));
+  const FilterTraits traits = traits_of(filter.options);
+  const bool by_bounds =
+      traits.certificate || (filter.automatic && bounded_instead(filter.options));
   std::int64_t most = most_bounded_bins;
-  if (slips || !by_bounds) {
-    most = histogram == nullptr
-               ? most_bins_on(device(), false)
-               : most_bins_on(device(), histogram->still_array, histogram->memory_limit_bytes);
-    if (histogram != nullptr && histogram->memory_limit_bytes) {
+  // The memory of a belief that slips follows the bins.
+  if (!traits.slip_sd.none() || !by_bounds) {
+    most = most_bins_on(device(), traits.still_array, traits.memory_limit_bytes);
+    if (traits.memory_limit_bytes) {
       // One bin an object may still exceed the limit: the histogram says how much memory it needs.
       most = std::max(most, static_cast<std::int64_t>(hypotheses.size()));
     }
   }
-  return {balanced_lattice(lattice_of(filter.options), hypotheses, most, width,
-                           touch_sd_of(filter.options)),
+  return {balanced_lattice(lattice_of(filter.options), hypotheses, most, width, traits.touch_sd),
           most};
 }
 
 FilterOptions filter_for_bins(std::span<const Hypothesis> hypotheses,
-                              const HistogramOptions& histogram) {
-  if (bins_in_all(hypotheses.size(), histogram.lattice) > most_histogram_bins) {
-    const std::optional<BoundedOptions> bounded = bounded_instead(histogram);
+                              const FilterOptions& filter) {
+  if (bins_in_all(hypotheses.size(), lattice_of(filter)) > most_histogram_bins) {
+    const std::optional<BoundedOptions> bounded = bounded_instead(filter);
     if (bounded && bounds_have_room(hypotheses, *bounded)) {
       return *bounded;
     }
   }
-  return histogram;
+  return filter;
 }
 
 bool bounds_have_room(std::span<const Hypothesis> hypotheses, BoundedOptions options) {

@@ -49,10 +49,6 @@ inline constexpr std::int64_t most_histogram_bins = 100'000;
 /// Most bins, of all objects together, that chosen_bins() gives to bounds.
 inline constexpr std::int64_t most_bounded_bins = 1'000'000'000;
 
-/// The options of a bounded posterior of the same bins; none where the histogram allows for
-/// something that bounds do not: a limit of its memory.
-std::optional<BoundedOptions> bounded_instead(const HistogramOptions& histogram);
-
 /// Bins that balanced_lattice() chose.
 struct ChosenBins {
   BalancedLattice balanced;
@@ -69,8 +65,7 @@ ChosenBins chosen_bins(const std::function<Device&()>& device,
 /// Bounds in the place of a histogram of more than most_histogram_bins bins in all, unless
 /// bounded_instead() has none or bounds have no room.
 /// @throws Error on a lattice out of range
-FilterOptions filter_for_bins(std::span<const Hypothesis> hypotheses,
-                              const HistogramOptions& histogram);
+FilterOptions filter_for_bins(std::span<const Hypothesis> hypotheses, const FilterOptions& filter);
 
 /// Whether the machine has room for a bounded posterior.
 /// @throws Error on a lattice out of range

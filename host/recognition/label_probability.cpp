@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <variant>
 
 namespace palpate {
 
@@ -92,18 +91,11 @@ Tempering tempering_of(std::span<const TouchEvidence> touches, const Recognition
 }
 
 double weighed(double known, const RecognitionTask& task) {
-  const auto weight_of = [](const auto& one) {
-    if constexpr (requires { one.none_weight; }) {
-      return one.none_weight.value_or(0.0);
-    } else {
-      return 0.0;
-    }
-  };
   double maps = 0.0;
   for (const Hypothesis& hypothesis : task.hypotheses) {
     maps += hypothesis.weight;
   }
-  const double none = std::visit(weight_of, task.filter);
+  const double none = traits_of(task.filter).none_weight.value_or(0.0);
   return known * maps / (known * maps + (1.0 - known) * none);
 }
 

@@ -77,7 +77,8 @@ class Recogniser {
   }
   /// The task's lattice about the pivot in use.
   const PoseLattice& lattice() const { return lattice_; }
-  std::string path() const { return filter_->path(); }
+  /// See Filter::words().
+  std::vector<std::string> words() const { return filter_->words(); }
   std::uint64_t device_bytes() const { return filter_->device_bytes(); }
   std::uint64_t host_bytes() const { return filter_->host_bytes(); }
   /// See Filter::histogram().

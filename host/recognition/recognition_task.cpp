@@ -9,47 +9,12 @@
 
 namespace palpate {
 
-namespace {
-
-/// The lattice of a filter's options, or the region where it has no bins.
-template <typename Options>
-auto& lattice_in(Options& options) {
-  if constexpr (requires { options.lattice; }) {
-    return options.lattice;
-  } else {
-    return options.region;
-  }
-}
-
-}  // namespace
-
-const PoseLattice& lattice_of(const FilterOptions& filter) {
-  return std::visit([](const auto& one) -> const PoseLattice& { return lattice_in(one); }, filter);
-}
-
 std::int64_t bins_in_all(std::size_t objects, const PoseLattice& lattice) {
   // In float64, as counts of three axes may exceed an integer.
   const double all = static_cast<double>(objects) * lattice.x_mm.count * lattice.y_mm.count *
                      lattice.theta_rad.count;
   constexpr double most = 9e18;
   return static_cast<std::int64_t>(std::min(all, most));
-}
-
-FilterOptions with_lattice(FilterOptions filter, const PoseLattice& lattice) {
-  std::visit([&](auto& one) { lattice_in(one) = lattice; }, filter);
-  return filter;
-}
-
-DisplacementSd touch_sd_of(const FilterOptions& filter) {
-  return std::visit(
-      [](const auto& one) {
-        if constexpr (requires { one.touch_sd; }) {
-          return one.touch_sd;
-        } else {
-          return DisplacementSd{};
-        }
-      },
-      filter);
 }
 
 RecognitionTask::RecognitionTask(std::vector<Hypothesis> objects, const FilterOptions& options)
@@ -65,32 +30,9 @@ RecognitionTask::RecognitionTask(std::vector<Hypothesis> objects, const FilterOp
       labels.push_back(label);
     }
   }
-  const auto has_none = [](const auto& one) {
-    if constexpr (requires { one.none_weight; }) {
-      return one.none_weight.has_value();
-    } else {
-      return false;
-    }
-  };
-  if (std::visit(has_none, filter)) {
+  if (traits_of(filter).none_weight) {
     labels.emplace_back(none_label);
   }
-}
-
-const ContactModel& RecognitionTask::contact() const {
-  return std::visit([](const auto& one) -> const ContactModel& { return one.contact; }, filter);
-}
-
-DisplacementSd RecognitionTask::slip_sd() const {
-  return std::visit(
-      [](const auto& one) {
-        if constexpr (requires { one.slip_sd; }) {
-          return one.slip_sd;
-        } else {
-          return DisplacementSd{};
-        }
-      },
-      filter);
 }
 
 FilterOptions opened_filter(const RecognitionTask& task) {

@@ -15,15 +15,8 @@
 
 namespace palpate {
 
-/// The lattice of a histogram or of a bounded posterior, or the particles' region, whose bins only
-/// marginals have.
-const PoseLattice& lattice_of(const FilterOptions& filter);
-/// How far a touch may be displaced; particles do not allow for it.
-DisplacementSd touch_sd_of(const FilterOptions& filter);
 /// Bins of so many objects together.
 std::int64_t bins_in_all(std::size_t objects, const PoseLattice& lattice);
-/// The filter on another lattice.
-FilterOptions with_lattice(FilterOptions filter, const PoseLattice& lattice);
 
 /// When a robot acts on a result; see decide().
 struct ActWhere {
@@ -38,12 +31,10 @@ struct RecognitionTask {
 
   /// See lattice_of().
   const PoseLattice& lattice() const { return lattice_of(filter); }
-  const ContactModel& contact() const;
-  /// See touch_sd_of().
-  DisplacementSd touch_sd() const { return touch_sd_of(filter); }
-  /// How far the object may move between two touches; only a histogram allows for it (the motion
-  /// noise of particles is not meant).
-  DisplacementSd slip_sd() const;
+  const ContactModel& contact() const { return contact_of(filter); }
+  /// See FilterTraits.
+  DisplacementSd touch_sd() const { return traits_of(filter).touch_sd; }
+  DisplacementSd slip_sd() const { return traits_of(filter).slip_sd; }
   std::int64_t bins_in_all() const { return palpate::bins_in_all(hypotheses.size(), lattice()); }
   const ContactClassifier& classifier() const { return contact().classifier; }
 

@@ -244,8 +244,7 @@ FilterOptions settled_filter(const Request& request, const Circumstances& of, Ch
     }
   }
   require_within_region(request, lattice_of(filter.options));
-  return filter.automatic ? filter_for_bins(hypotheses, std::get<HistogramOptions>(filter.options))
-                          : filter.options;
+  return filter.automatic ? filter_for_bins(hypotheses, filter.options) : filter.options;
 }
 
 }  // namespace

@@ -27,15 +27,14 @@ struct Start {
 
 /// The task's histogram, with displacements as the search begins and bins that resolve them.
 HistogramOptions histogram_of(const RecognitionTask& task, const DisplacementSd& start) {
-  if (!traits_of(task.filter).every_bin) {
+  const FilterTraits traits = traits_of(task.filter);
+  if (!traits.every_bin) {
     throw Error(Fault::input, "fit of touch-sd: needs the belief of all poses; use a histogram");
   }
-  auto options = std::get<HistogramOptions>(task.filter);
-  options.none_weight.reset();
-  options.slip_sd = {};
-  options.touch_sd = start;
-  options.still_array = false;
-  return options;
+  return {.lattice = task.lattice(),
+          .contact = task.contact(),
+          .touch_sd = start,
+          .memory_limit_bytes = traits.memory_limit_bytes};
 }
 
 /// Gives the axes steps of 0.6 times the displacements, which samples of them need no finer.

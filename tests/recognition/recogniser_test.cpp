@@ -92,7 +92,7 @@ TEST(Recogniser, OfBoundsTellsWhatTheBoundedPosteriorTells) {
             bounded.sample(3, 1)[2].T_object_robot.translation_mm);
   EXPECT_FALSE(recogniser.effective_sample_size());
   EXPECT_EQ(recogniser.histogram(), nullptr);
-  EXPECT_EQ(recogniser.path(), bounded.path());
+  EXPECT_NE(recogniser.words().front().find(bounded.path()), std::string::npos);
   EXPECT_EQ(recogniser.device_bytes(), 0u);
 }
 

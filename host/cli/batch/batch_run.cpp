@@ -125,11 +125,11 @@ struct OpenChunk {
 
 /// How many unknowns are recognised at once.
 std::size_t most_at_once(const RecognitionTask& task, std::size_t threads) {
-  if (traits_of(task.filter).certificate) {
+  const FilterTraits traits = traits_of(task.filter);
+  if (traits.certificate) {
     return threads;
   }
-  const auto* histogram = std::get_if<HistogramOptions>(&task.filter);
-  if (histogram == nullptr || histogram->memory_limit_bytes) {
+  if (!traits.every_bin || traits.memory_limit_bytes) {
     return 1;  // the limit is that of all histograms
   }
   // Few bins leave a device idle, and it waits for the host. What the threads submit meanwhile runs
