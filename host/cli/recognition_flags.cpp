@@ -199,8 +199,9 @@ void tell_on_stderr(const std::string& sentence) {
   fmt::print(stderr, "palpate: {}\n", in_flags(sentence));
 }
 
-Recogniser open_telling(Device* device, const RecognitionTask& task) {
-  Recogniser recogniser = open_recogniser(device, task);
+Recogniser open_telling(Device* device, const RecognitionTask& task,
+                        const std::function<void()>& cancel_point) {
+  Recogniser recogniser = open_recogniser(device, task, {.cancel_point = cancel_point});
   std::ranges::for_each(task.remarks, tell_on_stderr);
   return recogniser;
 }

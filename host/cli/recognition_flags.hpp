@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -63,7 +64,9 @@ void tell_on_stderr(const std::string& sentence);
 /// Opens the task's filter, then tells the task's remarks: bins that do not fit deserve only their
 /// refusal. Throws Error.
 /// @param device may be null where uses_device() is false
-Recogniser open_telling(Device* device, const RecognitionTask& task);
+/// @param cancel_point see SearchRun
+Recogniser open_telling(Device* device, const RecognitionTask& task,
+                        const std::function<void()>& cancel_point = {});
 
 /// Adds the files that the task of a completed request was read from.
 void add_recognition_files(const Request& request, CommandFiles& files);

@@ -231,21 +231,12 @@ void recognize(const RecognizeArguments& options) {
   }
   const std::vector<Unknown> unknowns = list_unknowns(request, recordings);
   const Recording& first = recordings.front();
-  std::optional<UnknownsProgress> progress;
   DeviceInWaiting device_in_waiting(request.device);
   const RecognitionTask task = resolve(request, {.pressure_unit = first.pressure_unit,
                                                  .source = first.path,
                                                  .reach_mm = largest_reach_mm(recordings),
                                                  .still_array = array_is_still(unknowns),
                                                  .need = histogram_need(options, request),
-                                                 // Between the steps of bounds' searches, which may
-                                                 // take minutes.
-                                                 .cancel_point =
-                                                     [&] {
-                                                       if (progress) {
-                                                         progress->show();
-                                                       }
-                                                     },
                                                  .device = std::ref(device_in_waiting)});
   if (options.fit_touch_sd) {
     require_fittable(task);
@@ -257,8 +248,13 @@ void recognize(const RecognizeArguments& options) {
     return;
   }
   std::string unresolved;
-  progress.emplace(unknowns.size());
-  Recogniser recogniser = open_telling(device, task);
+  std::optional<UnknownsProgress> progress(unknowns.size());
+  Recogniser recogniser = open_telling(device, task, [&] {
+    // Between the steps of bounds' searches, which may take minutes.
+    if (progress) {
+      progress->show();
+    }
+  });
   if (!options.png.empty()) {
     make_folder(options.png);
   }

@@ -272,6 +272,28 @@ FilterOptions filter_for_bins(std::span<const Hypothesis> hypotheses,
   return filter;
 }
 
+FilterOptions with_evidence(FilterOptions filter, const LearnedSensor& sensor) {
+  constexpr double share = 0.05;
+  constexpr double negligible = 1e-4;
+  constexpr std::int64_t poor_bins = 20'000;  // about as many as Eq. 7 needs of such touches
+  auto* bounded = std::get_if<BoundedOptions>(&filter);
+  if (bounded == nullptr) {
+    return filter;
+  }
+  if (sensor.table) {
+    bounded->poor_bins = poor_bins;
+  }
+  const bool tempered = sensor.temperature > 1.0 || sensor.temperature_growth > 0.0;
+  if ((tempered || sensor.features || sensor.familiarity) && !bounded->evidence_nats) {
+    bounded->evidence_nats = share * sensor.temperature;
+    bounded->evidence_range_nats = -std::log(negligible) * sensor.temperature;
+    // Familiarity is told of a single touch.
+    bounded->single_touch_range_nats = sensor.familiarity ? FamiliarityScore::most_lead_nats : 0.0;
+    bounded->evidence_growth = sensor.temperature_growth / sensor.temperature;
+  }
+  return filter;
+}
+
 bool bounds_have_room(std::span<const Hypothesis> hypotheses, BoundedOptions options) {
   options.lattice.collapse_fixed().validate();
   return why_no_room(hypotheses, options, memory_for_search()).empty();

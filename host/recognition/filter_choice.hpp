@@ -6,12 +6,13 @@
 #include <span>
 #include <string>
 
+#include "palpate/learned_sensor.hpp"
 #include "recognition/resolve.hpp"
 
 namespace palpate {
 
 // The part of resolve() that chooses the filter and its bins, and says how far touches may be
-// displaced.
+// displaced and how closely bounds find the evidence.
 
 /// The filter that is asked for.
 struct FilterWish {
@@ -66,6 +67,13 @@ ChosenBins chosen_bins(const std::function<Device&()>& device,
 /// bounded_instead() has none or bounds have no room.
 /// @throws Error on a lattice out of range
 FilterOptions filter_for_bins(std::span<const Hypothesis> hypotheses, const FilterOptions& filter);
+
+/// The filter as it is opened for a sensor model. A temperature above 1 and features give also
+/// improbable labels a share, and familiarity asks how far the best label leads, for which bounds
+/// find each label's evidence: within 0.05 times the temperature of the touches so far, so that no
+/// probability is off by more than about 10 % or 1e-4, unless BoundedOptions::evidence_nats is set.
+/// With a table, a search that meets nothing but poor fits ends.
+FilterOptions with_evidence(FilterOptions filter, const LearnedSensor& sensor);
 
 /// Whether the machine has room for a bounded posterior.
 /// @throws Error on a lattice out of range

@@ -10,12 +10,12 @@
 
 namespace palpate {
 
-Recogniser::Recogniser(Device* device, const RecognitionTask& task)
+Recogniser::Recogniser(Device* device, const RecognitionTask& task, const SearchRun& search)
     : traits_(traits_of(task.filter)),
       lattice_(task.lattice()),
       contact_(task.contact()),
       auto_pivot_(task.auto_pivot),
-      filter_(make_filter(device, task.hypotheses, opened_filter(task))) {}
+      filter_(make_filter(device, task.hypotheses, task.filter, search)) {}
 
 void Recogniser::reset() {
   filter_->reset();

@@ -19,9 +19,10 @@ namespace palpate {
 /// and ParticleFilter do.
 class Recogniser {
  public:
-  Recogniser(Device& device, const RecognitionTask& task) : Recogniser(&device, task) {}
+  Recogniser(Device& device, const RecognitionTask& task) : Recogniser(&device, task, {}) {}
   /// By bounds, which need no device.
-  explicit Recogniser(const RecognitionTask& task) : Recogniser(nullptr, task) {}
+  explicit Recogniser(const RecognitionTask& task, const SearchRun& search = {})
+      : Recogniser(nullptr, task, search) {}
 
   /// Forgets all touches, for the next unknown. Particles start from the same places again; bounds
   /// keep their tables. An automatic pivot returns to the robot frame's origin until a touch places
@@ -101,7 +102,7 @@ class Recogniser {
   void place_pivot(const TouchEvidence& touch);
   void move_pivot(const glm::dvec2& pivot_mm);
 
-  Recogniser(Device* device, const RecognitionTask& task);
+  Recogniser(Device* device, const RecognitionTask& task, const SearchRun& search);
 
   FilterTraits traits_;
   PoseLattice lattice_;

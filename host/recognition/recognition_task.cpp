@@ -9,6 +9,47 @@
 
 namespace palpate {
 
+namespace {
+
+/// RecognitionTask::labels
+std::vector<std::string> labels_in(const std::vector<Hypothesis>& hypotheses, bool with_none) {
+  std::vector<std::string> labels;
+  for (const Hypothesis& hypothesis : hypotheses) {
+    const std::string& label = hypothesis.map.label;
+    if (std::ranges::find(labels, label) == labels.end()) {
+      labels.push_back(label);
+    }
+  }
+  if (with_none) {
+    labels.emplace_back(none_label);
+  }
+  return labels;
+}
+
+/// RecognitionTask::label_of
+std::vector<std::size_t> label_indices(const std::vector<Hypothesis>& hypotheses,
+                                       const std::vector<std::string>& labels) {
+  std::vector<std::size_t> indices;
+  for (const Hypothesis& hypothesis : hypotheses) {
+    const auto known = std::ranges::find(labels, hypothesis.map.label);
+    indices.push_back(static_cast<std::size_t>(known - labels.begin()));
+  }
+  return indices;
+}
+
+/// RecognitionTask::bodies
+std::vector<std::optional<Body>> bodies_of(const std::vector<Hypothesis>& hypotheses) {
+  std::vector<std::optional<Body>> bodies;
+  for (const Hypothesis& hypothesis : hypotheses) {
+    const bool occupied =
+        std::ranges::any_of(hypothesis.map.log_odds, [](float l) { return l > 0.0F; });
+    bodies.push_back(occupied ? std::optional(body_of(hypothesis.map)) : std::nullopt);
+  }
+  return bodies;
+}
+
+}  // namespace
+
 std::int64_t bins_in_all(std::size_t objects, const PoseLattice& lattice) {
   // In float64, as counts of three axes may exceed an integer.
   const double all = static_cast<double>(objects) * lattice.x_mm.count * lattice.y_mm.count *
@@ -17,49 +58,12 @@ std::int64_t bins_in_all(std::size_t objects, const PoseLattice& lattice) {
   return static_cast<std::int64_t>(std::min(all, most));
 }
 
-RecognitionTask::RecognitionTask(std::vector<Hypothesis> objects, const FilterOptions& options)
-    : hypotheses(std::move(objects)), filter(options) {
-  for (const Hypothesis& hypothesis : hypotheses) {
-    const std::string& label = hypothesis.map.label;
-    const auto known = std::find(labels.begin(), labels.end(), label);
-    label_of.push_back(static_cast<std::size_t>(known - labels.begin()));
-    const bool occupied =
-        std::ranges::any_of(hypothesis.map.log_odds, [](float l) { return l > 0.0F; });
-    bodies.push_back(occupied ? std::optional(body_of(hypothesis.map)) : std::nullopt);
-    if (known == labels.end()) {
-      labels.push_back(label);
-    }
-  }
-  if (traits_of(filter).none_weight) {
-    labels.emplace_back(none_label);
-  }
-}
-
-FilterOptions opened_filter(const RecognitionTask& task) {
-  constexpr double share = 0.05;
-  constexpr double negligible = 1e-4;
-  constexpr std::int64_t poor_bins = 20'000;  // about as many as Eq. 7 needs of such touches
-  FilterOptions filter = task.filter;
-  auto* bounded = std::get_if<BoundedOptions>(&filter);
-  if (bounded == nullptr) {
-    return filter;
-  }
-  if (task.cancel_point) {
-    bounded->cancel_point = task.cancel_point;
-  }
-  if (task.contact().table) {
-    bounded->poor_bins = poor_bins;
-  }
-  const bool tempered = task.temperature > 1.0 || task.temperature_growth > 0.0;
-  if ((tempered || task.features || task.familiarity) && !bounded->evidence_nats) {
-    bounded->evidence_nats = share * task.temperature;
-    bounded->evidence_range_nats = -std::log(negligible) * task.temperature;
-    // Familiarity is told of a single touch.
-    bounded->single_touch_range_nats = task.familiarity ? FamiliarityScore::most_lead_nats : 0.0;
-    bounded->evidence_growth = task.temperature_growth / task.temperature;
-  }
-  return filter;
-}
+RecognitionTask::RecognitionTask(std::vector<Hypothesis> objects, FilterOptions options)
+    : hypotheses(std::move(objects)),
+      filter(std::move(options)),
+      labels(labels_in(hypotheses, traits_of(filter).none_weight.has_value())),
+      label_of(label_indices(hypotheses, labels)),
+      bodies(bodies_of(hypotheses)) {}
 
 std::string wider_bins_sentence(const RecognitionTask& task) {
   if (!task.learned_bins || !traits_of(task.filter).bins) {

@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -24,10 +23,10 @@ struct ActWhere {
   double above = 0.99;    ///< the best object's probability
 };
 
-/// The objects that an unknown may be, and the filter that tells which. The constructor derives the
-/// labels and bodies; neither the hypotheses nor the filter's none_weight may change afterwards.
+/// The objects that an unknown may be, and the filter that tells which. Who makes a task settles
+/// all of it; who recognises by it leaves it as it is.
 struct RecognitionTask {
-  RecognitionTask(std::vector<Hypothesis> objects, const FilterOptions& options);
+  RecognitionTask(std::vector<Hypothesis> objects, FilterOptions options);
 
   /// See lattice_of().
   const PoseLattice& lattice() const { return lattice_of(filter); }
@@ -38,14 +37,14 @@ struct RecognitionTask {
   std::int64_t bins_in_all() const { return palpate::bins_in_all(hypotheses.size(), lattice()); }
   const ContactClassifier& classifier() const { return contact().classifier; }
 
-  std::vector<Hypothesis> hypotheses;
-  FilterOptions filter;
+  const std::vector<Hypothesis> hypotheses;
+  const FilterOptions filter;  ///< as it is opened
   /// Each label once, in the order of the maps; none_label comes last where "none of these" has a
   /// weight.
-  std::vector<std::string> labels;
-  std::vector<std::size_t> label_of;  ///< [hypothesis] index into labels
+  const std::vector<std::string> labels;
+  const std::vector<std::size_t> label_of;  ///< [hypothesis] index into labels
   /// [hypothesis] the occupied cells of its map; none where no cell is.
-  std::vector<std::optional<Body>> bodies;
+  const std::vector<std::optional<Body>> bodies;
   std::vector<std::string> map_paths = {};  ///< [hypothesis] file of the map; empty without files
   /// By which the lattice's counts were chosen; none where these were given.
   std::optional<BinWidth> bin_width = {};
@@ -64,18 +63,10 @@ struct RecognitionTask {
   PoseScale pose_scale = {};  ///< of RecognitionStep::refined and of modes
   /// Tolerance of a trace's steps before the last; BoundedOptions::tolerance where it is not set.
   std::optional<double> trace_tolerance = {};
-  ActWhere act = {};                        ///< for RecognitionStep::decision
-  std::string sensor_model = {};            ///< file of what was learned; "" by Eq. 7
-  std::function<void()> cancel_point = {};  ///< BoundedOptions::cancel_point, where bounds search
-  std::vector<std::string> remarks = {};    ///< sentences for the user, once the filter is open
+  ActWhere act = {};                      ///< for RecognitionStep::decision
+  std::string sensor_model = {};          ///< file of what was learned; "" by Eq. 7
+  std::vector<std::string> remarks = {};  ///< sentences for the user, once the filter is open
 };
-
-/// The options that the task's filter is opened with: with its cancel_point, and with how closely
-/// bounds find each object's evidence. A temperature above 1 and features give also improbable
-/// labels a share, and familiarity asks how far the best label leads, which needs their evidence:
-/// within 0.05 times the temperature of the touches so far, so that no probability is off by more
-/// than about 10 % or 1e-4, unless BoundedOptions::evidence_nats says how closely.
-FilterOptions opened_filter(const RecognitionTask& task);
 
 /// What to say where the task's bins are more than 1.5 times as wide as those of the sensor model;
 /// "" elsewhere.

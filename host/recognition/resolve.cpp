@@ -286,7 +286,8 @@ RecognitionTask resolve(const Request& request, const Circumstances& of) {
                        (sensor != nullptr && sensor->temperature > far_from_independent);
   const ChosenFilter filter = choose_filter(wish, request, need, hypotheses, histogram);
   const FilterOptions settled = settled_filter(request, of, filter, hypotheses, bin_width, remarks);
-  RecognitionTask task(std::move(hypotheses), settled);
+  RecognitionTask task(std::move(hypotheses),
+                       sensor != nullptr ? with_evidence(settled, *sensor) : settled);
   task.map_paths = paths_of(objects, task.hypotheses);
   if (sensor != nullptr) {
     task.sensor_model = learned->file;
@@ -298,7 +299,9 @@ RecognitionTask resolve(const Request& request, const Circumstances& of) {
     task.fit_scale = sensor->fit_scale.value_or(FitScale{});
     task.pose_scale = sensor->pose_scale.value_or(PoseScale{});
   } else {
-    take_scales_of_maps(task);
+    const auto [fit, pose] = scales_of_maps(task);
+    task.fit_scale = fit;
+    task.pose_scale = pose;
   }
   task.bin_width = bin_width;
   task.auto_filter = filter.automatic;
@@ -309,7 +312,6 @@ RecognitionTask resolve(const Request& request, const Circumstances& of) {
     task.trace_tolerance = 1e-4;
   }
   task.act = act_where(request);
-  task.cancel_point = of.cancel_point;
   if (std::string wider = wider_bins_sentence(task); !wider.empty()) {
     remarks.push_back(std::move(wider));
   }
@@ -319,9 +321,9 @@ RecognitionTask resolve(const Request& request, const Circumstances& of) {
 
 bool uses_device(const RecognitionTask& task) { return !traits_of(task.filter).certificate; }
 
-Recogniser open_recogniser(Device* device, const RecognitionTask& task) {
+Recogniser open_recogniser(Device* device, const RecognitionTask& task, const SearchRun& search) {
   if (!uses_device(task)) {
-    return Recogniser(task);
+    return Recogniser(task, search);
   }
   try {
     return {*device, task};

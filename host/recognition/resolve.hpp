@@ -28,7 +28,6 @@ struct Circumstances {
   double reach_mm = 0.0;      ///< of the largest array that touches; see array_reach_mm()
   bool still_array = false;   ///< HistogramOptions::still_array
   HistogramNeed need = {};
-  std::function<void()> cancel_point = {};  ///< RecognitionTask::cancel_point
   /// Gives the device that recognises. Called where counts of bins follow from its memory, and
   /// where maps of unlike priors are built again.
   std::function<Device&()> device = {};
@@ -50,7 +49,8 @@ bool uses_device(const RecognitionTask& task);
 /// @param device may be null where uses_device() is false
 /// @throws Error; where the device has no memory for the histogram's bins,
 /// it names the options without which bounds would take them
-Recogniser open_recogniser(Device* device, const RecognitionTask& task);
+Recogniser open_recogniser(Device* device, const RecognitionTask& task,
+                           const SearchRun& search = {});
 
 /// What to say where the lattice does not resolve the task's touch_sd or slip_sd at one of these
 /// poses of the sensor; else "".

@@ -44,7 +44,7 @@ bool resolves(const PoseLattice& lattice, std::span<const Hypothesis> hypotheses
          holds(lattice.theta_rad, balanced.theta_rad);
 }
 
-void take_scales_of_maps(RecognitionTask& task) {
+Scales scales_of_maps(const RecognitionTask& task) {
   std::vector<FitScale> fits;
   double logs = 0.0;
   double squares = 0.0;
@@ -61,12 +61,14 @@ void take_scales_of_maps(RecognitionTask& task) {
     }
   }
   const bool as_map = judges_as_map(task);
+  Scales scales;
   if (!fits.empty() && as_map) {
-    task.fit_scale = pooled(fits);
+    scales.fit = pooled(fits);
   }
   if (poses > 0.0) {
-    task.pose_scale = {as_map ? std::exp(logs / poses) : 1.0, std::sqrt(squares / poses)};
+    scales.pose = {as_map ? std::exp(logs / poses) : 1.0, std::sqrt(squares / poses)};
   }
+  return scales;
 }
 
 }  // namespace palpate

@@ -77,6 +77,23 @@ ContactModel contact_of(const ContactModel& contact, const std::vector<std::size
   return part;
 }
 
+/// The task among these objects, by histogram_of().
+RecognitionTask part_of(const RecognitionTask& task, const std::vector<std::size_t>& objects,
+                        const DisplacementSd& start) {
+  HistogramOptions histogram = histogram_of(task, start);
+  histogram.contact = contact_of(histogram.contact, objects);
+  if (task.bin_width) {
+    histogram.lattice = coarse(histogram.lattice, start);
+  }
+  std::vector<Hypothesis> hypotheses;
+  for (const std::size_t object : objects) {
+    hypotheses.push_back(task.hypotheses[object]);
+  }
+  RecognitionTask part(std::move(hypotheses), histogram);
+  part.auto_pivot = task.auto_pivot;
+  return part;
+}
+
 /// Recognises every unknown among the objects that it may be.
 std::vector<Start> recognise_all(Device& device, const RecognitionTask& task,
                                  std::span<const TouchedObject> unknowns,
@@ -94,17 +111,7 @@ std::vector<Start> recognise_all(Device& device, const RecognitionTask& task,
       throw Error(Fault::input, fmt::format("{}: no map of {}; leave the label empty",
                                             unknowns[indices.front()].name, label));
     }
-    HistogramOptions histogram = histogram_of(task, options.start);
-    histogram.contact = contact_of(histogram.contact, objects);
-    if (task.bin_width) {
-      histogram.lattice = coarse(histogram.lattice, options.start);
-    }
-    std::vector<Hypothesis> hypotheses;
-    for (const std::size_t object : objects) {
-      hypotheses.push_back(task.hypotheses[object]);
-    }
-    RecognitionTask part(std::move(hypotheses), histogram);
-    part.auto_pivot = task.auto_pivot;
+    const RecognitionTask part = part_of(task, objects, options.start);
     Recogniser recogniser(device, part);
     for (const std::size_t i : indices) {
       recogniser.reset();

@@ -69,7 +69,7 @@ std::tuple<nb::bytes, Entries, Sentences> settle(const std::vector<std::string>&
 struct OpenBatch {
   BatchTask task;
   Request request;  ///< completed
-  RecognitionTask recognition;
+  const RecognitionTask recognition;
   Recogniser recogniser;
 };
 
@@ -85,12 +85,12 @@ OpenBatch open_batch(const std::string& head, const Session& session, Device& de
                 fmt::format("{}; give all workers the same palpate, maps, scene and sensor model",
                             difference));
   }
-  RecognitionTask recognition = resolve_batch(
-      task, request, [&device]() -> Device& { return device; },
-      // The open batch keeps the session.
-      [&session] { session.check(); });
-  take_threads(recognition, threads);
-  Recogniser recogniser = open_recogniser(&device, recognition);
+  RecognitionTask recognition =
+      resolve_batch(task, request, [&device]() -> Device& { return device; });
+  // The open batch keeps the session.
+  Recogniser recogniser =
+      open_recogniser(&device, recognition,
+                      {.threads = threads, .cancel_point = [&session] { session.check(); }});
   return {std::move(task), std::move(request), std::move(recognition), std::move(recogniser)};
 }
 

@@ -77,8 +77,9 @@ Answer recognize(const Subject& subject, Device& device, Call& call) {
   Answer answer;
   const std::vector<Unknown>& unknowns = subject.unknowns;
   const bool with_trace = subject.request.trace;
-  const RecognitionTask task = task_of(subject, device, call);
-  Recogniser recogniser = open_recogniser(&device, task);
+  const RecognitionTask task = task_of(subject, device);
+  Recogniser recogniser =
+      open_recogniser(&device, task, {.cancel_point = [&call] { call.check(); }});
   answer.sentences = task.remarks;
   std::string unresolved;
   for (std::size_t i = 0; i < unknowns.size(); ++i) {
@@ -123,11 +124,11 @@ Planned plan_next(const Subject& subject, const PlanRequest& wanted, Device& dev
       resolve(subject.request, {.pressure_unit = subject.recordings.front().pressure_unit,
                                 .source = unknown.recording,
                                 .reach_mm = largest_reach_mm(unknown.touches),
-                                .cancel_point = [&call] { call.check(); },
                                 .device = [&]() -> Device& { return device; }});
   require_plannable(task);
   planned.device = name_of_used(device, task);
-  Recogniser recogniser = open_recogniser(&device, task);
+  Recogniser recogniser =
+      open_recogniser(&device, task, {.cancel_point = [&call] { call.check(); }});
   planned.told = task.remarks;
   planned.plan = plan_touch(recogniser, task, unknown, wanted, call.progress());
   if (const std::string words = unresolved_words(task, recogniser.lattice(), unknown.touches);
@@ -196,7 +197,7 @@ using Fitted = std::tuple<TouchSdFit, Sentences>;
 
 Fitted fit_recordings(const Subject& subject, Device& device, Call& call) {
   const RecognitionTask task = task_of(
-      subject, device, call,
+      subject, device,
       {.option = "fit-touch-sd", .why = touch_sd_fit_needs, .learned_only = true, .eq7 = true});
   require_fittable(task);
   TouchSdFit fit =

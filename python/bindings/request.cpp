@@ -206,15 +206,13 @@ Subject subject_of(const GivenRecordings& recordings, const Request& given) {
   return subject;
 }
 
-RecognitionTask task_of(const Subject& subject, Device& device, const Call& call,
-                        const HistogramNeed& need) {
+RecognitionTask task_of(const Subject& subject, Device& device, const HistogramNeed& need) {
   const Recording& first = subject.recordings.front();
   return resolve(subject.request, {.pressure_unit = first.pressure_unit,
                                    .source = first.path,
                                    .reach_mm = largest_reach_mm(subject.recordings),
                                    .still_array = array_is_still(subject.unknowns),
                                    .need = need,
-                                   .cancel_point = [&call] { call.check(); },
                                    .device = [&device]() -> Device& { return device; }});
 }
 

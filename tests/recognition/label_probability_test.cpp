@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "palpate/error.hpp"
+#include "recognition/filter_choice.hpp"
 #include "recognition/recognition_record.hpp"
 #include "shapes.hpp"
 
@@ -231,57 +232,48 @@ TEST(LabelBounds, FollowTheTemperatureAndTheFeatures) {
   EXPECT_NEAR(with.identity_bounds[1].high, 2.0 / (2.0 + 2.0 * times), 1e-14);
 }
 
-TEST(OpenedFilter, HasBoundsFindTheEvidenceThatATemperatureNeeds) {
-  const auto bounds = [](const RecognitionTask& task) {
-    return std::get<BoundedOptions>(opened_filter(task));
+TEST(Evidence, IsWhatBoundsFindWhereATemperatureNeedsIt) {
+  const auto bounds = [](const LearnedSensor& sensor, const BoundedOptions& options = {}) {
+    return std::get<BoundedOptions>(with_evidence(options, sensor));
   };
-  RecognitionTask task = three_maps(BoundedOptions{});
-  EXPECT_FALSE(bounds(task).evidence_nats) << "at temperature 1";
-  task.temperature = 30.0;
-  EXPECT_EQ(bounds(task).evidence_nats, 0.05 * 30.0);
-  EXPECT_EQ(bounds(task).evidence_growth, 0.0);
-  RecognitionTask given = three_maps(BoundedOptions{.evidence_nats = 0.1});
-  given.temperature = 30.0;
-  EXPECT_EQ(bounds(given).evidence_nats, 0.1);
-  RecognitionTask growing = three_maps(BoundedOptions{});
-  growing.temperature = 0.8;
-  growing.temperature_growth = 0.2;
-  EXPECT_EQ(bounds(growing).evidence_nats, 0.05 * 0.8);
-  EXPECT_EQ(bounds(growing).evidence_growth, 0.25);
-  RecognitionTask featured = three_maps(BoundedOptions{});
-  featured.features = features_of_the_letter();
-  EXPECT_EQ(bounds(featured).evidence_nats, 0.05);
-  RecognitionTask dense = three_maps();
-  dense.temperature = 30.0;
-  EXPECT_TRUE(std::holds_alternative<HistogramOptions>(opened_filter(dense)));
+  LearnedSensor sensor;
+  EXPECT_FALSE(bounds(sensor).evidence_nats) << "at temperature 1";
+  sensor.temperature = 30.0;
+  EXPECT_EQ(bounds(sensor).evidence_nats, 0.05 * 30.0);
+  EXPECT_EQ(bounds(sensor).evidence_growth, 0.0);
+  EXPECT_EQ(bounds(sensor, {.evidence_nats = 0.1}).evidence_nats, 0.1);
+  EXPECT_TRUE(
+      std::holds_alternative<HistogramOptions>(with_evidence(HistogramOptions{}, sensor)));
+  sensor.temperature = 0.8;
+  sensor.temperature_growth = 0.2;
+  EXPECT_EQ(bounds(sensor).evidence_nats, 0.05 * 0.8);
+  EXPECT_EQ(bounds(sensor).evidence_growth, 0.25);
+  EXPECT_EQ(bounds({.features = features_of_the_letter()}).evidence_nats, 0.05);
+}
+
+/// What is told of the filter's bins where the sensor model was learned on others.
+std::string wider_bins(const FilterOptions& filter, const std::optional<BinSteps>& learned) {
+  RecognitionTask task = three_maps(filter);
+  task.learned_bins = learned;
+  return wider_bins_sentence(task);
 }
 
 TEST(WiderBins, AreToldOfWhereTheSensorModelWasLearnedOnNarrowerOnes) {
-  RecognitionTask task = three_maps(BoundedOptions{.lattice = {.x_mm = {-10.0, 10.0, 20},
-                                                               .y_mm = {-10.0, 10.0, 20},
-                                                               .theta_rad = {0.0, 2.0, 20}}});
-  EXPECT_EQ(wider_bins_sentence(task), "") << "nothing is known of the sensor model's";
-  task.learned_bins = BinSteps{0.7, 0.7, 0.07};
-  EXPECT_EQ(wider_bins_sentence(task), "") << "by less than a half";
+  BoundedOptions bounds{.lattice = {.x_mm = {-10.0, 10.0, 20},
+                                    .y_mm = {-10.0, 10.0, 20},
+                                    .theta_rad = {0.0, 2.0, 20}}};
+  EXPECT_EQ(wider_bins(bounds, {}), "") << "nothing is known of the sensor model's";
+  EXPECT_EQ(wider_bins(bounds, BinSteps{0.7, 0.7, 0.07}), "") << "by less than a half";
   for (const BinSteps& steps :
        {BinSteps{0.6, 1.0, 0.1}, BinSteps{1.0, 0.6, 0.1}, BinSteps{1.0, 1.0, 0.06}}) {
-    task.learned_bins = steps;
-    EXPECT_NE(wider_bins_sentence(task).find("too sure"), std::string::npos);
+    EXPECT_NE(wider_bins(bounds, steps).find("too sure"), std::string::npos);
   }
-  task.learned_bins = BinSteps{1.0, 1.0, 0.0};
-  EXPECT_NE(wider_bins_sentence(task), "") << "learned at a fixed angle";
-  task.learned_bins = BinSteps{1.0, 1.0, 0.5};
-  PoseLattice lattice = task.lattice();
-  lattice.theta_rad = {0.0, 6.0, 1};
-  task.filter = with_lattice(task.filter, lattice);
-  EXPECT_NE(wider_bins_sentence(task), "") << "one bin is as wide as the region";
-  task.learned_bins = BinSteps{1.0, 1.0, 0.06};
-  lattice.theta_rad = {1.0, 1.0, 1};
-  task.filter = with_lattice(task.filter, lattice);
-  EXPECT_EQ(wider_bins_sentence(task), "") << "a fixed angle has no bins";
-  task.learned_bins = BinSteps{0.6, 0.6, 0.0};
-  task.filter = ParticleOptions{};
-  EXPECT_EQ(wider_bins_sentence(task), "") << "particles have none";
+  EXPECT_NE(wider_bins(bounds, BinSteps{1.0, 1.0, 0.0}), "") << "learned at a fixed angle";
+  bounds.lattice.theta_rad = {0.0, 6.0, 1};
+  EXPECT_NE(wider_bins(bounds, BinSteps{1.0, 1.0, 0.5}), "") << "one bin is as wide as the region";
+  bounds.lattice.theta_rad = {1.0, 1.0, 1};
+  EXPECT_EQ(wider_bins(bounds, BinSteps{1.0, 1.0, 0.06}), "") << "a fixed angle has no bins";
+  EXPECT_EQ(wider_bins(ParticleOptions{}, BinSteps{0.6, 0.6, 0.0}), "") << "particles have none";
 }
 
 TEST(Misfit, SpeaksForNoneTheMoreTouchesThereAre) {

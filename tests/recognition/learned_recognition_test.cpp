@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "palpate/learned_sensor.hpp"
+#include "recognition/filter_choice.hpp"
 #include "recognition/recogniser.hpp"
 #include "recognition/recognition_record.hpp"
 #include "shapes.hpp"
@@ -151,8 +152,10 @@ TEST(Known, IsOfASingleTouchOfAnObject) {
   Device device = Device::open();
   const Recording recording = touched_letter(3);
   for (const std::size_t filter : {0U, 1U, 2U}) {
-    RecognitionTask task(shapes(), every_filter()[filter]);
-    task.familiarity = Familiarity{.offset = 1.0, .explained_slope = 2.0, .lead_slope = 0.3};
+    const LearnedSensor sensor{
+        .familiarity = Familiarity{.offset = 1.0, .explained_slope = 2.0, .lead_slope = 0.3}};
+    RecognitionTask task(shapes(), with_evidence(every_filter()[filter], sensor));
+    task.familiarity = sensor.familiarity;
     Recogniser recogniser(device, task);
     const RecognitionRecord record = recognise(recogniser, task, unknown_of(recording), true);
     const RecognitionStep& first = record.trace.front();
@@ -186,8 +189,9 @@ TEST(Temperature, LeavesPosesAndTellsTheSameByBoundsAsByTheHistogram) {
   const Recording recording = touched_letter(4);
   std::vector<RecognitionStep> steps;
   for (const std::size_t filter : {0U, 2U}) {
-    RecognitionTask task(shapes(), every_filter()[filter]);
-    task.temperature = 8.0;
+    const LearnedSensor sensor{.temperature = 8.0};
+    RecognitionTask task(shapes(), with_evidence(every_filter()[filter], sensor));
+    task.temperature = sensor.temperature;
     Recogniser recogniser(device, task);
     steps.push_back(recognise(recogniser, task, unknown_of(recording), false).last());
     task.temperature = 1.0;
@@ -218,6 +222,8 @@ TEST(LearnedSensor, TellsTheSameByBoundsAsByTheHistogram) {
   }
   LearnedFeatures features{.weight = 0.3, .any = {.mean = {2.0, 4.0, 1.5}, .sd = {1.0, 1.0, 1.0}}};
   features.objects["disc"] = {.mean = {3.0, 5.0, 2.0}, .sd = {0.5, 0.5, 0.5}};
+  sensor.temperature = 4.0;
+  sensor.features = features;
   std::vector<Hypothesis> maps = shapes();
   maps[0].map.mirror = true;
   add_mirror_images(maps);
@@ -228,9 +234,9 @@ TEST(LearnedSensor, TellsTheSameByBoundsAsByTheHistogram) {
       FilterOptions options = every_filter()[filter];
       std::vector<Hypothesis> learned = maps;
       std::visit([&](auto& of) { apply(sensor, learned, of.contact); }, options);
-      RecognitionTask task(learned, options);
-      task.temperature = 4.0;
-      task.features = features;
+      RecognitionTask task(learned, with_evidence(options, sensor));
+      task.temperature = sensor.temperature;
+      task.features = sensor.features;
       Recogniser recogniser(device, task);
       records.push_back(recognise(recogniser, task, unknown_of(recording), true));
     }

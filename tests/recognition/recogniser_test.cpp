@@ -187,12 +187,10 @@ std::vector<RecognitionTask> automatic_tasks() {
 }
 
 /// The same task about this pivot.
-RecognitionTask about(RecognitionTask task, const glm::dvec2& pivot_mm) {
-  task.auto_pivot = false;
+RecognitionTask about(const RecognitionTask& task, const glm::dvec2& pivot_mm) {
   PoseLattice lattice = task.lattice();
   lattice.pivot_mm = pivot_mm;
-  task.filter = with_lattice(task.filter, lattice);
-  return task;
+  return {task.hypotheses, with_lattice(task.filter, lattice)};
 }
 
 TEST(AutomaticPivot, IsTheArraysCentreAtTheFirstTouchOfEachUnknown) {

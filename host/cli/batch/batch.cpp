@@ -35,7 +35,7 @@ namespace {
 /// A batch whose task stands in its results folder.
 struct SettledBatch {
   BatchTask task;
-  RecognitionTask recognition;
+  const RecognitionTask recognition;
   std::optional<Device> device;  ///< where settling needed it
 };
 

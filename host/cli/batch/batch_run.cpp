@@ -169,7 +169,6 @@ class Pipeline {
       at += run.task.unknowns_of(entry);
     }
     recognisers_ = std::min(most_at_once(task_, run.threads), run.to_be_done);
-    take_threads(task_, run.threads / recognisers_);
   }
 
   BatchCounts run(const std::function<void(const BatchCounts&)>& progress) {
@@ -258,7 +257,8 @@ class Pipeline {
   }
 
   void recognise_jobs(bool first) {
-    Recogniser recogniser = open_recogniser(device_, task_);
+    Recogniser recogniser =
+        open_recogniser(device_, task_, {.threads = run_.threads / recognisers_});
     if (first && run_.verbose) {
       print_engine(device_, recogniser, task_);
     }
@@ -331,7 +331,7 @@ class Pipeline {
 
   const BatchRun& run_;
   Device* device_;  ///< null where none is used
-  RecognitionTask task_;
+  const RecognitionTask& task_;
   std::size_t unknowns_;
   std::vector<std::size_t> first_;  ///< [input] index of its first unknown
   std::size_t recognisers_ = 1;

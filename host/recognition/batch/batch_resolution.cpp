@@ -1,7 +1,5 @@
 #include "recognition/batch/batch_resolution.hpp"
 
-#include <algorithm>
-
 #include "io/file_hash.hpp"
 #include "recognition/refused_option.hpp"
 #include "recognition/resolve.hpp"
@@ -26,8 +24,7 @@ void hash_files(BatchTask& task, const Request& request) {
 }
 
 RecognitionTask resolve_batch(BatchTask& task, const Request& request,
-                              const std::function<Device&()>& device,
-                              const std::function<void()>& cancel_point) {
+                              const std::function<Device&()>& device) {
   const BatchInference& inferred = task.inferred;
   const bool settled = task.bins != std::array<int, 3>{};
   RecognitionTask recognition =
@@ -35,18 +32,11 @@ RecognitionTask resolve_batch(BatchTask& task, const Request& request,
                         .source = inferred.unit_from,
                         .reach_mm = inferred.reach_mm,
                         .still_array = inferred.still_array,
-                        .cancel_point = cancel_point,
                         .device = device,
                         .counts = settled ? std::optional(task.bins) : std::nullopt});
   const PoseLattice& lattice = recognition.lattice();
   task.bins = {lattice.x_mm.count, lattice.y_mm.count, lattice.theta_rad.count};
   return recognition;
-}
-
-void take_threads(RecognitionTask& recognition, std::size_t threads) {
-  if (auto* bounded = std::get_if<BoundedOptions>(&recognition.filter)) {
-    bounded->threads = static_cast<int>(std::max<std::size_t>(1, threads));
-  }
 }
 
 }  // namespace palpate

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <cstddef>
 #include <functional>
 
 #include "recognition/batch/batch_task.hpp"
@@ -22,13 +21,8 @@ void hash_files(BatchTask& task, const Request& request);
 /// The recognition that a task with its inference asks for, on the task's bins. Where the task has
 /// none yet, settles them and puts them there.
 /// @param device as Circumstances::device
-/// @param cancel_point as RecognitionTask::cancel_point
 /// @throws Error
 RecognitionTask resolve_batch(BatchTask& task, const Request& request,
-                              const std::function<Device&()>& device,
-                              const std::function<void()>& cancel_point = {});
-
-/// Has bounds take so many host threads.
-void take_threads(RecognitionTask& recognition, std::size_t threads);
+                              const std::function<Device&()>& device);
 
 }  // namespace palpate
