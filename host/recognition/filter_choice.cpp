@@ -261,8 +261,7 @@ ChosenBins chosen_bins(const std::function<Device&()>& device,
           most};
 }
 
-FilterOptions filter_for_bins(std::span<const Hypothesis> hypotheses,
-                              const FilterOptions& filter) {
+FilterOptions filter_for_bins(std::span<const Hypothesis> hypotheses, const FilterOptions& filter) {
   if (bins_in_all(hypotheses.size(), lattice_of(filter)) > most_histogram_bins) {
     const std::optional<BoundedOptions> bounded = bounded_instead(filter);
     if (bounded && bounds_have_room(hypotheses, *bounded)) {

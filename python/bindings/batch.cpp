@@ -88,9 +88,8 @@ OpenBatch open_batch(const std::string& head, const Session& session, Device& de
   RecognitionTask recognition =
       resolve_batch(task, request, [&device]() -> Device& { return device; });
   // The open batch keeps the session.
-  Recogniser recogniser =
-      open_recogniser(&device, recognition,
-                      {.threads = threads, .cancel_point = [&session] { session.check(); }});
+  Recogniser recogniser = open_recogniser(
+      &device, recognition, {.threads = threads, .cancel_point = [&session] { session.check(); }});
   return {std::move(task), std::move(request), std::move(recognition), std::move(recogniser)};
 }
 

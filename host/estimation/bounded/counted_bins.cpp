@@ -78,13 +78,12 @@ CountedPlane CountedBins::plane(std::size_t object, int theta) const {
     row = everywhere_ ? OverlapPlane::Bins{0, lattice_.x_mm.count} : overlap.row(y);
     if (row.count > 0) {
       plane.bins += row.count;
-      plane.around =
-          smallest_around(plane.around, {.object = static_cast<std::int32_t>(object),
-                                         .theta = theta,
-                                         .y_first = y,
-                                         .y_count = 1,
-                                         .x_first = row.first,
-                                         .x_count = row.count});
+      plane.around = smallest_around(plane.around, {.object = static_cast<std::int32_t>(object),
+                                                    .theta = theta,
+                                                    .y_first = y,
+                                                    .y_count = 1,
+                                                    .x_first = row.first,
+                                                    .x_count = row.count});
     }
   }
   return plane;

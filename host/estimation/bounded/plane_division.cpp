@@ -95,9 +95,8 @@ PlaneSurvey PlaneDivision::survey(int theta) {
   const Plane plane = this->plane(theta);
   PlaneSurvey found{.bins = plane.counted.bins};
   if (!plane.all_seen) {
-    const BinBox seen = plane.largest.x_first < plane.largest.x_end
-                            ? box_of(0, plane, plane.largest)
-                            : BinBox{};
+    const BinBox seen =
+        plane.largest.x_first < plane.largest.x_end ? box_of(0, plane, plane.largest) : BinBox{};
     found.unseen = task_.counted.outside(seen, plane.counted, shares_looked_at_);
   }
   if (const std::vector<std::uint32_t> sums = largest_sums(plane); !sums.empty()) {
@@ -155,8 +154,8 @@ PlaneDivision::Plane PlaneDivision::plane(int theta) const {
   const TileLevel& level = levels_.front();
   const auto [x_tile, x_tile_end] = tiles_of(level.x, around.x_first, x_end);
   const auto [y_tile, y_tile_end] = tiles_of(level.y, around.y_first, y_end);
-  const TileRange seen = seen_tiles(task_.reaches[static_cast<std::size_t>(theta)],
-                                    task_.space.maps[object_], level);
+  const TileRange seen =
+      seen_tiles(task_.reaches[static_cast<std::size_t>(theta)], task_.space.maps[object_], level);
   const auto down = [](int tile) { return tile - tile % batch_side; };
   const TileRange batches{down(std::max(x_tile, seen.x_first)),
                           down(std::min(x_tile_end, seen.x_end) + batch_side - 1),

@@ -17,8 +17,8 @@ namespace palpate::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 void PlaceWindows(const glm::dvec2* from_pivot_mm, std::size_t count, const TilePlace& place,
-                   const WindowTable& shape, std::int32_t* plane, std::int32_t* column,
-                   std::int32_t* row) {
+                  const WindowTable& shape, std::int32_t* plane, std::int32_t* column,
+                  std::int32_t* row) {
   const hn::ScalableTag<double> d;
   const hn::Rebind<std::int32_t, decltype(d)> di;
   // Squares that are told apart; farther elements see only the prior as well.
