@@ -7,7 +7,7 @@
 
 #include <glm/common.hpp>
 
-#include "io/element_spacing.hpp"
+#include "model/element_spacing.hpp"
 
 namespace palpate::cli {
 

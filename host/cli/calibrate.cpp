@@ -14,11 +14,11 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/calibrate_output.hpp"
+#include "cli/command_files.hpp"
 #include "cli/options.hpp"
 #include "cli/progress.hpp"
 #include "cli/recognition_flags.hpp"
 #include "cli/terminal.hpp"
-#include "io/command_files.hpp"
 #include "learning/calibration_task.hpp"
 #include "palpate/files.hpp"
 #include "recognition/recordings.hpp"

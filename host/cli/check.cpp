@@ -8,11 +8,11 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "cli/command_files.hpp"
 #include "cli/commands.hpp"
 #include "cli/options.hpp"
 #include "cli/progress.hpp"
 #include "cli/recognition_flags.hpp"
-#include "io/command_files.hpp"
 #include "learning/setup_check.hpp"
 #include "model/option_words.hpp"
 #include "recognition/recordings.hpp"

@@ -10,12 +10,12 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include "cli/command_files.hpp"
 #include "cli/evaluate_output.hpp"
 #include "cli/options.hpp"
 #include "cli/recognition_flags.hpp"
 #include "cli/results_folder.hpp"
 #include "cli/terminal.hpp"
-#include "io/command_files.hpp"
 #include "recognition/batch/batch_task.hpp"
 #include "recognition/judged_results.hpp"
 

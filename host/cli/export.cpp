@@ -7,9 +7,9 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include "cli/command_files.hpp"
 #include "cli/commands.hpp"
 #include "cli/options.hpp"
-#include "io/command_files.hpp"
 #include "io/recording_tables.hpp"
 #include "palpate/files.hpp"
 

@@ -6,11 +6,11 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include "cli/command_files.hpp"
 #include "cli/commands.hpp"
 #include "cli/options.hpp"
 #include "cli/recognition_flags.hpp"
 #include "cli/sensor_option.hpp"
-#include "io/command_files.hpp"
 #include "io/recording_rules.hpp"
 #include "palpate/files.hpp"
 #include "streaming/table_import.hpp"

@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include "cli/command_files.hpp"
 #include "cli/commands.hpp"
 #include "cli/interruption.hpp"
 #include "cli/live_record.hpp"
@@ -21,7 +22,6 @@
 #include "cli/recognition_flags.hpp"
 #include "cli/sensor_option.hpp"
 #include "cli/step_words.hpp"
-#include "io/command_files.hpp"
 #include "palpate/pose_track.hpp"
 #include "palpate/virtual_sensor.hpp"
 #include "recognition/live_recognition.hpp"

@@ -9,10 +9,10 @@
 #include <fmt/ranges.h>
 #include <CLI/CLI.hpp>
 
+#include "cli/command_files.hpp"
 #include "cli/map_drawing.hpp"
 #include "cli/options.hpp"
 #include "cli/recognition_flags.hpp"
-#include "io/command_files.hpp"
 #include "model/number_text.hpp"
 #include "model/printable.hpp"
 #include "recognition/option_text.hpp"

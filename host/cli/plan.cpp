@@ -13,6 +13,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "cli/command_files.hpp"
 #include "cli/commands.hpp"
 #include "cli/options.hpp"
 #include "cli/recognition_flags.hpp"
@@ -22,7 +23,6 @@
 #include "cli/terminal.hpp"
 #include "cli/text_table.hpp"
 #include "figures/figures.hpp"
-#include "io/command_files.hpp"
 #include "model/bounding_box.hpp"
 #include "recognition/record_json.hpp"
 #include "recognition/recordings.hpp"

@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "io/command_files.hpp"
+#include "cli/command_files.hpp"
 #include "recognition/resolve.hpp"
 
 namespace CLI {

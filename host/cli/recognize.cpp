@@ -13,6 +13,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "cli/command_files.hpp"
 #include "cli/commands.hpp"
 #include "cli/options.hpp"
 #include "cli/progress.hpp"
@@ -23,7 +24,6 @@
 #include "cli/terminal.hpp"
 #include "cli/text_table.hpp"
 #include "io/atomic_file.hpp"
-#include "io/command_files.hpp"
 #include "palpate/files.hpp"
 #include "recognition/filter_choice.hpp"
 #include "recognition/record_json.hpp"

@@ -7,12 +7,12 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include "cli/command_files.hpp"
 #include "cli/commands.hpp"
 #include "cli/interruption.hpp"
 #include "cli/options.hpp"
 #include "cli/sensor_option.hpp"
 #include "io/atomic_file.hpp"
-#include "io/command_files.hpp"
 #include "model/printable.hpp"
 #include "model/stream_time.hpp"
 #include "palpate/baseline.hpp"

@@ -6,7 +6,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "io/command_files.hpp"
+#include "cli/command_files.hpp"
 #include "palpate/pose_track.hpp"
 #include "palpate/sensor.hpp"
 #include "palpate/touch_detector.hpp"

@@ -11,8 +11,8 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include "cli/command_files.hpp"
 #include "cli/options.hpp"
-#include "io/command_files.hpp"
 #include "palpate/files.hpp"
 #include "palpate/simulation.hpp"
 #include "recognition/option_text.hpp"

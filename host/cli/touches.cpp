@@ -11,10 +11,10 @@
 #include <fmt/ranges.h>
 #include <CLI/CLI.hpp>
 
+#include "cli/command_files.hpp"
 #include "cli/commands.hpp"
 #include "cli/options.hpp"
 #include "cli/sensor_option.hpp"
-#include "io/command_files.hpp"
 #include "io/recording_state.hpp"
 #include "model/elements_that.hpp"
 #include "model/option_words.hpp"

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "io/element_spacing.hpp"
-#include "io/extremes.hpp"
 #include "io/recording_scan.hpp"
+#include "model/element_spacing.hpp"
+#include "model/extremes.hpp"
 
 namespace palpate {
 

@@ -6,8 +6,8 @@
 
 #include <fmt/format.h>
 
-#include "io/element_spacing.hpp"
 #include "learning/golden_section.hpp"
+#include "model/element_spacing.hpp"
 #include "model/touch_evidence.hpp"
 #include "palpate/error.hpp"
 #include "palpate/occupancy_grid.hpp"

@@ -8,9 +8,9 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
-#include "io/element_spacing.hpp"
 #include "model/bounding_box.hpp"
 #include "model/cell_range.hpp"
+#include "model/element_spacing.hpp"
 #include "model/touch_evidence.hpp"
 #include "palpate/contact.hpp"
 #include "palpate/error.hpp"

@@ -6,10 +6,10 @@
 
 #include <tbb/parallel_for.h>
 
-#include "io/element_spacing.hpp"
 #include "learning/contact_learning.hpp"
 #include "learning/golden_section.hpp"
 #include "model/bounding_box.hpp"
+#include "model/element_spacing.hpp"
 #include "model/touch_evidence.hpp"
 
 namespace palpate {

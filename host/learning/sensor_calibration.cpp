@@ -10,10 +10,10 @@
 #include <fmt/format.h>
 
 #include "estimation/maps/left_out_fit.hpp"
-#include "io/element_spacing.hpp"
 #include "learning/array_place.hpp"
 #include "learning/feature_learning.hpp"
 #include "learning/host_progress.hpp"
+#include "model/element_spacing.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {

@@ -6,10 +6,10 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
-#include "io/element_spacing.hpp"
 #include "learning/fused_map.hpp"
 #include "learning/observed_map.hpp"
 #include "learning/press_fusion.hpp"
+#include "model/element_spacing.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {

@@ -9,9 +9,9 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
-#include "io/element_spacing.hpp"
 #include "model/angle_unit.hpp"
 #include "model/bounding_box.hpp"
+#include "model/element_spacing.hpp"
 
 namespace palpate {
 

@@ -5,11 +5,11 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include "cli/command_files.hpp"
 #include "cli/commands.hpp"
 #include "cli/options.hpp"
 #include "cli/results_folder.hpp"
 #include "io/atomic_file.hpp"
-#include "io/command_files.hpp"
 #include "io/file_identity.hpp"
 #include "io/input_file.hpp"
 #include "recognition/batch/batch_task.hpp"

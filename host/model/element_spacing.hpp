@@ -7,7 +7,7 @@
 
 #include <glm/vec2.hpp>
 
-#include "io/extremes.hpp"
+#include "model/extremes.hpp"
 
 namespace palpate {
 

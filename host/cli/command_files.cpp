@@ -1,4 +1,4 @@
-#include "io/command_files.hpp"
+#include "cli/command_files.hpp"
 
 #include <fmt/format.h>
 #include <unistd.h>

@@ -1,4 +1,4 @@
-#include "io/element_spacing.hpp"
+#include "model/element_spacing.hpp"
 
 #include <algorithm>
 #include <cmath>
