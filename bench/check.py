@@ -24,9 +24,9 @@ POLYGONS = {
     "cross": "-4 -12\n4 -12\n4 -2\n11 -2\n11 5\n4 5\n4 12\n-4 12\n-4 5\n-9 5\n-9 -2\n-4 -2\n",
 }
 ARRAYS = {36: palpate.digitacts_array(), 64: palpate.grid_array(8, 8, 1.9)}
-#: How the readings of a grid [row, column] come, by the options that put them right.
+#: How the readings of a grid [row, column] come, by the first_element and order that put them right.
 ORDERS = {
-    f"{row}-{side} --order {order}": (row == "top", side == "right", order == "columns")
+    (f"{row}-{side}", order): (row == "top", side == "right", order == "columns")
     for row in ("bottom", "top")
     for side in ("left", "right")
     for order in ("rows", "columns")
@@ -52,9 +52,9 @@ Floats = NDArray[numpy.float64]
 Touches = list[palpate.Recording]
 
 
-def misread(pressure: Floats, option: str) -> Floats:
-    """Readings in the order in which an array gives them that the option's import puts right."""
-    top, right, columns = ORDERS[option]
+def misread(pressure: Floats, options: tuple[str, str]) -> Floats:
+    """Readings in the order in which an array gives them that the options' import puts right."""
+    top, right, columns = ORDERS[options]
     side = math.isqrt(pressure.shape[1])
     grid: Floats = pressure.reshape(-1, side, side)
     grid = grid[:, ::-1] if top else grid
@@ -84,12 +84,12 @@ class Set:
             for k, (shape, pose) in enumerate(zip(self.shapes, poses, strict=True))
         ]
 
-    def misread(self) -> tuple[str, Touches]:
+    def misread(self) -> tuple[tuple[str, str], Touches]:
         """Touches whose elements are read in another order, and the options that say so."""
-        option = list(ORDERS)[1 + int(self.random.uniforms(1)[0] * (len(ORDERS) - 1))]
-        return option, [
+        options = list(ORDERS)[1 + int(self.random.uniforms(1)[0] * (len(ORDERS) - 1))]
+        return options, [
             palpate.Recording(
-                misread(one.pressure, option), one.T_robot_sensor, one.elements_mm, object=one.object
+                misread(one.pressure, options), one.T_robot_sensor, one.elements_mm, object=one.object
             )
             for one in self.touches
         ]
@@ -118,12 +118,12 @@ def checked(device: palpate.Device, one: Set) -> Json:
 
     record: Json = {"objects": [pathlib.Path(shape).stem for shape in one.shapes]}
     record["sound"] = [finding.words for finding in found(one.touches).findings]
-    option, touches = one.misread()
+    (first_element, order), touches = one.misread()
     findings = found(touches).findings
-    words = option.replace(" --", "' and ").replace("order ", "order='")
+    words = f"first_element='{first_element}' and order='{order}'"
     record["order"] = {
-        "right": len(findings) == 1 and f"first_element='{words}'" in findings[0].words,
-        "option": option,
+        "right": len(findings) == 1 and words in findings[0].words,
+        "option": f"{first_element} --order {order}",
         "nats": findings[0].nats if findings else 0.0,
         "words": [finding.words for finding in findings],
     }

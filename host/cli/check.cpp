@@ -5,6 +5,7 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
@@ -47,8 +48,8 @@ std::string json_of(const SetupCheck& check) {
   for (const SetupFinding& finding : check.findings) {
     nlohmann::ordered_json json{
         {"what", finding.what}, {"nats", finding.nats}, {"words", in_flags(finding.words)}};
-    if (!finding.option.empty()) {
-      json["flag"] = "--" + finding.option;
+    if (!finding.options.empty()) {
+      json["flag"] = fmt::format("--{}", fmt::join(finding.options, " --"));
     }
     if (finding.array_offset) {
       const Pose& offset = *finding.array_offset;

@@ -179,8 +179,10 @@ std::optional<SetupFinding> dropped(const Presses& presses,
       "dropped", 0.0,
       fmt::format("{} of {} presses were left out: {}{}", lost, presses.all,
                   fmt::join(reasons, ", "),
-                  clock ? fmt::format("; the clocks differ: import with `{}`", clock->option) : ""),
-      clock ? clock->option : ""};
+                  clock ? fmt::format("; the clocks differ: import with `{}`",
+                                      fmt::join(clock->options, "` and `"))
+                        : ""),
+      clock ? clock->options : std::vector<std::string>{}};
 }
 
 /// Where every touch has the same elements dead, keeps one list for all touches: `dead`, which may
@@ -268,7 +270,7 @@ void find_touches(const TouchesArguments& options) {
              "none of its {} touches has a pose; {}, or keep them for 'palpate map --unposed' with "
              "--unposed",
              presses.without_pose,
-             clock ? fmt::format("import again with --{}", clock->option)
+             clock ? fmt::format("import again with --{}", fmt::join(clock->options, " --"))
                    : "record again with --poses");
     }
     if (!complaint.empty() || clock) {
@@ -290,7 +292,7 @@ void find_touches(const TouchesArguments& options) {
     fmt::print(", {} left out as not steady", presses.unsteady);
   }
   if (clock) {
-    fmt::print(", clocks differ (palpate import --{})", clock->option);
+    fmt::print(", clocks differ (palpate import --{})", fmt::join(clock->options, " --"));
   }
   std::uint64_t lost = stream->counters().lost;
   count_lost(lost, unreadable);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <iterator>
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
 #include "palpate/files.hpp"
@@ -82,7 +84,7 @@ void write_head(Hdf5Writer& file, const Recording& head) {
       findings.push_back({{"what", finding.what},
                           {"nats", finding.nats},
                           {"words", finding.words},
-                          {"option", finding.option}});
+                          {"option", fmt::format("{}", fmt::join(finding.options, ";"))}});
     }
     file.attribute("findings", findings.dump());
   }

@@ -25,8 +25,7 @@ void require_one_of(const std::filesystem::path& path, const char* attribute,
 void require_rows_of_touches(const Recording& recording) {
   if (recording.rows == "frames") {
     refuse(recording.path,
-           "rows = frames, a raw stream; find its touches first: palpate touches {} -o TOUCHES.h5",
-           recording.path);
+           "rows = frames, a raw stream; find its touches first, with palpate touches");
   }
 }
 

@@ -13,6 +13,7 @@
 #include "io/file_format.hpp"
 #include "io/hdf5_contents.hpp"
 #include "io/recording_rules.hpp"
+#include "model/number_text.hpp"
 #include "model/stream_time.hpp"
 
 namespace palpate {
@@ -73,7 +74,12 @@ std::vector<SetupFinding> read_findings(const Hdf5Contents& file) {
   const auto all = nlohmann::json::parse(file.text("findings"), nullptr, false);
   try {
     for (const nlohmann::json& one : all.get<nlohmann::json::array_t>()) {
-      findings.push_back({one.at("what"), one.at("nats"), one.at("words"), one.at("option")});
+      findings.push_back({one.at("what"), one.at("nats"), one.at("words")});
+      const std::string options = one.at("option");
+      if (!options.empty()) {
+        const auto parts = split_text(options, ';');
+        findings.back().options.assign(parts.begin(), parts.end());
+      }
     }
   } catch (const nlohmann::json::exception&) {
     file.refuse("attribute 'findings' is no JSON array of what, nats, words and option; delete it");

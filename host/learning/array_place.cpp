@@ -117,7 +117,7 @@ std::optional<SetupFinding> offset_of(const std::function<double(const Pose&)>& 
                   "turned by {:+.1f} +- {:.1f} degrees, from where its elements are said to be: "
                   "import with the corrected array",
                   offset[0], sd[0], offset[1], sd[1], degrees * offset[2], degrees * sd[2]),
-      "",
+      {},
       pose_of(offset),
       sd};
 }
@@ -216,8 +216,7 @@ void check_pitch(SetupJudge& judge, Setup& setup, double& nats, SetupCheck& chec
         {"pitch", most - nats,
          fmt::format("the elements lie {:.2f} times as far apart as they are said to: correct the "
                      "pitch in `array`, or import with the corrected array",
-                     best),
-         ""});
+                     best)});
     setup = scaled(best);
     nats = most;
     check.elements_mm = setup.elements_mm;

@@ -52,7 +52,7 @@ void check_units(SetupJudge& judge, Setup& setup, double& nats,
                                     : may_be_metres                 ? "metres"
                                                                     : "degrees",
                                     option),
-                        option});
+                        {option}});
     setup = other;
     nats += gain;
   }
@@ -76,8 +76,12 @@ bool at_one_place(const SetupJudge& judge, const Setup& setup) {
 
 /// Where the elements are a full grid, the eight orders in which it may be read, each with the
 /// options of an import that say so.
-std::vector<std::pair<std::string, std::vector<glm::dvec2>>> orders_of(
-    std::span<const glm::dvec2> elements_mm) {
+struct ElementOrder {
+  std::vector<std::string> options;
+  std::vector<glm::dvec2> elements_mm;
+};
+
+std::vector<ElementOrder> orders_of(std::span<const glm::dvec2> elements_mm) {
   constexpr double same_mm = 1e-6;
   const auto less = [](double a, double b) { return a < b - same_mm; };
   std::set<double, decltype(less)> xs(less);
@@ -88,7 +92,7 @@ std::vector<std::pair<std::string, std::vector<glm::dvec2>>> orders_of(
   }
   const std::vector<double> x(xs.begin(), xs.end());
   const std::vector<double> y(ys.begin(), ys.end());
-  std::vector<std::pair<std::string, std::vector<glm::dvec2>>> orders;
+  std::vector<ElementOrder> orders;
   if (x.size() < 2 || y.size() < 2 || x.size() * y.size() != elements_mm.size()) {
     return orders;
   }
@@ -102,9 +106,9 @@ std::vector<std::pair<std::string, std::vector<glm::dvec2>>> orders_of(
         const std::size_t j = by_rows ? e / x.size() : e % y.size();
         order.emplace_back(x[right ? x.size() - 1 - i : i], y[top ? y.size() - 1 - j : j]);
       }
-      orders.emplace_back(
-          fmt::format("first-element {} --order {}", first, by_rows ? "rows" : "columns"),
-          std::move(order));
+      orders.push_back({{fmt::format("first-element {}", first),
+                         fmt::format("order {}", by_rows ? "rows" : "columns")},
+                        std::move(order)});
     }
   }
   return orders;
@@ -118,14 +122,14 @@ void check_order(SetupJudge& judge, Setup& setup, double& nats, SetupCheck& chec
   }
   const std::vector<glm::dvec2> given = setup.elements_mm;
   double best = nats;
-  std::string option;
-  for (const auto& [words, elements_mm] : orders) {
+  std::vector<std::string> options;
+  for (const auto& [import_options, elements_mm] : orders) {
     Setup other = setup;
     other.elements_mm = elements_mm;
     const double tried = elements_mm == given ? nats : judge.nats(other);
     if (tried > best) {
       best = tried;
-      option = words;
+      options = import_options;
       check.elements_mm = elements_mm;
     }
   }
@@ -133,11 +137,11 @@ void check_order(SetupJudge& judge, Setup& setup, double& nats, SetupCheck& chec
   // little; a wrong order costs a good part of all that the touches tell.
   constexpr double least_share = 0.05;
   if (best - nats > std::max(least_nats, least_share * std::abs(nats))) {
-    std::string words = option;
-    words.replace(words.find(" --"), 3, "` and `");
     check.findings.push_back(
         {"element_order", best - nats,
-         fmt::format("the elements are read in another order: import with `{}`", words), option});
+         fmt::format("the elements are read in another order: import with `{}`",
+                     fmt::join(options, "` and `")),
+         options});
     setup.elements_mm = check.elements_mm;
     nats = best;
   }
@@ -188,7 +192,7 @@ void check_elements(SetupJudge& judge, Setup& setup, SetupCheck& check) {
            fmt::format("{} contact in every touch, on the object or beside it: "
                        "elements {}; import with `{}`",
                        stuck ? "always in" : "never in", fmt::join(found, ", "), option),
-           option});
+           {option}});
     }
   }
 }
@@ -217,8 +221,7 @@ void check_touches(SetupJudge& judge, const Setup& setup, SetupCheck& check) {
         {"contradicting", nats,
          fmt::format("{}: touches that contradict the others: {}; the object moved, or their poses "
                      "are others: leave them out",
-                     recording, fmt::join(indices, ", ")),
-         ""});
+                     recording, fmt::join(indices, ", "))});
   }
 }
 

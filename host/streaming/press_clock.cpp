@@ -238,7 +238,7 @@ SetupFinding clock_finding(const ClockOffset& offset, double given_s) {
                       "lifted, or has no pose; with `{}` in {}",
                       std::abs(offset.seconds), offset.seconds > 0.0 ? "ahead" : "behind",
                       offset.against, offset.presses, option, offset.left),
-          option};
+          {option}};
 }
 
 }  // namespace palpate

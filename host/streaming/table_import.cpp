@@ -104,7 +104,7 @@ bool has_column(const std::string& path, const std::string& name) {
 void choose_rows(const ImportOptions& options, std::size_t n, Recording& recording) {
   if (options.rate_hz) {
     if (!recording.time_s.empty()) {
-      refuse(fmt::format("`rate {}`", *options.rate_hz), "{} has times; leave the flag out",
+      refuse(fmt::format("`rate {}`", *options.rate_hz), "{} has times; leave it out",
              options.pressures);
     }
     for (std::size_t i = 0; i < n; ++i) {
@@ -165,7 +165,7 @@ void check_numbers(const ImportOptions& options) {
     refuse(fmt::format("`pose-delay {}`", options.pose_delay_s), "give seconds");
   }
   if (options.unposed && !options.poses.empty()) {
-    refuse("`unposed`", "{} holds the poses; leave one of the flags out", options.poses);
+    refuse("`unposed`", "{} holds the poses; leave one of them out", options.poses);
   }
 }
 
@@ -247,7 +247,7 @@ ImportedRecording import_tables(const ImportOptions& options) {
     }
     if (rows.poses->time_s.empty() && options.pose_delay_s != 0.0) {
       refuse(fmt::format("`pose-delay {}`", options.pose_delay_s),
-             "{} has no times; leave the flag out", options.poses);
+             "{} has no times; leave it out", options.poses);
     }
     pose_units = rows.poses->units;
   }

@@ -152,15 +152,13 @@ std::vector<SetupFinding> tilt_of(const TouchPlane& plane,
         {"tilt", 0.0,
          fmt::format("{} of {} poses under load are tilted by more than {:.0f} degrees, {:.1f} at "
                      "most: press the array flat, or give the `plane`",
-                     tilted, rows, much_tilt_rad * degrees, most_rad * degrees),
-         ""});
+                     tilted, rows, much_tilt_rad * degrees, most_rad * degrees)});
   }
   if (high - low > much_height_mm) {
     found.push_back({"tilt", 0.0,
                      fmt::format("the height under load varies by {:.1f} mm: do all touches lie in "
                                  "one plane?",
-                                 high - low),
-                     ""});
+                                 high - low)});
   }
   return found;
 }

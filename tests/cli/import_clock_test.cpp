@@ -68,13 +68,13 @@ TEST_F(ClocksOfLogs, ThatDifferAreSaidUntilTheirOffsetIsGiven) {
   EXPECT_EQ(touches.findings[0].what, "clock");
   EXPECT_GT(touches.findings[0].nats, 20.0);
   EXPECT_EQ(touches.findings[1].what, "dropped");
-  EXPECT_EQ(touches.findings[1].option, touches.findings[0].option);
+  EXPECT_EQ(touches.findings[1].options, touches.findings[0].options);
   expect_named(touches.findings[1].words, {"; the clocks differ: import with `pose-delay"});
   expect_named(palpate({"map", "t.h5", "-o", "cup.map.h5"}).err, {"t.h5: the poses' clock seems"});
   const json findings = check("t.h5");
   const json& clock = findings[findings.size() - 2];
   EXPECT_EQ(clock["what"], "clock");
-  EXPECT_EQ(clock["flag"], "--" + touches.findings[0].option);
+  EXPECT_EQ(clock["flag"], "--" + touches.findings[0].options.at(0));
   expect_named(clock["words"], {"t.h5: the poses' clock seems"});
   EXPECT_EQ(findings.back()["what"], "dropped");
   EXPECT_EQ(findings.back()["nats"], 0.0);

@@ -247,7 +247,7 @@ TEST_F(ImportCommand, FlagsNameTheirForm) {
   expect_said({"--time-unit", "h"}, "--time-unit h: give s, ms, us or ns");
   expect_said({"--pressure-unit", "psi"}, "--pressure-unit psi: give kPa or raw");
   expect_said({"--rows", "rows"}, "--rows rows: give frames or touches");
-  expect_said({"--rate", "5"}, "--rate 5: log.csv has times; leave the flag out");
+  expect_said({"--rate", "5"}, "--rate 5: log.csv has times; leave it out");
   expect_said({"--rate", "0"}, "--rate 0: give 0.001 to 1000000 Hz");
   expect_said({"--rate", "1e-300"}, "--rate 1e-300: give 0.001 to 1000000 Hz");
   expect_said({"--rate", "1e300"}, "--rate 1e+300: give 0.001 to 1000000 Hz");

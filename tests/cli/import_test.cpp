@@ -99,7 +99,7 @@ TEST_F(ImportCommand, RowsMayBeTouchesAtUnknownPoses) {
   expect_named(done(command({"--unposed"})),
                {"0 with a pose; next: palpate touches o.h5 -o TOUCHES.h5 --unposed"});
   expect_said({"--unposed", "--poses", "poses.csv"},
-              "--unposed: poses.csv holds the poses; leave one of the flags out");
+              "--unposed: poses.csv holds the poses; leave one of them out");
 }
 
 TEST_F(ImportCommand, FramesNeedNoPoses) {

@@ -64,15 +64,18 @@ TEST_F(RecordingFile, ComesBackAsItWasWritten) {
 
 TEST_F(RecordingFile, KeepsWhatItsLogsShowed) {
   Recording written = small_recording();
-  written.findings = {{"clock", 8.8, "ahead; `pose-delay 0.62`", "pose-delay 0.62"},
-                      {"tilt", 0.0, "t", ""}};
+  written.findings = {{"clock", 8.8, "ahead; `pose-delay 0.62`", {"pose-delay 0.62"}},
+                      {"tilt", 0.0, "t"},
+                      {"element_order", 5.0, "o", {"first-element top-left", "order rows"}}};
   write_recording(path_, written);
   const Recording read = read_recording(path_);
-  ASSERT_EQ(read.findings.size(), 2u);
+  ASSERT_EQ(read.findings.size(), 3u);
   EXPECT_EQ(read.findings[0].what, "clock");
   EXPECT_EQ(read.findings[0].nats, 8.8);
   EXPECT_EQ(read.findings[0].words, written.findings[0].words);
-  EXPECT_EQ(read.findings[0].option, "pose-delay 0.62");
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(read.findings[i].options, written.findings[i].options);
+  }
   for (const char* spoilt : {"[", "{}", "[1]", "[{\"what\": 2}]"}) {
     SCOPED_TRACE(spoilt);
     expect_named(message(recording_parts().attribute("findings", std::string(spoilt))),

@@ -67,7 +67,8 @@ TEST_F(SetupTouches, TellTheOrderInWhichElementsAreRead) {
   const SetupCheck found = check(recordings);
   ASSERT_EQ(found.findings.size(), 1u);
   EXPECT_EQ(found.findings[0].what, "element_order");
-  EXPECT_EQ(found.findings[0].option, "first-element top-right --order columns");
+  EXPECT_THAT(found.findings[0].options,
+              ElementsAre("first-element top-right", "order columns"));
   EXPECT_GT(found.findings[0].nats, 200.0);
   for (Recording& recording : recordings) {
     recording.elements_mm = found.elements_mm;
@@ -136,7 +137,7 @@ TEST_F(SetupTouches, TellThePitchAndTheUnitsOfPoses) {
   }
   const SetupCheck found = check(recordings);
   ASSERT_EQ(found.findings.size(), 2u);
-  EXPECT_EQ(found.findings[0].option, "pose-unit m,deg");
+  EXPECT_THAT(found.findings[0].options, ElementsAre("pose-unit m,deg"));
   EXPECT_EQ(found.findings[1].what, "pitch");
   EXPECT_NEAR(found.elements_mm[0].x, digitacts_array()[0].x, 0.15);
 }
@@ -154,13 +155,14 @@ TEST_F(SetupTouches, TellDeadAndStuckElementsAndTouchesOfAnotherPlace) {
   EXPECT_THAT(
       found.findings,
       ElementsAre(
-          Field(&SetupFinding::option, "dead 14"), Field(&SetupFinding::option, "dead 21"),
+          Field(&SetupFinding::options, ElementsAre("dead 14")),
+          Field(&SetupFinding::options, ElementsAre("dead 21")),
           Field(&SetupFinding::words, HasSubstr("E.h5: touches that contradict the others: 7;"))));
 }
 
 TEST_F(SetupTouches, BringWhatTheirLogsShowed) {
   std::vector<Recording> recordings = touches(digitacts_array());
-  recordings[1].findings = {{"dropped", 0.0, "6 of 40 presses were left out", ""}};
+  recordings[1].findings = {{"dropped", 0.0, "6 of 40 presses were left out"}};
   EXPECT_THAT(check(recordings).findings,
               ElementsAre(Field(&SetupFinding::words, "E.h5: 6 of 40 presses were left out")));
   Recording few = recordings[1];

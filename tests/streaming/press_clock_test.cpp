@@ -114,7 +114,7 @@ TEST(ClockOffset, BecomesAFindingThatNamesWhatMendsIt) {
   const SetupFinding finding =
       clock_finding({.seconds = -0.5, .presses = 60, .against = 41, .left = 1}, 0.2);
   EXPECT_EQ(finding.what, "clock");
-  EXPECT_EQ(finding.option, "pose-delay -0.30");
+  EXPECT_EQ(finding.options, std::vector<std::string>{"pose-delay -0.30"});
   EXPECT_NEAR(finding.nats, 40.0 * std::log(19.0), 1e-9);
   EXPECT_EQ(finding.words,
             "the poses' clock seems 0.50 s behind: in 41 of 60 presses the array moves, is lifted, "

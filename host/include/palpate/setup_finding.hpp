@@ -3,6 +3,7 @@
 #include <array>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "palpate/pose.hpp"
 
@@ -16,8 +17,8 @@ struct SetupFinding {
   /// By how much more likely the touches are once it is mended; of "clock", log 19 for each press
   /// that it explains; 0 of "tilt" and "dropped", which are counted or measured.
   double nats = 0.0;
-  std::string words;   ///< a sentence, options between `quotes`
-  std::string option;  ///< that mends it, such as "dead 13,42"; "" where none does
+  std::string words;                      ///< a sentence, options between `quotes`
+  std::vector<std::string> options = {};  ///< that mend it together, such as "dead 13,42"
   /// Pose of the recordings' array in the true sensor frame, to be applied to the elements, with
   /// its standard deviations in mm, mm and rad.
   std::optional<Pose> array_offset = {};
