@@ -1,12 +1,11 @@
 """Recordings from logs of ROS 1 and ROS 2: rosbag, sqlite3 and MCAP, read by the package rosbags."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import closing
 from typing import TYPE_CHECKING, Any, Literal
 
 from . import _palpate
-from ._bag_messages import Pressures, Progress, Topic, opened
 from ._error import Error
 from ._palpate import Recording
 from .recognition import _Path, array_option, filled, warn
@@ -14,6 +13,8 @@ from .recognition import _Path, array_option, filled, warn
 # The build writes the stubs by importing the package, where there is no NumPy.
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
+
+    from ._bag_messages import Pressures, Topic
 
 
 def read_bag(
@@ -33,7 +34,7 @@ def read_bag(
     largest_gap_s: float | None = None,
     pose_delay: float = 0.0,
     object: str = "",
-    progress: Progress | None = None,
+    progress: Callable[[float], object] | None = None,
 ) -> Recording:
     """Makes a recording of frames from a log of ROS, with the pose of the sensor at each frame's time.
 
@@ -65,10 +66,12 @@ def read_frames(
     tf: tuple[str, str] | None,
     truth_tf: tuple[str, str] | None,
     pose_delay: float,
-    progress: Progress | None,
+    progress: Callable[[float], object] | None,
     **options: Any,
 ) -> "tuple[Pressures, _palpate.ImportedFrames]":
     """What read_bag() reads: the pressures, which lie in a temporary file, and all else."""
+    from ._bag_messages import opened
+
     if pose_topic is not None and tf is not None:
         raise Error("pose_topic and tf: both say where the sensor is; leave one of them out")
     if truth_tf is not None and pose_topic is None and tf is None:
@@ -121,5 +124,7 @@ def read_frames(
 
 def topics(log: _Path) -> "list[Topic]":
     """The topics of a log, by name. Raises Error where it cannot be read."""
+    from ._bag_messages import opened
+
     with opened(os.fsdecode(log)) as bag:
         return bag.topics()

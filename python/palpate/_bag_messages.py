@@ -7,18 +7,15 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy
+from numpy.typing import NDArray
 
 from ._bag_transforms import Transforms, row_of, stamp_s
 from ._error import Error
 from ._palpate import ImportSurvey
 
-# The build writes the stubs by importing the package, where there is no NumPy.
-if TYPE_CHECKING:
-    import numpy
-    from numpy.typing import NDArray
-
-Progress = Callable[[float], object]
 #: Makes what takes the blocks of an array of so many elements.
 SurveyFor = Callable[[int], ImportSurvey]
 
@@ -138,8 +135,6 @@ class Pressures(_Timed):
             self._keep()
 
     def _begin(self, row: Any) -> None:
-        import numpy
-
         self.elements = len(row)
         if not self.elements:
             raise Error(f"{self.topic}: {self.path}: holds no reading; give another field")
@@ -149,8 +144,6 @@ class Pressures(_Timed):
         self.block = numpy.empty((self.BLOCK, self.elements), kind)
 
     def _keep(self) -> None:
-        import numpy
-
         rows = self.block[: self.held]
         assert self.survey is not None
         self.survey.add(rows)
@@ -166,20 +159,16 @@ class Pressures(_Timed):
         self.file.flush()
         return self.survey
 
-    def in_order(self) -> "NDArray[numpy.float64]":
+    def in_order(self) -> NDArray[numpy.float64]:
         """The frames' times [n], ascending."""
-        import numpy
-
         time_s = numpy.frombuffer(self.time_s)
         if numpy.any(time_s[1:] < time_s[:-1]):
             self.order = numpy.argsort(time_s, kind="stable")
             time_s = time_s[self.order]
         return time_s
 
-    def rows(self, first: int) -> "NDArray[numpy.float64]":
+    def rows(self, first: int) -> NDArray[numpy.float64]:
         """Readings [k, e] from a frame on, in the order of time."""
-        import numpy
-
         end = min(first + self.BLOCK, len(self.time_s))
         wanted = numpy.arange(first, end) if self.order is None else self.order[first:end]
         low, high = int(wanted.min()), int(wanted.max()) + 1
@@ -201,10 +190,8 @@ class Poses(_Timed):
         self.rows.extend(row_of(_at(message, self.path)))
         self.time_s.append(self.time_of(message, received_s))
 
-    def in_order(self) -> "tuple[NDArray[numpy.float64], NDArray[numpy.float64]]":
+    def in_order(self) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64]]:
         """Times, ascending, and the first pose of each, [n, 7]."""
-        import numpy
-
         times, first = numpy.unique(numpy.frombuffer(self.time_s), return_index=True)
         return times, numpy.frombuffer(self.rows).reshape(-1, 7)[first]
 
@@ -294,7 +281,7 @@ class Bag:
         return Transforms(topics, static, wanted)
 
     def read(
-        self, parts: Sequence[Pressures | Poses | Transforms], progress: Progress | None
+        self, parts: Sequence[Pressures | Poses | Transforms], progress: Callable[[float], object] | None
     ) -> None:
         takers: dict[str, list[Any]] = {}
         for part in parts:

@@ -4,17 +4,14 @@ import math
 from array import array as numbers
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy
+from numpy.typing import NDArray
 
 from ._error import Error
 
-# The build writes the stubs by importing the package, where there is no NumPy.
-if TYPE_CHECKING:
-    import numpy
-    from numpy.typing import NDArray
-
-    Rows = NDArray[numpy.float64]  #: [n, 7] mm, and a quaternion x, y, z, w; NaN where unknown
-
+Rows = NDArray[numpy.float64]  #: [n, 7] mm, and a quaternion x, y, z, w; NaN where unknown
 _UNKNOWN = (math.nan,) * 7
 _USUAL_GAP_S = 0.1
 _BLOCK = 1 << 14  #: rows of a chain at a time
@@ -44,10 +41,8 @@ class _Edge:
     time_s: "numbers[float]" = field(default_factory=lambda: numbers("d"))
     rows: "numbers[float]" = field(default_factory=lambda: numbers("d"))  #: one behind the other
 
-    def log(self) -> "tuple[Rows, Rows]":
+    def log(self) -> tuple[Rows, Rows]:
         """Times, ascending, and rows."""
-        import numpy
-
         time_s: Rows = numpy.frombuffer(self.time_s)
         rows: Rows = numpy.frombuffer(self.rows).reshape(-1, 7)
         if numpy.any(time_s[1:] < time_s[:-1]):
@@ -56,21 +51,17 @@ class _Edge:
         return time_s, rows
 
 
-def _gap_s(time_s: "Rows") -> float:
+def _gap_s(time_s: Rows) -> float:
     """The longest step that a regular log takes when its steps jitter or a message is lost."""
-    import numpy
-
     steps = numpy.sort(numpy.diff(time_s))
     return max(_USUAL_GAP_S, 2.5 * float(steps[len(steps) // 2])) if len(steps) else _USUAL_GAP_S
 
 
-def _interpolated(log: "tuple[Rows, Rows]", at_s: "Rows", gap_s: float) -> "Rows":
+def _interpolated(log: tuple[Rows, Rows], at_s: Rows, gap_s: float) -> Rows:
     """Rows at times; NaN outside the log or between rows further apart than the gap.
 
     The position is on the line and the rotation on the shorter arc between two rows.
     """
-    import numpy
-
     time_s, rows = log
     if len(time_s) == 0:
         return numpy.full((len(at_s), 7), math.nan)
@@ -93,19 +84,15 @@ def _interpolated(log: "tuple[Rows, Rows]", at_s: "Rows", gap_s: float) -> "Rows
     return numpy.where(known[:, None], numpy.hstack([p, q]), math.nan)
 
 
-def _turned(rotation: "Rows", vector: "Rows") -> "Rows":
+def _turned(rotation: Rows, vector: Rows) -> Rows:
     """Vectors [n, 3] turned by rotations [n, 4]."""
-    import numpy
-
     q, w = rotation[:, :3], rotation[:, 3:]
     t = 2.0 * numpy.cross(q, vector)
     return vector + w * t + numpy.cross(q, t)
 
 
-def _product(a: "Rows", b: "Rows") -> "Rows":
+def _product(a: Rows, b: Rows) -> Rows:
     """T_a_c from T_a_b and T_b_c."""
-    import numpy
-
     p, q, w = a[:, :3], a[:, 3:6], a[:, 6:]
     r, z = b[:, 3:6], b[:, 6:]
     position = p + _turned(a[:, 3:], b[:, :3])
@@ -113,9 +100,7 @@ def _product(a: "Rows", b: "Rows") -> "Rows":
     return numpy.hstack([position, w * r + z * q + numpy.cross(q, r), scalar])
 
 
-def _inverse(a: "Rows") -> "Rows":
-    import numpy
-
+def _inverse(a: Rows) -> Rows:
     back = a[:, 3:] * (-1.0, -1.0, -1.0, 1.0)
     return numpy.hstack([-_turned(back, a[:, :3]), back])
 
@@ -176,11 +161,9 @@ class Transforms:
         return ups[0][: ups[0].index(common)], ups[1][: ups[1].index(common)]
 
     def chain(
-        self, log: str, target: str, source: str, time_s: "Rows", gap_s: float | None
-    ) -> "Rows":
+        self, log: str, target: str, source: str, time_s: Rows, gap_s: float | None
+    ) -> Rows:
         """T_target_source at each time, [n, 7]; NaN where it is not known."""
-        import numpy
-
         path = self._path(target.lstrip("/"), source.lstrip("/"))
         if path is None:
             known = sorted({*self.edges, *(edge.parent for edge in self.edges.values())})
@@ -191,7 +174,7 @@ class Transforms:
         logs = {child: self.edges[child].log() for up in path for child in up}
         gaps = {child: _gap_s(at_s) if gap_s is None else gap_s for child, (at_s, _) in logs.items()}
 
-        def up_to_common(up: list[str], at_s: "Rows") -> "Rows":
+        def up_to_common(up: list[str], at_s: Rows) -> Rows:
             product = numpy.tile((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0), (len(at_s), 1))
             for child in up:
                 if self.edges[child].static:
@@ -212,19 +195,15 @@ class Transforms:
             )
         return rows
 
-    def still(self, log: str, target: str, source: str, time_s: "Rows") -> "Rows":
+    def still(self, log: str, target: str, source: str, time_s: Rows) -> Rows:
         """T_target_source of a frame that does not move: at the middle of the times when it is known."""
-        import numpy
-
         rows = self.chain(log, target, source, numpy.unique(time_s), None)
         known = numpy.flatnonzero(~numpy.isnan(rows[:, 0]))
         middle: Rows = rows[known[len(known) // 2]].copy()
         return middle
 
-    def remarks(self, log: str, chain: tuple[str, str], rows: "Rows") -> list[str]:
+    def remarks(self, log: str, chain: tuple[str, str], rows: Rows) -> list[str]:
         """What is worth saying of rows that chain() gave."""
-        import numpy
-
         unknown = int(numpy.isnan(rows[:, 0]).sum())
         if not unknown:
             return []
