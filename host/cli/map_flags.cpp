@@ -91,8 +91,8 @@ void add_map_flags(CLI::App& command, MapFlags& flags) {
                      "aligned to the map that they make [default: 0, exact]");
   command.add_option("--touch-sd-deg", flags.touch_sd_deg,
                      "The same of the sensor's angle, degrees [default: 0]");
-  add_frames_flag(command, flags.frames,
-                  "Use the touches A to B - 1 of every recording, counted from 0, as A:B");
+  add_text_flag(command, "--frames", flags.frames,
+                "Use the touches A to B - 1 of every recording, counted from 0, as A:B");
   command.add_option("--symmetry", flags.symmetry,
                      "n-fold rotational symmetry, 1: none, 0: any rotation; of all objects, or of "
                      "some, such as nut=6,key=1 [default: 1; where the map looks the same after "

@@ -8,19 +8,10 @@
 #include "cli/options.hpp"
 #include "model/option_words.hpp"
 #include "recognition/filter_choice.hpp"
-#include "recognition/option_text.hpp"
 
 namespace palpate::cli {
 
 namespace {
-
-/// Adds a flag whose text read_option() reads into the value.
-template <typename Value>
-CLI::Option* add_text_flag(CLI::App& command, const std::string& flag, Value& value,
-                           const std::string& help) {
-  return command.add_option_function<std::string>(
-      flag, [flag, &value](const std::string& text) { read_option(flag, text, value); }, help);
-}
 
 void add_filter_flags(CLI::App& command, Request& request) {
   add_text_flag(
@@ -107,25 +98,25 @@ void add_recognition_flags(CLI::App& command, Request& request, bool& verbose) {
       "table in the place of gamma and prior; and how sure to be: the temperature, press features, "
       "and whether the object was learned at all. Particles leave the standard deviations out "
       "[default: the sensor.yaml that 'palpate map' wrote beside the maps; none: Eq. 7]");
-  add_bins_flag(
-      command, request,
+  add_text_flag(
+      command, "--bins", request.bins,
       "Pose bins per object along x, y and theta, as 25x25x16; auto: as many as the refined pose "
       "needs, in steps of 0.6 times the maps' cell or 1.2 times the sensor's spread, whichever is "
       "larger, widened to half of --touch-sd-* but at most twice; fine: also as the mode needs, "
       "in steps of 0.6 times the larger of both. Auto and fine take wider steps where the "
       "histogram's device memory is short; the region about an automatic pivot fits the largest "
       "array of all RECORDINGs [default: auto, or 25x25x16 where a range or a pivot is given]");
-  add_range_flag(command, "--x-mm", request.x_mm,
-                 "Range of the pivot's x in the object frame, mm, as --x-mm=-10:10 [default: "
-                 "every place of an array that touches an object of the maps, or -10:10 where "
-                 "counts of --bins, another range or a pivot X,Y is given]");
-  add_range_flag(command, "--y-mm", request.y_mm,
-                 "Range of the pivot's y [default: as for --x-mm]");
-  add_range_flag(
+  add_text_flag(command, "--x-mm", request.x_mm,
+                "Range of the pivot's x in the object frame, mm, as --x-mm=-10:10 [default: "
+                "every place of an array that touches an object of the maps, or -10:10 where "
+                "counts of --bins, another range or a pivot X,Y is given]");
+  add_text_flag(command, "--y-mm", request.y_mm,
+                "Range of the pivot's y [default: as for --x-mm]");
+  add_text_flag(
       command, "--theta-deg", request.theta_deg,
       "Range of theta, degrees, at most 360 wide [default: 0:360]; 30:30 fixes theta at 30");
-  add_pivot_flag(
-      command, request,
+  add_text_flag(
+      command, "--pivot-mm", request.pivot_mm,
       "Point X,Y in the robot frame, mm, about which theta turns; the bins' x and y are the "
       "point's coordinates in the object frame. auto: the array's centre at the first touch of "
       "each unknown with an element in contact [default: auto, or 0,0 where counts of --bins or a "
@@ -168,31 +159,14 @@ void hide_particle_flags(CLI::App& command) {
 }
 
 void add_unknown_flags(CLI::App& command, Request& request) {
-  add_frames_flag(command, request.frames,
-                  "Use the touches A to B - 1 of every recording, counted from 0, as A:B");
+  add_text_flag(command, "--frames", request.frames,
+                "Use the touches A to B - 1 of every recording, counted from 0, as A:B");
   command
       .add_option("--touches", request.touches,
                   "Use the first N touches of every recording [default: all]")
       ->check(require_whole_number);
   command.add_flag("--each-frame", request.each_frame,
                    "Recognise every touch by itself, as an unknown object of its own");
-}
-
-void add_bins_flag(CLI::App& command, Request& request, const std::string& help) {
-  add_text_flag(command, "--bins", request.bins, help);
-}
-
-void add_range_flag(CLI::App& command, const std::string& flag,
-                    std::optional<std::array<double, 2>>& range, const std::string& help) {
-  add_text_flag(command, flag, range, help);
-}
-
-void add_pivot_flag(CLI::App& command, Request& request, const std::string& help) {
-  add_text_flag(command, "--pivot-mm", request.pivot_mm, help);
-}
-
-void add_frames_flag(CLI::App& command, std::optional<Frames>& frames, const std::string& help) {
-  add_text_flag(command, "--frames", frames, help);
 }
 
 void tell_on_stderr(const std::string& sentence) {

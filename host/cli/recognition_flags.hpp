@@ -4,13 +4,11 @@
 #include <optional>
 #include <string>
 
-#include "cli/command_files.hpp"
-#include "recognition/resolve.hpp"
+#include <CLI/CLI.hpp>
 
-namespace CLI {
-class App;
-class Option;
-}  // namespace CLI
+#include "cli/command_files.hpp"
+#include "recognition/option_text.hpp"
+#include "recognition/resolve.hpp"
 
 namespace palpate::cli {
 
@@ -26,17 +24,15 @@ void hide_particle_flags(CLI::App& command);
 /// Adds the flags that select unknowns from recordings.
 void add_unknown_flags(CLI::App& command, Request& request);
 
-// Flags whose values have several parts. Their Errors name flag, value and the form wanted.
-
-/// Counts as 25x25x16, auto or fine.
-void add_bins_flag(CLI::App& command, Request& request, const std::string& help);
-/// LOWER:UPPER
-void add_range_flag(CLI::App& command, const std::string& flag,
-                    std::optional<std::array<double, 2>>& range, const std::string& help);
-/// X,Y or auto
-void add_pivot_flag(CLI::App& command, Request& request, const std::string& help);
-/// A:B
-void add_frames_flag(CLI::App& command, std::optional<Frames>& frames, const std::string& help);
+/// Adds a flag whose text read_option() reads into the value: counts as 25x25x16, auto or fine, a
+/// range LOWER:UPPER, frames A:B, a pivot X,Y or auto. Its Errors name flag, value and the form
+/// wanted.
+template <typename Value>
+CLI::Option* add_text_flag(CLI::App& command, const std::string& flag, Value& value,
+                           const std::string& help) {
+  return command.add_option_function<std::string>(
+      flag, [flag, &value](const std::string& text) { read_option(flag, text, value); }, help);
+}
 
 /// A device that is opened once it is needed.
 class DeviceInWaiting {
