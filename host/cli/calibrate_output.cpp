@@ -64,18 +64,9 @@ std::string values_table(const SensorCalibration& calibration, std::optional<int
 std::string scores_table(const std::string& title, const char* records, const Scores& before,
                          const Scores& learned, const Scores& after, std::optional<int> columns) {
   TextTable table({{title, false}, {"Eq. 7", true}, {"table", true}, {"table, tempered", true}});
-  const auto add = [&](const char* name, auto text_of) {
-    table.add({name, text_of(before), text_of(learned), text_of(after)});
-  };
-  add(records, [](const Scores& s) { return fmt::format("{}", s.records); });
-  add("accuracy", [](const Scores& s) { return percent(s.accuracy()); });
-  add("95 % interval", [](const Scores& s) {
-    const Interval interval = s.interval();
-    return fmt::format("{:.1f} to {}", 100.0 * interval.low, percent(interval.high));
-  });
-  add("log-loss, nats", [](const Scores& s) { return fmt::format("{:.3f}", s.log_loss); });
-  add("calibration error",
-      [](const Scores& s) { return fmt::format("{:.3f}", s.calibration_error); });
+  table.add({records, fmt::format("{}", before.records), fmt::format("{}", learned.records),
+             fmt::format("{}", after.records)});
+  add_score_rows(table, {&before, &learned, &after});
   return table.text(columns);
 }
 
@@ -192,8 +183,8 @@ std::vector<ChartPoint> points_of(const std::vector<double>& table, std::size_t 
 
 std::string calibration_text(const SensorCalibration& calibration, std::size_t touches,
                              std::optional<int> columns) {
-  std::string text = fmt::format("{} touches, {} {}\n\n", touches, calibration.objects,
-                                 calibration.objects == 1 ? "object" : "objects");
+  std::string text = fmt::format("{} touches, {}\n\n", touches,
+                                 count_of(calibration.objects, "object", "objects"));
   text += values_table(calibration, columns);
   if (calibration.before) {
     text += "\n" + scores_tables(calibration, columns);

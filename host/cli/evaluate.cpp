@@ -18,6 +18,7 @@
 #include "cli/terminal.hpp"
 #include "recognition/batch/batch_task.hpp"
 #include "recognition/judged_results.hpp"
+#include "recognition/record_json.hpp"
 
 namespace palpate::cli {
 
@@ -76,11 +77,7 @@ void evaluate_results(const EvaluateArguments& options) {
   if (const std::string failed = failed_words(results); !failed.empty()) {
     tell_on_stderr(failed);
   }
-  // A label need not be UTF-8, as JSON must.
-  const std::string json =
-      to_json(evaluation, results.without_truth)
-          .dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) +
-      "\n";
+  const std::string json = text_of(to_json(evaluation, results.without_truth), 2);
   if (!options.png.empty()) {
     const std::filesystem::path folder = options.png;
     make_folder(folder);

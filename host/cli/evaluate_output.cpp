@@ -6,7 +6,6 @@
 
 #include <fmt/format.h>
 
-#include "cli/text_table.hpp"
 #include "palpate/occupancy_grid.hpp"
 
 namespace palpate::cli {
@@ -56,10 +55,6 @@ std::string range_words(const Interval& interval) {
   return fmt::format("{:.1f} to {:.1f} %", 100.0 * interval.low, 100.0 * interval.high);
 }
 
-std::string count_of(std::size_t count, const char* one, const char* more) {
-  return fmt::format("{} {}", count, count == 1 ? one : more);
-}
-
 std::string scores_table(const Evaluation& evaluation, std::optional<int> columns) {
   // A column without content is left out.
   TextTable table({{""}, {"all", true}, {"known classes", true}});
@@ -69,11 +64,7 @@ std::string scores_table(const Evaluation& evaluation, std::optional<int> column
   };
   add("records", [](const Scores& s) { return fmt::format("{}", s.records); });
   add("right", [](const Scores& s) { return fmt::format("{}", s.right); });
-  add("accuracy", [](const Scores& s) { return percent(s.accuracy()); });
-  add("95 % interval", [](const Scores& s) { return range_words(s.interval()); });
-  add("log-loss, nats", [](const Scores& s) { return fmt::format("{:.3f}", s.log_loss); });
-  add("calibration error",
-      [](const Scores& s) { return fmt::format("{:.3f}", s.calibration_error); });
+  add_score_rows(table, {&evaluation.all, evaluation.known ? &*evaluation.known : nullptr});
   return table.text(columns);
 }
 
@@ -194,6 +185,21 @@ Json to_json(const Evaluation& evaluation, std::size_t without_truth) {
     json["refined_error_mm"] = to_json(*evaluation.refined_error_mm);
   }
   return json;
+}
+
+void add_score_rows(TextTable& table, const std::vector<const Scores*>& columns) {
+  const auto add = [&](const char* name, auto text_of) {
+    std::vector<std::string> cells{name};
+    for (const Scores* scores : columns) {
+      cells.push_back(scores == nullptr ? std::string() : text_of(*scores));
+    }
+    table.add(cells);
+  };
+  add("accuracy", [](const Scores& s) { return percent(s.accuracy()); });
+  add("95 % interval", [](const Scores& s) { return range_words(s.interval()); });
+  add("log-loss, nats", [](const Scores& s) { return fmt::format("{:.3f}", s.log_loss); });
+  add("calibration error",
+      [](const Scores& s) { return fmt::format("{:.3f}", s.calibration_error); });
 }
 
 std::string evaluation_text(const Evaluation& evaluation, std::size_t without_truth,

@@ -3,9 +3,11 @@
 #include <cstddef>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <nlohmann/json.hpp>
 
+#include "cli/text_table.hpp"
 #include "figures/figures.hpp"
 #include "recognition/evaluation.hpp"
 
@@ -20,6 +22,10 @@ nlohmann::ordered_json to_json(const Evaluation& evaluation, std::size_t without
 /// @param columns see TextTable::text()
 std::string evaluation_text(const Evaluation& evaluation, std::size_t without_truth,
                             std::optional<int> columns);
+
+/// Adds what scores say of some records: accuracy and its interval, log-loss, calibration error.
+/// @param columns of the table after the first; null: an empty cell
+void add_score_rows(TextTable& table, const std::vector<const Scores*>& columns);
 
 /// How often each class was taken for each label.
 ConfusionFigure confusion_of(const Evaluation& evaluation);

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "cli/options.hpp"
+#include "cli/page/page_json.hpp"
 #include "cli/step_words.hpp"
 #include "model/printable.hpp"
 #include "palpate/error.hpp"
@@ -47,9 +48,7 @@ nlohmann::ordered_json to_json(const LiveTouch& touch, const RecognitionTask& ta
 }
 
 std::string json_line(const LiveTouch& touch, const RecognitionTask& task) {
-  // A label need not be UTF-8, as JSON must.
-  return to_json(touch, task)
-      .dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+  return line_of(to_json(touch, task));
 }
 
 std::string plan_line(const LiveTouch& touch) {

@@ -34,9 +34,9 @@ namespace {
 
 std::string believed_words(const Plan& plan) {
   return fmt::format(
-      "after {} {}: {:.2f} nats unknown of the identity, {:.2f} of the pose, "
+      "after {}: {:.2f} nats unknown of the identity, {:.2f} of the pose, "
       "counted in bins",
-      plan.record.touches, plan.record.touches == 1 ? "touch" : "touches", plan.identity_nats,
+      count_of(plan.record.touches, "touch", "touches"), plan.identity_nats,
       std::max(plan.both_nats - plan.identity_nats, 0.0));
 }
 
@@ -94,10 +94,10 @@ nlohmann::ordered_json plan_json(const Plan& plan, const RecognitionTask& task,
 std::string plan_text(const Plan& plan, const RecognitionTask& task, std::optional<int> columns) {
   const std::string limit = in_flags(limit_words(plan));
   return fmt::format(
-      "{}\n{}\n\n{}{}{}\n{}, {} {} in {:.0f} ms\n", result_words(plan.record.last(), task),
+      "{}\n{}\n\n{}{}{}\n{}, {} in {:.0f} ms\n", result_words(plan.record.last(), task),
       believed_words(plan), table_of(plan, columns), complaints({plan.record}, task),
       limit.empty() ? "" : limit + "\n", next_touch_words(plan.ranked.front(), plan.goal),
-      plan.ranked.size(), plan.ranked.size() == 1 ? "candidate" : "candidates", 1e3 * plan.seconds);
+      count_of(plan.ranked.size(), "candidate", "candidates"), 1e3 * plan.seconds);
 }
 
 /// The candidates about the places where the object may be.

@@ -9,6 +9,7 @@
 #include "cli/commands.hpp"
 #include "model/printable.hpp"
 #include "palpate/driver.hpp"
+#include "recognition/record_json.hpp"
 
 namespace palpate::cli {
 
@@ -31,8 +32,7 @@ void print_json(const std::vector<BoardInfo>& boards) {
                     {"usable", b.usable},
                     {"reason", b.reason}});
   }
-  // A device's strings need not be UTF-8, as JSON must.
-  fmt::print("{}\n", list.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  fmt::print("{}", text_of(list, 2));  // a device's strings need not be UTF-8, as JSON must
 }
 
 void print_text(const std::vector<BoardInfo>& boards) {

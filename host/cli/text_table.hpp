@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -13,6 +14,8 @@ std::string shorten_middle(std::string_view text, std::size_t columns);
 
 /// A share as "12.3 %".
 std::string percent(double share);
+/// A count with its noun: "1 record", "2 records".
+std::string count_of(std::size_t count, const char* one, const char* more);
 
 /// A table for people. Every column is as wide as its longest cell; a column without any content is
 /// left out.
