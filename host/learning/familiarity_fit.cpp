@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <vector>
 
 #include <fmt/format.h>
@@ -11,6 +12,7 @@
 #include <glm/vec3.hpp>
 
 #include "palpate/error.hpp"
+#include "recognition/evaluation.hpp"
 
 namespace palpate {
 
@@ -146,14 +148,10 @@ double area_under_curve(const FamiliarityScores& scores, const Familiarity& fami
     return familiarity.explained_slope * score.explained + familiarity.lead_slope * score.lead;
   };
   std::vector<double> unknown;
+  std::vector<double> known;
   std::ranges::transform(scores.unknown, std::back_inserter(unknown), log_odds);
-  std::ranges::sort(unknown);
-  double pairs = 0.0;
-  for (const FamiliarityScore& known : scores.known) {
-    const auto [first, last] = std::equal_range(unknown.begin(), unknown.end(), log_odds(known));
-    pairs += static_cast<double>(first - unknown.begin()) + 0.5 * static_cast<double>(last - first);
-  }
-  return pairs / (static_cast<double>(scores.known.size()) * static_cast<double>(unknown.size()));
+  std::ranges::transform(scores.known, std::back_inserter(known), log_odds);
+  return told_apart(unknown, known);
 }
 
 std::optional<double> area_under_curve(std::span<const FamiliarityScores> folds, std::size_t fold) {

@@ -1,15 +1,15 @@
 #include "learning/feature_learning.hpp"
 
 #include <algorithm>
-#include <array>
-#include <cmath>
+
+#include <glm/exponential.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
+#include <glm/vec3.hpp>
 
 namespace palpate {
 
 namespace {
-
-using Values = std::array<double, PressFeatures::count>;
-using Matrix = std::array<Values, PressFeatures::count>;
 
 constexpr double least_sd = 0.05;  ///< least deviation of a logarithm, 5 % of the feature
 constexpr double pseudo_presses = 4.0;
@@ -19,49 +19,29 @@ constexpr double most_correlated = 0.999;
 /// The products of the differences from a mean, summed over presses.
 struct Scatter {
   double n = 0.0;
-  Values mean{};
-  Matrix products{};
+  glm::dvec3 mean{0.0};
+  glm::dmat3 products{0.0};
 
   /// Welford's update, which keeps its digits where presses are nearly alike.
   void add(const PressFeatures& features) {
+    const auto [area, force, peak] = features.values;
+    const glm::dvec3 values(area, force, peak);
+    const glm::dvec3 before = values - mean;
     n += 1.0;
-    Values before{};
-    for (std::size_t i = 0; i < mean.size(); ++i) {
-      before[i] = features.values[i] - mean[i];
-      mean[i] += before[i] / n;
-    }
-    for (std::size_t i = 0; i < mean.size(); ++i) {
-      for (std::size_t j = 0; j < mean.size(); ++j) {
-        products[i][j] += before[i] * (features.values[j] - mean[j]);
-      }
-    }
+    mean += before / n;
+    products += glm::outerProduct(before, values - mean);
   }
 };
 
-/// a A + b B.
-Matrix combined(double a, const Matrix& of_a, double b, const Matrix& of_b) {
-  Matrix sum{};
-  for (std::size_t i = 0; i < sum.size(); ++i) {
-    for (std::size_t j = 0; j < sum.size(); ++j) {
-      sum[i][j] = a * of_a[i][j] + b * of_b[i][j];
-    }
-  }
-  return sum;
-}
-
-FeatureDistribution distribution_of(const Values& mean, const Matrix& covariance) {
-  FeatureDistribution distribution{.mean = mean};
-  for (std::size_t i = 0; i < mean.size(); ++i) {
-    distribution.sd[i] = std::sqrt(covariance[i][i] + least_sd * least_sd);
-  }
-  std::size_t pair = 0;
-  for (std::size_t i = 0; i < mean.size(); ++i) {
-    for (std::size_t j = i + 1; j < mean.size(); ++j) {
-      distribution.correlation[pair++] =
-          most_correlated * covariance[i][j] / (distribution.sd[i] * distribution.sd[j]);
-    }
-  }
-  return distribution;
+FeatureDistribution distribution_of(const glm::dvec3& mean, const glm::dmat3& covariance) {
+  const glm::dvec3 variance(covariance[0][0], covariance[1][1], covariance[2][2]);
+  const glm::dvec3 sd = glm::sqrt(variance + least_sd * least_sd);
+  const auto correlation = [&](int i, int j) {
+    return most_correlated * covariance[i][j] / (sd[i] * sd[j]);
+  };
+  return {.mean = {mean.x, mean.y, mean.z},
+          .sd = {sd.x, sd.y, sd.z},
+          .correlation = {correlation(0, 1), correlation(0, 2), correlation(1, 2)}};
 }
 
 }  // namespace
@@ -73,21 +53,20 @@ LearnedFeatures learn_features(std::span<const LabelledFeatures> presses) {
     all.add(press.features);
     objects[press.label].add(press.features);
   }
-  const Matrix none{};
-  const Matrix of_all = combined(1.0 / std::max(1.0, all.n - 1.0), all.products, 0.0, none);
+  const glm::dmat3 of_all = all.products / std::max(1.0, all.n - 1.0);
   const double freedoms = all.n - static_cast<double>(objects.size());
-  Matrix pooled = of_all;
+  glm::dmat3 pooled = of_all;
   if (freedoms > 0.0) {
-    pooled = none;
+    pooled = glm::dmat3(0.0);
     for (const auto& [label, own] : objects) {
-      pooled = combined(1.0, pooled, 1.0 / freedoms, own.products);
+      pooled += own.products / freedoms;
     }
   }
   LearnedFeatures learned{.any = distribution_of(all.mean, of_all)};
   for (const auto& [label, own] : objects) {
     const double share = (1.0 + 1.0 / own.n) / (own.n + pseudo_presses);
     learned.objects[label] =
-        distribution_of(own.mean, combined(share, own.products, share * pseudo_presses, pooled));
+        distribution_of(own.mean, share * (own.products + pseudo_presses * pooled));
   }
   return learned;
 }

@@ -8,6 +8,10 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
+#include <glm/vec3.hpp>
 
 #include "model/touch_evidence.hpp"
 #include "palpate/error.hpp"
@@ -25,34 +29,14 @@ template <typename Value>
 bool is_positive(double x) { return x > 0.0 && std::isfinite(x); }
 bool from_0(double x) { return x >= 0.0 && std::isfinite(x); }
 
-using FeatureMatrix = std::array<std::array<double, PressFeatures::count>, PressFeatures::count>;
-
-/// The lower triangle L with L L^T = the matrix of correlations; none where these are not positive
-/// definite.
-std::optional<FeatureMatrix> cholesky_of(
-    const std::array<double, FeatureDistribution::pairs>& correlation) {
-  FeatureMatrix lower{};
-  std::size_t pair = 0;
-  FeatureMatrix all{};
-  for (std::size_t i = 0; i < PressFeatures::count; ++i) {
-    all[i][i] = 1.0;
-    for (std::size_t j = i + 1; j < PressFeatures::count; ++j) {
-      all[j][i] = correlation[pair++];
-    }
-  }
-  for (std::size_t i = 0; i < PressFeatures::count; ++i) {
-    for (std::size_t j = 0; j <= i; ++j) {
-      double rest = all[i][j];
-      for (std::size_t k = 0; k < j; ++k) {
-        rest -= lower[i][k] * lower[j][k];
-      }
-      if (i == j && !(rest > 0.0)) {
-        return {};
-      }
-      lower[i][j] = i == j ? std::sqrt(rest) : rest / lower[j][j];
-    }
-  }
-  return lower;
+/// The matrix of correlations; none where it is not positive definite.
+std::optional<glm::dmat3> correlations_of(const FeatureDistribution& distribution) {
+  const auto [area_force, area_peak, force_peak] = distribution.correlation;
+  const glm::dmat3 all(1.0, area_force, area_peak,   //
+                       area_force, 1.0, force_peak,  //
+                       area_peak, force_peak, 1.0);
+  const bool definite = 1.0 - area_force * area_force > 0.0 && glm::determinant(all) > 0.0;
+  return definite ? std::optional(all) : std::nullopt;
 }
 
 void require_sound(const FeatureDistribution& distribution) {
@@ -64,7 +48,7 @@ void require_sound(const FeatureDistribution& distribution) {
       refuse("features: sd", distribution.sd[i], "give a positive number");
     }
   }
-  if (!cholesky_of(distribution.correlation)) {
+  if (!correlations_of(distribution)) {
     refuse("features: correlation", fmt::format("[{}]", fmt::join(distribution.correlation, ", ")),
            "give correlations that a distribution can have");
   }
@@ -94,22 +78,18 @@ PressFeatures features_of(const TouchEvidence& touch, double threshold) {
 }
 
 double FeatureDistribution::log_density(const PressFeatures& features) const {
-  const std::optional<FeatureMatrix> lower = cholesky_of(correlation);
-  if (!lower) {
+  const std::optional<glm::dmat3> correlations = correlations_of(*this);
+  if (!correlations) {
     return std::numeric_limits<double>::quiet_NaN();
   }
-  double nats = 0.0;
-  std::array<double, PressFeatures::count> z{};  // of unit variance, uncorrelated
-  for (std::size_t i = 0; i < PressFeatures::count; ++i) {
-    double rest = (features.values[i] - mean[i]) / sd[i];
-    for (std::size_t k = 0; k < i; ++k) {
-      rest -= (*lower)[i][k] * z[k];
-    }
-    z[i] = rest / (*lower)[i][i];
-    nats -= 0.5 * z[i] * z[i] + std::log(sd[i] * (*lower)[i][i]) +
-            0.5 * std::log(2.0 * std::numbers::pi);
+  double nats = -0.5 * std::log(glm::determinant(*correlations));
+  glm::dvec3 z{};  // of unit variance
+  for (int i = 0; i < z.length(); ++i) {
+    const auto feature = static_cast<std::size_t>(i);
+    z[i] = (features.values[feature] - mean[feature]) / sd[feature];
+    nats -= std::log(sd[feature]) + 0.5 * std::log(2.0 * std::numbers::pi);
   }
-  return nats;
+  return nats - 0.5 * glm::dot(z, glm::inverse(*correlations) * z);
 }
 
 FamiliarityScore FamiliarityScore::of(std::span<const Reading> readings, double log_likelihood,
