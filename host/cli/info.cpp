@@ -2,7 +2,6 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
-#include <numbers>
 #include <string>
 
 #include <fmt/format.h>
@@ -193,8 +192,7 @@ void print_recording(const std::string& path) {
     fmt::print(
         "  truth             {} at x {:.3f} mm, y {:.3f} mm, theta {:.2f} deg in the robot "
         "frame\n",
-        r.truth->object, T.translation_mm.x, T.translation_mm.y,
-        degrees(wrap_angle(T.theta_rad, 2.0 * std::numbers::pi)));
+        r.truth->object, T.translation_mm.x, T.translation_mm.y, degrees(wrap_angle(T.theta_rad)));
   }
   if (const std::vector<std::string> suspicions = suspicions_of(s); !suspicions.empty()) {
     fmt::print("Suspicious:\n");

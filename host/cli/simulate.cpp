@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <charconv>
 #include <memory>
-#include <numbers>
 #include <optional>
 #include <random>
 #include <string>
@@ -106,7 +105,7 @@ void simulate(const SimulateArguments& options) {
     const Pose T_robot_object = inverse(T_object_robot);
     fmt::print(" at x {:.2f} mm, y {:.2f} mm, theta {:.1f} deg in the robot frame",
                T_robot_object.translation_mm.x, T_robot_object.translation_mm.y,
-               degrees(wrap_angle(T_robot_object.theta_rad, 2.0 * std::numbers::pi)));
+               degrees(wrap_angle(T_robot_object.theta_rad)));
   }
   fmt::print("\n");
 }

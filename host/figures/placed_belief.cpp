@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 
 #include "model/bounding_box.hpp"
 
@@ -77,7 +76,7 @@ PlacedBelief placed_belief(const PoseLattice& lattice, std::span<const BinShare>
     for_parts(lattice, bin, add);
   }
   for (int k = 0; k < lattice.theta_rad.count; ++k) {
-    double theta_rad = wrap_angle(-lattice.theta_rad.centre(k), 2.0 * std::numbers::pi);
+    double theta_rad = wrap_angle(-lattice.theta_rad.centre(k));
     belief.theta.push_back({theta_rad, turns[static_cast<std::size_t>(k)]});
   }
   std::ranges::sort(belief.theta, {}, &PlacedBelief::Turn::theta_rad);

@@ -94,7 +94,7 @@ std::int64_t PoseLattice::bin_of(const Pose& T_object_robot) const {
                             T_object_robot.translation_mm.y, T_object_robot.theta_rad));
   }
   const double middle_rad = (theta_rad.lower + theta_rad.upper) / 2.0;
-  const double turn_rad = wrap_angle(T_object_robot.theta_rad - middle_rad, 2.0 * std::numbers::pi);
+  const double turn_rad = wrap_angle(T_object_robot.theta_rad - middle_rad);
   return nearest_index(theta_rad, middle_rad + turn_rad) * plane() +
          nearest_index(y_mm, place_mm.y) * x_mm.count + nearest_index(x_mm, place_mm.x);
 }

@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+
+#include "streaming/pose_between.hpp"
 
 namespace palpate {
 
@@ -88,9 +89,7 @@ std::optional<Pose> PoseTrack::at(double time_s) const {
     return {};
   }
   const double part = (time_s - earlier_s) / (later_s - earlier_s);
-  constexpr double turn_rad = 2.0 * std::numbers::pi;
-  return Pose{earlier.translation_mm + part * (later.translation_mm - earlier.translation_mm),
-              earlier.theta_rad + part * wrap_angle(later.theta_rad - earlier.theta_rad, turn_rad)};
+  return between(earlier, later, part);
 }
 
 std::optional<double> PoseTrack::last_s() const {

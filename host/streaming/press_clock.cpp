@@ -3,11 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <vector>
 
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
+
+#include "streaming/pose_between.hpp"
 
 namespace palpate {
 
@@ -65,7 +66,6 @@ struct Stay {
 };
 
 Stay stay_of(const PoseLog& poses, const Press& press, double offset_s, double reach_mm) {
-  constexpr double turn_rad = 2.0 * std::numbers::pi;
   Stay stay{.motion_mm = 0.0,
             .height_mm = poses.height_mm.empty() ? 0.0 : -std::numeric_limits<double>::infinity()};
   Pose first;
@@ -82,18 +82,14 @@ Stay stay_of(const PoseLog& poses, const Press& press, double offset_s, double r
       return {};
     }
     const double part = (at_s - poses.time_s[i - 1]) / step_s;
-    const Pose& a = poses.T_robot_sensor[i - 1];
-    const Pose& b = poses.T_robot_sensor[i];
-    const Pose pose{a.translation_mm + part * (b.translation_mm - a.translation_mm),
-                    a.theta_rad + part * wrap_angle(b.theta_rad - a.theta_rad, turn_rad)};
+    const Pose pose = between(poses.T_robot_sensor[i - 1], poses.T_robot_sensor[i], part);
     if (!std::isfinite(pose.theta_rad)) {
       return {};
     }
     first = s == 0 ? pose : first;
-    stay.motion_mm =
-        std::max(stay.motion_mm,
-                 glm::distance(pose.translation_mm, first.translation_mm) +
-                     reach_mm * std::abs(wrap_angle(pose.theta_rad - first.theta_rad, turn_rad)));
+    stay.motion_mm = std::max(
+        stay.motion_mm, glm::distance(pose.translation_mm, first.translation_mm) +
+                            reach_mm * std::abs(wrap_angle(pose.theta_rad - first.theta_rad)));
     if (!poses.height_mm.empty()) {
       stay.height_mm =
           std::max(stay.height_mm, std::lerp(poses.height_mm[i - 1], poses.height_mm[i], part));

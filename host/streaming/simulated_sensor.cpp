@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <chrono>
-#include <numbers>
 #include <utility>
 
 #include "model/random.hpp"
 #include "palpate/simulation.hpp"
 #include "streaming/pace.hpp"
+#include "streaming/pose_between.hpp"
 
 namespace palpate {
 
@@ -35,12 +35,6 @@ double smooth_step(double u) {
 double force_at(double t) {
   return smooth_step((t - travel_s) / ramp_s) -
          smooth_step((t - travel_s - ramp_s - steady_s) / ramp_s);
-}
-
-Pose between(const Pose& a, const Pose& b, double u) {
-  constexpr double turn_rad = 2.0 * std::numbers::pi;
-  return {a.translation_mm + u * (b.translation_mm - a.translation_mm),
-          a.theta_rad + u * wrap_angle(b.theta_rad - a.theta_rad, turn_rad)};
 }
 
 double unix_time_s() {

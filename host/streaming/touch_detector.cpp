@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <span>
 #include <utility>
 
@@ -19,7 +18,6 @@ namespace palpate {
 
 namespace {
 
-constexpr double turn_rad = 2.0 * std::numbers::pi;
 // Beyond this many frames, the sensor's own error exceeds the mean's noise.
 constexpr std::size_t most_kept = 512;
 // With fewer frames, a single wrong one would decide.
@@ -61,7 +59,7 @@ class SteadyPhase {
     }
     return glm::distance(T_robot_sensor->translation_mm, first_pose_->translation_mm) <
                options_.steady_mm &&
-           std::abs(wrap_angle(T_robot_sensor->theta_rad - first_pose_->theta_rad, turn_rad)) <
+           std::abs(wrap_angle(T_robot_sensor->theta_rad - first_pose_->theta_rad)) <
                options_.steady_rad;
   }
 
@@ -113,7 +111,7 @@ class SteadyPhase {
     for (std::size_t i = 0; i < n; ++i) {
       if (const auto& pose = kept_[i].T_robot_sensor) {
         sum.translation_mm += pose->translation_mm;
-        sum.theta_rad += wrap_angle(pose->theta_rad - first_pose_->theta_rad, turn_rad);
+        sum.theta_rad += wrap_angle(pose->theta_rad - first_pose_->theta_rad);
         poses += 1.0;
       }
     }

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <numbers>
+
 #include <glm/vec2.hpp>
 
 #include "palpate/api.hpp"
@@ -30,6 +32,6 @@ PALPATE_API Pose inverse(const Pose& T_a_b);
 PALPATE_API glm::dvec2 rotate(double theta_rad, const glm::dvec2& v);
 
 /// Returns the angle plus a whole number of periods, in [-period/2, period/2).
-PALPATE_API double wrap_angle(double theta_rad, double period_rad);
+PALPATE_API double wrap_angle(double theta_rad, double period_rad = 2.0 * std::numbers::pi);
 
 }  // namespace palpate
