@@ -114,6 +114,17 @@ std::string summary(const LiveState& state, std::vector<double> latencies_ms,
   return text;
 }
 
+double FrameRate::hz(std::uint64_t frames) {
+  const auto now = Clock::now();
+  const double elapsed_s = std::chrono::duration<double>(now - since_).count();
+  if (elapsed_s >= 1.0) {
+    hz_ = static_cast<double>(frames - before_) / elapsed_s;
+    before_ = frames;
+    since_ = now;
+  }
+  return hz_;
+}
+
 LineFile::LineFile(const std::string& path)
     : path_(path), file_(path == "-" ? stdout : std::fopen(path.c_str(), "we")) {
   if (!file_) {

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <chrono>
+#include <cstdint>
 #include <cstdio>
 #include <memory>
 #include <string>
@@ -26,6 +28,19 @@ std::string table_line(const LiveTouch& touch, const RecognitionTask& task);
 /// The whole stream in a few lines.
 std::string summary(const LiveState& state, std::vector<double> latencies_ms,
                     const RecognitionTask& task);
+
+/// Frames per second of a stream, measured over a second or more.
+class FrameRate {
+ public:
+  /// @param frames so far
+  double hz(std::uint64_t frames);
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  Clock::time_point since_ = Clock::now();
+  std::uint64_t before_ = 0;  ///< frames
+  double hz_ = 0.0;
+};
 
 /// A file to which lines are added; other programs can read each line at once.
 class LineFile {

@@ -191,8 +191,6 @@ int draw_words(TerminalCanvas& canvas, const LiveView& view, int columns) {
 
 }  // namespace
 
-using namespace std::chrono_literals;
-
 LiveScreen::LiveScreen(std::FILE* output, const SensorDescription& sensor,
                        const std::vector<glm::dvec2>& elements_mm, const RecognitionTask& task,
                        std::optional<PlanGoal> plan, const std::string& page)
@@ -220,7 +218,7 @@ bool LiveScreen::update(const LiveState& state, const std::string& warning) {
     view_.warning = true;
     view_.state += "; " + warning;
   }
-  measure_rate(state);
+  view_.rate_hz = rate_.hz(state.counters.frames);
   const Terminal::Size size = Terminal::size_of(fileno(output_));
   if (terminal_) {
     terminal_->show(draw(view_, size.columns, size.rows, colours_));
@@ -320,16 +318,6 @@ void LiveScreen::place_array(const LiveState& state) {
                       .pressure = pressure,
                       .valid = valid};
     view_.readings = TouchEvidence(touch, {.classifier = task_.classifier()}).readings;
-  }
-}
-
-void LiveScreen::measure_rate(const LiveState& state) {
-  const auto now = Clock::now();
-  const double elapsed_s = std::chrono::duration<double>(now - rated_).count();
-  if (elapsed_s >= 1.0) {
-    view_.rate_hz = static_cast<double>(state.counters.frames - rated_frames_) / elapsed_s;
-    rated_frames_ = state.counters.frames;
-    rated_ = now;
   }
 }
 

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <cstdio>
 #include <optional>
@@ -9,6 +8,7 @@
 
 #include <glm/vec2.hpp>
 
+#include "cli/live_record.hpp"
 #include "cli/terminal.hpp"
 #include "cli/terminal_canvas.hpp"
 #include "palpate/contact.hpp"
@@ -71,11 +71,8 @@ class LiveScreen {
   bool update(const LiveState& state, const std::string& warning);
 
  private:
-  using Clock = std::chrono::steady_clock;
-
   void describe(const LiveState& state);
   void place_array(const LiveState& state);
-  void measure_rate(const LiveState& state);
 
   std::FILE* output_;
   const RecognitionTask& task_;
@@ -84,8 +81,7 @@ class LiveScreen {
   TerminalColours colours_ = terminal_colours();
   std::optional<Terminal> terminal_;
   std::size_t printed_ = 0;  ///< touches that have a picture, where the cursor cannot be moved
-  Clock::time_point rated_ = Clock::now();
-  std::uint64_t rated_frames_ = 0;
+  FrameRate rate_;
 };
 
 }  // namespace palpate::cli

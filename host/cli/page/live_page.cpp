@@ -5,7 +5,6 @@
 
 #include <fmt/format.h>
 
-#include "cli/live_record.hpp"
 #include "cli/page/page_json.hpp"
 #include "cli/sheet.hpp"
 #include "cli/step_words.hpp"
@@ -73,7 +72,6 @@ LivePage::LivePage(const PageAddress& address, const SensorDescription& sensor,
     : task_(task),
       recogniser_(recogniser),
       plan_(plan),
-      valid_(sensor.valid),
       elements_mm_(elements_mm),
       server_(address, feed_,
               {.get = [this](const std::string& path) { return get(path); },
@@ -159,12 +157,6 @@ void LivePage::update(const LiveState& state, const std::string& warning) {
     return;
   }
   shown_ = now;
-  const double elapsed_s = std::chrono::duration<double>(now - rated_).count();
-  if (elapsed_s >= 1.0) {
-    rate_hz_ = static_cast<double>(state.counters.frames - rated_frames_) / elapsed_s;
-    rated_frames_ = state.counters.frames;
-    rated_ = now;
-  }
   nlohmann::ordered_json json{{"pressure", pressure_json(state.pressure)},
                               {"touching", state.touching},
                               {"taring", state.taring},
@@ -174,7 +166,7 @@ void LivePage::update(const LiveState& state, const std::string& warning) {
                               {"frames", state.counters.frames},
                               {"lost", state.counters.lost},
                               {"without_pose", state.without_pose},
-                              {"rate_hz", std::round(rate_hz_)},
+                              {"rate_hz", std::round(rate_.hz(state.counters.frames))},
                               {"worst_latency_ms", state.worst_latency_ms}};
   if (state.T_robot_sensor) {
     json["pose"] = pose_json(*state.T_robot_sensor);

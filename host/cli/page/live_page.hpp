@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "cli/live_record.hpp"
 #include "cli/page/page_feed.hpp"
 #include "cli/page/page_server.hpp"
 #include "recognition/live_recognition.hpp"
@@ -47,7 +48,6 @@ class LivePage {
   const RecognitionTask& task_;
   const Recogniser& recogniser_;
   std::optional<PlanGoal> plan_;
-  std::vector<std::uint8_t> valid_;
   std::vector<glm::dvec2> elements_mm_;
 
   std::optional<RecognitionStep> last_;  ///< of the thread that uses the recogniser alone
@@ -57,9 +57,7 @@ class LivePage {
   LiveRecognition* recognition_ = nullptr;
 
   Clock::time_point shown_{};
-  Clock::time_point rated_ = Clock::now();
-  std::uint64_t rated_frames_ = 0;
-  double rate_hz_ = 0.0;
+  FrameRate rate_;
 
   PageFeed feed_;
   PageServer server_;  ///< ends before all that it reads
