@@ -35,20 +35,10 @@ std::vector<glm::dvec2> placed(std::span<const glm::dvec2> elements_mm, const Po
   return result;
 }
 
-}  // namespace
-
-double likeness_of_angles(const SetupJudge& judge, double rad) {
-  std::complex<double> sum;
-  double count = 0.0;
-  for (const auto& [object, touches] : judge.touches()) {
-    for (const TriedTouch& given : touches) {
-      sum += std::polar(1.0, rad * given.touch.T_robot_sensor.theta_rad);
-      ++count;
-    }
-  }
-  return std::abs(sum) / count;
-}
-
+/// Where the array sits in the tool, as "array_offset": by a pattern search, refined by a parabola
+/// through the neighbours of the best place, whose curvature gives the standard deviations. None
+/// where it sits where its elements are said to be, for all that the touches tell.
+/// @param nats log-likelihood of the touches with the array at a pose in its own frame
 std::optional<SetupFinding> offset_of(const std::function<double(const Pose&)>& nats) {
   using Place = std::array<double, 3>;
   const auto pose_of = [](const Place& at) { return Pose{{at[0], at[1]}, at[2]}; };
@@ -120,6 +110,20 @@ std::optional<SetupFinding> offset_of(const std::function<double(const Pose&)>& 
       {},
       pose_of(offset),
       sd};
+}
+
+}  // namespace
+
+double likeness_of_angles(const SetupJudge& judge, double rad) {
+  std::complex<double> sum;
+  double count = 0.0;
+  for (const auto& [object, touches] : judge.touches()) {
+    for (const TriedTouch& given : touches) {
+      sum += std::polar(1.0, rad * given.touch.T_robot_sensor.theta_rad);
+      ++count;
+    }
+  }
+  return std::abs(sum) / count;
 }
 
 std::optional<SetupFinding> offset_on_drawings(const std::vector<Press>& presses,

@@ -18,13 +18,8 @@ double likeness_of_angles(const SetupJudge& judge, double rad);
 /// From this likeness on, angles count as one.
 inline constexpr double one_angle = 0.97;
 
-/// Where the array sits in the tool, as "array_offset": by a pattern search, refined by a parabola
-/// through the neighbours of the best place, whose curvature gives the standard deviations. None
-/// where it sits where its elements are said to be, for all that the touches tell.
-/// @param nats log-likelihood of the touches with the array at a pose in its own frame
-std::optional<SetupFinding> offset_of(const std::function<double(const Pose& offset)>& nats);
-
-/// offset_of() touches at known poses of objects whose map is drawn, by Eq. 7; none without any.
+/// Where the array sits in the tool, as "array_offset", by Eq. 7 of touches at known poses of
+/// objects whose map is drawn. None without any, or where it sits as its elements are said to be.
 std::optional<SetupFinding> offset_on_drawings(const std::vector<Press>& presses,
                                                const std::vector<OccupancyGrid>& maps,
                                                const ContactClassifier& classifier);
@@ -33,7 +28,7 @@ std::vector<Press> with_offset(std::vector<Press> presses, const Pose& offset);
 
 // Each adds its finding, if any, to the check, and goes on from the set-up that it mends.
 
-/// See offset_of().
+/// Where the array sits in the tool, as "array_offset".
 void check_offset(SetupJudge& judge, Setup& setup, double& nats, SetupCheck& check);
 
 /// How far apart the elements are.

@@ -20,13 +20,14 @@ std::optional<double> finite(std::optional<double> number) {
   return number && std::isfinite(*number) ? number : std::nullopt;
 }
 
-}  // namespace
-
+/// The text without the blanks around it.
 std::string_view trimmed(std::string_view text) {
   constexpr const char* blanks = " \t\r";
   const std::size_t begin = std::min(text.find_first_not_of(blanks), text.size());
   return text.substr(begin, text.find_last_not_of(blanks) + 1 - begin);
 }
+
+}  // namespace
 
 std::variant<PoseLines::TimedPose, PoseLines::Problem, PoseLines::Header> PoseLines::read(
     std::string_view line) {

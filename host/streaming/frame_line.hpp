@@ -13,9 +13,6 @@
 
 namespace palpate {
 
-/// The text without the blanks around it.
-std::string_view trimmed(std::string_view text);
-
 /// Reads lines with poses: JSON objects, or CSV of time, x_mm, y_mm and theta_rad in the order of a
 /// header, or in this one where there is no header.
 class PoseLines {

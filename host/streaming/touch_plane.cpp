@@ -107,6 +107,9 @@ TouchPlane touch_plane(const std::vector<std::optional<SpatialPose>>& poses,
   return plane;
 }
 
+namespace {
+
+/// What to say of the plane, in sentences.
 std::vector<std::string> words_about(const TouchPlane& plane) {
   std::vector<std::string> words;
   const auto text = [](const glm::dvec3& v) {
@@ -127,6 +130,8 @@ std::vector<std::string> words_about(const TouchPlane& plane) {
   return words;
 }
 
+/// The findings "tilt": poses under load that lie tilted in the plane, or off it.
+/// @param pressed [n] rows in which the array is pressed
 std::vector<SetupFinding> tilt_of(const TouchPlane& plane,
                                   const std::vector<std::optional<SpatialPose>>& poses,
                                   const std::vector<bool>& pressed) {
@@ -162,6 +167,8 @@ std::vector<SetupFinding> tilt_of(const TouchPlane& plane,
   }
   return found;
 }
+
+}  // namespace
 
 std::optional<glm::dvec3> plane_normal(const std::string& plane) {
   if (plane == "auto") {

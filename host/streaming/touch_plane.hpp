@@ -37,21 +37,12 @@ struct TouchPlane {
 TouchPlane touch_plane(const std::vector<std::optional<SpatialPose>>& poses,
                        const std::optional<glm::dvec3>& normal);
 
-/// What to say of the plane, in sentences.
-std::vector<std::string> words_about(const TouchPlane& plane);
-
-/// The findings "tilt": poses under load that lie tilted in the plane, or off it.
-/// @param pressed [n] rows in which the array is pressed
-std::vector<SetupFinding> tilt_of(const TouchPlane& plane,
-                                  const std::vector<std::optional<SpatialPose>>& poses,
-                                  const std::vector<bool>& pressed);
-
 /// The normal that `plane` gives as "NX,NY,NZ"; none of "auto". @throws Error naming the option
 std::optional<glm::dvec3> plane_normal(const std::string& plane);
 
 /// Takes a table's poses in space into the plane of the touches, with their heights above it, turns
 /// the recording's array over where it faces down, and gives it its findings "tilt".
-/// @returns what words_about() says
+/// @returns what to say of the plane, in sentences
 std::vector<std::string> take_into_plane(const TouchPlane& plane, const ImportSurvey& survey,
                                          PoseTable& poses, Recording& recording);
 
