@@ -204,7 +204,7 @@ def none_settings(quick: bool) -> list[tuple[str, Bins, float, Touching, Sd]]:
 
 
 def log_odds_of_none(step: Json) -> float:
-    """Of none over all letters together."""
+    """Log odds, in nats, of (none) over all letters together."""
     none = step["none"]
     letters = sum(of for label, of in step["identity"].items() if label != "(none)")
     tiny = numpy.finfo(float).tiny

@@ -19,7 +19,7 @@ struct Answers {
   std::vector<double> seconds = {};      ///< of update() and estimate()
   std::vector<double> cpu_seconds = {};  ///< of all threads
   std::vector<Mode> modes = {};
-  // Of bounds alone:
+  // Bounds alone have these:
   std::vector<double> bins_evaluated = {};
   std::vector<double> dropped_mass = {};
   int mode_certain = 0;

@@ -264,7 +264,7 @@ def program() -> None:
     scores: dict[str, dict[str, list[Json]]] = {name: {n: [] for n in SHOWN} for name in SENSORS}
     example: Any = None
     with tempfile.TemporaryDirectory() as name:
-        # Of people whose presses are held out, nothing was learned.
+        # Nothing was learned of people whose presses are held out.
         without = {press.person: None if held_out.exists() else press.person for press in tried}
         learned = {
             person: learn(

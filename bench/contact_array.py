@@ -28,14 +28,14 @@ ELEMENTS_MM = palpate.grid_array(WINDOW, WINDOW, PITCH_MM)
 #: A random point of the contact lies this many elements from a window's middle at most, along each axis.
 OFF_MIDDLE = 2
 
-# Of Eq. 7: from 300 counts on an element's middle lies over the contact about as often as beside it.
+# Eq. 7's: from 300 counts on an element's middle lies over the contact about as often as beside it.
 THRESHOLD, RATIO = 300.0, 0.1
 FELT = 50.0  #: counts, ten standard deviations of an element that nothing is near
 
 #: Probability that a place beyond the map is touched: the contacts' share of what windows cover, about.
 PRIOR = 0.02
-#: Of maps: contact is blurred by half a pitch, so that log odds say how far an outline is within 5 mm, as
-#: far as elements feel a finger, up to the 7.8 nats that a sensor model tells apart.
+#: Maps blur contact by half a pitch, so that log odds say how far an outline is within 5 mm, as far as
+#: elements feel a finger, up to the 7.8 nats that a sensor model tells apart.
 SPREAD_MM, PEAK = PITCH_MM / 4.0, 0.9996
 
 Ints = NDArray[numpy.int64]
@@ -50,7 +50,7 @@ class Press(NamedTuple):
 
     @property
     def centroid_mm(self) -> Floats:
-        """Of the contact area, in the sheet."""
+        """The middle of the contact area, in the sheet."""
         y, x = numpy.nonzero(self.contact)
         return PIXEL_MM * numpy.array([x.mean(), y.mean()])
 

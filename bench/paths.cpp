@@ -24,16 +24,16 @@ std::ptrdiff_t no_contacts(const Touch& touch) {
 }
 
 /// A touch as an array at rest often has it: most elements meet nothing.
-Touch resting_touch(const Recording& unknown) {
+Touch touch_at_rest(const Recording& unknown) {
   const std::vector<Touch> touches = all_touches(unknown);
-  const auto resting = std::find_if(touches.begin(), touches.end(), [](const Touch& touch) {
+  const auto at_rest = std::find_if(touches.begin(), touches.end(), [](const Touch& touch) {
     return 2 * static_cast<std::size_t>(no_contacts(touch)) >= touch.pressure.size();
   });
-  if (resting == touches.end()) {
+  if (at_rest == touches.end()) {
     throw Error(Fault::input, fmt::format("none of {} touches has half its elements in No Contact",
                                           touches.size()));
   }
-  return *resting;
+  return *at_rest;
 }
 
 /// One of the ways.
@@ -53,10 +53,10 @@ Json compare_ways(Device& device, std::span<const Hypothesis> letters, const Rec
   const ContactModel product{.prior = letters.front().map.prior};
   const ContactModel logs{.gamma = 0.0, .prior = product.prior};
   const std::vector<Touch> moving = unknown.touches(0, timed_touches);
-  const std::vector<Touch> resting(timed_touches, resting_touch(unknown));
+  const std::vector<Touch> at_rest(timed_touches, touch_at_rest(unknown));
   PoseHistogram histogram(device, letters, {.lattice = lattice});
   PoseHistogram in_logs(device, letters, {.lattice = lattice, .contact = logs});
-  PoseHistogram at_rest(device, letters, {.lattice = lattice, .still_array = true});
+  PoseHistogram still_array(device, letters, {.lattice = lattice, .still_array = true});
   OneBinKernel one_bin(device, letters, lattice, product);
   CpuLoop cpu_loop(letters, lattice, product);
   const auto way = [](const std::string& path, const ContactModel& model,
@@ -71,9 +71,9 @@ Json compare_ways(Device& device, std::span<const Hypothesis> letters, const Rec
       way(plain_text(histogram.paths()), product, moving, histogram),
       way("in logs: " + plain_text(in_logs.paths()), logs, moving, in_logs),
       way(fmt::format("array at rest, {} of {} elements in No Contact: {}",
-                      no_contacts(resting.front()), unknown.elements(),
-                      plain_text(at_rest.paths())),
-          product, resting, at_rest),
+                      no_contacts(at_rest.front()), unknown.elements(),
+                      plain_text(still_array.paths())),
+          product, at_rest, still_array),
       way("one-bin kernel", product, moving, one_bin),
       way("CPU loop", product, moving, cpu_loop),
   };

@@ -42,7 +42,8 @@ def together(records: Sequence[Json]) -> dict[str, float]:
 
 
 def scores(records: Sequence[Json], presses: int, random: numpy.random.Generator) -> Json:
-    """Of as many unknowns as there are presses: each with others of its object, drawn without replacement."""
+    """Scores of as many unknowns as there are presses: each with others of its object, drawn without
+    replacement."""
     of_label: dict[str, list[Json]] = {}
     for record in records:
         of_label.setdefault(record["truth"]["object"], []).append(record)

@@ -30,23 +30,23 @@ Bytes bytes_of(const Colour& colour) {
 
 /// Index of the nearest colour among the 216 of xterm's cube and its 24 greys.
 int palette_index(const Bytes& c) {
-  constexpr std::array<int, 6> levels{0, 95, 135, 175, 215, 255};
-  const auto level = [&](int value) {
+  constexpr std::array<int, 6> steps{0, 95, 135, 175, 215, 255};
+  const auto nearest_step = [&](int value) {
     return static_cast<int>(
-        std::min_element(levels.begin(), levels.end(),
+        std::min_element(steps.begin(), steps.end(),
                          [&](int a, int b) { return std::abs(a - value) < std::abs(b - value); }) -
-        levels.begin());
+        steps.begin());
   };
   const auto distance = [&](int red, int green, int blue) {
     return (c.red - red) * (c.red - red) + (c.green - green) * (c.green - green) +
            (c.blue - blue) * (c.blue - blue);
   };
-  const int r = level(c.red);
-  const int g = level(c.green);
-  const int b = level(c.blue);
+  const int r = nearest_step(c.red);
+  const int g = nearest_step(c.green);
+  const int b = nearest_step(c.blue);
   const int grey = std::clamp(((c.red + c.green + c.blue) / 3 - 3) / 10, 0, 23);
   const int value = 8 + 10 * grey;
-  return distance(value, value, value) < distance(levels[r], levels[g], levels[b])
+  return distance(value, value, value) < distance(steps[r], steps[g], steps[b])
              ? 232 + grey
              : 16 + 36 * r + 6 * g + b;
 }

@@ -22,7 +22,7 @@ struct ClockOffset {
   double seconds = 0.0;
   std::size_t presses = 0;  ///< that were judged
   std::size_t against = 0;  ///< of these, while the array moves, is lifted, or has no pose
-  std::size_t left = 0;     ///< the same once the clocks agree
+  std::size_t left = 0;     ///< of these, once the clocks agree
 };
 
 /// The clock's offset as presses show it: the array stands still while it is pressed, and is as low

@@ -26,7 +26,7 @@ TEST(GlyphScene, HasObjectsOfDifferentNamesAndSizes) {
   }
   ASSERT_EQ(names.size(), static_cast<std::size_t>(most_glyphs));
   EXPECT_TRUE(names.contains("A"));
-  // Of an area of 0.64 and 1.44 times; parts of a large glyph lie beyond the touches.
+  // Their areas are 0.64 and 1.44 times as large; parts of a large glyph lie beyond the touches.
   EXPECT_LT(by_size[1], 0.8 * by_size[0]) << "of 0.8 times the size";
   EXPECT_GT(by_size[2], 1.1 * by_size[0]) << "of 1.2 times the size";
 

@@ -81,7 +81,7 @@ def test_intervals() -> None:
     assert told["high"] - told["mean"] == pytest.approx(2.262 * math.sqrt(82.5 / 9 / 10), rel=1e-3)
     assert (told["low"] + told["high"]) / 2 == pytest.approx(told["mean"]) == 4.5
     assert student_record([1.0, 2.0]) == {"mean": 1.5}, "two tell no interval"
-    # Of many values the bootstrap's interval is the normal one.
+    # The bootstrap's interval of many values is the normal one.
     many = Random(1, Stream.pose_noise).normals(400)
     told = bootstrap_record(many)
     assert told["high"] - told["low"] == pytest.approx(2 * 1.96 * many.std() / 20, rel=0.1)

@@ -68,7 +68,7 @@ TEST_F(ClosedStreams, AreRefusedWhereTheyAreNamed) {
   EXPECT_EQ(outcome.err, "palpate: --poses -: standard input is closed; name a file\n");
 }
 
-// Of most flags "-" is a file of that name.
+// Most flags take "-" for a file of that name.
 TEST_F(ClosedStreams, AreNotAskedForByAFileCalledDash) {
   const Outcome outcome =
       palpate({"simulate", "A", "--touches", "3", "-o", "-"}, {.closed = every});

@@ -16,7 +16,7 @@ namespace palpate::defaults_test {
 using nlohmann::json;
 using Arguments = std::vector<std::string>;
 
-/// Of the maps, twice the usual one: automatic bins, as wide as the cells ask for, are then few.
+/// The maps' cells are twice as wide as usual: automatic bins, as wide as these ask for, are few.
 constexpr double cell_mm = 1.0;
 
 class Defaults : public ProgramTest {

@@ -37,7 +37,7 @@ class Live : public LiveTest {
     ASSERT_EQ(trace.size(), live.size());
     for (std::size_t i = 0; i < live.size(); ++i) {
       for (const auto& [key, value] : trace[i].items()) {
-        // The same touches on the same device give the same bits, one by one or together; files
+        // Equal touches on one device give the same bits, one by one or together; files
         // hold pressures in float64.
         EXPECT_EQ(live[i].at(key), value) << key << " after touch " << i;
       }
@@ -130,7 +130,7 @@ TEST_F(Live, JoinsFramesWithPosesFromAFifo) {
   done({"record", "--sensor", unknown_e, "-o", "frames.h5"});
   const auto expected = records_of("replay:frames.h5,speed=max");
 
-  // The same stream from a board that does not know where it is, and a robot that does.
+  // A board that does not know where it is gives this stream, too, and a robot that does.
   const auto stream =
       open_virtual_sensor("replay:" + (folder_ / "frames.h5").string() + ",speed=max");
   FrameRecorder bare(folder_ / "bare.h5", stream->description());

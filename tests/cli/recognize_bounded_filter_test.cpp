@@ -58,7 +58,7 @@ TEST_F(BoundedFilter, AgreesWithTheHistogram) {
       EXPECT_EQ(step["best"], other["best"]);
       EXPECT_EQ(step["mode"]["object"], other["mode"]["object"]);
       for (const char* field : {"x_mm", "y_mm", "theta_rad"}) {
-        // The same bin: the device's angles are in float32.
+        // Both are one bin: the device's angles are in float32.
         EXPECT_NEAR(step["mode"][field].get<double>(), other["mode"][field].get<double>(), 1e-6);
         // Fitted to logs that differ by the histogram's rounding, some 1e-5 nats.
         EXPECT_NEAR(step["refined"][field].get<double>(), other["refined"][field].get<double>(),

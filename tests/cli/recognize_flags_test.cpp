@@ -93,7 +93,7 @@ TEST_F(RecognizeFlags, FineBinsAreNotFinerThanTheSensorShows) {
                                            "--x-mm=1:3",  "--y-mm=-4:-2.5", "--theta-deg=40:70"};
   const std::string out = done(recognize);
   EXPECT_NE(out.find("7 x 5 x "), std::string::npos) << "steps of 0.3 mm\n" << out;
-  // Of a map that does not know its spread, the cells decide.
+  // The cells decide where a map does not know its spread.
   OccupancyGrid map = read_map(folder_ / "fine.map.h5");
   map.spread_mm.reset();
   write_map(folder_ / "fine.map.h5", map);

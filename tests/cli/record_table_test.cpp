@@ -48,7 +48,7 @@ RecognitionRecord sample_record(const std::string& name) {
       .recording = "/data/" + name, .frame = {}, .touches = 9, .true_label = {}, .trace = {step}};
 }
 
-/// The same with a truth.
+/// sample_record() with a truth.
 RecognitionRecord sample_trial(const std::string& name, const RecognitionTask& task) {
   RecognitionRecord record = sample_record(name);
   RecognitionStep& step = record.trace.back();

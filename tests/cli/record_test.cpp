@@ -229,7 +229,7 @@ TEST_F(RecordCommand, ATouchedTareLeavesAFileOfALongName) {
       {"touched", "element"});
 }
 
-// Of an array that is connected to nothing, no frame is saved before the tare ends.
+// No frame of an array that is connected to nothing is saved before the tare ends.
 TEST_F(RecordCommand, FramesWithoutAKnownReadingAreNoRecording) {
   Recording frames = recorded("a.h5", {"--sensor", "simulate:A,touches=1,speed=max"});
   recorded("s.h5", {"--sensor", "simulate:E,touches=1,speed=max"});

@@ -20,11 +20,11 @@ class SimulateCommand : public ProgramTest {
 };
 
 bool same_pose(const Pose& a, const Pose& b) {
-  // Of millimetres and radians; what inverting and multiplying poses rounds off.
+  // Inverting and multiplying poses rounds off so much, in millimetres and radians.
   constexpr double rounding = 1e-9;
   return std::abs(a.translation_mm.x - b.translation_mm.x) < rounding &&
          std::abs(a.translation_mm.y - b.translation_mm.y) < rounding &&
-         std::abs(wrap_angle(a.theta_rad - b.theta_rad, 2 * std::numbers::pi)) < rounding;
+         std::abs(wrap_angle(a.theta_rad - b.theta_rad)) < rounding;
 }
 
 TEST_F(SimulateCommand, GridTouchesAKnownObject) {

@@ -270,7 +270,7 @@ TEST_F(TouchesCommand, TellsOfElementsThatNeverRelease) {
   EXPECT_EQ(all.status, 0);
   expect_named(all.err, {"palpate: stuck.h5: elements 4, 31 never read below 1 kPa from 0.00 s on",
                          "'valid'", "--tare"});
-  // Of 461 frames, the first press is over at frame 230; the stuck elements begin another touch.
+  // The first press is over at frame 230 of 461; the stuck elements begin another touch.
   const Outcome later = stuck_from(215);
   EXPECT_EQ(later.status, 0);
   expect_named(later.err, {"elements 4, 31 never read below 1 kPa from 2.1"});

@@ -37,7 +37,7 @@ TEST_F(OwnSensorDocument, ItsCommandsFindTheUnknown) {
   for (std::size_t k = 0; k < truth.size(); ++k) {
     const double error = refined["T_robot_object"][k].get<double>() - truth[k];
     EXPECT_LT(std::abs(error), largest_error[k]) << k;
-    // Of normal errors, one in 16,000 is larger.
+    // One in 16,000 normal errors is larger.
     EXPECT_LT(std::abs(error), 4.0 * refined["sd"][k].get<double>()) << k;
   }
 

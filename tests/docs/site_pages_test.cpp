@@ -46,7 +46,7 @@ void expect_tables(const std::string& page, const std::string& said,
                    std::initializer_list<const char*> titles) {
   std::vector<Words> printed = words_of(said);
   for (Words& words : printed) {
-    // Of one digit, and at most 1e-4.
+    // Dropped mass has one digit, and is at most 1e-4.
     std::erase_if(words, [](const std::string& w) {
       return w == "dropped" || w == "0.0001" || (w.size() == 5 && w.substr(1, 3) == "e-0");
     });

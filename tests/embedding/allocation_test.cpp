@@ -11,7 +11,7 @@
 
 namespace {
 
-/// Of this thread, by operator new, while `counting`.
+/// How often operator new is called on this thread while `counting`.
 thread_local std::size_t allocations = 0;
 thread_local bool counting = false;
 

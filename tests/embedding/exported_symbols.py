@@ -84,7 +84,7 @@ def main():
     exported = symbols(options.nm, options.shared, "B-Zu-w", "--dynamic")
     recorded = set(options.list.read_text().splitlines())
     headers = [header for folder in options.folders for header in folder.glob("*.hpp")]
-    # Of what weak symbols (W) define, every program has a copy.
+    # Every program has a copy of what weak symbols (W) define.
     archive = symbols(options.nm, options.archive, "T", "--extern-only")
     faults = [f"new, add it to {options.list.name}: {s}" for s in exported - recorded]
     faults += [f"gone: {s}" for s in recorded - exported]

@@ -38,7 +38,7 @@ void expect_robust(const std::string& good, const Read& read) {
   const ScratchFolder folder;
   const std::filesystem::path path = folder / "damaged";
   ASSERT_TRUE(survives(path, good, read));
-  // Of these damages one, to a recording, makes libhdf5 loop, for the 2 s that its reader lets it.
+  // One of these damages, to a recording, makes libhdf5 loop, for the 2 s that its reader lets it.
   std::mt19937 random(6);
   const auto below = [&](std::size_t bound) { return random() % bound; };
   for (int k = 0; k < 60; ++k) {

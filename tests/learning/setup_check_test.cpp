@@ -77,7 +77,7 @@ TEST_F(SetupTouches, TellTheOrderInWhichElementsAreRead) {
 }
 
 TEST_F(SetupTouches, TellWhereTheArraySitsInTheTool) {
-  // Of the array that the recording has, in the true frame.
+  // Each is the pose of the recordings' array in the true frame.
   for (const Pose& offset : {Pose{{2.1, -1.4}, 0.07}, Pose{{0.0, 0.32}, -0.03}}) {
     std::vector<Recording> recordings = touches(digitacts_array());
     for (Recording& recording : recordings) {

@@ -312,7 +312,7 @@ TEST(FitScale, OfMeanZeroAndSdOneChangesNothing) {
 }
 
 TEST(FitScale, ObjectsTogetherVaryAsTheirTouchesDo) {
-  // Of one touch of each, z varies by 0.25 within the objects and by 0.25 between them.
+  // With one touch of each object, z varies by 0.25 within the objects and by 0.25 between them.
   const std::vector<FitScale> objects{{.mean = 0.5, .sd = 0.5}, {.mean = 1.5, .sd = 0.5}};
   const FitScale all = pooled(objects);
   EXPECT_DOUBLE_EQ(all.mean, 1.0);

@@ -88,8 +88,8 @@ TEST(RotationalSymmetry, OfRegularPolygonsIsTheNumberOfTheirCorners) {
 TEST(RotationalSymmetry, IsMeasuredAsTheDistanceOfTheOutlines) {
   const auto square = measure_symmetry(map_of(polygon(4, 13.0), 0.2));
   ASSERT_TRUE(square);
-  // Of a square of side 2 a, another that is turned by 45 degrees leaves four corners of the area
-  // a^2 (sqrt(2) - 1)^2 uncovered. At an edge, the measure forgives a part of a cell of 0.5 mm.
+  // A square turned by 45 degrees leaves four corners of another of side 2 a uncovered, of the area
+  // a^2 (sqrt(2) - 1)^2. At an edge, the measure forgives a part of a cell of 0.5 mm.
   const double a = 13.0 / std::numbers::sqrt2;
   const double corners_mm2 = 4.0 * a * a * std::pow(std::numbers::sqrt2 - 1.0, 2);
   EXPECT_NEAR(square->apart_mm[8], 2.0 * corners_mm2 / (8.0 * a), 0.25);

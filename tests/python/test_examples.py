@@ -39,7 +39,7 @@ def test_types_are_strict(tmp_path: pathlib.Path) -> None:
     assert (package / "reference.pyi").exists()
     assert (package / "py.typed").exists()
     assert (len(EXAMPLES), len(NODE)) == (3, 4)
-    # Of the package, the type stubs of the extension modules too.
+    # The package is checked with the type stubs of its extension modules.
     command = ROOT / "python" / "palpate_command.py"
     for checked in ([*EXAMPLES, *NODE, command], ["-p", "palpate"], ["-p", "bench"]):
         run = subprocess.run(

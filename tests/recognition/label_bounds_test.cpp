@@ -156,7 +156,7 @@ TEST(LabelBounds, AreOfBoundsAlone) {
       for (std::size_t i = 0; i < 2; ++i) {
         EXPECT_LE(step.identity_bounds[i].low, step.identity[i]);
         EXPECT_GE(step.identity_bounds[i].high, step.identity[i]);
-        // Of the mass that is dropped, all may be of one label.
+        // All of the mass that is dropped may be of one label.
         EXPECT_LE(step.identity_bounds[i].high - step.identity_bounds[i].low, 2.1e-6);
       }
     }

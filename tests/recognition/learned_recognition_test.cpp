@@ -70,7 +70,7 @@ void expect_equation_7(const std::vector<Hypothesis>& maps, std::span<const Touc
   const double plain = log_odds_of(device, RecognitionTask(maps, filter), touches);
   const double tabled = log_odds_of(device, RecognitionTask(learned, of_table), touches);
   EXPECT_GT(std::abs(plain), 0.1) << "the touches tell nothing";
-  // Of the difference of two objects, each within 1e-4 nats per touch.
+  // It is the difference of two objects, each within 1e-4 nats per touch.
   EXPECT_NEAR(tabled, plain, 2e-4 * static_cast<double>(touches.size()));
 }
 
@@ -100,7 +100,7 @@ TEST(LearnedTable, OfEquation7GivesItsAnswerByParticles) {
 }
 
 TEST(LearnedTable, SetsObjectsApartThatAreTouchedAlike) {
-  // The same map twice; the numbers of B alone hold In Contact for likely anywhere.
+  // Both objects have one map; the numbers of B alone hold In Contact for likely anywhere.
   LearnedSensor sensor = equation_7();
   sensor.table->objects["B"] = sensor.table->shared;
   std::fill_n(sensor.table->objects["B"].begin() + ReadingLayer::nodes, ReadingLayer::nodes, 0.0);

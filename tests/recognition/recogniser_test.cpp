@@ -186,7 +186,7 @@ std::vector<RecognitionTask> automatic_tasks() {
   return tasks;
 }
 
-/// The same task about this pivot.
+/// The task about this pivot.
 RecognitionTask about(const RecognitionTask& task, const glm::dvec2& pivot_mm) {
   PoseLattice lattice = task.lattice();
   lattice.pivot_mm = pivot_mm;
@@ -346,7 +346,7 @@ TEST(AutomaticPivot, ForgetsTouchesThatWaitForItOnlyByAReset) {
 TEST(AutomaticPivot, DependsOnTheElementsAndNotOnTheSensorFramesOrigin) {
   Device device = Device::open();
   const Recording recording = moved(touched_letter(1), {{400.0, 200.0}, 0.7});
-  // The same touches, of a frame 100 mm beside the elements such as the robot's flange.
+  // These are the touches of a frame 100 mm beside the elements, such as the robot's flange.
   const Pose T_flange_sensor{{100.0, 30.0}, 0.5};
   Recording of_flange = recording;
   for (Pose& pose : of_flange.T_robot_sensor) {

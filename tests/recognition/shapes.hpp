@@ -17,7 +17,7 @@ std::vector<FilterOptions> every_filter();
 
 /// Six touches of the letter at a pose within the lattice, with the truth.
 Recording touched_letter(std::uint64_t seed);
-/// The same of the disc.
+/// Six touches of the disc at a pose within the lattice, with the truth.
 Recording touched_disc(std::uint64_t seed);
 
 }  // namespace palpate

@@ -19,7 +19,7 @@ namespace palpate::pose_source_test {
 
 using namespace std::chrono_literals;
 
-// Of poses 10 ms apart.
+// The time of a pose; poses are 10 ms apart.
 double time_of(int i) { return 1.7e9 + 0.01 * i; }
 
 // A board whose frames the test hands over; none ever makes next() wait.
@@ -88,7 +88,7 @@ class PoseSource : public testing::Test {
     }
   }
 
-  // Of all frames that the sensor has without waiting.
+  // How many of the frames that the sensor has without waiting have a pose.
   static std::size_t posed_frames(PosedSensor& sensor) {
     std::size_t posed = 0;
     while (auto frame = sensor.next(0ms)) {

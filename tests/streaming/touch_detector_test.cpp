@@ -179,7 +179,7 @@ TEST(TouchDetector, BaselineRestsAfterARelease) {
   EXPECT_NEAR(*followed_s - *released_s, 0.51, 0.011);  // the frame after it, and a rounding
 }
 
-// Of what changes slowly, the frames that are kept tell the middle.
+// The frames that are kept tell the middle of what changes slowly.
 TEST(TouchDetector, EndlessTouchIsTheMeanOverAllOfIt) {
   const auto rising = [](double t) {
     return std::vector<double>{press(t, 1.0, 1e6) * (8.0 + 0.001 * t), press(t, 1.0, 1e6) * 3.0};

@@ -16,7 +16,7 @@ from .session import covariance_of
 
 New = Callable[[str], Any]
 
-#: Of a normal distribution over a plane, this many standard deviations about the mean hold 95 %.
+#: So many standard deviations about its mean hold 95 % of a normal distribution over a plane.
 _SD_OF_95 = math.sqrt(-2 * math.log(0.05))
 
 

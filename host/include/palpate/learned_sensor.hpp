@@ -27,7 +27,7 @@ struct LearnedTable {
   std::vector<double> level_edges;
   /// log P(level | layer) in nats, [level, node], over ReadingLayer::nodes nodes.
   std::vector<double> shared;
-  std::map<std::string, std::vector<double>> objects;  ///< the same by label
+  std::map<std::string, std::vector<double>> objects;  ///< numbers as `shared`, by label
 
   /// Number of levels, No Contact included.
   std::size_t levels() const { return level_edges.size() + 2; }

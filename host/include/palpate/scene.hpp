@@ -54,7 +54,7 @@ struct Scene {
   Displacement slip_sd;                    ///< HistogramOptions::slip_sd
   std::optional<std::array<int, 3>> bins;  ///< of x, y, theta
   bool auto_bins = false;                  ///< counts by balanced_lattice()
-  bool fine_bins = false;                  ///< the same with BinWidth::fine
+  bool fine_bins = false;                  ///< counts by balanced_lattice() with BinWidth::fine
   std::optional<std::string> filter;       ///< "auto", "histogram", "bounded" or "particles"
   std::optional<double> act_below_mm;      ///< see "decision" in docs/how_sure.md
   std::optional<double> act_above;         ///< a probability
