@@ -175,7 +175,6 @@ void warn_of_unknown_poses(const std::vector<Recording>& recordings) {
 }
 
 void build_maps(const MapFlags& flags) {
-  const bool folder = flags.to_folder();
   const std::vector<Recording> recordings = read_touch_recordings(flags.recordings);
   const std::optional<LearnedSensor> sensor = sensor_of(flags, recordings);
   MapOptions model = map_options(flags, recordings, sensor);
@@ -187,8 +186,7 @@ void build_maps(const MapFlags& flags) {
   std::vector<std::string> names;
   for (const ObjectTouches& object : objects) {
     names.push_back(object.label);
-    map_paths.push_back(folder ? std::filesystem::path(flags.output) / (object.label + ".map.h5")
-                               : std::filesystem::path(flags.output));
+    map_paths.push_back(map_path(flags, object.label));
   }
   const bool learns = learns_sensor(flags);
   std::vector<std::filesystem::path> outputs = map_paths;

@@ -144,9 +144,7 @@ void build_drawn_maps(const MapFlags& flags) {
   std::vector<WrittenMap> written;
   std::vector<std::filesystem::path> paths;
   for (std::size_t i = 0; i < labels.size(); ++i) {
-    paths.push_back(flags.to_folder()
-                        ? std::filesystem::path(flags.output) / (labels[i] + ".map.h5")
-                        : std::filesystem::path(flags.output));
+    paths.push_back(map_path(flags, labels[i]));
     written.push_back({paths.back(), flags.recordings[i]});
   }
   prepare_outputs(flags, paths, labels);

@@ -346,6 +346,11 @@ GroupedTouches group_by_label(const MapFlags& flags, const std::vector<Recording
   return result;
 }
 
+std::filesystem::path map_path(const MapFlags& flags, const std::string& name) {
+  return flags.to_folder() ? std::filesystem::path(flags.output) / (name + ".map.h5")
+                           : std::filesystem::path(flags.output);
+}
+
 std::filesystem::path ros_path(const MapFlags& flags, const std::string& name) {
   return std::filesystem::path(flags.ros) / (name + ".yaml");
 }

@@ -111,6 +111,8 @@ void require_name(const std::string& path, const std::string& label);
 /// Throws Error where --symmetry names a label that no object has.
 void require_known_symmetries(const MapFlags& flags, const std::vector<std::string>& labels);
 
+/// The file of a map of this name: --output, or a file in that folder.
+std::filesystem::path map_path(const MapFlags& flags, const std::string& name);
 /// The file for ROS beside the map of this name in the folder of --ros.
 std::filesystem::path ros_path(const MapFlags& flags, const std::string& name);
 /// Throws Error where an output cannot be written or would overwrite an input.

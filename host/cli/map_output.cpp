@@ -53,15 +53,34 @@ void settle_frame(const ObjectOrigin& origin, OccupancyGrid& map) {
   }
 }
 
-void write_maps(const MapFlags& flags, const std::vector<OccupancyGrid>& maps,
-                const std::vector<WrittenMap>& written, const std::function<void()>& beside) {
-  const std::string picture = flags.png.empty() ? "" : draw_maps(maps);
+void make_map_folders(const MapFlags& flags) {
   if (!flags.ros.empty()) {
     make_folder(flags.ros);
   }
   if (flags.to_folder()) {
     make_folder(flags.output);
   }
+}
+
+void write_for_ros(const MapFlags& flags, const std::string& name, const OccupancyGrid& map) {
+  if (!flags.ros.empty()) {
+    const std::filesystem::path yaml = ros_path(flags, name);
+    write_map_server(yaml, map);
+    fmt::print("{}\n", yaml.string());
+  }
+}
+
+void write_picture(const MapFlags& flags, const std::string& png) {
+  if (!flags.png.empty()) {
+    write_file(flags.png, png);
+    fmt::print("{}\n", flags.png);
+  }
+}
+
+void write_maps(const MapFlags& flags, const std::vector<OccupancyGrid>& maps,
+                const std::vector<WrittenMap>& written, const std::function<void()>& beside) {
+  const std::string picture = flags.png.empty() ? "" : draw_maps(maps);
+  make_map_folders(flags);
   for (std::size_t i = 0; i < maps.size(); ++i) {
     const OccupancyGrid& map = maps[i];
     const auto& [path, source, symmetry] = written[i];
@@ -74,17 +93,10 @@ void write_maps(const MapFlags& flags, const std::vector<OccupancyGrid>& maps,
     }
   }
   beside();
-  if (!flags.ros.empty()) {
-    for (const OccupancyGrid& map : maps) {
-      const std::filesystem::path yaml = ros_path(flags, map.label);
-      write_map_server(yaml, map);
-      fmt::print("{}\n", yaml.string());
-    }
+  for (const OccupancyGrid& map : maps) {
+    write_for_ros(flags, map.label, map);
   }
-  if (!flags.png.empty()) {
-    write_file(flags.png, picture);
-    fmt::print("{}\n", flags.png);
-  }
+  write_picture(flags, picture);
 }
 
 }  // namespace palpate::cli

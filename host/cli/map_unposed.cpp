@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "cli/map_flags.hpp"
+#include "cli/map_output.hpp"
 #include "cli/map_sensor.hpp"
 #include "cli/options.hpp"
 #include "cli/progress.hpp"
@@ -50,11 +51,6 @@ std::string name_of(const std::string& label, std::size_t map, std::size_t count
   return count == 1 ? label : fmt::format("{}.{}", label, map + 1);
 }
 
-std::filesystem::path path_of(const MapFlags& flags, const std::string& name) {
-  return flags.to_folder() ? std::filesystem::path(flags.output) / (name + ".map.h5")
-                           : std::filesystem::path(flags.output);
-}
-
 /// The files that the maps may have.
 std::vector<std::filesystem::path> prepare_unposed_outputs(const MapFlags& flags,
                                                            const GroupedTouches& grouped,
@@ -68,7 +64,7 @@ std::vector<std::filesystem::path> prepare_unposed_outputs(const MapFlags& flags
   }
   std::vector<std::filesystem::path> paths;
   for (const std::string& name : names) {
-    paths.push_back(path_of(flags, name));
+    paths.push_back(map_path(flags, name));
   }
   std::vector<std::filesystem::path> outputs = paths;
   if (learns) {
@@ -201,7 +197,7 @@ std::string draw(const std::vector<Object>& objects, const UnposedOptions& optio
 void warn_of_older_maps(const MapFlags& flags, const std::string& label, std::size_t count) {
   const auto warn = [&](const std::string& name) {
     std::error_code ignored;
-    const std::filesystem::path path = path_of(flags, name);
+    const std::filesystem::path path = map_path(flags, name);
     if (std::filesystem::exists(path, ignored)) {
       fmt::print(stderr,
                  "palpate: {}: an older map of '{}'; remove it, or --maps {} reads it, too\n",
@@ -222,15 +218,11 @@ void write_object(const MapFlags& flags, const Object& object) {
   const std::string& label = object.presses->label;
   for (std::size_t m = 0; m < count; ++m) {
     const UnposedMap& one = object.maps.maps[m];
-    const std::filesystem::path path = path_of(flags, name_of(label, m, count));
+    const std::filesystem::path path = map_path(flags, name_of(label, m, count));
     write_map(path, one.map);
     fmt::print("{}: {} from {}; {} x {} cells of {:.4g} mm, prior {:.3g}\n", path.string(), label,
                fit_words(one), one.map.nx, one.map.ny, one.map.cell_mm, one.map.prior);
-    if (!flags.ros.empty()) {
-      const std::filesystem::path yaml = ros_path(flags, name_of(label, m, count));
-      write_map_server(yaml, one.map);
-      fmt::print("{}\n", yaml.string());
-    }
+    write_for_ros(flags, name_of(label, m, count), one.map);
     for (const PlacedPress& press : one.presses) {
       if (press.fit && *press.fit < doubtful_fit) {
         const TouchSource& source = (*object.sources)[press.press];
@@ -291,28 +283,19 @@ void build_unposed_maps(const MapFlags& flags) {
   }
   const std::string picture = flags.png.empty() ? "" : draw(objects, options);
 
-  // Nothing is written before all maps are built, so that a failure leaves nothing behind.
-  if (!flags.ros.empty()) {
-    make_folder(flags.ros);
-  }
-  if (flags.to_folder()) {
-    make_folder(flags.output);
-  }
+  make_map_folders(flags);
   for (const Object& object : objects) {
     write_object(flags, object);
     for (std::size_t m = 0; learned.sensor && m < object.maps.maps.size(); ++m) {
       const std::string name = name_of(object.presses->label, m, object.maps.maps.size());
-      learned.sensor->maps[path_of(flags, name).filename().string()] =
+      learned.sensor->maps[map_path(flags, name).filename().string()] =
           digest_of(object.maps.maps[m].map);
     }
   }
   if (learns) {
     write_sensor(flags, learned);
   }
-  if (!flags.png.empty()) {
-    write_file(flags.png, picture);
-    fmt::print("{}\n", flags.png);
-  }
+  write_picture(flags, picture);
 }
 
 }  // namespace palpate::cli
