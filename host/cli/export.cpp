@@ -144,8 +144,8 @@ std::string shell_word(const std::string& text) {
 /// The command that makes the recording from its tables.
 std::string import_command(const std::filesystem::path& folder, const Recording& r) {
   const auto file = [&](const char* name) { return shell_word((folder / name).string()); };
-  std::string command = fmt::format("palpate import {} --array {} --poses {}",
-                                    file(pressures_name), file(array_name), file(poses_name));
+  std::string command = fmt::format("palpate import {} --array {} --poses {}", file(pressures_name),
+                                    file(array_name), file(poses_name));
   command += fmt::format(" --rows {} --pressure-unit {}", r.rows, r.pressure_unit);
   if (!r.object.empty()) {
     command += " " + shell_word("--object=" + r.object);

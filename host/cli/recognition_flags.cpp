@@ -110,8 +110,7 @@ void add_recognition_flags(CLI::App& command, Request& request, bool& verbose) {
                 "Range of the pivot's x in the object frame, mm, as --x-mm=-10:10 [default: "
                 "every place of an array that touches an object of the maps, or -10:10 where "
                 "counts of --bins, another range or a pivot X,Y is given]");
-  add_text_flag(command, "--y-mm", request.y_mm,
-                "Range of the pivot's y [default: as for --x-mm]");
+  add_text_flag(command, "--y-mm", request.y_mm, "Range of the pivot's y [default: as for --x-mm]");
   add_text_flag(
       command, "--theta-deg", request.theta_deg,
       "Range of theta, degrees, at most 360 wide [default: 0:360]; 30:30 fixes theta at 30");

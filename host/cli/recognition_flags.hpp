@@ -60,7 +60,7 @@ void tell_on_stderr(const std::string& sentence);
 /// Opens the task's filter, then tells the task's remarks: bins that do not fit deserve only their
 /// refusal. Throws Error.
 /// @param device may be null where uses_device() is false
-/// @param cancel_point see SearchRun
+/// @param cancel_point see FilterResources
 Recogniser open_telling(Device* device, const RecognitionTask& task,
                         const std::function<void()>& cancel_point = {});
 

@@ -175,14 +175,13 @@ std::optional<SetupFinding> dropped(const Presses& presses,
     reasons.push_back(
         fmt::format("{} that move or are steady for less than `min-steady-s`", presses.unsteady));
   }
-  return SetupFinding{
-      "dropped", 0.0,
-      fmt::format("{} of {} presses were left out: {}{}", lost, presses.all,
-                  fmt::join(reasons, ", "),
-                  clock ? fmt::format("; the clocks differ: import with `{}`",
-                                      fmt::join(clock->options, "` and `"))
-                        : ""),
-      clock ? clock->options : std::vector<std::string>{}};
+  return SetupFinding{"dropped", 0.0,
+                      fmt::format("{} of {} presses were left out: {}{}", lost, presses.all,
+                                  fmt::join(reasons, ", "),
+                                  clock ? fmt::format("; the clocks differ: import with `{}`",
+                                                      fmt::join(clock->options, "` and `"))
+                                        : ""),
+                      clock ? clock->options : std::vector<std::string>{}};
 }
 
 /// Where every touch has the same elements dead, keeps one list for all touches: `dead`, which may

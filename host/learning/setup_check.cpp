@@ -46,7 +46,8 @@ void check_units(SetupJudge& judge, Setup& setup, double& nats,
   if (gain > least_nats) {
     const std::string option =
         fmt::format("pose-unit {},{}", may_be_metres ? "m" : "mm", may_be_degrees ? "deg" : "rad");
-    findings.push_back({"pose_unit", gain,
+    findings.push_back({"pose_unit",
+                        gain,
                         fmt::format("the sensor's poses are in {}: import them with `{}`",
                                     may_be_metres && may_be_degrees ? "metres and degrees"
                                     : may_be_metres                 ? "metres"
@@ -188,7 +189,8 @@ void check_elements(SetupJudge& judge, Setup& setup, SetupCheck& check) {
     if (!found.empty()) {
       const std::string option = fmt::format("dead {}", fmt::join(found, ","));
       check.findings.push_back(
-          {stuck ? "stuck_elements" : "dead_elements", nats,
+          {stuck ? "stuck_elements" : "dead_elements",
+           nats,
            fmt::format("{} contact in every touch, on the object or beside it: "
                        "elements {}; import with `{}`",
                        stuck ? "always in" : "never in", fmt::join(found, ", "), option),

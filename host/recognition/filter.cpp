@@ -290,7 +290,7 @@ std::string size_words(const FilterOptions& options) {
 }
 
 std::unique_ptr<Filter> make_filter(Device* device, std::span<const Hypothesis> hypotheses,
-                                    const FilterOptions& options, const SearchRun& search) {
+                                    const FilterOptions& options, const FilterResources& search) {
   using Made = std::unique_ptr<Filter>;
   return std::visit(
       Each{[&](const HistogramOptions& one) -> Made {

@@ -60,7 +60,7 @@ std::optional<BoundedOptions> bounded_instead(const FilterOptions& options);
 std::string size_words(const FilterOptions& options);
 
 /// How a search by bounds runs on the host. What it finds does not depend on it.
-struct SearchRun {
+struct FilterResources {
   std::size_t threads = 0;                  ///< 0: BoundedOptions::threads
   std::function<void()> cancel_point = {};  ///< BoundedOptions::cancel_point
 };
@@ -117,7 +117,8 @@ class Filter {
 /// @param device may be null where FilterTraits::certificate is true
 /// @param search ignored where FilterTraits::certificate is false
 std::unique_ptr<Filter> make_filter(Device* device, std::span<const Hypothesis> hypotheses,
-                                    const FilterOptions& options, const SearchRun& search = {});
+                                    const FilterOptions& options,
+                                    const FilterResources& search = {});
 
 /// The lattice, or where it is finer than a picture shows a coarser grid of the same poses: at most
 /// 400 bins along x and along y and 360 along theta. Bins along x and y are a whole number of the

@@ -10,7 +10,7 @@
 
 namespace palpate {
 
-Recogniser::Recogniser(Device* device, const RecognitionTask& task, const SearchRun& search)
+Recogniser::Recogniser(Device* device, const RecognitionTask& task, const FilterResources& search)
     : traits_(traits_of(task.filter)),
       lattice_(task.lattice()),
       contact_(task.contact()),

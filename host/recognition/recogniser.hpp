@@ -21,7 +21,7 @@ class Recogniser {
  public:
   Recogniser(Device& device, const RecognitionTask& task) : Recogniser(&device, task, {}) {}
   /// By bounds, which need no device.
-  explicit Recogniser(const RecognitionTask& task, const SearchRun& search = {})
+  explicit Recogniser(const RecognitionTask& task, const FilterResources& search = {})
       : Recogniser(nullptr, task, search) {}
 
   /// Forgets all touches, for the next unknown. Particles start from the same places again; bounds
@@ -102,7 +102,7 @@ class Recogniser {
   void place_pivot(const TouchEvidence& touch);
   void move_pivot(const glm::dvec2& pivot_mm);
 
-  Recogniser(Device* device, const RecognitionTask& task, const SearchRun& search);
+  Recogniser(Device* device, const RecognitionTask& task, const FilterResources& search);
 
   FilterTraits traits_;
   PoseLattice lattice_;

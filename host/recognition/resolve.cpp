@@ -321,7 +321,8 @@ RecognitionTask resolve(const Request& request, const Circumstances& of) {
 
 bool uses_device(const RecognitionTask& task) { return !traits_of(task.filter).certificate; }
 
-Recogniser open_recogniser(Device* device, const RecognitionTask& task, const SearchRun& search) {
+Recogniser open_recogniser(Device* device, const RecognitionTask& task,
+                           const FilterResources& search) {
   if (!uses_device(task)) {
     return Recogniser(task, search);
   }

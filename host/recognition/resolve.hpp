@@ -50,7 +50,7 @@ bool uses_device(const RecognitionTask& task);
 /// @throws Error; where the device has no memory for the histogram's bins,
 /// it names the options without which bounds would take them
 Recogniser open_recogniser(Device* device, const RecognitionTask& task,
-                           const SearchRun& search = {});
+                           const FilterResources& search = {});
 
 /// What to say where the lattice does not resolve the task's touch_sd or slip_sd at one of these
 /// poses of the sensor; else "".

@@ -229,7 +229,8 @@ SetupFinding clock_finding(const ClockOffset& offset, double given_s) {
   const std::string option = fmt::format("pose-delay {:.2f}", given_s + offset.seconds);
   const double nats = (static_cast<double>(offset.against) - static_cast<double>(offset.left)) *
                       std::log(19.0);  // one press in twenty is against sound clocks
-  return {"clock", nats,
+  return {"clock",
+          nats,
           fmt::format("the poses' clock seems {:.2f} s {}: in {} of {} presses the array moves, is "
                       "lifted, or has no pose; with `{}` in {}",
                       std::abs(offset.seconds), offset.seconds > 0.0 ? "ahead" : "behind",

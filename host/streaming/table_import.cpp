@@ -246,8 +246,8 @@ ImportedRecording import_tables(const ImportOptions& options) {
       rows.poses->time_s = rows.pressures.time_s;
     }
     if (rows.poses->time_s.empty() && options.pose_delay_s != 0.0) {
-      refuse(fmt::format("`pose-delay {}`", options.pose_delay_s),
-             "{} has no times; leave it out", options.poses);
+      refuse(fmt::format("`pose-delay {}`", options.pose_delay_s), "{} has no times; leave it out",
+             options.poses);
     }
     pose_units = rows.poses->units;
   }

@@ -67,8 +67,7 @@ TEST_F(SetupTouches, TellTheOrderInWhichElementsAreRead) {
   const SetupCheck found = check(recordings);
   ASSERT_EQ(found.findings.size(), 1u);
   EXPECT_EQ(found.findings[0].what, "element_order");
-  EXPECT_THAT(found.findings[0].options,
-              ElementsAre("first-element top-right", "order columns"));
+  EXPECT_THAT(found.findings[0].options, ElementsAre("first-element top-right", "order columns"));
   EXPECT_GT(found.findings[0].nats, 200.0);
   for (Recording& recording : recordings) {
     recording.elements_mm = found.elements_mm;
@@ -152,12 +151,11 @@ TEST_F(SetupTouches, TellDeadAndStuckElementsAndTouchesOfAnotherPlace) {
   }
   recordings[1].T_robot_sensor[7].translation_mm += glm::dvec2(9.0, 4.0);
   const SetupCheck found = check(recordings);
-  EXPECT_THAT(
-      found.findings,
-      ElementsAre(
-          Field(&SetupFinding::options, ElementsAre("dead 14")),
-          Field(&SetupFinding::options, ElementsAre("dead 21")),
-          Field(&SetupFinding::words, HasSubstr("E.h5: touches that contradict the others: 7;"))));
+  EXPECT_THAT(found.findings,
+              ElementsAre(Field(&SetupFinding::options, ElementsAre("dead 14")),
+                          Field(&SetupFinding::options, ElementsAre("dead 21")),
+                          Field(&SetupFinding::words,
+                                HasSubstr("E.h5: touches that contradict the others: 7;"))));
 }
 
 TEST_F(SetupTouches, BringWhatTheirLogsShowed) {
