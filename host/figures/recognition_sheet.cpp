@@ -7,14 +7,19 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
 
 #include "figures/figures.hpp"
 #include "figures/footprint.hpp"
 #include "figures/identity_panel.hpp"
+#include "figures/label_places.hpp"
 #include "figures/map_layer.hpp"
+#include "figures/map_outline.hpp"
 #include "model/bounding_box.hpp"
 #include "palpate/error.hpp"
 #include "palpate/pose_error.hpp"
@@ -105,7 +110,9 @@ void draw_captions(Canvas& canvas, const RecognitionSheet& sheet) {
   constexpr double row_px = 28.0;    ///< from caption to caption
   constexpr std::size_t most_captions = 4;
   constexpr double room_px = width_px - 2 * margin_px;
-  const std::string words = canvas.fit(sheet.result, 0.8 * room_px, result);
+  const double title_px =
+      std::min(canvas.text_width(sheet.title, heading), 0.2 * room_px - margin_px);
+  const std::string words = canvas.fit(sheet.result, room_px - title_px - margin_px, result);
   canvas.text(words, {margin_px, first_px}, result);
   const double left_px = room_px - canvas.text_width(words, result) - margin_px;
   canvas.text(canvas.fit(sheet.title, left_px, heading), {width_px - margin_px, first_px}, heading,
@@ -151,15 +158,17 @@ View view_around(const Box& box, const RecognitionSheet& sheet,
   return {.box = box, .lower = part.middle() - half, .upper = part.middle() + half};
 }
 
-/// Draws the ellipses that hold 68 and 95 % of a mode's x and y.
-void draw_ellipses(Canvas& canvas, const View& view, const ObjectPose& pose, const Pen& pen) {
+/// The ellipses that hold 68 and 95 % of a mode's x and y, in pixels.
+std::array<std::vector<glm::dvec2>, 2> ellipses(const View& view, const ObjectPose& pose) {
   const double xx = pose.covariance[0];
   const double xy = pose.covariance[1];
   const double yy = pose.covariance[4];
   const double middle = (xx + yy) / 2.0;
   const double spread = std::hypot((xx - yy) / 2.0, xy);
   const double turn = 0.5 * std::atan2(2.0 * xy, xx - yy);
-  for (const double held : {0.68, 0.95}) {
+  std::array<std::vector<glm::dvec2>, 2> both;
+  for (const bool outer : {false, true}) {
+    const double held = outer ? 0.95 : 0.68;
     const double radius = std::sqrt(-2.0 * std::log(1.0 - held));
     const glm::dvec2 axes =
         radius * glm::dvec2(std::sqrt(middle + spread), std::sqrt(std::max(middle - spread, 0.0)));
@@ -170,23 +179,60 @@ void draw_ellipses(Canvas& canvas, const View& view, const ObjectPose& pose, con
       outline.push_back(pose.T_robot_object.translation_mm +
                         rotate(turn, axes * glm::dvec2(std::cos(angle), std::sin(angle))));
     }
-    canvas.polygon(view.pixels(outline), pen);
+    both[outer ? 1 : 0] = view.pixels(outline);
+  }
+  return both;
+}
+
+void draw_ellipses(Canvas& canvas, const View& view, const ObjectPose& pose, const Pen& pen) {
+  for (const std::vector<glm::dvec2>& ellipse : ellipses(view, pose)) {
+    canvas.polygon(ellipse, pen);
   }
 }
 
-/// Draws the modes, each with its name beside it where it is not the estimate's.
+Box box_around(std::span<const glm::dvec2> points) {
+  const BoundingBox box = bounding_box(points);
+  return {box.lower.x, box.lower.y, box.extent().x, box.extent().y};
+}
+
+/// Draws the modes, each with its name beside it where it is not the estimate's; a thin line leads
+/// to a name that found no place there.
 void draw_modes(Canvas& canvas, const View& view, const RecognitionSheet& sheet) {
+  std::vector<Box> marks;
+  std::vector<PlacedLabel> labels;
+  std::vector<std::string> names;
   for (const RecognitionSheet::Mode& mode : sheet.modes) {
     draw_ellipses(canvas, view, mode.pose, mode.own ? mode_pen : other_pen);
-    const glm::dvec2 at = mode.pose.T_robot_object.translation_mm;
-    if (!mode.own && view.contains(at)) {
-      const glm::dvec2 words = view.pixel(at) + glm::dvec2(14.0, -10.0);
-      const glm::dvec2 right{canvas.text_width(mode.name, small), 0.0};
-      const glm::dvec2 up{0.0, -small.size_px};
-      const std::array ground{words, words + right, words + right + up, words + up};
-      canvas.fill(ground, {1.0, 1.0, 1.0, 0.8});
-      canvas.text(mode.name, words, small, Align::left, other_pen.colour);
+    marks.push_back(box_around(ellipses(view, mode.pose)[1]));
+    if (!mode.own && view.contains(mode.pose.T_robot_object.translation_mm)) {
+      labels.push_back({marks.back(), {canvas.text_width(mode.name, small), small.size_px}});
+      names.push_back(mode.name);
     }
+  }
+  constexpr Pen leader{.colour = other_pen.colour, .width_px = 1.0};
+  constexpr double beside_px = 24.0;  // where the name speaks for itself
+  const std::vector<Box> places = places_of(labels, marks, view.box);
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const Box& place = places[i];
+    const Box& mark = labels[i].mark;
+    const glm::dvec2 centre{mark.left + mark.width / 2.0, mark.top + mark.height / 2.0};
+    const glm::dvec2 end = glm::clamp(centre, glm::dvec2(place.left, place.top),
+                                      glm::dvec2(place.right(), place.bottom()));
+    const glm::dvec2 begin = glm::clamp(end, glm::dvec2(mark.left, mark.top),
+                                        glm::dvec2(mark.right(), mark.bottom()));
+    if (glm::distance(begin, end) > beside_px) {
+      canvas.segment(centre, end, leader);
+    }
+  }
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const Box& place = places[i];
+    const std::array ground{glm::dvec2(place.left, place.top),
+                            glm::dvec2(place.right(), place.top),
+                            glm::dvec2(place.right(), place.bottom()),
+                            glm::dvec2(place.left, place.bottom())};
+    canvas.fill(ground, {1.0, 1.0, 1.0, 0.8});
+    canvas.text(names[i], {place.left, place.bottom() - 3.0}, small, Align::left,
+                other_pen.colour);
   }
 }
 
@@ -195,13 +241,18 @@ void draw_touches(Canvas& canvas, const RecognitionSheet& sheet) {
   for (const std::vector<glm::dvec2>& elements : sheet.footprints_mm) {
     footprints.push_back(footprint(elements, sheet.element_mm));
   }
-  const BoundingBox body = occupied_box(sheet.map);
-  std::vector<glm::dvec2> actual;
+  std::vector<std::vector<glm::dvec2>> actual;  // in the robot frame
+  std::vector<glm::dvec2> corners;
   if (const std::optional<Pose> truth = nearest_truth(sheet)) {
-    const auto corners = placed(body, *truth);
-    actual.assign(corners.begin(), corners.end());
+    const Pose T_robot_object = inverse(*truth);
+    for (std::vector<glm::dvec2> outline : outlines_of(sheet.map)) {
+      std::ranges::transform(outline, outline.begin(),
+                             [&](const glm::dvec2& p) { return T_robot_object * p; });
+      corners.insert(corners.end(), outline.begin(), outline.end());
+      actual.push_back(std::move(outline));
+    }
   }
-  const View view = view_around(plot(0), sheet, footprints, actual);
+  const View view = view_around(plot(0), sheet, footprints, corners);
   const EvidenceScale scale = evidence_scale(std::span(&sheet.map, 1));
   {
     const Canvas::Clip clip(canvas, view.box);
@@ -219,8 +270,8 @@ void draw_touches(Canvas& canvas, const RecognitionSheet& sheet) {
       canvas.polygon(view.pixels(f.outline), touch_pen);
     }
     draw_modes(canvas, view, sheet);
-    if (!actual.empty()) {
-      canvas.polygon(view.pixels(actual), truth_pen);
+    for (const std::vector<glm::dvec2>& outline : actual) {
+      canvas.polygon(view.pixels(outline), truth_pen);
     }
   }
   draw_axes(canvas, view, even_ticks(view.lower.x, view.upper.x, 7),
