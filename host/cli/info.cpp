@@ -13,6 +13,7 @@
 #include "io/file_summary.hpp"
 #include "io/recording_state.hpp"
 #include "io/recording_survey.hpp"
+#include "model/printable.hpp"
 #include "palpate/files.hpp"
 #include "palpate/learned_sensor.hpp"
 
@@ -39,6 +40,13 @@ std::string sensor_model_text(const LearnedSensor& sensor) {
   const auto add = [&](const char* name, const std::string& words) {
     text += fmt::format("  {:<17} {}\n", name, words);
   };
+  if (!sensor.maps.empty()) {
+    std::vector<std::string> files;
+    for (const auto& [file, digest] : sensor.maps) {
+      files.push_back(printable(file));
+    }
+    add("learned for", fmt::format("{}", fmt::join(files, ", ")));
+  }
   add("pressures", sensor.pressure_unit == "kPa" ? "kPa" : "raw");
   add("noise", fmt::format("{:.4g}{}", sensor.noise, unit));
   add("threshold", fmt::format("{:.4g}{}, ratio {:.4g}", sensor.classifier.threshold, unit,
@@ -72,6 +80,11 @@ std::string sensor_model_text(const LearnedSensor& sensor) {
   if (sensor.fit_scale) {
     add("fit scale", fmt::format("z of learned objects {:.4g} +- {:.4g}", sensor.fit_scale->mean,
                                  sensor.fit_scale->sd));
+  }
+  if (sensor.pose_scale) {
+    add("pose scale",
+        fmt::format("covariances times {:.4g}, and {:.4g} mm of the map along each axis",
+                    sensor.pose_scale->factor, sensor.pose_scale->map_sd_mm));
   }
   return text;
 }

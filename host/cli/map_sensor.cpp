@@ -1,6 +1,7 @@
 #include "cli/map_sensor.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 
 #include <fmt/format.h>
@@ -79,20 +80,38 @@ void require_enough(const std::vector<Press>& touches, std::size_t least) {
   }
 }
 
+/// "0.158 +-0.031 less, beyond chance"
+std::string words_of(const LossDifference& less, const std::string& amount) {
+  const LossDifference more{-less.mean, less.standard_error};
+  return fmt::format("{} {}, {} chance", amount, less.mean < 0.0 ? "more" : "less",
+                     less.is_clear() || more.is_clear() ? "beyond" : "within");
+}
+
 std::string words_of(const SensorGain& gain, const std::string& file, std::size_t touches) {
-  std::string scores =
-      fmt::format("touches that are left out have a log-loss of {:.3f} nats, {:.3f} by Eq. 7",
-                  gain.log_loss, gain.log_loss_before);
+  std::string scores = fmt::format(
+      "touches that are left out have a log-loss of {:.3f} nats, {:.3f} by Eq. 7 ({})",
+      gain.log_loss, gain.log_loss_before,
+      words_of(gain.less_loss, fmt::format("{:.3f} +-{:.2g}", std::abs(gain.less_loss.mean),
+                                           gain.less_loss.standard_error)));
   if (gain.error_mm) {
-    scores += fmt::format(", and {} of them together a pose error of {:.2f} mm, {:.2f} by Eq. 7",
-                          presses_in_group, *gain.error_mm, gain.error_mm_before.value());
+    const double share = *gain.error_mm / gain.error_mm_before.value();
+    scores += fmt::format(
+        ", and {} of them together a pose error of {:.2f} mm, {:.2f} by Eq. 7 ({})",
+        presses_in_group, *gain.error_mm, *gain.error_mm_before,
+        words_of(gain.less_error,
+                 fmt::format("{:.0f} +-{:.0f} %", 100.0 * std::abs(1.0 - share),
+                             100.0 * share * gain.less_error.standard_error)));
   }
-  return gain.better ? fmt::format(
-                           "{}: learned from {} touches: {}\n"
-                           "{}: recognition with this folder takes it, unless --sensor-model none "
-                           "is given",
-                           file, touches, scores, file)
-                     : "no sensor model, as none is better beyond chance: " + scores;
+  if (!gain.better) {
+    return fmt::format("no sensor model, as {}: {}",
+                       gain.gains ? "it gains on the one and loses on the other"
+                                  : "it is not better beyond chance, two standard errors",
+                       scores);
+  }
+  return fmt::format(
+      "{}: learned from {} touches: {}\n"
+      "{}: recognition with this folder takes it, unless --sensor-model none is given",
+      file, touches, scores, file);
 }
 
 /// What touches say of the sensor. Throws Error where they do not tell whether it is better.
@@ -124,15 +143,16 @@ MapSensor or_why_not(const Learn& learn) {
   }
 }
 
-/// Whether the folder's sensor model is one that `palpate map` wrote.
-bool is_own(const std::filesystem::path& file) {
+/// Whether `palpate map` wrote a sensor model, and whether recognition can read it.
+enum class Origin { own, foreign, unreadable };
+Origin origin_of(const std::filesystem::path& file) {
   try {
-    return !read_sensor_model(file).maps.empty();
+    return read_sensor_model(file).maps.empty() ? Origin::foreign : Origin::own;
   } catch (const Error& error) {
     if (error.fault() != Fault::input) {
       throw;
     }
-    return false;
+    return Origin::unreadable;
   }
 }
 
@@ -143,18 +163,33 @@ std::filesystem::path sensor_file(const MapFlags& flags) {
 }
 
 bool learns_sensor(const MapFlags& flags) {
-  if (!flags.to_folder() || !flags.sensor_model.empty()) {
+  if (!flags.to_folder()) {
     return false;
   }
+  const bool asked = flags.sensor_model.empty();
   const std::filesystem::path file = sensor_file(flags);
   std::error_code ignored;
-  if (std::filesystem::exists(file, ignored) && !is_own(file)) {
-    fmt::print(stderr,
-               "palpate: {}: was not written by palpate map, and stays; no sensor is learned\n",
-               file.string());
-    return false;
+  if (!std::filesystem::exists(file, ignored)) {
+    return asked;
   }
-  return true;
+  const Origin origin = origin_of(file);
+  if (origin == Origin::own && !asked) {
+    tell_on_stderr(fmt::format(
+        "{}: stays, and was learned for earlier maps: recognition leaves it out with others; "
+        "remove it, or build the maps without --sensor-model",
+        file.string()));
+  } else if (origin == Origin::foreign && asked) {
+    tell_on_stderr(fmt::format(
+        "{}: was not written by palpate map, and stays; no sensor is learned, and recognition "
+        "takes it by --sensor-model only",
+        file.string()));
+  } else if (origin == Origin::unreadable) {
+    tell_on_stderr(fmt::format(
+        "{}: was not written by palpate map, and stays; {}it is no sensor model, and recognition "
+        "with maps of this folder refuses it until it is mended or moved",
+        file.string(), asked ? "no sensor is learned; " : ""));
+  }
+  return asked && origin == Origin::own;
 }
 
 std::vector<std::filesystem::path> other_maps(const MapFlags& flags,

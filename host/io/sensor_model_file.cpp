@@ -251,6 +251,14 @@ class KeyWriter {
 
 LearnedSensor read_sensor_model(const std::filesystem::path& path) {
   require_readable(path);
+  constexpr std::string_view hdf5 = "\x89HDF";
+  std::string start(hdf5.size(), '\0');
+  std::ifstream(path, std::ios::binary).read(start.data(), std::ssize(start));
+  if (start == hdf5) {
+    refuse(path,
+           "is a recording or another HDF5 file, and no sensor model; give the YAML file that "
+           "palpate calibrate or palpate map wrote");
+  }
   LearnedSensor sensor;
   bool has_format = false;
   read_document(std::ifstream(path), path, "the sensor model", [&](const Entry& root) {

@@ -43,20 +43,23 @@ SensorGain gain_of(const CrossValidation& eq7, const CrossValidation& table,
   const std::vector<double> losses = losses_of(after);
   const std::vector<double> errors_before = log_errors_of(eq7);
   const std::vector<double> errors = log_errors_of(table);
-  SensorGain gain{.log_loss_before = mean_of(losses_before), .log_loss = mean_of(losses)};
-  bool gains = is_clearly_less(losses, losses_before);
+  SensorGain gain{.log_loss_before = mean_of(losses_before),
+                  .log_loss = mean_of(losses),
+                  .less_loss = difference_of(losses, losses_before)};
+  gain.gains = gain.less_loss.is_clear();
   constexpr double small_nats = 0.02;
   bool costs =
       is_clearly_less(losses_before, losses) && gain.log_loss > gain.log_loss_before + small_nats;
   if (!errors.empty()) {
     gain.error_mm_before = std::exp(mean_of(errors_before));
     gain.error_mm = std::exp(mean_of(errors));
-    gains = gains || is_clearly_less(errors, errors_before);
+    gain.less_error = difference_of(errors, errors_before);
+    gain.gains = gain.gains || gain.less_error.is_clear();
     constexpr double small_share = 0.1;
     costs = costs || (is_clearly_less(errors_before, errors) &&
                       *gain.error_mm > (1.0 + small_share) * *gain.error_mm_before);
   }
-  gain.better = gains && !costs;
+  gain.better = gain.gains && !costs;
   return gain;
 }
 

@@ -291,7 +291,12 @@ TemperedPresses tempered_by_folds(std::span<const ScoredPress> presses, const Gr
   return tempered;
 }
 
-bool is_clearly_less(std::span<const double> losses, std::span<const double> others) {
+bool LossDifference::is_clear() const {
+  constexpr double rounding = 1e-9;
+  return mean > std::max(rounding, 2.0 * standard_error);
+}
+
+LossDifference difference_of(std::span<const double> losses, std::span<const double> others) {
   const auto n = static_cast<double>(losses.size());
   double mean = 0.0;
   for (std::size_t i = 0; i < losses.size(); ++i) {
@@ -302,8 +307,11 @@ bool is_clearly_less(std::span<const double> losses, std::span<const double> oth
     const double apart = others[i] - losses[i] - mean;
     variance += apart * apart / std::max(1.0, n - 1.0);
   }
-  constexpr double rounding = 1e-9;
-  return mean > std::max(rounding, 2.0 * std::sqrt(variance / n));
+  return {mean, std::sqrt(variance / n)};
+}
+
+bool is_clearly_less(std::span<const double> losses, std::span<const double> others) {
+  return difference_of(losses, others).is_clear();
 }
 
 }  // namespace palpate

@@ -81,8 +81,15 @@ struct TemperedPresses {
 TemperedPresses tempered_by_folds(std::span<const ScoredPress> presses,
                                   const GroupHalves& groups = {});
 
-/// Whether one of two models has less loss on the same presses beyond chance: by more than two
-/// standard errors of the differences.
+/// By how much more the second of two models loses on the same presses.
+struct LossDifference {
+  double mean = 0.0;
+  double standard_error = 0.0;
+  /// Whether the first loses less beyond chance: by more than two standard errors.
+  bool is_clear() const;
+};
+LossDifference difference_of(std::span<const double> losses, std::span<const double> others);
+/// LossDifference::is_clear()
 bool is_clearly_less(std::span<const double> losses, std::span<const double> others);
 
 }  // namespace palpate

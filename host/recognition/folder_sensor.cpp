@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <set>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -42,22 +44,33 @@ std::optional<std::filesystem::path> sensor_beside(const std::filesystem::path& 
 
 std::optional<SensorFromFile> folder_sensor(std::span<const Hypothesis> hypotheses,
                                             std::vector<std::string>& remarks) {
-  std::optional<std::filesystem::path> file;
+  std::optional<SensorFromFile> known;
+  std::set<std::filesystem::path> seen;
   for (const Hypothesis& hypothesis : hypotheses) {
     const auto beside =
         hypothesis.map.file.empty() ? std::nullopt : sensor_beside(hypothesis.map.file);
-    if (file && beside && *beside != *file && hash_of_file(*beside) != hash_of_file(*file)) {
+    if (!beside || !seen.insert(*beside).second) {
+      continue;
+    }
+    LearnedSensor sensor = read_sensor_model(*beside);
+    if (sensor.maps.empty()) {
+      remarks.push_back(
+          fmt::format("{} does not say which maps it is for, and is left out; give "
+                      "`sensor-model {}` to take it",
+                      beside->string(), beside->string()));
+    } else if (!known) {
+      known = {beside->string(), std::move(sensor)};
+    } else if (hash_of_file(*beside) != hash_of_file(known->file)) {
       refuse(*beside,
              "differs from {}: each is for the maps of its own folder; give `sensor-model` with "
              "one of them, or `sensor-model none`",
-             file->string());
+             known->file);
     }
-    file = file ? file : beside;
   }
-  if (!file) {
+  if (!known) {
     return {};
   }
-  SensorFromFile found{file->string(), read_sensor_model(*file)};
+  const SensorFromFile& found = *known;
   const auto knows = [&](const Hypothesis& hypothesis) {
     return std::ranges::any_of(
         found.sensor.maps,
@@ -65,16 +78,15 @@ std::optional<SensorFromFile> folder_sensor(std::span<const Hypothesis> hypothes
   };
   const auto stranger = std::ranges::find_if_not(hypotheses, knows);
   if (stranger == hypotheses.end()) {
-    return found;
+    return known;
   }
-  remarks.push_back(
-      found.sensor.maps.empty()
-          ? fmt::format("{} does not say which maps it is for, and is left out; give "
-                        "`sensor-model {}` to take it",
-                        found.file, found.file)
-          : fmt::format("{} was not learned for {}, and is left out; build the folder's maps anew "
-                        "with palpate map, or give `sensor-model`",
-                        found.file, name_of(stranger->map)));
+  const std::filesystem::path folder = std::filesystem::path(found.file).parent_path();
+  const bool of_folder = std::filesystem::path(stranger->map.file).parent_path() == folder;
+  remarks.push_back(fmt::format(
+      "{} was not learned for {}, and is left out; build {} with palpate map, or give "
+      "`sensor-model`",
+      found.file, name_of(stranger->map),
+      of_folder ? "the folder's maps anew" : "the maps of both anew in one folder"));
   return {};
 }
 

@@ -39,6 +39,8 @@ class MapSensor : public ProgramTest {
 TEST_F(MapSensor, IsWrittenWithTheMapsAndTakenWithThem) {
   const std::string out = done({"map", "A.h5", "U.h5", "-o", "maps/"});
   EXPECT_NE(out.find("maps/sensor.yaml: learned from 60 touches: "), std::string::npos) << out;
+  EXPECT_NE(out.find(" +-"), std::string::npos) << "standard errors of the differences\n" << out;
+  EXPECT_NE(out.find(", beyond chance)"), std::string::npos) << out;
   const LearnedSensor learned = read_sensor_model(sensor("maps"));
   EXPECT_EQ(learned.maps.size(), 2u);
   EXPECT_TRUE(learned.table);
@@ -99,6 +101,18 @@ TEST_F(MapSensor, IsLeftOutWhereItDoesNotGoWithWhatIsAsked) {
   EXPECT_EQ(unlike.status, 2);
   EXPECT_NE(unlike.err.find("other/sensor.yaml: differs from maps/sensor.yaml"), std::string::npos)
       << unlike.err;
+
+  // One that is another's is no reason to refuse the maps.
+  another.maps.clear();
+  write_sensor_model(sensor("other"), another);
+  const std::string said = said_without({"maps/A.map.h5", "other/U.map.h5", "single.map.h5"});
+  EXPECT_NE(said.find("other/sensor.yaml does not say which maps it is for, and is left out"),
+            std::string::npos)
+      << said;
+  EXPECT_NE(said.find("maps/sensor.yaml was not learned for single.map.h5, and is left out; build "
+                      "the maps of both anew in one folder"),
+            std::string::npos)
+      << said;
 }
 
 TEST_F(MapSensor, IsLearnedAnewFromTheTouchesOfTheOtherMaps) {
@@ -117,6 +131,16 @@ TEST_F(MapSensor, IsLearnedAnewFromTheTouchesOfTheOtherMaps) {
   EXPECT_FALSE(std::filesystem::exists(sensor("maps")));
 }
 
+TEST_F(MapSensor, OfEarlierMapsIsSaidToStay) {
+  done({"map", "A.h5", "U.h5", "-o", "maps/"});
+  const Outcome outcome = palpate({"map", "A.h5", "-o", "maps/", "--sensor-model", "none"});
+  EXPECT_EQ(outcome.status, 0);
+  EXPECT_NE(outcome.err.find("maps/sensor.yaml: stays, and was learned for earlier maps"),
+            std::string::npos)
+      << outcome.err;
+  EXPECT_TRUE(std::filesystem::exists(sensor("maps")));
+}
+
 TEST_F(MapSensor, OfAnotherHandStays) {
   std::filesystem::create_directory(folder_ / "maps");
   for (const std::string& text :
@@ -126,6 +150,11 @@ TEST_F(MapSensor, OfAnotherHandStays) {
     EXPECT_EQ(outcome.status, 0);
     EXPECT_NE(outcome.err.find("maps/sensor.yaml: was not written by palpate map, and stays"),
               std::string::npos)
+        << outcome.err;
+    const Outcome recognised = palpate({"recognize", "u.h5", "--maps", "maps", "--touches=1"});
+    EXPECT_EQ(recognised.status, text == "x" ? 2 : 0) << recognised.err;
+    EXPECT_EQ(outcome.err.find("refuses it until it is mended or moved") != std::string::npos,
+              text == "x")
         << outcome.err;
     EXPECT_EQ(bytes_of(sensor("maps")), text);
   }

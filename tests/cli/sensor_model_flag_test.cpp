@@ -149,6 +149,8 @@ TEST_F(SensorModelFlag, SaysWhereBinsAreWiderThanItsOwn) {
 
 TEST_F(SensorModelFlag, IsRefusedInOneLine) {
   expect_refused(with({"--sensor-model", "no.yaml"}), {"no.yaml", "no such file"});
+  expect_refused(with({"--sensor-model", "u.h5"}),
+                 {"u.h5", "is a recording or another HDF5 file, and no sensor model"});
   write({.pressure_unit = "raw"});
   expect_refused(with({"--sensor-model", "s.yaml"}), {"s.yaml", "pressure_unit = raw", "kPa"});
   write({.table = table_of_equation_7()});

@@ -36,14 +36,19 @@ SensorGain gain(const CrossValidation& eq7, const CrossValidation& table) {
 TEST(SensorGain, IsBetterWhereTouchesAreToldApartAndPlacedNearer) {
   const auto found = gain(validation(about(0.9), about(0.3)), validation(about(0.7), about(0.2)));
   EXPECT_TRUE(found.better);
+  EXPECT_NEAR(found.less_loss.mean, found.log_loss_before - found.log_loss, 1e-9);
+  EXPECT_GT(found.less_loss.standard_error, 0.0);
+  EXPECT_LT(2.0 * found.less_loss.standard_error, found.less_loss.mean);
+  EXPECT_NEAR(found.less_error.mean, std::log(1.5), 1e-9);
   EXPECT_NEAR(found.log_loss_before / found.log_loss, 9.0 / 7.0, 1e-9);
   EXPECT_NEAR(*found.error_mm_before / *found.error_mm, 1.5, 1e-9);
 }
 
 TEST(SensorGain, IsNotBetterWhereNothingOrTheOneIsGainedForTheOther) {
   const CrossValidation eq7 = validation(about(0.9), about(0.3));
-  EXPECT_FALSE(gain(eq7, eq7).better);
+  EXPECT_FALSE(gain(eq7, eq7).gains);
   EXPECT_FALSE(gain(eq7, validation(about(0.7), about(0.4))).better) << "places";
+  EXPECT_TRUE(gain(eq7, validation(about(0.7), about(0.4))).gains);
   EXPECT_FALSE(gain(eq7, validation(about(1.0), about(0.2))).better) << "identities";
   EXPECT_TRUE(gain(eq7, validation(about(0.91), about(0.2))).better) << "hardly a loss";
 }
