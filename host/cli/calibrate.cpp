@@ -207,8 +207,8 @@ void add_calibrate(CLI::App& app) {
   add_text_flag(*command, "--frames", options->recognition.frames,
                 "Use the touches A to B - 1 of every recording, counted from 0, as A:B");
   command->add_option("--write-array", options->write_array,
-                      "File for the array (CSV: x, y in mm), where drawn maps say that it sits in "
-                      "the tool, for --array of palpate import");
+                      "File for the array, CSV of x and y in mm, where drawn maps say that it sits "
+                      "in the tool, for --array of palpate import");
   command->add_option("--png", options->png,
                       "Folder for pictures: table.png, what elements read, and reliability.png, "
                       "accuracy over confidence before and after");

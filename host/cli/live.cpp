@@ -123,7 +123,8 @@ void live(const LiveArguments& options) {
                                                  .reach_mm = array_reach_mm(elements_mm),
                                                  .device = std::ref(device_in_waiting)});
   if (goal && !traits_of(task.filter).bins) {
-    refuse_flag("--plan", options.plan, "{}; use --filter histogram, or leave it out", plan_needs);
+    refuse_flag("--plan", options.plan,
+                "{}; use --filter bounded or --filter histogram, or leave it out", plan_needs);
   }
   CommandFiles files;
   add_sensor_files(options, files);

@@ -94,9 +94,10 @@ void add_map_flags(CLI::App& command, MapFlags& flags) {
   add_text_flag(command, "--frames", flags.frames,
                 "Use the touches A to B - 1 of every recording, counted from 0, as A:B");
   command.add_option("--symmetry", flags.symmetry,
-                     "n-fold rotational symmetry, 1: none, 0: any rotation; of all objects, or of "
-                     "some, such as nut=6,key=1 [default: 1; where the map looks the same after "
-                     "turns, recognition takes them as equal once touches cannot tell them apart]");
+                     "n-fold rotational symmetry, where 1 is none and 0 any rotation; of all "
+                     "objects, or of some, such as nut=6,key=1. Where the map looks the same after "
+                     "turns, recognition takes them as equal once touches cannot tell them apart "
+                     "[default: 1]");
   command.add_option(
       "--origin", flags.origin,
       "Where the object's frame lies in the robot frame of the touches: robot, at "

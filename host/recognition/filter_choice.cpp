@@ -140,14 +140,14 @@ ParticleOptions asked_particles(const Request& request, const HistogramOptions& 
   for (const AskedSd& sd : {touch_mm(request), touch_deg(request)}) {
     if (sd.value) {
       refuse_given(request, sd.option,
-                   "particles take every touch's pose to be exact; use `filter histogram`, or "
-                   "`slip-sd-mm` and `slip-sd-deg`, their motion noise");
+                   "particles take every touch's pose to be exact; use `filter bounded` or "
+                   "`filter histogram`, or `slip-sd-mm` and `slip-sd-deg`, their motion noise");
     }
   }
   if (request.none && none_weight(request, {})) {
     refuse_given(request, "none",
-                 "particles have no mean over all poses, which (none) needs; use `filter "
-                 "histogram`");
+                 "particles have no mean over all poses, which (none) needs; use `filter bounded` "
+                 "or `filter histogram`");
   }
   set_displacement(slip_mm(request), slip_deg(request), particles.motion_mm, particles.motion_rad);
   return particles;

@@ -260,7 +260,8 @@ PlanRequest plan_request(const std::string& goal, const std::string& candidates,
 
 void require_plannable(const RecognitionTask& task) {
   if (!traits_of(task.filter).bins) {
-    refuse_option("filter", "particles", "{}; use `filter histogram`, or leave it out", plan_needs);
+    refuse_option("filter", "particles",
+                  "{}; use `filter bounded` or `filter histogram`, or leave it out", plan_needs);
   }
 }
 

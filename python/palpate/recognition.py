@@ -165,6 +165,8 @@ def recognize(
 
 def request_of(options: Mapping[str, object], maps: object = ()) -> _palpate.Request:
     """The options and maps of recognize() as a request; None leaves the default."""
+    if options.get("none") is True:  # as --none without a number
+        options = {**options, "none": "auto"}
     return filled(_palpate.Request(maps), recognize, options)
 
 

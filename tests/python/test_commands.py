@@ -88,6 +88,12 @@ def test_what_is_recognised_can_be_evaluated(files: Files) -> None:
     assert given.error_mm == (records[0].error_mm, 1)
 
 
+def test_none_that_is_true_has_the_weight_of_the_flag_without_a_number(files: Files) -> None:
+    [flag] = palpate.recognize(files.unknown, files.maps, none=True, bins=(10, 10, 8))
+    [auto] = palpate.recognize(files.unknown, files.maps, none="auto", bins=(10, 10, 8))
+    assert flag.identity == auto.identity
+
+
 def test_what_is_no_record_with_a_truth_is_refused(tmp_path: pathlib.Path) -> None:
     (tmp_path / "r.json").write_text(json.dumps(RECORDS[6:7]))
     expect_refused(lambda: palpate.evaluate(tmp_path / "r.json"), "evaluate", tmp_path / "r.json")
