@@ -89,12 +89,15 @@ nlohmann::ordered_json plan_json(const Plan& plan, const RecognitionTask& task,
   return json;
 }
 
-/// What is believed, the ten best candidates, what is wrong with the touches, and the best one.
+/// Whether to act, what is believed, the ten best candidates, what is wrong with the touches, and
+/// the best one.
 /// @param columns see TextTable::text()
 std::string plan_text(const Plan& plan, const RecognitionTask& task, std::optional<int> columns) {
   const std::string limit = in_flags(limit_words(plan));
+  const std::string decision = decision_words(plan.record.last());
   return fmt::format(
-      "{}\n{}\n\n{}{}{}\n{}, {} in {:.0f} ms\n", result_words(plan.record.last(), task),
+      "{}{}\n{}\n\n{}{}{}\n{}, {} in {:.0f} ms\n", decision.empty() ? "" : decision + "\n",
+      result_words(plan.record.last(), task),
       believed_words(plan), table_of(plan, columns), complaints({plan.record}, task),
       limit.empty() ? "" : limit + "\n", next_touch_words(plan.ranked.front(), plan.goal),
       count_of(plan.ranked.size(), "candidate", "candidates"), 1e3 * plan.seconds);

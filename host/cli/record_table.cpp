@@ -54,9 +54,15 @@ std::string confusions(const std::vector<RecognitionRecord>& records, const Reco
   return text;
 }
 
+/// Of more unknowns a line each would hide the table, where a column says on which to act.
+constexpr std::size_t few_decided = 3;
+
+bool is_decided(const RecognitionRecord& record) {
+  return !record.last().decision.because.empty();
+}
+
 /// Whether to act on each of a few unknowns, or on how many of more.
 std::string decisions(const std::vector<RecognitionRecord>& records) {
-  constexpr std::size_t few = 3;
   std::string text;
   std::size_t decided = 0;
   std::size_t acts = 0;
@@ -67,7 +73,20 @@ std::string decisions(const std::vector<RecognitionRecord>& records) {
       acts += record.last().decision.act ? 1 : 0;
     }
   }
-  return decided > few ? fmt::format("act on {} of {} unknowns\n", acts, decided) : text;
+  return decided > few_decided ? fmt::format("act on {} of {} unknowns\n", acts, decided) : text;
+}
+
+/// The best label, and "mirrored" where the pose is of its other side.
+std::string best_words(const RecognitionStep& step, const RecognitionTask& task) {
+  const std::string& best = task.labels[step.best];
+  const bool posed = best == task.labels[task.label_of[step.mode.object]];
+  return printable(posed ? mode_words(step.mode.object, task) : best);
+}
+
+/// The probability of "(none)" where another label is the best; 0 where it is not among the labels.
+double none_probability(const RecognitionStep& step, const RecognitionTask& task) {
+  const bool other = task.labels.back() == none_label && step.best + 1 != task.labels.size();
+  return other ? step.identity.back() : 0.0;
 }
 
 /// Every warning once, after the names of the unknowns that it is of.
@@ -153,23 +172,24 @@ std::string name_of(const RecognitionRecord& record) {
 std::string trace_table(const RecognitionRecord& record, const RecognitionTask& task,
                         std::optional<int> columns) {
   TextTable table({{"  touch", true},
-                   {"best", false, true},
+                   {"best"},
                    {"prob.", true},
-                   {"dropped", true},
-                   {"x mm", true},
-                   {"y mm", true},
-                   {"theta deg", true},
-                   {"error mm", true},
-                   {"effective particles", true},
-                   {"surprise", true},
-                   {"fit"}});
+                   {"dropped", true, false, 2},
+                   {"at pose", true},
+                   {"x mm", true, false, 4},
+                   {"y mm", true, false, 4},
+                   {"theta deg", true, false, 4},
+                   {"error mm", true, false, 3},
+                   {"effective particles", true, false, 1},
+                   {"surprise", true, false, 1},
+                   {"fit", false, false, 1}});
   for (std::size_t i = 0; i < record.trace.size(); ++i) {
     const RecognitionStep& step = record.trace[i];
     const std::array<std::string, 3> pose = pose_cells(pose_text(step));
     const auto& particles = step.effective_sample_size;
     table.add({fmt::format("{}", i + 1), object_words(step, task),
-               fmt::format("{:.3f}", step.confidence()), dropped_text(step), pose[0], pose[1],
-               pose[2], step.right ? error_text(step.pose_error_mm()) : "",
+               fmt::format("{:.3f}", step.confidence()), dropped_text(step), share_text(step, task),
+               pose[0], pose[1], pose[2], step.right ? error_text(step.pose_error_mm()) : "",
                particles ? fmt::format("{:.1f}", *particles) : "", surprise_text(step),
                fit_words(step)});
   }
@@ -209,36 +229,56 @@ std::string result_table(const std::vector<RecognitionRecord>& records, const Re
       records, [](const RecognitionRecord& record) { return !fit_words(record.last()).empty(); });
   const bool with_error = std::ranges::any_of(
       records, [](const RecognitionRecord& record) { return record.last().right.has_value(); });
-  // A narrower terminal has no room for the column; complaints() tell what matters of it.
+  const bool with_act = std::ranges::count_if(records, is_decided) > std::ptrdiff_t{few_decided};
+  // A narrower terminal has no room for the column where nothing matters of it.
   constexpr int with_room = 90;
-  const bool with_dropped = !columns || *columns >= with_room;
+  const auto dropped = [&](const RecognitionStep& step) {
+    return !columns || *columns >= with_room || !unproven_sentence(step, task).empty()
+               ? dropped_text(step)
+               : "";
+  };
   TextTable table({{"recording", false, true},
                    {"touches", true},
-                   {"best", false, true},
+                   {"act"},
+                   {"best"},
                    {"prob.", true},
-                   {"dropped", true},
-                   {"x mm", true},
-                   {"y mm", true},
-                   {"theta deg", true},
+                   {"dropped", true, false, 2},
+                   {"x mm", true, false, 3},
+                   {"y mm", true, false, 3},
+                   {"theta deg", true, false, 3},
                    {fmt::format("{}{}{}", with_fit ? "fit" : "", with_fit && with_error ? ", " : "",
-                                with_error ? "error" : "")}});
+                                with_error ? "error" : ""),
+                    false, false, 1}});
   const auto add_pose = [&](const char* what, const std::string& label, const Pose& T_robot_object,
                             std::optional<double> error_mm) {
     const PoseText pose = pose_text(T_robot_object);
-    table.add({what, "", label, "", "", pose.value[0], pose.value[1], pose.value[2],
+    table.add({what, "", "", label, "", "", pose.value[0], pose.value[1], pose.value[2],
                error_mm ? fmt::format("{:.2f} mm off", *error_mm) : ""});
   };
   for (const RecognitionRecord& record : records) {
     const RecognitionStep& step = record.last();
     const std::array<std::string, 3> pose = pose_cells(pose_text(step));
-    table.add({name_of(record), fmt::format("{}", record.touches), object_words(step, task),
-               fmt::format("{:.3f}", step.confidence()), with_dropped ? dropped_text(step) : "",
-               pose[0], pose[1], pose[2], fit_words(step)});
+    const std::string act = !with_act ? "" : step.decision.act ? "act" : "-";
+    const std::string share = share_text(step, task);
+    std::vector<std::string> row{name_of(record),        fmt::format("{}", record.touches), act,
+                                 best_words(step, task), fmt::format("{:.3f}", step.confidence()),
+                                 dropped(step)};
+    if (!share.empty()) {  // the pose has not the probability of the best label
+      row.insert(row.end(), 4, "");
+      table.add(row);
+      row = {"  pose", "", "", mode_words(step.mode.object, task), share, ""};
+    }
+    row.insert(row.end(), {pose[0], pose[1], pose[2], fit_words(step)});
+    table.add(row);
     for (const BeliefMode& mode : other_modes(step)) {
       const std::array<std::string, 3> there =
           pose_cells(pose_text(mode.pose.T_robot_object, mode.pose.sd()));
-      table.add({"  or", "", printable(mode_words(mode.object, task)),
+      table.add({"  or", "", "", printable(mode_words(mode.object, task)),
                  fmt::format("{:.3f}", mode.probability), "", there[0], there[1], there[2], ""});
+    }
+    if (const double none = none_probability(step, task); none >= 0.01) {
+      table.add({"  or", "", "", std::string(none_label), fmt::format("{:.3f}", none), "", "", "",
+                 "", ""});
     }
     if (step.refined) {
       add_pose("  mode", mode_words(step.mode.object, task), step.mode_T_robot_object(),
@@ -247,7 +287,7 @@ std::string result_table(const std::vector<RecognitionRecord>& records, const Re
     if (const std::optional<Pose> truth = step.true_T_robot_object()) {
       add_pose("  truth", step.truth.label, *truth, step.pose_error_mm());
     } else if (step.right == false) {
-      table.add({"  truth", "", step.truth.label, "", "", "", "", "", "wrong object"});
+      table.add({"  truth", "", "", step.truth.label, "", "", "", "", "", "wrong object"});
     }
   }
   return decisions(records) + table.text(columns) + complaints(records, task) +

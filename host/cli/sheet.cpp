@@ -96,7 +96,7 @@ RecognitionSheet sheet_of(const RecognitionRecord& record, const Unknown& unknow
   RecognitionSheet sheet;
   sheet.title = name_of(record);
   // A long label must leave the pose its room.
-  constexpr std::size_t longest_identity = 32;
+  constexpr std::size_t longest_identity = 48;
   const bool decided = !last.decision.because.empty();
   sheet.result = std::string(!decided            ? ""
                              : last.decision.act ? "Act: "

@@ -41,7 +41,7 @@ PoseText pose_text(const Pose& T_robot_object, const std::optional<std::array<do
 }
 
 PoseText pose_text(const RecognitionStep& step) {
-  return pose_text(step.T_robot_object(), step.sd());
+  return pose_text(step.T_robot_object(), step.places.peak ? step.sd() : std::nullopt);
 }
 
 std::array<std::string, 3> pose_cells(const PoseText& pose) {
@@ -75,8 +75,23 @@ std::string identity_words(const RecognitionStep& step, const RecognitionTask& t
   // "(none)" itself says that the touches are unlike the object.
   const bool unlike = step.fit && step.fit->verdict == Verdict::does_not_fit &&
                       task.labels[step.best] != none_label;
-  return fmt::format("{}{} ({:.1f} %)", unlike ? "unlike " : "", object_words(step, task),
-                     100.0 * step.confidence());
+  const std::string& best = task.labels[step.best];
+  const std::string object = printable(mode_words(step.mode.object, task));
+  const std::optional<double> share = share_at_pose(step, task);
+  const std::string there = share ? fmt::format("{:.1f} % there", 100.0 * *share) : "";
+  return best == posed_label(step, task)
+             ? fmt::format("{}{} ({:.1f} %{})", unlike ? "unlike " : "", object,
+                           100.0 * step.confidence(), share ? ", " + there : "")
+             : fmt::format("{}{} ({:.1f} %), pose of {}{}", unlike ? "unlike " : "",
+                           printable(best), 100.0 * step.confidence(), object,
+                           share ? " (" + there + ")" : "");
+}
+
+std::optional<double> share_at_pose(const RecognitionStep& step, const RecognitionTask& task) {
+  constexpr double nearly_all = 0.95;
+  const bool there = task.labels[step.best] == posed_label(step, task) &&
+                     step.places.share >= nearly_all * step.confidence();
+  return there ? std::nullopt : std::optional(step.places.share);
 }
 
 std::string decision_words(const RecognitionStep& step) {
@@ -177,21 +192,33 @@ std::string unproven_sentence(const RecognitionStep& step, const RecognitionTask
   }
   const double unproven = 100.0 * step.certificate->dropped_mass;
   constexpr double poor_fits = 0.01;  // rounding leaves less
+  const std::string left = fmt::format(
+      "{} left {} unproven",
+      traits.budget_s ? fmt::format("the budget of {:g} ms", 1e3 * *traits.budget_s)
+      : task.contact().table && unproven >= poor_fits
+          ? "the search, which met nothing but poor fits,"
+          : "rounding",
+      proven             ? "the probability of (none)"
+      : unproven >= 9.95 ? fmt::format("{:.0f} % of the belief", unproven)
+                         : fmt::format("{:.2g} % of the belief", unproven));
+  const std::string best = printable(task.labels[step.best]);
   // Bounds round outwards.
-  return fmt::format("{} {:.1f} % (at least {:.1f} %, at most {:.1f} %): {} left {} unproven",
-                     object_words(step, task), 100.0 * step.confidence(),
-                     std::floor(1000.0 * low) / 10.0, std::ceil(1000.0 * high) / 10.0,
-                     traits.budget_s ? fmt::format("the budget of {:g} ms", 1e3 * *traits.budget_s)
-                     : task.contact().table && unproven >= poor_fits
-                         ? "the search, which met nothing but poor fits,"
-                         : "rounding",
-                     proven             ? "the probability of (none)"
-                     : unproven >= 9.95 ? fmt::format("{:.0f} % of the belief", unproven)
-                                        : fmt::format("{:.2g} % of the belief", unproven));
+  const double least = std::floor(1000.0 * low) / 10.0;
+  const double most = std::ceil(1000.0 * high) / 10.0;
+  return least == most
+             ? fmt::format("{}; {} has {:.1f} % all the same", left, best, least)
+             : fmt::format("{} {:.1f} % (at least {:.1f} %, at most {:.1f} %): {}", best,
+                           100.0 * step.confidence(), least, most, left);
 }
 
 std::string surprise_text(const RecognitionStep& step) {
   return step.surprise ? fmt::format("{:+.1f}", *step.surprise) : "";
+}
+
+std::string share_text(const RecognitionStep& step, const RecognitionTask& task,
+                       const char* else_text) {
+  const std::optional<double> share = share_at_pose(step, task);
+  return share ? fmt::format("{:.3f}", *share) : else_text;
 }
 
 std::string error_text(std::optional<double> error_mm) {

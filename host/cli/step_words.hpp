@@ -22,7 +22,8 @@ struct PoseText {
   std::array<std::string, 3> sd;  ///< "" where there is none
 };
 PoseText pose_text(const Pose& T_robot_object, const std::optional<std::array<double, 3>>& sd = {});
-/// T_robot_object of a step, to act on, with its standard deviations.
+/// T_robot_object of a step, to act on, with its standard deviations where the belief has a peak
+/// there.
 PoseText pose_text(const RecognitionStep& step);
 
 /// x, y and theta for a table: "9.81+-0.05".
@@ -35,7 +36,11 @@ std::string mode_words(int object, const RecognitionTask& task);
 /// The object of the step and, where the pose is another object's, that object: "A", "A mirrored",
 /// "(none), pose of A".
 std::string object_words(const RecognitionStep& step, const RecognitionTask& task);
-/// The object and its probability: "A (98.8 %)", or "unlike A (98.8 %)" where it does not fit.
+/// How much of the belief lies about the pose, where this is less than 95 % of the probability of
+/// the best label, or the pose is another object's.
+std::optional<double> share_at_pose(const RecognitionStep& step, const RecognitionTask& task);
+/// The object and its probability: "A (98.8 %)", or "unlike A (98.8 %)" where it does not fit; with
+/// share_at_pose(): "A (98.8 %, 60.2 % there)", "U (42.0 %), pose of A (15.2 % there)".
 std::string identity_words(const RecognitionStep& step, const RecognitionTask& task);
 /// The object, its probability and its pose in the robot frame.
 std::string result_words(const RecognitionStep& step, const RecognitionTask& task);
@@ -72,6 +77,10 @@ std::string unproven_sentence(const RecognitionStep& step, const RecognitionTask
 /// The surprise of the last touch in standard deviations, with its sign: "+2.3"; "" where there is
 /// none.
 std::string surprise_text(const RecognitionStep& step);
+
+/// share_at_pose() for a table: "0.152", `else_text` where there is none.
+std::string share_text(const RecognitionStep& step, const RecognitionTask& task,
+                       const char* else_text = "");
 
 /// A pose error in mm, "-" where there is none.
 std::string error_text(std::optional<double> error_mm);

@@ -77,18 +77,37 @@ std::string TextTable::text(std::optional<int> columns) const {
     }
   }
   std::size_t gap = 2;
+  std::vector<std::size_t> below;  // columns whose cells lie below their rows
   if (columns && shown > 0) {
     const auto room = static_cast<std::size_t>(std::max(*columns, 0));
     std::size_t all = std::accumulate(widths.begin(), widths.end(), std::size_t{0});
     gap = all + gap * (shown - 1) > room ? 1 : gap;
     all += gap * (shown - 1);
-    for (std::size_t k = 0; k < columns_.size() && all > room; ++k) {
-      if (columns_[k].may_cut && widths[k] > shortest_name) {
-        const std::size_t less = std::min(all - room, widths[k] - shortest_name);
-        widths[k] -= less;
-        all -= less;
+    const auto spare = [&](std::size_t k) {
+      const std::size_t shortest = std::max(shortest_name, columns_of(columns_[k].heading));
+      return columns_[k].may_cut ? widths[k] - std::min(widths[k], shortest) : 0;
+    };
+    std::size_t least = all;  // with the shortest names
+    for (std::size_t k = 0; k < columns_.size(); ++k) {
+      least -= spare(k);
+    }
+    const int ranks = std::ranges::max(columns_, {}, &Column::below).below;
+    for (int rank = 1; rank <= ranks && least > room; ++rank) {
+      for (std::size_t k = 0; k < columns_.size(); ++k) {
+        if (columns_[k].below == rank && widths[k] > 0) {
+          least -= widths[k] + gap;
+          all -= widths[k] + gap;
+          widths[k] = 0;
+          below.push_back(k);
+        }
       }
     }
+    for (std::size_t k = 0; k < columns_.size() && all > room; ++k) {
+      const std::size_t less = std::min(all - room, spare(k));
+      widths[k] -= less;
+      all -= less;
+    }
+    std::ranges::sort(below);
   }
 
   std::string text;
@@ -109,6 +128,14 @@ std::string TextTable::text(std::optional<int> columns) const {
   add_line([&](std::size_t k) -> const std::string& { return columns_[k].heading; });
   for (const std::vector<std::string>& row : rows_) {
     add_line([&](std::size_t k) -> const std::string& { return row[k]; });
+    std::string rest;
+    for (const std::size_t k : below) {
+      if (!row[k].empty() && row[k] != "-") {
+        rest += (rest.empty() ? "    " : ", ") +
+                (columns_[k].right ? columns_[k].heading + " " : "") + row[k];
+      }
+    }
+    text += rest.empty() ? "" : rest + "\n";
   }
   return text;
 }

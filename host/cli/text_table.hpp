@@ -25,6 +25,9 @@ class TextTable {
     std::string heading;
     bool right = false;    ///< aligned to the right
     bool may_cut = false;  ///< holds names, which shorten_middle() may cut
+    /// Columns of the least rank above 0 are the first to go below their rows where the terminal is
+    /// too narrow, all of a rank together.
+    int below = 0;
   };
 
   explicit TextTable(std::vector<Column> columns);
@@ -34,7 +37,8 @@ class TextTable {
 
   /// The heading and the rows, each with a line end.
   /// @param columns of the terminal: where the table is wider, it gets one blank instead of two
-  /// between its columns, then shorter names. Without a number nothing is shortened.
+  /// between its columns, then shorter names, then what may lie below its row in a line of its own:
+  /// numbers after their headings, words alone. Without a number nothing is shortened.
   std::string text(std::optional<int> columns) const;
 
  private:

@@ -71,12 +71,42 @@ std::string percent(double probability) {
                      probability >= 0.9 ? 1 : 0);
 }
 
+/// The probability in as many decimals as tell that it is less than `limit`.
+std::string percent_below(double limit, double probability) {
+  if (probability < 0.999) {
+    return percent(probability);
+  }
+  constexpr int most_decimals = 12;
+  int decimals = 2;
+  const auto shown = [&] {
+    const double parts = std::pow(10.0, decimals);
+    return std::floor(100.0 * parts * probability) / parts;
+  };
+  while (shown() >= 100.0 * limit && decimals < most_decimals) {
+    ++decimals;
+  }
+  return fmt::format("{:.{}f} %", shown(), decimals);
+}
+
+/// A distance in as many decimals as tell that it is more than `limit_mm`.
+std::string mm_above(double limit_mm, double mm) {
+  constexpr int most_decimals = 12;
+  std::string text;
+  for (int decimals = 2; decimals <= most_decimals; ++decimals) {
+    text = fmt::format("{:.{}f} mm", mm, decimals);
+    if (std::stod(text) > limit_mm) {
+      break;
+    }
+  }
+  return text;
+}
+
 }  // namespace
 
 BeliefPlaces places_of(const Recogniser& recogniser, const Estimate& estimate,
                        const RecognitionTask& task, const RecognitionStep& step) {
   if (!recogniser.touched()) {
-    return {};  // every bin is as likely: no place is a mode, and all bins would be looked at
+    return {.modes = {}, .peak = false};  // every bin is as likely: all would be looked at
   }
   // Bins below it hold a thousandth of an object's belief, or of uncommonly many bins more: these
   // say little of peaks.
@@ -106,7 +136,12 @@ BeliefPlaces places_of(const Recogniser& recogniser, const Estimate& estimate,
       continue;
     }
     std::vector<PartAway> parts = parts_away(of, likely[k], step.pose());
-    places.share = probability[object] * share_within(parts, neighbourhood_mm);
+    const double near = share_within(parts, neighbourhood_mm);
+    places.share = probability[object] * near;
+    const auto bins_near = std::ranges::count_if(
+        parts, [](const PartAway& part) { return part.mm <= neighbourhood_mm; });
+    const double flat = static_cast<double>(bins_near) / static_cast<double>(lattice.bins());
+    places.peak = near > std::min(0.5, std::numbers::e * flat);
     if (step.refined) {
       parts = spread_between_bins(of, std::move(parts), *step.refined);
     }
@@ -142,8 +177,9 @@ Decision decide(const RecognitionStep& step, const RecognitionTask& task) {
   const std::string& best = task.labels[step.best];
   const std::string& posed = task.labels[task.label_of[step.mode.object]];
   if (best == none_label) {
-    return {false, fmt::format("{} has {}: the object was probably never learned", best,
-                               percent(step.confidence()))};
+    return {false, fmt::format("{} has {}: the object was {} never learned", best,
+                               percent(step.confidence()),
+                               step.confidence() > 0.5 ? "probably" : "possibly")};
   }
   if (step.fit && step.fit->verdict == Verdict::does_not_fit) {
     return {false, fmt::format("the touches do not fit {}, {:.0f} standard deviations worse than "
@@ -153,9 +189,9 @@ Decision decide(const RecognitionStep& step, const RecognitionTask& task) {
   const bool bounded = !step.identity_bounds.empty();
   const double proven = bounded ? step.identity_bounds[step.best].low : step.confidence();
   if (!(proven >= task.act.above)) {
-    const std::string least = percent(proven);
-    return {false, fmt::format("{} has {}{}, less than {:g} %", best, least,
-                               least != percent(step.confidence()) ? " for certain" : "",
+    const bool sure = percent(proven) == percent(step.confidence());
+    return {false, fmt::format("{} has {}{}, less than {:.10g} %", best,
+                               percent_below(task.act.above, proven), sure ? "" : " for certain",
                                100.0 * task.act.above)};
   }
   const BeliefPlaces& places = step.places;
@@ -181,9 +217,8 @@ Decision decide(const RecognitionStep& step, const RecognitionTask& task) {
             fmt::format("less than 95 % of the belief is known to lie near the pose of {}", posed)};
   }
   return {false,
-          fmt::format("95 % of the belief lies within {:.2f} mm of the pose, not within {:g} "
-                      "mm",
-                      *places.within_mm, task.act.below_mm)};
+          fmt::format("95 % of the belief lies within {} of the pose, not within {:g} mm",
+                      mm_above(task.act.below_mm, *places.within_mm), task.act.below_mm)};
 }
 
 }  // namespace palpate

@@ -49,6 +49,9 @@ struct BeliefPlaces {
   /// Distance from pose() within which 95 % of the belief lies, mm; none where another object, or
   /// what bounds have not proven, has more than the rest.
   std::optional<double> within_mm = {};
+  /// Whether the belief in the pose's object is a nat denser that near pose() than on average, or
+  /// lies there by half. Else the refined pose and its deviations are those of bins like others.
+  bool peak = true;
 };
 
 /// Whether a robot is to act on a result.

@@ -148,6 +148,17 @@ std::optional<std::string> at_the_edge(std::span<const TouchEvidence> touches,
   return {};
 }
 
+/// The belief has no peak about the pose.
+std::optional<std::string> pose_untold(std::span<const TouchEvidence> touches,
+                                       const RecognitionStep& step) {
+  if (step.places.peak) {
+    return {};
+  }
+  return std::ranges::any_of(touches, &TouchEvidence::in_contact)
+             ? "the touches do not tell the pose: the belief has no peak about it"
+             : "the touches do not tell the pose: no touch has an element In Contact";
+}
+
 }  // namespace
 
 std::vector<std::string> warnings_about(std::span<const TouchEvidence> touches,
@@ -163,6 +174,9 @@ std::vector<std::string> warnings_about(std::span<const TouchEvidence> touches,
   add(other_scale(touches, task));
   add(nothing_felt(touches, task.classifier().threshold));
   add(out_of_reach(touches, task, lattice));
+  if (warnings.empty()) {
+    add(pose_untold(touches, step));
+  }
   const std::optional<std::string> degrees = angles_in_degrees(touches);
   // Touches at wrong angles do not fit; where the touches fit, the estimate deserves its warnings.
   const bool fits = step.fit && step.fit->verdict == Verdict::fits;

@@ -162,6 +162,8 @@ TEST_F(PlanCommand, SaysWhatRecognizeSaysOfTheTouches) {
   with.insert(with.begin(), "plan");
   with.insert(with.end(), {"--candidates", "c.csv"});
   const std::string out = done(with);
+  const std::string because = record["decision"]["because"];
+  EXPECT_TRUE(out.starts_with("do not act: " + because)) << out;
   for (const json& warning : record["warnings"]) {
     EXPECT_NE(out.find("u.h5: " + warning.get<std::string>()), std::string::npos) << out;
   }

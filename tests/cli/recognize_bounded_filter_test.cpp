@@ -167,7 +167,7 @@ TEST_F(BoundedFilter, AutoKeepsNoneOfThese) {
   const Outcome table = palpate({"recognize", "u.h5", "--maps", "maps", "--bins=12x12x16",
                                  "--filter", "bounded", "--none", "1e300"});
   EXPECT_EQ(table.status, 0) << table.err;
-  EXPECT_THAT(table.out, HasSubstr("(none), pose of "));
+  EXPECT_THAT(table.out, HasSubstr("\n  pose "));
   EXPECT_THAT(table.out, HasSubstr("dropped"));
 }
 

@@ -30,7 +30,8 @@ RecognitionRecord record_of(double dropped_mass, std::vector<ProbabilityInterval
                        .certificate = Certificate{.dropped_mass = dropped_mass,
                                                   .blocks_bounded = 70'000,
                                                   .bins_evaluated = 1234},
-                       .mode = {.object = 0, .log_likelihood = -30.0}};
+                       .mode = {.object = 0, .log_likelihood = -30.0},
+                       .places = {.share = 0.98}};
   return {.recording = "/data/mug.h5", .frame = {}, .touches = 2, .trace = {step, step}};
 }
 
@@ -61,6 +62,8 @@ TEST(UnprovenSentence, SaysTheBoundsAndWhatEndedTheSearch) {
   EXPECT_EQ(unproven_sentence(record_of(1e-7, {{0.1, 0.99}, {0.0, 0.1}}).last(), task_with(0.1)),
             "A 62.0 % (at least 10.0 %, at most 99.0 %): the budget of 100 ms left the "
             "probability of (none) unproven");
+  EXPECT_EQ(unproven_sentence(record_of(0.37, {{1.0, 1.0}, {0.0, 0.0}}).last(), task_with({})),
+            "rounding left 37 % of the belief unproven; A has 100.0 % all the same");
   EXPECT_EQ(unproven_sentence(record_of(1e-4, {{}, {}}).last(), task_with(0.1)), "")
       << "the tolerance holds";
   EXPECT_EQ(unproven_sentence(wide.last(), RecognitionTask({{sample_map("A")}, {sample_map("I")}},

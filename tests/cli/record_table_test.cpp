@@ -13,6 +13,7 @@
 #include "cli/step_words.hpp"
 #include "palpate/pose_error.hpp"
 #include "recognition/record_json.hpp"
+#include "recognition/label_probability.hpp"
 #include "sample_files.hpp"
 #include "unknown_of.hpp"
 
@@ -43,7 +44,8 @@ RecognitionRecord sample_record(const std::string& name) {
                        .mode = {.object = 0,
                                 .T_object_robot = inverse(Pose{{399.0, -20.0}, 0.55}),
                                 .log_likelihood = -30.0},
-                       .refined = refined_at({{398.76, -20.5}, 0.5})};
+                       .refined = refined_at({{398.76, -20.5}, 0.5}),
+                       .places = {.share = 0.98}};
   return {
       .recording = "/data/" + name, .frame = {}, .touches = 9, .true_label = {}, .trace = {step}};
 }
@@ -87,12 +89,53 @@ TEST(ResultTable, SaysFirstWhetherToActAndBelowWhereElseTheObjectMayBe) {
             "  or                I     0.110    1.00+-0.20   -2.00+-0.30  28.65+-0.00\n"
             "  mode              A                  399.00        -20.00        31.51\n");
   EXPECT_THAT(result_table({record, record, record, record}, sample_task(), {}),
-              testing::StartsWith("act on 0 of 4 unknowns\nrecording"));
+              testing::StartsWith(
+                  "act on 0 of 4 unknowns\n"
+                  "recording  touches  act  best  prob.          x mm          y mm    theta deg\n"
+                  "mug.h5           9  -    A     0.988  398.76+-0.05  -20.50+-0.10  "
+                  "28.65+-0.57\n"));
+  RecognitionRecord sure = sample_record("pen.h5");
+  sure.trace.back().decision = {.act = true, .because = "A has 98.8 %"};
+  EXPECT_THAT(result_table({record, record, record, sure}, sample_task(), {}),
+              HasSubstr("\npen.h5           9  act  A     0.988  "));
   const nlohmann::ordered_json json = to_json(step, sample_task());
   EXPECT_EQ(json.begin().key(), "decision");
   EXPECT_EQ(json["modes"].size(), 3U);
   EXPECT_EQ(json["modes"][1]["object"], "I");
   EXPECT_EQ(json["modes"][1]["covariance"][1][1], 0.09);
+}
+
+TEST(ResultTable, GivesThePoseItsOwnShareOfTheBelief) {
+  RecognitionRecord record = sample_record("mug.h5");
+  RecognitionStep& step = record.trace.back();
+  step.identity = {0.4, 0.58, 0.02};
+  step.best = 1;
+  step.places.share = 0.152;
+  RecognitionTask task = sample_task();
+  task.labels.emplace_back(none_label);
+  EXPECT_EQ(result_table({record}, task, {}),
+            "recording  touches  best    prob.          x mm          y mm    theta deg\n"
+            "mug.h5           9  I       0.580\n"
+            "  pose              A       0.152  398.76+-0.05  -20.50+-0.10  28.65+-0.57\n"
+            "  or                (none)  0.020\n"
+            "  mode              A                    399.00        -20.00        31.51\n");
+  EXPECT_EQ(identity_words(step, task), "I (58.0 %), pose of A (15.2 % there)");
+  LiveTouch touch{.touch = {.T_robot_sensor = Pose{}}, .step = step};
+  EXPECT_THAT(table_line(touch, task), HasSubstr("I, pose of A  0.580    0.152 "));
+  step.best = 0;
+  step.places.share = 0.25;
+  EXPECT_EQ(identity_words(step, task), "A (40.0 %, 25.0 % there)");
+  EXPECT_THAT(trace_table(record, task, {}), HasSubstr("A     0.400    0.250  398.76"));
+  step.places.share = 0.39;
+  EXPECT_EQ(identity_words(step, task), "A (40.0 %)") << "all of it lies there";
+  step.identity = {0.4, 0.595, 0.005};
+  EXPECT_THAT(result_table({record}, task, {}), Not(HasSubstr("(none)")));
+}
+
+TEST(ResultTable, GivesNoDeviationWhereTheBeliefHasNoPeak) {
+  RecognitionRecord record = sample_record("mug.h5");
+  record.trace.back().places.peak = false;
+  EXPECT_THAT(result_table({record}, sample_task(), {}), Not(HasSubstr("+-")));
 }
 
 TEST(Words, OfAnObjectThatDoesNotFitDoNotCallItSo) {
@@ -146,7 +189,10 @@ TEST(ResultTable, SaysWhichObjectAWrongOneWasAndWhosePoseItIs) {
   record.trace.back().identity = {0.4, 0.6};
   record.trace.back().best = 1;
   record.trace.back().right = true;
-  EXPECT_THAT(result_table({record}, sample_task(), {}), HasSubstr("  I, pose of A  0.600 "));
+  record.trace.back().places.share = 0.38;
+  EXPECT_THAT(result_table({record}, sample_task(), {}),
+              testing::AllOf(HasSubstr("  I     0.600\n"),
+                             HasSubstr("\n  pose              A     0.380  398.76")));
 }
 
 TEST(ResultTable, OfParticlesHasTheModesPoseWithoutADeviation) {
@@ -200,6 +246,32 @@ TEST(ResultTable, SaysAWarningOfManyRecordingsOnce) {
       text.ends_with("u0.h5, u1.h5, u2.h5 and 497 more: every touch misses every map\n"
                      "u7.h5: the poses look like metres\n"))
       << text.substr(text.size() - 300);
+}
+
+TEST(ResultTable, OfStrangersAndDoubtFitsEightyColumnsWithWholeNames) {
+  RecognitionTask task({{sample_map("A")}, {sample_map("I")}}, BoundedOptions{.tolerance = 1e-4});
+  task.labels.emplace_back(none_label);
+  RecognitionRecord record = sample_record("stranger.h5");
+  RecognitionStep& step = record.trace.back();
+  step.refined = refined_at({{-25.65, -20.4}, -2.2});
+  step.mode.T_object_robot = step.refined->T_object_robot;
+  step.identity = {0.0, 0.0, 1.0};
+  step.identity_bounds = {{0.0, 1e-3}, {0.0, 1e-3}, {0.999, 1.0}};
+  step.best = 2;
+  step.places.share = 0.0;
+  step.certificate = Certificate{.dropped_mass = 0.37};
+  step.fit = {.z = -5.0, .verdict = Verdict::does_not_fit};
+  step.decision.because = "(none)";
+  const std::string text = result_table({record, record, record, record}, task, 80);
+  const std::string table = text.substr(0, text.find("stranger.h5: "));
+  for (std::size_t begin = 0; begin < table.size();) {
+    const std::size_t end = std::min(table.find('\n', begin), table.size());
+    EXPECT_LE(end - begin, 80u) << text;
+    begin = end + 1;
+  }
+  EXPECT_THAT(table, Not(HasSubstr("..."))) << "names are whole";
+  EXPECT_THAT(table, HasSubstr("dropped 0.4")) << "what is unproven is said";
+  EXPECT_THAT(table, HasSubstr("\n    no fit\n"));
 }
 
 // Letters within +-10 mm of the robot's origin, with truths and fits: no line wraps.

@@ -44,7 +44,7 @@ TEST(TextTable, GivesUpBlanksThenNamesWhereTheTerminalIsNarrow) {
 }
 
 TEST(TextTable, NoLineIsWiderThanTheTerminalAsLongAsNamesCanGiveWay) {
-  for (int columns = 8 + 1 + 5 + 1 + 8; columns < 80; ++columns) {
+  for (int columns = 9 + 1 + 5 + 1 + 8; columns < 80; ++columns) {
     const std::string text = sample().text(columns);
     for (std::size_t begin = 0; begin < text.size();) {
       const std::size_t end = text.find('\n', begin);
@@ -53,7 +53,35 @@ TEST(TextTable, NoLineIsWiderThanTheTerminalAsLongAsNamesCanGiveWay) {
     }
     EXPECT_NE(text.find("-1.25 "), std::string::npos) << "numbers are never cut";
   }
-  EXPECT_EQ(sample().text(1), sample().text(23)) << "shorter names could not be told apart";
+  EXPECT_EQ(sample().text(1), sample().text(24)) << "shorter names could not be told apart";
+}
+
+// Numbers keep their headings, and columns of a rank stay together.
+TEST(TextTable, PutsBelowItsRowWhatHasNoRoomThere) {
+  TextTable table(
+      {{"name"}, {"n", true, false, 2}, {"x", true, false, 3}, {"fit", false, false, 1}});
+  table.add({"mug", "12", "1.25", "fits"});
+  table.add({"pen", "", "10.50", "-"});
+  EXPECT_EQ(table.text(19),
+            "name  n     x fit\n"
+            "mug  12  1.25 fits\n"
+            "pen     10.50 -\n");
+  EXPECT_EQ(table.text(17),
+            "name  n     x\n"
+            "mug  12  1.25\n"
+            "    fits\n"
+            "pen     10.50\n");
+  EXPECT_EQ(table.text(10),
+            "name     x\n"
+            "mug   1.25\n"
+            "    n 12, fits\n"
+            "pen  10.50\n");
+  EXPECT_EQ(table.text(9),
+            "name\n"
+            "mug\n"
+            "    n 12, x 1.25, fits\n"
+            "pen\n"
+            "    x 10.50\n");
 }
 
 TEST(TextTable, ShowsNoControlCharacter) {

@@ -5,6 +5,7 @@
 #include <numbers>
 #include <numeric>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
@@ -300,6 +301,8 @@ TEST_F(Places, AreNoneBeforeATouchReachesTheBelief) {
   const RecognitionStep step = take_step(recogniser, task, all_touches(recording, 2), {});
   EXPECT_TRUE(step.places.modes.empty());
   EXPECT_FALSE(step.places.within_mm);
+  EXPECT_FALSE(step.places.peak);
+  EXPECT_THAT(step.warnings, testing::Contains(testing::HasSubstr("no touch has an element In")));
   EXPECT_FALSE(step.decision.act);
 }
 
@@ -351,6 +354,9 @@ TEST(Decision, SaysWhatSpeaksAgainst) {
   step.best = 2;
   EXPECT_EQ(refused(step), "(none) has 98.0 %: the object was probably never learned");
 
+  step.identity = {0.3, 0.21, 0.49};
+  EXPECT_EQ(refused(step), "(none) has 49 %: the object was possibly never learned");
+
   step = good_step();
   step.fit->verdict = Verdict::does_not_fit;
   step.fit->z = -6.2;
@@ -375,8 +381,16 @@ TEST(Decision, SaysWhatSpeaksAgainst) {
   step = good_step();
   step.places.within_mm = 0.8;
   EXPECT_EQ(refused(step), "95 % of the belief lies within 0.80 mm of the pose, not within 0.5 mm");
+  step.places.within_mm = 0.5004;
+  EXPECT_EQ(refused(step),
+            "95 % of the belief lies within 0.5004 mm of the pose, not within 0.5 mm");
   step.places.within_mm.reset();
   EXPECT_EQ(refused(step), "less than 95 % of the belief is known to lie near the pose of L");
+
+  task.act.above = 0.999999999;
+  step = good_step();
+  step.identity = {0.99998, 0.00002, 0.0};
+  EXPECT_EQ(refused(step), "L has 99.99 %, less than 99.9999999 %");
 
   task.act = {.below_mm = 1.0, .above = 0.8};
   step = good_step();

@@ -350,9 +350,12 @@ TEST_F(Warnings, ATouchOrTwoMayMissTheObject) {
   Recording recording = letter_touches("A", 2, 9);
   recording.pressure.assign(recording.pressure.size(), 0.1);
   recording.pressure.front() = 1.0;
+  // One element In Contact fits anywhere on the letters.
   EXPECT_THAT(warnings(recording), IsEmpty());
   recording.pressure.assign(recording.pressure.size(), 0.0);
-  EXPECT_THAT(warnings(recording), IsEmpty()) << "where all readings are Unknown by Eq. 3";
+  EXPECT_THAT(warnings(recording),
+              ElementsAre("the touches do not tell the pose: no touch has an element In Contact"))
+      << "where all readings are Unknown by Eq. 3";
 }
 
 }  // namespace palpate::warnings_test
