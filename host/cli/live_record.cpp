@@ -76,7 +76,8 @@ std::string table_line(const LiveTouch& touch, const RecognitionTask& task) {
       "{}",
       touch.unknown + 1, touch.index + 1, object_words(step, task), step.confidence(),
       dropped_cell(dropped_text(step), task), share_text(step, task, "-"), pose[0], pose[1],
-      pose[2], error_text(step.pose_error_mm()), touch.latency_ms, surprise.empty() ? "-" : surprise,
+      pose[2], error_text(step.pose_error_mm()), touch.latency_ms,
+      surprise.empty() ? "-" : surprise,
       (fit.empty() ? "-" : fit) + (step.decision.act ? ", act" : ""));
 }
 

@@ -98,9 +98,8 @@ std::string words_of(const SensorGain& gain, const std::string& file, std::size_
     scores += fmt::format(
         ", and {} of them together a pose error of {:.2f} mm, {:.2f} by Eq. 7 ({})",
         presses_in_group, *gain.error_mm, *gain.error_mm_before,
-        words_of(gain.less_error,
-                 fmt::format("{:.0f} +-{:.0f} %", 100.0 * std::abs(1.0 - share),
-                             100.0 * share * gain.less_error.standard_error)));
+        words_of(gain.less_error, fmt::format("{:.0f} +-{:.0f} %", 100.0 * std::abs(1.0 - share),
+                                              100.0 * share * gain.less_error.standard_error)));
   }
   if (!gain.better) {
     return fmt::format("no sensor model, as {}: {}",

@@ -97,9 +97,9 @@ std::string plan_text(const Plan& plan, const RecognitionTask& task, std::option
   const std::string decision = decision_words(plan.record.last());
   return fmt::format(
       "{}{}\n{}\n\n{}{}{}\n{}, {} in {:.0f} ms\n", decision.empty() ? "" : decision + "\n",
-      result_words(plan.record.last(), task),
-      believed_words(plan), table_of(plan, columns), complaints({plan.record}, task),
-      limit.empty() ? "" : limit + "\n", next_touch_words(plan.ranked.front(), plan.goal),
+      result_words(plan.record.last(), task), believed_words(plan), table_of(plan, columns),
+      complaints({plan.record}, task), limit.empty() ? "" : limit + "\n",
+      next_touch_words(plan.ranked.front(), plan.goal),
       count_of(plan.ranked.size(), "candidate", "candidates"), 1e3 * plan.seconds);
 }
 

@@ -57,9 +57,7 @@ std::string confusions(const std::vector<RecognitionRecord>& records, const Reco
 /// Of more unknowns a line each would hide the table, where a column says on which to act.
 constexpr std::size_t few_decided = 3;
 
-bool is_decided(const RecognitionRecord& record) {
-  return !record.last().decision.because.empty();
-}
+bool is_decided(const RecognitionRecord& record) { return !record.last().decision.because.empty(); }
 
 /// Whether to act on each of a few unknowns, or on how many of more.
 std::string decisions(const std::vector<RecognitionRecord>& records) {
@@ -260,9 +258,9 @@ std::string result_table(const std::vector<RecognitionRecord>& records, const Re
     const std::array<std::string, 3> pose = pose_cells(pose_text(step));
     const std::string act = !with_act ? "" : step.decision.act ? "act" : "-";
     const std::string share = share_text(step, task);
-    std::vector<std::string> row{name_of(record),        fmt::format("{}", record.touches), act,
-                                 best_words(step, task), fmt::format("{:.3f}", step.confidence()),
-                                 dropped(step)};
+    std::vector<std::string> row{
+        name_of(record),        fmt::format("{}", record.touches),        act,
+        best_words(step, task), fmt::format("{:.3f}", step.confidence()), dropped(step)};
     if (!share.empty()) {  // the pose has not the probability of the best label
       row.insert(row.end(), 4, "");
       table.add(row);

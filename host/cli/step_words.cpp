@@ -192,23 +192,22 @@ std::string unproven_sentence(const RecognitionStep& step, const RecognitionTask
   }
   const double unproven = 100.0 * step.certificate->dropped_mass;
   constexpr double poor_fits = 0.01;  // rounding leaves less
-  const std::string left = fmt::format(
-      "{} left {} unproven",
-      traits.budget_s ? fmt::format("the budget of {:g} ms", 1e3 * *traits.budget_s)
-      : task.contact().table && unproven >= poor_fits
-          ? "the search, which met nothing but poor fits,"
-          : "rounding",
-      proven             ? "the probability of (none)"
-      : unproven >= 9.95 ? fmt::format("{:.0f} % of the belief", unproven)
-                         : fmt::format("{:.2g} % of the belief", unproven));
+  const std::string left =
+      fmt::format("{} left {} unproven",
+                  traits.budget_s ? fmt::format("the budget of {:g} ms", 1e3 * *traits.budget_s)
+                  : task.contact().table && unproven >= poor_fits
+                      ? "the search, which met nothing but poor fits,"
+                      : "rounding",
+                  proven             ? "the probability of (none)"
+                  : unproven >= 9.95 ? fmt::format("{:.0f} % of the belief", unproven)
+                                     : fmt::format("{:.2g} % of the belief", unproven));
   const std::string best = printable(task.labels[step.best]);
   // Bounds round outwards.
   const double least = std::floor(1000.0 * low) / 10.0;
   const double most = std::ceil(1000.0 * high) / 10.0;
-  return least == most
-             ? fmt::format("{}; {} has {:.1f} % all the same", left, best, least)
-             : fmt::format("{} {:.1f} % (at least {:.1f} %, at most {:.1f} %): {}", best,
-                           100.0 * step.confidence(), least, most, left);
+  return least == most ? fmt::format("{}; {} has {:.1f} % all the same", left, best, least)
+                       : fmt::format("{} {:.1f} % (at least {:.1f} %, at most {:.1f} %): {}", best,
+                                     100.0 * step.confidence(), least, most, left);
 }
 
 std::string surprise_text(const RecognitionStep& step) {

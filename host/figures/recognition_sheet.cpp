@@ -218,21 +218,19 @@ void draw_modes(Canvas& canvas, const View& view, const RecognitionSheet& sheet)
     const glm::dvec2 centre{mark.left + mark.width / 2.0, mark.top + mark.height / 2.0};
     const glm::dvec2 end = glm::clamp(centre, glm::dvec2(place.left, place.top),
                                       glm::dvec2(place.right(), place.bottom()));
-    const glm::dvec2 begin = glm::clamp(end, glm::dvec2(mark.left, mark.top),
-                                        glm::dvec2(mark.right(), mark.bottom()));
+    const glm::dvec2 begin =
+        glm::clamp(end, glm::dvec2(mark.left, mark.top), glm::dvec2(mark.right(), mark.bottom()));
     if (glm::distance(begin, end) > beside_px) {
       canvas.segment(centre, end, leader);
     }
   }
   for (std::size_t i = 0; i < places.size(); ++i) {
     const Box& place = places[i];
-    const std::array ground{glm::dvec2(place.left, place.top),
-                            glm::dvec2(place.right(), place.top),
+    const std::array ground{glm::dvec2(place.left, place.top), glm::dvec2(place.right(), place.top),
                             glm::dvec2(place.right(), place.bottom()),
                             glm::dvec2(place.left, place.bottom())};
     canvas.fill(ground, {1.0, 1.0, 1.0, 0.8});
-    canvas.text(names[i], {place.left, place.bottom() - 3.0}, small, Align::left,
-                other_pen.colour);
+    canvas.text(names[i], {place.left, place.bottom() - 3.0}, small, Align::left, other_pen.colour);
   }
 }
 

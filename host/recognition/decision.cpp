@@ -216,9 +216,8 @@ Decision decide(const RecognitionStep& step, const RecognitionTask& task) {
     return {false,
             fmt::format("less than 95 % of the belief is known to lie near the pose of {}", posed)};
   }
-  return {false,
-          fmt::format("95 % of the belief lies within {} of the pose, not within {:g} mm",
-                      mm_above(task.act.below_mm, *places.within_mm), task.act.below_mm)};
+  return {false, fmt::format("95 % of the belief lies within {} of the pose, not within {:g} mm",
+                             mm_above(task.act.below_mm, *places.within_mm), task.act.below_mm)};
 }
 
 }  // namespace palpate

@@ -82,11 +82,11 @@ std::optional<SensorFromFile> folder_sensor(std::span<const Hypothesis> hypothes
   }
   const std::filesystem::path folder = std::filesystem::path(found.file).parent_path();
   const bool of_folder = std::filesystem::path(stranger->map.file).parent_path() == folder;
-  remarks.push_back(fmt::format(
-      "{} was not learned for {}, and is left out; build {} with palpate map, or give "
-      "`sensor-model`",
-      found.file, name_of(stranger->map),
-      of_folder ? "the folder's maps anew" : "the maps of both anew in one folder"));
+  remarks.push_back(
+      fmt::format("{} was not learned for {}, and is left out; build {} with palpate map, or give "
+                  "`sensor-model`",
+                  found.file, name_of(stranger->map),
+                  of_folder ? "the folder's maps anew" : "the maps of both anew in one folder"));
   return {};
 }
 

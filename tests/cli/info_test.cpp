@@ -144,13 +144,14 @@ TEST_F(InfoCommand, SensorModel) {
   sensor.table->shared.assign(3 * ReadingLayer::nodes, -1.0);
   sensor.table->objects["pen"] = sensor.table->shared;
   write_sensor_model(folder_ / "s.yaml", sensor);
-  expect_info("s.yaml",
-              {"s.yaml: sensor model", "threshold         15, ratio 0.15",
-               "table of 3 levels over log odds; 1 object(s) with numbers of their own",
-               "temperature       31.5, and 0.75 more for every further touch",
-               "learned on bins   0.8 x 0.4 mm x 22.5 deg", "z of learned objects -4.5 +- 12.25",
-               "learned for       mug.map.h5, pen.map.h5",
-               "pose scale        covariances times 0.75, and 0.125 mm of the map along each axis"});
+  expect_info(
+      "s.yaml",
+      {"s.yaml: sensor model", "threshold         15, ratio 0.15",
+       "table of 3 levels over log odds; 1 object(s) with numbers of their own",
+       "temperature       31.5, and 0.75 more for every further touch",
+       "learned on bins   0.8 x 0.4 mm x 22.5 deg", "z of learned objects -4.5 +- 12.25",
+       "learned for       mug.map.h5, pen.map.h5",
+       "pose scale        covariances times 0.75, and 0.125 mm of the map along each axis"});
 }
 
 }  // namespace palpate::info_test

@@ -12,8 +12,8 @@
 #include "cli/sheet.hpp"
 #include "cli/step_words.hpp"
 #include "palpate/pose_error.hpp"
-#include "recognition/record_json.hpp"
 #include "recognition/label_probability.hpp"
+#include "recognition/record_json.hpp"
 #include "sample_files.hpp"
 #include "unknown_of.hpp"
 
