@@ -22,10 +22,10 @@ namespace palpate::cli::record_table_test {
 using testing::HasSubstr;
 using testing::Not;
 
-RecognitionTask sample_task() {
+RecognitionTask sample_task(const HistogramOptions& options = {}) {
   std::vector<Hypothesis> maps{{sample_map("A")}, {sample_map("I")}};
   maps[1].map.symmetry = 2;
-  RecognitionTask task(std::move(maps), HistogramOptions{});
+  RecognitionTask task(std::move(maps), options);
   task.map_paths = {"A.map.h5", "I.map.h5"};
   return task;
 }
@@ -111,8 +111,7 @@ TEST(ResultTable, GivesThePoseItsOwnShareOfTheBelief) {
   step.identity = {0.4, 0.58, 0.02};
   step.best = 1;
   step.places.share = 0.152;
-  RecognitionTask task = sample_task();
-  task.labels.emplace_back(none_label);
+  const RecognitionTask task = sample_task({.none_weight = 1.0});
   EXPECT_EQ(result_table({record}, task, {}),
             "recording  touches  best    prob.          x mm          y mm    theta deg\n"
             "mug.h5           9  I       0.580\n"
@@ -249,8 +248,8 @@ TEST(ResultTable, SaysAWarningOfManyRecordingsOnce) {
 }
 
 TEST(ResultTable, OfStrangersAndDoubtFitsEightyColumnsWithWholeNames) {
-  RecognitionTask task({{sample_map("A")}, {sample_map("I")}}, BoundedOptions{.tolerance = 1e-4});
-  task.labels.emplace_back(none_label);
+  const RecognitionTask task({{sample_map("A")}, {sample_map("I")}},
+                             BoundedOptions{.tolerance = 1e-4, .none_weight = 1.0});
   RecognitionRecord record = sample_record("stranger.h5");
   RecognitionStep& step = record.trace.back();
   step.refined = refined_at({{-25.65, -20.4}, -2.2});
@@ -313,22 +312,6 @@ TEST(TraceTable, HasALinePerTouchAndThenTheTruth) {
                 "  fits\n"
                 "  truth: A at x 398.80 mm, y -20.40 mm, theta 29.22 deg; error " +
                 error + " mm\n");
-}
-
-TEST(RecordOutput, FitAndWarningsStandInJson) {
-  const RecognitionTask task = sample_task();
-  RecognitionStep step = sample_record("mug.h5").last();
-  EXPECT_FALSE(to_json(step, task).contains("fit"));
-  EXPECT_FALSE(to_json(step, task).contains("warnings"));
-  step.warnings = {"one", "two"};
-  for (const auto& [verdict, text] : {std::pair{Verdict::fits, "fits"},
-                                      {Verdict::doubtful, "doubtful"},
-                                      {Verdict::does_not_fit, "does not fit"}}) {
-    step.fit = {.z = -4.5, .verdict = verdict};
-    const nlohmann::json json = to_json(step, task);
-    EXPECT_EQ(json.at("fit"), (nlohmann::json{{"z", -4.5}, {"verdict", text}}));
-    EXPECT_EQ(json.at("warnings"), (nlohmann::json{"one", "two"}));
-  }
 }
 
 // One pose, one error, one truth in JSON, in both tables, on the sheet and in `live`.

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "palpate/error.hpp"
+#include "recognition/record_json.hpp"
 #include "reference/reference.hpp"
 #include "shapes.hpp"
 #include "synthetic.hpp"
@@ -308,6 +309,22 @@ TEST(ArrayIsStill, ForPressesOfOneLargeArrayInOnePlace) {
   Unknown small = press;
   small.touches.front().elements_mm = small.touches.front().elements_mm.first(255);
   EXPECT_FALSE(array_is_still(std::vector<Unknown>(3, small)));
+}
+
+TEST(RecordJson, HasFitAndWarningsWhereTheStepHas) {
+  const RecognitionTask task(shapes(), every_filter()[0]);
+  RecognitionStep step{.identity = {0.9876, 0.0124}};
+  EXPECT_FALSE(to_json(step, task).contains("fit"));
+  EXPECT_FALSE(to_json(step, task).contains("warnings"));
+  step.warnings = {"one", "two"};
+  for (const auto& [verdict, text] : {std::pair{Verdict::fits, "fits"},
+                                      {Verdict::doubtful, "doubtful"},
+                                      {Verdict::does_not_fit, "does not fit"}}) {
+    step.fit = {.z = -4.5, .verdict = verdict};
+    const nlohmann::json json = to_json(step, task);
+    EXPECT_EQ(json.at("fit"), (nlohmann::json{{"z", -4.5}, {"verdict", text}}));
+    EXPECT_EQ(json.at("warnings"), (nlohmann::json{"one", "two"}));
+  }
 }
 
 }  // namespace palpate::recognition_record_test
