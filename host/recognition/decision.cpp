@@ -189,7 +189,9 @@ Decision decide(const RecognitionStep& step, const RecognitionTask& task) {
   const bool bounded = !step.identity_bounds.empty();
   const double proven = bounded ? step.identity_bounds[step.best].low : step.confidence();
   if (!(proven >= task.act.above)) {
-    const bool sure = percent(proven) == percent(step.confidence());
+    // The sentence says that it is a bound where the probability itself is enough, or far from it.
+    constexpr double near = 0.05;
+    const bool sure = step.confidence() < task.act.above && step.confidence() - proven <= near;
     return {false, fmt::format("{} has {}{}, less than {:.10g} %", best,
                                percent_below(task.act.above, proven), sure ? "" : " for certain",
                                100.0 * task.act.above)};

@@ -164,7 +164,7 @@ TEST_F(RecognizeRecord, PrintsThePoseOfItsJson) {
   shown.insert(shown.begin(), "recognize");
   const std::string out = done(shown);
   EXPECT_TRUE(out.starts_with("u.h5: do not act: ")) << out;
-  EXPECT_NE(out.find("\nrecording  touches  best  prob. "), std::string::npos) << out;
+  EXPECT_NE(out.find("\nrecording  touches  best    prob. "), std::string::npos) << out;
   const std::vector<double> pose = r["refined"]["T_robot_object"];
   const std::vector<double> sd = r["refined"]["sd"];
   for (std::size_t i = 0; i < 3; ++i) {

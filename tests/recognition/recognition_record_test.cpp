@@ -312,8 +312,9 @@ TEST(ArrayIsStill, ForPressesOfOneLargeArrayInOnePlace) {
 }
 
 TEST(RecordJson, HasFitAndWarningsWhereTheStepHas) {
-  const RecognitionTask task(shapes(), every_filter()[0]);
-  RecognitionStep step{.identity = {0.9876, 0.0124}};
+  RecognitionTask task(shapes(), every_filter()[0]);
+  task.map_paths.assign(task.hypotheses.size(), "shape.map.h5");
+  RecognitionStep step{.identity = std::vector<double>(task.labels.size()), .mode = {.object = 0}};
   EXPECT_FALSE(to_json(step, task).contains("fit"));
   EXPECT_FALSE(to_json(step, task).contains("warnings"));
   step.warnings = {"one", "two"};

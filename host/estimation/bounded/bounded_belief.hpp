@@ -36,6 +36,9 @@ class BoundedBelief {
   std::vector<double> log_likelihood(std::span<const BinBox> boxes, Arithmetic arithmetic) {
     return touches_.log_likelihood(boxes, arithmetic);
   }
+  std::vector<double> close_log_likelihood(std::span<const BinBox> boxes) {
+    return touches_.close_log_likelihood(boxes);
+  }
   std::uint64_t bytes() const { return touches_.bytes() + (found_ ? found_->bins.bytes() : 0); }
 
   /// The result of a search to the tolerance, or as far as the options' budget reaches. Bounds

@@ -160,7 +160,7 @@ RefinedPose BoundedPosterior::refine(const Mode& mode) const {
   }
   const auto log_likelihood = [&](std::span<const BinBox> boxes) {
     if (!thin) {
-      return belief.log_likelihood(boxes, Arithmetic::float32);
+      return belief.close_log_likelihood(boxes);
     }
     std::size_t bins = 0;
     for (const BinBox& box : boxes) {

@@ -132,6 +132,16 @@ std::vector<double> SearchedTouches::log_likelihood(std::span<const BinBox> boxe
   return logs;
 }
 
+std::vector<double> SearchedTouches::close_log_likelihood(std::span<const BinBox> boxes) {
+  if (!moving_) {
+    return log_likelihood(boxes, Arithmetic::float32);
+  }
+  return arena_.execute([&] {
+    moving_->take_in(Deadline({}, &options_.cancel_point));
+    return moving_->close_log_likelihood(boxes);
+  });
+}
+
 void SearchedTouches::follow(FollowedBins& bins) const {
   const std::size_t next = bins.touches();
   KnownElements touch = known_elements(touches_.all()[next]);

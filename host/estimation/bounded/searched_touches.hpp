@@ -72,6 +72,8 @@ class SearchedTouches {
   /// Log-likelihood of bins, box after box, [y, x] in each, in nats; see MovingBelief where objects
   /// slip.
   std::vector<double> log_likelihood(std::span<const BinBox> boxes, Arithmetic arithmetic);
+  /// Log-likelihood as a pose's fit needs it, in float32; see MovingBelief where objects slip.
+  std::vector<double> close_log_likelihood(std::span<const BinBox> boxes);
   /// Takes one of the touches into the bins of an earlier search. Not where objects slip.
   void follow(FollowedBins& bins) const;
   /// Bounds of the log evidence of "none of these" with its prior weight, as SearchResult::mass has

@@ -233,6 +233,16 @@ bool MovingBelief::reaches(const SearchResult& found, const SearchGoal& goal) co
 }
 
 std::vector<double> MovingBelief::log_likelihood(std::span<const BinBox> boxes) const {
+  std::vector<double> logs;
+  for (const BinBox& box : boxes) {
+    for (std::int64_t i = 0; i < box.bins(); ++i) {
+      logs.push_back(objects_[box.object].most(box.bin(i, options_.lattice)));
+    }
+  }
+  return logs;
+}
+
+std::vector<double> MovingBelief::close_log_likelihood(std::span<const BinBox> boxes) const {
   const KnownElements nothing;
   const KnownElements& last = stepped_ > 0 ? touches_[stepped_ - 1] : nothing;
   std::vector<double> logs;

@@ -41,8 +41,12 @@ class MovingBelief {
   /// all are followed.
   SearchResult find(const SearchGoal& goal, const Deadline& deadline, const BinVisitor& visit);
 
-  /// After take_in(): MovingObject::log_belief().
+  /// After take_in(): upper bounds of the log-likelihood of bins in nats, box after box, [y, x] in
+  /// each: close where the belief is, and loose where a bin is not followed.
   std::vector<double> log_likelihood(std::span<const BinBox> boxes) const;
+  /// The same bins' log-likelihood, close also where they are not followed, but no bound there; see
+  /// MovingObject::log_belief().
+  std::vector<double> close_log_likelihood(std::span<const BinBox> boxes) const;
 
  private:
   void start();

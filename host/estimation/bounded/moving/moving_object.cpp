@@ -241,14 +241,18 @@ std::vector<double> MovingObject::log_belief(std::span<const BinBox> boxes,
   std::vector<double> logs;
   for (const BinBox& box : boxes) {
     for (std::int64_t i = 0; i < box.bins(); ++i) {
-      const auto bin = static_cast<std::size_t>(box.bin(i, task_.lattice));
-      const double most = over_ + log_add(log_mass_[bin] + rounding(), log_rest_[bin]);
-      const bool close =
-          followed_[tile_of(static_cast<std::int64_t>(bin))] == 0 && become[bin] > -infinity;
-      logs.push_back(scale_ + (close ? std::min(most, become[bin]) : most));
+      const std::int64_t bin = box.bin(i, task_.lattice);
+      const auto at = static_cast<std::size_t>(bin);
+      const bool close = followed_[tile_of(bin)] == 0 && become[at] > -infinity;
+      logs.push_back(close ? std::min(most(bin), scale_ + become[at]) : most(bin));
     }
   }
   return logs;
+}
+
+double MovingObject::most(std::int64_t bin) const {
+  const auto at = static_cast<std::size_t>(bin);
+  return scale_ + over_ + log_add(log_mass_[at] + rounding(), log_rest_[at]);
 }
 
 double MovingObject::rounding() const {

@@ -49,9 +49,11 @@ class MovingObject {
   void step(const KnownElements& touch, bool slips, std::span<const double> tiles, double least,
             bool by_logs);
 
-  /// Log-likelihood of the bins of some boxes of this object, box after box, [y, x] in each: an
-  /// upper bound, close where bins are followed; in the others, what the last slip and touch made
-  /// of the belief that was followed before them.
+  /// Upper bound of a bin's log-likelihood, in nats: close where it is followed.
+  double most(std::int64_t bin) const;
+  /// Log-likelihood of the bins of some boxes of this object, box after box, [y, x] in each. In
+  /// bins that are not followed, what the last slip and touch made of the belief that was followed
+  /// before them, which may lie below their own.
   /// @param touch that step() went through last
   std::vector<double> log_belief(std::span<const BinBox> boxes, const KnownElements& touch) const;
 
