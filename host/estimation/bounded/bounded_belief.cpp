@@ -305,7 +305,10 @@ double BoundedBelief::none_estimate() const {
   const LogInterval none = none_log_evidence();
   const HypothesisMass all = found_->result.all();
   const LogInterval objects = all.bounds();
-  const bool told = tells_enough(none) && objects.high - objects.low <= untold_nats;
+  // Without a budget, a search of the hypotheses ends early where all fits are poor, which tells of
+  // "none of these".
+  const bool told =
+      !options().budget_s || (tells_enough(none) && objects.high - objects.low <= untold_nats);
   if (told || !std::isfinite(all.evaluated)) {
     return std::isfinite(none.low) ? std::midpoint(none.low, none.high) : none.high;
   }

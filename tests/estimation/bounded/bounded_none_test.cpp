@@ -156,6 +156,20 @@ TEST(BoundedPosterior, LeavesNoneOfTheseItsPriorWhereABudgetToldNothing) {
   EXPECT_LT(whole.estimate().none, 0.01);
 }
 
+TEST(BoundedPosterior, BelievesNoneOfTheseWhereASearchOfPoorFitsEndsEarly) {
+  BoundedOptions options = small_options();
+  options.lattice.x_mm.count = options.lattice.y_mm.count = 60;
+  options.none_weight = 1.0 / 3.0;
+  options.poor_bins = 1;
+  BoundedPosterior posterior(two_shapes(), options);
+  // Readings at random, which no pose explains.
+  const Recording recording = random_recording(6, 36, 829);
+  posterior.update(all_touches(recording));
+  const Estimate estimate = posterior.estimate();
+  EXPECT_GT(estimate.certificate->dropped_mass, 0.7) << "the search did not end early";
+  EXPECT_GT(estimate.none, 0.99);
+}
+
 TEST(BoundedPosterior, LeavesObjectsWhereNoneTakesAllOfTheMass) {
   const Recording recording = random_recording(4, 36, 817);
   BoundedOptions options = small_options();
