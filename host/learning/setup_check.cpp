@@ -75,13 +75,13 @@ bool at_one_place(const SetupJudge& judge, const Setup& setup) {
          likeness_of_angles(judge, setup.rad) > one_angle;
 }
 
-/// Where the elements are a full grid, the eight orders in which it may be read, each with the
-/// options of an import that say so.
+/// The elements in the order of their readings, and the options of an import that say so.
 struct ElementOrder {
   std::vector<std::string> options;
   std::vector<glm::dvec2> elements_mm;
 };
 
+/// Where the elements are a full grid, the eight orders in which it may be read.
 std::vector<ElementOrder> orders_of(std::span<const glm::dvec2> elements_mm) {
   constexpr double same_mm = 1e-6;
   const auto less = [](double a, double b) { return a < b - same_mm; };
