@@ -158,17 +158,18 @@ View view_around(const Box& box, const RecognitionSheet& sheet,
   return {.box = box, .lower = part.middle() - half, .upper = part.middle() + half};
 }
 
-/// The ellipses that hold 68 and 95 % of a mode's x and y, in pixels.
-std::array<std::vector<glm::dvec2>, 2> ellipses(const View& view, const ObjectPose& pose) {
+/// Draws the ellipses that hold 68 and 95 % of a mode's x and y.
+/// @returns the outer one, in pixels
+std::vector<glm::dvec2> draw_ellipses(Canvas& canvas, const View& view, const ObjectPose& pose,
+                                      const Pen& pen) {
   const double xx = pose.covariance[0];
   const double xy = pose.covariance[1];
   const double yy = pose.covariance[4];
   const double middle = (xx + yy) / 2.0;
   const double spread = std::hypot((xx - yy) / 2.0, xy);
   const double turn = 0.5 * std::atan2(2.0 * xy, xx - yy);
-  std::array<std::vector<glm::dvec2>, 2> both;
-  for (const bool outer : {false, true}) {
-    const double held = outer ? 0.95 : 0.68;
+  std::vector<glm::dvec2> drawn;
+  for (const double held : {0.68, 0.95}) {
     const double radius = std::sqrt(-2.0 * std::log(1.0 - held));
     const glm::dvec2 axes =
         radius * glm::dvec2(std::sqrt(middle + spread), std::sqrt(std::max(middle - spread, 0.0)));
@@ -179,15 +180,10 @@ std::array<std::vector<glm::dvec2>, 2> ellipses(const View& view, const ObjectPo
       outline.push_back(pose.T_robot_object.translation_mm +
                         rotate(turn, axes * glm::dvec2(std::cos(angle), std::sin(angle))));
     }
-    both[outer ? 1 : 0] = view.pixels(outline);
+    drawn = view.pixels(outline);
+    canvas.polygon(drawn, pen);
   }
-  return both;
-}
-
-void draw_ellipses(Canvas& canvas, const View& view, const ObjectPose& pose, const Pen& pen) {
-  for (const std::vector<glm::dvec2>& ellipse : ellipses(view, pose)) {
-    canvas.polygon(ellipse, pen);
-  }
+  return drawn;
 }
 
 Box box_around(std::span<const glm::dvec2> points) {
@@ -202,8 +198,8 @@ void draw_modes(Canvas& canvas, const View& view, const RecognitionSheet& sheet)
   std::vector<PlacedLabel> labels;
   std::vector<std::string> names;
   for (const RecognitionSheet::Mode& mode : sheet.modes) {
-    draw_ellipses(canvas, view, mode.pose, mode.own ? mode_pen : other_pen);
-    marks.push_back(box_around(ellipses(view, mode.pose)[1]));
+    marks.push_back(
+        box_around(draw_ellipses(canvas, view, mode.pose, mode.own ? mode_pen : other_pen)));
     if (!mode.own && view.contains(mode.pose.T_robot_object.translation_mm)) {
       labels.push_back({marks.back(), {canvas.text_width(mode.name, small), small.size_px}});
       names.push_back(mode.name);

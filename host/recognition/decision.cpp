@@ -71,34 +71,10 @@ std::string percent(double probability) {
                      probability >= 0.9 ? 1 : 0);
 }
 
-/// The probability in as many decimals as tell that it is less than `limit`.
-std::string percent_below(double limit, double probability) {
-  if (probability < 0.999) {
-    return percent(probability);
-  }
-  constexpr int most_decimals = 12;
-  int decimals = 2;
-  const auto shown = [&] {
-    const double parts = std::pow(10.0, decimals);
-    return std::floor(100.0 * parts * probability) / parts;
-  };
-  while (shown() >= 100.0 * limit && decimals < most_decimals) {
-    ++decimals;
-  }
-  return fmt::format("{:.{}f} %", shown(), decimals);
-}
-
-/// A distance in as many decimals as tell that it is more than `limit_mm`.
-std::string mm_above(double limit_mm, double mm) {
-  constexpr int most_decimals = 12;
-  std::string text;
-  for (int decimals = 2; decimals <= most_decimals; ++decimals) {
-    text = fmt::format("{:.{}f} mm", mm, decimals);
-    if (std::stod(text) > limit_mm) {
-      break;
-    }
-  }
-  return text;
+/// A probability that is not enough, of which percent() may tell too little.
+std::string percent_below(double probability) {
+  return probability < 0.999 ? percent(probability)
+                             : fmt::format("{:.4f} %", std::floor(1e6 * probability) / 1e4);
 }
 
 }  // namespace
@@ -192,9 +168,8 @@ Decision decide(const RecognitionStep& step, const RecognitionTask& task) {
     // The sentence says that it is a bound where the probability itself is enough, or far from it.
     constexpr double near = 0.05;
     const bool sure = step.confidence() < task.act.above && step.confidence() - proven <= near;
-    return {false, fmt::format("{} has {}{}, less than {:.10g} %", best,
-                               percent_below(task.act.above, proven), sure ? "" : " for certain",
-                               100.0 * task.act.above)};
+    return {false, fmt::format("{} has {}{}, less than {:.10g} %", best, percent_below(proven),
+                               sure ? "" : " for certain", 100.0 * task.act.above)};
   }
   const BeliefPlaces& places = step.places;
   if (places.within_mm && *places.within_mm <= task.act.below_mm) {
@@ -218,8 +193,10 @@ Decision decide(const RecognitionStep& step, const RecognitionTask& task) {
     return {false,
             fmt::format("less than 95 % of the belief is known to lie near the pose of {}", posed)};
   }
-  return {false, fmt::format("95 % of the belief lies within {} of the pose, not within {:g} mm",
-                             mm_above(task.act.below_mm, *places.within_mm), task.act.below_mm)};
+  // Rounded up, so that it is seen to be more.
+  return {false,
+          fmt::format("95 % of the belief lies within {:.2f} mm of the pose, not within {:g} mm",
+                      std::ceil(100.0 * *places.within_mm) / 100.0, task.act.below_mm)};
 }
 
 }  // namespace palpate

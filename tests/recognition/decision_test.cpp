@@ -68,15 +68,14 @@ TEST(Decision, SaysWhatSpeaksAgainst) {
   step.places.within_mm = 0.8;
   EXPECT_EQ(refused(step), "95 % of the belief lies within 0.80 mm of the pose, not within 0.5 mm");
   step.places.within_mm = 0.5004;
-  EXPECT_EQ(refused(step),
-            "95 % of the belief lies within 0.5004 mm of the pose, not within 0.5 mm");
+  EXPECT_EQ(refused(step), "95 % of the belief lies within 0.51 mm of the pose, not within 0.5 mm");
   step.places.within_mm.reset();
   EXPECT_EQ(refused(step), "less than 95 % of the belief is known to lie near the pose of L");
 
   task.act.above = 0.999999999;
   step = good_step();
   step.identity = {0.99998, 0.00002, 0.0};
-  EXPECT_EQ(refused(step), "L has 99.99 %, less than 99.9999999 %");
+  EXPECT_EQ(refused(step), "L has 99.9980 %, less than 99.9999999 %");
 
   task.act = {.below_mm = 1.0, .above = 0.8};
   step = good_step();

@@ -57,6 +57,7 @@ MovingObject::MovingObject(const SlipTask& task, std::size_t object, const glm::
 void MovingObject::start() {
   const auto bins = static_cast<std::size_t>(task_.lattice.bins());
   log_mass_.assign(bins, 0.0);
+  before_.assign(bins, 0.0);
   log_rest_.assign(bins, -infinity);
   followed_.assign(static_cast<std::size_t>(task_.lattice.theta_rad.count) * rows_ * columns_, 1);
   rounding_ = scale_ = over_ = under_ = 0.0;
@@ -68,7 +69,8 @@ void MovingObject::start() {
 
 void MovingObject::step(const KnownElements& touch, bool slips, std::span<const double> tiles,
                         double least, bool by_logs) {
-  before_ = log_mass_;
+  // All of log_mass_ is written anew; before the first touch both are the uniform belief.
+  before_.swap(log_mass_);
   slipped_ = slips;
   choose(tiles, least);
   if (slips) {
@@ -91,7 +93,7 @@ void MovingObject::slip(bool by_logs) {
       log_rest_[bin] = log_mean[bin] == -infinity ? lost : log_mean[bin] + error[bin] + 1e-12;
     });
   }
-  const double lost = of_bins_.means(runs_, log_mass_, log_mean, error, by_logs);
+  const double lost = of_bins_.means(runs_, before_, log_mean, error, by_logs);
   rounding_ += of_bins_.mean_error();
   change_bins([&](std::size_t bin, double& log_mass, double& rest, double& most) {
     log_mass = log_mean[bin];
