@@ -47,10 +47,4 @@ ObjectPose scaled(const Body& body, ObjectPose pose, const PoseScale& scale) {
   return pose;
 }
 
-RefinedPose scaled(const Body& body, const RefinedPose& pose, const PoseScale& scale) {
-  const ObjectPose of_robot = scaled(body, inverse(pose), scale);
-  return {pose.T_object_robot,
-          inverse(RefinedPose{of_robot.T_robot_object, of_robot.covariance}).covariance};
-}
-
 }  // namespace palpate

@@ -15,6 +15,5 @@ double spread_mm(const Body& body, const ObjectPose& pose);
 
 /// The pose with the covariance that the scale makes of it.
 ObjectPose scaled(const Body& body, ObjectPose pose, const PoseScale& scale);
-RefinedPose scaled(const Body& body, const RefinedPose& pose, const PoseScale& scale);
 
 }  // namespace palpate

@@ -9,6 +9,7 @@
 #include "palpate/learned_sensor.hpp"
 #include "recognition/label_probability.hpp"
 #include "recognition/recognition_record.hpp"
+#include "recognition/scaled_pose.hpp"
 
 namespace palpate {
 
@@ -47,19 +48,19 @@ ObjectPose between_bins(const Recogniser& recogniser, const RecognitionTask& tas
                         const BeliefMode& mode, const BinnedObject& of,
                         std::optional<RefinedPose> refined) {
   constexpr double narrow_mm = 1.0;
-  const bool on_scale = refined.has_value();
+  const bool scaled = refined.has_value();
   if (spread_mm(of.body, mode.pose) >= narrow_mm) {
-    return scaled(of.body, mode.pose, task.pose_scale);
+    return on_scale(task, recogniser.evidence(), of.body, mode.pose);
   }
-  if (!on_scale) {
+  if (!scaled) {
     refined = recogniser.refine({.object = mode.object, .T_object_robot = mode.best});
   }
   if (!refined) {
-    return scaled(of.body, mode.pose, task.pose_scale);
+    return on_scale(task, recogniser.evidence(), of.body, mode.pose);
   }
   ObjectPose pose = inverse(least_turned(of.body, of.symmetry, *refined));
   pose.T_robot_object.theta_rad = wrap_angle(pose.T_robot_object.theta_rad, 2.0 * std::numbers::pi);
-  return on_scale ? pose : scaled(of.body, pose, task.pose_scale);
+  return scaled ? pose : on_scale(task, recogniser.evidence(), of.body, pose);
 }
 
 std::string percent(double probability) {

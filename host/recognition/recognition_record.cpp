@@ -8,12 +8,12 @@
 #include <fmt/format.h>
 
 #include "estimation/lattice/refinement.hpp"
-#include "model/body_spread.hpp"
 #include "palpate/error.hpp"
 #include "palpate/object_frame.hpp"
 #include "palpate/pose_error.hpp"
 #include "recognition/label_probability.hpp"
 #include "recognition/nearby_fit.hpp"
+#include "recognition/scaled_pose.hpp"
 #include "recognition/surprise.hpp"
 #include "recognition/warnings.hpp"
 
@@ -221,8 +221,8 @@ RecognitionStep take_step(Recogniser& recogniser, const RecognitionTask& task,
   const Clock::time_point estimated = Clock::now();
   std::optional<RefinedPose> refined = recogniser.refine(estimate.mode);
   if (refined) {
-    refined = scaled(displaced_body(task.hypotheses[estimate.mode.object].map), *refined,
-                     task.pose_scale);
+    refined = on_scale(task, evidence, displaced_body(task.hypotheses[estimate.mode.object].map),
+                       *refined);
   }
   const double refine_seconds = seconds_since(estimated);
   RecognitionStep step = judge(estimate, truth, task, evidence, refined);

@@ -12,8 +12,8 @@ namespace palpate {
 
 namespace {
 
-/// Whether recognition judges touches as `map` did: by Eq. 7 with the same numbers, at poses that
-/// are exact, on bins that resolve the maps.
+/// Whether recognition judges touches as `map` did: by Eq. 7 with the same numbers, on bins that
+/// resolve the maps.
 bool judges_as_map(const RecognitionTask& task) {
   constexpr double wider = 2.0;  // a pose between wider bins fits worse
   const ContactModel& contact = task.contact();
@@ -26,8 +26,7 @@ bool judges_as_map(const RecognitionTask& task) {
     return own.threshold == contact.classifier.threshold && own.ratio == contact.classifier.ratio &&
            contact.prior.value_or(hypothesis.map.prior) == hypothesis.map.prior;
   };
-  return !contact.table && contact.gamma == usual_gamma && task.touch_sd().none() &&
-         task.slip_sd().none() && traits_of(task.filter).bins &&
+  return !contact.table && contact.gamma == usual_gamma && traits_of(task.filter).bins &&
          std::ranges::all_of(task.hypotheses, alike) &&
          resolves(task.lattice(), task.hypotheses, wider);
 }
@@ -62,7 +61,8 @@ Scales scales_of_maps(const RecognitionTask& task) {
   }
   const bool as_map = judges_as_map(task);
   Scales scales;
-  if (!fits.empty() && as_map) {
+  const bool exact = task.touch_sd().none() && task.slip_sd().none();
+  if (!fits.empty() && as_map && exact) {
     scales.fit = pooled(fits);
   }
   if (poses > 0.0) {

@@ -133,6 +133,37 @@ TEST(PoseScale, MovesTheBodyAsFarAlongEveryAxis) {
   }
 }
 
+TEST_F(LeftOutFit, TouchesOfATurnedArrayAreAtOnePlace) {
+  Recording recording = touches(6, 1);
+  const glm::dvec2 middle_mm = array_centre_mm(recording.elements_mm);
+  const std::vector<glm::dvec2> at_mm{{0.2, 0.0}, {7.0, 0.0}, {0.2, 0.0},
+                                      {1.0, 0.0}, {7.0, 0.0}, {7.0, 1.1}};
+  for (std::size_t i = 0; i < recording.size(); ++i) {
+    const double theta_rad = 0.5 * static_cast<double>(i);
+    recording.T_robot_sensor[i] = {at_mm[i] - rotate(theta_rad, middle_mm), theta_rad};
+  }
+  const std::vector<TouchEvidence> evidence =
+      evidence_of(recording.touches(0, recording.size()), ContactModel{});
+  EXPECT_EQ(places_of(evidence, 3), (std::vector<std::size_t>{0, 1, 0, 0, 1, 2}));
+  EXPECT_EQ(places_of(evidence, 4), (std::vector<std::size_t>{0, 1, 2, 3, 4, 5})) << "too few";
+}
+
+TEST_F(LeftOutFit, PosesAreNoSurerWhereEachTouchHasATwin) {
+  const Recording once = touches(80, 3);
+  Recording twice = once;
+  twice.T_robot_sensor.insert(twice.T_robot_sensor.end(), once.T_robot_sensor.begin(),
+                              once.T_robot_sensor.end());
+  twice.pressure.insert(twice.pressure.end(), once.pressure.begin(), once.pressure.end());
+  twice.time_s.insert(twice.time_s.end(), once.time_s.begin(), once.time_s.end());
+  const auto variance_mm2 = [](const PoseScale& scale) {
+    constexpr double belief_sd_mm = 0.25;  // of some five touches
+    return scale.factor * belief_sd_mm * belief_sd_mm + scale.map_sd_mm * scale.map_sd_mm;
+  };
+  const double of_once = variance_mm2(judged(once).pose_scale.value());
+  const double of_twice = variance_mm2(judged(twice).pose_scale.value());
+  EXPECT_GT(of_twice, 0.7 * of_once);
+}
+
 TEST_F(LeftOutFit, Eq7IsLessSureOfPosesThanThisSensorDeserves) {
   const PoseScale scale = judged(touches(120, 3)).pose_scale.value();
   EXPECT_LT(scale.factor, 0.7);

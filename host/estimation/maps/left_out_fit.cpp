@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <iterator>
+#include <map>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -123,6 +125,21 @@ std::optional<PoseScale> pose_scale_of(std::span<const PlaceError> errors) {
   return best;
 }
 
+std::vector<std::size_t> places_of(std::span<const TouchEvidence> touches, std::size_t least) {
+  constexpr double side_mm = 1.7;
+  std::map<std::pair<long, long>, std::size_t> place_in;  // [square]
+  std::vector<std::size_t> place;
+  for (const TouchEvidence& touch : touches) {
+    const glm::dvec2 square = (touch.middle_mm() - touches.front().middle_mm()) / side_mm;
+    const std::pair key(std::lround(square.x), std::lround(square.y));
+    place.push_back(place_in.try_emplace(key, place_in.size()).first->second);
+  }
+  if (place_in.size() < least) {
+    std::iota(place.begin(), place.end(), std::size_t{0});
+  }
+  return place;
+}
+
 void judge_left_out(Device& device, MapSource& source) {
   const std::vector<Touch> touches = source.touches.touches(0, source.touches.size());
   const ContactModel contact{.classifier = source.options.classifier,
@@ -134,33 +151,45 @@ void judge_left_out(Device& device, MapSource& source) {
   if (std::cmp_less(std::ranges::count_if(evidence, &TouchEvidence::in_contact), least_judged)) {
     return;
   }
-  constexpr std::uint64_t seed = 0;
-  Random random(seed, Stream::touch_order);
-  std::vector<std::size_t> part(touches.size());
-  for (std::size_t& one : part) {
-    one = static_cast<std::size_t>(random.uniform(0.0, static_cast<double>(parts)));
-  }
   MapBuilder builder(device, source.options);
-  std::vector<double> z;
-  std::vector<PlaceError> errors;
-  for (std::size_t left_out = 0; left_out < parts && z.size() < enough; ++left_out) {
-    std::vector<Touch> others;
-    std::vector<TouchEvidence> judged;
-    for (std::size_t i = 0; i < touches.size(); ++i) {
-      if (part[i] != left_out) {
-        others.push_back(touches[i]);
-      } else if (evidence[i].in_contact()) {
-        judged.push_back(evidence[i]);
-      }
+  // Judges touches on maps of the others. Touches with the same number are left out together.
+  const auto leave_out = [&](std::span<const std::size_t> number, const auto& judge) {
+    constexpr std::uint64_t seed = 0;
+    Random random(seed, Stream::touch_order);
+    std::vector<std::size_t> part_of(touches.size());  // [number]
+    for (std::size_t& part : part_of) {
+      part = static_cast<std::size_t>(random.uniform(0.0, static_cast<double>(parts)));
     }
-    builder.clear();
-    builder.add(others);
-    const Hypothesis of{.map = builder.build(source.touches.object)};
+    std::size_t all_judged = 0;
+    for (std::size_t left_out = 0; left_out < parts && all_judged < enough; ++left_out) {
+      std::vector<Touch> others;
+      std::vector<TouchEvidence> judged;
+      for (std::size_t i = 0; i < touches.size(); ++i) {
+        if (part_of[number[i]] != left_out) {
+          others.push_back(touches[i]);
+        } else if (evidence[i].in_contact()) {
+          judged.push_back(evidence[i]);
+        }
+      }
+      builder.clear();
+      builder.add(others);
+      judge(Hypothesis{.map = builder.build(source.touches.object)}, judged);
+      all_judged += judged.size();
+    }
+  };
+  std::vector<std::size_t> each(touches.size());
+  std::iota(each.begin(), each.end(), std::size_t{0});
+  std::vector<double> z;
+  leave_out(each, [&](const Hypothesis& of, std::span<const TouchEvidence> judged) {
     for (const TouchEvidence& touch : judged) {
       z.push_back(evidence_fit(std::span(&touch, 1), Pose{}, of.map, contact, 0)->z);
     }
-    std::ranges::move(place_errors(judged, of, contact, 0), std::back_inserter(errors));
-  }
+  });
+  std::vector<PlaceError> errors;
+  leave_out(places_of(evidence, parts),
+            [&](const Hypothesis& of, std::span<const TouchEvidence> judged) {
+              std::ranges::move(place_errors(judged, of, contact, 0), std::back_inserter(errors));
+            });
   source.left_out = scale_of(z);
   source.pose_scale = pose_scale_of(errors);
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <span>
 #include <vector>
@@ -35,9 +36,15 @@ std::vector<PlaceError> place_errors(std::span<const TouchEvidence> touches, con
 /// up is the factor's, what remains the map's. None of fewer than 16 errors.
 std::optional<PoseScale> pose_scale_of(std::span<const PlaceError> errors);
 
+/// [touch] the number of its place, a square of 1.7 mm that holds the array's centre, however the
+/// array is turned. Each touch has a place of its own where these are fewer than `least`.
+std::vector<std::size_t> places_of(std::span<const TouchEvidence> touches, std::size_t least);
+
 /// Sets MapSource::left_out and pose_scale. Builds maps of random three quarters of the touches,
-/// and judges the others at their poses, until about 200 are judged, or each touch once. Both are
-/// none where fewer than 16 touches are in contact.
+/// and judges the others at their poses, until about 200 are judged, or each touch once. For
+/// pose_scale, touches at one place are left out together: turned by half a turn, an array has
+/// elements where it had others, so that a map of these places it better than one of touches
+/// elsewhere. Both are none where fewer than 16 touches are in contact.
 /// @throws Error as MapBuilder does
 void judge_left_out(Device& device, MapSource& source);
 
