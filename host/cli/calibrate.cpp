@@ -101,6 +101,9 @@ void calibrate(const CalibrateArguments& options) {
     array_mm = common_array(recordings);
   }
 
+  if (!options.png.empty()) {
+    make_folder(options.png);  // before the work that a wrong name would lose
+  }
   SensorCalibration calibration;
   {
     Progress progress("calibrating");
@@ -120,7 +123,6 @@ void calibrate(const CalibrateArguments& options) {
       pictures.emplace_back(folder / reliability_name,
                             draw_reliability(reliability_of(calibration)));
     }
-    make_folder(folder);
   }
   write_sensor_model(options.output, calibration.sensor);
   if (!options.write_array.empty()) {
