@@ -1,11 +1,9 @@
 #include "learning/cross_validation.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <iterator>
 #include <limits>
-#include <map>
 #include <utility>
 
 #include <tbb/parallel_for.h>
@@ -45,62 +43,6 @@ struct LabelScore {
     return maps == 0 ? nothing : log_evidence_sum - std::log(static_cast<double>(maps));
   }
 };
-
-void shuffle(std::span<const Press*> presses, Random& random) {
-  for (std::size_t i = presses.size(); i > 1; --i) {
-    const auto place = static_cast<std::size_t>(random.uniform() * static_cast<double>(i));
-    std::swap(presses[i - 1], presses[place]);
-  }
-}
-
-/// Groups of presses of one object.
-std::vector<Press> groups_of(std::span<const Press*> presses, Random& random) {
-  std::vector<Press> groups;
-  const std::size_t times = presses.size() < 2 * presses_in_group ? 1 : groups_of_press;
-  for (std::size_t time = 0; time < times; ++time) {
-    shuffle(presses, random);
-    for (std::size_t i = 0; i + presses_in_group <= presses.size(); i += presses_in_group) {
-      groups.push_back(together(presses.subspan(i, presses_in_group)));
-    }
-  }
-  return groups;
-}
-
-/// What is to be recognised of a fold.
-struct Unknowns {
-  std::vector<Press> presses;  ///< single presses, and then groups of them
-  std::vector<std::size_t> half_of_group = {};
-};
-
-/// Presses and groups of them as if their poses were unknown.
-Unknowns unknowns_of(const std::vector<Press>& presses, const RecognitionBins& bins,
-                     std::size_t fold) {
-  Unknowns asked{.presses = presses};
-  std::map<std::string, std::vector<const Press*>> of_label;
-  for (const Press& press : presses) {
-    of_label[press.label].push_back(&press);
-  }
-  Random random(fold, Stream::unknowns);
-  std::size_t half = fold % 2;
-  for (auto& [label, own] : of_label) {
-    // Presses that are too few for two halves are all of one.
-    shuffle(own, random);
-    const bool divided = own.size() >= 2 * presses_in_group;
-    const std::size_t middle = divided ? own.size() / 2 : own.size();
-    const std::array parts{std::span(own).first(middle), std::span(own).subspan(middle)};
-    for (std::size_t k = 0; k < parts.size(); ++k) {
-      for (Press& group : groups_of(parts.at(k), random)) {
-        asked.presses.push_back(std::move(group));
-        asked.half_of_group.push_back((half + k) % 2);
-      }
-    }
-    half = 1 - half;
-  }
-  for (Press& press : asked.presses) {
-    press = as_unknown(press, bins, random);
-  }
-  return asked;
-}
 
 /// A model of the other folds, by whose maps presses are recognised.
 class FoldTrial {

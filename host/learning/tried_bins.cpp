@@ -1,7 +1,11 @@
 #include "learning/tried_bins.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <map>
+#include <string>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -43,6 +47,26 @@ double additions_per_bin(const std::vector<Press>& presses, const ContactClassif
   return times_tried * readings * static_cast<double>(maps);
 }
 
+void shuffle(std::span<const Press*> presses, Random& random) {
+  for (std::size_t i = presses.size(); i > 1; --i) {
+    const auto place = static_cast<std::size_t>(random.uniform() * static_cast<double>(i));
+    std::swap(presses[i - 1], presses[place]);
+  }
+}
+
+/// Groups of presses of one object.
+std::vector<Press> groups_of(std::span<const Press*> presses, Random& random) {
+  std::vector<Press> groups;
+  const std::size_t times = presses.size() < 2 * presses_in_group ? 1 : groups_of_press;
+  for (std::size_t time = 0; time < times; ++time) {
+    shuffle(presses, random);
+    for (std::size_t i = 0; i + presses_in_group <= presses.size(); i += presses_in_group) {
+      groups.push_back(together(presses.subspan(i, presses_in_group)));
+    }
+  }
+  return groups;
+}
+
 }  // namespace
 
 Press as_unknown(const Press& press, const RecognitionBins& bins, Random& random) {
@@ -76,6 +100,35 @@ Press together(std::span<const Press* const> presses) {
     }
   }
   return all;
+}
+
+Unknowns unknowns_of(const std::vector<Press>& presses, const RecognitionBins& bins,
+                     std::size_t fold) {
+  Unknowns asked{.presses = presses};
+  std::map<std::string, std::vector<const Press*>> of_label;
+  for (const Press& press : presses) {
+    of_label[press.label].push_back(&press);
+  }
+  Random random(fold, Stream::unknowns);
+  std::size_t half = fold % 2;
+  for (auto& [label, own] : of_label) {
+    // Presses that are too few for two halves are all of one.
+    shuffle(own, random);
+    const bool divided = own.size() >= 2 * presses_in_group;
+    const std::size_t middle = divided ? own.size() / 2 : own.size();
+    const std::array parts{std::span(own).first(middle), std::span(own).subspan(middle)};
+    for (std::size_t k = 0; k < parts.size(); ++k) {
+      for (Press& group : groups_of(parts.at(k), random)) {
+        asked.presses.push_back(std::move(group));
+        asked.half_of_group.push_back((half + k) % 2);
+      }
+    }
+    half = 1 - half;
+  }
+  for (Press& press : asked.presses) {
+    press = as_unknown(press, bins, random);
+  }
+  return asked;
 }
 
 PoseLattice fine_lattice(const std::vector<Press>& presses, double spacing_mm) {

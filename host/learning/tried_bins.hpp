@@ -30,6 +30,15 @@ Press as_unknown(const Press& press, const RecognitionBins& bins, Random& random
 /// @param presses at known poses, at least one
 Press together(std::span<const Press* const> presses);
 
+/// Presses of a fold that are to be recognised.
+struct Unknowns {
+  std::vector<Press> presses;  ///< single presses, and then groups of them
+  std::vector<std::size_t> half_of_group = {};
+};
+/// Presses at known poses, and groups of presses_in_group of one object, as_unknown().
+Unknowns unknowns_of(const std::vector<Press>& presses, const RecognitionBins& bins,
+                     std::size_t fold);
+
 /// Steps of theta at which presses at unknown poses are placed; steps of x and y are the elements'
 /// spacing.
 inline constexpr double placing_step_rad = std::numbers::pi / 18.0;
