@@ -16,6 +16,7 @@
 #include "figures/ticks.hpp"
 #include "learning/level_counts.hpp"
 #include "model/option_words.hpp"
+#include "recognition/misfit.hpp"
 
 namespace palpate::cli {
 
@@ -57,6 +58,11 @@ std::string values_table(const SensorCalibration& calibration, std::optional<int
   if (sensor.fit_scale) {
     table.add({"fit of learned objects, z", "0 +- 1",
                fmt::format("{:.2g} +- {:.2g}", sensor.fit_scale->mean, sensor.fit_scale->sd)});
+    if (const auto& learned = sensor.fit_scale->stranger_sd) {
+      table.add({"of strangers, for every further touch",
+                 fmt::format("+- {:.2g} more", usual_stranger_sd),
+                 fmt::format("+- {:.2g} more", *learned)});
+    }
   }
   return table.text(columns);
 }
@@ -181,6 +187,16 @@ std::vector<ChartPoint> points_of(const std::vector<double>& table, std::size_t 
 
 }  // namespace
 
+std::string unlearned_strangers(const LearnedSensor& sensor) {
+  const bool known_poses = sensor.bins.has_value();
+  if (!known_poses || !sensor.fit_scale || sensor.fit_scale->stranger_sd) {
+    return "";
+  }
+  return "how badly strangers fit is a figure of Palpate's own, by which \"(none)\" is told: it "
+         "takes "
+         "15 touches or more of each of three objects to learn it";
+}
+
 std::string calibration_text(const SensorCalibration& calibration, std::size_t touches,
                              std::optional<int> columns) {
   std::string text = fmt::format("{} touches, {}\n\n", touches,
@@ -202,6 +218,9 @@ std::string calibration_text(const SensorCalibration& calibration, std::size_t t
     text +=
         fmt::format("area under the curve of touches of known against left-out objects: {:.3f}\n",
                     *calibration.area_under_curve);
+  }
+  if (const std::string words = unlearned_strangers(calibration.sensor); !words.empty()) {
+    text += words + "\n";
   }
   if (calibration.array_offset) {
     text += in_flags(calibration.array_offset->words) +

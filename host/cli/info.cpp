@@ -77,9 +77,13 @@ std::string sensor_model_text(const LearnedSensor& sensor) {
                                    sensor.familiarity->offset, sensor.familiarity->explained_slope,
                                    sensor.familiarity->lead_slope));
   }
-  if (sensor.fit_scale) {
-    add("fit scale", fmt::format("z of learned objects {:.4g} +- {:.4g}", sensor.fit_scale->mean,
-                                 sensor.fit_scale->sd));
+  if (const auto& scale = sensor.fit_scale) {
+    add("fit scale",
+        fmt::format("z of learned objects {:.4g} +- {:.4g}{}", scale->mean, scale->sd,
+                    scale->stranger_sd
+                        ? fmt::format(", of strangers +- {:.4g} more on it for every further touch",
+                                      *scale->stranger_sd)
+                        : ""));
   }
   if (sensor.pose_scale) {
     add("pose scale",

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "cli/calibrate_output.hpp"
 #include "cli/options.hpp"
 #include "cli/progress.hpp"
 #include "cli/recognition_flags.hpp"
@@ -221,6 +222,9 @@ MapSensor learn_sensor(const MapFlags& flags, const std::vector<OccupancyGrid>& 
       learned.sensor->touch_sd = touch_sd(flags);
       for (const auto& [file, map] : all) {
         learned.sensor->maps[file.filename().string()] = digest_of(map);
+      }
+      if (const std::string words = unlearned_strangers(*learned.sensor); !words.empty()) {
+        learned.words += fmt::format("\n{}: {}", sensor_file(flags).string(), words);
       }
     }
     return learned;

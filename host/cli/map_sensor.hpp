@@ -21,7 +21,7 @@ bool learns_sensor(const MapFlags& flags);
 std::vector<std::filesystem::path> other_maps(const MapFlags& flags,
                                               const std::vector<std::filesystem::path>& written);
 
-/// A sensor model for the maps of a folder, and a line or two about it.
+/// A sensor model for the maps of a folder, and some lines about it.
 struct MapSensor {
   std::optional<LearnedSensor> sensor;  ///< none where it is not better, or cannot be learned
   std::string words;

@@ -51,6 +51,7 @@ void describe(Keys& keys, FitScale& scale) {
   keys("mean", scale.mean);
   keys("sd", scale.sd);
   keys("shared_sd", scale.shared_sd, scale.shared_sd > 0.0);
+  keys("stranger_sd", scale.stranger_sd);
 }
 
 template <typename Keys>

@@ -93,6 +93,9 @@ class FoldTrial {
       std::ranges::transform(scores[i], std::back_inserter(scored.log_evidence),
                              &LabelScore::log_evidence);
       if (i >= tried.size()) {
+        if (const auto fit = stranger_fit_of(evidence[i], scores[i], scored.truth)) {
+          result.stranger_fits[asked.presses[i].label].push_back(*fit);
+        }
         const std::size_t half = asked.half_of_group[i - tried.size()];
         if (half == 0) {
           scored.error_mm =
@@ -228,12 +231,7 @@ class FoldTrial {
   /// Adds what tells whether a press's own object was learned.
   void add_familiarity(const TouchEvidence& touch, const std::vector<LabelScore>& scores,
                        const ScoredPress& scored, FamiliarityScores& familiarity) const {
-    std::vector<std::size_t> others;
-    for (std::size_t label = 0; label < labels_.size(); ++label) {
-      if (label != scored.truth && scores[label].maps > 0) {
-        others.push_back(label);
-      }
-    }
+    const std::vector<std::size_t> others = others_of(scored.truth, scores);
     if (others.empty()) {
       return;
     }
@@ -253,22 +251,57 @@ class FoldTrial {
     familiarity.unknown.push_back(score_without(scored.truth));
   }
 
+  /// The labels but one that have maps.
+  std::vector<std::size_t> others_of(std::size_t label,
+                                     const std::vector<LabelScore>& scores) const {
+    std::vector<std::size_t> others;
+    for (std::size_t other = 0; other < labels_.size(); ++other) {
+      if (other != label && scores[other].maps > 0) {
+        others.push_back(other);
+      }
+    }
+    return others;
+  }
+
+  const OccupancyGrid& compared(std::size_t map) const {
+    return model_.table ? layers_[map] : model_.maps[map].map;
+  }
+
+  /// How a press fits the best of these objects at about the best pose.
+  std::optional<Fit> best_fit(std::span<const TouchEvidence> press,
+                              const std::vector<LabelScore>& scores,
+                              std::span<const std::size_t> labels) const {
+    const std::size_t label = *std::ranges::max_element(
+        labels, {}, [&](std::size_t one) { return scores[one].best_log_likelihood; });
+    const LabelScore& at = scores[label];
+    return best_fit_near(press, at.best_pose, compared(at.best_map), contact_for(label), 0);
+  }
+
   /// How a press fits its object at its pose, or where that is unknown, the best object.
   std::optional<Fit> fit_of(std::span<const TouchEvidence> press,
                             const std::vector<LabelScore>& scores, std::size_t truth,
                             const std::optional<Pose>& T_object_robot) const {
-    std::size_t label = truth;
-    for (std::size_t other = 0; !T_object_robot && other < labels_.size(); ++other) {
-      if (scores[other].best_log_likelihood > scores[label].best_log_likelihood) {
-        label = other;
-      }
+    if (T_object_robot) {
+      return evidence_fit(press, *T_object_robot, compared(scores[truth].best_map),
+                          contact_for(truth), 0);
     }
-    const LabelScore& at = scores[label];
-    const OccupancyGrid& map = model_.table ? layers_[at.best_map] : model_.maps[at.best_map].map;
-    return T_object_robot ? evidence_fit(press, *T_object_robot, map, contact_for(label), 0)
-                          : best_fit_near(press, at.best_pose, map, contact_for(label), 0);
+    std::vector<std::size_t> labels = others_of(truth, scores);
+    labels.insert(labels.begin(), truth);  // the best where another is as good
+    return best_fit(press, scores, labels);
   }
 
+  /// See CrossValidation::stranger_fits.
+  std::optional<StrangerFit> stranger_fit_of(std::span<const TouchEvidence> press,
+                                             const std::vector<LabelScore>& scores,
+                                             std::size_t truth) const {
+    const std::vector<std::size_t> others = others_of(truth, scores);
+    const auto in_contact = std::ranges::count_if(press, &TouchEvidence::in_contact);
+    if (!model_.table || others.size() < 2 || in_contact == 0) {
+      return {};
+    }
+    const std::optional<Fit> fit = best_fit(press, scores, others);
+    return StrangerFit{fit.value(), static_cast<std::size_t>(in_contact)};
+  }
   /// Errors of the places of presses at known poses.
   std::vector<PlaceError> errors_of(const std::vector<Press>& presses) const {
     std::vector<PlaceError> errors;
@@ -319,6 +352,9 @@ CrossValidation joined(std::span<const CrossValidation> folds) {
     append(fold.place_errors, all.place_errors);
     for (const auto& [label, z] : fold.fit_z) {
       append(z, all.fit_z[label]);
+    }
+    for (const auto& [label, fits] : fold.stranger_fits) {
+      append(fits, all.stranger_fits[label]);
     }
   }
   return all;

@@ -13,6 +13,7 @@
 #include "learning/contact_learning.hpp"
 #include "learning/familiarity_fit.hpp"
 #include "learning/press.hpp"
+#include "learning/stranger_fit.hpp"
 #include "learning/table_learning.hpp"
 #include "learning/temperature_fit.hpp"
 #include "learning/training_maps.hpp"
@@ -98,6 +99,9 @@ struct CrossValidation {
   /// [label] Fit::z of presses with an element In Contact: at their pose where it is known, or else
   /// on the best map at about the best pose.
   std::map<std::string, std::vector<double>> fit_z;
+  /// [label] How the groups fit the best of all other objects, at about its best pose, by a table.
+  /// None with maps of fewer than two others.
+  std::map<std::string, std::vector<StrangerFit>> stranger_fits;
   std::vector<PlaceError> place_errors;  ///< of presses at known poses, by a table
 };
 /// The cross-validation of several folds, each of which has one FamiliarityScores.

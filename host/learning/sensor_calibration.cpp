@@ -249,6 +249,9 @@ LearnedSensor with_confidence(LearnedSensor sensor, const CrossValidation& valid
     sensor.features->weight = fit.feature_weight;
   }
   sensor.fit_scale = fit_scale_of(validation.fit_z);
+  if (sensor.fit_scale) {
+    sensor.fit_scale->stranger_sd = stranger_sd_of(validation.stranger_fits, *sensor.fit_scale);
+  }
   sensor.pose_scale = pose_scale_of(validation.place_errors);
   const FamiliarityScores scores = all_of(validation.familiarity);
   if (!scores.known.empty()) {

@@ -224,6 +224,9 @@ void LearnedSensor::validate() const {
   if (fit_scale && !from_0(fit_scale->shared_sd)) {
     refuse("fit_scale: shared_sd", fit_scale->shared_sd, "give a number from 0");
   }
+  if (fit_scale && fit_scale->stranger_sd && !is_positive(*fit_scale->stranger_sd)) {
+    refuse("fit_scale: stranger_sd", *fit_scale->stranger_sd, "give a positive number");
+  }
 }
 
 }  // namespace palpate

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "recognition/misfit.hpp"
+
 namespace palpate {
 
 namespace {
@@ -59,24 +61,6 @@ std::vector<double> label_log_evidence(const Estimate& estimate, const Recogniti
   return logs;
 }
 
-double misfit_nats(const Fit& fit, std::size_t touches) {
-  // Fits of learned objects on their scale: one in ten has a wider spread. A stranger's fit spreads
-  // the more, the more touches have to share a pose.
-  constexpr double odd_share = 0.1;
-  constexpr double odd_sd = 5.0;
-  constexpr double stranger_sd = 4.0;  // for every touch after the first
-  const auto normal = [&](double sd) { return std::exp(-0.5 * fit.z * fit.z / (sd * sd)) / sd; };
-  constexpr double farthest = 30.0;  // no density is 0
-  if (fit.z < -farthest) {
-    return misfit_nats({.z = -farthest}, touches);
-  }
-  const double further = stranger_sd * (static_cast<double>(touches) - 1.0);
-  const double own = (1.0 - odd_share) * normal(1.0) + odd_share * normal(odd_sd);
-  const double other = (1.0 - odd_share) * normal(std::hypot(1.0, further)) +
-                       odd_share * normal(std::hypot(odd_sd, further));
-  return std::log(other / own);
-}
-
 Tempering tempering_of(std::span<const TouchEvidence> touches, const RecognitionTask& task,
                        const std::optional<Fit>& fit) {
   Tempering tempering{temperature_of(std::max<std::size_t>(touches.size(), 1), task.temperature,
@@ -85,7 +69,8 @@ Tempering tempering_of(std::span<const TouchEvidence> touches, const Recognition
   const bool on_scale = task.fit_scale.shared_sd > 0.0;
   if (fit && on_scale && task.labels.back() == none_label) {
     tempering.features.back() += misfit_nats(
-        *fit, static_cast<std::size_t>(std::ranges::count_if(touches, &TouchEvidence::in_contact)));
+        *fit, static_cast<std::size_t>(std::ranges::count_if(touches, &TouchEvidence::in_contact)),
+        task.fit_scale.stranger_sd.value_or(usual_stranger_sd));
   }
   return tempering;
 }

@@ -44,13 +44,6 @@ struct Tempering {
 Tempering tempering_of(std::span<const TouchEvidence> touches, const RecognitionTask& task,
                        const std::optional<Fit>& fit = {});
 
-/// What the fit of the best object says for none_label: the log of how likely a stranger fits so,
-/// over how likely a learned object does. After one touch it says nothing: a stranger's single
-/// touch fits as well as a learned object's.
-/// @param fit on a scale that was learned
-/// @param touches with an element In Contact
-double misfit_nats(const Fit& fit, std::size_t touches);
-
 /// `known`, which is learned at even odds, at those of the maps' weights against that of "(none)".
 double weighed(double known, const RecognitionTask& task);
 

@@ -78,6 +78,14 @@ void bind_learned_sensor(nb::module_& module) {
       .def_ro("temperature_growth", &LearnedSensor::temperature_growth,
               "More of it for every touch after the first.")
       .def_prop_ro(
+          "stranger_sd",
+          [](const LearnedSensor& self) {
+            return self.fit_scale ? self.fit_scale->stranger_sd : std::nullopt;
+          },
+          "What every touch after the first adds to the standard deviation of fit.z where the\n"
+          "object was never learned; None where fewer than three objects tell it, at known poses:\n"
+          "then recognition takes 4.")
+      .def_prop_ro(
           "layer", [](const LearnedSensor& self) { return layer_word(self.table->layer.of); },
           "What of a map readings are compared with: \"mean_level\" or \"log_odds\".")
       .def_prop_ro(

@@ -44,6 +44,10 @@ TEST_F(MapSensor, IsWrittenWithTheMapsAndTakenWithThem) {
   const LearnedSensor learned = read_sensor_model(sensor("maps"));
   EXPECT_EQ(learned.maps.size(), 2u);
   EXPECT_TRUE(learned.table);
+  EXPECT_FALSE(learned.fit_scale->stranger_sd);
+  EXPECT_NE(out.find("maps/sensor.yaml: how badly strangers fit is a figure of Palpate's own"),
+            std::string::npos)
+      << out;
 
   const auto [said, by_default] = recognised({"maps"});
   EXPECT_EQ(said, "");

@@ -1,6 +1,7 @@
 // A sensor model in recognition, and objects that may lie on their other side.
 
 #include <cmath>
+#include <optional>
 
 #include <fmt/ranges.h>
 
@@ -121,6 +122,17 @@ TEST_F(SensorModelFlag, TakesATableInThePlaceOfEquation7) {
                      "maps", "--bins=9x9x8", "--sensor-model", "s.yaml"})
                 .status,
             0);
+}
+
+TEST_F(SensorModelFlag, TellsStrangersByHowBadlyTheyFit) {
+  const auto none = [&](std::optional<double> stranger_sd) {
+    write({.fit_scale = FitScale{.shared_sd = 0.1, .stranger_sd = stranger_sd}});
+    return record({"u.h5", "--maps", "maps", "--touches=2", "--sensor-model",
+                   "s.yaml"})["identity"]["(none)"]
+        .get<double>();
+  };
+  EXPECT_GT(none(1.0), none(8.0)) << "the touches fit well";
+  EXPECT_EQ(none({}), none(4.0));
 }
 
 TEST_F(SensorModelFlag, SaysWhereBinsAreWiderThanItsOwn) {

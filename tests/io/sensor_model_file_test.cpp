@@ -21,7 +21,7 @@ LearnedSensor full_sensor() {
       .bins = BinSteps{.x_mm = 0.5, .y_mm = 0.25, .theta_rad = 0.125},
       .features = LearnedFeatures{},
       .familiarity = Familiarity{.offset = -3.5, .explained_slope = 20.25, .lead_slope = 0.5},
-      .fit_scale = FitScale{.mean = -4.5, .sd = 12.25, .shared_sd = 0.5}};
+      .fit_scale = FitScale{.mean = -4.5, .sd = 12.25, .shared_sd = 0.5, .stranger_sd = 3.25}};
   LearnedTable& table = *sensor.table;
   table.layer = {.of = MapLayer::mean_level,
                  .near_mm = 3.5,
@@ -101,6 +101,7 @@ TEST_F(SensorModelFile, ComesBackAsItWasWritten) {
   EXPECT_EQ(read.fit_scale->mean, written.fit_scale->mean);
   EXPECT_EQ(read.fit_scale->sd, written.fit_scale->sd);
   EXPECT_EQ(read.fit_scale->shared_sd, written.fit_scale->shared_sd);
+  EXPECT_EQ(read.fit_scale->stranger_sd, written.fit_scale->stranger_sd);
 }
 
 TEST_F(SensorModelFile, MayHoldLittle) {
@@ -110,6 +111,17 @@ TEST_F(SensorModelFile, MayHoldLittle) {
   EXPECT_EQ(read.temperature, 1.0);
   EXPECT_EQ(read.temperature_growth, 0.0);
   EXPECT_FALSE(read.table || read.features || read.familiarity || read.fit_scale || read.bins);
+}
+
+TEST_F(SensorModelFile, MayTellNothingOfStrangers) {
+  LearnedSensor sensor = full_sensor();
+  sensor.fit_scale->stranger_sd.reset();
+  write_sensor_model(path_, sensor);
+  EXPECT_EQ(bytes_of(path_).find("stranger_sd"), std::string::npos);
+  const LearnedSensor read = read_sensor_model(path_);
+  ASSERT_TRUE(read.fit_scale);
+  EXPECT_EQ(read.fit_scale->sd, sensor.fit_scale->sd);
+  EXPECT_FALSE(read.fit_scale->stranger_sd);
 }
 
 TEST_F(SensorModelFile, SaysWhatIsWrong) {
@@ -131,6 +143,8 @@ TEST_F(SensorModelFile, SaysWhatIsWrong) {
   expect_named(message("[1, 2, 3]", "[1, 2]"), {"line 19", "mean", "area"});
   expect_named(message("sd: 12.25", "sd: 0"), {"fit_scale: sd", "positive"});
   expect_named(message("shared_sd: 0.5", "shared_sd: -1"), {"fit_scale: shared_sd", "from 0"});
+  expect_named(message("stranger_sd: 3.25", "stranger_sd: 0"),
+               {"fit_scale: stranger_sd", "positive"});
   expect_named(message("raw", "psi"), {"pressure_unit", "kPa or raw"});
   put_bytes(path_, "threshold: 3\n");
   expect_named(input_error([&] { read_sensor_model(path_); }), {"format", "palpate calibrate"});

@@ -1,5 +1,6 @@
 #include "learning/cross_validation.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <vector>
@@ -36,7 +37,9 @@ CrossValidation tried(const std::vector<Press>& presses, const std::vector<std::
       model.features = learn_features(others, model.how.contact.classifier);
     }
     if (with_table) {
-      model.table = learn_table(others, model.maps, model.how).table;
+      const std::vector<TrainingMap> maps =
+          options.bins ? maps_by_folds(others, map_options(), 2).without_folds : model.maps;
+      model.table = learn_table(others, maps, model.how).table;
     }
     folds.push_back(try_fold(fold, presses, labels, model, options));
   }
@@ -181,6 +184,39 @@ TEST(CrossValidation, JudgesTheFitOfPressesAtKnownPosesWhereTheyAre) {
   };
   // At the nearest bin, up to 4 mm off, touches would fit worse by standard deviations.
   EXPECT_NEAR(mean_z(3, 4), mean_z(24, 48), 1e-6);
+}
+
+TEST(CrossValidation, JudgesHowGroupsFitTheBestOfAllOthersWhereThereAreTwo) {
+  LetterPresses letters;
+  letters.add("A", 48, 23);
+  letters.add("U", 48, 24);
+  const CrossValidationOptions options{
+      .folds = 2,
+      .bins = RecognitionBins{.lattice = {.x_mm = {-12.0, 12.0, 18},
+                                          .y_mm = {-12.0, 12.0, 18},
+                                          .theta_rad = {0.0, two_pi, 30}},
+                              .auto_pivot = false}};
+  EXPECT_TRUE(tried(letters.presses, {"A", "U"}, options, true).stranger_fits.empty());
+  // Another A under a label of its own: left out, either fits the other well.
+  letters.add("A", 48, 25);
+  letters.recordings.back().object = "B";
+  letters.make_presses(true);
+  EXPECT_TRUE(tried(letters.presses, {"A", "B", "U"}, options).stranger_fits.empty());
+  const auto fits = tried(letters.presses, {"A", "B", "U"}, options, true).stranger_fits;
+  ASSERT_EQ(fits.size(), 3U);
+  std::size_t fewest = presses_in_group;
+  const auto mean_z = [&](const char* label) {
+    double sum = 0.0;
+    for (const StrangerFit& stranger : fits.at(label)) {
+      EXPECT_TRUE(stranger.touches >= 1 && stranger.touches <= presses_in_group);
+      fewest = std::min(fewest, stranger.touches);
+      sum += stranger.fit.z;
+    }
+    return sum / static_cast<double>(fits.at(label).size());
+  };
+  EXPECT_LT(mean_z("U"), mean_z("A") - 3.0);
+  EXPECT_LT(mean_z("U"), mean_z("B") - 3.0);
+  EXPECT_LT(fewest, presses_in_group) << "of which some touched nothing";
 }
 
 TEST(CrossValidation, LeavesOutPressesWhoseObjectHasNoMapWithoutThem) {

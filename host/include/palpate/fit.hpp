@@ -44,6 +44,9 @@ struct PALPATE_API FitScale {
   double mean = 0.0;       ///< of the z of single touches
   double sd = 1.0;         ///< their standard deviation, but for what all touches share
   double shared_sd = 0.0;  ///< of what all touches of an object share, such as its map's errors
+  /// What every touch after the first adds to the standard deviation of z on this scale where the
+  /// object was never learned; none: Palpate's own figure.
+  std::optional<double> stranger_sd = {};
 
   /// The fit on this scale: (z - mean sqrt(n)) / sqrt(sd^2 + n shared_sd^2), within
   /// +-`largest_fit_z`, with its verdict. The deviations of n independent touches add up, and so do

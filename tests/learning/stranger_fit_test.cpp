@@ -1,0 +1,86 @@
+#include "learning/stranger_fit.hpp"
+
+#include <cmath>
+#include <map>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "model/random.hpp"
+
+namespace palpate::stranger_fit_test {
+
+constexpr FitScale scale{.mean = 0.9, .sd = 1.4, .shared_sd = 0.1};
+
+/// Fits as wide as the model says, one in ten of them wider, of objects left out.
+class Strangers {
+ public:
+  void add(const std::string& label, int count, std::size_t touches, double stranger_sd) {
+    const auto n = static_cast<double>(touches);
+    for (int i = 0; i < count; ++i) {
+      const double own_sd = random_.uniform() < 0.1 ? 5.0 : 1.0;
+      const double z = std::hypot(own_sd, stranger_sd * (n - 1.0)) * random_.normal();
+      fits[label].push_back(
+          {{.z = scale.mean * std::sqrt(n) +
+                 z * std::sqrt(scale.sd * scale.sd + n * scale.shared_sd * scale.shared_sd)},
+           touches});
+    }
+  }
+
+  std::map<std::string, std::vector<StrangerFit>> fits;
+
+ private:
+  Random random_{7, Stream::readings};
+};
+
+TEST(StrangerSd, IsThatByWhichFitsWereDrawn) {
+  for (const double truth : {1.5, 3.0, 6.0}) {
+    Strangers strangers;
+    for (const char* label : {"A", "E", "U"}) {
+      strangers.add(label, 300, 3, truth);
+      strangers.add(label, 100, 2, truth);
+    }
+    EXPECT_NEAR(stranger_sd_of(strangers.fits, scale).value(), truth, 0.1 * truth);
+  }
+}
+
+TEST(StrangerSd, OfFewerThanThreeObjectsIsNone) {
+  Strangers strangers;
+  strangers.add("A", 300, 3, 4.0);
+  strangers.add("E", 300, 3, 4.0);
+  EXPECT_FALSE(stranger_sd_of({}, scale));
+  EXPECT_FALSE(stranger_sd_of(strangers.fits, scale));
+  strangers.add("U", 4, 3, 4.0);
+  strangers.add("U", 20, 1, 4.0);
+  EXPECT_FALSE(stranger_sd_of(strangers.fits, scale)) << "of four groups, and of single touches";
+  strangers.add("U", 1, 3, 4.0);
+  EXPECT_TRUE(stranger_sd_of(strangers.fits, scale));
+}
+
+TEST(StrangerSd, CountsObjectsAlikeHoweverOftenTheyWereTouched) {
+  Strangers alike;
+  Strangers often;
+  for (const char* label : {"A", "E", "U"}) {
+    const double stranger_sd = label[0] == 'A' ? 2.0 : 8.0;
+    alike.add(label, 200, 3, stranger_sd);
+    often.add(label, label[0] == 'A' ? 4000 : 200, 3, stranger_sd);
+  }
+  const double expected = stranger_sd_of(alike.fits, scale).value();
+  EXPECT_NEAR(stranger_sd_of(often.fits, scale).value(), expected, 0.15 * expected);
+}
+
+TEST(StrangerSd, StaysWithinAQuarterAndFourTimesPalpatesOwn) {
+  Strangers alike;
+  Strangers unlike;
+  for (const char* label : {"A", "E", "U"}) {
+    alike.add(label, 50, 3, 0.0);
+    for (int i = 0; i < 50; ++i) {
+      unlike.fits[label].push_back({{.z = -largest_fit_z}, 2});
+    }
+  }
+  EXPECT_EQ(stranger_sd_of(alike.fits, scale), 1.0);
+  EXPECT_NEAR(stranger_sd_of(unlike.fits, scale).value(), 16.0, 1.0);
+}
+
+}  // namespace palpate::stranger_fit_test
