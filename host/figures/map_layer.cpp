@@ -30,11 +30,14 @@ void draw_cells(Canvas& canvas, const View& view, const OccupancyGrid& map,
   const auto across = static_cast<int>(view.box.width);
   const auto up = static_cast<int>(view.box.height);
   const double prior = map.prior_log_odds();
+  const auto cell_at = [&](double x, double y) {
+    return (T_map_view * glm::dvec2(x, y) - map.origin_mm) / map.cell_mm;
+  };
+  const glm::dvec2 first = cell_at(view.lower.x, view.lower.y);
+  const glm::dvec2 along_x = (cell_at(view.upper.x, view.lower.y) - first) / (1.0 * across);
+  const glm::dvec2 along_y = (cell_at(view.lower.x, view.upper.y) - first) / (1.0 * up);
   canvas.cells(view.box, across, up, [&](int u, int v) {
-    const glm::dvec2 part{(u + 0.5) / across, (v + 0.5) / up};
-    const glm::dvec2 cell =
-        (T_map_view * (view.lower + part * (view.upper - view.lower)) - map.origin_mm) /
-        map.cell_mm;
+    const glm::dvec2 cell = first + (u + 0.5) * along_x + (v + 0.5) * along_y;
     const auto i = static_cast<int>(std::lround(std::clamp(cell.x, -1.0, 1.0 * map.nx)));
     const auto j = static_cast<int>(std::lround(std::clamp(cell.y, -1.0, 1.0 * map.ny)));
     const bool inside = i >= 0 && j >= 0 && i < map.nx && j < map.ny;

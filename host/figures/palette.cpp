@@ -28,21 +28,55 @@ Colour from_oklch(double lightness, double chroma, double hue_deg) {
           srgb_component(-0.0041960863 * l - 0.7034186147 * m + 1.7076147010 * s)};
 }
 
+/// A scale of colours over [0, 1], between shades that are computed once: a picture asks for a
+/// hundred thousand.
+class Shades {
+ public:
+  template <typename ColourAt>
+  explicit Shades(const ColourAt& colour_at) {
+    for (std::size_t k = 0; k <= steps; ++k) {
+      shades_[k] = colour_at(static_cast<double>(k) / steps);
+    }
+  }
+
+  Colour at(double t) const {
+    const auto k = std::min(static_cast<std::size_t>(t * steps), steps - 1);
+    const double part = t * steps - static_cast<double>(k);
+    const Colour& a = shades_[k];
+    const Colour& b = shades_[k + 1];
+    return {std::lerp(a.red, b.red, part), std::lerp(a.green, b.green, part),
+            std::lerp(a.blue, b.blue, part)};
+  }
+
+ private:
+  static constexpr std::size_t steps = 1024;
+  std::array<Colour, steps + 1> shades_;
+};
+
+/// A half of the diverging scale.
+Shades half_scale(double hue_deg) {
+  return Shades([hue_deg](double strength) {
+    // The chroma follows the sRGB gamut, which narrows towards white.
+    const double chroma = 0.145 * strength * (2.0 - strength);
+    return from_oklch(1.0 - 0.6 * strength, chroma, hue_deg);
+  });
+}
+
 }  // namespace
 
 Colour diverging(double t) {
   if (std::isnan(t)) {
     return white;
   }
-  const double strength = std::min(std::abs(t), 1.0);
-  // The chroma follows the sRGB gamut, which narrows towards white.
-  const double chroma = 0.145 * strength * (2.0 - strength);
-  return from_oklch(1.0 - 0.6 * strength, chroma, t < 0.0 ? 253.0 : 26.0);
+  static const Shades blue = half_scale(253.0);
+  static const Shades red = half_scale(26.0);
+  return (t < 0.0 ? blue : red).at(std::min(std::abs(t), 1.0));
 }
 
 Colour sequential(double t) {
-  const double v = std::isnan(t) ? 0.0 : std::clamp(t, 0.0, 1.0);
-  return from_oklch(0.2 + 0.73 * v, 0.09 + 0.07 * v * v, 305.0 - 200.0 * v);
+  static const Shades scale(
+      [](double v) { return from_oklch(0.2 + 0.73 * v, 0.09 + 0.07 * v * v, 305.0 - 200.0 * v); });
+  return scale.at(std::isnan(t) ? 0.0 : std::clamp(t, 0.0, 1.0));
 }
 
 Colour series(std::size_t i) {
