@@ -42,10 +42,10 @@ class Shades {
   Colour at(double t) const {
     const auto k = std::min(static_cast<std::size_t>(t * steps), steps - 1);
     const double part = t * steps - static_cast<double>(k);
+    const auto mix = [part](double a, double b) { return a + part * (b - a); };
     const Colour& a = shades_[k];
     const Colour& b = shades_[k + 1];
-    return {std::lerp(a.red, b.red, part), std::lerp(a.green, b.green, part),
-            std::lerp(a.blue, b.blue, part)};
+    return {mix(a.red, b.red), mix(a.green, b.green), mix(a.blue, b.blue)};
   }
 
  private:

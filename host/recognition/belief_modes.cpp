@@ -248,7 +248,8 @@ std::vector<PartAway> spread_between_bins(const BinnedObject& of, std::vector<Pa
   const glm::dmat3 factor = cholesky(refined.covariance);
   PlacedBody body(of);
   const PlacedBody::Place from = body.at(refined.T_object_robot);
-  for (const Pose& normal : displacement_points({.mm = 1.0, .rad = 1.0}, points)) {
+  static const std::vector<Pose> normals = displacement_points({.mm = 1.0, .rad = 1.0}, points);
+  for (const Pose& normal : normals) {
     const glm::dvec3 off = factor * glm::dvec3(normal.translation_mm, normal.theta_rad);
     const Pose at{refined.T_object_robot.translation_mm + glm::dvec2(off),
                   refined.T_object_robot.theta_rad + off.z};
