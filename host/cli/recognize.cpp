@@ -264,8 +264,9 @@ void recognize(const RecognizeArguments& options) {
   std::vector<RecognitionRecord> records;
   auto json = nlohmann::ordered_json::array();
   for (const Unknown& unknown : unknowns) {
-    records.push_back(recognise(recogniser, task, unknown, trace,
-                                [&](double fraction) { progress->show(fraction); }));
+    records.push_back(recognise(
+        recogniser, task, unknown, trace, [&](double fraction) { progress->show(fraction); },
+        !request.trace));
     records.back().require_steps();
     if (unresolved.empty()) {
       unresolved = unresolved_words(task, recogniser.lattice(), unknown.touches);

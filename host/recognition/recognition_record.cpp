@@ -130,6 +130,28 @@ std::optional<Fit> fit_of(const Mode& mode, const std::optional<RefinedPose>& re
   return task.fit_scale.of(fit.value(), static_cast<std::size_t>(in_contact));
 }
 
+/// RecognitionStep::refined
+std::optional<RefinedPose> refined_near(const Mode& mode, const Recogniser& recogniser,
+                                        const RecognitionTask& task) {
+  const std::optional<RefinedPose> refined = recogniser.refine(mode);
+  return refined
+             ? std::optional(on_scale(task, recogniser.evidence(),
+                                      displaced_body(task.hypotheses[mode.object].map), *refined))
+             : std::nullopt;
+}
+
+/// Updates the belief with more touches, and tells the identity alone.
+RecognitionStep identity_after(Recogniser& recogniser, const RecognitionTask& task,
+                               std::span<const Touch> touches,
+                               const std::function<void(double)>& progress) {
+  // Bounds only keep the touches, and search when they are asked for the estimate.
+  const bool searches = traits_of(task.filter).certificate;
+  recogniser.update(touches, searches ? std::function<void(double)>() : progress);
+  const Estimate estimate = recogniser.estimate(task.drawn_tolerance);
+  return judge(estimate, {}, task, recogniser.evidence(),
+               refined_near(estimate.mode, recogniser, task));
+}
+
 /// T_robot_object from T_object_robot, theta in [-pi, pi).
 Pose robot_pose(const Pose& T_object_robot) {
   Pose T_robot_object = inverse(T_object_robot);
@@ -219,11 +241,7 @@ RecognitionStep take_step(Recogniser& recogniser, const RecognitionTask& task,
   const double seconds = updated.seconds + seconds_since(start);
   const std::span<const TouchEvidence> evidence = recogniser.evidence();
   const Clock::time_point estimated = Clock::now();
-  std::optional<RefinedPose> refined = recogniser.refine(estimate.mode);
-  if (refined) {
-    refined = on_scale(task, evidence, displaced_body(task.hypotheses[estimate.mode.object].map),
-                       *refined);
-  }
+  const std::optional<RefinedPose> refined = refined_near(estimate.mode, recogniser, task);
   const double refine_seconds = seconds_since(estimated);
   RecognitionStep step = judge(estimate, truth, task, evidence, refined);
   step.surprise = updated.surprise;
@@ -248,7 +266,7 @@ RecognitionStep take_step(Recogniser& recogniser, const RecognitionTask& task,
 
 RecognitionRecord recognise(Recogniser& recogniser, const RecognitionTask& task,
                             const Unknown& unknown, bool trace,
-                            const std::function<void(double)>& progress) {
+                            const std::function<void(double)>& progress, bool drawn) {
   RecognitionRecord record{.recording = unknown.recording,
                            .frame = unknown.frame,
                            .touches = unknown.touches.size(),
@@ -274,11 +292,16 @@ RecognitionRecord recognise(Recogniser& recogniser, const RecognitionTask& task,
                  static_cast<double>(touches.size()));
         progress_threw = false;
       };
-      const bool last = done + together == touches.size();
-      record.trace.push_back(
-          take_step(recogniser, task, touches.subspan(done, together), unknown.truth,
-                    progress ? std::function<void(double)>(show) : std::function<void(double)>(),
-                    last ? std::nullopt : task.trace_tolerance));
+      const std::size_t left = touches.size() - done - together;
+      const std::span<const Touch> next = touches.subspan(done, together);
+      const std::function<void(double)> shown =
+          progress ? std::function<void(double)>(show) : std::function<void(double)>();
+      // The last step tells of the surprises of the last touches, which depend on the beliefs
+      // before.
+      record.trace.push_back(drawn && left > surprises_judged
+                                 ? identity_after(recogniser, task, next, shown)
+                                 : take_step(recogniser, task, next, unknown.truth, shown,
+                                             left == 0 ? std::nullopt : task.trace_tolerance));
       if (progress && traits_of(task.filter).certificate) {
         show(1.0);
       }

@@ -168,9 +168,11 @@ RecognitionStep take_step(Recogniser& recogniser, const RecognitionTask& task,
 /// @param trace whether to record a step after every touch instead of only after the last touch;
 /// those before the last are within RecognitionTask::trace_tolerance
 /// @param progress called now and then with the fraction done
+/// @param drawn whether the trace is for a picture of the identity: its steps on which nothing of
+/// the last one depends have no more than this, within RecognitionTask::drawn_tolerance
 /// @throws Error (Fault::system) if the device fails; what `progress` throws
 RecognitionRecord recognise(Recogniser& recogniser, const RecognitionTask& task,
                             const Unknown& unknown, bool trace,
-                            const std::function<void(double)>& progress = {});
+                            const std::function<void(double)>& progress = {}, bool drawn = false);
 
 }  // namespace palpate

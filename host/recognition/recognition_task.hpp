@@ -63,6 +63,8 @@ struct RecognitionTask {
   PoseScale pose_scale = {};  ///< of RecognitionStep::refined and of modes
   /// Tolerance of a trace's steps before the last; BoundedOptions::tolerance where it is not set.
   std::optional<double> trace_tolerance = {};
+  /// The same of steps of which a picture shows the identity alone.
+  std::optional<double> drawn_tolerance = {};
   ActWhere act = {};                      ///< for RecognitionStep::decision
   std::string sensor_model = {};          ///< file of what was learned; "" by Eq. 7
   std::vector<std::string> remarks = {};  ///< sentences for the user, once the filter is open

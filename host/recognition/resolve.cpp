@@ -310,6 +310,7 @@ RecognitionTask resolve(const Request& request, const Circumstances& of) {
   if (!request.tolerance) {
     // The belief after a first touch is wide, and takes twice as long to find within 1e-6.
     task.trace_tolerance = 1e-4;
+    task.drawn_tolerance = 1e-3;  // half a pixel of a picture's curve
   }
   task.act = act_where(request);
   if (std::string wider = wider_bins_sentence(task); !wider.empty()) {

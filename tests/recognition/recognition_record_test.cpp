@@ -5,6 +5,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "palpate/error.hpp"
@@ -85,6 +86,16 @@ TEST(Recognise, EndsItsTraceWithTheSameBits) {
       Recogniser recogniser(device, task);
       const RecognitionRecord traced = recognise(recogniser, task, unknown_of(letter), true);
       expect_same(traced, recognise(recogniser, task, unknown_of(letter), false));
+      task.drawn_tolerance = tolerance;
+      const RecognitionRecord drawn =
+          recognise(recogniser, task, unknown_of(letter), true, {}, true);
+      expect_same(drawn, traced);
+      EXPECT_EQ(drawn.last().surprise, traced.last().surprise);
+      ASSERT_EQ(drawn.trace.size(), traced.trace.size());
+      for (std::size_t k = 0; k < drawn.trace.size(); ++k) {
+        EXPECT_THAT(drawn.trace[k].identity,
+                    testing::Pointwise(testing::DoubleNear(2e-3), traced.trace[k].identity));
+      }
       const bool exact_touches = task.touch_sd().none() && task.slip_sd().none();
       if (tolerance && exact_touches && std::holds_alternative<BoundedOptions>(filter)) {
         EXPECT_GT(traced.trace.front().certificate->dropped_mass, 1e-6);
