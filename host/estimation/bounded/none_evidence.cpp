@@ -22,9 +22,9 @@ constexpr std::array<double, 7> left_out_nats{0.0, -3.0, -6.5, -10.0, -14.0, -18
 constexpr std::size_t first_exact = 3;
 /// The mean lies below the bounds of the largest tiles by about so large a part of these, in nats.
 /// That is where the second search looks first.
-constexpr double usual_gap = 0.6;
+constexpr double usual_gap = 0.4;
 constexpr double least_gap_nats = 2.0;
-constexpr double most_gap_nats = 20.0;
+constexpr double most_gap_nats = 10.0;
 /// Where so many searches found no likelihood, none is above e^-10^10: there may be none at all.
 constexpr std::size_t most_in_vain = 32;
 
