@@ -11,8 +11,6 @@ namespace {
 // Rectangles that come as close count as overlapping, as in sum_overlap.comp.glsl.
 constexpr double touching_mm = 1e-3;
 
-constexpr double unbounded = std::numeric_limits<double>::infinity();
-
 /// A length or place of which products stay finite. No region reaches so far.
 glm::dvec2 within_reach(const glm::dvec2& mm) {
   static constexpr double far_mm = 1e30;
@@ -20,28 +18,6 @@ glm::dvec2 within_reach(const glm::dvec2& mm) {
     return std::isnan(v) ? far_mm : std::clamp(v, -far_mm, far_mm);
   };
   return {limit(mm.x), limit(mm.y)};
-}
-
-/// An interval of reals.
-struct Interval {
-  double low = -unbounded;
-  double high = unbounded;
-
-  void cut(const Interval& other) {
-    low = std::max(low, other.low);
-    high = std::min(high, other.high);
-  }
-};
-
-/// The u with |slope u + offset| <= reach.
-/// @param per_slope 1 / slope
-Interval within(double slope, double per_slope, double offset, double reach) {
-  if (slope == 0.0) {
-    return std::abs(offset) <= reach ? Interval{} : Interval{unbounded, -unbounded};
-  }
-  const double a = (-reach - offset) * per_slope;
-  const double b = (reach - offset) * per_slope;
-  return {std::min(a, b), std::max(a, b)};
 }
 
 }  // namespace
@@ -56,7 +32,7 @@ ArrayRectangle array_rectangle(const Touch& touch, const glm::dvec2& pivot_mm) {
 OverlapPlane::Line::Line(const Axis& axis)
     : first_mm(axis.centre(0)), step_mm(axis.step()), per_mm(1.0 / step_mm), last(axis.count - 1) {}
 
-OverlapPlane::Bins OverlapPlane::Line::within(double low_mm, double high_mm) const {
+inline OverlapPlane::Bins OverlapPlane::Line::within(double low_mm, double high_mm) const {
   if (!(step_mm > 0.0)) {
     return {0, low_mm <= first_mm && first_mm <= high_mm ? last + 1 : 0};
   }
@@ -97,15 +73,69 @@ OverlapPlane::OverlapPlane(const ArrayRectangle& array, const BoundingBox& objec
   rows_ = y_mm_.within(-reach - apart_mm_.y, reach - apart_mm_.y);
 }
 
-OverlapPlane::Bins OverlapPlane::row(int y) const {
-  if (y < rows_.first || y >= rows_.first + rows_.count) {
-    return {};
+void OverlapPlane::find_rows(std::span<Bins> of_row) const {
+  std::ranges::fill(of_row, Bins{});
+  // Shadows that do not depend on x leave a row out, or do not bound it. All others bound it from
+  // both sides, in an order that the slope's sign tells.
+  struct Shadow {
+    Shadow(double slope, double per_slope, double per_row, double reach)
+        : flat(slope == 0.0),
+          per_slope(per_slope),
+          per_row(per_row),
+          to_low(slope > 0.0 ? -reach : reach),
+          reach(reach) {}
+
+    bool flat;
+    double per_slope;
+    double per_row;
+    double to_low;  ///< offset at the lower bound
+    double reach;
+  };
+  const Shadow shadows[] = {{cos_, per_cos_, sin_, turned_reach_mm_.x},
+                            {-sin_, -per_sin_, cos_, turned_reach_mm_.y}};
+  for (int y = rows_.first; y < rows_.first + rows_.count; ++y) {
+    const double apart_y = apart_mm_.y + y_mm_.centre(y);
+    double low = -reach_mm_.x;
+    double high = reach_mm_.x;
+    bool out = false;
+    for (const Shadow& shadow : shadows) {
+      const double offset = shadow.per_row * apart_y;
+      if (shadow.flat) {
+        out = out || !(std::abs(offset) <= shadow.reach);
+      } else {
+        low = std::max(low, (shadow.to_low - offset) * shadow.per_slope);
+        high = std::min(high, (-shadow.to_low - offset) * shadow.per_slope);
+      }
+    }
+    if (!out) {
+      of_row[static_cast<std::size_t>(y)] = x_mm_.within(low - apart_mm_.x, high - apart_mm_.x);
+    }
   }
-  const double apart_y = apart_mm_.y + y_mm_.centre(y);
-  Interval apart_x{-reach_mm_.x, reach_mm_.x};
-  apart_x.cut(within(cos_, per_cos_, sin_ * apart_y, turned_reach_mm_.x));
-  apart_x.cut(within(-sin_, -per_sin_, cos_ * apart_y, turned_reach_mm_.y));
-  return x_mm_.within(apart_x.low - apart_mm_.x, apart_x.high - apart_mm_.x);
+}
+
+std::int64_t count_bins(std::span<const OverlapPlane::Bins> rows, BinBox& around) {
+  std::int64_t bins = 0;
+  int x_first = std::numeric_limits<int>::max();
+  int x_end = 0;
+  int y_first = 0;
+  int y_end = 0;
+  for (int y = 0; y < static_cast<int>(rows.size()); ++y) {
+    const auto [first, count] = rows[static_cast<std::size_t>(y)];
+    if (count > 0) {
+      y_first = bins == 0 ? y : y_first;
+      y_end = y + 1;
+      bins += count;
+      x_first = std::min(x_first, first);
+      x_end = std::max(x_end, first + count);
+    }
+  }
+  if (bins > 0) {
+    around.y_first = y_first;
+    around.y_count = y_end - y_first;
+    around.x_first = x_first;
+    around.x_count = x_end - x_first;
+  }
+  return bins;
 }
 
 }  // namespace palpate

@@ -1,5 +1,9 @@
 #pragma once
 
+#include <cstdint>
+#include <span>
+
+#include "estimation/bin_box.hpp"
 #include "model/bounding_box.hpp"
 #include "palpate/lattice.hpp"
 #include "palpate/touch.hpp"
@@ -31,8 +35,8 @@ class OverlapPlane {
   OverlapPlane(const ArrayRectangle& array, const BoundingBox& object, const PoseLattice& lattice,
                int theta);
 
-  /// The overlapping bins of any row.
-  Bins row(int y) const;
+  /// Finds the overlapping bins of every row, [y].
+  void find_rows(std::span<Bins> of_row) const;
 
  private:
   /// The centres of an axis's bins.
@@ -58,5 +62,8 @@ class OverlapPlane {
   double per_sin_ = 0.0;
   Bins rows_;  ///< that may hold overlapping bins
 };
+
+/// Counts the bins of a plane's rows, [y], and widens a box of no bin to hold them.
+std::int64_t count_bins(std::span<const OverlapPlane::Bins> rows, BinBox& around);
 
 }  // namespace palpate

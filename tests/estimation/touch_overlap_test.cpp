@@ -19,8 +19,10 @@ std::int64_t expect_the_same_bins(const Touch& touch, const PoseLattice& lattice
   for (int t = 0; t < lattice.theta_rad.count; ++t) {
     const OverlapPlane plane(array_rectangle(touch, lattice.pivot_mm), occupied_box(map), lattice,
                              t);
+    std::vector<OverlapPlane::Bins> rows(static_cast<std::size_t>(lattice.y_mm.count));
+    plane.find_rows(rows);
     for (int y = 0; y < lattice.y_mm.count; ++y) {
-      const OverlapPlane::Bins row = plane.row(y);
+      const OverlapPlane::Bins row = rows[static_cast<std::size_t>(y)];
       for (int x = 0; x < lattice.x_mm.count; ++x) {
         const std::int64_t bin =
             (std::int64_t{t} * lattice.y_mm.count + y) * lattice.x_mm.count + x;
@@ -117,8 +119,10 @@ TEST(ArrayOverlap, OfAnArrayBeyondAllMeasureIsEverywhere) {
   for (int t = 0; t < 3; ++t) {
     const OverlapPlane plane(array_rectangle(recording.touch(0), {}), occupied_box(corner_map(641)),
                              lattice, t);
-    for (int y = 0; y < lattice.y_mm.count; ++y) {
-      EXPECT_EQ(plane.row(y).count, lattice.x_mm.count);
+    std::vector<OverlapPlane::Bins> rows(static_cast<std::size_t>(lattice.y_mm.count));
+    plane.find_rows(rows);
+    for (const OverlapPlane::Bins& row : rows) {
+      EXPECT_EQ(row.count, lattice.x_mm.count);
     }
   }
 }

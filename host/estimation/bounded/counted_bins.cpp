@@ -72,20 +72,13 @@ CountedPlane CountedBins::plane(std::size_t object, int theta) const {
                 OverlapPlane::Bins{plane.around.x_first, plane.around.x_count});
     return plane;
   }
-  const OverlapPlane overlap(array_, space_.boxes[object], lattice_, theta);
-  for (int y = 0; y < lattice_.y_mm.count; ++y) {
-    OverlapPlane::Bins& row = plane.rows[static_cast<std::size_t>(y)];
-    row = everywhere_ ? OverlapPlane::Bins{0, lattice_.x_mm.count} : overlap.row(y);
-    if (row.count > 0) {
-      plane.bins += row.count;
-      plane.around = smallest_around(plane.around, {.object = static_cast<std::int32_t>(object),
-                                                    .theta = theta,
-                                                    .y_first = y,
-                                                    .y_count = 1,
-                                                    .x_first = row.first,
-                                                    .x_count = row.count});
-    }
+  if (everywhere_) {
+    std::ranges::fill(plane.rows, OverlapPlane::Bins{0, lattice_.x_mm.count});
+  } else {
+    OverlapPlane(array_, space_.boxes[object], lattice_, theta).find_rows(plane.rows);
   }
+  plane.around = {.object = static_cast<std::int32_t>(object), .theta = theta};
+  plane.bins = count_bins(plane.rows, plane.around);
   return plane;
 }
 

@@ -126,22 +126,22 @@ OverlapShares::OverlapShares(const DisplacementWeights& weights, const ArrayRect
   });
 }
 
-OverlapPlane::Bins OverlapShares::row(const OverlapPlane& plane, int y) const {
-  return everywhere_ ? OverlapPlane::Bins{0, weights_.lattice().x_mm.count} : plane.row(y);
+std::vector<OverlapPlane::Bins> OverlapShares::rows(std::size_t object, int theta) const {
+  const PoseLattice& lattice = weights_.lattice();
+  std::vector<OverlapPlane::Bins> rows(static_cast<std::size_t>(lattice.y_mm.count),
+                                       {0, lattice.x_mm.count});
+  if (!everywhere_) {
+    OverlapPlane(array_, objects_[object], lattice, theta).find_rows(rows);
+  }
+  return rows;
 }
 
 OverlapShares::Extent OverlapShares::extent(std::size_t object, int theta) const {
   const PoseLattice& lattice = weights_.lattice();
-  const OverlapPlane plane(array_, objects_[object], lattice, theta);
   Extent found{.box = {.object = static_cast<std::int32_t>(object), .theta = theta}};
-  BinBox& box = found.box;
-  for (int y = 0; y < lattice.y_mm.count; ++y) {
-    if (const OverlapPlane::Bins bins = row(plane, y); bins.count > 0) {
-      found.bins += bins.count;
-      box = smallest_around(box, {box.object, theta, y, 1, bins.first, bins.count});
-    }
-  }
-  if (box.bins() == 0) {
+  const BinBox& box = found.box;
+  found.bins = count_bins(rows(object, theta), found.box);
+  if (found.bins == 0) {
     return found;
   }
   double least = 0.0;
@@ -204,15 +204,15 @@ double OverlapShares::most(std::size_t object, int theta) const {
 OverlapShares::Plane OverlapShares::plane(const Extent& extent) const {
   const PoseLattice& lattice = weights_.lattice();
   const BinBox& box = extent.box;
-  const OverlapPlane overlap(array_, objects_[static_cast<std::size_t>(box.object)], lattice,
-                             box.theta);
+  const std::vector<OverlapPlane::Bins> of_row =
+      rows(static_cast<std::size_t>(box.object), box.theta);
   const std::vector<Tap>& taps = taps_[static_cast<std::size_t>(box.theta)];
   Plane plane{.y_first = box.y_first, .rows = {}};
   std::vector<double> weights(static_cast<std::size_t>(box.x_count));  // inside, of a row's bins
   bool of_inner_row = false;  // so far inside that all such rows have the same
   for (int y = box.y_first; y < box.y_first + box.y_count; ++y) {
     std::vector<Step>& steps = plane.rows.emplace_back();
-    const OverlapPlane::Bins bins = row(overlap, y);
+    const OverlapPlane::Bins& bins = of_row[static_cast<std::size_t>(y)];
     if (bins.count == 0) {
       continue;
     }

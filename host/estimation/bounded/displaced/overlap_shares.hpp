@@ -73,7 +73,8 @@ class OverlapShares {
     bool inside = true;        ///< all of their weights lie inside the region
   };
 
-  OverlapPlane::Bins row(const OverlapPlane& plane, int y) const;
+  /// The rows of O at one theta, [y].
+  std::vector<OverlapPlane::Bins> rows(std::size_t object, int theta) const;
   Extent extent(std::size_t object, int theta) const;
   Plane plane(const Extent& extent) const;
   const Extent& extent_of(std::size_t object, int theta) const {
