@@ -11,8 +11,21 @@
 
 namespace palpate {
 
+namespace {
+
+/// What the sums of an object's largest tiles need at most, in bytes.
+std::size_t bytes_of_sums(const SearchSpace& space, const TileBounds& bounds) {
+  const TileLevel& level = bounds.levels().front();
+  const auto tiles = [](const TileAxis& axis) { return static_cast<std::size_t>(axis.tiles()); };
+  return space.turns.size() * tiles(level.x) * tiles(level.y) *
+         sizeof(PlaneDivision::LargestSums::value_type);
+}
+
+}  // namespace
+
 MeanSearch::MeanSearch(const SearchSpace& space, const BoundedOptions& options,
-                       const BinLikelihood& likelihood, const ArrayReadings& touch)
+                       const BinLikelihood& likelihood, const ArrayReadings& touch,
+                       std::size_t most_bytes)
     : space_(space),
       options_(options),
       likelihood_(likelihood),
@@ -23,6 +36,11 @@ MeanSearch::MeanSearch(const SearchSpace& space, const BoundedOptions& options,
       unpenalised_(unpenalised(space, elements_)),
       prior_log_likelihood_(
           prior_log_likelihoods(elements_, options.contact, space.bounds.size())) {
+  std::size_t bytes = 0;
+  for (const TileBounds& bounds : space.bounds) {
+    bytes += bytes_of_sums(space, bounds);
+  }
+  keep_sums_ = bytes <= most_bytes;
   for (std::size_t i = 0; i < space.bounds.size(); ++i) {
     prior_log_likelihood_[i] += space.log_weight[i];
     errors_.push_back({likelihood.exact_error(i, elements_, Arithmetic::float32),
@@ -55,10 +73,15 @@ bool MeanSearch::survey(const Deadline& deadline, bool everywhere) {
   counted_.emplace(space_, options_.lattice, rectangle_, sensor_from_pivot_mm_, everywhere);
   const MeanTask task = this->task();
   std::vector<PlaneSurvey> surveys(space_.bounds.size() * thetas);
+  std::vector<PlaneDivision::LargestSums> sums(surveys.size());
   if (!for_planes(deadline, [&](std::size_t object, std::size_t first, std::size_t end) {
         PlaneDivision planes(task, object);
         for (std::size_t theta = first; theta < end; ++theta) {
-          surveys[object * thetas + theta] = planes.survey(static_cast<int>(theta));
+          const std::size_t i = object * thetas + theta;
+          surveys[i] = planes.survey(static_cast<int>(theta), sums[i]);
+          if (!keep_sums_) {
+            sums[i] = {};
+          }
         }
       })) {
     return false;
@@ -74,6 +97,7 @@ bool MeanSearch::survey(const Deadline& deadline, bool everywhere) {
     return survey(deadline, true);
   }
   surveys_ = std::move(surveys);
+  sums_ = std::move(sums);
   log_bins_ = std::log(static_cast<double>(bins));
   log_weighted_bins_ = std::log(weighted);
   log_share_ = log_weighted_bins_ - std::log(static_cast<double>(options_.lattice.bins()));
@@ -96,7 +120,7 @@ std::optional<LogInterval> MeanSearch::bounds(double least, bool exact, const De
           const std::size_t i = object * thetas + theta;
           left_out[i] = surveys_[i].best < least_of_bin
                             ? surveys_[i].left_out
-                            : planes.divide(static_cast<int>(theta), least_of_bin);
+                            : planes.divide(static_cast<int>(theta), least_of_bin, sums_[i]);
         }
         evaluated[object * thetas + first] =
             planes.evaluated(exact ? Arithmetic::float64 : Arithmetic::float32);

@@ -30,8 +30,9 @@ namespace palpate {
 class MeanSearch {
  public:
   /// @param options checked, with a resolved contact model; all but the touch outlive this object
+  /// @param most_bytes for the sums of the largest tiles, which are kept where they need no more
   MeanSearch(const SearchSpace& space, const BoundedOptions& options,
-             const BinLikelihood& likelihood, const ArrayReadings& touch);
+             const BinLikelihood& likelihood, const ArrayReadings& touch, std::size_t most_bytes);
 
   /// Bounds of the log of the mean.
   /// @param least log of a mean: tiles are left out where their bins would have less than it on
@@ -73,8 +74,10 @@ class MeanSearch {
   std::vector<std::array<double, 2>> errors_;
   std::optional<CountedBins> counted_;  ///< empty before the first bounds()
   std::vector<PlaneSurvey> surveys_;    ///< [object, theta]; empty before the first bounds()
-  double log_bins_ = 0.0;               ///< of the number of bins that count
-  double log_weighted_bins_ = 0.0;      ///< of the sum of their prior weights
+  std::vector<PlaneDivision::LargestSums> sums_;  ///< as the surveys, empty where none are kept
+  bool keep_sums_;
+  double log_bins_ = 0.0;           ///< of the number of bins that count
+  double log_weighted_bins_ = 0.0;  ///< of the sum of their prior weights
   double log_share_ = 0.0;
 };
 

@@ -27,6 +27,8 @@ constexpr double least_gap_nats = 2.0;
 constexpr double most_gap_nats = 10.0;
 /// Where so many searches found no likelihood, none is above e^-10^10: there may be none at all.
 constexpr std::size_t most_in_vain = 32;
+/// Memory for what searches keep of all touches.
+constexpr std::size_t most_kept_bytes = std::size_t{32} << 20;
 
 double width(const LogInterval& of) { return of.high - of.low; }
 
@@ -34,11 +36,13 @@ double width(const LogInterval& of) { return of.high - of.low; }
 
 void NoneEvidence::add(std::span<const ArrayReadings> touches) {
   std::vector<TouchMean> added;
+  const std::size_t most_bytes =
+      most_kept_bytes / std::max<std::size_t>(means_.size() + touches.size(), 1);
   for (const ArrayReadings& touch : touches) {
     // A touch without a known element does not even tell where the array was.
     if (any_known(touch)) {
-      TouchMean& mean =
-          added.emplace_back(TouchMean{.search = MeanSearch(space_, options_, likelihood_, touch)});
+      TouchMean& mean = added.emplace_back(
+          TouchMean{.search = {space_, options_, likelihood_, touch, most_bytes}});
       const KnownElements known = known_elements(touch);
       for (const TileBounds& of : space_.bounds) {
         mean.before.high = std::max(mean.before.high, of.best(0, known));

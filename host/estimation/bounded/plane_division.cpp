@@ -91,7 +91,7 @@ PlaneDivision::PlaneDivision(const MeanTask& task, std::size_t object)
       levels_(bounds_.levels()),
       placed_(levels_.size()) {}
 
-PlaneSurvey PlaneDivision::survey(int theta) {
+PlaneSurvey PlaneDivision::survey(int theta, LargestSums& sums) {
   const Plane plane = this->plane(theta);
   PlaneSurvey found{.bins = plane.counted.bins};
   if (!plane.all_seen) {
@@ -99,7 +99,8 @@ PlaneSurvey PlaneDivision::survey(int theta) {
         plane.largest.x_first < plane.largest.x_end ? box_of(0, plane, plane.largest) : BinBox{};
     found.unseen = task_.counted.outside(seen, plane.counted, shares_looked_at_);
   }
-  if (const std::vector<std::uint32_t> sums = largest_sums(plane); !sums.empty()) {
+  sums = largest_sums(plane);
+  if (!sums.empty()) {
     const std::uint32_t least = std::ranges::min(sums);
     PenaltySum all(least);
     for_batches(plane.largest, sums.data(), [&](int x, int y, const std::uint32_t* of_batch) {
@@ -111,7 +112,7 @@ PlaneSurvey PlaneDivision::survey(int theta) {
   return found;
 }
 
-double PlaneDivision::divide(int theta, double least) {
+double PlaneDivision::divide(int theta, double least, const LargestSums& kept) {
   const Plane plane = this->plane(theta);
   if (plane.counted.around.bins() == 0) {
     return PlaneSurvey::nothing;
@@ -124,7 +125,8 @@ double PlaneDivision::divide(int theta, double least) {
         static_cast<std::int64_t>(std::clamp(room, -1.0, static_cast<double>(largest_sum))));
     division.left_out.emplace_back(std::max<std::int64_t>(division.last_divided.back(), 0));
   }
-  const std::vector<std::uint32_t> sums = largest_sums(plane);
+  const LargestSums again = kept.empty() ? largest_sums(plane) : LargestSums();
+  const LargestSums& sums = kept.empty() ? again : kept;
   for_batches(plane.largest, sums.data(), [&](int x, int y, const std::uint32_t* of_batch) {
     divide_batch(division, 0, x, y, of_batch);
   });
@@ -180,10 +182,10 @@ const WindowPlaces& PlaneDivision::places(std::size_t level, int theta) {
   return placed.places;
 }
 
-std::vector<std::uint32_t> PlaneDivision::largest_sums(const Plane& plane) {
+PlaneDivision::LargestSums PlaneDivision::largest_sums(const Plane& plane) {
   const TileRange& tiles = plane.largest;
-  std::vector<std::uint32_t> sums(static_cast<std::size_t>(tiles.x_end - tiles.x_first) *
-                                  static_cast<std::size_t>(tiles.y_end - tiles.y_first));
+  LargestSums sums(static_cast<std::size_t>(tiles.x_end - tiles.x_first) *
+                   static_cast<std::size_t>(tiles.y_end - tiles.y_first));
   for_batches(tiles, sums.data(), [&](int x, int y, std::uint32_t* of_batch) {
     bounds_.add(0, task_.elements, places(0, plane.counted.theta), x, y, of_batch);
   });

@@ -44,12 +44,17 @@ class PlaneDivision {
  public:
   PlaneDivision(const MeanTask& task, std::size_t object);
 
+  /// The sums of the penalties of a plane's largest tiles, [batch, tile].
+  using LargestSums = std::vector<std::uint32_t>;
+
   /// Looks at the largest tiles of a plane.
-  PlaneSurvey survey(int theta);
+  /// @param sums receives these
+  PlaneSurvey survey(int theta, LargestSums& sums);
   /// Divides a plane's tiles down to bins, which are evaluated later, but for those whose bounds,
   /// with the prior weight, are below `least`.
+  /// @param kept the sums that its survey found, or none
   /// @returns log of what these hold at most
-  double divide(int theta, double least);
+  double divide(int theta, double least, const LargestSums& kept);
   /// Bounds of the log of the summed likelihood of the bins that count in what was divided, with
   /// the prior weight, beside the likelihood's own error.
   LogInterval evaluated(Arithmetic arithmetic);
@@ -84,8 +89,7 @@ class PlaneDivision {
     return task_.unpenalised[object_][level] + plane.counted.log_most_share;
   }
   const WindowPlaces& places(std::size_t level, int theta);
-  /// The sums of the penalties of a plane's largest tiles, [batch, tile].
-  std::vector<std::uint32_t> largest_sums(const Plane& plane);
+  LargestSums largest_sums(const Plane& plane);
   /// Leaves out the tiles of a batch whose bounds are low, and divides the others.
   /// @param x, y its first tile
   void divide_batch(Division& division, std::size_t level, int x, int y, const std::uint32_t* sums);
