@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <ostream>
 #include <string>
 #include <vector>
@@ -307,6 +308,23 @@ TEST(NoneEvidence, HasTheSameBitsOnAnyNumberOfThreads) {
         tbb::task_arena(threads).execute([&] { return none.bounds_of(touches); });
     EXPECT_EQ(bounds.low, told.low) << threads;
     EXPECT_EQ(bounds.high, told.high) << threads;
+  }
+}
+
+TEST(MeanSearch, FindsTheSameWhereItHasNoRoomForSums) {
+  NoneByBounds none(two_objects(), lattice_of(30, 30, 8));
+  const Recording recording = random_recording(1, 36, 712);
+  const ArrayReadings touch =
+      array_readings(recording.touch(0), none.options.contact, none.options.lattice.pivot_mm);
+  MeanSearch keeping(none.space, none.options, none.likelihood, touch, std::size_t{1} << 20);
+  MeanSearch forgetting(none.space, none.options, none.likelihood, touch, 0);
+  double least = infinity;
+  for (int search = 0; search < 3; ++search) {
+    const LogInterval kept = keeping.bounds(least, false, Deadline({})).value();
+    const LogInterval found = forgetting.bounds(least, false, Deadline({})).value();
+    EXPECT_EQ(kept.low, found.low) << search;
+    EXPECT_EQ(kept.high, found.high) << search;
+    least = kept.high - 4.0;
   }
 }
 
