@@ -20,10 +20,9 @@ constexpr double least_gain = 0.9;
 /// once that comes near: from the first exact one on they evaluate bins in float64.
 constexpr std::array<double, 7> left_out_nats{0.0, -3.0, -6.5, -10.0, -14.0, -18.0, -22.0};
 constexpr std::size_t first_exact = 3;
-/// The second search leaves out what lies below the bounds of the largest tiles by so large a part
-/// of these, in nats. The mean lies about as far below; what it costs to look further is more than
-/// what it gains.
-constexpr double usual_gap = 0.4;
+/// The mean lies below the bounds of the largest tiles by about so large a part of these, in nats.
+/// That is where the second search looks first, but no farther down than gains as much as it costs.
+constexpr double usual_gap = 0.6;
 constexpr double least_gap_nats = 2.0;
 constexpr double most_gap_nats = 10.0;
 /// Where so many searches found no likelihood, none is above e^-10^10: there may be none at all.
