@@ -309,15 +309,13 @@ void LiveScreen::describe(const LiveState& state) {
 void LiveScreen::place_array(const LiveState& state) {
   const bool now = state.touching && state.T_robot_sensor;
   view_.T_robot_sensor = now ? state.T_robot_sensor : state.last->touch.T_robot_sensor;
-  const std::vector<double>& pressure = now ? state.pressure : state.last->touch.pressure;
-  const std::vector<std::uint8_t>& valid = now ? view_.valid : state.last->touch.valid;
-  view_.readings.clear();
-  if (pressure.size() == view_.elements_mm.size()) {
+  view_.readings = state.last->readings;
+  if (now) {
     const Touch touch{.T_robot_sensor = *view_.T_robot_sensor,
                       .elements_mm = view_.elements_mm,
-                      .pressure = pressure,
-                      .valid = valid};
-    view_.readings = TouchEvidence(touch, {.classifier = task_.classifier()}).readings;
+                      .pressure = state.pressure,
+                      .valid = view_.valid};
+    view_.readings = task_.classifier().classify(touch);
   }
 }
 

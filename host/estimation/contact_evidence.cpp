@@ -6,7 +6,6 @@
 #include <limits>
 #include <utility>
 
-#include "model/contact_readings.hpp"
 #include "palpate/occupancy_grid.hpp"
 
 namespace palpate {
@@ -45,8 +44,9 @@ void clear(ContactEvidence& evidence, std::size_t touches, std::size_t elements,
 }
 
 /// Adds the touch's elements that do not read `instead`, as segments of one reading each.
-void append(ContactEvidence& evidence, const Touch& touch, std::span<const Reading> readings,
-            Reading instead, const glm::dvec2& pivot_mm, std::size_t segment_elements) {
+void append(ContactEvidence& evidence, const TouchEvidence& touch,
+            std::span<const Reading> readings, Reading instead, const glm::dvec2& pivot_mm,
+            std::size_t segment_elements) {
   ReadingCounts counts{};
   for (const Reading reading : readings) {
     ++counts[static_cast<std::size_t>(reading)];
@@ -74,6 +74,19 @@ void append(ContactEvidence& evidence, const Touch& touch, std::span<const Readi
   }
 }
 
+/// Gathers all that is not Unknown in the place of what the evidence held.
+void gather_into(ContactEvidence& evidence, std::span<const TouchEvidence> touches,
+                 const glm::dvec2& pivot_mm, std::size_t segment_elements) {
+  std::size_t elements = 0;
+  for (const TouchEvidence& touch : touches) {
+    elements += touch.readings.size();
+  }
+  clear(evidence, touches.size(), elements, segment_elements);
+  for (const TouchEvidence& touch : touches) {
+    append(evidence, touch, touch.readings, Reading::unknown, pivot_mm, segment_elements);
+  }
+}
+
 }  // namespace
 
 bool ContactEvidence::operator==(const ContactEvidence& other) const {
@@ -85,44 +98,23 @@ bool ContactEvidence::operator==(const ContactEvidence& other) const {
 
 ContactEvidence gather_evidence(std::span<const Touch> touches, const ContactModel& model,
                                 const glm::dvec2& pivot_mm, std::size_t segment_elements) {
-  return EvidenceGatherer().gather(touches, model, pivot_mm, segment_elements);
+  ContactEvidence evidence;
+  gather_into(evidence, evidence_of(touches, model), pivot_mm, segment_elements);
+  return evidence;
 }
 
-const ContactEvidence& EvidenceGatherer::gather(std::span<const Touch> touches,
-                                                const ContactModel& model,
-                                                const glm::dvec2& pivot_mm,
-                                                std::size_t segment_elements) {
-  evidence_.resize(std::max<std::size_t>(evidence_.size(), 1));
-  gather_into(evidence_.front(), touches, model, pivot_mm, segment_elements);
-  return evidence_.front();
-}
-
-std::span<const ContactEvidence> EvidenceGatherer::gather_each(std::span<const Touch> touches,
-                                                               const ContactModel& model,
-                                                               const glm::dvec2& pivot_mm,
-                                                               std::size_t segment_elements) {
-  evidence_.resize(std::max(evidence_.size(), touches.size()));
-  for (std::size_t i = 0; i < touches.size(); ++i) {
-    gather_into(evidence_[i], touches.subspan(i, 1), model, pivot_mm, segment_elements);
+std::span<const ContactEvidence> EvidenceGatherer::gather(std::span<const TouchEvidence> touches,
+                                                          bool each, const glm::dvec2& pivot_mm,
+                                                          std::size_t segment_elements) {
+  const std::size_t parts = each ? touches.size() : 1;
+  evidence_.resize(std::max(evidence_.size(), parts));
+  for (std::size_t i = 0; i < parts; ++i) {
+    gather_into(evidence_[i], each ? touches.subspan(i, 1) : touches, pivot_mm, segment_elements);
   }
-  return std::span(evidence_).first(touches.size());
+  return std::span(evidence_).first(parts);
 }
 
-void EvidenceGatherer::gather_into(ContactEvidence& evidence, std::span<const Touch> touches,
-                                   const ContactModel& model, const glm::dvec2& pivot_mm,
-                                   std::size_t segment_elements) {
-  std::size_t elements = 0;
-  for (const Touch& touch : touches) {
-    elements += touch.pressure.size();
-  }
-  clear(evidence, touches.size(), elements, segment_elements);
-  for (const Touch& touch : touches) {
-    readings_ = classify(touch, model, std::move(readings_));
-    append(evidence, touch, readings_, Reading::unknown, pivot_mm, segment_elements);
-  }
-}
-
-ContactEvidence gather_evidence(const Touch& touch, std::span<const Reading> readings,
+ContactEvidence gather_evidence(const TouchEvidence& touch, std::span<const Reading> readings,
                                 Reading instead, const glm::dvec2& pivot_mm,
                                 std::size_t segment_elements, ContactEvidence reuse) {
   ContactEvidence evidence = std::move(reuse);

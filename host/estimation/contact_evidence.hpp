@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "model/touch_evidence.hpp"
 #include "palpate/contact_model.hpp"
 #include "palpate/lattice.hpp"
 #include "shaders/interface.h"
@@ -38,29 +39,19 @@ ContactEvidence gather_evidence(std::span<const Touch> touches, const ContactMod
 /// next call.
 class EvidenceGatherer {
  public:
-  /// Gathers the evidence of all touches together.
-  const ContactEvidence& gather(std::span<const Touch> touches, const ContactModel& model,
-                                const glm::dvec2& pivot_mm, std::size_t segment_elements);
-  /// Gathers the evidence of each touch by itself, [touch].
-  std::span<const ContactEvidence> gather_each(std::span<const Touch> touches,
-                                               const ContactModel& model,
-                                               const glm::dvec2& pivot_mm,
-                                               std::size_t segment_elements);
+  /// @param each whether each touch is gathered by itself, [touch], or else all together
+  std::span<const ContactEvidence> gather(std::span<const TouchEvidence> touches, bool each,
+                                          const glm::dvec2& pivot_mm, std::size_t segment_elements);
 
  private:
-  void gather_into(ContactEvidence& evidence, std::span<const Touch> touches,
-                   const ContactModel& model, const glm::dvec2& pivot_mm,
-                   std::size_t segment_elements);
-
-  std::vector<Reading> readings_;
   std::vector<ContactEvidence> evidence_;
 };
 
-/// Gathers the elements of a classified touch that read something else than `instead`. Each adds
-/// log L(reading) - log L(instead), with log L(Unknown) = 0: with No Contact, what the touch says
-/// beyond an array that reads No Contact everywhere.
+/// Gathers the elements of a touch that have something else than `instead` among their readings,
+/// which stand for the touch's own. Each adds log L(reading) - log L(instead), with log L(Unknown)
+/// = 0: with No Contact, what the touch says beyond an array that reads No Contact everywhere.
 /// @param reuse memory for the result
-ContactEvidence gather_evidence(const Touch& touch, std::span<const Reading> readings,
+ContactEvidence gather_evidence(const TouchEvidence& touch, std::span<const Reading> readings,
                                 Reading instead, const glm::dvec2& pivot_mm,
                                 std::size_t segment_elements, ContactEvidence reuse = {});
 

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "estimation/contact_evidence.hpp"
-#include "model/contact_readings.hpp"
 #include "palpate/occupancy_grid.hpp"
 
 namespace palpate {
@@ -69,23 +68,25 @@ std::vector<std::size_t> sorted_touches(std::span<const KnownElements> touches) 
   return order;
 }
 
-bool any_known(const ArrayReadings& array) {
-  return std::ranges::any_of(array.readings, [](Reading r) { return r != Reading::unknown; });
+bool any_known(const TouchEvidence& touch) {
+  return std::ranges::any_of(touch.readings, [](Reading r) { return r != Reading::unknown; });
 }
 
-KnownElements known_elements(const ArrayReadings& array) {
+KnownElements known_elements(const TouchEvidence& touch, const BoundedOptions& options) {
+  const Pose& T_robot_sensor = touch.T_robot_sensor;
+  const glm::dvec2& pivot_mm = options.lattice.pivot_mm;
   std::vector<KnownElement> elements;
-  for (std::size_t i = 0; i < array.readings.size(); ++i) {
-    if (array.readings[i] != Reading::unknown) {
-      elements.push_back({array.readings[i], array.from_pivot_mm[i]});
+  for (std::size_t i = 0; i < touch.readings.size(); ++i) {
+    if (touch.readings[i] != Reading::unknown) {
+      elements.push_back({touch.readings[i], T_robot_sensor * touch.elements_mm[i] - pivot_mm});
     }
   }
   std::sort(elements.begin(), elements.end(), before);
   KnownElements known = in_runs(elements);
-  if (array.sensor_from_pivot_mm && !known.runs.empty()) {
-    KnownElements touch = known;
-    touch.sensor_from_pivot_mm = *array.sensor_from_pivot_mm;
-    known.touches.push_back(std::move(touch));
+  if (!options.touch_sd.none() && !known.runs.empty()) {
+    KnownElements displaced = known;
+    displaced.sensor_from_pivot_mm = T_robot_sensor.translation_mm - pivot_mm;
+    known.touches.push_back(std::move(displaced));
   }
   return known;
 }
@@ -125,41 +126,28 @@ std::vector<double> prior_log_likelihoods(const KnownElements& elements,
   return sums;
 }
 
-void KeptTouches::add(std::span<const Touch> touches, const ContactModel& model,
-                      const glm::dvec2& pivot_mm) {
-  const std::size_t before = count_;
-  try {
-    for (const Touch& touch : touches) {
-      if (touches_.empty()) {
-        make_room(touch.elements_mm.size());
-      } else if (count_ == touches_.size()) {
-        touches_.emplace_back();
-      }
-      ArrayReadings& kept = touches_[count_];
-      kept.readings = classify(touch, model, std::move(kept.readings));
-      kept.from_pivot_mm.clear();
-      for (const glm::dvec2& element_mm : touch.elements_mm) {
-        kept.from_pivot_mm.push_back(touch.T_robot_sensor * element_mm - pivot_mm);
-      }
-      kept.rectangle = array_rectangle(touch, pivot_mm);
-      if (displaced_) {
-        kept.sensor_from_pivot_mm = touch.T_robot_sensor.translation_mm - pivot_mm;
-      }
-      ++count_;
-    }
-  } catch (...) {
-    count_ = before;
-    throw;
-  }
+void KeptTouches::add(std::span<const TouchEvidence> touches) {
+  make_room(touches.empty() ? 0 : touches.front().elements_mm.size());
+  touches_.resize(std::max(touches_.size(), count_ + touches.size()));
+  std::ranges::copy(touches, touches_.begin() + static_cast<std::ptrdiff_t>(count_));
+  count_ += touches.size();
+}
+
+void KeptTouches::add(std::span<const Touch> touches, const ContactModel& contact) {
+  make_room(touches.empty() ? 0 : touches.front().elements_mm.size());
+  count_ += evidence_of(touches, contact, touches_, count_).size();
 }
 
 void KeptTouches::make_room(std::size_t elements) {
-  const std::size_t bytes =
-      (sizeof(glm::dvec2) + sizeof(Reading)) * std::max<std::size_t>(elements, 1);
+  if (!touches_.empty() || elements == 0) {
+    return;
+  }
+  const std::size_t bytes = (sizeof(glm::dvec2) + sizeof(Reading) + 1) * elements;
   touches_.resize(std::clamp<std::size_t>(most_bytes / bytes, 1, room_for));
-  for (ArrayReadings& touch : touches_) {
-    touch.from_pivot_mm.reserve(elements);
+  for (TouchEvidence& touch : touches_) {
+    touch.elements_mm.reserve(elements);
     touch.readings.reserve(elements);
+    touch.lives.reserve(elements);
   }
 }
 

@@ -2,13 +2,13 @@
 
 #include <cstddef>
 #include <memory>
-#include <optional>
 #include <span>
 #include <vector>
 
 #include <glm/vec2.hpp>
 
-#include "estimation/touch_overlap.hpp"
+#include "model/touch_evidence.hpp"
+#include "palpate/bounded_posterior.hpp"
 #include "palpate/contact_model.hpp"
 
 namespace palpate {
@@ -38,21 +38,13 @@ struct KnownElements {
   std::shared_ptr<ExactBins> exact_bins = {};
 };
 
-/// All elements of a touch in the array's order, Unknown ones too: in the robot frame and relative
-/// to the lattice's pivot.
-struct ArrayReadings {
-  std::vector<glm::dvec2> from_pivot_mm;
-  std::vector<Reading> readings;
-  ArrayRectangle rectangle{};
-  /// The sensor's origin where the touch is displaced.
-  std::optional<glm::dvec2> sensor_from_pivot_mm = {};
-};
-
 /// Whether an element is not Unknown.
-bool any_known(const ArrayReadings& array);
+bool any_known(const TouchEvidence& touch);
 
 /// The elements that are not Unknown.
-KnownElements known_elements(const ArrayReadings& array);
+/// @param options whose lattice has the pivot, and whose touch_sd says whether touches are
+/// displaced
+KnownElements known_elements(const TouchEvidence& touch, const BoundedOptions& options);
 
 /// Indices of touches in an order that does not depend on when they came.
 std::vector<std::size_t> sorted_touches(std::span<const KnownElements> touches);
@@ -76,24 +68,22 @@ class KeptTouches {
   static constexpr std::size_t room_for = 64;
   static constexpr std::size_t most_bytes = std::size_t{1} << 22;
 
-  /// @param displaced whether touches are displaced
-  explicit KeptTouches(bool displaced = false) : displaced_(displaced) {}
-
+  void add(std::span<const TouchEvidence> touches);
   /// Classifies the touches' elements (Eq. 3) and keeps them.
   /// @throws Error on a touch that is not sound, and keeps none of these
-  void add(std::span<const Touch> touches, const ContactModel& model, const glm::dvec2& pivot_mm);
+  void add(std::span<const Touch> touches, const ContactModel& contact);
   std::size_t size() const { return count_; }
   /// Until the next call.
-  std::span<const ArrayReadings> all() const { return std::span(touches_).first(count_); }
+  std::span<const TouchEvidence> all() const { return std::span(touches_).first(count_); }
   /// Forgets them, and keeps the room.
   void clear() { count_ = 0; }
 
  private:
+  /// For the first touches, of so many elements.
   void make_room(std::size_t elements);
 
-  std::vector<ArrayReadings> touches_;  ///< those from count_ on are room
+  std::vector<TouchEvidence> touches_;  ///< those from count_ on are room
   std::size_t count_ = 0;
-  bool displaced_;
 };
 
 }  // namespace palpate

@@ -22,11 +22,12 @@ glm::dvec2 within_reach(const glm::dvec2& mm) {
 
 }  // namespace
 
-ArrayRectangle array_rectangle(const Touch& touch, const glm::dvec2& pivot_mm) {
-  const BoundingBox box = bounding_box(touch.elements_mm);
-  return {.from_pivot_mm = within_reach(touch.T_robot_sensor * box.middle() - pivot_mm),
+ArrayRectangle array_rectangle(const Pose& T_robot_sensor, std::span<const glm::dvec2> elements_mm,
+                               const glm::dvec2& pivot_mm) {
+  const BoundingBox box = bounding_box(elements_mm);
+  return {.from_pivot_mm = within_reach(T_robot_sensor * box.middle() - pivot_mm),
           .half_mm = within_reach(box.extent() / 2.0),
-          .direction_rad = touch.T_robot_sensor.theta_rad};
+          .direction_rad = T_robot_sensor.theta_rad};
 }
 
 OverlapPlane::Line::Line(const Axis& axis)

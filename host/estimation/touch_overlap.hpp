@@ -6,7 +6,7 @@
 #include "estimation/bin_box.hpp"
 #include "model/bounding_box.hpp"
 #include "palpate/lattice.hpp"
-#include "palpate/touch.hpp"
+#include "palpate/pose.hpp"
 
 namespace palpate {
 
@@ -17,7 +17,9 @@ struct ArrayRectangle {
   double direction_rad = 0.0;  ///< of the sensor's x axis, in the robot frame
 };
 
-ArrayRectangle array_rectangle(const Touch& touch, const glm::dvec2& pivot_mm);
+/// @param elements_mm in the sensor frame
+ArrayRectangle array_rectangle(const Pose& T_robot_sensor, std::span<const glm::dvec2> elements_mm,
+                               const glm::dvec2& pivot_mm);
 
 /// The bins of one theta at which the array overlaps an object: at which its rectangle meets the
 /// box around the object's cells, as OverlapMean and reference::overlaps() have it. Whether two

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
+
+#include "model/contact_readings.hpp"
 
 namespace palpate {
 
@@ -26,12 +29,15 @@ TouchEvidence evidence_where(TouchEvidence evidence, const Kept& kept) {
 
 }  // namespace
 
-TouchEvidence::TouchEvidence(const Touch& touch, const ContactModel& contact)
-    : T_robot_sensor(touch.T_robot_sensor),
-      elements_mm(touch.elements_mm.begin(), touch.elements_mm.end()),
-      readings(contact.classify(touch)),
-      lives(readings.size()),
-      contacts(static_cast<std::size_t>(std::ranges::count_if(readings, is_contact))) {
+void TouchEvidence::assign(const Touch& touch, const ContactModel& contact) {
+  readings = classify(touch, contact, std::move(readings));
+  T_robot_sensor = touch.T_robot_sensor;
+  elements_mm.assign(touch.elements_mm.begin(), touch.elements_mm.end());
+  lives.assign(readings.size(), 0);
+  contacts = static_cast<std::size_t>(std::ranges::count_if(readings, is_contact));
+  least_pressure = std::numeric_limits<double>::infinity();
+  largest_pressure = -least_pressure;
+  force = 0.0;
   for (std::size_t e = 0; e < readings.size(); ++e) {
     if (!is_living(touch, e)) {
       continue;
@@ -57,11 +63,18 @@ bool is_living(const Touch& touch, std::size_t element) {
 std::vector<TouchEvidence> evidence_of(std::span<const Touch> touches,
                                        const ContactModel& contact) {
   std::vector<TouchEvidence> evidence;
-  evidence.reserve(touches.size());
-  for (const Touch& touch : touches) {
-    evidence.emplace_back(touch, contact);
-  }
+  evidence_of(touches, contact, evidence);
   return evidence;
+}
+
+std::span<const TouchEvidence> evidence_of(std::span<const Touch> touches,
+                                           const ContactModel& contact,
+                                           std::vector<TouchEvidence>& room, std::size_t first) {
+  room.resize(std::max(room.size(), first + touches.size()));
+  for (std::size_t i = 0; i < touches.size(); ++i) {
+    room[first + i].assign(touches[i], contact);
+  }
+  return std::span(room).subspan(first, touches.size());
 }
 
 }  // namespace palpate

@@ -21,8 +21,11 @@ namespace palpate {
 /// What a touch says (Eq. 3), classified once. It holds copies: the touch's memory may go. Elements
 /// stay in the sensor frame, since an uncertain touch is displaced with its sensor.
 struct TouchEvidence {
+  TouchEvidence() = default;
   /// @throws Error on a touch that is not sound, or a classifier out of range
-  TouchEvidence(const Touch& touch, const ContactModel& contact);
+  TouchEvidence(const Touch& touch, const ContactModel& contact) { assign(touch, contact); }
+  /// As if made anew of this touch, in the same memory.
+  void assign(const Touch& touch, const ContactModel& contact);
 
   bool in_contact() const { return contacts > 0; }
   /// Place of the array's middle in the robot frame.
@@ -48,6 +51,10 @@ struct TouchEvidence {
 bool is_living(const Touch& touch, std::size_t element);
 
 std::vector<TouchEvidence> evidence_of(std::span<const Touch> touches, const ContactModel& contact);
+/// evidence_of() in the memory of `room` from `first` on, which grows where it is too small.
+std::span<const TouchEvidence> evidence_of(std::span<const Touch> touches,
+                                           const ContactModel& contact,
+                                           std::vector<TouchEvidence>& room, std::size_t first = 0);
 
 /// press_features() of a touch that is classified.
 /// @param threshold of the classifier

@@ -25,7 +25,7 @@ class FilterOf : public Filter {
 
   void reset() override { own_.reset(); }
   void move_pivot(const glm::dvec2& pivot_mm) override { own_.move_pivot(pivot_mm); }
-  void update(std::span<const Touch> touches,
+  void update(std::span<const TouchEvidence> touches,
               const std::function<void(double)>& progress) override {
     own_.update(touches, progress);
   }
@@ -63,7 +63,7 @@ class HistogramFilter final : public FilterInBins<PoseHistogram> {
  public:
   using FilterInBins::FilterInBins;
 
-  void prepare(const Touch& touch) override { own_.prepare(touch); }
+  void prepare(const TouchEvidence& touch) override { own_.prepare(touch); }
   Marginals marginals(int object, const PoseLattice& /*lattice*/) const override {
     return own_.marginals(object);
   }

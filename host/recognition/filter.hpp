@@ -10,6 +10,7 @@
 #include <variant>
 #include <vector>
 
+#include "model/touch_evidence.hpp"
 #include "palpate/bounded_posterior.hpp"
 #include "palpate/contact_model.hpp"
 #include "palpate/device.hpp"
@@ -73,11 +74,12 @@ class Filter {
 
   virtual void reset() = 0;
   virtual void move_pivot(const glm::dvec2& pivot_mm) = 0;
-  virtual void update(std::span<const Touch> touches,
+  /// @param touches classified by contact_of() the filter's options
+  virtual void update(std::span<const TouchEvidence> touches,
                       const std::function<void(double)>& progress) = 0;
   /// Does nothing where FilterTraits::every_bin is false: bounds search only once they are asked,
   /// and particles cannot be weighed ahead, since weighing follows resampling and noise.
-  virtual void prepare(const Touch& /*touch*/) {}
+  virtual void prepare(const TouchEvidence& /*touch*/) {}
 
   /// @param tolerance see BoundedPosterior::estimate(); ignored where FilterTraits::certificate is
   /// false

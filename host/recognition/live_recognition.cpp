@@ -320,7 +320,7 @@ void LiveRecognition::use(const Job& job) {
   const Touch touch = view_of(*job.touch);
   const PartialTruth truth = partial_truth(description_.object, description_.truth);
   RecognitionStep step = take_step(recogniser_, task_, std::span(&touch, 1), truth);
-  used_.push_back({job});
+  used_.push_back({job, recogniser_.evidence().back().readings});
   const double latency_ms =
       std::chrono::duration<double, std::milli>(Clock::now() - job.taken).count();
   {
@@ -330,7 +330,7 @@ void LiveRecognition::use(const Job& job) {
     state_.worst_latency_ms = std::max(state_.worst_latency_ms, latency_ms);
     latencies_ms_.push_back(latency_ms);
   }
-  tell(job, std::move(step));
+  tell(std::move(step));
 }
 
 void LiveRecognition::leave_out_now(std::size_t touch, bool out) {
@@ -346,12 +346,16 @@ void LiveRecognition::leave_out_now(std::size_t touch, bool out) {
     }
   }
   recogniser_.reset();
-  tell(used_.back().job, take_step(recogniser_, task_, touches,
-                                   partial_truth(description_.object, description_.truth)));
+  tell(take_step(recogniser_, task_, touches,
+                 partial_truth(description_.object, description_.truth)));
 }
 
-void LiveRecognition::tell(const Job& job, RecognitionStep step) {
-  LiveTouch result{.touch = *job.touch, .step = std::move(step), .frames_lost = job.frames_lost};
+void LiveRecognition::tell(RecognitionStep step) {
+  const UsedTouch& last = used_.back();
+  LiveTouch result{.touch = *last.job.touch,
+                   .readings = last.readings,
+                   .step = std::move(step),
+                   .frames_lost = last.job.frames_lost};
   for (std::size_t i = 0; i < used_.size(); ++i) {
     if (used_[i].left_out) {
       result.left_out.push_back(i);
@@ -368,7 +372,7 @@ void LiveRecognition::tell(const Job& job, RecognitionStep step) {
   if (!options_.plan) {
     return;
   }
-  result.next = plan(*job.touch);
+  result.next = plan(result.touch);
   {
     const std::lock_guard lock(mutex_);
     state_.last->next = result.next;

@@ -23,8 +23,9 @@ namespace palpate {
 /// A touch of a stream and what was believed after it.
 struct LiveTouch {
   DetectedTouch touch;
-  std::size_t unknown = 0;  ///< the unknown's number, from 0
-  std::size_t index = 0;    ///< the touch's number on that unknown, from 0
+  std::vector<Reading> readings = {};  ///< [e] what its elements said
+  std::size_t unknown = 0;             ///< the unknown's number, from 0
+  std::size_t index = 0;               ///< the touch's number on that unknown, from 0
   RecognitionStep step;
   double latency_ms = 0.0;        ///< from taking the frame that ended the touch to its estimate
   std::uint64_t frames_lost = 0;  ///< up to that frame
@@ -115,6 +116,7 @@ class LiveRecognition {
   /// A touch of the unknown, which people may take for a bad one.
   struct UsedTouch {
     Job job;
+    std::vector<Reading> readings;
     bool left_out = false;
   };
 
@@ -131,8 +133,8 @@ class LiveRecognition {
   void use(const Job& job);
   void begin_unknown();
   void leave_out_now(std::size_t touch, bool out);
-  /// Takes the result after the touch to whoever waits for it, and plans the next.
-  void tell(const Job& job, RecognitionStep step);
+  /// Takes the result after the last touch to whoever waits for it, and plans the next.
+  void tell(RecognitionStep step);
   /// The best next touch of a grid about the belief, with the array of this touch.
   PlannedTouch plan(const DetectedTouch& touch) const;
   Touch view_of(const DetectedTouch& touch) const;

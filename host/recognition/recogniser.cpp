@@ -20,7 +20,6 @@ Recogniser::Recogniser(Device* device, const RecognitionTask& task, const Filter
 void Recogniser::reset() {
   filter_->reset();
   evidence_.clear();
-  waiting_.clear();
   surprises_.clear();
   pivot_placed_ = false;
   touched_ = false;
@@ -49,51 +48,34 @@ void Recogniser::update(std::span<const Touch> touches,
                         const std::function<void(double)>& progress) {
   // Looks at all touches, so that a bad touch is refused before the pivot moves.
   std::vector<TouchEvidence> more = evidence_of(touches, contact_);
-  const auto keep = [&] { std::ranges::move(more, std::back_inserter(evidence_)); };
-  if (!lacks_pivot()) {
-    filter_->update(touches, progress);
-    touched_ = touched_ || !touches.empty();
-    keep();
-    return;
-  }
   const auto first = std::ranges::find_if(more, &TouchEvidence::in_contact);
-  if (first == more.end()) {
-    for (const Touch& touch : touches) {
-      waiting_.push_back({touch.T_robot_sensor,
-                          {touch.elements_mm.begin(), touch.elements_mm.end()},
-                          {touch.pressure.begin(), touch.pressure.end()},
-                          {touch.valid.begin(), touch.valid.end()}});
-    }
-    keep();
-    return;
+  if (lacks_pivot() && first != more.end()) {
+    place_pivot(*first);
+    more.insert(more.begin(), evidence_.begin(), evidence_.end());  // it has waited
+    filter_->update(more, progress);
+    evidence_.clear();
+    pivot_placed_ = true;
+    touched_ = true;
+  } else if (!lacks_pivot()) {
+    filter_->update(more, progress);
+    touched_ = touched_ || !more.empty();
   }
-  place_pivot(*first);
-  std::vector<Touch> all;
-  all.reserve(waiting_.size() + touches.size());
-  for (const WaitingTouch& touch : waiting_) {
-    all.push_back({touch.T_robot_sensor, touch.elements_mm, touch.pressure, touch.valid});
-  }
-  all.insert(all.end(), touches.begin(), touches.end());
-  filter_->update(all, progress);
-  waiting_.clear();
-  pivot_placed_ = true;
-  touched_ = true;
-  keep();
+  std::ranges::move(more, std::back_inserter(evidence_));
 }
 
 void Recogniser::prepare(const Touch& touch) {
   if (!traits_.every_bin) {
     return;
   }
+  const TouchEvidence evidence(touch, contact_);
   if (lacks_pivot()) {
     // A touch that comes after waiting touches is taken in together with them, not by itself.
-    const TouchEvidence evidence(touch, contact_);
-    if (!waiting_.empty() || !evidence.in_contact()) {
+    if (!evidence_.empty() || !evidence.in_contact()) {
       return;
     }
     place_pivot(evidence);
   }
-  filter_->prepare(touch);
+  filter_->prepare(evidence);
 }
 
 const SurpriseJudge& Recogniser::surprise_judge(const RecognitionTask& task) {

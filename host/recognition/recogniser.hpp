@@ -29,7 +29,7 @@ class Recogniser {
   /// it.
   void reset();
   /// Updates the belief with these touches. The first touch since reset() that has an element In
-  /// Contact (Eq. 3) places an automatic pivot. Copies of the touches before it wait, and join the
+  /// Contact (Eq. 3) places an automatic pivot. The touches before it wait, and join the
   /// belief together with that touch; until then the belief is the one before any touch.
   /// `progress` is called now and then with the fraction done.
   void update(std::span<const Touch> touches, const std::function<void(double)>& progress = {});
@@ -88,14 +88,6 @@ class Recogniser {
   std::optional<EvaluatedBelief> evaluated_bins() const { return filter_->evaluated_bins(); }
 
  private:
-  /// A copy of a touch that waits for the pivot.
-  struct WaitingTouch {
-    Pose T_robot_sensor;
-    std::vector<glm::dvec2> elements_mm;
-    std::vector<double> pressure;
-    std::vector<std::uint8_t> valid;
-  };
-
   /// Whether an automatic pivot has yet to be placed.
   bool lacks_pivot() const { return auto_pivot_ && !pivot_placed_; }
   /// Moves the pivot to the array's centre.
@@ -108,11 +100,10 @@ class Recogniser {
   PoseLattice lattice_;
   ContactModel contact_;
   bool auto_pivot_;
-  bool pivot_placed_ = false;  ///< by a touch since reset(); only where it is automatic
-  std::vector<TouchEvidence> evidence_;
-  std::vector<WaitingTouch> waiting_;  ///< in order; empty once the pivot is placed
-  bool touched_ = false;               ///< since reset()
-  std::vector<double> surprises_;      ///< since reset()
+  bool pivot_placed_ = false;            ///< by a touch since reset(); only where it is automatic
+  std::vector<TouchEvidence> evidence_;  ///< in order; waits where the pivot lacks
+  bool touched_ = false;                 ///< since reset()
+  std::vector<double> surprises_;        ///< since reset()
   std::optional<SurpriseJudge> surprise_judge_;
   std::unique_ptr<Filter> filter_;
 };

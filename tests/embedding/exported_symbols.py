@@ -33,16 +33,22 @@ def public_names(headers):
     return names
 
 
+def bare(signature):
+    """A signature without const and all scopes but std, which headers and nm write differently."""
+    return re.sub(r"\b(?:(?!std\b)\w+::)+|\bconst | const\b", "", signature)
+
+
 def hidden_members(headers):
     """How members begin that the headers mark as the library's own: their name and, of a constructor
-    among others, the first type that they take."""
-    return tuple(name for header in headers for name in re.findall(
-        r"^ .*PALPATE_LOCAL [\w&: ]*?(\w+(?=;)|\w+\([\w:]*)", header.read_text(), re.MULTILINE))
+    or an overload among others, the first type that they take."""
+    return tuple(bare(name) for header in headers for name in re.findall(
+        r"^ .*PALPATE_LOCAL [\w&: ]*?(\w+(?=;)|\w+\((?:const )?[\w:]*(?:<[\w: ]*)?)",
+        header.read_text(), re.MULTILINE))
 
 
 def is_hidden(symbol, hidden):
     member = re.match(r"palpate::\w+::(.*)", symbol)
-    return member is not None and member[1].startswith(hidden)
+    return member is not None and bare(member[1]).startswith(hidden)
 
 
 def missing(exported, archive, headers):

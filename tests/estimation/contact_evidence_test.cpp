@@ -64,8 +64,8 @@ TEST(GatherEvidence, OfUnknownElementsIsEmpty) {
 
 TEST(GatherEvidence, InsteadOfAReadingKeepsTheElementsThatReadSomethingElse) {
   const Recording recording = random_recording(1, 36, 34);
-  const Touch touch = recording.touch(0);
-  const std::vector<Reading> readings = ContactModel{}.classify(touch);
+  const TouchEvidence touch(recording.touch(0), {});
+  const std::vector<Reading>& readings = touch.readings;
   const ContactEvidence evidence =
       gather_evidence(touch, readings, Reading::no_contact, {}, segment_elements);
   std::vector<std::uint64_t> gathered(most_reading_levels + 1);

@@ -17,8 +17,9 @@ std::int64_t expect_the_same_bins(const Touch& touch, const PoseLattice& lattice
                                   const OccupancyGrid& map) {
   std::int64_t total = 0;
   for (int t = 0; t < lattice.theta_rad.count; ++t) {
-    const OverlapPlane plane(array_rectangle(touch, lattice.pivot_mm), occupied_box(map), lattice,
-                             t);
+    const ArrayRectangle array =
+        array_rectangle(touch.T_robot_sensor, touch.elements_mm, lattice.pivot_mm);
+    const OverlapPlane plane(array, occupied_box(map), lattice, t);
     std::vector<OverlapPlane::Bins> rows(static_cast<std::size_t>(lattice.y_mm.count));
     plane.find_rows(rows);
     for (int y = 0; y < lattice.y_mm.count; ++y) {
@@ -117,8 +118,9 @@ TEST(ArrayOverlap, OfAnArrayBeyondAllMeasureIsEverywhere) {
   recording.T_robot_sensor = {{{0.0, 0.0}, 0.3}};
   const PoseLattice lattice{.x_mm = {-9, 9, 5}, .y_mm = {-9, 9, 4}, .theta_rad = {0, 6, 3}};
   for (int t = 0; t < 3; ++t) {
-    const OverlapPlane plane(array_rectangle(recording.touch(0), {}), occupied_box(corner_map(641)),
-                             lattice, t);
+    const OverlapPlane plane(
+        array_rectangle(recording.T_robot_sensor.front(), recording.elements_mm, {}),
+        occupied_box(corner_map(641)), lattice, t);
     std::vector<OverlapPlane::Bins> rows(static_cast<std::size_t>(lattice.y_mm.count));
     plane.find_rows(rows);
     for (const OverlapPlane::Bins& row : rows) {

@@ -51,14 +51,9 @@ std::vector<std::string> sentences(const LiveTouch& touch, const RecognitionTask
 }
 
 /// What the elements said of a touch: "C" In Contact, "n" No Contact, "?" Unknown.
-std::string readings_text(const LiveTouch& touch, const std::vector<glm::dvec2>& elements_mm,
-                          const RecognitionTask& task) {
-  const Touch view{.T_robot_sensor = *touch.touch.T_robot_sensor,
-                   .elements_mm = elements_mm,
-                   .pressure = touch.touch.pressure,
-                   .valid = touch.touch.valid};
+std::string readings_text(const LiveTouch& touch) {
   std::string text;
-  for (const Reading reading : TouchEvidence(view, {.classifier = task.classifier()}).readings) {
+  for (const Reading reading : touch.readings) {
     text += is_contact(reading) ? 'C' : reading == Reading::unknown ? '?' : 'n';
   }
   return text;
@@ -72,7 +67,6 @@ LivePage::LivePage(const PageAddress& address, const SensorDescription& sensor,
     : task_(task),
       recogniser_(recogniser),
       plan_(plan),
-      elements_mm_(elements_mm),
       server_(address, feed_,
               {.get = [this](const std::string& path) { return get(path); },
                .act = [this](const nlohmann::json& request) { act(request); }}) {
@@ -128,7 +122,7 @@ void LivePage::add(const LiveTouch& touch) {
   nlohmann::ordered_json json = to_json(touch, task_);
   json["words"] = sentences(touch, task_);
   json["map"] = touch.step.mode.object;
-  json["readings"] = readings_text(touch, elements_mm_, task_);
+  json["readings"] = readings_text(touch);
   feed_.add("touch", line_of(json));
   show_belief();
 }

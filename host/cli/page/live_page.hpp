@@ -48,7 +48,6 @@ class LivePage {
   const RecognitionTask& task_;
   const Recogniser& recogniser_;
   std::optional<PlanGoal> plan_;
-  std::vector<glm::dvec2> elements_mm_;
 
   std::optional<RecognitionStep> last_;  ///< of the thread that uses the recogniser alone
 

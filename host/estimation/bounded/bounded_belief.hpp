@@ -24,8 +24,8 @@ class BoundedBelief {
   void reset();
   /// @throws Error after the first touch
   void move_pivot(const glm::dvec2& pivot_mm);
-  /// Keeps touches for take_in(): all, or none where one is not sound.
-  void add(std::span<const Touch> touches) { touches_.add(touches); }
+  /// The touches that are kept for take_in(), to be added to.
+  KeptTouches& kept() { return touches_.kept(); }
   /// Takes in the touches that were kept, and forgets what was found without them. All below is
   /// about the touches that were taken in.
   /// @throws Error where memory ended in the middle of it, until reset()

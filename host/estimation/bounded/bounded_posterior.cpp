@@ -68,7 +68,16 @@ void BoundedPosterior::update(std::span<const Touch> touches,
   if (progress) {
     progress(1.0);
   }
-  belief.add(touches);
+  belief.kept().add(touches, belief.touches().options().contact);
+}
+
+void BoundedPosterior::update(std::span<const TouchEvidence> touches,
+                              const std::function<void(double)>& progress) {
+  BoundedBelief& belief = impl().belief;
+  if (progress) {
+    progress(1.0);
+  }
+  belief.kept().add(touches);
 }
 
 Estimate BoundedPosterior::estimate(std::optional<double> tolerance) const {

@@ -24,14 +24,14 @@ std::size_t bytes_of_sums(const SearchSpace& space, const TileBounds& bounds) {
 }  // namespace
 
 MeanSearch::MeanSearch(const SearchSpace& space, const BoundedOptions& options,
-                       const BinLikelihood& likelihood, const ArrayReadings& touch,
-                       std::size_t most_bytes)
+                       const BinLikelihood& likelihood, const TouchEvidence& touch,
+                       KnownElements known, std::size_t most_bytes)
     : space_(space),
       options_(options),
       likelihood_(likelihood),
-      elements_(known_elements(touch)),
-      rectangle_(touch.rectangle),
-      sensor_from_pivot_mm_(touch.sensor_from_pivot_mm),
+      elements_(std::move(known)),
+      rectangle_(
+          array_rectangle(touch.T_robot_sensor, touch.elements_mm, options.lattice.pivot_mm)),
       reaches_(reaches_of(elements_, space.turns)),
       unpenalised_(unpenalised(space, elements_)),
       prior_log_likelihood_(
@@ -70,7 +70,11 @@ bool MeanSearch::for_planes(const Deadline& deadline, const Work& work) const {
 
 bool MeanSearch::survey(const Deadline& deadline, bool everywhere) {
   const std::size_t thetas = space_.turns.size();
-  counted_.emplace(space_, options_.lattice, rectangle_, sensor_from_pivot_mm_, everywhere);
+  std::optional<glm::dvec2> sensor_from_pivot_mm;
+  if (!elements_.touches.empty()) {  // the touch is displaced
+    sensor_from_pivot_mm = elements_.touches.front().sensor_from_pivot_mm;
+  }
+  counted_.emplace(space_, options_.lattice, rectangle_, sensor_from_pivot_mm, everywhere);
   const MeanTask task = this->task();
   std::vector<PlaneSurvey> surveys(space_.bounds.size() * thetas);
   std::vector<PlaneDivision::LargestSums> sums(surveys.size());

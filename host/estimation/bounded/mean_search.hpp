@@ -29,10 +29,13 @@ namespace palpate {
 /// of the smallest ones evaluated.
 class MeanSearch {
  public:
-  /// @param options checked, with a resolved contact model; all but the touch outlive this object
+  /// @param options checked, with a resolved contact model; these, space and likelihood outlive
+  /// this object
+  /// @param known the touch's known_elements()
   /// @param most_bytes for the sums of the largest tiles, which are kept where they need no more
   MeanSearch(const SearchSpace& space, const BoundedOptions& options,
-             const BinLikelihood& likelihood, const ArrayReadings& touch, std::size_t most_bytes);
+             const BinLikelihood& likelihood, const TouchEvidence& touch, KnownElements known,
+             std::size_t most_bytes);
 
   /// Bounds of the log of the mean.
   /// @param least log of a mean: tiles are left out where their bins would have less than it on
@@ -66,10 +69,9 @@ class MeanSearch {
   const BinLikelihood& likelihood_;
   KnownElements elements_;
   ArrayRectangle rectangle_;
-  std::optional<glm::dvec2> sensor_from_pivot_mm_;  ///< where the touch is displaced
-  std::vector<BoundingBox> reaches_;                ///< [theta] of the elements
-  std::vector<std::vector<double>> unpenalised_;    ///< [object][level]
-  std::vector<double> prior_log_likelihood_;        ///< [object] with the weight
+  std::vector<BoundingBox> reaches_;              ///< [theta] of the elements
+  std::vector<std::vector<double>> unpenalised_;  ///< [object][level]
+  std::vector<double> prior_log_likelihood_;      ///< [object] with the weight
   /// [object] of a bin in float32 and float64, in nats
   std::vector<std::array<double, 2>> errors_;
   std::optional<CountedBins> counted_;  ///< empty before the first bounds()

@@ -34,16 +34,15 @@ double width(const LogInterval& of) { return of.high - of.low; }
 
 }  // namespace
 
-void NoneEvidence::add(std::span<const ArrayReadings> touches) {
+void NoneEvidence::add(std::span<const TouchEvidence> touches) {
   std::vector<TouchMean> added;
   const std::size_t most_bytes =
       most_kept_bytes / std::max<std::size_t>(means_.size() + touches.size(), 1);
-  for (const ArrayReadings& touch : touches) {
+  for (const TouchEvidence& touch : touches) {
     // A touch without a known element does not even tell where the array was.
-    if (any_known(touch)) {
+    if (const KnownElements known = known_elements(touch, options_); !known.runs.empty()) {
       TouchMean& mean = added.emplace_back(
-          TouchMean{.search = {space_, options_, likelihood_, touch, most_bytes}});
-      const KnownElements known = known_elements(touch);
+          TouchMean{.search = {space_, options_, likelihood_, touch, known, most_bytes}});
       for (const TileBounds& of : space_.bounds) {
         mean.before.high = std::max(mean.before.high, of.best(0, known));
       }

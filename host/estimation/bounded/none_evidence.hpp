@@ -38,7 +38,7 @@ class NoneEvidence {
   void reset() { means_.clear(); }
   /// Takes in touches; those without a known element say nothing. All of them, or none where memory
   /// ends.
-  void add(std::span<const ArrayReadings> touches);
+  void add(std::span<const TouchEvidence> touches);
 
   /// Bounds of the log of the product of s and the touches' mean likelihoods, in nats; 0 before any
   /// touch. Searches on, for the touch whose mean is known worst, until they are enough, or

@@ -23,7 +23,6 @@ SearchedTouches::SearchedTouches(std::span<const Hypothesis> hypotheses,
       arena_(threads_),
       likelihood_(hypotheses_, options_.contact, options_.lattice, options_.touch_sd),
       space_(arena_.execute([&] { return SearchSpace(hypotheses_, options_); })),
-      touches_(!options_.touch_sd.none()),
       search_(space_, options_, likelihood_) {
   if (!options_.slip_sd.none()) {
     moving_.emplace(space_, options_, likelihood_, hypotheses_);
@@ -54,11 +53,6 @@ void SearchedTouches::move_pivot(const glm::dvec2& pivot_mm) {
   likelihood_.move_pivot(pivot_mm);
 }
 
-void SearchedTouches::add(std::span<const Touch> touches) {
-  change_.refuse();
-  touches_.add(touches, options_.contact, options_.lattice.pivot_mm);
-}
-
 bool SearchedTouches::waiting() const {
   change_.refuse();
   return taken_in_ < touches_.size();
@@ -66,10 +60,10 @@ bool SearchedTouches::waiting() const {
 
 void SearchedTouches::take_in() {
   change_.change([&] {
-    const std::span<const ArrayReadings> added = touches_.all().subspan(taken_in_);
+    const std::span<const TouchEvidence> added = touches_.all().subspan(taken_in_);
     std::vector<KnownElements> known;
-    for (const ArrayReadings& touch : added) {
-      known.push_back(known_elements(touch));
+    for (const TouchEvidence& touch : added) {
+      known.push_back(known_elements(touch, options_));
       for (KnownElements& displaced : known.back().touches) {
         displaced.exact_bins = std::make_shared<ExactBins>(hypotheses_.size(), space_.turns.size(),
                                                            ExactBins::most_bytes / touches_.size());
@@ -144,7 +138,7 @@ std::vector<double> SearchedTouches::close_log_likelihood(std::span<const BinBox
 
 void SearchedTouches::follow(FollowedBins& bins) const {
   const std::size_t next = bins.touches();
-  KnownElements touch = known_elements(touches_.all()[next]);
+  KnownElements touch = known_elements(touches_.all()[next], options_);
   std::vector<double> most;
   for (const TileBounds& bounds : space_.bounds) {
     most.push_back(bounds.best(space_.finest_level(), touch));

@@ -21,7 +21,7 @@
 
 namespace palpate {
 
-/// Touches, and searches for the poses that explain all of them. add() only keeps touches;
+/// Touches, and searches for the poses that explain all of them. Touches are only kept at first;
 /// take_in() brings everything that searches go through in step.
 class SearchedTouches {
  public:
@@ -33,8 +33,12 @@ class SearchedTouches {
   void reset();
   /// @throws Error after the first touch
   void move_pivot(const glm::dvec2& pivot_mm);
-  /// Keeps touches for take_in(): all, or none where one is not sound.
-  void add(std::span<const Touch> touches);
+  /// The touches that are kept for take_in(), to be added to.
+  /// @throws Error where memory ended in the middle of it, until reset()
+  KeptTouches& kept() {
+    change_.refuse();
+    return touches_;
+  }
   /// Whether touches were kept since take_in().
   /// @throws Error where memory ended in the middle of it, until reset()
   bool waiting() const;

@@ -6,7 +6,6 @@
 #include <fmt/format.h>
 
 #include "estimation/kernel_sizes.hpp"
-#include "model/contact_readings.hpp"
 #include "model/log_message.hpp"
 #include "palpate/error.hpp"
 #include "shaders/interface.h"
@@ -252,17 +251,17 @@ void PreparedTouch::accumulate(DenseBelief& belief,
   }
 }
 
-std::span<const StillTouch> StillArray::gather(std::span<const Touch> touches,
+std::span<const StillTouch> StillArray::gather(std::span<const TouchEvidence> touches,
                                                std::size_t segment_elements) {
   gathered_.resize(std::max(gathered_.size(), touches.size()));
   for (std::size_t i = 0; i < touches.size(); ++i) {
     StillTouch& still = gathered_[i];
-    still.touch = touches[i];
-    readings_ = classify(still.touch, contact_, std::move(readings_));
-    const auto no_contact = std::count(readings_.begin(), readings_.end(), Reading::no_contact);
-    still.by_differences = 2 * static_cast<std::size_t>(no_contact) >= readings_.size();
+    still.touch = &touches[i];
+    const std::vector<Reading>& readings = touches[i].readings;
+    const auto no_contact = std::ranges::count(readings, Reading::no_contact);
+    still.by_differences = 2 * static_cast<std::size_t>(no_contact) >= readings.size();
     still.evidence = gather_evidence(
-        still.touch, readings_, still.by_differences ? Reading::no_contact : Reading::unknown,
+        touches[i], readings, still.by_differences ? Reading::no_contact : Reading::unknown,
         lattice_.pivot_mm, segment_elements, std::move(still.evidence));
   }
   return std::span(gathered_).first(touches.size());
@@ -275,7 +274,7 @@ void StillArray::accumulate(std::span<const StillTouch> touches, DenseLikelihood
   for (const StillTouch& still : touches) {
     // The first touch also makes the memory that a later one may need.
     if (still.by_differences || !no_contact_) {
-      const DenseBelief& no_contact = no_contact_at(still.touch, likelihood, belief);
+      const DenseBelief& no_contact = no_contact_at(*still.touch, likelihood, belief);
       if (still.by_differences) {
         belief.add(no_contact);
       }
@@ -287,7 +286,8 @@ void StillArray::accumulate(std::span<const StillTouch> touches, DenseLikelihood
   }
 }
 
-const DenseBelief& StillArray::no_contact_at(const Touch& touch, DenseLikelihood& likelihood,
+const DenseBelief& StillArray::no_contact_at(const TouchEvidence& touch,
+                                             DenseLikelihood& likelihood,
                                              const DenseBelief& belief) {
   if (!no_contact_) {
     no_contact_.emplace(belief.uniform());

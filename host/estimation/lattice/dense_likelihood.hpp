@@ -120,7 +120,7 @@ class PreparedTouch {
 
 /// A touch as a still array takes it in.
 struct StillTouch {
-  Touch touch;
+  const TouchEvidence* touch = nullptr;
   bool by_differences = false;  ///< the evidence holds only what differs from No Contact everywhere
   ContactEvidence evidence;
 };
@@ -131,14 +131,13 @@ struct StillTouch {
 class StillArray {
  public:
   /// @param lattice outlives this object; its pivot may move
-  StillArray(const ContactModel& contact, const PoseLattice& lattice)
-      : contact_(contact), lattice_(lattice) {}
+  explicit StillArray(const PoseLattice& lattice) : lattice_(lattice) {}
 
   /// Gathers every touch by its differences where at least half of its elements read No Contact,
   /// or else as a whole.
-  /// @returns what stays until the next call
-  /// @throws Error on a touch that is not sound
-  std::span<const StillTouch> gather(std::span<const Touch> touches, std::size_t segment_elements);
+  /// @returns what stays until the next call, and as long as the touches do
+  std::span<const StillTouch> gather(std::span<const TouchEvidence> touches,
+                                     std::size_t segment_elements);
 
   /// Adds the touches to the belief one after the other, with the fraction done after each (Eq.
   /// 13).
@@ -149,16 +148,15 @@ class StillArray {
 
  private:
   /// Evaluates No Contact everywhere where the array was not before.
-  const DenseBelief& no_contact_at(const Touch& touch, DenseLikelihood& likelihood,
+  const DenseBelief& no_contact_at(const TouchEvidence& touch, DenseLikelihood& likelihood,
                                    const DenseBelief& belief);
 
-  ContactModel contact_;
   const PoseLattice& lattice_;
   std::optional<DenseBelief> no_contact_;  ///< log-likelihood of No Contact everywhere
   ContactEvidence evaluated_;              ///< that it holds
   // Memory that updates share.
   std::vector<StillTouch> gathered_;  ///< of the most touches so far
-  std::vector<Reading> readings_;
+  std::vector<Reading> readings_;     ///< all of them No Contact
   ContactEvidence everywhere_;
 };
 

@@ -40,7 +40,7 @@ struct PoseHistogram::Impl {
       bodies.push_back(displaced_body(hypothesis.map));
     }
     if (options.still_array) {
-      still.emplace(options.contact, options.lattice);
+      still.emplace(options.lattice);
     }
     if (TouchByTouch::wanted_by(options)) {
       by_touch.emplace(device.context(), stream, options, hypotheses, log_weight, belief);
@@ -52,16 +52,13 @@ struct PoseHistogram::Impl {
   }
 
   /// Gathers touches: each by itself where updates want it so, or else all together.
-  std::span<const ContactEvidence> gather(std::span<const Touch> touches) {
-    const glm::dvec2& pivot_mm = options.lattice.pivot_mm;
-    const std::size_t most = likelihood.segment_elements();
-    return by_touch ? gatherer.gather_each(touches, options.contact, pivot_mm, most)
-                    : std::span(&gatherer.gather(touches, options.contact, pivot_mm, most), 1);
+  std::span<const ContactEvidence> gather(std::span<const TouchEvidence> touches) {
+    return gatherer.gather(touches, by_touch.has_value(), options.lattice.pivot_mm,
+                           likelihood.segment_elements());
   }
 
   /// Eq. 13: the log-belief of a bin is the sum of the touches' log-likelihoods there (Eq. 7).
-  void update(std::span<const Touch> touches, const std::function<void(double)>& progress) {
-    // All touches are gathered before the first is added: one that is not sound refuses all.
+  void update(std::span<const TouchEvidence> touches, const std::function<void(double)>& progress) {
     const std::span<const StillTouch> still_touches =
         still ? still->gather(touches, likelihood.segment_elements()) : std::span<StillTouch>();
     const std::span<const ContactEvidence> evidence =
@@ -88,7 +85,8 @@ struct PoseHistogram::Impl {
   }
 
   /// Updates as above where each touch's likelihood is wanted by itself.
-  void update_by_touch(std::span<const Touch> touches, std::span<const ContactEvidence> evidence,
+  void update_by_touch(std::span<const TouchEvidence> touches,
+                       std::span<const ContactEvidence> evidence,
                        std::span<const StillTouch> still_touches,
                        const std::function<void(double)>& progress) {
     for (std::size_t i = 0; i < touches.size(); ++i) {
@@ -109,10 +107,7 @@ struct PoseHistogram::Impl {
 
   /// The largest bin and the sum of every object; reduced once after each update.
   const std::vector<BeliefSummary>& summaries() {
-    if (!summarised) {
-      summarised = belief.summarise();
-    }
-    return *summarised;
+    return summarised ? *summarised : summarised.emplace(belief.summarise());
   }
 
   /// What is to be added to the log-likelihoods that the belief holds of an object.
@@ -177,7 +172,8 @@ struct PoseHistogram::Impl {
   gpu::CommandStream stream;
   DenseBelief belief;
   DenseLikelihood likelihood;
-  std::optional<StillArray> still;  ///< where the options say so
+  std::optional<StillArray> still;        ///< where the options say so
+  std::vector<TouchEvidence> classified;  ///< room for touches that are not classified
   EvidenceGatherer gatherer;
   PreparedTouch prepared;
   ReadingPredictor predictor;  ///< of touches that are only imagined
@@ -247,10 +243,20 @@ void PoseHistogram::move_pivot(const glm::dvec2& pivot_mm) {
 
 void PoseHistogram::update(std::span<const Touch> touches,
                            const std::function<void(double)>& progress) {
+  // All touches are classified before the first is added: one that is not sound refuses all.
+  update(evidence_of(touches, whole().options.contact, impl_->classified), progress);
+}
+
+void PoseHistogram::update(std::span<const TouchEvidence> touches,
+                           const std::function<void(double)>& progress) {
   whole().update(touches, progress);
 }
 
 void PoseHistogram::prepare(const Touch& touch) {
+  prepare(TouchEvidence(touch, whole().options.contact));
+}
+
+void PoseHistogram::prepare(const TouchEvidence& touch) {
   Impl& histogram = whole();
   ContactEvidence evidence = histogram.gather(std::span(&touch, 1)).front();
   if (histogram.by_touch && !histogram.still) {
@@ -259,12 +265,7 @@ void PoseHistogram::prepare(const Touch& touch) {
         histogram.likelihood.accumulate(evidence, uniform, {});
       });
     });
-    return;
-  }
-  if (!histogram.prepared.has_room()) {
-    return;
-  }
-  if (histogram.prepared.make_room(histogram.belief)) {
+  } else if (histogram.prepared.has_room() && histogram.prepared.make_room(histogram.belief)) {
     // A device that fails also drops what reset() has recorded of the belief.
     histogram.change.change(
         [&] { histogram.prepared.evaluate(std::move(evidence), histogram.likelihood); });
@@ -298,8 +299,7 @@ Marginals PoseHistogram::marginals(int object) const {
   require_object(object, histogram.bodies.size());
   const BeliefSummary& summary = histogram.summaries()[object];
   const double of_largest = histogram.identity()[object] / summary.sum;
-  Marginals marginals =
-      histogram.belief.marginals(static_cast<std::size_t>(object), summary.max, of_largest);
+  Marginals marginals = histogram.belief.marginals(object, summary.max, of_largest);
   marginals.grid = lattice();  // the belief does not know where the pivot has moved to
   return marginals;
 }

@@ -7,7 +7,6 @@
 
 #include "estimation/kernel_sizes.hpp"
 #include "estimation/lattice/refinement.hpp"
-#include "estimation/touch_overlap.hpp"
 #include "shaders/sum_overlap.hpp"
 
 namespace palpate {
@@ -142,7 +141,7 @@ void TouchByTouch::prepare(ContactEvidence evidence,
   prepared_ = std::move(evidence);
 }
 
-void TouchByTouch::update(const Touch& touch, const ContactEvidence& evidence,
+void TouchByTouch::update(const TouchEvidence& touch, const ContactEvidence& evidence,
                           const std::function<void(const DenseBelief&)>& evaluate,
                           DenseBelief& belief) {
   if (slip_blur_ && touched_) {
@@ -153,11 +152,12 @@ void TouchByTouch::update(const Touch& touch, const ContactEvidence& evidence,
   if (!is_prepared) {
     evaluate_planes(evaluate);
   }
-  touch_blur_.turn_for(touch.T_robot_sensor.translation_mm - options_.lattice.pivot_mm);
+  const glm::dvec2& pivot_mm = options_.lattice.pivot_mm;
+  touch_blur_.turn_for(touch.T_robot_sensor.translation_mm - pivot_mm);
   touch_blur_.sum_turns(scratch_, belief);
   // A touch without a known element says nothing, not even where the array was.
   if (overlap_ && !evidence.segments.empty()) {
-    add_to_none(touch);
+    add_to_none(array_rectangle(touch.T_robot_sensor, touch.elements_mm, pivot_mm));
   }
   stream_.run();
   touched_ = true;
@@ -179,12 +179,11 @@ void TouchByTouch::slip(DenseBelief& belief) {
   }
 }
 
-void TouchByTouch::add_to_none(const Touch& touch) {
-  const glm::dvec2& pivot_mm = options_.lattice.pivot_mm;
-  std::span<const OverlapSum> sums = overlap_->sums(scratch_, touch, pivot_mm, false);
+void TouchByTouch::add_to_none(const ArrayRectangle& array) {
+  std::span<const OverlapSum> sums = overlap_->sums(scratch_, array, false);
   if (weighted_bins(sums, log_weight_) == 0.0) {
     // No pose of the region brings the array to an object: all poses are alike.
-    sums = overlap_->sums(scratch_, touch, pivot_mm, true);
+    sums = overlap_->sums(scratch_, array, true);
   }
   const double bins = weighted_bins(sums, log_weight_);
   none_log_evidence_ += weighted_log_sum(sums, log_weight_) - std::log(bins);
@@ -219,8 +218,7 @@ OverlapMean::OverlapMean(gpu::Context& context, gpu::CommandStream& stream,
                 gpu::Memory::device, "sums of planes"),
       read_partials_(partials_of(lattice, objects_)) {
   // The first run, at which drivers compile the kernel.
-  const std::vector<glm::dvec2> origin(1);
-  sums(belief, {.elements_mm = origin, .pressure = {}}, {0.0, 0.0}, false);
+  sums(belief, {}, false);
 }
 
 std::uint64_t OverlapMean::bytes_needed(const PoseLattice& lattice, std::size_t objects) {
@@ -234,9 +232,8 @@ std::uint64_t OverlapMean::device_bytes() const {
   return arrays_.bytes() + boxes_.bytes() + partials_.bytes();
 }
 
-std::span<const OverlapSum> OverlapMean::sums(const DenseBelief& scratch, const Touch& touch,
-                                              const glm::dvec2& pivot_mm, bool everywhere) {
-  const ArrayRectangle array = array_rectangle(touch, pivot_mm);
+std::span<const OverlapSum> OverlapMean::sums(const DenseBelief& scratch,
+                                              const ArrayRectangle& array, bool everywhere) {
   placed_ = arrays_of(array, lattice_, std::move(placed_));
   stream_.upload(arrays_, placed_);
   // Half a float's largest: sums of two stay finite.

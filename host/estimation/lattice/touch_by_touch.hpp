@@ -10,11 +10,12 @@
 #include "estimation/lattice/dense_belief.hpp"
 #include "estimation/lattice/dense_likelihood.hpp"
 #include "estimation/lattice/displacement_blur.hpp"
+#include "estimation/touch_overlap.hpp"
 #include "gpu/command_stream.hpp"
+#include "model/touch_evidence.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
 #include "palpate/pose_histogram.hpp"
-#include "palpate/touch.hpp"
 #include "shaders/interface.h"
 
 namespace palpate {
@@ -41,8 +42,8 @@ class OverlapMean {
   /// DisplacementBlur::sum_turns() leaves it
   /// @param everywhere whether all bins count, wherever the array is
   /// @returns [object], until the next call
-  std::span<const OverlapSum> sums(const DenseBelief& scratch, const Touch& touch,
-                                   const glm::dvec2& pivot_mm, bool everywhere);
+  std::span<const OverlapSum> sums(const DenseBelief& scratch, const ArrayRectangle& array,
+                                   bool everywhere);
 
  private:
   gpu::CommandStream& stream_;
@@ -79,7 +80,7 @@ class TouchByTouch {
                DenseBelief& belief);
 
   /// Adds a touch. `evaluate` adds its log-likelihood at every bin to a belief that is uniform.
-  void update(const Touch& touch, const ContactEvidence& evidence,
+  void update(const TouchEvidence& touch, const ContactEvidence& evidence,
               const std::function<void(const DenseBelief&)>& evaluate, DenseBelief& belief);
   /// Evaluates a touch that may come next; an update() with the same evidence need not. Does
   /// nothing where objects slip: the memory is needed for the slip that comes first.
@@ -99,7 +100,7 @@ class TouchByTouch {
  private:
   void slip(DenseBelief& belief);
   void evaluate_planes(const std::function<void(const DenseBelief&)>& evaluate);
-  void add_to_none(const Touch& touch);
+  void add_to_none(const ArrayRectangle& array);
 
   gpu::CommandStream& stream_;
   const HistogramOptions& options_;

@@ -238,6 +238,7 @@ struct ParticleFilter::Impl {
   shaders::uint share_count = 0;
   std::vector<shaders::WeightBlock> sums;
   std::vector<shaders::DrawBlock> bounds;  ///< what goes to draw_blocks
+  std::vector<TouchEvidence> classified;   ///< room for touches that are not classified
   EvidenceGatherer gatherer;
   WeightSummary summary;
   LikelihoodAverages averages;
@@ -288,10 +289,15 @@ void ParticleFilter::move_pivot(const glm::dvec2& pivot_mm) {
 void ParticleFilter::update(std::span<const Touch> touches,
                             const std::function<void(double)>& progress) {
   Impl& filter = whole();
-  const ParticleOptions& options = filter.options;
   // All of them before the first is taken in, for one that is not sound refuses all.
-  const std::span<const ContactEvidence> evidence = filter.gatherer.gather_each(
-      touches, options.contact, options.region.pivot_mm, ParticleLikelihood::segment_elements());
+  update(evidence_of(touches, filter.options.contact, filter.classified), progress);
+}
+
+void ParticleFilter::update(std::span<const TouchEvidence> touches,
+                            const std::function<void(double)>& progress) {
+  Impl& filter = whole();
+  const std::span<const ContactEvidence> evidence = filter.gatherer.gather(
+      touches, true, filter.options.region.pivot_mm, ParticleLikelihood::segment_elements());
   filter.change.change([&] {
     for (std::size_t i = 0; i < touches.size(); ++i) {
       filter.update(evidence[i]);

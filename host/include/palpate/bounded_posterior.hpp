@@ -124,6 +124,9 @@ class PALPATE_API BoundedPosterior {
   /// @throws Error on a touch that is not sound; what `progress` throws
   void update(std::span<const Touch> touches, const std::function<void(double)>& progress = {});
   void update(const Touch& touch) { update(std::span(&touch, 1)); }
+  /// Touches that are classified by the options' contact model already.
+  PALPATE_LOCAL void update(std::span<const TouchEvidence> touches,
+                            const std::function<void(double)>& progress);
 
   /// Identity probabilities (Eq. 14) with their bounds, mode (Eq. 15-16) and certificate. Searches
   /// once after each update(), and again where a call has a smaller tolerance than those before it;

@@ -72,6 +72,9 @@ class PALPATE_API ParticleFilter {
   /// the particles may then be updated in part, and every call but reset() throws
   void update(std::span<const Touch> touches, const std::function<void(double)>& progress = {});
   void update(const Touch& touch) { update(std::span(&touch, 1)); }
+  /// Touches that are classified by the options' contact model already.
+  PALPATE_LOCAL void update(std::span<const TouchEvidence> touches,
+                            const std::function<void(double)>& progress);
 
   /// Identity by Eq. 9; the pose is the maximum of the Parzen estimate with a cone kernel (Eq.
   /// 10-12), rho = 1 mm and 1 rad, on a grid of 0.5 mm and 0.04 pi rad through the region's centre.

@@ -80,6 +80,9 @@ class PALPATE_API PoseHistogram {
   /// @throws Error on a touch that is not sound, or if the device fails; what `progress` throws
   void update(std::span<const Touch> touches, const std::function<void(double)>& progress = {});
   void update(const Touch& touch) { update(std::span(&touch, 1)); }
+  /// Touches that are classified by the options' contact model already.
+  PALPATE_LOCAL void update(std::span<const TouchEvidence> touches,
+                            const std::function<void(double)>& progress);
 
   /// Evaluates the touch that is likely to come next, before it ends. An update() with this touch
   /// alone, of the same readings at the same place, then only adds the result, which differs by
@@ -88,6 +91,7 @@ class PALPATE_API PoseHistogram {
   /// nothing.
   /// @throws Error on a touch that is not sound, or if the device fails
   void prepare(const Touch& touch);
+  PALPATE_LOCAL void prepare(const TouchEvidence& touch);
 
   /// Identity probabilities (Eq. 14) and mode (Eq. 15-16). Of equal bins the mode is the lowest bin
   /// of the first object.

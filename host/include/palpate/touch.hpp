@@ -41,6 +41,9 @@ struct Touch {
   std::span<const std::uint8_t> valid = {};  ///< [e] 0 = dead element; empty: all are alive
 };
 
+/// A touch that is classified already. The library keeps it to itself.
+struct TouchEvidence;
+
 /// True where both touches have exactly the same pose and element centres.
 PALPATE_API bool same_placement(const Touch& a, const Touch& b);
 

@@ -130,16 +130,4 @@ std::vector<long double> by_definition(const BinCase& of, const std::vector<BinB
   return logs;
 }
 
-ArrayReadings array_readings(const Touch& touch, const ContactModel& model,
-                             const glm::dvec2& pivot_mm) {
-  ArrayReadings array{.from_pivot_mm = {},
-                      .readings = model.classify(touch),
-                      .rectangle = array_rectangle(touch, pivot_mm)};
-  array.from_pivot_mm.reserve(array.readings.size());
-  for (std::size_t i = 0; i < array.readings.size(); ++i) {
-    array.from_pivot_mm.push_back(touch.T_robot_sensor * touch.elements_mm[i] - pivot_mm);
-  }
-  return array;
-}
-
 }  // namespace palpate

@@ -34,8 +34,4 @@ LikelihoodTable gentle_table();
 /// double.
 std::vector<long double> by_definition(const BinCase& of, const std::vector<BinBox>& boxes);
 
-/// What KeptTouches keeps of a touch.
-ArrayReadings array_readings(const Touch& touch, const ContactModel& model,
-                             const glm::dvec2& pivot_mm);
-
 }  // namespace palpate

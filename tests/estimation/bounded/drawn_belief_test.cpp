@@ -225,7 +225,7 @@ TEST(BoundedBelief, DrawsOfManyBinsLeaveOutAHundredthAtMost) {
     valid[element] = 1;
   }
   touch.valid = valid;
-  belief.add(std::span(&touch, 1));
+  belief.kept().add(std::span<const Touch>(&touch, 1), options.contact);
   belief.take_in();
   constexpr std::size_t count = 4000;
   const std::vector<PoseSample> without_a_search = belief.sample(count, 831);

@@ -92,7 +92,7 @@ TEST(EvaluatedBins, BeyondTheirMemoryAreSearchedForAgain) {
 
   ContactModel contact;
   contact.prior = objects.front().map.prior;
-  const KnownElements elements = known_elements(array_readings(touch, contact, {}));
+  const KnownElements elements = known_elements(TouchEvidence(touch, contact), options);
   const BinLikelihood likelihood(objects, contact, options.lattice);
   const auto plane_bins = static_cast<std::size_t>(options.lattice.plane());
   std::vector<double> xy(plane_bins);

@@ -47,12 +47,13 @@ TEST(ExactBins, ShowInNoBit) {
   const std::vector<Hypothesis> two{{random_map(17, 13, 0.5, 3.0, 871), 1.0},
                                     {random_map(15, 19, 0.5, 3.0, 872), 1.0}};
   const PoseLattice lattice{.x_mm = {-4.0, 4.0, 21}, .y_mm = {-3.0, 3.0, 18}};
-  const BinLikelihood likelihood(two, {.prior = 0.2}, lattice, {0.6, 0.4});
-  const ArrayReadings array{
-      .from_pivot_mm = {{1.0, 0.5}, {-0.3, 2.0}, {0.4, -1.0}},
-      .readings = {Reading::in_contact, Reading::no_contact, Reading::in_contact},
-      .sensor_from_pivot_mm = glm::dvec2(0.4, 0.2)};
-  const KnownElements alone = known_elements(array);
+  const DisplacementSd touch_sd{0.6, 0.4};
+  const BinLikelihood likelihood(two, {.prior = 0.2}, lattice, touch_sd);
+  const std::vector<glm::dvec2> elements_mm{{0.6, 0.3}, {-0.7, 1.8}, {0.0, -1.2}};
+  const std::vector<double> pressure{9.0, 1.0, 9.0};
+  const Touch touch{
+      .T_robot_sensor = {{0.4, 0.2}, 0.0}, .elements_mm = elements_mm, .pressure = pressure};
+  const KnownElements alone = known_elements(TouchEvidence(touch, {}), {.touch_sd = touch_sd});
   KnownElements keeping = alone;
   constexpr std::size_t few_blocks = 10'000;
   for (const std::size_t room : {few_blocks, ExactBins::most_bytes}) {

@@ -41,17 +41,7 @@ class NoneByBounds {
         space(objects, options),
         none(space, options, likelihood) {}
 
-  void add(std::span<const Touch> touches) {
-    std::vector<ArrayReadings> arrays;
-    for (const Touch& touch : touches) {
-      arrays.push_back(array_readings(touch, options.contact, options.lattice.pivot_mm));
-      if (!options.touch_sd.none()) {
-        arrays.back().sensor_from_pivot_mm =
-            touch.T_robot_sensor.translation_mm - options.lattice.pivot_mm;
-      }
-    }
-    none.add(arrays);
-  }
+  void add(std::span<const Touch> touches) { none.add(evidence_of(touches, options.contact)); }
   LogInterval bounds(double width_nats = first_width) {
     return none.bounds(
         [&](const LogInterval& found) { return found.high - found.low <= width_nats; },
@@ -134,8 +124,8 @@ TEST(NoneEvidence, HoldsItsDefinition) {
         // The table is so steep that its float64 rounding may be more.
         double error = 0.0;
         for (const Touch& touch : touches) {
-          const KnownElements known = known_elements(
-              array_readings(touch, none.options.contact, none.options.lattice.pivot_mm));
+          const KnownElements known =
+              known_elements(TouchEvidence(touch, none.options.contact), none.options);
           error += std::max(none.likelihood.error(0, known, Arithmetic::float64),
                             none.likelihood.error(1, known, Arithmetic::float64));
         }
@@ -314,10 +304,10 @@ TEST(NoneEvidence, HasTheSameBitsOnAnyNumberOfThreads) {
 TEST(MeanSearch, FindsTheSameWhereItHasNoRoomForSums) {
   NoneByBounds none(two_objects(), lattice_of(30, 30, 8));
   const Recording recording = random_recording(1, 36, 712);
-  const ArrayReadings touch =
-      array_readings(recording.touch(0), none.options.contact, none.options.lattice.pivot_mm);
-  MeanSearch keeping(none.space, none.options, none.likelihood, touch, std::size_t{1} << 20);
-  MeanSearch forgetting(none.space, none.options, none.likelihood, touch, 0);
+  const TouchEvidence touch(recording.touch(0), none.options.contact);
+  const KnownElements known = known_elements(touch, none.options);
+  MeanSearch keeping(none.space, none.options, none.likelihood, touch, known, std::size_t{1} << 20);
+  MeanSearch forgetting(none.space, none.options, none.likelihood, touch, known, 0);
   double least = infinity;
   for (int search = 0; search < 3; ++search) {
     const LogInterval kept = keeping.bounds(least, false, Deadline({})).value();
