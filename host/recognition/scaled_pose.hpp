@@ -9,17 +9,17 @@
 
 namespace palpate {
 
-/// Variances of how far each touch tells where a body is, mm^2 summed over the axes of its motion;
-/// see spread_mm().
+/// What widens a belief beside its touches' readings: variances summed over the axes of the body's
+/// motion, as spread_mm() sums them.
 struct MotionVariances {
   double displacement_mm2 = 0.0;  ///< of a touch's array
   double slip_mm2 = 0.0;          ///< of the body between two touches
   int touches = 0;
 };
-/// By how much the belief's variance changes where each touch's readings are `factor` times as far
-/// off. What displacement and slip add is known and stays: the factor itself where these are 0, 1
-/// where they are all that the belief's variance is made of. By a Kalman filter along one axis,
-/// with readings of the variance by which it ends with the belief's.
+/// The factor of the belief's variance where that of each touch's readings has `factor`, since what
+/// displacement and slips add is known and stays: `factor` itself without these, 1 where they are
+/// all that the belief's variance is made of. The belief is taken for a Kalman filter's along one
+/// axis, all readings for equally good.
 double belief_factor(double factor, double variance_mm2, const MotionVariances& known);
 
 /// The pose with its covariance on the task's scale.

@@ -125,8 +125,9 @@ struct RefinedPose {
 
 /// How far poses are off where a belief is sure of them, as left-out touches show it.
 struct PoseScale {
-  /// Multiplies covariances. Eq. 7 is surer of a reading, or less, than the sensor deserves, and
-  /// readings of neighbouring elements are no news to each other.
+  /// Multiplies covariances, but for what displaced touches and slips add to them. Eq. 7 is surer
+  /// of a reading, or less, than the sensor deserves, and readings of neighbouring elements are no
+  /// news to each other.
   double factor = 1.0;
   /// What all touches share, since it is the map that is off: the standard deviation along each
   /// axis of the body's motion (its centroid's shift, and its turn as a displacement), mm.
