@@ -1,5 +1,6 @@
 #include "figures/canvas.hpp"
 
+#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <numbers>
@@ -26,7 +27,7 @@ void set_source(cairo_t* context, const Colour& c) {
 }
 
 std::uint32_t rgb24(const Colour& c) {
-  const auto byte = [](double v) { return static_cast<std::uint32_t>(255.0 * v + 0.5); };
+  const auto byte = [](double v) { return static_cast<std::uint32_t>(std::lround(255.0 * v)); };
   return byte(c.red) << 16 | byte(c.green) << 8 | byte(c.blue);
 }
 
