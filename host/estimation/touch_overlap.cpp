@@ -79,17 +79,9 @@ void OverlapPlane::find_rows(std::span<Bins> of_row) const {
   // Shadows that do not depend on x leave a row out, or do not bound it. All others bound it from
   // both sides, in an order that the slope's sign tells.
   struct Shadow {
-    Shadow(double slope, double per_slope, double per_row, double reach)
-        : flat(slope == 0.0),
-          per_slope(per_slope),
-          per_row(per_row),
-          to_low(slope > 0.0 ? -reach : reach),
-          reach(reach) {}
-
-    bool flat;
+    double slope;
     double per_slope;
     double per_row;
-    double to_low;  ///< offset at the lower bound
     double reach;
   };
   const Shadow shadows[] = {{cos_, per_cos_, sin_, turned_reach_mm_.x},
@@ -101,11 +93,12 @@ void OverlapPlane::find_rows(std::span<Bins> of_row) const {
     bool out = false;
     for (const Shadow& shadow : shadows) {
       const double offset = shadow.per_row * apart_y;
-      if (shadow.flat) {
+      if (shadow.slope == 0.0) {
         out = out || !(std::abs(offset) <= shadow.reach);
       } else {
-        low = std::max(low, (shadow.to_low - offset) * shadow.per_slope);
-        high = std::min(high, (-shadow.to_low - offset) * shadow.per_slope);
+        const double to_low = shadow.slope > 0.0 ? -shadow.reach : shadow.reach;
+        low = std::max(low, (to_low - offset) * shadow.per_slope);
+        high = std::min(high, (-to_low - offset) * shadow.per_slope);
       }
     }
     if (!out) {
