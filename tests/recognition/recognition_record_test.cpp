@@ -105,6 +105,30 @@ TEST(Recognise, EndsItsTraceWithTheSameBits) {
   }
 }
 
+TEST(Recognise, APosesScaleIsThatOfReadingsAlone) {
+  Device device = Device::open();
+  const Recording letter = touched_letter(7);
+  constexpr double factor = 0.25;
+  const auto widened = [&](const BoundedOptions& filter) {
+    RecognitionTask task(shapes(), filter);
+    const auto variance = [&] {
+      Recogniser recogniser(device, task);
+      return recognise(recogniser, task, unknown_of(letter), false).last().refined->covariance[0];
+    };
+    const double before = variance();
+    task.pose_scale.factor = factor;
+    return variance() / before;
+  };
+  const auto exact = std::get<BoundedOptions>(every_filter().back());
+  EXPECT_NEAR(widened(exact), factor, 1e-9);
+  for (auto sd : {&BoundedOptions::touch_sd, &BoundedOptions::slip_sd}) {
+    auto displaced = exact;
+    displaced.*sd = {0.5, 0.05};
+    EXPECT_GT(widened(displaced), factor + 0.05);
+    EXPECT_LE(widened(displaced), 1.0);
+  }
+}
+
 TEST(Recognise, SaysHowFarItIsAndCanBeLeft) {
   Device device = Device::open();
   const RecognitionTask task(shapes(), every_filter()[1]);

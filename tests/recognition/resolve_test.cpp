@@ -112,8 +112,10 @@ Request request_of_learned() {
   Request request = request_of_shapes();
   request.bins = std::array{40, 40, 200};
   for (std::size_t i = 0; i < 2; ++i) {
-    const MapSource source{
-        .touches = {}, .options = {}, .left_out = FitScale{0.5 + double(i), 0.5}};
+    const MapSource source{.touches = {},
+                           .options = {},
+                           .left_out = FitScale{0.5 + double(i), 0.5},
+                           .pose_scale = PoseScale{0.5, 0.1}};
     request.given_maps[i].hypothesis.map.source = std::make_shared<const MapSource>(source);
   }
   return request;
@@ -141,6 +143,13 @@ TEST(Resolve, TouchesThatAreJudgedOtherwiseHaveNoScale) {
   for (std::size_t i = 0; i < others.size(); ++i) {
     const FitScale scale = task_of(others[i]).fit_scale;
     EXPECT_EQ(std::pair(scale.mean, scale.sd), std::pair(0.0, 1.0)) << i;
+  }
+  // Poses have the map's errors always, and the readings' where these are judged as the map did.
+  for (std::size_t i = 0; i < others.size(); ++i) {
+    const PoseScale scale = task_of(others[i]).pose_scale;
+    const bool readings_alike = others[i].touch_sd_mm || others[i].slip_sd_deg;
+    EXPECT_NEAR(scale.factor, readings_alike ? 0.5 : 1.0, 1e-12) << i;
+    EXPECT_NEAR(scale.map_sd_mm, 0.1, 1e-12) << i;
   }
 }
 
