@@ -192,8 +192,8 @@ std::string unlearned_strangers(const LearnedSensor& sensor) {
   if (!known_poses || !sensor.fit_scale || sensor.fit_scale->stranger_sd) {
     return "";
   }
-  return "how badly strangers fit is a figure of Palpate's own, for \"(none)\"; 15 touches or more "
-         "of each of three objects would tell it";
+  return "\"(none)\" goes by a figure of Palpate's own for how badly strangers fit; to learn it, "
+         "give 15 touches or more of each of three objects";
 }
 
 std::string calibration_text(const SensorCalibration& calibration, std::size_t touches,

@@ -289,7 +289,7 @@ def test_a_calibration_is_that_of_the_command(
     assert numpy.allclose(numpy.exp(sensor.log_likelihood).sum(axis=0), 1)
     assert (sensor.classifier.threshold == 2) == ("threshold" in options)
     assert sensor.stranger_sd is None
-    assert ("how badly strangers fit is a figure of Palpate's own" in said) == ("bins" in options)
+    assert ("goes by a figure of Palpate's own for how badly strangers fit" in said) == ("bins" in options)
 
 
 @pytest.mark.parametrize(
