@@ -96,7 +96,7 @@ struct RecognizeArguments {
 
 HistogramNeed histogram_need(const RecognizeArguments& options, const Request& request) {
   if (options.fit_touch_sd) {
-    return {.option = "fit-touch-sd", .why = touch_sd_fit_needs, .learned_only = true, .eq7 = true};
+    return {.learned_only = true, .eq7 = true};
   }
   if (!options.posterior.empty() && filter_wish(request).kind != FilterKind::bounded) {
     return {"posterior", "holds the log-likelihood of every bin"};
@@ -182,7 +182,7 @@ void write_results(const RecognizeArguments& options, const RecognitionTask& tas
 }
 
 /// The whole command with --fit-touch-sd.
-void fit_touch_sd(const RecognizeArguments& options, Device& device, const RecognitionTask& task,
+void fit_touch_sd(const RecognizeArguments& options, Device* device, const RecognitionTask& task,
                   std::span<const Recording> recordings, std::span<const Unknown> unknowns) {
   TouchSdFit fit;
   {
@@ -190,7 +190,7 @@ void fit_touch_sd(const RecognizeArguments& options, Device& device, const Recog
     fit = palpate::fit_touch_sd(device, task, touched_objects(recordings, unknowns, task), {},
                                 [&](double fraction) { progress.show(fraction); });
   }
-  give_result(options.json, text_of(to_json(fit, device.name()), 2), touch_sd_text(fit));
+  give_result(options.json, text_of(to_json(fit, device_name(device)), 2), touch_sd_text(fit));
 }
 
 /// The line that shows how far the recognition of several unknowns is.
@@ -244,7 +244,7 @@ void recognize(const RecognizeArguments& options) {
   check_outputs(options, request, task, unknowns);
   Device* device = device_in_waiting.of(task);
   if (options.fit_touch_sd) {
-    fit_touch_sd(options, *device, task, recordings, unknowns);
+    fit_touch_sd(options, device, task, recordings, unknowns);
     return;
   }
   std::string unresolved;

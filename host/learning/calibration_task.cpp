@@ -216,7 +216,7 @@ void add_touch_sd(Device& device, const CalibrationTask& task, SensorCalibration
   histogram.contact = {
       .classifier = sensor.classifier, .gamma = ContactModel{}.gamma, .prior = sensor.prior};
   const RecognitionTask recognition(std::move(hypotheses), histogram);
-  const TouchSdFit fit = fit_touch_sd(device, recognition, unknowns, options, progress);
+  const TouchSdFit fit = fit_touch_sd(&device, recognition, unknowns, options, progress);
   const auto distinct = [](double sd, double error, double resolution) {
     return sd > std::max(2.0 * error, resolution) ? sd : 0.0;
   };

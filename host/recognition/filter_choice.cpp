@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <initializer_list>
 #include <numbers>
 #include <tuple>
 #include <utility>
@@ -49,16 +48,6 @@ double value_of(const AskedSd& sd) {
 void set_displacement(const AskedSd& asked_mm, const AskedSd& asked_deg, double& mm, double& rad) {
   mm = asked_mm.value ? value_of(asked_mm) : mm;
   rad = asked_deg.value ? value_of(asked_deg) * std::numbers::pi / 180.0 : rad;
-}
-
-/// What gives the first of these that is above 0; "" where none is.
-std::string giver_of(const Request& request, std::initializer_list<AskedSd> all) {
-  for (const AskedSd& sd : all) {
-    if (value_of(sd) > 0.0) {
-      return giver_of(request, sd.option);
-    }
-  }
-  return "";
 }
 
 std::optional<double> none_weight(const Request& request, std::span<const Hypothesis> hypotheses) {
@@ -114,11 +103,6 @@ BoundedOptions asked_bounds(const Request& request, const HistogramOptions& hist
     bounded.tolerance = *request.tolerance;
   }
   if (request.budget_ms) {
-    if (const std::string slip = giver_of(request, {slip_mm(request), slip_deg(request)});
-        !slip.empty()) {
-      refuse_given(request, "budget-ms",
-                   "a belief that slips cannot be cut short; leave it out, or {}", slip);
-    }
     bounded.budget_s = 1e-3 * require_above_0("budget-ms", *request.budget_ms);
   }
   if (request.evidence_nats) {

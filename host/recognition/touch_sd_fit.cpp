@@ -12,6 +12,7 @@
 #include "recognition/evidence_search.hpp"
 #include "recognition/recogniser.hpp"
 #include "recognition/refused_option.hpp"
+#include "recognition/resolve.hpp"
 
 namespace palpate {
 
@@ -24,18 +25,6 @@ struct Start {
   std::vector<PoseSample> samples;
   PoseLattice region;
 };
-
-/// The task's histogram, with displacements as the search begins and bins that resolve them.
-HistogramOptions histogram_of(const RecognitionTask& task, const DisplacementSd& start) {
-  const FilterTraits traits = traits_of(task.filter);
-  if (!traits.every_bin) {
-    throw Error(Fault::input, "fit of touch-sd: needs the belief of all poses; use a histogram");
-  }
-  return {.lattice = task.lattice(),
-          .contact = task.contact(),
-          .touch_sd = start,
-          .memory_limit_bytes = traits.memory_limit_bytes};
-}
 
 /// Gives the axes steps of 0.6 times the displacements, which samples of them need no finer.
 PoseLattice coarse(PoseLattice lattice, const DisplacementSd& start) {
@@ -77,25 +66,36 @@ ContactModel contact_of(const ContactModel& contact, const std::vector<std::size
   return part;
 }
 
-/// The task among these objects, by histogram_of().
+/// The task among these objects by a filter of the same kind, with displacements as the search
+/// begins and bins that resolve them.
 RecognitionTask part_of(const RecognitionTask& task, const std::vector<std::size_t>& objects,
                         const DisplacementSd& start) {
-  HistogramOptions histogram = histogram_of(task, start);
-  histogram.contact = contact_of(histogram.contact, objects);
-  if (task.bin_width) {
-    histogram.lattice = coarse(histogram.lattice, start);
+  const FilterTraits traits = traits_of(task.filter);
+  if (!traits.bins) {
+    throw Error(Fault::input, "fit of touch-sd: needs a belief in bins, which particles have not");
+  }
+  const HistogramOptions histogram{
+      .lattice = task.bin_width ? coarse(task.lattice(), start) : task.lattice(),
+      .contact = contact_of(task.contact(), objects),
+      .touch_sd = start,
+      .memory_limit_bytes = traits.memory_limit_bytes};
+  FilterOptions filter = histogram;
+  if (traits.certificate) {
+    BoundedOptions bounded = bounded_instead(histogram).value();
+    bounded.tolerance = traits.tolerance.value();
+    filter = std::move(bounded);
   }
   std::vector<Hypothesis> hypotheses;
   for (const std::size_t object : objects) {
     hypotheses.push_back(task.hypotheses[object]);
   }
-  RecognitionTask part(std::move(hypotheses), histogram);
+  RecognitionTask part(std::move(hypotheses), std::move(filter));
   part.auto_pivot = task.auto_pivot;
   return part;
 }
 
 /// Recognises every unknown among the objects that it may be.
-std::vector<Start> recognise_all(Device& device, const RecognitionTask& task,
+std::vector<Start> recognise_all(Device* device, const RecognitionTask& task,
                                  std::span<const TouchedObject> unknowns,
                                  const TouchSdFitOptions& options,
                                  const std::function<void(double)>& progress) {
@@ -112,7 +112,7 @@ std::vector<Start> recognise_all(Device& device, const RecognitionTask& task,
                                             unknowns[indices.front()].name, label));
     }
     const RecognitionTask part = part_of(task, objects, options.start);
-    Recogniser recogniser(device, part);
+    Recogniser recogniser = open_recogniser(device, part);
     for (const std::size_t i : indices) {
       recogniser.reset();
       recogniser.update(unknowns[i].touches);
@@ -201,8 +201,13 @@ std::vector<TouchedObject> touched_objects(std::span<const Recording> recordings
 }
 
 void require_fittable(const RecognitionTask& task) {
-  if (!traits_of(task.filter).every_bin) {
-    refuse_option("fit-touch-sd", "particles cannot fit it; use `filter histogram`");
+  const FilterTraits traits = traits_of(task.filter);
+  if (!traits.bins) {
+    refuse_option("fit-touch-sd",
+                  "particles cannot fit it; use `filter bounded` or `filter histogram`");
+  }
+  if (traits.budget_s) {
+    refuse_option("budget-ms", "has no effect on `fit-touch-sd`; leave it out");
   }
   if (!task.touch_sd().none()) {
     refuse_option(
@@ -228,7 +233,7 @@ void require_fittable(const RecognitionTask& task) {
   }
 }
 
-TouchSdFit fit_touch_sd(Device& device, const RecognitionTask& task,
+TouchSdFit fit_touch_sd(Device* device, const RecognitionTask& task,
                         std::span<const TouchedObject> unknowns, const TouchSdFitOptions& options,
                         const std::function<void(double)>& progress) {
   if (unknowns.empty()) {

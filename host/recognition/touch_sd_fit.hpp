@@ -27,10 +27,8 @@ std::vector<TouchedObject> touched_objects(std::span<const Recording> recordings
                                            std::span<const Unknown> unknowns,
                                            const RecognitionTask& task);
 
-/// Why the fit has no other filter than the histogram.
-inline constexpr const char* touch_sd_fit_needs = "needs the belief of all poses";
-/// Throws Error where the task has particles, a touch_sd, a slip_sd, a sensor model's table or
-/// "none of these".
+/// Throws Error where the task has particles, a budget, a touch_sd, a slip_sd, a sensor model's
+/// table or "none of these".
 void require_fittable(const RecognitionTask& task);
 
 struct TouchSdFitOptions {
@@ -67,11 +65,12 @@ struct TouchSdFit {
 /// by importance weights and Metropolis moves (Del Moral, Doucet and Jasra 2006). The steps are
 /// Newton's on the log evidence, whose first and second derivatives are expectations over the
 /// samples (Louis 1982). The same input gives the same result.
-/// @param task with a histogram filter; its touch_sd, slip_sd and none_weight are not used
+/// @param device may be null where uses_device() is false
+/// @param task with a filter in bins; its touch_sd, slip_sd and none_weight are not used
 /// @param progress called now and then with the fraction done
 /// @throws Error on a particle filter, no unknowns, an unknown without touches, a touch that is not
 /// sound, or if the device fails; what `progress` throws
-TouchSdFit fit_touch_sd(Device& device, const RecognitionTask& task,
+TouchSdFit fit_touch_sd(Device* device, const RecognitionTask& task,
                         std::span<const TouchedObject> unknowns,
                         const TouchSdFitOptions& options = {},
                         const std::function<void(double)>& progress = {});

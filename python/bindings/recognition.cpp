@@ -196,12 +196,10 @@ std::tuple<Fields, Sentences> plan_python(nb::handle recordings, const PythonReq
 using Fitted = std::tuple<TouchSdFit, Sentences>;
 
 Fitted fit_recordings(const Subject& subject, Device& device, Call& call) {
-  const RecognitionTask task = task_of(
-      subject, device,
-      {.option = "fit-touch-sd", .why = touch_sd_fit_needs, .learned_only = true, .eq7 = true});
+  const RecognitionTask task = task_of(subject, device, {.learned_only = true, .eq7 = true});
   require_fittable(task);
   TouchSdFit fit =
-      fit_touch_sd(device, task, touched_objects(subject.recordings, subject.unknowns, task), {},
+      fit_touch_sd(&device, task, touched_objects(subject.recordings, subject.unknowns, task), {},
                    call.progress());
   return {std::move(fit), in_python(task.remarks)};
 }

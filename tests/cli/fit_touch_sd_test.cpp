@@ -38,8 +38,18 @@ TEST_F(FitTouchSd, ReportsTheDeviationsAndTheFlagsToPaste) {
   EXPECT_NE(text.find("fewer than 3 touches"), std::string::npos) << text;
 }
 
+TEST_F(FitTouchSd, SearchesByBoundsOnTheHost) {
+  std::vector<std::string> bounded = fit_;
+  bounded.insert(bounded.end(), {"--filter", "bounded", "--json", "fit.json"});
+  done(bounded);
+  const json fit = json::parse(bytes_of(folder_ / "fit.json"));
+  EXPECT_EQ(fit["device"], "none");
+  EXPECT_EQ(fit["touches"], 4);
+}
+
 TEST_F(FitTouchSd, IsRefusedBesideFlagsOfOneResult) {
-  for (const char* flag : {"--trace", "--posterior=p.h5", "--png=pictures", "--filter=particles"}) {
+  for (const char* flag :
+       {"--trace", "--posterior=p.h5", "--png=pictures", "--filter=particles", "--budget-ms=9"}) {
     std::vector<std::string> with_flag = fit_;
     with_flag.emplace_back(flag);
     expect_refused(with_flag, {"--fit-touch-sd"});

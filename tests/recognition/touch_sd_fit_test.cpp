@@ -5,6 +5,8 @@
 #include <functional>
 #include <numeric>
 #include <optional>
+#include <utility>
+#include <variant>
 
 #include <gtest/gtest.h>
 
@@ -39,8 +41,9 @@ std::vector<TouchedObject> as_unknowns(const std::vector<Recording>& recordings)
   return unknowns;
 }
 
-RecognitionTask letter_task(Device& device, std::optional<BinWidth> width = BinWidth::automatic) {
-  RecognitionTask task(learned_letters(device), HistogramOptions{});
+RecognitionTask letter_task(Device& device, std::optional<BinWidth> width = BinWidth::automatic,
+                            FilterOptions filter = HistogramOptions{}) {
+  RecognitionTask task(learned_letters(device), std::move(filter));
   task.bin_width = width;
   return task;
 }
@@ -48,22 +51,28 @@ RecognitionTask letter_task(Device& device, std::optional<BinWidth> width = BinW
 TEST(TouchSdFit, FindsTheMisplacement) {
   Device device = Device::open();
   const std::vector<Recording> recordings = misplaced_letters(9, 8, {1.0, 0.05});
-  double shown = 0.0;
-  const TouchSdFit fit = fit_touch_sd(device, letter_task(device, {}), as_unknowns(recordings),
-                                      {.samples = 16, .sweeps = 10}, [&](double fraction) {
-                                        EXPECT_GE(fraction, shown);
-                                        EXPECT_LE(fraction, 1.0);
-                                        shown = fraction;
-                                      });
-  // 72 touches tell the deviation of x and y within 7 %, of the angle within 23 %, one standard
-  // error each; 50 unknowns of 12 touches were found within 3 and 7 %.
-  EXPECT_NEAR(fit.sd.mm, 1.0, 0.2);
-  EXPECT_NEAR(fit.sd.rad, 0.05, 0.03);
-  EXPECT_GT(fit.standard_error.mm, 0.02);
-  EXPECT_LT(fit.standard_error.mm, 0.15);
-  EXPECT_GT(fit.evidence_gain, 50.0);  // hundreds in fact
-  EXPECT_EQ(fit.unknowns, 9U);
-  EXPECT_EQ(fit.touches, 72U);
+  for (const FilterOptions& filter :
+       {FilterOptions(HistogramOptions{}), FilterOptions(BoundedOptions{})}) {
+    const bool bounded = std::holds_alternative<BoundedOptions>(filter);
+    SCOPED_TRACE(bounded ? "by bounds" : "by the histogram");
+    double shown = 0.0;
+    const TouchSdFit fit =
+        fit_touch_sd(bounded ? nullptr : &device, letter_task(device, {}, filter),
+                     as_unknowns(recordings), {.samples = 16, .sweeps = 10}, [&](double fraction) {
+                       EXPECT_GE(fraction, shown);
+                       EXPECT_LE(fraction, 1.0);
+                       shown = fraction;
+                     });
+    // 72 touches tell the deviation of x and y within 7 %, of the angle within 23 %, one standard
+    // error each; 50 unknowns of 12 touches were found within 3 and 7 %.
+    EXPECT_NEAR(fit.sd.mm, 1.0, 0.2);
+    EXPECT_NEAR(fit.sd.rad, 0.05, 0.03);
+    EXPECT_GT(fit.standard_error.mm, 0.02);
+    EXPECT_LT(fit.standard_error.mm, 0.15);
+    EXPECT_GT(fit.evidence_gain, 50.0);  // hundreds in fact
+    EXPECT_EQ(fit.unknowns, 9U);
+    EXPECT_EQ(fit.touches, 72U);
+  }
 }
 
 TEST(TouchSdFit, OfExactTouchesIsNextToNothing) {
@@ -74,7 +83,7 @@ TEST(TouchSdFit, OfExactTouchesIsNextToNothing) {
     unknowns[i].label = recordings[i].truth->object;
   }
   const TouchSdFit fit =
-      fit_touch_sd(device, letter_task(device), unknowns, {.samples = 16, .sweeps = 10});
+      fit_touch_sd(&device, letter_task(device), unknowns, {.samples = 16, .sweeps = 10});
   EXPECT_LT(fit.sd.mm, 0.2);  // the maps' cells have 0.5 mm
   EXPECT_LT(fit.sd.rad, 0.03);
   EXPECT_DOUBLE_EQ(fit.resolution.mm, 0.15);  // of cells of 0.5 mm
@@ -84,7 +93,7 @@ TEST(TouchSdFit, OfExactTouchesIsNextToNothing) {
 TEST(TouchSdFit, SaysWhereTouchesAreTooFew) {
   Device device = Device::open();
   const std::vector<Recording> recordings = misplaced_letters(2, 1, {});
-  const TouchSdFit fit = fit_touch_sd(device, letter_task(device), as_unknowns(recordings),
+  const TouchSdFit fit = fit_touch_sd(&device, letter_task(device), as_unknowns(recordings),
                                       {.samples = 8, .sweeps = 4});
   ASSERT_GE(fit.warnings.size(), 2U);
   EXPECT_NE(fit.warnings[0].find("2 of 2 unknowns have fewer than 3 touches"), std::string::npos);
@@ -96,13 +105,13 @@ TEST(TouchSdFit, RefusesWhatItCannotFit) {
   const RecognitionTask task = letter_task(device);
   const std::vector<Recording> recordings = misplaced_letters(1, 3, {});
   std::vector<TouchedObject> unknowns = as_unknowns(recordings);
-  EXPECT_THROW(fit_touch_sd(device, task, {}), Error);
-  EXPECT_THROW(fit_touch_sd(device, RecognitionTask(task.hypotheses, ParticleOptions{}), unknowns),
+  EXPECT_THROW(fit_touch_sd(&device, task, {}), Error);
+  EXPECT_THROW(fit_touch_sd(&device, RecognitionTask(task.hypotheses, ParticleOptions{}), unknowns),
                Error);
   unknowns[0].label = "Q";
-  EXPECT_THROW(fit_touch_sd(device, task, unknowns), Error);
+  EXPECT_THROW(fit_touch_sd(&device, task, unknowns), Error);
   unknowns[0] = {"empty", {}};
-  EXPECT_THROW(fit_touch_sd(device, task, unknowns), Error);
+  EXPECT_THROW(fit_touch_sd(&device, task, unknowns), Error);
 }
 
 /// The log evidence of touches of one object at a known angle by sums over a fine lattice.

@@ -186,7 +186,8 @@ BoundedBelief::Found BoundedBelief::search(double tolerance) {
 }
 
 BoundedBelief::Found BoundedBelief::search(const SearchGoal& goal, Deadline& deadline) {
-  EvaluatedBins bins(deadline.exists());
+  // The bins of a belief that slips stay in memory.
+  EvaluatedBins bins(deadline.exists() && !touches_.moving());
   SearchResult result = touches_.search(
       goal, deadline, [&](const BinBox& box, std::span<const double> log_likelihood) {
         bins.add(box, log_likelihood);
@@ -202,6 +203,9 @@ BoundedBelief::Found BoundedBelief::search(const SearchGoal& goal, Deadline& dea
 void BoundedBelief::visit(const BinVisitor& visitor) {
   if (found_->bins.complete()) {
     found_->bins.visit(visitor);
+  } else if (touches_.moving()) {
+    // As they are, whatever a budget left unproven.
+    touches_.search({.tolerance = unlimited}, until({}), visitor);
   } else {
     touches_.search(found_->goal, until({}), visitor);
   }
@@ -224,19 +228,16 @@ BoundedBelief::DrawnFrom BoundedBelief::drawable_bins() {
   if (found_ && (touches_.moving() || found_->bins.complete())) {
     return DrawnFrom::found;
   }
-  if (touches_.moving()) {
-    Deadline never = until({});
-    found_ = search(rough_goal(), never);
-    return DrawnFrom::found;
-  }
-  if (!found_ && follow()) {
-    return DrawnFrom::followed;
-  }
-  // Rejection looks at tiles here and there, which share little of what displaced touches reach.
-  const bool many_bins = bins_in_all() > most_searched_bins && options().touch_sd.none();
-  // Where a search had no room for its bins, another one would take as long.
-  if (found_ || touches_.taken_in() <= wide_touches || many_bins) {
-    return DrawnFrom::tiles;
+  if (!touches_.moving()) {
+    if (!found_ && follow()) {
+      return DrawnFrom::followed;
+    }
+    // Rejection looks at tiles here and there, which share little of what displaced touches reach.
+    const bool many_bins = bins_in_all() > most_searched_bins && options().touch_sd.none();
+    // Where a search had no room for its bins, another one would take as long.
+    if (found_ || touches_.taken_in() <= wide_touches || many_bins) {
+      return DrawnFrom::tiles;
+    }
   }
   Deadline deadline = until(options().budget_s);
   found_ = search(rough_goal(), deadline);

@@ -54,12 +54,6 @@ BoundedOptions checked(const BoundedOptions& options, std::span<const Hypothesis
   all.lattice.collapse_fixed().validate();
   validate_displacement(all.touch_sd, all.lattice, "touch_sd");
   validate_displacement(all.slip_sd, all.lattice, "slip_sd");
-  if (options.budget_s && !options.slip_sd.none()) {
-    throw Error(Fault::input,
-                fmt::format("budget_s = {}: a belief that slips cannot be cut short; leave it out, "
-                            "or leave out slip_sd",
-                            *options.budget_s));
-  }
   all.contact = resolve(options.contact, hypotheses);
   if (const std::string why = why_no_room(hypotheses, all, memory_for_search()); !why.empty()) {
     throw Error(Fault::input, why);

@@ -35,7 +35,6 @@ struct BoundedOptions {
   double tolerance = 1e-6;
   /// Seconds after which estimate() stops and reports what it has proven by then, also where that
   /// is less than the tolerance asks for. By default it takes the time that the tolerance needs.
-  /// Not with slip_sd.
   std::optional<double> budget_s = {};
   /// Also bounds each label's log evidence (of all hypotheses that bear it) within this many nats,
   /// however unlikely the label is: for a temperature that is applied later. By default only the

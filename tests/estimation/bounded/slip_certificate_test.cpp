@@ -17,6 +17,23 @@ TEST(SlipCertificate, HoldsOverUnknownsOfTwoThousandBins) {
 TEST(SlipCertificate, HoldsOverUnknownsOfTenThousandBins) {
   expect_trials({25, 25, 16}, sanitized ? 1 : 2, 943, make_slipping_trial);
 }
+TEST(SlipCertificate, HoldsWithinAnyBudget) {
+  for (std::uint64_t seed = 945; seed < (sanitized ? 947 : 953); ++seed) {
+    Trial trial = make_slipping_trial({25, 25, 9}, seed);
+    const reference::Posterior truth =
+        reference_posterior(trial.objects, trial.options, all_touches(trial.recording));
+    for (const double budget_s : {1e-9, 1e-3, 1e-2, 10.0}) {
+      SCOPED_TRACE(::testing::Message() << budget_s << " s, seed " << seed);
+      trial.options.budget_s = budget_s;
+      BoundedPosterior posterior(trial.objects, trial.options);
+      for (std::size_t i = 0; i < trial.recording.size(); ++i) {
+        posterior.update(trial.recording.touch(i));
+        posterior.estimate();
+      }
+      expect_certified(posterior, trial.objects, trial.options, truth);
+    }
+  }
+}
 TEST(SlipCertificate, HoldsAfterManyTouches) {
   expect_trials({16, 15, 16}, 1, 944, make_long_slipping_trial);
 }

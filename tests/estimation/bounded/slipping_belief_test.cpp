@@ -197,11 +197,45 @@ TEST(SlippingBelief, SlipsByLittleAsIfAtRest) {
   EXPECT_LT(largest_difference(still.identity, slipping.identity), 3e-6);
 }
 
-TEST(SlippingBelief, RefusesABudgetAndTooManyBins) {
+TEST(SlippingBelief, ABudgetThatIsEnoughChangesNothing) {
+  const Recording recording = touches_of_l(5, 966);
   BoundedOptions options = slipping_options();
-  options.budget_s = 1.0;
-  EXPECT_THROW(BoundedPosterior(two_shapes(), options), Error);
-  options.budget_s.reset();
+  options.none_weight = 1.0;
+  BoundedPosterior undisturbed(two_shapes(), options);
+  options.budget_s = 1e6;
+  BoundedPosterior timed(two_shapes(), options);
+  for (std::size_t n = 1; n <= recording.size(); ++n) {
+    undisturbed.update(recording.touch(n - 1));
+    timed.update(recording.touch(n - 1));
+    EXPECT_EQ(told_by(timed, 2), told_by(undisturbed, 2)) << n;
+  }
+}
+
+TEST(SlippingBelief, EndsSoonAfterItsBudget) {
+  const Recording recording = touches_of_l(5, 966);
+  BoundedOptions options = slipping_options();
+  options.lattice.x_mm.count = options.lattice.y_mm.count = 60;
+  options.slip_sd = {.mm = 3.0, .rad = 0.3};
+  BoundedPosterior undisturbed(two_shapes(), options);
+  options.budget_s = 1e-9;
+  BoundedPosterior belief(two_shapes(), options);
+  const auto certificate = [&] { return belief.estimate().certificate.value(); };
+  for (std::size_t n = 0; n < 2; ++n) {
+    undisturbed.update(recording.touch(n));
+    belief.update(recording.touch(n));
+    EXPECT_LE(certificate().bins_evaluated, 256 * 16);
+    EXPECT_LT(2 * certificate().bins_evaluated, undisturbed.estimate().certificate->bins_evaluated);
+  }
+  EXPECT_GT(certificate().dropped_mass, 10.0 * options.tolerance);
+  // Draws and marginals are of what was found: they begin no search of their own.
+  const Certificate before = certificate();
+  EXPECT_EQ(belief.sample(20, 1).size(), 20U);
+  EXPECT_GT(sum(belief.marginals(0).theta), 0.0);
+  EXPECT_EQ(certificate().dropped_mass, before.dropped_mass);
+}
+
+TEST(SlippingBelief, RefusesTooManyBins) {
+  BoundedOptions options = slipping_options();
   options.lattice.x_mm.count = options.lattice.y_mm.count = options.lattice.theta_rad.count = 3000;
   EXPECT_THROW(BoundedPosterior(two_shapes(), options), Error);
 }

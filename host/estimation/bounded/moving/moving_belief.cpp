@@ -1,7 +1,9 @@
 #include "estimation/bounded/moving/moving_belief.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <numbers>
 #include <utility>
@@ -19,6 +21,16 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 /// tiles are.
 constexpr double first_depth = 40.0;
 constexpr double last_depth = 160.0;
+/// Tiles that are followed however little time is left.
+constexpr std::size_t few_tiles = 256;
+/// Of the time that is left, what one touch may take: the first ones follow the most tiles.
+constexpr double share_of_touch = 0.5;
+/// Tiles that are followed in a second before any were: a slow machine's.
+constexpr double first_tiles_per_s = 2e5;
+
+double seconds_since(Deadline::Clock::time_point start) {
+  return std::chrono::duration<double>(Deadline::Clock::now() - start).count();
+}
 
 }  // namespace
 
@@ -49,6 +61,7 @@ double MovingBelief::bytes_needed(const PoseLattice& lattice, std::size_t object
 void MovingBelief::reset() {
   touches_.clear();
   depth_ = first_depth;
+  tiles_per_s_ = first_tiles_per_s;
   start();
 }
 
@@ -57,6 +70,8 @@ void MovingBelief::start() {
     object.start();
   }
   stepped_ = 0;
+  cut_short_ = false;
+  spent_s_ = 0.0;
   prior_log_likelihood_ = 0.0;
 }
 
@@ -73,16 +88,30 @@ void MovingBelief::take_in(const Deadline& deadline) {
 
 void MovingBelief::step(const KnownElements& touch, const Deadline& deadline) {
   const bool slips = stepped_ > 0;
+  const auto begin = Deadline::Clock::now();
   std::vector<std::vector<double>> tiles;
   for (const MovingObject& object : objects_) {
     deadline.cancel_point();
     tiles.push_back(object.bound_tiles(touch, slips));
   }
-  const std::vector<double> least = least_followed(tiles);
+  std::vector<double> least = least_followed(tiles);
+  if (deadline.exists()) {
+    const double most = share_of_touch * deadline.left_s() * tiles_per_s_;
+    follow_at_most(few_tiles + static_cast<std::size_t>(std::min(most, 1e12)), tiles, least);
+  }
+  const auto bounded = Deadline::Clock::now();
   for (std::size_t i = 0; i < objects_.size(); ++i) {
     deadline.cancel_point();
     objects_[i].step(touch, slips, tiles[i], least[i], depth_ == infinity);
   }
+  if (deadline.exists()) {
+    std::size_t followed = 0;
+    for (const MovingObject& object : objects_) {
+      followed += object.tiles_followed();
+    }
+    tiles_per_s_ = static_cast<double>(followed) / std::max(seconds_since(bounded), 1e-6);
+  }
+  spent_s_ += seconds_since(begin);
   prior_log_likelihood_ += prior_log_likelihood(touch, options_.contact);
   ++stepped_;
 }
@@ -113,12 +142,42 @@ std::vector<double> MovingBelief::least_followed(std::span<const std::vector<dou
   return least;
 }
 
+void MovingBelief::follow_at_most(std::size_t most, std::span<const std::vector<double>> tiles,
+                                  std::vector<double>& least) {
+  std::vector<double> wanted;
+  const auto belief = [&](std::size_t i, std::size_t tile) {
+    return tiles[i][tile] + objects_[i].log_bins_of(tile);
+  };
+  const auto scale = [&](std::size_t i) { return space_.log_weight[i] + objects_[i].scale(); };
+  for (std::size_t i = 0; i < objects_.size(); ++i) {
+    for (std::size_t tile = 0; tile < tiles[i].size(); ++tile) {
+      // What is no number is followed.
+      if (belief(i, tile) >= least[i]) {
+        wanted.push_back(scale(i) + belief(i, tile));
+      }
+    }
+  }
+  if (wanted.size() <= most) {
+    return;
+  }
+  cut_short_ = true;
+  const auto last = wanted.begin() + static_cast<std::ptrdiff_t>(most) - 1;
+  std::ranges::nth_element(wanted, last, std::greater<>());
+  for (std::size_t i = 0; i < objects_.size(); ++i) {
+    least[i] = std::max(least[i], *last - scale(i));
+  }
+}
+
 SearchResult MovingBelief::find(const SearchGoal& goal, const Deadline& deadline,
                                 const BinVisitor& visit) {
   take_in(deadline);
   SearchResult found = result();
-  while (depth_ < infinity && !reaches(found, goal)) {
-    depth_ = depth_ < last_depth ? 2.0 * depth_ : infinity;
+  // Another run takes at least as long as the one before.
+  while ((cut_short_ || depth_ < infinity) && spent_s_ < deadline.left_s() &&
+         !reaches(found, goal)) {
+    if (!cut_short_) {
+      depth_ = depth_ < last_depth ? 2.0 * depth_ : infinity;
+    }
     start();
     take_in(deadline);
     found = result();

@@ -34,11 +34,12 @@ class MovingBelief {
   void reset();
   /// Keeps one more touch for take_in().
   void add(KnownElements touch) { touches_.push_back(std::move(touch)); }
-  /// Takes in the touches that were kept, each after a slip unless it is the first. Begins anew the
-  /// next time where the deadline's cancel point throws.
+  /// Takes in the touches that were kept, each after a slip unless it is the first. A deadline lets
+  /// them follow as many tiles as the time is enough for, and a few after it has passed. Begins
+  /// anew the next time where the deadline's cancel point throws.
   void take_in(const Deadline& deadline);
-  /// Takes them in, and follows more bins, from the first touch on, until the goal is reached or
-  /// all are followed.
+  /// Takes them in, and follows more bins, from the first touch on, until the goal is reached, all
+  /// are followed or the deadline leaves no time to begin anew.
   SearchResult find(const SearchGoal& goal, const Deadline& deadline, const BinVisitor& visit);
 
   /// After take_in(): upper bounds of the log-likelihood of bins in nats, box after box, [y, x] in
@@ -54,6 +55,10 @@ class MovingBelief {
   /// [object] the least belief of a tile that is followed through the touch.
   /// @param tiles [object] MovingObject::bound_tiles()
   std::vector<double> least_followed(std::span<const std::vector<double>> tiles) const;
+  /// Raises least_followed() until no more tiles than this are followed, but for tiles as good as
+  /// the last of them.
+  void follow_at_most(std::size_t most, std::span<const std::vector<double>> tiles,
+                      std::vector<double>& least);
   SearchResult result() const;
   bool reaches(const SearchResult& found, const SearchGoal& goal) const;
 
@@ -67,6 +72,9 @@ class MovingBelief {
   /// Nats below all of the belief at which a tile is not followed.
   double depth_ = 0.0;
   std::size_t stepped_ = 0;            ///< touches that were taken in
+  bool cut_short_ = false;             ///< a deadline left out tiles within the depth
+  double spent_s_ = 0.0;               ///< on the touches that were taken in
+  double tiles_per_s_ = 0.0;           ///< by the last step that was timed
   double prior_log_likelihood_ = 0.0;  ///< of these
 };
 

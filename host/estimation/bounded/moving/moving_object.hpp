@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -74,6 +76,9 @@ class MovingObject {
   double over() const { return over_; }
   double under() const { return under_; }
   std::size_t tiles() const { return followed_.size(); }
+  std::size_t tiles_followed() const {
+    return static_cast<std::size_t>(std::ranges::count(followed_, 1));
+  }
   /// Log of a tile's number of bins.
   double log_bins_of(std::size_t tile) const {
     return log_tile_bins_[tile % log_tile_bins_.size()];

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdint>
@@ -34,6 +35,8 @@ struct SearchGoal {
 /// caller of the search an opportunity to cancel it.
 class Deadline {
  public:
+  using Clock = std::chrono::steady_clock;
+
   /// @param cancel_point of BoundedOptions; outlives the deadline
   explicit Deadline(const std::optional<double>& budget_s,
                     const std::function<void()>* cancel_point = nullptr)
@@ -55,6 +58,11 @@ class Deadline {
       (*cancel_point_)();
     }
   }
+  /// Seconds until it passes, from 0; infinity where there is no budget.
+  double left_s() const {
+    return at_ ? std::max(0.0, std::chrono::duration<double>(*at_ - Clock::now()).count())
+               : std::numeric_limits<double>::infinity();
+  }
   /// Lets it pass now, where there is a budget.
   void end() {
     if (at_) {
@@ -63,8 +71,6 @@ class Deadline {
   }
 
  private:
-  using Clock = std::chrono::steady_clock;
-
   std::optional<Clock::time_point> at_;
   const std::function<void()>* cancel_point_;
 };
