@@ -1,6 +1,7 @@
 #include "estimation/bounded/leaves/bin_likelihood.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <optional>
@@ -195,6 +196,35 @@ TEST(BinLikelihood, OfElementsOffTheMapIsThePriors) {
   }
 }
 
+/// A table with so many nodes, whose log-likelihoods change at every one of them.
+LikelihoodTable table_of(std::size_t nodes) {
+  LikelihoodTable table{.first_log_odds = -6.0, .last_log_odds = 5.0, .nodes = nodes};
+  table.level_edges = {5.0};
+  Uniform random(87);
+  for (std::size_t i = 0; i < table.levels() * nodes; ++i) {
+    table.log_likelihood.push_back(random(-8.0, 0.0));
+  }
+  return table;
+}
+
+/// About the number that one or several registers hold.
+constexpr std::array<std::size_t, 9> table_nodes{2, 15, 16, 17, 33, 49, 64, 65, 300};
+
+TEST(BinLikelihood, OfTablesOfAnySizeIsWithinItsBounds) {
+  for (const std::size_t nodes : table_nodes) {
+    BinCase of = letter_case();
+    of.contact.table = table_of(nodes);
+    of.elements = random_elements(41, 6.0, of.contact.table->levels(), 88);
+    expect_within_bounds(of, planes(of.lattice), fmt::format("{} nodes", nodes));
+  }
+}
+
+TEST(BinLikelihood, HasATightBoundOnATable) {
+  BinCase of = letter_case();
+  of.contact.table = table_of(9);  // of learned tables, log-likelihoods change as slowly
+  EXPECT_LT(expect_within_bounds(of, planes(of.lattice), "a table of a few nodes"), 1e-2);
+}
+
 TEST(BinLikelihood, OfATableIsWithinItsBounds) {
   BinCase of = letter_case();
   of.contact.table = crooked_table();
@@ -229,10 +259,13 @@ std::vector<unsigned char> bits(const std::vector<double>& logs) {
 }
 
 TEST(BinLikelihood, HasTheSameBitsWithEverySetOfInstructions) {
-  std::vector<BinCase> cases(4, letter_case());
+  std::vector<BinCase> cases(4 + table_nodes.size(), letter_case());
   cases[1].contact.gamma = 0.0;
   cases[2].map = random_map(31, 27, 0.05, 1000.0, 80);
   cases[3].contact.table = crooked_table();
+  for (std::size_t i = 0; i < table_nodes.size(); ++i) {
+    cases[4 + i].contact.table = table_of(table_nodes[i]);
+  }
   for (std::size_t c = 0; c < cases.size(); ++c) {
     const BinCase& of = cases[c];
     const BinLikelihood likelihood = likelihood_of(of);
@@ -303,6 +336,7 @@ TEST(BinLikelihood, HasTheSameBitsInEveryBox) {
     expect_same_in_parts(of, whole_plane(of.lattice, 1), Arithmetic::float64, random);
     of.contact.table = crooked_table();
     of.elements = random_elements(41, 6.0, of.contact.table->levels(), 86);
+    expect_same_in_parts(of, whole_plane(of.lattice, 1), Arithmetic::float32, random);
     expect_same_in_parts(of, whole_plane(of.lattice, 1), Arithmetic::float64, random);
   }
 }

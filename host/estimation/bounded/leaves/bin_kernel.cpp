@@ -105,15 +105,13 @@ void evaluate_vector(D d, const LogOddsAt& log_odds_at, const BinTask<hn::TFromD
   const ReadingForm& form = task.form;
   if (form.kind == ReadingForm::Kind::products) {
     multiply_elements(d, log_odds_at, task.runs, form, log_likelihood);
+  } else if (form.kind == ReadingForm::Kind::table) {
+    const auto row = [&](Reading reading)
+                         HWY_ATTR { return TableRow(d, form, task.object, reading); };
+    add_elements(d, log_odds_at, task.runs, row, log_likelihood);
   } else if constexpr (sizeof(hn::TFromD<D>) == 8) {
-    const auto add_up = [&](const auto& reading_logs) HWY_ATTR {
-      add_elements(d, log_odds_at, task.runs, reading_logs, log_likelihood);
-    };
-    if (form.kind == ReadingForm::Kind::table) {
-      add_up([&](Reading reading) HWY_ATTR { return TableRow(d, form, task.object, reading); });
-    } else {
-      add_up([&](Reading reading) HWY_ATTR { return LogisticFloor(d, form, reading); });
-    }
+    const auto logs = [&](Reading reading) HWY_ATTR { return LogisticFloor(d, form, reading); };
+    add_elements(d, log_odds_at, task.runs, logs, log_likelihood);
   }
 }
 

@@ -51,6 +51,21 @@ struct TableExtent {
   double width = 0.0;     ///< from the first node to the last, in nats of log odds
 };
 
+/// The numbers of a table for kernels: for each set and reading a row of values, then a row of the
+/// differences to the next node's value, 0 at the last.
+template <typename Lane>
+struct TableRows {
+  /// Rows are at least so long, and padded with 0 to a multiple of the lanes of a vector: shorter
+  /// ones may be read into registers as a whole.
+  static constexpr std::size_t least_length = 64;
+
+  std::size_t length = 0;  ///< of a row
+  std::vector<Lane> numbers;
+
+  /// @param row of values, counted over sets and readings; its differences are `length` farther
+  const Lane* values(std::size_t row) const { return numbers.data() + 2 * row * length; }
+};
+
 /// How kernels of bins evaluate Eq. 7, or the table in its place. With r = gamma m / s and
 /// s = gamma m + 1 - gamma, the likelihood of contact at log odds z (of no contact at -z) is
 ///
@@ -67,17 +82,24 @@ struct ReadingForm {
   /// @param contact resolved: with its prior
   explicit ReadingForm(const ContactModel& contact);
 
-  /// The numbers of an object's reading: value and difference to the next, for each node.
-  const double* row(std::size_t object, Reading reading) const {
-    return table.data() +
-           2 * nodes * ((sets == 1 ? 0 : object) * readings + static_cast<std::size_t>(reading));
+  /// The row of an object's reading, see TableRows.
+  std::size_t row(std::size_t object, Reading reading) const {
+    return (sets == 1 ? 0 : object) * readings + static_cast<std::size_t>(reading);
+  }
+  template <typename Lane>
+  const TableRows<Lane>& rows() const {
+    if constexpr (sizeof(Lane) == 4) {
+      return float_rows;
+    } else {
+      return double_rows;
+    }
   }
 
   TableExtent table_extent(std::size_t object) const;
   /// Largest magnitude of an element's log-likelihood by Eq. 7, for log odds of this magnitude.
   double largest_nats(double largest_log_odds) const;
 
-  Kind kind = Kind::products;  ///< float32 takes products only
+  Kind kind = Kind::products;  ///< float32 takes no logs
   double ratio = 0.0;          ///< r
   double log_ratio = 0.0;      ///< log r, finite also for r = 0
   double log_scale = 0.0;      ///< log s
@@ -90,8 +112,12 @@ struct ReadingForm {
   std::size_t nodes = 0;
   std::size_t readings = 0;
   std::size_t sets = 0;
-  std::vector<double> table;  ///< [set, reading, node, value | difference]
+  TableRows<float> float_rows;
+  TableRows<double> double_rows;
 };
+
+/// Elements whose log-likelihoods float32 adds up by itself; float64 takes their sum.
+inline constexpr int floats_together = 8;
 
 /// Most lanes of a vector. Lists that kernels read are padded to a multiple of it.
 inline constexpr std::size_t most_lanes = 16;
@@ -167,7 +193,7 @@ struct BinTask {
   std::size_t object = 0;
   const PlacedElements& placed;
   std::span<const ReadingRun> runs;  ///< of the placed elements
-  const ReadingForm& form;           ///< kinds other than products only for Lane = double
+  const ReadingForm& form;           ///< logs only for Lane = double
 };
 
 /// Log-likelihood of the elements at bins, in nats, with vectors of `Lane`. Vectors are filled with

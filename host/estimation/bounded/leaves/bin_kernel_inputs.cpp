@@ -38,6 +38,23 @@ constexpr double least_ratio = 0x1p-30;
 /// Stands for log 0: below all log odds.
 constexpr double log_zero = -1e38;
 
+template <typename Lane>
+TableRows<Lane> rows_of(const LikelihoodTable& table) {
+  TableRows<Lane> rows{.length = std::max(TableRows<Lane>::least_length, padded(table.nodes)),
+                       .numbers = {}};
+  for (auto of = table.log_likelihood.begin(); of != table.log_likelihood.end();
+       of += static_cast<std::ptrdiff_t>(table.nodes)) {
+    const std::size_t first = rows.numbers.size();
+    rows.numbers.resize(first + 2 * rows.length);
+    for (std::size_t node = 0; node < table.nodes; ++node) {
+      const double next = node + 1 < table.nodes ? of[node + 1] : of[node];
+      rows.numbers[first + node] = static_cast<Lane>(of[node]);
+      rows.numbers[first + rows.length + node] = static_cast<Lane>(next - of[node]);
+    }
+  }
+  return rows;
+}
+
 /// Elements whose numerators, in [ratio, 2], and denominators, in [1, 2], a product takes before it
 /// could leave 2^+-range. Each starts within [1, 2).
 int interval_within(double range, double ratio) {
@@ -90,12 +107,8 @@ ReadingForm::ReadingForm(const ContactModel& contact) {
     sets = from.sets();
     first_log_odds = from.first_log_odds;
     nodes_per_nat = static_cast<double>(nodes - 1) / (from.last_log_odds - from.first_log_odds);
-    table.reserve(2 * from.log_likelihood.size());
-    for (std::size_t i = 0; i < from.log_likelihood.size(); ++i) {
-      const double value = from.log_likelihood[i];
-      const bool last = i % nodes == nodes - 1;
-      table.insert(table.end(), {value, last ? 0.0 : from.log_likelihood[i + 1] - value});
-    }
+    float_rows = rows_of<float>(from);
+    double_rows = rows_of<double>(from);
     return;
   }
   const double floor = contact.gamma * contact.prior.value();
@@ -116,10 +129,13 @@ ReadingForm::ReadingForm(const ContactModel& contact) {
 
 TableExtent ReadingForm::table_extent(std::size_t object) const {
   TableExtent extent{.width = static_cast<double>(nodes - 1) / nodes_per_nat};
-  const double* from = row(object, Reading::no_contact);
-  for (std::size_t i = 0; i < readings * nodes; ++i) {
-    extent.largest = std::max(extent.largest, std::abs(from[2 * i]));
-    extent.steepest = std::max(extent.steepest, std::abs(from[2 * i + 1]) * nodes_per_nat);
+  for (std::size_t reading = 0; reading < readings; ++reading) {
+    const double* values = double_rows.values(row(object, static_cast<Reading>(reading)));
+    const double* differences = values + double_rows.length;
+    for (std::size_t i = 0; i < nodes; ++i) {
+      extent.largest = std::max(extent.largest, std::abs(values[i]));
+      extent.steepest = std::max(extent.steepest, std::abs(differences[i]) * nodes_per_nat);
+    }
   }
   return extent;
 }

@@ -174,7 +174,8 @@ template void BinLikelihood::evaluate_alone<double>(std::span<const BinBox>, con
                                                     double*) const;
 
 std::uint64_t BinLikelihood::bytes() const {
-  std::uint64_t sum = form_.table.capacity() * sizeof(double);
+  std::uint64_t sum = form_.float_rows.numbers.capacity() * sizeof(float) +
+                      form_.double_rows.numbers.capacity() * sizeof(double);
   for (const PlacedMap& map : maps_) {
     sum += map.nodes.bytes();
   }

@@ -18,8 +18,8 @@
 
 namespace palpate {
 
-/// The numbers in which bins are evaluated. What is no product of Eq. 7 (ReadingForm) takes float64
-/// in both.
+/// The numbers in which bins are evaluated. What needs the logs of Eq. 7 (ReadingForm) takes
+/// float64 in both.
 enum class Arithmetic { float32, float64 };
 
 /// A map, how a lattice's bins lie on it, and what bounds the rounding of log odds there.
@@ -88,7 +88,7 @@ class BinLikelihood {
 
  private:
   bool in_float32(Arithmetic arithmetic) const {
-    return arithmetic == Arithmetic::float32 && form_.kind == ReadingForm::Kind::products;
+    return arithmetic == Arithmetic::float32 && form_.kind != ReadingForm::Kind::logs;
   }
   /// Bins as if all touches were exact, on the caller's thread.
   template <typename Lane>

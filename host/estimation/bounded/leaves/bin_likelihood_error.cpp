@@ -91,13 +91,15 @@ double BinLikelihood::exact_error_in(std::size_t object, const KnownElements& el
   const double log_odds = moved + interpolated + marker;
 
   if (form_.kind == ReadingForm::Kind::table) {
-    // The place in the table: a difference, and a quotient and two products of the scale. Then a
-    // product and two sums, and the sum over elements.
+    // The place in the table: the first node, a difference, and a quotient and two products of the
+    // scale. Then the table's numbers, a product and a sum. Float32 adds up some elements' logs by
+    // itself, float64 these sums.
     const TableExtent table = form_.table_extent(object);
     const double argument =
-        log_odds + v * (map.largest + std::abs(form_.first_log_odds) + 4.0 * table.width);
+        log_odds + u * (map.largest + 2.0 * std::abs(form_.first_log_odds) + 4.0 * table.width);
+    const double summed = sizeof(Lane) == 4 ? floats_together * u : 0.0;
     const double each = std::min(table.steepest * argument, 2.0 * table.largest) +
-                        8.0 * v * table.largest + v * count * table.largest;
+                        (8.0 * u + summed + v * count) * table.largest;
     return second_order * count * each;
   }
 

@@ -8,6 +8,7 @@
 #define PALPATE_READING_LIKELIHOOD_INL
 #endif
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -122,20 +123,45 @@ void multiply_elements(D d, const LogOddsAt& log_odds_at, std::span<const Readin
   store_logs(d, product, static_cast<double>(count) * form.log_scale, log_likelihood);
 }
 
+/// Adds every lane to a sum in float64.
+template <class D>
+HWY_INLINE void add_lanes(D d, hn::Vec<D> v, double* sums) {
+  HWY_ALIGN hn::TFromD<D> lanes[most_lanes];
+  hn::Store(v, d, lanes);
+  for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
+    sums[i] += static_cast<double>(lanes[i]);
+  }
+}
+
 /// The bins of one vector, as sums of the elements' log-likelihoods.
 /// @param log_odds_at (element): in every lane
 /// @param logs_of (reading): its log-likelihoods, at(d, log odds)
 template <class D, class LogOddsAt, class LogsOf>
 void add_elements(D d, const LogOddsAt& log_odds_at, std::span<const ReadingRun> runs,
                   const LogsOf& logs_of, double* log_likelihood) {
+  constexpr bool in_parts = sizeof(hn::TFromD<D>) == 4;
   auto sum = hn::Zero(d);
+  HWY_ALIGN double sums[most_lanes] = {};
+  [[maybe_unused]] int together = 0;
   for (const ReadingRun& run : runs) {
     const auto logs = logs_of(run.reading);
     for (std::size_t e = run.begin; e < run.end; ++e) {
       sum = hn::Add(sum, logs.at(d, log_odds_at(e)));
+      if constexpr (in_parts) {
+        if (++together == floats_together) {
+          add_lanes(d, sum, sums);
+          sum = hn::Zero(d);
+          together = 0;
+        }
+      }
     }
   }
-  hn::StoreU(sum, d, log_likelihood);
+  if constexpr (in_parts) {
+    add_lanes(d, sum, sums);
+    std::copy(sums, sums + hn::Lanes(d), log_likelihood);
+  } else {
+    hn::StoreU(sum, d, log_likelihood);
+  }
 }
 
 /// The log-likelihoods of one reading by Eq. 7, where r is small; see ReadingForm.
@@ -164,29 +190,81 @@ class LogisticFloor {
   hn::Vec<D> log_scale_;
 };
 
+/// A row of a table, in registers where these hold it: gathers are several times slower than
+/// permutations.
+template <class D>
+class RowNumbers {
+ public:
+  RowNumbers(D d, const hn::TFromD<D>* row, std::size_t nodes) : row_(row) {
+    if constexpr (permutes) {
+      if (nodes <= parts * lanes) {
+        for (std::size_t part = 0; part < parts; ++part) {
+          parts_[part] = hn::LoadU(d, row + part * lanes);
+        }
+        in_registers_ = true;
+      }
+    }
+  }
+
+  template <class VI>
+  HWY_INLINE hn::Vec<D> at(D d, VI index) const {
+    if constexpr (permutes) {
+      if (in_registers_) {
+        const hn::RebindToSigned<D> di;
+        const auto lane = hn::IndicesFromVec(d, hn::And(index, hn::Set(di, lanes - 1)));
+        const auto odd = hn::RebindMask(d, hn::TestBit(index, hn::Set(di, lanes)));
+        const auto upper = hn::RebindMask(d, hn::TestBit(index, hn::Set(di, 2 * lanes)));
+        const auto part = [&](std::size_t i)
+                              HWY_ATTR { return hn::TableLookupLanes(parts_[i], lane); };
+        return hn::IfThenElse(upper, hn::IfThenElse(odd, part(3), part(2)),
+                              hn::IfThenElse(odd, part(1), part(0)));
+      }
+    }
+    return hn::GatherIndex(d, row_, index);
+  }
+
+ private:
+  static constexpr int lanes = 16;
+  static constexpr std::size_t parts = TableRows<float>::least_length / lanes;
+#if HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_AVX3_DL
+  static constexpr bool permutes = sizeof(hn::TFromD<D>) == 4;
+#else
+  static constexpr bool permutes = false;
+#endif
+
+  const hn::TFromD<D>* row_;
+  bool in_registers_ = false;
+  hn::Vec<D> parts_[permutes ? parts : 1];
+};
+
 /// The log-likelihoods of one reading in a table.
 template <class D>
 class TableRow {
+  using Lane = hn::TFromD<D>;
+
  public:
   TableRow(D d, const ReadingForm& form, std::size_t object, Reading reading)
-      : row_(form.row(object, reading)),
-        first_(hn::Set(d, form.first_log_odds)),
-        scale_(hn::Set(d, form.nodes_per_nat)),
-        last_(hn::Set(d, static_cast<double>(form.nodes - 1))),
-        last_segment_(hn::Set(d, static_cast<double>(form.nodes - 2))) {}
+      : TableRow(d, form, form.rows<Lane>().values(form.row(object, reading)),
+                 form.rows<Lane>().length) {}
 
   HWY_INLINE hn::Vec<D> at(D d, hn::Vec<D> l) const {
     const auto at = hn::Max(hn::Zero(d), hn::Min(hn::Mul(hn::Sub(l, first_), scale_), last_));
     const auto segment = hn::Min(hn::Floor(at), last_segment_);
-    const auto index =
-        hn::BitCast(hn::RebindToSigned<D>(), whole_number(d, hn::Add(segment, segment)));
-    const auto value = hn::GatherIndex(d, row_, index);
-    const auto difference = hn::GatherIndex(d, row_ + 1, index);
-    return hn::Add(value, hn::Mul(difference, hn::Sub(at, segment)));
+    const auto index = whole_number(d, segment);
+    return hn::Add(values_.at(d, index), hn::Mul(differences_.at(d, index), hn::Sub(at, segment)));
   }
 
  private:
-  const double* row_;
+  TableRow(D d, const ReadingForm& form, const Lane* values, std::size_t length)
+      : values_(d, values, form.nodes),
+        differences_(d, values + length, form.nodes),
+        first_(hn::Set(d, static_cast<Lane>(form.first_log_odds))),
+        scale_(hn::Set(d, static_cast<Lane>(form.nodes_per_nat))),
+        last_(hn::Set(d, static_cast<Lane>(form.nodes - 1))),
+        last_segment_(hn::Set(d, static_cast<Lane>(form.nodes - 2))) {}
+
+  RowNumbers<D> values_;
+  RowNumbers<D> differences_;
   hn::Vec<D> first_;
   hn::Vec<D> scale_;
   hn::Vec<D> last_;
