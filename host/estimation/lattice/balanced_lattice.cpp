@@ -44,7 +44,7 @@ double lever_mm(const OccupancyGrid& map, const PoseLattice& region) {
 double widening(double sd, double step) {
   // docs/refinement.md holds the measurements behind these numbers.
   constexpr double of_sd = 0.5;
-  constexpr double most = 2.0;
+  constexpr double most = 2.5;
   return std::clamp(of_sd * sd / step, 1.0, most);
 }
 
