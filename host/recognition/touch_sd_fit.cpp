@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <utility>
+#include <variant>
 
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
@@ -201,13 +203,17 @@ std::vector<TouchedObject> touched_objects(std::span<const Recording> recordings
 }
 
 void require_fittable(const RecognitionTask& task) {
-  const FilterTraits traits = traits_of(task.filter);
-  if (!traits.bins) {
+  if (!traits_of(task.filter).bins) {
     refuse_option("fit-touch-sd",
                   "particles cannot fit it; use `filter bounded` or `filter histogram`");
   }
-  if (traits.budget_s) {
-    refuse_option("budget-ms", "has no effect on `fit-touch-sd`; leave it out");
+  const auto* bounded = std::get_if<BoundedOptions>(&task.filter);
+  for (const auto& [option, given] :
+       {std::pair{"budget-ms", bounded != nullptr && bounded->budget_s},
+        std::pair{"evidence-nats", bounded != nullptr && bounded->evidence_nats}}) {
+    if (given) {
+      refuse_option(option, "has no effect on `fit-touch-sd`; leave it out");
+    }
   }
   if (!task.touch_sd().none()) {
     refuse_option(

@@ -27,8 +27,8 @@ std::vector<TouchedObject> touched_objects(std::span<const Recording> recordings
                                            std::span<const Unknown> unknowns,
                                            const RecognitionTask& task);
 
-/// Throws Error where the task has particles, a budget, a touch_sd, a slip_sd, a sensor model's
-/// table or "none of these".
+/// Throws Error where the task has particles, a budget, evidence_nats, a touch_sd, a slip_sd, a
+/// sensor model's table or "none of these".
 void require_fittable(const RecognitionTask& task);
 
 struct TouchSdFitOptions {

@@ -83,6 +83,7 @@ def plan(
     goal: Literal["identity", "pose", "both"] = "both",
     samples: int = 96,
     plan_seed: int = 0,
+    budget_ms: float | None = None,
     device: Device | str | int | None = None,
     progress: Callable[[float], object] | None = None,
     **options: "Unpack[RecognitionOptions]",
@@ -93,12 +94,12 @@ def plan(
     T_robot_sensor [n, 3] (x_mm, y_mm, theta_rad), a CSV file of such poses, a recording whose touches'
     poses are taken, or "grid": 100 to 300 poses about the places where the object may be; goal: what
     the touch shall tell; samples, 2 to 4096: objects and poses that stand for the belief; the time
-    grows with its square; plan_seed: of the samples.
+    grows with its square; plan_seed: of the samples; budget_ms: as for recognize().
 
     Raises Error in the words of the command, also for particles, which have no belief of all poses.
     What the command would say on standard error becomes a UserWarning.
     """
-    request = _request("plan", maps, options, device)
+    request = _request("plan", maps, options, device, budget_ms=budget_ms)
     fields, sentences = _palpate.plan(
         [recording], request, goal, candidates, samples, plan_seed, progress
     )
@@ -282,9 +283,13 @@ def import_tables(
 
 
 def _request(
-    function: str, maps: _Maps, options: RecognitionOptions, device: Device | str | int | None
+    function: str,
+    maps: _Maps,
+    options: RecognitionOptions,
+    device: Device | str | int | None,
+    **own: float | None,
 ) -> _palpate.Request:
     for name in options:
         if name not in RecognitionOptions.__annotations__:
             raise TypeError(f"{function}() got an unexpected keyword argument '{name}'")
-    return request_of({**options, "device": device}, maps)
+    return request_of({**options, **own, "device": device}, maps)

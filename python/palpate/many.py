@@ -37,9 +37,6 @@ class Task(RecognitionOptions, total=False):
     """
 
     maps: _Path | Sequence[_Path]
-    filter: Literal["auto", "histogram", "bounded", "particles"]
-    tolerance: float
-    evidence_nats: float
     particles: int
     resampling: Literal["multinomial", "systematic"]
     augmented: bool

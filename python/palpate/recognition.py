@@ -38,6 +38,9 @@ class RecognitionOptions(TypedDict, total=False):
     slip_sd_mm: float
     slip_sd_deg: float
     none: float | Literal["auto"]
+    filter: Literal["auto", "histogram", "bounded", "particles"]
+    tolerance: float
+    evidence_nats: float
     act_below_mm: float
     act_above: float
     memory_mib: int

@@ -48,8 +48,8 @@ TEST_F(FitTouchSd, SearchesByBoundsOnTheHost) {
 }
 
 TEST_F(FitTouchSd, IsRefusedBesideFlagsOfOneResult) {
-  for (const char* flag :
-       {"--trace", "--posterior=p.h5", "--png=pictures", "--filter=particles", "--budget-ms=9"}) {
+  for (const char* flag : {"--trace", "--posterior=p.h5", "--png=pictures", "--filter=particles",
+                           "--budget-ms=9", "--evidence-nats=1"}) {
     std::vector<std::string> with_flag = fit_;
     with_flag.emplace_back(flag);
     expect_refused(with_flag, {"--fit-touch-sd"});

@@ -4,7 +4,7 @@ import json
 import math
 import pathlib
 import re
-from typing import Any
+from typing import Any, Literal
 
 import numpy
 import pytest
@@ -143,6 +143,14 @@ def test_a_plan_is_that_of_the_command(files: Files, tmp_path: pathlib.Path) -> 
     expect_plan(plan, planned(files, "--candidates", "grid", *flags))
     assert len(plan.index) > 50 and fractions[-1] == 1
 
+    plan = palpate.plan(
+        files.unknown, files.maps, bins=(10, 10, 8), touches=2, samples=40,
+        filter="bounded", tolerance=1e-3, budget_ms=1e6,
+    )  # fmt: skip
+    flags = ["--touches", 2, "--samples", 40, "--tolerance", "1e-3", "--budget-ms", "1e6"]
+    expect_plan(plan, planned(files, "--candidates", "grid", *flags))
+    assert plan.device == "none" and "dropped_mass" in plan.believed
+
     table = tmp_path / "poses.csv"
     table.write_text("x,y,theta\n0,0,0\n5,-3,1\n40,40,0\n")
     expected = planned(files, "--candidates", table, "--touches", 3)
@@ -206,19 +214,22 @@ def test_candidates_that_are_no_poses_are_refused(files: Files) -> None:
 # How far touches lie from their poses
 
 
-def test_touch_sd_is_that_of_the_command(files: Files) -> None:
+@pytest.mark.parametrize("name", ["histogram", "bounded"])
+def test_touch_sd_is_that_of_the_command(
+    files: Files, name: Literal["histogram", "bounded"]
+) -> None:
     other = files.train[0]
-    flags = ["--maps", files.maps, "--touches", 2, "--bins", "8x8x8"]
+    flags = ["--maps", files.maps, "--touches", 2, "--bins", "8x8x8", "--filter", name]
     expected = json.loads(command("recognize", files.unknown, other, *flags, "--fit-touch-sd",
                                   "--json", "-"))  # fmt: skip
     fractions: list[float] = []
     fit = palpate.fit_touch_sd(
         [files.unknown, palpate.read_recording(other)], files.maps, touches=2, bins=(8, 8, 8),
-        progress=fractions.append,
+        filter=name, progress=fractions.append,
     )  # fmt: skip
-    for sd, name in ((fit.sd, "touch_sd"), (fit.standard_error, "standard_error")):
-        assert sd.mm == expected[name]["mm"]
-        assert sd.rad * 180 / math.pi == pytest.approx(expected[name]["deg"], rel=1e-15)
+    for sd, key in ((fit.sd, "touch_sd"), (fit.standard_error, "standard_error")):
+        assert sd.mm == expected[key]["mm"]
+        assert sd.rad * 180 / math.pi == pytest.approx(expected[key]["deg"], rel=1e-15)
     assert (fit.unknowns, fit.touches) == (expected["unknowns"], expected["touches"]) == (2, 4)
     assert fit.evidence_gain == expected["log_evidence_gain"]
     assert fit.warnings == expected["warnings"]
