@@ -48,6 +48,14 @@ MeanSearch::MeanSearch(const SearchSpace& space, const BoundedOptions& options,
   }
 }
 
+std::uint64_t MeanSearch::bytes() const {
+  std::uint64_t bytes = surveys_.capacity() * sizeof(PlaneSurvey);
+  for (const PlaneDivision::LargestSums& sums : sums_) {
+    bytes += sizeof sums + sums.capacity() * sizeof(sums.front());
+  }
+  return bytes;
+}
+
 template <typename Work>
 bool MeanSearch::for_planes(const Deadline& deadline, const Work& work) const {
   constexpr std::size_t together = 8;

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -48,6 +49,8 @@ class MeanSearch {
   /// Log of the share of the bins that count among all, by prior weight. To be asked for after
   /// bounds().
   double log_share() const { return log_share_; }
+  /// Host memory of what searches keep.
+  std::uint64_t bytes() const;
 
  private:
   static constexpr double nothing = PlaneSurvey::nothing;

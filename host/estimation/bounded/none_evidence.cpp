@@ -54,6 +54,14 @@ void NoneEvidence::add(std::span<const TouchEvidence> touches) {
   }
 }
 
+std::uint64_t NoneEvidence::bytes() const {
+  std::uint64_t bytes = 0;
+  for (const TouchMean& mean : means_) {
+    bytes += mean.search.bytes();
+  }
+  return bytes;
+}
+
 bool NoneEvidence::search(TouchMean& mean, const Deadline& deadline) {
   double least = infinity;
   bool close = false;

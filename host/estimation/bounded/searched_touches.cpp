@@ -94,6 +94,7 @@ std::uint64_t SearchedTouches::bytes() const {
     exact_bins += touch.exact_bins->bytes();
   }
   return exact_bins + likelihood_.bytes() + space_.bytes() + search_.largest().bytes() +
+         (none_ ? none_->bytes() : 0) +
          static_cast<std::uint64_t>(
              moving_ ? MovingBelief::bytes_needed(options_.lattice, hypotheses_.size()) : 0.0);
 }

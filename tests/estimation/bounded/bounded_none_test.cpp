@@ -119,6 +119,21 @@ TEST(BoundedPosterior, BoundsNoneOfTheseAsCloselyAsTheEvidenceIsAskedFor) {
   EXPECT_LE(width_of(close), 1e-4);
 }
 
+TEST(BoundedPosterior, CountsTheMemoryThatNoneOfTheseTakes) {
+  BoundedOptions options = small_options();
+  BoundedPosterior without(two_made_up(), options);
+  options.none_weight = 1.0;
+  BoundedPosterior with(two_made_up(), options);
+  const Recording recording = random_recording(3, 36, 823);
+  for (BoundedPosterior* posterior : {&without, &with}) {
+    posterior->update(all_touches(recording));
+    posterior->estimate();
+  }
+  // Of each touch, every object and theta has at least some numbers.
+  const auto planes = static_cast<std::uint64_t>(2 * options.lattice.theta_rad.count);
+  EXPECT_GT(with.host_bytes(), without.host_bytes() + 3 * planes * sizeof(double));
+}
+
 TEST(BoundedPosterior, ShowsInTheIdentitiesWhereABudgetLeftNoneOfThese) {
   BoundedOptions options = small_options();
   options.lattice.x_mm.count = 90;
