@@ -20,8 +20,8 @@ void add_filter_flags(CLI::App& command, Request& request) {
           "histogram: evaluates every pose bin; bounded: the same bins, but evaluates only those "
           "that matter and proves how little the others can; particles: the paper's particle "
           "filter; auto: bounded for more than {} bins of all objects together, else histogram. "
-          "Bounded refuses --memory-mib and --fit-touch-sd; auto then takes the "
-          "histogram, as it does for --posterior [default: auto]",
+          "Bounded refuses --memory-mib; auto then takes the histogram, as it does for --posterior "
+          "[default: auto]",
           most_histogram_bins));
   command.add_option(
       "--tolerance", request.tolerance,
@@ -31,7 +31,8 @@ void add_filter_flags(CLI::App& command, Request& request) {
       "what a trace or a picture of 'recognize' shows before the last touch]");
   command.add_option("--budget-ms", request.budget_ms,
                      "With --filter bounded: milliseconds after which each estimate's search ends "
-                     "and reports what it has proven by then [default: none]");
+                     "and reports what it has proven by then; with --slip-sd-* every touch takes "
+                     "besides a time that grows with the bins [default: none]");
   command.add_option("--evidence-nats", request.evidence_nats,
                      "With --filter bounded: also bounds the log evidence of every object, however "
                      "unlikely, within this many nats [default: only the tolerance counts]");
@@ -102,8 +103,8 @@ void add_recognition_flags(CLI::App& command, Request& request, bool& verbose) {
       command, "--bins", request.bins,
       "Pose bins per object along x, y and theta, as 25x25x16; auto: as many as the refined pose "
       "needs, in steps of 0.6 times the maps' cell or 1.2 times the sensor's spread, whichever is "
-      "larger, widened to half of --touch-sd-* but at most 2.5 times; fine: also as the mode needs, "
-      "in steps of 0.6 times the larger of both. Auto and fine take wider steps where the "
+      "larger, widened to half of --touch-sd-*, but at most 2.5 times; fine: also as the mode "
+      "needs, in steps of 0.6 times the larger of both. Auto and fine take wider steps where the "
       "histogram's device memory is short; the region about an automatic pivot fits the largest "
       "array of all RECORDINGs [default: auto, or 25x25x16 where a range or a pivot is given]");
   add_text_flag(command, "--x-mm", request.x_mm,

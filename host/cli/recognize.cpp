@@ -94,7 +94,7 @@ struct RecognizeArguments {
   bool fit_touch_sd = false;
 };
 
-HistogramNeed histogram_need(const RecognizeArguments& options, const Request& request) {
+CallerNeed caller_need(const RecognizeArguments& options, const Request& request) {
   if (options.fit_touch_sd) {
     return {.learned_only = true, .eq7 = true};
   }
@@ -236,10 +236,10 @@ void recognize(const RecognizeArguments& options) {
                                                  .source = first.path,
                                                  .reach_mm = largest_reach_mm(recordings),
                                                  .still_array = array_is_still(unknowns),
-                                                 .need = histogram_need(options, request),
+                                                 .need = caller_need(options, request),
                                                  .device = std::ref(device_in_waiting)});
   if (options.fit_touch_sd) {
-    require_fittable(task);
+    require_fittable(request, task);
   }
   check_outputs(options, request, task, unknowns);
   Device* device = device_in_waiting.of(task);

@@ -30,7 +30,7 @@ struct FilterTraits {
   /// and beliefs that a touch may surprise. Particles have none: motion noise comes between.
   bool bins = false;
   /// Evaluates every bin, in the device's memory, as soon as a touch comes. Posteriors of every bin
-  /// and displacements that are to be fitted need it.
+  /// need it.
   bool every_bin = false;
   /// Keeps touches, searches on the host once it is asked about the belief, and proves what it left
   /// out (Certificate).

@@ -67,8 +67,8 @@ std::optional<double> none_weight(const Request& request, std::span<const Hypoth
 }
 
 /// What bounds refuse and the histogram does not; each giver as a sentence names it.
-std::vector<HistogramNeed> all_needs(const Request& request, const HistogramNeed& of_caller) {
-  std::vector<HistogramNeed> needs;
+std::vector<CallerNeed> all_needs(const Request& request, const CallerNeed& of_caller) {
+  std::vector<CallerNeed> needs;
   if (!of_caller.why.empty()) {
     needs.push_back({fmt::format("`{}`", of_caller.option), of_caller.why});
   }
@@ -79,9 +79,9 @@ std::vector<HistogramNeed> all_needs(const Request& request, const HistogramNeed
 }
 
 /// What would have to go for bounds to take the bins: "`a` and `b`".
-std::string names_of(std::span<const HistogramNeed> needs) {
+std::string names_of(std::span<const CallerNeed> needs) {
   std::vector<std::string> names;
-  for (const HistogramNeed& need : needs) {
+  for (const CallerNeed& need : needs) {
     names.push_back(need.option);
   }
   return fmt::format("{}", fmt::join(names, " and "));
@@ -175,7 +175,7 @@ FilterWish filter_wish(const Request& request) {
 }
 
 ChosenFilter choose_filter(const FilterWish& wish, const Request& request,
-                           const HistogramNeed& of_caller, std::span<const Hypothesis> hypotheses,
+                           const CallerNeed& of_caller, std::span<const Hypothesis> hypotheses,
                            HistogramOptions histogram) {
   if (wish.kind == FilterKind::particles) {
     return {asked_particles(request, histogram), false, wish.by};
@@ -193,10 +193,10 @@ ChosenFilter choose_filter(const FilterWish& wish, const Request& request,
   if (request.none || !of_caller.learned_only) {
     histogram.none_weight = none_weight(request, hypotheses);
   }
-  std::vector<HistogramNeed> needs = all_needs(request, of_caller);
+  std::vector<CallerNeed> needs = all_needs(request, of_caller);
   if (wish.kind == FilterKind::bounded) {
     if (!needs.empty()) {
-      const HistogramNeed& need = needs.front();
+      const CallerNeed& need = needs.front();
       throw Error(Fault::input,
                   fmt::format("{}: {}; leave it out, or {}", need.option, need.why, wish.by));
     }

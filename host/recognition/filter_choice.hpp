@@ -34,7 +34,7 @@ struct ChosenFilter {
 /// @param histogram with the lattice, the contact model, and the sensor model's touch_sd
 /// @throws Error on values out of range, and where the filter has no use for an option
 ChosenFilter choose_filter(const FilterWish& wish, const Request& request,
-                           const HistogramNeed& of_caller, std::span<const Hypothesis> hypotheses,
+                           const CallerNeed& of_caller, std::span<const Hypothesis> hypotheses,
                            HistogramOptions histogram);
 
 /// An axis of one bin limits nothing.

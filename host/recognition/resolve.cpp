@@ -277,7 +277,7 @@ RecognitionTask resolve(const Request& request, const Circumstances& of) {
   histogram.lattice =
       inferred ? automatic_lattice(hypotheses, of.reach_mm, remarks) : given_lattice(request);
   const std::optional<BinWidth> bin_width = bin_width_of(request);
-  HistogramNeed need = of.need;
+  CallerNeed need = of.need;
   // An object between such bins fits none of them, and would be taken for a stranger. Where
   // elements are so far from independent, the tempered evidence leaves "(none)" its prior.
   constexpr double far_wider = 8.0;

@@ -11,10 +11,10 @@
 
 namespace palpate {
 
-/// Why a caller needs the histogram, beside what the request says.
-struct HistogramNeed {
-  std::string option = {};  ///< that asks for what needs it
-  std::string why = {};     ///< "" where every filter will do
+/// What a caller needs, beside what the request says.
+struct CallerNeed {
+  std::string option = {};  ///< that asks for what needs the histogram
+  std::string why = {};     ///< why that needs the histogram; "" where every filter will do
   /// Every unknown is one of the maps' objects, or cannot be told from "(none)", which then has no
   /// weight unless it is given one.
   bool learned_only = false;
@@ -27,7 +27,7 @@ struct Circumstances {
   std::string source;         ///< that gives them, for messages
   double reach_mm = 0.0;      ///< of the largest array that touches; see array_reach_mm()
   bool still_array = false;   ///< HistogramOptions::still_array
-  HistogramNeed need = {};
+  CallerNeed need = {};
   /// Gives the device that recognises. Called where counts of bins follow from its memory, and
   /// where maps of unlike priors are built again.
   std::function<Device&()> device = {};

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <map>
 #include <utility>
-#include <variant>
 
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
@@ -114,7 +113,7 @@ std::vector<Start> recognise_all(Device* device, const RecognitionTask& task,
                                             unknowns[indices.front()].name, label));
     }
     const RecognitionTask part = part_of(task, objects, options.start);
-    Recogniser recogniser = open_recogniser(device, part);
+    Recogniser recogniser = open_recogniser(device, part, options.resources);
     for (const std::size_t i : indices) {
       recogniser.reset();
       recogniser.update(unknowns[i].touches);
@@ -202,15 +201,14 @@ std::vector<TouchedObject> touched_objects(std::span<const Recording> recordings
   return objects;
 }
 
-void require_fittable(const RecognitionTask& task) {
+void require_fittable(const Request& request, const RecognitionTask& task) {
   if (!traits_of(task.filter).bins) {
     refuse_option("fit-touch-sd",
                   "particles cannot fit it; use `filter bounded` or `filter histogram`");
   }
-  const auto* bounded = std::get_if<BoundedOptions>(&task.filter);
   for (const auto& [option, given] :
-       {std::pair{"budget-ms", bounded != nullptr && bounded->budget_s},
-        std::pair{"evidence-nats", bounded != nullptr && bounded->evidence_nats}}) {
+       {std::pair{"budget-ms", request.budget_ms.has_value()},
+        std::pair{"evidence-nats", request.evidence_nats.has_value()}}) {
     if (given) {
       refuse_option(option, "has no effect on `fit-touch-sd`; leave it out");
     }

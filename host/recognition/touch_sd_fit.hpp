@@ -10,6 +10,7 @@
 #include "palpate/displacement.hpp"
 #include "recognition/recognition_record.hpp"
 #include "recognition/recognition_task.hpp"
+#include "recognition/request.hpp"
 
 namespace palpate {
 
@@ -27,9 +28,10 @@ std::vector<TouchedObject> touched_objects(std::span<const Recording> recordings
                                            std::span<const Unknown> unknowns,
                                            const RecognitionTask& task);
 
-/// Throws Error where the task has particles, a budget, evidence_nats, a touch_sd, a slip_sd, a
-/// sensor model's table or "none of these".
-void require_fittable(const RecognitionTask& task);
+/// Throws Error where the task has particles, a touch_sd, a slip_sd, a sensor model's table or
+/// "none of these", or the request options that the fit has no use for.
+/// @param request that the task was resolved from
+void require_fittable(const Request& request, const RecognitionTask& task);
 
 struct TouchSdFitOptions {
   /// Where the search begins: with displacements so large that every pose which may explain the
@@ -37,6 +39,7 @@ struct TouchSdFitOptions {
   DisplacementSd start{2.0, 0.1};
   std::size_t samples = 64;  ///< of every unknown's object, pose and displacements
   int sweeps = 20;           ///< moves of every sample in every step of the search
+  FilterResources resources = {};
   std::uint64_t seed = 0;
 };
 

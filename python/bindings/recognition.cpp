@@ -197,10 +197,10 @@ using Fitted = std::tuple<TouchSdFit, Sentences>;
 
 Fitted fit_recordings(const Subject& subject, Device& device, Call& call) {
   const RecognitionTask task = task_of(subject, device, {.learned_only = true, .eq7 = true});
-  require_fittable(task);
+  require_fittable(subject.request, task);
   TouchSdFit fit =
-      fit_touch_sd(&device, task, touched_objects(subject.recordings, subject.unknowns, task), {},
-                   call.progress());
+      fit_touch_sd(&device, task, touched_objects(subject.recordings, subject.unknowns, task),
+                   {.resources = {.cancel_point = [&call] { call.check(); }}}, call.progress());
   return {std::move(fit), in_python(task.remarks)};
 }
 

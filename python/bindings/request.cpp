@@ -206,7 +206,7 @@ Subject subject_of(const GivenRecordings& recordings, const Request& given) {
   return subject;
 }
 
-RecognitionTask task_of(const Subject& subject, Device& device, const HistogramNeed& need) {
+RecognitionTask task_of(const Subject& subject, Device& device, const CallerNeed& need) {
   const Recording& first = subject.recordings.front();
   return resolve(subject.request, {.pressure_unit = first.pressure_unit,
                                    .source = first.path,

@@ -47,7 +47,7 @@ struct Subject {
 Subject subject_of(const GivenRecordings& recordings, const Request& given);
 
 /// The task of a subject, by what all its recordings have. Throws Error as resolve() does.
-RecognitionTask task_of(const Subject& subject, Device& device, const HistogramNeed& need = {});
+RecognitionTask task_of(const Subject& subject, Device& device, const CallerNeed& need = {});
 
 /// The session, or where there is none, one that is nobody else's: of the device of this name, see
 /// Device::open(). Throws Error.

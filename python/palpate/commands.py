@@ -120,7 +120,8 @@ def fit_touch_sd(
     As `palpate recognize --fit-touch-sd`, number for number: of each recording all touches are of one
     object of the maps. recordings, maps, device, progress and options: as for recognize().
 
-    Raises Error in the words of the command, also beside touch_sd, slip_sd, none and a sensor model.
+    Raises Error in the words of the command, also beside touch_sd, slip_sd, none, evidence_nats and a
+    sensor model.
     What the command would say on standard error becomes a UserWarning.
     """
     request = _request("fit_touch_sd", maps, options, device)

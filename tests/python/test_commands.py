@@ -150,6 +150,8 @@ def test_a_plan_is_that_of_the_command(files: Files, tmp_path: pathlib.Path) -> 
     flags = ["--touches", 2, "--samples", 40, "--tolerance", "1e-3", "--budget-ms", "1e6"]
     expect_plan(plan, planned(files, "--candidates", "grid", *flags))
     assert plan.device == "none" and "dropped_mass" in plan.believed
+    hurried = palpate.plan(files.unknown, files.maps, bins="fine", touches=1, budget_ms=1e-6)
+    assert hurried.believed.dropped_mass > 1e-5
 
     table = tmp_path / "poses.csv"
     table.write_text("x,y,theta\n0,0,0\n5,-3,1\n40,40,0\n")
@@ -244,6 +246,11 @@ def test_a_fit_beside_what_it_finds_is_refused(files: Files, name: str) -> None:
         "recognize", files.unknown, "--maps", files.maps, "--fit-touch-sd",
         f"--{name.replace('_', '-')}", 2,
     )  # fmt: skip
+
+
+def test_a_fit_refuses_what_has_no_effect(files: Files) -> None:
+    with pytest.raises(palpate.Error, match="^evidence_nats: has no effect on fit_touch_sd"):
+        palpate.fit_touch_sd(files.unknown, files.maps, evidence_nats=1.0)
 
 
 def test_a_fit_needs_recordings(files: Files) -> None:

@@ -151,7 +151,7 @@ const SearchResult& BoundedBelief::found(std::optional<double> asked) {
   if (!found_ || tolerance < found_->tolerance) {
     // A budget may end the search before it proves as much as an earlier one.
     Found closer = search(tolerance);
-    if (!found_ || closer.result.unproven() < found_->result.unproven()) {
+    if (!found_ || better(closer, *found_)) {
       found_ = std::move(closer);
     }
     found_->tolerance = tolerance;
@@ -161,6 +161,11 @@ const SearchResult& BoundedBelief::found(std::optional<double> asked) {
         touches_.bound_none([&](const LogInterval& none) { return tells_enough(none); }, deadline);
   }
   return found_->result;
+}
+
+bool BoundedBelief::better(const Found& later, const Found& earlier) const {
+  // A belief that slips is what the last search left behind.
+  return touches_.moving() || later.result.unproven() < earlier.result.unproven();
 }
 
 BoundedBelief::Found BoundedBelief::search(double tolerance) {
@@ -177,15 +182,18 @@ BoundedBelief::Found BoundedBelief::search(double tolerance) {
   }
   Found best = search(first, deadline);
   if (first.tolerance > tolerance && !deadline.passed()) {
-    Found better = search(goal(tolerance), deadline);
-    if (better.result.unproven() < best.result.unproven()) {
-      best = std::move(better);
+    Found closer = search(goal(tolerance), deadline);
+    if (better(closer, best)) {
+      best = std::move(closer);
     }
   }
   return best;
 }
 
 BoundedBelief::Found BoundedBelief::search(const SearchGoal& goal, Deadline& deadline) {
+  if (touches_.moving()) {
+    found_.reset();  // the belief will be another one, also where this is cancelled
+  }
   // The bins of a belief that slips stay in memory.
   EvaluatedBins bins(deadline.exists() && !touches_.moving());
   SearchResult result = touches_.search(
@@ -282,7 +290,12 @@ std::vector<PoseBlock> BoundedBelief::refined_blocks() {
       evaluated.push_back(block_of(box, finest));
     }
   };
-  touches_.search(goal(tolerance()), until({}), note, &blocks);
+  if (touches_.moving()) {
+    found();
+    visit(note);
+  } else {
+    touches_.search(goal(tolerance()), until({}), note, &blocks);
+  }
   blocks.insert(blocks.end(), evaluated.begin(), evaluated.end());
   return blocks;
 }

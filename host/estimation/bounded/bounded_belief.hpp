@@ -94,6 +94,8 @@ class BoundedBelief {
   Found search(double tolerance);
   /// Ends the deadline where there is no room for more bins.
   Found search(const SearchGoal& goal, Deadline& deadline);
+  /// Whether the later of two searches through the same touches is to be kept.
+  bool better(const Found& later, const Found& earlier) const;
   /// Whether the bounds of "none of these" are as close as the options ask for.
   bool tells_enough(const LogInterval& none) const;
 

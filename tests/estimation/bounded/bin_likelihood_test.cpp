@@ -219,6 +219,16 @@ TEST(BinLikelihood, OfTablesOfAnySizeIsWithinItsBounds) {
   }
 }
 
+TEST(BinLikelihood, OfATableOfTheLargestNumbersIsFinite) {
+  BinCase of = letter_case();
+  of.contact.table = table_of(20);
+  for (double& nats : of.contact.table->log_likelihood) {
+    nats = nats < -4.0 ? -most_log_odds : most_log_odds;
+  }
+  of.elements = random_elements(41, 6.0, of.contact.table->levels(), 89);
+  expect_within_bounds(of, planes(of.lattice), "1e30 nats");
+}
+
 TEST(BinLikelihood, HasATightBoundOnATable) {
   BinCase of = letter_case();
   of.contact.table = table_of(9);  // of learned tables, log-likelihoods change as slowly

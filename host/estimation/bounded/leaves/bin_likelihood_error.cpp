@@ -98,8 +98,9 @@ double BinLikelihood::exact_error_in(std::size_t object, const KnownElements& el
     const double argument =
         log_odds + u * (map.largest + 2.0 * std::abs(form_.first_log_odds) + 4.0 * table.width);
     const double summed = sizeof(Lane) == 4 ? floats_together * u : 0.0;
+    const double subnormal = sizeof(Lane) == 4 ? 16.0 * 0x1p-149 : 0.0;  // has no unit of roundoff
     const double each = std::min(table.steepest * argument, 2.0 * table.largest) +
-                        (8.0 * u + summed + v * count) * table.largest;
+                        (8.0 * u + summed + v * count) * table.largest + subnormal;
     return second_order * count * each;
   }
 

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <numbers>
 #include <utility>
@@ -21,12 +20,13 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 /// tiles are.
 constexpr double first_depth = 40.0;
 constexpr double last_depth = 160.0;
-/// Tiles that are followed however little time is left.
-constexpr std::size_t few_tiles = 256;
-/// Of the time that is left, what one touch may take: the first ones follow the most tiles.
-constexpr double share_of_touch = 0.5;
-/// Tiles that are followed in a second before any were: a slow machine's.
-constexpr double first_tiles_per_s = 2e5;
+/// Tiles that are followed however little time is left, and the part of all: bounding all takes
+/// longer than following so many.
+constexpr std::size_t fewest_tiles = 256;
+constexpr std::size_t of_all_tiles = 64;
+/// Another run lets a touch follow so many times the tiles of the run before, which takes no longer
+/// than so many times its time.
+constexpr double again_more = 2.0;
 
 double seconds_since(Deadline::Clock::time_point start) {
   return std::chrono::duration<double>(Deadline::Clock::now() - start).count();
@@ -61,7 +61,7 @@ double MovingBelief::bytes_needed(const PoseLattice& lattice, std::size_t object
 void MovingBelief::reset() {
   touches_.clear();
   depth_ = first_depth;
-  tiles_per_s_ = first_tiles_per_s;
+  followed_.clear();
   start();
 }
 
@@ -71,6 +71,7 @@ void MovingBelief::start() {
   }
   stepped_ = 0;
   cut_short_ = false;
+  again_ = false;
   spent_s_ = 0.0;
   prior_log_likelihood_ = 0.0;
 }
@@ -89,42 +90,60 @@ void MovingBelief::take_in(const Deadline& deadline) {
 void MovingBelief::step(const KnownElements& touch, const Deadline& deadline) {
   const bool slips = stepped_ > 0;
   const auto begin = Deadline::Clock::now();
-  std::vector<std::vector<double>> tiles;
+  std::vector<TileBeliefs> tiles;
   for (const MovingObject& object : objects_) {
     deadline.cancel_point();
-    tiles.push_back(object.bound_tiles(touch, slips));
+    tiles.push_back(object.tile_beliefs(touch, slips, deadline.exists()));
   }
-  std::vector<double> least = least_followed(tiles);
+  set_least(tiles);
+  FollowedTiles followed = all_that_matter(tiles);
   if (deadline.exists()) {
-    const double most = share_of_touch * deadline.left_s() * tiles_per_s_;
-    follow_at_most(few_tiles + static_cast<std::size_t>(std::min(most, 1e12)), tiles, least);
+    cut_short_ |= leave_best(most_followed(slips, deadline), tiles, depth_, followed);
+  }
+  std::size_t count = 0;
+  for (const std::vector<std::uint8_t>& of_object : followed) {
+    count += static_cast<std::size_t>(std::ranges::count(of_object, 1));
   }
   const auto bounded = Deadline::Clock::now();
   for (std::size_t i = 0; i < objects_.size(); ++i) {
     deadline.cancel_point();
-    objects_[i].step(touch, slips, tiles[i], least[i], depth_ == infinity);
+    objects_[i].step(touch, slips, tiles[i], std::move(followed[i]), depth_ == infinity);
   }
   if (deadline.exists()) {
-    std::size_t followed = 0;
-    for (const MovingObject& object : objects_) {
-      followed += object.tiles_followed();
-    }
-    tiles_per_s_ = static_cast<double>(followed) / std::max(seconds_since(bounded), 1e-6);
+    pace_.note(slips, count, seconds_since(bounded));
   }
   spent_s_ += seconds_since(begin);
+  followed_.resize(std::max(followed_.size(), stepped_ + 1));
+  followed_[stepped_] = count;
   prior_log_likelihood_ += prior_log_likelihood(touch, options_.contact);
   ++stepped_;
 }
 
-std::vector<double> MovingBelief::least_followed(std::span<const std::vector<double>> tiles) const {
+std::size_t MovingBelief::most_followed(bool slips, const Deadline& deadline) const {
+  std::size_t all = 0;
+  for (const MovingObject& object : objects_) {
+    all += object.tiles();
+  }
+  const double within = std::min(pace_.tiles_within(slips, deadline.left_s()), 1e12);
+  std::size_t most = std::max({fewest_tiles, all / of_all_tiles, static_cast<std::size_t>(within)});
+  if (again_) {
+    // No worse than what the last run found.
+    most = std::max(
+        most, static_cast<std::size_t>(again_more * static_cast<double>(followed_[stepped_])));
+  }
+  return most;
+}
+
+void MovingBelief::set_least(std::span<TileBeliefs> tiles) const {
   std::vector<double> scale;
   LogSum total;
   std::vector<LogSum> of_label(objects_.size());
   for (std::size_t i = 0; i < objects_.size(); ++i) {
-    scale.push_back(space_.log_weight[i] + objects_[i].scale() + objects_[i].over());
+    tiles[i].scale += space_.log_weight[i];
+    scale.push_back(tiles[i].scale + objects_[i].over());
     LogSum sum;
-    for (std::size_t tile = 0; tile < tiles[i].size(); ++tile) {
-      sum.add(tiles[i][tile] + objects_[i].log_bins_of(tile));
+    for (const double bound : tiles[i].bound) {
+      sum.add(bound);
     }
     of_label[space_.label_of[i]].add(scale[i] + sum.log());
     total.add(scale[i] + sum.log());
@@ -132,39 +151,11 @@ std::vector<double> MovingBelief::least_followed(std::span<const std::vector<dou
   // Where every label's own total is wanted, none is negligible beside all.
   const double range = options_.evidence_range_nats *
                        (1.0 + options_.evidence_growth * static_cast<double>(stepped_));
-  std::vector<double> least;
   for (std::size_t i = 0; i < objects_.size(); ++i) {
     const double whole = options_.evidence_nats
                              ? std::max(of_label[space_.label_of[i]].log(), total.log() - range)
                              : total.log();
-    least.push_back(whole - depth_ - scale[i]);
-  }
-  return least;
-}
-
-void MovingBelief::follow_at_most(std::size_t most, std::span<const std::vector<double>> tiles,
-                                  std::vector<double>& least) {
-  std::vector<double> wanted;
-  const auto belief = [&](std::size_t i, std::size_t tile) {
-    return tiles[i][tile] + objects_[i].log_bins_of(tile);
-  };
-  const auto scale = [&](std::size_t i) { return space_.log_weight[i] + objects_[i].scale(); };
-  for (std::size_t i = 0; i < objects_.size(); ++i) {
-    for (std::size_t tile = 0; tile < tiles[i].size(); ++tile) {
-      // What is no number is followed.
-      if (belief(i, tile) >= least[i]) {
-        wanted.push_back(scale(i) + belief(i, tile));
-      }
-    }
-  }
-  if (wanted.size() <= most) {
-    return;
-  }
-  cut_short_ = true;
-  const auto last = wanted.begin() + static_cast<std::ptrdiff_t>(most) - 1;
-  std::ranges::nth_element(wanted, last, std::greater<>());
-  for (std::size_t i = 0; i < objects_.size(); ++i) {
-    least[i] = std::max(least[i], *last - scale(i));
+    tiles[i].least = whole - depth_ - scale[i];
   }
 }
 
@@ -172,14 +163,15 @@ SearchResult MovingBelief::find(const SearchGoal& goal, const Deadline& deadline
                                 const BinVisitor& visit) {
   take_in(deadline);
   SearchResult found = result();
-  // Another run takes at least as long as the one before.
-  while ((cut_short_ || depth_ < infinity) && spent_s_ < deadline.left_s() &&
+  while ((cut_short_ || depth_ < infinity) && again_more * spent_s_ < deadline.left_s() &&
          !reaches(found, goal)) {
     if (!cut_short_) {
       depth_ = depth_ < last_depth ? 2.0 * depth_ : infinity;
     }
     start();
+    again_ = true;
     take_in(deadline);
+    again_ = false;
     found = result();
   }
   std::vector<double> logs;
@@ -258,7 +250,9 @@ SearchResult MovingBelief::result() const {
       }
     }
   }
-  found.contradicted = prior_log_likelihood_ - most_likelihood > contradiction_nats;
+  // Where no bin has mass, none was looked at.
+  found.contradicted =
+      most_likelihood > -infinity && prior_log_likelihood_ - most_likelihood > contradiction_nats;
   return found;
 }
 

@@ -1,11 +1,14 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <utility>
 #include <vector>
 
 #include "estimation/bounded/moving/moving_object.hpp"
+#include "estimation/bounded/moving/step_pace.hpp"
+#include "estimation/bounded/moving/tile_choice.hpp"
 #include "estimation/bounded/search/search_goal.hpp"
 #include "palpate/bounded_posterior.hpp"
 
@@ -52,13 +55,11 @@ class MovingBelief {
  private:
   void start();
   void step(const KnownElements& touch, const Deadline& deadline);
-  /// [object] the least belief of a tile that is followed through the touch.
-  /// @param tiles [object] MovingObject::bound_tiles()
-  std::vector<double> least_followed(std::span<const std::vector<double>> tiles) const;
-  /// Raises least_followed() until no more tiles than this are followed, but for tiles as good as
-  /// the last of them.
-  void follow_at_most(std::size_t most, std::span<const std::vector<double>> tiles,
-                      std::vector<double>& least);
+  /// Sets the least bounds by the depth, and adds prior weights to the scales.
+  /// @param tiles [object] MovingObject::tile_beliefs()
+  void set_least(std::span<TileBeliefs> tiles) const;
+  /// How many tiles the next touch may follow.
+  std::size_t most_followed(bool slips, const Deadline& deadline) const;
   SearchResult result() const;
   bool reaches(const SearchResult& found, const SearchGoal& goal) const;
 
@@ -71,10 +72,12 @@ class MovingBelief {
   std::vector<KnownElements> touches_;
   /// Nats below all of the belief at which a tile is not followed.
   double depth_ = 0.0;
-  std::size_t stepped_ = 0;            ///< touches that were taken in
-  bool cut_short_ = false;             ///< a deadline left out tiles within the depth
-  double spent_s_ = 0.0;               ///< on the touches that were taken in
-  double tiles_per_s_ = 0.0;           ///< by the last step that was timed
+  std::size_t stepped_ = 0;  ///< touches that were taken in
+  bool cut_short_ = false;   ///< a deadline left out tiles within the depth
+  double spent_s_ = 0.0;     ///< on the touches that were taken in
+  StepPace pace_;
+  std::vector<std::size_t> followed_;  ///< [touch] tiles that it followed, by the last run
+  bool again_ = false;                 ///< another run, which is to follow more
   double prior_log_likelihood_ = 0.0;  ///< of these
 };
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "estimation/log_sum.hpp"
 #include "estimation/parallel_for.hpp"
@@ -59,20 +60,20 @@ void MovingObject::start() {
   log_mass_.assign(bins, 0.0);
   before_.assign(bins, 0.0);
   log_rest_.assign(bins, -infinity);
-  followed_.assign(static_cast<std::size_t>(task_.lattice.theta_rad.count) * rows_ * columns_, 1);
+  const auto tiles = static_cast<std::size_t>(task_.lattice.theta_rad.count) * rows_ * columns_;
+  follow(std::vector<std::uint8_t>(tiles, 1));
   rounding_ = scale_ = over_ = under_ = 0.0;
-  choose(std::vector<double>(followed_.size()), -infinity);
   // Nothing slips before the first touch: what slips keep is not asked for.
   const double log_bins = std::log(static_cast<double>(bins));
   sums_ = {.mass = log_bins, .rest = -infinity, .kept = log_bins, .off = -infinity};
 }
 
-void MovingObject::step(const KnownElements& touch, bool slips, std::span<const double> tiles,
-                        double least, bool by_logs) {
+void MovingObject::step(const KnownElements& touch, bool slips, const TileBeliefs& tiles,
+                        std::vector<std::uint8_t> followed, bool by_logs) {
   // All of log_mass_ is written anew; before the first touch both are the uniform belief.
   before_.swap(log_mass_);
   slipped_ = slips;
-  choose(tiles, least);
+  follow(std::move(followed));
   if (slips) {
     restore();
     slip(by_logs);
@@ -172,7 +173,7 @@ void MovingObject::change_bins(const Set& set) {
   }
 }
 
-void MovingObject::add_up(std::span<const double> tiles) {
+void MovingObject::add_up(const TileBeliefs& tiles) {
   std::vector<Sums> of_run(runs_.size());
   parallel_for(runs_.size(), [&](std::size_t i) {
     const std::span<const BlockRun> run = std::span(runs_).subspan(i, 1);
@@ -206,9 +207,9 @@ void MovingObject::add_up(std::span<const double> tiles) {
     return all;
   };
   LogSum rest = sum(&Sums::rest);
-  for (std::size_t i = 0; i < tiles.size(); ++i) {
+  for (std::size_t i = 0; i < followed_.size(); ++i) {
     if (followed_[i] == 0) {
-      rest.add(tiles[i] + log_bins_of(i));
+      rest.add(tiles.bound[i]);
     }
   }
   sums_ = {sum(&Sums::mass).log(), rest.log() + 1e-9, sum(&Sums::kept).log(),

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -11,6 +10,7 @@
 #include "estimation/bin_box.hpp"
 #include "estimation/bounded/leaves/bin_likelihood.hpp"
 #include "estimation/bounded/moving/slip_mean.hpp"
+#include "estimation/bounded/moving/tile_choice.hpp"
 #include "estimation/bounded/search/search_space.hpp"
 #include "estimation/known_elements.hpp"
 
@@ -41,15 +41,16 @@ class MovingObject {
 
   /// Returns to the uniform belief, all of it followed.
   void start();
-  /// Upper bounds of the belief of each tile's bins, [theta, y, x], in nats: after a slip, unless
-  /// `slips` is false, and the touch.
-  std::vector<double> bound_tiles(const KnownElements& touch, bool slips) const;
+  /// Belief in each tile, [theta, y, x], after a slip, unless `slips` is false, and the touch; with
+  /// scale(), but without least.
+  /// @param known asks for TileBeliefs::known
+  TileBeliefs tile_beliefs(const KnownElements& touch, bool slips, bool known) const;
   /// Goes through the slip and the touch.
-  /// @param tiles bound_tiles() of these
-  /// @param least belief of a tile that is followed, its bins together, in nats
+  /// @param tiles tile_beliefs() of these
+  /// @param followed [tile] 1 where its bins are followed
   /// @param by_logs also bins whose mass float64 does not hold beside their surroundings'
-  void step(const KnownElements& touch, bool slips, std::span<const double> tiles, double least,
-            bool by_logs);
+  void step(const KnownElements& touch, bool slips, const TileBeliefs& tiles,
+            std::vector<std::uint8_t> followed, bool by_logs);
 
   /// Upper bound of a bin's log-likelihood, in nats: close where it is followed.
   double most(std::int64_t bin) const;
@@ -76,13 +77,6 @@ class MovingObject {
   double over() const { return over_; }
   double under() const { return under_; }
   std::size_t tiles() const { return followed_.size(); }
-  std::size_t tiles_followed() const {
-    return static_cast<std::size_t>(std::ranges::count(followed_, 1));
-  }
-  /// Log of a tile's number of bins.
-  double log_bins_of(std::size_t tile) const {
-    return log_tile_bins_[tile % log_tile_bins_.size()];
-  }
 
   template <typename Visit>
   void for_bins(std::span<const BlockRun> runs, const Visit& visit) const {
@@ -107,9 +101,11 @@ class MovingObject {
     double off = 0.0;   ///< of its differences from the mass, bin by bin
   };
 
-  std::vector<double> largest_of_tiles() const;
-  void add_touch_bounds(const KnownElements& touch, std::vector<double>& logs) const;
-  void choose(std::span<const double> tiles, double least);
+  /// [tile] the most mass of a bin, with what may be missing unless only the known is asked for.
+  std::vector<double> largest_of_tiles(bool known) const;
+  /// [tile] upper bound of the touch's log-likelihood.
+  std::vector<double> touch_bounds(const KnownElements& touch) const;
+  void follow(std::vector<std::uint8_t> tiles);
   void slip(bool by_logs);
   void restore();
   /// Leaves the touch's log-likelihood at the tiles' bins, and its error, in the shared memory.
@@ -123,8 +119,13 @@ class MovingObject {
   /// @param set takes a bin, its log_mass and log_rest, and the largest error that no rest has
   template <typename Set>
   void change_bins(const Set& set);
-  void leave_others(std::span<const double> tiles);
-  void add_up(std::span<const double> tiles);
+  /// Leaves the bins of tiles that are not followed their bounds.
+  void leave_others(const TileBeliefs& tiles);
+  void add_up(const TileBeliefs& tiles);
+  /// Log of a tile's number of bins.
+  double log_bins_of(std::size_t tile) const {
+    return log_tile_bins_[tile % log_tile_bins_.size()];
+  }
 
   SlipTask task_;
   std::size_t object_;

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "estimation/bounded/moving/moving_object.hpp"
 #include "estimation/bounded/search/displaced_tiles.hpp"
@@ -15,21 +16,37 @@ namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr int side = MovingObject::tile_bins;
+/// Nats below the largest mass at which a bound of means may be that of no mass at all.
+constexpr double beyond_reach = 40.0;
 
 }  // namespace
 
-std::vector<double> MovingObject::bound_tiles(const KnownElements& touch, bool slips) const {
-  std::vector<double> logs = largest_of_tiles();
-  if (slips) {
-    logs = of_tiles_.bounds(logs);
+TileBeliefs MovingObject::tile_beliefs(const KnownElements& touch, bool slips, bool known) const {
+  const std::vector<double> of_touch =
+      touch.runs.empty() ? std::vector<double>(followed_.size()) : touch_bounds(touch);
+  const auto slipped = [&](const std::vector<double>& logs) {
+    return slips && *std::ranges::max_element(logs) > -infinity ? of_tiles_.bounds(logs) : logs;
+  };
+  const auto touched = [&](std::vector<double> logs) {
+    for (std::size_t tile = 0; tile < logs.size(); ++tile) {
+      logs[tile] += of_touch[tile] + log_bins_of(tile);
+    }
+    return logs;
+  };
+  TileBeliefs tiles{.bound = touched(slipped(largest_of_tiles(false))), .scale = scale()};
+  if (known) {
+    std::vector<double> held = largest_of_tiles(true);
+    const double negligible = *std::ranges::max_element(held) - beyond_reach;
+    std::vector<double> reached = slipped(held);
+    std::ranges::replace_if(
+        reached, [&](double log) { return log < negligible; }, -infinity);
+    tiles.known = touched(std::move(reached));
+    tiles.held = touched(std::move(held));
   }
-  if (!touch.runs.empty()) {
-    add_touch_bounds(touch, logs);
-  }
-  return logs;
+  return tiles;
 }
 
-std::vector<double> MovingObject::largest_of_tiles() const {
+std::vector<double> MovingObject::largest_of_tiles(bool known) const {
   const PoseLattice& lattice = task_.lattice;
   std::vector<double> largest(followed_.size());
   parallel_for(static_cast<std::size_t>(lattice.theta_rad.count), [&](std::size_t theta) {
@@ -47,15 +64,17 @@ std::vector<double> MovingObject::largest_of_tiles() const {
         }
       }
       for (int x = 0; x < columns_; ++x) {
+        const double most = mass[x] + rounding_;
         largest[(theta * rows_ + row) * columns_ + x] =
-            log_add(mass[x] + rounding_, rest[x]) + 1e-12;
+            known ? most : log_add(most, rest[x]) + 1e-12;
       }
     }
   });
   return largest;
 }
 
-void MovingObject::add_touch_bounds(const KnownElements& touch, std::vector<double>& logs) const {
+std::vector<double> MovingObject::touch_bounds(const KnownElements& touch) const {
+  std::vector<double> logs(followed_.size());
   const TileBounds& bounds = task_.space.bounds[object_];
   const TileLevel& tiling = bounds.levels().front();
   const double best = bounds.best(0, touch);
@@ -94,11 +113,12 @@ void MovingObject::add_touch_bounds(const KnownElements& touch, std::vector<doub
     }
     for (int y = 0; y < rows_; ++y) {
       for (int x = 0; x < columns_; ++x) {
-        logs[(theta * rows_ + y) * columns_ + x] +=
+        logs[(theta * rows_ + y) * columns_ + x] =
             best + nats[static_cast<std::size_t>(y) * width + x];
       }
     }
   });
+  return logs;
 }
 
 std::size_t MovingObject::tile_of(std::int64_t bin) const {
@@ -124,16 +144,12 @@ std::vector<BlockRun> MovingObject::runs_of(std::span<const std::uint8_t> wanted
   return runs;
 }
 
-void MovingObject::choose(std::span<const double> tiles, double least) {
-  for (std::size_t tile = 0; tile < tiles.size(); ++tile) {
-    // What is no number is followed.
-    followed_[tile] = !(tiles[tile] + log_bins_of(tile) < least) ? 1 : 0;
-  }
+void MovingObject::follow(std::vector<std::uint8_t> tiles) {
+  followed_ = std::move(tiles);
   runs_ = runs_of(followed_);
 }
 
-/// Leaves their upper bounds to the bins of tiles that are not followed.
-void MovingObject::leave_others(std::span<const double> tiles) {
+void MovingObject::leave_others(const TileBeliefs& tiles) {
   const PoseLattice& lattice = task_.lattice;
   parallel_for(static_cast<std::size_t>(lattice.theta_rad.count), [&](std::size_t theta) {
     for (int y = 0; y < lattice.y_mm.count; ++y) {
@@ -143,7 +159,7 @@ void MovingObject::leave_others(std::span<const double> tiles) {
       for (int x = 0; x < lattice.x_mm.count; ++x) {
         if (const std::size_t tile = first + x / side; followed_[tile] == 0) {
           log_mass_[row + x] = -infinity;
-          log_rest_[row + x] = tiles[tile];
+          log_rest_[row + x] = tiles.bound[tile] - log_bins_of(tile);
         }
       }
     }

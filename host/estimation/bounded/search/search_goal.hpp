@@ -1,6 +1,5 @@
 #pragma once
 
-#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdint>
@@ -60,8 +59,11 @@ class Deadline {
   }
   /// Seconds until it passes, from 0; infinity where there is no budget.
   double left_s() const {
-    return at_ ? std::max(0.0, std::chrono::duration<double>(*at_ - Clock::now()).count())
-               : std::numeric_limits<double>::infinity();
+    if (!at_) {
+      return std::numeric_limits<double>::infinity();
+    }
+    const auto now = Clock::now();
+    return now < *at_ ? std::chrono::duration<double>(*at_ - now).count() : 0.0;
   }
   /// Lets it pass now, where there is a budget.
   void end() {
