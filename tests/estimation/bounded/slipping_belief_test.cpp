@@ -12,6 +12,7 @@
 #include "bounded/certified.hpp"
 #include "bounded_set_up.hpp"
 #include "palpate/bounded_posterior.hpp"
+#include "palpate/error.hpp"
 #include "palpate/pose_histogram.hpp"
 
 namespace palpate::slipping_belief_test {
