@@ -104,6 +104,21 @@ Trial make_long_slipping_trial(const std::array<int, 3>& bins, std::uint64_t see
   return trial;
 }
 
+void expect_certified_within(Trial trial, std::initializer_list<double> budgets_s) {
+  const reference::Posterior truth =
+      reference_posterior(trial.objects, trial.options, all_touches(trial.recording));
+  for (const double budget_s : budgets_s) {
+    SCOPED_TRACE(::testing::Message() << budget_s << " s");
+    trial.options.budget_s = budget_s;
+    BoundedPosterior posterior(trial.objects, trial.options);
+    for (std::size_t i = 0; i < trial.recording.size(); ++i) {
+      posterior.update(trial.recording.touch(i));
+      posterior.estimate();
+    }
+    expect_certified(posterior, trial.objects, trial.options, truth);
+  }
+}
+
 void expect_trials(const std::array<int, 3>& bins, int trials, std::uint64_t seed,
                    const decltype(make_trial)& make) {
   double variation = 0.0;

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <initializer_list>
 #include <vector>
 
 #include "bounded/certified.hpp"
@@ -31,6 +32,10 @@ Trial make_slipping_trial(const std::array<int, 3>& bins, std::uint64_t seed);
 Trial make_long_slipping_trial(const std::array<int, 3>& bins, std::uint64_t seed);
 
 Recording first_touches(const Recording& recording, std::size_t touches);
+
+/// Expects the certificate to hold after a trial's touches, each followed by an estimate within a
+/// budget, for each of these budgets.
+void expect_certified_within(Trial trial, std::initializer_list<double> budgets_s);
 
 /// Runs trials and expects their certificates to hold; prints the largest error and certificate.
 /// @param make what makes a trial
