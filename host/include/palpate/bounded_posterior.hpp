@@ -35,7 +35,7 @@ struct BoundedOptions {
   double tolerance = 1e-6;
   /// Seconds after which estimate() stops and reports what it has proven by then, also where that
   /// is less than the tolerance asks for. By default it takes the time that the tolerance needs.
-  /// With slip_sd, every touch takes a time besides that grows with the bins: some 0.1 s for five
+  /// With slip_sd, every touch takes a time besides that grows with the bins: some 0.15 s for five
   /// objects of a million bins each.
   std::optional<double> budget_s = {};
   /// Also bounds each label's log evidence (of all hypotheses that bear it) within this many nats,
