@@ -51,7 +51,8 @@ MeanSearch::MeanSearch(const SearchSpace& space, const BoundedOptions& options,
 std::uint64_t MeanSearch::bytes() const {
   std::uint64_t bytes = surveys_.capacity() * sizeof(PlaneSurvey);
   for (const PlaneDivision::LargestSums& sums : sums_) {
-    bytes += sizeof sums + sums.capacity() * sizeof(sums.front());
+    bytes += sizeof(PlaneDivision::LargestSums) +
+             sums.capacity() * sizeof(PlaneDivision::LargestSums::value_type);
   }
   return bytes;
 }
