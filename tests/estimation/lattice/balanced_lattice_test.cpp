@@ -123,7 +123,7 @@ TEST(BalancedLattice, ForTheRefinedPoseSkipsWhatItEvensOut) {
   EXPECT_NEAR(lattice.theta_rad.count, fine.theta_rad.count / 2.0, 1.0);
 }
 
-TEST(BalancedLattice, FollowsUncertainTouchesUpToTwiceTheStep) {
+TEST(BalancedLattice, FollowsUncertainTouchesUpToTwoAndAHalfSteps) {
   const auto lattice = [](const DisplacementSd& sd, BinWidth width = BinWidth::automatic) {
     return balanced_lattice({}, letters(), most_balanced_bins, width, sd);
   };
@@ -140,7 +140,8 @@ TEST(BalancedLattice, FollowsUncertainTouchesUpToTwiceTheStep) {
   EXPECT_DOUBLE_EQ(step_mm(1.0), 0.6) << "half of it is less";
   EXPECT_DOUBLE_EQ(step_mm(1.5), 0.75);
   EXPECT_DOUBLE_EQ(step_mm(2.0), 1.0);
-  EXPECT_DOUBLE_EQ(step_mm(9.0), 1.2) << "twice the step";
+  EXPECT_DOUBLE_EQ(step_mm(3.0), 1.5);
+  EXPECT_DOUBLE_EQ(step_mm(9.0), 1.5) << "two and a half steps";
   const BalancedLattice turned = lattice({.mm = 0.0, .rad = 3.0 * step_rad});
   EXPECT_DOUBLE_EQ(turned.step_mm, 0.6);
   EXPECT_NEAR(turned.lattice.theta_rad.step(), 1.5 * step_rad, 0.02 * step_rad);
