@@ -31,8 +31,8 @@ void add_filter_flags(CLI::App& command, Request& request) {
       "what a trace or a picture of 'recognize' shows before the last touch]");
   command.add_option("--budget-ms", request.budget_ms,
                      "With --filter bounded: milliseconds after which each estimate's search ends "
-                     "and reports what it has proven by then; with --slip-sd-* every touch takes "
-                     "besides a time that grows with the bins [default: none]");
+                     "and reports what it has proven by then. With --slip-sd-* each touch also "
+                     "takes a time of its own, which grows with the bins [default: none]");
   command.add_option("--evidence-nats", request.evidence_nats,
                      "With --filter bounded: also bounds the log evidence of every object, however "
                      "unlikely, within this many nats [default: only the tolerance counts]");

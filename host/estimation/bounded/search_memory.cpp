@@ -124,7 +124,7 @@ SearchMemory search_memory(std::span<const Hypothesis> hypotheses, const Bounded
                    static_cast<double>(ExactBins::most_bytes);
   }
   if (!options.slip_sd.none()) {
-    memory.means += MovingBelief::bytes_needed(lattice, hypotheses.size());
+    memory.means += MovingBelief::bytes_needed(options, hypotheses.size());
   }
   return memory;
 }

@@ -96,7 +96,7 @@ std::uint64_t SearchedTouches::bytes() const {
   return exact_bins + likelihood_.bytes() + space_.bytes() + search_.largest().bytes() +
          (none_ ? none_->bytes() : 0) +
          static_cast<std::uint64_t>(
-             moving_ ? MovingBelief::bytes_needed(options_.lattice, hypotheses_.size()) : 0.0);
+             moving_ ? MovingBelief::bytes_needed(options_, hypotheses_.size()) : 0.0);
 }
 
 SearchResult SearchedTouches::search(const SearchGoal& goal, const Deadline& deadline,

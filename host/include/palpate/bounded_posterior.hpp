@@ -35,8 +35,8 @@ struct BoundedOptions {
   double tolerance = 1e-6;
   /// Seconds after which estimate() stops and reports what it has proven by then, also where that
   /// is less than the tolerance asks for. By default it takes the time that the tolerance needs.
-  /// With slip_sd, every touch takes a time besides that grows with the bins: some 0.15 s for five
-  /// objects of a million bins each.
+  /// With slip_sd, each touch also takes a time of its own, which grows with the bins: some 0.15 s
+  /// for five objects of a million bins each.
   std::optional<double> budget_s = {};
   /// Also bounds each label's log evidence (of all hypotheses that bear it) within this many nats,
   /// however unlikely the label is: for a temperature that is applied later. By default only the

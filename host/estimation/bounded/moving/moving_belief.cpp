@@ -49,13 +49,16 @@ MovingBelief::MovingBelief(const SearchSpace& space, const BoundedOptions& optio
   reset();
 }
 
-double MovingBelief::bytes_needed(const PoseLattice& lattice, std::size_t objects) {
+double MovingBelief::bytes_needed(const BoundedOptions& options, std::size_t objects) {
   // Every object keeps what is followed, also before the last touch, what is missing and what all
   // bins keep; one at a time has means, errors, what will be missing, and planes: as they are,
   // blurred along y, blurred, and their neighbours' sums.
-  const double numbers =
-      (lattice.full_circle() ? 3.0 : 4.0) * static_cast<double>(objects) + 3.0 + 4.0;
-  return numbers * sizeof(double) * static_cast<double>(lattice.bins());
+  const double of_object = options.lattice.full_circle() ? 3.0 : 4.0;
+  const double numbers = of_object * static_cast<double>(objects) + 3.0 + 4.0;
+  // What is believed of the tiles of all objects, and their ranks where there is a budget.
+  constexpr double tile = MovingObject::tile_bins * MovingObject::tile_bins;
+  const double of_tile = (options.budget_s ? 7.0 : 1.0) * static_cast<double>(objects) / tile;
+  return (numbers + of_tile) * sizeof(double) * static_cast<double>(options.lattice.bins());
 }
 
 void MovingBelief::reset() {

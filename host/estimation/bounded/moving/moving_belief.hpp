@@ -32,7 +32,7 @@ class MovingBelief {
   MovingBelief& operator=(const MovingBelief&) = delete;
 
   /// Host memory in bytes that so many objects take.
-  static double bytes_needed(const PoseLattice& lattice, std::size_t objects);
+  static double bytes_needed(const BoundedOptions& options, std::size_t objects);
 
   void reset();
   /// Keeps one more touch for take_in().

@@ -6,6 +6,7 @@ namespace palpate {
 
 namespace {
 
+/// Of the time that is left.
 constexpr double share_of_touch = 0.5;
 /// Of a tile, before any was timed: a slow machine's, [slips].
 constexpr std::array<double, 2> first_seconds{1e-5, 1e-4};
