@@ -194,8 +194,7 @@ BoundedBelief::Found BoundedBelief::search(const SearchGoal& goal, Deadline& dea
   if (touches_.moving()) {
     found_.reset();  // the belief will be another one, also where this is cancelled
   }
-  // The bins of a belief that slips stay in memory.
-  EvaluatedBins bins(deadline.exists() && !touches_.moving());
+  EvaluatedBins bins(deadline.exists());
   SearchResult result = touches_.search(
       goal, deadline, [&](const BinBox& box, std::span<const double> log_likelihood) {
         bins.add(box, log_likelihood);
@@ -209,11 +208,10 @@ BoundedBelief::Found BoundedBelief::search(const SearchGoal& goal, Deadline& dea
 }
 
 void BoundedBelief::visit(const BinVisitor& visitor) {
-  if (found_->bins.complete()) {
+  if (touches_.moving()) {
+    touches_.visit_moving(visitor);
+  } else if (found_->bins.complete()) {
     found_->bins.visit(visitor);
-  } else if (touches_.moving()) {
-    // As they are, whatever a budget left unproven.
-    touches_.search({.tolerance = unlimited}, until({}), visitor);
   } else {
     touches_.search(found_->goal, until({}), visitor);
   }

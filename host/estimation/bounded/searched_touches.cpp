@@ -102,8 +102,15 @@ std::uint64_t SearchedTouches::bytes() const {
 SearchResult SearchedTouches::search(const SearchGoal& goal, const Deadline& deadline,
                                      const BinVisitor& visitor, std::vector<PoseBlock>* refined) {
   return arena_.execute([&] {
-    return moving_ ? moving_->find(goal, deadline, visitor)
+    return moving_ ? moving_->find(goal, deadline)
                    : search_.run(elements_, goal, deadline, visitor, refined);
+  });
+}
+
+void SearchedTouches::visit_moving(const BinVisitor& visitor) {
+  arena_.execute([&] {
+    moving_->take_in(Deadline({}, &options_.cancel_point));
+    moving_->visit(visitor);
   });
 }
 

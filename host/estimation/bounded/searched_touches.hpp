@@ -67,10 +67,12 @@ class SearchedTouches {
     return arena_.execute(work);
   }
 
-  /// Searches; visits the bins that it evaluates.
+  /// Searches; visits the bins that it evaluates, unless objects slip, whose bins stay in memory.
   /// @param refined where not null, takes the tiles that were divided, but where objects slip
   SearchResult search(const SearchGoal& goal, const Deadline& deadline, const BinVisitor& visitor,
                       std::vector<PoseBlock>* refined = nullptr);
+  /// Visits the bins of objects that slip.
+  void visit_moving(const BinVisitor& visitor);
   /// Draws bins without a search, see draw_bins(). Not where objects slip.
   std::vector<DrawnBin> draw(std::size_t count, Random& random, const Deadline& deadline) const;
   /// Log-likelihood of bins, box after box, [y, x] in each, in nats; see MovingBelief where objects

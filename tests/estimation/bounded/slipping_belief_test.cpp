@@ -11,6 +11,10 @@
 #include "bins_by_definition.hpp"
 #include "bounded/certified.hpp"
 #include "bounded_set_up.hpp"
+#include "estimation/bounded/checked_options.hpp"
+#include "estimation/bounded/moving/moving_belief.hpp"
+#include "estimation/known_elements.hpp"
+#include "model/touch_evidence.hpp"
 #include "palpate/bounded_posterior.hpp"
 #include "palpate/error.hpp"
 #include "palpate/pose_histogram.hpp"
@@ -270,6 +274,25 @@ TEST(SlippingBelief, DrawsAndMarginalsOfACutShortBeliefBeginNoSearch) {
   const Certificate after = belief.estimate().certificate.value();
   EXPECT_EQ(after.bins_evaluated, before.bins_evaluated);
   EXPECT_EQ(after.dropped_mass, before.dropped_mass);
+}
+
+TEST(MovingBelief, MakesUpForWhatWasCutShortOnceThereIsTime) {
+  const BoundedOptions options = checked(hurried_options(), two_shapes());
+  const SearchSpace space(two_shapes(), options);
+  const BinLikelihood likelihood(two_shapes(), options.contact, options.lattice);
+  MovingBelief hurried(space, options, likelihood, two_shapes());
+  MovingBelief undisturbed(space, options, likelihood, two_shapes());
+  const Recording recording = touches_of_l(3, 966);
+  for (const TouchEvidence& touch : evidence_of(all_touches(recording), options.contact)) {
+    hurried.add(known_elements(touch, options));
+    undisturbed.add(known_elements(touch, options));
+  }
+  const SearchResult cut_short = hurried.find({}, Deadline(1e-9));
+  const SearchResult made_up = hurried.find({}, Deadline(1e6));
+  const SearchResult all = undisturbed.find({}, Deadline({}));
+  EXPECT_GT(cut_short.unproven(), made_up.unproven());
+  EXPECT_EQ(made_up.unproven(), all.unproven());
+  EXPECT_EQ(made_up.bins_evaluated, all.bins_evaluated) << "no deeper than is needed";
 }
 
 TEST(SlippingBelief, RefusesTooManyBins) {

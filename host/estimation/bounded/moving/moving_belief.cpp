@@ -162,8 +162,7 @@ void MovingBelief::set_least(std::span<TileBeliefs> tiles) const {
   }
 }
 
-SearchResult MovingBelief::find(const SearchGoal& goal, const Deadline& deadline,
-                                const BinVisitor& visit) {
+SearchResult MovingBelief::find(const SearchGoal& goal, const Deadline& deadline) {
   take_in(deadline);
   SearchResult found = result();
   while ((cut_short_ || depth_ < infinity) && again_more * spent_s_ < deadline.left_s() &&
@@ -177,6 +176,10 @@ SearchResult MovingBelief::find(const SearchGoal& goal, const Deadline& deadline
     again_ = false;
     found = result();
   }
+  return found;
+}
+
+void MovingBelief::visit(const BinVisitor& visit) const {
   std::vector<double> logs;
   for (const MovingObject& object : objects_) {
     if (object.mass() == -infinity) {
@@ -190,7 +193,6 @@ SearchResult MovingBelief::find(const SearchGoal& goal, const Deadline& deadline
       visit(object.box_of(run), logs);
     }
   }
-  return found;
 }
 
 SearchResult MovingBelief::result() const {

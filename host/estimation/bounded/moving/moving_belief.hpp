@@ -43,7 +43,9 @@ class MovingBelief {
   void take_in(const Deadline& deadline);
   /// Takes them in, and follows more bins, from the first touch on, until the goal is reached, all
   /// are followed or the deadline leaves no time to begin anew.
-  SearchResult find(const SearchGoal& goal, const Deadline& deadline, const BinVisitor& visit);
+  SearchResult find(const SearchGoal& goal, const Deadline& deadline);
+  /// Shows the bins that are followed after take_in().
+  void visit(const BinVisitor& visit) const;
 
   /// After take_in(): upper bounds of the log-likelihood of bins in nats, box after box, [y, x] in
   /// each: close where the belief is, and loose where a bin is not followed.

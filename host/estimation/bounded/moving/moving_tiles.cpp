@@ -16,8 +16,6 @@ namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr int side = MovingObject::tile_bins;
-/// Nats below the largest mass at which a bound of means may be that of no mass at all.
-constexpr double beyond_reach = 40.0;
 
 }  // namespace
 
@@ -36,11 +34,7 @@ TileBeliefs MovingObject::tile_beliefs(const KnownElements& touch, bool slips, b
   TileBeliefs tiles{.bound = touched(slipped(largest_of_tiles(false))), .scale = scale()};
   if (known) {
     std::vector<double> held = largest_of_tiles(true);
-    const double negligible = *std::ranges::max_element(held) - beyond_reach;
-    std::vector<double> reached = slipped(held);
-    std::ranges::replace_if(
-        reached, [&](double log) { return log < negligible; }, -infinity);
-    tiles.known = touched(std::move(reached));
+    tiles.known = touched(slipped(held));
     tiles.held = touched(std::move(held));
   }
   return tiles;

@@ -10,8 +10,8 @@ namespace palpate {
 /// Belief in an object's tiles after a slip and a touch, all bins of a tile together, in nats.
 struct TileBeliefs {
   std::vector<double> bound;  ///< [tile] upper bound
-  /// [tile] upper bound of what comes of the bins that were followed, -infinity where nothing does;
-  /// empty where it is not asked for. A bin has mass of such bins alone.
+  /// [tile] upper bound of what comes of the bins that were followed; empty where it is not asked
+  /// for. A bin has mass of such bins alone.
   std::vector<double> known = {};
   /// [tile] upper bound of what the tile's own bins held before the slip, which takes only a part
   /// of it away; empty with the above.
