@@ -178,7 +178,7 @@ std::vector<Moments> modes_of(std::span<const Moments> peaks, const PlacedBody& 
 
 }  // namespace
 
-std::vector<BeliefMode> find_modes(const BinnedObject& of, std::span<const BinShare> bins) {
+FoundModes find_modes(const BinnedObject& of, std::span<const BinShare> bins) {
   if (bins.empty()) {
     return {};
   }
@@ -206,9 +206,13 @@ std::vector<BeliefMode> find_modes(const BinnedObject& of, std::span<const BinSh
   }
   std::vector<std::size_t> mode_of(peaks.size(), peaks.size());
   std::vector<Moments> moments = modes_of(peaks, body, mode_of);
+  FoundModes found;
+  found.mode_of.reserve(bins.size());
   for (std::size_t i = 0; i < bins.size(); ++i) {
     const int peak = cells.peak_of(at[i]);
-    if (peak == BeliefCells::outside || mode_of[peak] == peaks.size()) {
+    const bool of_none = peak == BeliefCells::outside || mode_of[peak] == peaks.size();
+    found.mode_of.push_back(of_none ? moments.size() : mode_of[peak]);
+    if (of_none) {
       continue;
     }
     Moments& sums = moments[mode_of[peak]];
@@ -219,13 +223,12 @@ std::vector<BeliefMode> find_modes(const BinnedObject& of, std::span<const BinSh
     sums.sum += bins[i].share * d;
     sums.squares += bins[i].share * glm::outerProduct(d, d);
   }
-  std::vector<BeliefMode> modes;
   for (const Moments& sums : moments) {
-    modes.push_back({.probability = sums.share,
-                     .best = of.lattice.T_object_robot(sums.best_bin),
-                     .pose = pose_of(sums, of)});
+    found.modes.push_back({.probability = sums.share,
+                           .best = of.lattice.T_object_robot(sums.best_bin),
+                           .pose = pose_of(sums, of)});
   }
-  return modes;
+  return found;
 }
 
 std::vector<PartAway> parts_away(const BinnedObject& of, std::span<const BinShare> bins,

@@ -33,13 +33,19 @@ struct BeliefMode {
   ObjectPose pose;
 };
 
-/// The modes of one object's belief, in no order; `object` is left to the caller. Bins are gathered
+/// The modes of an object's bins.
+struct FoundModes {
+  std::vector<BeliefMode> modes;     ///< in no order; `object` is left to the caller
+  std::vector<std::size_t> mode_of;  ///< [bin] the mode that it is of; modes.size() where of none
+};
+
+/// The modes of one object's belief. Bins are gathered
 /// in cells of about a millimetre. Cells climb to their densest neighbour, and a peak that stands
 /// less than a nat above the saddle to a higher one is part of that peak (ToMATo: Chazal, Guibas,
 /// Oudot and Skraba 2013). Cells more than 7 nats below their peak are of no mode: 0.3 % of a
 /// Gaussian. Peaks within `neighbourhood_mm` of each other are one mode.
 /// @param bins of the lattice, each at most once
-std::vector<BeliefMode> find_modes(const BinnedObject& of, std::span<const BinShare> bins);
+FoundModes find_modes(const BinnedObject& of, std::span<const BinShare> bins);
 
 /// A part of a belief, and how far it lies from a pose.
 struct PartAway {

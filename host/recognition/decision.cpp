@@ -19,26 +19,98 @@ constexpr double least_probability = 1e-3;  ///< of a mode, and of an object to 
 constexpr std::size_t most_modes = 5;
 constexpr double held = 0.95;  ///< share of the belief that is to lie near the pose
 
-/// [hypothesis] what the task makes of its evidence: the identity of its label, shared among the
-/// label's maps.
-std::vector<double> probabilities(const Estimate& estimate, const RecognitionTask& task,
-                                  const RecognitionStep& step) {
+/// [hypothesis] its share of its label's evidence.
+std::vector<double> shares_of_label(const Estimate& estimate, const RecognitionTask& task) {
   const std::vector<double> of_label = label_log_evidence(estimate, task);
-  std::vector<double> probabilities;
+  std::vector<double> shares;
   for (std::size_t i = 0; i < estimate.log_evidence.size(); ++i) {
-    const std::size_t label = task.label_of[i];
-    probabilities.push_back(of_label[label] == log_zero
-                                ? 0.0
-                                : step.identity[label] *
-                                      std::exp(estimate.log_evidence[i] - of_label[label]));
+    const double all = of_label[task.label_of[i]];
+    shares.push_back(all == log_zero ? 0.0 : std::exp(estimate.log_evidence[i] - all));
   }
-  return probabilities;
+  return shares;
 }
 
 BinnedObject binned(const PoseLattice& lattice, const RecognitionTask& task,
                     const RecognitionStep& step, int object) {
   const OccupancyGrid& map = task.hypotheses[object].map;
   return {lattice, displaced_body(map), object == step.mode.object ? step.symmetry : map.symmetry};
+}
+
+/// What is believed of one hypothesis's poses: shares of its label's belief.
+struct PoseBelief {
+  int object = 0;  ///< index of the hypothesis
+  BinnedObject of;
+  std::vector<BinShare> bins;
+  FoundModes found;
+};
+
+/// Readings tell two poses apart as they tell two objects, and the temperature says how much too
+/// sure of that they are. So the modes of a label weigh as labels do, by their shares to the power
+/// of 1 / temperature. Together they keep the share that they had, and bins of no mode keep theirs.
+void temper_modes(std::vector<PoseBelief>& beliefs, const RecognitionTask& task,
+                  double temperature) {
+  if (temperature == 1.0) {
+    return;
+  }
+  std::vector<double> before(task.labels.size());
+  std::vector<double> after(task.labels.size());
+  for (const PoseBelief& belief : beliefs) {
+    for (const BeliefMode& mode : belief.found.modes) {
+      before[task.label_of[belief.object]] += mode.probability;
+      after[task.label_of[belief.object]] += std::pow(mode.probability, 1.0 / temperature);
+    }
+  }
+  for (PoseBelief& belief : beliefs) {
+    const std::size_t label = task.label_of[belief.object];
+    std::vector<double> factors;
+    for (BeliefMode& mode : belief.found.modes) {
+      const double root = std::pow(mode.probability, 1.0 / temperature);
+      const double share = root > 0.0 ? before[label] * root / after[label] : 0.0;
+      factors.push_back(root > 0.0 ? share / mode.probability : 1.0);
+      mode.probability = share;
+    }
+    factors.push_back(1.0);  // of bins of no mode
+    for (std::size_t i = 0; i < belief.bins.size(); ++i) {
+      belief.bins[i].share *= factors[belief.found.mode_of[i]];
+    }
+  }
+}
+
+/// The beliefs of the hypotheses that may have a mode, and of the pose's.
+/// @param share_of_label [hypothesis] see shares_of_label()
+/// @param lattice receives that of the bins
+std::vector<PoseBelief> pose_beliefs(const Recogniser& recogniser, const RecognitionTask& task,
+                                     const RecognitionStep& step,
+                                     std::span<const double> share_of_label, PoseLattice& lattice) {
+  // Bins below it hold a thousandth of an object's belief, or of uncommonly many bins more: these
+  // say little of peaks.
+  const double least_share = std::max(1e-3 / static_cast<double>(task.lattice().bins()), 1e-7);
+  std::vector<int> objects;
+  for (std::size_t i = 0; i < share_of_label.size(); ++i) {
+    const auto object = static_cast<int>(i);
+    if (step.identity[task.label_of[i]] * share_of_label[i] >= least_probability ||
+        object == step.mode.object) {
+      objects.push_back(object);
+    }
+  }
+  auto likely = recogniser.likely_bins(objects, least_share, lattice);
+  std::vector<PoseBelief> beliefs;
+  for (std::size_t k = 0; k < objects.size(); ++k) {
+    const int object = objects[k];
+    PoseBelief belief{object, binned(lattice, task, step, object), std::move(likely[k]), {}};
+    belief.found = find_modes(belief.of, belief.bins);
+    for (BeliefMode& mode : belief.found.modes) {
+      mode.object = object;
+      mode.probability *= share_of_label[object];
+    }
+    for (BinShare& bin : belief.bins) {
+      bin.share *= share_of_label[object];
+    }
+    beliefs.push_back(std::move(belief));
+  }
+  const std::size_t touches = recogniser.evidence().size();
+  temper_modes(beliefs, task, temperature_of(touches, task.temperature, task.temperature_growth));
+  return beliefs;
 }
 
 /// The mode's mean and covariance, on the task's scale: those of the refined pose there where the
@@ -85,46 +157,33 @@ BeliefPlaces places_of(const Recogniser& recogniser, const Estimate& estimate,
   if (!recogniser.touched()) {
     return {.modes = {}, .peak = false};  // every bin is as likely: all would be looked at
   }
-  // Bins below it hold a thousandth of an object's belief, or of uncommonly many bins more: these
-  // say little of peaks.
-  const double least_share = std::max(1e-3 / static_cast<double>(task.lattice().bins()), 1e-7);
-  const std::vector<double> probability = probabilities(estimate, task, step);
-  std::vector<int> objects;
-  for (std::size_t i = 0; i < probability.size(); ++i) {
-    const auto object = static_cast<int>(i);
-    if (probability[i] >= least_probability || object == step.mode.object) {
-      objects.push_back(object);
-    }
-  }
+  const std::vector<double> share_of_label = shares_of_label(estimate, task);
   PoseLattice lattice;
-  const auto likely = recogniser.likely_bins(objects, least_share, lattice);
   BeliefPlaces places;
-  for (std::size_t k = 0; k < objects.size(); ++k) {
-    const int object = objects[k];
-    const BinnedObject of = binned(lattice, task, step, object);
-    for (BeliefMode& mode : find_modes(of, likely[k])) {
-      mode.object = object;
-      mode.probability *= probability[object];
+  for (const PoseBelief& belief : pose_beliefs(recogniser, task, step, share_of_label, lattice)) {
+    const double of_label = step.identity[task.label_of[belief.object]];
+    for (BeliefMode mode : belief.found.modes) {
+      mode.probability *= of_label;
       if (mode.probability >= least_probability) {
         places.modes.push_back(mode);
       }
     }
-    if (object != step.mode.object) {
+    if (belief.object != step.mode.object) {
       continue;
     }
-    std::vector<PartAway> parts = parts_away(of, likely[k], step.pose());
+    std::vector<PartAway> parts = parts_away(belief.of, belief.bins, step.pose());
     const double near = share_within(parts, neighbourhood_mm);
-    places.share = probability[object] * near;
+    places.share = of_label * near;
     const auto bins_near = std::ranges::count_if(
         parts, [](const PartAway& part) { return part.mm <= neighbourhood_mm; });
     const double flat = static_cast<double>(bins_near) / static_cast<double>(lattice.bins());
-    places.peak = near > std::min(0.5, std::numbers::e * flat);
+    places.peak = near > std::min(0.5, std::numbers::e * flat) * share_of_label[belief.object];
     if (step.refined) {
-      parts = spread_between_bins(of, std::move(parts), *step.refined);
+      parts = spread_between_bins(belief.of, std::move(parts), *step.refined);
     }
     const double proven = step.certificate ? 1.0 - step.certificate->dropped_mass : 1.0;
-    // Above 1 where the object has less than all that is to lie near.
-    const double share = held / (probability[object] * proven);
+    // Above 1 where the label has less than all that is to lie near.
+    const double share = held / (of_label * proven);
     places.within_mm = share <= 1.0 ? distance_holding(std::move(parts), share) : std::nullopt;
   }
   std::ranges::stable_sort(places.modes, std::greater<>(), &BeliefMode::probability);

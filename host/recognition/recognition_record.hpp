@@ -38,7 +38,8 @@ struct Unknown {
 bool array_is_still(std::span<const Unknown> unknowns);
 
 /// Where a belief lies. Probabilities are those of RecognitionStep::identity, shared among a
-/// label's maps by their evidence and among an object's poses by the belief.
+/// label's maps by their evidence and among an object's poses by the belief, in which the task's
+/// temperature weighs a label's modes as it weighs labels.
 struct BeliefPlaces {
   /// At most five, the most probable first, none below 0.001. What they leave of 1 is "(none)",
   /// less probable modes, and poses of no peak. None before the first touch is taken in.

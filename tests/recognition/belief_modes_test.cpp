@@ -63,7 +63,7 @@ BinnedObject letter(int symmetry = 1) {
 }
 
 std::vector<BeliefMode> sorted_modes(const BinnedObject& of, std::span<const BinShare> bins) {
-  std::vector<BeliefMode> modes = find_modes(of, bins);
+  std::vector<BeliefMode> modes = find_modes(of, bins).modes;
   std::ranges::sort(modes, std::greater<>(), &BeliefMode::probability);
   return modes;
 }
@@ -115,6 +115,23 @@ TEST(BeliefModes, OfTwoHillsHaveTheirSharesMeansAndCovariances) {
   }
 }
 
+TEST(BeliefModes, AreSumsOverTheBinsThatAreTheirs) {
+  const BinnedObject of = letter();
+  const std::vector<BinShare> bins =
+      belief(of.lattice, std::vector<Hill>{{0.7, {-4.0, 3.0, 0.8}, {0.7, 0.6, 0.1}},
+                                           {0.3, {5.0, -2.0, 3.9}, {0.8, 0.9, 0.15}}});
+  const auto [modes, mode_of] = find_modes(of, bins);
+  ASSERT_EQ(mode_of.size(), bins.size());
+  std::vector<double> sums(modes.size() + 1);  // the last is of bins of no mode
+  for (std::size_t i = 0; i < bins.size(); ++i) {
+    sums.at(mode_of[i]) += bins[i].share;
+  }
+  for (std::size_t i = 0; i < modes.size(); ++i) {
+    EXPECT_NEAR(modes[i].probability, sums[i], 1e-12);
+  }
+  EXPECT_GT(sums.back(), 0.0);
+}
+
 TEST(BeliefModes, CountARippledPeakOnceAndAtTheCirclesEnd) {
   const BinnedObject of = letter();
   const std::vector<Hill> hill{{1.0, {1.0, 1.0, 0.02}, {1.5, 1.2, 0.15}}};
@@ -146,8 +163,8 @@ TEST(BeliefModes, FoldEqualTurnsOntoOne) {
   const glm::dvec3 sd(0.6, 0.6, 0.1);
   const std::vector<BinShare> bins =
       belief(of.lattice, std::vector<Hill>{{0.5, one, sd}, {0.5, other, sd}});
-  EXPECT_EQ(find_modes(letter(1), bins).size(), 2U);
-  const std::vector<BeliefMode> modes = find_modes(of, bins);
+  EXPECT_EQ(find_modes(letter(1), bins).modes.size(), 2U);
+  const std::vector<BeliefMode> modes = find_modes(of, bins).modes;
   ASSERT_EQ(modes.size(), 1U);
   EXPECT_GT(modes.front().probability, 0.99);
   const Pose at = inverse(of.lattice.T_object_robot(one.x, one.y, one.z));
@@ -290,6 +307,53 @@ TEST_F(Places, AreTheSameByBoundsAsByTheHistogram) {
     EXPECT_NEAR(dense.places.share, bounded.places.share, 1e-3);
     EXPECT_EQ(dense.places.own, bounded.places.own);
     EXPECT_EQ(dense.decision.act, bounded.decision.act);
+  }
+}
+
+TEST_F(Places, OfOneLabelWeighAsTheTemperatureHasLabelsWeigh) {
+  constexpr double temperature = 2.5;
+  for (const std::size_t filter : {0U, 2U}) {
+    RecognitionTask task(shapes(), every_filter()[filter]);
+    Recogniser recogniser(device, task);
+    const auto after = [&](double first, double growth) {
+      task.temperature = first;
+      task.temperature_growth = growth;
+      recogniser.reset();
+      // The same touch twice leaves the modes that one touch leaves.
+      const Touch touch = recording.touch(0);
+      return take_step(recogniser, task, std::vector{touch, touch}, {});
+    };
+    const RecognitionStep plain = after(1.0, 0.0);
+    const RecognitionStep tempered = after(temperature - 0.5, 0.5);
+    const auto same = [](const BeliefMode& a) {
+      return [&](const BeliefMode& b) {
+        return a.object == b.object && a.best.theta_rad == b.best.theta_rad &&
+               a.best.translation_mm == b.best.translation_mm;
+      };
+    };
+    std::vector<std::pair<double, double>> weights;  // of modes of the pose's object
+    for (const BeliefMode& mode : plain.places.modes) {
+      const auto found = std::ranges::find_if(tempered.places.modes, same(mode));
+      if (mode.object == plain.mode.object && found != tempered.places.modes.end()) {
+        weights.emplace_back(mode.probability, found->probability);
+      }
+    }
+    ASSERT_GE(weights.size(), 2U);
+    double all_before = 0.0;
+    double all_now = 0.0;
+    for (const auto& [before, now] : weights) {
+      all_before += before;
+      all_now += now;
+      const double ratio = before / weights.front().first;
+      EXPECT_NEAR(now / weights.front().second, std::pow(ratio, 1.0 / temperature), 1e-6);
+    }
+    EXPECT_NEAR(all_now, all_before, 1e-5);
+    // The bins go with the mode that they are of.
+    ASSERT_TRUE(plain.places.own && tempered.places.own);
+    EXPECT_NEAR(tempered.places.share / tempered.places.modes[*tempered.places.own].probability,
+                plain.places.share / plain.places.modes[*plain.places.own].probability, 0.02);
+    EXPECT_LT(tempered.places.share, plain.places.share);
+    EXPECT_GT(tempered.places.within_mm.value(), plain.places.within_mm.value());
   }
 }
 

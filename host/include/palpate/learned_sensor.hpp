@@ -114,8 +114,9 @@ struct PALPATE_API LearnedSensor {
   DisplacementSd touch_sd;            ///< of the touches' poses
   std::optional<LearnedTable> table;  ///< in the place of Eq. 7
   /// After one touch a label's probability is its evidence to the power of 1 / temperature,
-  /// normalised; the temperature of n touches is temperature + (n - 1) temperature_growth. What all
-  /// touches share, such as the distance from the pose to the nearest bin, makes several too sure.
+  /// normalised, and so do the modes of a label weigh. The temperature of n touches is
+  /// temperature + (n - 1) temperature_growth: what all touches share, such as the distance from
+  /// the pose to the nearest bin, makes several too sure.
   double temperature = 1.0;
   double temperature_growth = 0.0;
   /// How wide the bins are that it was learned for, from touches at known poses: on wider ones,
