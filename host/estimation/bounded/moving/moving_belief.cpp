@@ -301,8 +301,7 @@ std::vector<double> MovingBelief::log_likelihood(std::span<const BinBox> boxes) 
 }
 
 std::vector<double> MovingBelief::close_log_likelihood(std::span<const BinBox> boxes) const {
-  const KnownElements nothing;
-  const KnownElements& last = stepped_ > 0 ? touches_[stepped_ - 1] : nothing;
+  const std::span<const KnownElements> touches = std::span(touches_).first(stepped_);
   std::vector<double> logs;
   for (std::size_t begin = 0; begin < boxes.size();) {
     std::size_t end = begin;
@@ -310,7 +309,7 @@ std::vector<double> MovingBelief::close_log_likelihood(std::span<const BinBox> b
       ++end;
     }
     const std::vector<double> of_object =
-        objects_[boxes[begin].object].log_belief(boxes.subspan(begin, end - begin), last);
+        objects_[boxes[begin].object].log_belief(boxes.subspan(begin, end - begin), touches);
     logs.insert(logs.end(), of_object.begin(), of_object.end());
     begin = end;
   }

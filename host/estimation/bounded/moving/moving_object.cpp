@@ -16,6 +16,8 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr int side = MovingObject::tile_bins;
 /// Error of a bin, in nats, beyond which it counts as what may be missing.
 constexpr double most_rounding = 1e-11;
+/// What may be missing of a bin counts for a pose's fit where it is not so far below what is known.
+constexpr double most_missing_nats = 3.0;
 
 /// Takes an error of a bin's mass into what may be missing where it is large, and into the rounding
 /// of all bins where it is small.
@@ -72,7 +74,6 @@ void MovingObject::step(const KnownElements& touch, bool slips, const TileBelief
                         std::vector<std::uint8_t> followed, bool by_logs) {
   // All of log_mass_ is written anew; before the first touch both are the uniform belief.
   before_.swap(log_mass_);
-  slipped_ = slips;
   follow(std::move(followed));
   if (slips) {
     restore();
@@ -216,38 +217,44 @@ void MovingObject::add_up(const TileBeliefs& tiles) {
            sum(&Sums::off).log()};
 }
 
-std::vector<BlockRun> MovingObject::others_in(std::span<const BinBox> boxes) const {
-  std::vector<std::uint8_t> wanted(followed_.size());
-  for (const BinBox& box : boxes) {
-    for (std::int64_t i = 0; i < box.bins(); ++i) {
-      const std::size_t tile = tile_of(box.bin(i, task_.lattice));
-      wanted[tile] = followed_[tile] == 0 ? 1 : 0;
+std::vector<double> MovingObject::belief_within(std::span<const BlockRun> runs,
+                                                std::span<const KnownElements> touches) const {
+  std::vector<double> belief(log_mass_.size(), -infinity);
+  for_bins(runs, [&](std::size_t bin) { belief[bin] = 0.0; });
+  for (std::size_t i = 0; i < touches.size(); ++i) {
+    if (i > 0) {
+      of_bins_.means(runs, belief, task_.log_mean, task_.error, true);
+      for_bins(runs, [&](std::size_t bin) { belief[bin] = task_.log_mean[bin]; });
+    }
+    if (!touches[i].runs.empty()) {
+      evaluate(touches[i], runs);
+      for_bins(runs, [&](std::size_t bin) { belief[bin] += task_.log_mean[bin]; });
     }
   }
-  return runs_of(wanted);
+  return belief;
 }
 
 std::vector<double> MovingObject::log_belief(std::span<const BinBox> boxes,
-                                             const KnownElements& touch) const {
-  // [bin of tiles that are not followed] log of what became of the belief that was followed before.
-  std::vector<double> become;
-  if (const std::vector<BlockRun> others = others_in(boxes); !others.empty()) {
-    become = before_;
-    if (slipped_) {
-      of_bins_.means(others, before_, become, task_.error, true);
-    }
-    if (!touch.runs.empty()) {
-      evaluate(touch, others);
-      for_bins(others, [&](std::size_t bin) { become[bin] += task_.log_mean[bin]; });
+                                             std::span<const KnownElements> touches) const {
+  std::vector<std::uint8_t> tiles(followed_.size());
+  bool unknown = false;  // of some bin, what may be missing is more than what is known
+  for (const BinBox& box : boxes) {
+    for (std::int64_t i = 0; i < box.bins(); ++i) {
+      const std::int64_t bin = box.bin(i, task_.lattice);
+      const auto at = static_cast<std::size_t>(bin);
+      tiles[tile_of(bin)] = 1;
+      unknown |= log_rest_[at] > log_mass_[at] - most_missing_nats;
     }
   }
+  const std::vector<double> within =
+      unknown ? belief_within(runs_of(tiles), touches) : std::vector<double>();
   std::vector<double> logs;
   for (const BinBox& box : boxes) {
     for (std::int64_t i = 0; i < box.bins(); ++i) {
       const std::int64_t bin = box.bin(i, task_.lattice);
       const auto at = static_cast<std::size_t>(bin);
-      const bool close = followed_[tile_of(bin)] == 0 && become[at] > -infinity;
-      logs.push_back(close ? std::min(most(bin), scale_ + become[at]) : most(bin));
+      const double least = unknown ? std::max(log_mass_[at], within[at]) : log_mass_[at];
+      logs.push_back(least > -infinity ? std::min(most(bin), scale_ + least) : most(bin));
     }
   }
   return logs;

@@ -54,11 +54,12 @@ class MovingObject {
 
   /// Upper bound of a bin's log-likelihood, in nats: close where it is followed.
   double most(std::int64_t bin) const;
-  /// Log-likelihood of the bins of some boxes of this object, box after box, [y, x] in each. In
-  /// bins that are not followed, what the last slip and touch made of the belief that was followed
-  /// before them, which may lie below their own.
-  /// @param touch that step() went through last
-  std::vector<double> log_belief(std::span<const BinBox> boxes, const KnownElements& touch) const;
+  /// Log-likelihood of the bins of some boxes of this object, box after box, [y, x] in each, no
+  /// bound of it: where more may be missing than is known, as if the object had been within the
+  /// boxes' tiles all the time.
+  /// @param touches that step() went through
+  std::vector<double> log_belief(std::span<const BinBox> boxes,
+                                 std::span<const KnownElements> touches) const;
 
   /// The tiles that are followed, in runs along x.
   std::span<const BlockRun> runs() const { return runs_; }
@@ -114,8 +115,9 @@ class MovingObject {
   std::size_t tile_of(std::int64_t bin) const;
   /// [tile] not 0 where it is to be among the runs.
   std::vector<BlockRun> runs_of(std::span<const std::uint8_t> wanted) const;
-  /// The tiles of the boxes' bins that are not followed.
-  std::vector<BlockRun> others_in(std::span<const BinBox> boxes) const;
+  /// [bin] log-likelihood, but for the scale, of an object that has always been in these tiles.
+  std::vector<double> belief_within(std::span<const BlockRun> runs,
+                                    std::span<const KnownElements> touches) const;
   /// @param set takes a bin, its log_mass and log_rest, and the largest error that no rest has
   template <typename Set>
   void change_bins(const Set& set);
@@ -141,7 +143,6 @@ class MovingObject {
   std::vector<double> log_mass_;
   std::vector<double> log_rest_;
   std::vector<double> before_;          ///< log_mass() before the last step
-  bool slipped_ = false;                ///< in the last step
   std::vector<std::uint8_t> followed_;  ///< [theta, y, x] of tiles
   std::vector<BlockRun> runs_;
   Sums sums_;
