@@ -28,7 +28,8 @@ void add_filter_flags(CLI::App& command, Request& request) {
       "With --filter bounded: largest share of the belief that may be left "
       "unproven; the search goes on until it is reached. Rounding, which counts as "
       "unproven, may exceed a tolerance below about 1e-8 [default: 1e-6, and 1e-4 for "
-      "what a trace or a picture of 'recognize' shows before the last touch]");
+      "what a trace or a picture of 'recognize' shows before the last touch; a search by a "
+      "learned sensor ends sooner where it meets nothing but poor fits]");
   command.add_option("--budget-ms", request.budget_ms,
                      "With --filter bounded: milliseconds after which each estimate's search ends "
                      "and reports what it has proven by then. With --slip-sd-* each touch also "

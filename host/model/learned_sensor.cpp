@@ -39,6 +39,16 @@ std::optional<glm::dmat3> correlations_of(const FeatureDistribution& distributio
   return definite ? std::optional(all) : std::nullopt;
 }
 
+/// @param numbers [level, node] of a learned table with so many nodes
+void require_log_probabilities(std::span<const double> numbers, std::size_t nodes) {
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    if (!(numbers[i] <= 0.0)) {
+      refuse(fmt::format("table: number [{}, {}]", i / nodes, i % nodes).c_str(), numbers[i],
+             "give the log of a probability, 0 or less");
+    }
+  }
+}
+
 void require_sound(const FeatureDistribution& distribution) {
   for (std::size_t i = 0; i < PressFeatures::count; ++i) {
     if (!std::isfinite(distribution.mean[i])) {
@@ -188,11 +198,13 @@ void LearnedSensor::validate() const {
   if (table) {
     table->layer.validate();
     table_of(*table, table->shared).validate();
+    require_log_probabilities(table->shared, ReadingLayer::nodes);
     for (const auto& [label, own] : table->objects) {
       if (own.size() != table->shared.size()) {
         refuse("table: numbers", own.size(), "give as many to every object as to all together");
       }
       table_of(*table, own).validate();
+      require_log_probabilities(own, ReadingLayer::nodes);
     }
   }
   if (features) {

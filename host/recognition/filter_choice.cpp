@@ -255,7 +255,7 @@ FilterOptions filter_for_bins(std::span<const Hypothesis> hypotheses, const Filt
   return filter;
 }
 
-FilterOptions with_evidence(FilterOptions filter, const LearnedSensor& sensor) {
+FilterOptions with_evidence(FilterOptions filter, const LearnedSensor& sensor, bool to_the_end) {
   constexpr double share = 0.05;
   constexpr double negligible = 1e-4;
   constexpr std::int64_t poor_bins = 20'000;  // about as many as Eq. 7 needs of such touches
@@ -263,7 +263,7 @@ FilterOptions with_evidence(FilterOptions filter, const LearnedSensor& sensor) {
   if (bounded == nullptr) {
     return filter;
   }
-  if (sensor.table) {
+  if (sensor.table && !to_the_end) {
     bounded->poor_bins = poor_bins;
   }
   const bool tempered = sensor.temperature > 1.0 || sensor.temperature_growth > 0.0;

@@ -114,23 +114,31 @@ std::vector<double> label_probabilities(const Estimate& estimate, const Temperin
   return logs;
 }
 
+std::vector<LogInterval> label_log_bounds(const Estimate& estimate, const RecognitionTask& task) {
+  const Certificate& certificate = *estimate.certificate;
+  std::vector<LogInterval> of_label(task.labels.size(), {log_zero, log_zero});
+  for (std::size_t h = 0; h < certificate.log_evidence.size(); ++h) {
+    LogInterval& sum = of_label[task.label_of[h]];
+    sum.low = log_sum(sum.low, certificate.log_evidence[h].low);
+    sum.high = log_sum(sum.high, certificate.log_evidence[h].high);
+  }
+  if (certificate.none_log_evidence) {
+    of_label.back() = *certificate.none_log_evidence;
+  }
+  return of_label;
+}
+
 std::vector<ProbabilityInterval> label_bounds(const Estimate& estimate,
                                               std::span<const double> identity,
                                               const Tempering& tempering,
                                               const RecognitionTask& task,
-                                              std::optional<double> known) {
+                                              std::optional<ProbabilityInterval> known) {
   const bool learned_none = known && task.labels.back() == none_label;
-  const double times = learned_none ? weighed(*known, task) : 1.0;
-  const Certificate& certificate = *estimate.certificate;
-  const std::vector<LogInterval>& evidence = certificate.log_evidence;
-  std::vector<LogInterval> of_label(task.labels.size(), {log_zero, log_zero});
-  for (std::size_t h = 0; h < evidence.size(); ++h) {
-    LogInterval& sum = of_label[task.label_of[h]];
-    sum.low = log_sum(sum.low, evidence[h].low);
-    sum.high = log_sum(sum.high, evidence[h].high);
-  }
-  if (certificate.none_log_evidence && !learned_none) {
-    of_label.back() = *certificate.none_log_evidence;
+  ProbabilityInterval times{1.0, 1.0};
+  std::vector<LogInterval> of_label = label_log_bounds(estimate, task);
+  if (learned_none) {
+    times = {weighed(known->low, task), weighed(known->high, task)};
+    of_label.back() = {log_zero, log_zero};
   }
   for (std::size_t i = 0; i < of_label.size(); ++i) {
     of_label[i] = {tempering.tempered(of_label[i].low, i), tempering.tempered(of_label[i].high, i)};
@@ -144,12 +152,15 @@ std::vector<ProbabilityInterval> label_bounds(const Estimate& estimate,
         others.high = log_sum(others.high, of_label[j].high);
       }
     }
-    // The probability itself is rounded, too.
-    bounds.push_back({std::min(times * share(of_label[i].low, others.high), identity[i]),
-                      std::max(times * share(of_label[i].high, others.low), identity[i])});
+    bounds.push_back({times.low * share(of_label[i].low, others.high),
+                      times.high * share(of_label[i].high, others.low)});
   }
   if (learned_none) {
-    bounds.back() = {identity.back(), identity.back()};
+    bounds.back() = {1.0 - times.high, 1.0 - times.low};
+  }
+  for (std::size_t i = 0; i < bounds.size(); ++i) {
+    // The probability itself is rounded, too.
+    bounds[i] = {std::min(bounds[i].low, identity[i]), std::max(bounds[i].high, identity[i])};
   }
   return bounds;
 }

@@ -62,12 +62,17 @@ inline constexpr double log_zero = -std::numeric_limits<double>::infinity();
 /// log(exp(a) + exp(b))
 double log_sum(double a, double b);
 
+/// [label] bounds of the log evidence of its hypotheses together; of none_label, where the task has
+/// it, those of "none of these".
+/// @param estimate with a certificate
+std::vector<LogInterval> label_log_bounds(const Estimate& estimate, const RecognitionTask& task);
+
 /// The bounds of each label's probability, from the bounds of its hypotheses' log evidence
 /// (Certificate::log_evidence). A label is least probable where its own evidence is the lowest and
 /// all other evidence the highest. With q of label_probabilities() for the label's evidence E:
 ///   low = q(E_low) of the label / (q(E_low) of the label + q(E_high) of the others),
 /// high likewise. "(none)" has the bounds of its own evidence, or where `known` of
-/// label_probabilities() takes its place, that probability.
+/// label_probabilities() takes its place, those of 1 - weighed(known), and labels share the rest.
 /// @param estimate with a certificate
 /// @param identity [label] of the estimate; lies within its bounds
 /// @returns [label], none_label included where the task has it
@@ -75,6 +80,6 @@ std::vector<ProbabilityInterval> label_bounds(const Estimate& estimate,
                                               std::span<const double> identity,
                                               const Tempering& tempering,
                                               const RecognitionTask& task,
-                                              std::optional<double> known = {});
+                                              std::optional<ProbabilityInterval> known = {});
 
 }  // namespace palpate

@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <numbers>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "estimation/hypotheses.hpp"
 #include "estimation/lattice/refinement.hpp"
 #include "palpate/error.hpp"
 #include "palpate/object_frame.hpp"
@@ -114,6 +116,44 @@ std::optional<double> known_of(const Estimate& estimate, std::span<const TouchEv
       FamiliarityScore::of(touches.front().readings, estimate.mode.log_likelihood, evidence));
 }
 
+/// Bounds of known_of(): by as much as a bin that no search has evaluated may explain the touch
+/// better than the mode, and as the best label may lead.
+/// @param estimate with a certificate
+ProbabilityInterval known_bounds(const Estimate& estimate, std::span<const TouchEvidence> touches,
+                                 const RecognitionTask& task) {
+  const Certificate& certificate = *estimate.certificate;
+  double best = estimate.mode.log_likelihood;
+  if (!certificate.mode_certain) {
+    const std::vector<double> log_weight = log_weights(task.hypotheses);
+    for (std::size_t h = 0; h < log_weight.size(); ++h) {
+      const auto [low, high] = certificate.log_evidence[h];
+      best = std::max(best, high + std::log1p(-std::exp(low - high)) - log_weight[h]);
+    }
+  }
+  std::vector<LogInterval> evidence = label_log_bounds(estimate, task);
+  if (task.labels.back() == none_label) {
+    evidence.pop_back();
+  }
+  LogInterval lead{0.0, 0.0};  // of some label before all others
+  for (std::size_t i = 0; i < evidence.size() && evidence.size() > 1; ++i) {
+    LogInterval next{log_zero, log_zero};
+    for (std::size_t j = 0; j < evidence.size(); ++j) {
+      if (j != i) {
+        next = {std::max(next.low, evidence[j].low), std::max(next.high, evidence[j].high)};
+      }
+    }
+    lead = {std::max(lead.low, evidence[i].low - next.high),
+            std::max(lead.high, evidence[i].high - next.low)};
+  }
+  const auto probability = [&](double log_likelihood, double lead_nats) {
+    const std::vector<double> leading{0.0, -lead_nats};
+    return task.familiarity->probability(FamiliarityScore::of(
+        touches.front().readings, log_likelihood,
+        std::span(leading).first(std::min<std::size_t>(evidence.size(), leading.size()))));
+  };
+  return {probability(estimate.mode.log_likelihood, lead.low), probability(best, lead.high)};
+}
+
 /// RecognitionStep::fit
 std::optional<Fit> fit_of(const Mode& mode, const std::optional<RefinedPose>& refined,
                           std::span<const TouchEvidence> touches, const RecognitionTask& task) {
@@ -218,7 +258,9 @@ RecognitionStep judge(const Estimate& estimate, const PartialTruth& truth,
                        .fit = fit,
                        .known = known};
   if (estimate.certificate) {
-    step.identity_bounds = label_bounds(estimate, step.identity, tempering, task, known);
+    step.identity_bounds =
+        label_bounds(estimate, step.identity, tempering, task,
+                     known ? std::optional(known_bounds(estimate, touches, task)) : std::nullopt);
     step.certificate = estimate.certificate;
   }
   step.best = static_cast<std::size_t>(

@@ -286,8 +286,9 @@ RecognitionTask resolve(const Request& request, const Circumstances& of) {
                        (sensor != nullptr && sensor->temperature > far_from_independent);
   const ChosenFilter filter = choose_filter(wish, request, need, hypotheses, histogram);
   const FilterOptions settled = settled_filter(request, of, filter, hypotheses, bin_width, remarks);
+  const bool to_the_end = request.tolerance || request.evidence_nats;  // what was asked for holds
   RecognitionTask task(std::move(hypotheses),
-                       sensor != nullptr ? with_evidence(settled, *sensor) : settled);
+                       sensor != nullptr ? with_evidence(settled, *sensor, to_the_end) : settled);
   task.map_paths = paths_of(objects, task.hypotheses);
   if (sensor != nullptr) {
     task.sensor_model = learned->file;

@@ -1,5 +1,6 @@
 #include "palpate/learned_sensor.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -82,6 +83,20 @@ TEST(Apply, ChangesNothingWhereAMapLacksItsLayer) {
   EXPECT_EQ(contact.prior, 0.4);
   sensor.temperature = 0.0;
   EXPECT_THROW(apply(sensor, hypotheses, contact), Error);
+}
+
+TEST(LearnedSensor, RefusesALogProbabilityAbove0) {
+  for (const bool own : {false, true}) {
+    LearnedSensor sensor = sensor_of_two_levels();
+    std::vector<double>& numbers = own ? sensor.table->objects["A"] : sensor.table->shared;
+    numbers.assign(2 * ReadingLayer::nodes, -1.0);
+    numbers[ReadingLayer::nodes + 3] = 0.0;
+    sensor.validate();
+    numbers[ReadingLayer::nodes + 3] = 5.0;
+    EXPECT_THAT([&] { sensor.validate(); },
+                testing::ThrowsMessage<Error>(testing::HasSubstr(
+                    "table: number [1, 3] = 5: give the log of a probability, 0 or less")));
+  }
 }
 
 TEST(MirrorImage, TurnsEveryLayerOfTheMapAround) {

@@ -199,16 +199,48 @@ TEST(LabelBounds, ShareWhatASinglePressLeaves) {
   // Evidence of L within 4 to 9, of the disc within 1 to 4.
   estimate.certificate = Certificate{
       .log_evidence = {{std::log(3.0), std::log(8.0)}, {0.0, std::log(4.0)}, {0.0, 0.0}},
+      .mode_certain = true,
       .none_log_evidence = LogInterval{-1.0, 1.0}};
   const Press press;
   const std::vector<Touch> touches{press.touch()};
-  const RecognitionStep step = judge(estimate, {}, task, evidence_of(touches, task.contact()));
+  RecognitionStep step = judge(estimate, {}, task, evidence_of(touches, task.contact()));
   ASSERT_EQ(step.identity_bounds.size(), 3u);
   EXPECT_NEAR(step.identity_bounds[0].low, of_known * 2.0 / (2.0 + 2.0), 1e-15);
   EXPECT_NEAR(step.identity_bounds[0].high, of_known * 3.0 / (3.0 + 1.0), 1e-15);
   EXPECT_NEAR(step.identity_bounds[1].high, of_known * 2.0 / (2.0 + 2.0), 1e-15);
   EXPECT_NEAR(step.identity_bounds[2].low, 1.0 - of_known, 1e-15);
   EXPECT_EQ(step.identity_bounds[2].high, step.identity_bounds[2].low);
+
+  // One bin may hold all that is missing of the first map, whose weight is one of three.
+  estimate.certificate->mode_certain = false;
+  step = judge(estimate, {}, task, evidence_of(touches, task.contact()));
+  const double known =
+      1.0 / (1.0 + std::exp(2.0 * std::log(3.0 * (8.0 - 3.0)) / by_frequency_and_1()));
+  EXPECT_NEAR(step.identity_bounds[0].low, of_known * 2.0 / (2.0 + 2.0), 1e-15);
+  EXPECT_NEAR(step.identity_bounds[0].high, known * 3.0 / (3.0 + 1.0), 1e-14);
+  EXPECT_NEAR(step.identity_bounds[2].low, 1.0 - known, 1e-14);
+  EXPECT_NEAR(step.identity_bounds[2].high, 1.0 - of_known, 1e-15);
+}
+
+TEST(LabelBounds, OfASinglePressKnowNoMoreOfTheLeadThanTheEvidence) {
+  RecognitionTask task = with_known(BoundedOptions{.none_weight = 3.0});
+  task.familiarity = Familiarity{.offset = 0.0, .lead_slope = 1.0};
+  Estimate estimate = four_to_one();
+  const Press press;
+  const std::vector<Touch> touches{press.touch()};
+  const auto none_bounds = [&](LogInterval of_letter, LogInterval of_disc) {
+    estimate.certificate = Certificate{.log_evidence = {of_letter, of_disc, {log_zero, log_zero}},
+                                       .mode_certain = true};
+    estimate.log_evidence = {of_letter.low, of_disc.low, log_zero};
+    return judge(estimate, {}, task, evidence_of(touches, task.contact())).identity_bounds[2];
+  };
+  const auto none = [](double lead) { return 1.0 / (1.0 + std::exp(std::log1p(lead))); };
+  ProbabilityInterval bounds = none_bounds({3.0, 4.0}, {-1.0, 1.0});
+  EXPECT_NEAR(bounds.low, none(5.0), 1e-15);
+  EXPECT_NEAR(bounds.high, none(2.0), 1e-15);
+  bounds = none_bounds({-1.0, 5.0}, {0.0, 2.0});
+  EXPECT_NEAR(bounds.low, none(5.0), 1e-15);
+  EXPECT_NEAR(bounds.high, none(0.0), 1e-15) << "either may lead";
 }
 
 TEST(LabelBounds, FollowTheTemperatureAndTheFeatures) {
@@ -240,6 +272,7 @@ TEST(Evidence, IsWhatBoundsFindWhereATemperatureNeedsIt) {
   };
   LearnedSensor sensor;
   EXPECT_FALSE(bounds(sensor).evidence_nats) << "at temperature 1";
+  EXPECT_FALSE(bounds(sensor).poor_bins) << "without a table";
   sensor.temperature = 30.0;
   EXPECT_EQ(bounds(sensor).evidence_nats, 0.05 * 30.0);
   EXPECT_EQ(bounds(sensor).evidence_growth, 0.0);

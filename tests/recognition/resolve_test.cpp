@@ -120,6 +120,25 @@ Request request_of_learned() {
   return request;
 }
 
+TEST(Resolve, ASearchOfPoorFitsGoesOnWhereClosenessIsAskedFor) {
+  const SceneFile file("");
+  LearnedSensor sensor{.table = LearnedTable{}};
+  sensor.table->shared.assign(2 * ReadingLayer::nodes, -1.0);
+  write_sensor_model(file.path(), sensor);
+  Request request = request_of_shapes();
+  request.sensor_model = file.path();
+  request.filter = FilterKind::bounded;
+  const auto poor_bins = [&] {
+    return std::get<BoundedOptions>(task_of(request).filter).poor_bins;
+  };
+  EXPECT_TRUE(poor_bins());
+  request.tolerance = 1e-6;
+  EXPECT_FALSE(poor_bins());
+  request.tolerance.reset();
+  request.evidence_nats = 0.1;
+  EXPECT_FALSE(poor_bins());
+}
+
 TEST(Resolve, TheFitsScaleIsOfTouchesThatMapsHadNotSeen) {
   Request request = request_of_learned();
   EXPECT_EQ(task_of(request).fit_scale.mean, 1.0);
