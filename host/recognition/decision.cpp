@@ -10,6 +10,7 @@
 #include "recognition/label_probability.hpp"
 #include "recognition/recognition_record.hpp"
 #include "recognition/scaled_pose.hpp"
+#include "recognition/warnings.hpp"
 
 namespace palpate {
 
@@ -30,10 +31,19 @@ std::vector<double> shares_of_label(const Estimate& estimate, const RecognitionT
   return shares;
 }
 
-BinnedObject binned(const PoseLattice& lattice, const RecognitionTask& task,
-                    const RecognitionStep& step, int object) {
-  const OccupancyGrid& map = task.hypotheses[object].map;
-  return {lattice, displaced_body(map), object == step.mode.object ? step.symmetry : map.symmetry};
+/// The symmetry of an object's map, as far as its bins tell.
+int symmetry_of(const OccupancyGrid& map, const PoseLattice& lattice,
+                std::span<const BinShare> bins, double temperature) {
+  if (bins.empty()) {
+    return map.symmetry;
+  }
+  std::vector<double> shares(static_cast<std::size_t>(lattice.theta_rad.count));
+  for (const BinShare& bin : bins) {
+    shares[static_cast<std::size_t>(bin.bin / lattice.plane())] += bin.share;
+  }
+  const std::int64_t best = std::ranges::max_element(bins, {}, &BinShare::share)->bin;
+  return symmetry_told(map, lattice.theta_rad, shares, lattice.T_object_robot(best).theta_rad,
+                       temperature);
 }
 
 /// What is believed of one hypothesis's poses: shares of its label's belief.
@@ -94,10 +104,15 @@ std::vector<PoseBelief> pose_beliefs(const Recogniser& recogniser, const Recogni
     }
   }
   auto likely = recogniser.likely_bins(objects, least_share, lattice);
+  const double temperature = task.temperature_after(recogniser.evidence().size());
   std::vector<PoseBelief> beliefs;
   for (std::size_t k = 0; k < objects.size(); ++k) {
     const int object = objects[k];
-    PoseBelief belief{object, binned(lattice, task, step, object), std::move(likely[k]), {}};
+    const OccupancyGrid& map = task.hypotheses[object].map;
+    const int symmetry = object == step.mode.object
+                             ? step.symmetry
+                             : symmetry_of(map, lattice, likely[k], temperature);
+    PoseBelief belief{object, {lattice, displaced_body(map), symmetry}, std::move(likely[k]), {}};
     belief.found = find_modes(belief.of, belief.bins);
     for (BeliefMode& mode : belief.found.modes) {
       mode.object = object;
@@ -108,8 +123,7 @@ std::vector<PoseBelief> pose_beliefs(const Recogniser& recogniser, const Recogni
     }
     beliefs.push_back(std::move(belief));
   }
-  const std::size_t touches = recogniser.evidence().size();
-  temper_modes(beliefs, task, temperature_of(touches, task.temperature, task.temperature_growth));
+  temper_modes(beliefs, task, temperature);
   return beliefs;
 }
 
@@ -160,7 +174,9 @@ BeliefPlaces places_of(const Recogniser& recogniser, const Estimate& estimate,
   const std::vector<double> share_of_label = shares_of_label(estimate, task);
   PoseLattice lattice;
   BeliefPlaces places;
-  for (const PoseBelief& belief : pose_beliefs(recogniser, task, step, share_of_label, lattice)) {
+  const std::vector<PoseBelief> beliefs =
+      pose_beliefs(recogniser, task, step, share_of_label, lattice);
+  for (const PoseBelief& belief : beliefs) {
     const double of_label = step.identity[task.label_of[belief.object]];
     for (BeliefMode mode : belief.found.modes) {
       mode.probability *= of_label;
@@ -188,7 +204,10 @@ BeliefPlaces places_of(const Recogniser& recogniser, const Estimate& estimate,
   }
   std::ranges::stable_sort(places.modes, std::greater<>(), &BeliefMode::probability);
   places.modes.resize(std::min(places.modes.size(), most_modes));
-  const BinnedObject posed = binned(lattice, task, step, step.mode.object);
+  const auto binned = [&](int object) -> const BinnedObject& {
+    return std::ranges::find(beliefs, object, &PoseBelief::object)->of;
+  };
+  const BinnedObject& posed = binned(step.mode.object);
   double nearest_mm = neighbourhood_mm;
   for (std::size_t i = 0; i < places.modes.size(); ++i) {
     const BeliefMode& mode = places.modes[i];
@@ -203,7 +222,7 @@ BeliefPlaces places_of(const Recogniser& recogniser, const Estimate& estimate,
   }
   for (std::size_t i = 0; i < places.modes.size(); ++i) {
     BeliefMode& mode = places.modes[i];
-    mode.pose = between_bins(recogniser, task, mode, binned(lattice, task, step, mode.object),
+    mode.pose = between_bins(recogniser, task, mode, binned(mode.object),
                              i == places.own ? step.refined : std::nullopt);
   }
   return places;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -36,6 +37,10 @@ struct RecognitionTask {
   DisplacementSd slip_sd() const { return traits_of(filter).slip_sd; }
   std::int64_t bins_in_all() const { return palpate::bins_in_all(hypotheses.size(), lattice()); }
   const ContactClassifier& classifier() const { return contact().classifier; }
+  /// The temperature of so many touches; before any, of one.
+  double temperature_after(std::size_t touches) const {
+    return temperature_of(std::max<std::size_t>(touches, 1), temperature, temperature_growth);
+  }
 
   const std::vector<Hypothesis> hypotheses;
   const FilterOptions filter;  ///< as it is opened
@@ -53,7 +58,8 @@ struct RecognitionTask {
   std::string filter_asked_for_by = {};
   /// The pivot is the array's centre at the first touch of each unknown with an element In Contact.
   bool auto_pivot = false;
-  /// How sure labels' probabilities are, see LearnedSensor; poses are left as they are.
+  /// How sure probabilities of labels and of modes are, see LearnedSensor; poses are left as they
+  /// are.
   double temperature = 1.0;
   double temperature_growth = 0.0;
   std::optional<BinSteps> learned_bins = {};  ///< LearnedSensor::bins

@@ -15,16 +15,18 @@ namespace {
 constexpr double circle_rad = 2.0 * std::numbers::pi;
 
 /// Share of an object's belief at angles that are nearer to another of its n likenesses than to
-/// the mode's own, where all angles look alike (n = 0) at those more than 1/16 of a turn away.
-double share_at_other_turns(const Marginals& marginals, double mode_rad, int n) {
-  const double own_rad = std::numbers::pi / (n == 0 ? 8 : n);
+/// its own, where all angles look alike (n = 0) at those more than 1/16 of a turn away.
+/// @param shares [theta]
+double share_at_other_turns(const Axis& theta, std::span<const double> shares, double own_rad,
+                            int n) {
+  const double own_half_rad = std::numbers::pi / (n == 0 ? 8 : n);
   double all = 0.0;
   double other = 0.0;
-  for (std::size_t k = 0; k < marginals.theta.size(); ++k) {
-    const double theta_rad = marginals.grid.theta_rad.centre(static_cast<int>(k));
-    all += marginals.theta[k];
-    if (std::abs(wrap_angle(theta_rad - mode_rad, circle_rad)) > own_rad) {
-      other += marginals.theta[k];
+  for (std::size_t k = 0; k < shares.size(); ++k) {
+    const double theta_rad = theta.centre(static_cast<int>(k));
+    all += shares[k];
+    if (std::abs(wrap_angle(theta_rad - own_rad, circle_rad)) > own_half_rad) {
+      other += shares[k];
     }
   }
   return all > 0.0 ? other / all : 0.0;
@@ -32,17 +34,32 @@ double share_at_other_turns(const Marginals& marginals, double mode_rad, int n) 
 
 }  // namespace
 
-int symmetry_told(const Recogniser& recogniser, const RecognitionTask& task,
-                  const RecognitionStep& step) {
+bool may_look_alike(const OccupancyGrid& map) {
+  return map.symmetry == 1 && map.suggested_symmetry.value_or(1) != 1;
+}
+
+int symmetry_told(const OccupancyGrid& map, const Axis& theta, std::span<const double> shares,
+                  double own_rad, double temperature) {
   constexpr double least_share = 0.05;
-  const OccupancyGrid& map = task.hypotheses[step.mode.object].map;
-  const int n = map.suggested_symmetry.value_or(1);
-  if (map.symmetry != 1 || n == 1) {
+  if (!may_look_alike(map)) {
     return map.symmetry;
   }
-  const double share = share_at_other_turns(recogniser.marginals(step.mode.object),
-                                            step.mode.T_object_robot.theta_rad, n);
-  return share < least_share ? map.symmetry : n;
+  const double other = share_at_other_turns(theta, shares, own_rad, *map.suggested_symmetry);
+  // Turns weigh as other poses do.
+  const double odds = std::pow(other / (1.0 - other), 1.0 / temperature);
+  return odds < least_share / (1.0 - least_share) ? map.symmetry : *map.suggested_symmetry;
+}
+
+int symmetry_told(const Recogniser& recogniser, const RecognitionTask& task,
+                  const RecognitionStep& step) {
+  const OccupancyGrid& map = task.hypotheses[step.mode.object].map;
+  if (!may_look_alike(map)) {
+    return map.symmetry;  // the marginals are not asked for
+  }
+  const Marginals marginals = recogniser.marginals(step.mode.object);
+  return symmetry_told(map, marginals.grid.theta_rad, marginals.theta,
+                       step.mode.T_object_robot.theta_rad,
+                       task.temperature_after(recogniser.evidence().size()));
 }
 
 std::optional<std::string> turned_alike(const RecognitionTask& task, const RecognitionStep& step) {

@@ -48,6 +48,12 @@ inline constexpr double surprising_from = 1.5;
 /// (OccupancyGrid::suggested_symmetry).
 int symmetry_told(const Recogniser& recogniser, const RecognitionTask& task,
                   const RecognitionStep& step);
+/// The same of an object's map and its belief.
+/// @param shares [theta] of the belief, at the centres of the axis
+/// @param own_rad the most probable theta
+/// @param temperature by which turns weigh, see LearnedSensor
+int symmetry_told(const OccupancyGrid& map, const Axis& theta, std::span<const double> shares,
+                  double own_rad, double temperature);
 /// What to say where symmetry_told() takes turns as equal that the map does not, or where a known
 /// pose error is such a turn; else none.
 std::optional<std::string> turned_alike(const RecognitionTask& task, const RecognitionStep& step);

@@ -357,6 +357,25 @@ TEST_F(Places, OfOneLabelWeighAsTheTemperatureHasLabelsWeigh) {
   }
 }
 
+TEST_F(Places, OfAnObjectThatLooksAlikeWhenTurnedAreOneWhicheverHasTheMode) {
+  for (const std::size_t filter : {0U, 2U}) {
+    std::vector<Hypothesis> maps = shapes();
+    maps[1].map.symmetry = 1;  // a disc, which is not the mode's object
+    const auto modes_of_disc = [&](std::optional<int> suggested) {
+      maps[1].map.suggested_symmetry = suggested;
+      RecognitionTask task(maps, every_filter()[filter]);
+      task.temperature = 20.0;  // the disc has a share
+      Recogniser recogniser(device, task);
+      const RecognitionStep step = take_step(recogniser, task, all_touches(recording, 1), {});
+      EXPECT_EQ(step.mode.object, 0);
+      return std::ranges::count(step.places.modes, 1, &BeliefMode::object);
+    };
+    const auto apart = modes_of_disc({});
+    EXPECT_GT(apart, 1);
+    EXPECT_LT(modes_of_disc(0), apart);
+  }
+}
+
 TEST_F(Places, AreNoneBeforeATouchReachesTheBelief) {
   std::ranges::fill(recording.pressure, 0.0);
   RecognitionTask task(shapes(), every_filter()[2]);

@@ -7,6 +7,7 @@
 #include "letters.hpp"
 #include "palpate/rotational_symmetry.hpp"
 #include "recognition/recognition_record.hpp"
+#include "recognition/warnings.hpp"
 #include "unknown_of.hpp"
 
 namespace palpate::turn_warning_test {
@@ -36,6 +37,28 @@ TEST(MeasuredSymmetry, OfLearnedMapsIsTheShapes) {
     ASSERT_TRUE(measured);
     EXPECT_EQ(measured->suggested, n) << shape;
   }
+}
+
+TEST(SymmetryTold, IsTheMapsUnlessTurnsWeighAsTheTemperatureHasThem) {
+  OccupancyGrid map{.symmetry = 1, .suggested_symmetry = 2};
+  const Axis theta{0.0, 2.0 * std::numbers::pi, 8};
+  // A hundredth lies half a turn away, across the end of the circle, too.
+  std::vector<double> shares(8);
+  shares[7] = 0.99;
+  shares[3] = 0.01;
+  const auto told = [&](double temperature) {
+    return symmetry_told(map, theta, shares, theta.centre(7), temperature);
+  };
+  EXPECT_EQ(told(1.0), 1);
+  // 99^(1 / T) = 19
+  EXPECT_EQ(told(std::log(99.0) / std::log(19.0) - 0.01), 1);
+  EXPECT_EQ(told(std::log(99.0) / std::log(19.0) + 0.01), 2);
+  shares[6] = shares[0] = 0.5;  // nearer than a quarter of a turn
+  EXPECT_EQ(told(1.0), 1);
+  map.suggested_symmetry = 0;
+  EXPECT_EQ(told(1.0), 0) << "all turns look alike";
+  map.symmetry = 3;
+  EXPECT_EQ(told(9.0), 3) << "as the user says";
 }
 
 class TurnWarning : public testing::Test {
