@@ -181,7 +181,7 @@ bool learns_sensor(const MapFlags& flags) {
   } else if (origin == Origin::foreign && asked) {
     tell_on_stderr(fmt::format(
         "{}: was not written by palpate map, and stays; no sensor is learned, and recognition "
-        "takes it by --sensor-model only",
+        "takes it by --sensor-model only, with maps that --sensor-model here built for it",
         file.string()));
   } else if (origin == Origin::unreadable) {
     tell_on_stderr(fmt::format(

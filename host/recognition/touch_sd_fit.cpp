@@ -281,6 +281,16 @@ TouchSdFit fit_touch_sd(Device* device, const RecognitionTask& task,
   fit.sd = found.sd;
   fit.standard_error = found.standard_error;
   fit.evidence_gain = found.gain;
+  const bool none = found.gain < 0.0;  // exact poses explain the touches better
+  if (none || fit.sd.mm < fit.resolution.mm) {
+    fit.sd.mm = fit.standard_error.mm = 0.0;
+  }
+  if (none || fit.sd.rad < fit.resolution.rad) {
+    fit.sd.rad = fit.standard_error.rad = 0.0;
+  }
+  if (fit.sd.none()) {
+    fit.evidence_gain = 0.0;
+  }
   fit.warnings = warnings_about(unknowns, fit, found.ended);
   return fit;
 }

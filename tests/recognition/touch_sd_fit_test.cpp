@@ -87,6 +87,9 @@ TEST(TouchSdFit, OfExactTouchesIsNextToNothing) {
   EXPECT_LT(fit.sd.mm, 0.2);  // the maps' cells have 0.5 mm
   EXPECT_LT(fit.sd.rad, 0.03);
   EXPECT_DOUBLE_EQ(fit.resolution.mm, 0.15);  // of cells of 0.5 mm
+  EXPECT_TRUE(fit.sd.mm == 0.0 || fit.sd.mm >= fit.resolution.mm) << fit.sd.mm;
+  EXPECT_TRUE(fit.sd.rad == 0.0 || fit.sd.rad >= fit.resolution.rad) << fit.sd.rad;
+  EXPECT_GE(fit.evidence_gain, 0.0);
   EXPECT_DOUBLE_EQ(fit.resolution.rad, 0.15 / array_reach_mm(digitacts_array()));
 }
 
