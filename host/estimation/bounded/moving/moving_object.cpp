@@ -237,7 +237,7 @@ std::vector<double> MovingObject::belief_within(std::span<const BlockRun> runs,
 std::vector<double> MovingObject::log_belief(std::span<const BinBox> boxes,
                                              std::span<const KnownElements> touches) const {
   std::vector<std::uint8_t> tiles(followed_.size());
-  bool unknown = false;  // of some bin, what may be missing is more than what is known
+  bool unknown = false;  // what may be missing of some bin counts
   for (const BinBox& box : boxes) {
     for (std::int64_t i = 0; i < box.bins(); ++i) {
       const std::int64_t bin = box.bin(i, task_.lattice);
