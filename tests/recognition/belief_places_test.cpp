@@ -1,0 +1,203 @@
+// Where a belief lies: BeliefPlaces of a step, by every filter.
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <glm/geometric.hpp>
+
+#include "estimation/lattice/refinement.hpp"
+#include "recognition/belief_modes.hpp"
+#include "recognition/recognition_record.hpp"
+#include "shapes.hpp"
+#include "unknown_of.hpp"
+
+namespace palpate::belief_places_test {
+
+class Places : public testing::Test {
+ protected:
+  /// The last step of a letter's first touches.
+  RecognitionStep step_by(std::size_t filter, std::size_t touches) {
+    const RecognitionTask task(shapes(), every_filter()[filter]);
+    Recogniser recogniser(device, task);
+    return take_step(recogniser, task, all_touches(recording, touches),
+                     unknown_of(recording).truth);
+  }
+  static std::vector<Touch> all_touches(const Recording& recording, std::size_t touches) {
+    return recording.touches(0, touches);
+  }
+
+  Device device = Device::open();
+  Recording recording = touched_letter(5);
+};
+
+TEST_F(Places, AreTheMassesOfTheFullHistogram) {
+  const auto options = std::get<HistogramOptions>(every_filter()[0]);
+  const RecognitionTask task(shapes(), options);
+  for (const std::size_t touches : {1U, 3U, 6U}) {
+    Recogniser recogniser(device, task);
+    const RecognitionStep step = take_step(recogniser, task, all_touches(recording, touches), {});
+    std::vector<double> mass(task.hypotheses.size());
+    double near = 0.0;
+    for (std::size_t object = 0; object < mass.size(); ++object) {
+      const std::vector<double> logs =
+          recogniser.histogram()->log_likelihood(static_cast<int>(object));
+      const double top = *std::ranges::max_element(logs);
+      double sum = 0.0;
+      for (const double log : logs) {
+        sum += std::exp(log - top);
+      }
+      const auto likely =
+          recogniser.histogram()->likely_bins(std::vector<int>{static_cast<int>(object)}, 1e-6);
+      for (const auto& [bin, share] : likely.front()) {
+        mass[object] += share;
+        EXPECT_NEAR(share, std::exp(logs[static_cast<std::size_t>(bin)] - top) / sum, 1e-6);
+      }
+      EXPECT_NEAR(mass[object], 1.0, 0.01) << "6,400 bins below 1e-6 each";
+      // Bins within the neighbourhood, counted by their centres.
+      if (static_cast<int>(object) == step.mode.object) {
+        for (std::size_t bin = 0; bin < logs.size(); ++bin) {
+          const double mm =
+              pose_error_mm(displaced_body(task.hypotheses[object].map), step.symmetry, step.pose(),
+                            recogniser.lattice().T_object_robot(static_cast<std::int64_t>(bin)));
+          near += mm <= neighbourhood_mm ? step.identity[object] * std::exp(logs[bin] - top) / sum
+                                         : 0.0;
+        }
+      }
+    }
+    // A bin of 22.5 degrees is cut by the neighbourhood's edge, not counted as a whole.
+    EXPECT_NEAR(step.places.share, near, 0.35);
+    double all = 0.0;
+    for (const BeliefMode& mode : step.places.modes) {
+      all += mode.probability;
+      EXPECT_LE(mode.probability, step.identity[static_cast<std::size_t>(mode.object)] + 1e-9);
+    }
+    EXPECT_LE(all, 1.0 + 1e-9);
+    EXPECT_GT(all, 0.5);
+    EXPECT_LE(step.places.modes.size(), 5U);
+    EXPECT_TRUE(
+        std::ranges::is_sorted(step.places.modes, std::greater<>(), &BeliefMode::probability));
+  }
+}
+
+TEST_F(Places, AreTheSameByBoundsAsByTheHistogram) {
+  for (const std::size_t touches : {1U, 2U, 6U}) {
+    const RecognitionStep dense = step_by(0, touches);
+    const RecognitionStep bounded = step_by(2, touches);
+    ASSERT_EQ(bounded.places.modes.size(), dense.places.modes.size());
+    for (std::size_t i = 0; i < dense.places.modes.size(); ++i) {
+      const BeliefMode& a = dense.places.modes[i];
+      const BeliefMode& b = bounded.places.modes[i];
+      EXPECT_EQ(a.object, b.object);
+      // The histogram rounds in float32.
+      EXPECT_NEAR(a.probability, b.probability, 1e-4);
+      EXPECT_LT(
+          glm::distance(a.pose.T_robot_object.translation_mm, b.pose.T_robot_object.translation_mm),
+          1e-2);
+    }
+    EXPECT_NEAR(dense.places.share, bounded.places.share, 1e-3);
+    EXPECT_EQ(dense.places.own, bounded.places.own);
+    EXPECT_EQ(dense.decision.act, bounded.decision.act);
+  }
+}
+
+TEST_F(Places, OfOneLabelWeighAsTheTemperatureHasLabelsWeigh) {
+  constexpr double temperature = 2.5;
+  for (const std::size_t filter : {0U, 2U}) {
+    RecognitionTask task(shapes(), every_filter()[filter]);
+    Recogniser recogniser(device, task);
+    const auto after = [&](double first, double growth) {
+      task.temperature = first;
+      task.temperature_growth = growth;
+      recogniser.reset();
+      // The same touch twice leaves the modes that one touch leaves.
+      const Touch touch = recording.touch(0);
+      return take_step(recogniser, task, std::vector{touch, touch}, {});
+    };
+    const RecognitionStep plain = after(1.0, 0.0);
+    const RecognitionStep tempered = after(temperature - 0.5, 0.5);
+    const auto same = [](const BeliefMode& a) {
+      return [&](const BeliefMode& b) {
+        return a.object == b.object && a.best.theta_rad == b.best.theta_rad &&
+               a.best.translation_mm == b.best.translation_mm;
+      };
+    };
+    std::vector<std::pair<double, double>> weights;  // of modes of the pose's object
+    for (const BeliefMode& mode : plain.places.modes) {
+      const auto found = std::ranges::find_if(tempered.places.modes, same(mode));
+      if (mode.object == plain.mode.object && found != tempered.places.modes.end()) {
+        weights.emplace_back(mode.probability, found->probability);
+      }
+    }
+    ASSERT_GE(weights.size(), 2U);
+    double all_before = 0.0;
+    double all_now = 0.0;
+    for (const auto& [before, now] : weights) {
+      all_before += before;
+      all_now += now;
+      const double ratio = before / weights.front().first;
+      EXPECT_NEAR(now / weights.front().second, std::pow(ratio, 1.0 / temperature), 1e-6);
+    }
+    EXPECT_NEAR(all_now, all_before, 1e-5);
+    // The bins go with the mode that they are of.
+    ASSERT_TRUE(plain.places.own && tempered.places.own);
+    EXPECT_NEAR(tempered.places.share / tempered.places.modes[*tempered.places.own].probability,
+                plain.places.share / plain.places.modes[*plain.places.own].probability, 0.02);
+    EXPECT_LT(tempered.places.share, plain.places.share);
+    EXPECT_GT(tempered.places.within_mm.value(), plain.places.within_mm.value());
+  }
+}
+
+TEST_F(Places, OfAnObjectThatLooksAlikeWhenTurnedAreOneWhicheverHasTheMode) {
+  for (const std::size_t filter : {0U, 2U}) {
+    std::vector<Hypothesis> maps = shapes();
+    maps[1].map.symmetry = 1;  // a disc, which is not the mode's object
+    const auto modes_of_disc = [&](std::optional<int> suggested) {
+      maps[1].map.suggested_symmetry = suggested;
+      RecognitionTask task(maps, every_filter()[filter]);
+      task.temperature = 20.0;  // the disc has a share
+      Recogniser recogniser(device, task);
+      const RecognitionStep step = take_step(recogniser, task, all_touches(recording, 1), {});
+      EXPECT_EQ(step.mode.object, 0);
+      return std::ranges::count(step.places.modes, 1, &BeliefMode::object);
+    };
+    const auto apart = modes_of_disc({});
+    EXPECT_GT(apart, 1);
+    EXPECT_LT(modes_of_disc(0), apart);
+  }
+}
+
+TEST_F(Places, AreNoneBeforeATouchReachesTheBelief) {
+  std::ranges::fill(recording.pressure, 0.0);
+  RecognitionTask task(shapes(), every_filter()[2]);
+  task.auto_pivot = true;
+  Recogniser recogniser(device, task);
+  const RecognitionStep step = take_step(recogniser, task, all_touches(recording, 2), {});
+  EXPECT_TRUE(step.places.modes.empty());
+  EXPECT_FALSE(step.places.within_mm);
+  EXPECT_FALSE(step.places.peak);
+  EXPECT_THAT(step.warnings, testing::Contains(testing::HasSubstr("no touch has an element In")));
+  EXPECT_FALSE(step.decision.act);
+}
+
+TEST_F(Places, OfParticlesAreWhereTheHistogramsAre) {
+  const RecognitionStep dense = step_by(0, 6);
+  const RecognitionStep particles = step_by(1, 6);
+  ASSERT_FALSE(dense.places.modes.empty());
+  ASSERT_FALSE(particles.places.modes.empty());
+  const BeliefMode& a = dense.places.modes.front();
+  const BeliefMode& b = particles.places.modes.front();
+  EXPECT_EQ(a.object, b.object);
+  EXPECT_GT(b.probability, 0.5);
+  // Motion noise of 1 mm and 0.1 rad comes between, and bins of 22.5 degrees.
+  EXPECT_LT(pose_error_mm(displaced_body(shapes()[a.object].map), 1, inverse(a.pose.T_robot_object),
+                          inverse(b.pose.T_robot_object)),
+            3.0);
+}
+
+}  // namespace palpate::belief_places_test
