@@ -180,8 +180,8 @@ bool learns_sensor(const MapFlags& flags) {
         file.string()));
   } else if (origin == Origin::foreign && asked) {
     tell_on_stderr(fmt::format(
-        "{}: was not written by palpate map, and stays; no sensor is learned, and recognition "
-        "takes it by --sensor-model only, with maps that --sensor-model here built for it",
+        "{0}: was not written by palpate map, and stays; no sensor is learned. To recognise with "
+        "it, give `--sensor-model {0}` here and to recognition",
         file.string()));
   } else if (origin == Origin::unreadable) {
     tell_on_stderr(fmt::format(

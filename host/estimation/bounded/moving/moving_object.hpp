@@ -54,9 +54,9 @@ class MovingObject {
 
   /// Upper bound of a bin's log-likelihood, in nats: close where it is followed.
   double most(std::int64_t bin) const;
-  /// Log-likelihood of the bins of some boxes of this object, box after box, [y, x] in each, no
-  /// bound of it: where what may be missing counts, at least what it were if the object had been
-  /// within the boxes' tiles all the time.
+  /// Log-likelihood of the bins of some boxes of this object, box after box, [y, x] in each: no
+  /// bound of it, but what is known, and where more may be missing, no less than if the object had
+  /// always been within the boxes' tiles.
   /// @param touches that step() went through
   std::vector<double> log_belief(std::span<const BinBox> boxes,
                                  std::span<const KnownElements> touches) const;
