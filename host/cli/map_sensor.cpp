@@ -181,7 +181,7 @@ bool learns_sensor(const MapFlags& flags) {
   } else if (origin == Origin::foreign && asked) {
     tell_on_stderr(fmt::format(
         "{0}: was not written by palpate map, and stays; no sensor is learned. To recognise with "
-        "it, give `--sensor-model {0}` here and to recognition",
+        "it, give --sensor-model {0} here and to recognition",
         file.string()));
   } else if (origin == Origin::unreadable) {
     tell_on_stderr(fmt::format(
