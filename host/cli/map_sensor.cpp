@@ -52,6 +52,8 @@ std::vector<FolderMap> folder_maps(const MapFlags& flags, const std::vector<Occu
              maps.front().source->touches.pressure_unit);
     }
   }
+  // What is learned does not depend on the order in which objects join the folder.
+  std::ranges::sort(all, {}, [](const FolderMap& map) { return map.file.filename(); });
   return all;
 }
 

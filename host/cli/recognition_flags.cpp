@@ -73,7 +73,8 @@ void add_uncertainty_flags(CLI::App& command, Request& request) {
       command, "--none", request.none,
       "Prior weight of \"(none)\", an object that was never learned; a map has the weight 1. "
       "Without W (recordings stand before the flag) it is a ninth of the sum of the maps' weights: "
-      "a probability of one in ten before the first touch. (none) explains each touch by a piece "
+      "a probability of one in ten before the first touch. A sensor model's temperature tempers "
+      "these odds with the evidence. (none) explains each touch by a piece "
       "of some known object; the pieces need not belong to one pose. One touch cannot tell: after "
       "it, the odds are about the prior's, unless a sensor model has learned what a touch of no "
       "known object is like. 0 leaves (none) out, as particles do. By default it is also left out "
@@ -91,8 +92,8 @@ void add_recognition_flags(CLI::App& command, Request& request, bool& verbose) {
   command.add_option(
       "--scene", request.scene,
       "Scene file (YAML); its keys are array, sensor_model, threshold, ratio, gamma, prior, "
-      "touch_sd, slip_sd, none, objects, region, bins, filter and device, and a flag overrides its "
-      "key");
+      "touch_sd, slip_sd, none, act_below_mm, act_above, objects, region, bins, filter and device, "
+      "and a flag overrides its key");
   command.add_option(
       "--sensor-model", request.sensor_model,
       "What was learned about the sensor (YAML): the threshold, the ratio, gamma "
@@ -115,7 +116,8 @@ void add_recognition_flags(CLI::App& command, Request& request, bool& verbose) {
   add_text_flag(command, "--y-mm", request.y_mm, "Range of the pivot's y [default: as for --x-mm]");
   add_text_flag(
       command, "--theta-deg", request.theta_deg,
-      "Range of theta, degrees, at most 360 wide [default: 0:360]; 30:30 fixes theta at 30");
+      "Range of theta of T_object_robot, degrees, at most 360 wide; -30:-30 fixes it, for an object "
+      "that lies at 30 degrees in the robot frame [default: 0:360]");
   add_text_flag(
       command, "--pivot-mm", request.pivot_mm,
       "Point X,Y in the robot frame, mm, about which theta turns; the bins' x and y are the "

@@ -78,7 +78,7 @@ std::string decisions(const std::vector<RecognitionRecord>& records) {
 std::string best_words(const RecognitionStep& step, const RecognitionTask& task) {
   const std::string& best = task.labels[step.best];
   const bool posed = best == task.labels[task.label_of[step.mode.object]];
-  return printable(posed ? mode_words(step.mode.object, task) : best);
+  return printable(posed ? task.name_of(step.mode.object) : best);
 }
 
 /// The probability of "(none)" where another label is the best; 0 where it is not among the labels.
@@ -141,21 +141,27 @@ std::string summary(const std::vector<RecognitionRecord>& records) {
 
 /// Within which angles theta of symmetric objects is given, once for each label.
 std::string symmetries(const std::vector<RecognitionRecord>& records, const RecognitionTask& task) {
-  std::map<std::string, int> symmetric;
+  std::map<std::string, std::map<int, int>> records_of;  // [label, symmetry]
   for (const RecognitionRecord& record : records) {
     const RecognitionStep& step = record.last();
-    if (step.symmetry != 1) {
-      symmetric.emplace(task.labels[task.label_of[step.mode.object]], step.symmetry);
-    }
+    ++records_of[task.labels[task.label_of[step.mode.object]]][step.symmetry];
   }
   std::string text;
-  for (const auto& [label, n] : symmetric) {
-    text += n == 0 ? fmt::format("{} looks the same after any turn: its theta is given as 0\n",
-                                 printable(label))
-                   : fmt::format(
-                         "{} looks the same after every 1/{} of a turn: its theta is given "
-                         "from {:.4g} to {:.4g} deg\n",
-                         printable(label), n, -180.0 / n, 180.0 / n);
+  for (const auto& [label, counts] : records_of) {
+    for (const auto& [n, count] : counts) {
+      if (n == 1) {
+        continue;
+      }
+      const std::string given =
+          n == 0 ? "as 0" : fmt::format("from {:.4g} to {:.4g} deg", -180.0 / n, 180.0 / n);
+      // Touches may tell the turns of a map that looks alike apart.
+      text += fmt::format("{} looks the same after {}{}: its theta is given {}\n", printable(label),
+                          n == 0 ? "any turn" : fmt::format("every 1/{} of a turn", n),
+                          counts.size() > 1
+                              ? fmt::format(" by the touches of {} of these unknowns", count)
+                              : "",
+                          given + (counts.size() > 1 ? " there" : ""));
+    }
   }
   return text;
 }
@@ -264,14 +270,14 @@ std::string result_table(const std::vector<RecognitionRecord>& records, const Re
     if (!share.empty()) {  // the pose has not the probability of the best label
       row.insert(row.end(), 4, "");
       table.add(row);
-      row = {"  pose", "", "", mode_words(step.mode.object, task), share, ""};
+      row = {"  pose", "", "", task.name_of(step.mode.object), share, ""};
     }
     row.insert(row.end(), {pose[0], pose[1], pose[2], fit_words(step)});
     table.add(row);
     for (const BeliefMode& mode : other_modes(step)) {
       const std::array<std::string, 3> there =
           pose_cells(pose_text(mode.pose.T_robot_object, mode.pose.sd()));
-      table.add({"  or", "", "", printable(mode_words(mode.object, task)),
+      table.add({"  or", "", "", printable(task.name_of(mode.object)),
                  fmt::format("{:.3f}", mode.probability), "", there[0], there[1], there[2], ""});
     }
     if (const double none = none_probability(step, task); none >= 0.01) {
@@ -279,7 +285,7 @@ std::string result_table(const std::vector<RecognitionRecord>& records, const Re
                  "", ""});
     }
     if (step.refined) {
-      add_pose("  mode", mode_words(step.mode.object, task), step.mode_T_robot_object(),
+      add_pose("  mode", task.name_of(step.mode.object), step.mode_T_robot_object(),
                step.error_mm);
     }
     if (const std::optional<Pose> truth = step.true_T_robot_object()) {

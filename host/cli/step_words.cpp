@@ -59,15 +59,10 @@ std::string pose_words(const PoseText& pose) {
   return fmt::format("x {} mm, y {} mm, theta {} deg", with_sd(0), with_sd(1), with_sd(2));
 }
 
-std::string mode_words(int object, const RecognitionTask& task) {
-  const Hypothesis& hypothesis = task.hypotheses[static_cast<std::size_t>(object)];
-  return hypothesis.map.label + (hypothesis.mirrored ? " mirrored" : "");
-}
-
 std::string object_words(const RecognitionStep& step, const RecognitionTask& task) {
   const std::string& best = task.labels[step.best];
   const std::string& posed = posed_label(step, task);
-  const std::string object = mode_words(step.mode.object, task);
+  const std::string object = task.name_of(step.mode.object);
   return printable(best == posed ? object : fmt::format("{}, pose of {}", best, object));
 }
 
@@ -76,7 +71,7 @@ std::string identity_words(const RecognitionStep& step, const RecognitionTask& t
   const bool unlike = step.fit && step.fit->verdict == Verdict::does_not_fit &&
                       task.labels[step.best] != none_label;
   const std::string& best = task.labels[step.best];
-  const std::string object = printable(mode_words(step.mode.object, task));
+  const std::string object = printable(task.name_of(step.mode.object));
   const std::optional<double> share = share_at_pose(step, task);
   const std::string there = share ? fmt::format("{:.1f} % there", 100.0 * *share) : "";
   return best == posed_label(step, task)
@@ -191,13 +186,14 @@ std::string unproven_sentence(const RecognitionStep& step, const RecognitionTask
     return "";
   }
   const double unproven = 100.0 * step.certificate->dropped_mass;
-  constexpr double poor_fits = 0.01;  // rounding leaves less
+  const auto* bounded = std::get_if<BoundedOptions>(&task.filter);
+  const bool gave_up = bounded != nullptr && bounded->poor_bins &&
+                       step.certificate->bins_evaluated >= *bounded->poor_bins;
   const std::string left =
       fmt::format("{} left {} unproven",
                   traits.budget_s ? fmt::format("the budget of {:g} ms", 1e3 * *traits.budget_s)
-                  : task.contact().table && unproven >= poor_fits
-                      ? "the search, which met nothing but poor fits,"
-                      : "rounding",
+                  : gave_up       ? "the search, which met nothing but poor fits,"
+                                  : "rounding",
                   proven             ? "the probability of (none)"
                   : unproven >= 9.95 ? fmt::format("{:.0f} % of the belief", unproven)
                                      : fmt::format("{:.2g} % of the belief", unproven));

@@ -30,9 +30,6 @@ PoseText pose_text(const RecognitionStep& step);
 std::array<std::string, 3> pose_cells(const PoseText& pose);
 /// "x 9.81 +-0.05 mm, y 0.23 +-0.05 mm, theta -126.04 +-0.31 deg"
 std::string pose_words(const PoseText& pose);
-/// An object: "A", or "A mirrored" where it lies on its other side. Not
-/// yet printable().
-std::string mode_words(int object, const RecognitionTask& task);
 /// The object of the step and, where the pose is another object's, that object: "A", "A mirrored",
 /// "(none), pose of A".
 std::string object_words(const RecognitionStep& step, const RecognitionTask& task);

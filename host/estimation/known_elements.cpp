@@ -68,10 +68,6 @@ std::vector<std::size_t> sorted_touches(std::span<const KnownElements> touches) 
   return order;
 }
 
-bool any_known(const TouchEvidence& touch) {
-  return std::ranges::any_of(touch.readings, [](Reading r) { return r != Reading::unknown; });
-}
-
 KnownElements known_elements(const TouchEvidence& touch, const BoundedOptions& options) {
   const Pose& T_robot_sensor = touch.T_robot_sensor;
   const glm::dvec2& pivot_mm = options.lattice.pivot_mm;

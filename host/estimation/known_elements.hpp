@@ -38,9 +38,6 @@ struct KnownElements {
   std::shared_ptr<ExactBins> exact_bins = {};
 };
 
-/// Whether an element is not Unknown.
-bool any_known(const TouchEvidence& touch);
-
 /// The elements that are not Unknown.
 /// @param options whose lattice has the pivot, and whose touch_sd says whether touches are
 /// displaced

@@ -47,10 +47,17 @@ void describe(Keys& keys, Familiarity& familiarity) {
 }
 
 template <typename Keys>
+void describe(Keys& keys, FitScale::Alone& alone) {
+  keys("mean", alone.mean);
+  keys("sd", alone.sd);
+}
+
+template <typename Keys>
 void describe(Keys& keys, FitScale& scale) {
   keys("mean", scale.mean);
   keys("sd", scale.sd);
   keys("shared_sd", scale.shared_sd, scale.shared_sd > 0.0);
+  keys("alone", scale.alone);
   keys("stranger_sd", scale.stranger_sd);
 }
 

@@ -111,6 +111,11 @@ class FoldTrial {
                 fit_of(evidence[i], scores[i], scored.truth, asked.presses[i].T_object_robot)) {
           result.fit_z[asked.presses[i].label].push_back(fit->z);
         }
+        if (asked.presses[i].T_object_robot && model_.table) {
+          if (const auto fit = fit_of(evidence[i], scores[i], scored.truth, {})) {
+            result.best_fit_z.push_back(fit->z);
+          }
+        }
       }
       result.presses.push_back(std::move(scored));
     }
@@ -349,6 +354,7 @@ CrossValidation joined(std::span<const CrossValidation> folds) {
     append(fold.groups[0], all.groups[0]);
     append(fold.groups[1], all.groups[1]);
     append(fold.familiarity, all.familiarity);
+    append(fold.best_fit_z, all.best_fit_z);
     append(fold.place_errors, all.place_errors);
     for (const auto& [label, z] : fold.fit_z) {
       append(z, all.fit_z[label]);

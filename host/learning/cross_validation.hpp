@@ -99,6 +99,9 @@ struct CrossValidation {
   /// [label] Fit::z of presses with an element In Contact: at their pose where it is known, or else
   /// on the best map at about the best pose.
   std::map<std::string, std::vector<double>> fit_z;
+  /// Fit::z of presses at known poses with an element In Contact, by a table: on the map that fits
+  /// best, at about the best pose.
+  std::vector<double> best_fit_z;
   /// [label] How the groups fit the best of all other objects, at about its best pose, by a table.
   /// None with maps of fewer than two others.
   std::map<std::string, std::vector<StrangerFit>> stranger_fits;

@@ -250,6 +250,9 @@ LearnedSensor with_confidence(LearnedSensor sensor, const CrossValidation& valid
   }
   sensor.fit_scale = fit_scale_of(validation.fit_z);
   if (sensor.fit_scale) {
+    if (const auto best = scale_of(validation.best_fit_z)) {
+      sensor.fit_scale->alone = {best->mean, best->sd};
+    }
     sensor.fit_scale->stranger_sd = stranger_sd_of(validation.stranger_fits, *sensor.fit_scale);
   }
   sensor.pose_scale = pose_scale_of(validation.place_errors);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <optional>
 #include <set>
 #include <utility>
 
@@ -21,6 +22,18 @@ namespace palpate {
 
 namespace {
 
+/// A unit that poses may really have.
+struct PoseUnit {
+  bool metres = false;
+  bool degrees = false;
+
+  Setup of(Setup setup) const {
+    setup.mm = metres ? 1000.0 : 1.0;
+    setup.rad = degrees ? std::numbers::pi / 180.0 : 1.0;
+    return setup;
+  }
+};
+
 /// Poses in degrees or metres, where the numbers allow for it.
 void check_units(SetupJudge& judge, Setup& setup, double& nats,
                  std::vector<SetupFinding>& findings) {
@@ -36,27 +49,34 @@ void check_units(SetupJudge& judge, Setup& setup, double& nats,
   const double reach_mm = array_reach_mm(setup.elements_mm);
   const bool may_be_metres = places.diagonal() < 0.1 * reach_mm;
   const bool may_be_degrees = most_angle > circle;
-  if (!may_be_metres && !may_be_degrees) {
+  // An angle that counts turns exceeds a circle in radians, too.
+  std::optional<PoseUnit> best;
+  double gain = least_nats;
+  for (const PoseUnit& unit : {PoseUnit{may_be_metres, may_be_degrees}, PoseUnit{may_be_metres, false},
+                               PoseUnit{false, may_be_degrees}}) {
+    if (!unit.metres && !unit.degrees) {
+      continue;
+    }
+    if (const double gained = judge.nats(unit.of(setup)) - nats; gained > gain) {
+      best = unit;
+      gain = gained;
+    }
+  }
+  if (!best) {
     return;
   }
-  Setup other = setup;
-  other.mm = may_be_metres ? 1000.0 : 1.0;
-  other.rad = may_be_degrees ? std::numbers::pi / 180.0 : 1.0;
-  const double gain = judge.nats(other) - nats;
-  if (gain > least_nats) {
-    const std::string option =
-        fmt::format("pose-unit {},{}", may_be_metres ? "m" : "mm", may_be_degrees ? "deg" : "rad");
-    findings.push_back({"pose_unit",
-                        gain,
-                        fmt::format("the sensor's poses are in {}: import them with `{}`",
-                                    may_be_metres && may_be_degrees ? "metres and degrees"
-                                    : may_be_metres                 ? "metres"
-                                                                    : "degrees",
-                                    option),
-                        {option}});
-    setup = other;
-    nats += gain;
-  }
+  const std::string option =
+      fmt::format("pose-unit {},{}", best->metres ? "m" : "mm", best->degrees ? "deg" : "rad");
+  findings.push_back({"pose_unit",
+                      gain,
+                      fmt::format("the sensor's poses are in {}: import them with `{}`",
+                                  best->metres && best->degrees ? "metres and degrees"
+                                  : best->metres                ? "metres"
+                                                                : "degrees",
+                                  option),
+                      {option}});
+  setup = best->of(setup);
+  nats += gain;
 }
 
 /// Whether the touches are, but for a part of the array's reach, at one place and angle. Any array

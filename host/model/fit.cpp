@@ -54,13 +54,15 @@ ReadingMixture mixture_of(std::span<const glm::dvec2> elements_mm, const Pose& T
 }  // namespace
 
 Fit FitScale::of(const Fit& fit, std::size_t touches) const {
-  if (mean == 0.0 && sd == 1.0 && shared_sd == 0.0) {
+  if (mean == 0.0 && sd == 1.0 && shared_sd == 0.0 && !alone) {
     return fit;
   }
   const auto n = static_cast<double>(touches);
-  const double z =
-      std::clamp((fit.z - mean * std::sqrt(n)) / std::sqrt(sd * sd + n * shared_sd * shared_sd),
-                 -largest_fit_z, largest_fit_z);
+  const double gained = alone ? (alone->mean - mean) / std::sqrt(n) : 0.0;
+  const double spread =
+      alone && touches == 1 ? alone->sd : std::sqrt(sd * sd + n * shared_sd * shared_sd);
+  const double z = std::clamp((fit.z - mean * std::sqrt(n) - gained) / spread, -largest_fit_z,
+                              largest_fit_z);
   return {.z = z, .verdict = verdict_on(z, scaled_fits_from_z, scaled_doubtful_from_z)};
 }
 

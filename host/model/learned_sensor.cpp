@@ -236,6 +236,12 @@ void LearnedSensor::validate() const {
   if (fit_scale && !from_0(fit_scale->shared_sd)) {
     refuse("fit_scale: shared_sd", fit_scale->shared_sd, "give a number from 0");
   }
+  if (fit_scale && fit_scale->alone && !std::isfinite(fit_scale->alone->mean)) {
+    refuse("fit_scale: alone: mean", fit_scale->alone->mean, "give a number");
+  }
+  if (fit_scale && fit_scale->alone && !is_positive(fit_scale->alone->sd)) {
+    refuse("fit_scale: alone: sd", fit_scale->alone->sd, "give a positive number");
+  }
   if (fit_scale && fit_scale->stranger_sd && !is_positive(*fit_scale->stranger_sd)) {
     refuse("fit_scale: stranger_sd", *fit_scale->stranger_sd, "give a positive number");
   }

@@ -10,6 +10,8 @@ namespace palpate {
 
 namespace {
 
+bool is_known(Reading reading) { return reading != Reading::unknown; }
+
 /// The evidence of the elements whose reading is `kept`.
 template <typename Kept>
 TouchEvidence evidence_where(TouchEvidence evidence, const Kept& kept) {
@@ -50,9 +52,9 @@ void TouchEvidence::assign(const Touch& touch, const ContactModel& contact) {
   }
 }
 
-TouchEvidence TouchEvidence::known() const {
-  return evidence_where(*this, [](Reading reading) { return reading != Reading::unknown; });
-}
+bool TouchEvidence::tells() const { return std::ranges::any_of(readings, is_known); }
+
+TouchEvidence TouchEvidence::known() const { return evidence_where(*this, is_known); }
 
 TouchEvidence TouchEvidence::contact() const { return evidence_where(*this, is_contact); }
 

@@ -28,6 +28,8 @@ struct TouchEvidence {
   void assign(const Touch& touch, const ContactModel& contact);
 
   bool in_contact() const { return contacts > 0; }
+  /// Whether an element is not Unknown. A touch that tells nothing changes no belief.
+  bool tells() const;
   /// Place of the array's middle in the robot frame.
   glm::dvec2 middle_mm() const { return T_robot_sensor * array_centre_mm(elements_mm); }
   /// The evidence without the elements that are Unknown.

@@ -104,7 +104,7 @@ std::vector<PoseBelief> pose_beliefs(const Recogniser& recogniser, const Recogni
     }
   }
   auto likely = recogniser.likely_bins(objects, least_share, lattice);
-  const double temperature = task.temperature_after(recogniser.evidence().size());
+  const double temperature = task.temperature_after(recogniser.evidence());
   std::vector<PoseBelief> beliefs;
   for (std::size_t k = 0; k < objects.size(); ++k) {
     const int object = objects[k];
@@ -263,7 +263,7 @@ Decision decide(const RecognitionStep& step, const RecognitionTask& task) {
               fmt::format(
                   "{:.0f} % of the belief lies elsewhere: {} at x {:.2f} mm, y {:.2f} mm, "
                   "theta {:.2f} deg",
-                  100.0 * probability, task.labels[task.label_of[object]], there.translation_mm.x,
+                  100.0 * probability, task.name_of(object), there.translation_mm.x,
                   there.translation_mm.y,
                   180.0 / std::numbers::pi * wrap_angle(there.theta_rad, 2.0 * std::numbers::pi))};
     }

@@ -63,7 +63,7 @@ std::vector<double> label_log_evidence(const Estimate& estimate, const Recogniti
 
 Tempering tempering_of(std::span<const TouchEvidence> touches, const RecognitionTask& task,
                        const std::optional<Fit>& fit) {
-  Tempering tempering{task.temperature_after(touches.size()), feature_nats(touches, task)};
+  Tempering tempering{task.temperature_after(touches), feature_nats(touches, task)};
   const bool on_scale = task.fit_scale.shared_sd > 0.0;
   if (fit && on_scale && task.labels.back() == none_label) {
     tempering.features.back() += misfit_nats(

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <functional>
 #include <numbers>
 #include <utility>
 
@@ -102,10 +103,19 @@ Updated update(Recogniser& recogniser, const RecognitionTask& task, std::span<co
   return updated;
 }
 
+/// The touch that tells something where it is the only one; else null.
+const TouchEvidence* only_telling(std::span<const TouchEvidence> touches) {
+  const auto first = std::ranges::find_if(touches, &TouchEvidence::tells);
+  const bool only = first != touches.end() &&
+                    std::none_of(first + 1, touches.end(), std::mem_fn(&TouchEvidence::tells));
+  return only ? &*first : nullptr;
+}
+
 /// RecognitionStep::known
 std::optional<double> known_of(const Estimate& estimate, std::span<const TouchEvidence> touches,
                                const RecognitionTask& task) {
-  if (!tells_known(task) || touches.size() != 1 || !touches.front().in_contact()) {
+  const TouchEvidence* touch = only_telling(touches);
+  if (!tells_known(task) || touch == nullptr || !touch->in_contact()) {
     return {};
   }
   std::vector<double> evidence = label_log_evidence(estimate, task);
@@ -113,7 +123,7 @@ std::optional<double> known_of(const Estimate& estimate, std::span<const TouchEv
     evidence.pop_back();
   }
   return task.familiarity->probability(
-      FamiliarityScore::of(touches.front().readings, estimate.mode.log_likelihood, evidence));
+      FamiliarityScore::of(touch->readings, estimate.mode.log_likelihood, evidence));
 }
 
 /// Bounds of known_of(): by as much as a bin that no search has evaluated may explain the touch
@@ -148,7 +158,7 @@ ProbabilityInterval known_bounds(const Estimate& estimate, std::span<const Touch
   const auto probability = [&](double log_likelihood, double lead_nats) {
     const std::vector<double> leading{0.0, -lead_nats};
     return task.familiarity->probability(FamiliarityScore::of(
-        touches.front().readings, log_likelihood,
+        only_telling(touches)->readings, log_likelihood,
         std::span(leading).first(std::min<std::size_t>(evidence.size(), leading.size()))));
   };
   return {probability(estimate.mode.log_likelihood, lead.low), probability(best, lead.high)};

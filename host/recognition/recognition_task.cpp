@@ -65,6 +65,17 @@ RecognitionTask::RecognitionTask(std::vector<Hypothesis> objects, FilterOptions 
       label_of(label_indices(hypotheses, labels)),
       bodies(bodies_of(hypotheses)) {}
 
+std::string RecognitionTask::name_of(int object) const {
+  const Hypothesis& hypothesis = hypotheses[static_cast<std::size_t>(object)];
+  return hypothesis.map.label + (hypothesis.mirrored ? " mirrored" : "");
+}
+
+double RecognitionTask::temperature_after(std::span<const TouchEvidence> touches) const {
+  const auto telling = std::ranges::count_if(touches, &TouchEvidence::tells);
+  return temperature_of(static_cast<std::size_t>(std::max<std::ptrdiff_t>(telling, 1)), temperature,
+                        temperature_growth);
+}
+
 std::string wider_bins_sentence(const RecognitionTask& task) {
   if (!task.learned_bins || !traits_of(task.filter).bins) {
     return "";

@@ -4,9 +4,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "model/touch_evidence.hpp"
 #include "palpate/balanced_lattice.hpp"
 #include "palpate/device.hpp"
 #include "palpate/learned_sensor.hpp"
@@ -37,10 +39,10 @@ struct RecognitionTask {
   DisplacementSd slip_sd() const { return traits_of(filter).slip_sd; }
   std::int64_t bins_in_all() const { return palpate::bins_in_all(hypotheses.size(), lattice()); }
   const ContactClassifier& classifier() const { return contact().classifier; }
-  /// The temperature of so many touches; before any, of one.
-  double temperature_after(std::size_t touches) const {
-    return temperature_of(std::max<std::size_t>(touches, 1), temperature, temperature_growth);
-  }
+  /// The label of a hypothesis, and that it is the mirrored one where it is.
+  std::string name_of(int object) const;
+  /// The temperature of those of the touches that tell something; before any, of one.
+  double temperature_after(std::span<const TouchEvidence> touches) const;
 
   const std::vector<Hypothesis> hypotheses;
   const FilterOptions filter;  ///< as it is opened

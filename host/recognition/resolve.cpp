@@ -282,8 +282,14 @@ RecognitionTask resolve(const Request& request, const Circumstances& of) {
   // elements are so far from independent, the tempered evidence leaves "(none)" its prior.
   constexpr double far_wider = 8.0;
   constexpr double far_from_independent = 5.0;
-  need.learned_only |= (!bin_width && !resolves(histogram.lattice, hypotheses, far_wider)) ||
-                       (sensor != nullptr && sensor->temperature > far_from_independent);
+  const bool auto_pivot = inferred || has_auto_pivot(request);
+  const std::optional<double> near_mm =
+      auto_pivot ? std::optional(of.reach_mm) : std::nullopt;
+  const bool far_too_wide =
+      !bin_width && !resolves(histogram.lattice, hypotheses, far_wider, near_mm);
+  const bool without_none = far_too_wide && !request.none && !need.learned_only;
+  need.learned_only |=
+      far_too_wide || (sensor != nullptr && sensor->temperature > far_from_independent);
   const ChosenFilter filter = choose_filter(wish, request, need, hypotheses, histogram);
   const FilterOptions settled = settled_filter(request, of, filter, hypotheses, bin_width, remarks);
   const bool to_the_end = request.tolerance || request.evidence_nats;  // what was asked for holds
@@ -300,22 +306,25 @@ RecognitionTask resolve(const Request& request, const Circumstances& of) {
     task.fit_scale = sensor->fit_scale.value_or(FitScale{});
     task.pose_scale = sensor->pose_scale.value_or(PoseScale{});
   } else {
-    const auto [fit, pose] = scales_of_maps(task);
+    const auto [fit, pose] = scales_of_maps(task, near_mm);
     task.fit_scale = fit;
     task.pose_scale = pose;
   }
   task.bin_width = bin_width;
   task.auto_filter = filter.automatic;
   task.filter_asked_for_by = filter.asked_for_by;
-  task.auto_pivot = inferred || has_auto_pivot(request);
+  task.auto_pivot = auto_pivot;
   if (!request.tolerance) {
     // The belief after a first touch is wide, and takes twice as long to find within 1e-6.
     task.trace_tolerance = 1e-4;
     task.drawn_tolerance = 1e-3;  // half a pixel of a picture's curve
   }
   task.act = act_where(request);
-  if (std::string wider = wider_bins_sentence(task); !wider.empty()) {
-    remarks.push_back(std::move(wider));
+  for (std::string words :
+       {wider_bins_sentence(task), far_pivot_sentence(task, of.reach_mm, without_none)}) {
+    if (!words.empty()) {
+      remarks.push_back(std::move(words));
+    }
   }
   task.remarks = std::move(remarks);
   return task;

@@ -59,7 +59,7 @@ int symmetry_told(const Recogniser& recogniser, const RecognitionTask& task,
   const Marginals marginals = recogniser.marginals(step.mode.object);
   return symmetry_told(map, marginals.grid.theta_rad, marginals.theta,
                        step.mode.T_object_robot.theta_rad,
-                       task.temperature_after(recogniser.evidence().size()));
+                       task.temperature_after(recogniser.evidence()));
 }
 
 std::optional<std::string> turned_alike(const RecognitionTask& task, const RecognitionStep& step) {

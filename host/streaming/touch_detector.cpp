@@ -218,8 +218,10 @@ struct TouchDetector::Impl {
       ended = end_touch();
       released_s = time_s;
       smoother.reset();
+      began_s.reset();
     }
     last_s = time_s;
+    began_s = began_s.value_or(time_s);
 
     const std::vector<double>& smooth = smoother.add(time_s, pressure);
     double largest = 0.0;
@@ -228,7 +230,9 @@ struct TouchDetector::Impl {
       largest = std::max(largest, p);
       load += std::max(0.0, p - options.release);
     }
-    if (!touching && largest <= options.onset) {
+    // A mean of too few frames may exceed the onset by noise.
+    const bool settled = time_s - *began_s >= options.smooth_s;
+    if (!touching && (largest <= options.onset || !settled)) {
       if (largest < options.release && (!released_s || time_s - *released_s > rest_s)) {
         follow_drift(smooth, elapsed_s);
       }
@@ -306,6 +310,7 @@ struct TouchDetector::Impl {
   std::optional<DetectedTouch> best;  // longest finished phase of this touch
   std::vector<double> pressure;       // [e] of the present frame, above the baseline; NaN: Unknown
   std::optional<double> last_s;       // time of the last frame
+  std::optional<double> began_s;      // time of the first frame since a gap
   std::optional<double> released_s;   // end of the last touch
   bool touching = false;
 };

@@ -135,6 +135,19 @@ TEST_F(MapSensor, IsLearnedAnewFromTheTouchesOfTheOtherMaps) {
   EXPECT_FALSE(std::filesystem::exists(sensor("maps")));
 }
 
+TEST_F(MapSensor, IsTheSameWhateverTheOrderInWhichObjectsCame) {
+  const auto add = [&](const std::vector<std::string>& objects, const char* folder) {
+    std::vector<std::string> arguments{"map"};
+    arguments.insert(arguments.end(), objects.begin(), objects.end());
+    arguments.insert(arguments.end(), {"-o", std::string(folder) + "/", "--prior", "0.3"});
+    done(arguments);
+  };
+  add({"A.h5"}, "apart");
+  add({"U.h5"}, "apart");
+  add({"A.h5", "U.h5"}, "together");
+  EXPECT_TRUE(bytes_of(sensor("apart")) == bytes_of(sensor("together")));
+}
+
 TEST_F(MapSensor, OfEarlierMapsIsSaidToStay) {
   done({"map", "A.h5", "U.h5", "-o", "maps/"});
   const Outcome outcome = palpate({"map", "A.h5", "-o", "maps/", "--sensor-model", "none"});

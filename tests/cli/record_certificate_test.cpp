@@ -64,6 +64,15 @@ TEST(UnprovenSentence, SaysTheBoundsAndWhatEndedTheSearch) {
             "probability of (none) unproven");
   EXPECT_EQ(unproven_sentence(record_of(0.37, {{1.0, 1.0}, {0.0, 0.0}}).last(), task_with({})),
             "rounding left 37 % of the belief unproven; A has 100.0 % all the same");
+  const auto with_poor_fits = [](std::int64_t bins) {
+    return RecognitionTask({{sample_map("A")}, {sample_map("I")}}, BoundedOptions{.poor_bins = bins});
+  };
+  const RecognitionRecord little = record_of(2.3e-6, {{1.0, 1.0}, {0.0, 0.0}});
+  EXPECT_EQ(unproven_sentence(little.last(), with_poor_fits(1234)),
+            "the search, which met nothing but poor fits, left 0.00023 % of the belief unproven; A "
+            "has 100.0 % all the same");
+  EXPECT_EQ(unproven_sentence(little.last(), with_poor_fits(1235)),
+            "rounding left 0.00023 % of the belief unproven; A has 100.0 % all the same");
   EXPECT_EQ(unproven_sentence(record_of(1e-4, {{0.6, 0.64}, {0.36, 0.4}}).last(), task_with(0.1)),
             "")
       << "the tolerance holds";

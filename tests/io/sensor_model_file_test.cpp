@@ -21,7 +21,11 @@ LearnedSensor full_sensor() {
       .bins = BinSteps{.x_mm = 0.5, .y_mm = 0.25, .theta_rad = 0.125},
       .features = LearnedFeatures{},
       .familiarity = Familiarity{.offset = -3.5, .explained_slope = 20.25, .lead_slope = 0.5},
-      .fit_scale = FitScale{.mean = -4.5, .sd = 12.25, .shared_sd = 0.5, .stranger_sd = 3.25}};
+      .fit_scale = FitScale{.mean = -4.5,
+                            .sd = 12.25,
+                            .shared_sd = 0.5,
+                            .alone = FitScale::Alone{1.5, 0.75},
+                            .stranger_sd = 3.25}};
   LearnedTable& table = *sensor.table;
   table.layer = {.of = MapLayer::mean_level,
                  .near_mm = 3.5,
@@ -101,6 +105,9 @@ TEST_F(SensorModelFile, ComesBackAsItWasWritten) {
   EXPECT_EQ(read.fit_scale->mean, written.fit_scale->mean);
   EXPECT_EQ(read.fit_scale->sd, written.fit_scale->sd);
   EXPECT_EQ(read.fit_scale->shared_sd, written.fit_scale->shared_sd);
+  ASSERT_TRUE(read.fit_scale->alone);
+  EXPECT_EQ(read.fit_scale->alone->mean, written.fit_scale->alone->mean);
+  EXPECT_EQ(read.fit_scale->alone->sd, written.fit_scale->alone->sd);
   EXPECT_EQ(read.fit_scale->stranger_sd, written.fit_scale->stranger_sd);
 }
 
@@ -113,15 +120,17 @@ TEST_F(SensorModelFile, MayHoldLittle) {
   EXPECT_FALSE(read.table || read.features || read.familiarity || read.fit_scale || read.bins);
 }
 
-TEST_F(SensorModelFile, MayTellNothingOfStrangers) {
+TEST_F(SensorModelFile, MayTellNothingOfStrangersAndOfSingleTouches) {
   LearnedSensor sensor = full_sensor();
   sensor.fit_scale->stranger_sd.reset();
+  sensor.fit_scale->alone.reset();
   write_sensor_model(path_, sensor);
   EXPECT_EQ(bytes_of(path_).find("stranger_sd"), std::string::npos);
+  EXPECT_EQ(bytes_of(path_).find("alone"), std::string::npos);
   const LearnedSensor read = read_sensor_model(path_);
   ASSERT_TRUE(read.fit_scale);
   EXPECT_EQ(read.fit_scale->sd, sensor.fit_scale->sd);
-  EXPECT_FALSE(read.fit_scale->stranger_sd);
+  EXPECT_FALSE(read.fit_scale->stranger_sd || read.fit_scale->alone);
 }
 
 TEST_F(SensorModelFile, SaysWhatIsWrong) {
@@ -143,6 +152,8 @@ TEST_F(SensorModelFile, SaysWhatIsWrong) {
   expect_named(message("[1, 2, 3]", "[1, 2]"), {"line 19", "mean", "area"});
   expect_named(message("sd: 12.25", "sd: 0"), {"fit_scale: sd", "positive"});
   expect_named(message("shared_sd: 0.5", "shared_sd: -1"), {"fit_scale: shared_sd", "from 0"});
+  expect_named(message("alone: {mean: 1.5, sd: 0.75}", "alone: {mean: 1.5, sd: 0}"),
+               {"fit_scale: alone: sd", "positive"});
   expect_named(message("stranger_sd: 3.25", "stranger_sd: 0"),
                {"fit_scale: stranger_sd", "positive"});
   expect_named(message("raw", "psi"), {"pressure_unit", "kPa or raw"});

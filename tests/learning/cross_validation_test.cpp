@@ -186,7 +186,7 @@ TEST(CrossValidation, JudgesTheFitOfPressesAtKnownPosesWhereTheyAre) {
   EXPECT_NEAR(mean_z(3, 4), mean_z(24, 48), 1e-6);
 }
 
-TEST(CrossValidation, JudgesHowGroupsFitTheBestOfAllOthersWhereThereAreTwo) {
+TEST(CrossValidation, JudgesHowPressesFitBestAndHowGroupsFitTheBestOfTwoOthers) {
   LetterPresses letters;
   letters.add("A", 48, 23);
   letters.add("U", 48, 24);
@@ -201,8 +201,20 @@ TEST(CrossValidation, JudgesHowGroupsFitTheBestOfAllOthersWhereThereAreTwo) {
   letters.add("A", 48, 25);
   letters.recordings.back().object = "B";
   letters.make_presses(true);
-  EXPECT_TRUE(tried(letters.presses, {"A", "B", "U"}, options).stranger_fits.empty());
-  const auto fits = tried(letters.presses, {"A", "B", "U"}, options, true).stranger_fits;
+  const CrossValidation eq7 = tried(letters.presses, {"A", "B", "U"}, options);
+  EXPECT_TRUE(eq7.stranger_fits.empty() && eq7.best_fit_z.empty());
+  const CrossValidation found = tried(letters.presses, {"A", "B", "U"}, options, true);
+  const auto& fits = found.stranger_fits;
+  std::size_t judged = 0;
+  double own_z = 0.0;
+  for (const auto& [label, z] : found.fit_z) {
+    own_z = std::accumulate(z.begin(), z.end(), own_z);
+    judged += z.size();
+  }
+  ASSERT_EQ(found.best_fit_z.size(), judged);
+  const auto& best_z = found.best_fit_z;
+  EXPECT_GT(std::accumulate(best_z.begin(), best_z.end(), 0.0), own_z)
+      << "a single touch fits somewhere else better";
   ASSERT_EQ(fits.size(), 3U);
   std::size_t fewest = presses_in_group;
   const auto mean_z = [&](const char* label) {

@@ -125,6 +125,9 @@ TEST(SensorCalibration, OfLettersAtKnownPosesLearnsTheirSensor) {
   EXPECT_EQ(found.sensor.spread_mm, *found.sensor.psf_mm / 2.0);
   // Three touches of a letter fit the other two as badly as those of other strangers.
   EXPECT_NEAR(found.sensor.fit_scale->stranger_sd.value(), 4.0, 2.0);
+  ASSERT_TRUE(found.sensor.fit_scale->alone);
+  EXPECT_GT(found.sensor.fit_scale->alone->mean, found.sensor.fit_scale->mean);
+  EXPECT_LT(found.sensor.fit_scale->alone->sd, found.sensor.fit_scale->sd);
 }
 
 TEST(SensorCalibration, OfLettersAtUnknownPosesLearnsAllButThePointSpread) {
@@ -133,7 +136,8 @@ TEST(SensorCalibration, OfLettersAtUnknownPosesLearnsAllButThePointSpread) {
   const SensorCalibration found = calibrate_sensor(letters.presses, {}, {});
   expect_complete(found, 60);
   EXPECT_TRUE(found.sensor.features->objects.contains("R"));
-  EXPECT_FALSE(found.groups || found.sensor.bins || found.sensor.fit_scale->stranger_sd);
+  EXPECT_FALSE(found.groups || found.sensor.bins || found.sensor.fit_scale->stranger_sd ||
+               found.sensor.fit_scale->alone);
   EXPECT_EQ(found.sensor.temperature_growth, 0.0);
   EXPECT_FALSE(found.sensor.psf_mm.has_value());
   EXPECT_NEAR(found.sensor.spread_mm, 0.6 * 1.9, 0.1) << "of the spacing";

@@ -141,6 +141,20 @@ TEST_F(SetupTouches, TellThePitchAndTheUnitsOfPoses) {
   EXPECT_NEAR(found.elements_mm[0].x, digitacts_array()[0].x, 0.15);
 }
 
+TEST_F(SetupTouches, TellMetresWhereAnglesInRadiansCountTurns) {
+  std::vector<Recording> recordings = touches(digitacts_array());
+  for (Recording& recording : recordings) {
+    for (std::size_t i = 0; i < recording.size(); ++i) {
+      Pose& pose = recording.T_robot_sensor[i];
+      pose.translation_mm /= 1000.0;
+      pose.theta_rad += i % 2 == 0 ? 2.0 * std::numbers::pi : 0.0;
+    }
+  }
+  const SetupCheck found = check(recordings);
+  ASSERT_EQ(found.findings.size(), 1u);
+  EXPECT_THAT(found.findings[0].options, ElementsAre("pose-unit m,rad"));
+}
+
 TEST_F(SetupTouches, TellDeadAndStuckElementsAndTouchesOfAnotherPlace) {
   std::vector<Recording> recordings = touches(digitacts_array(), false, 60);
   for (Recording& recording : recordings) {

@@ -303,6 +303,15 @@ TEST(FitScale, IsWhatTouchesOfTheirOwnObjectShow) {
   EXPECT_EQ(shared.of({.z = -17.0}, 4).z, -1.0) << "variances of 9 and 4 times 4";
 }
 
+TEST(FitScale, OfOneTouchIsThatOfTouchesWhereTheyFitBest) {
+  const FitScale scale{
+      .mean = 1.0, .sd = 2.0, .shared_sd = 1.0, .alone = FitScale::Alone{1.5, 0.5}};
+  EXPECT_EQ(scale.of({.z = 0.5}, 1).z, -2.0);
+  // What the search for the pose gained is shared by more and more deviations.
+  EXPECT_DOUBLE_EQ(scale.of({.z = 2.0 + 0.5 / 2.0}, 4).z, 0.0);
+  EXPECT_DOUBLE_EQ(scale.of({.z = 3.0 + 0.5 / 3.0 - std::sqrt(13.0)}, 9).z, -1.0);
+}
+
 TEST(FitScale, OfMeanZeroAndSdOneChangesNothing) {
   for (const Fit fit : {Fit{.z = -2.9}, Fit{.z = -3.2, .verdict = Verdict::doubtful},
                         Fit{.z = -4.2, .verdict = Verdict::does_not_fit}}) {

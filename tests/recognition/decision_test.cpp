@@ -64,6 +64,13 @@ TEST(Decision, SaysWhatSpeaksAgainst) {
   EXPECT_EQ(refused(step),
             "11 % of the belief lies elsewhere: L at x 1.00 mm, y -2.00 mm, theta 28.65 deg");
 
+  std::vector<Hypothesis> sides(2, shapes()[0]);
+  sides[1].mirrored = true;
+  step.places.modes.back().object = 1;
+  EXPECT_EQ(decide(step, RecognitionTask(sides, options)).because,
+            "11 % of the belief lies elsewhere: L mirrored at x 1.00 mm, y -2.00 mm, theta 28.65 "
+            "deg");
+
   step = good_step();
   step.places.within_mm = 0.8;
   EXPECT_EQ(refused(step), "95 % of the belief lies within 0.80 mm of the pose, not within 0.5 mm");

@@ -88,6 +88,25 @@ TEST(LabelProbability, IsTemperedMoreWithEveryTouch) {
   }
 }
 
+TEST(LabelProbability, IsNotTemperedByTouchesThatTellNothing) {
+  RecognitionTask task = three_maps();
+  task.temperature_growth = 0.5;
+  task.familiarity = Familiarity{};
+  const Press press;
+  std::vector<TouchEvidence> touches = evidence_of(std::vector(1, press.touch()), task.contact());
+  const RecognitionStep one = judge(four_to_one(), {}, task, touches);
+  ASSERT_TRUE(one.known);
+  TouchEvidence silent = touches.front();
+  silent.readings.assign(silent.readings.size(), Reading::unknown);
+  silent.contacts = 0;
+  touches.insert(touches.begin(), silent);
+  const RecognitionStep two = judge(four_to_one(), {}, task, touches);
+  EXPECT_EQ(two.identity, one.identity);
+  EXPECT_EQ(two.known, one.known);
+  touches.push_back(touches.back());
+  EXPECT_FALSE(judge(four_to_one(), {}, task, touches).known) << "two touches tell";
+}
+
 TEST(LabelProbability, TempersNoneOfTheseToo) {
   RecognitionTask task = three_maps(HistogramOptions{.none_weight = 1.0});
   task.temperature = 2.0;

@@ -19,6 +19,8 @@
 
 namespace palpate::resolve_test {
 
+using testing::AllOf;
+using testing::ElementsAre;
 using testing::HasSubstr;
 
 Request request_of_shapes() {
@@ -145,6 +147,24 @@ TEST(Resolve, TheFitsScaleIsOfTouchesThatMapsHadNotSeen) {
   EXPECT_GT(task_of(request).fit_scale.shared_sd, 0.3);
   request.given_maps[0].hypothesis.map.source.reset();
   EXPECT_EQ(task_of(request).fit_scale.mean, 1.5) << "of the maps that have one";
+}
+
+TEST(Resolve, BinsOfALargeRegionResolveTheMapsWhereThePivotLiesAtATouch) {
+  Request request = request_of_learned();
+  request.x_mm = request.y_mm = std::array{-200.0, 200.0};
+  request.bins = std::array{800, 800, 200};
+  request.filter = FilterKind::bounded;
+  const RecognitionTask far = task_of(request);
+  EXPECT_EQ(far.fit_scale.mean, 0.0);
+  EXPECT_EQ(far.labels.size(), 2u);
+  EXPECT_THAT(far.remarks, ElementsAre(AllOf(HasSubstr("an object 283 mm from the pivot by 8.9 mm"),
+                                             HasSubstr("\"(none)\" is left out"),
+                                             HasSubstr("`pivot-mm auto`"))));
+  request.pivot_mm = Automatic{};
+  const RecognitionTask near = task_of(request);
+  EXPECT_EQ(near.fit_scale.mean, 1.0);
+  EXPECT_EQ(near.labels.back(), none_label);
+  EXPECT_THAT(near.remarks, testing::IsEmpty());
 }
 
 TEST(Resolve, TouchesThatAreJudgedOtherwiseHaveNoScale) {

@@ -44,6 +44,16 @@ TEST(TouchDetector, FindsNothingInNoise) {
   EXPECT_TRUE(touches_in(PressStream{.noise = 0.7}.frames(20.0, untouched)).empty());
 }
 
+TEST(TouchDetector, NoiseOfItsFirstFramesIsNoTouch) {
+  TouchDetector detector({}, std::vector<double>(4, 0.0), {});
+  for (int i = 0; i < 100; ++i) {
+    const Frame frame{.host_time_s = stream_begin_s + 0.01 * i,
+                      .values = std::vector<double>(4, i < 2 ? 3.0 : 0.0)};
+    EXPECT_FALSE(detector.add(frame));
+    EXPECT_FALSE(detector.touching()) << i;
+  }
+}
+
 TEST(TouchDetector, ScalesWithTheUnit) {
   std::vector<Frame> frames = PressStream{}.frames(3.0, presses);
   const std::vector<DetectedTouch> kpa = touches_in(frames);

@@ -32,7 +32,7 @@ nlohmann::ordered_json setup(const SensorDescription& sensor,
       {"labels", task.labels},
       {"live", true}};
   for (int i = 0; i < static_cast<int>(task.hypotheses.size()); ++i) {
-    json["maps"].push_back(mode_words(i, task));
+    json["maps"].push_back(task.name_of(i));
   }
   if (plan) {
     json["plan"] = goal_word(*plan);

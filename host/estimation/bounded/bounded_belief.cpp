@@ -114,7 +114,7 @@ void BoundedBelief::take_in() {
 SearchGoal BoundedBelief::goal(double tolerance) const {
   SearchGoal goal{tolerance, options().evidence_nats, options().evidence_range_nats};
   goal.poor_bins = options().poor_bins;
-  const std::size_t touches = touches_.taken_in();
+  const std::size_t touches = touches_.telling();
   if (touches == 1) {
     goal.evidence_range_nats =
         std::max(goal.evidence_range_nats, options().single_touch_range_nats);

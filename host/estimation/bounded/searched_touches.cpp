@@ -38,6 +38,7 @@ void SearchedTouches::reset() {
   change_.forget();
   touches_.clear();
   taken_in_ = 0;
+  telling_ = 0;
   elements_ = {};
   search_.largest().reset();
   if (moving_) {
@@ -80,6 +81,7 @@ void SearchedTouches::take_in() {
       none_->add(added);
     }
     taken_in_ = touches_.size();
+    telling_ += static_cast<std::size_t>(std::ranges::count_if(added, &TouchEvidence::tells));
   });
 }
 
@@ -154,7 +156,7 @@ void SearchedTouches::follow(FollowedBins& bins) const {
   if (!touch.touches.empty()) {
     // Displaced touches without known elements are not among the elements.
     const auto displaced =
-        static_cast<std::size_t>(std::ranges::count_if(touches_.all().first(next), any_known));
+        static_cast<std::size_t>(std::ranges::count_if(touches_.all().first(next), &TouchEvidence::tells));
     touch.touches.front() = elements_.touches[displaced];
     for (std::size_t i = 0; i < most.size(); ++i) {
       most[i] = std::min(most[i], search_.largest().most(displaced, i));

@@ -41,17 +41,27 @@ inline constexpr double scaled_doubtful_from_z = -5.0;
 /// of a large array are far from independent, as z takes them to be, maps are not perfect, and a
 /// sensor may err more or less often than Eq. 7 says.
 struct PALPATE_API FitScale {
-  double mean = 0.0;       ///< of the z of single touches
+  /// Of the z of single touches where they fit best.
+  struct Alone {
+    double mean = 0.0;
+    double sd = 1.0;
+  };
+
+  double mean = 0.0;       ///< of the z of single touches at their own poses
   double sd = 1.0;         ///< their standard deviation, but for what all touches share
   double shared_sd = 0.0;  ///< of what all touches of an object share, such as its map's errors
+  /// One touch fits some object at some pose better than its own, and z varies less there. None: it
+  /// is not known how much.
+  std::optional<Alone> alone = {};
   /// What every touch after the first adds to the standard deviation of z on this scale where the
   /// object was never learned; none: Palpate's own figure.
   std::optional<double> stranger_sd = {};
 
   /// The fit on this scale: (z - mean sqrt(n)) / sqrt(sd^2 + n shared_sd^2), within
   /// +-`largest_fit_z`, with its verdict. The deviations of n independent touches add up, and so do
-  /// their variances; what they share counts n times. The scale of mean 0 and sd 1 leaves the fit
-  /// as it is.
+  /// their variances; what they share counts n times. What the search for the pose gains in
+  /// likelihood stays the same, and so adds (alone.mean - mean) / sqrt(n) to the mean; of one touch
+  /// `alone` is the whole scale. The scale of mean 0 and sd 1 leaves the fit as it is.
   /// @param touches n, those with an element In Contact
   Fit of(const Fit& fit, std::size_t touches) const;
 };
