@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <numeric>
 
 #include <fmt/format.h>
 
@@ -108,9 +109,10 @@ std::string summary(const LiveState& state, std::vector<double> latencies_ms,
   }
   text += "\n";
   if (!latencies_ms.empty()) {
-    const auto middle = latencies_ms.begin() + static_cast<std::ptrdiff_t>(latencies_ms.size() / 2);
-    std::nth_element(latencies_ms.begin(), middle, latencies_ms.end());
-    text += fmt::format("from frame to estimate: median {:.2f} ms, worst {:.2f} ms\n", *middle,
+    std::ranges::sort(latencies_ms);
+    const std::size_t n = latencies_ms.size();
+    text += fmt::format("from frame to estimate: median {:.2f} ms, worst {:.2f} ms\n",
+                        std::midpoint(latencies_ms[(n - 1) / 2], latencies_ms[n / 2]),
                         state.worst_latency_ms);
   }
   return text;

@@ -155,12 +155,11 @@ std::string symmetries(const std::vector<RecognitionRecord>& records, const Reco
       const std::string given =
           n == 0 ? "as 0" : fmt::format("from {:.4g} to {:.4g} deg", -180.0 / n, 180.0 / n);
       // Touches may tell the turns of a map that looks alike apart.
-      text += fmt::format("{} looks the same after {}{}: its theta is given {}\n", printable(label),
-                          n == 0 ? "any turn" : fmt::format("every 1/{} of a turn", n),
-                          counts.size() > 1
-                              ? fmt::format(" by the touches of {} of these unknowns", count)
-                              : "",
-                          given + (counts.size() > 1 ? " there" : ""));
+      text += fmt::format(
+          "{} looks the same after {}{}: its theta is given {}\n", printable(label),
+          n == 0 ? "any turn" : fmt::format("every 1/{} of a turn", n),
+          counts.size() > 1 ? fmt::format(" by the touches of {} of these unknowns", count) : "",
+          given + (counts.size() > 1 ? " there" : ""));
     }
   }
   return text;
@@ -285,8 +284,7 @@ std::string result_table(const std::vector<RecognitionRecord>& records, const Re
                  "", ""});
     }
     if (step.refined) {
-      add_pose("  mode", task.name_of(step.mode.object), step.mode_T_robot_object(),
-               step.error_mm);
+      add_pose("  mode", task.name_of(step.mode.object), step.mode_T_robot_object(), step.error_mm);
     }
     if (const std::optional<Pose> truth = step.true_T_robot_object()) {
       add_pose("  truth", step.truth.label, *truth, step.pose_error_mm());

@@ -41,10 +41,9 @@ std::vector<RecognitionSheet::Caption> captions(const RecognitionRecord& record,
   const std::vector<BeliefMode> other = other_modes(last);
   std::string others;
   for (std::size_t k = 0; k < std::min(other.size(), shown); ++k) {
-    others +=
-        fmt::format("{}{:.0f} % {} at {}", k == 0 ? "or " : ", ", 100.0 * other[k].probability,
-                    printable(task.name_of(other[k].object)),
-                    pose_words(pose_text(other[k].pose.T_robot_object)));
+    others += fmt::format("{}{:.0f} % {} at {}", k == 0 ? "or " : ", ",
+                          100.0 * other[k].probability, printable(task.name_of(other[k].object)),
+                          pose_words(pose_text(other[k].pose.T_robot_object)));
   }
   others += other.size() > shown ? fmt::format(", and {} more", other.size() - shown) : "";
   add(printed(others), true);
@@ -114,9 +113,9 @@ RecognitionSheet sheet_of(const RecognitionRecord& record, const Unknown& unknow
   sheet.belief = std::move(belief);
   for (std::size_t i = 0; i < last.places.modes.size(); ++i) {
     const BeliefMode& mode = last.places.modes[i];
-    sheet.modes.push_back({fmt::format("{} {:.1f} %", printable(task.name_of(mode.object)),
-                                       100.0 * mode.probability),
-                           mode.pose, i == last.places.own});
+    sheet.modes.push_back(
+        {fmt::format("{} {:.1f} %", printable(task.name_of(mode.object)), 100.0 * mode.probability),
+         mode.pose, i == last.places.own});
   }
   sheet.labels = task.labels;
   for (const Touch& touch : unknown.touches) {

@@ -280,7 +280,9 @@ void draw_touches(Canvas& canvas, const RecognitionSheet& sheet) {
     };
   };
   legend.add(36.0, sample(touch_pen), "touches");
-  legend.add(36.0, sample(mode_pen), "68, 95 %");
+  if (!sheet.modes.empty()) {
+    legend.add(36.0, sample(mode_pen), "68, 95 %");
+  }
   if (!actual.empty()) {
     legend.add(36.0, sample(truth_pen), meaning_of_truth(sheet, "true outline"));
   }

@@ -52,8 +52,8 @@ void check_units(SetupJudge& judge, Setup& setup, double& nats,
   // An angle that counts turns exceeds a circle in radians, too.
   std::optional<PoseUnit> best;
   double gain = least_nats;
-  for (const PoseUnit& unit : {PoseUnit{may_be_metres, may_be_degrees}, PoseUnit{may_be_metres, false},
-                               PoseUnit{false, may_be_degrees}}) {
+  for (const PoseUnit& unit : {PoseUnit{may_be_metres, may_be_degrees},
+                               PoseUnit{may_be_metres, false}, PoseUnit{false, may_be_degrees}}) {
     if (!unit.metres && !unit.degrees) {
       continue;
     }

@@ -61,8 +61,8 @@ Fit FitScale::of(const Fit& fit, std::size_t touches) const {
   const double gained = alone ? (alone->mean - mean) / std::sqrt(n) : 0.0;
   const double spread =
       alone && touches == 1 ? alone->sd : std::sqrt(sd * sd + n * shared_sd * shared_sd);
-  const double z = std::clamp((fit.z - mean * std::sqrt(n) - gained) / spread, -largest_fit_z,
-                              largest_fit_z);
+  const double z =
+      std::clamp((fit.z - mean * std::sqrt(n) - gained) / spread, -largest_fit_z, largest_fit_z);
   return {.z = z, .verdict = verdict_on(z, scaled_fits_from_z, scaled_doubtful_from_z)};
 }
 

@@ -189,7 +189,7 @@ BeliefPlaces places_of(const Recogniser& recogniser, const Estimate& estimate,
     }
     std::vector<PartAway> parts = parts_away(belief.of, belief.bins, step.pose());
     const double near = share_within(parts, neighbourhood_mm);
-    places.share = of_label * near;
+    places.share = std::min(of_label * near, of_label);  // shares round
     const auto bins_near = std::ranges::count_if(
         parts, [](const PartAway& part) { return part.mm <= neighbourhood_mm; });
     const double flat = static_cast<double>(bins_near) / static_cast<double>(lattice.bins());

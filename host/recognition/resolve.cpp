@@ -283,8 +283,7 @@ RecognitionTask resolve(const Request& request, const Circumstances& of) {
   constexpr double far_wider = 8.0;
   constexpr double far_from_independent = 5.0;
   const bool auto_pivot = inferred || has_auto_pivot(request);
-  const std::optional<double> near_mm =
-      auto_pivot ? std::optional(of.reach_mm) : std::nullopt;
+  const std::optional<double> near_mm = auto_pivot ? std::optional(of.reach_mm) : std::nullopt;
   const bool far_too_wide =
       !bin_width && !resolves(histogram.lattice, hypotheses, far_wider, near_mm);
   const bool without_none = far_too_wide && !request.none && !need.learned_only;

@@ -65,7 +65,8 @@ TEST(UnprovenSentence, SaysTheBoundsAndWhatEndedTheSearch) {
   EXPECT_EQ(unproven_sentence(record_of(0.37, {{1.0, 1.0}, {0.0, 0.0}}).last(), task_with({})),
             "rounding left 37 % of the belief unproven; A has 100.0 % all the same");
   const auto with_poor_fits = [](std::int64_t bins) {
-    return RecognitionTask({{sample_map("A")}, {sample_map("I")}}, BoundedOptions{.poor_bins = bins});
+    return RecognitionTask({{sample_map("A")}, {sample_map("I")}},
+                           BoundedOptions{.poor_bins = bins});
   };
   const RecognitionRecord little = record_of(2.3e-6, {{1.0, 1.0}, {0.0, 0.0}});
   EXPECT_EQ(unproven_sentence(little.last(), with_poor_fits(1234)),

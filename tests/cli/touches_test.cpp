@@ -246,7 +246,7 @@ TEST_F(TouchesCommand, TellsOfAnArrayThatNeverReleases) {
   const Outcome outcome = palpate({"touches", "f.h5", "-o", "t.h5", "--tare", "0"});
   EXPECT_EQ(outcome.status, 0);
   expect_named(outcome.out, {"t.h5: 1 touches"});
-  expect_named(outcome.err, {"palpate: f.h5: the array never reads below 1 kPa from 0.00 s on",
+  expect_named(outcome.err, {"palpate: f.h5: the array never reads below 1 kPa from 0.06 s on",
                              "give --tare, or raise --onset"});
   EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
   // Where a touch that is nowhere steady is all there is, nothing is written.
@@ -268,7 +268,7 @@ TEST_F(TouchesCommand, TellsOfElementsThatNeverRelease) {
   };
   const Outcome all = stuck_from(0);
   EXPECT_EQ(all.status, 0);
-  expect_named(all.err, {"palpate: stuck.h5: elements 4, 31 never read below 1 kPa from 0.00 s on",
+  expect_named(all.err, {"palpate: stuck.h5: elements 4, 31 never read below 1 kPa from 0.06 s on",
                          "'valid'", "--tare"});
   // The first press is over at frame 230 of 461; the stuck elements begin another touch.
   const Outcome later = stuck_from(215);

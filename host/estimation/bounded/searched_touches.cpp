@@ -155,8 +155,8 @@ void SearchedTouches::follow(FollowedBins& bins) const {
   }
   if (!touch.touches.empty()) {
     // Displaced touches without known elements are not among the elements.
-    const auto displaced =
-        static_cast<std::size_t>(std::ranges::count_if(touches_.all().first(next), &TouchEvidence::tells));
+    const auto displaced = static_cast<std::size_t>(
+        std::ranges::count_if(touches_.all().first(next), &TouchEvidence::tells));
     touch.touches.front() = elements_.touches[displaced];
     for (std::size_t i = 0; i < most.size(); ++i) {
       most[i] = std::min(most[i], search_.largest().most(displaced, i));

@@ -47,8 +47,8 @@ struct BoundedOptions {
   double evidence_range_nats = std::numeric_limits<double>::infinity();
   /// evidence_range_nats after a single touch, where this is wider.
   double single_touch_range_nats = 0.0;
-  /// Both grow by this part of themselves with every touch after the first, as a temperature does
-  /// that suits several touches. From 0.
+  /// Both grow by this part of themselves with every touch after the first that has a known
+  /// element, as a temperature does that suits several touches. From 0.
   double evidence_growth = 0.0;
   /// Bins to evaluate before a search ends with what it has proven, where no bin of these explains
   /// the touches: where the best costs more than three quarters of the nats that they cost in
