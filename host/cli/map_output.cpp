@@ -91,6 +91,13 @@ void write_maps(const MapFlags& flags, const std::vector<OccupancyGrid>& maps,
     if (symmetry) {
       fmt::print("{}: {}\n", path.string(), symmetry_words(map, *symmetry));
     }
+    if (const auto sides = map.mirror ? measure_mirror_symmetry(map) : std::nullopt;
+        sides && sides->alike()) {
+      fmt::print(
+          "{}: {} looks the same as its mirror image, within {:.2f} mm: touches cannot tell "
+          "its sides apart, and each gets half of the belief; build its map without --mirror\n",
+          path.string(), map.label, sides->apart_mm);
+    }
   }
   beside();
   for (const OccupancyGrid& map : maps) {

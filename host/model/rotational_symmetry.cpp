@@ -145,6 +145,23 @@ class TurnedMap {
   std::vector<float> log_odds_;  ///< [ny, nx], clipped; NaN: not seen
 };
 
+constexpr double circle_rad = 2.0 * std::numbers::pi;
+constexpr double least_cells = 16.0;
+
+double tolerance_mm(const OccupancyGrid& map) {
+  // Among 47 simulated shapes, symmetric ones stay below 0.45 of the detail, others above 0.65.
+  constexpr double of_detail = 0.5;
+  // Interpolation finds an edge within half a cell.
+  return of_detail * (map.spread_mm ? std::max(*map.spread_mm, map.cell_mm / 2.0) : map.cell_mm);
+}
+
+/// Mean distance between outlines of which so large a share of the object falls on itself.
+double apart_mm(double likeness, const Occupied& occupied, const OccupancyGrid& map) {
+  // One half of the outline loses this area, the other half gains it.
+  const double lost = (1.0 - likeness) * occupied.cells;
+  return 2.0 * lost / occupied.outline * map.cell_mm;
+}
+
 }  // namespace
 
 int RotationalSymmetry::nearest() const {
@@ -153,40 +170,61 @@ int RotationalSymmetry::nearest() const {
 }
 
 std::optional<RotationalSymmetry> measure_symmetry(const OccupancyGrid& map) {
-  constexpr double least_cells = 16.0;
-  // Among 47 simulated shapes, symmetric ones stay below 0.45 of the detail, others above 0.65.
-  constexpr double tolerance = 0.5;
-  constexpr double circle_rad = 2.0 * std::numbers::pi;
   constexpr int angles = 8;  // over half a circle, as a turn by -a likens like one by a
   const Occupied occupied = occupied_cells(map);
   if (occupied.cells < least_cells) {
     return {};
   }
-  // Interpolation finds an edge within half a cell.
-  const double detail_mm =
-      map.spread_mm ? std::max(*map.spread_mm, map.cell_mm / 2.0) : map.cell_mm;
   const TurnedMap turned(map, occupied);
-  const auto apart_mm = [&](double turn_rad) {
-    // One half of the outline loses this area, the other half gains it.
-    const double lost = (1.0 - turned.likeness(turn_rad)) * occupied.cells;
-    return 2.0 * lost / occupied.outline * map.cell_mm;
+  const auto apart = [&](double turn_rad) {
+    return apart_mm(turned.likeness(turn_rad), occupied, map);
   };
-  RotationalSymmetry symmetry{.apart_mm = {}, .tolerance_mm = tolerance * detail_mm};
+  RotationalSymmetry symmetry{.apart_mm = {}, .tolerance_mm = tolerance_mm(map)};
   const auto most = static_cast<int>(symmetry.apart_mm.size()) - 1;
   for (int n = 2; n <= most; ++n) {
     for (int k = 1; 2 * k <= n; ++k) {
-      symmetry.apart_mm[n] = std::max(symmetry.apart_mm[n], apart_mm(circle_rad * k / n));
+      symmetry.apart_mm[n] = std::max(symmetry.apart_mm[n], apart(circle_rad * k / n));
     }
     symmetry.suggested = symmetry.apart_mm[n] <= symmetry.tolerance_mm ? n : symmetry.suggested;
   }
   for (int k = 0; k < angles; ++k) {
     const double turn_rad = circle_rad * (k + 0.5) / (2 * angles + 1);
-    symmetry.apart_mm[0] = std::max(symmetry.apart_mm[0], apart_mm(turn_rad));
+    symmetry.apart_mm[0] = std::max(symmetry.apart_mm[0], apart(turn_rad));
   }
   if (symmetry.apart_mm[0] <= symmetry.tolerance_mm) {
     symmetry.suggested = 0;
   }
   return symmetry;
+}
+
+std::optional<MirrorSymmetry> measure_mirror_symmetry(const OccupancyGrid& map) {
+  constexpr int angles = 36;
+  constexpr double finest_rad = 0.005;
+  Occupied mirrored = occupied_cells(map);
+  if (mirrored.cells < least_cells) {
+    return {};
+  }
+  for (glm::dvec2& p : mirrored.samples) {
+    p.x = -p.x;
+  }
+  const TurnedMap turned(map, mirrored);
+  double best_rad = 0.0;
+  double best = 0.0;
+  const auto look_at = [&](double turn_rad) {
+    if (const double likeness = turned.likeness(turn_rad); likeness > best) {
+      best = likeness;
+      best_rad = turn_rad;
+    }
+  };
+  for (int k = 0; k < angles; ++k) {
+    look_at(circle_rad * k / angles);
+  }
+  for (double step = circle_rad / angles / 2.0; step > finest_rad; step /= 2.0) {
+    const double middle = best_rad;
+    look_at(middle - step);
+    look_at(middle + step);
+  }
+  return MirrorSymmetry{apart_mm(best, mirrored, map), tolerance_mm(map)};
 }
 
 }  // namespace palpate

@@ -50,6 +50,10 @@ TEST_F(MapCommand, SaysAndStoresTheSymmetryThatTheMapsShow) {
   EXPECT_EQ(i.suggested_symmetry, 2);
   EXPECT_EQ(i.symmetry, 1) << "as given";
   EXPECT_EQ(read_map(folder_ / "maps/A.map.h5").suggested_symmetry, 1);
+  EXPECT_EQ(out.find("mirror image"), std::string::npos) << out;
+  EXPECT_NE(done({"map", "I.h5", "-o", "I.map.h5", "--mirror"})
+                .find("I looks the same as its mirror image, within 0."),
+            std::string::npos);
   const std::string given = done({"map", "I.h5", "-o", "I.map.h5", "--symmetry", "2"});
   EXPECT_EQ(given.find("--symmetry"), std::string::npos) << given;
   done({"map", "I.h5", "-o", "I.map.h5", "--symmetry", "1"});

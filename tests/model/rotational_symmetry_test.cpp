@@ -140,4 +140,20 @@ TEST(RotationalSymmetry, ComparesOnlyWhatWasSeen) {
   EXPECT_EQ(suggested(bare), 1);
 }
 
+TEST(MirrorSymmetry, IsThatOfTheLettersThatHaveAnAxis) {
+  for (const double turn_rad : {0.0, 0.4, 2.0}) {
+    for (const char* letter : {"A", "E", "I", "O", "U", "T", "H", "X"}) {
+      const auto sides = measure_mirror_symmetry(map_of(make_shape(letter), turn_rad));
+      ASSERT_TRUE(sides) << letter;
+      EXPECT_TRUE(sides->alike()) << letter << ": " << sides->apart_mm;
+    }
+    for (const char* letter : {"F", "L", "P", "R", "S", "Z", "N", "J"}) {
+      const auto sides = measure_mirror_symmetry(map_of(make_shape(letter), turn_rad));
+      ASSERT_TRUE(sides) << letter;
+      EXPECT_GT(sides->apart_mm, 1.2 * sides->tolerance_mm) << letter;
+    }
+  }
+  EXPECT_FALSE(measure_mirror_symmetry(OccupancyGrid{}));
+}
+
 }  // namespace palpate::rotational_symmetry_test

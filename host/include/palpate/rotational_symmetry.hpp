@@ -31,4 +31,18 @@ struct PALPATE_API RotationalSymmetry {
 /// @returns none where fewer than 16 cells are occupied
 PALPATE_API std::optional<RotationalSymmetry> measure_symmetry(const OccupancyGrid& map);
 
+/// How far an object is from looking like its mirror image, turned and shifted so that the two lie
+/// best on each other.
+struct PALPATE_API MirrorSymmetry {
+  double apart_mm = 0.0;      ///< mean distance between the outlines
+  double tolerance_mm = 0.0;  ///< as RotationalSymmetry::tolerance_mm
+
+  /// The object's two sides cannot be told apart.
+  bool alike() const { return apart_mm <= tolerance_mm; }
+};
+
+/// Compares as measure_symmetry() does.
+/// @returns none where fewer than 16 cells are occupied
+PALPATE_API std::optional<MirrorSymmetry> measure_mirror_symmetry(const OccupancyGrid& map);
+
 }  // namespace palpate
