@@ -114,10 +114,10 @@ void add_recognition_flags(CLI::App& command, Request& request, bool& verbose) {
                 "every place of an array that touches an object of the maps, or -10:10 where "
                 "counts of --bins, another range or a pivot X,Y is given]");
   add_text_flag(command, "--y-mm", request.y_mm, "Range of the pivot's y [default: as for --x-mm]");
-  add_text_flag(command, "--theta-deg", request.theta_deg,
-                "Range of theta of T_object_robot, degrees, at most 360 wide; -30:-30 fixes it, "
-                "for an object "
-                "that lies at 30 degrees in the robot frame [default: 0:360]");
+  add_text_flag(
+      command, "--theta-deg", request.theta_deg,
+      "Range of theta of T_object_robot, degrees, at most 360 wide; --theta-deg=-30:-30 fixes it, "
+      "for an object that lies at 30 degrees in the robot frame [default: 0:360]");
   add_text_flag(
       command, "--pivot-mm", request.pivot_mm,
       "Point X,Y in the robot frame, mm, about which theta turns; the bins' x and y are the "
