@@ -47,7 +47,7 @@ void describe(Keys& keys, Familiarity& familiarity) {
 }
 
 template <typename Keys>
-void describe(Keys& keys, FitScale::Alone& alone) {
+void describe(Keys& keys, SingleFitScale& alone) {
   keys("mean", alone.mean);
   keys("sd", alone.sd);
 }

@@ -140,7 +140,7 @@ TEST_F(InfoCommand, SensorModel) {
       .familiarity = Familiarity{.offset = 6.0, .explained_slope = 12.0, .lead_slope = 0.5},
       .fit_scale =
           FitScale{
-              .mean = -4.5, .sd = 12.25, .alone = FitScale::Alone{1.5, 0.75}, .stranger_sd = 3.5},
+              .mean = -4.5, .sd = 12.25, .alone = SingleFitScale{1.5, 0.75}, .stranger_sd = 3.5},
       .pose_scale = PoseScale{.factor = 0.75, .map_sd_mm = 0.125}};
   sensor.maps = {{"pen.map.h5", "1a"}, {"mug.map.h5", "2b"}};
   sensor.table->shared.assign(3 * ReadingLayer::nodes, -1.0);

@@ -24,7 +24,7 @@ LearnedSensor full_sensor() {
       .fit_scale = FitScale{.mean = -4.5,
                             .sd = 12.25,
                             .shared_sd = 0.5,
-                            .alone = FitScale::Alone{1.5, 0.75},
+                            .alone = SingleFitScale{1.5, 0.75},
                             .stranger_sd = 3.25}};
   LearnedTable& table = *sensor.table;
   table.layer = {.of = MapLayer::mean_level,

@@ -304,8 +304,7 @@ TEST(FitScale, IsWhatTouchesOfTheirOwnObjectShow) {
 }
 
 TEST(FitScale, OfOneTouchIsThatOfTouchesWhereTheyFitBest) {
-  const FitScale scale{
-      .mean = 1.0, .sd = 2.0, .shared_sd = 1.0, .alone = FitScale::Alone{1.5, 0.5}};
+  const FitScale scale{.mean = 1.0, .sd = 2.0, .shared_sd = 1.0, .alone = SingleFitScale{1.5, 0.5}};
   EXPECT_EQ(scale.of({.z = 0.5}, 1).z, -2.0);
   // What the search for the pose gained is shared by more and more deviations.
   EXPECT_DOUBLE_EQ(scale.of({.z = 2.0 + 0.5 / 2.0}, 4).z, 0.0);

@@ -37,22 +37,22 @@ inline constexpr double scaled_fits_from_z = -3.5;
 /// ... and about 0.1 % are below this z.
 inline constexpr double scaled_doubtful_from_z = -5.0;
 
+/// The mean and standard deviation of the z of single touches where they fit best.
+struct PALPATE_API SingleFitScale {
+  double mean = 0.0;
+  double sd = 1.0;
+};
+
 /// What z is like for touches of an object on a map that had not seen them. Neighbouring elements
 /// of a large array are far from independent, as z takes them to be, maps are not perfect, and a
 /// sensor may err more or less often than Eq. 7 says.
 struct PALPATE_API FitScale {
-  /// Of the z of single touches where they fit best.
-  struct Alone {
-    double mean = 0.0;
-    double sd = 1.0;
-  };
-
   double mean = 0.0;       ///< of the z of single touches at their own poses
   double sd = 1.0;         ///< their standard deviation, but for what all touches share
   double shared_sd = 0.0;  ///< of what all touches of an object share, such as its map's errors
   /// One touch fits some object at some pose better than its own, and z varies less there. None: it
   /// is not known how much.
-  std::optional<Alone> alone = {};
+  std::optional<SingleFitScale> alone = {};
   /// What every touch after the first adds to the standard deviation of z on this scale where the
   /// object was never learned; none: Palpate's own figure.
   std::optional<double> stranger_sd = {};
