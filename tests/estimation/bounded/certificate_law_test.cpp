@@ -1,6 +1,8 @@
 // The certificate against the posterior over all bins in float64, over many unknowns.
 
 #include <cmath>
+#include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -109,6 +111,14 @@ TEST(CertificateLaw, BoundsEvidenceLessCloselyWithEveryTouchWhereAskedTo) {
                 reference_posterior(trial.objects, trial.options, std::span(touches).first(1)))
                 .widest_nats,
             0.001);
+  // A touch that tells nothing does not count.
+  const std::int64_t bins = posterior.estimate().certificate->bins_evaluated;
+  const std::vector<double> nothing(touches.front().pressure.size(),
+                                    std::numeric_limits<double>::quiet_NaN());
+  Touch silent = touches.front();
+  silent.pressure = nothing;
+  posterior.update(std::span(&silent, 1));
+  EXPECT_EQ(posterior.estimate().certificate->bins_evaluated, bins);
 }
 
 TEST(CertificateLaw, KeepsEveryTolerance) {
