@@ -152,14 +152,15 @@ std::string symmetries(const std::vector<RecognitionRecord>& records, const Reco
       if (n == 1) {
         continue;
       }
-      const std::string given =
-          n == 0 ? "as 0" : fmt::format("from {:.4g} to {:.4g} deg", -180.0 / n, 180.0 / n);
       // Touches may tell the turns of a map that looks alike apart.
+      const std::string whose =
+          counts.size() == 1
+              ? ": its"
+              : fmt::format(", as far as the touches of {} of these unknowns tell: their", count);
       text += fmt::format(
-          "{} looks the same after {}{}: its theta is given {}\n", printable(label),
-          n == 0 ? "any turn" : fmt::format("every 1/{} of a turn", n),
-          counts.size() > 1 ? fmt::format(" by the touches of {} of these unknowns", count) : "",
-          given + (counts.size() > 1 ? " there" : ""));
+          "{} looks the same after {}{} theta is given {}\n", printable(label),
+          n == 0 ? "any turn" : fmt::format("every 1/{} of a turn", n), whose,
+          n == 0 ? "as 0" : fmt::format("from {:.4g} to {:.4g} deg", -180.0 / n, 180.0 / n));
     }
   }
   return text;
@@ -269,7 +270,7 @@ std::string result_table(const std::vector<RecognitionRecord>& records, const Re
     if (!share.empty()) {  // the pose has not the probability of the best label
       row.insert(row.end(), 4, "");
       table.add(row);
-      row = {"  pose", "", "", task.name_of(step.mode.object), share, ""};
+      row = {"  pose", "", "", printable(task.name_of(step.mode.object)), share, ""};
     }
     row.insert(row.end(), {pose[0], pose[1], pose[2], fit_words(step)});
     table.add(row);

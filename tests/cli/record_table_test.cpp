@@ -105,6 +105,19 @@ TEST(ResultTable, SaysFirstWhetherToActAndBelowWhereElseTheObjectMayBe) {
   EXPECT_EQ(json["modes"][1]["covariance"][1][1], 0.09);
 }
 
+TEST(ResultTable, SaysForHowManyUnknownsTurnsCountAsEqual) {
+  RecognitionRecord record = sample_record("mug.h5");
+  EXPECT_THAT(result_table({record}, sample_task(), {}), Not(HasSubstr("looks the same")));
+  RecognitionRecord folded = record;
+  folded.trace.back().symmetry = 2;
+  EXPECT_THAT(result_table({folded}, sample_task(), {}),
+              HasSubstr("A looks the same after every 1/2 of a turn: its theta is given from -90 "
+                        "to 90 deg\n"));
+  EXPECT_THAT(result_table({record, folded, folded}, sample_task(), {}),
+              HasSubstr("A looks the same after every 1/2 of a turn, as far as the touches of 2 of "
+                        "these unknowns tell: their theta is given from -90 to 90 deg\n"));
+}
+
 TEST(ResultTable, GivesThePoseItsOwnShareOfTheBelief) {
   RecognitionRecord record = sample_record("mug.h5");
   RecognitionStep& step = record.trace.back();
