@@ -18,7 +18,6 @@
 #include "cli/options.hpp"
 #include "cli/progress.hpp"
 #include "cli/recognition_flags.hpp"
-#include "cli/terminal.hpp"
 #include "learning/calibration_task.hpp"
 #include "palpate/files.hpp"
 #include "recognition/recordings.hpp"
@@ -131,8 +130,7 @@ void calibrate(const CalibrateArguments& options) {
     }
     write_file(options.write_array, array_table(array_mm));
   }
-  fmt::print("{}",
-             calibration_text(calibration, task.presses.size(), terminal_columns(STDOUT_FILENO)));
+  fmt::print("{}", calibration_text(calibration, task.presses.size()));
   std::ranges::for_each(calibration.warnings, tell_on_stderr);
   if (calibration.array_offset && options.write_array.empty()) {
     fmt::print("palpate calibrate --write-array FILE writes the corrected array\n");

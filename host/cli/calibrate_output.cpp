@@ -24,7 +24,7 @@ namespace {
 
 std::string short_number(double value) { return fmt::format("{:.3g}", value); }
 
-std::string values_table(const SensorCalibration& calibration, std::optional<int> columns) {
+std::string values_table(const SensorCalibration& calibration) {
   const LearnedSensor& sensor = calibration.sensor;
   const LearnedSensor initial;
   const bool raw = sensor.pressure_unit == "raw";
@@ -64,24 +64,24 @@ std::string values_table(const SensorCalibration& calibration, std::optional<int
                  fmt::format("+- {:.2g} more", *learned)});
     }
   }
-  return table.text(columns);
+  return table.text();
 }
 
 std::string scores_table(const std::string& title, const char* records, const Scores& before,
-                         const Scores& learned, const Scores& after, std::optional<int> columns) {
+                         const Scores& learned, const Scores& after) {
   TextTable table({{title, false}, {"Eq. 7", true}, {"table", true}, {"table, tempered", true}});
   table.add({records, fmt::format("{}", before.records), fmt::format("{}", learned.records),
              fmt::format("{}", after.records)});
   add_score_rows(table, {&before, &learned, &after});
-  return table.text(columns);
+  return table.text();
 }
 
-std::string scores_tables(const SensorCalibration& calibration, std::optional<int> columns) {
+std::string scores_tables(const SensorCalibration& calibration) {
   std::string text = scores_table("cross-validation", "touches", *calibration.before,
-                                  *calibration.table, *calibration.after, columns);
+                                  *calibration.table, *calibration.after);
   if (const auto& groups = calibration.groups) {
     text += "\n" + scores_table(fmt::format("{} touches together", groups->touches), "unknowns",
-                                groups->before, groups->table, groups->after, columns);
+                                groups->before, groups->table, groups->after);
   }
   return text;
 }
@@ -196,13 +196,12 @@ std::string unlearned_strangers(const LearnedSensor& sensor) {
          "give 15 touches or more of each of three objects";
 }
 
-std::string calibration_text(const SensorCalibration& calibration, std::size_t touches,
-                             std::optional<int> columns) {
+std::string calibration_text(const SensorCalibration& calibration, std::size_t touches) {
   std::string text = fmt::format("{} touches, {}\n\n", touches,
                                  count_of(calibration.objects, "object", "objects"));
-  text += values_table(calibration, columns);
+  text += values_table(calibration);
   if (calibration.before) {
-    text += "\n" + scores_tables(calibration, columns);
+    text += "\n" + scores_tables(calibration);
   }
   if (calibration.tried.size() > 1) {
     text += "tables tried, with their log-loss:";

@@ -15,9 +15,7 @@ std::string unlearned_strangers(const LearnedSensor& sensor);
 
 /// What was learned beside the defaults, and how good it is on touches that it has not seen.
 /// @param touches number of touches
-/// @param columns see TextTable::text()
-std::string calibration_text(const SensorCalibration& calibration, std::size_t touches,
-                             std::optional<int> columns);
+std::string calibration_text(const SensorCalibration& calibration, std::size_t touches);
 
 /// Draws how likely each level of reading is over what a map says, beside Eq. 7, and returns the
 /// bytes of a PNG file.

@@ -15,7 +15,6 @@
 #include "cli/options.hpp"
 #include "cli/recognition_flags.hpp"
 #include "cli/results_folder.hpp"
-#include "cli/terminal.hpp"
 #include "recognition/batch/batch_task.hpp"
 #include "recognition/judged_results.hpp"
 #include "recognition/record_json.hpp"
@@ -84,8 +83,7 @@ void evaluate_results(const EvaluateArguments& options) {
     write_file(folder / confusion_name, draw_confusion(confusion_of(evaluation)));
     write_file(folder / picture_name, draw_reliability(reliability_of(evaluation)));
   }
-  give_result(options.json, json,
-              evaluation_text(evaluation, results.without_truth, terminal_columns(STDOUT_FILENO)));
+  give_result(options.json, json, evaluation_text(evaluation, results.without_truth));
 }
 
 }  // namespace

@@ -19,9 +19,7 @@ nlohmann::ordered_json to_json(const Evaluation& evaluation, std::size_t without
 
 /// The scores, the reliability bins that have records, a line for each class with what it was taken
 /// for, unknown classes and pose errors.
-/// @param columns see TextTable::text()
-std::string evaluation_text(const Evaluation& evaluation, std::size_t without_truth,
-                            std::optional<int> columns);
+std::string evaluation_text(const Evaluation& evaluation, std::size_t without_truth);
 
 /// Adds what scores say of some records: accuracy and its interval, log-loss, calibration error.
 /// @param columns of the table after the first; null: an empty cell

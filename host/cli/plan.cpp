@@ -20,7 +20,6 @@
 #include "cli/record_table.hpp"
 #include "cli/sheet.hpp"
 #include "cli/step_words.hpp"
-#include "cli/terminal.hpp"
 #include "cli/text_table.hpp"
 #include "figures/figures.hpp"
 #include "model/bounding_box.hpp"
@@ -40,7 +39,7 @@ std::string believed_words(const Plan& plan) {
       std::max(plan.both_nats - plan.identity_nats, 0.0));
 }
 
-std::string table_of(const Plan& plan, std::optional<int> columns) {
+std::string table_of(const Plan& plan) {
   constexpr std::size_t most_rows = 10;
   TextTable table(
       {{"rank", true},
@@ -60,7 +59,7 @@ std::string table_of(const Plan& plan, std::optional<int> columns) {
                plan.goal == PlanGoal::pose ? "" : fmt::format("{:.2f}", touch.gain.pose),
                std::to_string(touch.index)});
   }
-  return table.text(columns);
+  return table.text();
 }
 
 /// The plan in the form that other programs rely on.
@@ -91,16 +90,15 @@ nlohmann::ordered_json plan_json(const Plan& plan, const RecognitionTask& task,
 
 /// Whether to act, what is believed, the ten best candidates, what is wrong with the touches, and
 /// the best one.
-/// @param columns see TextTable::text()
-std::string plan_text(const Plan& plan, const RecognitionTask& task, std::optional<int> columns) {
+std::string plan_text(const Plan& plan, const RecognitionTask& task) {
   const std::string limit = in_flags(limit_words(plan));
   const std::string decision = decision_words(plan.record.last());
-  return fmt::format(
-      "{}{}\n{}\n\n{}{}{}\n{}, {} in {:.0f} ms\n", decision.empty() ? "" : decision + "\n",
-      result_words(plan.record.last(), task), believed_words(plan), table_of(plan, columns),
-      complaints({plan.record}, task), limit.empty() ? "" : limit + "\n",
-      next_touch_words(plan.ranked.front(), plan.goal),
-      count_of(plan.ranked.size(), "candidate", "candidates"), 1e3 * plan.seconds);
+  return fmt::format("{}{}\n{}\n\n{}{}{}\n{}, {} in {:.0f} ms\n",
+                     decision.empty() ? "" : decision + "\n",
+                     result_words(plan.record.last(), task), believed_words(plan), table_of(plan),
+                     complaints({plan.record}, task), limit.empty() ? "" : limit + "\n",
+                     next_touch_words(plan.ranked.front(), plan.goal),
+                     count_of(plan.ranked.size(), "candidate", "candidates"), 1e3 * plan.seconds);
 }
 
 /// The candidates about the places where the object may be.
@@ -200,9 +198,8 @@ void plan_touches(const PlanArguments& options) {
   if (!options.png.empty()) {
     write_file(options.png, draw_plan(figure_of(plan, task, unknown.touches)));
   }
-  give_result(
-      options.json, text_of(plan_json(plan, task, device_name(device)), 2),
-      plan_text(plan, task, terminal_columns(STDOUT_FILENO)) + setup_words(device, task) + "\n");
+  give_result(options.json, text_of(plan_json(plan, task, device_name(device)), 2),
+              plan_text(plan, task) + setup_words(device, task) + "\n");
   if (options.verbose) {
     print_engine(device, recogniser, task);
   }

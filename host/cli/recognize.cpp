@@ -21,7 +21,6 @@
 #include "cli/record_table.hpp"
 #include "cli/sheet.hpp"
 #include "cli/step_words.hpp"
-#include "cli/terminal.hpp"
 #include "cli/text_table.hpp"
 #include "io/atomic_file.hpp"
 #include "palpate/files.hpp"
@@ -51,7 +50,7 @@ std::string touch_sd_text(const TouchSdFit& fit) {
   };
   add("along x and y", fit.sd.mm, fit.standard_error.mm, "mm");
   add("angle", degrees(fit.sd.rad), degrees(fit.standard_error.rad), "deg");
-  std::string text = table.text({});
+  std::string text = table.text();
   text += fmt::format("{}, {}; log evidence {:.1f} nats above that of exact poses\n",
                       number_of(fit.unknowns, "unknown", "unknowns"),
                       number_of(fit.touches, "touch", "touches"), fit.evidence_gain);
@@ -294,13 +293,12 @@ void recognize(const RecognizeArguments& options) {
   if (options.json == "-") {
     fmt::print("{}", json_text);
   } else {
-    const std::optional<int> columns = terminal_columns(STDOUT_FILENO);
     if (request.trace) {
       for (const RecognitionRecord& record : records) {
-        fmt::print("{}\n", trace_table(record, task, columns));
+        fmt::print("{}\n", trace_table(record, task));
       }
     }
-    fmt::print("{}{}\n", result_table(records, task, columns), setup_words(device, task));
+    fmt::print("{}{}\n", result_table(records, task), setup_words(device, task));
   }
   if (options.verbose) {
     double seconds = 0.0;
