@@ -214,45 +214,4 @@ std::string evaluation_text(const Evaluation& evaluation, std::size_t without_tr
   return text;
 }
 
-ConfusionFigure confusion_of(const Evaluation& evaluation) {
-  ConfusionFigure figure;
-  figure.title = fmt::format("{} of {} right ({}, 95 % interval {})", evaluation.all.right,
-                             evaluation.all.records, percent(evaluation.all.accuracy()),
-                             range_words(evaluation.all.interval()));
-  figure.columns = evaluation.answers;
-  for (const ClassScores& scores : evaluation.classes) {
-    const std::string right = scores.known ? scores.label : std::string(none_label);
-    ConfusionFigure::Row row{class_name(scores), right, scores.taken, {}};
-    for (const std::size_t taken : scores.taken) {
-      row.proven.push_back(wilson_interval(static_cast<double>(taken), scores.records).low);
-    }
-    figure.rows.push_back(std::move(row));
-  }
-  return figure;
-}
-
-ReliabilityFigure::Curve curve_of(const char* name, const Scores& scores) {
-  ReliabilityFigure::Curve curve{
-      .name = fmt::format("{} ({}, calibration error {:.3f})", name,
-                          count_of(scores.records, "record", "records"), scores.calibration_error),
-      .points = {}};
-  for (const ReliabilityBin& bin : scores.bins) {
-    if (bin.records > 0) {
-      const Interval interval = bin.interval();
-      curve.points.push_back(
-          {bin.mean_confidence, bin.accuracy(), interval.low, interval.high, bin.records});
-    }
-  }
-  return curve;
-}
-
-ReliabilityFigure reliability_of(const Evaluation& evaluation) {
-  ReliabilityFigure figure;
-  figure.curves.push_back(curve_of("all", evaluation.all));
-  if (evaluation.known) {
-    figure.curves.push_back(curve_of("known classes", *evaluation.known));
-  }
-  return figure;
-}
-
 }  // namespace palpate::cli

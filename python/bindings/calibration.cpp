@@ -101,6 +101,9 @@ void bind_learned_sensor(nb::module_& module) {
                          {self.table->levels(), static_cast<std::size_t>(ReadingLayer::nodes)});
           },
           "[levels, nodes] log P(level | layer) in nats, of all objects together.")
+      .def("plot", plot_method, "ax"_a = nb::none(), plot_signature,
+           "Draws the probability of each level of reading over what the map says, with\n"
+           "Matplotlib. Returns the axes.")
       .def(
           "save",
           [](const LearnedSensor& self, const PathLike& file) {

@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy
 import pytest
 from conftest import Files, command, comparable, expect_refused
+from matplotlib.figure import Figure
 
 import palpate
 
@@ -76,6 +77,12 @@ def test_an_evaluation_has_the_numbers_of_the_command(tmp_path: pathlib.Path) ->
         assert given.error_mm == (expected["error_mm"]["median"], 2)
         assert given.refined_error_mm == (expected["refined_error_mm"]["median"], 2)
         assert (given.without_truth, given.failed) == (expected["without_truth"], 1)
+        counts = [int(text.get_text()) for text in given.plot(Figure().add_subplot()).texts]
+        assert counts == [count for row in expected["confusion"]["counts"] for count in row if count]
+        [*_, accuracy, _] = given.all.plot(Figure().add_subplot()).lines
+        assert [*zip(*accuracy.get_data(), strict=True)] == [
+            (each.mean_confidence, each.accuracy) for each in given.all.reliability if each.records
+        ]
 
 
 def test_what_is_recognised_can_be_evaluated(files: Files) -> None:
@@ -305,6 +312,9 @@ def test_a_calibration_is_that_of_the_command(
     levels = len(sensor.level_edges) + 2
     assert sensor.log_likelihood.shape == (levels, 49)
     assert numpy.allclose(numpy.exp(sensor.log_likelihood).sum(axis=0), 1)
+    lines = sensor.plot(Figure().add_subplot()).lines
+    assert numpy.allclose(sum(line.get_ydata() for line in lines), 1)
+    assert [*lines[0].get_xdata()[[0, -1]]] == [-8, 8] and len(lines) == levels
     assert (sensor.classifier.threshold == 2) == ("threshold" in options)
     assert sensor.stranger_sd is None
     assert ("goes by a figure of Palpate's own for how badly strangers fit" in said) == ("bins" in options)
