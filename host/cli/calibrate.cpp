@@ -100,11 +100,6 @@ void calibrate(const CalibrateArguments& options) {
     calibration = calibrate_sensor(task.presses, task.maps, task.options,
                                    [&](double fraction) { progress.show(fraction); });
   }
-  if (task.known_poses()) {
-    Device device = Device::open(options.device);
-    Progress progress("fitting the touches' poses");
-    add_touch_sd(device, task, calibration, [&](double fraction) { progress.show(fraction); });
-  }
   write_sensor_model(options.output, calibration.sensor);
   if (!options.write_array.empty()) {
     for (glm::dvec2& p : array_mm) {
@@ -188,8 +183,7 @@ void add_calibrate(CLI::App& app) {
                       "File for the array, CSV of x and y in mm, where drawn maps say that it sits "
                       "in the tool, for --array of palpate import");
   command->add_option("--device", options->device,
-                      "Vulkan device, by index or a part of its name; touches at unknown poses use "
-                      "none");
+                      "Vulkan device, as for the other commands; learning uses none");
   command->callback([options] { calibrate(*options); });
 }
 

@@ -40,10 +40,6 @@ std::string values_table(const SensorCalibration& calibration) {
   add("spread of maps, mm", short_number(initial.spread_mm), sensor.spread_mm);
   add("gamma of Eq. 7", short_number(initial.gamma), sensor.gamma);
   add("prior", "", sensor.prior);
-  if (calibration.touch_sd_fitted) {
-    add("touch-sd, mm", "0", sensor.touch_sd.mm);
-    add("touch-sd, degrees", "0", degrees(sensor.touch_sd.rad));
-  }
   table.add({"levels of readings", "2", fmt::format("{}", sensor.table->levels())});
   add("temperature", "1", sensor.temperature);
   if (calibration.groups) {

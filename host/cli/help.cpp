@@ -23,7 +23,7 @@ const std::vector<Group>& groups() {
       {"Likelihood",
        {"--prior", "--gamma", "--ratio", "--spread-mm", "--psf-mm", "--peak", "--felt-share"}},
       {"Misplaced touches and slip",
-       {"--touch-sd-mm", "--touch-sd-deg", "--slip-sd-mm", "--slip-sd-deg", "--fit-touch-sd"}},
+       {"--touch-sd-mm", "--touch-sd-deg", "--slip-sd-mm", "--slip-sd-deg"}},
       {"Filter",
        {"--filter", "--tolerance", "--budget-ms", "--evidence-nats", "--particles", "--resampling",
         "--augmented", "--seed", "--memory-mib", "--device", "--verbose"}},
