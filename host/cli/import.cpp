@@ -107,14 +107,14 @@ void add_import(CLI::App& app) {
   auto* command = app.add_subcommand(
       "import",
       "Write a recording (HDF5) from tables: pressures, poses and the positions of the elements. "
-      "Tables are CSV files, with commas, semicolons, tabs or blanks between the cells; the "
-      "pressures may also be an array of numpy.save. docs/files.md describes them");
+      "Tables are CSV files, with commas, semicolons, tabs or blanks between the cells. "
+      "docs/files.md describes them");
   const auto options = std::make_shared<ImportArguments>();
   command
       ->add_option("PRESSURES", options->pressures,
                    "CSV: a row for each frame or touch, with a column for each element (and time, "
                    "where it is known); or a row for each reading, with the columns time, element "
-                   "(counted from 0) and pressure. NPY: [n, elements] or [n, rows, columns]. An "
+                   "(counted from 0) and pressure. An "
                    "empty cell or NaN is an unknown reading; an element without any reading is "
                    "dead")
       ->required();

@@ -104,9 +104,7 @@ double occupied_share(const std::vector<OccupancyGrid>& maps) {
 bool MapFlags::of_drawings() const { return std::ranges::any_of(recordings, is_drawing); }
 
 void add_drawing_flags(CLI::App& command, MapFlags& flags) {
-  command.add_option("--mm-per-pixel", flags.mm_per_pixel,
-                     "Of a drawing, edge of a PNG's pixel, or of the px of an SVG that has no size "
-                     "in mm (without width and height, of its viewBox's unit), mm");
+  command.add_option("--mm-per-pixel", flags.mm_per_pixel, "Of a drawing, edge of a pixel, mm");
   command.add_option("--occupied", flags.occupied,
                      "Of a drawing, whether the object is where it is dark or light [default: "
                      "dark]");
@@ -126,7 +124,7 @@ void require_no_drawing_flags(const MapFlags& flags) {
                 {"--occupied", !flags.occupied.empty()},
                 {"--felt-share", flags.felt_share.has_value()},
                 {"--array", !flags.array.empty()}},
-               "is of drawings, SVG or PNG, alone");
+               "is of drawings alone");
 }
 
 void build_drawn_maps(const MapFlags& flags) {
@@ -152,8 +150,7 @@ void build_drawn_maps(const MapFlags& flags) {
   std::vector<OccupancyGrid> maps;
   for (std::size_t i = 0; i < labels.size(); ++i) {
     Mask mask = read_drawing(flags.recordings[i], {.mm_per_pixel = flags.mm_per_pixel,
-                                                   .light = flags.occupied == "light",
-                                                   .pixel_mm = options.cell_mm / pixels_of_cell});
+                                                   .light = flags.occupied == "light"});
     mask.origin_mm -= origin.T_learned_robot_object.translation_mm;
     maps.push_back(drawn_map(labels[i], mask, options));
     settle_frame(origin, maps.back());

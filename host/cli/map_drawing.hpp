@@ -8,7 +8,7 @@ void add_drawing_flags(CLI::App& command, MapFlags& flags);
 /// Throws Error where flags of drawings alone are given without drawings.
 void require_no_drawing_flags(const MapFlags& flags);
 
-/// Maps of objects from drawings; `palpate map PART.svg`.
+/// Maps of objects from drawings; `palpate map PART.png`.
 void build_drawn_maps(const MapFlags& flags);
 
 }  // namespace palpate::cli

@@ -46,7 +46,7 @@ bool MapFlags::to_folder() const {
 void add_map_flags(CLI::App& command, MapFlags& flags) {
   command
       .add_option("RECORDING", flags.recordings,
-                  "Recordings of touches (HDF5), or drawings (SVG, PNG), each of one object")
+                  "Recordings of touches (HDF5), or drawings (PNG), each of one object")
       ->required();
   command
       .add_option("-o,--output", flags.output,

@@ -84,7 +84,7 @@ std::unique_ptr<LineSensor> open_lines(const SensorArguments& arguments,
            "standard input holds the frames of --sensor -; give the poses as a file or a FIFO, or "
            "x_mm, y_mm and theta_rad in the lines of the frames");
   }
-  ImportArray array = import_array(arguments.lines);
+  ArrayTable array = import_array(arguments.lines);
   return std::make_unique<LineSensor>(
       SensorDescription{.name = "standard input",
                         .serial = {},

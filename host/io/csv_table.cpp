@@ -257,7 +257,7 @@ void CsvTable::read_block() {
   at_end_ = got == 0;
   if (block_.find('\0', kept) != block_.npos) {
     palpate::refuse(path_,
-                    "is no text; save the table as CSV in UTF-8, or one array with numpy.save");
+                    "is no text; save the table as CSV in UTF-8; palpate.Recording takes arrays");
   }
 }
 

@@ -6,19 +6,30 @@
 #include <png.h>
 
 #include "io/input_file.hpp"
-#include "io/svg_drawing.hpp"
 
 namespace palpate {
 
 namespace {
 
-/// The ending of the file's name in small letters.
-std::string ending_of(const std::filesystem::path& path) {
-  std::string ending = path.extension().string();
-  std::ranges::transform(ending, ending.begin(), [](char c) {
+/// A picture of grey values, row 0 at the top.
+struct GreyPicture {
+  std::size_t rows = 0;
+  std::size_t columns = 0;
+  double pixel_mm = 0.0;
+  std::vector<std::uint8_t> grey = {};  ///< [rows, columns], 0 is black
+};
+
+/// Grey of a colour, by Rec. 709.
+std::uint8_t luma(std::uint32_t red, std::uint32_t green, std::uint32_t blue) {
+  return static_cast<std::uint8_t>((54 * red + 183 * green + 19 * blue) / 256);
+}
+
+bool ends_in(const std::filesystem::path& path, const char* ending) {
+  std::string own = path.extension().string();
+  std::ranges::transform(own, own.begin(), [](char c) {
     return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
   });
-  return ending;
+  return own == ending;
 }
 
 /// Reads a PNG picture on white paper, or black where light is occupied.
@@ -32,7 +43,10 @@ GreyPicture read_png(const std::filesystem::path& path, const DrawingOptions& op
   if (png_image_begin_read_from_file(&image, path.c_str()) == 0) {
     refuse(path, "is no PNG picture ({}); save it again as PNG", image.message);
   }
-  require_few_pixels(path, image.width, image.height, "save it with fewer");
+  if (static_cast<double>(image.width) * image.height > most_pixels) {
+    refuse(path, "{} x {} pixels are more than {:g}; save it with fewer", image.width, image.height,
+           most_pixels);
+  }
   if (!options.mm_per_pixel) {
     refuse(path,
            "a picture of {} x {} pixels has no physical size; say how large a pixel is with "
@@ -46,7 +60,7 @@ GreyPicture read_png(const std::filesystem::path& path, const DrawingOptions& op
   if (png_image_finish_read(&image, nullptr, colours.data(), 0, nullptr) == 0) {
     refuse(path, "is damaged ({}); save it again as PNG", image.message);
   }
-  // Transparent edges are as dark as an SVG's, which cairo draws: without gamma.
+  // Transparent edges are mixed with the paper as viewers do: without gamma.
   const std::uint32_t paper = options.light ? 0 : 255;
   picture.grey.reserve(colours.size() / 4);
   for (std::size_t i = 0; i < colours.size(); i += 4) {
@@ -59,28 +73,23 @@ GreyPicture read_png(const std::filesystem::path& path, const DrawingOptions& op
 
 }  // namespace
 
-void require_few_pixels(const std::filesystem::path& path, double columns, double rows,
-                        const char* remedy) {
-  if (!(columns * rows <= most_pixels)) {
-    refuse(path, "{:.6g} x {:.6g} pixels are more than {:g}; {}", columns, rows, most_pixels,
-           remedy);
-  }
-}
-
 bool is_drawing(const std::filesystem::path& path) {
-  const std::string ending = ending_of(path);
-  return ending == ".svg" || ending == ".png";
+  return ends_in(path, ".png") || ends_in(path, ".svg");
 }
 
 Mask read_drawing(const std::filesystem::path& path, const DrawingOptions& options) {
   require_readable(path);
+  if (ends_in(path, ".svg")) {
+    refuse(path,
+           "drawings are read as PNG; make one of 0.1 mm per pixel by rsvg-convert -d 254 -p "
+           "254 -o PART.png PART.svg, and give `mm-per-pixel 0.1`");
+  }
   if (options.mm_per_pixel &&
       !(*options.mm_per_pixel >= least_length_mm && *options.mm_per_pixel <= most_length_mm)) {
     refuse(fmt::format("`mm-per-pixel {}`", *options.mm_per_pixel), "give {:g} to {:g} mm",
            least_length_mm, most_length_mm);
   }
-  const GreyPicture picture =
-      ending_of(path) == ".svg" ? draw_svg(path, options) : read_png(path, options);
+  const GreyPicture picture = read_png(path, options);
   Mask mask{.pixel_mm = picture.pixel_mm,
             .origin_mm = glm::dvec2(picture.pixel_mm / 2.0),
             .rows = picture.rows,
@@ -100,13 +109,5 @@ Mask read_drawing(const std::filesystem::path& path, const DrawingOptions& optio
   }
   return mask;
 }
-
-#ifndef PALPATE_SVG
-
-GreyPicture draw_svg(const std::filesystem::path& path, const DrawingOptions& /*options*/) {
-  refuse(path, "this build reads no SVG; save the drawing as PNG, and give `mm-per-pixel`");
-}
-
-#endif
 
 }  // namespace palpate

@@ -11,7 +11,6 @@
 #include <fmt/ranges.h>
 
 #include "io/input_file.hpp"
-#include "io/npy_file.hpp"
 #include "model/number_text.hpp"
 
 namespace palpate {
@@ -52,7 +51,7 @@ std::optional<Grid> grid_of(const std::string& text) {
 }
 
 /// The grid's elements in the order in which they are read.
-ImportArray grid_array_of(const Grid& grid, const std::string& first, const std::string& order) {
+ArrayTable grid_array_of(const Grid& grid, const std::string& first, const std::string& order) {
   const bool top = first == "top-left" || first == "top-right";
   const bool right = first == "bottom-right" || first == "top-right";
   if (!top && !right && first != "bottom-left") {
@@ -65,13 +64,13 @@ ImportArray grid_array_of(const Grid& grid, const std::string& first, const std:
   }
   const bool by_rows = order == "rows";
   const std::vector<glm::dvec2> by_place = grid_array(grid.columns, grid.rows, grid.pitch_mm);
-  ImportArray array;
+  ArrayTable array;
   const auto columns = static_cast<std::size_t>(grid.columns);
   const auto rows = static_cast<std::size_t>(grid.rows);
-  array.line = by_rows ? columns : rows;
+  const std::size_t line = by_rows ? columns : rows;
   for (std::size_t e = 0; e < by_place.size(); ++e) {
-    const std::size_t along = e % array.line;
-    const std::size_t across = e / array.line;
+    const std::size_t along = e % line;
+    const std::size_t across = e / line;
     const std::size_t i = by_rows ? along : across;
     const std::size_t j = by_rows ? across : along;
     const std::size_t column = right ? columns - 1 - i : i;
@@ -101,11 +100,11 @@ void mark_dead(const std::string& dead, ArrayTable& array) {
 
 }  // namespace
 
-ImportArray import_array(const ImportOptions& options) {
+ArrayTable import_array(const ImportOptions& options) {
   if (options.pressure_unit != "kPa" && options.pressure_unit != "raw") {
     refuse(fmt::format("`pressure-unit {}`", options.pressure_unit), "give kPa or raw");
   }
-  ImportArray array;
+  ArrayTable array;
   const std::optional<Grid> grid = options.elements_mm ? std::nullopt : grid_of(options.array);
   if (grid) {
     array = grid_array_of(*grid, options.first_element, options.order);
@@ -122,7 +121,7 @@ ImportArray import_array(const ImportOptions& options) {
     if (options.elements_mm) {
       array.elements_mm = *options.elements_mm;
     } else {
-      static_cast<ArrayTable&>(array) = read_array(options.array);
+      array = read_array(options.array);
     }
   }
   if (array.elements_mm.empty()) {
@@ -130,28 +129,6 @@ ImportArray import_array(const ImportOptions& options) {
   }
   mark_dead(options.dead, array);
   return array;
-}
-
-PressureTable read_npy_pressures(const std::string& path, const ImportArray& array) {
-  NpyArray npy = read_npy(path);
-  const std::size_t elements = array.elements_mm.size();
-  const auto& shape = npy.shape;
-  const bool fits = (shape.size() == 2 && shape[1] == elements) ||
-                    (shape.size() == 3 && shape[1] * shape[2] == elements &&
-                     (array.line == 0 || shape[2] == array.line));
-  if (!fits || shape[0] == 0) {
-    refuse(
-        path, "has the shape ({}); save [n, {}]{}, n at least 1, or correct `array`",
-        fmt::format("{}", fmt::join(shape, ", ")), elements,
-        array.line == 0 ? "" : fmt::format(" or [n, {}, {}]", elements / array.line, array.line));
-  }
-  const auto infinite = std::ranges::find_if(npy.values, [](double p) { return std::isinf(p); });
-  if (infinite != npy.values.end()) {
-    const auto at = static_cast<std::size_t>(infinite - npy.values.begin());
-    refuse(path, "row {}, element {} = {}; save finite numbers, or NaN where a reading is unknown",
-           at / elements, at % elements, *infinite);
-  }
-  return {.pressure = std::move(npy.values)};
 }
 
 void mark_unknown(const std::string& path, const ImportSurvey& survey, Recording& recording) {

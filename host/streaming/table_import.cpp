@@ -8,7 +8,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "io/npy_file.hpp"
 #include "io/recording_rules.hpp"
 #include "io/table_columns.hpp"
 #include "model/number_text.hpp"
@@ -97,7 +96,7 @@ void require_touch_poses(const ImportOptions& options, const ImportedRecording& 
 
 /// True where a table of this name is given and has the column.
 bool has_column(const std::string& path, const std::string& name) {
-  return !path.empty() && !is_npy(path) && CsvTable(path).find(name);
+  return !path.empty() && CsvTable(path).find(name);
 }
 
 /// @param n rows
@@ -170,7 +169,7 @@ void check_numbers(const ImportOptions& options) {
 }
 
 /// The recording of rows that are read.
-ImportedRecording recording_of(const ImportOptions& options, ImportArray array, ImportRows rows) {
+ImportedRecording recording_of(const ImportOptions& options, ArrayTable array, ImportRows rows) {
   const std::optional<glm::dvec3> normal = plane_normal(options.plane);
   auto& [pressures, poses, T_robot_object, survey] = rows;
   ImportedRecording imported;
@@ -225,16 +224,14 @@ ImportedRecording import_tables(const ImportOptions& options) {
   const TableOptions columns = table_options(options);
   check_numbers(options);
   auto truth = options.truth.empty() ? std::nullopt : std::optional(truth_of(options.truth));
-  ImportArray array = import_array(options);
+  ArrayTable array = import_array(options);
   if (!options.time_column.empty() && !has_column(options.pressures, options.time_column) &&
       !has_column(options.poses, options.time_column)) {
     refuse(fmt::format("`time-column {}`", options.time_column),
            "no table has this column; give its name");
   }
   ImportRows rows{.pressures =
-                      is_npy(options.pressures)
-                          ? read_npy_pressures(options.pressures, array)
-                          : read_pressures(options.pressures, array.elements_mm.size(), columns)};
+                      read_pressures(options.pressures, array.elements_mm.size(), columns)};
   const Unit length_unit = columns.length_unit.value_or(length_units.front());
   std::array<Unit, 3> pose_units{length_unit, length_unit,
                                  columns.angle_unit.value_or(angle_units.front())};
@@ -265,7 +262,7 @@ ImportedRecording import_rows(const ImportOptions& options, ImportRows rows) {
 }
 
 ImportSurvey survey_for(const ImportOptions& options, std::size_t elements) {
-  ImportArray array = import_array(options);
+  ArrayTable array = import_array(options);
   if (array.elements_mm.size() != elements) {
     refuse(options.pressures,
            "has {} readings a frame for an array of {} elements; correct `array`", elements,

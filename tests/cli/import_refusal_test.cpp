@@ -238,7 +238,7 @@ INSTANTIATE_TEST_SUITE_P(
              "log.csv",
              std::string("\0\1\2", 3),
              {},
-             "log.csv: is no text; save the table as CSV in UTF-8, or one array with numpy.save"}),
+             "log.csv: is no text; save the table as CSV in UTF-8; palpate.Recording takes arrays"}),
     [](const auto& test) { return test.param.name; });
 
 TEST_F(ImportCommand, FlagsNameTheirForm) {

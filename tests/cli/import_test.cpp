@@ -177,11 +177,6 @@ TEST_F(ImportCommand, TheSameReadingsInAnyTable) {
   expect_same("time,a,b,c\n0,1,2,9\n0.05,3,4,9\n0.1,5,6,9\n", {"--pressure-columns", "a:b"});
   expect_same(",time,a,b\n0,0,1,2\n1,0.05,3,4\n2,0.1,5,6\n", {});
   expect_same("1,2\n3,4\n5,6\n", {"--rate", "20"});
-  const std::string header = "{'descr': '<f4', 'fortran_order': False, 'shape': (3, 1, 2), }";
-  const std::vector<float> numbers{1, 2, 3, 4, 5, 6};
-  expect_same(std::string("\x93NUMPY\x01\x00", 8) + static_cast<char>(header.size()) + '\0' +
-                  header + std::string(reinterpret_cast<const char*>(numbers.data()), 24),
-              {"--rate", "20"});
 }
 
 TEST_F(ImportCommand, EmptyCellsAreUnknownInFrames) {

@@ -20,7 +20,7 @@ TEST_F(OwnSensorDocument, ItsCommandsFindTheUnknown) {
   EXPECT_EQ(said.find("Suspicious"), said.npos);
   expect_named(said, {"with a pose       4161 frames", "E.h5: 40 touches in 4161 frames",
                       "A looks different after every turn",
-                      "bracket from bracket.svg, 237 x 217 cells"});  // as the page quotes
+                      "bracket from bracket.png, 237 x 217 cells"});  // as the page quotes
   expect_written({"maps.png", "drawn.png", "maps/sensor.yaml", "sheets/unknown.png"});
 
   const nlohmann::json records = json("result.json");

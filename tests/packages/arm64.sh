@@ -26,7 +26,7 @@ tools=(g++-aarch64-linux-gnu cmake ninja-build pkg-config glslang-tools spirv-to
   python3 fonts-dejavu-core libglm-dev libcli11-dev nlohmann-json3-dev libvulkan-volk-dev)
 libraries=(libvulkan-dev libvulkan1 mesa-vulkan-drivers vulkan-validationlayers libhdf5-dev libhwy-dev
   libtbb-dev libcpp-httplib-dev libfmt-dev libyaml-cpp-dev libcairo2-dev libfontconfig-dev
-  librsvg2-dev libusb-1.0-0-dev libgtest-dev libgmock-dev libumockdev-dev)
+  libusb-1.0-0-dev libgtest-dev libgmock-dev libumockdev-dev)
 {
   in_root dpkg --add-architecture arm64
   in_root apt-get update -qq
@@ -45,7 +45,7 @@ in_root cmake -S /source -B /build -G Ninja -DCMAKE_BUILD_TYPE=Release -DCMAKE_U
   -DCMAKE_C_COMPILER=aarch64-linux-gnu-gcc -DCMAKE_CXX_COMPILER=aarch64-linux-gnu-g++ \
   -DCMAKE_LIBRARY_ARCHITECTURE=aarch64-linux-gnu \
   -DCMAKE_CROSSCOMPILING_EMULATOR=/usr/bin/qemu-aarch64-static \
-  -DPALPATE_BENCH=OFF -DPALPATE_SVG=OFF -DPALPATE_WERROR=ON -DPALPATE_TESTS=ON --log-level=WARNING
+  -DPALPATE_BENCH=OFF -DPALPATE_WERROR=ON -DPALPATE_TESTS=ON --log-level=WARNING
 in_root cmake --build /build --target "${programs[@]}"
 in_root env GTEST_BRIEF=1 \
   ctest --test-dir /build --output-on-failure -j "$(nproc)" -R "^($(IFS='|' && echo "${programs[*]}"))"

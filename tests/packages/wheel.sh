@@ -35,7 +35,7 @@ in_root sh -ec '
 
 echo "Nothing that Palpate stands on is there:"
 in_root sh -ec '
-  for library in vulkan hdf5 fmt yaml-cpp cairo rsvg X11 xcb fontconfig freetype png usb tbb; do
+  for library in vulkan hdf5 fmt yaml-cpp cairo X11 xcb fontconfig freetype png usb tbb; do
     if ls /usr/lib/x86_64-linux-gnu/lib$library[-_.0-9]* 2>/dev/null; then exit 1; fi
   done
   if find / -xdev \( -path /environment -o -path /proc \) -prune -o -name "*.ttf" -print | grep .

@@ -15,10 +15,10 @@ import palpate
 
 @pytest.fixture
 def tables(tmp_path: pathlib.Path) -> pathlib.Path:
-    """Pressures of 2 x 2 elements and poses, each by time; an array of pressures; elements."""
+    """Pressures of 2 x 2 elements and poses, each by time; pressures without a time; elements."""
     (tmp_path / "pressures.csv").write_text("time_ms,a,b,c,d\n0,1,2,3,4\n50,5,,7,8\n1900,9,10,11,12\n")
     (tmp_path / "poses.csv").write_text("time,px,py,yaw\n0,1,2,0\n0.1,2,3,10\n2,4,5,20\n")
-    numpy.save(tmp_path / "pressures.npy", numpy.arange(12.0).reshape(3, 2, 2))
+    numpy.savetxt(tmp_path / "plain.csv", numpy.arange(12.0).reshape(3, 4), delimiter=",")
     (tmp_path / "array.csv").write_text("x,y\n0,0\n1,0\n0,1\n1,1\n")
     return tmp_path
 
@@ -43,21 +43,21 @@ def test_an_import_has_the_rows_of_the_command(tables: pathlib.Path) -> None:
     assert numpy.isnan(given.pressure[1, 1]) and numpy.isnan(given.T_robot_sensor[2]).all()
 
 
-def test_an_array_of_pressures_is_imported(tables: pathlib.Path) -> None:
+def test_a_table_without_times_is_imported(tables: pathlib.Path) -> None:
     elements = numpy.array([[0.0, 0], [1, 0], [0, 1], [1, 1]])
     truth = palpate.Truth("mug", (1, 2, 0.5))
     for array in (elements, tables / "array.csv"):
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             given = palpate.import_tables(
-                tables / "pressures.npy", array=array, unposed=True, pressure_unit="raw", truth=truth
+                tables / "plain.csv", array=array, unposed=True, pressure_unit="raw", truth=truth
             )
         assert given.pressure.tolist() == numpy.arange(12.0).reshape(3, 4).tolist()
         assert (given.rows, given.pressure_unit) == ("touches", "raw")
         assert numpy.array_equal(given.elements_mm, elements)
         assert given.truth is not None and given.truth.object == "mug"
     given.save(tables / "r.h5")
-    assert palpate.import_tables(tables / "pressures.npy", array=(2, 2, 1), rate=10).rows == "frames"
+    assert palpate.import_tables(tables / "plain.csv", array=(2, 2, 1), rate=10).rows == "frames"
 
 
 @pytest.mark.parametrize(
@@ -99,22 +99,22 @@ def test_arrays_that_no_table_can_have_are_refused(tables: pathlib.Path) -> None
 
 def test_a_grid_is_read_in_any_order(tables: pathlib.Path) -> None:
     given = palpate.import_tables(
-        tables / "pressures.npy", array="2x2x1", first_element="top-right", order="columns",
+        tables / "plain.csv", array="2x2x1", first_element="top-right", order="columns",
         dead=(0, 2), unposed=True, rate=10,
     )  # fmt: skip
     assert given.elements_mm.tolist() == [[0.5, 0.5], [0.5, -0.5], [-0.5, 0.5], [-0.5, -0.5]]
     assert given.valid is not None and given.valid.tolist() == [False, True, False, True]
     with pytest.raises(palpate.Error, match="^order='x': give rows or columns"):
-        palpate.import_tables(tables / "pressures.npy", array="2:2:1", order="x")  # type: ignore[arg-type]
+        palpate.import_tables(tables / "plain.csv", array="2:2:1", order="x")  # type: ignore[arg-type]
 
 
 def test_whole_numbers_that_are_no_pressures_are_noticed(tables: pathlib.Path) -> None:
-    numpy.save(tables / "raw.npy", numpy.array([[0, 4095, 7, 8]], dtype=numpy.int16))
+    (tables / "raw.csv").write_text("0,4095,7,8\n")
     with pytest.warns(UserWarning, match="whole numbers up to 4095: give pressure_unit='raw'"):
-        palpate.import_tables(tables / "raw.npy", array=(2, 2, 1), rate=10)
+        palpate.import_tables(tables / "raw.csv", array=(2, 2, 1), rate=10)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        palpate.import_tables(tables / "raw.npy", array=(2, 2, 1), rate=10, pressure_unit="raw")
+        palpate.import_tables(tables / "raw.csv", array=(2, 2, 1), rate=10, pressure_unit="raw")
 
 
 def test_poses_in_space_are_taken_into_the_plane(tables: pathlib.Path) -> None:
@@ -123,12 +123,12 @@ def test_poses_in_space_are_taken_into_the_plane(tables: pathlib.Path) -> None:
     for options in ({}, {"pose_columns": names}, {"plane": (0, 0, 1)}):
         with pytest.warns(UserWarning, match="its y is turned over"):
             given = palpate.import_tables(
-                tables / "pressures.npy", array=(2, 2, 1), rate=1, poses=tables / "space.csv", **options
+                tables / "plain.csv", array=(2, 2, 1), rate=1, poses=tables / "space.csv", **options
             )  # type: ignore[arg-type]
         assert given.T_robot_sensor[0].tolist() == [1, 2, 0]
         assert given.elements_mm[0].tolist() == [-0.5, 0.5], "seen from above"
     with pytest.raises(palpate.Error, match=r"^plane=\(0, 0, 0\): give auto"):
         palpate.import_tables(
-            tables / "pressures.npy", array=(2, 2, 1), rate=1, poses=tables / "space.csv",
+            tables / "plain.csv", array=(2, 2, 1), rate=1, poses=tables / "space.csv",
             plane=(0, 0, 0),
         )  # fmt: skip
