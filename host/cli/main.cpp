@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <iostream>
 #include <new>
+#include <span>
 #include <string>
 
 #include <fmt/format.h>
@@ -12,6 +13,7 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/commands.hpp"
+#include "cli/former_flags.hpp"
 #include "cli/help.hpp"
 #include "io/descriptor.hpp"
 #include "io/hdf5_process.hpp"
@@ -77,6 +79,11 @@ void refuse_empty_values(CLI::App& app) {
 }
 
 int run(int argc, char** argv) {
+  const std::span<const char* const> arguments(argv, static_cast<std::size_t>(argc));
+  if (const auto answer =
+          palpate::cli::answer_to_former_flag(arguments.subspan(argc > 0 ? 1 : 0))) {
+    return complain(wrong_input, *answer);
+  }
   CLI::App app("Palpate recognises objects by touch and finds their poses, on Vulkan.", "palpate");
   app.set_version_flag("--version", PALPATE_VERSION);
   app.require_subcommand(1);

@@ -105,22 +105,40 @@ void AtomicFile::write(std::string_view bytes, int flags) {
   }
 }
 
-void AtomicFile::commit() {
-  {
-    const Descriptor file(temporary_, O_RDONLY);
-    if (!file.valid() || ::fsync(file.get()) != 0) {
-      fail(target_, "write");
-    }
+void AtomicFile::bring_to_disk() const {
+  const Descriptor file(temporary_, O_RDONLY);
+  if (!file.valid() || ::fsync(file.get()) != 0) {
+    fail(target_, "write");
   }
+}
+
+void AtomicFile::bring_name_to_disk() const {
+  const Descriptor folder(folder_of(target_), O_RDONLY | O_DIRECTORY);
+  if (folder.valid()) {
+    ::fsync(folder.get());  // file systems that cannot sync a folder may refuse
+  }
+}
+
+void AtomicFile::commit() {
+  bring_to_disk();
   if (::rename(temporary_.c_str(), target_.c_str()) != 0) {
     fail(target_, "rename the finished file to it");
   }
   temporary_.clear();
-  // The new name lasts through a power cut; file systems that cannot sync a folder may refuse.
-  const Descriptor folder(folder_of(target_), O_RDONLY | O_DIRECTORY);
-  if (folder.valid()) {
-    ::fsync(folder.get());
+  bring_name_to_disk();
+}
+
+bool AtomicFile::commit_new() {
+  bring_to_disk();
+  // A second name, not renameat2(), which NFS refuses.
+  if (::link(temporary_.c_str(), target_.c_str()) != 0) {
+    if (errno == EEXIST) {
+      return false;
+    }
+    fail(target_, "give the finished file its name");
   }
+  bring_name_to_disk();
+  return true;
 }
 
 OlderFile::OlderFile(const std::filesystem::path& target) : target_(file_behind(target)) {

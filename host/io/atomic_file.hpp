@@ -32,8 +32,14 @@ class AtomicFile {
   /// Brings the content to the disk and renames the file to its target.
   /// @throws Error (Fault::system) where the disk refuses.
   void commit();
+  /// As commit(), but returns false, and leaves the target as it is, where there is one by now. Of
+  /// several processes that write one target, one is told true.
+  bool commit_new();
 
  private:
+  void bring_to_disk() const;
+  /// Has the new name last through a power cut.
+  void bring_name_to_disk() const;
   void write(std::string_view bytes, int flags);
 
   std::filesystem::path target_;
