@@ -131,8 +131,7 @@ void DenseBelief::add(const DenseBelief& other) const {
     const shaders::AddPush push{.bins = static_cast<shaders::uint>(bins),
                                 .row = static_cast<shaders::uint>(row)};
     stream_.dispatch(add_, {&other.slabs_[i].log_likelihood, &slabs_[i].log_likelihood}, push,
-                     {groups_of(row, lanes), groups_of(bins, push.row), 1},
-                     static_cast<double>(bins));
+                     {groups_of(row, lanes), groups_of(bins, push.row), 1});
   }
 }
 
@@ -152,8 +151,7 @@ std::vector<BeliefSummary> DenseBelief::summarise(std::vector<BeliefSummary> reu
                                    .partial_first = first};
     const std::uint32_t groups = groups_of(slab.bins(), reduction_.bins());
     stream_.dispatch(reduce_, {&slab.log_likelihood, &partials_}, push,
-                     {groups, slab.object_count, 1},
-                     static_cast<double>(slab.object_count * slab.bins()));
+                     {groups, slab.object_count, 1});
     first += static_cast<std::uint32_t>(partials_of(slab, reduction_));
   }
   read_partials_.resize(partial_count_);
@@ -338,7 +336,7 @@ Marginals DenseBelief::marginals(std::size_t object, TwoFloat max, double of_lar
         .max_high = max.high,
         .max_low = max.low};
     stream_.dispatch(sum_marginals_, {&slab.log_likelihood, &theta_parts, &plane_parts}, push,
-                     {blocks, chunks, 1}, static_cast<double>(slab.bins()));
+                     {blocks, chunks, 1});
     stream_.download(theta_parts, over_theta);
     stream_.download(plane_parts, over_plane);
     stream_.run();

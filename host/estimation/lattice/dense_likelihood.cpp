@@ -130,8 +130,8 @@ void DenseLikelihood::dispatch(const Group& group, const Range& range, const Sla
        maps.nodes().read_as(gpu::Access::storage), &maps.axes(), &maps.places(),
        &slab.log_likelihood},
       push,
-      {groups_of(invocations, independent_lanes(context_.limits())), range.count, slab.theta_count},
-      work_of(range, slab, elements));
+      {groups_of(invocations, independent_lanes(context_.limits())), range.count,
+       slab.theta_count});
 }
 
 void DenseLikelihood::reserve(std::size_t elements) {

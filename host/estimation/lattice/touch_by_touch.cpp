@@ -250,8 +250,7 @@ std::span<const OverlapSum> OverlapMean::sums(const DenseBelief& scratch,
                                     .half_x_mm = half.x,
                                     .half_y_mm = half.y};
     stream_.dispatch(kernel_, {&slab.log_likelihood, &arrays_, &boxes_, &partials_}, push,
-                     {slab.theta_count, slab.object_count, 1},
-                     static_cast<double>(slab.object_count * slab.bins()));
+                     {slab.theta_count, slab.object_count, 1});
     first += slab.theta_count * slab.object_count;
   }
   stream_.download(partials_, read_partials_);
