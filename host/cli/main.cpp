@@ -6,6 +6,7 @@
 #include <iostream>
 #include <new>
 #include <span>
+#include <stdexcept>
 #include <string>
 
 #include <fmt/format.h>
@@ -60,6 +61,12 @@ int complain(int status, std::string message) {
 int complain_of_output() {
   return complain(failed,
                   "standard output: cannot be written; free disk space, or read it to its end");
+}
+
+int complain_of_memory() {
+  return complain(failed,
+                  "out of memory; end other programs, or use smaller files, fewer bins, objects or "
+                  "cells");
 }
 
 /// The exit status after a command has succeeded: 0, or 1 where a part of its output was lost.
@@ -152,7 +159,9 @@ int main(int argc, char** argv) {
   } catch (const palpate::Error& error) {
     return complain(error.fault() == palpate::Fault::input ? wrong_input : failed, error.what());
   } catch (const std::bad_alloc&) {
-    return complain(failed, "out of memory; use fewer bins, objects or cells");
+    return complain_of_memory();
+  } catch (const std::length_error&) {  // more than any memory
+    return complain_of_memory();
   } catch (const std::exception& error) {
     // fmt::print throws where standard output cannot be written, without naming it.
     return std::ferror(stdout) != 0 ? complain_of_output() : complain(failed, error.what());

@@ -13,8 +13,8 @@
 #include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
-#include "io/available_memory.hpp"
 #include "io/input_file.hpp"
+#include "io/stored_bytes.hpp"
 #include "model/printable.hpp"
 
 namespace palpate {
@@ -165,9 +165,6 @@ NpyArray read_npy(const std::filesystem::path& path) {
            file_bytes - begin, fmt::format("{}", fmt::join(header.shape, ", ")), bytes);
   }
   const std::size_t count = bytes / type.width;
-  // A sparse file's count may be any.
-  require_memory(path, fmt::format("an array of {} numbers", count),
-                 stored_bytes(std::array{count}, (header.fortran_order ? 2 : 1) * sizeof(double)));
   NpyArray array{.shape = header.shape, .values = std::vector<double>(count)};
   constexpr std::size_t piece = 1 << 16;
   std::vector<char> stored(piece * type.width);

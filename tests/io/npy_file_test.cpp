@@ -143,12 +143,7 @@ TEST_F(NpyInMemory, MoreNumbersThanMemoryAreRefused) {
     const std::string header = std::string("\x93NUMPY\x01\x00", 8) +
                                static_cast<char>(dictionary.size()) + '\0' + dictionary;
     put(header, static_cast<off_t>(header.size() + (1ULL << 62)));
-    try {
-      read_npy(path_);
-      ADD_FAILURE() << "nothing was thrown";
-    } catch (const Error& error) {
-      expect_named(error.what(), {path_.c_str(), "4611686018427387904 numbers", "of memory"});
-    }
+    EXPECT_THROW(read_npy(path_), std::length_error);
   }
 }
 
