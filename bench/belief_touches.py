@@ -130,50 +130,6 @@ def measure_misplaced(inputs: Inputs) -> list[Json]:
     return records
 
 
-# Standard deviations of misplaced touches, as the touches alone tell them.
-
-TOUCH_SD: list[Column] = [
-    ("off by, mm", "true/mm", plain),
-    ("x and y, mm", "fitted/mm", number(".3f")),
-    ("standard error", "standard_error/mm", number(".3f")),
-    ("fitted / true", "share/mm", number(".2f")),
-    ("angle, rad", "fitted/rad", number(".4f")),
-    ("standard error", "standard_error/rad", number(".4f")),
-    ("fitted / true", "share/rad", number(".2f")),
-    ("log evidence above exact poses', nats", "gain_nats", number(".1f")),
-]
-
-
-def measure_touch_sd(inputs: Inputs) -> list[Json]:
-    """Every misplacement has unknowns of its own."""
-    records = Table(TOUCH_SD)
-    touches = 6 if inputs.quick else 12
-    bins: Bins = (13, 13, 55) if inputs.quick else (20, 20, 64)
-    for i, mm in enumerate((0.3, 0.5, 1.0, 2.0, 0.0)):
-        if inputs.quick and mm != 1.0:
-            continue
-        true = {"mm": mm, "rad": 0.05 * mm}
-        touching = Touching(at_random_poses=True, noise=(true["mm"], true["rad"]))
-        seed = TOUCH_SD_SEED + i * 5_000_000
-        trials = make_trials(VOWELS, inputs.each(10, 2), touches, seed, touching)
-        fit = palpate.fit_touch_sd(
-            trials, inputs.maps, bins=bins, x_mm=(-10.0, 10.0), y_mm=(-10.0, 10.0), device=inputs.device
-        )
-        found, error = ({"mm": sd.mm, "rad": sd.rad} for sd in (fit.sd, fit.standard_error))
-        records.append(
-            {
-                "true": true,
-                "unknowns": len(trials),
-                "touches": touches,
-                "fitted": found,
-                "standard_error": error,
-                "share": {of: found[of] / true[of] for of in true} if mm > 0.0 else None,
-                "gain_nats": fit.evidence_gain,
-            }
-        )
-    return records
-
-
 # "None of these", with exact and with misplaced touches.
 
 NONE: list[Column] = [

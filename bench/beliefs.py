@@ -7,13 +7,12 @@ from palpate import _charts as charts
 
 from . import belief_charts
 from .belief_moves import measure_costs, measure_plan, measure_slip
-from .belief_touches import Inputs, measure_misplaced, measure_none, measure_touch_sd
+from .belief_touches import Inputs, measure_misplaced, measure_none
 from .program import Json, begin, main, parser, write
 from .trials import letter_maps
 
 PARTS: dict[str, Callable[[Inputs], list[Json]]] = {
     "misplaced": measure_misplaced,
-    "touch-sd": measure_touch_sd,
     "none": measure_none,
     "slip": measure_slip,
     "plan": measure_plan,

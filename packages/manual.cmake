@@ -1,15 +1,10 @@
-# Writes palpate(1) and a page for every command, palpate-COMMAND(1), from what --help and
-# COMMAND --help-all print.
+# Writes palpate(1) and a page for every command, palpate-COMMAND(1), from what --help prints.
 cmake_minimum_required(VERSION 3.25)
 
 function(page name summary)
   string(REPLACE " " "-" file "${name}")
-  set(help --help)
-  if(ARGN)
-    set(help --help-all)
-  endif()
   execute_process(
-    COMMAND ${HELP2MAN} --no-info --help-option=${help} --version-string=${VERSION} --name=${summary} "${PALPATE}${ARGN}"
+    COMMAND ${HELP2MAN} --no-info --version-string=${VERSION} --name=${summary} "${PALPATE}${ARGN}"
     OUTPUT_VARIABLE text COMMAND_ERROR_IS_FATAL ANY)
   # help2man takes the program's name for the page's.
   string(REGEX REPLACE "\n\\.TH [^ ]+ " "\n.TH ${file} " text "${text}")

@@ -18,7 +18,6 @@
 #include "cli/options.hpp"
 #include "cli/progress.hpp"
 #include "cli/recognition_flags.hpp"
-#include "cli/terminal.hpp"
 #include "learning/calibration_task.hpp"
 #include "palpate/files.hpp"
 #include "recognition/recordings.hpp"
@@ -27,16 +26,12 @@ namespace palpate::cli {
 
 namespace {
 
-constexpr const char* table_name = "table.png";
-constexpr const char* reliability_name = "reliability.png";
-
 struct CalibrateArguments {
   std::vector<std::string> recordings;
   std::string output;
   std::vector<std::string> maps;
   CalibrationRequest request;
   Request recognition;  ///< bins, region and frames alone
-  std::string png;
   std::string write_array;
   std::string device;
 };
@@ -52,8 +47,6 @@ void check_outputs(const CalibrateArguments& options,
   }
   files.writes("-o", options.output);
   files.writes("--write-array", options.write_array);
-  files.writes_in("--png", options.png, table_name);
-  files.writes_in("--png", options.png, reliability_name);
   files.prepare();
 }
 
@@ -101,28 +94,11 @@ void calibrate(const CalibrateArguments& options) {
     array_mm = common_array(recordings);
   }
 
-  if (!options.png.empty()) {
-    make_folder(options.png);  // before the work that a wrong name would lose
-  }
   SensorCalibration calibration;
   {
     Progress progress("calibrating");
     calibration = calibrate_sensor(task.presses, task.maps, task.options,
                                    [&](double fraction) { progress.show(fraction); });
-  }
-  if (task.known_poses()) {
-    Device device = Device::open(options.device);
-    Progress progress("fitting the touches' poses");
-    add_touch_sd(device, task, calibration, [&](double fraction) { progress.show(fraction); });
-  }
-  std::vector<std::pair<std::filesystem::path, std::string>> pictures;
-  if (!options.png.empty()) {
-    const std::filesystem::path folder = options.png;
-    pictures.emplace_back(folder / table_name, draw_table(calibration.sensor));
-    if (calibration.before) {
-      pictures.emplace_back(folder / reliability_name,
-                            draw_reliability(reliability_of(calibration)));
-    }
   }
   write_sensor_model(options.output, calibration.sensor);
   if (!options.write_array.empty()) {
@@ -131,17 +107,12 @@ void calibrate(const CalibrateArguments& options) {
     }
     write_file(options.write_array, array_table(array_mm));
   }
-  fmt::print("{}",
-             calibration_text(calibration, task.presses.size(), terminal_columns(STDOUT_FILENO)));
+  fmt::print("{}", calibration_text(calibration, task.presses.size()));
   std::ranges::for_each(calibration.warnings, tell_on_stderr);
   if (calibration.array_offset && options.write_array.empty()) {
     fmt::print("palpate calibrate --write-array FILE writes the corrected array\n");
   }
   fmt::print("{}\n", options.output);
-  for (const auto& [file, picture] : pictures) {
-    write_file(file, picture);
-    fmt::print("{}\n", file.string());
-  }
 }
 
 }  // namespace
@@ -211,12 +182,8 @@ void add_calibrate(CLI::App& app) {
   command->add_option("--write-array", options->write_array,
                       "File for the array, CSV of x and y in mm, where drawn maps say that it sits "
                       "in the tool, for --array of palpate import");
-  command->add_option("--png", options->png,
-                      "Folder for pictures: table.png, what elements read, and reliability.png, "
-                      "accuracy over confidence before and after");
   command->add_option("--device", options->device,
-                      "Vulkan device, by index or a part of its name; touches at unknown poses use "
-                      "none");
+                      "Vulkan device, as for the other commands; learning uses none");
   command->callback([options] { calibrate(*options); });
 }
 

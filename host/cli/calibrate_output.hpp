@@ -4,7 +4,6 @@
 #include <optional>
 #include <string>
 
-#include "figures/figures.hpp"
 #include "learning/sensor_calibration.hpp"
 
 namespace palpate::cli {
@@ -15,16 +14,6 @@ std::string unlearned_strangers(const LearnedSensor& sensor);
 
 /// What was learned beside the defaults, and how good it is on touches that it has not seen.
 /// @param touches number of touches
-/// @param columns see TextTable::text()
-std::string calibration_text(const SensorCalibration& calibration, std::size_t touches,
-                             std::optional<int> columns);
-
-/// Draws how likely each level of reading is over what a map says, beside Eq. 7, and returns the
-/// bytes of a PNG file.
-std::string draw_table(const LearnedSensor& sensor);
-
-/// Accuracy over confidence before and after.
-/// @param calibration of two objects or more
-ReliabilityFigure reliability_of(const SensorCalibration& calibration);
+std::string calibration_text(const SensorCalibration& calibration, std::size_t touches);
 
 }  // namespace palpate::cli

@@ -8,7 +8,7 @@ _palpate() {
       sed -n -e '1,/^Subcommands:/d' -e 's/^  \([a-z]*\) .*/\1/p')
     mapfile -t COMPREPLY < <(compgen -W "$words --help --version" -- "$current")
   elif [[ $current == -* ]]; then
-    words=$(palpate "${COMP_WORDS[1]}" --help-all 2>/dev/null | grep -oE '^ +(-[a-z],)?--[a-z0-9-]+' |
+    words=$(palpate "${COMP_WORDS[1]}" --help 2>/dev/null | grep -oE '^ +(-[a-z],)?--[a-z0-9-]+' |
       grep -oE -- '--[a-z0-9-]+')
     mapfile -t COMPREPLY < <(compgen -W "$words" -- "$current")
   else

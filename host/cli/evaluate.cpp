@@ -15,7 +15,6 @@
 #include "cli/options.hpp"
 #include "cli/recognition_flags.hpp"
 #include "cli/results_folder.hpp"
-#include "cli/terminal.hpp"
 #include "recognition/batch/batch_task.hpp"
 #include "recognition/judged_results.hpp"
 #include "recognition/record_json.hpp"
@@ -24,13 +23,9 @@ namespace palpate::cli {
 
 namespace {
 
-constexpr const char* confusion_name = "confusion.png";
-constexpr const char* picture_name = "reliability.png";
-
 struct EvaluateArguments {
   std::vector<std::string> results;
   std::string json;
-  std::string png;
 };
 
 /// Throws Error where an output cannot be written, before any file is.
@@ -46,8 +41,6 @@ void check_outputs(const EvaluateArguments& options,
     }
   }
   files.writes("--json", options.json, CommandFiles::Dash::stream);
-  files.writes_in("--png", options.png, confusion_name);
-  files.writes_in("--png", options.png, picture_name);
   files.prepare();
 }
 
@@ -78,14 +71,7 @@ void evaluate_results(const EvaluateArguments& options) {
     tell_on_stderr(failed);
   }
   const std::string json = text_of(to_json(evaluation, results.without_truth), 2);
-  if (!options.png.empty()) {
-    const std::filesystem::path folder = options.png;
-    make_folder(folder);
-    write_file(folder / confusion_name, draw_confusion(confusion_of(evaluation)));
-    write_file(folder / picture_name, draw_reliability(reliability_of(evaluation)));
-  }
-  give_result(options.json, json,
-              evaluation_text(evaluation, results.without_truth, terminal_columns(STDOUT_FILENO)));
+  give_result(options.json, json, evaluation_text(evaluation, results.without_truth));
 }
 
 }  // namespace
@@ -106,9 +92,6 @@ void add_evaluate(CLI::App& app) {
                    "palpate batch, or folders of *.json. Records without a true label are left out")
       ->required();
   command->add_option("--json", options->json, "Write all numbers as JSON; - is standard output");
-  command->add_option("--png", options->png,
-                      "Folder for pictures: confusion.png (true classes against best labels) and "
-                      "reliability.png (accuracy against the best label's probability)");
   command->callback([options] { evaluate_results(*options); });
 }
 

@@ -55,7 +55,7 @@ std::string range_words(const Interval& interval) {
   return fmt::format("{:.1f} to {:.1f} %", 100.0 * interval.low, 100.0 * interval.high);
 }
 
-std::string scores_table(const Evaluation& evaluation, std::optional<int> columns) {
+std::string scores_table(const Evaluation& evaluation) {
   // A column without content is left out.
   TextTable table({{""}, {"all", true}, {"known classes", true}});
   const auto add = [&](const char* name, auto text_of) {
@@ -65,10 +65,10 @@ std::string scores_table(const Evaluation& evaluation, std::optional<int> column
   add("records", [](const Scores& s) { return fmt::format("{}", s.records); });
   add("right", [](const Scores& s) { return fmt::format("{}", s.right); });
   add_score_rows(table, {&evaluation.all, evaluation.known ? &*evaluation.known : nullptr});
-  return table.text(columns);
+  return table.text();
 }
 
-std::string reliability_table(const Scores& scores, std::optional<int> columns) {
+std::string reliability_table(const Scores& scores) {
   TextTable table({{"confidence"},
                    {"records", true},
                    {"mean", true},
@@ -81,7 +81,7 @@ std::string reliability_table(const Scores& scores, std::optional<int> columns) 
                  percent(bin.accuracy()), range_words(bin.interval())});
     }
   }
-  return table.text(columns);
+  return table.text();
 }
 
 std::string class_name(const ClassScores& scores) {
@@ -106,7 +106,7 @@ std::string taken_for(const ClassScores& scores, const std::vector<std::string>&
   return list;
 }
 
-std::string class_table(const Evaluation& evaluation, std::optional<int> columns) {
+std::string class_table(const Evaluation& evaluation) {
   TextTable table({{"class"},
                    {"records", true},
                    {"right", true},
@@ -118,7 +118,7 @@ std::string class_table(const Evaluation& evaluation, std::optional<int> columns
                fmt::format("{}", scores.right), percent(scores.recall()),
                range_words(scores.interval()), taken_for(scores, evaluation.answers)});
   }
-  return table.text(columns);
+  return table.text();
 }
 
 std::string unknown_words(const Evaluation& evaluation) {
@@ -202,58 +202,16 @@ void add_score_rows(TextTable& table, const std::vector<const Scores*>& columns)
       [](const Scores& s) { return fmt::format("{:.3f}", s.calibration_error); });
 }
 
-std::string evaluation_text(const Evaluation& evaluation, std::size_t without_truth,
-                            std::optional<int> columns) {
-  std::string text = scores_table(evaluation, columns);
+std::string evaluation_text(const Evaluation& evaluation, std::size_t without_truth) {
+  std::string text = scores_table(evaluation);
   if (without_truth > 0) {
     text += fmt::format("{} without a true label left out\n",
                         count_of(without_truth, "record", "records"));
   }
-  text += "\n" + reliability_table(evaluation.all, columns);
-  text += "\n" + class_table(evaluation, columns);
+  text += "\n" + reliability_table(evaluation.all);
+  text += "\n" + class_table(evaluation);
   text += unknown_words(evaluation) + error_words(evaluation);
   return text;
-}
-
-ConfusionFigure confusion_of(const Evaluation& evaluation) {
-  ConfusionFigure figure;
-  figure.title = fmt::format("{} of {} right ({}, 95 % interval {})", evaluation.all.right,
-                             evaluation.all.records, percent(evaluation.all.accuracy()),
-                             range_words(evaluation.all.interval()));
-  figure.columns = evaluation.answers;
-  for (const ClassScores& scores : evaluation.classes) {
-    const std::string right = scores.known ? scores.label : std::string(none_label);
-    ConfusionFigure::Row row{class_name(scores), right, scores.taken, {}};
-    for (const std::size_t taken : scores.taken) {
-      row.proven.push_back(wilson_interval(static_cast<double>(taken), scores.records).low);
-    }
-    figure.rows.push_back(std::move(row));
-  }
-  return figure;
-}
-
-ReliabilityFigure::Curve curve_of(const char* name, const Scores& scores) {
-  ReliabilityFigure::Curve curve{
-      .name = fmt::format("{} ({}, calibration error {:.3f})", name,
-                          count_of(scores.records, "record", "records"), scores.calibration_error),
-      .points = {}};
-  for (const ReliabilityBin& bin : scores.bins) {
-    if (bin.records > 0) {
-      const Interval interval = bin.interval();
-      curve.points.push_back(
-          {bin.mean_confidence, bin.accuracy(), interval.low, interval.high, bin.records});
-    }
-  }
-  return curve;
-}
-
-ReliabilityFigure reliability_of(const Evaluation& evaluation) {
-  ReliabilityFigure figure;
-  figure.curves.push_back(curve_of("all", evaluation.all));
-  if (evaluation.known) {
-    figure.curves.push_back(curve_of("known classes", *evaluation.known));
-  }
-  return figure;
 }
 
 }  // namespace palpate::cli

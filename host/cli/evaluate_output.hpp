@@ -8,7 +8,6 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/text_table.hpp"
-#include "figures/figures.hpp"
 #include "recognition/evaluation.hpp"
 
 namespace palpate::cli {
@@ -19,19 +18,10 @@ nlohmann::ordered_json to_json(const Evaluation& evaluation, std::size_t without
 
 /// The scores, the reliability bins that have records, a line for each class with what it was taken
 /// for, unknown classes and pose errors.
-/// @param columns see TextTable::text()
-std::string evaluation_text(const Evaluation& evaluation, std::size_t without_truth,
-                            std::optional<int> columns);
+std::string evaluation_text(const Evaluation& evaluation, std::size_t without_truth);
 
 /// Adds what scores say of some records: accuracy and its interval, log-loss, calibration error.
 /// @param columns of the table after the first; null: an empty cell
 void add_score_rows(TextTable& table, const std::vector<const Scores*>& columns);
-
-/// How often each class was taken for each label.
-ConfusionFigure confusion_of(const Evaluation& evaluation);
-/// Accuracy over confidence of some records.
-ReliabilityFigure::Curve curve_of(const char* name, const Scores& scores);
-/// Accuracy over confidence, of known classes apart where there are others.
-ReliabilityFigure reliability_of(const Evaluation& evaluation);
 
 }  // namespace palpate::cli

@@ -1,5 +1,3 @@
-#include <unistd.h>
-
 #include <chrono>
 #include <csignal>
 #include <functional>
@@ -16,7 +14,6 @@
 #include "cli/commands.hpp"
 #include "cli/interruption.hpp"
 #include "cli/live_record.hpp"
-#include "cli/live_screen.hpp"
 #include "cli/options.hpp"
 #include "cli/page/live_page.hpp"
 #include "cli/recognition_flags.hpp"
@@ -43,21 +40,13 @@ struct LiveArguments : SensorArguments {
   PageAddress page;
 };
 
-/// Tells what is wrong with the poses or the lattice as it happens: on standard error, or on the
-/// screen where the screen would overwrite standard error.
+/// Tells on standard error, as it happens, what is wrong with the poses, the lattice or the sensor.
 class Complaints {
  public:
   void add(const std::string& problem) {
     const std::lock_guard lock(mutex_);
     last_ = problem;
-    if (!on_screen_) {
-      fmt::print(stderr, "palpate: {}\n", problem);
-    }
-  }
-  /// Whether there is a screen from now on.
-  void show(bool on_screen) {
-    const std::lock_guard lock(mutex_);
-    on_screen_ = on_screen;
+    fmt::print(stderr, "palpate: {}\n", problem);
   }
   std::string last() const {
     const std::lock_guard lock(mutex_);
@@ -67,7 +56,27 @@ class Complaints {
  private:
   mutable std::mutex mutex_;
   std::string last_;
-  bool on_screen_ = false;
+};
+
+/// Tells on standard error when the state of the sensor changes that a person has to act on.
+class SensorWatch {
+ public:
+  void update(const LiveState& state) {
+    if (state.taring && !taring_) {
+      fmt::print(stderr, "palpate: taring: do not touch the array\n");
+    }
+    if (state.gone != gone_) {
+      fmt::print(
+          stderr, "palpate: {}\n",
+          state.gone ? "the board is unplugged; plug it in again to go on" : "the board is back");
+    }
+    taring_ = state.taring;
+    gone_ = state.gone;
+  }
+
+ private:
+  bool taring_ = false;
+  bool gone_ = false;
 };
 
 /// Uses the recogniser once and forgets: the first touch pages memory in and may compile shaders,
@@ -148,20 +157,17 @@ void live(const LiveArguments& options) {
   const Interruption interruption;
   const bool to_program = options.json == "-";
   std::FILE* const people = to_program ? stderr : stdout;
-  const bool on_terminal =
-      isatty(fileno(people)) != 0 && !(to_program && isatty(STDOUT_FILENO) != 0);
   std::optional<LivePage> page;
   if (options.page.port) {
     page.emplace(options.page, description, elements_mm, task, recogniser, goal);
     fmt::print(people, "{}\n", page->words());
     std::fflush(people);
   }
-  if (!to_program && !on_terminal) {
+  if (!to_program) {
     fmt::print("{}\n", table_heading(task));
     std::fflush(stdout);
   }
   bool resolved = true;  // nothing was said yet
-  complaints.show(on_terminal && isatty(STDERR_FILENO) != 0);
   LiveRecognition recognition(
       *opened.sensor, elements_mm, recogniser, task,
       {.detector = detector,
@@ -176,7 +182,7 @@ void live(const LiveArguments& options) {
              if (page) {
                page->plan(touch);
              }
-             if (!to_program && !on_terminal) {
+             if (!to_program) {
                fmt::print("         {}\n", next_touch_words(*touch.next, *goal));
                std::fflush(stdout);
              }
@@ -201,17 +207,13 @@ void live(const LiveArguments& options) {
         if (page) {
           page->add(touch);
         }
-        if (!to_program && !on_terminal) {
+        if (!to_program) {
           fmt::print("{}\n", table_line(touch, task));
           std::fflush(stdout);
         }
       });
   {
-    std::optional<LiveScreen> screen;
-    if (on_terminal) {
-      screen.emplace(people, description, elements_mm, task, goal,
-                     page ? page->words() : std::string());
-    }
+    SensorWatch watch;
     if (page) {
       page->serve(&recognition);
     }
@@ -223,11 +225,10 @@ void live(const LiveArguments& options) {
         }
         std::this_thread::sleep_for(40ms);
       }
-      if (screen && screen->update(recognition.state(), complaints.last())) {
-        recognition.reset();
-      }
+      const LiveState state = recognition.state();
+      watch.update(state);
       if (page) {
-        page->update(recognition.state(), complaints.last());
+        page->update(state, complaints.last());
       }
     }
     if (page) {
@@ -254,9 +255,8 @@ void add_live(CLI::App& app) {
   auto* command = app.add_subcommand(
       "live",
       "Recognise what a sensor touches and find its pose in the robot frame, T_robot_object, with "
-      "one standard deviation, touch by touch, until Ctrl-C. A terminal shows the pressure, the "
-      "identity and the array on the object's map; "
-      "key r begins the next unknown object");
+      "one standard deviation, a line for each touch, until Ctrl-C; --page shows the belief in a "
+      "browser");
   const auto options = std::make_shared<LiveArguments>();
   add_sensor_flags(*command, *options,
                    " [default: the poses of the replay, of the simulation or of the lines]");

@@ -132,11 +132,10 @@ int run(int argc, char** argv) {
     if (!unexpected.empty() && (command == nullptr || unknown || flag)) {
       const std::string& typed = unexpected.front();
       return complain(wrong_input,
-                      fmt::format("'{}' is {}{}; see palpate {}--help", typed,
+                      fmt::format("'{}' is {}; see palpate {}--help", typed,
                                   command == nullptr ? "no command or flag"
                                   : flag             ? "no flag of palpate " + command->get_name()
                                                      : "one argument too many",
-                                  palpate::cli::suggestion(app, command, typed),
                                   command == nullptr ? "" : command->get_name() + " "));
     }
     const bool number = error.get_name() == "ConversionError";  // all values but texts are numbers

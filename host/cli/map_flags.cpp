@@ -123,9 +123,7 @@ void add_map_flags(CLI::App& command, MapFlags& flags) {
                   "Where there are no more presses than maps, each press keeps a map of its own "
                   "[default: 4 into a FOLDER/, 1 into a MAP]")
       ->check(require_whole_number);
-  command.add_option("--png", flags.png,
-                     "Picture to write (PNG): all maps side by side, with --unposed each with its "
-                     "presses");
+  command.add_option("--png", flags.png, "Picture to write (PNG): all maps side by side");
   command.add_option("--ros", flags.ros,
                      "Folder to write every map to as PGM and YAML, for ROS's map_server");
   command.add_option("--device", flags.device,

@@ -16,7 +16,6 @@
 #include "figures/figures.hpp"
 #include "learning/contact_learning.hpp"
 #include "learning/unposed_maps.hpp"
-#include "model/touch_evidence.hpp"
 #include "palpate/files.hpp"
 #include "recognition/folder_sensor.hpp"
 #include "recognition/recordings.hpp"
@@ -146,51 +145,15 @@ std::string words_of(const Misfit& misfit) {
   return fmt::format("fits no map ({:.2f})", misfit.fit);
 }
 
-std::vector<glm::dvec2> contacts_of(const Touch& touch, const ContactClassifier& classifier,
-                                    const PlacedPress& place) {
-  std::vector<glm::dvec2> contacts;
-  const TouchEvidence evidence(touch, {.classifier = classifier});
-  for (const glm::dvec2& p : evidence.contact().elements_mm) {
-    contacts.push_back(place.T_object_sensor * glm::dvec2(place.mirrored ? -p.x : p.x, p.y));
-  }
-  return contacts;
-}
-
-std::string draw(const std::vector<Object>& objects, const UnposedOptions& options) {
-  std::vector<DrawnPresses> groups;
+std::string draw(const std::vector<Object>& objects) {
+  std::vector<OccupancyGrid> maps;
   for (const Object& object : objects) {
-    const std::string& label = object.presses->label;
-    const double element_mm = 0.9 * element_pitch_mm(object.presses->touches);
-    const auto drawn = [&](std::size_t press, const PlacedPress& place, std::string caption) {
-      return DrawnPress{
-          .caption = fmt::format("{}: {}", (*object.sources)[press].index, caption),
-          .contacts_mm = contacts_of(object.presses->touches[press], options.map.classifier, place),
-          .theta_rad = place.T_object_sensor.theta_rad,
-          .element_mm = element_mm};
-    };
     for (std::size_t m = 0; m < object.maps.maps.size(); ++m) {
-      const UnposedMap& map = object.maps.maps[m];
-      DrawnPresses group{.title = fmt::format("{}: {}", name_of(label, m, object.maps.maps.size()),
-                                              fit_words(map)),
-                         .map = map.map,
-                         .presses = {}};
-      for (const PlacedPress& press : map.presses) {
-        group.presses.push_back(
-            drawn(press.press, press,
-                  fmt::format("{}{}", press.fit ? fmt::format("fit {:.2f}", *press.fit) : "alone",
-                              press.mirrored ? ", mirrored" : "")));
-      }
-      groups.push_back(std::move(group));
-    }
-    DrawnPresses left_out{.title = label + ": left out", .presses = {}};
-    for (const Misfit& misfit : object.maps.misfits) {
-      left_out.presses.push_back(drawn(misfit.press, {}, words_of(misfit)));
-    }
-    if (!left_out.presses.empty()) {
-      groups.push_back(std::move(left_out));
+      maps.push_back(object.maps.maps[m].map);
+      maps.back().label = name_of(object.presses->label, m, object.maps.maps.size());
     }
   }
-  return draw_presses(groups);
+  return draw_maps(maps);
 }
 
 /// Says which older maps of the label `recognize` would read besides the new ones.
@@ -236,7 +199,7 @@ void write_object(const MapFlags& flags, const Object& object) {
     fmt::print("{}: press {} left out: {}\n", source.path, source.index, words_of(misfit));
   }
   if (!object.maps.settled) {
-    fmt::print("{}: presses still moved after {} rounds; look at --png\n", label,
+    fmt::print("{}: presses still moved after {} rounds; look at the maps\n", label,
                object.maps.rounds);
   }
   if (flags.to_folder()) {
@@ -281,7 +244,7 @@ void build_unposed_maps(const MapFlags& flags) {
       }
     }
   }
-  const std::string picture = flags.png.empty() ? "" : draw(objects, options);
+  const std::string picture = flags.png.empty() ? "" : draw(objects);
 
   make_map_folders(flags);
   for (const Object& object : objects) {

@@ -18,12 +18,8 @@
 #include "cli/options.hpp"
 #include "cli/recognition_flags.hpp"
 #include "cli/record_table.hpp"
-#include "cli/sheet.hpp"
 #include "cli/step_words.hpp"
-#include "cli/terminal.hpp"
 #include "cli/text_table.hpp"
-#include "figures/figures.hpp"
-#include "model/bounding_box.hpp"
 #include "recognition/record_json.hpp"
 #include "recognition/recordings.hpp"
 #include "recognition/touch_plan.hpp"
@@ -40,7 +36,7 @@ std::string believed_words(const Plan& plan) {
       std::max(plan.both_nats - plan.identity_nats, 0.0));
 }
 
-std::string table_of(const Plan& plan, std::optional<int> columns) {
+std::string table_of(const Plan& plan) {
   constexpr std::size_t most_rows = 10;
   TextTable table(
       {{"rank", true},
@@ -60,7 +56,7 @@ std::string table_of(const Plan& plan, std::optional<int> columns) {
                plan.goal == PlanGoal::pose ? "" : fmt::format("{:.2f}", touch.gain.pose),
                std::to_string(touch.index)});
   }
-  return table.text(columns);
+  return table.text();
 }
 
 /// The plan in the form that other programs rely on.
@@ -91,63 +87,15 @@ nlohmann::ordered_json plan_json(const Plan& plan, const RecognitionTask& task,
 
 /// Whether to act, what is believed, the ten best candidates, what is wrong with the touches, and
 /// the best one.
-/// @param columns see TextTable::text()
-std::string plan_text(const Plan& plan, const RecognitionTask& task, std::optional<int> columns) {
+std::string plan_text(const Plan& plan, const RecognitionTask& task) {
   const std::string limit = in_flags(limit_words(plan));
   const std::string decision = decision_words(plan.record.last());
-  return fmt::format(
-      "{}{}\n{}\n\n{}{}{}\n{}, {} in {:.0f} ms\n", decision.empty() ? "" : decision + "\n",
-      result_words(plan.record.last(), task), believed_words(plan), table_of(plan, columns),
-      complaints({plan.record}, task), limit.empty() ? "" : limit + "\n",
-      next_touch_words(plan.ranked.front(), plan.goal),
-      count_of(plan.ranked.size(), "candidate", "candidates"), 1e3 * plan.seconds);
-}
-
-/// The candidates about the places where the object may be.
-/// @param touches so far
-PlanFigure figure_of(const Plan& plan, const RecognitionTask& task,
-                     std::span<const Touch> touches) {
-  PlanFigure figure;
-  const RecognitionStep& last = plan.record.last();
-  const auto printed = [](std::string words) {
-    const std::size_t at = words.find(" deg");
-    return at == words.npos ? words : words.replace(at, 4, "°");
-  };
-  const std::string name = std::filesystem::path(plan.record.recording).filename().string();
-  figure.result = fmt::format("{}: {}", name, identity_words(last, task));
-  figure.captions = {
-      "object at " + printed(pose_words(pose_text(last.T_robot_object()))) + " in the robot frame",
-      believed_words(plan), printed(next_touch_words(plan.ranked.front(), plan.goal))};
-  figure.gain_caption =
-      plan.goal == PlanGoal::both
-          ? "expected information about object and pose, nats"
-          : fmt::format("expected information about the {}, nats", goal_word(plan.goal));
-  figure.elements_mm = plan.elements_mm;
-  figure.element_mm = element_edge_mm(plan.elements_mm);
-  BoundingBox area;
-  for (const PlannedTouch& touch : plan.ranked) {
-    figure.candidates.push_back({touch.T_robot_sensor, gain_for(touch.gain, plan.goal)});
-    area.take_in(touch.T_robot_sensor * array_centre_mm(plan.elements_mm));
-  }
-  const double margin_mm = array_reach_mm(plan.elements_mm) + figure.element_mm;
-  for (const Touch& touch : touches) {
-    auto& elements = figure.touches_mm.emplace_back();
-    for (const glm::dvec2& element : touch.elements_mm) {
-      elements.push_back(touch.T_robot_sensor * element);
-    }
-    area.take_in(touch.T_robot_sensor * array_centre_mm(touch.elements_mm));
-  }
-  area.lower -= margin_mm;
-  area.upper += margin_mm;
-  constexpr int cells = 160;
-  const OccupancyField field =
-      expected_occupancy(plan.samples, task, area.lower, area.upper, cells);
-  figure.lower_mm = field.lower_mm;
-  figure.cell_mm = field.cell_mm;
-  figure.nx = field.nx;
-  figure.ny = field.ny;
-  figure.occupied = field.probability;
-  return figure;
+  return fmt::format("{}{}\n{}\n\n{}{}{}\n{}, {} in {:.0f} ms\n",
+                     decision.empty() ? "" : decision + "\n",
+                     result_words(plan.record.last(), task), believed_words(plan), table_of(plan),
+                     complaints({plan.record}, task), limit.empty() ? "" : limit + "\n",
+                     next_touch_words(plan.ranked.front(), plan.goal),
+                     count_of(plan.ranked.size(), "candidate", "candidates"), 1e3 * plan.seconds);
 }
 
 struct PlanArguments {
@@ -159,7 +107,6 @@ struct PlanArguments {
   Request request;
   bool verbose = false;
   std::string json;
-  std::string png;
 };
 
 /// Throws Error where an output cannot be written, before any work is done.
@@ -171,7 +118,6 @@ void check_outputs(const PlanArguments& options, const Request& request) {
   }
   add_recognition_files(request, files);
   files.writes("--json", options.json, CommandFiles::Dash::stream);
-  files.writes("--png", options.png);
   files.prepare();
 }
 
@@ -197,12 +143,8 @@ void plan_touches(const PlanArguments& options) {
       !words.empty()) {
     tell_on_stderr(words);
   }
-  if (!options.png.empty()) {
-    write_file(options.png, draw_plan(figure_of(plan, task, unknown.touches)));
-  }
-  give_result(
-      options.json, text_of(plan_json(plan, task, device_name(device)), 2),
-      plan_text(plan, task, terminal_columns(STDOUT_FILENO)) + setup_words(device, task) + "\n");
+  give_result(options.json, text_of(plan_json(plan, task, device_name(device)), 2),
+              plan_text(plan, task) + setup_words(device, task) + "\n");
   if (options.verbose) {
     print_engine(device, recogniser, task);
   }
@@ -252,9 +194,6 @@ void add_plan(CLI::App& app) {
   command->add_option("--json", options->json,
                       "Write what is believed and all candidates, the best first, as JSON; - is "
                       "standard output");
-  command->add_option("--png", options->png,
-                      "Write a picture: the candidates, coloured by gain, over the places where "
-                      "the object may be");
   command->callback([options] { plan_touches(*options); });
 }
 

@@ -21,68 +21,16 @@
 #include "cli/record_table.hpp"
 #include "cli/sheet.hpp"
 #include "cli/step_words.hpp"
-#include "cli/terminal.hpp"
 #include "cli/text_table.hpp"
 #include "io/atomic_file.hpp"
 #include "palpate/files.hpp"
 #include "recognition/filter_choice.hpp"
 #include "recognition/record_json.hpp"
 #include "recognition/recordings.hpp"
-#include "recognition/touch_sd_fit.hpp"
 
 namespace palpate::cli {
 
 namespace {
-
-std::string flags_of(const TouchSdFit& fit) {
-  return fmt::format("--touch-sd-mm {:.3g} --touch-sd-deg {:.3g}", fit.sd.mm, degrees(fit.sd.rad));
-}
-
-std::string number_of(std::size_t count, const char* one, const char* more) {
-  return fmt::format("{} {}", count, count == 1 ? one : more);
-}
-
-/// The result as a table and the flags to paste.
-std::string touch_sd_text(const TouchSdFit& fit) {
-  TextTable table({{"touch-sd"}, {"value", true}, {"std. error", true}});
-  const auto add = [&](const char* what, double sd, double error, const char* unit) {
-    table.add({what, sd == 0.0 ? "exact" : fmt::format("{:.3f} {}", sd, unit),
-               sd == 0.0 ? "" : fmt::format("{:.3f} {}", error, unit)});
-  };
-  add("along x and y", fit.sd.mm, fit.standard_error.mm, "mm");
-  add("angle", degrees(fit.sd.rad), degrees(fit.standard_error.rad), "deg");
-  std::string text = table.text({});
-  text += fmt::format("{}, {}; log evidence {:.1f} nats above that of exact poses\n",
-                      number_of(fit.unknowns, "unknown", "unknowns"),
-                      number_of(fit.touches, "touch", "touches"), fit.evidence_gain);
-  if (fit.sd.mm == 0.0 || fit.sd.rad == 0.0) {
-    text += fmt::format(
-        "exact: below about {:.2g} mm, or {:.2g} deg, which cannot be told from 0 with these maps "
-        "and this array\n",
-        fit.resolution.mm, degrees(fit.resolution.rad));
-  }
-  for (const std::string& warning : fit.warnings) {
-    text += "warning: " + warning + "\n";
-  }
-  return text + flags_of(fit) + "\n";
-}
-
-/// The result in the form that other programs rely on.
-nlohmann::ordered_json to_json(const TouchSdFit& fit, const std::string& device) {
-  nlohmann::ordered_json json{
-      {"touch_sd", {{"mm", fit.sd.mm}, {"deg", degrees(fit.sd.rad)}}},
-      {"standard_error", {{"mm", fit.standard_error.mm}, {"deg", degrees(fit.standard_error.rad)}}},
-      {"exact", {{"mm", fit.sd.mm == 0.0}, {"deg", fit.sd.rad == 0.0}}},
-      {"log_evidence_gain", fit.evidence_gain},
-      {"unknowns", fit.unknowns},
-      {"touches", fit.touches},
-      {"flags", flags_of(fit)},
-      {"device", device}};
-  if (!fit.warnings.empty()) {
-    json["warnings"] = fit.warnings;
-  }
-  return json;
-}
 
 struct RecognizeArguments {
   std::vector<std::string> recordings;
@@ -91,13 +39,9 @@ struct RecognizeArguments {
   std::string json;
   std::string posterior;
   std::string png;
-  bool fit_touch_sd = false;
 };
 
 CallerNeed caller_need(const RecognizeArguments& options, const Request& request) {
-  if (options.fit_touch_sd) {
-    return {.learned_only = true, .eq7 = true};
-  }
   if (!options.posterior.empty() && filter_wish(request).kind != FilterKind::bounded) {
     return {"posterior", "holds the log-likelihood of every bin"};
   }
@@ -181,18 +125,6 @@ void write_results(const RecognizeArguments& options, const RecognitionTask& tas
   }
 }
 
-/// The whole command with --fit-touch-sd.
-void fit_touch_sd(const RecognizeArguments& options, Device* device, const RecognitionTask& task,
-                  std::span<const Recording> recordings, std::span<const Unknown> unknowns) {
-  TouchSdFit fit;
-  {
-    Progress progress("fitting touch-sd");
-    fit = palpate::fit_touch_sd(device, task, touched_objects(recordings, unknowns, task), {},
-                                [&](double fraction) { progress.show(fraction); });
-  }
-  give_result(options.json, text_of(to_json(fit, device_name(device)), 2), touch_sd_text(fit));
-}
-
 /// The line that shows how far the recognition of several unknowns is.
 class UnknownsProgress {
  public:
@@ -238,15 +170,8 @@ void recognize(const RecognizeArguments& options) {
                                                  .still_array = array_is_still(unknowns),
                                                  .need = caller_need(options, request),
                                                  .device = std::ref(device_in_waiting)});
-  if (options.fit_touch_sd) {
-    require_fittable(request, task);
-  }
   check_outputs(options, request, task, unknowns);
   Device* device = device_in_waiting.of(task);
-  if (options.fit_touch_sd) {
-    fit_touch_sd(options, device, task, recordings, unknowns);
-    return;
-  }
   std::string unresolved;
   std::optional<UnknownsProgress> progress(unknowns.size());
   Recogniser recogniser = open_telling(device, task, [&] {
@@ -294,13 +219,12 @@ void recognize(const RecognizeArguments& options) {
   if (options.json == "-") {
     fmt::print("{}", json_text);
   } else {
-    const std::optional<int> columns = terminal_columns(STDOUT_FILENO);
     if (request.trace) {
       for (const RecognitionRecord& record : records) {
-        fmt::print("{}\n", trace_table(record, task, columns));
+        fmt::print("{}\n", trace_table(record, task));
       }
     }
-    fmt::print("{}{}\n", result_table(records, task, columns), setup_words(device, task));
+    fmt::print("{}{}\n", result_table(records, task), setup_words(device, task));
   }
   if (options.verbose) {
     double seconds = 0.0;
@@ -335,15 +259,6 @@ void add_recognize(CLI::App& app) {
       "--png", options->png,
       "Folder for a picture of each unknown: the touches on the map, the belief over x and y, "
       "the identity after every touch");
-  auto* fit = command->add_flag(
-      "--fit-touch-sd", options->fit_touch_sd,
-      "Instead of recognising, find how far the touches lie from where the robot reports them: the "
-      "standard deviations for --touch-sd-mm and --touch-sd-deg under which all RECORDINGs have "
-      "the largest evidence. Give about 50 objects, each touched 5 times or more. Deviations "
-      "of the angle below about 2 degrees are not told by an array 10 mm wide");
-  for (const char* other : {"--each-frame", "--trace", "--posterior", "--png"}) {
-    fit->excludes(other);
-  }
   command->callback([options] { recognize(*options); });
 }
 

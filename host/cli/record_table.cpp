@@ -173,20 +173,19 @@ std::string name_of(const RecognitionRecord& record) {
   return record.frame ? fmt::format("{} frame {}", file, *record.frame) : file;
 }
 
-std::string trace_table(const RecognitionRecord& record, const RecognitionTask& task,
-                        std::optional<int> columns) {
+std::string trace_table(const RecognitionRecord& record, const RecognitionTask& task) {
   TextTable table({{"  touch", true},
                    {"best"},
                    {"prob.", true},
-                   {"dropped", true, false, 2},
+                   {"dropped", true},
                    {"at pose", true},
-                   {"x mm", true, false, 4},
-                   {"y mm", true, false, 4},
-                   {"theta deg", true, false, 4},
-                   {"error mm", true, false, 3},
-                   {"effective particles", true, false, 1},
-                   {"surprise", true, false, 1},
-                   {"fit", false, false, 1}});
+                   {"x mm", true},
+                   {"y mm", true},
+                   {"theta deg", true},
+                   {"error mm", true},
+                   {"effective particles", true},
+                   {"surprise", true},
+                   {"fit"}});
   for (std::size_t i = 0; i < record.trace.size(); ++i) {
     const RecognitionStep& step = record.trace[i];
     const std::array<std::string, 3> pose = pose_cells(pose_text(step));
@@ -198,8 +197,7 @@ std::string trace_table(const RecognitionRecord& record, const RecognitionTask& 
                fit_words(step)});
   }
   const std::string truth = truth_words(record.last());
-  return printable_name(record) + "\n" + table.text(columns) +
-         (truth.empty() ? "" : "  " + truth + "\n");
+  return printable_name(record) + "\n" + table.text() + (truth.empty() ? "" : "  " + truth + "\n");
 }
 
 std::string complaints(const std::vector<RecognitionRecord>& records, const RecognitionTask& task) {
@@ -227,32 +225,25 @@ std::string complaints(const std::vector<RecognitionRecord>& records, const Reco
   return text;
 }
 
-std::string result_table(const std::vector<RecognitionRecord>& records, const RecognitionTask& task,
-                         std::optional<int> columns) {
+std::string result_table(const std::vector<RecognitionRecord>& records,
+                         const RecognitionTask& task) {
   const bool with_fit = std::ranges::any_of(
       records, [](const RecognitionRecord& record) { return !fit_words(record.last()).empty(); });
   const bool with_error = std::ranges::any_of(
       records, [](const RecognitionRecord& record) { return record.last().right.has_value(); });
   const bool with_act = std::ranges::count_if(records, is_decided) > std::ptrdiff_t{few_decided};
-  // A narrower terminal has no room for the column where nothing matters of it.
-  constexpr int with_room = 90;
-  const auto dropped = [&](const RecognitionStep& step) {
-    return !columns || *columns >= with_room || !unproven_sentence(step, task).empty()
-               ? dropped_text(step)
-               : "";
-  };
-  TextTable table({{"recording", false, true},
+  TextTable table({{"recording"},
                    {"touches", true},
                    {"act"},
                    {"best"},
                    {"prob.", true},
-                   {"dropped", true, false, 2},
-                   {"x mm", true, false, 3},
-                   {"y mm", true, false, 3},
-                   {"theta deg", true, false, 3},
+                   {"dropped", true},
+                   {"x mm", true},
+                   {"y mm", true},
+                   {"theta deg", true},
                    {fmt::format("{}{}{}", with_fit ? "fit" : "", with_fit && with_error ? ", " : "",
                                 with_error ? "error" : ""),
-                    false, false, 1}});
+                    false}});
   const auto add_pose = [&](const char* what, const std::string& label, const Pose& T_robot_object,
                             std::optional<double> error_mm) {
     const PoseText pose = pose_text(T_robot_object);
@@ -266,7 +257,7 @@ std::string result_table(const std::vector<RecognitionRecord>& records, const Re
     const std::string share = share_text(step, task);
     std::vector<std::string> row{
         name_of(record),        fmt::format("{}", record.touches),        act,
-        best_words(step, task), fmt::format("{:.3f}", step.confidence()), dropped(step)};
+        best_words(step, task), fmt::format("{:.3f}", step.confidence()), dropped_text(step)};
     if (!share.empty()) {  // the pose has not the probability of the best label
       row.insert(row.end(), 4, "");
       table.add(row);
@@ -293,8 +284,8 @@ std::string result_table(const std::vector<RecognitionRecord>& records, const Re
       table.add({"  truth", "", "", step.truth.label, "", "", "", "", "", "wrong object"});
     }
   }
-  return decisions(records) + table.text(columns) + complaints(records, task) +
-         symmetries(records, task) + summary(records) + confusions(records, task);
+  return decisions(records) + table.text() + complaints(records, task) + symmetries(records, task) +
+         summary(records) + confusions(records, task);
 }
 
 }  // namespace palpate::cli

@@ -12,9 +12,7 @@ namespace palpate::cli {
 std::string name_of(const RecognitionRecord& record);
 
 /// The trace, a line per touch, then the truth as far as it is known.
-/// @param columns see TextTable::text()
-std::string trace_table(const RecognitionRecord& record, const RecognitionTask& task,
-                        std::optional<int> columns);
+std::string trace_table(const RecognitionRecord& record, const RecognitionTask& task);
 
 /// A line for each thing that is wrong with an unknown: contradicted or unlike touches, bounds that
 /// prove less than was asked for, each
@@ -27,8 +25,7 @@ std::string complaints(const std::vector<RecognitionRecord>& records, const Reco
 /// with the truth where it is known. Then what is wrong with which unknown and, where truths are
 /// known, how many are right, the mean pose errors and what each wrongly recognised label was taken
 /// for.
-/// @param columns see TextTable::text()
-std::string result_table(const std::vector<RecognitionRecord>& records, const RecognitionTask& task,
-                         std::optional<int> columns);
+std::string result_table(const std::vector<RecognitionRecord>& records,
+                         const RecognitionTask& task);
 
 }  // namespace palpate::cli

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstddef>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -23,11 +22,7 @@ class TextTable {
  public:
   struct Column {
     std::string heading;
-    bool right = false;    ///< aligned to the right
-    bool may_cut = false;  ///< holds names, which shorten_middle() may cut
-    /// Columns of the least rank above 0 are the first to go below their rows where the terminal is
-    /// too narrow, all of a rank together.
-    int below = 0;
+    bool right = false;  ///< aligned to the right
   };
 
   explicit TextTable(std::vector<Column> columns);
@@ -36,10 +31,7 @@ class TextTable {
   void add(const std::vector<std::string>& cells);
 
   /// The heading and the rows, each with a line end.
-  /// @param columns of the terminal: where the table is wider, it gets one blank instead of two
-  /// between its columns, then shorter names, then what may lie below its row in a line of its own:
-  /// numbers after their headings, words alone. Without a number nothing is shortened.
-  std::string text(std::optional<int> columns) const;
+  std::string text() const;
 
  private:
   std::vector<Column> columns_;

@@ -48,15 +48,4 @@ CalibrationTask calibration_task(const CalibrationRequest& request, const Reques
                                  std::span<const Recording> recordings,
                                  std::span<const GivenMap> maps);
 
-/// Adds to the result of calibrate_sensor() how far touches at known poses lie from the poses that
-/// the robot reported: standard deviations by fit_touch_sd(), and 0 where they lie below the fit's
-/// resolution or twice its standard error. A fifth of each object's touches, some at a time, is
-/// compared with maps of the others, by Eq. 7 with the sensor's classifier. The maps are of
-/// displaced touches, too: their edges are blurred, and the fit takes this for what elements read
-/// there. Nothing is added where there are fewer than five unknowns of at least five touches.
-/// @param progress called now and then with the fraction done
-/// @throws Error as fit_touch_sd() and observed_map(); what `progress` throws
-void add_touch_sd(Device& device, const CalibrationTask& task, SensorCalibration& calibration,
-                  const std::function<void(double)>& progress = {});
-
 }  // namespace palpate

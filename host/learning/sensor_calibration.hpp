@@ -58,7 +58,6 @@ struct SensorCalibration {
   /// Where the array sits in the tool, from touches at known poses of objects whose maps are drawn;
   /// all else is learned with the array there. None where it sits where the recordings say.
   std::optional<SetupFinding> array_offset = {};
-  bool touch_sd_fitted = false;  ///< sensor.touch_sd is the result of a fit
   std::size_t objects = 0;
   std::vector<TriedTable> tried;  ///< in the options' order; none with one object
   /// Scores of the cross-validation; none with one object.

@@ -158,7 +158,7 @@ std::optional<SensorFromFile> sensor_of(const Request& request, const Circumstan
                                         std::span<const Hypothesis> hypotheses,
                                         std::vector<std::string>& remarks) {
   const std::string& file = request.sensor_model;
-  if (file == no_sensor_model || (file.empty() && of.need.eq7)) {
+  if (file == no_sensor_model) {
     return {};
   }
   if (file.empty()) {

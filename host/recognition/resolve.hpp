@@ -18,7 +18,6 @@ struct CallerNeed {
   /// Every unknown is one of the maps' objects, or cannot be told from "(none)", which then has no
   /// weight unless it is given one.
   bool learned_only = false;
-  bool eq7 = false;  ///< the sensor model of the maps' folder is not taken
 };
 
 /// What a task follows from beside its request.

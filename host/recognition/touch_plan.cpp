@@ -13,7 +13,6 @@
 #include "io/pose_table.hpp"
 #include "io/recording_rules.hpp"
 #include "model/bounding_box.hpp"
-#include "model/interpolated_map.hpp"
 #include "palpate/files.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/touch.hpp"
@@ -319,32 +318,6 @@ std::vector<std::string> warnings_of(const Plan& plan) {
     warnings.push_back(limit);
   }
   return warnings;
-}
-
-OccupancyField expected_occupancy(std::span<const PoseSample> samples, const RecognitionTask& task,
-                                  const glm::dvec2& lower_mm, const glm::dvec2& upper_mm,
-                                  int cells) {
-  const glm::dvec2 extent = upper_mm - lower_mm;
-  OccupancyField field{
-      .lower_mm = lower_mm, .cell_mm = std::max(extent.x, extent.y) / cells, .probability = {}};
-  field.nx = std::max(1, static_cast<int>(std::lround(extent.x / field.cell_mm)));
-  field.ny = std::max(1, static_cast<int>(std::lround(extent.y / field.cell_mm)));
-  field.probability.assign(static_cast<std::size_t>(field.nx) * field.ny, 0.0);
-  for (const PoseSample& sample : samples) {
-    const Hypothesis& hypothesis = task.hypotheses[static_cast<std::size_t>(sample.object)];
-    const OccupancyGrid& map = hypothesis.map;
-    const InterpolatedMap interpolated(
-        map, hypothesis.layer ? map.prior : task.contact().prior.value_or(map.prior));
-    for (int j = 0; j < field.ny; ++j) {
-      for (int i = 0; i < field.nx; ++i) {
-        const glm::dvec2 place = lower_mm + field.cell_mm * glm::dvec2(i + 0.5, j + 0.5);
-        field.probability[static_cast<std::size_t>(j) * field.nx + i] +=
-            probability_from_log_odds(interpolated.log_odds(sample.T_object_robot * place)) /
-            static_cast<double>(samples.size());
-      }
-    }
-  }
-  return field;
 }
 
 }  // namespace palpate

@@ -107,18 +107,4 @@ std::string limit_words(const Plan& plan);
 /// What looks wrong with the touches, then limit_words().
 std::vector<std::string> warnings_of(const Plan& plan);
 
-/// How probably a place is occupied by the object, [ny, nx], over places in the robot frame.
-struct OccupancyField {
-  glm::dvec2 lower_mm{0.0};  ///< corner of cell (0, 0)
-  double cell_mm = 1.0;
-  int nx = 0;
-  int ny = 0;
-  std::vector<double> probability;
-};
-/// The mean of the samples' maps at their poses.
-/// @param cells along the longer side
-OccupancyField expected_occupancy(std::span<const PoseSample> samples, const RecognitionTask& task,
-                                  const glm::dvec2& lower_mm, const glm::dvec2& upper_mm,
-                                  int cells);
-
 }  // namespace palpate

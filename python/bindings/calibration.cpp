@@ -23,23 +23,12 @@ namespace {
 
 SensorCalibration calibrate(const GivenRecordings& given, PythonRequest request,
                             const CalibrationRequest& wanted, Call& call) {
-  constexpr double calibrating = 0.5;  // of the time, where touches' poses are fitted
   const std::vector<Recording> recordings = read_recordings(given);
   if (request.given_maps.empty()) {
     read_maps(request);
   }
   const CalibrationTask task = calibration_task(wanted, request, recordings, request.given_maps);
-  const auto report = call.progress();
-  const double share = task.known_poses() ? calibrating : 1.0;
-  SensorCalibration calibration = calibrate_sensor(
-      task.presses, task.maps, task.options, [&](double fraction) { report(share * fraction); });
-  if (task.known_poses()) {
-    const auto used = session_on(request.session, request.device);
-    auto lock = used->lock(call);
-    add_touch_sd(lock.device(), task, calibration,
-                 [&](double fraction) { report(share + (1.0 - share) * fraction); });
-  }
-  return calibration;
+  return calibrate_sensor(task.presses, task.maps, task.options, call.progress());
 }
 
 SetupCheck check(const GivenRecordings& given, const PythonRequest& request, double cell_mm,
@@ -101,6 +90,9 @@ void bind_learned_sensor(nb::module_& module) {
                          {self.table->levels(), static_cast<std::size_t>(ReadingLayer::nodes)});
           },
           "[levels, nodes] log P(level | layer) in nats, of all objects together.")
+      .def("plot", plot_method, "ax"_a = nb::none(), plot_signature,
+           "Draws the probability of each level of reading over what the map says, with\n"
+           "Matplotlib. Returns the axes.")
       .def(
           "save",
           [](const LearnedSensor& self, const PathLike& file) {
@@ -180,8 +172,6 @@ void bind_calibration(nb::module_& module) {
       "A learned sensor and how good it is on touches that it has not seen, by cross-validation.\n"
       "With one object there is none to compare by, and `before` to `area_under_curve` are None.")
       .def_ro("sensor", &SensorCalibration::sensor, "What was learned.")
-      .def_ro("touch_sd_fitted", &SensorCalibration::touch_sd_fitted,
-              "Whether sensor.touch_sd is the result of a fit.")
       .def_ro("array_offset", &SensorCalibration::array_offset,
               "Where the array sits in the tool, a SetupFinding, from touches at known poses of\n"
               "objects whose maps are drawn; all else is learned with the array there. None where\n"

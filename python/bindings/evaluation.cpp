@@ -13,6 +13,7 @@
 #include "bindings.hpp"
 #include "call.hpp"
 #include "recognition/judged_results.hpp"
+#include "types.hpp"
 
 namespace palpate::python {
 
@@ -60,7 +61,10 @@ void bind_scores(nb::module_& module) {
       .def_ro("records", &ReliabilityBin::records, "How many records.")
       .def_ro("right", &ReliabilityBin::right, "How many are right.")
       .def_ro("mean_confidence", &ReliabilityBin::mean_confidence, "0 where there are no records.")
-      .def_prop_ro("accuracy", &ReliabilityBin::accuracy, "NaN where there are no records.");
+      .def_prop_ro("accuracy", &ReliabilityBin::accuracy, "NaN where there are no records.")
+      .def_prop_ro(
+          "accuracy_interval", [](const ReliabilityBin& self) { return pair_of(self.interval()); },
+          "95 % interval (low, high) of the accuracy (Wilson).");
 
   nb::class_<Scores>(module, "Scores", "How right, and how honest, a set of records is.")
       .def_ro("records", &Scores::records, "How many records.")
@@ -76,6 +80,8 @@ void bind_scores(nb::module_& module) {
               "Mean over the records of how far the accuracy of their bin is from its mean\n"
               "confidence (expected calibration error).")
       .def_ro("reliability", &Scores::bins, "Ten equal bins of confidence.")
+      .def("plot", plot_method, "ax"_a = nb::none(), plot_signature,
+           "Draws accuracy over confidence with Matplotlib. Returns the axes.")
       .def("__repr__", [](const Scores& self) {
         return fmt::format("Scores({} of {} right, log_loss {:.3f} nats)", self.right, self.records,
                            self.log_loss);
@@ -139,6 +145,8 @@ void bind_evaluation(nb::module_& module) {
           "The same of the refined poses.")
       .def_ro("without_truth", &JudgedEvaluation::without_truth,
               "Records without a true label, which were left out.")
+      .def("plot", plot_method, "ax"_a = nb::none(), plot_signature,
+           "Draws which classes are taken for which with Matplotlib. Returns the axes.")
       .def_ro("failed", &JudgedEvaluation::failed, "Records with an error, which were left out.")
       .def("__repr__", [](const JudgedEvaluation& self) {
         return fmt::format("Evaluation({} of {} right, {} classes)", self.all.right,

@@ -1,4 +1,4 @@
-// `palpate recognize`, also with --fit-touch-sd, and `palpate plan`.
+// `palpate recognize` and `palpate plan`.
 
 #include <string>
 #include <utility>
@@ -17,7 +17,6 @@
 #include "recognition/recordings.hpp"
 #include "recognition/resolve.hpp"
 #include "recognition/touch_plan.hpp"
-#include "recognition/touch_sd_fit.hpp"
 #include "request.hpp"
 
 namespace palpate::python {
@@ -193,36 +192,6 @@ std::tuple<Fields, Sentences> plan_python(nb::handle recordings, const PythonReq
   return {result, in_python(std::move(sentences))};
 }
 
-using Fitted = std::tuple<TouchSdFit, Sentences>;
-
-Fitted fit_recordings(const Subject& subject, Device& device, Call& call) {
-  const RecognitionTask task = task_of(subject, device, {.learned_only = true, .eq7 = true});
-  require_fittable(subject.request, task);
-  TouchSdFit fit =
-      fit_touch_sd(&device, task, touched_objects(subject.recordings, subject.unknowns, task),
-                   {.resources = {.cancel_point = [&call] { call.check(); }}}, call.progress());
-  return {std::move(fit), in_python(task.remarks)};
-}
-
-void bind_touch_sd_fit(nb::module_& module) {
-  nb::class_<TouchSdFit>(module, "TouchSdFit",
-                         "Standard deviations of the touches' poses about the poses that the robot "
-                         "reported.")
-      .def_ro("sd", &TouchSdFit::sd,
-              "For PoseHistogram(touch_sd=...); 0: not distinguishable from 0, given the maps.")
-      .def_ro("standard_error", &TouchSdFit::standard_error, "Of sd; 0 where sd is 0.")
-      .def_ro("resolution", &TouchSdFit::resolution, "Below about this, sd cannot be told from 0.")
-      .def_ro("evidence_gain", &TouchSdFit::evidence_gain,
-              "By how much the log evidence exceeds that of exact poses, nats.")
-      .def_ro("unknowns", &TouchSdFit::unknowns, "How many recordings were used.")
-      .def_ro("touches", &TouchSdFit::touches, "How many touches were used.")
-      .def_ro("warnings", &TouchSdFit::warnings, "Why the result may be far off, in sentences.")
-      .def("__repr__", [](const TouchSdFit& self) {
-        return fmt::format("TouchSdFit({:.3g} +- {:.2g} mm, {:.3g} +- {:.2g} rad)", self.sd.mm,
-                           self.standard_error.mm, self.sd.rad, self.standard_error.rad);
-      });
-}
-
 }  // namespace
 
 void bind_recognition(nb::module_& module) {
@@ -231,14 +200,6 @@ void bind_recognition(nb::module_& module) {
   module.def("plan", &plan_python, "recordings"_a, "request"_a, "goal"_a, "candidates"_a,
              "samples"_a, "seed"_a, "progress"_a = nb::none(),
              "The fields of a plan, and what is worth a warning.");
-  bind_touch_sd_fit(module);
-  module.def(
-      "fit_touch_sd",
-      [](nb::handle recordings, const PythonRequest& request, const Progress& progress) {
-        return run_on_subject(recordings, request, progress, &fit_recordings);
-      },
-      "recordings"_a, "request"_a, "progress"_a = nb::none(),
-      "The fit, and what is worth a warning.");
 }
 
 }  // namespace palpate::python

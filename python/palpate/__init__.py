@@ -53,7 +53,6 @@ from ._palpate import (
     Touch as Touch,
     TouchDetector as TouchDetector,
     TouchGains as TouchGains,
-    TouchSdFit as TouchSdFit,
     Truth as Truth,
     balanced_lattice as balanced_lattice,
     baseline_of as baseline_of,
@@ -81,7 +80,6 @@ from .commands import (
     calibrate as calibrate,
     check_setup as check_setup,
     evaluate as evaluate,
-    fit_touch_sd as fit_touch_sd,
     import_tables as import_tables,
     plan as plan,
 )

@@ -1,4 +1,4 @@
-"""`palpate import`, `check`, `calibrate`, `plan`, `evaluate` and `recognize --fit-touch-sd` as functions.
+"""`palpate import`, `check`, `calibrate`, `plan` and `evaluate` as functions.
 
 They have the commands' rules, defaults and words.
 """
@@ -17,7 +17,6 @@ from ._palpate import (
     SensorCalibration,
     SetupCheck,
     TouchGains,
-    TouchSdFit,
     Truth,
 )
 from .many import Recognized
@@ -105,29 +104,6 @@ def plan(
     )
     warn(sentences)
     return Plan(**{**fields, "believed": Record(json.loads(fields["believed"]))})
-
-
-def fit_touch_sd(
-    recordings: _Recordings,
-    maps: _Maps = (),
-    *,
-    device: Device | str | int | None = None,
-    progress: Callable[[float], object] | None = None,
-    **options: "Unpack[RecognitionOptions]",
-) -> TouchSdFit:
-    """Finds how far touches lie from the poses that the robot reported, without knowing the objects.
-
-    As `palpate recognize --fit-touch-sd`, number for number: of each recording all touches are of one
-    object of the maps. recordings, maps, device, progress and options: as for recognize().
-
-    Raises Error in the words of the command, also beside touch_sd, slip_sd, none, evidence_nats and a
-    sensor model.
-    What the command would say on standard error becomes a UserWarning.
-    """
-    request = _request("fit_touch_sd", maps, options, device)
-    fit, sentences = _palpate.fit_touch_sd(recordings, request, progress)
-    warn(sentences)
-    return fit
 
 
 def calibrate(

@@ -1,4 +1,5 @@
-"""Pictures of maps, beliefs, touches and records with Matplotlib, which the extra `palpate[plot]` installs."""
+"""Pictures of maps, beliefs, touches, records and results with Matplotlib, which the extra
+`palpate[plot]` installs."""
 
 import io
 from typing import TYPE_CHECKING
@@ -6,17 +7,26 @@ from typing import TYPE_CHECKING
 import numpy
 
 from ._error import Error
-from ._palpate import Marginals, OccupancyGrid, Recording, transform
+from ._palpate import (
+    Evaluation,
+    LearnedSensor,
+    Marginals,
+    OccupancyGrid,
+    Recording,
+    Scores,
+    transform,
+)
 from .recognition import Record
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_Shown = OccupancyGrid | Marginals | Recording | Record
+_Shown = OccupancyGrid | Marginals | Recording | Record | Evaluation | Scores | LearnedSensor
 
 
 def plot(shown: _Shown, ax: "Axes | None" = None) -> "Axes":
-    """Draws a map, a belief over position, touches or a recognised pose, in mm; returns the axes."""
+    """Draws a map, a belief over position, touches or a recognised pose, in mm, or what was evaluated or
+    learned; returns the axes."""
     if ax is None:
         try:
             from matplotlib import pyplot
@@ -41,6 +51,12 @@ def png(shown: _Shown) -> bytes | None:
 
 
 def _draw(shown: _Shown, ax: "Axes") -> None:
+    if isinstance(shown, Evaluation):
+        return _draw_confusion(shown, ax)
+    if isinstance(shown, Scores):
+        return _draw_reliability(shown, ax)
+    if isinstance(shown, LearnedSensor):
+        return _draw_readings(shown, ax)
     if isinstance(shown, OccupancyGrid):
         _draw_map(shown, ax)
     elif isinstance(shown, Recording):
@@ -52,6 +68,49 @@ def _draw(shown: _Shown, ax: "Axes") -> None:
     ax.set_aspect("equal")
     ax.set_xlabel("x, mm")
     ax.set_ylabel("y, mm")
+    return None
+
+
+def _draw_confusion(evaluation: Evaluation, ax: "Axes") -> None:
+    """How often the records of a class, a row, were taken for an answer, a column."""
+    counts = evaluation.confusion
+    shares = counts / numpy.maximum(counts.sum(axis=1, keepdims=True), 1)
+    ax.imshow(shares, cmap="Blues", vmin=0, vmax=1)
+    for row, column in numpy.argwhere(counts > 0):
+        colour = "white" if shares[row, column] > 0.5 else "black"
+        ax.text(column, row, str(counts[row, column]), ha="center", va="center", color=colour)
+    ax.set_xticks(range(len(evaluation.answers)), evaluation.answers, rotation=90)
+    ax.set_yticks(range(len(evaluation.classes)), [scores.label for scores in evaluation.classes])
+    ax.set_xlabel("taken for")
+    ax.set_ylabel("class")
+    ax.set_title(f"{evaluation.all.right} of {evaluation.all.records} right")
+
+
+def _draw_reliability(scores: Scores, ax: "Axes") -> None:
+    """Accuracy over confidence with its 95 % interval; honest confidence lies on the dotted line."""
+    bins = [each for each in scores.reliability if each.records > 0]
+    confidence = [each.mean_confidence for each in bins]
+    for each in bins:
+        ax.plot([each.mean_confidence] * 2, each.accuracy_interval, color="0.6")
+    ax.plot(confidence, [each.accuracy for each in bins], "o-")
+    ax.plot([0, 1], [0, 1], ":", color="0.4")
+    ax.set_xlabel("probability of the best label")
+    ax.set_ylabel("share that is right")
+    ax.set_title(f"{scores.records} records, calibration error {scores.calibration_error:.3f}")
+
+
+def _draw_readings(sensor: LearnedSensor, ax: "Axes") -> None:
+    """The probability of each level of reading over what a map says at the element's place."""
+    sensed = numpy.arange(-8.0, 8.25, 0.5)  # the values of cells that touches sensed, after the others
+    edges = [f"{edge:.3g}" for edge in sensor.level_edges]
+    contact = [f"{a} to {b}" for a, b in zip(["threshold", *edges], edges, strict=False)]
+    contact.append(f"above {edges[-1]}" if edges else "In Contact")
+    for name, levels in zip(["No Contact", *contact], sensor.log_likelihood, strict=True):
+        ax.plot(sensed, numpy.exp(levels[-len(sensed) :]), label=name)
+    pressure = sensor.layer == "mean_level"
+    ax.set_xlabel("mean pressure of the map: -8 none, 8 full, log scale" if pressure else "log odds, nats")
+    ax.set_ylabel("probability of the reading")
+    ax.legend(title=f"pressure, {sensor.pressure_unit}")
 
 
 def _draw_map(grid: OccupancyGrid, ax: "Axes") -> None:

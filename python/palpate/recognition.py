@@ -20,7 +20,7 @@ _Request = TypeVar("_Request")
 
 
 class RecognitionOptions(TypedDict, total=False):
-    """Options of recognize(), by their names, that plan(), fit_touch_sd() and Task have, too."""
+    """Options of recognize(), by their names, that plan() and Task have, too."""
 
     bins: tuple[int, int, int] | Literal["auto", "fine"]
     x_mm: _Pair

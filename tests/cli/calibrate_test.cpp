@@ -47,7 +47,7 @@ class CalibrateCommand : public ProgramTest {
 };
 
 TEST_F(CalibrateCommand, WritesASensorModelAndSaysWhatItLearned) {
-  const std::string out = done(with({"--png", "pictures"}));
+  const std::string out = done(with({}));
   const LearnedSensor sensor = read_sensor_model(folder_ / "s.yaml");
   EXPECT_EQ(sensor.pressure_unit, "kPa");
   ASSERT_TRUE(sensor.table.has_value());
@@ -70,10 +70,6 @@ TEST_F(CalibrateCommand, WritesASensorModelAndSaysWhatItLearned) {
                            "accuracy", "95 % interval", "log-loss, nats", "calibration error",
                            "area under the curve", "\ns.yaml\n"}) {
     EXPECT_THAT(out, HasSubstr(part));
-  }
-  for (const char* name : {"pictures/table.png", "pictures/reliability.png"}) {
-    EXPECT_TRUE(bytes_of(folder_ / name).starts_with("\x89PNG")) << name;
-    EXPECT_THAT(out, HasSubstr(std::string(name) + "\n"));
   }
 }
 
@@ -150,14 +146,12 @@ TEST_F(CalibrateCommand, AtUnknownPosesLearnsNoPointSpread) {
   done({"calibrate", "still.h5", "U.h5", "--unposed", "-o", "s.yaml"});
 }
 
-TEST_F(CalibrateCommand, OfOneObjectWarnsAndDrawsNoReliability) {
-  const Outcome outcome = palpate({"calibrate", "A.h5", "-o", "s.yaml", "--png", "pictures"});
+TEST_F(CalibrateCommand, OfOneObjectWarns) {
+  const Outcome outcome = palpate({"calibrate", "A.h5", "-o", "s.yaml"});
   EXPECT_EQ(outcome.status, 0) << outcome.err;
   EXPECT_THAT(outcome.err, HasSubstr("palpate: touches of one object say nothing"));
   EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
   EXPECT_THAT(outcome.out, Not(HasSubstr("cross-validation")));
-  EXPECT_TRUE(std::filesystem::exists(folder_ / "pictures/table.png"));
-  EXPECT_FALSE(std::filesystem::exists(folder_ / "pictures/reliability.png"));
   EXPECT_EQ(read_sensor_model(folder_ / "s.yaml").temperature, 1.0);
 }
 
@@ -206,9 +200,6 @@ TEST_F(CalibrateCommand, RefusesOutputsThatItCannotWrite) {
   expect_refused({"calibrate", "A.h5", "U.h5", "-o", "nowhere/s.yaml"}, {"nowhere", "not exist"});
   std::filesystem::create_directory(folder_ / "folder");
   expect_refused({"calibrate", "A.h5", "U.h5", "-o", "folder"}, {"folder"});
-  expect_refused(with({"--png", "A.h5"}), {"A.h5: the folder cannot be made"});
-  expect_refused(with({"--png", "A.h5/new", "--unposed", "--frames", "0:8"}),
-                 {"A.h5/new: the folder cannot be made"});
 }
 
 TEST_F(CalibrateCommand, RefusesToOverwriteWhatItReads) {
@@ -217,12 +208,6 @@ TEST_F(CalibrateCommand, RefusesToOverwriteWhatItReads) {
   write_map(folder_ / "A.map.h5", sample_map("A"));
   expect_refused({"calibrate", "A.h5", "U.h5", "-o", "A.map.h5", "--maps", "A.map.h5"},
                  {"-o A.map.h5", "--maps reads"});
-  std::filesystem::create_directory(folder_ / "new");
-  std::filesystem::create_hard_link(folder_ / "A.h5", folder_ / "new/table.png");
-  expect_refused(with({"--png", "new"}), {"--png new/table.png", "RECORDING reads"});
-  std::filesystem::remove(folder_ / "new/table.png");
-  expect_refused({"calibrate", "A.h5", "U.h5", "-o", "new/reliability.png", "--png", "new"},
-                 {"new/reliability.png", "-o"});
 }
 
 }  // namespace palpate::calibrate_test

@@ -8,6 +8,7 @@
 
 #include "palpate/map_builder.hpp"
 #include "palpate/object_frame.hpp"
+#include "palpate/pose_error.hpp"
 #include "program.hpp"
 #include "sample_files.hpp"
 

@@ -85,9 +85,6 @@ TEST_F(MapSensor, IsLeftOutWhereItDoesNotGoWithWhatIsAsked) {
             std::string::npos);
   EXPECT_NE(said_without({"maps", "--threshold", "1.5"}).find("is left out: its threshold is"),
             std::string::npos);
-  const Outcome fit = palpate(
-      {"recognize", "u.h5", "--maps", "maps", "--fit-touch-sd", "--bins=15x15x12", "--touches=2"});
-  EXPECT_EQ(fit.status, 0) << "learns a model of its own: " << fit.err;
 
   done({"map", "A.h5", "-o", "single.map.h5"});
   EXPECT_FALSE(std::filesystem::exists(folder_ / "sensor.yaml"));

@@ -43,10 +43,10 @@ TEST_F(MapUnposedCommand, WritesOneMapIntoAFile) {
 
 TEST_F(MapUnposedCommand, ListsWhatFitsNowhereByFileAndPress) {
   const std::string out =
-      done({"map", "A.h5", "foreign.h5", "-o", "A.map.h5", "--unposed", "--png", "presses.png"});
+      done({"map", "A.h5", "foreign.h5", "-o", "A.map.h5", "--unposed", "--png", "maps.png"});
   EXPECT_NE(out.find("A from 6 presses"), std::string::npos) << out;
   EXPECT_NE(out.find("foreign.h5: press 0 left out: fits no map (0."), std::string::npos) << out;
-  EXPECT_TRUE(bytes_of(folder_ / "presses.png").starts_with("\x89PNG"));
+  EXPECT_TRUE(bytes_of(folder_ / "maps.png").starts_with("\x89PNG"));
 }
 
 TEST_F(MapUnposedCommand, SeveralMapsOfALabelAreReadByRecognize) {

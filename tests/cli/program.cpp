@@ -153,13 +153,6 @@ void ProgramOnTerminal::type(const std::string& keys) const {
   EXPECT_EQ(::write(terminal_, keys.data(), keys.size()), static_cast<ssize_t>(keys.size()));
 }
 
-void ProgramOnTerminal::resize(int columns, int rows) const {
-  winsize window{};
-  window.ws_col = static_cast<unsigned short>(columns);
-  window.ws_row = static_cast<unsigned short>(rows);
-  EXPECT_EQ(::ioctl(terminal_, TIOCSWINSZ, &window), 0);
-}
-
 Outcome ProgramOnTerminal::finish() {
   while (read_more()) {
   }

@@ -52,7 +52,6 @@ class ProgramOnTerminal {
   /// Waits until the program has shown this since the last call; false if it ends before.
   bool shows(const std::string& text);
   void type(const std::string& keys) const;
-  void resize(int columns, int rows) const;
   /// Waits for the end of the program: its status, and all that it has shown.
   Outcome finish();
 

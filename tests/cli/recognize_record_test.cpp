@@ -193,24 +193,6 @@ TEST_F(RecognizeRecord, SaysHowTheDeviceWorksOnlyWhereAskedTo) {
   EXPECT_EQ(outcome.out, out);
 }
 
-TEST_F(RecognizeRecord, ATableFitsItsTerminalAndAFileHasTheFullNames) {
-  const std::string name = "a-recording-whose-name-is-longer-than-half-of-a-terminal.h5";
-  std::filesystem::rename(folder_ / "u.h5", folder_ / name);
-  const std::vector<std::string> call{"recognize", name, "--maps", "A.map.h5"};
-  EXPECT_NE(done(call).find(name), std::string::npos);
-  ProgramOnTerminal program(folder_.path(), call, {{"COLUMNS", "80"}}, 200);
-  std::string shown = program.finish().out;
-  shown.erase(0, shown.find('\n'));  // the sentence before the table
-  EXPECT_EQ(shown.find(name), std::string::npos) << shown;
-  EXPECT_THAT(shown, testing::ContainsRegex("\na-.*\\.\\.\\..*\\.h5 "));
-  std::istringstream lines(shown);
-  for (std::string line; std::getline(lines, line);) {
-    EXPECT_LE(line.size(), 81u) << line;  // with the carriage return
-  }
-  ProgramOnTerminal wide(folder_.path(), call, {{"COLUMNS", ""}}, 200);
-  EXPECT_NE(wide.finish().out.find(name), std::string::npos);
-}
-
 TEST_F(RecognizeRecord, WithoutATruthNothingIsRight) {
   Recording recording = sample_unknown("A", true_pose, 3);
   recording.truth.reset();

@@ -86,11 +86,11 @@ TEST(Certificate, IsSaidWhereProbabilitiesAre) {
   const RecognitionTask task = task_with(0.1);
   const RecognitionRecord wide = record_of(0.97, {{0.03, 1.0}, {0.0, 0.97}});
   const std::string sentence = unproven_sentence(wide.last(), task);
-  const std::string table = result_table({wide}, task, {});
+  const std::string table = result_table({wide}, task);
   EXPECT_THAT(table, HasSubstr("prob.  dropped"));
   EXPECT_THAT(table, HasSubstr("0.620        1"));
   EXPECT_THAT(table, HasSubstr("mug.h5: " + sentence + "\n"));
-  EXPECT_THAT(trace_table(wide, task, {}), HasSubstr("0.620        1"));
+  EXPECT_THAT(trace_table(wide, task), HasSubstr("0.620        1"));
 
   LiveState state;
   state.touches = 2;
@@ -113,8 +113,8 @@ TEST(Certificate, IsSaidWhereProbabilitiesAre) {
   EXPECT_TRUE(caption->alarm);
 
   const RecognitionRecord narrow = record_of(2e-7, {{0.62, 0.62}, {0.38, 0.38}});
-  EXPECT_THAT(result_table({narrow}, task, {}), HasSubstr("0.620    2e-07"));
-  EXPECT_THAT(result_table({narrow}, task, {}), Not(HasSubstr("unproven")));
+  EXPECT_THAT(result_table({narrow}, task), HasSubstr("0.620    2e-07"));
+  EXPECT_THAT(result_table({narrow}, task), Not(HasSubstr("unproven")));
   EXPECT_EQ(sheet_of(narrow, unknown_of(touches), task, {}).captions.size() + 1,
             sheet.captions.size());
 }

@@ -175,8 +175,6 @@ TEST_F(SensorModelFlag, IsRefusedInOneLine) {
     put_bytes(folder_ / "scene.yaml", "sensor_model: s.yaml\n" + key + ": 0.1\n");
     expect_refused(with({"--scene", "scene.yaml"}), {"scene.yaml: " + key, "takes its place"});
   }
-  expect_refused(with({"--sensor-model", "s.yaml", "--fit-touch-sd"}),
-                 {"--fit-touch-sd", "leave out the sensor model"});
   expect_refused(with({"--sensor-model", "s.yaml", "--json", "s.yaml"}),
                  {"--json s.yaml", "--sensor-model reads"});
   LearnedTable of_levels = table_of_equation_7();

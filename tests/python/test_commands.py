@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy
 import pytest
 from conftest import Files, command, comparable, expect_refused
+from matplotlib.figure import Figure
 
 import palpate
 
@@ -76,6 +77,12 @@ def test_an_evaluation_has_the_numbers_of_the_command(tmp_path: pathlib.Path) ->
         assert given.error_mm == (expected["error_mm"]["median"], 2)
         assert given.refined_error_mm == (expected["refined_error_mm"]["median"], 2)
         assert (given.without_truth, given.failed) == (expected["without_truth"], 1)
+        counts = [int(text.get_text()) for text in given.plot(Figure().add_subplot()).texts]
+        assert counts == [count for row in expected["confusion"]["counts"] for count in row if count]
+        [*_, accuracy, _] = given.all.plot(Figure().add_subplot()).lines
+        assert [*zip(*accuracy.get_data(), strict=True)] == [
+            (each.mean_confidence, each.accuracy) for each in given.all.reliability if each.records
+        ]
 
 
 def test_what_is_recognised_can_be_evaluated(files: Files) -> None:
@@ -213,51 +220,6 @@ def test_candidates_that_are_no_poses_are_refused(files: Files) -> None:
         palpate.plan(files.unknown, files.maps, each_frame=True)  # type: ignore[call-arg]
 
 
-# How far touches lie from their poses
-
-
-@pytest.mark.parametrize("name", ["histogram", "bounded"])
-def test_touch_sd_is_that_of_the_command(
-    files: Files, name: Literal["histogram", "bounded"]
-) -> None:
-    other = files.train[0]
-    flags = ["--maps", files.maps, "--touches", 2, "--bins", "8x8x8", "--filter", name]
-    expected = json.loads(command("recognize", files.unknown, other, *flags, "--fit-touch-sd",
-                                  "--json", "-"))  # fmt: skip
-    fractions: list[float] = []
-    fit = palpate.fit_touch_sd(
-        [files.unknown, palpate.read_recording(other)], files.maps, touches=2, bins=(8, 8, 8),
-        filter=name, progress=fractions.append,
-    )  # fmt: skip
-    for sd, key in ((fit.sd, "touch_sd"), (fit.standard_error, "standard_error")):
-        assert sd.mm == expected[key]["mm"]
-        assert sd.rad * 180 / math.pi == pytest.approx(expected[key]["deg"], rel=1e-15)
-    assert (fit.unknowns, fit.touches) == (expected["unknowns"], expected["touches"]) == (2, 4)
-    assert fit.evidence_gain == expected["log_evidence_gain"]
-    assert fit.warnings == expected["warnings"]
-    assert fit.resolution.mm > 0 and fractions[-1] == 1
-
-
-@pytest.mark.parametrize("name", ["touch_sd_mm", "slip_sd_deg", "none"])
-def test_a_fit_beside_what_it_finds_is_refused(files: Files, name: str) -> None:
-    options: dict[str, Any] = {name: 2}
-    expect_refused(
-        lambda: palpate.fit_touch_sd(files.unknown, files.maps, **options),
-        "recognize", files.unknown, "--maps", files.maps, "--fit-touch-sd",
-        f"--{name.replace('_', '-')}", 2,
-    )  # fmt: skip
-
-
-def test_a_fit_refuses_what_has_no_effect(files: Files) -> None:
-    with pytest.raises(palpate.Error, match="^evidence_nats: has no effect on fit_touch_sd"):
-        palpate.fit_touch_sd(files.unknown, files.maps, evidence_nats=1.0)
-
-
-def test_a_fit_needs_recordings(files: Files) -> None:
-    with pytest.raises(palpate.Error, match="^recordings: none"):
-        palpate.fit_touch_sd([], files.maps)
-
-
 # Calibration
 
 
@@ -305,6 +267,9 @@ def test_a_calibration_is_that_of_the_command(
     levels = len(sensor.level_edges) + 2
     assert sensor.log_likelihood.shape == (levels, 49)
     assert numpy.allclose(numpy.exp(sensor.log_likelihood).sum(axis=0), 1)
+    lines = sensor.plot(Figure().add_subplot()).lines
+    assert numpy.allclose(sum(line.get_ydata() for line in lines), 1)
+    assert [*lines[0].get_xdata()[[0, -1]]] == [-8, 8] and len(lines) == levels
     assert (sensor.classifier.threshold == 2) == ("threshold" in options)
     assert sensor.stranger_sd is None
     assert ("goes by a figure of Palpate's own for how badly strangers fit" in said) == ("bins" in options)
@@ -363,7 +328,7 @@ def test_the_programs_of_the_guide_run(
     page = (pathlib.Path(__file__).parents[2] / "docs" / "python.md").read_text()
     [section] = re.findall(r"\n## From tables to the next touch\n(.*?)\n## ", page, re.DOTALL)
     programs = re.findall(r"```python\n(.*?)```", section, re.DOTALL)
-    assert len(programs) == 6
+    assert len(programs) == 5
     (tmp_path / "maps").symlink_to(files.maps)
     palpate.read_recording(files.unknown)[:3].save(tmp_path / "unknown.h5")
     readings = numpy.column_stack([numpy.linspace(0, 2, 3), numpy.ones((3, 36))])
@@ -374,5 +339,5 @@ def test_the_programs_of_the_guide_run(
     exec("".join(programs), names)
     assert names["logged"].T_robot_sensor[0].tolist() == [1000, 2000, 0]
     assert (tmp_path / "sensor.yaml").exists()
-    assert names["calibration"].objects == 2 and names["fit"].unknowns == 1
+    assert names["calibration"].objects == 2
     assert names["evaluation"].all.records == 1 and len(names["plan"].T_robot_sensor) > 10

@@ -156,7 +156,7 @@ def test_where_the_array_sits_counts_once(device: palpate.Device) -> None:
         )
     maps = [drawn_letter(letter) for letter in "AEIOU"]
     calibration = palpate.calibrate(recordings, maps=maps, device=device)
-    assert calibration.array_offset is not None and calibration.touch_sd_fitted
+    assert calibration.array_offset is not None
     assert calibration.sensor.touch_sd.mm < 0.5, "2 mm off is the array, not the touches"
 
 

@@ -6,6 +6,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <cstdlib>
 #include <string_view>
 #include <thread>
 
@@ -230,7 +231,11 @@ std::string PageServer::words() const {
   const std::string& host = impl_->address.host;
   const bool alone = host.starts_with("127.") || host == "::1" || host == "localhost";
   return "the page is at " + url() +
-         (alone ? ""
+         (alone ? std::getenv("SSH_CONNECTION") == nullptr
+                      ? ""
+                      : fmt::format("; from the machine before you, reach it through ssh -L "
+                                    "{0}:127.0.0.1:{0}",
+                                    impl_->port)
                 : ", for everybody who can reach this machine: what the array feels, and the "
                   "buttons");
 }
