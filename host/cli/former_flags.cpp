@@ -10,8 +10,17 @@ namespace palpate::cli {
 namespace {
 
 constexpr std::array table{
+    FormerFlag{"", "--help-all", "give --help, which explains every flag"},
+    FormerFlag{"", "--memory-mib",
+               "give --filter bounded, which needs no memory of the device, or fewer --bins"},
     FormerFlag{"batch", "--update",
                "give -o a new folder where recordings, maps or flags have changed"},
+    FormerFlag{"calibrate", "--png",
+               "draw it in Python, by palpate.calibrate(...).after.plot() and .sensor.plot()"},
+    FormerFlag{"evaluate", "--png", "draw it in Python, by palpate.evaluate(RESULTS).plot()"},
+    FormerFlag{"plan", "--png", "read the table, or give --json"},
+    FormerFlag{"recognize", "--fit-touch-sd",
+               "give --touch-sd-mm and --touch-sd-deg as touches of one object at one pose spread"},
 };
 
 }  // namespace

@@ -113,7 +113,7 @@ class Context {
   /// they reach the cases of much smaller devices and much larger problems.
   void lower_limits(const Limits& limits);
 
-  /// What buffers take and took at most; only tests ask.
+  /// What buffers take, and took at most.
   MemoryUse memory_use() const;
   /// Counts memory; buffers call this pair when they allocate memory and when they free it.
   void take_memory(VkDeviceSize bytes);

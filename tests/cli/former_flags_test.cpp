@@ -32,7 +32,7 @@ TEST_F(FormerFlags, TheTableAgreesWithTheHelp) {
   for (const char* command :
        {"batch", "calibrate", "check", "devices", "evaluate", "export", "import", "info", "live",
         "map", "merge", "plan", "recognize", "record", "sensors", "simulate", "touches", "view"}) {
-    all += help[command] = done({command, "--help-all"});
+    all += help[command] = done({command, "--help"});
   }
   const auto names = [](const std::string& text, std::string_view flag) {
     return std::regex_search(text, std::regex(std::string(flag) + "(?![a-z-])"));

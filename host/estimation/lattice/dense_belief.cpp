@@ -89,34 +89,6 @@ std::vector<SlabExtent> DenseBelief::cut(const gpu::Context& context, const Pose
   return cut_into_slabs(context, lattice, objects, sizes_for(context, lattice, objects).bins());
 }
 
-std::uint64_t DenseBelief::bytes_needed(const gpu::Context& context, const PoseLattice& lattice,
-                                        std::size_t objects) {
-  const ReductionSizes sizes = sizes_for(context, lattice, objects);
-  std::uint64_t bytes = 0;
-  std::size_t partials = 0;
-  for (const SlabExtent& slab : cut(context, lattice, objects)) {
-    bytes += gpu::allocated(slab.bytes());
-    partials += partials_of(slab, sizes);
-  }
-  return bytes + gpu::allocated(partials * sizeof(shaders::Partial));
-}
-
-std::uint64_t DenseBelief::marginal_bytes(const gpu::Context& context, const PoseLattice& lattice,
-                                          std::size_t objects) {
-  const MarginalSizes sizes =
-      marginal_sizes(context.limits(), lattice.plane(), lattice.theta_rad.count);
-  std::uint64_t most = 0;
-  for (const SlabExtent& slab : cut(context, lattice, objects)) {
-    const std::uint64_t over_theta =
-        std::uint64_t{groups_of(slab.theta_count, sizes.thetas)} * slab.plane();
-    const std::uint64_t over_plane =
-        std::uint64_t{groups_of(slab.plane(), sizes.plane())} * slab.theta_count;
-    most = std::max(most, gpu::allocated(over_theta * sizeof(float)) +
-                              gpu::allocated(over_plane * sizeof(float)));
-  }
-  return most;
-}
-
 void DenseBelief::clear() const {
   for (const Slab& slab : slabs_) {
     stream_.fill(slab.log_likelihood, 0);

@@ -259,22 +259,6 @@ DisplacementBlur::Pass DisplacementBlur::make_pass(const Axis& axis, bool along_
       .invocations = strips * (along_x ? lattice_.y_mm.count : groups_of(lattice_.x_mm.count, 2))};
 }
 
-std::uint64_t DisplacementBlur::bytes_needed(const PoseLattice& lattice, std::size_t objects,
-                                             const DisplacementSd& sd) {
-  const int steps = blur_steps(sd.rad, lattice.theta_rad);
-  const auto thetas = static_cast<std::uint64_t>(lattice.theta_rad.count);
-  const auto pass_bytes = [&](const Axis& axis) {
-    const int reach = plane_steps(sd.mm, axis);
-    return gpu::allocated((static_cast<std::uint64_t>(reach) + 1) * sizeof(float)) +
-           gpu::allocated(static_cast<std::uint64_t>(axis.count) * sizeof(float));
-  };
-  return pass_bytes(lattice.x_mm) + pass_bytes(lattice.y_mm) +
-         gpu::allocated(turns_of(lattice, objects, steps) * sizeof(shaders::Turn)) +
-         gpu::allocated((objects * thetas + static_cast<std::uint64_t>(steps) + 1) *
-                        sizeof(float)) +
-         gpu::allocated(objects * sizeof(TwoFloat));
-}
-
 std::uint64_t DisplacementBlur::device_bytes() const {
   return along_x_.weights.bytes() + along_x_.norms.bytes() + along_y_.weights.bytes() +
          along_y_.norms.bytes() + turns_.bytes() + plane_max_.bytes() + references_.bytes();

@@ -75,17 +75,6 @@ bool TouchByTouch::wanted_by(const HistogramOptions& options) {
   return !options.touch_sd.none() || !options.slip_sd.none() || options.none_weight;
 }
 
-std::uint64_t TouchByTouch::bytes_needed(const gpu::Context& context,
-                                         const HistogramOptions& options, std::size_t objects) {
-  const PoseLattice& lattice = options.lattice;
-  return DenseBelief::bytes_needed(context, lattice, objects) +
-         DisplacementBlur::bytes_needed(lattice, objects, options.touch_sd) +
-         (options.slip_sd.none()
-              ? 0
-              : DisplacementBlur::bytes_needed(lattice, objects, options.slip_sd)) +
-         (options.none_weight ? OverlapMean::bytes_needed(lattice, objects) : 0);
-}
-
 TouchByTouch::TouchByTouch(gpu::Context& context, gpu::CommandStream& stream,
                            const HistogramOptions& options, std::span<const Hypothesis> hypotheses,
                            const std::vector<double>& log_weight, DenseBelief& belief)
@@ -219,13 +208,6 @@ OverlapMean::OverlapMean(gpu::Context& context, gpu::CommandStream& stream,
       read_partials_(partials_of(lattice, objects_)) {
   // The first run, at which drivers compile the kernel.
   sums(belief, {}, false);
-}
-
-std::uint64_t OverlapMean::bytes_needed(const PoseLattice& lattice, std::size_t objects) {
-  const auto thetas = static_cast<std::uint64_t>(lattice.theta_rad.count);
-  return gpu::allocated(thetas * sizeof(shaders::ArrayAtTheta)) +
-         gpu::allocated(objects * sizeof(shaders::ObjectBox)) +
-         gpu::allocated(partials_of(lattice, objects) * sizeof(shaders::OverlapPartial));
 }
 
 std::uint64_t OverlapMean::device_bytes() const {
