@@ -8,13 +8,11 @@
 
 #include <CLI/CLI.hpp>
 
-#include "io/descriptor.hpp"
 #include "palpate/error.hpp"
 #include "report.hpp"
 
 int main(int argc, char** argv) try {
   using namespace palpate::bench;
-  palpate::open_closed_streams();
   CLI::App app("Measures Palpate's speed on simulated letters. ./dev bench measures its accuracy.",
                "palpate-bench");
   app.require_subcommand(1);

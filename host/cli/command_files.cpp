@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "io/atomic_file.hpp"
-#include "io/descriptor.hpp"
 #include "io/file_identity.hpp"
 #include "io/input_file.hpp"
 #include "palpate/error.hpp"
@@ -38,31 +37,17 @@ std::optional<Place> place_of(const std::filesystem::path& file, std::optional<i
   return Place{identity_of(status), {}};
 }
 
-void require_open(const std::string& flag, int stream, const char* name) {
-  if (was_closed(stream)) {
-    throw Error(Fault::input, fmt::format("{} -: standard {} is closed; name a file", flag, name));
-  }
-}
-
 }  // namespace
 
 void CommandFiles::reads(const std::string& flag, const std::filesystem::path& file, Dash dash) {
-  const bool is_stream = dash == Dash::stream && file == "-";
-  if (is_stream) {
-    require_open(flag, STDIN_FILENO, "input");
-  }
   if (!file.empty()) {
-    read_.push_back({flag, file, is_stream});
+    read_.push_back({flag, file, dash == Dash::stream && file == "-"});
   }
 }
 
 void CommandFiles::writes(const std::string& flag, const std::filesystem::path& file, Dash dash) {
-  const bool is_stream = dash == Dash::stream && file == "-";
-  if (is_stream) {
-    require_open(flag, STDOUT_FILENO, "output");
-  }
   if (!file.empty()) {
-    written_.push_back({flag, file, is_stream});
+    written_.push_back({flag, file, dash == Dash::stream && file == "-"});
   }
 }
 

@@ -14,10 +14,8 @@ class CommandFiles {
   enum class Dash { file, stream };
 
   /// Adds a file that the command reads, unless its name is "".
-  /// @throws Error (Fault::input) where it is standard input, which is closed
   void reads(const std::string& flag, const std::filesystem::path& file, Dash dash = Dash::file);
   /// Adds a file that the command writes, which need not exist, unless its name is "".
-  /// @throws Error (Fault::input) where it is standard output, which is closed
   void writes(const std::string& flag, const std::filesystem::path& file, Dash dash = Dash::file);
   /// Adds a file in a folder that the command makes where it is missing, unless the folder is "".
   void writes_in(const std::string& flag, const std::filesystem::path& folder,

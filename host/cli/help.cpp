@@ -26,7 +26,7 @@ const std::vector<Group>& groups() {
        {"--touch-sd-mm", "--touch-sd-deg", "--slip-sd-mm", "--slip-sd-deg"}},
       {"Filter",
        {"--filter", "--tolerance", "--budget-ms", "--evidence-nats", "--particles", "--resampling",
-        "--augmented", "--seed", "--memory-mib", "--device", "--verbose"}},
+        "--augmented", "--seed", "--device", "--verbose"}},
       {"Touches in a stream",
        {"--onset", "--release", "--steady", "--min-steady-s", "--smooth-s", "--drift-s", "--tare",
         "--reset-after"}},

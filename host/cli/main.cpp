@@ -5,6 +5,8 @@
 #include <filesystem>
 #include <iostream>
 #include <new>
+#include <span>
+#include <stdexcept>
 #include <string>
 
 #include <fmt/format.h>
@@ -12,6 +14,7 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/commands.hpp"
+#include "cli/former_flags.hpp"
 #include "cli/help.hpp"
 #include "io/descriptor.hpp"
 #include "io/hdf5_process.hpp"
@@ -60,6 +63,12 @@ int complain_of_output() {
                   "standard output: cannot be written; free disk space, or read it to its end");
 }
 
+int complain_of_memory() {
+  return complain(failed,
+                  "out of memory; end other programs, or use smaller files, fewer bins, objects or "
+                  "cells");
+}
+
 /// The exit status after a command has succeeded: 0, or 1 where a part of its output was lost.
 int finish() {
   return std::fflush(stdout) != 0 || std::ferror(stdout) != 0 ? complain_of_output() : 0;
@@ -77,6 +86,11 @@ void refuse_empty_values(CLI::App& app) {
 }
 
 int run(int argc, char** argv) {
+  const std::span<const char* const> arguments(argv, static_cast<std::size_t>(argc));
+  if (const auto answer =
+          palpate::cli::answer_to_former_flag(arguments.subspan(argc > 0 ? 1 : 0))) {
+    return complain(wrong_input, *answer);
+  }
   CLI::App app("Palpate recognises objects by touch and finds their poses, on Vulkan.", "palpate");
   app.set_version_flag("--version", PALPATE_VERSION);
   app.require_subcommand(1);
@@ -144,7 +158,9 @@ int main(int argc, char** argv) {
   } catch (const palpate::Error& error) {
     return complain(error.fault() == palpate::Fault::input ? wrong_input : failed, error.what());
   } catch (const std::bad_alloc&) {
-    return complain(failed, "out of memory; use fewer bins, objects or cells");
+    return complain_of_memory();
+  } catch (const std::length_error&) {  // more than any memory
+    return complain_of_memory();
   } catch (const std::exception& error) {
     // fmt::print throws where standard output cannot be written, without naming it.
     return std::ferror(stdout) != 0 ? complain_of_output() : complain(failed, error.what());

@@ -19,9 +19,8 @@ void add_filter_flags(CLI::App& command, Request& request) {
       fmt::format(
           "histogram: evaluates every pose bin; bounded: the same bins, but evaluates only those "
           "that matter and proves how little the others can; particles: the paper's particle "
-          "filter; auto: bounded for more than {} bins of all objects together, else histogram. "
-          "Bounded refuses --memory-mib; auto then takes the histogram, as it does for --posterior "
-          "[default: auto]",
+          "filter; auto: bounded for more than {} bins of all objects together, else histogram, "
+          "which it also takes for --posterior [default: auto]",
           most_histogram_bins));
   command.add_option(
       "--tolerance", request.tolerance,
@@ -46,12 +45,6 @@ void add_filter_flags(CLI::App& command, Request& request) {
   command.add_flag("--augmented", request.augmented,
                    "Augmented MCL: add random particles while the touches fit worse than before");
   command.add_option("--seed", request.seed, "Seed of the particles' random numbers [default: 0]")
-      ->check(require_whole_number);
-  command
-      .add_option(
-          "--memory-mib", request.memory_mib,
-          "Limit of the histogram's device memory, MiB; less memory costs time, no accuracy "
-          "[default: none]")
       ->check(require_whole_number);
 }
 

@@ -72,34 +72,42 @@ class FrameSource {
   bool done_ = false;
 };
 
-/// Writes all frames to the recording, and the baseline when the tare ends.
+/// Writes all frames to the recording. Those of the tare wait in memory until the baseline is
+/// known, so that a tare that fails leaves an older file as it is.
 class RecordingUnderWay {
  public:
   /// @param tare_s duration of the tare in seconds; 0: the sensor knows its baseline, or has none
-  RecordingUnderWay(const std::string& output, const SensorDescription& sensor, double tare_s)
-      : sensor_(sensor), tare_s_(tare_s), recorder_(std::in_place, output, sensor) {
-    if (taring()) {
-      older_.emplace(output);
-      recorder_->expect_baseline();
+  RecordingUnderWay(const std::string& output, SensorDescription sensor, double tare_s)
+      : output_(output), sensor_(std::move(sensor)), tare_s_(tare_s) {
+    if (tare_s_ == 0.0) {
+      recorder_.emplace(output_, sensor_);
     }
   }
 
   void add(const Frame& frame) {
-    recorder_->add(frame);
     time_.advance(frame.host_time_s);
-    if (taring()) {
-      first_.push_back(frame);
-      if (time_.elapsed_s() >= tare_s_) {
-        end_tare();
-      }
+    if (recorder_) {
+      recorder_->add(frame);
+      return;
+    }
+    of_tare_.push_back(frame);
+    if (time_.elapsed_s() >= tare_s_) {
+      end_tare();
     }
   }
-  void flush() { recorder_->flush(); }
+  void flush() {
+    if (recorder_) {
+      recorder_->flush();
+    }
+  }
 
   /// Closes the file. Throws Error where no frame was recorded or the array was touched during the
   /// tare; no recording is left then.
   void close(const std::string& sensor) {
-    if (recorder_->frames() == 0 && recorder_->unreadable() == 0) {
+    if (!recorder_ && !of_tare_.empty()) {
+      end_tare();
+    }
+    if (!recorder_ || recorder_->frames() + recorder_->unreadable() == 0) {
       throw Error(Fault::system,
                   fmt::format("sensor {}: no frame came; see palpate sensors", sensor));
     }
@@ -108,9 +116,6 @@ class RecordingUnderWay {
              "none of its {} frames has both a known reading and a time; check the board and its "
              "connection with palpate sensors",
              recorder_->unreadable());
-    }
-    if (taring() && !first_.empty()) {
-      end_tare();
     }
     recorder_->close();
   }
@@ -130,31 +135,23 @@ class RecordingUnderWay {
   }
 
  private:
-  bool taring() const { return tare_s_ > 0.0; }
-
   void end_tare() {
     const bool raw = sensor_.pressure_unit == "raw";
-    std::vector<double> baseline;
-    try {
-      baseline = baseline_of(first_, sensor_,
-                             raw ? std::nullopt : std::optional(TouchDetectorOptions{}.onset));
-    } catch (...) {
-      recorder_.reset();
-      older_->restore();
-      throw;
+    sensor_.baseline = baseline_of(
+        of_tare_, sensor_, raw ? std::nullopt : std::optional(TouchDetectorOptions{}.onset));
+    recorder_.emplace(output_, sensor_);
+    for (const Frame& frame : of_tare_) {
+      recorder_->add(frame);
     }
-    recorder_->set_baseline(std::move(baseline));
-    older_.reset();
-    tare_s_ = 0.0;
-    first_ = {};
+    of_tare_ = {};
   }
 
+  std::string output_;
   SensorDescription sensor_;
   double tare_s_;
-  std::vector<Frame> first_;  ///< frames of the tare
+  std::vector<Frame> of_tare_;
   StreamTime time_;
-  std::optional<OlderFile> older_;  ///< the replaced file, until the tare is over
-  std::optional<FrameRecorder> recorder_;
+  std::optional<FrameRecorder> recorder_;  ///< once the baseline is known
 };
 
 void record(const RecordArguments& options) {
@@ -203,8 +200,9 @@ void record(const RecordArguments& options) {
 void add_record(CLI::App& app) {
   auto* command = app.add_subcommand(
       "record",
-      "Record the frames of a sensor until Ctrl-C; 'palpate touches' finds the touches in them. A "
-      "kill, a crash or a full disk costs at most the last second of the recording");
+      "Record the frames of a sensor until Ctrl-C; 'palpate touches' finds the touches in them. "
+      "After the tare, a kill, a crash or a full disk costs at most the last second of the "
+      "recording");
   const auto options = std::make_shared<RecordArguments>();
   add_sensor_flags(*command, *options, "");
   command

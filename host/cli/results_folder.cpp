@@ -1,18 +1,12 @@
 #include "cli/results_folder.hpp"
 
-#include <fcntl.h>
-
 #include <algorithm>
-#include <cerrno>
 #include <charconv>
 #include <chrono>
-#include <cstdlib>
-#include <cstring>
 #include <fstream>
 #include <iterator>
 #include <string_view>
 #include <system_error>
-#include <thread>
 #include <utility>
 
 #include <nlohmann/json.hpp>
@@ -31,79 +25,21 @@ std::optional<std::size_t> count_in(std::string_view text) {
   return error == std::errc{} && rest == end ? std::optional(number) : std::nullopt;
 }
 
-/// That of a job array's task; the whole outside of one.
-Shard shard_of_array() {
-  const auto id = slurm_number("SLURM_ARRAY_TASK_ID");
-  const auto count = slurm_number("SLURM_ARRAY_TASK_COUNT");
-  if (!id || !count) {
-    return {};
-  }
-  const std::size_t first = slurm_number("SLURM_ARRAY_TASK_MIN").value_or(0);
-  const std::size_t step = slurm_number("SLURM_ARRAY_TASK_STEP").value_or(1);
-  const bool even = step > 0 && *id >= first && (*id - first) % step == 0;
-  const std::size_t index = even ? (*id - first) / step : *count;
-  if (index >= *count || *count > most_shards) {
-    refuse_flag("SLURM_ARRAY_TASK_ID", *id,
-                "is not one of {} evenly spaced numbers from {}; submit with --array=0-{}, or give "
-                "--shard I/N",
-                *count, first, *count - 1);
-  }
-  return {index, *count};
-}
-
 }  // namespace
 
-std::optional<std::size_t> slurm_number(const char* variable) {
-  const char* const text = std::getenv(variable);
-  if (text == nullptr || *text == '\0') {
+Shard shard_of(const std::string& flag) {
+  if (flag.empty()) {
     return {};
   }
-  const auto number = count_in(text);
-  if (!number) {
-    refuse_flag(variable, text, "is no whole number; unset it, or give --shard I/N");
-  }
-  return number;
-}
-
-Shard shard_of(const std::string& flag) {
-  if (!flag.empty()) {
-    const std::string_view text = flag;
-    const std::size_t slash = text.find('/');
-    const auto index = count_in(text.substr(0, slash));
-    const auto count = slash == text.npos ? std::nullopt : count_in(text.substr(slash + 1));
-    if (!index || !count || *index >= *count || *count > most_shards) {
-      refuse_flag("--shard", flag, "give it as I/N, with I from 0 to N - 1 and N up to {}",
-                  most_shards);
-    }
-    return {*index, *count};
-  }
-  const Shard array = shard_of_array();
-  // Not SLURM_NTASKS, which a batch script has outside of its steps, too.
-  const std::size_t tasks = slurm_number("SLURM_STEP_NUM_TASKS").value_or(1);
-  const std::size_t task = slurm_number("SLURM_PROCID").value_or(0);
-  if (task >= tasks || tasks > most_shards / array.count) {
-    refuse_flag("SLURM_PROCID", task,
-                "of {} tasks is no shard among up to {}; unset it, or give --shard I/N", tasks,
+  const std::string_view text = flag;
+  const std::size_t slash = text.find('/');
+  const auto index = count_in(text.substr(0, slash));
+  const auto count = slash == text.npos ? std::nullopt : count_in(text.substr(slash + 1));
+  if (!index || !count || *index >= *count || *count > most_shards) {
+    refuse_flag("--shard", flag, "give it as I/N, with I from 0 to N - 1 and N up to {}",
                 most_shards);
   }
-  return {array.index * tasks + task, array.count * tasks};
-}
-
-std::string local_device(std::span<const DeviceInfo> devices, const std::string& wished,
-                         std::size_t rank) {
-  const auto chosen = std::ranges::find_if(devices, &DeviceInfo::chosen);
-  const bool index =
-      !wished.empty() && std::ranges::all_of(wished, [](char c) { return c >= '0' && c <= '9'; });
-  if (chosen == devices.end() || index) {
-    return wished;
-  }
-  std::vector<int> alike;
-  for (const DeviceInfo& device : devices) {
-    if (device.usable && device.name == chosen->name) {
-      alike.push_back(device.index);
-    }
-  }
-  return alike.size() > 1 ? std::to_string(alike[rank % alike.size()]) : wished;
+  return {*index, *count};
 }
 
 namespace {
@@ -112,14 +48,6 @@ namespace fs = std::filesystem;
 
 std::string numbered(std::size_t index, const char* suffix) {
   return fmt::format("{:06}{}", index, suffix);
-}
-
-void remove_file(const fs::path& file) {
-  std::error_code error;
-  if (!fs::remove(file, error) && error) {
-    throw Error(Fault::system, fmt::format("{}: cannot be removed: {}; make the folder writable",
-                                           file.string(), error.message()));
-  }
 }
 
 /// What the folder holds; nothing where there is no such folder.
@@ -156,7 +84,7 @@ bool ResultsFolder::has_task() const {
 }
 
 void ResultsFolder::require_own() const {
-  for (const fs::path& path : {chunks(), runs(), lock()}) {
+  for (const fs::path& path : {chunks(), runs()}) {
     std::error_code ignored;
     if (fs::is_symlink(path, ignored)) {
       refuse(path, "is a link, and palpate batch writes through none; give another folder");
@@ -173,7 +101,7 @@ void ResultsFolder::require_own() const {
 std::optional<fs::path> ResultsFolder::foreign_file() const {
   for (const fs::path& folder : {folder_, chunks(), runs()}) {
     for (const fs::path& path : paths_in(folder)) {
-      if (!is_part(path) && path != chunks() && path != runs() && path != lock()) {
+      if (!is_part(path) && path != chunks() && path != runs()) {
         return path;
       }
     }
@@ -199,19 +127,14 @@ std::vector<std::size_t> ResultsFolder::finished_chunks(std::size_t end) const {
 void ResultsFolder::make() const {
   make_folder(chunks());
   make_folder(runs());
-}
-
-void ResultsFolder::remove_chunk(std::size_t index) const {
-  remove_file(chunk(index));
-  remove_file(run(index));
-}
-
-void ResultsFolder::remove_parts() const {
+  // A day: no living process takes so long to write a chunk, by whatever clock.
+  const auto old = fs::file_time_type::clock::now() - std::chrono::hours(24);
   for (const fs::path& folder : {folder_, chunks(), runs()}) {
     for (const fs::path& path : paths_in(folder)) {
-      if (is_part(path)) {
-        std::error_code ignored;
-        fs::remove(path, ignored);
+      std::error_code error;
+      const auto written = fs::last_write_time(path, error);
+      if (is_part(path) && !error && written < old) {
+        fs::remove(path, error);
       }
     }
   }
@@ -242,120 +165,6 @@ Chunk read_chunk(const fs::path& file, std::size_t unknowns) {
            unknowns);
   }
   return chunk;
-}
-
-// The lock file holds no bytes; its locks are of single bytes beyond its end: the first one is of
-// the process that settles the task, the others are of the shards, each count in a range of its
-// own.
-namespace {
-
-constexpr off_t settling = 0;
-
-off_t place_of(const Shard& shard) {
-  return static_cast<off_t>(shard.count * most_shards + shard.index);
-}
-
-struct flock lock_of(short type, off_t start, off_t length) {
-  struct flock lock {};
-  lock.l_type = type;
-  lock.l_whence = SEEK_SET;
-  lock.l_start = start;
-  lock.l_len = length;
-  return lock;
-}
-
-/// The place of a lock that another process holds in [start, start + length), or to the end where
-/// length is 0; -1 where there is none.
-off_t held_by_others(int descriptor, off_t start, off_t length) {
-  struct flock lock = lock_of(F_WRLCK, start, length);
-  if (length < 0 || ::fcntl(descriptor, F_GETLK, &lock) != 0 || lock.l_type == F_UNLCK) {
-    return -1;
-  }
-  return lock.l_start;
-}
-
-[[noreturn]] void fail_to_lock(const fs::path& file) {
-  throw Error(Fault::system,
-              fmt::format("{}: cannot be locked: {}; put the folder on a file system with locks",
-                          file.string(), std::strerror(errno)));
-}
-
-}  // namespace
-
-FolderLock::FolderLock(const ResultsFolder& folder, const Shard& shard,
-                       const std::function<bool()>& wait)
-    : file_(folder.lock()), shard_(shard), descriptor_(file_, O_RDWR | O_CREAT | O_NOFOLLOW, 0666) {
-  if (!descriptor_.valid()) {
-    refuse(folder.path(),
-           "cannot be written: {}; choose another folder (palpate merge and evaluate only read it)",
-           std::strerror(errno));
-  }
-  std::optional<Shard> other = take();
-  while (other && wait()) {
-    other = take();
-  }
-  if (other && other->count == shard.count) {
-    refuse(folder.path(),
-           "another process works on shard {}/{}; wait until it has ended, or give another --shard",
-           shard.index, shard.count);
-  }
-  if (other) {
-    refuse(folder.path(),
-           "another process works on shard {}/{} of it; wait until it has ended, or give --shard "
-           "I/{}",
-           other->index, other->count, other->count);
-  }
-}
-
-std::function<bool()> FolderLock::wait_for_a_second() {
-  constexpr int times = 20;
-  return [left = times]() mutable {
-    std::this_thread::sleep_for(std::chrono::milliseconds(1000 / times));
-    return --left >= 0;
-  };
-}
-
-std::optional<Shard> FolderLock::take() const {
-  struct flock lock = lock_of(F_WRLCK, place_of(shard_), 1);
-  if (::fcntl(descriptor_.get(), F_SETLK, &lock) != 0) {
-    if (errno != EACCES && errno != EAGAIN) {
-      fail_to_lock(file_);
-    }
-    return shard_;
-  }
-  const auto range = static_cast<off_t>(most_shards);
-  const off_t own = place_of({0, shard_.count});
-  for (const auto& [start, length] : {std::pair{range, own - range}, {own + range, off_t{0}}}) {
-    if (length == 0 && start <= own) {
-      continue;  // no count is smaller
-    }
-    if (const off_t other = held_by_others(descriptor_.get(), start, length); other >= 0) {
-      // Two that wait for each other shall not both find the other's lock.
-      lock.l_type = F_UNLCK;
-      ::fcntl(descriptor_.get(), F_SETLK, &lock);
-      return Shard{static_cast<std::size_t>(other % range),
-                   static_cast<std::size_t>(other / range)};
-    }
-  }
-  return {};
-}
-
-void FolderLock::lock() const {
-  struct flock lock = lock_of(F_WRLCK, settling, 1);
-  while (::fcntl(descriptor_.get(), F_SETLKW, &lock) != 0) {
-    if (errno != EINTR) {
-      fail_to_lock(file_);
-    }
-  }
-}
-
-void FolderLock::unlock() const {
-  struct flock lock = lock_of(F_UNLCK, settling, 1);
-  ::fcntl(descriptor_.get(), F_SETLK, &lock);
-}
-
-bool FolderLock::is_alone() const {
-  return held_by_others(descriptor_.get(), static_cast<off_t>(most_shards), 0) < 0;
 }
 
 }  // namespace palpate::cli

@@ -69,13 +69,9 @@ std::optional<gpu::Access> map_access(const gpu::Limits& limits, std::uint64_t c
   return {};
 }
 
-std::uint64_t BorderedMaps::bytes_needed(gpu::Access access, std::uint64_t cells) {
-  return cells * cell_bytes(access);
-}
-
 BorderedMaps::BorderedMaps(gpu::Context& context, gpu::Access access, std::uint64_t cells,
                            std::string_view purpose)
-    : nodes_(context, bytes_needed(access, cells), gpu::Memory::device, purpose,
+    : nodes_(context, cells * cell_bytes(access), gpu::Memory::device, purpose,
              access == gpu::Access::table ? VK_FORMAT_R32G32B32A32_SFLOAT : VK_FORMAT_UNDEFINED) {}
 
 int BorderedMaps::add(gpu::CommandStream& stream, const OccupancyGrid& map, double prior) {

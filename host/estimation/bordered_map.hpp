@@ -31,9 +31,6 @@ std::optional<gpu::Access> map_access(const gpu::Limits& limits, std::uint64_t c
 /// table each of these with the three above and to its right.
 class BorderedMaps {
  public:
-  /// Device memory that this many cells take, in bytes.
-  static std::uint64_t bytes_needed(gpu::Access access, std::uint64_t cells);
-
   BorderedMaps(gpu::Context& context, gpu::Access access, std::uint64_t cells,
                std::string_view purpose);
 

@@ -79,23 +79,19 @@ std::vector<std::uint32_t> contact_constants(const gpu::Limits& limits, const Co
           0};
 }
 
-std::uint64_t ContactTable::bytes_needed(const ContactModel& model) {
-  const std::size_t sets = model.table ? model.table->sets() : 0;
-  return std::max<std::uint64_t>(1, sets * nodes_of_a_set(model)) * sizeof(shaders::TableNode);
-}
-
 ContactTable::ContactTable(gpu::Context& context, gpu::CommandStream& stream,
                            const ContactModel& model)
     : nodes_of_a_set_(nodes_of_a_set(model)) {
-  const std::uint64_t bytes = bytes_needed(model);
+  const std::uint64_t count =
+      std::max<std::uint64_t>(1, (model.table ? model.table->sets() : 0) * nodes_of_a_set_);
   const std::uint64_t most = std::min<std::uint64_t>(
       context.limits().table_texels, context.limits().allocation / sizeof(shaders::TableNode));
-  if (bytes / sizeof(shaders::TableNode) > most) {
+  if (count > most) {
     throw Error(
         Fault::input,
         fmt::format("likelihood table: its {} nodes on the device exceed the {} that device '{}' "
                     "reads; use fewer nodes, levels or objects",
-                    bytes / sizeof(shaders::TableNode), most, context.name()));
+                    count, most, context.name()));
   }
   std::vector<shaders::TableNode> nodes;
   if (const auto& table = model.table) {
@@ -105,7 +101,7 @@ ContactTable::ContactTable(gpu::Context& context, gpu::CommandStream& stream,
       append_set(nodes, *table, std::span(table->log_likelihood).subspan(set * numbers, numbers));
     }
   }
-  nodes.resize(bytes / sizeof(shaders::TableNode));
+  nodes.resize(count);
   nodes_ = stream.uploaded(nodes, "the likelihood table", VK_FORMAT_R32G32_SFLOAT);
 }
 

@@ -17,9 +17,6 @@ std::vector<std::uint32_t> contact_constants(const gpu::Limits& limits, const Co
 /// table has one node that no kernel reads, because kernels bind the buffer all the same.
 class ContactTable {
  public:
-  /// Device memory that it takes, in bytes.
-  static std::uint64_t bytes_needed(const ContactModel& model);
-
   /// Records the upload.
   /// @throws Error where the table has more nodes than the device reads
   ContactTable(gpu::Context& context, gpu::CommandStream& stream, const ContactModel& model);

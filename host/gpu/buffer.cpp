@@ -45,6 +45,14 @@ Buffer::Buffer(Context& context, VkDeviceSize bytes, Memory memory, std::string_
                             "objects or cells",
                             doing, static_cast<double>(context.limits().allocation) / (1 << 20)));
   }
+  // A driver on the host may promise more than there is.
+  if (bytes > context.limits().memory ||
+      context.memory_use().now > context.limits().memory - bytes) {
+    throw Error(Fault::input,
+                fmt::format("{}: more than is left of its {:.1f} MiB; use fewer bins, objects or "
+                            "cells",
+                            doing, static_cast<double>(context.limits().memory) / (1 << 20)));
+  }
   // A larger view is undefined behaviour.
   if (table_where_it_fits(context.limits(), bytes, texel) != texel) {
     throw Error(Fault::input,

@@ -16,9 +16,6 @@ enum class Memory {
   download,  ///< mapped host memory that the device copies to
 };
 
-/// Device memory that a buffer of this size takes, in bytes, rounded up as drivers do.
-constexpr VkDeviceSize allocated(VkDeviceSize bytes) { return (bytes + 255) / 256 * 256; }
-
 /// The texel's format for a buffer of this size that kernels read as a table where the device reads
 /// so many texels, and VK_FORMAT_UNDEFINED where they read it from storage instead.
 VkFormat table_where_it_fits(const Limits& limits, VkDeviceSize bytes, VkFormat texel);

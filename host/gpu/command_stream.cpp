@@ -1,6 +1,8 @@
 #include "gpu/command_stream.hpp"
 
 #include <algorithm>
+#include <chrono>
+#include <limits>
 
 #include <fmt/format.h>
 
@@ -18,9 +20,67 @@ constexpr VkDeviceSize staging_block = CommandStream::staging_bytes / 2;
 /// Staging memory that a copy takes: copies start at multiples of 16 bytes.
 VkDeviceSize staged(VkDeviceSize bytes) { return (bytes + 15) / 16 * 16; }
 
+/// Lets what follows see the results of all commands before. The only barrier between commands.
+void barrier(VkCommandBuffer commands) {
+  constexpr VkPipelineStageFlags stages =
+      VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_TRANSFER_BIT;
+  const VkMemoryBarrier memory{
+      .sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER,
+      .srcAccessMask = VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_TRANSFER_WRITE_BIT,
+      .dstAccessMask = VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT |
+                       VK_ACCESS_TRANSFER_READ_BIT | VK_ACCESS_TRANSFER_WRITE_BIT};
+  vkCmdPipelineBarrier(commands, stages, stages, 0, 1, &memory, 0, nullptr, 0, nullptr);
+}
+
+/// Makes the device's writes to staging memory visible to the host after the fence.
+void barrier_to_host(VkCommandBuffer commands) {
+  const VkMemoryBarrier memory{.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER,
+                               .srcAccessMask = VK_ACCESS_TRANSFER_WRITE_BIT,
+                               .dstAccessMask = VK_ACCESS_HOST_READ_BIT};
+  vkCmdPipelineBarrier(commands, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_PIPELINE_STAGE_HOST_BIT, 0, 1,
+                       &memory, 0, nullptr, 0, nullptr);
+}
+
 }  // namespace
 
-CommandStream::CommandStream(Context& context) : context_(context), submitter_(context) {}
+CommandStream::CommandStream(Context& context) : context_(context) {
+  const VkDevice device = context.device();
+  const VkCommandPoolCreateInfo pool_info{.sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO,
+                                          .queueFamilyIndex = context.queue_family()};
+  pool_ = make_owned(vkCreateCommandPool, vkDestroyCommandPool, device, pool_info,
+                     "creating a command pool");
+  const VkCommandBufferAllocateInfo buffer_info{
+      .sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO,
+      .commandPool = pool_.get(),
+      .level = VK_COMMAND_BUFFER_LEVEL_PRIMARY,
+      .commandBufferCount = 1};
+  check(vkAllocateCommandBuffers(device, &buffer_info, &commands_), "creating commands");
+  const VkFenceCreateInfo fence_info{.sType = VK_STRUCTURE_TYPE_FENCE_CREATE_INFO};
+  fence_ = make_owned(vkCreateFence, vkDestroyFence, device, fence_info, "creating a fence");
+  if (context.limits().timestamp_ns > 0.0F) {
+    const VkQueryPoolCreateInfo query_info{.sType = VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO,
+                                           .queryType = VK_QUERY_TYPE_TIMESTAMP,
+                                           .queryCount = 2};
+    timestamps_ = make_owned(vkCreateQueryPool, vkDestroyQueryPool, device, query_info,
+                             "creating timestamps");
+  }
+}
+
+VkCommandBuffer CommandStream::next_command() {
+  if (!recording_) {
+    check(vkResetCommandPool(context_.device(), pool_.get(), 0), "resetting commands");
+    const VkCommandBufferBeginInfo info{.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO,
+                                        .flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT};
+    check(vkBeginCommandBuffer(commands_, &info), "recording commands");
+    recording_ = true;
+    if (timestamps_) {
+      vkCmdResetQueryPool(commands_, timestamps_.get(), 0, 2);
+      vkCmdWriteTimestamp(commands_, VK_PIPELINE_STAGE_TOP_OF_PIPE_BIT, timestamps_.get(), 0);
+    }
+  }
+  barrier(commands_);
+  return commands_;
+}
 
 template <typename Commands>
 void CommandStream::record(const Commands& commands) {
@@ -58,7 +118,8 @@ void CommandStream::upload_bytes(const Buffer& target, std::span<const std::byte
     record([&] {
       const std::size_t count = stage(upload_, bytes.size());
       std::memcpy(upload_.block.data() + upload_.used, bytes.data(), count);
-      recording_.copy(upload_.block.handle(), target.handle(), {upload_.used, offset, count});
+      const VkBufferCopy region{upload_.used, offset, count};
+      vkCmdCopyBuffer(next_command(), upload_.block.handle(), target.handle(), 1, &region);
       upload_.used += staged(count);
       bytes = bytes.subspan(count);
       offset += count;
@@ -71,7 +132,8 @@ void CommandStream::download_bytes(const Buffer& source, std::span<std::byte> by
   while (!bytes.empty()) {
     record([&] {
       const std::size_t count = stage(download_, bytes.size());
-      recording_.copy(source.handle(), download_.block.handle(), {offset, download_.used, count});
+      const VkBufferCopy region{offset, download_.used, count};
+      vkCmdCopyBuffer(next_command(), source.handle(), download_.block.handle(), 1, &region);
       downloads_.push_back({bytes.data(), download_.block.data() + download_.used, count});
       download_.used += staged(count);
       bytes = bytes.subspan(count);
@@ -81,7 +143,7 @@ void CommandStream::download_bytes(const Buffer& source, std::span<std::byte> by
 }
 
 void CommandStream::fill(const Buffer& target, std::uint32_t word) {
-  record([&] { recording_.fill(target.handle(), word); });
+  record([&] { vkCmdFillBuffer(next_command(), target.handle(), 0, VK_WHOLE_SIZE, word); });
 }
 
 VkDescriptorSet CommandStream::descriptor_set(const Kernel& kernel,
@@ -143,7 +205,7 @@ const Buffer& CommandStream::unread() {
 
 void CommandStream::dispatch_bytes(const Kernel& kernel, std::span<const Buffer* const> buffers,
                                    std::span<const std::byte> push,
-                                   std::array<std::uint32_t, 3> groups, double work) {
+                                   std::array<std::uint32_t, 3> groups) {
   record([&] {
     const auto& most = context_.limits().group_count;
     if (buffers.size() != kernel.bindings().size() || push.size() != kernel.push_bytes() ||
@@ -154,12 +216,19 @@ void CommandStream::dispatch_bytes(const Kernel& kernel, std::span<const Buffer*
                       "do not fit it or the device",
                       kernel.name(), buffers.size(), push.size(), groups[0], groups[1], groups[2]));
     }
-    recording_.dispatch(kernel, descriptor_set(kernel, buffers), push, groups, work);
+    const VkDescriptorSet set = descriptor_set(kernel, buffers);
+    const VkCommandBuffer commands = next_command();
+    vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, kernel.pipeline());
+    vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, kernel.layout(), 0, 1, &set,
+                            0, nullptr);
+    vkCmdPushConstants(commands, kernel.layout(), VK_SHADER_STAGE_COMPUTE_BIT, 0,
+                       static_cast<std::uint32_t>(push.size()), push.data());
+    vkCmdDispatch(commands, groups[0], groups[1], groups[2]);
   });
 }
 
 void CommandStream::run() {
-  if (recording_.empty()) {
+  if (!recording_) {
     return;
   }
   run_recorded();
@@ -169,25 +238,47 @@ void CommandStream::run() {
 
 void CommandStream::run_recorded() {
   try {
-    submit();
+    seconds_before_run_ += execute();
   } catch (...) {
     drop();
     throw;
+  }
+  for (const Download& download : downloads_) {
+    std::memcpy(download.target, download.source, download.bytes);
   }
   rewind();
   context_.validation().throw_if_any();
 }
 
-void CommandStream::submit() {
-  const RunOutcome outcome = context_.runs().run(recording_, submitter_);
-  if (outcome.result !=
-      VK_SUCCESS) {  // no message is made, and no memory taken, while all goes well
-    check(outcome.result, fmt::format("running on device '{}'", context_.name()));
+double CommandStream::execute() {
+  const VkDevice device = context_.device();
+  const VkFence fence = fence_.get();
+  const auto require = [this](VkResult result) {
+    if (result != VK_SUCCESS) {  // no message is made while all goes well
+      check(result, fmt::format("running on device '{}'", context_.name()));
+    }
+  };
+  barrier_to_host(commands_);
+  if (timestamps_) {
+    vkCmdWriteTimestamp(commands_, VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT, timestamps_.get(), 1);
   }
-  seconds_before_run_ += outcome.seconds;
-  for (const Download& download : downloads_) {
-    std::memcpy(download.target, download.source, download.bytes);
+  require(vkEndCommandBuffer(commands_));
+  require(vkResetFences(device, 1, &fence));
+  const VkSubmitInfo submit{.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO,
+                            .commandBufferCount = 1,
+                            .pCommandBuffers = &commands_};
+  const auto start = std::chrono::steady_clock::now();
+  require(context_.submit(submit, fence));
+  require(vkWaitForFences(device, 1, &fence, VK_TRUE, std::numeric_limits<std::uint64_t>::max()));
+  if (!timestamps_) {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   }
+  std::array<std::uint64_t, 2> ticks{};
+  require(vkGetQueryPoolResults(device, timestamps_.get(), 0, 2, sizeof ticks, ticks.data(),
+                                sizeof ticks[0],
+                                VK_QUERY_RESULT_64_BIT | VK_QUERY_RESULT_WAIT_BIT));
+  return static_cast<double>((ticks[1] - ticks[0]) & context_.limits().timestamp_mask) *
+         context_.limits().timestamp_ns * 1e-9;
 }
 
 void CommandStream::drop() {
@@ -197,7 +288,7 @@ void CommandStream::drop() {
 
 void CommandStream::rewind() {
   const VkDevice device = context_.device();
-  recording_.clear();
+  recording_ = false;
   downloads_.clear();
   for (const auto& pool : descriptor_pools_) {
     check(vkResetDescriptorPool(device, pool.get(), 0), "resetting a descriptor pool");

@@ -3,21 +3,20 @@
 #include <array>
 #include <cstring>
 #include <initializer_list>
-#include <limits>
 #include <ranges>
 #include <span>
 #include <vector>
 
 #include "gpu/buffer.hpp"
 #include "gpu/kernel.hpp"
-#include "gpu/recording.hpp"
-#include "gpu/submitter.hpp"
+#include "gpu/owned.hpp"
 
 namespace palpate::gpu {
 
 /// Records copies and dispatches, then runs them in order. A barrier stands between any two
-/// commands, so that each sees the results of all before it. Streams of several threads run side by
-/// side (RunQueue): they must share no buffer that one of them writes. Staging memory has a fixed
+/// commands, so that each sees the results of all before it. Buffers and kernels must live until
+/// then. Each thread has streams of its own, which take turns on the device: they must share no
+/// buffer that one of them writes. Staging memory has a fixed
 /// size: a copy that finds it full first runs the recorded commands. A call that throws drops all
 /// recorded commands, so that no later run uses a buffer that the caller has freed meanwhile.
 class CommandStream {
@@ -50,22 +49,19 @@ class CommandStream {
 
   /// Runs a kernel on groups[0] x groups[1] x groups[2] workgroups, with a buffer for each of its
   /// bindings: null for storage, or a table of floats, that its constants keep it from reading.
-  /// @param work Recording::work(), where it is known: only then other threads' commands may run
-  /// beside it
   template <typename Push>
   void dispatch(const Kernel& kernel, std::initializer_list<const Buffer*> buffers,
-                const Push& push, std::array<std::uint32_t, 3> groups,
-                double work = std::numeric_limits<double>::infinity()) {
+                const Push& push, std::array<std::uint32_t, 3> groups) {
     static_assert(std::is_trivially_copyable_v<Push>);
     dispatch_bytes(kernel, std::span(buffers.begin(), buffers.size()),
-                   std::as_bytes(std::span(&push, 1)), groups, work);
+                   std::as_bytes(std::span(&push, 1)), groups);
   }
 
   /// Submits everything recorded, waits for it and delivers the downloads.
   void run();
 
-  /// Time that the device took for all commands of the last run(), in seconds, with those of other
-  /// threads that ran beside them.
+  /// Time that the device took for all commands of the last run(), in seconds. A device may take
+  /// turns between the commands of several streams: then that of their turns, too.
   double device_seconds() const { return device_seconds_; }
 
  private:
@@ -87,13 +83,15 @@ class CommandStream {
   void upload_bytes(const Buffer& target, std::span<const std::byte> bytes, VkDeviceSize offset);
   void download_bytes(const Buffer& source, std::span<std::byte> bytes, VkDeviceSize offset);
   void dispatch_bytes(const Kernel& kernel, std::span<const Buffer* const> buffers,
-                      std::span<const std::byte> push, std::array<std::uint32_t, 3> groups,
-                      double work);
-  /// Calls `commands`, which add to the recording. Drops the recording if they throw.
+                      std::span<const std::byte> push, std::array<std::uint32_t, 3> groups);
+  /// The command buffer, behind a barrier.
+  VkCommandBuffer next_command();
+  /// Calls `commands`, which add to the command buffer. Drops what is recorded if they throw.
   template <typename Commands>
   void record(const Commands& commands);
   void run_recorded();
-  void submit();
+  /// Runs the command buffer and waits for it. Returns the device's time, in seconds.
+  double execute();
   void rewind();
   void drop();
   VkDescriptorSet descriptor_set(const Kernel& kernel, std::span<const Buffer* const> buffers);
@@ -101,8 +99,11 @@ class CommandStream {
   const Buffer& unread();
 
   Context& context_;
-  Submitter submitter_;
-  Recording recording_;
+  Owned<VkCommandPool> pool_;
+  VkCommandBuffer commands_ = VK_NULL_HANDLE;
+  bool recording_ = false;  ///< there are commands to run
+  Owned<VkFence> fence_;
+  Owned<VkQueryPool> timestamps_;  ///< none where the queue has none
   std::vector<Owned<VkDescriptorPool>> descriptor_pools_;
   std::size_t sets_used_ = 0;
   Buffer unread_;

@@ -10,7 +10,6 @@
 #include <vulkan/vulkan_core.h>
 
 #include "gpu/pipelines.hpp"
-#include "gpu/run_queue.hpp"
 #include "model/own_process.hpp"
 #include "palpate/device.hpp"
 #include "palpate/vulkan_device.hpp"
@@ -103,8 +102,6 @@ class Context {
   VkDevice device() const { return device_; }
   /// Submits to the queue; the commands of several threads take turns.
   VkResult submit(const VkSubmitInfo& info, VkFence fence);
-  /// The queue in which command streams wait for the device.
-  RunQueue& runs() { return runs_; }
   /// What kernels share.
   Pipelines& pipelines() { return pipelines_; }
   std::uint32_t queue_family() const { return queue_family_; }
@@ -116,7 +113,7 @@ class Context {
   /// they reach the cases of much smaller devices and much larger problems.
   void lower_limits(const Limits& limits);
 
-  /// What buffers take and took at most; only tests ask.
+  /// What buffers take, and took at most.
   MemoryUse memory_use() const;
   /// Counts memory; buffers call this pair when they allocate memory and when they free it.
   void take_memory(VkDeviceSize bytes);
@@ -139,7 +136,6 @@ class Context {
   VkQueue queue_ = VK_NULL_HANDLE;
   std::mutex own_queue_mutex_;
   std::mutex* queue_mutex_ = &own_queue_mutex_;
-  RunQueue runs_;
   Pipelines pipelines_;
   std::uint32_t queue_family_ = 0;
   std::string name_;

@@ -7,7 +7,6 @@
 #include <cerrno>
 #include <cstring>
 #include <system_error>
-#include <utility>
 
 #include "io/descriptor.hpp"
 #include "io/input_file.hpp"
@@ -33,17 +32,15 @@ std::filesystem::path file_behind(const std::filesystem::path& target) {
                                                            : target;
 }
 
-// Calls `make` with names in the target's folder until one is new. The name does not extend the
-// target's, which might be too long for the file system. Returns it; empty, with errno, where
-// `make` fails.
-template <typename Make>
-std::filesystem::path make_beside(const std::filesystem::path& target, const char* suffix,
-                                  const Make& make) {
+// Creates an empty file under a new name in the target's folder, which does not extend the
+// target's: that might be too long for the file system. Returns it; empty, with errno, where that
+// fails.
+std::filesystem::path make_beside(const std::filesystem::path& target) {
   static std::atomic<unsigned> serial = 0;
   for (;;) {
     std::filesystem::path name =
-        folder_of(target) / fmt::format(".palpate-{}-{}.{}", ::getpid(), serial++, suffix);
-    if (make(name)) {
+        folder_of(target) / fmt::format(".palpate-{}-{}.part", ::getpid(), serial++);
+    if (Descriptor(name, O_WRONLY | O_CREAT | O_EXCL, 0666).valid()) {
       return name;
     }
     if (errno != EEXIST) {
@@ -71,9 +68,7 @@ AtomicFile::AtomicFile(const std::filesystem::path& target, Links links)
   if (!std::filesystem::is_directory(folder, ignored)) {
     refuse(target, "folder '{0}' does not exist; create it (mkdir -p '{0}')", folder.string());
   }
-  temporary_ = make_beside(target_, "part", [](const std::filesystem::path& name) {
-    return Descriptor(name, O_WRONLY | O_CREAT | O_EXCL, 0666).valid();
-  });
+  temporary_ = make_beside(target_);
   if (temporary_.empty()) {
     refuse(target, "cannot create a file in folder '{}': {}; choose another folder",
            folder.string(), std::strerror(errno));
@@ -105,59 +100,40 @@ void AtomicFile::write(std::string_view bytes, int flags) {
   }
 }
 
-void AtomicFile::commit() {
-  {
-    const Descriptor file(temporary_, O_RDONLY);
-    if (!file.valid() || ::fsync(file.get()) != 0) {
-      fail(target_, "write");
-    }
+void AtomicFile::bring_to_disk() const {
+  const Descriptor file(temporary_, O_RDONLY);
+  if (!file.valid() || ::fsync(file.get()) != 0) {
+    fail(target_, "write");
   }
+}
+
+void AtomicFile::bring_name_to_disk() const {
+  const Descriptor folder(folder_of(target_), O_RDONLY | O_DIRECTORY);
+  if (folder.valid()) {
+    ::fsync(folder.get());  // file systems that cannot sync a folder may refuse
+  }
+}
+
+void AtomicFile::commit() {
+  bring_to_disk();
   if (::rename(temporary_.c_str(), target_.c_str()) != 0) {
     fail(target_, "rename the finished file to it");
   }
   temporary_.clear();
-  // The new name lasts through a power cut; file systems that cannot sync a folder may refuse.
-  const Descriptor folder(folder_of(target_), O_RDONLY | O_DIRECTORY);
-  if (folder.valid()) {
-    ::fsync(folder.get());
-  }
+  bring_name_to_disk();
 }
 
-OlderFile::OlderFile(const std::filesystem::path& target) : target_(file_behind(target)) {
-  if (::access(target_.c_str(), F_OK) != 0) {
-    return;
+bool AtomicFile::commit_new() {
+  bring_to_disk();
+  // A second name, not renameat2(), which NFS refuses.
+  if (::link(temporary_.c_str(), target_.c_str()) != 0) {
+    if (errno == EEXIST) {
+      return false;
+    }
+    fail(target_, "give the finished file its name");
   }
-  kept_ = make_beside(target_, "older", [&](const std::filesystem::path& name) {
-    return ::link(target_.c_str(), name.c_str()) == 0;
-  });
-  if (kept_.empty()) {
-    refuse(target,
-           "the older file cannot be kept until the new one is known to be wanted: {}; give "
-           "another name, or move the older file away",
-           std::strerror(errno));
-  }
-}
-
-OlderFile::~OlderFile() { let_go(); }
-
-void OlderFile::restore() {
-  if (kept_.empty()) {
-    ::unlink(target_.c_str());
-  } else if (::rename(kept_.c_str(), target_.c_str()) == 0) {
-    let_go();  // two names of one file stay as they are
-  } else {
-    throw Error(
-        Fault::system,
-        fmt::format("{}: the older file cannot be put back: {}; it is kept as {}", target_.string(),
-                    std::strerror(errno), std::exchange(kept_, {}).string()));
-  }
-}
-
-void OlderFile::let_go() {
-  if (!kept_.empty()) {
-    ::unlink(kept_.c_str());
-    kept_.clear();
-  }
+  bring_name_to_disk();
+  return true;
 }
 
 }  // namespace palpate

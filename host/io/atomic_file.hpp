@@ -32,36 +32,18 @@ class AtomicFile {
   /// Brings the content to the disk and renames the file to its target.
   /// @throws Error (Fault::system) where the disk refuses.
   void commit();
+  /// As commit(), but returns false, and leaves the target as it is, where there is one by now. Of
+  /// several processes that write one target, one is told true.
+  bool commit_new();
 
  private:
+  void bring_to_disk() const;
+  /// Has the new name last through a power cut.
+  void bring_name_to_disk() const;
   void write(std::string_view bytes, int flags);
 
   std::filesystem::path target_;
   std::filesystem::path temporary_;  ///< empty once committed
-};
-
-/// Keeps the older file under an output's name until the new one is known to be wanted, as a hard
-/// link in the same folder. A killed process leaves both files.
-class OlderFile {
- public:
-  /// @param target a file that an AtomicFile may replace; it need not exist
-  /// @throws Error (Fault::input) where the older file cannot be kept, as on a file system without
-  /// hard links
-  explicit OlderFile(const std::filesystem::path& target);
-  /// Does what let_go() does.
-  ~OlderFile();
-  OlderFile(const OlderFile&) = delete;
-  OlderFile& operator=(const OlderFile&) = delete;
-
-  /// Removes the new file, if any, and puts the older one back.
-  /// @throws Error (Fault::system) where the disk refuses; the message names the file that was kept
-  void restore();
-  /// Keeps the new file and drops the older one.
-  void let_go();
-
- private:
-  std::filesystem::path target_;
-  std::filesystem::path kept_;  ///< empty where nothing is kept
 };
 
 }  // namespace palpate

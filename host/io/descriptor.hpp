@@ -2,19 +2,17 @@
 
 #include <fcntl.h>
 
-#include <array>
 #include <filesystem>
 #include <utility>
 
 namespace palpate {
 
-/// Owns an open file descriptor other than 0, 1 and 2: where a daemon has closed these, whatever
-/// the process prints would go into the file.
+/// Owns an open file descriptor.
 class Descriptor {
  public:
   Descriptor() = default;
   /// Takes over an open close-on-exec descriptor; a negative one stays invalid and keeps errno.
-  explicit Descriptor(int descriptor);
+  explicit Descriptor(int descriptor) : descriptor_(descriptor) {}
   /// Opens a file; invalid, with errno, where that fails.
   Descriptor(const std::filesystem::path& path, int flags, mode_t mode = 0);
   ~Descriptor();
@@ -31,25 +29,8 @@ class Descriptor {
   int descriptor_ = -1;
 };
 
-/// Occupies the descriptors 0, 1 and 2 while it lives, so that a library that opens a file by name
-/// gets none of them.
-class StandardDescriptorsTaken {
- public:
-  StandardDescriptorsTaken();
-  ~StandardDescriptorsTaken();
-  StandardDescriptorsTaken(const StandardDescriptorsTaken&) = delete;
-  StandardDescriptorsTaken& operator=(const StandardDescriptorsTaken&) = delete;
-
- private:
-  std::array<int, 3> taken_{-1, -1, -1};
-};
-
-/// Opens /dev/null in place of closed standard streams, as a daemon may have. Otherwise the first
-/// files opened would take their numbers, and what is printed would go into them. Call it first in
-/// main().
+/// Opens /dev/null in place of closed standard streams. Otherwise the first files opened would take
+/// their numbers, and what is printed would go into them. Call it first in main().
 void open_closed_streams();
-
-/// True where this stream (0 to 2) was closed when open_closed_streams() was called.
-bool was_closed(int stream);
 
 }  // namespace palpate

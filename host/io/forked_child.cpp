@@ -12,9 +12,9 @@
 #include <cerrno>
 #include <csignal>
 #include <cstring>
+#include <fstream>
 #include <optional>
 
-#include "io/available_memory.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
@@ -32,6 +32,18 @@ using namespace std::chrono_literals;
 
 /// An answer has many small parts: together so many bytes cost one system call.
 constexpr std::size_t together = 1 << 14;
+
+/// Private writable memory of this process in bytes, about as RLIMIT_DATA counts it; none where the
+/// system does not tell.
+std::optional<std::uint64_t> data_bytes() {
+  std::uint64_t pages[6] = {};  // size, resident, shared, text, library, data
+  std::ifstream statm("/proc/self/statm");
+  for (std::uint64_t& field : pages) {
+    statm >> field;
+  }
+  return statm ? std::optional(pages[5] * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE)))
+               : std::nullopt;
+}
 
 /// Sets a soft limit, which the child raises as it learns what it has to read.
 void limit(__rlimit_resource resource, std::uint64_t most) {

@@ -12,7 +12,6 @@
 #include <string_view>
 #include <utility>
 
-#include "io/descriptor.hpp"
 #include "io/file_format.hpp"
 #include "io/hdf5_writer.hpp"
 #include "io/input_file.hpp"
@@ -120,11 +119,8 @@ struct FrameRecorder::Impl {
       if (!sensor.valid.empty()) {
         out.dataset("valid", {e}, sensor.valid);
       }
-      has_baseline = baseline_follows || !sensor.baseline.empty();
       if (!sensor.baseline.empty()) {
         out.dataset("baseline", {e}, sensor.baseline);
-      } else if (has_baseline) {
-        out.dataset("baseline", {e}, std::vector<double>(e, unknown));
       }
       constexpr auto growing = Hdf5Writer::Storage::growing;
       out.dataset("pressure", {n, e}, pending.pressure, growing);
@@ -152,10 +148,7 @@ struct FrameRecorder::Impl {
     const Hdf5Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
     set_appendable(access.get());
     H5Pset_file_locking(access.get(), true, true);  // some network file systems have no locks
-    {
-      const StandardDescriptorsTaken taken;
-      file = {H5Fopen(finished.c_str(), H5F_ACC_RDWR | H5F_ACC_SWMR_WRITE, access.get()), H5Fclose};
-    }
+    file = {H5Fopen(finished.c_str(), H5F_ACC_RDWR | H5F_ACC_SWMR_WRITE, access.get()), H5Fclose};
     // HDF5 locks a file with SWMR only while it opens it.
     if (void* descriptor = nullptr; H5Fget_vfd_handle(file.get(), H5P_DEFAULT, &descriptor) >= 0) {
       mark_as_being_recorded(*static_cast<int*>(descriptor));
@@ -230,8 +223,6 @@ struct FrameRecorder::Impl {
 
   std::filesystem::path path;
   SensorDescription sensor;
-  bool baseline_follows = false;
-  bool has_baseline = false;  // the file has space for it
   bool has_device_time = false;
   bool failed = false;
   Rows pending;
@@ -262,35 +253,6 @@ FrameRecorder::~FrameRecorder() {
     close();
   } catch (const std::exception& error) {
     log_message(LogLevel::error, error.what());  // callers who want to know call close()
-  }
-}
-
-void FrameRecorder::expect_baseline() { impl_->baseline_follows = true; }
-
-void FrameRecorder::set_baseline(std::vector<double> baseline) {
-  Impl& r = *impl_;
-  if (baseline.empty()) {
-    refuse(r.path, "its baseline has no values; give one for each element");
-  }
-  if (r.saved > 0 && !r.has_baseline) {
-    refuse(r.path, "has no space for a baseline; call expect_baseline() before the first frame");
-  }
-  std::swap(r.sensor.baseline, baseline);
-  try {
-    r.require_recordable();
-  } catch (...) {
-    std::swap(r.sensor.baseline, baseline);
-    throw;
-  }
-  if (r.saved == 0) {
-    return;  // the first save() writes it
-  }
-  const Hdf5Session session;
-  const Hdf5Handle dataset(H5Dopen2(r.file.get(), "baseline", H5P_DEFAULT), H5Dclose);
-  if (H5Dwrite(dataset.get(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT,
-               r.sensor.baseline.data()) < 0 ||
-      H5Dflush(dataset.get()) < 0) {
-    r.fail();
   }
 }
 

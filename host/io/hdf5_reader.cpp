@@ -1,5 +1,7 @@
 #include "io/hdf5_reader.hpp"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <numeric>
 #include <system_error>
@@ -8,7 +10,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "io/available_memory.hpp"
+#include "io/stored_bytes.hpp"
 
 namespace palpate {
 
@@ -269,16 +271,14 @@ std::string Hdf5Reader::reopen_with_cache(const std::string& name, hid_t creatio
     return hdf5_damaged;
   }
   dataset.needed_bytes = dataset.band_bytes + copies_of_a_chunk * chunk_bytes;
-  // Otherwise a child's own limit would count as what is available.
-  confinement_.memory_bytes(UINT64_MAX);
-  const std::uint64_t available = available_memory_bytes();
-  confinement_.memory_bytes(base_bytes);
-  if (dataset.needed_bytes > available) {
+  const std::uint64_t machine_bytes = static_cast<std::uint64_t>(::sysconf(_SC_PHYS_PAGES)) *
+                                      static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
+  if (dataset.needed_bytes > machine_bytes) {
     return fmt::format(
-        "is stored in chunks of {}, of which {:.1f} GB have to be held at a time; {:.1f} GB of "
-        "memory are available: store it in smaller chunks",
+        "is stored in chunks of {}, of which {:.1f} GB have to be held at a time; the machine has "
+        "{:.1f} GB of memory: store it in smaller chunks",
         chunk, static_cast<double>(dataset.needed_bytes) * 1e-9,
-        static_cast<double>(available) * 1e-9);
+        static_cast<double>(machine_bytes) * 1e-9);
   }
   const Hdf5Handle access(H5Pcreate(H5P_DATASET_ACCESS), H5Pclose);
   // HDF5 hashes chunks to slots: ten slots a chunk, and an odd number, make collisions rare.

@@ -8,7 +8,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "io/available_memory.hpp"
 #include "io/file_format.hpp"
 #include "io/file_summary.hpp"
 #include "io/hdf5_contents.hpp"
@@ -140,7 +139,6 @@ std::shared_ptr<const MapSource> read_source(const std::filesystem::path& path, 
   if (n == 0 || e == 0 || n > most / e) {
     file.refuse("dataset 'touch_pressure' has the shape [{}, {}]; build the map anew", n, e);
   }
-  require_memory(path, fmt::format("{} touches of {} elements", n, e), n * e * 4 * sizeof(double));
   touches.pressure = read_all(file, "touch_pressure", {n, e});
   const std::vector<double> poses = read_all(file, "touch_pose", {n, 3});
   for (std::size_t i = 0; i < n; ++i) {
@@ -226,8 +224,6 @@ OccupancyGrid read_map(const std::filesystem::path& path) {
         map = head;
         map.file = path.string();
         const auto count = static_cast<std::size_t>(map.nx) * static_cast<std::size_t>(map.ny);
-        require_memory(path, fmt::format("a map of {} x {} cells", map.nx, map.ny),
-                       count * sizeof(float));
         map.log_odds.reserve(count);
       },
       [&](std::span<const float> cells) {

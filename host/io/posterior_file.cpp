@@ -8,13 +8,13 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "io/available_memory.hpp"
 #include "io/file_format.hpp"
 #include "io/file_summary.hpp"
 #include "io/hdf5_contents.hpp"
 #include "io/hdf5_writer.hpp"
 #include "io/input_file.hpp"
 #include "io/recording_rules.hpp"
+#include "io/stored_bytes.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
@@ -84,8 +84,6 @@ std::vector<std::int64_t> read_index(const std::filesystem::path& path, Hdf5Cont
   if (const auto& shape = file.shape("index", 2); shape != std::vector<std::uint64_t>{rows, 4}) {
     file.refuse("dataset 'index' has the shape {}; 'log_likelihood' makes it [{}, 4]", shape, rows);
   }
-  require_memory(path, fmt::format("a posterior of {} bins", rows),
-                 stored_bytes(std::array{rows}, sizeof(std::int64_t) + sizeof(double)));
   const std::vector<std::uint64_t> counts = shape_of(posterior.objects.size(), posterior.lattice);
   std::vector<std::int64_t> index;
   index.reserve(rows);
@@ -233,8 +231,6 @@ Posterior read_posterior(const std::filesystem::path& path) {
         }
         const std::vector<std::uint64_t> shape =
             shape_of(posterior.objects.size(), posterior.lattice);
-        require_memory(path, fmt::format("a posterior of {} bins", fmt::join(shape, " x ")),
-                       stored_bytes(shape, sizeof(double)));
         posterior.log_likelihood.reserve(stored_bytes(shape, 1));
       },
       [&](std::span<const double> values) {

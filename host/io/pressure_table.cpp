@@ -6,7 +6,6 @@
 #include <limits>
 #include <utility>
 
-#include "io/available_memory.hpp"
 #include "model/number_text.hpp"
 #include "model/printable.hpp"
 #include "model/stream_time.hpp"
@@ -37,20 +36,6 @@ std::uint64_t count_in(const CsvTable& table, std::size_t column, std::uint64_t 
     table.refuse("column '{}': {} {}", printable(table.columns()[column]), number, remedy);
   }
   return static_cast<std::uint64_t>(number);
-}
-
-/// Reserves memory for so many frames. Requires as well what a recording of them takes, and its
-/// file, which is made in memory: whether each reading is valid and its float32, and three times
-/// the pose and twice the time of each frame.
-/// @param frames in words
-void reserve(const CsvTable& table, const char* frames, std::uint64_t count, std::size_t elements,
-             PressureTable& pressures) {
-  constexpr std::size_t of_reading = sizeof(double) + sizeof(std::uint8_t) + sizeof(float);
-  constexpr std::size_t of_frame = 3 * sizeof(Pose) + 2 * sizeof(double);
-  const std::uint64_t bytes = stored_bytes(std::array{count}, elements * of_reading + of_frame);
-  require_memory(table.path(),
-                 fmt::format("a table of {} {} by {} elements", count, frames, elements), bytes);
-  pressures.pressure.reserve(count * elements);
 }
 
 // Columns in the order in which they were named: p1 and p10 side by side come from names that were
@@ -168,7 +153,7 @@ PressureTable read_wide(CsvTable& table, std::size_t elements, const TableOption
 
   PressureTable all;
   all.holds_poses = !pose.empty();
-  reserve(table, "rows", table.count_lines(), elements, all);
+  all.pressure.reserve(table.count_lines() * elements);
   double last_s = before_all;
   while (table.next()) {
     for (const std::size_t column : columns) {
@@ -230,8 +215,7 @@ std::optional<PressureTable> read_long(CsvTable& table, std::size_t elements,
         "or name it by `time-column`");
   }
   PressureTable all;
-  reserve(table, time ? "frames, one for each time," : "frames",
-          count_runs(table.path(), time ? time->index : *frame_column), elements, all);
+  all.pressure.reserve(count_runs(table.path(), time ? time->index : *frame_column) * elements);
   const std::string remedy =
       fmt::format("is no element; the array has {}, counted from 0", elements);
   double last = before_all;

@@ -4,13 +4,13 @@
 
 #include <fmt/format.h>
 
-#include "io/available_memory.hpp"
 #include "io/file_format.hpp"
 #include "io/hdf5_writer.hpp"
 #include "io/input_file.hpp"
 #include "io/recording_parts.hpp"
 #include "io/recording_rules.hpp"
 #include "io/recording_scan.hpp"
+#include "io/stored_bytes.hpp"
 #include "palpate/files.hpp"
 
 namespace palpate {
@@ -22,21 +22,11 @@ void append(std::vector<Value>& list, std::span<const Value> more) {
   list.insert(list.end(), more.begin(), more.end());
 }
 
-void reserve(const std::filesystem::path& path, const RecordingHead& head, Recording& recording) {
-  const std::uint64_t n = head.rows;
-  const std::uint64_t e = head.elements;
-  const std::uint64_t places = head.array_changes ? stored_bytes(std::vector{n, e}, 1) : e;
-  std::uint64_t bytes = 0;
-  for (const auto& [count, width] : {std::pair{stored_bytes(std::vector{n, e}, 1), sizeof(double)},
-                                     {places, sizeof(glm::dvec2)},
-                                     {n, sizeof(Pose) + 3 * sizeof(double)}}) {
-    const std::uint64_t some = stored_bytes(std::array{count}, width);
-    bytes = some < UINT64_MAX - bytes ? bytes + some : UINT64_MAX;
-  }
-  require_memory(path, fmt::format("a recording of {} rows by {} elements", n, e), bytes);
-  recording.pressure.reserve(n * e);
-  recording.T_robot_sensor.reserve(n);
-  recording.elements_mm.reserve(places);
+void reserve(const RecordingHead& head, Recording& recording) {
+  const std::uint64_t readings = stored_bytes(std::array{head.rows, head.elements}, 1);
+  recording.pressure.reserve(readings);
+  recording.T_robot_sensor.reserve(head.rows);
+  recording.elements_mm.reserve(head.array_changes ? readings : head.elements);
 }
 
 // Checks the sizes of a recording that is about to be written.
@@ -76,8 +66,6 @@ void write_whole(const std::filesystem::path& path, const Recording& recording, 
   require_device_times(path, 0, recording.device_time_s);
   require_lost_counts(path, 0, recording.lost_before);
 
-  require_memory(path, fmt::format("the file of {} rows by {} elements", n, e),
-                 n * e * (narrow ? sizeof(float) : sizeof(double)));
   constexpr std::size_t head = 1 << 16;
   const std::size_t row =
       e * (narrow ? sizeof(float) : sizeof(double)) + sizeof(Pose) + sizeof(double);
@@ -120,7 +108,7 @@ Recording recording_read_by(const std::filesystem::path& path, Hdf5Child* child)
                  {.head =
                       [&](const RecordingHead& head) {
                         recording = head.recording;
-                        reserve(path, head, recording);
+                        reserve(head, recording);
                       },
                   .pressure = [&](auto values) { append(recording.pressure, values); },
                   .T_robot_sensor = [&](auto poses) { append(recording.T_robot_sensor, poses); },

@@ -9,10 +9,10 @@
 #include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
-#include "io/available_memory.hpp"
 #include "io/file_format.hpp"
 #include "io/hdf5_contents.hpp"
 #include "io/recording_rules.hpp"
+#include "io/stored_bytes.hpp"
 #include "model/number_text.hpp"
 #include "model/stream_time.hpp"
 
@@ -148,9 +148,7 @@ class Scan {
     Recording& r = head_.recording;
     const auto [n, e] = std::pair{head_.rows, head_.elements};
     if (has("valid", {{e}, {n, e}})) {
-      const std::uint64_t count = stored_bytes(file_.shape("valid"), 1);
-      require_memory(path_, fmt::format("dataset 'valid' of {} numbers", count), count);
-      r.valid.reserve(count);
+      r.valid.reserve(stored_bytes(file_.shape("valid"), 1));
       file_.read("valid", [&](std::uint64_t, std::span<const double> values) {
         for (const double valid : values) {
           if (std::isnan(valid)) {

@@ -9,7 +9,6 @@
 
 #include <fmt/format.h>
 
-#include "io/available_memory.hpp"
 #include "model/stream_time.hpp"
 #include "palpate/contact.hpp"
 #include "palpate/touch_detector.hpp"
@@ -54,11 +53,6 @@ class Survey {
 
  private:
   void begin(const RecordingHead& head) {
-    // Per element: what is surveyed of it, its place, and what spacing_of() holds.
-    constexpr std::uint64_t bytes =
-        sizeof(ElementSurvey) + sizeof(glm::dvec2) + 2 * sizeof(std::size_t);
-    require_memory(path_, fmt::format("a survey of {} elements", head.elements),
-                   head.elements * bytes);
     result_.head = head;
     if (head.recording.pressure_unit == "kPa") {
       result_.threshold = ContactClassifier{}.threshold;

@@ -236,8 +236,7 @@ FilterTraits traits_of(const FilterOptions& options) {
                                                .touch_sd = one.touch_sd,
                                                .slip_sd = one.slip_sd,
                                                .none_weight = one.none_weight,
-                                               .still_array = one.still_array,
-                                               .memory_limit_bytes = one.memory_limit_bytes};
+                                               .still_array = one.still_array};
                          },
                          [](const BoundedOptions& one) {
                            return FilterTraits{.bins = true,
@@ -267,7 +266,7 @@ FilterOptions with_lattice(FilterOptions options, const PoseLattice& lattice) {
 
 std::optional<BoundedOptions> bounded_instead(const FilterOptions& options) {
   const auto* histogram = std::get_if<HistogramOptions>(&options);
-  if (histogram == nullptr || histogram->memory_limit_bytes) {
+  if (histogram == nullptr) {
     return {};
   }
   return BoundedOptions{.lattice = histogram->lattice,

@@ -44,7 +44,6 @@ struct FilterTraits {
   std::optional<double> tolerance = {};    ///< of the certificate
   std::optional<double> budget_s = {};     ///< after which a search for the certificate ends
   bool still_array = false;                ///< HistogramOptions::still_array
-  std::optional<std::uint64_t> memory_limit_bytes = {};  ///< of the device's memory
 };
 FilterTraits traits_of(const FilterOptions& options);
 

@@ -66,27 +66,6 @@ std::optional<double> none_weight(const Request& request, std::span<const Hypoth
   return odds * sum;
 }
 
-/// What bounds refuse and the histogram does not; each giver as a sentence names it.
-std::vector<CallerNeed> all_needs(const Request& request, const CallerNeed& of_caller) {
-  std::vector<CallerNeed> needs;
-  if (!of_caller.why.empty()) {
-    needs.push_back({fmt::format("`{}`", of_caller.option), of_caller.why});
-  }
-  if (request.memory_mib) {
-    needs.push_back({"`memory-mib`", "has no effect on bounds, whose memory is the host's"});
-  }
-  return needs;
-}
-
-/// What would have to go for bounds to take the bins: "`a` and `b`".
-std::string names_of(std::span<const CallerNeed> needs) {
-  std::vector<std::string> names;
-  for (const CallerNeed& need : needs) {
-    names.push_back(need.option);
-  }
-  return fmt::format("{}", fmt::join(names, " and "));
-}
-
 double require_above_0(const char* option, double value) {
   if (!(value > 0.0 && std::isfinite(value))) {
     refuse_option(option, value, "must be above 0");
@@ -152,11 +131,6 @@ FilterWish filter_wish(const Request& request) {
                     fmt::format("has no effect on `filter {}`; add `filter particles`", filter));
     }
   }
-  if (request.memory_mib && particles) {
-    refuse_option("memory-mib",
-                  "has no effect on `filter particles`; use `filter histogram`, or fewer "
-                  "`particles`");
-  }
   for (const auto& [option, given] :
        {std::pair{"tolerance", request.tolerance.has_value()},
         std::pair{"budget-ms", request.budget_ms.has_value()},
@@ -180,12 +154,6 @@ ChosenFilter choose_filter(const FilterWish& wish, const Request& request,
   if (wish.kind == FilterKind::particles) {
     return {asked_particles(request, histogram), false, wish.by};
   }
-  if (request.memory_mib) {
-    if (*request.memory_mib < 1) {
-      refuse_option("memory-mib", *request.memory_mib, "give at least 1");
-    }
-    histogram.memory_limit_bytes = static_cast<std::uint64_t>(*request.memory_mib) << 20;
-  }
   set_displacement(touch_mm(request), touch_deg(request), histogram.touch_sd.mm,
                    histogram.touch_sd.rad);
   set_displacement(slip_mm(request), slip_deg(request), histogram.slip_sd.mm,
@@ -193,19 +161,22 @@ ChosenFilter choose_filter(const FilterWish& wish, const Request& request,
   if (request.none || !of_caller.learned_only) {
     histogram.none_weight = none_weight(request, hypotheses);
   }
-  std::vector<CallerNeed> needs = all_needs(request, of_caller);
+  const std::string caller = fmt::format("`{}`", of_caller.option);
   if (wish.kind == FilterKind::bounded) {
-    if (!needs.empty()) {
-      const CallerNeed& need = needs.front();
+    if (!of_caller.why.empty()) {
       throw Error(Fault::input,
-                  fmt::format("{}: {}; leave it out, or {}", need.option, need.why, wish.by));
+                  fmt::format("{}: {}; leave it out, or {}", caller, of_caller.why, wish.by));
     }
     return {asked_bounds(request, histogram), false, wish.by};
   }
-  if (wish.kind == FilterKind::histogram) {
-    needs.push_back({wish.by, "was asked for"});
+  std::vector<std::string> by;  // what would have to go for bounds to take the bins
+  if (!of_caller.why.empty()) {
+    by.push_back(caller);
   }
-  return {histogram, needs.empty(), names_of(needs)};
+  if (wish.kind == FilterKind::histogram) {
+    by.push_back(wish.by);
+  }
+  return {histogram, by.empty(), fmt::format("{}", fmt::join(by, " and "))};
 }
 
 void require_within_region(const Request& request, const PoseLattice& lattice) {
@@ -235,11 +206,7 @@ ChosenBins chosen_bins(const std::function<Device&()>& device,
   std::int64_t most = most_bounded_bins;
   // The memory of a belief that slips follows the bins.
   if (!traits.slip_sd.none() || !by_bounds) {
-    most = most_bins_on(device(), traits.still_array, traits.memory_limit_bytes);
-    if (traits.memory_limit_bytes) {
-      // One bin an object may still exceed the limit: the histogram says how much memory it needs.
-      most = std::max(most, static_cast<std::int64_t>(hypotheses.size()));
-    }
+    most = most_bins_on(device(), traits.still_array);
   }
   return {balanced_lattice(lattice_of(filter.options), hypotheses, most, width, traits.touch_sd),
           most};

@@ -71,7 +71,6 @@ void visit_options(AnyRequest& request, const Visit& visit) {
   visit("resampling", request.resampling);
   visit("augmented", request.augmented);
   visit("seed", request.seed);
-  visit("memory-mib", request.memory_mib);
   visit("frames", request.frames);
   visit("touches", request.touches);
   visit("each-frame", request.each_frame);

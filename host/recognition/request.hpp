@@ -81,7 +81,6 @@ struct Request {
   std::optional<Resampling> resampling;
   bool augmented = false;
   std::optional<std::uint64_t> seed;
-  std::optional<int> memory_mib;
   std::string device;
 
   // Which touches of a recording make an unknown.

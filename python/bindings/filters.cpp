@@ -154,21 +154,18 @@ void bind_histogram(nb::module_& module) {
               [](Histogram* self, const std::shared_ptr<Session>& device, const MapsLike& maps,
                  const PoseLattice& lattice, const ContactModel& contact, bool still_array,
                  std::optional<double> none_weight, const DisplacementSdLike& touch_sd,
-                 const DisplacementSdLike& slip_sd,
-                 std::optional<std::uint64_t> memory_limit_bytes) {
+                 const DisplacementSdLike& slip_sd) {
                 const HistogramOptions options{.lattice = lattice,
                                                .contact = contact,
                                                .still_array = still_array,
                                                .none_weight = none_weight,
                                                .touch_sd = sd_of(touch_sd, "touch_sd"),
-                                               .slip_sd = sd_of(slip_sd, "slip_sd"),
-                                               .memory_limit_bytes = memory_limit_bytes};
+                                               .slip_sd = sd_of(slip_sd, "slip_sd")};
                 new (self) Histogram(make_filter<PoseHistogram>(device, maps, options));
               },
               "device"_a, "maps"_a, "lattice"_a = PoseLattice{}, nb::kw_only(),
               "contact"_a = ContactModel{}, "still_array"_a = false, "none_weight"_a = nb::none(),
               "touch_sd"_a = DisplacementSd{}, "slip_sd"_a = DisplacementSd{},
-              "memory_limit_bytes"_a = nb::none(),
               "Starts with a uniform belief. still_array: the array stays in one place; "
               "none_weight:\n"
               "prior weight of \"none of these\"; touch_sd: how far the sensor may have been from\n"

@@ -43,7 +43,6 @@ class RecognitionOptions(TypedDict, total=False):
     evidence_nats: float
     act_below_mm: float
     act_above: float
-    memory_mib: int
     frames: tuple[int, int]
     touches: int
 
@@ -132,7 +131,6 @@ def recognize(
     resampling: Literal["multinomial", "systematic"] | None = None,
     augmented: bool = False,
     seed: int | None = None,
-    memory_mib: int | None = None,
     frames: tuple[int, int] | None = None,
     touches: int | None = None,
     each_frame: bool = False,

@@ -359,8 +359,6 @@ TEST_F(BadInput, FlagsOfTheOtherFilter) {
         Arguments{"--resampling", "systematic"}, Arguments{"--augmented"}}) {
     expect_refused(with(recognize, flags), {flags.front(), "add --filter particles"});
   }
-  expect_refused(with(recognize, {"--filter", "particles", "--memory-mib", "100"}),
-                 {"--memory-mib", "use --filter histogram"});
   expect_refused(with(recognize, {"--filter", "particles", "--posterior", "p.h5"}),
                  {"--posterior p.h5", "use --filter histogram"});
 }

@@ -52,7 +52,6 @@ TEST_F(Batch, BoundsNeedNoDevice) {
   EXPECT_NE(done({"devices"}).find(run["device"].get<std::string>()), std::string::npos);
 
   const Variable vulkan("PALPATE_VULKAN_LIBRARY", "/nonexistent/libvulkan.so.1");
-  const Variable rank("SLURM_LOCALID", "0");
   EXPECT_EQ(palpate(batch("without")).status, 3) << "one recording is broken";
   EXPECT_EQ(merged("without"), merged("r"));
   expect_failure(1, batch_of_one("d", histogram), {"install libvulkan1"});

@@ -31,14 +31,7 @@ TEST_F(BoundedFilter, IsAskedForByASceneToo) {
   refused({"--scene", "scene.yaml", "--tolerance", "0.1"}, {"--tolerance", "has no effect"});
 }
 
-TEST_F(BoundedFilter, RefusesWhatNeedsTheHistogram) {
-  for (const Arguments& asks : {Arguments{"--filter", "bounded"}, Arguments{"--tolerance", "1e-3"},
-                                Arguments{"--budget-ms", "9"}, Arguments{"--evidence-nats", "1"}}) {
-    const std::string by = asks.front() == "--filter" ? "--filter bounded" : asks.front();
-    Arguments memory = asks;
-    memory.insert(memory.end(), {"--memory-mib", "100"});
-    refused(memory, {"--memory-mib: ", "has no effect", "leave it out, or " + by});
-  }
+TEST_F(BoundedFilter, RefusesFlagsOfParticles) {
   refused({"--filter", "bounded", "--particles", "9"}, {"--particles", "--filter particles"});
 }
 
@@ -74,13 +67,10 @@ TEST_F(BoundedFilter, AutoTakesItForManyBins) {
   Arguments slips = many;
   slips.insert(slips.end(), {"--slip-sd-mm", "0.5"});
   EXPECT_THAT(engine(slips), HasSubstr("filter: bounded, "));
-  for (const Arguments& needs :
-       {Arguments{"--memory-mib", "500"}, Arguments{"--posterior", "p.h5"}}) {
-    Arguments flags = many;
-    flags.insert(flags.end(), needs.begin(), needs.end());
-    EXPECT_THAT(engine(flags), AllOf(HasSubstr("filter: histogram in "),
-                                     HasSubstr("asked for by " + needs.front())));
-  }
+  Arguments written = many;
+  written.insert(written.end(), {"--posterior", "p.h5"});
+  EXPECT_THAT(engine(written),
+              AllOf(HasSubstr("filter: histogram in "), HasSubstr("asked for by --posterior")));
   Arguments explicitly = many;
   explicitly.insert(explicitly.end(), {"--filter", "histogram"});
   EXPECT_THAT(engine(explicitly), HasSubstr("filter: histogram in "));
@@ -92,8 +82,7 @@ TEST_F(BoundedFilter, AutoTakesItForManyBins) {
 }
 
 TEST_F(BoundedFilter, AutoNamesTheFlagThatKeepsALargeLatticeFromIt) {
-  for (const Arguments& flags : {Arguments{"--memory-mib=9"}, Arguments{"--posterior=p.h5"},
-                                 Arguments{"--filter=histogram"}}) {
+  for (const Arguments& flags : {Arguments{"--posterior=p.h5"}, Arguments{"--filter=histogram"}}) {
     const std::string name = flags[0].starts_with("--filter")
                                  ? "--filter histogram"
                                  : flags[0].substr(0, flags[0].find('='));
@@ -108,8 +97,8 @@ TEST_F(BoundedFilter, AutoNamesTheFlagThatKeepsALargeLatticeFromIt) {
                   "--slip-sd-deg=2"},
                  {"MiB", "use fewer bins"});
   expect_refused({"recognize", "u.h5", "--maps", "maps", "--bins=4000x4000x300",
-                  "--filter=histogram", "--memory-mib=9"},
-                 {"leave out --memory-mib and --filter histogram"});
+                  "--filter=histogram", "--posterior=p.h5"},
+                 {"leave out --posterior and --filter histogram"});
 }
 
 TEST_F(BoundedFilter, IsRefusedWhereTheMachineHasNoRoomForIt) {

@@ -53,29 +53,6 @@ TEST_F(ClosedStreams, FilesAreReadAndWrittenAllTheSame) {
   }
 }
 
-// Whoever asks for standard output by name wants to have it.
-TEST_F(ClosedStreams, AreRefusedWhereTheyAreNamed) {
-  for (const std::vector<std::string>& arguments :
-       {std::vector<std::string>{"recognize", "u.h5", "--maps", "A.map.h5", "--json", "-"},
-        {"live", "--sensor", presses, "--maps", "A.map.h5", "--json", "-"}}) {
-    const Outcome outcome = palpate(arguments, {.closed = {STDOUT_FILENO}});
-    EXPECT_EQ(outcome.status, 2);
-    EXPECT_EQ(outcome.err, "palpate: --json -: standard output is closed; name a file\n");
-  }
-  const Outcome outcome = palpate({"record", "--sensor", presses, "--poses", "-", "-o", "f.h5"},
-                                  {.closed = {STDIN_FILENO}});
-  EXPECT_EQ(outcome.status, 2);
-  EXPECT_EQ(outcome.err, "palpate: --poses -: standard input is closed; name a file\n");
-}
-
-// Most flags take "-" for a file of that name.
-TEST_F(ClosedStreams, AreNotAskedForByAFileCalledDash) {
-  const Outcome outcome =
-      palpate({"simulate", "A", "--touches", "3", "-o", "-"}, {.closed = every});
-  EXPECT_EQ(outcome.status, 0);
-  EXPECT_EQ(read_recording(folder_ / "-").size(), 3u);
-}
-
 TEST_F(ClosedStreams, KeepTheStatus) {
   EXPECT_EQ(palpate({"info", "missing.h5"}, {.closed = every}).status, 2);
   EXPECT_EQ(palpate({"--version"}, {.closed = every}).status, 0);

@@ -248,16 +248,6 @@ TEST_F(Defaults, LiveAndRecognizeGiveTheSameNumbers) {
   }
 }
 
-TEST_F(Defaults, KeepToTheMemoryThatIsGiven) {
-  write_maps(0.5);
-  // 8 MiB are for copies; three eighths of the rest hold 4e5 bins of 8 bytes, a quarter of the
-  // default's.
-  const Outcome outcome =
-      palpate({"recognize", "u.h5", "--maps", "maps", "--memory-mib", "16", "--json", "r.json"});
-  EXPECT_EQ(outcome.status, 0) << outcome.err;
-  EXPECT_NE(outcome.err.find("--bins auto: steps of"), std::string::npos) << outcome.err;
-}
-
 TEST_F(Defaults, TellOfObjectsFarApartInTheirFrames) {
   EXPECT_EQ(palpate({"recognize", "u.h5", "--maps", "maps", "--json", "r.json"}).err, "");
   OccupancyGrid far = sample_map("I", cell_mm);

@@ -1,5 +1,8 @@
 #include <algorithm>
 
+#include <fmt/format.h>
+
+#include "io/memory_limit.hpp"
 #include "program.hpp"
 #include "sample_files.hpp"
 
@@ -113,6 +116,23 @@ TEST_F(FullDisk, JsonAndPosteriorAreBothWrittenOrNone) {
 
 TEST_F(FullDisk, StandardErrorThatCannotBeWrittenKeepsTheStatus) {
   EXPECT_EQ(palpate({"info", "missing.h5"}, {.standard_error = "/dev/full"}).status, 2);
+}
+
+// Each of 20,000 readings has its own time, and so a frame of 10,000 elements: 1.6 GB.
+TEST_F(FullDisk, AndMemoryThatEndsAreOneLine) {
+  if (!limits_memory()) {
+    GTEST_SKIP() << "memory of processes is not limited here";
+  }
+  std::string text = "time,element,pressure\n";
+  for (int i = 0; i < 20'000; ++i) {
+    text += fmt::format("{},0,1\n", i);
+  }
+  put_bytes(folder_ / "log.csv", text);
+  const auto before = content_of(folder_.path());
+  const Outcome outcome = palpate({"import", "log.csv", "--array", "100:100:1", "-o", "o.h5"},
+                                  {.memory_bytes = 512 << 20});
+  expect_failure(outcome, "palpate: out of memory; end other programs, or use smaller files");
+  EXPECT_TRUE(content_of(folder_.path()) == before);
 }
 
 }  // namespace palpate::full_disk_test

@@ -44,7 +44,7 @@ TEST_F(PlanCommand, ItsHelpListsNoFlagThatItRefuses) {
   for (const std::string flag : {"--particles", "--resampling", "--augmented", "--seed"}) {
     EXPECT_EQ(help.find("  " + flag + " "), std::string::npos) << flag;
   }
-  for (const std::string flag : {"--memory-mib", "--filter", "--budget-ms"}) {
+  for (const std::string flag : {"--filter", "--budget-ms"}) {
     EXPECT_NE(help.find("  " + flag + " "), std::string::npos) << flag << ", which a plan reads";
   }
 }

@@ -81,6 +81,10 @@ Outcome run_program(const std::filesystem::path& folder, const std::vector<std::
     if (surroundings.largest_file_bytes) {
       limit_files(*surroundings.largest_file_bytes);
     }
+    if (surroundings.memory_bytes) {
+      const rlimit limit{.rlim_cur = *surroundings.memory_bytes, .rlim_max = RLIM_INFINITY};
+      ::setrlimit(RLIMIT_DATA, &limit);
+    }
     if (surroundings.obeys_permissions) {
       ::prctl(PR_CAPBSET_DROP, CAP_DAC_OVERRIDE);  // of anybody but root: not permitted, nor needed
     }

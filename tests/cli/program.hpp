@@ -25,6 +25,7 @@ struct Outcome {
 /// What a run may find different from an ordinary shell.
 struct Surroundings {
   std::optional<rlim_t> largest_file_bytes;  ///< writes beyond it fail, as on a full disk
+  std::optional<rlim_t> memory_bytes;        ///< of data that it may hold, as on a small machine
   std::filesystem::path standard_output;     ///< a file in the place of Outcome::out
   std::filesystem::path standard_error;      ///< a file in the place of Outcome::err
   std::filesystem::path standard_input;      ///< a file in the place of the test's own

@@ -49,16 +49,6 @@ TEST_F(RecognizeFlags, EveryFlagOfTheModelMatters) {
   }
 }
 
-TEST_F(RecognizeFlags, MemoryIsBoundedWithoutAnotherResult) {
-  EXPECT_EQ(mode({"--bins=25x25x16", "--memory-mib", "10"}), mode({"--bins=25x25x16"}));
-  // 8 MiB are for copies alone.
-  expect_refused({"recognize", "u.h5", "--maps", "maps", "--bins=25x25x16", "--memory-mib", "8"},
-                 {"memory limit of 8.0 MiB", "raise it"});
-  expect_refused({"recognize", "u.h5", "--maps", "maps", "--memory-mib", "8"},
-                 {"memory limit of 8.0 MiB", "need 9 MiB", "raise it"});
-  expect_refused({"recognize", "u.h5", "--maps", "maps", "--memory-mib", "0"}, {"--memory-mib 0"});
-}
-
 TEST_F(RecognizeFlags, FineBinsAreChosenByTheMapsAndSaid) {
   for (const char* letter : {"A", "I"}) {
     write_map(folder_ / fmt::format("maps/{}.map.h5", letter), sample_map(letter, 0.5));

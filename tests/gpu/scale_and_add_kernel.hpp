@@ -28,10 +28,10 @@ class ScaleAndAdd {
                           .constants = {workgroup, factor}}) {}
 
   void dispatch(CommandStream& stream, const Buffer& source, const Buffer& target,
-                std::uint32_t addend, double work = 0.0) const {
+                std::uint32_t addend) const {
     const auto count = static_cast<std::uint32_t>(target.bytes() / sizeof(std::uint32_t));
     stream.dispatch(kernel_, {&source, &target}, Push{count, addend},
-                    {(count + workgroup - 1) / workgroup, 1, 1}, work);
+                    {(count + workgroup - 1) / workgroup, 1, 1});
   }
   const Kernel& kernel() const { return kernel_; }
 

@@ -144,19 +144,4 @@ TEST_F(Forked, LockIsFreeWhileTheChildWorks) {
   EXPECT_TRUE(lock.owns_lock());
 }
 
-// A daemon has closed its standard input, output and error.
-TEST_F(Forked, NeedsNoStandardDescriptors) {
-  const pid_t pid = ::fork();
-  if (pid == 0) {
-    for (const int standard : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
-      ::close(standard);
-    }
-    const std::string got = answer([](int socket) { forked_write(socket, "whole", 5); }, 5);
-    ::_exit(got == "whole" ? 0 : 1);
-  }
-  int status = -1;
-  ::waitpid(pid, &status, 0);
-  EXPECT_EQ(status, 0);
-}
-
 }  // namespace palpate::forked_child_test

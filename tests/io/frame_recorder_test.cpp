@@ -127,53 +127,6 @@ TEST_F(FrameRecorderFile, UnknownReadingsComeBackAsNaNs) {
                {"'pressure'[0, 1]", "nan"});
 }
 
-TEST_F(FrameRecorderFile, BaselineMayFollowTheFrames) {
-  for (const std::size_t flushed : {0u, 5u}) {
-    FrameRecorder recorder(path_, sensor_of(2));
-    recorder.expect_baseline();
-    for (std::size_t i = 0; i < 5; ++i) {
-      recorder.add(frame_of(i, 2));
-    }
-    if (flushed > 0) {
-      recorder.flush();
-      EXPECT_EQ(read_recording(path_).size(), 5u);
-      EXPECT_TRUE(read_recording(path_).baseline.empty()) << "not taken yet";
-    }
-    expect_named(input_error([&] { recorder.set_baseline({1.0}); }), {"1 baseline", "2 elements"});
-    recorder.set_baseline({1.5, -2.0});
-    recorder.add(frame_of(5, 2));
-    recorder.close();
-    const Recording read = read_recording(path_);
-    EXPECT_EQ(read.baseline, (std::vector<double>{1.5, -2.0})) << flushed;
-    ASSERT_EQ(read.size(), 6u);
-    expect_prefix(read, 2);
-  }
-}
-
-TEST_F(FrameRecorderFile, ABaselineThatHasNoPlaceCostsNothing) {
-  for (const bool expected : {true, false}) {
-    FrameRecorder recorder(path_, sensor_of(2));
-    if (expected) {
-      recorder.expect_baseline();
-    }
-    recorder.add(frame_of(0, 2));
-    recorder.flush();
-    expect_named(input_error([&] { recorder.set_baseline({}); }), {"stream.h5", "baseline"});
-    if (!expected) {
-      expect_named(input_error([&] {
-                     recorder.set_baseline({1.0, 2.0});
-                   }),
-                   {"stream.h5", "baseline", "before the first frame"});
-    }
-    recorder.add(frame_of(1, 2));
-    recorder.close();
-    const Recording read = read_recording(path_);
-    EXPECT_EQ(read.size(), 2u);
-    EXPECT_TRUE(read.baseline.empty());
-    expect_prefix(read, 2);
-  }
-}
-
 TEST_F(FrameRecorderFile, RefusesWhatDoesNotFit) {
   FrameRecorder recorder(path_, sensor_of(2));
   expect_named(input_error([&] { recorder.add(frame_of(0, 3)); }), {"3 values", "2 elements"});

@@ -11,7 +11,6 @@
 #include "file_parts.hpp"
 #include "io/file_summary.hpp"
 #include "io/hdf5_reader.hpp"
-#include "io/pressure_table.hpp"
 #include "io/recording_survey.hpp"
 #include "memory_limit.hpp"
 #include "palpate/files.hpp"
@@ -133,16 +132,6 @@ class LargeFile : public testing::Test {
   std::filesystem::path path_ = folder_ / "large.h5";
 };
 
-TEST_F(LargeFile, IsRefusedBeforeItTakesMoreThanThereIs) {
-  if (!limits_memory()) {
-    GTEST_SKIP() << "memory of processes is not limited here";
-  }
-  save_map_of_zeros(path_, 20, 20);  // 1.7 GB in 7 MB
-  EXPECT_LT(std::filesystem::file_size(path_), 16 * mib);
-  expect_named(with_memory(256 * mib, [&] { read_map(path_); }),
-               {path_.c_str(), "20480 x 20480 cells", "needs 1.7 GB", "0.3 GB are available"});
-}
-
 // 67 MB of cells.
 TEST_F(LargeFile, IsSummarizedInPieces) {
 #ifdef __SANITIZE_ADDRESS__
@@ -177,21 +166,6 @@ TEST_F(LargeFile, RecordingIsSurveyedInPieces) {
   });
   EXPECT_EQ(message, "");
   EXPECT_NE(with_memory(20 * mib, [&] { read_recording(path_); }), "") << "the limit holds";
-}
-
-// Each of 20,000 readings has its own time, and so a frame of 1,000 elements.
-TEST_F(LargeFile, LongTableIsRefusedBeforeItTakesMoreThanThereIs) {
-  if (!limits_memory()) {
-    GTEST_SKIP() << "memory of processes is not limited here";
-  }
-  std::string text = "time,element,pressure\n";
-  for (int i = 0; i < 20'000; ++i) {
-    text += fmt::format("{},0,1\n", i);
-  }
-  put_bytes(path_, text);
-  expect_named(with_memory(128 * mib, [&] { read_pressures(path_, 1000, {}); }),
-               {path_.c_str(), "20000 frames, one for each time, by 1000 elements", "needs 0.3 GB",
-                "GB are available"});
 }
 
 // What compresses by a factor of 1000 takes its time to read; the limit is for what is read.

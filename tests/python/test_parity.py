@@ -120,8 +120,8 @@ def test_errors_are_those_of_the_command(files: Files, tmp_path: pathlib.Path) -
         (["--gamma", "1.5"], {"gamma": 1.5}, "--gamma 1.5:", "gamma=1.5:"),
         (["--x-mm=5:-5"], {"x_mm": (5, -5)}, "--x-mm 5:-5:", "x_mm=(5, -5):"),
         (["--filter", "gauss"], {"filter": "gauss"}, "--filter gauss:", "filter='gauss':"),
-        (["--filter", "bounded", "--memory-mib", "1"], {"filter": "bounded", "memory_mib": 1},
-         "--memory-mib: has", "memory_mib: has"),
+        (["--filter", "bounded", "--particles", "1"], {"filter": "bounded", "particles": 1},
+         "--particles: has", "particles: has"),
         (["--scene", str(missing)], {"scene": missing}, "", ""),
         (["--touches", "10"], {"touches": 10}, "--touches 10 is", "touches=10 is"),
     ]:  # fmt: skip

@@ -66,9 +66,6 @@ TEST(ChosenBins, AreNotLimitedByTheDeviceWhereBoundsMayTakeThem) {
         chosen(device, slips, true)}) {
     EXPECT_LE(bins.most_bins, most_bins_on(device, false)) << "each bin takes memory";
   }
-  histogram.memory_limit_bytes = std::uint64_t{1} << 20;
-  EXPECT_LT(chosen(device, histogram, true).most_bins, most_bins_on(device, false))
-      << "bounds need none of the device's memory";
 }
 
 /// A histogram of so many bins of each object.
@@ -122,7 +119,6 @@ TEST(FilterForBins, IsTheHistogramForWhatBoundsRefuse) {
       << "too large for both; the histogram says so";
   EXPECT_TRUE(takes([](Options& options) { options.touch_sd.rad = 0.1; }));
   EXPECT_TRUE(takes([](Options& options) { options.slip_sd.mm = 0.1; }));
-  EXPECT_FALSE(takes([](Options& options) { options.memory_limit_bytes = 1; }));
 }
 
 }  // namespace palpate::filter_choice_test

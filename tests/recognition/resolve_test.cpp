@@ -209,12 +209,6 @@ TEST(Request, ARefusalNamesTheOptionOrTheScenesKey) {
   const SceneFile scene("{filter: bounded, slip_sd: {deg: 2}}");
   Request request = request_of_shapes();
   request.scene = scene.path();
-  request.memory_mib = 100;
-  EXPECT_EQ(refusal(complete(request)),
-            "`memory-mib`: has no effect on bounds, whose memory is the host's; leave it out, or "
-            "filter: bounded in " +
-                scene.path());
-  request.memory_mib.reset();
   request.filter = FilterKind::particles;
   request.none = Automatic{};
   EXPECT_THAT(refusal(complete(request)), HasSubstr("`none`: particles have no mean"));
@@ -271,7 +265,6 @@ TEST(OptionText, EveryOptionIsReadAsItWasWritten) {
                                                  {"particles", "100"},
                                                  {"augmented", "true"},
                                                  {"seed", "18446744073709551615"},
-                                                 {"memory-mib", "64"},
                                                  {"frames", "2:7"},
                                                  {"touches", "3"},
                                                  {"each-frame", "true"},

@@ -4,11 +4,9 @@
 #include <chrono>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
-#include <unordered_map>
 #include <utility>
 
 #include <fmt/format.h>
@@ -39,97 +37,45 @@ struct SettledBatch {
   std::optional<Device> device;  ///< where settling needed it
 };
 
-/// The surveys of inputs that are as they were.
-void keep_surveys(const BatchTask& before, BatchTask& now) {
-  std::unordered_map<std::string, const BatchEntry*> known;
-  for (const BatchEntry& entry : before.inputs) {
-    known[entry.input.path] = &entry;
-  }
-  for (BatchEntry& entry : now.inputs) {
-    const auto found = known.find(entry.input.path);
-    if (found != known.end() && found->second->input == entry.input &&
-        found->second->stamp == entry.stamp) {
-      entry.survey = found->second->survey;
-    }
-  }
-}
-
 /// Settles once for all shards what a results folder computes: by the task file that is there or,
 /// where there is none, by writing it. Everything that follows from all inputs together, or from
 /// the device at hand, is settled here, so that no chunk depends on who computes it.
-/// @param now what is asked for: program, chunk_unknowns, request and stamped inputs
+/// @param asked program, chunk_unknowns, request, files and stamped inputs
 /// @param request completed
 /// @param open opens the device, where the bins follow from its memory
-/// @param update whether results of another task may be dropped, as far as they differ
 /// @throws Error (Fault::input) where the folder has results of another task
-SettledBatch settle_batch(const ResultsFolder& folder, const FolderLock& lock, BatchTask now,
-                          const Request& request, const std::function<Device()>& open, bool update,
+SettledBatch settle_batch(const ResultsFolder& folder, const BatchTask& asked,
+                          const Request& request, const std::function<Device()>& open,
                           std::size_t threads) {
-  const std::lock_guard settling(lock);
-  folder.make();
-  if (lock.is_alone()) {
-    folder.remove_parts();
-  }
-  const auto require_equal = [&](const std::string& difference, const char* recognise) {
-    if (!difference.empty() && !update) {
-      refuse(folder.path(), "{}; undo that, give another folder, or recognise {} with --update",
-             difference, recognise);
-    }
-    if (!difference.empty() && !lock.is_alone()) {
-      refuse(folder.path(), "{}, but other shards are at work; wait until they have ended",
-             difference);
-    }
+  const auto resolved = [&](BatchTask task) {
+    std::optional<Device> device;
+    RecognitionTask recognition = resolve_batch(
+        task, request, [&]() -> Device& { return device ? *device : device.emplace(open()); });
+    return SettledBatch{std::move(task), std::move(recognition), std::move(device)};
   };
-  constexpr const char* all = "all again";
-  std::optional<BatchTask> before;
-  if (folder.has_task()) {
-    before = read_batch_task(folder.task());
-    require_equal(
-        difference_of_tasks(
-            {.program = before->program,
-             .chunk_unknowns = before->chunk_unknowns,
-             .request = before->request},
-            {.program = now.program, .chunk_unknowns = now.chunk_unknowns, .request = now.request}),
-        all);
+  if (!folder.has_task()) {
+    BatchTask task = asked;
+    {
+      Progress progress("looking through the recordings");
+      survey_inputs(task.inputs, request, threads, [&](double done) { progress.show(done); });
+    }
+    task.inferred = infer(task.inputs, request);
+    SettledBatch settled = resolved(std::move(task));
+    make_folder(folder.path());
+    if (write_batch_task(folder.task(), settled.task)) {
+      std::ranges::for_each(settled.recognition.remarks, tell_on_stderr);
+      return settled;
+    }
+    // Another process has settled the task meanwhile.
   }
-  if (before) {
-    require_equal(difference_of_inputs(*before, now), "what has changed");
-    keep_surveys(*before, now);
-  }
-  {
-    Progress progress("looking through the recordings");
-    survey_inputs(now.inputs, request, threads, [&](double done) { progress.show(done); });
-  }
-  const bool same_inputs = before && before->inputs == now.inputs;
-  now.inferred = same_inputs ? before->inferred : infer(now.inputs, request);
-  hash_files(now, request);
-  const std::string difference = before ? difference_of_tasks(*before, now) : "";
-  require_equal(difference, all);
-  const bool same_task = before && difference.empty();
-  if (same_task) {
-    now.bins = before->bins;
-  }
-  std::optional<Device> device;
-  RecognitionTask recognition = resolve_batch(
-      now, request, [&]() -> Device& { return device ? *device : device.emplace(open()); });
-  if (!same_task) {
-    std::ranges::for_each(recognition.remarks, tell_on_stderr);
-  }
-  SettledBatch settled{std::move(now), std::move(recognition), std::move(device)};
-  const BatchTask& task = settled.task;
-  if (same_task && same_inputs) {
-    return settled;
-  }
-  // Results go before the task that they belong to: a process that is killed in between leaves the
-  // older task, and less of it.
-  const std::vector<bool> kept = same_task ? equal_chunks(*before, task) : std::vector<bool>();
-  for (const std::size_t chunk : folder.finished_chunks()) {
-    if (chunk >= kept.size() || !kept[chunk]) {
-      folder.remove_chunk(chunk);
+  BatchTask there = read_batch_task(folder.task());
+  for (const std::string& difference :
+       {difference_of_tasks(there, asked), difference_of_inputs(there, asked)}) {
+    if (!difference.empty()) {
+      refuse(folder.path(), "{}; undo that, or give another folder", difference);
     }
   }
-  write_batch_task(folder.task(), task);
-  return settled;
+  return resolved(std::move(there));
 }
 
 struct BatchArguments {
@@ -137,7 +83,6 @@ struct BatchArguments {
   std::string results;
   Request request;
   bool verbose = false;
-  bool update = false;
   std::string shard;
   int chunk = 100;
   int threads = 0;
@@ -146,7 +91,7 @@ struct BatchArguments {
 /// Exit status where all is done but some unknowns failed, which other programs rely on.
 constexpr int some_failed = 3;
 
-/// The cores that this process may use, as Slurm and taskset limit them.
+/// The cores that this process may use: a job's or those of taskset.
 std::size_t cores() {
   cpu_set_t set;
   CPU_ZERO(&set);
@@ -221,12 +166,6 @@ std::string batch_summary(const BatchArguments& options, const Shard& shard, con
   return text + fmt::format("; {} failed\n", failed);
 }
 
-/// The device of this task among those that Slurm started on this computer.
-Device open_device_in_step(const std::string& wished) {
-  const std::optional<std::size_t> rank = slurm_number("SLURM_LOCALID");
-  return Device::open(rank ? local_device(Device::list(wished), wished, *rank) : wished);
-}
-
 int batch(const BatchArguments& options) {
   refuse_budget(options.request);
   if (options.chunk < 1) {
@@ -239,22 +178,18 @@ int batch(const BatchArguments& options) {
                   .chunk_unknowns = static_cast<std::size_t>(options.chunk),
                   .request = options.request,
                   .inputs = list_inputs(options.inputs)};
+  hash_files(asked, request);
   const ResultsFolder folder(options.results);
   folder.require_own();
-  if (folder.has_task()) {
-    require_batch_task(folder.task());
-  }
-  make_folder(folder.path());
-  const FolderLock lock(folder, shard);
   const std::size_t threads =
       options.threads > 0 ? static_cast<std::size_t>(options.threads) : cores();
-  const auto open = [&] { return open_device_in_step(request.device); };
-  SettledBatch settled =
-      settle_batch(folder, lock, std::move(asked), request, open, options.update, threads);
+  const auto open = [&] { return Device::open(request.device); };
+  SettledBatch settled = settle_batch(folder, asked, request, open, threads);
   const Chunks chunks = chunks_of(folder, settled.task, shard);
   const auto begin = std::chrono::steady_clock::now();
   BatchCounts now;
   if (chunks.to_be_done > 0) {
+    folder.make();
     now = compute({.folder = folder,
                    .task = settled.task,
                    .recognition = settled.recognition,
@@ -293,11 +228,8 @@ void add_batch(CLI::App& app, int& status) {
   add_unknown_flags(*command, options->request);
   command->add_flag("--trace", options->request.trace, "Add the estimate after every touch");
   command->add_option("--shard", options->shard,
-                      "Recognise only part I of N, from 0 to N - 1, as I/N [default: that of the "
-                      "Slurm task, or all]");
-  command->add_flag("--update", options->update,
-                    "Where inputs, maps or flags differ from those of the results that are there: "
-                    "recognise again what differs, instead of refusing");
+                      "Recognise only part I of N, from 0 to N - 1, as I/N, such as "
+                      "$SLURM_ARRAY_TASK_ID/$SLURM_ARRAY_TASK_COUNT [default: all]");
   command
       ->add_option("--chunk", options->chunk,
                    "Unknowns of a chunk, which is what a killed process loses [default: 100]")

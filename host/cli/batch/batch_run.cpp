@@ -129,11 +129,10 @@ std::size_t most_at_once(const RecognitionTask& task, std::size_t threads) {
   if (traits.certificate) {
     return threads;
   }
-  if (!traits.every_bin || traits.memory_limit_bytes) {
-    return 1;  // the limit is that of all histograms
+  if (!traits.every_bin) {
+    return 1;
   }
-  // Few bins leave a device idle, and it waits for the host. What the threads submit meanwhile runs
-  // side by side.
+  // A device that has few bins waits for the host, unless another thread gives it work meanwhile.
   constexpr std::int64_t filling_bins = 4'000'000;
   constexpr std::int64_t most = 16;
   const auto together = std::clamp<std::int64_t>(filling_bins / task.bins_in_all(), 1, most);

@@ -9,7 +9,6 @@
 #include <glm/vec3.hpp>
 
 #include "cli/page/page_json.hpp"
-#include "io/available_memory.hpp"
 #include "io/input_file.hpp"
 #include "io/recording_rules.hpp"
 #include "io/recording_survey.hpp"
@@ -70,9 +69,6 @@ ViewedFiles::Rows ViewedFiles::rows_of(const fs::path& path) {
                       [&](const RecordingHead& head) {
                         recording = head.recording;
                         rows.elements = head.elements;
-                        require_memory(
-                            path, "the recording's rows",
-                            stored_bytes(std::array{head.rows, head.elements + 8}, sizeof(float)));
                         rows.pressure.reserve(head.rows * head.elements);
                         recording.T_robot_sensor.reserve(head.rows);
                       },

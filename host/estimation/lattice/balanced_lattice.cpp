@@ -124,17 +124,9 @@ TouchRegion touch_region(std::span<const Hypothesis> hypotheses, double reach_mm
   return region;
 }
 
-std::int64_t most_bins_on(const Device& device, bool still_array,
-                          std::optional<std::uint64_t> memory_limit_bytes) {
+std::int64_t most_bins_on(const Device& device, bool still_array) {
   constexpr std::uint64_t bytes_per_bin = 8;
-  constexpr std::uint64_t staging = gpu::CommandStream::staging_bytes;
-  std::uint64_t room = device.memory_bytes() / 2;
-  if (memory_limit_bytes) {
-    // A limit counts the staging memory, too, and a second belief, of a touch by itself. What a
-    // GPU's reductions take beside them is a larger share of little memory.
-    room = std::min(room, (std::max(*memory_limit_bytes, staging) - staging) / 8 * 3);
-  }
-  const std::uint64_t held = room / (still_array ? 2 : 1) / bytes_per_bin;
+  const std::uint64_t held = device.memory_bytes() / 2 / (still_array ? 2 : 1) / bytes_per_bin;
   return static_cast<std::int64_t>(std::min(held, static_cast<std::uint64_t>(most_balanced_bins)));
 }
 

@@ -89,34 +89,6 @@ std::vector<SlabExtent> DenseBelief::cut(const gpu::Context& context, const Pose
   return cut_into_slabs(context, lattice, objects, sizes_for(context, lattice, objects).bins());
 }
 
-std::uint64_t DenseBelief::bytes_needed(const gpu::Context& context, const PoseLattice& lattice,
-                                        std::size_t objects) {
-  const ReductionSizes sizes = sizes_for(context, lattice, objects);
-  std::uint64_t bytes = 0;
-  std::size_t partials = 0;
-  for (const SlabExtent& slab : cut(context, lattice, objects)) {
-    bytes += gpu::allocated(slab.bytes());
-    partials += partials_of(slab, sizes);
-  }
-  return bytes + gpu::allocated(partials * sizeof(shaders::Partial));
-}
-
-std::uint64_t DenseBelief::marginal_bytes(const gpu::Context& context, const PoseLattice& lattice,
-                                          std::size_t objects) {
-  const MarginalSizes sizes =
-      marginal_sizes(context.limits(), lattice.plane(), lattice.theta_rad.count);
-  std::uint64_t most = 0;
-  for (const SlabExtent& slab : cut(context, lattice, objects)) {
-    const std::uint64_t over_theta =
-        std::uint64_t{groups_of(slab.theta_count, sizes.thetas)} * slab.plane();
-    const std::uint64_t over_plane =
-        std::uint64_t{groups_of(slab.plane(), sizes.plane())} * slab.theta_count;
-    most = std::max(most, gpu::allocated(over_theta * sizeof(float)) +
-                              gpu::allocated(over_plane * sizeof(float)));
-  }
-  return most;
-}
-
 void DenseBelief::clear() const {
   for (const Slab& slab : slabs_) {
     stream_.fill(slab.log_likelihood, 0);
@@ -131,8 +103,7 @@ void DenseBelief::add(const DenseBelief& other) const {
     const shaders::AddPush push{.bins = static_cast<shaders::uint>(bins),
                                 .row = static_cast<shaders::uint>(row)};
     stream_.dispatch(add_, {&other.slabs_[i].log_likelihood, &slabs_[i].log_likelihood}, push,
-                     {groups_of(row, lanes), groups_of(bins, push.row), 1},
-                     static_cast<double>(bins));
+                     {groups_of(row, lanes), groups_of(bins, push.row), 1});
   }
 }
 
@@ -152,8 +123,7 @@ std::vector<BeliefSummary> DenseBelief::summarise(std::vector<BeliefSummary> reu
                                    .partial_first = first};
     const std::uint32_t groups = groups_of(slab.bins(), reduction_.bins());
     stream_.dispatch(reduce_, {&slab.log_likelihood, &partials_}, push,
-                     {groups, slab.object_count, 1},
-                     static_cast<double>(slab.object_count * slab.bins()));
+                     {groups, slab.object_count, 1});
     first += static_cast<std::uint32_t>(partials_of(slab, reduction_));
   }
   read_partials_.resize(partial_count_);
@@ -338,7 +308,7 @@ Marginals DenseBelief::marginals(std::size_t object, TwoFloat max, double of_lar
         .max_high = max.high,
         .max_low = max.low};
     stream_.dispatch(sum_marginals_, {&slab.log_likelihood, &theta_parts, &plane_parts}, push,
-                     {blocks, chunks, 1}, static_cast<double>(slab.bins()));
+                     {blocks, chunks, 1});
     stream_.download(theta_parts, over_theta);
     stream_.download(plane_parts, over_plane);
     stream_.run();

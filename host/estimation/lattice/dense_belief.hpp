@@ -40,11 +40,6 @@ class DenseBelief {
   /// The slabs that a dense belief is cut into.
   static std::vector<SlabExtent> cut(const gpu::Context& context, const PoseLattice& lattice,
                                      std::size_t objects);
-  /// Device memory in bytes that a dense belief takes, and that marginals() takes while it runs.
-  static std::uint64_t bytes_needed(const gpu::Context& context, const PoseLattice& lattice,
-                                    std::size_t objects);
-  static std::uint64_t marginal_bytes(const gpu::Context& context, const PoseLattice& lattice,
-                                      std::size_t objects);
 
   /// Records the return to uniform.
   void clear() const;

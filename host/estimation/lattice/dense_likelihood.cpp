@@ -62,29 +62,15 @@ std::size_t DenseLikelihood::batch_for(const gpu::Context& context, const PoseLa
   return elements < factors ? elements : elements / factors * factors;
 }
 
-std::uint64_t DenseLikelihood::bytes_needed(const gpu::Context& context,
-                                            std::span<const Hypothesis> hypotheses,
-                                            const PoseLattice& lattice, const ContactModel& model,
-                                            std::size_t elements) {
-  std::uint64_t bytes = gpu::allocated(elements * bytes_per_element(lattice)) +
-                        gpu::allocated(elements * sizeof(shaders::Segment)) +
-                        gpu::allocated(ContactTable::bytes_needed(model));
-  for (const MapGroup& group : group_maps(context, hypotheses, lattice)) {
-    bytes += MapTable::bytes_needed(group, lattice);
-  }
-  return bytes;
-}
-
 DenseLikelihood::DenseLikelihood(gpu::Context& context, gpu::CommandStream& stream,
                                  const DenseBelief& belief, std::span<const Hypothesis> hypotheses,
-                                 const PoseLattice& lattice, const ContactModel& model,
-                                 std::size_t most_elements)
+                                 const PoseLattice& lattice, const ContactModel& model)
     : context_(context),
       stream_(stream),
       lattice_(lattice),
       objects_(hypotheses.size()),
       contact_(context, stream, model),
-      batch_elements_(std::min(batch_for(context, lattice, hypotheses.size()), most_elements)) {
+      batch_elements_(batch_for(context, lattice, hypotheses.size())) {
   const std::vector<std::uint32_t> first_bins = first_bins_of(belief, hypotheses.size());
   for (const MapGroup& group : group_maps(context, hypotheses, lattice)) {
     groups_.push_back({group,
@@ -130,8 +116,8 @@ void DenseLikelihood::dispatch(const Group& group, const Range& range, const Sla
        maps.nodes().read_as(gpu::Access::storage), &maps.axes(), &maps.places(),
        &slab.log_likelihood},
       push,
-      {groups_of(invocations, independent_lanes(context_.limits())), range.count, slab.theta_count},
-      work_of(range, slab, elements));
+      {groups_of(invocations, independent_lanes(context_.limits())), range.count,
+       slab.theta_count});
 }
 
 void DenseLikelihood::reserve(std::size_t elements) {
@@ -227,7 +213,6 @@ bool PreparedTouch::make_room(const DenseBelief& belief) {
     try {
       log_likelihood_.emplace(belief.uniform());
     } catch (const Error& error) {
-      // Others on the device have taken what the plan counted on.
       log_message(LogLevel::warning, fmt::format("no touch is prepared: {}", error.what()));
       room_ = false;
     }

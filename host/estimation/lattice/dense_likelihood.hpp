@@ -26,21 +26,12 @@ class DenseLikelihood {
   /// @throws Error where they do not hold one element at every theta
   static std::size_t batch_for(const gpu::Context& context, const PoseLattice& lattice,
                                std::size_t objects);
-  /// Device memory that maps, and tables for this many elements, take, in bytes.
-  /// @throws Error where a map is larger than what kernels read
-  static std::uint64_t bytes_needed(const gpu::Context& context,
-                                    std::span<const Hypothesis> hypotheses,
-                                    const PoseLattice& lattice, const ContactModel& model,
-                                    std::size_t elements);
-
   /// Records the upload of the maps, in the order of the belief's objects, and a first, empty run
   /// of every kernel: drivers compile them then, and no touch has to wait for that. Beyond each map
-  /// lies the model's prior.
-  /// @param most_elements of the tables; like batch_for(), which it may lower
+  /// lies the model's prior. @throws Error where a map is larger than what kernels read
   DenseLikelihood(gpu::Context& context, gpu::CommandStream& stream, const DenseBelief& belief,
                   std::span<const Hypothesis> hypotheses, const PoseLattice& lattice,
-                  const ContactModel& model,
-                  std::size_t most_elements = std::numeric_limits<std::size_t>::max());
+                  const ContactModel& model);
 
   /// Most elements that one segment of the evidence may hold.
   std::size_t segment_elements() const { return batch_elements_; }

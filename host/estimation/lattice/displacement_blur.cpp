@@ -145,11 +145,6 @@ int plane_steps(double sd_mm, const Axis& axis) {
   return std::min(blur_steps(sd_mm, axis), axis.count - 1);
 }
 
-/// See gpu::Recording::work().
-double work_of(const Slab& slab, std::size_t steps) {
-  return static_cast<double>(slab.object_count * slab.bins()) * static_cast<double>(steps);
-}
-
 /// Whether no object's bins are cut into parts.
 bool objects_in_one_slab(const gpu::Context& context, const PoseLattice& lattice,
                          std::size_t objects) {
@@ -264,22 +259,6 @@ DisplacementBlur::Pass DisplacementBlur::make_pass(const Axis& axis, bool along_
       .invocations = strips * (along_x ? lattice_.y_mm.count : groups_of(lattice_.x_mm.count, 2))};
 }
 
-std::uint64_t DisplacementBlur::bytes_needed(const PoseLattice& lattice, std::size_t objects,
-                                             const DisplacementSd& sd) {
-  const int steps = blur_steps(sd.rad, lattice.theta_rad);
-  const auto thetas = static_cast<std::uint64_t>(lattice.theta_rad.count);
-  const auto pass_bytes = [&](const Axis& axis) {
-    const int reach = plane_steps(sd.mm, axis);
-    return gpu::allocated((static_cast<std::uint64_t>(reach) + 1) * sizeof(float)) +
-           gpu::allocated(static_cast<std::uint64_t>(axis.count) * sizeof(float));
-  };
-  return pass_bytes(lattice.x_mm) + pass_bytes(lattice.y_mm) +
-         gpu::allocated(turns_of(lattice, objects, steps) * sizeof(shaders::Turn)) +
-         gpu::allocated((objects * thetas + static_cast<std::uint64_t>(steps) + 1) *
-                        sizeof(float)) +
-         gpu::allocated(objects * sizeof(TwoFloat));
-}
-
 std::uint64_t DisplacementBlur::device_bytes() const {
   return along_x_.weights.bytes() + along_x_.norms.bytes() + along_y_.weights.bytes() +
          along_y_.norms.bytes() + turns_.bytes() + plane_max_.bytes() + references_.bytes();
@@ -295,8 +274,7 @@ void DisplacementBlur::run_pass(const Pass& pass, const DenseBelief& from,
                      {&from.slabs()[i].log_likelihood, &references_, &plane_max_, &pass.weights,
                       &pass.norms, &slab.log_likelihood},
                      planes_of(slab, lattice_.theta_rad.count),
-                     few_groups ? std::array<std::uint32_t, 3>{1, 1, 1} : groups,
-                     work_of(slab, (pass.weights.bytes() + pass.norms.bytes()) / sizeof(float)));
+                     few_groups ? std::array<std::uint32_t, 3>{1, 1, 1} : groups);
   }
 }
 
@@ -309,8 +287,7 @@ void DisplacementBlur::blur_planes(const DenseBelief& from, const DenseBelief& s
                      planes_of(slab, lattice_.theta_rad.count),
                      few_groups
                          ? std::array<std::uint32_t, 3>{1, 1, 1}
-                         : std::array<std::uint32_t, 3>{slab.theta_count, slab.object_count, 1},
-                     work_of(slab, 1));
+                         : std::array<std::uint32_t, 3>{slab.theta_count, slab.object_count, 1});
   }
   if (blurs_planes()) {
     run_pass(along_y_, from, scratch, few_groups);
@@ -361,10 +338,10 @@ void DisplacementBlur::sum_turns(const DenseBelief& scratch, const DenseBelief& 
                       plane_max_.read_as(Access::table), plane_max_.read_as(Access::storage),
                       &belief.slabs()[i].log_likelihood, &slab.log_likelihood},
                      push,
-                     few_groups ? std::array<std::uint32_t, 3>{1, 1, 1}
-                                : std::array<std::uint32_t, 3>{groups_of(invocations, lanes_),
-                                                               slab.object_count, slab.theta_count},
-                     work_of(slab, 1 + 2 * static_cast<std::size_t>(theta_steps_)));
+                     few_groups
+                         ? std::array<std::uint32_t, 3>{1, 1, 1}
+                         : std::array<std::uint32_t, 3>{groups_of(invocations, lanes_),
+                                                        slab.object_count, slab.theta_count});
   }
 }
 

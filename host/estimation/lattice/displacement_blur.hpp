@@ -29,9 +29,6 @@ class DisplacementBlur {
                    std::size_t objects, const DisplacementSd& sd,
                    std::span<const glm::dvec2> slip_centroids_mm, bool keep_touch);
 
-  /// Device memory in bytes that it takes, without the scratch belief.
-  static std::uint64_t bytes_needed(const PoseLattice& lattice, std::size_t objects,
-                                    const DisplacementSd& sd);
   std::uint64_t device_bytes() const;
 
   /// Records the blur along y and x.

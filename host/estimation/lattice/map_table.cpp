@@ -138,12 +138,6 @@ std::vector<MapGroup> group_maps(const gpu::Context& context,
   return groups;
 }
 
-std::uint64_t MapTable::bytes_needed(const MapGroup& group, const PoseLattice& lattice) {
-  return gpu::allocated(BorderedMaps::bytes_needed(group.kind.access, group.cells)) +
-         gpu::allocated(group.objects.size() * axis_bins(lattice) * sizeof(shaders::Split)) +
-         gpu::allocated(group.objects.size() * sizeof(shaders::ObjectPlace));
-}
-
 MapTable::MapTable(gpu::Context& context, gpu::CommandStream& stream, const MapGroup& group,
                    std::span<const Hypothesis> hypotheses, const PoseLattice& lattice,
                    std::span<const std::uint32_t> first_bins, double prior,

@@ -57,9 +57,6 @@ std::vector<MapGroup> group_maps(const gpu::Context& context,
 /// The maps of a group on the device, one after the other, and what a kernel needs to find each.
 class MapTable {
  public:
-  /// Device memory that it takes, in bytes.
-  static std::uint64_t bytes_needed(const MapGroup& group, const PoseLattice& lattice);
-
   /// Records the upload. Beyond each map lies the prior.
   /// @param first_bins ObjectPlace::first_bin of every hypothesis
   MapTable(gpu::Context& context, gpu::CommandStream& stream, const MapGroup& group,

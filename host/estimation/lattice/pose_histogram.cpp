@@ -13,7 +13,6 @@
 #include "estimation/lattice/dense_belief.hpp"
 #include "estimation/lattice/dense_likelihood.hpp"
 #include "estimation/lattice/expected_gain.hpp"
-#include "estimation/lattice/memory_plan.hpp"
 #include "estimation/lattice/reading_predictor.hpp"
 #include "estimation/lattice/refinement.hpp"
 #include "estimation/lattice/touch_by_touch.hpp"
@@ -25,15 +24,39 @@
 
 namespace palpate {
 
+namespace {
+
+/// Throws Error where the device holds fewer bins, before there is a buffer of them. In floating
+/// point: bins may be too many to count.
+void require_room(const gpu::Context& context, const HistogramOptions& options,
+                  std::size_t objects) {
+  const PoseLattice& lattice = options.lattice;
+  // For a still array, No Contact everywhere; and a touch by itself.
+  const int beliefs =
+      1 + (options.still_array ? 1 : 0) + (TouchByTouch::wanted_by(options) ? 1 : 0);
+  constexpr double mib = 1 << 20;
+  const double needed_mib = beliefs * static_cast<double>(objects * sizeof(TwoFloat)) *
+                            lattice.x_mm.count * lattice.y_mm.count * lattice.theta_rad.count / mib;
+  const double has_mib = static_cast<double>(context.limits().memory) / mib;
+  if (needed_mib > has_mib) {
+    throw Error(
+        Fault::input,
+        fmt::format("{} objects x {} x {} x {} pose bins need {:.0f} MiB, device '{}' has "
+                    "{:.0f}; use fewer bins or objects",
+                    objects, lattice.x_mm.count, lattice.y_mm.count, lattice.theta_rad.count,
+                    std::ceil(needed_mib), context.name(), has_mib));
+  }
+}
+
+}  // namespace
+
 struct PoseHistogram::Impl {
   Impl(Device& device, std::span<const Hypothesis> hypotheses, const HistogramOptions& wanted)
       : options(wanted),
-        plan(plan_memory(device.context(), hypotheses, options)),
         stream(device.context()),
         belief(device.context(), stream, options.lattice, hypotheses.size()),
-        likelihood(device.context(), stream, belief, hypotheses, options.lattice, options.contact,
-                   plan.batch_elements),
-        prepared(stream, plan.room_to_prepare),
+        likelihood(device.context(), stream, belief, hypotheses, options.lattice, options.contact),
+        prepared(stream, !options.still_array && !TouchByTouch::wanted_by(options)),
         predictor(hypotheses, options.contact),
         log_weight(log_weights(hypotheses)) {
     for (const Hypothesis& hypothesis : hypotheses) {
@@ -168,7 +191,6 @@ struct PoseHistogram::Impl {
   }
 
   HistogramOptions options;
-  MemoryPlan plan;
   gpu::CommandStream stream;
   DenseBelief belief;
   DenseLikelihood likelihood;
@@ -201,6 +223,7 @@ PoseHistogram::PoseHistogram(Device& device, std::span<const Hypothesis> hypothe
     throw Error(Fault::input, fmt::format("none_weight = {}: give a positive number, or none",
                                           *checked.none_weight));
   }
+  require_room(device.context(), checked, hypotheses.size());
   impl_ = std::make_unique<Impl>(device, hypotheses, checked);
 }
 

@@ -75,17 +75,6 @@ bool TouchByTouch::wanted_by(const HistogramOptions& options) {
   return !options.touch_sd.none() || !options.slip_sd.none() || options.none_weight;
 }
 
-std::uint64_t TouchByTouch::bytes_needed(const gpu::Context& context,
-                                         const HistogramOptions& options, std::size_t objects) {
-  const PoseLattice& lattice = options.lattice;
-  return DenseBelief::bytes_needed(context, lattice, objects) +
-         DisplacementBlur::bytes_needed(lattice, objects, options.touch_sd) +
-         (options.slip_sd.none()
-              ? 0
-              : DisplacementBlur::bytes_needed(lattice, objects, options.slip_sd)) +
-         (options.none_weight ? OverlapMean::bytes_needed(lattice, objects) : 0);
-}
-
 TouchByTouch::TouchByTouch(gpu::Context& context, gpu::CommandStream& stream,
                            const HistogramOptions& options, std::span<const Hypothesis> hypotheses,
                            const std::vector<double>& log_weight, DenseBelief& belief)
@@ -221,13 +210,6 @@ OverlapMean::OverlapMean(gpu::Context& context, gpu::CommandStream& stream,
   sums(belief, {}, false);
 }
 
-std::uint64_t OverlapMean::bytes_needed(const PoseLattice& lattice, std::size_t objects) {
-  const auto thetas = static_cast<std::uint64_t>(lattice.theta_rad.count);
-  return gpu::allocated(thetas * sizeof(shaders::ArrayAtTheta)) +
-         gpu::allocated(objects * sizeof(shaders::ObjectBox)) +
-         gpu::allocated(partials_of(lattice, objects) * sizeof(shaders::OverlapPartial));
-}
-
 std::uint64_t OverlapMean::device_bytes() const {
   return arrays_.bytes() + boxes_.bytes() + partials_.bytes();
 }
@@ -250,8 +232,7 @@ std::span<const OverlapSum> OverlapMean::sums(const DenseBelief& scratch,
                                     .half_x_mm = half.x,
                                     .half_y_mm = half.y};
     stream_.dispatch(kernel_, {&slab.log_likelihood, &arrays_, &boxes_, &partials_}, push,
-                     {slab.theta_count, slab.object_count, 1},
-                     static_cast<double>(slab.object_count * slab.bins()));
+                     {slab.theta_count, slab.object_count, 1});
     first += slab.theta_count * slab.object_count;
   }
   stream_.download(partials_, read_partials_);

@@ -34,7 +34,6 @@ class OverlapMean {
   OverlapMean(gpu::Context& context, gpu::CommandStream& stream, const DenseBelief& belief,
               std::span<const Hypothesis> hypotheses, const PoseLattice& lattice);
 
-  static std::uint64_t bytes_needed(const PoseLattice& lattice, std::size_t objects);
   std::uint64_t device_bytes() const;
 
   /// Runs the stream.
@@ -68,9 +67,6 @@ class TouchByTouch {
  public:
   /// Whether the options ask for it.
   static bool wanted_by(const HistogramOptions& options);
-  /// Device memory in bytes that it takes, the dense belief included.
-  static std::uint64_t bytes_needed(const gpu::Context& context, const HistogramOptions& options,
-                                    std::size_t objects);
 
   /// Leaves the belief uniform.
   /// @param options outlive this object; the lattice's pivot may move

@@ -66,10 +66,8 @@ struct TouchRegion {
 /// range
 PALPATE_API TouchRegion touch_region(std::span<const Hypothesis> hypotheses, double reach_mm);
 
-/// The number of bins, of all objects together, that fill half of the device's memory, or three
-/// eighths of what a limit leaves beside 8 MiB of staging memory, where that is less; at most
+/// The number of bins, of all objects together, that fill half of the device's memory; at most
 /// `most_balanced_bins`. A bin takes 8 bytes, or 16 where `still_array` doubles the belief.
-PALPATE_API std::int64_t most_bins_on(const Device& device, bool still_array,
-                                      std::optional<std::uint64_t> memory_limit_bytes = {});
+PALPATE_API std::int64_t most_bins_on(const Device& device, bool still_array);
 
 }  // namespace palpate

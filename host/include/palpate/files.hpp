@@ -17,9 +17,9 @@ namespace palpate {
 // Every reader throws Error (Fault::input) on a missing, damaged or inconsistent file, ignores
 // attributes and datasets that it does not know, and refuses a higher version. Every writer throws
 // Error (Fault::input) on content that no reader takes. It writes a temporary file beside the
-// target and renames it, so that the target is whole or stays as it was. Lack of memory or a
-// failing disk throws Error (Fault::system). Messages are one line that names the file, the field
-// and the remedy.
+// target and renames it, so that the target is whole or stays as it was. A failing disk
+// throws Error (Fault::system), lack of memory std::bad_alloc. Messages are one line that names the
+// file, the field and the remedy.
 
 /// Read or write a "palpate.recording" HDF5 file; of an unclosed file, the whole rows are read.
 PALPATE_API Recording read_recording(const std::filesystem::path& path);

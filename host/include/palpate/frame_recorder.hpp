@@ -35,15 +35,6 @@ class PALPATE_API FrameRecorder {
   FrameRecorder(const FrameRecorder&) = delete;
   FrameRecorder& operator=(const FrameRecorder&) = delete;
 
-  /// Reserves space for a baseline that set_baseline() gives later; a file that is cut off before
-  /// has none. Call it before the first add().
-  void expect_baseline();
-  /// Stores the baseline, [e] in the sensor's unit.
-  /// @throws Error (Fault::input), and stays usable, on another size, on values that are not
-  /// finite, or where frames are saved already without space for a baseline; (Fault::system) where
-  /// the disk fails
-  void set_baseline(std::vector<double> baseline);
-
   /// Appends a frame. A frame that is not is_readable() is counted as lost instead: in lost(), and
   /// in the `lost_before` of the next frame in the file.
   /// @throws Error (Fault::input) on a frame of another size, (Fault::system) where the disk fails

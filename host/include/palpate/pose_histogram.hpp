@@ -43,9 +43,6 @@ struct HistogramOptions {
   /// How far the object may move between two touches, about the centroid of its map's cells with
   /// log odds above 0, which leaves the identity as it is. By default the object rests.
   DisplacementSd slip_sd = {};
-  /// Device memory in bytes that the histogram may take, staging memory included; by default all of
-  /// it. A lower limit makes tables smaller, which costs time; the result keeps its bits.
-  std::optional<std::uint64_t> memory_limit_bytes = {};
 };
 
 /// Histogram filter over object identity and planar pose (Sec. III-C, Eq. 13-16): the log-belief of
@@ -57,8 +54,8 @@ class PALPATE_API PoseHistogram {
   /// Uploads the maps and starts with a uniform belief.
   /// @throws Error on an empty list, a map that is not sound (see fault_of()), maps of different
   /// priors where the options give none, a weight that is not positive and finite, a lattice or a
-  /// contact model out of range, a table for another number of objects, or, before any memory is
-  /// taken, where the device or the limit has too little
+  /// contact model out of range, a table for another number of objects, or where the device has too
+  /// little memory: where the bins alone are more, before any is taken
   PoseHistogram(Device& device, std::span<const Hypothesis> hypotheses,
                 const HistogramOptions& options);
   ~PoseHistogram();

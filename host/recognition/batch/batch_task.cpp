@@ -21,7 +21,7 @@ using OrderedJson = nlohmann::ordered_json;
 namespace fs = std::filesystem;
 
 constexpr const char* format = "palpate.batch";
-constexpr int version = 2;
+constexpr int version = 3;
 /// Far more than anyone recognises, and few enough to count and to keep a bit for each.
 constexpr std::size_t most_unknowns = 1'000'000'000;
 
@@ -175,34 +175,6 @@ std::optional<std::string> first_difference(const Map& a, const Map& b) {
   return of_b == b.end() ? of_a->first : std::min(of_a->first, of_b->first);
 }
 
-/// An input within a chunk, and where the chunk begins in it.
-struct Part {
-  const BatchEntry* entry;
-  std::size_t first;
-  std::size_t count;
-
-  friend bool operator==(const Part& a, const Part& b) {
-    return *a.entry == *b.entry && a.first == b.first && a.count == b.count;
-  }
-};
-
-std::vector<std::vector<Part>> parts_of_chunks(const BatchTask& task) {
-  std::vector<std::vector<Part>> chunks(task.chunks());
-  std::size_t at = 0;
-  for (const BatchEntry& entry : task.inputs) {
-    const std::size_t count = task.unknowns_of(entry);
-    for (std::size_t done = 0; done < count;) {
-      const std::size_t chunk = (at + done) / task.chunk_unknowns;
-      const std::size_t room = (chunk + 1) * task.chunk_unknowns - (at + done);
-      const std::size_t taken = std::min(room, count - done);
-      chunks[chunk].push_back({&entry, done, taken});
-      done += taken;
-    }
-    at += count;
-  }
-  return chunks;
-}
-
 /// Reads the first line of a task file. @throws Error where it is of no task, or of another version
 OrderedJson read_head(const fs::path& file, std::istream& stream) {
   std::string line;
@@ -291,13 +263,7 @@ BatchTask read_batch_task(const fs::path& file) {
   }
 }
 
-void require_batch_task(const fs::path& file) {
-  require_readable(file);
-  std::ifstream stream(file, std::ios::binary);
-  read_head(file, stream);
-}
-
-void write_batch_task(const fs::path& file, const BatchTask& task) {
+bool write_batch_task(const fs::path& file, const BatchTask& task) {
   require_countable(file, task);
   AtomicFile target(file, AtomicFile::Links::replaced);
   std::string text = head_text(task);
@@ -310,7 +276,7 @@ void write_batch_task(const fs::path& file, const BatchTask& task) {
     }
   }
   target.append(text);
-  target.commit();
+  return target.commit_new();
 }
 
 std::string difference_of_tasks(const BatchTask& before, const BatchTask& now) {
@@ -331,9 +297,6 @@ std::string difference_of_tasks(const BatchTask& before, const BatchTask& now) {
                        !now.files.contains(*file)      ? "is no longer used"
                        : !before.files.contains(*file) ? "is new"
                                                        : "has changed");
-  }
-  if (!(before.inferred == now.inferred)) {
-    return "the recordings' arrays or pressure unit have changed";
   }
   return "";
 }
@@ -359,16 +322,6 @@ std::string difference_of_inputs(const BatchTask& before, const BatchTask& now) 
              ? ""
              : fmt::format("{} inputs are given, its results are of {}", now.inputs.size(),
                            before.inputs.size());
-}
-
-std::vector<bool> equal_chunks(const BatchTask& before, const BatchTask& now) {
-  const auto old = parts_of_chunks(before);
-  const auto parts = parts_of_chunks(now);
-  std::vector<bool> equal(parts.size());
-  for (std::size_t i = 0; i < std::min(old.size(), parts.size()); ++i) {
-    equal[i] = old[i] == parts[i];
-  }
-  return equal;
 }
 
 }  // namespace palpate

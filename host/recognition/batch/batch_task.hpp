@@ -41,16 +41,12 @@ struct InputSurvey {
   double reach_mm = 0.0;      ///< the largest array_reach_mm() of its touches
   std::string pressure_unit;  ///< "" where it cannot be read
   std::string placement;      ///< hash of pose and array where all touches share them, or ""
-
-  friend bool operator==(const InputSurvey&, const InputSurvey&) = default;
 };
 
 struct BatchEntry {
   BatchInput input;
   std::optional<FileStamp> stamp;
   std::optional<InputSurvey> survey;  ///< only where the task needs it
-
-  friend bool operator==(const BatchEntry&, const BatchEntry&) = default;
 };
 
 /// What follows from all inputs together.
@@ -59,8 +55,6 @@ struct BatchInference {
   std::string unit_from;  ///< the first input that can be read
   double reach_mm = 0.0;
   bool still_array = false;
-
-  friend bool operator==(const BatchInference&, const BatchInference&) = default;
 };
 
 /// What a results folder computes: the content of its task file, in whose absence nothing is
@@ -89,16 +83,13 @@ BatchEntry entry_from(std::string_view text);
 
 /// Reads and writes the task file. @throws Error, also for a task of more than 1e9 unknowns
 BatchTask read_batch_task(const std::filesystem::path& file);
-/// Looks only at the first line. @throws Error where this is no task file
-void require_batch_task(const std::filesystem::path& file);
-void write_batch_task(const std::filesystem::path& file, const BatchTask& task);
+/// Returns false, and leaves the file as it is, where there is one by then.
+bool write_batch_task(const std::filesystem::path& file, const BatchTask& task);
 
 /// Why all results of `before` are no results of `now`, naming the option or the file; "" where
 /// only inputs may differ.
 std::string difference_of_tasks(const BatchTask& before, const BatchTask& now);
 /// The first input that differs, in words; "" where none does.
 std::string difference_of_inputs(const BatchTask& before, const BatchTask& now);
-/// [chunk of `now`] whether it holds the same unknowns in `before`.
-std::vector<bool> equal_chunks(const BatchTask& before, const BatchTask& now);
 
 }  // namespace palpate
