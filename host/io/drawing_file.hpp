@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
 
 #include "palpate/drawn_map.hpp"
 
@@ -26,5 +27,9 @@ bool is_drawing(const std::filesystem::path& path);
 /// drawing that refers to other files, whatever it draws, one without a size, `mm-per-pixel`
 /// missing, or given beside a physical size, more than `most_pixels`, and nothing occupied
 Mask read_drawing(const std::filesystem::path& path, const DrawingOptions& options);
+
+/// Which edges of the picture have occupied pixels, as "left, upper"; "" where none has. An object
+/// that reaches one may go on beyond it.
+std::string reached_edges(const Mask& mask);
 
 }  // namespace palpate

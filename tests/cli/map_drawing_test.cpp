@@ -29,6 +29,21 @@ class MapDrawing : public ProgramTest {
           "<svg xmlns='http://www.w3.org/2000/svg' xmlns:xlink='http://www.w3.org/1999/xlink' " +
               size + ">" + inside + "</svg>");
   }
+  /// A PNG picture of 5 x 4 pixels, from "....." for each row: '#' is black.
+  void write_grey_png(const std::string& name, const std::string& pixels) const {
+    std::vector<png_byte> grey;
+    for (const char pixel : pixels) {
+      grey.push_back(pixel == '#' ? 0 : 255);
+    }
+    png_image image{};
+    image.version = PNG_IMAGE_VERSION;
+    image.width = 5;
+    image.height = 4;
+    image.format = PNG_FORMAT_GRAY;
+    ASSERT_EQ(grey.size(), 20u);
+    ASSERT_NE(png_image_write_to_file(&image, (folder_ / name).c_str(), 0, grey.data(), 0, nullptr),
+              0);
+  }
   /// A PNG picture of 60 x 40 pixels of a format of libpng, the part in pixels of 0.5 mm.
   void write_png(const std::string& name, png_uint_32 format, const std::vector<png_byte>& on,
                  const std::vector<png_byte>& off) const {
@@ -184,6 +199,55 @@ TEST_F(MapDrawing, AnArrayIsWrittenOnlyWhereItsPlaceIsToldAndNeverOverItself) {
                   "--write-array", "a.csv"},
                  {"--write-array", "drawn maps"});
   EXPECT_FALSE(std::filesystem::exists(folder_ / "s.yaml"));
+}
+
+TEST_F(MapDrawing, SaysWhichEdgesOfItsPictureAnObjectReaches) {
+  const auto said = [&](const std::string& pixels, const char* occupied) {
+    write_grey_png("part.png", pixels);
+    const Outcome outcome = palpate(
+        {"map", "part.png", "--mm-per-pixel", "5", "--occupied", occupied, "-o", "part.map.h5"});
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    return outcome.err;
+  };
+  const std::pair<const char*, const char*> cases[] = {{"..#.."
+                                                        "..#.."
+                                                        "....."
+                                                        ".....",
+                                                        "(upper)"},
+                                                       {"....."
+                                                        "....."
+                                                        "..#.."
+                                                        "..#..",
+                                                        "(lower)"},
+                                                       {"....."
+                                                        "##..."
+                                                        "##..."
+                                                        ".....",
+                                                        "(left)"},
+                                                       {"....."
+                                                        "..###"
+                                                        "...##"
+                                                        ".....",
+                                                        "(right)"},
+                                                       {"..###"
+                                                        "..###"
+                                                        "....."
+                                                        ".....",
+                                                        "(right, upper)"}};
+  for (const auto& [pixels, edges] : cases) {
+    EXPECT_THAT(said(pixels, "dark"),
+                HasSubstr(std::string("part.png: the object reaches the picture's edge ") + edges +
+                          ", and is cut off where it goes on beyond; leave white paper all around "
+                          "it"));
+  }
+  const char* within =
+      "....."
+      ".###."
+      ".###."
+      ".....";
+  EXPECT_EQ(said(within, "dark"), "");
+  EXPECT_THAT(said(within, "light"), HasSubstr("(left, right, lower, upper)"));
+  EXPECT_THAT(said(within, "light"), HasSubstr("leave dark paper all around it"));
 }
 
 TEST_F(MapDrawing, RefusesWhatIsNotInTheDrawing) {
