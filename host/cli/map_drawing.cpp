@@ -10,6 +10,7 @@
 
 #include "cli/map_output.hpp"
 #include "cli/options.hpp"
+#include "cli/recognition_flags.hpp"
 #include "io/drawing_file.hpp"
 #include "model/printable.hpp"
 #include "streaming/import_array.hpp"
@@ -151,6 +152,12 @@ void build_drawn_maps(const MapFlags& flags) {
   for (std::size_t i = 0; i < labels.size(); ++i) {
     Mask mask = read_drawing(flags.recordings[i], {.mm_per_pixel = flags.mm_per_pixel,
                                                    .light = flags.occupied == "light"});
+    if (const std::string edges = reached_edges(mask); !edges.empty()) {
+      tell_on_stderr(fmt::format(
+          "{}: the object reaches the picture's edge ({}), and is cut off where it goes on beyond; "
+          "leave {} paper all around it",
+          flags.recordings[i], edges, flags.occupied == "light" ? "dark" : "white"));
+    }
     mask.origin_mm -= origin.T_learned_robot_object.translation_mm;
     maps.push_back(drawn_map(labels[i], mask, options));
     settle_frame(origin, maps.back());

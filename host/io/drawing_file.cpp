@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <string>
+#include <utility>
 
 #include <png.h>
 
@@ -108,6 +109,27 @@ Mask read_drawing(const std::filesystem::path& path, const DrawingOptions& optio
            options.light ? "dark" : "light");
   }
   return mask;
+}
+
+std::string reached_edges(const Mask& mask) {
+  bool left = false, right = false, lower = false, upper = false;
+  for (std::size_t i = 0; i < mask.occupied.size(); ++i) {
+    const std::size_t row = i / mask.columns;
+    const std::size_t column = i % mask.columns;
+    const bool occupied = mask.occupied[i] != 0;
+    left |= occupied && column == 0;
+    right |= occupied && column + 1 == mask.columns;
+    lower |= occupied && row == 0;
+    upper |= occupied && row + 1 == mask.rows;
+  }
+  std::string edges;
+  for (const auto& [reached, name] : {std::pair(left, "left"), std::pair(right, "right"),
+                                      std::pair(lower, "lower"), std::pair(upper, "upper")}) {
+    if (reached) {
+      edges += (edges.empty() ? "" : ", ") + std::string(name);
+    }
+  }
+  return edges;
 }
 
 }  // namespace palpate

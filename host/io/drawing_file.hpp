@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
 
 #include "palpate/drawn_map.hpp"
 
@@ -23,5 +24,9 @@ bool is_drawing(const std::filesystem::path& path);
 /// @throws Error naming the file or the option and the remedy: of a file that is no PNG picture,
 /// `mm-per-pixel` missing, more than `most_pixels`, and nothing occupied
 Mask read_drawing(const std::filesystem::path& path, const DrawingOptions& options);
+
+/// Which edges of the picture have occupied pixels, as "left, upper"; "" where none has. An object
+/// that reaches one may go on beyond it.
+std::string reached_edges(const Mask& mask);
 
 }  // namespace palpate

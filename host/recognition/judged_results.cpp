@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <fstream>
 #include <iterator>
 #include <optional>
@@ -22,6 +23,39 @@ using Json = nlohmann::json;
 namespace fs = std::filesystem;
 
 constexpr const char* remedy = "give what palpate recognize (`json`) or palpate batch wrote";
+
+/// A field that no evaluation reads, but that people look at.
+struct ShownField {
+  const char* object;  ///< that holds it; "": the record
+  const char* key;
+  bool (*fits)(const Json& value);
+  const char* words;
+};
+
+bool is_text(const Json& value) { return value.is_string(); }
+bool is_truth(const Json& value) { return value.is_boolean(); }
+bool is_count(const Json& value) {
+  return value.is_number_unsigned() && value.get<std::uint64_t>() <= 1'000'000'000;
+}
+
+constexpr ShownField shown_fields[] = {{"", "recording", is_text, "a name"},
+                                       {"", "error", is_text, "a sentence"},
+                                       {"", "touches", is_count, "a whole number from 0"},
+                                       {"", "unknown", is_count, "a whole number from 0"},
+                                       {"", "touch", is_count, "a whole number from 0"},
+                                       {"mode", "map", is_text, "a file"},
+                                       {"mode", "mirrored", is_truth, "true or false"},
+                                       {"fit", "verdict", is_text, "a word"},
+                                       {"decision", "act", is_truth, "true or false"}};
+
+constexpr int most_nested = 64;  // a record is copied and written level by level
+
+bool is_nested_within(const Json& value, int levels) {
+  return !value.is_structured() ||
+         (levels > 0 && std::ranges::all_of(value, [levels](const Json& part) {
+            return is_nested_within(part, levels - 1);
+          }));
+}
 
 /// One record, and the words that name it in a message.
 class RecordReader {
@@ -50,6 +84,24 @@ class RecordReader {
       refuse_field("best", "'{}' has no probability in 'identity'; {}", judged.best, remedy);
     }
     return judged.truth.empty() ? std::nullopt : std::optional(std::move(judged));
+  }
+
+  void require_shown_fields() const {
+    if (!is_nested_within(record_, most_nested)) {
+      refuse(file_, "record {} is nested more than {} deep; {}", index_, most_nested, remedy);
+    }
+    for (const auto& [object, key, fits, words] : shown_fields) {
+      const bool inside = *object != '\0';
+      const Json* of = inside ? find(record_, object) : &record_;
+      if (of != nullptr && !of->is_object()) {
+        refuse_field(object, "is {}, not an object; {}", of->type_name(), remedy);
+      }
+      const Json* value = of == nullptr ? nullptr : find(*of, key);
+      if (value != nullptr && !fits(*value)) {
+        refuse_field(inside ? fmt::format("{}.{}", object, key) : key, "is {}, not {}; {}",
+                     value->is_number() ? value->dump() : value->type_name(), words, remedy);
+      }
+    }
   }
 
  private:
@@ -265,6 +317,7 @@ std::vector<Json> records_in(const fs::path& file) {
   const Json records = parse(file, read_bytes(file));
   for (std::size_t i = 0; i < records.size(); ++i) {
     const RecordReader reader(file, i, records[i]);
+    reader.require_shown_fields();
     if (!reader.failed() && !records[i].contains("next")) {
       reader.read();
     }

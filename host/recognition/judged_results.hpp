@@ -30,8 +30,10 @@ std::vector<std::filesystem::path> result_files(std::span<const std::string> arg
 /// field, where a file cannot be read, is not JSON or holds anything but records, where a value is
 /// of the wrong type or out of range, and where a record's probabilities do not sum to 1 +- 0.01
 JudgedResults read_results(std::span<const std::filesystem::path> files);
-/// The records of one such file as they stand in it, and the plans between those of `live`. Throws
-/// Error as read_results().
+/// The records of one such file as they stand in it, and the plans between those of `live`. Fields
+/// that are shown have their type, or are missing or null: recording, error, touches, unknown,
+/// touch, mode.map, mode.mirrored, fit.verdict and decision.act.
+/// @throws Error as read_results()
 std::vector<nlohmann::json> records_in(const std::filesystem::path& file);
 /// Adds the records of such a file's text.
 /// @param file names the text in messages

@@ -42,7 +42,9 @@ def read_bag(
     any message with a list of numbers, which pressure_field names where it is not the only one:
     "sensors.taxels.z", a list in each item of a list; pose_topic: of poses or transforms in metres; or
     tf: (target, source) frames of /tf and /tf_static, T_target_source, the robot's base and the array;
-    truth_tf: (base, object), where the object truly lies, for the recording's truth; object: its label.
+    truth_tf: (base, object), where the object truly lies, for the recording's truth, which an object that
+    moves by more than 1 mm or 1 degree does not have; object: its label. A frame of /tf_static that moves
+    in /tf is taken from /tf.
     Times are those of the messages' headers, or of their reception where a message has no header. Other
     options are those of import_tables(). progress(fraction) is called now and then.
 
@@ -110,7 +112,10 @@ def read_frames(
         pose_time_s, rows = poses.in_order()
         remarks += poses.remarks(name)
     if truth_tf is not None and tree is not None:
-        truth = tree.still(name, *truth_tf, time_s + pose_delay)
+        truth, moved = tree.still(name, *truth_tf, time_s + pose_delay)
+        remarks += moved
+    if tree is not None:
+        remarks += tree.both(name)
     if tf is not None and tree is not None:
         rows = tree.chain(name, *tf, time_s + pose_delay, options["largest_gap_s"])
         remarks += tree.remarks(name, tf, rows)

@@ -331,13 +331,10 @@ def _readable(name: str) -> Iterator[None]:
     """Says of any failure of the reader that the log is at fault."""
     try:
         yield
-    except MemoryError:
-        raise
     except Exception as error:  # a damaged bag may fail anywhere in rosbags
-        raise Error(
-            f"{name}: cannot be read as a bag ({error or type(error).__name__}); copy it again, or "
-            "reindex it"
-        ) from None
+        memory = isinstance(error, MemoryError)  # for a length that is damaged, in all likelihood
+        why = "a part of it does not fit into memory" if memory else str(error) or type(error).__name__
+        raise Error(f"{name}: cannot be read as a bag ({why}); copy it again, or reindex it") from None
 
 
 @contextmanager

@@ -14,6 +14,7 @@ from ._error import Error
 Rows = NDArray[numpy.float64]  #: [n, 7] mm, and a quaternion x, y, z, w; NaN where unknown
 _UNKNOWN = (math.nan,) * 7
 _USUAL_GAP_S = 0.1
+_STILL = 1.0  #: mm, and degrees, by which an object that lies still may seem to move
 _BLOCK = 1 << 14  #: rows of a chain at a time
 
 
@@ -38,6 +39,7 @@ class _Edge:
 
     parent: str
     static: bool
+    moves: bool = False  #: although /tf_static has it, too
     time_s: "numbers[float]" = field(default_factory=lambda: numbers("d"))
     rows: "numbers[float]" = field(default_factory=lambda: numbers("d"))  #: one behind the other
 
@@ -108,7 +110,7 @@ def _inverse(a: Rows) -> Rows:
 class Transforms:
     """The frames of /tf and /tf_static, by their names without a leading slash.
 
-    Once the wanted chains are complete, other frames' transforms are not kept.
+    A frame that both have is one that moves: its transforms of /tf count alone. Once the wanted chains are complete, other frames' transforms are not kept.
     """
 
     def __init__(
@@ -125,8 +127,14 @@ class Transforms:
             child = transform.child_frame_id.lstrip("/")
             parent = transform.header.frame_id.lstrip("/")
             edge = self.edges.get(child)
+            static = topic in self.static
+            if edge is not None and edge.static != static:
+                if static:
+                    edge.moves = True
+                    continue
+                edge = self.edges[child] = _Edge(edge.parent, False, moves=True)
             if edge is None or edge.parent != parent:
-                edge = self.edges[child] = _Edge(parent, topic in self.static)
+                edge = self.edges[child] = _Edge(parent, static, moves=edge is not None and edge.moves)
                 self._keep_chains()
             if edge.static:
                 edge.rows = numbers("d", row_of(transform.transform))
@@ -145,7 +153,7 @@ class Transforms:
         self.kept = {child for chain in chains if chain for up in chain for child in up}
         for child in self.edges.keys() - self.kept:
             edge = self.edges[child]
-            self.edges[child] = edge if edge.static else _Edge(edge.parent, False)
+            self.edges[child] = edge if edge.static else _Edge(edge.parent, False, edge.moves)
 
     def _path(self, target: str, source: str) -> tuple[list[str], list[str]] | None:
         """Frames from the source up to below the common ancestor, and from the target."""
@@ -195,12 +203,32 @@ class Transforms:
             )
         return rows
 
-    def still(self, log: str, target: str, source: str, time_s: Rows) -> Rows:
-        """T_target_source of a frame that does not move: at the middle of the times when it is known."""
+    def still(
+        self, log: str, target: str, source: str, time_s: Rows
+    ) -> tuple[Rows | None, list[str]]:
+        """T_target_source of a frame that lies still while the frames come, or None and why."""
         rows = self.chain(log, target, source, numpy.unique(time_s), None)
-        known = numpy.flatnonzero(~numpy.isnan(rows[:, 0]))
-        middle: Rows = rows[known[len(known) // 2]].copy()
-        return middle
+        rows = rows[~numpy.isnan(rows[:, 0])]
+        middle: Rows = rows[len(rows) // 2]
+        distance_mm = numpy.linalg.norm(rows[:, :3] - middle[:3], axis=1)
+        cosine = numpy.abs(rows[:, 3:] @ middle[3:])
+        angle_deg = numpy.degrees(2.0 * numpy.arccos(numpy.minimum(1.0, cosine)))
+        # A tracker's outliers are no motion.
+        if max(numpy.quantile(distance_mm, 0.95), numpy.quantile(angle_deg, 0.95)) <= _STILL:
+            return middle, []
+        return None, [
+            f"{log}: truth_tf {target}:{source}: the frame moves by {distance_mm.max():.1f} mm and "
+            f"{angle_deg.max():.1f}°, so that the recording has no truth; give a log in which the object "
+            "lies still"
+        ]
+
+    def both(self, log: str) -> list[str]:
+        """Which frames of the wanted chains are in /tf and in /tf_static."""
+        return [
+            f"{log}: the frame {child} is in /tf_static, but moves in /tf: its transforms of /tf are taken"
+            for child in sorted(self.kept or ())
+            if self.edges[child].moves
+        ]
 
     def remarks(self, log: str, chain: tuple[str, str], rows: Rows) -> list[str]:
         """What is worth saying of rows that chain() gave."""

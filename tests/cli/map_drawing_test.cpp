@@ -176,6 +176,60 @@ TEST_F(MapDrawing, AnArrayIsWrittenOnlyWhereItsPlaceIsToldAndNeverOverItself) {
   EXPECT_FALSE(std::filesystem::exists(folder_ / "s.yaml"));
 }
 
+TEST_F(MapDrawing, SaysWhichEdgesOfItsPictureAnObjectReaches) {
+  const auto said = [&](const std::string& pixels, const char* occupied) {
+    write_png(
+        "part.png",
+        [&](double x, double y) {
+          return pixels[static_cast<std::size_t>(y) * 5 + static_cast<std::size_t>(x)] == '#';
+        },
+        {5, 4}, 1.0);
+    const Outcome outcome = palpate(
+        {"map", "part.png", "--mm-per-pixel", "5", "--occupied", occupied, "-o", "part.map.h5"});
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    return outcome.err;
+  };
+  const std::pair<const char*, const char*> cases[] = {{"..#.."
+                                                        "..#.."
+                                                        "....."
+                                                        ".....",
+                                                        "(upper)"},
+                                                       {"....."
+                                                        "....."
+                                                        "..#.."
+                                                        "..#..",
+                                                        "(lower)"},
+                                                       {"....."
+                                                        "##..."
+                                                        "##..."
+                                                        ".....",
+                                                        "(left)"},
+                                                       {"....."
+                                                        "..###"
+                                                        "...##"
+                                                        ".....",
+                                                        "(right)"},
+                                                       {"..###"
+                                                        "..###"
+                                                        "....."
+                                                        ".....",
+                                                        "(right, upper)"}};
+  for (const auto& [pixels, edges] : cases) {
+    EXPECT_THAT(said(pixels, "dark"),
+                HasSubstr(std::string("part.png: the object reaches the picture's edge ") + edges +
+                          ", and is cut off where it goes on beyond; leave white paper all around "
+                          "it"));
+  }
+  const char* within =
+      "....."
+      ".###."
+      ".###."
+      ".....";
+  EXPECT_EQ(said(within, "dark"), "");
+  EXPECT_THAT(said(within, "light"), HasSubstr("(left, right, lower, upper)"));
+  EXPECT_THAT(said(within, "light"), HasSubstr("leave dark paper all around it"));
+}
+
 TEST_F(MapDrawing, RefusesBadDrawingsAndFlagsInOneLine) {
   write_png("good.png", part);
   write_png("empty.png", [](double, double) { return false; });

@@ -40,6 +40,15 @@ nlohmann::ordered_json setup(const SensorDescription& sensor,
   return json;
 }
 
+/// The whole number behind a key, of those from `least` to below `end`.
+int number_of(const nlohmann::json& request, const char* key, int least, int end) {
+  const double number = request.at(key).get<double>();
+  if (!(number >= least && number < end) || number != std::floor(number)) {
+    throw Error(Fault::input, fmt::format("{} {}: there is none", key, request.at(key).dump()));
+  }
+  return static_cast<int>(number);
+}
+
 /// What the step says besides its numbers, the most important first.
 std::vector<std::string> sentences(const LiveTouch& touch, const RecognitionTask& task) {
   std::vector<std::string> words{truth_words(touch.step), unproven_sentence(touch.step, task),
@@ -96,13 +105,11 @@ void LivePage::act(const nlohmann::json& request) {
   if (what == "next unknown") {
     recognition_->reset();
   } else if (what == "leave out") {
-    recognition_->leave_out(request.at("touch").get<std::size_t>(), request.value("out", true));
+    const int touches = static_cast<int>(recognition_->state().touches);
+    recognition_->leave_out(static_cast<std::size_t>(number_of(request, "touch", 0, touches)),
+                            request.value("out", true));
   } else if (what == "look at") {
-    const int object = request.at("object");
-    if (object >= static_cast<int>(task_.hypotheses.size())) {
-      throw Error(Fault::input, fmt::format("object {}: there is none", object));
-    }
-    looked_at_ = std::max(object, -1);
+    looked_at_ = number_of(request, "object", -1, static_cast<int>(task_.hypotheses.size()));
     recognition_->between_touches([this] { show_belief(); });
   } else {
     throw Error(Fault::input, fmt::format("'{}' is not one of the page's requests", what));

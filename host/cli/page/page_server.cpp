@@ -11,10 +11,10 @@
 #include <thread>
 
 #include <fmt/format.h>
-#include <httplib.h>
 #include <CLI/CLI.hpp>
 
 #include "cli/options.hpp"
+#include "cli/page/limited_server.hpp"
 #include "cli/page/page_feed.hpp"
 #include "cli/page/site.hpp"
 #include "model/option_words.hpp"
@@ -103,9 +103,9 @@ struct PageServer::Impl {
   PageAddress address;
   PageFeed& feed;
   PageAnswers answers;
+  LimitedServer server;
   int port = 0;
   std::atomic<int> pages{0};
-  httplib::Server server;
   std::thread thread;
 
   void give_events(httplib::Response& response) {
@@ -168,17 +168,16 @@ struct PageServer::Impl {
   }
 };
 
-PageServer::PageServer(const PageAddress& address, PageFeed& feed, PageAnswers answers)
-    : impl_(new Impl{.address = address, .feed = feed, .answers = std::move(answers)}) {
-  httplib::Server& server = impl_->server;
-  server.new_task_queue = [] { return new httplib::ThreadPool(most_pages + other_requests); };
+PageServer::PageServer(const PageAddress& address, PageFeed& feed, PageAnswers answers,
+                       const RequestLimits& limits)
+    : impl_(new Impl{.address = address,
+                     .feed = feed,
+                     .answers = std::move(answers),
+                     .server = {limits, most_pages + other_requests}}) {
+  LimitedServer& server = impl_->server;
   server.set_socket_options(own_port_alone);
   server.set_tcp_nodelay(true);  // a body shall not wait 40 ms for the head's acknowledgement
   server.set_payload_max_length(most_asked);
-  server.set_read_timeout(2s);
-  server.set_write_timeout(5s);
-  server.set_keep_alive_timeout(1);
-  server.set_keep_alive_max_count(100);
   // The page loads nothing from elsewhere. Notebooks of this machine may hold it in a frame.
   server.set_default_headers(
       {{"Content-Security-Policy",
@@ -206,6 +205,11 @@ PageServer::PageServer(const PageAddress& address, PageFeed& feed, PageAnswers a
   impl_->port = asked == 0                                 ? server.bind_to_any_port(address.host)
                 : server.bind_to_port(address.host, asked) ? asked
                                                            : -1;
+  if (impl_->port < 0 && httplib::Server().bind_to_any_port(address.host) < 0) {
+    refuse_flag("--page-address", address.host,
+                "no page can be served there; give an address of this machine, such as 127.0.0.1, "
+                "or 0.0.0.0 for all of them");
+  }
   if (impl_->port < 0) {
     refuse_flag("--page", asked,
                 "cannot be had at {}: another program may use it; give another port, or 0 for a "
@@ -217,7 +221,7 @@ PageServer::PageServer(const PageAddress& address, PageFeed& feed, PageAnswers a
 
 PageServer::~PageServer() {
   impl_->feed.close();
-  impl_->server.stop();
+  impl_->server.end();
   impl_->thread.join();
 }
 

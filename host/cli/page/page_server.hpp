@@ -1,5 +1,7 @@
 #pragma once
 
+#include <chrono>
+#include <cstddef>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -32,6 +34,15 @@ struct PageAnswers {
   std::function<void(const nlohmann::json& request)> act;
 };
 
+/// What one client may take of the server. A client that takes more is hung up on.
+struct RequestLimits {
+  std::size_t bytes = 16384;                ///< of a request: its head and its body
+  std::chrono::milliseconds idle{1000};     ///< until a request begins
+  std::chrono::milliseconds reading{2000};  ///< from then until the whole request is there
+  std::chrono::milliseconds writing{5000};  ///< that a client stops taking the answer
+  int connections = 64;                     ///< that are served or wait; others are not accepted
+};
+
 /// Serves Palpate's page over HTTP from construction on: its files, the events of a feed (as
 /// server-sent events, to 16 pages at a time), and `answers`. Answers are given on threads of the
 /// server's own. Requests for another host than this one, or from a page of another site, get 403,
@@ -39,9 +50,10 @@ struct PageAnswers {
 class PageServer {
  public:
   /// @param feed outlives the server
-  /// @throws Error where the port cannot be had
-  PageServer(const PageAddress& address, PageFeed& feed, PageAnswers answers);
-  /// Closes the feed and ends all connections.
+  /// @throws Error where the address is none of this machine's, or the port cannot be had
+  PageServer(const PageAddress& address, PageFeed& feed, PageAnswers answers,
+             const RequestLimits& limits = {});
+  /// Closes the feed and ends all connections, whatever their clients do.
   ~PageServer();
   PageServer(const PageServer&) = delete;
   PageServer& operator=(const PageServer&) = delete;

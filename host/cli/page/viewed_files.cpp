@@ -52,7 +52,17 @@ nlohmann::ordered_json reach_of(std::span<const Pose> poses) {
 }
 
 /// What `live --json` wrote is of touches, one a line.
-bool is_live(const Json& record) { return record.contains("unknown") && record.contains("touch"); }
+bool is_live(const Json& record) {
+  const auto holds_number = [&](const char* key) {
+    return record.contains(key) && record[key].is_number();
+  };
+  return holds_number("unknown") && holds_number("touch");
+}
+
+/// "" where the field is missing or null.
+std::string text_in(const Json& record, const char* key) {
+  return record.contains(key) && record[key].is_string() ? record[key].get<std::string>() : "";
+}
 
 }  // namespace
 
@@ -140,8 +150,11 @@ nlohmann::ordered_json ViewedFiles::some_of(const Rows& rows, std::size_t first)
 }
 
 void ViewedFiles::Records::add(const Json& record) {
-  const std::string best = record.value("best", "");
-  nlohmann::ordered_json row{record.value("recording", ""), record.value("touches", 0)};
+  const std::string best = text_in(record, "best");
+  const std::string error = text_in(record, "error");
+  const bool counted = record.contains("touches") && record["touches"].is_number();
+  nlohmann::ordered_json row{text_in(record, "recording"),
+                             counted ? record["touches"].get<int>() : 0};
   if (record.contains("frame")) {
     row[0] = row[0].get<std::string>() + " frame " + record["frame"].dump();
   }
@@ -150,11 +163,11 @@ void ViewedFiles::Records::add(const Json& record) {
                ? nlohmann::ordered_json(record[key][of])
                : nullptr;
   };
-  row.push_back(record.contains("error") ? record["error"].get<std::string>() : best);
+  row.push_back(error.empty() ? best : error);
   row.push_back(inner("identity", best.c_str()));
   row.push_back(inner("truth", "object"));
-  const char* error = record.contains("refined_error_mm") ? "refined_error_mm" : "error_mm";
-  row.push_back(record.contains(error) ? nlohmann::ordered_json(record[error]) : nullptr);
+  const char* error_mm = record.contains("refined_error_mm") ? "refined_error_mm" : "error_mm";
+  row.push_back(record.contains(error_mm) ? nlohmann::ordered_json(record[error_mm]) : nullptr);
   row.push_back(inner("fit", "verdict"));
   row.push_back(inner("decision", "act"));
   rows.push_back(row);
@@ -268,19 +281,21 @@ std::optional<nlohmann::ordered_json> ViewedFiles::answer(const File& file, cons
   if (records == nullptr || index >= records->text.size()) {
     return {};
   }
-  nlohmann::ordered_json record = nlohmann::ordered_json::parse(records->text[index]);
+  const Json record = Json::parse(records->text[index]);
   if (what == "record") {
     return record;
   }
-  if (what != "map" || !record.contains("mode") || !record["mode"].contains("map")) {
+  if (what != "map" || !record.contains("mode")) {
     return {};
   }
   // Relative to where recognize ran, which may be where this runs, or beside the results.
-  const fs::path named = record["mode"]["map"].get<std::string>();
+  const Json& mode = record["mode"];
+  const fs::path named = text_in(mode, "map");
+  const bool mirrored = mode.contains("mirrored") && mode["mirrored"] == true;
   for (const fs::path& path : {named, file.path.parent_path() / named}) {
     try {
       OccupancyGrid map = read_map(path);
-      return map_json(record["mode"].value("mirrored", false) ? mirror_image(map) : map);
+      return map_json(mirrored ? mirror_image(map) : map);
     } catch (const Error&) {
       // A map that is elsewhere now is not shown.
     }

@@ -1,0 +1,288 @@
+// What one client can take of the page's server: memory, threads, and the end of the program.
+
+#include "cli/page/page_server.hpp"
+
+#include <arpa/inet.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <future>
+#include <optional>
+#include <string>
+#include <system_error>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "cli/page/page_feed.hpp"
+#include "palpate/error.hpp"
+
+namespace palpate::page_server_test {
+
+using namespace std::chrono_literals;
+
+constexpr std::size_t large = std::size_t{32} << 20;  ///< more than sockets hold in between
+constexpr auto never = 1h;
+
+/// A page whose buttons do nothing, and whose "/large" is large.
+class Page {
+ public:
+  explicit Page(const cli::RequestLimits& limits = {}) {
+    server_.emplace(
+        cli::PageAddress{.port = 0}, feed_,
+        cli::PageAnswers{.get = [](const std::string& path) -> std::optional<std::string> {
+                           return path == "/large" ? std::optional(std::string(large, '1'))
+                                                   : std::nullopt;
+                         },
+                         .act = [](const nlohmann::json&) {}},
+        limits);
+  }
+  int port() const {
+    const std::string url = server_->url();
+    return std::stoi(url.substr(url.rfind(':') + 1));
+  }
+  void end() { server_.reset(); }
+
+ private:
+  cli::PageFeed feed_;
+  std::optional<cli::PageServer> server_;
+};
+
+class Client {
+ public:
+  explicit Client(int port) : socket_(::socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK, 0)) {
+    sockaddr_in address{.sin_family = AF_INET,
+                        .sin_port = htons(static_cast<std::uint16_t>(port)),
+                        .sin_addr = {htonl(INADDR_LOOPBACK)},
+                        .sin_zero = {}};
+    if (::connect(socket_, reinterpret_cast<sockaddr*>(&address), sizeof address) != 0 &&
+        errno != EINPROGRESS) {
+      throw std::system_error(errno, std::generic_category(), "connect");
+    }
+  }
+  ~Client() { ::close(socket_); }
+  Client(const Client&) = delete;
+  Client& operator=(const Client&) = delete;
+
+  bool ready(short event, std::chrono::milliseconds timeout = 20s) const {
+    pollfd waits{socket_, event, 0};
+    return ::poll(&waits, 1, static_cast<int>(timeout.count())) > 0;
+  }
+  /// False once the server has hung up.
+  bool send(std::string_view text) const {
+    while (!text.empty()) {
+      const ssize_t sent =
+          ready(POLLOUT) ? ::send(socket_, text.data(), text.size(), MSG_NOSIGNAL) : -1;
+      if (sent < 0) {
+        return false;
+      }
+      text.remove_prefix(static_cast<std::size_t>(sent));
+    }
+    return true;
+  }
+  /// At most so many bytes; none once the server has hung up.
+  std::string read(std::size_t most) const {
+    std::string text(most, '\0');
+    const ssize_t got = ready(POLLIN) ? ::recv(socket_, text.data(), most, 0) : -1;
+    text.resize(got > 0 ? static_cast<std::size_t>(got) : 0);
+    return text;
+  }
+  /// What comes until the server hangs up.
+  std::string read_all() const {
+    std::string text;
+    for (std::string more = read(65536); !more.empty(); more = read(65536)) {
+      text += more;
+    }
+    return text;
+  }
+
+ private:
+  int socket_;
+};
+
+std::string request(const std::string& line, const std::string& headers = "") {
+  return line + " HTTP/1.1\r\nHost: localhost\r\n" + headers + "\r\n";
+}
+
+int answers(const std::string& text) {
+  int count = 0;
+  for (std::size_t at = 0; (at = text.find("HTTP/1.1 ", at)) != text.npos; ++at) {
+    ++count;
+  }
+  return count;
+}
+
+/// How much of a request without end the server takes.
+std::size_t taken(const Page& page, const std::string& begin, const std::string& more) {
+  const Client client(page.port());
+  EXPECT_TRUE(client.send(begin));
+  std::size_t sent = 0;
+  while (sent < large && client.send(more)) {
+    sent += more.size();
+  }
+  return sent;
+}
+
+TEST(PageServer, TakesNoRequestWithoutEnd) {
+  const Page page;
+  const std::string begin = "POST /do HTTP/1.1\r\nHost: localhost\r\n";
+  EXPECT_LT(taken(page, begin, "X: " + std::string(8000, 'v') + "\r\n"), large);
+  EXPECT_LT(taken(page, begin + "Transfer-Encoding: chunked\r\n\r\n",
+                  "2000\r\n" + std::string(0x2000, 'v') + "\r\n"),
+            large);
+  EXPECT_LT(taken(page, request("GET /", "Content-Length: 99999999\r\n"), std::string(8000, 'v')),
+            large);
+}
+
+TEST(PageServer, TakesSixteenKibibytesOfARequest) {
+  const Page page;
+  const auto answer_to = [&](std::size_t length) {
+    const Client client(page.port());
+    const std::string value(4000, 'v');
+    std::string headers = fmt::format("A: {0}\r\nB: {0}\r\nC: {0}\r\nConnection: close\r\n", value);
+    const std::size_t filled = request("GET /", headers + "D: \r\n").size();
+    headers += "D: " + std::string(length - filled, 'v') + "\r\n";
+    EXPECT_TRUE(client.send(request("GET /", headers)));
+    return client.read_all();
+  };
+  EXPECT_TRUE(answer_to(16384).starts_with("HTTP/1.1 200 "));
+  EXPECT_TRUE(answer_to(16385).starts_with("HTTP/1.1 400 "));
+}
+
+TEST(PageServer, EveryRequestOfAConnectionMayTakeAsMuch) {
+  const Page page;
+  const Client client(page.port());
+  std::string requests;
+  for (int i = 1; i <= 10; ++i) {
+    requests += request("GET /none", "A: " + std::string(4000, 'v') + "\r\n" +
+                                         (i == 10 ? "Connection: close\r\n" : ""));
+  }
+  ASSERT_TRUE(client.send(requests));
+  EXPECT_EQ(answers(client.read_all()), 10);
+}
+
+TEST(PageServer, WhoAsksNothingIsHungUpOn) {
+  const Page page({.idle = 10ms});
+  EXPECT_EQ(Client(page.port()).read_all(), "");
+}
+
+TEST(PageServer, AnswersNoRanges) {
+  const Page page;
+  const Client client(page.port());
+  std::string ranges = "Range: bytes=0-";
+  for (int i = 1; i < 2650; ++i) {
+    ranges += ",0-";
+  }
+  ASSERT_TRUE(client.send(request("GET /page.js", ranges + "\r\nConnection: close\r\n")));
+  const std::string answer = client.read_all();
+  EXPECT_TRUE(answer.starts_with("HTTP/1.1 200 ")) << answer.substr(0, 200);
+  EXPECT_LT(answer.size(), 65536u);
+}
+
+// A page of another site may send any body to this server.
+TEST(PageServer, TakesNoBodyForARequest) {
+  const Page page;
+  // httplib reads 4 KiB ahead, and forgets what it has read.
+  const std::string body = request("GET /a", "X: " + std::string(5000, 'v') + "\r\n") +
+                           request("GET /b") + request("GET /c", "Connection: close\r\n");
+  const std::string length = fmt::format("Content-Length: {}\r\n", body.size());
+  for (const std::string& head :
+       {request("POST /do", "Origin: http://evil.example\r\n" + length), request("GET /", length),
+        request("HEAD /", length), request("PROPFIND /", length),
+        request("GET /", "Transfer-Encoding: chunked\r\n"), std::string("nonsense\r\n\r\n")}) {
+    const Client client(page.port());
+    client.send(head + body);
+    EXPECT_EQ(answers(client.read_all()), 1) << head;
+  }
+}
+
+TEST(PageServer, ARequestHasADeadline) {
+  for (const char* head : {"GET / HTTP/1.1\r\nX: ",
+                           "POST /do HTTP/1.1\r\nHost: localhost\r\n"
+                           "Content-Length: 4000\r\n\r\n"}) {
+    const Page page({.reading = 20ms});
+    const Client client(page.port());
+    ASSERT_TRUE(client.send(head));
+    int bytes = 0;
+    while (bytes < 3000 && client.send("v") && !client.ready(POLLIN, 1ms)) {
+      ++bytes;
+    }
+    EXPECT_LT(bytes, 3000);
+    client.read_all();  // ends
+  }
+}
+
+TEST(PageServer, WhoReadsNothingIsHungUpOn) {
+  const Page page({.writing = 10ms});
+  const Client client(page.port());
+  ASSERT_TRUE(client.send(request("GET /large", "Connection: close\r\n")));
+  for (int i = 0; i < 200; ++i) {
+    client.read(1);
+    std::this_thread::sleep_for(1ms);
+  }
+  EXPECT_LT(client.read_all().size(), large);
+}
+
+TEST(PageServer, WhoReadsGetsTheWholeAnswer) {
+  const Page page;
+  const Client client(page.port());
+  ASSERT_TRUE(client.send(request("GET /large", "Connection: close\r\n")));
+  EXPECT_GT(client.read_all().size(), large);
+}
+
+TEST(PageServer, TheEndWaitsForNobody) {
+  Page page({.idle = never, .reading = never, .writing = never});
+  const Client silent(page.port());
+  const Client slow(page.port());
+  ASSERT_TRUE(slow.send("GET / HTTP/1.1\r\nHost: "));
+  const Client events(page.port());
+  ASSERT_TRUE(events.send(request("GET /events")));
+  const Client deaf(page.port());
+  ASSERT_TRUE(deaf.send(request("GET /large")));
+  for (const Client* client : {&events, &deaf}) {
+    ASSERT_TRUE(client->ready(POLLIN));
+  }
+  std::future<void> ended = std::async(std::launch::async, [&] { page.end(); });
+  ASSERT_EQ(ended.wait_for(20s), std::future_status::ready);
+}
+
+TEST(PageServer, EndsAsSoonAsItHasBegun) {
+  for (int i = 0; i < 30; ++i) {
+    Page().end();
+  }
+}
+
+TEST(PageServer, AcceptsNoMoreConnectionsThanItHasRoomFor) {
+  const Page page({.idle = never, .connections = 4});
+  std::vector<std::unique_ptr<Client>> clients;
+  const auto connects = [&] {
+    clients.push_back(std::make_unique<Client>(page.port()));
+    return clients.back()->ready(POLLOUT, 200ms);
+  };
+  while (clients.size() < 50 && connects()) {
+  }
+  EXPECT_LT(clients.size(), 50u);
+  clients.clear();
+  const Client client(page.port());
+  ASSERT_TRUE(client.send(request("GET /", "Connection: close\r\n")));
+  EXPECT_TRUE(client.read_all().starts_with("HTTP/1.1 200 "));
+}
+
+TEST(PageServer, AnAddressOfAnotherMachineIsNamed) {
+  cli::PageFeed feed;
+  try {
+    const cli::PageServer server({.host = "192.0.2.1", .port = 0}, feed, {});
+    FAIL() << server.url();
+  } catch (const Error& error) {
+    EXPECT_STREQ(error.what(),
+                 "--page-address 192.0.2.1: no page can be served there; give an address of this "
+                 "machine, such as 127.0.0.1, or 0.0.0.0 for all of them");
+  }
+}
+
+}  // namespace palpate::page_server_test
