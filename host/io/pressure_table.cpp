@@ -15,7 +15,7 @@ namespace palpate {
 
 namespace {
 
-constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+constexpr double unknown_number = std::numeric_limits<double>::quiet_NaN();
 constexpr double before_all = -std::numeric_limits<double>::infinity();
 
 std::optional<std::size_t> find_one_of(const CsvTable& table,
@@ -157,14 +157,14 @@ PressureTable read_wide(CsvTable& table, std::size_t elements, const TableOption
   double last_s = before_all;
   while (table.next()) {
     for (const std::size_t column : columns) {
-      all.pressure.push_back(table.number(column).value_or(unknown));
+      all.pressure.push_back(table.number(column).value_or(unknown_number));
     }
     if (time) {
       last_s = time_in(table, *time, last_s, false);
       all.time_s.push_back(last_s);
     }
     if (device_time) {
-      all.device_time_s.push_back(table.number(*device_time).value_or(unknown));
+      all.device_time_s.push_back(table.number(*device_time).value_or(unknown_number));
     }
     if (lost_before) {
       all.lost_before.push_back(
@@ -224,7 +224,7 @@ std::optional<PressureTable> read_long(CsvTable& table, std::size_t elements,
     const double key =
         time ? time_in(table, *time, last, false) : frame_in(table, *frame_column, last);
     if (key != last) {
-      all.pressure.insert(all.pressure.end(), elements, unknown);
+      all.pressure.insert(all.pressure.end(), elements, unknown_number);
       read.assign(elements, false);
       if (time) {
         all.time_s.push_back(key);
@@ -238,7 +238,7 @@ std::optional<PressureTable> read_long(CsvTable& table, std::size_t elements,
     }
     read[element] = true;
     all.pressure[all.pressure.size() - elements + element] =
-        table.number(*pressure_column).value_or(unknown);
+        table.number(*pressure_column).value_or(unknown_number);
   }
   return all;
 }
