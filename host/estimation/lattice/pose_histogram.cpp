@@ -26,26 +26,42 @@ namespace palpate {
 
 namespace {
 
-/// Throws Error where the device holds fewer bins, before there is a buffer of them. In floating
-/// point: bins may be too many to count.
+constexpr double mib = 1 << 20;
+
+double memory_mib(const gpu::Context& context) {
+  return static_cast<double>(context.limits().memory) / mib;
+}
+
+/// What the bins of one belief take. In floating point: there may be too many to count.
+double belief_mib(const PoseLattice& lattice, std::size_t objects) {
+  return static_cast<double>(objects * sizeof(TwoFloat)) / mib * lattice.x_mm.count *
+         lattice.y_mm.count * lattice.theta_rad.count;
+}
+
+/// Throws Error where the device holds fewer bins, before there is a buffer of them.
 void require_room(const gpu::Context& context, const HistogramOptions& options,
                   std::size_t objects) {
   const PoseLattice& lattice = options.lattice;
   // For a still array, No Contact everywhere; and a touch by itself.
   const int beliefs =
       1 + (options.still_array ? 1 : 0) + (TouchByTouch::wanted_by(options) ? 1 : 0);
-  constexpr double mib = 1 << 20;
-  const double needed_mib = beliefs * static_cast<double>(objects * sizeof(TwoFloat)) *
-                            lattice.x_mm.count * lattice.y_mm.count * lattice.theta_rad.count / mib;
-  const double has_mib = static_cast<double>(context.limits().memory) / mib;
-  if (needed_mib > has_mib) {
+  const double needed_mib = beliefs * belief_mib(lattice, objects);
+  if (needed_mib > memory_mib(context)) {
     throw Error(
         Fault::input,
         fmt::format("{} objects x {} x {} x {} pose bins need {:.0f} MiB, device '{}' has "
                     "{:.0f}; use fewer bins or objects",
                     objects, lattice.x_mm.count, lattice.y_mm.count, lattice.theta_rad.count,
-                    std::ceil(needed_mib), context.name(), has_mib));
+                    std::ceil(needed_mib), context.name(), memory_mib(context)));
   }
+}
+
+/// Whether one more belief, of a touch that may come next, leaves room for all else.
+bool has_room_to_prepare(const gpu::Context& context, const HistogramOptions& options,
+                         std::size_t objects) {
+  // A still array prepares no touch, and a touch by itself has memory of its own.
+  return !options.still_array && !TouchByTouch::wanted_by(options) &&
+         4.0 * belief_mib(options.lattice, objects) <= memory_mib(context);
 }
 
 }  // namespace
@@ -56,7 +72,7 @@ struct PoseHistogram::Impl {
         stream(device.context()),
         belief(device.context(), stream, options.lattice, hypotheses.size()),
         likelihood(device.context(), stream, belief, hypotheses, options.lattice, options.contact),
-        prepared(stream, !options.still_array && !TouchByTouch::wanted_by(options)),
+        prepared(stream, has_room_to_prepare(device.context(), options, hypotheses.size())),
         predictor(hypotheses, options.contact),
         log_weight(log_weights(hypotheses)) {
     for (const Hypothesis& hypothesis : hypotheses) {

@@ -114,7 +114,7 @@ TEST_F(PreparedTouch, StaysWithinTheDevicesMemory) {
   HistogramOptions options = options_of(0.1);
   options.lattice.theta_rad.count = 8'000;  // 13 MB for each belief
   const std::uint64_t one_belief = 2 * 8 * static_cast<std::uint64_t>(options.lattice.bins());
-  for (const std::uint64_t memory : {3 * one_belief, 4 * one_belief}) {
+  for (const std::uint64_t memory : {4 * one_belief - 1, 4 * one_belief}) {
     Device fresh = Device::open();
     gpu::Limits limits = fresh.context().limits();
     limits.memory = memory;
@@ -122,8 +122,7 @@ TEST_F(PreparedTouch, StaysWithinTheDevicesMemory) {
     PoseHistogram histogram(fresh, objects(), options);
     histogram.prepare(touches[0]);
     histogram.update(touches[0]);
-    const bool room = memory > 3 * one_belief;
-    EXPECT_EQ(histogram.device_bytes() > 2 * one_belief, room);
+    EXPECT_EQ(histogram.device_bytes() > 2 * one_belief, memory == 4 * one_belief);
     EXPECT_LE(fresh.context().memory_use().peak, memory);
   }
 }
