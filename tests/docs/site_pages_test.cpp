@@ -63,6 +63,8 @@ TEST_F(SitePages, MoreBinsHelpTheModeOnly) {
   ASSERT_EQ(points.size(), 7U);
   EXPECT_NEAR(points.at(3).at("refined_error_mm").at("mean").get<double>(), 0.275, 0.02);
   EXPECT_NEAR(points.at(6).at("refined_error_mm").at("mean").get<double>(), 0.189, 0.02);
+  EXPECT_NEAR(points.at(3).at("sd_mm").get<double>(), 0.211, 0.02);
+  EXPECT_NEAR(points.at(6).at("sd_mm").get<double>(), 0.144, 0.02);
   const auto mean = [this](const std::string& results, const char* field) {
     double sum = 0.0;
     const nlohmann::json records = json(results);
