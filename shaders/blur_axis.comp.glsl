@@ -19,7 +19,7 @@ layout(constant_id = 3) const bool EVEN = false;  // rows have an even number of
 layout(binding = 0) uniform samplerBuffer source;      // two bins a texel
 layout(binding = 1) uniform samplerBuffer references;  // [object] log-likelihood in two floats
 layout(std430, binding = 2) readonly buffer PlaneMax { float plane_max[]; };  // [object, theta]
-layout(binding = 3) uniform samplerBuffer weights;  // by distance in bins
+layout(binding = 3) uniform samplerBuffer weights;  // by distance in bins; then their logarithms
 // For each bin of the axis, 1 over the sum of the weights that lie inside.
 layout(std430, binding = 4) readonly buffer Norms { float norms[]; };
 layout(std430, binding = 5) writeonly buffer Result { float result[]; };  // two words a bin
@@ -101,6 +101,7 @@ void main() {
     for (int j = BEGIN; j < BINS + REACH; j += STRIDE) { add(j); }
   }
 
+  const float vague = vague_below(LEAST, texelFetch(weights, REACH).x);
   const uint word = ALONG_X ? 0 : 1;
   uint poor = 0;
   [[unroll]] for (int b = 0; b < BINS * LINES; ++b) {
@@ -108,7 +109,7 @@ void main() {
     const uint beside = ALONG_X ? 0 : uint(b % 2);
     if (at < count && line + beside < (ALONG_X ? push.ny : push.nx)) {
       const float mean = sum[b] * norms[at];
-      poor |= mean < LEAST ? 1u << b : 0;
+      poor |= mean < vague ? 1u << b : 0;
       result[2 * (first + beside + uint(at) * step) + word] = mean;
     }
   }
@@ -120,13 +121,14 @@ void main() {
     for (int k = wanted ? -REACH : REACH + 1; k <= REACH; ++k) {
       if (at + k >= 0 && at + k < count) {
         logs = log_sum_add(logs,
-                           lifted_log(word_of(from + uint(at + k) * step, reference), largest),
-                           texelFetch(weights, abs(k)).x);
+                           lifted_log(word_of(from + uint(at + k) * step, reference), largest) +
+                               texelFetch(weights, REACH + 1 + abs(k)).x,
+                           1.0);
       }
     }
     if (wanted) {
-      result[2 * (from + uint(at) * step) + word] =
-          min(logs.x + log(logs.y * norms[at]), log(LEAST));
+      const float mean = logs.x + log(logs.y * norms[at]);
+      result[2 * (from + uint(at) * step) + word] = mean < log(LEAST) ? mean : exp(mean);
     }
   }
 }

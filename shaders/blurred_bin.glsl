@@ -40,7 +40,13 @@ float lifted_log(const float word, const float largest) {
   return IN_LOGS ? word - largest + BLUR_LIFT : word > 0.0 ? log(word) : word;
 }
 
-// Adds a likelihood to a sum of logs, a pair of the largest term and the sum relative to it.
+// Below which a sum of likelihoods is made again of their logarithms.
+float vague_below(const float least, const float least_weight) {
+  return least_weight < LEAST_WEIGHT ? BLUR_VAGUE : least;
+}
+
+// Adds a likelihood to a sum of logs, a pair of the largest term and the sum relative to it. A weight
+// that may be far from 1 belongs into the likelihood: the largest term decides what is negligible.
 vec2 log_sum_add(const vec2 sum, const float value, const float weight) {
   const float most = max(sum.x, value);
   return vec2(most, sum.y * exp(max(sum.x - most, NEGLIGIBLE)) +

@@ -162,6 +162,11 @@ const float BLUR_LARGEST = 88.0;    // exp() of it is finite
 const float LEAST_ALONG_Y = 1e-31;
 const float LEAST_ALONG_X = 1e-25;
 const float LEAST_OF_TURNS = 1e-19;
+// Weights of a Gaussian are followed by their logarithms. Where float32 does not hold the least of
+// them, a sum that is smaller than BLUR_VAGUE, some 75 nats below the largest of the plane, is made
+// again of logarithms.
+const float LEAST_WEIGHT = 1.2e-38;
+const float BLUR_VAGUE = 100.0;
 
 // Bins of a line that an invocation of blur_axis takes; along y, of two lines.
 const uint BLUR_STRIP_X = 16;

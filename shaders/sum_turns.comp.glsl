@@ -23,7 +23,8 @@ layout(binding = 2) uniform samplerBuffer source_after;   // and after them
 layout(binding = 3) uniform samplerBuffer references;  // [object] log-likelihood in two floats
 layout(binding = 4) uniform samplerBuffer turn_table;  // Turn, [theta or object, step]
 layout(std430, binding = 5) readonly buffer TurnStorage { vec4 turn_storage[]; };
-layout(binding = 6) uniform samplerBuffer max_table;  // [object, theta], then weights by steps
+// [object, theta], then weights by steps and their logarithms.
+layout(binding = 6) uniform samplerBuffer max_table;
 layout(std430, binding = 7) readonly buffer MaxStorage { float max_storage[]; };
 layout(std430, binding = 8) buffer Belief { vec2 belief[]; };
 layout(std430, binding = 9) writeonly buffer Kept { float kept[]; };  // two words a bin
@@ -44,6 +45,7 @@ struct Tap {
   int slab;     // 0: this one, 1: before, 2: after
   float largest;
   float weight;
+  float log_weight;
   uint first;   // bin of the plane
   int column;
   int row;
@@ -109,6 +111,7 @@ Tap tap_at(const int k, const uint object, const uint theta, const int x, const 
               uint(from - first_theta) * push.slab.nx * push.slab.ny;
   tap.largest = plane_max(int(object) * all + from);
   tap.weight = plane_max(int(push.first_weight) + abs(k));
+  tap.log_weight = plane_max(int(push.first_weight) + steps + 1 + abs(k));
   const int entry = 4 * (int(SLIP ? object : theta) * (2 * steps + 1) + k + steps);
   const vec2 whole = turn_part(entry).xy;
   const vec4 fraction = turn_part(entry + 1);
@@ -223,11 +226,12 @@ void main() {
 
   const uint first = gl_WorkGroupID.y * push.slab.stride +
                      (gl_WorkGroupID.z * push.slab.ny + uint(y)) * push.slab.nx + uint(x);
+  const float vague = vague_below(LEAST_OF_TURNS, plane_max(int(push.first_weight) + steps));
   uint poor = 0;
   FOR_EACH_BIN {
     const uint bin = first + b / COLUMNS * push.slab.nx + b % COLUMNS;
     if (y + int(b / COLUMNS) < ny && x + int(b % COLUMNS) < nx) {
-      if (sum[b] < LEAST_OF_TURNS * weight[b]) {
+      if (sum[b] < vague * weight[b]) {
         poor |= 1u << b;
       } else {
         put(bin, log(sum[b] / weight[b]) + (largest - BLUR_LIFT), reference);
@@ -243,13 +247,13 @@ void main() {
       for (int corner = tap.used ? 0 : 4; corner < 4; ++corner) {
         const int column = tap.column + int(b % COLUMNS) + corner % 2;
         const int row = tap.row + int(b / COLUMNS) + corner / 2;
-        const float part = tap.weight * tap.x[corner % 2] * tap.y[corner / 2];
-        if (column >= 0 && column < nx && row >= 0 && row < ny && part > 0.0) {
-          total += part;
+        const float share = tap.x[corner % 2] * tap.y[corner / 2];
+        if (column >= 0 && column < nx && row >= 0 && row < ny && share > 0.0) {
+          total += tap.weight * share;
           logs = log_sum_add(logs,
                              lifted_log(word_at(tap, column, row), tap.largest) +
-                                 (tap.largest - BLUR_LIFT),
-                             part);
+                                 (tap.largest - BLUR_LIFT) + (tap.log_weight + log(share)),
+                             1.0);
         }
       }
     }

@@ -19,7 +19,8 @@ struct Said {
 class DocumentTest : public ProgramTest {
  protected:
   /// Runs all blocks ```sh of a page, in their order, as one script that any failure ends. A
-  /// failure fails the test. `page` is relative to docs/.
+  /// failure fails the test, and so does a line of a block without a language that the last block
+  /// of commands above it has not printed. `page` is relative to docs/.
   Said run(const std::string& page) const;
   /// The array or object of a JSON file that the commands have written.
   nlohmann::json json(const std::string& file) const;
@@ -27,9 +28,6 @@ class DocumentTest : public ProgramTest {
   nlohmann::json scores(const std::string& results) const;
   /// Expects these files.
   void expect_written(const std::vector<std::string>& names) const;
-  /// Expects that the page quotes every line, and that the commands have printed it.
-  static void expect_quoted(const std::string& page, const std::string& printed,
-                            std::initializer_list<const char*> lines);
 };
 
 /// The text of a file of the source tree.

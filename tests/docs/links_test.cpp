@@ -1,6 +1,6 @@
-// Links and pictures of the Markdown pages lead to files and headings that exist. The site's build
-// knows its own pages only; README.md and bench/ are read elsewhere, too. The C++ reference has
-// every public header.
+// Links and pictures of the Markdown pages lead to files and headings that exist, and rows stand in
+// tables. The site's build knows its own pages only; README.md and bench/ are read elsewhere, too.
+// The C++ reference has every public header.
 
 #include <algorithm>
 #include <cctype>
@@ -99,6 +99,21 @@ TEST(Links, LeadToFilesAndHeadings) {
     }
   }
   EXPECT_GT(count, 50) << "the pattern finds the links";
+}
+
+TEST(Tables, BeginWithATitle) {
+  const std::regex first_row("(?:^|\n)(?!\\|)[^\n]*\n(\\|[^\n]*)\n([^\n]*)");
+  const std::regex rule("\\|[ :|-]+\\|");
+  int count = 0;
+  for (const fs::path& page : pages()) {
+    const std::string prose = prose_of(page);
+    for (std::sregex_iterator match(prose.begin(), prose.end(), first_row), end; match != end;
+         ++match, ++count) {
+      EXPECT_TRUE(std::regex_match((*match)[2].str(), rule))
+          << page << ": a row outside of a table: " << (*match)[1];
+    }
+  }
+  EXPECT_GT(count, 20) << "the pattern finds the tables";
 }
 
 TEST(Reference, HasEveryPublicHeader) {

@@ -8,6 +8,9 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <chrono>
+#include <functional>
+#include <semaphore>
 #include <utility>
 
 #include "palpate/error.hpp"

@@ -1,9 +1,5 @@
 #pragma once
 
-#include <chrono>
-#include <cstddef>
-#include <semaphore>
-
 #include <httplib.h>
 
 #include "cli/page/page_server.hpp"

@@ -47,18 +47,24 @@ int blur_steps(double sd, const Axis& axis) {
   return axis.count > 1 ? static_cast<int>(std::ceil(reach * sd / axis.step())) : 0;
 }
 
-/// The weights of a Gaussian by distance in bins, the first is 1; `steps` + 1 numbers.
+/// The weights of a Gaussian by distance in bins, the first is 1, and behind them their logarithms;
+/// 2 (`steps` + 1) numbers.
 std::vector<float> blur_weights(double sd, const Axis& axis, int steps) {
+  constexpr double nothing = -1e30;  // instead of minus infinity, for a weight that float64 lacks
   std::vector<float> weights{1.0F};
+  std::vector<float> logs{0.0F};
   for (int k = 1; k <= steps; ++k) {
     const double deviations = k * axis.step() / sd;
-    weights.push_back(static_cast<float>(std::exp(-deviations * deviations / 2.0)));
+    const double weight = std::exp(-deviations * deviations / 2.0);
+    weights.push_back(static_cast<float>(weight));
+    logs.push_back(static_cast<float>(std::max(std::log(weight), nothing)));
   }
+  weights.insert(weights.end(), logs.begin(), logs.end());
   return weights;
 }
 
 /// For every bin of the axis 1 over the sum of the weights whose bins lie inside.
-std::vector<float> blur_norms(const std::vector<float>& weights, const Axis& axis) {
+std::vector<float> blur_norms(std::span<const float> weights, const Axis& axis) {
   const int steps = static_cast<int>(weights.size()) - 1;
   std::vector<float> norms;
   for (int i = 0; i < axis.count; ++i) {
@@ -206,7 +212,8 @@ DisplacementBlur::DisplacementBlur(gpu::Context& context, gpu::CommandStream& st
       turn_rows_(slips_ ? 1 : rows_of_a_turn),
       turn_columns_(slips_ ? 1 : 2),
       turns_(turn_buffer(context, turns_of(lattice, objects, theta_steps_))),
-      plane_max_(maxima_buffer(context, planes() + static_cast<std::size_t>(theta_steps_) + 1)),
+      plane_max_(
+          maxima_buffer(context, planes() + 2 * (static_cast<std::size_t>(theta_steps_) + 1))),
       references_(context, objects * sizeof(TwoFloat), gpu::Memory::device, "maxima of objects",
                   VK_FORMAT_R32G32_SFLOAT),
       host_turns_(slip_turns(lattice, slip_centroids_mm, theta_steps_)) {
@@ -241,8 +248,9 @@ DisplacementBlur::Pass DisplacementBlur::make_pass(const Axis& axis, bool along_
   std::vector<std::uint32_t> constants{lanes_, along_x ? shaders::BLUR_ALONG_Y : source(),
                                        static_cast<std::uint32_t>(steps),
                                        lattice_.x_mm.count % 2 == 0 ? 1U : 0U};
+  const auto weights = std::span(table).first(static_cast<std::size_t>(steps) + 1);
   for (std::size_t k = 0; k <= shaders::BLUR_CONSTANT_STEPS; ++k) {
-    constants.push_back(std::bit_cast<std::uint32_t>(k < table.size() ? table[k] : 0.0F));
+    constants.push_back(std::bit_cast<std::uint32_t>(k < weights.size() ? weights[k] : 0.0F));
   }
   const std::int64_t strips =
       groups_of(axis.count, along_x ? shaders::BLUR_STRIP_X : shaders::BLUR_STRIP_Y);
@@ -255,7 +263,7 @@ DisplacementBlur::Pass DisplacementBlur::make_pass(const Axis& axis, bool along_
                                  .push_bytes = sizeof(shaders::PlanesPush),
                                  .constants = constants}),
       .weights = stream_.uploaded(table, "weights of a blur", VK_FORMAT_R32_SFLOAT),
-      .norms = stream_.uploaded(blur_norms(table, axis), "weights of a blur"),
+      .norms = stream_.uploaded(blur_norms(weights, axis), "weights of a blur"),
       .invocations = strips * (along_x ? lattice_.y_mm.count : groups_of(lattice_.x_mm.count, 2))};
 }
 

@@ -85,7 +85,7 @@ class DisplacementBlur {
   std::uint32_t turn_rows_;     ///< bins along y of an invocation of sum_turns
   std::uint32_t turn_columns_;  ///< along x
   gpu::Buffer turns_;
-  gpu::Buffer plane_max_;   ///< [object, theta], then the weights of theta
+  gpu::Buffer plane_max_;   ///< [object, theta], then weights of theta and their logarithms
   gpu::Buffer references_;  ///< [object]
   /// What goes to turns_: of a touch [theta, k], of a slip [object, k].
   std::vector<shaders::Turn> host_turns_;

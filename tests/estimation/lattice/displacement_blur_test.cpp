@@ -2,8 +2,10 @@
 // and where a Gaussian reaches far.
 
 #include <string>
+#include <utility>
 #include <vector>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "gpu/context.hpp"
@@ -108,6 +110,33 @@ TEST(DisplacementBlur, ReachesFarAlongFineBins) {
         EXPECT_LT(largest_difference(histogram.log_likelihood(static_cast<int>(object)), expected),
                   1e-3);  // what the method allows
       }
+    }
+  }
+}
+
+TEST(DisplacementBlur, OfGaussiansNarrowerThanABinIsThatOfTheReference) {
+  // A neighbour's weight is down to exp(-800). Without a floor, its likelihood is up to exp(1e4)
+  // times a bin's, and float32 keeps 6 digits of such logs.
+  const Recording recording = random_recording(1, 900, 85);
+  const Touch touch = recording.touch(0);
+  const PoseLattice lattice{
+      .x_mm = {-5.0, 6.0, 15}, .y_mm = {-3.0, 3.0, 9}, .theta_rad = {0.0, two_pi, 20}};
+  Device device = Device::open();
+  for (const double steps_of_sd : {4.0, 9.0, 12.5, 13.3, 14.5, 20.0, 37.0, 40.0}) {
+    for (const auto& [mm, rad] : {std::pair(1.0, 0.0), std::pair(0.0, 1.0), std::pair(1.0, 1.0)}) {
+      SCOPED_TRACE(fmt::format("step / {}, {} {}", steps_of_sd, mm, rad));
+      HistogramOptions options{.lattice = lattice,
+                               .touch_sd = {.mm = mm * lattice.x_mm.step() / steps_of_sd,
+                                            .rad = rad * lattice.theta_rad.step() / steps_of_sd}};
+      options.contact.prior = 0.2;
+      options.contact.gamma = 0.0;
+      PoseHistogram histogram(device, objects(), options);
+      histogram.update(touch);
+      const std::vector<double> exact = reference::log_likelihoods(
+          std::span(&touch, 1), lattice, objects()[0].map, options.contact, 0);
+      const std::vector<double> expected =
+          reference::displaced_touch(exact, lattice, options.touch_sd, touch.T_robot_sensor);
+      EXPECT_LT(largest_difference(histogram.log_likelihood(0), expected), 1e-2);
     }
   }
 }
