@@ -166,7 +166,7 @@ BoardName parse_board_name(const std::string& name) {
   if (parsed.kind.empty() || (colon != std::string::npos && parsed.which.empty())) {
     throw Error(Fault::input,
                 fmt::format("sensor '{}': must be a board's name, or its name, a colon and its "
-                            "serial number; see palpate sensors",
+                            "serial number, port or device file; see palpate sensors",
                             name));
   }
   return parsed;

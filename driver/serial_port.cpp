@@ -102,6 +102,9 @@ SerialPort::SerialPort(const std::string& node, const SerialLine& line)
   }
 }
 
+// A port that another program has open, too, would stay closed to users.
+SerialPort::~SerialPort() { ioctl(port_.get(), TIOCNXCL); }
+
 void SerialPort::refuse(const std::string& what) const {
   throw Error(Fault::system, fmt::format("{}: {}", node_, what));
 }

@@ -31,6 +31,9 @@ class SerialPort {
  public:
   /// Opens the port with these settings of the line. @throws Error naming the port and the remedy
   SerialPort(const std::string& node, const SerialLine& line);
+  ~SerialPort();
+  SerialPort(const SerialPort&) = delete;
+  SerialPort& operator=(const SerialPort&) = delete;
 
   /// Forgets what came and was not read. @throws Error where the device is gone
   void flush();

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <chrono>
 #include <cstdint>
 #include <exception>
@@ -100,15 +101,19 @@ class SerialSensor final : public Sensor {
  private:
   /// Opens the port of the one board that is meant, and then knows it by what tells it apart.
   void connect() {
-    const std::vector<Device> candidates =
-        profile_.usb.empty() ? serial_ports() : with_id(serial_ports(), profile_.usb);
-    // A path opens what is no known board, too: a port of the mainboard, a link of
-    // /dev/serial/by-id.
-    const bool by_path = which_.starts_with('/');
-    const Device device =
-        by_path ? Device{.node = which_} : choose_device(candidates, kind_, which_);
+    const std::vector<Device> ports = serial_ports();
+    Device device{.node = which_};
+    if (which_.starts_with('/')) {
+      // Opens what is not listed, too: a port of the mainboard, a link in /dev/serial/by-id.
+      const auto listed = std::ranges::find(ports, which_, &Device::node);
+      device = listed == ports.end() ? device : *listed;
+    } else {
+      const std::vector<Device> boards =
+          profile_.usb.empty() ? ports : with_id(ports, profile_.usb);
+      device = choose_device(boards, kind_, which_);
+      which_ = distinction(device, boards);
+    }
     port_ = std::make_unique<SerialPort>(device.node, profile_.line);
-    which_ = by_path ? which_ : distinction(device, candidates);
     description_ = {.name = profile_.name,
                     .serial = device.serial,
                     .pressure_unit = profile_.pressure_unit,

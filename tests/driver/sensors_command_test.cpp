@@ -1,10 +1,14 @@
 #include <cstdlib>
+#include <future>
+#include <random>
+#include <regex>
 
 #include <gmock/gmock.h>
 
 #include "cli/program.hpp"
 #include "fake_serial_board.hpp"
 #include "fake_takktile.hpp"
+#include "parsing/sent_frame.hpp"
 
 namespace palpate::sensors_command_test {
 
@@ -52,6 +56,28 @@ TEST_F(SensorsCommand, TellsBoardsFromOtherDevices) {
   EXPECT_THAT(text, HasSubstr("  2341:8036  Maker Serial board\n"
                               "     bus 1, address 4, serial B2, /dev/ttyUSB4\n"
                               "     not known: "));
+}
+
+TEST_F(SensorsCommand, RecordsASerialBoardUntilItIsUnplugged) {
+  FakeSerialBoard board(usb_, "A1", {});
+  auto recording = std::async(std::launch::async, [&] {
+    return palpate({"record", "--sensor", "tsf85", "--tare", "0", "-o", "frames.h5"});
+  });
+  EXPECT_EQ(board.port().received(5).size(), 5U) << "the command to start";
+  // More than the kernel keeps for the program, so that most frames have come before the end.
+  constexpr int sent = 2000;
+  std::mt19937 random(1);
+  for (int i = 0; i < sent; ++i) {
+    board.port().send(random_frame("tsf85", random).bytes);
+  }
+  board.unplug();
+  const Outcome outcome = recording.get();
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("/dev/ttyUSB2: hung up: the board was unplugged"));
+  const std::string info = done({"info", "frames.h5", "--close"});
+  std::smatch frames;
+  ASSERT_TRUE(std::regex_search(info, frames, std::regex("frames +([0-9]+)\\n"))) << info;
+  EXPECT_GT(std::stoi(frames[1]), sent / 4) << "what came is kept";
 }
 
 TEST_F(SensorsCommand, SaysWhyABoardCannotBeUsed) {

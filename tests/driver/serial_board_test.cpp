@@ -162,6 +162,7 @@ TEST_F(SerialBoards, WithoutAnIdOfTheirOwnAreNamedBySerialPortOrPath) {
               AllOf(HasSubstr("flexitac"), HasSubstr("serial number, port or device file")));
   for (const std::string& which : {std::string("B2"), std::string("1-2"), board.node()}) {
     const auto sensor = open_board("flexitac:" + which);
+    EXPECT_EQ(sensor->description().serial, "B2");
     sensor->start();
     const std::vector<SentFrame> sent = frames_of("flexitac", 50);
     board.port().send(stream_of(sent));
