@@ -1,31 +1,37 @@
 #include "palpate/driver.hpp"
 
 #include <algorithm>
+#include <cerrno>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
 
-#include "driver/board.hpp"
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include "driver/device.hpp"
+#include "driver/open_sensor.hpp"
+#include "driver/serial_port.hpp"
 #include "driver/serial_profile.hpp"
-#include "driver/usb_device.hpp"
+#include "driver/takktile_link.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
 
 namespace {
 
-/// Fills in what the board tells without disturbing a program that uses the board.
-void inspect(Board& board, const UsbDevice& device, BoardInfo& info) {
+/// Fills in what a TakkTile tells without disturbing a program that uses it.
+void inspect_takktile(const Device& device, BoardInfo& info) {
+  if (is_claimed(device)) {
+    info.reason = in_use(device.node);
+    return;
+  }
   try {
-    const StreamSource source = board.source(device);
-    const bool taken = std::ranges::any_of(source.interfaces, [&](int interface) {
-      return interface_driver(device, interface) == "usbfs";
-    });
-    if (taken) {
-      info.reason = in_use(device);
-      return;
-    }
-    UsbHandle handle(device);
-    const SensorDescription description = board.configure(handle);
+    const UsbContext context;
+    UsbHandle handle(context, device);
+    const SensorDescription description = takktile::read_setup(handle).description;
     info.elements = description.elements_mm.size();
-    info.rate_hz = description.rate_hz;
     info.pressure_unit = description.pressure_unit;
     info.usable = true;
   } catch (const Error& error) {
@@ -33,32 +39,65 @@ void inspect(Board& board, const UsbDevice& device, BoardInfo& info) {
   }
 }
 
+/// Fills in what the profile says. The port is not opened, which would restart many a board.
+void inspect_serial_board(const SerialProfile& profile, BoardInfo& info) {
+  info.elements = profile.elements_mm.size();
+  info.rate_hz = profile.rate_hz;
+  info.pressure_unit = profile.pressure_unit;
+  if (info.serial_port.empty()) {
+    info.reason = "the kernel has no serial port for it; load its driver, 'sudo modprobe cdc_acm'";
+  } else if (access(info.serial_port.c_str(), R_OK | W_OK) != 0) {
+    info.reason = why_not_opened(info.serial_port, errno);
+  } else if (!holders(info.serial_port).empty()) {
+    info.reason = in_use(info.serial_port);
+  } else {
+    info.usable = true;
+  }
+}
+
 }  // namespace
 
 std::vector<BoardInfo> list_boards() {
-  const UsbContext context;
-  const std::vector<std::unique_ptr<Board>> boards = known_boards();
+  const std::vector<Device> devices = usb_devices();
+  const std::vector<Device> ports = serial_ports();
+  std::map<std::string, SerialProfile> profiles;
+  for (const std::string& name : shipped_profiles()) {
+    profiles.emplace(name, read_serial_profile(name));
+  }
   std::vector<BoardInfo> infos;
-  const std::vector<UsbDevice> devices = usb_devices(context);
-  for (const UsbDevice& device : devices) {
-    BoardInfo info{.name = {},
-                   .bus = device.bus,
-                   .address = device.address,
-                   .vendor = device.vendor,
-                   .product = device.product,
-                   .manufacturer = device.manufacturer,
-                   .product_name = device.product_name,
-                   .serial = device.serial,
-                   .pressure_unit = {},
-                   .reason = "no board that is known by its USB ids"};
+  for (const Device& device : devices) {
+    const auto port = std::ranges::find(ports, device.port, &Device::port);
+    const std::string node = port == ports.end() ? "" : port->node;
+    BoardInfo& info = infos.emplace_back(BoardInfo{.name = {},
+                                                   .bus = device.bus,
+                                                   .address = device.address,
+                                                   .vendor = device.id.vendor,
+                                                   .product = device.id.product,
+                                                   .manufacturer = device.manufacturer,
+                                                   .product_name = device.product_name,
+                                                   .serial = device.serial,
+                                                   .serial_port = node,
+                                                   .pressure_unit = {},
+                                                   .reason = {}});
+    const auto named = [&](const std::string& kind, const std::vector<UsbId>& ids) {
+      const bool has_port = port != ports.end();
+      return fmt::format(
+          "{}:{}", kind,
+          distinction(has_port ? *port : device, with_id(has_port ? ports : devices, ids)));
+    };
     const auto board = std::ranges::find_if(
-        boards, [&](const std::unique_ptr<Board>& b) { return b->fits(device); });
-    if (board != boards.end()) {
-      info.reason.clear();
-      info.name = full_name(**board, device, devices);
-      inspect(**board, device, info);
+        profiles, [&](const auto& known) { return !with_id({device}, known.second.usb).empty(); });
+    if (device.id == takktile::usb_id) {
+      info.name = named(takktile_kind, {takktile::usb_id});
+      inspect_takktile(device, info);
+    } else if (board != profiles.end()) {
+      info.name = named(board->first, board->second.usb);
+      inspect_serial_board(board->second, info);
+    } else {
+      info.reason = "no board that is known by its USB ids";
+      info.reason +=
+          node.empty() ? "" : "; where a profile describes it, PROFILE:" + node + " opens it";
     }
-    infos.push_back(std::move(info));
   }
   return infos;
 }
@@ -66,6 +105,12 @@ std::vector<BoardInfo> list_boards() {
 std::optional<std::filesystem::path> board_file(const std::string& name) {
   const std::string kind = parse_board_name(name).kind;
   return kind == takktile_kind ? std::nullopt : std::optional(profile_path(kind));
+}
+
+std::unique_ptr<Sensor> open_board(const std::string& name) {
+  const auto [kind, which] = parse_board_name(name);
+  return kind == takktile_kind ? open_takktile(which)
+                               : open_serial_board(read_serial_profile(kind), kind, which);
 }
 
 }  // namespace palpate

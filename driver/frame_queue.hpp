@@ -15,6 +15,11 @@
 
 namespace palpate {
 
+/// The host's clock, since the Unix epoch, by which frames are stamped.
+inline double host_clock_s() {
+  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+}
+
 /// Passes frames from the thread that reads the bus to the thread that asks for frames. A full
 /// queue drops its oldest frame and counts the loss in the next frame's lost_before.
 class FrameQueue {

@@ -9,27 +9,21 @@
 #include <glm/vec2.hpp>
 
 #include "driver/deframer.hpp"
+#include "driver/device.hpp"
 #include "driver/packet_format.hpp"
 
 namespace palpate {
 
-/// Vendor and product of a USB device.
-struct UsbId {
-  std::uint16_t vendor = 0;
-  std::uint16_t product = 0;
-  friend bool operator==(const UsbId&, const UsbId&) = default;
-};
-
-/// Line settings of a CDC serial port, for SET_LINE_CODING.
+/// Settings of a serial port.
 struct SerialLine {
-  enum class Parity : std::uint8_t { none = 0, odd = 1, even = 2 };  // as CDC PSTN 1.2 codes them
+  enum class Parity : std::uint8_t { none, odd, even };
   std::uint32_t baud = 115200;
   std::uint8_t data_bits = 8;  ///< 5 to 8
   Parity parity = Parity::none;
   std::uint8_t stop_bits = 1;  ///< 1 or 2
 };
 
-/// What a profile says of a board behind a USB serial port (CDC ACM).
+/// What a profile says of a board behind a serial port.
 struct SerialProfile {
   std::filesystem::path path;  ///< the profile's file
   std::string name;            ///< for people, such as "Robotiq TSF-85"

@@ -7,14 +7,14 @@
 #include <glm/vec2.hpp>
 
 #include "driver/deframer.hpp"
+#include "driver/device.hpp"
 
 namespace palpate::takktile {
 
 // Vendor requests of the published firmware, TakkTile-usb: firmware/main.c, and TakkTile.py for the
 // calibration. All are IN requests to the device, also the request that starts and stops the
 // stream.
-inline constexpr std::uint16_t vendor_id = 0x59e3;
-inline constexpr std::uint16_t product_id = 0x74c7;
+inline constexpr UsbId usb_id{.vendor = 0x59e3, .product = 0x74c7};
 inline constexpr std::uint8_t request_type = 0xc0;
 inline constexpr std::size_t packet_bytes = 64;
 

@@ -1,9 +1,10 @@
 #include "driver/transfer_ring.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <new>
 #include <utility>
+
+#include "driver/frame_queue.hpp"
 
 namespace palpate {
 
@@ -11,10 +12,6 @@ namespace {
 
 // Ends and counts the transfers of a silent board.
 constexpr unsigned transfer_patience_ms = 1000;
-
-double now_s() {
-  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
-}
 
 }  // namespace
 
@@ -134,7 +131,7 @@ void TransferRing::keep(Slot& slot, std::size_t length, bool ended) noexcept {
     fresh.resize(transfer_bytes_);
     slot.buffer.swap(fresh);
     fresh.resize(length);
-    completed_.push_back({std::move(fresh), now_s(), ended, missing_});
+    completed_.push_back({std::move(fresh), host_clock_s(), ended, missing_});
     missing_ = 0;
   } catch (const std::bad_alloc&) {
     ++missing_;  // the caller is libusb, C code: no exception may leave

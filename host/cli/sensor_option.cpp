@@ -54,6 +54,7 @@ namespace {
 
 constexpr const char* sensor_help =
     "A board, by its name in 'palpate sensors' or the path of its profile; "
+    "behind a colon which one, as in flexitac:/dev/ttyUSB0; "
     "- for frames of the array --array that another program writes to standard input, a line each: "
     "JSON as {\"time\": s since 1970, \"pressure\": [...]}, or CSV with the time before the "
     "readings; the time may be left out, and x_mm, y_mm and theta_rad of T_robot_sensor added; "

@@ -26,6 +26,7 @@ void print_json(const std::vector<BoardInfo>& boards) {
                     {"manufacturer", b.manufacturer},
                     {"product_name", b.product_name},
                     {"serial", b.serial},
+                    {"serial_port", b.serial_port},
                     {"elements", b.elements},
                     {"rate_hz", b.rate_hz},
                     {"pressure_unit", b.pressure_unit},
@@ -45,8 +46,9 @@ void print_text(const std::vector<BoardInfo>& boards) {
                                   : printable(b.manufacturer + " " + b.product_name);
     fmt::print("{} {:04x}:{:04x}  {}\n", b.usable ? '*' : ' ', b.vendor, b.product,
                b.name.empty() ? named : printable(b.name));
-    fmt::print("     bus {}, address {}, serial {}\n", b.bus, b.address,
-               b.serial.empty() ? "none" : printable(b.serial));
+    fmt::print("     bus {}, address {}, serial {}{}\n", b.bus, b.address,
+               b.serial.empty() ? "none" : printable(b.serial),
+               b.serial_port.empty() ? "" : ", " + b.serial_port);
     if (b.usable) {
       fmt::print("     {} elements, {}, {}\n", b.elements, b.pressure_unit,
                  b.rate_hz > 0 ? fmt::format("{} frames/s", b.rate_hz) : "rate not known");

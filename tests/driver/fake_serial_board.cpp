@@ -1,85 +1,143 @@
 #include "fake_serial_board.hpp"
 
+#include <cerrno>
+#include <chrono>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <stdexcept>
+
+// The kernel's own termios tells every baud rate.
+#include <asm/termbits.h>
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <poll.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include "streamed.hpp"
+
 namespace palpate {
 
 namespace {
 
-// Interfaces 0 and 1 are another function of the board and have no CDC union descriptor.
-constexpr std::uint8_t control_interface = 2;
-constexpr std::uint8_t data_interface = 3;
-
-Bytes configuration(FakeSerialBoard::Union descriptor) {
-  std::vector<Bytes> descriptors = {
-      {9, 2, 0, 0, 4, 1, 0, 0x80, 50},  // four interfaces; the length follows below
-      {9, 4, 0, 0, 1, 0x02, 2, 0, 0},   // a control interface without a union
-      {7, 5, 0x84, 3, 8, 0, 16},
-      {9, 4, 1, 0, 0, 0xff, 0, 0, 0},
-      {9, 4, control_interface, 0, 1, 0x02, 2, 1, 0},
-      {5, 0x24, 0x00, 0x10, 0x01},  // header
-      {5, 0x24, 0x06, control_interface, data_interface},
-      {7, 5, 0x82, 3, 8, 0, 16},
-      {9, 4, data_interface, 0, 2, 0x0a, 0, 0, 0},
-      {7, 5, 0x03, 2, 64, 0, 0},
-      {7, 5, 0x83, 2, 64, 0x18, 0}};  // 64 bytes, and bits that mean nothing in a bulk endpoint
-  if (descriptor == FakeSerialBoard::Union::missing) {
-    descriptors.erase(descriptors.begin() + 6);
-  } else if (descriptor == FakeSerialBoard::Union::alone) {
-    descriptors.erase(descriptors.begin() + 1, descriptors.begin() + 8);
-    descriptors[0][4] = 1;
-    descriptors[1][2] = 0;
-  }
-  Bytes bytes;
-  for (const Bytes& d : descriptors) {
-    bytes.insert(bytes.end(), d.begin(), d.end());
-  }
-  bytes[2] = static_cast<std::uint8_t>(bytes.size());
-  return bytes;
+[[noreturn]] void no_terminal(const char* call) {
+  throw std::runtime_error(fmt::format("{}: {}; the test needs a pseudo-terminal: mount devpts",
+                                       call, std::strerror(errno)));
 }
+
+bool becomes_ready(int file, short events) {
+  pollfd ready{.fd = file, .events = events, .revents = 0};
+  return poll(&ready, 1, static_cast<int>(std::chrono::milliseconds(patience).count())) > 0;
+}
+
+termios2 settings_of(int file) {
+  termios2 settings{};
+  if (ioctl(file, TCGETS2, &settings) != 0) {
+    no_terminal("TCGETS2");
+  }
+  return settings;
+}
+
+/// One interface of the vendor's class.
+const Bytes one_interface = {9, 2, 18, 0, 1, 1, 0, 0x80, 50, 9, 4, 0, 0, 0, 0xff, 0, 0, 0};
 
 }  // namespace
 
-FakeSerialBoard::FakeSerialBoard(FakeUsb& usb, const std::string& serial, Ids ids, Union descriptor,
-                                 int address)
-    : device_(usb, address, /*port=*/address,
+FakePort::FakePort(FakeUsb& usb) : far_(posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC)) {
+  if (far_ < 0 || grantpt(far_) != 0 || unlockpt(far_) != 0) {
+    no_terminal("posix_openpt");
+  }
+  node_ = ptsname(far_);
+  usb.pass_on(node_);
+}
+
+FakePort::~FakePort() {
+  close(far_);
+  close(near_);
+}
+
+void FakePort::send(const Bytes& bytes) const {
+  std::size_t sent = 0;
+  ssize_t taken = 1;
+  while (sent < bytes.size() && taken > 0 && becomes_ready(far_, POLLOUT)) {
+    taken = write(far_, bytes.data() + sent, bytes.size() - sent);
+    sent += taken > 0 ? static_cast<std::size_t>(taken) : 0;
+  }
+}
+
+Bytes FakePort::received(std::size_t count) const {
+  Bytes bytes(count);
+  std::size_t filled = 0;
+  ssize_t taken = 1;
+  while (filled < count && taken > 0 && becomes_ready(far_, POLLIN)) {
+    taken = read(far_, bytes.data() + filled, count - filled);
+    filled += taken > 0 ? static_cast<std::size_t>(taken) : 0;
+  }
+  bytes.resize(filled);
+  return bytes;
+}
+
+void FakePort::watch() {
+  near_ = open(node_.c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC);
+  if (near_ < 0) {
+    no_terminal(node_.c_str());
+  }
+}
+
+int FakePort::unread() const {
+  int count = -1;
+  ioctl(near_, FIONREAD, &count);
+  return count;
+}
+
+unsigned FakePort::baud() const { return settings_of(far_).c_ospeed; }
+bool FakePort::two_stop_bits() const { return (settings_of(far_).c_cflag & CSTOPB) != 0; }
+
+FakeSerialBoard::FakeSerialBoard(FakeUsb& usb, const std::string& serial, Ids ids, int address,
+                                 bool has_driver)
+    : usb_(usb),
+      device_(usb, address, /*port=*/address,
               {.vendor = ids.vendor,
                .product = ids.product,
                .manufacturer = "Maker",
                .product_name = "Serial board",
                .serial = serial},
-              configuration(descriptor),
-              [this](const FakeUsbDevice::Setup& setup, const Bytes& data) {
-                return answer(setup, data);
-              }) {
-  if (descriptor != Union::alone) {
-    device_.bind_kernel_driver(control_interface);
-    device_.bind_kernel_driver(data_interface);
+              one_interface, [](const FakeUsbDevice::Setup&) { return std::nullopt; }),
+      number_(address) {
+  if (has_driver) {
+    show_port();
   }
 }
 
-std::optional<Bytes> FakeSerialBoard::line_coding() const {
-  const std::lock_guard lock(mutex_);
-  return line_coding_;
+FakeSerialBoard::~FakeSerialBoard() { unplug(); }
+
+void FakeSerialBoard::plug() {
+  device_.plug();
+  ++number_;
+  show_port();
 }
 
-std::optional<int> FakeSerialBoard::line_state() const {
-  const std::lock_guard lock(mutex_);
-  return line_state_;
+void FakeSerialBoard::unplug() {
+  if (port_) {
+    umockdev_testbed_remove_device(usb_.testbed(), ("/sys" + syspath()).c_str());
+    std::filesystem::remove(usb_.root() + node());
+    port_.reset();
+  }
+  device_.unplug();
 }
 
-std::optional<Bytes> FakeSerialBoard::answer(const FakeUsbDevice::Setup& setup, const Bytes& data) {
-  const std::lock_guard lock(mutex_);
-  if (setup.type != 0x21 || setup.index != control_interface) {
-    return std::nullopt;
-  }
-  if (setup.request == 0x20 && data.size() == 7) {
-    line_coding_ = data;
-    return Bytes{};
-  }
-  if (setup.request == 0x22) {
-    line_state_ = setup.value;
-    return Bytes{};
-  }
-  return std::nullopt;
+void FakeSerialBoard::show_port() {
+  tty_ = fmt::format("ttyUSB{}", number_);
+  port_.emplace(usb_);
+  std::filesystem::create_directories(usb_.root() + "/dev");
+  std::filesystem::create_symlink(port_->node(), usb_.root() + node());
+  usb_.pass_on(node());
+  usb_.add(fmt::format("P: {}\nE: SUBSYSTEM=tty\n", syspath()));
+}
+
+std::string FakeSerialBoard::syspath() const {
+  return fmt::format("{}/{}:1.0/tty/{}", device_.syspath(), device_.port(), tty_);
 }
 
 }  // namespace palpate

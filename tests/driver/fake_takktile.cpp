@@ -37,7 +37,7 @@ FakeTakktile::FakeTakktile(FakeUsb& usb, const std::string& serial,
                .product_name = "TakkTile USB",
                .serial = serial},
               configuration(),
-              [this](const FakeUsbDevice::Setup& setup, const Bytes&) { return answer(setup); }) {
+              [this](const FakeUsbDevice::Setup& setup) { return answer(setup); }) {
   alive_rows_.resize(8);
 }
 

@@ -16,6 +16,13 @@ namespace {
 
 constexpr const char* root_hub = "/devices/pci0000:00/usb1";
 
+/// Lets the kernel answer.
+gboolean leave(UMockdevIoctlBase*, UMockdevIoctlClient* client, gpointer) {
+  constexpr int unhandled = -100;  // UNHANDLED of umockdev's ioctl_tree.h
+  umockdev_ioctl_client_complete(client, unhandled, 0);
+  return TRUE;
+}
+
 std::string hex(const Bytes& bytes) {
   std::string text;
   for (const std::uint8_t byte : bytes) {
@@ -48,33 +55,47 @@ Bytes device_descriptor(std::uint16_t vendor, std::uint16_t product, std::uint8_
           1};
 }
 
-void add(UMockdevTestbed* testbed, const std::string& description) {
-  GError* error = nullptr;
-  if (!umockdev_testbed_add_from_string(testbed, description.c_str(), &error)) {
-    throw std::runtime_error(error->message);
-  }
-}
-
 std::string usb_device_text(const std::string& path, int address, const Bytes& descriptors) {
   return fmt::format(
       "P: {0}\nN: bus/usb/001/{1:03}\nE: SUBSYSTEM=usb\nE: DRIVER=usb\nE: DEVTYPE=usb_device\n"
       "E: BUSNUM=001\nE: DEVNUM={1:03}\nE: DEVNAME=/dev/bus/usb/001/{1:03}\n"
       "A: bConfigurationValue=1\\n\nA: busnum=1\\n\nA: devnum={1}\\n\nA: speed=12\\n\n"
-      "H: descriptors={2}\n",
-      path, address, hex(descriptors));
+      "A: idVendor={2:04x}\\n\nA: idProduct={3:04x}\\n\nA: bDeviceClass={4:02x}\\n\n"
+      "H: descriptors={5}\n",
+      path, address, descriptors[8] | descriptors[9] << 8, descriptors[10] | descriptors[11] << 8,
+      descriptors[4], hex(descriptors));
 }
 
 }  // namespace
 
-FakeUsb::FakeUsb() : testbed_(umockdev_testbed_new()) {
+FakeUsb::FakeUsb() : testbed_(umockdev_testbed_new()), kernel_(umockdev_ioctl_base_new()) {
+  g_signal_connect(kernel_, "handle-ioctl", G_CALLBACK(leave), nullptr);
   Bytes hub = device_descriptor(0x1d6b, 0x0002, /*device_class=*/9, /*has_serial=*/false);
   hub.insert(hub.end(), {9, 2, 25, 0, 1, 1, 0, 0xe0, 0});  // configuration of one interface
   hub.insert(hub.end(), {9, 4, 0, 0, 1, 9, 0, 0, 0});
   hub.insert(hub.end(), {7, 5, 0x81, 3, 4, 0, 12});
-  add(testbed_, usb_device_text(root_hub, 1, hub));
+  add(usb_device_text(root_hub, 1, hub));
 }
 
-FakeUsb::~FakeUsb() { g_object_unref(testbed_); }
+void FakeUsb::add(const std::string& description) {
+  GError* error = nullptr;
+  if (!umockdev_testbed_add_from_string(testbed_, description.c_str(), &error)) {
+    throw std::runtime_error(error->message);
+  }
+}
+
+void FakeUsb::pass_on(const std::string& node) {
+  umockdev_testbed_detach_ioctl(testbed_, node.c_str(), nullptr);
+  GError* error = nullptr;
+  if (!umockdev_testbed_attach_ioctl(testbed_, node.c_str(), kernel_, &error)) {
+    throw std::runtime_error(error->message);
+  }
+}
+
+FakeUsb::~FakeUsb() {
+  g_object_unref(testbed_);
+  g_object_unref(kernel_);
+}
 
 std::string FakeUsb::root() const {
   char* text = umockdev_testbed_get_root_dir(testbed_);
@@ -134,10 +155,10 @@ void FakeUsbDevice::plug(int by) {
   if (!umockdev_testbed_attach_ioctl(usb_.testbed(), node().c_str(), last().handler, &error)) {
     throw std::runtime_error(error->message);
   }
-  add(usb_.testbed(), text);
+  usb_.add(text);
   for (int interface = 0; interface < configuration_.at(4); ++interface) {
-    add(usb_.testbed(), fmt::format("P: {}/{}:1.{}\nE: SUBSYSTEM=usb\nE: DEVTYPE=usb_interface\n",
-                                    syspath(), port(), interface));
+    usb_.add(fmt::format("P: {}/{}:1.{}\nE: SUBSYSTEM=usb\nE: DEVTYPE=usb_interface\n", syspath(),
+                         port(), interface));
   }
 }
 
@@ -230,11 +251,6 @@ void FakeUsbDevice::forbid() {
   chmod((usb_.root() + node()).c_str(), is_root ? S_IRUSR | S_IWUSR : 0);
 }
 
-void FakeUsbDevice::bind_kernel_driver(int interface) {
-  const std::lock_guard lock(mutex_);
-  kernel_bound_.insert(interface);
-}
-
 std::vector<FakeUsbDevice::Setup> FakeUsbDevice::requests() const {
   const std::lock_guard lock(mutex_);
   return requests_;
@@ -253,16 +269,6 @@ int FakeUsbDevice::urbs_under_way() const {
 bool FakeUsbDevice::claimed(int interface) const {
   const std::lock_guard lock(mutex_);
   return last().claimed.contains(interface);
-}
-
-bool FakeUsbDevice::has_kernel_driver(int interface) const {
-  const std::lock_guard lock(mutex_);
-  return kernel_bound_.contains(interface) && !last().claimed.contains(interface);
-}
-
-Bytes FakeUsbDevice::received() const {
-  const std::lock_guard lock(mutex_);
-  return received_;
 }
 
 std::size_t FakeUsbDevice::waiting_packets() const {

@@ -12,7 +12,6 @@
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -30,10 +29,15 @@ class FakeUsb {
   FakeUsb& operator=(const FakeUsb&) = delete;
 
   UMockdevTestbed* testbed() const { return testbed_; }
+  /// Adds a device by its description, as umockdev-record writes it.
+  void add(const std::string& description);
+  /// Lets the kernel answer the ioctls of this device file, instead of umockdev.
+  void pass_on(const std::string& node);
   std::string root() const;
 
  private:
   UMockdevTestbed* testbed_;
+  UMockdevIoctlBase* kernel_;  // leaves every ioctl to the kernel
 };
 
 /// A USB device that answers libusb's ioctls as Linux's usbfs and the hardware would. Its firmware
@@ -55,9 +59,9 @@ class FakeUsbDevice {
     std::uint16_t value = 0;
     std::uint16_t index = 0;
   };
-  /// Answers a control request, from the thread that plays the kernel: with bytes for the host,
-  /// with no bytes to a request that brings `data`, or with nullopt for a stall.
-  using Firmware = std::function<std::optional<Bytes>(const Setup& setup, const Bytes& data)>;
+  /// Answers a control request, from the thread that plays the kernel: with bytes for the host, or
+  /// with nullopt for a stall.
+  using Firmware = std::function<std::optional<Bytes>(const Setup& setup)>;
   /// How a packet's turn on the bus ends, as the kernel reports it in the status of a URB.
   enum class Fault { none, stall, overflow, protocol };
 
@@ -89,21 +93,18 @@ class FakeUsbDevice {
   void forbid();
   /// Lets another program hold the interfaces.
   void occupy(bool occupied);
-  /// Lets a kernel driver hold the interface while no program claims it.
-  void bind_kernel_driver(int interface);
 
   // What the host did.
   std::vector<Setup> requests() const;
   int halts_cleared() const;
   int urbs_under_way() const;
   bool claimed(int interface) const;
-  bool has_kernel_driver(int interface) const;
-  Bytes received() const;  ///< through the bulk endpoint from the host
   /// Number of packets that the host has not fetched yet.
   std::size_t waiting_packets() const;
 
   std::string node() const;
   std::string port() const;
+  std::string syspath() const;
   const Identity& identity() const { return identity_; }
 
  private:
@@ -150,7 +151,6 @@ class FakeUsbDevice {
   void run_control(Urb& urb);
   void run_bulk(Attachment& attachment);
   Attachment& last() const { return *attachments_.back(); }
-  std::string syspath() const;
   void show_driver(int interface, const std::string& driver);
 
   FakeUsb& usb_;
@@ -166,11 +166,9 @@ class FakeUsbDevice {
   bool refusing_ = false;
   bool ignoring_ = false;
   bool occupied_ = false;
-  std::set<int> kernel_bound_;
   std::deque<Turn> turns_;
   std::vector<Setup> requests_;
   int halts_cleared_ = 0;
-  Bytes received_;
 };
 
 }  // namespace palpate

@@ -99,10 +99,6 @@ int FakeUsbDevice::submit(UMockdevIoctlData* argument, Attachment& attachment) {
   if (urb.fields().type == USBDEVFS_URB_TYPE_CONTROL) {
     run_control(urb);
     (ignoring_ ? attachment.under_way : attachment.finished).push_back(std::move(urb));
-  } else if ((urb.fields().endpoint & 0x80) == 0) {
-    received_.insert(received_.end(), urb.buffer->data, urb.buffer->data + length);
-    urb.filled = length;
-    attachment.finished.push_back(std::move(urb));
   } else {
     attachment.under_way.push_back(std::move(urb));
   }
@@ -117,19 +113,14 @@ void FakeUsbDevice::run_control(Urb& urb) {
   const Setup setup{.type = bytes[0], .request = bytes[1], .value = word(2), .index = word(4)};
   constexpr std::size_t setup_bytes = 8;
   const std::size_t room = word(6);
-  const bool towards_host = (setup.type & 0x80) != 0;
   requests_.push_back(setup);
-  const Bytes data =
-      towards_host ? Bytes{} : Bytes(bytes + setup_bytes, bytes + setup_bytes + room);
-  const std::optional<Bytes> reply = refusing_ || ignoring_ ? std::nullopt : firmware_(setup, data);
+  const std::optional<Bytes> reply = refusing_ || ignoring_ ? std::nullopt : firmware_(setup);
   if (!reply) {
     urb.status = -EPIPE;
     return;
   }
-  urb.filled = towards_host ? std::min(room, reply->size()) : room;
-  if (towards_host) {
-    std::memcpy(urb.buffer->data + setup_bytes, reply->data(), urb.filled);
-  }
+  urb.filled = std::min(room, reply->size());
+  std::memcpy(urb.buffer->data + setup_bytes, reply->data(), urb.filled);
 }
 
 int FakeUsbDevice::discard(UMockdevIoctlData* argument, Attachment& attachment) {

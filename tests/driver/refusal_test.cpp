@@ -1,5 +1,4 @@
 #include <fcntl.h>
-#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -9,7 +8,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "fake_serial_board.hpp"
 #include "fake_takktile.hpp"
+#include "ordinary_user.hpp"
 #include "palpate/driver.hpp"
 #include "palpate/error.hpp"
 
@@ -33,30 +34,6 @@ class Refusal : public testing::Test {
   }
 
   FakeUsb usb_;
-};
-
-/// Makes the process an ordinary user's while it lives, if the test is run by root.
-class OrdinaryUser {
- public:
-  explicit OrdinaryUser(const FakeUsb& usb) : was_root_(geteuid() == 0) {
-    if (was_root_) {
-      // umockdev's library makes and uses sockets there.
-      chmod(usb.root().c_str(), 0777);
-      chmod((usb.root() + "/ioctl/_default").c_str(), 0777);
-      constexpr uid_t nobody = 65534;
-      EXPECT_EQ(seteuid(nobody), 0);
-    }
-  }
-  ~OrdinaryUser() {
-    if (was_root_) {
-      EXPECT_EQ(seteuid(0), 0);
-    }
-  }
-  OrdinaryUser(const OrdinaryUser&) = delete;
-  OrdinaryUser& operator=(const OrdinaryUser&) = delete;
-
- private:
-  bool was_root_;
 };
 
 TEST_F(Refusal, MissingPermissionNamesTheRuleAndHowToInstallIt) {
@@ -125,6 +102,14 @@ TEST_F(Refusal, ABoardInUseNamesWhoHasIt) {
       << "whose files may not be ours to see";
   board.usb().occupy(false);
   EXPECT_EQ(refusal("takktile", Fault::system), "");
+}
+
+TEST_F(Refusal, TheListNamesWhoHasASerialBoard) {
+  const FakeSerialBoard board(usb_, "1", {});
+  const OtherProgram other(board.node());
+  const BoardInfo info = list_boards().at(0);
+  EXPECT_FALSE(info.usable);
+  EXPECT_THAT(info.reason, HasSubstr(fmt::format("usb_tests (process {})", other.id())));
 }
 
 TEST_F(Refusal, ABoardThatIsNotThereIsTheUsersMistake) {

@@ -6,11 +6,9 @@
 #include <gtest/gtest.h>
 
 #include "driver/transfer_ring.hpp"
-#include "fake_serial_board.hpp"
 #include "fake_takktile.hpp"
 #include "palpate/driver.hpp"
 #include "palpate/error.hpp"
-#include "parsing/sent_frame.hpp"
 #include "streamed.hpp"
 
 namespace palpate::restart_test {
@@ -195,42 +193,5 @@ TEST_F(Restart, StopsABoardThatIsGone) {
   sensor.reset();
   EXPECT_FALSE(board.usb().claimed(0));
 }
-
-class SerialRestart : public testing::TestWithParam<FakeSerialBoard::Union> {};
-
-// start() sends nothing to a FlexiTac without control interface: only the transfers can show that
-// it is a new device.
-TEST_P(SerialRestart, FindsABoardThatWasPluggedInAgain) {
-  FakeUsb usb;
-  FakeSerialBoard board(usb, "A1", {}, GetParam());
-  std::mt19937 random(20260722);
-  for (const std::string name : {"tsf85", "flexitac"}) {
-    const auto sensor = open_board(name + ":A1");
-    board.usb().unplug();
-    EXPECT_THAT(refusal(*sensor), HasSubstr("not plugged in"));
-    board.usb().plug();
-    for (int i = 0; i < 3; ++i) {
-      ASSERT_EQ(refusal(*sensor), "");
-      const SentFrame sent = random_frame(name, random);
-      board.usb().send_message(sent.bytes);
-      const std::vector<Frame> frames = take(*sensor, 1);
-      ASSERT_EQ(frames.size(), 1U);
-      EXPECT_EQ(frames[0].values, sent.values);
-      EXPECT_EQ(sensor->counters().reconnects, 0U);
-      sensor->stop();
-      board.usb().unplug();
-      board.usb().plug(i);
-    }
-  }
-}
-
-INSTANTIATE_TEST_SUITE_P(Descriptors, SerialRestart,
-                         testing::Values(FakeSerialBoard::Union::present,
-                                         FakeSerialBoard::Union::alone),
-                         [](const auto& descriptor) {
-                           return descriptor.param == FakeSerialBoard::Union::alone
-                                      ? "DataInterfaceAlone"
-                                      : "WithControlInterface";
-                         });
 
 }  // namespace palpate::restart_test

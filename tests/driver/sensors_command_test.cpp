@@ -1,10 +1,14 @@
 #include <cstdlib>
+#include <future>
+#include <random>
+#include <regex>
 
 #include <gmock/gmock.h>
 
 #include "cli/program.hpp"
 #include "fake_serial_board.hpp"
 #include "fake_takktile.hpp"
+#include "parsing/sent_frame.hpp"
 
 namespace palpate::sensors_command_test {
 
@@ -28,16 +32,16 @@ TEST_F(SensorsCommand, SaysThatNothingIsPluggedIn) {
 
 TEST_F(SensorsCommand, TellsBoardsFromOtherDevices) {
   FakeTakktile takktile(usb_, "0012", {0b11111, 0b111});
-  FakeSerialBoard tsf85(usb_, "", {}, FakeSerialBoard::Union::present, 3);
-  FakeSerialBoard other(usb_, "B2", {.vendor = 0x2341, .product = 0x8036},
-                        FakeSerialBoard::Union::present, 4);
+  const FakeSerialBoard tsf85(usb_, "", {}, 3);
+  const FakeSerialBoard other(usb_, "B2", {.vendor = 0x2341, .product = 0x8036}, 4);
   const json boards = json::parse(done({"sensors", "--json"}));
   ASSERT_EQ(boards.size(), 3U);
   EXPECT_EQ(boards[0], json::parse(R"({
     "name": "takktile:0012", "bus": 1, "address": 2, "vendor": "59e3", "product": "74c7",
     "manufacturer": "TakkTile LLC", "product_name": "TakkTile USB", "serial": "0012",
-    "elements": 8, "rate_hz": 0.0, "pressure_unit": "kPa", "usable": true, "reason": ""})"));
+    "serial_port": "", "elements": 8, "rate_hz": 0.0, "pressure_unit": "kPa", "usable": true, "reason": ""})"));
   EXPECT_EQ(boards[1]["name"], "tsf85:1-3") << "no serial number: named by its port";
+  EXPECT_EQ(boards[1]["serial_port"], tsf85.node());
   EXPECT_EQ(boards[1]["elements"], 56);
   EXPECT_EQ(boards[2]["usable"], false);
   EXPECT_EQ(boards[2]["name"], "");
@@ -47,11 +51,33 @@ TEST_F(SensorsCommand, TellsBoardsFromOtherDevices) {
                               "     bus 1, address 2, serial 0012\n"
                               "     8 elements, kPa, rate not known\n"));
   EXPECT_THAT(text, HasSubstr("* 16d0:14cc  tsf85:1-3\n"
-                              "     bus 1, address 3, serial none\n"
+                              "     bus 1, address 3, serial none, /dev/ttyUSB3\n"
                               "     56 elements, raw, 100 frames/s\n"));
   EXPECT_THAT(text, HasSubstr("  2341:8036  Maker Serial board\n"
-                              "     bus 1, address 4, serial B2\n"
+                              "     bus 1, address 4, serial B2, /dev/ttyUSB4\n"
                               "     not known: "));
+}
+
+TEST_F(SensorsCommand, RecordsASerialBoardUntilItIsUnplugged) {
+  FakeSerialBoard board(usb_, "A1", {});
+  auto recording = std::async(std::launch::async, [&] {
+    return palpate({"record", "--sensor", "tsf85", "--tare", "0", "-o", "frames.h5"});
+  });
+  EXPECT_EQ(board.port().received(5).size(), 5U) << "the command to start";
+  // More than the kernel keeps for the program, so that most frames have come before the end.
+  constexpr int sent = 2000;
+  std::mt19937 random(1);
+  for (int i = 0; i < sent; ++i) {
+    board.port().send(random_frame("tsf85", random).bytes);
+  }
+  board.unplug();
+  const Outcome outcome = recording.get();
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("/dev/ttyUSB2: hung up: the board was unplugged"));
+  const std::string info = done({"info", "frames.h5", "--close"});
+  std::smatch frames;
+  ASSERT_TRUE(std::regex_search(info, frames, std::regex("frames +([0-9]+)\\n"))) << info;
+  EXPECT_GT(std::stoi(frames[1]), sent / 4) << "what came is kept";
 }
 
 TEST_F(SensorsCommand, SaysWhyABoardCannotBeUsed) {

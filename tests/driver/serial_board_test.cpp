@@ -1,3 +1,5 @@
+#include <sys/stat.h>
+
 #include <algorithm>
 #include <fstream>
 #include <iterator>
@@ -7,9 +9,9 @@
 #include <gtest/gtest.h>
 
 #include "driver/data_folder.hpp"
-#include "driver/usb_device.hpp"
 #include "fake_serial_board.hpp"
 #include "io/scratch_folder.hpp"
+#include "ordinary_user.hpp"
 #include "palpate/driver.hpp"
 #include "palpate/error.hpp"
 #include "parsing/sent_frame.hpp"
@@ -20,12 +22,23 @@ namespace palpate::serial_board_test {
 using testing::AllOf;
 using testing::HasSubstr;
 
-// A USB id that no profile lists.
-constexpr FakeSerialBoard::Ids some_controller{.vendor = 0x2341, .product = 0x8036};
-constexpr int data_interface = 3;
+// A USB id that no profile lists: that of a CH340.
+constexpr FakeSerialBoard::Ids some_chip{.vendor = 0x1a86, .product = 0x7523};
 
 const Bytes tsf85_start = {0x9a, 0x00, 0x58, 0x01, 0x0a};
 const Bytes tsf85_stop = {0x9a, 0x00, 0x58, 0x01, 0x00};
+
+/// The message of the error; "" where there is none.
+template <class Action>
+std::string refusal(Fault fault, const Action& action) {
+  try {
+    action();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.fault(), fault) << error.what();
+    return error.what();
+  }
+  return "";
+}
 
 class SerialBoards : public testing::Test {
  protected:
@@ -49,175 +62,243 @@ class SerialBoards : public testing::Test {
   std::mt19937 random_{20260721};
 };
 
-TEST_F(SerialBoards, AreListedByTheirIds) {
-  FakeSerialBoard known(usb_, "A1", {});
-  FakeSerialBoard unknown(usb_, "B2", some_controller, FakeSerialBoard::Union::present, 3);
+TEST_F(SerialBoards, AreListedByTheirIdsAndNotOpened) {
+  const FakeSerialBoard known(usb_, "A1", {});
+  const FakeSerialBoard unknown(usb_, "B2", some_chip, 3);
+  const FakeSerialBoard without_driver(usb_, "", {}, 4, /*has_driver=*/false);
+  const unsigned baud_before = known.port().baud();
   const std::vector<BoardInfo> boards = list_boards();
-  ASSERT_EQ(boards.size(), 2U);
+  ASSERT_EQ(boards.size(), 3U);
   EXPECT_EQ(boards[0].name, "tsf85:A1");
+  EXPECT_EQ(boards[0].serial_port, known.node());
   EXPECT_EQ(boards[0].elements, 56U);
   EXPECT_EQ(boards[0].rate_hz, 100.0);
   EXPECT_EQ(boards[0].pressure_unit, "raw");
   EXPECT_TRUE(boards[0].usable) << boards[0].reason;
-  EXPECT_TRUE(known.usb().has_kernel_driver(data_interface)) << "looking disturbs nobody";
+  EXPECT_EQ(known.port().baud(), baud_before) << "opening it could restart the board";
   EXPECT_EQ(boards[1].name, "");
   EXPECT_EQ(boards[1].serial, "B2");
   EXPECT_FALSE(boards[1].usable);
+  EXPECT_THAT(boards[1].reason, HasSubstr("PROFILE:/dev/ttyUSB3"));
+  EXPECT_EQ(boards[2].name, "tsf85:1-4") << "no serial number: named by its port";
+  EXPECT_FALSE(boards[2].usable);
+  EXPECT_THAT(boards[2].reason, HasSubstr("modprobe"));
 }
 
 TEST_F(SerialBoards, SetTheLineAndSayStartAndStop) {
-  FakeSerialBoard board(usb_, "A1", {});
-  {
-    const auto sensor = open_board("tsf85");
-    EXPECT_FALSE(board.usb().has_kernel_driver(data_interface));
-    EXPECT_EQ(board.usb().received(), Bytes{});
-    sensor->start();
-    EXPECT_EQ(board.line_coding(), (Bytes{0x00, 0xc2, 0x01, 0x00, 0, 0, 8})) << "115200 8N1";
-    EXPECT_EQ(board.line_state(), 3);
-    EXPECT_EQ(board.usb().received(), tsf85_start);
-    sensor->stop();
-    EXPECT_EQ(board.line_state(), 0);
-    Bytes both = tsf85_start;
-    both.insert(both.end(), tsf85_stop.begin(), tsf85_stop.end());
-    EXPECT_EQ(board.usb().received(), both);
-  }
-  EXPECT_TRUE(board.usb().has_kernel_driver(data_interface)) << "given back";
-}
-
-TEST_F(SerialBoards, FindTheControlInterfaceWithoutAUnionDescriptor) {
-  FakeSerialBoard board(usb_, "A1", {}, FakeSerialBoard::Union::missing);
+  const FakeSerialBoard board(usb_, "A1", {});
   const auto sensor = open_board("tsf85");
+  EXPECT_EQ(sensor->description().serial, "A1");
+  EXPECT_EQ(board.port().baud(), 115200U);
+  EXPECT_FALSE(board.port().two_stop_bits());
+  for (int i = 0; i < 2; ++i) {
+    sensor->start();
+    EXPECT_EQ(board.port().received(tsf85_start.size()), tsf85_start);
+    sensor->stop();
+    EXPECT_EQ(board.port().received(tsf85_stop.size()), tsf85_stop);
+  }
+}
+
+TEST_F(SerialBoards, TakeEveryBaudRate) {
+  ScratchFolder folder;
+  const FakePort port(usb_);
+  const std::string path = folder.path() / "mine.yaml";
+  for (const unsigned baud : {9600U, 250000U, 2000000U, 12345678U}) {
+    std::ofstream(path)
+        << "{name: Mine, line: {baud: " << baud
+        << ", stop_bits: 2}, elements: [[0, 0]], packet: [bytes: aa55, values: u8]}";
+    const auto sensor = open_board(path + ":" + port.node());
+    EXPECT_EQ(port.baud(), baud);
+    EXPECT_TRUE(port.two_stop_bits());
+  }
+}
+
+TEST_F(SerialBoards, PassEveryByteOnAsItIs) {
+  ScratchFolder folder;
+  const FakePort port(usb_);
+  const std::string path = folder.path() / "mine.yaml";
+  std::ofstream(path) << "{name: Mine, elements: [{grid: [256, 1], pitch_mm: [1, 1]}],"
+                         " packet: [bytes: aa55aa55aa55, values: u8]}";
+  const auto sensor = open_board(path + ":" + port.node());
   sensor->start();
-  EXPECT_EQ(board.line_state(), 3);
+  Bytes packet = {0xaa, 0x55, 0xaa, 0x55, 0xaa, 0x55};
+  std::vector<double> values(256);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    packet.push_back(static_cast<std::uint8_t>(i));
+    values[i] = static_cast<double>(i);
+  }
+  port.send(packet);
+  port.send(packet);  // a marker counts once another marker follows one packet later
+  const std::vector<Frame> frames = take(*sensor, 1);
+  ASSERT_EQ(frames.size(), 1U);
+  EXPECT_EQ(frames[0].values, values);
 }
 
-TEST_F(SerialBoards, HavePacketsOfTheBitsThatCount) {
-  FakeSerialBoard board(usb_, "A1", {});
-  const UsbContext context;
-  const BulkInterface data = find_interface(usb_devices(context).at(0), LIBUSB_CLASS_DATA);
-  EXPECT_EQ(data.number, data_interface);
-  EXPECT_EQ(data.in_endpoint, 0x83);
-  EXPECT_EQ(data.out_endpoint, 0x03);
-  EXPECT_EQ(data.packet_bytes, 64U);
-}
-
-TEST_F(SerialBoards, StreamWhereverPacketsCutTheFrames) {
-  FakeSerialBoard board(usb_, "A1", {});
+TEST_F(SerialBoards, StreamWhereverReadsCutTheFrames) {
+  const FakeSerialBoard board(usb_, "A1", {});
   const auto sensor = open_board("tsf85");
   sensor->start();
   const std::vector<SentFrame> sent = frames_of("tsf85", 200);
   std::thread firmware([&] {
     std::mt19937 cuts(1);
-    Bytes waiting;
-    at_rate(1000.0, static_cast<int>(sent.size()), [&](int i) {
-      const Bytes& bytes = sent[static_cast<std::size_t>(i)].bytes;
-      waiting.insert(waiting.end(), bytes.begin(), bytes.end());
-      const bool last = i + 1 == static_cast<int>(sent.size());
-      while (!waiting.empty()) {
-        const std::size_t packet = std::min<std::size_t>(waiting.size(), 1 + cuts() % 64);
-        if (packet == waiting.size() && !last) {
-          break;  // the next frame brings the rest
-        }
-        const auto end = waiting.begin() + static_cast<std::ptrdiff_t>(packet);
-        board.usb().send_packet(Bytes(waiting.begin(), end));
-        waiting.erase(waiting.begin(), end);
-      }
-    });
+    const Bytes bytes = stream_of(sent);
+    for (auto at = bytes.begin(); at != bytes.end();) {
+      const auto piece = std::min<std::ptrdiff_t>(bytes.end() - at, 1 + cuts() % 200);
+      board.port().send(Bytes(at, at + piece));
+      at += piece;
+    }
   });
   expect_values(*sensor, sent);
   firmware.join();
   sensor->stop();
   EXPECT_EQ(sensor->counters().frames, sent.size());
+  EXPECT_EQ(sensor->counters().lost, 0U);
   EXPECT_EQ(sensor->counters().garbage_bytes, 0U);
 }
 
-TEST_F(SerialBoards, WithoutAnIdOfTheirOwnAreNamedBySerialOrPort) {
-  FakeSerialBoard board(usb_, "B2", some_controller);
-  try {
-    open_board("flexitac");
-    ADD_FAILURE() << "it could be any device";
-  } catch (const Error& error) {
-    EXPECT_EQ(error.fault(), Fault::input);
-    EXPECT_THAT(error.what(), AllOf(HasSubstr("flexitac"), HasSubstr("serial number or port")));
-  }
-  for (const std::string name : {"flexitac:B2", "flexitac:1-2"}) {
-    const auto sensor = open_board(name);
+TEST_F(SerialBoards, WithoutAnIdOfTheirOwnAreNamedBySerialPortOrPath) {
+  const FakeSerialBoard board(usb_, "B2", some_chip);
+  EXPECT_THAT(refusal(Fault::input, [] { open_board("flexitac"); }),
+              AllOf(HasSubstr("flexitac"), HasSubstr("serial number, port or device file")));
+  for (const std::string& which : {std::string("B2"), std::string("1-2"), board.node()}) {
+    const auto sensor = open_board("flexitac:" + which);
+    EXPECT_EQ(sensor->description().serial, "B2");
     sensor->start();
     const std::vector<SentFrame> sent = frames_of("flexitac", 50);
-    // Full packets: only the last frame's rest ends a transfer before the transfer is full.
-    board.usb().send_message(stream_of(sent));
+    board.port().send(stream_of(sent));
     // A marker counts once another marker follows one frame later, so that the last frame waits.
     const std::vector<SentFrame> more = frames_of("flexitac", 1);
-    board.usb().send_message(more[0].bytes);
+    board.port().send(more[0].bytes);
     expect_values(*sensor, sent);
   }
 }
 
+TEST_F(SerialBoards, AreToldApart) {
+  const FakeSerialBoard one(usb_, "A1", {});
+  const FakeSerialBoard other(usb_, "A1", {}, 3);
+  const FakeSerialBoard third(usb_, "A3", {}, 4);
+  EXPECT_THAT(refusal(Fault::input, [] { open_board("tsf85"); }),
+              HasSubstr("name one: tsf85:1-2, tsf85:1-3, tsf85:A3"));
+  open_board("tsf85:1-3")->start();
+  EXPECT_EQ(other.port().received(tsf85_start.size()), tsf85_start);
+  EXPECT_NE(refusal(Fault::input, [] { open_board("tsf85:A1"); }), "");
+}
+
+TEST_F(SerialBoards, WithTwoPortsAreNamedByTheirPaths) {
+  const FakeSerialBoard board(usb_, "A1", {});
+  usb_.add("P: /devices/pci0000:00/usb1/1-2/1-2:1.0/tty/ttyUSB7\nE: SUBSYSTEM=tty\n");
+  EXPECT_THAT(refusal(Fault::input, [] { open_board("tsf85:A1"); }),
+              HasSubstr("name one: tsf85:/dev/ttyUSB2, tsf85:/dev/ttyUSB7"));
+  open_board("tsf85:/dev/ttyUSB2")->start();
+  EXPECT_EQ(list_boards().at(0).name, "tsf85:/dev/ttyUSB2");
+}
+
 TEST_F(SerialBoards, CountWhatADamagedPacketCosts) {
-  FakeSerialBoard board(usb_, "B2", some_controller);
-  const auto sensor = open_board("wts:B2");
+  const FakePort port(usb_);
+  const auto sensor = open_board("wts:" + port.node());
   sensor->start();
   std::vector<SentFrame> sent = frames_of("wts", 3);
-  board.usb().send_message(sent[0].bytes);
+  port.send(sent[0].bytes);
+  std::vector<Frame> frames = take(*sensor, 1);
   Bytes damaged = sent[1].bytes;
   damaged[40] ^= 0x10;
-  board.usb().send_message(damaged);
-  board.usb().send_message(sent[2].bytes);
-  const std::vector<Frame> frames = take(*sensor, 2);
+  port.send(damaged);
+  port.send(sent[2].bytes);
+  std::ranges::move(take(*sensor, 1), std::back_inserter(frames));
   ASSERT_EQ(frames.size(), 2U);
   EXPECT_EQ(frames[0].values, sent[0].values);
   EXPECT_TRUE(frames[0].device_time_s.has_value());
+  EXPECT_GT(frames[0].host_time_s, 1.7e9) << "seconds since the Unix epoch";
+  EXPECT_EQ(frames[0].lost_before, 0U);
   EXPECT_EQ(frames[1].values, sent[2].values);
   EXPECT_EQ(frames[1].lost_before, 1U);
   sensor->stop();
   EXPECT_EQ(sensor->counters().checksum_errors, 1U);
   EXPECT_EQ(sensor->counters().lost, 1U);
+  sensor->start();
+  EXPECT_EQ(sensor->counters().checksum_errors, 0U);
 }
 
-TEST_F(SerialBoards, AreStartedAgainWhenTheyComeBack) {
-  FakeSerialBoard board(usb_, "A1", {});
-  const auto sensor = open_board("tsf85:A1");
-  sensor->start();
-  const std::vector<SentFrame> sent = frames_of("tsf85", 2);
-  // The plug is pulled within a frame.
-  board.usb().send_packet(Bytes(sent[0].bytes.begin(), sent[0].bytes.begin() + 30));
-  ASSERT_TRUE(becomes_true([&] { return board.usb().waiting_packets() == 0; }));
-  board.usb().unplug();
-  ASSERT_TRUE(becomes_true([&] { return sensor->gone(); }));
-  board.usb().plug();
-  ASSERT_TRUE(becomes_true([&] { return !sensor->gone(); }));
-  Bytes twice = tsf85_start;
-  twice.insert(twice.end(), tsf85_start.begin(), tsf85_start.end());
-  EXPECT_EQ(board.usb().received(), twice);
-  board.usb().send_message(sent[1].bytes);
-  expect_values(*sensor, {sent[1]});
+TEST_F(SerialBoards, ThatAreUnpluggedEndTheStreamUntilItIsStartedAgain) {
+  for (const std::string board_name : {"tsf85:A1", "flexitac:A1"}) {
+    FakeSerialBoard board(usb_, "A1", {});
+    const auto sensor = open_board(board_name);
+    const std::string kind = board_name.substr(0, board_name.find(':'));
+    sensor->start();
+    const auto drain = [&] {
+      while (sensor->next(patience)) {
+      }
+    };
+    for (int i = 0; i < 3; ++i) {
+      std::vector<SentFrame> sent = frames_of(kind, 3);
+      board.port().send(stream_of(sent));
+      sent.pop_back();  // which flexitac holds back
+      expect_values(*sensor, sent);
+      board.unplug();
+      for (int j = 0; j < 2; ++j) {
+        EXPECT_THAT(refusal(Fault::system, drain), HasSubstr("unplugged"));
+      }
+      EXPECT_THAT(refusal(Fault::input, [&] { sensor->start(); }), HasSubstr("not plugged in"));
+      sensor->stop();
+      board.plug();
+      sensor->start();
+      EXPECT_EQ(sensor->counters().frames, 0U);
+    }
+    sensor->stop();
+    board.unplug();
+    board.plug();
+    sensor->start();
+    std::vector<SentFrame> sent = frames_of(kind, 2);
+    board.port().send(stream_of(sent));
+    sent.pop_back();
+    expect_values(*sensor, sent);
+    board.unplug();
+    sensor->stop();
+  }
 }
 
-TEST_F(SerialBoards, ForgetHalfAFrameWhenTheyAreStartedAgain) {
-  FakeSerialBoard board(usb_, "A1", {});
-  const auto sensor = open_board("tsf85:A1");
-  const std::vector<SentFrame> sent = frames_of("tsf85", 2);
+TEST_F(SerialBoards, ForgetWhatCameBeforeTheyAreStarted) {
+  FakePort port(usb_);
+  port.watch();
+  const auto sensor = open_board("tsf85:" + port.node());
+  const std::vector<SentFrame> sent = frames_of("tsf85", 3);
+  port.send(sent[0].bytes);
+  const int waiting = static_cast<int>(sent[0].bytes.size());
+  ASSERT_TRUE(becomes_true([&] { return port.unread() == waiting; }));
   sensor->start();
-  board.usb().send_packet(Bytes(sent[0].bytes.begin(), sent[0].bytes.begin() + 30));
-  ASSERT_TRUE(becomes_true([&] { return board.usb().waiting_packets() == 0; }));
+  port.send(Bytes(sent[1].bytes.begin(), sent[1].bytes.begin() + 30));
+  ASSERT_TRUE(becomes_true([&] { return port.unread() == 0; }));
   sensor->start();
-  board.usb().send_message(sent[1].bytes);
-  expect_values(*sensor, {sent[1]});
+  port.send(sent[2].bytes);
+  expect_values(*sensor, {sent[2]});
   sensor->stop();
   EXPECT_EQ(sensor->counters().garbage_bytes, 0U);
 }
 
-TEST_F(SerialBoards, DoNotJoinWhatStandsOnBothSidesOfALoss) {
-  FakeSerialBoard board(usb_, "A1", {});
-  const auto sensor = open_board("tsf85:A1");
-  const std::vector<SentFrame> sent = frames_of("tsf85", 2);
+TEST_F(SerialBoards, AreOpenedByOneProgramAtATime) {
+  const FakePort port(usb_);
+  const std::string name = "tsf85:" + port.node();
+  const auto sensor = open_board(name);
+  EXPECT_THAT(refusal(Fault::system, [&] { open_board(name); }),
+              AllOf(HasSubstr(port.node()), HasSubstr("in use")));
   sensor->start();
-  board.usb().send_packet(Bytes(sent[0].bytes.begin(), sent[0].bytes.begin() + 30));
-  board.usb().send_fault(FakeUsbDevice::Fault::protocol);
-  board.usb().send_message(sent[1].bytes);
-  expect_values(*sensor, {sent[1]});
-  sensor->stop();
-  EXPECT_EQ(sensor->counters().lost, 1U);
+  EXPECT_EQ(port.received(tsf85_start.size()), tsf85_start) << "undisturbed";
+}
+
+TEST_F(SerialBoards, WithoutPermissionNameTheGroup) {
+  const FakePort port(usb_);
+  chmod(port.node().c_str(), 0);
+  const OrdinaryUser user(usb_);
+  EXPECT_THAT(refusal(Fault::system, [&] { open_board("tsf85:" + port.node()); }),
+              AllOf(HasSubstr(port.node()), HasSubstr("sudo usermod -aG ")));
+}
+
+TEST_F(SerialBoards, OfAnotherPathAreTheUsersMistake) {
+  EXPECT_THAT(refusal(Fault::input, [] { open_board("tsf85:/dev/ttyUSB99"); }),
+              AllOf(HasSubstr("/dev/ttyUSB99"), HasSubstr("not plugged in")));
+  EXPECT_THAT(refusal(Fault::input, [] { open_board("tsf85:/dev/zero"); }),
+              AllOf(HasSubstr("/dev/zero"), HasSubstr("no serial port")));
+  EXPECT_THAT(refusal(Fault::input, [] { open_board("tsf85:C3"); }), HasSubstr("not plugged in"));
 }
 
 TEST_F(SerialBoards, HaveProfilesOfTheUsersOwn) {
@@ -229,18 +310,20 @@ TEST_F(SerialBoards, HaveProfilesOfTheUsersOwn) {
     const std::string ids = "usb: [16d0:14cc, 04b4:f232]";
     const std::size_t at = text.find(ids);
     ASSERT_NE(at, std::string::npos);
-    std::ofstream(path) << text.replace(at, ids.size(), "usb: [2341:8036]");
+    std::ofstream(path) << text.replace(at, ids.size(), "usb: [1a86:7523]");
   }
-  FakeSerialBoard board(usb_, "B2", some_controller);
-  for (const std::string& name : {path, path + ":B2", path + ":1-2"}) {
+  const FakeSerialBoard other(usb_, "A1", {}, 3);
+  const FakeSerialBoard board(usb_, "B2", some_chip);
+  for (const std::string& name : {path, path + ":B2", path + ":1-2", path + ":" + board.node()}) {
     const auto sensor = open_board(name);
     EXPECT_EQ(sensor->description().elements_mm.size(), 56U);
     sensor->start();
     const std::vector<SentFrame> sent = frames_of("tsf85", 3);
-    board.usb().send_message(stream_of(sent));
+    board.port().send(stream_of(sent));
     expect_values(*sensor, sent);
   }
   EXPECT_THROW(open_board(path + ":C3"), Error);
+  EXPECT_THROW(open_board(path + ":A1"), Error) << "which is another kind of board";
 }
 
 }  // namespace palpate::serial_board_test

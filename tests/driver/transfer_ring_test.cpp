@@ -36,7 +36,7 @@ class Ring : public testing::Test {
   FakeUsb usb_;
   FakeTakktile board_{usb_, "1", {0b11111}};
   UsbContext context_;
-  UsbHandle handle_{usb_devices(context_).at(0)};
+  UsbHandle handle_{context_, usb_devices().at(0)};
   TransferRing::Counters counters_;
   std::optional<TransferRing> ring_;
 };

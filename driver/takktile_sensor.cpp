@@ -13,77 +13,17 @@
 
 #include <fmt/format.h>
 
-#include "driver/board.hpp"
 #include "driver/frame_queue.hpp"
+#include "driver/open_sensor.hpp"
+#include "driver/serial_profile.hpp"
+#include "driver/takktile_link.hpp"
 #include "driver/transfer_ring.hpp"
-#include "driver/usb_device.hpp"
-#include "palpate/driver.hpp"
 #include "palpate/error.hpp"
 #include "palpate/sensor.hpp"
 
 namespace palpate {
 
 namespace {
-
-/// An open board: its interfaces are claimed, its calibration is read. Between begin() and end()
-/// the link holds the board's stream.
-class BoardLink {
- public:
-  /// The references must outlive the link. @throws Error
-  BoardLink(const UsbContext& context, Board& board, UsbDevice device,
-            TransferRing::Counters& counters)
-      : context_(context),
-        board_(board),
-        counters_(counters),
-        handle_(std::move(device)),
-        source_(board.source(handle_.device())) {
-    for (const int interface : source_.interfaces) {
-      handle_.claim(interface);
-    }
-    description_ = board_.configure(handle_);
-    description_.serial = handle_.device().serial;
-  }
-
-  const SensorDescription& description() const { return description_; }
-
-  /// Starts the stream. @throws Error
-  void begin() {
-    board_.deframer().reset();
-    // The ring must be ready before the board sends.
-    ring_.emplace(context_, handle_, source_.endpoint, source_.transfer_bytes, counters_);
-    try {
-      board_.start(handle_);
-    } catch (...) {
-      ring_.reset();
-      throw;
-    }
-  }
-
-  /// Ends the stream and frees the ring. Returns the transfers not yet taken from the ring.
-  std::vector<TransferRing::Completion> end() {
-    try {
-      board_.stop(handle_);
-    } catch (const Error&) {
-      // The board may be unplugged; the transfers and interfaces are released either way.
-    }
-    ring_->drain();
-    std::vector<TransferRing::Completion> last = ring_->completed();
-    ring_.reset();
-    return last;
-  }
-
-  /// The ring of the running stream.
-  TransferRing& ring() { return *ring_; }
-
- private:
-  const UsbContext& context_;
-  Board& board_;
-  TransferRing::Counters& counters_;
-  UsbHandle handle_;
-  StreamSource source_;
-  SensorDescription description_;
-  std::optional<TransferRing> ring_;
-};
 
 using std::chrono::duration_cast;
 using std::chrono::microseconds;
@@ -113,27 +53,29 @@ int on_arrival(libusb_context*, libusb_device*, libusb_hotplug_event, void* arri
   return 0;  // stay registered
 }
 
-/// A sensor that streams from a USB board, also after the board was unplugged and plugged in again.
+std::vector<Device> boards() { return with_id(usb_devices(), {takktile::usb_id}); }
+
+/// A sensor that streams from a TakkTile, also after it was unplugged and plugged in again.
 ///
 /// Between start() and stop(), a thread of the sensor's own uses the device: it handles libusb's
 /// events, decodes transfers, ends stalls and waits for an unplugged board. It passes frames to
 /// next() through a queue.
-class UsbSensor final : public Sensor {
+class TakktileSensor final : public Sensor {
  public:
   /// @param which serial number or port of the board; "" if only one is plugged in. @throws Error
-  UsbSensor(std::unique_ptr<Board> board, const std::string& which) : board_(std::move(board)) {
-    const std::vector<UsbDevice> devices = usb_devices(context_);
-    const UsbDevice device = choose_device(devices, *board_, which);
-    which_ = distinction(*board_, device, devices);
-    link_ = std::make_unique<BoardLink>(context_, *board_, device, transfer_counters_);
+  explicit TakktileSensor(const std::string& which) {
+    const std::vector<Device> listed = boards();
+    const Device device = choose_device(listed, takktile_kind, which);
+    which_ = distinction(device, listed);
+    link_ = std::make_unique<takktile::Link>(context_, device, transfer_counters_);
     description_ = link_->description();
     watch_arrivals();
   }
 
-  ~UsbSensor() override { stop(); }
+  ~TakktileSensor() override { stop(); }
 
-  UsbSensor(const UsbSensor&) = delete;
-  UsbSensor& operator=(const UsbSensor&) = delete;
+  TakktileSensor(const TakktileSensor&) = delete;
+  TakktileSensor& operator=(const TakktileSensor&) = delete;
 
   const SensorDescription& description() const override { return description_; }
 
@@ -264,8 +206,8 @@ class UsbSensor final : public Sensor {
   }
 
   void reconnect() {
-    const UsbDevice device = choose_device(usb_devices(context_), *board_, which_);
-    auto link = std::make_unique<BoardLink>(context_, *board_, device, transfer_counters_);
+    const Device device = choose_device(boards(), takktile_kind, which_);
+    auto link = std::make_unique<takktile::Link>(context_, device, transfer_counters_);
     const std::size_t elements = link->description().elements_mm.size();
     if (link->description().elements_mm != description_.elements_mm) {
       throw OtherElements(
@@ -279,7 +221,7 @@ class UsbSensor final : public Sensor {
   }
 
   void deliver(const std::vector<TransferRing::Completion>& completions) {
-    Deframer& deframer = board_->deframer();
+    Deframer& deframer = link_->deframer();
     for (const TransferRing::Completion& completion : completions) {
       if (completion.missing > 0) {
         // A lower bound: each missing transfer held at least part of a frame.
@@ -287,11 +229,10 @@ class UsbSensor final : public Sensor {
         lost_before_next_ += completion.missing;
         tally_.lost += completion.missing;
       }
-      const DeframerCounters before = deframer.counters();
+      const std::uint64_t garbage_before = deframer.counters().garbage_bytes;
       parsed_.clear();
-      const std::uint64_t spoiled = board_->parse(completion, parsed_);
-      tally_.checksum_errors += deframer.counters().checksum_errors - before.checksum_errors;
-      tally_.garbage_bytes += deframer.counters().garbage_bytes - before.garbage_bytes;
+      const std::uint64_t spoiled = link_->parse(completion, parsed_);
+      tally_.garbage_bytes += deframer.counters().garbage_bytes - garbage_before;
       tally_.lost += spoiled;
       lost_before_next_ += spoiled;
       for (ParsedFrame& frame : parsed_) {
@@ -313,14 +254,13 @@ class UsbSensor final : public Sensor {
   }
 
   UsbContext context_;
-  std::unique_ptr<Board> board_;
   std::string which_;  // serial number or port, by which a board that comes back is known
   std::atomic<bool> arrived_ = false;  // a device was plugged in
 
   // Between start() and stop(), only the sensor's thread uses these.
   TransferRing::Counters transfer_counters_;
   SensorCounters tally_;
-  std::unique_ptr<BoardLink> link_;  // none while the board is gone
+  std::unique_ptr<takktile::Link> link_;  // none while the board is gone
   std::vector<ParsedFrame> parsed_;
   std::uint64_t lost_before_next_ = 0;
   std::chrono::milliseconds back_off_ = {};
@@ -336,9 +276,8 @@ class UsbSensor final : public Sensor {
 
 }  // namespace
 
-std::unique_ptr<Sensor> open_board(const std::string& name) {
-  const BoardName parsed = parse_board_name(name);
-  return std::make_unique<UsbSensor>(make_board(parsed.kind), parsed.which);
+std::unique_ptr<Sensor> open_takktile(const std::string& which) {
+  return std::make_unique<TakktileSensor>(which);
 }
 
 }  // namespace palpate
