@@ -67,9 +67,9 @@ Scales scales_of_maps(const RecognitionTask& task, std::optional<double> near_mm
     const auto& source = hypothesis.map.source;
     if (source && source->left_out) {
       fits.push_back(*source->left_out);
-      const Touch touch = source->touches.touch(0);
-      if (const auto spacing = spacing_of(touch.elements_mm)) {
-        array = {static_cast<double>(touch.elements_mm.size()), spacing->nearest_mm.most};
+      const std::size_t elements = source->touches.elements();
+      if (const auto spacing = spacing_of(std::span(source->touches.elements_mm).first(elements))) {
+        array = {static_cast<double>(elements), spacing->nearest_mm.most};
       }
     }
     if (source && source->pose_scale) {
