@@ -12,6 +12,7 @@
 #include "cli/recognition_flags.hpp"
 #include "cli/sensor_option.hpp"
 #include "io/recording_rules.hpp"
+#include "io/recording_survey.hpp"
 #include "palpate/files.hpp"
 #include "streaming/table_import.hpp"
 
@@ -99,6 +100,13 @@ void import_tables(const ImportArguments& options) {
   const ImportedRecording imported = palpate::import_tables(options);
   write_recording(options.output, imported.recording);
   print_summary(options, imported);
+  if (imported.recording.rows == "touches") {
+    if (const std::uint64_t repeated = survey_recording(options.output).repeated; repeated > 0) {
+      tell_on_stderr(fmt::format(
+          "{}: {} of {} touches equal an earlier one to the digit, and count as one with it",
+          options.pressures, repeated, imported.recording.size()));
+    }
+  }
 }
 
 }  // namespace

@@ -79,7 +79,7 @@ std::string sensor_model_text(const LearnedSensor& sensor) {
   }
   if (const auto& scale = sensor.fit_scale) {
     add("fit scale",
-        fmt::format("z of learned objects {:.4g} +- {:.4g}{}{}", scale->mean, scale->sd,
+        fmt::format("z of learned objects {:.4g} +- {:.4g}{}{}{}", scale->mean, scale->sd,
                     scale->alone
                         ? fmt::format(", of a single touch where it fits best {:.4g} +- {:.4g}",
                                       scale->alone->mean, scale->alone->sd)
@@ -87,7 +87,10 @@ std::string sensor_model_text(const LearnedSensor& sensor) {
                     scale->stranger_sd
                         ? fmt::format(", of strangers +- {:.4g} more on it for every further touch",
                                       *scale->stranger_sd)
-                        : ""));
+                        : "",
+                    scale->array ? fmt::format(", by {:.0f} elements {:.3g} mm apart",
+                                               scale->array->elements, scale->array->spacing_mm)
+                                 : ""));
   }
   if (sensor.pose_scale) {
     add("pose scale",

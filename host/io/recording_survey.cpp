@@ -19,6 +19,14 @@ namespace {
 
 constexpr std::uint32_t sign = 0x80000000;
 
+/// A digest of numbers in order, by one more number (the finaliser of SplitMix64).
+std::uint64_t digest_with(std::uint64_t digest, double number) {
+  digest = (digest ^ std::bit_cast<std::uint64_t>(number)) + 0x9E3779B97F4A7C15;
+  digest = (digest ^ (digest >> 30)) * 0xBF58476D1CE4E5B9;
+  digest = (digest ^ (digest >> 27)) * 0x94D049BB133111EB;
+  return digest ^ (digest >> 31);
+}
+
 class Survey {
  public:
   explicit Survey(const std::filesystem::path& path) : path_(path) {}
@@ -48,10 +56,26 @@ class Survey {
         element = placed_[element];
       }
     }
+    result_.repeated = repeated_touches();
     return std::move(result_);
   }
 
  private:
+  /// RecordingSurvey::repeated
+  std::uint64_t repeated_touches() const {
+    std::vector<std::uint64_t> digests;
+    for (std::size_t i = 0; i < std::min(pressed_.size(), posed_.size()); ++i) {
+      if (pressed_[i] != 0) {
+        digests.push_back(pressed_[i] ^ posed_[i]);
+      }
+    }
+    std::ranges::sort(digests);
+    return digests.size() -
+           static_cast<std::size_t>(std::ranges::unique(digests).begin() - digests.begin());
+  }
+
+  bool of_touches() const { return result_.head.recording.rows != "frames"; }
+
   void begin(const RecordingHead& head) {
     result_.head = head;
     if (head.recording.pressure_unit == "kPa") {
@@ -68,6 +92,7 @@ class Survey {
       if (valid.empty() || valid[(valid_by_row ? pressure_row_ * e : 0) + element_] != 0) {
         take_reading(pressure);
       }
+      pressures_ = digest_with(pressures_, pressure);
       if (++element_ == e) {
         end_row();
       }
@@ -114,7 +139,12 @@ class Survey {
   }
 
   void end_row() {
-    if (strongest_ && in_contact(*strongest_)) {
+    const bool felt = strongest_ && in_contact(*strongest_);
+    if (of_touches()) {
+      pressed_.push_back(felt ? pressures_ : 0);
+    }
+    pressures_ = 1;
+    if (felt) {
       ++result_.pressure.in_contact;
       ++result_.pressure.elements[strongest_element_].strongest;
     }
@@ -125,6 +155,9 @@ class Survey {
 
   void take(const Pose& T_robot_sensor) {
     const auto& [t, theta_rad] = T_robot_sensor;
+    if (of_touches()) {
+      posed_.push_back(digest_with(digest_with(digest_with(0, t.x), t.y), theta_rad));
+    }
     if (std::isnan(theta_rad)) {
       return;
     }
@@ -168,14 +201,17 @@ class Survey {
 
   const std::filesystem::path& path_;
   RecordingSurvey result_;
-  std::uint64_t pressure_row_ = 0;     ///< row of the next pressure
-  std::size_t element_ = 0;            ///< its element
-  std::optional<double> strongest_;    ///< largest pressure above the baseline in this row
-  std::size_t strongest_element_ = 0;  ///< the element that reads it
-  std::uint64_t last_at_most_ = 0;     ///< last row with the largest reading
-  std::vector<glm::dvec2> places_mm_;  ///< of the living elements in the first row
-  std::vector<std::size_t> placed_;    ///< their indices in the array
-  std::uint64_t place_ = 0;            ///< index of the next place
+  std::uint64_t pressure_row_ = 0;      ///< row of the next pressure
+  std::size_t element_ = 0;             ///< its element
+  std::optional<double> strongest_;     ///< largest pressure above the baseline in this row
+  std::size_t strongest_element_ = 0;   ///< the element that reads it
+  std::uint64_t last_at_most_ = 0;      ///< last row with the largest reading
+  std::uint64_t pressures_ = 1;         ///< digest of this row's pressures so far
+  std::vector<std::uint64_t> pressed_;  ///< [touch] digest of the pressures; 0 without contact
+  std::vector<std::uint64_t> posed_;    ///< [touch] digest of the pose
+  std::vector<glm::dvec2> places_mm_;   ///< of the living elements in the first row
+  std::vector<std::size_t> placed_;     ///< their indices in the array
+  std::uint64_t place_ = 0;             ///< index of the next place
   StreamTime time_;
   std::optional<double> last_s_;
   std::uint64_t row_ = 0;  ///< row of the next time

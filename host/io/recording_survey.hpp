@@ -88,10 +88,12 @@ struct RecordingSurvey {
   std::optional<Array> array;   ///< none where all elements are dead
   /// Spacing of the living elements; that of the first row where the array changes.
   std::optional<ElementSpacing> spacing;
-  std::optional<double> elapsed_s;         ///< from the first row to the last, see StreamTime
-  std::uint64_t times_back = 0;            ///< rows whose time is before the time of the row before
-  std::uint64_t first_back = 0;            ///< first such row
-  std::uint64_t long_steps = 0;            ///< steps of time too long for a touch to last over them
+  std::optional<double> elapsed_s;  ///< from the first row to the last, see StreamTime
+  std::uint64_t times_back = 0;     ///< rows whose time is before the time of the row before
+  std::uint64_t first_back = 0;     ///< first such row
+  std::uint64_t long_steps = 0;     ///< steps of time too long for a touch to last over them
+  /// Touches in contact that equal an earlier one to the digit, pose and pressures.
+  std::uint64_t repeated = 0;
   std::optional<std::uint64_t> lost = {};  ///< lost frames, where the file counts them
 };
 

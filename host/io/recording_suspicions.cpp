@@ -26,6 +26,10 @@ class Suspicions {
   std::vector<std::string> all() {
     look_at_array();
     look_at_poses();
+    if (s_.repeated > 0) {
+      say("{} of {} touches equal an earlier one to the digit, and count as one with it.",
+          s_.repeated, s_.head.rows);
+    }
     look_at_times();
     look_at_pressures();
     look_at_elements();

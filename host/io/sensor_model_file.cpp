@@ -53,12 +53,19 @@ void describe(Keys& keys, SingleFitScale& alone) {
 }
 
 template <typename Keys>
+void describe(Keys& keys, FitArray& array) {
+  keys("elements", array.elements);
+  keys("spacing_mm", array.spacing_mm);
+}
+
+template <typename Keys>
 void describe(Keys& keys, FitScale& scale) {
   keys("mean", scale.mean);
   keys("sd", scale.sd);
   keys("shared_sd", scale.shared_sd, scale.shared_sd > 0.0);
   keys("alone", scale.alone);
   keys("stranger_sd", scale.stranger_sd);
+  keys("array", scale.array);
 }
 
 template <typename Keys>

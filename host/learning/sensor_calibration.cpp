@@ -254,6 +254,9 @@ LearnedSensor with_confidence(LearnedSensor sensor, const CrossValidation& valid
       sensor.fit_scale->alone = {best->mean, best->sd};
     }
     sensor.fit_scale->stranger_sd = stranger_sd_of(validation.stranger_fits, *sensor.fit_scale);
+    sensor.fit_scale->array =
+        FitArray{static_cast<double>(presses.front().touches.front().elements_mm.size()),
+                 spacing_mm_of(presses)};
   }
   sensor.pose_scale = pose_scale_of(validation.place_errors);
   const FamiliarityScores scores = all_of(validation.familiarity);

@@ -66,6 +66,25 @@ Fit FitScale::of(const Fit& fit, std::size_t touches) const {
   return {.z = z, .verdict = verdict_on(z, scaled_fits_from_z, scaled_doubtful_from_z)};
 }
 
+FitScale FitScale::for_array(const FitArray& other) const {
+  FitScale scale = *this;
+  if (!array) {
+    return scale;
+  }
+  const double more = std::sqrt(other.elements / array->elements);
+  const double denser =
+      other.spacing_mm > 0.0 ? std::max(1.0, array->spacing_mm / other.spacing_mm) : 1.0;
+  scale.mean *= more;
+  scale.shared_sd *= more;
+  scale.sd *= denser;
+  if (scale.alone) {
+    scale.alone->mean *= more;
+    scale.alone->sd *= denser;
+  }
+  scale.array = other;
+  return scale;
+}
+
 FitScale pooled(std::span<const FitScale> objects) {
   constexpr double least_sd = 0.25;
   constexpr double least_shared_sd = 0.03;

@@ -245,6 +245,11 @@ void LearnedSensor::validate() const {
   if (fit_scale && fit_scale->stranger_sd && !is_positive(*fit_scale->stranger_sd)) {
     refuse("fit_scale: stranger_sd", *fit_scale->stranger_sd, "give a positive number");
   }
+  if (fit_scale && fit_scale->array &&
+      !(is_positive(fit_scale->array->elements) && is_positive(fit_scale->array->spacing_mm))) {
+    refuse("fit_scale: array", fit_scale->array->elements,
+           "give a number of elements and a spacing_mm above 0");
+  }
 }
 
 }  // namespace palpate

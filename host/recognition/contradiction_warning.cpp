@@ -133,7 +133,7 @@ std::optional<std::string> touches_contradict(std::span<const TouchEvidence> tou
     return {};
   }
   const Fit fit = evidence_fit(displaced, step.pose(), map, contact, object).value();
-  if (task.fit_scale.of(fit, in_contact).verdict != Verdict::fits) {
+  if (task.fit_scale_for(touches).of(fit, in_contact).verdict != Verdict::fits) {
     return {};
   }
   return fmt::format(

@@ -231,24 +231,26 @@ BeliefPlaces places_of(const Recogniser& recogniser, const Estimate& estimate,
 Decision decide(const RecognitionStep& step, const RecognitionTask& task) {
   const std::string& best = task.labels[step.best];
   const std::string& posed = task.labels[task.label_of[step.mode.object]];
+  const bool bounded = !step.identity_bounds.empty();
+  const double proven = bounded ? step.identity_bounds[step.best].low : step.confidence();
+  // Words say that they tell of a bound where that is well below the probability itself.
+  constexpr double near = 0.05;
+  const bool sure = step.confidence() - proven <= near;
   if (best == none_label) {
-    return {false, fmt::format("{} has {}: the object was {} never learned", best,
-                               percent(step.confidence()),
-                               step.confidence() > 0.5 ? "probably" : "possibly")};
+    return {false, fmt::format("{} has {}{}: the object was {} never learned", best,
+                               percent(sure ? step.confidence() : proven),
+                               sure ? "" : " for certain", proven > 0.5 ? "probably" : "possibly")};
   }
   if (step.fit && step.fit->verdict == Verdict::does_not_fit) {
     return {false, fmt::format("the touches do not fit {}, {:.0f} standard deviations worse than "
                                "its own do",
                                posed, -step.fit->z)};
   }
-  const bool bounded = !step.identity_bounds.empty();
-  const double proven = bounded ? step.identity_bounds[step.best].low : step.confidence();
   if (!(proven >= task.act.above)) {
-    // The sentence says that it is a bound where the probability itself is enough, or far from it.
-    constexpr double near = 0.05;
-    const bool sure = step.confidence() < task.act.above && step.confidence() - proven <= near;
+    // Where the probability itself is enough, they say so, too.
+    const bool below = step.confidence() < task.act.above && sure;
     return {false, fmt::format("{} has {}{}, less than {:.10g} %", best, percent_below(proven),
-                               sure ? "" : " for certain", 100.0 * task.act.above)};
+                               below ? "" : " for certain", 100.0 * task.act.above)};
   }
   const BeliefPlaces& places = step.places;
   if (places.within_mm && *places.within_mm <= task.act.below_mm) {

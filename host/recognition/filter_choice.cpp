@@ -234,8 +234,14 @@ FilterOptions with_evidence(FilterOptions filter, const LearnedSensor& sensor, b
     bounded->poor_bins = poor_bins;
   }
   const bool tempered = sensor.temperature > 1.0 || sensor.temperature_growth > 0.0;
-  if ((tempered || sensor.features || sensor.familiarity) && !bounded->evidence_nats) {
-    bounded->evidence_nats = share * sensor.temperature;
+  const double enough = share * sensor.temperature;
+  if (!(tempered || sensor.features || sensor.familiarity)) {
+    return filter;
+  }
+  if (bounded->evidence_nats) {
+    bounded->evidence_nats = std::min(*bounded->evidence_nats, enough);
+  } else {
+    bounded->evidence_nats = enough;
     bounded->evidence_range_nats = -std::log(negligible) * sensor.temperature;
     // Familiarity is told of a single touch.
     bounded->single_touch_range_nats = sensor.familiarity ? FamiliarityScore::most_lead_nats : 0.0;

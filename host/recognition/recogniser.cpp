@@ -15,11 +15,13 @@ Recogniser::Recogniser(Device* device, const RecognitionTask& task, const Filter
       lattice_(task.lattice()),
       contact_(task.contact()),
       auto_pivot_(task.auto_pivot),
+      by_place_(task.by_place),
       filter_(make_filter(device, task.hypotheses, task.filter, search)) {}
 
 void Recogniser::reset() {
   filter_->reset();
   evidence_.clear();
+  places_.clear();
   surprises_.clear();
   pivot_placed_ = false;
   touched_ = false;
@@ -48,6 +50,9 @@ void Recogniser::update(std::span<const Touch> touches,
                         const std::function<void(double)>& progress) {
   // Looks at all touches, so that a bad touch is refused before the pivot moves.
   std::vector<TouchEvidence> more = evidence_of(touches, contact_);
+  for (TouchEvidence& touch : by_place_ ? std::span(more) : std::span<TouchEvidence>()) {
+    touch = places_.add(touch);
+  }
   const auto first = std::ranges::find_if(more, &TouchEvidence::in_contact);
   if (lacks_pivot() && first != more.end()) {
     place_pivot(*first);
@@ -67,7 +72,10 @@ void Recogniser::prepare(const Touch& touch) {
   if (!traits_.every_bin) {
     return;
   }
-  const TouchEvidence evidence(touch, contact_);
+  TouchEvidence evidence(touch, contact_);
+  if (by_place_) {
+    evidence = places_.weighed(evidence);
+  }
   if (lacks_pivot()) {
     // A touch that comes after waiting touches is taken in together with them, not by itself.
     if (!evidence_.empty() || !evidence.in_contact()) {

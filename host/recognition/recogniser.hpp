@@ -12,6 +12,7 @@
 #include "recognition/filter.hpp"
 #include "recognition/recognition_task.hpp"
 #include "recognition/surprise.hpp"
+#include "recognition/touch_places.hpp"
 
 namespace palpate {
 
@@ -59,7 +60,8 @@ class Recogniser {
   /// Whether the belief has taken in a touch since reset(). Touches that wait for an automatic
   /// pivot do not count.
   bool touched() const { return touched_; }
-  /// All touches since reset(), in order, those that wait for an automatic pivot included.
+  /// All touches since reset(), in order, those that wait for an automatic pivot included; weighed
+  /// by place where RecognitionTask::by_place says so.
   std::span<const TouchEvidence> evidence() const { return evidence_; }
   /// Judges touches by the recogniser's task; made at the first call. Not for particles.
   const SurpriseJudge& surprise_judge(const RecognitionTask& task);
@@ -78,6 +80,8 @@ class Recogniser {
   }
   /// The task's lattice about the pivot in use.
   const PoseLattice& lattice() const { return lattice_; }
+  /// See TouchPlaces::words().
+  std::string place_words() const { return places_.words(); }
   /// See Filter::words().
   std::vector<std::string> words() const { return filter_->words(); }
   std::uint64_t device_bytes() const { return filter_->device_bytes(); }
@@ -100,6 +104,8 @@ class Recogniser {
   PoseLattice lattice_;
   ContactModel contact_;
   bool auto_pivot_;
+  bool by_place_;
+  TouchPlaces places_;                   ///< since reset(); only where touches count by place
   bool pivot_placed_ = false;            ///< by a touch since reset(); only where it is automatic
   std::vector<TouchEvidence> evidence_;  ///< in order; waits where the pivot lacks
   bool touched_ = false;                 ///< since reset()

@@ -177,7 +177,7 @@ std::optional<Fit> fit_of(const Mode& mode, const std::optional<RefinedPose>& re
       refined ? evidence_fit(touches, refined->T_object_robot, map, task.contact(), task.touch_sd(),
                              object)
               : best_fit_near(touches, mode.T_object_robot, map, task.contact(), object);
-  return task.fit_scale.of(fit.value(), static_cast<std::size_t>(in_contact));
+  return task.fit_scale_for(touches).of(fit.value(), static_cast<std::size_t>(in_contact));
 }
 
 /// RecognitionStep::refined
@@ -312,6 +312,9 @@ RecognitionStep take_step(Recogniser& recogniser, const RecognitionTask& task,
         step.warnings.push_back(*std::move(warning));
       }
     }
+  }
+  if (std::string words = recogniser.place_words(); !words.empty()) {
+    step.warnings.push_back(std::move(words));
   }
   return step;
 }

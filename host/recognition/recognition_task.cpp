@@ -7,6 +7,8 @@
 
 #include <fmt/format.h>
 
+#include "model/element_spacing.hpp"
+
 namespace palpate {
 
 namespace {
@@ -74,6 +76,25 @@ double RecognitionTask::temperature_after(std::span<const TouchEvidence> touches
   const auto telling = std::ranges::count_if(touches, &TouchEvidence::tells);
   return temperature_of(static_cast<std::size_t>(std::max<std::ptrdiff_t>(telling, 1)), temperature,
                         temperature_growth);
+}
+
+FitScale RecognitionTask::fit_scale_for(std::span<const TouchEvidence> touches) const {
+  double known = 0.0;
+  double in_contact = 0.0;
+  const TouchEvidence* last = nullptr;
+  for (const TouchEvidence& touch : touches) {
+    if (touch.in_contact()) {
+      known += static_cast<double>(touch.readings.size()) -
+               static_cast<double>(std::ranges::count(touch.readings, Reading::unknown));
+      in_contact += 1.0;
+      last = &touch;
+    }
+  }
+  if (last == nullptr || !fit_scale.array) {
+    return fit_scale;
+  }
+  const std::optional<ElementSpacing> spacing = spacing_of(last->elements_mm);
+  return fit_scale.for_array({known / in_contact, spacing ? spacing->nearest_mm.most : 0.0});
 }
 
 std::string wider_bins_sentence(const RecognitionTask& task) {

@@ -44,6 +44,10 @@ struct RecognitionTask {
   /// The temperature of those of the touches that tell something; before any, of one.
   double temperature_after(std::span<const TouchEvidence> touches) const;
 
+  /// `fit_scale` for the array of these touches, by the elements In Contact's touches that are
+  /// known.
+  FitScale fit_scale_for(std::span<const TouchEvidence> touches) const;
+
   const std::vector<Hypothesis> hypotheses;
   const FilterOptions filter;  ///< as it is opened
   /// Each label once, in the order of the maps; none_label comes last where "none of these" has a
@@ -60,6 +64,8 @@ struct RecognitionTask {
   std::string filter_asked_for_by = {};
   /// The pivot is the array's centre at the first touch of each unknown with an element In Contact.
   bool auto_pivot = false;
+  /// Touches of one place count as about one, see TouchPlaces.
+  bool by_place = false;
   /// How sure probabilities of labels and of modes are, see LearnedSensor; poses are left as they
   /// are.
   double temperature = 1.0;

@@ -309,6 +309,10 @@ RecognitionTask resolve(const Request& request, const Circumstances& of) {
     task.fit_scale = fit;
     task.pose_scale = pose;
   }
+  // By Eq. 7 without "(none)" all touches multiply, as in the paper; and where the object slips, a
+  // touch of the same place tells where it went.
+  const FilterTraits traits = traits_of(task.filter);
+  task.by_place = (sensor != nullptr || traits.none_weight) && traits.slip_sd.none();
   task.bin_width = bin_width;
   task.auto_filter = filter.automatic;
   task.filter_asked_for_by = filter.asked_for_by;

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "model/element_spacing.hpp"
 #include "palpate/map_builder.hpp"
 
 namespace palpate {
@@ -61,10 +62,15 @@ Scales scales_of_maps(const RecognitionTask& task, std::optional<double> near_mm
   double logs = 0.0;
   double squares = 0.0;
   double poses = 0.0;
+  std::optional<FitArray> array;  // of the last map: all are touched by one as a rule
   for (const Hypothesis& hypothesis : task.hypotheses) {
     const auto& source = hypothesis.map.source;
     if (source && source->left_out) {
       fits.push_back(*source->left_out);
+      const std::size_t elements = source->touches.elements();
+      if (const auto spacing = spacing_of(std::span(source->touches.elements_mm).first(elements))) {
+        array = {static_cast<double>(elements), spacing->nearest_mm.most};
+      }
     }
     if (source && source->pose_scale) {
       logs += std::log(source->pose_scale->factor);
@@ -77,6 +83,7 @@ Scales scales_of_maps(const RecognitionTask& task, std::optional<double> near_mm
   const bool exact = task.touch_sd().none() && task.slip_sd().none();
   if (!fits.empty() && as_map && exact) {
     scales.fit = pooled(fits);
+    scales.fit.array = array;
   }
   if (poses > 0.0) {
     scales.pose = {as_map ? std::exp(logs / poses) : 1.0, std::sqrt(squares / poses)};

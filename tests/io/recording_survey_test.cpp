@@ -284,6 +284,26 @@ TEST_F(RecordingSurveyed, FramesWithoutAPose) {
   expect_suspicion(r, {"No frame has a pose"});
 }
 
+TEST_F(RecordingSurveyed, TouchesThatAreWrittenAgain) {
+  Recording r = training();
+  expect_sound(r);
+  const auto write_again = [&](std::size_t from, std::size_t to) {
+    r.T_robot_sensor[to] = r.T_robot_sensor[from];
+    for (std::size_t e = 0; e < r.elements(); ++e) {
+      reading(r, to, e) = reading(r, from, e);
+    }
+  };
+  write_again(20, 30);
+  write_again(20, 31);
+  expect_suspicion(r, {"2 of 192 touches equal an earlier one to the digit"});
+  r.T_robot_sensor[30].translation_mm.x += 1e-9;
+  reading(r, 31, 35) += 1e-9;
+  expect_sound(r);
+  r = stream();
+  write_again(20, 21);
+  expect_sound(r);  // frames of a touch that lasts
+}
+
 TEST_F(RecordingSurveyed, Times) {
   Recording r = stream();
   expect_sound(r);

@@ -25,7 +25,8 @@ LearnedSensor full_sensor() {
                             .sd = 12.25,
                             .shared_sd = 0.5,
                             .alone = SingleFitScale{1.5, 0.75},
-                            .stranger_sd = 3.25}};
+                            .stranger_sd = 3.25,
+                            .array = FitArray{.elements = 36.0, .spacing_mm = 1.875}}};
   LearnedTable& table = *sensor.table;
   table.layer = {.of = MapLayer::mean_level,
                  .near_mm = 3.5,
@@ -109,6 +110,9 @@ TEST_F(SensorModelFile, ComesBackAsItWasWritten) {
   EXPECT_EQ(read.fit_scale->alone->mean, written.fit_scale->alone->mean);
   EXPECT_EQ(read.fit_scale->alone->sd, written.fit_scale->alone->sd);
   EXPECT_EQ(read.fit_scale->stranger_sd, written.fit_scale->stranger_sd);
+  ASSERT_TRUE(read.fit_scale->array);
+  EXPECT_EQ(read.fit_scale->array->elements, 36.0);
+  EXPECT_EQ(read.fit_scale->array->spacing_mm, 1.875);
 }
 
 TEST_F(SensorModelFile, MayHoldLittle) {
@@ -151,6 +155,7 @@ TEST_F(SensorModelFile, SaysWhatIsWrong) {
   expect_named(message("[35, 60.5]", "[35]"), {"log_likelihood"});
   expect_named(message("[1, 2, 3]", "[1, 2]"), {"line 19", "mean", "area"});
   expect_named(message("sd: 12.25", "sd: 0"), {"fit_scale: sd", "positive"});
+  expect_named(message("elements: 36", "elements: 0"), {"fit_scale: array", "above 0"});
   expect_named(message("shared_sd: 0.5", "shared_sd: -1"), {"fit_scale: shared_sd", "from 0"});
   expect_named(message("alone: {mean: 1.5, sd: 0.75}", "alone: {mean: 1.5, sd: 0}"),
                {"fit_scale: alone: sd", "positive"});

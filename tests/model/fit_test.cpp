@@ -311,6 +311,26 @@ TEST(FitScale, OfOneTouchIsThatOfTouchesWhereTheyFitBest) {
   EXPECT_DOUBLE_EQ(scale.of({.z = 3.0 + 0.5 / 3.0 - std::sqrt(13.0)}, 9).z, -1.0);
 }
 
+TEST(FitScale, GoesByTheNumberAndTheSpacingOfElements) {
+  const FitScale scale{.mean = 1.0,
+                       .sd = 2.0,
+                       .shared_sd = 0.5,
+                       .alone = SingleFitScale{1.5, 0.5},
+                       .array = FitArray{.elements = 36.0, .spacing_mm = 2.0}};
+  const FitScale dense = scale.for_array({.elements = 4.0 * 36.0, .spacing_mm = 1.0});
+  EXPECT_EQ(dense.mean, 2.0);
+  EXPECT_EQ(dense.sd, 4.0);
+  EXPECT_EQ(dense.shared_sd, 1.0);
+  EXPECT_EQ(dense.alone->mean, 3.0);
+  EXPECT_EQ(dense.alone->sd, 1.0);
+  const FitScale sparse = scale.for_array({.elements = 9.0, .spacing_mm = 4.0});
+  EXPECT_EQ(sparse.mean, 0.5);
+  EXPECT_EQ(sparse.sd, 2.0) << "elements further apart share no less than the others";
+  EXPECT_EQ(scale.for_array(*scale.array).of({.z = 5.0}, 4).z, scale.of({.z = 5.0}, 4).z);
+  EXPECT_EQ(FitScale{.mean = 3.0}.for_array({.elements = 9.0, .spacing_mm = 4.0}).mean, 3.0)
+      << "of any array";
+}
+
 TEST(FitScale, OfMeanZeroAndSdOneChangesNothing) {
   for (const Fit fit : {Fit{.z = -2.9}, Fit{.z = -3.2, .verdict = Verdict::doubtful},
                         Fit{.z = -4.2, .verdict = Verdict::does_not_fit}}) {

@@ -43,6 +43,12 @@ TEST(Decision, SaysWhatSpeaksAgainst) {
   step.identity = {0.3, 0.21, 0.49};
   EXPECT_EQ(refused(step), "(none) has 49 %: the object was possibly never learned");
 
+  step.identity = {0.0, 0.0, 1.0};
+  step.identity_bounds = {{0.0, 1.0}, {0.0, 1.0}, {0.0, 1.0}};
+  EXPECT_EQ(refused(step), "(none) has 0 % for certain: the object was possibly never learned");
+  step.identity_bounds[2].low = 0.98;
+  EXPECT_EQ(refused(step), "(none) has more than 99.9 %: the object was probably never learned");
+
   step = good_step();
   step.fit->verdict = Verdict::does_not_fit;
   step.fit->z = -6.2;

@@ -296,6 +296,7 @@ TEST(Evidence, IsWhatBoundsFindWhereATemperatureNeedsIt) {
   EXPECT_EQ(bounds(sensor).evidence_nats, 0.05 * 30.0);
   EXPECT_EQ(bounds(sensor).evidence_growth, 0.0);
   EXPECT_EQ(bounds(sensor, {.evidence_nats = 0.1}).evidence_nats, 0.1);
+  EXPECT_EQ(bounds(sensor, {.evidence_nats = 2.0}).evidence_nats, 1.5) << "it only tightens";
   EXPECT_TRUE(std::holds_alternative<HistogramOptions>(with_evidence(HistogramOptions{}, sensor)));
   sensor.temperature = 0.8;
   sensor.temperature_growth = 0.2;

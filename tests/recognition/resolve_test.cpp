@@ -108,6 +108,18 @@ TEST(Resolve, AWeightOfNoneOf0LeavesItOut) {
   EXPECT_EQ(task_of(complete(request)).labels.size(), 2u);
 }
 
+TEST(Resolve, TouchesCountByPlaceButAsThePaperHasItAndWhereTheObjectSlips) {
+  Request request = request_of_shapes();
+  EXPECT_TRUE(task_of(request).by_place);
+  request.slip_sd_mm = 0.5;
+  request.slip_sd_deg = 3.0;
+  EXPECT_FALSE(task_of(request).by_place);
+  request.slip_sd_mm.reset();
+  request.slip_sd_deg.reset();
+  request.none = 0.0;
+  EXPECT_FALSE(task_of(request).by_place);
+}
+
 /// The shapes, learned from touches that had these z on maps of the others.
 Request request_of_learned() {
   Request request = request_of_shapes();

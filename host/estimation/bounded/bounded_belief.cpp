@@ -302,7 +302,10 @@ bool BoundedBelief::tells_enough(const LogInterval& none) const {
   const SearchGoal asked = goal(tolerance());
   const double range = asked.evidence_nats ? asked.evidence_range_nats
                                            : -std::log(std::max(asked.tolerance, negligible));
-  return none.high - none.low <= asked.evidence_nats.value_or(none_nats) ||
+  // With a range, the evidence is for a temperature that is applied later, to "none of these", too.
+  const bool for_temperature = asked.evidence_range_nats < unlimited;
+  const double nats = asked.evidence_nats.value_or(none_nats);
+  return none.high - none.low <= (for_temperature ? nats : std::min(nats, none_nats)) ||
          none.high < log_total() - range || none.low > log_total() + range;
 }
 

@@ -59,8 +59,9 @@ struct BoundedOptions {
   /// likelihood is bounded by searches of its own, until the log odds of "none of these" against
   /// the objects are known within 0.05 nats, or it or the objects are known to have less than the
   /// tolerance or 1e-4, whichever is larger. With evidence_nats, it is known as closely as the
-  /// labels are. Certificate::none_log_evidence holds its bounds; Certificate::dropped_mass is of
-  /// the objects' bins alone.
+  /// labels are; where evidence_range_nats is infinite, never less closely than without.
+  /// Certificate::none_log_evidence holds its bounds; Certificate::dropped_mass is of the objects'
+  /// bins alone.
   std::optional<double> none_weight = {};
   /// Host threads; 0 takes as many as the machine has cores.
   int threads = 0;

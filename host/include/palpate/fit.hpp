@@ -43,6 +43,12 @@ struct PALPATE_API SingleFitScale {
   double sd = 1.0;
 };
 
+/// The array of touches, as far as the spread of z depends on it.
+struct PALPATE_API FitArray {
+  double elements = 0.0;    ///< that are known, of a touch
+  double spacing_mm = 0.0;  ///< of neighbours
+};
+
 /// What z is like for touches of an object on a map that had not seen them. Neighbouring elements
 /// of a large array are far from independent, as z takes them to be, maps are not perfect, and a
 /// sensor may err more or less often than Eq. 7 says.
@@ -56,6 +62,14 @@ struct PALPATE_API FitScale {
   /// What every touch after the first adds to the standard deviation of z on this scale where the
   /// object was never learned; none: Palpate's own figure.
   std::optional<double> stranger_sd = {};
+  /// The array that it was learned with; none: it is not known, and the scale is of any.
+  std::optional<FitArray> array = {};
+
+  /// The scale for touches by another array. What each element deviates by adds up, while z divides
+  /// by the square root of their number: the means and `shared_sd` grow with the square root of the
+  /// number of elements. Elements that stand closer than those that learned share more, so that the
+  /// other deviations grow as their spacing falls.
+  FitScale for_array(const FitArray& other) const;
 
   /// The fit on this scale: (z - mean sqrt(n)) / sqrt(sd^2 + n shared_sd^2), within
   /// +-`largest_fit_z`, with its verdict. The deviations of n independent touches add up, and so do

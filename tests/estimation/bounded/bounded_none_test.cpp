@@ -119,6 +119,19 @@ TEST(BoundedPosterior, BoundsNoneOfTheseAsCloselyAsTheEvidenceIsAskedFor) {
   EXPECT_LE(width_of(close), 1e-4);
 }
 
+TEST(BoundedPosterior, BoundsNoneOfTheseNoLessCloselyWhereLittleEvidenceIsAskedFor) {
+  BoundedOptions options = small_options();
+  options.none_weight = 1.0;
+  const Recording recording = random_recording(3, 36, 820);
+  for (const double nats : {0.01, 3.0}) {
+    options.evidence_nats = nats;
+    BoundedPosterior bounded(two_made_up(), options);
+    bounded.update(all_touches(recording));
+    const LogInterval none = bounded.estimate().certificate->none_log_evidence.value();
+    EXPECT_LE(none.high - none.low, std::min(nats, 0.05));
+  }
+}
+
 TEST(BoundedPosterior, CountsTheMemoryThatNoneOfTheseTakes) {
   BoundedOptions options = small_options();
   BoundedPosterior without(two_made_up(), options);
