@@ -18,16 +18,14 @@ from .contact_array import (
     AS_BUILT,
     PIXEL_MM,
     RATIO,
+    SPREAD_MM,
     THRESHOLD,
     Press,
     Registration,
-    Shifts,
-    add_pose_scale,
-    find_shifts,
-    learn_sensor,
     read_presses,
     touched,
 )
+from .contact_learning import Learned, Learning
 from .coverage import level_in_modes
 from .measures import wrapped
 from .program import Json, begin, main, parser, write
@@ -65,33 +63,6 @@ COLUMNS: list[Column] = [
     ("all contact seen, %", "seen", _PERCENT),
     ("recognised of these, %", "recognised_where_seen", _PERCENT),
 ]
-
-
-class Learned(NamedTuple):
-    """What is learned of the array without a person: where its elements lie, and what they read."""
-
-    registration: Registration
-    sensor: pathlib.Path
-
-
-def learn(
-    device: palpate.Device,
-    presses: Sequence[Press],
-    shifts: Shifts,
-    person: int | None,
-    path: pathlib.Path,
-    *,
-    quick: bool,
-) -> Learned:
-    """What the presses of all people but one tell."""
-    others = [press for press in presses if press.person != person]
-    registration = shifts.registration(without=person)
-    random = numpy.random.default_rng(SEED + 1)
-    learn_sensor(device, others, registration, random, path, quick=quick)
-    # A sensor knows what elements read beside a contact, which Eq. 7 does not.
-    registration = find_shifts(device, others, random, path).registration()
-    add_pose_scale(device, others, registration, random, path)
-    return Learned(registration, path)
 
 
 class Trial(NamedTuple):
@@ -237,13 +208,76 @@ def draw_press(trial: Trial, step: Json, presses: dict[str, Press], axes: Axes) 
     axes.grid(visible=False)
 
 
+def recognise(
+    device: palpate.Device,
+    presses: Sequence[Press],
+    learned: dict[int, Learned],
+    rounds: int,
+    objects: int,
+) -> tuple[dict[str, dict[str, list[Json]]], Any]:
+    """The scores by sensor and windows, and the beliefs of a press that is recognised, with all presses.
+
+    learned: without the person who pressed, by person.
+    """
+    # What is drawn of a belief must not change which unknowns follow.
+    random, in_beliefs = numpy.random.default_rng(SEED), numpy.random.default_rng(SEED + 2)
+    scores: dict[str, dict[str, list[Json]]] = {name: {n: [] for n in SHOWN} for name in SENSORS}
+    example: Any = None
+    for _ in range(rounds):
+        trials = draw_round(presses, objects, random)
+        maps = {
+            spread_mm: [trial.press.grid(trial.label, spread_mm) for trial in trials]
+            for spread_mm in {SPREAD_MM} | {one.settings.spread_mm for one in learned.values()}
+        }
+        for trial in trials:
+            own = learned[trial.press.person]
+            eq7: Any = {"threshold": THRESHOLD, "ratio": RATIO}
+            beliefs = {
+                "eq7": trial.beliefs(maps[SPREAD_MM], AS_BUILT, device=device, **eq7),
+                "learned": trial.beliefs(
+                    maps[own.settings.spread_mm], own.registration, device=device, sensor_model=own.sensor
+                ),
+            }
+            for sensor, after in beliefs.items():
+                for n, belief in after.items():
+                    scores[sensor][n].append(score(*belief, in_beliefs))
+            if example is None and scores["learned"]["5"][-1]["right"]:
+                example = beliefs["learned"], {one.label: one.press for one in trials}
+    return scores, example
+
+
+def results(scores: dict[str, dict[str, list[Json]]], learned: dict[int, Learned]) -> Json:
+    """The summaries by sensor and windows, which it prints, and what was learned without each person."""
+    summaries: Json = {
+        sensor: {"windows": {n: summary(of) for n, of in by.items()}} for sensor, by in scores.items()
+    }
+    rows = [
+        {"sensor": SENSORS[sensor], "windows": n} | summaries[sensor]["windows"][n]
+        for n in SHOWN
+        for sensor in SENSORS
+    ]
+    print_table(COLUMNS, rows)
+    people = {str(person): one for person, one in learned.items()}
+    return summaries | {
+        "registration": {name: one.registration.coefficients.tolist() for name, one in people.items()},
+        "settings": {
+            name: one.settings._asdict()
+            | {"pose_scale": dict(zip(("factor", "map_sd_mm"), one.pose_scale, strict=True))}
+            for name, one in people.items()
+        },
+        "unknowns": scores,
+    }
+
+
 def program() -> None:
     """Rounds of twelve presses, by Eq. 7 as the array was built, and by what other people's presses tell."""
     flags = parser(
         "capcontact",
         "Recognises presses of several fingers on a real array among twelve, at random poses in the plane, "
-        "from windows of 9 x 9 elements, in some ten minutes on two CPU cores. Sensor and the array's "
-        "place are learned without the person who is tried, or on presses.npz where there is held_out.npz.",
+        "from windows of 9 x 9 elements, in some twenty minutes of one CPU core. Settings, sensor, pose scale "
+        "and the array's place are learned without the person who is tried: the people of presses.npz are "
+        "left out in turn. The presses of held_out.npz, where there is one, are tried beside, by what all of "
+        "presses.npz tells.",
         plots="draw the errors, and a press with its belief, in this folder",
         trials="rounds of twelve presses [20, or 1 with --quick]",
     )
@@ -252,65 +286,37 @@ def program() -> None:
     folder = pathlib.Path(options.data)
     held_out = folder / "held_out.npz"
     training = read_presses(folder / "presses.npz")
-    tried = read_presses(held_out) if held_out.exists() else training
+    tried = {"in_turn": training}
+    if held_out.exists():
+        tried["held_out"] = read_presses(held_out)
     objects = QUICK_OBJECTS if options.quick else OBJECTS
-    if len(tried) < objects:
-        raise palpate.Error(f"--data {folder}: {len(tried)} presses; give {objects} or more")
-    device, facts = begin(options, f"{len(tried)} presses of fingers on a capacitive array")
+    for presses in tried.values():
+        if len(presses) < objects:
+            raise palpate.Error(f"--data {folder}: {len(presses)} presses; give {objects} or more")
+    device, facts = begin(options, f"{len(training)} presses of fingers on a capacitive array")
     rounds = options.trials or (1 if options.quick else ROUNDS)
-    # What is drawn of a belief must not change which unknowns follow.
-    random, in_beliefs = numpy.random.default_rng(SEED), numpy.random.default_rng(SEED + 2)
-    shifts = find_shifts(device, training, in_beliefs, None)
-    scores: dict[str, dict[str, list[Json]]] = {name: {n: [] for n in SHOWN} for name in SENSORS}
-    example: Any = None
+    documents: Json = {}
     with tempfile.TemporaryDirectory() as name:
-        # Nothing was learned of people whose presses are held out.
-        without = {press.person: None if held_out.exists() else press.person for press in tried}
-        learned = {
-            person: learn(
-                device, training, shifts, person, pathlib.Path(name, f"{person}.yaml"), quick=options.quick
-            )
-            for person in set(without.values())
-        }
-        for _ in range(rounds):
-            trials = draw_round(tried, objects, random)
-            grids = [trial.press.grid(trial.label) for trial in trials]
-            for trial in trials:
-                own = learned[without[trial.press.person]]
-                for sensor in SENSORS:
-                    eq7: Any = {"threshold": THRESHOLD, "ratio": RATIO}
-                    beliefs = (
-                        trial.beliefs(grids, AS_BUILT, device=device, **eq7)
-                        if sensor == "eq7"
-                        else trial.beliefs(
-                            grids, own.registration, device=device, sensor_model=own.sensor
-                        )
-                    )
-                    for n, belief in beliefs.items():
-                        scores[sensor][n].append(score(*belief, in_beliefs))
-                if example is None and scores["learned"]["5"][-1]["right"]:
-                    example = beliefs, {one.label: one.press for one in trials}
-    document: Json = {
-        sensor: {"windows": {n: summary(of) for n, of in by.items()}} for sensor, by in scores.items()
-    }
-    print_table(
-        COLUMNS,
-        [
-            {"sensor": SENSORS[sensor], "windows": n} | document[sensor]["windows"][n]
-            for n in SHOWN
-            for sensor in SENSORS
-        ],
-    )
-    # By whom they are learned without, as Registration has them.
-    shifts_of = {str(person): one.registration.coefficients.tolist() for person, one in learned.items()}
-    write(options.json, facts | document | {"registration": shifts_of, "unknowns": scores})
+        learning = Learning(device, training, pathlib.Path(name), quick=options.quick)
+        for regime, presses in tried.items():
+            people = sorted({press.person for press in presses})
+            if regime == "held_out":  # nobody of presses.npz is among them
+                learned = dict.fromkeys(people, learning.without(frozenset()))
+            else:
+                learned = {person: learning.without(frozenset({person})) for person in people}
+            scores, example = recognise(device, presses, learned, rounds, objects)
+            print(f"\npeople of {'held_out.npz' if regime == 'held_out' else 'presses.npz, in turn'}:")
+            documents[regime] = results(scores, learned)
+    # Figures are those of held-out people, where there are any.
+    last = documents.popitem()[1]
+    write(options.json, facts | last | documents)
     charts.save({"capcontact": draw_errors(scores)}, options.plots)
     if options.plots and example:
-        beliefs, presses = example
+        beliefs, of_labels = example
         figure = Figure(figsize=(11.4, 5.4))
         for windows, axes in zip(("1", "5"), figure.subplots(1, 2), strict=True):
             trial, step = beliefs[windows]
-            draw_press(trial, step, presses, axes)
+            draw_press(trial, step, of_labels, axes)
         write(pathlib.Path(options.plots, "capcontact_press.png"), charts.image(figure, "png", dpi=100))
 
 

@@ -1,14 +1,13 @@
-"""A real array and the contact under it, measured by light: its presses, maps, windows, and what is learned.
+"""A real array and the contact under it, measured by light: its presses, maps, windows and registration.
 
 The sheet's frame is that of the array: x along its rows, y along its columns, mm. An object is the
 contact area of one press; its frame lies along the sheet's axes with its origin in the area's centroid.
 A touch is a window of the array.
 """
 
-import math
 import pathlib
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any, NamedTuple
 
 import numpy
@@ -16,7 +15,6 @@ from numpy.typing import NDArray
 
 import palpate
 
-from .measures import wrapped
 from .trials import Floats
 
 ROWS, COLUMNS = 41, 72
@@ -34,8 +32,8 @@ FELT = 50.0  #: counts, ten standard deviations of an element that nothing is ne
 
 #: Probability that a place beyond the map is touched: the contacts' share of what windows cover, about.
 PRIOR = 0.02
-#: Maps blur contact by half a pitch, so that log odds say how far an outline is within 5 mm, as far as
-#: elements feel a finger, up to the 7.8 nats that a sensor model tells apart.
+#: Of maps: contact that is blurred by half a pitch has log odds that say how far an outline is within
+#: 5 mm, as far as elements feel a finger, up to the 7.8 nats that a sensor model tells apart.
 SPREAD_MM, PEAK = PITCH_MM / 4.0, 0.9996
 
 Ints = NDArray[numpy.int64]
@@ -54,15 +52,15 @@ class Press(NamedTuple):
         y, x = numpy.nonzero(self.contact)
         return PIXEL_MM * numpy.array([x.mean(), y.mean()])
 
-    def grid(self, label: str) -> palpate.OccupancyGrid:
-        """The map of the contact area: cells of half a pitch, soft outlines where they are drawn."""
+    def grid(self, label: str, spread_mm: float = SPREAD_MM) -> palpate.OccupancyGrid:
+        """The map of the contact area: cells of half a pitch, outlines as soft as spread_mm says."""
         return palpate.OccupancyGrid.from_mask(
             label,
             self.contact,
             pixel_mm=PIXEL_MM,
             origin_mm=-self.centroid_mm,
             cell_mm=PITCH_MM / 2.0,
-            spread_mm=SPREAD_MM,
+            spread_mm=spread_mm,
             peak=PEAK,
             prior=PRIOR,
             felt_share=0.5,
@@ -199,18 +197,19 @@ class Shifts(NamedTuple):
     places_mm: Floats  #: [n, 2] of the windows' middles in the sheet
     shifts_mm: Floats  #: [n, 2]
 
-    def registration(self, without: int | None = None) -> Registration:
-        """The least squares fit of all people but one, and twice more without what lies far off it."""
+    def registration(self, without: Collection[int] = ()) -> Registration:
+        """The least squares fit of all people but some, and twice more without what lies far off it."""
         terms = Registration.terms(self.places_mm)
         # All but the constant are held near 0, as four windows' places would: few windows tell no more.
         held = numpy.diag([0.0, 4.0, 4.0, 4.0, 4.0, 4.0])
-        kept = self.people != without
+        others = ~numpy.isin(self.people, list(without))
+        kept = others
         for _ in range(3):
             coefficients = numpy.linalg.solve(
                 terms[kept].T @ terms[kept] + held, terms[kept].T @ self.shifts_mm[kept]
             )
             off_mm = numpy.hypot(*(self.shifts_mm - terms @ coefficients).T)
-            kept = (self.people != without) & (off_mm < 2.5 * numpy.median(off_mm[kept]))
+            kept = others & (off_mm < 2.5 * numpy.median(off_mm[kept]))
         return Registration(coefficients)
 
 
@@ -219,11 +218,12 @@ def find_shifts(
     presses: Sequence[Press],
     random: numpy.random.Generator,
     sensor: pathlib.Path | None,
+    spread_mm: float = SPREAD_MM,
 ) -> Shifts:
     """Places six windows of every press on its map, each alone, by a sensor or by Eq. 7."""
     people, places, shifts = [], [], []
     for press in presses:
-        grid = press.grid("press")
+        grid = press.grid("press", spread_mm)
         for window in press.windows(random, 6):
             record = placed(device, touched(press, window[None], AS_BUILT), grid, sensor)
             if record["modes"]:
@@ -235,87 +235,3 @@ def find_shifts(
                 found = palpate.transform(record["modes"][0]["T_robot_object"], middle[None])[0]
                 shifts.append(found - middle)
     return Shifts(numpy.array(people), numpy.array(places), numpy.array(shifts))
-
-
-def learn_sensor(
-    device: palpate.Device,
-    presses: Sequence[Press],
-    registration: Registration,
-    random: numpy.random.Generator,
-    path: pathlib.Path,
-    *,
-    quick: bool,
-) -> None:
-    """Writes the sensor that ten of the presses tell, 15 windows each, on their drawn maps.
-
-    It has no `pose_scale`. quick: from six windows of three presses, tried at poses nearby alone.
-    """
-    most, each = (3, 6) if quick else (10, 15)
-    near: Any = {"bins": (8, 8, 8), "x_mm": (-8.0, 8.0), "y_mm": (-8.0, 8.0), "theta_deg": (-8.0, 8.0)}
-    chosen = random.permutation(len(presses))[:most]
-    drawn = [presses[k].grid(f"learned {k}") for k in chosen]
-    # A calibration on drawn maps seeks one offset of the array, from 30 counts on: it finds the fingers
-    # above the sheet beside their contact. The windows' poses are already registered by the contact.
-    grids = [
-        palpate.OccupancyGrid(
-            one.label, one.log_odds, cell_mm=one.cell_mm, origin_mm=one.origin_mm, prior=one.prior
-        )
-        for one in drawn
-    ]
-    touches = [
-        touched(presses[k], presses[k].windows(random, each), registration, label=grid.label)
-        for k, grid in zip(chosen, grids, strict=True)
-    ]
-    calibration = palpate.calibrate(
-        touches, maps=grids, layer="log_odds", levels=7, device=device, **(near if quick else {})
-    )
-    calibration.sensor.save(path)
-    lines = [line for line in path.read_text().splitlines() if not line.startswith("pose_scale:")]
-    path.write_text("\n".join(lines) + "\n")
-
-
-def add_pose_scale(
-    device: palpate.Device,
-    presses: Sequence[Press],
-    registration: Registration,
-    random: numpy.random.Generator,
-    path: pathlib.Path,
-) -> None:
-    """Adds to a sensor the `pose_scale` of the errors of 2 and of 5 windows of all presses."""
-    moved, covariances = [], []
-    for press in presses:
-        grid = press.grid("press")
-        radius_mm = math.sqrt(((numpy.argwhere(press.contact) * PIXEL_MM).var(axis=0)).sum())
-        for count in (2, 5):
-            record = placed(
-                device, touched(press, press.windows(random, count), registration), grid, path
-            )
-            if record["modes"]:
-                mode = record["modes"][0]
-                error = numpy.array(mode["T_robot_object"])
-                error[2] = wrapped(error[2], 2.0 * math.pi)
-                to_mm = numpy.array([1.0, 1.0, radius_mm])
-                moved.append(error * to_mm)
-                covariances.append(numpy.array(mode["covariance"]) * numpy.outer(to_mm, to_mm))
-    factor, sd_mm = pose_scale(numpy.array(moved), numpy.array(covariances))
-    path.write_text(
-        path.read_text().replace(
-            "\ntable:", f"\npose_scale: {{factor: {factor:.4g}, map_sd_mm: {sd_mm:.4g}}}\ntable:"
-        )
-    )
-
-
-def pose_scale(moved_mm: Floats, covariances_mm2: Floats) -> tuple[float, float]:
-    """The factor of the covariances and the deviation beside them by which errors [n, 3] are likeliest.
-
-    As a sensor model's `pose_scale`. Errors from 5 mm on are of another mode.
-    """
-    near = numpy.linalg.norm(moved_mm, axis=1) < 5.0
-    best = (math.inf, 1.0, 0.0)
-    for factor in numpy.geomspace(0.25, 16.0, 31):
-        for sd_mm in numpy.arange(0.0, 2.0, 0.05):
-            all_of = factor * covariances_mm2[near] + sd_mm**2 * numpy.eye(3)
-            squared = numpy.einsum("ni,nij,nj->n", moved_mm[near], numpy.linalg.inv(all_of), moved_mm[near])
-            cost = float((numpy.log(numpy.linalg.det(all_of)) + squared).sum())
-            best = min(best, (cost, float(factor), float(sd_mm)))
-    return best[1:]

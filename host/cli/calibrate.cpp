@@ -140,6 +140,10 @@ void add_calibrate(CLI::App& app) {
   command->add_flag("--unposed", options->request.unposed,
                     "The sensor's poses are unknown: find where each touch lies on the others. For "
                     "arrays so large that a touch shows much of the object");
+  command->add_option("--group", options->request.group,
+                      "Whose touches are alike, such as a person's or a day's, and are left out "
+                      "together where it is judged how sure to be: recording, those of each file; "
+                      "label, those of each GROUP of objects that are named LABEL@GROUP");
   command->add_option("--threshold", options->request.threshold,
                       "Contact threshold, in the recordings' pressure unit [default: learned]");
   command->add_option("--ratio", options->request.ratio,

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <functional>
+#include <iterator>
 #include <memory>
 #include <optional>
 #include <span>
@@ -180,7 +181,8 @@ void build_maps(const MapFlags& flags) {
   MapOptions model = map_options(flags, recordings, sensor);
   const std::optional<double> prior = given_prior(flags, sensor);
   const ObjectOrigin origin = object_origin(flags);
-  std::vector<ObjectTouches> objects = group_by_label(flags, recordings, model.classifier).objects;
+  const GroupedTouches grouped = group_by_label(flags, recordings, model.classifier);
+  std::vector<ObjectTouches> objects = grouped.objects;
 
   std::vector<std::filesystem::path> map_paths;
   std::vector<std::string> names;
@@ -234,6 +236,10 @@ void build_maps(const MapFlags& flags) {
       }
       maps.back().mirror = flags.mirror;
       MapSource source{gathered(object, recordings.front().pressure_unit), model};
+      if (!flags.group.empty()) {
+        std::ranges::transform(grouped.sources[maps.size() - 1], std::back_inserter(source.groups),
+                               &TouchSource::group);
+      }
       judge_left_out(device, source);
       maps.back().source = std::make_shared<const MapSource>(std::move(source));
       settle_frame(origin, maps.back());

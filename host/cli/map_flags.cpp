@@ -13,6 +13,7 @@
 #include "cli/map_drawing.hpp"
 #include "cli/options.hpp"
 #include "cli/recognition_flags.hpp"
+#include "learning/press.hpp"
 #include "model/number_text.hpp"
 #include "model/printable.hpp"
 #include "recognition/option_text.hpp"
@@ -111,6 +112,11 @@ void add_map_flags(CLI::App& command, MapFlags& flags) {
   command.add_option("--label", flags.label,
                      "Label of the map [default: the object that the recording names, "
                      "or a drawing's file]");
+  command.add_option("--group", flags.group,
+                     "Whose touches are alike, such as a person's or a day's, and are left out "
+                     "together where it is judged how sure to be, as of people and days to come: "
+                     "recording, those of each file; label, those of each GROUP of objects that "
+                     "recordings name as LABEL@GROUP, of which LABEL is the map's");
   command.add_flag("--unposed", flags.unposed,
                    "The sensor's poses are unknown: find how the presses of an object lie beside "
                    "each other, and build its maps from their means. For arrays so large that a "
@@ -314,7 +320,8 @@ GroupedTouches group_by_label(const MapFlags& flags, const std::vector<Recording
   };
   std::map<std::string, Group> groups;
   for (const Recording& recording : recordings) {
-    const std::string& label = flags.label.empty() ? recording.object : flags.label;
+    const auto [object, own_group] = grouped_object(recording, flags.group);
+    const std::string& label = flags.label.empty() ? object : flags.label;
     require_name(recording.path, label);
     const auto [begin, end] = selected_touches(recording, flags.frames);
     Group& group = groups[label];
@@ -325,7 +332,7 @@ GroupedTouches group_by_label(const MapFlags& flags, const std::vector<Recording
         refuse(recording.path, "sensor_pose[{}]: {}", i, *fault);
       }
       group.touches.push_back(touch);
-      group.sources.push_back({recording.path, i});
+      group.sources.push_back({recording.path, i, own_group});
     }
     if (!flags.to_folder() && groups.size() > 1) {
       refuse(recording.path,
@@ -337,6 +344,14 @@ GroupedTouches group_by_label(const MapFlags& flags, const std::vector<Recording
   GroupedTouches result;
   std::vector<std::string> labels;
   for (auto& [label, group] : groups) {
+    if (!flags.group.empty() && std::ranges::all_of(group.sources, [&](const TouchSource& source) {
+          return source.group == group.sources.front().group;
+        })) {
+      refuse_flag("--group", flags.group,
+                  "all touches of '{}' are of '{}': none are left to learn from without them; give "
+                  "touches of two groups or more of each object",
+                  label, group.sources.front().group);
+    }
     labels.push_back(label);
     result.objects.push_back({label, std::move(group.touches)});
     result.sources.push_back(std::move(group.sources));

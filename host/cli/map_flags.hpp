@@ -41,6 +41,7 @@ struct MapFlags {
   std::string symmetry;
   bool mirror = false;
   std::string label;
+  std::string group;
   bool unposed = false;
   std::optional<int> max_maps;
   std::optional<double> mm_per_pixel;
@@ -93,6 +94,7 @@ ObjectOrigin object_origin(const MapFlags& flags);
 struct TouchSource {
   std::string path;
   std::size_t index = 0;  ///< in the recording
+  std::string group;      ///< by --group; empty without
 };
 
 /// The touches of all recordings by label, in the labels' order.
@@ -100,8 +102,9 @@ struct GroupedTouches {
   std::vector<ObjectTouches> objects;
   std::vector<std::vector<TouchSource>> sources;  ///< [object][touch]
 };
-/// Throws Error on a label that no map can bear, on several labels but for a folder, and where
-/// --symmetry names another. Touches are in the robot frame, or in that of --origin X,Y,DEG; with
+/// Throws Error on a label that no map can bear, on several labels but for a folder, where
+/// --symmetry names another, and where --group puts all touches of an object into one. Touches are
+/// in the robot frame, or in that of --origin X,Y,DEG; with
 /// --unposed all are at the origin.
 GroupedTouches group_by_label(const MapFlags& flags, const std::vector<Recording>& recordings,
                               const ContactClassifier& classifier);

@@ -71,6 +71,17 @@ std::vector<Recording> touches_of(const std::vector<FolderMap>& maps) {
   return touches;
 }
 
+/// Gives presses, of all touches of the maps in turn, the groups that the maps know.
+void give_groups(const std::vector<FolderMap>& maps, std::vector<Press>& presses) {
+  auto press = presses.begin();
+  for (const auto& [file, map] : maps) {
+    const std::vector<std::string>& groups = map.source->groups;
+    for (std::size_t touch = 0; touch < map.source->touches.size(); ++touch, ++press) {
+      press->group = groups.empty() ? "" : groups[touch];
+    }
+  }
+}
+
 /// Throws Error where there are fewer than `least` touches of each of two objects.
 void require_enough(const std::vector<Press>& touches, std::size_t least) {
   std::map<std::string, std::size_t> counts;
@@ -218,6 +229,7 @@ MapSensor learn_sensor(const MapFlags& flags, const std::vector<OccupancyGrid>& 
     CalibrationTask task =
         calibration_task({.threshold = flags.threshold, .ratio = flags.ratio}, {}, touches, {});
     require_enough(task.presses, least_touches);
+    give_groups(all, task.presses);
     task.options.maps = model;
     MapSensor learned = learned_from(task, flags);
     if (learned.sensor) {
@@ -244,9 +256,9 @@ MapSensor learn_unposed_sensor(const MapFlags& flags, const std::vector<Recordin
     for (Recording& recording : labelled) {
       recording.object = flags.label.empty() ? recording.object : flags.label;
     }
-    const CalibrationTask task =
-        calibration_task({.unposed = true, .threshold = flags.threshold, .ratio = flags.ratio},
-                         {.frames = flags.frames}, labelled, {});
+    const CalibrationTask task = calibration_task(
+        {.unposed = true, .threshold = flags.threshold, .ratio = flags.ratio, .group = flags.group},
+        {.frames = flags.frames}, labelled, {});
     require_enough(task.presses, least_presses);
     return learned_from(task, flags);
   });

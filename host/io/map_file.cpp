@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <nlohmann/json.hpp>
 
 #include "io/file_format.hpp"
 #include "io/file_summary.hpp"
@@ -31,8 +32,9 @@ void require_sound(const std::filesystem::path& path, const std::optional<std::s
 Hdf5Contents open_map(const std::filesystem::path& path) {
   return {path,
           {"format", "version", "label", "cell_mm", "origin_mm", "prior", "symmetry", "spread_mm",
-           "suggested_symmetry", "mirror", "T_learned_robot_object", "centred_mm", "pressure_unit",
-           "threshold", "ratio", "peak", "left_out_fit", "pose_scale", "drawn"},
+           "suggested_symmetry", "mirror", "T_learned_robot_object", "centred_mm", "drawn",
+           // of the touches
+           "pressure_unit", "threshold", "ratio", "peak", "left_out_fit", "pose_scale", "groups"},
           {"log_odds", "observations", "mean_level", "touch_pressure", "touch_pose",
            "touch_elements", "touch_valid"}};
 }
@@ -118,6 +120,41 @@ std::vector<double> read_all(Hdf5Contents& file, const char* name,
   return numbers;
 }
 
+/// The groups of `touches` touches, as write_groups() wrote them.
+std::vector<std::string> read_groups(const Hdf5Contents& file, std::uint64_t touches) {
+  std::vector<std::string> groups;
+  const auto runs = nlohmann::json::parse(file.text("groups"), nullptr, false);
+  try {
+    for (const nlohmann::json& run : runs.get<nlohmann::json::array_t>()) {
+      const auto count = run.at(1).get<std::uint64_t>();
+      if (count > touches - groups.size()) {
+        break;
+      }
+      groups.insert(groups.end(), count, run.at(0).get<std::string>());
+    }
+  } catch (const nlohmann::json::exception&) {
+    groups.clear();
+  }
+  if (groups.size() != touches) {
+    file.refuse("attribute 'groups' does not name the groups of {} touches; build the map anew",
+                touches);
+  }
+  return groups;
+}
+
+/// As a JSON array of [group, touches in a row].
+void write_groups(Hdf5Writer& file, const std::vector<std::string>& groups) {
+  auto runs = nlohmann::json::array();
+  for (auto first = groups.begin(); first != groups.end();) {
+    const auto last = std::find_if(first, groups.end(),
+                                   [&](const std::string& group) { return group != *first; });
+    runs.push_back({*first, last - first});
+    first = last;
+  }
+  // A path need not be UTF-8.
+  file.attribute("groups", runs.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+}
+
 /// Reads what the map was built from, where the file has it.
 std::shared_ptr<const MapSource> read_source(const std::filesystem::path& path, Hdf5Contents& file,
                                              const OccupancyGrid& map) {
@@ -165,6 +202,9 @@ std::shared_ptr<const MapSource> read_source(const std::filesystem::path& path, 
     }
     source->pose_scale = PoseScale{.factor = scale[0], .map_sd_mm = scale[1]};
   }
+  if (file.has_attribute("groups")) {
+    source->groups = read_groups(file, n);
+  }
   if (file.has_dataset("touch_valid")) {
     const std::vector<double> valid = read_all(file, "touch_valid", {n, e});
     touches.valid.assign(valid.begin(), valid.end());
@@ -185,6 +225,9 @@ void write_source(Hdf5Writer& file, const MapSource& source) {
   }
   if (source.pose_scale) {
     file.attribute("pose_scale", {source.pose_scale->factor, source.pose_scale->map_sd_mm});
+  }
+  if (!source.groups.empty()) {
+    write_groups(file, source.groups);
   }
   constexpr auto compressed = Hdf5Writer::Storage::compressed;
   file.dataset("touch_pressure", {n, e}, touches.pressure, compressed);

@@ -39,11 +39,12 @@ Pose pose_of(const Recording& recording, const OccupancyGrid& map) {
 
 std::vector<Press> presses_of(std::span<const Recording> recordings,
                               const std::optional<Frames>& frames, bool posed,
-                              std::span<const OccupancyGrid> given) {
+                              const std::string& group_by, std::span<const OccupancyGrid> given) {
   std::vector<Press> presses;
   for (const Recording& recording : recordings) {
     const bool by_truth = recording.object.empty() && recording.truth && !given.empty();
-    const std::string& label = by_truth ? recording.truth->object : recording.object;
+    const auto [object, group] = grouped_object(recording, group_by);
+    const std::string& label = by_truth ? recording.truth->object : object;
     if (label.empty()) {
       refuse(recording.path,
              "attribute 'object' is empty; a calibration needs to know what was touched");
@@ -53,6 +54,7 @@ std::vector<Press> presses_of(std::span<const Recording> recordings,
     for (std::size_t touch = begin; touch < end; ++touch) {
       presses.push_back(posed ? posed_press(recording, touch) : single_press(recording, touch));
       presses.back().label = label;
+      presses.back().group = group;
       if (posed && map != given.end()) {
         presses.back().T_object_robot = pose_of(recording, *map) * *presses.back().T_object_robot;
       }
@@ -126,7 +128,15 @@ CalibrationTask calibration_task(const CalibrationRequest& request, const Reques
     }
     task.maps.push_back(map);
   }
-  task.presses = presses_of(recordings, recognition.frames, known_poses, task.maps);
+  task.presses = presses_of(recordings, recognition.frames, known_poses, request.group, task.maps);
+  if (!request.group.empty() && std::ranges::all_of(task.presses, [&](const Press& press) {
+        return press.group == task.presses.front().group;
+      })) {
+    throw Error(Fault::input,
+                fmt::format("`group {}`: all touches are of '{}'; give touches of two groups or "
+                            "more, or leave it out",
+                            request.group, task.presses.front().group));
+  }
   check_numbers(request);
   const bool gives_bins = recognition.bins || recognition.x_mm || recognition.y_mm ||
                           recognition.theta_deg || recognition.pivot_mm;

@@ -22,6 +22,7 @@ struct CalibrationRequest {
   std::string layer = "auto";       ///< auto, mean_level or log_odds
   std::optional<int> levels;        ///< of readings; none: as default_tables() has them
   int max_maps = 5;                 ///< SensorCalibrationOptions::most_maps
+  std::string group;                ///< what is left out together, see grouped_object()
 };
 
 /// What calibrate_sensor() takes. Presses are views into the recordings.

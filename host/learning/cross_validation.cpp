@@ -4,6 +4,7 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
+#include <map>
 #include <utility>
 
 #include <tbb/parallel_for.h>
@@ -312,15 +313,15 @@ class FoldTrial {
     std::vector<PlaceError> errors;
     for (std::size_t label = 0; label < labels_.size(); ++label) {
       ContactModel contact = contact_for(label);
-      std::vector<TouchEvidence> touches;
+      std::map<std::string, std::vector<TouchEvidence>> of_group;
       for (const Press& press : presses) {
         TouchEvidence touch(press.touches.front(), contact);
         touch.T_robot_sensor = press.T_object_robot.value() * touch.T_robot_sensor;
         if (press.label == labels_[label] && touch.in_contact()) {
-          touches.push_back(std::move(touch));
+          of_group[press.group].push_back(std::move(touch));
         }
       }
-      if (touches.empty()) {
+      if (of_group.empty()) {
         continue;
       }
       const std::size_t map = maps_of_[label].front();
@@ -329,7 +330,10 @@ class FoldTrial {
         of.layer = layers_[map];
       }
       contact.prior = contact.prior.value_or(of.compared().prior);
-      std::ranges::move(place_errors(touches, of, contact, 0), std::back_inserter(errors));
+      // Touches of several groups together would hide by how much each is off.
+      for (const auto& [group, touches] : of_group) {
+        std::ranges::move(place_errors(touches, of, contact, 0), std::back_inserter(errors));
+      }
     }
     return errors;
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <tuple>
 
 #include <fmt/format.h>
 
@@ -10,6 +11,53 @@
 #include "palpate/error.hpp"
 
 namespace palpate {
+
+namespace {
+
+/// The folds of presses of two groups or more; empty where there are fewer.
+std::vector<std::size_t> folds_of_groups(const std::vector<Press>& presses, std::size_t folds) {
+  std::map<std::string, std::size_t> fold_of;                // [group]
+  std::map<std::string, std::vector<std::size_t>> of_label;  // presses in each fold
+  std::vector<std::size_t> in_fold(folds);
+  std::vector<std::size_t> fold;
+  for (const Press& press : presses) {
+    std::vector<std::size_t>& own = of_label[press.label];
+    own.resize(folds);
+    const auto [group, is_new] = fold_of.try_emplace(press.group, std::size_t{0});
+    for (std::size_t k = 0; is_new && k < folds; ++k) {
+      const std::size_t best = group->second;
+      if (std::tie(own[k], in_fold[k]) < std::tie(own[best], in_fold[best])) {
+        group->second = k;
+      }
+    }
+    fold.push_back(group->second);
+    ++own[fold.back()];
+    ++in_fold[fold.back()];
+  }
+  return fold_of.size() < 2 ? std::vector<std::size_t>{} : fold;
+}
+
+}  // namespace
+
+GroupedObject grouped_object(const Recording& recording, const std::string& by) {
+  if (by.empty()) {
+    return {recording.object, ""};
+  }
+  if (by == "recording") {
+    return {recording.object, recording.path};
+  }
+  if (by != "label") {
+    throw Error(Fault::input, fmt::format("`group {}`: give recording or label", by));
+  }
+  const std::size_t at = recording.object.rfind('@');
+  if (at == std::string::npos || at == 0 || at + 1 == recording.object.size()) {
+    throw Error(Fault::input,
+                fmt::format("{}: object '{}' names no group; name it as LABEL@GROUP, or give "
+                            "`group recording`",
+                            recording.path, recording.object));
+  }
+  return {recording.object.substr(0, at), recording.object.substr(at + 1)};
+}
 
 bool has_poses(const Recording& recording) {
   for (const Pose& pose : recording.T_robot_sensor) {
@@ -36,6 +84,9 @@ Press posed_press(const Recording& recording, std::size_t touch) {
 }
 
 std::vector<std::size_t> folds_of(const std::vector<Press>& presses, std::size_t folds) {
+  if (std::vector<std::size_t> of_groups = folds_of_groups(presses, folds); !of_groups.empty()) {
+    return of_groups;
+  }
   std::map<std::string, std::size_t> of_label;
   for (const Press& press : presses) {
     ++of_label[press.label];

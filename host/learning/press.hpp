@@ -21,7 +21,20 @@ struct Press {
   /// Where the robot knew the object's pose; maps that the press is compared with are in the object
   /// frame of its recording then.
   std::optional<Pose> T_object_robot = {};
+  /// Whose press it is, such as a person's or a day's: presses of a group are alike in what those
+  /// of another are not, and are left out together, of all objects. Empty: no group.
+  std::string group = {};
 };
+
+/// What a recording was of, and whose it is.
+struct GroupedObject {
+  std::string label;
+  std::string group;  ///< see Press::group
+};
+/// @param by "": no groups; "recording": each is a group of its own, named by its path; "label":
+/// the group is what follows the last @ of the recording's object, "anna" of "cup@anna"
+/// @throws Error on another word, and where `by` is "label" and the object has no @ amid its name
+GroupedObject grouped_object(const Recording& recording, const std::string& by);
 
 /// Whether the robot knew where it touched: some touches of the recording are at different poses.
 bool has_poses(const Recording& recording);
@@ -36,7 +49,8 @@ Press posed_press(const Recording& recording, std::size_t touch);
 /// The fold of every press. At known poses press k of an object is in fold k % folds: a scan's
 /// neighbours lie side by side, and a map without several in a row would have a hole. At unknown
 /// poses press k of an object's n is in fold floor(k folds / n): presses made one after another are
-/// more alike than those of another day.
+/// more alike than those of another day. With groups, see Press::group, the presses of each are in
+/// one fold, and an object's groups in as many folds as there are, about evenly.
 std::vector<std::size_t> folds_of(const std::vector<Press>& presses, std::size_t folds);
 
 /// The presses of all folds but one.

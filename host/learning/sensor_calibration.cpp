@@ -99,8 +99,8 @@ std::vector<std::string> warnings_about(const LearnedPresses& learned) {
   for (const std::string& label : alone) {
     warnings.push_back(
         fmt::format("'{}': no touch has a map of the object that it is no part of, so that "
-                    "nothing is learned of its readings; give it two touches or a map",
-                    label));
+                    "nothing is learned of its readings; give it two touches{} or a map",
+                    label, learned.presses.front().group.empty() ? "" : " of different groups"));
   }
   return warnings;
 }
@@ -143,8 +143,15 @@ std::vector<std::vector<CrossValidation>> cross_validate(const std::vector<Press
   const double share = 1.0 / static_cast<double>(options.folds);
   const double learning = static_cast<double>(tables.size()) * table_cost;
   for (std::size_t fold = 0; fold < options.folds; ++fold) {
-    const std::vector<FoldModel> models = models_of(presses_without(fold, presses, options.folds),
-                                                    tables, how, progress.part(learning));
+    const std::vector<Press> others = presses_without(fold, presses, options.folds);
+    if (others.size() == presses.size()) {  // there are fewer groups than folds
+      progress.part(learning + static_cast<double>(tried.size()) * share)(1.0);
+      for (std::vector<CrossValidation>& of_model : tried) {
+        of_model.push_back({.familiarity = {{}}});
+      }
+      continue;
+    }
+    const std::vector<FoldModel> models = models_of(others, tables, how, progress.part(learning));
     for (std::size_t i = 0; i < tried.size(); ++i) {
       tried[i].push_back(models.empty() ? CrossValidation{.familiarity = {{}}}
                                         : try_fold(fold, presses, labels, models[i], options,

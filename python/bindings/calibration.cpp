@@ -211,7 +211,8 @@ void bind_calibration(nb::module_& module) {
       .def_rw("ratio", &CalibrationRequest::ratio)
       .def_rw("layer", &CalibrationRequest::layer)
       .def_rw("levels", &CalibrationRequest::levels)
-      .def_rw("max_maps", &CalibrationRequest::max_maps);
+      .def_rw("max_maps", &CalibrationRequest::max_maps)
+      .def_rw("group", &CalibrationRequest::group);
   module.def(
       "calibrate",
       [](nb::handle recordings, const PythonRequest& request, const CalibrationRequest& wanted,

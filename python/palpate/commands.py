@@ -116,6 +116,7 @@ def calibrate(
     layer: Literal["auto", "mean_level", "log_odds"] = "auto",
     levels: int | None = None,
     max_maps: int = 5,
+    group: Literal["", "recording", "label"] = "",
     bins: tuple[int, int, int] | None = None,
     x_mm: _Pair | None = None,
     y_mm: _Pair | None = None,
@@ -131,7 +132,10 @@ def calibrate(
     or with unposed, their poses count as unknown. Touches at known poses are at poses of the sensor in
     the object's frame, on given maps those that their truth says. maps: to compare touches with, drawn,
     which also tell where the array sits in the tool, or built from other touches; none: maps of the
-    touches themselves, each compared with maps that were built without it. Other options are the flags
+    touches themselves, each compared with maps that were built without it. group: whose touches are
+    alike, such as a person's or a day's, and are left out together, so that the pose scale and how sure
+    to be hold for people and days to come: "recording", those of each recording; "label", those of each
+    GROUP of objects that are named LABEL@GROUP. Other options are the flags
     of `palpate calibrate`, with its defaults: threshold, in the recordings' pressure unit, and ratio
     are learned where they are not given; bins, x_mm, y_mm, theta_deg and pivot_mm are those that
     recognize() will be given, for touches at known poses; device: an open Device, or a name or index
@@ -143,7 +147,7 @@ def calibrate(
     if isinstance(bins, str):
         raise TypeError(f"bins: {bins!r}; give counts, such as (25, 25, 16), or leave it out")
     asked = ("bins", "x_mm", "y_mm", "theta_deg", "pivot_mm", "frames", "device")
-    learned = ("unposed", "threshold", "ratio", "layer", "levels", "max_maps")
+    learned = ("unposed", "threshold", "ratio", "layer", "levels", "max_maps", "group")
     return _palpate.calibrate(
         recordings,
         request_of({name: given[name] for name in asked}, maps),

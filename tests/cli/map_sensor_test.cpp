@@ -145,6 +145,46 @@ TEST_F(MapSensor, IsTheSameWhateverTheOrderInWhichObjectsCame) {
   EXPECT_TRUE(bytes_of(sensor("apart")) == bytes_of(sensor("together")));
 }
 
+// On every day the objects lie elsewhere, by more than touches of one day can tell.
+TEST_F(MapSensor, IsOfGroupsThatAreLeftOutTogether) {
+  Arguments of_labels{"map"};
+  Arguments of_recordings{"map"};
+  for (std::size_t day = 0; day < 3; ++day) {
+    for (const char* letter : {"A", "U"}) {
+      Recording touches = part_of(sample_training(letter, 90), 30 * day, 30 * (day + 1));
+      for (Pose& pose : touches.T_robot_sensor) {
+        pose.translation_mm.x += 0.6 * static_cast<double>(day) - 0.6;
+      }
+      const std::string name = letter + std::to_string(day) + ".h5";
+      write_recording(folder_ / name, touches);
+      of_recordings.push_back(name);
+      touches.object = std::string(letter) + "@day" + std::to_string(day);
+      write_recording(folder_ / ("of_" + name), touches);
+      of_labels.push_back("of_" + name);
+    }
+  }
+  const auto sd_mm = [&](Arguments arguments, const std::string& folder, const Arguments& flags) {
+    arguments.insert(arguments.end(), {"-o", folder + "/"});
+    arguments.insert(arguments.end(), flags.begin(), flags.end());
+    done(arguments);
+    return std::pair(read_sensor_model(sensor(folder)).pose_scale.value().map_sd_mm,
+                     read_map(folder_ / folder / "A.map.h5").source->pose_scale->map_sd_mm);
+  };
+  const auto [alone, alone_eq7] = sd_mm(of_recordings, "alone", {});
+  const auto [grouped, grouped_eq7] = sd_mm(of_recordings, "days", {"--group", "recording"});
+  EXPECT_LT(alone, 0.25);
+  EXPECT_LT(alone_eq7, 0.25);
+  EXPECT_GT(grouped, 0.3);
+  EXPECT_GT(grouped_eq7, 0.3);
+  EXPECT_EQ(sd_mm(of_labels, "labels", {"--group", "label"}), std::pair(grouped, grouped_eq7));
+  EXPECT_EQ(read_map(folder_ / "labels/A.map.h5").source->groups.front(), "day0");
+
+  expect_refused({"map", "A0.h5", "A1.h5", "-o", "new/", "--group", "label"},
+                 {"A0.h5", "'A'", "LABEL@GROUP", "--group recording"});
+  expect_refused({"map", "A0.h5", "A1.h5", "U0.h5", "-o", "new/", "--group", "recording"},
+                 {"--group recording", "'U'", "'U0.h5'", "two groups or more"});
+}
+
 TEST_F(MapSensor, OfEarlierMapsIsSaidToStay) {
   done({"map", "A.h5", "U.h5", "-o", "maps/"});
   const Outcome outcome = palpate({"map", "A.h5", "-o", "maps/", "--sensor-model", "none"});

@@ -3,10 +3,12 @@
 #include "estimation/maps/left_out_fit.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -79,11 +81,15 @@ TEST_F(LeftOutFit, IsKeptInTheMapsFile) {
   MapBuilder builder(device_, MapOptions());
   builder.add(learned.touches(0, learned.size()));
   OccupancyGrid map = builder.build("E");
-  for (const MapSource& source : {MapSource{learned, MapOptions()}, judged(learned)}) {
+  MapSource grouped = judged(learned);
+  grouped.groups.assign(25, "anna");
+  grouped.groups.resize(40, "b\"en");
+  for (const MapSource& source : {MapSource{learned, MapOptions()}, judged(learned), grouped}) {
     map.source = std::make_shared<const MapSource>(source);
     write_map(file, map);
     const OccupancyGrid back = read_map(file);
-    const auto& [touches, options, fit, pose] = *back.source;
+    const auto& [touches, options, fit, pose, groups] = *back.source;
+    EXPECT_EQ(groups, source.groups);
     ASSERT_EQ(fit.has_value(), source.left_out.has_value());
     EXPECT_TRUE(!fit || (fit->mean == source.left_out->mean && fit->sd == source.left_out->sd));
     ASSERT_EQ(pose.has_value(), source.pose_scale.has_value());
@@ -146,6 +152,32 @@ TEST_F(LeftOutFit, TouchesOfATurnedArrayAreAtOnePlace) {
       evidence_of(recording.touches(0, recording.size()), ContactModel{});
   EXPECT_EQ(places_of(evidence, 3), (std::vector<std::size_t>{0, 1, 0, 0, 1, 2}));
   EXPECT_EQ(places_of(evidence, 4), (std::vector<std::size_t>{0, 1, 2, 3, 4, 5})) << "too few";
+}
+
+// On every day the object lies elsewhere, by more than touches of one day can tell.
+TEST_F(LeftOutFit, IsOfGroupsOnMapsWithoutThem) {
+  constexpr std::array offsets_mm{0.5, -0.5, 0.4, -0.4};
+  Recording learned = touches(120, 3);
+  MapSource source{learned, MapOptions()};
+  for (std::size_t i = 0; i < learned.size(); ++i) {
+    source.touches.T_robot_sensor[i].translation_mm.x += offsets_mm[i / 30];
+    source.touches.T_robot_sensor[i].translation_mm.y -= offsets_mm[(i / 30 + 2) % 4];
+  }
+  judge_left_out(device_, source);
+  const double by_places_mm = source.pose_scale->map_sd_mm;
+  const double fit = source.left_out->mean;
+  for (std::size_t i = 0; i < learned.size(); ++i) {
+    source.groups.push_back("day " + std::to_string(i / 30));
+  }
+  judge_left_out(device_, source);
+  EXPECT_LT(by_places_mm, 0.25) << "others of the same day are in the map";
+  // Three other days move a map by a third of a day's offset the other way; theta moves by less.
+  EXPECT_GT(source.pose_scale->map_sd_mm, 0.35);
+  EXPECT_LT(source.pose_scale->map_sd_mm, 0.75);
+  EXPECT_LT(source.left_out->mean, fit);
+  source.groups.assign(learned.size(), "one day");
+  judge_left_out(device_, source);
+  EXPECT_EQ(source.pose_scale->map_sd_mm, by_places_mm) << "one group tells of no other";
 }
 
 // The map of three corners knows nothing of the fourth, at whatever angle it was touched there.

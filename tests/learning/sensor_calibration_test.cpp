@@ -155,6 +155,36 @@ TEST(SensorCalibration, OnWideBinsIsLessSureTheMoreTouchesThereAre) {
   EXPECT_LT(found.groups->after.calibration_error, found.groups->table.calibration_error);
 }
 
+// On every day the letters lie elsewhere, by more than touches of one day can tell.
+TEST(SensorCalibration, LearnsThePoseScaleOfGroupsThatWereLeftOut) {
+  constexpr std::array offsets_mm{0.5, -0.5, 0.4};
+  LetterPresses letters;
+  letters.add("A", 90, 41);
+  letters.add("U", 90, 42);
+  for (Recording& recording : letters.recordings) {
+    for (std::size_t i = 0; i < recording.size(); ++i) {
+      recording.T_robot_sensor[i].translation_mm += glm::dvec2(offsets_mm[i / 30], 0.0);
+    }
+  }
+  letters.make_presses(true);
+  const auto calibrated = [&] {
+    double shown = 0.0;
+    const SensorCalibration found =
+        calibrate_sensor(letters.presses, {}, {}, [&](double fraction) { shown = fraction; });
+    EXPECT_NEAR(shown, 1.0, 1e-9) << "there are fewer days than folds";
+    return found.sensor.pose_scale.value().map_sd_mm;
+  };
+  const double by_touches_mm = calibrated();
+  for (std::size_t i = 0; i < letters.presses.size(); ++i) {
+    letters.presses[i].group = "day " + std::to_string(i % 90 / 30);
+  }
+  const double by_days_mm = calibrated();
+  EXPECT_LT(by_touches_mm, 0.2) << "others of the same day are in the map";
+  // Of 0.7 mm along one axis of three, about; two other days move the map by half as much.
+  EXPECT_GT(by_days_mm, 0.3);
+  EXPECT_LT(by_days_mm, 0.7);
+}
+
 TEST(SensorCalibration, LearnsTheSameGammaWhateverTheBins) {
   const LetterPresses letters = three_letters(24);
   const auto gamma = [&](const RecognitionBins& given) {

@@ -4,6 +4,7 @@
 #include <iterator>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -106,6 +107,51 @@ TEST(Presses, AtKnownPosesTakeTurnsInFoldsAndOthersShareThemWithTheirNeighbours)
     press.T_object_robot = Pose{};
   }
   EXPECT_EQ(folds_of(simulated.presses, 2), (std::vector<std::size_t>{0, 1, 0, 0, 1, 0}));
+}
+
+std::vector<Press> grouped(const std::vector<std::pair<std::string, std::string>>& of) {
+  std::vector<Press> presses;
+  for (const auto& [label, group] : of) {
+    presses.push_back({.name = "", .label = label, .touches = {}, .group = group});
+  }
+  return presses;
+}
+
+TEST(Presses, OfAGroupAreInOneFoldAndAnObjectsGroupsInDifferentOnes) {
+  using Folds = std::vector<std::size_t>;
+  // Whoever touched two objects is left out of both.
+  EXPECT_EQ(folds_of(grouped({{"A", "anna"},
+                              {"A", "anna"},
+                              {"A", "ben"},
+                              {"B", "ben"},
+                              {"B", "anna"},
+                              {"A", "ben"}}),
+                     5),
+            (Folds{0, 0, 1, 1, 0, 1}));
+  // A recording is of one object: as many folds as there are, and the emptiest next.
+  EXPECT_EQ(folds_of(grouped({{"A", "1"}, {"A", "2"}, {"B", "3"}, {"B", "4"}}), 5),
+            (Folds{0, 1, 2, 3}));
+  EXPECT_EQ(
+      folds_of(grouped({{"A", "1"}, {"A", "1"}, {"A", "2"}, {"B", "3"}, {"B", "4"}, {"A", "5"}}),
+               2),
+      (Folds{0, 0, 1, 1, 0, 1}));
+  // One group tells of no other.
+  EXPECT_EQ(folds_of(grouped({{"A", "anna"}, {"A", "anna"}}), 2), (Folds{0, 1}));
+}
+
+TEST(GroupedObject, IsNamedByTheRecordingOrItsLabel) {
+  Recording recording{.path = "day1/cup.h5", .object = "red@cup@anna"};
+  EXPECT_EQ(grouped_object(recording, "").label, "red@cup@anna");
+  EXPECT_EQ(grouped_object(recording, "").group, "");
+  EXPECT_EQ(grouped_object(recording, "recording").label, "red@cup@anna");
+  EXPECT_EQ(grouped_object(recording, "recording").group, "day1/cup.h5");
+  EXPECT_EQ(grouped_object(recording, "label").label, "red@cup");
+  EXPECT_EQ(grouped_object(recording, "label").group, "anna");
+  EXPECT_THROW(grouped_object(recording, "day"), Error);
+  for (const char* object : {"cup", "@anna", "cup@", ""}) {
+    recording.object = object;
+    EXPECT_THROW(grouped_object(recording, "label"), Error) << object;
+  }
 }
 
 TEST(PlacingLattice, IsAsWideAsTheShorterSideOfTheBoxAroundAllMaps) {

@@ -282,6 +282,8 @@ def test_a_calibration_is_that_of_the_command(
         (["--levels", 1], {"levels": 1}, {"--levels 1": "levels=1"}),
         (["--layer", "both"], {"layer": "both"}, {"--layer both": "layer='both'"}),
         (["--max-maps", 0], {"max_maps": 0}, {"--max-maps 0": "max_maps=0"}),
+        (["--group", "day"], {"group": "day"}, {"--group day": "group='day'"}),
+        (["--group", "label"], {"group": "label"}, {"--group recording": "group='recording'"}),
         (["--unposed", "--x-mm=-1:1"], {"unposed": True, "x_mm": (-1, 1)},
          {"--bins, --x-mm, --y-mm, --theta-deg and --pivot-mm":
           "bins=, x_mm=, y_mm=, theta_deg= and pivot_mm="}),

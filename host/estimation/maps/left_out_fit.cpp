@@ -8,6 +8,7 @@
 #include <iterator>
 #include <map>
 #include <numeric>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -25,8 +26,9 @@ namespace palpate {
 namespace {
 
 constexpr std::size_t parts = 4;
-constexpr std::size_t enough = 200;       // that are judged
-constexpr std::size_t least_judged = 16;  // fewer would tell the sd to no more than a fifth of it
+constexpr std::size_t enough = 200;        // that are judged
+constexpr std::size_t groups_judged = 20;  // if there are so many, whatever their touches
+constexpr std::size_t least_judged = 16;   // fewer would tell the sd to no more than a fifth of it
 
 /// Bins of T_object_robot about the identity, wide enough for refine() to move its window.
 PoseLattice lattice_about(const Body& body) {
@@ -103,14 +105,15 @@ std::vector<PlaceError> place_errors(std::span<const TouchEvidence> touches, con
 std::optional<PoseScale> pose_scale_of(std::span<const PlaceError> errors) {
   constexpr std::size_t enough_errors = 16;
   constexpr double most_factor = 4.0;
-  constexpr double most_mm = 0.3;
+  constexpr double most_mm = 1.5;  // errors are below
+  constexpr double fine_mm = 0.3;
   if (errors.size() < enough_errors) {
     return {};
   }
   std::optional<PoseScale> best;
   double least_cost = 0.0;
   for (double factor = most_factor / 64.0; factor <= most_factor; factor *= 1.1) {
-    for (double sd_mm = 0.0; sd_mm <= most_mm; sd_mm += 0.01) {
+    for (double sd_mm = 0.0; sd_mm <= most_mm; sd_mm += sd_mm < fine_mm ? 0.01 : 0.05) {
       double cost = 0.0;
       for (const auto& [moved_mm, covariance] : errors) {
         const glm::dmat3 all = factor * covariance + glm::dmat3(sd_mm * sd_mm);
@@ -140,6 +143,32 @@ std::vector<std::size_t> places_of(std::span<const TouchEvidence> touches, std::
   return place;
 }
 
+namespace {
+
+/// [touch] the number of its group; none where there are fewer than two.
+std::vector<std::size_t> groups_of(const MapSource& source) {
+  std::map<std::string, std::size_t> number_of;
+  std::vector<std::size_t> numbers;
+  for (const std::string& group : source.groups) {
+    numbers.push_back(number_of.try_emplace(group, number_of.size()).first->second);
+  }
+  return number_of.size() < 2 ? std::vector<std::size_t>{} : numbers;
+}
+
+/// [touch] one of `parts`, at random; the same for the same number.
+std::vector<std::size_t> random_parts(std::vector<std::size_t> number) {
+  constexpr std::uint64_t seed = 0;
+  Random random(seed, Stream::touch_order);
+  std::vector<std::size_t> part_of(number.size());
+  for (std::size_t& part : part_of) {
+    part = static_cast<std::size_t>(random.uniform(0.0, static_cast<double>(parts)));
+  }
+  std::ranges::transform(number, number.begin(), [&](std::size_t one) { return part_of[one]; });
+  return number;
+}
+
+}  // namespace
+
 void judge_left_out(Device& device, MapSource& source) {
   const std::vector<Touch> touches = source.touches.touches(0, source.touches.size());
   const ContactModel contact{.classifier = source.options.classifier,
@@ -152,20 +181,17 @@ void judge_left_out(Device& device, MapSource& source) {
     return;
   }
   MapBuilder builder(device, source.options);
-  // Judges touches on maps of the others. Touches with the same number are left out together.
-  const auto leave_out = [&](std::span<const std::size_t> number, const auto& judge) {
-    constexpr std::uint64_t seed = 0;
-    Random random(seed, Stream::touch_order);
-    std::vector<std::size_t> part_of(touches.size());  // [number]
-    for (std::size_t& part : part_of) {
-      part = static_cast<std::size_t>(random.uniform(0.0, static_cast<double>(parts)));
-    }
+  // Judges touches on maps of the others. Touches of one part are left out together.
+  const auto leave_out = [&](std::span<const std::size_t> part, std::size_t least_parts,
+                             const auto& judge) {
+    const std::size_t count = std::ranges::max(part) + 1;
     std::size_t all_judged = 0;
-    for (std::size_t left_out = 0; left_out < parts && all_judged < enough; ++left_out) {
+    for (std::size_t left_out = 0;
+         left_out < count && (all_judged < enough || left_out < least_parts); ++left_out) {
       std::vector<Touch> others;
       std::vector<TouchEvidence> judged;
       for (std::size_t i = 0; i < touches.size(); ++i) {
-        if (part_of[number[i]] != left_out) {
+        if (part[i] != left_out) {
           others.push_back(touches[i]);
         } else if (evidence[i].in_contact()) {
           judged.push_back(evidence[i]);
@@ -177,19 +203,28 @@ void judge_left_out(Device& device, MapSource& source) {
       all_judged += judged.size();
     }
   };
-  std::vector<std::size_t> each(touches.size());
-  std::iota(each.begin(), each.end(), std::size_t{0});
   std::vector<double> z;
-  leave_out(each, [&](const Hypothesis& of, std::span<const TouchEvidence> judged) {
+  const auto judge_fit = [&](const Hypothesis& of, std::span<const TouchEvidence> judged) {
     for (const TouchEvidence& touch : judged) {
       z.push_back(evidence_fit(std::span(&touch, 1), Pose{}, of.map, contact, 0)->z);
     }
-  });
+  };
   std::vector<PlaceError> errors;
-  leave_out(places_of(evidence, parts),
-            [&](const Hypothesis& of, std::span<const TouchEvidence> judged) {
-              std::ranges::move(place_errors(judged, of, contact, 0), std::back_inserter(errors));
-            });
+  const auto judge_places = [&](const Hypothesis& of, std::span<const TouchEvidence> judged) {
+    std::ranges::move(place_errors(judged, of, contact, 0), std::back_inserter(errors));
+  };
+  if (const std::vector<std::size_t> group = groups_of(source); !group.empty()) {
+    leave_out(group, groups_judged,
+              [&](const Hypothesis& of, std::span<const TouchEvidence> judged) {
+                judge_fit(of, judged);
+                judge_places(of, judged);
+              });
+  } else {
+    std::vector<std::size_t> each(touches.size());
+    std::iota(each.begin(), each.end(), std::size_t{0});
+    leave_out(random_parts(each), 0, judge_fit);
+    leave_out(random_parts(places_of(evidence, parts)), 0, judge_places);
+  }
   source.left_out = scale_of(z);
   source.pose_scale = pose_scale_of(errors);
 }

@@ -44,7 +44,8 @@ std::vector<std::size_t> places_of(std::span<const TouchEvidence> touches, std::
 /// and judges the others at their poses, until about 200 are judged, or each touch once. For
 /// pose_scale, touches at one place are left out together: turned by half a turn, an array has
 /// elements where it had others, so that a map of these places it better than one of touches
-/// elsewhere. Both are none where fewer than 16 touches are in contact.
+/// elsewhere. With two MapSource::groups or more, both are of touches on maps without their group.
+/// Both are none where fewer than 16 touches are in contact.
 /// @throws Error as MapBuilder does
 void judge_left_out(Device& device, MapSource& source);
 

@@ -77,6 +77,9 @@ struct MapSource {
   std::optional<FitScale> left_out = {};
   /// How far the poses of some of the touches are off on a map of the others, by Eq. 7 as above.
   std::optional<PoseScale> pose_scale = {};
+  /// [touch] whose it is, such as a person's or a day's: touches of a group are left out together
+  /// for `left_out` and `pose_scale`. Empty: there are no groups.
+  std::vector<std::string> groups = {};
 };
 
 /// Returns the map as its `source` makes it with another prior, and what its touches are like where
