@@ -261,7 +261,7 @@ void add_live(CLI::App& app) {
   add_sensor_flags(*command, *options,
                    " [default: the poses of the replay, of the simulation or of the lines]");
   add_recognition_flags(*command, options->request, options->verbose);
-  add_detector_flags(*command, options->detector);
+  add_detector_flags(*command, options->detector, "10; 0: the rest stays the baseline");
   command
       ->add_option(
           "--tare", options->tare_s,

@@ -12,7 +12,7 @@
 
 namespace palpate::cli {
 
-void add_detector_flags(CLI::App& command, DetectorFlags& flags) {
+void add_detector_flags(CLI::App& command, DetectorFlags& flags, const std::string& usual_drift) {
   TouchDetectorOptions& options = flags.options;
   command.add_option("--onset", flags.onset,
                      "A touch begins when the largest pressure above the baseline exceeds this "
@@ -31,11 +31,10 @@ void add_detector_flags(CLI::App& command, DetectorFlags& flags) {
       .add_option("--smooth-s", options.smooth_s,
                   "Time over which pressures are averaged before they are judged, s")
       ->capture_default_str();
-  command
-      .add_option("--drift-s", options.drift_s,
-                  "Time constant, s, with which the baseline follows drift while nothing "
-                  "touches the array; 0: the baseline is fixed")
-      ->capture_default_str();
+  command.add_option("--drift-s", flags.drift_s,
+                     "Longer than any press, s: what an element reads for so long is its rest, "
+                     "which drifts and is subtracted [default: " +
+                         usual_drift + "]");
 }
 
 TouchDetectorOptions detector_options(const DetectorFlags& flags, const std::string& pressure_unit,
@@ -47,6 +46,7 @@ TouchDetectorOptions detector_options(const DetectorFlags& flags, const std::str
     refuse(source, "pressure_unit = raw has no default onset; give --onset");
   }
   options.release = flags.release.value_or(options.onset / 2.0);
+  options.drift_s = flags.drift_s.value_or(options.drift_s);
   return options;
 }
 
