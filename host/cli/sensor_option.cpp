@@ -1,5 +1,7 @@
 #include "cli/sensor_option.hpp"
 
+#include <algorithm>
+#include <functional>
 #include <utility>
 
 #include <fmt/format.h>
@@ -68,8 +70,8 @@ constexpr const char* poses_help =
     "header has these names";
 
 /// The flags that add_array_flags() adds.
-constexpr const char* array_flags[] = {"--array", "--first-element", "--order", "--dead",
-                                       "--pressure-unit"};
+constexpr const char* array_flags[] = {"--array", "--first-element", "--order",
+                                       "--dead",  "--pressure-unit", "--sign"};
 
 /// Standard input as a sensor.
 std::unique_ptr<LineSensor> open_lines(const SensorArguments& arguments,
@@ -85,6 +87,9 @@ std::unique_ptr<LineSensor> open_lines(const SensorArguments& arguments,
            "x_mm, y_mm and theta_rad in the lines of the frames");
   }
   ImportArray array = import_array(arguments.lines);
+  if (arguments.lines.sign < 0) {
+    std::ranges::transform(array.baseline, array.baseline.begin(), std::negate<>{});
+  }
   return std::make_unique<LineSensor>(
       SensorDescription{.name = "standard input",
                         .serial = {},
@@ -92,16 +97,19 @@ std::unique_ptr<LineSensor> open_lines(const SensorArguments& arguments,
                         .elements_mm = std::move(array.elements_mm),
                         .valid = std::move(array.valid),
                         .baseline = std::move(array.baseline)},
-      complain);
+      complain, arguments.lines.sign);
 }
 
 /// Requires that the flags of an array are left out where the sensor has one.
 void require_no_array(const SensorArguments& arguments) {
   const ImportOptions& given = arguments.lines;
   const ImportOptions unset;
-  const bool is_set[] = {given.array != unset.array, given.first_element != unset.first_element,
-                         given.order != unset.order, given.dead != unset.dead,
-                         given.pressure_unit != unset.pressure_unit};
+  const bool is_set[] = {given.array != unset.array,
+                         given.first_element != unset.first_element,
+                         given.order != unset.order,
+                         given.dead != unset.dead,
+                         given.pressure_unit != unset.pressure_unit,
+                         given.sign != unset.sign};
   for (std::size_t i = 0; i < std::size(array_flags); ++i) {
     if (is_set[i]) {
       refuse(array_flags[i],
@@ -197,6 +205,10 @@ CLI::Option* add_array_flags(CLI::App& command, ImportOptions& options) {
   command
       .add_option("--pressure-unit", options.pressure_unit,
                   "Unit of the pressures: kPa, or raw for readings of another unit")
+      ->capture_default_str();
+  command
+      .add_option("--sign", options.sign,
+                  "-1 where readings fall under load: they are stored times -1 and rise")
       ->capture_default_str();
   return array;
 }

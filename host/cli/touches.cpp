@@ -43,9 +43,9 @@ class RestedFrames {
                std::optional<double> drift_s)
       : stream_(stream) {
     if (drift_s == 0.0) {
-      rest_ = {.time_s = {0.0},
-               .readings = {stream.description().baseline.begin(),
-                            stream.description().baseline.end()}};
+      rest_ = {
+          .time_s = {0.0},
+          .readings = {stream.description().baseline.begin(), stream.description().baseline.end()}};
     } else {
       RestFinder finder(stream.description().valid, thresholds.onset, thresholds.release);
       for (stream.start(); !stream.ended();) {
@@ -299,9 +299,10 @@ void add_touches(CLI::App& app) {
                    "Recording of touches to write (HDF5): per touch, the mean pressures above the "
                    "elements' rest in its steady phase")
       ->required();
-  add_detector_flags(*command, options->detector,
-                     "1.5 times most presses of the recording or more, up to 32; 0: the rest is the "
-                     "recording's baseline");
+  add_detector_flags(
+      *command, options->detector,
+      "1.5 times most presses of the recording or more, up to 32; 0: the rest is the "
+      "recording's baseline");
   command->add_flag("--unposed", options->unposed,
                     "The sensor's poses are unknown: write every touch at the pose 0, for 'palpate "
                     "map --unposed', 'palpate calibrate --unposed' and 'palpate recognize "

@@ -94,12 +94,11 @@ void Rest::at(double elapsed_s, std::vector<double>& rest) const {
   if (e == 0) {
     return;
   }
-  const auto after = static_cast<std::size_t>(std::ranges::upper_bound(time_s, elapsed_s) -
-                                              time_s.begin());
+  const auto after =
+      static_cast<std::size_t>(std::ranges::upper_bound(time_s, elapsed_s) - time_s.begin());
   const std::size_t high = std::min(after, time_s.size() - 1);
   const std::size_t low = after == 0 ? 0 : after - 1;
-  const double part =
-      high == low ? 0.0 : (elapsed_s - time_s[low]) / (time_s[high] - time_s[low]);
+  const double part = high == low ? 0.0 : (elapsed_s - time_s[low]) / (time_s[high] - time_s[low]);
   for (std::size_t k = 0; k < e; ++k) {
     rest[k] = std::lerp(double{readings[low * e + k]}, double{readings[high * e + k]}, part);
   }
@@ -136,7 +135,8 @@ void RestFinder::add(const Frame& frame) {
 void RestFinder::end_block() {
   time_s_.push_back(0.5 * (*begin_s_ + last_s_));
   for (std::size_t k = 0; k < elements_; ++k) {
-    readings_.push_back(known_[k] != 0 ? static_cast<float>(smoother_.means()[k]) : unknown_reading);
+    readings_.push_back(known_[k] != 0 ? static_cast<float>(smoother_.means()[k])
+                                       : unknown_reading);
   }
   known_.assign(elements_, 0);
   begin_s_.reset();
@@ -154,7 +154,8 @@ std::vector<float> RestFinder::column(std::size_t element, float sign) const {
   const float low = quantile(sorted, 0.25);
   const float high = quantile(sorted, 0.75);
   const float least = low - 4.0F * (high - low) - 100.0F * static_cast<float>(onset_);
-  std::ranges::replace_if(values, [&](float v) { return v < least; }, unknown_reading);
+  std::ranges::replace_if(
+      values, [&](float v) { return v < least; }, unknown_reading);
   fill_unknown(values);
   return values;
 }

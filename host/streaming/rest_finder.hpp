@@ -30,8 +30,8 @@ struct Rest {
 /// An element's rest is the morphological opening of its reading: the running minimum, and the
 /// running maximum of this, over a window longer than a press. Linear drift passes an opening
 /// unchanged; presses do not. Readings are means of 0.1 s of medians over three frames. The opening
-/// lies low by their noise, so the mean by which the untouched array reads above it is added. During
-/// a press the rest is a line from its value before to its value after.
+/// lies low by their noise, so the mean by which the untouched array reads above it is added.
+/// During a press the rest is a line from its value before to its value after.
 ///
 /// Memory: a float for each element and tenth of a second. Time: O(1) for each of these.
 class RestFinder {
@@ -43,8 +43,8 @@ class RestFinder {
   /// Takes the stream's next frame; one that is_readable() refuses is ignored.
   void add(const Frame& frame);
 
-  /// Returns the rest of the stream. Without `window_s` the window is the shortest of 2, 4, ... 32 s
-  /// that is 1.5 times as long as nine tenths of the presses and leaves the fewest steps in the
+  /// Returns the rest of the stream. Without `window_s` the window is the shortest of 2, 4, ... 32
+  /// s that is 1.5 times as long as nine tenths of the presses and leaves the fewest steps in the
   /// rest.
   Rest find(std::optional<double> window_s);
 

@@ -53,8 +53,8 @@ struct DetectedTouch {
 /// they count as at most `onset` below it. Where the array reads above the release for longer than
 /// `drift_s`, through presses and what lies between them, drift has overtaken the baseline, which
 /// becomes the lower quintile of what each element read meanwhile: a press that is held for longer
-/// ends then. Lost frames only coarsen the times of a touch. A silence longer than `largest_gap_s`, or a
-/// clock that goes back, ends a touch and restarts detection. Memory is bounded: a long steady
+/// ends then. Lost frames only coarsen the times of a touch. A silence longer than `largest_gap_s`,
+/// or a clock that goes back, ends a touch and restarts detection. Memory is bounded: a long steady
 /// phase keeps frames evenly spread over it. Every call on a moved-from detector throws Error.
 class PALPATE_API TouchDetector {
  public:
