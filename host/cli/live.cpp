@@ -100,6 +100,24 @@ void warm_up(Recogniser& recogniser, const RecognitionTask& task, const SensorDe
   recogniser.reset();
 }
 
+/// Says what is wrong with the frames' times and readings.
+void judge_frames(const LiveState& state) {
+  if (state.frames_back > 0) {
+    fmt::print(stderr,
+               "palpate: time runs backwards at {} of {} frames, each of which ends a touch; send "
+               "the frames in the order of their times\n",
+               state.frames_back, state.counters.frames);
+  }
+  // A sensor whose rest is taken in a press, too, reads below it for a while.
+  if (20 * state.frames_below > state.counters.frames) {
+    fmt::print(stderr,
+               "palpate: the readings fall below their rest by more than the onset in {} of {} "
+               "frames; if they fall under load, give --sign -1 to 'palpate import', or beside "
+               "--sensor -\n",
+               state.frames_below, state.counters.frames);
+  }
+}
+
 void live(const LiveArguments& options) {
   if (options.reset_after_s) {
     require_above("--reset-after", *options.reset_after_s, 0.0);
@@ -246,6 +264,7 @@ void live(const LiveArguments& options) {
   if (!to_program) {
     fmt::print("{}\n", setup_words(device, task));
   }
+  judge_frames(state);
   report_refused(opened);
 }
 
@@ -261,7 +280,7 @@ void add_live(CLI::App& app) {
   add_sensor_flags(*command, *options,
                    " [default: the poses of the replay, of the simulation or of the lines]");
   add_recognition_flags(*command, options->request, options->verbose);
-  add_detector_flags(*command, options->detector);
+  add_detector_flags(*command, options->detector, "10; 0: the rest stays the baseline");
   command
       ->add_option(
           "--tare", options->tare_s,

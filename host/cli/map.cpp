@@ -1,9 +1,11 @@
 #include "cli/commands.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <functional>
 #include <iterator>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -175,6 +177,30 @@ void warn_of_unknown_poses(const std::vector<Recording>& recordings) {
   }
 }
 
+/// Refuses touches in which every element is in contact in all of many touches: a map of them has
+/// no outline, and its cells' number makes every later step long.
+void require_outline(std::span<const ObjectTouches> objects, const ContactClassifier& classifier,
+                     const std::string& pressure_unit) {
+  constexpr std::size_t few = 10;
+  for (const ObjectTouches& object : objects) {
+    double least = std::numeric_limits<double>::infinity();
+    const bool all = std::ranges::all_of(object.touches, [&](const Touch& touch) {
+      const std::vector<Reading> readings = classifier.classify(touch);
+      for (std::size_t k = 0; k < readings.size(); ++k) {
+        least = readings[k] == Reading::in_contact ? std::min(least, touch.pressure[k]) : least;
+      }
+      return std::ranges::none_of(readings, [](Reading r) { return r == Reading::no_contact; });
+    });
+    if (all && object.touches.size() >= few && std::isfinite(least)) {
+      refuse(fmt::format("object '{}'", object.label),
+             "every element is in contact in all {} touches, which read {:.3g} {} or more, so that "
+             "its map would have no outline; subtract what the untouched array reads, or give a "
+             "higher --threshold",
+             object.touches.size(), least, pressure_unit);
+    }
+  }
+}
+
 void build_maps(const MapFlags& flags) {
   const std::vector<Recording> recordings = read_touch_recordings(flags.recordings);
   const std::optional<LearnedSensor> sensor = sensor_of(flags, recordings);
@@ -183,6 +209,8 @@ void build_maps(const MapFlags& flags) {
   const ObjectOrigin origin = object_origin(flags);
   const GroupedTouches grouped = group_by_label(flags, recordings, model.classifier);
   std::vector<ObjectTouches> objects = grouped.objects;
+
+  require_outline(objects, model.classifier, recordings.front().pressure_unit);
 
   std::vector<std::filesystem::path> map_paths;
   std::vector<std::string> names;

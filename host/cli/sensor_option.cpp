@@ -1,5 +1,7 @@
 #include "cli/sensor_option.hpp"
 
+#include <algorithm>
+#include <functional>
 #include <utility>
 
 #include <fmt/format.h>
@@ -12,7 +14,7 @@
 
 namespace palpate::cli {
 
-void add_detector_flags(CLI::App& command, DetectorFlags& flags) {
+void add_detector_flags(CLI::App& command, DetectorFlags& flags, const std::string& usual_drift) {
   TouchDetectorOptions& options = flags.options;
   command.add_option("--onset", flags.onset,
                      "A touch begins when the largest pressure above the baseline exceeds this "
@@ -31,11 +33,10 @@ void add_detector_flags(CLI::App& command, DetectorFlags& flags) {
       .add_option("--smooth-s", options.smooth_s,
                   "Time over which pressures are averaged before they are judged, s")
       ->capture_default_str();
-  command
-      .add_option("--drift-s", options.drift_s,
-                  "Time constant, s, with which the baseline follows drift while nothing "
-                  "touches the array; 0: the baseline is fixed")
-      ->capture_default_str();
+  command.add_option("--drift-s", flags.drift_s,
+                     "Longer than any press, s: what an element reads for so long is its rest, "
+                     "which drifts and is subtracted [default: " +
+                         usual_drift + "]");
 }
 
 TouchDetectorOptions detector_options(const DetectorFlags& flags, const std::string& pressure_unit,
@@ -47,6 +48,7 @@ TouchDetectorOptions detector_options(const DetectorFlags& flags, const std::str
     refuse(source, "pressure_unit = raw has no default onset; give --onset");
   }
   options.release = flags.release.value_or(options.onset / 2.0);
+  options.drift_s = flags.drift_s.value_or(options.drift_s);
   return options;
 }
 
@@ -69,8 +71,8 @@ constexpr const char* poses_help =
     "header has these names";
 
 /// The flags that add_array_flags() adds.
-constexpr const char* array_flags[] = {"--array", "--first-element", "--order", "--dead",
-                                       "--pressure-unit"};
+constexpr const char* array_flags[] = {"--array", "--first-element", "--order",
+                                       "--dead",  "--pressure-unit", "--sign"};
 
 /// Standard input as a sensor.
 std::unique_ptr<LineSensor> open_lines(const SensorArguments& arguments,
@@ -86,6 +88,9 @@ std::unique_ptr<LineSensor> open_lines(const SensorArguments& arguments,
            "x_mm, y_mm and theta_rad in the lines of the frames");
   }
   ArrayTable array = import_array(arguments.lines);
+  if (arguments.lines.sign < 0) {
+    std::ranges::transform(array.baseline, array.baseline.begin(), std::negate<>{});
+  }
   return std::make_unique<LineSensor>(
       SensorDescription{.name = "standard input",
                         .serial = {},
@@ -93,16 +98,19 @@ std::unique_ptr<LineSensor> open_lines(const SensorArguments& arguments,
                         .elements_mm = std::move(array.elements_mm),
                         .valid = std::move(array.valid),
                         .baseline = std::move(array.baseline)},
-      complain);
+      complain, arguments.lines.sign);
 }
 
 /// Requires that the flags of an array are left out where the sensor has one.
 void require_no_array(const SensorArguments& arguments) {
   const ImportOptions& given = arguments.lines;
   const ImportOptions unset;
-  const bool is_set[] = {given.array != unset.array, given.first_element != unset.first_element,
-                         given.order != unset.order, given.dead != unset.dead,
-                         given.pressure_unit != unset.pressure_unit};
+  const bool is_set[] = {given.array != unset.array,
+                         given.first_element != unset.first_element,
+                         given.order != unset.order,
+                         given.dead != unset.dead,
+                         given.pressure_unit != unset.pressure_unit,
+                         given.sign != unset.sign};
   for (std::size_t i = 0; i < std::size(array_flags); ++i) {
     if (is_set[i]) {
       refuse(array_flags[i],
@@ -198,6 +206,10 @@ CLI::Option* add_array_flags(CLI::App& command, ImportOptions& options) {
   command
       .add_option("--pressure-unit", options.pressure_unit,
                   "Unit of the pressures: kPa, or raw for readings of another unit")
+      ->capture_default_str();
+  command
+      .add_option("--sign", options.sign,
+                  "-1 where readings fall under load: they are stored times -1 and rise")
       ->capture_default_str();
   return array;
 }

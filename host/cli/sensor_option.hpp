@@ -15,14 +15,17 @@
 
 namespace palpate::cli {
 
-/// The flags of the touch detector; `onset` and `release` have defaults that depend on the unit.
+/// The flags of the touch detector; `onset` and `release` have defaults that depend on the unit,
+/// `drift_s` on the command.
 struct DetectorFlags {
   std::optional<double> onset;
   std::optional<double> release;
+  std::optional<double> drift_s;
   TouchDetectorOptions options;
 };
 
-void add_detector_flags(CLI::App& command, DetectorFlags& flags);
+/// @param usual_drift what stands for --drift-s where it is not given, for its help
+void add_detector_flags(CLI::App& command, DetectorFlags& flags, const std::string& usual_drift);
 
 /// The detector's options for pressures of this unit; the release is by default half of the onset.
 /// Throws Error naming `source` where the pressures are raw and --onset is missing.

@@ -16,123 +16,91 @@
 #include "cli/options.hpp"
 #include "cli/sensor_option.hpp"
 #include "io/recording_state.hpp"
-#include "model/elements_that.hpp"
 #include "model/option_words.hpp"
 #include "model/stream_time.hpp"
-#include "palpate/baseline.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
 #include "palpate/touch_detector.hpp"
 #include "palpate/virtual_sensor.hpp"
+#include "streaming/rest_finder.hpp"
 
 namespace palpate::cli {
 
 namespace {
 
-/// Watches a stream for a last touch that does not end, and for the elements that hold it.
-class EndlessTouch {
- public:
-  /// @param release of the touch detector
-  explicit EndlessTouch(double release) : release_(release) {}
-
-  /// Takes a frame that the detector has just taken.
-  void add(const Frame& frame, const TouchDetector& detector);
-
-  /// Returns what never releases and the remedy, as a sentence; "" where all touches end. The last
-  /// touch counts as endless where it goes on to the end of the stream and over more than half of
-  /// the frames. The only touch of a stream, which may just be cut short, counts where it goes over
-  /// more than nine tenths.
-  std::string complaint(const std::string& pressure_unit, const std::string& remedy) const;
-
- private:
-  double release_;
-  StreamTime time_;
-  std::uint64_t frames_ = 0;
-  std::vector<std::uint64_t> held_;  ///< [e] frames since the element was last below the release
-  std::uint64_t touched_ = 0;        ///< frames of the touch under way
-  double onset_s_ = 0.0;             ///< its onset, since the first frame
-  bool released_before_ = false;     ///< an earlier touch has ended
-};
-
-void EndlessTouch::add(const Frame& frame, const TouchDetector& detector) {
-  ++frames_;
-  time_.advance(frame.host_time_s);
-  const std::vector<double>& pressure = detector.smoothed();
-  held_.resize(pressure.size(), 0);
-  for (std::size_t i = 0; i < pressure.size(); ++i) {
-    held_[i] = pressure[i] < release_ ? 0 : held_[i] + 1;
-  }
-  if (detector.touching()) {
-    onset_s_ = touched_ == 0 ? time_.elapsed_s() : onset_s_;
-    ++touched_;
-  } else {
-    released_before_ = released_before_ || touched_ > 0;
-    touched_ = 0;
-  }
-}
-
-std::string EndlessTouch::complaint(const std::string& pressure_unit,
-                                    const std::string& remedy) const {
-  const double part = released_before_ ? 0.5 : 0.9;
-  if (static_cast<double>(touched_) <= part * static_cast<double>(frames_)) {
-    return "";
-  }
-  std::vector<std::size_t> held;
-  for (std::size_t i = 0; i < held_.size(); ++i) {
-    if (held_[i] >= touched_) {
-      held.push_back(i);
-    }
-  }
-  const std::string below =
-      fmt::format("below {:.4g} {} from {:.2f} s on", release_, pressure_unit, onset_s_);
-  // Where most elements are held, the whole array reads too much.
-  if (held.empty() || 2 * held.size() > held_.size()) {
-    return fmt::format("the array never reads {}, so that its touch does not end; {}", below,
-                       remedy);
-  }
-  return fmt::format(
-      "{} {}, so that the touch does not end; mark broken elements dead in 'valid', or {}",
-      elements_that(held, "never reads", "never read"), below, remedy);
-}
-
-/// Seconds of the tare where a recording has no baseline, as in `palpate record`.
-constexpr double usual_tare_s = 0.5;
-
 struct TouchesArguments {
   std::string frames;
   std::string output;
   DetectorFlags detector;
-  std::optional<double> tare_s;
   bool unposed = false;
 };
 
-/// Returns the baseline: by --tare, else as the recording holds it, else by a tare as of `palpate
-/// record`.
-std::vector<double> baseline_for(const TouchesArguments& options, Sensor& stream,
-                                 const TouchDetectorOptions& detector) {
-  const SensorDescription& sensor = stream.description();
-  if (!options.tare_s && !sensor.baseline.empty()) {
-    return sensor.baseline;
-  }
-  const double tare_s = options.tare_s.value_or(usual_tare_s);
-  if (tare_s == 0.0) {
-    return {};
-  }
-  std::vector<Frame> frames;
-  StreamTime time;
-  stream.start();
-  while (!stream.ended() && (frames.empty() || time.elapsed_s() < tare_s)) {
-    if (std::optional<Frame> frame = stream.next({})) {
-      time.advance(frame->host_time_s);
-      frames.push_back(std::move(*frame));
+/// The frames of a recording as pressures above their rest.
+class RestedFrames {
+ public:
+  /// Finds the rest in a first pass, unless `drift_s` is 0: then it is the recording's baseline.
+  RestedFrames(Sensor& stream, const TouchDetectorOptions& thresholds,
+               std::optional<double> drift_s)
+      : stream_(stream) {
+    if (drift_s == 0.0) {
+      rest_ = {
+          .time_s = {0.0},
+          .readings = {stream.description().baseline.begin(), stream.description().baseline.end()}};
+    } else {
+      RestFinder finder(stream.description().valid, thresholds.onset, thresholds.release);
+      for (stream.start(); !stream.ended();) {
+        if (const std::optional<Frame> frame = stream.next({})) {
+          finder.add(*frame);
+        }
+      }
+      rest_ = finder.find(drift_s);
     }
+    stream.start();
   }
-  stream.stop();
-  try {
-    return baseline_of(frames, sensor, detector.onset);
-  } catch (const Error& error) {
-    refuse(options.frames, "{}, or give another --tare; 0: no baseline", error.what());
+
+  bool ended() const { return stream_.ended(); }
+  std::optional<Frame> next() {
+    std::optional<Frame> frame = stream_.next({});
+    if (frame && is_readable(*frame, stream_.description().valid)) {
+      backwards_ += last_s_ && frame->host_time_s < *last_s_ ? 1 : 0;
+      last_s_ = frame->host_time_s;
+      rest_.at(time_.advance(frame->host_time_s), at_);
+      for (std::size_t k = 0; k < at_.size(); ++k) {
+        frame->values[k] -= at_[k];
+      }
+    }
+    return frame;
   }
+
+  const Rest& rest() const { return rest_; }
+  /// Frames that are older than the one before.
+  std::uint64_t backwards() const { return backwards_; }
+
+ private:
+  Sensor& stream_;
+  Rest rest_;
+  StreamTime time_;
+  std::vector<double> at_;
+  std::optional<double> last_s_;
+  std::uint64_t backwards_ = 0;
+};
+
+/// What may have cost touches, each in a sentence.
+std::vector<std::string> complaints(const RestedFrames& frames, std::uint64_t all) {
+  std::vector<std::string> words;
+  if (frames.backwards() > 0) {
+    words.push_back(fmt::format(
+        "time runs backwards at {} of its {} frames, each of which ends a touch; write the frames "
+        "in the order of their times",
+        frames.backwards(), all));
+  }
+  if (const auto rises_s = frames.rest().rises_s) {
+    words.push_back(fmt::format(
+        "from {:.2f} s on an element reads more by the onset for over {:.3g} s, which counts as "
+        "drift; if a press lasts that long, give --drift-s, more than its length",
+        *rises_s, frames.rest().window_s));
+  }
+  return words;
 }
 
 /// Appends the touch and a row of `valid` for it, `unposed` at the pose 0; returns false where the
@@ -211,21 +179,23 @@ void close_input(const std::string& frames) {
   }
 }
 
+/// The options of a detector of pressures above a rest that is known.
+TouchDetectorOptions fixed_rest(TouchDetectorOptions options) {
+  options.drift_s = 0.0;
+  return options;
+}
+
 void find_touches(const TouchesArguments& options) {
   CommandFiles files;
   files.reads("FRAMES", options.frames);
   files.writes("-o", options.output);
   files.prepare();
-  if (options.tare_s) {
-    require_above("--tare", *options.tare_s, 0.0, true);
-  }
   const std::unique_ptr<Sensor> stream =
       open_virtual_sensor("replay:" + options.frames + ",speed=max");
   const SensorDescription& sensor = stream->description();
   const TouchDetectorOptions thresholds =
       detector_options(options.detector, sensor.pressure_unit, options.frames);
-  TouchDetector detector(thresholds, baseline_for(options, *stream, thresholds), sensor.valid);
-  EndlessTouch endless(thresholds.release);
+  TouchDetector detector(fixed_rest(thresholds), {}, sensor.valid);
   Recording recording;
   recording.object = sensor.object;
   recording.pressure_unit = sensor.pressure_unit;
@@ -244,13 +214,17 @@ void find_touches(const TouchesArguments& options) {
     presses.unsteady += was_touching && !touching && !touch ? 1 : 0;
     presses.without_pose += touch && !append(*touch, options.unposed, recording) ? 1 : 0;
   };
-  stream->start();
-  while (!stream->ended()) {
-    if (const std::optional<Frame> frame = stream->next({})) {
+  RestedFrames frames(*stream, thresholds, options.detector.drift_s);
+  if (frames.rest().falls) {
+    refuse(options.frames,
+           "its readings fall in presses, where Palpate needs readings that rise; import it again "
+           "with --sign -1");
+  }
+  while (!frames.ended()) {
+    if (const std::optional<Frame> frame = frames.next()) {
       unknown += unknown_readings(*frame, sensor.valid);
       unreadable += is_readable(*frame, sensor.valid) ? 0 : 1;
       take(detector.add(*frame));
-      endless.add(*frame, detector);
     }
   }
   take(detector.finish());
@@ -259,9 +233,7 @@ void find_touches(const TouchesArguments& options) {
   if (const auto finding = dropped(presses, clock)) {
     recording.findings.push_back(*finding);
   }
-  const bool tared = options.tare_s.value_or(sensor.baseline.empty() ? usual_tare_s : 0.0) > 0.0;
-  const std::string complaint = endless.complaint(
-      sensor.pressure_unit, tared ? "raise --onset" : "give --tare, or raise --onset");
+  const std::vector<std::string> complaint = complaints(frames, stream->counters().frames);
 
   if (recording.size() == 0) {
     if (presses.without_pose > 0) {
@@ -272,13 +244,15 @@ void find_touches(const TouchesArguments& options) {
              clock ? fmt::format("import again with --{}", fmt::join(clock->options, " --"))
                    : "record again with --poses");
     }
-    if (!complaint.empty() || clock) {
-      refuse(options.frames, "no touch in its {} frames: {}", stream->counters().frames,
-             complaint.empty() ? in_flags(clock->words) : complaint);
+    std::vector<std::string> reasons = complaint;
+    if (clock) {
+      reasons.push_back(in_flags(clock->words));
     }
-    refuse(options.frames, "no touch in its {} frames; lower --onset or --min-steady-s{}",
-           stream->counters().frames,
-           tared ? ", or give --tare 0 where the readings have a baseline of 0" : "");
+    if (reasons.empty()) {
+      reasons.emplace_back("lower --onset or --min-steady-s");
+    }
+    refuse(options.frames, "no touch in its {} frames: {}", stream->counters().frames,
+           fmt::format("{}", fmt::join(reasons, "; ")));
   }
   shorten_valid(recording, sensor.valid);
   write_recording(options.output, recording);
@@ -302,8 +276,8 @@ void find_touches(const TouchesArguments& options) {
     fmt::print(", {} readings unknown", unknown);
   }
   fmt::print("\n");
-  if (!complaint.empty()) {
-    fmt::print(stderr, "palpate: {}: {}\n", options.frames, complaint);
+  for (const std::string& words : complaint) {
+    tell_on_stderr(fmt::format("{}: {}", options.frames, words));
   }
   close_input(options.frames);
 }
@@ -323,13 +297,12 @@ void add_touches(CLI::App& app) {
   command
       ->add_option("-o,--output", options->output,
                    "Recording of touches to write (HDF5): per touch, the mean pressures above the "
-                   "baseline in its steady phase")
+                   "elements' rest in its steady phase")
       ->required();
-  add_detector_flags(*command, options->detector);
-  command->add_option(
-      "--tare", options->tare_s,
-      "Seconds at the start in which nothing may touch the array and its baseline is read; 0: no "
-      "baseline [default: the recording's baseline, or 0.5 where it has none]");
+  add_detector_flags(
+      *command, options->detector,
+      "1.5 times most presses of the recording or more, up to 32; 0: the rest is the "
+      "recording's baseline");
   command->add_flag("--unposed", options->unposed,
                     "The sensor's poses are unknown: write every touch at the pose 0, for 'palpate "
                     "map --unposed', 'palpate calibrate --unposed' and 'palpate recognize "

@@ -47,6 +47,8 @@ struct LiveState {
   std::size_t all_touches = 0;   ///< with a pose, on every unknown
   std::size_t without_pose = 0;  ///< touches that were passed over
   std::uint64_t unknown_readings = 0;
+  std::uint64_t frames_back = 0;   ///< frames that are older than the one before
+  std::uint64_t frames_below = 0;  ///< in which an element reads below its rest by the onset
   std::optional<LiveTouch> last;
   double worst_latency_ms = 0.0;
 };
@@ -164,6 +166,7 @@ class LiveRecognition {
   Clock::time_point taken_;
   StreamTime time_;
   std::uint64_t unreadable_ = 0;
+  std::optional<double> last_frame_s_;
   std::optional<double> last_contact_s_;  ///< of time_
   bool was_touching_ = false;
   std::optional<double> candidate_begin_s_;

@@ -27,9 +27,10 @@ double now_s() {
 
 }  // namespace
 
-LineSensor::LineSensor(SensorDescription description, PosedSensor::Complaint complain)
+LineSensor::LineSensor(SensorDescription description, PosedSensor::Complaint complain, int sign)
     : description_(std::move(description)),
       complain_(std::move(complain)),
+      sign_(sign),
       format_(description_.elements_mm.size()),
       reader_("frames", "-", 4096 + most_bytes_per_reading * description_.elements_mm.size(),
               [this](const LineReader::Line& line) { take(line); }) {}
@@ -66,6 +67,9 @@ void LineSensor::take(const LineReader::Line& line) {
     refuse_line(line, problem->kind, problem->words);
   } else if (auto* frame = std::get_if<Frame>(&read)) {
     frame->lost_before = std::exchange(lost_before_, 0);
+    for (double& value : frame->values) {
+      value *= sign_;
+    }
     frames_.push_back(std::move(*frame));
     ++counters_.frames;
   }

@@ -19,7 +19,8 @@ class LineSensor : public Sensor {
   /// @param complain called from within next() with the first refused line of each kind; may be
   /// empty
   /// @throws Error (Fault::input) where standard input cannot be read
-  LineSensor(SensorDescription description, PosedSensor::Complaint complain);
+  /// @param sign -1: readings fall under load, and are taken times -1
+  LineSensor(SensorDescription description, PosedSensor::Complaint complain, int sign = 1);
 
   const SensorDescription& description() const override { return description_; }
   void start() override {}
@@ -39,6 +40,7 @@ class LineSensor : public Sensor {
 
   SensorDescription description_;
   PosedSensor::Complaint complain_;
+  int sign_;
   FrameLines format_;
   std::deque<Frame> frames_;  ///< read, and not yet taken
   SensorCounters counters_;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <utility>
 
 #include <fmt/format.h>
@@ -160,6 +161,9 @@ void check_numbers(const ImportOptions& options) {
   if (options.rate_hz && !(*options.rate_hz >= slowest_hz && *options.rate_hz <= fastest_hz)) {
     refuse(fmt::format("`rate {}`", *options.rate_hz), "give {} to {} Hz", slowest_hz, fastest_hz);
   }
+  if (options.sign != 1 && options.sign != -1) {
+    refuse(fmt::format("`sign {}`", options.sign), "give 1, or -1 where readings fall under load");
+  }
   if (!std::isfinite(options.pose_delay_s)) {
     refuse(fmt::format("`pose-delay {}`", options.pose_delay_s), "give seconds");
   }
@@ -181,6 +185,10 @@ ImportedRecording recording_of(const ImportOptions& options, ArrayTable array, I
   recording.valid = std::move(array.valid);
   recording.baseline = std::move(array.baseline);
   recording.pressure = std::move(pressures.pressure);
+  if (options.sign < 0) {
+    std::ranges::transform(recording.baseline, recording.baseline.begin(), std::negate<>{});
+    std::ranges::transform(recording.pressure, recording.pressure.begin(), std::negate<>{});
+  }
   recording.time_s = std::move(pressures.time_s);
   recording.device_time_s = std::move(pressures.device_time_s);
   recording.lost_before = std::move(pressures.lost_before);

@@ -29,6 +29,7 @@ struct ImportOptions {
   /// [e] of a program, in the place of `array`
   std::optional<std::vector<glm::dvec2>> elements_mm;
   std::string pressure_unit = "kPa";
+  int sign = 1;  ///< -1: readings fall under load, and are taken times -1
   std::string pose_unit;
   std::string time_unit;
   std::string time_column;

@@ -13,6 +13,7 @@
 #include "palpate/error.hpp"
 #include "palpate/pose_track.hpp"
 #include "streaming/frame_smoother.hpp"
+#include "streaming/rest_follower.hpp"
 
 namespace palpate {
 
@@ -173,9 +174,6 @@ class SteadyPhase {
   std::vector<double> pressure_;  ///< [kept, e]
 };
 
-// After a release the skin creeps back for a while, which is no drift.
-constexpr double rest_s = 0.5;
-
 void require(const char* field, double value, bool in_range, const char* range) {
   if (!std::isfinite(value) || !in_range) {
     throw Error(Fault::input,
@@ -202,7 +200,7 @@ struct TouchDetector::Impl {
   Impl(const TouchDetectorOptions& detector_options, std::vector<double> untouched,
        std::vector<std::uint8_t> alive)
       : options(detector_options),
-        baseline(std::move(untouched)),
+        rest(std::move(untouched), options.drift_s, options.onset),
         valid(std::move(alive)),
         smoother(options.smooth_s, options.largest_gap_s),
         phase(options) {}
@@ -216,7 +214,7 @@ struct TouchDetector::Impl {
     const double elapsed_s = last_s ? time_s - *last_s : 0.0;
     if (elapsed_s > options.largest_gap_s || elapsed_s < 0.0) {
       ended = end_touch();
-      released_s = time_s;
+      rest.forget();
       smoother.reset();
       began_s.reset();
     }
@@ -232,14 +230,18 @@ struct TouchDetector::Impl {
     }
     // A mean of too few frames may exceed the onset by noise.
     const bool settled = time_s - *began_s >= options.smooth_s;
+    if (largest < options.release) {
+      rest.follow(smooth, elapsed_s);
+    } else if (rest.keep(smooth, elapsed_s)) {
+      end_phase();  // its pressures, and the smoother's, are above the old rest
+      smoother.reset();
+      began_s = time_s;
+      return ended;
+    }
     if (!touching && (largest <= options.onset || !settled)) {
-      if (largest < options.release && (!released_s || time_s - *released_s > rest_s)) {
-        follow_drift(smooth, elapsed_s);
-      }
       return ended;
     }
     if (touching && largest < options.release) {
-      released_s = time_s;
       return end_touch();  // `ended` is none: a gap leaves nothing touched
     }
     touching = true;
@@ -256,9 +258,10 @@ struct TouchDetector::Impl {
   // Subtracts the baseline. Returns false for a frame without a known reading or a finite time.
   bool take(const Frame& frame) {
     const std::size_t e = frame.values.size();
-    if (baseline.empty()) {
-      baseline.assign(e, 0.0);
+    if (rest.rest().empty()) {
+      rest.resize(e);
     }
+    const std::vector<double>& baseline = rest.rest();
     if (e != baseline.size() || (!valid.empty() && valid.size() != e)) {
       throw Error(Fault::input, fmt::format("a frame has {} values where {} are expected; feed the "
                                             "touch detector the frames of one array",
@@ -273,17 +276,6 @@ struct TouchDetector::Impl {
       any_known = any_known || known;
     }
     return any_known && std::isfinite(frame.host_time_s);
-  }
-
-  void follow_drift(const std::vector<double>& smooth, double elapsed_s) {
-    if (options.drift_s <= 0.0) {
-      return;
-    }
-    const double part = std::clamp(elapsed_s / options.drift_s, 0.0, 1.0);
-    for (std::size_t i = 0; i < baseline.size(); ++i) {
-      // The bound keeps two frames of -1e38 from becoming the baseline.
-      baseline[i] += part * std::max(smooth[i], -options.onset);
-    }
   }
 
   void end_phase() {
@@ -303,7 +295,7 @@ struct TouchDetector::Impl {
   }
 
   TouchDetectorOptions options;
-  std::vector<double> baseline;
+  RestFollower rest;
   std::vector<std::uint8_t> valid;
   FrameSmoother smoother;
   SteadyPhase phase;                  // steady phase under way
@@ -311,28 +303,24 @@ struct TouchDetector::Impl {
   std::vector<double> pressure;       // [e] of the present frame, above the baseline; NaN: Unknown
   std::optional<double> last_s;       // time of the last frame
   std::optional<double> began_s;      // time of the first frame since a gap
-  std::optional<double> released_s;   // end of the last touch
   bool touching = false;
 };
 
 TouchDetector::TouchDetector(const TouchDetectorOptions& options, std::vector<double> baseline,
-                             std::vector<std::uint8_t> valid)
-    : impl_(std::make_unique<Impl>(options, std::move(baseline), std::move(valid))) {
+                             std::vector<std::uint8_t> valid) {
   validate(options);
-  if (!impl_->baseline.empty() && !impl_->valid.empty() &&
-      impl_->baseline.size() != impl_->valid.size()) {
+  if (!baseline.empty() && !valid.empty() && baseline.size() != valid.size()) {
     throw Error(Fault::input,
                 fmt::format("touch detector: {} baseline and {} valid values; make them agree",
-                            impl_->baseline.size(), impl_->valid.size()));
+                            baseline.size(), valid.size()));
   }
-  for (std::size_t i = 0; i < impl_->baseline.size(); ++i) {
-    const bool alive = impl_->valid.empty() || impl_->valid[i] != 0;
-    if (!alive) {
-      impl_->baseline[i] = 0.0;
+  for (std::size_t i = 0; i < baseline.size(); ++i) {
+    if (!valid.empty() && valid[i] == 0) {
+      baseline[i] = 0.0;
     }
-    require("baseline", impl_->baseline[i], is_known(impl_->baseline[i]),
-            "a pressure that float32 holds");
+    require("baseline", baseline[i], is_known(baseline[i]), "a pressure that float32 holds");
   }
+  impl_ = std::make_unique<Impl>(options, std::move(baseline), std::move(valid));
 }
 
 TouchDetector::~TouchDetector() = default;
@@ -348,13 +336,13 @@ std::optional<DetectedTouch> TouchDetector::finish() {
   std::optional<DetectedTouch> touch = detector.end_touch();
   detector.smoother.reset();
   detector.last_s.reset();
-  detector.released_s.reset();  // the next stream may begin at any time
+  detector.rest.forget();
   return touch;
 }
 
 const std::optional<DetectedTouch>& TouchDetector::candidate() const { return impl().best; }
 bool TouchDetector::touching() const { return impl().touching; }
 const std::vector<double>& TouchDetector::smoothed() const { return impl().smoother.means(); }
-const std::vector<double>& TouchDetector::baseline() const { return impl().baseline; }
+const std::vector<double>& TouchDetector::baseline() const { return impl().rest.rest(); }
 
 }  // namespace palpate

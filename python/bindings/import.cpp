@@ -193,6 +193,7 @@ void bind_import(nb::module_& module) {
       .def_rw("order", &ImportOptions::order)
       .def_rw("dead", &ImportOptions::dead)
       .def_rw("pressure_unit", &ImportOptions::pressure_unit)
+      .def_rw("sign", &ImportOptions::sign)
       .def_rw("pose_unit", &ImportOptions::pose_unit)
       .def_rw("time_unit", &ImportOptions::time_unit)
       .def_rw("time_column", &ImportOptions::time_column)

@@ -220,6 +220,7 @@ def import_tables(
     unposed: bool = False,
     rows: Literal["frames", "touches"] | None = None,
     pressure_unit: Literal["kPa", "raw"] = "kPa",
+    sign: Literal[1, -1] = 1,
     pose_unit: tuple[Literal["mm", "m"], Literal["rad", "deg"]] | None = None,
     time_unit: Literal["s", "ms", "us", "ns"] | None = None,
     time_column: str | None = None,
@@ -237,7 +238,8 @@ def import_tables(
     pressures: a CSV file, or an array of numpy.save, [n, e] or [n, rows, columns]; array: (columns,
     rows, pitch_mm), a CSV file, or the elements' centres [e, 2] in mm in the sensor frame, in the order
     of their readings; first_element and order: where the first element of a grid lies, seen with x to
-    the right and y upwards, and which follow it; dead: elements that do not read, from 0; poses: a CSV
+    the right and y upwards, and which follow it; dead: elements that do not read, from 0; sign: -1
+    where readings fall under load, which are taken times -1; poses: a CSV
     file of T_robot_sensor, in mm and rad where neither its columns' names nor pose_unit say otherwise;
     plane: of the touches, where poses are in space: found from them, or its normal in the robot frame;
     pose_delay: by how much later the poses' clock reads than the readings', s; rate: frames per second

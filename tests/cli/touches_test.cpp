@@ -157,9 +157,9 @@ TEST_F(TouchesCommand, AnElementThatIsUnknownInATouchIsNotValidInIt) {
   for (std::size_t k = 0; k < r.valid.size(); ++k) {
     EXPECT_EQ(r.valid[k], k == 36 + 5 ? 0 : 1) << k;
     if (k != 36 + 5) {
-      // The baselines of elements 5 and 7 follow 40 frames less of noise, of 1 frame: 0.4 s in 60 s
-      // of means of 0.7 / sqrt(5).
-      EXPECT_NEAR(r.pressure[k], all.pressure[k], k % 36 == 5 || k % 36 == 7 ? 0.002 : 1e-12) << k;
+      // Where element 5 is unknown, its rest is held, which may move the ends of what counts as
+      // untouched by a tenth of a second of noise.
+      EXPECT_NEAR(r.pressure[k], all.pressure[k], 0.1) << k;
     }
   }
   EXPECT_EQ(r.pressure[36 + 5], 0.0);
@@ -182,53 +182,28 @@ TEST_F(TouchesCommand, TouchesWithoutAPoseAreLeftOut) {
 }
 
 // The sensor reads about 3 kPa untouched, more than the onset.
-TEST_F(TouchesCommand, TareReadsTheBaseline) {
+TEST_F(TouchesCommand, TheRestIsFoundWithoutABaseline) {
   const std::string sensor = "simulate:A,touches=3,speed=max";
   done({"record", "--sensor", sensor, "-o", "tared.h5"});
   done({"record", "--sensor", sensor, "-o", "untared.h5", "--tare", "0"});
-  done({"touches", "tared.h5", "-o", "recorded.h5"});
-  done({"touches", "untared.h5", "-o", "usual.h5"});
-  done({"touches", "untared.h5", "-o", "half.h5", "--tare", "0.5"});
-  const Recording recorded = read_recording(folder_ / "recorded.h5");
-  const Recording usual = read_recording(folder_ / "usual.h5");
-  ASSERT_EQ(recorded.size(), 3u);
-  // The file holds a baseline as float64: the tares are of the same frames, as float32.
-  for (std::size_t k = 0; k < recorded.pressure.size(); ++k) {
-    EXPECT_NEAR(usual.pressure[k], recorded.pressure[k], 1e-5) << k;
-  }
-  EXPECT_EQ(usual.pressure, read_recording(folder_ / "half.h5").pressure);
+  done({"touches", "tared.h5", "-o", "tared.touches.h5"});
+  done({"touches", "untared.h5", "-o", "untared.touches.h5"});
+  const Recording tared = read_recording(folder_ / "tared.touches.h5");
+  ASSERT_EQ(tared.size(), 3u);
+  EXPECT_EQ(read_recording(folder_ / "untared.touches.h5").pressure, tared.pressure);
 
-  // A baseline in the file is used unless --tare is given.
-  Recording shifted = read_recording(folder_ / "tared.h5");
-  for (double& baseline : shifted.baseline) {
-    baseline += 0.5;
-  }
-  write_recording(folder_ / "shifted.h5", shifted);
-  done({"touches", "shifted.h5", "-o", "own.h5", "--drift-s", "0"});
-  done({"touches", "shifted.h5", "-o", "again.h5", "--drift-s", "0", "--tare", "0.5"});
-  const Recording own = read_recording(folder_ / "own.h5");
-  const Recording again = read_recording(folder_ / "again.h5");
-  ASSERT_EQ(own.pressure.size(), again.pressure.size());
-  // The steady phases may differ by a frame or two of 0.7 kPa of noise among 50.
-  EXPECT_NEAR(mean(again.pressure) - mean(own.pressure), 0.5, 0.05);
+  // With --drift-s 0, the baseline of the recording is all that is subtracted.
+  done({"touches", "tared.h5", "-o", "fixed.h5", "--drift-s", "0"});
+  const Recording fixed = read_recording(folder_ / "fixed.h5");
+  ASSERT_EQ(fixed.size(), 3u);
+  // Both know the rest by the noise of half a second, 0.7 kPa of 100 Hz, in 36 elements.
+  EXPECT_NEAR(mean(fixed.pressure), mean(tared.pressure), 0.15);
 }
 
-TEST_F(TouchesCommand, TareRefusesATouchedArray) {
-  done({"record", "--sensor", "simulate:A,touches=1,speed=max", "-o", "f.h5", "--tare", "0"});
-  // The press begins at 1.3 s.
-  expect_refused({"touches", "f.h5", "-o", "t.h5", "--tare", "1.6"},
-                 {"f.h5: the array is touched", "--tare"});
-  expect_refused({"touches", "f.h5", "-o", "t.h5", "--tare=-1"}, {"--tare -1"});
-}
-
-// A tare of fewer than 40 frames cannot tell that the array is touched.
-TEST_F(TouchesCommand, TareInATouchIsNamedWhereNoTouchIsLeft) {
+// The stream is cut where the first press is under way: what follows tells the rest.
+TEST_F(TouchesCommand, AStreamMayBeginInATouch) {
   done({"record", "--sensor", "simulate:A,touches=1,speed=max", "-o", "f.h5"});
   Recording frames = read_recording(folder_ / "f.h5");
-  for (std::size_t k = 0; k < frames.pressure.size(); ++k) {
-    frames.pressure[k] -= frames.baseline[k % 36];
-  }
-  frames.baseline.clear();
   const auto begin = static_cast<std::ptrdiff_t>(150);  // the press is steady from 1.4 to 1.9 s
   frames.pressure.erase(frames.pressure.begin(), frames.pressure.begin() + 36 * begin);
   frames.T_robot_sensor.erase(frames.T_robot_sensor.begin(), frames.T_robot_sensor.begin() + begin);
@@ -236,45 +211,51 @@ TEST_F(TouchesCommand, TareInATouchIsNamedWhereNoTouchIsLeft) {
   frames.lost_before.clear();
   frames.device_time_s.clear();
   write_recording(folder_ / "cut.h5", frames);
-  expect_refused({"touches", "cut.h5", "-o", "t.h5", "--tare", "0.3"},
-                 {"cut.h5: no touch in its", "--tare 0"});
-  expect_named(done({"touches", "cut.h5", "-o", "t.h5", "--tare", "0"}), {"1 touches"});
+  expect_named(done({"touches", "cut.h5", "-o", "t.h5"}), {"1 touches"});
 }
 
-TEST_F(TouchesCommand, TellsOfAnArrayThatNeverReleases) {
+TEST_F(TouchesCommand, ElementsThatStickCostNoTouch) {
   done({"record", "--sensor", "simulate:A,touches=3,speed=max", "-o", "f.h5"});
-  const Outcome outcome = palpate({"touches", "f.h5", "-o", "t.h5", "--tare", "0"});
-  EXPECT_EQ(outcome.status, 0);
-  expect_named(outcome.out, {"t.h5: 1 touches"});
-  expect_named(outcome.err, {"palpate: f.h5: the array never reads below 1 kPa from 0.06 s on",
-                             "give --tare, or raise --onset"});
-  EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
-  // Where a touch that is nowhere steady is all there is, nothing is written.
-  expect_refused({"touches", "f.h5", "-o", "u.h5", "--tare", "0", "--min-steady-s", "60"},
-                 {"f.h5: no touch", "never reads below 1 kPa"});
-}
-
-TEST_F(TouchesCommand, TellsOfElementsThatNeverRelease) {
-  done({"record", "--sensor", "simulate:A,touches=3,speed=max", "-o", "f.h5"});
-  const Recording frames = read_recording(folder_ / "f.h5");
-  const auto stuck_from = [&](std::size_t first) {
-    Recording stuck = frames;
-    for (std::size_t i = first; i < stuck.size(); ++i) {
-      stuck.pressure[36 * i + 4] = 9.0;
-      stuck.pressure[36 * i + 31] = 9.0;
+  Recording frames = read_recording(folder_ / "f.h5");
+  for (const std::size_t first : {std::size_t{0}, std::size_t{215}}) {
+    for (std::size_t i = first; i < frames.size(); ++i) {
+      frames.pressure[36 * i + 4] = 9.0;
+      frames.pressure[36 * i + 31] = 9.0;
     }
-    write_recording(folder_ / "stuck.h5", stuck);
-    return palpate({"touches", "stuck.h5", "-o", "t.h5"});
-  };
-  const Outcome all = stuck_from(0);
-  EXPECT_EQ(all.status, 0);
-  expect_named(all.err, {"palpate: stuck.h5: elements 4, 31 never read below 1 kPa from 0.06 s on",
-                         "'valid'", "--tare"});
-  // The first press is over at frame 230 of 461; the stuck elements begin another touch.
-  const Outcome later = stuck_from(215);
-  EXPECT_EQ(later.status, 0);
-  expect_named(later.err, {"elements 4, 31 never read below 1 kPa from 2.1"});
-  done({"touches", "stuck.h5", "-o", "t.h5", "--onset", "12"});
+    write_recording(folder_ / "stuck.h5", frames);
+    expect_named(done({"touches", "stuck.h5", "-o", "t.h5"}), {"3 touches"});
+  }
+}
+
+TEST_F(TouchesCommand, SaysThatAPressIsLongerThanTheWindow) {
+  done({"record", "--sensor", "simulate:A,touches=8,speed=max", "-o", "f.h5"});
+  const Outcome outcome = palpate({"touches", "f.h5", "-o", "t.h5", "--drift-s", "0.3"});
+  expect_named(outcome.err, {"f.h5: ", "an element reads more by the onset", "--drift-s"});
+  EXPECT_EQ(palpate({"touches", "f.h5", "-o", "t.h5"}).err, "");
+}
+
+TEST_F(TouchesCommand, SaysThatReadingsFallInPresses) {
+  done({"record", "--sensor", "simulate:A,touches=6,speed=max", "-o", "f.h5"});
+  Recording frames = read_recording(folder_ / "f.h5");
+  for (double& reading : frames.pressure) {
+    reading = -reading;
+  }
+  frames.baseline.clear();
+  write_recording(folder_ / "falls.h5", frames);
+  expect_refused({"touches", "falls.h5", "-o", "t.h5"},
+                 {"falls.h5: its readings fall in presses", "--sign -1"});
+}
+
+TEST_F(TouchesCommand, SaysThatTimeRunsBackwards) {
+  done({"record", "--sensor", "simulate:A,touches=2,speed=max", "-o", "f.h5"});
+  Recording frames = read_recording(folder_ / "f.h5");
+  for (std::size_t i = 0; i + 1 < frames.size(); i += 2) {
+    std::swap(frames.time_s[i], frames.time_s[i + 1]);
+  }
+  const std::size_t backwards = frames.size() / 2;
+  write_recording(folder_ / "swapped.h5", frames);
+  expect_refused({"touches", "swapped.h5", "-o", "t.h5"},
+                 {"time runs backwards at " + std::to_string(backwards) + " of its"});
 }
 
 TEST_F(TouchesCommand, RefusesWhatHoldsNoTouches) {

@@ -22,8 +22,9 @@ struct TouchDetectorOptions {
   double steady_mm = 0.5;     ///< a known pose moves less than this in a steady phase
   double steady_rad = 0.05;   ///< and turns less than this
   double smooth_s = 0.05;     ///< onset, release and load are judged on means over this time
-  /// Time constant with which the baseline follows drift while nothing is touched; 0: never.
-  double drift_s = 60.0;
+  /// Longer than any press: what an element reads for so long is its baseline, which drifts; 0: the
+  /// baseline is fixed.
+  double drift_s = 10.0;
   double largest_gap_s = 0.5;  ///< a longer silence ends a touch
 };
 
@@ -48,9 +49,12 @@ struct DetectedTouch {
 /// for longer than `largest_gap_s` counts as untouched until it can be read again. Wild readings
 /// have no effect on later touches.
 ///
-/// While nothing is touched, the baseline follows drift; readings count as at most `onset` below
-/// it. Lost frames only coarsen the times of a touch. A silence longer than `largest_gap_s`, or a
-/// clock that goes back, ends a touch and restarts detection. Memory is bounded: a long steady
+/// While nothing is touched, the baseline follows the readings with a time constant of a second;
+/// they count as at most `onset` below it. Where the array reads above the release for longer than
+/// `drift_s`, through presses and what lies between them, drift has overtaken the baseline, which
+/// becomes the lower quintile of what each element read meanwhile: a press that is held for longer
+/// ends then. Lost frames only coarsen the times of a touch. A silence longer than `largest_gap_s`,
+/// or a clock that goes back, ends a touch and restarts detection. Memory is bounded: a long steady
 /// phase keeps frames evenly spread over it. Every call on a moved-from detector throws Error.
 class PALPATE_API TouchDetector {
  public:

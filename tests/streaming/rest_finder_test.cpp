@@ -1,0 +1,216 @@
+// Presses on arrays whose rest drifts: the rest is found from the whole stream (RestFinder), and as
+// it comes (TouchDetector).
+#include "streaming/rest_finder.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include <gtest/gtest.h>
+
+#include "press.hpp"
+
+namespace palpate::rest_finder_test {
+
+constexpr double onset = 2.0;
+constexpr double release = 1.0;
+
+/// 3 x 3 elements that are pressed at a place of its own in every period, above a rest that is
+/// given as what is added to 3 kPa, times 0.5 to 1.5 by element.
+struct DriftingStream {
+  std::size_t presses = 60;
+  double ramp_s = 0.1;
+  double steady_s = 0.4;
+  double gap_s = 0.4;
+  double rate_hz = 100.0;
+  double noise = 0.3;
+  double hysteresis = 0.0;  ///< part of a press that stays after it, and decays over 2 s
+
+  double period_s() const { return 2.0 * ramp_s + steady_s + gap_s; }
+  double seconds() const { return 1.0 + static_cast<double>(presses) * period_s(); }
+
+  double load(double time_s, std::size_t element) const {
+    double load = 0.0;
+    const double at = (time_s - 1.0) / period_s();
+    for (double k = std::max(0.0, std::floor(at) - (hysteresis > 0.0 ? 6.0 : 0.0));
+         k <= at && k < static_cast<double>(presses); ++k) {
+      const double begin_s = 1.0 + k * period_s();
+      const double end_s = begin_s + 2.0 * ramp_s + steady_s;
+      const double most = 4.0 + 12.0 * std::abs(std::sin(1.7 * k + static_cast<double>(element)));
+      const double part =
+          std::clamp(std::min((time_s - begin_s) / ramp_s, (end_s - time_s) / ramp_s), 0.0, 1.0);
+      load += most * part;
+      load += time_s > end_s ? hysteresis * most * std::exp(-(time_s - end_s) / 2.0) : 0.0;
+    }
+    return load;
+  }
+
+  std::vector<Frame> frames(const std::function<double(double)>& drift) const {
+    return PressStream{.rate_hz = rate_hz, .noise = noise}.frames(seconds(), [&](double t) {
+      std::vector<double> values(9);
+      for (std::size_t k = 0; k < 9; ++k) {
+        values[k] = 3.0 + (0.5 + static_cast<double>(k) / 8.0) * drift(t) + load(t, k);
+      }
+      return values;
+    });
+  }
+};
+
+std::function<double(double)> per_minute(double kpa) {
+  return [kpa](double t) { return kpa * t / 60.0; };
+}
+
+Rest rest_of(const std::vector<Frame>& frames, std::optional<double> window_s = {}) {
+  RestFinder finder({}, onset, release);
+  for (const Frame& frame : frames) {
+    finder.add(frame);
+  }
+  return finder.find(window_s);
+}
+
+std::vector<DetectedTouch> touches_above(const Rest& rest, std::vector<Frame> frames) {
+  std::vector<double> at;
+  for (Frame& frame : frames) {
+    rest.at(frame.host_time_s - frames.front().host_time_s, at);
+    std::ranges::transform(frame.values, at, frame.values.begin(), std::minus<>{});
+  }
+  return touches_in(frames, {.drift_s = 0.0});
+}
+
+double mean_pressure(const std::vector<DetectedTouch>& touches) {
+  double sum = 0.0;
+  for (const DetectedTouch& touch : touches) {
+    sum += std::accumulate(touch.pressure.begin(), touch.pressure.end(), 0.0);
+  }
+  return sum / static_cast<double>(touches.size());
+}
+
+TEST(RestFinder, EveryPressIsFoundUnderDriftAndReadsAsWithoutIt) {
+  const DriftingStream stream;
+  const auto still =
+      touches_above(rest_of(stream.frames(per_minute(0.0))), stream.frames(per_minute(0.0)));
+  ASSERT_EQ(still.size(), 60u);
+  for (std::size_t i = 0; i < still.size(); ++i) {
+    const double middle_s = 0.5 * (still[i].begin_s + still[i].end_s) - stream_begin_s;
+    for (std::size_t k = 0; k < 9; ++k) {
+      // Five times the noise of the rest, of a few tenths of a second at 0.3 kPa.
+      EXPECT_NEAR(still[i].pressure[k], stream.load(middle_s, k), 0.5) << i << ", " << k;
+    }
+  }
+  for (const double drift : {1.0, 6.0, 30.0, 180.0, -6.0, -30.0}) {
+    const std::vector<Frame> frames = stream.frames(per_minute(drift));
+    const auto touches = touches_above(rest_of(frames), frames);
+    EXPECT_NEAR(static_cast<double>(touches.size()), 60.0, 1.0) << drift;
+    EXPECT_NEAR(mean_pressure(touches) / mean_pressure(still), 1.0, 0.02) << drift;
+  }
+}
+
+TEST(RestFinder, HysteresisMakesNoTouchAndHidesNone) {
+  const std::vector<Frame> frames = DriftingStream{.hysteresis = 0.1}.frames(per_minute(3.0));
+  EXPECT_EQ(touches_above(rest_of(frames), frames).size(), 60u);
+}
+
+TEST(RestFinder, TheWindowIsLongerThanThePresses) {
+  const DriftingStream slow{.presses = 10, .ramp_s = 2.0, .steady_s = 0.5, .gap_s = 1.0};
+  const std::vector<Frame> frames = slow.frames(per_minute(3.0));
+  const Rest rest = rest_of(frames);
+  EXPECT_GE(rest.window_s, 1.5 * 4.0);
+  EXPECT_FALSE(rest.rises_s);
+  EXPECT_EQ(touches_above(rest, frames).size(), 10u);
+  EXPECT_EQ(rest_of(DriftingStream{}.frames(per_minute(3.0))).window_s, 2.0);
+}
+
+TEST(RestFinder, APressLongerThanTheWindowIsSaid) {
+  const DriftingStream held{.presses = 3, .steady_s = 6.0, .gap_s = 3.0};
+  const Rest rest = rest_of(held.frames(per_minute(0.0)), 2.0);
+  ASSERT_TRUE(rest.rises_s);
+  EXPECT_NEAR(*rest.rises_s, 1.1, 0.3);
+}
+
+TEST(RestFinder, AnUntouchedArrayHasNoTouchWhateverItsRestDoes) {
+  const DriftingStream night{.presses = 0, .rate_hz = 20.0};
+  const auto sliding = [](double t) { return 30.0 * std::sin(t / 900.0); };
+  std::vector<Frame> frames = PressStream{.rate_hz = 20.0, .noise = 0.3}.frames(
+      3600.0, [&](double t) { return std::vector<double>(4, 50.0 + sliding(t)); });
+  const Rest rest = rest_of(frames);
+  EXPECT_TRUE(touches_above(rest, frames).empty());
+  std::vector<double> at;
+  for (const double t : {0.0, 10.0, 1800.0, 3599.0}) {
+    rest.at(t, at);
+    EXPECT_NEAR(at[0], 50.0 + sliding(t), 0.4) << t;
+  }
+}
+
+TEST(RestFinder, TellsReadingsThatFallInPresses) {
+  for (const bool alike : {false, true}) {
+    for (const double drift : {-20.0, 0.0, 20.0}) {
+      const DriftingStream stream{.presses = 12};
+      std::vector<Frame> frames = stream.frames(per_minute(drift));
+      if (alike) {
+        frames = PressStream{}.frames(12.0, [&](double t) {
+          return std::vector<double>{3.0 + drift * t / 60.0 +
+                                     10.0 * press(std::fmod(t, 1.0), 0.3, 0.4)};
+        });
+      }
+      EXPECT_FALSE(rest_of(frames).falls) << alike << ", " << drift;
+      for (Frame& frame : frames) {
+        std::ranges::transform(frame.values, frame.values.begin(), std::negate<>{});
+      }
+      EXPECT_TRUE(rest_of(frames).falls) << alike << ", " << drift;
+    }
+  }
+}
+
+TEST(RestFinder, WildUnknownAndDeadReadingsAreNoRest) {
+  const DriftingStream stream{.presses = 8};
+  std::vector<Frame> frames = stream.frames(per_minute(6.0));
+  frames[60].values[0] = frames[61].values[0] = -1e38;
+  for (std::size_t i = 250; i < 320; ++i) {
+    frames[i].values[1] = std::nan("");
+  }
+  RestFinder finder(std::vector<std::uint8_t>{1, 1, 0, 1, 1, 1, 1, 1, 1}, onset, release);
+  for (const Frame& frame : frames) {
+    finder.add(frame);
+  }
+  const Rest rest = finder.find({});
+  std::vector<double> at;
+  for (const double t : {0.6, 2.8}) {
+    rest.at(t, at);
+    EXPECT_NEAR(at[0], 3.0 + 0.5 * 6.0 * t / 60.0, 0.3);
+    EXPECT_NEAR(at[1], 3.0 + 0.625 * 6.0 * t / 60.0, 0.3);
+    EXPECT_EQ(at[2], 0.0);
+  }
+  RestFinder none({}, onset, release);
+  none.find({}).at(1.0, at);
+  EXPECT_TRUE(at.empty());
+}
+
+/// The touches of a detector that knows the rest of the first frame only.
+std::size_t live_touches(const std::vector<Frame>& frames, double rest = 3.0) {
+  TouchDetector detector({}, std::vector<double>(9, rest), {});
+  std::size_t touches = 0;
+  for (const Frame& frame : frames) {
+    touches += detector.add(frame) ? 1 : 0;
+  }
+  return touches + (detector.finish() ? 1 : 0);
+}
+
+TEST(TouchDetector, FindsThePressesOfADriftingArrayAsTheyCome) {
+  const DriftingStream stream;
+  for (const double drift : {0.0, 3.0, 6.0, -3.0, -30.0}) {
+    EXPECT_NEAR(static_cast<double>(live_touches(stream.frames(per_minute(drift)))), 60.0, 1.0)
+        << drift;
+  }
+  EXPECT_EQ(live_touches(DriftingStream{.hysteresis = 0.1}.frames(per_minute(0.0))), 60u);
+  const DriftingStream slow{.presses = 10, .ramp_s = 2.0, .steady_s = 0.5, .gap_s = 1.0};
+  EXPECT_EQ(live_touches(slow.frames(per_minute(3.0))), 10u);
+}
+
+// The rest is 6 kPa above what was said, as after a blow to the mount.
+TEST(TouchDetector, LearnsARestAnewThatWasLeft) {
+  const std::size_t touches = live_touches(DriftingStream{}.frames(per_minute(0.0)), -3.0);
+  EXPECT_GE(touches, 48u);  // 10 s of its 60 are lost
+  EXPECT_LE(touches, 52u);
+}
+
+}  // namespace palpate::rest_finder_test
