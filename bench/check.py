@@ -33,6 +33,10 @@ ORDERS = {
 }
 OFFSET_MM, OFFSET_RAD = 3.0, 0.09
 NEAR_MM, NEAR_RAD = 0.2, 0.02
+FAR_MM = 60.0
+FAR_NEAR_MM, FAR_NEAR_RAD = 0.3, math.radians(1)
+LATE = 2  # presses
+GAIN = 10.0
 
 COLUMNS: list[Column] = [
     ("elements", "elements", plain),
@@ -46,6 +50,9 @@ COLUMNS: list[Column] = [
     ("90 % within, mm", "most_mm", number(".3f")),
     ("rad", "most_rad", number(".4f")),
     ("at one angle, said", "one_angle", plain),
+    ("mounts to 60 mm within 0.3 mm, 1 degree", "mount", plain),
+    ("faults beyond", "beyond", plain),
+    ("of these named precisely", "precise", plain),
 ]
 
 Floats = NDArray[numpy.float64]
@@ -96,13 +103,53 @@ class Set:
 
     def misplaced(self) -> tuple[Floats, Touches]:
         """Touches whose array sits elsewhere in the tool than their poses say, and where."""
-        offset = (2 * self.random.uniforms(3) - 1) * (OFFSET_MM, OFFSET_MM, OFFSET_RAD)
+        return self.mounted((2 * self.random.uniforms(3) - 1) * (OFFSET_MM, OFFSET_MM, OFFSET_RAD))
+
+    def far_off(self) -> tuple[Floats, Touches]:
+        """The same anywhere within 60 mm and at any angle."""
+        part, way, turn = self.random.uniforms(3)
+        far, way = FAR_MM * math.sqrt(part), 2 * math.pi * way
+        return self.mounted(
+            numpy.array([far * math.cos(way), far * math.sin(way), math.pi * (2 * turn - 1)])
+        )
+
+    def mounted(self, offset: Floats) -> tuple[Floats, Touches]:
         back = palpate.inverse(offset)
         poses = [
             numpy.array([palpate.compose(pose, back) for pose in one.T_robot_sensor])
             for one in self.touches
         ]
         return offset, with_poses(self.touches, poses)
+
+    def beyond(self) -> dict[str, Touches]:
+        """Touches with faults that no set-up which is tried explains."""
+        poses = [one.T_robot_sensor for one in self.touches]
+        half = TOUCHES // 2
+        orders = [numpy.argsort(self.random.uniforms(TOUCHES)) for _ in poses]
+        gains = numpy.ones(len(self.elements_mm))
+        gains[: len(gains) // 2] = GAIN
+        return {
+            "late": with_poses(self.touches, [numpy.roll(pose, LATE, axis=0) for pose in poses]),
+            "shuffled": with_poses(
+                self.touches, [pose[order] for pose, order in zip(poses, orders, strict=True)]
+            ),
+            "mirrored": with_poses(self.touches, [pose * (-1, 1, 1) for pose in poses]),
+            "two objects": [
+                palpate.Recording(
+                    numpy.concatenate([one.pressure[:half], other.pressure[half:]]),
+                    numpy.concatenate([one.T_robot_sensor[:half], other.T_robot_sensor[half:]]),
+                    one.elements_mm,
+                    object=one.object,
+                )
+                for one, other in zip(self.touches, self.touches[1:] + self.touches[:1], strict=True)
+            ],
+            "gain": [
+                palpate.Recording(
+                    one.pressure * gains, one.T_robot_sensor, one.elements_mm, object=one.object
+                )
+                for one in self.touches
+            ],
+        }
 
     def at_one_angle(self) -> Touches:
         angle = 2 * math.pi * self.random.uniforms(1)[0]
@@ -111,7 +158,8 @@ class Set:
 
 
 def checked(device: palpate.Device, one: Set) -> Json:
-    """What is found in a set as it is, misread, misplaced, and touched at one angle."""
+    """What is found in a set as it is, misread, misplaced near and far, beyond any set-up, and touched
+    at one angle."""
 
     def found(touches: Touches) -> palpate.SetupCheck:
         return palpate.check_setup(touches, device=device)
@@ -135,6 +183,21 @@ def checked(device: palpate.Device, one: Set) -> Json:
     record["offset"] |= {"error_mm": math.hypot(off[0], off[1]), "error_rad": abs(off[2])}
     if findings and findings[0].sd is not None:
         record["offset"]["sd"] = findings[0].sd
+    offset, touches = one.far_off()
+    findings = found(touches).findings
+    pose = findings[0].array_offset if len(findings) == 1 else None
+    off = offset if pose is None else palpate.compose(palpate.inverse(offset), pose)
+    record["mount"] = {
+        "true": offset.tolist(),
+        "words": [finding.words for finding in findings],
+        "right": pose is not None
+        and math.hypot(off[0], off[1]) <= FAR_NEAR_MM
+        and abs(math.remainder(off[2], 2 * math.pi)) <= FAR_NEAR_RAD,
+    }
+    record["beyond"] = {
+        name: [finding.words for finding in found(touches).findings if finding.what != "unexplained"]
+        for name, touches in one.beyond().items()
+    }
     at_one = found(one.at_one_angle())
     said = [remark for remark in at_one.remarks if "at nearly one angle" in remark]
     record["one_angle"] = bool(said) and not at_one.findings
@@ -156,6 +219,9 @@ def summary(elements: int, records: list[Json]) -> Json:
         "most_mm": float(numpy.quantile(mm, 0.9)),
         "most_rad": float(numpy.quantile(rad, 0.9)),
         "one_angle": sum(record["one_angle"] for record in records),
+        "mount": sum(record["mount"]["right"] for record in records),
+        "beyond": sum(len(record["beyond"]) for record in records),
+        "precise": sum(bool(words) for record in records for words in record["beyond"].values()),
     }
 
 
@@ -163,9 +229,9 @@ def program() -> None:
     """Both arrays, set by set."""
     flags = parser(
         "check",
-        "Checks set-ups by sixty touches of each of three objects, in half an hour on a CPU core: "
-        "sound ones, with the elements in another order, with the array elsewhere in the tool, and "
-        "touched at one angle; with arrays of 36 and 64 elements, or of 36 with --quick.",
+        "Checks set-ups by sixty touches of each of three objects, in an hour and a half on a CPU core: "
+        "sound ones, with the elements in another order, with the array elsewhere in the tool, near or "
+        "far, with faults that no set-up explains, and touched at one angle; with arrays of 36 and 64 elements, or of 36 with --quick.",
         trials="sets [100, or 2 with --quick]",
     )
     options = flags.parse_args()

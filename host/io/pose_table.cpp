@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <span>
 #include <utility>
 
@@ -74,6 +75,56 @@ PoseColumns find_columns(const CsvTable& table, const TableOptions& options) {
                                       : "");
 }
 
+/// Columns of rotations out of the plane, and of the height, that poses of x, y and theta leave
+/// out.
+struct LeftOut {
+  std::vector<UnitColumn> rotations;
+  std::optional<UnitColumn> height;
+};
+
+LeftOut left_out_of(const CsvTable& table, const PoseColumns& columns,
+                    const TableOptions& options) {
+  constexpr Quantity rotations[] = {{"roll", angle_units, "pose-unit"},
+                                    {"pitch", angle_units, "pose-unit"},
+                                    {"rx", angle_units, "pose-unit"},
+                                    {"ry", angle_units, "pose-unit"}};
+  constexpr Quantity height{"z", length_units, "pose-unit"};
+  const auto taken = [&](const std::optional<UnitColumn>& column) {
+    return column &&
+           std::ranges::find(columns.pose, column->index, &UnitColumn::index) != columns.pose.end();
+  };
+  LeftOut left_out;
+  if (!table.has_header()) {
+    return left_out;
+  }
+  for (const Quantity& quantity : rotations) {
+    const auto column = find_column(table, quantity, "", options.angle_unit);
+    if (column && !taken(column)) {
+      left_out.rotations.push_back(*column);
+    }
+  }
+  left_out.height = find_column(table, height, "", options.length_unit);
+  if (taken(left_out.height)) {
+    left_out.height.reset();
+  }
+  return left_out;
+}
+
+/// Refuses a row whose rotation does not leave the array flat in the xy plane.
+void require_flat(const CsvTable& table, std::span<const UnitColumn> rotations) {
+  constexpr double most_rad = 3.0 * std::numbers::pi / 180.0;
+  for (const UnitColumn& column : rotations) {
+    const double turned = column.unit.convert(table.number(column.index).value_or(0.0));
+    if (!(std::abs(wrap_angle(turned)) <= most_rad)) {
+      table.refuse(
+          "column '{}': the array is turned by {:.0f} degrees out of the xy plane, which x, y and "
+          "an angle do not tell; write the rotation as a quaternion: columns tx, ty, tz, qx, qy, "
+          "qz and qw",
+          printable(table.columns()[column.index]), turned * 180.0 / std::numbers::pi);
+    }
+  }
+}
+
 /// The numbers of the columns in mm and rad; none where all cells are empty.
 std::optional<std::vector<double>> numbers_in(const CsvTable& table,
                                               std::span<const UnitColumn> columns) {
@@ -128,8 +179,17 @@ PoseTable read_poses(const std::filesystem::path& path, const TableOptions& opti
     poses.units[i] = columns.pose[i].unit;
     poses.assumed_units = poses.assumed_units || columns.pose[i].assumed;
   }
+  const LeftOut left_out = spatial ? LeftOut() : left_out_of(table, columns, options);
+  if (left_out.height) {
+    poses.left_out = fmt::format(
+        "its column '{}' was left out; poses with a quaternion (tx, ty, tz, qx, qy, qz and qw) "
+        "have "
+        "a height",
+        printable(table.columns()[left_out.height->index]));
+  }
   double last_s = -std::numeric_limits<double>::infinity();
   while (table.next()) {
+    require_flat(table, left_out.rotations);
     if (columns.time && with_times) {
       last_s = time_in(table, *columns.time, last_s, true);
       poses.time_s.push_back(last_s);

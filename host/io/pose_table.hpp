@@ -3,6 +3,7 @@
 #include <array>
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include <glm/gtc/quaternion.hpp>
@@ -29,6 +30,7 @@ struct PoseTable {
   std::vector<double> height_mm;  ///< [n] above the plane of the touches, of poses in space
   std::array<Unit, 3> units{length_units[0], length_units[0], angle_units[0]};  ///< of x, y, theta
   bool assumed_units = false;  ///< neither names nor options give them: mm and rad
+  std::string left_out = {};   ///< what of the table was not read, in a sentence; "": nothing
 };
 
 /// Reads poses from a CSV file with the columns x, y and theta (or yaw), or tx, ty, tz (or x, y, z)
@@ -37,7 +39,8 @@ struct PoseTable {
 /// or all seven, or time and all seven, as trajectories of TUM do.
 /// @param with_times false: poses by their rows alone; times are neither read nor checked
 /// @throws Error, naming file, line and column, where a row is no pose, or not later than the one
-/// before
+/// before, or where a column roll, pitch, rx or ry turns an array of x, y and theta out of the
+/// plane by more than 3 degrees
 PoseTable read_poses(const std::filesystem::path& path, const TableOptions& options,
                      bool with_times = true);
 

@@ -39,7 +39,8 @@ std::vector<glm::dvec2> placed(std::span<const glm::dvec2> elements_mm, const Po
 /// through the neighbours of the best place, whose curvature gives the standard deviations. None
 /// where it sits where its elements are said to be, for all that the touches tell.
 /// @param nats log-likelihood of the touches with the array at a pose in its own frame
-std::optional<SetupFinding> offset_of(const std::function<double(const Pose&)>& nats) {
+std::optional<SetupFinding> offset_of(const std::function<double(const Pose&)>& nats,
+                                      const Pose& start = {}) {
   using Place = std::array<double, 3>;
   const auto pose_of = [](const Place& at) { return Pose{{at[0], at[1]}, at[2]}; };
   std::map<Place, double> known;
@@ -50,7 +51,7 @@ std::optional<SetupFinding> offset_of(const std::function<double(const Pose&)>& 
     }
     return known.emplace(at, nats(pose_of(at))).first->second;
   };
-  Place best{};
+  Place best{start.translation_mm.x, start.translation_mm.y, start.theta_rad};
   const Place finest{0.125, 0.125, 0.0125};
   for (double step = 8.0; step >= 1.0;) {  // in units of the finest
     Place next = best;
@@ -174,7 +175,8 @@ std::vector<Press> with_offset(std::vector<Press> presses, const Pose& offset) {
   return presses;
 }
 
-void check_offset(SetupJudge& judge, Setup& setup, double& nats, SetupCheck& check) {
+void check_offset(SetupJudge& judge, Setup& setup, double& nats, SetupCheck& check,
+                  const Pose& start) {
   if (likeness_of_angles(judge, setup.rad) > one_angle) {
     check.remarks.emplace_back(
         "all touches are at nearly one angle of the sensor, which tells nothing of where the array "
@@ -186,7 +188,8 @@ void check_offset(SetupJudge& judge, Setup& setup, double& nats, SetupCheck& che
     other.elements_mm = placed(setup.elements_mm, offset);
     return other;
   };
-  const auto finding = offset_of([&](const Pose& offset) { return judge.nats(setup_at(offset)); });
+  const auto finding =
+      offset_of([&](const Pose& offset) { return judge.nats(setup_at(offset)); }, start);
   if (finding) {
     check.findings.push_back(*finding);
     setup = setup_at(*finding->array_offset);

@@ -29,7 +29,8 @@ std::vector<Press> with_offset(std::vector<Press> presses, const Pose& offset);
 // Each adds its finding, if any, to the check, and goes on from the set-up that it mends.
 
 /// Where the array sits in the tool, as "array_offset".
-void check_offset(SetupJudge& judge, Setup& setup, double& nats, SetupCheck& check);
+void check_offset(SetupJudge& judge, Setup& setup, double& nats, SetupCheck& check,
+                  const Pose& start = {});
 
 /// How far apart the elements are.
 void check_pitch(SetupJudge& judge, Setup& setup, double& nats, SetupCheck& check);

@@ -13,6 +13,8 @@
 #include <glm/geometric.hpp>
 
 #include "learning/array_place.hpp"
+#include "learning/element_order.hpp"
+#include "learning/mount_search.hpp"
 #include "learning/setup_judge.hpp"
 #include "model/bounding_box.hpp"
 #include "palpate/error.hpp"
@@ -34,9 +36,8 @@ struct PoseUnit {
   }
 };
 
-/// Poses in degrees or metres, where the numbers allow for it.
-void check_units(SetupJudge& judge, Setup& setup, double& nats,
-                 std::vector<SetupFinding>& findings) {
+/// Metres, degrees or both, where the numbers allow for it.
+std::vector<PoseUnit> possible_units(const SetupJudge& judge, const Setup& setup) {
   constexpr double circle = 2.0 * std::numbers::pi;
   BoundingBox places;
   double most_angle = 0.0;
@@ -46,37 +47,51 @@ void check_units(SetupJudge& judge, Setup& setup, double& nats,
       most_angle = std::max(most_angle, std::abs(given.touch.T_robot_sensor.theta_rad));
     }
   }
-  const double reach_mm = array_reach_mm(setup.elements_mm);
-  const bool may_be_metres = places.diagonal() < 0.1 * reach_mm;
+  const bool may_be_metres = places.diagonal() < 0.1 * array_reach_mm(setup.elements_mm);
   const bool may_be_degrees = most_angle > circle;
   // An angle that counts turns exceeds a circle in radians, too.
+  std::vector<PoseUnit> units;
+  if (may_be_metres && may_be_degrees) {
+    units.push_back({true, true});
+  }
+  if (may_be_metres) {
+    units.push_back({true, false});
+  }
+  if (may_be_degrees) {
+    units.push_back({false, true});
+  }
+  return units;
+}
+
+SetupFinding unit_finding(const PoseUnit& unit, double nats) {
+  const std::string option =
+      fmt::format("pose-unit {},{}", unit.metres ? "m" : "mm", unit.degrees ? "deg" : "rad");
+  return {"pose_unit",
+          nats,
+          fmt::format("the sensor's poses are in {}: import them with `{}`",
+                      unit.metres && unit.degrees ? "metres and degrees"
+                      : unit.metres               ? "metres"
+                                                  : "degrees",
+                      option),
+          {option}};
+}
+
+/// Poses in degrees or metres.
+void check_units(SetupJudge& judge, Setup& setup, double& nats,
+                 std::vector<SetupFinding>& findings) {
   std::optional<PoseUnit> best;
   double gain = least_nats;
-  for (const PoseUnit& unit : {PoseUnit{may_be_metres, may_be_degrees},
-                               PoseUnit{may_be_metres, false}, PoseUnit{false, may_be_degrees}}) {
-    if (!unit.metres && !unit.degrees) {
-      continue;
-    }
+  for (const PoseUnit& unit : possible_units(judge, setup)) {
     if (const double gained = judge.nats(unit.of(setup)) - nats; gained > gain) {
       best = unit;
       gain = gained;
     }
   }
-  if (!best) {
-    return;
+  if (best) {
+    findings.push_back(unit_finding(*best, gain));
+    setup = best->of(setup);
+    nats += gain;
   }
-  const std::string option =
-      fmt::format("pose-unit {},{}", best->metres ? "m" : "mm", best->degrees ? "deg" : "rad");
-  findings.push_back({"pose_unit",
-                      gain,
-                      fmt::format("the sensor's poses are in {}: import them with `{}`",
-                                  best->metres && best->degrees ? "metres and degrees"
-                                  : best->metres                ? "metres"
-                                                                : "degrees",
-                                  option),
-                      {option}});
-  setup = best->of(setup);
-  nats += gain;
 }
 
 /// Whether the touches are, but for a part of the array's reach, at one place and angle. Any array
@@ -95,78 +110,67 @@ bool at_one_place(const SetupJudge& judge, const Setup& setup) {
          likeness_of_angles(judge, setup.rad) > one_angle;
 }
 
-/// The elements in the order of their readings, and the options of an import that say so.
-struct ElementOrder {
-  std::vector<std::string> options;
-  std::vector<glm::dvec2> elements_mm;
-};
-
-/// Where the elements are a full grid, the eight orders in which it may be read.
-std::vector<ElementOrder> orders_of(std::span<const glm::dvec2> elements_mm) {
-  constexpr double same_mm = 1e-6;
-  const auto less = [](double a, double b) { return a < b - same_mm; };
-  std::set<double, decltype(less)> xs(less);
-  std::set<double, decltype(less)> ys(less);
-  for (const glm::dvec2& p : elements_mm) {
-    xs.insert(p.x);
-    ys.insert(p.y);
-  }
-  const std::vector<double> x(xs.begin(), xs.end());
-  const std::vector<double> y(ys.begin(), ys.end());
-  std::vector<ElementOrder> orders;
-  if (x.size() < 2 || y.size() < 2 || x.size() * y.size() != elements_mm.size()) {
-    return orders;
-  }
-  for (const bool by_rows : {true, false}) {
-    for (const char* first : {"bottom-left", "bottom-right", "top-left", "top-right"}) {
-      const bool right = std::string_view(first).ends_with("right");
-      const bool top = std::string_view(first).starts_with("top");
-      std::vector<glm::dvec2> order;
-      for (std::size_t e = 0; e < elements_mm.size(); ++e) {
-        const std::size_t i = by_rows ? e % x.size() : e / y.size();
-        const std::size_t j = by_rows ? e / x.size() : e % y.size();
-        order.emplace_back(x[right ? x.size() - 1 - i : i], y[top ? y.size() - 1 - j : j]);
+/// The array anywhere in the tool, in every unit and order that a turn of the array does not make.
+void search_widely(SetupJudge& judge, Setup& setup, SetupCheck& check) {
+  std::vector<PoseUnit> units = possible_units(judge, setup);
+  units.insert(units.begin(), PoseUnit());
+  const std::vector<ElementOrder> orders = orders_but_for_turns(setup.elements_mm);
+  struct Found {
+    PoseUnit unit;
+    ElementOrder order;
+    FoundMount mount;
+  };
+  std::optional<Found> best;
+  for (const PoseUnit& unit : units) {
+    for (const ElementOrder& order : orders) {
+      Setup tried = unit.of(setup);
+      tried.elements_mm = order.elements_mm;
+      if (likeness_of_angles(judge, tried.rad) > one_angle) {
+        continue;
       }
-      orders.push_back({{fmt::format("first-element {}", first),
-                         fmt::format("order {}", by_rows ? "rows" : "columns")},
-                        std::move(order)});
+      const FoundMount mount = search_mount(judge, tried);
+      if (!best || mount.nats - best->mount.nats > least_share * std::abs(best->mount.nats)) {
+        best = {unit, order, mount};
+      }
     }
   }
-  return orders;
-}
-
-void check_order(SetupJudge& judge, Setup& setup, double& nats, SetupCheck& check) {
-  const auto orders = orders_of(setup.elements_mm);
-  if (orders.empty()) {
-    check.remarks.emplace_back("the array is no grid: the order of its elements was not tried");
+  if (!best) {
     return;
   }
-  const std::vector<glm::dvec2> given = setup.elements_mm;
-  double best = nats;
-  std::vector<std::string> options;
-  for (const auto& [import_options, elements_mm] : orders) {
-    Setup other = setup;
-    other.elements_mm = elements_mm;
-    const double tried = elements_mm == given ? nats : judge.nats(other);
-    if (tried > best) {
-      best = tried;
-      options = import_options;
-      check.elements_mm = elements_mm;
+  const auto placed_best = [&](const Setup& from) {
+    Setup at = from;
+    for (glm::dvec2& p : at.elements_mm) {
+      p = best->mount.offset * p;
     }
+    return judge.nats(at);
+  };
+  Setup found = best->unit.of(setup);
+  found.elements_mm = best->order.elements_mm;
+  double nats = placed_best(found);
+  if (best->unit.metres || best->unit.degrees) {
+    Setup as_given = setup;
+    as_given.elements_mm = found.elements_mm;
+    check.findings.push_back(unit_finding(best->unit, nats - placed_best(as_given)));
   }
-  // Where touches overlap little, how the elements lie among the cells tells orders apart by a
-  // little; a wrong order costs a good part of all that the touches tell.
-  constexpr double least_share = 0.05;
-  if (best - nats > std::max(least_nats, least_share * std::abs(nats))) {
-    check.findings.push_back(
-        {"element_order", best - nats,
-         fmt::format("the elements are read in another order: import with `{}`",
-                     fmt::join(options, "` and `")),
-         options});
-    setup.elements_mm = check.elements_mm;
-    nats = best;
+  if (!best->order.options.empty()) {
+    Setup as_given = found;
+    as_given.elements_mm = setup.elements_mm;
+    check.findings.push_back(order_finding(best->order.options, nats - placed_best(as_given)));
   }
+  setup = found;
   check.elements_mm = setup.elements_mm;
+  nats = judge.nats(setup);
+  check_offset(judge, setup, nats, check, best->mount.offset);
+  check_pitch(judge, setup, nats, check);
+}
+
+SetupFinding unexplained(const SetupFit& fit) {
+  return {"unexplained", 0.0,
+          fmt::format("nothing that was tried explains these touches: {} of {} do not fit the map "
+                      "of the others; look at the clock of the poses (`pose-delay`), whether "
+                      "every pose is that of its touch, at the signs of x, y and the angle, where "
+                      "the array is mounted, and whether an object moved or was changed",
+                      fit.misfits, fit.touches)};
 }
 
 /// Elements that always, or never, read contact, against what their places predict.
@@ -220,23 +224,24 @@ void check_elements(SetupJudge& judge, Setup& setup, SetupCheck& check) {
 }
 
 /// Touches that fit the map of the others far worse than all else.
-void check_touches(SetupJudge& judge, const Setup& setup, SetupCheck& check) {
+void check_touches(SetupJudge& judge, Setup& setup, SetupCheck& check) {
   constexpr double least_z = -6.0;
   std::map<std::string, std::vector<std::size_t>> found;
   double nats = 0.0;
-  std::size_t count = 0;
+  std::set<const TriedTouch*> left_out;
   judge.visit(setup, [&](const TriedTouch& given, const Touch& touch, const OccupancyGrid& map) {
     const std::optional<Fit> fit = fit_of({&touch, 1}, {}, map, judge.contact());
     if (fit && fit->z < least_z) {
       found[given.recording].push_back(given.index);
       nats -= fit->z;
-      ++count;
+      left_out.insert(&given);
     }
     check.touches += 1;
   });
-  if (count == 0 || 4 * count > check.touches) {  // with so many, it is the set-up
+  if (left_out.empty() || 4 * left_out.size() > check.touches) {  // so many are the set-up's
     return;
   }
+  setup.left_out = std::move(left_out);
   for (auto& [recording, indices] : found) {
     std::ranges::sort(indices);
     check.findings.push_back(
@@ -345,7 +350,15 @@ SetupCheck check_setup(Device& device, std::span<const Recording> recordings,
     return check;
   }
   SetupJudge& judge = *some_judge;
-  Setup setup{.elements_mm = check.elements_mm};
+  const Setup given{.elements_mm = check.elements_mm};
+  Setup setup = given;
+  SetupFit fit;
+  const auto judged = [&] {
+    check_elements(judge, setup, check);
+    check_touches(judge, setup, check);
+    fit = judge.fit(setup);
+    return fit.is_sound();
+  };
   double nats = judge.nats(setup);
   check_units(judge, setup, nats, check.findings);
   show(0.1);
@@ -355,14 +368,24 @@ SetupCheck check_setup(Device& device, std::span<const Recording> recordings,
         "nothing of the array: move and turn the sensor between the touches");
   } else {
     check_order(judge, setup, nats, check);
-    show(0.3);
+    show(0.2);
     check_offset(judge, setup, nats, check);
-    show(0.7);
+    show(0.4);
     check_pitch(judge, setup, nats, check);
   }
-  show(0.9);
-  check_elements(judge, setup, check);
-  check_touches(judge, setup, check);
+  show(0.5);
+  if (!judged()) {
+    check = {.remarks = {}, .elements_mm = given.elements_mm};
+    setup = given;
+    search_widely(judge, setup, check);
+    show(0.9);
+    if (!judged()) {
+      check = {.findings = {unexplained(fit)},
+               .remarks = {},
+               .elements_mm = given.elements_mm,
+               .touches = check.touches};
+    }
+  }
   check.findings.insert(check.findings.end(), logged.begin(), logged.end());
   return check;
 }

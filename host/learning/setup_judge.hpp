@@ -1,8 +1,11 @@
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <set>
 #include <span>
 #include <string>
 #include <vector>
@@ -16,12 +19,15 @@
 
 namespace palpate {
 
+struct TriedTouch;
+
 /// How the touches are tried.
 struct Setup {
   std::vector<glm::dvec2> elements_mm;   ///< [e] in the order of the readings
   double mm = 1.0;                       ///< that the poses' unit of length has
   double rad = 1.0;                      ///< that the poses' unit of angle has
   std::vector<std::uint8_t> valid = {};  ///< [e] 0: dead, whatever the recording says; empty: none
+  std::set<const TriedTouch*> left_out = {};
 };
 
 /// A touch in contact, and where it stands.
@@ -32,6 +38,17 @@ struct TriedTouch {
   std::size_t index = 0;  ///< in the recording
 };
 
+/// How touches fit maps that they are no part of.
+struct SetupFit {
+  std::size_t touches = 0;
+  std::size_t misfits = 0;
+  double told = 0.0;  ///< nats by which the maps tell the readings better than the prior does
+
+  /// Of sound set-ups less than one touch in a hundred is a misfit.
+  bool is_sound() const { return misfits <= std::max(least_misfits, touches / 20) && told > 0.0; }
+  static constexpr std::size_t least_misfits = 2;
+};
+
 /// The predictive likelihood of set-ups: that of each half of an object's touches, every other one,
 /// on the map that the other half makes.
 class SetupJudge {
@@ -40,12 +57,17 @@ class SetupJudge {
                                   const OccupancyGrid& map_of_the_others)>;
 
   /// @param recordings outlive this object
-  /// @throws Error where an object has fewer than four touches in contact
+  /// @throws Error where an object has fewer than four touches in contact, or all elements are in
+  /// contact in all touches
   SetupJudge(Device& device, std::span<const Recording> recordings, const MapOptions& options);
 
   /// Log-likelihood of all readings (Eq. 7), in nats; -1e300 where the touches lie so far apart
   /// that no map holds them.
   double nats(const Setup& setup);
+
+  /// Whether the touches fit the maps of the others, by `fits_from_z`, as those of sound set-ups
+  /// do, and the maps tell of them. @throws Error as MapBuilder does
+  SetupFit fit(const Setup& setup);
 
   /// Visits every touch as the set-up has it. @throws Error as MapBuilder does
   void visit(const Setup& setup, const Take& take);

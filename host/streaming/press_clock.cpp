@@ -174,6 +174,32 @@ std::vector<double> offsets_for(std::span<const double> time_s, const PoseLog& p
   return offsets_s;
 }
 
+/// How far the nearest other valley below `limit` lies from that of the offsets low to high; none
+/// without another.
+std::optional<double> next_rival_s(const std::vector<double>& offsets_s,
+                                   const std::vector<double>& against, double limit,
+                                   std::size_t low, std::size_t high) {
+  const double middle_s = 0.5 * (offsets_s[low] + offsets_s[high]);
+  for (; low > 0 && against[low - 1] <= limit; --low) {
+  }
+  for (; high + 1 < against.size() && against[high + 1] <= limit; ++high) {
+  }
+  std::optional<double> nearest_s;
+  for (std::size_t k = 0; k < against.size(); ++k) {
+    if ((k >= low && k <= high) || against[k] > limit) {
+      continue;
+    }
+    std::size_t end = k;  // of this valley
+    while (end + 1 < against.size() && end + 1 != low && against[end + 1] <= limit) {
+      ++end;
+    }
+    const double away_s = std::abs(0.5 * (offsets_s[k] + offsets_s[end]) - middle_s);
+    nearest_s = std::min(nearest_s.value_or(away_s), away_s);
+    k = end;
+  }
+  return nearest_s;
+}
+
 }  // namespace
 
 std::optional<ClockOffset> clock_offset(std::span<const double> time_s, std::span<const float> load,
@@ -193,13 +219,17 @@ std::optional<ClockOffset> clock_offset(std::span<const double> time_s, std::spa
   for (std::size_t k = 0; k < offsets_s.size(); ++k) {
     against.push_back(comparison.sum_against(k));
   }
-  const auto nearest = [&](std::size_t a, std::size_t b) {
-    return std::abs(offsets_s[a]) < std::abs(offsets_s[b]) ? a : b;
+  const auto nearest_to = [&](double origin_s, std::size_t a, std::size_t b) {
+    return std::abs(offsets_s[a] - origin_s) < std::abs(offsets_s[b] - origin_s) ? a : b;
   };
   std::size_t none = 0;  // the offset 0
   for (std::size_t k = 0; k < offsets_s.size(); ++k) {
-    none = nearest(k, none);
+    none = nearest_to(0.0, k, none);
   }
+  // Of clocks with one epoch the smallest offset is the likeliest; of others 0 means nothing.
+  const bool overlap =
+      poses.time_s.front() <= time_s.back() && time_s.front() <= poses.time_s.back();
+  const double origin_s = overlap ? 0.0 : poses.time_s.front() - time_s.front();
   const auto count = static_cast<double>(presses.size());
   const double least = *std::ranges::min_element(against);
   const double as_good = least + std::max(0.5, 0.03 * count);
@@ -210,7 +240,7 @@ std::optional<ClockOffset> clock_offset(std::span<const double> time_s, std::spa
   std::size_t best = against.size();
   for (std::size_t k = 0; k < against.size(); ++k) {
     if (against[k] <= as_good) {
-      best = best == against.size() ? k : nearest(k, best);
+      best = best == against.size() ? k : nearest_to(origin_s, k, best);
     }
   }
   std::size_t low = best;
@@ -219,16 +249,31 @@ std::optional<ClockOffset> clock_offset(std::span<const double> time_s, std::spa
   }
   for (; high + 1 < against.size() && against[high + 1] <= as_good; ++high) {
   }
-  return ClockOffset{.seconds = 0.5 * (offsets_s[low] + offsets_s[high]),
+  ClockOffset offset{.seconds = 0.5 * (offsets_s[low] + offsets_s[high]),
                      .presses = presses.size(),
                      .against = comparison.count_against(none),
                      .left = comparison.count_against((low + high) / 2)};
+  if (!overlap) {
+    const double clearly_worse = least + std::max(2.0, 0.15 * count);
+    offset.open_s = next_rival_s(offsets_s, against, clearly_worse, low, high);
+  }
+  return offset;
 }
 
 SetupFinding clock_finding(const ClockOffset& offset, double given_s) {
   const std::string option = fmt::format("pose-delay {:.2f}", given_s + offset.seconds);
   const double nats = (static_cast<double>(offset.against) - static_cast<double>(offset.left)) *
                       std::log(19.0);  // one press in twenty is against sound clocks
+  if (offset.open_s) {
+    return {"clock", nats,
+            fmt::format("the poses' clock and the frames' have no common beginning, and presses "
+                        "tell their offset but for {:.2f} s: with `pose-delay {:.2f}`, where both "
+                        "logs begin together, the array moves, is lifted, or has no pose in {} of "
+                        "{} presses, and {:.2f} s more or less explain about as many; find one "
+                        "press in both logs, and give the difference of its times",
+                        *offset.open_s, given_s + offset.seconds, offset.left, offset.presses,
+                        *offset.open_s)};
+  }
   return {"clock",
           nats,
           fmt::format("the poses' clock seems {:.2f} s {}: in {} of {} presses the array moves, is "

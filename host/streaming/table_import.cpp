@@ -154,7 +154,7 @@ Pose truth_pose(const std::string& text, const Pose& in_units, const std::array<
 void check_numbers(const ImportOptions& options) {
   if (options.largest_gap_s &&
       !(*options.largest_gap_s > 0.0 && std::isfinite(*options.largest_gap_s))) {
-    refuse(fmt::format("`largest-gap-s {}`", *options.largest_gap_s), "must be above 0");
+    refuse(fmt::format("`largest-gap-s {}`", *options.largest_gap_s), "give seconds above 0");
   }
   constexpr double slowest_hz = 1e-3;
   constexpr double fastest_hz = 1e6;
@@ -214,6 +214,9 @@ ImportedRecording recording_of(const ImportOptions& options, ArrayTable array, I
         recording.truth = Truth{options.object, inverse(plane.project(*T_robot_object))};
       }
     }
+    if (!poses->left_out.empty()) {
+      imported.of_poses.push_back(poses->left_out);
+    }
     imported.assumed_units = poses->assumed_units;
     join(std::move(*poses), *survey, options, imported);
   } else {
@@ -270,6 +273,7 @@ ImportedRecording import_rows(const ImportOptions& options, ImportRows rows) {
 }
 
 ImportSurvey survey_for(const ImportOptions& options, std::size_t elements) {
+  check_numbers(options);
   ArrayTable array = import_array(options);
   if (array.elements_mm.size() != elements) {
     refuse(options.pressures,

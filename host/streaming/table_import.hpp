@@ -54,7 +54,7 @@ struct ImportedRecording {
   std::size_t in_gaps = 0;     ///< frames between two poses that are further apart
   /// The largest reading where all are whole numbers, as raw ones are, but said to be in kPa.
   std::optional<double> whole_up_to = {};
-  std::vector<std::string> of_poses = {};  ///< what is worth saying of poses in space, in sentences
+  std::vector<std::string> of_poses = {};  ///< what is worth saying of the poses, in sentences
 };
 
 /// Reads the pressures and the poses and joins them.
@@ -75,8 +75,8 @@ struct ImportRows {
 /// @throws Error as import_tables()
 ImportedRecording import_rows(const ImportOptions& options, ImportRows rows);
 
-/// What takes the pressures of rows that are not held. @throws Error where the array is of other
-/// elements, or cannot be read
+/// What takes the pressures of rows that are not held. @throws Error where a number among the
+/// options makes no sense, or the array is of other elements or cannot be read
 ImportSurvey survey_for(const ImportOptions& options, std::size_t elements);
 
 }  // namespace palpate

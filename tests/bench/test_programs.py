@@ -188,10 +188,11 @@ def test_a_sweep_is_whole_and_in_order(sweep: Program) -> None:
 
 
 def test_set_ups_are_checked(tmp_path: pathlib.Path) -> None:
-    # Takes some eleven seconds of a processor: a set of three objects is checked four times.
+    # Takes some forty seconds of a processor: a set of three objects is checked ten times.
     document = Program(tmp_path, "bench.check", "--quick", "--trials", 1).document
     (row,) = document["check"]
     assert (row["elements"], row["sets"], row["sound"], row["order"], row["one_angle"]) == (36, 1, 1, 1, 1)
+    assert (row["mount"], row["beyond"], row["precise"]) == (1, 5, 0)
     assert row["least_order_nats"] > 100 and row["most_mm"] < 0.5 and row["most_rad"] < 0.05
 
 

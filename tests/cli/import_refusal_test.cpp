@@ -234,6 +234,18 @@ INSTANTIATE_TEST_SUITE_P(
              {"--poses", "log.csv"},
              "log.csv: has 2 rows of readings for 1 frames or touches; give the poses in a table "
              "of their own, with a row for each"},
+        Case{"a_sideways_array", "poses.csv",
+             "time_s,x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg\n0,0,0,5,0,90,0\n", with_poses,
+             "poses.csv:2: column 'pitch_deg': the array is turned by 90 degrees out of the xy "
+             "plane, which x, y and an angle do not tell; write the rotation as a quaternion: "
+             "columns tx, ty, tz, qx, qy, qz and qw"},
+        Case{"a_rotation_vector_of_a_tool_that_points_down",
+             "poses.csv",
+             "time,x,y,z,rx,ry,rz\n0,0,0,5,2.2,2.2,0\n",
+             {"--poses", "poses.csv", "--pose-columns", "x,y,rz"},
+             "poses.csv:2: column 'rx': the array is turned by 126 degrees out of the xy plane, "
+             "which x, y and an angle do not tell; write the rotation as a quaternion: columns tx, "
+             "ty, tz, qx, qy, qz and qw"},
         Case{"binary",
              "log.csv",
              std::string("\0\1\2", 3),
@@ -251,7 +263,7 @@ TEST_F(ImportCommand, FlagsNameTheirForm) {
   expect_said({"--rate", "0"}, "--rate 0: give 0.001 to 1000000 Hz");
   expect_said({"--rate", "1e-300"}, "--rate 1e-300: give 0.001 to 1000000 Hz");
   expect_said({"--rate", "1e300"}, "--rate 1e+300: give 0.001 to 1000000 Hz");
-  expect_said({"--largest-gap-s", "0"}, "--largest-gap-s 0: must be above 0");
+  expect_said({"--largest-gap-s", "0"}, "--largest-gap-s 0: give seconds above 0");
   expect_said({"--pose-columns", "x,y"},
               "--pose-columns x,y: give three names, X,Y,THETA, or seven, TX,TY,TZ,QX,QY,QZ,QW");
   expect_said({"--pose-columns", "tx,ty,qz"},

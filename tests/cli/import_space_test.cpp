@@ -58,6 +58,14 @@ TEST_F(ImportCommand, PosesInSpaceBecomePosesInThePlaneOfTheTouches) {
   }
 }
 
+TEST_F(ImportCommand, AHeightBesideAnAngleIsLeftOutAndSaid) {
+  put("poses.csv", "time,x,y,z,roll,yaw\n0,1,2,30,0.01,0.5\n1,1,2,30,6.29,0.5\n");
+  const Outcome outcome = palpate(command({"--poses", "poses.csv", "--pose-unit", "mm,rad"}));
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("poses.csv: its column 'z' was left out"), std::string::npos)
+      << outcome.err;
+}
+
 TEST_F(ImportCommand, AGivenPlaneNeedsNoLikeDirections) {
   // The array looks up once, and down twice: it is turned over.
   put("poses.csv",

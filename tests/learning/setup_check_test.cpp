@@ -1,9 +1,11 @@
 // What touches at known poses say about the set-up that they were taken with.
 
 #include <algorithm>
+#include <cmath>
 #include <numbers>
 
 #include <gmock/gmock.h>
+#include <glm/geometric.hpp>
 
 #include "learning/setup_check.hpp"
 #include "palpate/error.hpp"
@@ -94,6 +96,78 @@ TEST_F(SetupTouches, TellWhereTheArraySitsInTheTool) {
     EXPECT_LT(finding.sd->at(0), 0.2);
     EXPECT_EQ(found.elements_mm[0], *finding.array_offset * digitacts_array()[0]);
   }
+}
+
+TEST_F(SetupTouches, TellAMountThatIsFarOffAndTurned) {
+  for (const auto& elements_mm : {digitacts_array(), grid_array(8, 8, 1.9)}) {
+    for (const Pose& offset : {Pose{{11.0, -10.0}, 0.4}, Pose{{-31.0, 47.0}, -2.6}}) {
+      std::vector<Recording> recordings = touches(elements_mm, false, 60);
+      for (Recording& recording : recordings) {
+        for (Pose& pose : recording.T_robot_sensor) {
+          pose = pose * inverse(offset);
+        }
+      }
+      const SetupCheck found = check(recordings);
+      ASSERT_EQ(found.findings.size(), 1u);
+      ASSERT_EQ(found.findings[0].what, "array_offset") << found.findings[0].words;
+      const Pose error = inverse(offset) * *found.findings[0].array_offset;
+      EXPECT_LT(glm::length(error.translation_mm), 0.3);
+      EXPECT_LT(std::abs(wrap_angle(error.theta_rad)), std::numbers::pi / 180.0);
+    }
+  }
+}
+
+TEST_F(SetupTouches, TellAMirroredOrderOfAnArrayThatIsFarOff) {
+  std::vector<Recording> recordings = touches(digitacts_array(), false, 60);
+  const std::vector<glm::dvec2> truth = recordings[0].elements_mm;
+  const Pose offset{{17.0, -24.0}, 1.0};
+  for (Recording& recording : recordings) {
+    for (Pose& pose : recording.T_robot_sensor) {
+      pose = pose * inverse(offset);
+    }
+    for (glm::dvec2& p : recording.elements_mm) {
+      p.x = -p.x;
+    }
+  }
+  const SetupCheck found = check(recordings);
+  EXPECT_THAT(found.findings, ElementsAre(Field(&SetupFinding::what, "element_order"),
+                                          Field(&SetupFinding::what, "array_offset")));
+  for (std::size_t e = 0; e < truth.size(); ++e) {
+    EXPECT_LT(glm::distance(found.elements_mm[e], offset * truth[e]), 0.4);
+  }
+}
+
+TEST_F(SetupTouches, ThatNoSetupExplainsAreGivenNone) {
+  const std::vector<Recording> sound = touches(digitacts_array(), false, 60);
+  const auto expect_unexplained = [&](const std::vector<Recording>& recordings) {
+    const SetupCheck found = check(recordings);
+    ASSERT_EQ(found.findings.size(), 1u);
+    EXPECT_EQ(found.findings[0].what, "unexplained") << found.findings[0].words;
+    EXPECT_THAT(found.findings[0].options, IsEmpty());
+    EXPECT_EQ(found.elements_mm, sound[0].elements_mm);
+    EXPECT_GT(found.touches, 100u);
+  };
+  std::vector<Recording> late = sound;
+  for (Recording& recording : late) {
+    std::ranges::rotate(recording.T_robot_sensor, recording.T_robot_sensor.begin() + 2);
+  }
+  expect_unexplained(late);
+  std::vector<Recording> mirrored = sound;
+  for (Recording& recording : mirrored) {
+    for (Pose& pose : recording.T_robot_sensor) {
+      pose.translation_mm.x = -pose.translation_mm.x;
+    }
+  }
+  expect_unexplained(mirrored);
+  std::vector<Recording> two = sound;  // objects in each
+  const std::size_t half = 30;
+  for (std::size_t k = 0; k < 2; ++k) {
+    const Recording& other = sound[1 - k];
+    const auto n = static_cast<std::ptrdiff_t>(half * other.elements());
+    std::ranges::copy_n(other.pressure.begin(), n, two[k].pressure.begin());
+    std::ranges::copy_n(other.T_robot_sensor.begin(), half, two[k].T_robot_sensor.begin());
+  }
+  expect_unexplained(two);
 }
 
 TEST_F(SetupTouches, AtOneAngleTellNothingOfTheArraysPlace) {
@@ -193,6 +267,18 @@ TEST_F(SetupTouches, AreRefusedWhereTheyCannotBeJudged) {
         check(std::vector{recordings[0], other});
       },
       testing::ThrowsMessage<Error>(HasSubstr("A.h5: its array is not that of all")));
+  const auto with_pressure = [&](double kPa) {
+    Recording always = touches(digitacts_array())[0];
+    std::ranges::fill(always.pressure, kPa);
+    return always;
+  };
+  EXPECT_THAT(
+      [&] {
+        check(std::vector{recordings[1], with_pressure(0.0)});
+      },
+      testing::ThrowsMessage<Error>(HasSubstr("object 'A': no element is in contact")));
+  EXPECT_THAT([&] { check(std::vector{with_pressure(5.0)}); },
+              testing::ThrowsMessage<Error>(HasSubstr("every element is in contact in every")));
   Recording& few = recordings[0];
   few.T_robot_sensor.resize(3);
   few.pressure.resize(3 * 36);

@@ -213,6 +213,11 @@ def test_frames_in_a_gap_of_transforms_have_no_pose(tmp_path: pathlib.Path) -> N
             log, pressure_topic="/plain", tf=("base", "array"), array=(2, 2, 2), largest_gap_s=1
         )
     numpy.testing.assert_allclose(wide.T_robot_sensor[:, 0], [200 * i for i in range(6)], atol=1e-3)
+    for name, value in (("pose_delay", math.nan), ("largest_gap_s", -1.0)):
+        with pytest.raises(palpate.Error, match=f"{name}=.*give seconds"):
+            read_bag(
+                log, pressure_topic="/plain", tf=("base", "array"), array=(2, 2, 2), **{name: value}
+            )
     with pytest.raises(palpate.Error, match="tf array:cup: no chain"):
         read_bag(log, pressure_topic="/plain", tf=("array", "cup"), array=(2, 2, 2))
 

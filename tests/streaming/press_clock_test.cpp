@@ -110,6 +110,23 @@ TEST(ClockOffset, IsTheOneNearestTo0WherePressesAreRegular) {
   EXPECT_NEAR(offset->seconds, 0.3, 0.1);
 }
 
+TEST(ClockOffset, OfClocksWithoutACommonEpochIsNamedOnlyWhereOneAloneExplainsThePresses) {
+  for (const double delay_s : {1.8e9, -1.8e9 + 0.7}) {
+    const auto known = Logs({}, delay_s).offset();
+    ASSERT_TRUE(known);
+    EXPECT_NEAR(known->seconds, delay_s, 0.1);
+    EXPECT_FALSE(known->open_s);
+    const auto open = Logs({.regular = true}, delay_s).offset();  // one a second
+    ASSERT_TRUE(open);
+    EXPECT_NEAR(open->seconds, delay_s, 0.1) << "where the logs begin together";
+    ASSERT_TRUE(open->open_s);
+    EXPECT_NEAR(*open->open_s, 1.0, 0.05);
+    const SetupFinding finding = clock_finding(*open, 0.0);
+    EXPECT_TRUE(finding.options.empty());
+    EXPECT_NE(finding.words.find("but for 1.00 s"), std::string::npos) << finding.words;
+  }
+}
+
 TEST(ClockOffset, BecomesAFindingThatNamesWhatMendsIt) {
   const SetupFinding finding =
       clock_finding({.seconds = -0.5, .presses = 60, .against = 41, .left = 1}, 0.2);
