@@ -14,6 +14,7 @@
 #include "cli/command_files.hpp"
 #include "cli/commands.hpp"
 #include "cli/options.hpp"
+#include "cli/recognition_flags.hpp"
 #include "cli/sensor_option.hpp"
 #include "io/recording_state.hpp"
 #include "model/option_words.hpp"

@@ -167,7 +167,7 @@ float RestFinder::low_by(std::span<const float> values, std::span<const float> r
   double sum = 0.0;
   double count = 0.0;
   for (std::size_t i = 0; i < above.size(); ++i) {
-    if (above[i] <= release_) {
+    if (above[i] <= onset_) {
       sum += values[i] - rest[i];
       count += 1.0;
     }

@@ -36,6 +36,14 @@ TEST_F(ImportCommand, JoinsFramesWithPosesByTime) {
   expect_pose(r.T_robot_sensor[2], {{10.0, 7.0}, 1.0});
 }
 
+TEST_F(ImportCommand, ReadingsThatFallUnderLoadAreStoredTimesMinusOne) {
+  put("array.csv", "x,y,baseline\n-1,0,7\n1,0,8\n");
+  const Recording r = imported({"--sign", "-1", "--array", "array.csv"});
+  EXPECT_EQ(r.pressure, (std::vector<double>{-1, -2, -3, -4, -5, -6}));
+  EXPECT_EQ(r.baseline, (std::vector<double>{-7, -8}));
+  expect_said({"--sign", "2"}, "--sign 2: give 1, or -1 where readings fall under load");
+}
+
 TEST_F(ImportCommand, FramesOutsideThePosesOrInAGapHaveNone) {
   put("poses.csv", "t,x,y,yaw\n0.01,1,2,3\n0.02,1,2,3\n0.07,1,2,3\n0.08,1,2,3\n");
   for (const auto& [gap, posed] : {std::pair{"0.03", false}, {"0.06", true}}) {

@@ -111,4 +111,39 @@ TEST_F(LiveLines, MayStayAwayForEver) {
   ::close(writer);
 }
 
+// The readings of a sensor that falls under load, and frames of which every two are swapped.
+TEST_F(LiveLines, FallingReadingsAndSwappedFramesAreSaid) {
+  done({"record", "--sensor", unknown_e, "-o", "frames.h5"});
+  const Recording frames = read_recording(folder_ / "frames.h5");
+  const auto line = [&](std::size_t i, double sign) {
+    const Touch frame = frames.touch(i);
+    const Pose& pose = frame.T_robot_sensor;
+    std::string text = fmt::format("{:.17g},{},{},{}", frames.time_s[i], pose.translation_mm.x,
+                                   pose.translation_mm.y, pose.theta_rad);
+    for (const double p : frame.pressure) {
+      text += fmt::format(",{}", sign * p);
+    }
+    return text + "\n";
+  };
+  std::string falling;
+  std::string swapped;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    falling += line(i, -1.0);
+    swapped += line(i + 1 < frames.size() + i % 2 ? i + 1 - 2 * (i % 2) : i, 1.0);
+  }
+  const auto live_of = [&](const std::string& lines, const Arguments& sign) {
+    put_bytes(folder_ / "lines", lines);
+    Arguments more{"--array", "6:6:1.9", "--json", "live.jsonl"};
+    more.insert(more.end(), sign.begin(), sign.end());
+    return palpate(live("-", more), {.standard_input = folder_ / "lines"});
+  };
+  expect_named(live_of(falling, {}).err, {"the readings fall below their rest", "--sign -1"});
+  const Outcome outcome = live_of(falling, {"--sign", "-1"});
+  EXPECT_EQ(outcome.err.find("fall"), std::string::npos) << outcome.err;
+  EXPECT_FALSE(parsed(bytes_of(folder_ / "live.jsonl")).empty());
+  const std::string said =
+      fmt::format("time runs backwards at {} of {} frames", frames.size() / 2, frames.size());
+  expect_named(live_of(swapped, {}).err, {said.c_str()});
+}
+
 }  // namespace palpate::live_lines_test

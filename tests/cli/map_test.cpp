@@ -40,6 +40,21 @@ TEST_F(MapCommand, FolderGetsAMapPerLabel) {
   }
 }
 
+TEST_F(MapCommand, RefusesAtOnceWhatHasNoOutline) {
+  done({"simulate", "A", "--touches", "12", "-o", "a.h5"});
+  Recording all = read_recording(folder_ / "a.h5");
+  for (std::size_t k = 0; k < all.pressure.size(); ++k) {
+    all.pressure[k] = 5.0 + 0.1 * static_cast<double>(k % 7);
+  }
+  write_recording(folder_ / "all.h5", all);
+  expect_refused(
+      {"map", "all.h5", "-o", "maps/"},
+      {"object 'A': every element is in contact in all 12 touches", "5 kPa", "--threshold"});
+  all.pressure[40] = 1.0;
+  write_recording(folder_ / "all.h5", all);
+  done({"map", "all.h5", "-o", "one.map.h5"});
+}
+
 TEST_F(MapCommand, SaysAndStoresTheSymmetryThatTheMapsShow) {
   const std::string out = done({"map", "A.h5", "I.h5", "-o", "maps/", "--sensor-model", "none"});
   EXPECT_NE(out.find("A looks different after every turn, by "), std::string::npos) << out;
