@@ -73,7 +73,8 @@ class MountSearch {
 
  private:
   /// @param place of the array's middle in the tool
-  double nats(const Pose& place, double square_mm, Squares& squares) const;
+  /// @param every of so many touches one counts
+  double nats(const Pose& place, double square_mm, Squares& squares, std::size_t every = 1) const;
   FoundMount refined(FoundMount from, Squares& squares) const;
 
   glm::dvec2 middle_mm_;                 ///< of the array
@@ -120,7 +121,8 @@ MountSearch::MountSearch(const SetupJudge& judge, const Setup& setup)
   }
 }
 
-double MountSearch::nats(const Pose& place, double square_mm, Squares& squares) const {
+double MountSearch::nats(const Pose& place, double square_mm, Squares& squares,
+                         std::size_t every) const {
   std::vector<glm::dvec2> elements_mm;
   for (const glm::dvec2& p : elements_mm_) {
     elements_mm.push_back(place * p);
@@ -131,7 +133,7 @@ double MountSearch::nats(const Pose& place, double square_mm, Squares& squares) 
         presses.span_mm + glm::length(place.translation_mm) + reach_mm_ + square_mm;
     squares.begin(static_cast<std::size_t>(2.0 * half_mm / square_mm) + 2);
     const glm::dvec2 corner = presses.middle_mm - half_mm;
-    for (std::size_t i = 0; i < presses.poses.size(); ++i) {
+    for (std::size_t i = 0; i < presses.poses.size(); i += every) {
       const Pose& pose = presses.poses[i];
       const double c = std::cos(pose.theta_rad) / square_mm;
       const double s = std::sin(pose.theta_rad) / square_mm;
@@ -192,7 +194,7 @@ FoundMount MountSearch::run() const {
   }
   tbb::enumerable_thread_specific<Squares> squares;
   tbb::parallel_for(std::size_t{0}, found.size(), [&](std::size_t k) {
-    found[k].nats = nats(found[k].offset, square_mm, squares.local());
+    found[k].nats = nats(found[k].offset, square_mm, squares.local(), 2);
   });
   const auto fewer = std::min(most_refined, found.size());
   std::ranges::partial_sort(found, found.begin() + static_cast<std::ptrdiff_t>(fewer),

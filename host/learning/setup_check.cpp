@@ -357,7 +357,7 @@ SetupCheck check_setup(Device& device, std::span<const Recording> recordings,
     check_elements(judge, setup, check);
     check_touches(judge, setup, check);
     fit = judge.fit(setup);
-    return fit.is_sound();
+    return fit.is_sound(!check.findings.empty());
   };
   double nats = judge.nats(setup);
   check_units(judge, setup, nats, check.findings);

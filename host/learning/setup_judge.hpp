@@ -44,8 +44,11 @@ struct SetupFit {
   std::size_t misfits = 0;
   double told = 0.0;  ///< nats by which the maps tell the readings better than the prior does
 
-  /// Of sound set-ups less than one touch in a hundred is a misfit.
-  bool is_sound() const { return misfits <= std::max(least_misfits, touches / 20) && told > 0.0; }
+  /// Of sound set-ups hardly a touch is a misfit. A set-up that is to be `named` has to fit better
+  /// than one that is left as it is, whose poses may be a little off.
+  bool is_sound(bool named) const {
+    return misfits <= std::max(least_misfits, touches / (named ? 50 : 20)) && told > 0.0;
+  }
   static constexpr std::size_t least_misfits = 2;
 };
 

@@ -265,14 +265,15 @@ SetupFinding clock_finding(const ClockOffset& offset, double given_s) {
   const double nats = (static_cast<double>(offset.against) - static_cast<double>(offset.left)) *
                       std::log(19.0);  // one press in twenty is against sound clocks
   if (offset.open_s) {
-    return {"clock", nats,
-            fmt::format("the poses' clock and the frames' have no common beginning, and presses "
-                        "tell their offset but for {:.2f} s: with `pose-delay {:.2f}`, where both "
-                        "logs begin together, the array moves, is lifted, or has no pose in {} of "
-                        "{} presses, and {:.2f} s more or less explain about as many; find one "
-                        "press in both logs, and give the difference of its times",
-                        *offset.open_s, given_s + offset.seconds, offset.left, offset.presses,
-                        *offset.open_s)};
+    return {
+        "clock", nats,
+        fmt::format("the poses' clock and the frames' have no common beginning, and presses "
+                    "tell their offset but for {:.2f} s: with `pose-delay {:.2f}`, next to where "
+                    "both logs begin together, the array moves, is lifted, or has no pose in {} of "
+                    "{} presses, and {:.2f} s more or less explain about as many; find one "
+                    "press in both logs, and give the difference of its times",
+                    *offset.open_s, given_s + offset.seconds, offset.left, offset.presses,
+                    *offset.open_s)};
   }
   return {"clock",
           nats,

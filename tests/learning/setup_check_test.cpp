@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include <gmock/gmock.h>
 #include <glm/geometric.hpp>
@@ -99,21 +100,21 @@ TEST_F(SetupTouches, TellWhereTheArraySitsInTheTool) {
 }
 
 TEST_F(SetupTouches, TellAMountThatIsFarOffAndTurned) {
-  for (const auto& elements_mm : {digitacts_array(), grid_array(8, 8, 1.9)}) {
-    for (const Pose& offset : {Pose{{11.0, -10.0}, 0.4}, Pose{{-31.0, 47.0}, -2.6}}) {
-      std::vector<Recording> recordings = touches(elements_mm, false, 60);
-      for (Recording& recording : recordings) {
-        for (Pose& pose : recording.T_robot_sensor) {
-          pose = pose * inverse(offset);
-        }
+  const std::pair<std::vector<glm::dvec2>, Pose> mounts[] = {
+      {digitacts_array(), {{-31.0, 47.0}, -2.6}}, {grid_array(8, 8, 1.9), {{11.0, -10.0}, 0.4}}};
+  for (const auto& [elements_mm, offset] : mounts) {
+    std::vector<Recording> recordings = touches(elements_mm, false, 60);
+    for (Recording& recording : recordings) {
+      for (Pose& pose : recording.T_robot_sensor) {
+        pose = pose * inverse(offset);
       }
-      const SetupCheck found = check(recordings);
-      ASSERT_EQ(found.findings.size(), 1u);
-      ASSERT_EQ(found.findings[0].what, "array_offset") << found.findings[0].words;
-      const Pose error = inverse(offset) * *found.findings[0].array_offset;
-      EXPECT_LT(glm::length(error.translation_mm), 0.3);
-      EXPECT_LT(std::abs(wrap_angle(error.theta_rad)), std::numbers::pi / 180.0);
     }
+    const SetupCheck found = check(recordings);
+    ASSERT_EQ(found.findings.size(), 1u);
+    ASSERT_EQ(found.findings[0].what, "array_offset") << found.findings[0].words;
+    const Pose error = inverse(offset) * *found.findings[0].array_offset;
+    EXPECT_LT(glm::length(error.translation_mm), 0.3);
+    EXPECT_LT(std::abs(wrap_angle(error.theta_rad)), std::numbers::pi / 180.0);
   }
 }
 

@@ -11,11 +11,11 @@ namespace palpate {
 
 /// Something that is wrong with the set-up of a robot and its array.
 struct SetupFinding {
-  /// "pose_unit", "element_order", "array_offset", "pitch", "dead_elements", "stuck_elements" or
-  /// "contradicting", as the touches say; "tilt", "clock" or "dropped", as their logs do.
+  /// "pose_unit", "element_order", "array_offset", "pitch", "dead_elements", "stuck_elements",
+  /// "contradicting", "unexplained", as touches say; "tilt", "clock" or "dropped", as logs do.
   std::string what;
   /// By how much more likely the touches are once it is mended; of "clock", log 19 for each press
-  /// that it explains; 0 of "tilt" and "dropped", which are counted or measured.
+  /// that it explains; 0 of "unexplained", "tilt" and "dropped", which are counted.
   double nats = 0.0;
   std::string words;                      ///< a sentence, options between `quotes`
   std::vector<std::string> options = {};  ///< that mend it together, such as "dead 13,42"
