@@ -20,7 +20,6 @@ Recogniser::Recogniser(Device* device, const RecognitionTask& task, const Filter
 void Recogniser::reset() {
   filter_->reset();
   evidence_.clear();
-  surprises_.clear();
   pivot_placed_ = false;
   touched_ = false;
   if (auto_pivot_) {
