@@ -158,6 +158,13 @@ std::string percent(double probability) {
                      probability >= 0.9 ? 1 : 0);
 }
 
+/// How near to where the robot says touches are taken to lie.
+std::string about(const DisplacementSd& touch_sd) {
+  return touch_sd.none() ? ""
+                         : fmt::format("within some {:.2g} mm and {:.2g} degrees of ", touch_sd.mm,
+                                       180.0 / std::numbers::pi * touch_sd.rad);
+}
+
 /// A probability that is not enough, of which percent() may tell too little.
 std::string percent_below(double probability) {
   return probability < 0.999 ? percent(probability)
@@ -254,8 +261,10 @@ Decision decide(const RecognitionStep& step, const RecognitionTask& task) {
   }
   const BeliefPlaces& places = step.places;
   if (places.within_mm && *places.within_mm <= task.act.below_mm) {
-    return {true, fmt::format("{} has {}, and 95 % of the belief lies within {:.2f} mm of its pose",
-                              best, percent(proven), *places.within_mm)};
+    return {true,
+            fmt::format("{} has {}, and 95 % of the belief lies within {:.2f} mm of its pose, "
+                        "if the touches lie {}where the robot says",
+                        best, percent(proven), *places.within_mm, about(task.touch_sd()))};
   }
   for (std::size_t i = 0; i < places.modes.size(); ++i) {
     const auto& [object, probability, at, pose] = places.modes[i];

@@ -22,7 +22,6 @@ void Recogniser::reset() {
   filter_->reset();
   evidence_.clear();
   places_.clear();
-  surprises_.clear();
   pivot_placed_ = false;
   touched_ = false;
   if (auto_pivot_) {

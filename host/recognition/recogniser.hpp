@@ -65,10 +65,6 @@ class Recogniser {
   std::span<const TouchEvidence> evidence() const { return evidence_; }
   /// Judges touches by the recogniser's task; made at the first call. Not for particles.
   const SurpriseJudge& surprise_judge(const RecognitionTask& task);
-  /// Keeps the surprise of a touch until reset().
-  void note_surprise(double surprise) { surprises_.push_back(surprise); }
-  /// What note_surprise() was given since reset(), in order.
-  std::span<const double> surprises() const { return surprises_; }
   /// See Filter::marginals().
   Marginals marginals(int object) const { return filter_->marginals(object, lattice_); }
   /// See Filter::likely_bins().
@@ -109,7 +105,6 @@ class Recogniser {
   bool pivot_placed_ = false;            ///< by a touch since reset(); only where it is automatic
   std::vector<TouchEvidence> evidence_;  ///< in order; waits where the pivot lacks
   bool touched_ = false;                 ///< since reset()
-  std::vector<double> surprises_;        ///< since reset()
   std::optional<SurpriseJudge> surprise_judge_;
   std::unique_ptr<Filter> filter_;
 };

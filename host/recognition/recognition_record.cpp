@@ -16,6 +16,7 @@
 #include "palpate/pose_error.hpp"
 #include "recognition/label_probability.hpp"
 #include "recognition/nearby_fit.hpp"
+#include "recognition/placement_judge.hpp"
 #include "recognition/scaled_pose.hpp"
 #include "recognition/surprise.hpp"
 #include "recognition/warnings.hpp"
@@ -96,9 +97,6 @@ Updated update(Recogniser& recogniser, const RecognitionTask& task, std::span<co
     updated.surprise = samples.empty() ? std::nullopt
                                        : recogniser.surprise_judge(task).surprise_of(
                                              recogniser.evidence().back(), samples);
-    if (updated.surprise) {
-      recogniser.note_surprise(*updated.surprise);
-    }
   }
   return updated;
 }
@@ -306,11 +304,12 @@ RecognitionStep take_step(Recogniser& recogniser, const RecognitionTask& task,
   step.decision = decide(step, task);
   step.warnings = warnings_about(evidence, task, recogniser.lattice(), step);
   if (step.warnings.empty()) {
-    for (auto warning : {turned_alike(task, step),
-                         touches_contradict(evidence, task, step, recogniser.surprises())}) {
-      if (warning) {
-        step.warnings.push_back(*std::move(warning));
-      }
+    if (auto warning = turned_alike(task, step)) {
+      step.warnings.push_back(*std::move(warning));
+    }
+    if (const auto placement = judge_placement(recogniser, estimate, task, step)) {
+      step.decision = {false, placement_words(*placement, task)};
+      step.warnings.push_back(placement_warning(*placement, task));
     }
   }
   if (std::string words = recogniser.place_words(); !words.empty()) {

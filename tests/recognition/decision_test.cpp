@@ -22,8 +22,16 @@ TEST(Decision, IsToActWhereAllIsWell) {
   const RecognitionTask task(shapes(), every_filter()[0]);
   const Decision decision = decide(good_step(), task);
   EXPECT_TRUE(decision.act);
-  EXPECT_EQ(decision.because,
-            "L has more than 99.9 %, and 95 % of the belief lies within 0.40 mm of its pose");
+  EXPECT_EQ(
+      decision.because,
+      "L has more than 99.9 %, and 95 % of the belief lies within 0.40 mm of its pose, if the "
+      "touches lie where the robot says");
+  auto options = std::get<HistogramOptions>(every_filter()[0]);
+  options.touch_sd = {.mm = 0.5, .rad = 0.02};
+  EXPECT_EQ(
+      decide(good_step(), RecognitionTask(shapes(), options)).because,
+      "L has more than 99.9 %, and 95 % of the belief lies within 0.40 mm of its pose, if the "
+      "touches lie within some 0.5 mm and 1.1 degrees of where the robot says");
 }
 
 TEST(Decision, SaysWhatSpeaksAgainst) {

@@ -209,7 +209,6 @@ TEST(Surprise, IsMeasuredWithoutAnEffectOnTheResult) {
     const Recording recording = touched_letter(5);
     const Unknown unknown = unknown_of(recording);
     const RecognitionStep last = recognise(recogniser, task, unknown, false).last();
-    const std::vector<double> kept(recogniser.surprises().begin(), recogniser.surprises().end());
     const RecognitionRecord traced = recognise(recogniser, task, unknown, true);
     recogniser.reset();
     recogniser.update(unknown.touches);
@@ -228,18 +227,13 @@ TEST(Surprise, IsMeasuredWithoutAnEffectOnTheResult) {
     EXPECT_FALSE(traced.trace.front().surprise) << "only the prior comes before";
     if (std::holds_alternative<ParticleOptions>(filter)) {
       EXPECT_FALSE(last.surprise);
-      EXPECT_TRUE(kept.empty());
       continue;
     }
-    std::size_t known = 0;
     for (std::size_t i = 1; i < traced.trace.size(); ++i) {
       // A touch of pressures of 0 alone says nothing.
       const bool says = *std::ranges::max_element(unknown.touches[i].pressure) > 0.0;
       EXPECT_EQ(traced.trace[i].surprise.has_value(), says) << i;
-      known += says && i + surprises_judged >= traced.trace.size() ? 1 : 0;
     }
-    EXPECT_GT(known, 0u);
-    EXPECT_EQ(kept.size(), known) << "of the last touches alone";
   }
 }
 
