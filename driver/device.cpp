@@ -6,6 +6,7 @@
 #include <iomanip>
 #include <iterator>
 #include <tuple>
+#include <utility>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

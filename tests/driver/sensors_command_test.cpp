@@ -72,7 +72,7 @@ TEST_F(SensorsCommand, RecordsASerialBoardUntilItIsUnplugged) {
   }
   board.unplug();
   const Outcome outcome = recording.get();
-  EXPECT_EQ(outcome.status, 2);
+  EXPECT_EQ(outcome.status, 1);
   EXPECT_THAT(outcome.err, HasSubstr("/dev/ttyUSB2: hung up: the board was unplugged"));
   const std::string info = done({"info", "frames.h5", "--close"});
   std::smatch frames;
