@@ -79,8 +79,7 @@ struct Limits {
   float timestamp_ns = 0.0F;            ///< ns per tick; 0 if the queue has no timestamps
 };
 
-/// Memory of all buffers of a device, staging included, in bytes; tests hold it against what was
-/// planned.
+/// Memory of all buffers of a device, staging included, in bytes.
 struct MemoryUse {
   VkDeviceSize now = 0;
   VkDeviceSize peak = 0;
