@@ -362,7 +362,8 @@ SetupCheck check_setup(Device& device, std::span<const Recording> recordings,
   double nats = judge.nats(setup);
   check_units(judge, setup, nats, check.findings);
   show(0.1);
-  if (at_one_place(judge, setup)) {
+  const bool moved = !at_one_place(judge, setup);
+  if (!moved) {
     check.remarks.emplace_back(
         "all touches of an object are at nearly one place and angle of the sensor, which tells "
         "nothing of the array: move and turn the sensor between the touches");
@@ -374,14 +375,14 @@ SetupCheck check_setup(Device& device, std::span<const Recording> recordings,
     check_pitch(judge, setup, nats, check);
   }
   show(0.5);
-  if (!judged()) {
-    check = {.remarks = {}, .elements_mm = given.elements_mm};
+  if (!judged() && moved) {
+    check = {.remarks = std::move(check.remarks), .elements_mm = given.elements_mm};
     setup = given;
     search_widely(judge, setup, check);
     show(0.9);
     if (!judged()) {
       check = {.findings = {unexplained(fit)},
-               .remarks = {},
+               .remarks = std::move(check.remarks),
                .elements_mm = given.elements_mm,
                .touches = check.touches};
     }

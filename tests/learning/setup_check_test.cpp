@@ -153,13 +153,6 @@ TEST_F(SetupTouches, ThatNoSetupExplainsAreGivenNone) {
     std::ranges::rotate(recording.T_robot_sensor, recording.T_robot_sensor.begin() + 2);
   }
   expect_unexplained(late);
-  std::vector<Recording> mirrored = sound;
-  for (Recording& recording : mirrored) {
-    for (Pose& pose : recording.T_robot_sensor) {
-      pose.translation_mm.x = -pose.translation_mm.x;
-    }
-  }
-  expect_unexplained(mirrored);
   std::vector<Recording> two = sound;  // objects in each
   const std::size_t half = 30;
   for (std::size_t k = 0; k < 2; ++k) {
