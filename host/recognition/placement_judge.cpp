@@ -31,6 +31,8 @@ constexpr double near_places = 30.0 * 30.0 * 0.8;
 /// seldom move, and the size of displacements is chosen to suit the touches.
 constexpr double least_displaced_nats = 4.0;
 constexpr double least_move_nats = 4.0;
+/// The same before "(none)": two pieces of a learned object explain a few touches of a stranger.
+constexpr double least_move_over_none_nats = 8.0;
 
 /// A way to explain the touches.
 struct Explanation {
@@ -289,8 +291,10 @@ std::optional<TouchPlacement> judge_placement(const Recogniser& recogniser,
     }
     const Tempering tempering = tempering_of(touches, task, one.fit);
     const std::size_t label = task.label_of[one.placement.object];
-    return tempering.tempered(one.log_evidence, label) >
-           tempering.tempered(estimate.none_log_evidence.value_or(log_zero), step.best);
+    const double lead =
+        tempering.tempered(one.log_evidence, label) -
+        tempering.tempered(estimate.none_log_evidence.value_or(log_zero), step.best);
+    return lead > (one.placement.moved_after > 0 ? least_move_over_none_nats : 0.0);
   };
   std::optional<Explanation> found;
   const auto consider = [&](std::optional<Explanation> one) {
