@@ -191,6 +191,9 @@ void find_touches(const TouchesArguments& options) {
   files.reads("FRAMES", options.frames);
   files.writes("-o", options.output);
   files.prepare();
+  if (options.detector.drift_s) {
+    require_above("--drift-s", *options.detector.drift_s, 0.0, true);
+  }
   const std::unique_ptr<Sensor> stream =
       open_virtual_sensor("replay:" + options.frames + ",speed=max");
   const SensorDescription& sensor = stream->description();

@@ -265,6 +265,7 @@ TEST_F(TouchesCommand, RefusesWhatHoldsNoTouches) {
   expect_refused({"touches", "a.frames.h5", "-o", "t.h5", "--onset=-1"}, {"onset = -1"});
   expect_refused({"touches", "a.frames.h5", "-o", "t.h5", "--release", "5"}, {"release = 5"});
   expect_refused({"touches", "a.frames.h5", "-o", "t.h5", "--steady", "2"}, {"steady = 2"});
+  expect_refused({"touches", "a.frames.h5", "-o", "t.h5", "--drift-s=-1"}, {"--drift-s -1"});
   expect_refused({"touches", "a.frames.h5", "-o", "a.frames.h5"},
                  {"-o a.frames.h5", "FRAMES reads"});
   expect_refused({"touches", "missing.h5", "-o", "t.h5"}, {"missing.h5"});
