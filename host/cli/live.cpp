@@ -255,6 +255,7 @@ void live(const LiveArguments& options) {
   }
 
   const LiveState state = recognition.state();
+  judge_frames(state);
   if (state.all_touches == 0 && state.without_pose > 0 && !interruption.requested()) {
     refuse(source, "none of its {} touches has a pose; give --poses{}", state.without_pose,
            opened.lines != nullptr ? ", or x_mm, y_mm and theta_rad in its lines" : "");
@@ -263,7 +264,6 @@ void live(const LiveArguments& options) {
   if (!to_program) {
     fmt::print("{}\n", setup_words(device, task));
   }
-  judge_frames(state);
   report_refused(opened);
 }
 
