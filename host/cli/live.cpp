@@ -99,8 +99,9 @@ void judge_frames(const LiveState& state) {
                "the frames in the order of their times\n",
                state.frames_back, state.counters.frames);
   }
-  // A sensor whose rest is taken in a press, too, reads below it for a while.
-  if (20 * state.frames_below > state.counters.frames) {
+  // A sensor whose rest is taken in a press, too, reads below it for a while; frames out of order
+  // are not smoothed.
+  if (state.frames_back == 0 && 20 * state.frames_below > state.counters.frames) {
     fmt::print(stderr,
                "palpate: the readings fall below their rest by more than the onset in {} of {} "
                "frames; if they fall under load, give --sign -1 to 'palpate import', or beside "
