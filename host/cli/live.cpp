@@ -93,7 +93,7 @@ void warm_up(Recogniser& recogniser, const RecognitionTask& task, const SensorDe
 
 /// Says what is wrong with the frames' times and readings.
 void judge_frames(const LiveState& state) {
-  if (state.frames_back > 0) {
+  if (100 * state.frames_back > state.counters.frames) {  // a clock may be set back once
     fmt::print(stderr,
                "palpate: time runs backwards at {} of {} frames, each of which ends a touch; send "
                "the frames in the order of their times\n",

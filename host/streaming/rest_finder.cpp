@@ -152,9 +152,11 @@ std::vector<float> RestFinder::column(std::size_t element, float sign) const {
   std::vector<float> sorted = values;
   const float low = quantile(sorted, 0.25);
   const float high = quantile(sorted, 0.75);
-  const float least = low - 4.0F * (high - low) - 100.0F * static_cast<float>(onset_);
+  const auto onset = static_cast<float>(onset_);
+  const float least = low - 4.0F * (high - low) - 100.0F * onset;
+  const float most = high + 4.0F * (high - low) + 1e4F * onset;
   std::ranges::replace_if(
-      values, [&](float v) { return v < least; }, unknown_reading);
+      values, [&](float v) { return v < least || v > most; }, unknown_reading);
   fill_unknown(values);
   return values;
 }
