@@ -102,14 +102,15 @@ void warm_up(Recogniser& recogniser, const RecognitionTask& task, const SensorDe
 
 /// Says what is wrong with the frames' times and readings.
 void judge_frames(const LiveState& state) {
-  if (state.frames_back > 0) {
+  if (100 * state.frames_back > state.counters.frames) {  // a clock may be set back once
     fmt::print(stderr,
                "palpate: time runs backwards at {} of {} frames, each of which ends a touch; send "
                "the frames in the order of their times\n",
                state.frames_back, state.counters.frames);
   }
-  // A sensor whose rest is taken in a press, too, reads below it for a while.
-  if (20 * state.frames_below > state.counters.frames) {
+  // A sensor whose rest is taken in a press, too, reads below it for a while; frames out of order
+  // are not smoothed.
+  if (state.frames_back == 0 && 20 * state.frames_below > state.counters.frames) {
     fmt::print(stderr,
                "palpate: the readings fall below their rest by more than the onset in {} of {} "
                "frames; if they fall under load, give --sign -1 to 'palpate import', or beside "
@@ -256,6 +257,7 @@ void live(const LiveArguments& options) {
   }
 
   const LiveState state = recognition.state();
+  judge_frames(state);
   if (state.all_touches == 0 && state.without_pose > 0 && !interruption.requested()) {
     refuse(source, "none of its {} touches has a pose; give --poses{}", state.without_pose,
            opened.lines != nullptr ? ", or x_mm, y_mm and theta_rad in its lines" : "");
@@ -264,7 +266,6 @@ void live(const LiveArguments& options) {
   if (!to_program) {
     fmt::print("{}\n", setup_words(device, task));
   }
-  judge_frames(state);
   report_refused(opened);
 }
 

@@ -191,6 +191,9 @@ void find_touches(const TouchesArguments& options) {
   files.reads("FRAMES", options.frames);
   files.writes("-o", options.output);
   files.prepare();
+  if (options.detector.drift_s) {
+    require_above("--drift-s", *options.detector.drift_s, 0.0, true);
+  }
   const std::unique_ptr<Sensor> stream =
       open_virtual_sensor("replay:" + options.frames + ",speed=max");
   const SensorDescription& sensor = stream->description();
@@ -300,10 +303,9 @@ void add_touches(CLI::App& app) {
                    "Recording of touches to write (HDF5): per touch, the mean pressures above the "
                    "elements' rest in its steady phase")
       ->required();
-  add_detector_flags(
-      *command, options->detector,
-      "1.5 times most presses of the recording or more, up to 32; 0: the rest is the "
-      "recording's baseline");
+  add_detector_flags(*command, options->detector,
+                     "the shortest of 2 to 32 that leaves no press in the rest; 0: the rest is the "
+                     "recording's baseline");
   command->add_flag("--unposed", options->unposed,
                     "The sensor's poses are unknown: write every touch at the pose 0, for 'palpate "
                     "map --unposed', 'palpate calibrate --unposed' and 'palpate recognize "

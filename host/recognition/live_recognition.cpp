@@ -201,6 +201,8 @@ std::optional<TouchDetector> LiveRecognition::tare() {
 void LiveRecognition::count(const Frame& frame) {
   unreadable_ += is_readable(frame, description_.valid) ? 0 : 1;
   state_.unknown_readings += unknown_readings(frame, description_.valid);
+  state_.frames_back += last_frame_s_ && frame.host_time_s < *last_frame_s_ ? 1 : 0;
+  last_frame_s_ = std::isfinite(frame.host_time_s) ? frame.host_time_s : last_frame_s_;
 }
 
 SensorCounters LiveRecognition::counters() const {
@@ -213,10 +215,8 @@ void LiveRecognition::take(TouchDetector& detector, const Frame& frame) {
   taken_ = Clock::now();
   const std::optional<DetectedTouch> touch = detector.add(frame);
   const bool touching = detector.touching();
-  const bool back = last_frame_s_ && frame.host_time_s < *last_frame_s_;
   const bool below = std::ranges::any_of(detector.smoothed(),
                                          [&](double p) { return p < -options_.detector.onset; });
-  last_frame_s_ = std::isfinite(frame.host_time_s) ? frame.host_time_s : last_frame_s_;
   const std::vector<double>& baseline = detector.baseline();
   {
     const std::lock_guard lock(mutex_);
@@ -231,7 +231,6 @@ void LiveRecognition::take(TouchDetector& detector, const Frame& frame) {
                                 ? frame.T_robot_sensor
                                 : std::nullopt;
     state_.touching = touching;
-    state_.frames_back += back ? 1 : 0;
     state_.frames_below += below ? 1 : 0;
     state_.counters = counters();
   }

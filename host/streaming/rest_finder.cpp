@@ -82,9 +82,8 @@ void fill_unknown(std::span<float> values) {
 
 /// What an opening tells of the whole array.
 struct RestFinder::Opened {
-  std::vector<float> above;       ///< [b] how far the most loaded element reads above its rest
-  std::vector<double> presses_s;  ///< durations of what goes beyond the onset
-  std::size_t steps = 0;          ///< blocks at which a rest has just risen by the onset
+  std::vector<float> above;  ///< [b] how far the most loaded element reads above its rest
+  std::size_t steps = 0;     ///< blocks at which a rest has just risen by the onset
   std::optional<double> first_step_s;
 };
 
@@ -153,9 +152,11 @@ std::vector<float> RestFinder::column(std::size_t element, float sign) const {
   std::vector<float> sorted = values;
   const float low = quantile(sorted, 0.25);
   const float high = quantile(sorted, 0.75);
-  const float least = low - 4.0F * (high - low) - 100.0F * static_cast<float>(onset_);
+  const auto onset = static_cast<float>(onset_);
+  const float least = low - 4.0F * (high - low) - 100.0F * onset;
+  const float most = high + 4.0F * (high - low) + 1e4F * onset;
   std::ranges::replace_if(
-      values, [&](float v) { return v < least; }, unknown_reading);
+      values, [&](float v) { return v < least || v > most; }, unknown_reading);
   fill_unknown(values);
   return values;
 }
@@ -209,7 +210,8 @@ RestFinder::Opened RestFinder::open(float sign, double window_s, std::span<const
       for (; time_s_[long_before] < time_s_[i] - 2.0 * step_s; ++long_before) {
       }
       const float drift = std::max(0.0F, rest[before] - rest[long_before]);
-      step[i] |= rest[i] - rest[before] - drift > onset_ ? 1 : 0;
+      const bool known = time_s_[i] - time_s_.front() > 2.0 * step_s;
+      step[i] |= known && rest[i] - rest[before] - drift > onset_ ? 1 : 0;
       if (readings != nullptr) {
         (*readings)[i * elements_ + k] = rest[i];
       }
@@ -219,15 +221,6 @@ RestFinder::Opened RestFinder::open(float sign, double window_s, std::span<const
     if (step[i] != 0) {
       ++opened.steps;
       opened.first_step_s = opened.first_step_s.value_or(time_s_[i]);
-    }
-  }
-  for (std::size_t i = 0, end = 0; i < blocks; i = end + 1) {
-    float most = 0.0F;
-    for (end = i; end < blocks && opened.above[end] > release_; ++end) {
-      most = std::max(most, opened.above[end]);
-    }
-    if (most > onset_) {
-      opened.presses_s.push_back(time_s_[end - 1] - time_s_[i]);
     }
   }
   return opened;
@@ -245,18 +238,13 @@ double RestFinder::window_for(float sign) const {
   double best_s = shortest_s;
   std::size_t fewest = std::numeric_limits<std::size_t>::max();
   for (double window_s = shortest_s; window_s <= longest_s; window_s *= 2.0) {
-    Opened opened = settle(sign, window_s, nullptr);
-    double press_s = 0.0;
-    if (!opened.presses_s.empty()) {
-      std::ranges::sort(opened.presses_s);
-      press_s = opened.presses_s[(9 * opened.presses_s.size() - 1) / 10];
-    }
-    if (2 * opened.steps < fewest) {
-      fewest = opened.steps;
-      best_s = window_s;
-    }
-    if (opened.steps == 0 && window_s >= 1.5 * press_s) {
+    const std::size_t steps = settle(sign, window_s, nullptr).steps;
+    if (steps == 0) {
       return window_s;
+    }
+    if (2 * steps < fewest) {
+      fewest = steps;
+      best_s = window_s;
     }
   }
   return best_s;

@@ -44,8 +44,7 @@ class RestFinder {
   void add(const Frame& frame);
 
   /// Returns the rest of the stream. Without `window_s` the window is the shortest of 2, 4, ... 32
-  /// s that is 1.5 times as long as nine tenths of the presses and leaves the fewest steps in the
-  /// rest.
+  /// s that leaves no press in the rest, which is told by its steps, or else by far the fewest.
   Rest find(std::optional<double> window_s);
 
  private:

@@ -118,7 +118,7 @@ INSTANTIATE_TEST_SUITE_P(
               "--tare", "=0.5", "--object"}},
         Help{"touches",
              {"FRAMES", "-o,", "--onset", "2 kPa", "--release", "half", "--steady", "=0.15",
-              "--min-steady-s", "=0.1", "--smooth-s", "=0.05", "--drift-s", "1.5 times"}},
+              "--min-steady-s", "=0.1", "--smooth-s", "=0.05", "--drift-s", "2 to 32"}},
         Help{"import",
              {"PRESSURES",
               "--poses",
