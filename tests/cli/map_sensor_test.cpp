@@ -156,7 +156,7 @@ TEST_F(MapSensor, IsOfGroupsThatAreLeftOutTogether) {
     for (const char* letter : {"A", "U"}) {
       Recording touches = part_of(sample_training(letter, 90), 30 * day, 30 * (day + 1));
       for (Pose& pose : touches.T_robot_sensor) {
-        pose.translation_mm.x += 0.6 * static_cast<double>(day) - 0.6;
+        pose.translation_mm.x += 0.35 * static_cast<double>(day) - 0.35;
       }
       const std::string name = letter + std::to_string(day) + ".h5";
       write_recording(folder_ / name, touches);
@@ -175,11 +175,11 @@ TEST_F(MapSensor, IsOfGroupsThatAreLeftOutTogether) {
   const auto learned_mm = [&](const std::string& folder) {
     return read_sensor_model(sensor(folder)).pose_scale.value().map_sd_mm;
   };
-  EXPECT_LT(map(of_recordings, "alone", {}).pose_scale->map_sd_mm, 0.25);
-  EXPECT_LT(learned_mm("alone"), 0.25);
+  EXPECT_LT(map(of_recordings, "alone", {}).pose_scale->map_sd_mm, 0.15);
+  EXPECT_LT(learned_mm("alone"), 0.15);
   const MapSource of_days = map(of_labels, "days", {"--group", "label"});
-  EXPECT_GT(of_days.pose_scale->map_sd_mm, 0.3);
-  EXPECT_GT(learned_mm("days"), 0.3);
+  EXPECT_GT(of_days.pose_scale->map_sd_mm, 0.2);
+  EXPECT_GT(learned_mm("days"), 0.2);
   EXPECT_EQ(of_days.groups.front(), "day0");
   const MapSource of_files =
       map(of_recordings, "files", {"--group", "recording", "--sensor-model", "none"});
