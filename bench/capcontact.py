@@ -274,7 +274,7 @@ def program() -> None:
     flags = parser(
         "capcontact",
         "Recognises presses of several fingers on a real array among twelve, at random poses in the plane, "
-        "from windows of 9 x 9 elements, in some twenty minutes of one CPU core. Settings, sensor, pose scale "
+        "from windows of 9 x 9 elements, in some twenty minutes of a core. Settings, sensor, pose scale "
         "and the array's place are learned without the person who is tried: the people of presses.npz are "
         "left out in turn. The presses of held_out.npz, where there is one, are tried beside, by what all of "
         "presses.npz tells.",

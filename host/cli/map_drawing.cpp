@@ -35,6 +35,7 @@ void check_flags(const MapFlags& flags) {
                 {"--frames", flags.frames.has_value()},
                 {"--touch-sd-mm", flags.touch_sd_mm.has_value()},
                 {"--touch-sd-deg", flags.touch_sd_deg.has_value()},
+                {"--group", !flags.group.empty()},
                 {"--unposed", flags.unposed},
                 {"--device", !flags.device.empty()}},
                "a drawing has no touches");

@@ -254,7 +254,10 @@ MapSensor learn_unposed_sensor(const MapFlags& flags, const std::vector<Recordin
     }
     std::vector<Recording> labelled = recordings;
     for (Recording& recording : labelled) {
-      recording.object = flags.label.empty() ? recording.object : flags.label;
+      if (!flags.label.empty()) {
+        const std::string group = grouped_object(recording, flags.group).group;
+        recording.object = flags.group == "label" ? flags.label + "@" + group : flags.label;
+      }
     }
     const CalibrationTask task = calibration_task(
         {.unposed = true, .threshold = flags.threshold, .ratio = flags.ratio, .group = flags.group},
