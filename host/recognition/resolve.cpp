@@ -309,10 +309,11 @@ RecognitionTask resolve(const Request& request, const Circumstances& of) {
     task.fit_scale = fit;
     task.pose_scale = pose;
   }
-  // By Eq. 7 without "(none)" all touches multiply, as in the paper; and where the object slips, a
-  // touch of the same place tells where it went.
-  const FilterTraits traits = traits_of(task.filter);
-  task.by_place = (sensor != nullptr || traits.none_weight) && traits.slip_sd.none();
+  // By Eq. 7 with "(none)" left out all touches multiply, as in the paper; and where the object
+  // slips, a touch of the same place tells where it went.
+  const double* none = request.none ? std::get_if<double>(&*request.none) : nullptr;
+  const bool as_in_the_paper = sensor == nullptr && none != nullptr && *none == 0.0;
+  task.by_place = !as_in_the_paper && task.slip_sd().none();
   task.bin_width = bin_width;
   task.auto_filter = filter.automatic;
   task.filter_asked_for_by = filter.asked_for_by;

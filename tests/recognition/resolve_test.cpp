@@ -110,7 +110,10 @@ TEST(Resolve, AWeightOfNoneOf0LeavesItOut) {
 
 TEST(Resolve, TouchesCountByPlaceButAsThePaperHasItAndWhereTheObjectSlips) {
   Request request = request_of_shapes();
-  EXPECT_TRUE(task_of(request).by_place);
+  for (const FilterKind filter : {FilterKind::particles, FilterKind::automatic}) {
+    request.filter = filter;
+    EXPECT_TRUE(task_of(request).by_place);
+  }
   request.slip_sd_mm = 0.5;
   request.slip_sd_deg = 3.0;
   EXPECT_FALSE(task_of(request).by_place);
