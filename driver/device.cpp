@@ -55,23 +55,23 @@ bool is_usb_device(const fs::path& folder) {
   return fs::exists(folder / "idVendor", code);
 }
 
-Device describe(const fs::path& folder) {
-  Device device{.node = {},
-                .bus = number<int>(folder / "busnum", 10),
-                .address = number<int>(folder / "devnum", 10),
-                .id = {number<std::uint16_t>(folder / "idVendor", 16),
-                       number<std::uint16_t>(folder / "idProduct", 16)},
-                .port = folder.filename(),
-                .serial = first_line(folder / "serial"),
-                .manufacturer = first_line(folder / "manufacturer"),
-                .product_name = first_line(folder / "product")};
+ListedDevice describe(const fs::path& folder) {
+  ListedDevice device{.node = {},
+                      .bus = number<int>(folder / "busnum", 10),
+                      .address = number<int>(folder / "devnum", 10),
+                      .id = {number<std::uint16_t>(folder / "idVendor", 16),
+                             number<std::uint16_t>(folder / "idProduct", 16)},
+                      .port = folder.filename(),
+                      .serial = first_line(folder / "serial"),
+                      .manufacturer = first_line(folder / "manufacturer"),
+                      .product_name = first_line(folder / "product")};
   device.node = fmt::format("/dev/bus/usb/{:03}/{:03}", device.bus, device.address);
   return device;
 }
 
-std::vector<Device> sorted(std::vector<Device> devices) {
+std::vector<ListedDevice> sorted(std::vector<ListedDevice> devices) {
   std::ranges::sort(devices, {},
-                    [](const Device& d) { return std::tuple(d.bus, d.address, d.node); });
+                    [](const ListedDevice& d) { return std::tuple(d.bus, d.address, d.node); });
   return devices;
 }
 
@@ -91,13 +91,13 @@ bool holds(const fs::path& process, const std::string& node) {
 
 }  // namespace
 
-std::string Device::place() const {
+std::string ListedDevice::place() const {
   return fmt::format("USB device {:04x}:{:04x} at {}", id.vendor, id.product, port);
 }
 
-std::vector<Device> usb_devices() {
+std::vector<ListedDevice> usb_devices() {
   const std::string hub_class = "09";
-  std::vector<Device> devices;
+  std::vector<ListedDevice> devices;
   for (const fs::path& folder : entries_of(sysfs_usb)) {
     if (is_usb_device(folder) && first_line(folder / "bDeviceClass") != hub_class) {
       devices.push_back(describe(folder));
@@ -106,8 +106,8 @@ std::vector<Device> usb_devices() {
   return sorted(std::move(devices));
 }
 
-std::vector<Device> serial_ports() {
-  std::vector<Device> ports;
+std::vector<ListedDevice> serial_ports() {
+  std::vector<ListedDevice> ports;
   for (const fs::path& tty : entries_of(sysfs_tty)) {
     std::error_code code;
     fs::path folder = fs::canonical(tty, code);
@@ -115,21 +115,22 @@ std::vector<Device> serial_ports() {
       folder = folder.parent_path();
     }
     if (folder.has_relative_path()) {
-      Device& port = ports.emplace_back(describe(folder));
+      ListedDevice& port = ports.emplace_back(describe(folder));
       port.node = fs::path("/dev") / tty.filename();
     }
   }
   return sorted(std::move(ports));
 }
 
-std::vector<Device> with_id(std::vector<Device> devices, const std::vector<UsbId>& ids) {
-  std::erase_if(devices, [&](const Device& device) {
+std::vector<ListedDevice> with_id(std::vector<ListedDevice> devices,
+                                  const std::vector<UsbId>& ids) {
+  std::erase_if(devices, [&](const ListedDevice& device) {
     return std::ranges::find(ids, device.id) == ids.end();
   });
   return devices;
 }
 
-bool is_claimed(const Device& device) {
+bool is_claimed(const ListedDevice& device) {
   return std::ranges::any_of(entries_of(sysfs_usb / device.port), [](const fs::path& folder) {
     std::error_code code;
     return fs::read_symlink(folder / "driver", code).filename() == "usbfs";
@@ -173,8 +174,8 @@ BoardName parse_board_name(const std::string& name) {
   return parsed;
 }
 
-std::string distinction(const Device& device, const std::vector<Device>& others) {
-  for (const auto part : {&Device::serial, &Device::port}) {
+std::string distinction(const ListedDevice& device, const std::vector<ListedDevice>& others) {
+  for (const auto part : {&ListedDevice::serial, &ListedDevice::port}) {
     const auto bearers = std::ranges::count(others, device.*part, part);
     if (!(device.*part).empty() && bearers <= 1) {
       return device.*part;
@@ -183,10 +184,10 @@ std::string distinction(const Device& device, const std::vector<Device>& others)
   return device.node;
 }
 
-Device choose_device(const std::vector<Device>& candidates, const std::string& kind,
-                     const std::string& which) {
-  std::vector<Device> fitting;
-  std::ranges::copy_if(candidates, std::back_inserter(fitting), [&](const Device& device) {
+ListedDevice choose_device(const std::vector<ListedDevice>& candidates, const std::string& kind,
+                           const std::string& which) {
+  std::vector<ListedDevice> fitting;
+  std::ranges::copy_if(candidates, std::back_inserter(fitting), [&](const ListedDevice& device) {
     return which.empty() || which == device.serial || which == device.port || which == device.node;
   });
   if (fitting.empty()) {
@@ -195,7 +196,7 @@ Device choose_device(const std::vector<Device>& candidates, const std::string& k
   }
   if (fitting.size() > 1) {
     std::vector<std::string> names;
-    for (const Device& device : fitting) {
+    for (const ListedDevice& device : fitting) {
       names.push_back(fmt::format("{}:{}", kind, distinction(device, candidates)));
     }
     throw Error(Fault::input,

@@ -14,7 +14,7 @@ struct UsbId {
 };
 
 /// What the kernel shows of a device that is not opened.
-struct Device {
+struct ListedDevice {
   std::string node;  ///< the device file: of the USB device, or of the serial port that it is
   int bus = 0;
   int address = 0;
@@ -29,17 +29,17 @@ struct Device {
 };
 
 /// Lists every USB device except hubs, by bus and address.
-std::vector<Device> usb_devices();
+std::vector<ListedDevice> usb_devices();
 
 /// Lists the serial ports of USB devices, by bus, address and device file, whichever driver of the
 /// kernel has them: /dev/ttyACM0, /dev/ttyUSB0.
-std::vector<Device> serial_ports();
+std::vector<ListedDevice> serial_ports();
 
 /// Those of the devices that bear one of these ids.
-std::vector<Device> with_id(std::vector<Device> devices, const std::vector<UsbId>& ids);
+std::vector<ListedDevice> with_id(std::vector<ListedDevice> devices, const std::vector<UsbId>& ids);
 
 /// Whether a program has claimed an interface of the USB device.
-bool is_claimed(const Device& device);
+bool is_claimed(const ListedDevice& device);
 
 /// The programs other than this one that have the file open, as "name (process 123)", as far as
 /// this user may see.
@@ -58,11 +58,11 @@ BoardName parse_board_name(const std::string& name);
 
 /// What tells the device from `others`, which may list it, too: its serial number, or else its
 /// port, or else its device file.
-std::string distinction(const Device& device, const std::vector<Device>& others);
+std::string distinction(const ListedDevice& device, const std::vector<ListedDevice>& others);
 
 /// The one device out of `candidates`, the boards of this kind, whose serial number, port or device
 /// file is `which`; "" fits every device. @throws Error (Fault::input) if none or several fit
-Device choose_device(const std::vector<Device>& candidates, const std::string& kind,
-                     const std::string& which);
+ListedDevice choose_device(const std::vector<ListedDevice>& candidates, const std::string& kind,
+                           const std::string& which);
 
 }  // namespace palpate

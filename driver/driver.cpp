@@ -22,7 +22,7 @@ namespace palpate {
 namespace {
 
 /// Fills in what a TakkTile tells without disturbing a program that uses it.
-void inspect_takktile(const Device& device, BoardInfo& info) {
+void inspect_takktile(const ListedDevice& device, BoardInfo& info) {
   if (is_claimed(device)) {
     info.reason = in_use(device.node);
     return;
@@ -58,15 +58,15 @@ void inspect_serial_board(const SerialProfile& profile, BoardInfo& info) {
 }  // namespace
 
 std::vector<BoardInfo> list_boards() {
-  const std::vector<Device> devices = usb_devices();
-  const std::vector<Device> ports = serial_ports();
+  const std::vector<ListedDevice> devices = usb_devices();
+  const std::vector<ListedDevice> ports = serial_ports();
   std::map<std::string, SerialProfile> profiles;
   for (const std::string& name : shipped_profiles()) {
     profiles.emplace(name, read_serial_profile(name));
   }
   std::vector<BoardInfo> infos;
-  for (const Device& device : devices) {
-    const auto port = std::ranges::find(ports, device.port, &Device::port);
+  for (const ListedDevice& device : devices) {
+    const auto port = std::ranges::find(ports, device.port, &ListedDevice::port);
     const std::string node = port == ports.end() ? "" : port->node;
     BoardInfo& info = infos.emplace_back(BoardInfo{.name = {},
                                                    .bus = device.bus,

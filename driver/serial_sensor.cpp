@@ -101,14 +101,14 @@ class SerialSensor final : public Sensor {
  private:
   /// Opens the port of the one board that is meant, and then knows it by what tells it apart.
   void connect() {
-    const std::vector<Device> ports = serial_ports();
-    Device device{.node = which_};
+    const std::vector<ListedDevice> ports = serial_ports();
+    ListedDevice device{.node = which_};
     if (which_.starts_with('/')) {
       // Opens what is not listed, too: a port of the mainboard, a link in /dev/serial/by-id.
-      const auto listed = std::ranges::find(ports, which_, &Device::node);
+      const auto listed = std::ranges::find(ports, which_, &ListedDevice::node);
       device = listed == ports.end() ? device : *listed;
     } else {
-      const std::vector<Device> boards =
+      const std::vector<ListedDevice> boards =
           profile_.usb.empty() ? ports : with_id(ports, profile_.usb);
       device = choose_device(boards, kind_, which_);
       which_ = distinction(device, boards);

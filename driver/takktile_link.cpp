@@ -42,7 +42,7 @@ Setup read_setup(UsbHandle& handle) {
   return setup;
 }
 
-Link::Link(const UsbContext& context, const Device& device, TransferRing::Counters& counters)
+Link::Link(const UsbContext& context, const ListedDevice& device, TransferRing::Counters& counters)
     : context_(context),
       counters_(counters),
       handle_(context, device),

@@ -25,7 +25,7 @@ Setup read_setup(UsbHandle& handle);
 class Link {
  public:
   /// The context and the counters must outlive the link. @throws Error
-  Link(const UsbContext& context, const Device& device, TransferRing::Counters& counters);
+  Link(const UsbContext& context, const ListedDevice& device, TransferRing::Counters& counters);
 
   const SensorDescription& description() const { return setup_.description; }
 

@@ -53,7 +53,7 @@ int on_arrival(libusb_context*, libusb_device*, libusb_hotplug_event, void* arri
   return 0;  // stay registered
 }
 
-std::vector<Device> boards() { return with_id(usb_devices(), {takktile::usb_id}); }
+std::vector<ListedDevice> boards() { return with_id(usb_devices(), {takktile::usb_id}); }
 
 /// A sensor that streams from a TakkTile, also after it was unplugged and plugged in again.
 ///
@@ -64,8 +64,8 @@ class TakktileSensor final : public Sensor {
  public:
   /// @param which serial number or port of the board; "" if only one is plugged in. @throws Error
   explicit TakktileSensor(const std::string& which) {
-    const std::vector<Device> listed = boards();
-    const Device device = choose_device(listed, takktile_kind, which);
+    const std::vector<ListedDevice> listed = boards();
+    const ListedDevice device = choose_device(listed, takktile_kind, which);
     which_ = distinction(device, listed);
     link_ = std::make_unique<takktile::Link>(context_, device, transfer_counters_);
     description_ = link_->description();
@@ -206,7 +206,7 @@ class TakktileSensor final : public Sensor {
   }
 
   void reconnect() {
-    const Device device = choose_device(boards(), takktile_kind, which_);
+    const ListedDevice device = choose_device(boards(), takktile_kind, which_);
     auto link = std::make_unique<takktile::Link>(context_, device, transfer_counters_);
     const std::size_t elements = link->description().elements_mm.size();
     if (link->description().elements_mm != description_.elements_mm) {

@@ -12,7 +12,7 @@ namespace palpate {
 
 namespace {
 
-std::string missing_permission(const Device& device) {
+std::string missing_permission(const ListedDevice& device) {
   const std::string rules = (data_folder() / "70-palpate.rules").string();
   return fmt::format(
       "no permission to open {}; install the udev rule with 'sudo cp {} /etc/udev/rules.d/ && sudo "
@@ -21,7 +21,7 @@ std::string missing_permission(const Device& device) {
       device.node, rules);
 }
 
-std::string help(const Device& device, int code) {
+std::string help(const ListedDevice& device, int code) {
   switch (code) {
     case LIBUSB_ERROR_ACCESS:
       return missing_permission(device);
@@ -41,7 +41,7 @@ std::string help(const Device& device, int code) {
 constexpr unsigned patience_ms = 1000;
 
 /// Returns what a libusb call returned; throws Error where the call failed.
-int checked(const Device& device, const std::string& what, int code) {
+int checked(const ListedDevice& device, const std::string& what, int code) {
   if (code < 0) {
     throw usb_fault(device, what, code);
   }
@@ -62,11 +62,11 @@ UsbContext::UsbContext() {
   context_.reset(context);
 }
 
-Error usb_fault(const Device& device, const std::string& what, int code) {
+Error usb_fault(const ListedDevice& device, const std::string& what, int code) {
   return {Fault::system, fmt::format("{}: {}: {}", device.place(), what, help(device, code))};
 }
 
-UsbHandle::UsbHandle(const UsbContext& context, Device device) : device_(std::move(device)) {
+UsbHandle::UsbHandle(const UsbContext& context, ListedDevice device) : device_(std::move(device)) {
   libusb_device** list = nullptr;
   const auto count = libusb_get_device_list(context.get(), &list);
   const std::unique_ptr<libusb_device*, void (*)(libusb_device**)> owner(

@@ -31,7 +31,7 @@ class UsbContext {
 /// The error of a libusb call that returned `code`. Its message names the device, what was tried,
 /// why it failed, and the remedy: for missing permission, how to install the udev rule; for an
 /// interface in use, the program to end, if /proc shows it.
-Error usb_fault(const Device& device, const std::string& what, int code);
+Error usb_fault(const ListedDevice& device, const std::string& what, int code);
 
 /// The fields of a control request, by USB 2.0, table 9-2.
 struct ControlRequest {
@@ -51,7 +51,7 @@ struct VendorInterface {
 /// call may run callbacks of other transfers; do not make it from a callback.
 class UsbHandle {
  public:
-  UsbHandle(const UsbContext& context, Device device);
+  UsbHandle(const UsbContext& context, ListedDevice device);
   ~UsbHandle();
   UsbHandle(const UsbHandle&) = delete;
   UsbHandle& operator=(const UsbHandle&) = delete;
@@ -65,7 +65,7 @@ class UsbHandle {
   std::vector<std::uint8_t> control_in(const ControlRequest& request, std::uint16_t length);
   void clear_halt(std::uint8_t endpoint);
 
-  const Device& device() const { return device_; }
+  const ListedDevice& device() const { return device_; }
   libusb_device_handle* get() const { return handle_.get(); }
 
  private:
@@ -73,7 +73,7 @@ class UsbHandle {
     void operator()(libusb_device_handle* handle) const { libusb_close(handle); }
   };
 
-  Device device_;
+  ListedDevice device_;
   std::unique_ptr<libusb_device_handle, Close> handle_;
   std::vector<int> claimed_;
 };

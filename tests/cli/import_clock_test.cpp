@@ -83,7 +83,7 @@ TEST_F(ClocksOfLogs, ThatDifferAreSaidUntilTheirOffsetIsGiven) {
   expect_named(import({"--pose-delay", "0.2"}).err, {"ahead"});
   put_logs(-3600.3);
   expect_refused(command({"--poses", "poses.csv"}),
-                 {"poses.csv", "finds a pose", "s behind: in 30 of 30", "--pose-delay -3600."});
+                 {"poses.csv", "finds a pose", "their offset but for 1.05 s", "--pose-delay -3600.3"});
 }
 
 TEST_F(ClocksOfLogs, ThatAgreeAreNotSaid) {

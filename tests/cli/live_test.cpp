@@ -37,6 +37,12 @@ class Live : public LiveTest {
     ASSERT_EQ(trace.size(), live.size());
     for (std::size_t i = 0; i < live.size(); ++i) {
       for (const auto& [key, value] : trace[i].items()) {
+        if (key == "fit") {
+          // What the array reads untouched is told to more than these digits by both.
+          EXPECT_NEAR(live[i].at(key).at("z").get<double>(), value.at("z").get<double>(), 1e-9);
+          EXPECT_EQ(live[i].at(key).at("verdict"), value.at("verdict")) << i;
+          continue;
+        }
         // Equal touches on one device give the same bits, one by one or together; files
         // hold pressures in float64.
         EXPECT_EQ(live[i].at(key), value) << key << " after touch " << i;

@@ -153,7 +153,7 @@ TEST(DenseBelief, MoreBinsThanMemoryIsRefusedBeforeAnyIsTaken) {
   limits.memory = needed - 1;
   device.context().lower_limits(limits);
   expect_refused();
-  limits.memory = 2 * needed;
+  limits.memory = needed + (std::uint64_t{16} << 20);  // also for staging
   device.context().lower_limits(limits);
   EXPECT_NO_THROW(PoseHistogram(device, objects, too_many)) << "the device is still usable";
   // Far beyond 64 bits of bins.
