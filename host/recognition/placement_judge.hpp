@@ -23,11 +23,11 @@ struct TouchPlacement {
 
 /// Judges where the touches lie before a step is believed: where "(none)" is best or the touches do
 /// not fit, whether a learned object explains them all the same, at least as well as "(none)" does
-/// and fit no worse than doubtfully; where the step would act or the fit is doubtful, whether its object
-/// explains them far better. Touches lie up to 2 mm and the turn that belongs to it from where the
-/// robot says, each by itself; or the object moved once, after two touches in contact or more and
-/// before two or more. Evidence decides, tempered as that of labels, by Laplace's approximation at
-/// the peaks that are found near the modes of the five most probable hypotheses.
+/// and fit no worse than doubtfully; where the step would act or the fit is doubtful, whether its
+/// object explains them far better. Touches lie up to 2 mm and the turn that belongs to it from
+/// where the robot says, each by itself; or the object moved once, after two touches in contact or
+/// more and before two or more. Evidence decides, tempered as that of labels, by Laplace's
+/// approximation at the peaks that are found near the modes of the five most probable hypotheses.
 /// @param step its decision and fit are read
 /// @returns none where neither helps, for particles, and where objects slip
 std::optional<TouchPlacement> judge_placement(const Recogniser& recogniser,

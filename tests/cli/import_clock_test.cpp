@@ -82,8 +82,9 @@ TEST_F(ClocksOfLogs, ThatDifferAreSaidUntilTheirOffsetIsGiven) {
   EXPECT_EQ(import({"--pose-delay", "0.62"}).err, "");
   expect_named(import({"--pose-delay", "0.2"}).err, {"ahead"});
   put_logs(-3600.3);
-  expect_refused(command({"--poses", "poses.csv"}),
-                 {"poses.csv", "finds a pose", "their offset but for 1.05 s", "--pose-delay -3600.3"});
+  expect_refused(
+      command({"--poses", "poses.csv"}),
+      {"poses.csv", "finds a pose", "their offset but for 1.05 s", "--pose-delay -3600.3"});
 }
 
 TEST_F(ClocksOfLogs, ThatAgreeAreNotSaid) {

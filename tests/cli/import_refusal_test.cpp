@@ -246,11 +246,12 @@ INSTANTIATE_TEST_SUITE_P(
              "poses.csv:2: column 'rx': the array is turned by 126 degrees out of the xy plane, "
              "which x, y and an angle do not tell; write the rotation as a quaternion: columns tx, "
              "ty, tz, qx, qy, qz and qw"},
-        Case{"binary",
-             "log.csv",
-             std::string("\0\1\2", 3),
-             {},
-             "log.csv: is no text; save the table as CSV in UTF-8; palpate.Recording takes arrays"}),
+        Case{
+            "binary",
+            "log.csv",
+            std::string("\0\1\2", 3),
+            {},
+            "log.csv: is no text; save the table as CSV in UTF-8; palpate.Recording takes arrays"}),
     [](const auto& test) { return test.param.name; });
 
 TEST_F(ImportCommand, FlagsNameTheirForm) {
