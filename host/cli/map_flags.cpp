@@ -344,13 +344,13 @@ GroupedTouches group_by_label(const MapFlags& flags, const std::vector<Recording
   GroupedTouches result;
   std::vector<std::string> labels;
   for (auto& [label, group] : groups) {
-    if (!flags.group.empty() && std::ranges::all_of(group.sources, [&](const TouchSource& source) {
-          return source.group == group.sources.front().group;
-        })) {
+    const std::string& first = group.sources.front().group;
+    const auto is_first = [&first](const TouchSource& source) { return source.group == first; };
+    if (!flags.group.empty() && std::ranges::all_of(group.sources, is_first)) {
       refuse_flag("--group", flags.group,
                   "all touches of '{}' are of '{}': none are left to learn from without them; give "
                   "touches of two groups or more of each object",
-                  label, group.sources.front().group);
+                  label, first);
     }
     labels.push_back(label);
     result.objects.push_back({label, std::move(group.touches)});

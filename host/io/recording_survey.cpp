@@ -71,7 +71,7 @@ class Survey {
     }
     std::ranges::sort(digests);
     return digests.size() -
-           static_cast<std::size_t>(std::ranges::unique(digests).begin() - digests.begin());
+           static_cast<std::size_t>(std::unique(digests.begin(), digests.end()) - digests.begin());
   }
 
   bool of_touches() const { return result_.head.recording.rows != "frames"; }

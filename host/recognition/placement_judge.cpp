@@ -297,9 +297,9 @@ std::optional<TouchPlacement> judge_placement(const Recogniser& recogniser,
     return lead > (one.placement.moved_after > 0 ? least_move_over_none_nats : 0.0);
   };
   std::optional<Explanation> found;
-  const auto consider = [&](std::optional<Explanation> one) {
+  const auto consider = [&](const std::optional<Explanation>& one) {
     if (one && explains(*one) && (!found || one->log_evidence > found->log_evidence)) {
-      found = std::move(one);
+      found = one;
     }
   };
   const auto placed_on = [&](int object) {
