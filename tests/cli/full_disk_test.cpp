@@ -120,6 +120,9 @@ TEST_F(FullDisk, StandardErrorThatCannotBeWrittenKeepsTheStatus) {
 
 // Each of 20,000 readings has its own time, and so a frame of 10,000 elements: 1.6 GB.
 TEST_F(FullDisk, AndMemoryThatEndsAreOneLine) {
+#ifdef __SANITIZE_ADDRESS__
+  GTEST_SKIP() << "the sanitizer takes memory of its own";
+#endif
   if (!limits_memory()) {
     GTEST_SKIP() << "memory of processes is not limited here";
   }
