@@ -20,7 +20,9 @@ constexpr std::array table{
     FormerFlag{"evaluate", "--png", "draw it in Python, by palpate.evaluate(RESULTS).plot()"},
     FormerFlag{"plan", "--png", "read the table, or give --json"},
     FormerFlag{"recognize", "--fit-touch-sd",
-               "give --touch-sd-mm and --touch-sd-deg as touches of one object at one pose spread"},
+               "give --touch-sd-mm, as docs/misplaced.md measures it"},
+    FormerFlag{"touches", "--tare",
+               "leave it out: the rest of each element is found in the whole recording"},
 };
 
 }  // namespace

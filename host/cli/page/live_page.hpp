@@ -34,7 +34,7 @@ class LivePage {
   /// Shows what is planned after a touch.
   void plan(const LiveTouch& touch);
   /// Shows what the array feels now, at most 25 times a second.
-  /// @param warning see LiveScreen::update()
+  /// @param warning what is wrong beside the state; "": nothing
   void update(const LiveState& state, const std::string& warning);
 
  private:

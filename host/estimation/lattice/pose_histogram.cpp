@@ -13,6 +13,7 @@
 #include "estimation/lattice/dense_belief.hpp"
 #include "estimation/lattice/dense_likelihood.hpp"
 #include "estimation/lattice/expected_gain.hpp"
+#include "estimation/lattice/histogram_room.hpp"
 #include "estimation/lattice/reading_predictor.hpp"
 #include "estimation/lattice/refinement.hpp"
 #include "estimation/lattice/touch_by_touch.hpp"
@@ -23,48 +24,6 @@
 #include "palpate/error.hpp"
 
 namespace palpate {
-
-namespace {
-
-constexpr double mib = 1 << 20;
-
-double memory_mib(const gpu::Context& context) {
-  return static_cast<double>(context.limits().memory) / mib;
-}
-
-/// What the bins of one belief take. In floating point: there may be too many to count.
-double belief_mib(const PoseLattice& lattice, std::size_t objects) {
-  return static_cast<double>(objects * sizeof(TwoFloat)) / mib * lattice.x_mm.count *
-         lattice.y_mm.count * lattice.theta_rad.count;
-}
-
-/// Throws Error where the device holds fewer bins, before there is a buffer of them.
-void require_room(const gpu::Context& context, const HistogramOptions& options,
-                  std::size_t objects) {
-  const PoseLattice& lattice = options.lattice;
-  // For a still array, No Contact everywhere; and a touch by itself.
-  const int beliefs =
-      1 + (options.still_array ? 1 : 0) + (TouchByTouch::wanted_by(options) ? 1 : 0);
-  const double needed_mib = beliefs * belief_mib(lattice, objects);
-  if (needed_mib > memory_mib(context)) {
-    throw Error(
-        Fault::input,
-        fmt::format("{} objects x {} x {} x {} pose bins need {:.0f} MiB, device '{}' has "
-                    "{:.0f}; use fewer bins or objects",
-                    objects, lattice.x_mm.count, lattice.y_mm.count, lattice.theta_rad.count,
-                    std::ceil(needed_mib), context.name(), memory_mib(context)));
-  }
-}
-
-/// Whether one more belief, of a touch that may come next, leaves room for all else.
-bool has_room_to_prepare(const gpu::Context& context, const HistogramOptions& options,
-                         std::size_t objects) {
-  // A still array prepares no touch, and a touch by itself has memory of its own.
-  return !options.still_array && !TouchByTouch::wanted_by(options) &&
-         4.0 * belief_mib(options.lattice, objects) <= memory_mib(context);
-}
-
-}  // namespace
 
 struct PoseHistogram::Impl {
   Impl(Device& device, std::span<const Hypothesis> hypotheses, const HistogramOptions& wanted)

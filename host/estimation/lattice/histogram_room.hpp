@@ -1,0 +1,18 @@
+#pragma once
+
+#include <cstddef>
+
+#include "gpu/context.hpp"
+#include "palpate/pose_histogram.hpp"
+
+namespace palpate {
+
+/// Throws Error where the device holds fewer bins, before there is a buffer of them.
+void require_room(const gpu::Context& context, const HistogramOptions& options,
+                  std::size_t objects);
+
+/// Whether one more belief, of a touch that may come next, leaves room for all else.
+bool has_room_to_prepare(const gpu::Context& context, const HistogramOptions& options,
+                         std::size_t objects);
+
+}  // namespace palpate
