@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "press.hpp"
+#include "streaming/rest_follower.hpp"
 
 namespace palpate::rest_finder_test {
 
@@ -217,6 +218,18 @@ TEST(TouchDetector, LearnsARestAnewThatWasLeft) {
   const std::size_t touches = live_touches(DriftingStream{}.frames(per_minute(0.0)), -3.0);
   EXPECT_GE(touches, 48u);  // 10 s of its 60 are lost
   EXPECT_LE(touches, 52u);
+}
+
+// Drift has lifted the rest to 5, and presses of 20 take three fifths of the time.
+TEST(RestFollower, LearnsAnewWhatIsReadBetweenPresses) {
+  RestFollower follower({0.0}, 10.0, 2.0);
+  bool learned = false;
+  for (int i = 0; i < 200 && !learned; ++i) {
+    const double pressure = i % 10 < 6 ? 20.0 : 5.0;
+    learned = follower.keep(std::vector{pressure}, 0.1);
+  }
+  ASSERT_TRUE(learned);
+  EXPECT_FLOAT_EQ(static_cast<float>(follower.rest()[0]), 5.0F);
 }
 
 }  // namespace palpate::rest_finder_test
