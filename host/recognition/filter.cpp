@@ -242,7 +242,6 @@ FilterTraits traits_of(const FilterOptions& options) {
                            return FilterTraits{.bins = true,
                                                .certificate = true,
                                                .touch_sd = one.touch_sd,
-                                               .slip_sd = one.slip_sd,
                                                .none_weight = one.none_weight,
                                                .tolerance = one.tolerance,
                                                .budget_s = one.budget_s};
@@ -266,13 +265,12 @@ FilterOptions with_lattice(FilterOptions options, const PoseLattice& lattice) {
 
 std::optional<BoundedOptions> bounded_instead(const FilterOptions& options) {
   const auto* histogram = std::get_if<HistogramOptions>(&options);
-  if (histogram == nullptr) {
+  if (histogram == nullptr || !histogram->slip_sd.none()) {
     return {};
   }
   return BoundedOptions{.lattice = histogram->lattice,
                         .contact = histogram->contact,
                         .touch_sd = histogram->touch_sd,
-                        .slip_sd = histogram->slip_sd,
                         .none_weight = histogram->none_weight};
 }
 

@@ -37,8 +37,8 @@ struct FilterTraits {
   bool certificate = false;
   /// How far a touch may be displaced; none with particles, which take touches to be exact.
   DisplacementSd touch_sd = {};
-  /// How far the object may move between two touches; none with particles, whose motion noise is
-  /// not meant.
+  /// How far the object may move between two touches; none with bounds, and with particles, whose
+  /// motion noise is not meant.
   DisplacementSd slip_sd = {};
   std::optional<double> none_weight = {};  ///< of "none of these"; particles have none
   std::optional<double> tolerance = {};    ///< of the certificate
@@ -54,7 +54,7 @@ const ContactModel& contact_of(const FilterOptions& options);
 /// The filter on another lattice.
 FilterOptions with_lattice(FilterOptions options, const PoseLattice& lattice);
 /// The options of a bounded posterior of the same bins; none where the filter is no histogram, or
-/// has what bounds do not: a limit of its memory.
+/// objects slip, which bounds do not follow.
 std::optional<BoundedOptions> bounded_instead(const FilterOptions& options);
 /// What the belief is divided into: "25 x 25 x 16 bins each", "10000 particles".
 std::string size_words(const FilterOptions& options);

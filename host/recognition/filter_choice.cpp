@@ -162,7 +162,19 @@ ChosenFilter choose_filter(const FilterWish& wish, const Request& request,
     histogram.none_weight = none_weight(request, hypotheses);
   }
   const std::string caller = fmt::format("`{}`", of_caller.option);
-  if (wish.kind == FilterKind::bounded) {
+  const bool slips = !histogram.slip_sd.none();
+  if (slips && wish.kind == FilterKind::bounded) {
+    for (const auto& [option, given] :
+         {std::pair{"tolerance", request.tolerance.has_value()},
+          std::pair{"budget-ms", request.budget_ms.has_value()},
+          std::pair{"evidence-nats", request.evidence_nats.has_value()}}) {
+      if (given) {
+        refuse_option(option,
+                      "has no effect where objects slip, as the histogram alone follows them; "
+                      "leave it out");
+      }
+    }
+  } else if (wish.kind == FilterKind::bounded) {
     if (!of_caller.why.empty()) {
       throw Error(Fault::input,
                   fmt::format("{}: {}; leave it out, or {}", caller, of_caller.why, wish.by));
@@ -176,7 +188,8 @@ ChosenFilter choose_filter(const FilterWish& wish, const Request& request,
   if (wish.kind == FilterKind::histogram) {
     by.push_back(wish.by);
   }
-  return {histogram, by.empty(), fmt::format("{}", fmt::join(by, " and "))};
+  return {histogram, by.empty() && !slips,
+          slips ? "" : fmt::format("{}", fmt::join(by, " and "))};
 }
 
 void require_within_region(const Request& request, const PoseLattice& lattice) {
@@ -203,12 +216,10 @@ ChosenBins chosen_bins(const std::function<Device&()>& device,
   const FilterTraits traits = traits_of(filter.options);
   const bool by_bounds =
       traits.certificate || (filter.automatic && bounded_instead(filter.options));
-  std::int64_t most = most_bounded_bins;
-  // The memory of a belief that slips follows the bins.
-  if (!traits.slip_sd.none() || !by_bounds) {
-    most = most_bins_on(device(), traits.still_array);
-  }
-  return {balanced_lattice(lattice_of(filter.options), hypotheses, most, width, traits.touch_sd),
+  const std::int64_t most =
+      by_bounds ? most_bounded_bins : most_bins_on(device(), traits.still_array);
+  return {balanced_lattice(lattice_of(filter.options), hypotheses, most, width, traits.touch_sd,
+                           traits.slip_sd),
           most};
 }
 

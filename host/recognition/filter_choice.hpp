@@ -30,7 +30,8 @@ struct ChosenFilter {
 };
 
 /// The options of the filter that is wished for. Leaves the choice between histogram and bounds to
-/// filter_for_bins() where neither is wished for and nothing needs the histogram.
+/// filter_for_bins() where neither is wished for and nothing needs the histogram. Objects that slip
+/// need it.
 /// @param histogram with the lattice, the contact model, and the sensor model's touch_sd
 /// @throws Error on values out of range, and where the filter has no use for an option
 ChosenFilter choose_filter(const FilterWish& wish, const Request& request,
@@ -56,7 +57,7 @@ struct ChosenBins {
   std::int64_t most_bins = 0;  ///< limit of all objects' bins together
 };
 /// As many bins as the device's memory holds; most_bounded_bins where bounds are or may become the
-/// filter, unless objects slip.
+/// filter.
 /// @param device see Circumstances::device; called where its memory is asked for
 /// @throws Error as balanced_lattice() does
 ChosenBins chosen_bins(const std::function<Device&()>& device,

@@ -291,6 +291,15 @@ RecognitionTask resolve(const Request& request, const Circumstances& of) {
       far_too_wide || (sensor != nullptr && sensor->temperature > far_from_independent);
   const ChosenFilter filter = choose_filter(wish, request, need, hypotheses, histogram);
   const FilterOptions settled = settled_filter(request, of, filter, hypotheses, bin_width, remarks);
+  const bool by_bounds_at_rest =
+      wish.kind == FilterKind::bounded ||
+      (wish.kind == FilterKind::automatic &&
+       bins_in_all(hypotheses.size(), lattice_of(settled)) > most_histogram_bins);
+  if (by_bounds_at_rest && !traits_of(settled).slip_sd.none()) {
+    remarks.emplace_back(
+        "objects that slip are followed by the histogram, over every bin; `filter histogram` says "
+        "so");
+  }
   const bool to_the_end = request.tolerance || request.evidence_nats;  // what was asked for holds
   RecognitionTask task(std::move(hypotheses),
                        sensor != nullptr ? with_evidence(settled, *sensor, to_the_end) : settled);
@@ -349,8 +358,7 @@ Recogniser open_recogniser(Device* device, const RecognitionTask& task,
         !task.filter_asked_for_by.empty() &&
         bounds_have_room(task.hypotheses, {.lattice = task.lattice(),
                                            .contact = task.contact(),
-                                           .touch_sd = task.touch_sd(),
-                                           .slip_sd = task.slip_sd()})) {
+                                           .touch_sd = task.touch_sd()})) {
       throw Error(Fault::input,
                   fmt::format("{}, or leave out {}: `filter bounded` needs no device memory",
                               error.what(), task.filter_asked_for_by));

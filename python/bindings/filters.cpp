@@ -293,19 +293,17 @@ void bind_bounded(nb::module_& module) {
       nb::class_<Bounded>(
           module, "BoundedPosterior",
           "The belief of PoseHistogram over the same bins, of which it evaluates only those that\n"
-          "matter, and proves how little the others can. Memory follows the maps, and\n"
-          "the bins where objects slip.")
+          "matter, and proves how little the others can. Memory follows the maps.")
           .def(
               "__init__",
               [](Bounded* self, const std::shared_ptr<Session>& device, const MapsLike& maps,
                  const PoseLattice& lattice, const ContactModel& contact, double tolerance,
                  std::optional<double> budget_s, std::optional<double> evidence_nats,
                  std::optional<double> none_weight, const DisplacementSdLike& touch_sd,
-                 const DisplacementSdLike& slip_sd, int threads) {
+                 int threads) {
                 const BoundedOptions options{.lattice = lattice,
                                              .contact = contact,
                                              .touch_sd = sd_of(touch_sd, "touch_sd"),
-                                             .slip_sd = sd_of(slip_sd, "slip_sd"),
                                              .tolerance = tolerance,
                                              .budget_s = budget_s,
                                              .evidence_nats = evidence_nats,
@@ -319,13 +317,11 @@ void bind_bounded(nb::module_& module) {
               "contact"_a = ContactModel{}, "tolerance"_a = BoundedOptions{}.tolerance,
               "budget_s"_a = nb::none(), "evidence_nats"_a = nb::none(),
               "none_weight"_a = nb::none(), "touch_sd"_a = DisplacementSd{},
-              "slip_sd"_a = DisplacementSd{}, "threads"_a = 0,
+              "threads"_a = 0,
               "tolerance: largest total variation distance from the posterior over all bins;\n"
               "budget_s: seconds after which estimate() reports what it has proven by then;\n"
               "evidence_nats: bounds every map's log evidence, too; touch_sd: how far off the\n"
-              "sensor's poses may be; slip_sd: how far the object moves between touches; memory "
-              "then\n"
-              "follows the bins; threads: 0 for as many as the machine has cores.\n\n"
+              "sensor's poses may be; threads: 0 for as many as the machine has cores.\n\n"
               "Raises Error as PoseHistogram does.")
           .def("update", &update<BoundedPosterior>, "touches"_a, "progress"_a = nb::none(),
                "Multiplies the belief by the likelihood of these touches (Eq. 7, 13); takes in "

@@ -139,7 +139,7 @@ class Run:
 def measure(data: Data, lattice: PoseLattice, dense: int) -> Run:
     """Recognises all unknowns by bounds, and some by the histogram.
 
-    All by the histogram where bounds have no room for what the options ask.
+    All by the histogram where bounds have no room for what the options ask, or objects slip.
     """
     unknowns = sum(count for _, count in data.entries)
     in_all = lattice.bins * len(data.maps)
@@ -156,6 +156,8 @@ def measure(data: Data, lattice: PoseLattice, dense: int) -> Run:
     try:
         bounds = data.on(lattice, "bounded")
     except Error:
+        bounds = None
+    if bounds is not None and not bounds.on_host:
         bounds = None
     # Half of the device's memory, as --bins auto has it.
     if in_all <= min(_MOST_HISTOGRAM, data.device.memory_bytes // 16) or bounds is None:

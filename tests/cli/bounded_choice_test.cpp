@@ -25,8 +25,7 @@ TEST_F(BoundedFilter, IsAskedForByASceneToo) {
   scene("filter: auto\n");
   EXPECT_FALSE(u({"--scene", "scene.yaml"}).contains("dropped_mass"));
   scene("filter: bounded\nslip_sd: {mm: 1}\n");
-  EXPECT_TRUE(u({"--scene", "scene.yaml"}).contains("dropped_mass"));
-  EXPECT_TRUE(u({"--scene", "scene.yaml", "--budget-ms", "9"}).contains("dropped_mass"));
+  refused({"--scene", "scene.yaml", "--budget-ms", "9"}, {"--budget-ms", "where objects slip"});
   scene("filter: histogram\n");
   refused({"--scene", "scene.yaml", "--tolerance", "0.1"}, {"--tolerance", "has no effect"});
 }
@@ -66,7 +65,8 @@ TEST_F(BoundedFilter, AutoTakesItForManyBins) {
                                  HasSubstr("99904 bins in all, at most 100000")));
   Arguments slips = many;
   slips.insert(slips.end(), {"--slip-sd-mm", "0.5"});
-  EXPECT_THAT(engine(slips), HasSubstr("filter: bounded, "));
+  EXPECT_THAT(engine(slips), AllOf(HasSubstr("filter: histogram in "),
+                                   HasSubstr("objects that slip are followed by the histogram")));
   Arguments written = many;
   written.insert(written.end(), {"--posterior", "p.h5"});
   EXPECT_THAT(engine(written),
@@ -92,9 +92,6 @@ TEST_F(BoundedFilter, AutoNamesTheFlagThatKeepsALargeLatticeFromIt) {
   }
   expect_refused({"recognize", "u.h5", "--maps", "maps", "--bins=4000x4000x300", "--filter=bounded",
                   "--touch-sd-mm=0.5"},
-                 {"MiB", "use fewer bins"});
-  expect_refused({"recognize", "u.h5", "--maps", "maps", "--bins=4000x4000x300", "--filter=bounded",
-                  "--slip-sd-deg=2"},
                  {"MiB", "use fewer bins"});
   expect_refused({"recognize", "u.h5", "--maps", "maps", "--bins=4000x4000x300",
                   "--filter=histogram", "--posterior=p.h5"},

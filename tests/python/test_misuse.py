@@ -60,11 +60,12 @@ def test_an_axis_or_a_displacement_of_another_form_is_refused_by_name(
         for name in ("x_mm", "y_mm", "theta_rad"):
             with pytest.raises(TypeError, match=rf"^{name}: give an Axis or \(lower, upper, count\)"):
                 palpate.PoseLattice(**{name: axis})
-    for name in ("touch_sd", "slip_sd"):
+    for belief, name in (
+        (palpate.PoseHistogram, "touch_sd"), (palpate.PoseHistogram, "slip_sd"),
+        (palpate.BoundedPosterior, "touch_sd"),
+    ):  # fmt: skip
         with pytest.raises(TypeError, match=rf"^{name}: give a DisplacementSd or \(mm, rad\)"):
-            palpate.PoseHistogram(device, maps, **{name: (1,)})
-        with pytest.raises(TypeError, match=rf"^{name}: give a DisplacementSd or \(mm, rad\)"):
-            palpate.BoundedPosterior(device, maps, **{name: (1,)})
+            belief(device, maps, **{name: (1,)})
 
 
 def test_what_a_path_raises_is_raised(tmp_path: pathlib.Path) -> None:

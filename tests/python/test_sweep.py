@@ -91,7 +91,7 @@ def test_without_true_poses_it_tells_distances(
     assert document["fine_count"] > document["auto_count"] > 0
 
 
-def test_histogram_and_bounds_answer_where_objects_slip(
+def test_the_histogram_answers_where_objects_slip(
     files: Files, unknowns: pathlib.Path, tmp_path: pathlib.Path
 ) -> None:
     scene = tmp_path / "scene.yaml"
@@ -101,7 +101,7 @@ def test_histogram_and_bounds_answer_where_objects_slip(
         "--x-mm=-10:10", "--y-mm=-10:10", "--max-bins", 3_000,
     )  # fmt: skip
     for point in document["points"]:
-        assert point["seconds_bounds"] > 0.0 and point["host_bytes"] > 0
+        assert point["seconds_bounds"] is None and point["host_bytes"] is None
         assert point["seconds_histogram"] > 0.0 and point["device_bytes"] > 0
 
 

@@ -61,11 +61,8 @@ TEST(ChosenBins, AreNotLimitedByTheDeviceWhereBoundsMayTakeThem) {
   }
   HistogramOptions slips = histogram;
   slips.slip_sd.mm = 1.0;
-  for (const ChosenBins& bins :
-       {chosen(device, BoundedOptions{.lattice = wide_lattice(), .slip_sd = slips.slip_sd}),
-        chosen(device, slips, true)}) {
-    EXPECT_LE(bins.most_bins, most_bins_on(device, false)) << "each bin takes memory";
-  }
+  EXPECT_LE(chosen(device, slips, true).most_bins, most_bins_on(device, false))
+      << "each bin takes memory";
 }
 
 /// A histogram of so many bins of each object.
@@ -118,7 +115,7 @@ TEST(FilterForBins, IsTheHistogramForWhatBoundsRefuse) {
   EXPECT_FALSE(takes([](Options& options) { options.lattice.y_mm.count = 100'000; }))
       << "too large for both; the histogram says so";
   EXPECT_TRUE(takes([](Options& options) { options.touch_sd.rad = 0.1; }));
-  EXPECT_TRUE(takes([](Options& options) { options.slip_sd.mm = 0.1; }));
+  EXPECT_FALSE(takes([](Options& options) { options.slip_sd.mm = 0.1; }));
 }
 
 }  // namespace palpate::filter_choice_test

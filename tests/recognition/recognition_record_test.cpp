@@ -74,11 +74,11 @@ TEST(Recognise, EndsItsTraceWithTheSameBits) {
   Device device = Device::open();
   const Recording letter = touched_letter(7);
   std::vector<FilterOptions> filters = every_filter();
-  for (auto sd : {&BoundedOptions::touch_sd, &BoundedOptions::slip_sd}) {
-    auto displaced = std::get<BoundedOptions>(every_filter().back());
-    displaced.*sd = {1.0, 0.1};
-    filters.emplace_back(displaced);
-  }
+  auto displaced = std::get<BoundedOptions>(every_filter().back());
+  displaced.touch_sd = {1.0, 0.1};
+  auto slipping = std::get<HistogramOptions>(every_filter().front());
+  slipping.slip_sd = {1.0, 0.1};
+  filters.insert(filters.end(), {displaced, slipping});
   for (const FilterOptions& filter : filters) {
     RecognitionTask task(shapes(), filter);
     for (const auto tolerance : {std::optional<double>(), std::optional(1e-3)}) {
@@ -109,7 +109,7 @@ TEST(Recognise, APosesScaleIsThatOfReadingsAlone) {
   Device device = Device::open();
   const Recording letter = touched_letter(7);
   constexpr double factor = 0.25;
-  const auto widened = [&](const BoundedOptions& filter) {
+  const auto widened = [&](const FilterOptions& filter) {
     RecognitionTask task(shapes(), filter);
     const auto variance = [&] {
       Recogniser recogniser(device, task);
@@ -119,9 +119,9 @@ TEST(Recognise, APosesScaleIsThatOfReadingsAlone) {
     task.pose_scale.factor = factor;
     return variance() / before;
   };
-  const auto exact = std::get<BoundedOptions>(every_filter().back());
+  const auto exact = std::get<HistogramOptions>(every_filter().front());
   EXPECT_NEAR(widened(exact), factor, 1e-9);
-  for (auto sd : {&BoundedOptions::touch_sd, &BoundedOptions::slip_sd}) {
+  for (auto sd : {&HistogramOptions::touch_sd, &HistogramOptions::slip_sd}) {
     auto displaced = exact;
     displaced.*sd = {0.5, 0.05};
     EXPECT_GT(widened(displaced), factor + 0.05);

@@ -78,10 +78,31 @@ TEST(Resolve, AnOptionOfBoundsAsksForBounds) {
   EXPECT_DOUBLE_EQ(std::get<BoundedOptions>(task_of(request).filter).touch_sd.rad,
                    2.0 * std::numbers::pi / 180.0);
   EXPECT_DOUBLE_EQ(task_of(request).touch_sd().rad, 2.0 * std::numbers::pi / 180.0);
-  request.slip_sd_deg = 2.0;
-  EXPECT_DOUBLE_EQ(task_of(request).slip_sd().rad, 2.0 * std::numbers::pi / 180.0);
   request.budget_ms = 10.0;
   EXPECT_DOUBLE_EQ(std::get<BoundedOptions>(task_of(request).filter).budget_s.value(), 0.01);
+}
+
+TEST(Resolve, ObjectsThatSlipAreFollowedByTheHistogramWhichIsSaidWhereBoundsWereDue) {
+  const auto said = [](const Request& request) {
+    const RecognitionTask task = task_of(request);
+    EXPECT_DOUBLE_EQ(std::get<HistogramOptions>(task.filter).slip_sd.rad,
+                     2.0 * std::numbers::pi / 180.0);
+    return std::ranges::any_of(task.remarks, [](const std::string& remark) {
+      return remark.find("followed by the histogram") != remark.npos;
+    });
+  };
+  Request request = request_of_shapes();
+  request.slip_sd_deg = 2.0;
+  for (const FilterKind kind :
+       {FilterKind::automatic, FilterKind::bounded, FilterKind::histogram}) {
+    request.filter = kind;
+    EXPECT_EQ(said(request), kind == FilterKind::bounded);
+  }
+  request.filter = FilterKind::automatic;
+  request.bins = std::array{60, 60, 60};
+  EXPECT_TRUE(said(request));
+  request.tolerance = 1e-3;
+  EXPECT_THAT(refusal(request), HasSubstr("`tolerance`: has no effect where objects slip"));
 }
 
 TEST(Resolve, CountsThatWereSettledBeforeStand) {

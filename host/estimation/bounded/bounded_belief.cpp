@@ -103,7 +103,7 @@ void BoundedBelief::take_in() {
   if (!touches_.waiting()) {
     return;
   }
-  if (!touches_.moving() && found_ && found_->bins.complete() &&
+  if (found_ && found_->bins.complete() &&
       found_->bins.values().size() <= FollowedBins::most_bins(touches_.likelihood())) {
     followed_.emplace(found_->bins, found_->result, touches_.log_weight(), touches_.taken_in());
   }
@@ -135,7 +135,7 @@ double BoundedBelief::bins_in_all() const {
 SearchGoal BoundedBelief::rough_goal() const {
   // Few bins take as long whatever the tolerance, and a close search lets those that are found be
   // followed through the next touches.
-  const double rough = touches_.likelihood().displaced() && !touches_.moving() ? followable : soon;
+  const double rough = touches_.likelihood().displaced() ? followable : soon;
   return {.tolerance = bins_in_all() <= closely_drawn_bins ? options().tolerance
                                                            : std::max(options().tolerance, rough),
           .exact = false,
@@ -163,11 +163,6 @@ const SearchResult& BoundedBelief::found(std::optional<double> asked) {
   return found_->result;
 }
 
-bool BoundedBelief::better(const Found& later, const Found& earlier) const {
-  // A belief that slips is what the last search left behind.
-  return touches_.moving() || later.result.unproven() < earlier.result.unproven();
-}
-
 BoundedBelief::Found BoundedBelief::search(double tolerance) {
   // "None of these" has the rest of a budget, which is half of it at least.
   std::optional<double> budget_s = options().budget_s;
@@ -191,9 +186,6 @@ BoundedBelief::Found BoundedBelief::search(double tolerance) {
 }
 
 BoundedBelief::Found BoundedBelief::search(const SearchGoal& goal, Deadline& deadline) {
-  if (touches_.moving()) {
-    found_.reset();  // the belief will be another one, also where this is cancelled
-  }
   EvaluatedBins bins(deadline.exists());
   SearchResult result = touches_.search(
       goal, deadline, [&](const BinBox& box, std::span<const double> log_likelihood) {
@@ -208,9 +200,7 @@ BoundedBelief::Found BoundedBelief::search(const SearchGoal& goal, Deadline& dea
 }
 
 void BoundedBelief::visit(const BinVisitor& visitor) {
-  if (touches_.moving()) {
-    touches_.visit_moving(visitor);
-  } else if (found_->bins.complete()) {
+  if (found_->bins.complete()) {
     found_->bins.visit(visitor);
   } else {
     touches_.search(found_->goal, until({}), visitor);
@@ -231,19 +221,17 @@ bool BoundedBelief::follow() {
 }
 
 BoundedBelief::DrawnFrom BoundedBelief::drawable_bins() {
-  if (found_ && (touches_.moving() || found_->bins.complete())) {
+  if (found_ && found_->bins.complete()) {
     return DrawnFrom::found;
   }
-  if (!touches_.moving()) {
-    if (!found_ && follow()) {
-      return DrawnFrom::followed;
-    }
-    // Rejection looks at tiles here and there, which share little of what displaced touches reach.
-    const bool many_bins = bins_in_all() > most_searched_bins && options().touch_sd.none();
-    // Where a search had no room for its bins, another one would take as long.
-    if (found_ || touches_.taken_in() <= wide_touches || many_bins) {
-      return DrawnFrom::tiles;
-    }
+  if (!found_ && follow()) {
+    return DrawnFrom::followed;
+  }
+  // Rejection looks at tiles here and there, which share little of what displaced touches reach.
+  const bool many_bins = bins_in_all() > most_searched_bins && options().touch_sd.none();
+  // Where a search had no room for its bins, another one would take as long.
+  if (found_ || touches_.taken_in() <= wide_touches || many_bins) {
+    return DrawnFrom::tiles;
   }
   Deadline deadline = until(options().budget_s);
   found_ = search(rough_goal(), deadline);
@@ -288,12 +276,7 @@ std::vector<PoseBlock> BoundedBelief::refined_blocks() {
       evaluated.push_back(block_of(box, finest));
     }
   };
-  if (touches_.moving()) {
-    found();
-    visit(note);
-  } else {
-    touches_.search(goal(tolerance()), until({}), note, &blocks);
-  }
+  touches_.search(goal(tolerance()), until({}), note, &blocks);
   blocks.insert(blocks.end(), evaluated.begin(), evaluated.end());
   return blocks;
 }

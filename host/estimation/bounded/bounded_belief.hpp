@@ -33,11 +33,8 @@ class BoundedBelief {
 
   const SearchedTouches& touches() const { return touches_; }
   /// See SearchedTouches.
-  std::vector<double> log_likelihood(std::span<const BinBox> boxes, Arithmetic arithmetic) {
+  std::vector<double> log_likelihood(std::span<const BinBox> boxes, Arithmetic arithmetic) const {
     return touches_.log_likelihood(boxes, arithmetic);
-  }
-  std::vector<double> close_log_likelihood(std::span<const BinBox> boxes) {
-    return touches_.close_log_likelihood(boxes);
   }
   std::uint64_t bytes() const { return touches_.bytes() + (found_ ? found_->bins.bytes() : 0); }
 
@@ -95,7 +92,9 @@ class BoundedBelief {
   /// Ends the deadline where there is no room for more bins.
   Found search(const SearchGoal& goal, Deadline& deadline);
   /// Whether the later of two searches through the same touches is to be kept.
-  bool better(const Found& later, const Found& earlier) const;
+  static bool better(const Found& later, const Found& earlier) {
+    return later.result.unproven() < earlier.result.unproven();
+  }
   /// Whether the bounds of "none of these" are as close as the options ask for.
   bool tells_enough(const LogInterval& none) const;
 

@@ -154,10 +154,9 @@ RefinedPose BoundedPosterior::refine(const Mode& mode) const {
   require_object(mode.object, posterior.bodies.size());
   BoundedBelief& belief = posterior.belief;
   // Where bins are very fine, a few of them tell the peak, and all would take long. A mean over
-  // displacements takes the others all the same, and a belief that slips has them.
-  const BoundedOptions& options = belief.touches().options();
+  // displacements takes the others all the same.
   const PoseLattice fit =
-      options.touch_sd.none() && options.slip_sd.none() ? thinned(lattice()) : lattice();
+      belief.touches().options().touch_sd.none() ? thinned(lattice()) : lattice();
   const bool thin = fit.plane() != lattice().plane();
   std::optional<BinLikelihood> of_thin;
   Mode start = mode;
@@ -169,7 +168,7 @@ RefinedPose BoundedPosterior::refine(const Mode& mode) const {
   }
   const auto log_likelihood = [&](std::span<const BinBox> boxes) {
     if (!thin) {
-      return belief.close_log_likelihood(boxes);
+      return belief.log_likelihood(boxes, Arithmetic::float32);
     }
     std::size_t bins = 0;
     for (const BinBox& box : boxes) {
@@ -266,9 +265,7 @@ EvaluatedBelief BoundedPosterior::evaluated_bins() const {
     }
     const std::int64_t first = box.object * lattice().bins();
     for (std::int64_t i = 0; i < box.bins(); ++i) {
-      if (const double l = log_likelihood[static_cast<std::size_t>(i)]; l > no_mass / 2.0) {
-        bins.push_back({first + box.bin(i, lattice()), l});
-      }
+      bins.push_back({first + box.bin(i, lattice()), log_likelihood[static_cast<std::size_t>(i)]});
     }
   });
   std::ranges::sort(bins, {}, &Bin::place);
@@ -293,7 +290,7 @@ double BoundedPosterior::log_likelihood(int object, const Pose& T_object_robot) 
   }
   BoundedBelief& belief = posterior.belief;
   const KnownElements& elements = belief.touches().elements();
-  if (!belief.touches().options().touch_sd.none() || !belief.touches().options().slip_sd.none()) {
+  if (!belief.touches().options().touch_sd.none()) {
     const std::int64_t bin = lattice().bin_of(T_object_robot);
     const auto row = static_cast<std::int32_t>(bin / lattice().x_mm.count);
     const BinBox box{.object = object,
@@ -346,11 +343,7 @@ std::vector<TouchGain> BoundedPosterior::expected_gain(std::span<const Pose> T_r
   if (!posterior.predictor) {
     posterior.predictor.emplace(belief.touches().hypotheses(), belief.touches().options().contact);
   }
-  std::vector<PoseSample> samples = belief.sample(plan.samples, plan.seed);
-  if (belief.touches().taken_in() > 0 && !belief.touches().options().slip_sd.none()) {
-    // The object slips between touches, not before the first.
-    slip(samples, posterior.bodies, belief.touches().options().slip_sd, plan.seed);
-  }
+  const std::vector<PoseSample> samples = belief.sample(plan.samples, plan.seed);
   return palpate::expected_gain(*posterior.predictor, samples, T_robot_sensor, elements_mm,
                                 belief.touches().options().touch_sd, plan);
 }

@@ -53,7 +53,6 @@ BoundedOptions checked(const BoundedOptions& options, std::span<const Hypothesis
   BoundedOptions all = options;
   all.lattice.collapse_fixed().validate();
   validate_displacement(all.touch_sd, all.lattice, "touch_sd");
-  validate_displacement(all.slip_sd, all.lattice, "slip_sd");
   all.contact = resolve(options.contact, hypotheses);
   if (const std::string why = why_no_room(hypotheses, all, memory_for_search()); !why.empty()) {
     throw Error(Fault::input, why);

@@ -12,7 +12,6 @@
 #include "estimation/bounded/displaced/displacement_weights.hpp"
 #include "estimation/bounded/displaced/exact_bins.hpp"
 #include "estimation/bounded/leaves/bin_kernel.hpp"
-#include "estimation/bounded/moving/moving_belief.hpp"
 #include "estimation/bounded/search/leaves.hpp"
 #include "estimation/bounded/tables/tile_bounds.hpp"
 #include "estimation/bounded/tables/window_table.hpp"
@@ -73,7 +72,7 @@ SearchMemory search_memory(std::span<const Hypothesis> hypotheses, const Bounded
     least_cell_mm = std::min(least_cell_mm, hypothesis.compared().cell_mm);
   }
   const std::vector<TileSize> sizes = tile_sizes(lattice, least_cell_mm, hypotheses.size(),
-                                                 options.touch_sd, !options.slip_sd.none());
+                                                 options.touch_sd);
   SearchMemory memory;
   for (const Hypothesis& hypothesis : hypotheses) {
     const OccupancyGrid& map = hypothesis.compared();
@@ -122,9 +121,6 @@ SearchMemory search_memory(std::span<const Hypothesis> hypotheses, const Bounded
     // Every plane's mean, and its neighbours' sums; and of all bins, what is kept of them.
     memory.means = 2.0 * sizeof(double) * bins_in_all(hypotheses.first(1), lattice) +
                    static_cast<double>(ExactBins::most_bytes);
-  }
-  if (!options.slip_sd.none()) {
-    memory.means += MovingBelief::bytes_needed(options, hypotheses.size());
   }
   return memory;
 }

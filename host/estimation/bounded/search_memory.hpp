@@ -15,8 +15,7 @@ struct SearchMemory {
   double tiles = 0.0;   ///< the largest tiles: their sums, and their places in a search
   double thetas = 0.0;  ///< what every theta of the lattice has
   double leaves = 0.0;  ///< bins that are evaluated together
-  double means = 0.0;   ///< displaced touches: all bins of one object within reach of some bins;
-                        ///< objects that slip: all bins
+  double means = 0.0;   ///< displaced touches: all bins of one object within reach of some bins
 
   double largest_family = 0.0;  ///< bins that the smallest tiles of one larger tile hold
   double total() const { return tables + tiles + thetas + leaves + means; }

@@ -24,9 +24,6 @@ SearchedTouches::SearchedTouches(std::span<const Hypothesis> hypotheses,
       likelihood_(hypotheses_, options_.contact, options_.lattice, options_.touch_sd),
       space_(arena_.execute([&] { return SearchSpace(hypotheses_, options_); })),
       search_(space_, options_, likelihood_) {
-  if (!options_.slip_sd.none()) {
-    moving_.emplace(space_, options_, likelihood_, hypotheses_);
-  }
   if (options_.none_weight) {
     none_.emplace(space_, options_, likelihood_);
     none_log_weight_ =
@@ -41,9 +38,6 @@ void SearchedTouches::reset() {
   telling_ = 0;
   elements_ = {};
   search_.largest().reset();
-  if (moving_) {
-    moving_->reset();
-  }
   if (none_) {
     none_->reset();
   }
@@ -70,11 +64,7 @@ void SearchedTouches::take_in() {
                                                            ExactBins::most_bytes / touches_.size());
       }
     }
-    if (moving_) {
-      std::ranges::for_each(known, [&](const KnownElements& touch) { moving_->add(touch); });
-    } else {
-      arena_.execute([&] { search_.largest().add(known); });
-    }
+    arena_.execute([&] { search_.largest().add(known); });
     known.insert(known.begin(), std::move(elements_));
     elements_ = merged(known);
     if (none_) {
@@ -96,24 +86,12 @@ std::uint64_t SearchedTouches::bytes() const {
     exact_bins += touch.exact_bins->bytes();
   }
   return exact_bins + likelihood_.bytes() + space_.bytes() + search_.largest().bytes() +
-         (none_ ? none_->bytes() : 0) +
-         static_cast<std::uint64_t>(
-             moving_ ? MovingBelief::bytes_needed(options_, hypotheses_.size()) : 0.0);
+         (none_ ? none_->bytes() : 0);
 }
 
 SearchResult SearchedTouches::search(const SearchGoal& goal, const Deadline& deadline,
                                      const BinVisitor& visitor, std::vector<PoseBlock>* refined) {
-  return arena_.execute([&] {
-    return moving_ ? moving_->find(goal, deadline)
-                   : search_.run(elements_, goal, deadline, visitor, refined);
-  });
-}
-
-void SearchedTouches::visit_moving(const BinVisitor& visitor) {
-  arena_.execute([&] {
-    moving_->take_in(Deadline({}, &options_.cancel_point));
-    moving_->visit(visitor);
-  });
+  return arena_.execute([&] { return search_.run(elements_, goal, deadline, visitor, refined); });
 }
 
 std::vector<DrawnBin> SearchedTouches::draw(std::size_t count, Random& random,
@@ -122,11 +100,7 @@ std::vector<DrawnBin> SearchedTouches::draw(std::size_t count, Random& random,
 }
 
 std::vector<double> SearchedTouches::log_likelihood(std::span<const BinBox> boxes,
-                                                    Arithmetic arithmetic) {
-  if (moving_) {
-    arena_.execute([&] { moving_->take_in(Deadline({}, &options_.cancel_point)); });
-    return moving_->log_likelihood(boxes);
-  }
+                                                    Arithmetic arithmetic) const {
   std::size_t bins = 0;
   for (const BinBox& box : boxes) {
     bins += static_cast<std::size_t>(box.bins());
@@ -134,16 +108,6 @@ std::vector<double> SearchedTouches::log_likelihood(std::span<const BinBox> boxe
   std::vector<double> logs(bins);
   arena_.execute([&] { likelihood_.evaluate(boxes, elements_, arithmetic, logs); });
   return logs;
-}
-
-std::vector<double> SearchedTouches::close_log_likelihood(std::span<const BinBox> boxes) {
-  if (!moving_) {
-    return log_likelihood(boxes, Arithmetic::float32);
-  }
-  return arena_.execute([&] {
-    moving_->take_in(Deadline({}, &options_.cancel_point));
-    return moving_->close_log_likelihood(boxes);
-  });
 }
 
 void SearchedTouches::follow(FollowedBins& bins) const {

@@ -11,7 +11,6 @@
 
 #include "estimation/bounded/evaluated_bins.hpp"
 #include "estimation/bounded/leaves/bin_likelihood.hpp"
-#include "estimation/bounded/moving/moving_belief.hpp"
 #include "estimation/bounded/none_evidence.hpp"
 #include "estimation/bounded/search/bound_search.hpp"
 #include "estimation/bounded/search/search_space.hpp"
@@ -55,8 +54,6 @@ class SearchedTouches {
   /// [hypothesis] log of its prior weight
   const std::vector<double>& log_weight() const { return space_.log_weight; }
   std::size_t finest_level() const { return space_.finest_level(); }
-  /// Whether objects slip between touches.
-  bool moving() const { return moving_.has_value(); }
   /// Whether the options ask for "none of these".
   bool has_none() const { return none_.has_value(); }
   /// Log of the prior weight of "none of these" times the number of bins. Only where has_none().
@@ -69,20 +66,15 @@ class SearchedTouches {
     return arena_.execute(work);
   }
 
-  /// Searches; visits the bins that it evaluates, unless objects slip, whose bins stay in memory.
-  /// @param refined where not null, takes the tiles that were divided, but where objects slip
+  /// Searches; visits the bins that it evaluates.
+  /// @param refined where not null, takes the tiles that were divided
   SearchResult search(const SearchGoal& goal, const Deadline& deadline, const BinVisitor& visitor,
                       std::vector<PoseBlock>* refined = nullptr);
-  /// Visits the bins of objects that slip.
-  void visit_moving(const BinVisitor& visitor);
-  /// Draws bins without a search, see draw_bins(). Not where objects slip.
+  /// Draws bins without a search, see draw_bins().
   std::vector<DrawnBin> draw(std::size_t count, Random& random, const Deadline& deadline) const;
-  /// Log-likelihood of bins, box after box, [y, x] in each, in nats; see MovingBelief where objects
-  /// slip.
-  std::vector<double> log_likelihood(std::span<const BinBox> boxes, Arithmetic arithmetic);
-  /// Log-likelihood as a pose's fit needs it, in float32; see MovingBelief where objects slip.
-  std::vector<double> close_log_likelihood(std::span<const BinBox> boxes);
-  /// Takes one of the touches into the bins of an earlier search. Not where objects slip.
+  /// Log-likelihood of bins, box after box, [y, x] in each, in nats.
+  std::vector<double> log_likelihood(std::span<const BinBox> boxes, Arithmetic arithmetic) const;
+  /// Takes one of the touches into the bins of an earlier search.
   void follow(FollowedBins& bins) const;
   /// Bounds of the log evidence of "none of these" with its prior weight, as SearchResult::mass has
   /// that of the hypotheses, see NoneEvidence::bounds(). Only where has_none().
@@ -97,12 +89,11 @@ class SearchedTouches {
   SearchSpace space_;
   double none_log_weight_ = 0.0;  ///< log of its prior weight times the number of bins
   KeptTouches touches_;
-  std::size_t taken_in_ = 0;            ///< of the touches
-  std::size_t telling_ = 0;             ///< of these, see TouchEvidence::tells()
-  KnownElements elements_;              ///< of all these
-  BoundSearch search_;                  ///< through all these
-  std::optional<MovingBelief> moving_;  ///< through all these, where objects slip
-  std::optional<NoneEvidence> none_;    ///< of all these, where the options ask for it
+  std::size_t taken_in_ = 0;          ///< of the touches
+  std::size_t telling_ = 0;           ///< of these, see TouchEvidence::tells()
+  KnownElements elements_;            ///< of all these
+  BoundSearch search_;                ///< through all these
+  std::optional<NoneEvidence> none_;  ///< of all these, where the options ask for it
   ChangeInSteps change_{"bounded posterior: memory ended in the middle of an update; call reset()"};
 };
 

@@ -40,12 +40,14 @@ double lever_mm(const OccupancyGrid& map, const PoseLattice& region) {
                    (width_mm * width_mm + height_mm * height_mm) / 12.0);
 }
 
-/// How much wider the steps may be where touches are displaced by sd, of the same unit as the step.
-double widening(double sd, double step) {
+/// How much wider the steps may be where touches are displaced and objects slip, by standard
+/// deviations of the same unit as the step.
+double widening(double touch_sd, double slip_sd, double step) {
   // docs/refinement.md holds the measurements behind these numbers.
-  constexpr double of_sd = 0.5;
+  constexpr double of_touch_sd = 0.5;
+  constexpr double of_slip_sd = 1.5;
   constexpr double most = 2.5;
-  return std::clamp(of_sd * sd / step, 1.0, most);
+  return std::clamp(std::max(of_touch_sd * touch_sd, of_slip_sd * slip_sd) / step, 1.0, most);
 }
 
 double count_of(double extent, double step) { return std::max(1.0, std::ceil(extent / step)); }
@@ -54,7 +56,8 @@ double count_of(double extent, double step) { return std::max(1.0, std::ceil(ext
 
 BalancedLattice balanced_lattice(const PoseLattice& region, std::span<const Hypothesis> hypotheses,
                                  std::int64_t most_bins, BinWidth width,
-                                 const DisplacementSd& touch_sd) {
+                                 const DisplacementSd& touch_sd,
+                                 const DisplacementSd& slip_sd) {
   validate_hypotheses(hypotheses);
   PoseLattice lattice = region;
   for (Axis* axis : {&lattice.x_mm, &lattice.y_mm, &lattice.theta_rad}) {
@@ -67,13 +70,15 @@ BalancedLattice balanced_lattice(const PoseLattice& region, std::span<const Hypo
     wanted_mm = std::min(wanted_mm, step_for(hypothesis.map, width));
     longest_mm = std::max(longest_mm, lever_mm(hypothesis.map, region));
   }
-  const DisplacementSd sd = width == BinWidth::fine ? DisplacementSd{} : touch_sd;
-  const double wider = widening(sd.mm, wanted_mm);
+  const bool may_widen = width != BinWidth::fine;
+  const double wider = may_widen ? widening(touch_sd.mm, slip_sd.mm, wanted_mm) : 1.0;
+  const double wider_turns =
+      may_widen ? widening(touch_sd.rad * longest_mm, slip_sd.rad * longest_mm, wanted_mm) : 1.0;
   // Shorter by as much as their steps are wider.
   const double extents_mm[] = {(lattice.x_mm.upper - lattice.x_mm.lower) / wider,
                                (lattice.y_mm.upper - lattice.y_mm.lower) / wider,
                                (lattice.theta_rad.upper - lattice.theta_rad.lower) * longest_mm /
-                                   widening(sd.rad * longest_mm, wanted_mm)};
+                                   wider_turns};
   const auto bins = [&](double step_mm) {
     double product = static_cast<double>(hypotheses.size());
     for (const double extent_mm : extents_mm) {

@@ -25,9 +25,6 @@ struct BoundedOptions {
   /// How far every touch's sensor may have been from where the robot says, as
   /// HistogramOptions::touch_sd: each touch's likelihood is its mean over these places.
   DisplacementSd touch_sd = {};
-  /// How far the object slips between touches, as HistogramOptions::slip_sd. The belief then moves
-  /// with every touch, whose order counts, and memory follows the bins.
-  DisplacementSd slip_sd = {};
   /// Largest total variation distance from the posterior over all bins, in (0, 1). Each estimate()
   /// evaluates as many bins as the tolerance needs. The certificate counts the rounding of float64,
   /// which alone may exceed a tolerance below about 1e-8, or any where there are many hundred
@@ -35,8 +32,6 @@ struct BoundedOptions {
   double tolerance = 1e-6;
   /// Seconds after which estimate() stops and reports what it has proven by then, also where that
   /// is less than the tolerance asks for. By default it takes the time that the tolerance needs.
-  /// With slip_sd, each touch also takes a time of its own, which grows with the bins: some 0.15 s
-  /// for five objects of a million bins each.
   std::optional<double> budget_s = {};
   /// Also bounds each label's log evidence (of all hypotheses that bear it) within this many nats,
   /// however unlikely the label is: for a temperature that is applied later. By default only the
@@ -98,9 +93,10 @@ struct EvaluatedBelief {
 /// bounded from above by tables of the smallest penalty within a window of the map; blocks that
 /// cannot matter are dropped, and the bins of the others are evaluated. Memory follows the maps and
 /// the region, or, where bins lie two cells of a map or more apart, the bins. The result does not
-/// depend on the order of touches (but where objects slip, and that "none of these" counts the
-/// first one's place), on the number of threads or on the processor's vector width, unless a budget
-/// ends the search. An object that was moved from throws Error on every call.
+/// depend on the order of touches (but that "none of these" counts the first one's place), on the
+/// number of threads or on the processor's vector width, unless a budget ends the search. Objects
+/// that slip between touches need PoseHistogram. An object that was moved from throws Error on every
+/// call.
 class PALPATE_API BoundedPosterior {
  public:
   /// Builds the window tables of the maps.
@@ -162,7 +158,7 @@ class PALPATE_API BoundedPosterior {
   /// @throws Error where the list would take more than a quarter of the machine's memory
   EvaluatedBelief evaluated_bins() const;
   /// Log-likelihood of any pose of an object in nats, in float64, without prior weights. With
-  /// touch_sd or slip_sd, of the bin that the pose lies in; with slip_sd, an upper bound.
+  /// touch_sd, of the bin that the pose lies in.
   /// @throws Error if there is no such object or the pose is not finite
   double log_likelihood(int object, const Pose& T_object_robot) const;
 

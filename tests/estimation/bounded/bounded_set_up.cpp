@@ -43,8 +43,7 @@ HistogramOptions dense_options(const BoundedOptions& options) {
   return {.lattice = options.lattice,
           .contact = options.contact,
           .none_weight = options.none_weight,
-          .touch_sd = options.touch_sd,
-          .slip_sd = options.slip_sd};
+          .touch_sd = options.touch_sd};
 }
 
 void expect_as_dense(BoundedPosterior& bounded, PoseHistogram& dense, std::size_t touches) {

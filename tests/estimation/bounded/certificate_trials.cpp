@@ -80,30 +80,6 @@ Trial make_displaced_trial(const std::array<int, 3>& bins, std::uint64_t seed) {
   return trial;
 }
 
-Trial make_slipping_trial(const std::array<int, 3>& bins, std::uint64_t seed) {
-  Trial trial = make_displaced_trial(bins, seed);
-  trial.options.slip_sd = trial.options.touch_sd;
-  Uniform random(seed + 2);
-  if (random(0.0, 3.0) < 2.0) {
-    trial.options.touch_sd = {};
-  }
-  return trial;
-}
-
-Trial make_long_slipping_trial(const std::array<int, 3>& bins, std::uint64_t seed) {
-  Trial trial = make_trial(bins, seed);
-  Uniform random(seed + 2);
-  trial.objects = {{map_of(on_letter_l, "L"), 1.0},
-                   {map_of(on_disc, "disc"), 0.5},
-                   {random_map(31, 27, 0.5, 4.0, seed), 1.0}};
-  trial.recording =
-      touches_of(on_letter_l, {{random(-3.0, 3.0), random(-3.0, 3.0)}, 1.0}, 20, seed);
-  trial.options.contact.gamma = 0.1;
-  trial.options.tolerance = 1e-6;
-  trial.options.slip_sd = {.mm = random(0.3, 1.0), .rad = random(0.0, 0.2)};
-  return trial;
-}
-
 void expect_certified_within(Trial trial, std::initializer_list<double> budgets_s) {
   const reference::Posterior truth =
       reference_posterior(trial.objects, trial.options, all_touches(trial.recording));

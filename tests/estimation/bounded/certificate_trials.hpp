@@ -25,11 +25,6 @@ Trial make_trial(const std::array<int, 3>& bins, std::uint64_t seed);
 /// bin.
 Trial make_displaced_trial(const std::array<int, 3>& bins, std::uint64_t seed);
 
-/// A trial as make_trial() has it where objects slip, some of them between displaced touches.
-Trial make_slipping_trial(const std::array<int, 3>& bins, std::uint64_t seed);
-
-/// Three objects that slip between 20 touches of the first, after which few bins matter.
-Trial make_long_slipping_trial(const std::array<int, 3>& bins, std::uint64_t seed);
 
 Recording first_touches(const Recording& recording, std::size_t touches);
 

@@ -63,8 +63,7 @@ reference::Posterior reference_posterior(std::span<const Hypothesis> objects,
   return reference_posterior(objects,
                              HistogramOptions{.lattice = options.lattice,
                                               .contact = options.contact,
-                                              .touch_sd = options.touch_sd,
-                                              .slip_sd = options.slip_sd},
+                                              .touch_sd = options.touch_sd},
                              touches);
 }
 
@@ -161,10 +160,7 @@ Certified expect_certified(const BoundedPosterior& posterior, std::span<const Hy
 
   const auto object = static_cast<std::size_t>(estimate.mode.object);
   const double at_mode = truth.log_likelihood[object][static_cast<std::size_t>(*estimate.mode.bin)];
-  // What slips took from the object's mass is known as well as the mass.
-  const LogInterval& own = certificate.log_evidence[object];
-  EXPECT_NEAR(estimate.mode.log_likelihood, at_mode,
-              nats + (options.slip_sd.none() ? 0.0 : own.high - own.low));
+  EXPECT_NEAR(estimate.mode.log_likelihood, at_mode, nats);
   if (!options.budget_s || certificate.mode_certain) {
     EXPECT_GE(prior[object] + at_mode, top - 2.0 * nats) << "not the best bin";
   }
@@ -175,10 +171,7 @@ Certified expect_certified(const BoundedPosterior& posterior, std::span<const Hy
           static_cast<std::size_t>(random(0.0, static_cast<double>(options.lattice.bins())));
       const Pose pose = reference::bin_pose(options.lattice, static_cast<std::int64_t>(bin));
       const double log_likelihood = posterior.log_likelihood(static_cast<int>(i), pose);
-      EXPECT_GE(log_likelihood, truth.log_likelihood[i][bin] - nats);
-      if (options.slip_sd.none()) {
-        EXPECT_LE(log_likelihood, truth.log_likelihood[i][bin] + nats);
-      }
+      EXPECT_NEAR(log_likelihood, truth.log_likelihood[i][bin], nats);
     }
   }
   return seen;

@@ -66,13 +66,6 @@ TEST(SearchMemory, GrowsWithWhatIsAskedFor) {
   BoundedOptions with_none = options_of(square(10.0, 200, 100));
   with_none.none_weight = 1.0;
   EXPECT_GT(search_memory(maps, with_none).thetas, few.thetas);
-  BoundedOptions slips = options_of(square(10.0, 200, 100));
-  slips.slip_sd.mm = 1.0;
-  const double bins_in_all = 200.0 * 200.0 * 100.0 * 2.0;
-  const double moving = search_memory(maps, slips).means;
-  EXPECT_GT(moving, 3.0 * sizeof(double) * bins_in_all);
-  slips.budget_s = 1.0;
-  EXPECT_GT(search_memory(maps, slips).means, moving + 2.0 * bins_in_all) << "tiles are ranked";
 }
 
 TEST(SearchMemory, IsRefusedAboveTheLimit) {

@@ -145,6 +145,14 @@ TEST(BalancedLattice, FollowsUncertainTouchesUpToTwoAndAHalfSteps) {
   const BalancedLattice turned = lattice({.mm = 0.0, .rad = 3.0 * step_rad});
   EXPECT_DOUBLE_EQ(turned.step_mm, 0.6);
   EXPECT_NEAR(turned.lattice.theta_rad.step(), 1.5 * step_rad, 0.02 * step_rad);
+  const auto slipping = [](const DisplacementSd& touch_sd, const DisplacementSd& slip_sd) {
+    return balanced_lattice({}, letters(), most_balanced_bins, BinWidth::automatic, touch_sd,
+                            slip_sd);
+  };
+  EXPECT_DOUBLE_EQ(slipping({}, {.mm = 0.5}).step_mm, 0.75) << "one and a half of a slip";
+  EXPECT_DOUBLE_EQ(slipping({.mm = 2.0}, {.mm = 0.5}).step_mm, 1.0) << "the wider of both";
+  EXPECT_NEAR(slipping({}, {.rad = step_rad}).lattice.theta_rad.step(), 1.5 * step_rad,
+              0.02 * step_rad);
   const BalancedLattice fine = lattice({.mm = 9.0, .rad = 1.0}, BinWidth::fine);
   EXPECT_EQ(fine.lattice.bins(), fine_lattice({}, letters()).lattice.bins()) << "for the mode";
 }

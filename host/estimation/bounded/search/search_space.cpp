@@ -29,7 +29,7 @@ SearchSpace::SearchSpace(std::span<const Hypothesis> hypotheses, const BoundedOp
     maps.push_back(std::move(shape));
   }
   const std::vector<TileSize> sizes = tile_sizes(options.lattice, least_cell_mm, hypotheses.size(),
-                                                 options.touch_sd, !options.slip_sd.none());
+                                                 options.touch_sd);
   if (!options.touch_sd.none()) {
     displacement = std::make_unique<DisplacementWeights>(options.lattice, options.touch_sd);
     for (const TileSize& size : sizes) {

@@ -130,10 +130,7 @@ TileAxis tile_axis(const Axis& axis, double side_mm) {
 }  // namespace
 
 std::vector<TileSize> tile_sizes(const PoseLattice& lattice, double least_cell_mm, std::size_t maps,
-                                 const DisplacementSd& touch_sd, bool slips) {
-  if (slips) {
-    return {tile_of_bins(lattice, least_cell_mm, slip_tile_bins)};
-  }
+                                 const DisplacementSd& touch_sd) {
   if (!touch_sd.none()) {
     return sizes_in_bins(lattice, least_cell_mm, maps, touch_sd);
   }

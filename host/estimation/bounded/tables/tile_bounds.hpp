@@ -97,16 +97,11 @@ struct TileLevel {
 /// the level before, so that a batch of 4 x 4 tiles makes up one tile. Where bins are few and lie
 /// cells apart, there is one level, of single bins: larger tiles would leave out few of them, and
 /// bound them loosely. Where touches are displaced, all tiles have whole bins, and the smallest are
-/// about half as wide as the standard deviation. Where objects slip, there is one level, of 4 x 4
-/// bins.
+/// about half as wide as the standard deviation.
 /// @param least_cell_mm of the maps
 /// @param touch_sd how far touches may be displaced
-/// @param slips whether objects slip
 std::vector<TileSize> tile_sizes(const PoseLattice& lattice, double least_cell_mm, std::size_t maps,
-                                 const DisplacementSd& touch_sd = {}, bool slips = false);
-
-/// Bins of a tile along x and y where objects slip.
-constexpr int slip_tile_bins = 4;
+                                 const DisplacementSd& touch_sd = {});
 
 /// The squares of a level over a map of this cell.
 glm::dvec2 square_mm(const TileSize& size, const PoseLattice& lattice, double cell_mm);
