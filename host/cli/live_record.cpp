@@ -62,23 +62,23 @@ std::string plan_line(const LiveTouch& touch) {
 // Lines are printed as touches come, so columns cannot be as wide as their content.
 std::string table_heading(const RecognitionTask& task) {
   return fmt::format(
-      "{:>7}  {:>5}  {:<10}  {:>5}{}  {:>7}  {:>14}  {:>14}  {:>15}  {:>8}  {:>10}  {:>8}  fit",
+      "{:>7}  {:>5}  {:<10}  {:>5}{}  {:>7}  {:>14}  {:>14}  {:>15}  {:>8}  {:>10}  {:>9}  fit",
       "unknown", "touch", "best", "prob.", dropped_cell("dropped", task), "at pose", "x mm", "y mm",
-      "theta deg", "error mm", "latency ms", "surprise");
+      "theta deg", "error mm", "latency ms", "touch's z");
 }
 
 std::string table_line(const LiveTouch& touch, const RecognitionTask& task) {
   const RecognitionStep& step = touch.step;
   const std::array<std::string, 3> pose = pose_cells(pose_text(step));
   const std::string fit = fit_words(step);
-  const std::string surprise = surprise_text(step);
+  const std::string touch_fit = touch_fit_text(step);
   return fmt::format(
-      "{:>7}  {:>5}  {:<10}  {:>5.3f}{}  {:>7}  {:>14}  {:>14}  {:>15}  {:>8}  {:>10.2f}  {:>8}  "
+      "{:>7}  {:>5}  {:<10}  {:>5.3f}{}  {:>7}  {:>14}  {:>14}  {:>15}  {:>8}  {:>10.2f}  {:>9}  "
       "{}",
       touch.unknown + 1, touch.index + 1, object_words(step, task), step.confidence(),
       dropped_cell(dropped_text(step), task), share_text(step, task, "-"), pose[0], pose[1],
       pose[2], error_text(step.pose_error_mm()), touch.latency_ms,
-      surprise.empty() ? "-" : surprise,
+      touch_fit.empty() ? "-" : touch_fit,
       (fit.empty() ? "-" : fit) + (step.decision.act ? ", act" : ""));
 }
 

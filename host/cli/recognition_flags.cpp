@@ -98,7 +98,7 @@ void add_recognition_flags(CLI::App& command, Request& request, bool& verbose) {
       command, "--bins", request.bins,
       "Pose bins per object along x, y and theta, as 25x25x16; auto: as many as the refined pose "
       "needs, in steps of 0.6 times the maps' cell or 1.2 times the sensor's spread, whichever is "
-      "larger, widened to half of --touch-sd-* or one and a half of --slip-sd-*, but at most 2.5 "
+      "larger, widened to half of --touch-sd-* or five quarters of --slip-sd-*, but at most 2.5 "
       "times; fine: also as the mode "
       "needs, in steps of 0.6 times the larger of both. Auto and fine take wider steps where the "
       "histogram's device memory is short; the region about an automatic pivot fits the largest "

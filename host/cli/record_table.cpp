@@ -184,7 +184,7 @@ std::string trace_table(const RecognitionRecord& record, const RecognitionTask& 
                    {"theta deg", true},
                    {"error mm", true},
                    {"effective particles", true},
-                   {"surprise", true},
+                   {"touch's z", true},
                    {"fit"}});
   for (std::size_t i = 0; i < record.trace.size(); ++i) {
     const RecognitionStep& step = record.trace[i];
@@ -193,7 +193,7 @@ std::string trace_table(const RecognitionRecord& record, const RecognitionTask& 
     table.add({fmt::format("{}", i + 1), object_words(step, task),
                fmt::format("{:.3f}", step.confidence()), dropped_text(step), share_text(step, task),
                pose[0], pose[1], pose[2], step.right ? error_text(step.pose_error_mm()) : "",
-               particles ? fmt::format("{:.1f}", *particles) : "", surprise_text(step),
+               particles ? fmt::format("{:.1f}", *particles) : "", touch_fit_text(step),
                fit_words(step)});
   }
   const std::string truth = truth_words(record.last());

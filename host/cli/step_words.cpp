@@ -206,8 +206,9 @@ std::string unproven_sentence(const RecognitionStep& step, const RecognitionTask
                                      100.0 * step.confidence(), least, most, left);
 }
 
-std::string surprise_text(const RecognitionStep& step) {
-  return step.surprise ? fmt::format("{:+.1f}", *step.surprise) : "";
+std::string touch_fit_text(const RecognitionStep& step) {
+  const bool told = !step.touch_fit.empty() && step.touch_fit.back();
+  return told ? fmt::format("{:+.1f}", *step.touch_fit.back()) : "";
 }
 
 std::string share_text(const RecognitionStep& step, const RecognitionTask& task,

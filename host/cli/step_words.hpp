@@ -71,9 +71,9 @@ std::string dropped_text(const RecognitionStep& step);
 /// search. "" where it proves enough.
 std::string unproven_sentence(const RecognitionStep& step, const RecognitionTask& task);
 
-/// The surprise of the last touch in standard deviations, with its sign: "+2.3"; "" where there is
-/// none.
-std::string surprise_text(const RecognitionStep& step);
+/// The z of the last touch by itself, RecognitionStep::touch_fit, with its sign: "-2.3"; "" where
+/// there is none.
+std::string touch_fit_text(const RecognitionStep& step);
 
 /// share_at_pose() for a table: "0.152", `else_text` where there is none.
 std::string share_text(const RecognitionStep& step, const RecognitionTask& task,

@@ -289,7 +289,7 @@ class FoldTrial {
                             const std::optional<Pose>& T_object_robot) const {
     if (T_object_robot) {
       return evidence_fit(press, *T_object_robot, compared(scores[truth].best_map),
-                          contact_for(truth), 0);
+                          contact_for(truth), {}, 0);
     }
     std::vector<std::size_t> labels = others_of(truth, scores);
     labels.insert(labels.begin(), truth);  // the best where another is as good

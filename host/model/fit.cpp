@@ -15,21 +15,16 @@ namespace palpate {
 
 namespace {
 
-/// Sums over the known elements.
-struct Sums {
-  double deviation = 0.0;  ///< of the log-likelihood from its predicted mean, in nats
-  double variance = 0.0;   ///< predicted
-
-  /// @param log_p [level] log-likelihood of each reading, in nats
-  void add(Reading reading, std::span<const double> log_p) {
-    const PredictedReading predicted = predicted_reading(log_p);
-    deviation += log_p[static_cast<std::size_t>(reading)] - predicted.most - predicted.below_most;
-    for (std::size_t level = 0; level < log_p.size(); ++level) {
-      const double from_mean = log_p[level] - predicted.most - predicted.below_most;
-      variance += predicted.probability[level] * from_mean * from_mean;
-    }
+/// @param log_p [level] log-likelihood of each reading of an element, in nats
+void add(FitSums& sums, Reading reading, std::span<const double> log_p) {
+  const PredictedReading predicted = predicted_reading(log_p);
+  const double mean = predicted.most + predicted.below_most;
+  sums.deviation += log_p[static_cast<std::size_t>(reading)] - mean;
+  for (std::size_t level = 0; level < log_p.size(); ++level) {
+    const double from_mean = log_p[level] - mean;
+    sums.variance += predicted.probability[level] * from_mean * from_mean;
   }
-};
+}
 
 Verdict verdict_on(double z, double fits_from = fits_from_z,
                    double doubtful_from = doubtful_from_z) {
@@ -109,7 +104,7 @@ FitScale pooled(std::span<const FitScale> objects) {
 std::optional<Fit> fit_of(std::span<const Touch> touches, const Pose& T_object_robot,
                           const OccupancyGrid& map, const ContactModel& contact,
                           std::size_t object) {
-  return evidence_fit(evidence_of(touches, contact), T_object_robot, map, contact, object);
+  return fit_of(touches, T_object_robot, map, contact, {}, object);
 }
 
 std::optional<Fit> fit_of(std::span<const Touch> touches, const Pose& T_object_robot,
@@ -122,9 +117,33 @@ std::optional<Fit> fit_of(std::span<const Touch> touches, const Pose& T_object_r
 std::optional<Fit> evidence_fit(std::span<const TouchEvidence> touches, const Pose& T_object_robot,
                                 const OccupancyGrid& map, const ContactModel& contact,
                                 const DisplacementSd& touch_sd, std::size_t object) {
-  if (touch_sd.none()) {
-    return evidence_fit(touches, T_object_robot, map, contact, object);
+  return fit_of(fit_sums(touches, T_object_robot, map, contact, touch_sd, object));
+}
+
+std::optional<Fit> fit_of(std::span<const std::optional<FitSums>> sums) {
+  FitSums all;
+  bool any_known = false;
+  for (const std::optional<FitSums>& touch : sums) {
+    if (touch) {
+      all.deviation += touch->deviation;
+      all.variance += touch->variance;
+      any_known = true;
+    }
   }
+  if (!any_known) {
+    return {};
+  }
+  // Where nothing else is possible, readings may be as predicted with a variance of 0.
+  const double z = all.deviation == 0.0 ? 0.0
+                                        : std::clamp(all.deviation / std::sqrt(all.variance),
+                                                     -largest_fit_z, largest_fit_z);
+  return Fit{.z = z, .verdict = verdict_on(z)};
+}
+
+std::vector<std::optional<FitSums>> fit_sums(std::span<const TouchEvidence> touches,
+                                             const Pose& T_object_robot, const OccupancyGrid& map,
+                                             const ContactModel& contact,
+                                             const DisplacementSd& touch_sd, std::size_t object) {
   constexpr std::size_t points = 128;  // log means of letters within 0.1 nats, sd 1 mm and 0.05 rad
   constexpr std::size_t draws = 64;    // the mean of z is out by 1 / sqrt(draws) at most
   constexpr std::uint64_t seed = 0;
@@ -133,63 +152,37 @@ std::optional<Fit> evidence_fit(std::span<const TouchEvidence> touches, const Po
   const InterpolatedMap interpolated(map, *model.prior);
   const std::vector<Pose> displacements = displacement_points(touch_sd, points);
   Random random(seed, Stream::readings);
-  Moments all;
-  double judged = 0.0;
-  bool any_known = false;
-  for (const TouchEvidence& touch : touches) {
-    const TouchEvidence known = touch.known();
-    if (known.readings.empty()) {
-      continue;
-    }
-    any_known = true;
+  const auto displaced = [&](const TouchEvidence& known, const Pose& T_object_sensor) {
     std::vector<Pose> drawn(draws);
     for (Pose& displacement : drawn) {
       displacement = random_displacement(touch_sd, random);
     }
-    const Pose T_object_sensor = T_object_robot * touch.T_robot_sensor;
     const ReadingMixture judge =
         mixture_of(known.elements_mm, T_object_sensor, displacements, interpolated, model, object);
     const ReadingMixture source =
         mixture_of(known.elements_mm, T_object_sensor, drawn, interpolated, model, object);
     const Moments predicted = predicted_log_mean(judge, source, random);
-    judged += judge.log_mean(known.readings);
-    all.mean += predicted.mean;
-    all.variance += predicted.variance;
-  }
-  if (!any_known) {
-    return {};
-  }
-  const double z = all.deviations(judged);
-  return Fit{.z = z, .verdict = verdict_on(z)};
-}
-
-std::optional<Fit> evidence_fit(std::span<const TouchEvidence> touches, const Pose& T_object_robot,
-                                const OccupancyGrid& map, const ContactModel& contact,
-                                std::size_t object) {
-  ContactModel model = contact;
-  model.prior = contact.prior.value_or(map.prior);
-  const InterpolatedMap interpolated(map, *model.prior);
-  const std::size_t levels = reading_levels(model);
-  Sums sums;
-  bool any_known = false;
-  for (const TouchEvidence& touch : touches) {
-    const std::vector<double> logs = reading_log_likelihoods(
-        touch.elements_mm, T_object_robot * touch.T_robot_sensor, interpolated, model, object);
-    for (std::size_t e = 0; e < touch.readings.size(); ++e) {
-      if (touch.readings[e] != Reading::unknown) {
-        sums.add(touch.readings[e], std::span(logs).subspan(e * levels, levels));
-        any_known = true;
-      }
+    return FitSums{judge.log_mean(known.readings) - predicted.mean, predicted.variance};
+  };
+  const auto exact = [&](const TouchEvidence& known, const Pose& T_object_sensor) {
+    const std::size_t levels = reading_levels(model);
+    const std::vector<double> logs =
+        reading_log_likelihoods(known.elements_mm, T_object_sensor, interpolated, model, object);
+    FitSums sums;
+    for (std::size_t e = 0; e < known.readings.size(); ++e) {
+      add(sums, known.readings[e], std::span(logs).subspan(e * levels, levels));
     }
+    return sums;
+  };
+  std::vector<std::optional<FitSums>> sums;
+  for (const TouchEvidence& touch : touches) {
+    const TouchEvidence known = touch.known();
+    const Pose T_object_sensor = T_object_robot * touch.T_robot_sensor;
+    sums.push_back(known.readings.empty() ? std::optional<FitSums>()
+                   : touch_sd.none()      ? exact(known, T_object_sensor)
+                                          : displaced(known, T_object_sensor));
   }
-  if (!any_known) {
-    return {};
-  }
-  // Where nothing else is possible, readings may be as predicted with a variance of 0.
-  const double z = sums.deviation == 0.0 ? 0.0
-                                         : std::clamp(sums.deviation / std::sqrt(sums.variance),
-                                                      -largest_fit_z, largest_fit_z);
-  return Fit{.z = z, .verdict = verdict_on(z)};
+  return sums;
 }
 
 }  // namespace palpate

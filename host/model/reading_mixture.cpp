@@ -78,12 +78,6 @@ PredictedTouches::DrawnTouch PredictedTouches::draw(std::size_t hypothesis, Rand
   return touch;
 }
 
-double Moments::deviations(double value) const {
-  return value == mean
-             ? 0.0
-             : std::clamp((value - mean) / std::sqrt(variance), -largest_fit_z, largest_fit_z);
-}
-
 Moments predicted_log_mean(const ReadingMixture& judge, const ReadingMixture& source,
                            Random& random) {
   const std::size_t n = source.hypotheses();

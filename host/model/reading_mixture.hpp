@@ -74,10 +74,6 @@ class PredictedTouches {
 struct Moments {
   double mean = 0.0;
   double variance = 0.0;
-
-  /// Standard deviations by which a value exceeds the mean, within +-`largest_fit_z`; 0 at the
-  /// mean.
-  double deviations(double value) const;
 };
 
 /// Mean and variance of `judge.log_mean()` over touches as `source` predicts them: one touch is

@@ -62,10 +62,20 @@ std::span<const TouchEvidence> evidence_of(std::span<const Touch> touches,
 /// @param threshold of the classifier
 PressFeatures features_of(const TouchEvidence& touch, double threshold);
 
+/// What one touch adds to the sums of fit_of().
+struct FitSums {
+  double deviation = 0.0;  ///< of the log-likelihood from its predicted mean, in nats
+  double variance = 0.0;   ///< predicted
+};
+/// The sums of fit_of() of each touch, which is classified by `contact`, [touch]; none of a touch
+/// without a known element.
+std::vector<std::optional<FitSums>> fit_sums(std::span<const TouchEvidence> touches,
+                                             const Pose& T_object_robot, const OccupancyGrid& map,
+                                             const ContactModel& contact,
+                                             const DisplacementSd& touch_sd, std::size_t object);
+/// The fit of these touches together; none where no element is known.
+std::optional<Fit> fit_of(std::span<const std::optional<FitSums>> sums);
 /// fit_of() of touches that are classified by `contact`.
-std::optional<Fit> evidence_fit(std::span<const TouchEvidence> touches, const Pose& T_object_robot,
-                                const OccupancyGrid& map, const ContactModel& contact,
-                                std::size_t object);
 std::optional<Fit> evidence_fit(std::span<const TouchEvidence> touches, const Pose& T_object_robot,
                                 const OccupancyGrid& map, const ContactModel& contact,
                                 const DisplacementSd& touch_sd, std::size_t object);

@@ -26,8 +26,8 @@ using FilterOptions = std::variant<HistogramOptions, BoundedOptions, ParticleOpt
 
 /// What a filter can tell, and what others than the filter itself ask of its options.
 struct FilterTraits {
-  /// Believes in bins of a lattice, and so has a refined pose, a log-likelihood of the mode, plans,
-  /// and beliefs that a touch may surprise. Particles have none: motion noise comes between.
+  /// Believes in bins of a lattice, and so has a refined pose, a log-likelihood of the mode and
+  /// plans. Particles have none: motion noise comes between.
   bool bins = false;
   /// Evaluates every bin, in the device's memory, as soon as a touch comes. Posteriors of every bin
   /// need it.

@@ -188,8 +188,7 @@ ChosenFilter choose_filter(const FilterWish& wish, const Request& request,
   if (wish.kind == FilterKind::histogram) {
     by.push_back(wish.by);
   }
-  return {histogram, by.empty() && !slips,
-          slips ? "" : fmt::format("{}", fmt::join(by, " and "))};
+  return {histogram, by.empty() && !slips, slips ? "" : fmt::format("{}", fmt::join(by, " and "))};
 }
 
 void require_within_region(const Request& request, const PoseLattice& lattice) {

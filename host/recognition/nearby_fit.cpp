@@ -12,7 +12,7 @@ std::optional<Fit> best_fit_near(std::span<const TouchEvidence> touches, const P
                                  std::size_t object) {
   constexpr double step_mm = 0.5;
   constexpr double step_rad = 0.04 * std::numbers::pi;
-  std::optional<Fit> best = evidence_fit(touches, T_object_robot, map, contact, object);
+  std::optional<Fit> best = evidence_fit(touches, T_object_robot, map, contact, {}, object);
   if (!best) {
     return {};
   }
@@ -27,7 +27,7 @@ std::optional<Fit> best_fit_near(std::span<const TouchEvidence> touches, const P
         const double turn_rad = sign * move.z;
         const Pose moved =
             Pose{shift_mm + middle_mm - rotate(turn_rad, middle_mm), turn_rad} * best_pose;
-        const std::optional<Fit> fit = evidence_fit(touches, moved, map, contact, object);
+        const std::optional<Fit> fit = evidence_fit(touches, moved, map, contact, {}, object);
         if (fit->z > best->z) {
           best = fit;
           best_pose = moved;

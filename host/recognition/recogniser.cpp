@@ -85,8 +85,4 @@ void Recogniser::prepare(const Touch& touch) {
   filter_->prepare(evidence);
 }
 
-const SurpriseJudge& Recogniser::surprise_judge(const RecognitionTask& task) {
-  return surprise_judge_ ? *surprise_judge_ : surprise_judge_.emplace(task);
-}
-
 }  // namespace palpate

@@ -11,7 +11,6 @@
 #include "model/touch_evidence.hpp"
 #include "recognition/filter.hpp"
 #include "recognition/recognition_task.hpp"
-#include "recognition/surprise.hpp"
 #include "recognition/touch_places.hpp"
 
 namespace palpate {
@@ -63,8 +62,6 @@ class Recogniser {
   /// All touches since reset(), in order, those that wait for an automatic pivot included; weighed
   /// by place where RecognitionTask::by_place says so.
   std::span<const TouchEvidence> evidence() const { return evidence_; }
-  /// Judges touches by the recogniser's task; made at the first call. Not for particles.
-  const SurpriseJudge& surprise_judge(const RecognitionTask& task);
   /// See Filter::marginals().
   Marginals marginals(int object) const { return filter_->marginals(object, lattice_); }
   /// See Filter::likely_bins().
@@ -105,7 +102,6 @@ class Recogniser {
   bool pivot_placed_ = false;            ///< by a touch since reset(); only where it is automatic
   std::vector<TouchEvidence> evidence_;  ///< in order; waits where the pivot lacks
   bool touched_ = false;                 ///< since reset()
-  std::optional<SurpriseJudge> surprise_judge_;
   std::unique_ptr<Filter> filter_;
 };
 

@@ -18,7 +18,6 @@
 #include "recognition/nearby_fit.hpp"
 #include "recognition/placement_judge.hpp"
 #include "recognition/scaled_pose.hpp"
-#include "recognition/surprise.hpp"
 #include "recognition/warnings.hpp"
 
 namespace palpate {
@@ -55,50 +54,6 @@ using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
-}
-
-struct Updated {
-  std::optional<double> surprise;  ///< of the last touch
-  double seconds = 0.0;            ///< wall time without that of the surprises
-};
-
-/// Recogniser::update(), and the surprises of the last touches.
-Updated update(Recogniser& recogniser, const RecognitionTask& task, std::span<const Touch> touches,
-               const std::function<void(double)>& progress) {
-  constexpr std::uint64_t seed = 0;
-  const FilterTraits traits = traits_of(task.filter);
-  // Nothing but the prior comes before the first touch.
-  const std::size_t before = recogniser.touched() ? 0 : 1;
-  const std::size_t one_by_one =
-      traits.bins ? std::min(surprises_judged, touches.size() - std::min(before, touches.size()))
-                  : 0;
-  Updated updated;
-  const auto take = [&](std::size_t begin, std::size_t end) {
-    const Clock::time_point start = Clock::now();
-    const auto show = [&, n = static_cast<double>(touches.size())](double fraction) {
-      // Bounds have only kept the touches, and search when they are asked about the belief.
-      const double taken = traits.certificate ? 0.0 : fraction;
-      progress((static_cast<double>(begin) + taken * static_cast<double>(end - begin)) / n);
-    };
-    recogniser.update(touches.subspan(begin, end - begin),
-                      progress ? std::function<void(double)>(show) : progress);
-    updated.seconds += seconds_since(start);
-  };
-  const std::size_t together = touches.size() - one_by_one;
-  if (together > 0) {
-    take(0, together);
-  }
-  for (std::size_t i = together; i < touches.size(); ++i) {
-    std::vector<PoseSample> samples;
-    if (recogniser.touched()) {
-      samples = recogniser.sample(surprise_samples(touches[i].elements_mm.size()), seed);
-    }
-    take(i, i + 1);
-    updated.surprise = samples.empty() ? std::nullopt
-                                       : recogniser.surprise_judge(task).surprise_of(
-                                             recogniser.evidence().back(), samples);
-  }
-  return updated;
 }
 
 /// The touch that tells something where it is the only one; else null.
@@ -162,20 +117,39 @@ ProbabilityInterval known_bounds(const Estimate& estimate, std::span<const Touch
   return {probability(estimate.mode.log_likelihood, lead.low), probability(best, lead.high)};
 }
 
-/// RecognitionStep::fit
-std::optional<Fit> fit_of(const Mode& mode, const std::optional<RefinedPose>& refined,
-                          std::span<const TouchEvidence> touches, const RecognitionTask& task) {
-  const auto in_contact = std::ranges::count_if(touches, &TouchEvidence::in_contact);
+/// RecognitionStep::fit and RecognitionStep::touch_fit.
+struct StepFit {
+  std::optional<Fit> fit = {};
+  std::vector<std::optional<double>> touches = {};
+};
+
+StepFit fit_of(const Mode& mode, const std::optional<RefinedPose>& refined,
+               std::span<const TouchEvidence> touches, const RecognitionTask& task) {
+  const auto in_contact =
+      static_cast<std::size_t>(std::ranges::count_if(touches, &TouchEvidence::in_contact));
   if (in_contact == 0) {
     return {};
   }
   const auto object = static_cast<std::size_t>(mode.object);
   const OccupancyGrid& map = task.hypotheses[object].compared();
-  const std::optional<Fit> fit =
-      refined ? evidence_fit(touches, refined->T_object_robot, map, task.contact(), task.touch_sd(),
-                             object)
-              : best_fit_near(touches, mode.T_object_robot, map, task.contact(), object);
-  return task.fit_scale_for(touches).of(fit.value(), static_cast<std::size_t>(in_contact));
+  const FitScale scale = task.fit_scale_for(touches);
+  if (!refined) {
+    const std::optional<Fit> fit =
+        best_fit_near(touches, mode.T_object_robot, map, task.contact(), object);
+    return {.fit = scale.of(fit.value(), in_contact)};
+  }
+  const std::vector<std::optional<FitSums>> sums =
+      fit_sums(touches, refined->T_object_robot, map, task.contact(), task.touch_sd(), object);
+  StepFit result{.fit = scale.of(palpate::fit_of(sums).value(), in_contact)};
+  FitScale of_one = scale;
+  if (in_contact > 1) {
+    of_one.alone.reset();  // the pose is that of all touches
+  }
+  for (const std::optional<FitSums>& touch : sums) {
+    const std::optional<Fit> fit = palpate::fit_of(std::span(&touch, 1));
+    result.touches.push_back(fit ? std::optional(of_one.of(*fit, 1).z) : std::nullopt);
+  }
+  return result;
 }
 
 /// RecognitionStep::refined
@@ -253,8 +227,8 @@ RecognitionStep judge(const Estimate& estimate, const PartialTruth& truth,
                       const RecognitionTask& task, std::span<const TouchEvidence> touches,
                       const std::optional<RefinedPose>& refined) {
   const std::vector<std::string>& labels = task.labels;
-  const std::optional<Fit> fit = fit_of(estimate.mode, refined, touches, task);
-  const Tempering tempering = tempering_of(touches, task, fit);
+  StepFit fit = fit_of(estimate.mode, refined, touches, task);
+  const Tempering tempering = tempering_of(touches, task, fit.fit);
   const std::optional<double> known = known_of(estimate, touches, task);
   RecognitionStep step{.identity = label_probabilities(estimate, tempering, task, known),
                        .mode = estimate.mode,
@@ -263,7 +237,8 @@ RecognitionStep judge(const Estimate& estimate, const PartialTruth& truth,
                        .truth = in_frame_of_map(task, truth),
                        .symmetry = task.hypotheses[estimate.mode.object].map.symmetry,
                        .body = task.bodies[estimate.mode.object],
-                       .fit = fit,
+                       .fit = fit.fit,
+                       .touch_fit = std::move(fit.touches),
                        .known = known};
   if (estimate.certificate) {
     step.identity_bounds =
@@ -285,16 +260,17 @@ RecognitionStep take_step(Recogniser& recogniser, const RecognitionTask& task,
                           std::span<const Touch> touches, const PartialTruth& truth,
                           const std::function<void(double)>& progress,
                           std::optional<double> tolerance) {
-  const Updated updated = update(recogniser, task, touches, progress);
   const Clock::time_point start = Clock::now();
+  // Bounds only keep the touches, and search when they are asked for the estimate.
+  const bool searches = traits_of(task.filter).certificate;
+  recogniser.update(touches, searches ? std::function<void(double)>() : progress);
   const Estimate estimate = recogniser.estimate(tolerance);
-  const double seconds = updated.seconds + seconds_since(start);
+  const double seconds = seconds_since(start);
   const std::span<const TouchEvidence> evidence = recogniser.evidence();
   const Clock::time_point estimated = Clock::now();
   const std::optional<RefinedPose> refined = refined_near(estimate.mode, recogniser, task);
   const double refine_seconds = seconds_since(estimated);
   RecognitionStep step = judge(estimate, truth, task, evidence, refined);
-  step.surprise = updated.surprise;
   step.seconds = seconds;
   step.refine_seconds = refine_seconds;
   step.symmetry = symmetry_told(recogniser, task, step);
@@ -307,9 +283,17 @@ RecognitionStep take_step(Recogniser& recogniser, const RecognitionTask& task,
     if (auto warning = turned_alike(task, step)) {
       step.warnings.push_back(*std::move(warning));
     }
-    if (const auto placement = judge_placement(recogniser, estimate, task, step)) {
+    const auto placement = judge_placement(recogniser, estimate, task, step);
+    auto unlike = unlike_touches(evidence, task, step);
+    // One touch that is far off looks as if all were a little, but for its own fit.
+    if (placement && (placement->moved_after > 0 || !unlike)) {
       step.decision = {false, placement_words(*placement, task)};
       step.warnings.push_back(placement_warning(*placement, task));
+    } else if (unlike) {
+      if (placement) {
+        step.decision = {false, *unlike};
+      }
+      step.warnings.push_back(*std::move(unlike));
     }
   }
   if (std::string words = recogniser.place_words(); !words.empty()) {
@@ -350,9 +334,7 @@ RecognitionRecord recognise(Recogniser& recogniser, const RecognitionTask& task,
       const std::span<const Touch> next = touches.subspan(done, together);
       const std::function<void(double)> shown =
           progress ? std::function<void(double)>(show) : std::function<void(double)>();
-      // The last step tells of the surprises of the last touches, which depend on the beliefs
-      // before.
-      record.trace.push_back(drawn && left > surprises_judged
+      record.trace.push_back(drawn && left > 0
                                  ? identity_after(recogniser, task, next, shown)
                                  : take_step(recogniser, task, next, unknown.truth, shown,
                                              left == 0 ? std::nullopt : task.trace_tolerance));

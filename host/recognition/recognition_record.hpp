@@ -92,10 +92,9 @@ struct RecognitionStep {
   /// averaged over displacements where the task has a touch_sd, and on the task's fit_scale. Empty
   /// where no element of any touch is in contact: an object out of reach explains them.
   std::optional<Fit> fit;
-  /// How much the last touch surprised the belief before it; see surprise_of(). Empty for
-  /// particles, for a touch without a known element, and for an unknown's first touch (so for all
-  /// of `--each-frame`), before which there is no belief but the prior.
-  std::optional<double> surprise;
+  /// [touch] z of each touch by itself at the refined pose, on the scale of `fit`: which of them
+  /// disagrees. None of a touch without a known element. Empty where `fit` is, and for particles.
+  std::vector<std::optional<double>> touch_fit = {};
   /// Probability that the object was learned, where tells_known() and the unknown is a single touch
   /// with an element In Contact; "(none)" in `identity` then has the rest.
   std::optional<double> known = {};
@@ -153,8 +152,7 @@ BeliefPlaces places_of(const Recogniser& recogniser, const Estimate& estimate,
 Decision decide(const RecognitionStep& step, const RecognitionTask& task);
 
 /// Updates the belief with more touches of the unknown, then judges the estimate and its refined
-/// pose. A filter with bins takes the last three of these touches one by one, to measure their
-/// surprise; the belief is the same, bit for bit.
+/// pose.
 /// @param touches those that the recogniser has not yet taken
 /// @param tolerance see Recogniser::estimate()
 /// @throws Error as Recogniser::update() does

@@ -139,8 +139,11 @@ nlohmann::ordered_json to_json(const RecognitionStep& step, const RecognitionTas
   if (step.fit) {
     json["fit"] = {{"z", step.fit->z}, {"verdict", verdict_text(step.fit->verdict)}};
   }
-  if (step.surprise) {
-    json["surprise"] = *step.surprise;
+  if (!step.touch_fit.empty()) {
+    nlohmann::ordered_json& fits = json["touch_fit"] = nlohmann::ordered_json::array();
+    for (const std::optional<double>& z : step.touch_fit) {
+      fits.push_back(to_json(z));
+    }
   }
   if (step.certificate) {
     add_certificate(json, step, task);

@@ -356,9 +356,9 @@ Recogniser open_recogniser(Device* device, const RecognitionTask& task,
     // A resolved task is sound: only the bins' memory can be refused.
     if (error.fault() == Fault::input && traits_of(task.filter).every_bin &&
         !task.filter_asked_for_by.empty() &&
-        bounds_have_room(task.hypotheses, {.lattice = task.lattice(),
-                                           .contact = task.contact(),
-                                           .touch_sd = task.touch_sd()})) {
+        bounds_have_room(
+            task.hypotheses,
+            {.lattice = task.lattice(), .contact = task.contact(), .touch_sd = task.touch_sd()})) {
       throw Error(Fault::input,
                   fmt::format("{}, or leave out {}: `filter bounded` needs no device memory",
                               error.what(), task.filter_asked_for_by));

@@ -161,6 +161,42 @@ std::optional<std::string> pose_untold(std::span<const TouchEvidence> touches,
 
 }  // namespace
 
+std::optional<std::string> unlike_touches(std::span<const TouchEvidence> touches,
+                                          const RecognitionTask& task,
+                                          const RecognitionStep& step) {
+  constexpr double unlike_z =
+      -10.0;  // of learned letters that lie as said two in a hundred have one
+  constexpr std::size_t least_others = 3;
+  std::vector<std::size_t> unlike;  // counted from 1
+  std::size_t others = 0;
+  double lowest_z = 0.0;
+  for (std::size_t i = 0; i < step.touch_fit.size(); ++i) {
+    const std::optional<double>& z = step.touch_fit[i];
+    if (z && *z < unlike_z) {
+      unlike.push_back(i + 1);
+      lowest_z = std::min(lowest_z, *z);
+    } else if (z && *z < fits_from_z) {
+      return {};  // where many fit badly, none stands out
+    } else if (z && touches[i].in_contact()) {
+      ++others;
+    }
+  }
+  if (unlike.empty() || others < std::max(least_others, 2 * unlike.size())) {
+    return {};
+  }
+  const std::string name = task.name_of(step.mode.object);
+  const bool one = unlike.size() == 1;
+  const bool last =
+      unlike.back() == touches.size() && unlike.front() + unlike.size() == touches.size() + 1;
+  return fmt::format(
+      "touch{} {} fit{} {} {:.0f} standard deviations worse than touches of {} do, while the other "
+      "{} fit: {}",
+      one ? "" : "es", fmt::join(unlike, ", "), one ? "s" : "", name, -lowest_z, name, others,
+      last  ? "did the object move, or does the array touch something else?"
+      : one ? "leave it out, or look at its pose"
+            : "leave them out, or look at their poses");
+}
+
 std::vector<std::string> warnings_about(std::span<const TouchEvidence> touches,
                                         const RecognitionTask& task, const PoseLattice& lattice,
                                         const RecognitionStep& step) {

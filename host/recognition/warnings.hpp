@@ -22,6 +22,11 @@ std::vector<std::string> warnings_about(std::span<const TouchEvidence> touches,
                                         const RecognitionTask& task, const PoseLattice& lattice,
                                         const RecognitionStep& step);
 
+/// Which touches disagree where all others fit the mode's object at the pose: by touch_fit, a third
+/// of them at most, and the others are three or more in contact. Else none.
+std::optional<std::string> unlike_touches(std::span<const TouchEvidence> touches,
+                                          const RecognitionTask& task, const RecognitionStep& step);
+
 /// The n-fold symmetry of the mode's object as far as touches tell: its map's, or where that is 1
 /// and the belief spreads over turns after which the map looks the same, the one that the map shows
 /// (OccupancyGrid::suggested_symmetry).

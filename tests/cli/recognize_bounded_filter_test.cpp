@@ -70,7 +70,7 @@ TEST_F(BoundedFilter, AgreesWithTheHistogram) {
                     3e-5);
       }
       EXPECT_EQ(step.contains("fit"), other.contains("fit"));
-      EXPECT_EQ(step.contains("surprise"), other.contains("surprise"));
+      EXPECT_EQ(step.contains("touch_fit"), other.contains("touch_fit"));
       EXPECT_FALSE(other.contains("dropped_mass")) << "exact";
       EXPECT_FALSE(other.contains("identity_bounds"));
     }

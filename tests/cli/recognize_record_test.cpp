@@ -63,7 +63,7 @@ TEST_F(RecognizeRecord, HasTheDocumentedKeysAndTypes) {
                                                   "refined_error_mm",
                                                   "right",
                                                   "seconds",
-                                                  "surprise",
+                                                  "touch_fit",
                                                   "touches",
                                                   "truth"}));
   EXPECT_EQ(r["recording"], "u.h5");
@@ -231,14 +231,11 @@ TEST_F(RecognizeRecord, TraceTellsTheSameAfterEveryTouch) {
   ASSERT_EQ(whole["trace"].size(), 6u);
   for (std::size_t i = 0; i < 6; ++i) {
     const json& step = whole["trace"][i];
-    std::vector<std::string> keys{
-        "T_robot_object", "best", "bins_evaluated", "blocks_bounded",   "decision", "dropped_mass",
-        "error_mm",       "fit",  "identity",       "identity_bounds",  "mode",     "mode_certain",
-        "modes",          "none", "refined",        "refined_error_mm", "right"};
-    if (i > 0) {  // only the prior comes before the first touch
-      keys.push_back("surprise");
-    }
-    EXPECT_EQ(keys_of(step), keys);
+    EXPECT_EQ(keys_of(step), (std::vector<std::string>{
+                                 "T_robot_object", "best", "bins_evaluated", "blocks_bounded",
+                                 "decision", "dropped_mass", "error_mm", "fit", "identity",
+                                 "identity_bounds", "mode", "mode_certain", "modes", "none",
+                                 "refined", "refined_error_mm", "right", "touch_fit"}));
     const json r =
         record({"u.h5", "--maps", "A.map.h5", "I.map.h5", "--touches", std::to_string(i + 1)});
     for (const char* key : {"best", "T_robot_object", "right", "error_mm"}) {

@@ -203,19 +203,20 @@ TEST_F(UncertaintyFlags, SayOnceWhatTheLatticeDoesNotResolve) {
   EXPECT_EQ(said({by, "--bins", "25x25x48", "--touch-sd-mm", "1", "--touch-sd-deg", "5"}), "");
 }
 
-TEST_F(UncertaintyFlags, TheSurpriseStandsInTheRecordAndInTheTrace) {
+TEST_F(UncertaintyFlags, TheFitOfEachTouchStandsInTheRecordAndInTheTrace) {
   const std::string by = "--filter=histogram";  // which computes the same bits with a trace
   const json r = record_with({by, "--trace"});
   ASSERT_EQ(r["trace"].size(), 6u);
-  EXPECT_FALSE(r["trace"][0].contains("surprise")) << "only the prior comes before";
-  for (std::size_t i = 1; i < 6; ++i) {
-    EXPECT_TRUE(r["trace"][i]["surprise"].is_number());
+  for (std::size_t i = 0; i < 6; ++i) {
+    const json& fits = r["trace"][i]["touch_fit"];
+    ASSERT_EQ(fits.size(), i + 1);
+    EXPECT_TRUE(fits.back().is_number());
   }
-  EXPECT_EQ(r["surprise"], r["trace"][5]["surprise"]);
-  EXPECT_EQ(record_with({by})["surprise"], r["surprise"]);
-  EXPECT_NE(done(with({"--trace", "--bins=20x20x72", "--filter=bounded"})).find("surprise"),
+  EXPECT_EQ(r["touch_fit"], r["trace"][5]["touch_fit"]);
+  EXPECT_EQ(record_with({by})["touch_fit"], r["touch_fit"]);
+  EXPECT_NE(done(with({"--trace", "--bins=20x20x72", "--filter=bounded"})).find("touch's z"),
             std::string::npos);
-  EXPECT_FALSE(record_with({"--touches", "1"}).contains("surprise"));
+  EXPECT_FALSE(record_with({"--filter=particles"}).contains("touch_fit"));
 }
 
 }  // namespace palpate::uncertainty_flags_test

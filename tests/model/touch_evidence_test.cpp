@@ -74,12 +74,36 @@ TEST(TouchEvidence, SaysOfATouchWhatTheTouchSays) {
 
   const OccupancyGrid map = random_map(31, 27, 0.5, 6.0, 481);
   const Pose T_object_robot{{100.0, 50.0}, 0.5 * two_pi};
-  const std::optional<Fit> fit = evidence_fit(evidence, T_object_robot, map, contact, 0);
+  const std::optional<Fit> fit = evidence_fit(evidence, T_object_robot, map, contact, {}, 0);
   ASSERT_TRUE(fit);
   EXPECT_EQ(fit->z, fit_of(touches, T_object_robot, map, contact, 0)->z);
   const DisplacementSd sd{.mm = 0.5, .rad = 0.05};
   EXPECT_EQ(evidence_fit(evidence, T_object_robot, map, contact, sd, 0)->z,
             fit_of(touches, T_object_robot, map, contact, sd, 0)->z);
+}
+
+TEST(FitSums, AreOfEachTouchAndAddUp) {
+  const OccupancyGrid map = random_map(31, 27, 0.5, 6.0, 481);
+  const ContactModel contact{.prior = 0.2};
+  SixElements six;
+  std::vector<TouchEvidence> touches;
+  for (const double theta_rad : {0.0, 1.0, 2.0}) {
+    Touch touch = six.touch();
+    touch.T_robot_sensor.theta_rad = theta_rad;
+    touches.emplace_back(touch, contact);
+  }
+  std::ranges::fill(touches[1].readings, Reading::unknown);
+  for (const DisplacementSd& sd : {DisplacementSd{}, DisplacementSd{.mm = 0.5, .rad = 0.05}}) {
+    const Pose pose{{1.0, -2.0}, 0.5};
+    const auto sums = fit_sums(touches, pose, map, contact, sd, 0);
+    ASSERT_EQ(sums.size(), 3u);
+    EXPECT_FALSE(sums[1]) << "tells nothing";
+    EXPECT_EQ(fit_of(std::span(sums).first(1))->z,
+              evidence_fit(std::span(touches).first(1), pose, map, contact, sd, 0)->z);
+    EXPECT_DOUBLE_EQ(fit_of(sums)->z, (sums[0]->deviation + sums[2]->deviation) /
+                                          std::sqrt(sums[0]->variance + sums[2]->variance));
+    EXPECT_FALSE(fit_of(std::span(sums).subspan(1, 1)));
+  }
 }
 
 TEST(TouchEvidence, RefusesATouchThatIsNotSound) {

@@ -358,4 +358,19 @@ TEST_F(Warnings, ATouchOrTwoMayMissTheObject) {
       << "where all readings are Unknown by Eq. 3";
 }
 
+TEST_F(Warnings, ATouchThatDisagreesIsNamed) {
+  const auto said = [](std::vector<std::size_t> moved) {
+    Recording recording = letter_touches("E", 9, 5);
+    for (const std::size_t touch : moved) {  // where the robot says, but of another place
+      recording.T_robot_sensor[touch].translation_mm += glm::dvec2(4.0, -5.0);
+    }
+    return warnings(recording);
+  };
+  EXPECT_THAT(said({}), IsEmpty());
+  EXPECT_THAT(said({3}), ElementsAre(AllOf(HasSubstr("touch 4 fits E "),
+                                           HasSubstr("while the other 8 fit: leave it out"))));
+  EXPECT_THAT(said({8}), ElementsAre(AllOf(HasSubstr("touch 9 fits E "),
+                                           HasSubstr("did the object move, or"))));
+}
+
 }  // namespace palpate::warnings_test

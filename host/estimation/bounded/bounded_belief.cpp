@@ -15,18 +15,8 @@ namespace palpate {
 
 namespace {
 
-/// After no more touches a belief is wide: a few draws need few of its bins.
-constexpr std::size_t wide_touches = 2;
-/// Bins of all hypotheses together up to which narrower beliefs are searched for draws.
-constexpr double most_searched_bins = 1e8;
-/// Bins of all hypotheses together up to which such a search has the full tolerance.
-constexpr double closely_drawn_bins = 1e6;
-/// Tolerance that a search with a budget reaches before it goes on, and enough for draws.
+/// Tolerance that a search with a budget reaches before it goes on.
 constexpr double soon = 1e-2;
-/// Tolerance of a search for draws where touches are displaced: it takes little longer than a rough
-/// one, and leaves so little out that its bins can be followed through the next touches. Two of
-/// them raise that share up to a hundred times.
-constexpr double followable = 1e-4;
 /// How closely the log odds of "none of these" are known, in nats, unless this or the tolerance is
 /// more than it, or the hypotheses, may have.
 constexpr double none_nats = 0.05;
@@ -34,6 +24,12 @@ constexpr double negligible = 1e-4;
 /// Bounds of the hypotheses' log evidence this far apart tell too little of them, in nats.
 constexpr double untold_nats = 1.0;
 constexpr double unlimited = std::numeric_limits<double>::infinity();
+
+/// A bin of one hypothesis's lattice.
+struct DrawnBin {
+  std::int32_t object = 0;
+  std::int64_t bin = 0;
+};
 
 /// Draws bins from a belief whose bins come box by box, one in each of equal parts of the belief.
 class BeliefDraws {
@@ -71,7 +67,8 @@ class BeliefDraws {
   /// The draws, in the order of objects and bins.
   std::vector<DrawnBin> take() {
     draws_.resize(targets_.size(), last_);  // rounding may leave the last draw out
-    std::ranges::sort(draws_, {}, &DrawnBin::place);
+    std::ranges::sort(draws_, {},
+                      [](const DrawnBin& one) { return std::pair(one.object, one.bin); });
     return std::move(draws_);
   }
 
@@ -90,22 +87,16 @@ class BeliefDraws {
 void BoundedBelief::reset() {
   touches_.reset();
   found_.reset();
-  followed_.reset();
 }
 
 void BoundedBelief::move_pivot(const glm::dvec2& pivot_mm) {
   touches_.move_pivot(pivot_mm);
   found_.reset();
-  followed_.reset();
 }
 
 void BoundedBelief::take_in() {
   if (!touches_.waiting()) {
     return;
-  }
-  if (found_ && found_->bins.complete() &&
-      found_->bins.values().size() <= FollowedBins::most_bins(touches_.likelihood())) {
-    followed_.emplace(found_->bins, found_->result, touches_.log_weight(), touches_.taken_in());
   }
   found_.reset();
   touches_.take_in();
@@ -127,27 +118,9 @@ SearchGoal BoundedBelief::goal(double tolerance) const {
   return goal;
 }
 
-double BoundedBelief::bins_in_all() const {
-  return static_cast<double>(options().lattice.bins()) *
-         static_cast<double>(touches_.hypotheses().size());
-}
-
-SearchGoal BoundedBelief::rough_goal() const {
-  // Few bins take as long whatever the tolerance, and a close search lets those that are found be
-  // followed through the next touches.
-  const double rough = touches_.likelihood().displaced() ? followable : soon;
-  return {.tolerance = bins_in_all() <= closely_drawn_bins ? options().tolerance
-                                                           : std::max(options().tolerance, rough),
-          .exact = false,
-          .poor_bins = options().poor_bins};
-}
-
 const SearchResult& BoundedBelief::found(std::optional<double> asked) {
   const Deadline deadline = until(options().budget_s);
   const double tolerance = asked.value_or(this->tolerance());
-  if (found_ && !found_->goal.exact) {
-    found_.reset();
-  }
   if (!found_ || tolerance < found_->tolerance) {
     // A budget may end the search before it proves as much as an earlier one.
     Found closer = search(tolerance);
@@ -207,61 +180,17 @@ void BoundedBelief::visit(const BinVisitor& visitor) {
   }
 }
 
-bool BoundedBelief::follow() {
-  if (!followed_) {
-    return false;
-  }
-  while (followed_->touches() < touches_.taken_in()) {
-    touches_.follow(*followed_);
-  }
-  if (!(followed_->share_outside() <= soon)) {
-    followed_.reset();
-  }
-  return followed_.has_value();
-}
-
-BoundedBelief::DrawnFrom BoundedBelief::drawable_bins() {
-  if (found_ && found_->bins.complete()) {
-    return DrawnFrom::found;
-  }
-  if (!found_ && follow()) {
-    return DrawnFrom::followed;
-  }
-  // Rejection looks at tiles here and there, which share little of what displaced touches reach.
-  const bool many_bins = bins_in_all() > most_searched_bins && options().touch_sd.none();
-  // Where a search had no room for its bins, another one would take as long.
-  if (found_ || touches_.taken_in() <= wide_touches || many_bins) {
-    return DrawnFrom::tiles;
-  }
-  Deadline deadline = until(options().budget_s);
-  found_ = search(rough_goal(), deadline);
-  return DrawnFrom::found;
-}
-
-std::vector<DrawnBin> BoundedBelief::draw(std::size_t count, Random& random) {
-  const DrawnFrom from = drawable_bins();
-  if (from == DrawnFrom::tiles) {
-    return touches_.draw(count, random, until(options().budget_s));
-  }
-  const bool followed = from == DrawnFrom::followed;
-  BeliefDraws draws(one_in_each_part(count, random), options().lattice, touches_.log_weight(),
-                    followed ? followed_->log_total() : log_total());
-  const auto add = [&](const BinBox& box, std::span<const double> log_likelihood) {
-    draws.add(box, log_likelihood);
-  };
-  if (followed) {
-    followed_->visit(add);
-  } else {
-    visit(add);
-  }
-  return draws.take();
-}
-
 std::vector<PoseSample> BoundedBelief::sample(std::size_t count, std::uint64_t seed) {
+  found();
   Random random(seed, Stream::belief);
+  BeliefDraws draws(one_in_each_part(count, random), options().lattice, touches_.log_weight(),
+                    log_total());
+  visit([&](const BinBox& box, std::span<const double> log_likelihood) {
+    draws.add(box, log_likelihood);
+  });
   std::vector<PoseSample> samples;
   samples.reserve(count);
-  for (const DrawnBin& drawn : draw(count, random)) {
+  for (const DrawnBin& drawn : draws.take()) {
     samples.push_back({drawn.object, draw_within(drawn.bin, options().lattice, random)});
   }
   return samples;

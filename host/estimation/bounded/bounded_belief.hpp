@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "estimation/bounded/evaluated_bins.hpp"
-#include "estimation/bounded/search/rejection_draws.hpp"
 #include "estimation/bounded/searched_touches.hpp"
 #include "palpate/bounded_posterior.hpp"
 
@@ -48,8 +47,7 @@ class BoundedBelief {
   void visit(const BinVisitor& visitor);
   /// Log of the summed likelihood of these bins, with prior weights.
   double log_total() const { return found_->result.all().evaluated; }
-  /// Draws from the bins of the last search, or where there are none, or too many to keep, from
-  /// bins that hold nearly all of the belief.
+  /// Draws from the bins that found() evaluates.
   std::vector<PoseSample> sample(std::size_t count, std::uint64_t seed);
   /// The blocks that a search divides or evaluates.
   std::vector<PoseBlock> refined_blocks();
@@ -77,15 +75,12 @@ class BoundedBelief {
   Deadline until(const std::optional<double>& budget_s) const {
     return Deadline(budget_s, &options().cancel_point);
   }
-  double bins_in_all() const;
   /// The goal that the options and a tolerance set.
   SearchGoal goal(double tolerance) const;
   /// found()'s where none is given.
   double tolerance() const {
-    return found_ && found_->goal.exact ? found_->tolerance : options().tolerance;
+    return found_ ? found_->tolerance : options().tolerance;
   }
-  /// What a search for draws is to reach.
-  SearchGoal rough_goal() const;
 
   /// Searches to the tolerance, or as far as the options' budget reaches.
   Found search(double tolerance);
@@ -98,22 +93,8 @@ class BoundedBelief {
   /// Whether the bounds of "none of these" are as close as the options ask for.
   bool tells_enough(const LogInterval& none) const;
 
-  /// What draws are made from.
-  enum class DrawnFrom {
-    found,     ///< the bins of the last search
-    followed,  ///< those of an earlier one, followed through the touches since
-    tiles,     ///< tiles, by rejection, without a search
-  };
-  /// Makes sure of the bins to draw from, by a search where that is quick.
-  DrawnFrom drawable_bins();
-  std::vector<DrawnBin> draw(std::size_t count, Random& random);
-  /// Follows the bins of an earlier search through the touches since.
-  /// @returns whether they hold enough to draw from; forgets them otherwise
-  bool follow();
-
   SearchedTouches touches_;
-  std::optional<Found> found_;            ///< nothing before a search
-  std::optional<FollowedBins> followed_;  ///< of the last search before, through some touches
+  std::optional<Found> found_;  ///< nothing before a search
 };
 
 }  // namespace palpate

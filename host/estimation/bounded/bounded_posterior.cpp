@@ -96,12 +96,8 @@ Estimate BoundedPosterior::estimate(std::optional<double> tolerance) const {
   }
   // Dropped and rounding mass over the whole that they are part of.
   const double dropped = found.unproven();
-  std::vector<LogInterval> evidence = bounds;
-  for (LogInterval& of : evidence) {
-    of = {of.low - found.shared_nats, of.high + found.shared_nats};
-  }
   Certificate certificate{.dropped_mass = std::isfinite(dropped) ? dropped / (1.0 + dropped) : 1.0,
-                          .log_evidence = std::move(evidence),
+                          .log_evidence = bounds,
                           .mode_certain = found.mode_certain,
                           .blocks_bounded = found.blocks_bounded,
                           .bins_evaluated = found.bins_evaluated};
@@ -126,8 +122,8 @@ Estimate BoundedPosterior::estimate(std::optional<double> tolerance) const {
   for (std::size_t i = 0; i < bounds.size(); ++i) {
     LogSum others_low;
     LogSum others_high;
-    others_low.add(none.low - found.shared_nats);
-    others_high.add(none.high + found.shared_nats);
+    others_low.add(none.low);
+    others_high.add(none.high);
     for (std::size_t other = 0; other < bounds.size(); ++other) {
       if (other != i) {
         others_low.add(bounds[other].low);

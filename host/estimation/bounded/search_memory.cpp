@@ -71,8 +71,8 @@ SearchMemory search_memory(std::span<const Hypothesis> hypotheses, const Bounded
   for (const Hypothesis& hypothesis : hypotheses) {
     least_cell_mm = std::min(least_cell_mm, hypothesis.compared().cell_mm);
   }
-  const std::vector<TileSize> sizes = tile_sizes(lattice, least_cell_mm, hypotheses.size(),
-                                                 options.touch_sd);
+  const std::vector<TileSize> sizes =
+      tile_sizes(lattice, least_cell_mm, hypotheses.size(), options.touch_sd);
   SearchMemory memory;
   for (const Hypothesis& hypothesis : hypotheses) {
     const OccupancyGrid& map = hypothesis.compared();

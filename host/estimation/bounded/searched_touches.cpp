@@ -94,11 +94,6 @@ SearchResult SearchedTouches::search(const SearchGoal& goal, const Deadline& dea
   return arena_.execute([&] { return search_.run(elements_, goal, deadline, visitor, refined); });
 }
 
-std::vector<DrawnBin> SearchedTouches::draw(std::size_t count, Random& random,
-                                            const Deadline& deadline) const {
-  return arena_.execute([&] { return search_.draw(elements_, count, random, deadline); });
-}
-
 std::vector<double> SearchedTouches::log_likelihood(std::span<const BinBox> boxes,
                                                     Arithmetic arithmetic) const {
   std::size_t bins = 0;
@@ -108,25 +103,6 @@ std::vector<double> SearchedTouches::log_likelihood(std::span<const BinBox> boxe
   std::vector<double> logs(bins);
   arena_.execute([&] { likelihood_.evaluate(boxes, elements_, arithmetic, logs); });
   return logs;
-}
-
-void SearchedTouches::follow(FollowedBins& bins) const {
-  const std::size_t next = bins.touches();
-  KnownElements touch = known_elements(touches_.all()[next], options_);
-  std::vector<double> most;
-  for (const TileBounds& bounds : space_.bounds) {
-    most.push_back(bounds.best(space_.finest_level(), touch));
-  }
-  if (!touch.touches.empty()) {
-    // Displaced touches without known elements are not among the elements.
-    const auto displaced = static_cast<std::size_t>(
-        std::ranges::count_if(touches_.all().first(next), &TouchEvidence::tells));
-    touch.touches.front() = elements_.touches[displaced];
-    for (std::size_t i = 0; i < most.size(); ++i) {
-      most[i] = std::min(most[i], search_.largest().most(displaced, i));
-    }
-  }
-  arena_.execute([&] { bins.add(touch, likelihood_, most); });
 }
 
 LogInterval SearchedTouches::bound_none(const NoneEvidence::Enough& enough,

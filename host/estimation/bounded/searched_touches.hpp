@@ -9,7 +9,6 @@
 
 #include <tbb/task_arena.h>
 
-#include "estimation/bounded/evaluated_bins.hpp"
 #include "estimation/bounded/leaves/bin_likelihood.hpp"
 #include "estimation/bounded/none_evidence.hpp"
 #include "estimation/bounded/search/bound_search.hpp"
@@ -70,12 +69,8 @@ class SearchedTouches {
   /// @param refined where not null, takes the tiles that were divided
   SearchResult search(const SearchGoal& goal, const Deadline& deadline, const BinVisitor& visitor,
                       std::vector<PoseBlock>* refined = nullptr);
-  /// Draws bins without a search, see draw_bins().
-  std::vector<DrawnBin> draw(std::size_t count, Random& random, const Deadline& deadline) const;
   /// Log-likelihood of bins, box after box, [y, x] in each, in nats.
   std::vector<double> log_likelihood(std::span<const BinBox> boxes, Arithmetic arithmetic) const;
-  /// Takes one of the touches into the bins of an earlier search.
-  void follow(FollowedBins& bins) const;
   /// Bounds of the log evidence of "none of these" with its prior weight, as SearchResult::mass has
   /// that of the hypotheses, see NoneEvidence::bounds(). Only where has_none().
   LogInterval bound_none(const NoneEvidence::Enough& enough, const Deadline& deadline);

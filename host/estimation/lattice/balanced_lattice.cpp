@@ -45,7 +45,7 @@ double lever_mm(const OccupancyGrid& map, const PoseLattice& region) {
 double widening(double touch_sd, double slip_sd, double step) {
   // docs/refinement.md holds the measurements behind these numbers.
   constexpr double of_touch_sd = 0.5;
-  constexpr double of_slip_sd = 1.5;
+  constexpr double of_slip_sd = 1.25;
   constexpr double most = 2.5;
   return std::clamp(std::max(of_touch_sd * touch_sd, of_slip_sd * slip_sd) / step, 1.0, most);
 }

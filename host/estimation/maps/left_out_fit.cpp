@@ -206,7 +206,7 @@ void judge_left_out(Device& device, MapSource& source) {
   std::vector<double> z;
   const auto judge_fit = [&](const Hypothesis& of, std::span<const TouchEvidence> judged) {
     for (const TouchEvidence& touch : judged) {
-      z.push_back(evidence_fit(std::span(&touch, 1), Pose{}, of.map, contact, 0)->z);
+      z.push_back(evidence_fit(std::span(&touch, 1), Pose{}, of.map, contact, {}, 0)->z);
     }
   };
   std::vector<PlaceError> errors;

@@ -149,10 +149,10 @@ TEST(BalancedLattice, FollowsUncertainTouchesUpToTwoAndAHalfSteps) {
     return balanced_lattice({}, letters(), most_balanced_bins, BinWidth::automatic, touch_sd,
                             slip_sd);
   };
-  EXPECT_DOUBLE_EQ(slipping({}, {.mm = 0.5}).step_mm, 0.75) << "one and a half of a slip";
-  EXPECT_DOUBLE_EQ(slipping({.mm = 2.0}, {.mm = 0.5}).step_mm, 1.0) << "the wider of both";
-  EXPECT_NEAR(slipping({}, {.rad = step_rad}).lattice.theta_rad.step(), 1.5 * step_rad,
-              0.02 * step_rad);
+  EXPECT_DOUBLE_EQ(slipping({}, {.mm = 0.8}).step_mm, 1.0) << "five quarters of a slip";
+  EXPECT_DOUBLE_EQ(slipping({.mm = 2.0}, {.mm = 0.6}).step_mm, 1.0) << "the wider of both";
+  EXPECT_NEAR(slipping({}, {.rad = 2.0 * step_rad}).lattice.theta_rad.step(), 2.5 * step_rad,
+              0.04 * step_rad);
   const BalancedLattice fine = lattice({.mm = 9.0, .rad = 1.0}, BinWidth::fine);
   EXPECT_EQ(fine.lattice.bins(), fine_lattice({}, letters()).lattice.bins()) << "for the mode";
 }

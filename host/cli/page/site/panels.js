@@ -349,7 +349,8 @@ export function numbersOfTouch(touch) {
   if (touch.fit) rows.push(["fit", `${touch.fit.verdict} (z ${touch.fit.z.toFixed(1)})`]);
   if (touch.none !== undefined) rows.push(["(none)", percent(touch.none)]);
   if (touch.known !== undefined) rows.push(["known", percent(touch.known)]);
-  if (touch.surprise !== undefined) rows.push(["surprise", `${touch.surprise.toFixed(1)} sd`]);
+  const ofLast = touch.touch_fit?.at(-1);
+  if (typeof ofLast === "number") rows.push(["last touch's fit", `z ${ofLast.toFixed(1)}`]);
   if (touch.refined) {
     const [x, y, theta] = touch.refined.sd;
     rows.push(["sd", `${x.toFixed(2)} mm, ${y.toFixed(2)} mm, ${degrees(theta).toFixed(2)}°`]);

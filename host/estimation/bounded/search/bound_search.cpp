@@ -322,12 +322,6 @@ SearchResult BoundSearch::run(const KnownElements& elements, const SearchGoal& g
       .result();
 }
 
-std::vector<DrawnBin> BoundSearch::draw(const KnownElements& elements, std::size_t count,
-                                        Random& random, const Deadline& deadline) const {
-  return draw_bins({space_, options_, likelihood_, elements, {}, deadline, {}}, largest_, count,
-                   random);
-}
-
 PoseBlock block_of(const BinBox& box, std::size_t level) {
   return {.object = box.object,
           .level = static_cast<int>(level),

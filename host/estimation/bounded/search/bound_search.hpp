@@ -4,7 +4,6 @@
 
 #include "estimation/bounded/leaves/bin_likelihood.hpp"
 #include "estimation/bounded/search/largest_tiles.hpp"
-#include "estimation/bounded/search/rejection_draws.hpp"
 #include "estimation/bounded/search/search_goal.hpp"
 #include "estimation/bounded/search/search_space.hpp"
 #include "estimation/known_elements.hpp"
@@ -33,9 +32,6 @@ class BoundSearch {
   /// @param refined where not null, takes the tiles that were divided
   SearchResult run(const KnownElements& elements, const SearchGoal& goal, const Deadline& deadline,
                    const BinVisitor& visit, std::vector<PoseBlock>* refined = nullptr) const;
-  /// Draws bins without a search, see draw_bins().
-  std::vector<DrawnBin> draw(const KnownElements& elements, std::size_t count, Random& random,
-                             const Deadline& deadline) const;
 
  private:
   const SearchSpace& space_;

@@ -287,8 +287,7 @@ std::vector<std::size_t> Leaves::to_be_refined(double share) const {
 }
 
 void Leaves::settle(double share) {
-  const std::vector<std::size_t> refined =
-      task_.goal.exact ? to_be_refined(share) : std::vector<std::size_t>();
+  const std::vector<std::size_t> refined = to_be_refined(share);
   const std::int64_t most =
       displaced_
           ? largest_batch

@@ -24,8 +24,6 @@ struct SearchGoal {
   double tolerance = 1e-6;
   std::optional<double> evidence_nats = {};
   double evidence_range_nats = std::numeric_limits<double>::infinity();
-  /// Bins that hold much of the mass are evaluated once more in float64.
-  bool exact = true;
   /// See BoundedOptions::poor_bins.
   std::optional<std::int64_t> poor_bins = {};
 };
@@ -57,14 +55,6 @@ class Deadline {
       (*cancel_point_)();
     }
   }
-  /// Seconds until it passes, from 0; infinity where there is no budget.
-  double left_s() const {
-    if (!at_) {
-      return std::numeric_limits<double>::infinity();
-    }
-    const auto now = Clock::now();
-    return now < *at_ ? std::chrono::duration<double>(*at_ - now).count() : 0.0;
-  }
   /// Lets it pass now, where there is a budget.
   void end() {
     if (at_) {
@@ -92,8 +82,6 @@ struct HypothesisMass {
 /// What a search by bounds returns.
 struct SearchResult {
   std::vector<HypothesisMass> mass;  ///< [hypothesis]
-  /// All masses may be wrong by one factor that they share, e^-shared_nats to e^shared_nats.
-  double shared_nats = 0.0;
   std::int32_t best_object = 0;
   std::int64_t best_bin = 0;
   double best_log_likelihood = 0.0;  ///< of the best bin, without prior weights
