@@ -151,8 +151,7 @@ def measure_presses(device: palpate.Device, folder: str, quick: bool) -> Json:
     )
     lattice = palpate.PoseLattice(x, y, (0.0, 2.0 * math.pi, 4 if quick else 144))
     bounded = palpate.BoundedPosterior(device, maps, lattice, contact=CONTACT)
-    # All frames lie at one place: the dense engine evaluates what is in contact, and the rest once.
-    histogram = palpate.PoseHistogram(device, maps, lattice, contact=CONTACT, still_array=True)
+    histogram = palpate.PoseHistogram(device, maps, lattice, contact=CONTACT)
     answers: list[Json] = []
     dense: list[Json] = []
     for i, recording in enumerate(recordings):

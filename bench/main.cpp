@@ -32,10 +32,6 @@ int main(int argc, char** argv) try {
       "element and touch), reductions (ms), maps (s), many unknowns (per second) and "
       "latency (ms), with errors in nats against float64",
       measure_kernels);
-  add("paths",
-      "Time every way to evaluate the likelihood in turn (ns per pose bin, element and "
-      "touch), in less than a minute, with errors in nats against float64",
-      compare_paths);
   add("bounded",
       "Measure the posterior by bounds, in some 20 minutes on two CPU cores: its "
       "time and memory at 10,000 to 1,000,000,000 bins beside the dense engine",

@@ -130,12 +130,6 @@ inline constexpr const char* bounded_parts[] = {"speed",     "mode",   "streamin
 /// Speed, memory and error of every kernel, beside two baselines and float64.
 void measure_kernels(const RunOptions& options, std::span<char* const> command_line);
 
-/// Every way to evaluate the likelihood, in turn on the same lattices: its time, and its error
-/// against float64. The sweep's tables and charts show them.
-/// @throws Error unless some touch has at least half its elements in No Contact, which an array at
-/// rest needs to gain anything
-void compare_paths(const RunOptions& options, std::span<char* const> command_line);
-
 /// The posterior by bounds: its time for nine touches at rising numbers of bins, touch by touch and
 /// in large scenes, its memory, and where it searches.
 void measure_bounded(const RunOptions& options, std::span<char* const> command_line);

@@ -1,12 +1,7 @@
 """Speed against error on simulated letters: every filter, bin counts, map cells, and their limits."""
 
 import argparse
-import json
 import math
-import os
-import pathlib
-import subprocess
-import tempfile
 import time
 from collections.abc import Sequence
 
@@ -17,7 +12,7 @@ from palpate._tables import Table, count_text, plain, print_table
 
 from .measures import differences, knee_of
 from .program import Json, begin, main, parser, write
-from .sweep_page import charts_of, page_of
+from .sweep_charts import charts_of
 from .sweep_runs import (
     first_each,
     measure_bounds,
@@ -25,7 +20,7 @@ from .sweep_runs import (
     measure_limits,
     measure_particles,
 )
-from .sweep_tables import BOUNDS, LIMITS, PRECISIONS, PRINTED, STEPS, VERDICTS
+from .sweep_tables import BOUNDS, LIMITS, PRINTED, STEPS, VERDICTS
 from .trials import (
     TABLE_1,
     VOWELS,
@@ -86,20 +81,6 @@ def knee_record(points: Sequence[Json], cell_mm: float, fine: Bins) -> Json:
         f"{count_text(math.prod(fine))}.",
         "steps": steps,
     }
-
-
-def compare_paths(options: argparse.Namespace) -> list[Json]:
-    """The ways to evaluate the likelihood, which `palpate-bench paths` times in C++."""
-    program = os.environ.get("PALPATE_BENCH", "build/palpate-bench")
-    flags = ["--quick"] if options.quick else []
-    flags += ["--device", options.device] if options.device else []
-    with tempfile.TemporaryDirectory() as folder:
-        file = pathlib.Path(folder, "paths.json")
-        subprocess.run(
-            [program, "paths", "--json", file, *flags], check=True, stdout=subprocess.DEVNULL
-        )
-        paths: list[Json] = json.loads(file.read_text())["precisions"]
-        return paths
 
 
 def bounds_sentence(points: Sequence[Json]) -> str:
@@ -168,8 +149,6 @@ def measure(device: palpate.Device, options: argparse.Namespace) -> Json:
             bounds.append(measure_bounds(device, maps, some, bins))
         fine = palpate.balanced_lattice(lattice_of(GOAL_BINS), maps, "fine")
         knees.append(knee_record(points, cell_mm, counts_of(fine)))
-    precisions = compare_paths(options)
-    print_table(PRECISIONS, precisions)
     print_table(BOUNDS, bounds)
     lattices = [scaled(1e4)] if quick else [GOAL_BINS, scaled(3e5), scaled(3e6)]
     each = min(len(trials) // len(VOWELS), 2 if quick else len(trials))
@@ -185,7 +164,6 @@ def measure(device: palpate.Device, options: argparse.Namespace) -> Json:
         "trials": len(trials),
         "points": points,
         "agreement": agreement,
-        "precisions": precisions,
         "bounds": bounds,
         "knees": knees,
         "limits": limits,
@@ -200,11 +178,8 @@ def program() -> None:
         "Measures speed against error on simulated letters, in some 20 minutes on two CPU cores: every "
         "filter, from 100 to 10,000,000 bins per object, on maps of several cell sizes. The same of "
         "your own objects: python -m palpate.sweep.",
-        plots="draw the page's charts in this folder",
+        plots="draw the charts in this folder",
         trials="trials per letter [10, or 4 with --quick]",
-    )
-    flags.add_argument(
-        "--html", metavar="FILE", help="write the results as a page with charts and tables"
     )
     options = flags.parse_args()
     start = time.perf_counter()
@@ -212,10 +187,7 @@ def program() -> None:
     document = facts | measure(device, options)
     document["seconds in all"] = round(time.perf_counter() - start, 1)
     write(options.json, document)
-    drawn = charts_of(document)
-    if options.html:
-        write(options.html, page_of(document, drawn))
-    charts.save({name: chart.figure for name, chart in drawn.items()}, options.plots)
+    charts.save(charts_of(document), options.plots)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""The tables of the sweep's document: their columns, for the terminal and for the page."""
+"""The tables of the sweep's document: their columns."""
 
 from palpate._tables import (
     Column,
@@ -40,14 +40,7 @@ RUNS: list[Column] = [
     ("refined: median, mm", "refined_error_mm/median", _MM),
     ("least probability", "least_confidence", number(".6f")),
 ]
-PRINTED = RUNS[:20]  # the page has more
-PRECISIONS: list[Column] = [
-    ("evaluated by", "path", plain),
-    ("bins per object", "count", count_text),
-    ("ns per pose, element and touch", "nanoseconds", number(".2f")),
-    ("largest deviation, nats", "deviation_nats/largest", _NATS),
-    ("RMS", "deviation_nats/rms", _NATS),
-]
+PRINTED = RUNS[:20]
 BOUNDS: list[Column] = [
     ("bins per object", "count", count_text),
     ("bins in all", "bins_in_all", count_text),

@@ -9,7 +9,7 @@
 #include "interface.h"
 
 layout(local_size_x_id = 0) in;
-layout(constant_id = 9) const uint TILE_X = 5;
+layout(constant_id = 8) const uint TILE_X = 5;
 
 const uint BINS = TILE_X;
 const uint FACTORS_PER_DIVISION = 1;

@@ -10,11 +10,11 @@
 #include "interface.h"
 
 layout(local_size_x_id = 0) in;
-layout(constant_id = 9) const uint TILE_X = 5;
-layout(constant_id = 10) const uint TILE_Y = 5;
-layout(constant_id = 11) const float STEP_X = 0.2;  // between bins, in cells
-layout(constant_id = 12) const float STEP_Y = 0.2;
-layout(constant_id = 13) const uint CELLS = 1;  // 1 or 2
+layout(constant_id = 8) const uint TILE_X = 5;
+layout(constant_id = 9) const uint TILE_Y = 5;
+layout(constant_id = 10) const float STEP_X = 0.2;  // between bins, in cells
+layout(constant_id = 11) const float STEP_Y = 0.2;
+layout(constant_id = 12) const uint CELLS = 1;  // 1 or 2
 
 const uint NODES = CELLS + 2;
 const uint BINS = TILE_X * TILE_Y;  // row by row

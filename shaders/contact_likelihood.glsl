@@ -6,29 +6,27 @@ layout(constant_id = 1) const uint FORM = AS_PRODUCTS;
 // Floor of Eq. 7: gamma m; AS_LOGS its logarithm or NO_FLOOR, because float32 does not hold every floor.
 layout(constant_id = 2) const float RANDOM_FLOOR = 0.02;
 layout(constant_id = 3) const float TRUST = 0.9;  // 1 - gamma
-// Shape of a table: the log odds of its first node, nodes per nat of log odds, nodes of a row, and levels.
+// Shape of a table: the log odds of its first node, nodes per nat of log odds, and nodes of a row.
 layout(constant_id = 4) const float FIRST_LOG_ODDS = -1.0;
 layout(constant_id = 5) const float NODES_PER_NAT = 1.0;
 layout(constant_id = 6) const uint TABLE_NODES = 2;
-layout(constant_id = 7) const uint TABLE_LEVELS = 2;
 
-layout(binding = 1) uniform samplerBuffer contact_table;  // TableNode, [set, row, node]
+layout(binding = 1) uniform samplerBuffer contact_table;  // TableNode, [set, level, node]
 
 const float LOG2_E = 1.4426950408889634;
 
 // The likelihood of a reading (Eq. 7) is (x + y z) / (1 + z), where z = exp(log odds) are the odds of
-// occupancy. Unknown has the likelihood 1: x = y = 1.
+// occupancy.
 vec2 likelihood_terms(const uint reading) {
   const vec2 contact = vec2(RANDOM_FLOOR, RANDOM_FLOOR + TRUST);
-  return reading == NO_CONTACT ? contact.yx : reading == IN_CONTACT ? contact : vec2(1.0);
+  return reading == NO_CONTACT ? contact.yx : contact;
 }
 
-// Numerator and denominator of a likelihood ratio, from the terms of both readings: several elements
-// share one division. The clamp at 2^30 changes the ratio by less than one part in 1e6 and keeps the
+// Numerator and denominator of the likelihood: several elements share one division. The clamp at 2^30 changes the ratio by less than one part in 1e6 and keeps the
 // product of four factors within float32.
-vec2 likelihood_ratio(const vec2 reading, const vec2 instead, const float log_odds) {
+vec2 likelihood_ratio(const vec2 terms, const float log_odds) {
   const float odds = exp2(clamp(log_odds * LOG2_E, -30.0, 30.0));
-  return vec2(reading.x + reading.y * odds, instead.x + instead.y * odds);
+  return vec2(terms.x + terms.y * odds, 1.0 + odds);
 }
 
 // Eq. 7 in logs for contact; that for no contact is the same at the negative log odds.
@@ -41,19 +39,11 @@ float contact_log_likelihood(const float log_odds) {
 }
 
 float log_likelihood(const uint reading, const float log_odds) {
-  return reading == UNKNOWN ? 0.0
-                            : contact_log_likelihood(reading == NO_CONTACT ? -log_odds : log_odds);
-}
-
-// First node of L(reading) - L(instead) in an object's part of the table. The first TABLE_LEVELS rows
-// hold L(reading), the others L(reading) - L(NO_CONTACT), where Unknown takes the row of No Contact.
-int row_of(const uint reading, const uint instead) {
-  const uint row = reading == UNKNOWN ? 0 : reading;
-  return int((instead == UNKNOWN ? row : TABLE_LEVELS + row) * TABLE_NODES);
+  return contact_log_likelihood(reading == NO_CONTACT ? -log_odds : log_odds);
 }
 
 // Linear between the nodes of a row, constant beyond the first and the last.
-float tabled_log_ratio(const int first_node, const float log_odds) {
+float tabled_log_likelihood(const int first_node, const float log_odds) {
   const float place =
       clamp((log_odds - FIRST_LOG_ODDS) * NODES_PER_NAT, 0.0, float(TABLE_NODES - 1));
   const float whole = floor(place);

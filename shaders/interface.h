@@ -101,17 +101,15 @@ struct ObjectPlace {
   int first_table_node;  // index of its first node in the contact table
 };
 
-// Consecutive elements [begin, end) of one reading. Each adds L(reading) - L(instead), where L is
-// the log-likelihood, L(UNKNOWN) = 0, and `instead` is UNKNOWN or NO_CONTACT. Kernels read it as an
-// ivec4.
+// Consecutive elements [begin, end) of one reading. Kernels read it as an ivec4.
 struct Segment {
   uint begin;
   uint end;
   uint reading;
-  uint instead;
+  uint unused;
 };
 
-// A log-likelihood ratio at a node of the contact table, and its rise to the next node. Kernels
+// A log-likelihood at a node of the contact table, and its rise to the next node. Kernels
 // read it as a vec2.
 struct TableNode {
   float nats;
@@ -140,11 +138,6 @@ struct ReducePush {
   uint bins;           // of one object in the slab
   uint stride;         // from one object's first bin to the next object's; even
   uint partial_first;  // index of the dispatch's first result
-};
-
-struct AddPush {
-  uint bins;
-  uint row;  // bins that one row of workgroups covers
 };
 
 // What the passes of a blur read of a bin: the log-likelihood of a touch, the difference of a
@@ -381,7 +374,7 @@ static_assert(sizeof(TileReading) == 16 && sizeof(Tile) == 20 && sizeof(Evidence
 static_assert(sizeof(RotatedElement) == 16 && sizeof(Segment) == 16 && sizeof(TableNode) == 8);
 static_assert(sizeof(Corners) == 16 && sizeof(ObjectPlace) == 24);
 static_assert(sizeof(LikelihoodPush) == 28 && sizeof(Partial) == 16);
-static_assert(sizeof(ReducePush) == 12 && sizeof(AddPush) == 8 && sizeof(MarginalPush) == 20);
+static_assert(sizeof(ReducePush) == 12 && sizeof(MarginalPush) == 20);
 static_assert(sizeof(TurnPush) == 52 && sizeof(Turn) == 64);
 static_assert(sizeof(ArrayAtTheta) == 16 && sizeof(ObjectBox) == 16);
 static_assert(sizeof(OverlapPush) == 56 && sizeof(OverlapPartial) == 12);

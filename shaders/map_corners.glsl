@@ -1,7 +1,7 @@
 // The map that a kernel interpolates. Tables are texel buffers: measured on lavapipe, a likelihood
 // kernel is up to twice as fast as with storage buffers, and GPUs cache them. Maps that are too large
 // for a table are in a storage buffer.
-layout(constant_id = 8) const bool MAP_IN_TABLE = true;
+layout(constant_id = 7) const bool MAP_IN_TABLE = true;
 
 layout(binding = 3) uniform samplerBuffer map_table;  // Corners of nodes, with a border of prior
 layout(std430, binding = 4) readonly buffer MapStorage { float map_storage[]; };  // nodes alone

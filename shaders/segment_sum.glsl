@@ -18,8 +18,7 @@ void interpolate(const int element);
 // Eq. 7 as products of ratios: one logarithm for FACTORS_PER_LOG elements, and one division for
 // FACTORS_PER_DIVISION. Where this is 1, the constant condition removes the innermost loop.
 void add_products(const ivec4 segment) {
-  const vec2 reading = likelihood_terms(uint(segment.z));
-  const vec2 instead = likelihood_terms(uint(segment.w));
+  const vec2 terms = likelihood_terms(uint(segment.z));
   float product[BINS];
   float numerator[BINS];
   float denominator[BINS];
@@ -36,7 +35,7 @@ void add_products(const ivec4 segment) {
       do {
         interpolate(k);
         FOR_EACH_BIN {
-          const vec2 ratio = likelihood_ratio(reading, instead, log_odds_of[b]);
+          const vec2 ratio = likelihood_ratio(terms, log_odds_of[b]);
           numerator[b] *= ratio.x;
           denominator[b] *= ratio.y;
         }
@@ -50,8 +49,7 @@ void add_products(const ivec4 segment) {
 // Sums of log-likelihoods. A table's numbers are summed FACTORS_PER_LOG at a time in one float.
 void add_logs(const ivec4 segment, const int first_node) {
   const uint reading = uint(segment.z);
-  const uint instead = uint(segment.w);
-  const int node = first_node + row_of(reading, instead);
+  const int node = first_node + int(reading * TABLE_NODES);
   const int terms = FORM == AS_TABLE ? int(FACTORS_PER_LOG) : 1;
   float part[BINS];
   for (int group = segment.x; group < segment.y; group += terms) {
@@ -62,8 +60,7 @@ void add_logs(const ivec4 segment, const int first_node) {
       interpolate(k);
       FOR_EACH_BIN {
         const float l = log_odds_of[b];
-        part[b] += FORM == AS_TABLE ? tabled_log_ratio(node, l)
-                                    : log_likelihood(reading, l) - log_likelihood(instead, l);
+        part[b] += FORM == AS_TABLE ? tabled_log_likelihood(node, l) : log_likelihood(reading, l);
       }
     } while (terms > 1 && ++k < end);
     FOR_EACH_BIN { sum[b] = two_float_add(sum[b], part[b]); }

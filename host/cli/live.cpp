@@ -92,7 +92,6 @@ void warm_up(Recogniser& recogniser, const RecognitionTask& task, const SensorDe
                     .elements_mm = elements_mm,
                     .pressure = pressure,
                     .valid = sensor.valid};
-  recogniser.prepare(touch);
   recogniser.update(std::span(&touch, 1));
   if (!traits_of(task.filter).certificate) {  // a search of one touch is long, compiles nothing
     recogniser.refine(recogniser.estimate().mode);

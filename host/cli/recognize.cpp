@@ -167,7 +167,6 @@ void recognize(const RecognizeArguments& options) {
   const RecognitionTask task = resolve(request, {.pressure_unit = first.pressure_unit,
                                                  .source = first.path,
                                                  .reach_mm = largest_reach_mm(recordings),
-                                                 .still_array = array_is_still(unknowns),
                                                  .need = caller_need(options, request),
                                                  .device = std::ref(device_in_waiting)});
   check_outputs(options, request, task, unknowns);

@@ -43,10 +43,10 @@ void clear(ContactEvidence& evidence, std::size_t touches, std::size_t elements,
   evidence.counts = {};
 }
 
-/// Adds the touch's elements that do not read `instead`, as segments of one reading each.
-void append(ContactEvidence& evidence, const TouchEvidence& touch,
-            std::span<const Reading> readings, Reading instead, const glm::dvec2& pivot_mm,
+/// Adds the touch's elements that are not Unknown, as segments of one reading each.
+void append(ContactEvidence& evidence, const TouchEvidence& touch, const glm::dvec2& pivot_mm,
             std::size_t segment_elements) {
+  const std::vector<Reading>& readings = touch.readings;
   ReadingCounts counts{};
   for (const Reading reading : readings) {
     ++counts[static_cast<std::size_t>(reading)];
@@ -54,7 +54,7 @@ void append(ContactEvidence& evidence, const TouchEvidence& touch,
   for (std::size_t level = 0; level < counts.size(); ++level) {
     evidence.counts[level] += counts[level];
     const auto reading = static_cast<Reading>(level);
-    if (counts[level] == 0 || reading == instead) {
+    if (counts[level] == 0 || reading == Reading::unknown) {
       continue;
     }
     const std::size_t first = evidence.from_pivot_mm.size();
@@ -68,8 +68,7 @@ void append(ContactEvidence& evidence, const TouchEvidence& touch,
       evidence.segments.push_back(
           {.begin = static_cast<shaders::uint>(begin),
            .end = static_cast<shaders::uint>(std::min(begin + segment_elements, end)),
-           .reading = static_cast<shaders::uint>(reading),
-           .instead = static_cast<shaders::uint>(instead)});
+           .reading = static_cast<shaders::uint>(reading)});
     }
   }
 }
@@ -83,18 +82,11 @@ void gather_into(ContactEvidence& evidence, std::span<const TouchEvidence> touch
   }
   clear(evidence, touches.size(), elements, segment_elements);
   for (const TouchEvidence& touch : touches) {
-    append(evidence, touch, touch.readings, Reading::unknown, pivot_mm, segment_elements);
+    append(evidence, touch, pivot_mm, segment_elements);
   }
 }
 
 }  // namespace
-
-bool ContactEvidence::operator==(const ContactEvidence& other) const {
-  const auto same = [](const shaders::Segment& a, const shaders::Segment& b) {
-    return a.begin == b.begin && a.end == b.end && a.reading == b.reading && a.instead == b.instead;
-  };
-  return from_pivot_mm == other.from_pivot_mm && std::ranges::equal(segments, other.segments, same);
-}
 
 ContactEvidence gather_evidence(std::span<const Touch> touches, const ContactModel& model,
                                 const glm::dvec2& pivot_mm, std::size_t segment_elements) {
@@ -112,15 +104,6 @@ std::span<const ContactEvidence> EvidenceGatherer::gather(std::span<const TouchE
     gather_into(evidence_[i], each ? touches.subspan(i, 1) : touches, pivot_mm, segment_elements);
   }
   return std::span(evidence_).first(parts);
-}
-
-ContactEvidence gather_evidence(const TouchEvidence& touch, std::span<const Reading> readings,
-                                Reading instead, const glm::dvec2& pivot_mm,
-                                std::size_t segment_elements, ContactEvidence reuse) {
-  ContactEvidence evidence = std::move(reuse);
-  clear(evidence, 1, readings.size(), segment_elements);
-  append(evidence, touch, readings, instead, pivot_mm, segment_elements);
-  return evidence;
 }
 
 shaders::Split split(double coordinate_cells) { return split(coordinate_cells, element_beyond); }

@@ -23,8 +23,6 @@ struct ContactEvidence {
   std::vector<glm::dvec2> from_pivot_mm;
   std::vector<shaders::Segment> segments;
   ReadingCounts counts{};  ///< of the whole touches, elements that stand in no segment included
-
-  bool operator==(const ContactEvidence& other) const;
   /// Number of elements of the whole touches.
   std::size_t elements() const { return std::reduce(counts.begin(), counts.end()); }
 };
@@ -46,14 +44,6 @@ class EvidenceGatherer {
  private:
   std::vector<ContactEvidence> evidence_;
 };
-
-/// Gathers the elements of a touch that have something else than `instead` among their readings,
-/// which stand for the touch's own. Each adds log L(reading) - log L(instead), with log L(Unknown)
-/// = 0: with No Contact, what the touch says beyond an array that reads No Contact everywhere.
-/// @param reuse memory for the result
-ContactEvidence gather_evidence(const TouchEvidence& touch, std::span<const Reading> readings,
-                                Reading instead, const glm::dvec2& pivot_mm,
-                                std::size_t segment_elements, ContactEvidence reuse = {});
 
 /// Splits an element's coordinate into whole cells and the rest. One beyond 2^29 cells, or that is
 /// no number, counts as off every map: its cell becomes so large that the sum with any cell of

@@ -21,30 +21,19 @@ constexpr double least_product_floor = 1e-3;
 
 std::uint32_t bits(double value) { return std::bit_cast<std::uint32_t>(static_cast<float>(value)); }
 
-/// The rows of a set: see row_of() in shaders/contact_likelihood.glsl.
 std::size_t nodes_of_a_set(const ContactModel& model) {
-  return model.table ? 2 * model.table->levels() * model.table->nodes : 0;
+  return model.table ? model.table->levels() * model.table->nodes : 0;
 }
 
-/// The log-likelihoods [level, node] of one set as ratios to Unknown and to No Contact.
+/// The log-likelihoods [level, node] of one set.
 void append_set(std::vector<shaders::TableNode>& nodes, const LikelihoodTable& table,
                 std::span<const double> log_likelihood) {
-  const auto append_row = [&](const auto& ratio) {
-    for (std::size_t i = 0; i < table.nodes; ++i) {
-      const double nats = ratio(i);
-      nodes.push_back({.nats = static_cast<float>(nats),
-                       .rise = static_cast<float>(ratio(std::min(i + 1, table.nodes - 1)) - nats)});
-    }
-  };
-  const auto at = [&](std::size_t level, std::size_t node) {
-    return log_likelihood[level * table.nodes + node];
-  };
   for (std::size_t level = 0; level < table.levels(); ++level) {
-    append_row([&](std::size_t i) { return at(level, i); });
-  }
-  append_row([&](std::size_t i) { return -at(0, i); });  // Unknown's
-  for (std::size_t level = 1; level < table.levels(); ++level) {
-    append_row([&](std::size_t i) { return at(level, i) - at(0, i); });
+    const std::span<const double> row = log_likelihood.subspan(level * table.nodes, table.nodes);
+    for (std::size_t i = 0; i < table.nodes; ++i) {
+      nodes.push_back({.nats = static_cast<float>(row[i]),
+                       .rise = static_cast<float>(row[std::min(i + 1, table.nodes - 1)] - row[i])});
+    }
   }
 }
 
@@ -61,8 +50,7 @@ std::vector<std::uint32_t> contact_constants(const gpu::Limits& limits, const Co
             0,
             bits(table->first_log_odds),
             bits(nodes_per_nat),
-            static_cast<std::uint32_t>(table->nodes),
-            static_cast<std::uint32_t>(table->levels())};
+            static_cast<std::uint32_t>(table->nodes)};
   }
   const double floor = model.gamma * model.prior.value();
   const bool as_logs = !(floor >= least_product_floor);
@@ -73,7 +61,6 @@ std::vector<std::uint32_t> contact_constants(const gpu::Limits& limits, const Co
           as_logs ? shaders::AS_LOGS : shaders::AS_PRODUCTS,
           bits(as_logs ? log_floor : floor),
           bits(1.0 - model.gamma),
-          0,
           0,
           0,
           0};

@@ -14,6 +14,7 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 #include <glm/common.hpp>
+#include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 
@@ -113,6 +114,16 @@ std::optional<SetupFinding> offset_of(const std::function<double(const Pose&)>& 
       sd};
 }
 
+/// How far an offset moves the elements, root mean square.
+double moved_mm(std::span<const glm::dvec2> elements_mm, const Pose& offset) {
+  double squares = 0.0;
+  for (const glm::dvec2& p : elements_mm) {
+    const glm::dvec2 moved = offset * p - p;
+    squares += glm::dot(moved, moved);
+  }
+  return std::sqrt(squares / static_cast<double>(elements_mm.size()));
+}
+
 }  // namespace
 
 double likeness_of_angles(const SetupJudge& judge, double rad) {
@@ -188,9 +199,11 @@ void check_offset(SetupJudge& judge, Setup& setup, double& nats, SetupCheck& che
     other.elements_mm = placed(setup.elements_mm, offset);
     return other;
   };
+  // Gains that differ from one side of the array to the other move the edges that it feels as much.
+  constexpr double least_moved_mm = 0.3;
   const auto finding =
       offset_of([&](const Pose& offset) { return judge.nats(setup_at(offset)); }, start);
-  if (finding) {
+  if (finding && moved_mm(setup.elements_mm, *finding->array_offset) > least_moved_mm) {
     check.findings.push_back(*finding);
     setup = setup_at(*finding->array_offset);
     nats = judge.nats(setup);

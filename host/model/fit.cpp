@@ -117,10 +117,10 @@ std::optional<Fit> fit_of(std::span<const Touch> touches, const Pose& T_object_r
 std::optional<Fit> evidence_fit(std::span<const TouchEvidence> touches, const Pose& T_object_robot,
                                 const OccupancyGrid& map, const ContactModel& contact,
                                 const DisplacementSd& touch_sd, std::size_t object) {
-  return fit_of(fit_sums(touches, T_object_robot, map, contact, touch_sd, object));
+  return combined_fit(fit_sums(touches, T_object_robot, map, contact, touch_sd, object));
 }
 
-std::optional<Fit> fit_of(std::span<const std::optional<FitSums>> sums) {
+std::optional<Fit> combined_fit(std::span<const std::optional<FitSums>> sums) {
   FitSums all;
   bool any_known = false;
   for (const std::optional<FitSums>& touch : sums) {

@@ -30,12 +30,6 @@ std::vector<glm::dvec2> grid_array(int columns, int rows, double pitch_mm) {
   return elements;
 }
 
-bool same_placement(const Touch& a, const Touch& b) {
-  return a.T_robot_sensor.translation_mm == b.T_robot_sensor.translation_mm &&
-         a.T_robot_sensor.theta_rad == b.T_robot_sensor.theta_rad &&
-         std::ranges::equal(a.elements_mm, b.elements_mm);
-}
-
 glm::dvec2 array_centre_mm(std::span<const glm::dvec2> elements_mm) {
   return elements_mm.empty() ? glm::dvec2(0.0) : bounding_box(elements_mm).middle();
 }

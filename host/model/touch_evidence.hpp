@@ -74,7 +74,7 @@ std::vector<std::optional<FitSums>> fit_sums(std::span<const TouchEvidence> touc
                                              const ContactModel& contact,
                                              const DisplacementSd& touch_sd, std::size_t object);
 /// The fit of these touches together; none where no element is known.
-std::optional<Fit> fit_of(std::span<const std::optional<FitSums>> sums);
+std::optional<Fit> combined_fit(std::span<const std::optional<FitSums>> sums);
 /// fit_of() of touches that are classified by `contact`.
 std::optional<Fit> evidence_fit(std::span<const TouchEvidence> touches, const Pose& T_object_robot,
                                 const OccupancyGrid& map, const ContactModel& contact,

@@ -63,7 +63,6 @@ class HistogramFilter final : public FilterInBins<PoseHistogram> {
  public:
   using FilterInBins::FilterInBins;
 
-  void prepare(const TouchEvidence& touch) override { own_.prepare(touch); }
   Marginals marginals(int object, const PoseLattice& /*lattice*/) const override {
     return own_.marginals(object);
   }
@@ -235,8 +234,7 @@ FilterTraits traits_of(const FilterOptions& options) {
                                                .every_bin = true,
                                                .touch_sd = one.touch_sd,
                                                .slip_sd = one.slip_sd,
-                                               .none_weight = one.none_weight,
-                                               .still_array = one.still_array};
+                                               .none_weight = one.none_weight};
                          },
                          [](const BoundedOptions& one) {
                            return FilterTraits{.bins = true,

@@ -43,7 +43,6 @@ struct FilterTraits {
   std::optional<double> none_weight = {};  ///< of "none of these"; particles have none
   std::optional<double> tolerance = {};    ///< of the certificate
   std::optional<double> budget_s = {};     ///< after which a search for the certificate ends
-  bool still_array = false;                ///< HistogramOptions::still_array
 };
 FilterTraits traits_of(const FilterOptions& options);
 
@@ -76,9 +75,6 @@ class Filter {
   /// @param touches classified by contact_of() the filter's options
   virtual void update(std::span<const TouchEvidence> touches,
                       const std::function<void(double)>& progress) = 0;
-  /// Does nothing where FilterTraits::every_bin is false: bounds search only once they are asked,
-  /// and particles cannot be weighed ahead, since weighing follows resampling and noise.
-  virtual void prepare(const TouchEvidence& /*touch*/) {}
 
   /// @param tolerance see BoundedPosterior::estimate(); ignored where FilterTraits::certificate is
   /// false

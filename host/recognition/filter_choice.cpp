@@ -215,8 +215,7 @@ ChosenBins chosen_bins(const std::function<Device&()>& device,
   const FilterTraits traits = traits_of(filter.options);
   const bool by_bounds =
       traits.certificate || (filter.automatic && bounded_instead(filter.options));
-  const std::int64_t most =
-      by_bounds ? most_bounded_bins : most_bins_on(device(), traits.still_array);
+  const std::int64_t most = by_bounds ? most_bounded_bins : most_bins_on(device());
   return {balanced_lattice(lattice_of(filter.options), hypotheses, most, width, traits.touch_sd,
                            traits.slip_sd),
           most};

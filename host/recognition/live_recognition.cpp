@@ -96,10 +96,6 @@ void LiveRecognition::between_touches(std::function<void()> work) {
 void LiveRecognition::push(Job job) {
   {
     const std::lock_guard lock(mutex_);
-    if (job.touch) {
-      // What has not begun to be evaluated ahead would now only hold up what comes.
-      std::erase_if(jobs_, [](const Job& waiting) { return waiting.under_way; });
-    }
     jobs_.push_back(std::move(job));
   }
   changed_.notify_all();
@@ -218,7 +214,6 @@ void LiveRecognition::take(TouchDetector& detector, const Frame& frame) {
     state_.counters = counters();
   }
   hand_on(touch);
-  hand_ahead(detector.candidate());
   const double now_s = time_.advance(frame.host_time_s);
   if (touching) {
     if (!was_touching_ && options_.reset_after_s && last_contact_s_ &&
@@ -240,15 +235,6 @@ void LiveRecognition::hand_on(const std::optional<DetectedTouch>& touch) {
     return;
   }
   push({.touch = touch, .taken = taken_, .frames_lost = counters().lost});
-}
-
-void LiveRecognition::hand_ahead(const std::optional<DetectedTouch>& candidate) {
-  if (!candidate) {
-    candidate_begin_s_.reset();
-  } else if (candidate_begin_s_ != candidate->begin_s && candidate->T_robot_sensor) {
-    candidate_begin_s_ = candidate->begin_s;
-    push({.touch = candidate, .under_way = true, .taken = taken_});
-  }
 }
 
 void LiveRecognition::believe() {
@@ -300,10 +286,6 @@ void LiveRecognition::begin_unknown() {
 void LiveRecognition::use(const Job& job) {
   if (job.work) {
     job.work();
-    return;
-  }
-  if (job.under_way) {
-    recogniser_.prepare(view_of(*job.touch));
     return;
   }
   const Touch touch = view_of(*job.touch);

@@ -67,8 +67,7 @@ struct LiveOptions {
 
 /// Recognises what a sensor's stream touches, from construction on. One thread reads frames and
 /// finds touches; another updates the belief, so that a slow update loses no frame. The first
-/// thread waits while 64 touches wait for the second. A press's steady phase is evaluated while the
-/// press is still being released, so that the estimate comes sooner.
+/// thread waits while 64 touches wait for the second.
 class LiveRecognition {
  public:
   /// Sensor, recogniser and task must outlive this object; nothing else may use sensor and
@@ -107,10 +106,9 @@ class LiveRecognition {
 
  private:
   using Clock = std::chrono::steady_clock;
-  /// A touch for the belief, now or in all likelihood, or other work between touches.
+  /// A touch for the belief, or other work between touches.
   struct Job {
     std::optional<DetectedTouch> touch = {};
-    bool under_way = false;
     Clock::time_point taken = {};
     std::uint64_t frames_lost = 0;
     std::function<void()> work = {};
@@ -129,7 +127,6 @@ class LiveRecognition {
   SensorCounters counters() const;
   void take(TouchDetector& detector, const Frame& frame);
   void hand_on(const std::optional<DetectedTouch>& touch);
-  void hand_ahead(const std::optional<DetectedTouch>& candidate);
   bool wait_for_room();
   void believe();
   void use(const Job& job);
@@ -169,7 +166,6 @@ class LiveRecognition {
   std::optional<double> last_frame_s_;
   std::optional<double> last_contact_s_;  ///< of time_
   bool was_touching_ = false;
-  std::optional<double> candidate_begin_s_;
 
   std::vector<UsedTouch> used_;  ///< of the unknown; of the believing thread alone
 

@@ -67,22 +67,4 @@ void Recogniser::update(std::span<const Touch> touches,
   std::ranges::move(more, std::back_inserter(evidence_));
 }
 
-void Recogniser::prepare(const Touch& touch) {
-  if (!traits_.every_bin) {
-    return;
-  }
-  TouchEvidence evidence(touch, contact_);
-  if (by_place_) {
-    evidence = places_.weighed(evidence);
-  }
-  if (lacks_pivot()) {
-    // A touch that comes after waiting touches is taken in together with them, not by itself.
-    if (!evidence_.empty() || !evidence.in_contact()) {
-      return;
-    }
-    place_pivot(evidence);
-  }
-  filter_->prepare(evidence);
-}
-
 }  // namespace palpate

@@ -33,10 +33,6 @@ class Recogniser {
   /// belief together with that touch; until then the belief is the one before any touch.
   /// `progress` is called now and then with the fraction done.
   void update(std::span<const Touch> touches, const std::function<void(double)>& progress = {});
-  /// Evaluates a touch that is likely to come next; see PoseHistogram::prepare(). Does nothing
-  /// with a touch that would wait for an automatic pivot, and nothing where Filter::prepare() does
-  /// not.
-  void prepare(const Touch& touch);
   /// See Filter::estimate().
   Estimate estimate(std::optional<double> tolerance = {}) const {
     return filter_->estimate(tolerance);

@@ -140,13 +140,13 @@ StepFit fit_of(const Mode& mode, const std::optional<RefinedPose>& refined,
   }
   const std::vector<std::optional<FitSums>> sums =
       fit_sums(touches, refined->T_object_robot, map, task.contact(), task.touch_sd(), object);
-  StepFit result{.fit = scale.of(palpate::fit_of(sums).value(), in_contact)};
+  StepFit result{.fit = scale.of(combined_fit(sums).value(), in_contact)};
   FitScale of_one = scale;
   if (in_contact > 1) {
     of_one.alone.reset();  // the pose is that of all touches
   }
   for (const std::optional<FitSums>& touch : sums) {
-    const std::optional<Fit> fit = palpate::fit_of(std::span(&touch, 1));
+    const std::optional<Fit> fit = combined_fit(std::span(&touch, 1));
     result.touches.push_back(fit ? std::optional(of_one.of(*fit, 1).z) : std::nullopt);
   }
   return result;
@@ -205,16 +205,6 @@ std::optional<Pose> RecognitionStep::true_T_robot_object() const {
 
 PartialTruth partial_truth(const std::string& object, const std::optional<Truth>& truth) {
   return truth ? PartialTruth{truth->object, truth->T_object_robot} : PartialTruth{object, {}};
-}
-
-bool array_is_still(std::span<const Unknown> unknowns) {
-  constexpr std::size_t large = 256;
-  const auto is_press = [&](const Unknown& unknown) {
-    return unknown.frame && unknown.touches.size() == 1 &&
-           same_placement(unknown.touches.front(), unknowns.front().touches.front());
-  };
-  return unknowns.size() > 1 && std::all_of(unknowns.begin(), unknowns.end(), is_press) &&
-         unknowns.front().touches.front().elements_mm.size() >= large;
 }
 
 void RecognitionRecord::require_steps() const {
@@ -284,16 +274,19 @@ RecognitionStep take_step(Recogniser& recogniser, const RecognitionTask& task,
       step.warnings.push_back(*std::move(warning));
     }
     const auto placement = judge_placement(recogniser, estimate, task, step);
-    auto unlike = unlike_touches(evidence, task, step);
-    // One touch that is far off looks as if all were a little, but for its own fit.
-    if (placement && (placement->moved_after > 0 || !unlike)) {
+    const std::vector<std::size_t> unlike = unlike_touches(evidence, step);
+    // One touch that is far off looks as if all were a little, or as if the object had moved, but
+    // for the fits of the others.
+    const bool all_after_a_move =
+        placement && placement->moved_after + unlike.size() == evidence.size();
+    if (placement && (unlike.empty() || all_after_a_move)) {
       step.decision = {false, placement_words(*placement, task)};
       step.warnings.push_back(placement_warning(*placement, task));
-    } else if (unlike) {
+    } else if (!unlike.empty()) {
+      step.warnings.push_back(unlike_words(unlike, task, step));
       if (placement) {
-        step.decision = {false, *unlike};
+        step.decision = {false, step.warnings.back()};
       }
-      step.warnings.push_back(*std::move(unlike));
     }
   }
   if (std::string words = recogniser.place_words(); !words.empty()) {

@@ -33,10 +33,6 @@ struct Unknown {
   std::string error = {};  ///< why the touches are missing, such as a file that cannot be read
 };
 
-/// Whether the unknowns are single presses of one large array that stays in its place, so that
-/// HistogramOptions::still_array saves time.
-bool array_is_still(std::span<const Unknown> unknowns);
-
 /// Where a belief lies. Probabilities are those of RecognitionStep::identity, shared among a
 /// label's maps by their evidence and among an object's poses by the belief, in which the task's
 /// temperature weighs a label's modes as it weighs labels.

@@ -256,7 +256,7 @@ RecognitionTask resolve(const Request& request, const Circumstances& of) {
   std::vector<std::string> remarks;
   const std::optional<SensorFromFile> learned = sensor_of(request, of, hypotheses, remarks);
   const LearnedSensor* sensor = learned ? &learned->sensor : nullptr;
-  HistogramOptions histogram{.still_array = of.still_array};
+  HistogramOptions histogram;
   ContactModel& contact = histogram.contact;
   const auto [classifier, gamma] = contact_rules(request, of, sensor);
   if (sensor == nullptr || !sensor->table) {

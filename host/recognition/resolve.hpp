@@ -25,7 +25,6 @@ struct Circumstances {
   std::string pressure_unit;  ///< of the touches to come
   std::string source;         ///< that gives them, for messages
   double reach_mm = 0.0;      ///< of the largest array that touches; see array_reach_mm()
-  bool still_array = false;   ///< HistogramOptions::still_array
   CallerNeed need = {};
   /// Gives the device that recognises. Called where counts of bins follow from its memory, and
   /// where maps of unlike priors are built again.

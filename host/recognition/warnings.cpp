@@ -161,37 +161,41 @@ std::optional<std::string> pose_untold(std::span<const TouchEvidence> touches,
 
 }  // namespace
 
-std::optional<std::string> unlike_touches(std::span<const TouchEvidence> touches,
-                                          const RecognitionTask& task,
-                                          const RecognitionStep& step) {
-  constexpr double unlike_z =
-      -10.0;  // of learned letters that lie as said two in a hundred have one
+std::vector<std::size_t> unlike_touches(std::span<const TouchEvidence> touches,
+                                        const RecognitionStep& step) {
+  constexpr double unlike_z = -10.0;  // of nine touches of a letter 2 in 100 have one
   constexpr std::size_t least_others = 3;
-  std::vector<std::size_t> unlike;  // counted from 1
+  std::vector<std::size_t> unlike;
   std::size_t others = 0;
-  double lowest_z = 0.0;
   for (std::size_t i = 0; i < step.touch_fit.size(); ++i) {
     const std::optional<double>& z = step.touch_fit[i];
     if (z && *z < unlike_z) {
-      unlike.push_back(i + 1);
-      lowest_z = std::min(lowest_z, *z);
+      unlike.push_back(i);
     } else if (z && *z < fits_from_z) {
       return {};  // where many fit badly, none stands out
     } else if (z && touches[i].in_contact()) {
       ++others;
     }
   }
-  if (unlike.empty() || others < std::max(least_others, 2 * unlike.size())) {
-    return {};
+  return others < std::max(least_others, 2 * unlike.size()) ? std::vector<std::size_t>() : unlike;
+}
+
+std::string unlike_words(std::span<const std::size_t> unlike, const RecognitionTask& task,
+                         const RecognitionStep& step) {
+  double lowest_z = 0.0;
+  std::vector<std::size_t> numbers;
+  for (const std::size_t touch : unlike) {
+    lowest_z = std::min(lowest_z, *step.touch_fit[touch]);
+    numbers.push_back(touch + 1);
   }
   const std::string name = task.name_of(step.mode.object);
   const bool one = unlike.size() == 1;
-  const bool last =
-      unlike.back() == touches.size() && unlike.front() + unlike.size() == touches.size() + 1;
+  const bool last = unlike.front() + unlike.size() == step.touch_fit.size();
   return fmt::format(
-      "touch{} {} fit{} {} {:.0f} standard deviations worse than touches of {} do, while the other "
-      "{} fit: {}",
-      one ? "" : "es", fmt::join(unlike, ", "), one ? "s" : "", name, -lowest_z, name, others,
+      "touch{} {} fit{} {} {:.0f} standard deviations worse than touches of {} do, while the "
+      "others "
+      "fit: {}",
+      one ? "" : "es", fmt::join(numbers, ", "), one ? "s" : "", name, -lowest_z, name,
       last  ? "did the object move, or does the array touch something else?"
       : one ? "leave it out, or look at its pose"
             : "leave them out, or look at their poses");

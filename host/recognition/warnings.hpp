@@ -22,10 +22,13 @@ std::vector<std::string> warnings_about(std::span<const TouchEvidence> touches,
                                         const RecognitionTask& task, const PoseLattice& lattice,
                                         const RecognitionStep& step);
 
-/// Which touches disagree where all others fit the mode's object at the pose: by touch_fit, a third
-/// of them at most, and the others are three or more in contact. Else none.
-std::optional<std::string> unlike_touches(std::span<const TouchEvidence> touches,
-                                          const RecognitionTask& task, const RecognitionStep& step);
+/// The touches, from 0, that disagree where all others fit the mode's object at the pose: by
+/// touch_fit, a third of them at most, and the others are three or more in contact. Else none.
+std::vector<std::size_t> unlike_touches(std::span<const TouchEvidence> touches,
+                                        const RecognitionStep& step);
+/// What to say of these touches.
+std::string unlike_words(std::span<const std::size_t> unlike, const RecognitionTask& task,
+                         const RecognitionStep& step);
 
 /// The n-fold symmetry of the mode's object as far as touches tell: its map's, or where that is 1
 /// and the belief spreads over turns after which the map looks the same, the one that the map shows

@@ -340,7 +340,6 @@ std::optional<DetectedTouch> TouchDetector::finish() {
   return touch;
 }
 
-const std::optional<DetectedTouch>& TouchDetector::candidate() const { return impl().best; }
 bool TouchDetector::touching() const { return impl().touching; }
 const std::vector<double>& TouchDetector::smoothed() const { return impl().smoother.means(); }
 const std::vector<double>& TouchDetector::baseline() const { return impl().rest.rest(); }

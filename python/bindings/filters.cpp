@@ -152,23 +152,21 @@ void bind_histogram(nb::module_& module) {
           .def(
               "__init__",
               [](Histogram* self, const std::shared_ptr<Session>& device, const MapsLike& maps,
-                 const PoseLattice& lattice, const ContactModel& contact, bool still_array,
+                 const PoseLattice& lattice, const ContactModel& contact,
                  std::optional<double> none_weight, const DisplacementSdLike& touch_sd,
                  const DisplacementSdLike& slip_sd) {
                 const HistogramOptions options{.lattice = lattice,
                                                .contact = contact,
-                                               .still_array = still_array,
                                                .none_weight = none_weight,
                                                .touch_sd = sd_of(touch_sd, "touch_sd"),
                                                .slip_sd = sd_of(slip_sd, "slip_sd")};
                 new (self) Histogram(make_filter<PoseHistogram>(device, maps, options));
               },
               "device"_a, "maps"_a, "lattice"_a = PoseLattice{}, nb::kw_only(),
-              "contact"_a = ContactModel{}, "still_array"_a = false, "none_weight"_a = nb::none(),
+              "contact"_a = ContactModel{}, "none_weight"_a = nb::none(),
               "touch_sd"_a = DisplacementSd{}, "slip_sd"_a = DisplacementSd{},
-              "Starts with a uniform belief. still_array: the array stays in one place; "
-              "none_weight:\n"
-              "prior weight of \"none of these\"; touch_sd: how far the sensor may have been from\n"
+              "Starts with a uniform belief. none_weight: prior weight of \"none of these\";\n"
+              "touch_sd: how far the sensor may have been from\n"
               "where it was said to be; slip_sd: how far the object moves between touches.\n\n"
               "Raises Error on maps that are not sound or differ in their prior, on options out "
               "of\n"
@@ -316,8 +314,7 @@ void bind_bounded(nb::module_& module) {
               "device"_a, "maps"_a, "lattice"_a = PoseLattice{}, nb::kw_only(),
               "contact"_a = ContactModel{}, "tolerance"_a = BoundedOptions{}.tolerance,
               "budget_s"_a = nb::none(), "evidence_nats"_a = nb::none(),
-              "none_weight"_a = nb::none(), "touch_sd"_a = DisplacementSd{},
-              "threads"_a = 0,
+              "none_weight"_a = nb::none(), "touch_sd"_a = DisplacementSd{}, "threads"_a = 0,
               "tolerance: largest total variation distance from the posterior over all bins;\n"
               "budget_s: seconds after which estimate() reports what it has proven by then;\n"
               "evidence_nats: bounds every map's log evidence, too; touch_sd: how far off the\n"

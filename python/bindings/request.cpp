@@ -211,7 +211,6 @@ RecognitionTask task_of(const Subject& subject, Device& device, const CallerNeed
   return resolve(subject.request, {.pressure_unit = first.pressure_unit,
                                    .source = first.path,
                                    .reach_mm = largest_reach_mm(subject.recordings),
-                                   .still_array = array_is_still(subject.unknowns),
                                    .need = need,
                                    .device = [&device]() -> Device& { return device; }});
 }

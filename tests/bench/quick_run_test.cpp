@@ -80,23 +80,6 @@ TEST(PalpateBench, QuickRunFillsTheDocumentAndKeepsTheErrorBounds) {
   EXPECT_GT(value_of(cases.at("latency 25x25x16"), "device, by its clock"), 0.0);
 }
 
-TEST(PalpateBench, EveryWayToEvaluateTheLikelihoodIsExact) {
-  const ScratchFolder folder;
-  const std::string file = folder / "paths.json";
-  ASSERT_EQ(run_bench("paths --quick --json " + file), 0);
-  const auto document = nlohmann::json::parse(std::ifstream(file));
-  std::map<std::string, int> paths;
-  for (const auto& way : document.at("precisions")) {
-    EXPECT_GT(way.at("nanoseconds"), 0.0);
-    EXPECT_LT(way.at("deviation_nats").at("largest"), 1e-4) << way.at("path");
-    const std::string path = way.at("path");
-    ++paths[path.substr(0, path.find(' '))];
-  }
-  for (const char* path : {"register", "runs", "in", "array", "one-bin", "CPU"}) {
-    EXPECT_GT(paths[path], 0) << path;
-  }
-}
-
 TEST(PalpateBench, RefusesAFileThatCannotBeWrittenBeforeItMeasures) {
   const ScratchFolder folder;
   EXPECT_EQ(

@@ -12,9 +12,9 @@ class BatchFiles : public BatchTest {
   void make_task(const std::string& head, const std::string& input) const {
     fs::create_directories(folder_ / "r/chunks");
     put_bytes(folder_ / "r/task.ndjson",
-              fmt::format(R"({{"format":"palpate.batch","version":3,"program":"0","inputs":1,)"
+              fmt::format(R"({{"format":"palpate.batch","version":4,"program":"0","inputs":1,)"
                           R"("unknowns":1,{},"maps":[],"files":{{}},"pressure_unit":"kPa",)"
-                          R"("unit_from":"","reach_mm":1,"still_array":false,"bins":[1,1,1]}})"
+                          R"("unit_from":"","reach_mm":1,"bins":[1,1,1]}})"
                           "\n{}\n",
                           head, input));
   }
@@ -98,9 +98,9 @@ TEST_F(BatchFiles, ATaskOfAnotherVersionOrWithUnknownOptionsIsRefused) {
     changed.replace(changed.find(old), old.size(), text);
     put_bytes(folder_ / "r/task.ndjson", changed);
   };
-  with("\"version\":3", "\"version\":2");
+  with("\"version\":4", "\"version\":3");
   expect_refused({"merge", "r"}, {"r/task.ndjson", "of an older palpate", "remove the folder"});
-  with("\"version\":3", "\"version\":4");
+  with("\"version\":4", "\"version\":5");
   expect_refused({"merge", "r"}, {"r/task.ndjson", "use a newer palpate"});
   for (const char* option : {"\"speed\":\"1\",", "\"x-mm\":\"1\",", "\"trace\":\"yes\","}) {
     with("\"options\":{", std::string("\"options\":{") + option);

@@ -111,17 +111,6 @@ TEST_F(Updates, OfUncertainTouchesSlipAndNoneAllocateNothingAfterTheFirst) {
   }
 }
 
-TEST_F(Updates, OfAStillArrayAllocateNothingAfterTheFirst) {
-  HistogramOptions still{.lattice = small_lattice(), .still_array = true};
-  HistogramOptions with_none = still;
-  with_none.none_weight = 1.0;
-  for (const HistogramOptions& options : {still, with_none}) {
-    PoseHistogram filter(device_, maps_, options);
-    // The array moves from touch to touch: what is evaluated for its place is evaluated anew.
-    expect_none_after_the_first(filter);
-  }
-}
-
 TEST_F(Updates, ByATableAllocateNothingAfterTheFirst) {
   const LikelihoodTable table{.nodes = 2,
                               .level_edges = {10.0, 20.0},

@@ -35,10 +35,9 @@ const std::vector<Hypothesis>& objects() {
   return two;
 }
 
-HistogramOptions options_of(bool still) {
+HistogramOptions with_none() {
   HistogramOptions options;
   options.lattice = {.x_mm = {-3.0, 3.0, 11}, .y_mm = {-2.0, 2.0, 9}, .theta_rad = {0.0, 3.0, 4}};
-  options.still_array = still;
   options.none_weight = 0.3;
   return options;
 }
@@ -62,7 +61,7 @@ std::vector<double> told_by(const ParticleFilter& filter) {
 }
 
 /// Presses of an array at rest, mostly No Contact; the last touch has a pose that is no number.
-class AllOrNothing : public testing::TestWithParam<bool> {
+class AllOrNothing : public testing::Test {
  protected:
   AllOrNothing() {
     recording.elements_mm.resize(60);
@@ -80,26 +79,21 @@ class AllOrNothing : public testing::TestWithParam<bool> {
   std::vector<Touch> touches;
 };
 
-TEST_P(AllOrNothing, OfTouchesOneOfWhichIsNotSoundNoneIsTakenIn) {
-  PoseHistogram histogram(device, objects(), options_of(GetParam()));
+TEST_F(AllOrNothing, OfTouchesOneOfWhichIsNotSoundNoneIsTakenIn) {
+  PoseHistogram histogram(device, objects(), with_none());
   histogram.update(touches[0]);
   const auto before = told_by(histogram);
   expect_refused([&] { histogram.update(touches); }, "T_robot_sensor is not finite");
   EXPECT_EQ(told_by(histogram), before);
-  if (!GetParam()) {  // an array at rest prepares nothing
-    expect_refused([&] { histogram.prepare(touches[3]); }, "T_robot_sensor is not finite");
-    EXPECT_EQ(told_by(histogram), before);
-  }
   histogram.update(std::span(touches).subspan(1, 2));
-  PoseHistogram sound(device, objects(), options_of(GetParam()));
+  PoseHistogram sound(device, objects(), with_none());
   sound.update(std::span(touches).first(3));
   EXPECT_EQ(told_by(histogram), told_by(sound)) << "as if nothing had been refused";
 }
 
-TEST_P(AllOrNothing, AnUpdateThatIsBrokenOffLeavesABeliefThatSaysSo) {
-  PoseHistogram histogram(device, objects(), options_of(GetParam()));
+TEST_F(AllOrNothing, AnUpdateThatIsBrokenOffLeavesABeliefThatSaysSo) {
+  PoseHistogram histogram(device, objects(), with_none());
   const auto update = [&] {
-    histogram.prepare(touches[1]);  // or else a small belief is done before there is any progress
     histogram.update(std::span(touches).subspan(1, 1),
                      [](double) { throw std::runtime_error("broken off"); });
   };
@@ -115,21 +109,17 @@ TEST_P(AllOrNothing, AnUpdateThatIsBrokenOffLeavesABeliefThatSaysSo) {
   EXPECT_GT(histogram.device_bytes(), 0U);
   histogram.reset();
   histogram.update(std::span(touches).first(2));
-  PoseHistogram sound(device, objects(), options_of(GetParam()));
+  PoseHistogram sound(device, objects(), with_none());
   sound.update(std::span(touches).first(2));
   EXPECT_EQ(told_by(histogram), told_by(sound)) << "begun anew";
 }
-
-INSTANTIATE_TEST_SUITE_P(Histogram, AllOrNothing, testing::Bool(), [](const auto& test) {
-  return std::string(test.param ? "OfAStillArray" : "OfAnyArray");
-});
 
 TEST(Histogram, ProgressThatThrowsBetweenTwoPartsOfAnUpdate) {
   Device device = Device::open();
   gpu::Limits limits = device.context().limits();
   limits.cpu = true;  // so that half a billion bins and elements are a part
   device.context().lower_limits(limits);
-  HistogramOptions options = options_of(false);
+  HistogramOptions options = with_none();
   options.lattice = {.x_mm = {-3, 3, 60}, .y_mm = {-3, 3, 60}, .theta_rad = {0, 3, 60}};
   const Recording recording = random_recording(200, 100, 174);
   PoseHistogram histogram(device, objects(), options);
@@ -229,14 +219,14 @@ TEST(MapBuilder, RoomForMoreNeverCostsWhatIsNeeded) {
 TEST(MovedFrom, HistogramsSaySo) {
   Device device = Device::open();
   const Recording recording = random_recording(1, 36, 178);
-  PoseHistogram first(device, objects(), options_of(false));
+  PoseHistogram first(device, objects(), with_none());
   PoseHistogram second(std::move(first));
   second.update(recording.touch(0));
   for (const auto& call : std::vector<std::function<void()>>{
            [&] { first.reset(); }, [&] { first.update(recording.touch(0)); },
-           [&] { first.prepare(recording.touch(0)); }, [&] { first.estimate(); },
-           [&] { first.refine({}); }, [&] { first.marginals(0); }, [&] { first.log_likelihood(0); },
-           [&] { first.lattice(); }, [&] { first.paths(); }, [&] { first.device_bytes(); }}) {
+           [&] { first.estimate(); }, [&] { first.refine({}); }, [&] { first.marginals(0); },
+           [&] { first.log_likelihood(0); }, [&] { first.lattice(); }, [&] { first.paths(); },
+           [&] { first.device_bytes(); }}) {
     expect_refused(call, "histogram: was moved from");
   }
   first = std::move(second);

@@ -62,28 +62,6 @@ TEST(GatherEvidence, OfUnknownElementsIsEmpty) {
   EXPECT_TRUE(evidence.segments.empty());
 }
 
-TEST(GatherEvidence, InsteadOfAReadingKeepsTheElementsThatReadSomethingElse) {
-  const Recording recording = random_recording(1, 36, 34);
-  const TouchEvidence touch(recording.touch(0), {});
-  const std::vector<Reading>& readings = touch.readings;
-  const ContactEvidence evidence =
-      gather_evidence(touch, readings, Reading::no_contact, {}, segment_elements);
-  std::vector<std::uint64_t> gathered(most_reading_levels + 1);
-  for (const shaders::Segment& segment : evidence.segments) {
-    EXPECT_EQ(segment.instead, shaders::NO_CONTACT);
-    gathered[segment.reading] += segment.end - segment.begin;
-  }
-  EXPECT_EQ(gathered[shaders::NO_CONTACT], 0U);
-  for (const Reading reading : {Reading::in_contact, Reading::unknown}) {
-    const auto i = static_cast<std::size_t>(reading);
-    EXPECT_EQ(gathered[i], evidence.counts[i]);
-  }
-  for (std::size_t i = 0; i < evidence.counts.size(); ++i) {
-    EXPECT_EQ(evidence.counts[i], static_cast<std::uint64_t>(std::count(
-                                      readings.begin(), readings.end(), static_cast<Reading>(i))));
-  }
-}
-
 TEST(Split, AddsUpToTheCoordinate) {
   for (const double at : {0.0, 0.25, -0.25, -1.0, 1234.5678, -98765.4321, 1e-20, -1e-20, 3e8}) {
     const shaders::Split parts = split(at);

@@ -98,35 +98,16 @@ class EveryWay : public testing::Test {
       const HistogramOptions options = options_of(step_mm, contact);
       const HistogramOptions other = options_of(step_mm, expected);
       const std::vector<Touch> moving = all_touches(moving_);
-      const std::vector<Touch> resting = all_touches(resting_);
       const reference::Posterior of_moving = reference_posterior(objects(), other, moving);
-      const reference::Posterior of_resting = reference_posterior(objects(), other, resting);
 
       PoseHistogram histogram(device_, objects(), options);
       histogram.update(moving);
       EXPECT_LT(likelihood_error(histogram, of_moving), 3 * nats_per_touch) << step_mm << " mm";
-
-      histogram.reset();
-      for (const Touch& touch : moving) {
-        histogram.prepare(touch);
-        histogram.update(touch);
-      }
-      EXPECT_LT(likelihood_error(histogram, of_moving), 3 * nats_per_touch)
-          << "prepared, " << step_mm << " mm";
-
-      HistogramOptions still = options;
-      still.still_array = true;
-      PoseHistogram at_rest(device_, objects(), still);
-      at_rest.update(resting);
-      // An element that is not in No Contact counts twice.
-      EXPECT_LT(likelihood_error(at_rest, of_resting), 6 * nats_per_touch)
-          << "at rest, " << step_mm << " mm";
     }
   }
 
   Device device_ = Device::open();
   Recording moving_ = random_recording(3, 36, 76);
-  Recording resting_ = presses();
 };
 
 TEST_F(EveryWay, GivesTheReferenceOfATable) {
@@ -242,7 +223,7 @@ TEST_F(EveryWay, RefusesATableOfOtherObjectsOrTooLargeForTheDevice) {
   };
   refuse(learned(2), "2 objects, but there are 3 maps");
   gpu::Limits limits = device_.context().limits();
-  limits.table_texels = 15'000;  // of the 3 sets' 15,630
+  limits.table_texels = 7'500;  // of the 3 sets' 7,815
   device_.context().lower_limits(limits);
   refuse(learned(3), "use fewer nodes");
 }

@@ -26,7 +26,7 @@ PoseLattice lattice_about(const glm::dvec2& pivot) {
           .pivot_mm = pivot};
 }
 
-/// Touches of a still array near the pivot, mostly No Contact.
+/// Touches near the pivot, mostly No Contact.
 Recording recording_near_pivot() {
   Recording recording = random_recording(3, 60, 183);
   recording.elements_mm.resize(60);
@@ -48,10 +48,10 @@ void expect_pivot_refused(Filter& filter, const glm::dvec2& pivot, const std::st
   }
 }
 
-class MovedPivot : public testing::TestWithParam<bool> {
+class MovedPivot : public testing::Test {
  protected:
-  HistogramOptions options(const glm::dvec2& pivot) const {
-    return {.lattice = lattice_about(pivot), .still_array = GetParam()};
+  static HistogramOptions options(const glm::dvec2& pivot) {
+    return {.lattice = lattice_about(pivot)};
   }
 
   Device device = Device::open();
@@ -59,7 +59,7 @@ class MovedPivot : public testing::TestWithParam<bool> {
   std::vector<Touch> touches = all_touches(recording);
 };
 
-TEST_P(MovedPivot, MakesAHistogramWhatItIsWithThePivotFromTheStart) {
+TEST_F(MovedPivot, MakesAHistogramWhatItIsWithThePivotFromTheStart) {
   PoseHistogram moved(device, objects(), options({0.0, 0.0}));
   moved.update(touches);  // about another pivot, which nothing may be left of
   moved.reset();
@@ -80,7 +80,7 @@ TEST_P(MovedPivot, MakesAHistogramWhatItIsWithThePivotFromTheStart) {
   EXPECT_EQ(moved.refine(mode).covariance, built.refine(mode).covariance);
 }
 
-TEST_P(MovedPivot, StaysWhereItIsWhileThereAreTouchesAboutIt) {
+TEST_F(MovedPivot, StaysWhereItIsWhileThereAreTouchesAboutIt) {
   PoseHistogram histogram(device, objects(), options({1.0, 2.0}));
   histogram.update(touches[0]);
   const std::vector<double> before = histogram.log_likelihood(0);
@@ -94,13 +94,7 @@ TEST_P(MovedPivot, StaysWhereItIsWhileThereAreTouchesAboutIt) {
   EXPECT_EQ(histogram.lattice().pivot_mm, glm::dvec2(1.0, 2.0)) << "also over reset()";
 }
 
-INSTANTIATE_TEST_SUITE_P(Histogram, MovedPivot, testing::Bool(), [](const auto& test) {
-  return std::string(test.param ? "OfAStillArray" : "OfAnyArray");
-});
-
-TEST(MovedPivot, CarriesTheParticlesWithIt) {
-  Device device = Device::open();
-  const Recording recording = recording_near_pivot();
+TEST_F(MovedPivot, CarriesTheParticlesWithIt) {
   const auto options = [](const glm::dvec2& pivot) {
     return ParticleOptions{.particles = 500, .region = lattice_about(pivot), .seed = 3};
   };

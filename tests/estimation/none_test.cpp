@@ -142,32 +142,6 @@ TEST(NoneOfThese, ChangesNeitherTheModeNorTheOddsBetweenObjects) {
               2 * per_mean);
 }
 
-TEST(NoneOfThese, OfAStillArrayIsTheSame) {
-  const std::vector<Hypothesis> objects = two_objects();
-  Recording recording = random_recording(4, 60, 156);
-  for (Pose& pose : recording.T_robot_sensor) {
-    pose = {{0.4, -0.3}, 0.2};
-  }
-  for (std::size_t i = 0; i < recording.pressure.size(); ++i) {
-    // The last touch has few No Contact elements and takes the plain way.
-    if (i % 60 != 0 && i % 5 != 0 && i < 180) {
-      recording.pressure[i] = 0.0;
-    }
-  }
-  HistogramOptions options = with_none(1e-6);
-  Device device = Device::open();
-  PoseHistogram plain(device, objects, options);
-  options.still_array = true;
-  PoseHistogram still(device, objects, options);
-  for (std::size_t i = 0; i < recording.size(); ++i) {
-    plain.update(recording.touch(i));
-    still.update(recording.touch(i));
-    // Rounding of the two ways, some 1e-4 nats per 36 elements and touch.
-    EXPECT_NEAR(still.estimate().none, plain.estimate().none, 1e-3) << "touch " << i;
-    EXPECT_EQ(still.estimate().contradicted, plain.estimate().contradicted);
-  }
-}
-
 TEST(NoneOfThese, WithAWeightThatIsNotPositiveIsRefused) {
   Device device = Device::open();
   for (const double weight : {0.0, -1.0, nan, infinity}) {

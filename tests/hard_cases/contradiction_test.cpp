@@ -55,8 +55,6 @@ TEST(Contradiction, CertainMapsWithoutGamma) {
     options.lattice.x_mm.upper = options.lattice.x_mm.lower + bins_mm;
     options.lattice.y_mm.upper = options.lattice.y_mm.lower + bins_mm;
     hard.expect_posterior(device, objects, options, all_touches(recording), seven_digits);
-    options.still_array = true;
-    hard.expect_posterior(device, objects, options, all_touches(recording), seven_digits);
   }
 }
 

@@ -15,7 +15,6 @@ constexpr Allowed long_run(int touches, double near_top_nats, double identity) {
 }
 
 constexpr int most_touches = sanitized ? 1'000 : 10'000;
-constexpr int still_touches = sanitized ? 1'000 : 4'000;
 
 /// Two objects so similar that thousands of touches hardly distinguish them.
 std::vector<Hypothesis> near_twins() {
@@ -68,25 +67,6 @@ TEST(LongRun, TheSameTouchTenThousandTimes) {
                                       most_touches / 100,
                                       long_run(most_touches, 0.05, 1e-2));  // 1.8e-2 seen
   }
-}
-
-TEST(LongRun, TouchesOneByOneOfAStillArray) {
-  HardCase hard("4,000 touches of a still array, one by one",
-                "every touch adds a shared base and takes back what it says otherwise",
-                "base and differences are two floats; 0.01 nats near the top");
-  const std::vector<Hypothesis> objects = near_twins();
-  HistogramOptions options = near_the_top(4);  // register tiles
-  options.still_array = true;
-  Recording recording = random_recording(2, 36, 405);
-  recording.T_robot_sensor[1] = recording.T_robot_sensor[0];
-  // Most elements are No Contact, so that the kernels use the base.
-  for (std::size_t i = 0; i < recording.pressure.size(); ++i) {
-    recording.pressure[i] = i % 8 == 0 ? 10.0 : i % 8 == 1 ? 2.0 : 1.0 * static_cast<double>(i % 2);
-  }
-  Device device = Device::open();
-  hard.expect_posterior_of_repeated(device, objects, options, all_touches(recording),
-                                    still_touches / 2,
-                                    long_run(still_touches, 0.01, 5e-3));  // 2.9e-3 seen
 }
 
 }  // namespace palpate::long_run_test

@@ -40,11 +40,7 @@ TEST(Size, AMapOfOneCell) {
                                         {random_map(1, 9, 1.0, 6.0, 455), 1.0}};
   const Recording recording = random_recording(4, 36, 456);
   Device device = Device::open();
-  for (const bool still : {false, true}) {
-    HistogramOptions options = small_options();
-    options.still_array = still;
-    hard.expect_posterior(device, objects, options, all_touches(recording));
-  }
+  hard.expect_posterior(device, objects, small_options(), all_touches(recording));
 }
 
 TEST(Size, CellsOfTwoHundredthsOfAMillimetre) {
@@ -83,17 +79,9 @@ TEST(Size, FourThousandElements) {
                                         {random_map(31, 31, 1.0, 6.0, 462), 1.0}};
   // 1,024 logarithms per bin with errors of some 1e-7 nats each: 4.7e-4 and 3.5e-5 nats are seen.
   constexpr Allowed per_36{.nats = 4e-3, .near_top_nats = 3e-4};
-  Recording recording = random_recording(2, 4096, 463);
+  const Recording recording = random_recording(2, 4096, 463);
   Device device = Device::open();
   hard.expect_posterior(device, objects, small_options(), all_touches(recording), per_36);
-  // The array rests and most elements are No Contact, so that the kernels use the base.
-  recording.T_robot_sensor[1] = recording.T_robot_sensor[0];
-  for (std::size_t i = 0; i < recording.pressure.size(); ++i) {
-    recording.pressure[i] = i % 7 == 0 ? 10.0 : i % 7 == 1 ? 2.0 : 0.5;
-  }
-  HistogramOptions options = small_options();
-  options.still_array = true;
-  hard.expect_posterior(device, objects, options, all_touches(recording), per_36);
   hard.expect_map(device, recording.touches(0, 1), {.cell_mm = 1.0});
 }
 

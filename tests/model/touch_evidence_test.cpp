@@ -98,11 +98,11 @@ TEST(FitSums, AreOfEachTouchAndAddUp) {
     const auto sums = fit_sums(touches, pose, map, contact, sd, 0);
     ASSERT_EQ(sums.size(), 3u);
     EXPECT_FALSE(sums[1]) << "tells nothing";
-    EXPECT_EQ(fit_of(std::span(sums).first(1))->z,
+    EXPECT_EQ(combined_fit(std::span(sums).first(1))->z,
               evidence_fit(std::span(touches).first(1), pose, map, contact, sd, 0)->z);
-    EXPECT_DOUBLE_EQ(fit_of(sums)->z, (sums[0]->deviation + sums[2]->deviation) /
+    EXPECT_DOUBLE_EQ(combined_fit(sums)->z, (sums[0]->deviation + sums[2]->deviation) /
                                           std::sqrt(sums[0]->variance + sums[2]->variance));
-    EXPECT_FALSE(fit_of(std::span(sums).subspan(1, 1)));
+    EXPECT_FALSE(combined_fit(std::span(sums).subspan(1, 1)));
   }
 }
 

@@ -40,10 +40,9 @@ TEST(ChosenBins, FollowUncertainTouches) {
 
 TEST(ChosenBins, AreCoarserWhereTheDeviceHoldsFewer) {
   Device device = Device::open();
-  const ChosenBins bins =
-      chosen(device, HistogramOptions{.lattice = wide_lattice(), .still_array = true});
+  const ChosenBins bins = chosen(device, HistogramOptions{.lattice = wide_lattice()});
   ASSERT_TRUE(bins.balanced.coarsened);
-  EXPECT_EQ(bins.most_bins, most_bins_on(device, true));
+  EXPECT_EQ(bins.most_bins, most_bins_on(device));
   EXPECT_LE(2 * bins.balanced.lattice.bins(), bins.most_bins);
   EXPECT_GT(bins.balanced.step_mm, balanced_step * 0.5) << "of cells of 0.5 mm";
 }
@@ -61,8 +60,7 @@ TEST(ChosenBins, AreNotLimitedByTheDeviceWhereBoundsMayTakeThem) {
   }
   HistogramOptions slips = histogram;
   slips.slip_sd.mm = 1.0;
-  EXPECT_LE(chosen(device, slips, true).most_bins, most_bins_on(device, false))
-      << "each bin takes memory";
+  EXPECT_LE(chosen(device, slips, true).most_bins, most_bins_on(device)) << "each bin takes memory";
 }
 
 /// A histogram of so many bins of each object.
@@ -110,8 +108,6 @@ TEST(FilterForBins, IsTheHistogramForWhatBoundsRefuse) {
   };
   using Options = HistogramOptions;
   EXPECT_TRUE(takes([](Options&) {}));
-  EXPECT_TRUE(takes([](Options& options) { options.still_array = true; }))
-      << "the rule is the same for a still array";
   EXPECT_FALSE(takes([](Options& options) { options.lattice.y_mm.count = 100'000; }))
       << "too large for both; the histogram says so";
   EXPECT_TRUE(takes([](Options& options) { options.touch_sd.rad = 0.1; }));

@@ -116,6 +116,14 @@ TEST_F(PlacementJudge, SaysAfterWhichTouchAnObjectMovedAndByHowMuch) {
   }
 }
 
+TEST_F(PlacementJudge, TakesNoMoveFromASingleTouch) {
+  for (const std::size_t after : {1, 8}) {  // of nine: one touch fits anywhere
+    const RecognitionStep step =
+        last_step(moved(letter_touches("E", 9, 23), after, {{5.4, 7.2}, 0.0}));
+    EXPECT_THAT(step.warnings, Not(Contains(HasSubstr("seems to have moved")))) << after;
+  }
+}
+
 TEST_F(PlacementJudge, TakesTheTouchSdThatIsToldAsExplained) {
   const RecognitionTask told(learned_letters(device_), with_none(1.0));
   Recogniser recogniser(device_, told);

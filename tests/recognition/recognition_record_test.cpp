@@ -323,27 +323,6 @@ TEST(PartialTruth, IsTheTruthOrElseTheObjectThatIsNamed) {
   EXPECT_TRUE(known.T_object_robot);
 }
 
-TEST(ArrayIsStill, ForPressesOfOneLargeArrayInOnePlace) {
-  const std::vector<glm::dvec2> elements_mm(256);
-  const std::vector<double> pressure(256);
-  const Touch touch{.T_robot_sensor = {}, .elements_mm = elements_mm, .pressure = pressure};
-  const Unknown press{.recording = "rest.h5", .frame = 0, .touches = {touch}};
-  std::vector<Unknown> unknowns(3, press);
-  EXPECT_TRUE(array_is_still(unknowns));
-  EXPECT_FALSE(array_is_still(std::span(unknowns).first(1))) << "nothing to share";
-  unknowns[1].frame.reset();
-  EXPECT_FALSE(array_is_still(unknowns)) << "recordings by themselves";
-  unknowns[1] = press;
-  unknowns[1].touches.front().T_robot_sensor.translation_mm.x = 1e-9;
-  EXPECT_FALSE(array_is_still(unknowns));
-  unknowns[1] = {.recording = "gone.h5", .frame = 1, .error = "gone.h5: cannot be read"};
-  EXPECT_FALSE(array_is_still(unknowns));
-  EXPECT_FALSE(array_is_still({}));
-  Unknown small = press;
-  small.touches.front().elements_mm = small.touches.front().elements_mm.first(255);
-  EXPECT_FALSE(array_is_still(std::vector<Unknown>(3, small)));
-}
-
 TEST(RecordJson, HasFitAndWarningsWhereTheStepHas) {
   RecognitionTask task(shapes(), every_filter()[0]);
   task.map_paths.assign(task.hypotheses.size(), "shape.map.h5");

@@ -98,6 +98,18 @@ TEST(TouchPlaces, ForgetTouchesAndLookAhead) {
   EXPECT_EQ(share(places.add(touch_at({}))), 1.0);
 }
 
+TEST(TouchPlaces, TouchesOfOnePoseAreNotEqualWhereTheirPressuresDiffer) {
+  static const std::vector<glm::dvec2> elements_mm = grid_array(6, 6, spacing_mm);
+  TouchPlaces places;
+  for (const double kpa : {10.0, 11.0}) {
+    std::vector<double> pressure(elements_mm.size());
+    std::fill_n(pressure.begin(), 9, kpa);
+    places.add({{{}, elements_mm, pressure}, {}});
+  }
+  EXPECT_EQ(places.words().find("equal an earlier one"), std::string::npos) << places.words();
+  EXPECT_NE(places.words(), "") << "they lie close together";
+}
+
 TEST(TouchPlaces, SayWhichTouchesAreWrittenAgainOrLieClose) {
   TouchPlaces places;
   for (int i = 0; i < 3; ++i) {

@@ -368,7 +368,7 @@ TEST_F(Warnings, ATouchThatDisagreesIsNamed) {
   };
   EXPECT_THAT(said({}), IsEmpty());
   EXPECT_THAT(said({3}), ElementsAre(AllOf(HasSubstr("touch 4 fits E "),
-                                           HasSubstr("while the other 8 fit: leave it out"))));
+                                           HasSubstr("while the others fit: leave it out"))));
   EXPECT_THAT(said({8}), ElementsAre(AllOf(HasSubstr("touch 9 fits E "),
                                            HasSubstr("did the object move, or"))));
 }

@@ -266,30 +266,6 @@ TEST(TouchDetector, OfASlideTheLongestRestCounts) {
   EXPECT_NEAR(touches[0].end_s - touches[0].begin_s, 2.0, 0.15);
 }
 
-TEST(TouchDetector, KnowsTheTouchBeforeItsRelease) {
-  TouchDetector detector({}, {}, {});
-  std::optional<DetectedTouch> candidate;
-  double known_s = 0.0;
-  std::size_t touches = 0;
-  for (const Frame& frame : PressStream{.rate_hz = 1000.0}.frames(3.0, presses)) {
-    const std::optional<DetectedTouch> touch = detector.add(frame);
-    if (touch) {
-      ++touches;
-      ASSERT_TRUE(candidate);
-      EXPECT_EQ(touch->pressure, candidate->pressure);
-      EXPECT_EQ(touch->begin_s, candidate->begin_s);
-      EXPECT_EQ(touch->end_s, candidate->end_s);
-      EXPECT_GT(frame.host_time_s - known_s, 0.02) << "of the 0.1 s that a release takes";
-      EXPECT_FALSE(detector.candidate());
-      candidate.reset();
-    } else if (!candidate && detector.candidate()) {
-      candidate = detector.candidate();
-      known_s = frame.host_time_s;
-    }
-  }
-  EXPECT_EQ(touches, 3u);
-}
-
 TEST(TouchDetector, RefusesWhatCannotBe) {
   const auto refused = [](TouchDetectorOptions options) {
     return input_error([&] { TouchDetector(options, {}, {}); });
@@ -319,7 +295,6 @@ TEST(TouchDetector, ThatWasMovedFromSaysSo) {
   // NOLINTBEGIN(bugprone-use-after-move): on purpose
   EXPECT_THROW(first.add({}), Error);
   EXPECT_THROW(first.finish(), Error);
-  EXPECT_THROW(first.candidate(), Error);
   EXPECT_THROW(first.touching(), Error);
   EXPECT_THROW(first.baseline(), Error);
   // NOLINTEND(bugprone-use-after-move)

@@ -56,8 +56,7 @@ double count_of(double extent, double step) { return std::max(1.0, std::ceil(ext
 
 BalancedLattice balanced_lattice(const PoseLattice& region, std::span<const Hypothesis> hypotheses,
                                  std::int64_t most_bins, BinWidth width,
-                                 const DisplacementSd& touch_sd,
-                                 const DisplacementSd& slip_sd) {
+                                 const DisplacementSd& touch_sd, const DisplacementSd& slip_sd) {
   validate_hypotheses(hypotheses);
   PoseLattice lattice = region;
   for (Axis* axis : {&lattice.x_mm, &lattice.y_mm, &lattice.theta_rad}) {
@@ -75,10 +74,10 @@ BalancedLattice balanced_lattice(const PoseLattice& region, std::span<const Hypo
   const double wider_turns =
       may_widen ? widening(touch_sd.rad * longest_mm, slip_sd.rad * longest_mm, wanted_mm) : 1.0;
   // Shorter by as much as their steps are wider.
-  const double extents_mm[] = {(lattice.x_mm.upper - lattice.x_mm.lower) / wider,
-                               (lattice.y_mm.upper - lattice.y_mm.lower) / wider,
-                               (lattice.theta_rad.upper - lattice.theta_rad.lower) * longest_mm /
-                                   wider_turns};
+  const double extents_mm[] = {
+      (lattice.x_mm.upper - lattice.x_mm.lower) / wider,
+      (lattice.y_mm.upper - lattice.y_mm.lower) / wider,
+      (lattice.theta_rad.upper - lattice.theta_rad.lower) * longest_mm / wider_turns};
   const auto bins = [&](double step_mm) {
     double product = static_cast<double>(hypotheses.size());
     for (const double extent_mm : extents_mm) {
@@ -129,9 +128,9 @@ TouchRegion touch_region(std::span<const Hypothesis> hypotheses, double reach_mm
   return region;
 }
 
-std::int64_t most_bins_on(const Device& device, bool still_array) {
+std::int64_t most_bins_on(const Device& device) {
   constexpr std::uint64_t bytes_per_bin = 8;
-  const std::uint64_t held = device.memory_bytes() / 2 / (still_array ? 2 : 1) / bytes_per_bin;
+  const std::uint64_t held = device.memory_bytes() / 2 / bytes_per_bin;
   return static_cast<std::int64_t>(std::min(held, static_cast<std::uint64_t>(most_balanced_bins)));
 }
 

@@ -6,7 +6,6 @@
 
 #include <fmt/format.h>
 
-#include "shaders/add_belief.hpp"
 #include "shaders/interface.h"
 #include "shaders/reduce_belief.hpp"
 #include "shaders/sum_marginals.hpp"
@@ -66,12 +65,7 @@ DenseBelief::DenseBelief(gpu::Context& context, gpu::CommandStream& stream,
                     .bindings = {Access::table, Access::storage, Access::storage},
                     .push_bytes = sizeof(shaders::MarginalPush),
                     .constants = {marginal_.lanes, marginal_.side_by_side, marginal_.pairs_per_lane,
-                                  marginal_.thetas, lattice.x_mm.count % 2 == 0 ? 1U : 0U}}),
-      add_(context, {.name = "add_belief",
-                     .spirv = shaders::add_belief,
-                     .bindings = {Access::table, Access::storage},
-                     .push_bytes = sizeof(shaders::AddPush),
-                     .constants = {independent_lanes(context.limits())}}) {
+                                  marginal_.thetas, lattice.x_mm.count % 2 == 0 ? 1U : 0U}}) {
   for (const SlabExtent& extent : cut(context, lattice, objects)) {
     slabs_.push_back(
         {extent, gpu::Buffer(context, extent.bytes(), gpu::Memory::device,
@@ -92,18 +86,6 @@ std::vector<SlabExtent> DenseBelief::cut(const gpu::Context& context, const Pose
 void DenseBelief::clear() const {
   for (const Slab& slab : slabs_) {
     stream_.fill(slab.log_likelihood, 0);
-  }
-}
-
-void DenseBelief::add(const DenseBelief& other) const {
-  const std::uint32_t lanes = independent_lanes(context_.limits());
-  for (std::size_t i = 0; i < slabs_.size(); ++i) {
-    const std::int64_t bins = slabs_[i].object_count * slabs_[i].stride();
-    const std::int64_t row = std::min(bins, std::int64_t{context_.limits().group_count[0]} * lanes);
-    const shaders::AddPush push{.bins = static_cast<shaders::uint>(bins),
-                                .row = static_cast<shaders::uint>(row)};
-    stream_.dispatch(add_, {&other.slabs_[i].log_likelihood, &slabs_[i].log_likelihood}, push,
-                     {groups_of(row, lanes), groups_of(bins, push.row), 1});
   }
 }
 

@@ -43,8 +43,6 @@ class DenseBelief {
 
   /// Records the return to uniform.
   void clear() const;
-  /// Records the addition of another dense belief over the same lattice and objects.
-  void add(const DenseBelief& other) const;
   std::span<const Slab> slabs() const { return slabs_; }
   std::uint64_t device_bytes() const;
 
@@ -84,7 +82,6 @@ class DenseBelief {
   MarginalSizes marginal_;
   gpu::Kernel reduce_;
   gpu::Kernel sum_marginals_;
-  gpu::Kernel add_;
   gpu::Buffer partials_;  ///< of all slabs in order
   std::size_t partial_count_ = 0;
   mutable std::vector<shaders::Partial> read_partials_;  ///< memory that summarise() keeps

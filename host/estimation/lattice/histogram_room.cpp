@@ -28,9 +28,7 @@ double belief_mib(const PoseLattice& lattice, std::size_t objects) {
 void require_room(const gpu::Context& context, const HistogramOptions& options,
                   std::size_t objects) {
   const PoseLattice& lattice = options.lattice;
-  // For a still array, No Contact everywhere; and a touch by itself.
-  const int beliefs =
-      1 + (options.still_array ? 1 : 0) + (TouchByTouch::wanted_by(options) ? 1 : 0);
+  const int beliefs = TouchByTouch::wanted_by(options) ? 2 : 1;  // a touch by itself
   const double needed_mib = beliefs * belief_mib(lattice, objects);
   if (needed_mib > memory_mib(context)) {
     throw Error(
@@ -40,13 +38,6 @@ void require_room(const gpu::Context& context, const HistogramOptions& options,
                     objects, lattice.x_mm.count, lattice.y_mm.count, lattice.theta_rad.count,
                     std::ceil(needed_mib), context.name(), memory_mib(context)));
   }
-}
-
-bool has_room_to_prepare(const gpu::Context& context, const HistogramOptions& options,
-                         std::size_t objects) {
-  // A still array prepares no touch, and a touch by itself has memory of its own.
-  return !options.still_array && !TouchByTouch::wanted_by(options) &&
-         4.0 * belief_mib(options.lattice, objects) <= memory_mib(context);
 }
 
 }  // namespace palpate

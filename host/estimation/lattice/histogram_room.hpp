@@ -11,8 +11,4 @@ namespace palpate {
 void require_room(const gpu::Context& context, const HistogramOptions& options,
                   std::size_t objects);
 
-/// Whether one more belief, of a touch that may come next, leaves room for all else.
-bool has_room_to_prepare(const gpu::Context& context, const HistogramOptions& options,
-                         std::size_t objects);
-
 }  // namespace palpate

@@ -31,14 +31,10 @@ struct PoseHistogram::Impl {
         stream(device.context()),
         belief(device.context(), stream, options.lattice, hypotheses.size()),
         likelihood(device.context(), stream, belief, hypotheses, options.lattice, options.contact),
-        prepared(stream, has_room_to_prepare(device.context(), options, hypotheses.size())),
         predictor(hypotheses, options.contact),
         log_weight(log_weights(hypotheses)) {
     for (const Hypothesis& hypothesis : hypotheses) {
       bodies.push_back(displaced_body(hypothesis.map));
-    }
-    if (options.still_array) {
-      still.emplace(options.lattice);
     }
     if (TouchByTouch::wanted_by(options)) {
       by_touch.emplace(device.context(), stream, options, hypotheses, log_weight, belief);
@@ -49,51 +45,29 @@ struct PoseHistogram::Impl {
     summaries();  // runs what was recorded, and the reductions a first time
   }
 
-  /// Gathers touches: each by itself where updates want it so, or else all together.
-  std::span<const ContactEvidence> gather(std::span<const TouchEvidence> touches) {
-    return gatherer.gather(touches, by_touch.has_value(), options.lattice.pivot_mm,
-                           likelihood.segment_elements());
-  }
-
   /// Eq. 13: the log-belief of a bin is the sum of the touches' log-likelihoods there (Eq. 7).
   void update(std::span<const TouchEvidence> touches, const std::function<void(double)>& progress) {
-    const std::span<const StillTouch> still_touches =
-        still ? still->gather(touches, likelihood.segment_elements()) : std::span<StillTouch>();
-    const std::span<const ContactEvidence> evidence =
-        by_touch || !still ? gather(touches) : std::span<ContactEvidence>();
+    const std::span<const ContactEvidence> evidence = gatherer.gather(
+        touches, by_touch.has_value(), options.lattice.pivot_mm, likelihood.segment_elements());
     change.change([&] {
       touched = touched || !touches.empty();
       summarised.reset();
       if (by_touch) {
-        update_by_touch(touches, evidence, still_touches, progress);
-      } else if (still) {
-        still->accumulate(still_touches, likelihood, belief, progress);
-      } else if (prepared.holds(evidence.front())) {
-        prepared.accumulate(belief, progress);
+        update_by_touch(touches, evidence, progress);
       } else {
         likelihood.accumulate(evidence.front(), belief, progress);
       }
-      if (!still) {
-        prior_log_likelihood += palpate::prior_log_likelihood(evidence, options.contact);
-      }
-      for (const StillTouch& one : still_touches) {
-        prior_log_likelihood += palpate::prior_log_likelihood(one.evidence.counts, options.contact);
-      }
+      prior_log_likelihood += palpate::prior_log_likelihood(evidence, options.contact);
     });
   }
 
   /// Updates as above where each touch's likelihood is wanted by itself.
   void update_by_touch(std::span<const TouchEvidence> touches,
                        std::span<const ContactEvidence> evidence,
-                       std::span<const StillTouch> still_touches,
                        const std::function<void(double)>& progress) {
     for (std::size_t i = 0; i < touches.size(); ++i) {
       const auto evaluate = [&](const DenseBelief& uniform) {
-        if (still) {
-          still->accumulate(still_touches.subspan(i, 1), likelihood, uniform, {});
-        } else {
-          likelihood.accumulate(evidence[i], uniform, {});
-        }
+        likelihood.accumulate(evidence[i], uniform, {});
       };
       // std::function would allocate a copy of it.
       by_touch->update(touches[i], evidence[i], std::cref(evaluate), belief);
@@ -169,10 +143,8 @@ struct PoseHistogram::Impl {
   gpu::CommandStream stream;
   DenseBelief belief;
   DenseLikelihood likelihood;
-  std::optional<StillArray> still;        ///< where the options say so
   std::vector<TouchEvidence> classified;  ///< room for touches that are not classified
   EvidenceGatherer gatherer;
-  PreparedTouch prepared;
   ReadingPredictor predictor;  ///< of touches that are only imagined
   std::vector<double> log_weight;
   std::optional<TouchByTouch> by_touch;   ///< where the options need each touch by itself
@@ -181,8 +153,7 @@ struct PoseHistogram::Impl {
   std::vector<Body> bodies;
   bool touched = false;  ///< since reset()
   std::optional<std::vector<BeliefSummary>> summarised;
-  ChangeInSteps change{
-      "histogram: an update or a prepared touch was broken off half-way; call reset()"};
+  ChangeInSteps change{"histogram: an update was broken off half-way; call reset()"};
   OwnProcess process;
 };
 
@@ -248,26 +219,6 @@ void PoseHistogram::update(std::span<const Touch> touches,
 void PoseHistogram::update(std::span<const TouchEvidence> touches,
                            const std::function<void(double)>& progress) {
   whole().update(touches, progress);
-}
-
-void PoseHistogram::prepare(const Touch& touch) {
-  prepare(TouchEvidence(touch, whole().options.contact));
-}
-
-void PoseHistogram::prepare(const TouchEvidence& touch) {
-  Impl& histogram = whole();
-  ContactEvidence evidence = histogram.gather(std::span(&touch, 1)).front();
-  if (histogram.by_touch && !histogram.still) {
-    histogram.change.change([&] {
-      histogram.by_touch->prepare(evidence, [&](const DenseBelief& uniform) {
-        histogram.likelihood.accumulate(evidence, uniform, {});
-      });
-    });
-  } else if (histogram.prepared.has_room() && histogram.prepared.make_room(histogram.belief)) {
-    // A device that fails also drops what reset() has recorded of the belief.
-    histogram.change.change(
-        [&] { histogram.prepared.evaluate(std::move(evidence), histogram.likelihood); });
-  }
 }
 
 Estimate PoseHistogram::estimate() const {
@@ -390,8 +341,6 @@ std::vector<std::string> PoseHistogram::paths() const { return impl().likelihood
 std::uint64_t PoseHistogram::device_bytes() const {
   const Impl& histogram = impl();
   return histogram.belief.device_bytes() + histogram.likelihood.device_bytes() +
-         histogram.prepared.device_bytes() +
-         (histogram.still ? histogram.still->device_bytes() : 0) +
          (histogram.by_touch ? histogram.by_touch->device_bytes() : 0);
 }
 

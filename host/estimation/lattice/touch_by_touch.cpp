@@ -113,34 +113,15 @@ void TouchByTouch::reset() {
   felt_ = false;
 }
 
-void TouchByTouch::evaluate_planes(const std::function<void(const DenseBelief&)>& evaluate) {
-  scratch_.clear();
-  evaluate(scratch_);
-  touch_blur_.blur_planes(scratch_, scratch_, references_);
-}
-
-void TouchByTouch::prepare(ContactEvidence evidence,
-                           const std::function<void(const DenseBelief&)>& evaluate) {
-  if (slip_blur_) {
-    return;
-  }
-  prepared_.reset();
-  evaluate_planes(evaluate);
-  stream_.run();
-  prepared_ = std::move(evidence);
-}
-
 void TouchByTouch::update(const TouchEvidence& touch, const ContactEvidence& evidence,
                           const std::function<void(const DenseBelief&)>& evaluate,
                           DenseBelief& belief) {
   if (slip_blur_ && touched_) {
     slip(belief);
   }
-  const bool is_prepared = prepared_ == evidence;
-  prepared_.reset();
-  if (!is_prepared) {
-    evaluate_planes(evaluate);
-  }
+  scratch_.clear();
+  evaluate(scratch_);
+  touch_blur_.blur_planes(scratch_, scratch_, references_);
   const glm::dvec2& pivot_mm = options_.lattice.pivot_mm;
   touch_blur_.turn_for(touch.T_robot_sensor.translation_mm - pivot_mm);
   touch_blur_.sum_turns(scratch_, belief);

@@ -78,9 +78,6 @@ class TouchByTouch {
   /// Adds a touch. `evaluate` adds its log-likelihood at every bin to a belief that is uniform.
   void update(const TouchEvidence& touch, const ContactEvidence& evidence,
               const std::function<void(const DenseBelief&)>& evaluate, DenseBelief& belief);
-  /// Evaluates a touch that may come next; an update() with the same evidence need not. Does
-  /// nothing where objects slip: the memory is needed for the slip that comes first.
-  void prepare(ContactEvidence evidence, const std::function<void(const DenseBelief&)>& evaluate);
   /// Forgets all touches.
   void reset();
 
@@ -95,7 +92,6 @@ class TouchByTouch {
 
  private:
   void slip(DenseBelief& belief);
-  void evaluate_planes(const std::function<void(const DenseBelief&)>& evaluate);
   void add_to_none(const ArrayRectangle& array);
 
   gpu::CommandStream& stream_;
@@ -106,7 +102,6 @@ class TouchByTouch {
   DisplacementBlur touch_blur_;
   std::optional<DisplacementBlur> slip_blur_;
   std::optional<OverlapMean> overlap_;
-  std::optional<ContactEvidence> prepared_;  ///< of what scratch_ holds, blurred along x and y
   std::vector<double> lost_mass_;
   // Memory that updates share.
   std::vector<TwoFloat> references_;  ///< all 0

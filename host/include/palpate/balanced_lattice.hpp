@@ -68,7 +68,7 @@ struct TouchRegion {
 PALPATE_API TouchRegion touch_region(std::span<const Hypothesis> hypotheses, double reach_mm);
 
 /// The number of bins, of all objects together, that fill half of the device's memory; at most
-/// `most_balanced_bins`. A bin takes 8 bytes, or 16 where `still_array` doubles the belief.
-PALPATE_API std::int64_t most_bins_on(const Device& device, bool still_array);
+/// `most_balanced_bins`. A bin takes 8 bytes.
+PALPATE_API std::int64_t most_bins_on(const Device& device);
 
 }  // namespace palpate

@@ -21,11 +21,6 @@ namespace palpate {
 struct HistogramOptions {
   PoseLattice lattice;
   ContactModel contact = {};  ///< what the sensor says about a place (Eq. 3, 7)
-  /// True where the array stays in one place from touch to touch, like a large array under a table
-  /// of objects. The filter then evaluates No Contact everywhere once, and of each touch only the
-  /// elements that read something else. The result differs by rounding only. The filter takes twice
-  /// the memory.
-  bool still_array = false;
   /// Prior weight W of "none of these", an object that was never learned, relative to the
   /// hypotheses' weights. Positive; by default "none of these" is left out.
   ///
@@ -80,15 +75,6 @@ class PALPATE_API PoseHistogram {
   /// Touches that are classified by the options' contact model already.
   PALPATE_LOCAL void update(std::span<const TouchEvidence> touches,
                             const std::function<void(double)>& progress);
-
-  /// Evaluates the touch that is likely to come next, before it ends. An update() with this touch
-  /// alone, of the same readings at the same place, then only adds the result, which differs by
-  /// rounding only. The belief does not change before. The first call takes memory for a second
-  /// belief; where the device or the limit has too little, and for a still array, prepare() does
-  /// nothing.
-  /// @throws Error on a touch that is not sound, or if the device fails
-  void prepare(const Touch& touch);
-  PALPATE_LOCAL void prepare(const TouchEvidence& touch);
 
   /// Identity probabilities (Eq. 14) and mode (Eq. 15-16). Of equal bins the mode is the lowest bin
   /// of the first object.

@@ -44,9 +44,6 @@ struct Touch {
 /// A touch that is classified already. The library keeps it to itself.
 struct TouchEvidence;
 
-/// True where both touches have exactly the same pose and element centres.
-PALPATE_API bool same_placement(const Touch& a, const Touch& b);
-
 /// The centre of the box around the elements, in mm in the frame of the elements; (0, 0) without
 /// elements. The sensor frame's origin may lie elsewhere, such as at the robot's flange.
 PALPATE_API glm::dvec2 array_centre_mm(std::span<const glm::dvec2> elements_mm);

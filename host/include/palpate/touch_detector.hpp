@@ -77,9 +77,6 @@ class PALPATE_API TouchDetector {
   /// detection.
   std::optional<DetectedTouch> finish();
 
-  /// Returns the longest finished steady phase of the touch under way, which the release returns
-  /// unless a longer one follows; none before. Only add() and finish() change it.
-  const std::optional<DetectedTouch>& candidate() const;
   /// True between onset and release.
   bool touching() const;
   /// Returns the smoothed pressures of the last frame, [e] above the baseline, on which onset and

@@ -31,7 +31,6 @@ RecognitionTask resolve_batch(BatchTask& task, const Request& request,
       resolve(request, {.pressure_unit = inferred.pressure_unit,
                         .source = inferred.unit_from,
                         .reach_mm = inferred.reach_mm,
-                        .still_array = inferred.still_array,
                         .device = device,
                         .counts = settled ? std::optional(task.bins) : std::nullopt});
   const PoseLattice& lattice = recognition.lattice();

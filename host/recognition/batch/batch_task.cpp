@@ -21,7 +21,7 @@ using OrderedJson = nlohmann::ordered_json;
 namespace fs = std::filesystem;
 
 constexpr const char* format = "palpate.batch";
-constexpr int version = 3;
+constexpr int version = 4;
 /// Far more than anyone recognises, and few enough to count and to keep a bit for each.
 constexpr std::size_t most_unknowns = 1'000'000'000;
 
@@ -73,7 +73,7 @@ OrderedJson to_json(const BatchEntry& entry) {
     json["modified_ns"] = entry.stamp->modified_ns;
   }
   if (const auto& survey = entry.survey) {
-    json["survey"] = {survey->touches, survey->reach_mm, survey->pressure_unit, survey->placement};
+    json["survey"] = {survey->touches, survey->reach_mm, survey->pressure_unit};
   }
   return json;
 }
@@ -91,7 +91,7 @@ BatchEntry entry_of(const OrderedJson& json) {
   }
   if (json.contains("survey")) {
     const OrderedJson& survey = json.at("survey");
-    entry.survey = InputSurvey{count_of(survey.at(0)), survey.at(1), survey.at(2), survey.at(3)};
+    entry.survey = InputSurvey{count_of(survey.at(0)), survey.at(1), survey.at(2)};
   }
   return entry;
 }
@@ -122,7 +122,6 @@ OrderedJson head_to_json(const BatchTask& task) {
           {"pressure_unit", inferred.pressure_unit},
           {"unit_from", to_utf8(inferred.unit_from)},
           {"reach_mm", inferred.reach_mm},
-          {"still_array", inferred.still_array},
           {"bins", task.bins}};
 }
 
@@ -145,8 +144,7 @@ BatchTask head_of(const OrderedJson& json) {
   for (const auto& [file, hash] : json.at("files").items()) {
     task.files[from_utf8(file)] = hash;
   }
-  task.inferred = {json.at("pressure_unit"), from_utf8(json.at("unit_from")), json.at("reach_mm"),
-                   json.at("still_array")};
+  task.inferred = {json.at("pressure_unit"), from_utf8(json.at("unit_from")), json.at("reach_mm")};
   json.at("bins").get_to(task.bins);
   return task;
 }

@@ -40,7 +40,6 @@ struct InputSurvey {
   std::size_t touches = 1;    ///< that are used; 1 where it cannot be read
   double reach_mm = 0.0;      ///< the largest array_reach_mm() of its touches
   std::string pressure_unit;  ///< "" where it cannot be read
-  std::string placement;      ///< hash of pose and array where all touches share them, or ""
 };
 
 struct BatchEntry {
@@ -54,7 +53,6 @@ struct BatchInference {
   std::string pressure_unit = "kPa";
   std::string unit_from;  ///< the first input that can be read
   double reach_mm = 0.0;
-  bool still_array = false;
 };
 
 /// What a results folder computes: the content of its task file, in whose absence nothing is

@@ -98,25 +98,6 @@ void read_pattern(const std::string& pattern, std::vector<BatchEntry>& inputs) {
   ::globfree(&found);
 }
 
-template <typename Value>
-std::string_view bytes_of(std::span<const Value> values) {
-  return {reinterpret_cast<const char*>(values.data()), values.size_bytes()};
-}
-
-/// The hash of the pose and the array that all touches share; "" where they differ.
-std::string placement_of(std::span<const Unknown> unknowns) {
-  const Touch& first = unknowns.front().touches.front();
-  for (const Unknown& unknown : unknowns) {
-    for (const Touch& touch : unknown.touches) {
-      if (!same_placement(touch, first)) {
-        return "";
-      }
-    }
-  }
-  return hash_of(std::string(bytes_of(std::span(&first.T_robot_sensor, 1))) +
-                 std::string(bytes_of(first.elements_mm)));
-}
-
 /// @param inferred whose pressure unit the recording must have; none: any unit will do
 /// @throws Error (Fault::input) where the recording is at fault
 ReadInput read_input(RecordingReader& reader, const BatchInput& input, const Request& request,
@@ -141,14 +122,9 @@ InputSurvey survey_of(RecordingReader& reader, const BatchEntry& entry, const Re
     const ReadInput read = read_input(reader, entry.input, request, nullptr);
     InputSurvey survey{.touches = 0,
                        .reach_mm = largest_reach_mm(std::span(read.recording.get(), 1)),
-                       .pressure_unit = read.recording->pressure_unit,
-                       .placement = ""};
+                       .pressure_unit = read.recording->pressure_unit};
     for (const Unknown& unknown : read.unknowns) {
       survey.touches += unknown.touches.size();
-    }
-    // Only single presses of large arrays are at rest to any use; see array_is_still().
-    if (array_is_still(read.unknowns) || (request.each_frame && read.unknowns.size() == 1)) {
-      survey.placement = placement_of(read.unknowns);
     }
     return survey;
   } catch (const Error& error) {
@@ -159,27 +135,7 @@ InputSurvey survey_of(RecordingReader& reader, const BatchEntry& entry, const Re
   }
 }
 
-/// As array_is_still() of all unknowns together.
-bool is_still(std::span<const BatchEntry> inputs, const Request& request,
-              const BatchInference& inferred) {
-  // A broken recording has no array that could move.
-  const auto broken = [](const BatchEntry& entry) { return entry.survey->pressure_unit.empty(); };
-  const auto first = std::ranges::find_if_not(inputs, broken);
-  if (!request.each_frame || first == inputs.end() || first->survey->placement.empty() ||
-      first->survey->pressure_unit != inferred.pressure_unit) {
-    return false;
-  }
-  std::size_t presses = 0;
-  for (const BatchEntry& entry : inputs) {
-    if (!broken(entry) && entry.survey->placement != first->survey->placement) {
-      return false;
-    }
-    presses += entry.survey->touches;
-  }
-  return presses > 1;
-}
-
-constexpr const char* begin_again = "begin again, palpate batch with `update`";
+constexpr const char* begin_again = "begin again, in another folder";
 
 /// Unknowns that have the error of their recording.
 ReadInput broken_input(const BatchInput& input, std::size_t count, const Request& request,
@@ -307,7 +263,6 @@ BatchInference infer(std::span<const BatchEntry> inputs, const Request& request)
     for (const BatchEntry& entry : inputs) {
       inferred.reach_mm = std::max(inferred.reach_mm, entry.survey->reach_mm);
     }
-    inferred.still_array = is_still(inputs, request, inferred);
   }
   return inferred;
 }

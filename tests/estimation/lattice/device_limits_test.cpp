@@ -60,22 +60,6 @@ TEST_P(DeviceLimits, LeaveBeliefsAsTheReferenceHasThem) {
   }
 }
 
-TEST_P(DeviceLimits, LeaveAStillArrayAsTheReferenceHasIt) {
-  Recording recording = random_recording(2, 60, 144);
-  recording.T_robot_sensor[1] = recording.T_robot_sensor[0];
-  std::fill(recording.pressure.begin() + 70, recording.pressure.end(), 0.0);
-  const std::vector<Touch> touches = all_touches(recording);
-  const std::vector<Hypothesis> objects = two_objects();
-  HistogramOptions options;
-  options.lattice = lattice_of(0.1, 19);
-  options.still_array = true;
-  PoseHistogram histogram(device, objects, options);
-  histogram.update(touches);
-  // Some of the 60 elements count twice.
-  EXPECT_LT(likelihood_error(histogram, reference_posterior(objects, options, touches)),
-            2 * 2 * per_touch * 60 / 36);
-}
-
 TEST_P(DeviceLimits, LeaveSumsOverMillionsOfBinsAsFloat64HasThem) {
   const Hypothesis object{random_map(31, 27, 0.5, 2.0, 145), 1.0};
   HistogramOptions options;

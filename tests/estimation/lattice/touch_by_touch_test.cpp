@@ -151,53 +151,6 @@ TEST_F(TouchByTouchTest, ForgetsAtAReset) {
   EXPECT_EQ(told(), first);
 }
 
-TEST_F(TouchByTouchTest, APreparedTouchIsTheSame) {
-  const HistogramOptions options{
-      .lattice = small_lattice(), .none_weight = 1.0, .touch_sd = {.mm = 0.8, .rad = 0.1}};
-  PoseHistogram plain(device, two_maps(), options);
-  PoseHistogram prepared(device, two_maps(), options);
-  for (const Touch& touch : touches) {
-    plain.update(touch);
-    prepared.prepare(touches.back());  // mostly another one
-    prepared.prepare(touch);
-    prepared.update(touch);
-    EXPECT_EQ(plain.log_likelihood(0), prepared.log_likelihood(0));
-    EXPECT_EQ(plain.estimate().none, prepared.estimate().none);
-  }
-}
-
-TEST_F(TouchByTouchTest, APreparedTouchSurvivesASlip) {
-  const HistogramOptions options{.lattice = small_lattice(),
-                                 .touch_sd = {.mm = 0.8, .rad = 0.1},
-                                 .slip_sd = {.mm = 0.5, .rad = 0.1}};
-  PoseHistogram plain(device, two_maps(), options);
-  PoseHistogram prepared(device, two_maps(), options);
-  for (const Touch& touch : touches) {
-    plain.update(touch);
-    prepared.prepare(touch);
-    prepared.update(touch);
-    EXPECT_EQ(plain.log_likelihood(0), prepared.log_likelihood(0));
-  }
-}
-
-TEST_F(TouchByTouchTest, TakesAStillArray) {
-  Recording presses = recording;
-  presses.T_robot_sensor.assign(presses.size(), presses.T_robot_sensor.front());
-  for (std::size_t i = 0; i < presses.pressure.size(); ++i) {
-    presses.pressure[i] = i % 4 == 0 ? presses.pressure[i] : 0.0;  // mostly No Contact
-  }
-  HistogramOptions options{.lattice = small_lattice(),
-                           .still_array = true,
-                           .none_weight = 1.0,
-                           .touch_sd = {.mm = 0.8, .rad = 0.1}};
-  options.contact.prior = 0.2;
-  PoseHistogram histogram(device, two_maps(), options);
-  const std::vector<Touch> pressed = all_touches(presses);
-  histogram.update(pressed);
-  EXPECT_LT(likelihood_error(histogram, expected_posterior(options, pressed)),
-            per_mean * static_cast<double>(pressed.size()));
-}
-
 TEST_F(TouchByTouchTest, TakesAnArrayThatChanges) {
   // Each touch with elements of its own, and fewer from touch to touch.
   std::vector<std::vector<glm::dvec2>> elements;
