@@ -348,10 +348,12 @@ TEST(AutomaticPivot, DependsOnTheElementsAndNotOnTheSensorFramesOrigin) {
 TEST(AutomaticPivot, WaitsForAResetAfterAnUpdateWasBrokenOff) {
   Device device = Device::open();
   const Recording recording = touched_letter(2);
-  for (RecognitionTask task : automatic_tasks()) {
-    if (auto* histogram = std::get_if<HistogramOptions>(&task.filter)) {
-      histogram->none_weight = 1.0;  // which takes touch by touch, and says how far it is
+  for (FilterOptions filter : every_filter()) {
+    if (auto* histogram = std::get_if<HistogramOptions>(&filter)) {
+      histogram->none_weight = 1.0;  // takes touch by touch, and says how far it is
     }
+    RecognitionTask task(shapes(), filter);
+    task.auto_pivot = true;
     Recogniser recogniser(device, task);
     const auto update = [&] {
       const Touch first = recording.touch(0);
