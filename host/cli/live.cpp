@@ -148,6 +148,7 @@ void live(const LiveArguments& options) {
   const RecognitionTask task = resolve(request, {.pressure_unit = description.pressure_unit,
                                                  .source = source,
                                                  .reach_mm = array_reach_mm(elements_mm),
+                                                 .need = {.waited_for = true},
                                                  .device = std::ref(device_in_waiting)});
   if (goal && !traits_of(task.filter).bins) {
     refuse_flag("--plan", options.plan,

@@ -259,6 +259,9 @@ namespace {
 std::string reason_of_filter(const RecognitionTask& task) {
   const std::int64_t bins = task.bins_in_all();
   if (task.auto_filter) {
+    if (bins <= most_histogram_bins && traits_of(task.filter).certificate) {
+      return "chosen by --filter auto: each touch is waited for";
+    }
     return fmt::format("chosen by --filter auto: {} bins in all, {} {}", bins,
                        bins > most_histogram_bins ? "more than" : "at most", most_histogram_bins);
   }

@@ -221,8 +221,9 @@ ChosenBins chosen_bins(const std::function<Device&()>& device,
           most};
 }
 
-FilterOptions filter_for_bins(std::span<const Hypothesis> hypotheses, const FilterOptions& filter) {
-  if (bins_in_all(hypotheses.size(), lattice_of(filter)) > most_histogram_bins) {
+FilterOptions filter_for_bins(std::span<const Hypothesis> hypotheses, const FilterOptions& filter,
+                              std::int64_t most_bins) {
+  if (bins_in_all(hypotheses.size(), lattice_of(filter)) > most_bins) {
     const std::optional<BoundedOptions> bounded = bounded_instead(filter);
     if (bounded && bounds_have_room(hypotheses, *bounded)) {
       return *bounded;

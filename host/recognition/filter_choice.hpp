@@ -64,10 +64,11 @@ ChosenBins chosen_bins(const std::function<Device&()>& device,
                        std::span<const Hypothesis> hypotheses, const ChosenFilter& filter,
                        BinWidth width);
 
-/// Bounds in the place of a histogram of more than most_histogram_bins bins in all, unless
+/// Bounds in the place of a histogram of more than `most_bins` bins in all, unless
 /// bounded_instead() has none or bounds have no room.
 /// @throws Error on a lattice out of range
-FilterOptions filter_for_bins(std::span<const Hypothesis> hypotheses, const FilterOptions& filter);
+FilterOptions filter_for_bins(std::span<const Hypothesis> hypotheses, const FilterOptions& filter,
+                              std::int64_t most_bins = most_histogram_bins);
 
 /// The filter as it is opened for a sensor model. A temperature above 1 and features give also
 /// improbable labels a share, and familiarity asks how far the best label leads, for which bounds

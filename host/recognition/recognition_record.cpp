@@ -274,7 +274,10 @@ RecognitionStep take_step(Recogniser& recogniser, const RecognitionTask& task,
       step.warnings.push_back(*std::move(warning));
     }
     const auto placement = judge_placement(recogniser, estimate, task, step);
-    const std::vector<std::size_t> unlike = unlike_touches(evidence, step);
+    const bool unexplained = step.fit && step.fit->verdict == Verdict::does_not_fit;
+    const std::vector<std::size_t> unlike = placement || unexplained
+                                                ? unlike_touches(evidence, task, step)
+                                                : std::vector<std::size_t>();
     // One touch that is far off looks as if all were a little, or as if the object had moved, but
     // for the fits of the others.
     const bool all_after_a_move =

@@ -244,7 +244,9 @@ FilterOptions settled_filter(const Request& request, const Circumstances& of, Ch
     }
   }
   require_within_region(request, lattice_of(filter.options));
-  return filter.automatic ? filter_for_bins(hypotheses, filter.options) : filter.options;
+  return filter.automatic ? filter_for_bins(hypotheses, filter.options,
+                                            of.need.waited_for ? 0 : most_histogram_bins)
+                          : filter.options;
 }
 
 }  // namespace

@@ -18,6 +18,8 @@ struct CallerNeed {
   /// Every unknown is one of the maps' objects, or cannot be told from "(none)", which then has no
   /// weight unless it is given one.
   bool learned_only = false;
+  /// Every touch is waited for: `auto` takes bounds for any number of bins, which tell sooner.
+  bool waited_for = false;
 };
 
 /// What a task follows from beside its request.

@@ -162,16 +162,18 @@ std::optional<std::string> pose_untold(std::span<const TouchEvidence> touches,
 }  // namespace
 
 std::vector<std::size_t> unlike_touches(std::span<const TouchEvidence> touches,
-                                        const RecognitionStep& step) {
-  constexpr double unlike_z = -10.0;  // of nine touches of a letter 2 in 100 have one
-  constexpr std::size_t least_others = 3;
+                                        const RecognitionTask& task, const RecognitionStep& step) {
+  constexpr double unlike_z = -8.0;
+  constexpr double others_from_z = -5.0;
+  // A stranger's few touches may agree by chance.
+  const std::size_t least_others = task.labels[step.best] == none_label ? 7 : 3;
   std::vector<std::size_t> unlike;
   std::size_t others = 0;
   for (std::size_t i = 0; i < step.touch_fit.size(); ++i) {
     const std::optional<double>& z = step.touch_fit[i];
     if (z && *z < unlike_z) {
       unlike.push_back(i);
-    } else if (z && *z < fits_from_z) {
+    } else if (z && *z < others_from_z) {
       return {};  // where many fit badly, none stands out
     } else if (z && touches[i].in_contact()) {
       ++others;

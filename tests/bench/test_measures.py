@@ -21,7 +21,7 @@ from bench.measures import (
     told_apart,
     with_interval,
 )
-from bench.sweep_page import front_of
+from bench.sweep_charts import front_of
 from bench.sweep_runs import by_bounds, comparison_of, follow, nearest_bin_mm
 from bench.trials import Body, Touching, lattice_of, letter_maps, make_trials, map_of, truth_of
 from palpate._palpate import Random, Stream
