@@ -7,7 +7,6 @@
 #include "io/file_format.hpp"
 #include "io/hdf5_writer.hpp"
 #include "io/input_file.hpp"
-#include "io/recording_parts.hpp"
 #include "io/recording_rules.hpp"
 #include "io/recording_scan.hpp"
 #include "io/stored_bytes.hpp"
@@ -50,52 +49,6 @@ void require_agreement(const std::filesystem::path& path, const Recording& recor
   }
 }
 
-Hdf5Writer::Storage storage_of(bool narrow) {
-  return narrow ? Hdf5Writer::Storage::narrow : Hdf5Writer::Storage::plain;
-}
-
-// Writes a recording whose pressures `write_pressures` writes.
-void write_whole(const std::filesystem::path& path, const Recording& recording, std::size_t e,
-                 bool narrow, const std::function<void(Hdf5Writer&)>& write_pressures) {
-  require_agreement(path, recording, e);
-  const std::size_t n = recording.size();
-  require_head(path, recording, e);
-  require_poses(path, recording, 0, recording.T_robot_sensor);
-  require_elements(path, 0, recording.elements_mm);
-  require_times(path, 0, recording.time_s);
-  require_device_times(path, 0, recording.device_time_s);
-  require_lost_counts(path, 0, recording.lost_before);
-
-  constexpr std::size_t head = 1 << 16;
-  const std::size_t row =
-      e * (narrow ? sizeof(float) : sizeof(double)) + sizeof(Pose) + sizeof(double);
-  Hdf5Writer file(path, Hdf5Writer::Layout::closed, n * row + head);
-  write_head(file, recording);
-  write_pressures(file);
-  if (recording.rows != "frames" ||
-      std::any_of(recording.T_robot_sensor.begin(), recording.T_robot_sensor.end(), is_finite)) {
-    file.dataset("sensor_pose", {n, 3}, recording.T_robot_sensor);
-  }
-  const bool constant_array = recording.elements_mm.size() == e;
-  file.dataset("elements", constant_array ? Hdf5Writer::Shape{e, 2} : Hdf5Writer::Shape{n, e, 2},
-               recording.elements_mm);
-  if (!recording.valid.empty()) {
-    const bool constant_valid = recording.valid.size() == e;
-    file.dataset("valid", constant_valid ? Hdf5Writer::Shape{e} : Hdf5Writer::Shape{n, e},
-                 recording.valid);
-  }
-  const auto write_list = [&](const char* name, const auto& values) {
-    if (!values.empty()) {
-      file.dataset(name, {values.size()}, values);
-    }
-  };
-  write_list("time", recording.time_s);
-  write_list("baseline", recording.baseline);
-  write_list("device_time", recording.device_time_s);
-  write_list("lost_before", recording.lost_before);
-  file.save();
-}
-
 }  // namespace
 
 Recording read_recording(const std::filesystem::path& path) {
@@ -125,23 +78,45 @@ void write_recording(const std::filesystem::path& path, const Recording& recordi
   const bool narrow =
       std::all_of(recording.pressure.begin(), recording.pressure.end(),
                   [](double p) { return static_cast<float>(p) == p || std::isnan(p); });
-  write_whole(path, recording, e, narrow, [&](Hdf5Writer& file) {
-    require_pressures(path, recording, e, 0, recording.pressure);
-    file.dataset("pressure", {recording.size(), e}, recording.pressure, storage_of(narrow));
-  });
-}
+  require_agreement(path, recording, e);
+  const std::size_t n = recording.size();
+  require_head(path, recording, e);
+  require_pressures(path, recording, e, 0, recording.pressure);
+  require_poses(path, recording, 0, recording.T_robot_sensor);
+  require_elements(path, 0, recording.elements_mm);
+  require_times(path, 0, recording.time_s);
+  require_device_times(path, 0, recording.device_time_s);
+  require_lost_counts(path, 0, recording.lost_before);
 
-void write_recording_in_parts(const std::filesystem::path& path, const Recording& recording,
-                              bool narrow, const PressureRows& rows) {
-  const std::size_t e = recording.elements_mm.size();
-  write_whole(path, recording, e, narrow, [&](Hdf5Writer& file) {
-    const auto part = [&](std::size_t first) {
-      std::vector<double> pressure = rows(first);
-      require_pressures(path, recording, e, first * e, pressure);
-      return pressure;
-    };
-    file.dataset("pressure", {recording.size(), e}, part, storage_of(narrow));
-  });
+  constexpr std::size_t head = 1 << 16;
+  const std::size_t row =
+      e * (narrow ? sizeof(float) : sizeof(double)) + sizeof(Pose) + sizeof(double);
+  Hdf5Writer file(path, Hdf5Writer::Layout::closed, n * row + head);
+  write_head(file, recording);
+  file.dataset("pressure", {n, e}, recording.pressure,
+               narrow ? Hdf5Writer::Storage::narrow : Hdf5Writer::Storage::plain);
+  if (recording.rows != "frames" ||
+      std::any_of(recording.T_robot_sensor.begin(), recording.T_robot_sensor.end(), is_finite)) {
+    file.dataset("sensor_pose", {n, 3}, recording.T_robot_sensor);
+  }
+  const bool constant_array = recording.elements_mm.size() == e;
+  file.dataset("elements", constant_array ? Hdf5Writer::Shape{e, 2} : Hdf5Writer::Shape{n, e, 2},
+               recording.elements_mm);
+  if (!recording.valid.empty()) {
+    const bool constant_valid = recording.valid.size() == e;
+    file.dataset("valid", constant_valid ? Hdf5Writer::Shape{e} : Hdf5Writer::Shape{n, e},
+                 recording.valid);
+  }
+  const auto write_list = [&](const char* name, const auto& values) {
+    if (!values.empty()) {
+      file.dataset(name, {values.size()}, values);
+    }
+  };
+  write_list("time", recording.time_s);
+  write_list("baseline", recording.baseline);
+  write_list("device_time", recording.device_time_s);
+  write_list("lost_before", recording.lost_before);
+  file.save();
 }
 
 }  // namespace palpate

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "io/pressure_table.hpp"
+#include "streaming/import_survey.hpp"
 #include "streaming/table_import.hpp"
 
 namespace palpate {

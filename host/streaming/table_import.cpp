@@ -1,4 +1,5 @@
 #include "streaming/table_import.hpp"
+#include "streaming/import_survey.hpp"
 
 #include <algorithm>
 #include <array>
@@ -175,7 +176,7 @@ void check_numbers(const ImportOptions& options) {
 /// The recording of rows that are read.
 ImportedRecording recording_of(const ImportOptions& options, ArrayTable array, ImportRows rows) {
   const std::optional<glm::dvec3> normal = plane_normal(options.plane);
-  auto& [pressures, poses, T_robot_object, survey] = rows;
+  auto& [pressures, poses, T_robot_object, elements] = rows;
   ImportedRecording imported;
   imported.holds_poses = pressures.holds_poses;
   Recording& recording = imported.recording;
@@ -192,13 +193,11 @@ ImportedRecording recording_of(const ImportOptions& options, ArrayTable array, I
   recording.time_s = std::move(pressures.time_s);
   recording.device_time_s = std::move(pressures.device_time_s);
   recording.lost_before = std::move(pressures.lost_before);
-  if (!survey) {
-    survey.emplace(recording.elements_mm.size(), recording.valid);
-    survey->add(recording.pressure);
-  }
-  imported.whole_up_to = recording.pressure_unit == "kPa" ? survey->whole_up_to() : std::nullopt;
-  choose_rows(options, survey->rows(), recording);
-  mark_unknown(options.pressures, *survey, recording);
+  ImportSurvey survey(recording.elements_mm.size(), recording.valid);
+  survey.add(recording.pressure);
+  imported.whole_up_to = recording.pressure_unit == "kPa" ? survey.whole_up_to() : std::nullopt;
+  choose_rows(options, survey.rows(), recording);
+  mark_unknown(options.pressures, survey, recording);
   if (poses) {
     if (poses->spatial.empty() && normal) {
       refuse(fmt::format("`plane {}`", options.plane),
@@ -209,7 +208,7 @@ ImportedRecording recording_of(const ImportOptions& options, ArrayTable array, I
     }
     if (!poses->spatial.empty()) {
       const TouchPlane plane = touch_plane(poses->spatial, normal);
-      imported.of_poses = take_into_plane(plane, *survey, *poses, recording);
+      imported.of_poses = take_into_plane(plane, survey, *poses, recording);
       if (T_robot_object) {
         recording.truth = Truth{options.object, inverse(plane.project(*T_robot_object))};
       }
@@ -218,10 +217,10 @@ ImportedRecording recording_of(const ImportOptions& options, ArrayTable array, I
       imported.of_poses.push_back(poses->left_out);
     }
     imported.assumed_units = poses->assumed_units;
-    join(std::move(*poses), *survey, options, imported);
+    join(std::move(*poses), survey, options, imported);
   } else {
     const bool at_zero = options.unposed && recording.rows == "touches";
-    recording.T_robot_sensor.assign(survey->rows(), at_zero ? Pose{} : unknown_pose);
+    recording.T_robot_sensor.assign(survey.rows(), at_zero ? Pose{} : unknown_pose);
   }
   if (recording.rows == "touches" && !options.unposed) {
     require_touch_poses(options, imported);
@@ -269,18 +268,13 @@ ImportedRecording import_tables(const ImportOptions& options) {
 
 ImportedRecording import_rows(const ImportOptions& options, ImportRows rows) {
   check_numbers(options);
-  return recording_of(options, import_array(options), std::move(rows));
-}
-
-ImportSurvey survey_for(const ImportOptions& options, std::size_t elements) {
-  check_numbers(options);
   ArrayTable array = import_array(options);
-  if (array.elements_mm.size() != elements) {
+  if (array.elements_mm.size() != rows.elements) {
     refuse(options.pressures,
-           "has {} readings a frame for an array of {} elements; correct `array`", elements,
+           "has {} readings a frame for an array of {} elements; correct `array`", rows.elements,
            array.elements_mm.size());
   }
-  return ImportSurvey(elements, std::move(array.valid));
+  return recording_of(options, std::move(array), std::move(rows));
 }
 
 }  // namespace palpate

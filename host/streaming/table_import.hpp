@@ -11,7 +11,6 @@
 #include "io/pressure_table.hpp"
 #include "palpate/pose_track.hpp"
 #include "palpate/touch.hpp"
-#include "streaming/import_survey.hpp"
 
 namespace palpate {
 
@@ -67,16 +66,11 @@ struct ImportRows {
   PressureTable pressures;
   std::optional<PoseTable> poses;             ///< in space, in mm
   std::optional<SpatialPose> T_robot_object;  ///< true pose of the object, in space
-  /// Survey of pressures that are not held, which the recording then has none of.
-  std::optional<ImportSurvey> survey;
+  std::size_t elements = 0;                   ///< of a row of pressures
 };
 /// As import_tables() of tables that hold this. The options' files name what the rows came from;
 /// poses without times are by the clock of the frames.
-/// @throws Error as import_tables()
+/// @throws Error as import_tables(), and where the array is of other elements
 ImportedRecording import_rows(const ImportOptions& options, ImportRows rows);
-
-/// What takes the pressures of rows that are not held. @throws Error where a number among the
-/// options makes no sense, or the array is of other elements or cannot be read
-ImportSurvey survey_for(const ImportOptions& options, std::size_t elements);
 
 }  // namespace palpate

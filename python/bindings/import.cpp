@@ -13,7 +13,6 @@
 #include "arrays.hpp"
 #include "bindings.hpp"
 #include "call.hpp"
-#include "io/recording_parts.hpp"
 #include "io/recording_rules.hpp"
 #include "model/option_words.hpp"
 #include "streaming/table_import.hpp"
@@ -60,18 +59,6 @@ std::vector<std::string> remarks_on(const ImportedRecording& imported,
 
 using Imported = std::tuple<ArrayRecording, std::vector<std::string>>;
 
-/// A function of Python that returns pressures [k, e] of some frames, from one on.
-struct Rows : nb::object {
-  NB_OBJECT_DEFAULT(Rows, nb::object, "collections.abc.Callable[[int], numpy.typing.ArrayLike]",
-                    PyCallable_Check)
-};
-
-/// Frames whose pressures Python holds.
-struct ImportedFrames {
-  ImportedRecording imported;
-  std::vector<std::string> remarks;
-};
-
 /// The options, with the elements that stand for the array.
 ImportOptions with_elements(ImportOptions options, const std::optional<ArrayLike>& elements_mm) {
   if (elements_mm) {
@@ -99,14 +86,17 @@ std::optional<SpatialPose> spatial_pose(std::span<const double> row) {
                      glm::normalize(glm::dquat(row[6], row[3], row[4], row[5]))};
 }
 
-ImportedFrames import_frames(const ImportOptions& given, const ImportSurvey& survey,
-                             const ArrayLike& time_s, const ArrayLike& pose_time_s,
-                             const std::optional<ArrayLike>& elements_mm,
-                             const std::optional<ArrayLike>& poses,
-                             const std::optional<ArrayLike>& object_pose) {
+Imported import_frames(const ImportOptions& given, const ArrayLike& pressures,
+                       const ArrayLike& time_s, const ArrayLike& pose_time_s,
+                       const std::optional<ArrayLike>& elements_mm,
+                       const std::optional<ArrayLike>& poses,
+                       const std::optional<ArrayLike>& object_pose) {
   const ImportOptions options = with_elements(given, elements_mm);
   ArrayReader reader;
-  ImportRows rows{.survey = survey};
+  ImportRows rows;
+  const Floats readings = reader.floats(pressures, "pressures", {"n", "e"});
+  rows.elements = readings.shape[1];
+  rows.pressures.pressure = readings.copied();
   rows.pressures.time_s = reader.floats(time_s, "time_s", {"n"}).copied();
   if (poses) {
     rows.poses.emplace();
@@ -121,63 +111,10 @@ ImportedFrames import_frames(const ImportOptions& given, const ImportSurvey& sur
     const Floats row = reader.floats(*object_pose, "object_pose", {"7"});
     rows.T_robot_object = spatial_pose(row.values());
   }
-  ImportedRecording imported = run([options, rows = std::move(rows)](Call&) mutable {
-    return import_rows(options, std::move(rows));
-  });
-  std::vector<std::string> remarks = remarks_on(imported, options);
-  return {std::move(imported), std::move(remarks)};
-}
-
-PressureRows rows_of(const Rows& rows) {
-  return [rows](std::size_t first) {
-    return ArrayReader().floats(rows(first), "rows", {"k", "e"}).copied();
-  };
-}
-
-ArrayRecording with_pressures(const ImportedFrames& frames, const Rows& rows) {
-  Recording recording = frames.imported.recording;
-  const std::size_t e = recording.elements_mm.size();
-  recording.pressure.reserve(recording.size() * e);
-  while (recording.pressure.size() < recording.size() * e) {
-    const std::vector<double> more = rows_of(rows)(recording.pressure.size() / e);
-    recording.pressure.insert(recording.pressure.end(), more.begin(), more.end());
-  }
-  return array_recording(std::move(recording));
-}
-
-void bind_frames(nb::module_& module) {
-  nb::class_<ImportSurvey>(module, "ImportSurvey", "Takes the frames of a log, block by block.")
-      .def(
-          "__init__",
-          [](ImportSurvey* self, const ImportOptions& given, std::size_t elements,
-             const std::optional<ArrayLike>& elements_mm) {
-            new (self) ImportSurvey(survey_for(with_elements(given, elements_mm), elements));
-          },
-          "options"_a, "elements"_a, "elements_mm"_a = nb::none())
-      .def(
-          "add",
-          [](ImportSurvey& self, const ArrayLike& rows) {
-            const Floats block = ArrayReader().floats(rows, "rows", {"k", "e"});
-            self.add(block.values());
-          },
-          "rows"_a, "Takes the next readings [k, e].");
-  nb::class_<ImportedFrames>(module, "ImportedFrames", "A recording of frames, without pressures.")
-      .def_rw("remarks", &ImportedFrames::remarks, "What is worth a warning.")
-      .def_prop_ro("posed",
-                   [](const ImportedFrames& self) {
-                     return std::ranges::count_if(self.imported.recording.T_robot_sensor,
-                                                  is_finite);
-                   })
-      .def("recording", &with_pressures, "rows"_a,
-           "The recording. rows(i): the pressures [k, e] of some frames from i on.")
-      .def(
-          "write",
-          [](const ImportedFrames& self, const PathLike& file, bool narrow, const Rows& rows) {
-            write_recording_in_parts(file.path(), self.imported.recording, narrow, rows_of(rows));
-          },
-          "path"_a, "narrow"_a, "rows"_a,
-          "Writes the recording, as recording(rows).save(path). narrow: float32 holds the "
-          "pressures.");
+  return returned(run([options, rows = std::move(rows)](Call&) mutable {
+                    return import_rows(options, std::move(rows));
+                  }),
+                  options);
 }
 
 }  // namespace
@@ -209,11 +146,10 @@ void bind_import(nb::module_& module) {
   module.def(
       "import_tables", &import_tables_python, "options"_a, "elements_mm"_a = nb::none(),
       "The recording, and what is worth a warning. elements_mm [e, 2] stands for the array.");
-  bind_frames(module);
   module.def(
-      "import_frames", &import_frames, "options"_a, "survey"_a, "time_s"_a, "pose_time_s"_a,
+      "import_frames", &import_frames, "options"_a, "pressures"_a, "time_s"_a, "pose_time_s"_a,
       "elements_mm"_a = nb::none(), "poses"_a = nb::none(), "object_pose"_a = nb::none(),
-      "As import_tables() of frames that the survey has taken, at times [n], and poses of the\n"
+      "As import_tables() of frames [n, e] at times [n], and of poses of the\n"
       "sensor [m, 7] in the robot frame, mm and a quaternion x, y, z, w, at times [m], or one for\n"
       "each frame where there are no times; and of an object's pose [7].");
 }

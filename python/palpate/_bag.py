@@ -2,7 +2,6 @@
 
 import os
 from collections.abc import Callable, Sequence
-from contextlib import closing
 from typing import TYPE_CHECKING, Any, Literal
 
 from . import _palpate
@@ -14,7 +13,7 @@ from .recognition import _Path, array_option, filled, warn
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from ._bag_messages import Pressures, Topic
+    from ._bag_messages import Topic
 
 
 def read_bag(
@@ -30,6 +29,7 @@ def read_bag(
     order: Literal["rows", "columns"] = "rows",
     dead: Sequence[int] = (),
     pressure_unit: Literal["kPa", "raw"] = "kPa",
+    sign: Literal[1, -1] = 1,
     plane: tuple[float, float, float] | Literal["auto"] = "auto",
     largest_gap_s: float | None = None,
     pose_delay: float = 0.0,
@@ -51,10 +51,8 @@ def read_bag(
     Raises Error naming log and topic. What import_tables() warns of, and messages without a header,
     become a UserWarning.
     """
-    frames, imported = read_frames(**locals())
-    with closing(frames.file):
-        recording = imported.recording(frames.rows)
-    warn(imported.remarks)
+    recording, remarks = read_frames(**locals())
+    warn(remarks)
     return recording
 
 
@@ -70,8 +68,8 @@ def read_frames(
     pose_delay: float,
     progress: Callable[[float], object] | None,
     **options: Any,
-) -> "tuple[Pressures, _palpate.ImportedFrames]":
-    """What read_bag() reads: the pressures, which lie in a temporary file, and all else."""
+) -> tuple[Recording, list[str]]:
+    """What read_bag() reads, and what is worth a warning."""
     from ._bag_messages import opened
 
     if pose_topic is not None and tf is not None:
@@ -92,17 +90,13 @@ def read_frames(
     }
     request = filled(_palpate.ImportOptions(), read_bag, options)
     with opened(name) as bag:
-        frames = bag.pressures(
-            pressure_topic,
-            pressure_field,
-            lambda elements: _palpate.ImportSurvey(request, elements, elements_mm),
-        )
+        frames = bag.pressures(pressure_topic, pressure_field)
         poses = bag.poses(pose_topic) if pose_topic is not None else None
         wanted = [chain for chain in (tf, truth_tf) if chain is not None]
         tree = bag.transforms(wanted) if wanted else None
         bag.read([part for part in (frames, poses, tree) if part is not None], progress)
-    survey = frames.finish(name)
-    time_s = frames.in_order()
+    frames.require_some(name)
+    time_s, pressures = frames.in_order()
     remarks = frames.remarks(name)
     pose_time_s: ArrayLike = ()
     rows: ArrayLike | None = None
@@ -119,12 +113,11 @@ def read_frames(
     if tf is not None and tree is not None:
         rows = tree.chain(name, *tf, time_s + pose_delay, options["largest_gap_s"])
         remarks += tree.remarks(name, tf, rows)
-    del poses, tree  # the memory of a long log
-    imported = _palpate.import_frames(
-        request, survey, time_s, pose_time_s, elements_mm, rows, truth
+    del frames, poses, tree  # the memory of a long log
+    recording, said = _palpate.import_frames(
+        request, pressures, time_s, pose_time_s, elements_mm, rows, truth
     )
-    imported.remarks += remarks
-    return frames, imported
+    return recording, said + remarks
 
 
 def topics(log: _Path) -> "list[Topic]":

@@ -1,7 +1,5 @@
 """The messages of a log of ROS: which topics it has, and the pressures and poses of one of them."""
 
-import os
-import tempfile
 from array import array as numbers
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -14,10 +12,6 @@ from numpy.typing import NDArray
 
 from ._bag_transforms import Transforms, row_of, stamp_s
 from ._error import Error
-from ._palpate import ImportSurvey
-
-#: Makes what takes the blocks of an array of so many elements.
-SurveyFor = Callable[[int], ImportSurvey]
 
 #: Where the pressures of known types lie; of another type, the only list of numbers is taken.
 _PRESSURES = {
@@ -103,79 +97,37 @@ class _Timed:
 
 
 class Pressures(_Timed):
-    """The readings of a topic, which lie in a temporary file: a long log's need no memory."""
+    """The readings of a topic."""
 
-    BLOCK = 4096  #: frames that are held
-
-    def __init__(self, topic: str, has_header: bool, path: str, survey_for: SurveyFor) -> None:
+    def __init__(self, topic: str, has_header: bool, path: str) -> None:
         super().__init__(topic, has_header)
         self.path = path
-        self.survey_for = survey_for
-        self.survey: ImportSurvey | None = None
         self.elements = 0
-        self.narrow = True  #: float32 holds all readings
-        self.held = 0  #: frames of the block that are not in the file yet
-        self.file = tempfile.TemporaryFile()
-        self.order: NDArray[numpy.int64] | None = None  #: of the frames in the file, by time
+        self.values = numbers("d")  #: frame by frame
 
     def add(self, topic: str, message: Any, received_s: float) -> None:
         values = _at(message, self.path)
         row = values if hasattr(values, "dtype") and values.ndim == 1 else _flat(values)
-        if self.survey is None:
-            self._begin(row)
+        if not self.time_s:
+            self.elements = len(row)
+            if not self.elements:
+                raise Error(f"{self.topic}: {self.path}: holds no reading; give another field")
         if len(row) != self.elements:
             raise Error(
                 f"{self.topic}: {self.path}: {len(row)} readings in message {len(self.time_s)}, counted "
                 f"from 0, but {self.elements} before; give a topic or a field of one length"
             )
-        self.block[self.held] = row
-        self.held += 1
+        self.values.frombytes(numpy.asarray(row, numpy.float64).tobytes())
         self.time_s.append(self.time_of(message, received_s))
-        if self.held == self.BLOCK:
-            self._keep()
 
-    def _begin(self, row: Any) -> None:
-        self.elements = len(row)
-        if not self.elements:
-            raise Error(f"{self.topic}: {self.path}: holds no reading; give another field")
-        self.survey = self.survey_for(self.elements)
-        small = numpy.can_cast(getattr(row, "dtype", numpy.float64), numpy.float32)
-        kind = numpy.float32 if small else numpy.float64
-        self.block = numpy.empty((self.BLOCK, self.elements), kind)
-
-    def _keep(self) -> None:
-        rows = self.block[: self.held]
-        assert self.survey is not None
-        self.survey.add(rows)
-        self.narrow &= bool(numpy.all((rows == rows.astype(numpy.float32)) | numpy.isnan(rows)))
-        self.file.write(rows.tobytes())
-        self.held = 0
-
-    def finish(self, log: str) -> ImportSurvey:
-        """What is known of all readings."""
-        self.require_some(log)
-        assert self.survey is not None
-        self._keep()
-        self.file.flush()
-        return self.survey
-
-    def in_order(self) -> NDArray[numpy.float64]:
-        """The frames' times [n], ascending."""
+    def in_order(self) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64]]:
+        """The frames' times [n], ascending, and their readings [n, e]."""
         time_s = numpy.frombuffer(self.time_s)
+        rows = numpy.frombuffer(self.values).reshape(-1, self.elements)
         if numpy.any(time_s[1:] < time_s[:-1]):
-            self.order = numpy.argsort(time_s, kind="stable")
-            time_s = time_s[self.order]
-        return time_s
-
-    def rows(self, first: int) -> NDArray[numpy.float64]:
-        """Readings [k, e] from a frame on, in the order of time."""
-        end = min(first + self.BLOCK, len(self.time_s))
-        wanted = numpy.arange(first, end) if self.order is None else self.order[first:end]
-        low, high = int(wanted.min()), int(wanted.max()) + 1
-        row_bytes = self.elements * self.block.itemsize
-        data = os.pread(self.file.fileno(), (high - low) * row_bytes, low * row_bytes)
-        rows = numpy.frombuffer(data, self.block.dtype).reshape(-1, self.elements)
-        return rows[wanted - low].astype(numpy.float64)
+            order = numpy.argsort(time_s, kind="stable")
+            time_s, rows = time_s[order], rows[order]
+        return time_s, rows
 
 
 class Poses(_Timed):
@@ -244,7 +196,7 @@ class Bag:
         known = _PRESSURES.get(msgtype)
         return known if known in found else found[0] if len(found) == 1 else None
 
-    def pressures(self, topic: str, path: str | None, survey_for: SurveyFor) -> Pressures:
+    def pressures(self, topic: str, path: str | None) -> Pressures:
         msgtype = self.connections(topic)[0].msgtype
         if path is None:
             path = self.pressure_path(msgtype)
@@ -259,7 +211,7 @@ class Bag:
                 f"{self.name}: {topic}: {msgtype} has no list of numbers"
                 + (f" {path}; it has {', '.join(found)}" if path and found else "; give another topic")
             )
-        return Pressures(topic, self.has_header(msgtype), path, survey_for)
+        return Pressures(topic, self.has_header(msgtype), path)
 
     def poses(self, topic: str) -> Poses:
         msgtype = self.connections(topic)[0].msgtype

@@ -8,8 +8,9 @@ import os
 import re
 import sys
 import warnings
-from contextlib import closing
 from typing import Any
+
+import numpy
 
 from ._bag import read_frames, topics
 from ._bag_messages import _PRESSURES, _at, _flat
@@ -51,6 +52,7 @@ def _flag_parser() -> argparse.ArgumentParser:
     add("--order", default="rows", help="rows or columns [rows]")
     add("--dead", default="", metavar="I,J", help="elements that do not read, from 0")
     add("--pressure-unit", default="kPa", help="kPa or raw [kPa]")
+    add("--sign", type=int, default=1, metavar="S", help="-1 where readings fall in presses [1]")
     add("--plane", default="auto", metavar="NX,NY,NZ", help="normal of the touches' plane [auto]")
     add("--largest-gap-s", type=float, metavar="S", help="poses further apart are not interpolated")
     add("--pose-delay", type=float, default=0.0, metavar="S",
@@ -111,7 +113,7 @@ def _run(arguments: argparse.Namespace) -> None:
         except ValueError:
             raise Error(f"--plane {arguments.plane}: give auto, or a normal such as 0,0,1") from None
     shown = sys.stderr.isatty()
-    frames, imported = read_frames(
+    recording, remarks = read_frames(
         log=arguments.log,
         pressure_topic=arguments.pressure_topic,
         array=arguments.array,
@@ -123,6 +125,7 @@ def _run(arguments: argparse.Namespace) -> None:
         order=arguments.order,
         dead=dead,
         pressure_unit=arguments.pressure_unit,
+        sign=arguments.sign,
         plane=plane,
         largest_gap_s=arguments.largest_gap_s,
         pose_delay=arguments.pose_delay,
@@ -131,13 +134,12 @@ def _run(arguments: argparse.Namespace) -> None:
     )
     if shown:
         print("\r" + " " * 16 + "\r", end="", file=sys.stderr)
-    with closing(frames.file):
-        imported.write(arguments.output, frames.narrow, frames.rows)
-    warn(imported.remarks)
-    posed = f"{imported.posed} with a pose"
+    recording.save(arguments.output)
+    warn(remarks)
+    posed = f"{int(numpy.isfinite(recording.T_robot_sensor[:, 0]).sum())} with a pose"
     if arguments.tf is None and arguments.pose_topic is None:
         posed = "none with a pose, as neither --tf nor --pose-topic is given"
-    print(f"{arguments.output}: {len(frames.time_s)} frames of {frames.elements} elements, "
+    print(f"{arguments.output}: {len(recording)} frames of {recording.pressure.shape[1]} elements, "
           f"{posed}; next: palpate touches {arguments.output} -o TOUCHES.h5")  # fmt: skip
 
 

@@ -6,7 +6,6 @@
 #include <utility>
 #include <vector>
 
-#include "io/recording_parts.hpp"
 #include "palpate/files.hpp"
 #include "scratch_folder.hpp"
 
@@ -37,19 +36,6 @@ TEST_F(RecordingBytes, AreTheSameBesideAFileOfTheNameInMemory) {
   write_recording(folder_ / "beside.h5", recording_);
   std::filesystem::current_path(here);
   expect_whole("beside.h5");
-}
-
-TEST_F(RecordingBytes, AreTheSameWherePressuresComeInParts) {
-  const std::vector<double> pressure = std::exchange(recording_.pressure, {});
-  for (const std::size_t rows : {1, 2, 3}) {
-    SCOPED_TRACE(rows);
-    write_recording_in_parts(folder_ / "parts.h5", recording_, false, [&](std::size_t first) {
-      const std::size_t end = std::min<std::size_t>(first + rows, 3);
-      return std::vector(pressure.begin() + static_cast<std::ptrdiff_t>(3 * first),
-                         pressure.begin() + static_cast<std::ptrdiff_t>(3 * end));
-    });
-    expect_whole("parts.h5");
-  }
 }
 
 }  // namespace palpate::recording_bytes_test

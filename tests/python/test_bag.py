@@ -222,23 +222,19 @@ def test_frames_in_a_gap_of_transforms_have_no_pose(tmp_path: pathlib.Path) -> N
         read_bag(log, pressure_topic="/plain", tf=("array", "cup"), array=(2, 2, 2))
 
 
-def test_blocks_join(log: pathlib.Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_chains_join_over_blocks(log: pathlib.Path, monkeypatch: pytest.MonkeyPatch) -> None:
     given: dict[str, Any] = {"pressure_topic": "/hand", "pressure_field": "fingers.taxels", "array": (2, 2, 2)}
     given |= {"tf": ("base", "array"), "truth_tf": ("base", "cup"), "pressure_unit": "raw"}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         whole = read_bag(log, **given)
-        monkeypatch.setattr(_bag_messages.Pressures, "BLOCK", 3)
         monkeypatch.setattr(_bag_transforms, "_BLOCK", 4)
         joined = read_bag(log, **given)
     for name in ("pressure", "time_s", "T_robot_sensor"):
         assert numpy.array_equal(getattr(whole, name), getattr(joined, name)), name
 
 
-def test_frames_come_in_the_order_of_their_times(
-    tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(_bag_messages.Pressures, "BLOCK", 3)
+def test_frames_come_in_the_order_of_their_times(tmp_path: pathlib.Path) -> None:
     bag = Bag(tmp_path, "mcap")
     for i, k in enumerate([3, 0, 7, 1, 2, 9, 4, 8, 5, 6]):
         finger = bag.of("lab_msgs/msg/Finger", "a", numpy.full(4, k, dtype=numpy.uint16))
@@ -248,6 +244,14 @@ def test_frames_come_in_the_order_of_their_times(
         bag.close(), pressure_topic="/hand", pressure_field="fingers.taxels", array=(2, 2, 2), pressure_unit="raw"
     )
     assert recording.pressure.tolist() == [[float(k)] * 4 for k in range(10)]
+
+
+def test_readings_that_fall_are_turned(log: pathlib.Path) -> None:
+    given: dict[str, Any] = {"pressure_topic": "/plain", "array": (2, 2, 2)}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        rising, falling = read_bag(log, **given), read_bag(log, **given, sign=-1)
+    assert numpy.array_equal(falling.pressure, -rising.pressure)
 
 
 def test_only_wanted_transforms_are_kept(tmp_path: pathlib.Path) -> None:
