@@ -266,6 +266,11 @@ ImportedRecording import_tables(const ImportOptions& options) {
   return imported;
 }
 
+void require_sound(const ImportOptions& options) {
+  check_numbers(options);
+  import_array(options);
+}
+
 ImportedRecording import_rows(const ImportOptions& options, ImportRows rows) {
   check_numbers(options);
   ArrayTable array = import_array(options);

@@ -68,6 +68,9 @@ struct ImportRows {
   std::optional<SpatialPose> T_robot_object;  ///< true pose of the object, in space
   std::size_t elements = 0;                   ///< of a row of pressures
 };
+/// Throws Error where a number among the options makes no sense, or the array cannot be read:
+/// before a program reads rows elsewhere.
+void require_sound(const ImportOptions& options);
 /// As import_tables() of tables that hold this. The options' files name what the rows came from;
 /// poses without times are by the clock of the frames.
 /// @throws Error as import_tables(), and where the array is of other elements

@@ -147,6 +147,13 @@ void bind_import(nb::module_& module) {
       "import_tables", &import_tables_python, "options"_a, "elements_mm"_a = nb::none(),
       "The recording, and what is worth a warning. elements_mm [e, 2] stands for the array.");
   module.def(
+      "require_sound",
+      [](const ImportOptions& options, const std::optional<ArrayLike>& elements_mm) {
+        require_sound(with_elements(options, elements_mm));
+      },
+      "options"_a, "elements_mm"_a = nb::none(),
+      "Raises Error where import_frames() would refuse the options or the array.");
+  module.def(
       "import_frames", &import_frames, "options"_a, "pressures"_a, "time_s"_a, "pose_time_s"_a,
       "elements_mm"_a = nb::none(), "poses"_a = nb::none(), "object_pose"_a = nb::none(),
       "As import_tables() of frames [n, e] at times [n], and of poses of the\n"

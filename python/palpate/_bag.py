@@ -89,6 +89,7 @@ def read_frames(
         "pose_delay": pose_delay,
     }
     request = filled(_palpate.ImportOptions(), read_bag, options)
+    _palpate.require_sound(request, elements_mm)
     with opened(name) as bag:
         frames = bag.pressures(pressure_topic, pressure_field)
         poses = bag.poses(pose_topic) if pose_topic is not None else None

@@ -123,7 +123,7 @@ class Pressures(_Timed):
     def in_order(self) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64]]:
         """The frames' times [n], ascending, and their readings [n, e]."""
         time_s = numpy.frombuffer(self.time_s)
-        rows = numpy.frombuffer(self.values).reshape(-1, self.elements)
+        rows: NDArray[numpy.float64] = numpy.frombuffer(self.values).reshape(-1, self.elements)
         if numpy.any(time_s[1:] < time_s[:-1]):
             order = numpy.argsort(time_s, kind="stable")
             time_s, rows = time_s[order], rows[order]
