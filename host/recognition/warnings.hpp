@@ -25,8 +25,7 @@ std::vector<std::string> warnings_about(std::span<const TouchEvidence> touches,
 /// The touches, from 0, that disagree where all others fit the mode's object at the pose: by
 /// touch_fit, a third of them at most, and the others are three or more in contact. Else none.
 std::vector<std::size_t> unlike_touches(std::span<const TouchEvidence> touches,
-                                        const RecognitionTask& task,
-                                        const RecognitionStep& step);
+                                        const RecognitionTask& task, const RecognitionStep& step);
 /// What to say of these touches.
 std::string unlike_words(std::span<const std::size_t> unlike, const RecognitionTask& task,
                          const RecognitionStep& step);

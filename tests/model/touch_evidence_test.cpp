@@ -101,7 +101,7 @@ TEST(FitSums, AreOfEachTouchAndAddUp) {
     EXPECT_EQ(combined_fit(std::span(sums).first(1))->z,
               evidence_fit(std::span(touches).first(1), pose, map, contact, sd, 0)->z);
     EXPECT_DOUBLE_EQ(combined_fit(sums)->z, (sums[0]->deviation + sums[2]->deviation) /
-                                          std::sqrt(sums[0]->variance + sums[2]->variance));
+                                                std::sqrt(sums[0]->variance + sums[2]->variance));
     EXPECT_FALSE(combined_fit(std::span(sums).subspan(1, 1)));
   }
 }

@@ -78,9 +78,7 @@ class BoundedBelief {
   /// The goal that the options and a tolerance set.
   SearchGoal goal(double tolerance) const;
   /// found()'s where none is given.
-  double tolerance() const {
-    return found_ ? found_->tolerance : options().tolerance;
-  }
+  double tolerance() const { return found_ ? found_->tolerance : options().tolerance; }
 
   /// Searches to the tolerance, or as far as the options' budget reaches.
   Found search(double tolerance);

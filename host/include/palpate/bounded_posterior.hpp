@@ -95,8 +95,8 @@ struct EvaluatedBelief {
 /// the region, or, where bins lie two cells of a map or more apart, the bins. The result does not
 /// depend on the order of touches (but that "none of these" counts the first one's place), on the
 /// number of threads or on the processor's vector width, unless a budget ends the search. Objects
-/// that slip between touches need PoseHistogram. An object that was moved from throws Error on every
-/// call.
+/// that slip between touches need PoseHistogram. An object that was moved from throws Error on
+/// every call.
 class PALPATE_API BoundedPosterior {
  public:
   /// Builds the window tables of the maps.

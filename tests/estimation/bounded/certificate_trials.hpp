@@ -25,7 +25,6 @@ Trial make_trial(const std::array<int, 3>& bins, std::uint64_t seed);
 /// bin.
 Trial make_displaced_trial(const std::array<int, 3>& bins, std::uint64_t seed);
 
-
 Recording first_touches(const Recording& recording, std::size_t touches);
 
 /// Expects the certificate to hold after a trial's touches, each followed by an estimate within a

@@ -60,11 +60,11 @@ double mass_of_zeros(std::span<const double> truth, std::span<const double> esti
 reference::Posterior reference_posterior(std::span<const Hypothesis> objects,
                                          const BoundedOptions& options,
                                          std::span<const Touch> touches) {
-  return reference_posterior(objects,
-                             HistogramOptions{.lattice = options.lattice,
-                                              .contact = options.contact,
-                                              .touch_sd = options.touch_sd},
-                             touches);
+  return reference_posterior(
+      objects,
+      HistogramOptions{
+          .lattice = options.lattice, .contact = options.contact, .touch_sd = options.touch_sd},
+      touches);
 }
 
 namespace {

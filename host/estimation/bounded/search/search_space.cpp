@@ -28,8 +28,8 @@ SearchSpace::SearchSpace(std::span<const Hypothesis> hypotheses, const BoundedOp
     shape.log_odds = {};
     maps.push_back(std::move(shape));
   }
-  const std::vector<TileSize> sizes = tile_sizes(options.lattice, least_cell_mm, hypotheses.size(),
-                                                 options.touch_sd);
+  const std::vector<TileSize> sizes =
+      tile_sizes(options.lattice, least_cell_mm, hypotheses.size(), options.touch_sd);
   if (!options.touch_sd.none()) {
     displacement = std::make_unique<DisplacementWeights>(options.lattice, options.touch_sd);
     for (const TileSize& size : sizes) {
