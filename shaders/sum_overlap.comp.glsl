@@ -9,13 +9,13 @@
 
 layout(local_size_x_id = 0) in;  // a power of two
 
-layout(binding = 0) uniform samplerBuffer source;  // two bins a texel; their second words count
+layout(binding = 0) uniform samplerBuffer source;  // two bins a texel
 layout(binding = 1) uniform samplerBuffer arrays;  // ArrayAtTheta, [theta]
 layout(binding = 2) uniform samplerBuffer boxes;   // ObjectBox, [object]
 layout(std430, binding = 3) writeonly buffer Partials { OverlapPartial partials[]; };
 layout(push_constant) uniform Push { OverlapPush push; };
 
-const uint SOURCE = BLUR_ALONG_Y;
+const uint SOURCE = BLUR_TOUCH;
 #include "blurred_bin.glsl"
 
 // Rectangles that come as close count as overlapping, so that rounding decides nothing on round

@@ -11,11 +11,10 @@
 layout(local_size_x_id = 0) in;
 layout(constant_id = 1) const bool SLIP = false;
 layout(constant_id = 2) const uint ROWS = 4;  // bins along y of an invocation; 1 for a slip
-layout(constant_id = 3) const bool KEEP = false;   // leaves a touch's result in the second words
-layout(constant_id = 4) const uint SOURCE = BLUR_ALONG_X;  // or BLUR_TOUCH, not blurred along x, y
-layout(constant_id = 5) const bool ONE_SLAB = true;        // every slab holds all thetas
-layout(constant_id = 6) const bool TURNS_IN_TABLE = true;  // else in storage
-layout(constant_id = 7) const bool MAXIMA_IN_TABLE = true;
+layout(constant_id = 3) const uint SOURCE = BLUR_ALONG_X;  // or BLUR_TOUCH, not blurred along x, y
+layout(constant_id = 4) const bool ONE_SLAB = true;        // every slab holds all thetas
+layout(constant_id = 5) const bool TURNS_IN_TABLE = true;  // else in storage
+layout(constant_id = 6) const bool MAXIMA_IN_TABLE = true;
 
 layout(binding = 0) uniform samplerBuffer source;  // two bins a texel
 layout(binding = 1) uniform samplerBuffer source_before;  // of the thetas before the slab's
@@ -27,7 +26,6 @@ layout(std430, binding = 5) readonly buffer TurnStorage { vec4 turn_storage[]; }
 layout(binding = 6) uniform samplerBuffer max_table;
 layout(std430, binding = 7) readonly buffer MaxStorage { float max_storage[]; };
 layout(std430, binding = 8) buffer Belief { vec2 belief[]; };
-layout(std430, binding = 9) writeonly buffer Kept { float kept[]; };  // two words a bin
 layout(push_constant) uniform Push { TurnPush push; };
 
 #include "two_float.glsl"
@@ -151,9 +149,6 @@ vec3 words_from(const Tap tap, const int row) {
 
 void put(const uint bin, const float value, const vec2 reference) {
   belief[bin] = SLIP ? two_float_add(reference, value) : two_float_add(belief[bin], value);
-  if (KEEP) {
-    kept[2 * bin + 1] = value;
-  }
 }
 
 void main() {

@@ -19,7 +19,7 @@ namespace {
 constexpr double soon = 1e-2;
 /// How closely the log odds of "none of these" are known, in nats, unless this or the tolerance is
 /// more than it, or the hypotheses, may have.
-constexpr double none_nats = 0.05;
+constexpr double none_nats = 0.3;
 constexpr double negligible = 1e-4;
 /// Bounds of the hypotheses' log evidence this far apart tell too little of them, in nats.
 constexpr double untold_nats = 1.0;

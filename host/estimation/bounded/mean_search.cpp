@@ -79,11 +79,7 @@ bool MeanSearch::for_planes(const Deadline& deadline, const Work& work) const {
 
 bool MeanSearch::survey(const Deadline& deadline, bool everywhere) {
   const std::size_t thetas = space_.turns.size();
-  std::optional<glm::dvec2> sensor_from_pivot_mm;
-  if (!elements_.touches.empty()) {  // the touch is displaced
-    sensor_from_pivot_mm = elements_.touches.front().sensor_from_pivot_mm;
-  }
-  counted_.emplace(space_, options_.lattice, rectangle_, sensor_from_pivot_mm, everywhere);
+  counted_.emplace(space_, options_.lattice, rectangle_, everywhere);
   const MeanTask task = this->task();
   std::vector<PlaneSurvey> surveys(space_.bounds.size() * thetas);
   std::vector<PlaneDivision::LargestSums> sums(surveys.size());
@@ -126,7 +122,7 @@ std::optional<LogInterval> MeanSearch::bounds(double least, bool exact, const De
   const MeanTask task = this->task();
   const std::size_t thetas = space_.turns.size();
   std::vector<double> left_out(surveys_.size());
-  std::vector<LogInterval> evaluated(surveys_.size(), {nothing, nothing});
+  std::vector<double> evaluated(surveys_.size(), nothing);
   if (!for_planes(deadline, [&](std::size_t object, std::size_t first, std::size_t end) {
         PlaneDivision planes(task, object);
         for (std::size_t theta = first; theta < end; ++theta) {
@@ -145,15 +141,15 @@ std::optional<LogInterval> MeanSearch::bounds(double least, bool exact, const De
   for (std::size_t i = 0; i < surveys_.size(); ++i) {
     const std::size_t object = i / thetas;
     const double error = errors_[object][exact ? 1 : 0];
-    low.add(evaluated[i].low - error);
-    high.add(evaluated[i].high + error);
+    low.add(evaluated[i] - error);
+    high.add(evaluated[i] + error);
     high.add(left_out[i]);
-    const CountedBins::ShareSum& unseen = surveys_[i].unseen;
-    if (unseen.shares + unseen.error > 0.0) {
+    if (surveys_[i].unseen > 0) {
       // Where every element sees the prior, all bins have the same likelihood.
-      const double each = prior_log_likelihood_[object];
-      low.add(each + std::log(std::max(unseen.shares - unseen.error, 0.0)) - errors_[object][1]);
-      high.add(each + std::log(unseen.shares + unseen.error) + errors_[object][1]);
+      const double unseen =
+          prior_log_likelihood_[object] + std::log(static_cast<double>(surveys_[i].unseen));
+      low.add(unseen - errors_[object][1]);
+      high.add(unseen + errors_[object][1]);
     }
   }
   const double log_low = low.log() - log_weighted_bins_;

@@ -6,8 +6,6 @@
 #include <optional>
 #include <vector>
 
-#include <glm/vec2.hpp>
-
 #include "estimation/bounded/counted_bins.hpp"
 #include "estimation/bounded/leaves/bin_likelihood.hpp"
 #include "estimation/bounded/plane_division.hpp"
@@ -21,8 +19,9 @@
 namespace palpate {
 
 /// Bounds one touch's mean likelihood over the bins at which its array overlaps an object, or over
-/// all bins where there is no such bin, by prior weight. Where the touch is displaced, the
-/// likelihood is an average, and exact likelihoods count in the mean by their OverlapShares.
+/// all bins where there is no such bin, by prior weight. The touch counts as if it lay where the
+/// robot says: a displacement moves likelihood between neighbouring bins, and changes their mean at
+/// the edge of the overlap alone.
 ///
 /// A mean is wide: thousands of bins hold it, and no order of tiles is worth keeping. So every
 /// object and theta is searched by itself, from the largest tiles down. Tiles whose bounds lie

@@ -89,6 +89,7 @@ PlaneDivision::PlaneDivision(const MeanTask& task, std::size_t object)
       object_(object),
       bounds_(task.space.bounds[object]),
       levels_(bounds_.levels()),
+      unpenalised_(task.unpenalised[object]),
       placed_(levels_.size()) {}
 
 PlaneSurvey PlaneDivision::survey(int theta, LargestSums& sums) {
@@ -97,7 +98,7 @@ PlaneSurvey PlaneDivision::survey(int theta, LargestSums& sums) {
   if (!plane.all_seen) {
     const BinBox seen =
         plane.largest.x_first < plane.largest.x_end ? box_of(0, plane, plane.largest) : BinBox{};
-    found.unseen = task_.counted.outside(seen, plane.counted, shares_looked_at_);
+    found.unseen = plane.counted.outside(seen);
   }
   sums = largest_sums(plane);
   if (!sums.empty()) {
@@ -106,8 +107,8 @@ PlaneSurvey PlaneDivision::survey(int theta, LargestSums& sums) {
     for_batches(plane.largest, sums.data(), [&](int x, int y, const std::uint32_t* of_batch) {
       all.add_batch(levels_.front(), x, y, of_batch);
     });
-    found.best = most(0, plane) - least / penalties_per_nat;
-    found.left_out = most(0, plane) + all.log();
+    found.best = unpenalised_.front() - least / penalties_per_nat;
+    found.left_out = unpenalised_.front() + all.log();
   }
   return found;
 }
@@ -120,7 +121,7 @@ double PlaneDivision::divide(int theta, double least, const LargestSums& kept) {
   Division division{.plane = plane};
   for (std::size_t level = 0; level < levels_.size(); ++level) {
     const double of_level = level + 1 == levels_.size() ? least + closer_nats : least;
-    const double room = std::floor((most(level, plane) - of_level) * penalties_per_nat);
+    const double room = std::floor((unpenalised_[level] - of_level) * penalties_per_nat);
     division.last_divided.push_back(
         static_cast<std::int64_t>(std::clamp(room, -1.0, static_cast<double>(largest_sum))));
     division.left_out.emplace_back(std::max<std::int64_t>(division.last_divided.back(), 0));
@@ -132,16 +133,14 @@ double PlaneDivision::divide(int theta, double least, const LargestSums& kept) {
   });
   LogSum left_out;
   for (std::size_t level = 0; level < levels_.size(); ++level) {
-    left_out.add(most(level, plane) + division.left_out[level].log());
+    left_out.add(unpenalised_[level] + division.left_out[level].log());
   }
   return left_out.log();
 }
 
-LogInterval PlaneDivision::evaluated(Arithmetic arithmetic) {
-  const double log_weight = task_.space.log_weight[object_];
-  const LogInterval sum = boxes_.log_sum(task_.likelihood, task_.elements, arithmetic,
-                                         task_.counted, shares_looked_at_);
-  return {log_weight + sum.low, log_weight + sum.high};
+double PlaneDivision::evaluated(Arithmetic arithmetic) const {
+  return task_.space.log_weight[object_] +
+         boxes_.log_sum(task_.likelihood, task_.elements, arithmetic);
 }
 
 PlaneDivision::Plane PlaneDivision::plane(int theta) const {

@@ -7,13 +7,11 @@
 #include <vector>
 
 #include "estimation/bounded/counted_bins.hpp"
-#include "estimation/bounded/displaced/overlap_shares.hpp"
 #include "estimation/bounded/leaves/bin_likelihood.hpp"
 #include "estimation/bounded/search/search_space.hpp"
 #include "estimation/bounded/tables/tile_bounds.hpp"
 #include "estimation/known_elements.hpp"
 #include "model/bounding_box.hpp"
-#include "palpate/estimate.hpp"
 
 namespace palpate {
 
@@ -31,10 +29,10 @@ struct MeanTask {
 struct PlaneSurvey {
   static constexpr double nothing = -std::numeric_limits<double>::infinity();
 
-  std::int64_t bins = 0;         ///< that count
-  CountedBins::ShareSum unseen;  ///< of the bins at which every element sees the prior
-  double best = nothing;         ///< the largest bound, in nats, with the prior weight
-  double left_out = nothing;     ///< log of what the tiles that see the map hold at most, with it
+  std::int64_t bins = 0;      ///< that count
+  std::int64_t unseen = 0;    ///< of these, bins at which every element sees the prior
+  double best = nothing;      ///< the largest bound, in nats, with the prior weight
+  double left_out = nothing;  ///< log of what the tiles that see the map hold at most, with it
 };
 
 /// Divides the tiles of neighbouring planes of one object, one plane after another, and evaluates
@@ -55,9 +53,9 @@ class PlaneDivision {
   /// @param kept the sums that its survey found, or none
   /// @returns log of what these hold at most
   double divide(int theta, double least, const LargestSums& kept);
-  /// Bounds of the log of the summed likelihood of the bins that count in what was divided, with
-  /// the prior weight, beside the likelihood's own error.
-  LogInterval evaluated(Arithmetic arithmetic);
+  /// The log of the summed likelihood of the bins that count in what was divided, with the prior
+  /// weight.
+  double evaluated(Arithmetic arithmetic) const;
 
  private:
   class PenaltySum;
@@ -84,10 +82,6 @@ class PlaneDivision {
   BinBox box_of(std::size_t level, const Plane& plane, const TileRange& tiles) const {
     return levels_[level].box_of(static_cast<std::int32_t>(object_), plane.counted.theta, tiles);
   }
-  /// The log of what a bin counts at most where no element has a penalty.
-  double most(std::size_t level, const Plane& plane) const {
-    return task_.unpenalised[object_][level] + plane.counted.log_most_share;
-  }
   const WindowPlaces& places(std::size_t level, int theta);
   LargestSums largest_sums(const Plane& plane);
   /// Leaves out the tiles of a batch whose bounds are low, and divides the others.
@@ -101,9 +95,9 @@ class PlaneDivision {
   std::size_t object_;
   const TileBounds& bounds_;
   std::span<const TileLevel> levels_;
-  std::vector<Placed> placed_;  ///< [level]
-  CountedBoxes boxes_;          ///< to be evaluated
-  OverlapShares::Planes shares_looked_at_;
+  std::span<const double> unpenalised_;  ///< [level]
+  std::vector<Placed> placed_;           ///< [level]
+  CountedBoxes boxes_;                   ///< to be evaluated
 };
 
 }  // namespace palpate

@@ -192,7 +192,7 @@ void require_whole_planes(const gpu::Context& context, const PoseLattice& lattic
 DisplacementBlur::DisplacementBlur(gpu::Context& context, gpu::CommandStream& stream,
                                    const PoseLattice& lattice, std::size_t objects,
                                    const DisplacementSd& sd,
-                                   std::span<const glm::dvec2> slip_centroids_mm, bool keep_touch)
+                                   std::span<const glm::dvec2> slip_centroids_mm)
     : context_(context),
       stream_(stream),
       lattice_(lattice),
@@ -228,16 +228,16 @@ DisplacementBlur::DisplacementBlur(gpu::Context& context, gpu::CommandStream& st
     }
   }
   sum_turns_ = gpu::Kernel(
-      context, {.name = "sum_turns",
-                .spirv = shaders::sum_turns,
-                .bindings = {Access::table, Access::table, Access::table, Access::table,
-                             Access::table, Access::storage, Access::table, Access::storage,
-                             Access::storage, Access::storage},
-                .push_bytes = sizeof(shaders::TurnPush),
-                .constants = {lanes_, slips_ ? 1U : 0U, turn_rows_, keep_touch ? 1U : 0U,
-                              blurs_planes() ? shaders::BLUR_ALONG_X : shaders::BLUR_TOUCH,
-                              objects_in_one_slab(context, lattice, objects) ? 1U : 0U,
-                              turns_.is_table() ? 1U : 0U, plane_max_.is_table() ? 1U : 0U}});
+      context,
+      {.name = "sum_turns",
+       .spirv = shaders::sum_turns,
+       .bindings = {Access::table, Access::table, Access::table, Access::table, Access::table,
+                    Access::storage, Access::table, Access::storage, Access::storage},
+       .push_bytes = sizeof(shaders::TurnPush),
+       .constants = {lanes_, slips_ ? 1U : 0U, turn_rows_,
+                     blurs_planes() ? shaders::BLUR_ALONG_X : shaders::BLUR_TOUCH,
+                     objects_in_one_slab(context, lattice, objects) ? 1U : 0U,
+                     turns_.is_table() ? 1U : 0U, plane_max_.is_table() ? 1U : 0U}});
   stream.upload(plane_max_, blur_weights(sd.rad, lattice.theta_rad, theta_steps_),
                 planes() * sizeof(float));
 }
@@ -344,7 +344,7 @@ void DisplacementBlur::sum_turns(const DenseBelief& scratch, const DenseBelief& 
                      {&slab.log_likelihood, &before.log_likelihood, &after.log_likelihood,
                       &references_, turns_.read_as(Access::table), turns_.read_as(Access::storage),
                       plane_max_.read_as(Access::table), plane_max_.read_as(Access::storage),
-                      &belief.slabs()[i].log_likelihood, &slab.log_likelihood},
+                      &belief.slabs()[i].log_likelihood},
                      push,
                      few_groups
                          ? std::array<std::uint32_t, 3>{1, 1, 1}

@@ -24,10 +24,9 @@ class DisplacementBlur {
   /// part of one object's bins.
   /// @param slip_centroids_mm of a belief's blur: every object's centroid, in its frame; empty for
   /// that of touches
-  /// @param keep_touch whether sum_turns() leaves a touch's mean likelihood in the scratch belief
   DisplacementBlur(gpu::Context& context, gpu::CommandStream& stream, const PoseLattice& lattice,
                    std::size_t objects, const DisplacementSd& sd,
-                   std::span<const glm::dvec2> slip_centroids_mm, bool keep_touch);
+                   std::span<const glm::dvec2> slip_centroids_mm);
 
   std::uint64_t device_bytes() const;
 

@@ -83,8 +83,7 @@ TouchByTouch::TouchByTouch(gpu::Context& context, gpu::CommandStream& stream,
       log_weight_(log_weight),
       objects_(hypotheses.size()),
       scratch_(belief.uniform()),
-      touch_blur_(context, stream, options.lattice, objects_, options.touch_sd, {},
-                  options.none_weight.has_value()),
+      touch_blur_(context, stream, options.lattice, objects_, options.touch_sd, {}),
       lost_mass_(objects_, 0.0),
       references_(objects_) {
   touch_blur_.warm_up(scratch_, belief);
@@ -93,8 +92,7 @@ TouchByTouch::TouchByTouch(gpu::Context& context, gpu::CommandStream& stream,
     for (const Hypothesis& hypothesis : hypotheses) {
       centroids_mm.push_back(displaced_body(hypothesis.map).centroid_mm);
     }
-    slip_blur_.emplace(context, stream, options.lattice, objects_, options.slip_sd, centroids_mm,
-                       false);
+    slip_blur_.emplace(context, stream, options.lattice, objects_, options.slip_sd, centroids_mm);
     slip_blur_->warm_up(scratch_, belief);
     before_slip_ = belief.summarise();
     after_slip_ = before_slip_;
@@ -121,14 +119,16 @@ void TouchByTouch::update(const TouchEvidence& touch, const ContactEvidence& evi
   }
   scratch_.clear();
   evaluate(scratch_);
-  touch_blur_.blur_planes(scratch_, scratch_, references_);
   const glm::dvec2& pivot_mm = options_.lattice.pivot_mm;
-  touch_blur_.turn_for(touch.T_robot_sensor.translation_mm - pivot_mm);
-  touch_blur_.sum_turns(scratch_, belief);
-  // A touch without a known element says nothing, not even where the array was.
+  // A touch without a known element says nothing, not even where the array was. A displacement
+  // moves likelihood between neighbouring bins: it changes their sum at the edge of the overlap
+  // alone, and is left out of it.
   if (overlap_ && !evidence.segments.empty()) {
     add_to_none(array_rectangle(touch.T_robot_sensor, touch.elements_mm, pivot_mm));
   }
+  touch_blur_.blur_planes(scratch_, scratch_, references_);
+  touch_blur_.turn_for(touch.T_robot_sensor.translation_mm - pivot_mm);
+  touch_blur_.sum_turns(scratch_, belief);
   stream_.run();
   touched_ = true;
 }

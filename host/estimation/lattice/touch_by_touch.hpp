@@ -26,9 +26,9 @@ struct OverlapSum {
   std::int64_t bins = 0;
 };
 
-/// Sums a touch's likelihood, object by object, over the bins at which the array overlaps the
-/// object: at which the rectangle around its elements, parallel to the sensor's axes, meets the box
-/// around the map's cells with log odds above 0.
+/// Sums a touch's likelihood, as if it lay where the robot says, object by object, over the bins at
+/// which the array overlaps the object: at which the rectangle around its elements, parallel to the
+/// sensor's axes, meets the box around the map's cells with log odds above 0.
 class OverlapMean {
  public:
   OverlapMean(gpu::Context& context, gpu::CommandStream& stream, const DenseBelief& belief,
@@ -37,8 +37,7 @@ class OverlapMean {
   std::uint64_t device_bytes() const;
 
   /// Runs the stream.
-  /// @param scratch with a touch's log-likelihood in the low words, as
-  /// DisplacementBlur::sum_turns() leaves it
+  /// @param scratch with a touch's log-likelihood in the high words
   /// @param everywhere whether all bins count, wherever the array is
   /// @returns [object], until the next call
   std::span<const OverlapSum> sums(const DenseBelief& scratch, const ArrayRectangle& array,

@@ -60,6 +60,8 @@ reference::Posterior expected_posterior(const HistogramOptions& options,
 
 double expected_log_odds_of_none(const HistogramOptions& options, std::span<const Touch> touches,
                                  const std::vector<std::vector<Logs>>& by_touch) {
+  HistogramOptions as_if_exact = options;
+  as_if_exact.touch_sd = {};
   const reference::Posterior posterior =
       expected_posterior(options, std::span(by_touch).first(touches.size()));
   std::vector<double> evidence;
@@ -79,8 +81,9 @@ double expected_log_odds_of_none(const HistogramOptions& options, std::span<cons
     sum += std::exp(e - most);
   }
   return std::log(*options.none_weight) +
-         reference::none_log_evidence(touches, options.lattice, two_maps(), by_touch) - most -
-         std::log(sum);
+         reference::none_log_evidence(touches, options.lattice, two_maps(),
+                                      reference_touches(as_if_exact, touches)) -
+         most - std::log(sum);
 }
 
 double log_odds_of_none(const PoseHistogram& histogram) {

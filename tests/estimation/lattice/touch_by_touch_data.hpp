@@ -33,7 +33,8 @@ reference::Posterior expected_posterior(const HistogramOptions& options,
 reference::Posterior expected_posterior(const HistogramOptions& options,
                                         std::span<const Touch> touches);
 
-/// The log odds of "none of these", by its definition and by a histogram.
+/// The log odds of "none of these", by its definition and by a histogram. Its own evidence takes
+/// touches as if they lay where the robot says.
 /// @param by_touch likelihoods of these touches and perhaps of more
 double expected_log_odds_of_none(const HistogramOptions& options, std::span<const Touch> touches,
                                  const std::vector<std::vector<Logs>>& by_touch);
