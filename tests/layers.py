@@ -6,15 +6,16 @@ import pathlib
 import re
 import sys
 
-LIBRARY = ["model", "gpu", "shaders", "estimation", "simulation", "yaml", "io", "streaming"]
+LIBRARY = ["model", "gpu", "shaders", "estimation", "simulation", "options", "yaml", "io", "streaming"]
 BELOW = {
     "host/model": [],
     "host/reference": [],
     "host/gpu": ["model"],
     "host/estimation": ["model", "gpu", "shaders"],
     "host/simulation": ["model"],
+    "host/options": ["model"],
     "host/yaml": ["model"],
-    "host/io": ["model", "yaml"],
+    "host/io": ["model", "options", "yaml"],
     "host/streaming": ["model", "simulation", "io"],
     "host/recognition": LIBRARY,
     "host/learning": [*LIBRARY, "recognition"],

@@ -166,23 +166,22 @@ void add_calibrate(CLI::App& app) {
                    "about as many as you will recognize with. More take longer")
       ->check(require_whole_number)
       ->capture_default_str();
-  add_text_flag(
-      *command, "--bins", options->recognition.bins,
+  add_option_flag(
+      *command, options->recognition, "bins",
       "Pose bins that recognize will be given, as 25x25x16; for touches at known poses. Unknowns "
       "lie between bins, and fit the worse the wider bins are: calibrate learns by how much "
       "[default: bins half the elements' spacing and 5 degrees wide where the touches are; "
       "25x25x16 where a range or X,Y is given]");
-  add_text_flag(*command, "--x-mm", options->recognition.x_mm,
-                "Range of these bins, mm, as recognize will be given it [default: -10:10 "
-                "beside --bins]");
-  add_text_flag(*command, "--y-mm", options->recognition.y_mm, "The same along y, mm");
-  add_text_flag(*command, "--theta-deg", options->recognition.theta_deg,
-                "The same of theta, degrees [default: 0:360]");
-  add_text_flag(*command, "--pivot-mm", options->recognition.pivot_mm,
-                "Pivot of these bins, mm, as recognize will be given it: X,Y or auto "
-                "[default: 0,0 beside --bins]");
-  add_text_flag(*command, "--frames", options->recognition.frames,
-                "Use the touches A to B - 1 of every recording, counted from 0, as A:B");
+  add_option_flag(*command, options->recognition, "x-mm",
+                  "Range of these bins, mm, as recognize will be given it [default: -10:10 "
+                  "beside --bins]");
+  add_option_flag(*command, options->recognition, "y-mm", "The same along y, mm");
+  add_option_flag(*command, options->recognition, "theta-deg",
+                  "The same of theta, degrees [default: 0:360]");
+  add_option_flag(*command, options->recognition, "pivot-mm",
+                  "Pivot of these bins, mm, as recognize will be given it: X,Y or auto "
+                  "[default: 0,0 beside --bins]");
+  add_option_flag(*command, options->recognition, "frames");
   command->add_option("--write-array", options->write_array,
                       "File for the array, CSV of x and y in mm, where drawn maps say that it sits "
                       "in the tool, for --array of palpate import");

@@ -19,14 +19,10 @@ struct Group {
 };
 const std::vector<Group>& groups() {
   static const std::vector<Group> all{
-      {"Bins and region", {"--bins", "--x-mm", "--y-mm", "--theta-deg", "--pivot-mm"}},
       {"Likelihood",
        {"--prior", "--gamma", "--ratio", "--spread-mm", "--psf-mm", "--peak", "--felt-share"}},
-      {"Misplaced touches and slip",
-       {"--touch-sd-mm", "--touch-sd-deg", "--slip-sd-mm", "--slip-sd-deg"}},
-      {"Filter",
-       {"--filter", "--tolerance", "--budget-ms", "--evidence-nats", "--particles", "--resampling",
-        "--augmented", "--seed", "--device", "--verbose"}},
+      {"Misplaced touches and slip", {"--touch-sd-mm", "--touch-sd-deg"}},
+      {"Filter", {"--device", "--verbose"}},
       {"Touches in a stream",
        {"--onset", "--release", "--steady", "--min-steady-s", "--smooth-s", "--drift-s", "--tare",
         "--reset-after"}},
@@ -61,10 +57,7 @@ void arrange_help(CLI::App& app) {
     for (const Group& group : groups()) {
       for (const char* flag : group.flags) {
         CLI::Option* option = command->get_option_no_throw(flag);
-        // A seed is a filter's only where there is one.
-        const bool own = std::string_view(flag) == "--seed" &&
-                         command->get_option_no_throw("--particles") == nullptr;
-        if (option != nullptr && option->get_group() == "Options" && !own) {
+        if (option != nullptr && option->get_group() == "Options") {
           option->group(group.name);
         }
       }

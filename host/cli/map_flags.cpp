@@ -15,7 +15,7 @@
 #include "cli/recognition_flags.hpp"
 #include "model/number_text.hpp"
 #include "model/printable.hpp"
-#include "recognition/option_text.hpp"
+#include "options/option.hpp"
 #include "recognition/recordings.hpp"
 
 namespace palpate::cli {
@@ -91,8 +91,10 @@ void add_map_flags(CLI::App& command, MapFlags& flags) {
                      "aligned to the map that they make [default: 0, exact]");
   command.add_option("--touch-sd-deg", flags.touch_sd_deg,
                      "The same of the sensor's angle, degrees [default: 0]");
-  add_text_flag(command, "--frames", flags.frames,
-                "Use the touches A to B - 1 of every recording, counted from 0, as A:B");
+  command.add_option_function<std::string>(
+      "--frames",
+      [&flags](const std::string& text) { flags.frames = parse_frames("--frames", text); },
+      option_named("frames").help);
   command.add_option("--symmetry", flags.symmetry,
                      "n-fold rotational symmetry, where 1 is none and 0 any rotation; of all "
                      "objects, or of some, such as nut=6,key=1. Where the map looks the same after "

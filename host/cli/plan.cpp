@@ -175,12 +175,8 @@ void add_plan(CLI::App& app) {
       ->add_option("--goal", options->goal,
                    "What the touch shall tell: identity, pose (once the object is known) or both")
       ->capture_default_str();
-  add_text_flag(*command, "--frames", options->request.frames,
-                "Use the touches A to B - 1 of the recording, counted from 0, as A:B");
-  command
-      ->add_option("--touches", options->request.touches,
-                   "Use the first N touches of the recording [default: all]")
-      ->check(require_whole_number);
+  add_option_flag(*command, options->request, "frames");
+  add_option_flag(*command, options->request, "touches");
   command
       ->add_option("--samples", options->samples,
                    "Objects and poses that stand for the belief; the time grows with its square")

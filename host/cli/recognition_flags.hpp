@@ -3,11 +3,12 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include <CLI/CLI.hpp>
 
 #include "cli/command_files.hpp"
-#include "recognition/option_text.hpp"
+#include "options/option.hpp"
 #include "recognition/resolve.hpp"
 
 namespace palpate::cli {
@@ -22,17 +23,12 @@ void add_recognition_flags(CLI::App& command, Request& request, bool& verbose);
 void hide_particle_flags(CLI::App& command);
 
 /// Adds the flags that select unknowns from recordings.
-void add_unknown_flags(CLI::App& command, Request& request);
+void add_selection_flags(CLI::App& command, Request& request);
 
-/// Adds a flag whose text read_option() reads into the value: counts as 25x25x16, auto or fine, a
-/// range LOWER:UPPER, frames A:B, a pivot X,Y or auto. Its Errors name flag, value and the form
-/// wanted.
-template <typename Value>
-CLI::Option* add_text_flag(CLI::App& command, const std::string& flag, Value& value,
-                           const std::string& help) {
-  return command.add_option_function<std::string>(
-      flag, [flag, &value](const std::string& text) { read_option(flag, text, value); }, help);
-}
+/// Adds the flag of one option. Its Errors name flag, value and what to give instead.
+/// @param help "": the option's own
+void add_option_flag(CLI::App& command, Request& request, std::string_view name,
+                     const std::string& help = "");
 
 /// A device that is opened once it is needed.
 class DeviceInWaiting {

@@ -247,8 +247,7 @@ void add_recognize(CLI::App& app) {
   command->add_option("RECORDING", options->recordings, "Recordings of unknown objects (HDF5)")
       ->required();
   add_recognition_flags(*command, options->request, options->verbose);
-  add_unknown_flags(*command, options->request);
-  command->add_flag("--trace", options->request.trace, "Show the estimate after every touch");
+  add_selection_flags(*command, options->request);
   command->add_option("--json", options->json, "Write the records as JSON; - is standard output");
   command->add_option(
       "--posterior", options->posterior,

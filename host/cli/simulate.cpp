@@ -12,9 +12,9 @@
 
 #include "cli/command_files.hpp"
 #include "cli/options.hpp"
+#include "options/option.hpp"
 #include "palpate/files.hpp"
 #include "palpate/simulation.hpp"
-#include "recognition/option_text.hpp"
 
 namespace palpate::cli {
 

@@ -1,15 +1,16 @@
 #include "palpate/scene.hpp"
 
-#include <algorithm>
 #include <fstream>
-#include <numbers>
+#include <optional>
+#include <string_view>
 #include <utility>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "io/input_file.hpp"
 #include "io/pressure_table.hpp"
-#include "palpate/lattice.hpp"
+#include "options/option.hpp"
 #include "palpate/touch.hpp"
 #include "yaml/yaml_entry.hpp"
 
@@ -19,34 +20,9 @@ namespace {
 
 using Entry = YamlEntry;
 
-std::array<double, 2> read_pair(const Entry& entry, const char* remedy) {
-  const std::vector<Entry> entries = entry.list(2, remedy);
-  return {entries[0].number(), entries[1].number()};
-}
-
-std::array<double, 2> read_range(const Entry& entry) {
-  const std::array<double, 2> ends = read_pair(entry, "give [lower, upper]");
-  if (ends[0] > ends[1]) {
-    entry.refuse(fmt::format("[{}, {}] is reversed; write the lower end first", ends[0], ends[1]));
-  }
-  return ends;
-}
-
-std::array<double, 2> read_angles_deg(const Entry& entry) {
-  const std::array<double, 2> ends = read_range(entry);
-  constexpr double degree = std::numbers::pi / 180.0;
-  if (PoseLattice{.theta_rad = {ends[0] * degree, ends[1] * degree, 1}}.exceeds_circle()) {
-    entry.refuse(
-        fmt::format("[{}, {}] is wider than the full circle, poses would count twice; give a range "
-                    "of at most 360 degrees",
-                    ends[0], ends[1]));
-  }
-  return ends;
-}
-
 glm::dvec2 read_point(const Entry& entry) {
-  const std::array<double, 2> xy = read_pair(entry, "give [x, y]");
-  return {xy[0], xy[1]};
+  const std::vector<Entry> entries = entry.list(2, "give [x, y]");
+  return {entries[0].number(), entries[1].number()};
 }
 
 void read_array(const Entry& array, Scene& scene) {
@@ -97,56 +73,43 @@ std::vector<Scene::Object> read_objects(const Entry& entry) {
   return objects;
 }
 
-void read_pivot(const Entry& entry, Scene::Region& region) {
-  if (entry.node.IsScalar() && entry.node.Scalar() == "auto") {
-    region.auto_pivot = true;
-    return;
+/// The option's value as a flag has it: a list's numbers are joined as in "25x25x16".
+std::string text_of(const Entry& entry, const Option& option) {
+  const std::optional<char> separator = separator_of(option);
+  if (!separator || !entry.node.IsSequence()) {
+    return entry.text();
   }
-  const std::array<double, 2> xy = read_pair(entry, "give [x, y], or auto");
-  region.pivot_mm = {xy[0], xy[1]};
-}
-
-Scene::Region read_region(const Entry& entry) {
-  Scene::Region region;
-  read_keys(entry, {{"x_mm", [&](const Entry& e) { region.x_mm = read_range(e); }},
-                    {"y_mm", [&](const Entry& e) { region.y_mm = read_range(e); }},
-                    {"theta_deg", [&](const Entry& e) { region.theta_deg = read_angles_deg(e); }},
-                    {"pivot_mm", [&](const Entry& e) { read_pivot(e, region); }}});
-  return region;
-}
-
-Scene::Displacement read_displacement(const Entry& entry) {
-  const auto at_least_0 = [](double value) { return value >= 0; };
-  constexpr const char* remedy = "give a number from 0";
-  Scene::Displacement sd;
-  read_keys(entry, {{"mm", [&](const Entry& e) { sd.mm = e.number(at_least_0, remedy); }},
-                    {"deg", [&](const Entry& e) { sd.deg = e.number(at_least_0, remedy); }}});
-  return sd;
-}
-
-void read_none(const Entry& entry, Scene& scene) {
-  scene.auto_none = entry.node.IsScalar() && entry.node.Scalar() == "auto";
-  if (!scene.auto_none) {
-    scene.none =
-        entry.number([](double weight) { return weight >= 0; }, "give a number from 0, or auto");
+  std::vector<std::string> numbers;
+  for (const Entry& item : entry.list("")) {
+    numbers.push_back(item.text());
   }
+  return fmt::format("{}", fmt::join(numbers, std::string(1, *separator)));
 }
 
-void read_bins(const Entry& entry, Scene& scene) {
-  scene.auto_bins = entry.node.IsScalar() && entry.node.Scalar() == "auto";
-  scene.fine_bins = entry.node.IsScalar() && entry.node.Scalar() == "fine";
-  if (scene.auto_bins || scene.fine_bins) {
-    return;
+void read_option(const Entry& entry, const Option& option, Scene& scene) {
+  std::string text = text_of(entry, option);
+  Request request;
+  if (const std::string remedy = set_option(request, option, text); !remedy.empty()) {
+    entry.refuse(remedy);
   }
-  const std::vector<Entry> counts =
-      entry.list(3, "give the counts of bins [x, y, theta], or auto, or fine");
-  scene.bins = {counts[0].integer(1), counts[1].integer(1), counts[2].integer(1)};
+  const bool names_file = option.member == Option::Member(&Request::sensor_model);
+  if (names_file && text != no_sensor_model) {
+    text = (entry.file.parent_path() / text).string();
+  }
+  scene.options[option.name] = std::move(text);
 }
 
-/// A file, relative to the scene's, or "none".
-std::filesystem::path sensor_model_in(const Entry& entry) {
-  const std::string name = entry.text();
-  return name == "none" ? std::filesystem::path(name) : entry.file.parent_path() / name;
+/// Adds the keys of the options that stand in the section, "" for the scene itself.
+void add_option_keys(std::string_view section, Scene& scene, YamlKeys& keys) {
+  for (const Option& option : options()) {
+    const std::string_view path = option.scene_key;
+    const std::size_t dot = path.find('.');
+    const std::string_view in = dot == path.npos ? "" : path.substr(0, dot);
+    if (!path.empty() && in == section) {
+      keys.emplace_back(path.substr(dot == path.npos ? 0 : dot + 1),
+                        [&](const Entry& entry) { read_option(entry, option, scene); });
+    }
+  }
 }
 
 }  // namespace
@@ -158,37 +121,17 @@ Scene read_scene(const std::filesystem::path& path) {
     if (root.node.IsNull()) {
       return;  // comments alone: everything is left out
     }
-    const auto number = [](std::optional<double>& key, bool (*fits)(double), const char* remedy) {
-      return [&key, fits, remedy](const Entry& e) { key = e.number(fits, remedy); };
-    };
-    const auto at_least_0 = [](double value) { return value >= 0; };
-    const auto rate = [](double value) { return value >= 0 && value < 1; };
-    const auto inner = [](double value) { return value > 0 && value < 1; };
-    const auto above_0 = [](double value) { return value > 0; };
-    const auto probability = [](double value) { return value >= 0 && value <= 1; };
-    read_keys(root,
-              {{"array", [&](const Entry& e) { read_array(e, scene); }},
-               {"sensor_model", [&](const Entry& e) { scene.sensor_model = sensor_model_in(e); }},
-               {"threshold", number(scene.threshold, at_least_0, "give a number from 0")},
-               {"ratio", number(scene.ratio, rate, "give a number in [0, 1)")},
-               {"gamma", number(scene.gamma, rate, "give a number in [0, 1)")},
-               {"prior", number(scene.prior, inner, "give a number in (0, 1)")},
-               {"objects", [&](const Entry& e) { scene.objects = read_objects(e); }},
-               {"region", [&](const Entry& e) { scene.region = read_region(e); }},
-               {"none", [&](const Entry& e) { read_none(e, scene); }},
-               {"touch_sd", [&](const Entry& e) { scene.touch_sd = read_displacement(e); }},
-               {"slip_sd", [&](const Entry& e) { scene.slip_sd = read_displacement(e); }},
-               {"bins", [&](const Entry& e) { read_bins(e, scene); }},
-               {"filter",
-                [&](const Entry& e) {
-                  scene.filter = e.one_of<std::string>({{"auto", "auto"},
-                                                        {"histogram", "histogram"},
-                                                        {"bounded", "bounded"},
-                                                        {"particles", "particles"}});
-                }},
-               {"act_below_mm", number(scene.act_below_mm, above_0, "give a number above 0")},
-               {"act_above", number(scene.act_above, probability, "give a number in [0, 1]")},
-               {"device", [&](const Entry& e) { scene.device = e.text(); }}});
+    YamlKeys keys{{"array", [&](const Entry& e) { read_array(e, scene); }},
+                  {"objects", [&](const Entry& e) { scene.objects = read_objects(e); }}};
+    for (const char* section : {"region", "touch_sd", "slip_sd"}) {
+      keys.emplace_back(section, [&scene, section](const Entry& entry) {
+        YamlKeys inner;
+        add_option_keys(section, scene, inner);
+        read_keys(entry, inner);
+      });
+    }
+    add_option_keys("", scene, keys);
+    read_keys(root, keys);
   });
   return scene;
 }

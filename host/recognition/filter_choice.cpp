@@ -12,50 +12,23 @@
 
 #include "estimation/bounded/search_memory.hpp"
 #include "estimation/displacement_check.hpp"
-#include "recognition/refused_option.hpp"
+#include "options/option.hpp"
+#include "options/refused_option.hpp"
 
 namespace palpate {
 
 namespace {
 
-/// What gave the option, in the middle of a sentence.
-std::string giver_of(const Request& request, const std::string& option) {
-  const auto key = request.keys.find(option);
-  return key == request.keys.end() ? fmt::format("`{}`", option)
-                                   : fmt::format("{} in {}", key->second, request.scene);
-}
-
-/// One standard deviation: its option and what is asked.
-struct AskedSd {
-  const char* option;
-  std::optional<double> value;
-};
-
-AskedSd touch_mm(const Request& request) { return {"touch-sd-mm", request.touch_sd_mm}; }
-AskedSd touch_deg(const Request& request) { return {"touch-sd-deg", request.touch_sd_deg}; }
-AskedSd slip_mm(const Request& request) { return {"slip-sd-mm", request.slip_sd_mm}; }
-AskedSd slip_deg(const Request& request) { return {"slip-sd-deg", request.slip_sd_deg}; }
-
-/// The standard deviation; 0 where it is not asked. Throws Error where it is none.
-double value_of(const AskedSd& sd) {
-  if (sd.value && !(*sd.value >= 0.0 && std::isfinite(*sd.value))) {
-    refuse_option(sd.option, *sd.value, "give a finite number from 0");
-  }
-  return sd.value.value_or(0.0);
-}
-
 /// Sets what is asked, and leaves the rest.
-void set_displacement(const AskedSd& asked_mm, const AskedSd& asked_deg, double& mm, double& rad) {
-  mm = asked_mm.value ? value_of(asked_mm) : mm;
-  rad = asked_deg.value ? value_of(asked_deg) * std::numbers::pi / 180.0 : rad;
+void set_displacement(const std::optional<double>& asked_mm, const std::optional<double>& asked_deg,
+                      DisplacementSd& sd) {
+  sd.mm = asked_mm.value_or(sd.mm);
+  sd.rad = asked_deg ? *asked_deg * std::numbers::pi / 180.0 : sd.rad;
 }
 
 std::optional<double> none_weight(const Request& request, std::span<const Hypothesis> hypotheses) {
   const NoneWeight given = request.none.value_or(Automatic{});
   if (const auto* weight = std::get_if<double>(&given)) {
-    if (!(*weight >= 0.0 && std::isfinite(*weight))) {
-      refuse_option("none", *weight, "give a weight from 0, or no value");
-    }
     return *weight > 0.0 ? std::optional(*weight) : std::nullopt;
   }
   constexpr double odds = 1.0 / 9.0;  // against all objects together: one in ten
@@ -66,27 +39,13 @@ std::optional<double> none_weight(const Request& request, std::span<const Hypoth
   return odds * sum;
 }
 
-double require_above_0(const char* option, double value) {
-  if (!(value > 0.0 && std::isfinite(value))) {
-    refuse_option(option, value, "must be above 0");
-  }
-  return value;
-}
-
 BoundedOptions asked_bounds(const Request& request, const HistogramOptions& histogram) {
   BoundedOptions bounded = bounded_instead(histogram).value();
-  if (request.tolerance) {
-    if (!(*request.tolerance > 0.0 && *request.tolerance < 1.0)) {
-      refuse_option("tolerance", *request.tolerance, "give a probability between 0 and 1");
-    }
-    bounded.tolerance = *request.tolerance;
-  }
+  bounded.tolerance = request.tolerance.value_or(bounded.tolerance);
   if (request.budget_ms) {
-    bounded.budget_s = 1e-3 * require_above_0("budget-ms", *request.budget_ms);
+    bounded.budget_s = 1e-3 * *request.budget_ms;
   }
-  if (request.evidence_nats) {
-    bounded.evidence_nats = require_above_0("evidence-nats", *request.evidence_nats);
-  }
+  bounded.evidence_nats = request.evidence_nats;
   return bounded;
 }
 
@@ -95,14 +54,12 @@ ParticleOptions asked_particles(const Request& request, const HistogramOptions& 
   ParticleOptions particles{
       .region = histogram.lattice, .contact = histogram.contact, .augmented = request.augmented};
   particles.particles = request.particles.value_or(particles.particles);
-  if (particles.particles < 1 || particles.particles > 1'000'000) {
-    refuse_option("particles", particles.particles, "give 1 to 1,000,000");
-  }
   particles.resampling = request.resampling.value_or(particles.resampling);
   particles.seed = request.seed.value_or(particles.seed);
-  for (const AskedSd& sd : {touch_mm(request), touch_deg(request)}) {
-    if (sd.value) {
-      refuse_given(request, sd.option,
+  for (const auto& [option, sd] : {std::pair{"touch-sd-mm", request.touch_sd_mm},
+                                   std::pair{"touch-sd-deg", request.touch_sd_deg}}) {
+    if (sd) {
+      refuse_given(request, option,
                    "particles take every touch's pose to be exact; use `filter bounded` or "
                    "`filter histogram`, or `slip-sd-mm` and `slip-sd-deg`, their motion noise");
     }
@@ -112,7 +69,10 @@ ParticleOptions asked_particles(const Request& request, const HistogramOptions& 
                  "particles have no mean over all poses, which (none) needs; use `filter bounded` "
                  "or `filter histogram`");
   }
-  set_displacement(slip_mm(request), slip_deg(request), particles.motion_mm, particles.motion_rad);
+  DisplacementSd motion{particles.motion_mm, particles.motion_rad};
+  set_displacement(request.slip_sd_mm, request.slip_sd_deg, motion);
+  particles.motion_mm = motion.mm;
+  particles.motion_rad = motion.rad;
   return particles;
 }
 
@@ -141,11 +101,10 @@ FilterWish filter_wish(const Request& request) {
                               filter));
     }
     if (given && kind == FilterKind::automatic) {
-      return {FilterKind::bounded, giver_of(request, option)};
+      return {FilterKind::bounded, fmt::format("`{}`", option)};
     }
   }
-  return {kind, request.keys.contains("filter") ? giver_of(request, "filter")
-                                                : fmt::format("`filter {}`", filter)};
+  return {kind, request.filter ? origin_of_option(request, "filter") : "`filter auto`"};
 }
 
 ChosenFilter choose_filter(const FilterWish& wish, const Request& request,
@@ -154,10 +113,8 @@ ChosenFilter choose_filter(const FilterWish& wish, const Request& request,
   if (wish.kind == FilterKind::particles) {
     return {asked_particles(request, histogram), false, wish.by};
   }
-  set_displacement(touch_mm(request), touch_deg(request), histogram.touch_sd.mm,
-                   histogram.touch_sd.rad);
-  set_displacement(slip_mm(request), slip_deg(request), histogram.slip_sd.mm,
-                   histogram.slip_sd.rad);
+  set_displacement(request.touch_sd_mm, request.touch_sd_deg, histogram.touch_sd);
+  set_displacement(request.slip_sd_mm, request.slip_sd_deg, histogram.slip_sd);
   if (request.none || !of_caller.learned_only) {
     histogram.none_weight = none_weight(request, hypotheses);
   }
@@ -194,17 +151,14 @@ ChosenFilter choose_filter(const FilterWish& wish, const Request& request,
 void require_within_region(const Request& request, const PoseLattice& lattice) {
   const DisplacementSd widest = widest_displacement(lattice);
   const double widest_deg = widest.rad * 180.0 / std::numbers::pi;
-  for (const auto& [sd, most, unit] : {std::tuple{touch_mm(request), widest.mm, "mm"},
-                                       std::tuple{slip_mm(request), widest.mm, "mm"},
-                                       std::tuple{touch_deg(request), widest_deg, "deg"},
-                                       std::tuple{slip_deg(request), widest_deg, "deg"}}) {
-    if (const double value = value_of(sd); value > most) {
-      const std::string remedy =
-          fmt::format("wider than the region, {:g} {}; give less, or widen the region", most, unit);
-      if (const auto key = request.keys.find(sd.option); key != request.keys.end()) {
-        refuse(request.scene, "{} = {}: {}", key->second, value, remedy);
-      }
-      refuse_option(sd.option, value, "{}", remedy);
+  for (const auto& [option, sd, most, unit] :
+       {std::tuple{"touch-sd-mm", request.touch_sd_mm, widest.mm, "mm"},
+        std::tuple{"slip-sd-mm", request.slip_sd_mm, widest.mm, "mm"},
+        std::tuple{"touch-sd-deg", request.touch_sd_deg, widest_deg, "deg"},
+        std::tuple{"slip-sd-deg", request.slip_sd_deg, widest_deg, "deg"}}) {
+    if (sd.value_or(0.0) > most) {
+      refuse_given(request, option,
+                   "wider than the region, {:g} {}; give less, or widen the region", most, unit);
     }
   }
 }

@@ -11,8 +11,9 @@
 #include "io/file_identity.hpp"
 #include "io/input_file.hpp"
 #include "io/recording_rules.hpp"
+#include "options/option.hpp"
+#include "options/refused_option.hpp"
 #include "palpate/files.hpp"
-#include "recognition/refused_option.hpp"
 
 namespace palpate {
 
@@ -72,13 +73,7 @@ ContactClassifier make_classifier(const std::string& pressure_unit, const std::s
 }
 
 void require_selection(const Request& request) {
-  if (const auto& frames = request.frames; frames && frames->begin >= frames->end) {
-    refuse_option("frames", fmt::format("{}:{}", frames->begin, frames->end),
-                  "selects no touch; give the first touch and, behind it, the one after the last");
-  }
-  if (request.touches && *request.touches < 1) {
-    refuse_option("touches", *request.touches, "give at least 1");
-  }
+  require_sound(request);
   if (request.touches && request.each_frame) {
     refuse_option("touches",
                   "with `each-frame` every unknown has one touch; leave one of them out");

@@ -1,114 +1,41 @@
 #include "recognition/request.hpp"
 
-#include <algorithm>
-#include <cmath>
 #include <numbers>
 #include <set>
 
 #include <fmt/format.h>
 
+#include "io/input_file.hpp"
+#include "options/option.hpp"
+#include "options/refused_option.hpp"
 #include "recognition/folder_sensor.hpp"
 #include "recognition/recordings.hpp"
-#include "recognition/refused_option.hpp"
 
 namespace palpate {
 
 namespace {
 
-constexpr double rad_per_deg = std::numbers::pi / 180.0;
-
-using FilterName = std::pair<FilterKind, const char*>;
-constexpr std::array<FilterName, 4> filter_names{{{FilterKind::automatic, "auto"},
-                                                  {FilterKind::histogram, "histogram"},
-                                                  {FilterKind::bounded, "bounded"},
-                                                  {FilterKind::particles, "particles"}}};
-
 /// Sets the axis to the range, if there is one.
-void set_range(const char* option, const std::optional<std::array<double, 2>>& range, double unit,
-               Axis& axis) {
-  if (!range) {
-    return;
-  }
-  const auto [lower, upper] = *range;
-  const std::string given = fmt::format("{}:{}", lower, upper);
-  if (lower > upper) {
-    refuse_option(option, given, "the range is reversed; write the lower end first");
-  }
-  axis.lower = lower * unit;
-  axis.upper = upper * unit;
-  if (!(axis.lower >= -farthest_mm && axis.upper <= farthest_mm)) {
-    refuse_option(option, given, "give numbers within +-{:g}", farthest_mm / unit);
+void set_range(const std::optional<Range>& range, double unit, Axis& axis) {
+  if (range) {
+    axis.lower = (*range)[0] * unit;
+    axis.upper = (*range)[1] * unit;
   }
 }
 
 }  // namespace
-
-std::string name_of(FilterKind kind) {
-  return std::ranges::find(filter_names, kind, &FilterName::first)->second;
-}
-
-FilterKind filter_named(const std::string& name) {
-  const auto* const found = std::ranges::find(filter_names, name, &FilterName::second);
-  if (found == filter_names.end()) {
-    refuse_option("filter", name, "not known; use auto, histogram, bounded or particles");
-  }
-  return found->first;
-}
-
-Resampling resampling_named(const std::string& name) {
-  if (name != "multinomial" && name != "systematic") {
-    refuse_option("resampling", name, "not known; use multinomial or systematic");
-  }
-  return name == "systematic" ? Resampling::systematic : Resampling::multinomial;
-}
 
 Request complete(Request request) {
   if (request.scene.empty()) {
     return request;
   }
   Scene scene = read_scene(request.scene);
-  const auto take = [&](const char* option, auto& asked, const auto& given, const char* key) {
-    if (!asked && given) {
-      asked = *given;
-      request.keys[option] = key;
+  for (const auto& [name, text] : scene.options) {
+    const Option& option = option_named(name);
+    if (option_text(request, option).empty()) {
+      set_option(request, option, text);
+      request.keys[name] = option.scene_key;
     }
-  };
-  take("x-mm", request.x_mm, scene.region.x_mm, "x_mm");
-  take("y-mm", request.y_mm, scene.region.y_mm, "y_mm");
-  take("theta-deg", request.theta_deg, scene.region.theta_deg, "theta_deg");
-  take("prior", request.prior, scene.prior, "prior");
-  take("gamma", request.gamma, scene.gamma, "gamma");
-  take("threshold", request.threshold, scene.threshold, "threshold");
-  take("ratio", request.ratio, scene.ratio, "ratio");
-  take("touch-sd-mm", request.touch_sd_mm, scene.touch_sd.mm, "touch_sd mm");
-  take("touch-sd-deg", request.touch_sd_deg, scene.touch_sd.deg, "touch_sd deg");
-  take("slip-sd-mm", request.slip_sd_mm, scene.slip_sd.mm, "slip_sd mm");
-  take("slip-sd-deg", request.slip_sd_deg, scene.slip_sd.deg, "slip_sd deg");
-  take("act-below-mm", request.act_below_mm, scene.act_below_mm, "act_below_mm");
-  take("act-above", request.act_above, scene.act_above, "act_above");
-  const auto automatic = [](bool given) {
-    return given ? std::optional(Automatic{}) : std::nullopt;
-  };
-  take("pivot-mm", request.pivot_mm, automatic(scene.region.auto_pivot), "pivot_mm");
-  take("pivot-mm", request.pivot_mm, scene.region.pivot_mm, "pivot_mm");
-  take("none", request.none, automatic(scene.auto_none), "none");
-  take("none", request.none, scene.none, "none");
-  take("bins", request.bins,
-       scene.fine_bins   ? std::optional(BinWidth::fine)
-       : scene.auto_bins ? std::optional(BinWidth::automatic)
-                         : std::nullopt,
-       "bins");
-  take("bins", request.bins, scene.bins, "bins");
-  if (!request.filter && scene.filter) {
-    request.filter = filter_named(*scene.filter);
-    request.keys["filter"] = "filter: " + *scene.filter;
-  }
-  if (request.sensor_model.empty() && scene.sensor_model) {
-    request.sensor_model = scene.sensor_model->string();
-    request.keys["sensor-model"] = "sensor_model";
-  }
-  if (request.device.empty()) {
-    request.device = scene.device.value_or("");
   }
   request.objects = std::move(scene.objects);
   request.array_mm = std::move(scene.array_mm);
@@ -179,32 +106,23 @@ bool has_auto_pivot(const Request& request) {
 
 PoseLattice given_lattice(const Request& request) {
   PoseLattice lattice;
-  set_range("x-mm", request.x_mm, 1.0, lattice.x_mm);
-  set_range("y-mm", request.y_mm, 1.0, lattice.y_mm);
-  set_range("theta-deg", request.theta_deg, rad_per_deg, lattice.theta_rad);
+  set_range(request.x_mm, 1.0, lattice.x_mm);
+  set_range(request.y_mm, 1.0, lattice.y_mm);
+  set_range(request.theta_deg, std::numbers::pi / 180.0, lattice.theta_rad);
   if (lattice.exceeds_circle()) {
-    refuse_option(
-        "theta-deg", fmt::format("{}:{}", (*request.theta_deg)[0], (*request.theta_deg)[1]),
-        "wider than the full circle, poses would count twice; give a range of at most 360 "
-        "degrees");
+    refuse_given(request, "theta-deg",
+                 "wider than the full circle, poses would count twice; give a range of at most 360 "
+                 "degrees");
   }
   if (const auto* counts =
           request.bins ? std::get_if<std::array<int, 3>>(&*request.bins) : nullptr) {
     const auto [x, y, theta] = *counts;
-    if (std::min({x, y, theta}) < 1) {
-      refuse_option("bins", fmt::format("{}x{}x{}", x, y, theta), "every count must be at least 1");
-    }
     lattice.x_mm.count = x;
     lattice.y_mm.count = y;
     lattice.theta_rad.count = theta;
   }
   if (request.pivot_mm && !has_auto_pivot(request)) {
     lattice.pivot_mm = std::get<glm::dvec2>(*request.pivot_mm);
-    if (!(std::abs(lattice.pivot_mm.x) <= farthest_mm &&
-          std::abs(lattice.pivot_mm.y) <= farthest_mm)) {
-      refuse_option("pivot-mm", fmt::format("{},{}", lattice.pivot_mm.x, lattice.pivot_mm.y),
-                    "give numbers within +-{:g}", farthest_mm);
-    }
   }
   return lattice.collapse_fixed();
 }

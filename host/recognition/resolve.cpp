@@ -13,13 +13,15 @@
 
 #include "estimation/displacement_check.hpp"
 #include "io/file_identity.hpp"
+#include "io/input_file.hpp"
 #include "model/printable.hpp"
+#include "options/option.hpp"
+#include "options/refused_option.hpp"
 #include "palpate/files.hpp"
 #include "palpate/map_builder.hpp"
 #include "recognition/filter_choice.hpp"
 #include "recognition/folder_sensor.hpp"
 #include "recognition/recordings.hpp"
-#include "recognition/refused_option.hpp"
 #include "recognition/scales_of_maps.hpp"
 
 namespace palpate {
@@ -54,14 +56,6 @@ std::vector<Hypothesis> hypotheses_of(const Request& request,
     hypotheses.push_back({std::move(map), object.weight});
   }
   return hypotheses;
-}
-
-/// The prior that was given, if any.
-std::optional<double> given_prior(std::optional<double> given) {
-  if (given && !(*given > 0.0 && *given < 1.0)) {
-    refuse_option("prior", *given, "give a probability between 0 and 1");
-  }
-  return given;
 }
 
 /// Brings maps of unlike priors to the one that all of their touches together tell.
@@ -110,12 +104,6 @@ ActWhere act_where(const Request& request) {
   ActWhere act;
   act.below_mm = request.act_below_mm.value_or(act.below_mm);
   act.above = request.act_above.value_or(act.above);
-  if (!(act.below_mm > 0.0)) {
-    refuse_option("act-below-mm", act.below_mm, "give a number above 0");
-  }
-  if (!(act.above >= 0.0 && act.above <= 1.0)) {
-    refuse_option("act-above", act.above, "give a probability, 0 to 1");
-  }
   return act;
 }
 
@@ -188,9 +176,6 @@ std::pair<ContactClassifier, double> contact_rules(const Request& request, const
     ratio = ratio.value_or(sensor->classifier.ratio);
   }
   const double gamma = request.gamma.value_or(sensor != nullptr ? sensor->gamma : usual_gamma);
-  if (!(gamma >= 0.0 && gamma < 1.0)) {
-    refuse_option("gamma", gamma, "must be at least 0 and below 1");
-  }
   return {make_classifier(of.pressure_unit, of.source, threshold, ratio), gamma};
 }
 
@@ -252,6 +237,7 @@ FilterOptions settled_filter(const Request& request, const Circumstances& of, Ch
 }  // namespace
 
 RecognitionTask resolve(const Request& request, const Circumstances& of) {
+  require_sound(request);
   const FilterWish wish = filter_wish(request);
   const std::vector<Scene::Object> objects = objects_of(request);
   std::vector<Hypothesis> hypotheses = hypotheses_of(request, objects);
@@ -262,7 +248,7 @@ RecognitionTask resolve(const Request& request, const Circumstances& of) {
   ContactModel& contact = histogram.contact;
   const auto [classifier, gamma] = contact_rules(request, of, sensor);
   if (sensor == nullptr || !sensor->table) {
-    contact.prior = given_prior(request.prior);
+    contact.prior = request.prior;
     if (!contact.prior) {
       bring_to_one_prior(of, objects, hypotheses, remarks);
     }

@@ -13,11 +13,11 @@
 #include "io/pose_table.hpp"
 #include "io/recording_rules.hpp"
 #include "model/bounding_box.hpp"
+#include "options/refused_option.hpp"
 #include "palpate/files.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/touch.hpp"
 #include "recognition/label_probability.hpp"
-#include "recognition/refused_option.hpp"
 
 namespace palpate {
 

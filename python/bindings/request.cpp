@@ -2,8 +2,7 @@
 
 #include <algorithm>
 #include <array>
-#include <initializer_list>
-#include <string_view>
+#include <type_traits>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -15,11 +14,11 @@
 #include "bindings.hpp"
 #include "estimate.hpp"
 #include "model/option_words.hpp"
+#include "options/option.hpp"
+#include "options/refused_option.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
-#include "recognition/option_text.hpp"
 #include "recognition/recordings.hpp"
-#include "recognition/refused_option.hpp"
 #include "touches.hpp"
 
 namespace palpate::python {
@@ -34,75 +33,55 @@ Value typed(nb::handle value) {
   return value_of<Value>(value, "another type is wanted");
 }
 
-// Each function takes an option's value from Python.
+/// The text of an option's value, as a flag has it; each member takes values of its type.
+struct OptionText {
+  nb::handle given;
 
-template <typename Value>
-void take(const char* /*option*/, nb::handle given, Value& value) {
-  value = typed<Value>(given);
-}
-
-/// Numbers, or a word that the option has.
-template <typename Numbers>
-std::variant<Numbers, std::string> numbers_or_word(const char* option, nb::handle given,
-                                                   std::initializer_list<std::string_view> words) {
-  auto value = typed<std::variant<Numbers, std::string>>(given);
-  if (const auto* word = std::get_if<std::string>(&value)) {
-    if (std::ranges::find(words, *word) == words.end()) {
-      refuse_option(option, *word, "not known; give numbers, or {}",
-                    fmt::format("'{}'", fmt::join(words.begin(), words.end(), "' or '")));
-    }
+  template <typename Numbers>
+  static std::string joined(const Numbers& numbers, const char* separator) {
+    return fmt::format("{}", fmt::join(numbers, separator));
   }
-  return value;
-}
-
-void take(const char* option, nb::handle given, Bins& value) {
-  const auto bins = numbers_or_word<std::array<int, 3>>(option, given, {"auto", "fine"});
-  if (const auto* counts = std::get_if<std::array<int, 3>>(&bins)) {
-    value = *counts;
-  } else {
-    value = std::get<std::string>(bins) == "fine" ? BinWidth::fine : BinWidth::automatic;
+  /// Numbers, or a word.
+  template <typename Numbers>
+  std::string numbers_or_word(const char* separator) const {
+    const auto value = typed<std::variant<Numbers, std::string>>(given);
+    const auto* word = std::get_if<std::string>(&value);
+    return word != nullptr ? *word : joined(std::get<Numbers>(value), separator);
   }
-}
 
-void take(const char* option, nb::handle given, Pivot& value) {
-  const auto pivot = numbers_or_word<std::array<double, 2>>(option, given, {"auto"});
-  if (const auto* xy = std::get_if<std::array<double, 2>>(&pivot)) {
-    value = glm::dvec2((*xy)[0], (*xy)[1]);
-  } else {
-    value = Automatic{};
+  std::string operator()(std::string Request::* /*of*/) const { return typed<std::string>(given); }
+  std::string operator()(bool Request::* /*of*/) const {
+    return fmt::format("{}", typed<bool>(given));
   }
-}
-
-void take(const char* option, nb::handle given, NoneWeight& value) {
-  const auto weight = numbers_or_word<double>(option, given, {"auto"});
-  if (const auto* number = std::get_if<double>(&weight)) {
-    value = *number;
-  } else {
-    value = Automatic{};
+  template <typename Number>
+  requires std::is_arithmetic_v<Number> std::string operator()(
+      std::optional<Number> Request::* /*of*/) const {
+    return fmt::format("{}", typed<Number>(given));
   }
-}
-
-void take(const char* option, nb::handle given, Frames& value) {
-  const auto [begin, end] = typed<std::array<std::int64_t, 2>>(given);
-  if (begin < 0 || end < 0) {
-    refuse_option(option, fmt::format("{}:{}", begin, end),
-                  "touches are counted from 0; give none below");
+  std::string operator()(std::optional<Range> Request::* /*of*/) const {
+    return joined(typed<Range>(given), ":");
   }
-  value = {static_cast<std::size_t>(begin), static_cast<std::size_t>(end)};
-}
-
-void take(const char* /*option*/, nb::handle given, FilterKind& value) {
-  value = filter_named(typed<std::string>(given));
-}
-
-void take(const char* /*option*/, nb::handle given, Resampling& value) {
-  value = resampling_named(typed<std::string>(given));
-}
-
-template <typename Value>
-void take(const char* option, nb::handle given, std::optional<Value>& value) {
-  take(option, given, value.emplace());
-}
+  std::string operator()(std::optional<Bins> Request::* /*of*/) const {
+    return numbers_or_word<std::array<int, 3>>("x");
+  }
+  std::string operator()(std::optional<Pivot> Request::* /*of*/) const {
+    return numbers_or_word<std::array<double, 2>>(",");
+  }
+  std::string operator()(std::optional<NoneWeight> Request::* /*of*/) const {
+    const auto value = typed<std::variant<double, std::string>>(given);
+    const auto* word = std::get_if<std::string>(&value);
+    return word != nullptr ? *word : fmt::format("{}", std::get<double>(value));
+  }
+  std::string operator()(std::optional<Frames> Request::* /*of*/) const {
+    return joined(typed<std::array<std::int64_t, 2>>(given), ":");
+  }
+  /// A word.
+  template <typename Word>
+  requires std::is_enum_v<Word> std::string operator()(
+      std::optional<Word> Request::* /*of*/) const {
+    return typed<std::string>(given);
+  }
+};
 
 void set_option(PythonRequest& request, std::string option, nb::handle given) {
   if (option == "device") {
@@ -117,15 +96,13 @@ void set_option(PythonRequest& request, std::string option, nb::handle given) {
     return;
   }
   std::ranges::replace(option, '_', '-');
-  bool known = false;
-  visit_options(request, [&](const char* name, auto& value) {
-    if (option == name) {
-      take(name, given, value);
-      known = true;
-    }
-  });
-  if (!known) {
+  const auto row = std::ranges::find(options(), option, &Option::name);
+  if (row == options().end()) {
     throw nb::attribute_error(option.c_str());
+  }
+  const std::string text = std::visit(OptionText{given}, row->member);
+  if (const std::string remedy = palpate::set_option(request, *row, text); !remedy.empty()) {
+    refuse_option(option, text, "{}", remedy);
   }
 }
 
@@ -231,7 +208,18 @@ void bind_request(nb::module_& module) {
           },
           "maps"_a = nb::make_tuple())
       .def("__setattr__", &set_option, "option"_a, "value"_a,
-           "Sets an option of recognize(). Raises TypeError where the value is of another type.");
+           "Sets an option of recognize(). Raises TypeError where the value is of another type.")
+      .def_static(
+          "options",
+          [] {
+            std::vector<std::string> names;
+            for (const Option& option : options()) {
+              names.emplace_back(option.name);
+              std::ranges::replace(names.back(), '-', '_');
+            }
+            return names;
+          },
+          "The names of all options of recognize().");
 }
 
 }  // namespace palpate::python

@@ -89,7 +89,7 @@ INSTANTIATE_TEST_SUITE_P(
         Flag{"recognize", "threshold", {"x", "1x", "nan", "inf", "-1"}},
         Flag{"recognize", "ratio", {"x", "nan", "-1", "1", "2"}},
         Flag{"recognize", "frames", {"x", "1", "1:2:3", "3:3", "2:1", "-1:3", "0:4", "1.5:3"}},
-        Flag{"recognize", "touches", {"x", "0", "-1", "4", "1.5", "03"}}),
+        Flag{"recognize", "touches", {"x", "0", "-1", "4", "1.5"}}),
     [](const auto& test) {
       std::string name = std::string(test.param.command) + "_" + test.param.flag;
       std::replace(name.begin(), name.end(), '-', '_');
@@ -139,11 +139,11 @@ INSTANTIATE_TEST_SUITE_P(
         Scene{"reversed_range", "region: {x_mm: [10, -10]}\n", {"x_mm", "reversed"}},
         Scene{"angles_that_count_twice",
               "region: {theta_deg: [-10, 351]}\n",
-              {"'theta_deg'", "wider than the full circle", "at most 360 degrees"}},
-        Scene{"no_bins", "bins: [0, 5, 5]\n", {"bins[0]", "whole number from 1"}},
+              {"theta_deg", "wider than the full circle", "at most 360 degrees"}},
+        Scene{"no_bins", "bins: [0, 5, 5]\n", {"'bins'", "at least 1"}},
         Scene{"bins_in_a_word", "bins: many\n", {"'bins' = 'many'", "or auto"}},
         Scene{"none_of_less", "none: -1\n", {"'none' = '-1'", "from 0"}},
-        Scene{"two_bins", "bins: [5, 5]\n", {"'bins'", "[x, y, theta]"}},
+        Scene{"two_bins", "bins: [5, 5]\n", {"'bins'", "25x25x16"}},
         Scene{"no_weight", "objects: [{map: A.map.h5, weight: 0}]\n", {"weight", "above 0"}},
         Scene{"unknown_filter", "filter: kalman\n", {"filter", "kalman", "histogram"}},
         Scene{"other_array",

@@ -1,11 +1,14 @@
 """What is misused raises the exception that Python has for it, and no call ends the process."""
 
+import inspect
 import pathlib
 
 import numpy
 import pytest
 
 import palpate
+from palpate import _palpate
+from palpate.recognition import RecognitionOptions
 
 
 class Raising:
@@ -19,6 +22,13 @@ class Raising:
 
 
 RECORDING = palpate.simulate("E", palpate.random_poses(4, seed=2))
+
+
+def test_keywords_are_the_options_of_the_table() -> None:
+    table = set(_palpate.Request.options())
+    keywords = set(inspect.signature(palpate.recognize).parameters)
+    assert keywords == table | {"recordings", "maps", "progress"}
+    assert RecognitionOptions.__annotations__.keys() <= table
 
 
 @pytest.mark.parametrize(

@@ -225,8 +225,7 @@ void add_batch(CLI::App& app, int& status) {
       ->required();
   add_recognition_flags(*command, options->request, options->verbose);
   command->get_option("--budget-ms")->group("");  // read still, to be refused with its reason
-  add_unknown_flags(*command, options->request);
-  command->add_flag("--trace", options->request.trace, "Add the estimate after every touch");
+  add_selection_flags(*command, options->request);
   command->add_option("--shard", options->shard,
                       "Recognise only part I of N, from 0 to N - 1, as I/N, such as "
                       "$SLURM_ARRAY_TASK_ID/$SLURM_ARRAY_TASK_COUNT [default: all]");

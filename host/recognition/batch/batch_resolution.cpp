@@ -1,7 +1,7 @@
 #include "recognition/batch/batch_resolution.hpp"
 
 #include "io/file_hash.hpp"
-#include "recognition/refused_option.hpp"
+#include "options/refused_option.hpp"
 #include "recognition/resolve.hpp"
 
 namespace palpate {

@@ -11,7 +11,7 @@
 
 #include "io/atomic_file.hpp"
 #include "io/input_file.hpp"
-#include "recognition/option_text.hpp"
+#include "options/option.hpp"
 
 namespace palpate {
 

@@ -14,7 +14,7 @@
 #include "io/file_hash.hpp"
 #include "io/input_file.hpp"
 #include "model/printable.hpp"
-#include "recognition/option_text.hpp"
+#include "options/option.hpp"
 
 namespace palpate {
 
@@ -50,7 +50,7 @@ void read_manifest(const fs::path& manifest, std::vector<BatchEntry>& inputs) {
     input.path = (manifest.parent_path() / fs::path(table.text(*path))).string();
     if (frames && !table.text(*frames).empty()) {
       try {
-        read_option("column 'frames':", std::string(table.text(*frames)), input.frames);
+        input.frames = parse_frames("column 'frames':", std::string(table.text(*frames)));
       } catch (const Error& error) {
         table.refuse("{}", error.what());
       }

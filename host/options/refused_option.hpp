@@ -3,8 +3,10 @@
 #include <string>
 #include <string_view>
 
-#include "io/input_file.hpp"
-#include "recognition/request.hpp"
+#include <fmt/format.h>
+
+#include "options/option.hpp"
+#include "palpate/error.hpp"
 
 namespace palpate {
 
@@ -22,15 +24,18 @@ template <typename Value, typename... Parts>
   throw Error(Fault::input, fmt::format("`{}`: {}", option, message));
 }
 
-/// Throws Error as above, or "<scene file>: <key>: <message>" where that gave the option.
+/// Throws Error about an option that the request has: "`<option> <value>`: <message>", or "<scene
+/// file>: <key> = <value>: <message>" where that gave the option.
 template <typename... Parts>
-[[noreturn]] void refuse_given(const Request& request, const std::string& option,
+[[noreturn]] void refuse_given(const Request& request, std::string_view option,
                                fmt::format_string<const Parts&...> message, const Parts&... parts) {
   const std::string text = fmt::format(message, parts...);
-  if (const auto key = request.keys.find(option); key != request.keys.end()) {
-    refuse(request.scene, "{}: {}", key->second, text);
+  const std::string value = option_text(request, option_named(option));
+  if (const auto key = request.keys.find(std::string(option)); key != request.keys.end()) {
+    throw Error(Fault::input,
+                fmt::format("{}: {} = {}: {}", request.scene, key->second, value, text));
   }
-  refuse_option(option, text);
+  refuse_option(option, value, "{}", text);
 }
 
 }  // namespace palpate
