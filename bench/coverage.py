@@ -11,7 +11,7 @@ import palpate
 from palpate._tables import Column, Table, plain, print_table
 
 from .defaults import learn
-from .measures import share_record, with_interval, wrapped
+from .measures import level_in_modes, share_record, with_interval
 from .program import Json, begin, main, parser, write
 from .trials import VOWELS, Floats, Touching, make_trials, training_recordings, truth_of
 
@@ -38,39 +38,6 @@ DECISIONS: list[Column] = [
     ("acted and right, %", "right", _PERCENT),
     ("acted and within 0.5 mm, %", "within", _PERCENT),
 ]
-
-
-def densities(modes: Sequence[Json], label: str, poses: Floats) -> Floats:
-    """Density of a record's modes at an object's poses T_robot_object [n, 3], per mm^2 rad."""
-    sum_of = numpy.zeros(len(poses))
-    for mode in modes:
-        if mode["object"] != label:
-            continue
-        d = poses - mode["T_robot_object"]
-        d[:, 2] = wrapped(d[:, 2], 2.0 * math.pi)
-        covariance = numpy.array(mode["covariance"])
-        squared = numpy.einsum("ni,ij,nj->n", d, numpy.linalg.inv(covariance), d)
-        height = mode["probability"] / math.sqrt((2.0 * math.pi) ** 3 * numpy.linalg.det(covariance))
-        sum_of += height * numpy.exp(-0.5 * squared)
-    return sum_of
-
-
-def level_in_modes(modes: Sequence[Json], truth: palpate.Truth, random: numpy.random.Generator) -> float:
-    """Probability of all that is denser than the truth, by the modes as Gaussians.
-
-    What the modes leave of 1 is spread over everything else and comes last.
-    """
-    pose = palpate.inverse(truth.T_object_robot)
-    at_truth = densities(modes, truth.object, pose[None])[0]
-    level = 0.0
-    for mode in modes:
-        count = math.ceil(SAMPLES * mode["probability"])
-        samples = random.multivariate_normal(mode["T_robot_object"], mode["covariance"], count)
-        denser = densities(modes, mode["object"], samples) > at_truth
-        level += mode["probability"] * float(numpy.mean(denser))
-    held = sum(mode["probability"] for mode in modes)
-    # A truth outside all modes is anywhere in the rest.
-    return level if level < held else held + (1.0 - held) * random.uniform()
 
 
 def covered(levels: Sequence[float]) -> Json:

@@ -2,7 +2,6 @@
 
 import json
 import pathlib
-import subprocess
 import tempfile
 from collections.abc import Iterable
 
@@ -12,7 +11,7 @@ import palpate
 from palpate._tables import Column, number, plain, print_table
 
 from .measures import share_record, with_interval
-from .program import Json, begin, main, parser, write
+from .program import Json, begin, main, parser, run_palpate, write
 from .trials import Touching, make_trials
 
 SEED = 500_000_000
@@ -37,21 +36,13 @@ DEFAULTS: list[Column] = [
 ]
 
 
-def told(command: str, *arguments: str) -> str:
-    """What `palpate` prints."""
-    done = subprocess.run([command, *arguments], capture_output=True, text=True)
-    if done.returncode != 0:
-        raise palpate.Error(done.stderr.strip())
-    return done.stdout
-
-
 def learn(command: str, recordings: Iterable[palpate.Recording], folder: pathlib.Path) -> str:
     """What `palpate map` says of recordings, of which it makes `folder`/maps with the learned sensor."""
     files = []
     for recording in recordings:
         files.append(str(folder / f"{recording.object}.h5"))
         recording.save(files[-1])
-    return told(command, "map", *files, "-o", f"{folder}/maps/")
+    return run_palpate(command, "map", *files, "-o", f"{folder}/maps/")
 
 
 def scores_of(known: list[Json], strangers: list[Json]) -> Json:
@@ -97,7 +88,7 @@ def program() -> None:
             steps = {}
             for sensor, model in FLAGS.items():
                 recognize = ["recognize", *unknowns, "--maps", maps, "--trace", "--json", str(result)]
-                told(options.palpate, *recognize, *model)
+                run_palpate(options.palpate, *recognize, *model)
                 steps[sensor] = [record["trace"] for record in json.loads(result.read_text())]
             known = each * len(learned)
             for touches in TOUCHES:
