@@ -29,6 +29,8 @@ SET_SEEDS = 10**10  # between the unknowns of two training sets
 PLAN_BINS: Bins = (13, 13, 55)
 NEAR_MM = 0.5  # the error that decisions allow by default
 
+Scores = list[list[Json]]  # [unknown][touch]
+
 _PERCENT, _ERROR = with_interval(".1f", 100.0), number(".3f")
 ROW: list[Column] = [
     ("scenario", "scenario", plain),
@@ -116,11 +118,11 @@ def score(
     step: Json, truth: palpate.Truth, grid: palpate.OccupancyGrid | None, random: numpy.random.Generator
 ) -> Json:
     """What a belief says beside the truth; without the map of a stranger, that alone which needs none."""
-    fit, tiny = step.get("fit", {}), numpy.finfo(float).tiny
-    none = step["identity"].get("(none)", 0.0)
+    fit, labels, tiny = step.get("fit", {}), dict(step["identity"]), numpy.finfo(float).tiny
+    none, objects = labels.pop("(none)", 0.0), sum(labels.values())
     scored: Json = {
         "none": step["best"] == "(none)",
-        "none_log_odds": math.log(max(none, tiny)) - math.log(max(1.0 - none, tiny)),
+        "none_log_odds": math.log(max(none, tiny)) - math.log(max(objects, tiny)),
         "z": fit.get("z"),
         "fits": fit.get("verdict") == "fits",
         "unfit": fit.get("verdict") == "does not fit",
@@ -148,8 +150,8 @@ def score(
 def believed(
     device: palpate.Device, scenario: Scenario, engine: Json, maps: Any,
     grids: dict[str, palpate.OccupancyGrid], trials: Sequence[palpate.Recording],
-) -> list[list[Json]]:  # fmt: skip
-    """The scores [unknown][touch] of one engine."""
+) -> Scores:  # fmt: skip
+    """The scores of one engine."""
     options, random = {**scenario.options, **engine}, numpy.random.default_rng(scenario.seed)
     touched, truths = [], []
     for i, trial in enumerate(trials):
@@ -174,26 +176,25 @@ def believed(
 
 
 def row_of(
-    known: list[list[Json]], strangers: list[list[Json]], first: list[list[Json]], after: int | tuple[int, int],
-    within_mm: float,
-) -> Json:  # fmt: skip
+    known: Scores, strangers: Scores, first: Scores, after: int | tuple[int, int], within_mm: float
+) -> Json:
     """The columns of one row; first: what `known` is by the scenario's first engine."""
     least, most = (after, after) if isinstance(after, int) else after
 
-    def values(of: list[list[Json]], name: str) -> Floats:
+    def values(of: Scores, name: str) -> Floats:
         """By unknown, the mean over the touches that have the field; NaN where none has."""
         steps = column(of, name).reshape(len(of), -1)[:, least - 1 : most]
         if name.endswith("_mm"):
             steps[steps > within_mm] = numpy.nan
         return numpy.array([there.mean() if len(there := present(one)) else math.nan for one in steps])
 
-    def share(of: Floats) -> Json | None:
+    def share(of: Any) -> Json | None:
         return share_record(of.sum(), len(of)) if len(of) else None
 
     def mean(of: Floats, over: Any = 1.0) -> Json | None:
         return bootstrap_record(of, over) if len(of) else None
 
-    def quantiles_half(of: Floats) -> float | None:
+    def median(of: Floats) -> float | None:
         return float(numpy.median(of)) if len(of) else None
 
     refined, first_mm = values(known, "refined_mm"), values(first, "refined_mm")
@@ -204,12 +205,12 @@ def row_of(
         "unknowns": len(known),
         "right": share(values(known, "right")),
         "log_loss": mean(values(known, "loss")),
-        "median_mm": quantiles_half(present(refined)),
+        "median_mm": median(present(refined)),
         "refined_mm": mean(present(refined)),
         "over_first": mean(refined[both], first_mm[both]) if known is not first else None,
         "mode_mm": mean(present(values(known, "mode_mm"))),
         "nees": mean(present(nees)),
-        "median_nees": quantiles_half(present(nees)),
+        "median_nees": median(present(nees)),
         "coverage_68": share(levels < 0.68),
         "coverage_95": share(levels < 0.95),
         "acts": share(acts),
@@ -244,7 +245,7 @@ def program() -> None:
         trials="unknowns of each object, and strangers [each scenario's own, or 1 with --quick]",
     )
     flags.add_argument(
-        "--scenario", action="append", choices=SCENARIOS, metavar="NAME", help="measure only this; more than once"
+        "--scenario", action="append", choices=SCENARIOS, metavar="NAME", help="measure only this or these"
     )
     flags.add_argument(
         "--sets", type=int, default=1, help="training sets, each with unknowns of its own [%(default)s]"
@@ -253,12 +254,12 @@ def program() -> None:
     options = flags.parse_args()
     device, facts = begin(options)
     chosen = {name: of for name, of in SCENARIOS.items() if name in (options.scenario or SCENARIOS)}
-    shown = [columns for group, columns in COLUMNS.items() if any(group in of.columns for of in chosen.values())]
-    table = Table([*ROW, *(column for columns in shown for column in columns)])
+    groups = {group for scenario in chosen.values() for group in scenario.columns}
+    table = Table([*ROW, *(column for group in COLUMNS if group in groups for column in COLUMNS[group])])
     for name, scenario in chosen.items():
         each = options.trials or (1 if options.quick else scenario.each)
         each_stranger = options.trials or (1 if options.quick else scenario.each_stranger)
-        scores: dict[str, tuple[list[Any], list[Any]]] = {engine: ([], []) for engine in scenario.engines}
+        scores: dict[str, tuple[Scores, Scores]] = {engine: ([], []) for engine in scenario.engines}
         for i in range(options.sets):
             with tempfile.TemporaryDirectory() as folder:
                 recordings = learned_touches(scenario, 1 + i * len(VOWELS))

@@ -1,7 +1,7 @@
 """What `accuracy` tries: which objects are learned, what touches the unknowns, and what recognises them."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -10,9 +10,9 @@ import numpy
 import palpate
 from palpate._palpate import Random, Stream
 
+from .program import Json
 from .trials import MISFITS, VOWELS, Floats, Touching, make_trials, truth_of
 
-Options = Mapping[str, Any]  # of palpate.recognize()
 Sd = tuple[float, float]  # standard deviations in mm and rad
 PLANNED = "planned"  # of an engine: each touch is where most is expected of it
 
@@ -25,12 +25,12 @@ def off_by(mm: float, rad: float) -> Touching:
     return Touching(at_random_poses=True, noise=(mm, rad))
 
 
-def told(mm: float, rad: float) -> Options:
+def told(mm: float, rad: float) -> Json:
     """Recognition that knows how far touches are off."""
     return {"touch_sd_mm": mm, "touch_sd_deg": math.degrees(rad)}
 
 
-def on_bins(*bins: int, extent_mm: float = 10.0, engine: str = "histogram") -> Options:
+def on_bins(*bins: int, extent_mm: float = 10.0, engine: str = "histogram") -> Json:
     """Bins over an extent about 0 along x and y, and over the full circle."""
     reach = (-extent_mm, extent_mm)
     return {"bins": bins, "x_mm": reach, "y_mm": reach, "pivot_mm": (0.0, 0.0), "filter": engine}
@@ -42,7 +42,7 @@ class Scenario:
 
     about: str
     columns: tuple[str, ...]  #: groups of columns that are shown
-    engines: Mapping[str, Options]  #: by name
+    engines: dict[str, Json]  #: by name
     seed: int
     each: int  #: unknowns of every object that was learned
     learned: tuple[str, ...] = VOWELS
@@ -55,7 +55,7 @@ class Scenario:
     own_gains: bool = False  #: each unknown is touched by a sensor of its own
     slip_sd: Sd = (0.0, 0.0)  #: of the object, between two touches
     within_mm: float = math.inf  #: errors beyond are of another peak of the belief, and left out
-    options: Options = field(default_factory=dict)  #: of all engines
+    options: Json = field(default_factory=dict)  #: of all engines
 
     @property
     def touches(self) -> int:
@@ -68,10 +68,10 @@ class Scenario:
         return any("sensor_model" not in self.options | of for of in self.engines.values())
 
 
-EQ7: Options = {"sensor_model": "none"}
-MODELS: Mapping[str, Options] = {"Eq. 7": EQ7, "learned": {}}
-NO_NONE = {"none": 0.0}
-EVEN_NONE = {"none": float(len(VOWELS))}  # as likely before the first touch as all letters together
+EQ7: Json = {"sensor_model": "none"}
+MODELS: dict[str, Json] = {"Eq. 7": EQ7, "learned": {}}
+NO_NONE: Json = {"none": 0.0}
+EVEN_NONE: Json = {"none": float(len(VOWELS))}  # as likely before the first touch as all letters together
 
 _GAINS: Any = dict(
     columns=("identity", "regions"), learned=("A", "E", "U"), own_gains=True, seed=400_000_000, each=34,
@@ -111,7 +111,7 @@ SCENARIOS = {
     ),
     "misplaced-told": Scenario(
         "touches 1 mm and 0.05 rad off, which is known", touching=off_by(1.0, 0.05),
-        engines={name: {**model, **told(1.0, 0.05)} for name, model in MODELS.items()}, **_GAINS,
+        engines={name: model | told(1.0, 0.05) for name, model in MODELS.items()}, **_GAINS,
     ),
     "misplaced-untold": Scenario(
         "touches 0.5 mm and 0.02 rad off, which nobody says", touching=off_by(0.5, 0.02), engines=MODELS,
