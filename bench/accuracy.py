@@ -1,5 +1,6 @@
 """How right recognition is, and how sure: scenarios, the engines that recognise them, after some touches."""
 
+import argparse
 import math
 import pathlib
 import tempfile
@@ -234,6 +235,13 @@ def row_of(
     return row
 
 
+def scenario_name(text: str) -> str:
+    """A scenario's name of a flag."""
+    if text not in SCENARIOS:
+        raise argparse.ArgumentTypeError(f"{text}: no such scenario; give one of {', '.join(SCENARIOS)}")
+    return text
+
+
 def program() -> None:
     """Scenario by scenario, its engines on the same unknowns."""
     flags = parser(
@@ -245,7 +253,7 @@ def program() -> None:
         trials="unknowns of each object, and strangers [each scenario's own, or 1 with --quick]",
     )
     flags.add_argument(
-        "--scenario", action="append", choices=SCENARIOS, metavar="NAME", help="measure only this or these"
+        "scenarios", nargs="*", type=scenario_name, metavar="SCENARIO", help="measure only this or these [all]"
     )
     flags.add_argument(
         "--sets", type=int, default=1, help="training sets, each with unknowns of its own [%(default)s]"
@@ -253,7 +261,7 @@ def program() -> None:
     flags.add_argument("--palpate", default="build/palpate", help="the command [%(default)s]")
     options = flags.parse_args()
     device, facts = begin(options)
-    chosen = {name: of for name, of in SCENARIOS.items() if name in (options.scenario or SCENARIOS)}
+    chosen = {name: of for name, of in SCENARIOS.items() if name in (options.scenarios or SCENARIOS)}
     groups = {group for scenario in chosen.values() for group in scenario.columns}
     table = Table([*ROW, *(column for group in COLUMNS if group in groups for column in COLUMNS[group])])
     for name, scenario in chosen.items():

@@ -17,10 +17,7 @@ from bench.trials import make_trials, truth_of
 @pytest.fixture(scope="module")
 def accuracy(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
     # Takes some twenty seconds of a processor, most to learn from letters and for uncertain touches.
-    scenarios = [
-        word for name in ("letters", "misplaced-2mm", "fit", "none", "strangers", "planned")
-        for word in ("--scenario", name)
-    ]  # fmt: skip
+    scenarios = ("letters", "misplaced-2mm", "fit", "none", "strangers", "planned")
     command = ("--palpate", os.environ["PALPATE_COMMAND"])
     folder = tmp_path_factory.mktemp("accuracy")
     rows: list[dict[str, Any]] = Program(folder, "bench.accuracy", "--quick", *scenarios, *command).document[
