@@ -26,8 +26,7 @@ from .contact_array import (
     touched,
 )
 from .contact_learning import Learned, Learning
-from .coverage import level_in_modes
-from .measures import wrapped
+from .measures import level_in_modes, wrapped
 from .program import Json, begin, main, parser, write
 from .trials import Floats, truth_of
 

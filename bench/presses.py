@@ -11,9 +11,8 @@ import palpate
 from palpate._tables import Column, number, plain, print_table
 
 from .bounded import CLASSIFIER, pitch_of, read_presses
-from .defaults import told
 from .measures import share_record, with_interval
-from .program import Json, begin, main, parser, write
+from .program import Json, begin, main, parser, run_palpate, write
 
 SEED = 800_000_000
 # Where an object may lie about the place where its map was learned, and how fine that is told apart: bins
@@ -107,9 +106,9 @@ def program() -> None:
             ("learned", "learned", []),
         ):
             maps = str(folder / key) + "/"
-            told(options.palpate, "map", *learned, "--unposed", *model, "-o", maps)
+            run_palpate(options.palpate, "map", *learned, "--unposed", *model, "-o", maps)
             recognize = ["recognize", *tried, "--each-frame", "--maps", maps, "--none", "0", *region, *bins]
-            told(options.palpate, *recognize, *model, "--device", device.name, "--json", str(result))
+            run_palpate(options.palpate, *recognize, *model, "--device", device.name, "--json", str(result))
             records = json.loads(result.read_text())
             random = numpy.random.default_rng(SEED)
             of_sensor = [scores(records, presses, random) for presses in TOGETHER]

@@ -19,8 +19,7 @@ struct Group {
 };
 const std::vector<Group>& groups() {
   static const std::vector<Group> all{
-      {"Likelihood",
-       {"--prior", "--gamma", "--ratio", "--spread-mm", "--psf-mm", "--peak", "--felt-share"}},
+      {"Likelihood", {"--prior", "--gamma", "--ratio", "--spread-mm", "--peak", "--felt-share"}},
       {"Misplaced touches and slip", {"--touch-sd-mm", "--touch-sd-deg"}},
       {"Filter", {"--device", "--verbose"}},
       {"Touches in a stream",

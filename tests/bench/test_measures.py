@@ -8,7 +8,6 @@ import pytest
 
 import palpate
 from bench.certificates import log_sum_exp
-from bench.defaults import scores_of
 from bench.measures import (
     bootstrap_record,
     calibration,
@@ -175,11 +174,3 @@ def test_bounds_give_the_histograms_poses(
     for trial, record in zip(trials, records, strict=True):
         body, truth = Body.of(map_of(maps, trial)), truth_of(trial).T_object_robot
         assert 0.0 < nearest_bin_mm(lattice, body, truth) <= record["error_mm"]
-
-
-def test_defaults_are_scored_by_what_they_place_and_refuse() -> None:
-    known = [{"right": k != 3, "refined_error_mm": None if k == 3 else 0.1 * k} for k in range(4)]
-    strangers = [{"fit": {"verdict": "does not fit"}}, {"fit": {"verdict": "fits"}}, {}]
-    scores = scores_of(known, strangers)
-    assert scores["right"]["mean"] == 0.75 and scores["unfit"]["mean"] == 1 / 3
-    assert scores["median_mm"] == pytest.approx(0.1) and scores["mean_mm"] == pytest.approx(0.1)

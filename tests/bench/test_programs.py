@@ -1,122 +1,90 @@
 """The other programs with small settings: their documents are whole, and keep what must hold."""
 
-import json
 import os
 import pathlib
 import subprocess
+from typing import Any
+
+import numpy
 import pytest
 from conftest import Program, run
 
 import palpate
+from bench.scenarios import slipping
+from bench.trials import make_trials, truth_of
 
 
 @pytest.fixture(scope="module")
-def beliefs(tmp_path_factory: pytest.TempPathFactory) -> Program:
-    # Takes some 40 seconds of a processor, for six parts and their charts; the maps are built once.
-    folder = tmp_path_factory.mktemp("beliefs")
-    return Program(folder, "bench.beliefs", "--quick", "--trials", 1, "--plots", folder / "plots")
-
-
-def test_averaging_makes_misplaced_touches_honest(beliefs: Program) -> None:
-    records = beliefs.document["misplaced"]
-    assert len(records) == 2 * 4 * 2, "two displacements, four numbers of touches, two beliefs"
-    for level_mm in (1.0, 2.0):
-        nees = {
-            belief: sum(
-                record["normalised_error"]["mean"]
-                for record in records
-                if (record["noise_mm"], record["belief"]) == (level_mm, belief)
-            )
-            for belief in ("as if exact", "averaged")
-        }
-        assert nees["averaged"] < 0.7 * nees["as if exact"], "too sure"
-    beliefs.expect_charts("misplaced", "sureness")
-    assert (beliefs.folder / "plots/misplaced_unknown.png").stat().st_size > 10_000
-
-
-def test_none_is_found(beliefs: Program) -> None:
-    by = {(record["name"], record["touches"]): record for record in beliefs.document["none"]}
-    exact = by["exact, ±10 mm", 9]
-    assert exact["learned_called_none"]["mean"] == 0.0
-    assert exact["unlearned_called_none"]["mean"] > 0.5
-    one = by["exact, ±10 mm", 1]
-    assert exact["told_apart"]["mean"] > 0.9 > one["told_apart"]["mean"], "one touch cannot tell"
-    assert len(exact["unlearned_log_odds"]) == 8
-    beliefs.expect_charts("none")
-
-
-def test_a_belief_that_allows_for_slips_follows(beliefs: Program) -> None:
-    following, plain = beliefs.document["slip"]
-    assert following["late_error_mm"]["mean"] < plain["late_error_mm"]["mean"]
-    assert following["located"] > 0.8
-    beliefs.expect_charts("slip")
-
-
-def test_planned_touches_tell_more(tmp_path: pathlib.Path) -> None:
-    # Takes some six seconds, of which the letters' maps, as of every program, take three.
-    plots = ("--plots", tmp_path / "plots")
-    beliefs = Program(tmp_path, "bench.beliefs", "--quick", "--part", "plan", *plots)
-    assert "none" not in beliefs.document, "a part alone"
-    entropy = {
-        record["order"]: [point["entropy"]["mean"] for point in record["curve"]]
-        for record in beliefs.document["plan"]
-    }
-    assert entropy["planned"][0] == entropy["random"][0], "the same first touch"
-    assert sum(entropy["planned"]) < sum(entropy["random"])
-    for curve in entropy.values():
-        assert curve == sorted(curve, reverse=True), "touches tell"
-    beliefs.expect_charts("plan")
-
-
-def test_costs_are_counted(beliefs: Program) -> None:
-    costs = beliefs.document["cost"]
-    value = {(cost["name"], *cost["bins"]): cost["value"] for cost in costs}
-    assert 1.0 < value["memory over plain: uncertain", 30, 30, 113] <= 2.0
-    assert value["uncertain touch to estimate", 25, 25, 16] > 0.0
-    assert len(value) == len(costs) == 11
-
-
-def test_unlearned_shapes_fit_worse(tmp_path: pathlib.Path) -> None:
-    # Takes some twelve seconds, most for the maps of an array of 256 elements.
-    fits = Program(tmp_path, "bench.fit", "--quick", "--trials", 1).document["fits"]
-    assert len(fits) == 10, "two arrays after 1, 3, 5, 9 and 15 touches"
-    for fit in fits:
-        assert fit["learned"]["fits"]["mean"] == 1.0, fit["name"]
-    by = {(fit["name"], fit["touches"]): fit for fit in fits}
-    assert by["6x6 array", 9]["told_apart"]["mean"] > 0.8, "of forty pairs, by maps of 64 touches"
-    assert by["16x16 array", 9]["never learned"]["does not fit"]["mean"] == 1.0
-
-
-def test_shapes_drawn_at_random_are_strangers(tmp_path: pathlib.Path) -> None:
-    # Takes some four seconds of a processor, to learn from five letters and to search for three strangers.
+def accuracy(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
+    # Takes some twenty seconds of a processor, most to learn from letters and for uncertain touches.
+    scenarios = ("letters", "misplaced-2mm", "fit", "none", "strangers", "planned")
     command = ("--palpate", os.environ["PALPATE_COMMAND"])
-    document = Program(tmp_path, "bench.strangers", "--quick", *command).document
-    assert [row["sensor"] for row in document["strangers"]] == ["Eq. 7", "learned"]
-    for row in document["strangers"]:
-        assert row["learned_called_none"]["mean"] == 0.0
-        assert row["strangers_called_none"]["mean"] > 0.5
+    folder = tmp_path_factory.mktemp("accuracy")
+    rows: list[dict[str, Any]] = Program(folder, "bench.accuracy", "--quick", *scenarios, *command).document[
+        "accuracy"
+    ]
+    return rows
 
 
-def test_finer_steps_err_less(tmp_path: pathlib.Path) -> None:
-    fine, coarse = Program(tmp_path, "bench.bin_steps", "--quick").document["runs"]
-    assert fine["count"] > 4 * coarse["count"]
-    assert fine["excess"] == 0.0 and fine["difference_mm"] is None
-    assert coarse["difference_mm"]["mean"] == pytest.approx(
-        coarse["refined_error_mm"]["mean"] - fine["refined_error_mm"]["mean"]
-    )
+def rows_of(accuracy: list[dict[str, Any]], scenario: str, touches: str) -> dict[str, Any]:
+    """The rows of a scenario after some touches, by engine."""
+    return {
+        row["engine"]: row
+        for row in accuracy
+        if (row["scenario"], row["touches"]) == (scenario, touches)
+    }
+
+
+def test_averaging_makes_misplaced_touches_honest(accuracy: list[dict[str, Any]]) -> None:
+    rows = [rows_of(accuracy, "misplaced-2mm", touches) for touches in ("3", "5", "9", "12")]
+    exact, averaged = (sum(of[name]["nees"]["mean"] for of in rows) for name in ("as if exact", "averaged"))
+    assert averaged < 0.7 * exact, "too sure"
+    assert rows[-1]["as if exact"]["over_first"] is None and rows[-1]["averaged"]["over_first"]["mean"] < 1.0
+
+
+def test_strangers_are_told_from_what_was_learned(accuracy: list[dict[str, Any]]) -> None:
+    for row in rows_of(accuracy, "none", "9").values():
+        assert row["called_none"]["mean"] == 0.0 and row["strangers_called_none"]["mean"] > 0.5
+        assert row["told_apart_by_none"]["mean"] > 0.9
+    for row in rows_of(accuracy, "strangers", "9").values():
+        assert row["called_none"]["mean"] == 0.0 and row["strangers_called_none"]["mean"] > 0.5
+    (fit,) = rows_of(accuracy, "fit", "9").values()
+    assert (fit["unknowns"], fit["strangers"], fit["fits"]["mean"]) == (5, 8, 1.0)
+    assert fit["told_apart_by_z"]["mean"] > 0.8, "of forty pairs, by maps of few touches"
+
+
+def test_regions_and_errors_are_of_what_is_recognised(accuracy: list[dict[str, Any]]) -> None:
+    for touches in ("1", "3", "9"):
+        rows = rows_of(accuracy, "letters", touches)
+        assert list(rows) == ["Eq. 7", "learned"]
+        for row in rows.values():
+            assert row["coverage_68"]["mean"] <= row["coverage_95"]["mean"], "the larger holds the smaller"
+            assert row["unknowns"] == 3 and row["strangers"] == 2
+    assert rows["learned"]["right"]["mean"] == 1.0 and rows["learned"]["median_mm"] < 0.5
+
+
+def test_planned_touches_begin_as_those_at_random(accuracy: list[dict[str, Any]]) -> None:
+    first, last = (rows_of(accuracy, "planned", touches) for touches in ("1", "3"))
+    assert first["at random"]["log_loss"] == first["planned"]["log_loss"]
+    assert last["at random"]["refined_mm"] != last["planned"]["refined_mm"]
+
+
+def test_a_walk_keeps_touches_where_they_are_on_the_object() -> None:
+    (trial,) = make_trials("A", 1, 5, 7)
+    walk, truths = slipping(trial, numpy.array([1.0, 2.0]), (0.3, 0.02), 11)
+    assert (walk.pressure == trial.pressure).all() and len(truths) == 5
+    for of_walk, truth, at_rest in zip(walk.T_robot_sensor, truths, trial.T_robot_sensor, strict=True):
+        on_object = palpate.compose(truth_of(trial).T_object_robot, at_rest)
+        assert palpate.compose(truth, of_walk) == pytest.approx(on_object, abs=1e-9)
 
 
 @pytest.fixture(scope="module")
 def bounded(tmp_path_factory: pytest.TempPathFactory, device: palpate.Device) -> Program:
     # Takes some eight seconds of a processor, half of them for the letters' maps.
-    folder, times = tmp_path_factory.mktemp("bounded"), {}
-    for part in ("growth", "search"):
-        file = folder / f"{part}.json"
-        flags = ["--quick", "--part", part, "--json", str(file), "--device", device.name]
-        subprocess.run([os.environ["PALPATE_BENCH"], "bounded", *flags], check=True, timeout=300)
-        times[part] = json.loads(file.read_text())[part]
+    folder = tmp_path_factory.mktemp("bounded")
     file = folder / "times.json"
-    file.write_text(json.dumps(times))
+    flags = ["--quick", "--part", "search", "--json", str(file), "--device", device.name]
+    subprocess.run([os.environ["PALPATE_BENCH"], "bounded", *flags], check=True, timeout=300)
     return Program(folder, "bench.bounded", "--quick", "--plots", folder / "plots", "--times", file)
 
 
@@ -131,12 +99,11 @@ def test_certificates_hold(bounded: Program, tmp_path: pathlib.Path) -> None:
     assert missing.returncode == 2 and "holds no recording" in missing.stderr
 
 
-def test_times_become_charts(bounded: Program) -> None:
+def test_search_becomes_a_picture(bounded: Program, tmp_path: pathlib.Path) -> None:
     plots = bounded.folder / "plots"
-    bounded.expect_charts("bounded_growth")
     assert (plots / "bounded_search.png").stat().st_size > 10_000
-    drawn = ("--quick", "--plots", plots, "--times", bounded.folder / "growth.json")
-    partial = run("bench.bounded", *drawn)
+    (tmp_path / "mode.json").write_text('{"mode": []}')
+    partial = run("bench.bounded", "--plots", plots, "--times", tmp_path / "mode.json")
     assert partial.returncode == 2 and "holds no search" in partial.stderr
 
 
@@ -197,21 +164,3 @@ def test_set_ups_are_checked(tmp_path: pathlib.Path) -> None:
 
 def test_the_sweep_draws_its_charts(sweep: Program) -> None:
     sweep.expect_charts("sweep_front", "sweep_bins", "sweep_bounds")
-
-
-@pytest.mark.parametrize("flag", ["--equal-gains", "--misplaced"])
-def test_regions_hold_the_truth_as_often_as_can_be(tmp_path: pathlib.Path, flag: str) -> None:
-    # Takes some three seconds of a processor, to learn the sensor from touches of three letters; seven
-    # where touches are misplaced, as each answer is a sum over displacements.
-    command = ("--palpate", os.environ["PALPATE_COMMAND"], flag)
-    document = Program(tmp_path, "bench.coverage", "--quick", "--trials", 1, *command).document
-    assert document["gain_spread"] == (0.05 if flag == "--misplaced" else 0.0)
-    rows = {(row["sensor"], row["touches"]): row for row in document["coverage"]}
-    assert len(rows) == 2 * 2, "by both sensors, after two numbers of touches"
-    for row in rows.values():
-        assert row["unknowns"] == 3
-        assert row["0.68"]["mean"] <= row["0.95"]["mean"], "the larger region holds the smaller"
-    assert rows["Eq. 7", 1]["0.95"]["mean"] > 0.5
-    acts = {(row["sensor"], row["touches"]): row["acts"]["mean"] for row in document["decisions"]}
-    assert len(acts) == 2 * 2
-    assert acts["learned", 5] == (0.0 if flag == "--misplaced" else 1.0), "within half a millimetre?"
