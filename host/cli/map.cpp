@@ -180,7 +180,7 @@ void build_maps(const MapFlags& flags) {
     }
   }
 
-  Device device = Device::open(flags.device);
+  Device device = Device::open(flags.request.device);
   if (const auto suspicion = suspected_order(device, recordings, model)) {
     fmt::print(stderr, "palpate: {} ({:.0f} nats; palpate check tells more)\n",
                in_flags(suspicion->words), suspicion->nats);

@@ -29,15 +29,15 @@ void require_none(std::initializer_list<std::pair<const char*, bool>> given, con
 }
 
 void check_flags(const MapFlags& flags) {
-  require_none({{"--threshold", flags.threshold.has_value()},
-                {"--ratio", flags.ratio.has_value()},
-                {"--sensor-model", !flags.sensor_model.empty()},
-                {"--frames", flags.frames.has_value()},
-                {"--touch-sd-mm", flags.touch_sd_mm.has_value()},
-                {"--touch-sd-deg", flags.touch_sd_deg.has_value()},
+  require_none({{"--threshold", flags.request.threshold.has_value()},
+                {"--ratio", flags.request.ratio.has_value()},
+                {"--sensor-model", !flags.request.sensor_model.empty()},
+                {"--frames", flags.request.frames.has_value()},
+                {"--touch-sd-mm", flags.request.touch_sd_mm.has_value()},
+                {"--touch-sd-deg", flags.request.touch_sd_deg.has_value()},
                 {"--group", !flags.group.empty()},
                 {"--unposed", flags.unposed},
-                {"--device", !flags.device.empty()}},
+                {"--device", !flags.request.device.empty()}},
                "a drawing has no touches");
   for (const std::string& path : flags.recordings) {
     if (!is_drawing(path)) {

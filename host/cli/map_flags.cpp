@@ -34,7 +34,7 @@ double require_length(const std::string& flag, double mm) {
 
 /// Whether --sensor-model names a file.
 bool has_sensor_model(const MapFlags& flags) {
-  return !flags.sensor_model.empty() && flags.sensor_model != no_sensor_model;
+  return !flags.request.sensor_model.empty() && flags.request.sensor_model != no_sensor_model;
 }
 
 }  // namespace
@@ -73,26 +73,24 @@ void add_map_flags(CLI::App& command, MapFlags& flags) {
                   "divided by the area that their maps cover, with --unposed the share of elements "
                   "in contact")
       ->capture_default_str();
-  command.add_option("--threshold", flags.threshold,
-                     "Contact threshold, in the recording's pressure unit [default: learned where "
-                     "--unposed learns the sensor; else 2 kPa, and required for raw pressure]");
-  command.add_option("--ratio", flags.ratio,
-                     "Threshold as a fraction of the touch's largest pressure [default: 0.3]");
-  command.add_option("--sensor-model", flags.sensor_model,
-                     "Sensor model (YAML) whose threshold, ratio, spread and prior are the "
-                     "defaults; none learns no sensor [default: into a FOLDER/, the sensor is "
-                     "learned from the touches, and FOLDER/sensor.yaml is written where it is "
-                     "better than Eq. 7 on touches that are left out]");
-  command.add_option("--touch-sd-mm", flags.touch_sd_mm,
-                     "How exact the robot's poses are: standard deviation of the sensor's true "
-                     "position about the reported one, along x and along y, mm. The touches are "
-                     "aligned to the map that they make [default: 0, exact]");
-  command.add_option("--touch-sd-deg", flags.touch_sd_deg,
-                     "The same of the sensor's angle, degrees [default: 0]");
-  command.add_option_function<std::string>(
-      "--frames",
-      [&flags](const std::string& text) { flags.frames = parse_frames("--frames", text); },
-      option_named("frames").help);
+  Request& request = flags.request;
+  add_option_flag(command, request, "threshold",
+                  "Contact threshold, in the recording's pressure unit [default: learned where "
+                  "--unposed learns the sensor; else 2 kPa, and required for raw pressure]");
+  add_option_flag(command, request, "ratio",
+                  "Threshold as a fraction of the touch's largest pressure [default: 0.3]");
+  add_option_flag(command, request, "sensor-model",
+                  "Sensor model (YAML) whose threshold, ratio, spread and prior are the "
+                  "defaults; none learns no sensor [default: into a FOLDER/, the sensor is "
+                  "learned from the touches, and FOLDER/sensor.yaml is written where it is "
+                  "better than Eq. 7 on touches that are left out]");
+  add_option_flag(command, request, "touch-sd-mm",
+                  "How exact the robot's poses are: standard deviation of the sensor's true "
+                  "position about the reported one, along x and along y, mm. The touches are "
+                  "aligned to the map that they make [default: 0, exact]");
+  add_option_flag(command, request, "touch-sd-deg",
+                  "The same of the sensor's angle, degrees [default: 0]");
+  add_option_flag(command, request, "frames");
   command.add_option("--symmetry", flags.symmetry,
                      "n-fold rotational symmetry, where 1 is none and 0 any rotation; of all "
                      "objects, or of some, such as nut=6,key=1. Where the map looks the same after "
@@ -131,8 +129,8 @@ void add_map_flags(CLI::App& command, MapFlags& flags) {
   command.add_option("--png", flags.png, "Picture to write (PNG): all maps side by side");
   command.add_option("--ros", flags.ros,
                      "Folder to write every map to as PGM and YAML, for ROS's map_server");
-  command.add_option("--device", flags.device,
-                     "Vulkan device, by index or a part of its name; --unposed uses none");
+  add_option_flag(command, request, "device",
+                  "Vulkan device, by index or a part of its name; --unposed uses none");
 }
 
 void finish_map_flags(const CLI::App& command, MapFlags& flags) {
@@ -146,8 +144,8 @@ void finish_map_flags(const CLI::App& command, MapFlags& flags) {
                 "stands for objects that were never learned; choose another label");
   }
   for (const auto& [flag, sd, most] :
-       {std::tuple{"--touch-sd-mm", flags.touch_sd_mm, most_length_mm},
-        {"--touch-sd-deg", flags.touch_sd_deg, 180.0}}) {
+       {std::tuple{"--touch-sd-mm", flags.request.touch_sd_mm, most_length_mm},
+        {"--touch-sd-deg", flags.request.touch_sd_deg, 180.0}}) {
     if (sd && !(*sd >= 0.0 && *sd <= most)) {
       refuse_flag(flag, *sd, "give 0 to {:g}", most);
     }
@@ -169,10 +167,10 @@ std::optional<LearnedSensor> sensor_of(const MapFlags& flags,
   if (!has_sensor_model(flags)) {
     return {};
   }
-  LearnedSensor sensor = read_sensor_model(flags.sensor_model);
+  LearnedSensor sensor = read_sensor_model(flags.request.sensor_model);
   const Recording& first = recordings.front();
   if (sensor.pressure_unit != first.pressure_unit) {
-    refuse(flags.sensor_model,
+    refuse(flags.request.sensor_model,
            "pressure_unit is {} but {} has {}; give a sensor model that was learned from such "
            "recordings",
            sensor.pressure_unit, first.path, first.pressure_unit);
@@ -194,8 +192,8 @@ MapOptions map_options(const MapFlags& flags, const std::vector<Recording>& reco
     refuse_flag("--peak", result.sensor.peak,
                 "must be below 1, or one reading would make a cell certain");
   }
-  std::optional<double> threshold = flags.threshold;
-  std::optional<double> ratio = flags.ratio;
+  std::optional<double> threshold = flags.request.threshold;
+  std::optional<double> ratio = flags.request.ratio;
   if (sensor) {
     threshold = threshold.value_or(sensor->classifier.threshold);
     ratio = ratio.value_or(sensor->classifier.ratio);
@@ -206,7 +204,7 @@ MapOptions map_options(const MapFlags& flags, const std::vector<Recording>& reco
 }
 
 DisplacementSd touch_sd(const MapFlags& flags) {
-  return {flags.touch_sd_mm.value_or(0.0), radians(flags.touch_sd_deg.value_or(0.0))};
+  return {flags.request.touch_sd_mm.value_or(0.0), radians(flags.request.touch_sd_deg.value_or(0.0))};
 }
 
 std::optional<double> given_prior(const MapFlags& flags,
@@ -319,7 +317,7 @@ void prepare_outputs(const MapFlags& flags, const std::vector<std::filesystem::p
     files.reads("RECORDING", recording);
   }
   if (has_sensor_model(flags)) {
-    files.reads("--sensor-model", flags.sensor_model);
+    files.reads("--sensor-model", flags.request.sensor_model);
   }
   if (std::error_code none; std::filesystem::is_regular_file(flags.array, none)) {
     files.reads("--array", flags.array);

@@ -26,15 +26,9 @@ struct MapFlags {
   double cell_mm = 0.5;
   bool cell_given = false;
   std::optional<double> spread_mm;
-  std::optional<double> touch_sd_mm;
-  std::optional<double> touch_sd_deg;
   std::optional<double> peak;
   std::string prior = "auto";
   bool prior_given = false;
-  std::optional<double> threshold;
-  std::optional<double> ratio;
-  std::string sensor_model;
-  std::optional<Frames> frames;
   std::string origin;
   std::string symmetry;
   bool mirror = false;
@@ -48,7 +42,7 @@ struct MapFlags {
   std::string array;
   std::string png;
   std::string ros;
-  std::string device;
+  Request request;  ///< frames, threshold, ratio, sensor_model, touch_sd_mm, touch_sd_deg, device
 
   /// Whether drawings are mapped.
   bool of_drawings() const;

@@ -196,7 +196,7 @@ bool learns_sensor(const MapFlags& flags) {
   if (!flags.to_folder()) {
     return false;
   }
-  const bool asked = flags.sensor_model.empty();
+  const bool asked = flags.request.sensor_model.empty();
   const std::filesystem::path file = sensor_file(flags);
   std::error_code ignored;
   if (!std::filesystem::exists(file, ignored)) {
@@ -228,7 +228,7 @@ MapSensor learn_sensor(const MapFlags& flags, const std::vector<OccupancyGrid>& 
     const std::vector<FolderMap> all = folder_maps(flags, maps, written);
     const std::vector<Recording> touches = touches_of(all);
     CalibrationTask task =
-        calibration_task({.threshold = flags.threshold, .ratio = flags.ratio}, {}, touches, {});
+        calibration_task({.threshold = flags.request.threshold, .ratio = flags.request.ratio}, {}, touches, {});
     require_enough(task.presses, least_touches);
     give_groups(all, task.presses);
     task.options.maps = model;
@@ -261,8 +261,8 @@ MapSensor learn_unposed_sensor(const MapFlags& flags, const std::vector<Recordin
       }
     }
     const CalibrationTask task = calibration_task(
-        {.unposed = true, .threshold = flags.threshold, .ratio = flags.ratio, .group = flags.group},
-        {.frames = flags.frames}, labelled, {});
+        {.unposed = true, .threshold = flags.request.threshold, .ratio = flags.request.ratio, .group = flags.group},
+        {.frames = flags.request.frames}, labelled, {});
     require_enough(task.presses, least_presses);
     return learned_from(task, flags);
   });

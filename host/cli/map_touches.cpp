@@ -37,7 +37,7 @@ GroupedTouches group_by_label(const MapFlags& flags, const std::vector<Recording
     const auto [object, own_group] = grouped_object(recording, flags.group);
     const std::string& label = flags.label.empty() ? object : flags.label;
     require_name(recording.path, label);
-    const auto [begin, end] = selected_touches(recording, flags.frames);
+    const auto [begin, end] = selected_touches(recording, flags.request.frames);
     Group& group = groups[label];
     for (std::size_t i = begin; i < end; ++i) {
       Touch touch = recording.touch(i);
