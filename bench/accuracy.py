@@ -93,7 +93,8 @@ def learn(
     run_palpate(command, "map", *files, "-o", f"{folder}/maps/")
     grids = [palpate.read_map(path) for path in pathlib.Path(folder, "maps").glob("*.map.h5")]
     for grid in grids:
-        grid.symmetry = grid.suggested_symmetry or grid.symmetry
+        if grid.suggested_symmetry is not None:  # errors are from the nearest of poses that look alike
+            grid.symmetry = grid.suggested_symmetry
     return f"{folder}/maps", {grid.label: grid for grid in grids}
 
 
@@ -242,7 +243,7 @@ def program() -> None:
         + "; ".join(f"{name}: {of.about}" for name, of in SCENARIOS.items())
         + ". All of them take some two hours on two CPU cores, most a few minutes each. Intervals are of "
         "95 %: Wilson's of shares, by bootstrap over unknowns of means.",
-        trials="unknowns of each object, and strangers [each scenario's own, or 1 with --quick]",
+        trials="unknowns of each object, and strangers [each scenario's own]",
     )
     flags.add_argument(
         "--scenario", action="append", choices=SCENARIOS, metavar="NAME", help="measure only this or these"
@@ -257,8 +258,9 @@ def program() -> None:
     groups = {group for scenario in chosen.values() for group in scenario.columns}
     table = Table([*ROW, *(column for group in COLUMNS if group in groups for column in COLUMNS[group])])
     for name, scenario in chosen.items():
-        each = options.trials or (1 if options.quick else scenario.each)
-        each_stranger = options.trials or (1 if options.quick else scenario.each_stranger)
+        scenario = scenario.quick() if options.quick else scenario
+        each = options.trials or scenario.each
+        each_stranger = options.trials or scenario.each_stranger
         scores: dict[str, tuple[Scores, Scores]] = {engine: ([], []) for engine in scenario.engines}
         for i in range(options.sets):
             with tempfile.TemporaryDirectory() as folder:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy
@@ -66,6 +66,22 @@ class Scenario:
     def learns(self) -> bool:
         """Whether an engine takes the sensor that `palpate map` learns."""
         return any("sensor_model" not in self.options | of for of in self.engines.values())
+
+    def quick(self) -> "Scenario":
+        """One unknown of each object, at most five touches of it, and half as many bins along each axis."""
+
+        def wider(options: Json) -> Json:
+            bins = options.get("bins")
+            return options | {"bins": tuple(n // 2 for n in bins)} if isinstance(bins, tuple) else options
+
+        return replace(
+            self,
+            each=1,
+            each_stranger=1,
+            after=tuple(of for of in self.after if isinstance(of, int) and of <= 5) or ((1, 5),),
+            engines={name: wider(options) for name, options in self.engines.items()},
+            options=wider(self.options),
+        )
 
 
 EQ7: Json = {"sensor_model": "none"}
