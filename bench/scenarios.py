@@ -90,7 +90,7 @@ NO_NONE: Json = {"none": 0.0}
 EVEN_NONE: Json = {"none": float(len(VOWELS))}  # as likely before the first touch as all letters together
 
 _GAINS: Any = dict(
-    columns=("identity", "regions"), learned=("A", "E", "U"), own_gains=True, seed=400_000_000, each=34,
+    columns=("identity", "pose", "regions"), learned=("A", "E", "U"), own_gains=True, seed=400_000_000, each=34,
     options=NO_NONE,
 )  # fmt: skip
 _DEFAULTS: Any = dict(
