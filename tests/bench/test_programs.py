@@ -50,7 +50,7 @@ def test_strangers_are_told_from_what_was_learned(accuracy: list[dict[str, Any]]
     for row in rows_of(accuracy, "strangers", "5").values():
         assert (row["unknowns"], row["strangers"]) == (5, 5)
         assert row["called_none"]["mean"] == 0.0 and row["strangers_called_none"]["mean"] > 0.5
-        assert row["told_apart_by_none"]["mean"] > 0.9
+        assert row["told_apart_by_none"]["mean"] > 0.8
     (fit,) = rows_of(accuracy, "fit", "5").values()
     assert (fit["unknowns"], fit["strangers"], fit["fits"]["mean"]) == (5, 8, 1.0)
     assert fit["told_apart_by_z"]["mean"] > 0.8, "of forty pairs, by maps of few touches"
