@@ -60,6 +60,7 @@ COLUMNS: dict[str, list[Column]] = {
         ("standard deviation", "sd_z", number(".2f")),
         ("fit, %", "fits", _PERCENT),
         ("do not fit, %", "unfit", _PERCENT),
+        ("strangers that fit, %", "strangers_fit", _PERCENT),
         ("told from strangers by z, %", "told_apart_by_z", _PERCENT),
     ],
     "strangers": [("strangers that do not fit, %", "strangers_unfit", _PERCENT)],
@@ -219,6 +220,7 @@ def row_of(
     }
     if strangers:
         row |= {
+            "strangers_fit": share(values(strangers, "fits")),
             "strangers_unfit": share(values(strangers, "unfit")),
             "strangers_called_none": share(values(strangers, "none")),
             "told_apart_by_z": told_apart(present(values(strangers, "z")), present(z)),
