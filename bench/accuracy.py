@@ -1,5 +1,6 @@
 """How right recognition is, and how sure: scenarios, the engines that recognise them, after some touches."""
 
+import argparse
 import math
 import pathlib
 import tempfile
@@ -231,6 +232,13 @@ def row_of(
     return row
 
 
+def scenario_name(text: str) -> str:
+    """A scenario's name of a flag."""
+    if text not in SCENARIOS:
+        raise argparse.ArgumentTypeError(f"{text}: no such scenario; give one of {', '.join(SCENARIOS)}")
+    return text
+
+
 def program() -> None:
     """Scenario by scenario, its engines on the same unknowns."""
     flags = parser(
@@ -242,7 +250,7 @@ def program() -> None:
         trials="unknowns of each object, and strangers [each scenario's own]",
     )
     flags.add_argument(
-        "--scenario", action="append", choices=SCENARIOS, metavar="NAME", help="measure only this or these"
+        "scenarios", nargs="*", type=scenario_name, metavar="SCENARIO", help="measure only this or these [all]"
     )
     flags.add_argument(
         "--sets", type=at_least_1, default=1, metavar="N",
@@ -251,7 +259,7 @@ def program() -> None:
     flags.add_argument("--palpate", default="build/palpate", help="the command [%(default)s]")
     options = flags.parse_args()
     device, facts = begin(options)
-    chosen = {name: of for name, of in SCENARIOS.items() if name in (options.scenario or SCENARIOS)}
+    chosen = {name: of for name, of in SCENARIOS.items() if name in (options.scenarios or SCENARIOS)}
     groups = {group for scenario in chosen.values() for group in scenario.columns}
     shown: list[Column] = [(fact, fact, plain) for fact in FACTS]
     for group, columns in COLUMNS.items():

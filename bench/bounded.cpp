@@ -254,8 +254,7 @@ void measure_bounded(const RunOptions& options, std::span<char* const> command_l
   const BoundedInputs inputs{report.device(), letters, options.quick};
   constexpr decltype(&measure_bounded_speed) measures[] = {
       measure_bounded_speed, measure_bounded_mode,      measure_bounded_streaming,
-      measure_bounded_large, measure_bounded_misplaced, measure_bounded_growth,
-      measure_bounded_search};
+      measure_bounded_large, measure_bounded_misplaced, measure_bounded_search};
   static_assert(std::size(measures) == std::size(bounded_parts));
   for (std::size_t i = 0; i < std::size(measures); ++i) {
     if (options.part.empty() || options.part == bounded_parts[i]) {

@@ -87,8 +87,6 @@ Json measure_bounded_large(const BoundedInputs& inputs, Report& report);
 /// Touches that are not where the robot says: time and memory, beside the dense engine where it can
 /// answer.
 Json measure_bounded_misplaced(const BoundedInputs& inputs, Report& report);
-/// Time over bins, from 10^4 to 10^9 in all, beside the dense engine.
-Json measure_bounded_growth(const BoundedInputs& inputs, Report& report);
 /// The blocks of poses that one search goes into after 1, 3 and 9 touches, for a picture.
 Json measure_bounded_search(const BoundedInputs& inputs, Report& report);
 

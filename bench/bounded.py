@@ -1,4 +1,4 @@
-"""The posterior by bounds: its certificates against all bins, everyday objects, and its charts.
+"""The posterior by bounds: its certificates against all bins, everyday objects, and its picture.
 
 Times are measured in C++, by `palpate-bench bounded`.
 """
@@ -195,28 +195,6 @@ def _answer(belief: Any, touches: palpate.Recording) -> Json:
     return answer
 
 
-def draw_growth(records: list[Json]) -> Figure:
-    """Time against bins, by what `palpate-bench bounded` measured in its part "growth"."""
-    axes = charts.chart(
-        "bins in all, five objects", "time of nine touches, to the posterior",
-        xscale="log", yscale="log",
-    )  # fmt: skip
-    for name, label in (
-        ("dense", "dense, every bin"),
-        ("bounded", "by bounds, proven to 1e-6"),
-        ("one_thread", "by bounds, on one thread"),
-    ):
-        bins, median, least, most = (
-            column(records, of)
-            for of in ("bins_in_all", f"{name}/median", f"{name}/least", f"{name}/most")
-        )
-        (line,) = axes.plot(bins, median, linestyle="-", label=label)
-        axes.vlines(bins, least, most, color=line.get_color(), linewidth=1.0)
-    charts.ticks(axes.xaxis, count_text)
-    charts.ticks(axes.yaxis, seconds_text)
-    return charts.finished(axes)
-
-
 def draw_search(search: Json, grid: palpate.OccupancyGrid) -> Figure:
     """The blocks of poses that a search goes into, after some touches each, over the object's map.
 
@@ -262,25 +240,24 @@ def draw_search(search: Json, grid: palpate.OccupancyGrid) -> Figure:
 
 
 def read_times(path: str) -> Json:
-    """What `palpate-bench bounded` measured. Raises palpate.Error where the charts' parts are missing."""
+    """What `palpate-bench bounded` measured. Raises palpate.Error where the picture's part is missing."""
     try:
         times: Json = json.loads(pathlib.Path(path).read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise palpate.Error(f"--times {path}: {error}") from error
-    for part in ("growth", "search"):
-        if part not in times:
-            raise palpate.Error(f"--times {path}: holds no {part}; measure without --part")
+    if "search" not in times:
+        raise palpate.Error(f"--times {path}: holds no search; measure without --part")
     return times
 
 
 def program() -> None:
-    """Measures the parts, and draws the charts of times where they are given."""
+    """Measures the parts, and draws the search where times are given."""
     flags = parser(
         "bounded",
         "Holds the certificates of the posterior by bounds against all bins in float64, in some "
         "minutes on two CPU cores, and recognises everyday objects from one press each. Times are "
         "measured by build/palpate-bench bounded.",
-        plots="draw the charts of --times in this folder",
+        plots="draw the search of --times in this folder",
     )
     flags.add_argument("--part", choices=("accuracy", "presses"), help="measure only this part")
     flags.add_argument("--presses", metavar="FOLDER", help="recordings of everyday objects")
@@ -302,7 +279,6 @@ def program() -> None:
         document["presses"] = measure_presses(device, options.presses, options.quick)
     write(options.json, document)
     if times:
-        charts.save({"bounded_growth": draw_growth(times["growth"])}, options.plots)
         picture = draw_search(times["search"], maps[0])
         path = pathlib.Path(options.plots, "bounded_search.png")
         write(path, charts.image(picture, "png", dpi=100))

@@ -33,8 +33,8 @@ int main(int argc, char** argv) try {
       "latency (ms), with errors in nats against float64",
       measure_kernels);
   add("bounded",
-      "Measure the posterior by bounds, in some 20 minutes on two CPU cores: its "
-      "time and memory at 10,000 to 1,000,000,000 bins beside the dense engine",
+      "Measure the posterior by bounds, in less than 20 minutes on two CPU cores: its "
+      "time and memory, in large scenes and beside the dense engine",
       measure_bounded)
       ->add_option("--part", options.part, "Measure only this part")
       ->check(CLI::IsMember(

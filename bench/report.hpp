@@ -121,8 +121,8 @@ class Report {
 // The commands.
 
 /// Names of the parts of `bounded`, in order.
-inline constexpr const char* bounded_parts[] = {"speed",     "mode",   "streaming", "large",
-                                                "misplaced", "growth", "search"};
+inline constexpr const char* bounded_parts[] = {"speed", "mode",      "streaming",
+                                                "large", "misplaced", "search"};
 
 // Each prints its results as Markdown tables and writes them to the file that its options name.
 // They throw Error where the device or the file cannot be opened.
@@ -130,8 +130,8 @@ inline constexpr const char* bounded_parts[] = {"speed",     "mode",   "streamin
 /// Speed, memory and error of every kernel, beside two baselines and float64.
 void measure_kernels(const RunOptions& options, std::span<char* const> command_line);
 
-/// The posterior by bounds: its time for nine touches at rising numbers of bins, touch by touch and
-/// in large scenes, its memory, and where it searches.
+/// The posterior by bounds: its time for nine touches on lattices of several sizes, touch by touch
+/// and in large scenes, its memory, and where it searches.
 void measure_bounded(const RunOptions& options, std::span<char* const> command_line);
 
 }  // namespace palpate::bench

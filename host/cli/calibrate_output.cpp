@@ -34,9 +34,6 @@ std::string values_table(const SensorCalibration& calibration) {
   add("contact threshold, " + unit, raw ? "" : short_number(initial.classifier.threshold),
       sensor.classifier.threshold);
   add("ratio", short_number(initial.classifier.ratio), sensor.classifier.ratio);
-  if (sensor.psf_mm) {
-    add("point spread, mm", "1", *sensor.psf_mm);
-  }
   add("spread of maps, mm", short_number(initial.spread_mm), sensor.spread_mm);
   add("gamma of Eq. 7", short_number(initial.gamma), sensor.gamma);
   add("prior", "", sensor.prior);

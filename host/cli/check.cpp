@@ -15,6 +15,7 @@
 #include "cli/progress.hpp"
 #include "cli/recognition_flags.hpp"
 #include "learning/setup_check.hpp"
+#include "model/element_spacing.hpp"
 #include "model/option_words.hpp"
 #include "recognition/recordings.hpp"
 
@@ -27,7 +28,7 @@ struct CheckArguments {
   std::optional<double> threshold;
   std::optional<double> ratio;
   double cell_mm = 0.5;
-  double psf_mm = 1.0;
+  std::optional<double> spread_mm;
   std::string json;
   std::string write_array;
   std::string device;
@@ -66,7 +67,8 @@ void check(const CheckArguments& options) {
   const std::vector<Recording> recordings = read_touch_recordings(options.recordings);
   const Recording& first = recordings.front();
   MapOptions maps{.cell_mm = require_above("--cell-mm", options.cell_mm, 0.0)};
-  maps.sensor.spread_mm = require_above("--psf-mm", options.psf_mm, 0.0) / 2.0;
+  maps.sensor.spread_mm = options.spread_mm ? require_above("--spread-mm", *options.spread_mm, 0.0)
+                                            : usual_spread_mm(recordings);
   maps.classifier =
       make_classifier(first.pressure_unit, first.path, options.threshold, options.ratio);
   Device device = Device::open(options.device);
@@ -129,8 +131,9 @@ void add_check(CLI::App& app) {
                       "Threshold as a fraction of the touch's largest pressure [default: 0.3]");
   command->add_option("--cell-mm", options->cell_mm, "Edge of a map's cell, mm")
       ->capture_default_str();
-  command->add_option("--psf-mm", options->psf_mm, "Standard deviation of the point spread, mm")
-      ->capture_default_str();
+  command->add_option("--spread-mm", options->spread_mm,
+                      "Standard deviation of the inverse sensor model, mm [default: a quarter of "
+                      "the distance of neighbouring elements; 0.5 for DigiTacts and one element]");
   command->add_option("--device", options->device, "Vulkan device, by index or a part of its name");
   command->callback([options] { check(*options); });
 }

@@ -20,8 +20,7 @@ struct Group {
 const std::vector<Group>& groups() {
   static const std::vector<Group> all{
       {"Bins and region", {"--bins", "--x-mm", "--y-mm", "--theta-deg", "--pivot-mm"}},
-      {"Likelihood",
-       {"--prior", "--gamma", "--ratio", "--spread-mm", "--psf-mm", "--peak", "--felt-share"}},
+      {"Likelihood", {"--prior", "--gamma", "--ratio", "--spread-mm", "--peak", "--felt-share"}},
       {"Misplaced touches and slip",
        {"--touch-sd-mm", "--touch-sd-deg", "--slip-sd-mm", "--slip-sd-deg"}},
       {"Filter",

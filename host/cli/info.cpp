@@ -53,9 +53,7 @@ std::string sensor_model_text(const LearnedSensor& sensor) {
                                sensor.classifier.ratio));
   add("gamma",
       fmt::format("{:.4g}{}", sensor.gamma, sensor.table ? ", not used beside the table" : ""));
-  add("maps",
-      fmt::format("prior {:.4g}, spread {:.4g} mm{}", sensor.prior, sensor.spread_mm,
-                  sensor.psf_mm ? fmt::format(", point spread {:.4g} mm", *sensor.psf_mm) : ""));
+  add("maps", fmt::format("prior {:.4g}, spread {:.4g} mm", sensor.prior, sensor.spread_mm));
   if (!sensor.touch_sd.none()) {
     add("touch sd",
         fmt::format("{:.4g} mm, {:.4g} deg", sensor.touch_sd.mm, degrees(sensor.touch_sd.rad)));

@@ -23,11 +23,9 @@
 #include "cli/progress.hpp"
 #include "cli/recognition_flags.hpp"
 #include "estimation/maps/left_out_fit.hpp"
-#include "io/file_summary.hpp"
 #include "learning/observed_map.hpp"
 #include "learning/press.hpp"
 #include "learning/setup_check.hpp"
-#include "learning/spread_choice.hpp"
 #include "learning/touch_alignment.hpp"
 #include "model/option_words.hpp"
 #include "palpate/error.hpp"
@@ -116,55 +114,6 @@ void align(const MapFlags& flags, const MapOptions& model, std::vector<ObjectTou
   compare("--touch-sd-deg", "degrees", degrees(sd.rad), degrees(found.displaced.rad));
 }
 
-/// The spread of the folder's maps that are not written anew, where all have the same.
-std::optional<double> spread_of_others(const MapFlags& flags,
-                                       const std::vector<std::filesystem::path>& written) {
-  std::optional<double> spread;
-  for (const std::filesystem::path& path : other_maps(flags, written)) {
-    try {
-      const std::optional<double> own = summarize_map(path).head.spread_mm;
-      if (!own || (spread && *spread != *own)) {
-        return {};
-      }
-      spread = own;
-    } catch (const Error& error) {
-      if (error.fault() != Fault::input) {  // what is no map says nothing
-        throw;
-      }
-    }
-  }
-  return spread;
-}
-
-/// Settles the spread where no flag decides on it, and says why in a line.
-/// @param model with the prior
-/// @returns whether another than the default was taken
-bool settle_spread(const MapFlags& flags, const std::vector<std::filesystem::path>& written,
-                   std::span<const ObjectTouches> objects, MapOptions& model) {
-  if (spread_given(flags)) {
-    return false;
-  }
-  const double usual_mm = model.sensor.spread_mm;
-  if (const auto others_mm = spread_of_others(flags, written)) {
-    model.sensor.spread_mm = *others_mm;
-    fmt::print("spread {:.3g} mm, as the other maps of {} have it\n", *others_mm, flags.output);
-  } else {
-    const SpreadChoice choice = choose_spread(objects, model);
-    model.sensor.spread_mm = choice.spread_mm;
-    if (choice.spread_mm == usual_mm) {
-      fmt::print("spread {:.3g} mm: no other predicts left-out touches better beyond chance\n",
-                 usual_mm);
-    } else {
-      fmt::print(
-          "spread {:.3g} mm: left-out touches are {:.2f} nats each more likely than with {:.3g} "
-          "mm, "
-          "and found {:.2g} mm nearer to their places; --spread-mm {:.3g} keeps the default\n",
-          choice.spread_mm, choice.likelihood_gain, usual_mm, choice.place_gain_mm, usual_mm);
-    }
-  }
-  return model.sensor.spread_mm != usual_mm;
-}
-
 /// Says where poses are unknown: touches that are no touches of one place would make a blur.
 void warn_of_unknown_poses(const std::vector<Recording>& recordings) {
   for (const Recording& recording : recordings) {
@@ -237,13 +186,7 @@ void build_maps(const MapFlags& flags) {
                in_flags(suspicion->words), suspicion->nats);
   }
   align(flags, model, objects);
-  const auto settle_prior = [&] {
-    model.sensor.prior = prior ? *prior : estimate_prior(device, objects, model);
-  };
-  settle_prior();
-  if (settle_spread(flags, map_paths, objects, model)) {
-    settle_prior();
-  }
+  model.sensor.prior = prior ? *prior : estimate_prior(device, objects, model);
   std::vector<OccupancyGrid> maps;
   std::vector<std::optional<RotationalSymmetry>> symmetries;
   {

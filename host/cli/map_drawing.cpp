@@ -62,8 +62,8 @@ void check_flags(const MapFlags& flags) {
 DrawnMapOptions options_of(const MapFlags& flags) {
   DrawnMapOptions options;
   options.cell_mm = require_above("--cell-mm", flags.cell_mm, 0.0);
-  options.spread_mm = flags.spread_mm ? require_above("--spread-mm", *flags.spread_mm, 0.0)
-                                      : require_above("--psf-mm", flags.psf_mm, 0.0) / 2.0;
+  options.spread_mm =
+      require_above("--spread-mm", flags.spread_mm.value_or(options.spread_mm), 0.0);
   options.peak = flags.peak.value_or(options.peak);
   options.prior = given_prior(flags, {}).value_or(options.prior);
   options.felt_share = flags.felt_share.value_or(options.felt_share);

@@ -13,6 +13,7 @@
 #include "cli/map_drawing.hpp"
 #include "cli/options.hpp"
 #include "cli/recognition_flags.hpp"
+#include "model/element_spacing.hpp"
 #include "model/number_text.hpp"
 #include "model/printable.hpp"
 #include "recognition/option_text.hpp"
@@ -58,13 +59,10 @@ void add_map_flags(CLI::App& command, MapFlags& flags) {
                   "Edge of a cell, mm; with --unposed by default half the distance of neighbouring "
                   "elements")
       ->capture_default_str();
-  command.add_option("--psf-mm", flags.psf_mm, "Standard deviation of the point spread, mm")
-      ->capture_default_str();
   command.add_option("--spread-mm", flags.spread_mm,
-                     "Standard deviation of the inverse sensor model, mm [default: half of "
-                     "--psf-mm where that is given; else that of the FOLDER's other maps, or 0.5 "
-                     "unless another predicts left-out touches better; with --unposed 0.6 times "
-                     "the distance of neighbouring elements]");
+                     "Standard deviation of the inverse sensor model, mm [default: a quarter of "
+                     "the distance of neighbouring elements; 0.5 for DigiTacts, for one element "
+                     "and for drawings; with --unposed 0.6 times that distance]");
   command.add_option(
       "--peak", flags.peak,
       "Peak of the inverse sensor model, a probability p below 1 [default: 0.9]; of a "
@@ -137,7 +135,6 @@ void add_map_flags(CLI::App& command, MapFlags& flags) {
 
 void finish_map_flags(const CLI::App& command, MapFlags& flags) {
   flags.cell_given = command.count("--cell-mm") > 0;
-  flags.psf_given = command.count("--psf-mm") > 0;
   flags.prior_given = command.count("--prior") > 0;
   if (!is_printable(flags.label)) {
     refuse("--label", "give printable text, in UTF-8");
@@ -185,12 +182,10 @@ MapOptions map_options(const MapFlags& flags, const std::vector<Recording>& reco
                        const std::optional<LearnedSensor>& sensor) {
   MapOptions result;
   result.cell_mm = require_length("--cell-mm", flags.cell_mm);
-  result.sensor.spread_mm = require_length("--psf-mm", flags.psf_mm) / 2.0;
-  if (sensor && !flags.psf_given) {
-    result.sensor.spread_mm = sensor->spread_mm;
-  }
   if (flags.spread_mm) {
     result.sensor.spread_mm = require_length("--spread-mm", *flags.spread_mm);
+  } else {
+    result.sensor.spread_mm = sensor ? sensor->spread_mm : usual_spread_mm(recordings);
   }
   result.sensor.peak = require_above("--peak", flags.peak.value_or(result.sensor.peak), 0.0);
   if (result.sensor.peak >= 1.0) {
@@ -206,10 +201,6 @@ MapOptions map_options(const MapFlags& flags, const std::vector<Recording>& reco
   const Recording& first = recordings.front();
   result.classifier = make_classifier(first.pressure_unit, first.path, threshold, ratio);
   return result;
-}
-
-bool spread_given(const MapFlags& flags) {
-  return flags.spread_mm || flags.psf_given || has_sensor_model(flags);
 }
 
 DisplacementSd touch_sd(const MapFlags& flags) {

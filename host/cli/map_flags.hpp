@@ -25,8 +25,6 @@ struct MapFlags {
   std::string output;
   double cell_mm = 0.5;
   bool cell_given = false;
-  double psf_mm = 1.0;
-  bool psf_given = false;
   std::optional<double> spread_mm;
   std::optional<double> touch_sd_mm;
   std::optional<double> touch_sd_deg;
@@ -70,8 +68,6 @@ std::optional<LearnedSensor> sensor_of(const MapFlags& flags,
 /// The map's options but for the prior. A flag overrides the sensor model.
 MapOptions map_options(const MapFlags& flags, const std::vector<Recording>& recordings,
                        const std::optional<LearnedSensor>& sensor);
-/// Whether --spread-mm, --psf-mm or a sensor model decides on the spread of maps.
-bool spread_given(const MapFlags& flags);
 /// By --touch-sd-mm and --touch-sd-deg.
 DisplacementSd touch_sd(const MapFlags& flags);
 /// The prior by --prior, or else the sensor model's; none where it is to be estimated.

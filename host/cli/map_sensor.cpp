@@ -31,6 +31,23 @@ struct FolderMap {
   OccupancyGrid map;
 };
 
+/// The maps in the folder of --output but for those that are written anew.
+std::vector<std::filesystem::path> other_maps(const MapFlags& flags,
+                                              const std::vector<std::filesystem::path>& written) {
+  std::vector<std::filesystem::path> others;
+  std::error_code none;
+  if (std::filesystem::is_directory(flags.output, none)) {
+    for (const std::filesystem::path& file : maps_in(flags.output)) {
+      if (std::ranges::none_of(written, [&](const std::filesystem::path& own) {
+            return own.lexically_normal() == file.lexically_normal();
+          })) {
+        others.push_back(file);
+      }
+    }
+  }
+  return others;
+}
+
 /// The maps of the folder as they will be. Throws Error where a map that stays does not tell what
 /// learning needs.
 std::vector<FolderMap> folder_maps(const MapFlags& flags, const std::vector<OccupancyGrid>& maps,
@@ -203,22 +220,6 @@ bool learns_sensor(const MapFlags& flags) {
         file.string(), asked ? "no sensor is learned; " : ""));
   }
   return asked && origin == Origin::own;
-}
-
-std::vector<std::filesystem::path> other_maps(const MapFlags& flags,
-                                              const std::vector<std::filesystem::path>& written) {
-  std::vector<std::filesystem::path> others;
-  std::error_code none;
-  if (std::filesystem::is_directory(flags.output, none)) {
-    for (const std::filesystem::path& file : maps_in(flags.output)) {
-      if (std::ranges::none_of(written, [&](const std::filesystem::path& own) {
-            return own.lexically_normal() == file.lexically_normal();
-          })) {
-        others.push_back(file);
-      }
-    }
-  }
-  return others;
 }
 
 MapSensor learn_sensor(const MapFlags& flags, const std::vector<OccupancyGrid>& maps,

@@ -17,10 +17,6 @@ std::filesystem::path sensor_file(const MapFlags& flags);
 /// --sensor-model. Says so where the folder has a sensor model that `palpate map` did not write.
 bool learns_sensor(const MapFlags& flags);
 
-/// The maps in the folder of --output but for those that are written anew.
-std::vector<std::filesystem::path> other_maps(const MapFlags& flags,
-                                              const std::vector<std::filesystem::path>& written);
-
 /// A sensor model for the maps of a folder, and some lines about it.
 struct MapSensor {
   std::optional<LearnedSensor> sensor;  ///< none where it is not better, or cannot be learned

@@ -91,7 +91,7 @@ UnposedOptions unposed_options(const MapFlags& flags, const std::vector<Recordin
   if (!flags.cell_given) {
     result.map.cell_mm = 0.5 * pitch_mm;
   }
-  if (!sensor && !spread_given(flags)) {
+  if (!sensor && !flags.spread_mm) {
     constexpr double of_pitch = 0.6;  // leaves no gaps between the elements of a press
     result.map.sensor.spread_mm = of_pitch * pitch_mm;
   }

@@ -109,7 +109,6 @@ void describe(Keys& keys, LearnedSensor& sensor) {
   keys("ratio", sensor.classifier.ratio);
   keys("gamma", sensor.gamma);
   keys("prior", sensor.prior);
-  keys("psf_mm", sensor.psf_mm);
   keys("spread_mm", sensor.spread_mm);
   keys("touch_sd", sensor.touch_sd, !sensor.touch_sd.none());
   keys("temperature", sensor.temperature);
@@ -286,11 +285,13 @@ LearnedSensor read_sensor_model(const std::filesystem::path& path) {
              e.refuse(fmt::format("give {}, as palpate calibrate writes it", file_format));
            }
          }},
-        {"version", [&](const Entry& e) {
+        {"version",
+         [&](const Entry& e) {
            if (e.integer(1) > 1) {
              e.refuse("this palpate reads version 1; update palpate");
            }
-         }}};
+         }},
+        {"psf_mm", [](const Entry& /*unused*/) {}}};  // of earlier releases, and nothing took it
     describe(reader, sensor);
     read_keys(root, reader.keys);
   });

@@ -167,12 +167,9 @@ LearnedReadings learn_readings(const std::vector<Press>& presses, const ReadingO
     return readings;
   }
   readings.prior = share_in_contact(evidence);
-  if (at_known_poses(presses)) {
-    readings.psf_mm = learn_point_spread(presses, readings.classifier);
-  }
-  // Maps of presses at unknown poses have this spread, too: it leaves no gaps between elements.
-  constexpr double of_spacing = 0.6;
-  readings.spread_mm = readings.psf_mm ? *readings.psf_mm / 2.0 : of_spacing * options.spacing_mm;
+  constexpr double of_spacing = 0.6;  // leaves no gaps between the elements of a press
+  readings.spread_mm = at_known_poses(presses) ? usual_spread_mm(options.spacing_mm)
+                                               : of_spacing * options.spacing_mm;
   return readings;
 }
 

@@ -26,12 +26,11 @@ struct ReadingOptions {
 /// What presses say of a sensor's readings, whatever objects they are of.
 struct LearnedReadings {
   ContactClassifier classifier;
-  double noise = 0.0;             ///< see noise_floor()
-  std::vector<double> pressures;  ///< of all elements In Contact, ascending
-  double prior = 0.2;             ///< see share_in_contact()
-  std::optional<double> psf_mm;   ///< where presses at known poses tell the point spread
-  double spread_mm = 0.5;         ///< of maps
-  double spacing_mm = 0.0;        ///< between the elements
+  double noise = 0.0;                         ///< see noise_floor()
+  std::vector<double> pressures;              ///< of all elements In Contact, ascending
+  double prior = 0.2;                         ///< see share_in_contact()
+  double spread_mm = 0.5;                     ///< of maps
+  double spacing_mm = 0.0;                    ///< between the elements
   std::optional<MapOptions> given_maps = {};  ///< ReadingOptions::maps
 
   /// The given options of maps, or else those of maps with cells of half a spacing.
@@ -42,9 +41,8 @@ struct LearnedReadings {
 };
 
 /// Learns the classifier, then what it makes of the presses. A learned threshold is at least three
-/// standard deviations of the noise. The maps' spread is half of the point spread's, or 0.6
-/// spacings. Where their options are given, spread and prior are theirs, and no point spread is
-/// learned.
+/// standard deviations of the noise. The maps' spread is usual_spread_mm() at known poses, and 0.6
+/// spacings at unknown ones. Where their options are given, spread and prior are theirs.
 /// @throws Error as learn_classifier(), on a classifier out of range, and where no pressure is
 /// above the threshold
 LearnedReadings learn_readings(const std::vector<Press>& presses, const ReadingOptions& options);
@@ -62,19 +60,6 @@ ContactClassifier learn_classifier(const std::vector<Press>& presses,
 /// element In Contact of their touch. Where no pressure is negative, half of the noise is taken to
 /// be cut off at 0. 0 where there are no such elements.
 double noise_floor(const std::vector<Press>& presses, const ContactClassifier& classifier);
-
-/// Standard deviation of the sensor's point spread in mm, from touches at known poses.
-///
-/// Takes every object for a flat face at one height. The face lies where the mean pressure, each
-/// touch relative to its force, exceeds half of its plateau. Blurred by a Gaussian and averaged
-/// over elements (squares of 0.95 element spacings), the face explains the pressures up to each
-/// touch's force with a least squared error, whose place is the result. Edges that are rounded or
-/// sloped count as blur.
-/// @param presses at known poses
-/// @returns none where the touches do not determine it: too few, or the least error lies at the end
-/// of what is searched, a twentieth to three times the element spacing
-std::optional<double> learn_point_spread(const std::vector<Press>& presses,
-                                         const ContactClassifier& classifier);
 
 /// Gamma of Eq. 7 under which readings are most likely where the log odds are known.
 /// @param counts of two levels over log odds; nodes of cells that nothing sensed are left out

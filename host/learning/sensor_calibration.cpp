@@ -84,11 +84,6 @@ std::vector<std::string> labels_of(const std::vector<TrainingMap>& maps) {
 std::vector<std::string> warnings_about(const LearnedPresses& learned) {
   std::vector<std::string> warnings = stuck_elements(
       learned.presses, learned.readings.classifier.threshold, learned.readings.pressures);
-  if (at_known_poses(learned.presses) && !learned.readings.psf_mm && !learned.readings.given_maps) {
-    warnings.emplace_back(
-        "the touches do not tell the point spread: too few of an object, or no edges; the "
-        "maps' spread is 0.6 element spacings");
-  }
   std::set<std::string> alone;
   for (const Press& press : learned.presses) {
     alone.insert(press.label);
@@ -111,7 +106,6 @@ LearnedSensor sensor_of(const LearnedReadings& readings, const std::string& pres
   LearnedSensor sensor{
       .pressure_unit = pressure_unit, .noise = readings.noise, .classifier = readings.classifier};
   sensor.prior = readings.prior;
-  sensor.psf_mm = readings.psf_mm;
   sensor.spread_mm = readings.spread_mm;
   sensor.bins = bins;
   return sensor;

@@ -76,7 +76,7 @@ struct SensorCalibration {
 /// Learns from presses the contact threshold and ratio, the noise floor, gamma, the prior, the
 /// table, the temperature and the familiarity.
 ///   Presses at known poses are counted, and recognised alone and in groups, as far from the
-///   nearest bin as unknowns are. They also give the point spread, and by how much the temperature
+///   nearest bin as unknowns are. They also give by how much the temperature
 ///   grows with every further touch. Presses at unknown poses show much of an object. They also
 ///   give the features' distributions with their weight.
 /// Among several tables it keeps the first, unless a later one has less log-loss in the
@@ -84,7 +84,7 @@ struct SensorCalibration {
 /// weight, familiarity) keeps its default, with a warning. Takes all host threads.
 ///   The numbers before and after are of cross-validation. All that a fold's presses are judged by
 /// is learned again from the presses of the other folds alone, from the contact threshold on:
-/// noise, prior, point spread, levels, maps, tables and features. Which table is kept, temperature,
+/// noise, prior, levels, maps, tables and features. Which table is kept, temperature,
 /// weight and familiarity come from the scores of the other folds' presses.
 ///
 /// Data that say little:

@@ -57,9 +57,8 @@ double element_pitch_mm(std::span<const Touch> presses) {
   std::optional<double> least;
   for (std::size_t i = 0; i < presses.size(); ++i) {
     const bool same = i > 0 && presses[i].elements_mm.data() == presses[i - 1].elements_mm.data();
-    const auto spacing = same ? std::nullopt : spacing_of(presses[i].elements_mm);
-    if (spacing && spacing->nearest_mm.most > 0.0) {
-      least = std::min(least.value_or(spacing->nearest_mm.most), spacing->nearest_mm.most);
+    if (const auto pitch_mm = same ? std::nullopt : pitch_of(presses[i].elements_mm)) {
+      least = std::min(least.value_or(*pitch_mm), *pitch_mm);
     }
   }
   if (!least) {

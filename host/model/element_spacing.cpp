@@ -8,6 +8,8 @@
 
 #include <glm/geometric.hpp>
 
+#include "palpate/sensor_model.hpp"
+
 namespace palpate {
 
 std::optional<ElementSpacing> spacing_of(std::span<const glm::dvec2> elements_mm, double alike_mm) {
@@ -53,6 +55,34 @@ std::optional<ElementSpacing> spacing_of(std::span<const glm::dvec2> elements_mm
     spacing.nearest_mm.most = std::max(spacing.nearest_mm.most, nearest_mm);
   }
   return spacing;
+}
+
+std::optional<double> pitch_of(std::span<const glm::dvec2> elements_mm) {
+  const std::optional<ElementSpacing> spacing = spacing_of(elements_mm);
+  return spacing && spacing->nearest_mm.most > 0.0 ? std::optional(spacing->nearest_mm.most)
+                                                   : std::nullopt;
+}
+
+double usual_spread_mm(std::optional<double> pitch_mm) {
+  constexpr double of_pitch = 0.25;
+  constexpr double alike = 0.1;  // a quarter of the pitch is 0.475 mm for DigiTacts
+  const double usual_mm = InverseSensorModel{}.spread_mm;
+  const double spread_mm = pitch_mm ? of_pitch * *pitch_mm : usual_mm;
+  return std::abs(spread_mm - usual_mm) <= alike * usual_mm ? usual_mm : spread_mm;
+}
+
+double usual_spread_mm(std::span<const Recording> recordings) {
+  std::optional<double> finest_mm;
+  for (const Recording& recording : recordings) {
+    const std::span<const glm::dvec2> all = recording.elements_mm;
+    const std::size_t elements = recording.elements();
+    for (std::size_t first = 0; elements > 0 && first < all.size(); first += elements) {
+      if (const auto pitch_mm = pitch_of(all.subspan(first, elements))) {
+        finest_mm = std::min(finest_mm.value_or(*pitch_mm), *pitch_mm);
+      }
+    }
+  }
+  return usual_spread_mm(finest_mm);
 }
 
 }  // namespace palpate

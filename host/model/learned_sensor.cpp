@@ -173,9 +173,6 @@ void LearnedSensor::validate() const {
   if (!(prior >= least_prior && prior <= 1.0 - least_prior)) {
     refuse("prior", prior, "give a probability from 1e-6 to 1 - 1e-6");
   }
-  if (psf_mm && !is_positive(*psf_mm)) {
-    refuse("psf_mm", *psf_mm, "give a positive number");
-  }
   if (!(spread_mm >= least_length_mm && spread_mm <= most_length_mm)) {
     refuse("spread_mm", spread_mm, "give a length from 1e-6 to 1e6");
   }

@@ -11,6 +11,7 @@
 #include "bindings.hpp"
 #include "learning/calibration_task.hpp"
 #include "learning/setup_check.hpp"
+#include "model/element_spacing.hpp"
 #include "model/option_words.hpp"
 #include "recognition/recordings.hpp"
 #include "request.hpp"
@@ -32,10 +33,11 @@ SensorCalibration calibrate(const GivenRecordings& given, PythonRequest request,
 }
 
 SetupCheck check(const GivenRecordings& given, const PythonRequest& request, double cell_mm,
-                 double psf_mm, Call& call) {
+                 std::optional<double> spread_mm, Call& call) {
   const std::vector<Recording> recordings = read_recordings(given);
   const Recording& first = recordings.front();
-  MapOptions options{.cell_mm = cell_mm, .sensor = {.spread_mm = psf_mm / 2.0}};
+  MapOptions options{.cell_mm = cell_mm,
+                     .sensor = {.spread_mm = spread_mm ? *spread_mm : usual_spread_mm(recordings)}};
   options.classifier =
       make_classifier(first.pressure_unit, first.path, request.threshold, request.ratio);
   const auto used = session_on(request.session, request.device);
@@ -57,8 +59,6 @@ void bind_learned_sensor(nb::module_& module) {
       .def_ro("classifier", &LearnedSensor::classifier, "Contact threshold and ratio (Eq. 3).")
       .def_ro("gamma", &LearnedSensor::gamma, "Of Eq. 7.")
       .def_ro("prior", &LearnedSensor::prior, "Of new maps.")
-      .def_ro("psf_mm", &LearnedSensor::psf_mm,
-              "Standard deviation of the point spread, mm; None for presses at unknown poses.")
       .def_ro("spread_mm", &LearnedSensor::spread_mm, "Of new maps.")
       .def_ro("touch_sd", &LearnedSensor::touch_sd,
               "How far touches lie from their poses; 0 where that cannot be told.")
@@ -146,13 +146,13 @@ void bind_setup_check(nb::module_& module) {
       .def_ro("touches", &SetupCheck::touches, "How many touches were in contact.");
   module.def(
       "check_setup",
-      [](nb::handle recordings, const PythonRequest& request, double cell_mm, double psf_mm,
-         const Progress& progress) {
+      [](nb::handle recordings, const PythonRequest& request, double cell_mm,
+         std::optional<double> spread_mm, const Progress& progress) {
         return run({}, progress, [=, given = given_recordings(recordings)](Call& call) {
-          return check(given, request, cell_mm, psf_mm, call);
+          return check(given, request, cell_mm, spread_mm, call);
         });
       },
-      "recordings"_a, "request"_a, "cell_mm"_a, "psf_mm"_a, "progress"_a = nb::none(),
+      "recordings"_a, "request"_a, "cell_mm"_a, "spread_mm"_a, "progress"_a = nb::none(),
       "What the touches say; of the request count the classifier and the device.");
 }
 

@@ -162,22 +162,27 @@ def check_setup(
     threshold: float | None = None,
     ratio: float | None = None,
     cell_mm: float = 0.5,
-    psf_mm: float = 1.0,
+    spread_mm: float | None = None,
     device: Device | str | int | None = None,
     progress: Callable[[float], object] | None = None,
+    **former: object,
 ) -> SetupCheck:
     """Asks touches which set-up explains them best, as `palpate check` does.
 
     recordings: of touches at known poses, of one array and of objects that stay in place: some 60 of
     each, at several angles of the sensor. Tried are the order of the elements, where the array sits in
     the tool, its pitch and units of the poses; elements that are dead and touches that contradict the
-    others are found. threshold, in the recordings' pressure unit, ratio, cell_mm and psf_mm are those
-    of the maps.
+    others are found. threshold, in the recordings' pressure unit, ratio, cell_mm and spread_mm are those
+    of the maps; the spread is by default a quarter of the distance of neighbouring elements, 0.5 mm for
+    one element and DigiTacts.
 
     Raises Error where an object has fewer than four touches in contact, or the arrays differ.
     """
+    for name in former:
+        instead = "; give spread_mm, half of it" if name == "psf_mm" else ""
+        raise TypeError(f"check_setup() got an unexpected keyword argument '{name}'{instead}")
     given = {"threshold": threshold, "ratio": ratio, "device": device}
-    return _palpate.check_setup(recordings, request_of(given, ()), cell_mm, psf_mm, progress)
+    return _palpate.check_setup(recordings, request_of(given, ()), cell_mm, spread_mm, progress)
 
 
 def evaluate(

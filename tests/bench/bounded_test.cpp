@@ -112,23 +112,6 @@ TEST(Bounded, TakesMemoryThatIsMeasured) {
   }
 }
 
-TEST(Bounded, GrowsWithTheBins) {
-  const ScratchFolder folder;
-  const auto document = quick_run(folder, "growth");
-  expect_sound_cases(document);
-  const auto& growth = document.at("growth");
-  ASSERT_EQ(growth.size(), 4U);
-  for (std::size_t i = 0; i < growth.size(); ++i) {
-    EXPECT_LE(growth[i].at("dropped_mass"), 1e-6);
-    EXPECT_GT(growth[i].at("bounded").at("median"), 0.0);
-    EXPECT_LE(growth[i]["bounded"].at("least"), growth[i]["bounded"].at("median"));
-    EXPECT_LE(growth[i]["bounded"]["median"], growth[i]["bounded"].at("most"));
-    if (i > 0) {
-      EXPECT_GT(growth[i].at("bins_in_all"), growth[i - 1].at("bins_in_all"));
-    }
-  }
-}
-
 TEST(Bounded, RefusesWhatCannotBe) {
   EXPECT_EQ(run_bench("bounded --part nonsense 2>/dev/null"), 2);
 }

@@ -1,6 +1,5 @@
 """The other programs with small settings: their documents are whole, and keep what must hold."""
 
-import json
 import os
 import pathlib
 import subprocess
@@ -18,10 +17,7 @@ from bench.trials import make_trials, truth_of
 @pytest.fixture(scope="module")
 def accuracy(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
     # Takes some twenty seconds of a processor, most to learn from letters and for uncertain touches.
-    scenarios = [
-        word for name in ("other-gains", "misplaced-2mm", "fit", "strangers", "planned")
-        for word in ("--scenario", name)
-    ]  # fmt: skip
+    scenarios = ("other-gains", "misplaced-2mm", "fit", "strangers", "planned")
     command = ("--palpate", os.environ["PALPATE_COMMAND"])
     folder = tmp_path_factory.mktemp("accuracy")
     rows: list[dict[str, Any]] = Program(folder, "bench.accuracy", "--quick", *scenarios, *command).document[
@@ -84,14 +80,10 @@ def test_a_walk_keeps_touches_where_they_are_on_the_object() -> None:
 @pytest.fixture(scope="module")
 def bounded(tmp_path_factory: pytest.TempPathFactory, device: palpate.Device) -> Program:
     # Takes some eight seconds of a processor, half of them for the letters' maps.
-    folder, times = tmp_path_factory.mktemp("bounded"), {}
-    for part in ("growth", "search"):
-        file = folder / f"{part}.json"
-        flags = ["--quick", "--part", part, "--json", str(file), "--device", device.name]
-        subprocess.run([os.environ["PALPATE_BENCH"], "bounded", *flags], check=True, timeout=300)
-        times[part] = json.loads(file.read_text())[part]
+    folder = tmp_path_factory.mktemp("bounded")
     file = folder / "times.json"
-    file.write_text(json.dumps(times))
+    flags = ["--quick", "--part", "search", "--json", str(file), "--device", device.name]
+    subprocess.run([os.environ["PALPATE_BENCH"], "bounded", *flags], check=True, timeout=300)
     return Program(folder, "bench.bounded", "--quick", "--plots", folder / "plots", "--times", file)
 
 
@@ -106,12 +98,11 @@ def test_certificates_hold(bounded: Program, tmp_path: pathlib.Path) -> None:
     assert missing.returncode == 2 and "holds no recording" in missing.stderr
 
 
-def test_times_become_charts(bounded: Program) -> None:
+def test_search_becomes_a_picture(bounded: Program, tmp_path: pathlib.Path) -> None:
     plots = bounded.folder / "plots"
-    bounded.expect_charts("bounded_growth")
     assert (plots / "bounded_search.png").stat().st_size > 10_000
-    drawn = ("--quick", "--plots", plots, "--times", bounded.folder / "growth.json")
-    partial = run("bench.bounded", *drawn)
+    (tmp_path / "mode.json").write_text('{"mode": []}')
+    partial = run("bench.bounded", "--plots", plots, "--times", tmp_path / "mode.json")
     assert partial.returncode == 2 and "holds no search" in partial.stderr
 
 

@@ -66,7 +66,6 @@ INSTANTIATE_TEST_SUITE_P(
         Flag{"simulate", "object-pose", {"x", "1,2", "1,2,3,4", "1,2,x", "1,2,nan", "1;2;3"}},
         Flag{"simulate", "touches", {"x", "0", "-1", "193", "1.5"}},
         Flag{"map", "cell-mm", {"x", "1x", "nan", "inf", "0", "-1"}},
-        Flag{"map", "psf-mm", {"x", "1x", "nan", "inf", "0", "-1"}},
         Flag{"map", "spread-mm", {"x", "1x", "nan", "inf", "0", "-1"}},
         Flag{"map", "touch-sd-mm", {"x", "nan", "inf", "-1"}},
         Flag{"map", "touch-sd-deg", {"x", "nan", "-1", "181"}},

@@ -31,7 +31,6 @@ class CalibrateCommand : public ProgramTest {
     flags.insert(flags.begin(), {"calibrate", "A.h5", "U.h5", "-o", "s.yaml"});
     return flags;
   }
-  /// By so few touches that they tell no point spread, whose search takes long, and are said to be.
   LearnedSensor learned_of_16(const Arguments& flags) const {
     const Outcome outcome = palpate(with(flags));
     EXPECT_EQ(outcome.status, 0) << outcome.err;
@@ -54,12 +53,12 @@ TEST_F(CalibrateCommand, WritesASensorModelAndSaysWhatItLearned) {
   EXPECT_EQ(sensor.table->levels(), 7U);
   EXPECT_EQ(sensor.table->layer.of, MapLayer::mean_level);
   EXPECT_TRUE(sensor.table->objects.contains("A") && sensor.table->objects.contains("U"));
-  EXPECT_TRUE(sensor.psf_mm && sensor.familiarity && sensor.bins);
+  EXPECT_TRUE(sensor.familiarity && sensor.bins);
   EXPECT_THAT(out, HasSubstr("48 touches, 2 objects"));
   for (const auto& [name, value] :
        std::map<std::string, double>{{"noise floor, kPa", sensor.noise},
                                      {"contact threshold, kPa", sensor.classifier.threshold},
-                                     {"point spread, mm", *sensor.psf_mm},
+                                     {"spread of maps, mm", sensor.spread_mm},
                                      {"temperature", sensor.temperature}}) {
     const std::size_t row = out.find(name);
     ASSERT_NE(row, out.npos) << name << " not in\n" << out;
@@ -138,10 +137,9 @@ TEST_F(CalibrateCommand, RefusesBinsThatSayNothing) {
   expect_refused(with({"--unposed", "--pivot-mm", "auto"}), {"known poses"});
 }
 
-TEST_F(CalibrateCommand, AtUnknownPosesLearnsNoPointSpread) {
-  const std::string out = done(with({"--unposed", "--frames", "0:12"}));
-  EXPECT_THAT(out, Not(HasSubstr("point spread")));
-  EXPECT_FALSE(read_sensor_model(folder_ / "s.yaml").psf_mm.has_value());
+TEST_F(CalibrateCommand, TakesTouchesAtUnknownPoses) {
+  done(with({"--unposed", "--frames", "0:12"}));
+  EXPECT_FALSE(read_sensor_model(folder_ / "s.yaml").bins.has_value());
   write_unposed("still.h5");
   done({"calibrate", "still.h5", "U.h5", "--unposed", "-o", "s.yaml"});
 }

@@ -51,19 +51,19 @@ TEST_P(FullDiskOutput, LeavesNoPartAndAnOlderFileIntact) {
 
 INSTANTIATE_TEST_SUITE_P(
     All, FullDiskOutput,
-    testing::Values(
-        Output{"recording", {"simulate", "A", "-o", "new.h5"}, "new.h5"},
-        Output{"map", {"map", "A.h5", "--spread-mm=0.5", "-o", "new.map.h5"}, "new.map.h5"},
-        Output{"map_in_folder", {"map", "A.h5", "--spread-mm=0.5", "-o", "maps/"}, "maps/A.map.h5"},
-        Output{"json",
-               {"recognize", "u.h5", "--maps", "A.map.h5", "--trace", "--json", "r.json"},
-               "r.json"},
-        Output{"posterior",
-               {"recognize", "u.h5", "--maps", "A.map.h5", "--posterior", "p.h5"},
-               "p.h5"},
-        Output{"sheet",
-               {"recognize", "u.h5", "--maps", "A.map.h5", "--png", "sheets"},
-               "sheets/u.png"}),
+    testing::Values(Output{"recording", {"simulate", "A", "-o", "new.h5"}, "new.h5"},
+                    Output{"map", {"map", "A.h5", "-o", "new.map.h5"}, "new.map.h5"},
+                    Output{"map_in_folder", {"map", "A.h5", "-o", "maps/"}, "maps/A.map.h5"},
+                    Output{
+                        "json",
+                        {"recognize", "u.h5", "--maps", "A.map.h5", "--trace", "--json", "r.json"},
+                        "r.json"},
+                    Output{"posterior",
+                           {"recognize", "u.h5", "--maps", "A.map.h5", "--posterior", "p.h5"},
+                           "p.h5"},
+                    Output{"sheet",
+                           {"recognize", "u.h5", "--maps", "A.map.h5", "--png", "sheets"},
+                           "sheets/u.png"}),
     [](const auto& test) { return std::string(test.param.name); });
 
 TEST_F(FullDisk, StandardOutputThatCannotBeWrittenIsAFailure) {

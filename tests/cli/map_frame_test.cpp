@@ -44,8 +44,7 @@ class MapFrame : public ProgramTest {
   }
 
   OccupancyGrid map_with(const std::string& recording, std::vector<std::string> flags) const {
-    // A spread that is given need not be chosen.
-    flags.insert(flags.begin(), {"map", recording, "-o", "one.map.h5", "--spread-mm", "0.5"});
+    flags.insert(flags.begin(), {"map", recording, "-o", "one.map.h5"});
     out_ = done(flags);
     return read_map(folder_ / "one.map.h5");
   }
@@ -139,9 +138,9 @@ TEST_F(MapFrame, SymmetryIsOfEveryObjectOrOfSome) {
 }
 
 TEST_F(MapFrame, MapsOfDifferentDaysAreRecognisedAsIfLearnedTogether) {
-  done({"map", "A.h5", "-o", "maps/", "--sensor-model", "none", "--spread-mm", "0.5"});
+  done({"map", "A.h5", "-o", "maps/", "--sensor-model", "none"});
   done({"map", "I.h5", "-o", "maps/", "--sensor-model", "none"});
-  done({"map", "A.h5", "I.h5", "-o", "together/", "--sensor-model", "none", "--spread-mm", "0.5"});
+  done({"map", "A.h5", "I.h5", "-o", "together/", "--sensor-model", "none"});
   ASSERT_NE(read_map(folder_ / "maps/A.map.h5").prior, read_map(folder_ / "maps/I.map.h5").prior);
   const Outcome outcome = palpate({"recognize", "uA.h5", "--maps", "maps", "--json", "-"});
   EXPECT_EQ(outcome.status, 0) << outcome.err;

@@ -75,30 +75,18 @@ TEST_F(MapCommand, SaysAndStoresTheSymmetryThatTheMapsShow) {
   EXPECT_FALSE(read_map(folder_ / "I.map.h5").suggested_symmetry) << "not to be taken";
 }
 
-TEST_F(MapCommand, SaysWhichSpreadItTook) {
-  const std::string given = done({"map", "A.h5", "-o", "maps/", "--spread-mm", "0.8"});
-  EXPECT_EQ(given.find("spread"), std::string::npos) << given;
-  const std::string joined = done({"map", "I.h5", "-o", "maps/", "--sensor-model", "none"});
-  EXPECT_NE(joined.find("spread 0.8 mm, as the other maps of maps/ have it\n"), std::string::npos)
-      << joined;
-  EXPECT_EQ(read_map(folder_ / "maps/I.map.h5").spread_mm, 0.8);
-  const std::string anew = done({"map", "A.h5", "I.h5", "-o", "maps/", "--sensor-model", "none"});
-  EXPECT_NE(anew.find("spread 0.5 mm: no other predicts left-out touches"), std::string::npos)
-      << "all are written anew: " << anew;
-}
-
-TEST_F(MapCommand, ChoosesTheSpreadOfAFineArray) {
-  for (const char* letter : {"A", "U"}) {
-    Simulator simulator(make_shape(letter), {.psf_mm = 0.3, .element_mm = 0.95},
-                        grid_array(16, 16, 1.0), 4);
-    write_recording(folder_ / (std::string("fine.") + letter + ".h5"),
-                    simulator.touch(random_poses(40, 7), {}));
-  }
-  const std::string out =
-      done({"map", "fine.A.h5", "fine.U.h5", "-o", "fine/", "--sensor-model", "none"});
-  EXPECT_NE(out.find("nats each more likely than with 0.5 mm"), std::string::npos) << out;
-  EXPECT_LT(*read_map(folder_ / "fine/A.map.h5").spread_mm, 0.4);
-  EXPECT_LT(*read_map(folder_ / "fine/U.map.h5").spread_mm, 0.4) << "one spread for all";
+TEST_F(MapCommand, SpreadIsAQuarterOfThePitch) {
+  const auto spread_of = [&](const std::vector<glm::dvec2>& elements_mm, const Arguments& flags) {
+    write_recording(folder_ / "A.h5",
+                    Simulator(make_shape("A"), {}, elements_mm, 4).touch(random_poses(12, 7), {}));
+    return map_of_a(flags).spread_mm.value();
+  };
+  EXPECT_EQ(spread_of(grid_array(10, 10, 1.0), {}), 0.25);
+  EXPECT_NEAR(spread_of(grid_array(4, 4, 4.8), {}), 1.2, 1e-12);
+  EXPECT_EQ(spread_of(grid_array(4, 4, 4.8), {"--spread-mm", "0.7"}), 0.7);
+  EXPECT_EQ(spread_of(grid_array(6, 6, 2.0), {}), 0.5);
+  EXPECT_EQ(spread_of(digitacts_array(), {}), 0.5) << "as of 2 mm";
+  EXPECT_EQ(spread_of(grid_array(1, 1, 1.0), {}), 0.5) << "no pitch";
 }
 
 TEST_F(MapCommand, AlignsTouchesOfAnUncertainRobot) {
@@ -135,9 +123,9 @@ TEST_F(MapCommand, FileSaysWhatItIs) {
 TEST_F(MapCommand, DefaultsAreTheDocumentedOnes) {
   map_of_a({});
   const std::string bare = bytes_of(folder_ / "A.map.h5");
-  map_of_a({"--cell-mm", "0.5",     "--psf-mm", "1.0",         "--spread-mm", "0.5",     "--peak",
-            "0.9",       "--prior", "auto",     "--threshold", "2",           "--ratio", "0.3",
-            "--frames",  "0:48",    "--origin", "auto",        "--label",     "A"});
+  map_of_a({"--cell-mm", "0.5", "--spread-mm", "0.5", "--peak", "0.9", "--prior", "auto",
+            "--threshold", "2", "--ratio", "0.3", "--frames", "0:48", "--origin", "auto", "--label",
+            "A"});
   EXPECT_TRUE(bytes_of(folder_ / "A.map.h5") == bare) << "the same input gives the same file";
 }
 
@@ -150,18 +138,12 @@ TEST_F(MapCommand, FlagsAreStoredInTheMap) {
   EXPECT_EQ(map.label, "other name");
 }
 
-// What --spread-mm, --psf-mm, --threshold and --frames do is in tests of their own.
+// What --spread-mm, --threshold and --frames do is in tests of their own.
 TEST_F(MapCommand, FlagsOfTheModelMatter) {
   const OccupancyGrid usual = map_of_a({"--prior", "0.2"});
   for (const auto& [flag, value] : {std::pair{"--peak", "0.5"}, {"--ratio", "0.6"}}) {
     EXPECT_NE(map_of_a({"--prior", "0.2", flag, value}).log_odds, usual.log_odds) << flag;
   }
-}
-
-TEST_F(MapCommand, SpreadIsHalfThePointSpread) {
-  const OccupancyGrid by_psf = map_of_a({"--psf-mm", "1.6"});
-  EXPECT_EQ(by_psf.spread_mm, 0.8) << "the map says so";
-  EXPECT_EQ(map_of_a({"--spread-mm", "0.8", "--psf-mm", "5"}).log_odds, by_psf.log_odds);
 }
 
 TEST_F(MapCommand, FramesAreHalfOpen) {
@@ -222,7 +204,7 @@ TEST_F(MapCommand, ReplacesAnOlderFile) {
 }
 
 TEST_F(MapCommand, RefusesLengthsThatNoMapCanHave) {
-  for (const char* flag : {"--cell-mm", "--psf-mm", "--spread-mm"}) {
+  for (const char* flag : {"--cell-mm", "--spread-mm"}) {
     for (const char* value : {"1e+200", "1e-200", "1e-07", "2000000"}) {
       expect_refused({"map", "A.h5", "-o", "new/", flag, value}, {flag, value, "1e-06 to 1e+06"});
     }

@@ -131,8 +131,8 @@ TEST_F(MapWithSensorModel, TakesItsNumbersAsDefaults) {
 }
 
 TEST_F(MapWithSensorModel, FlagsComeFirst) {
-  const OccupancyGrid map =
-      map_with({"--sensor-model", "sensor.yaml", "--prior", "0.3", "--psf-mm", "1.4", "--mirror"});
+  const OccupancyGrid map = map_with(
+      {"--sensor-model", "sensor.yaml", "--prior", "0.3", "--spread-mm", "0.7", "--mirror"});
   EXPECT_EQ(map.prior, 0.3);
   EXPECT_EQ(map.spread_mm, 0.7);
   EXPECT_TRUE(map.mirror);

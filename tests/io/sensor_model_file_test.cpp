@@ -12,7 +12,6 @@ LearnedSensor full_sensor() {
       .classifier = {.threshold = 15.0, .ratio = 0.15},
       .gamma = 0.2,
       .prior = 0.1,
-      .psf_mm = 1.25,
       .spread_mm = 1.14,
       .touch_sd = {.mm = 0.5, .rad = 0.0625},
       .table = LearnedTable{},
@@ -74,7 +73,6 @@ TEST_F(SensorModelFile, ComesBackAsItWasWritten) {
   EXPECT_EQ(read.classifier.ratio, written.classifier.ratio);
   EXPECT_EQ(read.gamma, written.gamma);
   EXPECT_EQ(read.prior, written.prior);
-  EXPECT_EQ(read.psf_mm, written.psf_mm);
   EXPECT_EQ(read.spread_mm, written.spread_mm);
   EXPECT_EQ(read.touch_sd.mm, written.touch_sd.mm);
   EXPECT_EQ(read.touch_sd.rad, written.touch_sd.rad);
@@ -116,7 +114,7 @@ TEST_F(SensorModelFile, ComesBackAsItWasWritten) {
 }
 
 TEST_F(SensorModelFile, MayHoldLittle) {
-  put_bytes(path_, "format: palpate.sensor_model\nthreshold: 3\n");
+  put_bytes(path_, "format: palpate.sensor_model\nthreshold: 3\npsf_mm: 1.2\n");
   const LearnedSensor read = read_sensor_model(path_);
   EXPECT_EQ(read.classifier.threshold, 3.0);
   EXPECT_EQ(read.temperature, 1.0);

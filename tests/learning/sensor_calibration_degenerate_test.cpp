@@ -16,7 +16,7 @@ namespace palpate::sensor_calibration_degenerate_test {
 
 constexpr std::size_t elements = 36;
 
-/// Touches of two letters: half of them are too few for the point spread, whose search takes long.
+/// Touches of two letters.
 LetterPresses two_letters(int touches = 16) {
   LetterPresses letters;
   letters.add("A", touches, 61);

@@ -120,9 +120,7 @@ TEST(SensorCalibration, OfLettersAtKnownPosesLearnsTheirSensor) {
   // Elements of the simulator are nearly independent. Bins an element apart would blame the table
   // for poses between them.
   EXPECT_LT(found.sensor.temperature, 2.5);
-  ASSERT_TRUE(found.sensor.psf_mm.has_value());
-  EXPECT_NEAR(*found.sensor.psf_mm, 1.0, 0.1);
-  EXPECT_EQ(found.sensor.spread_mm, *found.sensor.psf_mm / 2.0);
+  EXPECT_EQ(found.sensor.spread_mm, 0.5);
   // Three touches of a letter fit the other two as badly as those of other strangers.
   EXPECT_NEAR(found.sensor.fit_scale->stranger_sd.value(), 4.0, 2.0);
   ASSERT_TRUE(found.sensor.fit_scale->alone);
@@ -130,7 +128,7 @@ TEST(SensorCalibration, OfLettersAtKnownPosesLearnsTheirSensor) {
   EXPECT_LT(found.sensor.fit_scale->alone->sd, 0.95 * found.sensor.fit_scale->sd);
 }
 
-TEST(SensorCalibration, OfLettersAtUnknownPosesLearnsAllButThePointSpread) {
+TEST(SensorCalibration, OfLettersAtUnknownPosesIsComplete) {
   LetterPresses letters = three_letters(10, 5);
   letters.make_presses(false);
   const SensorCalibration found = calibrate_sensor(letters.presses, {}, {});
@@ -139,7 +137,6 @@ TEST(SensorCalibration, OfLettersAtUnknownPosesLearnsAllButThePointSpread) {
   EXPECT_FALSE(found.groups || found.sensor.bins || found.sensor.fit_scale->stranger_sd ||
                found.sensor.fit_scale->alone);
   EXPECT_EQ(found.sensor.temperature_growth, 0.0);
-  EXPECT_FALSE(found.sensor.psf_mm.has_value());
   EXPECT_NEAR(found.sensor.spread_mm, 0.6 * 1.9, 0.1) << "of the spacing";
 }
 

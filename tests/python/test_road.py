@@ -88,10 +88,9 @@ def test_from_bags_to_poses(device: palpate.Device, tmp_path: pathlib.Path) -> N
         recording_of(tmp_path / letter, touched(letter, 48, k + 1, (0, 0, 0)), letter)
         for k, letter in enumerate("AEUK4B")
     ]
-    flags = ("--threshold", 200, "--psf-mm", 1)
-    assert json.loads(command("check", *learned, *flags[:2], "--json", "-")) == []
+    assert json.loads(command("check", *learned, "--threshold", 200, "--json", "-")) == []
     maps = tmp_path / "maps"
-    command("map", *learned, "-o", f"{maps}/", *flags)
+    command("map", *learned, "-o", f"{maps}/", "--threshold", 200)
     for k, letter in enumerate("EKO"):
         moved = (12.0 - 5 * k, -9.0 + 3 * k, 0.5 - k)
         # The middle of the moved object: turned about the robot's base, as the letter's frame is.

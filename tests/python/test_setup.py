@@ -37,6 +37,8 @@ def test_a_wrong_order_is_found_as_the_command_finds_it(
     assert numpy.array_equal(array, check.elements_mm)
     with pytest.raises(palpate.Error, match="four or more of every object"):
         palpate.check_setup(sound[:3], device=device)
+    with pytest.raises(TypeError, match="'psf_mm'; give spread_mm, half of it"):
+        palpate.check_setup(files, psf_mm=1.0)
 
 
 def test_frames_of_objects(device: palpate.Device) -> None:

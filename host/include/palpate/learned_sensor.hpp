@@ -109,7 +109,6 @@ struct PALPATE_API LearnedSensor {
   ContactClassifier classifier;
   double gamma = 0.1;                 ///< of Eq. 7
   double prior = 0.2;                 ///< of new maps
-  std::optional<double> psf_mm;       ///< standard deviation of the point spread
   double spread_mm = 0.5;             ///< of new maps
   DisplacementSd touch_sd;            ///< of the touches' poses
   std::optional<LearnedTable> table;  ///< in the place of Eq. 7
