@@ -79,7 +79,7 @@ def learn(
 ) -> tuple[Any, dict[str, palpate.OccupancyGrid]]:  # fmt: skip
     """What recognize() takes as maps, and the maps by label.
 
-    By `palpate map` where an engine takes the sensor that it learns; without one, the maps are the same.
+    By `palpate map` where an engine takes the sensor that it learns, else by letter_maps(), with equal cells.
     """
     if not scenario.learns:
         maps = letter_maps(device, recordings)
