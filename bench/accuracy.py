@@ -10,7 +10,7 @@ from typing import Any
 import numpy
 
 import palpate
-from palpate._statistics import present
+from palpate._statistics import present, quantile
 from palpate._tables import Column, Table, column, number, plain
 
 from .measures import (
@@ -21,7 +21,7 @@ from .measures import (
     told_apart,
     with_interval,
 )
-from .program import Json, begin, main, parser, run_palpate, write
+from .program import Json, at_least_1, begin, main, parser, run_palpate, write
 from .scenarios import PLANNED, SCENARIOS, Scenario, learned_touches, slipping, trials_of
 from .trials import VOWELS, Bins, Body, Floats, lattice_of, letter_maps, truth_of
 
@@ -33,12 +33,7 @@ NEAR_MM = 0.5  # the error that decisions allow by default
 Scores = list[list[Json]]  # [unknown][touch]
 
 _PERCENT, _ERROR = with_interval(".1f", 100.0), number(".3f")
-ROW: list[Column] = [
-    ("scenario", "scenario", plain),
-    ("engine", "engine", plain),
-    ("touches", "touches", plain),
-    ("unknowns", "unknowns", plain),
-]
+FACTS = ("scenario", "engine", "touches", "unknowns", "strangers")
 #: By group: what is told of the unknowns that were learned, but where columns say otherwise.
 COLUMNS: dict[str, list[Column]] = {
     "identity": [
@@ -66,6 +61,7 @@ COLUMNS: dict[str, list[Column]] = {
         ("standard deviation", "sd_z", number(".2f")),
         ("fit, %", "fits", _PERCENT),
         ("do not fit, %", "unfit", _PERCENT),
+        ("strangers that fit, %", "strangers_fit", _PERCENT),
         ("told from strangers by z, %", "told_apart_by_z", _PERCENT),
     ],
     "strangers": [("strangers that do not fit, %", "strangers_unfit", _PERCENT)],
@@ -83,7 +79,7 @@ def learn(
 ) -> tuple[Any, dict[str, palpate.OccupancyGrid]]:  # fmt: skip
     """What recognize() takes as maps, and the maps by label.
 
-    By `palpate map` where an engine takes the sensor that it learns; without one, the maps are the same.
+    By `palpate map` where an engine takes the sensor that it learns, else by letter_maps(), with equal cells.
     """
     if not scenario.learns:
         maps = letter_maps(device, recordings)
@@ -94,7 +90,8 @@ def learn(
     run_palpate(command, "map", *files, "-o", f"{folder}/maps/")
     grids = [palpate.read_map(path) for path in pathlib.Path(folder, "maps").glob("*.map.h5")]
     for grid in grids:
-        grid.symmetry = grid.suggested_symmetry or grid.symmetry
+        if grid.suggested_symmetry is not None:  # errors are from the nearest of poses that look alike
+            grid.symmetry = grid.suggested_symmetry
     return f"{folder}/maps", {grid.label: grid for grid in grids}
 
 
@@ -196,7 +193,7 @@ def row_of(
         return bootstrap_record(of, over) if len(of) else None
 
     def median(of: Floats) -> float | None:
-        return float(numpy.median(of)) if len(of) else None
+        return quantile(of, 0.5) if len(of) else None
 
     refined, first_mm = values(known, "refined_mm"), values(first, "refined_mm")
     both = ~numpy.isnan(refined + first_mm)
@@ -224,7 +221,7 @@ def row_of(
     }
     if strangers:
         row |= {
-            "strangers": len(strangers),
+            "strangers_fit": share(values(strangers, "fits")),
             "strangers_unfit": share(values(strangers, "unfit")),
             "strangers_called_none": share(values(strangers, "none")),
             "told_apart_by_z": told_apart(present(values(strangers, "z")), present(z)),
@@ -250,23 +247,28 @@ def program() -> None:
         + "; ".join(f"{name}: {of.about}" for name, of in SCENARIOS.items())
         + ". All of them take some two hours on two CPU cores, most a few minutes each. Intervals are of "
         "95 %: Wilson's of shares, by bootstrap over unknowns of means.",
-        trials="unknowns of each object, and strangers [each scenario's own, or 1 with --quick]",
+        trials="unknowns of each object, and strangers [each scenario's own]",
     )
     flags.add_argument(
         "scenarios", nargs="*", type=scenario_name, metavar="SCENARIO", help="measure only this or these [all]"
     )
     flags.add_argument(
-        "--sets", type=int, default=1, help="training sets, each with unknowns of its own [%(default)s]"
-    )
+        "--sets", type=at_least_1, default=1, metavar="N",
+        help="training sets, each with unknowns of its own [%(default)s]",
+    )  # fmt: skip
     flags.add_argument("--palpate", default="build/palpate", help="the command [%(default)s]")
     options = flags.parse_args()
     device, facts = begin(options)
     chosen = {name: of for name, of in SCENARIOS.items() if name in (options.scenarios or SCENARIOS)}
     groups = {group for scenario in chosen.values() for group in scenario.columns}
-    table = Table([*ROW, *(column for group in COLUMNS if group in groups for column in COLUMNS[group])])
+    shown: list[Column] = [(fact, fact, plain) for fact in FACTS]
+    for group, columns in COLUMNS.items():
+        shown += columns if group in groups else []
+    table = Table(shown)
     for name, scenario in chosen.items():
-        each = options.trials or (1 if options.quick else scenario.each)
-        each_stranger = options.trials or (1 if options.quick else scenario.each_stranger)
+        scenario = scenario.quick() if options.quick else scenario
+        each = options.trials or scenario.each
+        each_stranger = options.trials or scenario.each_stranger
         scores: dict[str, tuple[Scores, Scores]] = {engine: ([], []) for engine in scenario.engines}
         for i in range(options.sets):
             with tempfile.TemporaryDirectory() as folder:
@@ -282,7 +284,9 @@ def program() -> None:
         for after in scenario.after:
             for engine, (known, strangers) in scores.items():
                 row = row_of(known, strangers, first, after, scenario.within_mm)
-                table.append({"scenario": name, "engine": engine} | row)
+                fields = [field for group in scenario.columns for _, field, _ in COLUMNS[group]]
+                row |= {"scenario": name, "engine": engine, "strangers": len(strangers)}
+                table.append({field: row[field] for field in (*FACTS, *fields) if field in row})
     write(options.json, facts | {"accuracy": table})
 
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy
@@ -67,6 +67,22 @@ class Scenario:
         """Whether an engine takes the sensor that `palpate map` learns."""
         return any("sensor_model" not in self.options | of for of in self.engines.values())
 
+    def quick(self) -> "Scenario":
+        """One unknown of each object, at most five touches of it, and half as many bins along each axis."""
+
+        def wider(options: Json) -> Json:
+            bins = options.get("bins")
+            return options | {"bins": tuple(n // 2 for n in bins)} if isinstance(bins, tuple) else options
+
+        return replace(
+            self,
+            each=1,
+            each_stranger=1,
+            after=tuple(of for of in self.after if isinstance(of, int) and of <= 5) or ((1, 5),),
+            engines={name: wider(options) for name, options in self.engines.items()},
+            options=wider(self.options),
+        )
+
 
 EQ7: Json = {"sensor_model": "none"}
 MODELS: dict[str, Json] = {"Eq. 7": EQ7, "learned": {}}
@@ -74,7 +90,7 @@ NO_NONE: Json = {"none": 0.0}
 EVEN_NONE: Json = {"none": float(len(VOWELS))}  # as likely before the first touch as all letters together
 
 _GAINS: Any = dict(
-    columns=("identity", "regions"), learned=("A", "E", "U"), own_gains=True, seed=400_000_000, each=34,
+    columns=("identity", "pose", "regions"), learned=("A", "E", "U"), own_gains=True, seed=400_000_000, each=34,
     options=NO_NONE,
 )  # fmt: skip
 _DEFAULTS: Any = dict(

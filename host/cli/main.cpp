@@ -8,6 +8,7 @@
 #include <span>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 
 #include <fmt/format.h>
 #include <fontconfig/fontconfig.h>
@@ -16,8 +17,8 @@
 #include "cli/commands.hpp"
 #include "cli/former_flags.hpp"
 #include "cli/help.hpp"
+#include "cli/supervisor.hpp"
 #include "io/descriptor.hpp"
-#include "io/hdf5_process.hpp"
 #include "model/option_words.hpp"
 #include "palpate/error.hpp"
 
@@ -83,6 +84,12 @@ void refuse_empty_values(CLI::App& app) {
       });
     }
   }
+}
+
+/// A batch has a record for a file that cannot be read, and a page of files stays.
+palpate::cli::Restart restart_of(std::string_view command) {
+  return command == "batch" || command == "view" ? palpate::cli::Restart::without_the_file
+                                                 : palpate::cli::Restart::never;
 }
 
 int run(int argc, char** argv) {
@@ -151,9 +158,9 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   palpate::open_closed_streams();
-  palpate::read_hdf5_in_children(true);
-  use_bundled_fonts();
   try {
+    palpate::cli::supervise(restart_of(argc > 1 ? argv[1] : ""));
+    use_bundled_fonts();
     return run(argc, argv);
   } catch (const palpate::Error& error) {
     return complain(error.fault() == palpate::Fault::input ? wrong_input : failed, error.what());

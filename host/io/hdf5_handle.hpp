@@ -9,15 +9,8 @@
 
 namespace palpate {
 
-/// Locked for every use of HDF5 in this process and while a child that uses HDF5 is forked: the
-/// child must not inherit the library in the middle of another thread's call.
+/// Locked for every use of HDF5 in this process.
 inline std::mutex hdf5_mutex;
-
-/// Initialises HDF5, which takes a millisecond, so that no child forked from now on has to.
-inline void initialise_hdf5() {
-  const std::lock_guard lock(hdf5_mutex);
-  H5open();
-}
 
 /// Locks HDF5 for this thread and silences HDF5's error printing while it lives.
 class Hdf5Session {

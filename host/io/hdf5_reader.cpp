@@ -1,7 +1,5 @@
 #include "io/hdf5_reader.hpp"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <numeric>
 #include <system_error>
@@ -11,6 +9,7 @@
 #include <fmt/ranges.h>
 
 #include "io/stored_bytes.hpp"
+#include "io/watched_reading.hpp"
 
 namespace palpate {
 
@@ -109,12 +108,6 @@ Hdf5Handle open_file(const std::filesystem::path& path, std::string& reason) {
   return file;
 }
 
-// Reading a piece takes milliseconds; a child that takes this long loops.
-constexpr std::uint64_t piece_cpu_seconds = 2;
-// A fifth of the measured rate of inflating and widening.
-constexpr std::uint64_t cpu_bytes_per_second = 20'000'000;
-// Enough for metadata and a piece of an answer.
-constexpr std::uint64_t base_bytes = 256 << 20;
 // Copies of a chunk in memory: stored, inflated (which grows by doubling) and unshuffled.
 constexpr std::uint64_t copies_of_a_chunk = 5;
 
@@ -171,8 +164,8 @@ std::uint64_t size_of(const std::filesystem::path& path) {
 
 Hdf5Reader::Hdf5Reader(const std::filesystem::path& path,
                        const std::vector<std::string>& attributes,
-                       const std::vector<std::string>& datasets, Hdf5Confinement confinement)
-    : confinement_(std::move(confinement)) {
+                       const std::vector<std::string>& datasets, bool follows_links)
+    : follows_links_(follows_links) {
   if (H5Fis_hdf5(path.c_str()) <= 0) {
     problem_ = "is not an HDF5 file; give a file that Palpate or h5py wrote";
     return;
@@ -208,7 +201,7 @@ std::string Hdf5Reader::open(const std::string& name, std::uint64_t file_bytes,
   if (link != H5L_TYPE_HARD && link != H5L_TYPE_SOFT && link != H5L_TYPE_ERROR) {
     return "is a link to another file, which is not followed; copy the dataset into this file";
   }
-  if (link == H5L_TYPE_SOFT && !confinement_.follows_links) {
+  if (link == H5L_TYPE_SOFT && !follows_links_) {
     return "is a link, which may lead to another file; store the dataset itself";
   }
   Hdf5Handle& handle = dataset.handle;
@@ -270,15 +263,13 @@ std::string Hdf5Reader::reopen_with_cache(const std::string& name, hid_t creatio
   if (__builtin_mul_overflow(chunk_bytes, chunks, &dataset.band_bytes)) {
     return hdf5_damaged;
   }
-  dataset.needed_bytes = dataset.band_bytes + copies_of_a_chunk * chunk_bytes;
-  const std::uint64_t machine_bytes = static_cast<std::uint64_t>(::sysconf(_SC_PHYS_PAGES)) *
-                                      static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
-  if (dataset.needed_bytes > machine_bytes) {
+  const std::uint64_t needed_bytes = dataset.band_bytes + copies_of_a_chunk * chunk_bytes;
+  if (needed_bytes > machine_bytes()) {
     return fmt::format(
         "is stored in chunks of {}, of which {:.1f} GB have to be held at a time; the machine has "
         "{:.1f} GB of memory: store it in smaller chunks",
-        chunk, static_cast<double>(dataset.needed_bytes) * 1e-9,
-        static_cast<double>(machine_bytes) * 1e-9);
+        chunk, static_cast<double>(needed_bytes) * 1e-9,
+        static_cast<double>(machine_bytes()) * 1e-9);
   }
   const Hdf5Handle access(H5Pcreate(H5P_DATASET_ACCESS), H5Pclose);
   // HDF5 hashes chunks to slots: ten slots a chunk, and an odd number, make collisions rare.
@@ -304,15 +295,11 @@ bool Hdf5Reader::read(const std::string& name, std::uint64_t rows, const Take& t
   const std::uint64_t block =
       std::max<std::uint64_t>(1, hdf5_piece / std::max<std::uint64_t>(inner, 1));
   std::vector<double> values;
-  if (dataset.needed_bytes > 0) {
-    confinement_.memory_bytes(base_bytes + dataset.needed_bytes);
-  }
   const auto end = [&](std::size_t k) { return k == 0 ? rows : shape[k]; };
   for (bool more = true; more;) {
     box[axis] = std::min<hsize_t>(block, end(axis) - begin[axis]);
     values.resize(box[axis] * inner);
-    // The time limit follows what a piece reads: the chunks of a pass, at most.
-    confinement_.cpu_seconds(piece_cpu_seconds + dataset.band_bytes / cpu_bytes_per_second);
+    begin_reading_step(dataset.band_bytes);  // at most: the chunks of a pass
     if (values.empty() || !read_box(dataset.handle.get(), begin, box, values)) {
       return false;
     }

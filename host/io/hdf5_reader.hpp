@@ -19,15 +19,6 @@ inline constexpr std::uint64_t hdf5_piece = 1 << 17;
 inline constexpr const char* hdf5_damaged =
     "cannot be read: the file is damaged; copy or record it again";
 
-/// What the process that reads a file allows.
-struct Hdf5Confinement {
-  /// Links within the file are followed. Only where HDF5 can follow none to another file.
-  bool follows_links = false;
-  // Called with what the next step needs; a forked child has limits, which these raise.
-  std::function<void(std::uint64_t)> memory_bytes = [](std::uint64_t) {};
-  std::function<void(std::uint64_t)> cpu_seconds = [](std::uint64_t) {};
-};
-
 /// Value of an attribute (numbers or strings in row-major order), or shape of a dataset.
 struct Hdf5Value {
   std::vector<std::uint64_t> shape;  ///< empty for a scalar
@@ -46,12 +37,12 @@ class Hdf5Reader {
   /// A dataset's shape and problem, without numbers.
   struct Dataset : Hdf5Value {
     Hdf5Handle handle{H5I_INVALID_HID, H5Dclose};
-    std::uint64_t band_bytes = 0;    ///< of the chunks that a pass over the rows holds at once
-    std::uint64_t needed_bytes = 0;  ///< of memory for these chunks and for inflating one
+    std::uint64_t band_bytes = 0;  ///< of the chunks that a pass over the rows holds at once
   };
 
+  /// @param follows_links within the file; only where HDF5 can follow none to another file
   Hdf5Reader(const std::filesystem::path& path, const std::vector<std::string>& attributes,
-             const std::vector<std::string>& datasets, Hdf5Confinement confinement);
+             const std::vector<std::string>& datasets, bool follows_links);
 
   const std::string& problem() const { return problem_; }  ///< why it cannot be opened; "": it can
   const std::map<std::string, Hdf5Value>& attributes() const { return attributes_; }
@@ -66,7 +57,7 @@ class Hdf5Reader {
   std::string reopen_with_cache(const std::string& name, hid_t creation, std::size_t width,
                                 Dataset& dataset) const;
 
-  Hdf5Confinement confinement_;
+  bool follows_links_;
   Hdf5Handle file_{H5I_INVALID_HID, H5Fclose};
   std::string problem_;
   std::map<std::string, Hdf5Value> attributes_;

@@ -52,10 +52,6 @@ void require_agreement(const std::filesystem::path& path, const Recording& recor
 }  // namespace
 
 Recording read_recording(const std::filesystem::path& path) {
-  return recording_read_by(path, nullptr);
-}
-
-Recording recording_read_by(const std::filesystem::path& path, Hdf5Child* child) {
   Recording recording;
   scan_recording(path,
                  {.head =
@@ -68,8 +64,7 @@ Recording recording_read_by(const std::filesystem::path& path, Hdf5Child* child)
                   .elements_mm = [&](auto places) { append(recording.elements_mm, places); },
                   .time_s = [&](auto times) { append(recording.time_s, times); },
                   .device_time_s = [&](auto times) { append(recording.device_time_s, times); },
-                  .lost_before = [&](auto counts) { append(recording.lost_before, counts); }},
-                 child);
+                  .lost_before = [&](auto counts) { append(recording.lost_before, counts); }});
   return recording;
 }
 

@@ -89,8 +89,8 @@ std::vector<SetupFinding> read_findings(const Hdf5Contents& file) {
 
 class Scan {
  public:
-  Scan(const std::filesystem::path& path, const RecordingTakers& takers, Hdf5Child* child)
-      : path_(path), takers_(takers), file_(path, attribute_names, dataset_names, child) {}
+  Scan(const std::filesystem::path& path, const RecordingTakers& takers)
+      : path_(path), takers_(takers), file_(path, attribute_names, dataset_names) {}
 
   void run() {
     read_texts();
@@ -282,13 +282,8 @@ class Scan {
 
 }  // namespace
 
-std::shared_ptr<Hdf5Child> recording_child(std::uint64_t file_bytes) {
-  return std::make_shared<Hdf5Child>(attribute_names, dataset_names, file_bytes);
-}
-
-void scan_recording(const std::filesystem::path& path, const RecordingTakers& takers,
-                    Hdf5Child* child) {
-  Scan(path, takers, child).run();
+void scan_recording(const std::filesystem::path& path, const RecordingTakers& takers) {
+  Scan(path, takers).run();
 }
 
 }  // namespace palpate

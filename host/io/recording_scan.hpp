@@ -3,14 +3,11 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
-#include <memory>
 #include <span>
 
 #include "palpate/touch.hpp"
 
 namespace palpate {
-
-struct Hdf5Child;
 
 /// A recording without its rows, as a file announces it.
 struct RecordingHead {
@@ -31,16 +28,9 @@ struct RecordingTakers {
   std::function<void(std::span<const std::uint64_t>)> lost_before;
 };
 
-/// Makes a child that reads recordings of so many bytes at most.
-std::shared_ptr<Hdf5Child> recording_child(std::uint64_t file_bytes);
-
-// The functions below read a "palpate.recording" HDF5 file in a recording_child(), as Hdf5Contents
-// does.
-
-/// Reads and checks the file, holding a few MB of it at a time.
+/// Reads and checks a "palpate.recording" HDF5 file as Hdf5Contents does, holding a few MB of it at
+/// a time.
 /// @throws Error as read_recording() does
-void scan_recording(const std::filesystem::path& path, const RecordingTakers& takers,
-                    Hdf5Child* child = nullptr);
-Recording recording_read_by(const std::filesystem::path& path, Hdf5Child* child);
+void scan_recording(const std::filesystem::path& path, const RecordingTakers& takers);
 
 }  // namespace palpate

@@ -10,12 +10,11 @@
 
 #include "io/descriptor.hpp"
 #include "io/file_format.hpp"
-#include "io/forked_child.hpp"
 #include "io/hdf5_handle.hpp"
-#include "io/hdf5_process.hpp"
 #include "io/hdf5_writer.hpp"
 #include "io/input_file.hpp"
 #include "io/recording_survey.hpp"
+#include "io/watched_reading.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
 
@@ -45,8 +44,6 @@ Recorder recorder_of(const std::filesystem::path& path) {
 }
 
 namespace {
-
-using namespace std::chrono_literals;
 
 // Cuts every growing dataset to the complete rows.
 bool cut_rows(hid_t file, std::uint64_t rows) {
@@ -106,23 +103,6 @@ Descriptor lock(const std::filesystem::path& path) {
          "recorded; copy it to another disk first");
 }
 
-// Closes the file in a child; returns why that failed, or "".
-std::string failure_of_child(const std::filesystem::path& path, std::uint64_t rows) {
-  constexpr std::uint64_t memory_bytes = 256 << 20;
-  ForkedChild child(
-      [&](int socket) {
-        H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
-        H5PLset_loading_state(0);
-        const std::string failure = close_file(path, rows) ? "" : hdf5_failure();
-        ForkedSender sender(socket);
-        sender.list(failure);
-        sender.flush();
-      },
-      {.cpu_seconds = 10, .memory_bytes = memory_bytes, .silence = 1min}, hdf5_mutex);
-  std::string reason;
-  return child.list(reason, memory_bytes) ? reason : "HDF5 failed";
-}
-
 }  // namespace
 
 bool close_recording(const std::filesystem::path& path) {
@@ -137,11 +117,9 @@ bool close_recording(const std::filesystem::path& path) {
     if (!is_marked_open(path)) {
       return false;
     }
-    const auto failure_here = [&] {
-      const Hdf5Session session;
-      return close_file(path, before.rows) ? std::string() : hdf5_failure();
-    };
-    reason = reads_hdf5_in_children() ? failure_of_child(path, before.rows) : failure_here();
+    const Hdf5Session session;
+    const ReadingMark mark(path);
+    reason = close_file(path, before.rows) ? "" : hdf5_failure();
   }
   if (reason.empty()) {
     const RecordingHead after = survey_recording(path).head;

@@ -105,9 +105,8 @@ std::pair<std::vector<Line>, std::string> recognise_entries(OpenBatch& batch,
                                                             const Call& call) {
   std::vector<Line> lines;
   std::string unresolved;
-  RecordingReader reader;
   for (const std::string& entry : entries) {
-    const ReadInput read = read_entry(reader, batch.task, entry_from(entry), batch.request);
+    const ReadInput read = read_entry(batch.task, entry_from(entry), batch.request);
     for (const Unknown& unknown : read.unknowns) {
       const RecognitionRecord record =
           recognise(batch.recogniser, batch.recognition, unknown, batch.request.trace,

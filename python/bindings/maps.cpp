@@ -222,7 +222,9 @@ void bind_map(nb::module_& module) {
       [](const PathLike& file) {
         return run([path = file.path()](Call&) { return read_map(path); });
       },
-      "path"_a, "Reads a map file (HDF5). Raises Error naming file, field and remedy.");
+      "path"_a,
+      "Reads a map file (HDF5). Raises Error naming file, field and remedy; see read_recording()\n"
+      "for damaged files.");
 }
 
 void bind_hypothesis(nb::module_& module) {

@@ -26,8 +26,7 @@ TEST_F(BatchResumption, KilledAtAnyMomentItEndsInTheSameBytes) {
     }
     const pid_t pid = start(batch("r", {"--threads", std::to_string(1 + i % 3)}));
     ::usleep(moment(random));
-    ::kill(pid, SIGKILL);
-    ::waitpid(pid, nullptr, 0);
+    kill_program(pid);
     if (i % 4 == 3) {
       EXPECT_EQ(palpate(batch("r")).status, 3) << i;
       EXPECT_EQ(merged("r"), expected) << i;

@@ -2,8 +2,10 @@
 
 #include <fcntl.h>
 #include <linux/capability.h>
+#include <poll.h>
 #include <pty.h>
 #include <sys/ioctl.h>
+#include <sys/pidfd.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -12,7 +14,10 @@
 #include <cerrno>
 #include <csignal>
 #include <cstdlib>
+#include <fstream>
 #include <system_error>
+
+#include <fmt/format.h>
 
 namespace palpate {
 
@@ -183,6 +188,19 @@ pid_t ProgramTest::start(const std::vector<std::string>& arguments) const {
     become_program(arguments);
   }
   return pid;
+}
+
+void ProgramTest::kill_program(pid_t pid) {
+  // The command runs in a child, which dies with the process that is killed, but is not waited for
+  // by anybody here.
+  std::ifstream children(fmt::format("/proc/{0}/task/{0}/children", pid));
+  pid_t child = -1;
+  children >> child;
+  pollfd ended{.fd = child > 0 ? ::pidfd_open(child, 0) : -1, .events = POLLIN, .revents = 0};
+  ::kill(pid, SIGKILL);
+  ::waitpid(pid, nullptr, 0);
+  ::poll(&ended, 1, ended.fd < 0 ? 0 : -1);
+  ::close(ended.fd);
 }
 
 std::string ProgramTest::done(const std::vector<std::string>& arguments) const {

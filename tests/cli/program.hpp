@@ -79,6 +79,8 @@ class ProgramTest : public testing::Test {
   }
   /// Starts the program, whose output goes to the files "said" and "complained".
   pid_t start(const std::vector<std::string>& arguments) const;
+  /// Kills the program with SIGKILL and waits for its end.
+  static void kill_program(pid_t pid);
   /// Standard output of a run that has to go well and say nothing else.
   std::string done(const std::vector<std::string>& arguments) const;
   /// The records of `recognize` with these arguments, as `--json -` prints them.

@@ -155,7 +155,7 @@ TEST_F(RecordCommand, KilledItLeavesAReadableFile) {
     const pid_t pid = start(file, "simulate:A,rate=1000,speed=5");
     ASSERT_TRUE(appears(file, pid));
     std::this_thread::sleep_for(std::chrono::milliseconds(random() % 300));
-    end(pid, SIGKILL);
+    kill_program(pid);
     const Recording r = read_recording(folder_ / file);
     EXPECT_GT(r.size(), 0u);  // how many it appears with is the clock's matter
     for (std::size_t i = 1; i < r.size(); ++i) {
@@ -250,7 +250,7 @@ TEST_F(RecordCommand, KilledDuringTheTareItLeavesWhatWasThere) {
   const auto before = content_of(folder_.path());
   const pid_t pid = start("s.h5", "simulate:A,rate=1000,speed=10", {"--tare", "1000"});
   ::usleep(300'000);
-  end(pid, SIGKILL);
+  kill_program(pid);
   EXPECT_EQ(content_of(folder_.path()).at("s.h5"), before.at("s.h5"));
 }
 

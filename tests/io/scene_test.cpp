@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <random>
+
 #include "palpate/touch.hpp"
 #include "scratch_folder.hpp"
 
@@ -180,6 +182,32 @@ TEST_F(SceneFile, HoldsOneDocument) {
 TEST_F(SceneFile, NamesTheLineThatIsNoYaml) {
   expect_named(message("ratio: 0.3\nobjects: [1, 2\nbins: 3"), {"line", "YAML"});
   expect_named(input_error([&] { read_scene(folder_ / "no.yaml"); }), {"no.yaml", "no such file"});
+}
+
+// Cut short or with flipped bits: read, or refused by name.
+TEST_F(SceneFile, IsReadOrRefusedWhateverItsBytes) {
+  const std::string good =
+      "array: [[0, 1], [2, 3]]\nthreshold: 2.0\nobjects:\n  - {map: A.h5, label: A, weight: 1.0}\n"
+      "region: {x_mm: [-10, 10], theta_deg: [0, 360]}\nbins: [25, 25, 16]\nfilter: histogram\n";
+  read(good);
+  std::mt19937 random(6);
+  const auto below = [&](std::size_t bound) { return random() % bound; };
+  int refused = 0;
+  for (int k = 0; k < 220; ++k) {
+    std::string bytes = k < 60 ? good.substr(0, below(good.size())) : good;
+    for (int flips = k < 60 ? 0 : k % 2 == 0 ? 1 : 8; flips > 0; --flips) {
+      char& byte = bytes[below(bytes.size())];
+      byte = static_cast<char>(byte ^ (1 << below(8)));
+    }
+    try {
+      read(bytes);
+    } catch (const Error& error) {
+      EXPECT_EQ(error.fault(), Fault::input) << error.what();
+      expect_named(error.what(), {path_.c_str()});
+      ++refused;
+    }
+  }
+  EXPECT_GT(refused, 0) << "the damage hit nothing that matters";
 }
 
 }  // namespace palpate::scene_test

@@ -171,12 +171,11 @@ class Pipeline {
   }
 
   BatchCounts run(const std::function<void(const BatchCounts&)>& progress) {
-    std::vector<RecordingReader> readers((recognisers_ + 1) / 2);  // before the threads; see there
-    readers_left_ = readers.size();
+    readers_left_ = (recognisers_ + 1) / 2;
     recognisers_left_ = recognisers_;
     std::vector<std::jthread> threads;
-    for (RecordingReader& reader : readers) {
-      threads.emplace_back([&] { guard([&] { read(reader); }, readers_left_, jobs_); });
+    for (std::size_t i = 0; i < (recognisers_ + 1) / 2; ++i) {
+      threads.emplace_back([&] { guard([&] { read(); }, readers_left_, jobs_); });
     }
     for (std::size_t i = 0; i < recognisers_; ++i) {
       threads.emplace_back(
@@ -232,10 +231,10 @@ class Pipeline {
     return false;
   }
 
-  void read(RecordingReader& reader) {
+  void read() {
     for (std::size_t i = next_input_++; i < first_.size(); i = next_input_++) {
       if (is_wanted(i) &&
-          !push_unknowns(i, read_entry(reader, run_.task, run_.task.inputs[i], run_.request))) {
+          !push_unknowns(i, read_entry(run_.task, run_.task.inputs[i], run_.request))) {
         return;
       }
     }

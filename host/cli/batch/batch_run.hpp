@@ -30,11 +30,10 @@ struct BatchRun {
 };
 
 /// Recognises the unknowns of the wanted chunks and writes each chunk once it is whole. Recordings
-/// are read in child processes while others are recognised, so that memory does not follow their
-/// number. Bounds recognise several unknowns at once, and so do histograms of so few bins that a
-/// device would wait for the host; larger ones and particles, whose work a device divides by
-/// itself, one. The chunks have the same bytes whatever the number of threads. Calls `progress` now
-/// and then.
+/// are read while others are recognised, so that memory does not follow their number. Bounds
+/// recognise several unknowns at once, and so do histograms of so few bins that a device would wait
+/// for the host; larger ones and particles, whose work a device divides by itself, one. The chunks
+/// have the same bytes whatever the number of threads. Calls `progress` now and then.
 /// @param device may be null where uses_device() is false
 /// @throws Error where an input changes meanwhile, and on a full disk or a device that fails
 BatchCounts run_batch(const BatchRun& run, Device* device,

@@ -15,6 +15,7 @@
 #include "io/input_file.hpp"
 #include "model/printable.hpp"
 #include "options/option.hpp"
+#include "palpate/files.hpp"
 
 namespace palpate {
 
@@ -100,9 +101,9 @@ void read_pattern(const std::string& pattern, std::vector<BatchEntry>& inputs) {
 
 /// @param inferred whose pressure unit the recording must have; none: any unit will do
 /// @throws Error (Fault::input) where the recording is at fault
-ReadInput read_input(RecordingReader& reader, const BatchInput& input, const Request& request,
+ReadInput read_input(const BatchInput& input, const Request& request,
                      const BatchInference* inferred) {
-  const auto recording = std::make_shared<Recording>(reader.read(input.path));
+  const auto recording = std::make_shared<Recording>(read_recording(input.path));
   Recording like = inferred == nullptr ? Recording{} : Recording{.path = inferred->unit_from};
   like.pressure_unit = inferred == nullptr ? recording->pressure_unit : inferred->pressure_unit;
   require_touches(*recording, like);
@@ -117,9 +118,9 @@ ReadInput read_input(RecordingReader& reader, const BatchInput& input, const Req
   return read;
 }
 
-InputSurvey survey_of(RecordingReader& reader, const BatchEntry& entry, const Request& request) {
+InputSurvey survey_of(const BatchEntry& entry, const Request& request) {
   try {
-    const ReadInput read = read_input(reader, entry.input, request, nullptr);
+    const ReadInput read = read_input(entry.input, request, nullptr);
     InputSurvey survey{.touches = 0,
                        .reach_mm = largest_reach_mm(std::span(read.recording.get(), 1)),
                        .pressure_unit = read.recording->pressure_unit};
@@ -178,8 +179,7 @@ std::vector<BatchEntry> list_inputs(std::span<const std::string> arguments) {
   return inputs;
 }
 
-ReadInput read_entry(RecordingReader& reader, const BatchTask& task, const BatchEntry& entry,
-                     const Request& request) {
+ReadInput read_entry(const BatchTask& task, const BatchEntry& entry, const Request& request) {
   const BatchInput& input = entry.input;
   const std::size_t count = task.unknowns_of(entry);
   const auto require_unchanged = [&] {
@@ -190,7 +190,7 @@ ReadInput read_entry(RecordingReader& reader, const BatchTask& task, const Batch
   require_unchanged();
   ReadInput read;
   try {
-    read = read_input(reader, input, request, &task.inferred);
+    read = read_input(input, request, &task.inferred);
   } catch (const Error& error) {
     require_unchanged();
     if (error.fault() != Fault::input) {
@@ -217,12 +217,11 @@ void survey_inputs(std::span<BatchEntry> inputs, const Request& request, std::si
     return;
   }
   threads = std::min(threads, missing);
-  std::vector<RecordingReader> readers(threads);  // before the threads; see there
-  const auto work = [&](RecordingReader& reader, bool shows) {
+  const auto work = [&](bool shows) {
     try {
       for (std::size_t i = next++; i < inputs.size(); i = next++) {
         if (!inputs[i].survey) {
-          inputs[i].survey = survey_of(reader, inputs[i], request);
+          inputs[i].survey = survey_of(inputs[i], request);
         }
         if (shows) {
           progress(static_cast<double>(i) / static_cast<double>(inputs.size()));
@@ -237,9 +236,9 @@ void survey_inputs(std::span<BatchEntry> inputs, const Request& request, std::si
   {
     std::vector<std::jthread> others;
     for (std::size_t i = 1; i < threads; ++i) {
-      others.emplace_back(work, std::ref(readers[i]), false);
+      others.emplace_back(work, false);
     }
-    work(readers[0], true);
+    work(true);
   }
   if (failure) {
     std::rethrow_exception(failure);
@@ -248,9 +247,8 @@ void survey_inputs(std::span<BatchEntry> inputs, const Request& request, std::si
 
 BatchInference infer(std::span<const BatchEntry> inputs, const Request& request) {
   BatchInference inferred;
-  RecordingReader reader;
   const auto surveyed = [&](const BatchEntry& entry) {
-    return entry.survey ? *entry.survey : survey_of(reader, entry, request);
+    return entry.survey ? *entry.survey : survey_of(entry, request);
   };
   for (const BatchEntry& entry : inputs) {
     if (const InputSurvey survey = surveyed(entry); !survey.pressure_unit.empty()) {

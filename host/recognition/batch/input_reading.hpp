@@ -7,7 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "io/recording_reader.hpp"
 #include "recognition/batch/batch_task.hpp"
 #include "recognition/recordings.hpp"
 
@@ -30,8 +29,7 @@ struct ReadInput {
 /// the input is at fault.
 /// @param request completed
 /// @throws Error where the file is not as it was when the task was settled, or the machine fails
-ReadInput read_entry(RecordingReader& reader, const BatchTask& task, const BatchEntry& entry,
-                     const Request& request);
+ReadInput read_entry(const BatchTask& task, const BatchEntry& entry, const Request& request);
 
 /// Reads the inputs that lack a survey, where the request needs surveys, on so many threads; one
 /// that cannot be read counts as one unknown without arrays. `progress` is called now and then by
