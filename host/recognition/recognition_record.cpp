@@ -9,7 +9,6 @@
 
 #include <fmt/format.h>
 
-#include "estimation/hypotheses.hpp"
 #include "estimation/lattice/refinement.hpp"
 #include "palpate/error.hpp"
 #include "palpate/object_frame.hpp"
