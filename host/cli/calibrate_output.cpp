@@ -48,6 +48,10 @@ std::string values_table(const SensorCalibration& calibration) {
   if (sensor.fit_scale) {
     table.add({"fit of learned objects, z", "0 +- 1",
                fmt::format("{:.2g} +- {:.2g}", sensor.fit_scale->mean, sensor.fit_scale->sd)});
+    if (const auto& learned = sensor.fit_scale->stranger_alone) {
+      table.add({"of one touch of strangers, on it", "0 +- 1",
+                 fmt::format("{:.2g} +- {:.2g}", learned->mean, learned->sd)});
+    }
     if (const auto& learned = sensor.fit_scale->stranger_sd) {
       table.add({"of strangers, for every further touch",
                  fmt::format("+- {:.2g} more", usual_stranger_sd),
@@ -85,11 +89,14 @@ std::string kind_name(const TableKind& kind) {
 
 std::string unlearned_strangers(const LearnedSensor& sensor) {
   const bool known_poses = sensor.bins.has_value();
-  if (!known_poses || !sensor.fit_scale || sensor.fit_scale->stranger_sd) {
+  if (!sensor.fit_scale || (known_poses ? sensor.fit_scale->stranger_sd.has_value()
+                                        : sensor.fit_scale->stranger_alone.has_value())) {
     return "";
   }
-  return "\"(none)\" goes by a figure of Palpate's own for how badly strangers fit; to learn it, "
-         "give 15 touches or more of each of three objects";
+  return known_poses ? "\"(none)\" goes by a figure of Palpate's own for how badly strangers fit; "
+                       "to learn it, give 15 touches or more of each of three objects"
+                     : "how badly strangers fit is not learned, so that a press does not tell "
+                       "\"(none)\"; give presses of three objects or more";
 }
 
 std::string calibration_text(const SensorCalibration& calibration, std::size_t touches) {
@@ -107,11 +114,6 @@ std::string calibration_text(const SensorCalibration& calibration, std::size_t t
     }
     text += fmt::format("; kept: {}\n", kind_name({calibration.sensor.table->layer.of,
                                                    calibration.sensor.table->levels()}));
-  }
-  if (calibration.area_under_curve) {
-    text +=
-        fmt::format("area under the curve of touches of known against left-out objects: {:.3f}\n",
-                    *calibration.area_under_curve);
   }
   if (const std::string words = unlearned_strangers(calibration.sensor); !words.empty()) {
     text += words + "\n";

@@ -136,7 +136,7 @@ std::string unknown_words(const Evaluation& evaluation) {
         name_of(against->score), against->area, against->standard_error, against->known,
         against->unknown);
   } else if (evaluation.known) {
-    text += "no area under the curve: records of both kinds need known, none or fit.z\n";
+    text += "no area under the curve: records of both kinds need none or fit.z\n";
   }
   return text;
 }

@@ -70,14 +70,9 @@ std::string sensor_model_text(const LearnedSensor& sensor) {
     add("press features", fmt::format("weight {:.4g}, of {} object(s)", sensor.features->weight,
                                       sensor.features->objects.size()));
   }
-  if (sensor.familiarity) {
-    add("familiarity", fmt::format("1 / (1 + exp(-({:.4g} + {:.4g} explained + {:.4g} lead)))",
-                                   sensor.familiarity->offset, sensor.familiarity->explained_slope,
-                                   sensor.familiarity->lead_slope));
-  }
   if (const auto& scale = sensor.fit_scale) {
     add("fit scale",
-        fmt::format("z of learned objects {:.4g} +- {:.4g}{}{}{}", scale->mean, scale->sd,
+        fmt::format("z of learned objects {:.4g} +- {:.4g}{}{}{}{}", scale->mean, scale->sd,
                     scale->alone
                         ? fmt::format(", of a single touch where it fits best {:.4g} +- {:.4g}",
                                       scale->alone->mean, scale->alone->sd)
@@ -85,6 +80,10 @@ std::string sensor_model_text(const LearnedSensor& sensor) {
                     scale->stranger_sd
                         ? fmt::format(", of strangers +- {:.4g} more on it for every further touch",
                                       *scale->stranger_sd)
+                        : "",
+                    scale->stranger_alone
+                        ? fmt::format(", of a single touch of strangers {:.4g} +- {:.4g} on it",
+                                      scale->stranger_alone->mean, scale->stranger_alone->sd)
                         : "",
                     scale->array ? fmt::format(", by {:.0f} elements {:.3g} mm apart",
                                                scale->array->elements, scale->array->spacing_mm)

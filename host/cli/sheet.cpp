@@ -54,10 +54,6 @@ std::vector<RecognitionSheet::Caption> captions(const RecognitionRecord& record,
     add(fmt::format("fit: {} (z {:.1f})", verdict_text(last.fit->verdict), last.fit->z),
         last.fit->verdict != Verdict::fits);
   }
-  if (last.known) {
-    add(fmt::format("known {:.2f}: the probability that the object was learned", *last.known),
-        *last.known < 0.5);
-  }
   if (const std::vector<std::string> warnings = warning_words(last); !warnings.empty()) {
     const std::size_t more = warnings.size() - 1;
     add((more > 0 ? fmt::format("(1 of {}) ", more + 1) : "") + warnings.front(), true);

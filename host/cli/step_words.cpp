@@ -125,11 +125,9 @@ std::string fit_words(const RecognitionStep& step) {
   if (!step.contradicted && !step.fit) {
     return "";
   }
-  const std::string word = step.contradicted ? "contradicted"
-                           : step.fit->verdict == Verdict::does_not_fit
-                               ? "no fit"
-                               : verdict_text(step.fit->verdict);
-  return word + (step.known ? fmt::format(", known {:.2f}", *step.known) : "");
+  return step.contradicted                            ? "contradicted"
+         : step.fit->verdict == Verdict::does_not_fit ? "no fit"
+                                                      : verdict_text(step.fit->verdict);
 }
 
 std::string misfit_sentence(const RecognitionStep& step, std::size_t touches,
@@ -152,7 +150,7 @@ std::vector<std::string> warning_words(const RecognitionStep& step) {
 }
 
 std::string single_touch_words(const RecognitionTask& task, std::size_t touches) {
-  if (touches != 1 || task.labels.back() != none_label || tells_known(task)) {
+  if (touches != 1 || task.labels.back() != none_label || task.fit_scale.stranger_alone) {
     return "";
   }
   return "one touch cannot tell whether the object is one of the maps': the odds of (none) are "

@@ -49,9 +49,7 @@ std::vector<BeliefMode> other_modes(const RecognitionStep& step);
 /// step's pose; "" where nothing is known.
 std::string truth_words(const RecognitionStep& step);
 
-/// What a table says of the fit: "fits", "doubtful", "no fit" or "contradicted", and the
-/// probability that the object was learned where a touch tells it: "fits, known 0.83"; "" without a
-/// fit.
+/// What a table says of the fit: "fits", "doubtful", "no fit" or "contradicted"; "" without a fit.
 std::string fit_words(const RecognitionStep& step);
 /// A sentence on touches that do not fit; "" where they fit or are doubtful.
 std::string misfit_sentence(const RecognitionStep& step, std::size_t touches,

@@ -40,16 +40,9 @@ void describe(Keys& keys, BinSteps& steps) {
 }
 
 template <typename Keys>
-void describe(Keys& keys, Familiarity& familiarity) {
-  keys("offset", familiarity.offset);
-  keys("explained_slope", familiarity.explained_slope);
-  keys("lead_slope", familiarity.lead_slope);
-}
-
-template <typename Keys>
-void describe(Keys& keys, SingleFitScale& alone) {
-  keys("mean", alone.mean);
-  keys("sd", alone.sd);
+void describe(Keys& keys, SingleFitScale& scale) {
+  keys("mean", scale.mean);
+  keys("sd", scale.sd);
 }
 
 template <typename Keys>
@@ -65,6 +58,7 @@ void describe(Keys& keys, FitScale& scale) {
   keys("shared_sd", scale.shared_sd, scale.shared_sd > 0.0);
   keys("alone", scale.alone);
   keys("stranger_sd", scale.stranger_sd);
+  keys("stranger_alone", scale.stranger_alone);
   keys("array", scale.array);
 }
 
@@ -114,7 +108,6 @@ void describe(Keys& keys, LearnedSensor& sensor) {
   keys("temperature", sensor.temperature);
   keys("temperature_growth", sensor.temperature_growth, sensor.temperature_growth > 0.0);
   keys("bins", sensor.bins);
-  keys("familiarity", sensor.familiarity);
   keys("fit_scale", sensor.fit_scale);
   keys("pose_scale", sensor.pose_scale);
   keys("features", sensor.features);
@@ -291,7 +284,13 @@ LearnedSensor read_sensor_model(const std::filesystem::path& path) {
              e.refuse("this palpate reads version 1; update palpate");
            }
          }},
-        {"psf_mm", [](const Entry& /*unused*/) {}}};  // of earlier releases, and nothing took it
+        {"psf_mm",
+         [](const Entry& e) { e.refuse("is no key any more; remove it, spread_mm alone counts"); }},
+        {"familiarity", [](const Entry& e) {
+           e.refuse(
+               "is no key any more; remove it, or learn the sensor again: its fit_scale then "
+               "tells by stranger_alone what one touch of a stranger is like");
+         }}};
     describe(reader, sensor);
     read_keys(root, reader.keys);
   });

@@ -72,7 +72,7 @@ class FoldTrial {
   /// @param tried presses of the fold whose objects have maps
   CrossValidation run(const std::vector<Press>& tried, std::size_t fold,
                       const std::function<void(double)>& progress) const {
-    CrossValidation result{.familiarity = {{}}};
+    CrossValidation result;
     if (tried.empty()) {
       return result;
     }
@@ -93,10 +93,10 @@ class FoldTrial {
                          .log_density = log_densities(evidence[i].front())};
       std::ranges::transform(scores[i], std::back_inserter(scored.log_evidence),
                              &LabelScore::log_evidence);
+      if (const auto fit = stranger_fit_of(evidence[i], scores[i], scored.truth)) {
+        result.stranger_fits[asked.presses[i].label].push_back(*fit);
+      }
       if (i >= tried.size()) {
-        if (const auto fit = stranger_fit_of(evidence[i], scores[i], scored.truth)) {
-          result.stranger_fits[asked.presses[i].label].push_back(*fit);
-        }
         const std::size_t half = asked.half_of_group[i - tried.size()];
         if (half == 0) {
           scored.error_mm =
@@ -107,7 +107,6 @@ class FoldTrial {
       }
       // A press of which nothing is In Contact says nothing of its object.
       if (evidence[i].front().in_contact()) {
-        add_familiarity(evidence[i].front(), scores[i], scored, result.familiarity.front());
         if (const auto fit =
                 fit_of(evidence[i], scores[i], scored.truth, asked.presses[i].T_object_robot)) {
           result.fit_z[asked.presses[i].label].push_back(fit->z);
@@ -234,29 +233,6 @@ class FoldTrial {
     return densities;
   }
 
-  /// Adds what tells whether a press's own object was learned.
-  void add_familiarity(const TouchEvidence& touch, const std::vector<LabelScore>& scores,
-                       const ScoredPress& scored, FamiliarityScores& familiarity) const {
-    const std::vector<std::size_t> others = others_of(scored.truth, scores);
-    if (others.empty()) {
-      return;
-    }
-    const auto score_without = [&](std::size_t left_out) {
-      double best = nothing;
-      std::vector<double> log_evidence;
-      for (std::size_t label = 0; label < labels_.size(); ++label) {
-        if (label != left_out) {
-          best = std::max(best, scores[label].best_log_likelihood);
-          log_evidence.push_back(scored.log_evidence[label]);
-        }
-      }
-      return FamiliarityScore::of(touch.readings, best, log_evidence);
-    };
-    const std::size_t turn = familiarity.known.size() % others.size();
-    familiarity.known.push_back(score_without(others[turn]));
-    familiarity.unknown.push_back(score_without(scored.truth));
-  }
-
   /// The labels but one that have maps.
   std::vector<std::size_t> others_of(std::size_t label,
                                      const std::vector<LabelScore>& scores) const {
@@ -357,7 +333,6 @@ CrossValidation joined(std::span<const CrossValidation> folds) {
     append(fold.presses, all.presses);
     append(fold.groups[0], all.groups[0]);
     append(fold.groups[1], all.groups[1]);
-    append(fold.familiarity, all.familiarity);
     append(fold.best_fit_z, all.best_fit_z);
     append(fold.place_errors, all.place_errors);
     for (const auto& [label, z] : fold.fit_z) {

@@ -11,7 +11,6 @@
 
 #include "estimation/maps/left_out_fit.hpp"
 #include "learning/contact_learning.hpp"
-#include "learning/familiarity_fit.hpp"
 #include "learning/press.hpp"
 #include "learning/stranger_fit.hpp"
 #include "learning/table_learning.hpp"
@@ -93,21 +92,18 @@ struct CrossValidation {
   /// fewer presses of each object. Those of the first half have the pose error (Eq. 17-20), in mm,
   /// of the mean by their likelihood over poses about their own, on their object's map.
   GroupHalves groups;
-  /// [fold] Scores of presses with an element In Contact: known with the maps of their own object
-  /// and all others but one, each left out in turn; unknown with the maps of all others.
-  std::vector<FamiliarityScores> familiarity;
   /// [label] Fit::z of presses with an element In Contact: at their pose where it is known, or else
   /// on the best map at about the best pose.
   std::map<std::string, std::vector<double>> fit_z;
   /// Fit::z of presses at known poses with an element In Contact, by a table: on the map that fits
   /// best, at about the best pose.
   std::vector<double> best_fit_z;
-  /// [label] How the groups fit the best of all other objects, at about its best pose, by a table.
-  /// None with maps of fewer than two others.
+  /// [label] How presses with an element In Contact and groups fit the best of all other objects,
+  /// at about its best pose, by a table. None with maps of fewer than two others.
   std::map<std::string, std::vector<StrangerFit>> stranger_fits;
   std::vector<PlaceError> place_errors;  ///< of presses at known poses, by a table
 };
-/// The cross-validation of several folds, each of which has one FamiliarityScores.
+/// The cross-validation of several folds.
 CrossValidation joined(std::span<const CrossValidation> folds);
 
 /// Presses in one of CrossValidation::groups, and most groups that a press is in.

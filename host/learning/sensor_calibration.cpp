@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <iterator>
 #include <map>
-#include <numeric>
 #include <set>
 #include <utility>
 
@@ -141,13 +140,13 @@ std::vector<std::vector<CrossValidation>> cross_validate(const std::vector<Press
     if (others.size() == presses.size()) {  // there are fewer groups than folds
       progress.part(learning + static_cast<double>(tried.size()) * share)(1.0);
       for (std::vector<CrossValidation>& of_model : tried) {
-        of_model.push_back({.familiarity = {{}}});
+        of_model.emplace_back();
       }
       continue;
     }
     const std::vector<FoldModel> models = models_of(others, tables, how, progress.part(learning));
     for (std::size_t i = 0; i < tried.size(); ++i) {
-      tried[i].push_back(models.empty() ? CrossValidation{.familiarity = {{}}}
+      tried[i].push_back(models.empty() ? CrossValidation()
                                         : try_fold(fold, presses, labels, models[i], options,
                                                    progress.part(share)));
     }
@@ -184,24 +183,16 @@ void judge(const CrossValidation& eq7, const std::vector<TriedModel>& tried, boo
   const std::size_t folds = tried.front().folds.size();
   std::vector<CrossValidation> of_folds;
   TemperedPresses after;
-  std::vector<double> areas;
   for (std::size_t fold = 0; fold < folds; ++fold) {
     const TriedModel& model = kept(tried, fold);
     of_folds.push_back(model.folds[fold]);
     std::ranges::copy(of_fold(model.after.presses, fold, true), std::back_inserter(after.presses));
     std::ranges::copy(of_fold(model.after.groups, fold, true), std::back_inserter(after.groups));
-    if (const auto area = area_under_curve(model.all.familiarity, fold)) {
-      areas.push_back(*area);
-    }
   }
   const CrossValidation table = joined(of_folds);
   judged.before = scores_of(eq7.presses, 1.0);
   judged.table = scores_of(table.presses, 1.0);
   judged.after = scores_of(after.presses, 1.0);
-  if (!areas.empty()) {
-    judged.area_under_curve =
-        std::accumulate(areas.begin(), areas.end(), 0.0) / static_cast<double>(areas.size());
-  }
   if (!after.groups.empty()) {
     judged.groups = GroupScores{.touches = presses_in_group,
                                 .before = scores_of(both(eq7.groups), 1.0),
@@ -254,16 +245,12 @@ LearnedSensor with_confidence(LearnedSensor sensor, const CrossValidation& valid
     if (const auto best = scale_of(validation.best_fit_z)) {
       sensor.fit_scale->alone = {best->mean, best->sd};
     }
-    sensor.fit_scale->stranger_sd = stranger_sd_of(validation.stranger_fits, *sensor.fit_scale);
+    sensor.fit_scale = with_strangers(validation.stranger_fits, *sensor.fit_scale);
     sensor.fit_scale->array =
         FitArray{static_cast<double>(presses.front().touches.front().elements_mm.size()),
                  spacing_mm_of(presses)};
   }
   sensor.pose_scale = pose_scale_of(validation.place_errors);
-  const FamiliarityScores scores = all_of(validation.familiarity);
-  if (!scores.known.empty()) {
-    sensor.familiarity = fit_familiarity(scores);
-  }
   return sensor;
 }
 
@@ -276,7 +263,7 @@ SensorCalibration of_one_object(SensorCalibration calibration, const LearnedPres
   calibration.sensor.gamma = gamma_of(placed, table, learned);
   calibration.warnings.emplace_back(
       "touches of one object say nothing about confidence: the temperature stays 1, and "
-      "neither features nor familiarity are learned; give touches of two objects or more");
+      "press features are not learned; give touches of two objects or more");
   return calibration;
 }
 

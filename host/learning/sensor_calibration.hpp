@@ -66,26 +66,22 @@ struct SensorCalibration {
   std::optional<Scores> after;        ///< the table, temperature and features
   std::optional<GroupScores> groups;  ///< none for presses at unknown poses, or few touches
   std::optional<SensorGain> gain;     ///< none for few touches at known poses, or one object
-  /// Mean over the folds of the area under the curve of presses whose object is known against those
-  /// whose object is left out, see FamiliarityScores: about one half where presses say nothing;
-  /// none with one object.
-  std::optional<double> area_under_curve;
   std::vector<std::string> warnings;  ///< what could not be learned, in whole sentences
 };
 
 /// Learns from presses the contact threshold and ratio, the noise floor, gamma, the prior, the
-/// table, the temperature and the familiarity.
+/// table, the temperature and the fit of presses, of learned objects and of strangers.
 ///   Presses at known poses are counted, and recognised alone and in groups, as far from the
 ///   nearest bin as unknowns are. They also give by how much the temperature
 ///   grows with every further touch. Presses at unknown poses show much of an object. They also
 ///   give the features' distributions with their weight.
 /// Among several tables it keeps the first, unless a later one has less log-loss in the
 /// cross-validation by more than two standard errors. What one object cannot tell (temperature,
-/// weight, familiarity) keeps its default, with a warning. Takes all host threads.
+/// weight) keeps its default, with a warning. Takes all host threads.
 ///   The numbers before and after are of cross-validation. All that a fold's presses are judged by
 /// is learned again from the presses of the other folds alone, from the contact threshold on:
-/// noise, prior, levels, maps, tables and features. Which table is kept, temperature,
-/// weight and familiarity come from the scores of the other folds' presses.
+/// noise, prior, levels, maps, tables and features. Which table is kept, temperature, and
+/// weight come from the scores of the other folds' presses.
 ///
 /// Data that say little:
 ///   one press: refused; so are presses none of which has a map of its object without it

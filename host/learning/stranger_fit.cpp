@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "recognition/misfit.hpp"
 
@@ -9,49 +10,79 @@ namespace palpate {
 
 namespace {
 
-/// The mean log density of an object's fits; none of too few.
-std::optional<double> mean_log_density(const std::vector<StrangerFit>& fits, const FitScale& scale,
-                                       double stranger_sd) {
-  constexpr double enough = 5.0;
-  double sum = 0.0;
-  double count = 0.0;
-  for (const auto& [fit, touches] : fits) {
-    if (touches > 1) {
-      sum += std::log(stranger_density(scale.of(fit, touches), touches, stranger_sd));
-      count += 1.0;
+using StrangerFits = std::map<std::string, std::vector<StrangerFit>>;
+
+/// Finds the likeliest scale for the fits of one touch each, or of several.
+class LikeliestScale {
+ public:
+  LikeliestScale(const StrangerFits& objects, const FitScale& scale, bool alone) {
+    constexpr std::size_t enough = 5;
+    for (const auto& [label, fits] : objects) {
+      std::vector<StrangerFit> counted;
+      for (const auto& [fit, touches] : fits) {
+        if ((touches == 1) == alone) {
+          counted.push_back({scale.of(fit, touches), touches});
+        }
+      }
+      if (counted.size() >= enough) {
+        fits_.push_back(std::move(counted));
+      }
     }
   }
-  return count < enough ? std::nullopt : std::optional(sum / count);
-}
+
+  bool tells() const {
+    constexpr std::size_t least_objects = 3;
+    return fits_.size() >= least_objects;
+  }
+
+  void try_scale(const FitScale& scale) {
+    double sum = 0.0;
+    for (const std::vector<StrangerFit>& fits : fits_) {
+      double of_object = 0.0;
+      for (const auto& [fit, touches] : fits) {
+        of_object += std::log(stranger_density(fit, touches, scale));
+      }
+      sum += of_object / static_cast<double>(fits.size());
+    }
+    if (sum > highest_) {
+      highest_ = sum;
+      best_ = scale;
+    }
+  }
+
+  const FitScale& best() const { return best_; }
+
+ private:
+  std::vector<std::vector<StrangerFit>> fits_;  ///< [object] on the scale
+  double highest_ = -std::numeric_limits<double>::infinity();
+  FitScale best_;
+};
 
 }  // namespace
 
-std::optional<double> stranger_sd_of(const std::map<std::string, std::vector<StrangerFit>>& objects,
-                                     const FitScale& scale) {
-  constexpr int least_objects = 3;
-  constexpr double least = 1.0;
-  constexpr double most = 16.0;
+FitScale with_strangers(const StrangerFits& objects, FitScale scale) {
+  constexpr double least_sd = 1.0;
+  constexpr double most_sd = 16.0;
   constexpr double step = 1.05;
-  std::optional<double> best;
-  double highest = -std::numeric_limits<double>::infinity();
-  for (double stranger_sd = least; stranger_sd <= most; stranger_sd *= step) {
-    double sum = 0.0;
-    int judged = 0;
-    for (const auto& [label, fits] : objects) {
-      if (const auto mean = mean_log_density(fits, scale, stranger_sd)) {
-        sum += *mean;
-        ++judged;
-      }
+  constexpr double least_mean = -16.0;
+  constexpr double mean_step = 0.5;
+  scale.stranger_sd.reset();
+  scale.stranger_alone.reset();
+  LikeliestScale of_several(objects, scale, false);
+  LikeliestScale of_one(objects, scale, true);
+  for (double sd = least_sd; sd <= most_sd; sd *= step) {
+    if (of_several.tells()) {
+      scale.stranger_sd = sd;
+      of_several.try_scale(scale);
     }
-    if (judged < least_objects) {
-      return {};
-    }
-    if (sum > highest) {
-      highest = sum;
-      best = stranger_sd;
+    for (double mean = 0.0; mean >= least_mean && of_one.tells(); mean -= mean_step) {
+      scale.stranger_alone = {mean, sd};
+      of_one.try_scale(scale);
     }
   }
-  return best;
+  scale.stranger_sd = of_several.best().stranger_sd;
+  scale.stranger_alone = of_one.best().stranger_alone;
+  return scale;
 }
 
 }  // namespace palpate

@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <map>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,12 +15,14 @@ struct StrangerFit {
   std::size_t touches = 0;  ///< with an element In Contact
 };
 
-/// FitScale::stranger_sd by which the fits are likeliest; each object counts alike. No fit of less
-/// than two touches counts.
+/// The scale with stranger_sd and stranger_alone by which the fits are likeliest, those of several
+/// touches and of one; each object counts alike. Either is none where fewer than three objects have
+/// five such fits.
 /// @param objects [label]
 /// @param scale of learned objects' z
-/// @returns from 1 to 16; none of fewer than three objects with five fits each
-std::optional<double> stranger_sd_of(const std::map<std::string, std::vector<StrangerFit>>& objects,
-                                     const FitScale& scale);
+/// @returns stranger_sd from 1 to 16, stranger_alone with a mean from -16 to 0 and an sd from 1 to
+/// 16
+FitScale with_strangers(const std::map<std::string, std::vector<StrangerFit>>& objects,
+                        FitScale scale);
 
 }  // namespace palpate

@@ -102,35 +102,6 @@ double FeatureDistribution::log_density(const PressFeatures& features) const {
   return nats - 0.5 * glm::dot(z, glm::inverse(*correlations) * z);
 }
 
-FamiliarityScore FamiliarityScore::of(std::span<const Reading> readings, double log_likelihood,
-                                      std::span<const double> label_evidence) {
-  std::array<double, static_cast<std::size_t>(Reading::unknown)> count{};
-  double known = 0.0;
-  for (const Reading reading : readings) {
-    if (reading != Reading::unknown) {
-      count.at(static_cast<std::size_t>(reading)) += 1.0;
-      known += 1.0;
-    }
-  }
-  double by_frequency = 0.0;
-  for (const double n : count) {
-    by_frequency -= n > 0.0 ? n * std::log(n / known) : 0.0;
-  }
-  double best = -std::numeric_limits<double>::infinity();
-  double next = best;
-  for (const double evidence : label_evidence) {
-    next = std::max(next, std::min(best, evidence));
-    best = std::max(best, evidence);
-  }
-  const double lead = label_evidence.size() < 2 ? 0.0 : std::min(best - next, most_lead_nats);
-  return {log_likelihood / (1.0 + by_frequency), std::log1p(lead)};
-}
-
-double Familiarity::probability(const FamiliarityScore& score) const {
-  return 1.0 /
-         (1.0 + std::exp(-(offset + explained_slope * score.explained + lead_slope * score.lead)));
-}
-
 void apply(const LearnedSensor& sensor, std::vector<Hypothesis>& hypotheses,
            ContactModel& contact) {
   sensor.validate();
@@ -213,11 +184,6 @@ void LearnedSensor::validate() const {
       require_sound(own);
     }
   }
-  if (familiarity &&
-      !(std::isfinite(familiarity->offset) && std::isfinite(familiarity->explained_slope) &&
-        std::isfinite(familiarity->lead_slope))) {
-    refuse("familiarity", familiarity->offset, "give an offset and two slopes");
-  }
   if (fit_scale && !std::isfinite(fit_scale->mean)) {
     refuse("fit_scale: mean", fit_scale->mean, "give a number");
   }
@@ -241,6 +207,13 @@ void LearnedSensor::validate() const {
   }
   if (fit_scale && fit_scale->stranger_sd && !is_positive(*fit_scale->stranger_sd)) {
     refuse("fit_scale: stranger_sd", *fit_scale->stranger_sd, "give a positive number");
+  }
+  if (fit_scale && fit_scale->stranger_alone && !std::isfinite(fit_scale->stranger_alone->mean)) {
+    refuse("fit_scale: stranger_alone: mean", fit_scale->stranger_alone->mean, "give a number");
+  }
+  if (fit_scale && fit_scale->stranger_alone && !(fit_scale->stranger_alone->sd >= 1.0)) {
+    refuse("fit_scale: stranger_alone: sd", fit_scale->stranger_alone->sd,
+           "give a number from 1, that of learned objects");
   }
   if (fit_scale && fit_scale->array &&
       !(is_positive(fit_scale->array->elements) && is_positive(fit_scale->array->spacing_mm))) {

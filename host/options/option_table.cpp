@@ -35,9 +35,9 @@ const std::array table{
            "What was learned about the sensor (YAML): the threshold, the ratio, gamma "
            "and the touches' standard deviations, which flags and scene keys override; a "
            "likelihood table in the place of gamma and prior; and how sure to be: the "
-           "temperature, press features, and whether the object was learned at all. Particles "
-           "leave the standard deviations out [default: the sensor.yaml that 'palpate map' wrote "
-           "beside the maps; none: Eq. 7]"},
+           "temperature, press features, and what touches of strangers are like. Particles leave "
+           "the standard deviations out [default: the sensor.yaml that 'palpate map' wrote beside "
+           "the maps; none: Eq. 7]"},
     Option{"bins", "bins", lattice, &Request::bins, from_1,
            "Pose bins per object along x, y and theta, as 25x25x16; auto: as many as the refined "
            "pose needs, in steps of 0.6 times the maps' cell or 1.2 times the sensor's spread, "

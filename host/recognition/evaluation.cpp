@@ -132,15 +132,10 @@ std::vector<ClassScores> classes_of(std::span<const JudgedRecord> records,
 }
 
 std::optional<double> score_of(const JudgedRecord& record, KnownScore score) {
-  switch (score) {
-    case KnownScore::known:
-      return record.known;
-    case KnownScore::none:
-      return record.none ? std::optional(1.0 - *record.none) : std::nullopt;
-    case KnownScore::fit:
-      break;
+  if (score == KnownScore::fit) {
+    return record.fit_z;
   }
-  return record.fit_z;
+  return record.none ? std::optional(1.0 - *record.none) : std::nullopt;
 }
 
 std::optional<KnownAgainstUnknown> compare_by(KnownScore score,
@@ -166,7 +161,7 @@ std::optional<KnownAgainstUnknown> compare_by(KnownScore score,
 
 std::optional<KnownAgainstUnknown> known_against_unknown(std::span<const JudgedRecord> records) {
   std::optional<KnownAgainstUnknown> best;
-  for (const KnownScore score : {KnownScore::known, KnownScore::none, KnownScore::fit}) {
+  for (const KnownScore score : {KnownScore::none, KnownScore::fit}) {
     const auto by_score = compare_by(score, records);
     if (by_score && (!best || by_score->records() > best->records())) {
       best = by_score;
@@ -195,17 +190,7 @@ std::optional<Median> median_of(std::span<const JudgedRecord> records,
 
 }  // namespace
 
-const char* name_of(KnownScore score) {
-  switch (score) {
-    case KnownScore::known:
-      return "known";
-    case KnownScore::none:
-      return "1 - none";
-    case KnownScore::fit:
-      break;
-  }
-  return "fit.z";
-}
+const char* name_of(KnownScore score) { return score == KnownScore::none ? "1 - none" : "fit.z"; }
 
 bool JudgedRecord::of_known_class() const {
   return truth != none_answer && identity.contains(truth);

@@ -34,7 +34,6 @@ struct JudgedRecord {
   std::string truth;                       ///< label of the true object
   std::string best;                        ///< label of the largest probability
   std::map<std::string, double> identity;  ///< {label: probability}; has `best`, sums to 1
-  std::optional<double> known;             ///< probability that the object is one of the maps'
   std::optional<double> none;              ///< probability of "(none)"
   std::optional<double> fit_z;             ///< see Fit
   std::optional<double> error_mm;          ///< pose error of the mode
@@ -94,18 +93,17 @@ struct ClassScores {
 
 /// What tells known from unknown classes; larger for known ones.
 enum class KnownScore {
-  known,  ///< JudgedRecord::known
-  none,   ///< 1 - JudgedRecord::none
-  fit     ///< JudgedRecord::fit_z
+  none,  ///< 1 - JudgedRecord::none
+  fit    ///< JudgedRecord::fit_z
 };
 
-/// "known", "1 - none" or "fit.z", by the fields of a record.
+/// "1 - none" or "fit.z", by the fields of a record.
 const char* name_of(KnownScore score);
 
 /// Area under the curve (ROC) of records of known against those of unknown classes: the probability
 /// that the one of the known class has the larger score; a tie counts half.
 struct KnownAgainstUnknown {
-  KnownScore score = KnownScore::known;
+  KnownScore score = KnownScore::none;
   std::size_t known = 0;  ///< records that have the score
   std::size_t unknown = 0;
   double area = 0.0;

@@ -199,7 +199,7 @@ FilterOptions with_evidence(FilterOptions filter, const LearnedSensor& sensor, b
   }
   const bool tempered = sensor.temperature > 1.0 || sensor.temperature_growth > 0.0;
   const double enough = share * sensor.temperature;
-  if (!(tempered || sensor.features || sensor.familiarity)) {
+  if (!(tempered || sensor.features)) {
     return filter;
   }
   if (bounded->evidence_nats) {
@@ -207,8 +207,6 @@ FilterOptions with_evidence(FilterOptions filter, const LearnedSensor& sensor, b
   } else {
     bounded->evidence_nats = enough;
     bounded->evidence_range_nats = -std::log(negligible) * sensor.temperature;
-    // Familiarity is told of a single touch.
-    bounded->single_touch_range_nats = sensor.familiarity ? FamiliarityScore::most_lead_nats : 0.0;
     bounded->evidence_growth = sensor.temperature_growth / sensor.temperature;
   }
   return filter;

@@ -71,11 +71,10 @@ FilterOptions filter_for_bins(std::span<const Hypothesis> hypotheses, const Filt
                               std::int64_t most_bins = most_histogram_bins);
 
 /// The filter as it is opened for a sensor model. A temperature above 1 and features give also
-/// improbable labels a share, and familiarity asks how far the best label leads, for which bounds
-/// find each label's evidence: within 0.05 times the temperature of the touches so far, so that no
-/// probability is off by more than about 10 % or 1e-4, or closer where
-/// BoundedOptions::evidence_nats says so. With a table, a search that meets nothing but poor fits
-/// ends, unless it is to go `to_the_end`.
+/// improbable labels a share, for which bounds find each label's evidence: within 0.05 times the
+/// temperature of the touches so far, so that no probability is off by more than about 10 % or
+/// 1e-4, or closer where BoundedOptions::evidence_nats says so. With a table, a search that meets
+/// nothing but poor fits ends, unless it is to go `to_the_end`.
 FilterOptions with_evidence(FilterOptions filter, const LearnedSensor& sensor,
                             bool to_the_end = false);
 

@@ -75,7 +75,6 @@ class RecordReader {
     JudgedRecord judged{.truth = true_label(),
                         .best = text("best", find(record_, "best")),
                         .identity = identity(),
-                        .known = probability("known"),
                         .none = probability("none"),
                         .fit_z = fit_z(),
                         .error_mm = error("error_mm"),

@@ -68,30 +68,19 @@ Tempering tempering_of(std::span<const TouchEvidence> touches, const Recognition
   if (fit && on_scale && task.labels.back() == none_label) {
     tempering.features.back() += misfit_nats(
         *fit, static_cast<std::size_t>(std::ranges::count_if(touches, &TouchEvidence::in_contact)),
-        task.fit_scale.stranger_sd.value_or(usual_stranger_sd));
+        task.fit_scale);
   }
   return tempering;
 }
 
-double weighed(double known, const RecognitionTask& task) {
-  double maps = 0.0;
-  for (const Hypothesis& hypothesis : task.hypotheses) {
-    maps += hypothesis.weight;
-  }
-  const double none = traits_of(task.filter).none_weight.value_or(0.0);
-  return known * maps / (known * maps + (1.0 - known) * none);
-}
-
 std::vector<double> label_probabilities(const Estimate& estimate, const Tempering& tempering,
-                                        const RecognitionTask& task, std::optional<double> known) {
-  const bool learned_none = known && task.labels.back() == none_label;
-  known = learned_none ? std::optional(weighed(*known, task)) : known;
+                                        const RecognitionTask& task) {
   const bool plain = std::ranges::all_of(tempering.features, [](double f) { return f == 0.0; });
-  if (tempering.temperature == 1.0 && plain && !learned_none) {
+  if (tempering.temperature == 1.0 && plain) {
     return sums_by_label(estimate, task);
   }
   std::vector<double> logs = label_log_evidence(estimate, task);
-  if (estimate.none_log_evidence && !learned_none) {
+  if (estimate.none_log_evidence) {
     logs.back() = *estimate.none_log_evidence;
   }
   for (std::size_t i = 0; i < logs.size(); ++i) {
@@ -104,10 +93,7 @@ std::vector<double> label_probabilities(const Estimate& estimate, const Temperin
     total += p;
   }
   for (double& p : logs) {
-    p *= (learned_none ? *known : 1.0) / total;
-  }
-  if (learned_none) {
-    logs.back() = 1.0 - *known;
+    p /= total;
   }
   return logs;
 }
@@ -129,15 +115,8 @@ std::vector<LogInterval> label_log_bounds(const Estimate& estimate, const Recogn
 std::vector<ProbabilityInterval> label_bounds(const Estimate& estimate,
                                               std::span<const double> identity,
                                               const Tempering& tempering,
-                                              const RecognitionTask& task,
-                                              std::optional<ProbabilityInterval> known) {
-  const bool learned_none = known && task.labels.back() == none_label;
-  ProbabilityInterval times{1.0, 1.0};
+                                              const RecognitionTask& task) {
   std::vector<LogInterval> of_label = label_log_bounds(estimate, task);
-  if (learned_none) {
-    times = {weighed(known->low, task), weighed(known->high, task)};
-    of_label.back() = {log_zero, log_zero};
-  }
   for (std::size_t i = 0; i < of_label.size(); ++i) {
     of_label[i] = {tempering.tempered(of_label[i].low, i), tempering.tempered(of_label[i].high, i)};
   }
@@ -150,11 +129,7 @@ std::vector<ProbabilityInterval> label_bounds(const Estimate& estimate,
         others.high = log_sum(others.high, of_label[j].high);
       }
     }
-    bounds.push_back({times.low * share(of_label[i].low, others.high),
-                      times.high * share(of_label[i].high, others.low)});
-  }
-  if (learned_none) {
-    bounds.back() = {1.0 - times.high, 1.0 - times.low};
+    bounds.push_back({share(of_label[i].low, others.high), share(of_label[i].high, others.low)});
   }
   for (std::size_t i = 0; i < bounds.size(); ++i) {
     // The probability itself is rounded, too.

@@ -44,17 +44,10 @@ struct Tempering {
 Tempering tempering_of(std::span<const TouchEvidence> touches, const RecognitionTask& task,
                        const std::optional<Fit>& fit = {});
 
-/// `known`, which is learned at even odds, at those of the maps' weights against that of "(none)".
-double weighed(double known, const RecognitionTask& task);
-
 /// The probability of every label: E^(1 / temperature) exp(features), normalised; by
-/// sums_by_label() where nothing changes them. Where the task has none_label and `known` is given,
-/// the maps' labels share weighed(known) among themselves and none_label has the rest: touches that
-/// disagree, of which the evidence of none_label is made, take at least two.
-/// @param known probability that the object is one of the maps'; see RecognitionStep::known
+/// sums_by_label() where nothing changes them.
 std::vector<double> label_probabilities(const Estimate& estimate, const Tempering& tempering,
-                                        const RecognitionTask& task,
-                                        std::optional<double> known = {});
+                                        const RecognitionTask& task);
 
 /// The log of a probability of 0.
 inline constexpr double log_zero = -std::numeric_limits<double>::infinity();
@@ -71,15 +64,13 @@ std::vector<LogInterval> label_log_bounds(const Estimate& estimate, const Recogn
 /// (Certificate::log_evidence). A label is least probable where its own evidence is the lowest and
 /// all other evidence the highest. With q of label_probabilities() for the label's evidence E:
 ///   low = q(E_low) of the label / (q(E_low) of the label + q(E_high) of the others),
-/// high likewise. "(none)" has the bounds of its own evidence, or where `known` of
-/// label_probabilities() takes its place, those of 1 - weighed(known), and labels share the rest.
+/// high likewise. "(none)" has the bounds of its own evidence.
 /// @param estimate with a certificate
 /// @param identity [label] of the estimate; lies within its bounds
 /// @returns [label], none_label included where the task has it
 std::vector<ProbabilityInterval> label_bounds(const Estimate& estimate,
                                               std::span<const double> identity,
                                               const Tempering& tempering,
-                                              const RecognitionTask& task,
-                                              std::optional<ProbabilityInterval> known = {});
+                                              const RecognitionTask& task);
 
 }  // namespace palpate

@@ -10,17 +10,15 @@ namespace palpate {
 inline constexpr double usual_stranger_sd = 4.0;
 
 /// The density, but for a factor, of Fit::z of touches of a stranger, an object that was never
-/// learned, at the best pose of the best object that was. One touch fits as well as a learned
-/// object's; the further ones have to share its pose, and each spreads z by `stranger_sd` more.
-/// That of 0 is the density of a learned object's z. No density is 0.
-/// @param fit on a scale that was learned
+/// learned, at the best pose of the best object that was. One touch fits as stranger_alone says;
+/// further ones have to share its pose, and each spreads z by stranger_sd more. No density is 0.
+/// @param fit on the scale
 /// @param touches with an element In Contact
-double stranger_density(const Fit& fit, std::size_t touches, double stranger_sd);
+/// @param scale that was learned
+double stranger_density(const Fit& fit, std::size_t touches, const FitScale& scale);
 
 /// What the fit of the best object says for none_label: the log of how likely a stranger fits so,
-/// over how likely a learned object does. After one touch it says nothing.
-/// @param fit on a scale that was learned
-/// @param touches with an element In Contact
-double misfit_nats(const Fit& fit, std::size_t touches, double stranger_sd);
+/// over how likely a learned object does. Parameters as above.
+double misfit_nats(const Fit& fit, std::size_t touches, const FitScale& scale);
 
 }  // namespace palpate

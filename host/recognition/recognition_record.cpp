@@ -9,7 +9,6 @@
 
 #include <fmt/format.h>
 
-#include "estimation/hypotheses.hpp"
 #include "estimation/lattice/refinement.hpp"
 #include "palpate/error.hpp"
 #include "palpate/object_frame.hpp"
@@ -54,67 +53,6 @@ using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
-}
-
-/// The touch that tells something where it is the only one; else null.
-const TouchEvidence* only_telling(std::span<const TouchEvidence> touches) {
-  const auto first = std::ranges::find_if(touches, &TouchEvidence::tells);
-  const bool only = first != touches.end() &&
-                    std::none_of(first + 1, touches.end(), std::mem_fn(&TouchEvidence::tells));
-  return only ? &*first : nullptr;
-}
-
-/// RecognitionStep::known
-std::optional<double> known_of(const Estimate& estimate, std::span<const TouchEvidence> touches,
-                               const RecognitionTask& task) {
-  const TouchEvidence* touch = only_telling(touches);
-  if (!tells_known(task) || touch == nullptr || !touch->in_contact()) {
-    return {};
-  }
-  std::vector<double> evidence = label_log_evidence(estimate, task);
-  if (task.labels.back() == none_label) {
-    evidence.pop_back();
-  }
-  return task.familiarity->probability(
-      FamiliarityScore::of(touch->readings, estimate.mode.log_likelihood, evidence));
-}
-
-/// Bounds of known_of(): by as much as a bin that no search has evaluated may explain the touch
-/// better than the mode, and as the best label may lead.
-/// @param estimate with a certificate
-ProbabilityInterval known_bounds(const Estimate& estimate, std::span<const TouchEvidence> touches,
-                                 const RecognitionTask& task) {
-  const Certificate& certificate = *estimate.certificate;
-  double best = estimate.mode.log_likelihood;
-  if (!certificate.mode_certain) {
-    const std::vector<double> log_weight = log_weights(task.hypotheses);
-    for (std::size_t h = 0; h < log_weight.size(); ++h) {
-      const auto [low, high] = certificate.log_evidence[h];
-      best = std::max(best, high + std::log1p(-std::exp(low - high)) - log_weight[h]);
-    }
-  }
-  std::vector<LogInterval> evidence = label_log_bounds(estimate, task);
-  if (task.labels.back() == none_label) {
-    evidence.pop_back();
-  }
-  LogInterval lead{0.0, 0.0};  // of some label before all others
-  for (std::size_t i = 0; i < evidence.size() && evidence.size() > 1; ++i) {
-    LogInterval next{log_zero, log_zero};
-    for (std::size_t j = 0; j < evidence.size(); ++j) {
-      if (j != i) {
-        next = {std::max(next.low, evidence[j].low), std::max(next.high, evidence[j].high)};
-      }
-    }
-    lead = {std::max(lead.low, evidence[i].low - next.high),
-            std::max(lead.high, evidence[i].high - next.low)};
-  }
-  const auto probability = [&](double log_likelihood, double lead_nats) {
-    const std::vector<double> leading{0.0, -lead_nats};
-    return task.familiarity->probability(FamiliarityScore::of(
-        only_telling(touches)->readings, log_likelihood,
-        std::span(leading).first(std::min<std::size_t>(evidence.size(), leading.size()))));
-  };
-  return {probability(estimate.mode.log_likelihood, lead.low), probability(best, lead.high)};
 }
 
 /// RecognitionStep::fit and RecognitionStep::touch_fit.
@@ -219,8 +157,7 @@ RecognitionStep judge(const Estimate& estimate, const PartialTruth& truth,
   const std::vector<std::string>& labels = task.labels;
   StepFit fit = fit_of(estimate.mode, refined, touches, task);
   const Tempering tempering = tempering_of(touches, task, fit.fit);
-  const std::optional<double> known = known_of(estimate, touches, task);
-  RecognitionStep step{.identity = label_probabilities(estimate, tempering, task, known),
+  RecognitionStep step{.identity = label_probabilities(estimate, tempering, task),
                        .mode = estimate.mode,
                        .refined = refined,
                        .contradicted = estimate.contradicted,
@@ -228,12 +165,9 @@ RecognitionStep judge(const Estimate& estimate, const PartialTruth& truth,
                        .symmetry = task.hypotheses[estimate.mode.object].map.symmetry,
                        .body = task.bodies[estimate.mode.object],
                        .fit = fit.fit,
-                       .touch_fit = std::move(fit.touches),
-                       .known = known};
+                       .touch_fit = std::move(fit.touches)};
   if (estimate.certificate) {
-    step.identity_bounds =
-        label_bounds(estimate, step.identity, tempering, task,
-                     known ? std::optional(known_bounds(estimate, touches, task)) : std::nullopt);
+    step.identity_bounds = label_bounds(estimate, step.identity, tempering, task);
     step.certificate = estimate.certificate;
   }
   step.best = static_cast<std::size_t>(

@@ -91,9 +91,6 @@ struct RecognitionStep {
   /// [touch] z of each touch by itself at the refined pose, on the scale of `fit`: which of them
   /// disagrees. None of a touch without a known element. Empty where `fit` is, and for particles.
   std::vector<std::optional<double>> touch_fit = {};
-  /// Probability that the object was learned, where tells_known() and the unknown is a single touch
-  /// with an element In Contact; "(none)" in `identity` then has the rest.
-  std::optional<double> known = {};
   BeliefPlaces places = {};           ///< where the belief lies, all objects' together
   Decision decision = {};             ///< whether to act on pose()
   std::vector<std::string> warnings;  ///< what looks wrong with the touches, in whole sentences

@@ -126,8 +126,4 @@ std::string wider_bins_sentence(const RecognitionTask& task) {
       lattice.x_mm.count, lattice.y_mm.count, lattice.theta_rad.count);
 }
 
-bool tells_known(const RecognitionTask& task) {
-  return task.familiarity && traits_of(task.filter).bins;
-}
-
 }  // namespace palpate

@@ -72,7 +72,6 @@ struct RecognitionTask {
   double temperature_growth = 0.0;
   std::optional<BinSteps> learned_bins = {};  ///< LearnedSensor::bins
   std::optional<LearnedFeatures> features = {};
-  std::optional<Familiarity> familiarity = {};
   FitScale fit_scale = {};    ///< of RecognitionStep::fit
   PoseScale pose_scale = {};  ///< of RecognitionStep::refined and of modes
   /// Tolerance of a trace's steps before the last; BoundedOptions::tolerance where it is not set.
@@ -87,9 +86,5 @@ struct RecognitionTask {
 /// What to say where the task's bins are more than 1.5 times as wide as those of the sensor model;
 /// "" elsewhere.
 std::string wider_bins_sentence(const RecognitionTask& task);
-
-/// Whether a single touch tells how probably its object was learned: the task has a Familiarity,
-/// and the filter a mode with the log-likelihood of the touch.
-bool tells_known(const RecognitionTask& task);
 
 }  // namespace palpate

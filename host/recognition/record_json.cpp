@@ -102,9 +102,6 @@ nlohmann::ordered_json to_json(const RecognitionStep& step, const RecognitionTas
   if (task.labels.back() == none_label) {
     json["none"] = step.identity.back();
   }
-  if (step.known) {
-    json["known"] = *step.known;
-  }
   const Mode& mode = step.mode;
   json["mode"] = {{"object", task.labels[task.label_of[mode.object]]},
                   {"map", task.map_paths[mode.object]},

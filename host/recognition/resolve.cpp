@@ -298,7 +298,6 @@ RecognitionTask resolve(const Request& request, const Circumstances& of) {
     task.temperature_growth = sensor->temperature_growth;
     task.learned_bins = sensor->bins;
     task.features = sensor->features;
-    task.familiarity = sensor->familiarity;
     task.fit_scale = sensor->fit_scale.value_or(FitScale{});
     task.pose_scale = sensor->pose_scale.value_or(PoseScale{});
   } else {

@@ -75,6 +75,14 @@ void bind_learned_sensor(nb::module_& module) {
           "object was never learned; None where fewer than three objects tell it, at known poses:\n"
           "then recognition takes 4.")
       .def_prop_ro(
+          "stranger_alone",
+          [](const LearnedSensor& self) {
+            const auto& alone = self.fit_scale ? self.fit_scale->stranger_alone : std::nullopt;
+            return alone ? std::optional(std::tuple(alone->mean, alone->sd)) : std::nullopt;
+          },
+          "(mean, standard deviation) of fit.z of one touch where the object was never learned;\n"
+          "None where fewer than three objects tell it.")
+      .def_prop_ro(
           "layer", [](const LearnedSensor& self) { return layer_word(self.table->layer.of); },
           "What of a map readings are compared with: \"mean_level\" or \"log_odds\".")
       .def_prop_ro(
@@ -170,7 +178,7 @@ void bind_calibration(nb::module_& module) {
   nb::class_<SensorCalibration>(
       module, "SensorCalibration",
       "A learned sensor and how good it is on touches that it has not seen, by cross-validation.\n"
-      "With one object there is none to compare by, and `before` to `area_under_curve` are None.")
+      "With one object there is none to compare by, and `before` to `groups` are None.")
       .def_ro("sensor", &SensorCalibration::sensor, "What was learned.")
       .def_ro("array_offset", &SensorCalibration::array_offset,
               "Where the array sits in the tool, a SetupFinding, from touches at known poses of\n"
@@ -192,8 +200,6 @@ void bind_calibration(nb::module_& module) {
       .def_ro("after", &SensorCalibration::after, "The table, temperature and press features.")
       .def_ro("groups", &SensorCalibration::groups,
               "Several touches at a time; None at unknown poses, or for few touches.")
-      .def_ro("area_under_curve", &SensorCalibration::area_under_curve,
-              "Of touches of known objects against those of objects that were left out.")
       .def_ro("warnings", &SensorCalibration::warnings, "What could not be learned, in sentences.")
       .def("__repr__", [](const SensorCalibration& self) {
         return fmt::format(

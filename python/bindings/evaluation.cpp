@@ -103,7 +103,7 @@ void bind_scores(nb::module_& module) {
       "How well a score tells records of known classes from those of unknown ones.")
       .def_prop_ro(
           "score", [](const KnownAgainstUnknown& self) { return name_of(self.score); },
-          "\"known\", \"1 - none\" or \"fit.z\": the field that most records have.")
+          "\"1 - none\" or \"fit.z\": the field that most records have.")
       .def_ro("known", &KnownAgainstUnknown::known, "Records of known classes with the score.")
       .def_ro("unknown", &KnownAgainstUnknown::unknown, "Records of unknown classes with it.")
       .def_ro(

@@ -60,7 +60,7 @@ INSTANTIATE_TEST_SUITE_P(
                   [](json& r) { r["identity"]["A"] = 0.5; },
                   {"'identity' sums to 0.75", "sum to 1"}},
         BadRecord{
-            "known_out_of_range", [](json& r) { r["known"] = 2; }, {"'known' = 2", "give 0 to 1"}},
+            "none_out_of_range", [](json& r) { r["none"] = 2; }, {"'none' = 2", "give 0 to 1"}},
         BadRecord{"none_is_a_text", [](json& r) { r["none"] = "?"; }, {"'none' is string"}},
         BadRecord{"fit_is_a_number", [](json& r) { r["fit"] = 1.0; }, {"'fit' is number"}},
         BadRecord{"z_is_a_text", [](json& r) { r["fit"]["z"] = "x"; }, {"'fit.z' is string"}},

@@ -105,17 +105,9 @@ TEST_F(EvaluateCommand, ReadsLinesFoldersAndSingleRecords) {
             expected);
 }
 
-TEST_F(EvaluateCommand, PrefersTheScoreKnown) {
+TEST_F(EvaluateCommand, TakesTheFitWhereNothingSaysNone) {
   json records = four();
   for (json& each : records) {
-    each["known"] = 0.5;
-  }
-  put_bytes(folder_ / "r.json", records.dump());
-  const json by_known = evaluated({"r.json"})["unknown_classes"]["area_under_curve"];
-  EXPECT_EQ(by_known["score"], "known");
-  EXPECT_EQ(by_known["area"], 0.5);
-  for (json& each : records) {
-    each.erase("known");
     each.erase("none");
     each["fit"] = {{"z", each["best"] == "(none)" ? -5.0 : 0.0}, {"verdict", "fits"}};
   }

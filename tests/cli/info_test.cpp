@@ -137,10 +137,11 @@ TEST_F(InfoCommand, SensorModel) {
       .temperature = 31.5,
       .temperature_growth = 0.75,
       .bins = BinSteps{.x_mm = 0.8, .y_mm = 0.4, .theta_rad = std::numbers::pi / 8.0},
-      .familiarity = Familiarity{.offset = 6.0, .explained_slope = 12.0, .lead_slope = 0.5},
-      .fit_scale =
-          FitScale{
-              .mean = -4.5, .sd = 12.25, .alone = SingleFitScale{1.5, 0.75}, .stranger_sd = 3.5},
+      .fit_scale = FitScale{.mean = -4.5,
+                            .sd = 12.25,
+                            .alone = SingleFitScale{1.5, 0.75},
+                            .stranger_sd = 3.5,
+                            .stranger_alone = SingleFitScale{-2.5, 1.25}},
       .pose_scale = PoseScale{.factor = 0.75, .map_sd_mm = 0.125}};
   sensor.maps = {{"pen.map.h5", "1a"}, {"mug.map.h5", "2b"}};
   sensor.table->shared.assign(3 * ReadingLayer::nodes, -1.0);
@@ -153,7 +154,8 @@ TEST_F(InfoCommand, SensorModel) {
        "temperature       31.5, and 0.75 more for every further touch",
        "learned on bins   0.8 x 0.4 mm x 22.5 deg",
        "z of learned objects -4.5 +- 12.25, of a single touch where it fits best 1.5 +- 0.75, of "
-       "strangers +- 3.5 more on it for every further touch",
+       "strangers +- 3.5 more on it for every further touch, of a single touch of strangers -2.5 "
+       "+- 1.25 on it",
        "learned for       mug.map.h5, pen.map.h5",
        "pose scale        covariances times 0.75, and 0.125 mm of the map along each axis"});
 }

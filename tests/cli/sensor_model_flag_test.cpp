@@ -105,15 +105,11 @@ TEST_F(SensorModelFlag, LowersConfidenceByItsTemperature) {
 }
 
 TEST_F(SensorModelFlag, TakesATableInThePlaceOfEquation7) {
-  write({.table = table_of_equation_7(),
-         .familiarity = Familiarity{.offset = 2.0, .explained_slope = 1.0}});
+  write({.table = table_of_equation_7()});
   for (const char* filter : {"histogram", "bounded", "particles"}) {
     const json r = learned({"--filter", filter});
     EXPECT_EQ(r["best"], "R") << filter;
-    EXPECT_FALSE(r.contains("known")) << "of six touches";
   }
-  const double known = learned({"--touches=1"})["known"].get<double>();
-  EXPECT_TRUE(known > 0.0 && known < 1.0) << known;
   EXPECT_EQ(palpate({"plan", "u.h5", "--maps", "maps", "--candidates", "u.h5", "--samples=16",
                      "--bins=9x9x8", "--sensor-model", "s.yaml"})
                 .status,
@@ -125,14 +121,21 @@ TEST_F(SensorModelFlag, TakesATableInThePlaceOfEquation7) {
 }
 
 TEST_F(SensorModelFlag, TellsStrangersByHowBadlyTheyFit) {
-  const auto none = [&](std::optional<double> stranger_sd) {
-    write({.fit_scale = FitScale{.shared_sd = 0.1, .stranger_sd = stranger_sd}});
-    return record({"u.h5", "--maps", "maps", "--touches=2", "--sensor-model",
+  const auto none = [&](const FitScale& scale, const char* touches) {
+    write({.fit_scale = scale});
+    return record({"u.h5", "--maps", "maps", touches, "--sensor-model",
                    "s.yaml"})["identity"]["(none)"]
         .get<double>();
   };
-  EXPECT_GT(none(1.0), none(8.0)) << "the touches fit well";
-  EXPECT_EQ(none({}), none(4.0));
+  const auto of_two = [&](std::optional<double> stranger_sd) {
+    return none({.shared_sd = 0.1, .stranger_sd = stranger_sd}, "--touches=2");
+  };
+  EXPECT_GT(of_two(1.0), of_two(8.0)) << "the touches fit well";
+  EXPECT_EQ(of_two({}), of_two(4.0));
+  const auto of_one = [&](std::optional<SingleFitScale> alone) {
+    return none({.shared_sd = 0.1, .stranger_alone = alone}, "--touches=1");
+  };
+  EXPECT_LT(of_one(SingleFitScale{-8.0, 2.0}), 0.5 * of_one({})) << "the touch fits well";
 }
 
 TEST_F(SensorModelFlag, SaysWhereBinsAreWiderThanItsOwn) {

@@ -19,12 +19,12 @@ LearnedSensor full_sensor() {
       .temperature_growth = 2.25,
       .bins = BinSteps{.x_mm = 0.5, .y_mm = 0.25, .theta_rad = 0.125},
       .features = LearnedFeatures{},
-      .familiarity = Familiarity{.offset = -3.5, .explained_slope = 20.25, .lead_slope = 0.5},
       .fit_scale = FitScale{.mean = -4.5,
                             .sd = 12.25,
                             .shared_sd = 0.5,
                             .alone = SingleFitScale{1.5, 0.75},
                             .stranger_sd = 3.25,
+                            .stranger_alone = SingleFitScale{-4.25, 2.75},
                             .array = FitArray{.elements = 36.0, .spacing_mm = 1.875}}};
   LearnedTable& table = *sensor.table;
   table.layer = {.of = MapLayer::mean_level,
@@ -82,7 +82,7 @@ TEST_F(SensorModelFile, ComesBackAsItWasWritten) {
   EXPECT_EQ(read.bins->x_mm, written.bins->x_mm);
   EXPECT_EQ(read.bins->y_mm, written.bins->y_mm);
   EXPECT_EQ(read.bins->theta_rad, written.bins->theta_rad);
-  ASSERT_TRUE(read.table && read.features && read.familiarity);
+  ASSERT_TRUE(read.table && read.features);
   EXPECT_EQ(read.table->layer.of, written.table->layer.of);
   EXPECT_EQ(read.table->layer.near_mm, written.table->layer.near_mm);
   EXPECT_EQ(read.table->layer.far_mm, written.table->layer.far_mm);
@@ -97,9 +97,6 @@ TEST_F(SensorModelFile, ComesBackAsItWasWritten) {
   EXPECT_EQ(read.features->objects.at("pen").sd, written.features->objects.at("pen").sd);
   EXPECT_EQ(read.features->objects.at("pen").correlation,
             written.features->objects.at("pen").correlation);
-  EXPECT_EQ(read.familiarity->offset, written.familiarity->offset);
-  EXPECT_EQ(read.familiarity->explained_slope, written.familiarity->explained_slope);
-  EXPECT_EQ(read.familiarity->lead_slope, written.familiarity->lead_slope);
   ASSERT_TRUE(read.fit_scale);
   EXPECT_EQ(read.fit_scale->mean, written.fit_scale->mean);
   EXPECT_EQ(read.fit_scale->sd, written.fit_scale->sd);
@@ -108,31 +105,36 @@ TEST_F(SensorModelFile, ComesBackAsItWasWritten) {
   EXPECT_EQ(read.fit_scale->alone->mean, written.fit_scale->alone->mean);
   EXPECT_EQ(read.fit_scale->alone->sd, written.fit_scale->alone->sd);
   EXPECT_EQ(read.fit_scale->stranger_sd, written.fit_scale->stranger_sd);
+  ASSERT_TRUE(read.fit_scale->stranger_alone);
+  EXPECT_EQ(read.fit_scale->stranger_alone->mean, written.fit_scale->stranger_alone->mean);
+  EXPECT_EQ(read.fit_scale->stranger_alone->sd, written.fit_scale->stranger_alone->sd);
   ASSERT_TRUE(read.fit_scale->array);
   EXPECT_EQ(read.fit_scale->array->elements, 36.0);
   EXPECT_EQ(read.fit_scale->array->spacing_mm, 1.875);
 }
 
 TEST_F(SensorModelFile, MayHoldLittle) {
-  put_bytes(path_, "format: palpate.sensor_model\nthreshold: 3\npsf_mm: 1.2\n");
+  put_bytes(path_, "format: palpate.sensor_model\nthreshold: 3\n");
   const LearnedSensor read = read_sensor_model(path_);
   EXPECT_EQ(read.classifier.threshold, 3.0);
   EXPECT_EQ(read.temperature, 1.0);
   EXPECT_EQ(read.temperature_growth, 0.0);
-  EXPECT_FALSE(read.table || read.features || read.familiarity || read.fit_scale || read.bins);
+  EXPECT_FALSE(read.table || read.features || read.fit_scale || read.bins);
 }
 
 TEST_F(SensorModelFile, MayTellNothingOfStrangersAndOfSingleTouches) {
   LearnedSensor sensor = full_sensor();
   sensor.fit_scale->stranger_sd.reset();
+  sensor.fit_scale->stranger_alone.reset();
   sensor.fit_scale->alone.reset();
   write_sensor_model(path_, sensor);
-  EXPECT_EQ(bytes_of(path_).find("stranger_sd"), std::string::npos);
+  EXPECT_EQ(bytes_of(path_).find("stranger"), std::string::npos);
   EXPECT_EQ(bytes_of(path_).find("alone"), std::string::npos);
   const LearnedSensor read = read_sensor_model(path_);
   ASSERT_TRUE(read.fit_scale);
   EXPECT_EQ(read.fit_scale->sd, sensor.fit_scale->sd);
-  EXPECT_FALSE(read.fit_scale->stranger_sd || read.fit_scale->alone);
+  EXPECT_FALSE(read.fit_scale->stranger_sd || read.fit_scale->stranger_alone ||
+               read.fit_scale->alone);
 }
 
 TEST_F(SensorModelFile, SaysWhatIsWrong) {
@@ -159,6 +161,12 @@ TEST_F(SensorModelFile, SaysWhatIsWrong) {
                {"fit_scale: alone: sd", "positive"});
   expect_named(message("stranger_sd: 3.25", "stranger_sd: 0"),
                {"fit_scale: stranger_sd", "positive"});
+  expect_named(
+      message("stranger_alone: {mean: -4.25, sd: 2.75}", "stranger_alone: {mean: -4.25, sd: 0.5}"),
+      {"fit_scale: stranger_alone: sd", "from 1"});
+  expect_named(message("noise: 0.25", "psf_mm: 1"), {"psf_mm", "remove it", "spread_mm"});
+  expect_named(message("noise: 0.25", "familiarity: {offset: 1}"),
+               {"familiarity", "remove it", "stranger_alone"});
   expect_named(message("raw", "psi"), {"pressure_unit", "kPa or raw"});
   put_bytes(path_, "threshold: 3\n");
   expect_named(input_error([&] { read_sensor_model(path_); }), {"format", "palpate calibrate"});

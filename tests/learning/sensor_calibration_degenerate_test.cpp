@@ -79,7 +79,7 @@ TEST_P(DegeneratePresses, OfOneObjectKeepTheDefaultConfidence) {
   const SensorCalibration found = learned(letters.presses);
   EXPECT_EQ(found.objects, 1U);
   EXPECT_EQ(found.sensor.temperature, 1.0);
-  EXPECT_FALSE(found.sensor.features || found.sensor.familiarity || found.before);
+  EXPECT_FALSE(found.sensor.features || found.before);
   ASSERT_EQ(found.warnings.size(), 1U);
   EXPECT_TRUE(warns(found, "touches of one object say nothing about confidence"));
 }

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,10 @@
 namespace palpate::stranger_fit_test {
 
 constexpr FitScale scale{.mean = 0.9, .sd = 1.4, .shared_sd = 0.1};
+
+using Fits = std::map<std::string, std::vector<StrangerFit>>;
+
+std::optional<double> sd_of(const Fits& fits) { return with_strangers(fits, scale).stranger_sd; }
 
 /// Fits as wide as the model says, one in ten of them wider, of objects left out.
 class Strangers {
@@ -28,37 +33,58 @@ class Strangers {
     }
   }
 
-  std::map<std::string, std::vector<StrangerFit>> fits;
+  Fits fits;
 
  private:
   Random random_{7, Stream::readings};
 };
 
-TEST(StrangerSd, IsThatByWhichFitsWereDrawn) {
+TEST(WithStrangers, FindsTheSdByWhichFitsWereDrawn) {
   for (const double truth : {1.5, 3.0, 6.0}) {
     Strangers strangers;
     for (const char* label : {"A", "E", "U"}) {
       strangers.add(label, 300, 3, truth);
       strangers.add(label, 100, 2, truth);
     }
-    EXPECT_NEAR(stranger_sd_of(strangers.fits, scale).value(), truth, 0.1 * truth);
+    EXPECT_NEAR(sd_of(strangers.fits).value(), truth, 0.1 * truth);
   }
 }
 
-TEST(StrangerSd, OfFewerThanThreeObjectsIsNone) {
+TEST(WithStrangers, FindsWhatSingleTouchesAreLike) {
+  Random random(8, Stream::readings);
+  for (const SingleFitScale& truth : {SingleFitScale{0.0, 1.0}, SingleFitScale{-6.0, 3.0}}) {
+    Fits fits;
+    const double spread = std::sqrt(scale.sd * scale.sd + scale.shared_sd * scale.shared_sd);
+    for (const char* label : {"A", "E", "U"}) {
+      for (int i = 0; i < 300; ++i) {
+        const double z = truth.mean + truth.sd * random.normal();
+        fits[label].push_back({{.z = scale.mean + spread * z}, 1});
+      }
+    }
+    const FitScale found = with_strangers(fits, scale);
+    ASSERT_TRUE(found.stranger_alone);
+    EXPECT_NEAR(found.stranger_alone->mean, truth.mean, 0.5);
+    EXPECT_NEAR(found.stranger_alone->sd, truth.sd, 0.15 * truth.sd);
+    EXPECT_FALSE(found.stranger_sd) << "of single touches alone";
+    fits.erase("U");
+    EXPECT_FALSE(with_strangers(fits, scale).stranger_alone) << "of two objects";
+  }
+}
+
+TEST(WithStrangers, OfFewerThanThreeObjectsIsNone) {
   Strangers strangers;
   strangers.add("A", 300, 3, 4.0);
   strangers.add("E", 300, 3, 4.0);
-  EXPECT_FALSE(stranger_sd_of({}, scale));
-  EXPECT_FALSE(stranger_sd_of(strangers.fits, scale));
+  EXPECT_FALSE(sd_of({}));
+  EXPECT_FALSE(sd_of(strangers.fits));
   strangers.add("U", 4, 3, 4.0);
   strangers.add("U", 20, 1, 4.0);
-  EXPECT_FALSE(stranger_sd_of(strangers.fits, scale)) << "of four groups, and of single touches";
+  EXPECT_FALSE(sd_of(strangers.fits)) << "of four groups, and of single touches";
   strangers.add("U", 1, 3, 4.0);
-  EXPECT_TRUE(stranger_sd_of(strangers.fits, scale));
+  EXPECT_TRUE(sd_of(strangers.fits));
 }
 
-TEST(StrangerSd, CountsObjectsAlikeHoweverOftenTheyWereTouched) {
+TEST(WithStrangers, CountsObjectsAlikeHoweverOftenTheyWereTouched) {
   Strangers alike;
   Strangers often;
   for (const char* label : {"A", "E", "U"}) {
@@ -66,11 +92,11 @@ TEST(StrangerSd, CountsObjectsAlikeHoweverOftenTheyWereTouched) {
     alike.add(label, 200, 3, stranger_sd);
     often.add(label, label[0] == 'A' ? 4000 : 200, 3, stranger_sd);
   }
-  const double expected = stranger_sd_of(alike.fits, scale).value();
-  EXPECT_NEAR(stranger_sd_of(often.fits, scale).value(), expected, 0.15 * expected);
+  const double expected = sd_of(alike.fits).value();
+  EXPECT_NEAR(sd_of(often.fits).value(), expected, 0.15 * expected);
 }
 
-TEST(StrangerSd, StaysWithinAQuarterAndFourTimesPalpatesOwn) {
+TEST(WithStrangers, StaysWithinAQuarterAndFourTimesPalpatesOwn) {
   Strangers alike;
   Strangers unlike;
   for (const char* label : {"A", "E", "U"}) {
@@ -79,8 +105,8 @@ TEST(StrangerSd, StaysWithinAQuarterAndFourTimesPalpatesOwn) {
       unlike.fits[label].push_back({{.z = -largest_fit_z}, 2});
     }
   }
-  EXPECT_EQ(stranger_sd_of(alike.fits, scale), 1.0);
-  EXPECT_NEAR(stranger_sd_of(unlike.fits, scale).value(), 16.0, 1.0);
+  EXPECT_EQ(sd_of(alike.fits), 1.0);
+  EXPECT_NEAR(sd_of(unlike.fits).value(), 16.0, 1.0);
 }
 
 }  // namespace palpate::stranger_fit_test

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <numbers>
 
 #include "palpate/error.hpp"
 
@@ -140,26 +139,6 @@ TEST(PressFeatures, AreLogarithmsOfAreaForceAndPeak) {
   EXPECT_DOUBLE_EQ(area, std::log(3.0));
   EXPECT_DOUBLE_EQ(force, std::log(8.25));
   EXPECT_DOUBLE_EQ(peak, std::log(6.0));
-}
-
-TEST(Familiarity, IsALogisticFunctionOfTheScore) {
-  const Familiarity familiarity{.offset = 3.0, .explained_slope = 2.0, .lead_slope = 0.5};
-  EXPECT_DOUBLE_EQ(familiarity.probability({.explained = -2.0, .lead = 2.0}), 0.5);
-  EXPECT_DOUBLE_EQ(familiarity.probability({.explained = -2.0, .lead = 0.0}),
-                   1.0 / (1.0 + std::numbers::e));
-}
-
-TEST(Familiarity, ScoresATouchBesideItsOwnFrequencies) {
-  const std::vector<Reading> readings{Reading::no_contact, Reading::no_contact, Reading::in_contact,
-                                      contact_level(1), Reading::unknown};
-  const double by_frequency = -2.0 * std::log(0.5) - 2.0 * std::log(0.25);
-  const std::vector<double> evidence{-7.0, -3.0, -12.0};
-  const FamiliarityScore score = FamiliarityScore::of(readings, -5.0, evidence);
-  EXPECT_DOUBLE_EQ(score.explained, -5.0 / (1.0 + by_frequency));
-  EXPECT_DOUBLE_EQ(score.lead, std::log(5.0));
-  EXPECT_EQ(FamiliarityScore::of(readings, -5.0, std::vector{-3.0}).lead, 0.0);
-  const std::vector<double> apart{-3.0, -INFINITY};
-  EXPECT_DOUBLE_EQ(FamiliarityScore::of(readings, -5.0, apart).lead, std::log(101.0));
 }
 
 }  // namespace palpate::learned_sensor_test

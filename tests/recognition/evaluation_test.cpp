@@ -13,7 +13,6 @@ JudgedRecord record(const std::string& truth, const std::string& best, double a,
   return {.truth = truth,
           .best = best,
           .identity = {{"A", a}, {"B", b}, {"(none)", none}},
-          .known = {},
           .none = none,
           .fit_z = {},
           .error_mm = {},
@@ -110,7 +109,7 @@ TEST(Evaluation, WithoutUnknownClassesHasNothingToTellApart) {
   EXPECT_FALSE(e.known || e.unknown || e.known_against_unknown);
 }
 
-TEST(KnownAgainstUnknown, PrefersKnownThenNoneThenFit) {
+TEST(KnownAgainstUnknown, PrefersNoneToTheFit) {
   std::vector<JudgedRecord> records = six();
   const auto by_none = evaluate(records).known_against_unknown.value();
   EXPECT_EQ(by_none.score, KnownScore::none);
@@ -120,27 +119,13 @@ TEST(KnownAgainstUnknown, PrefersKnownThenNoneThenFit) {
   EXPECT_DOUBLE_EQ(by_none.standard_error, told_apart_error(7.0 / 8.0, 2, 4));
 
   for (JudgedRecord& each : records) {
-    each.known = each.of_known_class() ? 0.5 : 0.1;
+    each.fit_z = each.of_known_class() ? 0.5 : -0.1;
   }
-  EXPECT_EQ(evaluate(records).known_against_unknown->score, KnownScore::known);
-  EXPECT_EQ(evaluate(records).known_against_unknown->area, 1.0);
-  records[0].known.reset();
-  EXPECT_EQ(evaluate(records).known_against_unknown->score, KnownScore::none)
+  EXPECT_EQ(evaluate(records).known_against_unknown->score, KnownScore::none);
+  records[0].none.reset();
+  EXPECT_EQ(evaluate(records).known_against_unknown->score, KnownScore::fit)
       << "one record has no other score";
-}
-
-TEST(KnownAgainstUnknown, TakesKnownWhereOneTouchMetNothing) {
-  std::vector<JudgedRecord> records = six();
-  for (JudgedRecord& each : records) {
-    each.none.reset();
-    each.known = each.of_known_class() ? 0.5 : 0.1;
-    each.fit_z = -1.0;
-  }
-  records[0].known.reset();
-  records[0].fit_z.reset();
-  const auto by_known = evaluate(records).known_against_unknown.value();
-  EXPECT_EQ(by_known.score, KnownScore::known);
-  EXPECT_EQ(by_known.known, 3u);
+  EXPECT_EQ(evaluate(records).known_against_unknown->area, 1.0);
 }
 
 TEST(KnownAgainstUnknown, TakesTheFitOfTheRecordsThatHaveOne) {

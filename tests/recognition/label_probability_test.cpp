@@ -91,20 +91,15 @@ TEST(LabelProbability, IsTemperedMoreWithEveryTouch) {
 TEST(LabelProbability, IsNotTemperedByTouchesThatTellNothing) {
   RecognitionTask task = three_maps();
   task.temperature_growth = 0.5;
-  task.familiarity = Familiarity{};
   const Press press;
   std::vector<TouchEvidence> touches = evidence_of(std::vector(1, press.touch()), task.contact());
   const RecognitionStep one = judge(four_to_one(), {}, task, touches);
-  ASSERT_TRUE(one.known);
   TouchEvidence silent = touches.front();
   silent.readings.assign(silent.readings.size(), Reading::unknown);
   silent.contacts = 0;
   touches.insert(touches.begin(), silent);
   const RecognitionStep two = judge(four_to_one(), {}, task, touches);
   EXPECT_EQ(two.identity, one.identity);
-  EXPECT_EQ(two.known, one.known);
-  touches.push_back(touches.back());
-  EXPECT_FALSE(judge(four_to_one(), {}, task, touches).known) << "two touches tell";
 }
 
 TEST(LabelProbability, TempersNoneOfTheseToo) {
@@ -165,101 +160,6 @@ TEST(LabelProbability, PassesOverTouchesWithoutContact) {
   const Touch touch{.T_robot_sensor = {}, .elements_mm = elements_mm, .pressure = pressure};
   EXPECT_EQ(feature_nats(evidence_of(std::span(&touch, 1), task.contact()), task),
             std::vector<double>(2));
-}
-
-/// A task in which a press that costs its readings' frequencies and 1 nat is of a learned object
-/// with probability 1 / (1 + e^2).
-RecognitionTask with_known(const FilterOptions& filter) {
-  RecognitionTask task = three_maps(filter);
-  task.temperature = 2.0;
-  task.familiarity = Familiarity{.offset = 0.0, .explained_slope = 2.0};
-  return task;
-}
-const double of_known = 1.0 / (1.0 + std::exp(2.0));
-/// Two of three elements are In Contact.
-double by_frequency_and_1() { return 2.0 * std::log(2.0 / 3.0) + std::log(1.0 / 3.0) - 1.0; }
-
-TEST(LabelProbability, GivesNoneOfTheseWhatASinglePressLeaves) {
-  const RecognitionTask task = with_known(HistogramOptions{.none_weight = 3.0});
-  Estimate estimate = four_to_one();
-  estimate.none_log_evidence = 1e4;  // which all else is 0 beside
-  estimate.mode.log_likelihood = by_frequency_and_1();
-  const Press press;
-  const std::vector<Touch> two{press.touch(), press.touch()};
-  const RecognitionStep step =
-      judge(estimate, {}, task, evidence_of(std::span(two).first(1), task.contact()));
-  EXPECT_NEAR(step.known.value(), of_known, 1e-15);
-  EXPECT_NEAR(step.identity[0], of_known * 2.0 / 3.0, 1e-15);
-  EXPECT_NEAR(step.identity[1], of_known / 3.0, 1e-15);
-  EXPECT_NEAR(step.identity[2], 1.0 - of_known, 1e-15);
-  const RecognitionStep after_two = judge(estimate, {}, task, evidence_of(two, task.contact()));
-  EXPECT_FALSE(after_two.known) << "which may disagree";
-  EXPECT_EQ(after_two.identity[2], 1.0);
-  const RecognitionStep without = judge(four_to_one(), {}, with_known(HistogramOptions{}),
-                                        evidence_of(std::span(two).first(1), task.contact()));
-  EXPECT_NEAR(without.identity[0], 2.0 / 3.0, 1e-15) << "without (none), known stands aside";
-}
-
-TEST(LabelProbability, TakesKnownAtTheOddsOfTheWeights) {
-  // Three maps of weight 1 each.
-  for (const auto& [none, odds] : {std::pair(3.0, 1.0), std::pair(1.0 / 3.0, 1.0 / 9.0)}) {
-    const RecognitionTask task = with_known(HistogramOptions{.none_weight = none});
-    EXPECT_DOUBLE_EQ(weighed(0.5, task), 1.0 / (1.0 + odds));
-    EXPECT_DOUBLE_EQ(weighed(0.9, task), 0.9 / (0.9 + 0.1 * odds));
-    EXPECT_EQ(weighed(0.0, task), 0.0);
-  }
-}
-
-TEST(LabelBounds, ShareWhatASinglePressLeaves) {
-  const RecognitionTask task = with_known(BoundedOptions{.none_weight = 3.0});
-  Estimate estimate = four_to_one();
-  estimate.mode.log_likelihood = by_frequency_and_1();
-  estimate.none_log_evidence = 0.0;
-  // Evidence of L within 4 to 9, of the disc within 1 to 4.
-  estimate.certificate = Certificate{
-      .log_evidence = {{std::log(3.0), std::log(8.0)}, {0.0, std::log(4.0)}, {0.0, 0.0}},
-      .mode_certain = true,
-      .none_log_evidence = LogInterval{-1.0, 1.0}};
-  const Press press;
-  const std::vector<Touch> touches{press.touch()};
-  RecognitionStep step = judge(estimate, {}, task, evidence_of(touches, task.contact()));
-  ASSERT_EQ(step.identity_bounds.size(), 3u);
-  EXPECT_NEAR(step.identity_bounds[0].low, of_known * 2.0 / (2.0 + 2.0), 1e-15);
-  EXPECT_NEAR(step.identity_bounds[0].high, of_known * 3.0 / (3.0 + 1.0), 1e-15);
-  EXPECT_NEAR(step.identity_bounds[1].high, of_known * 2.0 / (2.0 + 2.0), 1e-15);
-  EXPECT_NEAR(step.identity_bounds[2].low, 1.0 - of_known, 1e-15);
-  EXPECT_EQ(step.identity_bounds[2].high, step.identity_bounds[2].low);
-
-  // One bin may hold all that is missing of the first map, whose weight is one of three.
-  estimate.certificate->mode_certain = false;
-  step = judge(estimate, {}, task, evidence_of(touches, task.contact()));
-  const double known =
-      1.0 / (1.0 + std::exp(2.0 * std::log(3.0 * (8.0 - 3.0)) / by_frequency_and_1()));
-  EXPECT_NEAR(step.identity_bounds[0].low, of_known * 2.0 / (2.0 + 2.0), 1e-15);
-  EXPECT_NEAR(step.identity_bounds[0].high, known * 3.0 / (3.0 + 1.0), 1e-14);
-  EXPECT_NEAR(step.identity_bounds[2].low, 1.0 - known, 1e-14);
-  EXPECT_NEAR(step.identity_bounds[2].high, 1.0 - of_known, 1e-15);
-}
-
-TEST(LabelBounds, OfASinglePressKnowNoMoreOfTheLeadThanTheEvidence) {
-  RecognitionTask task = with_known(BoundedOptions{.none_weight = 3.0});
-  task.familiarity = Familiarity{.offset = 0.0, .lead_slope = 1.0};
-  Estimate estimate = four_to_one();
-  const Press press;
-  const std::vector<Touch> touches{press.touch()};
-  const auto none_bounds = [&](LogInterval of_letter, LogInterval of_disc) {
-    estimate.certificate = Certificate{.log_evidence = {of_letter, of_disc, {log_zero, log_zero}},
-                                       .mode_certain = true};
-    estimate.log_evidence = {of_letter.low, of_disc.low, log_zero};
-    return judge(estimate, {}, task, evidence_of(touches, task.contact())).identity_bounds[2];
-  };
-  const auto none = [](double lead) { return 1.0 / (1.0 + std::exp(std::log1p(lead))); };
-  ProbabilityInterval bounds = none_bounds({3.0, 4.0}, {-1.0, 1.0});
-  EXPECT_NEAR(bounds.low, none(5.0), 1e-15);
-  EXPECT_NEAR(bounds.high, none(2.0), 1e-15);
-  bounds = none_bounds({-1.0, 5.0}, {0.0, 2.0});
-  EXPECT_NEAR(bounds.low, none(5.0), 1e-15);
-  EXPECT_NEAR(bounds.high, none(0.0), 1e-15) << "either may lead";
 }
 
 TEST(LabelBounds, FollowTheTemperatureAndTheFeatures) {
@@ -340,7 +240,7 @@ TEST(Misfit, CountsForNoneAloneWhereTheScaleWasLearned) {
   EXPECT_EQ(tempering_of(touches, task, fit).features.back(), 0.0);
   task.fit_scale = {.mean = 0.1, .sd = 0.9, .shared_sd = 0.1};
   const std::vector<double> nats = tempering_of(touches, task, fit).features;
-  EXPECT_EQ(nats.back(), misfit_nats(fit, 3, usual_stranger_sd));
+  EXPECT_EQ(nats.back(), misfit_nats(fit, 3, {.stranger_sd = usual_stranger_sd}));
   EXPECT_EQ(nats.front(), 0.0);
 }
 

@@ -148,42 +148,6 @@ TEST(Mirror, FindsTheObjectOnItsOtherSide) {
   }
 }
 
-TEST(Known, IsOfASingleTouchOfAnObject) {
-  Device device = Device::open();
-  const Recording recording = touched_letter(3);
-  for (const std::size_t filter : {0U, 1U, 2U}) {
-    const LearnedSensor sensor{
-        .familiarity = Familiarity{.offset = 1.0, .explained_slope = 2.0, .lead_slope = 0.3}};
-    RecognitionTask task(shapes(), with_evidence(every_filter()[filter], sensor));
-    task.familiarity = sensor.familiarity;
-    Recogniser recogniser(device, task);
-    const RecognitionRecord record = recognise(recogniser, task, unknown_of(recording), true);
-    const RecognitionStep& first = record.trace.front();
-    if (std::holds_alternative<ParticleOptions>(task.filter)) {
-      EXPECT_FALSE(first.known);
-      continue;
-    }
-    const std::vector<Reading> readings = task.classifier().classify(recording.touch(0));
-    // At temperature 1 the ratio of two labels' probabilities is that of their evidence.
-    std::vector<double> evidence;
-    for (const double p : first.identity) {
-      evidence.push_back(std::log(p));
-    }
-    const FamiliarityScore score =
-        FamiliarityScore::of(readings, first.mode.log_likelihood, evidence);
-    ASSERT_TRUE(first.known);
-    EXPECT_NEAR(*first.known, task.familiarity->probability(score), 0.003);
-    EXPECT_FALSE(record.trace[1].known) << "two touches may disagree";
-
-    Recording nothing = touched_letter(3);
-    nothing.pressure.assign(nothing.pressure.size(), -1.0);
-    const Unknown one{.recording = "nothing", .touches = {nothing.touch(0)}};
-    EXPECT_FALSE(recognise(recogniser, task, one, false).last().known);
-    task.familiarity.reset();
-    EXPECT_FALSE(recognise(recogniser, task, unknown_of(recording), true).trace.front().known);
-  }
-}
-
 TEST(Temperature, LeavesPosesAndTellsTheSameByBoundsAsByTheHistogram) {
   Device device = Device::open();
   const Recording recording = touched_letter(4);

@@ -106,10 +106,6 @@ SearchGoal BoundedBelief::goal(double tolerance) const {
   SearchGoal goal{tolerance, options().evidence_nats, options().evidence_range_nats};
   goal.poor_bins = options().poor_bins;
   const std::size_t touches = touches_.telling();
-  if (touches == 1) {
-    goal.evidence_range_nats =
-        std::max(goal.evidence_range_nats, options().single_touch_range_nats);
-  }
   if (goal.evidence_nats && touches > 1) {
     const double grown = 1.0 + options().evidence_growth * static_cast<double>(touches - 1);
     *goal.evidence_nats *= grown;

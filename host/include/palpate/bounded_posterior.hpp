@@ -40,8 +40,6 @@ struct BoundedOptions {
   /// With evidence_nats: labels whose log evidence lies more nats than this below the largest are
   /// only known to lie there.
   double evidence_range_nats = std::numeric_limits<double>::infinity();
-  /// evidence_range_nats after a single touch, where this is wider.
-  double single_touch_range_nats = 0.0;
   /// Both grow by this part of themselves with every touch after the first that has a known
   /// element, as a temperature does that suits several touches. From 0.
   double evidence_growth = 0.0;

@@ -62,6 +62,9 @@ struct PALPATE_API FitScale {
   /// What every touch after the first adds to the standard deviation of z on this scale where the
   /// object was never learned; none: Palpate's own figure.
   std::optional<double> stranger_sd = {};
+  /// What z on this scale is like of one touch of an object that was never learned; its sd is 1 or
+  /// more. None: one touch of it is taken to fit as well as one of a learned object.
+  std::optional<SingleFitScale> stranger_alone = {};
   /// The array that it was learned with; none: it is not known, and the scale is of any.
   std::optional<FitArray> array = {};
 

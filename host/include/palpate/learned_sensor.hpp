@@ -66,34 +66,6 @@ struct LearnedFeatures {
   std::map<std::string, FeatureDistribution> objects;  ///< by label
 };
 
-/// What of a single touch tells whether its object was learned.
-struct PALPATE_API FamiliarityScore {
-  /// Log-likelihood of its known elements at the best pose of the best map, over 1 nat more than
-  /// they cost a model that knows no more than how often each level occurs among them: about -1
-  /// where the map explains nothing, and the nearer to 0 the more it explains.
-  double explained = 0.0;
-  /// log(1 + m), where the log evidence of the best label exceeds that of the next by m nats, at
-  /// most most_lead_nats; 0 with one label.
-  double lead = 0.0;
-
-  static constexpr double most_lead_nats = 100.0;
-
-  /// @param readings of the touch, by the contact model that the log-likelihood is of
-  /// @param label_evidence log evidence of each label
-  static FamiliarityScore of(std::span<const Reading> readings, double log_likelihood,
-                             std::span<const double> label_evidence);
-};
-
-/// How probably a single touch is of an object that was learned: 1 / (1 + exp(-(offset +
-/// explained_slope explained + lead_slope lead))).
-struct PALPATE_API Familiarity {
-  double offset = 0.0;
-  double explained_slope = 0.0;
-  double lead_slope = 0.0;
-
-  double probability(const FamiliarityScore& score) const;
-};
-
 /// Steps of a lattice's bins; 0 along an axis that is fixed.
 struct BinSteps {
   double x_mm = 0.0;
@@ -122,7 +94,6 @@ struct PALPATE_API LearnedSensor {
   /// probabilities are too sure.
   std::optional<BinSteps> bins;
   std::optional<LearnedFeatures> features;
-  std::optional<Familiarity> familiarity;
   std::optional<FitScale> fit_scale;    ///< of the z of Fit; without one, z stays as it is
   std::optional<PoseScale> pose_scale;  ///< of the table
   /// [file] digests of the maps of its folder that it was learned for; empty where it is for any.

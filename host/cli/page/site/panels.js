@@ -348,7 +348,6 @@ export function numbersOfTouch(touch) {
   const rows = [];
   if (touch.fit) rows.push(["fit", `${touch.fit.verdict} (z ${touch.fit.z.toFixed(1)})`]);
   if (touch.none !== undefined) rows.push(["(none)", percent(touch.none)]);
-  if (touch.known !== undefined) rows.push(["known", percent(touch.known)]);
   const ofLast = touch.touch_fit?.at(-1);
   if (typeof ofLast === "number") rows.push(["last touch's fit", `z ${ofLast.toFixed(1)}`]);
   if (touch.refined) {
