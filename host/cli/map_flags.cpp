@@ -204,7 +204,8 @@ MapOptions map_options(const MapFlags& flags, const std::vector<Recording>& reco
 }
 
 DisplacementSd touch_sd(const MapFlags& flags) {
-  return {flags.request.touch_sd_mm.value_or(0.0), radians(flags.request.touch_sd_deg.value_or(0.0))};
+  return {flags.request.touch_sd_mm.value_or(0.0),
+          radians(flags.request.touch_sd_deg.value_or(0.0))};
 }
 
 std::optional<double> given_prior(const MapFlags& flags,

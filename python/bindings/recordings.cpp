@@ -236,7 +236,8 @@ void bind_recording(nb::module_& module) {
       },
       "path"_a,
       "Reads a recording file (HDF5); of an unclosed file, the whole rows. Raises Error naming\n"
-      "file, field and remedy, also where a shape is larger than what is stored of it. A file that\n"
+      "file, field and remedy, also where a shape is larger than what is stored of it. A file "
+      "that\n"
       "is damaged so that libhdf5 crashes or loops takes this process with it: check files of\n"
       "unknown origin with the command `palpate info FILE` first.");
 }
