@@ -10,7 +10,6 @@
 #include <gtest/gtest.h>
 
 #include "learning/sensor_calibration.hpp"
-#include "sanitized.hpp"
 #include "simulated_presses.hpp"
 #include "synthetic.hpp"
 
@@ -47,27 +46,6 @@ struct Noise {
 };
 
 class NoiseCalibration : public testing::TestWithParam<bool> {};
-
-TEST_P(NoiseCalibration, HasAnAreaUnderTheCurveOfOneHalf) {
-  constexpr int sets = sanitized ? 8 : 24;
-  const SensorCalibrationOptions options{.tables = {{MapLayer::log_odds, 2}}, .folds = 3};
-  std::vector<double> areas;
-  for (int set = 0; set < sets; ++set) {
-    const Noise noise(GetParam(), 100 + static_cast<std::uint64_t>(set));
-    areas.push_back(*calibrate_sensor(noise.presses, {}, options).area_under_curve);
-  }
-  double mean = 0.0;
-  for (const double area : areas) {
-    mean += area / sets;
-  }
-  double variance = 0.0;
-  for (const double area : areas) {
-    variance += (area - mean) * (area - mean) / (sets - 1.0);
-  }
-  const double standard_error = std::sqrt(variance / sets);
-  EXPECT_LT(standard_error, sanitized ? 0.035 : 0.02);
-  EXPECT_NEAR(mean, 0.5, 2.5 * standard_error);
-}
 
 TEST_P(NoiseCalibration, JudgesAFoldByWhatTheOtherFoldsSayAlone) {
   const bool known_poses = GetParam();

@@ -136,8 +136,6 @@ TEST_P(DegeneratePresses, OfADeadElementIgnoreIt) {
   const SensorCalibration found = learned(letters.presses);
   EXPECT_EQ(found.sensor.classifier.threshold, expected.sensor.classifier.threshold);
   EXPECT_EQ(found.sensor.noise, expected.sensor.noise);
-  EXPECT_EQ(found.sensor.psf_mm, expected.sensor.psf_mm);
-  EXPECT_EQ(found.sensor.psf_mm.has_value(), GetParam());
   EXPECT_EQ(found.sensor.table->shared, expected.sensor.table->shared);
   ASSERT_EQ(found.sensor.features.has_value(), !GetParam()) << "at unknown poses only";
   ASSERT_EQ(expected.sensor.features.has_value(), !GetParam());
@@ -180,7 +178,6 @@ TEST_P(DegeneratePresses, OfOneObjectUnderTwoLabelsMakeNoneSure) {
   EXPECT_EQ(found.objects, 2U);
   EXPECT_LT(found.after->accuracy(), 0.7);
   EXPECT_LT(found.after->log_loss, std::log(2.0) + 0.15) << "hardly worse than a guess";
-  EXPECT_LT(*found.area_under_curve, 0.65);
 }
 
 TEST_P(DegeneratePresses, WithoutTheLevelsAskedForHaveFewer) {

@@ -59,10 +59,10 @@ TEST(LabelBounds, HoldTheProbabilityHoweverItIsRounded) {
   const RecognitionTask task = three_maps({});
   const Estimate estimate = estimate_of({{-3.0, -3.0}, {-2.0, -2.0}, {-4.0, -4.0}}, 0.0);
   const Tempering tempering = tempering_of({}, task);
-  std::vector<double> identity = label_probabilities(estimate, tempering, task, {});
+  std::vector<double> identity = label_probabilities(estimate, tempering, task);
   identity[0] *= 1.0 - 1e-12;
   identity[1] *= 1.0 + 1e-12;
-  const auto bounds = label_bounds(estimate, identity, tempering, task, {});
+  const auto bounds = label_bounds(estimate, identity, tempering, task);
   for (std::size_t i = 0; i < 2; ++i) {
     EXPECT_LE(bounds[i].low, identity[i]);
     EXPECT_GE(bounds[i].high, identity[i]);
