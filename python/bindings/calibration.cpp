@@ -160,7 +160,7 @@ void bind_setup_check(nb::module_& module) {
           return check(given, request, cell_mm, spread_mm, call);
         });
       },
-      "recordings"_a, "request"_a, "cell_mm"_a, "spread_mm"_a, "progress"_a = nb::none(),
+      "recordings"_a, "request"_a, "cell_mm"_a, "spread_mm"_a.none(), "progress"_a = nb::none(),
       "What the touches say; of the request count the classifier and the device.");
 }
 
