@@ -76,7 +76,8 @@ TEST_F(MapCommand, SaysAndStoresTheSymmetryThatTheMapsShow) {
 }
 
 TEST_F(MapCommand, SpreadIsAQuarterOfThePitch) {
-  const auto spread_of = [&](const std::vector<glm::dvec2>& elements_mm, const Arguments& flags) {
+  const auto spread_of = [&](const std::vector<glm::dvec2>& elements_mm,
+                             const std::vector<std::string>& flags) {
     write_recording(folder_ / "A.h5",
                     Simulator(make_shape("A"), {}, elements_mm, 4).touch(random_poses(12, 7), {}));
     return map_of_a(flags).spread_mm.value();
