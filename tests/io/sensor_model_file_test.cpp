@@ -153,7 +153,7 @@ TEST_F(SensorModelFile, SaysWhatIsWrong) {
   expect_named(message("mean_level", "pressure"), {"layer", "log_odds, mean_level"});
   expect_named(message("[35, 60.5]", "[60.5, 35]"), {"level_edges"});
   expect_named(message("[35, 60.5]", "[35]"), {"log_likelihood"});
-  expect_named(message("[1, 2, 3]", "[1, 2]"), {"line 19", "mean", "area"});
+  expect_named(message("[1, 2, 3]", "[1, 2]"), {"line 17", "mean", "area"});
   expect_named(message("sd: 12.25", "sd: 0"), {"fit_scale: sd", "positive"});
   expect_named(message("elements: 36", "elements: 0"), {"fit_scale: array", "above 0"});
   expect_named(message("shared_sd: 0.5", "shared_sd: -1"), {"fit_scale: shared_sd", "from 0"});

@@ -260,7 +260,7 @@ TEST(Request, ValuesThatCannotBeMeantAreRefused) {
   EXPECT_THAT(refused([](Request& r) {
                 r.x_mm = {5.0, -5.0};
               }),
-              HasSubstr("`x-mm 5:-5`: the range"));
+              HasSubstr("`x-mm 5:-5`: give the lower end first"));
   EXPECT_THAT(refused([](Request& r) { r.theta_deg = {0.0, 400.0}; }), HasSubstr("full circle"));
   EXPECT_THAT(refused([](Request& r) { r.pivot_mm = glm::dvec2(1e10, 0.0); }),
               HasSubstr("`pivot-mm 1"));
