@@ -1,5 +1,7 @@
 // libhdf5 is known to crash and to loop on damaged files; the command must do neither.
 
+#include <gtest/gtest.h>
+
 #include <algorithm>
 #include <random>
 
