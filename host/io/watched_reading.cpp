@@ -3,6 +3,8 @@
 #include <sys/prctl.h>
 #include <unistd.h>
 
+#include <hdf5.h>
+
 #include <algorithm>
 #include <cstring>
 #include <fstream>
@@ -38,6 +40,9 @@ std::uint64_t data_bytes() {
 void watch_reading(WatchedReading& watched, BrokenFiles broken) {
   watching = &watched;
   broken_files = std::move(broken);
+  // Of damaged files the library keeps pieces that it cannot close as the program ends, and says
+  // so.
+  ::H5dont_atexit();
 }
 
 bool is_reading_watched() { return watching != nullptr; }

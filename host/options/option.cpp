@@ -242,6 +242,16 @@ std::string wanted(const std::optional<Value>& /*value*/) {
   return wanted(Value{});
 }
 
+template <typename Value>
+std::string wanted_within(const NumberLimits& /*limits*/, const Value& value) {
+  return wanted(value);
+}
+template <typename Number>
+requires std::is_arithmetic_v<Number> std::string wanted_within(
+    const NumberLimits& limits, const std::optional<Number>& /*value*/) {
+  return wanted(Number{}) + words_of(limits);
+}
+
 /// What to give in the place of the value that the request has, or "".
 std::string fault_of(const Request& request, const Option& option) {
   const std::string wanted =
@@ -274,8 +284,9 @@ std::string set_option(Request& request, const Option& option, const std::string
   return std::visit(
       [&](auto member) -> std::string {
         const auto before = request.*member;
-        std::string fault =
-            read(text, request.*member) ? fault_of(request, option) : "give " + wanted(before);
+        std::string fault = read(text, request.*member)
+                                ? fault_of(request, option)
+                                : "give " + wanted_within(option.limits, before);
         if (!fault.empty()) {
           request.*member = before;
         }

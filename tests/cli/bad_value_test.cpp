@@ -137,7 +137,7 @@ INSTANTIATE_TEST_SUITE_P(
         Scene{"gamma_of_one", "gamma: 1\n", {"'gamma' = '1'", "give a number"}},
         Scene{"reversed_range", "region: {x_mm: [10, -10]}\n", {"x_mm", "reversed"}},
         Scene{"angles_that_count_twice",
-              "region: {theta_deg: [-10, 351]}\n",
+              "objects: [{map: A.map.h5}]\nregion: {theta_deg: [-10, 351]}\n",
               {"theta_deg", "wider than the full circle", "at most 360 degrees"}},
         Scene{"no_bins", "bins: [0, 5, 5]\n", {"'bins'", "at least 1"}},
         Scene{"bins_in_a_word", "bins: many\n", {"'bins' = 'many'", "or auto"}},

@@ -46,7 +46,7 @@ TEST_F(BoundedFilter, ItsFlagsAreRefusedBesideOtherFilters) {
 
 TEST_F(BoundedFilter, RefusesValuesOutOfRange) {
   for (const char* value : {"0", "1", "-1e-3", "2", "nan"}) {
-    refused({"--tolerance", value}, {"--tolerance", "between 0 and 1"});
+    refused({"--tolerance", value}, {"--tolerance", "above 0, below 1"});
   }
   for (const char* flag : {"--budget-ms", "--evidence-nats"}) {
     for (const char* value : {"0", "-1", "nan", "inf"}) {
