@@ -90,7 +90,8 @@ void read_option(const Entry& entry, const Option& option, Scene& scene) {
   std::string text = text_of(entry, option);
   Request request;
   if (const std::string remedy = set_option(request, option, text); !remedy.empty()) {
-    entry.refuse(remedy);
+    const bool shown = entry.node.IsScalar() || text.size() > 60;  // a message is one short line
+    entry.refuse(shown ? remedy : fmt::format("{}: {}", text, remedy));
   }
   const bool names_file = option.member == Option::Member(&Request::sensor_model);
   if (names_file && text != no_sensor_model) {

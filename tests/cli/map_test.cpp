@@ -78,8 +78,10 @@ TEST_F(MapCommand, SaysAndStoresTheSymmetryThatTheMapsShow) {
 TEST_F(MapCommand, SpreadIsAQuarterOfThePitch) {
   const auto spread_of = [&](const std::vector<glm::dvec2>& elements_mm,
                              const std::vector<std::string>& flags) {
+    std::vector<Pose> poses = random_poses(12, 7);
+    poses.push_back({{25.0, 25.0}, 0.0});  // beside the object, for the array of one element
     write_recording(folder_ / "A.h5",
-                    Simulator(make_shape("A"), {}, elements_mm, 4).touch(random_poses(12, 7), {}));
+                    Simulator(make_shape("A"), {}, elements_mm, 4).touch(poses, {}));
     return map_of_a(flags).spread_mm.value();
   };
   EXPECT_EQ(spread_of(grid_array(10, 10, 1.0), {}), 0.25);

@@ -28,12 +28,12 @@ TEST_F(RecognizeBounds, BinsBeyondTheDeviceAreTheUsersNumber) {
 }
 
 TEST_F(RecognizeBounds, RegionsAndPivotsBeyondAnyRobotAreNamed) {
-  refuse({"--x-mm=-1e200:1e200"}, {"--x-mm", "-1e+200:1e+200", "+-1e+09"});
-  refuse({"--y-mm=0:2e9"}, {"--y-mm", "0:2000000000", "+-1e+09"});
-  refuse({"--theta-deg=0:1e200"}, {"--theta-deg", "0:1e+200"});
+  refuse({"--x-mm=-1e200:1e200"}, {"--x-mm", "-1e200:1e200", "+-1e+09"});
+  refuse({"--y-mm=0:2e9"}, {"--y-mm", "0:2e9", "+-1e+09"});
+  refuse({"--theta-deg=0:1e200"}, {"--theta-deg", "0:1e200"});
   refuse({"--pivot-mm=1e+200,0"}, {"--pivot-mm", "1e+200"});
   put_bytes(folder_ / "scene.yaml", "region: {x_mm: [0, 1e200]}\n");
-  refuse({"--scene", "scene.yaml"}, {"x-mm", "0:1e+200"});
+  refuse({"--scene", "scene.yaml"}, {"x_mm", "0:1e200"});
 }
 
 TEST_F(RecognizeBounds, TheLabelOfObjectsThatWereNeverLearnedIsRefused) {
