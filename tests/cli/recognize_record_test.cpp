@@ -230,7 +230,8 @@ TEST_F(RecognizeRecord, TraceTellsTheSameAfterEveryTouch) {
   const json whole = record({"u.h5", "--maps", "A.map.h5", "I.map.h5", "--trace"});
   ASSERT_EQ(whole["trace"].size(), 6u);
   for (std::size_t i = 0; i < 6; ++i) {
-    const json& step = whole["trace"][i];
+    json step = whole["trace"][i];
+    step.erase("warnings");  // which one of the first steps may have
     EXPECT_EQ(keys_of(step), (std::vector<std::string>{
                                  "T_robot_object", "best", "bins_evaluated", "blocks_bounded",
                                  "decision", "dropped_mass", "error_mm", "fit", "identity",
