@@ -1,5 +1,6 @@
 #include "io/watched_reading.hpp"
 
+#include <hdf5.h>
 #include <sys/prctl.h>
 #include <unistd.h>
 
@@ -38,6 +39,9 @@ std::uint64_t data_bytes() {
 void watch_reading(WatchedReading& watched, BrokenFiles broken) {
   watching = &watched;
   broken_files = std::move(broken);
+  // At the program's end, libhdf5 would close what a damaged file has left open in it, and
+  // complain.
+  H5dont_atexit();
 }
 
 bool is_reading_watched() { return watching != nullptr; }

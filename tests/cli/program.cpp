@@ -5,8 +5,8 @@
 #include <poll.h>
 #include <pty.h>
 #include <sys/ioctl.h>
-#include <sys/pidfd.h>
 #include <sys/prctl.h>
+#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -196,7 +196,9 @@ void ProgramTest::kill_program(pid_t pid) {
   std::ifstream children(fmt::format("/proc/{0}/task/{0}/children", pid));
   pid_t child = -1;
   children >> child;
-  pollfd ended{.fd = child > 0 ? ::pidfd_open(child, 0) : -1, .events = POLLIN, .revents = 0};
+  pollfd ended{.fd = child > 0 ? static_cast<int>(::syscall(SYS_pidfd_open, child, 0)) : -1,
+               .events = POLLIN,
+               .revents = 0};
   ::kill(pid, SIGKILL);
   ::waitpid(pid, nullptr, 0);
   ::poll(&ended, 1, ended.fd < 0 ? 0 : -1);
