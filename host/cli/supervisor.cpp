@@ -150,8 +150,10 @@ std::string fault_of_file(const Ending& ending) {
 
 }  // namespace
 
-void supervise(Restart restart) {
+// Opening a file and reading a piece of it take milliseconds; disks and networks pause.
+void supervise(Restart restart, std::uint64_t patience_s) {
   WatchedReading& reading = shared_reading();
+  reading.least_patience_s = patience_s;
   const sigset_t signals = taken_signals();
   sigset_t before;
   ::sigprocmask(SIG_BLOCK, &signals, &before);

@@ -1,5 +1,6 @@
 #include "io/watched_reading.hpp"
 
+#include <hdf5.h>
 #include <sys/prctl.h>
 #include <unistd.h>
 
@@ -14,8 +15,6 @@ namespace palpate {
 
 namespace {
 
-// Opening a file and reading a piece of it take milliseconds; disks and networks pause.
-constexpr std::uint64_t least_patience_s = 60;
 // A fifth of the measured rate of inflating and widening.
 constexpr std::uint64_t bytes_per_second = 20'000'000;
 
@@ -79,7 +78,7 @@ ReadingMark::~ReadingMark() {
 
 void begin_reading_step(std::uint64_t bytes) {
   if (watching != nullptr) {
-    watching->patience_s = least_patience_s + bytes / bytes_per_second;
+    watching->patience_s = watching->least_patience_s + bytes / bytes_per_second;
     ++watching->steps;
   }
 }

@@ -19,6 +19,7 @@ struct WatchedReading {
   std::atomic<pid_t> thread;              ///< that reads the file
   std::atomic<std::uint64_t> steps;       ///< grows with every step of reading
   std::atomic<std::uint64_t> patience_s;  ///< a step that takes longer never ends
+  std::uint64_t least_patience_s;         ///< of steps that process nothing
 };
 
 /// Files that no process could read, and what is wrong with them.
