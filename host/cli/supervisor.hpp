@@ -12,8 +12,8 @@ enum class Restart { never, without_the_file };
 /// child, both stop and go on together, and the child dies with this process, however that ends.
 ///
 /// Where the child crashes in libhdf5, or takes longer than `patience_s` for a step of it, the file
-/// is at fault. With Restart::without_the_file another child is forked, for which the file is a broken
-/// one (see watch_reading()).
+/// is at fault. With Restart::without_the_file another child is forked, for which the file is a
+/// broken one (see watch_reading()).
 ///
 /// To be called before any thread, device or file is there.
 /// @throws Error (Fault::input) in this process, naming the file, where that ends the command;
