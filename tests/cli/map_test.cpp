@@ -1,7 +1,9 @@
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "io/hdf5_contents.hpp"
+#include "model/element_spacing.hpp"
 #include "palpate/map_builder.hpp"
 #include "palpate/simulation.hpp"
 #include "program.hpp"
@@ -78,10 +80,8 @@ TEST_F(MapCommand, SaysAndStoresTheSymmetryThatTheMapsShow) {
 TEST_F(MapCommand, SpreadIsAQuarterOfThePitch) {
   const auto spread_of = [&](const std::vector<glm::dvec2>& elements_mm,
                              const std::vector<std::string>& flags) {
-    std::vector<Pose> poses = random_poses(12, 7);
-    poses.push_back({{25.0, 25.0}, 0.0});  // beside the object, for the array of one element
     write_recording(folder_ / "A.h5",
-                    Simulator(make_shape("A"), {}, elements_mm, 4).touch(poses, {}));
+                    Simulator(make_shape("A"), {}, elements_mm, 4).touch(random_poses(12, 7), {}));
     return map_of_a(flags).spread_mm.value();
   };
   EXPECT_EQ(spread_of(grid_array(10, 10, 1.0), {}), 0.25);
@@ -89,7 +89,7 @@ TEST_F(MapCommand, SpreadIsAQuarterOfThePitch) {
   EXPECT_EQ(spread_of(grid_array(4, 4, 4.8), {"--spread-mm", "0.7"}), 0.7);
   EXPECT_EQ(spread_of(grid_array(6, 6, 2.0), {}), 0.5);
   EXPECT_EQ(spread_of(digitacts_array(), {}), 0.5) << "as of 2 mm";
-  EXPECT_EQ(spread_of(grid_array(1, 1, 1.0), {}), 0.5) << "no pitch";
+  EXPECT_EQ(usual_spread_mm(std::nullopt), 0.5) << "one element has no pitch";
 }
 
 TEST_F(MapCommand, AlignsTouchesOfAnUncertainRobot) {
