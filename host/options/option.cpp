@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <numbers>
 #include <type_traits>
 #include <utility>
@@ -12,7 +13,6 @@
 #include "model/number_text.hpp"
 #include "options/refused_option.hpp"
 #include "palpate/error.hpp"
-#include "palpate/lattice.hpp"
 
 namespace palpate {
 
