@@ -208,7 +208,9 @@ void ProgramTest::kill_program(pid_t pid) {
 std::string ProgramTest::done(const std::vector<std::string>& arguments) const {
   const Outcome outcome = palpate(arguments);
   EXPECT_EQ(outcome.status, 0) << outcome.err;
-  EXPECT_EQ(outcome.err, "");
+  // Where the machine is busy, `live` sees a sensor of any speed at its tare, and says so.
+  EXPECT_TRUE(outcome.err.empty() || outcome.err == "palpate: taring: do not touch the array\n")
+      << outcome.err;
   return outcome.out;
 }
 
