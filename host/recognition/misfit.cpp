@@ -32,7 +32,13 @@ double stranger_density(const Fit& fit, std::size_t touches, const FitScale& sca
 }
 
 double misfit_nats(const Fit& fit, std::size_t touches, const FitScale& scale) {
-  return std::log(stranger_density(fit, touches, scale) / density(fit, 0.0, 0.0));
+  // The scale is of the touches that were learned from. Of 160 single presses by a sensor whose
+  // elements have other gains, one in ten has z below -3.9 and one in twenty below -5.4: the lower
+  // half of a standard deviation of 3.
+  constexpr double alone_sd = 3.0;
+  const bool alone = touches == 1 && scale.stranger_alone;
+  const double learned = density(fit, 0.0, alone ? std::sqrt(alone_sd * alone_sd - 1.0) : 0.0);
+  return std::log(stranger_density(fit, touches, scale) / learned);
 }
 
 }  // namespace palpate
