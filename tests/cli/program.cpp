@@ -209,8 +209,9 @@ std::string ProgramTest::done(const std::vector<std::string>& arguments) const {
   const Outcome outcome = palpate(arguments);
   EXPECT_EQ(outcome.status, 0) << outcome.err;
   // Where the machine is busy, `live` sees a sensor of any speed at its tare, and says so.
-  EXPECT_TRUE(outcome.err.empty() || outcome.err == "palpate: taring: do not touch the array\n")
-      << outcome.err;
+  const bool tares =
+      arguments.front() == "live" && outcome.err == "palpate: taring: do not touch the array\n";
+  EXPECT_TRUE(outcome.err.empty() || tares) << outcome.err;
   return outcome.out;
 }
 

@@ -231,7 +231,9 @@ TEST_F(RecognizeRecord, TraceTellsTheSameAfterEveryTouch) {
   ASSERT_EQ(whole["trace"].size(), 6u);
   for (std::size_t i = 0; i < 6; ++i) {
     json step = whole["trace"][i];
-    step.erase("warnings");  // which one of the first steps may have
+    if (step["best"] == "(none)") {
+      step.erase("warnings");  // of what else may explain touches of no object
+    }
     EXPECT_EQ(keys_of(step), (std::vector<std::string>{
                                  "T_robot_object", "best", "bins_evaluated", "blocks_bounded",
                                  "decision", "dropped_mass", "error_mm", "fit", "identity",

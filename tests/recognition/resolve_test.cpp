@@ -15,6 +15,7 @@
 #include "options/option.hpp"
 #include "palpate/error.hpp"
 #include "palpate/map_builder.hpp"
+#include "recognition/filter_choice.hpp"
 #include "shapes.hpp"
 
 namespace palpate::resolve_test {
@@ -313,6 +314,22 @@ TEST(RecognitionOptions, EveryOptionIsReadAsItWasWritten) {
   const std::map<std::string, std::string> words{
       {"bins", "fine"}, {"pivot-mm", "auto"}, {"none", "auto"}, {"filter", "auto"}};
   EXPECT_EQ(option_texts(request_with(words)), words);
+}
+
+TEST(RecognitionOptions, ATextThatCannotBeMeantLeavesTheOptionAsItWas) {
+  Request request;
+  EXPECT_EQ(set_option(request, option_named("gamma"), "0.2"), "");
+  for (const char* wrong : {"1", "-0.1", "nan", "x", ""}) {
+    EXPECT_EQ(set_option(request, option_named("gamma"), wrong), "give a number from 0, below 1")
+        << wrong;
+    EXPECT_EQ(request.gamma, 0.2) << wrong;
+  }
+  EXPECT_NE(set_option(request, option_named("bins"), "5x5"), "");
+  EXPECT_FALSE(request.bins);
+}
+
+TEST(RecognitionOptions, HelpSaysWhereAutoChangesToBounds) {
+  EXPECT_THAT(option_named("filter").help, HasSubstr(std::to_string(most_histogram_bins)));
 }
 
 TEST(RecognitionOptions, WhatIsNoOptionOrNoValueIsRefused) {
