@@ -140,11 +140,11 @@ void add_calibrate(CLI::App& app) {
   command->add_flag("--unposed", options->request.unposed,
                     "The sensor's poses are unknown: find where each touch lies on the others. For "
                     "arrays so large that a touch shows much of the object");
-  command->add_option(
-      "--group", options->request.group,
-      "How touches are grouped, such as by the person or the day that made them. A group "
-      "is left out as a whole where it is learned how sure to be: recording, a "
-      "group a file; label, a group for each GROUP of objects named LABEL@GROUP");
+  command->add_option("--group", options->request.group,
+                      "How touches are grouped, such as by the person or the day that made them. A"
+                      " group is left out as a whole where it is learned how sure to be: "
+                      "recording, a group a file; label, a group for each GROUP of objects named "
+                      "LABEL@GROUP");
   command->add_option("--threshold", options->request.threshold,
                       "Contact threshold, in the recordings' pressure unit [default: learned]");
   command->add_option("--ratio", options->request.ratio,

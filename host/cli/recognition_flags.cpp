@@ -47,10 +47,9 @@ void add_recognition_flags(CLI::App& command, Request& request, bool& verbose) {
       add_option_flag(command, request, option.name);
     }
   }
-  command.add_flag(
-      "--verbose", verbose,
-      "Say on standard error how the filter works: its device and memory, the kernels of "
-      "the likelihood, the lattice, the seconds it took");
+  command.add_flag("--verbose", verbose,
+                   "Say on standard error how the filter works: its device and memory, the kernels"
+                   " of the likelihood, the lattice, the seconds it took");
 }
 
 void hide_particle_flags(CLI::App& command) {

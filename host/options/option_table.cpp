@@ -39,15 +39,14 @@ const std::array table{
            "temperature, press features, and what touches of strangers are like. Particles leave "
            "the standard deviations out [default: the sensor.yaml that 'palpate map' wrote beside "
            "the maps; none: Eq. 7]"},
-    Option{
-        "bins", "bins", lattice, &Request::bins, from_1,
-        "Pose bins per object along x, y and theta, as 25x25x16; auto: as many as the refined "
-        "pose needs, in steps of 0.6 times the maps' cell or 1.2 times the sensor's spread, "
-        "whichever is larger, widened to half of --touch-sd-* or five quarters of "
-        "--slip-sd-*, but at most 2.5 times; fine: as many as the mode needs, too, in steps of "
-        "0.6 times the larger of both. Auto and fine take wider steps where the histogram's device "
-        "memory is short; the region about an automatic pivot fits the largest array of all "
-        "RECORDINGs [default: auto, or 25x25x16 where a range or a pivot is given]"},
+    Option{"bins", "bins", lattice, &Request::bins, from_1,
+           "Pose bins per object along x, y and theta, as 25x25x16; auto: as many as the refined "
+           "pose needs, in steps of 0.6 times the maps' cell or 1.2 times the sensor's spread, "
+           "whichever is larger, widened to half of --touch-sd-* or five quarters of --slip-sd-*, "
+           "but at most 2.5 times; fine: as many as the mode needs, too, in steps of 0.6 times the"
+           " larger of both. Auto and fine take wider steps where the histogram's device memory is"
+           " short; the region about an automatic pivot fits the largest array of all RECORDINGs "
+           "[default: auto, or 25x25x16 where a range or a pivot is given]"},
     Option{"x-mm", "region.x_mm", lattice, &Request::x_mm, near,
            "Range of the pivot's x in the object frame, mm, as --x-mm=-10:10 [default: every "
            "place of an array that touches an object of the maps, or -10:10 where counts of "

@@ -5,15 +5,13 @@ lines of its diffs in the files that they name."""
 
 import pathlib
 import re
-import sys
+import runpy
 import unittest
 from xml.etree import ElementTree
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "tests"))
-from layers import BELOW  # noqa: E402
-
 PAGE = ROOT / "docs/architecture.md"
+BELOW = runpy.run_path(str(ROOT / "tests/layers.py"))["BELOW"]
 #: From the top down.
 FOLDERS = list(reversed(BELOW))
 
