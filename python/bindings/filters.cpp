@@ -170,7 +170,7 @@ void bind_histogram(nb::module_& module) {
               "range, and where the device has too little memory.")
           .def("update", &update<PoseHistogram>, "touches"_a, "progress"_a = nb::none(),
                "Multiplies the belief by the likelihood of these touches (Eq. 7, 13).\n\n"
-               "progress(fraction) is called up to 50 times a second. After Ctrl-C, or where "
+               "progress(fraction) is called up to 20 times a second. After Ctrl-C, or where "
                "progress\n"
                "raises, the belief is left half-way: call reset(). Raises Error on a touch that is "
                "not\n"

@@ -341,7 +341,7 @@ void bind_map_builder(nb::module_& module) {
           "cell_mm: edge of a cell. Raises Error on options out of range.")
       .def("add", &add_touches, "touches"_a, "progress"_a = nb::none(),
            "Adds the evidence of these touches.\n\n"
-           "progress(fraction) is called up to 50 times a second. Ctrl-C stops the call after a\n"
+           "progress(fraction) is called up to 20 times a second. Ctrl-C stops the call after a\n"
            "part of the touches. Raises Error on a touch that is not sound.")
       .def("build", shared_method<Builder>(&MapBuilder::build), "label"_a,
            "The map of all touches so far. Raises Error if no element of any touch was In Contact\n"

@@ -50,10 +50,15 @@ Subject subject_of(const GivenRecordings& recordings, const Request& given);
 /// The task of a subject, by what all its recordings have. Throws Error as resolve() does.
 RecognitionTask task_of(const Subject& subject, Device& device, const CallerNeed& need = {});
 
-/// The device that is open, or else the one of this name, see Device::open(). Throws Error.
+/// The device that is open, or else the one of this name, see Device::open(). Throws Error, also
+/// in a child of fork() whose parent has opened it.
 inline std::shared_ptr<Device> device_of(const std::shared_ptr<Device>& open,
                                          const std::string& name) {
-  return open ? open : std::make_shared<Device>(Device::open(name));
+  if (open == nullptr) {
+    return std::make_shared<Device>(Device::open(name));
+  }
+  open->context();
+  return open;
 }
 
 /// Runs `work(subject, device, report)` on the request's device, as run() does.

@@ -92,7 +92,7 @@ def recognize(
     the sensor.yaml that `palpate map` wrote beside the files of the maps. bins: counts of x, y and theta
     of T_object_robot; x_mm, y_mm, theta_deg: their ranges (lower, upper); pivot_mm (x, y) in the robot
     frame; frames (a, b): the touches a to b - 1; device: an open Device, or a name or index as for
-    Device.open(). progress(fraction) is called up to 50 times a second.
+    Device.open(). progress(fraction) is called up to 20 times a second.
 
     Raises Error in the words of the command, with options as keyword arguments. What the command
     would say on standard error becomes a UserWarning; what looks wrong with the touches is in the
