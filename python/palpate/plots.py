@@ -24,7 +24,7 @@ def plot(shown: _Shown, ax: "Axes | None" = None) -> "Axes":
             from matplotlib import pyplot
         except ImportError as missing:
             raise Error("plot: Matplotlib is missing; pip install 'palpate[plot]'") from missing
-        ax = pyplot.figure().add_subplot()
+        ax = pyplot.figure(layout="constrained").add_subplot()
     _draw(shown, ax)
     return ax
 

@@ -186,7 +186,7 @@ def test_a_calibration_is_that_of_the_command(
         told = (scores.before, scores.table, scores.after)
         assert row.split() == [f"{one.log_loss:.3f}" for one in told]
     assert given.objects == 2 and fractions == sorted(fractions) and fractions[-1] == 1
-    assert repr(given) == f"SensorCalibration(2 objects, {given.after.right} of 20 touches right)"
+    assert repr(given) == f"SensorCalibration(2 objects, {given.after.right} of {given.after.records} touches right)"
     assert json.loads(json.dumps(given)) == given and given.tried[0].layer == "mean_level"
     sensor = given.sensor
     levels = len(sensor.level_edges) + 2
