@@ -205,8 +205,9 @@ void bind_map(nb::module_& module) {
       .def(
           "save",
           [](const OccupancyGrid& self, const PathLike& file) {
+            const OccupancyGrid copy = self;  // which another thread may change meanwhile
             const std::filesystem::path path = file.path();
-            run([&] { write_map(path, self); });
+            run([&] { write_map(path, copy); });
           },
           "path"_a, "Writes a map file (HDF5). Raises Error where it cannot be written.")
       .def("plot", plot_method, "ax"_a = nb::none(), plot_signature,
