@@ -24,6 +24,8 @@ using namespace nb::literals;
 
 namespace {
 
+using Json = nlohmann::ordered_json;
+
 std::string layer_word(MapLayer layer) {
   return layer == MapLayer::mean_level ? "mean_level" : "log_odds";
 }
@@ -97,8 +99,6 @@ void bind_learned_sensor(nb::module_& module) {
             self.table->levels(), layer_word(self.table->layer.of), self.temperature);
       });
 }
-
-using Json = nlohmann::ordered_json;
 
 SensorCalibration calibrate(const GivenRecordings& given, PythonRequest request,
                             const CalibrationRequest& wanted, const Report& report) {
