@@ -75,7 +75,7 @@ Imported returned(ImportedRecording imported, const ImportOptions& options) {
 Imported import_tables_python(const ImportOptions& given,
                               const std::optional<ArrayLike>& elements_mm) {
   const ImportOptions options = with_elements(given, elements_mm);
-  return returned(run([options](Call&) { return import_tables(options); }), options);
+  return returned(run([&] { return import_tables(options); }), options);
 }
 
 std::optional<SpatialPose> spatial_pose(std::span<const double> row) {
@@ -111,10 +111,7 @@ Imported import_frames(const ImportOptions& given, const ArrayLike& pressures,
     const Floats row = reader.floats(*object_pose, "object_pose", {"7"});
     rows.T_robot_object = spatial_pose(row.values());
   }
-  return returned(run([options, rows = std::move(rows)](Call&) mutable {
-                    return import_rows(options, std::move(rows));
-                  }),
-                  options);
+  return returned(run([&] { return import_rows(options, std::move(rows)); }), options);
 }
 
 }  // namespace

@@ -6,23 +6,13 @@ They have the commands' rules, defaults and words.
 import json
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 from . import _palpate
-from ._palpate import (
-    Device,
-    Evaluation,
-    Recording,
-    SensorCalibration,
-    SetupCheck,
-    TouchGains,
-    Truth,
-)
+from ._palpate import Device, Recording, Truth
 from .many import Recognized
 from .recognition import (
     RecognitionOptions,
-    Record,
     _Maps,
     _Pair,
     _Path,
@@ -32,46 +22,12 @@ from .recognition import (
     request_of,
     warn,
 )
+from .results import Evaluation, Plan, SensorCalibration, SetupCheck
 
 # The build writes the stubs by importing the package, where there is no NumPy.
 if TYPE_CHECKING:
-    import numpy
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
     from typing_extensions import Unpack
-
-
-@dataclass(frozen=True, eq=False)
-class Plan:
-    """Poses of the next touch, the best first: the n candidates of plan()."""
-
-    recording: str
-    """The file of the touches so far, or another name."""
-    touches: int
-    """How many touches were used."""
-    goal: str
-    """"identity", "pose" or "both"."""
-    believed: Record
-    """What is believed before the touch: the fields of a Record from `best` on."""
-    identity_nats: float
-    """What is unknown of the identity: the entropy of the labels, nats."""
-    pose_nats: float
-    """What is unknown of the pose once the object is known, counted in bins, nats."""
-    index: "NDArray[numpy.uint64]"
-    """[n] places of the candidates among those that were given, from 0."""
-    T_robot_sensor: "NDArray[numpy.float64]"
-    """[n, 3] (x_mm, y_mm, theta_rad)."""
-    gains: TouchGains
-    """[n] what each touch is expected to tell, nats."""
-    warnings: list[str]
-    """What looks wrong with the touches, and what limits the gains, in sentences."""
-    samples: int
-    """Objects and poses that stood for the belief."""
-    seed: int
-    """Seed of the samples and of the readings that they simulate."""
-    seconds: float
-    """Wall time of the plan alone, s."""
-    device: str
-    """Name of the device; "none" where bounds searched, which use none."""
 
 
 def plan(
@@ -103,7 +59,7 @@ def plan(
         [recording], request, goal, candidates, samples, plan_seed, progress
     )
     warn(sentences)
-    return Plan(**{**fields, "believed": Record(json.loads(fields["believed"]))})
+    return Plan(fields)
 
 
 def calibrate(
@@ -148,12 +104,13 @@ def calibrate(
         raise TypeError(f"bins: {bins!r}; give counts, such as (25, 25, 16), or leave it out")
     asked = ("bins", "x_mm", "y_mm", "theta_deg", "pivot_mm", "frames", "device")
     learned = ("unposed", "threshold", "ratio", "layer", "levels", "max_maps", "group")
-    return _palpate.calibrate(
+    fields, sensor = _palpate.calibrate(
         recordings,
         request_of({name: given[name] for name in asked}, maps),
         filled(_palpate.CalibrationRequest(), calibrate, {name: given[name] for name in learned}),
         progress,
     )
+    return SensorCalibration(fields, sensor)
 
 
 def check_setup(
@@ -182,7 +139,9 @@ def check_setup(
         instead = "; give spread_mm, half of it" if name == "psf_mm" else ""
         raise TypeError(f"check_setup() got an unexpected keyword argument '{name}'{instead}")
     given = {"threshold": threshold, "ratio": ratio, "device": device}
-    return _palpate.check_setup(recordings, request_of(given, ()), cell_mm, spread_mm, progress)
+    return SetupCheck(
+        _palpate.check_setup(recordings, request_of(given, ()), cell_mm, spread_mm, progress)
+    )
 
 
 def evaluate(
@@ -211,7 +170,7 @@ def evaluate(
     # As in the command's JSON, numbers that are not finite are null, and names need not be UTF-8.
     finite = json.loads(json.dumps(records), parse_constant=lambda _: None)
     text = json.dumps(finite, ensure_ascii=False).encode(errors="replace")
-    return _palpate.evaluate_results(paths, text)
+    return Evaluation(_palpate.evaluate_results(paths, text))
 
 
 def import_tables(

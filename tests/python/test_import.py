@@ -63,14 +63,8 @@ def test_a_table_without_times_is_imported(tables: pathlib.Path) -> None:
 @pytest.mark.parametrize(
     ("flags", "options", "said"),
     [
-        (["--rate", 0], {"rate": 0}, "rate=0: "),
-        (["--rate", 10], {"rate": 10}, "rate=10: "),
-        (["--time-unit", "h"], {"time_unit": "h"}, "time_unit='h': "),
         (["--pose-unit", "m,turn"], {"pose_unit": ("m", "turn")}, "pose_unit='m,turn': "),
-        (["--rows", "lines"], {"rows": "lines"}, "rows='lines': "),
-        (["--largest-gap-s", 0], {"largest_gap_s": 0}, "largest_gap_s=0: "),
         (["--poses", "none.csv"], {"poses": pathlib.Path("none.csv")}, "none.csv: "),
-        (["--pressure-unit", "psi"], {"pressure_unit": "psi"}, "pressure_unit='psi': "),
     ],
 )
 def test_tables_are_refused_in_the_words_of_the_command(
