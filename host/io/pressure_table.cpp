@@ -95,7 +95,8 @@ PressureTable read_wide(CsvTable& table, std::size_t elements, const TableOption
     all.understood.push_back(fmt::format(
         "its readings are {} of x, y and z of each element, of the first '{}', '{}' and '{}'",
         is_norm ? "the length" : "the z", name(0), name(1), name(2)));
-  } else if (!options.pressure_columns.empty()) {
+  } else if (options.pressure_columns.find_first_of("*{") != std::string::npos ||
+             options.pressure_columns.find("::") != std::string::npos) {
     all.understood.push_back(fmt::format(
         "its readings are {} columns, '{}' to '{}'", columns.size(),
         printable(table.columns()[columns.front()]), printable(table.columns()[columns.back()])));

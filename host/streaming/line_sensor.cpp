@@ -45,9 +45,12 @@ std::optional<Frame> LineSensor::next(std::chrono::milliseconds timeout) {
         0ms, std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now()));
     const bool some = reader_.read_some(left);
     if (reader_.ended() && counters_.frames == 0) {
-      throw Error(Fault::input,
-                  fmt::format("{} ended before the first frame; write frames to it, a line each",
-                              reader_.name()));
+      throw Error(
+          Fault::input,
+          before_ > 0
+              ? problem_before_
+              : fmt::format("{} ended before the first frame; write frames to it, a line each",
+                            reader_.name()));
     }
     if (frames_.empty() && (reader_.ended() || (left == 0ms && (!some || ++late == most_late)))) {
       return {};
@@ -66,14 +69,15 @@ void LineSensor::take(const LineReader::Line& line) {
   }
   const double read_s = now_s();
   auto read = format_.read(line.text, read_s);
-  if (std::holds_alternative<FrameLines::Problem>(read) && has_header_ && counters_.frames == 0) {
-    format_ = FrameLines(format_.elements());  // the header was words of a greeting
-    has_header_ = false;
-    ++before_;
-    read = format_.read(line.text, read_s);
+  if (std::holds_alternative<FrameLines::Problem>(read) && counters_.frames == 0) {
+    format_ = FrameLines(format_.elements());  // what looked like a header was a greeting
+    if (std::exchange(has_header_, false)) {
+      ++before_;
+      read = format_.read(line.text, read_s);
+    }
   }
   if (const auto* problem = std::get_if<FrameLines::Problem>(&read)) {
-    if (!may_stand_before(line)) {
+    if (!may_stand_before(line, problem->words)) {
       refuse_line(line, problem->kind, problem->words);
     }
   } else if (auto* frame = std::get_if<Frame>(&read)) {
@@ -90,15 +94,17 @@ void LineSensor::take(const LineReader::Line& line) {
 }
 
 /// Leaves out a line before the first frame that a board prints as it starts.
-bool LineSensor::may_stand_before(const LineReader::Line& line) {
+bool LineSensor::may_stand_before(const LineReader::Line& line, const std::string& problem) {
   constexpr std::uint64_t most = 100;
   const bool is_cut = line.number == 1 && !trimmed(line.text).starts_with('{');
   if (counters_.frames > 0 || before_ == most || !(is_cut || FrameLines::is_text(line.text))) {
     return false;
   }
+  format_ = FrameLines(format_.elements());  // numbers among the words are no columns
   if (before_++ == 0) {
     constexpr std::size_t enough = 60;
     first_before_ = printable(trimmed(line.text).substr(0, enough));
+    problem_before_ = words_about(line, problem);
   }
   return true;
 }
@@ -138,13 +144,17 @@ void LineSensor::say_first(double now_s, double time_s) {
   }
 }
 
+std::string LineSensor::words_about(const LineReader::Line& line,
+                                    const std::string& problem) const {
+  return fmt::format(
+      "{}, line {}: {}; write {{\"time\": s, \"pressure\": [{} numbers]}}, or CSV with {} "
+      "readings, behind their time where it is known",
+      reader_.name(), line.number, problem, format_.elements(), format_.elements());
+}
+
 void LineSensor::refuse_line(const LineReader::Line& line, FrameLines::Problem::Kind kind,
                              const std::string& problem) {
-  const std::string text = fmt::format(
-      "{}, line {}: {}; write {{\"time\": s, \"pressure\": [{} numbers]}}, or CSV with {} "
-      "readings, "
-      "behind their time where it is known",
-      reader_.name(), line.number, problem, format_.elements(), format_.elements());
+  const std::string text = words_about(line, problem);
   if (counters_.frames == 0) {
     throw Error(Fault::input, text);
   }

@@ -37,7 +37,8 @@ class LineSensor : public Sensor {
 
  private:
   void take(const LineReader::Line& line);
-  bool may_stand_before(const LineReader::Line& line);
+  bool may_stand_before(const LineReader::Line& line, const std::string& problem);
+  std::string words_about(const LineReader::Line& line, const std::string& problem) const;
   void say_first(double now_s, double time_s);
   void refuse_line(const LineReader::Line& line, FrameLines::Problem::Kind kind,
                    const std::string& problem);
@@ -51,6 +52,7 @@ class LineSensor : public Sensor {
   bool has_header_ = false;        ///< no frame has come since the header
   std::uint64_t before_ = 0;       ///< lines left out before the first frame
   std::string first_before_;       ///< the first of them
+  std::string problem_before_;     ///< why it is no frame
   std::vector<double> first_s_;    ///< times of the first frames, of those that have one
   std::uint64_t lost_before_ = 0;  ///< lines refused since the last frame
   std::uint64_t refused_ = 0;

@@ -181,6 +181,9 @@ void check_numbers(const ImportOptions& options) {
   if (!std::isfinite(options.pose_delay_s)) {
     refuse(fmt::format("`pose-delay {}`", options.pose_delay_s), "give seconds");
   }
+  if (!options.mount.empty() && options.poses.empty()) {
+    refuse(fmt::format("`mount {}`", options.mount), "is for poses; give `poses`");
+  }
   if (options.unposed && !options.poses.empty()) {
     refuse("`unposed`", "{} holds the poses; leave one of them out", options.poses);
   }

@@ -23,8 +23,10 @@ def read_bag(
     array: "tuple[int, int, float] | _Path | ArrayLike",
     pressure_field: str | None = None,
     pose_topic: str | None = None,
+    pose_field: str | None = None,
     tf: tuple[str, str] | None = None,
     truth_tf: tuple[str, str] | None = None,
+    mount: tuple[float, float, float, float, float, float] | None = None,
     first_element: Literal["bottom-left", "bottom-right", "top-left", "top-right"] = "bottom-left",
     order: Literal["rows", "columns"] = "rows",
     dead: Sequence[int] = (),
@@ -40,11 +42,15 @@ def read_bag(
 
     log: a bag of ROS 1 (.bag), or of ROS 2: its folder, or its .db3 or .mcap file; pressure_topic: of
     any message with a list of numbers, which pressure_field names where it is not the only one:
-    "sensors.taxels.z", a list in each item of a list; pose_topic: of poses or transforms in metres; or
+    "sensors.taxels.z", a list in each item of a list, or "matrices[1].data", of one item by its index, name
+    or frame; flags beside them that are called valid, validity, is_valid or mask make readings unknown;
+    pose_topic: of poses or transforms in metres, or of messages whose pose_field is one, or is a list of a
+    position and a quaternion, or of a matrix; or
     tf: (target, source) frames of /tf and /tf_static, T_target_source, the robot's base and the array;
     truth_tf: (base, object), where the object truly lies, for the recording's truth, which an object that
     moves by more than 1 mm or 1 degree does not have; object: its label. A frame of /tf_static that moves
-    in /tf is taken from /tf.
+    in /tf is taken from /tf. mount: x, y, z, roll, pitch, yaw, mm and degrees: where the array sits in the
+    frame whose poses are given.
     Times are those of the messages' headers, or of their reception where a message has no header. Other
     options are those of import_tables(). progress(fraction) is called now and then.
 
@@ -63,6 +69,7 @@ def read_frames(
     array: Any,
     pressure_field: str | None,
     pose_topic: str | None,
+    pose_field: str | None,
     tf: tuple[str, str] | None,
     truth_tf: tuple[str, str] | None,
     pose_delay: float,
@@ -87,12 +94,13 @@ def read_frames(
         "dead": ",".join(map(str, options["dead"])),
         "plane": plane if isinstance(plane, str) else ",".join(map(str, plane)),
         "pose_delay": pose_delay,
+        "mount": None if options["mount"] is None else ",".join(map(str, options["mount"])),
     }
     request = filled(_palpate.ImportOptions(), read_bag, options)
     _palpate.require_sound(request, elements_mm)
     with opened(name) as bag:
         frames = bag.pressures(pressure_topic, pressure_field)
-        poses = bag.poses(pose_topic) if pose_topic is not None else None
+        poses = bag.poses(pose_topic, pose_field) if pose_topic is not None else None
         wanted = [chain for chain in (tf, truth_tf) if chain is not None]
         tree = bag.transforms(wanted) if wanted else None
         bag.read([part for part in (frames, poses, tree) if part is not None], progress)
