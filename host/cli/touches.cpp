@@ -222,7 +222,7 @@ void find_touches(const TouchesArguments& options) {
   PressWatch watch(thresholds);
   std::optional<StrokeTouches> stroke;
   if (options.slide_mm) {
-    stroke.emplace(thresholds, *options.slide_mm, sensor.valid);
+    stroke.emplace(*options.slide_mm, sensor.valid);
   }
   const auto take = [&](const std::optional<DetectedTouch>& touch) {
     const bool was_touching = std::exchange(touching, detector.touching());

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <span>
 #include <utility>
 
@@ -28,9 +27,8 @@ double distance_mm(const Pose& a, const Pose& b) {
 
 }  // namespace
 
-StrokeTouches::StrokeTouches(const TouchDetectorOptions& options, double every_mm,
-                             std::vector<std::uint8_t> valid)
-    : options_(options), every_mm_(every_mm), valid_(std::move(valid)) {}
+StrokeTouches::StrokeTouches(double every_mm, std::vector<std::uint8_t> valid)
+    : every_mm_(every_mm), valid_(std::move(valid)) {}
 
 void StrokeTouches::add(const Frame& frame) {
   if (!frame.T_robot_sensor || !is_robot_pose(*frame.T_robot_sensor)) {
@@ -76,8 +74,7 @@ void StrokeTouches::end_part() {
   const std::span<const FramePlace> frames = std::span(part_).subspan(begin, end - begin);
   const std::span<const double> pressure =
       std::span(pressure_).subspan(begin * e, (end - begin) * e);
-  if (frames.size() >= least_frames_of_touch && is_steady(middle) &&
-      has_steady_load(pressure, e, options_)) {
+  if (frames.size() >= least_frames_of_touch && is_steady(middle)) {
     touches_.push_back(mean_touch(frames, pressure, part_[middle].T_robot_sensor));
   }
   part_.erase(part_.begin(), part_.end() - 1);

@@ -189,7 +189,9 @@ REFUSED = {
         "matrix; the header there is 'time', 'a', 'b', 'c', ...",
     ),
     "no_axes": ({}, ["--euler", "xxy"], "--euler xxy: give the axes of the three angles in their order"),
-    "no_mount": ({}, ["--mount", "1,2,3"], "--mount 1,2,3: give X,Y,Z,ROLL,PITCH,YAW"),
+    "no_mount": (poses("x,y,theta", "0,0,0"), [*WITH_POSES, "--mount", "1,2,3"],
+                 "--mount 1,2,3: give X,Y,Z,ROLL,PITCH,YAW"),
+    "a_mount_of_no_poses": ({}, ["--mount", "1,2,3,0,0,0"], "--mount 1,2,3,0,0,0: is for poses; give --poses"),
     "no_such_column_to_keep": ({}, ["--where", "id=2"], "--where id=2: no table has this column; give its name"),
     "no_such_header_line": ({}, ["--header-line", "9"], "--header-line 9: log.csv has no such line"),
     "three_axes_unsaid": (

@@ -12,9 +12,17 @@ import palpate
 
 RATE_HZ = 100.0
 REST = 60  #: frames before, between and after presses
-POSE = [3.0, -2.0, 0.4]  #: of the letter in the robot frame
+POSE = [3.0, -2.0, 0.4]  #: T_object_robot of the letter
 
 Path = NDArray[numpy.float64]  #: of the array during a press, [n, 3], a pose a frame
+
+
+def about_object(T_robot_sensor: Path) -> Path:
+    """T_object_sensor of poses in the robot frame."""
+    x, y, theta = POSE
+    c, s = numpy.cos(theta), numpy.sin(theta)
+    position = T_robot_sensor[:, :2] @ numpy.array([[c, s], [-s, c]]) + (x, y)
+    return numpy.hstack([position, T_robot_sensor[:, 2:] + theta])
 
 
 def still(x: float, y: float, frames: int = 60) -> Path:
@@ -37,7 +45,8 @@ def frames(presses: list[Path], shape: str = "E", scale: float = 1.0) -> palpate
         touches = palpate.simulate(shape, press, T_object_robot=POSE, seed=1 + i)
         rest = numpy.zeros((REST, touches.pressure.shape[1]))
         pressures += [rest, scale * touches.pressure, rest]
-        poses += [press[:1].repeat(REST, 0), press, press[-1:].repeat(REST, 0)]
+        at = numpy.array(touches.T_robot_sensor)
+        poses += [at[:1].repeat(REST, 0), at, at[-1:].repeat(REST, 0)]
     pressure = numpy.vstack(pressures)
     time_s = numpy.arange(len(pressure)) / RATE_HZ
     return palpate.Recording(
@@ -51,7 +60,7 @@ def run(folder: pathlib.Path, recording: palpate.Recording, *flags: str) -> "sub
     return subprocess.run(arguments, cwd=folder, capture_output=True, text=True)
 
 
-STROKES = [stroke((-8, -6), (8, -6), 20), stroke((8, 0), (-8, 0), 20), stroke((-8, 6), (8, 6), 20)]
+STROKES = [stroke((-9, -6), (8, -6), 20), stroke((9, 0), (-8, 0), 20), stroke((-9, 6), (8, 6), 20)]
 
 
 def test_strokes_recognise_as_presses_at_the_same_places(
@@ -60,10 +69,11 @@ def test_strokes_recognise_as_presses_at_the_same_places(
     done = run(tmp_path, frames(STROKES), "--slide", "4")
     assert done.returncode == 0, done.stderr
     cut = palpate.read_recording(tmp_path / "t.h5")
-    # 16 mm of each stroke make four parts; their middles lie at -6, -2, 2 and 6 mm.
+    # 17 mm of each stroke make four parts.
     assert len(cut) == 12
-    numpy.testing.assert_allclose(numpy.sort(cut.T_robot_sensor[:4, 0]), [-6, -2, 2, 6], atol=0.3)
-    presses = palpate.simulate("E", cut.T_robot_sensor, T_object_robot=POSE, seed=9)
+    places = about_object(numpy.array(cut.T_robot_sensor))
+    numpy.testing.assert_allclose(places[:4, 0], [-7, -3, 1, 5], atol=0.5)
+    presses = palpate.simulate("E", places, T_object_robot=POSE, seed=9)
     errors = []
     for recording in (cut, presses):
         [record] = palpate.recognize(recording, maps, device=device)
@@ -80,8 +90,7 @@ def test_a_press_that_does_not_slide_stays_one_touch(tmp_path: pathlib.Path) -> 
 @pytest.mark.parametrize(
     ("presses", "scale", "said"),
     [
-        (STROKES, 1.0, "the press 0.6 s from its start, of 1.03 s, moved by 16.0 mm (hold the array still, or give "
-                       "--slide MM)"),
+        (STROKES, 1.0, "s, moved by 17.0 mm (hold the array still, or give --slide MM)"),
         ([still(0, 0, 12)], 1.0, "was never steady for 0.1 s (press longer"),
         ([still(0, 0)], 0.01, "above their rest"),
         ([still(0, 0, 12)] * 5, 1.0, "and so did 2 more presses"),
