@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 def read_bag(
     log: _Path,
     *,
-    pressure_topic: str,
+    pressure_topic: str | Sequence[str],
     array: "tuple[int, int, float] | _Path | ArrayLike",
     pressure_field: str | None = None,
     pose_topic: str | None = None,
@@ -43,7 +43,8 @@ def read_bag(
     log: a bag of ROS 1 (.bag), or of ROS 2: its folder, or its .db3 or .mcap file; pressure_topic: of
     any message with a list of numbers, which pressure_field names where it is not the only one:
     "sensors.taxels.z", a list in each item of a list, or "matrices[1].data", of one item by its index, name
-    or frame; flags beside them that are called valid, validity, is_valid or mask make readings unknown;
+    or frame; several topics, of pads on one hand, are one array, whose elements follow in their order, and a
+    frame of the first takes the nearest of the others; flags beside them that are called valid, validity, is_valid or mask make readings unknown;
     pose_topic: of poses or transforms in metres, or of messages whose pose_field is one, or is a list of a
     position and a quaternion, or of a matrix; or
     tf: (target, source) frames of /tf and /tf_static, T_target_source, the robot's base and the array;
@@ -65,7 +66,7 @@ def read_bag(
 def read_frames(
     log: _Path,
     *,
-    pressure_topic: str,
+    pressure_topic: str | Sequence[str],
     array: Any,
     pressure_field: str | None,
     pose_topic: str | None,
@@ -77,7 +78,7 @@ def read_frames(
     **options: Any,
 ) -> tuple[Recording, list[str]]:
     """What read_bag() reads, and what is worth a warning."""
-    from ._bag_messages import opened
+    from ._bag_messages import opened, together
 
     if pose_topic is not None and tf is not None:
         raise Error("pose_topic and tf: both say where the sensor is; leave one of them out")
@@ -85,11 +86,12 @@ def read_frames(
         raise Error("truth_tf: needs the sensor's poses in the same frame; give pose_topic or tf")
     name = os.fsdecode(log)
     text, elements_mm = array_option(array)
+    names = [pressure_topic] if isinstance(pressure_topic, str) else list(pressure_topic)
     plane = options["plane"]
     source = pose_topic or (":".join(tf) if tf else "")
     options |= {
         "array": text,
-        "pressures": f"{name}: {pressure_topic}",
+        "pressures": f"{name}: {', '.join(names)}",
         "poses": f"{name}: {source}" if source else "",
         "dead": ",".join(map(str, options["dead"])),
         "plane": plane if isinstance(plane, str) else ",".join(map(str, plane)),
@@ -99,14 +101,15 @@ def read_frames(
     request = filled(_palpate.ImportOptions(), read_bag, options)
     _palpate.require_sound(request, elements_mm)
     with opened(name) as bag:
-        frames = bag.pressures(pressure_topic, pressure_field)
+        pads = [bag.pressures(topic, pressure_field) for topic in names]
         poses = bag.poses(pose_topic, pose_field) if pose_topic is not None else None
         wanted = [chain for chain in (tf, truth_tf) if chain is not None]
         tree = bag.transforms(wanted) if wanted else None
-        bag.read([part for part in (frames, poses, tree) if part is not None], progress)
-    frames.require_some(name)
-    time_s, pressures = frames.in_order()
-    remarks = frames.remarks(name)
+        bag.read([part for part in (*pads, poses, tree) if part is not None], progress)
+    for pad in pads:
+        pad.require_some(name)
+    time_s, pressures = together([pad.in_order() for pad in pads])
+    remarks = [remark for pad in pads for remark in pad.remarks(name)]
     pose_time_s: ArrayLike = ()
     rows: ArrayLike | None = None
     truth: ArrayLike | None = None
@@ -122,7 +125,7 @@ def read_frames(
     if tf is not None and tree is not None:
         rows = tree.chain(name, *tf, time_s + pose_delay, options["largest_gap_s"])
         remarks += tree.remarks(name, tf, rows)
-    del frames, poses, tree  # the memory of a long log
+    del pads, poses, tree  # the memory of a long log
     recording, said = _palpate.import_frames(
         request, pressures, time_s, pose_time_s, elements_mm, rows, truth
     )

@@ -186,6 +186,24 @@ class Pressures(_Timed):
         return time_s, rows
 
 
+def together(
+    pads: Sequence[tuple[NDArray[numpy.float64], NDArray[numpy.float64]]],
+) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64]]:
+    """The frames of several pads as those of one array: at the times of the first, with the nearest frame of
+    each other, whose readings are unknown where that is over 0.1 s away."""
+    (time_s, rows), *others = pads
+    if not others:
+        return time_s, rows
+    beside = [rows]
+    for other_s, other in others:
+        after = numpy.searchsorted(other_s, time_s).clip(max=len(other_s) - 1)
+        before = (after - 1).clip(min=0)
+        nearest = numpy.where(time_s - other_s[before] < other_s[after] - time_s, before, after)
+        far = numpy.abs(other_s[nearest] - time_s) > 0.1
+        beside.append(numpy.where(far[:, None], numpy.nan, other[nearest]))
+    return time_s, numpy.hstack(beside)
+
+
 class Poses(_Timed):
     """The poses of a topic."""
 

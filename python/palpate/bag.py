@@ -40,7 +40,8 @@ def _flag_parser() -> argparse.ArgumentParser:
     add = parser.add_argument
     add("log", metavar="LOG", help="bag of ROS 1 (.bag), or of ROS 2: its folder, .db3, .mcap or .mcap.zstd")
     add("--list", action="store_true", help="show the topics, their types, rates and what they may be")
-    add("--pressure-topic", metavar="TOPIC", help="topic of the readings")
+    add("--pressure-topic", metavar="TOPIC", help="topic of the readings; several, of pads on one hand, as "
+        "/left,/right")  # fmt: skip
     add("--pressure-field", metavar="FIELD", help="field of its messages, as sensors.taxels.z, or "
         "matrices[1].data of one item, by its index, name or frame [the only list of numbers]")  # fmt: skip
     add("--pose-topic", metavar="TOPIC", help="topic of the array's poses in the robot frame")
@@ -125,7 +126,7 @@ def _run(arguments: argparse.Namespace) -> None:
     shown = sys.stderr.isatty()
     recording, remarks = read_frames(
         log=arguments.log,
-        pressure_topic=arguments.pressure_topic,
+        pressure_topic=arguments.pressure_topic.split(","),
         array=arguments.array,
         pressure_field=arguments.pressure_field,
         pose_topic=arguments.pose_topic,

@@ -126,6 +126,11 @@ CASES = {
         {"log.csv": "time,sensor_id,p0,p1\n0,1,9,9\n0,2,1,2\n.1,1,9,9\n.1,2.0,3,4\n"}, ["--where", "sensor_id=2"],
         READINGS, times=[0, 0.1],
     ),
+    "two_pads_of_a_hand_are_one_array": Case(
+        {"log.csv": "time,left_0,right_0,left_1,pad\n0,1,2,3,9\n.1,4,5,6,9\n",
+         "hand.csv": "x,y\n-10,0\n-8,0\n9,0\n"},
+        ["--pressure-columns", "left_{n},right_{n}"], [[1, 3, 2], [4, 6, 5]], array="hand.csv",
+    ),
     # Sheets.
     "lines_before_the_header": Case(
         {"log.csv": "Tactile array 5\nRecorded 2026-11-01, by hand\n\ntime,p0,p1\n0,1,2\n.1,3,4\n"}, [], READINGS,
