@@ -162,8 +162,9 @@ void bind_import(nb::module_& module) {
       "options"_a, "elements_mm"_a = nb::none(),
       "Raises Error where import_frames() would refuse the options or the array.");
   module.def(
-      "import_frames", &import_frames, "options"_a, "pressures"_a, "time_s"_a, "pose_time_s"_a,
-      "elements_mm"_a = nb::none(), "poses"_a = nb::none(), "object_pose"_a = nb::none(),
+      "import_frames", &import_frames, "options"_a, "pressures"_a, "time_s"_a.none(),
+      "pose_time_s"_a, "elements_mm"_a = nb::none(), "poses"_a = nb::none(),
+      "object_pose"_a = nb::none(),
       "As import_tables() of frames [n, e] at times [n], or of touches, and of poses of the\n"
       "sensor [m, 7] in the robot frame, mm and a quaternion x, y, z, w, at times [m], or one for\n"
       "each frame where there are no times; and of an object's pose [7].");

@@ -217,7 +217,7 @@ class Poses(_Timed):
             pose = _at(message, self.path)
             row = row_of(pose) if hasattr(pose, "__dict__") or hasattr(pose, "__slots__") else None
             self.rows.extend(row_of_numbers(_flat(pose)) if row is None else row)
-        except AttributeError:
+        except (AttributeError, TypeError):
             raise Error(
                 f"{self.topic}: {self.path or 'the message'}: is no pose, no transform, and no list of 7, 12 or "
                 "16 numbers; give another pose_field"
