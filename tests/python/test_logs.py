@@ -176,54 +176,6 @@ CASES = {
     ),
 }  # fmt: skip
 
-REFUSED = {
-    "no_rotation_by_row": (
-        poses(",".join(f"t{i}" for i in range(12)), MATRIX_ROWS[0], "1,0,0,0,0,2,0,0,0,0,1,0"),
-        [*WITH_POSES, "--pose-columns", "t*"],
-        "poses.csv:3: the numbers are no rotation and position, read by rows; correct them, or give --matrix columns",
-    ),
-    "a_matrix_that_may_be_either": (
-        poses(",".join(f"t{i}" for i in range(16)), "0,1,0,0,-1,0,0,0,0,0,1,0,0,0,0,1"),
-        [*WITH_POSES, "--pose-columns", "t*"],
-        "poses.csv: its matrices may be written by columns or by rows; give --matrix columns or --matrix rows",
-    ),
-    "four_columns_of_a_pose": (
-        poses("a,b,c,d", "1,2,3,4"), [*WITH_POSES, "--pose-columns", "a:d"],
-        "poses.csv:1: --pose-columns a:d names 4 columns; give three, X,Y,THETA, or of poses in space six "
-        "(X,Y,Z,ROLL,PITCH,YAW, or a rotation vector), seven (TX,TY,TZ,QX,QY,QZ,QW), or the 12 or 16 numbers of a "
-        "matrix; the header there is 'time', 'a', 'b', 'c', ...",
-    ),
-    "no_axes": ({}, ["--euler", "xxy"], "--euler xxy: give the axes of the three angles in their order"),
-    "no_mount": (poses("x,y,theta", "0,0,0"), [*WITH_POSES, "--mount", "1,2,3"],
-                 "--mount 1,2,3: give X,Y,Z,ROLL,PITCH,YAW"),
-    "a_mount_of_no_poses": ({}, ["--mount", "1,2,3,0,0,0"], "--mount 1,2,3,0,0,0: is for poses; give --poses"),
-    "no_such_column_to_keep": ({}, ["--where", "id=2"], "--where id=2: no table has this column; give its name"),
-    "no_such_header_line": ({}, ["--header-line", "9"], "--header-line 9: log.csv has no such line"),
-    "three_axes_unsaid": (
-        {"log.csv": "time,x0,y0,z0,x1,y1,z1\n0,8,9,1,8,9,2\n"}, [],
-        "log.csv:1: 6 columns of pressure ('x0' to 'z1') for an array of 2 elements; where each element reads x, y "
-        "and z, give --pressure-component z or --pressure-component norm; the header there is 'time', 'x0', 'y0', "
-        "'z0', ...",
-    ),
-    "a_block_cut_short": (
-        {"log.csv": "Frame 1\n1,2\n3,4\nFrame 2\n5,6\n"}, ["--rows", "frames", "--rate", "10", "--array", "2:2:2"],
-        "log.csv:5: the last frame has 1 rows, and the array has 2",
-    ),
-    "blocks_unsaid": (
-        {"log.csv": "1,2\n3,4\n"}, ["--array", "2:2:2"],
-        "where each frame is a block of rows, as the array has them, give --rows frames",
-    ),
-    "one_clock_steps_back": (
-        {"log.csv": PRESSURES, "poses.csv": "time,x,y,theta\n1,0,0,0\n0,0,0,0\n"}, WITH_POSES,
-        "poses.csv:3: 0 s is earlier than the row before, at 1 s, and the clock of log.csv does not step back with it",
-    ),
-    "rows_that_are_not_sorted": (
-        {"log.csv": "time,p0,p1\n" + "1,1,2\n0,1,2\n" * 11}, [], "and so are more than 10 rows; sort the rows by time",
-    ),
-    "no_time": ({"log.csv": "time,p0,p1\n25:00:00,1,2\n"}, [], "log.csv:2: column 'time': '25:00:00' is no time"),
-}  # fmt: skip
-
-
 def run(folder: pathlib.Path, files: dict[str, "str | bytes"], flags: list[str]) -> "subprocess.CompletedProcess[str]":
     for name, text in {"log.csv": PRESSURES, **files}.items():
         (folder / name).write_bytes(text if isinstance(text, bytes) else text.encode())
@@ -248,15 +200,6 @@ def test_a_log_is_read(name: str, tmp_path: pathlib.Path) -> None:
     for words in case.said:
         assert words in done.stderr
     assert len(done.stderr.splitlines()) <= 6
-
-
-@pytest.mark.parametrize("name", REFUSED)
-def test_a_log_is_refused_in_one_line(name: str, tmp_path: pathlib.Path) -> None:
-    files, flags, said = REFUSED[name]
-    done = run(tmp_path, files, flags)
-    assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
-    assert said in done.stderr
-    assert not (tmp_path / "o.h5").exists()
 
 
 def test_a_column_of_labels_makes_a_recording_each(tmp_path: pathlib.Path) -> None:
