@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 from . import _palpate
+from ._error import Error
 from ._palpate import (
     Device,
     Evaluation,
