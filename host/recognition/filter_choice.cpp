@@ -26,19 +26,6 @@ void set_displacement(const std::optional<double>& asked_mm, const std::optional
   sd.rad = asked_deg ? *asked_deg * std::numbers::pi / 180.0 : sd.rad;
 }
 
-std::optional<double> none_weight(const Request& request, std::span<const Hypothesis> hypotheses) {
-  const NoneWeight given = request.none.value_or(Automatic{});
-  if (const auto* weight = std::get_if<double>(&given)) {
-    return *weight > 0.0 ? std::optional(*weight) : std::nullopt;
-  }
-  constexpr double odds = 1.0 / 9.0;  // against all objects together: one in ten
-  double sum = 0.0;
-  for (const Hypothesis& hypothesis : hypotheses) {
-    sum += hypothesis.weight;
-  }
-  return odds * sum;
-}
-
 BoundedOptions asked_bounds(const Request& request, const HistogramOptions& histogram) {
   BoundedOptions bounded = bounded_instead(histogram).value();
   bounded.tolerance = request.tolerance.value_or(bounded.tolerance);
@@ -64,7 +51,7 @@ ParticleOptions asked_particles(const Request& request, const HistogramOptions& 
                    "`filter histogram`, or `slip-sd-mm` and `slip-sd-deg`, their motion noise");
     }
   }
-  if (request.none && none_weight(request, {})) {
+  if (request.none && histogram.none_weight) {
     refuse_given(request, "none",
                  "particles have no mean over all poses, which (none) needs; use `filter bounded` "
                  "or `filter histogram`");
@@ -108,17 +95,12 @@ FilterWish filter_wish(const Request& request) {
 }
 
 ChosenFilter choose_filter(const FilterWish& wish, const Request& request,
-                           const CallerNeed& of_caller, std::span<const Hypothesis> hypotheses,
-                           HistogramOptions histogram) {
+                           const std::string& every_bin_for, HistogramOptions histogram) {
   if (wish.kind == FilterKind::particles) {
     return {asked_particles(request, histogram), false, wish.by};
   }
   set_displacement(request.touch_sd_mm, request.touch_sd_deg, histogram.touch_sd);
   set_displacement(request.slip_sd_mm, request.slip_sd_deg, histogram.slip_sd);
-  if (request.none || !of_caller.learned_only) {
-    histogram.none_weight = none_weight(request, hypotheses);
-  }
-  const std::string caller = fmt::format("`{}`", of_caller.option);
   const bool slips = !histogram.slip_sd.none();
   if (slips && wish.kind == FilterKind::bounded) {
     for (const auto& [option, given] :
@@ -132,15 +114,11 @@ ChosenFilter choose_filter(const FilterWish& wish, const Request& request,
       }
     }
   } else if (wish.kind == FilterKind::bounded) {
-    if (!of_caller.why.empty()) {
-      throw Error(Fault::input,
-                  fmt::format("{}: {}; leave it out, or {}", caller, of_caller.why, wish.by));
-    }
     return {asked_bounds(request, histogram), false, wish.by};
   }
   std::vector<std::string> by;  // what would have to go for bounds to take the bins
-  if (!of_caller.why.empty()) {
-    by.push_back(caller);
+  if (!every_bin_for.empty()) {
+    by.push_back(fmt::format("`{}`", every_bin_for));
   }
   if (wish.kind == FilterKind::histogram) {
     by.push_back(wish.by);
@@ -163,9 +141,8 @@ void require_within_region(const Request& request, const PoseLattice& lattice) {
   }
 }
 
-ChosenBins chosen_bins(const std::function<Device&()>& device,
-                       std::span<const Hypothesis> hypotheses, const ChosenFilter& filter,
-                       BinWidth width) {
+ChosenBins chosen_bins(const DeviceSource& device, std::span<const Hypothesis> hypotheses,
+                       const ChosenFilter& filter, BinWidth width) {
   const FilterTraits traits = traits_of(filter.options);
   const bool by_bounds =
       traits.certificate || (filter.automatic && bounded_instead(filter.options));

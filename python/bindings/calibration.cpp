@@ -210,11 +210,9 @@ void bind_calibration(nb::module_& module) {
       });
   nb::class_<CalibrationRequest>(
       module, "CalibrationRequest",
-      "What is asked of a calibration beside a Request's maps, bins and frames.")
+      "What is asked of a calibration beside a Request's maps, classifier, bins and frames.")
       .def(nb::init<>())
       .def_rw("unposed", &CalibrationRequest::unposed)
-      .def_rw("threshold", &CalibrationRequest::threshold)
-      .def_rw("ratio", &CalibrationRequest::ratio)
       .def_rw("layer", &CalibrationRequest::layer)
       .def_rw("levels", &CalibrationRequest::levels)
       .def_rw("max_maps", &CalibrationRequest::max_maps)
@@ -228,7 +226,7 @@ void bind_calibration(nb::module_& module) {
         });
       },
       "recordings"_a, "request"_a, "calibration"_a, "progress"_a = nb::none(),
-      "The calibration; of the request count the maps, bins, frames and device.");
+      "The calibration; of the request count the maps, classifier, bins, frames and device.");
 }
 
 }  // namespace palpate::python

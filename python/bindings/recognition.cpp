@@ -14,8 +14,6 @@
 #include "estimate.hpp"
 #include "model/option_words.hpp"
 #include "recognition/record_json.hpp"
-#include "recognition/recordings.hpp"
-#include "recognition/resolve.hpp"
 #include "recognition/touch_plan.hpp"
 #include "request.hpp"
 
@@ -66,20 +64,13 @@ struct Answer {
   Sentences sentences;
 };
 
-/// Name of the device that the task's filter computes on.
-std::string name_of_used(const Device& device, const RecognitionTask& task) {
-  return uses_device(task) ? device.name() : "none";
-}
-
-Answer recognize(const Subject& subject, Device& device, Call& call) {
+Answer recognize(const RecognitionJob& job, Call& call) {
   const std::function<void(double)> progress = call.progress();
-  Answer answer;
-  const std::vector<Unknown>& unknowns = subject.unknowns;
-  const bool with_trace = subject.request.trace;
-  const RecognitionTask task = task_of(subject, device);
-  Recogniser recogniser =
-      open_recogniser(&device, task, {.cancel_point = [&call] { call.check(); }});
-  answer.sentences = task.remarks;
+  const std::vector<Query>& unknowns = job.unknowns();
+  const bool with_trace = job.request().trace;
+  const RecognitionTask& task = job.task();
+  Recogniser recogniser = job.open({.cancel_point = [&call] { call.check(); }});
+  Answer answer{.sentences = task.remarks};
   std::string unresolved;
   for (std::size_t i = 0; i < unknowns.size(); ++i) {
     const auto show = [&](double fraction) {
@@ -88,10 +79,9 @@ Answer recognize(const Subject& subject, Device& device, Call& call) {
     const RecognitionRecord record = recognise(recogniser, task, unknowns[i], with_trace, show);
     record.require_steps();
     if (unresolved.empty()) {
-      unresolved = unresolved_words(task, recogniser.lattice(), unknowns[i].touches);
+      unresolved = recogniser.unresolved_words();
     }
-    answer.records.push_back(
-        to_json(record, task, name_of_used(device, task), with_trace, in_keywords));
+    answer.records.push_back(to_json(record, task, job.device_name(), with_trace, in_keywords));
   }
   if (!unresolved.empty()) {
     answer.sentences.push_back(unresolved);
@@ -104,7 +94,7 @@ using Records = nb::typed<nb::list, Fields>;
 
 std::tuple<Records, Sentences> recognize_python(nb::handle recordings, const PythonRequest& request,
                                                 const Progress& progress) {
-  const Answer answer = run_on_subject(recordings, request, progress, &recognize);
+  const Answer answer = run_job(recordings, request, progress, &recognize);
   return {nb::borrow<Records>(to_python(answer.records)), in_python(answer.sentences)};
 }
 
@@ -116,22 +106,15 @@ struct Planned {
   Sentences told;
 };
 
-Planned plan_next(const Subject& subject, const PlanRequest& wanted, Device& device, Call& call) {
+Planned plan_next(const RecognitionJob& job, const PlanRequest& wanted, Call& call) {
   Planned planned;
-  const Unknown& unknown = subject.unknowns.front();
-  const RecognitionTask task =
-      resolve(subject.request, {.pressure_unit = subject.recordings.front().pressure_unit,
-                                .source = unknown.recording,
-                                .reach_mm = largest_reach_mm(unknown.touches),
-                                .device = [&]() -> Device& { return device; }});
+  const RecognitionTask& task = job.task();
   require_plannable(task);
-  planned.device = name_of_used(device, task);
-  Recogniser recogniser =
-      open_recogniser(&device, task, {.cancel_point = [&call] { call.check(); }});
+  planned.device = job.device_name();
+  Recogniser recogniser = job.open({.cancel_point = [&call] { call.check(); }});
   planned.told = task.remarks;
-  planned.plan = plan_touch(recogniser, task, unknown, wanted, call.progress());
-  if (const std::string words = unresolved_words(task, recogniser.lattice(), unknown.touches);
-      !words.empty()) {
+  planned.plan = plan_touch(recogniser, task, job.unknowns().front(), wanted, call.progress());
+  if (const std::string words = recogniser.unresolved_words(); !words.empty()) {
     planned.told.push_back(words);
   }
   planned.believed = palpate::text_of(to_json(planned.plan.record.last(), task, in_keywords));
@@ -159,11 +142,11 @@ std::tuple<Fields, Sentences> plan_python(nb::handle recordings, const PythonReq
   if (!poses.empty()) {
     wanted.candidates = poses;
   }
-  const Planned planned = run_on_subject(
-      recordings, request, progress,
-      [wanted = std::move(wanted)](const Subject& subject, Device& device, Call& call) {
-        return plan_next(subject, wanted, device, call);
-      });
+  const Planned planned =
+      run_job(recordings, request, progress,
+              [wanted = std::move(wanted)](const RecognitionJob& job, Call& call) {
+                return plan_next(job, wanted, call);
+              });
   sentences.insert(sentences.end(), planned.told.begin(), planned.told.end());
   const Plan& plan = planned.plan;
   TouchGains gains;

@@ -6,9 +6,8 @@
 #include <variant>
 #include <vector>
 
-#include "recognition/recognition_record.hpp"
+#include "recognition/recognition_job.hpp"
 #include "recognition/request.hpp"
-#include "recognition/resolve.hpp"
 #include "session.hpp"
 
 namespace palpate::python {
@@ -36,19 +35,6 @@ std::vector<Recording> read_recordings(const GivenRecordings& given);
 /// Takes a Recording, a file, or an iterable of them. Throws Error where there are none.
 GivenRecordings given_recordings(nb::handle given);
 
-/// What a request is about.
-struct Subject {
-  Request request;  ///< completed
-  std::vector<Recording> recordings;
-  std::vector<Unknown> unknowns;  ///< views into the recordings
-};
-/// Completes the request, reads the recordings, with the scene's array, and selects the unknowns.
-/// Throws Error.
-Subject subject_of(const GivenRecordings& recordings, const Request& given);
-
-/// The task of a subject, by what all its recordings have. Throws Error as resolve() does.
-RecognitionTask task_of(const Subject& subject, Device& device, const CallerNeed& need = {});
-
 /// The session, or where there is none, one that is nobody else's: of the device of this name, see
 /// Device::open(). Throws Error.
 inline std::shared_ptr<Session> session_on(const std::shared_ptr<Session>& session,
@@ -56,16 +42,19 @@ inline std::shared_ptr<Session> session_on(const std::shared_ptr<Session>& sessi
   return session ? session : std::make_shared<Session>(Device::open(name));
 }
 
-/// Runs `work(subject, device, call)` on the request's device, as run() does.
+/// Runs `work(job, call)` on the request's device, as run() does.
 template <typename F>
-auto run_on_subject(nb::handle recordings, const PythonRequest& request, const Progress& progress,
-                    F work) {
+auto run_job(nb::handle recordings, const PythonRequest& request, const Progress& progress,
+             F work) {
   return run({}, progress,
              [given = given_recordings(recordings), request, work = std::move(work)](Call& call) {
-               const Subject subject = subject_of(given, request);
-               const auto session = session_on(request.session, subject.request.device);
+               const Request completed = complete(request);
+               std::vector<Recording> read = read_recordings(given);
+               const auto session = session_on(request.session, completed.device);
                auto lock = session->lock(call);
-               return work(subject, lock.device(), call);
+               return work(RecognitionJob(completed, std::move(read), {},
+                                          [&]() -> Device& { return lock.device(); }),
+                           call);
              });
 }
 

@@ -22,7 +22,7 @@ std::vector<BatchEntry> list_inputs(std::span<const std::string> arguments);
 /// A recording and its unknowns, which are views into it.
 struct ReadInput {
   std::shared_ptr<const Recording> recording;
-  std::vector<Unknown> unknowns;
+  std::vector<Query> unknowns;
 };
 
 /// Reads an input of a settled task: as many unknowns as the task counts, each with the error where
