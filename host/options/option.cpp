@@ -307,6 +307,14 @@ const Option& option_named(std::string_view name) {
   return *found;
 }
 
+std::string_view first_given(const Request& request,
+                             std::initializer_list<std::string_view> options) {
+  const auto* given = std::ranges::find_if(options, [&](std::string_view name) {
+    return !option_text(request, option_named(name)).empty();
+  });
+  return given == options.end() ? "" : *given;
+}
+
 void require_sound(const Request& request) {
   for (const Option& option : options()) {
     if (const std::string fault = fault_of(request, option); !fault.empty()) {

@@ -19,6 +19,11 @@ namespace palpate {
 
 namespace {
 
+/// The first option that only bounds read; "" where none is given.
+std::string_view option_of_bounds(const Request& request) {
+  return first_given(request, {"tolerance", "budget-ms", "evidence-nats"});
+}
+
 /// Sets what is asked, and leaves the rest.
 void set_displacement(const std::optional<double>& asked_mm, const std::optional<double>& asked_deg,
                       DisplacementSd& sd) {
@@ -43,13 +48,10 @@ ParticleOptions asked_particles(const Request& request, const HistogramOptions& 
   particles.particles = request.particles.value_or(particles.particles);
   particles.resampling = request.resampling.value_or(particles.resampling);
   particles.seed = request.seed.value_or(particles.seed);
-  for (const auto& [option, sd] : {std::pair{"touch-sd-mm", request.touch_sd_mm},
-                                   std::pair{"touch-sd-deg", request.touch_sd_deg}}) {
-    if (sd) {
-      refuse_given(request, option,
-                   "particles take every touch's pose to be exact; use `filter bounded` or "
-                   "`filter histogram`, or `slip-sd-mm` and `slip-sd-deg`, their motion noise");
-    }
+  if (const auto option = first_given(request, {"touch-sd-mm", "touch-sd-deg"}); !option.empty()) {
+    refuse_given(request, option,
+                 "particles take every touch's pose to be exact; use `filter bounded` or "
+                 "`filter histogram`, or `slip-sd-mm` and `slip-sd-deg`, their motion noise");
   }
   if (request.none && histogram.none_weight) {
     refuse_given(request, "none",
@@ -69,25 +71,18 @@ FilterWish filter_wish(const Request& request) {
   const FilterKind kind = request.filter.value_or(FilterKind::automatic);
   const std::string filter = name_of(kind);
   const bool particles = kind == FilterKind::particles;
-  for (const auto& [option, given] :
-       {std::pair{"particles", request.particles.has_value()},
-        std::pair{"resampling", request.resampling.has_value()},
-        std::pair{"augmented", request.augmented}, std::pair{"seed", request.seed.has_value()}}) {
-    if (given && !particles) {
-      refuse_option(option,
-                    fmt::format("has no effect on `filter {}`; add `filter particles`", filter));
-    }
+  if (const auto option = first_given(request, {"particles", "resampling", "augmented", "seed"});
+      !option.empty() && !particles) {
+    refuse_option(option,
+                  fmt::format("has no effect on `filter {}`; add `filter particles`", filter));
   }
-  for (const auto& [option, given] :
-       {std::pair{"tolerance", request.tolerance.has_value()},
-        std::pair{"budget-ms", request.budget_ms.has_value()},
-        std::pair{"evidence-nats", request.evidence_nats.has_value()}}) {
-    if (given && (particles || kind == FilterKind::histogram)) {
+  if (const std::string_view option = option_of_bounds(request); !option.empty()) {
+    if (particles || kind == FilterKind::histogram) {
       refuse_option(
           option, fmt::format("has no effect on `filter {}`; use `filter bounded`, or leave it out",
                               filter));
     }
-    if (given && kind == FilterKind::automatic) {
+    if (kind == FilterKind::automatic) {
       return {FilterKind::bounded, fmt::format("`{}`", option)};
     }
   }
@@ -103,15 +98,10 @@ ChosenFilter choose_filter(const FilterWish& wish, const Request& request,
   set_displacement(request.slip_sd_mm, request.slip_sd_deg, histogram.slip_sd);
   const bool slips = !histogram.slip_sd.none();
   if (slips && wish.kind == FilterKind::bounded) {
-    for (const auto& [option, given] :
-         {std::pair{"tolerance", request.tolerance.has_value()},
-          std::pair{"budget-ms", request.budget_ms.has_value()},
-          std::pair{"evidence-nats", request.evidence_nats.has_value()}}) {
-      if (given) {
-        refuse_option(option,
-                      "has no effect where objects slip, as the histogram alone follows them; "
-                      "leave it out");
-      }
+    if (const std::string_view option = option_of_bounds(request); !option.empty()) {
+      refuse_option(option,
+                    "has no effect where objects slip, as the histogram alone follows them; leave "
+                    "it out");
     }
   } else if (wish.kind == FilterKind::bounded) {
     return {asked_bounds(request, histogram), false, wish.by};

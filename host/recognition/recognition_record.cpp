@@ -120,9 +120,9 @@ RecognitionStep identity_after(Recogniser& recogniser, const RecognitionTask& ta
                refined_near(estimate.mode, recogniser, task));
 }
 
-/// Where a learned object explains the touches only if some lie elsewhere than the robot says, or
-/// if the object moved, or where single touches disagree with the others: warns of it, and does not
-/// act.
+/// Warns where a learned object explains the touches only if they lie elsewhere than the robot
+/// says, or if the object moved, which forbids to act; and of single touches that disagree with the
+/// others.
 void doubt_places(const Recogniser& recogniser, const Estimate& estimate,
                   const RecognitionTask& task, RecognitionStep& step) {
   const std::span<const TouchEvidence> touches = recogniser.evidence();

@@ -84,6 +84,11 @@ std::vector<std::string> paths_of(const std::vector<Scene::Object>& objects,
 
 // 2. The sensor: what was learned about it, and the objects as its readings are compared with them.
 
+/// The first option that only Eq. 7 reads; "" where none is given.
+std::string_view option_of_eq7(const Request& request) {
+  return first_given(request, {"gamma", "prior"});
+}
+
 /// The model of the maps' folder, unless it does not go with what is asked or touched.
 std::optional<SensorFromFile> usual_sensor(Asked& asked, std::span<const Hypothesis> hypotheses) {
   const Request& request = asked.request;
@@ -103,11 +108,8 @@ std::optional<SensorFromFile> usual_sensor(Asked& asked, std::span<const Hypothe
     return left_out(fmt::format("it is for pressures in {}, and those of {} are in {}",
                                 sensor.pressure_unit, of.source, of.pressure_unit));
   }
-  for (const auto& [option, given] :
-       {std::pair{"gamma", request.gamma}, std::pair{"prior", request.prior}}) {
-    if (given) {
-      return left_out(fmt::format("`{}` is for Eq. 7", option));
-    }
+  if (const std::string_view option = option_of_eq7(request); !option.empty()) {
+    return left_out(fmt::format("`{}` is for Eq. 7", option));
   }
   for (const auto& [option, given, learned] :
        {std::tuple{"threshold", request.threshold, sensor.classifier.threshold},
@@ -136,11 +138,8 @@ std::optional<SensorFromFile> sensor_of(Asked& asked, std::span<const Hypothesis
     refuse(file, "pressure_unit = {}, but {} has pressures in {}; calibrate from recordings in {}",
            sensor.pressure_unit, of.source, of.pressure_unit, of.pressure_unit);
   }
-  for (const auto& [option, given] :
-       {std::pair{"gamma", request.gamma}, std::pair{"prior", request.prior}}) {
-    if (sensor.table && given) {
-      refuse_given(request, option, "the table of {} takes its place; leave it out", file);
-    }
+  if (const std::string_view option = option_of_eq7(request); sensor.table && !option.empty()) {
+    refuse_given(request, option, "the table of {} takes its place; leave it out", file);
   }
   return SensorFromFile{file, std::move(sensor)};
 }
@@ -265,8 +264,8 @@ struct NoneOfThese {
 
 NoneOfThese none_of_these(const Request& request, const LearnedSensor* sensor, const Region& region,
                           std::span<const Hypothesis> hypotheses) {
-  const NoneWeight asked = request.none.value_or(Automatic{});
-  if (const auto* weight = std::get_if<double>(&asked)) {
+  const NoneWeight wish = request.none.value_or(Automatic{});
+  if (const auto* weight = std::get_if<double>(&wish)) {
     return {.weight = *weight > 0.0 ? std::optional(*weight) : std::nullopt};
   }
   if (!request.none) {

@@ -11,7 +11,6 @@
 #include <glm/matrix.hpp>
 
 #include "palpate/pose_error.hpp"
-#include "recognition/touch_warnings.hpp"
 
 namespace palpate {
 
