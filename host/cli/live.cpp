@@ -185,49 +185,46 @@ void live(const LiveArguments& options) {
     std::fflush(stdout);
   }
   bool resolved = true;  // nothing was said yet
-  LiveRecognition recognition(*opened.sensor, elements_mm, recogniser, task,
-                              {.detector = detector,
-                               .tare_s = options.tare_s,
-                               .reset_after_s = options.reset_after_s,
-                               .plan = goal,
-                               .on_plan =
-                                   [&](const LiveTouch& touch) {
-                                     if (json) {
-                                       json->add(plan_line(touch));
-                                     }
-                                     if (page) {
-                                       page->plan(touch);
-                                     }
-                                     if (!to_program) {
-                                       fmt::print("         {}\n",
-                                                  next_touch_words(*touch.next, *goal));
-                                       std::fflush(stdout);
-                                     }
-                                   },
-                               .on_unknown =
-                                   [&] {
-                                     if (page) {
-                                       page->begin_unknown();
-                                     }
-                                   }},
-                              [&](const LiveTouch& touch) {
-                                // This thread alone uses the recogniser meanwhile.
-                                const std::string unresolved = recogniser.unresolved_words();
-                                if (resolved && !unresolved.empty()) {
-                                  resolved = false;
-                                  findings.add(unresolved);
-                                }
-                                if (json) {
-                                  json->add(json_line(touch, task));
-                                }
-                                if (page) {
-                                  page->add(touch);
-                                }
-                                if (!to_program) {
-                                  fmt::print("{}\n", table_line(touch, task));
-                                  std::fflush(stdout);
-                                }
-                              });
+  LiveOptions settings{.detector = detector,
+                       .tare_s = options.tare_s,
+                       .reset_after_s = options.reset_after_s,
+                       .plan = goal};
+  settings.on_plan = [&](const LiveTouch& touch) {
+    if (json) {
+      json->add(plan_line(touch));
+    }
+    if (page) {
+      page->plan(touch);
+    }
+    if (!to_program) {
+      fmt::print("         {}\n", next_touch_words(*touch.next, *goal));
+      std::fflush(stdout);
+    }
+  };
+  settings.on_unknown = [&] {
+    if (page) {
+      page->begin_unknown();
+    }
+  };
+  // Its thread alone uses the recogniser meanwhile.
+  const auto on_touch = [&](const LiveTouch& touch) {
+    const std::string unresolved = recogniser.unresolved_words();
+    if (resolved && !unresolved.empty()) {
+      resolved = false;
+      findings.add(unresolved);
+    }
+    if (json) {
+      json->add(json_line(touch, task));
+    }
+    if (page) {
+      page->add(touch);
+    }
+    if (!to_program) {
+      fmt::print("{}\n", table_line(touch, task));
+      std::fflush(stdout);
+    }
+  };
+  LiveRecognition recognition(*opened.sensor, elements_mm, recogniser, task, settings, on_touch);
   {
     SensorWatch watch;
     if (page) {

@@ -25,14 +25,11 @@ void hash_files(BatchTask& task, const Request& request) {
 }
 
 RecognitionJob job_of(BatchTask& task, const Request& request, DeviceSource device) {
-  const BatchInference& inferred = task.inferred;
-  const bool settled = task.bins != std::array<int, 3>{};
-  RecognitionJob job(request,
-                     Circumstances{.pressure_unit = inferred.pressure_unit,
-                                   .source = inferred.unit_from,
-                                   .reach_mm = inferred.reach_mm,
-                                   .counts = settled ? std::optional(task.bins) : std::nullopt},
-                     std::move(device));
+  Circumstances circumstances = task.inferred;
+  if (task.bins != std::array<int, 3>{}) {
+    circumstances.counts = task.bins;
+  }
+  RecognitionJob job(request, circumstances, std::move(device));
   const PoseLattice& lattice = job.task().lattice();
   task.bins = {lattice.x_mm.count, lattice.y_mm.count, lattice.theta_rad.count};
   return job;

@@ -102,9 +102,9 @@ void read_pattern(const std::string& pattern, std::vector<BatchEntry>& inputs) {
 /// @param inferred whose pressure unit the recording must have; none: any unit will do
 /// @throws Error (Fault::input) where the recording is at fault
 ReadInput read_input(const BatchInput& input, const Request& request,
-                     const BatchInference* inferred) {
+                     const Circumstances* inferred) {
   const auto recording = std::make_shared<Recording>(read_recording(input.path));
-  Recording like = inferred == nullptr ? Recording{} : Recording{.path = inferred->unit_from};
+  Recording like = inferred == nullptr ? Recording{} : Recording{.path = inferred->source};
   like.pressure_unit = inferred == nullptr ? recording->pressure_unit : inferred->pressure_unit;
   require_touches(*recording, like);
   replace_array(request, *recording);
@@ -245,15 +245,15 @@ void survey_inputs(std::span<BatchEntry> inputs, const Request& request, std::si
   }
 }
 
-BatchInference infer(std::span<const BatchEntry> inputs, const Request& request) {
-  BatchInference inferred;
+Circumstances infer(std::span<const BatchEntry> inputs, const Request& request) {
+  Circumstances inferred{.pressure_unit = "kPa"};
   const auto surveyed = [&](const BatchEntry& entry) {
     return entry.survey ? *entry.survey : survey_of(entry, request);
   };
   for (const BatchEntry& entry : inputs) {
     if (const InputSurvey survey = surveyed(entry); !survey.pressure_unit.empty()) {
       inferred.pressure_unit = survey.pressure_unit;
-      inferred.unit_from = entry.input.path;
+      inferred.source = entry.input.path;
       break;
     }
   }

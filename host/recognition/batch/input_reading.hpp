@@ -38,6 +38,6 @@ void survey_inputs(std::span<BatchEntry> inputs, const Request& request, std::si
                    const std::function<void(double)>& progress);
 
 /// What follows from surveyed inputs. Without surveys, reads inputs until one can be read.
-BatchInference infer(std::span<const BatchEntry> inputs, const Request& request);
+Circumstances infer(std::span<const BatchEntry> inputs, const Request& request);
 
 }  // namespace palpate
