@@ -5,7 +5,7 @@
 namespace palpate {
 
 /// All touches of a recording as one unknown.
-inline Unknown unknown_of(const Recording& recording) {
+inline Query unknown_of(const Recording& recording) {
   return unknowns_in({}, {}, recording).front();
 }
 

@@ -31,9 +31,8 @@ struct CalibrateArguments {
   std::string output;
   std::vector<std::string> maps;
   CalibrationRequest request;
-  Request recognition;  ///< bins, region and frames alone
+  Request recognition;  ///< classifier, bins, region, frames and device alone
   std::string write_array;
-  std::string device;
 };
 
 void check_outputs(const CalibrateArguments& options,
@@ -145,10 +144,10 @@ void add_calibrate(CLI::App& app) {
                       " group is left out as a whole where it is learned how sure to be: "
                       "recording, a group a file; label, a group for each GROUP of objects named "
                       "LABEL@GROUP");
-  command->add_option("--threshold", options->request.threshold,
-                      "Contact threshold, in the recordings' pressure unit [default: learned]");
-  command->add_option("--ratio", options->request.ratio,
-                      "Threshold as a fraction of the touch's largest pressure [default: learned]");
+  add_option_flag(*command, options->recognition, "threshold",
+                  "Contact threshold, in the recordings' pressure unit [default: learned]");
+  add_option_flag(*command, options->recognition, "ratio",
+                  "Threshold as a fraction of the touch's largest pressure [default: learned]");
   command
       ->add_option("--layer", options->request.layer,
                    "What of a map readings are compared with: mean_level, the mean pressure; "
@@ -186,8 +185,8 @@ void add_calibrate(CLI::App& app) {
   command->add_option("--write-array", options->write_array,
                       "File for the array, CSV of x and y in mm, where drawn maps say that it sits "
                       "in the tool, for --array of palpate import");
-  command->add_option("--device", options->device,
-                      "Vulkan device, as for the other commands; learning uses none");
+  add_option_flag(*command, options->recognition, "device",
+                  "Vulkan device, as for the other commands; learning uses none");
   command->callback([options] { calibrate(*options); });
 }
 

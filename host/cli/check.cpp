@@ -25,13 +25,11 @@ namespace {
 
 struct CheckArguments {
   std::vector<std::string> recordings;
-  std::optional<double> threshold;
-  std::optional<double> ratio;
+  Request request;  ///< threshold, ratio and device
   double cell_mm = 0.5;
   std::optional<double> spread_mm;
   std::string json;
   std::string write_array;
-  std::string device;
 };
 
 void check_outputs(const CheckArguments& options) {
@@ -59,9 +57,9 @@ void check(const CheckArguments& options) {
   MapOptions maps{.cell_mm = require_above("--cell-mm", options.cell_mm, 0.0)};
   maps.sensor.spread_mm = options.spread_mm ? require_above("--spread-mm", *options.spread_mm, 0.0)
                                             : usual_spread_mm(recordings);
-  maps.classifier =
-      make_classifier(first.pressure_unit, first.path, options.threshold, options.ratio);
-  Device device = Device::open(options.device);
+  maps.classifier = make_classifier(first.pressure_unit, first.path, options.request.threshold,
+                                    options.request.ratio);
+  Device device = Device::open(options.request.device);
   SetupCheck found;
   {
     Progress progress("trying set-ups");
@@ -113,18 +111,18 @@ void add_check(CLI::App& app) {
   command->add_option("--write-array", options->write_array,
                       "File for the array as the findings correct it (CSV: x, y in mm), for "
                       "--array of palpate import");
-  command->add_option(
-      "--threshold", options->threshold,
-      "Contact threshold, in the recording's pressure unit [default: 2 kPa; required "
-      "for raw pressure]");
-  command->add_option("--ratio", options->ratio,
-                      "Threshold as a fraction of the touch's largest pressure [default: 0.3]");
+  add_option_flag(*command, options->request, "threshold",
+                  "Contact threshold, in the recording's pressure unit [default: 2 kPa; required "
+                  "for raw pressure]");
+  add_option_flag(*command, options->request, "ratio",
+                  "Threshold as a fraction of the touch's largest pressure [default: 0.3]");
   command->add_option("--cell-mm", options->cell_mm, "Edge of a map's cell, mm")
       ->capture_default_str();
   command->add_option("--spread-mm", options->spread_mm,
                       "Standard deviation of the inverse sensor model, mm [default: a quarter of "
                       "the distance of neighbouring elements; 0.5 for DigiTacts and one element]");
-  command->add_option("--device", options->device, "Vulkan device, by index or a part of its name");
+  add_option_flag(*command, options->request, "device",
+                  "Vulkan device, by index or a part of its name");
   command->callback([options] { check(*options); });
 }
 

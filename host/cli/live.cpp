@@ -41,12 +41,12 @@ struct LiveArguments : SensorArguments {
 };
 
 /// Tells on standard error, as it happens, what is wrong with the poses, the lattice or the sensor.
-class Complaints {
+class Findings {
  public:
-  void add(const std::string& problem) {
+  void add(const std::string& finding) {
     const std::lock_guard lock(mutex_);
-    last_ = problem;
-    fmt::print(stderr, "palpate: {}\n", problem);
+    last_ = finding;
+    fmt::print(stderr, "palpate: {}\n", finding);
   }
   std::string last() const {
     const std::lock_guard lock(mutex_);
@@ -135,21 +135,20 @@ void live(const LiveArguments& options) {
         "poses",
         options.sensor);
   }
-  Complaints complaints;
+  Findings findings;
   const OpenSensor opened =
-      open_sensor(options, [&complaints](const std::string& problem) { complaints.add(problem); });
+      open_sensor(options, [&findings](const std::string& finding) { findings.add(finding); });
   const SensorDescription& description = opened.sensor->description();
   std::vector<glm::dvec2> elements_mm = description.elements_mm;
   const std::string source = "sensor " + options.sensor;
   replace_array(request, source, elements_mm.size(), elements_mm);
   const TouchDetectorOptions detector =
       detector_options(options.detector, description.pressure_unit, source);
-  DeviceInWaiting device_in_waiting(request.device);
-  const RecognitionTask task = resolve(request, {.pressure_unit = description.pressure_unit,
-                                                 .source = source,
-                                                 .reach_mm = array_reach_mm(elements_mm),
-                                                 .need = {.waited_for = true},
-                                                 .device = std::ref(device_in_waiting)});
+  const RecognitionJob job(request, Circumstances{.pressure_unit = description.pressure_unit,
+                                                  .source = source,
+                                                  .reach_mm = array_reach_mm(elements_mm),
+                                                  .waited_for = true});
+  const RecognitionTask& task = job.task();
   if (goal && !traits_of(task.filter).bins) {
     refuse_flag("--plan", options.plan,
                 "{}; use --filter bounded or --filter histogram, or leave it out", plan_needs);
@@ -159,11 +158,10 @@ void live(const LiveArguments& options) {
   add_recognition_files(request, files);
   files.writes("--json", options.json, CommandFiles::Dash::stream);
   files.require_distinct();
-  Device* device = device_in_waiting.of(task);
-  Recogniser recogniser = open_telling(device, task);
+  Recogniser recogniser = open_telling(job);
   warm_up(recogniser, task, description, elements_mm);
   if (options.verbose) {
-    print_engine(device, recogniser, task);
+    print_engine(job, recogniser);
   }
   std::optional<LineFile> json;
   if (!options.json.empty()) {
@@ -187,50 +185,46 @@ void live(const LiveArguments& options) {
     std::fflush(stdout);
   }
   bool resolved = true;  // nothing was said yet
-  LiveRecognition recognition(
-      *opened.sensor, elements_mm, recogniser, task,
-      {.detector = detector,
-       .tare_s = options.tare_s,
-       .reset_after_s = options.reset_after_s,
-       .plan = goal,
-       .on_plan =
-           [&](const LiveTouch& touch) {
-             if (json) {
-               json->add(plan_line(touch));
-             }
-             if (page) {
-               page->plan(touch);
-             }
-             if (!to_program) {
-               fmt::print("         {}\n", next_touch_words(*touch.next, *goal));
-               std::fflush(stdout);
-             }
-           },
-       .on_unknown =
-           [&] {
-             if (page) {
-               page->begin_unknown();
-             }
-           }},
-      [&](const LiveTouch& touch) {
-        // This thread alone uses the recogniser meanwhile.
-        const auto unresolved = unresolved_words(task, recogniser.lattice(),
-                                                 std::span(&*touch.touch.T_robot_sensor, 1));
-        if (resolved && !unresolved.empty()) {
-          resolved = false;
-          complaints.add(unresolved);
-        }
-        if (json) {
-          json->add(json_line(touch, task));
-        }
-        if (page) {
-          page->add(touch);
-        }
-        if (!to_program) {
-          fmt::print("{}\n", table_line(touch, task));
-          std::fflush(stdout);
-        }
-      });
+  LiveOptions settings{.detector = detector,
+                       .tare_s = options.tare_s,
+                       .reset_after_s = options.reset_after_s,
+                       .plan = goal};
+  settings.on_plan = [&](const LiveTouch& touch) {
+    if (json) {
+      json->add(plan_line(touch));
+    }
+    if (page) {
+      page->plan(touch);
+    }
+    if (!to_program) {
+      fmt::print("         {}\n", next_touch_words(*touch.next, *goal));
+      std::fflush(stdout);
+    }
+  };
+  settings.on_unknown = [&] {
+    if (page) {
+      page->begin_unknown();
+    }
+  };
+  // Its thread alone uses the recogniser meanwhile.
+  const auto on_touch = [&](const LiveTouch& touch) {
+    const std::string unresolved = recogniser.unresolved_words();
+    if (resolved && !unresolved.empty()) {
+      resolved = false;
+      findings.add(unresolved);
+    }
+    if (json) {
+      json->add(json_line(touch, task));
+    }
+    if (page) {
+      page->add(touch);
+    }
+    if (!to_program) {
+      fmt::print("{}\n", table_line(touch, task));
+      std::fflush(stdout);
+    }
+  };
+  LiveRecognition recognition(*opened.sensor, elements_mm, recogniser, task, settings, on_touch);
   {
     SensorWatch watch;
     if (page) {
@@ -247,7 +241,7 @@ void live(const LiveArguments& options) {
       const LiveState state = recognition.state();
       watch.update(state);
       if (page) {
-        page->update(state, complaints.last());
+        page->update(state, findings.last());
       }
     }
     if (page) {
@@ -264,7 +258,7 @@ void live(const LiveArguments& options) {
   }
   fmt::print(people, "{}", summary(state, recognition.latencies_ms(), task));
   if (!to_program) {
-    fmt::print("{}\n", setup_words(device, task));
+    fmt::print("{}\n", setup_words(job));
   }
   report_refused(opened);
 }

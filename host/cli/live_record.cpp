@@ -10,7 +10,6 @@
 #include "cli/options.hpp"
 #include "cli/page/page_json.hpp"
 #include "cli/step_words.hpp"
-#include "model/printable.hpp"
 #include "palpate/error.hpp"
 #include "recognition/record_json.hpp"
 #include "recognition/result_json.hpp"
@@ -88,13 +87,11 @@ std::string summary(const LiveState& state, std::vector<double> latencies_ms,
   std::string text;
   if (state.last) {
     const RecognitionStep& step = state.last->step;
-    const std::string decision = decision_words(step);
-    text += (decision.empty() ? "" : decision + "\n") + result_words(step, task) + "\n";
-    std::vector<std::string> more{truth_words(step), unproven_sentence(step, task),
-                                  single_touch_words(task, state.touches)};
-    std::ranges::move(warning_words(step), std::back_inserter(more));
-    for (const std::string& words : more) {
-      text += words.empty() ? "" : printable(words) + "\n";
+    const StepSentences words = sentences_of(step, task);
+    std::vector<std::string> lines{words.decision, result_words(step, task), words.truth};
+    std::ranges::copy(words.findings, std::back_inserter(lines));
+    for (const std::string& line : lines) {
+      text += line.empty() ? "" : line + "\n";
     }
   }
   text += fmt::format("{} touches, {} frames, {} lost", state.all_touches, state.counters.frames,

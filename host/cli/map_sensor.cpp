@@ -228,7 +228,7 @@ MapSensor learn_sensor(const MapFlags& flags, const std::vector<OccupancyGrid>& 
     const std::vector<FolderMap> all = folder_maps(flags, maps, written);
     const std::vector<Recording> touches = touches_of(all);
     CalibrationTask task = calibration_task(
-        {.threshold = flags.request.threshold, .ratio = flags.request.ratio}, {}, touches, {});
+        {}, {.threshold = flags.request.threshold, .ratio = flags.request.ratio}, touches, {});
     require_enough(task.presses, least_touches);
     give_groups(all, task.presses);
     task.options.maps = model;
@@ -260,11 +260,11 @@ MapSensor learn_unposed_sensor(const MapFlags& flags, const std::vector<Recordin
         recording.object = flags.group == "label" ? flags.label + "@" + group : flags.label;
       }
     }
-    const CalibrationTask task = calibration_task({.unposed = true,
-                                                   .threshold = flags.request.threshold,
+    const CalibrationTask task = calibration_task({.unposed = true, .group = flags.group},
+                                                  {.threshold = flags.request.threshold,
                                                    .ratio = flags.request.ratio,
-                                                   .group = flags.group},
-                                                  {.frames = flags.request.frames}, labelled, {});
+                                                   .frames = flags.request.frames},
+                                                  labelled, {});
     require_enough(task.presses, least_presses);
     return learned_from(task, flags);
   });

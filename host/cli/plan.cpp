@@ -63,11 +63,11 @@ std::string table_of(const Plan& plan) {
 /// the best one.
 std::string plan_text(const Plan& plan, const RecognitionTask& task) {
   const std::string limit = in_flags(limit_words(plan));
-  const std::string decision = decision_words(plan.record.last());
+  const std::string decision = sentences_of(plan.record.last(), task).decision;
   return fmt::format("{}{}\n{}\n\n{}{}{}\n{}, {} in {:.0f} ms\n",
                      decision.empty() ? "" : decision + "\n",
                      result_words(plan.record.last(), task), believed_words(plan), table_of(plan),
-                     complaints({plan.record}, task), limit.empty() ? "" : limit + "\n",
+                     findings({plan.record}, task), limit.empty() ? "" : limit + "\n",
                      next_touch_words(plan.ranked.front(), plan.goal),
                      count_of(plan.ranked.size(), "candidate", "candidates"), 1e3 * plan.seconds);
 }
@@ -98,29 +98,19 @@ void check_outputs(const PlanArguments& options, const Request& request) {
 void plan_touches(const PlanArguments& options) {
   const PlanRequest wanted =
       plan_request(options.goal, options.candidates, options.samples, options.seed, tell_on_stderr);
-  const Request request = complete(options.request);
-  std::vector<Recording> recordings = read_touch_recordings({options.recording});
-  Recording& recording = recordings.front();
-  replace_array(request, recording.path, recording.elements(), recording.elements_mm);
-  const Unknown unknown = list_unknowns(request, recordings).front();
-  DeviceInWaiting device_in_waiting(request.device);
-  const RecognitionTask task = resolve(request, {.pressure_unit = recording.pressure_unit,
-                                                 .source = recording.path,
-                                                 .reach_mm = largest_reach_mm(unknown.touches),
-                                                 .device = std::ref(device_in_waiting)});
+  const RecognitionJob job{complete(options.request), read_touch_recordings({options.recording})};
+  const RecognitionTask& task = job.task();
   require_plannable(task);
-  check_outputs(options, request);
-  Device* device = device_in_waiting.of(task);
-  Recogniser recogniser = open_telling(device, task);
-  const Plan plan = plan_touch(recogniser, task, unknown, wanted);
-  if (const auto words = unresolved_words(task, recogniser.lattice(), unknown.touches);
-      !words.empty()) {
+  check_outputs(options, job.request());
+  Recogniser recogniser = open_telling(job);
+  const Plan plan = plan_touch(recogniser, task, job.unknowns().front(), wanted);
+  if (const std::string words = recogniser.unresolved_words(); !words.empty()) {
     tell_on_stderr(words);
   }
-  give_result(options.json, text_of(to_json(plan, task, device_name(device)), 2),
-              plan_text(plan, task) + setup_words(device, task) + "\n");
+  give_result(options.json, text_of(to_json(plan, task, job.device_name()), 2),
+              plan_text(plan, task) + setup_words(job) + "\n");
   if (options.verbose) {
-    print_engine(device, recogniser, task);
+    print_engine(job, recogniser);
   }
 }
 

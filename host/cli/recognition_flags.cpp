@@ -70,10 +70,9 @@ void tell_on_stderr(const std::string& sentence) {
   fmt::print(stderr, "palpate: {}\n", in_flags(sentence));
 }
 
-Recogniser open_telling(Device* device, const RecognitionTask& task,
-                        const std::function<void()>& cancel_point) {
-  Recogniser recogniser = open_recogniser(device, task, {.cancel_point = cancel_point});
-  std::ranges::for_each(task.remarks, tell_on_stderr);
+Recogniser open_telling(const RecognitionJob& job, const std::function<void()>& cancel_point) {
+  Recogniser recogniser = job.open({.cancel_point = cancel_point});
+  std::ranges::for_each(job.task().remarks, tell_on_stderr);
   return recogniser;
 }
 

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <functional>
-#include <optional>
 #include <string>
 #include <string_view>
 
@@ -9,11 +8,11 @@
 
 #include "cli/command_files.hpp"
 #include "options/option.hpp"
-#include "recognition/resolve.hpp"
+#include "recognition/recognition_job.hpp"
 
 namespace palpate::cli {
 
-// What the command line asks of a recognition fills a Request, which resolve() makes a task.
+// What the command line asks of a recognition fills a Request, which makes a RecognitionJob.
 
 /// Adds the flags of maps, sensor, lattice and filter, and --verbose.
 void add_recognition_flags(CLI::App& command, Request& request, bool& verbose);
@@ -30,35 +29,13 @@ void add_selection_flags(CLI::App& command, Request& request);
 void add_option_flag(CLI::App& command, Request& request, std::string_view name,
                      const std::string& help = "");
 
-/// A device that is opened once it is needed.
-class DeviceInWaiting {
- public:
-  explicit DeviceInWaiting(std::string name) : name_(std::move(name)) {}
-  Device& operator()() { return device_ ? *device_ : device_.emplace(Device::open(name_)); }
-  /// Opens the device of a task's filter; null where that uses none.
-  /// @throws Error where there is no device of the name that was given, also where none is used
-  Device* of(const RecognitionTask& task) {
-    if (!uses_device(task) && name_.empty()) {
-      return nullptr;
-    }
-    Device& device = (*this)();
-    return uses_device(task) ? &device : nullptr;
-  }
-
- private:
-  std::string name_;
-  std::optional<Device> device_;
-};
-
 /// Says a sentence to the user, on standard error, its options as flags.
 void tell_on_stderr(const std::string& sentence);
 
-/// Opens the task's filter, then tells the task's remarks: bins that do not fit deserve only their
+/// Opens the job's filter, then tells the task's remarks: bins that do not fit deserve only their
 /// refusal. Throws Error.
-/// @param device may be null where uses_device() is false
 /// @param cancel_point see FilterResources
-Recogniser open_telling(Device* device, const RecognitionTask& task,
-                        const std::function<void()>& cancel_point = {});
+Recogniser open_telling(const RecognitionJob& job, const std::function<void()>& cancel_point = {});
 
 /// Adds the files that the task of a completed request was read from.
 void add_recognition_files(const Request& request, CommandFiles& files);

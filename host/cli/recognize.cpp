@@ -24,7 +24,6 @@
 #include "cli/text_table.hpp"
 #include "io/atomic_file.hpp"
 #include "palpate/files.hpp"
-#include "recognition/filter_choice.hpp"
 #include "recognition/record_json.hpp"
 #include "recognition/recordings.hpp"
 
@@ -41,29 +40,22 @@ struct RecognizeArguments {
   std::string png;
 };
 
-CallerNeed caller_need(const RecognizeArguments& options, const Request& request) {
-  if (!options.posterior.empty() && filter_wish(request).kind != FilterKind::bounded) {
-    return {"posterior", "holds the log-likelihood of every bin"};
-  }
-  return {};
-}
-
-std::filesystem::path png_path(const RecognizeArguments& options, const Unknown& unknown) {
+std::filesystem::path png_path(const RecognizeArguments& options, const Query& unknown) {
   const std::string stem = std::filesystem::path(unknown.recording).stem().string();
   return std::filesystem::path(options.png) /
          (unknown.frame ? fmt::format("{}.{}.png", stem, *unknown.frame) : stem + ".png");
 }
 
 /// Throws Error where an output cannot be written, before any work is done.
-void check_outputs(const RecognizeArguments& options, const Request& request,
-                   const RecognitionTask& task, const std::vector<Unknown>& unknowns) {
+void check_outputs(const RecognizeArguments& options, const RecognitionJob& job) {
+  const std::vector<Query>& unknowns = job.unknowns();
   CommandFiles files;
   for (const std::string& recording : options.recordings) {
     files.reads("RECORDING", recording);
   }
-  add_recognition_files(request, files);
+  add_recognition_files(job.request(), files);
   if (!options.posterior.empty()) {
-    if (!traits_of(task.filter).bins) {
+    if (!traits_of(job.task().filter).bins) {
       refuse_flag("--posterior", options.posterior,
                   "particles have no bins; use --filter histogram");
     }
@@ -77,7 +69,7 @@ void check_outputs(const RecognizeArguments& options, const Request& request,
   files.writes("--json", options.json, CommandFiles::Dash::stream);
   if (!options.png.empty()) {
     std::set<std::filesystem::path> pictures;
-    for (const Unknown& unknown : unknowns) {
+    for (const Query& unknown : unknowns) {
       if (!pictures.insert(png_path(options, unknown)).second) {
         refuse(unknown.recording,
                "its picture would overwrite the picture of another recording of the same name; "
@@ -156,24 +148,15 @@ class UnknownsProgress {
 };
 
 void recognize(const RecognizeArguments& options) {
-  const Request request = complete(options.request);
-  std::vector<Recording> recordings = read_touch_recordings(options.recordings);
-  for (Recording& recording : recordings) {
-    replace_array(request, recording.path, recording.elements(), recording.elements_mm);
-  }
-  const std::vector<Unknown> unknowns = list_unknowns(request, recordings);
-  const Recording& first = recordings.front();
-  DeviceInWaiting device_in_waiting(request.device);
-  const RecognitionTask task = resolve(request, {.pressure_unit = first.pressure_unit,
-                                                 .source = first.path,
-                                                 .reach_mm = largest_reach_mm(recordings),
-                                                 .need = caller_need(options, request),
-                                                 .device = std::ref(device_in_waiting)});
-  check_outputs(options, request, task, unknowns);
-  Device* device = device_in_waiting.of(task);
+  const RecognitionJob job{complete(options.request),
+                           read_touch_recordings(options.recordings),
+                           {.every_bin_for = options.posterior.empty() ? "" : "posterior"}};
+  const Request& request = job.request();
+  const RecognitionTask& task = job.task();
+  check_outputs(options, job);
   std::string unresolved;
-  std::optional<UnknownsProgress> progress(unknowns.size());
-  Recogniser recogniser = open_telling(device, task, [&] {
+  std::optional<UnknownsProgress> progress(job.unknowns().size());
+  Recogniser recogniser = open_telling(job, [&] {
     // Between the steps of bounds' searches, which may take minutes.
     if (progress) {
       progress->show();
@@ -187,16 +170,16 @@ void recognize(const RecognizeArguments& options) {
   const bool trace = request.trace || !options.png.empty();
   std::vector<RecognitionRecord> records;
   auto json = nlohmann::ordered_json::array();
-  for (const Unknown& unknown : unknowns) {
+  for (const Query& unknown : job.unknowns()) {
     records.push_back(recognise(
         recogniser, task, unknown, trace, [&](double fraction) { progress->show(fraction); },
         !request.trace));
     records.back().require_steps();
     if (unresolved.empty()) {
-      unresolved = unresolved_words(task, recogniser.lattice(), unknown.touches);
+      unresolved = recogniser.unresolved_words();
     }
     if (!options.json.empty()) {
-      json.push_back(to_json(records.back(), task, device_name(device), request.trace));
+      json.push_back(to_json(records.back(), task, job.device_name(), request.trace));
     }
     if (!options.png.empty()) {
       write_file(
@@ -223,14 +206,14 @@ void recognize(const RecognizeArguments& options) {
         fmt::print("{}\n", trace_table(record, task));
       }
     }
-    fmt::print("{}{}\n", result_table(records, task), setup_words(device, task));
+    fmt::print("{}{}\n", result_table(records, task), setup_words(job));
   }
   if (options.verbose) {
     double seconds = 0.0;
     for (const RecognitionRecord& record : records) {
       seconds += record.seconds;
     }
-    print_engine(device, recogniser, task);
+    print_engine(job, recogniser);
     fmt::print(stderr, "seconds: {:.3f} to recognise\n", seconds);
   }
 }

@@ -60,12 +60,12 @@ constexpr std::size_t few_decided = 3;
 bool is_decided(const RecognitionRecord& record) { return !record.last().decision.because.empty(); }
 
 /// Whether to act on each of a few unknowns, or on how many of more.
-std::string decisions(const std::vector<RecognitionRecord>& records) {
+std::string decisions(const std::vector<RecognitionRecord>& records, const RecognitionTask& task) {
   std::string text;
   std::size_t decided = 0;
   std::size_t acts = 0;
   for (const RecognitionRecord& record : records) {
-    if (const std::string words = decision_words(record.last()); !words.empty()) {
+    if (const std::string words = sentences_of(record.last(), task).decision; !words.empty()) {
       text += fmt::format("{}: {}\n", printable_name(record), words);
       ++decided;
       acts += record.last().decision.act ? 1 : 0;
@@ -85,29 +85,6 @@ std::string best_words(const RecognitionStep& step, const RecognitionTask& task)
 double none_probability(const RecognitionStep& step, const RecognitionTask& task) {
   const bool other = task.labels.back() == none_label && step.best + 1 != task.labels.size();
   return other ? step.identity.back() : 0.0;
-}
-
-/// Every warning once, after the names of the unknowns that it is of.
-std::string warnings(const std::vector<RecognitionRecord>& records) {
-  constexpr std::size_t most_names = 3;
-  std::vector<std::pair<std::string, std::vector<std::string>>> names_of;  // by warning
-  for (const RecognitionRecord& record : records) {
-    for (const std::string& warning : warning_words(record.last())) {
-      auto known = std::ranges::find(names_of, warning, &decltype(names_of)::value_type::first);
-      if (known == names_of.end()) {
-        known = names_of.insert(names_of.end(), {warning, {}});
-      }
-      known->second.push_back(printable_name(record));
-    }
-  }
-  std::string text;
-  for (auto& [warning, names] : names_of) {
-    const std::size_t more = names.size() - std::min(names.size(), most_names);
-    names.resize(names.size() - more);
-    text += fmt::format("{}{}: {}\n", fmt::join(names, ", "),
-                        more > 0 ? fmt::format(" and {} more", more) : "", printable(warning));
-  }
-  return text;
 }
 
 /// How many unknowns of a known truth are right, and their mean pose errors.
@@ -196,31 +173,29 @@ std::string trace_table(const RecognitionRecord& record, const RecognitionTask& 
                particles ? fmt::format("{:.1f}", *particles) : "", touch_fit_text(step),
                fit_words(step)});
   }
-  const std::string truth = truth_words(record.last());
+  const std::string truth = sentences_of(record.last(), task).truth;
   return printable_name(record) + "\n" + table.text() + (truth.empty() ? "" : "  " + truth + "\n");
 }
 
-std::string complaints(const std::vector<RecognitionRecord>& records, const RecognitionTask& task) {
-  std::string text;
+std::string findings(const std::vector<RecognitionRecord>& records, const RecognitionTask& task) {
+  constexpr std::size_t most_names = 3;
+  std::vector<std::pair<std::string, std::vector<std::string>>> names_of;  // [finding]
+  std::map<std::string, std::size_t> index_of;
   for (const RecognitionRecord& record : records) {
-    if (record.last().contradicted) {
-      text += fmt::format(
-          "{}: contradicted: no map explains these touches at any pose tried; the object may be "
-          "unknown, its pose outside the region, or gamma too small\n",
-          printable_name(record));
-    }
-    if (const auto unproven = unproven_sentence(record.last(), task); !unproven.empty()) {
-      text += fmt::format("{}: {}\n", printable_name(record), unproven);
-    }
-    if (const auto misfit = misfit_sentence(record.last(), record.touches, task); !misfit.empty()) {
-      text += fmt::format("{}: {}\n", printable_name(record), misfit);
+    for (const std::string& finding : sentences_of(record.last(), task).findings) {
+      const auto [known, is_new] = index_of.try_emplace(finding, names_of.size());
+      if (is_new) {
+        names_of.push_back({finding, {}});
+      }
+      names_of[known->second].second.push_back(printable_name(record));
     }
   }
-  text += warnings(records);
-  const bool any_single = std::ranges::any_of(
-      records, [](const RecognitionRecord& record) { return record.touches == 1; });
-  if (const auto words = single_touch_words(task, any_single ? 1 : 0); !words.empty()) {
-    text += words + "\n";
+  std::string text;
+  for (auto& [finding, names] : names_of) {
+    const std::size_t more = names.size() - std::min(names.size(), most_names);
+    names.resize(names.size() - more);
+    text += fmt::format("{}{}: {}\n", fmt::join(names, ", "),
+                        more > 0 ? fmt::format(" and {} more", more) : "", finding);
   }
   return text;
 }
@@ -284,8 +259,8 @@ std::string result_table(const std::vector<RecognitionRecord>& records,
       table.add({"  truth", "", "", step.truth.label, "", "", "", "", "", "wrong object"});
     }
   }
-  return decisions(records) + table.text() + complaints(records, task) + symmetries(records, task) +
-         summary(records) + confusions(records, task);
+  return decisions(records, task) + table.text() + findings(records, task) +
+         symmetries(records, task) + summary(records) + confusions(records, task);
 }
 
 }  // namespace palpate::cli

@@ -14,10 +14,8 @@ std::string name_of(const RecognitionRecord& record);
 /// The trace, a line per touch, then the truth as far as it is known.
 std::string trace_table(const RecognitionRecord& record, const RecognitionTask& task);
 
-/// A line for each thing that is wrong with an unknown: contradicted or unlike touches, bounds that
-/// prove less than was asked for, each
-/// warning once, and that one touch cannot tell (none).
-std::string complaints(const std::vector<RecognitionRecord>& records, const RecognitionTask& task);
+/// A line for each of StepSentences::findings, after the names of the unknowns that it is of.
+std::string findings(const std::vector<RecognitionRecord>& records, const RecognitionTask& task);
 
 /// First whether to act on each of up to three unknowns and why, or on how many of more. Then for
 /// each unknown a line with its pose in the robot frame, below it a line for each other mode with

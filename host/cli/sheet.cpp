@@ -35,8 +35,9 @@ std::vector<RecognitionSheet::Caption> captions(const RecognitionRecord& record,
       lines.push_back({words, alarm});
     }
   };
+  const StepSentences words = sentences_of(last, task);
   add(printed(printable(last.decision.because)), !last.decision.act);
-  add(printed(truth_words(last)), last.right == false);
+  add(printed(words.truth), last.right == false);
   constexpr std::size_t shown = 2;
   const std::vector<BeliefMode> other = other_modes(last);
   std::string others;
@@ -47,16 +48,12 @@ std::vector<RecognitionSheet::Caption> captions(const RecognitionRecord& record,
   }
   others += other.size() > shown ? fmt::format(", and {} more", other.size() - shown) : "";
   add(printed(others), true);
-  add(unproven_sentence(last, task), true);
-  if (last.contradicted) {
-    add("contradicted: no map explains these touches at any pose tried", true);
-  } else if (last.fit) {
+  if (last.fit && last.fit->verdict != Verdict::does_not_fit) {  // which is a finding
     add(fmt::format("fit: {} (z {:.1f})", verdict_text(last.fit->verdict), last.fit->z),
-        last.fit->verdict != Verdict::fits);
+        last.fit->verdict == Verdict::doubtful);
   }
-  if (const std::vector<std::string> warnings = warning_words(last); !warnings.empty()) {
-    const std::size_t more = warnings.size() - 1;
-    add((more > 0 ? fmt::format("(1 of {}) ", more + 1) : "") + warnings.front(), true);
+  for (const std::string& finding : words.findings) {
+    add(finding, true);
   }
   if (last.refined) {
     std::string mode = "most probable bin: " + pose_words(pose_text(last.mode_T_robot_object()));
@@ -85,7 +82,7 @@ PlacedBelief belief_of(const Recogniser& recogniser, int object) {
                               : placed_belief(lattice, bins.front());
 }
 
-RecognitionSheet sheet_of(const RecognitionRecord& record, const Unknown& unknown,
+RecognitionSheet sheet_of(const RecognitionRecord& record, const Query& unknown,
                           const RecognitionTask& task, PlacedBelief belief) {
   const RecognitionStep& last = record.last();
   RecognitionSheet sheet;

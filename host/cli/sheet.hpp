@@ -15,7 +15,7 @@ PlacedBelief belief_of(const Recogniser& recogniser, int object);
 
 /// The picture of one recognised unknown: its result in words, its touches, its trace.
 /// @param belief of the object of the last step's mode
-RecognitionSheet sheet_of(const RecognitionRecord& record, const Unknown& unknown,
+RecognitionSheet sheet_of(const RecognitionRecord& record, const Query& unknown,
                           const RecognitionTask& task, PlacedBelief belief);
 
 }  // namespace palpate::cli

@@ -89,11 +89,6 @@ std::optional<double> share_at_pose(const RecognitionStep& step, const Recogniti
   return there ? std::nullopt : std::optional(step.places.share);
 }
 
-std::string decision_words(const RecognitionStep& step) {
-  const auto& [act, because] = step.decision;
-  return because.empty() ? "" : printable((act ? "act: " : "do not act: ") + because);
-}
-
 std::vector<BeliefMode> other_modes(const RecognitionStep& step) {
   constexpr double least = 0.05;
   std::vector<BeliefMode> others;
@@ -109,18 +104,6 @@ std::string result_words(const RecognitionStep& step, const RecognitionTask& tas
   return identity_words(step, task) + ": " + pose_words(pose_text(step));
 }
 
-std::string truth_words(const RecognitionStep& step) {
-  if (step.truth.label.empty()) {
-    return "";
-  }
-  std::string words = "truth: " + printable(step.truth.label);
-  if (const std::optional<Pose> truth = step.true_T_robot_object()) {
-    words += fmt::format(" at {}; error {} mm", pose_words(pose_text(*truth)),
-                         error_text(step.pose_error_mm()));
-  }
-  return words;
-}
-
 std::string fit_words(const RecognitionStep& step) {
   if (!step.contradicted && !step.fit) {
     return "";
@@ -128,33 +111,6 @@ std::string fit_words(const RecognitionStep& step) {
   return step.contradicted                            ? "contradicted"
          : step.fit->verdict == Verdict::does_not_fit ? "no fit"
                                                       : verdict_text(step.fit->verdict);
-}
-
-std::string misfit_sentence(const RecognitionStep& step, std::size_t touches,
-                            const RecognitionTask& task) {
-  if (!step.fit || step.fit->verdict != Verdict::does_not_fit) {
-    return "";
-  }
-  const std::string label = printable(posed_label(step, task));
-  return fmt::format("unlike {}: its {} {:.0f} standard deviations worse than touches of {} do",
-                     label, touches == 1 ? "touch fits" : fmt::format("{} touches fit", touches),
-                     -step.fit->z, label);
-}
-
-std::vector<std::string> warning_words(const RecognitionStep& step) {
-  std::vector<std::string> words;
-  for (const std::string& warning : step.warnings) {
-    words.push_back(in_flags(warning));
-  }
-  return words;
-}
-
-std::string single_touch_words(const RecognitionTask& task, std::size_t touches) {
-  if (touches != 1 || task.labels.back() != none_label || task.fit_scale.stranger_alone) {
-    return "";
-  }
-  return "one touch cannot tell whether the object is one of the maps': the odds of (none) are "
-         "about the prior's";
 }
 
 std::string dropped_text(const RecognitionStep& step) {
@@ -171,6 +127,42 @@ std::string dropped_text(const RecognitionStep& step) {
   return fmt::format("{:.1g}", std::min(rounded, 1.0));
 }
 
+std::string touch_fit_text(const RecognitionStep& step) {
+  const bool told = !step.touch_fit.empty() && step.touch_fit.back();
+  return told ? fmt::format("{:+.1f}", *step.touch_fit.back()) : "";
+}
+
+std::string share_text(const RecognitionStep& step, const RecognitionTask& task,
+                       const char* else_text) {
+  const std::optional<double> share = share_at_pose(step, task);
+  return share ? fmt::format("{:.3f}", *share) : else_text;
+}
+
+std::string error_text(std::optional<double> error_mm) {
+  return error_mm ? fmt::format("{:.2f}", *error_mm) : "-";
+}
+
+namespace {
+
+std::string decision_words(const Decision& decision) {
+  const auto& [act, because] = decision;
+  return because.empty() ? "" : printable((act ? "act: " : "do not act: ") + because);
+}
+
+std::string truth_words(const RecognitionStep& step) {
+  if (step.truth.label.empty()) {
+    return "";
+  }
+  std::string words = "truth: " + printable(step.truth.label);
+  if (const std::optional<Pose> truth = step.true_T_robot_object()) {
+    words += fmt::format(" at {}; error {} mm", pose_words(pose_text(*truth)),
+                         error_text(step.pose_error_mm()));
+  }
+  return words;
+}
+
+/// Bounds that prove less than their tolerance asks for: those of the best label's probability, how
+/// much of the belief is unproven, and what ended the search. "" where they prove enough.
 std::string unproven_sentence(const RecognitionStep& step, const RecognitionTask& task) {
   const FilterTraits traits = traits_of(task.filter);
   if (!traits.tolerance || !step.certificate) {
@@ -204,19 +196,45 @@ std::string unproven_sentence(const RecognitionStep& step, const RecognitionTask
                                      100.0 * step.confidence(), least, most, left);
 }
 
-std::string touch_fit_text(const RecognitionStep& step) {
-  const bool told = !step.touch_fit.empty() && step.touch_fit.back();
-  return told ? fmt::format("{:+.1f}", *step.touch_fit.back()) : "";
+/// Touches that do not fit; "" where they fit or are doubtful.
+std::string misfit_sentence(const RecognitionStep& step, const RecognitionTask& task) {
+  if (!step.fit || step.fit->verdict != Verdict::does_not_fit) {
+    return "";
+  }
+  const std::string label = printable(posed_label(step, task));
+  return fmt::format("unlike {}: its {} {:.0f} standard deviations worse than touches of {} do",
+                     label,
+                     step.touches == 1 ? "touch fits" : fmt::format("{} touches fit", step.touches),
+                     -step.fit->z, label);
 }
 
-std::string share_text(const RecognitionStep& step, const RecognitionTask& task,
-                       const char* else_text) {
-  const std::optional<double> share = share_at_pose(step, task);
-  return share ? fmt::format("{:.3f}", *share) : else_text;
+/// That "(none)" has a weight, but a single touch and no sensor model that tells what one touch
+/// says of it; else "".
+std::string single_touch_sentence(const RecognitionStep& step, const RecognitionTask& task) {
+  if (step.touches != 1 || task.labels.back() != none_label || task.fit_scale().stranger_alone) {
+    return "";
+  }
+  return "one touch cannot tell whether the object is one of the maps': the odds of (none) are "
+         "about the prior's";
 }
 
-std::string error_text(std::optional<double> error_mm) {
-  return error_mm ? fmt::format("{:.2f}", *error_mm) : "-";
+}  // namespace
+
+StepSentences sentences_of(const RecognitionStep& step, const RecognitionTask& task) {
+  StepSentences words{.decision = decision_words(step.decision), .truth = truth_words(step)};
+  if (step.contradicted) {
+    words.findings.emplace_back(
+        "contradicted: no map explains these touches at any pose tried; the object may be unknown, "
+        "its pose outside the region, or gamma too small");
+  }
+  words.findings.push_back(unproven_sentence(step, task));
+  words.findings.push_back(misfit_sentence(step, task));
+  for (const std::string& warning : step.warnings) {
+    words.findings.push_back(printable(in_flags(warning)));
+  }
+  words.findings.push_back(single_touch_sentence(step, task));
+  std::erase(words.findings, "");
+  return words;
 }
 
 std::string gain_text(const TouchGain& gain, PlanGoal goal) {
@@ -255,21 +273,20 @@ std::string reason_of_filter(const RecognitionTask& task) {
 
 }  // namespace
 
-std::string device_name(const Device* device) {
-  return device != nullptr ? device->name() : "none";
-}
-
-std::string setup_words(const Device* device, const RecognitionTask& task) {
+std::string setup_words(const RecognitionJob& job) {
+  const RecognitionTask& task = job.task();
   const auto mirrored =
       static_cast<std::size_t>(std::ranges::count_if(task.hypotheses, &Hypothesis::mirrored));
   const std::size_t maps = task.hypotheses.size() - mirrored;
   return fmt::format("{} map{}{}{}, {}{}", maps, maps == 1 ? "" : "s",
                      mirrored > 0 ? fmt::format(" and {} mirrored", mirrored) : "",
                      task.sensor_model.empty() ? "" : " with " + printable(task.sensor_model),
-                     size_words(task.filter), device != nullptr ? ", on " + device->name() : "");
+                     size_words(task.filter),
+                     task.uses_device() ? ", on " + job.device_name() : "");
 }
 
-void print_engine(const Device* device, const Recogniser& recogniser, const RecognitionTask& task) {
+void print_engine(const RecognitionJob& job, const Recogniser& recogniser) {
+  const RecognitionTask& task = job.task();
   const PoseLattice& lattice = task.lattice();
   const auto words = [](const char* name, const Axis& axis, double unit, const char* unit_name) {
     return fmt::format("{} {:g} to {:g} {}, {} bins in steps of {:.4g}", name, axis.lower * unit,
@@ -279,8 +296,8 @@ void print_engine(const Device* device, const Recogniser& recogniser, const Reco
   if (std::string reason = reason_of_filter(task); !reason.empty()) {
     filter.push_back(std::move(reason));
   }
-  std::string memory = device_name(device);
-  if (device != nullptr) {
+  std::string memory = job.device_name();
+  if (task.uses_device()) {
     memory += fmt::format(", {:.1f} MiB of its memory",
                           static_cast<double>(recogniser.device_bytes()) / (1 << 20));
   }

@@ -6,7 +6,7 @@
 #include <vector>
 
 
-#include "recognition/recogniser.hpp"
+#include "recognition/recognition_job.hpp"
 #include "recognition/recognition_record.hpp"
 #include "recognition/touch_plan.hpp"
 
@@ -40,33 +40,27 @@ std::optional<double> share_at_pose(const RecognitionStep& step, const Recogniti
 std::string identity_words(const RecognitionStep& step, const RecognitionTask& task);
 /// The object, its probability and its pose in the robot frame.
 std::string result_words(const RecognitionStep& step, const RecognitionTask& task);
-/// "act: " or "do not act: " and why; "" where nothing was decided.
-std::string decision_words(const RecognitionStep& step);
 /// Modes with at least 5 % of the belief besides that of the pose.
 std::vector<BeliefMode> other_modes(const RecognitionStep& step);
-/// The true object and its pose, as far as the step can be compared with them, and the error of the
-/// step's pose; "" where nothing is known.
-std::string truth_words(const RecognitionStep& step);
+
+/// What a step says in whole sentences, for every reader in this order.
+struct StepSentences {
+  std::string decision;  ///< "act: " or "do not act: " and why; "" where nothing was decided
+  /// The true object and its pose, as far as the step can be compared with them, and the error of
+  /// the step's pose; "" where nothing is known.
+  std::string truth;
+  /// What is wrong, the gravest first: touches that no pose explains, bounds that prove less than
+  /// was asked for, touches that do not fit, RecognitionStep::warnings, and a single touch, which
+  /// cannot tell "(none)". Options are flags.
+  std::vector<std::string> findings;
+};
+StepSentences sentences_of(const RecognitionStep& step, const RecognitionTask& task);
 
 /// What a table says of the fit: "fits", "doubtful", "no fit" or "contradicted"; "" without a fit.
 std::string fit_words(const RecognitionStep& step);
-/// A sentence on touches that do not fit; "" where they fit or are doubtful.
-std::string misfit_sentence(const RecognitionStep& step, std::size_t touches,
-                            const RecognitionTask& task);
-
-/// RecognitionStep::warnings, their options as flags.
-std::vector<std::string> warning_words(const RecognitionStep& step);
-
-/// What to say where "(none)" was asked for, an unknown was touched once only, and no sensor model
-/// tells what one touch says of it; else "".
-std::string single_touch_words(const RecognitionTask& task, std::size_t touches);
 
 /// Dropped mass of a bounded posterior, rounded up to one digit: "3e-07"; "" without a certificate.
 std::string dropped_text(const RecognitionStep& step);
-/// What to say where a bounded posterior proves less than its tolerance asks for: the bounds of the
-/// best label's probability, how much of the belief is unproven, and the budget that ended the
-/// search. "" where it proves enough.
-std::string unproven_sentence(const RecognitionStep& step, const RecognitionTask& task);
 
 /// The z of the last touch by itself, RecognitionStep::touch_fit, with its sign: "-2.3"; "" where
 /// there is none.
@@ -86,14 +80,10 @@ std::string gain_text(const TouchGain& gain, PlanGoal goal);
 /// this touch, the best, tells nothing.
 std::string next_touch_words(const PlannedTouch& touch, PlanGoal goal);
 
-/// Name of a device; "none" where it is null.
-std::string device_name(const Device* device);
 /// Maps, bins or particles, and device in a short line.
-/// @param device null where none is used
-std::string setup_words(const Device* device, const RecognitionTask& task);
+std::string setup_words(const RecognitionJob& job);
 /// Prints on standard error how the device works: its memory, the filter with its paths through the
 /// likelihood, the lattice.
-/// @param device null where none is used
-void print_engine(const Device* device, const Recogniser& recogniser, const RecognitionTask& task);
+void print_engine(const RecognitionJob& job, const Recogniser& recogniser);
 
 }  // namespace palpate::cli

@@ -1,7 +1,6 @@
 #include "learning/calibration_task.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <map>
 #include <utility>
 
@@ -9,6 +8,7 @@
 
 #include "io/input_file.hpp"
 #include "learning/array_place.hpp"
+#include "options/option.hpp"
 #include "palpate/object_frame.hpp"
 #include "recognition/recordings.hpp"
 
@@ -63,15 +63,10 @@ std::vector<Press> presses_of(std::span<const Recording> recordings,
   return presses;
 }
 
-void check_numbers(const CalibrationRequest& request) {
-  if (request.threshold && !(*request.threshold > 0.0 && std::isfinite(*request.threshold))) {
-    refuse(fmt::format("`threshold {}`", *request.threshold), "must be above 0");
-  }
-  if (request.ratio && !(*request.ratio >= 0.0)) {
-    refuse(fmt::format("`ratio {}`", *request.ratio), "must be at least 0");
-  }
-  if (request.ratio && *request.ratio >= 1.0) {
-    refuse(fmt::format("`ratio {}`", *request.ratio), "must be below 1");
+void check_numbers(const CalibrationRequest& request, const Request& recognition) {
+  require_sound(recognition);
+  if (recognition.threshold == 0.0) {
+    refuse("`threshold 0`", "must be above 0");
   }
   constexpr auto most = static_cast<int>(most_reading_levels);
   if (request.levels && (*request.levels < 2 || *request.levels > most)) {
@@ -137,7 +132,7 @@ CalibrationTask calibration_task(const CalibrationRequest& request, const Reques
                             "more, or leave it out",
                             request.group, task.presses.front().group));
   }
-  check_numbers(request);
+  check_numbers(request, recognition);
   const bool gives_bins = recognition.bins || recognition.x_mm || recognition.y_mm ||
                           recognition.theta_deg || recognition.pivot_mm;
   if (gives_bins && !known_poses) {
@@ -147,8 +142,8 @@ CalibrationTask calibration_task(const CalibrationRequest& request, const Reques
         "them out: touches at unknown poses are placed on bins one element wide");
   }
   task.options = {.pressure_unit = recordings.front().pressure_unit,
-                  .threshold = request.threshold,
-                  .ratio = request.ratio,
+                  .threshold = recognition.threshold,
+                  .ratio = recognition.ratio,
                   .tables = tables_of(request, known_poses, task.maps),
                   .most_maps = static_cast<std::size_t>(request.max_maps)};
   if (!infers_region(recognition)) {

@@ -14,15 +14,14 @@
 
 namespace palpate {
 
-/// What is asked of a calibration beside a Request's bins, region and frames, as a user says it.
+/// What is asked of a calibration beside a Request's classifier, bins, region and frames, as a user
+/// says it.
 struct CalibrationRequest {
-  bool unposed = false;             ///< the recordings' poses do not count
-  std::optional<double> threshold;  ///< in the recordings' pressure unit; none: learned
-  std::optional<double> ratio;      ///< of a touch's largest pressure; none: learned
-  std::string layer = "auto";       ///< auto, mean_level or log_odds
-  std::optional<int> levels;        ///< of readings; none: as default_tables() has them
-  int max_maps = 5;                 ///< SensorCalibrationOptions::most_maps
-  std::string group;                ///< what is left out together, see grouped_object()
+  bool unposed = false;        ///< the recordings' poses do not count
+  std::string layer = "auto";  ///< auto, mean_level or log_odds
+  std::optional<int> levels;   ///< of readings; none: as default_tables() has them
+  int max_maps = 5;            ///< SensorCalibrationOptions::most_maps
+  std::string group;           ///< what is left out together, see grouped_object()
 };
 
 /// What calibrate_sensor() takes. Presses are views into the recordings.
@@ -39,7 +38,8 @@ struct CalibrationTask {
 /// log odds; at unknown ones both layers are tried, but without a mean level of every map only log
 /// odds. On given maps, touches at known poses lie where the recording's truth says, or else where
 /// the object was learned.
-/// @param recognition what recognize will be given; its bins, region and frames alone count
+/// @param recognition what recognize will be given; its classifier, which is learned where it is
+/// left out, bins, region and frames alone count
 /// @param recordings of touches of one pressure unit, at least one
 /// @param maps to compare touches with
 /// @throws Error naming the option or the recording, where a value is out of range, a recording

@@ -259,24 +259,16 @@ std::string fault_of(const Request& request, const Option& option) {
   return wanted.empty() ? "" : "give " + wanted;
 }
 
-struct Separator {
-  std::optional<char> operator()(std::optional<Bins> Request::* /*member*/) const {
-    return bins_separator;
-  }
-  std::optional<char> operator()(std::optional<Range> Request::* /*member*/) const {
-    return range_separator;
-  }
-  std::optional<char> operator()(std::optional<Frames> Request::* /*member*/) const {
-    return range_separator;
-  }
-  std::optional<char> operator()(std::optional<Pivot> Request::* /*member*/) const {
-    return point_separator;
-  }
-  template <typename Value>
-  std::optional<char> operator()(Value Request::* /*member*/) const {
-    return {};
-  }
-};
+template <typename Value>
+constexpr std::optional<char> separator = {};
+template <>
+constexpr std::optional<char> separator<std::optional<Bins>> = bins_separator;
+template <>
+constexpr std::optional<char> separator<std::optional<Range>> = range_separator;
+template <>
+constexpr std::optional<char> separator<std::optional<Frames>> = range_separator;
+template <>
+constexpr std::optional<char> separator<std::optional<Pivot>> = point_separator;
 
 }  // namespace
 
@@ -305,6 +297,14 @@ const Option& option_named(std::string_view name) {
     refuse_option(name, "no option has this name");
   }
   return *found;
+}
+
+std::string_view first_given(const Request& request,
+                             std::initializer_list<std::string_view> options) {
+  const auto* given = std::ranges::find_if(options, [&](std::string_view name) {
+    return !option_text(request, option_named(name)).empty();
+  });
+  return given == options.end() ? "" : *given;
 }
 
 void require_sound(const Request& request) {
@@ -352,7 +352,8 @@ Request request_with(const std::map<std::string, std::string>& texts) {
 std::string name_of(FilterKind kind) { return word_of(filter_words, kind); }
 
 std::optional<char> separator_of(const Option& option) {
-  return std::visit(Separator{}, option.member);
+  return std::visit([]<typename Value>(Value Request::* /*member*/) { return separator<Value>; },
+                    option.member);
 }
 
 Pose parse_pose(const std::string& what, const std::string& text) {

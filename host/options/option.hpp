@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <initializer_list>
 #include <limits>
 #include <map>
 #include <optional>
@@ -58,6 +59,9 @@ const Option& option_named(std::string_view name);
 std::string set_option(Request& request, const Option& option, const std::string& text);
 /// The text that sets the option as it is; "" where it is left out.
 std::string option_text(const Request& request, const Option& option);
+/// The first of these options that the request has; "" where it has none of them.
+std::string_view first_given(const Request& request,
+                             std::initializer_list<std::string_view> options);
 /// @throws Error naming the first option whose value cannot be meant. Values that set_option() set
 /// can.
 void require_sound(const Request& request);

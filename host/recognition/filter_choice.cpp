@@ -19,24 +19,16 @@ namespace palpate {
 
 namespace {
 
+/// The first option that only bounds read; "" where none is given.
+std::string_view option_of_bounds(const Request& request) {
+  return first_given(request, {"tolerance", "budget-ms", "evidence-nats"});
+}
+
 /// Sets what is asked, and leaves the rest.
 void set_displacement(const std::optional<double>& asked_mm, const std::optional<double>& asked_deg,
                       DisplacementSd& sd) {
   sd.mm = asked_mm.value_or(sd.mm);
   sd.rad = asked_deg ? *asked_deg * std::numbers::pi / 180.0 : sd.rad;
-}
-
-std::optional<double> none_weight(const Request& request, std::span<const Hypothesis> hypotheses) {
-  const NoneWeight given = request.none.value_or(Automatic{});
-  if (const auto* weight = std::get_if<double>(&given)) {
-    return *weight > 0.0 ? std::optional(*weight) : std::nullopt;
-  }
-  constexpr double odds = 1.0 / 9.0;  // against all objects together: one in ten
-  double sum = 0.0;
-  for (const Hypothesis& hypothesis : hypotheses) {
-    sum += hypothesis.weight;
-  }
-  return odds * sum;
 }
 
 BoundedOptions asked_bounds(const Request& request, const HistogramOptions& histogram) {
@@ -56,15 +48,12 @@ ParticleOptions asked_particles(const Request& request, const HistogramOptions& 
   particles.particles = request.particles.value_or(particles.particles);
   particles.resampling = request.resampling.value_or(particles.resampling);
   particles.seed = request.seed.value_or(particles.seed);
-  for (const auto& [option, sd] : {std::pair{"touch-sd-mm", request.touch_sd_mm},
-                                   std::pair{"touch-sd-deg", request.touch_sd_deg}}) {
-    if (sd) {
-      refuse_given(request, option,
-                   "particles take every touch's pose to be exact; use `filter bounded` or "
-                   "`filter histogram`, or `slip-sd-mm` and `slip-sd-deg`, their motion noise");
-    }
+  if (const auto option = first_given(request, {"touch-sd-mm", "touch-sd-deg"}); !option.empty()) {
+    refuse_given(request, option,
+                 "particles take every touch's pose to be exact; use `filter bounded` or "
+                 "`filter histogram`, or `slip-sd-mm` and `slip-sd-deg`, their motion noise");
   }
-  if (request.none && none_weight(request, {})) {
+  if (request.none && histogram.none_weight) {
     refuse_given(request, "none",
                  "particles have no mean over all poses, which (none) needs; use `filter bounded` "
                  "or `filter histogram`");
@@ -82,25 +71,18 @@ FilterWish filter_wish(const Request& request) {
   const FilterKind kind = request.filter.value_or(FilterKind::automatic);
   const std::string filter = name_of(kind);
   const bool particles = kind == FilterKind::particles;
-  for (const auto& [option, given] :
-       {std::pair{"particles", request.particles.has_value()},
-        std::pair{"resampling", request.resampling.has_value()},
-        std::pair{"augmented", request.augmented}, std::pair{"seed", request.seed.has_value()}}) {
-    if (given && !particles) {
-      refuse_option(option,
-                    fmt::format("has no effect on `filter {}`; add `filter particles`", filter));
-    }
+  if (const auto option = first_given(request, {"particles", "resampling", "augmented", "seed"});
+      !option.empty() && !particles) {
+    refuse_option(option,
+                  fmt::format("has no effect on `filter {}`; add `filter particles`", filter));
   }
-  for (const auto& [option, given] :
-       {std::pair{"tolerance", request.tolerance.has_value()},
-        std::pair{"budget-ms", request.budget_ms.has_value()},
-        std::pair{"evidence-nats", request.evidence_nats.has_value()}}) {
-    if (given && (particles || kind == FilterKind::histogram)) {
+  if (const std::string_view option = option_of_bounds(request); !option.empty()) {
+    if (particles || kind == FilterKind::histogram) {
       refuse_option(
           option, fmt::format("has no effect on `filter {}`; use `filter bounded`, or leave it out",
                               filter));
     }
-    if (given && kind == FilterKind::automatic) {
+    if (kind == FilterKind::automatic) {
       return {FilterKind::bounded, fmt::format("`{}`", option)};
     }
   }
@@ -108,39 +90,25 @@ FilterWish filter_wish(const Request& request) {
 }
 
 ChosenFilter choose_filter(const FilterWish& wish, const Request& request,
-                           const CallerNeed& of_caller, std::span<const Hypothesis> hypotheses,
-                           HistogramOptions histogram) {
+                           const std::string& every_bin_for, HistogramOptions histogram) {
   if (wish.kind == FilterKind::particles) {
     return {asked_particles(request, histogram), false, wish.by};
   }
   set_displacement(request.touch_sd_mm, request.touch_sd_deg, histogram.touch_sd);
   set_displacement(request.slip_sd_mm, request.slip_sd_deg, histogram.slip_sd);
-  if (request.none || !of_caller.learned_only) {
-    histogram.none_weight = none_weight(request, hypotheses);
-  }
-  const std::string caller = fmt::format("`{}`", of_caller.option);
   const bool slips = !histogram.slip_sd.none();
   if (slips && wish.kind == FilterKind::bounded) {
-    for (const auto& [option, given] :
-         {std::pair{"tolerance", request.tolerance.has_value()},
-          std::pair{"budget-ms", request.budget_ms.has_value()},
-          std::pair{"evidence-nats", request.evidence_nats.has_value()}}) {
-      if (given) {
-        refuse_option(option,
-                      "has no effect where objects slip, as the histogram alone follows them; "
-                      "leave it out");
-      }
+    if (const std::string_view option = option_of_bounds(request); !option.empty()) {
+      refuse_option(option,
+                    "has no effect where objects slip, as the histogram alone follows them; leave "
+                    "it out");
     }
   } else if (wish.kind == FilterKind::bounded) {
-    if (!of_caller.why.empty()) {
-      throw Error(Fault::input,
-                  fmt::format("{}: {}; leave it out, or {}", caller, of_caller.why, wish.by));
-    }
     return {asked_bounds(request, histogram), false, wish.by};
   }
   std::vector<std::string> by;  // what would have to go for bounds to take the bins
-  if (!of_caller.why.empty()) {
-    by.push_back(caller);
+  if (!every_bin_for.empty()) {
+    by.push_back(fmt::format("`{}`", every_bin_for));
   }
   if (wish.kind == FilterKind::histogram) {
     by.push_back(wish.by);
@@ -163,9 +131,8 @@ void require_within_region(const Request& request, const PoseLattice& lattice) {
   }
 }
 
-ChosenBins chosen_bins(const std::function<Device&()>& device,
-                       std::span<const Hypothesis> hypotheses, const ChosenFilter& filter,
-                       BinWidth width) {
+ChosenBins chosen_bins(const DeviceSource& device, std::span<const Hypothesis> hypotheses,
+                       const ChosenFilter& filter, BinWidth width) {
   const FilterTraits traits = traits_of(filter.options);
   const bool by_bounds =
       traits.certificate || (filter.automatic && bounded_instead(filter.options));

@@ -32,11 +32,12 @@ struct ChosenFilter {
 /// The options of the filter that is wished for. Leaves the choice between histogram and bounds to
 /// filter_for_bins() where neither is wished for and nothing needs the histogram. Objects that slip
 /// need it.
-/// @param histogram with the lattice, the contact model, and the sensor model's touch_sd
+/// @param every_bin_for see Circumstances
+/// @param histogram with the lattice, the contact model, the weight of "(none)", and the sensor
+/// model's touch_sd
 /// @throws Error on values out of range, and where the filter has no use for an option
 ChosenFilter choose_filter(const FilterWish& wish, const Request& request,
-                           const CallerNeed& of_caller, std::span<const Hypothesis> hypotheses,
-                           HistogramOptions histogram);
+                           const std::string& every_bin_for, HistogramOptions histogram);
 
 /// An axis of one bin limits nothing.
 /// @param lattice with the counts that are used, or with one bin where these are not known yet
@@ -58,11 +59,10 @@ struct ChosenBins {
 };
 /// As many bins as the device's memory holds; most_bounded_bins where bounds are or may become the
 /// filter.
-/// @param device see Circumstances::device; called where its memory is asked for
+/// @param device called where its memory is asked for
 /// @throws Error as balanced_lattice() does
-ChosenBins chosen_bins(const std::function<Device&()>& device,
-                       std::span<const Hypothesis> hypotheses, const ChosenFilter& filter,
-                       BinWidth width);
+ChosenBins chosen_bins(const DeviceSource& device, std::span<const Hypothesis> hypotheses,
+                       const ChosenFilter& filter, BinWidth width);
 
 /// Bounds in the place of a histogram of more than `most_bins` bins in all, unless
 /// bounded_instead() has none or bounds have no room.

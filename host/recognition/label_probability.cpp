@@ -22,10 +22,10 @@ double log_sum(double a, double b) {
 std::vector<double> feature_nats(std::span<const TouchEvidence> touches,
                                  const RecognitionTask& task) {
   std::vector<double> nats(task.labels.size());
-  if (!task.features) {
+  if (!task.sensor.features) {
     return nats;
   }
-  const LearnedFeatures& learned = *task.features;
+  const LearnedFeatures& learned = *task.sensor.features;
   for (const TouchEvidence& touch : touches) {
     const PressFeatures features = features_of(touch, task.classifier().threshold);
     if (features.values[0] == 0.0) {  // the log of 1 + no element
@@ -64,11 +64,12 @@ std::vector<double> label_log_evidence(const Estimate& estimate, const Recogniti
 Tempering tempering_of(std::span<const TouchEvidence> touches, const RecognitionTask& task,
                        const std::optional<Fit>& fit) {
   Tempering tempering{task.temperature_after(touches), feature_nats(touches, task)};
-  const bool on_scale = task.fit_scale.shared_sd > 0.0;
+  const FitScale scale = task.fit_scale();
+  const bool on_scale = scale.shared_sd > 0.0;
   if (fit && on_scale && task.labels.back() == none_label) {
     tempering.features.back() += misfit_nats(
         *fit, static_cast<std::size_t>(std::ranges::count_if(touches, &TouchEvidence::in_contact)),
-        task.fit_scale);
+        scale);
   }
   return tempering;
 }

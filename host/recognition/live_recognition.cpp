@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <csignal>
 #include <limits>
 #include <utility>
 
 #include "palpate/baseline.hpp"
 #include "palpate/pose_track.hpp"
-#include "recognition/signals_elsewhere.hpp"
 
 namespace palpate {
 
@@ -17,6 +17,23 @@ using namespace std::chrono_literals;
 
 // A simulation at full speed would fill the memory, and finish() would have to use all of them.
 constexpr std::size_t most_jobs = 64;
+
+/// Signals are for the thread that can end the others: a thread that is started meanwhile leaves
+/// them all to it.
+class SignalsElsewhere {
+ public:
+  SignalsElsewhere() {
+    sigset_t all;
+    ::sigfillset(&all);
+    ::pthread_sigmask(SIG_SETMASK, &all, &before_);
+  }
+  ~SignalsElsewhere() { ::pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
+  SignalsElsewhere(const SignalsElsewhere&) = delete;
+  SignalsElsewhere& operator=(const SignalsElsewhere&) = delete;
+
+ private:
+  sigset_t before_;
+};
 
 }  // namespace
 

@@ -66,7 +66,7 @@ struct Question {
   Fit fit(std::span<const TouchEvidence> placed, const Pose& T_object_robot, DisplacementSd sd,
           int object) const {
     const OccupancyGrid& map = task.hypotheses[object].compared();
-    return task.fit_scale.of(
+    return task.fit_scale().of(
         evidence_fit(placed, T_object_robot, map, task.contact(), sd, object).value(), in_contact);
   }
 };

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "estimation/displacement_check.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
@@ -43,6 +44,17 @@ void Recogniser::place_pivot(const TouchEvidence& touch) {
                             centre_mm.x, centre_mm.y, farthest_mm));
   }
   move_pivot(centre_mm);
+}
+
+std::string Recogniser::unresolved_words() const {
+  std::optional<std::string> fault = unresolved_by_steps(traits_.touch_sd, lattice_, "touch-sd");
+  if (!fault) {
+    fault = unresolved_by_steps(traits_.slip_sd, lattice_, "slip-sd");
+  }
+  for (auto touch = evidence_.begin(); !fault && touch != evidence_.end(); ++touch) {
+    fault = unresolved_at(touch->T_robot_sensor, traits_.touch_sd, lattice_, "touch-sd");
+  }
+  return fault.value_or("");
 }
 
 void Recogniser::update(std::span<const Touch> touches,

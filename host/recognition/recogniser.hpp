@@ -69,6 +69,9 @@ class Recogniser {
   }
   /// The task's lattice about the pivot in use.
   const PoseLattice& lattice() const { return lattice_; }
+  /// What to say where the lattice does not resolve the filter's touch_sd or slip_sd at one of the
+  /// touches since reset(); else "".
+  std::string unresolved_words() const;
   /// See TouchPlaces::words().
   std::string place_words() const { return places_.words(); }
   /// See Filter::words().

@@ -100,16 +100,51 @@ std::optional<RefinedPose> refined_near(const Mode& mode, const Recogniser& reco
              : std::nullopt;
 }
 
+/// The estimate after more touches.
+Estimate estimate_after(Recogniser& recogniser, const RecognitionTask& task,
+                        std::span<const Touch> touches, const std::function<void(double)>& progress,
+                        std::optional<double> tolerance) {
+  // Bounds only keep the touches, and search when they are asked for the estimate.
+  const bool searches = traits_of(task.filter).certificate;
+  recogniser.update(touches, searches ? std::function<void(double)>() : progress);
+  return recogniser.estimate(tolerance);
+}
+
 /// Updates the belief with more touches, and tells the identity alone.
 RecognitionStep identity_after(Recogniser& recogniser, const RecognitionTask& task,
                                std::span<const Touch> touches,
                                const std::function<void(double)>& progress) {
-  // Bounds only keep the touches, and search when they are asked for the estimate.
-  const bool searches = traits_of(task.filter).certificate;
-  recogniser.update(touches, searches ? std::function<void(double)>() : progress);
-  const Estimate estimate = recogniser.estimate(task.drawn_tolerance);
+  const Estimate estimate =
+      estimate_after(recogniser, task, touches, progress, task.drawn_tolerance);
   return judge(estimate, {}, task, recogniser.evidence(),
                refined_near(estimate.mode, recogniser, task));
+}
+
+/// Warns where a learned object explains the touches only if they lie elsewhere than the robot
+/// says, or if the object moved, which forbids to act; and of single touches that disagree with the
+/// others.
+void doubt_places(const Recogniser& recogniser, const Estimate& estimate,
+                  const RecognitionTask& task, RecognitionStep& step) {
+  const std::span<const TouchEvidence> touches = recogniser.evidence();
+  const auto placement = judge_placement(recogniser, estimate, task, step);
+  const bool unexplained = step.fit && step.fit->verdict == Verdict::does_not_fit;
+  if (!placement && !unexplained) {
+    return;
+  }
+  const std::vector<std::size_t> unlike = unlike_touches(touches, task, step);
+  // One touch that is far off looks as if all were a little, or as if the object had moved, but
+  // for the fits of the others.
+  const bool all_after_a_move =
+      placement && placement->moved_after + unlike.size() == touches.size();
+  if (placement && (unlike.empty() || all_after_a_move)) {
+    step.decision = {false, placement_words(*placement, task)};
+    step.warnings.push_back(placement_warning(*placement, task));
+  } else if (!unlike.empty()) {
+    step.warnings.push_back(unlike_words(unlike, task, step));
+    if (placement) {
+      step.decision = {false, step.warnings.back()};
+    }
+  }
 }
 
 /// T_robot_object from T_object_robot, theta in [-pi, pi).
@@ -157,7 +192,8 @@ RecognitionStep judge(const Estimate& estimate, const PartialTruth& truth,
   const std::vector<std::string>& labels = task.labels;
   StepFit fit = fit_of(estimate.mode, refined, touches, task);
   const Tempering tempering = tempering_of(touches, task, fit.fit);
-  RecognitionStep step{.identity = label_probabilities(estimate, tempering, task),
+  RecognitionStep step{.touches = touches.size(),
+                       .identity = label_probabilities(estimate, tempering, task),
                        .mode = estimate.mode,
                        .refined = refined,
                        .contradicted = estimate.contradicted,
@@ -185,46 +221,28 @@ RecognitionStep take_step(Recogniser& recogniser, const RecognitionTask& task,
                           const std::function<void(double)>& progress,
                           std::optional<double> tolerance) {
   const Clock::time_point start = Clock::now();
-  // Bounds only keep the touches, and search when they are asked for the estimate.
-  const bool searches = traits_of(task.filter).certificate;
-  recogniser.update(touches, searches ? std::function<void(double)>() : progress);
-  const Estimate estimate = recogniser.estimate(tolerance);
+  const Estimate estimate = estimate_after(recogniser, task, touches, progress, tolerance);
   const double seconds = seconds_since(start);
-  const std::span<const TouchEvidence> evidence = recogniser.evidence();
   const Clock::time_point estimated = Clock::now();
   const std::optional<RefinedPose> refined = refined_near(estimate.mode, recogniser, task);
   const double refine_seconds = seconds_since(estimated);
+
+  const std::span<const TouchEvidence> evidence = recogniser.evidence();
   RecognitionStep step = judge(estimate, truth, task, evidence, refined);
   step.seconds = seconds;
   step.refine_seconds = refine_seconds;
   step.symmetry = symmetry_told(recogniser, task, step);
-  measure_errors(task, step);
+  measure_errors(task, step);  // again, by the symmetry that is told
   step.effective_sample_size = recogniser.effective_sample_size();
   step.places = places_of(recogniser, estimate, task, step);
   step.decision = decide(step, task);
+
   step.warnings = warnings_about(evidence, task, recogniser.lattice(), step);
   if (step.warnings.empty()) {
     if (auto warning = turned_alike(task, step)) {
       step.warnings.push_back(*std::move(warning));
     }
-    const auto placement = judge_placement(recogniser, estimate, task, step);
-    const bool unexplained = step.fit && step.fit->verdict == Verdict::does_not_fit;
-    const std::vector<std::size_t> unlike = placement || unexplained
-                                                ? unlike_touches(evidence, task, step)
-                                                : std::vector<std::size_t>();
-    // One touch that is far off looks as if all were a little, or as if the object had moved, but
-    // for the fits of the others.
-    const bool all_after_a_move =
-        placement && placement->moved_after + unlike.size() == evidence.size();
-    if (placement && (unlike.empty() || all_after_a_move)) {
-      step.decision = {false, placement_words(*placement, task)};
-      step.warnings.push_back(placement_warning(*placement, task));
-    } else if (!unlike.empty()) {
-      step.warnings.push_back(unlike_words(unlike, task, step));
-      if (placement) {
-        step.decision = {false, step.warnings.back()};
-      }
-    }
+    doubt_places(recogniser, estimate, task, step);
   }
   if (std::string words = recogniser.place_words(); !words.empty()) {
     step.warnings.push_back(std::move(words));
@@ -233,7 +251,7 @@ RecognitionStep take_step(Recogniser& recogniser, const RecognitionTask& task,
 }
 
 RecognitionRecord recognise(Recogniser& recogniser, const RecognitionTask& task,
-                            const Unknown& unknown, bool trace,
+                            const Query& unknown, bool trace,
                             const std::function<void(double)>& progress, bool drawn) {
   RecognitionRecord record{.recording = unknown.recording,
                            .frame = unknown.frame,

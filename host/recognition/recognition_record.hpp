@@ -25,7 +25,7 @@ struct PartialTruth {
 PartialTruth partial_truth(const std::string& object, const std::optional<Truth>& truth);
 
 /// One unknown object: its touches in order, views into memory that the caller keeps alive.
-struct Unknown {
+struct Query {
   std::string recording;             ///< file of the touches, or another name
   std::optional<std::size_t> frame;  ///< index in the file where each touch is an unknown
   std::vector<Touch> touches;
@@ -59,6 +59,7 @@ struct Decision {
 
 /// What the filter believes after a touch.
 struct RecognitionStep {
+  std::size_t touches = 0;  ///< so far
   /// [label] probability, see label_probabilities(): the sum over the label's maps, after the
   /// task's temperature and features.
   std::vector<double> identity;
@@ -164,7 +165,7 @@ RecognitionStep take_step(Recogniser& recogniser, const RecognitionTask& task,
 /// the last one depends have no more than this, within RecognitionTask::drawn_tolerance
 /// @throws Error (Fault::system) if the device fails; what `progress` throws
 RecognitionRecord recognise(Recogniser& recogniser, const RecognitionTask& task,
-                            const Unknown& unknown, bool trace,
+                            const Query& unknown, bool trace,
                             const std::function<void(double)>& progress = {}, bool drawn = false);
 
 }  // namespace palpate

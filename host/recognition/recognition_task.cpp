@@ -74,8 +74,8 @@ std::string RecognitionTask::name_of(int object) const {
 
 double RecognitionTask::temperature_after(std::span<const TouchEvidence> touches) const {
   const auto telling = std::ranges::count_if(touches, &TouchEvidence::tells);
-  return temperature_of(static_cast<std::size_t>(std::max<std::ptrdiff_t>(telling, 1)), temperature,
-                        temperature_growth);
+  return temperature_of(static_cast<std::size_t>(std::max<std::ptrdiff_t>(telling, 1)),
+                        sensor.temperature, sensor.temperature_growth);
 }
 
 FitScale RecognitionTask::fit_scale_for(std::span<const TouchEvidence> touches) const {
@@ -90,19 +90,20 @@ FitScale RecognitionTask::fit_scale_for(std::span<const TouchEvidence> touches) 
       last = &touch;
     }
   }
-  if (last == nullptr || !fit_scale.array) {
-    return fit_scale;
+  const FitScale scale = fit_scale();
+  if (last == nullptr || !scale.array) {
+    return scale;
   }
   const std::optional<ElementSpacing> spacing = spacing_of(last->elements_mm);
-  return fit_scale.for_array({known / in_contact, spacing ? spacing->nearest_mm.most : 0.0});
+  return scale.for_array({known / in_contact, spacing ? spacing->nearest_mm.most : 0.0});
 }
 
 std::string wider_bins_sentence(const RecognitionTask& task) {
-  if (!task.learned_bins || !traits_of(task.filter).bins) {
+  if (!task.sensor.bins || !traits_of(task.filter).bins) {
     return "";
   }
   constexpr double much = 1.5;
-  const BinSteps& learned = *task.learned_bins;
+  const BinSteps& learned = *task.sensor.bins;
   const PoseLattice& lattice = task.lattice();
   // A fixed axis has a step of 0, and is no wider than any.
   const double x_mm = lattice.x_mm.step();

@@ -44,9 +44,15 @@ struct RecognitionTask {
   /// The temperature of those of the touches that tell something; before any, of one.
   double temperature_after(std::span<const TouchEvidence> touches) const;
 
-  /// `fit_scale` for the array of these touches, by the elements In Contact's touches that are
+  /// Of RecognitionStep::fit; 1 where the sensor has none.
+  FitScale fit_scale() const { return sensor.fit_scale.value_or(FitScale{}); }
+  /// Of RecognitionStep::refined and of modes; 1 where the sensor has none.
+  PoseScale pose_scale() const { return sensor.pose_scale.value_or(PoseScale{}); }
+  /// fit_scale() for the array of these touches, by the elements In Contact's touches that are
   /// known.
   FitScale fit_scale_for(std::span<const TouchEvidence> touches) const;
+  /// Whether the filter computes on a device. Bounds search on the host.
+  bool uses_device() const { return !traits_of(filter).certificate; }
 
   const std::vector<Hypothesis> hypotheses;
   const FilterOptions filter;  ///< as it is opened
@@ -66,20 +72,16 @@ struct RecognitionTask {
   bool auto_pivot = false;
   /// Touches of one place count as about one, see TouchPlaces.
   bool by_place = false;
-  /// How sure probabilities of labels and of modes are, see LearnedSensor; poses are left as they
-  /// are.
-  double temperature = 1.0;
-  double temperature_growth = 0.0;
-  std::optional<BinSteps> learned_bins = {};  ///< LearnedSensor::bins
-  std::optional<LearnedFeatures> features = {};
-  FitScale fit_scale = {};    ///< of RecognitionStep::fit
-  PoseScale pose_scale = {};  ///< of RecognitionStep::refined and of modes
+  std::string sensor_model = {};  ///< file of what was learned about the sensor; "" by Eq. 7
+  /// What was learned: how sure probabilities are, the bins that they are for, press features and
+  /// the scales of fits and poses; by Eq. 7 its scales alone, of the maps' left-out touches. What
+  /// the request overrides, and its table, count as `filter` has them.
+  LearnedSensor sensor = {};
   /// Tolerance of a trace's steps before the last; BoundedOptions::tolerance where it is not set.
   std::optional<double> trace_tolerance = {};
   /// The same of steps of which a picture shows the identity alone.
   std::optional<double> drawn_tolerance = {};
   ActWhere act = {};                      ///< for RecognitionStep::decision
-  std::string sensor_model = {};          ///< file of what was learned; "" by Eq. 7
   std::vector<std::string> remarks = {};  ///< sentences for the user, once the filter is open
 };
 

@@ -1,7 +1,6 @@
 #include "recognition/recordings.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <iterator>
 #include <set>
 #include <system_error>
@@ -55,20 +54,11 @@ Frames selected_touches(const Recording& recording, const std::optional<Frames>&
 ContactClassifier make_classifier(const std::string& pressure_unit, const std::string& source,
                                   std::optional<double> threshold, std::optional<double> ratio) {
   ContactClassifier classifier;
-  if (threshold) {
-    if (!(*threshold >= 0.0 && std::isfinite(*threshold))) {
-      refuse_option("threshold", *threshold, "must be at least 0");
-    }
-    classifier.threshold = *threshold;
-  } else if (pressure_unit == "raw") {
+  if (!threshold && pressure_unit == "raw") {
     refuse(source, "pressure_unit = raw has no default threshold; give `threshold`");
   }
-  if (ratio) {
-    if (!(*ratio >= 0.0 && *ratio < 1.0)) {
-      refuse_option("ratio", *ratio, "must be at least 0 and below 1");
-    }
-    classifier.ratio = *ratio;
-  }
+  classifier.threshold = threshold.value_or(classifier.threshold);
+  classifier.ratio = ratio.value_or(classifier.ratio);
   return classifier;
 }
 
@@ -80,8 +70,8 @@ void require_selection(const Request& request) {
   }
 }
 
-std::vector<Unknown> unknowns_in(const Request& request, const std::optional<Frames>& frames,
-                                 const Recording& recording) {
+std::vector<Query> unknowns_in(const Request& request, const std::optional<Frames>& frames,
+                               const Recording& recording) {
   auto [begin, end] = selected_touches(recording, frames);
   if (request.touches && static_cast<std::size_t>(*request.touches) > end - begin) {
     refuse(recording.path, "has {} touches; `touches {}` is too many", end - begin,
@@ -92,16 +82,16 @@ std::vector<Unknown> unknowns_in(const Request& request, const std::optional<Fra
     end = request.touches ? begin + static_cast<std::size_t>(*request.touches) : end;
     return {{recording.path, {}, recording.touches(begin, end), truth}};
   }
-  std::vector<Unknown> unknowns;
+  std::vector<Query> unknowns;
   for (std::size_t i = begin; i < end; ++i) {
     unknowns.push_back({recording.path, i, {recording.touch(i)}, truth});
   }
   return unknowns;
 }
 
-std::vector<Unknown> list_unknowns(const Request& request, std::span<const Recording> recordings) {
+std::vector<Query> list_unknowns(const Request& request, std::span<const Recording> recordings) {
   require_selection(request);
-  std::vector<Unknown> unknowns;
+  std::vector<Query> unknowns;
   for (const Recording& recording : recordings) {
     std::ranges::move(unknowns_in(request, request.frames, recording),
                       std::back_inserter(unknowns));
@@ -109,18 +99,12 @@ std::vector<Unknown> list_unknowns(const Request& request, std::span<const Recor
   return unknowns;
 }
 
-double largest_reach_mm(std::span<const Touch> touches) {
-  double reach = 0.0;
-  for (const Touch& touch : touches) {
-    reach = std::max(reach, array_reach_mm(touch.elements_mm));
-  }
-  return reach;
-}
-
 double largest_reach_mm(std::span<const Recording> recordings) {
   double reach = 0.0;
   for (const Recording& recording : recordings) {
-    reach = std::max(reach, largest_reach_mm(recording.touches(0, recording.size())));
+    for (const Touch& touch : recording.touches(0, recording.size())) {
+      reach = std::max(reach, array_reach_mm(touch.elements_mm));
+    }
   }
   return reach;
 }

@@ -23,8 +23,8 @@ void require_touches(const Recording& recording, const Recording& first);
 /// The selected touches of a recording, or all. Throws Error where it has fewer.
 Frames selected_touches(const Recording& recording, const std::optional<Frames>& frames);
 
-/// The classifier of Eq. 3 for pressures of this unit: raw ones have no default threshold. `source`
-/// is named where it is missing.
+/// The classifier of Eq. 3 for pressures of this unit, by options that are sound: raw pressures
+/// have no default threshold. `source` is named where it is missing.
 ContactClassifier make_classifier(const std::string& pressure_unit, const std::string& source,
                                   std::optional<double> threshold, std::optional<double> ratio);
 
@@ -33,15 +33,14 @@ void require_selection(const Request& request);
 
 /// The unknowns of one recording: views into its memory. Throws Error where it has fewer touches.
 /// @param frames the touches to use, or all
-std::vector<Unknown> unknowns_in(const Request& request, const std::optional<Frames>& frames,
-                                 const Recording& recording);
+std::vector<Query> unknowns_in(const Request& request, const std::optional<Frames>& frames,
+                               const Recording& recording);
 
 /// The unknowns that the request selects: views into the recordings' memory. Throws Error.
-std::vector<Unknown> list_unknowns(const Request& request, std::span<const Recording> recordings);
+std::vector<Query> list_unknowns(const Request& request, std::span<const Recording> recordings);
 
 /// The largest reach of any touch's array, which may change from touch to touch; see
 /// array_reach_mm().
-double largest_reach_mm(std::span<const Touch> touches);
 double largest_reach_mm(std::span<const Recording> recordings);
 
 /// The maps in a folder: its *.map.h5 and what else is a map among its *.h5, in order.

@@ -141,4 +141,8 @@ void replace_array(const Request& request, const std::string& source, std::size_
   elements_mm = *request.array_mm;
 }
 
+void replace_array(const Request& request, Recording& recording) {
+  replace_array(request, recording.path, recording.elements(), recording.elements_mm);
+}
+
 }  // namespace palpate

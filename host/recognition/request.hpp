@@ -8,6 +8,7 @@
 
 #include "options/request.hpp"
 #include "palpate/lattice.hpp"
+#include "palpate/touch.hpp"
 
 namespace palpate {
 
@@ -35,5 +36,7 @@ bool has_auto_pivot(const Request& request);
 /// the two differ in their number of elements
 void replace_array(const Request& request, const std::string& source, std::size_t elements,
                    std::vector<glm::dvec2>& elements_mm);
+/// The same of a recording.
+void replace_array(const Request& request, Recording& recording);
 
 }  // namespace palpate

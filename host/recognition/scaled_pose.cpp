@@ -65,7 +65,7 @@ double belief_factor(double factor, double variance_mm2, const MotionVariances& 
 ObjectPose on_scale(const RecognitionTask& task, std::span<const TouchEvidence> touches,
                     const Body& body, const ObjectPose& pose) {
   const double sd_mm = spread_mm(body, pose);
-  PoseScale scale = task.pose_scale;
+  PoseScale scale = task.pose_scale();
   scale.factor =
       belief_factor(scale.factor, sd_mm * sd_mm, motion_variances(task, touches, body, pose));
   return scaled(body, pose, scale);

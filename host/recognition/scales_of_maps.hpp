@@ -18,8 +18,8 @@ bool resolves(const PoseLattice& lattice, std::span<const Hypothesis> hypotheses
 
 /// Scales of what recognition says.
 struct Scales {
-  FitScale fit = {};    ///< RecognitionTask::fit_scale
-  PoseScale pose = {};  ///< RecognitionTask::pose_scale
+  FitScale fit = {};    ///< LearnedSensor::fit_scale
+  PoseScale pose = {};  ///< LearnedSensor::pose_scale
 };
 /// Those of the maps' own touches that were left out. That maps are off counts whatever judges.
 /// @param near_mm see resolves()

@@ -264,7 +264,7 @@ void require_plannable(const RecognitionTask& task) {
   }
 }
 
-Plan plan_touch(Recogniser& recogniser, const RecognitionTask& task, const Unknown& unknown,
+Plan plan_touch(Recogniser& recogniser, const RecognitionTask& task, const Query& unknown,
                 const PlanRequest& request, const std::function<void(double)>& progress) {
   if (unknown.touches.empty()) {
     refuse(unknown.recording, "has no touches; give a recording with at least one");

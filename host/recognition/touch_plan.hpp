@@ -100,7 +100,7 @@ struct Plan {
 /// @param recogniser of the task, without touches; see require_plannable()
 /// @throws Error where the unknown has no touches or no living element, and as recognise() and
 /// PoseHistogram::expected_gain() do; what `progress` throws
-Plan plan_touch(Recogniser& recogniser, const RecognitionTask& task, const Unknown& unknown,
+Plan plan_touch(Recogniser& recogniser, const RecognitionTask& task, const Query& unknown,
                 const PlanRequest& request, const std::function<void(double)>& progress = {});
 /// Why the gains are no more exact; "" where nothing is to be said.
 std::string limit_words(const Plan& plan);

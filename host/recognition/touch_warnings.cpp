@@ -1,4 +1,4 @@
-#include "recognition/touch_warnings.hpp"
+#include "recognition/warnings.hpp"
 
 #include <algorithm>
 #include <cmath>

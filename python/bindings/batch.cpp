@@ -19,7 +19,6 @@
 #include "recognition/batch/input_reading.hpp"
 #include "recognition/record_json.hpp"
 #include "recognition/recordings.hpp"
-#include "recognition/resolve.hpp"
 #include "request.hpp"
 #include "shared.hpp"
 
@@ -52,9 +51,8 @@ std::tuple<nb::bytes, Entries, Sentences> settle(const std::vector<std::string>&
     survey_inputs(settled.inputs, completed, threads, [](double) { check_signals(); });
     settled.inferred = infer(settled.inputs, completed);
     hash_files(settled, completed);
-    const RecognitionTask recognition =
-        resolve_batch(settled, completed, [&]() -> Device& { return device; });
-    return std::pair(std::move(settled), in_python(recognition.remarks));
+    const RecognitionJob job = job_of(settled, completed, [&]() -> Device& { return device; });
+    return std::pair(std::move(settled), in_python(job.task().remarks));
   });
   Entries entries;
   for (const BatchEntry& entry : task.inputs) {
@@ -67,14 +65,13 @@ std::tuple<nb::bytes, Entries, Sentences> settle(const std::vector<std::string>&
 /// A settled batch on a device, ready to recognise any of its recordings.
 struct OpenBatch {
   BatchTask task;
-  Request request;  ///< completed
-  const RecognitionTask recognition;
+  RecognitionJob job;
   Recogniser recogniser;
 };
 
 OpenBatch open_batch(const std::string& head, Device& device, std::size_t threads) {
   BatchTask task = head_from(head);
-  Request request = complete(task.request);
+  const Request request = complete(task.request);
   BatchTask own = task;
   own.program = PALPATE_VERSION;
   hash_files(own, request);
@@ -83,11 +80,9 @@ OpenBatch open_batch(const std::string& head, Device& device, std::size_t thread
                 fmt::format("{}; give all workers the same palpate, maps, scene and sensor model",
                             difference));
   }
-  RecognitionTask recognition =
-      resolve_batch(task, request, [&device]() -> Device& { return device; });
-  Recogniser recogniser =
-      open_recogniser(&device, recognition, {.threads = threads, .cancel_point = check_signals});
-  return {std::move(task), std::move(request), std::move(recognition), std::move(recogniser)};
+  RecognitionJob job = job_of(task, request, [&device]() -> Device& { return device; });
+  Recogniser recogniser = job.open({.threads = threads, .cancel_point = check_signals});
+  return {std::move(task), std::move(job), std::move(recogniser)};
 }
 
 struct Line {
@@ -99,21 +94,20 @@ struct Line {
 /// The entries' lines, and a sentence on what is not resolved, "" where there is none.
 std::pair<std::vector<Line>, std::string> recognise_entries(
     OpenBatch& batch, const std::vector<std::string>& entries) {
+  const Request& request = batch.job.request();
+  const RecognitionTask& task = batch.job.task();
   std::vector<Line> lines;
   std::string unresolved;
   for (const std::string& entry : entries) {
-    const ReadInput read = read_entry(batch.task, entry_from(entry), batch.request);
-    for (const Unknown& unknown : read.unknowns) {
-      const RecognitionRecord record =
-          recognise(batch.recogniser, batch.recognition, unknown, batch.request.trace,
-                    [](double) { check_signals(); });
+    const ReadInput read = read_entry(batch.task, entry_from(entry), request);
+    for (const Query& unknown : read.unknowns) {
+      const RecognitionRecord record = recognise(batch.recogniser, task, unknown, request.trace,
+                                                 [](double) { check_signals(); });
       if (record.error.empty() && unresolved.empty()) {
-        unresolved =
-            unresolved_words(batch.recognition, batch.recogniser.lattice(), unknown.touches);
+        unresolved = batch.recogniser.unresolved_words();
       }
       const auto text = [&](OptionWords words) {
-        return palpate::text_of(
-            to_json(record, batch.recognition, std::nullopt, batch.request.trace, words));
+        return palpate::text_of(to_json(record, task, std::nullopt, request.trace, words));
       };
       lines.push_back({text(in_flags), text(in_keywords), record.seconds});
     }
@@ -163,7 +157,7 @@ void bind_batch(nb::module_& module) {
           "the batch was settled.")
       .def_prop_ro(
           "on_host",
-          [](const Shared<OpenBatch>& self) { return !uses_device(self.constant().recognition); },
+          [](const Shared<OpenBatch>& self) { return !self.constant().job.task().uses_device(); },
           "Whether bounds recognise, which compute on the host alone.")
       .def_prop_ro(
           "lattice",
@@ -171,15 +165,15 @@ void bind_batch(nb::module_& module) {
           "The bins, whose pivot is (0, 0) where it is automatic.")
       .def_prop_ro(
           "auto_pivot",
-          [](const Shared<OpenBatch>& self) { return self.constant().recognition.auto_pivot; },
+          [](const Shared<OpenBatch>& self) { return self.constant().job.task().auto_pivot; },
           "Whether theta turns about each unknown's first touch.")
       .def_prop_ro(
           "maps",
           [](const Shared<OpenBatch>& self) {
             std::vector<std::tuple<std::string, Hypothesis>> maps;
-            const RecognitionTask& recognition = self.constant().recognition;
-            for (std::size_t i = 0; i < recognition.hypotheses.size(); ++i) {
-              maps.emplace_back(recognition.map_paths[i], recognition.hypotheses[i]);
+            const RecognitionTask& task = self.constant().job.task();
+            for (std::size_t i = 0; i < task.hypotheses.size(); ++i) {
+              maps.emplace_back(task.map_paths[i], task.hypotheses[i]);
             }
             return maps;
           },

@@ -182,19 +182,17 @@ void bind_calibration(nb::module_& module) {
   bind_learned_sensor(module);
   nb::class_<CalibrationRequest>(
       module, "CalibrationRequest",
-      "What is asked of a calibration beside a Request's maps, bins and frames.")
+      "What is asked of a calibration beside a Request's maps, classifier, bins and frames.")
       .def(nb::init<>())
       .def_rw("unposed", &CalibrationRequest::unposed)
-      .def_rw("threshold", &CalibrationRequest::threshold)
-      .def_rw("ratio", &CalibrationRequest::ratio)
       .def_rw("layer", &CalibrationRequest::layer)
       .def_rw("levels", &CalibrationRequest::levels)
       .def_rw("max_maps", &CalibrationRequest::max_maps)
       .def_rw("group", &CalibrationRequest::group);
   module.def("calibrate", &calibrate_python, "recordings"_a, "request"_a, "calibration"_a,
              "progress"_a = nb::none(),
-             "What was learned, and the sensor; of the request count the maps, bins, frames and\n"
-             "device.");
+             "What was learned, and the sensor; of the request count the maps, classifier, bins,\n"
+             "frames and device.");
   module.def("check_setup", &check_python, "recordings"_a, "request"_a, "cell_mm"_a,
              "spread_mm"_a.none(), "progress"_a = nb::none(),
              "What the touches say; of the request count the classifier and the device.");

@@ -14,8 +14,6 @@
 #include "json.hpp"
 #include "model/option_words.hpp"
 #include "recognition/record_json.hpp"
-#include "recognition/recordings.hpp"
-#include "recognition/resolve.hpp"
 #include "recognition/result_json.hpp"
 #include "recognition/touch_plan.hpp"
 #include "request.hpp"
@@ -31,18 +29,12 @@ struct Answer {
   Sentences sentences;
 };
 
-/// Name of the device that the task's filter computes on.
-std::string name_of_used(const Device& device, const RecognitionTask& task) {
-  return uses_device(task) ? device.name() : "none";
-}
-
-Answer recognize(const Subject& subject, Device& device, const Report& report) {
-  Answer answer;
-  const std::vector<Unknown>& unknowns = subject.unknowns;
-  const bool with_trace = subject.request.trace;
-  const RecognitionTask task = task_of(subject, device);
-  Recogniser recogniser = open_recogniser(&device, task, {.cancel_point = check_signals});
-  answer.sentences = task.remarks;
+Answer recognize(const RecognitionJob& job, const Report& report) {
+  const std::vector<Query>& unknowns = job.unknowns();
+  const bool with_trace = job.request().trace;
+  const RecognitionTask& task = job.task();
+  Recogniser recogniser = job.open({.cancel_point = check_signals});
+  Answer answer{.sentences = task.remarks};
   std::string unresolved;
   for (std::size_t i = 0; i < unknowns.size(); ++i) {
     const auto show = [&](double fraction) {
@@ -51,10 +43,9 @@ Answer recognize(const Subject& subject, Device& device, const Report& report) {
     const RecognitionRecord record = recognise(recogniser, task, unknowns[i], with_trace, show);
     record.require_steps();
     if (unresolved.empty()) {
-      unresolved = unresolved_words(task, recogniser.lattice(), unknowns[i].touches);
+      unresolved = recogniser.unresolved_words();
     }
-    answer.records.push_back(
-        to_json(record, task, name_of_used(device, task), with_trace, in_keywords));
+    answer.records.push_back(to_json(record, task, job.device_name(), with_trace, in_keywords));
   }
   if (!unresolved.empty()) {
     answer.sentences.push_back(unresolved);
@@ -66,7 +57,7 @@ using Records = nb::typed<nb::list, Fields>;
 
 std::tuple<Records, Sentences> recognize_python(nb::handle recordings, const PythonRequest& request,
                                                 const Progress& progress) {
-  const Answer answer = run_on_subject(recordings, request, progress, &recognize);
+  const Answer answer = run_job(recordings, request, progress, &recognize);
   return {nb::borrow<Records>(to_python(answer.records)), in_python(answer.sentences)};
 }
 
@@ -75,24 +66,17 @@ struct Planned {
   Sentences told;
 };
 
-Planned plan_next(const Subject& subject, const PlanRequest& wanted, Device& device,
-                  const Report& report) {
+Planned plan_next(const RecognitionJob& job, const PlanRequest& wanted, const Report& report) {
   Planned planned;
-  const Unknown& unknown = subject.unknowns.front();
-  const RecognitionTask task =
-      resolve(subject.request, {.pressure_unit = subject.recordings.front().pressure_unit,
-                                .source = unknown.recording,
-                                .reach_mm = largest_reach_mm(unknown.touches),
-                                .device = [&]() -> Device& { return device; }});
+  const RecognitionTask& task = job.task();
   require_plannable(task);
-  Recogniser recogniser = open_recogniser(&device, task, {.cancel_point = check_signals});
+  Recogniser recogniser = job.open({.cancel_point = check_signals});
   planned.told = task.remarks;
-  const Plan plan = plan_touch(recogniser, task, unknown, wanted, report);
-  if (const std::string words = unresolved_words(task, recogniser.lattice(), unknown.touches);
-      !words.empty()) {
+  const Plan plan = plan_touch(recogniser, task, job.unknowns().front(), wanted, report);
+  if (const std::string words = recogniser.unresolved_words(); !words.empty()) {
     planned.told.push_back(words);
   }
-  planned.plan = to_json(plan, task, name_of_used(device, task), in_keywords);
+  planned.plan = to_json(plan, task, job.device_name(), in_keywords);
   return planned;
 }
 
@@ -117,10 +101,9 @@ std::tuple<Fields, Sentences> plan_python(nb::handle recordings, const PythonReq
     wanted.candidates = std::move(poses);
   }
   const Planned planned =
-      run_on_subject(recordings, request, progress,
-                     [&](const Subject& subject, Device& device, const Report& report) {
-                       return plan_next(subject, wanted, device, report);
-                     });
+      run_job(recordings, request, progress, [&](const RecognitionJob& job, const Report& report) {
+        return plan_next(job, wanted, report);
+      });
   sentences.insert(sentences.end(), planned.told.begin(), planned.told.end());
   return {fields_of(planned.plan), in_python(std::move(sentences))};
 }

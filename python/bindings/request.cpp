@@ -174,24 +174,6 @@ GivenRecordings given_recordings(nb::handle given) {
   return recordings;
 }
 
-Subject subject_of(const GivenRecordings& recordings, const Request& given) {
-  Subject subject{complete(given), read_recordings(recordings), {}};
-  for (Recording& recording : subject.recordings) {
-    replace_array(subject.request, recording.path, recording.elements(), recording.elements_mm);
-  }
-  subject.unknowns = list_unknowns(subject.request, subject.recordings);
-  return subject;
-}
-
-RecognitionTask task_of(const Subject& subject, Device& device, const CallerNeed& need) {
-  const Recording& first = subject.recordings.front();
-  return resolve(subject.request, {.pressure_unit = first.pressure_unit,
-                                   .source = first.path,
-                                   .reach_mm = largest_reach_mm(subject.recordings),
-                                   .need = need,
-                                   .device = [&device]() -> Device& { return device; }});
-}
-
 Sentences in_python(Sentences sentences) {
   std::ranges::transform(sentences, sentences.begin(), in_keywords);
   return sentences;

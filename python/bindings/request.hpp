@@ -8,9 +8,8 @@
 
 #include "call.hpp"
 #include "palpate/device.hpp"
-#include "recognition/recognition_record.hpp"
+#include "recognition/recognition_job.hpp"
 #include "recognition/request.hpp"
-#include "recognition/resolve.hpp"
 
 namespace palpate::python {
 
@@ -37,19 +36,6 @@ std::vector<Recording> read_recordings(const GivenRecordings& given);
 /// Takes a Recording, a file, or an iterable of them. Throws Error where there are none.
 GivenRecordings given_recordings(nb::handle given);
 
-/// What a request is about.
-struct Subject {
-  Request request;  ///< completed
-  std::vector<Recording> recordings;
-  std::vector<Unknown> unknowns;  ///< views into the recordings
-};
-/// Completes the request, reads the recordings, with the scene's array, and selects the unknowns.
-/// Throws Error.
-Subject subject_of(const GivenRecordings& recordings, const Request& given);
-
-/// The task of a subject, by what all its recordings have. Throws Error as resolve() does.
-RecognitionTask task_of(const Subject& subject, Device& device, const CallerNeed& need = {});
-
 /// The device that is open, or else the one of this name, see Device::open(). Throws Error, also
 /// in a child of fork() whose parent has opened it.
 inline std::shared_ptr<Device> device_of(const std::shared_ptr<Device>& open,
@@ -61,15 +47,18 @@ inline std::shared_ptr<Device> device_of(const std::shared_ptr<Device>& open,
   return open;
 }
 
-/// Runs `work(subject, device, report)` on the request's device, as run() does.
+/// Runs `work(job, report)` on the request's device, as run() does.
 template <typename F>
-auto run_on_subject(nb::handle recordings, const PythonRequest& request, const Progress& progress,
-                    F work) {
+auto run_job(nb::handle recordings, const PythonRequest& request, const Progress& progress,
+             F work) {
   const GivenRecordings given = given_recordings(recordings);
   return run(progress, [&](const Report& report) {
-    const Subject subject = subject_of(given, request);
-    const auto device = device_of(request.open_device, subject.request.device);
-    return work(subject, *device, report);
+    const Request completed = complete(request);
+    std::vector<Recording> read = read_recordings(given);
+    const auto device = device_of(request.open_device, completed.device);
+    return work(
+        RecognitionJob(completed, std::move(read), {}, [&]() -> Device& { return *device; }),
+        report);
   });
 }
 

@@ -103,8 +103,8 @@ def calibrate(
     given = locals()
     if isinstance(bins, str):
         raise TypeError(f"bins: {bins!r}; give counts, such as (25, 25, 16), or leave it out")
-    asked = ("bins", "x_mm", "y_mm", "theta_deg", "pivot_mm", "frames", "device")
-    learned = ("unposed", "threshold", "ratio", "layer", "levels", "max_maps", "group")
+    learned = ("unposed", "layer", "levels", "max_maps", "group")
+    asked = [name for name in given if name not in ("recordings", "maps", "progress", *learned)]
     fields, sensor = _palpate.calibrate(
         recordings,
         request_of({name: given[name] for name in asked}, maps),

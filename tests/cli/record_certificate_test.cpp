@@ -35,6 +35,11 @@ RecognitionRecord record_of(double dropped_mass, std::vector<ProbabilityInterval
   return {.recording = "/data/mug.h5", .frame = {}, .touches = 2, .trace = {step, step}};
 }
 
+std::string unproven_sentence(const RecognitionStep& step, const RecognitionTask& task) {
+  const StepSentences words = sentences_of(step, task);
+  return words.findings.empty() ? "" : words.findings.front();
+}
+
 TEST(DroppedText, RoundsUpToOneDigit) {
   const auto text = [](double mass) { return dropped_text(record_of(mass, {{}, {}}).last()); };
   EXPECT_EQ(text(0.0), "0");

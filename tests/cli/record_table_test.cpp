@@ -40,7 +40,8 @@ RefinedPose refined_at(const Pose& T_robot_object) {
 
 /// An A at x 398.76 mm, y -20.5 mm, theta 0.5 rad, between the bins.
 RecognitionRecord sample_record(const std::string& name) {
-  RecognitionStep step{.identity = {0.9876, 0.0124},
+  RecognitionStep step{.touches = 9,
+                       .identity = {0.9876, 0.0124},
                        .mode = {.object = 0,
                                 .T_object_robot = inverse(Pose{{399.0, -20.0}, 0.55}),
                                 .log_likelihood = -30.0},
@@ -231,7 +232,7 @@ TEST(ResultTable, SaysInASentenceWhatDoesNotFit) {
   records[2].trace.back().fit = {.z = -11.2, .verdict = Verdict::does_not_fit};
   records[3].trace.back().fit = {.z = -25.0, .verdict = Verdict::does_not_fit};
   records[3].trace.back().contradicted = true;
-  records[3].touches = 1;
+  records[3].trace.back().touches = 1;
   const std::string text = result_table(records, sample_task());
   EXPECT_THAT(text, HasSubstr("  theta deg  fit\n"));
   EXPECT_THAT(text, HasSubstr("28.65+-0.57  fits\n"));
@@ -300,10 +301,11 @@ TEST(RecordOutput, SaysTheSameNumbersEverywhere) {
                                  pose_words(pose_text(Pose{{truth[0], truth[1]}, truth[2]})) +
                                  "; error " + error + " mm";
   LiveState state;
-  state.touches = 9;
   state.last = LiveTouch{.touch = {.T_robot_sensor = Pose{}}, .step = step};
+  const std::string misfit =
+      "unlike A: its 9 touches fit 11 standard deviations worse than touches of A do";
   EXPECT_TRUE(summary(state, {}, task)
-                  .starts_with("unlike A (98.8 %): " + words + "\n" + true_words +
+                  .starts_with("unlike A (98.8 %): " + words + "\n" + true_words + "\n" + misfit +
                                "\nthe poses look like metres\n"))
       << summary(state, {}, task);
   for (const std::string& line :
@@ -328,7 +330,7 @@ TEST(RecordOutput, SaysTheSameNumbersEverywhere) {
   EXPECT_EQ(sheet.captions[0].text,
             "truth: A at x 398.80 mm, y -20.40 mm, theta 29.22°; error " + error + " mm");
   EXPECT_FALSE(sheet.captions[0].alarm);
-  EXPECT_EQ(sheet.captions[1].text, "fit: does not fit (z -11.0)");
+  EXPECT_EQ(sheet.captions[1].text, misfit);
   EXPECT_TRUE(sheet.captions[1].alarm);
   EXPECT_EQ(sheet.captions[2].text, "the poses look like metres");
   EXPECT_TRUE(sheet.captions[2].alarm);

@@ -112,8 +112,8 @@ TEST_F(Places, OfOneLabelWeighAsTheTemperatureHasLabelsWeigh) {
     RecognitionTask task(shapes(), every_filter()[filter]);
     Recogniser recogniser(device, task);
     const auto after = [&](double first, double growth) {
-      task.temperature = first;
-      task.temperature_growth = growth;
+      task.sensor.temperature = first;
+      task.sensor.temperature_growth = growth;
       recogniser.reset();
       // The same touch twice leaves the modes that one touch leaves.
       const Touch touch = recording.touch(0);
@@ -160,7 +160,7 @@ TEST_F(Places, OfAnObjectThatLooksAlikeWhenTurnedAreOneWhicheverHasTheMode) {
     const auto modes_of_disc = [&](std::optional<int> suggested) {
       maps[1].map.suggested_symmetry = suggested;
       RecognitionTask task(maps, every_filter()[filter]);
-      task.temperature = 20.0;  // the disc has a share
+      task.sensor.temperature = 20.0;  // the disc has a share
       Recogniser recogniser(device, task);
       const RecognitionStep step = take_step(recogniser, task, all_touches(recording, 1), {});
       EXPECT_EQ(step.mode.object, 0);

@@ -67,7 +67,7 @@ TEST(LabelProbability, IsTheSumOfTheMapsAtTemperatureOne) {
 
 TEST(LabelProbability, IsTheRootOfTheEvidenceAtTemperatureTwo) {
   RecognitionTask task = three_maps();
-  task.temperature = 2.0;
+  task.sensor.temperature = 2.0;
   const RecognitionStep step = judge(four_to_one(), {}, task);
   // Evidence 4 and 1.
   EXPECT_NEAR(step.identity[0], 2.0 / 3.0, 1e-15);
@@ -77,8 +77,8 @@ TEST(LabelProbability, IsTheRootOfTheEvidenceAtTemperatureTwo) {
 
 TEST(LabelProbability, IsTemperedMoreWithEveryTouch) {
   RecognitionTask task = three_maps();
-  task.temperature = 1.0;
-  task.temperature_growth = 0.5;
+  task.sensor.temperature = 1.0;
+  task.sensor.temperature_growth = 0.5;
   const Press press;
   for (const std::size_t touches : {1U, 2U, 3U}) {
     const std::vector<Touch> all(touches, press.touch());
@@ -90,7 +90,7 @@ TEST(LabelProbability, IsTemperedMoreWithEveryTouch) {
 
 TEST(LabelProbability, IsNotTemperedByTouchesThatTellNothing) {
   RecognitionTask task = three_maps();
-  task.temperature_growth = 0.5;
+  task.sensor.temperature_growth = 0.5;
   const Press press;
   std::vector<TouchEvidence> touches = evidence_of(std::vector(1, press.touch()), task.contact());
   const RecognitionStep one = judge(four_to_one(), {}, task, touches);
@@ -104,7 +104,7 @@ TEST(LabelProbability, IsNotTemperedByTouchesThatTellNothing) {
 
 TEST(LabelProbability, TempersNoneOfTheseToo) {
   RecognitionTask task = three_maps(HistogramOptions{.none_weight = 1.0});
-  task.temperature = 2.0;
+  task.sensor.temperature = 2.0;
   Estimate estimate = four_to_one();
   estimate.none_log_evidence = std::log(9.0);
   const RecognitionStep step = judge(estimate, {}, task);
@@ -116,7 +116,7 @@ TEST(LabelProbability, TempersNoneOfTheseToo) {
 
 TEST(LabelProbability, ReachesEvidenceBelowEveryNumber) {
   RecognitionTask task = three_maps();
-  task.temperature = 1000.0;
+  task.sensor.temperature = 1000.0;
   const Estimate estimate{.identity = {1.0, 0.0, 0.0}, .log_evidence = {0.0, -2000.0, -9000.0}};
   const RecognitionStep step = judge(estimate, {}, task);
   EXPECT_NEAR(step.identity[1] / step.identity[0], std::exp(-2.0), 1e-14);
@@ -124,8 +124,8 @@ TEST(LabelProbability, ReachesEvidenceBelowEveryNumber) {
 
 TEST(LabelProbability, AddsWhatEveryPressSaysAfterTheTemperature) {
   RecognitionTask task = three_maps(HistogramOptions{.none_weight = 1.0});
-  task.temperature = 2.0;
-  task.features = features_of_the_letter();
+  task.sensor.temperature = 2.0;
+  task.sensor.features = features_of_the_letter();
   Estimate estimate = four_to_one();
   estimate.none_log_evidence = 0.0;
   const Press press;
@@ -139,7 +139,7 @@ TEST(LabelProbability, AddsWhatEveryPressSaysAfterTheTemperature) {
 
 TEST(LabelProbability, MayTurnTheMostProbableLabelAround) {
   RecognitionTask task = three_maps();
-  task.features = features_of_the_letter();
+  task.sensor.features = features_of_the_letter();
   const Estimate estimate{.identity = {0.1, 0.9, 0.0},
                           .log_evidence = {std::log(0.1), std::log(0.9), -1e9}};
   const Press press;
@@ -154,7 +154,7 @@ TEST(LabelProbability, MayTurnTheMostProbableLabelAround) {
 
 TEST(LabelProbability, PassesOverTouchesWithoutContact) {
   RecognitionTask task = three_maps();
-  task.features = features_of_the_letter();
+  task.sensor.features = features_of_the_letter();
   const std::vector<glm::dvec2> elements_mm(2);
   const std::vector<double> pressure{0.0, 0.5};
   const Touch touch{.T_robot_sensor = {}, .elements_mm = elements_mm, .pressure = pressure};
@@ -164,7 +164,7 @@ TEST(LabelProbability, PassesOverTouchesWithoutContact) {
 
 TEST(LabelBounds, FollowTheTemperatureAndTheFeatures) {
   RecognitionTask task = three_maps(BoundedOptions{});
-  task.temperature = 2.0;
+  task.sensor.temperature = 2.0;
   Estimate estimate = four_to_one();
   // Evidence of L within 4 to 9, of the disc within 1 to 4.
   estimate.certificate = Certificate{
@@ -176,7 +176,7 @@ TEST(LabelBounds, FollowTheTemperatureAndTheFeatures) {
   EXPECT_NEAR(step.identity_bounds[1].low, 1.0 / (1.0 + 3.0), 1e-15);
   EXPECT_NEAR(step.identity_bounds[1].high, 2.0 / (2.0 + 2.0), 1e-15);
 
-  task.features = features_of_the_letter();
+  task.sensor.features = features_of_the_letter();
   const Press press;
   const std::vector<Touch> touches{press.touch()};
   const RecognitionStep with = judge(estimate, {}, task, evidence_of(touches, task.contact()));
@@ -208,7 +208,7 @@ TEST(Evidence, IsWhatBoundsFindWhereATemperatureNeedsIt) {
 /// What is told of the filter's bins where the sensor model was learned on others.
 std::string wider_bins(const FilterOptions& filter, const std::optional<BinSteps>& learned) {
   RecognitionTask task = three_maps(filter);
-  task.learned_bins = learned;
+  task.sensor.bins = learned;
   return wider_bins_sentence(task);
 }
 
@@ -238,7 +238,7 @@ TEST(Misfit, CountsForNoneAloneWhereTheScaleWasLearned) {
   const std::vector<TouchEvidence> touches(3, TouchEvidence(press.touch(), task.contact()));
   const Fit fit{.z = -8.0};
   EXPECT_EQ(tempering_of(touches, task, fit).features.back(), 0.0);
-  task.fit_scale = {.mean = 0.1, .sd = 0.9, .shared_sd = 0.1};
+  task.sensor.fit_scale = FitScale{.mean = 0.1, .sd = 0.9, .shared_sd = 0.1};
   const std::vector<double> nats = tempering_of(touches, task, fit).features;
   EXPECT_EQ(nats.back(), misfit_nats(fit, 3, {.stranger_sd = usual_stranger_sd}));
   EXPECT_EQ(nats.front(), 0.0);
@@ -251,7 +251,8 @@ TEST(Misfit, IsByHowBadlyStrangersFitTheObjectsOfTheSensorModel) {
   Estimate estimate = four_to_one();
   estimate.none_log_evidence = 0.0;
   const auto none = [&](const Fit& fit, std::optional<double> stranger_sd) {
-    task.fit_scale = {.mean = 0.1, .sd = 0.9, .shared_sd = 0.1, .stranger_sd = stranger_sd};
+    task.sensor.fit_scale =
+        FitScale{.mean = 0.1, .sd = 0.9, .shared_sd = 0.1, .stranger_sd = stranger_sd};
     return label_probabilities(estimate, tempering_of(touches, task, fit), task).back();
   };
   // Where strangers fit hardly worse than learned objects, a fair fit may be one's, and a bad one

@@ -155,10 +155,10 @@ TEST(Temperature, LeavesPosesAndTellsTheSameByBoundsAsByTheHistogram) {
   for (const std::size_t filter : {0U, 2U}) {
     const LearnedSensor sensor{.temperature = 8.0};
     RecognitionTask task(shapes(), with_evidence(every_filter()[filter], sensor));
-    task.temperature = sensor.temperature;
+    task.sensor.temperature = sensor.temperature;
     Recogniser recogniser(device, task);
     steps.push_back(recognise(recogniser, task, unknown_of(recording), false).last());
-    task.temperature = 1.0;
+    task.sensor.temperature = 1.0;
     const RecognitionStep plain = recognise(recogniser, task, unknown_of(recording), false).last();
     EXPECT_EQ(steps.back().mode.bin, plain.mode.bin);
     EXPECT_EQ(steps.back().refined->covariance, plain.refined->covariance);
@@ -199,8 +199,8 @@ TEST(LearnedSensor, TellsTheSameByBoundsAsByTheHistogram) {
       std::vector<Hypothesis> learned = maps;
       std::visit([&](auto& of) { apply(sensor, learned, of.contact); }, options);
       RecognitionTask task(learned, with_evidence(options, sensor));
-      task.temperature = sensor.temperature;
-      task.features = sensor.features;
+      task.sensor.temperature = sensor.temperature;
+      task.sensor.features = sensor.features;
       Recogniser recogniser(device, task);
       records.push_back(recognise(recogniser, task, unknown_of(recording), true));
     }

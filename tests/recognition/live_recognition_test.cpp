@@ -26,8 +26,8 @@ TEST(LiveRecognition, BelievesOfAStreamWhatRecogniseDoesOfItsTouches) {
   EXPECT_EQ(live.latencies_ms().size(), 4U);
 
   const SensorDescription& description = sensor->description();
-  Unknown unknown{.recording = "stream",
-                  .truth = partial_truth(description.object, description.truth)};
+  Query unknown{.recording = "stream",
+                .truth = partial_truth(description.object, description.truth)};
   for (const LiveTouch& touch : touches) {
     unknown.touches.push_back({.T_robot_sensor = *touch.touch.T_robot_sensor,
                                .elements_mm = description.elements_mm,

@@ -39,18 +39,18 @@ TEST(Recognise, MakesABrokenUnknownARecordAndTheOthersAreRight) {
   const Recording disc = touched_disc(5);
   Recording unsound = touched_letter(6);
   unsound.T_robot_sensor[3].translation_mm.x = std::numeric_limits<double>::quiet_NaN();
-  Unknown unreadable{.recording = "gone.h5", .error = "gone.h5: cannot be read"};
-  const std::vector<Unknown> unknowns{unknown_of(letter),
-                                      unknown_of(unsound),
-                                      unreadable,
-                                      {.recording = "empty"},
-                                      unknown_of(disc)};
+  Query unreadable{.recording = "gone.h5", .error = "gone.h5: cannot be read"};
+  const std::vector<Query> unknowns{unknown_of(letter),
+                                    unknown_of(unsound),
+                                    unreadable,
+                                    {.recording = "empty"},
+                                    unknown_of(disc)};
   for (const FilterOptions& filter : every_filter()) {
     const RecognitionTask task(shapes(), filter);
     Recogniser recogniser(device, task);
     for (const bool trace : {false, true}) {
       std::vector<RecognitionRecord> records;
-      for (const Unknown& unknown : unknowns) {
+      for (const Query& unknown : unknowns) {
         records.push_back(recognise(recogniser, task, unknown, trace));
       }
       for (const std::size_t good : {0U, 4U}) {
@@ -116,7 +116,7 @@ TEST(Recognise, APosesScaleIsThatOfReadingsAlone) {
       return recognise(recogniser, task, unknown_of(letter), false).last().refined->covariance[0];
     };
     const double before = variance();
-    task.pose_scale.factor = factor;
+    task.sensor.pose_scale = PoseScale{.factor = factor};
     return variance() / before;
   };
   const auto exact = std::get<HistogramOptions>(every_filter().front());
@@ -299,7 +299,7 @@ TEST(TakeStep, JudgesTheRefinedPoseToo) {
   const RecognitionTask task(shapes(), every_filter()[0]);
   Recogniser recogniser(device, task);
   const Recording letter = touched_letter(9);
-  const Unknown unknown = unknown_of(letter);
+  const Query unknown = unknown_of(letter);
   const RecognitionStep step = take_step(recogniser, task, unknown.touches, unknown.truth);
   ASSERT_EQ(step.mode.object, 0);
   const OccupancyGrid& map = task.hypotheses[0].map;

@@ -180,10 +180,10 @@ TEST(Resolve, ASearchOfPoorFitsGoesOnWhereClosenessIsAskedFor) {
 
 TEST(Resolve, TheFitsScaleIsOfTouchesThatMapsHadNotSeen) {
   Request request = request_of_learned();
-  EXPECT_EQ(task_of(request).fit_scale.mean, 1.0);
-  EXPECT_GT(task_of(request).fit_scale.shared_sd, 0.3);
+  EXPECT_EQ(task_of(request).fit_scale().mean, 1.0);
+  EXPECT_GT(task_of(request).fit_scale().shared_sd, 0.3);
   request.given_maps[0].hypothesis.map.source.reset();
-  EXPECT_EQ(task_of(request).fit_scale.mean, 1.5) << "of the maps that have one";
+  EXPECT_EQ(task_of(request).fit_scale().mean, 1.5) << "of the maps that have one";
 }
 
 TEST(Resolve, BinsOfALargeRegionResolveTheMapsWhereThePivotLiesAtATouch) {
@@ -192,14 +192,14 @@ TEST(Resolve, BinsOfALargeRegionResolveTheMapsWhereThePivotLiesAtATouch) {
   request.bins = std::array{800, 800, 200};
   request.filter = FilterKind::bounded;
   const RecognitionTask far = task_of(request);
-  EXPECT_EQ(far.fit_scale.mean, 0.0);
+  EXPECT_EQ(far.fit_scale().mean, 0.0);
   EXPECT_EQ(far.labels.size(), 2u);
   EXPECT_THAT(far.remarks, ElementsAre(AllOf(HasSubstr("an object 283 mm from the pivot by 8.9 mm"),
                                              HasSubstr("\"(none)\" is left out"),
                                              HasSubstr("`pivot-mm auto`"))));
   request.pivot_mm = Automatic{};
   const RecognitionTask near = task_of(request);
-  EXPECT_EQ(near.fit_scale.mean, 1.0);
+  EXPECT_EQ(near.fit_scale().mean, 1.0);
   EXPECT_EQ(near.labels.back(), none_label);
   EXPECT_THAT(near.remarks, testing::IsEmpty());
 }
@@ -216,12 +216,12 @@ TEST(Resolve, TouchesThatAreJudgedOtherwiseHaveNoScale) {
   others[6].filter = FilterKind::particles;
   others[7].bins = std::array{6, 5, 4};
   for (std::size_t i = 0; i < others.size(); ++i) {
-    const FitScale scale = task_of(others[i]).fit_scale;
+    const FitScale scale = task_of(others[i]).fit_scale();
     EXPECT_EQ(std::pair(scale.mean, scale.sd), std::pair(0.0, 1.0)) << i;
   }
   // Poses have the map's errors always, and the readings' where these are judged as the map did.
   for (std::size_t i = 0; i < others.size(); ++i) {
-    const PoseScale scale = task_of(others[i]).pose_scale;
+    const PoseScale scale = task_of(others[i]).pose_scale();
     const bool readings_alike = others[i].touch_sd_mm || others[i].slip_sd_deg;
     EXPECT_NEAR(scale.factor, readings_alike ? 0.5 : 1.0, 1e-12) << i;
     EXPECT_NEAR(scale.map_sd_mm, 0.1, 1e-12) << i;

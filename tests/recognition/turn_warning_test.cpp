@@ -76,7 +76,7 @@ class TurnWarning : public testing::Test {
       }
     }
     const Recording recording = letter_touches(letter, 9, 11);
-    Unknown unknown = unknown_of(recording);
+    Query unknown = unknown_of(recording);
     if (turn_rad) {
       // Turned in the object frame, about the letter's middle.
       unknown.truth.T_object_robot = Pose{{}, *turn_rad} * *unknown.truth.T_object_robot;

@@ -36,7 +36,7 @@ class Warnings : public testing::Test {
     delete device_;
   }
 
-  static RecognitionRecord record_of(const RecognitionTask& task, const Unknown& unknown,
+  static RecognitionRecord record_of(const RecognitionTask& task, const Query& unknown,
                                      bool trace = false) {
     Recogniser recogniser(*device_, task);
     return recognise(recogniser, task, unknown, trace);
@@ -95,7 +95,7 @@ TEST_F(Warnings, GoodSinglePressesGiveNone) {
   for (const std::string& letter : names) {
     const Recording recording = letter_touches(letter, sanitized ? 5 : 20, 60);
     for (std::size_t i = 0; i < recording.size(); ++i) {
-      const Unknown press{.recording = letter, .frame = i, .touches = {recording.touch(i)}};
+      const Query press{.recording = letter, .frame = i, .touches = {recording.touch(i)}};
       EXPECT_THAT(recognise(recogniser, task, press, false).last().warnings, IsEmpty())
           << letter << " " << i;
     }

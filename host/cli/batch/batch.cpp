@@ -2,9 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
-#include <functional>
 #include <memory>
-#include <optional>
 #include <string>
 #include <thread>
 #include <utility>
@@ -22,7 +20,6 @@
 #include "recognition/batch/batch_resolution.hpp"
 #include "recognition/batch/batch_task.hpp"
 #include "recognition/batch/input_reading.hpp"
-#include "recognition/recogniser.hpp"
 #include "recognition/recordings.hpp"
 #include "recognition/request.hpp"
 
@@ -33,8 +30,7 @@ namespace {
 /// A batch whose task stands in its results folder.
 struct SettledBatch {
   BatchTask task;
-  const RecognitionTask recognition;
-  std::optional<Device> device;  ///< where settling needed it
+  RecognitionJob job;
 };
 
 /// Settles once for all shards what a results folder computes: by the task file that is there or,
@@ -42,17 +38,9 @@ struct SettledBatch {
 /// the device at hand, is settled here, so that no chunk depends on who computes it.
 /// @param asked program, chunk_unknowns, request, files and stamped inputs
 /// @param request completed
-/// @param open opens the device, where the bins follow from its memory
 /// @throws Error (Fault::input) where the folder has results of another task
 SettledBatch settle_batch(const ResultsFolder& folder, const BatchTask& asked,
-                          const Request& request, const std::function<Device()>& open,
-                          std::size_t threads) {
-  const auto resolved = [&](BatchTask task) {
-    std::optional<Device> device;
-    RecognitionTask recognition = resolve_batch(
-        task, request, [&]() -> Device& { return device ? *device : device.emplace(open()); });
-    return SettledBatch{std::move(task), std::move(recognition), std::move(device)};
-  };
+                          const Request& request, std::size_t threads) {
   if (!folder.has_task()) {
     BatchTask task = asked;
     {
@@ -60,11 +48,11 @@ SettledBatch settle_batch(const ResultsFolder& folder, const BatchTask& asked,
       survey_inputs(task.inputs, request, threads, [&](double done) { progress.show(done); });
     }
     task.inferred = infer(task.inputs, request);
-    SettledBatch settled = resolved(std::move(task));
+    RecognitionJob job = job_of(task, request);
     make_folder(folder.path());
-    if (write_batch_task(folder.task(), settled.task)) {
-      std::ranges::for_each(settled.recognition.remarks, tell_on_stderr);
-      return settled;
+    if (write_batch_task(folder.task(), task)) {
+      std::ranges::for_each(job.task().remarks, tell_on_stderr);
+      return {std::move(task), std::move(job)};
     }
     // Another process has settled the task meanwhile.
   }
@@ -75,7 +63,8 @@ SettledBatch settle_batch(const ResultsFolder& folder, const BatchTask& asked,
       refuse(folder.path(), "{}; undo that, or give another folder", difference);
     }
   }
-  return resolved(std::move(there));
+  RecognitionJob job = job_of(there, request);
+  return {std::move(there), std::move(job)};
 }
 
 struct BatchArguments {
@@ -131,21 +120,16 @@ double seconds_since(std::chrono::steady_clock::time_point begin) {
 }
 
 /// Recognises what is missing of the shard. Returns the counts of this run.
-BatchCounts compute(const BatchRun& run, SettledBatch& settled,
-                    const std::function<Device()>& open) {
-  if (!settled.device && uses_device(settled.recognition)) {
-    settled.device = open();
-  }
+BatchCounts compute(const BatchRun& run) {
+  run.job.device();  // opens it before the line of progress is there
   Progress progress("recognising");
   const auto begin = std::chrono::steady_clock::now();
-  return run_batch(
-      run, settled.device ? &*settled.device : nullptr, [&](const BatchCounts& counts) {
-        const double seconds = seconds_since(begin);
-        progress.show(
-            static_cast<double>(counts.done) / static_cast<double>(run.to_be_done),
-            fmt::format(", {:.0f} per second{}", static_cast<double>(counts.done) / seconds,
-                        counts.failed > 0 ? fmt::format(", {} failed", counts.failed) : ""));
-      });
+  return run_batch(run, [&](const BatchCounts& counts) {
+    const double seconds = seconds_since(begin);
+    progress.show(static_cast<double>(counts.done) / static_cast<double>(run.to_be_done),
+                  fmt::format(", {:.0f} per second{}", static_cast<double>(counts.done) / seconds,
+                              counts.failed > 0 ? fmt::format(", {} failed", counts.failed) : ""));
+  });
 }
 
 std::string batch_summary(const BatchArguments& options, const Shard& shard, const Chunks& chunks,
@@ -183,8 +167,7 @@ int batch(const BatchArguments& options) {
   folder.require_own();
   const std::size_t threads =
       options.threads > 0 ? static_cast<std::size_t>(options.threads) : cores();
-  const auto open = [&] { return Device::open(request.device); };
-  SettledBatch settled = settle_batch(folder, asked, request, open, threads);
+  const SettledBatch settled = settle_batch(folder, asked, request, threads);
   const Chunks chunks = chunks_of(folder, settled.task, shard);
   const auto begin = std::chrono::steady_clock::now();
   BatchCounts now;
@@ -192,13 +175,11 @@ int batch(const BatchArguments& options) {
     folder.make();
     now = compute({.folder = folder,
                    .task = settled.task,
-                   .recognition = settled.recognition,
-                   .request = request,
+                   .job = settled.job,
                    .wanted = chunks.wanted,
                    .to_be_done = chunks.to_be_done,
                    .threads = threads,
-                   .verbose = options.verbose},
-                  settled, open);
+                   .verbose = options.verbose});
   }
   fmt::print("{}", batch_summary(options, shard, chunks, now, seconds_since(begin)));
   return chunks.finished.failed + now.failed > 0 ? some_failed : 0;

@@ -21,7 +21,6 @@
 #include "io/input_file.hpp"
 #include "recognition/batch/batch_resolution.hpp"
 #include "recognition/record_json.hpp"
-#include "recognition/resolve.hpp"
 
 namespace palpate::cli {
 
@@ -104,7 +103,7 @@ constexpr auto pause = 200ms;
 struct Job {
   std::size_t index;  ///< among all unknowns
   std::shared_ptr<const Recording> recording;
-  Unknown unknown;
+  Query unknown;
 };
 
 /// A record as text.
@@ -144,7 +143,7 @@ std::string host_name() {
   return ::gethostname(name, sizeof name - 1) == 0 ? name : "";
 }
 
-std::size_t bytes_of(const Unknown& unknown) {
+std::size_t bytes_of(const Query& unknown) {
   constexpr std::size_t least = 4096;
   std::size_t bytes = least;
   for (const Touch& touch : unknown.touches) {
@@ -155,10 +154,9 @@ std::size_t bytes_of(const Unknown& unknown) {
 
 class Pipeline {
  public:
-  Pipeline(const BatchRun& run, Device* device)
+  explicit Pipeline(const BatchRun& run)
       : run_(run),
-        device_(uses_device(run.recognition) ? device : nullptr),
-        task_(run.recognition),
+        task_(run.job.task()),
         unknowns_(run.task.unknowns()),
         jobs_(most_waiting_bytes),
         lines_(most_waiting_bytes) {
@@ -234,7 +232,7 @@ class Pipeline {
   void read() {
     for (std::size_t i = next_input_++; i < first_.size(); i = next_input_++) {
       if (is_wanted(i) &&
-          !push_unknowns(i, read_entry(run_.task, run_.task.inputs[i], run_.request))) {
+          !push_unknowns(i, read_entry(run_.task, run_.task.inputs[i], run_.job.request()))) {
         return;
       }
     }
@@ -255,18 +253,17 @@ class Pipeline {
   }
 
   void recognise_jobs(bool first) {
-    Recogniser recogniser =
-        open_recogniser(device_, task_, {.threads = run_.threads / recognisers_});
+    const bool trace = run_.job.request().trace;
+    Recogniser recogniser = run_.job.open({.threads = run_.threads / recognisers_});
     if (first && run_.verbose) {
-      print_engine(device_, recogniser, task_);
+      print_engine(run_.job, recogniser);
     }
     while (const std::optional<Job> job = jobs_.pop()) {
-      const RecognitionRecord record =
-          recognise(recogniser, task_, job->unknown, run_.request.trace);
+      const RecognitionRecord record = recognise(recogniser, task_, job->unknown, trace);
       if (record.error.empty()) {
-        tell_once(unresolved_words(task_, recogniser.lattice(), job->unknown.touches));
+        tell_once(recogniser.unresolved_words());
       }
-      RecordLine line{job->index, text_of(to_json(record, task_, std::nullopt, run_.request.trace)),
+      RecordLine line{job->index, text_of(to_json(record, task_, std::nullopt, trace)),
                       record.seconds, !record.error.empty()};
       const std::size_t bytes = line.text.size();
       if (!lines_.push(std::move(line), bytes)) {
@@ -317,7 +314,7 @@ class Pipeline {
                         {"unknowns", chunk.lines.size()},
                         {"failed", chunk.failed},
                         {"host", host_name()},
-                        {"device", device_name(device_)},
+                        {"device", run_.job.device_name()},
                         {"seconds", chunk.seconds}}),
                AtomicFile::Links::replaced);
     std::string text;
@@ -328,7 +325,6 @@ class Pipeline {
   }
 
   const BatchRun& run_;
-  Device* device_;  ///< null where none is used
   const RecognitionTask& task_;
   std::size_t unknowns_;
   std::vector<std::size_t> first_;  ///< [input] index of its first unknown
@@ -347,9 +343,9 @@ class Pipeline {
 
 }  // namespace
 
-BatchCounts run_batch(const BatchRun& run, Device* device,
+BatchCounts run_batch(const BatchRun& run,
                       const std::function<void(const BatchCounts&)>& progress) {
-  return Pipeline(run, device).run(progress);
+  return Pipeline(run).run(progress);
 }
 
 }  // namespace palpate::cli

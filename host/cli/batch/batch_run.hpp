@@ -7,7 +7,7 @@
 #include "cli/results_folder.hpp"
 #include "recognition/batch/batch_task.hpp"
 #include "recognition/batch/input_reading.hpp"
-#include "recognition/recognition_task.hpp"
+#include "recognition/recognition_job.hpp"
 
 namespace palpate::cli {
 
@@ -21,8 +21,7 @@ struct BatchCounts {
 struct BatchRun {
   const ResultsFolder& folder;
   const BatchTask& task;
-  const RecognitionTask& recognition;  ///< settled
-  const Request& request;
+  const RecognitionJob& job;        ///< settled
   const std::vector<bool>& wanted;  ///< [chunk]
   std::size_t to_be_done = 0;       ///< unknowns of these chunks
   std::size_t threads = 1;
@@ -34,9 +33,7 @@ struct BatchRun {
 /// recognise several unknowns at once, and so do histograms of so few bins that a device would wait
 /// for the host; larger ones and particles, whose work a device divides by itself, one. The chunks
 /// have the same bytes whatever the number of threads. Calls `progress` now and then.
-/// @param device may be null where uses_device() is false
 /// @throws Error where an input changes meanwhile, and on a full disk or a device that fails
-BatchCounts run_batch(const BatchRun& run, Device* device,
-                      const std::function<void(const BatchCounts&)>& progress);
+BatchCounts run_batch(const BatchRun& run, const std::function<void(const BatchCounts&)>& progress);
 
 }  // namespace palpate::cli

@@ -50,14 +50,12 @@ int number_of(const nlohmann::json& request, const char* key, int least, int end
   return static_cast<int>(number);
 }
 
-/// What the step says besides its numbers, the most important first.
-std::vector<std::string> sentences(const LiveTouch& touch, const RecognitionTask& task) {
-  std::vector<std::string> words{truth_words(touch.step), unproven_sentence(touch.step, task),
-                                 misfit_sentence(touch.step, touch.index + 1, task),
-                                 single_touch_words(task, touch.index + 1)};
-  std::ranges::move(warning_words(touch.step), std::back_inserter(words));
-  std::erase(words, "");
-  return words;
+/// What the step says besides its numbers and its decision.
+std::vector<std::string> sentences(const RecognitionStep& step, const RecognitionTask& task) {
+  StepSentences words = sentences_of(step, task);
+  words.findings.insert(words.findings.begin(), words.truth);
+  std::erase(words.findings, "");
+  return words.findings;
 }
 
 /// What the elements said of a touch: "C" In Contact, "n" No Contact, "?" Unknown.
@@ -128,7 +126,7 @@ void LivePage::begin_unknown() {
 void LivePage::add(const LiveTouch& touch) {
   last_ = touch.step;
   nlohmann::ordered_json json = to_json(touch, task_);
-  json["words"] = sentences(touch, task_);
+  json["words"] = sentences(touch.step, task_);
   json["map"] = touch.step.mode.object;
   json["readings"] = readings_text(touch);
   feed_.add("touch", line_of(json));

@@ -1,8 +1,9 @@
 #include "recognition/batch/batch_resolution.hpp"
 
+#include <utility>
+
 #include "io/file_hash.hpp"
 #include "options/refused_option.hpp"
-#include "recognition/resolve.hpp"
 
 namespace palpate {
 
@@ -23,19 +24,15 @@ void hash_files(BatchTask& task, const Request& request) {
   }
 }
 
-RecognitionTask resolve_batch(BatchTask& task, const Request& request,
-                              const std::function<Device&()>& device) {
-  const BatchInference& inferred = task.inferred;
-  const bool settled = task.bins != std::array<int, 3>{};
-  RecognitionTask recognition =
-      resolve(request, {.pressure_unit = inferred.pressure_unit,
-                        .source = inferred.unit_from,
-                        .reach_mm = inferred.reach_mm,
-                        .device = device,
-                        .counts = settled ? std::optional(task.bins) : std::nullopt});
-  const PoseLattice& lattice = recognition.lattice();
+RecognitionJob job_of(BatchTask& task, const Request& request, DeviceSource device) {
+  Circumstances circumstances = task.inferred;
+  if (task.bins != std::array<int, 3>{}) {
+    circumstances.counts = task.bins;
+  }
+  RecognitionJob job(request, circumstances, std::move(device));
+  const PoseLattice& lattice = job.task().lattice();
   task.bins = {lattice.x_mm.count, lattice.y_mm.count, lattice.theta_rad.count};
-  return recognition;
+  return job;
 }
 
 }  // namespace palpate

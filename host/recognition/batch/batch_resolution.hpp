@@ -1,10 +1,7 @@
 #pragma once
 
-#include <functional>
-
 #include "recognition/batch/batch_task.hpp"
-#include "recognition/recognition_task.hpp"
-#include "recognition/request.hpp"
+#include "recognition/recognition_job.hpp"
 
 namespace palpate {
 
@@ -20,9 +17,8 @@ void hash_files(BatchTask& task, const Request& request);
 
 /// The recognition that a task with its inference asks for, on the task's bins. Where the task has
 /// none yet, settles them and puts them there.
-/// @param device as Circumstances::device
+/// @param device see RecognitionJob
 /// @throws Error
-RecognitionTask resolve_batch(BatchTask& task, const Request& request,
-                              const std::function<Device&()>& device);
+RecognitionJob job_of(BatchTask& task, const Request& request, DeviceSource device = {});
 
 }  // namespace palpate

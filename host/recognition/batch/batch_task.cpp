@@ -109,7 +109,7 @@ OrderedJson head_to_json(const BatchTask& task) {
   for (const auto& [file, hash] : task.files) {
     files[to_utf8(file)] = hash;
   }
-  const BatchInference& inferred = task.inferred;
+  const Circumstances& inferred = task.inferred;
   return {{"format", format},
           {"version", version},
           {"program", task.program},
@@ -120,7 +120,7 @@ OrderedJson head_to_json(const BatchTask& task) {
           {"options", options},
           {"files", files},
           {"pressure_unit", inferred.pressure_unit},
-          {"unit_from", to_utf8(inferred.unit_from)},
+          {"unit_from", to_utf8(inferred.source)},
           {"reach_mm", inferred.reach_mm},
           {"bins", task.bins}};
 }

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "recognition/request.hpp"
+#include "recognition/resolve.hpp"
 
 namespace palpate {
 
@@ -48,13 +49,6 @@ struct BatchEntry {
   std::optional<InputSurvey> survey;  ///< only where the task needs it
 };
 
-/// What follows from all inputs together.
-struct BatchInference {
-  std::string pressure_unit = "kPa";
-  std::string unit_from;  ///< the first input that can be read
-  double reach_mm = 0.0;
-};
-
 /// What a results folder computes: the content of its task file, in whose absence nothing is
 /// computed. Two equal tasks have equal results.
 struct BatchTask {
@@ -62,7 +56,7 @@ struct BatchTask {
   std::size_t chunk_unknowns = 0;            ///< in each chunk but the last
   Request request;                           ///< as asked; its device does not count
   std::map<std::string, std::string> files;  ///< maps, sensor model, scene: hashes of their content
-  BatchInference inferred;
+  Circumstances inferred;  ///< from all inputs together; its source is the first that can be read
   std::array<int, 3> bins{};  ///< of the lattice; those of --bins auto follow from the device
   std::vector<BatchEntry> inputs;
 

@@ -102,15 +102,15 @@ void read_pattern(const std::string& pattern, std::vector<BatchEntry>& inputs) {
 /// @param inferred whose pressure unit the recording must have; none: any unit will do
 /// @throws Error (Fault::input) where the recording is at fault
 ReadInput read_input(const BatchInput& input, const Request& request,
-                     const BatchInference* inferred) {
+                     const Circumstances* inferred) {
   const auto recording = std::make_shared<Recording>(read_recording(input.path));
-  Recording like = inferred == nullptr ? Recording{} : Recording{.path = inferred->unit_from};
+  Recording like = inferred == nullptr ? Recording{} : Recording{.path = inferred->source};
   like.pressure_unit = inferred == nullptr ? recording->pressure_unit : inferred->pressure_unit;
   require_touches(*recording, like);
-  replace_array(request, recording->path, recording->elements(), recording->elements_mm);
+  replace_array(request, *recording);
   ReadInput read{recording,
                  unknowns_in(request, input.frames ? input.frames : request.frames, *recording)};
-  for (Unknown& unknown : read.unknowns) {
+  for (Query& unknown : read.unknowns) {
     if (!input.label.empty() && unknown.truth.label != input.label) {
       unknown.truth = {input.label, {}};
     }
@@ -124,7 +124,7 @@ InputSurvey survey_of(const BatchEntry& entry, const Request& request) {
     InputSurvey survey{.touches = 0,
                        .reach_mm = largest_reach_mm(std::span(read.recording.get(), 1)),
                        .pressure_unit = read.recording->pressure_unit};
-    for (const Unknown& unknown : read.unknowns) {
+    for (const Query& unknown : read.unknowns) {
       survey.touches += unknown.touches.size();
     }
     return survey;
@@ -141,11 +141,11 @@ constexpr const char* begin_again = "begin again, in another folder";
 /// Unknowns that have the error of their recording.
 ReadInput broken_input(const BatchInput& input, std::size_t count, const Request& request,
                        const std::string& error) {
-  const Unknown unknown{.recording = input.path,
-                        .frame = {},
-                        .touches = {},
-                        .truth = {input.label, {}},
-                        .error = error};
+  const Query unknown{.recording = input.path,
+                      .frame = {},
+                      .touches = {},
+                      .truth = {input.label, {}},
+                      .error = error};
   ReadInput broken{nullptr, std::vector(count, unknown)};
   const std::optional<Frames>& frames = input.frames ? input.frames : request.frames;
   for (std::size_t i = 0; count > 1 && i < count; ++i) {
@@ -245,15 +245,15 @@ void survey_inputs(std::span<BatchEntry> inputs, const Request& request, std::si
   }
 }
 
-BatchInference infer(std::span<const BatchEntry> inputs, const Request& request) {
-  BatchInference inferred;
+Circumstances infer(std::span<const BatchEntry> inputs, const Request& request) {
+  Circumstances inferred{.pressure_unit = "kPa"};
   const auto surveyed = [&](const BatchEntry& entry) {
     return entry.survey ? *entry.survey : survey_of(entry, request);
   };
   for (const BatchEntry& entry : inputs) {
     if (const InputSurvey survey = surveyed(entry); !survey.pressure_unit.empty()) {
       inferred.pressure_unit = survey.pressure_unit;
-      inferred.unit_from = entry.input.path;
+      inferred.source = entry.input.path;
       break;
     }
   }

@@ -22,7 +22,7 @@ std::vector<BatchEntry> list_inputs(std::span<const std::string> arguments);
 /// A recording and its unknowns, which are views into it.
 struct ReadInput {
   std::shared_ptr<const Recording> recording;
-  std::vector<Unknown> unknowns;
+  std::vector<Query> unknowns;
 };
 
 /// Reads an input of a settled task: as many unknowns as the task counts, each with the error where
@@ -38,6 +38,6 @@ void survey_inputs(std::span<BatchEntry> inputs, const Request& request, std::si
                    const std::function<void(double)>& progress);
 
 /// What follows from surveyed inputs. Without surveys, reads inputs until one can be read.
-BatchInference infer(std::span<const BatchEntry> inputs, const Request& request);
+Circumstances infer(std::span<const BatchEntry> inputs, const Request& request);
 
 }  // namespace palpate
