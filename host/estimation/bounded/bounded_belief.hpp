@@ -32,8 +32,8 @@ class BoundedBelief {
 
   const SearchedTouches& touches() const { return touches_; }
   /// See SearchedTouches.
-  std::vector<double> log_likelihood(std::span<const BinBox> boxes, Arithmetic arithmetic) const {
-    return touches_.log_likelihood(boxes, arithmetic);
+  std::vector<double> log_likelihood(std::span<const BinBox> boxes) const {
+    return touches_.log_likelihood(boxes);
   }
   std::uint64_t bytes() const { return touches_.bytes() + (found_ ? found_->bins.bytes() : 0); }
 

@@ -164,7 +164,7 @@ RefinedPose BoundedPosterior::refine(const Mode& mode) const {
   }
   const auto log_likelihood = [&](std::span<const BinBox> boxes) {
     if (!thin) {
-      return belief.log_likelihood(boxes, Arithmetic::float32);
+      return belief.log_likelihood(boxes);
     }
     std::size_t bins = 0;
     for (const BinBox& box : boxes) {
@@ -172,7 +172,7 @@ RefinedPose BoundedPosterior::refine(const Mode& mode) const {
     }
     std::vector<double> logs(bins);
     belief.touches().on_threads(
-        [&] { of_thin->evaluate(boxes, belief.touches().elements(), Arithmetic::float32, logs); });
+        [&] { of_thin->evaluate(boxes, belief.touches().elements(), logs); });
     return logs;
   };
   return palpate::refine(log_likelihood, fit, posterior.bodies[mode.object], start);
@@ -295,7 +295,7 @@ double BoundedPosterior::log_likelihood(int object, const Pose& T_object_robot) 
                      .y_count = 1,
                      .x_first = static_cast<std::int32_t>(bin % lattice().x_mm.count),
                      .x_count = 1};
-    return belief.log_likelihood(std::span(&box, 1), Arithmetic::float64).front();
+    return belief.log_likelihood(std::span(&box, 1)).front();
   }
   const ContactModel& contact = belief.touches().options().contact;
   const InterpolatedMap map(belief.touches().hypotheses()[object].compared(), *contact.prior);

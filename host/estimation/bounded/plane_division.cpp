@@ -138,9 +138,8 @@ double PlaneDivision::divide(int theta, double least, const LargestSums& kept) {
   return left_out.log();
 }
 
-double PlaneDivision::evaluated(Arithmetic arithmetic) const {
-  return task_.space.log_weight[object_] +
-         boxes_.log_sum(task_.likelihood, task_.elements, arithmetic);
+double PlaneDivision::evaluated() const {
+  return task_.space.log_weight[object_] + boxes_.log_sum(task_.likelihood, task_.elements);
 }
 
 PlaneDivision::Plane PlaneDivision::plane(int theta) const {

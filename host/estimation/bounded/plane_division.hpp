@@ -55,7 +55,7 @@ class PlaneDivision {
   double divide(int theta, double least, const LargestSums& kept);
   /// The log of the summed likelihood of the bins that count in what was divided, with the prior
   /// weight.
-  double evaluated(Arithmetic arithmetic) const;
+  double evaluated() const;
 
  private:
   class PenaltySum;

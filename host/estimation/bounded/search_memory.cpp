@@ -112,8 +112,8 @@ SearchMemory search_memory(std::span<const Hypothesis> hypotheses, const Bounded
     }
   }
   // The last family of a batch may exceed the batch by all of its bins.
-  // Each bin's value as it is evaluated, settled and kept.
-  constexpr double bytes_per_bin = sizeof(float) + 2 * sizeof(double);
+  // Each bin's value as it is evaluated and kept.
+  constexpr double bytes_per_bin = 2 * sizeof(double);
   memory.leaves =
       bytes_per_bin * std::min(static_cast<double>(largest_batch) + memory.largest_family,
                                bins_in_all(hypotheses, lattice));

@@ -94,14 +94,13 @@ SearchResult SearchedTouches::search(const SearchGoal& goal, const Deadline& dea
   return arena_.execute([&] { return search_.run(elements_, goal, deadline, visitor, refined); });
 }
 
-std::vector<double> SearchedTouches::log_likelihood(std::span<const BinBox> boxes,
-                                                    Arithmetic arithmetic) const {
+std::vector<double> SearchedTouches::log_likelihood(std::span<const BinBox> boxes) const {
   std::size_t bins = 0;
   for (const BinBox& box : boxes) {
     bins += static_cast<std::size_t>(box.bins());
   }
   std::vector<double> logs(bins);
-  arena_.execute([&] { likelihood_.evaluate(boxes, elements_, arithmetic, logs); });
+  arena_.execute([&] { likelihood_.evaluate(boxes, elements_, logs); });
   return logs;
 }
 

@@ -70,7 +70,7 @@ class SearchedTouches {
   SearchResult search(const SearchGoal& goal, const Deadline& deadline, const BinVisitor& visitor,
                       std::vector<PoseBlock>* refined = nullptr);
   /// Log-likelihood of bins, box after box, [y, x] in each, in nats.
-  std::vector<double> log_likelihood(std::span<const BinBox> boxes, Arithmetic arithmetic) const;
+  std::vector<double> log_likelihood(std::span<const BinBox> boxes) const;
   /// Bounds of the log evidence of "none of these" with its prior weight, as SearchResult::mass has
   /// that of the hypotheses, see NoneEvidence::bounds(). Only where has_none().
   LogInterval bound_none(const NoneEvidence::Enough& enough, const Deadline& deadline);

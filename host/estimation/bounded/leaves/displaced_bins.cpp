@@ -75,7 +75,6 @@ class BlockSums {
 
 }  // namespace
 
-template <typename Lane>
 void BinLikelihood::evaluate_blocks(std::size_t object, std::span<const BlockRun> runs,
                                     const KnownElements& touch,
                                     const PlaceRows<double>& rows) const {
@@ -92,7 +91,7 @@ void BinLikelihood::evaluate_blocks(std::size_t object, std::span<const BlockRun
     bins += static_cast<std::size_t>(part.bins());
   }
   std::vector<double> values(bins);
-  evaluate_alone<Lane>(parts, touch, values.data());
+  evaluate_alone(parts, touch, values.data());
   auto value = values.begin();
   for (const BinBox& part : parts) {
     for (int y = part.y_first; y < part.y_first + part.y_count; ++y) {
@@ -102,7 +101,6 @@ void BinLikelihood::evaluate_blocks(std::size_t object, std::span<const BlockRun
   }
 }
 
-template <typename Lane>
 void BinLikelihood::evaluate_displaced(std::span<const BinBox> boxes, const KnownElements& elements,
                                        std::span<double> log_likelihood,
                                        std::span<double> errors) const {
@@ -120,13 +118,12 @@ void BinLikelihood::evaluate_displaced(std::span<const BinBox> boxes, const Know
     for (const std::size_t i : order) {
       const KnownElements& touch = elements.touches[i];
       const auto source = [&](std::span<const BlockRun> runs, const PlaceRows<double>& rows) {
-        // Few bins are evaluated in float64 more than once.
-        if (sizeof(Lane) == sizeof(double) || touch.exact_bins == nullptr) {
-          evaluate_blocks<Lane>(object, runs, touch, rows);
+        if (touch.exact_bins == nullptr) {
+          evaluate_blocks(object, runs, touch, rows);
           return;
         }
         const std::vector<BlockRun> others = touch.exact_bins->copy(object, runs, rows);
-        evaluate_blocks<Lane>(object, others, touch, rows);
+        evaluate_blocks(object, others, touch, rows);
         touch.exact_bins->keep(object, others, rows);
       };
       sums.add(displaced_->means(touch.sensor_from_pivot_mm, sums.runs(), source));
@@ -138,12 +135,5 @@ void BinLikelihood::evaluate_displaced(std::span<const BinBox> boxes, const Know
     }
   }
 }
-
-template void BinLikelihood::evaluate_displaced<float>(std::span<const BinBox>,
-                                                       const KnownElements&, std::span<double>,
-                                                       std::span<double>) const;
-template void BinLikelihood::evaluate_displaced<double>(std::span<const BinBox>,
-                                                        const KnownElements&, std::span<double>,
-                                                        std::span<double>) const;
 
 }  // namespace palpate

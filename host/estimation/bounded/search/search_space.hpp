@@ -55,6 +55,7 @@ struct SearchTask {
   const BoundedOptions& options;    ///< checked, with a resolved contact model
   const BinLikelihood& likelihood;  ///< evaluates bins
   const KnownElements& elements;
+  std::span<const double> error;  ///< [hypothesis] BinLikelihood::error() of the elements
   const SearchGoal& goal;
   const Deadline& deadline;  ///< after which tiles are dropped unseen
   const BinVisitor& visit;
