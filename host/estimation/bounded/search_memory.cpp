@@ -9,12 +9,12 @@
 
 #include <fmt/format.h>
 
-#include "estimation/bounded/displaced/displacement_weights.hpp"
 #include "estimation/bounded/displaced/exact_bins.hpp"
 #include "estimation/bounded/leaves/bin_kernel.hpp"
 #include "estimation/bounded/search/leaves.hpp"
 #include "estimation/bounded/tables/tile_bounds.hpp"
 #include "estimation/bounded/tables/window_table.hpp"
+#include "estimation/displacement_weights.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {

@@ -56,8 +56,7 @@ BinLikelihood::BinLikelihood(std::span<const Hypothesis> hypotheses, const Conta
                              const PoseLattice& lattice, const DisplacementSd& touch_sd)
     : form_(contact), lattice_(lattice) {
   if (!touch_sd.none()) {
-    displacement_ = std::make_unique<DisplacementWeights>(lattice, touch_sd);
-    displaced_.emplace(*displacement_, 1);
+    displaced_.emplace(DisplacementWeights(lattice, touch_sd), 1);
   }
   for (const Hypothesis& hypothesis : hypotheses) {
     maps_.emplace_back(hypothesis.compared(), *contact.prior, lattice);
@@ -144,9 +143,9 @@ void BinLikelihood::evaluate_exact(std::span<const BinBox> boxes, const KnownEle
 }
 
 void BinLikelihood::evaluate(std::span<const BinBox> boxes, const KnownElements& elements,
-                             std::span<double> log_likelihood, std::span<double> errors) const {
+                             std::span<double> log_likelihood) const {
   if (displaced_) {
-    evaluate_displaced(boxes, elements, log_likelihood, errors);
+    evaluate_displaced(boxes, elements, log_likelihood);
   } else {
     evaluate_exact(boxes, elements, log_likelihood);
   }

@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -58,10 +57,8 @@ class BinLikelihood {
   /// Log-likelihood of the elements at every bin in nats, boxes one after another, [y, x] in each.
   /// On the threads of the caller's TBB arena. Fastest where boxes of one object and theta stand
   /// together.
-  /// @param errors where not empty and touches are displaced, [bin] receives error: the likelihood
-  /// may be wrong by e^error - 1 of itself beside error()
   void evaluate(std::span<const BinBox> boxes, const KnownElements& elements,
-                std::span<double> log_likelihood, std::span<double> errors = {}) const;
+                std::span<double> log_likelihood) const;
   /// Proven bound, in nats, of the error of evaluate() at any bin of an object.
   double error(std::size_t object, const KnownElements& elements) const;
   /// evaluate() and its error() as if all touches were exact.
@@ -84,13 +81,12 @@ class BinLikelihood {
   void evaluate_blocks(std::size_t object, std::span<const BlockRun> runs,
                        const KnownElements& touch, const PlaceRows<double>& rows) const;
   void evaluate_displaced(std::span<const BinBox> boxes, const KnownElements& elements,
-                          std::span<double> log_likelihood, std::span<double> errors) const;
+                          std::span<double> log_likelihood) const;
 
   std::vector<PlacedMap> maps_;  ///< [object]
   ReadingForm form_;
   PoseLattice lattice_;
-  std::unique_ptr<const DisplacementWeights> displacement_;  ///< null where touches are exact
-  std::optional<DisplacementMean> displaced_;                ///< of bins
+  std::optional<DisplacementMean> displaced_;  ///< of bins; nothing where touches are exact
 };
 
 }  // namespace palpate

@@ -22,7 +22,6 @@ constexpr std::int64_t first_displaced = 16384;
 /// Products of bins and elements, where a budget must not be overdrawn by much: a few ms.
 constexpr std::int64_t budgeted_work = 5'000'000;
 constexpr std::size_t leaves_per_task = 16;
-constexpr double infinity = std::numeric_limits<double>::infinity();
 /// See BoundedOptions::poor_bins.
 constexpr double poor_share = 0.75;
 
@@ -70,7 +69,7 @@ void Leaves::probe(std::vector<Tile> tiles) {
 void Leaves::look(std::span<const Tile> tiles) {
   for (const Leaf& leaf : evaluated(boxes_of(tiles))) {
     bins_ += leaf.box.bins();
-    account_.raise_best(leaf.box.object, leaf.least - leaf.error);
+    account_.raise_best(leaf.box.object, leaf.largest - task_.error[leaf.box.object]);
   }
 }
 
@@ -179,52 +178,29 @@ std::vector<Leaves::Leaf> Leaves::evaluated(std::vector<BinBox> boxes) {
     bins += static_cast<std::size_t>(box.bins());
   }
   values_.resize(bins);
-  std::vector<double> errors(displaced_ ? bins : 0);
-  task_.likelihood.evaluate(boxes, task_.elements, values_, errors);
+  task_.likelihood.evaluate(boxes, task_.elements, values_);
   std::vector<Leaf> leaves(boxes.size());
   parallel_for((leaves.size() + leaves_per_task - 1) / leaves_per_task, [&](std::size_t part) {
     const std::size_t last = std::min((part + 1) * leaves_per_task, leaves.size());
     for (std::size_t i = part * leaves_per_task; i < last; ++i) {
       const auto count = static_cast<std::size_t>(boxes[i].bins());
-      leaves[i] = {.box = boxes[i], .values = std::span(values_).subspan(first[i], count)};
-      add_up(leaves[i],
-             displaced_ ? std::span(errors).subspan(first[i], count) : std::span<double>());
+      const auto values = std::span(values_).subspan(first[i], count);
+      const double largest = std::ranges::max(values);
+      double sum = 0.0;
+      for (const double nats : values) {
+        sum += std::exp(nats - largest);
+      }
+      leaves[i] = {boxes[i], values, largest + std::log(sum), largest};
     }
   });
   return leaves;
-}
-
-void Leaves::add_up(Leaf& leaf, std::span<const double> errors) const {
-  // An error of half a nat may be that of a likelihood of 0.
-  constexpr double most_error = 0.45;
-  leaf.largest = std::ranges::max(leaf.values);
-  double sum = 0.0;
-  for (const double nats : leaf.values) {
-    sum += std::exp(nats - leaf.largest);
-  }
-  leaf.log_mass = leaf.largest + std::log(sum);
-  leaf.least = leaf.largest;
-  leaf.error = task_.error[leaf.box.object];
-  double wrong = 0.0;
-  double of_best = 0.0;
-  for (std::size_t i = 0; i < errors.size(); ++i) {
-    const double below = leaf.values[i] - leaf.largest;
-    // Large errors are those of very small likelihoods.
-    wrong +=
-        errors[i] < 1.0 ? std::exp(below) * std::expm1(errors[i]) : std::exp(below + errors[i]);
-    of_best = below == 0.0 ? std::max(of_best, errors[i]) : of_best;
-  }
-  if (wrong > 0.0) {
-    leaf.error += std::log1p(wrong / sum);
-    leaf.least = of_best < most_error ? leaf.largest - 2.0 * of_best : -infinity;
-  }
 }
 
 void Leaves::add(std::vector<BinBox> boxes) {
   for (const Leaf& leaf : evaluated(std::move(boxes))) {
     const BinBox& box = leaf.box;
     bins_ += box.bins();
-    account_.settle(box.object, box.bins(), leaf.log_mass, leaf.least, leaf.error);
+    account_.settle(box.object, box.bins(), leaf.log_mass, leaf.largest, task_.error[box.object]);
     account_.note_best(box, std::ranges::max_element(leaf.values) - leaf.values.begin(),
                        leaf.largest);
     task_.visit(box, leaf.values);

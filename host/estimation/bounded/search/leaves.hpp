@@ -51,8 +51,6 @@ class Leaves {
     std::span<const double> values;  ///< until others are evaluated
     double log_mass = 0.0;           ///< without the prior weight
     double largest = 0.0;
-    double error = 0.0;  ///< of the mass
-    double least = 0.0;  ///< lower bound of the largest, but for that error
   };
 
   BinBox box_of(const Tile& tile) const {
@@ -71,8 +69,6 @@ class Leaves {
   /// Evaluates the bins of boxes.
   /// @returns the leaves, sorted by place, with the sums of their bins
   std::vector<Leaf> evaluated(std::vector<BinBox> boxes);
-  /// @param errors of the values, see BinLikelihood::evaluate(); empty where touches are exact
-  void add_up(Leaf& leaf, std::span<const double> errors) const;
   /// Evaluates the bins of boxes and settles them.
   void add(std::vector<BinBox> boxes);
 
