@@ -89,7 +89,7 @@ class BoundedBelief {
     return later.result.unproven() < earlier.result.unproven();
   }
   /// Whether the bounds of "none of these" are as close as the options ask for.
-  bool tells_enough(const LogInterval& none) const;
+  bool close_enough(const LogInterval& none) const;
 
   SearchedTouches touches_;
   std::optional<Found> found_;  ///< nothing before a search

@@ -55,7 +55,7 @@ double CountedBoxes::log_sum(const BinLikelihood& likelihood, const KnownElement
     bins += box.bins();
   }
   std::vector<double> values(static_cast<std::size_t>(bins));
-  likelihood.evaluate_exact(boxes_, elements, values);
+  likelihood.evaluate_undisplaced(boxes_, elements, values);
   LogSum sum;
   auto value = values.cbegin();
   auto row = rows_.cbegin();

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <utility>
 
-#include "estimation/bounded/search/largest_tiles.hpp"
+#include "estimation/bounded/search/item_bounds.hpp"
 #include "estimation/log_sum.hpp"
 
 namespace palpate {
@@ -98,7 +98,7 @@ PlaneSurvey PlaneDivision::survey(int theta, LargestSums& sums) {
   if (!plane.all_seen) {
     const BinBox seen =
         plane.largest.x_first < plane.largest.x_end ? box_of(0, plane, plane.largest) : BinBox{};
-    found.unseen = plane.counted.outside(seen);
+    found.off_map = plane.counted.outside(seen);
   }
   sums = largest_sums(plane);
   if (!sums.empty()) {

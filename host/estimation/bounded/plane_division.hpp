@@ -30,7 +30,7 @@ struct PlaneSurvey {
   static constexpr double nothing = -std::numeric_limits<double>::infinity();
 
   std::int64_t bins = 0;      ///< that count
-  std::int64_t unseen = 0;    ///< of these, bins at which every element sees the prior
+  std::int64_t off_map = 0;   ///< of these, bins at which every element sees the prior
   double best = nothing;      ///< the largest bound, in nats, with the prior weight
   double left_out = nothing;  ///< log of what the tiles that see the map hold at most, with it
 };

@@ -9,7 +9,7 @@
 
 #include <fmt/format.h>
 
-#include "estimation/bounded/displaced/exact_bins.hpp"
+#include "estimation/bounded/displaced/undisplaced_bins.hpp"
 #include "estimation/bounded/leaves/bin_kernel.hpp"
 #include "estimation/bounded/search/leaves.hpp"
 #include "estimation/bounded/tables/tile_bounds.hpp"
@@ -120,7 +120,7 @@ SearchMemory search_memory(std::span<const Hypothesis> hypotheses, const Bounded
   if (!options.touch_sd.none()) {
     // Every plane's mean, and its neighbours' sums; and of all bins, what is kept of them.
     memory.means = 2.0 * sizeof(double) * bins_in_all(hypotheses.first(1), lattice) +
-                   static_cast<double>(ExactBins::most_bytes);
+                   static_cast<double>(UndisplacedBins::most_bytes);
   }
   return memory;
 }

@@ -17,7 +17,7 @@ struct Account {
   MassAccount account{log_weight, label_of, lattice, goal};
 };
 
-TEST(MassAccount, CountsTheRoundingOfSumsOfExactBins) {
+TEST(MassAccount, CountsTheRoundingOfSumsOfUndisplacedBins) {
   for (const std::int64_t bins : {std::int64_t{1}, std::int64_t{1'000'000}}) {
     Account of;
     of.account.settle(0, bins, -300.0, -310.0, 0.0);

@@ -1,7 +1,7 @@
 // Tiles in which every element sees the prior: none may be taken for one, and their bins have the
 // likelihood of the prior.
 
-#include "estimation/bounded/search/largest_tiles.hpp"
+#include "estimation/bounded/search/item_bounds.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -54,7 +54,7 @@ BinCase random_far_case(Uniform& random) {
 }
 
 BoundingBox reach_of(const KnownElements& elements, const glm::dvec2& turn) {
-  return reaches_of(elements, std::span(&turn, 1)).front();
+  return undisplaced_reaches(elements, std::span(&turn, 1)).front();
 }
 
 TEST(SeenTiles, LeavesOutNoTileInWhichAnElementSeesTheMap) {

@@ -114,8 +114,9 @@ void BinLikelihood::evaluate_alone(std::span<const BinBox> boxes, const KnownEle
   evaluate_list();
 }
 
-void BinLikelihood::evaluate_exact(std::span<const BinBox> boxes, const KnownElements& elements,
-                                   std::span<double> log_likelihood) const {
+void BinLikelihood::evaluate_undisplaced(std::span<const BinBox> boxes,
+                                         const KnownElements& elements,
+                                         std::span<double> log_likelihood) const {
   std::vector<BinBox> parts;               // large boxes are cut between rows
   std::vector<std::size_t> first_bin{0};   // [part]
   std::vector<std::size_t> first_part{0};  // [task]
@@ -147,7 +148,7 @@ void BinLikelihood::evaluate(std::span<const BinBox> boxes, const KnownElements&
   if (displaced_) {
     evaluate_displaced(boxes, elements, log_likelihood);
   } else {
-    evaluate_exact(boxes, elements, log_likelihood);
+    evaluate_undisplaced(boxes, elements, log_likelihood);
   }
 }
 

@@ -43,8 +43,8 @@ struct PlacedMap {
 /// Evaluates the log-likelihood (Eq. 7, 13) of bins on the host, by vector instructions chosen at
 /// run time. A bin has the same bits with every set of instructions, on every number of threads and
 /// in every box. Calls from several threads may run at once, but for those about the same touches
-/// with KnownElements::exact_bins. Displaced touches have their mean likelihoods: all bins within
-/// reach of a bin are evaluated, too, and boxes that lie together share them.
+/// with KnownElements::undisplaced_bins. Displaced touches have their mean likelihoods: all bins
+/// within reach of a bin are evaluated, too, and boxes that lie together share them.
 class BinLikelihood {
  public:
   /// @param contact resolved: with its prior
@@ -62,9 +62,9 @@ class BinLikelihood {
   /// Proven bound, in nats, of the error of evaluate() at any bin of an object.
   double error(std::size_t object, const KnownElements& elements) const;
   /// evaluate() and its error() as if all touches were exact.
-  void evaluate_exact(std::span<const BinBox> boxes, const KnownElements& elements,
-                      std::span<double> log_likelihood) const;
-  double exact_error(std::size_t object, const KnownElements& elements) const;
+  void evaluate_undisplaced(std::span<const BinBox> boxes, const KnownElements& elements,
+                            std::span<double> log_likelihood) const;
+  double undisplaced_error(std::size_t object, const KnownElements& elements) const;
 
   /// Whether touches are displaced.
   bool displaced() const { return displaced_.has_value(); }

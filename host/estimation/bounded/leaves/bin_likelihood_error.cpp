@@ -67,7 +67,7 @@ PlacedMap::PlacedMap(const OccupancyGrid& map, double prior, const PoseLattice& 
   range = most - least;
 }
 
-double BinLikelihood::exact_error(std::size_t object, const KnownElements& elements) const {
+double BinLikelihood::undisplaced_error(std::size_t object, const KnownElements& elements) const {
   const PlacedMap& map = maps_[object];
   const auto count = static_cast<double>(elements.from_pivot_mm.size());
 
@@ -108,7 +108,7 @@ double BinLikelihood::exact_error(std::size_t object, const KnownElements& eleme
 double BinLikelihood::error(std::size_t object, const KnownElements& elements) const {
   const double of_means =
       displaced_ ? static_cast<double>(elements.touches.size()) * displaced_->mean_error() : 0.0;
-  return of_means + exact_error(object, elements);
+  return of_means + undisplaced_error(object, elements);
 }
 
 }  // namespace palpate

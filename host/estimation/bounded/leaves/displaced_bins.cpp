@@ -2,7 +2,7 @@
 #include <functional>
 #include <tuple>
 
-#include "estimation/bounded/displaced/exact_bins.hpp"
+#include "estimation/bounded/displaced/undisplaced_bins.hpp"
 #include "estimation/bounded/leaves/bin_likelihood.hpp"
 
 // Bins of displaced touches: the logs of each touch's mean likelihood, added up.
@@ -96,7 +96,8 @@ void BinLikelihood::evaluate_blocks(std::size_t object, std::span<const BlockRun
 void BinLikelihood::evaluate_displaced(std::span<const BinBox> boxes, const KnownElements& elements,
                                        std::span<double> log_likelihood) const {
   // The order in which touches came must show in no bit.
-  const std::vector<std::size_t> order = sorted_touches(elements.touches);
+  const std::span<const KnownElements> items = elements.items();
+  const std::vector<std::size_t> order = sorted_touches(items);
   double* to = log_likelihood.data();
   for (std::size_t first = 0, end = 0; first < boxes.size(); first = end) {
     while (end < boxes.size() && boxes[end].object == boxes[first].object) {
@@ -106,15 +107,15 @@ void BinLikelihood::evaluate_displaced(std::span<const BinBox> boxes, const Know
     const auto object = static_cast<std::size_t>(boxes[first].object);
     BlockSums sums(of_object);
     for (const std::size_t i : order) {
-      const KnownElements& touch = elements.touches[i];
+      const KnownElements& touch = items[i];
       const auto source = [&](std::span<const BlockRun> runs, const PlaceRows<double>& rows) {
-        if (touch.exact_bins == nullptr) {
+        if (touch.undisplaced_bins == nullptr) {
           evaluate_blocks(object, runs, touch, rows);
           return;
         }
-        const std::vector<BlockRun> others = touch.exact_bins->copy(object, runs, rows);
+        const std::vector<BlockRun> others = touch.undisplaced_bins->copy(object, runs, rows);
         evaluate_blocks(object, others, touch, rows);
-        touch.exact_bins->keep(object, others, rows);
+        touch.undisplaced_bins->keep(object, others, rows);
       };
       sums.add(displaced_->means(touch.sensor_from_pivot_mm, sums.runs(), source));
     }

@@ -41,7 +41,7 @@ class SearchRun {
         leaves_(task, account_) {}
 
   SearchResult result() {
-    settle_unseen();
+    settle_off_map();
     const std::vector<Tile> best = division_.best_of_largest();
     if (!best.empty()) {
       raise(best, 0);
@@ -63,15 +63,15 @@ class SearchRun {
 
  private:
   /// Settles the bins of all largest tiles in which every element sees the prior.
-  void settle_unseen() {
-    for (const BinBox& box : division_.unseen()) {
-      settle_unseen(box);
+  void settle_off_map() {
+    for (const BinBox& box : division_.off_map()) {
+      settle_off_map(box);
     }
     account_.raise_totals();
   }
 
   /// Settles bins at which every element sees the prior.
-  void settle_unseen(const BinBox& box) {
+  void settle_off_map(const BinBox& box) {
     const std::int64_t bins = box.bins();
     const auto object = static_cast<std::size_t>(box.object);
     const double value = division_.prior_log_likelihood(box.object);
@@ -179,11 +179,11 @@ class SearchRun {
       }
     }
     std::ranges::sort(tiles, stands_before);
-    std::vector<Tile> unseen;
+    std::vector<Tile> off_map;
     division_.set_negligible(std::max(negligible(), droppable(tiles, level, tolerance)));
-    std::vector<Tile> parts = division_.parts_of(tiles, level, &unseen);
-    for (const Tile& tile : unseen) {
-      settle_unseen(space_.bounds[tile.object].levels()[level + 1].box_of(tile));
+    std::vector<Tile> parts = division_.parts_of(tiles, level, &off_map);
+    for (const Tile& tile : off_map) {
+      settle_off_map(space_.bounds[tile.object].levels()[level + 1].box_of(tile));
     }
     const double dropped = account_.dropped_share();
     double used = 0.0;
