@@ -30,7 +30,7 @@ void set_two_floats(double value, float& high, float& low) {
 /// A distance along an axis in whole bins and the rest. An axis of one bin keeps its place.
 void set_shift(double distance_mm, const Axis& axis, float& whole, float& fraction,
                float& fraction_low) {
-  // So far is what is no number: the difference of places beyond float64.
+  // What is no number, the difference of places beyond float64, lies as far.
   const double bins = axis.count == 1 ? 0.0
                       : std::isnan(distance_mm)
                           ? farthest

@@ -192,9 +192,10 @@ BlurredPlane<Domain> blurred_plane(int theta, const BlockRange& range,
   for (const BlockRange& blocks : asked) {
     wanted.add(blocks);
   }
-  const BlockSet along_x = wanted.widened(blur_x.reach, 0, blur_x.blocks(), blur_y.blocks());
+  const BlockSet along_x =
+      wanted.with_neighbours(blur_x.reach, 0, blur_x.blocks(), blur_y.blocks());
   const std::vector<BlockRun> sources =
-      along_x.widened(0, blur_y.reach, blur_x.blocks(), blur_y.blocks()).runs(theta);
+      along_x.with_neighbours(0, blur_y.reach, blur_x.blocks(), blur_y.blocks()).runs(theta);
 
   BlurredPlane<Domain> plane{.pitch = BlockRun::side * (window.x_end - window.x_first),
                              .x = BlockRun::side * window.x_first,

@@ -66,8 +66,6 @@ class BinLikelihood {
                             std::span<double> log_likelihood) const;
   double undisplaced_error(std::size_t object, const KnownElements& elements) const;
 
-  /// Whether touches are displaced.
-  bool displaced() const { return displaced_.has_value(); }
   /// Host memory that the maps' nodes and the table hold.
   std::uint64_t bytes() const;
   /// The vector instructions in use, such as "AVX3".

@@ -44,7 +44,7 @@ UnsettledMass unsettled(std::span<const Tile> tiles, std::size_t level, const Se
 Leaves::Leaves(const SearchTask& task, MassAccount& account)
     : task_(task),
       account_(account),
-      displaced_(task.likelihood.displaced()),
+      displaced_(task.space.displacement.has_value()),
       poor_below_(poor_share * prior_log_likelihood(task.elements, task.options.contact)) {}
 
 std::vector<BinBox> Leaves::boxes_of(std::span<const Tile> tiles) const {

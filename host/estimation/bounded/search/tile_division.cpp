@@ -14,9 +14,6 @@ namespace palpate {
 
 namespace {
 
-/// Tiles of one theta that a task divides.
-constexpr std::size_t tiles_per_task = 64;
-
 std::vector<Tile> joined(const std::vector<std::vector<Tile>>& lists) {
   std::vector<Tile> all;
   std::size_t count = 0;
@@ -180,38 +177,20 @@ std::vector<Tile> TileDivision::best_smallest(std::vector<Tile> tiles, std::size
 std::vector<Tile> TileDivision::parts_of(std::span<const Tile> tiles, std::size_t level,
                                          std::vector<Tile>* off_map) {
   const std::vector<std::int64_t> sums = sums_of_parts(tiles, level + 1);
-  std::vector<std::size_t> begins;  // of tasks: tiles of one object and theta
+  std::vector<Tile> parts;
+  parts.reserve(sums.size());
+  TileRange seen;
   for (std::size_t i = 0; i < tiles.size(); ++i) {
-    if (i == 0 || tiles[i].object != tiles[i - 1].object || tiles[i].theta != tiles[i - 1].theta ||
-        i - begins.back() == tiles_per_task) {
-      begins.push_back(i);
+    const Tile& tile = tiles[i];
+    if (i == 0 || tile.object != tiles[i - 1].object || tile.theta != tiles[i - 1].theta) {
+      seen = seen_tiles(reaches_[tile.theta], space_.maps[tile.object],
+                        space_.bounds[tile.object].levels()[level + 1]);
     }
+    append_parts(tile, level + 1, std::span(sums).subspan(i * batch_tiles, batch_tiles), seen,
+                 parts, off_map);
   }
-  std::vector<std::vector<Tile>> parts(begins.size());
-  std::vector<std::vector<Tile>> rest(begins.size());
-  parallel_for(begins.size(), [&](std::size_t task) {
-    const std::size_t end = task + 1 < begins.size() ? begins[task + 1] : tiles.size();
-    const Tile& first = tiles[begins[task]];
-    const TileRange seen = seen_tiles(reaches_[first.theta], space_.maps[first.object],
-                                      space_.bounds[first.object].levels()[level + 1]);
-    parts[task].reserve((end - begins[task]) * batch_tiles);
-    for (std::size_t i = begins[task]; i < end; ++i) {
-      append_parts(tiles[i], level + 1, std::span(sums).subspan(i * batch_tiles, batch_tiles),
-                   parts[task]);
-    }
-    const auto begin_off_map = std::stable_partition(
-        parts[task].begin(), parts[task].end(), [&](const Tile& tile) { return seen.holds(tile); });
-    if (off_map != nullptr) {
-      rest[task].assign(begin_off_map, parts[task].end());
-    }
-    parts[task].erase(begin_off_map, parts[task].end());
-  });
-  if (off_map != nullptr) {
-    *off_map = joined(rest);
-  }
-  std::vector<Tile> all = joined(parts);
-  bounded_ += static_cast<std::int64_t>(all.size());
-  return all;
+  bounded_ += static_cast<std::int64_t>(parts.size());
+  return parts;
 }
 
 std::vector<std::int64_t> TileDivision::sums_of_parts(std::span<const Tile> tiles,
@@ -268,8 +247,8 @@ void TileDivision::add_items(std::span<const Tile> tiles, std::size_t level,
 }
 
 void TileDivision::append_parts(const Tile& of, std::size_t level,
-                                std::span<const std::int64_t> sums,
-                                std::vector<Tile>& parts) const {
+                                std::span<const std::int64_t> sums, const TileRange& seen,
+                                std::vector<Tile>& parts, std::vector<Tile>* off_map) const {
   const TileLevel& tiling = space_.bounds[of.object].levels()[level];
   const double unpenalised = unpenalised_[of.object][level];
   for (int j = 0; j < batch_side; ++j) {
@@ -278,8 +257,13 @@ void TileDivision::append_parts(const Tile& of, std::size_t level,
       const auto penalties = static_cast<double>(sums[batch_side * i + j]);
       const Tile part{unpenalised - penalties / penalties_per_nat, of.object, of.theta,
                       batch_side * of.x + i, y};
-      if (tiling.x.bins(part.x) > 0) {
+      if (tiling.x.bins(part.x) == 0) {
+        continue;
+      }
+      if (seen.holds(part)) {
         parts.push_back(part);
+      } else if (off_map != nullptr) {
+        off_map->push_back(part);
       }
     }
   }

@@ -79,8 +79,10 @@ class TileDivision {
                  std::span<std::int64_t> sums) const;
   /// Appends those parts of a tile, which are tiles of this level, that hold bins.
   /// @param sums of their penalties, [x, y]
+  /// @param seen the tiles that see the map; where not null, off_map takes the others
   void append_parts(const Tile& of, std::size_t level, std::span<const std::int64_t> sums,
-                    std::vector<Tile>& parts) const;
+                    const TileRange& seen, std::vector<Tile>& parts,
+                    std::vector<Tile>* off_map) const;
 
   const SearchTask& task_;
   const SearchSpace& space_;
