@@ -13,7 +13,7 @@
 
 namespace palpate {
 
-class ExactBins;
+class UndisplacedBins;
 
 /// Elements of one reading: [begin, end) of a list.
 struct ReadingRun {
@@ -30,12 +30,18 @@ struct KnownElements {
   std::vector<glm::dvec2> from_pivot_mm;
   std::vector<ReadingRun> runs;  ///< ascending by reading
 
+  /// What is bounded and evaluated by itself: all of these elements together, or each displaced
+  /// touch.
+  std::span<const KnownElements> items() const {
+    return touches.empty() ? std::span(this, 1) : std::span<const KnownElements>(touches);
+  }
+
   // Displaced touches, whose sensors may have stood elsewhere (touch_sd), are averaged each by
   // itself: their elements do not multiply with those of others.
   std::vector<KnownElements> touches = {};  ///< each by itself; empty where all are exact
   glm::dvec2 sensor_from_pivot_mm = {};     ///< of one touch: the sensor's origin
   /// Where set, keeps what was evaluated of this one touch. Copies share it.
-  std::shared_ptr<ExactBins> exact_bins = {};
+  std::shared_ptr<UndisplacedBins> undisplaced_bins = {};
 };
 
 /// The elements that are not Unknown.

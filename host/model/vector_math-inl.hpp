@@ -1,5 +1,5 @@
-// Functions of Highway's vectors, for files that are compiled once for every set of instructions.
-// All of them work lane by lane and fuse nothing: every set gives the same bits.
+// Functions of Highway's vectors of float64, for files that are compiled once for every set of
+// instructions. All of them work lane by lane and fuse nothing: every set gives the same bits.
 
 #if defined(PALPATE_VECTOR_MATH_INL) == defined(HWY_TARGET_TOGGLE)
 #ifdef PALPATE_VECTOR_MATH_INL
@@ -19,26 +19,7 @@ namespace HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-template <typename Lane>
-struct VectorMath;
-
-template <>
-struct VectorMath<float> {
-  static constexpr int mantissa_bits = 23;
-  static constexpr std::uint32_t mantissa_mask = 0x007FFFFF;
-  static constexpr std::uint32_t one_bits = 0x3F800000;
-  static constexpr float log2_e = 1.44269504F;
-  static constexpr float whole = 0x1p23F;
-  static constexpr float rounder = 0x1.8p23F;
-  static constexpr float least_exponent = -125.0F;
-  /// (2^f - 1) / f over [-1/2, 1/2]; 2^f is within 4.4e-7 of itself.
-  static constexpr float exp2_terms[] = {0.693142831325531F, 0.24022351205348969F,
-                                         0.05557400360703468F, 0.009666282683610916F,
-                                         0.001112550962716341F};
-};
-
-template <>
-struct VectorMath<double> {
+struct VectorMath {
   static constexpr int mantissa_bits = 52;
   static constexpr std::uint64_t mantissa_mask = 0x000FFFFFFFFFFFFF;
   static constexpr std::uint64_t one_bits = 0x3FF0000000000000;
@@ -47,7 +28,8 @@ struct VectorMath<double> {
   static constexpr double whole = 0x1p52;
   static constexpr double rounder = 0x1.8p52;
   static constexpr double least_exponent = -1021.0;
-  /// As above; 2^f is within 7.8e-14 of itself: the positions' rounding to a grid counts for more.
+  /// (2^f - 1) / f over [-1/2, 1/2]; 2^f is within 7.8e-14 of itself: the positions' rounding to a
+  /// grid counts for more.
   static constexpr double exp2_terms[] = {
       0.6931471805585505,     0.24022650695813708,    0.055504108739712246,
       0.009618129159172244,   0.0013333547331461978,  0.0001540345603665657,
@@ -57,28 +39,16 @@ struct VectorMath<double> {
 /// The integers that lanes hold, which are at least 0 and below 2^52.
 template <class D>
 HWY_INLINE hn::Vec<hn::RebindToSigned<D>> whole_number(D d, hn::Vec<D> v) {
-  using Math = VectorMath<hn::TFromD<D>>;
   const hn::RebindToSigned<D> di;
   // Below the leading bit of 2^52 stands the integer.
-  const auto bits = hn::BitCast(di, hn::Add(v, hn::Set(d, Math::whole)));
-  return hn::And(bits, hn::Set(di, static_cast<hn::TFromD<decltype(di)>>(Math::mantissa_mask)));
+  const auto bits = hn::BitCast(di, hn::Add(v, hn::Set(d, VectorMath::whole)));
+  return hn::And(bits, hn::Set(di, static_cast<std::int64_t>(VectorMath::mantissa_mask)));
 }
 
-/// The integers below 2^23 that lanes hold, in 32 bits.
-template <class D>
-HWY_INLINE auto small_integer(D d, hn::Vec<D> v) {
-  if constexpr (sizeof(hn::TFromD<D>) == 4) {
-    return whole_number(d, v);
-  } else {
-    const hn::Rebind<float, D> df;
-    return whole_number(df, hn::DemoteTo(df, v));
-  }
-}
-
-/// exp(-v) for v >= 0, by powers of two and a polynomial; at least about 2^-125 or 2^-1021.
+/// exp(-v) for v >= 0, by powers of two and a polynomial; at least about 2^-1021.
 template <class D>
 HWY_INLINE hn::Vec<D> exp_of_minus(D d, hn::Vec<D> v) {
-  using Math = VectorMath<hn::TFromD<D>>;
+  using Math = VectorMath;
   const hn::RebindToUnsigned<D> du;
   const auto exponent =
       hn::Max(hn::Mul(v, hn::Set(d, -Math::log2_e)), hn::Set(d, Math::least_exponent));
@@ -90,7 +60,7 @@ HWY_INLINE hn::Vec<D> exp_of_minus(D d, hn::Vec<D> v) {
   for (int k = terms - 2; k >= 0; --k) {
     p = hn::Add(hn::Mul(p, f), hn::Set(d, Math::exp2_terms[k]));
   }
-  p = hn::Add(hn::Mul(p, f), hn::Set(d, hn::TFromD<D>{1}));
+  p = hn::Add(hn::Mul(p, f), hn::Set(d, 1.0));
   const auto power = hn::ShiftLeft<Math::mantissa_bits>(hn::BitCast(du, rounded));
   return hn::BitCast(d, hn::Add(hn::BitCast(du, p), power));
 }
@@ -100,7 +70,7 @@ HWY_INLINE hn::Vec<D> exp_of_minus(D d, hn::Vec<D> v) {
 template <class D>
 HWY_INLINE hn::Vec<D> log_near_one(D d, hn::Vec<D> v) {
   const auto one = hn::Set(d, 1.0);
-  const auto ln2 = hn::Set(d, VectorMath<double>::ln2);
+  const auto ln2 = hn::Set(d, VectorMath::ln2);
   const auto large = hn::Gt(v, hn::Set(d, 1.4142135623730951));
   const auto small = hn::Lt(v, hn::Set(d, 0.7071067811865476));
   v = hn::IfThenElse(large, hn::Mul(v, hn::Set(d, 0.5)), v);

@@ -80,8 +80,8 @@ std::vector<double> blurred_planes(const std::vector<double>& logs, const PoseLa
 }
 
 /// The sum over angles. `moved` says how far from t the value for theta and theta + alpha comes
-/// from: a distance, because the rounding of a place would let a neighbour in with a weight of
-/// 1e-16, which counts where likelihoods lie far apart.
+/// from, in bins: a distance, because the rounding of a place would let a neighbour in with a
+/// weight of 1e-16, which counts where likelihoods lie far apart.
 std::vector<double> summed_turns(
     const std::vector<double>& logs, const PoseLattice& lattice, double sd_rad,
     const std::function<glm::dvec2(double theta, double alpha, const glm::dvec2& t)>& moved) {
@@ -103,8 +103,8 @@ std::vector<double> summed_turns(
           const int from = ((t + k) % angle.count + angle.count) % angle.count;
           const glm::dvec2 distance =
               moved(centre_of(angle, t), k * step_of(angle), {centre_of(x, i), centre_of(y, j)});
-          const double u = x.count == 1 ? 0.0 : i + distance.x / step_of(x);
-          const double v = y.count == 1 ? 0.0 : j + distance.y / step_of(y);
+          const double u = x.count == 1 ? 0.0 : i + distance.x;
+          const double v = y.count == 1 ? 0.0 : j + distance.y;
           for (const double column : {std::floor(u), std::floor(u) + 1.0}) {
             for (const double row : {std::floor(v), std::floor(v) + 1.0}) {
               if (column >= 0.0 && column < x.count && row >= 0.0 && row < y.count) {
@@ -123,6 +123,11 @@ std::vector<double> summed_turns(
     }
   }
   return out;
+}
+
+/// A distance in bins.
+glm::dvec2 in_bins(const glm::dvec2& mm, const PoseLattice& lattice) {
+  return mm / glm::dvec2(step_of(lattice.x_mm), step_of(lattice.y_mm));
 }
 
 glm::dvec2 turned(double theta_rad, const glm::dvec2& v) {
@@ -157,10 +162,14 @@ std::vector<double> displaced_touch(const std::vector<double>& log_likelihood,
                                     const PoseLattice& lattice, const DisplacementSd& sd,
                                     const Pose& T_robot_sensor) {
   const glm::dvec2 r = T_robot_sensor.translation_mm - lattice.pivot_mm;
-  return summed_turns(blurred_planes(log_likelihood, lattice, sd.mm), lattice, sd.rad,
-                      [&](double theta, double alpha, const glm::dvec2&) {
-                        return turned(theta, r) - turned(theta + alpha, r);
-                      });
+  return summed_turns(
+      blurred_planes(log_likelihood, lattice, sd.mm), lattice, sd.rad,
+      [&](double theta, double alpha, const glm::dvec2&) {
+        // Places are rounded by definition.
+        constexpr double parts = 1 << 20;
+        const glm::dvec2 bins = in_bins(turned(theta, r) - turned(theta + alpha, r), lattice);
+        return glm::dvec2(std::round(bins.x * parts), std::round(bins.y * parts)) / parts;
+      });
 }
 
 std::vector<double> slipped(const std::vector<double>& log_belief, const PoseLattice& lattice,
@@ -168,7 +177,7 @@ std::vector<double> slipped(const std::vector<double>& log_belief, const PoseLat
   std::vector<double> moved =
       summed_turns(blurred_planes(log_belief, lattice, sd.mm), lattice, sd.rad,
                    [&](double, double alpha, const glm::dvec2& t) {
-                     return turned(alpha, t - centroid_mm) - (t - centroid_mm);
+                     return in_bins(turned(alpha, t - centroid_mm) - (t - centroid_mm), lattice);
                    });
   const double lost = log_sum(log_belief) - log_sum(moved);
   for (double& l : moved) {

@@ -146,8 +146,8 @@ std::vector<double> log_likelihoods(std::span<const Touch> touches, const PoseLa
 /// R(theta + alpha)) r): one touch's log-likelihoods f, [theta, y, x], averaged over where the
 /// sensor may have been. r is the sensor's origin relative to the pivot, in the robot frame. The
 /// angles alpha are steps of theta, wrapped where theta covers the circle and left out where it
-/// ends; a place between bins takes its four neighbours bilinearly, as far as they lie inside; the
-/// sum is divided by that of all weights used.
+/// ends; a place between bins, rounded to 2^-20 of a bin, takes its four neighbours bilinearly, as
+/// far as they lie inside; the sum is divided by that of all weights used.
 std::vector<double> displaced_touch(const std::vector<double>& log_likelihood,
                                     const PoseLattice& lattice, const DisplacementSd& sd,
                                     const Pose& T_robot_sensor);

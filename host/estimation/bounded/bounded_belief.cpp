@@ -16,7 +16,7 @@ namespace palpate {
 namespace {
 
 /// Tolerance that a search with a budget reaches before it goes on.
-constexpr double soon = 1e-2;
+constexpr double first_tolerance = 1e-2;
 /// How closely the log odds of "none of these" are known, in nats, unless this or the tolerance is
 /// more than it, or the hypotheses, may have.
 constexpr double none_nats = 0.3;
@@ -105,7 +105,7 @@ void BoundedBelief::take_in() {
 SearchGoal BoundedBelief::goal(double tolerance) const {
   SearchGoal goal{tolerance, options().evidence_nats, options().evidence_range_nats};
   goal.poor_bins = options().poor_bins;
-  const std::size_t touches = touches_.telling();
+  const std::size_t touches = touches_.informative();
   if (goal.evidence_nats && touches > 1) {
     const double grown = 1.0 + options().evidence_growth * static_cast<double>(touches - 1);
     *goal.evidence_nats *= grown;
@@ -127,7 +127,7 @@ const SearchResult& BoundedBelief::found(std::optional<double> asked) {
   }
   if (touches_.has_none() && !found_->none) {
     found_->none =
-        touches_.bound_none([&](const LogInterval& none) { return tells_enough(none); }, deadline);
+        touches_.bound_none([&](const LogInterval& none) { return close_enough(none); }, deadline);
   }
   return found_->result;
 }
@@ -142,7 +142,7 @@ BoundedBelief::Found BoundedBelief::search(double tolerance) {
   SearchGoal first = goal(tolerance);
   if (deadline.exists()) {
     // What is proven soon comes first: a search that is cut short proves little.
-    first.tolerance = std::max(first.tolerance, soon);
+    first.tolerance = std::max(first.tolerance, first_tolerance);
   }
   Found best = search(first, deadline);
   if (first.tolerance > tolerance && !deadline.passed()) {
@@ -206,7 +206,7 @@ std::vector<PoseBlock> BoundedBelief::refined_blocks() {
   return blocks;
 }
 
-bool BoundedBelief::tells_enough(const LogInterval& none) const {
+bool BoundedBelief::close_enough(const LogInterval& none) const {
   const SearchGoal asked = goal(tolerance());
   const double range = asked.evidence_nats ? asked.evidence_range_nats
                                            : -std::log(std::max(asked.tolerance, negligible));
@@ -231,7 +231,7 @@ double BoundedBelief::none_estimate() const {
   // Without a budget, a search of the hypotheses ends early where all fits are poor, which tells of
   // "none of these".
   const bool told =
-      !options().budget_s || (tells_enough(none) && objects.high - objects.low <= untold_nats);
+      !options().budget_s || (close_enough(none) && objects.high - objects.low <= untold_nats);
   if (told || !std::isfinite(all.evaluated)) {
     return std::isfinite(none.low) ? std::midpoint(none.low, none.high) : none.high;
   }

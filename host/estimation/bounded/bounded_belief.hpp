@@ -32,8 +32,8 @@ class BoundedBelief {
 
   const SearchedTouches& touches() const { return touches_; }
   /// See SearchedTouches.
-  std::vector<double> log_likelihood(std::span<const BinBox> boxes, Arithmetic arithmetic) const {
-    return touches_.log_likelihood(boxes, arithmetic);
+  std::vector<double> log_likelihood(std::span<const BinBox> boxes) const {
+    return touches_.log_likelihood(boxes);
   }
   std::uint64_t bytes() const { return touches_.bytes() + (found_ ? found_->bins.bytes() : 0); }
 
@@ -89,7 +89,7 @@ class BoundedBelief {
     return later.result.unproven() < earlier.result.unproven();
   }
   /// Whether the bounds of "none of these" are as close as the options ask for.
-  bool tells_enough(const LogInterval& none) const;
+  bool close_enough(const LogInterval& none) const;
 
   SearchedTouches touches_;
   std::optional<Found> found_;  ///< nothing before a search

@@ -50,7 +50,7 @@ BoundedPosterior::Impl& BoundedPosterior::impl() const {
   return held_here(impl_, "bounded posterior");
 }
 
-BoundedPosterior::Impl& BoundedPosterior::whole() const {
+BoundedPosterior::Impl& BoundedPosterior::with_touches_taken_in() const {
   Impl& held = impl();
   held.belief.take_in();
   return held;
@@ -59,7 +59,7 @@ BoundedPosterior::Impl& BoundedPosterior::whole() const {
 void BoundedPosterior::reset() { impl().belief.reset(); }
 
 void BoundedPosterior::move_pivot(const glm::dvec2& pivot_mm) {
-  whole().belief.move_pivot(pivot_mm);
+  with_touches_taken_in().belief.move_pivot(pivot_mm);
 }
 
 void BoundedPosterior::update(std::span<const Touch> touches,
@@ -81,7 +81,7 @@ void BoundedPosterior::update(std::span<const TouchEvidence> touches,
 }
 
 Estimate BoundedPosterior::estimate(std::optional<double> tolerance) const {
-  BoundedBelief& belief = whole().belief;
+  BoundedBelief& belief = with_touches_taken_in().belief;
   if (tolerance) {
     require_tolerance(*tolerance);
   }
@@ -146,7 +146,7 @@ Estimate BoundedPosterior::estimate(std::optional<double> tolerance) const {
 }
 
 RefinedPose BoundedPosterior::refine(const Mode& mode) const {
-  Impl& posterior = whole();
+  Impl& posterior = with_touches_taken_in();
   require_object(mode.object, posterior.bodies.size());
   BoundedBelief& belief = posterior.belief;
   // Where bins are very fine, a few of them tell the peak, and all would take long. A mean over
@@ -164,7 +164,7 @@ RefinedPose BoundedPosterior::refine(const Mode& mode) const {
   }
   const auto log_likelihood = [&](std::span<const BinBox> boxes) {
     if (!thin) {
-      return belief.log_likelihood(boxes, Arithmetic::float32);
+      return belief.log_likelihood(boxes);
     }
     std::size_t bins = 0;
     for (const BinBox& box : boxes) {
@@ -172,7 +172,7 @@ RefinedPose BoundedPosterior::refine(const Mode& mode) const {
     }
     std::vector<double> logs(bins);
     belief.touches().on_threads(
-        [&] { of_thin->evaluate(boxes, belief.touches().elements(), Arithmetic::float32, logs); });
+        [&] { of_thin->evaluate(boxes, belief.touches().elements(), logs); });
     return logs;
   };
   return palpate::refine(log_likelihood, fit, posterior.bodies[mode.object], start);
@@ -181,7 +181,7 @@ RefinedPose BoundedPosterior::refine(const Mode& mode) const {
 Marginals BoundedPosterior::marginals(int object) const { return marginals(object, lattice()); }
 
 Marginals BoundedPosterior::marginals(int object, const PoseLattice& grid) const {
-  Impl& posterior = whole();
+  Impl& posterior = with_touches_taken_in();
   require_object(object, posterior.bodies.size());
   PoseLattice onto = grid;
   onto.collapse_fixed().validate();
@@ -200,7 +200,7 @@ Marginals BoundedPosterior::marginals(int object, const PoseLattice& grid) const
 
 std::vector<std::vector<BinShare>> BoundedPosterior::likely_bins(std::span<const int> objects,
                                                                  double least_share) const {
-  Impl& posterior = whole();
+  Impl& posterior = with_touches_taken_in();
   for (const int object : objects) {
     require_object(object, posterior.bodies.size());
   }
@@ -237,7 +237,7 @@ std::vector<std::vector<BinShare>> BoundedPosterior::likely_bins(std::span<const
 }
 
 EvaluatedBelief BoundedPosterior::evaluated_bins() const {
-  BoundedBelief& belief = whole().belief;
+  BoundedBelief& belief = with_touches_taken_in().belief;
   const SearchResult& found = belief.found();
   struct Bin {
     std::int64_t place;
@@ -252,11 +252,11 @@ EvaluatedBelief BoundedPosterior::evaluated_bins() const {
                     found.bins_evaluated, list_bytes / (1 << 20)));
   }
   std::vector<Bin> bins;
-  LogSum unseen;
+  LogSum off_map;
   belief.visit([&](const BinBox& box, std::span<const double> log_likelihood) {
     if (static_cast<std::int64_t>(log_likelihood.size()) != box.bins()) {
-      unseen.add(belief.touches().log_weight()[box.object] + log_likelihood[0] +
-                 std::log(static_cast<double>(box.bins())));
+      off_map.add(belief.touches().log_weight()[box.object] + log_likelihood[0] +
+                  std::log(static_cast<double>(box.bins())));
       return;
     }
     const std::int64_t first = box.object * lattice().bins();
@@ -270,13 +270,13 @@ EvaluatedBelief BoundedPosterior::evaluated_bins() const {
     evaluated.index.push_back(bin.place);
     evaluated.log_likelihood.push_back(bin.log_likelihood);
   }
-  const double rest = std::exp(unseen.log() - belief.log_total()) + found.unproven();
+  const double rest = std::exp(off_map.log() - belief.log_total()) + found.unproven();
   evaluated.rest_mass_bound = rest < 1.0 ? rest : 1.0;
   return evaluated;
 }
 
 double BoundedPosterior::log_likelihood(int object, const Pose& T_object_robot) const {
-  Impl& posterior = whole();
+  Impl& posterior = with_touches_taken_in();
   require_object(object, posterior.bodies.size());
   const auto& [translation_mm, theta_rad] = T_object_robot;
   if (!std::isfinite(translation_mm.x) || !std::isfinite(translation_mm.y) ||
@@ -295,7 +295,7 @@ double BoundedPosterior::log_likelihood(int object, const Pose& T_object_robot) 
                      .y_count = 1,
                      .x_first = static_cast<std::int32_t>(bin % lattice().x_mm.count),
                      .x_count = 1};
-    return belief.log_likelihood(std::span(&box, 1), Arithmetic::float64).front();
+    return belief.log_likelihood(std::span(&box, 1)).front();
   }
   const ContactModel& contact = belief.touches().options().contact;
   const InterpolatedMap map(belief.touches().hypotheses()[object].compared(), *contact.prior);
@@ -312,7 +312,7 @@ double BoundedPosterior::log_likelihood(int object, const Pose& T_object_robot) 
 }
 
 double BoundedPosterior::entropy() const {
-  BoundedBelief& belief = whole().belief;
+  BoundedBelief& belief = with_touches_taken_in().belief;
   belief.found();
   const double log_total = belief.log_total();
   double entropy = 0.0;
@@ -327,13 +327,13 @@ double BoundedPosterior::entropy() const {
 }
 
 std::vector<PoseSample> BoundedPosterior::sample(std::size_t count, std::uint64_t seed) const {
-  return whole().belief.sample(count, seed);
+  return with_touches_taken_in().belief.sample(count, seed);
 }
 
 std::vector<TouchGain> BoundedPosterior::expected_gain(std::span<const Pose> T_robot_sensor,
                                                        std::span<const glm::dvec2> elements_mm,
                                                        const PlanOptions& plan) const {
-  Impl& posterior = whole();
+  Impl& posterior = with_touches_taken_in();
   BoundedBelief& belief = posterior.belief;
   require_plan(T_robot_sensor, elements_mm, plan, posterior.bodies.size());
   if (!posterior.predictor) {
@@ -345,7 +345,7 @@ std::vector<TouchGain> BoundedPosterior::expected_gain(std::span<const Pose> T_r
 }
 
 std::vector<PoseBlock> BoundedPosterior::refined_blocks() const {
-  return whole().belief.refined_blocks();
+  return with_touches_taken_in().belief.refined_blocks();
 }
 
 const PoseLattice& BoundedPosterior::lattice() const {

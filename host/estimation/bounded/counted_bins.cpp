@@ -49,14 +49,13 @@ void CountedBoxes::add(const BinBox& box, const CountedPlane& plane) {
   }
 }
 
-double CountedBoxes::log_sum(const BinLikelihood& likelihood, const KnownElements& elements,
-                             Arithmetic arithmetic) const {
+double CountedBoxes::log_sum(const BinLikelihood& likelihood, const KnownElements& elements) const {
   std::int64_t bins = 0;
   for (const BinBox& box : boxes_) {
     bins += box.bins();
   }
   std::vector<double> values(static_cast<std::size_t>(bins));
-  likelihood.evaluate_exact(boxes_, elements, arithmetic, values);
+  likelihood.evaluate_undisplaced(boxes_, elements, values);
   LogSum sum;
   auto value = values.cbegin();
   auto row = rows_.cbegin();

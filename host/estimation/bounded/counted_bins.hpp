@@ -54,8 +54,7 @@ class CountedBoxes {
   void add(const BinBox& box, const CountedPlane& plane);
 
   /// The log of the summed likelihood of the bins that count.
-  double log_sum(const BinLikelihood& likelihood, const KnownElements& elements,
-                 Arithmetic arithmetic) const;
+  double log_sum(const BinLikelihood& likelihood, const KnownElements& elements) const;
 
  private:
   std::vector<BinBox> boxes_;

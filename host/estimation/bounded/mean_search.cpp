@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <utility>
 
-#include "estimation/bounded/search/largest_tiles.hpp"
+#include "estimation/bounded/search/item_bounds.hpp"
 #include "estimation/log_sum.hpp"
 #include "estimation/parallel_for.hpp"
 
@@ -32,7 +32,7 @@ MeanSearch::MeanSearch(const SearchSpace& space, const BoundedOptions& options,
       elements_(std::move(known)),
       rectangle_(
           array_rectangle(touch.T_robot_sensor, touch.elements_mm, options.lattice.pivot_mm)),
-      reaches_(reaches_of(elements_, space.turns)),
+      reaches_(undisplaced_reaches(elements_, space.turns)),
       unpenalised_(unpenalised(space, elements_)),
       prior_log_likelihood_(
           prior_log_likelihoods(elements_, options.contact, space.bounds.size())) {
@@ -43,8 +43,7 @@ MeanSearch::MeanSearch(const SearchSpace& space, const BoundedOptions& options,
   keep_sums_ = bytes <= most_bytes;
   for (std::size_t i = 0; i < space.bounds.size(); ++i) {
     prior_log_likelihood_[i] += space.log_weight[i];
-    errors_.push_back({likelihood.exact_error(i, elements_, Arithmetic::float32),
-                       likelihood.exact_error(i, elements_, Arithmetic::float64)});
+    errors_.push_back(likelihood.undisplaced_error(i, elements_));
   }
 }
 
@@ -113,7 +112,7 @@ bool MeanSearch::survey(const Deadline& deadline, bool everywhere) {
   return true;
 }
 
-std::optional<LogInterval> MeanSearch::bounds(double least, bool exact, const Deadline& deadline) {
+std::optional<LogInterval> MeanSearch::bounds(double least, const Deadline& deadline) {
   if (surveys_.empty() && !survey(deadline)) {
     return {};
   }
@@ -131,8 +130,7 @@ std::optional<LogInterval> MeanSearch::bounds(double least, bool exact, const De
                             ? surveys_[i].left_out
                             : planes.divide(static_cast<int>(theta), least_of_bin, sums_[i]);
         }
-        evaluated[object * thetas + first] =
-            planes.evaluated(exact ? Arithmetic::float64 : Arithmetic::float32);
+        evaluated[object * thetas + first] = planes.evaluated();
       })) {
     return {};
   }
@@ -140,16 +138,16 @@ std::optional<LogInterval> MeanSearch::bounds(double least, bool exact, const De
   LogSum high;
   for (std::size_t i = 0; i < surveys_.size(); ++i) {
     const std::size_t object = i / thetas;
-    const double error = errors_[object][exact ? 1 : 0];
+    const double error = errors_[object];
     low.add(evaluated[i] - error);
     high.add(evaluated[i] + error);
     high.add(left_out[i]);
-    if (surveys_[i].unseen > 0) {
+    if (surveys_[i].off_map > 0) {
       // Where every element sees the prior, all bins have the same likelihood.
-      const double unseen =
-          prior_log_likelihood_[object] + std::log(static_cast<double>(surveys_[i].unseen));
-      low.add(unseen - errors_[object][1]);
-      high.add(unseen + errors_[object][1]);
+      const double off_map =
+          prior_log_likelihood_[object] + std::log(static_cast<double>(surveys_[i].off_map));
+      low.add(off_map - error);
+      high.add(off_map + error);
     }
   }
   const double log_low = low.log() - log_weighted_bins_;

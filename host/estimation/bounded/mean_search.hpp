@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -41,10 +40,9 @@ class MeanSearch {
   /// @param least log of a mean: tiles are left out where their bins would have less than it on
   /// average, and the smallest tiles a little above. Infinity leaves all to the bounds of the
   /// largest tiles.
-  /// @param exact evaluates bins in float64 instead of float32
   /// @returns nothing where the deadline passed. On the threads of the caller's arena; the bits do
   /// not depend on their number.
-  std::optional<LogInterval> bounds(double least, bool exact, const Deadline& deadline);
+  std::optional<LogInterval> bounds(double least, const Deadline& deadline);
   /// Log of the share of the bins that count among all, by prior weight. To be asked for after
   /// bounds().
   double log_share() const { return log_share_; }
@@ -74,10 +72,9 @@ class MeanSearch {
   std::vector<BoundingBox> reaches_;              ///< [theta] of the elements
   std::vector<std::vector<double>> unpenalised_;  ///< [object][level]
   std::vector<double> prior_log_likelihood_;      ///< [object] with the weight
-  /// [object] of a bin in float32 and float64, in nats
-  std::vector<std::array<double, 2>> errors_;
-  std::optional<CountedBins> counted_;  ///< empty before the first bounds()
-  std::vector<PlaneSurvey> surveys_;    ///< [object, theta]; empty before the first bounds()
+  std::vector<double> errors_;                    ///< [object] of a bin, in nats
+  std::optional<CountedBins> counted_;            ///< empty before the first bounds()
+  std::vector<PlaneSurvey> surveys_;  ///< [object, theta]; empty before the first bounds()
   std::vector<PlaneDivision::LargestSums> sums_;  ///< as the surveys, empty where none are kept
   bool keep_sums_;
   double log_bins_ = 0.0;           ///< of the number of bins that count

@@ -13,13 +13,14 @@ namespace palpate {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
-/// Bounds that a closer search narrows by less are rounding.
+/// Bounds that a closer search leaves wider than this part are rounding.
 constexpr double least_gain = 0.9;
 
 /// What the searches of a touch leave out at most, in nats above a lower bound of its mean,
-/// once that comes near: from the first exact one on they evaluate bins in float64.
+/// once that comes near.
 constexpr std::array<double, 7> left_out_nats{0.0, -3.0, -6.5, -10.0, -14.0, -18.0, -22.0};
-constexpr std::size_t first_exact = 3;
+/// From this one on, a search that narrows bounds by little has come to rounding.
+constexpr std::size_t first_at_rounding = 3;
 /// The mean lies below the bounds of the largest tiles by about so large a part of these, in nats.
 /// That is where the second search looks first, but no farther down than gains as much as it costs.
 constexpr double usual_gap = 0.6;
@@ -75,8 +76,8 @@ bool NoneEvidence::search(TouchMean& mean, const Deadline& deadline) {
     close = by_low >= by_high;
     least = close ? by_low : by_high;
   }
-  const bool exact = close && mean.close_searches >= first_exact;
-  const std::optional<LogInterval> found = mean.search.bounds(least, exact, deadline);
+  const bool at_rounding = close && mean.close_searches >= first_at_rounding;
+  const std::optional<LogInterval> found = mean.search.bounds(least, deadline);
   if (!found) {
     return false;
   }
@@ -86,7 +87,7 @@ bool NoneEvidence::search(TouchMean& mean, const Deadline& deadline) {
   mean.found.push_back({std::max(last.low, found->low), std::min(last.high, found->high)});
   mean.closest = mean.close_searches == left_out_nats.size() ||
                  (mean.found.size() >= most_in_vain && mean.found.back().low == -infinity) ||
-                 (exact && width(mean.found.back()) > least_gain * width(last));
+                 (at_rounding && width(mean.found.back()) > least_gain * width(last));
   return true;
 }
 

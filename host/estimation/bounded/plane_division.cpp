@@ -5,7 +5,7 @@
 #include <cmath>
 #include <utility>
 
-#include "estimation/bounded/search/largest_tiles.hpp"
+#include "estimation/bounded/search/item_bounds.hpp"
 #include "estimation/log_sum.hpp"
 
 namespace palpate {
@@ -98,7 +98,7 @@ PlaneSurvey PlaneDivision::survey(int theta, LargestSums& sums) {
   if (!plane.all_seen) {
     const BinBox seen =
         plane.largest.x_first < plane.largest.x_end ? box_of(0, plane, plane.largest) : BinBox{};
-    found.unseen = plane.counted.outside(seen);
+    found.off_map = plane.counted.outside(seen);
   }
   sums = largest_sums(plane);
   if (!sums.empty()) {
@@ -138,9 +138,8 @@ double PlaneDivision::divide(int theta, double least, const LargestSums& kept) {
   return left_out.log();
 }
 
-double PlaneDivision::evaluated(Arithmetic arithmetic) const {
-  return task_.space.log_weight[object_] +
-         boxes_.log_sum(task_.likelihood, task_.elements, arithmetic);
+double PlaneDivision::evaluated() const {
+  return task_.space.log_weight[object_] + boxes_.log_sum(task_.likelihood, task_.elements);
 }
 
 PlaneDivision::Plane PlaneDivision::plane(int theta) const {

@@ -30,7 +30,7 @@ struct PlaneSurvey {
   static constexpr double nothing = -std::numeric_limits<double>::infinity();
 
   std::int64_t bins = 0;      ///< that count
-  std::int64_t unseen = 0;    ///< of these, bins at which every element sees the prior
+  std::int64_t off_map = 0;   ///< of these, bins at which every element sees the prior
   double best = nothing;      ///< the largest bound, in nats, with the prior weight
   double left_out = nothing;  ///< log of what the tiles that see the map hold at most, with it
 };
@@ -55,7 +55,7 @@ class PlaneDivision {
   double divide(int theta, double least, const LargestSums& kept);
   /// The log of the summed likelihood of the bins that count in what was divided, with the prior
   /// weight.
-  double evaluated(Arithmetic arithmetic) const;
+  double evaluated() const;
 
  private:
   class PenaltySum;

@@ -9,12 +9,12 @@
 
 #include <fmt/format.h>
 
-#include "estimation/bounded/displaced/displacement_weights.hpp"
-#include "estimation/bounded/displaced/exact_bins.hpp"
+#include "estimation/bounded/displaced/undisplaced_bins.hpp"
 #include "estimation/bounded/leaves/bin_kernel.hpp"
 #include "estimation/bounded/search/leaves.hpp"
 #include "estimation/bounded/tables/tile_bounds.hpp"
 #include "estimation/bounded/tables/window_table.hpp"
+#include "estimation/displacement_weights.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
@@ -112,15 +112,15 @@ SearchMemory search_memory(std::span<const Hypothesis> hypotheses, const Bounded
     }
   }
   // The last family of a batch may exceed the batch by all of its bins.
-  // Each bin's value as it is evaluated, settled and kept.
-  constexpr double bytes_per_bin = sizeof(float) + 2 * sizeof(double);
+  // Each bin's value as it is evaluated and kept.
+  constexpr double bytes_per_bin = 2 * sizeof(double);
   memory.leaves =
       bytes_per_bin * std::min(static_cast<double>(largest_batch) + memory.largest_family,
                                bins_in_all(hypotheses, lattice));
   if (!options.touch_sd.none()) {
     // Every plane's mean, and its neighbours' sums; and of all bins, what is kept of them.
     memory.means = 2.0 * sizeof(double) * bins_in_all(hypotheses.first(1), lattice) +
-                   static_cast<double>(ExactBins::most_bytes);
+                   static_cast<double>(UndisplacedBins::most_bytes);
   }
   return memory;
 }

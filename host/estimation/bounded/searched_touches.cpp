@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 #include <tbb/info.h>
 
-#include "estimation/bounded/displaced/exact_bins.hpp"
+#include "estimation/bounded/displaced/undisplaced_bins.hpp"
 #include "estimation/hypotheses.hpp"
 #include "palpate/lattice.hpp"
 
@@ -35,7 +35,7 @@ void SearchedTouches::reset() {
   change_.forget();
   touches_.clear();
   taken_in_ = 0;
-  telling_ = 0;
+  informative_ = 0;
   elements_ = {};
   search_.largest().reset();
   if (none_) {
@@ -60,8 +60,8 @@ void SearchedTouches::take_in() {
     for (const TouchEvidence& touch : added) {
       known.push_back(known_elements(touch, options_));
       for (KnownElements& displaced : known.back().touches) {
-        displaced.exact_bins = std::make_shared<ExactBins>(hypotheses_.size(), space_.turns.size(),
-                                                           ExactBins::most_bytes / touches_.size());
+        displaced.undisplaced_bins = std::make_shared<UndisplacedBins>(
+            hypotheses_.size(), space_.turns.size(), UndisplacedBins::most_bytes / touches_.size());
       }
     }
     arena_.execute([&] { search_.largest().add(known); });
@@ -71,7 +71,7 @@ void SearchedTouches::take_in() {
       none_->add(added);
     }
     taken_in_ = touches_.size();
-    telling_ += static_cast<std::size_t>(std::ranges::count_if(added, &TouchEvidence::tells));
+    informative_ += static_cast<std::size_t>(std::ranges::count_if(added, &TouchEvidence::tells));
   });
 }
 
@@ -81,11 +81,11 @@ std::string SearchedTouches::path() const {
 }
 
 std::uint64_t SearchedTouches::bytes() const {
-  std::uint64_t exact_bins = 0;
+  std::uint64_t undisplaced_bins = 0;
   for (const KnownElements& touch : elements_.touches) {
-    exact_bins += touch.exact_bins->bytes();
+    undisplaced_bins += touch.undisplaced_bins->bytes();
   }
-  return exact_bins + likelihood_.bytes() + space_.bytes() + search_.largest().bytes() +
+  return undisplaced_bins + likelihood_.bytes() + space_.bytes() + search_.largest().bytes() +
          (none_ ? none_->bytes() : 0);
 }
 
@@ -94,14 +94,13 @@ SearchResult SearchedTouches::search(const SearchGoal& goal, const Deadline& dea
   return arena_.execute([&] { return search_.run(elements_, goal, deadline, visitor, refined); });
 }
 
-std::vector<double> SearchedTouches::log_likelihood(std::span<const BinBox> boxes,
-                                                    Arithmetic arithmetic) const {
+std::vector<double> SearchedTouches::log_likelihood(std::span<const BinBox> boxes) const {
   std::size_t bins = 0;
   for (const BinBox& box : boxes) {
     bins += static_cast<std::size_t>(box.bins());
   }
   std::vector<double> logs(bins);
-  arena_.execute([&] { likelihood_.evaluate(boxes, elements_, arithmetic, logs); });
+  arena_.execute([&] { likelihood_.evaluate(boxes, elements_, logs); });
   return logs;
 }
 

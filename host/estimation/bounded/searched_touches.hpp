@@ -44,7 +44,7 @@ class SearchedTouches {
   void take_in();
   std::size_t taken_in() const { return taken_in_; }
   /// Those of them that tell something.
-  std::size_t telling() const { return telling_; }
+  std::size_t informative() const { return informative_; }
 
   const BoundedOptions& options() const { return options_; }
   const std::vector<Hypothesis>& hypotheses() const { return hypotheses_; }
@@ -70,7 +70,7 @@ class SearchedTouches {
   SearchResult search(const SearchGoal& goal, const Deadline& deadline, const BinVisitor& visitor,
                       std::vector<PoseBlock>* refined = nullptr);
   /// Log-likelihood of bins, box after box, [y, x] in each, in nats.
-  std::vector<double> log_likelihood(std::span<const BinBox> boxes, Arithmetic arithmetic) const;
+  std::vector<double> log_likelihood(std::span<const BinBox> boxes) const;
   /// Bounds of the log evidence of "none of these" with its prior weight, as SearchResult::mass has
   /// that of the hypotheses, see NoneEvidence::bounds(). Only where has_none().
   LogInterval bound_none(const NoneEvidence::Enough& enough, const Deadline& deadline);
@@ -85,7 +85,7 @@ class SearchedTouches {
   double none_log_weight_ = 0.0;  ///< log of its prior weight times the number of bins
   KeptTouches touches_;
   std::size_t taken_in_ = 0;          ///< of the touches
-  std::size_t telling_ = 0;           ///< of these, see TouchEvidence::tells()
+  std::size_t informative_ = 0;       ///< of these, see TouchEvidence::tells()
   KnownElements elements_;            ///< of all these
   BoundSearch search_;                ///< through all these
   std::optional<NoneEvidence> none_;  ///< of all these, where the options ask for it

@@ -6,8 +6,8 @@
 
 #include <fmt/format.h>
 
+#include "estimation/displacement_weights.hpp"
 #include "palpate/error.hpp"
-#include "palpate/pose.hpp"
 #include "shaders/blur_axis.hpp"
 #include "shaders/max_planes.hpp"
 #include "shaders/sum_turns.hpp"
@@ -19,8 +19,8 @@ namespace {
 using gpu::Access;
 
 constexpr std::uint32_t rows_of_a_turn = 4;  // of an invocation of sum_turns
-/// A Gaussian is cut off at as many standard deviations.
-constexpr double reach = 4.0;
+/// Farther than any lattice has bins, yet whole numbers are exact.
+constexpr double farthest = 1 << 23;
 
 void set_two_floats(double value, float& high, float& low) {
   high = static_cast<float>(value);
@@ -30,9 +30,7 @@ void set_two_floats(double value, float& high, float& low) {
 /// A distance along an axis in whole bins and the rest. An axis of one bin keeps its place.
 void set_shift(double distance_mm, const Axis& axis, float& whole, float& fraction,
                float& fraction_low) {
-  // Farther than any lattice has bins, yet whole numbers are exact. So far is what is no number:
-  // the difference of places beyond float64.
-  constexpr double farthest = 1 << 23;
+  // What is no number, the difference of places beyond float64, lies as far.
   const double bins = axis.count == 1 ? 0.0
                       : std::isnan(distance_mm)
                           ? farthest
@@ -41,40 +39,14 @@ void set_shift(double distance_mm, const Axis& axis, float& whole, float& fracti
   set_two_floats(bins - std::floor(bins), fraction, fraction_low);
 }
 
-/// Bins to either side that a Gaussian of this standard deviation reaches. 0 for an axis of one
-/// bin, which is not blurred.
-int blur_steps(double sd, const Axis& axis) {
-  return axis.count > 1 ? static_cast<int>(std::ceil(reach * sd / axis.step())) : 0;
-}
-
-/// The weights of a Gaussian by distance in bins, the first is 1, and behind them their logarithms;
-/// 2 (`steps` + 1) numbers.
-std::vector<float> blur_weights(double sd, const Axis& axis, int steps) {
+/// Weights, and behind them their logarithms.
+std::vector<float> with_logs(std::span<const double> weights) {
   constexpr double nothing = -1e30;  // instead of minus infinity, for a weight that float64 lacks
-  std::vector<float> weights{1.0F};
-  std::vector<float> logs{0.0F};
-  for (int k = 1; k <= steps; ++k) {
-    const double deviations = k * axis.step() / sd;
-    const double weight = std::exp(-deviations * deviations / 2.0);
-    weights.push_back(static_cast<float>(weight));
-    logs.push_back(static_cast<float>(std::max(std::log(weight), nothing)));
+  std::vector<float> table(weights.begin(), weights.end());
+  for (const double weight : weights) {
+    table.push_back(static_cast<float>(std::max(std::log(weight), nothing)));
   }
-  weights.insert(weights.end(), logs.begin(), logs.end());
-  return weights;
-}
-
-/// For every bin of the axis 1 over the sum of the weights whose bins lie inside.
-std::vector<float> blur_norms(std::span<const float> weights, const Axis& axis) {
-  const int steps = static_cast<int>(weights.size()) - 1;
-  std::vector<float> norms;
-  for (int i = 0; i < axis.count; ++i) {
-    double sum = 0.0;
-    for (int k = std::max(-steps, -i); k <= std::min(steps, axis.count - 1 - i); ++k) {
-      sum += weights[static_cast<std::size_t>(std::abs(k))];
-    }
-    norms.push_back(static_cast<float>(1.0 / sum));
-  }
-  return norms;
+  return table;
 }
 
 /// Where a slip takes the belief of a bin from as theta grows by k steps: g + R(alpha) (t - g),
@@ -145,12 +117,6 @@ gpu::Buffer maxima_buffer(gpu::Context& context, std::uint64_t count) {
           gpu::table_where_it_fits(context.limits(), bytes, VK_FORMAT_R32_SFLOAT)};
 }
 
-/// Bins that a Gaussian along x or y reaches. Farther than the axis is long there is nothing to
-/// weigh.
-int plane_steps(double sd_mm, const Axis& axis) {
-  return std::min(blur_steps(sd_mm, axis), axis.count - 1);
-}
-
 /// Whether no object's bins are cut into parts.
 bool objects_in_one_slab(const gpu::Context& context, const PoseLattice& lattice,
                          std::size_t objects) {
@@ -199,7 +165,7 @@ DisplacementBlur::DisplacementBlur(gpu::Context& context, gpu::CommandStream& st
       objects_(objects),
       sd_(sd),
       slips_(!slip_centroids_mm.empty()),
-      theta_steps_(blur_steps(sd.rad, lattice.theta_rad)),
+      theta_steps_(blur_steps(lattice.theta_rad, sd.rad)),
       lanes_(independent_lanes(context.limits())),
       max_planes_(context, {.name = "max_planes",
                             .spirv = shaders::max_planes,
@@ -220,11 +186,11 @@ DisplacementBlur::DisplacementBlur(gpu::Context& context, gpu::CommandStream& st
   require_whole_planes(context, lattice, objects, lanes_, theta_steps_);
   for (const Axis& axis : {lattice.x_mm, lattice.y_mm}) {
     // A loop over the bins of a strip and over the steps, and other loops.
-    if (int{shaders::BLUR_STRIP_X} * (2 * plane_steps(sd.mm, axis) + 1) >
-        int{gpu::most_iterations}) {
+    const int steps = std::min(blur_steps(axis, sd.mm), axis.count - 1);
+    if (int{shaders::BLUR_STRIP_X} * (2 * steps + 1) > int{gpu::most_iterations}) {
       throw Error(Fault::input,
                   fmt::format("a standard deviation of {} mm reaches {} bins; use fewer bins",
-                              sd.mm, plane_steps(sd.mm, axis)));
+                              sd.mm, steps));
     }
   }
   sum_turns_ = gpu::Kernel(
@@ -238,19 +204,21 @@ DisplacementBlur::DisplacementBlur(gpu::Context& context, gpu::CommandStream& st
                      blurs_planes() ? shaders::BLUR_ALONG_X : shaders::BLUR_TOUCH,
                      objects_in_one_slab(context, lattice, objects) ? 1U : 0U,
                      turns_.is_table() ? 1U : 0U, plane_max_.is_table() ? 1U : 0U}});
-  stream.upload(plane_max_, blur_weights(sd.rad, lattice.theta_rad, theta_steps_),
-                planes() * sizeof(float));
+  std::vector<double> of_turns;
+  for (int k = 0; k <= theta_steps_; ++k) {
+    of_turns.push_back(blur_weight(k, lattice.theta_rad, sd.rad));
+  }
+  stream.upload(plane_max_, with_logs(of_turns), planes() * sizeof(float));
 }
 
 DisplacementBlur::Pass DisplacementBlur::make_pass(const Axis& axis, bool along_x) {
-  const int steps = plane_steps(sd_.mm, axis);
-  const std::vector<float> table = blur_weights(sd_.mm, axis, steps);
+  const AxisBlur blur(axis, sd_.mm, 1);
   std::vector<std::uint32_t> constants{lanes_, along_x ? shaders::BLUR_ALONG_Y : source(),
-                                       static_cast<std::uint32_t>(steps),
+                                       static_cast<std::uint32_t>(blur.steps),
                                        lattice_.x_mm.count % 2 == 0 ? 1U : 0U};
-  const auto weights = std::span(table).first(static_cast<std::size_t>(steps) + 1);
   for (std::size_t k = 0; k <= shaders::BLUR_CONSTANT_STEPS; ++k) {
-    constants.push_back(std::bit_cast<std::uint32_t>(k < weights.size() ? weights[k] : 0.0F));
+    const double weight = k < blur.weight.size() ? blur.weight[k] : 0.0;
+    constants.push_back(std::bit_cast<std::uint32_t>(static_cast<float>(weight)));
   }
   const std::int64_t strips =
       groups_of(axis.count, along_x ? shaders::BLUR_STRIP_X : shaders::BLUR_STRIP_Y);
@@ -262,8 +230,10 @@ DisplacementBlur::Pass DisplacementBlur::make_pass(const Axis& axis, bool along_
                                               Access::table, Access::storage, Access::storage},
                                  .push_bytes = sizeof(shaders::PlanesPush),
                                  .constants = constants}),
-      .weights = stream_.uploaded(table, "weights of a blur", VK_FORMAT_R32_SFLOAT),
-      .norms = stream_.uploaded(blur_norms(weights, axis), "weights of a blur"),
+      .weights =
+          stream_.uploaded(with_logs(blur.weight), "weights of a blur", VK_FORMAT_R32_SFLOAT),
+      .norms = stream_.uploaded(std::vector<float>(blur.scale.begin(), blur.scale.end()),
+                                "weights of a blur"),
       .invocations = strips * (along_x ? lattice_.y_mm.count : groups_of(lattice_.x_mm.count, 2))};
 }
 
@@ -304,18 +274,19 @@ void DisplacementBlur::blur_planes(const DenseBelief& from, const DenseBelief& s
 }
 
 void DisplacementBlur::turn_for(const glm::dvec2& sensor_from_pivot_mm) {
-  host_turns_.clear();
-  for (int t = 0; t < lattice_.theta_rad.count; ++t) {
-    const double theta = lattice_.theta_rad.centre(t);
-    for (int k = -theta_steps_; k <= theta_steps_; ++k) {
-      const double turned = theta + k * lattice_.theta_rad.step();
-      // Without a turn the place is the same, even one beyond float64.
-      const glm::dvec2 shift_mm =
-          k == 0 ? glm::dvec2(0.0)
-                 : rotate(theta, sensor_from_pivot_mm) - rotate(turned, sensor_from_pivot_mm);
-      shaders::Turn& turn = host_turns_.emplace_back();
-      set_shift(shift_mm.x, lattice_.x_mm, turn.whole_x, turn.fraction_x, turn.fraction_x_low);
-      set_shift(shift_mm.y, lattice_.y_mm, turn.whole_y, turn.fraction_y, turn.fraction_y_low);
+  const auto turns = 2 * static_cast<std::size_t>(theta_steps_) + 1;
+  const auto thetas = static_cast<std::size_t>(lattice_.theta_rad.count);
+  constexpr auto beyond = static_cast<float>(farthest);
+  host_turns_.assign(thetas * turns, {.whole_x = beyond, .whole_y = beyond});
+  const DisplacementWeights weights(lattice_, sd_);
+  for (std::size_t t = 0; t < thetas; ++t) {
+    for (const Tap& tap : weights.taps(static_cast<int>(t), sensor_from_pivot_mm)) {
+      shaders::Turn& turn =
+          host_turns_[t * turns + static_cast<std::size_t>(tap.steps + theta_steps_)];
+      turn.whole_x = static_cast<float>(tap.bins.x);
+      turn.whole_y = static_cast<float>(tap.bins.y);
+      turn.fraction_x = static_cast<float>(tap.fraction.x);
+      turn.fraction_y = static_cast<float>(tap.fraction.y);
     }
   }
 }

@@ -185,7 +185,7 @@ class PALPATE_API BoundedPosterior {
   struct PALPATE_LOCAL Impl;
   PALPATE_LOCAL Impl& impl() const;
   /// impl(), where no update has left the belief half-way. @throws Error where one has
-  PALPATE_LOCAL Impl& whole() const;
+  PALPATE_LOCAL Impl& with_touches_taken_in() const;
   std::unique_ptr<Impl> impl_;
 };
 

@@ -100,7 +100,7 @@ TEST(EvaluatedBins, BeyondTheirMemoryAreSearchedForAgain) {
   std::vector<double> plane(plane_bins);
   for (std::size_t t = 0; t < theta.size(); ++t) {
     const BinBox box = whole_plane(options.lattice, static_cast<int>(t));
-    likelihood.evaluate(std::span(&box, 1), elements, Arithmetic::float64, plane);
+    likelihood.evaluate(std::span(&box, 1), elements, plane);
     for (std::size_t i = 0; i < plane_bins; ++i) {
       const double value = std::exp(plane[i]);
       xy[i] += value;

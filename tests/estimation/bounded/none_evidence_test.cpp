@@ -120,8 +120,7 @@ TEST(NoneEvidence, HoldsItsDefinition) {
         for (const Touch& touch : touches) {
           const KnownElements known =
               known_elements(TouchEvidence(touch, none.options.contact), none.options);
-          error += std::max(none.likelihood.error(0, known, Arithmetic::float64),
-                            none.likelihood.error(1, known, Arithmetic::float64));
+          error += std::max(none.likelihood.error(0, known), none.likelihood.error(1, known));
         }
         expect_holds(none.bounds(1e-6), expected, std::max(1e-6, 2.5 * error));
       }
@@ -236,8 +235,8 @@ TEST(MeanSearch, FindsTheSameWhereItHasNoRoomForSums) {
   MeanSearch forgetting(none.space, none.options, none.likelihood, touch, known, 0);
   double least = infinity;
   for (int search = 0; search < 3; ++search) {
-    const LogInterval kept = keeping.bounds(least, false, Deadline({})).value();
-    const LogInterval found = forgetting.bounds(least, false, Deadline({})).value();
+    const LogInterval kept = keeping.bounds(least, Deadline({})).value();
+    const LogInterval found = forgetting.bounds(least, Deadline({})).value();
     EXPECT_EQ(kept.low, found.low) << search;
     EXPECT_EQ(kept.high, found.high) << search;
     least = kept.high - 4.0;

@@ -1,7 +1,7 @@
 // Tiles in which every element sees the prior: none may be taken for one, and their bins have the
 // likelihood of the prior.
 
-#include "estimation/bounded/search/largest_tiles.hpp"
+#include "estimation/bounded/search/item_bounds.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -54,7 +54,7 @@ BinCase random_far_case(Uniform& random) {
 }
 
 BoundingBox reach_of(const KnownElements& elements, const glm::dvec2& turn) {
-  return reaches_of(elements, std::span(&turn, 1)).front();
+  return undisplaced_reaches(elements, std::span(&turn, 1)).front();
 }
 
 TEST(SeenTiles, LeavesOutNoTileInWhichAnElementSeesTheMap) {
@@ -209,21 +209,19 @@ std::int64_t expect_sound_search(const BinCase& of, double tolerance) {
         once = once && visited.take(box, values);
         if (values.size() == 1 && box.bins() > 1) {
           EXPECT_NEAR(values[0], prior_log_likelihood(of, static_cast<std::size_t>(box.object)),
-                      likelihood.error(static_cast<std::size_t>(box.object), of.elements,
-                                       Arithmetic::float64));
+                      likelihood.error(static_cast<std::size_t>(box.object), of.elements));
           together += box.bins();
         }
       });
   EXPECT_TRUE(once) << "a bin was visited twice, or is none";
   for (std::size_t object = 0; object < 2; ++object) {
-    const double rounding = likelihood.error(object, of.elements, Arithmetic::float32) +
-                            likelihood.error(object, of.elements, Arithmetic::float64);
+    const double rounding = 2.0 * likelihood.error(object, of.elements);
     LogSum dropped;
     for (int theta = 0; theta < of.lattice.theta_rad.count; ++theta) {
       BinBox plane = whole_plane(of.lattice, theta);
       plane.object = static_cast<std::int32_t>(object);
       std::vector<double> exact(static_cast<std::size_t>(plane.bins()));
-      likelihood.evaluate(std::span(&plane, 1), of.elements, Arithmetic::float64, exact);
+      likelihood.evaluate(std::span(&plane, 1), of.elements, exact);
       for (std::size_t i = 0; i < exact.size(); ++i) {
         const double value = visited.at(object, static_cast<std::size_t>(theta) * exact.size() + i);
         if (value == Visited::not_visited) {

@@ -77,10 +77,9 @@ void check_case(const BinCase& of, std::size_t object, const std::vector<TileSiz
     BinBox box = whole_plane(of.lattice, theta);
     box.object = static_cast<std::int32_t>(object);
     std::vector<double> plane(static_cast<std::size_t>(box.bins()));
-    likelihood.evaluate(std::span(&box, 1), of.elements, Arithmetic::float64, plane);
+    likelihood.evaluate(std::span(&box, 1), of.elements, plane);
     // Where no element has a penalty, bound and likelihood are the same sum in two orders.
-    const double rounding =
-        std::min(1e-9, likelihood.error(object, of.elements, Arithmetic::float64));
+    const double rounding = std::min(1e-9, likelihood.error(object, of.elements));
     check_tiles(of, bounds, theta, plane, rounding, checked);
   }
 }

@@ -8,8 +8,8 @@
 #include <span>
 #include <vector>
 
-#include "estimation/bounded/displaced/displacement_weights.hpp"
 #include "estimation/bounded/displaced/places.hpp"
+#include "estimation/displacement_weights.hpp"
 #include "estimation/log_sum.hpp"
 
 namespace palpate {
@@ -51,16 +51,15 @@ struct TileLikelihoods {
   static Value weight(double weight) { return static_cast<Value>(weight); }
   static Value factor(double nats) { return static_cast<Value>(std::exp(nats)); }
   static void add(Value& sum, Value weight, Value likelihood) { sum += weight * likelihood; }
-  static void widen(Value& widest, Value likelihood) {
-    widest = std::bit_cast<Value>(
-        std::max(std::bit_cast<std::int32_t>(widest), std::bit_cast<std::int32_t>(likelihood)));
+  static Value larger(Value a, Value b) {
+    return std::bit_cast<Value>(
+        std::max(std::bit_cast<std::int32_t>(a), std::bit_cast<std::int32_t>(b)));
   }
   static Value scaled(Value likelihood, Value scale) { return likelihood * scale; }
   /// Log of the sum over the weights of its terms.
   static double log_mean(Value sum, double weights) {
     return std::log(sum / static_cast<Value>(weights) + vanished);
   }
-  static double log(Value sum) { return std::log(sum); }
 };
 
 /// Likelihoods of bins, as float64.
@@ -74,10 +73,8 @@ struct BinLikelihoods {
   static Value weight(double weight) { return weight; }
   static Value factor(double nats) { return std::exp(nats); }
   static void add(Value& sum, Value weight, Value likelihood) { sum += weight * likelihood; }
-  static void widen(Value& sum, Value likelihood) { sum += likelihood; }
   static Value scaled(Value likelihood, Value scale) { return likelihood * scale; }
   static double log_mean(Value sum, double weights) { return std::log(sum / weights); }
-  static double log(Value sum) { return std::log(sum); }
 };
 
 /// Likelihoods of bins by their logs, for those that float64 does not hold.
@@ -91,10 +88,8 @@ struct BinLogs {
   static Value weight(double weight) { return std::log(weight); }
   static Value factor(double nats) { return nats; }
   static void add(Value& sum, Value weight, Value log) { sum = log_add(sum, weight + log); }
-  static void widen(Value& sum, Value log) { sum = log_add(sum, log); }
   static Value scaled(Value log, Value scale) { return log + scale; }
   static double log_mean(Value sum, double weights) { return sum - std::log(weights); }
-  static double log(Value sum) { return sum; }
 };
 
 /// An AxisBlur in a domain's numbers.
@@ -147,41 +142,25 @@ struct BlurredPlane {
   int x = 0;  ///< of the first place
   int y = 0;
   int height = 0;
-  /// [y, x] relative to the reference; nothing outside the region. Of tiles, where asked for, the
-  /// largest of a place, the next one along x, and those above both.
+  /// [y, x] relative to the reference; nothing outside the region. Of tiles of several bins, see
+  /// max_with_next().
   std::vector<Value> blurred;
-  std::vector<Value> wide;  ///< of bins, where asked for: sums of a place and its eight neighbours
 
   PlaceRows<Value> rows(std::vector<Value>& values) const { return {values.data(), pitch, x, y}; }
 };
-
-/// Adds up each place and its neighbours, so far before and behind it.
-template <typename Domain>
-std::vector<typename Domain::Value> widened(const std::vector<typename Domain::Value>& from,
-                                            std::ptrdiff_t stride) {
-  std::vector<typename Domain::Value> wide = from;
-  const auto size = static_cast<std::ptrdiff_t>(from.size());
-  for (const std::ptrdiff_t distance : {stride, -stride}) {
-    const std::ptrdiff_t end = std::min(size, size - distance);
-    for (std::ptrdiff_t i = std::max<std::ptrdiff_t>(0, -distance); i < end; ++i) {
-      Domain::widen(wide[i], from[i + distance]);
-    }
-  }
-  return wide;
-}
 
 /// Replaces each place by the largest of itself, the next one along x, and those above both; also
 /// the places before the first ones of the region.
 /// @param runs the places that hold something
 template <typename Domain>
-void widen(std::span<const BlockRun> runs, const PlaceRows<typename Domain::Value>& rows) {
+void max_with_next(std::span<const BlockRun> runs, const PlaceRows<typename Domain::Value>& rows) {
   using Value = typename Domain::Value;
   const auto first = [](int block) { return block == 0 ? -1 : BlockRun::side * block; };
   const auto take = [&](const BlockRun& run, int y, const Value* next) {
     Value* const row = rows.at(first(run.x), y);
     const int count = BlockRun::side * (run.x + run.count) - first(run.x);
     for (int i = 0; i < count; ++i) {
-      Domain::widen(row[i], next[i]);
+      row[i] = Domain::larger(row[i], next[i]);
     }
   };
   for (const BlockRun& run : runs) {
@@ -197,10 +176,11 @@ void widen(std::span<const BlockRun> runs, const PlaceRows<typename Domain::Valu
 }
 
 /// @param range around the asked blocks
+/// @param several_bins places are tiles of more than one bin: a turn moves one to between four
 template <typename Domain>
 BlurredPlane<Domain> blurred_plane(int theta, const BlockRange& range,
                                    std::span<const BlockRange> asked, const BlurIn<Domain>& blur_x,
-                                   const BlurIn<Domain>& blur_y, bool wide,
+                                   const BlurIn<Domain>& blur_y, bool several_bins,
                                    const PlaceSource<typename Domain::Value>& source) {
   using Value = typename Domain::Value;
   // A block more on every BlockRun::side, since taps lie between places.
@@ -212,9 +192,10 @@ BlurredPlane<Domain> blurred_plane(int theta, const BlockRange& range,
   for (const BlockRange& blocks : asked) {
     wanted.add(blocks);
   }
-  const BlockSet along_x = wanted.widened(blur_x.reach, 0, blur_x.blocks(), blur_y.blocks());
+  const BlockSet along_x =
+      wanted.with_neighbours(blur_x.reach, 0, blur_x.blocks(), blur_y.blocks());
   const std::vector<BlockRun> sources =
-      along_x.widened(0, blur_y.reach, blur_x.blocks(), blur_y.blocks()).runs(theta);
+      along_x.with_neighbours(0, blur_y.reach, blur_x.blocks(), blur_y.blocks()).runs(theta);
 
   BlurredPlane<Domain> plane{.pitch = BlockRun::side * (window.x_end - window.x_first),
                              .x = BlockRun::side * window.x_first,
@@ -271,10 +252,10 @@ BlurredPlane<Domain> blurred_plane(int theta, const BlockRange& range,
       row[i] = Domain::scaled(row[i], blur_x.scale[x + i]);
     }
   });
-  if (wide && Domain::bounds) {
-    widen<Domain>(results, result);
-  } else if (wide) {
-    plane.wide = widened<Domain>(widened<Domain>(plane.blurred, 1), plane.pitch);
+  if constexpr (Domain::bounds) {
+    if (several_bins) {
+      max_with_next<Domain>(results, result);
+    }
   }
   return plane;
 }

@@ -4,10 +4,10 @@
 #include <atomic>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <utility>
 
 #include "estimation/bounded/displaced/blurred_plane.hpp"
-#include "estimation/log_sum.hpp"
 #include "estimation/parallel_for.hpp"
 
 namespace palpate {
@@ -59,8 +59,8 @@ class TapSum {
   using Value = typename Domain::Value;
 
   TapSum(std::span<const Tap> taps, const std::vector<BlurredPlane<Domain>>& planes,
-         const PlaceWeights& weights, double fraction_error)
-      : taps_(taps), planes_(planes), weights_(weights), fraction_error_(fraction_error) {
+         const PlaceWeights& weights)
+      : taps_(taps), planes_(planes), weights_(weights) {
     for (const Tap& tap : taps) {
       reference_ = std::max(reference_, planes[tap.theta].reference);
     }
@@ -69,13 +69,12 @@ class TapSum {
     }
   }
 
-  /// @param log_mean,error [block, y, x]
+  /// @param log_mean [block, y, x]
   /// @returns false where the domain holds a sum too inexactly
-  bool add_up(const BlockRun& run, double* log_mean, double* error) {
+  bool add_up(const BlockRun& run, double* log_mean) {
     width_ = side * run.count;
     const std::size_t size = static_cast<std::size_t>(width_) * side;
     sums_.assign(size, Domain::nothing);
-    wide_.assign(size, Domain::nothing);
     inside_.assign(size, 0.0);
     wholly_inside_ = 0.0;
     const int bins = weights_.bins;
@@ -88,7 +87,7 @@ class TapSum {
       }
       const glm::ivec2 moved = places_of(tap, bins);
       if (bins > 1) {
-        add(plane, plane.blurred, run, moved, weighted(tap.weight, i), -1, sums_);
+        add(plane, run, moved, weighted(tap.weight, i), -1);
         continue;
       }
       const glm::dvec2 behind = tap.fraction;
@@ -97,13 +96,10 @@ class TapSum {
                                          {{1, 0}, behind.x * before.y},
                                          {{0, 1}, before.x * behind.y},
                                          {{1, 1}, behind.x * behind.y}}) {
-        add(plane, plane.blurred, run, moved + corner, weighted(tap.weight * part, i), 0, sums_);
-      }
-      if (!Domain::bounds && fraction_error_ > 0.0) {
-        add(plane, plane.wide, run, moved, weighted(tap.weight, i), -1, wide_);
+        add(plane, run, moved + corner, weighted(tap.weight * part, i), 0);
       }
     }
-    return take(run, log_mean, error);
+    return take(run, log_mean);
   }
 
  private:
@@ -113,8 +109,8 @@ class TapSum {
   }
 
   /// Adds values that lie `moved` away, as far as they lie behind `first` in the region.
-  void add(const BlurredPlane<Domain>& plane, const std::vector<Value>& values, const BlockRun& run,
-           const glm::ivec2& moved, Value of_tap, int first, std::vector<Value>& sums) const {
+  void add(const BlurredPlane<Domain>& plane, const BlockRun& run, const glm::ivec2& moved,
+           Value of_tap, int first) {
     if (of_tap == Domain::nothing) {
       return;
     }
@@ -128,8 +124,8 @@ class TapSum {
           y >= std::min(static_cast<int>(weights_.y.scale.size()), plane.y + plane.height)) {
         continue;
       }
-      const Value* const from = values.data() + (y - plane.y) * plane.pitch + (x - plane.x);
-      Value* const __restrict to = sums.data() + std::ptrdiff_t{j} * width_;
+      const Value* const from = plane.blurred.data() + (y - plane.y) * plane.pitch + (x - plane.x);
+      Value* const __restrict to = sums_.data() + std::ptrdiff_t{j} * width_;
       for (int i = begin; i < end; ++i) {
         Domain::add(to[i], of_tap, from[i]);
       }
@@ -163,12 +159,12 @@ class TapSum {
     }
   }
 
-  bool take(const BlockRun& run, double* log_mean, double* error) const {
+  bool take(const BlockRun& run, double* log_mean) const {
     const int columns = static_cast<int>(weights_.x.scale.size()) - side * run.x;
     const int rows = static_cast<int>(weights_.y.scale.size()) - side * run.y;
     for (int block = 0; block < run.count; ++block) {
       for (int j = 0; j < side; ++j) {
-        for (int i = side * block; i < side * (block + 1); ++i, ++log_mean, ++error) {
+        for (int i = side * block; i < side * (block + 1); ++i, ++log_mean) {
           if (i >= columns || j >= rows) {
             *log_mean = -infinity;
             continue;
@@ -178,12 +174,6 @@ class TapSum {
             return false;
           }
           *log_mean = Domain::log_mean(sums_[place], inside_[place] + wholly_inside_) + reference_;
-          if (!Domain::bounds && fraction_error_ > 0.0) {
-            // Each of two fractions may change a neighbour's weight by so much.
-            const double log_part = std::log(2.0 * fraction_error_) + Domain::log(wide_[place]) -
-                                    Domain::log(sums_[place]);
-            *error = log_add(0.0, log_part);
-          }
         }
       }
     }
@@ -193,22 +183,21 @@ class TapSum {
   std::span<const Tap> taps_;
   const std::vector<BlurredPlane<Domain>>& planes_;  ///< [theta]
   const PlaceWeights& weights_;
-  double fraction_error_;
   double reference_ = -infinity;  ///< of the sums, in nats
   int width_ = 0;                 ///< of a run's rows
   std::vector<Value> factors_;    ///< [tap] of its plane's reference
   std::vector<Value> sums_;       ///< [y, x] of the run
-  std::vector<Value> wide_;
-  std::vector<double> inside_;  ///< [y, x] weights of taps that lie partly inside the region
+  std::vector<double> inside_;    ///< [y, x] weights of taps that lie partly inside the region
   std::vector<double> of_columns_;
   double wholly_inside_ = 0.0;  ///< of those that lie inside for all of the run's places
 };
 
-/// @returns false where the domain holds a mean too inexactly
+/// @returns nothing where the domain holds a mean too inexactly
 template <typename Domain>
-bool average(const PlaceWeights& weights, const glm::dvec2& sensor_from_pivot_mm,
-             std::span<const BlockRun> targets, const PlaceSource<typename Domain::Value>& source,
-             DisplacedMeans& means) {
+std::optional<std::vector<double>> average(const PlaceWeights& weights,
+                                           const glm::dvec2& sensor_from_pivot_mm,
+                                           std::span<const BlockRun> targets,
+                                           const PlaceSource<typename Domain::Value>& source) {
   const auto thetas = static_cast<std::size_t>(weights.touch.lattice().theta_rad.count);
   struct Target {
     std::size_t first = 0;  ///< run
@@ -235,33 +224,30 @@ bool average(const PlaceWeights& weights, const glm::dvec2& sensor_from_pivot_mm
       }
     }
   }
-  means.log_mean.resize(places);
-  means.error.resize(places);
   std::vector<BlurredPlane<Domain>> planes(thetas);
   const BlurIn<Domain> blur_x(weights.x);
   const BlurIn<Domain> blur_y(weights.y);
   parallel_for(thetas, [&](std::size_t theta) {
     if (!asked[theta].empty()) {
-      planes[theta] =
-          blurred_plane<Domain>(static_cast<int>(theta), ranges[theta], asked[theta], blur_x,
-                                blur_y, !Domain::bounds || weights.bins > 1, source);
+      planes[theta] = blurred_plane<Domain>(static_cast<int>(theta), ranges[theta], asked[theta],
+                                            blur_x, blur_y, weights.bins > 1, source);
     }
   });
+  std::vector<double> means(places);
   std::atomic<bool> holds = true;
-  const double fraction_error = weights.touch.fraction_error(sensor_from_pivot_mm);
   parallel_for(of_theta.size(), [&](std::size_t i) {
     const Target& target = of_theta[i];
-    TapSum<Domain> sum(target.taps, planes, weights, fraction_error);
+    TapSum<Domain> sum(target.taps, planes, weights);
     std::size_t place = target.place;
     for (const BlockRun& run : targets.subspan(target.first, target.end - target.first)) {
-      if (!sum.add_up(run, means.log_mean.data() + place, means.error.data() + place)) {
+      if (!sum.add_up(run, means.data() + place)) {
         holds = false;
         return;
       }
       place += static_cast<std::size_t>(run.count) * BlockRun::places;
     }
   });
-  return holds;
+  return holds ? std::optional(std::move(means)) : std::nullopt;
 }
 
 /// Terms of the sums that make up a mean.
@@ -279,24 +265,22 @@ DisplacementMean::DisplacementMean(const DisplacementWeights& weights, int bins)
 std::vector<double> DisplacementMean::bounds(const glm::dvec2& sensor_from_pivot_mm,
                                              std::span<const BlockRun> targets,
                                              const PlaceSource<float>& source) const {
-  DisplacedMeans found;
-  average<TileLikelihoods>(weights_, sensor_from_pivot_mm, targets, source, found);
+  std::vector<double> found =
+      average<TileLikelihoods>(weights_, sensor_from_pivot_mm, targets, source).value();
   // Each term rounds by a few units, and so do exponentials and the logarithm.
   const double rounding = 1e-3 + 0x1p-22 * terms_of(weights_);
-  for (double& log_mean : found.log_mean) {
+  for (double& log_mean : found) {
     log_mean += rounding;
   }
-  return std::move(found.log_mean);
+  return found;
 }
 
-DisplacedMeans DisplacementMean::means(const glm::dvec2& sensor_from_pivot_mm,
-                                       std::span<const BlockRun> targets,
-                                       const PlaceSource<double>& source) const {
-  DisplacedMeans found;
-  if (!average<BinLikelihoods>(weights_, sensor_from_pivot_mm, targets, source, found)) {
-    average<BinLogs>(weights_, sensor_from_pivot_mm, targets, source, found);
-  }
-  return found;
+std::vector<double> DisplacementMean::means(const glm::dvec2& sensor_from_pivot_mm,
+                                            std::span<const BlockRun> targets,
+                                            const PlaceSource<double>& source) const {
+  auto found = average<BinLikelihoods>(weights_, sensor_from_pivot_mm, targets, source);
+  return found ? *std::move(found)
+               : average<BinLogs>(weights_, sensor_from_pivot_mm, targets, source).value();
 }
 
 double DisplacementMean::mean_error() const {

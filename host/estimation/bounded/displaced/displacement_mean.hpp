@@ -5,22 +5,14 @@
 
 #include <glm/vec2.hpp>
 
-#include "estimation/bounded/displaced/displacement_weights.hpp"
 #include "estimation/bounded/displaced/places.hpp"
+#include "estimation/displacement_weights.hpp"
 
 namespace palpate {
 
-/// A touch's log-likelihoods averaged over where its sensor may have been, [run, block, y, x].
-struct DisplacedMeans {
-  std::vector<double> log_mean;  ///< in nats; -infinity where a place holds no bin
-  /// A bin's mean may be wrong by e^error - 1 of itself, since the places to which turns move the
-  /// bin are rounded.
-  std::vector<double> error;
-};
-
 /// The weights of displacements between places.
 struct PlaceWeights {
-  const DisplacementWeights& touch;
+  DisplacementWeights touch;
   int bins;  ///< of a place along each axis
   AxisBlur x;
   AxisBlur y;
@@ -29,10 +21,10 @@ struct PlaceWeights {
 /// Averages a touch's likelihoods over where its sensor may have been, at the places that are asked
 /// for. Each theta is blurred along y and then along x; then neighbouring thetas are added up at
 /// the places to which the turns move a bin. From upper bounds of the likelihoods of tiles, this
-/// gives upper bounds of the means.
+/// gives upper bounds of the means. Both are logs, [run, block, y, x], in nats; -infinity where a
+/// place holds no bin.
 class DisplacementMean {
  public:
-  /// @param weights outlive this object
   /// @param bins of a place along each axis
   DisplacementMean(const DisplacementWeights& weights, int bins);
 
@@ -42,9 +34,10 @@ class DisplacementMean {
                              std::span<const BlockRun> targets,
                              const PlaceSource<float>& source) const;
   /// Means of bins, in float64 arithmetic.
-  DisplacedMeans means(const glm::dvec2& sensor_from_pivot_mm, std::span<const BlockRun> targets,
-                       const PlaceSource<double>& source) const;
-  /// Bound of the error of means(), in nats, beside DisplacedMeans::error and the source's own.
+  std::vector<double> means(const glm::dvec2& sensor_from_pivot_mm,
+                            std::span<const BlockRun> targets,
+                            const PlaceSource<double>& source) const;
+  /// Bound of the error of means(), in nats, beside the source's own.
   double mean_error() const;
 
  private:

@@ -23,15 +23,15 @@ void BlockSet::add(const BlockRange& blocks) {
   }
 }
 
-BlockSet BlockSet::widened(int x_blocks, int y_blocks, int x_count, int y_count) const {
-  BlockSet wide(range_);
+BlockSet BlockSet::with_neighbours(int x_blocks, int y_blocks, int x_count, int y_count) const {
+  BlockSet all(range_);
   for (const BlockRun& run : runs(0)) {
-    wide.add({.x_first = std::max({range_.x_first, 0, run.x - x_blocks}),
-              .x_end = std::min({range_.x_end, x_count, run.x + run.count + x_blocks}),
-              .y_first = std::max({range_.y_first, 0, run.y - y_blocks}),
-              .y_end = std::min({range_.y_end, y_count, run.y + 1 + y_blocks})});
+    all.add({.x_first = std::max({range_.x_first, 0, run.x - x_blocks}),
+             .x_end = std::min({range_.x_end, x_count, run.x + run.count + x_blocks}),
+             .y_first = std::max({range_.y_first, 0, run.y - y_blocks}),
+             .y_end = std::min({range_.y_end, y_count, run.y + 1 + y_blocks})});
   }
-  return wide;
+  return all;
 }
 
 std::vector<BlockRun> BlockSet::runs(int theta) const {

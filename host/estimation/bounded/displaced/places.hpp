@@ -65,7 +65,7 @@ class BlockSet {
 
   void add(const BlockRange& blocks);
   /// All blocks within so many of these, as far as the range and the axes' blocks reach.
-  BlockSet widened(int x_blocks, int y_blocks, int x_count, int y_count) const;
+  BlockSet with_neighbours(int x_blocks, int y_blocks, int x_count, int y_count) const;
   std::vector<BlockRun> runs(int theta) const;
 
  private:

@@ -52,23 +52,10 @@ void PlaceElements(const double* xy_mm, std::size_t count, double cos_by_cell, d
   }
 }
 
-template <class D>
-void store_as(D d, hn::Vec<D> v, double* to) {
-  hn::StoreU(v, d, to);
-}
-
-template <class D>
-void store_as(D /*d*/, hn::Vec<D> v, float* to) {
-  const hn::Rebind<float, D> df;
-  hn::StoreU(hn::DemoteTo(df, v), df, to);
-}
-
 /// Finds each element's patch. The index is clamped so that elements beyond the map see a patch of
-/// the border, whose nodes are all equal. For float64, patches with nodes of the border have their
-/// index's bits flipped.
-template <typename Lane>
+/// the border, whose nodes are all equal.
 void find_patches(const BinBlock& block, const MapPatches& map, const PlacedElements& placed,
-                  ElementPatches<Lane>& found) {
+                  ElementPatches& found) {
   const hn::ScalableTag<double> d;
   const hn::Rebind<std::int32_t, decltype(d)> di;
   const auto first_x = hn::Set(d, block.x);
@@ -76,31 +63,29 @@ void find_patches(const BinBlock& block, const MapPatches& map, const PlacedElem
   const auto last_x = hn::Set(d, static_cast<double>(map.width() - MapPatches::side));
   const auto last_y = hn::Set(d, static_cast<double>(map.height() - MapPatches::side));
   const auto width = hn::Set(d, static_cast<double>(map.width()));
-  [[maybe_unused]] const auto border = hn::Set(d, static_cast<double>(MapPatches::border));
+  const auto border = hn::Set(d, static_cast<double>(MapPatches::border));
   for (std::size_t e = 0; e < found.patch.size(); e += hn::Lanes(d)) {
     const auto x = hn::Add(hn::LoadU(d, placed.x.data() + e), first_x);
     const auto y = hn::Add(hn::LoadU(d, placed.y.data() + e), first_y);
     const auto whole_x = hn::Floor(x);
     const auto whole_y = hn::Floor(y);
-    store_as(d, hn::Sub(x, whole_x), found.x.data() + e);
-    store_as(d, hn::Sub(y, whole_y), found.y.data() + e);
+    hn::StoreU(hn::Sub(x, whole_x), d, found.x.data() + e);
+    hn::StoreU(hn::Sub(y, whole_y), d, found.y.data() + e);
     const auto column = hn::Max(hn::Zero(d), hn::Min(whole_x, last_x));
     const auto row = hn::Max(hn::Zero(d), hn::Min(whole_y, last_y));
-    auto patch = hn::Add(hn::Mul(row, width), column);
-    if constexpr (sizeof(Lane) == 8) {
-      const auto x_off = hn::Or(hn::Lt(column, border), hn::Gt(column, hn::Sub(last_x, border)));
-      const auto y_off = hn::Or(hn::Lt(row, border), hn::Gt(row, hn::Sub(last_y, border)));
-      const auto flipped = hn::Sub(hn::Set(d, -1.0), patch);
-      patch = hn::IfThenElse(hn::Or(x_off, y_off), flipped, patch);
-    }
-    hn::StoreU(hn::DemoteTo(di, patch), di, found.patch.data() + e);
+    const auto patch = hn::Add(hn::Mul(row, width), column);
+    const auto x_off = hn::Or(hn::Lt(column, border), hn::Gt(column, hn::Sub(last_x, border)));
+    const auto y_off = hn::Or(hn::Lt(row, border), hn::Gt(row, hn::Sub(last_y, border)));
+    const auto flipped = hn::Sub(hn::Set(d, -1.0), patch);
+    const auto marked = hn::IfThenElse(hn::Or(x_off, y_off), flipped, patch);
+    hn::StoreU(hn::DemoteTo(di, marked), di, found.patch.data() + e);
   }
 }
 
 /// The bins of one vector, by the model's form.
 /// @param log_odds_at (element): in every lane
 template <class D, class LogOddsAt>
-void evaluate_vector(D d, const LogOddsAt& log_odds_at, const BinTask<hn::TFromD<D>>& task,
+void evaluate_vector(D d, const LogOddsAt& log_odds_at, const BinTask& task,
                      double* log_likelihood) {
   const ReadingForm& form = task.form;
   if (form.kind == ReadingForm::Kind::products) {
@@ -109,7 +94,7 @@ void evaluate_vector(D d, const LogOddsAt& log_odds_at, const BinTask<hn::TFromD
     const auto row = [&](Reading reading)
                          HWY_ATTR { return TableRow(d, form, task.object, reading); };
     add_elements(d, log_odds_at, task.runs, row, log_likelihood);
-  } else if constexpr (sizeof(hn::TFromD<D>) == 8) {
+  } else {
     const auto logs = [&](Reading reading) HWY_ATTR { return LogisticFloor(d, form, reading); };
     add_elements(d, log_odds_at, task.runs, logs, log_likelihood);
   }
@@ -117,18 +102,17 @@ void evaluate_vector(D d, const LogOddsAt& log_odds_at, const BinTask<hn::TFromD
 
 /// Fills vectors with the bins of as many blocks as fit wholly, or with a part of one block's.
 /// @param patches [block] memory
-template <typename Lane>
-void evaluate(const BinTask<Lane>& task, std::vector<ElementPatches<Lane>>& patches) {
-  const BinList<Lane>& bins = task.bins;
+void EvaluateBins(const BinTask& task, std::vector<ElementPatches>& patches) {
+  const BinList& bins = task.bins;
   const std::vector<BinBlock>& blocks = bins.blocks;
   for (std::size_t i = 0; i < blocks.size(); ++i) {
     find_patches(blocks[i], task.map, task.placed, patches[i]);
   }
-  using D = hn::ScalableTag<Lane>;
+  using D = hn::ScalableTag<double>;
   const D d;
   const std::size_t lanes = hn::Lanes(d);
-  HWY_ALIGN Lane x_offset[most_lanes] = {};
-  HWY_ALIGN Lane y_offset[most_lanes] = {};
+  HWY_ALIGN double x_offset[most_lanes] = {};
+  HWY_ALIGN double y_offset[most_lanes] = {};
   HWY_ALIGN double out[most_lanes] = {};
   LanesOfBlock<D> parts[most_lanes];
   std::size_t block = 0;
@@ -166,14 +150,6 @@ void evaluate(const BinTask<Lane>& task, std::vector<ElementPatches<Lane>>& patc
   }
 }
 
-void EvaluateFloat(const BinTask<float>& task, std::vector<ElementPatches<float>>& patches) {
-  evaluate(task, patches);
-}
-
-void EvaluateDouble(const BinTask<double>& task, std::vector<ElementPatches<double>>& patches) {
-  evaluate(task, patches);
-}
-
 std::int64_t Target() { return HWY_TARGET; }
 
 }  // namespace HWY_NAMESPACE
@@ -187,12 +163,12 @@ HWY_AFTER_NAMESPACE();
 namespace palpate {
 
 HWY_EXPORT(PlaceElements);
-HWY_EXPORT(EvaluateFloat);
-HWY_EXPORT(EvaluateDouble);
+HWY_EXPORT(EvaluateBins);
 HWY_EXPORT(Target);
 
-PositionGrid::PositionGrid(double reach_cells, double finest)
-    : step_(std::max(finest, std::exp2(std::ceil(std::log2(2.0 * reach_cells)) - 51.0))) {}
+// Places within a patch are below 4 cells: they are exact in 53 bits.
+PositionGrid::PositionGrid(double reach_cells)
+    : step_(std::max(0x1p-51, std::exp2(std::ceil(std::log2(2.0 * reach_cells)) - 51.0))) {}
 
 void place_elements(std::span<const glm::dvec2> from_pivot_mm, double theta_rad, double cell_mm,
                     double reach_cells, const PositionGrid& grid, PlacedElements& placed) {
@@ -205,24 +181,16 @@ void place_elements(std::span<const glm::dvec2> from_pivot_mm, double theta_rad,
   }
 }
 
-template <typename Lane>
-void evaluate_bins(const BinTask<Lane>& task, std::vector<ElementPatches<Lane>>& scratch) {
+void evaluate_bins(const BinTask& task, std::vector<ElementPatches>& scratch) {
   const std::size_t elements = task.placed.x.size();
   scratch.resize(std::max(scratch.size(), task.bins.blocks.size()));
-  for (ElementPatches<Lane>& patches : scratch) {
+  for (ElementPatches& patches : scratch) {
     patches.patch.resize(elements);
     patches.x.resize(elements);
     patches.y.resize(elements);
   }
-  if constexpr (sizeof(Lane) == 4) {
-    HWY_DYNAMIC_DISPATCH(EvaluateFloat)(task, scratch);
-  } else {
-    HWY_DYNAMIC_DISPATCH(EvaluateDouble)(task, scratch);
-  }
+  HWY_DYNAMIC_DISPATCH(EvaluateBins)(task, scratch);
 }
-
-template void evaluate_bins(const BinTask<float>&, std::vector<ElementPatches<float>>&);
-template void evaluate_bins(const BinTask<double>&, std::vector<ElementPatches<double>>&);
 
 std::string vector_instructions() { return hwy::TargetName(HWY_DYNAMIC_DISPATCH(Target)()); }
 

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <string>
 #include <vector>
@@ -31,16 +32,14 @@ class MapPatches {
   const float* nodes() const { return nodes_.data(); }
   std::uint64_t bytes() const { return nodes_.capacity() * sizeof(float); }
 
-  /// The number that stands for the prior in nodes(): a float near it that no cell of the map
-  /// holds, so that float64 kernels can put the exact prior in its place.
-  float marker() const { return marker_; }
+  /// Stands for the prior in nodes(): kernels put the exact prior in its place.
+  static constexpr float marker = std::numeric_limits<float>::infinity();
   double prior_log_odds() const { return prior_log_odds_; }
 
  private:
   int width_;
   int height_;
   double prior_log_odds_;
-  float marker_;
   std::vector<float> nodes_;
 };
 
@@ -51,21 +50,6 @@ struct TableExtent {
   double width = 0.0;     ///< from the first node to the last, in nats of log odds
 };
 
-/// The numbers of a table for kernels: for each set and reading a row of values, then a row of the
-/// differences to the next node's value, 0 at the last.
-template <typename Lane>
-struct TableRows {
-  /// Rows are at least so long, and padded with 0 to a multiple of the lanes of a vector: shorter
-  /// ones may be read into registers as a whole.
-  static constexpr std::size_t least_length = 64;
-
-  std::size_t length = 0;  ///< of a row
-  std::vector<Lane> numbers;
-
-  /// @param row of values, counted over sets and readings; its differences are `length` farther
-  const Lane* values(std::size_t row) const { return numbers.data() + 2 * row * length; }
-};
-
 /// How kernels of bins evaluate Eq. 7, or the table in its place. With r = gamma m / s and
 /// s = gamma m + 1 - gamma, the likelihood of contact at log odds z (of no contact at -z) is
 ///
@@ -73,7 +57,7 @@ struct TableRows {
 ///
 /// Numerators and denominators are multiplied over elements, powers of two taken out every
 /// `interval` elements, and one logarithm taken per bin. Where r is too small for products of
-/// r + e, and for gamma = 0, float64 adds up the elements' logs instead, each with
+/// r + e, and for gamma = 0, the elements' logs are added up instead, each with
 ///
 ///     r + e = exp(a) (1 + exp(-|z - log r|)),   a = max(z, log r), for z < 0.
 struct ReadingForm {
@@ -82,29 +66,21 @@ struct ReadingForm {
   /// @param contact resolved: with its prior
   explicit ReadingForm(const ContactModel& contact);
 
-  /// The row of an object's reading, see TableRows.
-  std::size_t row(std::size_t object, Reading reading) const {
-    return (sets == 1 ? 0 : object) * readings + static_cast<std::size_t>(reading);
+  /// A table's values of an object's reading, [node]; behind them the differences to the next
+  /// node's value, 0 at the last.
+  const double* values(std::size_t object, Reading reading) const {
+    const std::size_t row = (sets == 1 ? 0 : object) * readings + static_cast<std::size_t>(reading);
+    return rows.data() + 2 * row * nodes;
   }
-  template <typename Lane>
-  const TableRows<Lane>& rows() const {
-    if constexpr (sizeof(Lane) == 4) {
-      return float_rows;
-    } else {
-      return double_rows;
-    }
-  }
-
   TableExtent table_extent(std::size_t object) const;
   /// Largest magnitude of an element's log-likelihood by Eq. 7, for log odds of this magnitude.
   double largest_nats(double largest_log_odds) const;
 
-  Kind kind = Kind::products;  ///< float32 takes no logs
-  double ratio = 0.0;          ///< r
-  double log_ratio = 0.0;      ///< log r, finite also for r = 0
-  double log_scale = 0.0;      ///< log s
-  int float_interval = 1;
-  int double_interval = 1;
+  Kind kind = Kind::products;
+  double ratio = 0.0;      ///< r
+  double log_ratio = 0.0;  ///< log r, finite also for r = 0
+  double log_scale = 0.0;  ///< log s
+  int interval = 1;
 
   // What a table has beside.
   double first_log_odds = 0.0;
@@ -112,15 +88,11 @@ struct ReadingForm {
   std::size_t nodes = 0;
   std::size_t readings = 0;
   std::size_t sets = 0;
-  TableRows<float> float_rows;
-  TableRows<double> double_rows;
+  std::vector<double> rows;  ///< [set, reading, values and differences, node]
 };
 
-/// Elements whose log-likelihoods float32 adds up by itself; float64 takes their sum.
-inline constexpr int floats_together = 8;
-
 /// Most lanes of a vector. Lists that kernels read are padded to a multiple of it.
-inline constexpr std::size_t most_lanes = 16;
+inline constexpr std::size_t most_lanes = 8;
 constexpr std::size_t padded(std::size_t count) {
   return (count + most_lanes - 1) / most_lanes * most_lanes;
 }
@@ -130,8 +102,7 @@ constexpr std::size_t padded(std::size_t count) {
 class PositionGrid {
  public:
   /// @param reach_cells largest magnitude of a position
-  /// @param finest no step is finer: where fractions below 4 must fit the lanes' numbers exactly
-  PositionGrid(double reach_cells, double finest);
+  explicit PositionGrid(double reach_cells);
 
   double step() const { return step_; }
   /// Added to a position and subtracted again, it rounds the position to the grid.
@@ -150,11 +121,10 @@ struct PlacedElements {
 
 /// Where an element stands about a block of bins: the patch, as an index of MapPatches, and the
 /// place of the block's first bin within the patch's first cell, [e], padded.
-template <typename Lane>
 struct ElementPatches {
-  std::vector<std::int32_t> patch;
-  std::vector<Lane> x;
-  std::vector<Lane> y;
+  std::vector<std::int32_t> patch;  ///< its bits flipped where it has nodes of the border
+  std::vector<double> x;
+  std::vector<double> y;
 };
 
 /// Bins of one object and theta that lie within two cells of the map along each axis.
@@ -165,11 +135,10 @@ struct BinBlock {
 };
 
 /// The bins of some blocks, one block after another.
-template <typename Lane>
 struct BinList {
   std::vector<BinBlock> blocks;
-  std::vector<Lane> x_offset;  ///< [bin] from the first of its block, in [0, 2] cells
-  std::vector<Lane> y_offset;
+  std::vector<double> x_offset;  ///< [bin] from the first of its block, in [0, 2] cells
+  std::vector<double> y_offset;
   std::vector<double*> result;  ///< [bin] where its log-likelihood goes
 
   std::size_t bins() const { return x_offset.size(); }
@@ -186,21 +155,19 @@ void place_elements(std::span<const glm::dvec2> from_pivot_mm, double theta_rad,
                     double reach_cells, const PositionGrid& grid, PlacedElements& placed);
 
 /// Bins of one object and theta, and what their log-likelihood follows from.
-template <typename Lane>
 struct BinTask {
-  const BinList<Lane>& bins;
+  const BinList& bins;
   const MapPatches& map;
   std::size_t object = 0;
   const PlacedElements& placed;
   std::span<const ReadingRun> runs;  ///< of the placed elements
-  const ReadingForm& form;           ///< logs only for Lane = double
+  const ReadingForm& form;
 };
 
-/// Log-likelihood of the elements at bins, in nats, with vectors of `Lane`. Vectors are filled with
-/// bins of several blocks. Each bin's bits depend neither on the others nor on the processor.
+/// Log-likelihood of the elements at bins, in nats. Vectors are filled with bins of several blocks.
+/// Each bin's bits depend neither on the others nor on the processor.
 /// @param scratch memory to be used again
-template <typename Lane>
-void evaluate_bins(const BinTask<Lane>& task, std::vector<ElementPatches<Lane>>& scratch);
+void evaluate_bins(const BinTask& task, std::vector<ElementPatches>& scratch);
 
 /// The vector instructions that kernels use on this processor, such as "AVX3".
 std::string vector_instructions();

@@ -2,7 +2,6 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <unordered_set>
 
 #include <fmt/format.h>
 
@@ -13,61 +12,36 @@ namespace palpate {
 
 namespace {
 
-/// A float near the log odds that none of the cells holds.
-float unused_float(const OccupancyGrid& map, double log_odds) {
-  const auto nearest = static_cast<float>(log_odds);
-  const double near = 1e-3 * (1.0 + std::abs(log_odds));
-  std::unordered_set<float> used;
-  for (const float cell : map.log_odds) {
-    if (std::abs(cell - log_odds) < near) {
-      used.insert(cell);
-    }
-  }
-  constexpr float infinity = std::numeric_limits<float>::infinity();
-  float below = nearest;
-  float above = nearest;
-  while (used.contains(below) && used.contains(above)) {
-    below = std::nextafter(below, -infinity);
-    above = std::nextafter(above, infinity);
-  }
-  return used.contains(below) ? above : below;
-}
-
-/// Below it float32 would have to take out powers of two at every third element or oftener.
+/// Below it powers of two would have to be taken out every 33 elements or oftener.
 constexpr double least_ratio = 0x1p-30;
 /// Stands for log 0: below all log odds.
 constexpr double log_zero = -1e38;
 
-template <typename Lane>
-TableRows<Lane> rows_of(const LikelihoodTable& table) {
-  TableRows<Lane> rows{.length = std::max(TableRows<Lane>::least_length, padded(table.nodes)),
-                       .numbers = {}};
-  for (auto of = table.log_likelihood.begin(); of != table.log_likelihood.end();
-       of += static_cast<std::ptrdiff_t>(table.nodes)) {
-    const std::size_t first = rows.numbers.size();
-    rows.numbers.resize(first + 2 * rows.length);
-    for (std::size_t node = 0; node < table.nodes; ++node) {
-      const double next = node + 1 < table.nodes ? of[node + 1] : of[node];
-      rows.numbers[first + node] = static_cast<Lane>(of[node]);
-      rows.numbers[first + rows.length + node] = static_cast<Lane>(next - of[node]);
+/// See ReadingForm::rows.
+std::vector<double> rows_of(const LikelihoodTable& table) {
+  std::vector<double> rows;
+  rows.reserve(2 * table.log_likelihood.size());
+  const auto nodes = static_cast<std::ptrdiff_t>(table.nodes);
+  for (auto of = table.log_likelihood.begin(); of != table.log_likelihood.end(); of += nodes) {
+    rows.insert(rows.end(), of, of + nodes);
+    for (auto node = of; node + 1 != of + nodes; ++node) {
+      rows.push_back(node[1] - node[0]);
     }
+    rows.push_back(0.0);
   }
   return rows;
 }
 
 /// Elements whose numerators, in [ratio, 2], and denominators, in [1, 2], a product takes before it
-/// could leave 2^+-range. Each starts within [1, 2).
-int interval_within(double range, double ratio) {
-  return static_cast<int>(std::min(64.0, (range - 1.0) / std::max(1.0, -std::log2(ratio))));
+/// could leave 2^+-1000. Each starts within [1, 2).
+int interval_of(double ratio) {
+  return static_cast<int>(std::min(64.0, 999.0 / std::max(1.0, -std::log2(ratio))));
 }
 
 }  // namespace
 
 MapPatches::MapPatches(const OccupancyGrid& map, double prior)
-    : width_(0),
-      height_(0),
-      prior_log_odds_(log_odds_from_probability(prior)),
-      marker_(unused_float(map, prior_log_odds_)) {
+    : width_(0), height_(0), prior_log_odds_(log_odds_from_probability(prior)) {
   // Kernels hold the index of a node in 32 bits.
   const std::int64_t width = std::int64_t{map.nx} + 2 * border;
   const std::int64_t height = std::int64_t{map.ny} + 2 * border;
@@ -83,7 +57,7 @@ MapPatches::MapPatches(const OccupancyGrid& map, double prior)
     const std::int64_t j = row - border;
     return i >= 0 && i < map.nx && j >= 0 && j < map.ny
                ? map.at(static_cast<int>(i), static_cast<int>(j))
-               : marker_;
+               : marker;
   };
   // A vector of 16 floats may start as far as one column and one row into the last patch.
   constexpr std::size_t beyond = side * side;
@@ -95,7 +69,7 @@ MapPatches::MapPatches(const OccupancyGrid& map, double prior)
       }
     }
   }
-  nodes_.resize(nodes_.size() + beyond, marker_);
+  nodes_.resize(nodes_.size() + beyond, marker);
 }
 
 ReadingForm::ReadingForm(const ContactModel& contact) {
@@ -107,8 +81,7 @@ ReadingForm::ReadingForm(const ContactModel& contact) {
     sets = from.sets();
     first_log_odds = from.first_log_odds;
     nodes_per_nat = static_cast<double>(nodes - 1) / (from.last_log_odds - from.first_log_odds);
-    float_rows = rows_of<float>(from);
-    double_rows = rows_of<double>(from);
+    rows = rows_of(from);
     return;
   }
   const double floor = contact.gamma * contact.prior.value();
@@ -117,8 +90,7 @@ ReadingForm::ReadingForm(const ContactModel& contact) {
   ratio = floor / scale;
   if (ratio >= least_ratio) {
     log_ratio = std::log(ratio);
-    float_interval = interval_within(120.0, ratio);
-    double_interval = interval_within(1000.0, ratio);
+    interval = interval_of(ratio);
     return;
   }
   kind = Kind::logs;
@@ -130,11 +102,10 @@ ReadingForm::ReadingForm(const ContactModel& contact) {
 TableExtent ReadingForm::table_extent(std::size_t object) const {
   TableExtent extent{.width = static_cast<double>(nodes - 1) / nodes_per_nat};
   for (std::size_t reading = 0; reading < readings; ++reading) {
-    const double* values = double_rows.values(row(object, static_cast<Reading>(reading)));
-    const double* differences = values + double_rows.length;
+    const double* of = values(object, static_cast<Reading>(reading));
     for (std::size_t i = 0; i < nodes; ++i) {
-      extent.largest = std::max(extent.largest, std::abs(values[i]));
-      extent.steepest = std::max(extent.steepest, std::abs(differences[i]) * nodes_per_nat);
+      extent.largest = std::max(extent.largest, std::abs(of[i]));
+      extent.steepest = std::max(extent.steepest, std::abs(of[nodes + i]) * nodes_per_nat);
     }
   }
   return extent;

@@ -20,17 +20,16 @@ constexpr std::size_t blocks_together = 16;
 constexpr std::size_t task_bins = 1024;
 
 /// Positions along one axis of neighbouring bins: on the grid, and as offsets from the first.
-template <typename Lane>
 struct AxisRun {
   double first = 0.0;
   int count = 0;
-  std::array<Lane, most_block_bins> offset{};
+  std::array<double, most_block_bins> offset{};
 
   /// Takes as many bins from `begin` on as a block may span, `most` at most.
   AxisRun(const Axis& axis_mm, int begin, int most, double origin_mm, const PlacedMap& map) {
     const auto at = [&](int bin) {
       const double cells = (axis_mm.centre(bin) - origin_mm) / map.cell_mm + MapPatches::border;
-      return map.grid<Lane>().rounded(cells);
+      return map.grid.rounded(cells);
     };
     first = at(begin);
     for (; count < std::min(most, most_block_bins); ++count) {
@@ -38,7 +37,7 @@ struct AxisRun {
       if (cells > most_block_cells) {
         break;
       }
-      offset[count] = static_cast<Lane>(cells);
+      offset[count] = cells;
     }
   }
 };
@@ -57,8 +56,7 @@ BinLikelihood::BinLikelihood(std::span<const Hypothesis> hypotheses, const Conta
                              const PoseLattice& lattice, const DisplacementSd& touch_sd)
     : form_(contact), lattice_(lattice) {
   if (!touch_sd.none()) {
-    displacement_ = std::make_unique<DisplacementWeights>(lattice, touch_sd);
-    displaced_.emplace(*displacement_, 1);
+    displaced_.emplace(DisplacementWeights(lattice, touch_sd), 1);
   }
   for (const Hypothesis& hypothesis : hypotheses) {
     maps_.emplace_back(hypothesis.compared(), *contact.prior, lattice);
@@ -67,18 +65,16 @@ BinLikelihood::BinLikelihood(std::span<const Hypothesis> hypotheses, const Conta
 
 void BinLikelihood::move_pivot(const glm::dvec2& pivot_mm) { lattice_.pivot_mm = pivot_mm; }
 
-template <typename Lane>
 void BinLikelihood::evaluate_alone(std::span<const BinBox> boxes, const KnownElements& elements,
                                    double* log_likelihood) const {
   PlacedElements placed;
-  BinList<Lane> bins;
-  std::vector<ElementPatches<Lane>> scratch;
+  BinList bins;
+  std::vector<ElementPatches> scratch;
   const BinBox* of = nullptr;  // the listed bins' object and theta
   const auto evaluate_list = [&] {
     if (bins.bins() > 0) {
       const auto object = static_cast<std::size_t>(of->object);
-      evaluate_bins<Lane>({bins, maps_[object].nodes, object, placed, elements.runs, form_},
-                          scratch);
+      evaluate_bins({bins, maps_[object].nodes, object, placed, elements.runs, form_}, scratch);
       bins.clear();
     }
   };
@@ -87,17 +83,17 @@ void BinLikelihood::evaluate_alone(std::span<const BinBox> boxes, const KnownEle
     if (of == nullptr || of->object != box.object || of->theta != box.theta) {
       evaluate_list();
       place_elements(elements.from_pivot_mm, lattice_.theta_rad.centre(box.theta), map.cell_mm,
-                     map.reach_cells, map.grid<Lane>(), placed);
+                     map.reach_cells, map.grid, placed);
     }
     of = &box;
     const int width = bins_per_part(box.x_count, lattice_.x_mm.step() / map.cell_mm);
     const int height = bins_per_part(box.y_count, lattice_.y_mm.step() / map.cell_mm);
     for (int j = 0; j < box.y_count;) {
-      const AxisRun<Lane> rows(lattice_.y_mm, box.y_first + j, std::min(height, box.y_count - j),
-                               map.origin_mm.y, map);
+      const AxisRun rows(lattice_.y_mm, box.y_first + j, std::min(height, box.y_count - j),
+                         map.origin_mm.y, map);
       for (int i = 0; i < box.x_count;) {
-        const AxisRun<Lane> columns(lattice_.x_mm, box.x_first + i,
-                                    std::min(width, box.x_count - i), map.origin_mm.x, map);
+        const AxisRun columns(lattice_.x_mm, box.x_first + i, std::min(width, box.x_count - i),
+                              map.origin_mm.x, map);
         for (int r = 0; r < rows.count; ++r) {
           for (int c = 0; c < columns.count; ++c) {
             bins.x_offset.push_back(columns.offset[c]);
@@ -118,9 +114,9 @@ void BinLikelihood::evaluate_alone(std::span<const BinBox> boxes, const KnownEle
   evaluate_list();
 }
 
-template <typename Lane>
-void BinLikelihood::evaluate_parts(std::span<const BinBox> boxes, const KnownElements& elements,
-                                   std::span<double> log_likelihood) const {
+void BinLikelihood::evaluate_undisplaced(std::span<const BinBox> boxes,
+                                         const KnownElements& elements,
+                                         std::span<double> log_likelihood) const {
   std::vector<BinBox> parts;               // large boxes are cut between rows
   std::vector<std::size_t> first_bin{0};   // [part]
   std::vector<std::size_t> first_part{0};  // [task]
@@ -142,40 +138,22 @@ void BinLikelihood::evaluate_parts(std::span<const BinBox> boxes, const KnownEle
   }
   parallel_for(first_part.size() - 1, [&](std::size_t task) {
     const std::size_t first = first_part[task];
-    evaluate_alone<Lane>(std::span(parts).subspan(first, first_part[task + 1] - first), elements,
-                         log_likelihood.data() + first_bin[first]);
+    evaluate_alone(std::span(parts).subspan(first, first_part[task + 1] - first), elements,
+                   log_likelihood.data() + first_bin[first]);
   });
 }
 
 void BinLikelihood::evaluate(std::span<const BinBox> boxes, const KnownElements& elements,
-                             Arithmetic arithmetic, std::span<double> log_likelihood,
-                             std::span<double> errors) const {
-  if (!displaced_) {
-    evaluate_exact(boxes, elements, arithmetic, log_likelihood);
-  } else if (in_float32(arithmetic)) {
-    evaluate_displaced<float>(boxes, elements, log_likelihood, errors);
+                             std::span<double> log_likelihood) const {
+  if (displaced_) {
+    evaluate_displaced(boxes, elements, log_likelihood);
   } else {
-    evaluate_displaced<double>(boxes, elements, log_likelihood, errors);
+    evaluate_undisplaced(boxes, elements, log_likelihood);
   }
 }
-
-void BinLikelihood::evaluate_exact(std::span<const BinBox> boxes, const KnownElements& elements,
-                                   Arithmetic arithmetic, std::span<double> log_likelihood) const {
-  if (in_float32(arithmetic)) {
-    evaluate_parts<float>(boxes, elements, log_likelihood);
-  } else {
-    evaluate_parts<double>(boxes, elements, log_likelihood);
-  }
-}
-
-template void BinLikelihood::evaluate_alone<float>(std::span<const BinBox>, const KnownElements&,
-                                                   double*) const;
-template void BinLikelihood::evaluate_alone<double>(std::span<const BinBox>, const KnownElements&,
-                                                    double*) const;
 
 std::uint64_t BinLikelihood::bytes() const {
-  std::uint64_t sum = form_.float_rows.numbers.capacity() * sizeof(float) +
-                      form_.double_rows.numbers.capacity() * sizeof(double);
+  std::uint64_t sum = form_.rows.capacity() * sizeof(double);
   for (const PlacedMap& map : maps_) {
     sum += map.nodes.bytes();
   }

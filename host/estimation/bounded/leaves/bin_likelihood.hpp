@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -18,19 +17,11 @@
 
 namespace palpate {
 
-/// The numbers in which bins are evaluated. What needs the logs of Eq. 7 (ReadingForm) takes
-/// float64 in both.
-enum class Arithmetic { float32, float64 };
-
 /// A map, how a lattice's bins lie on it, and what bounds the rounding of log odds there.
 struct PlacedMap {
   /// @throws Error where the map has too many cells
   PlacedMap(const OccupancyGrid& map, double prior, const PoseLattice& lattice);
 
-  template <typename Lane>
-  const PositionGrid& grid() const {
-    return sizeof(Lane) == 4 ? float_grid : double_grid;
-  }
   /// Bound, in cells along an axis, of the float64 rounding of an element's place at a bin.
   double place_error(const KnownElements& elements) const;
   /// Bound of the change of log odds where a place is wrong by so many cells along both axes.
@@ -41,8 +32,7 @@ struct PlacedMap {
   glm::dvec2 origin_mm;
   double lattice_cells;  ///< no bin nor node is farther from the frames' origins
   double reach_cells;    ///< no bin's position is larger; from farther elements all bins are off
-  PositionGrid float_grid;
-  PositionGrid double_grid;
+  PositionGrid grid;
 
   // Over all nodes of the map and the prior beyond.
   double largest = 0.0;   ///< magnitude
@@ -53,8 +43,8 @@ struct PlacedMap {
 /// Evaluates the log-likelihood (Eq. 7, 13) of bins on the host, by vector instructions chosen at
 /// run time. A bin has the same bits with every set of instructions, on every number of threads and
 /// in every box. Calls from several threads may run at once, but for those about the same touches
-/// with KnownElements::exact_bins. Displaced touches have their mean likelihoods: all bins within
-/// reach of a bin are evaluated, too, and boxes that lie together share them.
+/// with KnownElements::undisplaced_bins. Displaced touches have their mean likelihoods: all bins
+/// within reach of a bin are evaluated, too, and boxes that lie together share them.
 class BinLikelihood {
  public:
   /// @param contact resolved: with its prior
@@ -67,51 +57,34 @@ class BinLikelihood {
   /// Log-likelihood of the elements at every bin in nats, boxes one after another, [y, x] in each.
   /// On the threads of the caller's TBB arena. Fastest where boxes of one object and theta stand
   /// together.
-  /// @param errors where not empty and touches are displaced, [bin] receives error: the likelihood
-  /// may be wrong by e^error - 1 of itself beside error()
-  void evaluate(std::span<const BinBox> boxes, const KnownElements& elements, Arithmetic arithmetic,
-                std::span<double> log_likelihood, std::span<double> errors = {}) const;
+  void evaluate(std::span<const BinBox> boxes, const KnownElements& elements,
+                std::span<double> log_likelihood) const;
   /// Proven bound, in nats, of the error of evaluate() at any bin of an object.
-  double error(std::size_t object, const KnownElements& elements, Arithmetic arithmetic) const;
+  double error(std::size_t object, const KnownElements& elements) const;
   /// evaluate() and its error() as if all touches were exact.
-  void evaluate_exact(std::span<const BinBox> boxes, const KnownElements& elements,
-                      Arithmetic arithmetic, std::span<double> log_likelihood) const;
-  double exact_error(std::size_t object, const KnownElements& elements,
-                     Arithmetic arithmetic) const;
+  void evaluate_undisplaced(std::span<const BinBox> boxes, const KnownElements& elements,
+                            std::span<double> log_likelihood) const;
+  double undisplaced_error(std::size_t object, const KnownElements& elements) const;
 
-  /// Whether touches are displaced.
-  bool displaced() const { return displaced_.has_value(); }
   /// Host memory that the maps' nodes and the table hold.
   std::uint64_t bytes() const;
   /// The vector instructions in use, such as "AVX3".
   static std::string instructions() { return vector_instructions(); }
 
  private:
-  bool in_float32(Arithmetic arithmetic) const {
-    return arithmetic == Arithmetic::float32 && form_.kind != ReadingForm::Kind::logs;
-  }
   /// Bins as if all touches were exact, on the caller's thread.
-  template <typename Lane>
   void evaluate_alone(std::span<const BinBox> boxes, const KnownElements& elements,
                       double* log_likelihood) const;
   /// Sets a touch's bins as if its pose were exact, on the caller's thread.
-  template <typename Lane>
   void evaluate_blocks(std::size_t object, std::span<const BlockRun> runs,
                        const KnownElements& touch, const PlaceRows<double>& rows) const;
-  template <typename Lane>
-  void evaluate_parts(std::span<const BinBox> boxes, const KnownElements& elements,
-                      std::span<double> log_likelihood) const;
-  template <typename Lane>
   void evaluate_displaced(std::span<const BinBox> boxes, const KnownElements& elements,
-                          std::span<double> log_likelihood, std::span<double> errors) const;
-  template <typename Lane>
-  double exact_error_in(std::size_t object, const KnownElements& elements) const;
+                          std::span<double> log_likelihood) const;
 
   std::vector<PlacedMap> maps_;  ///< [object]
   ReadingForm form_;
   PoseLattice lattice_;
-  std::unique_ptr<const DisplacementWeights> displacement_;  ///< null where touches are exact
-  std::optional<DisplacementMean> displaced_;                ///< of bins
+  std::optional<DisplacementMean> displaced_;  ///< of bins; nothing where touches are exact
 };
 
 }  // namespace palpate

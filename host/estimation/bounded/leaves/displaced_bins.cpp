@@ -1,7 +1,8 @@
 #include <algorithm>
+#include <functional>
 #include <tuple>
 
-#include "estimation/bounded/displaced/exact_bins.hpp"
+#include "estimation/bounded/displaced/undisplaced_bins.hpp"
 #include "estimation/bounded/leaves/bin_likelihood.hpp"
 
 // Bins of displaced touches: the logs of each touch's mean likelihood, added up.
@@ -34,19 +35,14 @@ class BlockSums {
       }
       log_likelihood_.resize(log_likelihood_.size() + BlockRun::places);
     }
-    error_.resize(log_likelihood_.size());
   }
 
   std::span<const BlockRun> runs() const { return runs_; }
-  void add(const DisplacedMeans& touch) {
-    for (std::size_t i = 0; i < error_.size(); ++i) {
-      log_likelihood_[i] += touch.log_mean[i];
-      error_[i] += touch.error[i];
-    }
+  void add(std::span<const double> log_means) {
+    std::ranges::transform(log_likelihood_, log_means, log_likelihood_.begin(), std::plus());
   }
   /// Copies the sums of a box's bins, [y, x].
-  /// @param errors may be null
-  void copy(const BinBox& box, double* to, double* errors) const {
+  void copy(const BinBox& box, double* to) const {
     const auto after = [](const BlockRun& run) { return std::tuple(run.theta, run.y, run.x); };
     for (int y = box.y_first; y < box.y_first + box.y_count; ++y) {
       // A box's bins of a row lie in one run.
@@ -59,9 +55,6 @@ class BlockSums {
         const std::size_t bin = first + block * BlockRun::places +
                                 static_cast<std::size_t>(side * (y % side) + x % side);
         *to++ = log_likelihood_[bin];
-        if (errors != nullptr) {
-          *errors++ = error_[bin];
-        }
       }
     }
   }
@@ -70,12 +63,10 @@ class BlockSums {
   std::vector<BlockRun> runs_;
   std::vector<std::size_t> first_;  ///< [run] its first bin's place in what follows
   std::vector<double> log_likelihood_;
-  std::vector<double> error_;
 };
 
 }  // namespace
 
-template <typename Lane>
 void BinLikelihood::evaluate_blocks(std::size_t object, std::span<const BlockRun> runs,
                                     const KnownElements& touch,
                                     const PlaceRows<double>& rows) const {
@@ -92,7 +83,7 @@ void BinLikelihood::evaluate_blocks(std::size_t object, std::span<const BlockRun
     bins += static_cast<std::size_t>(part.bins());
   }
   std::vector<double> values(bins);
-  evaluate_alone<Lane>(parts, touch, values.data());
+  evaluate_alone(parts, touch, values.data());
   auto value = values.begin();
   for (const BinBox& part : parts) {
     for (int y = part.y_first; y < part.y_first + part.y_count; ++y) {
@@ -102,14 +93,12 @@ void BinLikelihood::evaluate_blocks(std::size_t object, std::span<const BlockRun
   }
 }
 
-template <typename Lane>
 void BinLikelihood::evaluate_displaced(std::span<const BinBox> boxes, const KnownElements& elements,
-                                       std::span<double> log_likelihood,
-                                       std::span<double> errors) const {
+                                       std::span<double> log_likelihood) const {
   // The order in which touches came must show in no bit.
-  const std::vector<std::size_t> order = sorted_touches(elements.touches);
+  const std::span<const KnownElements> items = elements.items();
+  const std::vector<std::size_t> order = sorted_touches(items);
   double* to = log_likelihood.data();
-  double* to_errors = errors.empty() ? nullptr : errors.data();
   for (std::size_t first = 0, end = 0; first < boxes.size(); first = end) {
     while (end < boxes.size() && boxes[end].object == boxes[first].object) {
       ++end;
@@ -118,32 +107,23 @@ void BinLikelihood::evaluate_displaced(std::span<const BinBox> boxes, const Know
     const auto object = static_cast<std::size_t>(boxes[first].object);
     BlockSums sums(of_object);
     for (const std::size_t i : order) {
-      const KnownElements& touch = elements.touches[i];
+      const KnownElements& touch = items[i];
       const auto source = [&](std::span<const BlockRun> runs, const PlaceRows<double>& rows) {
-        // Few bins are evaluated in float64 more than once.
-        if (sizeof(Lane) == sizeof(double) || touch.exact_bins == nullptr) {
-          evaluate_blocks<Lane>(object, runs, touch, rows);
+        if (touch.undisplaced_bins == nullptr) {
+          evaluate_blocks(object, runs, touch, rows);
           return;
         }
-        const std::vector<BlockRun> others = touch.exact_bins->copy(object, runs, rows);
-        evaluate_blocks<Lane>(object, others, touch, rows);
-        touch.exact_bins->keep(object, others, rows);
+        const std::vector<BlockRun> others = touch.undisplaced_bins->copy(object, runs, rows);
+        evaluate_blocks(object, others, touch, rows);
+        touch.undisplaced_bins->keep(object, others, rows);
       };
       sums.add(displaced_->means(touch.sensor_from_pivot_mm, sums.runs(), source));
     }
     for (const BinBox& box : of_object) {
-      sums.copy(box, to, to_errors);
+      sums.copy(box, to);
       to += box.bins();
-      to_errors += errors.empty() ? 0 : box.bins();
     }
   }
 }
-
-template void BinLikelihood::evaluate_displaced<float>(std::span<const BinBox>,
-                                                       const KnownElements&, std::span<double>,
-                                                       std::span<double>) const;
-template void BinLikelihood::evaluate_displaced<double>(std::span<const BinBox>,
-                                                        const KnownElements&, std::span<double>,
-                                                        std::span<double>) const;
 
 }  // namespace palpate

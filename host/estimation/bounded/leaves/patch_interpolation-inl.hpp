@@ -51,15 +51,9 @@ template <class DF, class VI>
 HWY_INLINE hn::Vec<DF> PatchNodes::at(DF df, VI index, int offset) const {
   const hn::Full512<float> whole;
   const hn::Full512<std::int32_t> whole_index;
-  const auto of_all = [&](auto wide) HWY_ATTR {
-    const auto lane = hn::Add(wide, hn::Set(whole_index, offset));
-    return hn::TableLookupLanes(nodes_, hn::IndicesFromVec(whole, lane));
-  };
-  if constexpr (hn::MaxLanes(DF()) == 16) {
-    return of_all(index);
-  } else {
-    return hn::LowerHalf(df, of_all(hn::ZeroExtendVector(whole_index, index)));
-  }
+  const auto wide = hn::ZeroExtendVector(whole_index, index);
+  const auto lane = hn::Add(wide, hn::Set(whole_index, offset));
+  return hn::LowerHalf(df, hn::TableLookupLanes(nodes_, hn::IndicesFromVec(whole, lane)));
 }
 
 #elif HWY_TARGET == HWY_AVX2
@@ -72,18 +66,11 @@ template <class DF, class VI>
 HWY_INLINE hn::Vec<DF> PatchNodes::at(DF df, VI index, int offset) const {
   const hn::Full256<float> whole;
   const hn::Full256<std::int32_t> whole_index;
-  const auto of_all = [&](auto wide) HWY_ATTR {
-    const auto node = hn::Add(wide, hn::Set(whole_index, offset));
-    const auto lane = hn::IndicesFromVec(whole, hn::And(node, hn::Set(whole_index, 7)));
-    const auto is_high = hn::BitCast(whole, hn::ShiftLeft<28>(node));
-    return hn::IfNegativeThenElse(is_high, hn::TableLookupLanes(high_, lane),
-                                  hn::TableLookupLanes(low_, lane));
-  };
-  if constexpr (hn::MaxLanes(DF()) == 8) {
-    return of_all(index);
-  } else {
-    return hn::LowerHalf(df, of_all(hn::ZeroExtendVector(whole_index, index)));
-  }
+  const auto node = hn::Add(hn::ZeroExtendVector(whole_index, index), hn::Set(whole_index, offset));
+  const auto lane = hn::IndicesFromVec(whole, hn::And(node, hn::Set(whole_index, 7)));
+  const auto is_high = hn::BitCast(whole, hn::ShiftLeft<28>(node));
+  return hn::LowerHalf(df, hn::IfNegativeThenElse(is_high, hn::TableLookupLanes(high_, lane),
+                                                  hn::TableLookupLanes(low_, lane)));
 }
 
 #else
@@ -106,10 +93,10 @@ struct LanesOfBlock {
   // GCC compiles constructors that it makes itself without the instructions that masks of NEON
   // need.
   HWY_ATTR LanesOfBlock() {}
-  HWY_ATTR LanesOfBlock(const ElementPatches<hn::TFromD<D>>* of, Mask all, FloatMask float_all)
+  HWY_ATTR LanesOfBlock(const ElementPatches* of, Mask all, FloatMask float_all)
       : elements(of), lanes(all), float_lanes(float_all) {}
 
-  const ElementPatches<hn::TFromD<D>>* elements = nullptr;
+  const ElementPatches* elements = nullptr;
   Mask lanes;
   FloatMask float_lanes;
 };
@@ -142,8 +129,8 @@ HWY_INLINE Corners<hn::Vec<DF>> corners_of(DF df, const float* patch, VI index) 
 }
 
 /// Interpolates between the corners that corners_at(index) reads, the nodes of a patch being
-/// numbered from its first corner column by column. In float64, where nodes of the border are among
-/// the patch's, puts the exact prior in the place of its marker.
+/// numbered from its first corner column by column. Where nodes of the border are among the
+/// patch's, puts the exact prior in the place of its marker.
 /// @param x, y places within the patch
 template <class D, class CornersAt>
 HWY_INLINE hn::Vec<D> interpolate(D d, const MapPatches& map, hn::Vec<D> x, hn::Vec<D> y,
@@ -152,25 +139,23 @@ HWY_INLINE hn::Vec<D> interpolate(D d, const MapPatches& map, hn::Vec<D> x, hn::
   const auto row = hn::Floor(y);
   const auto fx = hn::Sub(x, column);
   const auto fy = hn::Sub(y, row);
-  const auto index = small_integer(d, hn::Add(hn::Mul(column, hn::Set(d, hn::TFromD<D>{4})), row));
+  const hn::Rebind<std::int32_t, D> di;
+  const auto index =
+      hn::DemoteTo(di, hn::Add(hn::Mul(column, hn::Set(d, double{MapPatches::side})), row));
   const auto c = corners_at(index);
-  if constexpr (sizeof(hn::TFromD<D>) == 4) {
-    return bilinear(c.v00, c.v01, c.v10, c.v11, fx, fy);
-  } else {
-    const auto w00 = hn::PromoteTo(d, c.v00);
-    const auto w01 = hn::PromoteTo(d, c.v01);
-    const auto w10 = hn::PromoteTo(d, c.v10);
-    const auto w11 = hn::PromoteTo(d, c.v11);
-    // Few patches have nodes of the border: seldom is the branch mispredicted.
-    if (!with_border) {
-      return bilinear(w00, w01, w10, w11, fx, fy);
-    }
-    const auto marker = hn::Set(d, static_cast<double>(map.marker()));
-    const auto prior = hn::Set(d, map.prior_log_odds());
-    const auto unmarked = [&](hn::Vec<D> v)
-                              HWY_ATTR { return hn::IfThenElse(hn::Eq(v, marker), prior, v); };
-    return bilinear(unmarked(w00), unmarked(w01), unmarked(w10), unmarked(w11), fx, fy);
+  const auto w00 = hn::PromoteTo(d, c.v00);
+  const auto w01 = hn::PromoteTo(d, c.v01);
+  const auto w10 = hn::PromoteTo(d, c.v10);
+  const auto w11 = hn::PromoteTo(d, c.v11);
+  // Few patches have nodes of the border: seldom is the branch mispredicted.
+  if (!with_border) {
+    return bilinear(w00, w01, w10, w11, fx, fy);
   }
+  const auto marker = hn::Set(d, double{MapPatches::marker});
+  const auto prior = hn::Set(d, map.prior_log_odds());
+  const auto unmarked = [&](hn::Vec<D> v)
+                            HWY_ATTR { return hn::IfThenElse(hn::Eq(v, marker), prior, v); };
+  return bilinear(unmarked(w00), unmarked(w01), unmarked(w10), unmarked(w11), fx, fy);
 }
 
 /// The first node of a patch, see ElementPatches::patch.
@@ -187,14 +172,14 @@ template <class D, class Count>
 HWY_INLINE hn::Vec<D> log_odds(D d, const MapPatches& map, const LanesOfBlock<D>* parts,
                                Count count, std::size_t e, hn::Vec<D> x, hn::Vec<D> y) {
   const hn::Rebind<float, D> df;
-  const ElementPatches<hn::TFromD<D>>& first = *parts[0].elements;
+  const ElementPatches& first = *parts[0].elements;
   const float* nodes[most_lanes];
   nodes[0] = nodes_of(map, first.patch[e]);
   bool with_border = first.patch[e] < 0;
   auto from_x = hn::Set(d, first.x[e]);
   auto from_y = hn::Set(d, first.y[e]);
   for (std::size_t p = 1; p < count; ++p) {
-    const ElementPatches<hn::TFromD<D>>& elements = *parts[p].elements;
+    const ElementPatches& elements = *parts[p].elements;
     nodes[p] = nodes_of(map, elements.patch[e]);
     with_border = with_border || elements.patch[e] < 0;
     from_x = hn::IfThenElse(parts[p].lanes, hn::Set(d, elements.x[e]), from_x);

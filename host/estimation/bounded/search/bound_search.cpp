@@ -14,8 +14,8 @@ namespace palpate {
 
 namespace {
 
-/// Part of the tolerance that dropped tiles may use up; the rest is for rounding.
-constexpr double search_share = 0.75;
+/// Part of the tolerance that dropped tiles may use up; the rest is a margin.
+constexpr double search_share = 0.95;
 /// Beam width during survey(), where all tiles of a level are looked at first.
 constexpr std::size_t surveyed_tiles = 1024;
 /// Tiles that survey() looks at where touches are displaced, those of the largest bounds: they tell
@@ -41,7 +41,7 @@ class SearchRun {
         leaves_(task, account_) {}
 
   SearchResult result() {
-    settle_unseen();
+    settle_off_map();
     const std::vector<Tile> best = division_.best_of_largest();
     if (!best.empty()) {
       raise(best, 0);
@@ -54,7 +54,6 @@ class SearchRun {
       divide(std::move(tiles), 0, share - used);
     }
     const bool contradicts = contradicted(best);
-    leaves_.flush();
     SearchResult result = account_.result();
     result.contradicted = contradicts;
     result.blocks_bounded = division_.bounded();
@@ -64,20 +63,20 @@ class SearchRun {
 
  private:
   /// Settles the bins of all largest tiles in which every element sees the prior.
-  void settle_unseen() {
-    for (const BinBox& box : division_.unseen()) {
-      settle_unseen(box);
+  void settle_off_map() {
+    for (const BinBox& box : division_.off_map()) {
+      settle_off_map(box);
     }
-    account_.raise_totals(std::vector<LogSum>(space_.bounds.size()));
+    account_.raise_totals();
   }
 
   /// Settles bins at which every element sees the prior.
-  void settle_unseen(const BinBox& box) {
+  void settle_off_map(const BinBox& box) {
     const std::int64_t bins = box.bins();
     const auto object = static_cast<std::size_t>(box.object);
     const double value = division_.prior_log_likelihood(box.object);
     account_.settle(box.object, 1, value + std::log(static_cast<double>(bins)), value,
-                    task_.likelihood.error(object, task_.elements, Arithmetic::float64));
+                    task_.error[object]);
     account_.note_best(box, 0, value);
     task_.visit(box, std::span(&value, 1));
   }
@@ -180,11 +179,11 @@ class SearchRun {
       }
     }
     std::ranges::sort(tiles, stands_before);
-    std::vector<Tile> unseen;
+    std::vector<Tile> off_map;
     division_.set_negligible(std::max(negligible(), droppable(tiles, level, tolerance)));
-    std::vector<Tile> parts = division_.parts_of(tiles, level, &unseen);
-    for (const Tile& tile : unseen) {
-      settle_unseen(space_.bounds[tile.object].levels()[level + 1].box_of(tile));
+    std::vector<Tile> parts = division_.parts_of(tiles, level, &off_map);
+    for (const Tile& tile : off_map) {
+      settle_off_map(space_.bounds[tile.object].levels()[level + 1].box_of(tile));
     }
     const double dropped = account_.dropped_share();
     double used = 0.0;
@@ -310,15 +309,16 @@ class SearchRun {
 SearchResult BoundSearch::run(const KnownElements& elements, const SearchGoal& goal,
                               const Deadline& deadline, const BinVisitor& visit,
                               std::vector<PoseBlock>* refined) const {
-  // Evaluating all in float64 would leave so much rounding; the rest may be used up.
-  double least_error = 0.0;
+  std::vector<double> error;
   for (std::size_t i = 0; i < space_.bounds.size(); ++i) {
-    least_error = std::max(least_error, likelihood_.error(i, elements, Arithmetic::float64));
+    error.push_back(likelihood_.error(i, elements));
   }
+  // What rounding leaves may be used up.
   SearchGoal reachable = goal;
-  reachable.tolerance = std::max(goal.tolerance - 1.1 * least_error, goal.tolerance / 4.0);
-  return SearchRun({space_, options_, likelihood_, elements, reachable, deadline, visit}, largest_,
-                   refined)
+  reachable.tolerance =
+      std::max(goal.tolerance - 1.1 * std::ranges::max(error), goal.tolerance / 4.0);
+  return SearchRun({space_, options_, likelihood_, elements, error, reachable, deadline, visit},
+                   largest_, refined)
       .result();
 }
 

@@ -4,7 +4,6 @@
 #include <bit>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <optional>
 #include <tuple>
 
@@ -23,13 +22,6 @@ constexpr std::int64_t first_displaced = 16384;
 /// Products of bins and elements, where a budget must not be overdrawn by much: a few ms.
 constexpr std::int64_t budgeted_work = 5'000'000;
 constexpr std::size_t leaves_per_task = 16;
-constexpr double infinity = std::numeric_limits<double>::infinity();
-/// Memory for leaves that are not settled.
-constexpr std::size_t most_pending_bytes = std::size_t{32} << 20;
-/// Part of the tolerance that rounding may use up.
-constexpr double rounding_part = 0.2;
-/// Products of bins and elements that are evaluated in float64 before the clock is looked at again.
-constexpr double refined_together = 2e6;
 /// See BoundedOptions::poor_bins.
 constexpr double poor_share = 0.75;
 
@@ -52,15 +44,8 @@ UnsettledMass unsettled(std::span<const Tile> tiles, std::size_t level, const Se
 Leaves::Leaves(const SearchTask& task, MassAccount& account)
     : task_(task),
       account_(account),
-      displaced_(task.likelihood.displaced()),
-      poor_below_(poor_share * prior_log_likelihood(task.elements, task.options.contact)),
-      pending_mass_(task.space.bounds.size()) {
-  for (std::size_t i = 0; i < pending_mass_.size(); ++i) {
-    float32_error_.push_back(task.likelihood.error(i, task.elements, Arithmetic::float32));
-    float64_error_.push_back(task.likelihood.error(i, task.elements, Arithmetic::float64));
-  }
-  least_error_ = std::ranges::max(float64_error_);
-}
+      displaced_(task.space.displacement.has_value()),
+      poor_below_(poor_share * prior_log_likelihood(task.elements, task.options.contact)) {}
 
 std::vector<BinBox> Leaves::boxes_of(std::span<const Tile> tiles) const {
   std::vector<BinBox> boxes;
@@ -82,10 +67,9 @@ void Leaves::probe(std::vector<Tile> tiles) {
 }
 
 void Leaves::look(std::span<const Tile> tiles) {
-  std::vector<double> values;
-  for (const Leaf& leaf : evaluated(boxes_of(tiles), Arithmetic::float32, values)) {
+  for (const Leaf& leaf : evaluated(boxes_of(tiles))) {
     bins_ += leaf.box.bins();
-    account_.raise_best(leaf.box.object, leaf.least - float32_error_[leaf.box.object] - leaf.error);
+    account_.raise_best(leaf.box.object, leaf.largest - task_.error[leaf.box.object]);
   }
 }
 
@@ -183,146 +167,45 @@ void Leaves::evaluate(std::span<const Tile> tiles, double tolerance) {
   account_.drop(left);
 }
 
-std::vector<Leaves::Leaf> Leaves::evaluated(std::vector<BinBox> boxes, Arithmetic arithmetic,
-                                            std::vector<double>& values) const {
+std::vector<Leaves::Leaf> Leaves::evaluated(std::vector<BinBox> boxes) {
   std::ranges::sort(boxes, {}, [](const BinBox& box) {
     return std::tie(box.object, box.theta, box.y_first, box.x_first);
   });
-  const std::size_t before = values.size();
-  std::size_t end = before;
-  std::vector<Leaf> leaves;
+  std::vector<std::size_t> first;  // [box] of its values
+  std::size_t bins = 0;
   for (const BinBox& box : boxes) {
-    leaves.push_back({.box = box, .first = end});
-    end += static_cast<std::size_t>(box.bins());
+    first.push_back(bins);
+    bins += static_cast<std::size_t>(box.bins());
   }
-  values.resize(end);
-  std::vector<double> errors(displaced_ ? end - before : 0);
-  task_.likelihood.evaluate(boxes, task_.elements, arithmetic, std::span(values).subspan(before),
-                            errors);
+  values_.resize(bins);
+  task_.likelihood.evaluate(boxes, task_.elements, values_);
+  std::vector<Leaf> leaves(boxes.size());
   parallel_for((leaves.size() + leaves_per_task - 1) / leaves_per_task, [&](std::size_t part) {
     const std::size_t last = std::min((part + 1) * leaves_per_task, leaves.size());
     for (std::size_t i = part * leaves_per_task; i < last; ++i) {
-      Leaf& leaf = leaves[i];
-      const auto bins = static_cast<std::size_t>(leaf.box.bins());
-      const auto own = std::span(values).subspan(leaf.first, bins);
-      add_up(
-          leaf, own,
-          displaced_ ? std::span(errors).subspan(leaf.first - before, bins) : std::span<double>());
+      const auto count = static_cast<std::size_t>(boxes[i].bins());
+      const auto values = std::span(values_).subspan(first[i], count);
+      const double largest = std::ranges::max(values);
+      double sum = 0.0;
+      for (const double nats : values) {
+        sum += std::exp(nats - largest);
+      }
+      leaves[i] = {boxes[i], values, largest + std::log(sum), largest};
     }
   });
   return leaves;
 }
 
-void Leaves::add_up(Leaf& leaf, std::span<const double> values, std::span<const double> errors) {
-  // An error of half a nat may be that of a likelihood of 0.
-  constexpr double most_error = 0.45;
-  leaf.largest = std::ranges::max(values);
-  double sum = 0.0;
-  for (const double nats : values) {
-    sum += std::exp(nats - leaf.largest);
-  }
-  leaf.log_mass = leaf.largest + std::log(sum);
-  leaf.least = leaf.largest;
-  double wrong = 0.0;
-  double of_best = 0.0;
-  for (std::size_t i = 0; i < errors.size(); ++i) {
-    const double below = values[i] - leaf.largest;
-    // Large errors are those of very small likelihoods.
-    wrong +=
-        errors[i] < 1.0 ? std::exp(below) * std::expm1(errors[i]) : std::exp(below + errors[i]);
-    of_best = below == 0.0 ? std::max(of_best, errors[i]) : of_best;
-  }
-  if (wrong > 0.0) {
-    leaf.error = std::log1p(wrong / sum);
-    leaf.least = of_best < most_error ? leaf.largest - 2.0 * of_best : -infinity;
-  }
-}
-
 void Leaves::add(std::vector<BinBox> boxes) {
-  const std::vector<Leaf> added = evaluated(std::move(boxes), Arithmetic::float32, values_);
-  for (const Leaf& leaf : added) {
-    const double error = float32_error_[leaf.box.object] + leaf.error;
-    pending_mass_[leaf.box.object].add(task_.space.log_weight[leaf.box.object] - error +
-                                       leaf.log_mass);
-    account_.raise_best(leaf.box.object, leaf.least - error);
-    bins_ += leaf.box.bins();
+  for (const Leaf& leaf : evaluated(std::move(boxes))) {
+    const BinBox& box = leaf.box;
+    bins_ += box.bins();
+    account_.settle(box.object, box.bins(), leaf.log_mass, leaf.largest, task_.error[box.object]);
+    account_.note_best(box, std::ranges::max_element(leaf.values) - leaf.values.begin(),
+                       leaf.largest);
+    task_.visit(box, leaf.values);
   }
-  pending_.insert(pending_.end(), added.begin(), added.end());
-  account_.raise_totals(pending_mass_);
-  if (pending_.size() * sizeof(Leaf) + values_.size() * sizeof(double) > most_pending_bytes) {
-    settle(0.5);
-  }
-}
-
-std::vector<std::size_t> Leaves::to_be_refined(double share) const {
-  const std::vector<double>& log_weight = task_.space.log_weight;
-  const SearchGoal& goal = task_.goal;
-  const auto log_mass = [&](std::size_t i) {
-    return log_weight[pending_[i].box.object] + pending_[i].log_mass;
-  };
-  const auto may_be_best = [&](std::size_t i) {
-    const std::int32_t object = pending_[i].box.object;
-    return log_weight[object] + pending_[i].largest + float32_error_[object] >= account_.best();
-  };
-  const auto needs_evidence = [&](std::size_t i) {
-    return goal.evidence_nats && 2.0 * std::expm1(float32_error_[pending_[i].box.object]) >
-                                     evidence_rounding_part * *goal.evidence_nats;
-  };
-  // The lightest keep the rounding of float32, as long as it fits.
-  std::vector<std::size_t> by_mass(pending_.size());
-  std::iota(by_mass.begin(), by_mass.end(), std::size_t{0});
-  std::ranges::stable_sort(by_mass, {}, log_mass);
-  double left = share * (goal.tolerance * rounding_part + least_error_ - account_.rounding_share());
-  std::vector<std::size_t> refined;
-  for (const std::size_t i : by_mass) {
-    left -= std::expm1(float32_error_[pending_[i].box.object]) *
-            std::exp(log_mass(i) - account_.log_total());
-    if (left < 0.0 || may_be_best(i) || needs_evidence(i)) {
-      refined.push_back(i);
-    }
-  }
-  // Bins that may be the mode come first: it is told in float64 whatever the budget.
-  std::stable_partition(refined.begin(), refined.end(), may_be_best);
-  return refined;
-}
-
-void Leaves::settle(double share) {
-  const std::vector<std::size_t> refined = to_be_refined(share);
-  const std::int64_t most =
-      displaced_
-          ? largest_batch
-          : static_cast<std::int64_t>(refined_together /
-                                      static_cast<double>(task_.elements.from_pivot_mm.size() + 1));
-  std::vector<double> values;
-  for (std::size_t done = 0; done < refined.size() && (done == 0 || !task_.deadline.passed());) {
-    std::vector<BinBox> boxes;
-    for (std::int64_t bins = 0; done < refined.size() && (boxes.empty() || bins < most); ++done) {
-      BinBox& box = pending_[refined[done]].box;
-      boxes.push_back(box);
-      bins += box.bins();
-      box.y_count = 0;  // settled below
-    }
-    values.clear();
-    for (const Leaf& leaf : evaluated(std::move(boxes), Arithmetic::float64, values)) {
-      settle(leaf, values, float64_error_[leaf.box.object] + leaf.error);
-    }
-  }
-  for (const Leaf& leaf : pending_) {
-    if (leaf.box.bins() > 0) {
-      settle(leaf, values_, float32_error_[leaf.box.object] + leaf.error);
-    }
-  }
-  pending_.clear();
-  values_.clear();
-  pending_mass_.assign(pending_mass_.size(), {});
-  account_.raise_totals(pending_mass_);
-}
-
-void Leaves::settle(const Leaf& leaf, std::span<const double> values, double error) {
-  const auto own = values.subspan(leaf.first, static_cast<std::size_t>(leaf.box.bins()));
-  account_.settle(leaf.box.object, leaf.box.bins(), leaf.log_mass, leaf.least, error);
-  account_.note_best(leaf.box, std::ranges::max_element(own) - own.begin(), leaf.largest);
-  task_.visit(leaf.box, own);
+  account_.raise_totals();
 }
 
 }  // namespace palpate

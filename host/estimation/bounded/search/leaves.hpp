@@ -15,8 +15,7 @@ namespace palpate {
 inline constexpr std::int64_t largest_batch = 500'000;
 
 /// The last step of a search by bounds: evaluates the bins of the smallest tiles in the order of
-/// their bounds, as boxes, the leaves. All are evaluated in float32, and those that hold most of
-/// the mass once more in float64, so that rounding stays within its part of the tolerance.
+/// their bounds, as boxes, the leaves.
 class Leaves {
  public:
   /// @param task,account outlive the leaves
@@ -30,8 +29,6 @@ class Leaves {
   /// Evaluates the bins of tiles of the finest level, until those left hold at most this part of
   /// the total; drops these.
   void evaluate(std::span<const Tile> tiles, double tolerance);
-  /// Settles all bins that were evaluated.
-  void flush() { settle(1.0); }
   /// Number of bins that were evaluated.
   std::int64_t bins() const { return bins_; }
   /// Whether the search is to end with what it has proven.
@@ -51,11 +48,9 @@ class Leaves {
   };
   struct Leaf {
     BinBox box;
-    std::size_t first = 0;  ///< of its values
-    double log_mass = 0.0;  ///< without the prior weight
+    std::span<const double> values;  ///< until others are evaluated
+    double log_mass = 0.0;           ///< without the prior weight
     double largest = 0.0;
-    double error = 0.0;  ///< of the mass, beside that of every bin of the object
-    double least = 0.0;  ///< lower bound of the largest, but for that error
   };
 
   BinBox box_of(const Tile& tile) const {
@@ -71,31 +66,18 @@ class Leaves {
   /// Takes a family's tiles before the slots `from` out of what is left, as boxes.
   void take(const Family& family, std::span<const Tile> tiles, const std::vector<std::size_t>& from,
             UnsettledMass& left, std::vector<BinBox>& boxes) const;
-  /// Evaluates the bins of boxes, as far as they count, and appends their values.
+  /// Evaluates the bins of boxes.
   /// @returns the leaves, sorted by place, with the sums of their bins
-  std::vector<Leaf> evaluated(std::vector<BinBox> boxes, Arithmetic arithmetic,
-                              std::vector<double>& values) const;
-  /// @param errors of the values, see BinLikelihood::evaluate(); empty where touches are exact
-  static void add_up(Leaf& leaf, std::span<const double> values, std::span<const double> errors);
-  /// Evaluates the bins of boxes. They are settled later.
+  std::vector<Leaf> evaluated(std::vector<BinBox> boxes);
+  /// Evaluates the bins of boxes and settles them.
   void add(std::vector<BinBox> boxes);
-  /// Indices of the pending leaves that must be evaluated in float64: the heaviest.
-  std::vector<std::size_t> to_be_refined(double share) const;
-  /// @param share of the rounding that is left to be used up
-  void settle(double share);
-  void settle(const Leaf& leaf, std::span<const double> values, double error);
 
   const SearchTask& task_;
   MassAccount& account_;
-  bool displaced_;                     ///< touches are displaced
-  std::vector<Tile> probed_;           ///< sorted by place
-  std::vector<double> float32_error_;  ///< [hypothesis]
-  std::vector<double> float64_error_;
-  double poor_below_;         ///< see BoundedOptions::poor_bins
-  double least_error_ = 0.0;  ///< that evaluating all in float64 would leave
-  std::vector<Leaf> pending_;
-  std::vector<double> values_;        ///< of the pending leaves
-  std::vector<LogSum> pending_mass_;  ///< [hypothesis] lower bounds, with the prior weight
+  bool displaced_;              ///< touches are displaced
+  std::vector<Tile> probed_;    ///< sorted by place
+  double poor_below_;           ///< see BoundedOptions::poor_bins
+  std::vector<double> values_;  ///< of the leaves that were evaluated last
   std::int64_t bins_ = 0;
 };
 

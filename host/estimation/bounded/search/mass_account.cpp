@@ -6,6 +6,13 @@
 
 namespace palpate {
 
+namespace {
+
+/// Part of BoundedOptions::evidence_nats that is left for rounding.
+constexpr double evidence_rounding_part = 0.2;
+
+}  // namespace
+
 MassAccount::MassAccount(std::span<const double> log_weight, std::span<const std::size_t> label_of,
                          const PoseLattice& lattice, const SearchGoal& goal)
     : log_weight_(log_weight),
@@ -22,9 +29,7 @@ void MassAccount::settle(std::int32_t object, std::int64_t bins, double log_mass
   of.terms += static_cast<double>(bins);
   // Beyond, expm1 is infinite, and the log of it is the error itself.
   constexpr double most = 700.0;
-  const double rounding = mass + (error < most ? std::log(std::expm1(error)) : error);
-  of.rounding.add(rounding);
-  all_rounding_.add(rounding);
+  of.rounding.add(mass + (error < most ? std::log(std::expm1(error)) : error));
   raise_best(object, largest - error);
 }
 
@@ -49,13 +54,11 @@ void MassAccount::note_best(const BinBox& box, std::int64_t bin_of_box, double l
   }
 }
 
-void MassAccount::raise_totals(std::span<const LogSum> pending) {
+void MassAccount::raise_totals() {
   LogSum total;
-  for (std::size_t i = 0; i < of_.size(); ++i) {
-    Account& of = of_[i];
+  for (Account& of : of_) {
     // What rounding may have added does not count.
-    const double own =
-        log_add(log_subtract(of.evaluated.log(), of.rounding.log()), pending[i].log());
+    const double own = log_subtract(of.evaluated.log(), of.rounding.log());
     of.log_total = std::max(of.log_total, own);
     total.add(own);
   }
@@ -129,8 +132,6 @@ std::vector<double> MassAccount::droppable_evidence(double tolerance) const {
 }
 
 double MassAccount::dropped_share() const { return std::exp(all_dropped_.log() - log_total_); }
-
-double MassAccount::rounding_share() const { return std::exp(all_rounding_.log() - log_total_); }
 
 SearchResult MassAccount::result() const {
   SearchResult result{.mass = {},

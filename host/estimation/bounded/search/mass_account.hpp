@@ -81,9 +81,6 @@ class UnsettledMass {
   std::vector<SlotSet> used_;       ///< [hypothesis] slots to which bins were added
 };
 
-/// Part of BoundedOptions::evidence_nats that rounding may use up.
-inline constexpr double evidence_rounding_part = 0.2;
-
 /// Keeps account of a search: of the mass that was settled, by evaluating bins, with the error of
 /// rounding, and of the mass that was dropped. Says which tiles may be dropped.
 class MassAccount {
@@ -108,10 +105,8 @@ class MassAccount {
   /// labels that lie hundreds of nats apart count, they are as wide as the evidence's nats allow.
   double slot_nats(double largest) const;
 
-  /// Raises the lower bounds of the totals by what was settled, together with bins that are not yet
-  /// settled but known well enough.
-  /// @param pending [hypothesis] lower bounds of their mass, with the prior weight
-  void raise_totals(std::span<const LogSum> pending);
+  /// Raises the lower bounds of the totals by what was settled.
+  void raise_totals();
   /// A bin of the hypothesis has at least this log-likelihood, without the prior weight.
   void raise_best(std::int32_t object, double log_likelihood);
 
@@ -120,8 +115,6 @@ class MassAccount {
   std::vector<std::size_t> droppable_from(const UnsettledMass& tiles, double tolerance) const;
   /// What was dropped so far as a part of the total, at most.
   double dropped_share() const;
-  /// What rounding may have changed so far as a part of the total, at most.
-  double rounding_share() const;
   /// Lower bound of the log of the total mass, in nats.
   double log_total() const { return log_total_; }
   /// What the best bin has at least, with the prior weight, in nats.
@@ -155,7 +148,6 @@ class MassAccount {
   const PoseLattice& lattice_;
   const SearchGoal& goal_;
   std::vector<Account> of_;  ///< [hypothesis]
-  LogSum all_rounding_;
   LogSum all_dropped_;
   double log_total_ = nothing;
   double best_ = nothing;        ///< what the best bin has at least, with the prior weight, in nats

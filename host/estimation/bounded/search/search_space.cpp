@@ -31,7 +31,7 @@ SearchSpace::SearchSpace(std::span<const Hypothesis> hypotheses, const BoundedOp
   const std::vector<TileSize> sizes =
       tile_sizes(options.lattice, least_cell_mm, hypotheses.size(), options.touch_sd);
   if (!options.touch_sd.none()) {
-    displacement = std::make_unique<DisplacementWeights>(options.lattice, options.touch_sd);
+    displacement.emplace(options.lattice, options.touch_sd);
     for (const TileSize& size : sizes) {
       displaced.emplace_back(*displacement, size.bins);
     }

@@ -2,16 +2,16 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include <glm/vec2.hpp>
 
 #include "estimation/bounded/displaced/displacement_mean.hpp"
-#include "estimation/bounded/displaced/displacement_weights.hpp"
 #include "estimation/bounded/search/search_goal.hpp"
 #include "estimation/bounded/tables/tile_bounds.hpp"
+#include "estimation/displacement_weights.hpp"
 #include "estimation/known_elements.hpp"
 #include "model/bounding_box.hpp"
 #include "palpate/bounded_posterior.hpp"
@@ -38,8 +38,8 @@ struct SearchSpace {
   std::vector<BoundingBox> boxes;     ///< [hypothesis] around its occupied cells
   std::vector<TileBounds> bounds;     ///< [hypothesis]
 
-  std::unique_ptr<const DisplacementWeights> displacement;  ///< null where touches are exact
-  std::vector<DisplacementMean> displaced;                  ///< [level] of tiles' bounds
+  std::optional<DisplacementWeights> displacement;  ///< nothing where touches are exact
+  std::vector<DisplacementMean> displaced;          ///< [level] of tiles' bounds
 };
 
 /// Log-likelihood of elements without any penalty over the tiles of every level, in nats with the
@@ -55,6 +55,7 @@ struct SearchTask {
   const BoundedOptions& options;    ///< checked, with a resolved contact model
   const BinLikelihood& likelihood;  ///< evaluates bins
   const KnownElements& elements;
+  std::span<const double> error;  ///< [hypothesis] BinLikelihood::error() of the elements
   const SearchGoal& goal;
   const Deadline& deadline;  ///< after which tiles are dropped unseen
   const BinVisitor& visit;

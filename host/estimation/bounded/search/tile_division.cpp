@@ -1,22 +1,18 @@
 #include "estimation/bounded/search/tile_division.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <functional>
 #include <limits>
 #include <numeric>
 #include <tuple>
 
-#include "estimation/bounded/search/displaced_tiles.hpp"
+#include "estimation/bounded/search/item_bounds.hpp"
 #include "estimation/parallel_for.hpp"
 
 namespace palpate {
 
 namespace {
-
-/// Tiles of one theta that a task divides.
-constexpr std::size_t tiles_per_task = 64;
 
 std::vector<Tile> joined(const std::vector<std::vector<Tile>>& lists) {
   std::vector<Tile> all;
@@ -59,8 +55,7 @@ TileDivision::TileDivision(const SearchTask& task, const LargestTiles& largest)
       space_(task.space),
       largest_(largest),
       thetas_(space_.turns.size()),
-      reaches_(space_.displacement ? displaced_reaches(space_, task.elements.touches)
-                                   : reaches_of(task.elements, space_.turns)),
+      reaches_(reaches_of(task.elements, space_)),
       seen_(space_.bounds.size() * thetas_),
       unpenalised_(unpenalised(space_, task.elements)),
       prior_log_likelihoods_(
@@ -106,10 +101,10 @@ double TileDivision::bound_of(std::size_t object, std::size_t level, std::int64_
 }
 
 double TileDivision::bound_of_largest(std::size_t object, std::int32_t sum) const {
-  return bound_of(object, 0, largest_.unseen(object) + sum);
+  return bound_of(object, 0, largest_.off_map(object) + sum);
 }
 
-std::vector<BinBox> TileDivision::unseen() const {
+std::vector<BinBox> TileDivision::off_map() const {
   std::vector<BinBox> boxes;
   for (std::size_t row = 0; row < seen_.size(); ++row) {
     const auto object = static_cast<std::int32_t>(row / thetas_);
@@ -154,7 +149,7 @@ std::vector<Tile> TileDivision::largest_above(double bound) const {
   parallel_for(above.size(), [&](std::size_t row) {
     const std::size_t object = row / thetas_;
     const double end = (unpenalised_[object][0] - bound) * penalties_per_nat -
-                       static_cast<double>(largest_.unseen(object));
+                       static_cast<double>(largest_.off_map(object));
     constexpr double most_sum = std::numeric_limits<std::int32_t>::max();
     const auto end_sum = static_cast<std::int64_t>(std::clamp(end, -most_sum, most_sum)) + 1;
     for_largest(row, end_sum, [&](std::int32_t sum, Tile tile) {
@@ -180,93 +175,59 @@ std::vector<Tile> TileDivision::best_smallest(std::vector<Tile> tiles, std::size
 }
 
 std::vector<Tile> TileDivision::parts_of(std::span<const Tile> tiles, std::size_t level,
-                                         std::vector<Tile>* unseen) {
-  const std::vector<std::int64_t> displaced = displaced_sums(tiles, level + 1);
-  std::vector<std::size_t> begins;  // of tasks: tiles of one object and theta
+                                         std::vector<Tile>* off_map) {
+  const std::vector<std::int64_t> sums = sums_of_parts(tiles, level + 1);
+  std::vector<Tile> parts;
+  parts.reserve(sums.size());
+  TileRange seen;
   for (std::size_t i = 0; i < tiles.size(); ++i) {
-    if (i == 0 || tiles[i].object != tiles[i - 1].object || tiles[i].theta != tiles[i - 1].theta ||
-        i - begins.back() == tiles_per_task) {
-      begins.push_back(i);
+    const Tile& tile = tiles[i];
+    if (i == 0 || tile.object != tiles[i - 1].object || tile.theta != tiles[i - 1].theta) {
+      seen = seen_tiles(reaches_[tile.theta], space_.maps[tile.object],
+                        space_.bounds[tile.object].levels()[level + 1]);
     }
+    append_parts(tile, level + 1, std::span(sums).subspan(i * batch_tiles, batch_tiles), seen,
+                 parts, off_map);
   }
-  std::vector<std::vector<Tile>> parts(begins.size());
-  std::vector<std::vector<Tile>> rest(begins.size());
-  parallel_for(begins.size(), [&](std::size_t task) {
-    thread_local WindowPlaces placed;
-    const std::size_t end = task + 1 < begins.size() ? begins[task + 1] : tiles.size();
-    const Tile& first = tiles[begins[task]];
-    const TileBounds& bounds = space_.bounds[first.object];
-    const TileRange seen =
-        seen_tiles(reaches_[first.theta], space_.maps[first.object], bounds.levels()[level + 1]);
-    if (displaced.empty()) {
-      bounds.place(level + 1, space_.turns[first.theta], task_.elements, placed);
-    }
-    parts[task].reserve((end - begins[task]) * batch_tiles);
-    for (std::size_t i = begins[task]; i < end; ++i) {
-      std::array<std::int64_t, batch_tiles> sums{};
-      if (displaced.empty()) {
-        std::uint32_t penalties[batch_tiles] = {};
-        bounds.add(level + 1, task_.elements, placed, tiles[i].x * batch_side,
-                   tiles[i].y * batch_side, penalties);
-        std::ranges::copy(penalties, sums.begin());
-      } else {
-        std::copy_n(displaced.begin() + static_cast<std::ptrdiff_t>(i * batch_tiles), batch_tiles,
-                    sums.begin());
-      }
-      append_parts(tiles[i], level + 1, sums, parts[task]);
-    }
-    const auto begin_unseen = std::stable_partition(
-        parts[task].begin(), parts[task].end(), [&](const Tile& tile) { return seen.holds(tile); });
-    if (unseen != nullptr) {
-      rest[task].assign(begin_unseen, parts[task].end());
-    }
-    parts[task].erase(begin_unseen, parts[task].end());
-  });
-  if (unseen != nullptr) {
-    *unseen = joined(rest);
-  }
-  std::vector<Tile> all = joined(parts);
-  bounded_ += static_cast<std::int64_t>(all.size());
-  return all;
+  bounded_ += static_cast<std::int64_t>(parts.size());
+  return parts;
 }
 
-std::vector<std::int64_t> TileDivision::displaced_sums(std::span<const Tile> tiles,
-                                                       std::size_t level) const {
-  if (!space_.displacement) {
-    return {};
-  }
+std::vector<std::int64_t> TileDivision::sums_of_parts(std::span<const Tile> tiles,
+                                                      std::size_t level) const {
   std::vector<std::int64_t> sums(tiles.size() * batch_tiles);
   for (std::size_t first = 0, end = 0; first < tiles.size(); first = end) {
     while (end < tiles.size() && tiles[end].object == tiles[first].object) {
       ++end;
     }
-    add_displaced(tiles.subspan(first, end - first), level,
-                  std::span(sums).subspan(first * batch_tiles, (end - first) * batch_tiles));
+    add_items(tiles.subspan(first, end - first), level,
+              std::span(sums).subspan(first * batch_tiles, (end - first) * batch_tiles));
   }
   return sums;
 }
 
-void TileDivision::add_displaced(std::span<const Tile> tiles, std::size_t level,
-                                 std::span<std::int64_t> sums) const {
+void TileDivision::add_items(std::span<const Tile> tiles, std::size_t level,
+                             std::span<std::int64_t> sums) const {
   const auto object = static_cast<std::size_t>(tiles.front().object);
-  const std::vector<KnownElements>& touches = task_.elements.touches;
-  // Penalties that every touch has at least, wherever it is.
-  std::vector<std::int64_t> least;
-  for (std::size_t i = 0; i < touches.size(); ++i) {
-    const double nats = space_.bounds[object].best(level, touches[i]) - largest_.most(i, object);
-    least.push_back(static_cast<std::int64_t>(std::floor(nats * penalties_per_nat)));
+  const std::span<const KnownElements> items = task_.elements.items();
+  const std::vector<std::size_t> order = sorted_touches(items);
+  // Penalties that each item after the first has at least, wherever it is.
+  std::vector<std::int64_t> least(items.size());
+  for (const std::size_t i : std::span(order).subspan(1)) {
+    const double nats =
+        space_.bounds[object].best(level, items[i]) - largest_.upper_bound(i, object);
+    least[i] = static_cast<std::int64_t>(std::floor(nats * penalties_per_nat));
   }
   std::int64_t rest = std::accumulate(least.begin(), least.end(), std::int64_t{0});
   std::vector<std::size_t> open(tiles.size());
   std::iota(open.begin(), open.end(), std::size_t{0});
-  for (const std::size_t i : sorted_touches(touches)) {
+  for (const std::size_t i : order) {
     task_.deadline.cancel_point();
     std::vector<BlockRun> batches;
     for (const std::size_t tile : open) {
       append_block(tiles[tile].theta, tiles[tile].y, tiles[tile].x, batches);
     }
-    const std::vector<std::int32_t> added =
-        displaced_penalties(space_, object, level, touches[i], batches);
+    const std::vector<std::int32_t> added = penalties_of(items[i], space_, object, level, batches);
     rest -= least[i];
     auto from = added.begin();
     std::erase_if(open, [&](std::size_t tile) {
@@ -286,8 +247,8 @@ void TileDivision::add_displaced(std::span<const Tile> tiles, std::size_t level,
 }
 
 void TileDivision::append_parts(const Tile& of, std::size_t level,
-                                std::span<const std::int64_t> sums,
-                                std::vector<Tile>& parts) const {
+                                std::span<const std::int64_t> sums, const TileRange& seen,
+                                std::vector<Tile>& parts, std::vector<Tile>* off_map) const {
   const TileLevel& tiling = space_.bounds[of.object].levels()[level];
   const double unpenalised = unpenalised_[of.object][level];
   for (int j = 0; j < batch_side; ++j) {
@@ -296,8 +257,13 @@ void TileDivision::append_parts(const Tile& of, std::size_t level,
       const auto penalties = static_cast<double>(sums[batch_side * i + j]);
       const Tile part{unpenalised - penalties / penalties_per_nat, of.object, of.theta,
                       batch_side * of.x + i, y};
-      if (tiling.x.bins(part.x) > 0) {
+      if (tiling.x.bins(part.x) == 0) {
+        continue;
+      }
+      if (seen.holds(part)) {
         parts.push_back(part);
+      } else if (off_map != nullptr) {
+        off_map->push_back(part);
       }
     }
   }

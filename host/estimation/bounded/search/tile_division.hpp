@@ -33,7 +33,7 @@ class TileDivision {
 
   /// The bins of all largest tiles in which every element sees the prior: all have the same
   /// likelihood. The others are seen.
-  std::vector<BinBox> unseen() const;
+  std::vector<BinBox> off_map() const;
   /// Log-likelihood of the elements where all of them see the prior, in nats.
   double prior_log_likelihood(std::int32_t object) const {
     return prior_log_likelihoods_[static_cast<std::size_t>(object)];
@@ -46,11 +46,11 @@ class TileDivision {
 
   /// The parts, one level down, of tiles that are sorted by place. Leaves out those in which every
   /// element sees the prior.
-  /// @param unseen where not null, takes these
+  /// @param off_map where not null, takes these
   std::vector<Tile> parts_of(std::span<const Tile> tiles, std::size_t level,
-                             std::vector<Tile>* unseen = nullptr);
-  /// Tiles whose bounds are below are not looked at more closely than to know that: where touches
-  /// are displaced, the last touches may be left out.
+                             std::vector<Tile>* off_map = nullptr);
+  /// Tiles whose bounds are below are not looked at more closely than to know that: the last items
+  /// may be left out.
   void set_negligible(double bound) { negligible_ = bound; }
 
   /// Follows tiles of a level down to the smallest ones, the best of each level.
@@ -71,16 +71,18 @@ class TileDivision {
   double bound_of(std::size_t object, std::size_t level, std::int64_t penalties) const;
   /// The bound of a largest tile, from the sum that LargestTiles keeps.
   double bound_of_largest(std::size_t object, std::int32_t sum) const;
-  /// Where touches are displaced, the sums of their penalties over the parts of tiles, [tile,
-  /// part], which are tiles of this level; else empty.
-  std::vector<std::int64_t> displaced_sums(std::span<const Tile> tiles, std::size_t level) const;
-  /// Adds the sums of one object's tiles.
-  void add_displaced(std::span<const Tile> tiles, std::size_t level,
-                     std::span<std::int64_t> sums) const;
+  /// The sums of the elements' penalties over the parts of tiles, [tile, part], which are tiles of
+  /// this level.
+  std::vector<std::int64_t> sums_of_parts(std::span<const Tile> tiles, std::size_t level) const;
+  /// Adds those of one object's tiles.
+  void add_items(std::span<const Tile> tiles, std::size_t level,
+                 std::span<std::int64_t> sums) const;
   /// Appends those parts of a tile, which are tiles of this level, that hold bins.
   /// @param sums of their penalties, [x, y]
+  /// @param seen the tiles that see the map; where not null, off_map takes the others
   void append_parts(const Tile& of, std::size_t level, std::span<const std::int64_t> sums,
-                    std::vector<Tile>& parts) const;
+                    const TileRange& seen, std::vector<Tile>& parts,
+                    std::vector<Tile>* off_map) const;
 
   const SearchTask& task_;
   const SearchSpace& space_;

@@ -9,6 +9,12 @@
 
 namespace palpate {
 
+/// Bins to either side that a Gaussian reaches: 4 standard deviations. An axis of one bin is not
+/// blurred.
+int blur_steps(const Axis& axis, double sd);
+/// The weight of a bin so many steps away; that of the bin itself is 1.
+double blur_weight(int steps, const Axis& axis, double sd);
+
 /// A Gaussian along x or y, between tiles of bins. Of tiles of one bin, these are the weights of
 /// the definition; of larger tiles, no bin of a tile gives another tile's bins together more than
 /// this.
@@ -24,7 +30,8 @@ struct AxisBlur {
 };
 
 /// What a touch's mean takes from one theta: the likelihoods of bins that lie `bins` + `fraction`
-/// away along x and y.
+/// away along x and y. By definition, fractions are rounded to 2^-20 of a bin: then float32 holds
+/// them, and no rounding of the place lets a neighbour in that it does not reach.
 struct Tap {
   int theta = 0;
   int steps = 0;  ///< of theta, by which it is turned
@@ -41,7 +48,7 @@ inline double part_inside(const Axis& axis, int bin, double fraction) {
   return (holds(bin) ? 1.0 - fraction : 0.0) + (holds(bin + 1) ? fraction : 0.0);
 }
 
-/// The displacements of a touch on a lattice: weights and turns as PoseHistogram has them.
+/// The displacements of a touch on a lattice.
 class DisplacementWeights {
  public:
   DisplacementWeights(const PoseLattice& lattice, const DisplacementSd& sd);
@@ -52,8 +59,6 @@ class DisplacementWeights {
   /// The thetas that a mean at this theta takes likelihoods from, as far as the region reaches.
   /// @param sensor_from_pivot_mm the sensor's origin, in the robot frame
   std::vector<Tap> taps(int theta, const glm::dvec2& sensor_from_pivot_mm) const;
-  /// Bound of the error of a tap's fraction.
-  double fraction_error(const glm::dvec2& sensor_from_pivot_mm) const;
   /// How far the bins that a mean takes lie from a tap's place, in mm along x and y, at most.
   glm::dvec2 reach_mm() const;
 

@@ -16,13 +16,13 @@ namespace palpate {
 /// Log-likelihoods of bins, in nats, as if the pose of their touch were exact. Means over
 /// displacements take the same bins again and again: for bins nearby, and for the belief after
 /// further touches. Several threads may work on planes of different thetas.
-class ExactBins {
+class UndisplacedBins {
  public:
   /// Memory for all touches of a belief together, if each has its part.
   static constexpr std::size_t most_bytes = std::size_t{64} << 20;
 
   /// @param bytes that are held at most, about: what finds no room is not kept
-  ExactBins(std::size_t objects, std::size_t thetas, std::size_t bytes)
+  UndisplacedBins(std::size_t objects, std::size_t thetas, std::size_t bytes)
       : thetas_(thetas),
         planes_(objects * thetas),
         most_(static_cast<std::int64_t>(bytes / block_bytes)),

@@ -1,9 +1,7 @@
-#include "estimation/bounded/displaced/displacement_weights.hpp"
+#include "estimation/displacement_weights.hpp"
 
 #include <algorithm>
 #include <cmath>
-
-#include <glm/geometric.hpp>
 
 #include "palpate/pose.hpp"
 
@@ -13,24 +11,25 @@ namespace {
 
 /// A Gaussian is cut off at as many standard deviations.
 constexpr double reach_sd = 4.0;
+/// Steps into which a bin is divided by the places of taps.
+constexpr double fractions_of_bin = 0x1p20;
 
-/// Bins to either side that a Gaussian reaches. An axis of one bin is not blurred.
-int steps_of(const Axis& axis, double sd) {
+}  // namespace
+
+int blur_steps(const Axis& axis, double sd) {
   return axis.count > 1 ? static_cast<int>(std::ceil(reach_sd * sd / axis.step())) : 0;
 }
 
-double weight_at(int steps, const Axis& axis, double sd) {
+double blur_weight(int steps, const Axis& axis, double sd) {
   const double deviations = steps == 0 ? 0.0 : steps * axis.step() / sd;
   return std::exp(-deviations * deviations / 2.0);
 }
 
-}  // namespace
-
 AxisBlur::AxisBlur(const Axis& axis, double sd, int bins)
-    : steps(std::min(steps_of(axis, sd), axis.count - 1)) {
+    : steps(std::min(blur_steps(axis, sd), axis.count - 1)) {
   std::vector<double> of_bins;
   for (int k = 0; k <= steps; ++k) {
-    of_bins.push_back(weight_at(k, axis, sd));
+    of_bins.push_back(blur_weight(k, axis, sd));
   }
   const auto between = [&](int from, int to) {
     const int distance = std::abs(to - from);
@@ -61,13 +60,12 @@ AxisBlur::AxisBlur(const Axis& axis, double sd, int bins)
 }
 
 DisplacementWeights::DisplacementWeights(const PoseLattice& lattice, const DisplacementSd& sd)
-    : lattice_(lattice), sd_(sd), theta_steps_(steps_of(lattice.theta_rad, sd.rad)) {}
+    : lattice_(lattice), sd_(sd), theta_steps_(blur_steps(lattice.theta_rad, sd.rad)) {}
 
 std::vector<Tap> DisplacementWeights::taps(int theta,
                                            const glm::dvec2& sensor_from_pivot_mm) const {
   const Axis& angles = lattice_.theta_rad;
   const double theta_rad = angles.centre(theta);
-  const double error = fraction_error(sensor_from_pivot_mm);
   const glm::dvec2 sensor_mm = rotate(theta_rad, sensor_from_pivot_mm);
   std::vector<Tap> taps;
   for (int k = -theta_steps_; k <= theta_steps_; ++k) {
@@ -76,13 +74,15 @@ std::vector<Tap> DisplacementWeights::taps(int theta,
     }
     Tap tap{.theta = ((theta + k) % angles.count + angles.count) % angles.count,
             .steps = k,
-            .weight = weight_at(k, angles, sd_.rad)};
+            .weight = blur_weight(k, angles, sd_.rad)};
     const glm::dvec2 shift_mm =
         k == 0 ? glm::dvec2(0.0)
                : sensor_mm - rotate(theta_rad + k * angles.step(), sensor_from_pivot_mm);
     bool inside = true;
     const auto split = [&](const Axis& axis, double mm, int& bins, double& fraction) {
-      const double steps = axis.count == 1 ? 0.0 : mm / axis.step();
+      const double steps = axis.count == 1
+                               ? 0.0
+                               : std::round(mm / axis.step() * fractions_of_bin) / fractions_of_bin;
       // Written so that what is no number lies outside.
       if (!(std::abs(steps) < axis.count + 1.0)) {
         inside = false;
@@ -90,10 +90,6 @@ std::vector<Tap> DisplacementWeights::taps(int theta,
       }
       bins = static_cast<int>(std::floor(steps));
       fraction = steps - bins;
-      if (fraction > 1.0 - error) {
-        ++bins;
-        fraction = 0.0;
-      }
     };
     split(lattice_.x_mm, shift_mm.x, tap.bins.x, tap.fraction.x);
     split(lattice_.y_mm, shift_mm.y, tap.bins.y, tap.fraction.y);
@@ -104,24 +100,11 @@ std::vector<Tap> DisplacementWeights::taps(int theta,
   return taps;
 }
 
-double DisplacementWeights::fraction_error(const glm::dvec2& sensor_from_pivot_mm) const {
-  // Two angles with their sines and cosines, two rotations, a difference and a quotient.
-  const Axis& angles = lattice_.theta_rad;
-  const double farthest = std::max(std::abs(angles.lower), std::abs(angles.upper));
-  double most = 0.0;
-  for (const Axis& axis : {lattice_.x_mm, lattice_.y_mm}) {
-    if (axis.count > 1) {
-      most =
-          std::max(most, 16.0 * (1.0 + farthest) * glm::length(sensor_from_pivot_mm) / axis.step());
-    }
-  }
-  return theta_steps_ == 0 ? 0.0 : std::min(most * 0x1p-53, 0.5);
-}
-
 glm::dvec2 DisplacementWeights::reach_mm() const {
   const auto along = [&](const Axis& axis) {
     // A step more for the bins about a tap's place.
-    return axis.count == 1 ? 0.0 : (std::min(steps_of(axis, sd_.mm), axis.count) + 1) * axis.step();
+    return axis.count == 1 ? 0.0
+                           : (std::min(blur_steps(axis, sd_.mm), axis.count) + 1) * axis.step();
   };
   return {along(lattice_.x_mm), along(lattice_.y_mm)};
 }

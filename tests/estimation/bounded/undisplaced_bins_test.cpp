@@ -1,6 +1,6 @@
 // What is kept of bins as if touches were exact shows in no bit of the means over displacements.
 
-#include "estimation/bounded/displaced/exact_bins.hpp"
+#include "estimation/bounded/displaced/undisplaced_bins.hpp"
 
 #include <array>
 #include <memory>
@@ -12,15 +12,15 @@
 #include "estimation/bounded/leaves/bin_likelihood.hpp"
 #include "synthetic.hpp"
 
-namespace palpate::exact_bins_test {
+namespace palpate::undisplaced_bins_test {
 
 constexpr int width = 16;
 
 PlaceRows<double> rows_of(std::vector<double>& values) { return {values.data(), width, 0, 0}; }
 
-TEST(ExactBins, CopyWhatTheyKeptAndNameTheOthers) {
+TEST(UndisplacedBins, CopyWhatTheyKeptAndNameTheOthers) {
   // Room for two or three blocks of 16 numbers.
-  ExactBins bins(2, 3, 400);
+  UndisplacedBins bins(2, 3, 400);
   std::vector<double> values(std::size_t{width} * 8);
   std::iota(values.begin(), values.end(), 1.0);
   bins.keep(1, std::array{BlockRun{.theta = 2, .y = 1, .x = 1, .count = 2}}, rows_of(values));
@@ -43,7 +43,7 @@ TEST(ExactBins, CopyWhatTheyKeptAndNameTheOthers) {
   EXPECT_GE(bins.bytes(), held);
 }
 
-TEST(ExactBins, ShowInNoBit) {
+TEST(UndisplacedBins, ShowInNoBit) {
   const std::vector<Hypothesis> two{{random_map(17, 13, 0.5, 3.0, 871), 1.0},
                                     {random_map(15, 19, 0.5, 3.0, 872), 1.0}};
   const PoseLattice lattice{.x_mm = {-4.0, 4.0, 21}, .y_mm = {-3.0, 3.0, 18}};
@@ -56,23 +56,21 @@ TEST(ExactBins, ShowInNoBit) {
   const KnownElements alone = known_elements(TouchEvidence(touch, {}), {.touch_sd = touch_sd});
   KnownElements keeping = alone;
   constexpr std::size_t few_blocks = 10'000;
-  for (const std::size_t room : {few_blocks, ExactBins::most_bytes}) {
-    keeping.touches.front().exact_bins = std::make_shared<ExactBins>(
+  for (const std::size_t room : {few_blocks, UndisplacedBins::most_bytes}) {
+    keeping.touches.front().undisplaced_bins = std::make_shared<UndisplacedBins>(
         two.size(), static_cast<std::size_t>(lattice.theta_rad.count), room);
     for (const int first : {0, 3, 0}) {
       const std::vector<BinBox> boxes{
           {.object = 0, .theta = 2, .y_first = 5, .y_count = 4, .x_first = first, .x_count = 9},
           {.object = 1, .theta = 3, .y_first = 14, .y_count = 4, .x_first = 12, .x_count = 9}};
-      for (const Arithmetic arithmetic : {Arithmetic::float32, Arithmetic::float64}) {
-        std::vector<double> expected(72);
-        std::vector<double> got(72);
-        likelihood.evaluate(boxes, alone, arithmetic, expected);
-        likelihood.evaluate(boxes, keeping, arithmetic, got);
-        EXPECT_EQ(got, expected);
-      }
+      std::vector<double> expected(72);
+      std::vector<double> got(72);
+      likelihood.evaluate(boxes, alone, expected);
+      likelihood.evaluate(boxes, keeping, got);
+      EXPECT_EQ(got, expected);
     }
-    EXPECT_GT(keeping.touches.front().exact_bins->bytes(), 0U);
+    EXPECT_GT(keeping.touches.front().undisplaced_bins->bytes(), 0U);
   }
 }
 
-}  // namespace palpate::exact_bins_test
+}  // namespace palpate::undisplaced_bins_test

@@ -1,4 +1,4 @@
-#include "estimation/bounded/displaced/exact_bins.hpp"
+#include "estimation/bounded/displaced/undisplaced_bins.hpp"
 
 #include <algorithm>
 
@@ -14,8 +14,8 @@ std::uint64_t place(int y, int x) {
 
 }  // namespace
 
-std::vector<BlockRun> ExactBins::copy(std::size_t object, std::span<const BlockRun> runs,
-                                      const PlaceRows<double>& to) const {
+std::vector<BlockRun> UndisplacedBins::copy(std::size_t object, std::span<const BlockRun> runs,
+                                            const PlaceRows<double>& to) const {
   std::vector<BlockRun> others;
   for (const BlockRun& run : runs) {
     const Plane& plane = planes_[object * thetas_ + static_cast<std::size_t>(run.theta)];
@@ -33,8 +33,8 @@ std::vector<BlockRun> ExactBins::copy(std::size_t object, std::span<const BlockR
   return others;
 }
 
-void ExactBins::keep(std::size_t object, std::span<const BlockRun> runs,
-                     const PlaceRows<double>& from) {
+void UndisplacedBins::keep(std::size_t object, std::span<const BlockRun> runs,
+                           const PlaceRows<double>& from) {
   for (const BlockRun& run : runs) {
     Plane& plane = planes_[object * thetas_ + static_cast<std::size_t>(run.theta)];
     for (int x = run.x; x < run.x + run.count; ++x) {

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <glm/vec2.hpp>
+
+#include "estimation/bounded/displaced/places.hpp"
+#include "estimation/bounded/search/search_space.hpp"
+#include "estimation/known_elements.hpp"
+#include "model/bounding_box.hpp"
+#include "palpate/occupancy_grid.hpp"
+
+namespace palpate {
+
+// A search asks four things of its evidence, item by item (KnownElements::items()): all exact
+// touches together are one item, each displaced touch is one. Likelihoods of items multiply, so
+// that what these return adds up:
+//
+//   penalties_of()               lower bounds of the item's penalties over tiles of any level
+//   reaches_of()                 where its elements may lie, and so which tiles may see the map
+//   BinLikelihood::evaluate()    the log-likelihood at bins, of all items
+//   BinLikelihood::error()       the bound of its rounding
+
+/// Lower bounds of an item's penalties over batches of tiles of one level, relative to
+/// TileBounds::best(). Those of a displaced touch are of its mean likelihood; they lie below 0
+/// where the mean may exceed what best() says.
+/// @param batches sorted by theta, y, x
+/// @returns [run, batch, tile] as add_penalties() orders a batch's tiles
+std::vector<std::int32_t> penalties_of(const KnownElements& item, const SearchSpace& space,
+                                       std::size_t object, std::size_t level,
+                                       std::span<const BlockRun> batches);
+
+/// The box in which the elements of all items lie at every theta, from the pivot, wherever their
+/// sensors may have been.
+std::vector<BoundingBox> reaches_of(const KnownElements& elements, const SearchSpace& space);
+
+/// The box around the elements where the robot says that they lie, from the pivot, at every theta.
+/// @param turns [theta] its cosine and sine
+std::vector<BoundingBox> undisplaced_reaches(const KnownElements& elements,
+                                             std::span<const glm::dvec2> turns);
+
+/// The tiles in which an element may see something else than the prior, at one theta; none without
+/// elements. In all others every bin has the same likelihood.
+/// @param reach of the elements at this theta
+TileRange seen_tiles(const BoundingBox& reach, const OccupancyGrid& map, const TileLevel& level);
+
+}  // namespace palpate
