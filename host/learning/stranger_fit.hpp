@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "palpate/fit.hpp"
+#include "palpate/learned_sensor.hpp"
 
 namespace palpate {
 
@@ -24,5 +25,9 @@ struct StrangerFit {
 /// 16
 FitScale with_strangers(const std::map<std::string, std::vector<StrangerFit>>& objects,
                         FitScale scale);
+
+/// Says, without a full stop, that touches did not tell how badly strangers fit; "" where they did,
+/// or where nothing of fits was learned.
+std::string unlearned_strangers(const LearnedSensor& sensor);
 
 }  // namespace palpate

@@ -52,6 +52,7 @@ NB_MODULE(_palpate, module) {
   bind_batch(module);
   bind_evaluation(module);
   bind_calibration(module);
+  bind_map_learning(module);
   bind_import(module);
   Call::end_all_at_exit();
 }
