@@ -232,8 +232,8 @@ LearnedMaps learn_posed_maps(const MapTask& task, Device& device,
     learned.remarks.push_back(fmt::format("{} ({:.0f} nats; palpate check tells more)",
                                           suspicion->words, suspicion->nats));
   }
-  constexpr double align_cost = 2.0;
-  constexpr double sensor_cost = 9.0;
+  constexpr double align_cost = 4.0;  // of building the maps
+  constexpr double sensor_cost = 7.0;
   const auto count = static_cast<double>(task.objects.size());
   const DisplacementSd sd = task.request.touch_sd();
   SerialProgress work(

@@ -10,7 +10,7 @@ namespace palpate {
 
 namespace {
 
-using StrangerFits = std::map<std::string, std::vector<StrangerFit>>;
+using StrangerFits = std::map<std::size_t, std::vector<StrangerFit>>;
 
 /// Finds the likeliest scale for the fits of one touch each, or of several.
 class LikeliestScale {

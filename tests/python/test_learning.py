@@ -27,7 +27,8 @@ def test_a_folder_has_the_bytes_and_words_of_the_command(tmp_path: pathlib.Path)
     options = {"origin": (1, 2, 30), "symmetry": {"U": 1}, "prior": 0.3, "frames": (0, 25)}
     given = palpate.learn_maps(train, tmp_path / "python", **options)  # type: ignore[arg-type]
     assert contents(tmp_path / "python") == contents(tmp_path / "command")
-    assert given.words == said.replace(f"{tmp_path}/command/", f"{tmp_path}/python/").splitlines()
+    said = said.replace(f"{tmp_path}/command/", f"{tmp_path}/python/")
+    assert given.words == said.replace("--sensor-model none", "sensor_model='none'").splitlines()
 
     # Without a folder nothing is written, and no file of another is taken in.
     recordings = [palpate.read_recording(file) for file in train]
@@ -54,8 +55,9 @@ def test_it_refuses_in_the_words_of_the_command(files: Files, tmp_path: pathlib.
     expect_refused(
         lambda: palpate.learn_maps(train, out, origin=(1, 2, 3), unposed=True),
         "map", train, "-o", out, "--origin", "1,2,3", "--unposed",
+        spelled={"--origin 1,2,3": "origin=(1, 2, 3)"},
     )  # fmt: skip
-    with pytest.raises(TypeError, match="^cell_mm: 'wide'; give float | None"):
+    with pytest.raises(TypeError, match=r"^cell_mm: 'wide'; give float \| None"):
         palpate.learn_maps(train, cell_mm="wide")  # type: ignore[arg-type]
     assert not (tmp_path / "new").exists()
 
