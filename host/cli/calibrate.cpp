@@ -141,9 +141,10 @@ void add_calibrate(CLI::App& app) {
                     "The sensor's poses are unknown: find where each touch lies on the others. For "
                     "arrays so large that a touch shows much of the object");
   command->add_option("--group", options->request.group,
-                      "Whose touches are alike, such as a person's or a day's, and are left out "
-                      "together where it is judged how sure to be: recording, those of each file; "
-                      "label, those of each GROUP of objects that are named LABEL@GROUP");
+                      "How touches are grouped, such as by the person or the day that made them. A"
+                      " group is left out as a whole where it is learned how sure to be: "
+                      "recording, a group a file; label, a group for each GROUP of objects named "
+                      "LABEL@GROUP");
   command->add_option("--threshold", options->request.threshold,
                       "Contact threshold, in the recordings' pressure unit [default: learned]");
   command->add_option("--ratio", options->request.ratio,
@@ -163,7 +164,7 @@ void add_calibrate(CLI::App& app) {
   command
       ->add_option("--max-maps", options->request.max_maps,
                    "Most maps of an object that a touch is compared with to learn how sure to be: "
-                   "about as many as you will recognize with. More take longer")
+                   "about as many as you will recognise with. More maps take longer")
       ->check(require_whole_number)
       ->capture_default_str();
   add_option_flag(

@@ -21,7 +21,7 @@ const std::vector<Group>& groups() {
   static const std::vector<Group> all{
       {"Likelihood", {"--prior", "--gamma", "--ratio", "--spread-mm", "--peak", "--felt-share"}},
       {"Misplaced touches and slip", {"--touch-sd-mm", "--touch-sd-deg"}},
-      {"Filter", {"--device", "--verbose"}},
+      {"Device", {"--device", "--verbose"}},
       {"Touches in a stream",
        {"--onset", "--release", "--steady", "--min-steady-s", "--smooth-s", "--drift-s", "--tare",
         "--reset-after"}},

@@ -171,8 +171,8 @@ void add_import(CLI::App& app) {
                       "them has no pose, s [default: 2.5 times the median step of the poses' "
                       "times, at least 0.1]");
   command->add_option("--pose-delay", options->pose_delay_s,
-                      "By how much later the poses' clock reads than the readings', s; taken from "
-                      "the poses' times [default: 0]");
+                      "How far the poses' clock is ahead of the readings' clock, s; subtracted "
+                      "from the poses' times [default: 0]");
   command->add_option("--rate", options->rate_hz,
                       "Frames per second of pressures without times; the first frame is at 0 s");
   command->add_option("--object", options->object, "Label of the touched object");

@@ -95,10 +95,11 @@ void add_map_flags(CLI::App& command, MapFlags& flags) {
                      "Label of the map [default: the object that the recording names, "
                      "or a drawing's file]");
   command.add_option("--group", flags.group,
-                     "Whose touches are alike, such as a person's or a day's, and are left out "
-                     "together where it is judged how sure to be, as of people and days to come: "
-                     "recording, those of each file; label, those of each GROUP of objects that "
-                     "recordings name as LABEL@GROUP, of which LABEL is the map's");
+                     "How touches are grouped, such as by the person or the day that made them. A "
+                     "group is left out as a whole where it is learned how sure to be, so that "
+                     "this holds for other people and days: recording, a group a file; label, a "
+                     "group for each GROUP of recordings whose object is LABEL@GROUP, of which "
+                     "LABEL is the map's");
   command.add_flag("--unposed", flags.unposed,
                    "The sensor's poses are unknown: find how the presses of an object lie beside "
                    "each other, and build its maps from their means. For arrays so large that a "

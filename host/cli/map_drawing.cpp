@@ -109,8 +109,8 @@ void add_drawing_flags(CLI::App& command, MapFlags& flags) {
                      "Of a drawing, whether the object is where it is dark or light [default: "
                      "dark]");
   command.add_option("--felt-share", flags.felt_share,
-                     "Of a drawing, the share of an element's point spread on the object from "
-                     "which on it feels the object; 0.5 leaves outlines where they are drawn "
+                     "Of a drawing, the least share of an element's point spread on the object "
+                     "with which the element feels it; 0.5 leaves outlines where they are drawn "
                      "[default: 0.2, midway between No Contact and In Contact, 1.7 spreads "
                      "outside]");
   command.add_option("--array", flags.array,

@@ -48,8 +48,8 @@ void add_recognition_flags(CLI::App& command, Request& request, bool& verbose) {
     }
   }
   command.add_flag("--verbose", verbose,
-                   "Say on standard error how the device works: its memory, the likelihood's path, "
-                   "the lattice, the seconds it took");
+                   "Say on standard error how the filter works: its device and memory, the kernels"
+                   " of the likelihood, the lattice, the seconds it took");
 }
 
 void hide_particle_flags(CLI::App& command) {

@@ -34,8 +34,8 @@ void add_detector_flags(CLI::App& command, DetectorFlags& flags, const std::stri
                   "Time over which pressures are averaged before they are judged, s")
       ->capture_default_str();
   command.add_option("--drift-s", flags.drift_s,
-                     "Longer than any press, s: what an element reads for so long is its rest, "
-                     "which drifts and is subtracted [default: " +
+                     "Time longer than any press, s: what an element reads for so long is no press "
+                     "but its rest, which may drift and is subtracted [default: " +
                          usual_drift + "]");
 }
 

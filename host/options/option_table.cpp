@@ -24,6 +24,7 @@ constexpr const char* lattice = "Bins and region";
 constexpr const char* likelihood = "Likelihood";
 constexpr const char* displaced = "Misplaced touches and slip";
 constexpr const char* filter = "Filter";
+constexpr const char* device = "Device";
 
 const std::array table{
     Option{"scene", "", general, &Request::scene, any,
@@ -41,11 +42,11 @@ const std::array table{
     Option{"bins", "bins", lattice, &Request::bins, from_1,
            "Pose bins per object along x, y and theta, as 25x25x16; auto: as many as the refined "
            "pose needs, in steps of 0.6 times the maps' cell or 1.2 times the sensor's spread, "
-           "whichever is larger, widened to half of --touch-sd-* or five quarters of "
-           "--slip-sd-*, but at most 2.5 times; fine: also as the mode needs, in steps of 0.6 "
-           "times the larger of both. Auto and fine take wider steps where the histogram's device "
-           "memory is short; the region about an automatic pivot fits the largest array of all "
-           "RECORDINGs [default: auto, or 25x25x16 where a range or a pivot is given]"},
+           "whichever is larger, widened to half of --touch-sd-* or five quarters of --slip-sd-*, "
+           "but at most 2.5 times; fine: as many as the mode needs, too, in steps of 0.6 times the"
+           " larger of both. Auto and fine take wider steps where the histogram's device memory is"
+           " short; the region about an automatic pivot fits the largest array of all RECORDINGs "
+           "[default: auto, or 25x25x16 where a range or a pivot is given]"},
     Option{"x-mm", "region.x_mm", lattice, &Request::x_mm, near,
            "Range of the pivot's x in the object frame, mm, as --x-mm=-10:10 [default: every "
            "place of an array that touches an object of the maps, or -10:10 where counts of "
@@ -87,7 +88,7 @@ const std::array table{
            "tell: after it, the odds are about the prior's, unless a sensor model has learned "
            "what a touch of no known object is like. 0 leaves (none) out, as particles do. By "
            "default it is also left out where the bins are too wide to tell it, or where the "
-           "learned sensor trusts no touch enough [default: as without W]"},
+           "sensor model's temperature is above 5 [default: as without W]"},
     Option{"threshold", "threshold", general, &Request::threshold, from_0,
            "Contact threshold, in the recording's pressure unit [default: the sensor model's, or "
            "2 kPa; required for raw pressure without a model]"},
@@ -128,7 +129,7 @@ const std::array table{
            "Augmented MCL: add random particles while the touches fit worse than before"},
     Option{"seed", "", filter, &Request::seed, any,
            "Seed of the particles' random numbers [default: 0]"},
-    Option{"device", "device", filter, &Request::device, any,
+    Option{"device", "device", device, &Request::device, any,
            "Vulkan device, by index or a part of its name; a search by bounds needs none"},
     Option{"frames", "", general, &Request::frames, any,
            "Use the touches A to B - 1 of every recording, counted from 0, as A:B", true},

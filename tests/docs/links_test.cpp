@@ -66,8 +66,8 @@ fs::path included_by(const fs::path& page) {
 
 std::vector<fs::path> pages() {
   const fs::path root = PALPATE_SOURCE_DIR;
-  std::vector<fs::path> found{root / "README.md", root / "CHANGELOG.md"};
-  for (const char* folder : {"docs", "bench"}) {
+  std::vector<fs::path> found{root / "README.md", root / "CHANGELOG.md", root / "CONTRIBUTING.md"};
+  for (const char* folder : {"docs", "bench", "examples"}) {
     for (const auto& entry : fs::recursive_directory_iterator(root / folder)) {
       if (entry.path().extension() == ".md") {
         found.push_back(entry.path());

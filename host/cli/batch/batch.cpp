@@ -221,7 +221,7 @@ void add_batch(CLI::App& app, int& status) {
       ->required();
   command
       ->add_option("-o,--output", options->results,
-                   "Folder of results; made where it is missing, completed where it is not")
+                   "Folder of results; made where it is missing, else completed")
       ->required();
   add_recognition_flags(*command, options->request, options->verbose);
   command->get_option("--budget-ms")->group("");  // read still, to be refused with its reason
