@@ -178,14 +178,14 @@ def checked(device: palpate.Device, one: Set) -> Json:
     offset, touches = one.misplaced()
     findings = found(touches).findings
     record["offset"] = {"true": offset.tolist(), "words": [finding.words for finding in findings]}
-    pose = findings[0].array_offset if len(findings) == 1 else None
+    pose = getattr(findings[0], "array_offset", None) if len(findings) == 1 else None
     off = offset if pose is None else pose - offset
     record["offset"] |= {"error_mm": math.hypot(off[0], off[1]), "error_rad": abs(off[2])}
-    if findings and findings[0].sd is not None:
-        record["offset"]["sd"] = findings[0].sd
+    if findings and "sd" in findings[0]:
+        record["offset"]["sd"] = findings[0]["sd"]
     offset, touches = one.far_off()
     findings = found(touches).findings
-    pose = findings[0].array_offset if len(findings) == 1 else None
+    pose = getattr(findings[0], "array_offset", None) if len(findings) == 1 else None
     off = offset if pose is None else palpate.compose(palpate.inverse(offset), pose)
     record["mount"] = {
         "true": offset.tolist(),

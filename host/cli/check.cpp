@@ -5,7 +5,6 @@
 #include <vector>
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
@@ -18,6 +17,7 @@
 #include "model/element_spacing.hpp"
 #include "model/option_words.hpp"
 #include "recognition/recordings.hpp"
+#include "recognition/result_json.hpp"
 
 namespace palpate::cli {
 
@@ -47,17 +47,7 @@ void check_outputs(const CheckArguments& options) {
 std::string json_of(const SetupCheck& check) {
   auto all = nlohmann::ordered_json::array();
   for (const SetupFinding& finding : check.findings) {
-    nlohmann::ordered_json json{
-        {"what", finding.what}, {"nats", finding.nats}, {"words", in_flags(finding.words)}};
-    if (!finding.options.empty()) {
-      json["flag"] = fmt::format("--{}", fmt::join(finding.options, " --"));
-    }
-    if (finding.array_offset) {
-      const Pose& offset = *finding.array_offset;
-      json["array_offset"] = {offset.translation_mm.x, offset.translation_mm.y, offset.theta_rad};
-      json["sd"] = *finding.sd;
-    }
-    all.push_back(std::move(json));
+    all.push_back(to_json(finding));
   }
   return all.dump(2) + "\n";
 }

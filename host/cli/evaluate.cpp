@@ -18,6 +18,7 @@
 #include "recognition/batch/batch_task.hpp"
 #include "recognition/judged_results.hpp"
 #include "recognition/record_json.hpp"
+#include "recognition/result_json.hpp"
 
 namespace palpate::cli {
 
@@ -70,7 +71,7 @@ void evaluate_results(const EvaluateArguments& options) {
   if (const std::string failed = failed_words(results); !failed.empty()) {
     tell_on_stderr(failed);
   }
-  const std::string json = text_of(to_json(evaluation, results.without_truth), 2);
+  const std::string json = text_of(to_json(evaluation, results), 2);
   give_result(options.json, json, evaluation_text(evaluation, results.without_truth));
 }
 

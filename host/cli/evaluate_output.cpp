@@ -12,45 +12,6 @@ namespace palpate::cli {
 
 namespace {
 
-using Json = nlohmann::ordered_json;
-
-Json to_json(const Interval& interval) { return {interval.low, interval.high}; }
-
-Json to_json(const Scores& scores) {
-  Json json{{"records", scores.records},     {"right", scores.right},
-            {"accuracy", scores.accuracy()}, {"accuracy_interval", to_json(scores.interval())},
-            {"log_loss", scores.log_loss},   {"calibration_error", scores.calibration_error},
-            {"reliability", Json::array()}};
-  for (const ReliabilityBin& bin : scores.bins) {
-    Json row{{"lower", bin.lower}, {"upper", bin.upper}, {"records", bin.records}};
-    if (bin.records > 0) {
-      row["mean_confidence"] = bin.mean_confidence;
-      row["accuracy"] = bin.accuracy();
-      row["accuracy_interval"] = to_json(bin.interval());
-    }
-    json["reliability"].push_back(row);
-  }
-  return json;
-}
-
-Json unknown_to_json(const Evaluation& evaluation) {
-  const Scores& unknown = *evaluation.unknown;
-  Json json{{"records", unknown.records},
-            {"called_none", unknown.right},
-            {"share_called_none", unknown.accuracy()},
-            {"share_interval", to_json(unknown.interval())}};
-  if (const auto& against = evaluation.known_against_unknown) {
-    json["area_under_curve"] = {{"score", name_of(against->score)},
-                                {"known", against->known},
-                                {"unknown", against->unknown},
-                                {"area", against->area},
-                                {"standard_error", against->standard_error}};
-  }
-  return json;
-}
-
-Json to_json(const Median& median) { return {{"records", median.count}, {"median", median.value}}; }
-
 std::string range_words(const Interval& interval) {
   return fmt::format("{:.1f} to {:.1f} %", 100.0 * interval.low, 100.0 * interval.high);
 }
@@ -155,37 +116,6 @@ std::string error_words(const Evaluation& evaluation) {
 }
 
 }  // namespace
-
-Json to_json(const Evaluation& evaluation, std::size_t without_truth) {
-  Json json = to_json(evaluation.all);
-  json["without_truth"] = without_truth;
-  if (evaluation.known) {
-    json["known_classes"] = to_json(*evaluation.known);
-  }
-  if (evaluation.unknown) {
-    json["unknown_classes"] = unknown_to_json(evaluation);
-  }
-  json["classes"] = Json::array();
-  json["confusion"] = {
-      {"rows", Json::array()}, {"columns", evaluation.answers}, {"counts", Json::array()}};
-  for (const ClassScores& scores : evaluation.classes) {
-    json["classes"].push_back({{"class", scores.label},
-                               {"known", scores.known},
-                               {"records", scores.records},
-                               {"right", scores.right},
-                               {"recall", scores.recall()},
-                               {"recall_interval", to_json(scores.interval())}});
-    json["confusion"]["rows"].push_back(scores.label);
-    json["confusion"]["counts"].push_back(scores.taken);
-  }
-  if (evaluation.error_mm) {
-    json["error_mm"] = to_json(*evaluation.error_mm);
-  }
-  if (evaluation.refined_error_mm) {
-    json["refined_error_mm"] = to_json(*evaluation.refined_error_mm);
-  }
-  return json;
-}
 
 void add_score_rows(TextTable& table, const std::vector<const Scores*>& columns) {
   const auto add = [&](const char* name, auto text_of) {

@@ -5,19 +5,14 @@
 #include <string>
 #include <vector>
 
-#include <nlohmann/json.hpp>
-
 #include "cli/text_table.hpp"
 #include "recognition/evaluation.hpp"
 
 namespace palpate::cli {
 
-/// The evaluation in the form that other programs rely on.
-/// @param without_truth number of records that were left out
-nlohmann::ordered_json to_json(const Evaluation& evaluation, std::size_t without_truth);
-
 /// The scores, the reliability bins that have records, a line for each class with what it was taken
 /// for, unknown classes and pose errors.
+/// @param without_truth number of records that were left out
 std::string evaluation_text(const Evaluation& evaluation, std::size_t without_truth);
 
 /// Adds what scores say of some records: accuracy and its interval, log-loss, calibration error.

@@ -1,7 +1,9 @@
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
@@ -11,6 +13,7 @@
 #include "cli/options.hpp"
 #include "cli/recognition_flags.hpp"
 #include "cli/sensor_option.hpp"
+#include "io/csv_table.hpp"
 #include "io/recording_rules.hpp"
 #include "io/recording_survey.hpp"
 #include "palpate/files.hpp"
@@ -22,6 +25,7 @@ namespace {
 
 struct ImportArguments : ImportOptions {
   std::string output;
+  std::string split;
 };
 
 /// The command that takes the recording.
@@ -80,15 +84,13 @@ void print_summary(const ImportArguments& options, const ImportedRecording& impo
                *imported.whole_up_to);
   }
   fmt::print("; next: {}\n", next_command(options, r));
-  for (const std::string& words : imported.of_poses) {
-    tell_on_stderr(fmt::format("{}: {}", options.poses, words));
-  }
+  std::ranges::for_each(imported.understood, tell_on_stderr);
   for (const SetupFinding& finding : r.findings) {
     tell_on_stderr(fmt::format("{}: {}", options.poses, finding.words));
   }
 }
 
-void import_tables(const ImportArguments& options) {
+void import_one(const ImportArguments& options) {
   CommandFiles files;
   files.reads("PRESSURES", options.pressures);
   files.reads("--poses", options.poses);
@@ -106,6 +108,52 @@ void import_tables(const ImportArguments& options) {
           "{}: {} of {} touches equal an earlier one to the digit, and count as one with it",
           options.pressures, repeated, imported.recording.size()));
     }
+  }
+}
+
+/// The texts in a column, each once, in the order of the rows.
+std::vector<std::string> values_in(const ImportArguments& options) {
+  constexpr std::size_t most = 1000;
+  CsvTable table(options.pressures, options.header_line);
+  const auto column = table.find_or_count(options.split);
+  if (!column) {
+    table.refuse_columns("`split {}`: no column is called so", options.split);
+  }
+  std::vector<std::string> values;
+  while (table.next()) {
+    const std::string value(table.text(*column));
+    if (!value.empty() && std::ranges::find(values, value) == values.end()) {
+      values.push_back(value);
+    }
+    if (values.size() > most) {
+      table.refuse("`split {}`: the column has more than {} values; name a column of labels",
+                   options.split, most);
+    }
+  }
+  return values;
+}
+
+/// Where the recording of a value goes: OUTPUT-VALUE.h5, without characters that a path may not
+/// have.
+std::string output_of(const std::string& output, std::string value) {
+  std::ranges::replace_if(
+      value, [](unsigned char c) { return c == '/' || c < ' '; }, '_');
+  std::filesystem::path path(output);
+  path.replace_filename(path.stem().string() + "-" + value + path.extension().string());
+  return path.string();
+}
+
+void import_tables(const ImportArguments& options) {
+  if (options.split.empty()) {
+    import_one(options);
+    return;
+  }
+  for (const std::string& value : values_in(options)) {
+    ImportArguments one = options;
+    one.where.push_back(fmt::format("{}={}", options.split, value));
+    one.output = output_of(options.output, value);
+    one.object = options.object.empty() ? value : options.object;
+    import_one(one);
   }
 }
 
@@ -153,13 +201,45 @@ void add_import(CLI::App& app) {
   command->add_option("--time-column", options->time_column,
                       "Name of the column of times, in both tables; a column without a name is "
                       "called by its number, from 1 [default: time, timestamp, stamp or t]");
-  command->add_option("--pressure-columns", options->pressure_columns,
-                      "Columns of the pressures: a prefix of their names, or FIRST:LAST [default: "
-                      "all columns that are neither time nor pose]");
-  command->add_option("--pose-columns", options->pose_columns,
-                      "Names of the columns of the poses: X,Y,THETA, or TX,TY,TZ,QX,QY,QZ,QW of "
-                      "poses in space, with a quaternion [default: x,y,theta, or "
-                      "tx,ty,tz,qx,qy,qz,qw]");
+  command->add_option("--header-line", options->header_line,
+                      "Number of the line of PRESSURES that holds the columns' names, from 1 "
+                      "[default: the first with as many cells as the rows]");
+  command->add_option("--where", options->where,
+                      "COLUMN=VALUE: take only the rows in which the column is this, as those of "
+                      "one sensor of several [default: all rows]");
+  command->add_option("--split", options->split,
+                      "Write a recording for each value of this column, OUTPUT-VALUE.h5, labelled "
+                      "by it unless --object is given");
+  command->add_option(
+      "--pressure-columns", options->pressure_columns,
+      "Columns of the pressures, of their own table, separated by commas: names or numbers from 1, "
+      "FIRST:LAST, START::STEP (3::3, every third from the third on), patterns (*_fz, or p{n}_fz "
+      "in "
+      "the order of the numbers) or a beginning of names [default: all columns that are neither "
+      "time nor pose]");
+  command->add_option("--pressure-component", options->pressure_component,
+                      "Of elements that read three axes, in three columns each: z, or norm, the "
+                      "length of the vector [default: one column an element]");
+  command->add_option(
+      "--pose-columns", options->pose_columns,
+      "Columns of the poses, of their own table, as --pressure-columns names them: X,Y,THETA; or "
+      "in "
+      "space X,Y,Z,ROLL,PITCH,YAW (see --euler), a rotation vector X,Y,Z,RX,RY,RZ, a quaternion "
+      "TX,TY,TZ,QX,QY,QZ,QW, or the 12 or 16 numbers of a matrix [default: these names; "
+      "actual_TCP_pose_0 to 5; O_T_EE_0 to 15]");
+  command->add_option(
+      "--euler", options->euler,
+      "Axes about which three angles turn, in the order of their columns: xyz, zyx and so on about "
+      "fixed axes, ZYX and so on about moving ones, as SciPy has them; or vector, a rotation "
+      "vector "
+      "[default: xyz, of columns called rx, ry and rz a vector]");
+  command->add_option("--matrix", options->matrix,
+                      "How matrices are written: columns or rows [default: the one by which they "
+                      "are rotations]");
+  command->add_option(
+      "--mount", options->mount,
+      "X,Y,Z,ROLL,PITCH,YAW: the array's pose in the frame whose poses are logged, such as the "
+      "robot's flange, mm and degrees about fixed axes [default: the poses are the array's]");
   command
       ->add_option(
           "--plane", options->plane,

@@ -13,6 +13,7 @@
 #include "model/printable.hpp"
 #include "palpate/error.hpp"
 #include "recognition/record_json.hpp"
+#include "recognition/result_json.hpp"
 
 namespace palpate::cli {
 

@@ -11,7 +11,6 @@
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
-#include <nlohmann/json.hpp>
 
 #include "cli/command_files.hpp"
 #include "cli/commands.hpp"
@@ -22,6 +21,7 @@
 #include "cli/text_table.hpp"
 #include "recognition/record_json.hpp"
 #include "recognition/recordings.hpp"
+#include "recognition/result_json.hpp"
 #include "recognition/touch_plan.hpp"
 
 namespace palpate::cli {
@@ -57,32 +57,6 @@ std::string table_of(const Plan& plan) {
                std::to_string(touch.index)});
   }
   return table.text();
-}
-
-/// The plan in the form that other programs rely on.
-nlohmann::ordered_json plan_json(const Plan& plan, const RecognitionTask& task,
-                                 const std::string& device) {
-  nlohmann::ordered_json json{{"recording", plan.record.recording},
-                              {"touches", plan.record.touches},
-                              {"goal", goal_word(plan.goal)},
-                              {"believed", to_json(plan.record.last(), task)}};
-  json["believed"]["entropy"] = {{"identity", plan.identity_nats},
-                                 {"pose", plan.both_nats - plan.identity_nats},
-                                 {"both", plan.both_nats}};
-  json["candidates"] = nlohmann::ordered_json::array();
-  for (const PlannedTouch& touch : plan.ranked) {
-    json["candidates"].push_back(to_json(touch));
-  }
-  std::vector<std::string> warnings = warnings_of(plan);
-  std::ranges::transform(warnings, warnings.begin(), in_flags);
-  if (!warnings.empty()) {
-    json["warnings"] = warnings;
-  }
-  json["samples"] = plan.samples.size();
-  json["seed"] = plan.seed;
-  json["seconds"] = plan.seconds;
-  json["device"] = device;
-  return json;
 }
 
 /// Whether to act, what is believed, the ten best candidates, what is wrong with the touches, and
@@ -143,7 +117,7 @@ void plan_touches(const PlanArguments& options) {
       !words.empty()) {
     tell_on_stderr(words);
   }
-  give_result(options.json, text_of(plan_json(plan, task, device_name(device)), 2),
+  give_result(options.json, text_of(to_json(plan, task, device_name(device)), 2),
               plan_text(plan, task) + setup_words(device, task) + "\n");
   if (options.verbose) {
     print_engine(device, recogniser, task);

@@ -219,21 +219,6 @@ std::string error_text(std::optional<double> error_mm) {
   return error_mm ? fmt::format("{:.2f}", *error_mm) : "-";
 }
 
-nlohmann::ordered_json to_json(const PlannedTouch& touch) {
-  const Pose& pose = touch.T_robot_sensor;
-  const TouchGain::StandardError& error = touch.gain.standard_error;
-  return {{"index", touch.index},
-          {"x_mm", pose.translation_mm.x},
-          {"y_mm", pose.translation_mm.y},
-          {"theta_rad", pose.theta_rad},
-          {"gain",
-           {{"identity", touch.gain.identity},
-            {"pose", touch.gain.pose},
-            {"both", touch.gain.both()},
-            {"standard_error",
-             {{"identity", error.identity}, {"pose", error.pose}, {"both", error.both}}}}}};
-}
-
 std::string gain_text(const TouchGain& gain, PlanGoal goal) {
   const TouchGain::StandardError& of = gain.standard_error;
   const double error = goal == PlanGoal::identity ? of.identity

@@ -5,7 +5,6 @@
 #include <string>
 #include <vector>
 
-#include <nlohmann/json.hpp>
 
 #include "recognition/recogniser.hpp"
 #include "recognition/recognition_record.hpp"
@@ -79,10 +78,6 @@ std::string share_text(const RecognitionStep& step, const RecognitionTask& task,
 
 /// A pose error in mm, "-" where there is none.
 std::string error_text(std::optional<double> error_mm);
-
-/// index, x_mm, y_mm, theta_rad, and the gain in nats: identity, pose, both, and the standard_error
-/// of each.
-nlohmann::ordered_json to_json(const PlannedTouch& touch);
 
 /// The part of a gain that the goal asks for, with its standard error: "2.31+-0.07".
 std::string gain_text(const TouchGain& gain, PlanGoal goal);

@@ -14,6 +14,7 @@
 #include "cli/command_files.hpp"
 #include "cli/commands.hpp"
 #include "cli/options.hpp"
+#include "cli/press_watch.hpp"
 #include "cli/recognition_flags.hpp"
 #include "cli/sensor_option.hpp"
 #include "io/recording_state.hpp"
@@ -24,6 +25,7 @@
 #include "palpate/touch_detector.hpp"
 #include "palpate/virtual_sensor.hpp"
 #include "streaming/rest_finder.hpp"
+#include "streaming/stroke_touches.hpp"
 
 namespace palpate::cli {
 
@@ -33,6 +35,7 @@ struct TouchesArguments {
   std::string frames;
   std::string output;
   DetectorFlags detector;
+  std::optional<double> slide_mm;
   bool unposed = false;
 };
 
@@ -194,6 +197,9 @@ void find_touches(const TouchesArguments& options) {
   if (options.detector.drift_s) {
     require_above("--drift-s", *options.detector.drift_s, 0.0, true);
   }
+  if (options.slide_mm) {
+    require_above("--slide", *options.slide_mm, 0.0, false);
+  }
   const std::unique_ptr<Sensor> stream =
       open_virtual_sensor("replay:" + options.frames + ",speed=max");
   const SensorDescription& sensor = stream->description();
@@ -213,10 +219,25 @@ void find_touches(const TouchesArguments& options) {
   std::uint64_t unreadable = 0;
   Presses presses;
   bool touching = false;
+  PressWatch watch(thresholds);
+  std::optional<StrokeTouches> stroke;
+  if (options.slide_mm) {
+    stroke.emplace(*options.slide_mm, sensor.valid);
+  }
   const auto take = [&](const std::optional<DetectedTouch>& touch) {
     const bool was_touching = std::exchange(touching, detector.touching());
-    presses.unsteady += was_touching && !touching && !touch ? 1 : 0;
-    presses.without_pose += touch && !append(*touch, options.unposed, recording) ? 1 : 0;
+    if (!was_touching || touching) {
+      return;
+    }
+    std::vector<DetectedTouch> found = stroke ? stroke->finish() : std::vector<DetectedTouch>();
+    if (found.empty() && touch) {
+      found.push_back(*touch);
+    }
+    presses.unsteady += found.empty() ? 1 : 0;
+    watch.end(!found.empty());
+    for (const DetectedTouch& one : found) {
+      presses.without_pose += append(one, options.unposed, recording) ? 0 : 1;
+    }
   };
   RestedFrames frames(*stream, thresholds, options.detector.drift_s);
   if (frames.rest().falls) {
@@ -228,7 +249,12 @@ void find_touches(const TouchesArguments& options) {
     if (const std::optional<Frame> frame = frames.next()) {
       unknown += unknown_readings(*frame, sensor.valid);
       unreadable += is_readable(*frame, sensor.valid) ? 0 : 1;
-      take(detector.add(*frame));
+      const std::optional<DetectedTouch> touch = detector.add(*frame);
+      watch.add(*frame, detector.smoothed(), detector.touching());
+      if (stroke && detector.touching()) {
+        stroke->add(*frame);
+      }
+      take(touch);
     }
   }
   take(detector.finish());
@@ -252,9 +278,8 @@ void find_touches(const TouchesArguments& options) {
     if (clock) {
       reasons.push_back(in_flags(clock->words));
     }
-    if (reasons.empty()) {
-      reasons.emplace_back("lower --onset or --min-steady-s");
-    }
+    const std::vector<std::string> of_presses = watch.reasons(sensor.pressure_unit);
+    reasons.insert(reasons.end(), of_presses.begin(), of_presses.end());
     refuse(options.frames, "no touch in its {} frames: {}", stream->counters().frames,
            fmt::format("{}", fmt::join(reasons, "; ")));
   }
@@ -306,6 +331,10 @@ void add_touches(CLI::App& app) {
   add_detector_flags(*command, options->detector,
                      "the shortest of 2 to 32 that leaves no press in the rest; 0: the rest is the "
                      "recording's baseline");
+  command->add_option("--slide", options->slide_mm,
+                      "Presses during which the array slides: cut each into touches, one every so "
+                      "many millimetres where the array moves steadily, with the pose at its "
+                      "middle, mm [default: a press is one touch, where the array stands still]");
   command->add_flag("--unposed", options->unposed,
                     "The sensor's poses are unknown: write every touch at the pose 0, for 'palpate "
                     "map --unposed', 'palpate calibrate --unposed' and 'palpate recognize "

@@ -4,12 +4,14 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cerrno>
-#include <charconv>
 #include <cstring>
 #include <set>
+#include <utility>
 
+#include <fmt/ranges.h>
+
+#include "io/descriptor.hpp"
 #include "model/number_text.hpp"
 #include "model/printable.hpp"
 
@@ -17,133 +19,91 @@ namespace palpate {
 
 namespace {
 
-constexpr std::size_t block_bytes = 1 << 20;
-// A row of 100,000 numbers is shorter; a file without line ends must not fill the memory.
-constexpr std::size_t longest_line = 16 << 20;
-constexpr std::string_view blanks = " \t\r\v\f";
-constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
-
-std::string_view trimmed(std::string_view text) {
-  text.remove_prefix(std::min(text.find_first_not_of(blanks), text.size()));
-  return text.substr(0, text.find_last_not_of(blanks) + 1);
-}
+// Lines that show where a table begins.
+constexpr std::size_t enough_lines = 200;
 
 bool is_unknown(std::string_view cell) { return cell.empty() || alike(cell, "nan"); }
 
-/// Index of the quote that ends the text in quotes from `begin` on; npos where none does.
-std::size_t closing_quote(std::string_view line, std::size_t begin) {
-  std::size_t at = line.find('"', begin + 1);
-  while (at != line.npos && at + 1 < line.size() && line[at + 1] == '"') {
-    at = line.find('"', at + 2);  // a doubled quote stands for itself
-  }
-  return at;
-}
-
-/// The line up to its comment.
-std::string_view without_comment(std::string_view line) {
-  if (line.find('#') == line.npos) {
-    return line;
-  }
-  for (std::size_t at = 0; at < line.size(); ++at) {
-    if (line[at] == '"') {
-      at = std::min(closing_quote(line, at), line.size());
-    } else if (line[at] == '#' && (at == 0 || blanks.find(line[at - 1]) != blanks.npos)) {
-      return line.substr(0, at);
-    }
-  }
-  return line;
-}
-
-char separator_of(std::string_view line) {
-  std::string bare;
-  for (std::size_t at = 0; at < line.size(); ++at) {
-    if (line[at] == '"') {
-      at = std::min(closing_quote(line, at), line.size());
-    } else {
-      bare += line[at];
-    }
-  }
-  for (const char separator : {'\t', ';', ','}) {
-    if (bare.find(separator) != bare.npos) {
-      return separator;
-    }
-  }
-  return ' ';
-}
-
-std::optional<double> number_in(std::string_view cell, char separator) {
-  if (separator == ',' || cell.find(',') == cell.npos) {
-    return number_of(cell);
-  }
-  std::string with_point(cell);
-  std::ranges::replace(with_point, ',', '.');
-  return number_of(with_point);
-}
-
-/// True for the text of a number, finite or not: 1, -2.5, inf, nan, 1e999.
-bool is_numeric(std::string_view cell, char separator) {
-  std::string text(cell.substr(cell.starts_with('+') ? 1 : 0));
-  if (separator != ',') {
-    std::ranges::replace(text, ',', '.');
-  }
-  double number = 0.0;
-  const char* const end = text.data() + text.size();
-  return !text.empty() && std::from_chars(text.data(), end, number).ptr == end;
+/// The separator that a spreadsheet's first line "sep=;" names.
+std::optional<char> separator_named(std::string_view line) {
+  constexpr std::string_view key = "sep=";
+  const bool names_it = line.size() > key.size() && alike(line.substr(0, key.size()), key) &&
+                        trimmed(line.substr(key.size() + 1)).empty();
+  return names_it ? std::optional(line[key.size()]) : std::nullopt;
 }
 
 }  // namespace
 
-bool alike(std::string_view a, std::string_view b) {
-  return std::ranges::equal(
-      a, b, [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
-}
-
-CsvTable::CsvTable(std::filesystem::path path) : path_(std::move(path)) {
-  require_readable(path_);
-  file_ = Descriptor(path_, O_RDONLY);
-  if (!next_line()) {
-    palpate::refuse(path_, "holds no row; write at least one");
-  }
-  separator_ = separator_of(line_);
-  split(line_);
-  has_header_ = is_header();
+CsvTable::CsvTable(std::filesystem::path path, std::uint64_t header_line)
+    : path_(std::move(path)), lines_(path_) {
+  find_start(header_line);
+  split();
+  has_header_ = header_line > 0 || is_header(cells_, separator_);
   name_columns();
   row_is_ready_ = !has_header_;
 }
 
-bool CsvTable::is_header() const {
-  bool counts = true;
-  std::size_t numbers = 0;
-  std::size_t names = 0;
-  for (const std::string_view cell : cells_) {
-    if (is_numeric(cell, separator_)) {
-      counts = counts && cell == fmt::format_int(numbers).c_str();
-      ++numbers;
-    } else {
-      names += cell.empty() ? 0 : 1;
+/// Goes on to the first line of the table.
+void CsvTable::find_start(std::uint64_t header_line) {
+  std::vector<std::string> lines;
+  std::vector<std::uint64_t> numbers;
+  std::optional<char> named;
+  while (lines.size() < enough_lines + header_line && next_line()) {
+    named = numbers.empty() && !named ? separator_named(line_) : named;
+    if (named && lines.empty() && separator_named(line_)) {
+      ++skipped_lines_;
+      continue;
+    }
+    if (number_ >= header_line) {
+      lines.emplace_back(line_);
+      numbers.push_back(number_);
     }
   }
-  if (numbers == 0) {
-    return names > 0;
+  if (header_line > 0 && (numbers.empty() || numbers.front() != header_line)) {
+    palpate::refuse(fmt::format("`header-line {}`", header_line),
+                    "{} has no such line, or nothing stands in it; give the number of the line "
+                    "with the columns' names, from 1",
+                    path_.string());
   }
-  // pandas names the columns of an array by counting, beside the names of other columns. A short
-  // row that counts may be a pose.
-  constexpr std::size_t enough = 5;
-  return counts && numbers >= enough;
+  if (lines.empty()) {
+    palpate::refuse(path_, "holds no row; write at least one");
+  }
+  TableStart start = find_table(lines);
+  if (header_line > 0) {
+    start = {.first = 0, .separator = separator_of(lines.front())};
+  }
+  separator_ = named.value_or(start.separator);
+  skipped_lines_ += start.first;
+  header_number_ = numbers[start.first];
+  lines_ = TextLines(path_);
+  number_ = 0;
+  while (number_ < header_number_) {
+    next_line();
+  }
 }
 
 void CsvTable::name_columns() {
   if (has_header_ && cells_.size() > 1 && cells_.back().empty()) {
     cells_.pop_back();  // a separator ends each row
   }
+  first_cells_.assign(cells_.begin(), cells_.end());
   std::set<std::string> seen;
   for (std::size_t i = 0; i < cells_.size(); ++i) {
     columns_.push_back(has_header_ ? std::string(cells_[i]) : std::to_string(i + 1));
     const std::string& name = columns_.back();
     if (!name.empty() && !seen.insert(name).second) {
-      refuse("two columns are called '{}'; rename one", printable(name));
+      refuse_columns("two columns are called '{}'; rename one", printable(name));
     }
   }
+}
+
+std::string CsvTable::header_words() const {
+  constexpr std::size_t enough = 4;
+  std::vector<std::string> shown;
+  for (std::size_t i = 0; i < std::min(enough, first_cells_.size()); ++i) {
+    shown.push_back(fmt::format("'{}'", printable(first_cells_[i])));
+  }
+  return fmt::format("{}{}", fmt::join(shown, ", "), first_cells_.size() > enough ? ", ..." : "");
 }
 
 std::optional<std::size_t> CsvTable::find(std::string_view name) const {
@@ -156,25 +116,69 @@ std::optional<std::size_t> CsvTable::find(std::string_view name) const {
                                  : std::optional<std::size_t>(found - columns_.begin());
 }
 
+std::optional<std::size_t> CsvTable::find_or_count(std::string_view name) const {
+  if (const auto found = find(name)) {
+    return found;
+  }
+  const auto number = whole_number_of(name);
+  const bool is_column =
+      number && *number >= 1 && static_cast<std::size_t>(*number) <= columns_.size();
+  return is_column ? std::optional(static_cast<std::size_t>(*number) - 1) : std::nullopt;
+}
+
+void CsvTable::keep_where(std::size_t column, std::string value) {
+  kept_.emplace_back(column, std::move(value));
+}
+
+bool CsvTable::is_kept() const {
+  return std::ranges::all_of(kept_, [&](const auto& where) {
+    const auto& [column, value] = where;
+    const auto number = number_in(value, separator_);
+    return cells_[column] == value || (number && number_in(cells_[column], separator_) == number);
+  });
+}
+
 bool CsvTable::next() {
-  if (row_is_ready_) {
-    row_is_ready_ = false;
-    row_is_first_ = true;
+  do {
+    row_is_first_ = std::exchange(row_is_ready_, false);
+    if (!row_is_first_) {
+      if (!next_line()) {
+        return false;
+      }
+      split();
+      if (cells_.size() == columns_.size() + 1 && cells_.back().empty()) {
+        cells_.pop_back();
+      }
+      if (cells_.size() != columns_.size()) {
+        refuse("the row has {} cells, the first row {}; write the same columns in every row",
+               cells_.size(), columns_.size());
+      }
+    }
+  } while (!is_kept());
+  return true;
+}
+
+bool CsvTable::next_numbers(bool& passed) {
+  passed = false;
+  const std::uint64_t before = number_;
+  if (std::exchange(row_is_ready_, false)) {
     return true;
   }
-  row_is_first_ = false;
-  if (!next_line()) {
-    return false;
+  while (next_line()) {
+    if (split_cells(line_, separator_, cells_) != nullptr) {
+      continue;
+    }
+    if (cells_.size() == columns_.size() + 1 && cells_.back().empty()) {
+      cells_.pop_back();
+    }
+    if (cells_.size() == columns_.size() && std::ranges::all_of(cells_, [&](std::string_view cell) {
+          return cell.empty() || is_numeric(cell, separator_);
+        })) {
+      passed = number_ > before + 1;
+      return true;
+    }
   }
-  split(line_);
-  if (cells_.size() == columns_.size() + 1 && cells_.back().empty()) {
-    cells_.pop_back();
-  }
-  if (cells_.size() != columns_.size()) {
-    refuse("the row has {} cells, the first row {}; write the same columns in every row",
-           cells_.size(), columns_.size());
-  }
-  return true;
+  return false;
 }
 
 std::optional<double> CsvTable::number(std::size_t column) const {
@@ -201,6 +205,7 @@ double CsvTable::require_number(std::size_t column) const {
 }
 
 std::uint64_t CsvTable::count_lines() const {
+  constexpr std::size_t block_bytes = 1 << 20;
   const Descriptor file(path_, O_RDONLY);
   std::string bytes(block_bytes, '\0');
   std::uint64_t lines = 1;  // the last line may lack its end
@@ -214,88 +219,24 @@ std::uint64_t CsvTable::count_lines() const {
   return lines;
 }
 
-/// Finds the next line that holds a row: line_, without its comment.
+/// Finds the next line that holds anything: line_, without its comment.
 bool CsvTable::next_line() {
-  for (;;) {
-    std::size_t end = block_.find('\n', begin_);
-    while (end == block_.npos && !at_end_) {
-      const std::size_t unread = block_.size() - begin_;
-      read_block();
-      end = block_.find('\n', unread);
-    }
-    if (end == block_.npos && begin_ == block_.size()) {
-      return false;
-    }
-    end = std::min(end, block_.size());
-    line_ = std::string_view(block_).substr(begin_, end - begin_);
-    begin_ = std::min(end + 1, block_.size());
-    ++line_number_;
-    if (line_number_ == 1 && line_.starts_with(byte_order_mark)) {
-      line_.remove_prefix(byte_order_mark.size());
-    }
-    line_ = without_comment(line_);
-    if (line_.find_first_not_of(blanks) != line_.npos) {
+  while (lines_.next()) {
+    number_ = lines_.number();
+    line_ = without_comment(lines_.line());
+    if (!trimmed(line_).empty()) {
       return true;
     }
   }
+  return false;
 }
 
-void CsvTable::read_block() {
-  block_.erase(0, begin_);
-  begin_ = 0;
-  const std::size_t kept = block_.size();
-  if (kept > longest_line) {
-    palpate::refuse(path_, "line {} is longer than 16 MB: this is no table; give one row a line",
-                    line_number_ + 1);
-  }
-  block_.resize(kept + block_bytes);
-  const ssize_t got = ::read(file_.get(), block_.data() + kept, block_bytes);
-  if (got < 0) {
-    palpate::refuse(path_, "cannot be read: {}; copy or record it again", std::strerror(errno));
-  }
-  block_.resize(kept + static_cast<std::size_t>(got));
-  at_end_ = got == 0;
-  if (block_.find('\0', kept) != block_.npos) {
-    palpate::refuse(path_,
-                    "is no text; save the table as CSV in UTF-8; palpate.Recording takes arrays");
+void CsvTable::split() {
+  if (const char* problem = split_cells(line_, separator_, cells_)) {
+    refuse("{}", problem);
   }
 }
 
-void CsvTable::split(std::string_view line) {
-  cells_.clear();
-  if (separator_ == ' ') {
-    line = trimmed(line);
-  }
-  for (std::size_t at = 0;;) {
-    const std::size_t begin = line.find_first_not_of(separator_ == '\t' ? " \r" : blanks, at);
-    if (begin != line.npos && line[begin] == '"') {
-      const std::size_t quote = closing_quote(line, begin);
-      if (quote == line.npos) {
-        refuse("a quote is not closed; close it in the line in which it opens");
-      }
-      cells_.push_back(trimmed(line.substr(begin + 1, quote - begin - 1)));
-      at = quote + 1;
-      if (separator_ != ' ' && !trimmed(line.substr(at, line.find(separator_, at) - at)).empty()) {
-        refuse("text follows a closing quote; put the whole cell in quotes");
-      }
-      at = separator_ == ' ' ? at : line.find(separator_, at);
-    } else {
-      const std::size_t start = separator_ == ' ' ? begin : at;
-      const std::size_t end =
-          separator_ == ' ' ? line.find_first_of(blanks, start) : line.find(separator_, start);
-      cells_.push_back(trimmed(line.substr(start, end - start)));
-      at = end;
-    }
-    if (at >= line.size()) {
-      return;  // npos too
-    }
-    ++at;
-    if (separator_ == ' ' && line.find_first_not_of(blanks, at) == line.npos) {
-      return;
-    }
-  }
-}
-
-std::string CsvTable::place() const { return fmt::format("{}:{}", path_.string(), line_number_); }
+std::string CsvTable::place() const { return fmt::format("{}:{}", path_.string(), number_); }
 
 }  // namespace palpate

@@ -8,26 +8,27 @@
 #include <string_view>
 #include <vector>
 
-#include "io/descriptor.hpp"
+#include "io/csv_cells.hpp"
 #include "io/input_file.hpp"
+#include "io/text_lines.hpp"
 
 namespace palpate {
 
-/// True for equal texts, upper and lower case alike.
-bool alike(std::string_view a, std::string_view b);
-
 /// Reads a table of numbers from a text file, row by row, in constant memory.
 ///
-/// The first row decides: cells are separated by tabs, else by semicolons, else by commas, else by
-/// blanks. The first row is the header where it holds names and no number, or where its numbers
-/// count 0, 1, 2, ... (five at least); "inf" and "nan" are numbers. '#' at the start of a line or
-/// after a blank begins a comment. Empty lines, a byte order mark, CRLF, quotes around a cell and a
-/// separator after the last cell of a row are accepted; so are decimal commas where commas do not
-/// separate. Every error is one line that names the file, the line and the column.
+/// Cells are separated by tabs, semicolons, commas or blanks. The table begins at the first line
+/// that has as many cells as most of the first 200 lines; what stands before it is skipped, and
+/// `sep=;` names the separator, as spreadsheets write it. The first row is the header where it
+/// holds names and no number, or where its numbers count 0, 1, 2, ... (five at least); "inf" and
+/// "nan" are numbers. '#' at the start of a line or after a blank begins a comment. Empty lines, a
+/// byte order mark, UTF-16, CRLF, quotes around a cell and a separator after the last cell of a row
+/// are accepted; so are decimal commas where commas do not separate. Every error is one line that
+/// names the file, the line and the column.
 class CsvTable {
  public:
+  /// @param header_line number of the line that holds the names, from 1; 0: it is found
   /// @throws Error where the file cannot be read, is not text or holds no row
-  explicit CsvTable(std::filesystem::path path);
+  explicit CsvTable(std::filesystem::path path, std::uint64_t header_line = 0);
 
   const std::filesystem::path& path() const { return path_; }
   bool has_header() const { return has_header_; }
@@ -36,10 +37,25 @@ class CsvTable {
   /// Returns the column of this name, else of this name in upper and lower case alike; none where
   /// there is none.
   std::optional<std::size_t> find(std::string_view name) const;
+  /// As find(), or else the column of this number, counted from 1.
+  std::optional<std::size_t> find_or_count(std::string_view name) const;
+  /// Lines before the header, or before the first row, that hold something else than a comment.
+  std::uint64_t skipped_lines() const { return skipped_lines_; }
+  /// Number of the line that holds the names, or of the first row.
+  std::uint64_t header_number() const { return header_number_; }
+  /// Its first cells, "'time', 'p0', 'p1', ...".
+  std::string header_words() const;
+
+  /// Passes over the rows whose cell in the column is not this text, or this number.
+  void keep_where(std::size_t column, std::string value);
 
   /// Goes on to the next row; false after the last.
   /// @throws Error where the row has more or fewer cells than the first
   bool next();
+  /// As next(), of a text in which rows stand between other lines: passes over lines that are no
+  /// numbers, or more or fewer than the columns.
+  /// @param passed whether lines were passed over, blank ones too
+  bool next_numbers(bool& passed);
   /// Returns the number in a cell of the row; none where the cell is empty or NaN.
   /// @throws Error where the cell holds anything else than a finite number
   std::optional<double> number(std::size_t column) const;
@@ -48,12 +64,21 @@ class CsvTable {
 
   /// Returns the text of a cell of the row, without the quotes around it; valid until next().
   std::string_view text(std::size_t column) const { return cells_[column]; }
+  std::uint64_t line_number() const { return number_; }  ///< of the row, from 1
 
   /// Throws Error that names the row's line and the message, formatted as by fmt::format().
   template <typename... Parts>
   [[noreturn]] void refuse(fmt::format_string<const Parts&...> message,
                            const Parts&... parts) const {
     palpate::refuse(place(), message, parts...);
+  }
+  /// As refuse(), of the columns: names the line that is taken for the header, and shows it.
+  template <typename... Parts>
+  [[noreturn]] void refuse_columns(fmt::format_string<const Parts&...> message,
+                                   const Parts&... parts) const {
+    palpate::refuse(fmt::format("{}:{}", path_.string(), header_number_), "{}; the {} there is {}",
+                    fmt::format(message, parts...), has_header_ ? "header" : "first row",
+                    header_words());
   }
 
   /// Returns at least the number of rows that are left, for reserving memory.
@@ -62,25 +87,26 @@ class CsvTable {
 
  private:
   bool next_line();
-  void read_block();
-  void split(std::string_view line);
+  void split();
+  void find_start(std::uint64_t header_line);
   void name_columns();
-  bool is_header() const;
+  bool is_kept() const;
   std::string place() const;
 
   std::filesystem::path path_;
-  Descriptor file_;
-  std::string block_;      ///< bytes read, from the present line on
-  std::size_t begin_ = 0;  ///< where the next line begins in block_
-  bool at_end_ = false;    ///< the whole file is in block_
-  std::string_view line_;
-  std::uint64_t line_number_ = 0;
+  TextLines lines_;
+  std::string_view line_;     ///< without its comment
+  std::uint64_t number_ = 0;  ///< of the line
+  std::uint64_t skipped_lines_ = 0;
+  std::uint64_t header_number_ = 0;
   char separator_ = ',';
   bool has_header_ = false;
   bool row_is_ready_ = false;  ///< the first row, which was no header
   bool row_is_first_ = false;  ///< the row is the table's first, which was no header
   std::vector<std::string> columns_;
+  std::vector<std::string> first_cells_;  ///< of the header, or the first row
   std::vector<std::string_view> cells_;
+  std::vector<std::pair<std::size_t, std::string>> kept_;
 };
 
 }  // namespace palpate

@@ -18,14 +18,14 @@ namespace {
 
 constexpr double most_turned_rad = 1e9;
 
-constexpr std::size_t in_space = 7;  // columns
+constexpr std::size_t in_space = 7;  // columns of a position and a quaternion
 
-struct PoseColumns {
+struct TableColumns {
   std::optional<UnitColumn> time;
-  std::vector<UnitColumn> pose;  ///< of x, y, theta, or of a position and a quaternion
+  PoseColumns pose;
 };
 
-PoseColumns columns_without_names(const CsvTable& table, const TableOptions& options) {
+TableColumns columns_without_names(const CsvTable& table, const TableOptions& options) {
   const std::size_t count = table.columns().size();
   const std::size_t of_pose = count >= in_space ? in_space : 3;
   if (count != of_pose && count != of_pose + 1) {
@@ -37,42 +37,35 @@ PoseColumns columns_without_names(const CsvTable& table, const TableOptions& opt
   const auto column = [](std::size_t index, const std::optional<Unit>& unit, const Unit& usual) {
     return UnitColumn{.index = index, .unit = unit.value_or(usual), .assumed = !unit};
   };
-  PoseColumns columns;
+  TableColumns columns;
+  columns.pose.form = of_pose == in_space ? PoseForm::quaternion : PoseForm::planar;
   std::size_t index = 0;
   if (count > of_pose) {
     columns.time = column(index++, options.time_unit, time_units.front());
   }
   const std::size_t lengths = of_pose == in_space ? 3 : 2;
   for (std::size_t i = 0; i < of_pose; ++i) {
-    columns.pose.push_back(i < lengths ? column(index++, options.length_unit, length_units.front())
-                           : of_pose == in_space
-                               ? UnitColumn{.index = index++}
-                               : column(index++, options.angle_unit, angle_units.front()));
+    columns.pose.columns.push_back(
+        i < lengths           ? column(index++, options.length_unit, length_units.front())
+        : of_pose == in_space ? UnitColumn{.index = index++}
+                              : column(index++, options.angle_unit, angle_units.front()));
   }
   return columns;
 }
 
-PoseColumns find_columns(const CsvTable& table, const TableOptions& options) {
-  std::vector<UnitColumn> pose = find_pose(table, options);
-  if (!pose.empty()) {
+TableColumns find_columns(const CsvTable& table, const TableOptions& options) {
+  PoseColumns pose = find_pose(table, options);
+  if (!pose.columns.empty()) {
     return {find_time(table, options), std::move(pose)};
   }
   if (!table.has_header()) {
     return columns_without_names(table, options);
   }
-  std::vector<std::string> names = options.pose_columns;
-  if (names.empty()) {
-    names = {"x", "y", "theta"};
-  }
-  std::ranges::transform(names, names.begin(),
-                         [](const std::string& name) { return std::string(printable(name)); });
-  const std::string last = std::move(names.back());
-  names.pop_back();
-  table.refuse("has no columns '{}' and '{}'; rename its columns{}",
-               fmt::format("{}", fmt::join(names, "', '")), last,
-               options.may_name_poses ? ", or give `pose-columns X,Y,THETA` or "
-                                        "`pose-columns TX,TY,TZ,QX,QY,QZ,QW`"
-                                      : "");
+  table.refuse_columns("has no columns 'x', 'y' and 'theta'; rename its columns{}",
+                       options.may_name_poses
+                           ? ", or name them by `pose-columns`: X,Y,THETA, or in space "
+                             "X,Y,Z,ROLL,PITCH,YAW or TX,TY,TZ,QX,QY,QZ,QW"
+                           : "");
 }
 
 /// Columns of rotations out of the plane, and of the height, that poses of x, y and theta leave
@@ -82,8 +75,7 @@ struct LeftOut {
   std::optional<UnitColumn> height;
 };
 
-LeftOut left_out_of(const CsvTable& table, const PoseColumns& columns,
-                    const TableOptions& options) {
+LeftOut left_out_of(const CsvTable& table, const PoseColumns& pose, const TableOptions& options) {
   constexpr Quantity rotations[] = {{"roll", angle_units, "pose-unit"},
                                     {"pitch", angle_units, "pose-unit"},
                                     {"rx", angle_units, "pose-unit"},
@@ -91,7 +83,7 @@ LeftOut left_out_of(const CsvTable& table, const PoseColumns& columns,
   constexpr Quantity height{"z", length_units, "pose-unit"};
   const auto taken = [&](const std::optional<UnitColumn>& column) {
     return column &&
-           std::ranges::find(columns.pose, column->index, &UnitColumn::index) != columns.pose.end();
+           std::ranges::find(pose.columns, column->index, &UnitColumn::index) != pose.columns.end();
   };
   LeftOut left_out;
   if (!table.has_header()) {
@@ -118,94 +110,237 @@ void require_flat(const CsvTable& table, std::span<const UnitColumn> rotations) 
     if (!(std::abs(wrap_angle(turned)) <= most_rad)) {
       table.refuse(
           "column '{}': the array is turned by {:.0f} degrees out of the xy plane, which x, y and "
-          "an angle do not tell; write the rotation as a quaternion: columns tx, ty, tz, qx, qy, "
-          "qz and qw",
+          "an angle do not tell; name all columns of the pose by `pose-columns`, such as "
+          "x,y,z,roll,pitch,yaw",
           printable(table.columns()[column.index]), turned * 180.0 / std::numbers::pi);
     }
   }
 }
 
-/// The numbers of the columns in mm and rad; none where all cells are empty.
+/// The numbers of the columns in their units' mm and rad; none where all cells are empty.
 std::optional<std::vector<double>> numbers_in(const CsvTable& table,
                                               std::span<const UnitColumn> columns) {
   std::vector<double> values;
-  std::size_t known = 0;
-  for (std::size_t i = 0; i < columns.size(); ++i) {
-    const std::optional<double> number = table.number(columns[i].index);
-    known += number ? 1 : 0;
-    values.push_back(columns[i].unit.convert(number.value_or(0.0)));
-    const bool is_length = i < (columns.size() == in_space ? 3 : 2);
-    if (std::abs(values[i]) > (is_length ? farthest_mm : most_turned_rad)) {
+  std::vector<std::string> empty;
+  for (const UnitColumn& column : columns) {
+    const std::optional<double> number = table.number(column.index);
+    if (!number) {
+      empty.push_back(fmt::format("'{}'", printable(table.columns()[column.index])));
+    }
+    values.push_back(column.unit.convert(number.value_or(0.0)));
+    const bool is_angle =
+        column.unit.name == angle_units[0].name || column.unit.name == angle_units[1].name;
+    if (std::abs(values.back()) > (is_angle ? most_turned_rad : farthest_mm)) {
       table.refuse(
           "column '{}': {} {} is further than any robot gets; check the number and its "
           "unit",
-          printable(table.columns()[columns[i].index]), *number, columns[i].unit.name);
+          printable(table.columns()[column.index]), *number, column.unit.name);
     }
   }
-  if (known == 0) {
+  if (empty.size() == columns.size()) {
     return {};
   }
-  if (known < columns.size()) {
-    const char* all =
-        columns.size() == in_space ? "tx, ty, tz, qx, qy, qz and qw" : "x, y and theta";
-    table.refuse("a part of the pose is empty; write {}, or leave all {} empty", all,
-                 columns.size() == in_space ? "seven" : "three");
+  if (!empty.empty()) {
+    table.refuse("a part of the pose is empty: {}; write all {} numbers, or leave all empty",
+                 fmt::format("{}", fmt::join(empty, ", ")), columns.size());
   }
   return values;
 }
 
-SpatialPose pose_in_space(const CsvTable& table, std::span<const double> v) {
+/// None where the quaternion is of zeros.
+std::optional<SpatialPose> pose_of_quaternion(const CsvTable& table, std::span<const double> v) {
   const glm::dquat rotation(v[6], v[3], v[4], v[5]);
   const double length = glm::length(rotation);
   constexpr double rounding = 1e-2;  // three decimals of a log leave less
+  if (length == 0.0) {
+    return {};
+  }
   if (std::abs(length - 1.0) > rounding) {
     table.refuse(
         "the quaternion's length is {:.4g}, so that it is no rotation; write qx, qy, qz "
         "and qw in this order, of length 1",
         length);
   }
-  return {{v[0], v[1], v[2]}, rotation / length};
+  return SpatialPose{{v[0], v[1], v[2]}, rotation / length};
+}
+
+/// Reads the rotations of a table's rows.
+class SpatialReader {
+ public:
+  SpatialReader(const std::filesystem::path& path, const TableOptions& options,
+                const PoseColumns& pose)
+      : pose_(pose), axes_(options.euler.empty() ? "xyz" : options.euler) {
+    if (pose.form == PoseForm::matrix) {
+      by_columns_ =
+          options.matrix.empty() ? is_by_columns(path, options) : options.matrix == "columns";
+    }
+  }
+
+  std::optional<SpatialPose> read(const CsvTable& table) const {
+    const auto numbers = numbers_in(table, pose_.columns);
+    if (!numbers) {
+      return {};
+    }
+    const std::vector<double>& v = *numbers;
+    switch (pose_.form) {
+      case PoseForm::euler:
+        return SpatialPose{{v[0], v[1], v[2]}, rotation_of_angles(axes_, std::span(v).subspan(3))};
+      case PoseForm::rotation_vector:
+        return SpatialPose{{v[0], v[1], v[2]}, rotation_of_vector({v[3], v[4], v[5]})};
+      case PoseForm::matrix:
+        return pose_in_matrix(table, v);
+      default:
+        return pose_of_quaternion(table, v);
+    }
+  }
+
+  /// What the columns are, in a sentence.
+  std::string words(const CsvTable& table) const {
+    const char* position = "its poses are x, y, z and ";
+    std::string form;
+    switch (pose_.form) {
+      case PoseForm::euler:
+        form = fmt::format("{}angles about the {} axes {} one after another (`euler`)", position,
+                           axes_[0] >= 'x' ? "fixed" : "moving", axes_);
+        break;
+      case PoseForm::rotation_vector:
+        form = fmt::format("{}a rotation vector", position);
+        break;
+      case PoseForm::matrix:
+        form = fmt::format("its poses are matrices written by {} (`matrix`)",
+                           by_columns_ ? "columns" : "rows");
+        break;
+      default:
+        form = fmt::format("{}a quaternion", position);
+    }
+    const auto name = [&](const UnitColumn& column) {
+      return printable(table.columns()[column.index]);
+    };
+    const bool has_angles =
+        pose_.form == PoseForm::euler || pose_.form == PoseForm::rotation_vector;
+    return fmt::format("{}, columns '{}' to '{}', in {}{}", form, name(pose_.columns.front()),
+                       name(pose_.columns.back()), pose_.columns.front().unit.name,
+                       has_angles ? fmt::format(" and {}", pose_.columns.back().unit.name) : "");
+  }
+
+ private:
+  // The position's unit is not that of the rotation's numbers.
+  std::vector<double> with_rotation(std::span<const double> in_mm) const {
+    std::vector<double> numbers(in_mm.begin(), in_mm.end());
+    const Unit& unit = pose_.columns.front().unit;
+    for (double& number : numbers) {
+      number *= unit.divisor / unit.multiplier;
+    }
+    return numbers;
+  }
+
+  std::optional<SpatialPose> matrix_of(std::span<const double> in_mm, bool by_columns) const {
+    auto pose = pose_of_matrix(with_rotation(in_mm), by_columns);
+    if (pose) {
+      const Unit& unit = pose_.columns.front().unit;
+      pose->translation_mm *= unit.multiplier / unit.divisor;
+    }
+    return pose;
+  }
+
+  SpatialPose pose_in_matrix(const CsvTable& table, std::span<const double> in_mm) const {
+    const auto pose = matrix_of(in_mm, by_columns_);
+    if (!pose) {
+      table.refuse(
+          "the numbers are no rotation and position, read by {}; correct them, or give `matrix {}`",
+          by_columns_ ? "columns" : "rows", by_columns_ ? "rows" : "columns");
+    }
+    return *pose;
+  }
+
+  /// Finds the first row that only one of the two ways makes a pose.
+  bool is_by_columns(const std::filesystem::path& path, const TableOptions& options) const {
+    CsvTable table = open_table(path, options);
+    while (table.next()) {
+      const auto numbers = numbers_in(table, pose_.columns);
+      const bool by_columns = numbers && matrix_of(*numbers, true);
+      const bool by_rows = numbers && matrix_of(*numbers, false);
+      if (by_columns != by_rows) {
+        return by_columns;
+      }
+      if (numbers && !by_columns) {
+        table.refuse(
+            "the numbers are no rotation and position, read by columns or by rows; name the 12 or "
+            "16 columns of the matrix in its order");
+      }
+    }
+    refuse(path,
+           "its matrices may be written by columns or by rows; give `matrix columns` or "
+           "`matrix rows`");
+  }
+
+  const PoseColumns& pose_;
+  std::string axes_;
+  bool by_columns_ = true;
+};
+
+/// Says what a table of x, y and an angle leaves out.
+void say_left_out(const CsvTable& table, const LeftOut& left_out, PoseTable& poses) {
+  if (left_out.height) {
+    poses.understood.push_back(fmt::format(
+        "its column '{}' was left out; poses in space (with roll, pitch and yaw, or a quaternion) "
+        "have a height",
+        printable(table.columns()[left_out.height->index])));
+  }
 }
 
 }  // namespace
 
 PoseTable read_poses(const std::filesystem::path& path, const TableOptions& options,
                      bool with_times) {
-  CsvTable table(path);
-  const PoseColumns columns = find_columns(table, options);
+  CsvTable table = open_table(path, options);
+  const auto [time, pose] = find_columns(table, options);
   PoseTable poses;
-  const bool spatial = columns.pose.size() == in_space;
-  for (std::size_t i = 0; i < (spatial ? 2 : 3); ++i) {
-    poses.units[i] = columns.pose[i].unit;
-    poses.assumed_units = poses.assumed_units || columns.pose[i].assumed;
+  const bool is_planar = pose.form == PoseForm::planar;
+  for (std::size_t i = 0; i < (is_planar ? 3 : 2); ++i) {
+    poses.units[i] = pose.columns[i].unit;
+    poses.assumed_units = poses.assumed_units || pose.columns[i].assumed;
   }
-  const LeftOut left_out = spatial ? LeftOut() : left_out_of(table, columns, options);
-  if (left_out.height) {
-    poses.left_out = fmt::format(
-        "its column '{}' was left out; poses with a quaternion (tx, ty, tz, qx, qy, qz and qw) "
-        "have "
-        "a height",
-        printable(table.columns()[left_out.height->index]));
+  const LeftOut left_out = is_planar ? left_out_of(table, pose, options) : LeftOut();
+  say_left_out(table, left_out, poses);
+  const SpatialReader spatial(path, options, pose);
+  if (table.skipped_lines() > 0) {
+    poses.understood.push_back(skipped_words(table));
   }
-  double last_s = -std::numeric_limits<double>::infinity();
+  if (!pose.are_usual) {
+    poses.understood.push_back(spatial.words(table));
+  }
+  std::optional<TableTimes> times;
+  if (time && with_times) {
+    times.emplace(table, *time);
+  }
+  std::uint64_t repeated = 0;
   while (table.next()) {
     require_flat(table, left_out.rotations);
-    if (columns.time && with_times) {
-      last_s = time_in(table, *columns.time, last_s, true);
-      poses.time_s.push_back(last_s);
+    if (times) {
+      const double time_s = times->next(poses.time_s.size());
+      if (!poses.time_s.empty() && time_s == poses.time_s.back()) {
+        ++repeated;
+        continue;
+      }
+      poses.time_s.push_back(time_s);
     }
-    const auto numbers = numbers_in(table, columns.pose);
-    if (spatial) {
-      poses.spatial.push_back(numbers ? std::optional(pose_in_space(table, *numbers))
-                                      : std::nullopt);
-    } else {
+    if (is_planar) {
+      const auto numbers = numbers_in(table, pose.columns);
       poses.T_robot_sensor.push_back(numbers ? Pose{{(*numbers)[0], (*numbers)[1]}, (*numbers)[2]}
                                              : unknown_pose);
+    } else {
+      poses.spatial.push_back(spatial.read(table));
     }
   }
   if (poses.T_robot_sensor.empty() && poses.spatial.empty()) {
     refuse(path, "holds a header and no row; write a row for each pose");
   }
+  if (repeated > 0) {
+    poses.understood.push_back(fmt::format(
+        "{} of its rows repeat the time of the row before, whose pose is kept", repeated));
+  }
+  poses.steps = times ? std::move(times->steps) : std::vector<ClockStep>();
   return poses;
 }
 

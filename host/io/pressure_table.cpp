@@ -6,6 +6,8 @@
 #include <limits>
 #include <utility>
 
+#include "io/column_choice.hpp"
+#include "io/pressure_columns.hpp"
 #include "model/number_text.hpp"
 #include "model/printable.hpp"
 #include "model/stream_time.hpp"
@@ -38,68 +40,6 @@ std::uint64_t count_in(const CsvTable& table, std::size_t column, std::uint64_t 
   return static_cast<std::uint64_t>(number);
 }
 
-// Columns in the order in which they were named: p1 and p10 side by side come from names that were
-// sorted as texts.
-void require_counting_names(const CsvTable& table, const std::vector<std::size_t>& columns) {
-  const auto split = [&](std::size_t column) {
-    const std::string_view name = table.columns()[column];
-    const std::size_t digits = name.find_last_not_of("0123456789") + 1;
-    return std::pair{name.substr(0, digits), whole_number_of(name.substr(digits))};
-  };
-  for (std::size_t i = 1; i < columns.size(); ++i) {
-    const auto [before, number_before] = split(columns[i - 1]);
-    const auto [stem, number] = split(columns[i]);
-    if (stem == before && number && number_before && *number <= *number_before) {
-      table.refuse("column '{}' comes after '{}'; order the columns as the array's elements",
-                   printable(table.columns()[columns[i]]),
-                   printable(table.columns()[columns[i - 1]]));
-    }
-  }
-}
-
-/// The columns that `pressure-columns` names.
-/// @param taken columns of times, poses and what else is no pressure
-std::vector<std::size_t> columns_named(const CsvTable& table, const std::string& names,
-                                       const std::vector<std::size_t>& taken) {
-  std::vector<std::size_t> columns;
-  for (std::size_t colon = names.find(':'); colon != names.npos;
-       colon = names.find(':', colon + 1)) {
-    const auto first = table.find(std::string_view(names).substr(0, colon));
-    const auto last = table.find(std::string_view(names).substr(colon + 1));
-    if (!first || !last) {
-      continue;
-    }
-    if (*last < *first) {
-      table.refuse("column '{}' comes before '{}'; give `pressure-columns FIRST:LAST`",
-                   printable(table.columns()[*last]), printable(table.columns()[*first]));
-    }
-    for (std::size_t i = *first; i <= *last; ++i) {
-      if (std::ranges::find(taken, i) != taken.end()) {
-        table.refuse(
-            "column '{}', between '{}' and '{}', holds no pressures; correct "
-            "`pressure-columns FIRST:LAST`",
-            printable(table.columns()[i]), printable(table.columns()[*first]),
-            printable(table.columns()[*last]));
-      }
-      columns.push_back(i);
-    }
-    return columns;
-  }
-  for (std::size_t i = 0; i < table.columns().size(); ++i) {
-    const std::string_view name = table.columns()[i];
-    if (alike(name.substr(0, names.size()), names) && std::ranges::find(taken, i) == taken.end()) {
-      columns.push_back(i);
-    }
-  }
-  if (columns.empty()) {
-    table.refuse(
-        "no column is called or begins with '{}'; give `pressure-columns` a prefix of "
-        "the columns' names, or FIRST:LAST",
-        printable(names));
-  }
-  return columns;
-}
-
 /// The columns that have a name and are not taken. A column without a name is the index that pandas
 /// writes.
 std::vector<std::size_t> columns_left(const CsvTable& table,
@@ -122,7 +62,7 @@ PressureTable read_wide(CsvTable& table, std::size_t elements, const TableOption
   }
   const auto device_time = table.find("device_time");
   const auto lost_before = table.find("lost_before");
-  const std::vector<UnitColumn> pose = find_pose(table, options);
+  const std::vector<UnitColumn> pose = find_pose(table, options).columns;
   std::vector<std::size_t> taken;
   for (const auto& column : {device_time, lost_before}) {
     if (column) {
@@ -135,33 +75,44 @@ PressureTable read_wide(CsvTable& table, std::size_t elements, const TableOption
   for (const UnitColumn& column : pose) {
     taken.push_back(column.index);
   }
-  const std::vector<std::size_t> columns =
-      options.pressure_columns.empty() ? columns_left(table, taken)
-                                       : columns_named(table, options.pressure_columns, taken);
-  if (columns.size() != elements) {
-    const std::string span =
-        columns.empty() || !table.has_header()
-            ? ""
-            : fmt::format(" ('{}' to '{}')", printable(table.columns()[columns.front()]),
-                          printable(table.columns()[columns.back()]));
-    table.refuse(
-        "{} columns of pressure{} for an array of {} elements; correct `array`, or name "
-        "the columns by `pressure-columns`",
-        columns.size(), span, elements);
+  for (const auto& [name, value] : options.where) {
+    if (const auto column = table.find_or_count(name)) {
+      taken.push_back(*column);
+    }
   }
-  require_counting_names(table, columns);
+  const std::vector<std::size_t> columns =
+      options.pressure_columns.empty()
+          ? columns_left(table, taken)
+          : choose_columns(table, options.pressure_columns, taken, "pressure-columns");
+  const PressureColumns readings = pressure_columns(table, columns, elements, options);
+  const bool is_norm = options.pressure_component == "norm";
 
   PressureTable all;
+  if (!options.pressure_component.empty()) {
+    const auto name = [&](std::size_t axis) {
+      return printable(table.columns()[readings.front()[axis]]);
+    };
+    all.understood.push_back(fmt::format(
+        "its readings are {} of x, y and z of each element, of the first '{}', '{}' and '{}'",
+        is_norm ? "the length" : "the z", name(0), name(1), name(2)));
+  } else if (options.pressure_columns.find_first_of("*{") != std::string::npos ||
+             options.pressure_columns.find("::") != std::string::npos) {
+    all.understood.push_back(fmt::format(
+        "its readings are {} columns, '{}' to '{}'", columns.size(),
+        printable(table.columns()[columns.front()]), printable(table.columns()[columns.back()])));
+  }
   all.holds_poses = !pose.empty();
   all.pressure.reserve(table.count_lines() * elements);
-  double last_s = before_all;
+  std::optional<TableTimes> times;
+  if (time) {
+    times.emplace(table, *time);
+  }
   while (table.next()) {
-    for (const std::size_t column : columns) {
-      all.pressure.push_back(table.number(column).value_or(unknown_number));
+    for (const std::vector<std::size_t>& axes : readings) {
+      all.pressure.push_back(reading_in(table, axes, is_norm));
     }
-    if (time) {
-      last_s = time_in(table, *time, last_s, false);
-      all.time_s.push_back(last_s);
+    if (times) {
+      all.time_s.push_back(times->next(all.time_s.size()));
     }
     if (device_time) {
       all.device_time_s.push_back(table.number(*device_time).value_or(unknown_number));
@@ -171,13 +122,41 @@ PressureTable read_wide(CsvTable& table, std::size_t elements, const TableOption
           count_in(table, *lost_before, largest_count, "is no count of lost frames"));
     }
   }
+  all.steps = times ? std::move(times->steps) : std::vector<ClockStep>();
+  return all;
+}
+
+/// Reads frames that are blocks of so many rows.
+PressureTable read_blocks(CsvTable& table, std::size_t rows) {
+  PressureTable all;
+  bool passed = false;
+  std::size_t row = 0;
+  std::uint64_t between = 0;
+  while (table.next_numbers(passed)) {
+    between += passed ? 1 : 0;
+    if (passed && row > 0) {
+      table.refuse("a frame ends after {} rows, and the array has {}; correct `array`", row, rows);
+    }
+    for (std::size_t i = 0; i < table.columns().size(); ++i) {
+      all.pressure.push_back(table.number(i).value_or(unknown_number));
+    }
+    row = (row + 1) % rows;
+  }
+  if (row > 0) {
+    table.refuse(
+        "the last frame has {} rows, and the array has {}; correct `array`, or complete it", row,
+        rows);
+  }
+  all.understood.push_back(
+      fmt::format("its frames are blocks of {} rows of {} readings", rows, table.columns().size()));
   return all;
 }
 
 /// At least the number of runs of rows with the same cell in a column: a number may be written in
 /// two ways.
-std::uint64_t count_runs(const std::filesystem::path& path, std::size_t column) {
-  CsvTable rows(path);
+std::uint64_t count_runs(const std::filesystem::path& path, std::size_t column,
+                         const TableOptions& options) {
+  CsvTable rows = open_table(path, options);
   std::string last;
   std::uint64_t runs = 0;
   while (rows.next()) {
@@ -210,19 +189,24 @@ std::optional<PressureTable> read_long(CsvTable& table, std::size_t elements,
     return {};
   }
   if (!time && !frame_column) {
-    table.refuse(
+    table.refuse_columns(
         "a table with a row for each reading needs a column 'time' or 'frame'; add it, "
         "or name it by `time-column`");
   }
   PressureTable all;
-  all.pressure.reserve(count_runs(table.path(), time ? time->index : *frame_column) * elements);
+  all.pressure.reserve(count_runs(table.path(), time ? time->index : *frame_column, options) *
+                       elements);
   const std::string remedy =
       fmt::format("is no element; the array has {}, counted from 0", elements);
   double last = before_all;
   std::vector<bool> read(elements);
+  std::optional<TableTimes> times;
+  if (time) {
+    times.emplace(table, *time);
+  }
   while (table.next()) {
     const double key =
-        time ? time_in(table, *time, last, false) : frame_in(table, *frame_column, last);
+        times ? times->next(all.time_s.size()) : frame_in(table, *frame_column, last);
     if (key != last) {
       all.pressure.insert(all.pressure.end(), elements, unknown_number);
       read.assign(elements, false);
@@ -240,6 +224,7 @@ std::optional<PressureTable> read_long(CsvTable& table, std::size_t elements,
     all.pressure[all.pressure.size() - elements + element] =
         table.number(*pressure_column).value_or(unknown_number);
   }
+  all.steps = times ? std::move(times->steps) : std::vector<ClockStep>();
   return all;
 }
 
@@ -250,7 +235,8 @@ UnitColumn find_axis(const CsvTable& table, std::size_t axis) {
   const char* const name = axis == 0 ? "x" : "y";
   const auto column = find_column(table, {name, length_units, "array"}, "", {});
   if (!column) {
-    table.refuse("no column is called '{}'; write a row 'x y' in mm for each element", name);
+    table.refuse_columns("no column is called '{}'; write a row 'x y' in mm for each element",
+                         name);
   }
   return *column;
 }
@@ -268,10 +254,15 @@ double coordinate(const CsvTable& table, const UnitColumn& column) {
 
 PressureTable read_pressures(const std::filesystem::path& path, std::size_t elements,
                              const TableOptions& options) {
-  CsvTable table(path);
-  std::optional<PressureTable> pressures = read_long(table, elements, options);
-  if (!pressures) {
-    pressures = read_wide(table, elements, options);
+  CsvTable table = open_table(path, options);
+  std::optional<PressureTable> pressures;
+  if (options.has_blocks && is_of_blocks(table, options)) {
+    pressures = read_blocks(table, (*options.grid)[1]);
+  }
+  pressures = pressures ? std::move(pressures) : read_long(table, elements, options);
+  pressures = pressures ? std::move(pressures) : read_wide(table, elements, options);
+  if (table.skipped_lines() > 0) {
+    pressures->understood.insert(pressures->understood.begin(), skipped_words(table));
   }
   if (pressures->pressure.empty()) {
     refuse(path, "holds a header and no row; write a row for each frame");

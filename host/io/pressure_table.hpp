@@ -6,7 +6,7 @@
 
 #include <glm/vec2.hpp>
 
-#include "io/table_columns.hpp"
+#include "io/table_times.hpp"
 
 namespace palpate {
 
@@ -16,19 +16,24 @@ struct PressureTable {
   std::vector<double> time_s;              ///< [n], or empty
   std::vector<double> device_time_s;       ///< [n], or empty
   std::vector<std::uint64_t> lost_before;  ///< [n], or empty
-  bool holds_poses = false;  ///< a wide table has columns of poses beside the readings
+  bool holds_poses = false;           ///< a wide table has columns of poses beside the readings
+  std::vector<ClockStep> steps = {};  ///< where the clock steps back
+  std::vector<std::string> understood = {};  ///< what was not plain, in sentences
 };
 
 /// Reads pressures from a CSV file.
 ///
-/// Wide: a row for each frame and a column for each element, in the order of the elements. The
-/// columns are those that `options` names, by their first and last or by a prefix, or, in a table
-/// with a header, all columns that have a name and hold neither times, nor poses, nor
-/// `device_time`, nor `lost_before`. A table without a header holds the pressures, and before them
-/// the times where it has one column more than elements.
+/// Wide: a row for each frame and a column for each element, in the order of the elements, or three
+/// where each element reads three axes and `options` says what of them is the pressure. The columns
+/// are those that `options` names, or, in a table with a header, all columns that have a name and
+/// hold neither times, nor poses, nor `device_time`, nor `lost_before`. A table without a header
+/// holds the pressures, and before them the times where it has one column more than elements.
 ///
 /// Long: a row for each reading, in a table with the columns `element` (or taxel, counted from 0)
 /// and `pressure` (or value), and `time` or `frame`, which is the same in all readings of a frame.
+///
+/// Blocks: where `options` says so, each frame is a block of rows as the array has them, and other
+/// lines, such as "Frame 12", stand between the blocks.
 ///
 /// @param elements of the array, e
 /// @throws Error, naming file, line and column, where a row does not fit

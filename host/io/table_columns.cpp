@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cctype>
-#include <cmath>
 
+#include "io/column_choice.hpp"
 #include "model/number_text.hpp"
 #include "model/printable.hpp"
 
@@ -12,30 +12,63 @@ namespace palpate {
 namespace {
 
 constexpr Unit no_unit[] = {{""}};
+constexpr Unit metres[] = {{"m", 1e3, 1.0}};
+constexpr Unit radians[] = {{"rad"}};
 
 // rostopic echo -p names its times %time.
 constexpr Quantity time{"time timestamp stamp t %time", time_units, "time-unit"};
-constexpr Quantity pose[] = {{"x", length_units, "pose-unit"},
-                             {"y", length_units, "pose-unit"},
-                             {"theta yaw", angle_units, "pose-unit"}};
-constexpr Quantity spatial_pose[] = {
-    {"tx x", length_units, "pose-unit"}, {"ty y", length_units, "pose-unit"},
-    {"tz z", length_units, "pose-unit"}, {"qx", no_unit, "pose-unit"},
-    {"qy", no_unit, "pose-unit"},        {"qz", no_unit, "pose-unit"},
-    {"qw", no_unit, "pose-unit"}};
+constexpr Quantity theta{"theta yaw", angle_units, "pose-unit"};
+constexpr Quantity planar_position[] = {{"x", length_units, "pose-unit"},
+                                        {"y", length_units, "pose-unit"}};
+constexpr Quantity position[] = {
+    {"tx x position.x pose.position.x field.pose.position.x", length_units, "pose-unit"},
+    {"ty y position.y pose.position.y field.pose.position.y", length_units, "pose-unit"},
+    {"tz z position.z pose.position.z field.pose.position.z", length_units, "pose-unit"}};
+constexpr Quantity quaternion[] = {
+    {"qx orientation.x pose.orientation.x field.pose.orientation.x", no_unit, "pose-unit"},
+    {"qy orientation.y pose.orientation.y field.pose.orientation.y", no_unit, "pose-unit"},
+    {"qz orientation.z pose.orientation.z field.pose.orientation.z", no_unit, "pose-unit"},
+    {"qw orientation.w pose.orientation.w field.pose.orientation.w", no_unit, "pose-unit"}};
+constexpr Quantity roll_pitch_yaw[] = {{"roll", angle_units, "pose-unit"},
+                                       {"pitch", angle_units, "pose-unit"},
+                                       {"yaw", angle_units, "pose-unit"}};
+constexpr Quantity rotation_vector[] = {{"rx", angle_units, "pose-unit"},
+                                        {"ry", angle_units, "pose-unit"},
+                                        {"rz", angle_units, "pose-unit"}};
 
-// The year 5138; a time in ms is larger.
-constexpr double latest_s = 1e11;
+/// Names of units that stand for the units above.
+constexpr std::pair<std::string_view, std::string_view> spellings[] = {
+    {"sec", "s"},   {"seconds", "s"},   {"msec", "ms"},     {"µs", "us"},
+    {"μs", "us"},   {"usec", "us"},     {"degrees", "deg"}, {"°", "deg"},
+    {"nsec", "ns"}, {"radians", "rad"}, {"metres", "m"},    {"meters", "m"}};
 
-/// The unit with which a column's name ends, such as "_ms".
-std::optional<Unit> unit_of(std::string name, std::span<const Unit> units) {
-  std::ranges::transform(name, name.begin(), [](unsigned char c) { return std::tolower(c); });
-  for (const Unit& unit : units) {
-    if (name.ends_with("_" + std::string(unit.name))) {
-      return unit;
+/// A column's name without its unit, and the unit: of "time_ms", "time [ms]" and "time (ms)".
+struct NameParts {
+  std::string_view stem;
+  std::optional<Unit> unit;
+};
+
+NameParts parts_of(std::string_view name, std::span<const Unit> units) {
+  const auto unit_called = [&](std::string_view text) -> std::optional<Unit> {
+    for (const auto& [spelling, usual] : spellings) {
+      text = alike(text, spelling) ? usual : text;
+    }
+    const auto found =
+        std::ranges::find_if(units, [&](const Unit& unit) { return alike(unit.name, text); });
+    return found == units.end() || text.empty() ? std::nullopt : std::optional(*found);
+  };
+  for (const char* brackets : {"[]", "()"}) {
+    const std::size_t open = name.rfind(brackets[0]);
+    if (open != name.npos && open > 0 && name.back() == brackets[1]) {
+      const auto unit = unit_called(trimmed(name.substr(open + 1, name.size() - open - 2)));
+      if (unit) {
+        return {trimmed(name.substr(0, open)), unit};
+      }
     }
   }
-  return {};
+  const std::size_t line = name.rfind('_');
+  const auto unit = line == name.npos ? std::nullopt : unit_called(name.substr(line + 1));
+  return unit ? NameParts{name.substr(0, line), unit} : NameParts{name, {}};
 }
 
 std::optional<std::size_t> find_usual(const CsvTable& table, const Quantity& quantity) {
@@ -44,83 +77,183 @@ std::optional<std::size_t> find_usual(const CsvTable& table, const Quantity& qua
         found && (name != "t" || table.columns()[*found] == name)) {  // T is a temperature
       return found;
     }
-    for (const Unit& unit : quantity.units) {
-      if (const auto found = table.find(std::string(name) + "_" + std::string(unit.name))) {
-        return found;
+    for (std::size_t i = 0; i < table.columns().size(); ++i) {
+      const auto [stem, unit] = parts_of(table.columns()[i], quantity.units);
+      if (unit && (alike(stem, name) && (name != "t" || stem == name))) {
+        return i;
       }
     }
   }
   return {};
 }
 
-}  // namespace
+std::optional<Unit> unit_for(const Quantity& quantity, const TableOptions& options) {
+  return quantity.units.data() == length_units.data()  ? options.length_unit
+         : quantity.units.data() == angle_units.data() ? options.angle_unit
+                                                       : std::nullopt;
+}
 
-std::optional<UnitColumn> find_column(const CsvTable& table, const Quantity& quantity,
-                                      const std::string& name, const std::optional<Unit>& unit) {
-  const auto index = name.empty() ? find_usual(table, quantity) : table.find(name);
-  if (!index) {
-    return {};
-  }
-  const std::string& found = table.columns()[*index];
-  const std::optional<Unit> named = unit_of(found, quantity.units);
+UnitColumn with_unit(const CsvTable& table, std::size_t index, const Quantity& quantity,
+                     const std::optional<Unit>& unit) {
+  const std::string& name = table.columns()[index];
+  const std::optional<Unit> named = parts_of(name, quantity.units).unit;
   if (named && unit && named->name != unit->name) {
-    table.refuse("column '{}' is in {} by its name, in {} by `{}`; make them agree",
-                 printable(found), named->name, unit->name, quantity.option);
+    table.refuse_columns("column '{}' is in {} by its name, in {} by `{}`; make them agree",
+                         printable(name), named->name, unit->name, quantity.option);
   }
-  return UnitColumn{.index = *index,
-                    .unit = named.value_or(unit.value_or(quantity.units.front())),
-                    .assumed = !named && !unit};
+  return {.index = index,
+          .unit = named.value_or(unit.value_or(quantity.units.front())),
+          .assumed = !named && !unit && quantity.units.size() > 1};
 }
 
-std::optional<UnitColumn> find_time(const CsvTable& table, const TableOptions& options) {
-  const bool has_it = table.find(options.time_column).has_value();
-  return find_column(table, time, has_it ? options.time_column : "", options.time_unit);
+/// Adds the columns of the quantities; false, and none added, unless the table has all.
+bool add_all(const CsvTable& table, std::span<const Quantity> quantities,
+             const TableOptions& options, std::vector<UnitColumn>& columns) {
+  std::vector<UnitColumn> found;
+  for (const Quantity& quantity : quantities) {
+    const auto column = find_column(table, quantity, "", unit_for(quantity, options));
+    if (!column) {
+      return false;
+    }
+    found.push_back(*column);
+  }
+  columns.insert(columns.end(), found.begin(), found.end());
+  return true;
 }
 
-double time_in(const CsvTable& table, const UnitColumn& column, double last_s, bool later) {
-  const double number = table.require_number(column.index);
-  const double time_s = column.unit.convert(number);
-  const std::string name = printable(table.columns()[column.index]);
-  if (std::abs(time_s) > latest_s) {
-    table.refuse("column '{}': {} {} is no time; give the unit by `time-unit` ms, us or ns", name,
-                 number, column.unit.name);
-  }
-  if (time_s < last_s || (later && time_s == last_s)) {
-    table.refuse("column '{}': {} s is {} the row before, at {} s; sort the rows by time", name,
-                 time_s, later ? "not later than" : "earlier than", last_s);
-  }
-  return time_s;
-}
-
-namespace {
-
-/// The columns of the quantities; none unless the table has all.
-std::vector<UnitColumn> find_all(const CsvTable& table, std::span<const Quantity> quantities,
-                                 const TableOptions& options) {
-  const auto& names = options.pose_columns;
+/// The columns whose names are `stem` and so many numbers from 0 on, as robots name the parts of a
+/// pose: in metres and radians.
+std::vector<UnitColumn> counted_columns(const CsvTable& table, std::string_view stem,
+                                        std::size_t count) {
   std::vector<UnitColumn> columns;
-  if (!names.empty() && names.size() != quantities.size()) {
-    return columns;
-  }
-  for (std::size_t i = 0; i < quantities.size(); ++i) {
-    const std::optional<Unit>& unit =
-        quantities[i].units.data() == length_units.data()  ? options.length_unit
-        : quantities[i].units.data() == angle_units.data() ? options.angle_unit
-                                                           : std::optional<Unit>();
-    const auto found = find_column(table, quantities[i], names.empty() ? "" : names[i], unit);
+  for (std::size_t i = 0; i < count; ++i) {
+    std::optional<std::size_t> found;
+    for (const char* form : {"{}_{}", "{}[{}]", "{}{}", "{}.{}"}) {
+      found = found ? found : table.find(fmt::format(fmt::runtime(form), stem, i));
+    }
     if (!found) {
       return {};
     }
-    columns.push_back(*found);
+    columns.push_back({.index = *found, .unit = i < 3 ? metres[0] : radians[0]});
   }
   return columns;
 }
 
+PoseColumns usual_pose(const CsvTable& table, const TableOptions& options) {
+  PoseColumns pose;
+  const auto has = [&](PoseForm form, std::span<const Quantity> where,
+                       std::span<const Quantity> rotation) {
+    std::vector<UnitColumn> columns;
+    const bool found =
+        add_all(table, where, options, columns) && add_all(table, rotation, options, columns);
+    if (found) {
+      pose = {.form = form,
+              .columns = std::move(columns),
+              .are_usual = form == PoseForm::planar || form == PoseForm::quaternion};
+    }
+    return found;
+  };
+  if (has(PoseForm::euler, position, roll_pitch_yaw) ||
+      has(PoseForm::planar, planar_position, std::span(&theta, 1)) ||
+      has(PoseForm::quaternion, position, quaternion) ||
+      has(PoseForm::rotation_vector, position, rotation_vector)) {
+    return pose;
+  }
+  pose.are_usual = false;
+  pose.form = PoseForm::rotation_vector;  // of Universal Robots' RTDE
+  pose.columns = counted_columns(table, "actual_TCP_pose", 6);
+  if (pose.columns.empty()) {
+    pose.form = PoseForm::matrix;  // of libfranka
+    pose.columns = counted_columns(table, "O_T_EE", 16);
+    std::ranges::for_each(pose.columns, [](UnitColumn& column) { column.unit = metres[0]; });
+  }
+  return pose;
+}
+
+PoseColumns named_pose(const CsvTable& table, const TableOptions& options) {
+  const auto time = find_time(table, options);
+  const std::vector<std::size_t> taken(time ? 1 : 0, time ? time->index : 0);
+  const std::vector<std::size_t> chosen =
+      choose_columns(table, options.pose_columns, taken, "pose-columns");
+  std::vector<Quantity> quantities;
+  const auto add = [&](auto&& more) {
+    quantities.insert(quantities.end(), std::begin(more), std::end(more));
+  };
+  PoseColumns pose{.are_usual = chosen.size() == 3 || chosen.size() == 7};
+  switch (chosen.size()) {
+    case 3:
+      add(planar_position);
+      quantities.push_back(theta);
+      break;
+    case 6: {
+      // UR's names and rx, ry, rz say what they are; other angles are roll, pitch and yaw.
+      const std::string_view first = table.columns()[chosen[3]];
+      const bool is_vector =
+          options.euler == "vector" ||
+          (options.euler.empty() && (alike(parts_of(first, angle_units).stem, "rx") ||
+                                     alike(first.substr(0, 15), "actual_TCP_pose")));
+      pose.form = is_vector ? PoseForm::rotation_vector : PoseForm::euler;
+      add(position);
+      add(roll_pitch_yaw);
+      break;
+    }
+    case 7:
+      pose.form = PoseForm::quaternion;
+      add(position);
+      add(quaternion);
+      break;
+    case 12:
+    case 16:
+      pose.form = PoseForm::matrix;
+      quantities.assign(chosen.size(), position[0]);
+      break;
+    default:
+      table.refuse_columns(
+          "`pose-columns {}` names {} columns; give three, X,Y,THETA, or of poses in space six "
+          "(X,Y,Z,ROLL,PITCH,YAW, or a rotation vector), seven (TX,TY,TZ,QX,QY,QZ,QW), or the 12 "
+          "or 16 numbers of a matrix",
+          options.pose_columns, chosen.size());
+  }
+  for (std::size_t i = 0; i < chosen.size(); ++i) {
+    pose.columns.push_back(
+        with_unit(table, chosen[i], quantities[i], unit_for(quantities[i], options)));
+  }
+  return pose;
+}
+
 }  // namespace
 
-std::vector<UnitColumn> find_pose(const CsvTable& table, const TableOptions& options) {
-  std::vector<UnitColumn> columns = find_all(table, pose, options);
-  return columns.empty() ? find_all(table, spatial_pose, options) : columns;
+CsvTable open_table(const std::filesystem::path& path, const TableOptions& options) {
+  CsvTable table(path, options.header_line);
+  for (const auto& [name, value] : options.where) {
+    if (const auto column = table.find_or_count(name)) {
+      table.keep_where(*column, value);
+    }
+  }
+  return table;
+}
+
+std::string skipped_words(const CsvTable& table) {
+  const std::uint64_t lines = table.skipped_lines();
+  return fmt::format("{} before line {} ({}) {} left out (`header-line`)",
+                     lines == 1 ? "the line" : fmt::format("{} lines", lines),
+                     table.header_number(), table.header_words(), lines == 1 ? "is" : "are");
+}
+
+std::optional<UnitColumn> find_column(const CsvTable& table, const Quantity& quantity,
+                                      const std::string& name, const std::optional<Unit>& unit) {
+  const auto index = name.empty() ? find_usual(table, quantity) : table.find_or_count(name);
+  return index ? std::optional(with_unit(table, *index, quantity, unit)) : std::nullopt;
+}
+
+std::optional<UnitColumn> find_time(const CsvTable& table, const TableOptions& options) {
+  const bool has_it =
+      !options.time_column.empty() && table.find_or_count(options.time_column).has_value();
+  return find_column(table, time, has_it ? options.time_column : "", options.time_unit);
+}
+
+PoseColumns find_pose(const CsvTable& table, const TableOptions& options) {
+  return options.pose_columns.empty() ? usual_pose(table, options) : named_pose(table, options);
 }
 
 }  // namespace palpate

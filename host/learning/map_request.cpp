@@ -18,7 +18,6 @@
 #include "options/option.hpp"
 #include "options/refused_option.hpp"
 #include "palpate/files.hpp"
-#include "palpate/learned_sensor.hpp"
 #include "palpate/object_frame.hpp"
 #include "recognition/folder_sensor.hpp"
 

@@ -7,7 +7,9 @@
 
 #include "options/request.hpp"
 #include "palpate/displacement.hpp"
+#include "palpate/learned_sensor.hpp"
 #include "palpate/occupancy_grid.hpp"
+#include "palpate/pose.hpp"
 #include "palpate/rotational_symmetry.hpp"
 
 namespace palpate {

@@ -10,7 +10,6 @@
 
 #include "learning/map_request.hpp"
 #include "palpate/device.hpp"
-#include "palpate/learned_sensor.hpp"
 #include "palpate/map_builder.hpp"
 #include "palpate/touch.hpp"
 

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "io/csv_cells.hpp"
 #include "model/number_text.hpp"
 #include "model/printable.hpp"
 #include "palpate/pose_track.hpp"
@@ -18,13 +19,6 @@ namespace {
 
 std::optional<double> finite(std::optional<double> number) {
   return number && std::isfinite(*number) ? number : std::nullopt;
-}
-
-/// The text without the blanks around it.
-std::string_view trimmed(std::string_view text) {
-  constexpr const char* blanks = " \t\r";
-  const std::size_t begin = std::min(text.find_first_not_of(blanks), text.size());
-  return text.substr(begin, text.find_last_not_of(blanks) + 1 - begin);
 }
 
 }  // namespace
@@ -114,17 +108,21 @@ bool add_readings(const nlohmann::json& list, std::vector<double>& values, bool 
   });
 }
 
-std::vector<std::string_view> cells_of(std::string_view line) {
-  constexpr std::string_view separators = "\t;, ";
-  const auto used = std::ranges::find_if(
-      separators, [&](char separator) { return line.find(separator) != line.npos; });
-  const char separator = used == separators.end() ? ',' : *used;
-  std::vector<std::string_view> cells = split_text(line, separator);
-  std::ranges::transform(cells, cells.begin(), trimmed);
-  if (separator == ' ') {
-    std::erase(cells, "");
+/// The line with null in the place of the NaN that Python writes, which JSON does not know.
+std::string without_nan(std::string_view line) {
+  constexpr std::string_view nan = "NaN";
+  std::string text;
+  bool quoted = false;
+  for (std::size_t at = 0; at < line.size(); ++at) {
+    quoted = quoted != (line[at] == '"' && (at == 0 || line[at - 1] != '\\'));
+    if (!quoted && line.substr(at, nan.size()) == nan) {
+      text += "null";
+      at += nan.size() - 1;
+    } else {
+      text += line[at];
+    }
   }
-  return cells;
+  return text;
 }
 
 /// The reading in a cell, NaN where it is Unknown; none where the cell holds no number.
@@ -147,7 +145,10 @@ std::variant<Frame, FrameLines::Problem, FrameLines::Header> FrameLines::read(st
 
 std::variant<Frame, FrameLines::Problem, FrameLines::Header> FrameLines::read_json(
     std::string_view line, double now_s) const {
-  const nlohmann::json json = nlohmann::json::parse(line, nullptr, false);
+  nlohmann::json json = nlohmann::json::parse(line, nullptr, false);
+  if (json.is_discarded()) {
+    json = nlohmann::json::parse(without_nan(line), nullptr, false);
+  }
   if (json.is_discarded()) {
     return Problem{Kind::malformed, "is no whole JSON"};
   }
@@ -197,7 +198,10 @@ std::variant<Frame, FrameLines::Problem, FrameLines::Header> FrameLines::read_he
 
 std::variant<Frame, FrameLines::Problem, FrameLines::Header> FrameLines::read_csv(
     std::string_view line, double now_s) {
-  const std::vector<std::string_view> cells = cells_of(line);
+  std::vector<std::string_view> cells;
+  if (const char* problem = split_cells(line, separator_of(line), cells)) {
+    return Problem{Kind::malformed, problem};
+  }
   if (columns_.empty()) {
     if (!reading_in(cells.front())) {
       return read_header(cells);
@@ -238,6 +242,18 @@ std::variant<Frame, FrameLines::Problem, FrameLines::Header> FrameLines::read_cs
     }
   }
   return frame_of(numbers, std::move(values), now_s);
+}
+
+bool FrameLines::is_text(std::string_view line) {
+  const std::string_view text = trimmed(line);
+  std::vector<std::string_view> cells;
+  if (text.starts_with('{') || text.starts_with('[') ||
+      split_cells(line, separator_of(line), cells) != nullptr) {
+    return !text.starts_with('{') && !text.starts_with('[');
+  }
+  const auto words = std::ranges::count_if(
+      cells, [](std::string_view cell) { return !reading_in(cell).has_value(); });
+  return 2 * static_cast<std::size_t>(words) >= cells.size();
 }
 
 std::variant<Frame, FrameLines::Problem, FrameLines::Header> FrameLines::frame_of(

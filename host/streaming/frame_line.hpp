@@ -45,7 +45,7 @@ class PoseLines {
 ///
 /// JSON: an object with `pressure`, a list of the array's readings or a list of such lists, and
 /// where they are known `time` (s) and x_mm, y_mm and theta_rad of T_robot_sensor; or the list
-/// alone. null is an Unknown reading.
+/// alone. null, and the NaN that Python writes, is an Unknown reading.
 ///
 /// CSV, its cells separated by tabs, semicolons, commas or blanks: with a header, columns of the
 /// names above and one for each reading (`device_time` and `lost_before` are left out); without
@@ -65,6 +65,10 @@ class FrameLines {
   /// @param line not blank
   /// @param now_s the time of frames without a time of their own
   std::variant<Frame, Problem, Header> read(std::string_view line, double now_s);
+
+  /// True for a line of words, such as a board prints as it starts: no JSON, and at most half of it
+  /// numbers.
+  static bool is_text(std::string_view line);
 
  private:
   std::variant<Frame, Problem, Header> read_json(std::string_view line, double now_s) const;

@@ -100,6 +100,13 @@ void mark_dead(const std::string& dead, ArrayTable& array) {
 
 }  // namespace
 
+std::optional<std::array<std::size_t, 2>> grid_size(const ImportOptions& options) {
+  const std::optional<Grid> grid = options.elements_mm ? std::nullopt : grid_of(options.array);
+  return grid && grid->rows > 1 ? std::optional(std::array{static_cast<std::size_t>(grid->columns),
+                                                           static_cast<std::size_t>(grid->rows)})
+                                : std::nullopt;
+}
+
 ArrayTable import_array(const ImportOptions& options) {
   if (options.pressure_unit != "kPa" && options.pressure_unit != "raw") {
     refuse(fmt::format("`pressure-unit {}`", options.pressure_unit), "give kPa or raw");

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
+#include <optional>
 #include <string>
 
 #include "io/pressure_table.hpp"
@@ -8,6 +10,9 @@
 #include "streaming/table_import.hpp"
 
 namespace palpate {
+
+/// Columns and rows of `array` where it is a grid of more than one row; none of a file.
+std::optional<std::array<std::size_t, 2>> grid_size(const ImportOptions& options);
 
 /// Reads `array`, its elements in the order of their readings, as a grid or as a file, or takes the
 /// elements of a program; checks `pressure-unit`.

@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 
+#include "io/csv_cells.hpp"
+#include "model/printable.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
@@ -43,9 +45,12 @@ std::optional<Frame> LineSensor::next(std::chrono::milliseconds timeout) {
         0ms, std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now()));
     const bool some = reader_.read_some(left);
     if (reader_.ended() && counters_.frames == 0) {
-      throw Error(Fault::input,
-                  fmt::format("{} ended before the first frame; write frames to it, a line each",
-                              reader_.name()));
+      throw Error(
+          Fault::input,
+          before_ > 0
+              ? problem_before_
+              : fmt::format("{} ended before the first frame; write frames to it, a line each",
+                            reader_.name()));
     }
     if (frames_.empty() && (reader_.ended() || (left == 0ms && (!some || ++late == most_late)))) {
       return {};
@@ -62,26 +67,94 @@ void LineSensor::take(const LineReader::Line& line) {
     refuse_line(line, Kind::malformed, "is longer than any frame");
     return;
   }
-  auto read = format_.read(line.text, now_s());
+  const double read_s = now_s();
+  auto read = format_.read(line.text, read_s);
+  if (std::holds_alternative<FrameLines::Problem>(read) && counters_.frames == 0) {
+    format_ = FrameLines(format_.elements());  // what looked like a header was a greeting
+    if (std::exchange(has_header_, false)) {
+      ++before_;
+      read = format_.read(line.text, read_s);
+    }
+  }
   if (const auto* problem = std::get_if<FrameLines::Problem>(&read)) {
-    refuse_line(line, problem->kind, problem->words);
+    if (!may_stand_before(line, problem->words)) {
+      refuse_line(line, problem->kind, problem->words);
+    }
   } else if (auto* frame = std::get_if<Frame>(&read)) {
+    say_first(read_s, frame->host_time_s);
     frame->lost_before = std::exchange(lost_before_, 0);
     for (double& value : frame->values) {
       value *= sign_;
     }
     frames_.push_back(std::move(*frame));
     ++counters_.frames;
+  } else {
+    has_header_ = true;
   }
+}
+
+/// Leaves out a line before the first frame that a board prints as it starts.
+bool LineSensor::may_stand_before(const LineReader::Line& line, const std::string& problem) {
+  constexpr std::uint64_t most = 100;
+  const bool is_cut = line.number == 1 && !trimmed(line.text).starts_with('{');
+  if (counters_.frames > 0 || before_ == most || !(is_cut || FrameLines::is_text(line.text))) {
+    return false;
+  }
+  format_ = FrameLines(format_.elements());  // numbers among the words are no columns
+  if (before_++ == 0) {
+    constexpr std::size_t enough = 60;
+    first_before_ = printable(trimmed(line.text).substr(0, enough));
+    problem_before_ = words_about(line, problem);
+  }
+  return true;
+}
+
+/// Says once what was left out before the first frame, and where times are in no seconds.
+void LineSensor::say_first(double now_s, double time_s) {
+  if (!complain_) {
+    return;
+  }
+  if (counters_.frames == 0 && before_ > 0) {
+    complain_(fmt::format("{}: {} before the first frame {} left out{}", reader_.name(),
+                          before_ == 1 ? "a line" : fmt::format("{} lines", before_),
+                          before_ == 1 ? "is" : "are",
+                          first_before_.empty() ? "" : fmt::format(": '{}'", first_before_)));
+  }
+  constexpr std::size_t enough = 20;
+  constexpr double latest_s = 1e11;
+  if (time_s == now_s || first_s_.size() == enough) {
+    return;
+  }
+  first_s_.push_back(time_s);
+  if (first_s_.size() < enough) {
+    return;
+  }
+  // Times since 1970 show their unit by their size, others by how far frames lie apart.
+  const double step_s = (first_s_.back() - first_s_.front()) / static_cast<double>(enough - 1);
+  const char* unit = nullptr;
+  if (time_s > latest_s) {
+    unit = time_s > 1e17 ? "nanoseconds" : time_s > 1e14 ? "microseconds" : "milliseconds";
+  } else if (step_s >= 1.0) {
+    unit = step_s >= 1e6 ? "nanoseconds" : step_s >= 1e3 ? "microseconds" : "milliseconds";
+  }
+  if (unit != nullptr) {
+    complain_(fmt::format(
+        "{}: its frames are {:.3g} s apart by their times, which look like {}; write seconds",
+        reader_.name(), step_s, unit));
+  }
+}
+
+std::string LineSensor::words_about(const LineReader::Line& line,
+                                    const std::string& problem) const {
+  return fmt::format(
+      "{}, line {}: {}; write {{\"time\": s, \"pressure\": [{} numbers]}}, or CSV with {} "
+      "readings, behind their time where it is known",
+      reader_.name(), line.number, problem, format_.elements(), format_.elements());
 }
 
 void LineSensor::refuse_line(const LineReader::Line& line, FrameLines::Problem::Kind kind,
                              const std::string& problem) {
-  const std::string text = fmt::format(
-      "{}, line {}: {}; write {{\"time\": s, \"pressure\": [{} numbers]}}, or CSV with {} "
-      "readings, "
-      "behind their time where it is known",
-      reader_.name(), line.number, problem, format_.elements(), format_.elements());
+  const std::string text = words_about(line, problem);
   if (counters_.frames == 0) {
     throw Error(Fault::input, text);
   }

@@ -104,8 +104,8 @@ void require_times(const ImportOptions& options, const Recording& recording, Pos
 }  // namespace
 
 bool in_one_file(const ImportOptions& options) {
-  return identity_of(std::filesystem::path(options.poses)) ==
-         identity_of(std::filesystem::path(options.pressures));
+  const auto poses = identity_of(std::filesystem::path(options.poses));
+  return poses && poses == identity_of(std::filesystem::path(options.pressures));
 }
 
 void join(PoseTable poses, const ImportSurvey& survey, const ImportOptions& options,

@@ -13,6 +13,7 @@
 #include "io/recording_rules.hpp"
 #include "io/table_columns.hpp"
 #include "model/number_text.hpp"
+#include "streaming/clock_stretches.hpp"
 #include "streaming/import_array.hpp"
 #include "streaming/pose_join.hpp"
 #include "streaming/touch_plane.hpp"
@@ -42,8 +43,13 @@ std::optional<Unit> unit_named(std::span<const Unit> units, const std::string& n
 }
 
 TableOptions table_options(const ImportOptions& options) {
-  TableOptions table{.time_column = options.time_column,
-                     .pressure_columns = options.pressure_columns};
+  TableOptions table{.header_line = options.header_line,
+                     .time_column = options.time_column,
+                     .pressure_columns = options.pressure_columns,
+                     .pressure_component = options.pressure_component,
+                     .pose_columns = options.pose_columns,
+                     .euler = options.euler,
+                     .matrix = options.matrix};
   if (!options.time_unit.empty()) {
     table.time_unit = unit_named(time_units, options.time_unit);
     if (!table.time_unit) {
@@ -59,19 +65,26 @@ TableOptions table_options(const ImportOptions& options) {
              "give mm,rad or mm,deg or m,rad or m,deg");
     }
   }
-  if (!options.pose_columns.empty()) {
-    const bool in_space = std::ranges::count(options.pose_columns, ',') == 6;
-    table.pose_columns = split_last(options.pose_columns, ',', in_space ? 7 : 3);
-    if (table.pose_columns.empty()) {
-      refuse(fmt::format("`pose-columns {}`", options.pose_columns),
-             "give three names, X,Y,THETA, or seven, TX,TY,TZ,QX,QY,QZ,QW");
+  for (const std::string& where : options.where) {
+    const std::size_t equals = where.find('=');
+    if (equals == where.npos || equals == 0) {
+      refuse(fmt::format("`where {}`", where), "give COLUMN=VALUE");
     }
-    for (const char* part : {"qx", "qy", "qz", "qw"}) {
-      if (!in_space && std::ranges::find(table.pose_columns, part) != table.pose_columns.end()) {
-        refuse(fmt::format("`pose-columns {}`", options.pose_columns),
-               "'{}' is a part of a quaternion, no angle; give TX,TY,TZ,QX,QY,QZ,QW", part);
-      }
+    table.where.emplace_back(where.substr(0, equals), where.substr(equals + 1));
+  }
+  const auto require_one_of = [](const char* option, const std::string& value,
+                                 std::initializer_list<const char*> values) {
+    if (!value.empty() && std::ranges::find(values, value) == values.end()) {
+      refuse(fmt::format("`{} {}`", option, value), "give {}",
+             fmt::format("{}", fmt::join(values, " or ")));
     }
+  };
+  require_one_of("pressure-component", options.pressure_component, {"z", "norm"});
+  require_one_of("matrix", options.matrix, {"columns", "rows"});
+  if (!options.euler.empty() && options.euler != "vector" && !are_axes(options.euler)) {
+    refuse(fmt::format("`euler {}`", options.euler),
+           "give the axes of the three angles in their order, xyz, zyx and so on about fixed axes, "
+           "XYZ, ZYX and so on about moving ones, or vector for a rotation vector");
   }
   return table;
 }
@@ -98,7 +111,7 @@ void require_touch_poses(const ImportOptions& options, const ImportedRecording& 
 
 /// True where a table of this name is given and has the column.
 bool has_column(const std::string& path, const std::string& name) {
-  return !path.empty() && CsvTable(path).find(name);
+  return !path.empty() && CsvTable(path).find_or_count(name);
 }
 
 /// @param n rows
@@ -168,16 +181,80 @@ void check_numbers(const ImportOptions& options) {
   if (!std::isfinite(options.pose_delay_s)) {
     refuse(fmt::format("`pose-delay {}`", options.pose_delay_s), "give seconds");
   }
+  if (!options.mount.empty() && options.poses.empty()) {
+    refuse(fmt::format("`mount {}`", options.mount), "is for poses; give `poses`");
+  }
   if (options.unposed && !options.poses.empty()) {
     refuse("`unposed`", "{} holds the poses; leave one of them out", options.poses);
   }
 }
 
+/// The pose of `mount`; none where it is not given.
+std::optional<SpatialPose> mount_of(const std::string& text) {
+  if (text.empty()) {
+    return {};
+  }
+  const auto parts = split_text(text, ',');
+  std::array<double, 6> numbers{};
+  bool are_numbers = parts.size() == numbers.size();
+  for (std::size_t i = 0; i < numbers.size() && are_numbers; ++i) {
+    const auto number = number_of(parts[i]);
+    are_numbers = number.has_value() && std::abs(*number) <= farthest_mm;
+    numbers[i] = number.value_or(0.0);
+  }
+  if (!are_numbers) {
+    refuse(fmt::format("`mount {}`", text),
+           "give X,Y,Z,ROLL,PITCH,YAW, the array's pose in the frame whose poses are given, in mm "
+           "and degrees about fixed axes");
+  }
+  for (std::size_t i = 3; i < numbers.size(); ++i) {
+    numbers[i] = angle_units[1].convert(numbers[i]);
+  }
+  return SpatialPose{{numbers[0], numbers[1], numbers[2]},
+                     rotation_of_angles("xyz", std::span(numbers).subspan(3))};
+}
+
+/// Takes poses of a frame to those of the array that is mounted in it.
+void mount_array(const SpatialPose& mount, PoseTable& poses) {
+  for (const Pose& pose : poses.T_robot_sensor) {
+    poses.spatial.push_back(
+        is_finite(pose)
+            ? std::optional(SpatialPose{{pose.translation_mm.x, pose.translation_mm.y, 0.0},
+                                        rotation_of_vector({0.0, 0.0, pose.theta_rad})})
+            : std::nullopt);
+  }
+  poses.T_robot_sensor.clear();
+  for (std::optional<SpatialPose>& pose : poses.spatial) {
+    pose = pose ? std::optional(*pose * mount) : std::nullopt;
+  }
+}
+
+/// The options of a table of poses, which is another than that of the pressures unless it is the
+/// same file.
+TableOptions pose_options(const ImportOptions& options, TableOptions columns) {
+  columns.header_line = in_one_file(options) ? columns.header_line : 0;
+  return columns;
+}
+
+/// The options of the table of pressures.
+TableOptions pressure_options(const ImportOptions& options, TableOptions columns) {
+  if (options.poses.empty() || !in_one_file(options)) {
+    columns.pose_columns.clear();  // they are of another table
+  }
+  return columns;
+}
+
 /// The recording of rows that are read.
 ImportedRecording recording_of(const ImportOptions& options, ArrayTable array, ImportRows rows) {
   const std::optional<glm::dvec3> normal = plane_normal(options.plane);
+  const std::optional<SpatialPose> mount = mount_of(options.mount);
   auto& [pressures, poses, T_robot_object, elements] = rows;
   ImportedRecording imported;
+  for (const std::string& words : pressures.understood) {
+    imported.understood.push_back(fmt::format("{}: {}", options.pressures, words));
+  }
+  const std::vector<std::string> stretches = lay_out_stretches(options, pressures, poses);
+  imported.understood.insert(imported.understood.end(), stretches.begin(), stretches.end());
   imported.holds_poses = pressures.holds_poses;
   Recording& recording = imported.recording;
   recording.pressure_unit = options.pressure_unit;
@@ -199,6 +276,14 @@ ImportedRecording recording_of(const ImportOptions& options, ArrayTable array, I
   choose_rows(options, survey.rows(), recording);
   mark_unknown(options.pressures, survey, recording);
   if (poses) {
+    const auto say = [&](const std::vector<std::string>& words) {
+      for (const std::string& sentence : words) {
+        imported.understood.push_back(fmt::format("{}: {}", options.poses, sentence));
+      }
+    };
+    if (mount) {
+      mount_array(*mount, *poses);
+    }
     if (poses->spatial.empty() && normal) {
       refuse(fmt::format("`plane {}`", options.plane),
              "is for poses in space; {} has x, y and theta", options.poses);
@@ -208,14 +293,12 @@ ImportedRecording recording_of(const ImportOptions& options, ArrayTable array, I
     }
     if (!poses->spatial.empty()) {
       const TouchPlane plane = touch_plane(poses->spatial, normal);
-      imported.of_poses = take_into_plane(plane, survey, *poses, recording);
+      say(take_into_plane(plane, survey, *poses, recording));
       if (T_robot_object) {
         recording.truth = Truth{options.object, inverse(plane.project(*T_robot_object))};
       }
     }
-    if (!poses->left_out.empty()) {
-      imported.of_poses.push_back(poses->left_out);
-    }
+    say(poses->understood);
     imported.assumed_units = poses->assumed_units;
     join(std::move(*poses), survey, options, imported);
   } else {
@@ -231,7 +314,7 @@ ImportedRecording recording_of(const ImportOptions& options, ArrayTable array, I
 }  // namespace
 
 ImportedRecording import_tables(const ImportOptions& options) {
-  const TableOptions columns = table_options(options);
+  TableOptions columns = table_options(options);
   check_numbers(options);
   auto truth = options.truth.empty() ? std::nullopt : std::optional(truth_of(options.truth));
   ArrayTable array = import_array(options);
@@ -240,17 +323,25 @@ ImportedRecording import_tables(const ImportOptions& options) {
     refuse(fmt::format("`time-column {}`", options.time_column),
            "no table has this column; give its name");
   }
-  ImportRows rows{.pressures =
-                      read_pressures(options.pressures, array.elements_mm.size(), columns)};
+  for (const auto& [name, value] : columns.where) {
+    if (!has_column(options.pressures, name) && !has_column(options.poses, name)) {
+      refuse(fmt::format("`where {}={}`", name, value), "no table has this column; give its name");
+    }
+  }
+  columns.grid = grid_size(options);
+  columns.has_blocks = options.rows == "frames";
+  ImportRows rows{.pressures = read_pressures(options.pressures, array.elements_mm.size(),
+                                              pressure_options(options, columns))};
   const Unit length_unit = columns.length_unit.value_or(length_units.front());
   std::array<Unit, 3> pose_units{length_unit, length_unit,
                                  columns.angle_unit.value_or(angle_units.front())};
   if (!options.poses.empty()) {
     // The rows of one file belong together, even where their times are equal.
-    rows.poses = read_poses(options.poses, columns, !in_one_file(options));
+    rows.poses = read_poses(options.poses, pose_options(options, columns), !in_one_file(options));
     if (in_one_file(options) && options.pose_delay_s != 0.0 &&
         rows.pressures.time_s.size() == rows.poses->T_robot_sensor.size()) {
       rows.poses->time_s = rows.pressures.time_s;
+      rows.poses->steps = rows.pressures.steps;
     }
     if (rows.poses->time_s.empty() && options.pose_delay_s != 0.0) {
       refuse(fmt::format("`pose-delay {}`", options.pose_delay_s), "{} has no times; leave it out",

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -32,8 +33,16 @@ struct ImportOptions {
   std::string pose_unit;
   std::string time_unit;
   std::string time_column;
+  std::uint64_t header_line = 0;   ///< of the pressures, from 1; 0: found
+  std::vector<std::string> where;  ///< COLUMN=VALUE: only rows of which all hold
   std::string pressure_columns;
+  std::string pressure_component;  ///< "z" or "norm" of elements that read x, y and z
   std::string pose_columns;
+  std::string euler;   ///< axes of three angles, or "vector", see TableOptions
+  std::string matrix;  ///< "columns" or "rows", see TableOptions
+  /// X,Y,Z,ROLL,PITCH,YAW, mm and degrees about fixed axes: the pose of the array in the frame
+  /// whose poses are given; "": it is this frame.
+  std::string mount;
   std::string plane = "auto";           ///< of poses in space: auto, or its normal "NX,NY,NZ"
   std::optional<double> largest_gap_s;  ///< none: by the times of the poses
   double pose_delay_s = 0.0;  ///< by how much later the poses' clock reads than the frames'
@@ -53,7 +62,8 @@ struct ImportedRecording {
   std::size_t in_gaps = 0;     ///< frames between two poses that are further apart
   /// The largest reading where all are whole numbers, as raw ones are, but said to be in kPa.
   std::optional<double> whole_up_to = {};
-  std::vector<std::string> of_poses = {};  ///< what is worth saying of the poses, in sentences
+  /// What was understood, or is worth saying, in sentences that begin with their file.
+  std::vector<std::string> understood = {};
 };
 
 /// Reads the pressures and the poses and joins them.

@@ -14,6 +14,7 @@
 #include "palpate/pose_track.hpp"
 #include "streaming/frame_smoother.hpp"
 #include "streaming/rest_follower.hpp"
+#include "streaming/touch_mean.hpp"
 
 namespace palpate {
 
@@ -21,24 +22,6 @@ namespace {
 
 // Beyond this many frames, the sensor's own error exceeds the mean's noise.
 constexpr std::size_t most_kept = 512;
-// With fewer frames, a single wrong one would decide.
-constexpr std::size_t least_frames = 3;
-
-// Returns the mean of the middle half; values at its borders count in part. Reorders the values. It
-// averages Gaussian noise with 84 % of the mean's efficiency (the median: 64 %) and, unlike the
-// median, resolves less than a step of the sensor's converter.
-double interquartile_mean(std::span<double> values) {
-  std::sort(values.begin(), values.end());
-  const double n = static_cast<double>(values.size());
-  double sum = 0.0;
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    const double rank = static_cast<double>(i);
-    const double part = std::min(rank + 1.0, 0.75 * n) - std::max(rank, 0.25 * n);
-    sum += std::max(part, 0.0) * values[i];
-  }
-  return sum / (0.5 * n);
-}
-
 /// Consecutive frames of steady load and pose: a candidate for a touch's reading.
 class SteadyPhase {
  public:
@@ -85,42 +68,12 @@ class SteadyPhase {
   /// frames is not valid in it.
   std::optional<DetectedTouch> touch() const {
     const std::size_t n = steady_frames();
-    if (n < least_frames || kept_[n - 1].time_s - kept_[0].time_s < options_.min_steady_s) {
+    if (n < least_frames_of_touch ||
+        kept_[n - 1].time_s - kept_[0].time_s < options_.min_steady_s) {
       return {};
     }
     const std::size_t e = pressure_.size() / kept_.size();
-    DetectedTouch touch{.begin_s = kept_[0].time_s,
-                        .end_s = kept_[n - 1].time_s,
-                        .frames = n,
-                        .pressure = std::vector<double>(e, 0.0),
-                        .valid = std::vector<std::uint8_t>(e, 0)};
-    std::vector<double> values(n);
-    for (std::size_t k = 0; k < e; ++k) {
-      std::size_t known = 0;
-      for (std::size_t i = 0; i < n; ++i) {
-        if (const double value = pressure_[i * e + k]; !std::isnan(value)) {
-          values[known++] = value;
-        }
-      }
-      if (known >= least_frames) {
-        touch.pressure[k] = interquartile_mean(std::span(values).first(known));
-        touch.valid[k] = 1;
-      }
-    }
-    Pose sum;
-    double poses = 0.0;
-    for (std::size_t i = 0; i < n; ++i) {
-      if (const auto& pose = kept_[i].T_robot_sensor) {
-        sum.translation_mm += pose->translation_mm;
-        sum.theta_rad += wrap_angle(pose->theta_rad - first_pose_->theta_rad);
-        poses += 1.0;
-      }
-    }
-    if (poses > 0.0) {
-      touch.T_robot_sensor =
-          Pose{sum.translation_mm / poses, first_pose_->theta_rad + sum.theta_rad / poses};
-    }
-    return touch;
+    return mean_touch(std::span(kept_).first(n), std::span(pressure_).first(n * e), first_pose_);
   }
 
   /// Forgets all frames.
@@ -134,11 +87,6 @@ class SteadyPhase {
   }
 
  private:
-  struct Kept {
-    double time_s;
-    std::optional<Pose> T_robot_sensor;
-  };
-
   // Counts the frames kept before the release, which shows late in the smoothed pressures.
   std::size_t steady_frames() const {
     constexpr std::size_t median_delay = 2;
@@ -170,7 +118,7 @@ class SteadyPhase {
   double load_sum_ = 0.0;
   std::optional<Pose> first_pose_;
   std::size_t stride_ = 1;  ///< one of this many frames is kept
-  std::vector<Kept> kept_;
+  std::vector<FramePlace> kept_;
   std::vector<double> pressure_;  ///< [kept, e]
 };
 

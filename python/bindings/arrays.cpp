@@ -19,22 +19,20 @@ namespace {
 /// The array with its mask where some of its values are masked, or else a null object. A list may
 /// hold masked rows or values.
 nb::object masked_array(nb::handle object) {
-  return with_python([&]() -> nb::object {
-    const nb::module_ ma = nb::module_::import_("numpy.ma");
-    nb::object array = nb::borrow(object);
-    if (nb::isinstance<nb::list>(object) || nb::isinstance<nb::tuple>(object)) {
-      const nb::object masked = ma.attr("MaskedArray");
-      bool any = false;
-      for (const nb::handle item : object) {
-        any = any || nb::isinstance(item, masked);
-      }
-      if (!any) {
-        return {};
-      }
-      array = ma.attr("asarray")(object);
+  const nb::module_ ma = nb::module_::import_("numpy.ma");
+  nb::object array = nb::borrow(object);
+  if (nb::isinstance<nb::list>(object) || nb::isinstance<nb::tuple>(object)) {
+    const nb::object masked = ma.attr("MaskedArray");
+    bool any = false;
+    for (const nb::handle item : object) {
+      any = any || nb::isinstance(item, masked);
     }
-    return nb::cast<bool>(ma.attr("is_masked")(array)) ? array : nb::object();
-  });
+    if (!any) {
+      return {};
+    }
+    array = ma.attr("asarray")(object);
+  }
+  return nb::cast<bool>(ma.attr("is_masked")(array)) ? array : nb::object();
 }
 
 /// numpy.asarray(object); throws Error where it is no array of numbers of these kinds.

@@ -21,6 +21,7 @@
 #include "recognition/recordings.hpp"
 #include "recognition/resolve.hpp"
 #include "request.hpp"
+#include "shared.hpp"
 
 namespace palpate::python {
 
@@ -35,14 +36,12 @@ using Entries = std::vector<std::tuple<nb::bytes, std::size_t>>;
 
 std::tuple<nb::bytes, Entries, Sentences> settle(const std::vector<std::string>& inputs,
                                                  nb::handle maps, PythonRequest request,
-                                                 const std::shared_ptr<Session>& session,
-                                                 std::size_t threads) {
+                                                 Device& device, std::size_t threads) {
   if (inputs.empty()) {
     throw Error(Fault::input, "paths: none; give recordings, a folder of them or a manifest");
   }
   add_maps(maps, request);
-  auto [task, sentences] = run([=](Call& call) {
-    auto lock = session->lock(call);
+  auto [task, sentences] = run([&] {
     refuse_budget(request);
     require_selection(request);
     const Request completed = complete(request);
@@ -50,11 +49,11 @@ std::tuple<nb::bytes, Entries, Sentences> settle(const std::vector<std::string>&
                       .chunk_unknowns = 1,  // chunks are of recordings, whoever makes them
                       .request = request,
                       .inputs = list_inputs(inputs)};
-    survey_inputs(settled.inputs, completed, threads, call.progress());
+    survey_inputs(settled.inputs, completed, threads, [](double) { check_signals(); });
     settled.inferred = infer(settled.inputs, completed);
     hash_files(settled, completed);
     const RecognitionTask recognition =
-        resolve_batch(settled, completed, [&]() -> Device& { return lock.device(); });
+        resolve_batch(settled, completed, [&]() -> Device& { return device; });
     return std::pair(std::move(settled), in_python(recognition.remarks));
   });
   Entries entries;
@@ -73,8 +72,7 @@ struct OpenBatch {
   Recogniser recogniser;
 };
 
-OpenBatch open_batch(const std::string& head, const Session& session, Device& device,
-                     std::size_t threads) {
+OpenBatch open_batch(const std::string& head, Device& device, std::size_t threads) {
   BatchTask task = head_from(head);
   Request request = complete(task.request);
   BatchTask own = task;
@@ -87,9 +85,8 @@ OpenBatch open_batch(const std::string& head, const Session& session, Device& de
   }
   RecognitionTask recognition =
       resolve_batch(task, request, [&device]() -> Device& { return device; });
-  // The open batch keeps the session.
-  Recogniser recogniser = open_recogniser(
-      &device, recognition, {.threads = threads, .cancel_point = [&session] { session.check(); }});
+  Recogniser recogniser =
+      open_recogniser(&device, recognition, {.threads = threads, .cancel_point = check_signals});
   return {std::move(task), std::move(request), std::move(recognition), std::move(recogniser)};
 }
 
@@ -100,9 +97,8 @@ struct Line {
 };
 
 /// The entries' lines, and a sentence on what is not resolved, "" where there is none.
-std::pair<std::vector<Line>, std::string> recognise_entries(OpenBatch& batch,
-                                                            const std::vector<std::string>& entries,
-                                                            const Call& call) {
+std::pair<std::vector<Line>, std::string> recognise_entries(
+    OpenBatch& batch, const std::vector<std::string>& entries) {
   std::vector<Line> lines;
   std::string unresolved;
   for (const std::string& entry : entries) {
@@ -110,7 +106,7 @@ std::pair<std::vector<Line>, std::string> recognise_entries(OpenBatch& batch,
     for (const Unknown& unknown : read.unknowns) {
       const RecognitionRecord record =
           recognise(batch.recogniser, batch.recognition, unknown, batch.request.trace,
-                    [&](double) { call.check(); });
+                    [](double) { check_signals(); });
       if (record.error.empty() && unresolved.empty()) {
         unresolved =
             unresolved_words(batch.recognition, batch.recogniser.lattice(), unknown.touches);
@@ -127,14 +123,12 @@ std::pair<std::vector<Line>, std::string> recognise_entries(OpenBatch& batch,
 
 using Lines = std::vector<std::tuple<nb::bytes, nb::bytes, double>>;
 
-std::tuple<Lines, std::string> recognise_python(const Owned<OpenBatch>& batch,
+std::tuple<Lines, std::string> recognise_python(const Shared<OpenBatch>& batch,
                                                 const std::vector<nb::bytes>& entries) {
   std::vector<std::string> texts;
   std::ranges::transform(entries, std::back_inserter(texts), text_in);
   const auto [recognised, unresolved] =
-      batch.use([texts = std::move(texts)](OpenBatch& open, Call& call) {
-        return recognise_entries(open, texts, call);
-      });
+      batch.use([&](OpenBatch& open) { return recognise_entries(open, texts); });
   Lines lines;
   for (const Line& line : recognised) {
     lines.emplace_back(bytes_of(line.text),
@@ -154,35 +148,34 @@ void bind_batch(nb::module_& module) {
   module.def(
       "device_of", [](const PythonRequest& request) { return complete(request).device; },
       "request"_a, "The device that the request or its scene names, or \"\".");
-  nb::class_<Owned<OpenBatch>>(module, "OpenBatch",
-                               "A settled batch on a device, ready to recognise any of its "
-                               "recordings. One thread at\na time recognises.")
+  nb::class_<Shared<OpenBatch>>(module, "OpenBatch",
+                                "A settled batch on a device, ready to recognise any of its "
+                                "recordings. One thread at\na time recognises.")
       .def_static(
           "open",
-          [](const nb::bytes& head, const std::shared_ptr<Session>& session, std::size_t threads) {
-            return make_owned<OpenBatch>(
-                session, [head = text_in(head), &on = *session, threads](Device& device) {
-                  return open_batch(head, on, device, threads);
-                });
+          [](const nb::bytes& head, const std::shared_ptr<Device>& device, std::size_t threads) {
+            const std::string text = text_in(head);
+            return make_shared_on(device,
+                                  [&](Device& on) { return open_batch(text, on, threads); });
           },
           "head"_a, "device"_a, "threads"_a,
           "Raises Error where palpate, a map, the scene or the sensor model is not as it was when\n"
           "the batch was settled.")
       .def_prop_ro(
           "on_host",
-          [](const Owned<OpenBatch>& self) { return !uses_device(self.constant().recognition); },
+          [](const Shared<OpenBatch>& self) { return !uses_device(self.constant().recognition); },
           "Whether bounds recognise, which compute on the host alone.")
       .def_prop_ro(
           "lattice",
-          [](const Owned<OpenBatch>& self) { return self.constant().recogniser.lattice(); },
+          [](const Shared<OpenBatch>& self) { return self.constant().recogniser.lattice(); },
           "The bins, whose pivot is (0, 0) where it is automatic.")
       .def_prop_ro(
           "auto_pivot",
-          [](const Owned<OpenBatch>& self) { return self.constant().recognition.auto_pivot; },
+          [](const Shared<OpenBatch>& self) { return self.constant().recognition.auto_pivot; },
           "Whether theta turns about each unknown's first touch.")
       .def_prop_ro(
           "maps",
-          [](const Owned<OpenBatch>& self) {
+          [](const Shared<OpenBatch>& self) {
             std::vector<std::tuple<std::string, Hypothesis>> maps;
             const RecognitionTask& recognition = self.constant().recognition;
             for (std::size_t i = 0; i < recognition.hypotheses.size(); ++i) {
@@ -193,7 +186,7 @@ void bind_batch(nb::module_& module) {
           "The maps, by their files; symmetries and mirror images are the task's.")
       .def_prop_ro(
           "memory_bytes",
-          [](const Owned<OpenBatch>& self) {
+          [](const Shared<OpenBatch>& self) {
             const Recogniser& recogniser = self.constant().recogniser;
             return recogniser.device_bytes() + recogniser.host_bytes();
           },

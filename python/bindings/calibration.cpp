@@ -9,11 +9,13 @@
 
 #include "arrays.hpp"
 #include "bindings.hpp"
+#include "json.hpp"
 #include "learning/calibration_task.hpp"
 #include "learning/setup_check.hpp"
 #include "model/element_spacing.hpp"
 #include "model/option_words.hpp"
 #include "recognition/recordings.hpp"
+#include "recognition/result_json.hpp"
 #include "request.hpp"
 
 namespace palpate::python {
@@ -22,28 +24,7 @@ using namespace nb::literals;
 
 namespace {
 
-SensorCalibration calibrate(const GivenRecordings& given, PythonRequest request,
-                            const CalibrationRequest& wanted, Call& call) {
-  const std::vector<Recording> recordings = read_recordings(given);
-  if (request.given_maps.empty()) {
-    read_maps(request);
-  }
-  const CalibrationTask task = calibration_task(wanted, request, recordings, request.given_maps);
-  return calibrate_sensor(task.presses, task.maps, task.options, call.progress());
-}
-
-SetupCheck check(const GivenRecordings& given, const PythonRequest& request, double cell_mm,
-                 std::optional<double> spread_mm, Call& call) {
-  const std::vector<Recording> recordings = read_recordings(given);
-  const Recording& first = recordings.front();
-  MapOptions options{.cell_mm = cell_mm,
-                     .sensor = {.spread_mm = spread_mm ? *spread_mm : usual_spread_mm(recordings)}};
-  options.classifier =
-      make_classifier(first.pressure_unit, first.path, request.threshold, request.ratio);
-  const auto used = session_on(request.session, request.device);
-  auto lock = used->lock(call);
-  return check_setup(lock.device(), recordings, options, call.progress());
-}
+using Json = nlohmann::ordered_json;
 
 std::string layer_word(MapLayer layer) {
   return layer == MapLayer::mean_level ? "mean_level" : "log_odds";
@@ -104,7 +85,8 @@ void bind_learned_sensor(nb::module_& module) {
       .def(
           "save",
           [](const LearnedSensor& self, const PathLike& file) {
-            run([sensor = self, path = file.path()](Call&) { write_sensor_model(path, sensor); });
+            const std::filesystem::path path = file.path();
+            run([&] { write_sensor_model(path, self); });
           },
           "path"_a,
           "Writes the sensor model (YAML), which recognize() and the commands take. Raises Error\n"
@@ -118,96 +100,86 @@ void bind_learned_sensor(nb::module_& module) {
       });
 }
 
-}  // namespace
+SensorCalibration calibrate(const GivenRecordings& given, PythonRequest request,
+                            const CalibrationRequest& wanted, const Report& report) {
+  const std::vector<Recording> recordings = read_recordings(given);
+  if (request.given_maps.empty()) {
+    read_maps(request);
+  }
+  const CalibrationTask task = calibration_task(wanted, request, recordings, request.given_maps);
+  return calibrate_sensor(task.presses, task.maps, task.options, report);
+}
 
-namespace {
+Json to_json(const SensorCalibration& calibration) {
+  Json json{{"objects", calibration.objects}, {"tried", Json::array()}};
+  for (const TriedTable& table : calibration.tried) {
+    json["tried"].push_back({{"layer", layer_word(table.kind.layer)},
+                             {"levels", table.kind.levels},
+                             {"log_loss", table.log_loss}});
+  }
+  if (calibration.before) {
+    json["before"] = to_json(*calibration.before);
+    json["table"] = to_json(*calibration.table);
+    json["after"] = to_json(*calibration.after);
+  }
+  if (const auto& groups = calibration.groups) {
+    json["groups"] = {{"touches", groups->touches},
+                      {"before", to_json(groups->before)},
+                      {"table", to_json(groups->table)},
+                      {"after", to_json(groups->after)}};
+  }
+  if (calibration.array_offset) {
+    json["array_offset"] = to_json(*calibration.array_offset, in_keywords);
+  }
+  json["warnings"] = calibration.warnings;
+  return json;
+}
 
-void bind_setup_check(nb::module_& module) {
-  nb::class_<SetupFinding>(module, "SetupFinding", "Something that is wrong with a set-up.")
-      .def_ro("what", &SetupFinding::what,
-              "\"pose_unit\", \"element_order\", \"array_offset\", \"pitch\", \"dead_elements\",\n"
-              "\"stuck_elements\", \"contradicting\", \"tilt\", \"clock\" or \"dropped\".")
-      .def_ro(
-          "nats", &SetupFinding::nats,
-          "By how much more likely the touches are once it is mended; of \"clock\", log 19 for\n"
-          "each press that it explains; 0 of \"tilt\" and \"dropped\".")
-      .def_prop_ro(
-          "words", [](const SetupFinding& self) { return in_keywords(self.words); },
-          "A sentence with what mends it.")
-      .def_prop_ro(
-          "array_offset",
-          [](const SetupFinding& self) {
-            return self.array_offset ? std::optional(to_array(*self.array_offset)) : std::nullopt;
-          },
-          "[3], the array's pose in the true sensor frame, mm, mm and rad; None but for\n"
-          "\"array_offset\".")
-      .def_ro("sd", &SetupFinding::sd, "Standard deviations of array_offset, or None.")
-      .def("__repr__", [](const SetupFinding& self) {
-        return fmt::format("SetupFinding('{}', {:.0f} nats: {})", self.what, self.nats,
-                           in_keywords(self.words));
-      });
-  nb::class_<SetupCheck>(module, "SetupCheck", "What touches say about their set-up.")
-      .def_ro("findings", &SetupCheck::findings, "Empty where the set-up is sound.")
-      .def_ro("remarks", &SetupCheck::remarks, "What these touches cannot tell, in sentences.")
-      .def_prop_ro("elements_mm", array_of(&SetupCheck::elements_mm),
-                   "[e, 2], the array as the findings correct it.")
-      .def_ro("touches", &SetupCheck::touches, "How many touches were in contact.");
-  module.def(
-      "check_setup",
-      [](nb::handle recordings, const PythonRequest& request, double cell_mm,
-         std::optional<double> spread_mm, const Progress& progress) {
-        return run({}, progress, [=, given = given_recordings(recordings)](Call& call) {
-          return check(given, request, cell_mm, spread_mm, call);
-        });
-      },
-      "recordings"_a, "request"_a, "cell_mm"_a, "spread_mm"_a.none(), "progress"_a = nb::none(),
-      "What the touches say; of the request count the classifier and the device.");
+std::tuple<Fields, LearnedSensor> calibrate_python(nb::handle recordings,
+                                                   const PythonRequest& request,
+                                                   const CalibrationRequest& wanted,
+                                                   const Progress& progress) {
+  const GivenRecordings given = given_recordings(recordings);
+  const SensorCalibration calibration = run(
+      progress, [&](const Report& report) { return calibrate(given, request, wanted, report); });
+  return {fields_of(to_json(calibration)), calibration.sensor};
+}
+
+Json check(const GivenRecordings& given, const PythonRequest& request, double cell_mm,
+           std::optional<double> spread_mm, const Report& report) {
+  const std::vector<Recording> recordings = read_recordings(given);
+  const Recording& first = recordings.front();
+  MapOptions options{.cell_mm = cell_mm,
+                     .sensor = {.spread_mm = spread_mm ? *spread_mm : usual_spread_mm(recordings)}};
+  options.classifier =
+      make_classifier(first.pressure_unit, first.path, request.threshold, request.ratio);
+  const auto device = device_of(request.open_device, request.device);
+  const SetupCheck check = check_setup(*device, recordings, options, report);
+  Json json{{"findings", Json::array()},
+            {"remarks", in_python(check.remarks)},
+            {"elements_mm", Json::array()},
+            {"touches", check.touches}};
+  for (const SetupFinding& finding : check.findings) {
+    json["findings"].push_back(to_json(finding, in_keywords));
+  }
+  for (const glm::dvec2& p : check.elements_mm) {
+    json["elements_mm"].push_back({p.x, p.y});
+  }
+  return json;
+}
+
+Fields check_python(nb::handle recordings, const PythonRequest& request, double cell_mm,
+                    std::optional<double> spread_mm, const Progress& progress) {
+  const GivenRecordings given = given_recordings(recordings);
+  return fields_of(run(progress, [&](const Report& report) {
+    return check(given, request, cell_mm, spread_mm, report);
+  }));
 }
 
 }  // namespace
 
 void bind_calibration(nb::module_& module) {
-  bind_setup_check(module);
   bind_learned_sensor(module);
-  nb::class_<GroupScores>(module, "GroupScores",
-                          "The cross-validation of several touches of one object at a time.")
-      .def_ro("touches", &GroupScores::touches, "Touches of a group.")
-      .def_ro("before", &GroupScores::before, "Eq. 7 with gamma 0.1, temperature 1.")
-      .def_ro("table", &GroupScores::table, "The table, temperature 1.")
-      .def_ro("after", &GroupScores::after, "The table and the temperature.");
-  nb::class_<SensorCalibration>(
-      module, "SensorCalibration",
-      "A learned sensor and how good it is on touches that it has not seen, by cross-validation.\n"
-      "With one object there is none to compare by, and `before` to `groups` are None.")
-      .def_ro("sensor", &SensorCalibration::sensor, "What was learned.")
-      .def_ro("array_offset", &SensorCalibration::array_offset,
-              "Where the array sits in the tool, a SetupFinding, from touches at known poses of\n"
-              "objects whose maps are drawn; all else is learned with the array there. None where\n"
-              "it sits where the recordings say.")
-      .def_ro("objects", &SensorCalibration::objects, "Number of objects.")
-      .def_prop_ro(
-          "tried",
-          [](const SensorCalibration& self) {
-            std::vector<std::tuple<std::string, std::size_t, double>> tried;
-            for (const TriedTable& table : self.tried) {
-              tried.emplace_back(layer_word(table.kind.layer), table.kind.levels, table.log_loss);
-            }
-            return tried;
-          },
-          "(layer, levels, log-loss in nats) of the tables that were tried.")
-      .def_ro("before", &SensorCalibration::before, "Eq. 7 with gamma 0.1, temperature 1.")
-      .def_ro("table", &SensorCalibration::table, "The table, temperature 1.")
-      .def_ro("after", &SensorCalibration::after, "The table, temperature and press features.")
-      .def_ro("groups", &SensorCalibration::groups,
-              "Several touches at a time; None at unknown poses, or for few touches.")
-      .def_ro("warnings", &SensorCalibration::warnings, "What could not be learned, in sentences.")
-      .def("__repr__", [](const SensorCalibration& self) {
-        return fmt::format(
-            "SensorCalibration({} object{}{})", self.objects, self.objects == 1 ? "" : "s",
-            self.after
-                ? fmt::format(", {} of {} touches right", self.after->right, self.after->records)
-                : "");
-      });
   nb::class_<CalibrationRequest>(
       module, "CalibrationRequest",
       "What is asked of a calibration beside a Request's maps, bins and frames.")
@@ -219,16 +191,13 @@ void bind_calibration(nb::module_& module) {
       .def_rw("levels", &CalibrationRequest::levels)
       .def_rw("max_maps", &CalibrationRequest::max_maps)
       .def_rw("group", &CalibrationRequest::group);
-  module.def(
-      "calibrate",
-      [](nb::handle recordings, const PythonRequest& request, const CalibrationRequest& wanted,
-         const Progress& progress) {
-        return run({}, progress, [=, given = given_recordings(recordings)](Call& call) {
-          return calibrate(given, request, wanted, call);
-        });
-      },
-      "recordings"_a, "request"_a, "calibration"_a, "progress"_a = nb::none(),
-      "The calibration; of the request count the maps, bins, frames and device.");
+  module.def("calibrate", &calibrate_python, "recordings"_a, "request"_a, "calibration"_a,
+             "progress"_a = nb::none(),
+             "What was learned, and the sensor; of the request count the maps, bins, frames and\n"
+             "device.");
+  module.def("check_setup", &check_python, "recordings"_a, "request"_a, "cell_mm"_a,
+             "spread_mm"_a.none(), "progress"_a = nb::none(),
+             "What the touches say; of the request count the classifier and the device.");
 }
 
 }  // namespace palpate::python

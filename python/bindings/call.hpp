@@ -1,97 +1,58 @@
 #pragma once
 
-#include <atomic>
-#include <chrono>
-#include <condition_variable>
-#include <exception>
 #include <functional>
-#include <memory>
-#include <mutex>
-#include <optional>
-#include <thread>
 #include <type_traits>
-#include <utility>
-#include <vector>
 
 #include <nanobind/nanobind.h>
 
-#include "model/own_process.hpp"
 #include "types.hpp"
 
 namespace palpate::python {
 
-/// Work that runs on a thread of its own while the thread that called it from Python waits without
-/// the GIL: other threads of Python go on, and Ctrl-C ends the wait at once. Work that was given up
-/// stops where it next reports its progress, in the background; what it uses lives until then. In a
-/// child of fork(), the parent's calls are neither waited for nor destroyed.
-class Call {
+/// Leaves the GIL to other threads while it lives.
+class WithoutGil {
  public:
-  using Work = std::function<void(Call&)>;
-
-  /// @param kept objects of Python whose memory the work reads
-  Call(Work work, std::vector<nb::object> kept);
-  /// Waits for the work.
-  ~Call();
-  Call(const Call&) = delete;
-  Call& operator=(const Call&) = delete;
-
-  // For the work, on its thread.
-
-  /// Throws Interrupted where the call was given up.
-  void check() const;
-  /// Takes note of the fraction done; throws as check() does.
-  std::function<void(double)> progress();
-
-  // For the thread that called, which holds the GIL.
-
-  /// Waits for the work, then throws what the work threw.
-  /// @param progress called on this thread with the fraction done, about 20 times a second
-  /// @throws nb::python_error on Ctrl-C, or what `progress` throws; the work is then given up
-  static void wait(const std::shared_ptr<Call>& call, const Progress& progress);
-  /// Has the end of the interpreter give up the work of all threads and wait for it, since work
-  /// uses libraries that the end of the process takes down. The threads stay where they are.
-  static void end_all_at_exit();
-
-  struct Interrupted {};
+  WithoutGil() : state_(PyEval_SaveThread()) {}
+  ~WithoutGil();
+  WithoutGil(const WithoutGil&) = delete;
+  WithoutGil& operator=(const WithoutGil&) = delete;
 
  private:
-  static void end_all();
-  bool is_done();
-  bool wait_for(std::chrono::milliseconds time);
-  void watch(const Progress& progress);
-
-  OwnProcess process_;
-  Work work_;
-  std::vector<nb::object> kept_;
-  std::atomic<double> fraction_{0.0};
-  std::atomic<bool> given_up_{false};
-  std::mutex mutex_;
-  std::condition_variable ended_;
-  bool done_ = false;
-  std::exception_ptr failure_;
-  std::thread thread_;
+  PyThreadState* state_;
 };
 
-/// Runs `work(call)` as a Call and returns its result. The work must own all that it uses, or
-/// `kept` must: it may outlive this function.
-template <typename F>
-auto run(std::vector<nb::object> kept, const Progress& progress, F work) {
-  using Result = std::invoke_result_t<F&, Call&>;
-  if constexpr (std::is_void_v<Result>) {
-    Call::wait(std::make_shared<Call>(std::move(work), std::move(kept)), progress);
-  } else {
-    const auto result = std::make_shared<std::optional<Result>>();
-    const auto shared = std::make_shared<F>(std::move(work));  // std::function copies
-    Call::wait(std::make_shared<Call>([result, shared](Call& call) { *result = (*shared)(call); },
-                                      std::move(kept)),
-               progress);
-    return std::move(**result);
-  }
-}
+/// For work without the GIL: has Python handle signals, about 20 times a second. Only the thread
+/// that Python called from does so, and of these the main thread alone has signals to handle.
+/// @throws nb::python_error where a handler raises, as that of Ctrl-C does
+void check_signals();
 
+/// What work tells the fraction done; throws as check_signals() does, and what `progress` raises.
+using Report = std::function<void(double)>;
+/// @param progress outlives the report
+Report reporter(const Progress& progress);
+/// Calls progress(1.0), with the GIL.
+void report_end(const Progress& progress);
+
+/// Runs `work()` without the GIL and returns its result.
 template <typename F>
 auto run(F work) {
-  return run({}, Progress(), std::move(work));
+  const WithoutGil released;
+  return work();
+}
+
+/// Runs `work(report)` without the GIL. `progress` is called on this thread, about 20 times a
+/// second and at the end.
+template <typename F>
+auto run(const Progress& progress, F work) {
+  const auto reported = [&] { return work(reporter(progress)); };
+  if constexpr (std::is_void_v<std::invoke_result_t<F&, Report>>) {
+    run(reported);
+    report_end(progress);
+  } else {
+    auto result = run(reported);
+    report_end(progress);
+    return result;
+  }
 }
 
 }  // namespace palpate::python

@@ -15,7 +15,7 @@
 #include "palpate/bounded_posterior.hpp"
 #include "palpate/particle_filter.hpp"
 #include "palpate/pose_histogram.hpp"
-#include "session.hpp"
+#include "shared.hpp"
 #include "touches.hpp"
 
 namespace palpate::python {
@@ -26,58 +26,56 @@ namespace {
 
 /// A filter over object and pose.
 template <typename Filter>
-struct Named : Owned<Filter> {
+struct Named : Shared<Filter> {
   std::string name;        ///< "A, E, I on 'llvmpipe'"
   double extent_mm = 0.0;  ///< farthest occupied place of any map from its object frame's origin
 };
 
-std::string name_of(const std::vector<Hypothesis>& hypotheses, const Session& session) {
+std::string name_of(const std::vector<Hypothesis>& hypotheses, const Device& device) {
   std::vector<std::string> labels;
   for (const Hypothesis& hypothesis : hypotheses) {
     labels.push_back(hypothesis.map.label);
   }
-  return fmt::format("{} on '{}'", fmt::join(labels, ", "), session.name());
+  return fmt::format("{} on '{}'", fmt::join(labels, ", "), device.name());
 }
 
 template <typename Filter, typename Options>
-Named<Filter> make_filter(const std::shared_ptr<Session>& session, nb::handle maps,
+Named<Filter> make_filter(const std::shared_ptr<Device>& device, nb::handle maps,
                           const Options& options) {
   const std::vector<Hypothesis> hypotheses = hypotheses_of(maps);
-  auto filter = make_owned<Filter>(session, [hypotheses, options](Device& device) {
+  auto filter = make_shared_on(device, [&](Device& on) {
     if constexpr (std::is_constructible_v<Filter, Device&, decltype(hypotheses), Options>) {
-      return Filter(device, hypotheses, options);
+      return Filter(on, hypotheses, options);
     } else {
       return Filter(hypotheses, options);
     }
   });
-  return {std::move(filter), name_of(hypotheses, *session), extent_mm(hypotheses)};
+  return {std::move(filter), name_of(hypotheses, *device), extent_mm(hypotheses)};
 }
 
 template <typename Filter>
 void update(const Named<Filter>& self, const TouchesLike& touches, const Progress& progress) {
-  TouchViews views = views_of(touches);
-  self.use(std::move(views.kept), progress,
-           [all = std::move(views.touches), extent = self.extent_mm](Filter& filter, Call& call) {
-             if constexpr (requires { filter.lattice(); }) {
-               require_reach(filter.lattice(), extent, all);
-             }
-             filter.update(all, call.progress());
-           });
+  const TouchViews views = views_of(touches);
+  self.use(progress, [&](Filter& filter, const Report& report) {
+    if constexpr (requires { filter.lattice(); }) {
+      require_reach(filter.lattice(), self.extent_mm, views.touches);
+    }
+    filter.update(views.touches, report);
+  });
 }
 
 /// The refined pose near a mode, by default that of estimate().
 template <typename Filter>
 RefinedPose refine(const Named<Filter>& self, const std::optional<Mode>& mode) {
-  return self.use([mode](Filter& belief, Call&) {
-    return belief.refine(mode ? *mode : belief.estimate().mode);
-  });
+  return self.use(
+      [&](Filter& belief) { return belief.refine(mode ? *mode : belief.estimate().mode); });
 }
 
 /// The bins of one object with their shares.
 template <typename Filter>
 std::tuple<Result<std::int64_t, 1>, Result<double, 1>> likely_bins(const Named<Filter>& self,
                                                                    int object, double least_share) {
-  const auto likely = self.use([object, least_share](Filter& belief, Call&) {
+  const auto likely = self.use([&](Filter& belief) {
     return belief.likely_bins(std::span(&object, 1), least_share).front();
   });
   std::vector<std::int64_t> bins;
@@ -92,9 +90,9 @@ std::tuple<Result<std::int64_t, 1>, Result<double, 1>> likely_bins(const Named<F
 template <typename Filter>
 TouchGains expected_gain(const Named<Filter>& self, const ArrayLike& T_robot_sensor,
                          const ArrayLike& elements_mm, std::size_t samples, std::uint64_t seed) {
-  return {self.use([poses = poses_of(T_robot_sensor, "T_robot_sensor"),
-                    elements = points_of(elements_mm, "elements_mm"), samples,
-                    seed](Filter& belief, Call&) {
+  const std::vector<Pose> poses = poses_of(T_robot_sensor, "T_robot_sensor");
+  const std::vector<glm::dvec2> elements = points_of(elements_mm, "elements_mm");
+  return {self.use([&](Filter& belief) {
     return belief.expected_gain(poses, elements, {.samples = samples, .seed = seed});
   })};
 }
@@ -108,8 +106,7 @@ DisplacementSd sd_of(const DisplacementSdLike& sd, const char* name) {
 
 /// The bins of one object, [ntheta, ny, nx].
 Result<double, 3> log_likelihood(const Histogram& self, int object) {
-  auto bins =
-      self.use([object](PoseHistogram& belief, Call&) { return belief.log_likelihood(object); });
+  auto bins = self.use([&](PoseHistogram& belief) { return belief.log_likelihood(object); });
   return owned(std::move(bins), self.constant().lattice());
 }
 
@@ -131,15 +128,15 @@ void bind_belief(nb::class_<Named<Belief>> belief, const char* class_name) {
       .def("likely_bins", &likely_bins<Belief>, "object"_a, "least_share"_a = 1e-6,
            "The bins that hold at least least_share of the object's belief: indices [n] into the\n"
            "lattice, theta, y, x, x fastest, and the shares [n].")
-      .def("sample", on_device<Own>(&Belief::sample), "count"_a, "seed"_a = 0,
+      .def("sample", shared_method<Own>(&Belief::sample), "count"_a, "seed"_a = 0,
            "Draws objects and poses from the belief.")
       .def("expected_gain", &expected_gain<Belief>, "T_robot_sensor"_a, "elements_mm"_a,
            nb::kw_only(), "samples"_a = PlanOptions{}.samples, "seed"_a = 0,
            "What one more touch at each candidate pose [n, 3] is expected to tell, in nats.\n"
            "elements_mm [e, 2]: living elements in the sensor frame.")
-      .def("reset", on_device<Own>(&Belief::reset),
+      .def("reset", shared_method<Own>(&Belief::reset),
            "Returns to the uniform belief, for the next unknown.")
-      .def_prop_ro("lattice", on_device<Own>(&Belief::lattice), "The bins.");
+      .def_prop_ro("lattice", shared_method<Own>(&Belief::lattice), "The bins.");
   bind_text(belief, class_name);
 }
 
@@ -151,7 +148,7 @@ void bind_histogram(nb::module_& module) {
           "device. The same input gives the same bits as in C++.")
           .def(
               "__init__",
-              [](Histogram* self, const std::shared_ptr<Session>& device, const MapsLike& maps,
+              [](Histogram* self, const std::shared_ptr<Device>& device, const MapsLike& maps,
                  const PoseLattice& lattice, const ContactModel& contact,
                  std::optional<double> none_weight, const DisplacementSdLike& touch_sd,
                  const DisplacementSdLike& slip_sd) {
@@ -173,7 +170,7 @@ void bind_histogram(nb::module_& module) {
               "range, and where the device has too little memory.")
           .def("update", &update<PoseHistogram>, "touches"_a, "progress"_a = nb::none(),
                "Multiplies the belief by the likelihood of these touches (Eq. 7, 13).\n\n"
-               "progress(fraction) is called up to 50 times a second. After Ctrl-C, or where "
+               "progress(fraction) is called up to 20 times a second. After Ctrl-C, or where "
                "progress\n"
                "raises, the belief is left half-way: call reset(). Raises Error on a touch that is "
                "not\n"
@@ -181,23 +178,22 @@ void bind_histogram(nb::module_& module) {
           .def(
               "move_pivot",
               [](const Histogram& self, const ArrayLike& pivot_mm) {
-                self.use([pivot = point_of(pivot_mm, "pivot_mm")](PoseHistogram& belief, Call&) {
-                  belief.move_pivot(pivot);
-                });
+                const glm::dvec2 pivot = point_of(pivot_mm, "pivot_mm");
+                self.use([&](PoseHistogram& belief) { belief.move_pivot(pivot); });
               },
               "pivot_mm"_a,
               "Turns theta about another pivot [2], in the robot frame, before any touch.")
-          .def("estimate", on_device<Histogram>(&PoseHistogram::estimate),
+          .def("estimate", shared_method<Histogram>(&PoseHistogram::estimate),
                "Identity probabilities (Eq. 14) and mode (Eq. 15-16).")
-          .def("marginals", on_device<Histogram>(&PoseHistogram::marginals), "object"_a,
+          .def("marginals", shared_method<Histogram>(&PoseHistogram::marginals), "object"_a,
                "Marginal probabilities of one object's poses, over the lattice.")
           .def(
               "log_likelihood", &log_likelihood, "object"_a,
               "Log-likelihood of every bin of one object in nats, [ntheta, ny, nx], without prior\n"
               "weights.")
-          .def("entropy", on_device<Histogram>(&PoseHistogram::entropy),
+          .def("entropy", shared_method<Histogram>(&PoseHistogram::entropy),
                "Entropy of the belief over objects and bins, in nats.")
-          .def_prop_ro("device_bytes", on_device<Histogram>(&PoseHistogram::device_bytes),
+          .def_prop_ro("device_bytes", shared_method<Histogram>(&PoseHistogram::device_bytes),
                        "Device memory held.");
   bind_belief(belief, "PoseHistogram");
 }
@@ -206,7 +202,7 @@ using Particles = Named<ParticleFilter>;
 
 std::tuple<Result<std::int32_t, 1>, Result<double, 2>, Result<double, 1>> particles(
     const Particles& self) {
-  const auto all = self.use([](ParticleFilter& filter, Call&) { return filter.particles(); });
+  const auto all = self.use([](ParticleFilter& filter) { return filter.particles(); });
   std::vector<std::int32_t> objects;
   std::vector<Pose> poses;
   std::vector<double> weights;
@@ -229,7 +225,7 @@ void bind_particles(nb::module_& module) {
           "Monte Carlo localization over object identity and planar pose (Sec. III-B, Eq. 8-12).")
           .def(
               "__init__",
-              [](Particles* self, const std::shared_ptr<Session>& device, const MapsLike& maps,
+              [](Particles* self, const std::shared_ptr<Device>& device, const MapsLike& maps,
                  const PoseLattice& region, int count, const ContactModel& contact,
                  double motion_mm, double motion_rad, Resampling resampling, bool augmented,
                  double alpha_slow, double alpha_fast, std::uint64_t seed) {
@@ -261,18 +257,18 @@ void bind_particles(nb::module_& module) {
                "Resamples, moves and weighs the particles by each touch in turn (Eq. 7-8).\n\n"
                "After Ctrl-C, or where progress(fraction) raises, call reset(). Raises Error on a\n"
                "touch that is not sound, of which none is taken in.")
-          .def("estimate", on_device<Particles>(&ParticleFilter::estimate),
+          .def("estimate", shared_method<Particles>(&ParticleFilter::estimate),
                "Identity by Eq. 9; the pose is the maximum of the Parzen estimate (Eq. 10-12).")
-          .def("reset", on_device<Particles>(&ParticleFilter::reset),
+          .def("reset", shared_method<Particles>(&ParticleFilter::reset),
                "Restores the initial particles for the next unknown.")
           .def("effective_sample_size",
-               on_device<Particles>(&ParticleFilter::effective_sample_size),
+               shared_method<Particles>(&ParticleFilter::effective_sample_size),
                "1 / sum of squared weights, in [1, n].")
           .def("particles", &particles,
                "All particles: objects [n], T_object_robot [n, 3] (x_mm, y_mm, theta_rad) and "
                "weights\n"
                "[n], which sum to 1.")
-          .def_prop_ro("device_bytes", on_device<Particles>(&ParticleFilter::device_bytes),
+          .def_prop_ro("device_bytes", shared_method<Particles>(&ParticleFilter::device_bytes),
                        "Device memory held.");
   bind_text(filter, "ParticleFilter");
 }
@@ -280,8 +276,7 @@ void bind_particles(nb::module_& module) {
 using Bounded = Named<BoundedPosterior>;
 
 std::tuple<Result<std::int64_t, 1>, Result<double, 1>, double> evaluated_bins(const Bounded& self) {
-  EvaluatedBelief bins =
-      self.use([](BoundedPosterior& belief, Call&) { return belief.evaluated_bins(); });
+  EvaluatedBelief bins = self.use([](BoundedPosterior& belief) { return belief.evaluated_bins(); });
   return {owned(std::move(bins.index)), owned(std::move(bins.log_likelihood)),
           bins.rest_mass_bound};
 }
@@ -294,7 +289,7 @@ void bind_bounded(nb::module_& module) {
           "matter, and proves how little the others can. Memory follows the maps.")
           .def(
               "__init__",
-              [](Bounded* self, const std::shared_ptr<Session>& device, const MapsLike& maps,
+              [](Bounded* self, const std::shared_ptr<Device>& device, const MapsLike& maps,
                  const PoseLattice& lattice, const ContactModel& contact, double tolerance,
                  std::optional<double> budget_s, std::optional<double> evidence_nats,
                  std::optional<double> none_weight, const DisplacementSdLike& touch_sd,
@@ -307,8 +302,7 @@ void bind_bounded(nb::module_& module) {
                                              .evidence_nats = evidence_nats,
                                              .none_weight = none_weight,
                                              .threads = threads,
-                                             // The belief keeps the session.
-                                             .cancel_point = [on = device.get()] { on->check(); }};
+                                             .cancel_point = check_signals};
                 new (self) Bounded(make_filter<BoundedPosterior>(device, maps, options));
               },
               "device"_a, "maps"_a, "lattice"_a = PoseLattice{}, nb::kw_only(),
@@ -327,7 +321,7 @@ void bind_bounded(nb::module_& module) {
                "is\n"
                "not sound.")
           .def(
-              "estimate", on_device<Bounded>(&BoundedPosterior::estimate),
+              "estimate", shared_method<Bounded>(&BoundedPosterior::estimate),
               "tolerance"_a = nb::none(),
               "Identity with its bounds, mode and certificate. Searches once after each update(),\n"
               "and again where a call has a smaller tolerance than those before it.\n"
@@ -338,7 +332,7 @@ void bind_bounded(nb::module_& module) {
           .def(
               "marginals",
               [](const Bounded& self, int object, const std::optional<PoseLattice>& grid) {
-                return self.use([object, grid](BoundedPosterior& belief, Call&) {
+                return self.use([&](BoundedPosterior& belief) {
                   return grid ? belief.marginals(object, *grid) : belief.marginals(object);
                 });
               },
@@ -348,9 +342,8 @@ void bind_bounded(nb::module_& module) {
               "log_likelihood",
               [](const Bounded& self, int object, const ArrayLike& T_object_robot) {
                 const Pose pose = pose_of(T_object_robot, "T_object_robot");
-                return self.use([object, pose](BoundedPosterior& belief, Call&) {
-                  return belief.log_likelihood(object, pose);
-                });
+                return self.use(
+                    [&](BoundedPosterior& belief) { return belief.log_likelihood(object, pose); });
               },
               "object"_a, "T_object_robot"_a,
               "Log-likelihood of any pose [3] of an object in nats, in float64.")
@@ -358,9 +351,9 @@ void bind_bounded(nb::module_& module) {
                "The bins that the search evaluated: indices [n] into [object, theta, y, x], x\n"
                "fastest, log-likelihoods [n] in nats, without prior weights, and a bound of the\n"
                "share of the belief that all other bins hold together.")
-          .def("entropy", on_device<Bounded>(&BoundedPosterior::entropy),
+          .def("entropy", shared_method<Bounded>(&BoundedPosterior::entropy),
                "Entropy of the belief over objects and evaluated bins, in nats.")
-          .def_prop_ro("host_bytes", on_device<Bounded>(&BoundedPosterior::host_bytes),
+          .def_prop_ro("host_bytes", shared_method<Bounded>(&BoundedPosterior::host_bytes),
                        "Memory held.");
   bind_belief(belief, "BoundedPosterior");
 }

@@ -42,8 +42,8 @@ std::vector<std::string> remarks_on(const ImportedRecording& imported,
     remarks.push_back(
         fmt::format("{}: poses taken to be in mm and rad; give pose_unit", options.poses));
   }
-  for (const std::string& words : imported.of_poses) {
-    remarks.push_back(fmt::format("{}: {}", options.poses, in_keywords(words)));
+  for (const std::string& words : imported.understood) {
+    remarks.push_back(in_keywords(words));
   }
   for (const SetupFinding& finding : imported.recording.findings) {
     remarks.push_back(fmt::format("{}: {}", options.poses, in_keywords(finding.words)));
@@ -75,7 +75,7 @@ Imported returned(ImportedRecording imported, const ImportOptions& options) {
 Imported import_tables_python(const ImportOptions& given,
                               const std::optional<ArrayLike>& elements_mm) {
   const ImportOptions options = with_elements(given, elements_mm);
-  return returned(run([options](Call&) { return import_tables(options); }), options);
+  return returned(run([&] { return import_tables(options); }), options);
 }
 
 std::optional<SpatialPose> spatial_pose(std::span<const double> row) {
@@ -87,7 +87,7 @@ std::optional<SpatialPose> spatial_pose(std::span<const double> row) {
 }
 
 Imported import_frames(const ImportOptions& given, const ArrayLike& pressures,
-                       const ArrayLike& time_s, const ArrayLike& pose_time_s,
+                       const std::optional<ArrayLike>& time_s, const ArrayLike& pose_time_s,
                        const std::optional<ArrayLike>& elements_mm,
                        const std::optional<ArrayLike>& poses,
                        const std::optional<ArrayLike>& object_pose) {
@@ -97,7 +97,9 @@ Imported import_frames(const ImportOptions& given, const ArrayLike& pressures,
   const Floats readings = reader.floats(pressures, "pressures", {"n", "e"});
   rows.elements = readings.shape[1];
   rows.pressures.pressure = readings.copied();
-  rows.pressures.time_s = reader.floats(time_s, "time_s", {"n"}).copied();
+  if (time_s) {
+    rows.pressures.time_s = reader.floats(*time_s, "time_s", {"n"}).copied();
+  }
   if (poses) {
     rows.poses.emplace();
     rows.poses->time_s = reader.floats(pose_time_s, "pose_time_s", {"t"}).copied();
@@ -111,10 +113,7 @@ Imported import_frames(const ImportOptions& given, const ArrayLike& pressures,
     const Floats row = reader.floats(*object_pose, "object_pose", {"7"});
     rows.T_robot_object = spatial_pose(row.values());
   }
-  return returned(run([options, rows = std::move(rows)](Call&) mutable {
-                    return import_rows(options, std::move(rows));
-                  }),
-                  options);
+  return returned(run([&] { return import_rows(options, std::move(rows)); }), options);
 }
 
 }  // namespace
@@ -134,8 +133,14 @@ void bind_import(nb::module_& module) {
       .def_rw("pose_unit", &ImportOptions::pose_unit)
       .def_rw("time_unit", &ImportOptions::time_unit)
       .def_rw("time_column", &ImportOptions::time_column)
+      .def_rw("header_line", &ImportOptions::header_line)
+      .def_rw("where", &ImportOptions::where)
       .def_rw("pressure_columns", &ImportOptions::pressure_columns)
+      .def_rw("pressure_component", &ImportOptions::pressure_component)
       .def_rw("pose_columns", &ImportOptions::pose_columns)
+      .def_rw("euler", &ImportOptions::euler)
+      .def_rw("matrix", &ImportOptions::matrix)
+      .def_rw("mount", &ImportOptions::mount)
       .def_rw("plane", &ImportOptions::plane)
       .def_rw("largest_gap_s", &ImportOptions::largest_gap_s)
       .def_rw("pose_delay", &ImportOptions::pose_delay_s)
@@ -154,9 +159,10 @@ void bind_import(nb::module_& module) {
       "options"_a, "elements_mm"_a = nb::none(),
       "Raises Error where import_frames() would refuse the options or the array.");
   module.def(
-      "import_frames", &import_frames, "options"_a, "pressures"_a, "time_s"_a, "pose_time_s"_a,
-      "elements_mm"_a = nb::none(), "poses"_a = nb::none(), "object_pose"_a = nb::none(),
-      "As import_tables() of frames [n, e] at times [n], and of poses of the\n"
+      "import_frames", &import_frames, "options"_a, "pressures"_a, "time_s"_a.none(),
+      "pose_time_s"_a, "elements_mm"_a = nb::none(), "poses"_a = nb::none(),
+      "object_pose"_a = nb::none(),
+      "As import_tables() of frames [n, e] at times [n], or of touches, and of poses of the\n"
       "sensor [m, 7] in the robot frame, mm and a quaternion x, y, z, w, at times [m], or one for\n"
       "each frame where there are no times; and of an object's pose [7].");
 }

@@ -20,18 +20,17 @@ using namespace nb::literals;
 namespace {
 
 LearnedMaps learn(const GivenRecordings& given, const MapRequest& request,
-                  const std::shared_ptr<Session>& session, Call& call) {
+                  const std::shared_ptr<Device>& open_device, const Report& report) {
   const std::vector<Recording> recordings = read_recordings(given);
   const MapTask task = map_task(request, recordings);
-  std::shared_ptr<Session> used;
-  std::optional<Session::Lock> lock;
+  std::shared_ptr<Device> device;
   LearnedMaps learned = learn_maps(
       task,
       [&]() -> Device& {
-        used = session_on(session, request.shared.device);
-        return lock.emplace(*used, call).device();
+        device = device_of(open_device, request.shared.device);
+        return *device;
       },
-      call.progress());
+      report);
   learned.remarks.insert(learned.remarks.begin(), task.remarks.begin(), task.remarks.end());
   if (!request.output.empty()) {
     save(request, learned);
@@ -63,11 +62,10 @@ void bind_map_learning(nb::module_& module) {
       [](nb::handle recordings, const PythonRequest& shared, MapRequest request,
          const Progress& progress) {
         request.shared = shared;
-        LearnedMaps learned =
-            run({}, progress,
-                [=, given = given_recordings(recordings), session = shared.session](Call& call) {
-                  return learn(given, request, session, call);
-                });
+        const GivenRecordings given = given_recordings(recordings);
+        LearnedMaps learned = run(progress, [&](const Report& report) {
+          return learn(given, request, shared.open_device, report);
+        });
         Learned result{{}, std::move(learned.sensor), in_python(std::move(learned.words))};
         for (auto& [name, map] : learned.maps) {
           std::get<0>(result).push_back(std::move(map));

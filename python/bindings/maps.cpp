@@ -16,7 +16,7 @@
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/pose_error.hpp"
 #include "palpate/rotational_symmetry.hpp"
-#include "session.hpp"
+#include "shared.hpp"
 #include "touches.hpp"
 
 namespace palpate::python {
@@ -82,8 +82,7 @@ void bind_drawn_maps(nb::class_<OccupancyGrid>& grid) {
         drawn.rows = reader.extent("rows");
         drawn.columns = reader.extent("columns");
         const DrawnMapOptions options{cell_mm, spread_mm, peak, prior, felt_share, reach_mm};
-        return run(
-            [=, drawn = std::move(drawn)](Call&) { return drawn_map(label, drawn, options); });
+        return run([&] { return drawn_map(label, drawn, options); });
       },
       "label"_a, "mask"_a, nb::kw_only(), "pixel_mm"_a, "origin_mm"_a, "cell_mm"_a = usual.cell_mm,
       "spread_mm"_a = usual.spread_mm, "peak"_a = usual.peak, "prior"_a = usual.prior,
@@ -108,8 +107,8 @@ void bind_drawn_maps(nb::class_<OccupancyGrid>& grid) {
       [](const std::string& label, const ArrayLike& polygon, double cell_mm, double spread_mm,
          double peak, double prior, double felt_share, double reach_mm) {
         const DrawnMapOptions options{cell_mm, spread_mm, peak, prior, felt_share, reach_mm};
-        Shape shape{.label = label, .strokes = {}, .polygons = polygons_of(polygon)};
-        return run([=, shape = std::move(shape)](Call&) {
+        const Shape shape{.label = label, .strokes = {}, .polygons = polygons_of(polygon)};
+        return run([&] {
           options.validate();
           return drawn_map(label, mask_of(shape, options.cell_mm / pixels_of_cell), options);
         });
@@ -206,7 +205,9 @@ void bind_map(nb::module_& module) {
       .def(
           "save",
           [](const OccupancyGrid& self, const PathLike& file) {
-            run([self, path = file.path()](Call&) { write_map(path, self); });
+            const OccupancyGrid copy = self;  // which another thread may change meanwhile
+            const std::filesystem::path path = file.path();
+            run([&] { write_map(path, copy); });
           },
           "path"_a, "Writes a map file (HDF5). Raises Error where it cannot be written.")
       .def("plot", plot_method, "ax"_a = nb::none(), plot_signature,
@@ -220,7 +221,8 @@ void bind_map(nb::module_& module) {
   module.def(
       "read_map",
       [](const PathLike& file) {
-        return run([path = file.path()](Call&) { return read_map(path); });
+        const std::filesystem::path path = file.path();
+        return run([&] { return read_map(path); });
       },
       "path"_a,
       "Reads a map file (HDF5). Raises Error naming file, field and remedy; see read_recording()\n"
@@ -292,22 +294,20 @@ void bind_lattices(nb::module_& module) {
       "reach_mm: largest distance of an element from the array's centre.");
 }
 
-using Builder = Owned<MapBuilder>;
+using Builder = Shared<MapBuilder>;
 
 /// Touches that are added at once: some milliseconds of work, after which a call can stop.
 constexpr std::size_t batch = 200;
 
 void add_touches(const Builder& builder, const TouchesLike& touches, const Progress& progress) {
-  TouchViews views = views_of(touches);
-  builder.use(std::move(views.kept), progress,
-              [all = std::move(views.touches)](MapBuilder& target, Call& call) {
-                const std::span<const Touch> span = all;
-                const auto report = call.progress();
-                for (std::size_t begin = 0; begin < span.size(); begin += batch) {
-                  report(static_cast<double>(begin) / static_cast<double>(span.size()));
-                  target.add(span.subspan(begin, std::min(batch, span.size() - begin)));
-                }
-              });
+  const TouchViews views = views_of(touches);
+  builder.use(progress, [&](MapBuilder& target, const Report& report) {
+    const std::span<const Touch> all = views.touches;
+    for (std::size_t begin = 0; begin < all.size(); begin += batch) {
+      report(static_cast<double>(begin) / static_cast<double>(all.size()));
+      target.add(all.subspan(begin, std::min(batch, all.size() - begin)));
+    }
+  });
 }
 
 MapOptions options_of(double cell_mm, const InverseSensorModel& sensor,
@@ -331,31 +331,31 @@ void bind_map_builder(nb::module_& module) {
       "object frame is the robot frame of the touches.")
       .def(
           "__init__",
-          [](Builder* self, const std::shared_ptr<Session>& device, double cell_mm,
+          [](Builder* self, const std::shared_ptr<Device>& device, double cell_mm,
              const InverseSensorModel& sensor, const ContactClassifier& classifier) {
             const MapOptions options = options_of(cell_mm, sensor, classifier);
-            new (self) Builder(make_owned<MapBuilder>(
-                device, [options](Device& on) { return MapBuilder(on, options); }));
+            new (self) Builder(
+                make_shared_on(device, [&](Device& on) { return MapBuilder(on, options); }));
           },
           "device"_a, nb::kw_only(), "cell_mm"_a = MapOptions{}.cell_mm,
           "sensor"_a = InverseSensorModel{}, "classifier"_a = ContactClassifier{},
           "cell_mm: edge of a cell. Raises Error on options out of range.")
       .def("add", &add_touches, "touches"_a, "progress"_a = nb::none(),
            "Adds the evidence of these touches.\n\n"
-           "progress(fraction) is called up to 50 times a second. Ctrl-C stops the call after a\n"
+           "progress(fraction) is called up to 20 times a second. Ctrl-C stops the call after a\n"
            "part of the touches. Raises Error on a touch that is not sound.")
-      .def("build", on_device<Builder>(&MapBuilder::build), "label"_a,
+      .def("build", shared_method<Builder>(&MapBuilder::build), "label"_a,
            "The map of all touches so far. Raises Error if no element of any touch was In Contact\n"
            "or No Contact.")
-      .def("clear", on_device<Builder>(&MapBuilder::clear),
+      .def("clear", shared_method<Builder>(&MapBuilder::clear),
            "Forgets all touches, for the next object.")
       .def("__repr__", [](const Builder& self) {
-        return fmt::format("MapBuilder(on '{}')", self.session().name());
+        return fmt::format("MapBuilder(on '{}')", self.device().name());
       });
   module.def(
       "estimate_prior",
-      [](const std::shared_ptr<Session>& session, const std::map<std::string, TouchesLike>& objects,
-         double cell_mm, const InverseSensorModel& sensor, const ContactClassifier& classifier) {
+      [](Device& device, const std::map<std::string, TouchesLike>& objects, double cell_mm,
+         const InverseSensorModel& sensor, const ContactClassifier& classifier) {
         std::vector<nb::object> kept;
         std::vector<ObjectTouches> all;
         for (const auto& [label, touches] : objects) {
@@ -364,11 +364,7 @@ void bind_map_builder(nb::module_& module) {
           kept.insert(kept.end(), views.kept.begin(), views.kept.end());
         }
         const MapOptions options = options_of(cell_mm, sensor, classifier);
-        return run(std::move(kept), Progress(),
-                   [session, all = std::move(all), options](Call& call) {
-                     auto lock = session->lock(call);
-                     return estimate_prior(lock.device(), all, options);
-                   });
+        return run([&] { return estimate_prior(device, all, options); });
       },
       "device"_a, "objects"_a, nb::kw_only(), "cell_mm"_a = MapOptions{}.cell_mm,
       "sensor"_a = InverseSensorModel{}, "classifier"_a = ContactClassifier{},
@@ -376,15 +372,11 @@ void bind_map_builder(nb::module_& module) {
       "touches by label.");
   module.def(
       "keep_touches",
-      [](const std::shared_ptr<Session>& session, OccupancyGrid& map,
-         const ArrayRecording& recording, const InverseSensorModel& sensor,
-         const ContactClassifier& classifier) {
+      [](Device& device, OccupancyGrid& map, const ArrayRecording& recording,
+         const InverseSensorModel& sensor, const ContactClassifier& classifier) {
         MapSource source{recording.copied(), options_of(map.cell_mm, sensor, classifier)};
-        map.source = run({}, Progress(), [session, source = std::move(source)](Call& call) mutable {
-          auto lock = session->lock(call);
-          judge_left_out(lock.device(), source);
-          return std::make_shared<const MapSource>(std::move(source));
-        });
+        run([&] { judge_left_out(device, source); });
+        map.source = std::make_shared<const MapSource>(std::move(source));
       },
       "device"_a, "map"_a, "recording"_a, nb::kw_only(), "sensor"_a = InverseSensorModel{},
       "classifier"_a = ContactClassifier{},

@@ -1,7 +1,6 @@
 #include <nanobind/nanobind.h>
 
 #include "bindings.hpp"
-#include "call.hpp"
 #include "model/option_words.hpp"
 #include "palpate/error.hpp"
 
@@ -16,9 +15,6 @@ void add_error() {
   error_class = nb::object(nb::module_::import_("palpate._error").attr("Error")).release().ptr();
   nb::register_exception_translator(
       [](const std::exception_ptr& thrown, void*) {
-        if (!thrown) {
-          stay();  // CPython ends the thread, from where with_python() does not see it
-        }
         try {
           std::rethrow_exception(thrown);
         } catch (const Error& error) {
@@ -36,6 +32,7 @@ void add_error() {
 
 NB_MODULE(_palpate, module) {
   using namespace palpate::python;
+  nb::set_leak_warnings(false);  // of what daemon threads hold at the end, or children of fork()
   module.doc() = "Bindings of libpalpate; import palpate instead.";
   add_error();
   bind_model(module);
@@ -54,5 +51,4 @@ NB_MODULE(_palpate, module) {
   bind_calibration(module);
   bind_map_learning(module);
   bind_import(module);
-  Call::end_all_at_exit();
 }

@@ -8,14 +8,15 @@
 #include <nanobind/stl/string_view.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
-#include <nlohmann/json.hpp>
 
 #include "bindings.hpp"
 #include "estimate.hpp"
+#include "json.hpp"
 #include "model/option_words.hpp"
 #include "recognition/record_json.hpp"
 #include "recognition/recordings.hpp"
 #include "recognition/resolve.hpp"
+#include "recognition/result_json.hpp"
 #include "recognition/touch_plan.hpp"
 #include "request.hpp"
 
@@ -25,44 +26,8 @@ using namespace nb::literals;
 
 namespace {
 
-using Json = nlohmann::ordered_json;
-
-nb::object to_python(const Json& json) {
-  switch (json.type()) {
-    case Json::value_t::object: {
-      nb::dict result;
-      for (const auto& [key, value] : json.items()) {
-        result[key.c_str()] = to_python(value);
-      }
-      return result;
-    }
-    case Json::value_t::array: {
-      nb::list result;
-      for (const Json& value : json) {
-        result.append(to_python(value));
-      }
-      return result;
-    }
-    case Json::value_t::string: {
-      const auto& text = json.get_ref<const std::string&>();
-      // The path of a recording need not be UTF-8.
-      return nb::steal(
-          PyUnicode_DecodeFSDefaultAndSize(text.data(), static_cast<Py_ssize_t>(text.size())));
-    }
-    case Json::value_t::boolean:
-      return nb::bool_(json.get<bool>());
-    case Json::value_t::number_integer:
-    case Json::value_t::number_unsigned:
-      return nb::int_(json.get<std::int64_t>());
-    case Json::value_t::number_float:
-      return nb::float_(json.get<double>());
-    default:
-      return nb::none();
-  }
-}
-
 struct Answer {
-  Json records = Json::array();
+  nlohmann::ordered_json records = nlohmann::ordered_json::array();
   Sentences sentences;
 };
 
@@ -71,19 +36,17 @@ std::string name_of_used(const Device& device, const RecognitionTask& task) {
   return uses_device(task) ? device.name() : "none";
 }
 
-Answer recognize(const Subject& subject, Device& device, Call& call) {
-  const std::function<void(double)> progress = call.progress();
+Answer recognize(const Subject& subject, Device& device, const Report& report) {
   Answer answer;
   const std::vector<Unknown>& unknowns = subject.unknowns;
   const bool with_trace = subject.request.trace;
   const RecognitionTask task = task_of(subject, device);
-  Recogniser recogniser =
-      open_recogniser(&device, task, {.cancel_point = [&call] { call.check(); }});
+  Recogniser recogniser = open_recogniser(&device, task, {.cancel_point = check_signals});
   answer.sentences = task.remarks;
   std::string unresolved;
   for (std::size_t i = 0; i < unknowns.size(); ++i) {
     const auto show = [&](double fraction) {
-      progress((static_cast<double>(i) + fraction) / static_cast<double>(unknowns.size()));
+      report((static_cast<double>(i) + fraction) / static_cast<double>(unknowns.size()));
     };
     const RecognitionRecord record = recognise(recogniser, task, unknowns[i], with_trace, show);
     record.require_steps();
@@ -99,7 +62,6 @@ Answer recognize(const Subject& subject, Device& device, Call& call) {
   return answer;
 }
 
-using Fields = nb::typed<nb::dict, nb::str, nb::any>;
 using Records = nb::typed<nb::list, Fields>;
 
 std::tuple<Records, Sentences> recognize_python(nb::handle recordings, const PythonRequest& request,
@@ -108,15 +70,13 @@ std::tuple<Records, Sentences> recognize_python(nb::handle recordings, const Pyt
   return {nb::borrow<Records>(to_python(answer.records)), in_python(answer.sentences)};
 }
 
-/// A plan, with what is believed as JSON.
 struct Planned {
-  Plan plan;
-  std::string believed;
-  std::string device;
+  nlohmann::ordered_json plan;
   Sentences told;
 };
 
-Planned plan_next(const Subject& subject, const PlanRequest& wanted, Device& device, Call& call) {
+Planned plan_next(const Subject& subject, const PlanRequest& wanted, Device& device,
+                  const Report& report) {
   Planned planned;
   const Unknown& unknown = subject.unknowns.front();
   const RecognitionTask task =
@@ -125,16 +85,14 @@ Planned plan_next(const Subject& subject, const PlanRequest& wanted, Device& dev
                                 .reach_mm = largest_reach_mm(unknown.touches),
                                 .device = [&]() -> Device& { return device; }});
   require_plannable(task);
-  planned.device = name_of_used(device, task);
-  Recogniser recogniser =
-      open_recogniser(&device, task, {.cancel_point = [&call] { call.check(); }});
+  Recogniser recogniser = open_recogniser(&device, task, {.cancel_point = check_signals});
   planned.told = task.remarks;
-  planned.plan = plan_touch(recogniser, task, unknown, wanted, call.progress());
+  const Plan plan = plan_touch(recogniser, task, unknown, wanted, report);
   if (const std::string words = unresolved_words(task, recogniser.lattice(), unknown.touches);
       !words.empty()) {
     planned.told.push_back(words);
   }
-  planned.believed = palpate::text_of(to_json(planned.plan.record.last(), task, in_keywords));
+  planned.plan = to_json(plan, task, name_of_used(device, task), in_keywords);
   return planned;
 }
 
@@ -150,46 +108,21 @@ std::tuple<Fields, Sentences> plan_python(nb::handle recordings, const PythonReq
     poses = poses_of(candidates, "candidates");
     require_reachable("candidates", poses);
   }
-  auto [wanted, sentences] = run([=](Call&) {
-    Sentences told;
-    PlanRequest read = plan_request(goal, source, samples, seed,
-                                    [&](const std::string& sentence) { told.push_back(sentence); });
-    return std::pair(std::move(read), std::move(told));
+  Sentences sentences;
+  PlanRequest wanted = run([&] {
+    return plan_request(goal, source, samples, seed,
+                        [&](const std::string& sentence) { sentences.push_back(sentence); });
   });
   if (!poses.empty()) {
-    wanted.candidates = poses;
+    wanted.candidates = std::move(poses);
   }
-  const Planned planned = run_on_subject(
-      recordings, request, progress,
-      [wanted = std::move(wanted)](const Subject& subject, Device& device, Call& call) {
-        return plan_next(subject, wanted, device, call);
-      });
+  const Planned planned =
+      run_on_subject(recordings, request, progress,
+                     [&](const Subject& subject, Device& device, const Report& report) {
+                       return plan_next(subject, wanted, device, report);
+                     });
   sentences.insert(sentences.end(), planned.told.begin(), planned.told.end());
-  const Plan& plan = planned.plan;
-  TouchGains gains;
-  std::vector<std::uint64_t> index;
-  poses.clear();
-  for (const PlannedTouch& touch : plan.ranked) {
-    gains.each.push_back(touch.gain);
-    index.push_back(touch.index);
-    poses.push_back(touch.T_robot_sensor);
-  }
-  Fields result;
-  result["recording"] = plan.record.recording;
-  result["touches"] = plan.record.touches;
-  result["goal"] = goal_word(plan.goal);
-  result["believed"] = nb::bytes(planned.believed.data(), planned.believed.size());
-  result["identity_nats"] = plan.identity_nats;
-  result["pose_nats"] = plan.both_nats - plan.identity_nats;
-  result["index"] = owned(std::move(index));
-  result["T_robot_sensor"] = to_array(poses);
-  result["gains"] = nb::cast(std::move(gains));
-  result["warnings"] = in_python(warnings_of(plan));
-  result["samples"] = plan.samples.size();
-  result["seed"] = plan.seed;
-  result["seconds"] = plan.seconds;
-  result["device"] = planned.device;
-  return {result, in_python(std::move(sentences))};
+  return {fields_of(planned.plan), in_python(std::move(sentences))};
 }
 
 }  // namespace
@@ -199,7 +132,7 @@ void bind_recognition(nb::module_& module) {
              "Records as in the JSON of `palpate recognize`, and what is worth a warning.");
   module.def("plan", &plan_python, "recordings"_a, "request"_a, "goal"_a, "candidates"_a,
              "samples"_a, "seed"_a, "progress"_a = nb::none(),
-             "The fields of a plan, and what is worth a warning.");
+             "A plan as in the JSON of `palpate plan`, and what is worth a warning.");
 }
 
 }  // namespace palpate::python

@@ -91,7 +91,7 @@ nb::object item(const ArrayRecording& recording, nb::handle index) {
     Py_ssize_t start = 0;
     Py_ssize_t stop = 0;
     Py_ssize_t step = 0;
-    if (with_python([&] { return PySlice_Unpack(index.ptr(), &start, &stop, &step); }) != 0) {
+    if (PySlice_Unpack(index.ptr(), &start, &stop, &step) != 0) {
       throw nb::python_error();
     }
     return nb::cast(sliced(recording, nb::slice(start, stop, step)));
@@ -102,8 +102,7 @@ nb::object item(const ArrayRecording& recording, nb::handle index) {
             .c_str());
   }
   const auto n = static_cast<Py_ssize_t>(recording.size());
-  const Py_ssize_t given =
-      with_python([&] { return PyNumber_AsSsize_t(index.ptr(), PyExc_IndexError); });
+  const Py_ssize_t given = PyNumber_AsSsize_t(index.ptr(), PyExc_IndexError);
   if (given == -1 && PyErr_Occurred() != nullptr) {
     throw nb::python_error();
   }
@@ -215,7 +214,9 @@ void bind_recording(nb::module_& module) {
       .def(
           "save",
           [](const ArrayRecording& self, const PathLike& file) {
-            run([copy = self.copied(), path = file.path()](Call&) { write_recording(path, copy); });
+            const Recording copy = self.copied();
+            const std::filesystem::path path = file.path();
+            run([&] { write_recording(path, copy); });
           },
           "path"_a,
           "Writes a recording file (HDF5), whole or not at all. Raises Error where the content is "
@@ -232,7 +233,8 @@ void bind_recording(nb::module_& module) {
   module.def(
       "read_recording",
       [](const PathLike& file) {
-        return array_recording(run([path = file.path()](Call&) { return read_recording(path); }));
+        const std::filesystem::path path = file.path();
+        return array_recording(run([&] { return read_recording(path); }));
       },
       "path"_a,
       "Reads a recording file (HDF5); of an unclosed file, the whole rows. Raises Error naming\n"

@@ -24,12 +24,9 @@ Result<std::uint8_t, 1> classify(const ArrayTouch& touch, const ContactClassifie
 Result<double, 2> log_odds_map(const TouchesLike& touches, const OccupancyGrid& grid,
                                const ContactClassifier& classifier,
                                const InverseSensorModel& sensor) {
-  TouchViews views = views_of(touches);
-  OccupancyGrid geometry = grid;
-  auto cells = run(std::move(views.kept), Progress(),
-                   [all = std::move(views.touches), geometry, classifier, sensor](Call&) {
-                     return reference::log_odds_map(all, geometry, classifier, sensor);
-                   });
+  const TouchViews views = views_of(touches);
+  auto cells =
+      run([&] { return reference::log_odds_map(views.touches, grid, classifier, sensor); });
   return owned(std::move(cells),
                {static_cast<std::size_t>(grid.ny), static_cast<std::size_t>(grid.nx)});
 }
@@ -43,11 +40,8 @@ double log_likelihood(const ArrayTouch& touch, const ArrayLike& T_object_robot,
 Result<double, 3> log_likelihoods(const TouchesLike& touches, const PoseLattice& lattice,
                                   const OccupancyGrid& map, const ContactModel& contact) {
   lattice.validate();
-  TouchViews views = views_of(touches);
-  auto bins = run(std::move(views.kept), Progress(),
-                  [all = std::move(views.touches), lattice, map, contact](Call&) {
-                    return reference::log_likelihoods(all, lattice, map, contact);
-                  });
+  const TouchViews views = views_of(touches);
+  auto bins = run([&] { return reference::log_likelihoods(views.touches, lattice, map, contact); });
   return owned(std::move(bins), lattice);
 }
 
@@ -98,5 +92,4 @@ NB_MODULE(reference, module) {
                                         pose_of(truth, "truth"));
       },
       "map"_a, "estimate"_a, "truth"_a, "Eq. 17-20, in mm; poses T_object_robot [3].");
-  Call::end_all_at_exit();
 }

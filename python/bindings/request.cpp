@@ -86,9 +86,9 @@ struct OptionText {
 void set_option(PythonRequest& request, std::string option, nb::handle given) {
   if (option == "device") {
     const auto device =
-        typed<std::variant<std::shared_ptr<Session>, std::int64_t, std::string>>(given);
-    if (const auto* session = std::get_if<std::shared_ptr<Session>>(&device)) {
-      request.session = *session;
+        typed<std::variant<std::shared_ptr<Device>, std::int64_t, std::string>>(given);
+    if (const auto* open = std::get_if<std::shared_ptr<Device>>(&device)) {
+      request.open_device = *open;
     } else {
       const auto* index = std::get_if<std::int64_t>(&device);
       request.device = index != nullptr ? std::to_string(*index) : std::get<std::string>(device);

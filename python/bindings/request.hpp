@@ -6,10 +6,11 @@
 #include <variant>
 #include <vector>
 
+#include "call.hpp"
+#include "palpate/device.hpp"
 #include "recognition/recognition_record.hpp"
 #include "recognition/request.hpp"
 #include "recognition/resolve.hpp"
-#include "session.hpp"
 
 namespace palpate::python {
 
@@ -20,7 +21,7 @@ Sentences in_python(Sentences sentences);
 
 /// What a call from Python asks.
 struct PythonRequest : Request {
-  std::shared_ptr<Session> session;  ///< in the place of `device`
+  std::shared_ptr<Device> open_device;  ///< in the place of `device`
 };
 
 /// Adds a map or an iterable of maps: files, folders, and maps in memory, beside which files are
@@ -49,24 +50,27 @@ Subject subject_of(const GivenRecordings& recordings, const Request& given);
 /// The task of a subject, by what all its recordings have. Throws Error as resolve() does.
 RecognitionTask task_of(const Subject& subject, Device& device, const CallerNeed& need = {});
 
-/// The session, or where there is none, one that is nobody else's: of the device of this name, see
-/// Device::open(). Throws Error.
-inline std::shared_ptr<Session> session_on(const std::shared_ptr<Session>& session,
-                                           const std::string& name) {
-  return session ? session : std::make_shared<Session>(Device::open(name));
+/// The device that is open, or else the one of this name, see Device::open(). Throws Error, also
+/// in a child of fork() whose parent has opened it.
+inline std::shared_ptr<Device> device_of(const std::shared_ptr<Device>& open,
+                                         const std::string& name) {
+  if (open == nullptr) {
+    return std::make_shared<Device>(Device::open(name));
+  }
+  open->context();
+  return open;
 }
 
-/// Runs `work(subject, device, call)` on the request's device, as run() does.
+/// Runs `work(subject, device, report)` on the request's device, as run() does.
 template <typename F>
 auto run_on_subject(nb::handle recordings, const PythonRequest& request, const Progress& progress,
                     F work) {
-  return run({}, progress,
-             [given = given_recordings(recordings), request, work = std::move(work)](Call& call) {
-               const Subject subject = subject_of(given, request);
-               const auto session = session_on(request.session, subject.request.device);
-               auto lock = session->lock(call);
-               return work(subject, lock.device(), call);
-             });
+  const GivenRecordings given = given_recordings(recordings);
+  return run(progress, [&](const Report& report) {
+    const Subject subject = subject_of(given, request);
+    const auto device = device_of(request.open_device, subject.request.device);
+    return work(subject, *device, report);
+  });
 }
 
 }  // namespace palpate::python

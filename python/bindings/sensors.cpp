@@ -2,7 +2,6 @@
 #include <cmath>
 #include <functional>
 #include <memory>
-#include <mutex>
 
 #include <fmt/format.h>
 #include <nanobind/stl/optional.h>
@@ -10,13 +9,13 @@
 #include <nanobind/stl/vector.h>
 
 #include "bindings.hpp"
-#include "call.hpp"
 #include "palpate/baseline.hpp"
 #include "palpate/driver.hpp"
 #include "palpate/pose_track.hpp"
 #include "palpate/sensor.hpp"
 #include "palpate/touch_detector.hpp"
 #include "palpate/virtual_sensor.hpp"
+#include "shared.hpp"
 #include "touches.hpp"
 
 namespace palpate::python {
@@ -29,21 +28,12 @@ namespace {
 /// A sensor that one thread at a time calls, without the GIL.
 class SharedSensor {
  public:
-  explicit SharedSensor(std::unique_ptr<Sensor> sensor) : sensor_(std::move(sensor)) {}
-  ~SharedSensor() {
-    if (!process_.is_here()) {
-      static_cast<void>(sensor_.release());  // whose threads are the parent's
-    }
-  }
-  SharedSensor(const SharedSensor&) = delete;
-  SharedSensor& operator=(const SharedSensor&) = delete;
+  explicit SharedSensor(std::unique_ptr<Sensor> sensor)
+      : sensor_("sensor", {}, std::move(sensor)) {}
 
   template <typename F>
   auto use(F work) {
-    process_.require("sensor");
-    const WithoutGil released;
-    const std::lock_guard lock(mutex_);
-    return work(*sensor_);
+    return sensor_.use([&](std::unique_ptr<Sensor>& sensor) { return work(*sensor); });
   }
 
   /// The next frame; none where the stream has ended, or after the timeout. Ctrl-C ends the wait.
@@ -81,9 +71,7 @@ class SharedSensor {
   }
 
  private:
-  OwnProcess process_;
-  std::unique_ptr<Sensor> sensor_;
-  std::mutex mutex_;
+  Shared<std::unique_ptr<Sensor>> sensor_;
 };
 
 std::unique_ptr<SharedSensor> open_sensor(const PathLike& board_or_file,
@@ -92,7 +80,8 @@ std::unique_ptr<SharedSensor> open_sensor(const PathLike& board_or_file,
   if (pose_source) {
     poses = pose_source->path();
   }
-  auto sensor = run([name = board_or_file.text(), poses](Call&) {
+  const std::string name = board_or_file.text();
+  auto sensor = run([&] {
     std::unique_ptr<Sensor> opened =
         is_virtual_sensor(name) ? open_virtual_sensor(name) : open_board(name);
     return poses ? std::make_unique<PosedSensor>(std::move(opened), poses->string())

@@ -25,7 +25,8 @@ ArrayRecording simulate(const PathLike& letter_or_file,
       elements_mm ? points_of(*elements_mm, "elements_mm") : digitacts_array();
   const std::optional<Pose> object =
       T_object_robot ? std::optional(pose_of(*T_object_robot, "T_object_robot")) : std::nullopt;
-  return array_recording(run([=, shape = letter_or_file.text()](Call&) {
+  const std::string shape = letter_or_file.text();
+  return array_recording(run([&] {
     const Shape made = make_shape(shape);
     Simulator simulator(made, model, elements, seed);
     std::vector<Pose> T_robot_sensor = poses;

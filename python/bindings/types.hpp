@@ -6,8 +6,6 @@
 
 #include <nanobind/nanobind.h>
 
-#include "gil.hpp"
-
 namespace nanobind::detail {
 
 /// Text as UTF-8, in the place of nanobind's own caster, which refuses all else. Names of files
@@ -45,9 +43,7 @@ namespace nb = nanobind;
 /// Calls a function of a module of Python.
 template <typename... Arguments>
 nb::object call(const char* module, const char* function, Arguments&&... arguments) {
-  return with_python([&] {
-    return nb::module_::import_(module).attr(function)(std::forward<Arguments>(arguments)...);
-  });
+  return nb::module_::import_(module).attr(function)(std::forward<Arguments>(arguments)...);
 }
 
 // The methods `plot` and `_repr_png_`, which palpate.plots implements in Python.
@@ -90,7 +86,7 @@ struct PathLike : nb::object {
   /// The path's bytes. Throws what __fspath__ raises, and ValueError where the path holds a null.
   std::string text() const {
     PyObject* converted = nullptr;
-    if (with_python([&] { return PyUnicode_FSConverter(m_ptr, &converted); }) == 0) {
+    if (PyUnicode_FSConverter(m_ptr, &converted) == 0) {
       throw nb::python_error();
     }
     const nb::object bytes = nb::steal(converted);

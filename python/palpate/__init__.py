@@ -17,7 +17,6 @@ from ._palpate import (
     Axis as Axis,
     BoundedPosterior as BoundedPosterior,
     Certificate as Certificate,
-    ClassScores as ClassScores,
     ContactClassifier as ContactClassifier,
     ContactModel as ContactModel,
     DetectedTouch as DetectedTouch,
@@ -25,12 +24,9 @@ from ._palpate import (
     DeviceInfo as DeviceInfo,
     DisplacementSd as DisplacementSd,
     Estimate as Estimate,
-    Evaluation as Evaluation,
     Frame as Frame,
-    GroupScores as GroupScores,
     Hypothesis as Hypothesis,
     InverseSensorModel as InverseSensorModel,
-    KnownAgainstUnknown as KnownAgainstUnknown,
     LearnedSensor as LearnedSensor,
     MapBuilder as MapBuilder,
     Marginals as Marginals,
@@ -42,13 +38,8 @@ from ._palpate import (
     PoseSample as PoseSample,
     Recording as Recording,
     RefinedPose as RefinedPose,
-    ReliabilityBin as ReliabilityBin,
     Resampling as Resampling,
-    Scores as Scores,
     Sensor as Sensor,
-    SensorCalibration as SensorCalibration,
-    SetupCheck as SetupCheck,
-    SetupFinding as SetupFinding,
     SensorModel as SensorModel,
     Touch as Touch,
     TouchDetector as TouchDetector,
@@ -76,7 +67,6 @@ from ._palpate import (
 )
 from ._bag import read_bag as read_bag
 from .commands import (
-    Plan as Plan,
     calibrate as calibrate,
     check_setup as check_setup,
     evaluate as evaluate,
@@ -91,8 +81,16 @@ from .many import (
 )
 from .recognition import (
     RecognitionOptions as RecognitionOptions,
-    Record as Record,
     recognize as recognize,
+)
+from .results import (
+    Evaluation as Evaluation,
+    GroupScores as GroupScores,
+    Plan as Plan,
+    Record as Record,
+    Scores as Scores,
+    SensorCalibration as SensorCalibration,
+    SetupCheck as SetupCheck,
 )
 from .show import Page as Page, show as show
 from .streams import touches as touches

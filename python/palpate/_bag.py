@@ -19,12 +19,14 @@ if TYPE_CHECKING:
 def read_bag(
     log: _Path,
     *,
-    pressure_topic: str,
+    pressure_topic: str | Sequence[str],
     array: "tuple[int, int, float] | _Path | ArrayLike",
     pressure_field: str | None = None,
     pose_topic: str | None = None,
+    pose_field: str | None = None,
     tf: tuple[str, str] | None = None,
     truth_tf: tuple[str, str] | None = None,
+    mount: tuple[float, float, float, float, float, float] | None = None,
     first_element: Literal["bottom-left", "bottom-right", "top-left", "top-right"] = "bottom-left",
     order: Literal["rows", "columns"] = "rows",
     dead: Sequence[int] = (),
@@ -40,11 +42,16 @@ def read_bag(
 
     log: a bag of ROS 1 (.bag), or of ROS 2: its folder, or its .db3 or .mcap file; pressure_topic: of
     any message with a list of numbers, which pressure_field names where it is not the only one:
-    "sensors.taxels.z", a list in each item of a list; pose_topic: of poses or transforms in metres; or
+    "sensors.taxels.z", a list in each item of a list, or "matrices[1].data", of one item by its index, name
+    or frame; several topics, of pads on one hand, are one array, whose elements follow in their order, and a
+    frame of the first takes the nearest of the others; flags beside them that are called valid, validity, is_valid or mask make readings unknown;
+    pose_topic: of poses or transforms in metres, or of messages whose pose_field is one, or is a list of a
+    position and a quaternion, or of a matrix; or
     tf: (target, source) frames of /tf and /tf_static, T_target_source, the robot's base and the array;
     truth_tf: (base, object), where the object truly lies, for the recording's truth, which an object that
     moves by more than 1 mm or 1 degree does not have; object: its label. A frame of /tf_static that moves
-    in /tf is taken from /tf.
+    in /tf is taken from /tf. mount: x, y, z, roll, pitch, yaw, mm and degrees: where the array sits in the
+    frame whose poses are given.
     Times are those of the messages' headers, or of their reception where a message has no header. Other
     options are those of import_tables(). progress(fraction) is called now and then.
 
@@ -59,10 +66,11 @@ def read_bag(
 def read_frames(
     log: _Path,
     *,
-    pressure_topic: str,
+    pressure_topic: str | Sequence[str],
     array: Any,
     pressure_field: str | None,
     pose_topic: str | None,
+    pose_field: str | None,
     tf: tuple[str, str] | None,
     truth_tf: tuple[str, str] | None,
     pose_delay: float,
@@ -70,7 +78,7 @@ def read_frames(
     **options: Any,
 ) -> tuple[Recording, list[str]]:
     """What read_bag() reads, and what is worth a warning."""
-    from ._bag_messages import opened
+    from ._bag_messages import opened, together
 
     if pose_topic is not None and tf is not None:
         raise Error("pose_topic and tf: both say where the sensor is; leave one of them out")
@@ -78,27 +86,30 @@ def read_frames(
         raise Error("truth_tf: needs the sensor's poses in the same frame; give pose_topic or tf")
     name = os.fsdecode(log)
     text, elements_mm = array_option(array)
+    names = [pressure_topic] if isinstance(pressure_topic, str) else list(pressure_topic)
     plane = options["plane"]
     source = pose_topic or (":".join(tf) if tf else "")
     options |= {
         "array": text,
-        "pressures": f"{name}: {pressure_topic}",
+        "pressures": f"{name}: {', '.join(names)}",
         "poses": f"{name}: {source}" if source else "",
         "dead": ",".join(map(str, options["dead"])),
         "plane": plane if isinstance(plane, str) else ",".join(map(str, plane)),
         "pose_delay": pose_delay,
+        "mount": None if options["mount"] is None else ",".join(map(str, options["mount"])),
     }
     request = filled(_palpate.ImportOptions(), read_bag, options)
     _palpate.require_sound(request, elements_mm)
     with opened(name) as bag:
-        frames = bag.pressures(pressure_topic, pressure_field)
-        poses = bag.poses(pose_topic) if pose_topic is not None else None
+        pads = [bag.pressures(topic, pressure_field) for topic in names]
+        poses = bag.poses(pose_topic, pose_field) if pose_topic is not None else None
         wanted = [chain for chain in (tf, truth_tf) if chain is not None]
         tree = bag.transforms(wanted) if wanted else None
-        bag.read([part for part in (frames, poses, tree) if part is not None], progress)
-    frames.require_some(name)
-    time_s, pressures = frames.in_order()
-    remarks = frames.remarks(name)
+        bag.read([part for part in (*pads, poses, tree) if part is not None], progress)
+    for pad in pads:
+        pad.require_some(name)
+    time_s, pressures = together([pad.in_order() for pad in pads])
+    remarks = [remark for pad in pads for remark in pad.remarks(name)]
     pose_time_s: ArrayLike = ()
     rows: ArrayLike | None = None
     truth: ArrayLike | None = None
@@ -114,7 +125,7 @@ def read_frames(
     if tf is not None and tree is not None:
         rows = tree.chain(name, *tf, time_s + pose_delay, options["largest_gap_s"])
         remarks += tree.remarks(name, tf, rows)
-    del frames, poses, tree  # the memory of a long log
+    del pads, poses, tree  # the memory of a long log
     recording, said = _palpate.import_frames(
         request, pressures, time_s, pose_time_s, elements_mm, rows, truth
     )

@@ -1,5 +1,10 @@
 """The messages of a log of ROS: which topics it has, and the pressures and poses of one of them."""
 
+import contextlib
+import os
+import re
+import shutil
+import tempfile
 from array import array as numbers
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -10,7 +15,7 @@ from typing import Any
 import numpy
 from numpy.typing import NDArray
 
-from ._bag_transforms import Transforms, row_of, stamp_s
+from ._bag_transforms import Transforms, row_of, row_of_numbers, stamp_s
 from ._error import Error
 
 #: Where the pressures of known types lie; of another type, the only list of numbers is taken.
@@ -30,6 +35,10 @@ _POSES = {
     "geometry_msgs/msg/TransformStamped": "transform",
     "nav_msgs/msg/Odometry": "pose.pose",
 }
+#: Lists of flags beside the readings that say which of them are valid.
+_FLAGS = ("valid", "validity", "is_valid", "mask", "valid_mask")
+#: Fields by which an item of a list is called.
+_NAMES = ("name", "label", "frame_id", "id")
 #: Kinds of fields in definitions of rosbags: Nodetype.
 _BASE, _NAME, _LISTS = 1, 2, (3, 4)
 _TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
@@ -46,12 +55,39 @@ class Topic:
     guess: str  #: "pressures", "poses", "transforms" or ""
 
 
+def _without_keys(path: str) -> str:
+    """The path without what names single items: "matrices.data" of "matrices[1].data"."""
+    return re.sub(r"\[[^]]*\]", "", path)
+
+
+def _item(items: Sequence[Any], key: str) -> Any:
+    """The item of this index, or of this name or frame."""
+    if re.fullmatch(r"\d+", key):
+        if int(key) < len(items):
+            return items[int(key)]
+        raise Error(f"[{key}]: the list has {len(items)} items, counted from 0; give another one")
+    called = []
+    for item in items:
+        header = getattr(item, "header", None)
+        names = [getattr(item, name) for name in _NAMES if hasattr(item, name)]
+        names += [header.frame_id] if hasattr(header, "frame_id") else []
+        if key in map(str, names):
+            return item
+        called += map(str, names[:1])
+    raise Error(f"[{key}]: no item has this name or frame; the list has {', '.join(called) or 'no names'}")
+
+
 def _at(message: Any, path: str) -> Any:
-    """The field of a dotted path; of lists, and lists in them, the field of each item."""
+    """The field of a dotted path; of lists, and lists in them, the field of each item, or of the one item
+    that stands in brackets by its index, name or frame: "matrices[1].data"."""
     if isinstance(message, list):
         return [_at(item, path) for item in message]
-    field, _, rest = path.partition(".")
-    return _at(getattr(message, field), rest) if field else message
+    if not path:
+        return message
+    match = re.match(r"([^.[]*)(?:\[([^]]*)\])?\.?", path)
+    assert match is not None
+    field = getattr(message, match[1])
+    return _at(field if match[2] is None else _item(field, match[2]), path[match.end():])
 
 
 def _flat(values: Any) -> list[float]:
@@ -99,14 +135,16 @@ class _Timed:
 class Pressures(_Timed):
     """The readings of a topic."""
 
-    def __init__(self, topic: str, has_header: bool, path: str) -> None:
+    def __init__(self, topic: str, has_header: bool, path: str, flags: str | None) -> None:
         super().__init__(topic, has_header)
         self.path = path
+        self.flags = flags  #: where the flags of valid readings lie
+        self.invalid = 0  #: readings
         self.elements = 0
         self.values = numbers("d")  #: frame by frame
 
     def add(self, topic: str, message: Any, received_s: float) -> None:
-        values = _at(message, self.path)
+        values = self._field(message, self.path)
         row = values if hasattr(values, "dtype") and values.ndim == 1 else _flat(values)
         if not self.time_s:
             self.elements = len(row)
@@ -117,8 +155,26 @@ class Pressures(_Timed):
                 f"{self.topic}: {self.path}: {len(row)} readings in message {len(self.time_s)}, counted "
                 f"from 0, but {self.elements} before; give a topic or a field of one length"
             )
-        self.values.frombytes(numpy.asarray(row, numpy.float64).tobytes())
+        readings = numpy.array(row, numpy.float64)
+        if self.flags is not None:
+            flags = _flat(self._field(message, self.flags))
+            if len(flags) == len(readings):
+                readings[numpy.array(flags) == 0.0] = numpy.nan
+                self.invalid += flags.count(0.0)
+        self.values.frombytes(readings.tobytes())
         self.time_s.append(self.time_of(message, received_s))
+
+    def _field(self, message: Any, path: str) -> Any:
+        try:
+            return _at(message, path)
+        except Error as error:
+            raise Error(f"{self.topic}: {path}: {error}") from None
+
+    def remarks(self, log: str) -> list[str]:
+        if self.invalid:
+            said = f"{log}: {self.topic}: {self.invalid} readings are unknown by their flags {self.flags}"
+            return [*super().remarks(log), said]
+        return super().remarks(log)
 
     def in_order(self) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64]]:
         """The frames' times [n], ascending, and their readings [n, e]."""
@@ -130,6 +186,24 @@ class Pressures(_Timed):
         return time_s, rows
 
 
+def together(
+    pads: Sequence[tuple[NDArray[numpy.float64], NDArray[numpy.float64]]],
+) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64]]:
+    """The frames of several pads as those of one array: at the times of the first, with the nearest frame of
+    each other, whose readings are unknown where that is over 0.1 s away."""
+    (time_s, rows), *others = pads
+    if not others:
+        return time_s, rows
+    beside = [rows]
+    for other_s, other in others:
+        after = numpy.searchsorted(other_s, time_s).clip(max=len(other_s) - 1)
+        before = (after - 1).clip(min=0)
+        nearest = numpy.where(time_s - other_s[before] < other_s[after] - time_s, before, after)
+        far = numpy.abs(other_s[nearest] - time_s) > 0.1
+        beside.append(numpy.where(far[:, None], numpy.nan, other[nearest]))
+    return time_s, numpy.hstack(beside)
+
+
 class Poses(_Timed):
     """The poses of a topic."""
 
@@ -139,7 +213,22 @@ class Poses(_Timed):
         self.rows = numbers("d")  #: one behind the other
 
     def add(self, topic: str, message: Any, received_s: float) -> None:
-        self.rows.extend(row_of(_at(message, self.path)))
+        try:
+            pose = _at(message, self.path)
+            row = row_of(pose) if hasattr(pose, "__dict__") or hasattr(pose, "__slots__") else None
+            self.rows.extend(row_of_numbers(_flat(pose)) if row is None else row)
+        except (AttributeError, TypeError):
+            raise Error(
+                f"{self.topic}: {self.path or 'the message'}: is no pose, no transform, and no list of 7, 12 or "
+                "16 numbers; give another pose_field"
+            ) from None
+        except ValueError:
+            raise Error(
+                f"{self.topic}: {self.path}: the matrix of message {len(self.time_s)}, counted from 0, is no "
+                "rotation and position; give another pose_field"
+            ) from None
+        except Error as error:
+            raise Error(f"{self.topic}: {self.path}: {error}") from None
         self.time_s.append(self.time_of(message, received_s))
 
     def in_order(self) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64]]:
@@ -194,7 +283,18 @@ class Bag:
         """Where the pressures of a type lie; None where several lists may be meant, or none."""
         found = list(self.lists(msgtype))
         known = _PRESSURES.get(msgtype)
-        return known if known in found else found[0] if len(found) == 1 else None
+        readings = [path for path in found if path.rpartition(".")[2] not in _FLAGS]
+        return known if known in found else readings[0] if len(readings) == 1 else None
+
+    def flags(self, msgtype: str, path: str) -> str | None:
+        """Where the flags beside the readings of a path lie."""
+        beside = path.rpartition(".")[0]
+        of = msgtype
+        for field in filter(None, _without_keys(beside).split(".")):
+            kind, what = dict(self.fields(of))[field]
+            of = what if kind == _NAME else what[0][1]
+        names = dict(self.fields(of))
+        return next((f"{beside}.{name}".lstrip(".") for name in _FLAGS if name in names), None)
 
     def pressures(self, topic: str, path: str | None) -> Pressures:
         msgtype = self.connections(topic)[0].msgtype
@@ -206,21 +306,24 @@ class Bag:
                 f"{self.name}: {topic}: {msgtype} has the lists {', '.join(found)}; name one by "
                 "pressure_field"
             )
-        if path is None or path not in found:
+        if path is None or _without_keys(path) not in found:
             raise Error(
                 f"{self.name}: {topic}: {msgtype} has no list of numbers"
                 + (f" {path}; it has {', '.join(found)}" if path and found else "; give another topic")
             )
-        return Pressures(topic, self.has_header(msgtype), path)
+        return Pressures(topic, self.has_header(msgtype), path, self.flags(msgtype, path))
 
-    def poses(self, topic: str) -> Poses:
+    def poses(self, topic: str, path: str | None) -> Poses:
         msgtype = self.connections(topic)[0].msgtype
-        if msgtype not in _POSES:
+        first = re.split(r"[.[]", path or "")[0]
+        if path is None and msgtype not in _POSES:
             raise Error(
-                f"{self.name}: {topic}: {msgtype} is no pose; give a topic of "
+                f"{self.name}: {topic}: {msgtype} is no pose; name its field by pose_field, give a topic of "
                 f"{', '.join(sorted(_POSES))}, or frames by tf"
             )
-        return Poses(topic, self.has_header(msgtype), _POSES[msgtype])
+        if first and first not in (fields := dict(self.fields(msgtype))):
+            raise Error(f"{self.name}: {topic}: {msgtype} has no field {first}; it has {', '.join(fields)}")
+        return Poses(topic, self.has_header(msgtype), _POSES[msgtype] if path is None else path)
 
     def transforms(self, wanted: list[tuple[str, str]]) -> Transforms:
         topics = {c.topic for c in self.reader.connections if c.msgtype in _TRANSFORMS}
@@ -286,7 +389,34 @@ def _readable(name: str) -> Iterator[None]:
     except Exception as error:  # a damaged bag may fail anywhere in rosbags
         memory = isinstance(error, MemoryError)  # for a length that is damaged, in all likelihood
         why = "a part of it does not fit into memory" if memory else str(error) or type(error).__name__
-        raise Error(f"{name}: cannot be read as a bag ({why}); copy it again, or reindex it") from None
+        mend = (
+            f"'rosbag reindex {name}'"
+            if name.endswith(".bag")
+            else f"'mcap recover {name} -o MENDED.mcap'"
+            if name.endswith(".mcap")
+            else "'ros2 bag reindex'"
+        )
+        raise Error(
+            f"{name}: cannot be read as a bag ({why}); copy it again, or, where its recording was cut off, mend "
+            f"it by {mend}"
+        ) from None
+
+
+@contextmanager
+def _unpacked(name: str) -> Iterator[Path]:
+    """The log's path, of one that is compressed as a whole that of a copy, which goes."""
+    if not name.endswith(".zstd") and not name.endswith(".zst"):
+        yield Path(name)
+        return
+    try:
+        from compression import zstd
+    except ImportError:
+        from backports import zstd  # comes with rosbags
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / Path(name).stem
+        with _readable(name), zstd.open(name) as packed, path.open("wb") as plain:
+            shutil.copyfileobj(packed, plain)
+        yield path
 
 
 @contextmanager
@@ -300,12 +430,11 @@ def opened(name: str) -> Iterator[Bag]:
     path = Path(name)
     if not path.exists():
         raise Error(f"{name}: no such file or folder; give a bag")
-    if path.suffix in (".db3", ".mcap") and (path.parent / "metadata.yaml").exists():
-        path = path.parent
-    with _readable(name):
-        reader = AnyReader([path], default_typestore=get_typestore(Stores.LATEST))
-        reader.open()
-    try:
-        yield Bag(name, reader)
-    finally:
-        reader.close()
+    if (path.parent / "metadata.yaml").exists() and re.search(r"\.(db3|mcap)(\.zstd?)?$", name):
+        name = os.fspath(path.parent)
+    with _unpacked(name) as unpacked:
+        with _readable(os.fspath(path)):
+            reader = AnyReader([unpacked], default_typestore=get_typestore(Stores.LATEST))
+            reader.open()
+        with contextlib.closing(reader):
+            yield Bag(os.fspath(path), reader)

@@ -29,6 +29,38 @@ def row_of(pose: Any) -> tuple[float, ...]:
     return (1e3 * p.x, 1e3 * p.y, 1e3 * p.z, x, y, z, w)
 
 
+def row_of_numbers(values: Sequence[float]) -> tuple[float, ...]:
+    """A list as a row: a position, m, and a quaternion x, y, z, w; or 12 or 16 numbers of a homogeneous
+    matrix, by columns or by rows, whichever is a rotation. Raises ValueError where none is, AttributeError of
+    a list of another length."""
+    if len(values) == 7:
+        x, y, z, *q = values
+        length = math.hypot(*q)
+        return (1e3 * x, 1e3 * y, 1e3 * z, *(part / length for part in q)) if length > 0.0 else _UNKNOWN
+    if len(values) not in (12, 16):
+        raise AttributeError("no pose")
+    for by_columns in (True, False):
+        given = numpy.array(values)
+        matrix = given.reshape(4, -1).T if by_columns else given.reshape(-1, 4)
+        turn = matrix[:3, :3]
+        is_last = len(values) == 12 or numpy.array_equal(matrix[3], (0, 0, 0, 1))
+        if is_last and numpy.abs(turn @ turn.T - numpy.eye(3)).max() <= 1e-2 and numpy.linalg.det(turn) > 0:
+            return (*(1e3 * matrix[:3, 3]), *_quaternion(turn))
+    raise ValueError("no rotation")
+
+
+def _quaternion(turn: Rows) -> Rows:
+    """The quaternion x, y, z, w of a rotation [3, 3]: the eigenvector of its largest eigenvalue (Bar-Itzhack)."""
+    (a, b, c), (d, e, f), (g, h, i) = turn
+    k = numpy.array([
+        [a - e - i, 0, 0, 0],
+        [b + d, e - a - i, 0, 0],
+        [c + g, f + h, i - a - e, 0],
+        [h - f, c - g, d - b, a + e + i],
+    ])  # fmt: skip
+    return numpy.linalg.eigh(k / 3.0)[1][:, 3]
+
+
 def stamp_s(stamp: Any) -> float:
     return float(stamp.sec) + 1e-9 * float(stamp.nanosec)
 
@@ -177,7 +209,8 @@ class Transforms:
             known = sorted({*self.edges, *(edge.parent for edge in self.edges.values())})
             raise Error(
                 f"{log}: tf {target}:{source}: no chain of transforms joins these frames; the log has "
-                f"{', '.join(known) or 'none'}"
+                f"{', '.join(known) or 'none'}; where the array's mount is not among them, name the frame "
+                "that carries it and give the mount"
             )
         logs = {child: self.edges[child].log() for up in path for child in up}
         gaps = {child: _gap_s(at_s) if gap_s is None else gap_s for child, (at_s, _) in logs.items()}

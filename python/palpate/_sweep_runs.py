@@ -11,7 +11,8 @@ from . import _palpate
 from ._error import Error
 from ._palpate import Device, Hypothesis, PoseLattice, pose_error_mm
 from ._statistics import Errors, errors_over
-from .recognition import Record, request_of
+from .recognition import request_of
+from .results import Record
 
 _FEWEST_BINS = 1e3  # of the coarsest lattice; of a small region, a thirtieth of the finest one's
 _MOST_HISTOGRAM = 100_000_000  # bins of all objects
@@ -74,12 +75,12 @@ def counts_of(lattice: PoseLattice) -> tuple[int, int, int]:
     return lattice.x_mm.count, lattice.y_mm.count, lattice.theta_rad.count
 
 
-def lattices_of(fine: PoseLattice, most: int) -> list[PoseLattice]:
+def lattices_of(fine: PoseLattice, most_bins: int) -> list[PoseLattice]:
     """Lattices of the region in the proportions of `fine`, by rising count.
 
     Up to three times as many bins; each has about three times as many as the one before.
     """
-    finest = min(3.0 * fine.bins, float(most))
+    finest = min(3.0 * fine.bins, float(most_bins))
     free = max(1, sum(count > 1 for count in counts_of(fine)))
     lattices: list[PoseLattice] = []
     count = finest

@@ -38,14 +38,19 @@ def _flag_parser() -> argparse.ArgumentParser:
         description="Makes a recording (HDF5) from a log of ROS 1 or ROS 2.",
     )
     add = parser.add_argument
-    add("log", metavar="LOG", help="bag of ROS 1 (.bag), or of ROS 2: its folder, .db3 or .mcap")
+    add("log", metavar="LOG", help="bag of ROS 1 (.bag), or of ROS 2: its folder, .db3, .mcap or .mcap.zstd")
     add("--list", action="store_true", help="show the topics, their types, rates and what they may be")
-    add("--pressure-topic", metavar="TOPIC", help="topic of the readings")
-    add("--pressure-field", metavar="FIELD", help="field of its messages, as sensors.taxels.z "
-        "[the only list of numbers]")  # fmt: skip
+    add("--pressure-topic", metavar="TOPIC", help="topic of the readings; several, of pads on one hand, as "
+        "/left,/right")  # fmt: skip
+    add("--pressure-field", metavar="FIELD", help="field of its messages, as sensors.taxels.z, or "
+        "matrices[1].data of one item, by its index, name or frame [the only list of numbers]")  # fmt: skip
     add("--pose-topic", metavar="TOPIC", help="topic of the array's poses in the robot frame")
+    add("--pose-field", metavar="FIELD", help="field of its messages: a pose, or a list of a position and a "
+        "quaternion, or of a matrix [the pose of known types]")  # fmt: skip
     add("--tf", metavar="TARGET:SOURCE", help="frames of the robot's base and of the array, from /tf")
     add("--truth-tf", metavar="TARGET:SOURCE", help="frames of the robot's base and of the object")
+    add("--mount", metavar="X,Y,Z,ROLL,PITCH,YAW", help="the array's pose in the frame whose poses are "
+        "given, mm and degrees [it is the array's]")  # fmt: skip
     add("--array", metavar="ARRAY", help="COLUMNS:ROWS:PITCH in mm, or a CSV file of the elements")
     add("--first-element", default="bottom-left", metavar="CORNER",
         help="corner that is read first: bottom-left, bottom-right, top-left, top-right [bottom-left]")  # fmt: skip
@@ -112,13 +117,21 @@ def _run(arguments: argparse.Namespace) -> None:
             plane = tuple(float(text) for text in plane.split(","))
         except ValueError:
             raise Error(f"--plane {arguments.plane}: give auto, or a normal such as 0,0,1") from None
+    mount: Any = arguments.mount
+    if mount is not None:
+        try:
+            mount = tuple(float(text) for text in mount.split(","))
+        except ValueError:
+            raise Error(f"--mount {arguments.mount}: give X,Y,Z,ROLL,PITCH,YAW, mm and degrees") from None
     shown = sys.stderr.isatty()
     recording, remarks = read_frames(
         log=arguments.log,
-        pressure_topic=arguments.pressure_topic,
+        pressure_topic=arguments.pressure_topic.split(","),
         array=arguments.array,
         pressure_field=arguments.pressure_field,
         pose_topic=arguments.pose_topic,
+        pose_field=arguments.pose_field,
+        mount=mount,
         tf=_frames("--tf", arguments.tf),
         truth_tf=_frames("--truth-tf", arguments.truth_tf),
         first_element=arguments.first_element,

@@ -6,23 +6,14 @@ They have the commands' rules, defaults and words.
 import json
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 from . import _palpate
-from ._palpate import (
-    Device,
-    Evaluation,
-    Recording,
-    SensorCalibration,
-    SetupCheck,
-    TouchGains,
-    Truth,
-)
+from ._error import Error
+from ._palpate import Device, Recording, Truth
 from .many import Recognized
 from .recognition import (
     RecognitionOptions,
-    Record,
     _Maps,
     _Pair,
     _Path,
@@ -32,46 +23,12 @@ from .recognition import (
     request_of,
     warn,
 )
+from .results import Evaluation, Plan, SensorCalibration, SetupCheck
 
 # The build writes the stubs by importing the package, where there is no NumPy.
 if TYPE_CHECKING:
-    import numpy
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
     from typing_extensions import Unpack
-
-
-@dataclass(frozen=True, eq=False)
-class Plan:
-    """Poses of the next touch, the best first: the n candidates of plan()."""
-
-    recording: str
-    """The file of the touches so far, or another name."""
-    touches: int
-    """How many touches were used."""
-    goal: str
-    """"identity", "pose" or "both"."""
-    believed: Record
-    """What is believed before the touch: the fields of a Record from `best` on."""
-    identity_nats: float
-    """What is unknown of the identity: the entropy of the labels, nats."""
-    pose_nats: float
-    """What is unknown of the pose once the object is known, counted in bins, nats."""
-    index: "NDArray[numpy.uint64]"
-    """[n] places of the candidates among those that were given, from 0."""
-    T_robot_sensor: "NDArray[numpy.float64]"
-    """[n, 3] (x_mm, y_mm, theta_rad)."""
-    gains: TouchGains
-    """[n] what each touch is expected to tell, nats."""
-    warnings: list[str]
-    """What looks wrong with the touches, and what limits the gains, in sentences."""
-    samples: int
-    """Objects and poses that stood for the belief."""
-    seed: int
-    """Seed of the samples and of the readings that they simulate."""
-    seconds: float
-    """Wall time of the plan alone, s."""
-    device: str
-    """Name of the device; "none" where bounds searched, which use none."""
 
 
 def plan(
@@ -103,7 +60,7 @@ def plan(
         [recording], request, goal, candidates, samples, plan_seed, progress
     )
     warn(sentences)
-    return Plan(**{**fields, "believed": Record(json.loads(fields["believed"]))})
+    return Plan(fields)
 
 
 def calibrate(
@@ -148,12 +105,13 @@ def calibrate(
         raise TypeError(f"bins: {bins!r}; give counts, such as (25, 25, 16), or leave it out")
     asked = ("bins", "x_mm", "y_mm", "theta_deg", "pivot_mm", "frames", "device")
     learned = ("unposed", "threshold", "ratio", "layer", "levels", "max_maps", "group")
-    return _palpate.calibrate(
+    fields, sensor = _palpate.calibrate(
         recordings,
         request_of({name: given[name] for name in asked}, maps),
         filled(_palpate.CalibrationRequest(), calibrate, {name: given[name] for name in learned}),
         progress,
     )
+    return SensorCalibration(fields, sensor)
 
 
 def check_setup(
@@ -182,7 +140,9 @@ def check_setup(
         instead = "; give spread_mm, half of it" if name == "psf_mm" else ""
         raise TypeError(f"check_setup() got an unexpected keyword argument '{name}'{instead}")
     given = {"threshold": threshold, "ratio": ratio, "device": device}
-    return _palpate.check_setup(recordings, request_of(given, ()), cell_mm, spread_mm, progress)
+    return SetupCheck(
+        _palpate.check_setup(recordings, request_of(given, ()), cell_mm, spread_mm, progress)
+    )
 
 
 def evaluate(
@@ -211,17 +171,19 @@ def evaluate(
     # As in the command's JSON, numbers that are not finite are null, and names need not be UTF-8.
     finite = json.loads(json.dumps(records), parse_constant=lambda _: None)
     text = json.dumps(finite, ensure_ascii=False).encode(errors="replace")
-    return _palpate.evaluate_results(paths, text)
+    return Evaluation(_palpate.evaluate_results(paths, text))
 
 
 def import_tables(
-    pressures: _Path,
+    pressures: "_Path | ArrayLike",
     *,
     array: "tuple[int, int, float] | _Path | ArrayLike",
     first_element: Literal["bottom-left", "bottom-right", "top-left", "top-right"] = "bottom-left",
     order: Literal["rows", "columns"] = "rows",
     dead: Sequence[int] = (),
-    poses: _Path | None = None,
+    poses: "_Path | ArrayLike | None" = None,
+    time_s: "ArrayLike | None" = None,
+    pose_time_s: "ArrayLike | None" = None,
     unposed: bool = False,
     rows: Literal["frames", "touches"] | None = None,
     pressure_unit: Literal["kPa", "raw"] = "kPa",
@@ -229,8 +191,14 @@ def import_tables(
     pose_unit: tuple[Literal["mm", "m"], Literal["rad", "deg"]] | None = None,
     time_unit: Literal["s", "ms", "us", "ns"] | None = None,
     time_column: str | None = None,
-    pressure_columns: str | None = None,
-    pose_columns: tuple[str, str, str] | tuple[str, str, str, str, str, str, str] | None = None,
+    header_line: int | None = None,
+    where: Mapping[str, str | float] | None = None,
+    pressure_columns: str | Sequence[str] | None = None,
+    pressure_component: Literal["z", "norm"] | None = None,
+    pose_columns: str | Sequence[str] | None = None,
+    euler: str | None = None,
+    matrix: Literal["columns", "rows"] | None = None,
+    mount: tuple[float, float, float, float, float, float] | None = None,
     plane: tuple[float, float, float] | Literal["auto"] = "auto",
     largest_gap_s: float | None = None,
     pose_delay: float = 0.0,
@@ -240,12 +208,16 @@ def import_tables(
 ) -> Recording:
     """Makes a recording from tables, as `palpate import` does; docs/files.md describes them.
 
-    pressures: a CSV file, or an array of numpy.save, [n, e] or [n, rows, columns]; array: (columns,
+    pressures: a CSV file, or readings [n, e] or [n, rows, columns] with their times time_s [n] in s, where
+    NaN is unknown; array: (columns,
     rows, pitch_mm), a CSV file, or the elements' centres [e, 2] in mm in the sensor frame, in the order
     of their readings; first_element and order: where the first element of a grid lies, seen with x to
     the right and y upwards, and which follow it; dead: elements that do not read, from 0; sign: -1
     where readings fall under load, which are taken times -1; poses: a CSV
-    file of T_robot_sensor, in mm and rad where neither its columns' names nor pose_unit say otherwise;
+    file of T_robot_sensor, in mm and rad where neither its columns' names nor pose_unit say otherwise, or,
+    beside readings, poses [m, 3] of x, y, theta, or [m, 7] of a position and a quaternion x, y, z, w, mm and
+    rad, at pose_time_s [m], or one for each frame; mount: x, y, z, roll, pitch, yaw, mm and degrees, the
+    array's pose in the frame whose poses are given; where: columns, and what their cells must be;
     plane: of the touches, where poses are in space: found from them, or its normal in the robot frame;
     pose_delay: by how much later the poses' clock reads than the readings', s; rate: frames per second
     of pressures without times, Hz; object: label of what was touched; truth:
@@ -260,14 +232,49 @@ def import_tables(
     options["array"], elements_mm = array_option(array)
     options["dead"] = ",".join(map(str, dead))
     options["plane"] = plane if isinstance(plane, str) else ",".join(map(str, plane))
-    for names in ("pose_unit", "pose_columns"):
-        if options[names] is not None:
-            options[names] = ",".join(options[names])
-    request = filled(_palpate.ImportOptions(), import_tables, options)
-    recording, sentences = _palpate.import_tables(request, elements_mm)
+    for names in ("pose_unit", "pose_columns", "pressure_columns", "mount"):
+        if options[names] is not None and not isinstance(options[names], str):
+            options[names] = ",".join(map(str, options[names]))
+    options["where"] = [f"{name}={value}" for name, value in (where or {}).items()]
+    del options["time_s"], options["pose_time_s"]
+    if isinstance(pressures, (str, bytes, os.PathLike)):
+        if time_s is not None or pose_time_s is not None:
+            raise Error("time_s and pose_time_s: are for arrays; a table has a column of times")
+        request = filled(_palpate.ImportOptions(), import_tables, options)
+        recording, sentences = _palpate.import_tables(request, elements_mm)
+    else:
+        options |= {"pressures": "pressures", "poses": None if poses is None else "poses"}
+        request = filled(_palpate.ImportOptions(), import_tables, options)
+        recording, sentences = _imported_arrays(request, elements_mm, pressures, time_s, poses, pose_time_s)
     recording.truth = truth
     warn(sentences)
     return recording
+
+
+def _imported_arrays(
+    request: "_palpate.ImportOptions",
+    elements_mm: "ArrayLike | None",
+    pressures: "ArrayLike",
+    time_s: "ArrayLike | None",
+    poses: "ArrayLike | None",
+    pose_time_s: "ArrayLike | None",
+) -> tuple[Recording, list[str]]:
+    import numpy
+
+    readings = numpy.asarray(pressures, numpy.float64)
+    rows = None if poses is None else numpy.asarray(poses, numpy.float64)
+    if rows is not None and rows.ndim == 2 and rows.shape[1] == 3:  # in the plane
+        half = 0.5 * rows[:, 2:]
+        zero = 0.0 * half
+        rows = numpy.hstack([rows[:, :2], zero, zero, zero, numpy.sin(half), numpy.cos(half)])
+    return _palpate.import_frames(
+        request,
+        readings.reshape(len(readings), -1) if readings.ndim == 3 else readings,
+        time_s,
+        () if pose_time_s is None else pose_time_s,
+        elements_mm,
+        rows,
+    )
 
 
 def _request(

@@ -22,7 +22,8 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 from . import _palpate
 from ._error import Error
 from ._palpate import Device, DeviceInfo
-from .recognition import RecognitionOptions, Record, _Path, request_of, warn
+from .recognition import RecognitionOptions, _Path, request_of, warn
+from .results import Record
 
 if TYPE_CHECKING:
     from distributed import Client

@@ -7,16 +7,8 @@ from typing import TYPE_CHECKING
 import numpy
 
 from ._error import Error
-from ._palpate import (
-    Evaluation,
-    LearnedSensor,
-    Marginals,
-    OccupancyGrid,
-    Recording,
-    Scores,
-    transform,
-)
-from .recognition import Record
+from ._palpate import LearnedSensor, Marginals, OccupancyGrid, Recording, transform
+from .results import Evaluation, Record, Scores
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,7 +24,7 @@ def plot(shown: _Shown, ax: "Axes | None" = None) -> "Axes":
             from matplotlib import pyplot
         except ImportError as missing:
             raise Error("plot: Matplotlib is missing; pip install 'palpate[plot]'") from missing
-        ax = pyplot.figure().add_subplot()
+        ax = pyplot.figure(layout="constrained").add_subplot()
     _draw(shown, ax)
     return ax
 
@@ -73,17 +65,18 @@ def _draw(shown: _Shown, ax: "Axes") -> None:
 
 def _draw_confusion(evaluation: Evaluation, ax: "Axes") -> None:
     """How often the records of a class, a row, were taken for an answer, a column."""
-    counts = evaluation.confusion
+    confusion = evaluation.confusion
+    counts = confusion.counts
     shares = counts / numpy.maximum(counts.sum(axis=1, keepdims=True), 1)
     ax.imshow(shares, cmap="Blues", vmin=0, vmax=1)
     for row, column in numpy.argwhere(counts > 0):
         colour = "white" if shares[row, column] > 0.5 else "black"
         ax.text(column, row, str(counts[row, column]), ha="center", va="center", color=colour)
-    ax.set_xticks(range(len(evaluation.answers)), evaluation.answers, rotation=90)
-    ax.set_yticks(range(len(evaluation.classes)), [scores.label for scores in evaluation.classes])
+    ax.set_xticks(range(counts.shape[1]), confusion["columns"], rotation=90)
+    ax.set_yticks(range(counts.shape[0]), confusion["rows"])
     ax.set_xlabel("taken for")
     ax.set_ylabel("class")
-    ax.set_title(f"{evaluation.all.right} of {evaluation.all.records} right")
+    ax.set_title(f"{evaluation.right} of {evaluation.records} right")
 
 
 def _draw_reliability(scores: Scores, ax: "Axes") -> None:

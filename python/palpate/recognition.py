@@ -4,13 +4,11 @@ import inspect
 import os
 import warnings
 from collections.abc import Callable, Iterable, Mapping
-from typing import TYPE_CHECKING, Any, Literal, TypedDict, TypeVar
+from typing import Any, Literal, TypedDict, TypeVar
 
 from . import _palpate
 from ._palpate import Device, Hypothesis, OccupancyGrid, Recording
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from .results import Record
 
 _Path = str | bytes | os.PathLike[str] | os.PathLike[bytes]
 _Pair = tuple[float, float]
@@ -45,60 +43,6 @@ class RecognitionOptions(TypedDict, total=False):
     act_above: float
     frames: tuple[int, int]
     touches: int
-
-
-class Fields(dict[str, Any]):
-    """A JSON object whose keys are attributes, too; lists of numbers are arrays as attributes."""
-
-    def __getattr__(self, name: str) -> Any:
-        try:
-            value = self[name]
-        except KeyError:
-            raise AttributeError(f"the record has no '{name}'; it has {', '.join(self)}") from None
-        if type(value) is dict and name in ("mode", "refined", "truth", "fit", "decision"):
-            value = self[name] = Fields(value)
-        if name == "modes":
-            value = self[name] = [Fields(mode) for mode in value]
-        elif isinstance(value, list) and value and isinstance(value[0], (float, int, list)):
-            import numpy
-
-            return numpy.array(value)
-        return value
-
-    def __dir__(self) -> list[str]:
-        return sorted({*super().__dir__(), *(key for key in self if key.isidentifier())})
-
-
-class Record(Fields):
-    """What was recognised, as a record in the JSON of `palpate recognize`.
-
-    Keys are attributes, too: record["refined"]["sd"] is a list, record.refined.sd an array.
-
-    `best` is the most probable label, `identity` {label: probability}, `mode` the most probable bin,
-    `decision` whether to act, and why: {"act", "because"}, `modes` where the belief lies: a list of
-    {"object", "probability", "T_robot_object", "covariance"}, the most probable first, `refined` the
-    refined pose, where the posterior peaks to a fraction of a bin, with
-    `T_robot_object` [x_mm, y_mm, theta_rad], `sd` and `covariance`, `fit` how well the touches fit
-    it: {"z", "verdict"}. Of a recording that recognize_many() could not recognise there are only its
-    name, `touches` (0), `truth` and `error`. docs/files.md lists all keys.
-    """
-
-    def plot(self, ax: "Axes | None" = None) -> "Axes":
-        """Draws the object's frame and where x and y lie in 68 and 95 %, in the robot frame, in mm."""
-        from .plots import plot
-
-        return plot(self, ax)
-
-    def __repr__(self) -> str:
-        if "error" in self:
-            return f"Record(error: {self['error']})"
-        probability = self["identity"][self["best"]]
-        pose = self.get("refined", self)["T_robot_object"]
-        return (
-            f"Record('{self['best']}' with probability {probability:.3f}, T_robot_object "
-            f"x {pose[0]:.2f} mm, y {pose[1]:.2f} mm, theta {pose[2]:.3f} rad: "
-            f"{'act' if self['decision']['act'] else 'do not act'})"
-        )
 
 
 def recognize(
@@ -148,7 +92,7 @@ def recognize(
     the sensor.yaml that `palpate map` wrote beside the files of the maps. bins: counts of x, y and theta
     of T_object_robot; x_mm, y_mm, theta_deg: their ranges (lower, upper); pivot_mm (x, y) in the robot
     frame; frames (a, b): the touches a to b - 1; device: an open Device, or a name or index as for
-    Device.open(). progress(fraction) is called up to 50 times a second.
+    Device.open(). progress(fraction) is called up to 20 times a second.
 
     Raises Error in the words of the command, with options as keyword arguments. What the command
     would say on standard error becomes a UserWarning; what looks wrong with the touches is in the

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from ._error import Error
 from ._palpate import Marginals, OccupancyGrid, Recording
-from .recognition import Record
+from .results import Record
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -140,11 +140,11 @@ def _first_that_suffices(runs: Sequence[Run], kind: str) -> Run | None:
 
     None where only the finest run would do, which no finer run confirms.
     """
-    first, most = None, runs[-1].recognised
+    first, most_recognised = None, runs[-1].recognised
     for run in reversed(runs[:-1]):
-        if run.recognised < most or not _rests(run, runs[-1], kind):
+        if run.recognised < most_recognised or not _rests(run, runs[-1], kind):
             break
-        first, most = run, max(most, run.recognised)
+        first, most_recognised = run, max(most_recognised, run.recognised)
     return first
 
 

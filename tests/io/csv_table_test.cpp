@@ -125,10 +125,6 @@ TEST_F(Csv, FilesThatHoldNoTable) {
   expect_named(message("# nothing\n\n"), {"holds no row"});
   expect_named(message("a,a\n1,2\n"), {":1: ", "two columns are called 'a'"});
   expect_named(message(std::string("a,b\n\0", 5)), {"is no text", "CSV"});
-  expect_named(message(std::string("\xFF\xFE"
-                                   "1\0,\0",
-                                   6)),
-               {"is no text", "UTF-8"});
   expect_named(message(std::string((17 << 20) + 1, '1')), {"line 1", "longer than 16 MB"});
   expect_named(input_error([&] { CsvTable(folder_ / "none.csv"); }), {"none.csv", "no such file"});
 }

@@ -29,6 +29,17 @@ KNOWN = {
 std_msgs/Header header
 sensor_msgs/ChannelFloat32[] sensors
 """,
+    "lab_msgs/msg/State": """
+std_msgs/Header header
+float64[16] O_T_EE
+geometry_msgs/Pose tool
+lab_msgs/Pad[] pads
+================================================================================
+MSG: lab_msgs/Pad
+string name
+float32[] values
+bool[] valid
+""",
     "takktile_ros/msg/Touch": "float32[] pressure\nfloat32[] temp\n",
     "xela_server_ros2/msg/SensStream": """
 xela_server_ros2/SensorFull[] sensors

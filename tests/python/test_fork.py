@@ -86,20 +86,6 @@ elif sys.argv[1] == "at work":
     in_a_child(use_all)
     over.set()
     thread.join()
-elif sys.argv[1] == "in progress":
-    def fork(fraction):
-        global parent
-        if parent == os.getpid() and (child := os.fork()):
-            print("child ended with", os.waitpid(child, 0)[1])
-            parent = None
-
-    parent = os.getpid()
-    sys.stdout.flush()
-    try:
-        belief.update(touches, progress=fork)
-    except palpate.Error as error:
-        print(str(error).split(" belongs")[0])
-        sys.exit()
 belief.update(touches[3])  # the parent goes on
 print(belief.estimate().identity.tolist())
 """
@@ -113,7 +99,6 @@ REFUSED = ["device:"] * 7 + ["sensor:", "device:", "Vulkan:", "Vulkan:", "True 1
         ("closed", ["[1.0]", "child ended with 0", "[[1.0], [1.0]]"]),
         ("open", [*REFUSED, "child ended with 0", "[1.0]"]),
         ("at work", [*REFUSED, "child ended with 0", "[1.0]"]),
-        ("in progress", ["call:", "child ended with 0", "[1.0]"]),
     ],
 )
 def test_a_child_of_fork_is_refused_at_once_or_works(state: str, lines: list[str]) -> None:

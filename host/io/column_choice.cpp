@@ -1,0 +1,175 @@
+#include "io/column_choice.hpp"
+
+#include <algorithm>
+#include <cstdint>
+#include <optional>
+#include <string_view>
+#include <utility>
+
+#include "model/number_text.hpp"
+#include "model/printable.hpp"
+
+namespace palpate {
+
+namespace {
+
+constexpr std::string_view number_mark = "{n}";
+
+/// What a pattern finds of a name.
+struct Match {
+  bool is_whole = false;
+  std::optional<std::int64_t> number;  ///< at `{n}`
+};
+
+Match match(std::string_view name, std::string_view pattern) {
+  if (pattern.empty()) {
+    return {.is_whole = name.empty()};
+  }
+  if (pattern.starts_with(number_mark)) {
+    pattern.remove_prefix(number_mark.size());
+    const std::size_t digits = std::min(name.find_first_not_of("0123456789"), name.size());
+    const auto number = whole_number_of(name.substr(0, digits));
+    return {.is_whole = number && match(name.substr(digits), pattern).is_whole, .number = number};
+  }
+  if (pattern.front() == '*') {
+    for (std::size_t skip = 0; skip <= name.size(); ++skip) {
+      if (const Match rest = match(name.substr(skip), pattern.substr(1)); rest.is_whole) {
+        return rest;
+      }
+    }
+    return {};
+  }
+  return !name.empty() && alike(name.substr(0, 1), pattern.substr(0, 1))
+             ? match(name.substr(1), pattern.substr(1))
+             : Match{};
+}
+
+/// Chooses the columns of a text, part by part.
+class Choice {
+ public:
+  Choice(const CsvTable& table, const std::vector<std::size_t>& taken, const char* option)
+      : table_(table), taken_(taken), option_(option) {}
+
+  /// Adds the columns that the part names; false where it names none.
+  bool add(std::string_view part) {
+    if (part.find('*') != part.npos || part.find(number_mark) != part.npos) {
+      return add_matches(part);
+    }
+    if (const auto column = table_.find_or_count(part)) {
+      return add_one(*column);
+    }
+    return add_every(part) || add_range(part) || add_prefixed(part);
+  }
+
+  std::vector<std::size_t> columns;
+
+ private:
+  std::string name(std::size_t column) const {
+    return std::string(printable(table_.columns()[column]));
+  }
+  bool is_taken(std::size_t column) const {
+    return std::ranges::find(taken_, column) != taken_.end();
+  }
+
+  bool add_one(std::size_t column) {
+    if (std::ranges::find(columns, column) != columns.end()) {
+      table_.refuse_columns("`{}` names column '{}' twice; leave one out", option_, name(column));
+    }
+    columns.push_back(column);
+    return true;
+  }
+
+  /// Whatever of FIRST:LAST names columns, as a name may hold a colon.
+  bool add_range(std::string_view part) {
+    for (std::size_t colon = part.find(':'); colon != part.npos;
+         colon = part.find(':', colon + 1)) {
+      const auto first = table_.find_or_count(part.substr(0, colon));
+      const auto last = table_.find_or_count(part.substr(colon + 1));
+      if (!first || !last) {
+        continue;
+      }
+      if (*last < *first) {
+        table_.refuse_columns("column '{}' comes before '{}'; give `{} FIRST:LAST`", name(*last),
+                              name(*first), option_);
+      }
+      for (std::size_t i = *first; i <= *last; ++i) {
+        if (is_taken(i)) {
+          table_.refuse_columns(
+              "column '{}', between '{}' and '{}', holds something else; correct `{} FIRST:LAST`",
+              name(i), name(*first), name(*last), option_);
+        }
+        add_one(i);
+      }
+      return true;
+    }
+    return false;
+  }
+
+  bool add_every(std::string_view part) {
+    const std::size_t colons = part.rfind("::");
+    const auto step = colons == part.npos ? std::nullopt : whole_number_of(part.substr(colons + 2));
+    const auto first = step ? table_.find_or_count(part.substr(0, colons)) : std::nullopt;
+    if (!first || *step < 1) {
+      return false;
+    }
+    for (std::size_t i = *first; i < table_.columns().size();
+         i += static_cast<std::size_t>(*step)) {
+      if (!is_taken(i)) {
+        add_one(i);
+      }
+    }
+    return true;
+  }
+
+  bool add_matches(std::string_view pattern) {
+    std::vector<std::pair<std::int64_t, std::size_t>> found;
+    for (std::size_t i = 0; i < table_.columns().size(); ++i) {
+      const Match matched = match(table_.columns()[i], pattern);
+      if (matched.is_whole && !is_taken(i)) {
+        found.emplace_back(matched.number.value_or(0), i);
+      }
+    }
+    std::ranges::sort(found);
+    for (const auto& [number, column] : found) {
+      add_one(column);
+    }
+    return !found.empty();
+  }
+
+  bool add_prefixed(std::string_view prefix) {
+    const std::size_t before = columns.size();
+    for (std::size_t i = 0; i < table_.columns().size(); ++i) {
+      const std::string_view name = table_.columns()[i];
+      if (alike(name.substr(0, prefix.size()), prefix) && !is_taken(i)) {
+        add_one(i);
+      }
+    }
+    return columns.size() > before;
+  }
+
+  const CsvTable& table_;
+  const std::vector<std::size_t>& taken_;
+  const char* option_;
+};
+
+}  // namespace
+
+std::vector<std::size_t> choose_columns(const CsvTable& table, const std::string& text,
+                                        const std::vector<std::size_t>& taken, const char* option) {
+  Choice whole(table, taken, option);
+  if (whole.add(text)) {
+    return std::move(whole.columns);  // a name may hold a comma
+  }
+  Choice choice(table, taken, option);
+  for (const std::string_view part : split_text(text, ',')) {
+    if (part.empty() || !choice.add(trimmed(part))) {
+      table.refuse_columns(
+          "no column is called or begins with '{}'; give `{}` names or numbers of columns, "
+          "FIRST:LAST, START::STEP or a pattern such as *_fz or p{{n}}",
+          printable(part), option);
+    }
+  }
+  return std::move(choice.columns);
+}
+
+}  // namespace palpate

@@ -1,0 +1,162 @@
+#include "io/table_times.hpp"
+
+#include <array>
+#include <chrono>
+#include <cmath>
+
+#include "model/number_text.hpp"
+#include "model/printable.hpp"
+
+namespace palpate {
+
+namespace {
+
+// The year 5138; a time in ms is larger.
+constexpr double latest_s = 1e11;
+constexpr double day_s = 86400.0;
+// Rows that are not sorted step back more often than a clock is set.
+constexpr std::size_t most_steps = 10;
+
+/// Takes so many digits from the front of the text; none where it does not begin with them.
+std::optional<int> take_digits(std::string_view& text, std::size_t count) {
+  const auto number =
+      text.size() >= count && text.substr(0, count).find_first_not_of("0123456789") == text.npos
+          ? whole_number_of(text.substr(0, count))
+          : std::nullopt;
+  text.remove_prefix(number ? count : 0);
+  return number ? std::optional(static_cast<int>(*number)) : std::nullopt;
+}
+
+bool take(std::string_view& text, std::string_view any_of) {
+  const bool found = !text.empty() && any_of.find(text.front()) != any_of.npos;
+  text.remove_prefix(found ? 1 : 0);
+  return found;
+}
+
+/// Takes HH:MM or HH:MM:SS with a fraction; none where the text does not begin with it.
+std::optional<double> take_clock(std::string_view& text) {
+  const auto hours = take_digits(text, 2);
+  if (!hours || !take(text, ":")) {
+    return {};
+  }
+  const auto minutes = take_digits(text, 2);
+  double seconds = 0.0;
+  if (take(text, ":")) {
+    const auto whole = take_digits(text, 2);
+    if (!whole) {
+      return {};
+    }
+    seconds = *whole;
+    if (take(text, ".,")) {
+      for (double unit = 0.1; !text.empty() && text.front() >= '0' && text.front() <= '9';
+           unit /= 10.0) {
+        seconds += unit * (text.front() - '0');
+        text.remove_prefix(1);
+      }
+    }
+  }
+  constexpr double leap_second = 61.0;
+  if (!minutes || *hours > 24 || *minutes > 59 || seconds >= leap_second) {
+    return {};
+  }
+  return *hours * 3600.0 + *minutes * 60.0 + seconds;
+}
+
+/// Takes YYYY-MM-DD, or DD.MM.YYYY; the seconds of its midnight since the Unix epoch.
+std::optional<double> take_date(std::string_view& text) {
+  std::string_view rest = text;
+  std::optional<int> year = take_digits(rest, 4);
+  std::optional<int> month;
+  std::optional<int> day;
+  if (year && take(rest, "-/")) {
+    month = take_digits(rest, 2);
+    day = take(rest, "-/") ? take_digits(rest, 2) : std::nullopt;
+  } else {
+    rest = text;
+    day = take_digits(rest, 2);
+    month = take(rest, ".") ? take_digits(rest, 2) : std::nullopt;
+    year = take(rest, ".") ? take_digits(rest, 4) : std::nullopt;
+  }
+  if (!year || !month || !day) {
+    return {};
+  }
+  using namespace std::chrono;
+  const year_month_day date{std::chrono::year(*year), std::chrono::month(*month),
+                            std::chrono::day(*day)};
+  if (!date.ok()) {
+    return {};
+  }
+  text = rest;
+  return day_s * sys_days(date).time_since_epoch().count();
+}
+
+}  // namespace
+
+std::optional<double> clock_time_of(std::string_view text, bool& of_day) {
+  const auto midnight_s = take_date(text);
+  of_day = !midnight_s;
+  if (midnight_s && !take(text, "Tt _-")) {
+    return {};
+  }
+  const auto clock_s = take_clock(text);
+  if (!clock_s) {
+    return {};
+  }
+  double offset_s = 0.0;
+  if (midnight_s && !take(text, "Zz")) {
+    const bool behind = text.starts_with('-');
+    if (take(text, "+-")) {
+      const auto hours = take_digits(text, 2);
+      take(text, ":");
+      const auto minutes = take_digits(text, 2);
+      if (!hours) {
+        return {};
+      }
+      offset_s = (*hours * 3600.0 + minutes.value_or(0) * 60.0) * (behind ? -1.0 : 1.0);
+    }
+  }
+  return text.empty() ? std::optional(midnight_s.value_or(0.0) + *clock_s - offset_s)
+                      : std::nullopt;
+}
+
+double TableTimes::next(std::size_t row) {
+  const std::string_view text = table_.text(column_.index);
+  double time_s = 0.0;
+  if (text.find(':') == text.npos) {
+    const double number = table_.require_number(column_.index);
+    time_s = column_.unit.convert(number);
+    if (std::abs(time_s) > latest_s) {
+      table_.refuse("column '{}': {} {} is no time; give the unit by `time-unit` ms, us or ns",
+                    printable(table_.columns()[column_.index]), number, column_.unit.name);
+    }
+  } else {
+    bool of_day = false;
+    const auto clock_s = clock_time_of(text, of_day);
+    if (!clock_s) {
+      table_.refuse(
+          "column '{}': '{}' is no time; write seconds, or as in 2026-11-29T12:41:27.5 or "
+          "12:41:27.5",
+          printable(table_.columns()[column_.index]), printable(text));
+    }
+    time_s = *clock_s + (of_day ? days_s_ : 0.0);
+    if (of_day && !first_ && time_s < last_s_ - day_s / 2.0) {
+      days_s_ += day_s;
+      time_s += day_s;
+    }
+  }
+  if (!first_ && time_s < last_s_) {
+    steps.push_back({row, table_.line_number(), last_s_, time_s});
+    if (steps.size() > most_steps) {
+      const ClockStep& step = steps.front();
+      refuse(fmt::format("{}:{}", table_.path().string(), step.line),
+             "column '{}': {} s is earlier than the row before, at {} s, and so are more than {} "
+             "rows; sort the rows by time",
+             printable(table_.columns()[column_.index]), step.to_s, step.from_s, most_steps);
+    }
+  }
+  first_ = false;
+  last_s_ = time_s;
+  return time_s;
+}
+
+}  // namespace palpate
