@@ -87,18 +87,6 @@ std::string kind_name(const TableKind& kind) {
 
 }  // namespace
 
-std::string unlearned_strangers(const LearnedSensor& sensor) {
-  const bool known_poses = sensor.bins.has_value();
-  if (!sensor.fit_scale || (known_poses ? sensor.fit_scale->stranger_sd.has_value()
-                                        : sensor.fit_scale->stranger_alone.has_value())) {
-    return "";
-  }
-  return known_poses ? "\"(none)\" goes by a figure of Palpate's own for how badly strangers fit; "
-                       "to learn it, give 15 touches or more of each of three objects"
-                     : "how badly strangers fit is not learned, so that a press does not tell "
-                       "\"(none)\"; give presses of three objects or more";
-}
-
 std::string calibration_text(const SensorCalibration& calibration, std::size_t touches) {
   std::string text = fmt::format("{} touches, {}\n\n", touches,
                                  count_of(calibration.objects, "object", "objects"));

@@ -1,238 +1,209 @@
 #include "cli/commands.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
-#include <functional>
-#include <iterator>
-#include <limits>
 #include <memory>
-#include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include "cli/map_drawing.hpp"
+#include "cli/command_files.hpp"
 #include "cli/map_flags.hpp"
-#include "cli/map_output.hpp"
-#include "cli/map_sensor.hpp"
 #include "cli/options.hpp"
 #include "cli/progress.hpp"
 #include "cli/recognition_flags.hpp"
-#include "estimation/maps/left_out_fit.hpp"
-#include "learning/observed_map.hpp"
-#include "learning/press.hpp"
-#include "learning/setup_check.hpp"
-#include "learning/touch_alignment.hpp"
+#include "figures/figures.hpp"
+#include "learning/map_task.hpp"
 #include "model/option_words.hpp"
-#include "palpate/error.hpp"
-#include "palpate/map_builder.hpp"
+#include "palpate/files.hpp"
 #include "recognition/recordings.hpp"
 
 namespace palpate::cli {
 
 namespace {
 
-void add_in_batches(MapBuilder& builder, std::span<const Touch> touches,
-                    const std::function<void(double)>& progress) {
-  constexpr std::size_t batch = 1000;
-  for (std::size_t begin = 0; begin < touches.size(); begin += batch) {
-    builder.add(touches.subspan(begin, std::min(batch, touches.size() - begin)));
-    progress(static_cast<double>(begin) / static_cast<double>(touches.size()));
-  }
+/// The file for ROS beside the map of this name in the folder of --ros.
+std::filesystem::path ros_path(const MapFlags& flags, const std::string& name) {
+  return std::filesystem::path(flags.ros) / (name + ".yaml");
 }
 
-/// The touches as one recording. Where their arrays differ, it has elements for the largest, and
-/// those that a touch lacks are dead.
-Recording gathered(const ObjectTouches& object, const std::string& pressure_unit) {
-  Recording result{.object = object.label, .pressure_unit = pressure_unit};
-  std::size_t most = 0;
-  bool one_array = true;
-  bool dead = false;
-  for (const Touch& touch : object.touches) {
-    most = std::max(most, touch.pressure.size());
-    one_array =
-        one_array && std::ranges::equal(touch.elements_mm, object.touches.front().elements_mm);
-    dead = dead || !touch.valid.empty();
-  }
-  for (const Touch& touch : object.touches) {
-    const std::size_t lacks = most - touch.pressure.size();
-    result.T_robot_sensor.push_back(touch.T_robot_sensor);
-    result.pressure.insert(result.pressure.end(), touch.pressure.begin(), touch.pressure.end());
-    result.pressure.insert(result.pressure.end(), lacks, 0.0);
-    if (!one_array || result.elements_mm.empty()) {
-      result.elements_mm.insert(result.elements_mm.end(), touch.elements_mm.begin(),
-                                touch.elements_mm.end());
-      result.elements_mm.insert(result.elements_mm.end(), lacks, touch.elements_mm.front());
-    }
-    if (dead || !one_array) {
-      const std::vector<std::uint8_t> all_alive(touch.pressure.size(), 1);
-      const std::span<const std::uint8_t> valid = touch.valid.empty() ? all_alive : touch.valid;
-      result.valid.insert(result.valid.end(), valid.begin(), valid.end());
-      result.valid.insert(result.valid.end(), lacks, 0);
-    }
-  }
-  return result;
-}
-
-OccupancyGrid build_map(MapBuilder& builder, const ObjectTouches& object,
-                        const std::function<void(double)>& progress) {
-  builder.clear();
-  add_in_batches(builder, object.touches, progress);
-  return builder.build(object.label);
-}
-
-/// Aligns the touches by --touch-sd-mm and --touch-sd-deg, and says how far they moved.
-void align(const MapFlags& flags, const MapOptions& model, std::vector<ObjectTouches>& objects) {
-  const DisplacementSd sd = touch_sd(flags);
-  if (sd.none()) {
-    return;
-  }
-  TouchAlignment found;
-  {
-    Progress progress("aligning touches");
-    found = align_touches(objects, sd, model, [&](double done) { progress.show(done); });
-  }
-  fmt::print(
-      "touches moved by {:.2f} mm along x and y and by {:.2f} degrees, root mean square, to "
-      "the map of the others in {} rounds\n",
-      found.moved.mm, degrees(found.moved.rad), found.rounds);
-  const auto compare = [](const char* flag, const char* unit, double given, double told) {
-    constexpr double least = 0.75;
-    constexpr double most = 1.1;  // the posterior keeps what it finds near a given that is too low
-    if (given > 0.0 && !(told > least * given && told < most * given)) {
-      fmt::print(
-          stderr,
-          "palpate: by the touches the sensor was {:.2g} {} off where {} says {:g}: give {}\n",
-          told, unit, flag, given, told < given ? "less" : "more");
-    }
-  };
-  compare("--touch-sd-mm", "mm", sd.mm, found.displaced.mm);
-  compare("--touch-sd-deg", "degrees", degrees(sd.rad), degrees(found.displaced.rad));
-}
-
-/// Says where poses are unknown: touches that are no touches of one place would make a blur.
-void warn_of_unknown_poses(const std::vector<Recording>& recordings) {
-  for (const Recording& recording : recordings) {
-    if (recording.size() > 1 && !has_poses(recording)) {
-      fmt::print(stderr,
-                 "palpate: {}: all {} touches are at one pose; if their poses are unknown, give "
-                 "--unposed\n",
-                 recording.path, recording.size());
-    }
-  }
-}
-
-/// Refuses touches in which every element is in contact in all of many touches: a map of them has
-/// no outline, and its cells' number makes every later step long.
-void require_outline(std::span<const ObjectTouches> objects, const ContactClassifier& classifier,
-                     const std::string& pressure_unit) {
-  constexpr std::size_t few = 10;
-  for (const ObjectTouches& object : objects) {
-    double least = std::numeric_limits<double>::infinity();
-    const bool all = std::ranges::all_of(object.touches, [&](const Touch& touch) {
-      const std::vector<Reading> readings = classifier.classify(touch);
-      for (std::size_t k = 0; k < readings.size(); ++k) {
-        least = readings[k] == Reading::in_contact ? std::min(least, touch.pressure[k]) : least;
-      }
-      return std::ranges::none_of(readings, [](Reading r) { return r == Reading::no_contact; });
-    });
-    if (all && object.touches.size() >= few && std::isfinite(least)) {
-      refuse(fmt::format("object '{}'", object.label),
-             "every element is in contact in all {} touches, which read {:.3g} {} or more, so that "
-             "its map would have no outline; subtract what the untouched array reads, or give a "
-             "higher --threshold",
-             object.touches.size(), least, pressure_unit);
-    }
-  }
+void add_map_flags(CLI::App& command, MapFlags& flags) {
+  command
+      .add_option("RECORDING", flags.recordings,
+                  "Recordings of touches (HDF5), or drawings (PNG), each of one object")
+      ->required();
+  command
+      .add_option("-o,--output", flags.output,
+                  "Map to write (HDF5), or FOLDER/ for one map of each object, or several with "
+                  "--unposed")
+      ->required();
+  command
+      .add_option("--cell-mm", flags.cell_mm,
+                  "Edge of a cell, mm; with --unposed by default half the distance of neighbouring "
+                  "elements")
+      ->default_str("0.5");
+  command.add_option("--spread-mm", flags.spread_mm,
+                     "Standard deviation of the inverse sensor model, mm [default: a quarter of "
+                     "the distance of neighbouring elements; 0.5 for DigiTacts, for one element "
+                     "and for drawings; with --unposed 0.6 times that distance]");
+  command.add_option(
+      "--peak", flags.peak,
+      "Peak of the inverse sensor model, a probability p below 1 [default: 0.9]; of a "
+      "drawing, whose log odds lie within +-log(p / (1 - p)) [default: 0.999]");
+  command
+      .add_option("--prior", flags.prior,
+                  "Probability that an unseen cell is occupied; auto: the area of all objects "
+                  "divided by the area that their maps cover, with --unposed the share of elements "
+                  "in contact")
+      ->default_str("auto");
+  Request& request = flags.shared;
+  add_option_flag(command, request, "threshold",
+                  "Contact threshold, in the recording's pressure unit [default: learned where "
+                  "--unposed learns the sensor; else 2 kPa, and required for raw pressure]");
+  add_option_flag(command, request, "ratio",
+                  "Threshold as a fraction of the touch's largest pressure [default: 0.3]");
+  add_option_flag(command, request, "sensor-model",
+                  "Sensor model (YAML) whose threshold, ratio, spread and prior are the "
+                  "defaults; none learns no sensor [default: into a FOLDER/, the sensor is "
+                  "learned from the touches, and FOLDER/sensor.yaml is written where it is "
+                  "better than Eq. 7 on touches that are left out]");
+  add_option_flag(command, request, "touch-sd-mm",
+                  "How exact the robot's poses are: standard deviation of the sensor's true "
+                  "position about the reported one, along x and along y, mm. The touches are "
+                  "aligned to the map that they make [default: 0, exact]");
+  add_option_flag(command, request, "touch-sd-deg",
+                  "The same of the sensor's angle, degrees [default: 0]");
+  add_option_flag(command, request, "frames");
+  command.add_option("--symmetry", flags.symmetry,
+                     "n-fold rotational symmetry, where 1 is none and 0 any rotation; of all "
+                     "objects, or of some, such as nut=6,key=1. Where the map looks the same after "
+                     "turns, recognition takes them as equal once touches cannot tell them apart "
+                     "[default: 1]");
+  command.add_option(
+      "--origin", flags.origin,
+      "Where the object's frame lies in the robot frame of the touches: robot, at "
+      "its origin; centroid, at the middle of the occupied cells; X,Y,DEG, in mm and "
+      "degrees; auto, at the robot's origin where the map covers it, else at the "
+      "centroid. Of a drawing, in the frame of the picture's lower left corner, auto: at the "
+      "centroid [default: auto]");
+  command.add_flag("--mirror", flags.mirror,
+                   "The object is flat and may lie on its other side; with --unposed, presses of "
+                   "that side join the maps mirrored");
+  command.add_option("--label", flags.label,
+                     "Label of the map [default: the object that the recording names, "
+                     "or a drawing's file]");
+  command.add_option("--group", flags.group,
+                     "How touches are grouped, such as by the person or the day that made them. A "
+                     "group is left out as a whole where it is learned how sure to be, so that "
+                     "this holds for other people and days: recording, a group a file; label, a "
+                     "group for each GROUP of recordings whose object is LABEL@GROUP, of which "
+                     "LABEL is the map's");
+  command.add_flag("--unposed", flags.unposed,
+                   "The sensor's poses are unknown: find how the presses of an object lie beside "
+                   "each other, and build its maps from their means. For arrays so large that a "
+                   "press shows much of the object. Lists presses that fit poorly, and leaves out "
+                   "those that fit nowhere");
+  command
+      .add_option("--max-maps", flags.max_maps,
+                  "With --unposed, most maps of an object: presses that do not fit a map begin "
+                  "another, FOLDER/LABEL.2.map.h5. More maps recognise better and take longer. "
+                  "Where there are no more presses than maps, each press keeps a map of its own "
+                  "[default: 4 into a FOLDER/, 1 into a MAP]")
+      ->check(require_whole_number);
+  command.add_option("--png", flags.png, "Picture to write (PNG): all maps side by side");
+  command.add_option("--ros", flags.ros,
+                     "Folder to write every map to as PGM and YAML, for ROS's map_server");
+  add_option_flag(command, request, "device",
+                  "Vulkan device, by index or a part of its name; --unposed uses none");
 }
 
 void build_maps(const MapFlags& flags) {
   const std::vector<Recording> recordings = read_touch_recordings(flags.recordings);
-  const std::optional<LearnedSensor> sensor = sensor_of(flags, recordings);
-  MapOptions model = map_options(flags, recordings, sensor);
-  const std::optional<double> prior = given_prior(flags, sensor);
-  const ObjectOrigin origin = object_origin(flags);
-  const GroupedTouches grouped = group_by_label(flags, recordings, model.classifier);
-  std::vector<ObjectTouches> objects = grouped.objects;
-
-  require_outline(objects, model.classifier, recordings.front().pressure_unit);
-
-  std::vector<std::filesystem::path> map_paths;
-  std::vector<std::string> names;
-  for (const ObjectTouches& object : objects) {
-    names.push_back(object.label);
-    map_paths.push_back(map_path(flags, object.label));
-  }
-  const bool learns = learns_sensor(flags);
-  std::vector<std::filesystem::path> outputs = map_paths;
-  if (learns) {
-    outputs.push_back(sensor_file(flags));
-  }
-  prepare_outputs(flags, outputs, names);
-  warn_of_unknown_poses(recordings);
-  for (const Recording& recording : recordings) {
-    for (const SetupFinding& finding : recording.findings) {
-      tell_on_stderr(fmt::format("{}: {}", recording.path, finding.words));
-    }
-  }
-
-  Device device = Device::open(flags.request.device);
-  if (const auto suspicion = suspected_order(device, recordings, model)) {
-    fmt::print(stderr, "palpate: {} ({:.0f} nats; palpate check tells more)\n",
-               in_flags(suspicion->words), suspicion->nats);
-  }
-  align(flags, model, objects);
-  model.sensor.prior = prior ? *prior : estimate_prior(device, objects, model);
-  std::vector<OccupancyGrid> maps;
-  std::vector<std::optional<RotationalSymmetry>> symmetries;
+  const MapTask task = map_task(flags, recordings);
+  prepare_outputs(flags, task.names(), task.learns_sensor);
+  std::ranges::for_each(task.remarks, tell_on_stderr);
+  DeviceInWaiting device(flags.shared.device);
+  LearnedMaps learned;
   {
-    Progress progress("building maps");
-    MapBuilder builder(device, model);
-    for (const ObjectTouches& object : objects) {
-      const auto show = [&](double fraction) {
-        progress.show((static_cast<double>(maps.size()) + fraction) /
-                      static_cast<double>(objects.size()));
-      };
-      // What was learned is compared with more than log odds.
-      maps.push_back(sensor ? observed_map(object.touches, model, object.label)
-                            : build_map(builder, object, show));
-      if (learns) {
-        OccupancyGrid observed = observed_map(object.touches, model, object.label);
-        maps.back().observations = std::move(observed.observations);
-        maps.back().mean_level = std::move(observed.mean_level);
-      }
-      maps.back().mirror = flags.mirror;
-      MapSource source{gathered(object, recordings.front().pressure_unit), model};
-      if (!flags.group.empty()) {
-        std::ranges::transform(grouped.sources[maps.size() - 1], std::back_inserter(source.groups),
-                               &TouchSource::group);
-      }
-      judge_left_out(device, source);
-      maps.back().source = std::make_shared<const MapSource>(std::move(source));
-      settle_frame(origin, maps.back());
-      symmetries.push_back(settle_symmetry(flags, maps.back()));
-    }
+    Progress progress("learning maps");
+    learned = learn_maps(
+        task, [&]() -> Device& { return device(); },
+        [&](double fraction) { progress.show(fraction); });
   }
-
-  const std::optional<MapSensor> learned =
-      learns ? std::optional(learn_sensor(flags, maps, map_paths, model)) : std::nullopt;
-  std::vector<WrittenMap> written;
-  for (std::size_t i = 0; i < maps.size(); ++i) {
-    written.push_back(
-        {map_paths[i], fmt::format("{} touches", objects[i].touches.size()), symmetries[i]});
-  }
-  write_maps(flags, maps, written, [&] {
-    if (learned) {
-      write_sensor(flags, *learned);
-    }
-  });
+  std::ranges::for_each(learned.remarks, tell_on_stderr);
+  write_maps(flags, learned);
 }
 
 }  // namespace
+
+void prepare_outputs(const MapFlags& flags, const std::vector<std::string>& names,
+                     bool with_sensor) {
+  CommandFiles files;
+  for (const std::string& recording : flags.recordings) {
+    files.reads("RECORDING", recording);
+  }
+  if (flags.shared.sensor_model != no_sensor_model) {
+    files.reads("--sensor-model", flags.shared.sensor_model);
+  }
+  if (std::error_code none; std::filesystem::is_regular_file(flags.array, none)) {
+    files.reads("--array", flags.array);
+  }
+  std::vector<std::filesystem::path> outputs;
+  for (const std::string& name : names) {
+    outputs.push_back(flags.map_file(name));
+  }
+  if (with_sensor) {
+    outputs.push_back(flags.sensor_file());
+  }
+  for (const std::filesystem::path& path : outputs) {
+    if (flags.to_folder()) {
+      files.writes_in("-o", path.parent_path(), path.filename().string());
+    } else {
+      files.writes("-o", path);
+    }
+  }
+  if (!flags.png.empty()) {
+    files.writes("--png", flags.png);
+  }
+  if (!flags.ros.empty()) {
+    for (const std::string& name : names) {
+      const std::filesystem::path yaml = ros_path(flags, name);
+      for (const std::filesystem::path& file :
+           {yaml, std::filesystem::path(yaml).replace_extension(".pgm")}) {
+        files.writes_in("--ros", file.parent_path(), file.filename().string());
+      }
+    }
+  }
+  files.prepare();
+}
+
+void write_maps(const MapFlags& flags, const LearnedMaps& learned) {
+  // Drawn before anything is written, so that a failure leaves nothing behind.
+  std::vector<OccupancyGrid> drawn;
+  for (const auto& [name, map] : learned.maps) {
+    drawn.push_back(map);
+    drawn.back().label = name;
+  }
+  const std::string picture = flags.png.empty() ? "" : draw_maps(drawn);
+  if (!flags.ros.empty()) {
+    make_folder(flags.ros);
+  }
+  save(flags, learned);
+  for (const std::string& line : learned.words) {
+    fmt::print("{}\n", in_flags(line));
+  }
+  for (std::size_t i = 0; i < drawn.size() && !flags.ros.empty(); ++i) {
+    const std::filesystem::path yaml = ros_path(flags, learned.maps[i].name);
+    write_map_server(yaml, learned.maps[i].map);
+    fmt::print("{}\n", yaml.string());
+  }
+  if (!flags.png.empty()) {
+    write_file(flags.png, picture);
+    fmt::print("{}\n", flags.png);
+  }
+}
 
 void add_map(CLI::App& app) {
   auto* command = app.add_subcommand("map",
@@ -242,13 +213,11 @@ void add_map(CLI::App& app) {
   const auto flags = std::make_shared<MapFlags>();
   add_map_flags(*command, *flags);
   add_drawing_flags(*command, *flags);
-  command->callback([flags, command] {
-    finish_map_flags(*command, *flags);
+  command->callback([flags] {
     if (flags->of_drawings()) {
       build_drawn_maps(*flags);
-    } else if (flags->unposed) {
-      build_unposed_maps(*flags);
     } else {
+      require_no_drawing_flags(*flags);
       build_maps(*flags);
     }
   });

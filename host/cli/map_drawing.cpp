@@ -1,4 +1,4 @@
-#include "cli/map_drawing.hpp"
+#include "cli/map_flags.hpp"
 
 #include <algorithm>
 #include <filesystem>
@@ -8,7 +8,6 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include "cli/map_output.hpp"
 #include "cli/options.hpp"
 #include "cli/recognition_flags.hpp"
 #include "io/drawing_file.hpp"
@@ -29,15 +28,15 @@ void require_none(std::initializer_list<std::pair<const char*, bool>> given, con
 }
 
 void check_flags(const MapFlags& flags) {
-  require_none({{"--threshold", flags.request.threshold.has_value()},
-                {"--ratio", flags.request.ratio.has_value()},
-                {"--sensor-model", !flags.request.sensor_model.empty()},
-                {"--frames", flags.request.frames.has_value()},
-                {"--touch-sd-mm", flags.request.touch_sd_mm.has_value()},
-                {"--touch-sd-deg", flags.request.touch_sd_deg.has_value()},
+  require_none({{"--threshold", flags.shared.threshold.has_value()},
+                {"--ratio", flags.shared.ratio.has_value()},
+                {"--sensor-model", !flags.shared.sensor_model.empty()},
+                {"--frames", flags.shared.frames.has_value()},
+                {"--touch-sd-mm", flags.shared.touch_sd_mm.has_value()},
+                {"--touch-sd-deg", flags.shared.touch_sd_deg.has_value()},
                 {"--group", !flags.group.empty()},
                 {"--unposed", flags.unposed},
-                {"--device", !flags.request.device.empty()}},
+                {"--device", !flags.shared.device.empty()}},
                "a drawing has no touches");
   for (const std::string& path : flags.recordings) {
     if (!is_drawing(path)) {
@@ -61,11 +60,10 @@ void check_flags(const MapFlags& flags) {
 /// The options of maps; the prior only where it is given.
 DrawnMapOptions options_of(const MapFlags& flags) {
   DrawnMapOptions options;
-  options.cell_mm = require_above("--cell-mm", flags.cell_mm, 0.0);
-  options.spread_mm =
-      require_above("--spread-mm", flags.spread_mm.value_or(options.spread_mm), 0.0);
+  options.cell_mm = flags.cell_mm.value_or(options.cell_mm);
+  options.spread_mm = flags.spread_mm.value_or(options.spread_mm);
   options.peak = flags.peak.value_or(options.peak);
-  options.prior = given_prior(flags, {}).value_or(options.prior);
+  options.prior = given_prior(flags).value_or(options.prior);
   options.felt_share = flags.felt_share.value_or(options.felt_share);
   if (!flags.array.empty()) {
     options.reach_mm = array_reach_mm(import_array({.array = flags.array}).elements_mm);
@@ -131,6 +129,7 @@ void require_no_drawing_flags(const MapFlags& flags) {
 
 void build_drawn_maps(const MapFlags& flags) {
   check_flags(flags);
+  flags.validate();
   const DrawnMapOptions options = options_of(flags);
   ObjectOrigin origin = object_origin(flags);
   if (origin.kind == ObjectOrigin::Kind::automatic) {
@@ -141,13 +140,7 @@ void build_drawn_maps(const MapFlags& flags) {
   }
   const std::vector<std::string> labels = labels_of(flags);
   require_known_symmetries(flags, labels);
-  std::vector<WrittenMap> written;
-  std::vector<std::filesystem::path> paths;
-  for (std::size_t i = 0; i < labels.size(); ++i) {
-    paths.push_back(map_path(flags, labels[i]));
-    written.push_back({paths.back(), flags.recordings[i]});
-  }
-  prepare_outputs(flags, paths, labels);
+  prepare_outputs(flags, labels);
 
   std::vector<OccupancyGrid> maps;
   for (std::size_t i = 0; i < labels.size(); ++i) {
@@ -164,12 +157,14 @@ void build_drawn_maps(const MapFlags& flags) {
     settle_frame(origin, maps.back());
     maps.back().mirror = flags.mirror;
   }
-  const double prior = given_prior(flags, {}).value_or(occupied_share(maps));
+  const double prior = given_prior(flags).value_or(occupied_share(maps));
+  LearnedMaps drawn;
   for (std::size_t i = 0; i < maps.size(); ++i) {
     maps[i].prior = prior;
-    written[i].symmetry = settle_symmetry(flags, maps[i]);
+    const auto symmetry = settle_symmetry(flags, maps[i]);
+    drawn.add(flags, std::move(maps[i]), flags.recordings[i], symmetry);
   }
-  write_maps(flags, maps, written);
+  write_maps(flags, drawn);
 }
 
 }  // namespace palpate::cli

@@ -2,7 +2,6 @@
 
 #include <charconv>
 #include <cmath>
-#include <numbers>
 #include <system_error>
 
 namespace palpate::cli {
@@ -41,14 +40,6 @@ void give_result(const std::string& json_file, const std::string& json, const st
   fmt::print("{}", json_file == "-" ? json : text);
 }
 
-void make_folder(const std::filesystem::path& folder) {
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error || !std::filesystem::is_directory(folder)) {
-    refuse(folder, "the folder cannot be made ({}); choose another name", error.message());
-  }
-}
-
 std::string array_table(std::span<const glm::dvec2> elements_mm) {
   std::string text = "x,y\n";
   for (const glm::dvec2& p : elements_mm) {
@@ -56,8 +47,5 @@ std::string array_table(std::span<const glm::dvec2> elements_mm) {
   }
   return text;
 }
-
-double degrees(double rad) { return rad * 180.0 / std::numbers::pi; }
-double radians(double deg) { return deg * std::numbers::pi / 180.0; }
 
 }  // namespace palpate::cli

@@ -9,6 +9,7 @@
 
 #include "io/atomic_file.hpp"
 #include "io/input_file.hpp"
+#include "model/angle_unit.hpp"
 
 namespace palpate::cli {
 
@@ -34,13 +35,8 @@ void write_file(const std::filesystem::path& file, std::string_view bytes,
 /// Gives a result to its readers: as JSON to a file or, where it is "-", to standard output, unless
 /// it is ""; and as text to standard output, unless the JSON stands there. Throws Error.
 void give_result(const std::string& json_file, const std::string& json, const std::string& text);
-/// Makes the folder if it does not exist. Throws Error.
-void make_folder(const std::filesystem::path& folder);
 
 /// An array as a table (CSV: x, y in mm) that palpate import takes as --array.
 std::string array_table(std::span<const glm::dvec2> elements_mm);
-
-double degrees(double rad);
-double radians(double deg);
 
 }  // namespace palpate::cli

@@ -76,7 +76,7 @@ void simulate(const SimulateArguments& options) {
   if (unknown) {
     T_object_robot = options.object_pose == "random"
                          ? random_object_pose(options.seed)
-                         : parse_pose("--object-pose", options.object_pose);
+                         : parse_pose("object-pose", options.object_pose);
   }
 
   std::vector<Pose> poses = sensor_poses(options.poses, options.seed);

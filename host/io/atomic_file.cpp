@@ -136,4 +136,12 @@ bool AtomicFile::commit_new() {
   return true;
 }
 
+void make_folder(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error || !std::filesystem::is_directory(folder)) {
+    refuse(folder, "the folder cannot be made ({}); choose another name", error.message());
+  }
+}
+
 }  // namespace palpate

@@ -46,4 +46,8 @@ class AtomicFile {
   std::filesystem::path temporary_;  ///< empty once committed
 };
 
+/// Makes the folder if it does not exist.
+/// @throws Error where it cannot be made
+void make_folder(const std::filesystem::path& folder);
+
 }  // namespace palpate

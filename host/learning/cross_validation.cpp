@@ -86,38 +86,11 @@ class FoldTrial {
     }
     const auto scores = score(evidence, progress);
     for (std::size_t i = 0; i < asked.presses.size(); ++i) {
-      ScoredPress scored{.truth = *label_of(asked.presses[i].label),
-                         .fold = fold,
-                         .touches = evidence[i].size(),
-                         .log_evidence = {},
-                         .log_density = log_densities(evidence[i].front())};
-      std::ranges::transform(scores[i], std::back_inserter(scored.log_evidence),
-                             &LabelScore::log_evidence);
-      if (const auto fit = stranger_fit_of(evidence[i], scores[i], scored.truth)) {
-        result.stranger_fits[asked.presses[i].label].push_back(*fit);
-      }
+      HeldOut& unknown = result.unknowns.emplace_back(HeldOut{.fold = fold, .log_evidence = {}});
       if (i >= tried.size()) {
-        const std::size_t half = asked.half_of_group[i - tried.size()];
-        if (half == 0) {
-          scored.error_mm =
-              pose_error_of(evidence[i], scored.truth, *asked.presses[i].T_object_robot);
-        }
-        result.groups[half].push_back(std::move(scored));
-        continue;
+        unknown.half = asked.half_of_group[i - tried.size()];
       }
-      // A press of which nothing is In Contact says nothing of its object.
-      if (evidence[i].front().in_contact()) {
-        if (const auto fit =
-                fit_of(evidence[i], scores[i], scored.truth, asked.presses[i].T_object_robot)) {
-          result.fit_z[asked.presses[i].label].push_back(fit->z);
-        }
-        if (asked.presses[i].T_object_robot && model_.table) {
-          if (const auto fit = fit_of(evidence[i], scores[i], scored.truth, {})) {
-            result.best_fit_z.push_back(fit->z);
-          }
-        }
-      }
-      result.presses.push_back(std::move(scored));
+      judge(asked.presses[i], evidence[i], scores[i], unknown);
     }
     if (options_.bins && model_.table) {
       result.place_errors = errors_of(tried);
@@ -164,7 +137,33 @@ class FoldTrial {
     return scores;
   }
 
-  /// See CrossValidation::groups.
+  /// Fills in what the model says of a press, or of a group.
+  void judge(const Press& press, std::span<const TouchEvidence> evidence,
+             const std::vector<LabelScore>& scores, HeldOut& unknown) const {
+    unknown.truth = *label_of(press.label);
+    unknown.touches = evidence.size();
+    std::ranges::transform(scores, std::back_inserter(unknown.log_evidence),
+                           &LabelScore::log_evidence);
+    unknown.log_density = log_densities(evidence.front());
+    unknown.stranger_fit = stranger_fit_of(evidence, scores, unknown.truth);
+    if (unknown.half == 0) {
+      unknown.error_mm = pose_error_of(evidence, unknown.truth, *press.T_object_robot);
+    }
+    // A press of which nothing is In Contact says nothing of its object.
+    if (unknown.half || !evidence.front().in_contact()) {
+      return;
+    }
+    const auto z_at = [&](const std::optional<Pose>& T_object_robot) {
+      const std::optional<Fit> fit = fit_of(evidence, scores, unknown.truth, T_object_robot);
+      return fit ? std::optional(fit->z) : std::nullopt;
+    };
+    unknown.fit_z = z_at(press.T_object_robot);
+    if (press.T_object_robot && model_.table) {
+      unknown.best_fit_z = z_at({});
+    }
+  }
+
+  /// See HeldOut::error_mm.
   double pose_error_of(std::span<const TouchEvidence> press, std::size_t label,
                        const Pose& T_object_robot) const {
     constexpr int steps = 3;  // to either side
@@ -272,7 +271,7 @@ class FoldTrial {
     return best_fit(press, scores, labels);
   }
 
-  /// See CrossValidation::stranger_fits.
+  /// See HeldOut::stranger_fit.
   std::optional<StrangerFit> stranger_fit_of(std::span<const TouchEvidence> press,
                                              const std::vector<LabelScore>& scores,
                                              std::size_t truth) const {
@@ -284,6 +283,7 @@ class FoldTrial {
     const std::optional<Fit> fit = best_fit(press, scores, others);
     return StrangerFit{fit.value(), static_cast<std::size_t>(in_contact)};
   }
+
   /// Errors of the places of presses at known poses.
   std::vector<PlaceError> errors_of(const std::vector<Press>& presses) const {
     std::vector<PlaceError> errors;
@@ -324,25 +324,10 @@ class FoldTrial {
 
 }  // namespace
 
-CrossValidation joined(std::span<const CrossValidation> folds) {
-  CrossValidation all;
-  const auto append = [](const auto& from, auto& to) {
-    to.insert(to.end(), from.begin(), from.end());
-  };
-  for (const CrossValidation& fold : folds) {
-    append(fold.presses, all.presses);
-    append(fold.groups[0], all.groups[0]);
-    append(fold.groups[1], all.groups[1]);
-    append(fold.best_fit_z, all.best_fit_z);
-    append(fold.place_errors, all.place_errors);
-    for (const auto& [label, z] : fold.fit_z) {
-      append(z, all.fit_z[label]);
-    }
-    for (const auto& [label, fits] : fold.stranger_fits) {
-      append(fits, all.stranger_fits[label]);
-    }
-  }
-  return all;
+CrossValidation& CrossValidation::operator+=(const CrossValidation& fold) {
+  unknowns.insert(unknowns.end(), fold.unknowns.begin(), fold.unknowns.end());
+  place_errors.insert(place_errors.end(), fold.place_errors.begin(), fold.place_errors.end());
+  return *this;
 }
 
 CrossValidation try_fold(std::size_t fold, const std::vector<Press>& presses,

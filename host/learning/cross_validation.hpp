@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <functional>
-#include <map>
 #include <optional>
 #include <set>
 #include <span>
@@ -11,10 +10,9 @@
 
 #include "estimation/maps/left_out_fit.hpp"
 #include "learning/contact_learning.hpp"
+#include "learning/held_out.hpp"
 #include "learning/press.hpp"
-#include "learning/stranger_fit.hpp"
 #include "learning/table_learning.hpp"
-#include "learning/temperature_fit.hpp"
 #include "learning/training_maps.hpp"
 #include "learning/tried_bins.hpp"
 #include "palpate/learned_sensor.hpp"
@@ -86,27 +84,16 @@ struct CrossValidationOptions {
 
 /// What models that had not seen the presses said of them.
 struct CrossValidation {
-  std::vector<ScoredPress> presses;  ///< with a map of their object in the other folds
-  /// Several presses at known poses of one object and fold together, with
-  /// CrossValidationOptions::bins. A press is in groups of one half only. None where a fold has
-  /// fewer presses of each object. Those of the first half have the pose error (Eq. 17-20), in mm,
-  /// of the mean by their likelihood over poses about their own, on their object's map.
-  GroupHalves groups;
-  /// [label] Fit::z of presses with an element In Contact: at their pose where it is known, or else
-  /// on the best map at about the best pose.
-  std::map<std::string, std::vector<double>> fit_z;
-  /// Fit::z of presses at known poses with an element In Contact, by a table: on the map that fits
-  /// best, at about the best pose.
-  std::vector<double> best_fit_z;
-  /// [label] How presses with an element In Contact and groups fit the best of all other objects,
-  /// at about its best pose, by a table. None with maps of fewer than two others.
-  std::map<std::string, std::vector<StrangerFit>> stranger_fits;
+  /// Presses with a map of their object in the other folds and, with CrossValidationOptions::bins,
+  /// groups of several of one object and fold. A press is in groups of one half only. A fold with
+  /// fewer presses of each object has no groups.
+  std::vector<HeldOut> unknowns;
   std::vector<PlaceError> place_errors;  ///< of presses at known poses, by a table
-};
-/// The cross-validation of several folds.
-CrossValidation joined(std::span<const CrossValidation> folds);
 
-/// Presses in one of CrossValidation::groups, and most groups that a press is in.
+  CrossValidation& operator+=(const CrossValidation& fold);
+};
+
+/// Presses in a group, and most groups that a press is in.
 inline constexpr std::size_t presses_in_group = 3;
 inline constexpr std::size_t groups_of_press = 3;
 

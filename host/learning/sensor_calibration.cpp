@@ -12,6 +12,7 @@
 #include "learning/array_place.hpp"
 #include "learning/feature_learning.hpp"
 #include "learning/host_progress.hpp"
+#include "learning/temperature_fit.hpp"
 #include "model/element_spacing.hpp"
 #include "palpate/error.hpp"
 
@@ -125,49 +126,66 @@ double gamma_of(const PlacedPresses& placed, const TableLearning& table,
   return fit_gamma(all, learned.readings.prior);
 }
 
-/// Tries every fold's presses on the models_of() the others, [model][fold].
-std::vector<std::vector<CrossValidation>> cross_validate(const std::vector<Press>& presses,
-                                                         const std::vector<std::string>& labels,
-                                                         const std::vector<TableKind>& tables,
-                                                         const ModelLearning& how,
-                                                         const CrossValidationOptions& options,
-                                                         SerialProgress& progress) {
-  std::vector<std::vector<CrossValidation>> tried(tables.size() + 1);
-  const double share = 1.0 / static_cast<double>(options.folds);
-  const double learning = static_cast<double>(tables.size()) * table_cost;
-  for (std::size_t fold = 0; fold < options.folds; ++fold) {
-    const std::vector<Press> others = presses_without(fold, presses, options.folds);
-    if (others.size() == presses.size()) {  // there are fewer groups than folds
-      progress.part(learning + static_cast<double>(tried.size()) * share)(1.0);
-      for (std::vector<CrossValidation>& of_model : tried) {
-        of_model.emplace_back();
-      }
-      continue;
-    }
-    const std::vector<FoldModel> models = models_of(others, tables, how, progress.part(learning));
-    for (std::size_t i = 0; i < tried.size(); ++i) {
-      tried[i].push_back(models.empty() ? CrossValidation()
-                                        : try_fold(fold, presses, labels, models[i], options,
-                                                   progress.part(share)));
-    }
-  }
-  return tried;
-}
-
 /// A table, and what it says of presses that it has not seen.
 struct TriedModel {
+  TableKind kind;
   TableLearning how;
   PlacedPresses placed;
-  std::vector<CrossValidation> folds;
-  CrossValidation all;    ///< the folds together
-  TemperedPresses after;  ///< the folds together, with temperature and features
+  std::vector<HeldOut> unknowns = {};
+  std::vector<HeldOut> after = {};  ///< with temperature and features
+  std::vector<PlaceError> place_errors = {};
 };
+
+/// What is tried on presses that it has not seen.
+struct Trials {
+  std::vector<TriedModel> tables;
+  std::vector<HeldOut> eq7;
+};
+
+/// Learns each table from all presses, and tries every fold's presses on the models_of() the
+/// others.
+Trials cross_validate(const LearnedPresses& learned, const std::vector<std::string>& labels,
+                      const std::vector<TableKind>& tables, const ModelLearning& how,
+                      const CrossValidationOptions& options,
+                      const std::function<void(double)>& progress) {
+  const auto count = static_cast<double>(tables.size());
+  const auto folds = static_cast<double>(options.folds);
+  SerialProgress work(count * (1.0 + folds) * table_cost + count + 1.0, progress);
+  Trials trials;
+  for (const TableKind& kind : tables) {
+    TriedModel& one =
+        trials.tables.emplace_back(TriedModel{kind, table_learning(kind, learned, how), {}});
+    one.placed = learn_table(learned.presses, learned.maps, one.how, work.part(table_cost));
+  }
+  std::vector<CrossValidation> found(tables.size() + 1);  // of Eq. 7 last
+  for (std::size_t fold = 0; fold < options.folds; ++fold) {
+    const std::vector<Press> others = presses_without(fold, learned.presses, options.folds);
+    const auto show_learning = work.part(count * table_cost);
+    if (others.size() == learned.presses.size()) {  // there are fewer groups than folds
+      work.part((count + 1.0) / folds)(1.0);
+      continue;
+    }
+    const std::vector<FoldModel> models = models_of(others, tables, how, show_learning);
+    for (std::size_t i = 0; i < models.size(); ++i) {
+      found[i] +=
+          try_fold(fold, learned.presses, labels, models[i], options, work.part(1.0 / folds));
+    }
+  }
+  for (std::size_t i = 0; i < tables.size(); ++i) {
+    TriedModel& one = trials.tables[i];
+    one.unknowns = std::move(found[i].unknowns);
+    one.place_errors = std::move(found[i].place_errors);
+    one.after = tempered_by_folds(one.unknowns);
+  }
+  trials.eq7 = std::move(found.back().unknowns);
+  return trials;
+}
 
 /// The first table, unless a later one is clearly better about presses, without those of a fold.
 const TriedModel& kept(const std::vector<TriedModel>& tried,
                        std::optional<std::size_t> without = {}) {
   const auto losses = [&](const TriedModel& one) {
-    return losses_of(without ? of_fold(one.after.presses, *without, false) : one.after.presses);
+    return losses_of(without ? of_fold(one.after, *without, false) : one.after);
   };
   const TriedModel* best = &tried.front();
   for (const TriedModel& one : tried) {
@@ -176,82 +194,118 @@ const TriedModel& kept(const std::vector<TriedModel>& tried,
   return *best;
 }
 
+/// What is said of each fold's presses by the table that the other folds keep.
+std::vector<HeldOut> said_by_kept(const std::vector<TriedModel>& tried, std::size_t folds,
+                                  std::vector<HeldOut> TriedModel::*said) {
+  std::vector<HeldOut> all;
+  for (std::size_t fold = 0; fold < folds; ++fold) {
+    std::ranges::move(of_fold(kept(tried, fold).*said, fold, true), std::back_inserter(all));
+  }
+  return all;
+}
+
+/// The distributions of the features of presses at unknown poses, with their weight.
+std::optional<LearnedFeatures> features_of(const LearnedPresses& learned, double weight) {
+  if (at_known_poses(learned.presses)) {
+    return {};
+  }
+  LearnedFeatures features = learn_features(learned.presses, learned.readings.classifier);
+  features.weight = weight;
+  return features;
+}
+
+/// The scale of the objects' z together, of best fits and of strangers; none where no object's z
+/// differ.
+std::optional<FitScale> fit_scale_of(std::span<const HeldOut> unknowns,
+                                     const std::vector<Press>& presses) {
+  std::vector<FitScale> scales;
+  for (const auto& [label, z] : by_label(unknowns, &HeldOut::fit_z)) {
+    if (const std::optional<FitScale> of_label = scale_of(z)) {
+      scales.push_back(*of_label);
+    }
+  }
+  if (scales.empty()) {
+    return {};
+  }
+  FitScale scale = pooled(scales);
+  std::vector<double> best_z;
+  for (const HeldOut& press : unknowns) {
+    if (press.best_fit_z) {
+      best_z.push_back(*press.best_fit_z);
+    }
+  }
+  if (const auto best = scale_of(best_z)) {
+    scale.alone = {best->mean, best->sd};
+  }
+  scale = with_strangers(by_label(unknowns, &HeldOut::stranger_fit), scale);
+  scale.array = FitArray{static_cast<double>(presses.front().touches.front().elements_mm.size()),
+                         spacing_mm_of(presses)};
+  return scale;
+}
+
+/// The scores of groups; none where there are no groups.
+std::optional<GroupScores> group_scores_of(std::span<const HeldOut> eq7,
+                                           std::span<const HeldOut> table,
+                                           std::span<const HeldOut> after) {
+  const auto scores = [](std::span<const HeldOut> all) { return scores_of(groups_in(all), 1.0); };
+  if (groups_in(after).empty()) {
+    return {};
+  }
+  return GroupScores{presses_in_group, scores(eq7), scores(table), scores(after)};
+}
+
+/// Warns where Eq. 7 with a temperature is clearly better about presses than the table is; what few
+/// presses could show by chance is no warning.
+std::optional<std::string> warning_of_loss(std::span<const HeldOut> eq7,
+                                           std::span<const HeldOut> after) {
+  const std::vector<HeldOut> without = tempered_by_folds(alone(eq7));
+  if (!is_clearly_less(losses_of(without), losses_of(after))) {
+    return {};
+  }
+  return fmt::format(
+      "on touches that it has not seen, the learned table has a log-loss of {:.3f}, worse than "
+      "{:.3f} by Eq. 7 with a temperature: give more touches of each object, or recognize without "
+      "the sensor model",
+      scores_of(alone(after), 1.0).log_loss, scores_of(without, 1.0).log_loss);
+}
+
 /// Adds how right the cross-validation is: each fold's presses are judged by the table that the
 /// other folds keep.
-void judge(const CrossValidation& eq7, const std::vector<TriedModel>& tried, bool known_poses,
-           SensorCalibration& judged) {
-  const std::size_t folds = tried.front().folds.size();
-  std::vector<CrossValidation> of_folds;
-  TemperedPresses after;
-  for (std::size_t fold = 0; fold < folds; ++fold) {
-    const TriedModel& model = kept(tried, fold);
-    of_folds.push_back(model.folds[fold]);
-    std::ranges::copy(of_fold(model.after.presses, fold, true), std::back_inserter(after.presses));
-    std::ranges::copy(of_fold(model.after.groups, fold, true), std::back_inserter(after.groups));
+void judge(const Trials& trials, std::size_t folds, bool known_poses, SensorCalibration& judged) {
+  const std::vector<HeldOut>& eq7 = trials.eq7;
+  const auto table = said_by_kept(trials.tables, folds, &TriedModel::unknowns);
+  const auto after = said_by_kept(trials.tables, folds, &TriedModel::after);
+  for (const TriedModel& one : trials.tables) {
+    judged.tried.push_back({one.kind, scores_of(alone(one.after), 1.0).log_loss});
   }
-  const CrossValidation table = joined(of_folds);
-  judged.before = scores_of(eq7.presses, 1.0);
-  judged.table = scores_of(table.presses, 1.0);
-  judged.after = scores_of(after.presses, 1.0);
-  if (!after.groups.empty()) {
-    judged.groups = GroupScores{.touches = presses_in_group,
-                                .before = scores_of(both(eq7.groups), 1.0),
-                                .table = scores_of(both(table.groups), 1.0),
-                                .after = scores_of(after.groups, 1.0)};
-    judged.gain = gain_of(eq7, table, after.presses);
-  } else if (known_poses) {
-    judged.warnings.push_back(
-        fmt::format("too few touches to try {} of an object together on maps without them, so "
-                    "that how sure to be after several touches is not learned; give {} or more "
-                    "of each object",
-                    presses_in_group, presses_in_group * folds));
+  judged.before = scores_of(alone(eq7), 1.0);
+  judged.table = scores_of(alone(table), 1.0);
+  judged.after = scores_of(alone(after), 1.0);
+  judged.groups = group_scores_of(eq7, table, after);
+  if (judged.groups || !known_poses) {
+    judged.gain = gain_of(eq7, after);
   } else {
-    judged.gain = gain_of(eq7, table, after.presses);
+    judged.warnings.push_back(
+        fmt::format("too few touches to try {} of an object together on maps without them, so that "
+                    "how sure to be after several touches is not learned; give {} or more of each "
+                    "object",
+                    presses_in_group, presses_in_group * folds));
   }
-  const std::vector<ScoredPress> without = tempered_by_folds(eq7.presses).presses;
-  // What few presses could show by chance is no warning.
-  if (is_clearly_less(losses_of(without), losses_of(after.presses))) {
-    judged.warnings.push_back(fmt::format(
-        "on touches that it has not seen, the learned table has a log-loss of {:.3f}, worse than "
-        "{:.3f} by Eq. 7 with a temperature: give more touches of each object, or recognize "
-        "without the sensor model",
-        judged.after->log_loss, scores_of(without, 1.0).log_loss));
+  if (const auto warning = warning_of_loss(eq7, after)) {
+    judged.warnings.push_back(*warning);
   }
 }
 
-/// The scale of the objects' z together; none where no object's differ.
-std::optional<FitScale> fit_scale_of(const std::map<std::string, std::vector<double>>& objects) {
-  std::vector<FitScale> scales;
-  for (const auto& [label, z] : objects) {
-    if (const std::optional<FitScale> scale = scale_of(z)) {
-      scales.push_back(*scale);
-    }
-  }
-  return scales.empty() ? std::nullopt : std::optional(pooled(scales));
-}
-
-/// The sensor with how sure to be of what its table says.
-LearnedSensor with_confidence(LearnedSensor sensor, const CrossValidation& validation,
-                              const std::vector<Press>& presses) {
-  const TemperatureFit fit = fit_temperature(validation.presses, validation.groups);
+/// Sets what a table and its cross-validation say.
+void set_numbers(const TriedModel& model, const LearnedPresses& learned, LearnedSensor& sensor) {
+  const TemperatureFit fit = fit_temperature(model.unknowns);
+  sensor.table = model.placed.table;
+  sensor.gamma = gamma_of(model.placed, model.how, learned);
   sensor.temperature = fit.temperature;
   sensor.temperature_growth = fit.growth;
-  if (!at_known_poses(presses)) {
-    sensor.features = learn_features(presses, sensor.classifier);
-    sensor.features->weight = fit.feature_weight;
-  }
-  sensor.fit_scale = fit_scale_of(validation.fit_z);
-  if (sensor.fit_scale) {
-    if (const auto best = scale_of(validation.best_fit_z)) {
-      sensor.fit_scale->alone = {best->mean, best->sd};
-    }
-    sensor.fit_scale = with_strangers(validation.stranger_fits, *sensor.fit_scale);
-    sensor.fit_scale->array =
-        FitArray{static_cast<double>(presses.front().touches.front().elements_mm.size()),
-                 spacing_mm_of(presses)};
-  }
-  sensor.pose_scale = pose_scale_of(validation.place_errors);
-  return sensor;
+  sensor.features = features_of(learned, fit.feature_weight);
+  sensor.fit_scale = fit_scale_of(model.unknowns, learned.presses);
+  sensor.pose_scale = pose_scale_of(model.place_errors);
 }
 
 /// The calibration of the sensor with one table, of which nothing can be judged.
@@ -327,35 +381,14 @@ SensorCalibration calibrate_sensor(const std::vector<Press>& given_presses,
   if (bins) {
     bins = affordable_bins(*bins, learned, options);
   }
-  const auto table_count = static_cast<double>(tables.size());
-  const double learnings = table_count * (1.0 + static_cast<double>(options.folds));
-  SerialProgress work(learnings * table_cost + table_count + 1.0, progress);
-  std::vector<TriedModel> tried;
-  for (const TableKind& kind : tables) {
-    TriedModel& one = tried.emplace_back();
-    one.how = table_learning(kind, learned, how);
-    one.placed = learn_table(learned.presses, learned.maps, one.how, work.part(table_cost));
-  }
-  const std::vector<std::vector<CrossValidation>> validations =
-      cross_validate(learned.presses, labels, tables, how,
-                     {.folds = options.folds,
-                      .maps_per_object = options.most_maps,
-                      .bins = bins,
-                      .spacing_mm = readings.spacing_mm},
-                     work);
-  for (std::size_t i = 0; i < tables.size(); ++i) {
-    TriedModel& one = tried[i];
-    one.folds = validations[i];
-    one.all = joined(one.folds);
-    one.after = tempered_by_folds(one.all.presses, one.all.groups);
-    calibration.tried.push_back({tables[i], scores_of(one.after.presses, 1.0).log_loss});
-  }
-  const TriedModel& best = kept(tried);
-  calibration.sensor.table = best.placed.table;
-  calibration.sensor.gamma = gamma_of(best.placed, best.how, learned);
-  calibration.sensor = with_confidence(calibration.sensor, best.all, learned.presses);
-
-  judge(joined(validations.back()), tried, known_poses, calibration);
+  const Trials trials = cross_validate(learned, labels, tables, how,
+                                       {.folds = options.folds,
+                                        .maps_per_object = options.most_maps,
+                                        .bins = bins,
+                                        .spacing_mm = readings.spacing_mm},
+                                       progress);
+  set_numbers(kept(trials.tables), learned, calibration.sensor);
+  judge(trials, options.folds, known_poses, calibration);
   return calibration;
 }
 

@@ -8,13 +8,15 @@ namespace palpate {
 
 namespace {
 
-/// The logarithms of the pose errors of a cross-validation's groups: a group that is taken for
-/// another place of the object counts no more than ten that are placed a little better.
-std::vector<double> log_errors_of(const CrossValidation& validation) {
+/// The logarithms of the pose errors: a group that is taken for another place of the object counts
+/// no more than ten that are placed a little better.
+std::vector<double> log_errors_of(std::span<const HeldOut> all) {
   constexpr double least_mm = 1e-3;  // no smaller error tells anything
   std::vector<double> errors;
-  for (const ScoredPress& group : validation.groups[0]) {
-    errors.push_back(std::log(std::max(group.error_mm.value(), least_mm)));
+  for (const HeldOut& one : all) {
+    if (one.error_mm) {
+      errors.push_back(std::log(std::max(*one.error_mm, least_mm)));
+    }
   }
   return errors;
 }
@@ -25,24 +27,23 @@ double mean_of(std::span<const double> numbers) {
 
 }  // namespace
 
-std::vector<double> losses_of(std::span<const ScoredPress> presses) {
+std::vector<double> losses_of(std::span<const HeldOut> all) {
   std::vector<double> of_each;
-  for (const ScoredPress& press : presses) {
+  for (const HeldOut& press : alone(all)) {
     of_each.push_back(-press.log_evidence[press.truth]);
   }
   return of_each;
 }
 
-SensorGain gain_of(const CrossValidation& eq7, const CrossValidation& table,
-                   std::span<const ScoredPress> after) {
+SensorGain gain_of(std::span<const HeldOut> eq7, std::span<const HeldOut> tempered) {
   std::vector<double> losses_before;
-  for (const ScoredPress& press : eq7.presses) {
+  for (const HeldOut& press : alone(eq7)) {
     const double p = press_probabilities(press, 1.0)[press.truth];
     losses_before.push_back(-std::log(std::max(p, least_answer_probability)));
   }
-  const std::vector<double> losses = losses_of(after);
+  const std::vector<double> losses = losses_of(tempered);
   const std::vector<double> errors_before = log_errors_of(eq7);
-  const std::vector<double> errors = log_errors_of(table);
+  const std::vector<double> errors = log_errors_of(tempered);
   SensorGain gain{.log_loss_before = mean_of(losses_before),
                   .log_loss = mean_of(losses),
                   .less_loss = difference_of(losses, losses_before)};

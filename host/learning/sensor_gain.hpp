@@ -4,7 +4,6 @@
 #include <span>
 #include <vector>
 
-#include "learning/cross_validation.hpp"
 #include "learning/temperature_fit.hpp"
 
 namespace palpate {
@@ -14,7 +13,7 @@ struct SensorGain {
   double log_loss_before = 0.0;  ///< of single touches by Eq. 7 with gamma 0.1, in nats
   double log_loss = 0.0;         ///< of single touches by the table and the temperature
   LossDifference less_loss;      ///< of single touches, in nats
-  /// Geometric means of the pose errors of CrossValidation::groups; none where there are no groups.
+  /// Geometric means of HeldOut::error_mm; none where there are no groups.
   std::optional<double> error_mm_before;  ///< by Eq. 7
   std::optional<double> error_mm;         ///< by the table
   LossDifference less_error;              ///< of the errors' logarithms, where there are groups
@@ -25,11 +24,11 @@ struct SensorGain {
   bool gains = false;  ///< the first of both
 };
 
-/// @param after the presses of `table` with the temperature
-SensorGain gain_of(const CrossValidation& eq7, const CrossValidation& table,
-                   std::span<const ScoredPress> after);
+/// @param eq7 what Eq. 7 says, with gamma 0.1
+/// @param tempered what the table says, see tempered_by_folds()
+SensorGain gain_of(std::span<const HeldOut> eq7, std::span<const HeldOut> tempered);
 
-/// The losses of presses with their labels' log probabilities, in nats.
-std::vector<double> losses_of(std::span<const ScoredPress> presses);
+/// The losses of presses alone with their labels' log probabilities, in nats.
+std::vector<double> losses_of(std::span<const HeldOut> all);
 
 }  // namespace palpate

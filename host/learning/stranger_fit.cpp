@@ -10,7 +10,7 @@ namespace palpate {
 
 namespace {
 
-using StrangerFits = std::map<std::string, std::vector<StrangerFit>>;
+using StrangerFits = std::map<std::size_t, std::vector<StrangerFit>>;
 
 /// Finds the likeliest scale for the fits of one touch each, or of several.
 class LikeliestScale {
@@ -83,6 +83,18 @@ FitScale with_strangers(const StrangerFits& objects, FitScale scale) {
   scale.stranger_sd = of_several.best().stranger_sd;
   scale.stranger_alone = of_one.best().stranger_alone;
   return scale;
+}
+
+std::string unlearned_strangers(const LearnedSensor& sensor) {
+  const bool known_poses = sensor.bins.has_value();
+  if (!sensor.fit_scale || (known_poses ? sensor.fit_scale->stranger_sd.has_value()
+                                        : sensor.fit_scale->stranger_alone.has_value())) {
+    return "";
+  }
+  return known_poses ? "\"(none)\" goes by a figure of Palpate's own for how badly strangers fit; "
+                       "to learn it, give 15 touches or more of each of three objects"
+                     : "how badly strangers fit is not learned, so that a press does not tell "
+                       "\"(none)\"; give presses of three objects or more";
 }
 
 }  // namespace palpate

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "palpate/fit.hpp"
+#include "palpate/learned_sensor.hpp"
 
 namespace palpate {
 
@@ -22,7 +23,11 @@ struct StrangerFit {
 /// @param scale of learned objects' z
 /// @returns stranger_sd from 1 to 16, stranger_alone with a mean from -16 to 0 and an sd from 1 to
 /// 16
-FitScale with_strangers(const std::map<std::string, std::vector<StrangerFit>>& objects,
+FitScale with_strangers(const std::map<std::size_t, std::vector<StrangerFit>>& objects,
                         FitScale scale);
+
+/// Says, without a full stop, that touches did not tell how badly strangers fit; "" where they did,
+/// or where nothing of fits was learned.
+std::string unlearned_strangers(const LearnedSensor& sensor);
 
 }  // namespace palpate

@@ -1,8 +1,8 @@
 #include "learning/temperature_fit.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <iterator>
 #include <limits>
 #include <optional>
 #include <set>
@@ -28,7 +28,7 @@ double log_sum_exp(std::span<const double> nats) {
 }
 
 /// Logarithms of the labels' probabilities.
-std::vector<double> log_probabilities(const ScoredPress& press, double temperature,
+std::vector<double> log_probabilities(const HeldOut& press, double temperature,
                                       double feature_weight) {
   std::vector<double> nats = press.log_evidence;
   for (std::size_t i = 0; i < nats.size(); ++i) {
@@ -43,11 +43,11 @@ std::vector<double> log_probabilities(const ScoredPress& press, double temperatu
 }
 
 /// -log of the label's probability.
-double loss_of(const ScoredPress& press, double temperature, double feature_weight) {
+double loss_of(const HeldOut& press, double temperature, double feature_weight) {
   return -log_probabilities(press, temperature, feature_weight)[press.truth];
 }
 
-void require_presses(std::span<const ScoredPress> presses) {
+void require_presses(std::span<const HeldOut> presses) {
   if (presses.empty()) {
     throw Error(Fault::input, "calibration: no presses to try the model on; give more presses");
   }
@@ -63,7 +63,7 @@ double margin_of(std::span<const double> of_labels, std::size_t label) {
 }
 
 /// Whether a press has two labels to choose from.
-bool has_choice(const ScoredPress& press) {
+bool has_choice(const HeldOut& press) {
   return std::isfinite(margin_of(press.log_evidence, press.truth));
 }
 
@@ -80,9 +80,9 @@ double least_place(double lower, double upper, const Function& function) {
   return least_at(lower, upper, 1e-3 * (upper - lower), function);
 }
 
-std::set<std::size_t> folds_in(std::span<const ScoredPress> presses) {
+std::set<std::size_t> folds_in(std::span<const HeldOut> presses) {
   std::set<std::size_t> folds;
-  for (const ScoredPress& press : presses) {
+  for (const HeldOut& press : presses) {
     folds.insert(press.fold);
   }
   return folds;
@@ -92,10 +92,10 @@ std::set<std::size_t> folds_in(std::span<const ScoredPress> presses) {
 /// features.
 class PressLoss {
  public:
-  explicit PressLoss(std::span<const ScoredPress> presses) : presses_(presses) {
+  explicit PressLoss(std::span<const HeldOut> presses) : presses_(presses) {
     std::vector<double> margins;
     std::vector<double> of_features;
-    for (const ScoredPress& press : presses) {
+    for (const HeldOut& press : presses) {
       if (!has_choice(press)) {
         continue;
       }
@@ -111,7 +111,7 @@ class PressLoss {
     }
     margin_ = median(std::move(margins));
     if (std::ranges::none_of(presses,
-                             [](const ScoredPress& press) { return press.log_density.empty(); })) {
+                             [](const HeldOut& press) { return press.log_density.empty(); })) {
       feature_margin_ = median(std::move(of_features));
     }
   }
@@ -140,7 +140,7 @@ class PressLoss {
     if (feature_margin_) {
       sum += of_even_press(weight * *feature_margin_);
     }
-    for (const ScoredPress& press : presses_) {
+    for (const HeldOut& press : presses_) {
       sum += loss_of(press, temperature, weight);
     }
     return sum;
@@ -155,23 +155,23 @@ class PressLoss {
     }));
   }
 
-  std::span<const ScoredPress> presses_;
+  std::span<const HeldOut> presses_;
   double margin_ = 0.0;
   std::optional<double> feature_margin_;
 };
 
 /// Whether the features' weight that the other folds show helps each fold's presses, all together.
-bool features_help(std::span<const ScoredPress> presses) {
+bool features_help(std::span<const HeldOut> presses) {
   double gain = 0.0;
   for (const std::size_t fold : folds_in(presses)) {
-    const std::vector<ScoredPress> others = of_fold(presses, fold, false);
+    const std::vector<HeldOut> others = of_fold(presses, fold, false);
     if (!std::ranges::any_of(others, has_choice)) {
       continue;
     }
     const PressLoss loss(others);
     const TemperatureFit both = loss.of_both();
     const TemperatureFit evidence = loss.of_evidence();
-    for (const ScoredPress& press : of_fold(presses, fold, true)) {
+    for (const HeldOut& press : of_fold(presses, fold, true)) {
       gain += loss_of(press, evidence.temperature, 0.0) -
               loss_of(press, both.temperature, both.feature_weight);
     }
@@ -179,17 +179,17 @@ bool features_help(std::span<const ScoredPress> presses) {
   return gain > 0.0;
 }
 
-double loss_of_groups(std::span<const ScoredPress> groups, TemperatureFit fit, double growth) {
+double loss_of_groups(std::span<const HeldOut> groups, TemperatureFit fit, double growth) {
   fit.growth = growth;
   double sum = 0.0;
-  for (const ScoredPress& group : groups) {
+  for (const HeldOut& group : groups) {
     sum += loss_of(group, fit.temperature_after(group.touches), fit.feature_weight);
   }
   return sum;
 }
 
 /// The growth of the least loss, from 0, given the rest of the fit.
-double least_growth(std::span<const ScoredPress> groups, const TemperatureFit& fit) {
+double least_growth(std::span<const HeldOut> groups, const TemperatureFit& fit) {
   // Where all groups have one size, the loss has one minimum along the growth's logarithm, as along
   // the temperature's.
   const double growth = std::exp(least_place(
@@ -201,33 +201,19 @@ double least_growth(std::span<const ScoredPress> groups, const TemperatureFit& f
 /// The growth that groups show, given the rest of the fit: 0 unless what each half of them shows
 /// helps the other half, both taken together. A single group that is surely wrong, by a touch like
 /// no other, is no growth.
-double fit_growth(const GroupHalves& groups, const TemperatureFit& fit) {
+double fit_growth(std::span<const HeldOut> all, const TemperatureFit& fit) {
   double gain = 0.0;
   for (std::size_t half = 0; half < 2; ++half) {
-    const std::vector<ScoredPress>& other = groups[1 - half];
+    const std::vector<HeldOut> other = of_half(all, 1 - half);
     gain += loss_of_groups(other, fit, 0.0) -
-            loss_of_groups(other, fit, least_growth(groups[half], fit));
+            loss_of_groups(other, fit, least_growth(of_half(all, half), fit));
   }
-  return gain > 0.0 ? least_growth(both(groups), fit) : 0.0;
+  return gain > 0.0 ? least_growth(groups_in(all), fit) : 0.0;
 }
 
 }  // namespace
 
-std::vector<ScoredPress> of_fold(std::span<const ScoredPress> presses, std::size_t fold,
-                                 bool inside) {
-  std::vector<ScoredPress> some;
-  std::ranges::copy_if(presses, std::back_inserter(some),
-                       [&](const ScoredPress& press) { return (press.fold == fold) == inside; });
-  return some;
-}
-
-std::vector<ScoredPress> both(const GroupHalves& groups) {
-  std::vector<ScoredPress> all = groups[0];
-  all.insert(all.end(), groups[1].begin(), groups[1].end());
-  return all;
-}
-
-std::vector<double> press_probabilities(const ScoredPress& press, double temperature,
+std::vector<double> press_probabilities(const HeldOut& press, double temperature,
                                         double feature_weight) {
   std::vector<double> p = log_probabilities(press, temperature, feature_weight);
   for (double& x : p) {
@@ -236,10 +222,10 @@ std::vector<double> press_probabilities(const ScoredPress& press, double tempera
   return p;
 }
 
-Scores scores_of(std::span<const ScoredPress> presses, double temperature, double feature_weight) {
+Scores scores_of(std::span<const HeldOut> presses, double temperature, double feature_weight) {
   require_presses(presses);
   std::vector<JudgedRecord> records;
-  for (const ScoredPress& press : presses) {
+  for (const HeldOut& press : presses) {
     const std::vector<double> p = press_probabilities(press, temperature, feature_weight);
     JudgedRecord record{.truth = std::to_string(press.truth)};
     for (std::size_t label = 0; label < p.size(); ++label) {
@@ -251,40 +237,30 @@ Scores scores_of(std::span<const ScoredPress> presses, double temperature, doubl
   return evaluate(records).all;
 }
 
-TemperatureFit fit_temperature(std::span<const ScoredPress> presses, const GroupHalves& groups) {
+TemperatureFit fit_temperature(std::span<const HeldOut> all) {
+  const std::vector<HeldOut> presses = alone(all);
   require_presses(presses);
   const PressLoss loss(presses);
   TemperatureFit fit =
       loss.has_features() && features_help(presses) ? loss.of_both() : loss.of_evidence();
-  fit.growth = fit_growth(groups, fit);
+  fit.growth = fit_growth(all, fit);
   return fit;
 }
 
-TemperedPresses tempered_by_folds(std::span<const ScoredPress> presses, const GroupHalves& groups) {
-  TemperedPresses tempered{std::vector<ScoredPress>(presses.size()), {}};
-  const auto with = [](const ScoredPress& press, const TemperatureFit& fit) {
-    ScoredPress result{.truth = press.truth,
-                       .fold = press.fold,
-                       .touches = press.touches,
-                       .log_evidence = {},
-                       .log_density = {}};
-    result.log_evidence =
-        log_probabilities(press, fit.temperature_after(press.touches), fit.feature_weight);
-    return result;
-  };
+std::vector<HeldOut> tempered_by_folds(std::span<const HeldOut> all) {
+  std::vector<HeldOut> tempered(all.begin(), all.end());
+  const std::vector<HeldOut> presses = alone(all);
   for (const std::size_t fold : folds_in(presses)) {
-    const std::vector<ScoredPress> others = of_fold(presses, fold, false);
-    TemperatureFit fit = fit_temperature(
-        std::ranges::any_of(others, has_choice) ? std::span<const ScoredPress>(others) : presses);
-    for (std::size_t i = 0; i < presses.size(); ++i) {
-      if (presses[i].fold == fold) {
-        tempered.presses[i] = with(presses[i], fit);
-      }
-    }
-    for (std::size_t half = 0; half < 2; ++half) {
-      fit.growth = least_growth(groups[1 - half], fit);
-      for (const ScoredPress& group : of_fold(groups[half], fold, true)) {
-        tempered.groups.push_back(with(group, fit));
+    const std::vector<HeldOut> others = of_fold(presses, fold, false);
+    TemperatureFit fit =
+        fit_temperature(std::ranges::any_of(others, has_choice) ? others : presses);
+    const std::array growth{least_growth(of_half(all, 1), fit), least_growth(of_half(all, 0), fit)};
+    for (HeldOut& one : tempered) {
+      if (one.fold == fold) {
+        fit.growth = one.half ? growth.at(*one.half) : 0.0;
+        one.log_evidence =
+            log_probabilities(one, fit.temperature_after(one.touches), fit.feature_weight);
+        one.log_density.clear();
       }
     }
   }

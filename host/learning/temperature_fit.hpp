@@ -1,43 +1,22 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
-#include <optional>
 #include <span>
 #include <vector>
 
+#include "learning/held_out.hpp"
 #include "palpate/learned_sensor.hpp"
 #include "recognition/evaluation.hpp"
 
 namespace palpate {
 
-/// What a model that has not seen a press says of it, label by label.
-struct ScoredPress {
-  std::size_t truth = 0;             ///< index of the press's label
-  std::size_t fold = 0;              ///< of the cross-validation
-  std::size_t touches = 1;           ///< of one object, together
-  std::vector<double> log_evidence;  ///< of every label, in nats; -infinity: without a map
-  /// Log density of the press's features under every label, in nats; empty without features.
-  std::vector<double> log_density;
-  std::optional<double> error_mm = {};  ///< see CrossValidation::groups
-};
-
-/// The presses of a fold (inside) or of all other folds.
-std::vector<ScoredPress> of_fold(std::span<const ScoredPress> presses, std::size_t fold,
-                                 bool inside);
-
 /// Probabilities of the labels: proportional to evidence^(1 / temperature) * density^weight.
-std::vector<double> press_probabilities(const ScoredPress& press, double temperature,
+std::vector<double> press_probabilities(const HeldOut& press, double temperature,
                                         double feature_weight = 0.0);
 
 /// How right and how honest the probabilities of presses are; see evaluate().
 /// @throws Error on no press
-Scores scores_of(std::span<const ScoredPress> presses, double temperature,
-                 double feature_weight = 0.0);
-
-/// Groups of several touches each, in two halves that share no touch.
-using GroupHalves = std::array<std::vector<ScoredPress>, 2>;
-std::vector<ScoredPress> both(const GroupHalves& groups);
+Scores scores_of(std::span<const HeldOut> presses, double temperature, double feature_weight = 0.0);
 
 /// See LearnedSensor::temperature.
 struct TemperatureFit {
@@ -62,24 +41,17 @@ struct TemperatureFit {
 /// presses of a fold were made at another time than the others, see folds_of().
 ///   The growth has the least log-loss of the groups; it is 0 unless what each half of them
 /// shows helps the other half, both taken together.
-/// @param presses of one touch each, with a log evidence for each of the same labels, finite for
-/// their own
+/// @param all presses of one touch each, with a log evidence for each of the same labels, finite
+/// for their own, and groups
 /// @throws Error on no press, and where no press has two labels to choose from
-TemperatureFit fit_temperature(std::span<const ScoredPress> presses,
-                               const GroupHalves& groups = {});
+TemperatureFit fit_temperature(std::span<const HeldOut> all);
 
-/// Presses and groups of them.
-struct TemperedPresses {
-  std::vector<ScoredPress> presses;
-  std::vector<ScoredPress> groups;
-};
 /// The presses and groups with the logarithms of their labels' probabilities in the place of the
 /// evidences. The presses and groups of a fold have the numbers of the other folds' presses, or of
 /// all where none of these has two labels to choose from; the groups have the growth of the other
 /// half.
 /// @throws Error as fit_temperature()
-TemperedPresses tempered_by_folds(std::span<const ScoredPress> presses,
-                                  const GroupHalves& groups = {});
+std::vector<HeldOut> tempered_by_folds(std::span<const HeldOut> all);
 
 /// By how much more the second of two models loses on the same presses.
 struct LossDifference {

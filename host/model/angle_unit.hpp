@@ -5,6 +5,9 @@
 
 namespace palpate {
 
+inline double degrees(double rad) { return rad * 180.0 / std::numbers::pi; }
+inline double radians(double deg) { return deg * std::numbers::pi / 180.0; }
+
 /// Whether angles that stand for radians look like degrees: they go beyond one and a half turns,
 /// and either span more than a turn or go beyond two. Angles within a full turn, interpolated the
 /// short way round, reach one and a half; angles that a robot counts on from turn to turn span

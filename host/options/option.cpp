@@ -356,11 +356,10 @@ std::optional<char> separator_of(const Option& option) {
                     option.member);
 }
 
-Pose parse_pose(const std::string& what, const std::string& text) {
+Pose parse_pose(std::string_view option, const std::string& text) {
   const auto numbers = numbers_of<double, 3>(text, point_separator);
   if (!numbers) {
-    throw Error(Fault::input,
-                fmt::format("{} {}: give it as X,Y,DEG, in mm and degrees", what, text));
+    refuse_option(option, text, "give it as X,Y,DEG, in mm and degrees");
   }
   const auto [x, y, deg] = *numbers;
   return {{x, y}, deg * std::numbers::pi / 180.0};

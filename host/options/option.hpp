@@ -76,9 +76,9 @@ Request request_with(const std::map<std::string, std::string>& texts);
 
 std::string name_of(FilterKind kind);
 
-/// "X,Y,DEG". @throws Error naming `what` the text is of, and the form wanted
-Pose parse_pose(const std::string& what, const std::string& text);
-/// "A:B" with A < B. @throws Error as above
+/// "X,Y,DEG". @throws Error naming the option and the form wanted
+Pose parse_pose(std::string_view option, const std::string& text);
+/// "A:B" with A < B. @throws Error naming `what` the text is of, and the form wanted
 Frames parse_frames(const std::string& what, const std::string& text);
 
 /// What joins the numbers of an option's text: "25x25x16", "-10:10", "1,2". None where it has one.

@@ -20,6 +20,7 @@ void bind_recognition(nb::module_& module);
 void bind_batch(nb::module_& module);
 void bind_evaluation(nb::module_& module);
 void bind_calibration(nb::module_& module);
+void bind_map_learning(nb::module_& module);
 void bind_import(nb::module_& module);
 
 /// "PoseLattice(x_mm=(-10, 10, 25), ...)"

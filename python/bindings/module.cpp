@@ -49,5 +49,6 @@ NB_MODULE(_palpate, module) {
   bind_batch(module);
   bind_evaluation(module);
   bind_calibration(module);
+  bind_map_learning(module);
   bind_import(module);
 }

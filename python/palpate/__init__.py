@@ -73,6 +73,7 @@ from .commands import (
     import_tables as import_tables,
     plan as plan,
 )
+from .learning import LearnedMaps as LearnedMaps, learn_maps as learn_maps
 from .many import (
     Recognized as Recognized,
     Task as Task,

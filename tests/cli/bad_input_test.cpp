@@ -264,7 +264,7 @@ TEST_F(BadInput, LabelsThatNameNoFile) {
 
 TEST_F(BadInput, SeveralLabelsForOneFile) {
   expect_refused({"map", "A.h5", "I.h5", "-o", "out.map.h5"},
-                 {"I.h5", "'I' differs from 'A'", "-o out.map.h5/", "--label"});
+                 {"I.h5", "'I' differs from 'A'", "--output out.map.h5/", "--label"});
 }
 
 TEST_F(BadInput, SeveralUnknownsForOnePosterior) {

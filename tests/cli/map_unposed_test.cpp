@@ -88,7 +88,7 @@ TEST_F(MapUnposedCommand, RefusesInOneLine) {
   expect_refused({"map", "A.h5", "-o", "new/", "--unposed", "--max-maps", "0"},
                  {"--max-maps 0", "1 or more"});
   expect_refused({"map", "A.h5", "-o", "A.map.h5", "--unposed", "--max-maps", "2"},
-                 {"--max-maps 2", "-o A.map.h5/"});
+                 {"--max-maps 2", "--output A.map.h5/"});
   expect_refused({"map", "A.h5", "-o", "new/", "--max-maps", "2"}, {"--max-maps 2", "--unposed"});
   expect_refused({"map", "A.h5", "-o", "new/", "--unposed", "--threshold", "1000"},
                  {"'A'", "no press", "threshold"});

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "learning/feature_learning.hpp"
+#include "learning/temperature_fit.hpp"
 #include "palpate/error.hpp"
 #include "simulated_presses.hpp"
 #include "synthetic.hpp"
@@ -26,7 +27,7 @@ TableLearning learning(const std::vector<TrainingMap>& maps) {
 /// Tries all folds on the maps of the others' presses, by Eq. 7 or a table that they learned.
 CrossValidation tried(const std::vector<Press>& presses, const std::vector<std::string>& labels,
                       const CrossValidationOptions& options, bool with_table = false) {
-  std::vector<CrossValidation> folds;
+  CrossValidation all;
   for (std::size_t fold = 0; fold < options.folds; ++fold) {
     const std::vector<Press> others = presses_without(fold, presses, options.folds);
     FoldModel model;
@@ -41,9 +42,9 @@ CrossValidation tried(const std::vector<Press>& presses, const std::vector<std::
           options.bins ? maps_by_folds(others, map_options(), 2).without_folds : model.maps;
       model.table = learn_table(others, maps, model.how).table;
     }
-    folds.push_back(try_fold(fold, presses, labels, model, options));
+    all += try_fold(fold, presses, labels, model, options);
   }
-  return joined(folds);
+  return all;
 }
 
 TEST(CrossValidation, TriesEveryPressOnMapsOfOtherFolds) {
@@ -51,12 +52,12 @@ TEST(CrossValidation, TriesEveryPressOnMapsOfOtherFolds) {
   simulated.add_shapes(3, 11);
   for (const bool with_table : {false, true}) {
     const CrossValidation found = tried(simulated.presses, {"L", "disc"}, {.folds = 3}, with_table);
-    ASSERT_EQ(found.presses.size(), 6U);
+    ASSERT_EQ(found.unknowns.size(), 6U);
     // The shapes differ by tens of elements: evidence tells them apart by tens of nats.
-    EXPECT_NEAR(scores_of(found.presses, 1.0).accuracy(), 1.0, 1e-9);
+    EXPECT_NEAR(scores_of(found.unknowns, 1.0).accuracy(), 1.0, 1e-9);
     for (std::size_t i = 0; i < 6; ++i) {
-      EXPECT_EQ(found.presses[i].fold, i / 2);
-      EXPECT_EQ(found.presses[i].log_density.size(), 2U);
+      EXPECT_EQ(found.unknowns[i].fold, i / 2);
+      EXPECT_EQ(found.unknowns[i].log_density.size(), 2U);
     }
   }
 }
@@ -66,11 +67,11 @@ TEST(CrossValidation, LeavesOutAPressThatIsAloneOfItsObject) {
   simulated.add(on_letter_l, "L", 2, 12);
   simulated.add(on_disc, "disc", 1, 13);
   const CrossValidation found = tried(simulated.presses, {"L", "disc"}, {.folds = 2});
-  ASSERT_EQ(found.presses.size(), 2U);
+  ASSERT_EQ(found.unknowns.size(), 2U);
   // The disc's only press is in the first fold, so that it has no map for the L of that fold.
-  EXPECT_EQ(found.presses[0].log_evidence[1], -INFINITY);
-  EXPECT_TRUE(std::isfinite(found.presses[1].log_evidence[1]));
-  EXPECT_GT(fit_temperature(found.presses).temperature, 0.0);
+  EXPECT_EQ(found.unknowns[0].log_evidence[1], -INFINITY);
+  EXPECT_TRUE(std::isfinite(found.unknowns[1].log_evidence[1]));
+  EXPECT_GT(fit_temperature(found.unknowns).temperature, 0.0);
 }
 
 TEST(CrossValidation, LooksForPressesAtKnownPosesAsForUnknownsAloneAndInGroups) {
@@ -85,23 +86,24 @@ TEST(CrossValidation, LooksForPressesAtKnownPosesAsForUnknownsAloneAndInGroups) 
                                           .theta_rad = {0.0, two_pi, 48}},
                               .auto_pivot = false}};
   const CrossValidation found = tried(letters.presses, {"A", "U"}, options);
-  ASSERT_EQ(found.presses.size(), 38U);
+  const std::vector<HeldOut> presses = alone(found.unknowns);
+  ASSERT_EQ(presses.size(), 38U);
   // Either fold has 12 presses of A: the 6 of each half make two groups three times over. It has 7
   // presses of U: 3 and 4 make one group each.
-  const std::vector<ScoredPress> groups = both(found.groups);
+  const std::vector<HeldOut> groups = groups_in(found.unknowns);
   EXPECT_EQ(groups.size(), 2U * (2U * 3U * 2U + 2U));
-  EXPECT_FALSE(found.groups[0].empty() || found.groups[1].empty());
-  for (const ScoredPress& press : found.presses) {
+  EXPECT_NE(groups.front().half, groups.back().half);
+  for (const HeldOut& press : presses) {
     EXPECT_EQ(press.touches, 1U);
     EXPECT_TRUE(press.log_density.empty()) << "features tell where a touch was";
   }
-  for (const ScoredPress& group : groups) {
+  for (const HeldOut& group : groups) {
     EXPECT_EQ(group.touches, presses_in_group);
   }
   EXPECT_GT(scores_of(groups, 1.0).accuracy(), 0.95) << "24 of 28 are of A";
-  EXPECT_GT(scores_of(found.presses, 1.0).accuracy(), 0.85) << "24 of 38 are of A";
+  EXPECT_GT(scores_of(presses, 1.0).accuracy(), 0.85) << "24 of 38 are of A";
   const CrossValidation again = tried(letters.presses, {"A", "U"}, options);
-  EXPECT_EQ(both(again.groups).back().log_evidence, groups.back().log_evidence);
+  EXPECT_EQ(groups_in(again.unknowns).back().log_evidence, groups.back().log_evidence);
 }
 
 TEST(CrossValidation, TakesNoMoreMapsOfAnObjectThanItMay) {
@@ -109,7 +111,7 @@ TEST(CrossValidation, TakesNoMoreMapsOfAnObjectThanItMay) {
   simulated.add_shapes(4, 21);
   const auto evidence = [&](std::size_t most) {
     return tried(simulated.presses, {"L", "disc"}, {.folds = 2, .maps_per_object = most})
-        .presses.front()
+        .unknowns.front()
         .log_evidence[0];
   };
   // The other fold has two presses of each: the mean over both is at least half of the first's.
@@ -129,7 +131,8 @@ TEST(CrossValidation, SharesTheGroupsOfFewPressesBetweenTheHalves) {
                                                  .y_mm = {-9.0, 9.0, 6},
                                                  .theta_rad = {0.0, two_pi, 8}}}});
   // One of each letter in each fold.
-  for (const std::vector<ScoredPress>& half : found.groups) {
+  for (const std::size_t one : {0U, 1U}) {
+    const std::vector<HeldOut> half = of_half(found.unknowns, one);
     ASSERT_EQ(half.size(), 2U);
     EXPECT_NE(half[0].fold, half[1].fold);
     EXPECT_NE(half[0].truth, half[1].truth);
@@ -149,9 +152,9 @@ TEST(CrossValidation, JudgesTheFitOfPressesAtKnownPosesWhereTheyAre) {
                                        .auto_pivot = false}});
     double sum = 0.0;
     double count = 0.0;
-    for (const auto& [label, z] : found.fit_z) {
-      sum = std::accumulate(z.begin(), z.end(), sum);
-      count += static_cast<double>(z.size());
+    for (const HeldOut& unknown : found.unknowns) {
+      sum += unknown.fit_z.value_or(0.0);
+      count += unknown.fit_z ? 1.0 : 0.0;
     }
     return sum / count;
   };
@@ -169,28 +172,33 @@ TEST(CrossValidation, JudgesHowPressesFitBestAndHowStrangersFitTheBestOfTwoOther
                                           .y_mm = {-12.0, 12.0, 18},
                                           .theta_rad = {0.0, two_pi, 30}},
                               .auto_pivot = false}};
-  EXPECT_TRUE(tried(letters.presses, {"A", "U"}, options, true).stranger_fits.empty());
+  const auto strangers = [](const CrossValidation& of) {
+    return by_label(of.unknowns, &HeldOut::stranger_fit);
+  };
+  EXPECT_TRUE(strangers(tried(letters.presses, {"A", "U"}, options, true)).empty());
   // Another A under a label of its own: left out, either fits the other well.
   letters.add("A", 48, 25);
   letters.recordings.back().object = "B";
   letters.make_presses(true);
   const CrossValidation eq7 = tried(letters.presses, {"A", "B", "U"}, options);
-  EXPECT_TRUE(eq7.stranger_fits.empty() && eq7.best_fit_z.empty());
+  EXPECT_TRUE(strangers(eq7).empty());
   const CrossValidation found = tried(letters.presses, {"A", "B", "U"}, options, true);
-  const auto& fits = found.stranger_fits;
   std::size_t judged = 0;
   double own_z = 0.0;
-  for (const auto& [label, z] : found.fit_z) {
-    own_z = std::accumulate(z.begin(), z.end(), own_z);
-    judged += z.size();
+  double best_z = 0.0;
+  for (const HeldOut& unknown : found.unknowns) {
+    ASSERT_EQ(unknown.best_fit_z.has_value(), unknown.fit_z.has_value());
+    judged += unknown.fit_z ? 1 : 0;
+    own_z += unknown.fit_z.value_or(0.0);
+    best_z += unknown.best_fit_z.value_or(0.0);
   }
-  ASSERT_EQ(found.best_fit_z.size(), judged);
-  const auto& best_z = found.best_fit_z;
-  EXPECT_GT(std::accumulate(best_z.begin(), best_z.end(), 0.0),
-            own_z + 0.1 * static_cast<double>(judged))
+  EXPECT_TRUE(std::ranges::none_of(
+      eq7.unknowns, [](const HeldOut& unknown) { return unknown.best_fit_z.has_value(); }));
+  EXPECT_GT(best_z, own_z + 0.1 * static_cast<double>(judged))
       << "a single touch fits somewhere else better";
+  const auto fits = strangers(found);
   ASSERT_EQ(fits.size(), 3U);
-  const auto mean_z = [&](const char* label, std::size_t touches) {
+  const auto mean_z = [&](std::size_t label, std::size_t touches) {
     std::vector<double> z;
     for (const StrangerFit& stranger : fits.at(label)) {
       if (stranger.touches == touches) {
@@ -200,16 +208,17 @@ TEST(CrossValidation, JudgesHowPressesFitBestAndHowStrangersFitTheBestOfTwoOther
     EXPECT_FALSE(z.empty()) << label;
     return std::accumulate(z.begin(), z.end(), 0.0) / static_cast<double>(z.size());
   };
-  for (const char* alike : {"A", "B"}) {
-    EXPECT_LT(mean_z("U", 1), mean_z(alike, 1)) << alike;
-    EXPECT_LT(mean_z("U", presses_in_group), mean_z(alike, presses_in_group) - 3.0) << alike;
+  constexpr std::size_t u = 2;
+  for (const std::size_t alike : {0U, 1U}) {
+    EXPECT_LT(mean_z(u, 1), mean_z(alike, 1)) << alike;
+    EXPECT_LT(mean_z(u, presses_in_group), mean_z(alike, presses_in_group) - 3.0) << alike;
   }
 }
 
 TEST(CrossValidation, LeavesOutPressesWhoseObjectHasNoMapWithoutThem) {
   SimulatedPresses simulated;
   simulated.add_shapes(1, 14);
-  EXPECT_TRUE(tried(simulated.presses, {"L", "disc"}, {}).presses.empty());
+  EXPECT_TRUE(tried(simulated.presses, {"L", "disc"}, {}).unknowns.empty());
 }
 
 }  // namespace palpate::cross_validation_test

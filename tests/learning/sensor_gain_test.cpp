@@ -7,15 +7,15 @@
 namespace palpate::sensor_gain_test {
 
 /// Presses whose label has this loss, and groups with these pose errors.
-CrossValidation validation(const std::vector<double>& losses,
-                           const std::vector<double>& errors_mm) {
-  CrossValidation made;
+std::vector<HeldOut> validation(const std::vector<double>& losses,
+                                const std::vector<double>& errors_mm) {
+  std::vector<HeldOut> made;
   for (const double loss : losses) {
     const double right = std::exp(-loss);
-    made.presses.push_back({.log_evidence = {-loss, std::log(1.0 - right)}});
+    made.push_back({.log_evidence = {-loss, std::log(1.0 - right)}});
   }
   for (const double error_mm : errors_mm) {
-    made.groups[0].push_back({.log_evidence = {0.0, -1.0}, .error_mm = error_mm});
+    made.push_back({.half = 0, .log_evidence = {0.0, -1.0}, .error_mm = error_mm});
   }
   return made;
 }
@@ -29,12 +29,9 @@ std::vector<double> about(double value) {
   return values;
 }
 
-SensorGain gain(const CrossValidation& eq7, const CrossValidation& table) {
-  return gain_of(eq7, table, table.presses);
-}
-
 TEST(SensorGain, IsBetterWhereTouchesAreToldApartAndPlacedNearer) {
-  const auto found = gain(validation(about(0.9), about(0.3)), validation(about(0.7), about(0.2)));
+  const auto found =
+      gain_of(validation(about(0.9), about(0.3)), validation(about(0.7), about(0.2)));
   EXPECT_TRUE(found.better);
   EXPECT_NEAR(found.less_loss.mean, found.log_loss_before - found.log_loss, 1e-9);
   EXPECT_GT(found.less_loss.standard_error, 0.0);
@@ -45,26 +42,27 @@ TEST(SensorGain, IsBetterWhereTouchesAreToldApartAndPlacedNearer) {
 }
 
 TEST(SensorGain, IsNotBetterWhereNothingOrTheOneIsGainedForTheOther) {
-  const CrossValidation eq7 = validation(about(0.9), about(0.3));
-  EXPECT_FALSE(gain(eq7, eq7).gains);
-  EXPECT_FALSE(gain(eq7, validation(about(0.7), about(0.4))).better) << "places";
-  EXPECT_TRUE(gain(eq7, validation(about(0.7), about(0.4))).gains);
-  EXPECT_FALSE(gain(eq7, validation(about(1.0), about(0.2))).better) << "identities";
-  EXPECT_TRUE(gain(eq7, validation(about(0.91), about(0.2))).better) << "hardly a loss";
+  const std::vector<HeldOut> eq7 = validation(about(0.9), about(0.3));
+  EXPECT_FALSE(gain_of(eq7, eq7).gains);
+  EXPECT_FALSE(gain_of(eq7, validation(about(0.7), about(0.4))).better) << "places";
+  EXPECT_TRUE(gain_of(eq7, validation(about(0.7), about(0.4))).gains);
+  EXPECT_FALSE(gain_of(eq7, validation(about(1.0), about(0.2))).better) << "identities";
+  EXPECT_TRUE(gain_of(eq7, validation(about(0.91), about(0.2))).better) << "hardly a loss";
 }
 
 TEST(SensorGain, OneGroupAtAnotherPlaceOutweighsNoTenBetterOnes) {
   std::vector<double> errors_mm = about(0.2);
   errors_mm[5] = 20.0;  // more than all the others gain together
-  EXPECT_TRUE(gain(validation(about(0.9), about(0.3)), validation(about(0.7), errors_mm)).better);
+  EXPECT_TRUE(
+      gain_of(validation(about(0.9), about(0.3)), validation(about(0.7), errors_mm)).better);
 }
 
 TEST(SensorGain, IsToldByIdentitiesAloneWithoutGroups) {
-  const CrossValidation eq7 = validation(about(0.9), {});
-  const SensorGain found = gain(eq7, validation(about(0.7), {}));
+  const std::vector<HeldOut> eq7 = validation(about(0.9), {});
+  const SensorGain found = gain_of(eq7, validation(about(0.7), {}));
   EXPECT_TRUE(found.better);
   EXPECT_FALSE(found.error_mm);
-  EXPECT_FALSE(gain(eq7, eq7).better);
+  EXPECT_FALSE(gain_of(eq7, eq7).better);
 }
 
 }  // namespace palpate::sensor_gain_test

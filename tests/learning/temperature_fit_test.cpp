@@ -17,12 +17,12 @@ double normal(Uniform& random) {
 
 /// Presses whose labels are drawn with the probabilities that their log evidences, divided by
 /// `temperature`, say together with `weight` times their log densities.
-std::vector<ScoredPress> drawn_presses(std::size_t count, double temperature, double weight,
-                                       std::uint64_t seed) {
+std::vector<HeldOut> drawn_presses(std::size_t count, double temperature, double weight,
+                                   std::uint64_t seed) {
   Uniform random(seed);
-  std::vector<ScoredPress> presses;
+  std::vector<HeldOut> presses;
   for (std::size_t i = 0; i < count; ++i) {
-    ScoredPress press{.fold = i % 5};
+    HeldOut press{.fold = i % 5};
     for (int label = 0; label < 5; ++label) {
       press.log_evidence.push_back(-900.0 + 2.0 * temperature * normal(random));
       press.log_density.push_back(3.0 * normal(random));
@@ -38,7 +38,7 @@ std::vector<ScoredPress> drawn_presses(std::size_t count, double temperature, do
 }
 
 TEST(TemperatureFit, RecoversTheTemperatureOfAnOverconfidentModel) {
-  const std::vector<ScoredPress> presses = drawn_presses(2000, 30.0, 0.5, 1);
+  const std::vector<HeldOut> presses = drawn_presses(2000, 30.0, 0.5, 1);
   const TemperatureFit fit = fit_temperature(presses);
   EXPECT_NEAR(fit.temperature, 30.0, 2.0);  // 2000 presses tell it within 3 %
   EXPECT_NEAR(fit.feature_weight, 0.5, 0.05);
@@ -56,7 +56,7 @@ TEST(TemperatureFit, GivesFeaturesAWeightOfTwoAtMost) {
 }
 
 TEST(TemperatureFit, LeavesFeaturesOutWhereAPressHasNone) {
-  std::vector<ScoredPress> presses = drawn_presses(1000, 10.0, 0.0, 2);
+  std::vector<HeldOut> presses = drawn_presses(1000, 10.0, 0.0, 2);
   presses[3].log_density.clear();
   const TemperatureFit fit = fit_temperature(presses);
   EXPECT_EQ(fit.feature_weight, 0.0);
@@ -69,8 +69,8 @@ TEST(TemperatureFit, GivesFeaturesThatSayNothingNoWeight) {
 }
 
 /// Presses of folds that both the evidence, by 200 nats, and the features, by 50 nats, tell apart.
-std::vector<ScoredPress> presses_told_apart_by_both() {
-  std::vector<ScoredPress> presses;
+std::vector<HeldOut> presses_told_apart_by_both() {
+  std::vector<HeldOut> presses;
   for (std::size_t i = 0; i < 20; ++i) {
     presses.push_back({.truth = 0,
                        .fold = i % 5,
@@ -87,20 +87,20 @@ TEST(TemperatureFit, LeavesTheEvidenceItsSayWhereFeaturesTellAllPressesApart) {
   // With x nats from 50 w, 20 / (1 + 41 e^x) = 1 / (1 + e^-x) - 1 / 2.
   EXPECT_NEAR(50.0 * fit.feature_weight, 0.93, 0.1);
   // Lighter presses turn the features round twice as far; the shape still tells.
-  const ScoredPress lighter{
+  const HeldOut lighter{
       .truth = 0, .log_evidence = {-100.0, -300.0}, .log_density = {-154.0, -54.0}};
   EXPECT_GT(press_probabilities(lighter, fit.temperature, fit.feature_weight)[0], 0.5);
 }
 
 TEST(TemperatureFit, GivesFeaturesNoWeightThatOtherTimesDoNotBearOut) {
-  std::vector<ScoredPress> presses = presses_told_apart_by_both();
-  for (ScoredPress& press : presses) {
+  std::vector<HeldOut> presses = presses_told_apart_by_both();
+  for (HeldOut& press : presses) {
     press.fold = 0;
   }
   EXPECT_EQ(fit_temperature(presses).feature_weight, 0.0) << "there is one time alone";
   // Features that tell four folds apart by little, and mislead by far in the fifth.
   presses = presses_told_apart_by_both();
-  for (ScoredPress& press : presses) {
+  for (HeldOut& press : presses) {
     press.log_evidence = {0.0, -2.0};
     press.log_density = press.fold == 4 ? std::vector{-60.0, 0.0} : std::vector{0.0, -3.0};
   }
@@ -108,7 +108,7 @@ TEST(TemperatureFit, GivesFeaturesNoWeightThatOtherTimesDoNotBearOut) {
 }
 
 TEST(TemperatureFit, StaysFiniteWhereAllPressesAreToldApart) {
-  std::vector<ScoredPress> presses;
+  std::vector<HeldOut> presses;
   for (int i = 0; i < 20; ++i) {
     presses.push_back({.truth = 0, .log_evidence = {-100.0, -300.0}, .log_density = {}});
   }
@@ -118,7 +118,7 @@ TEST(TemperatureFit, StaysFiniteWhereAllPressesAreToldApart) {
 }
 
 TEST(TemperatureFit, IsLargeWhereEvidenceIsNoGuide) {
-  std::vector<ScoredPress> presses;
+  std::vector<HeldOut> presses;
   for (int i = 0; i < 40; ++i) {
     presses.push_back(
         {.truth = i % 2 == 0 ? 0U : 1U, .log_evidence = {-100.0, -300.0}, .log_density = {}});
@@ -127,19 +127,32 @@ TEST(TemperatureFit, IsLargeWhereEvidenceIsNoGuide) {
 }
 
 /// Groups of touches whose labels are drawn at a temperature of their number.
-std::vector<ScoredPress> drawn_groups(std::size_t count, std::size_t touches, double temperature,
-                                      std::uint64_t seed) {
-  std::vector<ScoredPress> groups = drawn_presses(count, temperature, 0.0, seed);
-  for (ScoredPress& group : groups) {
+std::vector<HeldOut> drawn_groups(std::size_t count, std::size_t touches, double temperature,
+                                  std::uint64_t seed) {
+  std::vector<HeldOut> groups = drawn_presses(count, temperature, 0.0, seed);
+  for (HeldOut& group : groups) {
     group.touches = touches;
     group.log_density.clear();
   }
   return groups;
 }
 
+/// Presses with the groups of either half.
+std::vector<HeldOut> with_groups(std::vector<HeldOut> presses, const std::vector<HeldOut>& first,
+                                 const std::vector<HeldOut>& second) {
+  for (const auto& [half, groups] : {std::pair{0U, &first}, {1U, &second}}) {
+    for (HeldOut group : *groups) {
+      group.half = half;
+      presses.push_back(std::move(group));
+    }
+  }
+  return presses;
+}
+
 TEST(TemperatureFit, GrowsAsGroupsOfTouchesNeed) {
-  const GroupHalves groups{drawn_groups(2000, 3, 24.0, 7), drawn_groups(2000, 4, 31.0, 8)};
-  const TemperatureFit fit = fit_temperature(drawn_groups(2000, 1, 10.0, 9), groups);
+  const TemperatureFit fit =
+      fit_temperature(with_groups(drawn_groups(2000, 1, 10.0, 9), drawn_groups(2000, 3, 24.0, 7),
+                                  drawn_groups(2000, 4, 31.0, 8)));
   EXPECT_NEAR(fit.temperature, 10.0, 0.7);
   EXPECT_NEAR(fit.growth, 7.0, 0.7);
   EXPECT_NEAR(fit.temperature_after(3), 24.0, 1.7);
@@ -147,30 +160,30 @@ TEST(TemperatureFit, GrowsAsGroupsOfTouchesNeed) {
 }
 
 TEST(TemperatureFit, DoesNotGrowWhereTouchesAreIndependentOrAllToldApart) {
-  const std::vector<ScoredPress> presses = drawn_groups(2000, 1, 10.0, 9);
-  const auto growth = [&](const std::vector<ScoredPress>& a, const std::vector<ScoredPress>& b) {
-    return fit_temperature(presses, {a, b}).growth;
+  const std::vector<HeldOut> presses = drawn_groups(2000, 1, 10.0, 9);
+  const auto growth = [&](const std::vector<HeldOut>& a, const std::vector<HeldOut>& b) {
+    return fit_temperature(with_groups(presses, a, b)).growth;
   };
   EXPECT_EQ(growth(drawn_groups(500, 3, 5.0, 10), drawn_groups(500, 3, 5.0, 14)), 0.0);
   EXPECT_LT(growth(drawn_groups(2000, 3, 10.0, 11), drawn_groups(2000, 3, 10.0, 15)), 0.4);
-  std::vector<ScoredPress> apart(40, {.truth = 0,
-                                      .touches = 3,
-                                      .log_evidence = {-100.0, -300.0, -300.0, -300.0, -300.0},
-                                      .log_density = {}});
+  std::vector<HeldOut> apart(40, {.truth = 0,
+                                  .touches = 3,
+                                  .log_evidence = {-100.0, -300.0, -300.0, -300.0, -300.0},
+                                  .log_density = {}});
   EXPECT_EQ(growth(apart, apart), 0.0);
   EXPECT_EQ(growth({}, {}), 0.0);
   // A group that is surely wrong would like a growth of 20, which the other half does not.
-  const std::vector<ScoredPress> right = apart;
+  const std::vector<HeldOut> right = apart;
   apart[3].truth = 1;
   EXPECT_EQ(growth(apart, right), 0.0);
-  std::vector<ScoredPress> as_wrong = right;
+  std::vector<HeldOut> as_wrong = right;
   as_wrong[5].truth = 1;
   EXPECT_GT(growth(apart, as_wrong), 5.0) << "both halves show it";
 }
 
 TEST(ScoresOfPresses, CountsByHand) {
   const double sure = std::log(0.85 / 0.15);
-  const std::vector<ScoredPress> presses{
+  const std::vector<HeldOut> presses{
       {.truth = 0, .log_evidence = {sure, 0.0}, .log_density = {}},
       {.truth = 0, .log_evidence = {sure, 0.0}, .log_density = {}},
       {.truth = 1, .log_evidence = {sure, 0.0}, .log_density = {}},
@@ -184,7 +197,7 @@ TEST(ScoresOfPresses, CountsByHand) {
 }
 
 TEST(TemperatureFit, TakesLabelsWithoutAMap) {
-  std::vector<ScoredPress> presses(
+  std::vector<HeldOut> presses(
       20, {.truth = 0, .log_evidence = {-100.0, -300.0, -INFINITY}, .log_density = {}});
   EXPECT_NEAR(fit_temperature(presses).temperature, 200.0 / std::log(41.0), 2.0);
   EXPECT_EQ(press_probabilities(presses[0], 30.0)[2], 0.0);
@@ -193,9 +206,9 @@ TEST(TemperatureFit, TakesLabelsWithoutAMap) {
 
 TEST(TemperedByFolds, GivesEachFoldTheTemperatureOfTheOthers) {
   // Folds 0 to 2, of which the first differs from the others.
-  std::vector<ScoredPress> presses = drawn_presses(300, 4.0, 0.5, 5);
-  const std::vector<ScoredPress> blunt = drawn_presses(300, 40.0, 0.0, 6);
-  std::array<std::vector<ScoredPress>, 3> without;
+  std::vector<HeldOut> presses = drawn_presses(300, 4.0, 0.5, 5);
+  const std::vector<HeldOut> blunt = drawn_presses(300, 40.0, 0.0, 6);
+  std::array<std::vector<HeldOut>, 3> without;
   for (std::size_t i = 0; i < presses.size(); ++i) {
     const std::size_t fold = i % 3;
     presses[i] = fold == 0 ? blunt[i] : presses[i];
@@ -206,10 +219,10 @@ TEST(TemperedByFolds, GivesEachFoldTheTemperatureOfTheOthers) {
       }
     }
   }
-  const std::vector<ScoredPress> tempered = tempered_by_folds(presses).presses;
+  const std::vector<HeldOut> tempered = tempered_by_folds(presses);
   ASSERT_EQ(tempered.size(), presses.size());
   std::vector<TemperatureFit> fits;
-  for (const std::vector<ScoredPress>& others : without) {
+  for (const std::vector<HeldOut>& others : without) {
     fits.push_back(fit_temperature(others));
   }
   EXPECT_GT(fits[0].feature_weight, 0.2);
@@ -228,52 +241,47 @@ TEST(TemperedByFolds, GivesEachFoldTheTemperatureOfTheOthers) {
 }
 
 TEST(TemperedByFolds, GivesGroupsTheGrowthOfTheOtherHalf) {
-  std::vector<ScoredPress> presses = drawn_groups(400, 1, 4.0, 12);
+  std::vector<HeldOut> presses = drawn_groups(400, 1, 4.0, 12);
   for (std::size_t i = 0; i < presses.size(); ++i) {
     presses[i].fold = i % 2;
   }
-  GroupHalves groups{
-      drawn_groups(400, 3, 20.0, 13),
-      std::vector<ScoredPress>(400, {.truth = 0,
-                                     .touches = 3,
-                                     .log_evidence = {0.0, -300.0, -300.0, -300.0, -300.0},
-                                     .log_density = {}})};
-  for (ScoredPress& group : groups[0]) {
+  std::vector<HeldOut> first = drawn_groups(400, 3, 20.0, 13);
+  for (HeldOut& group : first) {
     group.fold = 0;
   }
-  const TemperedPresses tempered = tempered_by_folds(presses, groups);
-  ASSERT_EQ(tempered.groups.size(), 800U);
-  std::vector<ScoredPress> odd;
+  const std::vector<HeldOut> second(
+      400, {.truth = 0, .touches = 3, .log_evidence = {0.0, -300.0, -300.0, -300.0, -300.0}});
+  const std::vector<HeldOut> tempered = tempered_by_folds(with_groups(presses, first, second));
+  ASSERT_EQ(tempered.size(), 1200U);
+  std::vector<HeldOut> odd;
   for (std::size_t i = 1; i < presses.size(); i += 2) {
     odd.push_back(presses[i]);
   }
   // The second half is told apart and shows no growth; the first half's temperature is about 20.
   const double temperature = fit_temperature(odd).temperature;
-  EXPECT_NEAR(tempered.groups[7].log_evidence[1],
-              std::log(press_probabilities(groups[0][7], temperature)[1]), 1e-9);
-  EXPECT_NEAR(tempered.groups[400].log_evidence[1], -300.0 / 20.0, 2.0);
+  EXPECT_NEAR(tempered[407].log_evidence[1],
+              std::log(press_probabilities(first[7], temperature)[1]), 1e-9);
+  EXPECT_NEAR(tempered[800].log_evidence[1], -300.0 / 20.0, 2.0);
 }
 
 TEST(TemperedByFolds, TakesAllPressesWhereTheOtherHalfHasNoChoice) {
-  const ScoredPress choice{.truth = 0, .log_evidence = {-100.0, -300.0}, .log_density = {}};
-  const ScoredPress none{
-      .truth = 0, .fold = 1, .log_evidence = {-100.0, -INFINITY}, .log_density = {}};
+  const HeldOut choice{.truth = 0, .log_evidence = {-100.0, -300.0}, .log_density = {}};
+  const HeldOut none{.truth = 0, .fold = 1, .log_evidence = {-100.0, -INFINITY}, .log_density = {}};
   const double alone = fit_temperature(std::vector{choice}).temperature;
-  EXPECT_NEAR(tempered_by_folds(std::vector{choice}).presses.front().log_evidence[1],
+  EXPECT_NEAR(tempered_by_folds(std::vector{choice}).front().log_evidence[1],
               -200.0 / alone - std::log1p(std::exp(-200.0 / alone)), 1e-9);
-  const std::vector<ScoredPress> tempered = tempered_by_folds(std::vector{none, choice}).presses;
+  const std::vector<HeldOut> tempered = tempered_by_folds(std::vector{none, choice});
   EXPECT_EQ(tempered[0].log_evidence[0], 0.0);
   EXPECT_LT(tempered[1].log_evidence[1], -1.0);
 }
 
 TEST(TemperedByFolds, StaysFiniteWhereAPressIsSurelyWrong) {
-  std::vector<ScoredPress> presses(20,
-                                   {.truth = 0, .log_evidence = {0.0, -100.0}, .log_density = {}});
+  std::vector<HeldOut> presses(20, {.truth = 0, .log_evidence = {0.0, -100.0}, .log_density = {}});
   for (std::size_t i = 0; i < presses.size(); ++i) {
     presses[i].fold = i % 2;
   }
   presses[4].log_evidence = {-1e6, 0.0};  // its probability is no number above 0
-  const std::vector<ScoredPress> tempered = tempered_by_folds(presses).presses;
+  const std::vector<HeldOut> tempered = tempered_by_folds(presses);
   EXPECT_LT(tempered[4].log_evidence[0], -1e4);
   EXPECT_TRUE(std::isfinite(scores_of(tempered, 1.0).log_loss));
 }
@@ -281,7 +289,7 @@ TEST(TemperedByFolds, StaysFiniteWhereAPressIsSurelyWrong) {
 TEST(ScoresOfPresses, RefusesWhatCannotBeTried) {
   EXPECT_THROW(scores_of({}, 1.0), Error);
   EXPECT_THROW(fit_temperature({}), Error);
-  const std::vector<ScoredPress> one_label{{.truth = 0, .log_evidence = {1.0}, .log_density = {}}};
+  const std::vector<HeldOut> one_label{{.truth = 0, .log_evidence = {1.0}, .log_density = {}}};
   EXPECT_THROW(fit_temperature(one_label), Error);
 }
 

@@ -233,7 +233,7 @@ def test_the_programs_of_the_guide_run(
     page = (pathlib.Path(__file__).parents[2] / "docs" / "python.md").read_text()
     [section] = re.findall(r"\n## From tables to the next touch\n(.*?)\n## ", page, re.DOTALL)
     programs = re.findall(r"```python\n(.*?)```", section, re.DOTALL)
-    assert len(programs) == 5
+    assert len(programs) == 6
     (tmp_path / "maps").symlink_to(files.maps)
     palpate.read_recording(files.unknown)[:3].save(tmp_path / "unknown.h5")
     readings = numpy.column_stack([numpy.linspace(0, 2, 3), numpy.ones((3, 36))])
@@ -245,4 +245,5 @@ def test_the_programs_of_the_guide_run(
     assert names["logged"].T_robot_sensor[0].tolist() == [1000, 2000, 0]
     assert (tmp_path / "sensor.yaml").exists()
     assert names["calibration"].objects == 2
+    assert sorted(file.name for file in (tmp_path / "learned").iterdir()) == ["A.map.h5", "E.map.h5"]
     assert names["evaluation"].all.records == 1 and len(names["plan"].T_robot_sensor) > 10
