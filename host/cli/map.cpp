@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,7 @@
 #include "figures/figures.hpp"
 #include "learning/map_task.hpp"
 #include "model/option_words.hpp"
+#include "palpate/device.hpp"
 #include "palpate/files.hpp"
 #include "recognition/recordings.hpp"
 
@@ -124,12 +126,15 @@ void build_maps(const MapFlags& flags) {
   const MapTask task = map_task(flags, recordings);
   prepare_outputs(flags, task.names(), task.learns_sensor);
   std::ranges::for_each(task.remarks, tell_on_stderr);
-  DeviceInWaiting device(flags.shared.device);
+  std::optional<Device> device;  // opened once it is needed
   LearnedMaps learned;
   {
     Progress progress("learning maps");
     learned = learn_maps(
-        task, [&]() -> Device& { return device(); },
+        task,
+        [&]() -> Device& {
+          return device ? *device : device.emplace(Device::open(flags.shared.device));
+        },
         [&](double fraction) { progress.show(fraction); });
   }
   std::ranges::for_each(learned.remarks, tell_on_stderr);

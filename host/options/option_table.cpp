@@ -33,12 +33,10 @@ const std::array table{
            "prior, none, act_below_mm, act_above, bins, filter and device, and a flag overrides "
            "its key"},
     Option{"sensor-model", "sensor_model", general, &Request::sensor_model, any,
-           "What was learned about the sensor (YAML): the threshold, the ratio, gamma "
-           "and the touches' standard deviations, which flags and scene keys override; a "
-           "likelihood table in the place of gamma and prior; and how sure to be: the "
-           "temperature, press features, and what touches of strangers are like. Particles leave "
-           "the standard deviations out [default: the sensor.yaml that 'palpate map' wrote beside "
-           "the maps; none: Eq. 7]"},
+           "Sensor model (YAML), what was learned about the sensor: threshold, ratio, gamma, how "
+           "far touches are off, a likelihood table, and how sure to be. Flags and scene keys "
+           "override it; particles leave the standard deviations of touches out [default: the "
+           "sensor.yaml that 'palpate map' wrote beside the maps; none: Eq. 7]"},
     Option{"bins", "bins", lattice, &Request::bins, from_1,
            "Pose bins per object along x, y and theta, as 25x25x16; auto: as many as the refined "
            "pose needs, in steps of 0.6 times the maps' cell or 1.2 times the sensor's spread, "
@@ -81,7 +79,7 @@ const std::array table{
            "particles: 5.73, which is 0.1 rad]"},
     Option{"none", "none", general, &Request::none, from_0,
            "Prior weight of \"(none)\", an object that was never learned; a map has the weight 1. "
-           "Without W (recordings stand before the flag) it is a ninth of the sum of the maps' "
+           "Without W (write recordings before the flag) it is a ninth of the sum of the maps' "
            "weights: a probability of one in ten before the first touch. A sensor model's "
            "temperature tempers these odds with the evidence. (none) explains each touch by a "
            "piece of some known object; the pieces need not belong to one pose. One touch cannot "

@@ -78,7 +78,8 @@ def read_frames(
     **options: Any,
 ) -> tuple[Recording, list[str]]:
     """What read_bag() reads, and what is worth a warning."""
-    from ._bag_messages import opened, together
+    from ._bag_fields import together
+    from ._bag_messages import opened
 
     if pose_topic is not None and tf is not None:
         raise Error("pose_topic and tf: both say where the sensor is; leave one of them out")

@@ -13,7 +13,8 @@ from typing import Any
 import numpy
 
 from ._bag import read_frames, topics
-from ._bag_messages import _PRESSURES, _at, _flat
+from ._bag_fields import _at, _flat
+from ._bag_messages import _PRESSURES
 from ._bag_transforms import stamp_s as stamp_s
 from ._error import Error
 from .recognition import warn

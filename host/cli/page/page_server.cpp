@@ -86,8 +86,7 @@ void add_page_flags(CLI::App& command, PageAddress& address) {
             address.port = port.empty() ? default_page_port : std::stoi(port);
           },
           "Serve a page for a browser at PORT of this machine, 8080 unless given; 0 takes a free "
-          "port. The page shows the array, the object and its pose in the robot frame, the belief, "
-          "the decision")
+          "port")
       ->expected(0, 1)
       ->type_name("PORT")
       ->check(CLI::Range(0, 65535));
