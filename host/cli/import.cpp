@@ -204,9 +204,11 @@ void add_import(CLI::App& app) {
   command->add_option("--header-line", options->header_line,
                       "Number of the line of PRESSURES that holds the columns' names, from 1 "
                       "[default: the first with as many cells as the rows]");
-  command->add_option("--where", options->where,
-                      "COLUMN=VALUE: take only the rows in which the column is this, as those of "
-                      "one sensor of several [default: all rows]");
+  command
+      ->add_option("--where", options->where,
+                   "COLUMN=VALUE: take only the rows in which the column is this, as those of one "
+                   "sensor of several; may be given more than once [default: all rows]")
+      ->allow_extra_args(false);
   command->add_option("--split", options->split,
                       "Write a recording for each value of this column, OUTPUT-VALUE.h5, labelled "
                       "by it unless --object is given");

@@ -131,6 +131,10 @@ CASES = {
          "hand.csv": "x,y\n-10,0\n-8,0\n9,0\n"},
         ["--pressure-columns", "left_{n},right_{n}"], [[1, 3, 2], [4, 6, 5]], array="hand.csv",
     ),
+    "rows_of_which_two_columns_hold": Case(
+        {"log.csv": "time,id,side,p0,p1\n0,2,left,1,2\n0,2,right,9,9\n.1,1,left,9,9\n.1,2,left,3,4\n"},
+        ["--where", "id=2", "--where", "side=left"], READINGS, times=[0, 0.1],
+    ),
     # Sheets.
     "lines_before_the_header": Case(
         {"log.csv": "Tactile array 5\nRecorded 2026-11-01, by hand\n\ntime,p0,p1\n0,1,2\n.1,3,4\n"}, [], READINGS,
