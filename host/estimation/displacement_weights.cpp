@@ -62,12 +62,12 @@ AxisBlur::AxisBlur(const Axis& axis, double sd, int bins)
 DisplacementWeights::DisplacementWeights(const PoseLattice& lattice, const DisplacementSd& sd)
     : lattice_(lattice), sd_(sd), theta_steps_(blur_steps(lattice.theta_rad, sd.rad)) {}
 
-std::vector<Tap> DisplacementWeights::taps(int theta,
-                                           const glm::dvec2& sensor_from_pivot_mm) const {
+void DisplacementWeights::find_taps(int theta, const glm::dvec2& sensor_from_pivot_mm,
+                                    std::vector<Tap>& taps) const {
+  taps.clear();
   const Axis& angles = lattice_.theta_rad;
   const double theta_rad = angles.centre(theta);
   const glm::dvec2 sensor_mm = rotate(theta_rad, sensor_from_pivot_mm);
-  std::vector<Tap> taps;
   for (int k = -theta_steps_; k <= theta_steps_; ++k) {
     if (!lattice_.full_circle() && (theta + k < 0 || theta + k >= angles.count)) {
       continue;
@@ -97,7 +97,6 @@ std::vector<Tap> DisplacementWeights::taps(int theta,
       taps.push_back(tap);
     }
   }
-  return taps;
 }
 
 glm::dvec2 DisplacementWeights::reach_mm() const {

@@ -26,11 +26,11 @@ def _item(items: Sequence[Any], key: str) -> Any:
         if int(key) < len(items):
             return items[int(key)]
         raise Error(f"[{key}]: the list has {len(items)} items, counted from 0; give another one")
-    called = []
+    called: list[str] = []
     for item in items:
         header = getattr(item, "header", None)
         names = [getattr(item, name) for name in _NAMES if hasattr(item, name)]
-        names += [header.frame_id] if hasattr(header, "frame_id") else []
+        names += [header.frame_id] if header is not None else []
         if key in map(str, names):
             return item
         called += map(str, names[:1])

@@ -1,6 +1,7 @@
 """The topics of a log of ROS, and which of their fields hold pressures and poses."""
 
 import contextlib
+import importlib
 import os
 import re
 import shutil
@@ -215,19 +216,23 @@ def _readable(name: str) -> Iterator[None]:
         ) from None
 
 
+def _zstd() -> Any:
+    """The module that reads Zstandard, Python's own or the one that rosbags brings."""
+    for name in ("compression.zstd", "backports.zstd", "zstandard"):
+        with contextlib.suppress(ImportError):
+            return importlib.import_module(name)
+    raise Error("a reader of Zstandard is missing; pip install 'palpate[bag]'")
+
+
 @contextmanager
 def _unpacked(name: str) -> Iterator[Path]:
     """The log's path, of one that is compressed as a whole that of a copy, which goes."""
     if not name.endswith(".zstd") and not name.endswith(".zst"):
         yield Path(name)
         return
-    try:
-        from compression import zstd
-    except ImportError:
-        from backports import zstd  # comes with rosbags
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / Path(name).stem
-        with _readable(name), zstd.open(name) as packed, path.open("wb") as plain:
+        with _readable(name), _zstd().open(name, "rb") as packed, path.open("wb") as plain:
             shutil.copyfileobj(packed, plain)
         yield path
 

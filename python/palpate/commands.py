@@ -242,6 +242,8 @@ def import_tables(
             raise Error("time_s and pose_time_s: are for arrays; a table has a column of times")
         request = filled(_palpate.ImportOptions(), import_tables, options)
         recording, sentences = _palpate.import_tables(request, elements_mm)
+    elif isinstance(poses, (str, bytes, os.PathLike)):
+        raise Error(f"poses: {os.fsdecode(poses)!r} is a file beside an array of pressures; give an array")
     else:
         options |= {"pressures": "pressures", "poses": None if poses is None else "poses"}
         request = filled(_palpate.ImportOptions(), import_tables, options)

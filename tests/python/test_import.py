@@ -146,5 +146,7 @@ def test_arrays_take_their_times_and_poses(tables: pathlib.Path) -> None:
     numpy.testing.assert_allclose(mounted.T_robot_sensor, [[2, 2, 0]] * 3, atol=1e-9)
     with pytest.raises(palpate.Error, match="time_s and pose_time_s: are for arrays"):
         palpate.import_tables(tables / "plain.csv", array=(2, 2, 1), time_s=time_s)
+    with pytest.raises(palpate.Error, match="poses: .*poses.csv' is a file beside an array"):
+        palpate.import_tables(readings, array=(2, 2, 1), poses=tables / "poses.csv")
     with pytest.raises(palpate.Error, match="time_s"):
         palpate.import_tables(readings, array=(2, 2, 1), time_s=time_s[:2])

@@ -280,7 +280,8 @@ void DisplacementBlur::turn_for(const glm::dvec2& sensor_from_pivot_mm) {
   host_turns_.assign(thetas * turns, {.whole_x = beyond, .whole_y = beyond});
   const DisplacementWeights weights(lattice_, sd_);
   for (std::size_t t = 0; t < thetas; ++t) {
-    for (const Tap& tap : weights.taps(static_cast<int>(t), sensor_from_pivot_mm)) {
+    weights.find_taps(static_cast<int>(t), sensor_from_pivot_mm, taps_);
+    for (const Tap& tap : taps_) {
       shaders::Turn& turn =
           host_turns_[t * turns + static_cast<std::size_t>(tap.steps + theta_steps_)];
       turn.whole_x = static_cast<float>(tap.bins.x);

@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "estimation/displacement_weights.hpp"
 #include "estimation/kernel_sizes.hpp"
 #include "estimation/lattice/dense_belief.hpp"
 #include "gpu/command_stream.hpp"
@@ -88,6 +89,7 @@ class DisplacementBlur {
   gpu::Buffer references_;  ///< [object]
   /// What goes to turns_: of a touch [theta, k], of a slip [object, k].
   std::vector<shaders::Turn> host_turns_;
+  std::vector<Tap> taps_;  ///< of a theta; kept, so that a touch allocates nothing
 };
 
 }  // namespace palpate
