@@ -5,7 +5,6 @@
 #include <string>
 #include <vector>
 
-
 #include "recognition/recognition_job.hpp"
 #include "recognition/recognition_record.hpp"
 #include "recognition/touch_plan.hpp"
