@@ -188,7 +188,8 @@ TableStart find_table(const std::vector<std::string>& lines) {
       shape = {separator, width};
     }
   }
-  const auto [separator, width] = shape;
+  const char separator = shape.first;
+  const std::size_t width = shape.second;
   TableStart start{.first = 0, .separator = separator};
   const auto has_width = [&](std::size_t i) { return count_cells(lines[i], separator) == width; };
   while (start.first < lines.size() && !has_width(start.first)) {

@@ -72,7 +72,7 @@ void BinLikelihood::evaluate_alone(std::span<const BinBox> boxes, const KnownEle
   std::vector<ElementPatches> scratch;
   const BinBox* of = nullptr;  // the listed bins' object and theta
   const auto evaluate_list = [&] {
-    if (bins.bins() > 0) {
+    if (of != nullptr && bins.bins() > 0) {
       const auto object = static_cast<std::size_t>(of->object);
       evaluate_bins({bins, maps_[object].nodes, object, placed, elements.runs, form_}, scratch);
       bins.clear();
