@@ -16,7 +16,7 @@ constexpr Unit metres[] = {{"m", 1e3, 1.0}};
 constexpr Unit radians[] = {{"rad"}};
 
 // rostopic echo -p names its times %time.
-constexpr Quantity time{"time timestamp stamp t %time", time_units, "time-unit"};
+constexpr Quantity time_of_row{"time timestamp stamp t %time", time_units, "time-unit"};
 constexpr Quantity theta{"theta yaw", angle_units, "pose-unit"};
 constexpr Quantity planar_position[] = {{"x", length_units, "pose-unit"},
                                         {"y", length_units, "pose-unit"}};
@@ -249,7 +249,7 @@ std::optional<UnitColumn> find_column(const CsvTable& table, const Quantity& qua
 std::optional<UnitColumn> find_time(const CsvTable& table, const TableOptions& options) {
   const bool has_it =
       !options.time_column.empty() && table.find_or_count(options.time_column).has_value();
-  return find_column(table, time, has_it ? options.time_column : "", options.time_unit);
+  return find_column(table, time_of_row, has_it ? options.time_column : "", options.time_unit);
 }
 
 PoseColumns find_pose(const CsvTable& table, const TableOptions& options) {
