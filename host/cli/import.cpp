@@ -3,6 +3,8 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -13,9 +15,10 @@
 #include "cli/options.hpp"
 #include "cli/recognition_flags.hpp"
 #include "cli/sensor_option.hpp"
-#include "io/csv_table.hpp"
 #include "io/recording_rules.hpp"
 #include "io/recording_survey.hpp"
+#include "io/table_columns.hpp"
+#include "model/number_text.hpp"
 #include "palpate/files.hpp"
 #include "streaming/table_import.hpp"
 
@@ -90,40 +93,50 @@ void print_summary(const ImportArguments& options, const ImportedRecording& impo
   }
 }
 
-void import_one(const ImportArguments& options) {
+/// Tables that are read, and where their recording goes.
+struct Imported {
+  ImportArguments options;
+  ImportedRecording tables;
+};
+
+CommandFiles files_of(const ImportArguments& options) {
   CommandFiles files;
   files.reads("PRESSURES", options.pressures);
   files.reads("--poses", options.poses);
   files.reads("--array", options.array);
   files.writes("-o", options.output);
-  files.require_distinct();
-  require_writable(options.output);
+  return files;
+}
 
-  const ImportedRecording imported = palpate::import_tables(options);
-  write_recording(options.output, imported.recording);
-  print_summary(options, imported);
-  if (imported.recording.rows == "touches") {
+void write(const Imported& imported) {
+  const auto& [options, tables] = imported;
+  write_recording(options.output, tables.recording);
+  print_summary(options, tables);
+  if (tables.recording.rows == "touches") {
     if (const std::uint64_t repeated = survey_recording(options.output).repeated; repeated > 0) {
       tell_on_stderr(fmt::format(
           "{}: {} of {} touches equal an earlier one to the digit, and count as one with it",
-          options.pressures, repeated, imported.recording.size()));
+          options.pressures, repeated, tables.recording.size()));
     }
   }
 }
 
-/// The texts in a column, each once, in the order of the rows.
+/// The values in the column that splits the rows, each once, in their order; 1 and 1.0 are one.
 std::vector<std::string> values_in(const ImportArguments& options) {
   constexpr std::size_t most = 1000;
-  CsvTable table(options.pressures, options.header_line);
+  CsvTable table = open_table(options.pressures, table_options(options));
   const auto column = table.find_or_count(options.split);
   if (!column) {
     table.refuse_columns("`split {}`: no column is called so", options.split);
   }
   std::vector<std::string> values;
   while (table.next()) {
-    const std::string value(table.text(*column));
-    if (!value.empty() && std::ranges::find(values, value) == values.end()) {
-      values.push_back(value);
+    const std::string_view text = table.text(*column);
+    const auto is_same = [&](const std::string& value) {
+      return value == text || (number_of(text) && number_of(value) == number_of(text));
+    };
+    if (!text.empty() && std::ranges::none_of(values, is_same)) {
+      values.emplace_back(text);
     }
     if (values.size() > most) {
       table.refuse("`split {}`: the column has more than {} values; name a column of labels",
@@ -143,18 +156,39 @@ std::string output_of(const std::string& output, std::string value) {
   return path.string();
 }
 
-void import_tables(const ImportArguments& options) {
+/// The imports that are asked for: one, or one for each value of the column that splits the rows.
+std::vector<ImportArguments> imports_of(const ImportArguments& options) {
   if (options.split.empty()) {
-    import_one(options);
-    return;
+    return {options};
   }
+  std::vector<ImportArguments> imports;
   for (const std::string& value : values_in(options)) {
     ImportArguments one = options;
     one.where.push_back(fmt::format("{}={}", options.split, value));
     one.output = output_of(options.output, value);
     one.object = options.object.empty() ? value : options.object;
-    import_one(one);
+    if (std::ranges::find(imports, one.output, &ImportArguments::output) != imports.end()) {
+      refuse(options.pressures, "`split {}`: two values would be written to {}; rename one",
+             options.split, one.output);
+    }
+    imports.push_back(std::move(one));
   }
+  if (imports.empty()) {
+    refuse(options.pressures, "`split {}`: no row has a value there; name a column of labels",
+           options.split);
+  }
+  return imports;
+}
+
+/// All tables are read before any recording is written.
+void import_tables(const ImportArguments& options) {
+  std::vector<Imported> all;
+  for (const ImportArguments& one : imports_of(options)) {
+    files_of(one).require_distinct();
+    require_writable(one.output);
+    all.push_back({one, palpate::import_tables(one)});
+  }
+  std::ranges::for_each(all, write);
 }
 
 }  // namespace
@@ -176,7 +210,8 @@ void add_import(CLI::App& app) {
       ->required();
   command->add_option(
       "--poses", options->poses,
-      "CSV with the poses T_robot_sensor: columns x, y, theta (or yaw) and time. Frames take the "
+      "CSV with the poses T_robot_sensor: columns x, y, theta (or yaw), or of poses in space (see "
+      "--pose-columns), and time. Frames take the "
       "pose interpolated at their time; without a column time, rows are taken one by one. It may "
       "be PRESSURES itself [default: frames without poses]");
   command->add_flag(

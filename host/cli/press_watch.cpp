@@ -53,7 +53,7 @@ void PressWatch::end(bool makes_touches) {
 std::vector<std::string> PressWatch::reasons(const std::string& unit) const {
   std::vector<std::string> words = words_;
   if (missed_ > most_shown) {
-    words.push_back(fmt::format("and so did {} more presses", missed_ - most_shown));
+    words.push_back(fmt::format("and {} more presses make no touch", missed_ - most_shown));
   }
   if (missed_ == 0) {
     words.push_back(

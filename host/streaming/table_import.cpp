@@ -42,6 +42,8 @@ std::optional<Unit> unit_named(std::span<const Unit> units, const std::string& n
   return found == units.end() ? std::nullopt : std::optional(*found);
 }
 
+}  // namespace
+
 TableOptions table_options(const ImportOptions& options) {
   TableOptions table{.header_line = options.header_line,
                      .time_column = options.time_column,
@@ -88,6 +90,8 @@ TableOptions table_options(const ImportOptions& options) {
   }
   return table;
 }
+
+namespace {
 
 /// Requires a pose of every touch.
 void require_touch_poses(const ImportOptions& options, const ImportedRecording& imported) {

@@ -66,6 +66,10 @@ struct ImportedRecording {
   std::vector<std::string> understood = {};
 };
 
+/// What the options say about columns, rows and units.
+/// @throws Error naming the option whose value makes no sense
+TableOptions table_options(const ImportOptions& options);
+
 /// Reads the pressures and the poses and joins them.
 /// @throws Error, naming the option and its value, or file and line or row, where the tables do not
 /// make a recording

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <span>
 #include <string>
@@ -6,6 +7,7 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include <nanobind/stl/array.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
@@ -86,6 +88,17 @@ std::optional<SpatialPose> spatial_pose(std::span<const double> row) {
                      glm::normalize(glm::dquat(row[6], row[3], row[4], row[5]))};
 }
 
+std::optional<std::array<double, 7>> row_of_matrix(const std::vector<double>& numbers) {
+  for (const bool by_columns : {true, false}) {
+    if (const auto pose = pose_of_matrix(numbers, by_columns)) {
+      const glm::dvec3 p = 1e3 * pose->translation_mm;
+      const glm::dquat& q = pose->rotation;
+      return std::array{p.x, p.y, p.z, q.x, q.y, q.z, q.w};
+    }
+  }
+  return {};
+}
+
 Imported import_frames(const ImportOptions& given, const ArrayLike& pressures,
                        const std::optional<ArrayLike>& time_s, const ArrayLike& pose_time_s,
                        const std::optional<ArrayLike>& elements_mm,
@@ -151,6 +164,10 @@ void bind_import(nb::module_& module) {
   module.def(
       "import_tables", &import_tables_python, "options"_a, "elements_mm"_a = nb::none(),
       "The recording, and what is worth a warning. elements_mm [e, 2] stands for the array.");
+  module.def(
+      "row_of_matrix", &row_of_matrix, "numbers"_a,
+      "The 12 or 16 numbers of a homogeneous matrix, m, by columns or by rows, whichever is a\n"
+      "rotation, as a position, mm, and a quaternion x, y, z, w; None where neither is.");
   module.def(
       "require_sound",
       [](const ImportOptions& options, const std::optional<ArrayLike>& elements_mm) {

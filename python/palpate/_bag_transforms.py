@@ -9,6 +9,7 @@ from typing import Any
 import numpy
 from numpy.typing import NDArray
 
+from . import _palpate
 from ._error import Error
 
 Rows = NDArray[numpy.float64]  #: [n, 7] mm, and a quaternion x, y, z, w; NaN where unknown
@@ -39,26 +40,10 @@ def row_of_numbers(values: Sequence[float]) -> tuple[float, ...]:
         return (1e3 * x, 1e3 * y, 1e3 * z, *(part / length for part in q)) if length > 0.0 else _UNKNOWN
     if len(values) not in (12, 16):
         raise AttributeError("no pose")
-    for by_columns in (True, False):
-        given = numpy.array(values)
-        matrix = given.reshape(4, -1).T if by_columns else given.reshape(-1, 4)
-        turn = matrix[:3, :3]
-        is_last = len(values) == 12 or numpy.array_equal(matrix[3], (0, 0, 0, 1))
-        if is_last and numpy.abs(turn @ turn.T - numpy.eye(3)).max() <= 1e-2 and numpy.linalg.det(turn) > 0:
-            return (*(1e3 * matrix[:3, 3]), *_quaternion(turn))
-    raise ValueError("no rotation")
-
-
-def _quaternion(turn: Rows) -> Rows:
-    """The quaternion x, y, z, w of a rotation [3, 3]: the eigenvector of its largest eigenvalue (Bar-Itzhack)."""
-    (a, b, c), (d, e, f), (g, h, i) = turn
-    k = numpy.array([
-        [a - e - i, 0, 0, 0],
-        [b + d, e - a - i, 0, 0],
-        [c + g, f + h, i - a - e, 0],
-        [h - f, c - g, d - b, a + e + i],
-    ])  # fmt: skip
-    return numpy.linalg.eigh(k / 3.0)[1][:, 3]
+    row = _palpate.row_of_matrix(values)
+    if row is None:
+        raise ValueError("no rotation")
+    return row
 
 
 def stamp_s(stamp: Any) -> float:

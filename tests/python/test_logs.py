@@ -212,3 +212,15 @@ def test_a_column_of_labels_makes_a_recording_each(tmp_path: pathlib.Path) -> No
     cup, key = (palpate.read_recording(tmp_path / f"o-{label}.h5") for label in ("cup", "key"))
     assert (cup.object, cup.pressure.tolist()) == ("cup", [[1, 2], [5, 6]])
     assert (key.object, key.pressure.tolist()) == ("key", [[3, 4]])
+
+
+def test_splitting_writes_all_or_nothing(tmp_path: pathlib.Path) -> None:
+    """Values of which only kept rows have some make no recording; where one is refused, none is written."""
+    log = "time,p0,p1,label,id\n0,1,2,cup,1\n.1,3,4,key,2\n.2,5,6,1,1\n.3,5,6,1.0,1\n"
+    assert run(tmp_path, {"log.csv": log}, ["--split", "label", "--where", "id=1"]).returncode == 0
+    assert sorted(file.name for file in tmp_path.glob("*.h5")) == ["o-1.h5", "o-cup.h5"]
+    assert len(palpate.read_recording(tmp_path / "o-1.h5")) == 2
+    for name, bad in (("x", log + ".4,abc,6,late,1\n"), ("y", log + ".4,1,2,a/b,1\n.5,1,2,a_b,1\n")):
+        done = run(tmp_path, {"log.csv": bad}, ["--split", "label", "-o", f"{name}.h5"])
+        assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
+        assert not list(tmp_path.glob(f"{name}-*.h5"))

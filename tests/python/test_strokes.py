@@ -93,7 +93,7 @@ def test_a_press_that_does_not_slide_stays_one_touch(tmp_path: pathlib.Path) -> 
         (STROKES, 1.0, "s, moved by 17.0 mm (hold the array still, or give --slide MM)"),
         ([still(0, 0, 12)], 1.0, "was never steady for 0.1 s (press longer"),
         ([still(0, 0)], 0.01, "above their rest"),
-        ([still(0, 0, 12)] * 5, 1.0, "and so did 2 more presses"),
+        ([still(0, 0, 12)] * 5, 1.0, "and 2 more presses make no touch"),
     ],
 )  # fmt: skip
 def test_a_recording_without_touches_says_why(
