@@ -43,7 +43,7 @@ def row_of_numbers(values: Sequence[float]) -> tuple[float, ...]:
     row = _palpate.row_of_matrix(values)
     if row is None:
         raise ValueError("no rotation")
-    return row
+    return tuple(row)
 
 
 def stamp_s(stamp: Any) -> float:
