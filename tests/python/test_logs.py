@@ -54,7 +54,7 @@ CASES = {
         poses=TWO_POSES, said=["the array looks against the plane's normal"],
     ),
     "other_axes": Case(
-        poses("a,b,c,rz,ry,rx", "10,20,5,0,0,0", "10,20,5,90,0,0"),
+        poses("a,b,c,rz,ry,rx", "10,20,5,0,0,180", "10,20,5,90,0,180"),
         [*WITH_POSES, "--pose-columns", "a:rx", "--euler", "ZYX", "--pose-unit", "mm,deg"], poses=TWO_POSES,
         said=["angles about the moving axes ZYX"],
     ),
@@ -172,11 +172,11 @@ CASES = {
         poses=[[10, 20, 0]] * 2, said=["1 of its rows repeat the time of the row before, whose pose is kept"],
     ),
     "a_clock_that_steps_back": Case(
-        {"log.csv": "time,p0,p1\n5,1,2\n6,3,4\n0,1,2\n1,3,4\n",
+        {"log.csv": "time,p0,p1\n5,1,2\n6,3,4\n0.5,1,2\n1.5,3,4\n",
          "poses.csv": "time,x,y,theta\n5,1,1,0\n6,1,1,0\n0,2,2,0\n2,2,2,0\n"},
-        [*WITH_POSES, "--largest-gap-s", "3"], READINGS * 2, times=[5, 6, 16, 17],
+        [*WITH_POSES, "--largest-gap-s", "3"], READINGS * 2, times=[5, 6, 16.5, 17.5],
         poses=[[1, 1, 0]] * 2 + [[2, 2, 0]] * 2,
-        said=["log.csv:4: the clock steps back from 6 to 0 s; a new stretch begins there, 10 s after the last"],
+        said=["log.csv:4: the clock steps back from 6 to 0.5 s; a new stretch begins there, 10 s after the last"],
     ),
 }  # fmt: skip
 
