@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "bench_program.hpp"
-#include "io/scratch_folder.hpp"
+#include "support/scratch_folder.hpp"
 
 namespace palpate::quick_run_test {
 

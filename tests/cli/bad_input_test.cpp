@@ -6,9 +6,9 @@
 #include <cmath>
 
 #include "io/file_parts.hpp"
-#include "limits.hpp"
-#include "program.hpp"
-#include "sample_files.hpp"
+#include "support/limits.hpp"
+#include "support/program.hpp"
+#include "support/sample_files.hpp"
 
 namespace palpate::bad_input_test {
 

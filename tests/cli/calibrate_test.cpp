@@ -9,8 +9,8 @@
 
 #include "palpate/learned_sensor.hpp"
 #include "palpate/map_builder.hpp"
-#include "program.hpp"
-#include "sample_files.hpp"
+#include "support/program.hpp"
+#include "support/sample_files.hpp"
 
 namespace palpate::calibrate_test {
 

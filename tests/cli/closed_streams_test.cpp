@@ -4,8 +4,8 @@
 
 #include <fstream>
 
-#include "program.hpp"
-#include "sample_files.hpp"
+#include "support/program.hpp"
+#include "support/sample_files.hpp"
 
 namespace palpate::closed_streams_test {
 

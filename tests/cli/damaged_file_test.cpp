@@ -6,9 +6,9 @@
 #include <random>
 
 #include "io/file_parts.hpp"
-#include "program.hpp"
-#include "sample_files.hpp"
-#include "sanitized.hpp"
+#include "support/program.hpp"
+#include "support/sample_files.hpp"
+#include "support/sanitized.hpp"
 
 namespace palpate::damaged_file_test {
 

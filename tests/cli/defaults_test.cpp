@@ -8,8 +8,8 @@
 #include <fmt/format.h>
 
 #include "palpate/balanced_lattice.hpp"
-#include "program.hpp"
-#include "sample_files.hpp"
+#include "support/program.hpp"
+#include "support/sample_files.hpp"
 
 namespace palpate::defaults_test {
 

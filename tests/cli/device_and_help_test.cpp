@@ -2,8 +2,8 @@
 #include <set>
 #include <sstream>
 
-#include "program.hpp"
-#include "sample_files.hpp"
+#include "support/program.hpp"
+#include "support/sample_files.hpp"
 
 namespace palpate::device_and_help_test {
 

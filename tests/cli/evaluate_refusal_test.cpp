@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "program.hpp"
+#include "support/program.hpp"
 
 namespace palpate::evaluate_refusal_test {
 

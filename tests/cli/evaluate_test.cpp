@@ -5,8 +5,8 @@
 
 #include <gmock/gmock.h>
 
-#include "program.hpp"
-#include "sample_files.hpp"
+#include "support/program.hpp"
+#include "support/sample_files.hpp"
 
 namespace palpate::evaluate_test {
 

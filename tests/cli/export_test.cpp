@@ -2,8 +2,8 @@
 #include <limits>
 
 #include "palpate/frame_recorder.hpp"
-#include "program.hpp"
-#include "sample_files.hpp"
+#include "support/program.hpp"
+#include "support/sample_files.hpp"
 
 namespace palpate::export_test {
 

@@ -4,7 +4,7 @@
 
 #include <regex>
 
-#include "program.hpp"
+#include "support/program.hpp"
 
 namespace palpate::former_flags_test {
 

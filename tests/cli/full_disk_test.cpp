@@ -2,9 +2,9 @@
 
 #include <fmt/format.h>
 
-#include "io/memory_limit.hpp"
-#include "program.hpp"
-#include "sample_files.hpp"
+#include "support/memory_limit.hpp"
+#include "support/program.hpp"
+#include "support/sample_files.hpp"
 
 namespace palpate::full_disk_test {
 

@@ -1,8 +1,8 @@
 #include <cmath>
 #include <limits>
 
-#include "program.hpp"
-#include "sample_files.hpp"
+#include "support/program.hpp"
+#include "support/sample_files.hpp"
 
 // Cases of docs/hard_cases.md through the program: what the library says of them must survive
 // files, options and JSON.

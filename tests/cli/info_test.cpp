@@ -3,8 +3,8 @@
 #include <numbers>
 
 #include "palpate/learned_sensor.hpp"
-#include "program.hpp"
-#include "sample_files.hpp"
+#include "support/program.hpp"
+#include "support/sample_files.hpp"
 
 namespace palpate::info_test {
 

@@ -8,8 +8,8 @@
 #include <thread>
 #include <vector>
 
-#include "program.hpp"
-#include "sample_files.hpp"
+#include "support/program.hpp"
+#include "support/sample_files.hpp"
 
 namespace palpate {
 

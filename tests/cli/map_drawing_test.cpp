@@ -10,8 +10,8 @@
 
 #include "model/bounding_box.hpp"
 #include "palpate/files.hpp"
-#include "program.hpp"
-#include "sample_files.hpp"
+#include "support/program.hpp"
+#include "support/sample_files.hpp"
 
 namespace palpate::map_drawing_test {
 

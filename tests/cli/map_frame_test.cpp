@@ -9,8 +9,8 @@
 #include "palpate/map_builder.hpp"
 #include "palpate/object_frame.hpp"
 #include "palpate/pose_error.hpp"
-#include "program.hpp"
-#include "sample_files.hpp"
+#include "support/program.hpp"
+#include "support/sample_files.hpp"
 
 namespace palpate::map_frame_test {
 

@@ -3,8 +3,8 @@
 #include <filesystem>
 
 #include "palpate/learned_sensor.hpp"
-#include "program.hpp"
-#include "sample_files.hpp"
+#include "support/program.hpp"
+#include "support/sample_files.hpp"
 
 namespace palpate::map_sensor_test {
 

@@ -6,8 +6,8 @@
 #include "model/element_spacing.hpp"
 #include "palpate/map_builder.hpp"
 #include "palpate/simulation.hpp"
-#include "program.hpp"
-#include "sample_files.hpp"
+#include "support/program.hpp"
+#include "support/sample_files.hpp"
 
 namespace palpate::map_test {
 

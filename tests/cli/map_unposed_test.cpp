@@ -2,8 +2,8 @@
 
 #include "palpate/learned_sensor.hpp"
 #include "palpate/simulation.hpp"
-#include "program.hpp"
-#include "sample_files.hpp"
+#include "support/program.hpp"
+#include "support/sample_files.hpp"
 
 namespace palpate::map_unposed_test {
 

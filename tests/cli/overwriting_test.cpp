@@ -2,8 +2,8 @@
 
 #include <sys/stat.h>
 
-#include "program.hpp"
-#include "sample_files.hpp"
+#include "support/program.hpp"
+#include "support/sample_files.hpp"
 
 namespace palpate::overwriting_test {
 

@@ -11,8 +11,8 @@
 #include <memory>
 #include <system_error>
 
-#include "program.hpp"
-#include "sample_files.hpp"
+#include "support/program.hpp"
+#include "support/sample_files.hpp"
 
 namespace palpate::progress_test {
 

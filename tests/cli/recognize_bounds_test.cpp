@@ -1,7 +1,7 @@
 // Sizes, places and labels that recognition cannot take.
 
-#include "program.hpp"
-#include "sample_files.hpp"
+#include "support/program.hpp"
+#include "support/sample_files.hpp"
 
 namespace palpate::recognize_bounds_test {
 

@@ -4,8 +4,8 @@
 
 #include <fmt/format.h>
 
-#include "program.hpp"
-#include "sample_files.hpp"
+#include "support/program.hpp"
+#include "support/sample_files.hpp"
 
 namespace palpate::recognize_flags_test {
 

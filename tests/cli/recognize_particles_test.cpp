@@ -1,7 +1,7 @@
 #include <algorithm>
 
-#include "program.hpp"
-#include "sample_files.hpp"
+#include "support/program.hpp"
+#include "support/sample_files.hpp"
 
 namespace palpate::recognize_particles_test {
 

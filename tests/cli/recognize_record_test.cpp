@@ -9,8 +9,8 @@
 #include <gmock/gmock.h>
 
 #include "palpate/pose_error.hpp"
-#include "program.hpp"
-#include "sample_files.hpp"
+#include "support/program.hpp"
+#include "support/sample_files.hpp"
 
 namespace palpate::recognize_record_test {
 

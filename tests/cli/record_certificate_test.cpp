@@ -8,8 +8,8 @@
 #include "cli/sheet.hpp"
 #include "cli/step_words.hpp"
 #include "recognition/record_json.hpp"
-#include "sample_files.hpp"
-#include "unknown_of.hpp"
+#include "support/sample_files.hpp"
+#include "support/unknown_of.hpp"
 
 namespace palpate::cli::record_certificate_test {
 

@@ -14,8 +14,8 @@
 #include "palpate/pose_error.hpp"
 #include "recognition/label_probability.hpp"
 #include "recognition/record_json.hpp"
-#include "sample_files.hpp"
-#include "unknown_of.hpp"
+#include "support/sample_files.hpp"
+#include "support/unknown_of.hpp"
 
 namespace palpate::cli::record_table_test {
 

@@ -10,7 +10,7 @@
 #include <thread>
 
 #include "palpate/files.hpp"
-#include "program.hpp"
+#include "support/program.hpp"
 
 namespace palpate::record_test {
 

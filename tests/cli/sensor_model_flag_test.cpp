@@ -6,8 +6,8 @@
 #include <fmt/ranges.h>
 
 #include "palpate/learned_sensor.hpp"
-#include "program.hpp"
-#include "sample_files.hpp"
+#include "support/program.hpp"
+#include "support/sample_files.hpp"
 
 namespace palpate::sensor_model_flag_test {
 

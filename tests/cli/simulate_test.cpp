@@ -5,7 +5,7 @@
 #include "io/hdf5_contents.hpp"
 #include "palpate/files.hpp"
 #include "palpate/simulation.hpp"
-#include "program.hpp"
+#include "support/program.hpp"
 
 namespace palpate::simulate_test {
 

@@ -15,9 +15,9 @@
 #include <string>
 #include <thread>
 
-#include "io/scratch_folder.hpp"
 #include "io/watched_reading.hpp"
 #include "palpate/error.hpp"
+#include "support/scratch_folder.hpp"
 
 namespace palpate::supervisor_test {
 

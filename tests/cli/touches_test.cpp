@@ -8,7 +8,7 @@
 #include "palpate/files.hpp"
 #include "palpate/frame_recorder.hpp"
 #include "palpate/simulation.hpp"
-#include "program.hpp"
+#include "support/program.hpp"
 
 namespace palpate::touches_test {
 

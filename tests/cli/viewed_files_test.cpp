@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "io/scratch_folder.hpp"
+#include "support/scratch_folder.hpp"
 
 namespace palpate::viewed_files_test {
 

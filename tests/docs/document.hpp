@@ -5,7 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "cli/program.hpp"
+#include "support/program.hpp"
 
 namespace palpate {
 

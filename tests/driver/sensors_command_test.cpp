@@ -5,10 +5,10 @@
 
 #include <gmock/gmock.h>
 
-#include "cli/program.hpp"
 #include "fake_serial_board.hpp"
 #include "fake_takktile.hpp"
 #include "parsing/sent_frame.hpp"
+#include "support/program.hpp"
 
 namespace palpate::sensors_command_test {
 

@@ -10,12 +10,12 @@
 
 #include "driver/data_folder.hpp"
 #include "fake_serial_board.hpp"
-#include "io/scratch_folder.hpp"
 #include "ordinary_user.hpp"
 #include "palpate/driver.hpp"
 #include "palpate/error.hpp"
 #include "parsing/sent_frame.hpp"
 #include "streamed.hpp"
+#include "support/scratch_folder.hpp"
 
 namespace palpate::serial_board_test {
 

@@ -14,7 +14,7 @@
 #include "palpate/map_builder.hpp"
 #include "palpate/particle_filter.hpp"
 #include "palpate/pose_histogram.hpp"
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::all_or_nothing_test {
 

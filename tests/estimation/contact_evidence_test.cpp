@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::contact_evidence_test {
 

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "palpate/error.hpp"
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::kept_touches_test {
 

@@ -4,8 +4,8 @@
 
 #include <gtest/gtest.h>
 
-#include "made_up_devices.hpp"
 #include "shaders/interface.h"
+#include "support/made_up_devices.hpp"
 
 namespace palpate::kernel_sizes_test {
 

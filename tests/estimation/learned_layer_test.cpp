@@ -5,12 +5,12 @@
 
 #include <gtest/gtest.h>
 
-#include "bounded/certified.hpp"
 #include "palpate/learned_sensor.hpp"
 #include "palpate/particle_filter.hpp"
 #include "palpate/pose_histogram.hpp"
 #include "particles/weighed_particles.hpp"
-#include "synthetic.hpp"
+#include "support/certified.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::learned_layer_test {
 

@@ -6,12 +6,12 @@
 #include <gtest/gtest.h>
 
 #include "estimation/particles/parzen_mode.hpp"
-#include "gpu/least_limits.hpp"
 #include "lattice/touch_by_touch_data.hpp"
 #include "palpate/particle_filter.hpp"
 #include "palpate/pose_histogram.hpp"
 #include "particles/weighed_particles.hpp"
-#include "synthetic.hpp"
+#include "support/least_limits.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::least_limits_test {
 

@@ -12,7 +12,7 @@
 #include "palpate/particle_filter.hpp"
 #include "palpate/pose_histogram.hpp"
 #include "particles/weighed_particles.hpp"
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::likelihood_table_test {
 

@@ -2,7 +2,7 @@
 
 #include "palpate/map_builder.hpp"
 #include "palpate/pose_histogram.hpp"
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 // More elements in one call than a device loops over in one dispatch: llvmpipe silently ends an
 // invocation's loops after 65,535 turns.

@@ -7,7 +7,7 @@
 #include "palpate/error.hpp"
 #include "palpate/particle_filter.hpp"
 #include "palpate/pose_histogram.hpp"
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::moved_pivot_test {
 

@@ -8,11 +8,11 @@
 #include <gtest/gtest.h>
 
 #include "lattice/touch_by_touch_data.hpp"
-#include "limits.hpp"
 #include "palpate/error.hpp"
 #include "palpate/particle_filter.hpp"
 #include "palpate/pose_histogram.hpp"
-#include "synthetic.hpp"
+#include "support/limits.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::none_test {
 

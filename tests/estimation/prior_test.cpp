@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "palpate/map_builder.hpp"
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::prior_test {
 

@@ -4,13 +4,13 @@
 
 #include <gtest/gtest.h>
 
-#include "limits.hpp"
 #include "palpate/balanced_lattice.hpp"
 #include "palpate/error.hpp"
 #include "palpate/map_builder.hpp"
 #include "palpate/particle_filter.hpp"
 #include "palpate/pose_histogram.hpp"
-#include "synthetic.hpp"
+#include "support/limits.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::refusal_test {
 

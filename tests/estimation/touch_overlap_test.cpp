@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::touch_overlap_test {
 

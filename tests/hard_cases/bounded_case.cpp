@@ -10,11 +10,6 @@ BoundedOptions few_bins() {
   return options;
 }
 
-std::vector<Hypothesis> two_objects(double steepness, std::uint64_t seed) {
-  return {{random_map(31, 27, 0.5, steepness, seed), 1.0},
-          {random_map(27, 33, 0.5, steepness, seed + 1), 1.0}};
-}
-
 Certified expect_certificate(HardCase& hard, const std::vector<Hypothesis>& objects,
                              const BoundedOptions& options, const Recording& recording,
                              double nats) {

@@ -3,16 +3,13 @@
 #include <cstdint>
 #include <vector>
 
-#include "bounded/certified.hpp"
 #include "hard_case.hpp"
+#include "support/certified.hpp"
 
 namespace palpate {
 
 /// 9 x 8 x 7 bins.
 BoundedOptions few_bins();
-
-/// Two maps of random cells, with log odds up to the steepness.
-std::vector<Hypothesis> two_objects(double steepness, std::uint64_t seed);
 
 /// Expects the certificate to hold after every touch, and one object's answers to be the tolerance
 /// away from float64 at most.

@@ -8,8 +8,8 @@
 
 #include "palpate/map_builder.hpp"
 #include "palpate/pose_histogram.hpp"
-#include "sanitized.hpp"
-#include "synthetic.hpp"
+#include "support/sanitized.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate {
 

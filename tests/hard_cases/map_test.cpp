@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "hard_case.hpp"
-#include "io/scratch_folder.hpp"
+#include "support/scratch_folder.hpp"
 
 namespace palpate::map_test {
 

@@ -6,7 +6,7 @@
 #include <csignal>
 
 #include "palpate/files.hpp"
-#include "scratch_folder.hpp"
+#include "support/scratch_folder.hpp"
 
 namespace palpate::atomic_file_test {
 

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "scratch_folder.hpp"
+#include "support/scratch_folder.hpp"
 
 namespace palpate::csv_table_test {
 

@@ -12,9 +12,9 @@
 #include "io/file_summary.hpp"
 #include "io/hdf5_reader.hpp"
 #include "io/recording_survey.hpp"
-#include "memory_limit.hpp"
 #include "palpate/files.hpp"
-#include "scratch_folder.hpp"
+#include "support/memory_limit.hpp"
+#include "support/scratch_folder.hpp"
 
 namespace palpate::large_file_test {
 

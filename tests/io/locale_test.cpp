@@ -2,11 +2,11 @@
 
 #include <gtest/gtest.h>
 
-#include "host_locale.hpp"
 #include "palpate/files.hpp"
 #include "palpate/scene.hpp"
 #include "palpate/simulation.hpp"
-#include "scratch_folder.hpp"
+#include "support/host_locale.hpp"
+#include "support/scratch_folder.hpp"
 
 namespace palpate::locale_test {
 

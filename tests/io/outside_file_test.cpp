@@ -6,7 +6,7 @@
 
 #include "file_parts.hpp"
 #include "palpate/files.hpp"
-#include "scratch_folder.hpp"
+#include "support/scratch_folder.hpp"
 
 namespace palpate::outside_file_test {
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "palpate/files.hpp"
-#include "scratch_folder.hpp"
+#include "support/scratch_folder.hpp"
 
 namespace palpate::recording_bytes_test {
 

@@ -8,10 +8,10 @@
 #include <numbers>
 
 #include "file_parts.hpp"
-#include "limits.hpp"
 #include "palpate/files.hpp"
 #include "palpate/simulation.hpp"
-#include "scratch_folder.hpp"
+#include "support/limits.hpp"
+#include "support/scratch_folder.hpp"
 
 namespace palpate::recording_survey_test {
 

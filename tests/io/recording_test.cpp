@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include "file_parts.hpp"
-#include "limits.hpp"
 #include "palpate/files.hpp"
-#include "scratch_folder.hpp"
+#include "support/limits.hpp"
+#include "support/scratch_folder.hpp"
 
 namespace palpate::recording_test {
 

@@ -9,11 +9,11 @@
 #include <random>
 
 #include "io/recording_rules.hpp"
-#include "limits.hpp"
 #include "model/stream_time.hpp"
 #include "palpate/files.hpp"
 #include "palpate/frame_recorder.hpp"
-#include "scratch_folder.hpp"
+#include "support/limits.hpp"
+#include "support/scratch_folder.hpp"
 
 namespace palpate::round_trip_test {
 

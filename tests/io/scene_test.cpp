@@ -5,7 +5,7 @@
 #include <random>
 
 #include "palpate/touch.hpp"
-#include "scratch_folder.hpp"
+#include "support/scratch_folder.hpp"
 
 namespace palpate::scene_test {
 

@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "palpate/learned_sensor.hpp"
-#include "scratch_folder.hpp"
+#include "support/scratch_folder.hpp"
 
 namespace palpate::sensor_model_file_test {
 

@@ -10,7 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "palpate/error.hpp"
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::contact_learning_test {
 

@@ -11,7 +11,7 @@
 #include "learning/temperature_fit.hpp"
 #include "palpate/error.hpp"
 #include "simulated_presses.hpp"
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::cross_validation_test {
 

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "simulated_presses.hpp"
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::drawn_poses_test {
 

@@ -11,7 +11,7 @@
 
 #include "learning/sensor_calibration.hpp"
 #include "simulated_presses.hpp"
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::held_out_calibration_test {
 

@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "palpate/error.hpp"
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::observed_map_test {
 

@@ -10,7 +10,7 @@
 #include "palpate/error.hpp"
 #include "palpate/reading_layer.hpp"
 #include "simulated_presses.hpp"
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::press_placement_test {
 

@@ -8,8 +8,8 @@
 #include <gtest/gtest.h>
 
 #include "palpate/error.hpp"
-#include "sanitized.hpp"
 #include "simulated_presses.hpp"
+#include "support/sanitized.hpp"
 
 namespace palpate::sensor_calibration_test {
 

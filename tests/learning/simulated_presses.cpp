@@ -1,6 +1,6 @@
 #include "simulated_presses.hpp"
 
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate {
 

@@ -8,7 +8,7 @@
 #include "learning/press.hpp"
 #include "palpate/simulation.hpp"
 #include "palpate/touch.hpp"
-#include "touched_shape.hpp"
+#include "support/touched_shape.hpp"
 
 namespace palpate {
 

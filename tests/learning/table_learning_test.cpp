@@ -11,7 +11,7 @@
 #include "model/interpolated_map.hpp"
 #include "palpate/error.hpp"
 #include "simulated_presses.hpp"
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::table_learning_test {
 

@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "palpate/error.hpp"
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::temperature_fit_test {
 

@@ -13,7 +13,7 @@
 #include "learning/press_placement.hpp"
 #include "palpate/error.hpp"
 #include "simulated_presses.hpp"
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::training_maps_test {
 

@@ -6,7 +6,7 @@
 
 #include "palpate/error.hpp"
 #include "simulated_presses.hpp"
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::tried_bins_test {
 

@@ -6,9 +6,9 @@
 
 #include <gtest/gtest.h>
 
-#include "limits.hpp"
 #include "palpate/error.hpp"
 #include "reference/reference.hpp"
+#include "support/limits.hpp"
 
 namespace palpate::contact_model_test {
 

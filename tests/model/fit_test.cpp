@@ -10,8 +10,8 @@
 #include "model/displacement_points.hpp"
 #include "palpate/error.hpp"
 #include "reference/reference.hpp"
-#include "synthetic.hpp"
-#include "touched_shape.hpp"
+#include "support/synthetic.hpp"
+#include "support/touched_shape.hpp"
 
 namespace palpate::fit_test {
 

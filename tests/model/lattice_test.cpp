@@ -7,9 +7,9 @@
 
 #include <gtest/gtest.h>
 
-#include "limits.hpp"
 #include "palpate/error.hpp"
 #include "reference/reference.hpp"
+#include "support/limits.hpp"
 
 namespace palpate::lattice_test {
 

@@ -6,8 +6,8 @@
 
 #include <gtest/gtest.h>
 
-#include "every_set_of_instructions.hpp"
-#include "limits.hpp"
+#include "support/every_set_of_instructions.hpp"
+#include "support/limits.hpp"
 
 namespace palpate::mixture_kernel_test {
 

@@ -6,8 +6,8 @@
 
 #include <gtest/gtest.h>
 
-#include "limits.hpp"
 #include "palpate/pose.hpp"
+#include "support/limits.hpp"
 
 namespace palpate::occupancy_grid_test {
 

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "palpate/touch.hpp"
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::predicted_readings_test {
 

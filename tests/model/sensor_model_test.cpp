@@ -6,10 +6,10 @@
 
 #include <gtest/gtest.h>
 
-#include "limits.hpp"
 #include "palpate/error.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "reference/reference.hpp"
+#include "support/limits.hpp"
 
 namespace palpate::sensor_model_test {
 

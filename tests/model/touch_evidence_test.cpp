@@ -2,9 +2,9 @@
 
 #include <gtest/gtest.h>
 
-#include "limits.hpp"
 #include "palpate/error.hpp"
-#include "synthetic.hpp"
+#include "support/limits.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::touch_evidence_test {
 

@@ -15,7 +15,7 @@
 #include "recognition/belief_modes.hpp"
 #include "recognition/recognition_record.hpp"
 #include "shapes.hpp"
-#include "unknown_of.hpp"
+#include "support/unknown_of.hpp"
 
 namespace palpate::belief_places_test {
 

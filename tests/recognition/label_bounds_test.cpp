@@ -10,8 +10,8 @@
 
 #include "recognition/recognition_record.hpp"
 #include "shapes.hpp"
-#include "synthetic.hpp"
-#include "unknown_of.hpp"
+#include "support/synthetic.hpp"
+#include "support/unknown_of.hpp"
 
 namespace palpate::label_bounds_test {
 

@@ -11,9 +11,9 @@
 #include "recognition/recogniser.hpp"
 #include "recognition/recognition_record.hpp"
 #include "shapes.hpp"
-#include "synthetic.hpp"
-#include "touched_shape.hpp"
-#include "unknown_of.hpp"
+#include "support/synthetic.hpp"
+#include "support/touched_shape.hpp"
+#include "support/unknown_of.hpp"
 
 namespace palpate::learned_recognition_test {
 

@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include "synthetic.hpp"
-#include "touched_shape.hpp"
+#include "support/synthetic.hpp"
+#include "support/touched_shape.hpp"
 
 namespace palpate::nearby_fit_test {
 

@@ -8,7 +8,7 @@
 
 #include "letters.hpp"
 #include "model/displacement_points.hpp"
-#include "unknown_of.hpp"
+#include "support/unknown_of.hpp"
 
 namespace palpate::placement_judge_test {
 

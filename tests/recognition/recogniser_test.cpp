@@ -9,7 +9,7 @@
 
 #include "palpate/error.hpp"
 #include "shapes.hpp"
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::recogniser_test {
 

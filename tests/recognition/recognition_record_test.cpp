@@ -12,9 +12,9 @@
 #include "recognition/record_json.hpp"
 #include "reference/reference.hpp"
 #include "shapes.hpp"
-#include "synthetic.hpp"
-#include "touched_shape.hpp"
-#include "unknown_of.hpp"
+#include "support/synthetic.hpp"
+#include "support/touched_shape.hpp"
+#include "support/unknown_of.hpp"
 
 namespace palpate::recognition_record_test {
 

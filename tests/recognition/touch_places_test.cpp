@@ -10,7 +10,7 @@
 
 #include "recognition/recogniser.hpp"
 #include "shapes.hpp"
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::touch_places_test {
 

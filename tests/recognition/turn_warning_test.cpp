@@ -8,7 +8,7 @@
 #include "palpate/rotational_symmetry.hpp"
 #include "recognition/recognition_record.hpp"
 #include "recognition/warnings.hpp"
-#include "unknown_of.hpp"
+#include "support/unknown_of.hpp"
 
 namespace palpate::turn_warning_test {
 

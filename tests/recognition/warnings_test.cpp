@@ -12,8 +12,8 @@
 #include "letters.hpp"
 #include "recognition/filter_choice.hpp"
 #include "recognition/recognition_record.hpp"
-#include "sanitized.hpp"
-#include "unknown_of.hpp"
+#include "support/sanitized.hpp"
+#include "support/unknown_of.hpp"
 
 namespace palpate::warnings_test {
 

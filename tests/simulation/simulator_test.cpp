@@ -7,9 +7,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "limits.hpp"
 #include "palpate/error.hpp"
 #include "palpate/simulation.hpp"
+#include "support/limits.hpp"
 
 namespace palpate::simulator_test {
 

@@ -2,8 +2,8 @@
 
 #include <cmath>
 
-#include "io/scratch_folder.hpp"
 #include "press.hpp"
+#include "support/scratch_folder.hpp"
 
 namespace palpate::baseline_test {
 

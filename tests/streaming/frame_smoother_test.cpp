@@ -1,5 +1,5 @@
 #include "streaming/frame_smoother.hpp"
-#include "limits.hpp"
+#include "support/limits.hpp"
 
 #include <gtest/gtest.h>
 

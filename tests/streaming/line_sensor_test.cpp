@@ -12,8 +12,8 @@
 #include <string>
 #include <vector>
 
-#include "io/scratch_folder.hpp"
 #include "model/printable.hpp"
+#include "support/scratch_folder.hpp"
 
 namespace palpate::line_sensor_test {
 

@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include "limits.hpp"
 #include "palpate/pose_track.hpp"
+#include "support/limits.hpp"
 
 namespace palpate::pose_order_test {
 

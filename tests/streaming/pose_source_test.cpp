@@ -12,8 +12,8 @@
 #include <iterator>
 #include <vector>
 
-#include "io/scratch_folder.hpp"
 #include "palpate/pose_track.hpp"
+#include "support/scratch_folder.hpp"
 
 namespace palpate::pose_source_test {
 

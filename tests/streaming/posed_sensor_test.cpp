@@ -8,9 +8,9 @@
 #include <thread>
 #include <vector>
 
-#include "io/host_locale.hpp"
-#include "io/scratch_folder.hpp"
 #include "palpate/pose_track.hpp"
+#include "support/host_locale.hpp"
+#include "support/scratch_folder.hpp"
 
 namespace palpate::posed_sensor_test {
 

@@ -7,10 +7,10 @@
 #include <numbers>
 #include <utility>
 
-#include "io/scratch_folder.hpp"
-#include "limits.hpp"
 #include "palpate/error.hpp"
 #include "press.hpp"
+#include "support/limits.hpp"
+#include "support/scratch_folder.hpp"
 
 namespace palpate::touch_detector_test {
 

@@ -5,11 +5,11 @@
 #include <cfloat>
 #include <cmath>
 
-#include "io/scratch_folder.hpp"
-#include "limits.hpp"
 #include "palpate/baseline.hpp"
 #include "palpate/touch_detector.hpp"
 #include "press.hpp"
+#include "support/limits.hpp"
+#include "support/scratch_folder.hpp"
 
 namespace palpate::unknown_reading_test {
 

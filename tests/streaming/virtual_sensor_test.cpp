@@ -6,12 +6,12 @@
 #include <cmath>
 #include <numbers>
 
-#include "io/scratch_folder.hpp"
-#include "limits.hpp"
 #include "palpate/baseline.hpp"
 #include "palpate/files.hpp"
 #include "palpate/simulation.hpp"
 #include "palpate/touch_detector.hpp"
+#include "support/limits.hpp"
+#include "support/scratch_folder.hpp"
 
 namespace palpate::virtual_sensor_test {
 

@@ -5,10 +5,10 @@
 #include <random>
 
 #include "driver/serial_profile.hpp"
-#include "io/scratch_folder.hpp"
 #include "palpate/error.hpp"
 #include "receiver.hpp"
 #include "sent_frame.hpp"
+#include "support/scratch_folder.hpp"
 
 namespace palpate::board_protocol_test {
 

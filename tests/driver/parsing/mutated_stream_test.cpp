@@ -8,9 +8,9 @@
 
 #include "driver/serial_profile.hpp"
 #include "driver/takktile_protocol.hpp"
-#include "io/scratch_folder.hpp"
 #include "palpate/error.hpp"
 #include "sent_frame.hpp"
+#include "support/scratch_folder.hpp"
 
 namespace palpate::mutated_stream_test {
 

@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include "io/host_locale.hpp"
-#include "io/scratch_folder.hpp"
+#include "support/host_locale.hpp"
+#include "support/scratch_folder.hpp"
 
 namespace palpate::serial_profile_test {
 

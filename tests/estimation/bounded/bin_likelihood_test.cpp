@@ -12,10 +12,10 @@
 #include <tbb/task_arena.h>
 
 #include "bins_by_definition.hpp"
-#include "every_set_of_instructions.hpp"
 #include "model/interpolated_map.hpp"
 #include "palpate/error.hpp"
-#include "synthetic.hpp"
+#include "support/every_set_of_instructions.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::bin_likelihood_test {
 

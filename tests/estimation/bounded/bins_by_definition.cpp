@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate {
 

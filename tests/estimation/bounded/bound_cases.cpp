@@ -5,7 +5,7 @@
 #include <cmath>
 #include <iterator>
 
-#include "touched_shape.hpp"
+#include "support/touched_shape.hpp"
 
 namespace palpate {
 

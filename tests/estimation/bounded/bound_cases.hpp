@@ -4,7 +4,7 @@
 
 #include "bins_by_definition.hpp"
 #include "estimation/bounded/tables/tile_bounds.hpp"
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate {
 

@@ -9,11 +9,11 @@
 
 #include <gtest/gtest.h>
 
-#include "bounded/certified.hpp"
 #include "bounded_set_up.hpp"
 #include "palpate/error.hpp"
 #include "palpate/pose_histogram.hpp"
-#include "touched_shape.hpp"
+#include "support/certified.hpp"
+#include "support/touched_shape.hpp"
 
 namespace palpate::bounded_belief_test {
 

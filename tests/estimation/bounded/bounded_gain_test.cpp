@@ -10,7 +10,7 @@
 #include "bounded_set_up.hpp"
 #include "palpate/bounded_posterior.hpp"
 #include "palpate/pose_histogram.hpp"
-#include "touched_shape.hpp"
+#include "support/touched_shape.hpp"
 
 namespace palpate::bounded_gain_test {
 

@@ -10,9 +10,9 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include "bounded/certified.hpp"
 #include "bounded_set_up.hpp"
 #include "palpate/bounded_posterior.hpp"
+#include "support/certified.hpp"
 
 namespace palpate::bounded_laws_test {
 

@@ -8,7 +8,7 @@
 #include "bounded_set_up.hpp"
 #include "palpate/bounded_posterior.hpp"
 #include "palpate/pose_histogram.hpp"
-#include "sanitized.hpp"
+#include "support/sanitized.hpp"
 
 namespace palpate::bounded_none_test {
 

@@ -8,9 +8,9 @@
 
 #include <gtest/gtest.h>
 
-#include "bounded/certified.hpp"
 #include "bounded_set_up.hpp"
 #include "palpate/pose_histogram.hpp"
+#include "support/certified.hpp"
 
 namespace palpate::bounded_posterior_test {
 

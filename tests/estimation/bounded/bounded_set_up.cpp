@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "palpate/error.hpp"
-#include "touched_shape.hpp"
+#include "support/touched_shape.hpp"
 
 namespace palpate {
 

@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "limits.hpp"
 #include "palpate/bounded_posterior.hpp"
 #include "palpate/pose_histogram.hpp"
-#include "synthetic.hpp"
+#include "support/limits.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate {
 

@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "bounded/certificate_trials.hpp"
-#include "sanitized.hpp"
+#include "support/sanitized.hpp"
 
 namespace palpate::certificate_law_test {
 

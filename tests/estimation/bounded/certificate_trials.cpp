@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "touched_shape.hpp"
+#include "support/touched_shape.hpp"
 
 namespace palpate {
 

@@ -5,7 +5,7 @@
 #include <initializer_list>
 #include <vector>
 
-#include "bounded/certified.hpp"
+#include "support/certified.hpp"
 
 namespace palpate {
 

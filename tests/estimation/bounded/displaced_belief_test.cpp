@@ -8,10 +8,10 @@
 #include <gtest/gtest.h>
 
 #include "bins_by_definition.hpp"
-#include "bounded/certified.hpp"
 #include "bounded_set_up.hpp"
 #include "palpate/bounded_posterior.hpp"
 #include "palpate/pose_histogram.hpp"
+#include "support/certified.hpp"
 
 namespace palpate::displaced_belief_test {
 

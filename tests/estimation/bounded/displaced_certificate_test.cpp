@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "bounded/certificate_trials.hpp"
-#include "sanitized.hpp"
+#include "support/sanitized.hpp"
 
 namespace palpate::displaced_certificate_test {
 

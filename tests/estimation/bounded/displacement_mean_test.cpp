@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "estimation/bounded/displaced/displacement_mean.hpp"
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::displacement_mean_test {
 

@@ -9,9 +9,9 @@
 #include <glm/common.hpp>
 #include <glm/vec3.hpp>
 
-#include "bounded/certified.hpp"
 #include "bounded_set_up.hpp"
-#include "touched_shape.hpp"
+#include "support/certified.hpp"
+#include "support/touched_shape.hpp"
 
 namespace palpate::drawn_belief_test {
 

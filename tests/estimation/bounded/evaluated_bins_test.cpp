@@ -10,7 +10,7 @@
 
 #include "bins_by_definition.hpp"
 #include "palpate/bounded_posterior.hpp"
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::evaluated_bins_test {
 

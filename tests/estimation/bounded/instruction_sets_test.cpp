@@ -9,7 +9,7 @@
 
 #include "bounded/certificate_trials.hpp"
 #include "estimation/bounded/leaves/bin_likelihood.hpp"
-#include "every_set_of_instructions.hpp"
+#include "support/every_set_of_instructions.hpp"
 
 namespace palpate::instruction_sets_test {
 

@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include "bounded/certified.hpp"
-#include "touched_shape.hpp"
+#include "support/certified.hpp"
+#include "support/touched_shape.hpp"
 
 namespace palpate::many_touches_test {
 

@@ -1,5 +1,5 @@
 #include "estimation/bounded/search/mass_account.hpp"
-#include "limits.hpp"
+#include "support/limits.hpp"
 
 #include <array>
 #include <cmath>

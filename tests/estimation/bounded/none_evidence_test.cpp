@@ -14,9 +14,9 @@
 
 #include "bins_by_definition.hpp"
 #include "estimation/hypotheses.hpp"
-#include "limits.hpp"
-#include "sanitized.hpp"
-#include "synthetic.hpp"
+#include "support/limits.hpp"
+#include "support/sanitized.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::none_evidence_test {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate {
 

@@ -8,9 +8,9 @@
 #include <gtest/gtest.h>
 
 #include "bins_by_definition.hpp"
-#include "limits.hpp"
 #include "model/interpolated_map.hpp"
-#include "synthetic.hpp"
+#include "support/limits.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::reading_penalties_test {
 

@@ -6,8 +6,8 @@
 #include <gtest/gtest.h>
 
 #include "palpate/bounded_posterior.hpp"
-#include "synthetic.hpp"
-#include "touched_shape.hpp"
+#include "support/synthetic.hpp"
+#include "support/touched_shape.hpp"
 
 namespace palpate::thinned_lattice_test {
 

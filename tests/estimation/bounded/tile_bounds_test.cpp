@@ -13,8 +13,8 @@
 #include "bound_cases.hpp"
 #include "estimation/bounded/leaves/bin_likelihood.hpp"
 #include "estimation/bounded/tables/window_table.hpp"
-#include "limits.hpp"
-#include "sanitized.hpp"
+#include "support/limits.hpp"
+#include "support/sanitized.hpp"
 
 namespace palpate::tile_bounds_test {
 

@@ -8,9 +8,9 @@
 #include <gtest/gtest.h>
 
 #include "bins_by_definition.hpp"
-#include "every_set_of_instructions.hpp"
 #include "random_penalties.hpp"
-#include "synthetic.hpp"
+#include "support/every_set_of_instructions.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::tile_penalties_test {
 

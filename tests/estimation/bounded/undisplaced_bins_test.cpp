@@ -10,7 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "estimation/bounded/leaves/bin_likelihood.hpp"
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::undisplaced_bins_test {
 

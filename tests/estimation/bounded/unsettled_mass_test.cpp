@@ -7,8 +7,8 @@
 #include <gtest/gtest.h>
 
 #include "estimation/log_sum.hpp"
-#include "limits.hpp"
-#include "synthetic.hpp"
+#include "support/limits.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::unsettled_mass_test {
 

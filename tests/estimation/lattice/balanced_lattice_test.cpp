@@ -10,7 +10,7 @@
 #include "palpate/pose_histogram.hpp"
 #include "palpate/simulation.hpp"
 #include "palpate/touch.hpp"
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::balanced_lattice_test {
 

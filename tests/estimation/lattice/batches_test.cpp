@@ -10,7 +10,7 @@
 #include "estimation/lattice/dense_likelihood.hpp"
 #include "gpu/context.hpp"
 #include "palpate/pose_histogram.hpp"
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::batches_test {
 

@@ -5,11 +5,11 @@
 
 #include <gtest/gtest.h>
 
-#include "made_up_devices.hpp"
 #include "palpate/error.hpp"
 #include "palpate/pose_histogram.hpp"
 #include "shaders/interface.h"
-#include "synthetic.hpp"
+#include "support/made_up_devices.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::device_limits_test {
 

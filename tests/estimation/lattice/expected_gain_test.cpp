@@ -10,7 +10,7 @@
 #include "model/displacement_points.hpp"
 #include "palpate/error.hpp"
 #include "palpate/pose_histogram.hpp"
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::expected_gain_test {
 

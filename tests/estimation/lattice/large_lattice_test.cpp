@@ -6,7 +6,7 @@
 
 #include "gpu/context.hpp"
 #include "palpate/pose_histogram.hpp"
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::large_lattice_test {
 

@@ -9,7 +9,7 @@
 
 #include "gpu/context.hpp"
 #include "palpate/pose_histogram.hpp"
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::likelihood_path_test {
 

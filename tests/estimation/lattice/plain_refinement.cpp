@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "reference/reference.hpp"
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate {
 

@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "palpate/pose.hpp"
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::pose_histogram_test {
 

@@ -6,7 +6,7 @@
 
 #include "model/interpolated_map.hpp"
 #include "model/predicted_readings.hpp"
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::reading_predictor_test {
 

@@ -12,7 +12,7 @@
 
 #include "estimation/lattice/refinement.hpp"
 #include "palpate/pose.hpp"
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::refined_truth_test {
 

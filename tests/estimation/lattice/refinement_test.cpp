@@ -15,7 +15,7 @@
 #include "palpate/pose_histogram.hpp"
 #include "palpate/simulation.hpp"
 #include "plain_refinement.hpp"
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::refinement_test {
 

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "palpate/pose_histogram.hpp"
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate {
 

@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "palpate/particle_filter.hpp"
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::particle_drawing_test {
 

@@ -9,9 +9,9 @@
 #include <gtest/gtest.h>
 #include <glm/vec3.hpp>
 
-#include "limits.hpp"
 #include "palpate/error.hpp"
-#include "synthetic.hpp"
+#include "support/limits.hpp"
+#include "support/synthetic.hpp"
 #include "weighed_particles.hpp"
 
 namespace palpate::particle_filter_test {

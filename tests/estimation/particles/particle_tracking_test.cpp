@@ -6,8 +6,8 @@
 #include "palpate/particle_filter.hpp"
 #include "palpate/pose_error.hpp"
 #include "palpate/pose_histogram.hpp"
-#include "synthetic.hpp"
-#include "touched_shape.hpp"
+#include "support/synthetic.hpp"
+#include "support/touched_shape.hpp"
 
 namespace palpate::particle_tracking_test {
 

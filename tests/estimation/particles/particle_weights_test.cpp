@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "palpate/particle_filter.hpp"
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 #include "weighed_particles.hpp"
 
 namespace palpate::particle_weights_test {

@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "palpate/pose.hpp"
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::parzen_mode_test {
 

@@ -6,7 +6,7 @@
 
 #include "gpu/command_stream.hpp"
 #include "philox_words.hpp"
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::philox_test {
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "palpate/particle_filter.hpp"
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate {
 

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::weight_blocks_test {
 

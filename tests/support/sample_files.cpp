@@ -1,4 +1,4 @@
-#include "sample_files.hpp"
+#include "support/sample_files.hpp"
 
 #include <cmath>
 

@@ -11,7 +11,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "io/scratch_folder.hpp"
+#include "support/scratch_folder.hpp"
 
 namespace palpate {
 

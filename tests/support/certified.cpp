@@ -1,4 +1,4 @@
-#include "bounded/certified.hpp"
+#include "support/certified.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,9 +1,9 @@
-#include "touched_shape.hpp"
+#include "support/touched_shape.hpp"
 
 #include <cmath>
 #include <numbers>
 
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <ostream>
 
-#include "gpu/least_limits.hpp"
+#include "support/least_limits.hpp"
 
 namespace palpate {
 

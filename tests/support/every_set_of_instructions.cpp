@@ -1,7 +1,7 @@
 // As the kernels.
 #define HWY_COMPILE_ALL_ATTAINABLE
 #define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
-#include "every_set_of_instructions.hpp"
+#include "support/every_set_of_instructions.hpp"
 
 #include <bit>
 #include <cstdint>

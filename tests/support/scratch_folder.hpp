@@ -1,6 +1,5 @@
 #pragma once
 
-#include <gtest/gtest.h>
 #include <stdlib.h>
 
 #include <filesystem>
@@ -9,7 +8,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "palpate/error.hpp"
+#include "support/errors.hpp"
 
 namespace palpate {
 
@@ -41,27 +40,6 @@ inline std::string bytes_of(const std::filesystem::path& path) {
 
 inline void put_bytes(const std::filesystem::path& path, const std::string& bytes) {
   std::ofstream(path, std::ios::binary) << bytes;
-}
-
-/// The message of the input Error that `action` throws; it must be one line.
-template <class Action>
-std::string input_error(const Action& action) {
-  try {
-    action();
-  } catch (const Error& error) {
-    EXPECT_EQ(error.fault(), Fault::input) << error.what();
-    EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos) << error.what();
-    return error.what();
-  }
-  ADD_FAILURE() << "nothing was thrown";
-  return "";
-}
-
-/// Expects that a message names every one of these.
-inline void expect_named(const std::string& message, std::initializer_list<const char*> parts) {
-  for (const char* part : parts) {
-    EXPECT_NE(message.find(part), std::string::npos) << "'" << part << "' not in: " << message;
-  }
 }
 
 }  // namespace palpate

@@ -36,6 +36,9 @@ Recording random_recording(std::size_t touches, std::size_t elements, std::uint6
 /// error of position shows.
 OccupancyGrid random_map(int nx, int ny, double cell_mm, double steepness, std::uint64_t seed);
 
+/// Two such objects of different sizes, 0.5 mm a cell.
+std::vector<Hypothesis> two_objects(double steepness, std::uint64_t seed);
+
 /// Every touch of a recording.
 std::vector<Touch> all_touches(const Recording& recording);
 

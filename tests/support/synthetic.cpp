@@ -1,4 +1,4 @@
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -51,6 +51,11 @@ OccupancyGrid random_map(int nx, int ny, double cell_mm, double steepness, std::
     map.log_odds.push_back(static_cast<float>(random(-steepness, steepness)));
   }
   return map;
+}
+
+std::vector<Hypothesis> two_objects(double steepness, std::uint64_t seed) {
+  return {{random_map(31, 27, 0.5, steepness, seed), 1.0},
+          {random_map(27, 33, 0.5, steepness, seed + 1), 1.0}};
 }
 
 std::vector<Touch> all_touches(const Recording& recording) {

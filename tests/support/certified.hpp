@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "palpate/bounded_posterior.hpp"
-#include "synthetic.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate {
 
