@@ -93,7 +93,7 @@ class PressFusion {
     FusedPresses result{
         .homes = homes_, .maps = maps_.size(), .rounds = rounds, .settled = settled};
     for (std::size_t p = 0; p < presses_.size(); ++p) {
-      result.homes[p].says_little = is_little(p, homes_[p].place);
+      result.homes[p].too_little_contact = is_little(p, homes_[p].place);
     }
     return result;
   }

@@ -97,7 +97,7 @@ struct PressHome {
   double fit = 0.0;  ///< see PlacedPress::fit; 1 where the map is of this press alone
   /// Its contact gains so little, even on the map of this press alone, that the best of all the
   /// places compared may gain as much by chance. Set once all presses are placed.
-  bool says_little = false;
+  bool too_little_contact = false;
 
   ImagePlace image_place() const;
 };

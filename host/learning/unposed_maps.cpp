@@ -110,7 +110,7 @@ UnposedMaps unposed_maps(std::span<const Touch> presses, const std::string& labe
     if (!home.map) {
       result.misfits.push_back(
           {.press = placeable[p].index,
-           .reason = home.says_little ? Misfit::Reason::too_little : Misfit::Reason::unlike,
+           .reason = home.too_little_contact ? Misfit::Reason::too_little : Misfit::Reason::unlike,
            .fit = home.fit});
     }
   }

@@ -153,7 +153,8 @@ FilterOptions filter_for_bins(std::span<const Hypothesis> hypotheses, const Filt
   return filter;
 }
 
-FilterOptions with_evidence(FilterOptions filter, const LearnedSensor& sensor, bool to_the_end) {
+FilterOptions with_evidence(FilterOptions filter, const LearnedSensor& sensor,
+                            bool honour_tolerance) {
   constexpr double share = 0.05;
   constexpr double negligible = 1e-4;
   constexpr std::int64_t poor_bins = 20'000;  // about as many as Eq. 7 needs of such touches
@@ -161,7 +162,7 @@ FilterOptions with_evidence(FilterOptions filter, const LearnedSensor& sensor, b
   if (bounded == nullptr) {
     return filter;
   }
-  if (sensor.table && !to_the_end) {
+  if (sensor.table && !honour_tolerance) {
     bounded->poor_bins = poor_bins;
   }
   const bool tempered = sensor.temperature > 1.0 || sensor.temperature_growth > 0.0;

@@ -74,9 +74,9 @@ FilterOptions filter_for_bins(std::span<const Hypothesis> hypotheses, const Filt
 /// improbable labels a share, for which bounds find each label's evidence: within 0.05 times the
 /// temperature of the touches so far, so that no probability is off by more than about 10 % or
 /// 1e-4, or closer where BoundedOptions::evidence_nats says so. With a table, a search that meets
-/// nothing but poor fits ends, unless it is to go `to_the_end`.
+/// nothing but poor fits ends, unless it is to honour_tolerance.
 FilterOptions with_evidence(FilterOptions filter, const LearnedSensor& sensor,
-                            bool to_the_end = false);
+                            bool honour_tolerance = false);
 
 /// Whether the machine has room for a bounded posterior.
 /// @throws Error on a lattice out of range

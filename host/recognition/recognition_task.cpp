@@ -73,8 +73,8 @@ std::string RecognitionTask::name_of(int object) const {
 }
 
 double RecognitionTask::temperature_after(std::span<const TouchEvidence> touches) const {
-  const auto telling = std::ranges::count_if(touches, &TouchEvidence::tells);
-  return temperature_of(static_cast<std::size_t>(std::max<std::ptrdiff_t>(telling, 1)),
+  const auto informative = std::ranges::count_if(touches, &TouchEvidence::tells);
+  return temperature_of(static_cast<std::size_t>(std::max<std::ptrdiff_t>(informative, 1)),
                         sensor.temperature, sensor.temperature_growth);
 }
 

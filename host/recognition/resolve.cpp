@@ -358,8 +358,9 @@ RecognitionTask resolve(const Request& request, const Circumstances& of,
                       .touch_sd = sensor != nullptr ? sensor->touch_sd : DisplacementSd{}},
                      region.bin_width, by.hypotheses);
   if (sensor != nullptr) {
-    const bool to_the_end = request.tolerance || request.evidence_nats;  // what was asked for holds
-    filter.options = with_evidence(filter.options, *sensor, to_the_end);
+    const bool honour_tolerance =
+        request.tolerance || request.evidence_nats;  // what was asked for holds
+    filter.options = with_evidence(filter.options, *sensor, honour_tolerance);
   }
 
   RecognitionTask task(std::move(by.hypotheses), std::move(filter.options));

@@ -24,12 +24,12 @@ constexpr int samples = 5;  // of the poses in a press
 constexpr double much_motion_mm = 2.0;
 
 /// The middle half of a press, in the frames' time.
-struct Press {
+struct PressInterval {
   double begin_s = 0.0;
   double end_s = 0.0;
 };
 
-std::vector<Press> presses_of(std::span<const double> time_s, std::span<const float> load) {
+std::vector<PressInterval> presses_of(std::span<const double> time_s, std::span<const float> load) {
   constexpr double longest_step_s = 0.5;
   constexpr std::size_t least_frames = 3;
   std::vector<float> smooth(load.size(), 0.0F);  // a median over three frames
@@ -38,7 +38,7 @@ std::vector<Press> presses_of(std::span<const double> time_s, std::span<const fl
     smooth[i] = std::clamp(load[i], low, high);
   }
   const float most = load.empty() ? 0.0F : *std::ranges::max_element(smooth);
-  std::vector<Press> presses;
+  std::vector<PressInterval> presses;
   std::size_t first = 0;
   std::size_t frames = 0;
   for (std::size_t i = 0; i < smooth.size(); ++i) {
@@ -65,7 +65,7 @@ struct Stay {
   double height_mm = not_known;  ///< at most
 };
 
-Stay stay_of(const PoseLog& poses, const Press& press, double offset_s, double reach_mm) {
+Stay stay_of(const PoseLog& poses, const PressInterval& press, double offset_s, double reach_mm) {
   Stay stay{.motion_mm = 0.0,
             .height_mm = poses.height_mm.empty() ? 0.0 : -std::numeric_limits<double>::infinity()};
   Pose first;
@@ -101,13 +101,13 @@ Stay stay_of(const PoseLog& poses, const Press& press, double offset_s, double r
 /// All presses at all offsets, and how much each speaks against its offset: 0 to 1.
 class Comparison {
  public:
-  Comparison(const std::vector<Press>& presses, const PoseLog& poses,
+  Comparison(const std::vector<PressInterval>& presses, const PoseLog& poses,
              const std::vector<double>& offsets_s, double reach_mm) {
     for (const double offset_s : offsets_s) {
       double heights_mm = 0.0;
       double known = 0.0;
       auto& stays = stays_.emplace_back();
-      for (const Press& press : presses) {
+      for (const PressInterval& press : presses) {
         stays.push_back(stay_of(poses, press, offset_s, reach_mm));
         if (!std::isnan(stays.back().motion_mm)) {
           heights_mm += stays.back().height_mm;
@@ -204,12 +204,12 @@ std::optional<double> next_rival_s(const std::vector<double>& offsets_s,
 
 std::optional<ClockOffset> clock_offset(std::span<const double> time_s, std::span<const float> load,
                                         const PoseLog& poses, double reach_mm) {
-  const std::vector<Press> presses = presses_of(time_s, load);
+  const std::vector<PressInterval> presses = presses_of(time_s, load);
   if (presses.size() < least_presses || poses.time_s.size() < 2) {
     return {};
   }
   std::vector<double> lengths_s;
-  for (const Press& press : presses) {
+  for (const PressInterval& press : presses) {
     lengths_s.push_back(press.end_s - press.begin_s);
   }
   std::ranges::nth_element(lengths_s, lengths_s.begin() + lengths_s.size() / 2);

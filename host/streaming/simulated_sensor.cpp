@@ -119,16 +119,16 @@ class SimulatedSensor : public Sensor {
   SensorCounters counters() const override { return counters_; }
 
  private:
-  struct Press {
+  struct SimulatedPress {
     Pose T_robot_sensor;
     std::vector<double> pressure_kpa;  ///< [e] in steady contact, without noise
   };
 
   // Draws the next press that meets the shape, as a guarded move goes on where it meets nothing.
-  Press draw_press() {
+  SimulatedPress draw_press() {
     constexpr double least_kpa = 5.0;
     constexpr int batch = 256;
-    Press press;
+    SimulatedPress press;
     // After so many misses, the robot presses where it is.
     for (int tries = 0; tries < 1000; ++tries) {
       if (poses_.empty()) {
@@ -158,8 +158,8 @@ class SimulatedSensor : public Sensor {
   std::vector<Pose> poses_;  ///< T_object_sensor still to be tried, the last first
   std::uint64_t batches_ = 0;
   std::uint64_t presses_ = 0;  ///< presses that have begun
-  Press before_;
-  Press press_;
+  SimulatedPress before_;
+  SimulatedPress press_;
   double start_s_ = 0.0;  ///< Unix time of frame 0
   std::uint64_t at_ = 0;  ///< index of the next frame
   SensorCounters counters_;
