@@ -11,7 +11,7 @@
 #include <glm/vec3.hpp>
 
 #include "estimation/lattice/refinement.hpp"
-#include "learning/host_progress.hpp"
+#include "learning/progress.hpp"
 #include "palpate/pose_error.hpp"
 #include "recognition/nearby_fit.hpp"
 
@@ -118,7 +118,7 @@ class FoldTrial {
                                              const std::function<void(double)>& progress) const {
     std::vector<std::vector<LabelScore>> scores(presses.size(),
                                                 std::vector<LabelScore>(labels_.size()));
-    HostProgress counter(labels_.size(), progress);
+    Progress counter(static_cast<double>(labels_.size()), progress);
     tbb::parallel_for(std::size_t{0}, labels_.size(), [&](std::size_t label) {
       const ContactModel contact = contact_for(label);
       for (const std::size_t map : maps_of_[label]) {

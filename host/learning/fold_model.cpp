@@ -3,7 +3,7 @@
 
 #include "learning/cross_validation.hpp"
 #include "learning/feature_learning.hpp"
-#include "learning/host_progress.hpp"
+#include "learning/progress.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
@@ -89,7 +89,7 @@ std::vector<FoldModel> models_of(const std::vector<Press>& presses,
   } catch (const Error&) {
     return {};
   }
-  SerialProgress work(static_cast<double>(tables.size()), progress);
+  Progress work(static_cast<double>(tables.size()), progress);
   std::vector<FoldModel> models;
   for (const TableKind& kind : tables) {
     FoldModel& model = models.emplace_back(eq7);

@@ -12,10 +12,10 @@
 
 #include "estimation/maps/left_out_fit.hpp"
 #include "io/input_file.hpp"
-#include "learning/host_progress.hpp"
 #include "learning/map_sensor.hpp"
 #include "learning/observed_map.hpp"
 #include "learning/press.hpp"
+#include "learning/progress.hpp"
 #include "learning/setup_check.hpp"
 #include "learning/touch_alignment.hpp"
 #include "model/angle_unit.hpp"
@@ -236,7 +236,7 @@ LearnedMaps learn_posed_maps(const MapTask& task, Device& device,
   constexpr double sensor_cost = 7.0;
   const auto count = static_cast<double>(task.objects.size());
   const DisplacementSd sd = task.request.touch_sd();
-  SerialProgress work(
+  Progress work(
       count * (1.0 + (sd.none() ? 0.0 : align_cost) + (task.learns_sensor ? sensor_cost : 0.0)),
       progress);
   std::vector<ObjectTouches> objects = task.objects;

@@ -11,7 +11,7 @@
 #include "estimation/maps/left_out_fit.hpp"
 #include "learning/array_place.hpp"
 #include "learning/feature_learning.hpp"
-#include "learning/host_progress.hpp"
+#include "learning/progress.hpp"
 #include "learning/temperature_fit.hpp"
 #include "model/element_spacing.hpp"
 #include "palpate/error.hpp"
@@ -150,7 +150,7 @@ Trials cross_validate(const LearnedPresses& learned, const std::vector<std::stri
                       const std::function<void(double)>& progress) {
   const auto count = static_cast<double>(tables.size());
   const auto folds = static_cast<double>(options.folds);
-  SerialProgress work(count * (1.0 + folds) * table_cost + count + 1.0, progress);
+  Progress work(count * (1.0 + folds) * table_cost + count + 1.0, progress);
   Trials trials;
   for (const TableKind& kind : tables) {
     TriedModel& one =

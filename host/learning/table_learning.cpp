@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
-#include "learning/host_progress.hpp"
+#include "learning/progress.hpp"
 #include "model/bounding_box.hpp"
 #include "palpate/error.hpp"
 
@@ -50,7 +50,7 @@ std::vector<OwnPlacement> place_all(const std::vector<Press>& presses,
                                     const std::vector<TrainingMap>& maps,
                                     const std::vector<OccupancyGrid>& layers,
                                     const TableLearning& how, const LearnedTable& table,
-                                    HostProgress& progress) {
+                                    Progress& progress) {
   const auto presses_of = presses_by_map(presses, maps, how.most_maps);
   std::vector<std::vector<OwnPlacement>> on_map(maps.size());
   tbb::parallel_for(std::size_t{0}, maps.size(), [&](std::size_t map) {
@@ -160,7 +160,7 @@ PlacedPresses learn_table(const std::vector<Press>& presses, const std::vector<T
   }
   const int rounds = at_known_poses(presses) ? 1 : how.rounds;
   PlacedPresses placed{.placements = {}, .table = how.initial()};
-  HostProgress counter(maps.size() * static_cast<std::size_t>(rounds), progress);
+  Progress counter(static_cast<double>(maps.size()) * rounds, progress);
   for (int round = 0; round < rounds; ++round) {
     placed.placements = place_all(presses, evidence, maps, layers, how, placed.table, counter);
     if (placed.placements.empty()) {

@@ -10,8 +10,8 @@
 #include <tbb/parallel_for.h>
 #include <glm/geometric.hpp>
 
-#include "learning/host_progress.hpp"
 #include "learning/predictive_map.hpp"
+#include "learning/progress.hpp"
 
 namespace palpate {
 
@@ -207,7 +207,7 @@ TouchAlignment align_touches(std::span<ObjectTouches> objects, const Displacemen
   if (sd.none() || touches == 0) {
     return {};
   }
-  HostProgress shown(touches * most_rounds, progress);
+  Progress shown(touches * most_rounds, progress);
   std::vector<TouchAlignment> alignments(objects.size());
   tbb::parallel_for(std::size_t{0}, objects.size(), [&](std::size_t k) {
     alignments[k] = align(objects[k], sd, options, [&] { shown.add(); });

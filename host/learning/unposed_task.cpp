@@ -6,9 +6,9 @@
 
 #include "io/input_file.hpp"
 #include "learning/contact_learning.hpp"
-#include "learning/host_progress.hpp"
 #include "learning/map_sensor.hpp"
 #include "learning/map_task.hpp"
+#include "learning/progress.hpp"
 #include "learning/table_learning.hpp"
 #include "learning/unposed_maps.hpp"
 #include "palpate/error.hpp"
@@ -171,7 +171,7 @@ std::vector<std::string> MapTask::names() const {
 LearnedMaps learn_unposed_maps(const MapTask& task, const std::function<void(double)>& progress) {
   constexpr double sensor_cost = 2.0;
   const auto count = static_cast<double>(task.objects.size());
-  SerialProgress work(count * (1.0 + (task.learns_sensor ? sensor_cost : 0.0)), progress);
+  Progress work(count * (1.0 + (task.learns_sensor ? sensor_cost : 0.0)), progress);
   LearnedMaps learned{.replaces_sensor = task.learns_sensor};
   if (task.learns_sensor) {
     learn_unposed_sensor(task, learned, work.part(count * sensor_cost));
