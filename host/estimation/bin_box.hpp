@@ -1,6 +1,5 @@
 #pragma once
 
-#include <algorithm>
 #include <cstdint>
 #include <functional>
 #include <span>
@@ -26,21 +25,6 @@ struct BinBox {
     return row * lattice.x_mm.count + x_first + i % x_count;
   }
 };
-
-/// The smallest box around two of one object and theta; the first may hold no bin.
-inline BinBox smallest_around(const BinBox& a, const BinBox& b) {
-  if (a.bins() == 0) {
-    return b;
-  }
-  const int x = std::min(a.x_first, b.x_first);
-  const int y = std::min(a.y_first, b.y_first);
-  return {.object = a.object,
-          .theta = a.theta,
-          .y_first = y,
-          .y_count = std::max(a.y_first + a.y_count, b.y_first + b.y_count) - y,
-          .x_first = x,
-          .x_count = std::max(a.x_first + a.x_count, b.x_first + b.x_count) - x};
-}
 
 /// All bins of an object at one theta.
 inline BinBox whole_plane(const PoseLattice& lattice, int theta, int object = 0) {
