@@ -5,7 +5,6 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <array>
 #include <functional>
 
 #include "file_parts.hpp"
@@ -14,7 +13,7 @@
 #include "io/recording_survey.hpp"
 #include "palpate/files.hpp"
 #include "support/memory_limit.hpp"
-#include "support/scratch_folder.hpp"
+#include "support/sanitized.hpp"
 
 namespace palpate::large_file_test {
 
@@ -22,22 +21,16 @@ constexpr std::uint64_t mib = 1 << 20;
 
 // Writes a dataset of floats whose chunks all hold these values: made by copying the stored bytes
 // of the first chunk.
-void save_equal_chunks(const std::filesystem::path& path, const char* name,
-                       const std::array<hsize_t, 2>& extents, const std::array<hsize_t, 2>& chunk,
-                       const std::vector<float>& values) {
+void save_equal_chunks(const std::filesystem::path& path, const char* name, const Extents& extents,
+                       const Extents& chunk, const std::vector<float>& values) {
   edit(path, [&](hid_t file) {
-    const Hdf5Handle space(H5Screate_simple(2, extents.data(), nullptr), H5Sclose);
-    const Hdf5Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
-    H5Pset_chunk(creation.get(), 2, chunk.data());
-    H5Pset_deflate(creation.get(), 1);
-    const Hdf5Handle dataset(H5Dcreate2(file, name, H5T_NATIVE_FLOAT, space.get(), H5P_DEFAULT,
-                                        creation.get(), H5P_DEFAULT),
-                             H5Dclose);
+    const Hdf5Handle space = space_of(extents);
+    const Hdf5Handle dataset =
+        new_dataset(file, name, H5T_NATIVE_FLOAT, space, storage_in(chunk).get());
     const hsize_t origin[] = {0, 0};
     H5Sselect_hyperslab(space.get(), H5S_SELECT_SET, origin, nullptr, chunk.data(), nullptr);
-    const Hdf5Handle memory(H5Screate_simple(2, chunk.data(), nullptr), H5Sclose);
-    ASSERT_GE(H5Dwrite(dataset.get(), H5T_NATIVE_FLOAT, memory.get(), space.get(), H5P_DEFAULT,
-                       values.data()),
+    ASSERT_GE(H5Dwrite(dataset.get(), H5T_NATIVE_FLOAT, space_of(chunk).get(), space.get(),
+                       H5P_DEFAULT, values.data()),
               0);
     ASSERT_GE(H5Dflush(dataset.get()), 0);
     hsize_t size = 0;
@@ -52,14 +45,6 @@ void save_equal_chunks(const std::filesystem::path& path, const char* name,
       }
     }
   });
-}
-
-// A map in chunks of 1 x 1 Ki cells, all of zeros, stored as 18 KB each.
-void save_map_of_zeros(const std::filesystem::path& path, hsize_t chunks_x, hsize_t chunks_y) {
-  map_parts().without("log_odds").save(path);
-  constexpr hsize_t edge = 1024;
-  save_equal_chunks(path, "log_odds", {edge * chunks_y, edge * chunks_x}, {edge, edge},
-                    std::vector<float>(edge * edge, 0.0F));
 }
 
 // A stream of `chunks` times 4,096 frames of 40 elements: 640 KiB of pressures each.
@@ -83,7 +68,7 @@ void save_frames(const std::filesystem::path& path, hsize_t chunks) {
                     std::vector<float>(rows * 3, 1.5F));
 }
 
-class LargeFile : public testing::Test {
+class LargeFile : public OneFile {
  protected:
   // Private writable memory of this process, as RLIMIT_DATA counts it.
   static std::uint64_t data_bytes() {
@@ -95,112 +80,78 @@ class LargeFile : public testing::Test {
     return pages[5] * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
   }
 
-  // Runs the work in a process that may hold so much memory beyond what it holds already. The
-  // message of its Error, "" where it has none.
-  static std::string with_memory(std::uint64_t bytes, const std::function<void()>& work) {
-    int ends[2];
-    EXPECT_EQ(::pipe(ends), 0);
+  // Whether the work, in a process of its own that may hold so much memory beyond what it holds
+  // already, returns true.
+  static bool done_with_memory(std::uint64_t bytes, const std::function<bool()>& work) {
     const pid_t pid = ::fork();
     if (pid == 0) {
-      std::string message;
       const rlimit limit{.rlim_cur = data_bytes() + bytes, .rlim_max = RLIM_INFINITY};
       ::setrlimit(RLIMIT_DATA, &limit);
       try {
-        work();
-      } catch (const Error& error) {
-        message = error.what();
-      } catch (const std::exception& error) {
-        message = std::string("not an Error: ") + error.what();
+        ::_exit(work() ? 0 : 1);
+      } catch (const std::exception&) {
+        ::_exit(2);
       }
-      if (::write(ends[1], message.data(), message.size()) < 0) {
-        ::_exit(1);
-      }
-      ::_exit(0);
     }
-    ::close(ends[1]);
-    std::string message(4096, '\0');
-    message.resize(static_cast<std::size_t>(
-        std::max<ssize_t>(0, ::read(ends[0], message.data(), message.size()))));
-    ::close(ends[0]);
     int status = -1;
     ::waitpid(pid, &status, 0);
-    EXPECT_EQ(status, 0);
-    return message;
+    return status == 0;
   }
-
-  ScratchFolder folder_;
-  std::filesystem::path path_ = folder_ / "large.h5";
 };
 
-// 67 MB of cells.
-TEST_F(LargeFile, IsSummarizedInPieces) {
-#ifdef __SANITIZE_ADDRESS__
-  GTEST_SKIP() << "the sanitizer holds memory of its own";
-#endif
-  save_map_of_zeros(path_, 4, 4);
-  const std::string message = with_memory(40 * mib, [&] {
+// 67 MB of cells, stored as 18 KB for each of 16 chunks. What compresses by a factor of 1000 takes
+// its time to read; a limit is for what is read.
+TEST_F(LargeFile, MapIsSummarizedInPiecesAndReadWhole) {
+  constexpr hsize_t edge = 1024;
+  map_parts().without("log_odds").save(path_);
+  save_equal_chunks(path_, "log_odds", {4 * edge, 4 * edge}, {edge, edge},
+                    std::vector<float>(edge * edge, 0.0F));
+  EXPECT_EQ(read_map(path_).log_odds.size(), 4096u * 4096u);
+  if (sanitized) {
+    GTEST_SKIP() << "the sanitizer holds memory of its own";
+  }
+  EXPECT_TRUE(done_with_memory(40 * mib, [&] {
     const MapSummary summary = summarize_map(path_);
-    if (summary.head.nx != 4096 || summary.occupied != 0 || summary.log_odds.most != 0.0) {
-      throw std::runtime_error("wrong summary");
-    }
-  });
-  EXPECT_EQ(message, "");
+    return summary.head.nx == 4096 && summary.occupied == 0 && summary.log_odds.most == 0.0;
+  }));
 }
 
 // 42 MB of pressures.
 TEST_F(LargeFile, RecordingIsSurveyedInPieces) {
-#ifdef __SANITIZE_ADDRESS__
-  GTEST_SKIP() << "the sanitizer holds memory of its own";
-#endif
-  if (!limits_memory()) {
+  if (sanitized || !limits_memory()) {
     GTEST_SKIP() << "memory of processes is not limited here";
   }
   constexpr hsize_t chunks = 64;
   save_frames(path_, chunks);
-  const std::string message = with_memory(20 * mib, [&] {
+  EXPECT_TRUE(done_with_memory(20 * mib, [&] {
     const RecordingSurvey survey = survey_recording(path_);
-    if (survey.head.rows != 4096 * chunks || survey.pressure.in_contact != chunks ||
-        survey.with_pose != 4096 * chunks || suspicions_of(survey).size() != 0) {
-      throw std::runtime_error("wrong survey");
-    }
-  });
-  EXPECT_EQ(message, "");
-  EXPECT_NE(with_memory(20 * mib, [&] { read_recording(path_); }), "") << "the limit holds";
-}
-
-// What compresses by a factor of 1000 takes its time to read; the limit is for what is read.
-TEST_F(LargeFile, IsReadWhole) {
-  save_map_of_zeros(path_, 4, 4);
-  EXPECT_EQ(read_map(path_).log_odds.size(), 4096u * 4096u);
+    return survey.head.rows == 4096 * chunks && survey.pressure.in_contact == chunks &&
+           survey.with_pose == 4096 * chunks && suspicions_of(survey).size() == 0;
+  }));
+  EXPECT_FALSE(done_with_memory(20 * mib, [&] { return read_recording(path_).size() > 0; }))
+      << "the limit holds";
 }
 
 // Rows may be longer than a piece, and chunks may lie across them.
 TEST_F(LargeFile, PiecesComeInOrderWhateverTheChunks) {
-  const std::vector<hsize_t> shape{3, 2, 700, 101};
+  const Extents shape{3, 2, 700, 101};
   std::vector<double> values(3 * 2 * 700 * 101);
   for (std::size_t k = 0; k < values.size(); ++k) {
     values[k] = -static_cast<double>(k);
   }
-  for (const std::vector<hsize_t>& chunk :
-       {std::vector<hsize_t>{}, {3, 2, 700, 1}, {1, 1, 1, 101}, {2, 2, 300, 50}, {1, 2, 7, 9}}) {
-    FileParts parts = posterior_parts();
-    parts.without("log_likelihood")
+  for (const Extents& chunk :
+       {Extents{}, {3, 2, 700, 1}, {1, 1, 1, 101}, {2, 2, 300, 50}, {1, 2, 70, 9}}) {
+    posterior_parts()
+        .without("log_likelihood")
         .attribute("objects", std::vector<std::string>{"A", "B", "C"})
         .attribute("bins_theta", 2)
         .attribute("bins_y", 700)
         .attribute("bins_x", 101)
         .save(path_);
     edit(path_, [&](hid_t file) {
-      const Hdf5Handle space(H5Screate_simple(4, shape.data(), nullptr), H5Sclose);
-      const Hdf5Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
-      if (!chunk.empty()) {
-        H5Pset_chunk(creation.get(), 4, chunk.data());
-        H5Pset_deflate(creation.get(), 1);
-      }
-      const Hdf5Handle dataset(H5Dcreate2(file, "log_likelihood", H5T_NATIVE_DOUBLE, space.get(),
-                                          H5P_DEFAULT, creation.get(), H5P_DEFAULT),
-                               H5Dclose);
-      H5Dwrite(dataset.get(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data());
+      put_values(new_dataset(file, "log_likelihood", H5T_NATIVE_DOUBLE, space_of(shape),
+                             storage_in(chunk).get()),
+                 H5T_NATIVE_DOUBLE, values.data());
     });
     EXPECT_TRUE(read_posterior(path_).log_likelihood == values);
     const PosteriorSummary summary = summarize_posterior(path_);

@@ -6,89 +6,73 @@
 
 #include "file_parts.hpp"
 #include "palpate/files.hpp"
-#include "support/scratch_folder.hpp"
 
 namespace palpate::outside_file_test {
 
 constexpr H5Z_filter_t filter_id = 40000;  // of nobody
 
-class OutsideFile : public testing::Test {
+class OutsideFile : public OneFile {
  protected:
   OutsideFile() {
     EXPECT_EQ(::mkfifo((folder_ / "fifo").c_str(), 0600), 0);
     // Something that could be taken for numbers, and a file with a dataset of the right shape.
     put_bytes(folder_ / "secret", std::string(24, 's'));
     recording_parts().save(folder_ / "other.h5");
-    recording_parts().without("pressure").save(path_);
   }
 
-  // What reading says once `change` was made to the file names the dataset and the word. Whoever
-  // opened the FIFO would wait for ever.
-  void expect_refused(const std::function<void(hid_t)>& change, const char* word) {
+  // What reading says once `change` was made to a file without pressures names the dataset and the
+  // word. Whoever opened the FIFO would wait for ever.
+  void expect_refused(const std::function<void(hid_t)>& change, const char* word) const {
     recording_parts().without("pressure").save(path_);
     edit(path_, change);
     if (H5Zfilter_avail(filter_id) > 0) {
       H5Zunregister(filter_id);  // it was there to write the file
     }
-    expect_named(input_error([&] { read_recording(path_); }), {path_.c_str(), "'pressure'", word});
+    expect_named(refusal([&] { read_recording(path_); }), {"'pressure'", word});
   }
 
-  static void create(hid_t file, hid_t creation, const hsize_t* most = nullptr) {
-    const hsize_t extents[] = {2, 3};
-    const Hdf5Handle space(H5Screate_simple(2, extents, most), H5Sclose);
-    const Hdf5Handle dataset(H5Dcreate2(file, "pressure", H5T_NATIVE_FLOAT, space.get(),
-                                        H5P_DEFAULT, creation, H5P_DEFAULT),
-                             H5Dclose);
-    EXPECT_TRUE(dataset.valid());
-  }
+  std::string other(const char* name) const { return (folder_ / name).string(); }
 
-  ScratchFolder folder_;
-  std::filesystem::path path_ = folder_ / "recording.h5";
+  const Extents shape_{2, 3};
 };
 
 TEST_F(OutsideFile, ExternalStorageIsNotRead) {
   for (const char* name : {"fifo", "secret", "missing"}) {
     expect_refused(
         [&](hid_t file) {
-          const Hdf5Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
-          H5Pset_external(creation.get(), (folder_ / name).c_str(), 0, 24);
-          create(file, creation.get());
+          const Hdf5Handle storage = storage_in({});
+          H5Pset_external(storage.get(), other(name).c_str(), 0, 24);
+          new_dataset(file, "pressure", H5T_NATIVE_FLOAT, space_of(shape_), storage.get());
         },
         "another file");
   }
 }
 
-TEST_F(OutsideFile, ExternalLinksAreNotFollowed) {
+TEST_F(OutsideFile, LinksAreNotFollowed) {
   for (const char* name : {"fifo", "other.h5", "missing"}) {
-    expect_refused(
-        [&](hid_t file) {
-          H5Lcreate_external((folder_ / name).c_str(), "/pressure", file, "pressure", H5P_DEFAULT,
-                             H5P_DEFAULT);
-        },
-        "link to another file");
+    const auto lead_away = [&](hid_t file, const char* object, const char* link) {
+      H5Lcreate_external(other(name).c_str(), object, file, link, H5P_DEFAULT, H5P_DEFAULT);
+    };
+    expect_refused([&](hid_t file) { lead_away(file, "/pressure", "pressure"); },
+                   "link to another file");
     // On the way of a link within the file.
     expect_refused(
         [&](hid_t file) {
-          H5Lcreate_external((folder_ / name).c_str(), "/", file, "away", H5P_DEFAULT, H5P_DEFAULT);
+          lead_away(file, "/", "away");
           H5Lcreate_soft("/away/pressure", file, "pressure", H5P_DEFAULT, H5P_DEFAULT);
         },
         "link");
   }
-}
-
-TEST_F(OutsideFile, LinksOfOtherKindsAreNotFollowed) {
-  const auto traverse = [](const char*, hid_t, const void*, size_t, hid_t, hid_t) -> hid_t {
+  // libhdf5, which is not this process's alone, might follow it to another file.
+  expect_refused(
+      [](hid_t file) { H5Lcreate_soft("/elements", file, "pressure", H5P_DEFAULT, H5P_DEFAULT); },
+      "link");
+  // A link of a kind that a program has made up.
+  H5L_class_t kind{.version = H5L_LINK_CLASS_T_VERS,
+                   .id = static_cast<H5L_type_t>(H5L_TYPE_UD_MIN + 36)};
+  kind.trav_func = [](const char*, hid_t, const void*, size_t, hid_t, hid_t) -> hid_t {
     return H5I_INVALID_HID;
   };
-  const H5L_class_t kind{H5L_LINK_CLASS_T_VERS,
-                         static_cast<H5L_type_t>(H5L_TYPE_UD_MIN + 36),
-                         "test",
-                         nullptr,
-                         nullptr,
-                         nullptr,
-                         traverse,
-                         nullptr,
-                         nullptr};
   ASSERT_GE(H5Lregister(&kind), 0);
   expect_refused(
       [&](hid_t file) {
@@ -104,18 +88,16 @@ TEST_F(OutsideFile, VirtualDatasetsAreNotResolved) {
       expect_refused(
           [&](hid_t file) {
             // Even the shape of an unlimited one is read from its sources.
-            const hsize_t extents[] = {2, 3};
             const hsize_t most[] = {unlimited ? H5S_UNLIMITED : 2, 3};
-            const Hdf5Handle space(H5Screate_simple(2, extents, most), H5Sclose);
+            const Hdf5Handle space = space_of(shape_, most);
             const hsize_t begin[] = {0, 0};
             const hsize_t one[] = {1, 1};
-            const hsize_t block[] = {most[0], 3};
-            H5Sselect_hyperslab(space.get(), H5S_SELECT_SET, begin, nullptr, one, block);
-            const Hdf5Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
-            EXPECT_GE(H5Pset_virtual(creation.get(), space.get(), (folder_ / name).c_str(),
-                                     "/pressure", space.get()),
+            H5Sselect_hyperslab(space.get(), H5S_SELECT_SET, begin, nullptr, one, most);
+            const Hdf5Handle storage = storage_in({});
+            EXPECT_GE(H5Pset_virtual(storage.get(), space.get(), other(name).c_str(), "/pressure",
+                                     space.get()),
                       0);
-            create(file, creation.get(), most);
+            new_dataset(file, "pressure", H5T_NATIVE_FLOAT, space_of(shape_, most), storage.get());
           },
           "virtual");
     }
@@ -129,31 +111,22 @@ TEST_F(OutsideFile, FiltersAreNotLoaded) {
   H5PLprepend(folder_.path().c_str());
   expect_refused(
       [&](hid_t file) {
-        const auto pass = [](unsigned, size_t, const unsigned*, size_t bytes, size_t*,
-                             void**) -> size_t { return bytes; };
-        const H5Z_class2_t filter{H5Z_CLASS_T_VERS, filter_id, 1,       1,
-                                  "test",           nullptr,   nullptr, pass};
+        H5Z_class2_t filter{.version = H5Z_CLASS_T_VERS, .id = filter_id, .encoder_present = 1};
+        filter.decoder_present = 1;
+        filter.name = "test";
+        filter.filter = [](unsigned, size_t, const unsigned*, size_t bytes, size_t*, void**) {
+          return bytes;
+        };
         ASSERT_GE(H5Zregister(&filter), 0);
-        const Hdf5Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
-        const hsize_t chunk[] = {2, 3};
-        H5Pset_chunk(creation.get(), 2, chunk);
-        H5Pset_filter(creation.get(), filter.id, H5Z_FLAG_MANDATORY, 0, nullptr);
-        create(file, creation.get());
-        const Hdf5Handle dataset(H5Dopen2(file, "pressure", H5P_DEFAULT), H5Dclose);
+        const Hdf5Handle storage = storage_in({});
+        H5Pset_chunk(storage.get(), 2, shape_.data());
+        H5Pset_filter(storage.get(), filter.id, H5Z_FLAG_MANDATORY, 0, nullptr);
         const std::vector<float> values(6, 1.0F);
-        EXPECT_GE(
-            H5Dwrite(dataset.get(), H5T_NATIVE_FLOAT, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()),
-            0);
+        put_values(new_dataset(file, "pressure", H5T_NATIVE_FLOAT, space_of(shape_), storage.get()),
+                   H5T_NATIVE_FLOAT, values.data());
       },
       "cannot be read");
   H5PLremove(0);
-}
-
-// libhdf5, which is not this process's alone, might follow it to another file.
-TEST_F(OutsideFile, SoftLinksAreNotFollowed) {
-  expect_refused(
-      [](hid_t file) { H5Lcreate_soft("/elements", file, "pressure", H5P_DEFAULT, H5P_DEFAULT); },
-      "link");
 }
 
 // What the caller has set up stays as it was.

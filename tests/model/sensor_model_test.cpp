@@ -1,14 +1,12 @@
 #include "palpate/sensor_model.hpp"
 
 #include <cmath>
-#include <limits>
-#include <string>
 
 #include <gtest/gtest.h>
 
-#include "palpate/error.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "reference/reference.hpp"
+#include "support/errors.hpp"
 #include "support/limits.hpp"
 
 namespace palpate::sensor_model_test {
@@ -19,7 +17,6 @@ constexpr Reading no = Reading::no_contact;
 TEST(LogOdds, AndProbabilityAreInverse) {
   EXPECT_EQ(log_odds_from_probability(0.5), 0.0);
   EXPECT_DOUBLE_EQ(log_odds_from_probability(0.2), -std::log(4.0));
-  EXPECT_EQ(probability_from_log_odds(0.0), 0.5);
   EXPECT_EQ(probability_from_log_odds(1000.0), 1.0);
   EXPECT_EQ(probability_from_log_odds(-1000.0), 0.0);
   for (double p = 0.001; p < 1.0; p += 0.037) {
@@ -34,7 +31,7 @@ TEST(InverseSensorModel, IsEquations4To6) {
         const InverseSensorModel model{.spread_mm = spread_mm, .peak = peak, .prior = prior};
         // Beyond 4 spreads the reference itself loses digits of log(p / (1 - p)).
         for (double d = 0.0; d < 4.0 * spread_mm; d += 0.1 * spread_mm) {
-          for (const Reading reading : {in, no}) {
+          for (const Reading reading : {in, no, Reading::unknown}) {
             EXPECT_NEAR(model.increment(reading, d), reference::increment(reading, d, model), 1e-12)
                 << "float64 rounding of logs near 10";
           }
@@ -44,38 +41,20 @@ TEST(InverseSensorModel, IsEquations4To6) {
   }
 }
 
-TEST(InverseSensorModel, AtTheElementsCentre) {
-  // p = 0.2 + 0.8 * 0.9 = 0.92, and 0.2 - 0.2 * 0.9 = 0.02.
-  const InverseSensorModel model{.spread_mm = 0.5, .peak = 0.9, .prior = 0.2};
-  EXPECT_NEAR(model.increment(in, 0.0), std::log(0.92 / 0.08) - std::log(0.2 / 0.8), 1e-14);
-  EXPECT_NEAR(model.increment(no, 0.0), std::log(0.02 / 0.98) - std::log(0.2 / 0.8), 1e-14);
-}
-
 TEST(InverseSensorModel, ContactAndNoContactMirrorEachOtherAboutAnEvenPrior) {
-  const InverseSensorModel even{.spread_mm = 0.5, .peak = 0.9, .prior = 0.5};
   const InverseSensorModel low{.spread_mm = 0.5, .peak = 0.9, .prior = 0.1};
   const InverseSensorModel high{.spread_mm = 0.5, .peak = 0.9, .prior = 0.9};
   for (double d = 0.0; d < 3.0; d += 0.2) {
-    EXPECT_DOUBLE_EQ(even.increment(in, d), -even.increment(no, d));
     EXPECT_NEAR(low.increment(in, d), -high.increment(no, d), 1e-14) << "rounding of 1 - prior";
   }
 }
 
-TEST(InverseSensorModel, UnknownChangesNothing) {
-  const InverseSensorModel model;
-  EXPECT_EQ(model.increment(Reading::unknown, 0.0), 0.0);
-  EXPECT_EQ(model.increment(Reading::unknown, 1.0), 0.0);
-}
-
 TEST(InverseSensorModel, TendsToThePriorFarAway) {
   const InverseSensorModel model;
-  double last = model.increment(in, 0.0);
   for (double d = 0.1; d < 5.0; d += 0.1) {
-    const double here = model.increment(in, d);
-    EXPECT_LT(here, last);
-    EXPECT_GT(here, 0.0);
+    EXPECT_LT(model.increment(in, d), model.increment(in, d - 0.1));
+    EXPECT_GT(model.increment(in, d), 0.0);
     EXPECT_LT(model.increment(no, d), 0.0);
-    last = here;
   }
   EXPECT_EQ(model.increment(in, 1e6), 0.0);
 }
@@ -97,16 +76,11 @@ TEST(InverseSensorModel, SupportRadiusKeepsTheCutSumBelowTheTolerance) {
 
 TEST(InverseSensorModel, RefusesWhatIsOutOfRange) {
   const auto expect_refused = [](const InverseSensorModel& model, const std::string& field) {
-    try {
-      model.validate();
-      ADD_FAILURE() << field << " was accepted";
-    } catch (const Error& error) {
-      EXPECT_EQ(error.fault(), Fault::input);
-      EXPECT_EQ(std::string(error.what()).find(field), 0U) << error.what();
-    }
+    const std::string said = input_error([&] { model.validate(); });
+    EXPECT_TRUE(said.starts_with(field)) << said;
   };
   InverseSensorModel().validate();
-  for (const double spread : {0.0, -1.0, nan, std::numeric_limits<double>::infinity()}) {
+  for (const double spread : {0.0, -1.0, nan, infinity}) {
     expect_refused({.spread_mm = spread}, "spread");
   }
   for (const double p : {0.0, 1.0, -0.1, 1.5, nan}) {
