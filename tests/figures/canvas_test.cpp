@@ -1,12 +1,13 @@
 #include "figures/canvas.hpp"
 
+#include <algorithm>
 #include <array>
 #include <string>
 
 #include <gtest/gtest.h>
 
-#include "palpate/error.hpp"
 #include "picture.hpp"
+#include "support/errors.hpp"
 
 namespace palpate::canvas_test {
 
@@ -14,18 +15,11 @@ TEST(Canvas, IsWhiteAndOfTheSizeAskedFor) {
   const Picture picture = decode(Canvas(31, 17).encode());
   EXPECT_EQ(picture.width, 31);
   EXPECT_EQ(picture.height, 17);
-  for (const std::uint32_t pixel : picture.pixels) {
-    EXPECT_EQ(pixel, 0xFFFFFFu);
-  }
+  EXPECT_EQ(std::ranges::count(picture.pixels, 0xFFFFFFu), 31 * 17);
 }
 
 TEST(Canvas, RefusesASizeBeyondCairo) {
-  try {
-    Canvas(100000, 10);
-    FAIL() << "no Error";
-  } catch (const Error& error) {
-    EXPECT_EQ(error.fault(), Fault::system);
-  }
+  error_of(Fault::system, [] { Canvas(100000, 10); });
 }
 
 TEST(Canvas, FillsCellsFromTheLowestRowUp) {
