@@ -45,16 +45,6 @@ TEST(Footprint, OfTheDigiTactsRegionIsItsRectangleAtEveryPose) {
   }
 }
 
-TEST(Footprint, TurnsItsSquaresWithTheArray) {
-  const Pose T{{3.0, 4.0}, 0.4};
-  const Footprint f = footprint(at(T, digitacts_array()), 1.8);
-  for (const auto& square : f.elements) {
-    const glm::dvec2 edge = square[1] - square[0];
-    // The array's own direction, or a right angle to it.
-    EXPECT_NEAR(std::sin(2.0 * (std::atan2(edge.y, edge.x) - T.theta_rad)), 0.0, 1e-9);
-  }
-}
-
 /// Area of the rectangle along this direction around the points.
 double rectangle_around(const std::vector<glm::dvec2>& points, double angle_rad) {
   glm::dvec2 lower = rotate(-angle_rad, points.front());
@@ -103,14 +93,6 @@ TEST(Footprint, OfALargeArrayIsMadeAtOnce) {
   // The ring, and up to half a diagonal of an element around it.
   EXPECT_GT(area(round.outline), std::numbers::pi * 50.0 * 50.0);
   EXPECT_LT(area(round.outline), std::numbers::pi * 50.01 * 50.01);
-
-  std::vector<glm::dvec2> grid;
-  for (std::size_t k = 0; k < elements; ++k) {
-    grid.emplace_back(0.5 * static_cast<double>(k % 200), 0.25 * static_cast<double>(k / 200));
-  }
-  const Footprint rectangle = footprint(at({{3.0, 4.0}, 0.4}, grid), 0.25);
-  EXPECT_EQ(rectangle.outline.size(), 4u);
-  EXPECT_NEAR(area(rectangle.outline), 99.75 * 50.0, 1e-8);
 }
 
 TEST(Footprint, OfFewElements) {

@@ -76,18 +76,6 @@ TEST(EvidenceScale, CellsWithoutEvidenceDoNotCount) {
   EXPECT_EQ(range_of(evidence), 6.0);
 }
 
-TEST(DrawMaps, LeavesUnseenCellsWhite) {
-  const Picture picture = decode(draw(unseen("A", 20, 20)));
-  int coloured = 0;
-  for (const std::uint32_t pixel : picture.pixels) {
-    const std::uint32_t red = pixel >> 16;
-    const std::uint32_t blue = pixel & 0xFF;
-    coloured += red != blue;
-  }
-  EXPECT_GT(coloured, 0);
-  EXPECT_LE(coloured, 440 * 20) << "more than the colour bar";
-}
-
 TEST(DrawMaps, DrawsEachCellInItsPlaceWithYUp) {
   // One occupied cell at the lower left against one at the upper right: the pictures differ in
   // these two cells alone, whose rectangle is therefore the map.

@@ -146,9 +146,8 @@ TEST(GoldenValues, OfTheHistogramFilter) {
   const std::vector<double> xy[] = {
       {0.06831091637, 0.055160227, 0.01874962027, 0.04333685476, 0.02837270665, 0.03101173393},
       {0.08079095938, 0.1839936706, 0.01383326467, 0.09129867783, 0.03187735201, 0.161661582}};
-  const std::vector<double> theta[] = {
-      {0.05718158206, 0.06157249194, 0.04861849296, 0.07756949202},
-      {0.09363329598, 0.1284885382, 0.1748760836, 0.1664575886}};
+  const std::vector<double> theta[] = {{0.05718158206, 0.06157249194, 0.04861849296, 0.07756949202},
+                                       {0.09363329598, 0.1284885382, 0.1748760836, 0.1664575886}};
   // Two touches with the error of a log-likelihood change a probability by at most this.
   constexpr double probability = 4 * per_touch;
 
@@ -166,9 +165,8 @@ TEST(GoldenValues, OfTheHistogramFilter) {
   const reference::Posterior posterior = reference_posterior(objects(), options, touches);
   std::vector<std::vector<std::vector<double>>> by_touch;
   for (const std::size_t touch : {0U, 1U}) {
-    by_touch.push_back(
-        reference_posterior(objects(), options, std::span(touches).subspan(touch, 1))
-            .log_likelihood);
+    by_touch.push_back(reference_posterior(objects(), options, std::span(touches).subspan(touch, 1))
+                           .log_likelihood);
   }
   EXPECT_NEAR(reference::none_log_evidence(touches, options.lattice, objects(), by_touch),
               none_log_evidence, float32_maps);

@@ -102,6 +102,7 @@ TEST_F(MapFile, IsNotWrittenWhereItCouldNotBeRead) {
     return refusal([&] { write_map(path_, map); });
   };
   expect_named(spoilt(&OccupancyGrid::prior, 1.0), {"'prior'"});
+  expect_named(spoilt(&OccupancyGrid::label, "\xc3"), {"'label'"});
   expect_named(spoilt(&OccupancyGrid::nx, 4), {"4 x 2"});
   expect_named(spoilt(&OccupancyGrid::observations, std::vector(5, 1.0F)), {"observations"});
   expect_named(spoilt(&OccupancyGrid::mean_level, std::vector{0.0F, 0.0F, 0.0F, -1.0F, 0.0F, 0.0F}),

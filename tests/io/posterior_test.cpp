@@ -6,6 +6,7 @@
 
 #include "file_parts.hpp"
 #include "palpate/files.hpp"
+#include "same.hpp"
 #include "support/limits.hpp"
 
 namespace palpate::posterior_test {
@@ -18,32 +19,37 @@ class PosteriorFile : public OneFile {
   }
 };
 
-// RoundTrip.Posterior has every field; this one is of more than one chunk, and written at once or
-// object by object. Chunks hold a part of one object, one object, or several objects.
-TEST_F(PosteriorFile, OfAnySizeIsTheSameFileWrittenWholeOrObjectByObject) {
+// Of chunks that hold a part of one object, one object, or several objects.
+TEST_F(PosteriorFile, ComesBackAsItWasWrittenWholeOrObjectByObject) {
   for (const int thetas : {150, 70, 3}) {
-    Posterior whole;
-    whole.objects = {"A", "B", "lång name", "D", "E"};
-    whole.lattice.x_mm.count = 47;
-    whole.lattice.y_mm.count = 29;
-    whole.lattice.theta_rad.count = thetas;
-    const auto bins = static_cast<std::size_t>(whole.lattice.bins());
-    for (std::size_t k = 0; k < whole.objects.size() * bins; ++k) {
-      whole.log_likelihood.push_back(-std::sqrt(static_cast<double>(k)));
+    Posterior written{.objects = {"A", "B", "lång name", "", "E"},
+                      .lattice = {.x_mm = {-10.5, 10, 47},
+                                  .y_mm = {-5, 5.25, 29},
+                                  .theta_rad = {-0.0, 6, thetas},
+                                  .pivot_mm = {100, -3}}};
+    const auto bins = static_cast<std::size_t>(written.lattice.bins());
+    for (std::size_t k = 0; k < written.objects.size() * bins; ++k) {
+      written.log_likelihood.push_back(-std::sqrt(static_cast<double>(k)));
     }
-    whole.log_likelihood[5] = -infinity;
-    write_posterior(path_, whole);
+    written.log_likelihood[5] = -infinity;
+    write_posterior(path_, written);
     const std::string bytes = bytes_of(path_);
-    EXPECT_LT(bytes.size(), whole.log_likelihood.size() * sizeof(double));
+    EXPECT_LT(bytes.size(), written.log_likelihood.size() * sizeof(double));
+    const Posterior read = read_posterior(path_);
+    EXPECT_EQ(read.objects, written.objects);
+    EXPECT_EQ(read.log_likelihood, written.log_likelihood);
+    EXPECT_TRUE(same(read.lattice.x_mm, written.lattice.x_mm));
+    EXPECT_TRUE(same(read.lattice.y_mm, written.lattice.y_mm));
+    EXPECT_TRUE(same(read.lattice.theta_rad, written.lattice.theta_rad));
+    EXPECT_EQ(read.lattice.pivot_mm, written.lattice.pivot_mm);
     std::vector<std::size_t> asked;
-    write_posterior(path_, whole.objects, whole.lattice, [&](std::size_t object) {
+    write_posterior(path_, written.objects, written.lattice, [&](std::size_t object) {
       asked.push_back(object);
-      const double* first = whole.log_likelihood.data() + object * bins;
+      const double* first = written.log_likelihood.data() + object * bins;
       return std::vector<double>(first, first + bins);
     });
     EXPECT_EQ(asked, (std::vector<std::size_t>{0, 1, 2, 3, 4}));
     EXPECT_TRUE(bytes_of(path_) == bytes);
-    EXPECT_EQ(read_posterior(path_).log_likelihood, whole.log_likelihood);
   }
 }
 
@@ -86,25 +92,47 @@ TEST_F(PosteriorFile, OfSomeBinsComesBackAsItWasWritten) {
   }
 }
 
-TEST_F(PosteriorFile, OfSomeBinsThatIsNotSoundIsNeverWritten) {
-  const auto expect_refused = [&](const std::function<void(Posterior&)>& spoil, const char* named) {
-    Posterior posterior = of_some_bins();
+TEST_F(PosteriorFile, ThatIsNotSoundIsNeverWritten) {
+  Posterior of_all{.objects = {"A"},
+                   .lattice = {{0, 1, 1}, {0, 1, 1}, {0, 1, 2}},
+                   .log_likelihood = {-1.0, -2.0}};
+  const auto expect_refused = [&](Posterior posterior, const std::function<void(Posterior&)>& spoil,
+                                  const char* named) {
     spoil(posterior);
     expect_named(refusal([&] { write_posterior(path_, posterior); }), {named});
   };
-  expect_refused([](Posterior& p) { p.index.pop_back(); }, "2 bins and 3 log-likelihoods");
-  expect_refused([](Posterior& p) { p.index[1] = 2000; }, "2000 is no bin of 2000");
-  expect_refused([](Posterior& p) { p.index[0] = -1; }, "-1 is no bin");
-  expect_refused([](Posterior& p) { p.log_likelihood[0] = nan; }, "nan");
-  for (const double share : {-0.1, 1.1, nan}) {
-    expect_refused([&](Posterior& p) { p.rest_mass_bound = share; }, "rest_mass_bound");
-  }
-  constexpr int most = std::numeric_limits<int>::max();
   expect_refused(
-      [](Posterior& p) {
-        p.lattice = {{0, 1, most}, {0, 1, most}, {0, 1, most}};
+      of_all, [](Posterior& p) { p.objects = {"\xff"}; }, "'objects'");
+  expect_refused(
+      of_all, [](Posterior& p) { p.objects.clear(); }, "'objects'");
+  expect_refused(
+      of_all, [](Posterior& p) { p.lattice.y_mm.count = -1; }, "y_mm");
+  expect_refused(
+      of_all, [](Posterior& p) { p.lattice.pivot_mm.x = nan; }, "pivot_mm");
+  expect_refused(
+      of_all, [](Posterior& p) { p.log_likelihood.pop_back(); }, "1 log-likelihoods");
+  expect_refused(
+      of_all, [](Posterior& p) { p.log_likelihood[1] = infinity; }, "inf");
+  const Posterior of_some = of_some_bins();
+  expect_refused(
+      of_some, [](Posterior& p) { p.index.pop_back(); }, "2 bins and 3");
+  expect_refused(
+      of_some, [](Posterior& p) { p.index[1] = 2000; }, "2000 is no bin of 2000");
+  expect_refused(
+      of_some, [](Posterior& p) { p.index[0] = -1; }, "-1 is no bin");
+  expect_refused(
+      of_some, [](Posterior& p) { p.log_likelihood[0] = nan; }, "nan");
+  for (const double share : {-0.1, 1.1, nan}) {
+    expect_refused(
+        of_some, [&](Posterior& p) { p.rest_mass_bound = share; }, "rest_mass_bound");
+  }
+  constexpr Axis most{0, 1, std::numeric_limits<int>::max()};
+  expect_refused(
+      of_some,
+      [&](Posterior& p) {
+        p.lattice = {most, most, most};
       },
-      "too many to be numbered");
+      "too many");
   EXPECT_FALSE(std::filesystem::exists(path_));
 }
 

@@ -280,4 +280,19 @@ TEST_F(RecordingFile, IsNotWrittenWhereItCouldNotBeRead) {
   EXPECT_TRUE(std::filesystem::is_empty(folder_.path()));
 }
 
+// Files of another program, where they lie beside the source tree.
+TEST(SharedFiles, RealPressesAreRead) {
+  const auto presses = std::filesystem::path(PALPATE_SOURCE_DIR) / "../shared/data/presses";
+  if (!std::filesystem::exists(presses)) {
+    GTEST_SKIP() << presses << " is not there";
+  }
+  for (const auto& file : std::filesystem::directory_iterator(presses)) {
+    const Recording recording = read_recording(file.path());
+    EXPECT_EQ(recording.object, file.path().stem());
+    EXPECT_EQ(recording.pressure_unit, "raw");
+    EXPECT_EQ(recording.size(), 25u);
+    EXPECT_EQ(recording.elements(), 1400u);
+  }
+}
+
 }  // namespace palpate::recording_test

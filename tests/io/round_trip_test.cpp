@@ -1,5 +1,5 @@
-// What the library agrees to write it reads back as it was, whatever it is; what it refuses leaves
-// no file.
+// A recording that the library agrees to write it reads back as it was, whatever it is; what it
+// refuses leaves no file.
 
 #include <gtest/gtest.h>
 
@@ -150,76 +150,6 @@ TEST_F(RoundTrip, Recording) {
   expect_whole_or_refused(
       trials(100), drawn, [&](const Recording& r) { write_recording(path_, r); },
       [&](const Recording& r) { expect_same(read_recording(path_), r); });
-}
-
-TEST_F(RoundTrip, Map) {
-  Hostile draw(6);
-  const auto drawn = [&](bool often) {
-    draw.set_rarity(often ? 10 : 1000);
-    OccupancyGrid m;
-    m.label = draw.text();
-    m.cell_mm = std::abs(draw.number()) + 0.25;
-    m.origin_mm = {draw.number(), draw.number()};
-    m.prior = draw.once_in(20) ? draw.number() : draw.one_of({0.2, 1e-300, 1.0 - 0x1p-53});
-    m.symmetry = draw.once_in(20) ? -1 : static_cast<int>(draw.below(5));
-    if (draw.once_in(2)) {
-      m.spread_mm = std::abs(draw.number()) + 0.25;
-    }
-    m.nx = static_cast<int>(draw.below(20));
-    m.ny = static_cast<int>(1 + draw.below(3));
-    const auto cells = static_cast<std::size_t>(m.nx) * static_cast<std::size_t>(m.ny);
-    for (const double value : draw.numbers(draw.size(cells))) {
-      m.log_odds.push_back(static_cast<float>(value));
-    }
-    return m;
-  };
-  expect_whole_or_refused(
-      trials(120), drawn, [&](const OccupancyGrid& m) { write_map(path_, m); },
-      [&](const OccupancyGrid& m) {
-        const OccupancyGrid read = read_map(path_);
-        EXPECT_EQ(read.label, m.label);
-        EXPECT_EQ(read.cell_mm, m.cell_mm);
-        EXPECT_EQ(read.origin_mm, m.origin_mm);
-        EXPECT_EQ(read.prior, m.prior);
-        EXPECT_EQ(read.symmetry, m.symmetry);
-        EXPECT_EQ(read.spread_mm, m.spread_mm);
-        EXPECT_EQ(read.nx, m.nx);
-        EXPECT_EQ(read.ny, m.ny);
-        EXPECT_EQ(read.log_odds, m.log_odds);
-      });
-}
-
-TEST_F(RoundTrip, Posterior) {
-  Hostile draw(3);
-  const auto drawn = [&](bool often) {
-    draw.set_rarity(often ? 20 : 1000);
-    Posterior p;
-    for (std::size_t i = draw.size(1 + draw.below(3)); i > 0; --i) {
-      p.objects.push_back(draw.text());
-    }
-    std::size_t bins = p.objects.size();
-    for (Axis* axis : {&p.lattice.x_mm, &p.lattice.y_mm, &p.lattice.theta_rad}) {
-      axis->lower = draw.number();
-      axis->upper = axis->lower + std::abs(draw.number());
-      axis->count = draw.once_in(50) ? draw.one_of({0, -1, std::numeric_limits<int>::max()})
-                                     : static_cast<int>(1 + draw.below(4));
-      bins *= static_cast<std::size_t>(axis->count > 0 && axis->count < 5 ? axis->count : 1);
-    }
-    p.lattice.pivot_mm = {draw.number(), draw.number()};
-    p.log_likelihood = draw.numbers(draw.size(bins));
-    return p;
-  };
-  expect_whole_or_refused(
-      trials(120), drawn, [&](const Posterior& p) { write_posterior(path_, p); },
-      [&](const Posterior& p) {
-        const Posterior read = read_posterior(path_);
-        EXPECT_EQ(read.objects, p.objects);
-        EXPECT_EQ(read.log_likelihood, p.log_likelihood);
-        EXPECT_TRUE(same(read.lattice.x_mm, p.lattice.x_mm));
-        EXPECT_TRUE(same(read.lattice.y_mm, p.lattice.y_mm));
-        EXPECT_TRUE(same(read.lattice.theta_rad, p.lattice.theta_rad));
-        EXPECT_EQ(read.lattice.pivot_mm, p.lattice.pivot_mm);
-      });
 }
 
 // What a stored frame is read back as: what is no pose, no time of a device and no reading of an

@@ -104,14 +104,6 @@ TEST(InverseSensorModel, IsEquations4To6) {
   }
 }
 
-TEST(InverseSensorModel, ContactAndNoContactMirrorEachOtherAboutAnEvenPrior) {
-  const InverseSensorModel low{.spread_mm = 0.5, .peak = 0.9, .prior = 0.1};
-  const InverseSensorModel high{.spread_mm = 0.5, .peak = 0.9, .prior = 0.9};
-  for (double d = 0.0; d < 3.0; d += 0.2) {
-    EXPECT_NEAR(low.increment(in, d), -high.increment(no, d), 1e-14) << "rounding of 1 - prior";
-  }
-}
-
 TEST(InverseSensorModel, TendsToThePriorFarAway) {
   const InverseSensorModel model;
   for (double d = 0.1; d < 5.0; d += 0.1) {
