@@ -8,20 +8,11 @@
 
 #include "palpate/pose.hpp"
 #include "palpate/touch.hpp"
+#include "picture.hpp"
 #include "support/limits.hpp"
 #include "support/synthetic.hpp"
 
 namespace palpate::footprint_test {
-
-double area(const std::vector<glm::dvec2>& polygon) {
-  double twice = 0.0;
-  for (std::size_t k = 0; k < polygon.size(); ++k) {
-    const glm::dvec2 a = polygon[k];
-    const glm::dvec2 b = polygon[(k + 1) % polygon.size()];
-    twice += a.x * b.y - a.y * b.x;
-  }
-  return twice / 2;
-}
 
 std::vector<glm::dvec2> at(const Pose& T, std::vector<glm::dvec2> points) {
   for (glm::dvec2& p : points) {

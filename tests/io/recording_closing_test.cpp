@@ -1,12 +1,9 @@
 // A recording that was cut off is closed for programs other than Palpate.
 
 #include <gtest/gtest.h>
-#include <linux/capability.h>
-#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <array>
 #include <functional>
 
 #include "file_parts.hpp"
@@ -19,24 +16,6 @@
 namespace palpate::recording_closing_test {
 
 constexpr std::size_t elements = 36;
-
-/// While this lives, root may write only what its permissions let it write, as anybody else.
-class ObeyedPermissions {
- public:
-  ObeyedPermissions() {
-    EXPECT_EQ(::syscall(SYS_capget, &header_, before_), 0);
-    auto after = std::to_array(before_);
-    after[0].effective &= ~(1U << CAP_DAC_OVERRIDE);
-    EXPECT_EQ(::syscall(SYS_capset, &header_, after.data()), 0);
-  }
-  ~ObeyedPermissions() { ::syscall(SYS_capset, &header_, before_); }
-  ObeyedPermissions(const ObeyedPermissions&) = delete;
-  ObeyedPermissions& operator=(const ObeyedPermissions&) = delete;
-
- private:
-  __user_cap_header_struct header_{.version = _LINUX_CAPABILITY_VERSION_3, .pid = 0};
-  __user_cap_data_struct before_[_LINUX_CAPABILITY_U32S_3] = {};
-};
 
 class RecordingClosing : public OneFile {
  protected:
@@ -201,11 +180,16 @@ TEST_F(RecordingClosing, WhatIsNoRecordingIsLeftAlone) {
 
 TEST_F(RecordingClosing, NeedsTheRightToWrite) {
   cut_off(300);
-  std::filesystem::permissions(path_, std::filesystem::perms::owner_read);
-  {
-    const ObeyedPermissions obeyed;
-    expect_named(refusal([&] { close_recording(path_); }), {"permissions"});
-  }
+  using std::filesystem::perms;
+  std::filesystem::permissions(path_, perms::owner_read | perms::others_read);
+  std::filesystem::permissions(folder_.path(), perms::owner_all | perms::others_exec);
+  EXPECT_EQ(status_of([&] {
+              constexpr uid_t nobody = 65534;
+              EXPECT_EQ(::setuid(::getuid() == 0 ? nobody : ::getuid()), 0);  // root may all
+              expect_named(refusal([&] { close_recording(path_); }), {"permissions"});
+              ::_exit(HasFailure() ? 1 : 0);
+            }),
+            0);
   expect_frames(300);
 }
 

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <numbers>
@@ -52,21 +53,17 @@ TEST_F(RecordingSurveyed, Ranges) {
   r.pressure = {0.0, 1.0, 2.0, 9.0, 2.0, 0.5};
   r.time_s = {10.0, 12.5};
   const RecordingSurvey s = survey(r);
+  const auto ends = [](const Extremes& range) { return std::pair(range.least, range.most); };
   EXPECT_EQ(s.head.rows, 2u);
   EXPECT_EQ(s.head.elements, 3u);
-  EXPECT_EQ(s.poses->x_mm.least, -4.0);
-  EXPECT_EQ(s.poses->x_mm.most, 1.0);
-  EXPECT_EQ(s.poses->y_mm.least, -2.0);
-  EXPECT_EQ(s.poses->y_mm.most, 8.0);
-  EXPECT_EQ(s.poses->theta_rad.least, -1.5);
-  EXPECT_EQ(s.poses->theta_rad.most, 0.5);
+  EXPECT_EQ(ends(s.poses->x_mm), std::pair(-4.0, 1.0));
+  EXPECT_EQ(ends(s.poses->y_mm), std::pair(-2.0, 8.0));
+  EXPECT_EQ(ends(s.poses->theta_rad), std::pair(-1.5, 0.5));
   EXPECT_EQ(s.array->x_mm.span(), 2.0);
   EXPECT_EQ(s.array->y_mm.span(), 3.0);
-  EXPECT_EQ(s.spacing->nearest_mm.least, 2.0);
-  EXPECT_EQ(s.spacing->nearest_mm.most, 3.0);
+  EXPECT_EQ(ends(s.spacing->nearest_mm), std::pair(2.0, 3.0));
+  EXPECT_EQ(ends(*s.pressure.range), std::pair(0.0, 9.0));
   EXPECT_EQ(s.spacing->closest, (std::array<std::size_t, 2>{0, 1}));
-  EXPECT_EQ(s.pressure.range->least, 0.0);
-  EXPECT_EQ(s.pressure.range->most, 9.0);
   EXPECT_EQ(s.pressure.readings.quantile(0.5), 1.0);
   EXPECT_EQ(s.pressure.in_contact, 1u) << "a reading of 2 kPa is not above 2 kPa";
   EXPECT_EQ(s.elapsed_s, 2.5);
@@ -77,9 +74,7 @@ TEST_F(RecordingSurveyed, ContactIsJudgedAboveTheBaseline) {
   const std::uint64_t touched = survey(r).pressure.in_contact;
   EXPECT_GT(touched, 100u);
   r.baseline.assign(36, 64.0);
-  for (double& pressure : r.pressure) {
-    pressure += 64.0;
-  }
+  std::ranges::for_each(r.pressure, [](double& pressure) { pressure += 64.0; });
   EXPECT_EQ(survey(r).pressure.in_contact, touched);
   r.pressure_unit = "raw";
   EXPECT_FALSE(survey(r).threshold);
@@ -123,7 +118,7 @@ TEST_F(RecordingSurveyed, SpacingIsThatOfAllPairs) {
   }
   std::optional<Extremes> expected;
   for (const glm::dvec2& a : places) {
-    double nearest = std::numeric_limits<double>::infinity();
+    double nearest = infinity;
     for (const glm::dvec2& b : places) {
       nearest = &a == &b ? nearest : std::min(nearest, std::hypot(a.x - b.x, a.y - b.y));
     }
@@ -138,10 +133,10 @@ TEST_F(RecordingSurveyed, SpacingIsThatOfAllPairs) {
 
 TEST_F(RecordingSurveyed, SimulatedTouchesAreSound) {
   for (const double noise_kpa : {0.0, 0.7}) {
-    for (const int touches : {3, 9, 200}) {
-      for (const char* letter : {"E", "O"}) {
-        Simulator sensor(make_shape(letter), {.noise_kpa = noise_kpa}, digitacts_array(), 1);
-        EXPECT_EQ(suspicions(sensor.touch(random_poses(touches, 1), {})),
+    for (const int touches : {3, 9, 40, 200}) {
+      for (const auto& [letter, seed] : {std::pair("E", 0u), {"O", 1u}}) {
+        Simulator sensor(make_shape(letter), {.noise_kpa = noise_kpa}, digitacts_array(), seed);
+        EXPECT_EQ(suspicions(sensor.touch(random_poses(touches, seed), {})),
                   std::vector<std::string>{})
             << letter << " " << touches << " " << noise_kpa;
       }
@@ -160,19 +155,9 @@ Change scale(std::vector<Value> Recording::*list, double factor) {
   };
 }
 
-Change each_place(const std::function<glm::dvec2(const glm::dvec2&)>& change) {
+Change each_pose(Pose (*change)(const Pose&)) {
   return [=](Recording& r) {
-    for (Pose& pose : r.T_robot_sensor) {
-      pose.translation_mm = change(pose.translation_mm);
-    }
-  };
-}
-
-Change each_angle(const std::function<double(double)>& change) {
-  return [=](Recording& r) {
-    for (Pose& pose : r.T_robot_sensor) {
-      pose.theta_rad = change(pose.theta_rad);
-    }
+    std::ranges::transform(r.T_robot_sensor, r.T_robot_sensor.begin(), change);
   };
 }
 
@@ -235,9 +220,13 @@ void touch_again_nearby(Recording& r) {
 
 double with_offset(double kpa) { return kpa + 50.0; }
 double as_switch(double kpa) { return kpa > 5.0 ? 1.0 : 0.0; }
-double in_degrees(double rad) { return rad * 180.0 / std::numbers::pi; }
-double counted_on(double rad) { return rad + 1.5 * std::numbers::pi; }
-glm::dvec2 in_metres(const glm::dvec2& p_mm) { return 1e-3 * p_mm + glm::dvec2(0.6, -0.2); }
+Pose in_metres(const Pose& T) {
+  return {1e-3 * T.translation_mm + glm::dvec2(0.6, -0.2), T.theta_rad};
+}
+Pose in_degrees(const Pose& T) {
+  return {T.translation_mm, T.theta_rad * 180.0 / std::numbers::pi};
+}
+Pose counted_on(const Pose& T) { return {T.translation_mm, T.theta_rad + 1.5 * std::numbers::pi}; }
 
 const Change twice_again = both(write_again(20, 30), write_again(20, 31));
 const Change constant_elements = both(element(4, 7.25), element(9, 7.25));
@@ -259,10 +248,10 @@ const Rule rules[] = {
     {"ElementsAtOnePlace", training,
      [](Recording& r) { r.elements_mm[7] = r.elements_mm[30] + glm::dvec2(0.005, 0.0); },
      "Elements 7 and 30", "0.005 mm apart"},
-    {"PosesInMetres", training, each_place(in_metres), "0.0204 x 0.0204 mm", "metres"},
-    {"PosesOfOnePlace", training, both(each_place(in_metres), tremble)},
-    {"AnglesInDegrees", training, each_angle(in_degrees), "330", "degrees"},
-    {"AnglesBeyondATurn", training, each_angle(counted_on)},
+    {"PosesInMetres", training, each_pose(in_metres), "0.0204 x 0.0204 mm", "metres"},
+    {"PosesOfOnePlace", training, both(each_pose(in_metres), tremble)},
+    {"AnglesInDegrees", training, each_pose(in_degrees), "330", "degrees"},
+    {"AnglesBeyondATurn", training, each_pose(counted_on)},
     {"ConstantElements", training, constant_elements, "Elements 4, 9 read", "7.25 kPa"},
     {"ElementOfZero", training, element(4, 0.0), "Element 4 reads", "0 kPa"},
     {"ConstantReadings", training, each_reading([](double) { return 3.0; }, "kPa"),
