@@ -38,25 +38,21 @@ TEST(MapLayer, ColoursEveryCellByItsDistanceFromThePrior) {
   EXPECT_EQ(picture.at(50, 10), rgb(diverging(1.0)));
 }
 
-/// A row of cells with this evidence, in nats over a prior of one half.
-OccupancyGrid row_of(const std::vector<float>& evidence) {
-  OccupancyGrid map;
-  map.prior = 0.5;
-  map.nx = static_cast<int>(evidence.size());
-  map.ny = 1;
-  map.log_odds = evidence;
-  return map;
-}
-
-double range_of(const std::vector<float>& evidence) {
-  const OccupancyGrid map = row_of(evidence);
+/// The scale of a row of cells with this evidence, in nats over the prior.
+double range_of(const std::vector<float>& evidence, double prior = 0.5) {
+  OccupancyGrid map{.prior = prior, .nx = static_cast<int>(evidence.size()), .ny = 1};
+  for (const float nats : evidence) {
+    map.log_odds.push_back(nats + static_cast<float>(map.prior_log_odds()));
+  }
   return evidence_scale(std::span(&map, 1)).range_nats;
 }
 
 TEST(EvidenceScale, NineOfTenCellsStayWithinIt) {
   // Nine of ten up to 3.9, one far beyond; then the ninth is beyond, too.
-  EXPECT_EQ(range_of({0.1F, -0.2F, 0.3F, -0.4F, 0.5F, 0.6F, 0.7F, -0.8F, 3.9F, -3.9F, 70.0F}), 4.0);
-  EXPECT_EQ(range_of({0.1F, -0.2F, 0.3F, -0.4F, 0.5F, 0.6F, 0.7F, -0.8F, 3.9F, 70.0F}), 80.0);
+  std::vector<float> nats{0.1F, -0.2F, 0.3F, -0.4F, 0.5F, 0.6F, 0.7F, -0.8F, 3.9F, -3.9F, 70.0F};
+  EXPECT_EQ(range_of(nats, 0.2), 4.0);
+  std::erase(nats, -3.9F);
+  EXPECT_EQ(range_of(nats, 0.2), 80.0);
 }
 
 TEST(EvidenceScale, IsRoundedUpToANumberWhoseHalfIsShort) {

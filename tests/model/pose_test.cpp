@@ -8,6 +8,9 @@
 
 #include "palpate/estimate.hpp"
 #include "palpate/pose.hpp"
+#include "palpate/pose_error.hpp"
+#include "reference/reference.hpp"
+#include "support/errors.hpp"
 #include "support/synthetic.hpp"
 
 namespace palpate::pose_test {
@@ -17,11 +20,12 @@ constexpr double pi = std::numbers::pi;
 // Coordinates of a few hundred mm lose about 1e-13 mm to each rotation in float64.
 constexpr double rounding = 1e-11;
 
-std::vector<Pose> some_poses() {
+std::vector<Pose> some_poses(double most_mm, double most_rad) {
   Uniform random(3);
   std::vector<Pose> poses{{}, {{1.0, 0.0}, 0.0}, {{0.0, 0.0}, pi}};
-  for (int i = 0; i < 20; ++i) {
-    poses.push_back({{random(-300.0, 300.0), random(-300.0, 300.0)}, random(-20.0, 20.0)});
+  for (int i = 0; i < 12; ++i) {
+    poses.push_back(
+        {{random(-most_mm, most_mm), random(-most_mm, most_mm)}, random(-most_rad, most_rad)});
   }
   return poses;
 }
@@ -33,7 +37,7 @@ void expect_same_pose(const Pose& a, const Pose& b) {
 }
 
 TEST(Pose, IsOfAGroupThatActsInTurn) {
-  const std::vector<Pose> poses = some_poses();
+  const std::vector<Pose> poses = some_poses(300.0, 20.0);
   const glm::dvec2 p{12.5, -7.25};
   for (std::size_t i = 0; i + 2 < poses.size(); ++i) {
     const Pose &a = poses[i], &b = poses[i + 1], &c = poses[i + 2];
@@ -131,6 +135,68 @@ TEST(ObjectPose, AFarRobotOriginDoesNotBlurTheObject) {
     // Terms of (2000 mm)^2 times 1e-4 rad^2 cancel: some 1e-16 of 400 mm^2 remain.
     EXPECT_NEAR(back.covariance[i], known[i], 1e-12) << "entry " << i;
   }
+}
+
+/// An L of 2 mm cells: occupied at (10, 20), (12, 20), (14, 20) and (10, 22).
+OccupancyGrid letter_l() {
+  return {.label = "L",
+          .cell_mm = 2.0,
+          .origin_mm = {10.0, 20.0},
+          .nx = 3,
+          .ny = 2,
+          .log_odds = {1.0F, 0.5F, 9.0F, 0.1F, 0.0F, -3.0F}};
+}
+
+constexpr double metric_rounding = 1e-10;  // of squares
+
+TEST(BodyOf, IsUniformOverTheOccupiedCells) {
+  const Body body = body_of(letter_l());
+  // x: 10, 12, 14, 10 and y: 20, 20, 20, 22.
+  EXPECT_DOUBLE_EQ(body.centroid_mm.x, 11.5);
+  EXPECT_DOUBLE_EQ(body.centroid_mm.y, 20.5);
+  // Mean squares: x (2.25 + 0.25 + 6.25 + 2.25) / 4, y (3 * 0.25 + 2.25) / 4.
+  EXPECT_DOUBLE_EQ(body.inertia_mm2, 2.75 + 0.75);
+}
+
+TEST(BodyOf, RefusesAMapWithoutOccupiedCells) {
+  OccupancyGrid map = letter_l();
+  map.log_odds.assign(6, 0.0F);
+  expect_named(input_error([&] { body_of(map); }), {"'L'"});
+}
+
+// The root mean squared displacement of the occupied cells, the least of all turns of the symmetry;
+// 0 for the truth itself.
+TEST(PoseError, IsTheReferences) {
+  OccupancyGrid map = letter_l();
+  const std::vector<Pose> poses = some_poses(100.0, 7.0);
+  for (map.symmetry = 0; map.symmetry < 5; ++map.symmetry) {
+    for (const Pose& estimate : poses) {
+      for (const Pose& truth : poses) {
+        EXPECT_NEAR(pose_error_mm(body_of(map), map.symmetry, estimate, truth),
+                    reference::pose_error_mm(map, estimate, truth), metric_rounding);
+      }
+    }
+  }
+}
+
+TEST(NearestEqualPose, IsNoErrorAwayFromTheTruthAndAtMostHalfATurnOfTheSymmetryFromTheEstimate) {
+  const Body body = body_of(letter_l());
+  const std::vector<Pose> poses = some_poses(100.0, 7.0);
+  for (const int symmetry : {0, 1, 2, 3, 6}) {
+    for (std::size_t i = 0; i + 1 < poses.size(); ++i) {
+      const Pose nearest = nearest_equal_pose(body, symmetry, poses[i], poses[i + 1]);
+      EXPECT_NEAR(pose_error_mm(body, symmetry, nearest, poses[i + 1]), 0.0, metric_rounding);
+      // Compared with the nearest pose, the symmetry has no turn to forgive.
+      EXPECT_NEAR(pose_error_mm(body, 1, poses[i], nearest),
+                  pose_error_mm(body, symmetry, poses[i], poses[i + 1]), metric_rounding);
+    }
+  }
+}
+
+TEST(PoseError, OfATruthThatIsAbsurdlyFarAwayIsFinite) {
+  // The square of 1e200 mm is infinite.
+  const double error_mm = pose_error_mm(body_of(letter_l()), 1, {}, {{1e200, 0.0}, 0.0});
+  EXPECT_NEAR(error_mm / 1e200, 1.0, 1e-12);
 }
 
 }  // namespace palpate::pose_test
