@@ -86,7 +86,7 @@ TEST(Footprint, OfALargeArrayIsMadeAtOnce) {
   EXPECT_LT(area(round.outline), std::numbers::pi * 50.01 * 50.01);
 }
 
-TEST(Footprint, OfFewElements) {
+TEST(Footprint, OfOneElementOfARowAndOfNone) {
   const Footprint one = footprint(std::vector<glm::dvec2>{{2.0, 3.0}}, 1.8);
   ASSERT_EQ(one.elements.size(), 1u);
   EXPECT_EQ(one.outline.size(), 4u);

@@ -46,7 +46,7 @@ double& reading(Recording& recording, std::size_t row, std::size_t element) {
   return recording.pressure[recording.elements() * row + element];
 }
 
-TEST_F(RecordingSurveyed, Ranges) {
+TEST_F(RecordingSurveyed, FindsTheRangesOfPosesPlacesReadingsAndTimes) {
   Recording r;
   r.elements_mm = {{-1.0, 0.0}, {1.0, 0.0}, {1.0, 3.0}};
   r.T_robot_sensor = {{{1.0, -2.0}, 0.5}, {{-4.0, 8.0}, -1.5}};

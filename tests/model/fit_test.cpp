@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -35,9 +36,9 @@ ContactModel three_levels(std::size_t objects) {
 // likelihood 0.02 + 0.9 * 3/4 = 0.695 and no contact 0.02 + 0.9 / 4 = 0.245. They predict contact
 // with q = 0.695 / 0.94 = 139/188 = 1 - 49/188. In units of D = log(0.695 / 0.245), contact is
 // 49/188 above the mean, no contact 139/188 below it, and the variance is 49 * 139 / 188^2.
-class SmallCase : public testing::Test {
+class FitByHand : public testing::Test {
  protected:
-  SmallCase() { map_.log_odds.assign(9, static_cast<float>(std::log(3.0))); }
+  FitByHand() { map_.log_odds.assign(9, static_cast<float>(std::log(3.0))); }
 
   std::optional<Fit> fit(const std::vector<double>& pressure,
                          const ContactModel& model = {.gamma = 0.1}, std::size_t object = 0) const {
@@ -50,7 +51,7 @@ class SmallCase : public testing::Test {
       .label = "small", .origin_mm = {-0.5, -0.5}, .prior = 0.2, .nx = 3, .ny = 3, .log_odds = {}};
 };
 
-TEST_F(SmallCase, HasTheZAndTheVerdictThatOneComputesByHand) {
+TEST_F(FitByHand, HasTheZAndTheVerdictThatOneComputesByHand) {
   const double sd = std::sqrt(49.0 * 139.0);
   EXPECT_NEAR(fit({10.0})->z, 49.0 / sd, 1e-6) << "of the map's float32";
   // One contact among n readings.
@@ -64,20 +65,20 @@ TEST_F(SmallCase, HasTheZAndTheVerdictThatOneComputesByHand) {
   }
 }
 
-TEST_F(SmallCase, IsNoneWhereNothingIsKnown) {
+TEST_F(FitByHand, IsNoneWhereNothingIsKnown) {
   EXPECT_FALSE(fit({2.0, 2.0})) << "at the threshold";
   EXPECT_FALSE(fit({}));
   EXPECT_FALSE(fit_of({}, Pose{}, map_, ContactModel{}));
 }
 
-TEST_F(SmallCase, CutsOffWhatIsHeldToBeImpossible) {
+TEST_F(FitByHand, CutsOffWhatIsHeldToBeImpossible) {
   map_.log_odds.assign(9, 1000.0F);
   EXPECT_EQ(fit({10.0, 10.0}, {.gamma = 0.0})->z, 0.0) << "nothing else is possible";
   EXPECT_EQ(fit({10.0, 0.0}, {.gamma = 0.0})->z, -largest_fit_z);
   EXPECT_EQ(fit({10.0, 0.0}, {.gamma = 0.0})->verdict, Verdict::does_not_fit);
 }
 
-TEST_F(SmallCase, RefusesWhatIsNotSound) {
+TEST_F(FitByHand, RefusesWhatIsNotSound) {
   input_error([&] { fit({10.0, infinity}); });
   EXPECT_NO_THROW(fit({10.0}, three_levels(2), 1));
   input_error([&] { fit({10.0}, three_levels(2), 2); });
@@ -227,14 +228,10 @@ TEST(FitScale, GoesByTheNumberAndTheSpacingOfElements) {
                        .alone = SingleFitScale{1.5, 0.5},
                        .array = FitArray{.elements = 36.0, .spacing_mm = 2.0}};
   const FitScale dense = scale.for_array({.elements = 4.0 * 36.0, .spacing_mm = 1.0});
-  EXPECT_EQ(dense.mean, 2.0);
-  EXPECT_EQ(dense.sd, 4.0);
-  EXPECT_EQ(dense.shared_sd, 1.0);
-  EXPECT_EQ(dense.alone->mean, 3.0);
-  EXPECT_EQ(dense.alone->sd, 1.0);
+  EXPECT_EQ(std::tie(dense.mean, dense.sd, dense.shared_sd), std::tuple(2.0, 4.0, 1.0));
+  EXPECT_EQ(std::tie(dense.alone->mean, dense.alone->sd), std::tuple(3.0, 1.0));
   const FitScale sparse = scale.for_array({.elements = 9.0, .spacing_mm = 4.0});
-  EXPECT_EQ(sparse.mean, 0.5);
-  EXPECT_EQ(sparse.sd, 2.0) << "elements further apart share no less than the others";
+  EXPECT_EQ(std::tie(sparse.mean, sparse.sd), std::tuple(0.5, 2.0)) << "share no less";
   EXPECT_EQ(FitScale{.mean = 3.0}.for_array({.elements = 9.0, .spacing_mm = 4.0}).mean, 3.0)
       << "of any array";
 }
