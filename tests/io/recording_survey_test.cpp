@@ -240,6 +240,8 @@ struct Rule {
   const char* besides = "";
 };
 
+void PrintTo(const Rule& rule, std::ostream* out) { *out << rule.name; }
+
 const Rule rules[] = {
     {"SoundTouches", training, [](Recording&) {}},
     {"SoundFrames", stream, [](Recording&) {}},
