@@ -76,7 +76,7 @@ class Records(Batch):
         records = parse(self.merged("s"))
         self.assertEqual(len(records), 10 * 3 + 1, "a broken recording is one unknown")
         self.assertEqual([record["frame"] for record in records[:9]], 3 * [1, 2, 3])
-        self.assertEqual((records[2]["recording"], records[3]["recording"]), (name(0), name(1)))
+        self.assertEqual([record["recording"] for record in records[2:4]], [name(0), name(1)])
         # Each touch has the error.
         self.assertTrue(all("pressure_unit" in record["error"] for record in records[6:9]))
 

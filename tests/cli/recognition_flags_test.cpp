@@ -3,14 +3,18 @@
 
 #include "recognition_flags.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 namespace palpate::cli::recognition_flags_test {
 
 using nlohmann::json;
+using namespace nlohmann::literals;
 
 double rounded(double number) { return std::round(number * 1e9) / 1e9; }
 
@@ -64,14 +68,14 @@ json told(const RecognitionTask& task) {
 }
 
 /// What is told of 20 x 20 x 72 bins and no other option.
-const json papers = json::parse(R"json({
+const json papers = R"json({
   "x": [-10, 10, 20], "y": [-10, 10, 20], "theta": [0, 360, 72], "pivot": [0, 0],
   "auto_pivot": false, "prior": null, "gamma": 0.1, "threshold": 2, "ratio": 0.3,
   "touch_sd": [0, 0], "slip_sd": [0, 0], "none": 0.222222222, "labels": ["A", "I", "(none)"],
   "by_place": true, "act": [0.5, 0.99], "filter": 0, "auto_filter": true,
   "trace_tolerance": 1e-4, "drawn_tolerance": 1e-3, "tolerance": null, "budget_s": null,
   "sensor": 0
-})json");
+})json"_json;
 
 class TaskOfFlags : public RecognitionFlags {
  protected:
@@ -91,14 +95,10 @@ struct Wish {
 
 const std::vector<Wish>& wishes() {
   static const std::vector<Wish> all{
-      {"bins",
-       "5x4x3",
-       "bins: [5, 4, 3]",
-       {{"x", {-10, 10, 5}},
-        {"y", {-10, 10, 4}},
-        {"theta", {0, 360, 3}},
-        {"none", nullptr},  // such bins are too wide to tell it
-        {"labels", {"A", "I"}}}},
+      {"bins", "5x4x3", "bins: [5, 4, 3]",
+       // Such bins are too wide to tell "(none)".
+       R"({"x": [-10, 10, 5], "y": [-10, 10, 4], "theta": [0, 360, 3], "none": null,
+           "labels": ["A", "I"]})"_json},
       {"x-mm", "-4:9", "region: {x_mm: [-4, 9]}", {{"x", {-4, 9, 20}}}},
       {"y-mm", "-4:9", "region: {y_mm: [-4, 9]}", {{"y", {-4, 9, 20}}}},
       {"theta-deg", "10:80", "region: {theta_deg: [10, 80]}", {{"theta", {10, 80, 72}}}},
@@ -112,15 +112,9 @@ const std::vector<Wish>& wishes() {
       {"touch-sd-mm", "1", "touch_sd: {mm: 1}", {{"touch_sd", {1, 0}}}},
       {"touch-sd-mm", "0", "touch_sd: {mm: 0}", json::object()},
       {"touch-sd-deg", "5", "touch_sd: {deg: 5}", {{"touch_sd", {0, 5}}}},
-      {"slip-sd-mm",
-       "0.5",
-       "slip_sd: {mm: 0.5}",
-       {{"slip_sd", {0.5, 0}}, {"by_place", false}},
-       "histogram"},
-      {"slip-sd-deg",
-       "9",
-       "slip_sd: {deg: 9}",
-       {{"slip_sd", {0, 9}}, {"by_place", false}},
+      {"slip-sd-mm", "0.5", "slip_sd: {mm: 0.5}",
+       R"({"slip_sd": [0.5, 0], "by_place": false})"_json, "histogram"},
+      {"slip-sd-deg", "9", "slip_sd: {deg: 9}", R"({"slip_sd": [0, 9], "by_place": false})"_json,
        "histogram"},
       {"slip-sd-mm", "0.5", "slip_sd: {mm: 0.5}", {{"motion", {0.5, 5.729577951}}}, "particles"},
       {"slip-sd-deg", "9", "slip_sd: {deg: 9}", {{"motion", {1, 9}}}, "particles"},
@@ -129,25 +123,17 @@ const std::vector<Wish>& wishes() {
       {"none", "0", "none: 0", {{"none", nullptr}, {"labels", {"A", "I"}}, {"by_place", false}}},
       {"act-below-mm", "0.3", "act_below_mm: 0.3", {{"act", {0.3, 0.99}}}},
       {"act-above", "0.9", "act_above: 0.9", {{"act", {0.5, 0.9}}}},
-      {"tolerance",
-       "1e-3",
-       "",
-       {{"tolerance", 1e-3}, {"trace_tolerance", nullptr}, {"drawn_tolerance", nullptr}}},
+      {"tolerance", "1e-3", "",
+       R"({"tolerance": 1e-3, "trace_tolerance": null, "drawn_tolerance": null})"_json},
       {"budget-ms", "5", "", {{"budget_s", 0.005}}},
       {"evidence-nats", "0.5", "", {{"evidence_nats", 0.5}}},
       {"particles", "500", "", {{"particles", {500, false, false, 0}}}, "particles"},
       {"resampling", "systematic", "", {{"particles", {10000, true, false, 0}}}, "particles"},
       {"augmented", "true", "", {{"particles", {10000, false, true, 0}}}, "particles"},
       {"seed", "7", "", {{"particles", {10000, false, false, 7}}}, "particles"},
-      {"sensor-model",
-       "s.yaml",
-       "sensor_model: s.yaml",
-       {{"threshold", 5},
-        {"ratio", 0.6},
-        {"gamma", 0.3},
-        {"touch_sd", {1, 0}},
-        {"sensor", 4},
-        {"evidence_nats", 0.2}}}};
+      {"sensor-model", "s.yaml", "sensor_model: s.yaml",
+       R"({"threshold": 5, "ratio": 0.6, "gamma": 0.3, "touch_sd": [1, 0], "sensor": 4,
+           "evidence_nats": 0.2})"_json}};
   return all;
 }
 
@@ -158,13 +144,8 @@ TEST_F(TaskOfFlags, HasThePapersNumbersWhereNoneIsGiven) {
       {"histogram", {{"auto_filter", false}}},
       {"bounded",
        {{"auto_filter", false}, {"filter", 1}, {"tolerance", 1e-6}, {"evidence_nats", nullptr}}},
-      {"particles",
-       {{"auto_filter", false},
-        {"filter", 2},
-        {"none", nullptr},
-        {"labels", {"A", "I"}},
-        {"particles", {10000, false, false, 0}},
-        {"motion", {1, 5.729577951}}}}};
+      {"particles", R"({"auto_filter": false, "filter": 2, "none": null, "labels": ["A", "I"],
+                        "particles": [10000, false, false, 0], "motion": [1, 5.729577951]})"_json}};
   for (const auto& [filter, of_filter] : changes) {
     json expected = papers;
     expected.update(of_filter);

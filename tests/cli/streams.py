@@ -3,7 +3,6 @@
 import csv
 import dataclasses
 import json
-import math
 
 from command import CommandTest, Ended
 
@@ -59,12 +58,3 @@ class StreamTest(CommandTest):
         """What `record` makes of the frames that another program writes for array.csv."""
         arguments = ("record", "--sensor", "-", "--array", "array.csv", "-o", file, *flags)
         return self.palpate(*arguments, status=status, input=frames.lines())
-
-
-def same(a: list[list[float]], b: list[list[float]]) -> bool:
-    """Equal, unknown where the others are."""
-    return len(a) == len(b) and all(
-        p == q or (math.isnan(p) and math.isnan(q))
-        for row, other in zip(a, b, strict=True)
-        for p, q in zip(row, other, strict=True)
-    )
