@@ -47,23 +47,6 @@ def test_records_of_what_is_in_memory(files: Files) -> None:
     assert comparable(given) == comparable(expected)
 
 
-def test_records_by_the_sensor_that_a_folder_brings(files: Files, tmp_path: pathlib.Path) -> None:
-    maps = tmp_path / "maps"
-    command("simulate", "U", "-o", tmp_path / "U.h5", "--seed", 3)
-    command("map", files.train[0], tmp_path / "U.h5", "-o", f"{maps}/")
-    [expected] = printed("recognize", files.unknown, "--maps", maps, *SMALL)
-    assert expected["sensor_model"] == str(maps / "sensor.yaml")
-    [given] = palpate.recognize(files.unknown, maps, **BINS)
-    assert comparable(given) == comparable(expected)
-    read = [palpate.read_map(path) for path in sorted(maps.glob("*.map.h5"))]
-    [of_read] = palpate.recognize(files.unknown, read, **BINS)
-    assert of_read.sensor_model == given.sensor_model
-    [by_eq7] = palpate.recognize(files.unknown, read, sensor_model="none", **BINS)
-    assert "sensor_model" not in by_eq7
-    others = [*read, palpate.read_map(files.maps / "A.map.h5")]
-    assert "was not learned for" in warned(palpate.recognize, files.unknown, others, **BINS)[1]
-
-
 def test_the_cells_of_a_map_and_the_readings_of_a_simulation(
     files: Files, device: palpate.Device
 ) -> None:
@@ -115,7 +98,7 @@ def test_the_rows_of_an_import(tmp_path: pathlib.Path) -> None:
     assert numpy.isnan(given.pressure[1, 1]) and numpy.isnan(given.T_robot_sensor[2]).all()
 
 
-def test_the_bytes_and_words_of_a_folder_of_maps(tmp_path: pathlib.Path) -> None:
+def test_the_bytes_and_words_of_a_folder_of_maps(files: Files, tmp_path: pathlib.Path) -> None:
     train = [tmp_path / f"{letter}.h5" for letter in "AU"]
     for seed, file in enumerate(train, start=1):
         palpate.simulate(file.stem, palpate.random_poses(30, seed), seed=seed).save(file)
@@ -138,6 +121,20 @@ def test_the_bytes_and_words_of_a_folder_of_maps(tmp_path: pathlib.Path) -> None
         assert one.label == other.label
         assert numpy.array_equal(one.log_odds, other.log_odds)
     assert {file.name for file in tmp_path.iterdir()} == {"A.h5", "U.h5", "command", "python"}
+
+    # The folder brings its sensor to recognition.
+    maps = tmp_path / "python"
+    [expected] = printed("recognize", files.unknown, "--maps", maps, *SMALL)
+    assert expected["sensor_model"] == str(maps / "sensor.yaml")
+    [record] = palpate.recognize(files.unknown, maps, **BINS)
+    assert comparable(record) == comparable(expected)
+    read = [palpate.read_map(path) for path in sorted(maps.glob("*.map.h5"))]
+    [of_read] = palpate.recognize(files.unknown, read, **BINS)
+    assert of_read.sensor_model == record.sensor_model
+    [by_eq7] = palpate.recognize(files.unknown, read, sensor_model="none", **BINS)
+    assert "sensor_model" not in by_eq7
+    others = [*read, palpate.read_map(files.maps / "A.map.h5")]
+    assert "was not learned for" in warned(palpate.recognize, files.unknown, others, prior=0.3, **BINS)[1]
 
 
 def comparable_plan(plan: dict[str, Any]) -> dict[str, Any]:
@@ -194,7 +191,8 @@ REFUSALS: dict[str, tuple[Callable[[Files], object], Callable[[Files], list[obje
     "particles": (
         lambda files: palpate.recognize(files.unknown, files.maps, filter="bounded", particles=1),
         lambda files: ["recognize", files.unknown, "--maps", files.maps, "--filter", "bounded", "--particles", "1"],
-        {"--particles": "particles", "--filter bounded": "filter='bounded'", "--filter particles": "filter='particles'"},
+        {"--particles": "particles", "--filter bounded": "filter='bounded'",
+         "--filter particles": "filter='particles'"},
     ),
     "samples_of_a_plan": (
         lambda files: palpate.plan(files.unknown, files.maps, samples=1),
@@ -217,13 +215,13 @@ REFUSALS: dict[str, tuple[Callable[[Files], object], Callable[[Files], list[obje
         {"--bins, --x-mm, --y-mm, --theta-deg and --pivot-mm": "bins=, x_mm=, y_mm=, theta_deg= and pivot_mm="},
     ),
     "units_of_a_table": (
-        lambda files: palpate.import_tables(files.unknown, array=(2, 2, 1), pose_unit=("m", "turn")),  # type: ignore[arg-type]
-        lambda files: ["import", files.unknown, "--array", "2:2:1", "-o", f"{files.folder}/o.h5", "--pose-unit", "m,turn"],
+        lambda files: palpate.import_tables("p.csv", array=(2, 2, 1), pose_unit="m,turn"),  # type: ignore[arg-type]
+        lambda files: ["import", "p.csv", "--array", "2:2:1", "-o", "o.h5", "--pose-unit", "m,turn"],
         {"--pose-unit m,turn": "pose_unit='m,turn'"},
     ),
     "a_table_that_is_not_there": (
-        lambda files: palpate.import_tables(files.folder / "none.csv", array=(2, 2, 1)),
-        lambda files: ["import", files.folder / "none.csv", "--array", "2:2:1", "-o", f"{files.folder}/o.h5"],
+        lambda files: palpate.import_tables(pathlib.Path("none.csv"), array=(2, 2, 1)),
+        lambda files: ["import", "none.csv", "--array", "2:2:1", "-o", "o.h5"],
         {},
     ),
     "records_without_truth": (
