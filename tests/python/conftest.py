@@ -3,6 +3,7 @@ import os
 import pathlib
 import re
 import subprocess
+import sys
 import warnings
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -10,6 +11,8 @@ from typing import Any
 import pytest
 
 import palpate
+
+sys.path.append(str(pathlib.Path(__file__).parents[1] / "support"))
 
 
 @pytest.fixture(scope="session")
