@@ -11,12 +11,11 @@ import re
 import signal
 import socket
 import subprocess
-import urllib.request
 from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
-from conftest import command, error_of, run
+from conftest import command, run
 from selenium import webdriver
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import Select, WebDriverWait
@@ -271,21 +270,6 @@ def test_saved_files_are_shown(
     browser.find_element(By.ID, "filter").send_keys("nothing such")
     shows("0 of 3 records", "records")
     assert browser.complaints() == []
-
-
-def test_show_serves_files_and_draws_what_is_in_memory(
-    folder: pathlib.Path, maps: list[palpate.OccupancyGrid]
-) -> None:
-    program = os.environ["PALPATE_COMMAND"]
-    page = palpate.show(folder / "maps" / "A.map.h5", command=program)
-    assert isinstance(page, palpate.Page)
-    with urllib.request.urlopen(page.url + "file/0") as answer:
-        assert json.load(answer)["label"] == "A"
-    assert f'<iframe src="{page.url}"' in page._repr_html_()
-    page.close()
-    assert "nothing.h5: no such file" in error_of(palpate.show, folder / "nothing.h5", command=program)
-    axes = palpate.show(maps[0])
-    assert not isinstance(axes, palpate.Page) and axes.get_xlabel() == "x, mm"
 
 
 # Before other sites and hostile clients.
