@@ -181,60 +181,52 @@ def test_a_calibration(presses: list[pathlib.Path], tmp_path: pathlib.Path) -> N
     assert json.loads(json.dumps(given)) == given and given.tried[0].layer == "mean_level"
 
 
-#: What a function refuses, the arguments of the command, and how Python spells the options that it names.
-REFUSALS: dict[str, tuple[Callable[[Files], object], Callable[[Files], list[object]], dict[str, str]]] = {
+#: What a function refuses, the command line, and how Python spells the options that it names.
+REFUSALS: dict[str, tuple[Callable[[Files], object], str, dict[str, str]]] = {
     "bins": (
         lambda files: palpate.recognize(files.unknown, files.maps, bins=(0, 1, 1)),
-        lambda files: ["recognize", files.unknown, "--maps", files.maps, "--bins", "0x1x1"],
-        {"--bins 0x1x1": "bins=(0, 1, 1)"},
+        "recognize {0.unknown} --maps {0.maps} --bins 0x1x1", {"--bins 0x1x1": "bins=(0, 1, 1)"},
     ),
     "particles": (
         lambda files: palpate.recognize(files.unknown, files.maps, filter="bounded", particles=1),
-        lambda files: ["recognize", files.unknown, "--maps", files.maps, "--filter", "bounded", "--particles", "1"],
+        "recognize {0.unknown} --maps {0.maps} --filter bounded --particles 1",
         {"--particles": "particles", "--filter bounded": "filter='bounded'",
          "--filter particles": "filter='particles'"},
     ),
     "samples_of_a_plan": (
         lambda files: palpate.plan(files.unknown, files.maps, samples=1),
-        lambda files: ["plan", files.unknown, "--maps", files.maps, "--candidates", "grid", "--samples", 1],
-        {},
+        "plan {0.unknown} --maps {0.maps} --candidates grid --samples 1", {},
     ),
     "cells_of_a_map": (
         lambda files: palpate.learn_maps(files.train[0], f"{files.folder}/new/", cell_mm=0.0),
-        lambda files: ["map", files.train[0], "-o", f"{files.folder}/new/", "--cell-mm", 0],
-        {},
+        "map {0.train[0]} -o {0.folder}/new/ --cell-mm 0", {},
     ),
     "an_origin_of_unposed_touches": (
         lambda files: palpate.learn_maps(files.train[0], f"{files.folder}/new/", origin=(1, 2, 3), unposed=True),
-        lambda files: ["map", files.train[0], "-o", f"{files.folder}/new/", "--origin", "1,2,3", "--unposed"],
-        {"--origin 1,2,3": "origin=(1, 2, 3)"},
+        "map {0.train[0]} -o {0.folder}/new/ --origin 1,2,3 --unposed", {"--origin 1,2,3": "origin=(1, 2, 3)"},
     ),
     "a_region_of_unposed_presses": (
         lambda files: palpate.calibrate(files.train, unposed=True, x_mm=(-1, 1)),
-        lambda files: ["calibrate", *files.train, "-o", f"{files.folder}/s.yaml", "--unposed", "--x-mm=-1:1"],
+        "calibrate {0.train[0]} {0.train[1]} -o {0.folder}/s.yaml --unposed --x-mm=-1:1",
         {"--bins, --x-mm, --y-mm, --theta-deg and --pivot-mm": "bins=, x_mm=, y_mm=, theta_deg= and pivot_mm="},
     ),
     "units_of_a_table": (
-        lambda files: palpate.import_tables("p.csv", array=(2, 2, 1), pose_unit="m,turn"),  # type: ignore[arg-type]
-        lambda files: ["import", "p.csv", "--array", "2:2:1", "-o", "o.h5", "--pose-unit", "m,turn"],
-        {"--pose-unit m,turn": "pose_unit='m,turn'"},
+        lambda _: palpate.import_tables("p.csv", array=(2, 2, 1), pose_unit="m,turn"),  # type: ignore[arg-type]
+        "import p.csv --array 2:2:1 -o o.h5 --pose-unit m,turn", {"--pose-unit m,turn": "pose_unit='m,turn'"},
     ),
     "a_table_that_is_not_there": (
-        lambda files: palpate.import_tables(pathlib.Path("none.csv"), array=(2, 2, 1)),
-        lambda files: ["import", "none.csv", "--array", "2:2:1", "-o", "o.h5"],
-        {},
+        lambda _: palpate.import_tables(pathlib.Path("none.csv"), array=(2, 2, 1)),
+        "import none.csv --array 2:2:1 -o o.h5", {},
     ),
     "records_without_truth": (
-        lambda files: palpate.evaluate(files.without_truth),
-        lambda files: ["evaluate", files.without_truth],
-        {},
+        lambda files: palpate.evaluate(files.without_truth), "evaluate {0.without_truth}", {},
     ),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("name", REFUSALS)
 def test_refusals(name: str, files: Files) -> None:
-    call, arguments, spelled = REFUSALS[name]
+    call, line, spelled = REFUSALS[name]
     before = sorted(files.folder.iterdir())
-    expect_refused(lambda: call(files), *arguments(files), spelled=spelled)
+    expect_refused(lambda: call(files), *line.format(files).split(), spelled=spelled)
     assert sorted(files.folder.iterdir()) == before, "nothing is written"
