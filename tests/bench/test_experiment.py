@@ -88,7 +88,8 @@ def test_tables_say_what_the_curves_say(experiment: Program) -> None:
 
 
 def test_what_cannot_be_is_refused(tmp_path: pathlib.Path) -> None:
-    assert "give 1 or more" in run("bench.experiment", "--trials", 0).err
+    none = run("bench.experiment", "--trials", 0)
+    assert none.status == 2 and "give 1 or more" in none.err
     expect_refused(run("bench.experiment", "--touches", 193), "give 1 to 192")
     wrong = ["--json", str(tmp_path / "missing" / "file")]
     expect_refused(run("bench.experiment", *wrong), "cannot be written")

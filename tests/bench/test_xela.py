@@ -51,19 +51,6 @@ def test_readings_lie_where_the_robot_took_them(reverse: bool) -> None:
     assert numpy.allclose(recording.pressure, held, atol=1e-9), "the mean of the held frames"
 
 
-def test_an_unknown_is_placed_on_a_map_of_such_touches(device: palpate.Device) -> None:
-    recording = recording_of(readings("F", False), PITCH_MM, object="F")
-    builder = palpate.MapBuilder(device)
-    builder.add(recording)
-    truth = palpate.random_object_pose(seed=4)
-    unknown = palpate.simulate(
-        "F", palpate.random_poses(6, seed=3), T_object_robot=truth,
-        elements_mm=recording.elements_mm, sensor=SHARP,
-    )  # fmt: skip
-    [record] = palpate.recognize(unknown, [builder.build("F")], device=device)
-    assert record.refined_error_mm < 0.8  # elements are 4.7 mm apart
-
-
 def test_the_program_writes_a_recording_and_refuses_other_arrays(tmp_path: pathlib.Path) -> None:
     def run(array: NDArray[Any]) -> Done:
         numpy.save(tmp_path / "letter.npy", array)

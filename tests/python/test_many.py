@@ -216,27 +216,27 @@ def test_errors_of_workers_arrive(
 
 
 @pytest.mark.parametrize(
-    ("task", "arguments", "message"),
+    ("changed", "arguments", "message"),
     [
         ({"bin": 3}, {}, "task: 'bin' is not known; give bins, x_mm"),
         ({"budget_ms": 3.0}, {}, "task: 'budget_ms' is not known"),
         ({}, {"chunk": 0}, "chunk 0: give at least 1"),
         ({}, {"paths": []}, "paths: none"),
-        ({}, {}, "maps: missing"),
+        ({"maps": []}, {}, "maps: missing"),
     ],
 )
 def test_a_wrong_call_is_refused_at_once(
-    task: Any, arguments: dict[str, Any], message: str, recordings: pathlib.Path
+    changed: Any, arguments: dict[str, Any], message: str, task: palpate.Task, recordings: pathlib.Path
 ) -> None:
-    assert message in error_of(palpate.recognize_many, **{"paths": recordings, "task": task, **arguments})
+    call = {"paths": recordings, "task": {**task, **changed}, **arguments}
+    assert message in error_of(palpate.recognize_many, **call)
 
 
 def test_an_open_device_is_no_part_of_a_task(
-    device: palpate.Device, files: Files, recordings: pathlib.Path
+    device: palpate.Device, task: palpate.Task, recordings: pathlib.Path
 ) -> None:
-    task: Any = {"maps": files.maps, "device": device}
     with pytest.raises(TypeError, match="^device: each worker opens its own; give a name"):
-        palpate.recognize_many(recordings, task)
+        palpate.recognize_many(recordings, {**task, "device": device})  # type: ignore[typeddict-item]
 
 
 def test_what_every_recording_tells_is_told_once(task: palpate.Task, recordings: pathlib.Path) -> None:

@@ -85,16 +85,6 @@ def test_pictures_are_of_maps_beliefs_and_records(
             assert reach == pytest.approx(radius * record.refined.sd[axis], rel=1e-2)
 
 
-def test_the_pose_error_is_that_of_the_refined_pose(
-    maps: Maps, unknown: palpate.Recording, record: palpate.Record
-) -> None:
-    assert unknown.truth is not None
-    refined = (record.refined["x_mm"], record.refined["y_mm"], record.refined["theta_rad"])
-    error = palpate.pose_error_mm(maps[1], refined, unknown.truth.T_object_robot)
-    assert error == record.refined_error_mm
-    assert error < 1.0
-
-
 def test_show_serves_files_and_draws_what_is_in_memory(tmp_path: pathlib.Path, maps: Maps) -> None:
     command = os.environ["PALPATE_COMMAND"]
     maps[0].save(tmp_path / "A.map.h5")
