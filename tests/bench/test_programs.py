@@ -27,8 +27,8 @@ def small() -> Iterator[pytest.MonkeyPatch]:
 
 @pytest.fixture(scope="module")
 def rows(tmp_path_factory: pytest.TempPathFactory, small: pytest.MonkeyPatch) -> Rows:
-    # Takes some fifteen seconds of a processor, half of them to learn three letters with their sensor.
-    few = replace(accuracy.SCENARIOS["strangers"], learned=("A", "E", "U"))
+    # Takes some twelve seconds of a processor.
+    few = replace(accuracy.SCENARIOS["strangers"], learned=("A", "E", "U"), after=(1, 3))
     small.setitem(accuracy.SCENARIOS, "strangers", few)
     scenarios = ("other-gains", "misplaced-2mm", "fit", "strangers", "planned")
     folder = tmp_path_factory.mktemp("accuracy")

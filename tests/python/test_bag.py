@@ -38,7 +38,8 @@ def write_log(path: pathlib.Path, storage: str) -> pathlib.Path:
     bag.frames("/tf_static", [flange, cup], START_S)
     for k in range(11):
         at, steps = START_S + 0.1 * k - 0.05, k - 0.5
-        bag.frames("/tf", [bag.edge("/base", "arm", at, 0.6 + 0.01 * steps, 0.1, 0.3, about_z(0.05 * steps))], at + 0.005)
+        arm = bag.edge("/base", "arm", at, 0.6 + 0.01 * steps, 0.1, 0.3, about_z(0.05 * steps))
+        bag.frames("/tf", [arm], at + 0.005)
     for i in range(10):
         at = START_S + 0.1 * i
         bag.plain("/plain", readings(i), at)

@@ -195,22 +195,21 @@ def use_all():
             lambda: palpate.Device.open(name), palpate.Device.list)
     print(repr(belief) == f"PoseHistogram(E on '{device.name}')", len(palpate.simulate("A")))
 
-if sys.argv[1] == "open":
-    in_a_child(use_all)
-elif sys.argv[1] == "at work":
-    at_work = threading.Event()
-    over = threading.Event()
+at_work = threading.Event()
+over = threading.Event()
 
-    def show(fraction):
-        at_work.set()
-        if over.is_set():
-            raise SystemExit
+def show(fraction):
+    at_work.set()
+    if over.is_set():
+        raise SystemExit
 
-    thread = threading.Thread(target=lambda: builder.add([*touches] * 1000, progress=show))
+thread = threading.Thread(target=lambda: builder.add([*touches] * 100, progress=show))
+if sys.argv[1] == "at work":
     thread.start()
     at_work.wait()
-    in_a_child(use_all)
-    over.set()
+in_a_child(use_all)
+over.set()
+if sys.argv[1] == "at work":
     thread.join()
 belief.update(touches[3])  # the parent goes on
 print(belief.estimate().identity.tolist())

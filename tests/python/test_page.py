@@ -307,7 +307,8 @@ def test_other_sites_and_bad_requests_are_refused(served: Paged) -> None:
     assert request(port, "GET", "/", Host=own, Origin="http://" + own)[0] == 200
     for path in ("/page.cpp", "/../page.js", "//etc/passwd", "/map/9", "/map/-1", "/events/x"):
         assert request(port, "GET", path)[0] == 404, path
-    objects, touches = ("99", "3", "-2", "0.5", "4294967296", "1e+300"), ("-1", "4", "0.5", "18446744073709551615", "1e+300")
+    objects = ("99", "3", "-2", "0.5", "4294967296", "1e+300")
+    touches = ("-1", "4", "0.5", "18446744073709551615", "1e+300")
     for body, words in (
         ("", "object of JSON"),
         ("[1]", "object of JSON"),

@@ -33,7 +33,9 @@ def stroke(begin: tuple[float, float], end: tuple[float, float]) -> Path:
 STROKES = [stroke((-9, -6), (8, -6)), stroke((9, 0), (-8, 0)), stroke((-9, 6), (8, 6))]
 
 
-def cut(folder: pathlib.Path, presses: list[Path], *flags: str, scale: float = 1.0) -> "subprocess.CompletedProcess[str]":
+def cut(
+    folder: pathlib.Path, presses: list[Path], *flags: str, scale: float = 1.0
+) -> "subprocess.CompletedProcess[str]":
     """Cuts a stream in which an array is pressed onto an E along each path, and lifted between them."""
     pressures, poses = [], []
     for i, press in enumerate(presses):
