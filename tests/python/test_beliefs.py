@@ -1,5 +1,7 @@
 """Options and results of the estimators reach C++ and come back as they are named; the float64 reference agrees."""
 
+from typing import Any
+
 import numpy
 import pytest
 from conftest import error_of
@@ -135,20 +137,15 @@ def test_the_reference_has_the_map_of_the_builder(device: palpate.Device) -> Non
 
 
 @pytest.mark.parametrize("kind", [palpate.PoseHistogram, palpate.BoundedPosterior])
-def test_gains_are_never_below_zero_and_have_standard_errors(
-    device: palpate.Device,
-    maps: Maps,
-    unknown: palpate.Recording,
-    kind: type[palpate.PoseHistogram] | type[palpate.BoundedPosterior],
+def test_gains_come_with_standard_errors(
+    device: palpate.Device, maps: Maps, unknown: palpate.Recording, kind: Any
 ) -> None:
     belief = kind(device, maps, palpate.PoseLattice((-5, 5, 8), (-5, 5, 8)))
     belief.update(unknown[0])
-    poses = [[0, 0, 0], [3, -2, 1], [500, 0, 0]]
-    gains = belief.expected_gain(poses, palpate.digitacts_array(), samples=16)
+    gains = belief.expected_gain([[0, 0, 0], [3, -2, 1], [500, 0, 0]], palpate.digitacts_array(), samples=16)
     identity, pose = gains
-    assert numpy.all(identity >= 0) and numpy.all(pose >= 0)
-    assert numpy.array_equal(gains.both, identity + pose)
+    assert numpy.array_equal(gains.both, identity + pose) and min(*identity, *pose) >= 0
     for error in (gains.identity_error, gains.pose_error, gains.both_error):
         assert error.shape == (3,)
         assert numpy.all((error >= 0) & (error < 1))
-    assert gains.both[2] == pytest.approx(0, abs=1e-5)  # far from every object
+    assert gains.both[0] > gains.both[2] == pytest.approx(0, abs=1e-5), "far from every object"
