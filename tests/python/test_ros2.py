@@ -101,21 +101,6 @@ def test_the_pose_is_that_of_the_record(records: Any, letter: str) -> None:
     assert sd == pytest.approx(record.refined.sd, rel=1e-6)
 
 
-def test_the_covariance_is_carried_over_to_the_object_in_the_robots_frame(records: Any) -> None:
-    # Draws of T_object_robot, inverted and turned as the record's pose is; 1 % of 200,000 draws.
-    _, record = records["I"]
-    refined = record.refined
-    mean = numpy.array([refined.x_mm, refined.y_mm, refined.theta_rad])
-    turned = palpate.compose(mean, refined.T_robot_object)
-    draws = numpy.random.default_rng(1).multivariate_normal(mean, 1e-4 * numpy.array(refined.covariance), 200_000)
-    c, s = numpy.cos(draws[:, 2]), numpy.sin(draws[:, 2])
-    x, y = turned[0] - draws[:, 0], turned[1] - draws[:, 1]
-    found = numpy.cov(numpy.array([c * x + s * y, c * y - s * x, -draws[:, 2]])) * 1e4
-    expected = session.covariance_of(record)
-    scale = numpy.sqrt(numpy.outer(expected.diagonal(), expected.diagonal()))
-    assert numpy.abs((found - expected) / scale).max() < 0.01
-
-
 @pytest.mark.parametrize("mirrored", [False, True])
 def test_the_map_lies_where_the_object_lies(records: Any, mirrored: bool) -> None:
     _, record = records["E"]
@@ -136,15 +121,6 @@ def test_the_map_lies_where_the_object_lies(records: Any, mirrored: bool) -> Non
     middle = (-14, 20) if mirrored else (14, 20)
     assert at == pytest.approx(palpate.transform(record.refined.T_robot_object, [middle])[0] / 1000)
     assert info.origin.position.z == 0.05
-
-
-def test_the_map_of_an_object_covers_it(records: Any) -> None:
-    grid, record = records["E"]
-    message = sent(conversion.map_message(new, grid, record, "base", START_S, 0.0))
-    cells = message.data.reshape(message.info.height, message.info.width)
-    assert cells.shape == grid.log_odds.shape
-    assert cells.min() >= -1 and cells.max() <= 100
-    assert numpy.array_equal(cells > 50, grid.log_odds > math.log(50.5 / 49.5))
 
 
 def test_markers_show_array_uncertainty_and_label(records: Any) -> None:
