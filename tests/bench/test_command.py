@@ -74,48 +74,46 @@ def test_kernels_keep_their_error_bounds(tmp_path: pathlib.Path) -> None:
     assert cases["latency 25x25x16"]["device, by its clock"] > 0.0
 
 
-def part(folder: pathlib.Path, name: str) -> Any:
-    """What `palpate-bench bounded` says of a part."""
-    document = document_of(folder, "bounded", "--part", name)
-    if name != "search":
-        cases_of(document)
-    return document[name]
+@pytest.fixture(scope="module")
+def bounded(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """What `palpate-bench bounded` says of each part."""
+    document = document_of(tmp_path_factory.mktemp("bounded"), "bounded")
+    cases_of(document)
+    return document
 
 
-def expect_within_tolerance(answers: dict[str, Any], count: int) -> None:
-    """The certificates of answers that had the time they needed."""
-    assert len(answers["milliseconds"]) == count
+def expect_within_tolerance(answers: dict[str, Any]) -> None:
+    """The certificates of three answers that had the time they needed."""
+    assert len(answers["milliseconds"]) == 3
     assert max(answers["dropped_mass"]) <= 1e-6
     assert min(answers["bins_evaluated"]) > 0.0
 
 
-def test_bounds_answer_on_any_number_of_threads(tmp_path: pathlib.Path) -> None:
-    sizes = part(tmp_path, "speed")
-    assert len(sizes) == 2
-    for size in sizes:
+def test_bounds_answer_within_the_tolerance_on_any_number_of_threads(bounded: dict[str, Any]) -> None:
+    assert len(bounded["speed"]) == 2
+    for size in bounded["speed"]:
         for threads in ("all_threads", "one_thread"):
-            expect_within_tolerance(size[threads], 3)
+            expect_within_tolerance(size[threads])
         assert size["all_threads"]["bins_evaluated"] == size["one_thread"]["bins_evaluated"], "of the same search"
         assert len(size["dense_seconds"]) == 3
+    assert len(bounded["mode"]) == 2, "two tolerances"
+    expect_within_tolerance(bounded["mode"][0]["answers"])
+    assert bounded["mode"][0]["answers"]["mode_certain"] == 3
+    assert len(bounded["large"]) == 2, "two pivots"
+    for scene in bounded["large"]:
+        expect_within_tolerance(scene["answers"])
+        assert scene["host_bytes"] > 0
 
 
-def test_bounds_are_certain_of_the_mode(tmp_path: pathlib.Path) -> None:
-    modes = part(tmp_path, "mode")
-    assert len(modes) == 2, "two tolerances"
-    expect_within_tolerance(modes[0]["answers"], 3)
-    assert modes[0]["answers"]["mode_certain"] == 3
-
-
-def test_bounds_answer_after_every_touch(tmp_path: pathlib.Path) -> None:
-    touches = part(tmp_path, "streaming")
-    assert len(touches) == 9
-    for touch in touches:
+def test_bounds_answer_after_every_touch(bounded: dict[str, Any]) -> None:
+    assert len(bounded["streaming"]) == 9
+    for touch in bounded["streaming"]:
         assert len(touch["milliseconds"]) == 3
         assert all(0.0 <= dropped <= 1.0 for dropped in touch["dropped_mass"]), "also where the budget ends it"
 
 
-def test_bounds_tell_where_they_search(tmp_path: pathlib.Path) -> None:
-    search = part(tmp_path, "search")
+def test_bounds_tell_where_they_search(bounded: dict[str, Any]) -> None:
+    search = bounded["search"]
     before = search["bins_in_all"]
     assert len(search["stages"]) == 3
     for stage in search["stages"]:
@@ -125,14 +123,6 @@ def test_bounds_tell_where_they_search(tmp_path: pathlib.Path) -> None:
             assert x + nx <= search["bins"][0] and y + ny <= search["bins"][1] and thetas <= search["bins"][2]
         assert stage["bins_evaluated"] < before, "touches leave fewer places"
         before = stage["bins_evaluated"]
-
-
-def test_bounds_take_memory_that_is_measured(tmp_path: pathlib.Path) -> None:
-    scenes = part(tmp_path, "large")
-    assert len(scenes) == 2, "two pivots"
-    for scene in scenes:
-        expect_within_tolerance(scene["answers"], 3)
-        assert scene["host_bytes"] > 0
 
 
 @pytest.mark.parametrize(
