@@ -22,27 +22,31 @@ def test_other_threads_and_signal_handlers_run_during_an_update(
 ) -> None:
     belief = palpate.PoseHistogram(device, maps, LARGE)
     over = threading.Event()
-    seen: list[bool] = []
-    steps: list[bool] = []
+    steps: list[bool] = []  # of another thread during an update, each with a signal, which this one handles
+    handled: list[int] = []
 
     def step() -> None:
-        """Steps and sends signals, which the main thread handles, until both came during the update."""
-        while not over.is_set() and not (len(steps) > 10 and seen):
-            steps.append(over.wait(0.001))
+        while not over.wait(0.001):
+            steps.append(True)
             os.kill(os.getpid(), signal.SIGUSR1)
 
-    before = signal.signal(signal.SIGUSR1, lambda number, frame: seen.append(over.is_set()))
+    before = signal.signal(signal.SIGUSR1, lambda number, frame: handled.append(number))
     thread = threading.Thread(target=step)
+    thread.start()
     try:
-        thread.start()
-        while not (len(steps) > 10 and seen):  # an update holds nobody up, and a handler ends none
+        for _ in range(50):  # on a busy machine the other thread may get few turns
             belief.reset()
+            steps.clear()
             belief.update(unknown)
-        assert belief.estimate().identity.argmax() == 1
+            if len(steps) > 10 and handled:
+                break
+        else:
+            pytest.fail("an update holds the interpreter")
     finally:
         over.set()
         thread.join()
         signal.signal(signal.SIGUSR1, before)
+    assert belief.estimate().identity.argmax() == 1, "no handler ends an update"
 
 
 def test_threads_share_a_device_and_a_belief(
