@@ -1,131 +1,85 @@
 // What palpate evaluate says of results that it cannot take.
 
-#include <functional>
-
-#include <gtest/gtest.h>
-
+#include "recognition/judged_results.hpp"
 #include "support/program.hpp"
 
 namespace palpate::evaluate_refusal_test {
 
 using nlohmann::json;
 
-json sound() {
-  return {{"recording", "u.h5"},
-          {"best", "A"},
-          {"identity", {{"A", 0.75}, {"B", 0.25}}},
-          {"truth", {{"object", "A"}}}};
+const json sound = json::parse(
+    R"({"recording": "u.h5", "best": "A", "identity": {"A": 0.75, "B": 0.25}, "truth": {"object": "A"}})");
+
+/// What is said of such a file's text.
+std::string refusal_of(const std::string& text) {
+  return input_error([&] {
+    JudgedResults results;
+    add_records("bad.json", text, results);
+    evaluate(results, "bad.json");
+  });
 }
 
-struct BadRecord {
-  std::string name;
-  std::function<void(json&)> spoil;
-  std::vector<std::string> named;
-
-  friend void PrintTo(const BadRecord& record, std::ostream* out) { *out << record.name; }
-};
-
-class BadResult : public ProgramTest, public testing::WithParamInterface<BadRecord> {};
-
-TEST_P(BadResult, IsRefusedByFileRecordAndField) {
-  json records = json::array({sound(), sound()});
-  put_bytes(folder_ / "good.json", records.dump());
-  GetParam().spoil(records[1]);
-  put_bytes(folder_ / "bad.json", records.dump());
-  std::vector<std::string> named = GetParam().named;
-  named.push_back("bad.json: record 1");
-  expect_refused({"evaluate", "good.json", "bad.json", "--json", "e.json"}, named);
-}
-
-INSTANTIATE_TEST_SUITE_P(
-    All, BadResult,
-    testing::Values(
-        BadRecord{"no_object", [](json& r) { r = 3; }, {"no JSON object but number"}},
-        BadRecord{"no_best", [](json& r) { r.erase("best"); }, {"'best' is missing"}},
-        BadRecord{"best_is_a_number", [](json& r) { r["best"] = 1; }, {"'best' is number"}},
-        BadRecord{"best_without_probability",
-                  [](json& r) { r["best"] = "C"; },
-                  {"'best' 'C' has no probability"}},
-        BadRecord{"no_identity", [](json& r) { r.erase("identity"); }, {"'identity' is missing"}},
-        BadRecord{"probability_above_one",
-                  [](json& r) { r["identity"]["A"] = 1.5; },
-                  {"'identity.A' = 1.5", "give 0 to 1"}},
-        BadRecord{"probability_below_zero",
-                  [](json& r) { r["identity"]["B"] = -0.25; },
-                  {"'identity.B' = -0.25", "give 0 to 1"}},
-        BadRecord{"probability_without_a_value",
-                  [](json& r) { r["identity"]["A"] = nullptr; },
-                  {"'identity.A' is null, not a number"}},
-        BadRecord{"sum",
-                  [](json& r) { r["identity"]["A"] = 0.5; },
-                  {"'identity' sums to 0.75", "sum to 1"}},
-        BadRecord{
-            "none_out_of_range", [](json& r) { r["none"] = 2; }, {"'none' = 2", "give 0 to 1"}},
-        BadRecord{"none_is_a_text", [](json& r) { r["none"] = "?"; }, {"'none' is string"}},
-        BadRecord{"fit_is_a_number", [](json& r) { r["fit"] = 1.0; }, {"'fit' is number"}},
-        BadRecord{"z_is_a_text", [](json& r) { r["fit"]["z"] = "x"; }, {"'fit.z' is string"}},
-        BadRecord{"truth_is_a_text", [](json& r) { r["truth"] = "A"; }, {"'truth' is string"}},
-        BadRecord{"truth_without_a_label",
-                  [](json& r) { r["truth"] = json::object(); },
-                  {"'truth.object' is missing"}},
-        BadRecord{"negative_error",
-                  [](json& r) { r["error_mm"] = -1.0; },
-                  {"'error_mm' = -1 mm", "at least 0"}}),
-    [](const auto& test) { return test.param.name; });
-
-class EvaluateRefuses : public ProgramTest {
- protected:
-  void expect_content_refused(const std::string& content, std::vector<std::string> named) const {
-    put_bytes(folder_ / "bad.json", content);
-    named.push_back("bad.json: ");
-    expect_refused({"evaluate", "bad.json", "--json", "e.json"}, named);
+TEST(EvaluateRefuses, RecordsByFileRecordAndField) {
+  const std::pair<const char*, const char*> cases[] = {
+      {R"(3)", "no JSON object but number"},
+      {R"({"best": null})", "'best' is missing"},
+      {R"({"best": 1})", "'best' is number"},
+      {R"({"best": "C"})", "'best' 'C' has no probability"},
+      {R"({"identity": null})", "'identity' is missing"},
+      {R"({"identity": {"A": 1.5}})", "'identity.A' = 1.5, not a probability; give 0 to 1"},
+      {R"({"identity": {"B": -0.25}})", "'identity.B' = -0.25, not a probability; give 0 to 1"},
+      {R"({"identity": {"A": 0.5}})", "'identity' sums to 0.75"},
+      {R"({"none": 2})", "'none' = 2, not a probability; give 0 to 1"},
+      {R"({"none": "?"})", "'none' is string"},
+      {R"({"fit": 1.0})", "'fit' is number"},
+      {R"({"fit": {"z": "x"}})", "'fit.z' is string"},
+      {R"({"truth": "A"})", "'truth' is string"},
+      {R"({"truth": {"object": null}})", "'truth.object' is missing"},
+      {R"({"error_mm": -1.0})", "'error_mm' = -1 mm"}};
+  for (const auto& [change, words] : cases) {
+    json records = json::array({sound, sound});
+    records[1].merge_patch(json::parse(change));
+    expect_named(refusal_of(records.dump()), {"bad.json: record 1", words});
   }
-};
-
-TEST_F(EvaluateRefuses, WhatIsNotJson) {
-  expect_content_refused("recordings", {"not JSON at byte 1"});
-  expect_content_refused("[" + sound().dump() + ",]", {"not JSON at byte"});
-  expect_content_refused(sound().dump() + "\n\n" + sound().dump().substr(0, 20),
-                         {"line 3 (record 1) is not JSON"});
-  expect_content_refused("[1e999]", {"too large"});
+  json records = json::array({sound});
+  records[0]["identity"]["A"] = nullptr;
+  expect_named(refusal_of(records.dump()), {"record 0", "'identity.A' is null, not a number"});
 }
 
-TEST_F(EvaluateRefuses, WhatHoldsNoRecords) {
-  expect_content_refused("3", {"holds number, not an array of records"});
-  expect_content_refused("[]", {"none of 0 record(s) has a true label"});
-  expect_content_refused("", {"none of 0 record(s)"});
-  expect_content_refused("{\"touch_sd\": {\"mm\": 1}}", {"record 0: field 'best' is missing"});
+TEST(EvaluateRefuses, TextsWithoutRecords) {
+  json nameless = sound;
+  nameless.erase("truth");
+  const std::pair<std::string, const char*> cases[] = {
+      {"recordings", "not JSON at byte 1"},
+      {"[" + sound.dump() + ",]", "not JSON at byte"},
+      {sound.dump() + "\n\n" + sound.dump().substr(0, 20), "line 3 (record 1) is not JSON"},
+      {"[1e999]", "too large"},
+      {"3", "holds number, not an array of records"},
+      {"[]", "none of 0 record(s) has a true label"},
+      {"", "none of 0 record(s)"},
+      {R"({"touch_sd": {"mm": 1}})", "record 0: field 'best' is missing"},
+      {json::array({nameless, nameless}).dump(),
+       "none of 2 record(s) has a true label ('truth'); name the object"}};
+  for (const auto& [text, words] : cases) {
+    expect_named(refusal_of(text), {"bad.json: ", words});
+  }
 }
 
-TEST_F(EvaluateRefuses, RecordsWithoutATruth) {
-  json record = sound();
-  record.erase("truth");
-  expect_content_refused(json::array({record, record}).dump(),
-                         {"none of 2 record(s) has a true label ('truth')", "name the object"});
-}
+using EvaluateCommandRefuses = ProgramTest;
 
-TEST_F(EvaluateRefuses, MissingFilesAndEmptyFolders) {
-  expect_refused({"evaluate", "missing.json"}, {"missing.json: no such file"});
+TEST_F(EvaluateCommandRefuses, FilesInOneLine) {
   std::filesystem::create_directory(folder_ / "empty");
-  expect_refused({"evaluate", "empty"}, {"empty: a folder without *.json"});
-  expect_refused({"evaluate"}, {"RESULTS is required", "palpate evaluate --help"});
-}
-
-TEST_F(EvaluateRefuses, AFileTwice) {
   std::filesystem::create_directory(folder_ / "results");
-  put_bytes(folder_ / "results/a.json", sound().dump());
-  expect_refused({"evaluate", "results/a.json", "results"}, {"results/a.json: given twice"});
-}
-
-TEST_F(EvaluateRefuses, ToOverwriteWhatItReads) {
-  put_bytes(folder_ / "r.json", sound().dump());
-  expect_refused({"evaluate", "r.json", "--json", "./r.json"},
-                 {"--json ./r.json", "RESULTS reads", "overwrite"});
-}
-
-TEST_F(EvaluateRefuses, OutputsThatCannotBeWritten) {
-  put_bytes(folder_ / "r.json", sound().dump());
-  expect_refused({"evaluate", "r.json", "--json", "nowhere/e.json"}, {"nowhere", "does not exist"});
+  put_bytes(folder_ / "results/a.json", sound.dump());
+  put_bytes(folder_ / "bad.json", "[3]");
+  expect_refused("evaluate results/a.json bad.json --json e.json", {"bad.json: record 0"});
+  expect_refused("evaluate missing.json", {"missing.json: no such file"});
+  expect_refused("evaluate empty", {"empty: a folder without *.json"});
+  expect_refused("evaluate", {"RESULTS is required", "palpate evaluate --help"});
+  expect_refused("evaluate results/a.json results", {"results/a.json: given twice"});
+  expect_refused("evaluate results --json ./results/a.json",
+                 {"--json ./results/a.json", "RESULTS reads", "overwrite"});
+  expect_refused("evaluate results --json nowhere/e.json", {"nowhere", "does not exist"});
 }
 
 }  // namespace palpate::evaluate_refusal_test

@@ -1,9 +1,8 @@
 // palpate evaluate on results written by hand, whose scores are worked out here, and on results of
 // palpate recognize.
 
+#include <algorithm>
 #include <cmath>
-
-#include <gmock/gmock.h>
 
 #include "support/program.hpp"
 #include "support/sample_files.hpp"
@@ -11,7 +10,6 @@
 namespace palpate::evaluate_test {
 
 using nlohmann::json;
-using testing::HasSubstr;
 
 json record(const char* truth, const char* best, double a, double b, double none) {
   json record{{"recording", "u.h5"},
@@ -36,17 +34,17 @@ json four() {
 
 class EvaluateCommand : public ProgramTest {
  protected:
-  json evaluated(const std::vector<std::string>& results) const {
-    std::vector<std::string> arguments{"evaluate"};
-    arguments.insert(arguments.end(), results.begin(), results.end());
-    arguments.insert(arguments.end(), {"--json", "-"});
-    return json::parse(done(arguments));
+  json evaluated(const std::string& results) const {
+    return json::parse(done("evaluate " + results + " --json -"));
+  }
+  json evaluation_of(const json& records) const {
+    put_bytes(folder_ / "r.json", records.dump(2));
+    return evaluated("r.json");
   }
 };
 
-TEST_F(EvaluateCommand, WritesAllNumbersAsJson) {
-  put_bytes(folder_ / "r.json", four().dump(2));
-  const json e = evaluated({"r.json"});
+TEST_F(EvaluateCommand, WritesAllNumbersAsJsonAndInWords) {
+  const json e = evaluation_of(four());
   EXPECT_EQ(e["records"], 3);
   EXPECT_EQ(e["without_truth"], 1);
   EXPECT_EQ(e["right"], 2);
@@ -72,25 +70,20 @@ TEST_F(EvaluateCommand, WritesAllNumbersAsJson) {
   EXPECT_EQ(e["confusion"]["counts"], json({{1, 1, 0}, {0, 0, 1}}));
   EXPECT_EQ(e["error_mm"], json({{"records", 1}, {"median", 0.5}}));
   EXPECT_EQ(e["refined_error_mm"]["median"], 0.25);
-}
 
-TEST_F(EvaluateCommand, SaysTheSameInWords) {
-  put_bytes(folder_ / "r.json", four().dump());
-  const std::string text = done({"evaluate", "r.json"});
-  for (const char* part :
-       {"66.7 %", "1 record without a true label left out", "0.7 to 0.8", "A", "1 B", "M (unknown)",
-        "unknown classes: 1 of 1 called \"(none)\"", "by 1 - none: 1.000 +- 0.000",
-        "median error of refined poses 0.25 mm (1 record), of modes 0.50 mm (1 record)"}) {
-    EXPECT_THAT(text, HasSubstr(part));
-  }
-  json known = json::array({four()[0]});
-  put_bytes(folder_ / "r.json", known.dump());
-  EXPECT_EQ(done({"evaluate", "r.json"}).find("nknown"), std::string::npos);
+  expect_named(
+      done("evaluate r.json"),
+      {"66.7 %", "1 record without a true label left out", "0.7 to 0.8", "A", "1 B", "M (unknown)",
+       "unknown classes: 1 of 1 called \"(none)\"", "by 1 - none: 1.000 +- 0.000",
+       "median error of refined poses 0.25 mm (1 record), of modes 0.50 mm (1 record)"});
+  done("evaluate r.json --json e.json");
+  EXPECT_EQ(json::parse(bytes_of(folder_ / "e.json")), e);
+  evaluation_of(json::array({four()[0]}));
+  EXPECT_EQ(done("evaluate r.json").find("nknown"), std::string::npos);
 }
 
 TEST_F(EvaluateCommand, ReadsLinesFoldersAndSingleRecords) {
-  put_bytes(folder_ / "all.json", four().dump());
-  const json expected = evaluated({"all.json"});
+  const json expected = evaluation_of(four());
   std::string lines;
   std::filesystem::create_directory(folder_ / "results");
   for (std::size_t i = 0; i < 4; ++i) {
@@ -99,10 +92,10 @@ TEST_F(EvaluateCommand, ReadsLinesFoldersAndSingleRecords) {
   }
   put_bytes(folder_ / "lines.ndjson", lines);
   put_bytes(folder_ / "results/notes.txt", "no results");
-  EXPECT_EQ(evaluated({"lines.ndjson"}), expected);
-  EXPECT_EQ(evaluated({"results"}), expected);
-  EXPECT_EQ(evaluated({"results/0.json", "results/1.json", "results/2.json", "results/3.json"}),
-            expected);
+  for (const std::string results :
+       {"lines.ndjson", "results", "results/0.json results/1.json results/2.json results/3.json"}) {
+    EXPECT_EQ(evaluated(results), expected) << results;
+  }
 }
 
 TEST_F(EvaluateCommand, TakesTheFitWhereNothingSaysNone) {
@@ -111,35 +104,23 @@ TEST_F(EvaluateCommand, TakesTheFitWhereNothingSaysNone) {
     each.erase("none");
     each["fit"] = {{"z", each["best"] == "(none)" ? -5.0 : 0.0}, {"verdict", "fits"}};
   }
-  put_bytes(folder_ / "r.json", records.dump());
-  EXPECT_EQ(evaluated({"r.json"})["unknown_classes"]["area_under_curve"]["score"], "fit.z");
-}
-
-TEST_F(EvaluateCommand, WritesAFile) {
-  put_bytes(folder_ / "r.json", four().dump());
-  done({"evaluate", "r.json", "--json", "e.json"});
-  EXPECT_EQ(json::parse(bytes_of(folder_ / "e.json")), evaluated({"r.json"}));
+  EXPECT_EQ(evaluation_of(records)["unknown_classes"]["area_under_curve"]["score"], "fit.z");
 }
 
 TEST_F(EvaluateCommand, TakesWhatRecognizeWrites) {
   write_map(folder_ / "A.map.h5", sample_map("A"));
   write_map(folder_ / "I.map.h5", sample_map("I"));
-  const Pose pose{{2.0, -3.0}, 1.0};
-  write_recording(folder_ / "a.h5", sample_unknown("A", pose, 6));
-  write_recording(folder_ / "i.h5", sample_unknown("I", pose, 6));
-  write_recording(folder_ / "e.h5", sample_unknown("E", pose, 6));
-  Recording nameless = sample_unknown("A", pose, 6);
-  nameless.truth.reset();
-  nameless.object.clear();
-  write_recording(folder_ / "nameless.h5", nameless);
-  done({"recognize", "a.h5", "i.h5", "e.h5", "nameless.h5", "--maps", "A.map.h5", "I.map.h5",
-        "--none", "--bins", "25x25x16", "--json", "r.json"});
-  const json records = json::parse(bytes_of(folder_ / "r.json"));
-  const json e = evaluated({"r.json"});
-  int right = 0;
-  for (const json& each : records) {
-    right += each.value("right", false) ? 1 : 0;
+  for (const std::string letter : {"A", "I", "E"}) {
+    write_recording(folder_ / (letter + ".h5"), sample_unknown(letter, {{2.0, -3.0}, 1.0}, 6));
   }
+  Recording nameless = sample_unknown("A", {{2.0, -3.0}, 1.0}, 6);
+  nameless.truth.reset();
+  write_recording(folder_ / "nameless.h5", nameless);
+  const json records =
+      this->records("A.h5 I.h5 E.h5 nameless.h5 --maps A.map.h5 I.map.h5 --bins 25x25x16 --none");
+  const json e = evaluation_of(records);
+  const auto right =
+      std::ranges::count_if(records, [](const json& each) { return each.value("right", false); });
   EXPECT_EQ(e["records"], 3);
   EXPECT_EQ(e["without_truth"], 1);
   EXPECT_EQ(e["right"], right);

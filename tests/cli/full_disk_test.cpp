@@ -16,106 +16,62 @@ class FullDisk : public ProgramTest {
     write_recording(folder_ / "A.h5", sample_training("A", 48));
   }
 
-  static void expect_failure(const Outcome& outcome, const char* named) {
+  /// Expects status 1 and one line that names this.
+  void expect_failure(const std::string& command, const Surroundings& surroundings,
+                      const char* named) const {
+    SCOPED_TRACE(command);
+    const Outcome outcome = palpate(command, surroundings);
     EXPECT_EQ(outcome.status, 1) << outcome.err;
-    EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
-    EXPECT_NE(outcome.err.find(named), std::string::npos) << outcome.err;
+    EXPECT_EQ(std::ranges::count(outcome.err, '\n'), 1) << outcome.err;
+    expect_named(outcome.err, {named});
   }
-};
-
-struct Output {
-  const char* name;
-  std::vector<std::string> arguments;
-  const char* file;
-
-  friend void PrintTo(const Output& output, std::ostream* out) { *out << output.file; }
-};
-
-class FullDiskOutput : public FullDisk, public testing::WithParamInterface<Output> {};
-
-TEST_P(FullDiskOutput, LeavesNoPartAndAnOlderFileIntact) {
-  const std::filesystem::path target = folder_ / GetParam().file;
-  std::filesystem::create_directories(target.parent_path());
-  for (const char* older : {"", "an older file"}) {
-    std::filesystem::remove(target);
-    if (*older != '\0') {
-      put_bytes(target, older);
-    }
+  /// The same, and the folder as it was before, where files may grow to so many bytes.
+  void expect_untouched(const std::string& command, rlim_t bytes, const char* named) const {
     const auto before = content_of(folder_.path());
+    expect_failure(command, {.largest_file_bytes = bytes}, named);
+    EXPECT_TRUE(content_of(folder_.path()) == before) << "the folder has changed: " << command;
+  }
+};
+
+TEST_F(FullDisk, LeavesNoPartOfAnOutputAndAnOlderFileIntact) {
+  for (const auto& [command, file] :
+       {std::pair{"simulate A -o new.h5", "new.h5"},
+        {"map A.h5 -o new.map.h5", "new.map.h5"},
+        {"map A.h5 -o maps/", "maps/A.map.h5"},
+        {"recognize u.h5 --maps A.map.h5 --trace --json r.json", "r.json"},
+        {"recognize u.h5 --maps A.map.h5 --posterior p.h5", "p.h5"},
+        {"recognize u.h5 --maps A.map.h5 --png sheets", "sheets/u.png"}}) {
+    std::filesystem::create_directories((folder_ / file).parent_path());
     // Below the size of every output here, above that of a message.
-    const Outcome outcome = palpate(GetParam().arguments, {.largest_file_bytes = 2048});
-    expect_failure(outcome, GetParam().file);
-    EXPECT_TRUE(content_of(folder_.path()) == before) << "the folder has changed";
+    expect_untouched(command, 2048, file);
+    put_bytes(folder_ / file, "an older file");
+    expect_untouched(command, 2048, file);
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    All, FullDiskOutput,
-    testing::Values(Output{"recording", {"simulate", "A", "-o", "new.h5"}, "new.h5"},
-                    Output{"map", {"map", "A.h5", "-o", "new.map.h5"}, "new.map.h5"},
-                    Output{"map_in_folder", {"map", "A.h5", "-o", "maps/"}, "maps/A.map.h5"},
-                    Output{
-                        "json",
-                        {"recognize", "u.h5", "--maps", "A.map.h5", "--trace", "--json", "r.json"},
-                        "r.json"},
-                    Output{"posterior",
-                           {"recognize", "u.h5", "--maps", "A.map.h5", "--posterior", "p.h5"},
-                           "p.h5"},
-                    Output{"sheet",
-                           {"recognize", "u.h5", "--maps", "A.map.h5", "--png", "sheets"},
-                           "sheets/u.png"}),
-    [](const auto& test) { return std::string(test.param.name); });
-
-TEST_F(FullDisk, StandardOutputThatCannotBeWrittenIsAFailure) {
-  expect_failure(palpate({"recognize", "u.h5", "--maps", "A.map.h5", "--json", "-"},
-                         {.standard_output = "/dev/full"}),
-                 "standard output");
+TEST_F(FullDisk, LeavesJsonAndPosteriorBothOrNone) {
+  const std::string recognize = "recognize A.h5 --maps A.map.h5 --json r.json --posterior p.h5";
+  // Below the size of one of them, above that of the other.
+  expect_untouched(recognize + " --bins 5x5x4 --trace", 12000, "r.json");
+  expect_untouched(recognize + " --bins 25x25x16", 12000, "p.h5");
 }
 
-TEST_F(FullDisk, LongOutputThatCannotBeWrittenIsAFailureOfStandardOutputToo) {
-  // More than standard output keeps back until the end.
-  expect_failure(palpate({"recognize", "u.h5", "--maps", "A.map.h5", "--each-frame", "--trace",
-                          "--bins", "5x5x4", "--json", "-"},
-                         {.standard_output = "/dev/full"}),
-                 "standard output");
-  expect_failure(palpate({"live", "--sensor", "simulate:A,rate=100,touches=2,speed=max", "--maps",
-                          "A.map.h5", "--bins", "5x5x4"},
-                         {.standard_output = "/dev/full"}),
-                 "standard output");
-}
-
-TEST_F(FullDisk, HelpThatCannotBeWrittenIsAFailure) {
-  for (const char* flag : {"--help", "--version"}) {
-    expect_failure(palpate({flag}, {.standard_output = "/dev/full"}), "standard output");
+TEST_F(FullDisk, OfStandardOutputIsAFailureThatLeavesFiles) {
+  const std::string recognize = "recognize A.h5 --maps A.map.h5 --bins 5x5x4 --each-frame --trace";
+  for (const std::string& command :
+       {std::string("recognize u.h5 --maps A.map.h5 --json -"),
+        // More than standard output keeps back until the end.
+        recognize + " --json -", std::string("--help"), std::string("--version"),
+        std::string("live --sensor simulate:A,rate=100,touches=2,speed=max --maps A.map.h5"
+                    " --bins 5x5x4")}) {
+    expect_failure(command, {.standard_output = "/dev/full"}, "standard output");
   }
-}
-
-TEST_F(FullDisk, ResultsAreWrittenWhereNobodyListens) {
-  const Outcome outcome = palpate({"recognize", "A.h5", "--maps", "A.map.h5", "--each-frame",
-                                   "--trace", "--bins", "5x5x4", "--json", "r.json"},
-                                  {.standard_output = "/dev/full"});
-  expect_failure(outcome, "standard output");
+  expect_failure(recognize + " --json r.json", {.standard_output = "/dev/full"}, "standard output");
   EXPECT_EQ(nlohmann::json::parse(bytes_of(folder_ / "r.json")).size(), 48u);
 }
 
-TEST_F(FullDisk, JsonAndPosteriorAreBothWrittenOrNone) {
-  const auto before = content_of(folder_.path());
-  const auto expect_none = [&](const std::string& bins, bool trace, const char* refused) {
-    std::vector<std::string> arguments{"recognize", "A.h5",   "--maps", "A.map.h5",    "--bins",
-                                       bins,        "--json", "r.json", "--posterior", "p.h5"};
-    if (trace) {
-      arguments.emplace_back("--trace");
-    }
-    // Below the size of one of them, above that of the other.
-    expect_failure(palpate(arguments, {.largest_file_bytes = 12000}), refused);
-    EXPECT_TRUE(content_of(folder_.path()) == before) << "the folder has changed";
-  };
-  expect_none("5x5x4", true, "r.json");
-  expect_none("25x25x16", false, "p.h5");
-}
-
-TEST_F(FullDisk, StandardErrorThatCannotBeWrittenKeepsTheStatus) {
-  EXPECT_EQ(palpate({"info", "missing.h5"}, {.standard_error = "/dev/full"}).status, 2);
+TEST_F(FullDisk, OfStandardErrorKeepsTheStatus) {
+  EXPECT_EQ(palpate("info missing.h5", {.standard_error = "/dev/full"}).status, 2);
 }
 
 // Each of 20,000 readings has its own time, and so a frame of 10,000 elements: 1.6 GB.
@@ -131,11 +87,9 @@ TEST_F(FullDisk, AndMemoryThatEndsAreOneLine) {
     text += fmt::format("{},0,1\n", i);
   }
   put_bytes(folder_ / "log.csv", text);
-  const auto before = content_of(folder_.path());
-  const Outcome outcome = palpate({"import", "log.csv", "--array", "100:100:1", "-o", "o.h5"},
-                                  {.memory_bytes = 512 << 20});
-  expect_failure(outcome, "palpate: out of memory; end other programs, or use smaller files");
-  EXPECT_TRUE(content_of(folder_.path()) == before);
+  expect_failure("import log.csv --array 100:100:1 -o o.h5", {.memory_bytes = 512 << 20},
+                 "palpate: out of memory; end other programs, or use smaller files");
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "o.h5"));
 }
 
 }  // namespace palpate::full_disk_test

@@ -11,7 +11,7 @@ namespace palpate::info_test {
 class InfoCommand : public ProgramTest {
  protected:
   void expect_info(const char* file, std::initializer_list<const char*> parts) const {
-    expect_named(done({"info", file}), parts);
+    expect_named(done(std::string("info ") + file), parts);
   }
 };
 
@@ -42,7 +42,7 @@ TEST_F(InfoCommand, SuspicionsComeLast) {
     pose.theta_rad *= 180.0 / std::numbers::pi;
   }
   write_recording(folder_ / "r.h5", recording);
-  const std::string said = done({"info", "r.h5"});
+  const std::string said = done("info r.h5");
   const std::string suspicions = said.substr(std::min(said.find("Suspicious:\n"), said.size()));
   expect_named(suspicions, {"are these metres?\n", "are these degrees?\n"});
   EXPECT_EQ(std::count(suspicions.begin(), suspicions.end(), '\n'), 3) << suspicions;
@@ -51,17 +51,15 @@ TEST_F(InfoCommand, SuspicionsComeLast) {
 // Streams have offsets, phases of rest, and ramps; without noise, most frames are equal.
 TEST_F(InfoCommand, SimulatedRecordingsAreNotSuspicious) {
   for (const std::string noise : {"0", "0.7"}) {
-    done({"simulate", "E", "--noise-kpa", noise, "-o", "train.h5"});
-    done({"simulate", "E", "--noise-kpa", noise, "--object-pose", "random", "--touches", "9", "-o",
-          "unknown.h5"});
+    done("simulate E -o train.h5 --noise-kpa " + noise);
+    done("simulate E -o unknown.h5 --object-pose random --touches 9 --noise-kpa " + noise);
     for (const std::string touches : {"1", "12"}) {
-      done({"record", "--sensor",
-            "simulate:A,object=random,speed=max,noise=" + noise + ",touches=" + touches, "-o",
-            "frames" + touches + ".h5"});
+      done("record -o frames" + touches + ".h5 --sensor simulate:A,object=random,speed=max,noise=" +
+           noise + ",touches=" + touches);
     }
-    done({"touches", "frames12.h5", "-o", "touches.h5"});
-    for (const char* file : {"train.h5", "unknown.h5", "frames1.h5", "frames12.h5", "touches.h5"}) {
-      const std::string said = done({"info", file});
+    done("touches frames12.h5 -o touches.h5");
+    for (const std::string file : {"train", "unknown", "frames1", "frames12", "touches"}) {
+      const std::string said = done("info " + file + ".h5");
       EXPECT_EQ(said.find("Suspicious"), std::string::npos) << said;
     }
   }
@@ -93,10 +91,10 @@ TEST_F(InfoCommand, DeadElementsDoNotCountAmongThePressures) {
 TEST_F(InfoCommand, ClosesRecordingsOnly) {
   write_recording(folder_ / "u.h5", sample_training("A", 1));
   const std::string before = bytes_of(folder_ / "u.h5");
-  expect_named(done({"info", "--close", "u.h5"}), {"touches           1"});
+  expect_named(done("info --close u.h5"), {"touches           1"});
   EXPECT_TRUE(bytes_of(folder_ / "u.h5") == before) << "it is closed already";
   write_map(folder_ / "I.map.h5", sample_map("I"));
-  expect_refused({"info", "--close", "I.map.h5"}, {"I.map.h5", "palpate.map", "recording"});
+  expect_refused("info --close I.map.h5", {"I.map.h5", "palpate.map", "recording"});
 }
 
 TEST_F(InfoCommand, Map) {

@@ -15,9 +15,12 @@
 #include <csignal>
 #include <cstdlib>
 #include <fstream>
+#include <iterator>
+#include <sstream>
 #include <system_error>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 namespace palpate {
 
@@ -48,6 +51,13 @@ void limit_files(rlim_t bytes) {
 }
 
 }  // namespace
+
+CommandLine::CommandLine(const std::string& text) {
+  std::istringstream words(text);
+  std::copy(std::istream_iterator<std::string>(words), {}, std::back_inserter(arguments_));
+}
+
+std::string CommandLine::text() const { return fmt::format("{}", fmt::join(arguments_, " ")); }
 
 [[noreturn]] void become_program(const std::vector<std::string>& arguments) {
   std::string name = PALPATE_PROGRAM;
@@ -178,14 +188,14 @@ std::map<std::string, std::string> content_of(const std::filesystem::path& folde
   return content;
 }
 
-pid_t ProgramTest::start(const std::vector<std::string>& arguments) const {
+pid_t ProgramTest::start(const CommandLine& command) const {
   const pid_t pid = require_process(::fork(), "fork");
   if (pid == 0) {
     if (::chdir(folder_.path().c_str()) != 0 || std::freopen("said", "w", stdout) == nullptr ||
         std::freopen("complained", "w", stderr) == nullptr) {
       ::_exit(126);
     }
-    become_program(arguments);
+    become_program(command.arguments());
   }
   return pid;
 }
@@ -205,37 +215,40 @@ void ProgramTest::kill_program(pid_t pid) {
   ::close(ended.fd);
 }
 
-std::string ProgramTest::done(const std::vector<std::string>& arguments) const {
-  const Outcome outcome = palpate(arguments);
+std::string ProgramTest::done(const CommandLine& command) const {
+  const Outcome outcome = palpate(command);
   EXPECT_EQ(outcome.status, 0) << outcome.err;
   // Where the machine is busy, `live` sees a sensor of any speed at its tare, and says so.
-  const bool tares =
-      arguments.front() == "live" && outcome.err == "palpate: taring: do not touch the array\n";
+  const bool tares = command.arguments().front() == "live" &&
+                     outcome.err == "palpate: taring: do not touch the array\n";
   EXPECT_TRUE(outcome.err.empty() || tares) << outcome.err;
   return outcome.out;
 }
 
-nlohmann::json ProgramTest::records(std::vector<std::string> arguments) const {
+std::string ProgramTest::remarks(const CommandLine& command) const {
+  const Outcome outcome = palpate(command);
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  return outcome.err;
+}
+
+nlohmann::json ProgramTest::records(const CommandLine& flags) const {
+  std::vector<std::string> arguments = flags.arguments();
   arguments.insert(arguments.begin(), "recognize");
   arguments.insert(arguments.end(), {"--json", "-"});
   return nlohmann::json::parse(done(arguments));
 }
 
-nlohmann::json ProgramTest::record(const std::vector<std::string>& arguments) const {
-  const nlohmann::json all = records(arguments);
+nlohmann::json ProgramTest::record(const CommandLine& flags) const {
+  const nlohmann::json all = records(flags);
   EXPECT_EQ(all.size(), 1u);
   return all.at(0);
 }
 
-void ProgramTest::expect_refused(const std::vector<std::string>& arguments,
+void ProgramTest::expect_refused(const CommandLine& command,
                                  const std::vector<std::string>& named) const {
   const auto before = content_of(folder_.path());
-  const Outcome outcome = palpate(arguments);
-  std::string command = "palpate";
-  for (const std::string& argument : arguments) {
-    command += " " + argument;
-  }
-  SCOPED_TRACE(command);
+  const Outcome outcome = palpate(command);
+  SCOPED_TRACE("palpate " + command.text());
   EXPECT_EQ(outcome.status, 2) << outcome.err;
   EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
   EXPECT_TRUE(outcome.err.ends_with('\n'));
