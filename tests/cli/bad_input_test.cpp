@@ -3,31 +3,22 @@
 // are refused is tested where they are read.
 
 #include "io/file_parts.hpp"
+#include "letter_files.hpp"
 #include "support/limits.hpp"
-#include "support/program.hpp"
-#include "support/sample_files.hpp"
 
 namespace palpate::bad_input_test {
 
 /// Commands that succeed.
-const std::string recognize = "recognize u.h5 --maps A.map.h5";
+const std::string recognize = "recognize u.h5 --maps maps/A.map.h5";
 const std::string map = "map A.h5 -o out.map.h5";
 
-class BadInput : public ProgramTest {
+class BadInput : public LetterFiles {
  protected:
-  BadInput() {
-    write_recording(folder_ / "A.h5", sample_training("A", 12));
-    write_recording(folder_ / "I.h5", sample_training("I", 12));
-    write_recording(folder_ / "u.h5", sample_unknown("A", {}, 3));
-    write_map(folder_ / "A.map.h5", sample_map("A"));
-  }
-
   /// Expects that map and recognize refuse the recording.
   void expect_no_touches(const Recording& recording, const std::vector<std::string>& named) const {
     write_recording(folder_ / "r.h5", recording);
     expect_refused("map r.h5 -o new/ --png new.png", named);
-    expect_refused("recognize r.h5 --maps A.map.h5 --json r.json", named);
-    std::filesystem::remove(folder_ / "r.h5");
+    expect_refused("recognize r.h5 --maps maps --json r.json", named);
   }
 };
 
@@ -36,42 +27,39 @@ TEST_F(BadInput, RecordingsThatCannotBeRead) {
   std::filesystem::resize_file(folder_ / "bad.h5", 4000);
   for (const char* command :
        {"map A.h5 bad.h5 -o out/ --png out.png", "info bad.h5",
-        "recognize bad.h5 --maps A.map.h5 --json r.json --posterior p.h5 --png new"}) {
+        "recognize bad.h5 --maps maps --json r.json --posterior p.h5 --png new"}) {
     expect_refused(command, {"bad.h5: ", "is truncated", "again"});
   }
 }
 
 TEST_F(BadInput, MapsThatCannotBeReadOrDoNotGoTogether) {
-  for (const char* folder : {"mixed", "none"}) {
+  for (const char* folder : {"mixed", "none", "empty"}) {
     std::filesystem::create_directory(folder_ / folder);
-    std::filesystem::copy(folder_ / "u.h5", folder_ / folder / "u.h5");
   }
+  std::filesystem::copy(folder_ / "u.h5", folder_ / "none/u.h5");
   recording_parts().save(folder_ / "mixed/bad.map.h5");
-  std::filesystem::create_directory(folder_ / "empty");
   map_parts().dataset("log_odds", {2, 3}, nan).save(folder_ / "nan.map.h5");
   map_parts().attribute("prior", 0.4).save(folder_ / "prior.map.h5");
-  std::filesystem::create_hard_link(folder_ / "A.map.h5", folder_ / "hard.h5");
+  std::filesystem::create_hard_link(folder_ / "maps/A.map.h5", folder_ / "hard.h5");
   const std::string long_name(300, 'x');
-  const std::pair<std::string, std::vector<std::string>> cases[] = {
-      {"missing.map.h5", {"missing.map.h5: no such file", "check the path"}},
-      {"u.h5", {"u.h5: ", "this is a recording", "give a map"}},
-      {"mixed", {"mixed/bad.map.h5: ", "this is a recording"}},
-      {"none", {"none: a folder without maps", "build some"}},
-      {"empty", {"empty: a folder without maps"}},
-      {"nan.map.h5", {"nan.map.h5: ", "'log_odds'[0, 0] = nan", "give finite numbers"}},
-      {"prior.map.h5",
-       {"prior.map.h5: ", "prior 0.4 differs", "no touches", "A.map.h5", "--prior"}},
-      {"./A.map.h5", {"A.map.h5: ", "twice", "leave one out"}},
-      {"hard.h5", {"hard.h5: ", "twice"}},
-      {long_name, {long_name}}};
-  for (const auto& [file, named] : cases) {
-    expect_refused(recognize + " " + file + " --json r.json --png new", named);
-  }
+  const std::string with_a = "recognize u.h5 --json r.json --png new --maps maps/A.map.h5 ";
+  expect_each_refused(
+      {{with_a + "missing.map.h5", {"missing.map.h5: no such file", "check the path"}},
+       {with_a + "u.h5", {"u.h5: ", "this is a recording", "give a map"}},
+       {with_a + "mixed", {"mixed/bad.map.h5: ", "this is a recording"}},
+       {with_a + "none", {"none: a folder without maps", "build some"}},
+       {with_a + "empty", {"empty: a folder without maps"}},
+       {with_a + "nan.map.h5", {"nan.map.h5: ", "'log_odds'[0, 0] = nan", "give finite"}},
+       {with_a + "prior.map.h5",
+        {"prior.map.h5: ", "prior 0.4 differs", "no touches", "A.map.h5", "--prior"}},
+       {with_a + "maps/../maps/A.map.h5", {"A.map.h5: ", "twice", "leave one out"}},
+       {with_a + "hard.h5", {"hard.h5: ", "twice"}},
+       {with_a + long_name, {long_name}}});
 }
 
 TEST_F(BadInput, TheSameRecordingTwice) {
   std::filesystem::create_hard_link(folder_ / "A.h5", folder_ / "hard.h5");
-  expect_refused("recognize u.h5 ./u.h5 --maps A.map.h5", {"u.h5", "twice", "leave one out"});
+  expect_refused("recognize u.h5 ./u.h5 --maps maps", {"u.h5", "twice", "leave one out"});
   expect_refused("map A.h5 hard.h5 -o out.map.h5", {"hard.h5", "twice"});
 }
 
@@ -105,38 +93,25 @@ TEST_F(BadInput, LabelsThatAreMissingOrNameNoFileOrSeveral) {
 
 TEST_F(BadInput, OutputsOfSeveralUnknownsInOneFile) {
   expect_refused(recognize + " --each-frame --posterior p.h5",
-                 {"--posterior p.h5", "not 3", "select one"});
+                 {"--posterior p.h5", "not 6", "select one"});
   std::filesystem::create_directory(folder_ / "other");
   std::filesystem::copy(folder_ / "u.h5", folder_ / "other/u.h5");
-  expect_refused("recognize u.h5 other/u.h5 --maps A.map.h5 --png new",
+  expect_refused("recognize u.h5 other/u.h5 --maps maps --png new",
                  {"other/u.h5", "same name", "rename"});
 }
 
 TEST_F(BadInput, OutputsThatCannotBeWritten) {
-  std::filesystem::create_directory(folder_ / "folder");
   std::filesystem::create_directories(folder_ / "sheets/u.1.png");
-  const std::vector<std::string> missing{"nowhere", "does not exist", "create it"};
-  const std::vector<std::string> folder{"folder", "is a folder", "give the name of a file"};
-  const std::pair<std::string, std::vector<std::string>> cases[] = {
-      {"simulate A -o nowhere/out.h5", missing},
-      {"map A.h5 -o nowhere/out.map.h5", missing},
-      {map + " --png nowhere/out.png", missing},
-      {recognize + " --json nowhere/r.json --png new", missing},
-      {recognize + " --posterior nowhere/p.h5 --json r.json", missing},
-      {"simulate A -o folder", folder},
-      {map + " --png folder", folder},
-      {recognize + " --json folder", folder},
-      {recognize + " --each-frame --json r.json --png sheets", {"sheets/u.1.png", "is a folder"}},
-      {"map A.h5 -o u.h5/", {"u.h5", "folder"}},
-      {recognize + " --png u.h5", {"u.h5", "folder", "choose another"}}};
-  for (const auto& [command, named] : cases) {
-    expect_refused(command, named);
-  }
-}
-
-TEST_F(BadInput, NamesThatAreLongOrOfSeveralLines) {
+  expect_each_refused(
+      {{"simulate A -o nowhere/out.h5", {"nowhere", "does not exist", "create it"}},
+       {map + " --png sheets", {"sheets", "is a folder", "give the name of a file"}},
+       {"map A.h5 -o u.h5/", {"u.h5", "folder"}},
+       {recognize + " --posterior nowhere/p.h5 --json r.json", {"nowhere", "does not exist"}},
+       {recognize + " --png u.h5", {"u.h5", "folder", "choose another"}},
+       {recognize + " --each-frame --json r.json --png sheets",
+        {"sheets/u.1.png", "is a folder"}}});
   const std::string long_name(300, 'x');
-  expect_refused({"info", long_name}, {long_name});
+  expect_refused("info " + long_name, {long_name});
   expect_refused({"info", "a\nb"}, {"a b: no such file"});
 }
 
@@ -149,17 +124,17 @@ TEST_F(BadInput, DevicesThatAreNotThere) {
 }
 
 TEST_F(BadInput, CommandLinesThatAreNotComplete) {
-  expect_refused({}, {"subcommand is required", "--help"});
-  expect_refused("frobnicate u.h5", {"'frobnicate'", "no command", "--help"});
-  expect_refused("--frobnicate", {"'--frobnicate'", "--help"});
-  expect_refused("simulate A", {"--output is required", "palpate simulate --help"});
-  expect_refused("simulate -o out.h5", {"SHAPE is required"});
-  expect_refused("map -o out.map.h5", {"RECORDING is required", "palpate map --help"});
-  expect_refused("recognize --maps A.map.h5", {"RECORDING is required"});
-  expect_refused("recognize u.h5", {"--maps: missing", "--scene"});
-  expect_refused("info", {"FILE is required"});
-  expect_refused("info u.h5 --frobnicate",
-                 {"'--frobnicate' is no flag of palpate info", "see palpate info --help"});
+  expect_each_refused(
+      {{"", {"subcommand is required", "--help"}},
+       {"frobnicate u.h5", {"'frobnicate' is no command or flag; see palpate --help\n"}},
+       {"--frobnicate", {"'--frobnicate'", "--help"}},
+       {"simulate A", {"--output is required", "palpate simulate --help"}},
+       {"simulate -o out.h5", {"SHAPE is required"}},
+       {"map -o out.map.h5", {"RECORDING is required", "palpate map --help"}},
+       {"recognize --maps maps", {"RECORDING is required"}},
+       {"recognize u.h5", {"--maps: missing", "--scene"}},
+       {"info", {"FILE is required"}},
+       {"map --spread", {"'--spread' is no flag of palpate map; see palpate map --help\n"}}});
 }
 
 TEST_F(BadInput, FlagsThatDoNotGoTogether) {

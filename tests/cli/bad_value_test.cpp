@@ -2,11 +2,10 @@
 
 #include "cli/options.hpp"
 #include "learning/map_request.hpp"
+#include "letter_files.hpp"
 #include "options/option.hpp"
 #include "palpate/simulation.hpp"
 #include "support/limits.hpp"
-#include "support/program.hpp"
-#include "support/sample_files.hpp"
 
 namespace palpate::bad_value_test {
 
@@ -78,6 +77,8 @@ TEST(BadValue, TextsOfNumbersAndPosesAreReadWhole) {
   for (const char* wrong : {"x", "-1", "1.5", "010", "1x", "", "99999999999999999999"}) {
     EXPECT_NE(cli::require_whole_number(wrong), "") << wrong;
   }
+  Request request;
+  EXPECT_EQ(set_option(request, option_named("threshold"), "1e-323"), "") << "a subnormal";
   EXPECT_EQ(cli::require_whole_number("0"), "");
   EXPECT_EQ(cli::require_whole_number("10"), "");
   for (const char* wrong : {"x", "1,2", "1,2,3,4", "1,2,x", "1,2,nan", "1;2;3"}) {
@@ -90,34 +91,26 @@ TEST(BadValue, TextsOfNumbersAndPosesAreReadWhole) {
   }
 }
 
-class BadValueOnTheCommandLine : public ProgramTest {
- protected:
-  BadValueOnTheCommandLine() {
-    write_recording(folder_ / "A.h5", sample_training("A", 12));
-    write_recording(folder_ / "u.h5", sample_unknown("A", {}, 3));
-    write_map(folder_ / "A.map.h5", sample_map("A"));
-  }
-
-  const std::string simulate_ = "simulate A -o out.h5";
-  const std::string map_ = "map A.h5 -o new/";
-  const std::string recognize_ = "recognize u.h5 --maps A.map.h5 --json r.json --png new";
-};
+using BadValueOnTheCommandLine = LetterFiles;
 
 TEST_F(BadValueOnTheCommandLine, IsNamedWithItsFlag) {
+  const std::string simulate = "simulate A -o out.h5";
+  const std::string map = "map A.h5 -o new/";
+  const std::string recognize = "recognize u.h5 --maps maps --json r.json --png new";
   const std::tuple<std::string, std::string, std::vector<const char*>> cases[] = {
-      {simulate_, "--seed", {"010"}},
-      {simulate_, "--poses", {"x", "random", "random:", "random:0", "random:-1", "random:x"}},
-      {simulate_, "--object-pose", {"1,2"}},
-      {simulate_, "--touches", {"0", "193", "1.5"}},
-      {simulate_, "--noise-kpa", {"1x"}},
-      {map_, "--cell-mm", {"1x", "0"}},
-      {map_, "--threshold", {"-1"}},
-      {map_, "--frames", {"3:3", "0:13"}},
-      {recognize_, "--gamma", {"1"}},
-      {recognize_, "--filter", {"kalman"}},
-      {recognize_, "--theta-deg", {"0:720"}},
-      {recognize_, "--frames", {"0:4"}},
-      {recognize_, "--touches", {"4"}}};
+      {simulate, "--seed", {"010"}},
+      {simulate, "--poses", {"x", "random", "random:", "random:0", "random:-1", "random:x"}},
+      {simulate, "--object-pose", {"1,2"}},
+      {simulate, "--touches", {"0", "193", "1.5"}},
+      {simulate, "--noise-kpa", {"1x"}},
+      {map, "--cell-mm", {"1x", "0"}},
+      {map, "--threshold", {"-1"}},
+      {map, "--frames", {"3:3", "0:49"}},
+      {recognize, "--gamma", {"1"}},
+      {recognize, "--filter", {"kalman"}},
+      {recognize, "--theta-deg", {"0:720"}},
+      {recognize, "--frames", {"0:7"}},
+      {recognize, "--touches", {"7"}}};
   for (const auto& [command, flag, wrong] : cases) {
     for (const char* value : wrong) {
       expect_refused(command + " " + flag + "=" + value, {flag, value});
@@ -133,10 +126,10 @@ TEST_F(BadValueOnTheCommandLine, IsNamedWithItsScene) {
   const std::pair<const char*, std::vector<std::string>> cases[] = {
       {"gamma: 0.1\ntreshold: 2\n", {"line 2", "'treshold'", "unknown key", "threshold"}},
       {"gamma: 0.1\n", {"objects: missing", "--maps"}},
-      {"objects: [{map: A.map.h5}]\nnone: -1\n", {"'none' = '-1'", "from 0"}},
-      {"objects: [{map: A.map.h5}]\nregion: {theta_deg: [-10, 351]}\n",
+      {"objects: [{map: maps/A.map.h5}]\nnone: -1\n", {"'none' = '-1'", "from 0"}},
+      {"objects: [{map: maps/A.map.h5}]\nregion: {theta_deg: [-10, 351]}\n",
        {"theta_deg", "wider than the full circle", "at most 360 degrees"}},
-      {"objects: [{map: A.map.h5}]\narray: [[0, 0], [1, 0]]\n",
+      {"objects: [{map: maps/A.map.h5}]\narray: [[0, 0], [1, 0]]\n",
        {"u.h5", "36 elements", "array", "has 2", "leaving the key out"}}};
   for (const auto& [yaml, named] : cases) {
     put_bytes(folder_ / "scene.yaml", yaml);

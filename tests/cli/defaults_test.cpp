@@ -7,27 +7,18 @@
 
 #include <fmt/format.h>
 
+#include "letter_files.hpp"
+#include "options/option.hpp"
 #include "palpate/balanced_lattice.hpp"
-#include "support/program.hpp"
-#include "support/sample_files.hpp"
+#include "recognition/request.hpp"
 
 namespace palpate::defaults_test {
 
 using nlohmann::json;
 
-/// The maps' cells are twice as wide as usual: automatic bins, as wide as these ask for, are few.
-constexpr double cell_mm = 1.0;
-
-class Defaults : public ProgramTest {
+/// Automatic bins are few: the maps' cells are twice as wide as usual, 1 mm.
+class Defaults : public LetterFiles {
  protected:
-  Defaults() {
-    std::filesystem::create_directory(folder_ / "maps");
-    for (const std::string letter : {"A", "I"}) {
-      write_map(folder_ / "maps" / (letter + ".map.h5"), sample_map(letter, cell_mm));
-    }
-    write_recording(folder_ / "u.h5", unknown_);
-  }
-
   /// The record of the recording's unknown.
   json of(const std::string& recording, const std::string& flags = "") const {
     return record(recording + " --maps maps " + flags);
@@ -36,8 +27,6 @@ class Defaults : public ProgramTest {
     of(recording, flags + " --posterior p.h5");
     return read_posterior(folder_ / "p.h5").lattice;
   }
-
-  Recording unknown_ = sample_unknown("A", {{2.0, -3.0}, 1.0}, 6);
 };
 
 void expect_same(const json& a, const json& b) {
@@ -68,8 +57,7 @@ void expect_like(const json& a, const json& b, double identity, double pose) {
 TEST_F(Defaults, FollowTheMapsTheArrayAndTheFirstTouch) {
   const PoseLattice lattice = lattice_of("u.h5", "");
   EXPECT_EQ(lattice.pivot_mm, unknown_.T_robot_sensor.front().translation_mm);
-  const std::vector<Hypothesis> hypotheses{{.map = sample_map("A", cell_mm)},
-                                           {.map = sample_map("I", cell_mm)}};
+  const std::vector<Hypothesis> hypotheses{{.map = sample_map("A")}, {.map = sample_map("I")}};
   const TouchRegion region = touch_region(hypotheses, array_reach_mm(digitacts_array()));
   expect_same_axes(lattice, balanced_lattice(region.lattice, hypotheses).lattice, 0.0);
 }
@@ -90,76 +78,88 @@ TEST_F(Defaults, FindAnObjectFarFromTheRobotsOrigin) {
   EXPECT_EQ(of("far.h5", "--pivot-mm=0,0")["mode"]["map"].is_string(), true);
 }
 
-TEST_F(Defaults, GiveTheSameNumbersInAnyRobotAndSensorFrame) {
-  const Pose T_moved_robot{{-700.0, 250.0}, 0.0};
-  // Elements and poses of a frame 100 mm beside the array, such as the robot's flange.
+// Elements and poses of a frame 100 mm beside the array, such as the robot's flange.
+TEST_F(Defaults, AreTheSameInAnySensorFrame) {
   const glm::dvec2 offset_mm{100.0, 0.0};
-  Recording moved = unknown_;
-  Recording of_flange = unknown_;
-  for (std::size_t i = 0; i < unknown_.size(); ++i) {
-    moved.T_robot_sensor[i] = T_moved_robot * moved.T_robot_sensor[i];
-    of_flange.T_robot_sensor[i] = of_flange.T_robot_sensor[i] * Pose{-offset_mm, 0.0};
+  const PoseLattice lattice = lattice_of("u.h5", "--filter=bounded");
+  for (Pose& pose : unknown_.T_robot_sensor) {
+    pose = pose * Pose{-offset_mm, 0.0};
   }
-  for (glm::dvec2& element_mm : of_flange.elements_mm) {
+  for (glm::dvec2& element_mm : unknown_.elements_mm) {
     element_mm += offset_mm;
   }
-  moved.truth->T_object_robot = moved.truth->T_object_robot * inverse(T_moved_robot);
-  write_recording(folder_ / "moved.h5", moved);
-  write_recording(folder_ / "flange.h5", of_flange);
-  const json here = of("u.h5", "--filter=bounded");
-  const json there = of("moved.h5", "--filter=bounded");
-  const json flange = of("flange.h5", "--filter=bounded");
-  // Places relative to the pivot differ by the rounding of 1,000 mm, 1e-13 mm.
-  expect_like(flange, here, 1e-6, 1e-4);
-  EXPECT_NEAR(there["identity"]["A"].get<double>(), here["identity"]["A"].get<double>(), 1e-6);
-  EXPECT_NEAR(there["refined_error_mm"].get<double>(), here["refined_error_mm"].get<double>(),
-              1e-4);
-  const PoseLattice lattice = lattice_of("u.h5", "--filter=bounded");
+  write_recording(folder_ / "flange.h5", unknown_);
   const PoseLattice about_flange = lattice_of("flange.h5", "--filter=bounded");
   EXPECT_NEAR(about_flange.pivot_mm.x, lattice.pivot_mm.x, 1e-9);
   EXPECT_NEAR(about_flange.pivot_mm.y, lattice.pivot_mm.y, 1e-9);
   expect_same_axes(about_flange, lattice, 1e-9);
+  // Places relative to the pivot differ by the rounding of 100 mm, 1e-14 mm.
+  expect_like(of("flange.h5", "--filter=bounded"), of("u.h5", "--filter=bounded"), 1e-6, 1e-4);
 }
 
-TEST_F(Defaults, GiveWayTogetherToAnyPartOfALattice) {
+TEST(DefaultLattice, GivesWayTogetherToAnyPartOfALattice) {
+  for (const std::map<std::string, std::string>& automatic :
+       {std::map<std::string, std::string>{},
+        {{"bins", "auto"}},
+        {{"bins", "fine"}},
+        {{"pivot-mm", "auto"}},
+        {{"bins", "auto"}, {"pivot-mm", "auto"}}}) {
+    EXPECT_TRUE(infers_region(request_with(automatic)));
+  }
+  const PoseLattice paper{.x_mm = {-10.0, 10.0, 25},
+                          .y_mm = {-10.0, 10.0, 25},
+                          .theta_rad = {0.0, 2.0 * std::numbers::pi, 16}};
+  for (const auto& [name, text, change] :
+       std::initializer_list<std::tuple<const char*, const char*, void (*)(PoseLattice&)>>{
+           {"bins", "25x25x16", [](PoseLattice&) {}},
+           {"bins", "9x8x7",
+            [](PoseLattice& l) { l.x_mm.count = 9, l.y_mm.count = 8, l.theta_rad.count = 7; }},
+           {"x-mm", "-4:9",
+            [](PoseLattice& l) {
+              l.x_mm = {-4.0, 9.0, 25};
+            }},
+           {"y-mm", "-4:9",
+            [](PoseLattice& l) {
+              l.y_mm = {-4.0, 9.0, 25};
+            }},
+           {"theta-deg", "0:90",
+            [](PoseLattice& l) { l.theta_rad.upper = 0.5 * std::numbers::pi; }},
+           {"pivot-mm", "3,-2",
+            [](PoseLattice& l) {
+              l.pivot_mm = {3.0, -2.0};
+            }},
+           {"pivot-mm", "0,0", [](PoseLattice&) {}}}) {
+    SCOPED_TRACE(std::string(name) + " " + text);
+    const Request request = request_with({{name, text}});
+    EXPECT_FALSE(infers_region(request));
+    PoseLattice expected = paper;
+    change(expected);
+    expect_same_axes(given_lattice(request), expected, 0.0);
+    EXPECT_EQ(given_lattice(request).pivot_mm, expected.pivot_mm);
+  }
+}
+
+TEST_F(Defaults, AreWhatAutoAsksForInFlagsAndScenes) {
   const glm::dvec2 pivot_mm = unknown_.T_robot_sensor.front().translation_mm;
-  const std::string given = fmt::format(" --pivot-mm={},{}", pivot_mm.x, pivot_mm.y);
-  const std::string wide = "--x-mm=-15:15 --y-mm=-15:15 --bins=30x30x36";
-  const std::string x = "--x-mm=-10:10 ";
-  const std::string y = "--y-mm=-10:10 ";
-  const std::string theta = "--theta-deg=0:360 ";
-  const std::string pivot = "--pivot-mm=0,0 ";
-  const std::string bins = "--bins=25x25x16 ";
+  const std::string pivot = fmt::format("--pivot-mm={},{}", pivot_mm.x, pivot_mm.y);
+  const std::string wide = "--x-mm=-15:15 --y-mm=-15:15 --bins=30x30x36 ";
   struct Case {
     std::string flags;
     std::string scene;
     std::string same_as;  ///< these flags
   };
-  for (const auto& [flags, scene, same_as] : std::initializer_list<Case>{
-           {"--bins auto", "", ""},
-           {"--pivot-mm auto", "", ""},
-           {"--bins auto --pivot-mm auto", "", ""},
-           {"", "bins: auto", ""},
-           {"", "region: {pivot_mm: auto}", ""},
-           {"--bins auto", "bins: [5, 5, 4]", ""},
-           {"--pivot-mm auto", "region: {pivot_mm: [90, 90]}", ""},
-           {"", "bins: fine", "--bins fine"},
-           {"--bins=25x25x16", "", x + y + theta + pivot + bins},
-           {"--bins=9x9x8", "", x + y + theta + pivot + "--bins=9x9x8"},
-           {"--x-mm=-4:9", "", bins + y + theta + pivot + "--x-mm=-4:9"},
-           {"--y-mm=-4:9", "", bins + x + theta + pivot + "--y-mm=-4:9"},
-           {"--theta-deg=10:80", "", bins + x + y + pivot + "--theta-deg=10:80"},
-           {"--pivot-mm=3,-2", "", bins + x + y + theta + "--pivot-mm=3,-2"},
-           {"--pivot-mm=0,0", "", bins + x + y + theta + pivot},
-           {"", "bins: [9, 9, 8]", x + y + theta + pivot + "--bins=9x9x8"},
-           {"", "region: {x_mm: [-4, 9]}", bins + y + theta + pivot + "--x-mm=-4:9"},
-           {"", "region: {pivot_mm: [3, -2]}", bins + x + y + theta + "--pivot-mm=3,-2"},
-           {wide + " --pivot-mm=auto", "", wide + given},
-           {"", "{region: {x_mm: [-15, 15], y_mm: [-15, 15], pivot_mm: auto}, bins: [30, 30, 36]}",
-            wide + given}}) {
+  for (const auto& [flags, scene, same_as] :
+       std::initializer_list<Case>{{"--bins auto", "bins: [5, 5, 4]", ""},
+                                   {"--pivot-mm auto", "region: {pivot_mm: [90, 90]}", ""},
+                                   {"", "{bins: auto, region: {pivot_mm: auto}}", ""},
+                                   {"", "bins: fine", "--bins fine"},
+                                   {"", "bins: [9, 9, 8]", "--bins=9x9x8"},
+                                   {"", "region: {x_mm: [-4, 9]}", "--x-mm=-4:9"},
+                                   {"", "region: {pivot_mm: [3, -2]}", "--pivot-mm=3,-2"},
+                                   {wide + "--pivot-mm=auto", "", wide + pivot}}) {
     SCOPED_TRACE(flags + scene);
     put_bytes(folder_ / "scene.yaml", scene);
-    const std::string few = " --filter=bounded --touches 3 ";
+    const std::string few = "--filter=bounded --touches 3 ";
     expect_same(of("u.h5", few + flags + " --scene scene.yaml"), of("u.h5", few + same_as));
   }
   expect_same(of("u.h5", "--bins auto"), of("u.h5"));
@@ -208,7 +208,7 @@ TEST_F(Defaults, LiveAndRecognizeGiveTheSameNumbers) {
 TEST_F(Defaults, TellOfObjectsFarApartInTheirFrames) {
   const char* recognize = "recognize u.h5 --maps maps --json r.json";
   EXPECT_EQ(remarks(recognize), "");
-  OccupancyGrid far = sample_map("I", cell_mm);
+  OccupancyGrid far = sample_map("I");
   far.origin_mm.x += 60.0;
   write_map(folder_ / "maps/I.map.h5", far);
   expect_named(remarks(recognize), {"far apart", "--x-mm"});

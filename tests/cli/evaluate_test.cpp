@@ -1,11 +1,11 @@
-// palpate evaluate on results written by hand, whose scores are worked out here, and on results of
-// palpate recognize.
+// palpate evaluate on results written by hand, whose scores are worked out here, and on results
+// that it cannot take.
 
 #include <algorithm>
 #include <cmath>
 
+#include "recognition/judged_results.hpp"
 #include "support/program.hpp"
-#include "support/sample_files.hpp"
 
 namespace palpate::evaluate_test {
 
@@ -107,26 +107,77 @@ TEST_F(EvaluateCommand, TakesTheFitWhereNothingSaysNone) {
   EXPECT_EQ(evaluation_of(records)["unknown_classes"]["area_under_curve"]["score"], "fit.z");
 }
 
-TEST_F(EvaluateCommand, TakesWhatRecognizeWrites) {
-  write_map(folder_ / "A.map.h5", sample_map("A"));
-  write_map(folder_ / "I.map.h5", sample_map("I"));
-  for (const std::string letter : {"A", "I", "E"}) {
-    write_recording(folder_ / (letter + ".h5"), sample_unknown(letter, {{2.0, -3.0}, 1.0}, 6));
+const json sound = json::parse(
+    R"({"recording": "u.h5", "best": "A", "identity": {"A": 0.75, "B": 0.25}, "truth": {"object": "A"}})");
+
+/// What is said of such a file's text.
+std::string refusal_of(const std::string& text) {
+  return input_error([&] {
+    JudgedResults results;
+    add_records("bad.json", text, results);
+    evaluate(results, "bad.json");
+  });
+}
+
+TEST(ResultsThatCannotBeJudged, AreRefusedByFileRecordAndField) {
+  const std::pair<const char*, const char*> cases[] = {
+      {R"(3)", "no JSON object but number"},
+      {R"({"best": null})", "'best' is missing"},
+      {R"({"best": 1})", "'best' is number"},
+      {R"({"best": "C"})", "'best' 'C' has no probability"},
+      {R"({"identity": null})", "'identity' is missing"},
+      {R"({"identity": {"A": 1.5}})", "'identity.A' = 1.5, not a probability; give 0 to 1"},
+      {R"({"identity": {"B": -0.25}})", "'identity.B' = -0.25, not a probability; give 0 to 1"},
+      {R"({"identity": {"A": 0.5}})", "'identity' sums to 0.75"},
+      {R"({"none": 2})", "'none' = 2, not a probability; give 0 to 1"},
+      {R"({"none": "?"})", "'none' is string"},
+      {R"({"fit": 1.0})", "'fit' is number"},
+      {R"({"fit": {"z": "x"}})", "'fit.z' is string"},
+      {R"({"truth": "A"})", "'truth' is string"},
+      {R"({"truth": {"object": null}})", "'truth.object' is missing"},
+      {R"({"error_mm": -1.0})", "'error_mm' = -1 mm"}};
+  for (const auto& [change, words] : cases) {
+    json records = json::array({sound, sound});
+    records[1].merge_patch(json::parse(change));
+    expect_named(refusal_of(records.dump()), {"bad.json: record 1", words});
   }
-  Recording nameless = sample_unknown("A", {{2.0, -3.0}, 1.0}, 6);
-  nameless.truth.reset();
-  write_recording(folder_ / "nameless.h5", nameless);
-  const json records =
-      this->records("A.h5 I.h5 E.h5 nameless.h5 --maps A.map.h5 I.map.h5 --bins 25x25x16 --none");
-  const json e = evaluation_of(records);
-  const auto right =
-      std::ranges::count_if(records, [](const json& each) { return each.value("right", false); });
-  EXPECT_EQ(e["records"], 3);
-  EXPECT_EQ(e["without_truth"], 1);
-  EXPECT_EQ(e["right"], right);
-  EXPECT_EQ(e["known_classes"]["records"], 2);
-  EXPECT_EQ(e["unknown_classes"]["records"], 1);
-  EXPECT_EQ(e["unknown_classes"]["area_under_curve"]["score"], "1 - none");
+  json records = json::array({sound});
+  records[0]["identity"]["A"] = nullptr;
+  expect_named(refusal_of(records.dump()), {"record 0", "'identity.A' is null, not a number"});
+}
+
+TEST(ResultsThatCannotBeJudged, AreTextsWithoutRecords) {
+  json nameless = sound;
+  nameless.erase("truth");
+  const std::pair<std::string, const char*> cases[] = {
+      {"recordings", "not JSON at byte 1"},
+      {"[" + sound.dump() + ",]", "not JSON at byte"},
+      {sound.dump() + "\n\n" + sound.dump().substr(0, 20), "line 3 (record 1) is not JSON"},
+      {"[1e999]", "too large"},
+      {"3", "holds number, not an array of records"},
+      {"[]", "none of 0 record(s) has a true label"},
+      {"", "none of 0 record(s)"},
+      {R"({"touch_sd": {"mm": 1}})", "record 0: field 'best' is missing"},
+      {json::array({nameless, nameless}).dump(),
+       "none of 2 record(s) has a true label ('truth'); name the object"}};
+  for (const auto& [text, words] : cases) {
+    expect_named(refusal_of(text), {"bad.json: ", words});
+  }
+}
+
+TEST_F(EvaluateCommand, RefusesFilesInOneLine) {
+  std::filesystem::create_directory(folder_ / "empty");
+  std::filesystem::create_directory(folder_ / "results");
+  put_bytes(folder_ / "results/a.json", sound.dump());
+  put_bytes(folder_ / "bad.json", "[3]");
+  expect_refused("evaluate results/a.json bad.json --json e.json", {"bad.json: record 0"});
+  expect_refused("evaluate missing.json", {"missing.json: no such file"});
+  expect_refused("evaluate empty", {"empty: a folder without *.json"});
+  expect_refused("evaluate", {"RESULTS is required", "palpate evaluate --help"});
+  expect_refused("evaluate results/a.json results", {"results/a.json: given twice"});
+  expect_refused("evaluate results --json ./results/a.json",
+                 {"--json ./results/a.json", "RESULTS reads", "overwrite"});
+  expect_refused("evaluate results --json nowhere/e.json", {"nowhere", "does not exist"});
 }
 
 }  // namespace palpate::evaluate_test

@@ -1,4 +1,7 @@
 #include <cmath>
+#include <cstdlib>
+
+#include <fmt/format.h>
 
 #include "palpate/frame_recorder.hpp"
 #include "support/limits.hpp"
@@ -6,24 +9,6 @@
 #include "support/sample_files.hpp"
 
 namespace palpate::export_test {
-
-/// The words of a shell's command.
-std::vector<std::string> words_of(const std::string& command) {
-  std::vector<std::string> words(1);
-  bool quoted = false;
-  for (std::size_t i = 0; i < command.size(); ++i) {
-    const char c = command[i];
-    if (c == '\'') {
-      quoted = !quoted;
-    } else if (!quoted && (c == ' ' || c == '\n')) {
-      words.emplace_back();
-    } else {
-      words.back() += !quoted && c == '\\' ? command[++i] : c;
-    }
-  }
-  words.pop_back();
-  return words;
-}
 
 bool same(double a, double b) { return a == b || (std::isnan(a) && std::isnan(b)); }
 bool same_pose(const Pose& a, const Pose& b) {
@@ -39,7 +24,10 @@ class ExportCommand : public ProgramTest {
     const std::string said = done("export a.h5 -o tables");
     const std::string::size_type at = said.find("; back: palpate ");
     ASSERT_NE(at, said.npos) << said;
-    done(words_of(said.substr(at + 16)));
+    // As it stands, in a shell.
+    const std::string back =
+        fmt::format("cd '{}' && '{}' {}", folder_.path().string(), program(), said.substr(at + 16));
+    ASSERT_EQ(std::system(back.c_str()), 0) << back;
     const Recording read = read_recording(folder_ / "FILE.h5");
     EXPECT_EQ(read.object, expected.object);
     EXPECT_EQ(read.pressure_unit, expected.pressure_unit);

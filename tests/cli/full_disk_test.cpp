@@ -1,21 +1,17 @@
+#include <unistd.h>
+
 #include <algorithm>
+#include <sstream>
 
 #include <fmt/format.h>
 
+#include "letter_files.hpp"
 #include "support/memory_limit.hpp"
-#include "support/program.hpp"
-#include "support/sample_files.hpp"
 
 namespace palpate::full_disk_test {
 
-class FullDisk : public ProgramTest {
+class FullDisk : public LetterFiles {
  protected:
-  FullDisk() {
-    write_map(folder_ / "A.map.h5", sample_map("A"));
-    write_recording(folder_ / "u.h5", sample_unknown("A", {}, 6));
-    write_recording(folder_ / "A.h5", sample_training("A", 48));
-  }
-
   /// Expects status 1 and one line that names this.
   void expect_failure(const std::string& command, const Surroundings& surroundings,
                       const char* named) const {
@@ -37,10 +33,10 @@ TEST_F(FullDisk, LeavesNoPartOfAnOutputAndAnOlderFileIntact) {
   for (const auto& [command, file] :
        {std::pair{"simulate A -o new.h5", "new.h5"},
         {"map A.h5 -o new.map.h5", "new.map.h5"},
-        {"map A.h5 -o maps/", "maps/A.map.h5"},
-        {"recognize u.h5 --maps A.map.h5 --trace --json r.json", "r.json"},
-        {"recognize u.h5 --maps A.map.h5 --posterior p.h5", "p.h5"},
-        {"recognize u.h5 --maps A.map.h5 --png sheets", "sheets/u.png"}}) {
+        {"map A.h5 -o new/", "new/A.map.h5"},
+        {"recognize u.h5 --maps maps/A.map.h5 --trace --json r.json", "r.json"},
+        {"recognize u.h5 --maps maps/A.map.h5 --posterior p.h5", "p.h5"},
+        {"recognize u.h5 --maps maps/A.map.h5 --png sheets", "sheets/u.png"}}) {
     std::filesystem::create_directories((folder_ / file).parent_path());
     // Below the size of every output here, above that of a message.
     expect_untouched(command, 2048, file);
@@ -50,19 +46,21 @@ TEST_F(FullDisk, LeavesNoPartOfAnOutputAndAnOlderFileIntact) {
 }
 
 TEST_F(FullDisk, LeavesJsonAndPosteriorBothOrNone) {
-  const std::string recognize = "recognize A.h5 --maps A.map.h5 --json r.json --posterior p.h5";
+  const std::string recognize =
+      "recognize A.h5 --maps maps/A.map.h5 --json r.json --posterior p.h5";
   // Below the size of one of them, above that of the other.
   expect_untouched(recognize + " --bins 5x5x4 --trace", 12000, "r.json");
   expect_untouched(recognize + " --bins 25x25x16", 12000, "p.h5");
 }
 
 TEST_F(FullDisk, OfStandardOutputIsAFailureThatLeavesFiles) {
-  const std::string recognize = "recognize A.h5 --maps A.map.h5 --bins 5x5x4 --each-frame --trace";
+  const std::string recognize =
+      "recognize A.h5 --maps maps/A.map.h5 --bins 5x5x4 --each-frame --trace";
   for (const std::string& command :
-       {std::string("recognize u.h5 --maps A.map.h5 --json -"),
+       {std::string("recognize u.h5 --maps maps/A.map.h5 --json -"),
         // More than standard output keeps back until the end.
         recognize + " --json -", std::string("--help"), std::string("--version"),
-        std::string("live --sensor simulate:A,rate=100,touches=2,speed=max --maps A.map.h5"
+        std::string("live --sensor simulate:A,rate=100,touches=2,speed=max --maps maps/A.map.h5"
                     " --bins 5x5x4")}) {
     expect_failure(command, {.standard_output = "/dev/full"}, "standard output");
   }
@@ -70,8 +68,37 @@ TEST_F(FullDisk, OfStandardOutputIsAFailureThatLeavesFiles) {
   EXPECT_EQ(nlohmann::json::parse(bytes_of(folder_ / "r.json")).size(), 48u);
 }
 
-TEST_F(FullDisk, OfStandardErrorKeepsTheStatus) {
+// Closed, as a daemon's are.
+TEST_F(FullDisk, OrClosedStreamsKeepTheStatusAndLandInNoFile) {
+  const std::vector<int> every{STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO};
   EXPECT_EQ(palpate("info missing.h5", {.standard_error = "/dev/full"}).status, 2);
+  EXPECT_EQ(palpate("info missing.h5", {.closed = every}).status, 2);
+  EXPECT_EQ(palpate("--version", {.closed = every}).status, 0);
+
+  const std::string recognize = "recognize u.h5 --maps maps --bins 5x5x4 --posterior p.h5 --png s";
+  EXPECT_EQ(palpate(recognize).status, 0);
+  const auto expected = content_of(folder_.path());
+  for (const std::vector<int>& closed :
+       {std::vector{STDIN_FILENO}, {STDOUT_FILENO}, {STDERR_FILENO}, every}) {
+    std::filesystem::remove(folder_ / "p.h5");
+    std::filesystem::remove_all(folder_ / "s");
+    EXPECT_EQ(palpate(recognize, {.closed = closed}).status, 0);
+    EXPECT_TRUE(content_of(folder_.path()) == expected);
+  }
+  for (const std::vector<int>& closed : {std::vector{STDOUT_FILENO}, every}) {
+    const Outcome live = palpate(
+        "live --sensor simulate:A,rate=100,seed=3,touches=2,speed=max --maps maps"
+        " --bins 5x5x4 --json f",
+        {.closed = closed});
+    EXPECT_EQ(live.status, 0) << live.err;
+    EXPECT_EQ(live.err, "");
+    std::istringstream file(bytes_of(folder_ / "f"));
+    int lines = 0;
+    for (std::string line; std::getline(file, line); ++lines) {
+      EXPECT_TRUE(nlohmann::json::accept(line)) << line;
+    }
+    EXPECT_EQ(lines, 2);
+  }
 }
 
 // Each of 20,000 readings has its own time, and so a frame of 10,000 elements: 1.6 GB.

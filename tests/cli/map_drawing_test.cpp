@@ -139,14 +139,13 @@ TEST_F(MapDrawing, TellsCalibrateWhereTheArraySitsInTheTool) {
   EXPECT_EQ(outcome.status, 0) << outcome.err;
   expect_named(outcome.out, {"the array sits in the tool at x +"});
   std::ifstream array(folder_ / "array.csv");
-  std::string line;
-  ASSERT_TRUE(std::getline(array, line) && line == "x,y");
+  std::string header;
+  ASSERT_TRUE(std::getline(array, header) && header == "x,y");
+  glm::dvec2 found;
+  char comma = ' ';
   for (const glm::dvec2& p : sits) {
-    glm::dvec2 found;
-    char comma = ' ';
     ASSERT_TRUE(array >> found.x >> comma >> found.y);
-    EXPECT_NEAR(found.x, p.x, 0.25);
-    EXPECT_NEAR(found.y, p.y, 0.25);
+    EXPECT_LT(glm::distance(found, p), 0.3);
   }
 }
 

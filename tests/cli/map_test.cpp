@@ -88,17 +88,16 @@ TEST_F(MapCommand, SaysAndStoresTheSymmetryThatTheMapsShow) {
   EXPECT_FALSE(read_map(folder_ / "I.map.h5").suggested_symmetry) << "not to be taken";
 }
 
-TEST_F(MapCommand, SpreadIsAQuarterOfThePitch) {
-  const auto spread_of = [&](const std::vector<glm::dvec2>& elements_mm) {
-    return map_of(Simulator(make_shape("A"), {}, elements_mm, 4).touch(random_poses(12, 7), {}))
-        .spread_mm.value();
+TEST(UsualSpread, IsAQuarterOfTheFinestPitch) {
+  const auto spread_of = [](const std::vector<glm::dvec2>& elements_mm) {
+    const Recording recordings[] = {{.elements_mm = elements_mm}, {.elements_mm = {{0.0, 0.0}}}};
+    return usual_spread_mm(recordings);
   };
   EXPECT_EQ(spread_of(grid_array(10, 10, 1.0)), 0.25);
   EXPECT_EQ(spread_of(grid_array(6, 6, 2.0)), 0.5);
   EXPECT_EQ(spread_of(digitacts_array()), 0.5) << "as of 2 mm";
   EXPECT_NEAR(spread_of(grid_array(4, 4, 4.8)), 1.2, 1e-12);
-  EXPECT_EQ(map_of_a("--spread-mm 0.7").spread_mm, 0.7);
-  EXPECT_EQ(usual_spread_mm(std::nullopt), 0.5) << "one element has no pitch";
+  EXPECT_EQ(spread_of({}), 0.5) << "one element has no pitch";
 }
 
 TEST_F(MapCommand, AlignsTouchesOfAnUncertainRobot) {
@@ -135,6 +134,7 @@ TEST_F(MapCommand, TakesItsFlags) {
   EXPECT_EQ(map.prior, 0.3);
   EXPECT_EQ(map.symmetry, 0);
   EXPECT_EQ(map.label, "other");
+  EXPECT_EQ(map_of_a("--spread-mm 0.7").spread_mm, 0.7);
   const OccupancyGrid usual = map_of_a("--prior 0.2");
   EXPECT_NE(map_of_a("--prior 0.2 --peak 0.5").log_odds, usual.log_odds);
   EXPECT_NE(map_of_a("--prior 0.2 --ratio 0.6").log_odds, usual.log_odds);
@@ -154,18 +154,6 @@ TEST_F(MapCommand, IsOfTheTouchesThatAreGiven) {
   write_recording(folder_ / "second.h5", part_of(training_, 30, 48));
   done("map first.h5 second.h5 -o both.map.h5");
   EXPECT_EQ(read_map(folder_ / "both.map.h5").log_odds, whole.log_odds);
-}
-
-TEST_F(MapCommand, DeadElementsChangeNothing) {
-  training_.valid.assign(training_.elements(), 1);
-  training_.valid[7] = 0;
-  const auto with_dead = [&](double pressure) {
-    for (std::size_t i = 0; i < training_.size(); ++i) {
-      training_.pressure[i * training_.elements() + 7] = pressure;
-    }
-    return map_of(training_).log_odds;
-  };
-  EXPECT_EQ(with_dead(std::nan("")), with_dead(1e6));
 }
 
 TEST_F(MapCommand, RefusesTouchesBeyondAnyRobotBeforeAnythingIsWritten) {

@@ -3,8 +3,7 @@
 #include <sys/stat.h>
 
 #include "cli/command_files.hpp"
-#include "support/program.hpp"
-#include "support/sample_files.hpp"
+#include "letter_files.hpp"
 
 namespace palpate::overwriting_test {
 
@@ -66,14 +65,9 @@ TEST_F(FilesOfACommand, MayBeDevicesButNotAFifo) {
 // Four presses, at full speed.
 const std::string presses = "simulate:A,rate=100,seed=3,touches=1,speed=max";
 
-class Overwriting : public ProgramTest {
+class Overwriting : public LetterFiles {
  protected:
   Overwriting() {
-    write_recording(folder_ / "A.h5", sample_training("A", 12));
-    write_recording(folder_ / "u.h5", sample_unknown("A", {}, 2));
-    std::filesystem::create_directory(folder_ / "maps");
-    write_map(folder_ / "maps/A.map.h5", sample_map("A"));
-    write_map(folder_ / "maps/E.map.h5", sample_map("E"));
     put_bytes(folder_ / "square.txt", "-5 -5\n5 -5\n5 5\n-5 5\n");
     put_bytes(folder_ / "scene.yaml", "objects: [{map: maps/A.map.h5}]\narray: elements.txt\n");
     std::string elements;
@@ -105,7 +99,7 @@ TEST_F(Overwriting, NoCommandWritesWhatItReads) {
   expect_kept("touches cc,1.h5", "-o", "./cc,1.h5", "FRAMES reads");
   for (const char* flag : {"--json", "--posterior"}) {
     expect_kept(maps, flag, "u.h5", "RECORDING reads");
-    expect_kept(maps, flag, "maps/E.map.h5", "--maps reads");
+    expect_kept(maps, flag, "maps/I.map.h5", "--maps reads");
     expect_kept(scene, flag, "scene.yaml", "--scene reads");
     expect_kept(scene, flag, "maps/A.map.h5", "--scene reads");
     expect_kept(scene, flag, "elements.txt", "--scene reads");
@@ -118,7 +112,7 @@ TEST_F(Overwriting, NoCommandWritesWhatItReads) {
   expect_refused({"record", "--sensor", "board.yaml:serial 7", "-o", "board.yaml"},
                  {"-o board.yaml", "--sensor reads", "overwrite"});
   expect_kept(live, "--json", "./cc,1.h5", "--sensor reads");
-  expect_kept(live, "--json", "maps/E.map.h5", "--maps reads");
+  expect_kept(live, "--json", "maps/I.map.h5", "--maps reads");
   expect_kept(live + " --poses poses.jsonl", "--json", "poses.jsonl", "--poses reads");
   for (const char* file : {"scene.yaml", "maps/A.map.h5", "elements.txt"}) {
     expect_kept(live_scene, "--json", file, "--scene reads");
@@ -139,7 +133,7 @@ TEST_F(Overwriting, FilesInFoldersKeepWhatIsRead) {
   std::filesystem::create_directory(folder_ / "d");
   std::filesystem::copy(folder_ / "u.h5", folder_ / "d/a.png");
   std::filesystem::create_directory_symlink("d", folder_ / "link");
-  std::filesystem::copy(folder_ / "maps/E.map.h5", folder_ / "d/u.1.png");
+  std::filesystem::copy(folder_ / "maps/I.map.h5", folder_ / "d/u.1.png");
   std::filesystem::create_hard_link(folder_ / "A.h5", folder_ / "d/A.map.h5");
   std::filesystem::create_symlink(folder_ / "A.h5", folder_ / "d/A.pgm");
   expect_refused("map A.h5 -o d/", {"-o d/A.map.h5", "RECORDING", "overwrite"});

@@ -1,6 +1,3 @@
-#include <sys/wait.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -35,29 +32,6 @@ class TouchesCommand : public ProgramTest {
   void expect_no_touches(const Recording& frames, const std::vector<std::string>& named) const {
     write_recording(folder_ / "f.h5", frames);
     expect_refused("touches f.h5 -o u.h5", named);
-  }
-
-  /// Writes the frames of three touches to cut.h5, whose recorder is killed, and returns them.
-  Recording cut_off() const {
-    Recording whole = frames_of("A,touches=3");
-    const pid_t pid = ::fork();
-    if (pid == 0) {
-      FrameRecorder recorder(folder_ / "cut.h5",
-                             {.elements_mm = whole.elements_mm, .baseline = whole.baseline});
-      for (std::size_t i = 0; i < whole.size(); ++i) {
-        const Touch row = whole.touch(i);
-        recorder.add({.host_time_s = whole.time_s[i],
-                      .values = {row.pressure.begin(), row.pressure.end()},
-                      .T_robot_sensor = row.T_robot_sensor});
-      }
-      recorder.flush();
-      ::_exit(0);  // as a kill: nothing is closed
-    }
-    int status = -1;
-    ::waitpid(pid, &status, 0);
-    EXPECT_EQ(status, 0);
-    EXPECT_FALSE(read_recording(folder_ / "cut.h5").closed);
-    return whole;
   }
 };
 
@@ -107,7 +81,21 @@ TEST_F(TouchesCommand, LettersAreRecognisedByWhatTheyFound) {
 }
 
 TEST_F(TouchesCommand, StreamThatWasCutOffIsClosedForOthers) {
-  const std::size_t size = cut_off().size();
+  const Recording whole = frames_of("A,touches=3");
+  {
+    FrameRecorder recorder(folder_ / "open.h5",
+                           {.elements_mm = whole.elements_mm, .baseline = whole.baseline});
+    for (std::size_t i = 0; i < whole.size(); ++i) {
+      const Touch row = whole.touch(i);
+      recorder.add({.host_time_s = whole.time_s[i],
+                    .values = {row.pressure.begin(), row.pressure.end()},
+                    .T_robot_sensor = row.T_robot_sensor});
+    }
+    recorder.flush();
+    // As a kill leaves it.
+    std::filesystem::copy(folder_ / "open.h5", folder_ / "cut.h5");
+  }
+  ASSERT_FALSE(read_recording(folder_ / "cut.h5").closed);
   // The touches are found where it cannot be closed: it is left as it is.
   std::filesystem::permissions(folder_ / "cut.h5", std::filesystem::perms::owner_read);
   const Outcome outcome = palpate("touches cut.h5 -o t.h5", {.obeys_permissions = true});
@@ -121,7 +109,7 @@ TEST_F(TouchesCommand, StreamThatWasCutOffIsClosedForOthers) {
   std::filesystem::permissions(folder_ / "cut.h5", std::filesystem::perms::owner_all);
   expect_named(done("touches cut.h5 -o t.h5"), {"3 touches", "cut.h5: was cut off"});
   EXPECT_TRUE(read_recording(folder_ / "cut.h5").closed);
-  EXPECT_EQ(read_recording(folder_ / "cut.h5").size(), size);
+  EXPECT_EQ(read_recording(folder_ / "cut.h5").size(), whole.size());
   const std::string before = bytes_of(folder_ / "cut.h5");
   EXPECT_EQ(done("touches cut.h5 -o t.h5").find("cut off"), std::string::npos);
   EXPECT_TRUE(bytes_of(folder_ / "cut.h5") == before);

@@ -59,6 +59,8 @@ CommandLine::CommandLine(const std::string& text) {
 
 std::string CommandLine::text() const { return fmt::format("{}", fmt::join(arguments_, " ")); }
 
+const char* program() { return PALPATE_PROGRAM; }
+
 [[noreturn]] void become_program(const std::vector<std::string>& arguments) {
   std::string name = PALPATE_PROGRAM;
   std::vector<std::string> texts = arguments;

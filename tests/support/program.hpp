@@ -51,6 +51,9 @@ class CommandLine {
   std::vector<std::string> arguments_;
 };
 
+/// The file of the palpate program.
+const char* program();
+
 /// Runs the palpate program in `folder`, on which its relative paths depend.
 Outcome run_program(const std::filesystem::path& folder, const std::vector<std::string>& arguments,
                     const Surroundings& surroundings = {});
@@ -109,6 +112,13 @@ class ProgramTest : public testing::Test {
   /// Expects status 2, one line on standard error that holds every one of `named`, nothing on
   /// standard output, and the folder as it was before.
   void expect_refused(const CommandLine& command, const std::vector<std::string>& named) const;
+  /// The same of each of these commands.
+  void expect_each_refused(
+      const std::vector<std::pair<std::string, std::vector<std::string>>>& commands) const {
+    for (const auto& [command, named] : commands) {
+      expect_refused(command, named);
+    }
+  }
 
   ScratchFolder folder_;
 };
