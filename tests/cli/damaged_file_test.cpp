@@ -46,9 +46,9 @@ TEST_F(DamagedInput, IsReadOrRefusedInOneLine) {
   const std::string recognize =
       "recognize u.h5 --maps A.map.h5 --bins 5x5x4 --json - --filter=bounded";
   for (const auto& [name, command, damages] :
-       {std::tuple<std::string, std::string, int>{"u.h5", "info u.h5", 30},
-        {"A.map.h5", "info A.map.h5", 30},
-        {"p.h5", "info p.h5", 30},
+       {std::tuple<std::string, std::string, int>{"u.h5", "info u.h5", 18},
+        {"A.map.h5", "info A.map.h5", 18},
+        {"p.h5", "info p.h5", 18},
         {"u.h5", recognize, 6},
         {"A.map.h5", recognize, 6}}) {
     const std::string good = bytes_of(folder_ / name);

@@ -106,34 +106,18 @@ TEST(DefaultLattice, GivesWayTogetherToAnyPartOfALattice) {
         {{"bins", "auto"}, {"pivot-mm", "auto"}}}) {
     EXPECT_TRUE(infers_region(request_with(automatic)));
   }
-  const PoseLattice paper{.x_mm = {-10.0, 10.0, 25},
-                          .y_mm = {-10.0, 10.0, 25},
-                          .theta_rad = {0.0, 2.0 * std::numbers::pi, 16}};
-  for (const auto& [name, text, change] :
-       std::initializer_list<std::tuple<const char*, const char*, void (*)(PoseLattice&)>>{
-           {"bins", "25x25x16", [](PoseLattice&) {}},
-           {"bins", "9x8x7",
-            [](PoseLattice& l) { l.x_mm.count = 9, l.y_mm.count = 8, l.theta_rad.count = 7; }},
-           {"x-mm", "-4:9",
-            [](PoseLattice& l) {
-              l.x_mm = {-4.0, 9.0, 25};
-            }},
-           {"y-mm", "-4:9",
-            [](PoseLattice& l) {
-              l.y_mm = {-4.0, 9.0, 25};
-            }},
-           {"theta-deg", "0:90",
-            [](PoseLattice& l) { l.theta_rad.upper = 0.5 * std::numbers::pi; }},
-           {"pivot-mm", "3,-2",
-            [](PoseLattice& l) {
-              l.pivot_mm = {3.0, -2.0};
-            }},
-           {"pivot-mm", "0,0", [](PoseLattice&) {}}}) {
+  constexpr double circle = 2.0 * std::numbers::pi;
+  for (const auto& [name, text, expected] :
+       std::initializer_list<std::tuple<const char*, const char*, PoseLattice>>{
+           {"bins", "9x8x7", {{-10, 10, 9}, {-10, 10, 8}, {0, circle, 7}, {}}},
+           {"x-mm", "-4:9", {{-4, 9, 25}, {-10, 10, 25}, {0, circle, 16}, {}}},
+           {"y-mm", "-4:9", {{-10, 10, 25}, {-4, 9, 25}, {0, circle, 16}, {}}},
+           {"theta-deg", "0:90", {{-10, 10, 25}, {-10, 10, 25}, {0, circle / 4, 16}, {}}},
+           {"pivot-mm", "3,-2", {{-10, 10, 25}, {-10, 10, 25}, {0, circle, 16}, {3, -2}}},
+           {"pivot-mm", "0,0", {{-10, 10, 25}, {-10, 10, 25}, {0, circle, 16}, {0, 0}}}}) {
     SCOPED_TRACE(std::string(name) + " " + text);
     const Request request = request_with({{name, text}});
     EXPECT_FALSE(infers_region(request));
-    PoseLattice expected = paper;
-    change(expected);
     expect_same_axes(given_lattice(request), expected, 0.0);
     EXPECT_EQ(given_lattice(request).pivot_mm, expected.pivot_mm);
   }
@@ -173,16 +157,6 @@ TEST_F(Defaults, FineBinsAreHalfAsWide) {
   // Counts round up.
   EXPECT_NEAR(fine.x_mm.count, 2 * usual.x_mm.count, 2);
   EXPECT_NEAR(fine.theta_rad.count, 2 * usual.theta_rad.count, 2);
-}
-
-TEST_F(Defaults, EveryUnknownHasAPivotOfItsOwn) {
-  const json frames = records("u.h5 --maps maps --each-frame --frames 0:3 --filter=bounded");
-  ASSERT_EQ(frames.size(), 3u);
-  for (std::size_t i = 0; i < frames.size(); ++i) {
-    const std::string frame = fmt::format("--frames {}:{} --filter=bounded", i, i + 1);
-    expect_same(frames[i], of("u.h5", frame));
-    EXPECT_EQ(lattice_of("u.h5", frame).pivot_mm, unknown_.T_robot_sensor[i].translation_mm);
-  }
 }
 
 TEST_F(Defaults, LiveAndRecognizeGiveTheSameNumbers) {

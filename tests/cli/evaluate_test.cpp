@@ -45,9 +45,16 @@ class EvaluateCommand : public ProgramTest {
 
 TEST_F(EvaluateCommand, WritesAllNumbersAsJsonAndInWords) {
   const json e = evaluation_of(four());
-  EXPECT_EQ(e["records"], 3);
-  EXPECT_EQ(e["without_truth"], 1);
-  EXPECT_EQ(e["right"], 2);
+  json expected = e;
+  expected.merge_patch(json::parse(R"json({
+      "records": 3, "without_truth": 1, "right": 2, "known_classes": {"records": 2},
+      "unknown_classes": {"called_none": 1,
+                          "area_under_curve": {"score": "1 - none", "area": 1.0, "known": 2}},
+      "confusion": {"rows": ["A", "M"], "columns": ["A", "B", "(none)"],
+                    "counts": [[1, 1, 0], [0, 0, 1]]},
+      "error_mm": {"records": 1, "median": 0.5},
+      "refined_error_mm": {"median": 0.25}})json"));
+  EXPECT_EQ(e, expected);
   EXPECT_NEAR(e["accuracy"].get<double>(), 2.0 / 3.0, 1e-12);
   EXPECT_NEAR(e["log_loss"].get<double>(), -std::log(0.9 * 0.25 * 0.7) / 3.0, 1e-12);
   EXPECT_NEAR(e["calibration_error"].get<double>(), (0.1 + 2 * (0.725 - 0.5)) / 3.0, 1e-12)
@@ -56,20 +63,9 @@ TEST_F(EvaluateCommand, WritesAllNumbersAsJsonAndInWords) {
   EXPECT_EQ(e["reliability"][7]["records"], 2);
   EXPECT_EQ(e["reliability"][7]["accuracy"], 0.5);
   EXPECT_FALSE(e["reliability"][0].contains("accuracy"));
-  EXPECT_EQ(e["known_classes"]["records"], 2);
-  EXPECT_EQ(e["unknown_classes"]["called_none"], 1);
-  const json& area = e["unknown_classes"]["area_under_curve"];
-  EXPECT_EQ(area["score"], "1 - none");
-  EXPECT_EQ(area["area"], 1.0);
-  EXPECT_EQ(area["known"], 2);
-  EXPECT_EQ(e["classes"].size(), 2u);
+  ASSERT_EQ(e["classes"].size(), 2u);
   EXPECT_EQ(e["classes"][0]["recall"], 0.5);
   EXPECT_EQ(e["classes"][1]["known"], false);
-  EXPECT_EQ(e["confusion"]["rows"], json({"A", "M"}));
-  EXPECT_EQ(e["confusion"]["columns"], json({"A", "B", "(none)"}));
-  EXPECT_EQ(e["confusion"]["counts"], json({{1, 1, 0}, {0, 0, 1}}));
-  EXPECT_EQ(e["error_mm"], json({{"records", 1}, {"median", 0.5}}));
-  EXPECT_EQ(e["refined_error_mm"]["median"], 0.25);
 
   expect_named(
       done("evaluate r.json"),

@@ -1,3 +1,4 @@
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -38,9 +39,8 @@ TEST_F(FullDisk, LeavesNoPartOfAnOutputAndAnOlderFileIntact) {
         {"recognize u.h5 --maps maps/A.map.h5 --posterior p.h5", "p.h5"},
         {"recognize u.h5 --maps maps/A.map.h5 --png sheets", "sheets/u.png"}}) {
     std::filesystem::create_directories((folder_ / file).parent_path());
-    // Below the size of every output here, above that of a message.
-    expect_untouched(command, 2048, file);
     put_bytes(folder_ / file, "an older file");
+    // Below the size of every output here, above that of a message.
     expect_untouched(command, 2048, file);
   }
 }
@@ -117,6 +117,43 @@ TEST_F(FullDisk, AndMemoryThatEndsAreOneLine) {
   expect_failure("import log.csv --array 100:100:1 -o o.h5", {.memory_bytes = 512 << 20},
                  "palpate: out of memory; end other programs, or use smaller files");
   EXPECT_FALSE(std::filesystem::exists(folder_ / "o.h5"));
+}
+
+using ImportMemory = ProgramTest;
+
+/// The largest memory of a command so far.
+long largest_kib() {
+  rusage usage{};
+  ::getrusage(RUSAGE_CHILDREN, &usage);
+  return usage.ru_maxrss;
+}
+
+TEST_F(ImportMemory, OfLongLogsIsLittle) {
+#ifdef __SANITIZE_ADDRESS__
+  GTEST_SKIP() << "the sanitizer holds memory of its own";
+#endif
+  done("simulate A -o A.h5");
+  const long before = largest_kib();
+  // 200,000 frames: 7 MB of text and 6 MB of pressures.
+  std::string log = "time,p0,p1,p2,p3\n";
+  for (int i = 0; i < 200'000; ++i) {
+    log += fmt::format("{},0.125,1.25,2.5,{}\n", i * 0.001, i % 7);
+  }
+  put_bytes(folder_ / "log.csv", log);
+  done("import log.csv -o o.h5 --array 4:1:2");
+  // The recording takes 72 bytes a row here (pressures, pose and time), and its file as much again,
+  // twice; every row of text would be 40 bytes more.
+  EXPECT_LT(largest_kib() - before, 64 * 1024);
+  EXPECT_EQ(read_recording(folder_ / "o.h5").size(), 200'000u);
+  // 2,000 readings at as many times: frames of 4,096 elements each.
+  log = "time,element,pressure\n";
+  for (int i = 0; i < 2000; ++i) {
+    log += fmt::format("{0},{0},0.5\n", i);
+  }
+  put_bytes(folder_ / "log.csv", log);
+  done("import log.csv -o o.h5 --array 64:64:2");
+  constexpr long checked_kib = 2000 * (4096 * (8 + 1 + 4) + 88) / 1024;
+  EXPECT_LT(largest_kib() - before, checked_kib);
 }
 
 }  // namespace palpate::full_disk_test

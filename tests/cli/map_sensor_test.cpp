@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "palpate/learned_sensor.hpp"
+#include "palpate/map_builder.hpp"
 #include "support/program.hpp"
 #include "support/sample_files.hpp"
 

@@ -1,21 +1,15 @@
 #include <cmath>
 
 #include "io/hdf5_contents.hpp"
+#include "letter_files.hpp"
 #include "model/element_spacing.hpp"
 #include "palpate/map_builder.hpp"
 #include "palpate/simulation.hpp"
-#include "support/program.hpp"
-#include "support/sample_files.hpp"
 
 namespace palpate::map_test {
 
-class MapCommand : public ProgramTest {
+class MapCommand : public LetterFiles {
  protected:
-  MapCommand() {
-    write_recording(folder_ / "A.h5", training_);
-    write_recording(folder_ / "I.h5", sample_training("I", 48));
-  }
-
   /// The map of A.h5 built with these flags.
   OccupancyGrid map_of_a(const std::string& flags = "") const {
     done("map A.h5 -o A.map.h5 " + flags);
@@ -90,14 +84,19 @@ TEST_F(MapCommand, SaysAndStoresTheSymmetryThatTheMapsShow) {
 
 TEST(UsualSpread, IsAQuarterOfTheFinestPitch) {
   const auto spread_of = [](const std::vector<glm::dvec2>& elements_mm) {
-    const Recording recordings[] = {{.elements_mm = elements_mm}, {.elements_mm = {{0.0, 0.0}}}};
+    std::vector<Recording> recordings(2);
+    for (Recording& recording : recordings) {
+      recording.elements_mm = elements_mm;
+      recording.pressure.resize(elements_mm.size());
+      recording.T_robot_sensor.resize(1);
+    }
     return usual_spread_mm(recordings);
   };
   EXPECT_EQ(spread_of(grid_array(10, 10, 1.0)), 0.25);
   EXPECT_EQ(spread_of(grid_array(6, 6, 2.0)), 0.5);
   EXPECT_EQ(spread_of(digitacts_array()), 0.5) << "as of 2 mm";
   EXPECT_NEAR(spread_of(grid_array(4, 4, 4.8)), 1.2, 1e-12);
-  EXPECT_EQ(spread_of({}), 0.5) << "one element has no pitch";
+  EXPECT_EQ(usual_spread_mm(std::nullopt), 0.5) << "one element has no pitch";
 }
 
 TEST_F(MapCommand, AlignsTouchesOfAnUncertainRobot) {
