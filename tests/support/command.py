@@ -32,7 +32,9 @@ def run(folder: pathlib.Path, *arguments: str, **more: Any) -> Ended:
 class Running:
     """The command while it runs. What it prints and says comes in one text."""
 
-    def __init__(self, folder: pathlib.Path, *arguments: str, stdin: int | None = None, terminal: bool = False):
+    def __init__(
+        self, folder: pathlib.Path, *arguments: str, stdin: int | None = None, terminal: bool = False
+    ) -> None:
         # Where the machine has no pseudo-terminal to give, this fails with the reason.
         self._reader, end = pty.openpty() if terminal else os.pipe()
         self._text = ""

@@ -2,18 +2,13 @@
 
 #include <fcntl.h>
 #include <linux/capability.h>
-#include <poll.h>
-#include <pty.h>
-#include <sys/ioctl.h>
 #include <sys/prctl.h>
-#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <csignal>
-#include <cstdlib>
 #include <fstream>
 #include <iterator>
 #include <sstream>
@@ -35,14 +30,6 @@ void redirect(int descriptor, const std::filesystem::path& file) {
   ::close(opened);
 }
 
-/// What fork() and its like return, unless they refuse: this test fails then, with their reason.
-pid_t require_process(pid_t pid, const char* call) {
-  if (pid < 0) {
-    throw std::system_error(errno, std::generic_category(), call);
-  }
-  return pid;
-}
-
 void limit_files(rlim_t bytes) {
   // Ignored, so that a write beyond the limit fails like one to a full disk.
   std::signal(SIGXFSZ, SIG_IGN);
@@ -50,18 +37,12 @@ void limit_files(rlim_t bytes) {
   ::setrlimit(RLIMIT_FSIZE, &limit);
 }
 
-}  // namespace
-
-CommandLine::CommandLine(const std::string& text) {
-  std::istringstream words(text);
-  std::copy(std::istream_iterator<std::string>(words), {}, std::back_inserter(arguments_));
-}
-
-std::string CommandLine::text() const { return fmt::format("{}", fmt::join(arguments_, " ")); }
-
-const char* program() { return PALPATE_PROGRAM; }
-
-[[noreturn]] void become_program(const std::vector<std::string>& arguments) {
+/// In a forked child: becomes the program, in the folder.
+[[noreturn]] void become_program(const std::filesystem::path& folder,
+                                 const std::vector<std::string>& arguments) {
+  if (::chdir(folder.c_str()) != 0) {
+    ::_exit(126);
+  }
   std::string name = PALPATE_PROGRAM;
   std::vector<std::string> texts = arguments;
   std::vector<char*> argv{name.data()};
@@ -75,16 +56,27 @@ const char* program() { return PALPATE_PROGRAM; }
   ::_exit(127);
 }
 
+}  // namespace
+
+CommandLine::CommandLine(const std::string& text) {
+  std::istringstream words(text);
+  std::copy(std::istream_iterator<std::string>(words), {}, std::back_inserter(arguments_));
+}
+
+std::string CommandLine::text() const { return fmt::format("{}", fmt::join(arguments_, " ")); }
+
+const char* program() { return PALPATE_PROGRAM; }
+
 Outcome run_program(const std::filesystem::path& folder, const std::vector<std::string>& arguments,
                     const Surroundings& surroundings) {
   const ScratchFolder captured;
   const std::filesystem::path out = captured / "out";
   const std::filesystem::path err = captured / "err";
-  const pid_t pid = require_process(::fork(), "fork");
+  const pid_t pid = ::fork();
+  if (pid < 0) {
+    throw std::system_error(errno, std::generic_category(), "fork");
+  }
   if (pid == 0) {
-    if (::chdir(folder.c_str()) != 0) {
-      ::_exit(126);
-    }
     redirect(STDOUT_FILENO,
              surroundings.standard_output.empty() ? out : surroundings.standard_output);
     redirect(STDERR_FILENO,
@@ -105,80 +97,13 @@ Outcome run_program(const std::filesystem::path& folder, const std::vector<std::
     if (surroundings.obeys_permissions) {
       ::prctl(PR_CAPBSET_DROP, CAP_DAC_OVERRIDE);  // of anybody but root: not permitted, nor needed
     }
-    become_program(arguments);
+    become_program(folder, arguments);
   }
   int status = 0;
   ::waitpid(pid, &status, 0);
   return {.status = WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status),
           .out = bytes_of(out),
           .err = bytes_of(err)};
-}
-
-ProgramOnTerminal::ProgramOnTerminal(const std::filesystem::path& folder,
-                                     const std::vector<std::string>& arguments,
-                                     const std::map<std::string, std::string>& environment,
-                                     int columns, int rows) {
-  winsize window{};
-  window.ws_col = static_cast<unsigned short>(columns);
-  window.ws_row = static_cast<unsigned short>(rows);
-  pid_ = require_process(::forkpty(&terminal_, nullptr, nullptr, &window), "forkpty");
-  if (pid_ == 0) {
-    if (::chdir(folder.c_str()) != 0) {
-      ::_exit(126);
-    }
-    for (const auto& [name, value] : environment) {
-      ::setenv(name.c_str(), value.c_str(), 1);
-    }
-    become_program(arguments);
-  }
-}
-
-ProgramOnTerminal::~ProgramOnTerminal() {
-  if (pid_ > 0) {
-    ::kill(pid_, SIGKILL);
-    ::waitpid(pid_, nullptr, 0);
-  }
-  if (terminal_ >= 0) {
-    ::close(terminal_);
-  }
-}
-
-bool ProgramOnTerminal::read_more() {
-  char piece[4096];
-  // The terminal ends with an error, not with an end of file, when the program is gone.
-  const ssize_t got = ::read(terminal_, piece, sizeof piece);
-  if (got > 0) {
-    text_.append(piece, static_cast<std::size_t>(got));
-  }
-  return got > 0;
-}
-
-bool ProgramOnTerminal::shows(const std::string& text) {
-  for (;;) {
-    const std::size_t found = text_.find(text, seen_);
-    if (found != text_.npos) {
-      seen_ = found + text.size();
-      return true;
-    }
-    if (!read_more()) {
-      return false;
-    }
-  }
-}
-
-void ProgramOnTerminal::type(const std::string& keys) const {
-  EXPECT_EQ(::write(terminal_, keys.data(), keys.size()), static_cast<ssize_t>(keys.size()));
-}
-
-Outcome ProgramOnTerminal::finish() {
-  while (read_more()) {
-  }
-  int status = 0;
-  ::waitpid(pid_, &status, 0);
-  pid_ = -1;
-  return {.status = WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status),
-          .out = text_,
-          .err = {}};
 }
 
 std::map<std::string, std::string> content_of(const std::filesystem::path& folder) {
@@ -188,33 +113,6 @@ std::map<std::string, std::string> content_of(const std::filesystem::path& folde
         entry.is_regular_file() ? bytes_of(entry.path()) : "";
   }
   return content;
-}
-
-pid_t ProgramTest::start(const CommandLine& command) const {
-  const pid_t pid = require_process(::fork(), "fork");
-  if (pid == 0) {
-    if (::chdir(folder_.path().c_str()) != 0 || std::freopen("said", "w", stdout) == nullptr ||
-        std::freopen("complained", "w", stderr) == nullptr) {
-      ::_exit(126);
-    }
-    become_program(command.arguments());
-  }
-  return pid;
-}
-
-void ProgramTest::kill_program(pid_t pid) {
-  // The command runs in a child, which dies with the process that is killed, but is not waited for
-  // by anybody here.
-  std::ifstream children(fmt::format("/proc/{0}/task/{0}/children", pid));
-  pid_t child = -1;
-  children >> child;
-  pollfd ended{.fd = child > 0 ? static_cast<int>(::syscall(SYS_pidfd_open, child, 0)) : -1,
-               .events = POLLIN,
-               .revents = 0};
-  ::kill(pid, SIGKILL);
-  ::waitpid(pid, nullptr, 0);
-  ::poll(&ended, 1, ended.fd < 0 ? 0 : -1);
-  ::close(ended.fd);
 }
 
 std::string ProgramTest::done(const CommandLine& command) const {

@@ -58,36 +58,6 @@ const char* program();
 Outcome run_program(const std::filesystem::path& folder, const std::vector<std::string>& arguments,
                     const Surroundings& surroundings = {});
 
-/// The palpate program on a terminal of its own.
-class ProgramOnTerminal {
- public:
-  /// `environment` is set on top of the test's own. Throws, and so fails the test, where the
-  /// machine has no pseudo-terminal to give.
-  ProgramOnTerminal(const std::filesystem::path& folder, const std::vector<std::string>& arguments,
-                    const std::map<std::string, std::string>& environment = {}, int columns = 80,
-                    int rows = 24);
-  ~ProgramOnTerminal();
-  ProgramOnTerminal(const ProgramOnTerminal&) = delete;
-  ProgramOnTerminal& operator=(const ProgramOnTerminal&) = delete;
-
-  /// Waits until the program has shown this since the last call; false if it ends before.
-  bool shows(const std::string& text);
-  void type(const std::string& keys) const;
-  /// Waits for the end of the program: its status, and all that it has shown.
-  Outcome finish();
-
- private:
-  bool read_more();
-
-  int terminal_ = -1;
-  pid_t pid_ = -1;
-  std::string text_;
-  std::size_t seen_ = 0;  ///< of text_, by shows()
-};
-
-/// In a forked child: becomes the palpate program.
-[[noreturn]] void become_program(const std::vector<std::string>& arguments);
-
 /// Every file and folder below `folder`, with the files' content.
 std::map<std::string, std::string> content_of(const std::filesystem::path& folder);
 
@@ -97,10 +67,6 @@ class ProgramTest : public testing::Test {
   Outcome palpate(const CommandLine& command, const Surroundings& surroundings = {}) const {
     return run_program(folder_.path(), command.arguments(), surroundings);
   }
-  /// Starts the program, whose output goes to the files "said" and "complained".
-  pid_t start(const CommandLine& command) const;
-  /// Kills the program with SIGKILL and waits for its end.
-  static void kill_program(pid_t pid);
   /// Standard output of a run that has to go well and say nothing else.
   std::string done(const CommandLine& command) const;
   /// Standard error of a run that has to go well.
