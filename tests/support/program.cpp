@@ -10,6 +10,8 @@
 #include <cerrno>
 #include <csignal>
 #include <fstream>
+#include <iterator>
+#include <sstream>
 #include <system_error>
 
 #include <fmt/format.h>
@@ -55,6 +57,15 @@ void limit_files(rlim_t bytes) {
 }
 
 }  // namespace
+
+CommandLine::CommandLine(const std::string& text) {
+  std::istringstream words(text);
+  std::copy(std::istream_iterator<std::string>(words), {}, std::back_inserter(arguments_));
+}
+
+std::string CommandLine::text() const { return fmt::format("{}", fmt::join(arguments_, " ")); }
+
+const char* program() { return PALPATE_PROGRAM; }
 
 Outcome run_program(const std::filesystem::path& folder, const std::vector<std::string>& arguments,
                     const Surroundings& surroundings) {
@@ -104,33 +115,40 @@ std::map<std::string, std::string> content_of(const std::filesystem::path& folde
   return content;
 }
 
-std::string ProgramTest::done(const std::vector<std::string>& arguments) const {
-  const Outcome outcome = palpate(arguments);
+std::string ProgramTest::done(const CommandLine& command) const {
+  const Outcome outcome = palpate(command);
   EXPECT_EQ(outcome.status, 0) << outcome.err;
   // Where the machine is busy, `live` sees a sensor of any speed at its tare, and says so.
-  const bool tares =
-      arguments.front() == "live" && outcome.err == "palpate: taring: do not touch the array\n";
+  const bool tares = command.arguments().front() == "live" &&
+                     outcome.err == "palpate: taring: do not touch the array\n";
   EXPECT_TRUE(outcome.err.empty() || tares) << outcome.err;
   return outcome.out;
 }
 
-nlohmann::json ProgramTest::records(std::vector<std::string> arguments) const {
+std::string ProgramTest::remarks(const CommandLine& command) const {
+  const Outcome outcome = palpate(command);
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  return outcome.err;
+}
+
+nlohmann::json ProgramTest::records(const CommandLine& flags) const {
+  std::vector<std::string> arguments = flags.arguments();
   arguments.insert(arguments.begin(), "recognize");
   arguments.insert(arguments.end(), {"--json", "-"});
   return nlohmann::json::parse(done(arguments));
 }
 
-nlohmann::json ProgramTest::record(const std::vector<std::string>& arguments) const {
-  const nlohmann::json all = records(arguments);
+nlohmann::json ProgramTest::record(const CommandLine& flags) const {
+  const nlohmann::json all = records(flags);
   EXPECT_EQ(all.size(), 1u);
   return all.at(0);
 }
 
-void ProgramTest::expect_refused(const std::vector<std::string>& arguments,
+void ProgramTest::expect_refused(const CommandLine& command,
                                  const std::vector<std::string>& named) const {
   const auto before = content_of(folder_.path());
-  const Outcome outcome = palpate(arguments);
-  SCOPED_TRACE(fmt::format("palpate {}", fmt::join(arguments, " ")));
+  const Outcome outcome = palpate(command);
+  SCOPED_TRACE("palpate " + command.text());
   EXPECT_EQ(outcome.status, 2) << outcome.err;
   EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
   EXPECT_TRUE(outcome.err.ends_with('\n'));

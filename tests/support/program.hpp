@@ -4,9 +4,11 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <initializer_list>
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <nlohmann/json.hpp>
@@ -33,6 +35,25 @@ struct Surroundings {
   std::vector<int> closed;                   ///< standard streams that are closed, as a daemon's
 };
 
+/// The program's arguments: a list, or a text of them with a space between each two.
+class CommandLine {
+ public:
+  CommandLine(std::initializer_list<std::string> arguments) : arguments_(arguments) {}
+  CommandLine(std::vector<std::string> arguments) : arguments_(std::move(arguments)) {}
+  CommandLine(const std::string& text);
+  CommandLine(const char* text) : CommandLine(std::string(text)) {}
+
+  const std::vector<std::string>& arguments() const& { return arguments_; }
+  std::vector<std::string> arguments() && { return std::move(arguments_); }
+  std::string text() const;
+
+ private:
+  std::vector<std::string> arguments_;
+};
+
+/// The file of the palpate program.
+const char* program();
+
 /// Runs the palpate program in `folder`, on which its relative paths depend.
 Outcome run_program(const std::filesystem::path& folder, const std::vector<std::string>& arguments,
                     const Surroundings& surroundings = {});
@@ -43,20 +64,27 @@ std::map<std::string, std::string> content_of(const std::filesystem::path& folde
 /// Runs the program in a folder of the test's own.
 class ProgramTest : public testing::Test {
  protected:
-  Outcome palpate(const std::vector<std::string>& arguments,
-                  const Surroundings& surroundings = {}) const {
-    return run_program(folder_.path(), arguments, surroundings);
+  Outcome palpate(const CommandLine& command, const Surroundings& surroundings = {}) const {
+    return run_program(folder_.path(), command.arguments(), surroundings);
   }
   /// Standard output of a run that has to go well and say nothing else.
-  std::string done(const std::vector<std::string>& arguments) const;
+  std::string done(const CommandLine& command) const;
+  /// Standard error of a run that has to go well.
+  std::string remarks(const CommandLine& command) const;
   /// The records of `recognize` with these arguments, as `--json -` prints them.
-  nlohmann::json records(std::vector<std::string> arguments) const;
+  nlohmann::json records(const CommandLine& flags) const;
   /// The one record of `recognize` with these arguments.
-  nlohmann::json record(const std::vector<std::string>& arguments) const;
+  nlohmann::json record(const CommandLine& flags) const;
   /// Expects status 2, one line on standard error that holds every one of `named`, nothing on
   /// standard output, and the folder as it was before.
-  void expect_refused(const std::vector<std::string>& arguments,
-                      const std::vector<std::string>& named) const;
+  void expect_refused(const CommandLine& command, const std::vector<std::string>& named) const;
+  /// The same of each of these commands.
+  void expect_each_refused(
+      const std::vector<std::pair<std::string, std::vector<std::string>>>& commands) const {
+    for (const auto& [command, named] : commands) {
+      expect_refused(command, named);
+    }
+  }
 
   ScratchFolder folder_;
 };
