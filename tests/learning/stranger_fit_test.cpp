@@ -100,9 +100,7 @@ TEST(WithStrangers, StaysWithinAQuarterAndFourTimesPalpatesOwn) {
   Strangers unlike;
   for (const std::size_t label : {0U, 1U, 2U}) {
     alike.add(label, 50, 3, 0.0);
-    for (int i = 0; i < 50; ++i) {
-      unlike.fits[label].push_back({{.z = -largest_fit_z}, 2});
-    }
+    unlike.fits[label].assign(50, {{.z = -largest_fit_z}, 2});
   }
   EXPECT_EQ(sd_of(alike.fits), 1.0);
   EXPECT_NEAR(sd_of(unlike.fits).value(), 16.0, 1.0);
