@@ -1,7 +1,9 @@
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <set>
 #include <tuple>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -33,46 +35,38 @@ TEST(TouchPoses, TrainingGridHasTwelveAnglesAtSixteenPositions) {
   EXPECT_NEAR(mean.y, 0.0, 1e-9);
 }
 
-/// Checks that values are uniform over [lower, upper): inside it, in every eighth of it.
-class Coverage {
- public:
-  Coverage(double lower, double upper) : lower_(lower), upper_(upper) {}
-  void add(double value) {
-    ASSERT_GE(value, lower_);
-    ASSERT_LT(value, upper_);
-    ++counts_[static_cast<int>((value - lower_) / (upper_ - lower_) * eighths)];
-    ++total_;
+/// Expects values spread uniformly over [lower, upper): inside it, in every eighth of it.
+void expect_uniform(const std::vector<double>& values, double lower, double upper) {
+  std::array<int, 8> counts{};
+  for (const double value : values) {
+    ASSERT_GE(value, lower);
+    ASSERT_LT(value, upper);
+    ++counts.at(static_cast<std::size_t>((value - lower) / (upper - lower) * 8.0));
   }
-  void expect_uniform() const {
-    for (const int count : counts_) {
-      // Five standard errors of a binomial proportion of 1/8.
-      EXPECT_NEAR(count, total_ / 8.0, 5.0 * std::sqrt(total_ * 7.0 / 64.0));
-    }
+  const auto n = static_cast<double>(values.size());
+  for (const int count : counts) {
+    // Five standard errors of a binomial proportion of 1/8.
+    EXPECT_NEAR(count, n / 8.0, 5.0 * std::sqrt(n * 7.0 / 64.0));
   }
+}
 
- private:
-  static constexpr int eighths = 8;
-  double lower_;
-  double upper_;
-  int counts_[eighths] = {};
-  int total_ = 0;
-};
+/// Expects x and y uniform within half_mm of 0, and theta over the circle.
+void expect_uniform(const std::vector<Pose>& poses, double half_mm) {
+  std::array<std::vector<double>, 3> of;
+  for (const Pose& pose : poses) {
+    of[0].push_back(pose.translation_mm.x);
+    of[1].push_back(pose.translation_mm.y);
+    of[2].push_back(pose.theta_rad);
+  }
+  expect_uniform(of[0], -half_mm, half_mm);
+  expect_uniform(of[1], -half_mm, half_mm);
+  expect_uniform(of[2], 0.0, 2.0 * std::numbers::pi);
+}
 
 TEST(TouchPoses, RandomPosesAreUniformOverTheGridAndRepeatable) {
   const std::vector<Pose> poses = random_poses(20'000, 9);
   ASSERT_EQ(poses.size(), 20'000U);
-  Coverage x(-10.2, 10.2);
-  Coverage y(-10.2, 10.2);
-  Coverage theta(0.0, 2.0 * std::numbers::pi);
-  for (const Pose& pose : poses) {
-    x.add(pose.translation_mm.x);
-    y.add(pose.translation_mm.y);
-    theta.add(pose.theta_rad);
-  }
-  x.expect_uniform();
-  y.expect_uniform();
-  theta.expect_uniform();
-
+  expect_uniform(poses, 10.2);
   // More poses of the same seed begin with the same ones.
   const std::vector<Pose> few = random_poses(3, 9);
   EXPECT_EQ(few[2].translation_mm, poses[2].translation_mm);
@@ -82,23 +76,16 @@ TEST(TouchPoses, RandomPosesAreUniformOverTheGridAndRepeatable) {
 }
 
 TEST(TouchPoses, RandomObjectPosesAreUniformAndIndependentOfTheTouches) {
-  Coverage x(-10.0, 10.0);
-  Coverage y(-10.0, 10.0);
-  Coverage theta(0.0, 2.0 * std::numbers::pi);
-  constexpr int n = 4000;
+  constexpr int n = 2000;
+  std::vector<Pose> poses;
   double correlation = 0.0;
   for (int seed = 0; seed < n; ++seed) {
-    const Pose pose = random_object_pose(seed);
-    x.add(pose.translation_mm.x);
-    y.add(pose.translation_mm.y);
-    theta.add(pose.theta_rad);
+    poses.push_back(random_object_pose(seed));
     // Both have a variance of one third of their squared half range.
-    correlation +=
-        pose.translation_mm.x / 10.0 * (random_poses(1, seed)[0].translation_mm.x / 10.2) * 3.0 / n;
+    correlation += poses.back().translation_mm.x / 10.0 *
+                   (random_poses(1, seed)[0].translation_mm.x / 10.2) * 3.0 / n;
   }
-  x.expect_uniform();
-  y.expect_uniform();
-  theta.expect_uniform();
+  expect_uniform(poses, 10.0);
   EXPECT_NEAR(correlation, 0.0, 5.0 / std::sqrt(n));  // five standard errors
 }
 
