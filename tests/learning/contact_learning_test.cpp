@@ -6,7 +6,12 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
 
+#include "learning/feature_learning.hpp"
+#include "palpate/error.hpp"
 #include "simulated_presses.hpp"
 #include "support/errors.hpp"
 #include "support/limits.hpp"
@@ -68,29 +73,6 @@ TEST(ContactClassifierOfPresses, LearnsTheRatioFromSharesOfThePeak) {
   EXPECT_EQ(learn_classifier(RowPress({exps({5.0, 5.0})}).presses, 1.0).ratio,
             ContactClassifier{}.ratio)
       << "all shares are 1";
-}
-
-TEST(ContactClassifierOfPresses, PartsTwoClusters) {
-  Uniform random(41);
-  std::vector<std::vector<double>> touches;
-  double highest_noise = 0.0;
-  double lowest_contact = 1e9;
-  for (int touch = 0; touch < 20; ++touch) {
-    touches.emplace_back();
-    for (int e = 0; e < 60; ++e) {
-      const bool contact = e % 3 == 0;
-      const double x =
-          contact ? 20.0 * std::exp(0.25 * normal(random)) : 0.5 * std::exp(0.4 * normal(random));
-      (contact ? lowest_contact : highest_noise) =
-          contact ? std::min(lowest_contact, x) : std::max(highest_noise, x);
-      touches.back().push_back(x);
-    }
-  }
-  const ContactClassifier found = learn_classifier(RowPress(touches).presses);
-  ASSERT_LT(highest_noise, lowest_contact);
-  EXPECT_NEAR(found.threshold, std::sqrt(highest_noise * lowest_contact), 1e-9);
-  EXPECT_GT(found.ratio, 0.05);
-  EXPECT_LT(found.ratio, 0.3);
 }
 
 TEST(ContactClassifierOfPresses, RefusesPressuresThatTellNothing) {
@@ -241,6 +223,71 @@ TEST(Readings, OfNoiseAloneMakeNoContact) {
   EXPECT_EQ(found.classifier.threshold, 3.0 * found.noise);
   const ReadingOptions given{.threshold = 1.0, .spacing_mm = 2.0};
   EXPECT_EQ(learn_readings(presses, given).classifier.threshold, 1.0);
+}
+
+LabelledFeatures press(const char* label, double value) {
+  return {label, {{value, 2.0 * value, 7.0}}};
+}
+
+/// With what keeps like presses from being demanded alike.
+double sd(double variance) { return std::sqrt(variance + 0.05 * 0.05); }
+
+TEST(FeatureLearning, DrawsDeviationsTowardsThePooledOnes) {
+  const std::vector<LabelledFeatures> presses{press("A", 1.0), press("A", 3.0), press("B", 10.0),
+                                              press("B", 16.0)};
+  const LearnedFeatures learned = learn_features(presses);
+  // Squared differences: A 2, B 18; pooled 20 / 2. Shrunk: (2 + 4 * 10) / 6 and (18 + 40) / 6.
+  EXPECT_DOUBLE_EQ(learned.objects.at("A").mean[0], 2.0);
+  EXPECT_NEAR(learned.objects.at("A").sd[0], sd(42.0 / 6.0 * 1.5), 1e-9);
+  EXPECT_NEAR(learned.objects.at("B").sd[0], sd(58.0 / 6.0 * 1.5), 1e-9);
+  EXPECT_NEAR(learned.objects.at("B").sd[1], sd(4.0 * 58.0 / 6.0 * 1.5), 1e-9);
+  EXPECT_DOUBLE_EQ(learned.objects.at("A").sd[2], 0.05) << "the least deviation";
+  EXPECT_DOUBLE_EQ(learned.any.mean[0], 7.5);
+  EXPECT_NEAR(learned.any.sd[0], sd(141.0 / 3.0), 1e-9);
+  EXPECT_EQ(learned.weight, 0.0);
+}
+
+TEST(FeatureLearning, NoCorrelationIsSoHighThatRoundingInAFileBreaksIt) {
+  const std::vector<LabelledFeatures> presses{press("A", 1.0), press("A", 1e6)};
+  EXPECT_NEAR(learn_features(presses).any.correlation[0], 0.999, 1e-6);
+}
+
+TEST(FeatureLearning, FeaturesThatGoTogetherAreExpectedToGoTogether) {
+  // The force is the area's double or so, and the peak goes its own way.
+  const std::vector<LabelledFeatures> presses{{"A", {{1.0, 2.1, 5.0}}}, {"A", {{2.0, 3.9, 5.2}}},
+                                              {"A", {{3.0, 6.1, 5.2}}}, {"A", {{4.0, 7.9, 5.0}}},
+                                              {"B", {{1.0, 1.0, 1.0}}}, {"B", {{1.0, 1.0, 1.0}}}};
+  const FeatureDistribution learned = learn_features(presses).objects.at("A");
+  EXPECT_GT(learned.correlation[0], 0.9);
+  EXPECT_LT(learned.correlation[0], 1.0);
+  EXPECT_NEAR(learned.correlation[1], 0.0, 0.05);
+  // Both are an sd from the mean in area; one has the force of its area.
+  const double apart = learned.sd[0];
+  const double fits = learned.log_density({{2.5 + apart, 5.0 + 2.0 * apart, 5.1}});
+  const double does_not = learned.log_density({{2.5 + apart, 5.0 - 2.0 * apart, 5.1}});
+  EXPECT_GT(fits, does_not + 5.0);
+}
+
+TEST(FeatureLearning, DensityIsThatOfTheCovariance) {
+  FeatureDistribution distribution{
+      .mean = {1.0, 2.0, 3.0}, .sd = {0.5, 2.0, 1.0}, .correlation = {0.6, -0.3, 0.2}};
+  // -z^T C^-1 z / 2 - log sqrt((2 pi)^3 det C); the sd multiply to 1.
+  const glm::dmat3 c{{1.0, 0.6, -0.3}, {0.6, 1.0, 0.2}, {-0.3, 0.2, 1.0}};
+  const glm::dvec3 z{1.0, -0.5, 2.0};
+  const double expected = -0.5 * glm::dot(z, glm::inverse(c) * z) - 1.5 * std::log(two_pi) -
+                          0.5 * std::log(glm::determinant(c));
+  EXPECT_NEAR(distribution.log_density({{1.5, 1.0, 5.0}}), expected, 1e-12);
+  distribution.correlation = {0.9, 0.9, -0.9};
+  EXPECT_TRUE(std::isnan(distribution.log_density({{1.5, 1.0, 5.0}})));
+}
+
+TEST(FeatureLearning, OfOnePressEachTakesAllPressesAndOfOneIsFinite) {
+  // The variance of both is 8; (0 + 4 * 8) / 5 * 2.
+  const LearnedFeatures both = learn_features(std::vector{press("A", 1.0), press("B", 5.0)});
+  EXPECT_NEAR(both.objects.at("A").sd[0], sd(12.8), 1e-9);
+  const LearnedFeatures one = learn_features(std::vector{press("A", 1.0)});
+  EXPECT_DOUBLE_EQ(one.objects.at("A").sd[0], 0.05);
+  EXPECT_DOUBLE_EQ(one.any.sd[0], 0.05);
 }
 
 }  // namespace palpate::contact_learning_test

@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "learning/golden_section.hpp"
 #include "palpate/error.hpp"
 #include "simulated_presses.hpp"
 
@@ -277,6 +278,26 @@ TEST(ClearlyLess, IsByMoreThanTwoStandardErrors) {
   EXPECT_FALSE(is_clearly_less(losses(0.19, 100), same)) << "within two standard errors of 0.1005";
   EXPECT_FALSE(is_clearly_less(losses(-2.0, 100), same));
   EXPECT_FALSE(is_clearly_less(same, same));
+}
+
+TEST(GoldenSection, FindsTheLeastValue) {
+  int calls = 0;
+  const double found = least_at(-3.0, 7.0, 1e-6, [&](double x) {
+    ++calls;
+    return std::abs(x - 1.25);
+  });
+  EXPECT_NEAR(found, 1.25, 1e-6);
+  // Each section leaves 0.618 of the interval: 34 for a factor of 1e7, and the two to begin with.
+  EXPECT_LE(calls, 37);
+}
+
+TEST(GoldenSection, ReachesBothEnds) {
+  EXPECT_NEAR(least_at(2.0, 5.0, 1e-4, [](double x) { return -x; }), 5.0, 1e-4);
+  EXPECT_NEAR(least_at(2.0, 5.0, 1e-4, [](double x) { return x; }), 2.0, 1e-4);
+}
+
+TEST(GoldenSection, OfEqualValuesTakesTheLowest) {
+  EXPECT_NEAR(least_at(0.0, 2.0, 1e-4, [](double) { return 3.0; }), 0.0, 1e-4);
 }
 
 }  // namespace palpate::temperature_fit_test

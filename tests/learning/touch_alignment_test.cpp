@@ -9,8 +9,10 @@
 #include "learning/predictive_map.hpp"
 #include "learning/touch_alignment.hpp"
 #include "model/displacement_points.hpp"
+#include "palpate/map_builder.hpp"
 #include "palpate/simulation.hpp"
 #include "reference/reference.hpp"
+#include "support/shared_device.hpp"
 
 namespace palpate::touch_alignment_test {
 
@@ -58,16 +60,13 @@ struct Touched {
 
   /// Mean log-likelihood of exact touches that the map of these has not seen, in nats.
   double held_out_nats(const Recording& learned) const {
-    std::vector<Touch> all = learned.touches(0, learned.size());
-    const std::vector<Touch> others = held_out.touches(0, held_out.size());
-    all.insert(all.end(), others.begin(), others.end());
-    PredictiveMap map(all, {});
-    for (std::size_t i = learned.size(); i < all.size(); ++i) {
-      map.take_out(i);
-    }
+    MapBuilder builder(shared_device(), {});
+    builder.add(learned.touches(0, learned.size()));
+    const OccupancyGrid map = builder.build("E");
+    const ContactModel contact{.prior = map.prior};
     double sum = 0.0;
-    for (std::size_t i = learned.size(); i < all.size(); ++i) {
-      sum += map.log_likelihood(i, all[i].T_robot_sensor);
+    for (const Touch& touch : held_out.touches(0, held_out.size())) {
+      sum += reference::log_likelihood(touch, {}, map, contact);
     }
     return sum / static_cast<double>(held_out.size());
   }

@@ -127,9 +127,9 @@ TEST(LabelBounds, OfASearchThatEvaluatedNothing) {
   EXPECT_EQ(bounds[0].high, 1.0);
 }
 
-class LabelBoundsOf : public ByEveryFilter {};
+class LabelBoundsOfAStep : public ByEveryFilter {};
 
-TEST_P(LabelBoundsOf, AStepAreOfBoundsAlone) {
+TEST_P(LabelBoundsOfAStep, AreOfBoundsAlone) {
   const RecognitionTask task(shapes(), filter());
   for (const RecognitionStep& step : recognised(task, touched_letter(1), true).trace) {
     ASSERT_EQ(step.certificate.has_value(), bounded());
@@ -144,7 +144,6 @@ TEST_P(LabelBoundsOf, AStepAreOfBoundsAlone) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(By, LabelBoundsOf, testing::Range(std::size_t{0}, std::size_t{3}),
-                         filter_name);
+INSTANTIATE_TEST_SUITE_P(By, LabelBoundsOfAStep, each_filter, filter_name);
 
 }  // namespace palpate::label_bounds_test

@@ -44,20 +44,6 @@ TEST(Mirror, FindsTheObjectOnItsOtherSide) {
   }
 }
 
-TEST(Temperature, LeavesPosesAndLowersConfidence) {
-  const Recording recording = touched_letter(4);
-  const LearnedSensor sensor{.temperature = 8.0};
-  for (const std::size_t filter : {0U, 2U}) {
-    RecognitionTask task(shapes(), with_evidence(every_filter()[filter], sensor));
-    const RecognitionStep plain = last_step(task, recording);
-    task.sensor.temperature = sensor.temperature;
-    const RecognitionStep tempered = last_step(task, recording);
-    EXPECT_EQ(tempered.mode.bin, plain.mode.bin);
-    EXPECT_EQ(tempered.refined->covariance, plain.refined->covariance);
-    EXPECT_LT(tempered.confidence(), plain.confidence());
-  }
-}
-
 /// A table of Eq. 7 over a layer, but for the disc's own numbers, which leave more to chance, with
 /// features of the disc and a temperature.
 LearnedSensor learned_sensor() {

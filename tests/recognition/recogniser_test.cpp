@@ -1,12 +1,14 @@
 #include "recognition/recogniser.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 #include <gtest/gtest.h>
 #include <glm/geometric.hpp>
 
 #include "palpate/error.hpp"
+#include "recognition/filter.hpp"
 #include "shapes.hpp"
 #include "support/synthetic.hpp"
 
@@ -25,13 +27,13 @@ Recogniser updated(const RecognitionTask& task, std::span<const Touch> touches) 
   return recogniser;
 }
 
-class RecogniserOf : public testing::Test {
+class RecogniserTells : public testing::Test {
  protected:
   Recording recording_ = touched_letter(1);
   std::vector<Touch> touches_ = all_touches(recording_);
 };
 
-TEST_F(RecogniserOf, AHistogramTellsWhatTheHistogramTells) {
+TEST_F(RecogniserTells, OfAHistogramWhatTheHistogramTells) {
   const auto options = std::get<HistogramOptions>(every_filter()[0]);
   const Recogniser recogniser = updated({shapes(), options}, touches_);
   PoseHistogram histogram(shared_device(), shapes(), options);
@@ -46,7 +48,7 @@ TEST_F(RecogniserOf, AHistogramTellsWhatTheHistogramTells) {
   EXPECT_FALSE(recogniser.effective_sample_size());
 }
 
-TEST_F(RecogniserOf, ParticlesTellsWhatTheParticlesTell) {
+TEST_F(RecogniserTells, OfParticlesWhatTheParticlesTell) {
   const auto options = std::get<ParticleOptions>(every_filter()[1]);
   Recogniser recogniser(shared_device(), {shapes(), options});
   std::vector<double> fractions;
@@ -74,7 +76,7 @@ TEST_F(RecogniserOf, ParticlesTellsWhatTheParticlesTell) {
   }
 }
 
-TEST_F(RecogniserOf, BoundsTellsWhatTheBoundedPosteriorTells) {
+TEST_F(RecogniserTells, OfBoundsWhatTheBoundedPosteriorTells) {
   const auto options = std::get<BoundedOptions>(every_filter()[2]);
   const Recogniser recogniser = updated({shapes(), options}, touches_);
   BoundedPosterior bounded(shapes(), options);
@@ -251,7 +253,45 @@ TEST_P(AutomaticPivot, WaitsForAResetAfterAnUpdateWasBrokenOff) {
   recogniser.update(touches_);
 }
 
-INSTANTIATE_TEST_SUITE_P(By, AutomaticPivot, testing::Range(std::size_t{0}, std::size_t{3}),
-                         filter_name);
+INSTANTIATE_TEST_SUITE_P(By, AutomaticPivot, each_filter, filter_name);
+
+PoseLattice lattice_of(int nx, int ny, int ntheta) {
+  return {{-10.0, 10.0, nx}, {-20.0, 25.0, ny}, {0.0, 6.283185307179586, ntheta}, {3.0, 4.0}};
+}
+
+TEST(MarginalGrid, IsTheLatticeWhereAPictureShowsItsBins) {
+  for (const PoseLattice& lattice : {lattice_of(1, 25, 16), lattice_of(400, 399, 360)}) {
+    const PoseLattice grid = marginal_grid(lattice);
+    for (Axis PoseLattice::*axis :
+         {&PoseLattice::x_mm, &PoseLattice::y_mm, &PoseLattice::theta_rad}) {
+      EXPECT_EQ((grid.*axis).count, (lattice.*axis).count);
+      EXPECT_EQ((grid.*axis).upper, (lattice.*axis).upper);
+    }
+  }
+}
+
+TEST(MarginalGrid, HoldsWholeBinsAndTheRegion) {
+  for (const int count : {401, 799, 800, 801, 1000, 40'009, 2'000'000'000}) {
+    const PoseLattice lattice = lattice_of(count, 17, 100'000);
+    const PoseLattice grid = marginal_grid(lattice);
+    EXPECT_LE(grid.x_mm.count, 400);
+    EXPECT_GE(grid.x_mm.count, 200);
+    const double width = grid.x_mm.step() / lattice.x_mm.step();
+    EXPECT_NEAR(width, std::round(width), 1e-9 * width) << count << ": stripes";
+    EXPECT_EQ(grid.x_mm.lower, lattice.x_mm.lower);
+    EXPECT_GE(grid.x_mm.upper, lattice.x_mm.upper);
+    EXPECT_LT(grid.x_mm.upper, lattice.x_mm.upper + grid.x_mm.step());
+    EXPECT_EQ(grid.y_mm.count, 17);
+    EXPECT_EQ(grid.theta_rad.count, 360);
+    EXPECT_TRUE(grid.full_circle());
+    EXPECT_EQ(grid.pivot_mm, lattice.pivot_mm);
+  }
+}
+
+TEST(MarginalGrid, OfTheLargestRegionIsSound) {
+  PoseLattice lattice = lattice_of(1001, 1001, 1);
+  lattice.x_mm = {-1e9, 1e9, 1001};
+  EXPECT_NO_THROW(marginal_grid(lattice).validate());
+}
 
 }  // namespace palpate::recogniser_test

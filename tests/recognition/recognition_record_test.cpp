@@ -6,10 +6,11 @@
 #include <stdexcept>
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include "palpate/error.hpp"
+#include "recognition/nearby_fit.hpp"
 #include "recognition/record_json.hpp"
+#include "recognition/scaled_pose.hpp"
 #include "reference/reference.hpp"
 #include "shapes.hpp"
 #include "support/limits.hpp"
@@ -177,8 +178,7 @@ TEST_P(Recognise, SaysWhatFitsAndWhatDoesNot) {
   EXPECT_TRUE(last_step(task_, cross).fit);
 }
 
-INSTANTIATE_TEST_SUITE_P(By, Recognise, testing::Range(std::size_t{0}, std::size_t{3}),
-                         filter_name);
+INSTANTIATE_TEST_SUITE_P(By, Recognise, each_filter, filter_name);
 
 TEST(FitOfAStep, IsOfTheAveragedLikelihoodWhereTouchesMayBeDisplaced) {
   const Recording recording = touched_letter(26);
@@ -303,6 +303,56 @@ TEST(RecordJson, HasFitAndWarningsWhereTheStepHas) {
     const nlohmann::json json = to_json(step, task);
     EXPECT_EQ(json.at("fit"), (nlohmann::json{{"z", -4.5}, {"verdict", text}}));
     EXPECT_EQ(json.at("warnings"), (nlohmann::json{"one", "two"}));
+  }
+}
+
+// Of n touches, each of which tells the place with a variance, the belief has an n-th of that.
+TEST(ScaledPose, ExactTouchesScaleAsTheirReadingsDo) {
+  for (const int touches : {1, 3, 9}) {
+    EXPECT_DOUBLE_EQ(belief_factor(0.4, 0.1, {.touches = touches}), 0.4);
+  }
+}
+
+TEST(ScaledPose, WhatDisplacementAddsStays) {
+  constexpr double readings_mm2 = 0.3;
+  constexpr double displacement_mm2 = 1.2;
+  constexpr double factor = 0.4;
+  for (const int touches : {1, 3, 9}) {
+    const double before = (readings_mm2 + displacement_mm2) / touches;
+    const double after = (factor * readings_mm2 + displacement_mm2) / touches;
+    EXPECT_NEAR(
+        belief_factor(factor, before, {.displacement_mm2 = displacement_mm2, .touches = touches}),
+        after / before, 1e-9);
+  }
+}
+
+TEST(ScaledPose, ABeliefNoWiderThanDisplacementMakesItStays) {
+  EXPECT_EQ(belief_factor(0.4, 0.1, {.displacement_mm2 = 1.0, .touches = 9}), 1.0);
+  EXPECT_EQ(belief_factor(2.5, 0.1, {.displacement_mm2 = 1.0, .touches = 9}), 1.0);
+}
+
+// Where an object slips, a belief settles where a touch tells as much as a slip forgets:
+// p^2 = c s for readings of a variance c far above that of a slip, s.
+TEST(ScaledPose, ASlippingBeliefGrowsAsTheRootOfItsReadings) {
+  constexpr double slip_mm2 = 1e-4;
+  constexpr double readings_mm2 = 1.0;
+  EXPECT_NEAR(belief_factor(0.25, std::sqrt(slip_mm2 * readings_mm2),
+                            {.slip_mm2 = slip_mm2, .touches = 10'000}),
+              0.5, 0.01);
+}
+
+TEST(NearbyFit, IsAsGoodAsThatOfTheTruePoseHalfAStepAway) {
+  const OccupancyGrid map = map_of(on_letter_l, "L");
+  const ContactModel contact{.prior = 0.2};
+  const Pose truth{{1.3, -0.8}, 0.7};
+  const Recording recording = touches_of(on_letter_l, truth, 20, 856);
+  const std::vector<Touch> touches = all_touches(recording);
+  const double at_truth = fit_of(touches, truth, map, contact, 0)->z;
+  for (const glm::dvec2& off_mm : {glm::dvec2(0.375, 0.0), {-0.4375, 0.25}, {0.4, 0.4}}) {
+    const Pose start{truth.translation_mm + off_mm, truth.theta_rad + 0.05};
+    EXPECT_LT(fit_of(touches, start, map, contact, 0)->z, at_truth - 1.0);
+    // The best pose of these touches fits a little better than the true one.
+    EXPECT_GT(best_fit_near(evidence_of(touches, contact), start, map, contact, 0)->z, at_truth);
   }
 }
 

@@ -2,19 +2,18 @@
 
 #include "recognition/resolve.hpp"
 
-#include <functional>
 #include <memory>
 #include <numbers>
 #include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include "options/option.hpp"
 #include "palpate/error.hpp"
 #include "palpate/map_builder.hpp"
 #include "recognition/filter_choice.hpp"
+#include "recognition/recognition_task.hpp"
 #include "shapes.hpp"
 #include "support/errors.hpp"
 #include "support/scratch_folder.hpp"
@@ -87,24 +86,20 @@ TEST(Resolve, AnOptionOfBoundsAsksForBounds) {
 }
 
 TEST(Resolve, ObjectsThatSlipAreFollowedByTheHistogramWhichIsSaidWhereBoundsWereDue) {
-  const auto said = [](const Request& request) {
-    const RecognitionTask task = task_of(request);
+  const auto said = [](FilterKind filter, int bins) {
+    const RecognitionTask task = task_of(changed([&](Request& r) {
+      r.slip_sd_deg = 2.0;
+      r.filter = filter;
+      r.bins = std::array{bins, bins, bins};
+    }));
     EXPECT_DOUBLE_EQ(std::get<HistogramOptions>(task.filter).slip_sd.rad,
                      2.0 * std::numbers::pi / 180.0);
-    return std::ranges::any_of(task.remarks, [](const std::string& remark) {
-      return remark.find("followed by the histogram") != remark.npos;
-    });
+    return testing::Value(task.remarks, testing::Contains(HasSubstr("followed by the histogram")));
   };
-  Request request = request_of_shapes();
-  request.slip_sd_deg = 2.0;
-  for (const FilterKind kind :
-       {FilterKind::automatic, FilterKind::bounded, FilterKind::histogram}) {
-    request.filter = kind;
-    EXPECT_EQ(said(request), kind == FilterKind::bounded);
-  }
-  request.filter = FilterKind::automatic;
-  request.bins = std::array{60, 60, 60};
-  EXPECT_TRUE(said(request));
+  EXPECT_FALSE(said(FilterKind::automatic, 5));
+  EXPECT_TRUE(said(FilterKind::bounded, 5));
+  EXPECT_FALSE(said(FilterKind::histogram, 5));
+  EXPECT_TRUE(said(FilterKind::automatic, 60));
 }
 
 TEST(Resolve, CountsThatWereSettledBeforeStand) {
@@ -117,16 +112,13 @@ TEST(Resolve, CountsThatWereSettledBeforeStand) {
 }
 
 TEST(Resolve, AWeightOfNoneOf0LeavesItOut) {
-  Request request = request_of_shapes();
-  request.none = 0.0;
-  for (const FilterKind filter : {FilterKind::automatic, FilterKind::particles}) {
-    request.filter = filter;
-    EXPECT_EQ(task_of(request).labels.size(), 2u);
-  }
   const OneFile scene("none: 0");
-  request.none = {};
-  request.scene = scene.path();
-  EXPECT_EQ(task_of(complete(request)).labels.size(), 2u);
+  for (const Request& request : {changed([](Request& r) { r.none = 0.0; }), changed([](Request& r) {
+                                   r.none = 0.0, r.filter = FilterKind::particles;
+                                 }),
+                                 changed([&](Request& r) { r.scene = scene.path(); })}) {
+    EXPECT_EQ(task_of(complete(request)).labels.size(), 2u);
+  }
 }
 
 TEST(Resolve, TouchesCountByPlaceButAsThePaperHasItAndWhereTheObjectSlips) {
@@ -194,22 +186,17 @@ TEST(Resolve, BinsOfALargeRegionResolveTheMapsWhereThePivotLiesAtATouch) {
 }
 
 TEST(Resolve, TouchesThatAreJudgedOtherwiseHaveNoScale) {
-  using Change = std::function<void(Request&)>;
-  const std::pair<const char*, Change> changes[] = {
-      {"gamma", [](Request& r) { r.gamma = 0.2; }},
-      {"prior", [](Request& r) { r.prior = 0.4; }},
-      {"threshold", [](Request& r) { r.threshold = 3.0; }},
-      {"ratio", [](Request& r) { r.ratio = 0.2; }},
-      {"touch_sd", [](Request& r) { r.touch_sd_mm = 1.0; }},
-      {"slip_sd", [](Request& r) { r.slip_sd_deg = 1.0; }},
-      {"particles", [](Request& r) { r.filter = FilterKind::particles; }},
-      {"bins", [](Request& r) {
-         r.bins = std::array{6, 5, 4};
-       }}};
-  for (const auto& [name, change] : changes) {
-    SCOPED_TRACE(name);
+  for (const auto& [option, text] : {std::pair{"gamma", "0.2"},
+                                     {"prior", "0.4"},
+                                     {"threshold", "3"},
+                                     {"ratio", "0.2"},
+                                     {"touch-sd-mm", "1"},
+                                     {"slip-sd-deg", "1"},
+                                     {"filter", "particles"},
+                                     {"bins", "6x5x4"}}) {
+    SCOPED_TRACE(option);
     Request request = request_of_learned();
-    change(request);
+    ASSERT_EQ(set_option(request, option_named(option), text), "");
     const RecognitionTask task = task_of(request);
     EXPECT_EQ(std::pair(task.fit_scale().mean, task.fit_scale().sd), std::pair(0.0, 1.0));
     // Poses have the map's errors always, and the readings' where these are judged as the map did.
@@ -234,39 +221,27 @@ TEST(Request, ASceneGivesWhatIsNotAsked) {
 }
 
 TEST(Request, ValuesThatCannotBeMeantAreRefusedByOption) {
-  using Change = std::function<void(Request&)>;
-  const std::pair<const char*, Change> cases[] = {
-      {"`bins 0x1x1`",
-       [](Request& r) {
-         r.bins = std::array{0, 1, 1};
-       }},
-      {"`x-mm 5:-5`",
-       [](Request& r) {
-         r.x_mm = {{5.0, -5.0}};
-       }},
-      {"full circle",
-       [](Request& r) {
-         r.theta_deg = {{0.0, 400.0}};
-       }},
-      {"`pivot-mm 1", [](Request& r) { r.pivot_mm = glm::dvec2(1e10, 0.0); }},
-      {"`gamma 1`", [](Request& r) { r.gamma = 1.0; }},
-      {"`none -1`", [](Request& r) { r.none = -1.0; }},
-      {"`touch-sd-mm 500`: wider than", [](Request& r) { r.touch_sd_mm = 500.0; }},
-      {"`act-below-mm 0`", [](Request& r) { r.act_below_mm = 0.0; }},
-      {"`act-above 1.5`", [](Request& r) { r.act_above = 1.5; }},
-      {"`filter particles`", [](Request& r) { r.particles = 10; }},
-      {"`tolerance`", [](Request& r) { r.slip_sd_deg = 2.0, r.tolerance = 1e-3; }},
-      {"`maps`: missing", [](Request& r) { r.given_maps.clear(); }}};
-  for (const auto& [named, change] : cases) {
-    EXPECT_THAT(refusal(changed(change)), HasSubstr(named));
-  }
+  const auto expect_refused = [](const char* named, const auto& change) {
+    EXPECT_THAT(refusal(complete(changed(change))), HasSubstr(named));
+  };
+  expect_refused("`bins 0x1x1`", [](Request& r) { r.bins = std::array<int, 3>{0, 1, 1}; });
+  expect_refused("`x-mm 5:-5`", [](Request& r) { r.x_mm = Range{5.0, -5.0}; });
+  expect_refused("full circle", [](Request& r) { r.theta_deg = Range{0.0, 400.0}; });
+  expect_refused("`pivot-mm 1", [](Request& r) { r.pivot_mm = glm::dvec2(1e10, 0.0); });
+  expect_refused("`gamma 1`", [](Request& r) { r.gamma = 1.0; });
+  expect_refused("`none -1`", [](Request& r) { r.none = -1.0; });
+  expect_refused("`touch-sd-mm 500`: wider", [](Request& r) { r.touch_sd_mm = 500.0; });
+  expect_refused("`act-below-mm 0`", [](Request& r) { r.act_below_mm = 0.0; });
+  expect_refused("`act-above 1.5`", [](Request& r) { r.act_above = 1.5; });
+  expect_refused("`filter particles`", [](Request& r) { r.particles = 10; });
+  expect_refused("`tolerance`", [](Request& r) { r.slip_sd_deg = 2.0, r.tolerance = 1e-3; });
+  expect_refused("`maps`: missing", [](Request& r) { r.given_maps.clear(); });
   const OneFile scene("{filter: bounded, slip_sd: {deg: 2}}");
-  EXPECT_THAT(refusal(complete(changed([&](Request& r) {
-                r.scene = scene.path();
-                r.filter = FilterKind::particles;
-                r.none = Automatic{};
-              }))),
-              HasSubstr("particles have no mean"));
+  expect_refused("particles have no mean", [&](Request& r) {
+    r.scene = scene.path();
+    r.filter = FilterKind::particles;
+    r.none = Automatic{};
+  });
 }
 
 TEST(RecognitionOptions, EveryOptionIsReadAsItWasWritten) {
@@ -329,6 +304,26 @@ TEST(RecognitionOptions, ATextThatCannotBeMeantLeavesTheOptionAsItWas) {
                                       {"gamma", "1"}}) {
     EXPECT_THROW(request_with({{option, wrong}}), Error) << option;
   }
+}
+
+TEST(RecognitionTask, NamesEachLabelOnceAndNoneLast) {
+  std::vector<Hypothesis> three = shapes();
+  three.push_back(three[0]);
+  const RecognitionTask known(three, HistogramOptions{});
+  EXPECT_EQ(known.labels, (std::vector<std::string>{"L", "disc"}));
+  EXPECT_EQ(known.label_of, (std::vector<std::size_t>{0, 1, 0}));
+  const RecognitionTask with_none(three, HistogramOptions{.none_weight = 2.0});
+  EXPECT_EQ(with_none.labels, (std::vector<std::string>{"L", "disc", "(none)"}));
+  const RecognitionTask bounded_with_none(three, BoundedOptions{.none_weight = 2.0});
+  EXPECT_EQ(bounded_with_none.labels, with_none.labels);
+}
+
+TEST(RecognitionTask, CountsBinsBeyondEveryInteger) {
+  constexpr int many = 2'000'000'000;
+  const PoseLattice lattice{
+      .x_mm = {.count = many}, .y_mm = {.count = many}, .theta_rad = {.count = many}};
+  const RecognitionTask task(shapes(), HistogramOptions{.lattice = lattice});
+  EXPECT_GT(task.bins_in_all(), 1'000'000'000'000'000'000);
 }
 
 }  // namespace palpate::resolve_test

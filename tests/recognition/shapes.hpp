@@ -37,14 +37,16 @@ RecognitionRecord recognised(const RecognitionTask& task, const Recording& recor
 RecognitionStep last_step(const RecognitionTask& task, const Recording& recording);
 
 /// Tests by each filter.
-class ByEveryFilter : public testing::TestWithParam<std::size_t> {
+class ByEveryFilter : public testing::TestWithParam<int> {
  protected:
   FilterOptions filter() const { return every_filter()[GetParam()]; }
   bool bounded() const { return std::holds_alternative<BoundedOptions>(filter()); }
 };
 
+inline const auto each_filter = testing::Range(0, 3);
+
 /// The name of the filter that a test is by.
-inline std::string filter_name(const testing::TestParamInfo<std::size_t>& test) {
+inline std::string filter_name(const testing::TestParamInfo<int>& test) {
   constexpr std::array names{"Histogram", "Particles", "Bounds"};
   return names.at(test.param);
 }

@@ -124,9 +124,9 @@ TEST(TouchPlaces, SayWhichTouchesAreWrittenAgainOrLieClose) {
       << places.words();
 }
 
-class TouchPlacesOf : public ByEveryFilter {};
+class TouchPlacesOfARecogniser : public ByEveryFilter {};
 
-TEST_P(TouchPlacesOf, ARecogniserMakeATouchThatIsWrittenAgainCountOnce) {
+TEST_P(TouchPlacesOfARecogniser, CountATouchThatIsWrittenAgainOnce) {
   const Recording recording = touched_letter(1);
   RecognitionTask task(shapes(), filter());
   const auto told = [&](std::size_t times) {
@@ -140,7 +140,6 @@ TEST_P(TouchPlacesOf, ARecogniserMakeATouchThatIsWrittenAgainCountOnce) {
   EXPECT_NEAR(told(9), once, 1e-9);
 }
 
-INSTANTIATE_TEST_SUITE_P(By, TouchPlacesOf, testing::Range(std::size_t{0}, std::size_t{3}),
-                         filter_name);
+INSTANTIATE_TEST_SUITE_P(By, TouchPlacesOfARecogniser, each_filter, filter_name);
 
 }  // namespace palpate::touch_places_test

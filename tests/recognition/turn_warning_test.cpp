@@ -9,7 +9,6 @@
 #include <glm/matrix.hpp>
 
 #include "letters.hpp"
-#include "palpate/rotational_symmetry.hpp"
 #include "recognition/warnings.hpp"
 #include "shapes.hpp"
 
@@ -19,19 +18,6 @@ using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
-
-TEST(MeasuredSymmetry, OfLearnedMapsIsTheShapes) {
-  // B, M, 8 and Q come close to a symmetry.
-  for (const auto& [shapes, n] : {std::pair{"BMQ8", 1}, {"HX", 2}}) {
-    for (const char shape : std::string(shapes)) {
-      EXPECT_EQ(measure_symmetry(learned_map({shape})).value().suggested, n) << shape;
-    }
-  }
-  for (const Hypothesis& letter : learned_letters()) {
-    EXPECT_EQ(measure_symmetry(letter.map).value().suggested, letter.map.symmetry)
-        << letter.map.label;
-  }
-}
 
 TEST(SymmetryTold, IsTheMapsUnlessTurnsWeighAsTheTemperatureHasThem) {
   OccupancyGrid map{.symmetry = 1, .suggested_symmetry = 2};
