@@ -20,23 +20,6 @@ RecognitionBins bins(int nx, int ny, int ntheta) {
           .auto_pivot = false};
 }
 
-TEST(SensorCalibration, LearnsWhatAFileHolds) {
-  SimulatedPresses simulated;
-  simulated.add_shapes(4, 31);
-  const SensorCalibration found = calibrate_sensor(
-      simulated.presses, {},
-      {.threshold = 2.0, .ratio = 0.3, .tables = {{MapLayer::log_odds, 2}}, .folds = 2});
-  found.sensor.validate();
-  EXPECT_EQ(found.objects, 2U);
-  ASSERT_TRUE(found.after.has_value());
-  EXPECT_EQ(found.after->records, 8U);
-  EXPECT_NEAR(found.after->accuracy(), 1.0, 1e-9);
-  EXPECT_LT(found.after->log_loss, 0.7) << "a guess's";
-  EXPECT_EQ(found.sensor.table->objects.size(), 2U);
-  EXPECT_TRUE(found.sensor.features.has_value());
-  EXPECT_TRUE(found.warnings.empty());
-}
-
 /// What a calibration of letters has to have, at poses that are known or not.
 void expect_complete(const SensorCalibration& found, std::size_t touches) {
   found.sensor.validate();
@@ -141,8 +124,9 @@ TEST(SensorCalibration, LearnsThePoseScaleOfGroupsThatWereLeftOut) {
   letters.make_presses(true);
   const auto map_sd_mm = [&] {
     double shown = 0.0;
-    const SensorCalibration found =
-        calibrate_sensor(letters.presses, {}, {}, [&](double fraction) { shown = fraction; });
+    const SensorCalibration found = calibrate_sensor(
+        letters.presses, {}, {.tables = {{MapLayer::log_odds, 2}}, .bins = bins(13, 13, 12)},
+        [&](double fraction) { shown = fraction; });
     EXPECT_NEAR(shown, 1.0, 1e-9) << "there are fewer days than folds";
     return found.sensor.pose_scale.value().map_sd_mm;
   };

@@ -172,7 +172,7 @@ TEST(SetupCheck, GivesNoneForTouchesThatNoSetupExplains) {
   for (const Recordings& recordings : {late, two}) {
     const SetupCheck found = check(recordings);
     EXPECT_THAT(only_finding(found, "unexplained").options, IsEmpty());
-    EXPECT_EQ(found.elements_mm, sound[0].elements_mm);
+    EXPECT_EQ(found.elements_mm, digitacts_array());
     EXPECT_GT(found.touches, 100u);
   }
 }

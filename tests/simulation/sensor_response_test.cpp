@@ -77,19 +77,6 @@ TEST(SensorResponse, WithoutPointSpreadIsTheCoveredPartOfTheElement) {
   }
 }
 
-TEST(SensorResponse, OnALargePolygonIsTheNominalPressureAndOffItZero) {
-  for (const double psf_mm : {0.0, 1.0}) {
-    Simulator simulator(rectangle({-40.0, -40.0}, {40.0, 40.0}), exact(psf_mm), digitacts_array(),
-                        1);
-    const Recording both = simulator.touch({{{3.0, -2.0}, 0.7}, {{70.0, 0.0}, 0.7}}, {});
-    for (std::size_t i = 0; i < both.elements(); ++i) {
-      // 1e-6 of 20 kPa lies beyond the point spread's reach of five deviations on either axis.
-      EXPECT_NEAR(both.touch(0).pressure[i], 20.0, 5e-5);
-      EXPECT_EQ(both.touch(1).pressure[i], 0.0);
-    }
-  }
-}
-
 TEST(SensorResponse, ConservesTheShapesArea) {
   // Elements that tile the plane see every part of the shape exactly once, blurred or not.
   const double element_mm = digitacts_element_mm;

@@ -137,11 +137,14 @@ TEST(Simulator, HandlesAShapeFarLargerThanTheGridsLimit) {
   const Shape wide{.label = "wide",
                    .strokes = {},
                    .polygons = {{{0.0, -1e4}, {3e4, -1e4}, {3e4, 1e4}, {0.0, 1e4}}}};
-  Simulator simulator(wide, {.force_spread = 0.0, .gain_spread = 0.0, .noise_kpa = 0.0},
-                      {{0.0, 0.0}}, 1);
-  const Recording r = simulator.touch({{{1.5e4, 0.0}, 0.0}, {{-200.0, 0.0}, 0.0}}, {});
-  EXPECT_NEAR(r.pressure[0], 20.0, 1e-4);  // up to the tails of the point spread
-  EXPECT_EQ(r.pressure[1], 0.0);
+  for (const double psf_mm : {0.0, 1.0}) {
+    const SensorModel model{
+        .psf_mm = psf_mm, .force_spread = 0.0, .gain_spread = 0.0, .noise_kpa = 0.0};
+    Simulator simulator(wide, model, {{0.0, 0.0}}, 1);
+    const Recording r = simulator.touch({{{1.5e4, 0.0}, 0.0}, {{-200.0, 0.0}, 0.0}}, {});
+    EXPECT_NEAR(r.pressure[0], 20.0, 5e-5);  // up to the tails of the point spread
+    EXPECT_EQ(r.pressure[1], 0.0);
+  }
 }
 
 TEST(Simulator, RefusesWhatItCannotSimulateNamingTheField) {
