@@ -39,10 +39,10 @@ TEST_P(LargestPacket, IsFoundBehindManyThatBeginLikeIt) {
   noise[0] = 1;  // out of step from here on
   receiver.push(noise);
   // In pieces, as a board with short packets delivers them.
-  for (std::size_t at = 0; at < packet.size(); at += 7) {
-    const auto begin = packet.begin() + static_cast<std::ptrdiff_t>(at);
-    receiver.push(Bytes(
-        begin, begin + static_cast<std::ptrdiff_t>(std::min<std::size_t>(7, packet.size() - at))));
+  for (std::span<const std::uint8_t> rest = packet; !rest.empty();) {
+    const std::size_t piece = std::min<std::size_t>(7, rest.size());
+    receiver.push(rest.first(piece));
+    rest = rest.subspan(piece);
   }
   ASSERT_EQ(receiver.frames().size(), 1u);
   EXPECT_EQ(receiver.frames()[0].values.back(), packet[1 + 3 * 16383]);
