@@ -62,7 +62,7 @@ void FakeTakktile::send_frame(int raw_pressure, int raw_temperature) {
       frame.push_back(static_cast<std::uint8_t>(raw << 6));
     }
   }
-  device_.send_message(frame);
+  device_.send(frame);
 }
 
 std::optional<Bytes> FakeTakktile::answer(const FakeUsbDevice::Setup& setup) {
@@ -82,16 +82,12 @@ std::optional<Bytes> FakeTakktile::answer(const FakeUsbDevice::Setup& setup) {
       }
       return map;
     }
-    case 0x6c:
+    case 0x6c: {
       // The MPL115A2's data sheet: a0 = 2009.75, b1 = -2.375854, b2 = -0.920471, c12 = 0.000790.
-      return Bytes{static_cast<std::uint8_t>(0x3e + recalibrations_),
-                   0xce,
-                   0xb3,
-                   0xf9,
-                   0xc5,
-                   0x17,
-                   0x33,
-                   0xc8};
+      Bytes calibration = {0x3e, 0xce, 0xb3, 0xf9, 0xc5, 0x17, 0x33, 0xc8};
+      calibration[0] = static_cast<std::uint8_t>(calibration[0] + recalibrations_);
+      return calibration;
+    }
     case 0xc7: {
       // TCC0.CTRLA = TC_CLKSEL_DIV256_gc & wIndex: the timer runs if a bit of 0x06 is set.
       constexpr int clock_by_256 = 0x06;

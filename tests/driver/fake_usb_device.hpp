@@ -12,6 +12,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -59,9 +60,17 @@ class FakeUsbDevice {
     std::uint16_t value = 0;
     std::uint16_t index = 0;
   };
+  struct Seen {
+    std::vector<Setup> requests;
+    int halts_cleared = 0;
+    std::size_t urbs_under_way = 0;
+    std::size_t waiting_packets = 0;  ///< that the host has not fetched yet
+    bool claimed = false;
+  };
   /// Answers a control request, from the thread that plays the kernel: with bytes for the host, or
   /// with nullopt for a stall.
   using Firmware = std::function<std::optional<Bytes>(const Setup& setup)>;
+  enum class Manner { answers, refuses, ignores };
   /// How a packet's turn on the bus ends, as the kernel reports it in the status of a URB.
   enum class Fault { none, stall, overflow, protocol };
 
@@ -80,32 +89,24 @@ class FakeUsbDevice {
   /// the device is plugged in again.
   void unplug();
 
-  /// Queues a packet of the bulk endpoint towards the host.
-  void send_packet(Bytes bytes);
-  /// Queues bytes as packets of 64 bytes and a last, shorter packet, which may be empty.
-  void send_message(const Bytes& bytes);
+  /// Queues bytes of the bulk endpoint towards the host, as packets of 64 bytes and, where they end
+  /// here, a last, shorter packet, which may be empty.
+  void send(std::span<const std::uint8_t> bytes, bool end = true);
   /// Makes the next turn on the bus end this way. A stall stays until the halt is cleared.
   void send_fault(Fault fault, int times = 1);
-  /// Refuses every control request by a stall, or never answers one.
-  void refuse_requests(bool refuse);
-  void ignore_requests(bool ignore);
+  /// Answers control requests, refuses each by a stall, or never answers one.
+  void behave(Manner manner);
   /// Lets only root open the device; nobody if the test is not run by root.
   void forbid();
-  /// Lets another program hold the interfaces.
+  /// Lets another program hold the interface.
   void occupy(bool occupied);
 
-  // What the host did.
-  std::vector<Setup> requests() const;
-  int halts_cleared() const;
-  int urbs_under_way() const;
-  bool claimed(int interface) const;
-  /// Number of packets that the host has not fetched yet.
-  std::size_t waiting_packets() const;
+  /// What the host did.
+  Seen seen() const;
 
   std::string node() const;
   std::string port() const;
   std::string syspath() const;
-  const Identity& identity() const { return identity_; }
 
  private:
   struct Unref {
@@ -151,7 +152,7 @@ class FakeUsbDevice {
   void run_control(Urb& urb);
   void run_bulk(Attachment& attachment);
   Attachment& last() const { return *attachments_.back(); }
-  void show_driver(int interface, const std::string& driver);
+  void queue(const std::vector<Turn>& turns);
 
   FakeUsb& usb_;
   int address_;
@@ -163,8 +164,7 @@ class FakeUsbDevice {
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   std::vector<std::unique_ptr<Attachment>> attachments_;  // earlier ones may still be open
-  bool refusing_ = false;
-  bool ignoring_ = false;
+  Manner manner_ = Manner::answers;
   bool occupied_ = false;
   std::deque<Turn> turns_;
   std::vector<Setup> requests_;

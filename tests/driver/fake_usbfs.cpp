@@ -98,7 +98,8 @@ int FakeUsbDevice::submit(UMockdevIoctlData* argument, Attachment& attachment) {
   }
   if (urb.fields().type == USBDEVFS_URB_TYPE_CONTROL) {
     run_control(urb);
-    (ignoring_ ? attachment.under_way : attachment.finished).push_back(std::move(urb));
+    (manner_ == Manner::ignores ? attachment.under_way : attachment.finished)
+        .push_back(std::move(urb));
   } else {
     attachment.under_way.push_back(std::move(urb));
   }
@@ -114,7 +115,7 @@ void FakeUsbDevice::run_control(Urb& urb) {
   constexpr std::size_t setup_bytes = 8;
   const std::size_t room = word(6);
   requests_.push_back(setup);
-  const std::optional<Bytes> reply = refusing_ || ignoring_ ? std::nullopt : firmware_(setup);
+  const std::optional<Bytes> reply = manner_ == Manner::answers ? firmware_(setup) : std::nullopt;
   if (!reply) {
     urb.status = -EPIPE;
     return;

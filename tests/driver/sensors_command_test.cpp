@@ -25,12 +25,9 @@ class SensorsCommand : public ProgramTest {
   FakeUsb usb_;
 };
 
-TEST_F(SensorsCommand, SaysThatNothingIsPluggedIn) {
+TEST_F(SensorsCommand, TellsBoardsFromOtherDevices) {
   EXPECT_EQ(done({"sensors"}), "no USB devices\n");
   EXPECT_EQ(json::parse(done({"sensors", "--json"})), json::array());
-}
-
-TEST_F(SensorsCommand, TellsBoardsFromOtherDevices) {
   FakeTakktile takktile(usb_, "0012", {0b11111, 0b111});
   const FakeSerialBoard tsf85(usb_, "", {}, 3);
   const FakeSerialBoard other(usb_, "B2", {.vendor = 0x2341, .product = 0x8036}, 4);
@@ -43,6 +40,9 @@ TEST_F(SensorsCommand, TellsBoardsFromOtherDevices) {
   EXPECT_EQ(boards[1]["name"], "tsf85:1-3") << "no serial number: named by its port";
   EXPECT_EQ(boards[1]["serial_port"], tsf85.node());
   EXPECT_EQ(boards[1]["elements"], 56);
+  EXPECT_EQ(boards[1]["rate_hz"], 100.0);
+  EXPECT_EQ(boards[1]["pressure_unit"], "raw");
+  EXPECT_EQ(boards[1]["usable"], true);
   EXPECT_EQ(boards[2]["usable"], false);
   EXPECT_EQ(boards[2]["name"], "");
 
@@ -80,17 +80,13 @@ TEST_F(SensorsCommand, RecordsASerialBoardUntilItIsUnplugged) {
   EXPECT_GT(std::stoi(frames[1]), sent / 4) << "what came is kept";
 }
 
-TEST_F(SensorsCommand, SaysWhyABoardCannotBeUsed) {
-  FakeTakktile board(usb_, "0012", {0b11111});
-  board.usb().refuse_requests(true);
-  EXPECT_THAT(done({"sensors"}), HasSubstr("     not usable: USB device 59e3:74c7 at 1-2: request "
-                                           "0x5C: it refuses the request"));
-}
-
-TEST_F(SensorsCommand, DoesNotPassOnWhatADeviceWouldSayToATerminal) {
+TEST_F(SensorsCommand, SaysWhyABoardCannotBeUsedAndNothingThatATerminalObeys) {
   FakeTakktile board(usb_, "\x1b[2J", {0b11111});
   EXPECT_THAT(done({"sensors"}), Not(HasSubstr("\x1b")));
   EXPECT_EQ(json::parse(done({"sensors", "--json"})).size(), 1U);
+  board.usb().behave(FakeUsbDevice::Manner::refuses);
+  EXPECT_THAT(done({"sensors"}), HasSubstr("     not usable: USB device 59e3:74c7 at 1-2: request "
+                                           "0x5C: it refuses the request"));
 }
 
 }  // namespace palpate::sensors_command_test
