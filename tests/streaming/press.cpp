@@ -39,8 +39,10 @@ std::vector<Frame> PressStream::frames(double seconds, const Pressures& pressure
 }
 
 std::vector<DetectedTouch> touches_in(const std::vector<Frame>& frames,
-                                      const TouchDetectorOptions& options) {
-  TouchDetector detector(options, {}, {});
+                                      const TouchDetectorOptions& options,
+                                      const std::vector<double>& baseline,
+                                      const std::vector<std::uint8_t>& valid) {
+  TouchDetector detector(options, baseline, valid);
   std::vector<DetectedTouch> touches;
   const auto take = [&](std::optional<DetectedTouch> touch) {
     if (touch) {

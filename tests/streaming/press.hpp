@@ -28,8 +28,10 @@ struct PressStream {
 
 inline constexpr double stream_begin_s = 1.7e9;
 
-/// The touches in a stream that begins untouched with nothing to subtract.
+/// The touches in a stream, and the one that is not over at its end.
 std::vector<DetectedTouch> touches_in(const std::vector<Frame>& frames,
-                                      const TouchDetectorOptions& options = {});
+                                      const TouchDetectorOptions& options = {},
+                                      const std::vector<double>& baseline = {},
+                                      const std::vector<std::uint8_t>& valid = {});
 
 }  // namespace palpate

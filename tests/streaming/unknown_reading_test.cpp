@@ -1,15 +1,11 @@
 // What a stream with readings that no element can have, or that are no numbers, makes of touches.
 
-#include <gtest/gtest.h>
-
 #include <cfloat>
 #include <cmath>
 
-#include "palpate/baseline.hpp"
 #include "palpate/touch_detector.hpp"
 #include "press.hpp"
 #include "support/limits.hpp"
-#include "support/scratch_folder.hpp"
 
 namespace palpate::unknown_reading_test {
 
@@ -70,37 +66,11 @@ TEST(UnknownReading, HugeReadingsLeaveNoTraceInLaterTouches) {
   }
 }
 
-TEST(UnknownReading, TouchesAreFoundByTheOthers) {
-  const std::vector<Frame> clean = PressStream{}.frames(8.0, presses);
-  const std::vector<DetectedTouch> expected = touches_in(clean);
-  ASSERT_EQ(expected.size(), 8u);
-  for (const double none : {nan, infinity, -infinity, 1e300}) {
-    std::vector<Frame> frames = clean;
-    for (std::size_t i = 0; i < frames.size(); ++i) {
-      frames[i].values[i % 4] = none;  // in every frame one
-    }
-    const std::vector<DetectedTouch> touches = touches_in(frames);
-    ASSERT_EQ(touches.size(), 8u) << none;
-    for (std::size_t i = 0; i < 8; ++i) {
-      EXPECT_EQ(touches[i].valid, std::vector<std::uint8_t>(4, 1));
-      for (std::size_t k = 0; k < 4; ++k) {
-        // Five standard errors of the interquartile mean, 0.3 / sqrt(0.84 * 25), of what is known.
-        EXPECT_NEAR(touches[i].pressure[k], pattern[k], 0.33);
-      }
-    }
-  }
-}
-
 TEST(UnknownReading, AnElementWithoutReadingsIsNotValidInTheTouch) {
   std::vector<Frame> frames = PressStream{}.frames(3.0, presses);
-  const auto in_second_press = [](const Frame& frame) {
-    const double t = frame.host_time_s - stream_begin_s;
-    return t > 1.2 && t < 2.0;
-  };
   for (Frame& frame : frames) {
-    if (in_second_press(frame)) {
-      frame.values[1] = nan;
-    }
+    const double t = frame.host_time_s - stream_begin_s;
+    frame.values[1] = t > 1.2 && t < 2.0 ? nan : frame.values[1];  // in the second press
   }
   const std::vector<DetectedTouch> touches = touches_in(frames);
   ASSERT_EQ(touches.size(), 3u);
@@ -127,18 +97,6 @@ TEST(UnknownReading, ThreeReadingsAreEnough) {
     EXPECT_EQ(touches[0].valid[1], known == 3 ? 1 : 0);
     EXPECT_EQ(touches[0].pressure[1], known == 3 ? 6.0 : 0.0);
   }
-}
-
-TEST(UnknownReading, DeadElementsAreNotValidInTouches) {
-  TouchDetector detector({}, {}, {1, 0, 1, 1});
-  std::optional<DetectedTouch> touch;
-  for (const Frame& frame : PressStream{}.frames(1.0, presses)) {
-    if (auto ended = detector.add(frame)) {
-      touch = ended;
-    }
-  }
-  ASSERT_TRUE(touch);
-  EXPECT_EQ(touch->valid, (std::vector<std::uint8_t>{1, 0, 1, 1}));
 }
 
 // Held for a moment at most: a press whose elements all go dark has an end.
@@ -198,7 +156,7 @@ TEST(UnknownReading, PosesThatNoRobotHasAreNotKnown) {
 }
 
 // An array that was pressed while its baseline was taken reads below it from then on.
-TEST(UnknownReading, BaselineFollowsWhatIsReadBelowItByTheOnsetAtMost) {
+TEST(TouchDetector, BaselineFollowsWhatIsReadBelowItByTheOnsetAtMost) {
   const auto below = [](double) { return std::vector<double>{-10.0}; };
   TouchDetector detector({.onset = 2.0}, {}, {});
   for (const Frame& frame : PressStream{.noise = 0.0}.frames(3.0, below)) {
@@ -209,7 +167,7 @@ TEST(UnknownReading, BaselineFollowsWhatIsReadBelowItByTheOnsetAtMost) {
 }
 
 // After finish() another stream may begin, at any time.
-TEST(UnknownReading, BaselineFollowsInAStreamOfEarlierTimes) {
+TEST(TouchDetector, BaselineFollowsInAStreamOfEarlierTimes) {
   TouchDetector detector({}, {}, {});
   const auto drifted = [](double) { return std::vector<double>{0.5}; };
   std::vector<Frame> frames = PressStream{.noise = 0.0}.frames(1.0, drifted);
@@ -226,27 +184,6 @@ TEST(UnknownReading, BaselineFollowsInAStreamOfEarlierTimes) {
   // over 0.05 s, whose frames are above the baseline of 0.02 s before: 1.02 of a second each.
   EXPECT_NEAR(once, 0.5 * (1.0 - std::exp(-1.0)), 6e-3);
   EXPECT_NEAR(detector.baseline()[0], 0.5 * (1.0 - std::exp(-2.0)), 6e-3);
-}
-
-TEST(UnknownReading, BaselinesBeyondFloat32AreRefused) {
-  expect_named(input_error([] { TouchDetector({}, {1e300}, {}); }), {"baseline", "float32"});
-  EXPECT_NO_THROW(TouchDetector({}, {nan, 1.0}, {0, 1})) << "a dead element may have none";
-}
-
-TEST(UnknownReading, TareIsTakenAndJudgedByTheKnownReadings) {
-  SensorDescription sensor;
-  sensor.elements_mm = {{0.0, 0.0}, {1.0, 0.0}};
-  auto frames = PressStream{}.frames(1.0, [](double t) {
-    return std::vector<double>{3.0, 3.0 + 5.0 * press(t, 0.3, 10.0)};
-  });
-  for (std::size_t i = 0; i < frames.size(); i += 2) {
-    frames[i].values = {infinity, nan};
-  }
-  expect_named(input_error([&] { baseline_of(frames, sensor, 2.0); }), {"touched", "element 1"});
-  // Five standard errors of the median, 1.25 * 0.3 / sqrt(50).
-  EXPECT_NEAR(baseline_of(frames, sensor, {})[0], 3.0, 0.27);
-  frames[7].values = {1.0};
-  expect_named(input_error([&] { baseline_of(frames, sensor, 2.0); }), {"1 values", "2 elements"});
 }
 
 }  // namespace palpate::unknown_reading_test
