@@ -9,8 +9,6 @@
 #include <utility>
 #include <vector>
 
-#include <gtest/gtest.h>
-
 #include "letters.hpp"
 
 namespace palpate::fork_test {
