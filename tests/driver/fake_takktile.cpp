@@ -30,7 +30,7 @@ FakeTakktile::FakeTakktile(FakeUsb& usb, const std::string& serial,
                            std::vector<std::uint8_t> alive_rows, Layout layout, int address)
     : alive_rows_(std::move(alive_rows)),
       layout_(layout),
-      device_(usb, address, /*port=*/address,
+      device_(usb, address,
               {.vendor = 0x59e3,
                .product = 0x74c7,
                .manufacturer = "TakkTile LLC",

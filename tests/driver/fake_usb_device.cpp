@@ -66,12 +66,16 @@ void FakeUsb::add(const std::string& description) {
   }
 }
 
-void FakeUsb::pass_on(const std::string& node) {
-  umockdev_testbed_detach_ioctl(testbed_, node.c_str(), nullptr);
+void FakeUsb::attach(const std::string& node, UMockdevIoctlBase* handler) {
   GError* error = nullptr;
-  if (!umockdev_testbed_attach_ioctl(testbed_, node.c_str(), kernel_, &error)) {
+  if (!umockdev_testbed_attach_ioctl(testbed_, node.c_str(), handler, &error)) {
     throw std::runtime_error(error->message);
   }
+}
+
+void FakeUsb::pass_on(const std::string& node) {
+  umockdev_testbed_detach_ioctl(testbed_, node.c_str(), nullptr);
+  attach(node, kernel_);
 }
 
 FakeUsb::~FakeUsb() {
@@ -86,11 +90,11 @@ std::string FakeUsb::root() const {
   return root;
 }
 
-FakeUsbDevice::FakeUsbDevice(FakeUsb& usb, int address, int port, Identity identity,
-                             Bytes configuration, Firmware firmware)
+FakeUsbDevice::FakeUsbDevice(FakeUsb& usb, int address, Identity identity, Bytes configuration,
+                             Firmware firmware)
     : usb_(usb),
       address_(address),
-      port_(port),
+      port_(address),
       identity_(std::move(identity)),
       configuration_(std::move(configuration)),
       firmware_(std::move(firmware)) {
@@ -133,15 +137,10 @@ void FakeUsbDevice::plug(int by) {
   attribute("product", identity_.product_name);
   attribute("serial", identity_.serial);
   // Comes before the device appears: a program that sees the device can open it.
-  GError* error = nullptr;
-  if (!umockdev_testbed_attach_ioctl(usb_.testbed(), node().c_str(), last().handler, &error)) {
-    throw std::runtime_error(error->message);
-  }
+  usb_.attach(node(), last().handler);
   usb_.add(text);
-  for (int interface = 0; interface < configuration_.at(4); ++interface) {
-    usb_.add(fmt::format("P: {}/{}:1.{}\nE: SUBSYSTEM=usb\nE: DEVTYPE=usb_interface\n", syspath(),
-                         port(), interface));
-  }
+  usb_.add(
+      fmt::format("P: {}/{}:1.0\nE: SUBSYSTEM=usb\nE: DEVTYPE=usb_interface\n", syspath(), port()));
 }
 
 void FakeUsbDevice::unplug() {
@@ -156,13 +155,10 @@ void FakeUsbDevice::unplug() {
       last().finished.push_back(std::move(urb));
     }
     last().under_way.clear();
-    last().claimed.clear();
+    last().claimed = false;
   }
   const std::string path = "/sys" + syspath();
-  for (int interface = 0; interface < configuration_.at(4); ++interface) {
-    umockdev_testbed_remove_device(usb_.testbed(),
-                                   fmt::format("{}/{}:1.{}", path, port(), interface).c_str());
-  }
+  umockdev_testbed_remove_device(usb_.testbed(), fmt::format("{}/{}:1.0", path, port()).c_str());
   umockdev_testbed_uevent(usb_.testbed(), path.c_str(), "remove");
   umockdev_testbed_remove_device(usb_.testbed(), path.c_str());
   umockdev_testbed_detach_ioctl(usb_.testbed(), node().c_str(), nullptr);
@@ -223,7 +219,7 @@ FakeUsbDevice::Seen FakeUsbDevice::seen() const {
           .halts_cleared = halts_cleared_,
           .urbs_under_way = last().under_way.size(),
           .waiting_packets = turns_.size(),
-          .claimed = last().claimed.contains(0)};
+          .claimed = last().claimed};
 }
 
 }  // namespace palpate

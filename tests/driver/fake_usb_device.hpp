@@ -3,12 +3,12 @@
 #include <linux/usbdevice_fs.h>
 #include <umockdev.h>
 
+#include <cerrno>
 #include <condition_variable>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <functional>
-#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -32,7 +32,8 @@ class FakeUsb {
   UMockdevTestbed* testbed() const { return testbed_; }
   /// Adds a device by its description, as umockdev-record writes it.
   void add(const std::string& description);
-  /// Lets the kernel answer the ioctls of this device file, instead of umockdev.
+  /// Lets a handler, or the kernel, answer the ioctls of this device file.
+  void attach(const std::string& node, UMockdevIoctlBase* handler);
   void pass_on(const std::string& node);
   std::string root() const;
 
@@ -71,11 +72,12 @@ class FakeUsbDevice {
   /// with nullopt for a stall.
   using Firmware = std::function<std::optional<Bytes>(const Setup& setup)>;
   enum class Manner { answers, refuses, ignores };
-  /// How a packet's turn on the bus ends, as the kernel reports it in the status of a URB.
-  enum class Fault { none, stall, overflow, protocol };
+  /// How a packet's turn on the bus ends: minus the status of the URB.
+  enum class Fault { none = 0, stall = EPIPE, overflow = EOVERFLOW, protocol = EPROTO };
 
+  /// @param address also the number of its port
   /// @param configuration the configuration descriptor and the descriptors behind it
-  FakeUsbDevice(FakeUsb& usb, int address, int port, Identity identity, Bytes configuration,
+  FakeUsbDevice(FakeUsb& usb, int address, Identity identity, Bytes configuration,
                 Firmware firmware);
   /// Sensors with submitted transfers must be stopped before: nobody would end the transfers.
   ~FakeUsbDevice();
@@ -138,14 +140,13 @@ class FakeUsbDevice {
     UMockdevIoctlBase* handler;
     bool plugged = true;
     bool halted = false;
-    std::map<int, UMockdevIoctlClient*> claimed = {};  // by which open file
+    bool claimed = false;
     std::deque<Urb> under_way = {};
     std::deque<Urb> finished = {};
   };
 
   static gboolean on_ioctl(UMockdevIoctlBase*, UMockdevIoctlClient* client, gpointer attachment);
   void handle(UMockdevIoctlClient* client, Attachment& attachment);
-  int take_interface(int interface, UMockdevIoctlClient* client, Attachment& attachment) const;
   int submit(UMockdevIoctlData* argument, Attachment& attachment);
   static int discard(UMockdevIoctlData* argument, Attachment& attachment);
   int reap(UMockdevIoctlData* argument, Attachment& attachment, std::unique_lock<std::mutex>& lock);

@@ -3,7 +3,6 @@
 #include <chrono>
 #include <functional>
 #include <string>
-#include <thread>
 
 #include "scale_and_add_kernel.hpp"
 #include "support/errors.hpp"
@@ -91,39 +90,6 @@ TEST(CommandStream, StagingMemoryDoesNotGrowWithWhatIsCopiedAndTimeIsTheDevices)
     EXPECT_LE(context.memory_use().peak, buffers + CommandStream::staging_bytes);
   }
   EXPECT_LE(context.memory_use().now, CommandStream::staging_bytes);
-}
-
-TEST(ThreadsOfStreams, GetTheirOwnResultsFromOneDevice) {
-  Context context("");
-  constexpr std::uint32_t threads = 6;
-  constexpr std::uint32_t repetitions = 20;
-  std::vector<std::uint32_t> wrong(threads, repetitions);
-  {
-    std::vector<std::jthread> running;
-    for (std::uint32_t thread = 0; thread < threads; ++thread) {
-      running.emplace_back([&context, thread, &wrong = wrong[thread]] {
-        CommandStream stream(context);
-        const ScaleAndAdd triple(context, 3);
-        const std::size_t n = thread < threads - 2 ? 65 : 30'000;
-        const Buffer a = words_buffer(context, n);
-        const Buffer b = words_buffer(context, n);
-        for (std::uint32_t repetition = 0; repetition < repetitions; ++repetition) {
-          std::uint32_t value = 1000 * thread + repetition;
-          Words words(n);
-          stream.fill(a, value);
-          for (std::uint32_t i = 0; i <= 2 * thread; ++i) {
-            triple.dispatch(stream, a, b, i);
-            triple.dispatch(stream, b, a, thread);
-            value = 3 * (3 * value + i) + thread;
-          }
-          stream.download(a, std::span(words));
-          stream.run();
-          wrong -= words == Words(n, value) ? 1 : 0;
-        }
-      });
-    }
-  }
-  EXPECT_EQ(wrong, std::vector<std::uint32_t>(threads, 0));
 }
 
 TEST(CommandStream, AnyValidationMessageFailsTheRun) {

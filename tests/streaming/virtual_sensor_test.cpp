@@ -7,7 +7,7 @@
 #include "palpate/baseline.hpp"
 #include "palpate/files.hpp"
 #include "palpate/simulation.hpp"
-#include "palpate/touch_detector.hpp"
+#include "press.hpp"
 #include "support/limits.hpp"
 #include "support/scratch_folder.hpp"
 
@@ -35,15 +35,7 @@ std::vector<DetectedTouch> touches_of(const std::string& name) {
   const auto sensor = open_virtual_sensor(name);
   const std::vector<Frame> frames = frames_of(*sensor);
   const std::span first = std::span(frames).first(frames.size() / 30);
-  TouchDetector detector({}, baseline_of(first, sensor->description(), 2.0), {});
-  std::vector<DetectedTouch> touches;
-  for (const Frame& frame : frames) {
-    if (auto touch = detector.add(frame)) {
-      touches.push_back(std::move(*touch));
-    }
-  }
-  EXPECT_FALSE(detector.finish()) << "the stream ends untouched";
-  return touches;
+  return touches_in(frames, {}, baseline_of(first, sensor->description(), 2.0));
 }
 
 TEST(SimulatedSensor, ThePressesAreFoundAsTheyWereMade) {
@@ -84,41 +76,33 @@ TEST(SimulatedSensor, ThePressesAreFoundAsTheyWereMade) {
   EXPECT_EQ(found, touches.size());
 }
 
-TEST(SimulatedSensor, HasTheArrayThatIsAskedFor) {
-  const auto sensor = open_virtual_sensor("simulate:E,array=3:2:1.5,touches=2,speed=max");
-  const std::vector<glm::dvec2> expected = {{-1.5, -0.75}, {0.0, -0.75}, {1.5, -0.75},
-                                            {-1.5, 0.75},  {0.0, 0.75},  {1.5, 0.75}};
-  EXPECT_EQ(sensor->description().elements_mm, expected);
-  sensor->start();
-  const std::optional<Frame> frame = sensor->next(0ms);
-  ASSERT_TRUE(frame);
-  EXPECT_EQ(frame->values.size(), 6u);
-}
-
 TEST(SimulatedSensor, SameSeedGivesTheSameStream) {
-  const auto values = [](const std::string& name) {
-    std::vector<double> all;
-    for (const Frame& frame : frames_of(name)) {
-      all.insert(all.end(), frame.values.begin(), frame.values.end());
-    }
+  const auto values = [](const std::vector<Frame>& frames) {
+    std::vector<std::vector<double>> all;
+    std::ranges::transform(frames, std::back_inserter(all), &Frame::values);
     return all;
   };
   const std::string name = "simulate:A,touches=2,speed=max";
-  EXPECT_EQ(values(name), values(name));
-  EXPECT_EQ(values(name), values(name + ",seed=1"));
-  EXPECT_NE(values(name), values(name + ",seed=2"));
   const auto sensor = open_virtual_sensor(name);
-  EXPECT_EQ(frames_of(*sensor)[77].values, frames_of(*sensor)[77].values) << "start() begins anew";
+  const auto first = values(frames_of(*sensor));
+  EXPECT_EQ(values(frames_of(*sensor)), first) << "start() begins anew";
+  EXPECT_EQ(values(frames_of(name + ",seed=1")), first);
+  EXPECT_NE(values(frames_of(name + ",seed=2")), first);
 }
 
-TEST(SimulatedSensor, FramesComeAtTheRate) {
-  const auto sensor = open_virtual_sensor("simulate:A,touches=1,rate=250,speed=max");
+TEST(SimulatedSensor, HasTheArrayAndTheRateThatAreAskedFor) {
+  const auto sensor = open_virtual_sensor("simulate:A,array=3:2:1.5,touches=1,rate=250,speed=max");
+  EXPECT_EQ(
+      sensor->description().elements_mm,
+      (std::vector<glm::dvec2>{
+          {-1.5, -0.75}, {0.0, -0.75}, {1.5, -0.75}, {-1.5, 0.75}, {0.0, 0.75}, {1.5, 0.75}}));
   EXPECT_EQ(sensor->description().rate_hz, 250.0);
   EXPECT_EQ(sensor->description().object, "A");
   EXPECT_FALSE(sensor->description().truth);
   const std::vector<Frame> frames = frames_of(*sensor);
   // 1 s of hovering, 1 s of pressing, 0.6 s until the end; the first and the last frame count.
   ASSERT_EQ(frames.size(), 651u);
+  EXPECT_EQ(frames[0].values.size(), 6u);
   for (std::size_t i = 1; i < frames.size(); ++i) {
     // A double holds times since 1970 to 2.4e-7 s.
     EXPECT_NEAR(frames[i].host_time_s - frames[i - 1].host_time_s, 0.004, 1e-6);

@@ -20,6 +20,15 @@ class Receiver {
 
   void push(std::span<const std::uint8_t> bytes) { deframer_->push(bytes, frames_); }
   void send(const std::vector<SentFrame>& sent) { push(stream_of(sent)); }
+  /// Pushes pieces of as many bytes as `size` says, as transfers deliver them.
+  template <class Size>
+  void push_in_pieces(std::span<const std::uint8_t> bytes, const Size& size) {
+    while (!bytes.empty()) {
+      const std::size_t piece = std::min<std::size_t>(bytes.size(), size());
+      push(bytes.first(piece));
+      bytes = bytes.subspan(piece);
+    }
+  }
 
   /// Whether the frames [begin, end) came in order, perhaps among other frames.
   bool has(const std::vector<SentFrame>& sent, std::size_t begin, std::size_t end) const {
