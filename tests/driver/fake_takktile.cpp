@@ -2,6 +2,10 @@
 
 #include <bit>
 
+#include <gtest/gtest.h>
+
+#include "streamed.hpp"
+
 namespace palpate {
 
 namespace {
@@ -24,6 +28,20 @@ double expected_kpa(int raw_pressure, int raw_temperature, int recalibrations) {
   const double compensated =
       2009.75 + 32.0 * recalibrations + (-2.375854 + 0.000790 * t) * p - 0.920471 * t;
   return 50.0 + compensated * 65.0 / 1023.0;
+}
+
+std::vector<Frame> expect_frames(Sensor& sensor, std::size_t cells, int first_raw,
+                                 std::size_t count, int recalibrations) {
+  std::vector<Frame> frames = take(sensor, count);
+  EXPECT_EQ(frames.size(), count);
+  for (const Frame& frame : frames) {
+    EXPECT_EQ(frame.values.size(), cells);
+    for (const double value : frame.values) {
+      EXPECT_NEAR(value, expected_kpa(first_raw, 512, recalibrations), kpa_tolerance);
+    }
+    ++first_raw;
+  }
+  return frames;
 }
 
 FakeTakktile::FakeTakktile(FakeUsb& usb, const std::string& serial,

@@ -31,8 +31,11 @@ TEST_F(SensorsCommand, TellsBoardsFromOtherDevices) {
   FakeTakktile takktile(usb_, "0012", {0b11111, 0b111});
   const FakeSerialBoard tsf85(usb_, "", {}, 3);
   const FakeSerialBoard other(usb_, "B2", {.vendor = 0x2341, .product = 0x8036}, 4);
+  const FakeSerialBoard without_driver(usb_, "A1", {}, 5, /*has_driver=*/false);
+  const unsigned baud_before = tsf85.port().baud();
   const json boards = json::parse(done({"sensors", "--json"}));
-  ASSERT_EQ(boards.size(), 3U);
+  ASSERT_EQ(boards.size(), 4U);
+  EXPECT_EQ(tsf85.port().baud(), baud_before) << "opening it could restart the board";
   EXPECT_EQ(boards[0], json::parse(R"({
     "name": "takktile:0012", "bus": 1, "address": 2, "vendor": "59e3", "product": "74c7",
     "manufacturer": "TakkTile LLC", "product_name": "TakkTile USB", "serial": "0012",
@@ -45,6 +48,10 @@ TEST_F(SensorsCommand, TellsBoardsFromOtherDevices) {
   EXPECT_EQ(boards[1]["usable"], true);
   EXPECT_EQ(boards[2]["usable"], false);
   EXPECT_EQ(boards[2]["name"], "");
+  EXPECT_THAT(boards[2]["reason"], HasSubstr("PROFILE:/dev/ttyUSB4"));
+  EXPECT_EQ(boards[3]["name"], "tsf85:A1");
+  EXPECT_EQ(boards[3]["usable"], false);
+  EXPECT_THAT(boards[3]["reason"], HasSubstr("modprobe"));
 
   const std::string text = done({"sensors"});
   EXPECT_THAT(text, HasSubstr("* 59e3:74c7  takktile:0012\n"

@@ -61,23 +61,6 @@ class SerialBoards : public testing::Test {
   std::mt19937 random_{20260721};
 };
 
-TEST_F(SerialBoards, AreListedByTheirIdsAndNotOpened) {
-  const FakeSerialBoard known(usb_, "A1", {});
-  const FakeSerialBoard unknown(usb_, "B2", some_chip, 3);
-  const FakeSerialBoard without_driver(usb_, "", {}, 4, /*has_driver=*/false);
-  const unsigned baud_before = known.port().baud();
-  const std::vector<BoardInfo> boards = list_boards();
-  ASSERT_EQ(boards.size(), 3U);
-  EXPECT_EQ(boards[0].name, "tsf85:A1");
-  EXPECT_TRUE(boards[0].usable) << boards[0].reason;
-  EXPECT_EQ(known.port().baud(), baud_before) << "opening it could restart the board";
-  EXPECT_FALSE(boards[1].usable);
-  expect_named(boards[1].reason, {"PROFILE:/dev/ttyUSB3"});
-  EXPECT_EQ(boards[2].name, "tsf85:1-4") << "no serial number: named by its port";
-  EXPECT_FALSE(boards[2].usable);
-  expect_named(boards[2].reason, {"modprobe"});
-}
-
 TEST_F(SerialBoards, SetTheLineAndSayStartAndStop) {
   const FakeSerialBoard board(usb_, "A1", {});
   const auto sensor = open_board("tsf85");

@@ -61,16 +61,10 @@ TEST_F(Takktile, FramesCarryCalibratedPressureInOrder) {
     for (int i = 0; i < count; ++i) {
       board.send_frame(i);
     }
-    const std::vector<Frame> frames = take(*sensor, count);
-    ASSERT_EQ(frames.size(), std::size_t{count});
-    for (int i = 0; i < count; ++i) {
-      ASSERT_EQ(static_cast<int>(frames[i].values.size()), board.cells());
-      for (const double value : frames[i].values) {
-        ASSERT_NEAR(value, expected_kpa(i), kpa_tolerance) << i;
-      }
-      ASSERT_EQ(frames[i].lost_before, 0U);
-      ASSERT_GT(frames[i].host_time_s, 1.7e9) << "seconds since the Unix epoch";
-      ASSERT_GE(frames[i].host_time_s, frames[i > 0 ? i - 1 : 0].host_time_s);
+    double before_s = 1.7e9;  // since the Unix epoch
+    for (const Frame& frame : expect_frames(*sensor, board.cells(), 0, count)) {
+      ASSERT_EQ(frame.lost_before, 0U);
+      ASSERT_GE(frame.host_time_s, std::exchange(before_s, frame.host_time_s));
     }
     sensor->stop();
     EXPECT_FALSE(board.streaming());
