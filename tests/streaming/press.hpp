@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <random>
+#include <span>
 #include <vector>
 
 #include "palpate/touch_detector.hpp"
@@ -33,5 +34,9 @@ std::vector<DetectedTouch> touches_in(const std::vector<Frame>& frames,
                                       const TouchDetectorOptions& options = {},
                                       const std::vector<double>& baseline = {},
                                       const std::vector<std::uint8_t>& valid = {});
+
+/// Expects the same touches, their pressure times `scale`.
+void expect_same(std::span<const DetectedTouch> touches, std::span<const DetectedTouch> expected,
+                 double scale = 1.0);
 
 }  // namespace palpate

@@ -77,6 +77,7 @@ TEST(TouchDetector, NoiseOfItsFirstFramesIsNoTouch) {
 TEST(TouchDetector, ScalesWithTheUnit) {
   std::vector<Frame> frames = PressStream{}.frames(3.0, presses);
   const std::vector<DetectedTouch> kpa = touches_in(frames);
+  ASSERT_EQ(kpa.size(), 3u);
   constexpr double counts_per_kpa = 64.0;  // a power of two: the same digits
   for (Frame& frame : frames) {
     for (double& value : frame.values) {
@@ -86,15 +87,7 @@ TEST(TouchDetector, ScalesWithTheUnit) {
   TouchDetectorOptions options;
   options.onset *= counts_per_kpa;
   options.release *= counts_per_kpa;
-  const std::vector<DetectedTouch> raw = touches_in(frames, options);
-  ASSERT_EQ(raw.size(), kpa.size());
-  for (std::size_t i = 0; i < raw.size(); ++i) {
-    EXPECT_EQ(raw[i].begin_s, kpa[i].begin_s);
-    EXPECT_EQ(raw[i].frames, kpa[i].frames);
-    for (std::size_t k = 0; k < pattern.size(); ++k) {
-      EXPECT_EQ(raw[i].pressure[k], counts_per_kpa * kpa[i].pressure[k]);
-    }
-  }
+  expect_same(touches_in(frames, options), kpa, counts_per_kpa);
 }
 
 TEST(TouchDetector, LightTouchOfOneElementIsOne) {
@@ -196,22 +189,29 @@ TEST(TouchDetector, DeadElementsTakeNoPart) {
   EXPECT_EQ(touches[0].valid, (std::vector<std::uint8_t>{1, 1, 0, 1}));
 }
 
-TEST(TouchDetector, PoseIsTheMeanAcrossTheTurn) {
-  std::vector<Frame> frames = PressStream{}.frames(1.0, presses);
-  for (std::size_t i = 0; i < frames.size(); ++i) {
-    const double sign = i % 2 == 0 ? 1.0 : -1.0;
-    if (i % 4 < 2) {  // half of the frames have none
-      frames[i].T_robot_sensor = Pose{{5.0 + 0.1 * sign, -2.0}, sign * (std::numbers::pi - 0.01)};
+TEST(TouchDetector, PoseIsTheMeanOfThoseKnownAcrossTheTurn) {
+  // Half of the frames have no pose, or one that no robot has.
+  for (const std::optional<Pose>& none : {std::optional<Pose>(),
+                                          {Pose{{nan, 0.0}, 0.0}},
+                                          {Pose{{0.0, 1.7e308}, 0.0}},
+                                          {Pose{{0.0, 0.0}, infinity}},
+                                          {Pose{{-1.7e308, 0.0}, 0.0}}}) {
+    std::vector<Frame> frames = PressStream{}.frames(1.0, presses);
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      const double sign = i % 2 == 0 ? 1.0 : -1.0;
+      const Pose known{{5.0 + 0.1 * sign, -2.0}, sign * (std::numbers::pi - 0.01)};
+      frames[i].T_robot_sensor = i % 4 < 2 ? known : none;
     }
+    const auto touches = touches_in(frames);
+    ASSERT_EQ(touches.size(), 1u);
+    ASSERT_TRUE(touches[0].T_robot_sensor);
+    const Pose& pose = *touches[0].T_robot_sensor;
+    // At worst one frame more of one sign than of the other.
+    EXPECT_NEAR(pose.translation_mm.x, 5.0, 0.011);
+    EXPECT_NEAR(pose.translation_mm.y, -2.0, 1e-9);
+    EXPECT_NEAR(std::abs(wrap_angle(pose.theta_rad, 2 * std::numbers::pi)), std::numbers::pi,
+                0.002);
   }
-  const auto touches = touches_in(frames);
-  ASSERT_EQ(touches.size(), 1u);
-  ASSERT_TRUE(touches[0].T_robot_sensor);
-  const Pose& pose = *touches[0].T_robot_sensor;
-  // At worst one frame more of one sign than of the other.
-  EXPECT_NEAR(pose.translation_mm.x, 5.0, 0.011);
-  EXPECT_NEAR(pose.translation_mm.y, -2.0, 1e-9);
-  EXPECT_NEAR(std::abs(wrap_angle(pose.theta_rad, 2 * std::numbers::pi)), std::numbers::pi, 0.002);
 }
 
 TEST(TouchDetector, OfASlideTheLongestRestCounts) {

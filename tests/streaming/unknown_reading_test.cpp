@@ -12,14 +12,6 @@ namespace palpate::unknown_reading_test {
 const std::vector<double> pattern = {20.0, 6.0, 0.0, 3.0};
 const Pressures presses = presses_of(pattern);
 
-void expect_same(const DetectedTouch& touch, const DetectedTouch& expected) {
-  EXPECT_EQ(touch.begin_s, expected.begin_s);
-  EXPECT_EQ(touch.end_s, expected.end_s);
-  EXPECT_EQ(touch.frames, expected.frames);
-  EXPECT_EQ(touch.pressure, expected.pressure);
-  EXPECT_EQ(touch.valid, expected.valid);
-}
-
 TEST(UnknownReading, IsWhatFloat32DoesNotHold) {
   EXPECT_TRUE(is_known(0.0));
   EXPECT_TRUE(is_known(-1e38));
@@ -48,17 +40,15 @@ TEST(UnknownReading, HugeReadingsLeaveNoTraceInLaterTouches) {
         frames[first].values[0] = frames[first + 1].values[0] = wrong;
         const std::vector<DetectedTouch> touches = touches_in(frames, options);
         ASSERT_GE(touches.size(), 29u);
-        const std::size_t spoilt = touches.size() - 29;  // what became of the first press
+        const std::span others = std::span(touches).last(29);  // than the first press
+        if (drift_s == 0.0) {
+          expect_same(others, std::span(expected).last(29));
+        }
         for (std::size_t i = 0; i < 29; ++i) {
-          const DetectedTouch& touch = touches[spoilt + i];
-          if (drift_s == 0.0) {
-            expect_same(touch, expected[1 + i]);
-          } else {
-            for (std::size_t k = 0; k < pattern.size(); ++k) {
-              // The baseline follows 8 frames of at most the onset with a time constant of 1 s, and
-              // not the noise of 0.15 that they hide: 8 * 0.01 * (2 + 0.15).
-              EXPECT_NEAR(touch.pressure[k], expected[1 + i].pressure[k], 0.18);
-            }
+          for (std::size_t k = 0; k < pattern.size(); ++k) {
+            // The baseline follows 8 frames of at most the onset with a time constant of 1 s, and
+            // not the noise of 0.15 that they hide: 8 * 0.01 * (2 + 0.15).
+            EXPECT_NEAR(others[i].pressure[k], expected[1 + i].pressure[k], 0.18);
           }
         }
       }
@@ -66,36 +56,26 @@ TEST(UnknownReading, HugeReadingsLeaveNoTraceInLaterTouches) {
   }
 }
 
-TEST(UnknownReading, AnElementWithoutReadingsIsNotValidInTheTouch) {
-  std::vector<Frame> frames = PressStream{}.frames(3.0, presses);
-  for (Frame& frame : frames) {
-    const double t = frame.host_time_s - stream_begin_s;
-    frame.values[1] = t > 1.2 && t < 2.0 ? nan : frame.values[1];  // in the second press
-  }
-  const std::vector<DetectedTouch> touches = touches_in(frames);
-  ASSERT_EQ(touches.size(), 3u);
-  EXPECT_EQ(touches[0].valid, (std::vector<std::uint8_t>{1, 1, 1, 1}));
-  EXPECT_EQ(touches[1].valid, (std::vector<std::uint8_t>{1, 0, 1, 1}));
-  EXPECT_EQ(touches[1].pressure[1], 0.0);
-  EXPECT_NEAR(touches[1].pressure[0], 20.0, 0.33);
-  EXPECT_EQ(touches[2].valid, (std::vector<std::uint8_t>{1, 1, 1, 1}));
-}
-
 // Three known readings are the fewest that one wrong reading does not decide.
-TEST(UnknownReading, ThreeReadingsAreEnough) {
-  for (const std::size_t known : {2u, 3u}) {
-    std::vector<Frame> frames = PressStream{.noise = 0.0}.frames(1.0, presses);
+TEST(UnknownReading, AnElementOfFewerThanThreeReadingsIsNotValidInTheTouch) {
+  for (const std::size_t known : {0u, 2u, 3u}) {
+    SCOPED_TRACE(known);
+    std::vector<Frame> frames = PressStream{.noise = 0.0}.frames(3.0, presses);
     std::size_t count = 0;
     for (Frame& frame : frames) {
       const double t = frame.host_time_s - stream_begin_s;
-      if (t < 0.45 || ++count > known) {
+      if (t < 1.0 && (t < 0.45 || ++count > known)) {  // in the first press
         frame.values[1] = nan;
       }
     }
     const std::vector<DetectedTouch> touches = touches_in(frames);
-    ASSERT_EQ(touches.size(), 1u);
-    EXPECT_EQ(touches[0].valid[1], known == 3 ? 1 : 0);
-    EXPECT_EQ(touches[0].pressure[1], known == 3 ? 6.0 : 0.0);
+    ASSERT_EQ(touches.size(), 3u);
+    for (const std::size_t i : {0u, 1u, 2u}) {
+      const bool valid = i > 0 || known == 3;
+      EXPECT_EQ(touches[i].valid, (std::vector<std::uint8_t>{1, valid, 1, 1}));
+      EXPECT_NEAR(touches[i].pressure[0], 20.0, 0.33);
+      EXPECT_NEAR(touches[i].pressure[1], valid ? 6.0 : 0.0, valid ? 0.33 : 0.0);
+    }
   }
 }
 
@@ -131,28 +111,7 @@ TEST(UnknownReading, FramesThatSayNothingArePassedOver) {
     timeless.host_time_s = i % 16 == 1 ? nan : infinity;
     frames.insert(frames.begin() + static_cast<std::ptrdiff_t>(i), {none, timeless});
   }
-  const std::vector<DetectedTouch> touches = touches_in(frames);
-  ASSERT_EQ(touches.size(), expected.size());
-  for (std::size_t i = 0; i < touches.size(); ++i) {
-    expect_same(touches[i], expected[i]);
-  }
-}
-
-TEST(UnknownReading, PosesThatNoRobotHasAreNotKnown) {
-  for (const Pose& wrong : {Pose{{nan, 0.0}, 0.0}, Pose{{0.0, 1.7e308}, 0.0},
-                            Pose{{0.0, 0.0}, infinity}, Pose{{-1.7e308, 0.0}, 0.0}}) {
-    std::vector<Frame> frames = PressStream{}.frames(1.0, presses);
-    for (std::size_t i = 0; i < frames.size(); ++i) {
-      frames[i].T_robot_sensor = i % 3 == 0 ? wrong : Pose{{4.0, 5.0}, 0.5};
-    }
-    const std::vector<DetectedTouch> touches = touches_in(frames);
-    ASSERT_EQ(touches.size(), 1u);
-    ASSERT_TRUE(touches[0].T_robot_sensor);
-    // The mean of about 25 numbers that are the same, but for rounding.
-    EXPECT_NEAR(touches[0].T_robot_sensor->translation_mm.x, 4.0, 1e-12);
-    EXPECT_NEAR(touches[0].T_robot_sensor->translation_mm.y, 5.0, 1e-12);
-    EXPECT_NEAR(touches[0].T_robot_sensor->theta_rad, 0.5, 1e-12);
-  }
+  expect_same(touches_in(frames), expected);
 }
 
 // An array that was pressed while its baseline was taken reads below it from then on.
