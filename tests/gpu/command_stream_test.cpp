@@ -44,6 +44,7 @@ TEST(CommandStream, ALongChainOfDispatchesTakesSeveralDescriptorPools) {
   Context context("");
   CommandStream stream(context);
   stream.run();  // nothing, which is allowed
+  stream.run();
   const ScaleAndAdd copy(context, 1);
   const Buffer a = words_buffer(context, 65);
   const Buffer b = words_buffer(context, 65);

@@ -309,6 +309,18 @@ TEST_F(PoseFifo, FrameWaitsForThePoseAfterItForAMoment) {
   EXPECT_EQ(sensor_->poses().without, 1u);
 }
 
+TEST_F(PoseFifo, OutlivesItsWriters) {
+  for (const int i : {0, 1}) {
+    ::close(fifo_);
+    EXPECT_FALSE(sensor_->next(0ms)) << "nobody writes";
+    fifo_ = ::open(path_.c_str(), O_WRONLY | O_NONBLOCK);
+    tell(lines(i, i + 1));
+  }
+  EXPECT_EQ(sensor_->poses().read, 2u);
+  add_frames(0, 1);
+  EXPECT_EQ(posed_frames(*sensor_), 1u);
+}
+
 // Neither lines that never end nor lines that never stop keep next() from returning.
 TEST_F(PoseFifo, AFloodIsReadInPieces) {
   ASSERT_GE(::fcntl(fifo_, F_SETPIPE_SZ, 1 << 17), 1 << 17);

@@ -131,12 +131,12 @@ TEST(RestFinder, APressLongerThanTheWindowIsSaid) {
 
 TEST(RestFinder, AnUntouchedArrayHasNoTouchWhateverItsRestDoes) {
   const auto sliding = [](double t) { return 30.0 * std::sin(t / 900.0); };
-  std::vector<Frame> frames = PressStream{.rate_hz = 10.0, .noise = 0.3}.frames(
-      1800.0, [&](double t) { return std::vector<double>(4, 50.0 + sliding(t)); });
+  std::vector<Frame> frames = PressStream{.rate_hz = 20.0, .noise = 0.3}.frames(
+      3600.0, [&](double t) { return std::vector<double>(4, 50.0 + sliding(t)); });
   const Rest rest = rest_of(frames);
   EXPECT_TRUE(touches_above(rest, frames).empty());
   std::vector<double> at;
-  for (const double t : {0.0, 10.0, 900.0, 1799.0}) {
+  for (const double t : {0.0, 10.0, 1800.0, 3599.0}) {
     rest.at(t, at);
     EXPECT_NEAR(at[0], 50.0 + sliding(t), 0.4) << t;
   }
