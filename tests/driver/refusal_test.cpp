@@ -114,7 +114,7 @@ TEST_F(Refusal, NamesThatAreNoBoardOrSeveralAreTheUsersMistake) {
   expect_named(refusal(Fault::input, "no/such.yaml:1"), {"no/such.yaml: "});
 }
 
-TEST_F(Refusal, ABoardThatRefusesItsRequestsOrDoesNotAnswer) {
+TEST_F(Refusal, ABoardThatRefusesItsRequestsDoesNotAnswerOrHasNoCells) {
   FakeTakktile board(usb_, "1", {0b11111});
   board.usb().behave(FakeUsbDevice::Manner::refuses);
   expect_named(refusal(Fault::system), {"0x5C", "refuses"});
@@ -122,10 +122,8 @@ TEST_F(Refusal, ABoardThatRefusesItsRequestsOrDoesNotAnswer) {
   board.usb().behave(FakeUsbDevice::Manner::ignores);
   expect_named(refusal(Fault::system), {"does not answer"});
   EXPECT_EQ(board.usb().seen().urbs_under_way, 0U);
-}
-
-TEST_F(Refusal, ABoardWithoutCells) {
-  FakeTakktile board(usb_, "1", {});
+  board.usb().behave(FakeUsbDevice::Manner::answers);
+  board.replace_cells({});
   refusal(Fault::system);
   EXPECT_FALSE(list_boards().at(0).usable);
 }

@@ -88,23 +88,6 @@ TEST_F(SerialBoards, TakeEveryBaudRate) {
   }
 }
 
-TEST_F(SerialBoards, PassEveryByteOnAsItIs) {
-  const FakePort port(usb_);
-  const std::string path = own_profile(
-      "{name: Mine, elements: [{grid: [256, 1], pitch_mm: [1, 1]}],"
-      " packet: [bytes: aa55aa55aa55, values: u8]}");
-  const auto sensor = open_board(path + ":" + port.node());
-  sensor->start();
-  SentFrame sent{.bytes = {0xaa, 0x55, 0xaa, 0x55, 0xaa, 0x55}, .values = {}};
-  for (int i = 0; i < 256; ++i) {
-    sent.bytes.push_back(static_cast<std::uint8_t>(i));
-    sent.values.push_back(i);
-  }
-  port.send(sent.bytes);
-  port.send(sent.bytes);  // a marker counts once another marker follows one packet later
-  expect_values(*sensor, {sent});
-}
-
 // More bytes than the kernel keeps: reads cut the frames anywhere.
 TEST_F(SerialBoards, StreamWithoutALoss) {
   const FakeSerialBoard board(usb_, "A1", {});
@@ -117,6 +100,7 @@ TEST_F(SerialBoards, StreamWithoutALoss) {
   EXPECT_EQ(sensor->counters().garbage_bytes, 0U);
 }
 
+// Their frames hold every byte, also those that a terminal would take for itself.
 TEST_F(SerialBoards, WithoutAnIdOfTheirOwnAreNamedBySerialPortOrPath) {
   const FakeSerialBoard board(usb_, "B2", some_chip);
   expect_refused(Fault::input, "flexitac", {"flexitac", "serial number, port or device file"});
