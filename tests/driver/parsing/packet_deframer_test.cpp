@@ -1,10 +1,13 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <random>
 
 #include "driver/serial_profile.hpp"
 #include "receiver.hpp"
 #include "sent_frame.hpp"
+#include "support/trials.hpp"
 
 namespace palpate::packet_deframer_test {
 
@@ -52,6 +55,40 @@ TEST_P(ShippedBoard, StreamMayBeginAnywhere) {
     receiver.push(std::span(stream).subspan(begin));
     ASSERT_TRUE(receiver.has(sent, 2, 4)) << "from " << begin;
     ASSERT_EQ(receiver.strangers(sent), 0) << "from " << begin;
+  }
+}
+
+// None may crash or read out of bounds, which the sanitizers watch.
+TEST_P(ShippedBoard, IsInStepTwoFramesAfterDamage) {
+  Receiver receiver(profile_);
+  // To make a frame takes longer than to parse it.
+  const std::vector<SentFrame> pool = random_frames(board_, 300, random_);
+  for (int trial = 0; trial < trials(1500); ++trial) {
+    const auto first = pool.begin() + static_cast<std::ptrdiff_t>(random_() % (pool.size() - 8));
+    const std::vector<SentFrame> sent(first, first + 8);
+    std::vector<SentFrame> damaged = sent;
+    const bool between_frames = trial % (kinds_of_damage + 1) == kinds_of_damage;
+    const Bytes garbage = random_bytes(between_frames ? 1 + random_() % 300 : 0, random_);
+    if (between_frames) {
+      damaged[3].bytes.insert(damaged[3].bytes.begin(), garbage.begin(), garbage.end());
+    } else {
+      damage(damaged[3].bytes, static_cast<Damage>(trial % (kinds_of_damage + 1)), random_);
+    }
+    receiver.clear();
+    const std::uint64_t garbage_before = receiver.garbage();
+    const Bytes stream = stream_of(damaged);
+    receiver.push_in_pieces(stream, [&] { return 1 + random_() % 200; });
+    SCOPED_TRACE(trial);
+    for (const ParsedFrame& frame : receiver.frames()) {
+      ASSERT_EQ(frame.values.size(), profile_.elements_mm.size());
+      ASSERT_TRUE(std::ranges::none_of(frame.values, [](double v) { return std::isinf(v); }));
+    }
+    ASSERT_TRUE(receiver.has(sent, 0, 3));
+    ASSERT_TRUE(receiver.has(sent, 5, 8));
+    // Without a checksum, the damaged frame and one more may have wrong values.
+    ASSERT_LE(receiver.strangers(sent), between_frames || board_ == "wts" ? 0 : 2);
+    ASSERT_GE(receiver.garbage() - garbage_before, garbage.size());
+    ASSERT_LE(receiver.garbage() - garbage_before, stream.size());
   }
 }
 

@@ -123,6 +123,38 @@ Bytes random_bytes(std::size_t count, std::mt19937& random) {
   return bytes;
 }
 
+void damage(Bytes& bytes, Damage kind, std::mt19937& random) {
+  const auto place = [&] {
+    return bytes.begin() + static_cast<std::ptrdiff_t>(random() % (bytes.size() + 1));
+  };
+  const auto [from, to] = std::minmax({place(), place()});
+  switch (kind) {
+    case Damage::bits_flip:
+      for (unsigned flips = 1 + random() % 8; flips > 0 && !bytes.empty(); --flips) {
+        bytes[random() % bytes.size()] ^= static_cast<std::uint8_t>(1u << random() % 8);
+      }
+      break;
+    case Damage::end_lost:
+      bytes.erase(from, bytes.end());
+      break;
+    case Damage::middle_lost:
+      bytes.erase(from, to);
+      break;
+    case Damage::others_between: {
+      const Bytes more = random_bytes(random() % 70, random);
+      bytes.insert(from, more.begin(), more.end());
+      break;
+    }
+    case Damage::some_twice: {
+      const Bytes again(from, to);
+      bytes.insert(to, again.begin(), again.end());
+      break;
+    }
+    case Damage::all_random:
+      bytes = random_bytes(random() % 80, random);
+  }
+}
+
 Bytes stream_of(const std::vector<SentFrame>& frames) {
   Bytes bytes;
   for (const SentFrame& frame : frames) {

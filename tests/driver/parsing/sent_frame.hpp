@@ -28,6 +28,12 @@ Bytes wts_packet(std::uint8_t id, const Bytes& payload);
 
 Bytes random_bytes(std::size_t count, std::mt19937& random);
 
+enum class Damage { bits_flip, end_lost, middle_lost, others_between, some_twice, all_random };
+constexpr int kinds_of_damage = 6;
+
+/// Damages bytes as a line or a board may damage them.
+void damage(Bytes& bytes, Damage kind, std::mt19937& random);
+
 /// The bytes of all frames, in order.
 Bytes stream_of(const std::vector<SentFrame>& frames);
 

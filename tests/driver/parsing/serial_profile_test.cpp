@@ -1,9 +1,11 @@
 #include "driver/serial_profile.hpp"
 
-#include <gtest/gtest.h>
+#include <sstream>
 
+#include "receiver.hpp"
 #include "support/host_locale.hpp"
 #include "support/scratch_folder.hpp"
+#include "support/trials.hpp"
 
 namespace palpate::serial_profile_test {
 
@@ -191,6 +193,63 @@ TEST_F(ProfileFile, WholeNumbersAreDecimalOrHexadecimal) {
   for (const char* number : {"0115200", "0x1c200"}) {
     EXPECT_EQ(read(head + "line: {baud: " + number + "}\n" + packet).line.baud, 115200u);
   }
+}
+
+// Lines of the shipped profiles, changed and put together at random.
+TEST(MutatedProfile, IsReadOrRefusedInOneLine) {
+  std::mt19937 random(61);
+  const std::vector<std::string> boards = shipped_profiles();
+  std::vector<std::string> texts;
+  std::vector<std::string> lines;
+  for (const std::string& name : boards) {
+    std::istringstream file(bytes_of(read_serial_profile(name).path));
+    texts.emplace_back();
+    for (std::string line; std::getline(file, line);) {
+      if (!line.starts_with('#') && !line.empty()) {  // comments would only take time
+        lines.push_back(line + "\n");
+        texts.back() += lines.back();
+      }
+    }
+  }
+  const std::vector<std::string> words = {
+      "0",  "-1",  "65536",  "1e308", ".nan",  "u16le",   "[",  "]",         "{",  "}",
+      "*a", "&a ", "tag: 0", "aa",    "bytes", "most: 1", "? ", "!!binary ", "\t", "\xff"};
+  int read = 0;
+  for (int trial = 0; trial < trials(2000); ++trial) {
+    std::string text = texts[random() % texts.size()];
+    for (unsigned edits = random() % 4 == 0 ? 3 : 1; edits > 0; --edits) {
+      const std::size_t at = random() % (text.size() + 1);
+      const std::size_t next_line = text.find('\n', at);
+      switch (random() % 3) {
+        case 0:
+          text.insert(next_line == std::string::npos ? at : next_line + 1,
+                      lines[random() % lines.size()]);
+          break;
+        case 1:
+          text.erase(at, random() % 30);
+          break;
+        default:
+          text.replace(at, random() % 6, words[random() % words.size()]);
+      }
+    }
+    try {
+      const SerialProfile profile = parse_serial_profile(text, "mutated.yaml");
+      Receiver receiver(profile);
+      for (int i = 0; i < 4; ++i) {
+        receiver.send({random_frame(boards[random() % boards.size()], random)});
+      }
+      for (const ParsedFrame& frame : receiver.frames()) {
+        ASSERT_EQ(frame.values.size(), profile.elements_mm.size());
+      }
+      ++read;
+    } catch (const Error& error) {
+      ASSERT_EQ(error.fault(), Fault::input);
+      const std::string message = error.what();
+      ASSERT_TRUE(message.starts_with("mutated.yaml: line ")) << message << "\n" << text;
+      ASSERT_EQ(message.find('\n'), std::string::npos) << message;
+    }
+  }
+  EXPECT_GT(read, trials(2000) / 16) << "too few get as far as a deframer";
 }
 
 }  // namespace palpate::serial_profile_test

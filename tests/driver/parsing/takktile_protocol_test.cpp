@@ -1,12 +1,10 @@
 #include "driver/takktile_protocol.hpp"
 
-#include <gtest/gtest.h>
-
+#include "sent_frame.hpp"
 #include "support/errors.hpp"
+#include "support/trials.hpp"
 
 namespace palpate::takktile::takktile_protocol_test {
-
-using Bytes = std::vector<std::uint8_t>;
 
 TEST(TakkTileAliveMap, HasABitPerColumnOrInTheForkAByteForEachCell) {
   const std::vector<Cell> cells = {{1, 0}, {1, 2}, {1, 4}, {7, 3}};
@@ -107,7 +105,10 @@ class TakkTileFrames : public testing::TestWithParam<std::size_t> {
  protected:
   void push(const std::vector<Bytes>& packets) {
     for (const Bytes& packet : packets) {
+      const std::size_t before = frames_.size();
       deframer_.push(packet, frames_);
+      pushed_bytes_ += packet.size();
+      framed_bytes_ += (frames_.size() - before) * 4 * cells_;
     }
   }
   void expect_frame(std::size_t index, std::uint16_t first) {
@@ -123,6 +124,8 @@ class TakkTileFrames : public testing::TestWithParam<std::size_t> {
   const std::size_t cells_ = GetParam();
   Deframer deframer_{std::vector<Calibration>(cells_, plain)};
   std::vector<ParsedFrame> frames_;
+  std::uint64_t pushed_bytes_ = 0;
+  std::uint64_t framed_bytes_ = 0;
 };
 
 TEST_P(TakkTileFrames, EndWithAShortOrAnEmptyPacket) {
@@ -150,6 +153,29 @@ TEST_P(TakkTileFrames, ThatLoseAPacketAreDropped) {
     ASSERT_EQ(frames_.size(), 1u) << "not in step two frames after";
     expect_frame(0, 300);
   }
+}
+
+TEST_P(TakkTileFrames, AreNeverHalfBehindForeignPackets) {
+  std::mt19937 random(59);
+  for (int trial = 0; trial < trials(500); ++trial) {
+    for (unsigned foreign = random() % 4; foreign > 0; --foreign) {
+      Bytes packet = random_bytes(packet_bytes, random);
+      damage(packet, static_cast<Damage>(random() % kinds_of_damage), random);
+      push({packet});
+    }
+    push(packets_of(cells_, 50));
+    push(packets_of(cells_, 55));
+    for (const ParsedFrame& frame : frames_) {
+      ASSERT_EQ(frame.values.size(), cells_);
+    }
+    frames_.clear();
+    push(packets_of(cells_, 60));
+    ASSERT_EQ(frames_.size(), 1u);
+    expect_frame(0, 60);
+    ASSERT_EQ(deframer_.counters().garbage_bytes + framed_bytes_, pushed_bytes_);
+    frames_.clear();
+  }
+  EXPECT_EQ(deframer_.counters().checksum_errors, 0u);
 }
 
 TEST_P(TakkTileFrames, BeginAnewAfterReset) {
