@@ -8,6 +8,7 @@
 
 #include "palpate/map_builder.hpp"
 #include "palpate/pose_histogram.hpp"
+#include "support/certified.hpp"
 #include "support/sanitized.hpp"
 #include "support/synthetic.hpp"
 
@@ -39,21 +40,29 @@ class HardCase {
   /// Expects the error to be allowed, and keeps each quantity's largest error.
   void expect(const std::string& quantity, double error, double allowed);
 
-  /// Runs a histogram over the touches and expects finite results that agree with float64: every
-  /// bin, the posterior near its top, identity, mode, marginals and their sums.
-  Estimate expect_posterior(Device& device, std::span<const Hypothesis> objects,
-                            const HistogramOptions& options, std::span<const Touch> touches,
-                            Allowed allowed = {});
-  /// As expect_posterior() for `times` repetitions of the touches, which float64 sums once.
-  Estimate expect_posterior_of_repeated(Device& device, std::span<const Hypothesis> objects,
-                                        const HistogramOptions& options,
-                                        std::span<const Touch> touches, int times, Allowed allowed);
+  /// The device of the case, opened where one is asked for.
+  Device& device();
+
+  /// Runs a histogram over the touches, so many times, and expects finite results that agree with
+  /// float64, which sums them once: every bin, the posterior near its top, identity, mode,
+  /// marginals and their sums.
+  Estimate expect_posterior(std::span<const Hypothesis> objects, const HistogramOptions& options,
+                            std::span<const Touch> touches, Allowed allowed = {}, int times = 1);
+
+  /// Expects the laws of a posterior by bounds, see palpate::expect_laws(), and its answers to be
+  /// the tolerance away from float64 at most.
+  /// @param nats what rounding may add to a log-likelihood
+  /// @returns what was seen after the last touch
+  Certified expect_laws(std::span<const Hypothesis> objects, const BoundedOptions& options,
+                        const Recording& recording, double nats = 1e-9);
+  /// As a histogram of these options has them.
+  Certified expect_laws(std::span<const Hypothesis> objects, const HistogramOptions& options,
+                        const Recording& recording, double nats = 1e-9);
 
   /// Expects a map's cell within MapBuilder's promise: 1e-3 nats or a relative 1e-4.
   void expect_cell(double log_odds, double expected);
   /// Builds a map of the touches and expects finite cells that agree with float64.
-  OccupancyGrid expect_map(Device& device, std::span<const Touch> touches,
-                           const MapOptions& options);
+  OccupancyGrid expect_map(std::span<const Touch> touches, const MapOptions& options);
 
  private:
   struct Largest {
@@ -68,10 +77,14 @@ class HardCase {
   std::string risk_;
   std::string bound_;
   std::map<std::string, Largest> largest_;
+  std::optional<Device> device_;
 };
 
 /// Whether all numbers are finite.
 bool all_finite(std::span<const double> numbers);
+bool is_finite(const Pose& pose);
+/// Expects finite numbers and no negative variance.
+void expect_finite(const RefinedPose& refined);
 
 /// The sum of the numbers.
 double total(std::span<const double> numbers);

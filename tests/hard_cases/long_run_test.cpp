@@ -42,11 +42,10 @@ TEST(LongRun, TenThousandTouchesInARow) {
                 "the top");
   const std::vector<Hypothesis> objects = near_twins();
   const Recording recording = random_recording(most_touches, 100, 403);
-  Device device = Device::open();
   // Four rows take register tiles, one row takes runs of bins. float64 takes long for every theta.
   for (const int rows : {4, 1}) {
     const Estimate estimate =
-        hard.expect_posterior(device, objects, near_the_top(rows, 1), all_touches(recording),
+        hard.expect_posterior(objects, near_the_top(rows, 1), all_touches(recording),
                               long_run(most_touches, 0.01, 1e-3));  // 2.5e-3 seen
     EXPECT_LT(estimate.mode.log_likelihood, -100.0 * most_touches) << "the case is not hard enough";
     EXPECT_GT(estimate.identity[0], 1e-6) << "no longer near the top";
@@ -61,12 +60,32 @@ TEST(LongRun, TheSameTouchTenThousandTimes) {
   const std::vector<Hypothesis> objects = near_twins();
   const Recording recording = random_recording(1, 36, 404);
   std::vector<Touch> touches(100, recording.touch(0));
-  Device device = Device::open();
   for (const int rows : {4, 1}) {
-    hard.expect_posterior_of_repeated(device, objects, near_the_top(rows), touches,
-                                      most_touches / 100,
-                                      long_run(most_touches, 0.05, 1e-2));  // 1.8e-2 seen
+    hard.expect_posterior(objects, near_the_top(rows), touches,
+                          long_run(most_touches, 0.05, 1e-2),  // 1.8e-2 seen
+                          most_touches / 100);
   }
+}
+
+TEST(LongRun, TheSameTouchAThousandTimesByBounds) {
+  HardCase hard("bounds: the same touch 1,000 times",
+                "penalties add up to a million nats; the mass shrinks to one bin",
+                "integers widen; leaves sum in float64");
+  const std::vector<Hypothesis> objects = two_objects(6.0, 879);
+  const Recording recording = random_recording(1, 24, 880);
+  const BoundedOptions options{.lattice = {{-5.0, 5.0, 9}, {-5.0, 5.0, 8}, {0, two_pi, 7}, {}}};
+  reference::Posterior truth = reference_posterior(objects, options, all_touches(recording));
+  for (std::vector<double>& logs : truth.log_likelihood) {
+    for (double& l : logs) {
+      l *= 1000.0;
+    }
+  }
+  BoundedPosterior posterior(objects, options);
+  posterior.update(std::vector(1000, recording.touch(0)));
+  // 24,000 elements of 1e-15 and some 1e4 nats of 16 digits.
+  const Certified seen = expect_certified(posterior, objects, options, truth, 1e-6);
+  hard.expect("total variation", seen.total_variation, options.tolerance + 2e-6);
+  hard.expect("certificate", seen.estimate.certificate->dropped_mass, options.tolerance);
 }
 
 }  // namespace palpate::long_run_test

@@ -25,20 +25,16 @@ Estimate expect_sound(const ParticleFilter& filter, int particles) {
   std::vector<double> weights;
   for (const ParticleFilter::Particle& particle : filter.particles()) {
     weights.push_back(particle.weight);
-    const auto& [translation_mm, theta_rad] = particle.T_object_robot;
-    EXPECT_TRUE(all_finite(std::vector{translation_mm.x, translation_mm.y, theta_rad}));
+    EXPECT_TRUE(is_finite(particle.T_object_robot));
   }
-  EXPECT_TRUE(all_finite(weights));
   EXPECT_NEAR(total(weights), 1.0, 1e-12);
   const double effective = filter.effective_sample_size();
   EXPECT_GE(effective, 1.0);
   EXPECT_LE(effective, particles);
   Estimate estimate = filter.estimate();
-  EXPECT_TRUE(all_finite(estimate.identity));
   EXPECT_NEAR(total(estimate.identity), 1.0, 1e-12);
   EXPECT_TRUE(std::isfinite(estimate.mode.log_likelihood));
-  EXPECT_TRUE(std::isfinite(estimate.mode.T_object_robot.theta_rad));
-  EXPECT_TRUE(std::isfinite(estimate.mode.T_object_robot.translation_mm.x));
+  EXPECT_TRUE(is_finite(estimate.mode.T_object_robot));
   return estimate;
 }
 
@@ -70,9 +66,8 @@ Estimate expect_weights(HardCase& hard, ParticleFilter& filter, const Touch& tou
 
 bool all_weigh_the_same(const ParticleFilter& filter) {
   const auto particles = filter.particles();
-  return std::all_of(particles.begin(), particles.end(), [&](const auto& particle) {
-    return particle.weight == particles.front().weight;
-  });
+  return std::ranges::all_of(
+      particles, [&](const auto& one) { return one.weight == particles.front().weight; });
 }
 
 TEST(Particles, OfTouchesThatSayNothing) {
@@ -81,8 +76,7 @@ TEST(Particles, OfTouchesThatSayNothing) {
                 "equal bits; a touch without a known element moves particles only");
   const std::vector<Hypothesis> objects = two_objects();
   const ParticleOptions options = two_thousand();
-  Device device = Device::open();
-  ParticleFilter filter(device, objects, options);
+  ParticleFilter filter(hard.device(), objects, options);
   Recording unknown = random_recording(5, 36, 504);
   unknown.pressure.assign(unknown.pressure.size(), options.contact.classifier.threshold);
   filter.update(all_touches(unknown));
@@ -104,11 +98,10 @@ TEST(Particles, OfIdenticalObjectsAndOfOneParticle) {
   const OccupancyGrid map = random_map(31, 27, 0.5, 4.0, 506);
   const std::vector<Hypothesis> objects{{map, 1.0}, {map, 1.0}};
   const Recording recording = random_recording(3, 36, 507);
-  Device device = Device::open();
   for (const int particles : {2000, 1}) {
     ParticleOptions options = two_thousand();
     options.particles = particles;
-    ParticleFilter filter(device, objects, options);
+    ParticleFilter filter(hard.device(), objects, options);
     for (const Touch& touch : all_touches(recording)) {
       const Estimate estimate = expect_weights(hard, filter, touch, objects, options);
       if (particles == 1) {
@@ -128,8 +121,7 @@ TEST(Particles, FarFromTheRobotsOrigin) {
   options.region.pivot_mm = {1e6, -1e6};
   options.region.theta_rad = {1e6 * two_pi, 1e6 * two_pi + two_pi, 1};
   const Recording recording = moved(random_recording(3, 36, 508), {{1e6, -1e6}, 0.0});
-  Device device = Device::open();
-  ParticleFilter filter(device, objects, options);
+  ParticleFilter filter(hard.device(), objects, options);
   for (const Touch& touch : all_touches(recording)) {
     const Estimate estimate = expect_weights(hard, filter, touch, objects, options);
     EXPECT_NE(estimate.identity[0], 0.5) << "off the map";
@@ -147,12 +139,11 @@ TEST(Particles, OfCertainMapsWithoutGamma) {
     }
   }
   const Recording recording = random_recording(3, 36, 509);
-  Device device = Device::open();
   for (const bool augmented : {false, true}) {
     ParticleOptions options = two_thousand();
     options.contact.gamma = 0.0;
     options.augmented = augmented;
-    ParticleFilter filter(device, objects, options);
+    ParticleFilter filter(hard.device(), objects, options);
     for (const Touch& touch : all_touches(recording)) {
       expect_weights(hard, filter, touch, objects, options, 5e-3);
       EXPECT_TRUE(filter.estimate().contradicted);
@@ -166,12 +157,11 @@ TEST(Particles, OfExtremelyUnequalWeights) {
                 "shares are rounded to whole particles, relative to the largest weight");
   std::vector<Hypothesis> objects = two_objects();
   const Recording recording = random_recording(2, 36, 510);
-  Device device = Device::open();
   const ParticleOptions options = two_thousand();
   const auto first_identity = [&](double first, double second) {
     objects[0].weight = first;
     objects[1].weight = second;
-    ParticleFilter filter(device, objects, options);
+    ParticleFilter filter(hard.device(), objects, options);
     const double identity = filter.estimate().identity[0];
     for (const Touch& touch : all_touches(recording)) {
       expect_weights(hard, filter, touch, objects, options);

@@ -3,18 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <iterator>
 
 #include "support/touched_shape.hpp"
 
 namespace palpate {
 
 namespace {
-
-template <typename Choices>
-auto one_of(Uniform& random, const Choices& choices) {
-  return choices[static_cast<std::size_t>(random(0.0, static_cast<double>(std::size(choices))))];
-}
 
 /// Bins about a place of the map's, in mm.
 Axis random_axis(Uniform& random, double cell_mm, double middle_mm) {

@@ -1,5 +1,4 @@
-// What a bounded posterior tells of its belief: entropy, memory, and within other tolerances; and
-// beliefs that are flat.
+// A belief within other tolerances than the options', and one that is flat.
 
 #include <chrono>
 #include <cmath>
@@ -10,34 +9,8 @@
 #include <gtest/gtest.h>
 
 #include "bounded_set_up.hpp"
-#include "palpate/error.hpp"
-#include "palpate/pose_histogram.hpp"
-#include "support/certified.hpp"
-#include "support/touched_shape.hpp"
 
 namespace palpate::bounded_belief_test {
-
-TEST(BoundedBelief, HasTheEntropyOfTheDenseOne) {
-  Device device = Device::open();
-  for (const bool none : {false, true}) {
-    BoundedOptions options = small_options();
-    HistogramOptions dense_options{.lattice = options.lattice};
-    if (none) {
-      options.none_weight = dense_options.none_weight = 5.0;
-    }
-    BoundedPosterior bounded(two_shapes(), options);
-    PoseHistogram dense(device, two_shapes(), dense_options);
-    const Recording recording = touches_of_l(4, 821);
-    for (std::size_t n = 0; n <= recording.size(); ++n) {
-      if (n > 0) {
-        bounded.update(recording.touch(n - 1));
-        dense.update(recording.touch(n - 1));
-      }
-      // The dense one's own promise, and a millionth of the mass times the log of the bins.
-      EXPECT_NEAR(bounded.entropy(), dense.entropy(), 1e-3 + 1e-4) << n << " touches";
-    }
-  }
-}
 
 TEST(BoundedBelief, IsFoundWithinAnotherToleranceUntilTheNextTouch) {
   const Recording recording = touches_of_l(2, 825);
@@ -66,9 +39,6 @@ TEST(BoundedBelief, IsFoundWithinAnotherToleranceUntilTheNextTouch) {
   cancels = true;
   EXPECT_EQ(posterior.estimate(0.1).identity, wide.identity);
   EXPECT_EQ(posterior.sample(10, 826).size(), 10U);
-  for (const double tolerance : {0.0, 1.0, std::nan("")}) {
-    EXPECT_THROW(posterior.estimate(tolerance), Error) << tolerance;
-  }
   EXPECT_THROW(posterior.estimate(), std::runtime_error);
   EXPECT_EQ(posterior.entropy(), wide_entropy) << "the belief stays as it was";
   cancels = false;
@@ -91,13 +61,13 @@ TEST(BoundedBelief, IsFoundWithinAnotherToleranceUntilTheNextTouch) {
 }
 
 TEST(BoundedBelief, IsKnownNoWorseAfterAnotherSearchThatABudgetEnds) {
-  constexpr std::chrono::milliseconds budget(100);
+  constexpr std::chrono::milliseconds budget(50);
   bool slow = false;
   BoundedOptions options = small_options();
   options.budget_s = std::chrono::duration<double>(budget).count();
   options.cancel_point = [&] {
     if (slow) {
-      std::this_thread::sleep_for(budget);
+      std::this_thread::sleep_for(budget);  // so that the search ends after its first step
     }
   };
   BoundedPosterior posterior(two_shapes(), options);
@@ -108,33 +78,19 @@ TEST(BoundedBelief, IsKnownNoWorseAfterAnotherSearchThatABudgetEnds) {
 }
 
 TEST(BoundedBelief, OfAHundredMillionBinsBeforeAnyTouchIsFlat) {
-  BoundedOptions options;
-  options.lattice = {
-      .x_mm = {-50.0, 50.0, 600}, .y_mm = {-50.0, 50.0, 500}, .theta_rad = {0, two_pi, 180}};
-  BoundedPosterior posterior(two_shapes(), options);
+  const BoundedOptions options{
+      .lattice = {{-50.0, 50.0, 600}, {-50.0, 50.0, 500}, {0, two_pi, 180}, {}}};
+  const BoundedPosterior posterior(two_shapes(), options);
   const Estimate estimate = posterior.estimate();
   EXPECT_NEAR(estimate.identity[0], 1.0 / 3.0, 1e-6);
   EXPECT_EQ(estimate.mode.log_likelihood, 0.0);
   EXPECT_LE(estimate.certificate->dropped_mass, options.tolerance);
-  const PoseLattice grid{
-      .x_mm = {-50.0, 50.0, 2}, .y_mm = {-50.0, 50.0, 2}, .theta_rad = {0, two_pi, 3}};
+  const PoseLattice grid{{-50.0, 50.0, 2}, {-50.0, 50.0, 2}, {0, two_pi, 3}, {}};
   const Marginals marginals = posterior.marginals(1, grid);
-  for (const double p : marginals.xy) {
-    EXPECT_NEAR(p, 2.0 / 3.0 / 4.0, 1e-6);
-  }
-  for (const double p : marginals.theta) {
-    EXPECT_NEAR(p, 2.0 / 3.0 / 3.0, 1e-6);
-  }
+  EXPECT_LE(largest_difference(marginals.xy, std::vector<double>(4, 2.0 / 3.0 / 4.0)), 1e-6);
+  EXPECT_LE(largest_difference(marginals.theta, std::vector<double>(3, 2.0 / 3.0 / 3.0)), 1e-6);
   // What is promised for a thousand million bins.
   EXPECT_LE(posterior.host_bytes(), std::uint64_t{256} << 20);
-}
-
-TEST(BoundedBelief, SaysHowItWasFound) {
-  BoundedPosterior posterior(two_shapes(), small_options());
-  EXPECT_FALSE(posterior.path().empty());
-  EXPECT_EQ(posterior.path().find('\n'), std::string::npos);
-  EXPECT_GT(posterior.host_bytes(), 0U);
-  EXPECT_EQ(posterior.lattice().bins(), small_options().lattice.bins());
 }
 
 }  // namespace palpate::bounded_belief_test

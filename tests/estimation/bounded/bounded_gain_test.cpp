@@ -8,8 +8,6 @@
 #include <gtest/gtest.h>
 
 #include "bounded_set_up.hpp"
-#include "palpate/bounded_posterior.hpp"
-#include "palpate/pose_histogram.hpp"
 #include "support/touched_shape.hpp"
 
 namespace palpate::bounded_gain_test {
@@ -18,15 +16,9 @@ const std::vector<Pose> candidates{{{0.0, 0.0}, 0.0},  {{-4.0, 3.0}, 1.0},  {{6.
                                    {{3.0, 7.0}, -1.0}, {{-7.0, -6.0}, 0.5}, {{400.0, 0.0}, 0.0}};
 
 /// The L and its mirror image, which one touch hardly tells apart.
-const std::vector<Hypothesis>& two_alike() {
-  static const std::vector<Hypothesis> two{{map_of(on_letter_l, "L"), 1.0},
-                                           {map_of(
-                                                [](const glm::dvec2& p_mm) {
-                                                  return on_letter_l({-p_mm.x, p_mm.y});
-                                                },
-                                                "J"),
-                                            2.0}};
-  return two;
+std::vector<Hypothesis> two_alike() {
+  const auto mirrored = [](const glm::dvec2& p_mm) { return on_letter_l({-p_mm.x, p_mm.y}); };
+  return {{map_of(on_letter_l, "L"), 1.0}, {map_of(mirrored, "J"), 2.0}};
 }
 
 /// Mean and variance of the mean of the gains over seeds, [identity of every candidate, pose].
@@ -72,38 +64,27 @@ LikelihoodTable three_levels() {
 
 TEST(BoundedGain, IsThatOfTheHistogram) {
   Device device = Device::open();
-  BoundedOptions uncertain = small_options();
-  uncertain.touch_sd = {.mm = 1.0, .rad = 0.2};
   BoundedOptions learned = small_options();
   learned.contact.table = three_levels();
   learned.none_weight = 2.0;
-  for (const auto& [name, options] :
-       {std::pair{"exact", small_options()}, {"uncertain", uncertain}, {"learned", learned}}) {
-    BoundedPosterior bounded(two_alike(), options);
-    PoseHistogram dense(device, two_alike(),
-                        {.lattice = options.lattice,
-                         .contact = options.contact,
-                         .none_weight = options.none_weight,
-                         .touch_sd = options.touch_sd});
-    const Recording recording = touches_of_l(2, 861);
-    bounded.update(recording.touch(0));
-    dense.update(recording.touch(0));
-    bounded.estimate();  // as a plan asks first
-    const Gains ours = gains_of(bounded);
-    const Gains theirs = gains_of(dense);
+  for (const auto& [name, options] : {std::pair{"exact", small_options()},
+                                      {"uncertain", uncertain_options()},
+                                      {"learned", learned}}) {
+    BothFilters both(device, two_alike(), options);
+    both.update(touches_of_l(2, 861).touch(0));
+    both.bounded.estimate();  // as a plan asks first
+    const Gains ours = gains_of(both.bounded);
+    const Gains theirs = gains_of(both.dense);
     for (std::size_t i = 0; i < ours.mean.size(); ++i) {
       const double error = std::sqrt(ours.variance[i] + theirs.variance[i]);
       // Four standard errors: the draws are not the same.
       EXPECT_NEAR(ours.mean[i], theirs.mean[i], 4.0 * error + 1e-6) << name << ", " << i;
       EXPECT_LT(error, 0.03) << "or the test would see nothing";
     }
-    const auto most = [](const Gains& gains, std::size_t from) {
-      const auto first = gains.mean.begin() + static_cast<std::ptrdiff_t>(from);
-      return *std::max_element(first, first + static_cast<std::ptrdiff_t>(candidates.size()));
-    };
-    EXPECT_GT(most(theirs, 0), 0.1) << name << ": identities";
-    EXPECT_GT(most(theirs, candidates.size()), 1.0) << name << ": poses";
-    EXPECT_NEAR(bounded.entropy(), dense.entropy(), 1e-3) << name;
+    const auto poses = theirs.mean.begin() + std::ssize(candidates);
+    EXPECT_GT(*std::max_element(theirs.mean.begin(), poses), 0.1) << name << ": identities";
+    EXPECT_GT(*std::max_element(poses, theirs.mean.end()), 1.0) << name << ": poses";
+    EXPECT_NEAR(both.bounded.entropy(), both.dense.entropy(), 1e-3) << name;
   }
 }
 
@@ -115,15 +96,6 @@ TEST(BoundedGain, IsReproducibleBySeed) {
   };
   EXPECT_EQ(gain(3), gain(3));
   EXPECT_NE(gain(3), gain(4));
-}
-
-TEST(BoundedGain, RefusesWhatTheHistogramRefuses) {
-  const BoundedPosterior bounded(two_shapes(), small_options());
-  const std::vector<glm::dvec2> array = digitacts_array();
-  expect_refused([&] { bounded.expected_gain({}, array); }, "no candidate");
-  expect_refused([&] { bounded.expected_gain(candidates, {}); }, "no living element");
-  expect_refused([&] { bounded.expected_gain(candidates, array, {.samples = 1}); }, "samples = 1");
-  expect_refused([&] { bounded.expected_gain(candidates, array, {.label_of = {0}}); }, "label_of");
 }
 
 }  // namespace palpate::bounded_gain_test

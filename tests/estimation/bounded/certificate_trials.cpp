@@ -1,36 +1,22 @@
 #include "bounded/certificate_trials.hpp"
 
 #include <algorithm>
-#include <iostream>
-
-#include <fmt/format.h>
-#include <gtest/gtest.h>
 
 #include "support/touched_shape.hpp"
 
 namespace palpate {
 
-Recording first_touches(const Recording& recording, std::size_t touches) {
-  Recording part = recording;
-  part.pressure.resize(touches * recording.elements());
-  part.T_robot_sensor.resize(touches);
-  return part;
-}
-
 Trial make_trial(const std::array<int, 3>& bins, std::uint64_t seed) {
   Uniform random(seed);
-  const auto one_of = [&](const auto& choices) {
-    return choices[static_cast<std::size_t>(random(0.0, static_cast<double>(std::size(choices))))];
-  };
   Trial trial;
   PoseLattice& lattice = trial.options.lattice;
-  const double half_mm = one_of(std::array{5.0, 10.0, 25.0});
+  const double half_mm = one_of(random, std::array{5.0, 10.0, 25.0});
   lattice.x_mm = {-half_mm + random(-1.0, 1.0), half_mm, bins[0]};
   lattice.y_mm = {-half_mm, half_mm + random(-1.0, 1.0), bins[1]};
-  lattice.theta_rad = {0.0, one_of(std::array{two_pi, two_pi, 2.0}), bins[2]};
+  lattice.theta_rad = {0.0, one_of(random, std::array{two_pi, two_pi, 2.0}), bins[2]};
   lattice.pivot_mm = {random(-5.0, 5.0), random(-5.0, 5.0)};
-  trial.options.contact.gamma = one_of(std::array{0.1, 0.1, 0.02, 0.0});
-  trial.options.tolerance = one_of(std::array{1e-6, 1e-6, 1e-9, 1e-3});
+  trial.options.contact.gamma = one_of(random, std::array{0.1, 0.1, 0.02, 0.0});
+  trial.options.tolerance = one_of(random, std::array{1e-6, 1e-6, 1e-9, 1e-3});
   const auto touches = static_cast<std::size_t>(random(1.0, 10.0));
   const auto object_seed = static_cast<std::uint64_t>(random(1.0, 1e9));
   if (random(0.0, 2.0) < 1.0) {
@@ -38,7 +24,7 @@ Trial make_trial(const std::array<int, 3>& bins, std::uint64_t seed) {
     const Pose T_object_robot{{random(-4.0, 4.0), random(-4.0, 4.0)}, random(0.0, 2.0)};
     trial.recording = touches_of(on_letter_l, T_object_robot, touches, object_seed);
   } else {
-    const double steepness = one_of(std::array{1.0, 4.0, 12.0});
+    const double steepness = one_of(random, std::array{1.0, 4.0, 12.0});
     trial.objects = {{random_map(31, 27, 0.5, steepness, object_seed), 1.0},
                      {random_map(17, 23, 0.8, steepness, object_seed + 1), 1.0}};
     trial.recording =
@@ -49,7 +35,7 @@ Trial make_trial(const std::array<int, 3>& bins, std::uint64_t seed) {
     trial.objects.push_back({random_map(1, 1, 4.0, 6.0, object_seed + 4), 1.0});
   }
   for (Hypothesis& object : trial.objects) {
-    object.weight = one_of(std::array{1.0, 1.0, 0.2, 1e-6});
+    object.weight = one_of(random, std::array{1.0, 1.0, 0.2, 1e-6});
   }
   return trial;
 }
@@ -57,71 +43,24 @@ Trial make_trial(const std::array<int, 3>& bins, std::uint64_t seed) {
 Trial make_displaced_trial(const std::array<int, 3>& bins, std::uint64_t seed) {
   Trial trial = make_trial(bins, seed);
   Uniform random(seed + 1);
-  const auto one_of = [&](const auto& choices) {
-    return choices[static_cast<std::size_t>(random(0.0, static_cast<double>(std::size(choices))))];
-  };
   PoseLattice& lattice = trial.options.lattice;
-  lattice.pivot_mm *= one_of(std::array{1.0, 1.0, 10.0});
+  lattice.pivot_mm *= one_of(random, std::array{1.0, 1.0, 10.0});
   Axis* const fixed =
-      one_of(std::array<Axis*, 8>{&lattice.x_mm, &lattice.y_mm, &lattice.theta_rad});
+      one_of(random, std::array<Axis*, 8>{&lattice.x_mm, &lattice.y_mm, &lattice.theta_rad});
   if (fixed != nullptr) {
     fixed->count = 1;
   }
   if (random(0.0, 4.0) < 1.0) {
     lattice.collapse_fixed();
   }
-  trial.options.touch_sd = {.mm = one_of(std::array{0.0, 0.3, 1.0, 1.0, 2.5, 6.0}),
-                            .rad = one_of(std::array{0.0, 0.05, 0.05, 0.3, 1.5})};
+  trial.options.touch_sd = {.mm = one_of(random, std::array{0.0, 0.3, 1.0, 1.0, 2.5, 6.0}),
+                            .rad = one_of(random, std::array{0.0, 0.05, 0.05, 0.3, 1.5})};
   if (trial.options.touch_sd.none()) {
     trial.options.touch_sd.mm = 1.0;
   }
   // Where a far pivot turns a bin to is known to 1e-14 of a step, which may count for as much.
   trial.options.tolerance = std::max(trial.options.tolerance, 1e-7);
   return trial;
-}
-
-void expect_certified_within(Trial trial, std::initializer_list<double> budgets_s) {
-  const reference::Posterior truth =
-      reference_posterior(trial.objects, trial.options, all_touches(trial.recording));
-  for (const double budget_s : budgets_s) {
-    SCOPED_TRACE(::testing::Message() << budget_s << " s");
-    trial.options.budget_s = budget_s;
-    BoundedPosterior posterior(trial.objects, trial.options);
-    for (std::size_t i = 0; i < trial.recording.size(); ++i) {
-      posterior.update(trial.recording.touch(i));
-      posterior.estimate();
-    }
-    expect_certified(posterior, trial.objects, trial.options, truth);
-  }
-}
-
-void expect_trials(const std::array<int, 3>& bins, int trials, std::uint64_t seed,
-                   const decltype(make_trial)& make) {
-  double variation = 0.0;
-  double dropped = 0.0;
-  double evaluated = 0.0;
-  for (int i = 0; i < trials; ++i) {
-    SCOPED_TRACE(::testing::Message() << "trial " << i);
-    const Trial trial = make(bins, 1000 * seed + static_cast<std::uint64_t>(i));
-    // Log odds of 12 at gamma = 0 sum to some thousand nats, and float64 keeps 16 digits of them.
-    const Certified seen =
-        expect_certified(trial.objects, trial.options, all_touches(trial.recording), 1e-9);
-    if (!seen.estimate.certificate) {
-      continue;
-    }
-    const Certificate& certificate = *seen.estimate.certificate;
-    variation = std::max(variation, seen.total_variation);
-    dropped = std::max(dropped, certificate.dropped_mass);
-    evaluated += static_cast<double>(certificate.bins_evaluated) /
-                 (static_cast<double>(trial.objects.size()) *
-                  static_cast<double>(trial.options.lattice.bins())) /
-                 trials;
-  }
-  std::cout << fmt::format(
-                   "largest total variation {:.1e}, largest dropped_mass {:.1e}, {:.1f} % of the "
-                   "bins evaluated",
-                   variation, dropped, 100.0 * evaluated)
-            << std::endl;
 }
 
 }  // namespace palpate

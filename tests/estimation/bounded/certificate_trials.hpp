@@ -2,10 +2,10 @@
 
 #include <array>
 #include <cstdint>
-#include <initializer_list>
 #include <vector>
 
-#include "support/certified.hpp"
+#include "palpate/bounded_posterior.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate {
 
@@ -24,16 +24,5 @@ Trial make_trial(const std::array<int, 3>& bins, std::uint64_t seed);
 /// beyond half the region, about pivots near and far, on lattices some of which have an axis of one
 /// bin.
 Trial make_displaced_trial(const std::array<int, 3>& bins, std::uint64_t seed);
-
-Recording first_touches(const Recording& recording, std::size_t touches);
-
-/// Expects the certificate to hold after a trial's touches, each followed by an estimate within a
-/// budget, for each of these budgets.
-void expect_certified_within(Trial trial, std::initializer_list<double> budgets_s);
-
-/// Runs trials and expects their certificates to hold; prints the largest error and certificate.
-/// @param make what makes a trial
-void expect_trials(const std::array<int, 3>& bins, int trials, std::uint64_t seed,
-                   const decltype(make_trial)& make = make_trial);
 
 }  // namespace palpate

@@ -1,28 +1,26 @@
-// More evaluated bins than are kept: a posterior searches again for what needs them all.
+// Evaluated bins, and more of them than are kept: a posterior searches again for what needs them
+// all.
 
 #include "estimation/bounded/evaluated_bins.hpp"
 
-#include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
 
 #include "bins_by_definition.hpp"
+#include "bounded_set_up.hpp"
 #include "palpate/bounded_posterior.hpp"
-#include "support/synthetic.hpp"
 
 namespace palpate::evaluated_bins_test {
 
-struct Kept {
-  BinBox box;
-  std::vector<double> values;
-};
-
-std::vector<Kept> visited(const EvaluatedBins& bins) {
-  std::vector<Kept> kept;
+/// Objects, thetas and bins of the boxes, and their values.
+std::vector<std::pair<std::vector<std::int64_t>, std::vector<double>>> visited(
+    const EvaluatedBins& bins) {
+  std::vector<std::pair<std::vector<std::int64_t>, std::vector<double>>> kept;
   bins.visit([&](const BinBox& box, std::span<const double> values) {
-    kept.push_back({box, {values.begin(), values.end()}});
+    kept.push_back({{box.object, box.theta, box.bins()}, {values.begin(), values.end()}});
   });
   return kept;
 }
@@ -30,7 +28,7 @@ std::vector<Kept> visited(const EvaluatedBins& bins) {
 TEST(EvaluatedBins, AreVisitedInTheOrderInWhichTheyCame) {
   EvaluatedBins bins;
   EXPECT_TRUE(visited(bins).empty());
-  std::vector<Kept> added;
+  auto added = visited(bins);
   for (int i = 0; i < 50; ++i) {
     const BinBox box{.object = i, .theta = 2 * i, .y_count = i % 5 + 1, .x_count = 3};
     // One number stands for all bins of some boxes.
@@ -39,17 +37,10 @@ TEST(EvaluatedBins, AreVisitedInTheOrderInWhichTheyCame) {
       values[k] = -i - 0.01 * static_cast<double>(k);
     }
     bins.add(box, values);
-    added.push_back({box, values});
+    added.push_back({{box.object, box.theta, box.bins()}, values});
   }
   EXPECT_TRUE(bins.complete());
-  const std::vector<Kept> kept = visited(bins);
-  ASSERT_EQ(kept.size(), added.size());
-  for (std::size_t i = 0; i < kept.size(); ++i) {
-    EXPECT_EQ(kept[i].box.object, added[i].box.object);
-    EXPECT_EQ(kept[i].box.theta, added[i].box.theta);
-    EXPECT_EQ(kept[i].box.bins(), added[i].box.bins());
-    EXPECT_EQ(kept[i].values, added[i].values);
-  }
+  EXPECT_EQ(visited(bins), added);
   bins.clear();
   EXPECT_TRUE(visited(bins).empty());
   EXPECT_TRUE(bins.complete());
@@ -78,9 +69,8 @@ TEST(EvaluatedBins, AreGivenUpBeyondTheirMemory) {
 TEST(EvaluatedBins, BeyondTheirMemoryAreSearchedForAgain) {
   // 12 million bins, nearly all of which matter after one touch of three elements.
   const std::vector<Hypothesis> objects{{random_map(41, 37, 0.5, 2.0, 701), 1.0}};
-  BoundedOptions options;
-  options.lattice = {
-      .x_mm = {-8.0, 8.0, 500}, .y_mm = {-8.0, 8.0, 500}, .theta_rad = {0.0, two_pi, 48}};
+  const BoundedOptions options{
+      .lattice = {{-8.0, 8.0, 500}, {-8.0, 8.0, 500}, {0.0, two_pi, 48}, {}}};
   const std::vector<glm::dvec2> elements_mm{{-1.0, 0.0}, {0.3, 0.9}, {2.0, -1.0}};
   const std::vector<double> pressure{10.0, 0.0, 9.0};
   const Touch touch{.T_robot_sensor = {}, .elements_mm = elements_mm, .pressure = pressure};
@@ -90,43 +80,38 @@ TEST(EvaluatedBins, BeyondTheirMemoryAreSearchedForAgain) {
   ASSERT_GT(certificate.bins_evaluated, 10'600'000) << "80 MiB would hold them";
   EXPECT_LT(posterior.host_bytes(), std::uint64_t{80} << 20);
 
-  ContactModel contact;
-  contact.prior = objects.front().map.prior;
+  const ContactModel contact{.prior = objects.front().map.prior};
   const KnownElements elements = known_elements(TouchEvidence(touch, contact), options);
   const BinLikelihood likelihood(objects, contact, options.lattice);
-  const auto plane_bins = static_cast<std::size_t>(options.lattice.plane());
-  std::vector<double> xy(plane_bins);
-  std::vector<double> theta(static_cast<std::size_t>(options.lattice.theta_rad.count));
-  std::vector<double> plane(plane_bins);
+  std::vector<double> plane(static_cast<std::size_t>(options.lattice.plane()));
+  std::vector<double> xy(plane.size());
+  std::vector<double> theta(48);
   for (std::size_t t = 0; t < theta.size(); ++t) {
     const BinBox box = whole_plane(options.lattice, static_cast<int>(t));
     likelihood.evaluate(std::span(&box, 1), elements, plane);
-    for (std::size_t i = 0; i < plane_bins; ++i) {
+    for (std::size_t i = 0; i < plane.size(); ++i) {
       const double value = std::exp(plane[i]);
       xy[i] += value;
       theta[t] += value;
     }
   }
-  double total = 0.0;
-  for (const double value : theta) {
-    total += value;
+  const double total = sum(theta);
+  for (double& value : xy) {
+    value /= total;
   }
-  for (std::vector<double>* sums : {&xy, &theta}) {
-    for (double& value : *sums) {
-      value /= total;
-    }
+  for (double& value : theta) {
+    value /= total;
   }
   const Marginals marginals = posterior.marginals(0);
   EXPECT_LE(largest_difference(marginals.xy, xy), options.tolerance);
   EXPECT_LE(largest_difference(marginals.theta, theta), options.tolerance);
 
-  const std::vector<PoseSample> samples = posterior.sample(20'000, 702);
-  ASSERT_EQ(samples.size(), 20'000U);
   std::vector<double> drawn(theta.size());
-  for (const PoseSample& sample : samples) {
+  for (const PoseSample& sample : posterior.sample(20'000, 702)) {
     const std::int64_t bin = options.lattice.bin_of(sample.T_object_robot);
     drawn[static_cast<std::size_t>(bin / options.lattice.plane())] += 1.0 / 20'000.0;
   }
+  EXPECT_NEAR(sum(drawn), 1.0, 1e-9);
   // Five standard errors of the share of a theta, some 1/48.
   EXPECT_LE(largest_difference(drawn, theta), 5.0 * std::sqrt(1.0 / 48.0 / 20'000.0));
 }
