@@ -59,11 +59,9 @@ Real log_likelihood(const ContactModel& contact, Reading reading, Real l) {
 }  // namespace
 
 BinCase letter_case() {
-  ContactModel contact;
-  contact.prior = 0.2;
   return {
       .map = random_map(31, 27, 0.5, 12.0, 71),
-      .contact = contact,
+      .contact = {.prior = 0.2},
       .lattice = {.x_mm = {-3.0, 3.5, 65}, .y_mm = {-2.0, 1.0, 31}, .theta_rad = {0.0, two_pi, 3}},
       .elements = random_elements(36, 6.0, 2, 72)};
 }
@@ -90,16 +88,6 @@ LikelihoodTable crooked_table() {
   Uniform random(77);
   for (std::size_t i = 0; i < table.levels() * table.nodes; ++i) {
     table.log_likelihood.push_back(i < 3 * table.nodes ? random(-4.0, 0.0) : random(-3e3, 3e3));
-  }
-  return table;
-}
-
-LikelihoodTable gentle_table() {
-  LikelihoodTable table{.first_log_odds = -7.0, .last_log_odds = 9.0, .nodes = 25};
-  table.level_edges = {5.0};
-  Uniform random(82);
-  for (std::size_t i = 0; i < table.levels() * table.nodes; ++i) {
-    table.log_likelihood.push_back(random(-8.0, 0.0));
   }
   return table;
 }

@@ -27,9 +27,6 @@ KnownElements random_elements(std::size_t count, double half_mm, std::size_t lev
 /// A table of four levels that is not monotone, the last level steeper than any map.
 LikelihoodTable crooked_table();
 
-/// A table of three levels, about as steep as learned ones.
-LikelihoodTable gentle_table();
-
 /// Log-likelihood of the elements at every bin of the boxes, in nats: the definition in long
 /// double.
 std::vector<long double> by_definition(const BinCase& of, const std::vector<BinBox>& boxes);

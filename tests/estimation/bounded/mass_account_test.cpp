@@ -1,10 +1,11 @@
 #include "estimation/bounded/search/mass_account.hpp"
-#include "support/limits.hpp"
 
 #include <array>
 #include <cmath>
 
 #include <gtest/gtest.h>
+
+#include "support/limits.hpp"
 
 namespace palpate::mass_account_test {
 

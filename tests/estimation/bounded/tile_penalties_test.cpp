@@ -102,16 +102,11 @@ void expect_sums(const BatchCase& of, std::size_t split = 0) {
 TEST(TilePenalties, AreTheSumsOfWindowsWithEverySetOfInstructions) {
   for (std::size_t count = 0; count <= 70; ++count) {
     for (const int side : {1, 2, 8}) {
-      expect_sums(random_batch(count, side, 900, 93 + 7 * count));
+      expect_sums(random_batch(count, side, 900, 93 + 7 * count), count / 3);
     }
-  }
-}
-
-TEST(TilePenalties, OfSingleBinsAreThoseOfTheSquaresTheySee) {
-  for (std::size_t count = 0; count <= 70; count += 7) {
-    BatchCase of = random_batch(count, 4, 900, 99 + count);
-    of.window = 1;
-    expect_sums(of);
+    BatchCase of_single_bins = random_batch(count, 4, 900, 99 + count);
+    of_single_bins.window = 1;
+    expect_sums(of_single_bins);
   }
 }
 
@@ -120,32 +115,18 @@ TEST(TilePenalties, OfNeighbouringBatchesAreThoseOfEach) {
   Uniform random(100);
   for (std::uint64_t trial = 0; trial < 300; ++trial) {
     const int side = 1 << static_cast<int>(random(0.0, 4.0));
-    BatchCase of =
-        random_batch(static_cast<std::size_t>(random(0.0, 70.0)), side, 900, 1000 + trial);
+    const auto elements = static_cast<std::size_t>(random(0.0, 70.0));
+    BatchCase of = random_batch(elements, side, trial % 3 == 0 ? 8192 : 900, 1000 + trial);
     of.batches = static_cast<int>(random(1.0, 9.0));
     of.first_x -= static_cast<int>(random(0.0, 40.0));
     of.first_y -= static_cast<int>(random(0.0, 20.0));
     of.penalties.beyond = static_cast<std::uint16_t>(random(0.0, 901.0));
-    of.before = trial % 2 == 0 ? 0 : 123456789;
-    expect_sums(of, of.elements.from_pivot_mm.size() / 3);
+    of.before = one_of(random, std::array{0U, 123456789U, largest_sum});
+    expect_sums(of, static_cast<std::size_t>(random(0.0, static_cast<double>(elements) + 1.0)));
   }
 }
 
-TEST(TilePenalties, OfARunThatBeginsAnywhereAreThose) {
-  for (std::size_t split = 0; split <= 35; ++split) {
-    expect_sums(random_batch(36, 2, 8192, 94 + split), split);
-  }
-}
-
-TEST(TilePenalties, AddToWhatIsThere) {
-  BatchCase of = random_batch(36, 2, 8192, 95);
-  of.before = 123456789;
-  expect_sums(of);
-  of.before = largest_sum;
-  expect_sums(of);
-}
-
-TEST(TilePenalties, OfAPressOfManyElementsDoNotWrap) {
+TEST(TilePenalties, OfManyElementsNeitherWrapNorExceedTheLargestSum) {
   // 16 bits hold 7 of the largest penalties.
   for (const int side : {1, 8}) {
     for (const std::uint16_t largest : {std::uint16_t{0}, std::uint16_t{1}, largest_penalty}) {
@@ -156,24 +137,16 @@ TEST(TilePenalties, OfAPressOfManyElementsDoNotWrap) {
       }
     }
   }
-}
-
-TEST(TilePenalties, StopAtTheLargestSum) {
+  expect_sums(random_batch(300000, 1, 4000, 98));
   BatchCase of = random_batch(300000, 1, largest_penalty, 97);
   std::fill(of.penalties.least.begin(), of.penalties.least.end(), largest_penalty);
-  const std::vector<std::uint32_t> all(batch_tiles, largest_sum);
-  ASSERT_EQ(sums_by_definition(of), all);
-  expect_sums(of);
   of.batches = 2;
+  ASSERT_EQ(sums_by_definition(of), std::vector<std::uint32_t>(2 * batch_tiles, largest_sum));
   expect_sums(of);
   // Just below it.
   of.elements.from_pivot_mm.resize(largest_sum / largest_penalty - 1);
   ASSERT_LT(sums_by_definition(of).front(), largest_sum);
   expect_sums(of);
-}
-
-TEST(TilePenalties, OfVeryManyElementsAreTheirSum) {
-  expect_sums(random_batch(300000, 1, 4000, 98));
 }
 
 }  // namespace palpate::tile_penalties_test

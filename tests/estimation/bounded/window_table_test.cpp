@@ -10,6 +10,25 @@
 
 namespace palpate::window_table_test {
 
+/// Calls visit(x, y, row, column, entry) with the square at which each entry's window begins.
+template <typename Visit>
+void for_entries(const WindowTable& table, const Visit& visit) {
+  const int side = 1 << table.side_log2;
+  auto entry = table.entries.begin();
+  for (int phase_y = 0; phase_y < side; ++phase_y) {
+    for (int phase_x = 0; phase_x < side; ++phase_x) {
+      for (int row = 0; row < table.rows; ++row) {
+        for (int column = 0; column < table.columns; ++column) {
+          for (int j = 0; j < batch_side; ++j, ++entry) {
+            visit((column - WindowTable::margin) * side + phase_x,
+                  (row + j - WindowTable::margin) * side + phase_y, row, column, *entry);
+          }
+        }
+      }
+    }
+  }
+}
+
 TEST(WindowTable, HoldsTheLeastPenaltyOfEveryWindow) {
   for (const glm::ivec2 squares : {glm::ivec2(2, 2), {7, 5}, {16, 9}, {33, 1}}) {
     for (const auto& [side, window] :
@@ -24,22 +43,10 @@ TEST(WindowTable, HoldsTheLeastPenaltyOfEveryWindow) {
       ASSERT_EQ(table.entries.size(),
                 static_cast<std::size_t>(side) * side * table.rows * table.columns * batch_side);
       std::uint16_t largest = 0;
-      auto entry = table.entries.begin();
-      for (int phase_y = 0; phase_y < side; ++phase_y) {
-        for (int phase_x = 0; phase_x < side; ++phase_x) {
-          for (int row = 0; row < table.rows; ++row) {
-            for (int column = 0; column < table.columns; ++column) {
-              for (int j = 0; j < batch_side; ++j, ++entry) {
-                const int x = (column - WindowTable::margin) * side + phase_x;
-                const int y = (row + j - WindowTable::margin) * side + phase_y;
-                ASSERT_EQ(*entry, least_penalty(penalties, window, x, y))
-                    << "window at square " << x << ", " << y;
-                largest = std::max(largest, *entry);
-              }
-            }
-          }
-        }
-      }
+      for_entries(table, [&](int x, int y, int, int, std::uint16_t entry) {
+        ASSERT_EQ(entry, least_penalty(penalties, window, x, y)) << "square " << x << ", " << y;
+        largest = std::max(largest, entry);
+      });
       EXPECT_EQ(table.largest, largest);
     }
   }
@@ -51,24 +58,12 @@ TEST(WindowTable, EndsInBatchesThatSeeOnlyThePrior) {
     SquarePenalties penalties = random_penalties(13, 11, 100, 92);
     penalties.beyond = 200;
     const WindowTable table = window_table(penalties, side, side + 1);
-    const std::size_t plane = static_cast<std::size_t>(table.rows) * table.columns * batch_side;
-    for (std::size_t phase = 0; phase < static_cast<std::size_t>(side) * side; ++phase) {
-      for (int row = 0; row < table.rows; ++row) {
-        for (int column = 0; column < table.columns; ++column) {
-          const bool last_column = column < batch_side || column >= table.columns - batch_side;
-          const bool last_row = row < 1 || row >= table.rows - batch_side;
-          if (!last_column && !last_row) {
-            continue;
-          }
-          const std::size_t first =
-              phase * plane + (static_cast<std::size_t>(row) * table.columns + column) * batch_side;
-          for (std::size_t j = 0; j < batch_side; ++j) {
-            ASSERT_EQ(table.entries[first + j], 200)
-                << "side " << side << ", " << column << ", " << row << ", " << j;
-          }
-        }
+    for_entries(table, [&](int x, int y, int row, int column, std::uint16_t entry) {
+      if (column < batch_side || column >= table.columns - batch_side || row < 1 ||
+          row >= table.rows - batch_side) {
+        ASSERT_EQ(entry, 200) << "side " << side << ", square " << x << ", " << y;
       }
-    }
+    });
   }
 }
 
