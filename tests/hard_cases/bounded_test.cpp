@@ -17,9 +17,7 @@ BoundedOptions few_bins() {
 }
 
 TEST(BoundedHard, MapPriorsOfAMillionth) {
-  HardCase hard("bounds: a prior of 1e-6 and of 0.999999",
-                "beyond the maps one class costs 14 nats, which no cell of the map shows",
-                "the space beyond a map is part of its windows");
+  HardCase hard("bounds: a prior of 1e-6 and of 0.999999");
   BoundedOptions options = few_bins();
   options.lattice.x_mm = {-20.0, 20.0, 11};
   for (const double prior : {1e-6, 0.999999}) {
@@ -32,9 +30,7 @@ TEST(BoundedHard, MapPriorsOfAMillionth) {
 }
 
 TEST(BoundedHard, MapsOfDifferentCellSizesTogether) {
-  HardCase hard("bounds: maps in cells of 0.1, 0.37, 0.5, 2 and 9 mm together",
-                "tiles of one level differ from map to map",
-                "each map has levels of its own; they compete by mass");
+  HardCase hard("bounds: maps in cells of 0.1, 0.37, 0.5, 2 and 9 mm together");
   std::vector<Hypothesis> objects;
   for (const double cell_mm : {0.1, 0.37, 0.5, 2.0, 9.0}) {
     const auto cells = static_cast<int>(std::max(2.0, std::min(90.0, 14.0 / cell_mm)));
@@ -59,9 +55,7 @@ LikelihoodTable crooked_table(std::size_t objects, double nats, std::uint64_t se
 
 TEST(BoundedHard, ACrookedTable) {
   HardCase hard(
-      "bounds: a table that is not monotone, of four levels, for all objects and for each",
-      "the least penalty of a window lies between its nodes, or above 0",
-      "a window's bound is the table's largest value over the range of its log odds");
+      "bounds: a table that is not monotone, of four levels, for all objects and for each");
   const std::vector<Hypothesis> objects = two_objects(9.0, 863);
   const Recording recording = random_recording(4, 24, 865);
   for (const std::size_t sets : {1U, 2U}) {
@@ -77,9 +71,7 @@ TEST(BoundedHard, ACrookedTable) {
 }
 
 TEST(BoundedHard, BinsWiderThanTheMap) {
-  HardCase hard("bounds: bins of 44 mm over a map of 15 mm, and a region that misses the map",
-                "nearly all bins see only the prior and are equal",
-                "tiles off the map are exact: their mass is counted, not dropped");
+  HardCase hard("bounds: bins of 44 mm over a map of 15 mm, and a region that misses the map");
   BoundedOptions options = few_bins();
   options.lattice.y_mm = {-200.0, 190.0, 9};
   for (const Axis& x_mm : {Axis{-200.0, 200.0, 9}, Axis{100.0, 140.0, 9}}) {
@@ -89,9 +81,7 @@ TEST(BoundedHard, BinsWiderThanTheMap) {
 }
 
 TEST(BoundedHard, ElementsOnTheBoundariesOfCells) {
-  HardCase hard("bounds: elements exactly on nodes and cell borders at every bin",
-                "rounding puts an element into the neighbouring cell, beyond its window",
-                "windows overlap by the node that a border shares");
+  HardCase hard("bounds: elements exactly on nodes and cell borders at every bin");
   for (const double cell_mm : {0.5, 1.0, 0.1}) {  // 0.1 mm is no binary fraction
     const std::vector<Hypothesis> objects{{random_map(41, 41, cell_mm, 12.0, 860), 1.0},
                                           {random_map(41, 41, cell_mm, 12.0, 861), 1.0}};
@@ -121,8 +111,7 @@ TEST(BoundedHard, ElementsOnTheBoundariesOfCells) {
 }
 
 TEST(BoundedHard, TouchesWithoutAKnownElement) {
-  HardCase hard("bounds: touches without a known element, and none at all",
-                "no penalty to add, no reading to have a table for", "nothing changes");
+  HardCase hard("bounds: touches without a known element, and none at all");
   const std::vector<Hypothesis> objects = two_objects(6.0, 867);
   Recording recording = random_recording(4, 12, 868);
   recording.valid.assign(4 * 12, 1);
@@ -136,8 +125,7 @@ TEST(BoundedHard, TouchesWithoutAKnownElement) {
 }
 
 TEST(BoundedHard, OneReadingAlone) {
-  HardCase hard("bounds: touches of In Contact alone, and of No Contact alone",
-                "a class that no touch has yet read has no penalties", "classes join as they come");
+  HardCase hard("bounds: touches of In Contact alone, and of No Contact alone");
   Recording recording = random_recording(4, 12, 870);
   recording.pressure.assign(4 * 12, 0.0);
   std::fill_n(recording.pressure.begin(), 24, 10.0);

@@ -72,9 +72,7 @@ TEST(Bounds, OfMapsLatticesAndTouchesLeaveNumbers) {
 }
 
 TEST(Bounds, WhatLiesBeyondThemOnBothSidesDoesNotMeet) {
-  HardCase hard("an element and a lattice that are both further away than cells are counted",
-                "both are clamped to the same bound, and meet in the middle of the map",
-                "beyond 2^29 cells they stand for places that never meet: the prior's likelihood");
+  HardCase hard("an element and a lattice that are both further away than cells are counted");
   Hypothesis object{random_map(21, 21, 0.5, 12.0, 524), 1.0};
   object.map.cell_mm = 1e-3;
   object.map.origin_mm = {-0.01, -0.01};

@@ -46,12 +46,8 @@ Recording press(double pressure, double first = 10.0) {
 }
 
 TEST(Contradiction, CertainMapsWithoutGamma) {
-  HardCase hard("gamma = 0 on maps at log odds of +-1,000",
-                "a likelihood of exp(-1000) is 0 in float64, and 0 / 0 is no number",
-                "logs throughout and no floor; seven digits of the 1,000 nats of an element");
-  HardCase bounds("bounds: gamma = 0 on maps at log odds of +-1,000",
-                  "penalties of 1,000 nats saturate 16 bits and hide which tile is best",
-                  "a saturated penalty still bounds from above; leaves decide in float64");
+  HardCase hard("gamma = 0 on maps at log odds of +-1,000");
+  HardCase bounds("bounds: gamma = 0 on maps at log odds of +-1,000");
   const std::vector<Hypothesis> objects{{certain_map(412), 1.0}, {certain_map(413), 1.0}};
   const Recording recording = random_recording(4, 36, 414);
   for (const double bins_mm : {0.4, 6.0}) {
@@ -69,12 +65,8 @@ TEST(Contradiction, CertainMapsWithoutGamma) {
 }
 
 TEST(Contradiction, OfEveryHypothesis) {
-  HardCase hard("gamma = 0 and evidence that contradicts every hypothesis",
-                "normalising what is left hides that nothing fits",
-                "log-likelihoods keep the 1,000 nats of every element; `contradicted` says so");
-  HardCase bounds("bounds: gamma = 0 and touches that contradict every hypothesis",
-                  "every tile has a bound of exp(-36000), equal to every other one's",
-                  "logs throughout; `contradicted` says so");
+  HardCase hard("gamma = 0 and evidence that contradicts every hypothesis");
+  HardCase bounds("bounds: gamma = 0 and touches that contradict every hypothesis");
   const std::vector<Hypothesis> objects{{filled_map(-1000.0F), 1.0}, {filled_map(-999.0F), 1.0}};
   const Recording recording = press(10.0);
   HistogramOptions options = with_gamma(0.0);
@@ -99,9 +91,7 @@ TEST(Contradiction, OfEveryHypothesis) {
 }
 
 TEST(Contradiction, OfEveryHypothesisByPiecesOfThem) {
-  HardCase hard("gamma = 0 and touches of pieces that no single hypothesis has",
-                "a weight of 1e-30 against exp(-36000) is 0 / 0 in float64",
-                "logs throughout: \"none of these\" takes all of the mass");
+  HardCase hard("gamma = 0 and touches of pieces that no single hypothesis has");
   const std::vector<Hypothesis> objects{{filled_map(-1000.0F), 1.0}, {filled_map(1000.0F), 1.0}};
   HistogramOptions options = with_gamma(0.0);
   options.none_weight = 1e-30;
@@ -116,9 +106,7 @@ TEST(Contradiction, OfEveryHypothesisByPiecesOfThem) {
 }
 
 TEST(Contradiction, IsNoneWhereOneHypothesisFits) {
-  HardCase hard("gamma = 0 and evidence that contradicts all objects but one",
-                "the one that fits must keep all of the mass, and exactly",
-                "log1p of exp(-1000) is 0: a certain element costs nothing");
+  HardCase hard("gamma = 0 and evidence that contradicts all objects but one");
   const std::vector<Hypothesis> objects{{filled_map(-1000.0F), 1.0}, {filled_map(1000.0F), 1e-30}};
   const Estimate estimate =
       hard.expect_posterior(objects, with_gamma(0.0), all_touches(press(10.0)), seven_digits);
@@ -129,12 +117,8 @@ TEST(Contradiction, IsNoneWhereOneHypothesisFits) {
 }
 
 TEST(Contradiction, LogOddsAtTheLargestThatAMapMayHold) {
-  HardCase hard("log odds of +-1e30, gamma 0 and 0.1",
-                "products and differences overflow float32 to infinity",
-                "log odds are bounded at 1e30, sums stay below 1e38; seven digits");
-  HardCase bounds("bounds: log odds of +-1e30, gamma 0 and 0.1",
-                  "penalties of 1e30 nats leave every integer, sums leave float32",
-                  "penalties saturate; what a bin costs is float64's");
+  HardCase hard("log odds of +-1e30, gamma 0 and 0.1");
+  HardCase bounds("bounds: log odds of +-1e30, gamma 0 and 0.1");
   const std::vector<Hypothesis> objects{{filled_map(-1e30F), 1.0}, {filled_map(1e30F), 1.0}};
   for (const double gamma : {0.0, 0.1}) {
     for (const double pressure : {0.0, 10.0}) {
@@ -150,10 +134,7 @@ TEST(Contradiction, LogOddsAtTheLargestThatAMapMayHold) {
 }
 
 TEST(Contradiction, AFloorThatNoFloatHolds) {
-  HardCase hard("gamma of 1e-30, 1e-42 and 1e-300",
-                "the floor gamma m of the likelihood is subnormal or 0 in float32, its logarithm "
-                "wrong",
-                "the floor reaches the kernels as a logarithm; seven digits of its nats");
+  HardCase hard("gamma of 1e-30, 1e-42 and 1e-300");
   const std::vector<Hypothesis> objects{{filled_map(-1000.0F), 1.0}, {certain_map(415), 1.0}};
   for (const double gamma : {1e-30, 1e-42, 1e-300}) {
     const Estimate estimate =

@@ -45,11 +45,7 @@ Recording touch_of_both_ends(const Pose& T_object_robot, const OccupancyGrid& ma
 }
 
 TEST(FiftyMillionBins, OfWhichOneOrAllHoldTheMass) {
-  HardCase hard("50 M bins, of which one holds all the mass, or all hold the same",
-                "float32 counts to 16.7 M, indices leave 32 bits or a binding, the rest outweighs "
-                "the one",
-                "parts of 16,384 bins in float32, joined in float64; a bin below exp(-80) counts "
-                "as that");
+  HardCase hard("50 M bins, of which one holds all the mass, or all hold the same");
   const PoseLattice lattice = fifty_million();
   const Pose chosen = reference::bin_pose(lattice, chosen_bin);
   const OccupancyGrid map = two_certain_cells(chosen.translation_mm);

@@ -29,10 +29,11 @@ struct Allowed {
   double at(double log_likelihood) const;
 };
 
-/// A case of docs/hard_cases.md. Its destructor prints the case's row of the table there.
+/// A case of docs/hard_cases.md, which says by this name what could go wrong and what bounds the
+/// error. Its destructor prints the largest errors for the case's row there.
 class HardCase {
  public:
-  HardCase(std::string name, std::string risk, std::string bound);
+  explicit HardCase(std::string name) : name_(std::move(name)) {}
   ~HardCase();
   HardCase(const HardCase&) = delete;
   HardCase& operator=(const HardCase&) = delete;
@@ -74,8 +75,6 @@ class HardCase {
   void check(const std::string& quantity, double error, double allowed) const;
 
   std::string name_;
-  std::string risk_;
-  std::string bound_;
   std::map<std::string, Largest> largest_;
   std::optional<Device> device_;
 };

@@ -73,12 +73,8 @@ void expect_twins(HardCase& hard, const OccupancyGrid& map, int quarters,
 }
 
 TEST(Tie, IdenticalObjects) {
-  HardCase hard("identical objects",
-                "rounding of one of them, or the order of a reduction, decides",
-                "equal bits; the mode is the first object's, the identity the prior weights'");
-  HardCase bounds("bounds: identical objects, and maps of equal cells",
-                  "equal bounds: one of the twins is dropped with all that it holds",
-                  "tiles are dropped by mass; what is dropped stays below the tolerance");
+  HardCase hard("identical objects");
+  HardCase bounds("bounds: identical objects, and maps of equal cells");
   const OccupancyGrid map = random_map(31, 27, 0.5, 6.0, 431);
   const Recording recording = random_recording(6, 36, 432);
   const HistogramOptions options = symmetric_options();
@@ -105,9 +101,7 @@ TEST(Tie, IdenticalObjects) {
 }
 
 TEST(Tie, TwoFoldSymmetry) {
-  HardCase hard("two-fold symmetry",
-                "two modes whose bins differ by rounding only: the choice must not wander",
-                "the same bits in every run; each half holds half of the mass");
+  HardCase hard("two-fold symmetry");
   OccupancyGrid map = random_map(31, 27, 0.5, 6.0, 433);
   map.symmetry = 2;
   for (std::size_t cell = 0; cell < map.log_odds.size(); ++cell) {
@@ -118,15 +112,12 @@ TEST(Tie, TwoFoldSymmetry) {
 }
 
 TEST(Tie, FullSymmetry) {
-  HardCase hard("full symmetry, touched all over",
-                "every pose has a twin at each turn; rounding alone would choose among them",
-                "the same bits in every run; a turn of the pose moves no log-likelihood");
+  HardCase hard("full symmetry, touched all over");
   expect_twins(hard, rings(), 1, random_recording(4, 36, 436));
 }
 
 TEST(Tie, FullSymmetryTouchedAtTheMiddle) {
-  HardCase hard("full symmetry, touched at its middle", "every theta is as good as the others",
-                "equal bits for all thetas; the mode is the lowest bin's");
+  HardCase hard("full symmetry, touched at its middle");
   const std::vector<Hypothesis> objects{{rings(), 1.0}};
   Recording recording;
   recording.T_robot_sensor = {{{12.0, -7.0}, 0.4}, {{12.0, -7.0}, 2.0}};

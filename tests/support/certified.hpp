@@ -26,6 +26,7 @@ struct Certified {
 ///   - the total variation from `truth`, of identities and of marginals, and the mass of `truth`
 ///     where the marginals are 0 are at most dropped_mass, which is at most the tolerance and what
 ///     rounding adds where there is no budget,
+///   - the entropy is that of `truth` where the tolerance is small,
 ///   - the mode has its log-likelihood, and is the best of all bins where there is no budget or
 ///     the certificate says so,
 ///   - the log-likelihood of any pose is the reference's.

@@ -14,6 +14,7 @@
 #include "bound_cases.hpp"
 #include "estimation/bounded/leaves/bin_likelihood.hpp"
 #include "estimation/bounded/search/bound_search.hpp"
+#include "support/limits.hpp"
 #include "support/trials.hpp"
 
 namespace palpate::seen_tiles_test {
@@ -146,38 +147,6 @@ TEST(SeenTiles, HaveThePriorsBoundWhereNoElementSeesTheMap) {
   EXPECT_GT(tiles, 40'000);
 }
 
-/// What a search did with a lattice's bins.
-class Visited {
- public:
-  Visited(const PoseLattice& lattice, std::size_t objects)
-      : lattice_(lattice),
-        value_(objects, std::vector(static_cast<std::size_t>(lattice.bins()), not_visited)) {}
-
-  /// Takes a box; false where one of its bins was visited before or lies outside.
-  bool take(const BinBox& box, std::span<const double> values) {
-    if (box.x_first + box.x_count > lattice_.x_mm.count ||
-        box.y_first + box.y_count > lattice_.y_mm.count) {
-      return false;
-    }
-    for (std::int64_t i = 0; i < box.bins(); ++i) {
-      double& value = value_[box.object][static_cast<std::size_t>(box.bin(i, lattice_))];
-      if (value != not_visited) {
-        return false;
-      }
-      value = values[values.size() == 1 ? 0 : static_cast<std::size_t>(i)];
-    }
-    return true;
-  }
-  /// `not_visited` for bins that were dropped.
-  double at(std::size_t object, std::size_t bin) const { return value_[object][bin]; }
-
-  static constexpr double not_visited = 1e308;
-
- private:
-  const PoseLattice& lattice_;
-  std::vector<std::vector<double>> value_;
-};
-
 /// Expects of a search that it visits each bin at most once, with its likelihood, and that the
 /// others hold at most what it says was dropped.
 /// @returns number of bins that were settled together, without being evaluated
@@ -189,14 +158,24 @@ std::int64_t expect_sound_search(const BinCase& of, double tolerance) {
   SearchSpace space(hypotheses, options);
   BoundSearch search(space, options, likelihood);
   search.largest().add(of.elements);
-  Visited visited(of.lattice, 2);
+  // [object][bin], nan where a bin is not visited
+  std::vector<std::vector<double>> visited(
+      2, std::vector(static_cast<std::size_t>(of.lattice.bins()), nan));
   std::int64_t together = 0;
   bool once = true;
   const SearchResult result = search.run(
       of.elements, {.tolerance = tolerance}, Deadline({}),
       [&](const BinBox& box, std::span<const double> values) {
-        once = once && visited.take(box, values);
-        if (values.size() == 1 && box.bins() > 1) {
+        const bool alike = values.size() == 1;
+        once = once && box.x_first + box.x_count <= of.lattice.x_mm.count &&
+               box.y_first + box.y_count <= of.lattice.y_mm.count;
+        for (std::int64_t i = 0; once && i < box.bins(); ++i) {
+          double& value = visited[static_cast<std::size_t>(box.object)]
+                                 [static_cast<std::size_t>(box.bin(i, of.lattice))];
+          once = std::isnan(value);
+          value = values[alike ? 0 : static_cast<std::size_t>(i)];
+        }
+        if (alike && box.bins() > 1) {
           EXPECT_NEAR(values[0], prior_log_likelihood(of, static_cast<std::size_t>(box.object)),
                       likelihood.error(static_cast<std::size_t>(box.object), of.elements));
           together += box.bins();
@@ -207,13 +186,12 @@ std::int64_t expect_sound_search(const BinCase& of, double tolerance) {
     const double rounding = 2.0 * likelihood.error(object, of.elements);
     LogSum dropped;
     for (int theta = 0; theta < of.lattice.theta_rad.count; ++theta) {
-      BinBox plane = whole_plane(of.lattice, theta);
-      plane.object = static_cast<std::int32_t>(object);
+      const BinBox plane = whole_plane(of.lattice, theta, static_cast<int>(object));
       std::vector<double> exact(static_cast<std::size_t>(plane.bins()));
       likelihood.evaluate(std::span(&plane, 1), of.elements, exact);
       for (std::size_t i = 0; i < exact.size(); ++i) {
-        const double value = visited.at(object, static_cast<std::size_t>(theta) * exact.size() + i);
-        if (value == Visited::not_visited) {
+        const double value = visited[object][static_cast<std::size_t>(theta) * exact.size() + i];
+        if (std::isnan(value)) {
           dropped.add(exact[i] + std::log(0.5));
         } else {
           EXPECT_NEAR(value, exact[i], rounding) << "bin " << i << " of theta " << theta;

@@ -46,8 +46,7 @@ void check_case(const BinCase& of, std::size_t object, const std::vector<TileSiz
   // Where no element has a penalty, bound and likelihood are the same sum in two orders.
   const double rounding = std::min(1e-9, likelihood.error(object, of.elements));
   for (int theta = 0; theta < of.lattice.theta_rad.count; ++theta) {
-    BinBox whole = whole_plane(of.lattice, theta);
-    whole.object = static_cast<std::int32_t>(object);
+    const BinBox whole = whole_plane(of.lattice, theta, static_cast<int>(object));
     std::vector<double> plane(static_cast<std::size_t>(whole.bins()));
     likelihood.evaluate(std::span(&whole, 1), of.elements, plane);
     for_tiles(bounds, of, theta, [&](std::size_t l, const Tile& tile, double bound, std::uint32_t) {
