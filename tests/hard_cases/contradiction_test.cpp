@@ -64,6 +64,19 @@ TEST(Contradiction, CertainMapsWithoutGamma) {
   }
 }
 
+TEST(Contradiction, OfParticlesOnCertainMaps) {
+  HardCase hard("particles: gamma = 0 on maps at log odds of +-1,000, all contradicted");
+  const std::vector<Hypothesis> objects{{certain_map(412), 1.0}, {certain_map(413), 1.0}};
+  for (const bool augmented : {false, true}) {
+    ParticleOptions options = two_thousand_particles();
+    options.contact.gamma = 0.0;
+    options.augmented = augmented;
+    const ParticleFilter filter =
+        hard.expect_particles(objects, options, random_recording(3, 36, 509), 5e-3);
+    EXPECT_TRUE(filter.estimate().contradicted);
+  }
+}
+
 TEST(Contradiction, OfEveryHypothesis) {
   HardCase hard("gamma = 0 and evidence that contradicts every hypothesis");
   HardCase bounds("bounds: gamma = 0 and touches that contradict every hypothesis");

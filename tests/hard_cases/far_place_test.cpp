@@ -20,6 +20,7 @@ std::vector<Hypothesis> two_objects() {
 TEST(FarPlace, PosesFarFromTheRobotsOrigin) {
   HardCase hard("poses 1e6 mm from the robot's origin, with a pivot, in bins of 0.1 mm");
   HardCase bounds("bounds: pivots 1e6 mm away, with and without the touches");
+  HardCase particles("particles: 1e6 mm from the robot's origin, with a pivot, after 1e6 turns");
   const std::vector<Hypothesis> objects = two_objects();
   const Recording near = random_recording(4, 36, 443);
   PoseHistogram at_origin(hard.device(), objects, fine_options());
@@ -37,6 +38,10 @@ TEST(FarPlace, PosesFarFromTheRobotsOrigin) {
     // 1e-10 mm of 1e6 mm are 2e-10 cells of 12 nats, times 150 elements and turns.
     bounds.expect_laws(objects, options, far, 1e-5);
     bounds.expect_laws(objects, options, near, 1e-5);  // far from the pivot: off the maps
+    ParticleOptions about = two_thousand_particles(away_mm);
+    about.region.theta_rad = {1e6 * two_pi, 1e6 * two_pi + two_pi, 1};
+    EXPECT_NE(particles.expect_particles(objects, about, far).estimate().identity[0], 0.5)
+        << "off the map";
   }
 }
 

@@ -45,6 +45,16 @@ double Allowed::at(double log_likelihood) const {
   return nats + relative * std::abs(log_likelihood);
 }
 
+HistogramOptions small_options() {
+  return {.lattice = {{-5.0, 5.0, 5}, {-5.0, 5.0, 6}, {0.0, two_pi, 4}, {}}};
+}
+
+ParticleOptions two_thousand_particles(const glm::dvec2& pivot_mm) {
+  return {.particles = 2000,
+          .region = {{-5.0, 5.0, 1}, {-5.0, 5.0, 1}, {0, two_pi, 1}, pivot_mm},
+          .seed = 501};
+}
+
 bool all_finite(std::span<const double> numbers) {
   return std::all_of(numbers.begin(), numbers.end(), [](double n) { return std::isfinite(n); });
 }
@@ -196,6 +206,44 @@ Certified HardCase::expect_laws(std::span<const Hypothesis> objects,
   return expect_laws(objects,
                      BoundedOptions{.lattice = options.lattice, .contact = options.contact},
                      recording, nats);
+}
+
+ParticleFilter HardCase::expect_particles(std::span<const Hypothesis> objects,
+                                          const ParticleOptions& options,
+                                          const Recording& recording, double allowed_nats) {
+  SCOPED_TRACE(name_);
+  ParticleFilter filter(device(), objects, options);
+  for (const Touch& touch : all_touches(recording)) {
+    filter.update(touch);
+    const std::vector<ParticleFilter::Particle> particles = filter.particles();
+    std::vector<double> expected;
+    double sum = 0.0;
+    for (const ParticleFilter::Particle& particle : particles) {
+      const OccupancyGrid& map = objects[static_cast<std::size_t>(particle.object)].map;
+      EXPECT_TRUE(is_finite(particle.T_object_robot));
+      expected.push_back(
+          reference::log_likelihood(touch, particle.T_object_robot, map, options.contact));
+      sum += particle.weight;
+    }
+    EXPECT_NEAR(sum, 1.0, 1e-12);
+    // The largest error of the weights that are not negligible.
+    const double most = *std::max_element(expected.begin(), expected.end());
+    const std::vector<double> weights = reference::importance_weights(expected);
+    double error = 0.0;
+    for (std::size_t i = 0; i < expected.size(); ++i) {
+      if (expected[i] > most - near_top_nats) {
+        error = std::max(error, std::abs(std::log(particles[i].weight / weights[i])));
+      }
+    }
+    expect("log weights near the top, nats", error, 2.0 * allowed_nats);
+    EXPECT_GE(filter.effective_sample_size(), 1.0);
+    EXPECT_LE(filter.effective_sample_size(), options.particles);
+    const Estimate estimate = filter.estimate();
+    EXPECT_NEAR(total(estimate.identity), 1.0, 1e-12);
+    EXPECT_TRUE(std::isfinite(estimate.mode.log_likelihood));
+    EXPECT_TRUE(is_finite(estimate.mode.T_object_robot));
+  }
+  return filter;
 }
 
 void HardCase::expect_cell(double log_odds, double expected) {

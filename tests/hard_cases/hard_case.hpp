@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "palpate/map_builder.hpp"
+#include "palpate/particle_filter.hpp"
 #include "palpate/pose_histogram.hpp"
 #include "support/certified.hpp"
 #include "support/sanitized.hpp"
@@ -60,6 +61,13 @@ class HardCase {
   Certified expect_laws(std::span<const Hypothesis> objects, const HistogramOptions& options,
                         const Recording& recording, double nats = 1e-9);
 
+  /// Gives the touches to particles one by one, and expects finite results and, after each touch,
+  /// every particle's weight to agree with float64 at the particle's pose.
+  /// @returns the filter after the last touch
+  ParticleFilter expect_particles(std::span<const Hypothesis> objects,
+                                  const ParticleOptions& options, const Recording& recording,
+                                  double allowed_nats = 1e-4);
+
   /// Expects a map's cell within MapBuilder's promise: 1e-3 nats or a relative 1e-4.
   void expect_cell(double log_odds, double expected);
   /// Builds a map of the touches and expects finite cells that agree with float64.
@@ -78,6 +86,11 @@ class HardCase {
   std::map<std::string, Largest> largest_;
   std::optional<Device> device_;
 };
+
+/// 5 x 6 x 4 bins over 10 x 10 mm and all angles.
+HistogramOptions small_options();
+/// 2,000 particles over 10 x 10 mm and all angles about a pivot.
+ParticleOptions two_thousand_particles(const glm::dvec2& pivot_mm = {});
 
 /// Whether all numbers are finite.
 bool all_finite(std::span<const double> numbers);

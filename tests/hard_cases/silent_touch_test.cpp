@@ -1,6 +1,5 @@
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 #include <gtest/gtest.h>
 
@@ -16,14 +15,6 @@ std::vector<Hypothesis> three_objects() {
   return {{random_map(31, 27, 0.5, 6.0, 421), 1.0},
           {random_map(25, 25, 0.5, 6.0, 422), 2.0},
           {random_map(14, 15, 1.0, 6.0, 423), 1.0}};
-}
-
-HistogramOptions small_options() {
-  HistogramOptions options;
-  options.lattice = {.x_mm = {-5.0, 5.0, 5},
-                     .y_mm = {-5.0, 5.0, 7},
-                     .theta_rad = {0.0, 2.0 * std::numbers::pi, 6}};
-  return options;
 }
 
 /// Expects that touches without known elements change no bit of a bin, and make no map.
@@ -96,6 +87,26 @@ TEST(SilentTouch, EntirelyOffTheMap) {
         EXPECT_NEAR(estimate.mode.log_likelihood, expected, 1e-4);
       }
     }
+  }
+}
+
+TEST(SilentTouch, LeavesParticlesTheirWeights) {
+  HardCase hard("particles: all-Unknown touches, and touches off the map by 40 to 1e300 mm");
+  const std::vector<Hypothesis> objects{{random_map(61, 61, 0.5, 4.0, 502), 1.0},
+                                        {random_map(31, 31, 1.0, 4.0, 503), 1.0}};
+  const auto expect_alike = [&](const Recording& recording) {
+    ParticleFilter filter = hard.expect_particles(objects, two_thousand_particles(), recording);
+    const std::vector<ParticleFilter::Particle> particles = filter.particles();
+    for (const ParticleFilter::Particle& particle : particles) {
+      EXPECT_EQ(particle.weight, particles.front().weight);
+    }
+    return filter;
+  };
+  Recording unknown = random_recording(5, 36, 504);
+  unknown.pressure.assign(unknown.pressure.size(), ContactClassifier{}.threshold);
+  EXPECT_NEAR(expect_alike(unknown).estimate().identity[0], 0.5, 1e-12);
+  for (const double away_mm : {40.0, 1e6, 1e300}) {
+    expect_alike(moved(random_recording(2, 36, 505), {{away_mm, 0.0}, 0.0}));
   }
 }
 

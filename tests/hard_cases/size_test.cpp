@@ -6,12 +6,6 @@
 
 namespace palpate::size_test {
 
-HistogramOptions small_options() {
-  HistogramOptions options;
-  options.lattice = {.x_mm = {-5.0, 5.0, 6}, .y_mm = {-5.0, 5.0, 5}, .theta_rad = {0, two_pi, 4}};
-  return options;
-}
-
 TEST(Size, OneObjectOneBinOneElement) {
   HardCase hard("one object, one bin, one element");
   const std::vector<Hypothesis> objects{{random_map(31, 27, 0.5, 6.0, 451), 1e-30}};

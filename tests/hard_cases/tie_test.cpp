@@ -100,6 +100,18 @@ TEST(Tie, IdenticalObjects) {
   bounds.expect_laws(std::vector<Hypothesis>{{flat, 1.0}, {flat, 1.0}}, options, recording);
 }
 
+TEST(Tie, IdenticalObjectsOfParticlesAndASingleParticle) {
+  HardCase hard("particles: identical objects, and a single particle");
+  const OccupancyGrid map = random_map(31, 27, 0.5, 4.0, 506);
+  const std::vector<Hypothesis> objects{{map, 1.0}, {map, 1.0}};
+  ParticleOptions options = two_thousand_particles();
+  hard.expect_particles(objects, options, random_recording(3, 36, 507));
+  options.particles = 1;
+  const ParticleFilter one = hard.expect_particles(objects, options, random_recording(3, 36, 507));
+  EXPECT_EQ(std::ranges::max(one.estimate().identity), 1.0);
+  EXPECT_EQ(one.effective_sample_size(), 1.0);
+}
+
 TEST(Tie, TwoFoldSymmetry) {
   HardCase hard("two-fold symmetry");
   OccupancyGrid map = random_map(31, 27, 0.5, 6.0, 433);

@@ -6,12 +6,6 @@
 
 namespace palpate::weight_test {
 
-HistogramOptions small_options() {
-  HistogramOptions options;
-  options.lattice = {.x_mm = {-5.0, 5.0, 5}, .y_mm = {-5.0, 5.0, 5}, .theta_rad = {0.0, 6.0, 4}};
-  return options;
-}
-
 TEST(Weight, ExtremelyUnequal) {
   HardCase hard("prior weights of 1e-30 beside 1");
   std::vector<Hypothesis> objects{{random_map(31, 27, 0.5, 6.0, 471), 1.0},
@@ -51,6 +45,19 @@ TEST(Weight, OfAMillionthByBounds) {
       EXPECT_LE(hard.expect_laws(objects, options, recording).widest_nats, 0.1);
     }
   }
+}
+
+TEST(Weight, ExtremelyUnequalOfParticles) {
+  HardCase hard("particles: prior weights of 1e-30 beside 1, and of 1e308");
+  const auto first_identity = [&](double first, double second) {
+    const std::vector<Hypothesis> objects{{random_map(61, 61, 0.5, 4.0, 502), first},
+                                          {random_map(31, 31, 1.0, 4.0, 503), second}};
+    hard.expect_particles(objects, two_thousand_particles(), random_recording(2, 36, 510));
+    return ParticleFilter(hard.device(), objects, two_thousand_particles()).estimate().identity[0];
+  };
+  EXPECT_EQ(first_identity(1e-30, 1.0), 0.0) << "too light for one of 2,000 particles";
+  EXPECT_NEAR(first_identity(1e308, 1e308), 0.5, 1e-12);
+  EXPECT_NEAR(first_identity(5e-324, 5e-324), 0.5, 1e-12);
 }
 
 TEST(Weight, AtTheEndsOfFloat64) {

@@ -1,12 +1,17 @@
-// A belief within other tolerances than the options', and one that is flat.
+// A belief within other tolerances than the options', one that is flat, and samples of beliefs.
 
 #include <chrono>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <stdexcept>
 #include <thread>
+#include <vector>
 
 #include <gtest/gtest.h>
+#include <glm/common.hpp>
+#include <glm/vec3.hpp>
 
 #include "bounded_set_up.hpp"
 
@@ -91,6 +96,104 @@ TEST(BoundedBelief, OfAHundredMillionBinsBeforeAnyTouchIsFlat) {
   EXPECT_LE(largest_difference(marginals.theta, std::vector<double>(3, 2.0 / 3.0 / 3.0)), 1e-6);
   // What is promised for a thousand million bins.
   EXPECT_LE(posterior.host_bytes(), std::uint64_t{256} << 20);
+}
+
+/// The share of draws in every (x, y) and theta of both objects, on small_options()' lattice.
+struct Shares {
+  explicit Shares(const std::vector<PoseSample>& draws) {
+    const PoseLattice lattice = small_options().lattice;
+    const auto plane = static_cast<std::size_t>(lattice.plane());
+    xy.assign(2, std::vector<double>(plane));
+    theta.assign(2, std::vector<double>(16));
+    for (const PoseSample& draw : draws) {
+      const auto bin = static_cast<std::size_t>(lattice.bin_of(draw.T_object_robot));
+      xy[static_cast<std::size_t>(draw.object)][bin % plane] += 1.0 / std::ssize(draws);
+      theta[static_cast<std::size_t>(draw.object)][bin / plane] += 1.0 / std::ssize(draws);
+    }
+  }
+  std::vector<std::vector<double>> xy;
+  std::vector<std::vector<double>> theta;
+};
+
+/// Draws to the bit.
+std::vector<std::vector<double>> bits_of(const std::vector<PoseSample>& draws) {
+  std::vector<std::vector<double>> bits;
+  for (const PoseSample& draw : draws) {
+    bits.push_back({static_cast<double>(draw.object), draw.T_object_robot.translation_mm.x,
+                    draw.T_object_robot.translation_mm.y, draw.T_object_robot.theta_rad});
+  }
+  return bits;
+}
+
+TEST(DrawnBelief, IsDrawnFromInProportion) {
+  BoundedOptions with_none = small_options();
+  with_none.none_weight = 5.0;  // which draws leave out
+  for (const BoundedOptions& options : {small_options(), with_none, uncertain_options()}) {
+    BoundedPosterior posterior(two_shapes(), options);
+    for (const std::size_t touches : {0U, 1U, 3U}) {
+      SCOPED_TRACE(::testing::Message() << touches << " touches");
+      posterior.reset();
+      posterior.update(touches_of_l(3, 822).touches(0, touches));
+      constexpr std::size_t count = 4000;
+      const std::vector<PoseSample> draws = posterior.sample(count, 823);
+      ASSERT_EQ(draws.size(), count);
+      const Shares drawn(draws);
+      const Estimate estimate = posterior.estimate();
+      const double objects = sum(estimate.identity);
+      for (std::size_t i = 0; i < 2; ++i) {
+        // One draw in each of `count` equal parts of the belief.
+        EXPECT_NEAR(sum(drawn.xy[i]), estimate.identity[i] / objects, 1.0 / count + 1e-6);
+        const Marginals marginals = posterior.marginals(static_cast<int>(i));
+        const auto expect_drawn = [&](const std::vector<double>& shares,
+                                      const std::vector<double>& expected) {
+          for (std::size_t k = 0; k < shares.size(); ++k) {
+            const double p = expected[k] / objects;
+            EXPECT_NEAR(shares[k], p, 5.0 * std::sqrt(p / count) + 2.0 / count);
+          }
+        };
+        expect_drawn(drawn.xy[i], marginals.xy);
+        expect_drawn(drawn.theta[i], marginals.theta);
+      }
+      EXPECT_EQ(bits_of(posterior.sample(count, 823)), bits_of(draws));
+      EXPECT_NE(bits_of(posterior.sample(count, 824)), bits_of(draws));
+      EXPECT_TRUE(posterior.sample(0, 1).empty());
+    }
+  }
+}
+
+TEST(DrawnBelief, IsDrawnFromEverywhereWhereNoTouchSeesAMap) {
+  BoundedPosterior posterior(two_shapes(), small_options());
+  const Recording recording = moved(touches_of_l(3, 829), {{1e3, 0.0}, 0.0});
+  constexpr std::size_t count = 3000;
+  for (const Touch& touch : all_touches(recording)) {
+    posterior.update(touch);
+    const Shares drawn(posterior.sample(count, 830));
+    EXPECT_NEAR(sum(drawn.theta[0]), 1.0 / 3.0, 1.0 / count) << "the prior weights";
+    for (std::size_t t = 0; t < 16; ++t) {
+      EXPECT_NEAR(drawn.theta[0][t] + drawn.theta[1][t], 1.0 / 16.0, 3.0 / count);
+    }
+  }
+}
+
+TEST(DrawnBelief, IsDrawnFromAllOverTheBins) {
+  BoundedPosterior posterior(two_shapes(), small_options());
+  const PoseLattice& lattice = posterior.lattice();
+  posterior.update(touches_of_l(2, 826).touches(0, 2));
+  glm::dvec3 least(1.0);
+  glm::dvec3 most(-1.0);
+  for (const PoseSample& draw : posterior.sample(500, 827)) {
+    const Pose centre = lattice.T_object_robot(lattice.bin_of(draw.T_object_robot));
+    const glm::dvec2 off_mm = draw.T_object_robot * lattice.pivot_mm - centre * lattice.pivot_mm;
+    const glm::dvec3 off(
+        off_mm.x / lattice.x_mm.step(), off_mm.y / lattice.y_mm.step(),
+        (draw.T_object_robot.theta_rad - centre.theta_rad) / lattice.theta_rad.step());
+    least = glm::min(least, off);
+    most = glm::max(most, off);
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    EXPECT_LT(least[axis], -0.45) << "of half a step";
+    EXPECT_GT(most[axis], 0.45);
+  }
 }
 
 }  // namespace palpate::bounded_belief_test

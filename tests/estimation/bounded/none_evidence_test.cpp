@@ -9,8 +9,6 @@
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <tbb/global_control.h>
-#include <tbb/task_arena.h>
 
 #include "bins_by_definition.hpp"
 #include "estimation/hypotheses.hpp"
@@ -189,19 +187,6 @@ TEST(NoneEvidence, DoesNotDependOnTheOrderButForTheFirstShare) {
   expect_same(none.bounds_of(touches), forth);
   std::ranges::reverse(touches);
   expect_holds(none.bounds_of(touches), none.expected(touches), first_width);
-}
-
-TEST(NoneEvidence, HasTheSameBitsOnAnyNumberOfThreads) {
-  // More threads than the machine may have cores.
-  const tbb::global_control allow(tbb::global_control::max_allowed_parallelism, 4);
-  const Recording recording = random_recording(2, 36, 710);
-  const std::vector<Touch> touches = all_touches(recording);
-  NoneByBounds none(two_objects(), lattice_of(30, 30, 8));
-  const LogInterval told = none.bounds_of(touches);
-  for (const int threads : {1, 2, 4}) {
-    SCOPED_TRACE(threads);
-    expect_same(tbb::task_arena(threads).execute([&] { return none.bounds_of(touches); }), told);
-  }
 }
 
 TEST(MeanSearch, FindsTheSameWhereItHasNoRoomForSums) {
