@@ -24,10 +24,8 @@ OccupancyGrid filled_map(float log_odds) {
 }
 
 HistogramOptions with_gamma(double gamma) {
-  HistogramOptions options;
-  options.contact.gamma = gamma;
-  options.lattice = {.x_mm = {-3.0, 3.0, 5}, .y_mm = {-3.0, 3.0, 6}, .theta_rad = {0.0, 6.0, 4}};
-  return options;
+  return {.lattice = {{-3.0, 3.0, 5}, {-3.0, 3.0, 6}, {0.0, 6.0, 4}, {}},
+          .contact = {.gamma = gamma}};
 }
 
 // Interpolation between -1,000 and 1,000 keeps the seven digits of float32: an error of 1e-4 nats

@@ -8,9 +8,7 @@ namespace palpate::far_place_test {
 
 /// Bins of 0.1 mm.
 HistogramOptions fine_options() {
-  HistogramOptions options;
-  options.lattice = {.x_mm = {-1.0, 1.0, 20}, .y_mm = {-0.5, 0.5, 10}, .theta_rad = {0, two_pi, 4}};
-  return options;
+  return {.lattice = {{-1.0, 1.0, 20}, {-0.5, 0.5, 10}, {0, two_pi, 4}, {}}};
 }
 
 std::vector<Hypothesis> two_objects() {

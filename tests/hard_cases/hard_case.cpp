@@ -21,24 +21,6 @@ constexpr double near_top_nats = 20.0;
 
 std::string digits(double number) { return number == 0.0 ? "0" : fmt::format("{:.1e}", number); }
 
-/// Log probability of every bin of every object, [object][bin].
-std::vector<std::vector<double>> log_posterior(std::span<const Hypothesis> objects,
-                                               std::vector<std::vector<double>> logs) {
-  LogSum sum;
-  for (std::size_t object = 0; object < logs.size(); ++object) {
-    for (double& l : logs[object]) {
-      l += std::log(objects[object].weight);
-      sum.add(l);
-    }
-  }
-  for (auto& bins : logs) {
-    for (double& l : bins) {
-      l -= sum.log();
-    }
-  }
-  return logs;
-}
-
 }  // namespace
 
 double Allowed::at(double log_likelihood) const {
@@ -120,40 +102,40 @@ Estimate HardCase::expect_posterior(std::span<const Hypothesis> objects,
   Estimate estimate = histogram.estimate();
 
   std::vector<std::vector<double>> bins;
+  LogSum product_evidence;
+  LogSum evidence;
+  double top = -std::numeric_limits<double>::infinity();
   for (std::size_t object = 0; object < objects.size(); ++object) {
     bins.push_back(histogram.log_likelihood(static_cast<int>(object)));
     EXPECT_TRUE(all_finite(bins.back())) << name_ << ": bins of object " << object;
+    const double log_weight = std::log(objects[object].weight);
+    for (std::size_t bin = 0; bin < bins.back().size(); ++bin) {
+      const double l = expected.log_likelihood[object][bin] + log_weight;
+      product_evidence.add(bins[object][bin] + log_weight);
+      evidence.add(l);
+      top = std::max(top, l);
+    }
+  }
+  Largest near_top;
+  for (std::size_t object = 0; object < objects.size(); ++object) {
     // The bin whose error comes closest to the allowed error, or exceeds it the most.
     std::optional<Largest> largest;
-    for (std::size_t bin = 0; bin < bins.back().size(); ++bin) {
+    for (std::size_t bin = 0; bin < bins[object].size(); ++bin) {
       const double l = expected.log_likelihood[object][bin];
-      const Largest here{std::abs(bins.back()[bin] - l), allowed.at(l)};
-      if (!largest || here.error - here.allowed > largest->error - largest->allowed) {
-        largest = here;
+      const double error = bins[object][bin] - l;
+      if (!largest || std::abs(error) - allowed.at(l) > largest->error - largest->allowed) {
+        largest = {std::abs(error), allowed.at(l)};
+      }
+      if (l + std::log(objects[object].weight) > top - near_top_nats) {
+        const double of_log_posterior = error - (product_evidence.log() - evidence.log());
+        near_top.error = std::max(near_top.error, std::abs(of_log_posterior));
+        near_top.allowed = std::max(near_top.allowed, 2.0 * allowed.at(l));
       }
     }
     expect("log-likelihood, nats", largest->error, largest->allowed);
   }
-
-  const auto product_logs = log_posterior(objects, bins);
-  const auto expected_logs = log_posterior(objects, expected.log_likelihood);
-  double top = -std::numeric_limits<double>::infinity();
-  for (const auto& logs : expected_logs) {
-    top = std::max(top, *std::max_element(logs.begin(), logs.end()));
-  }
-  Largest near_top;
-  for (std::size_t object = 0; object < objects.size(); ++object) {
-    for (std::size_t bin = 0; bin < bins[object].size(); ++bin) {
-      if (expected_logs[object][bin] > top - near_top_nats) {
-        const double error = std::abs(product_logs[object][bin] - expected_logs[object][bin]);
-        near_top.error = std::max(near_top.error, error);
-        near_top.allowed =
-            std::max(near_top.allowed, 2.0 * allowed.at(expected.log_likelihood[object][bin]));
-      }
-    }
-  }
-  const double near_top_nats_allowed = allowed.near_top_nats.value_or(near_top.allowed);
-  expect("log posterior near the top, nats", near_top.error, near_top_nats_allowed);
+  near_top.allowed = allowed.near_top_nats.value_or(near_top.allowed);
+  expect("log posterior near the top, nats", near_top.error, near_top.allowed);
 
   EXPECT_NEAR(total(estimate.identity), 1.0, 1e-12) << name_;
   expect("identity", largest_difference(estimate.identity, reference::identity(expected)),
@@ -162,7 +144,9 @@ Estimate HardCase::expect_posterior(std::span<const Hypothesis> objects,
   const auto object = static_cast<std::size_t>(estimate.mode.object);
   const auto bin = static_cast<std::size_t>(estimate.mode.bin.value());
   EXPECT_EQ(estimate.mode.log_likelihood, bins[object][bin]) << name_;
-  check("mode below the best bin, nats", top - expected_logs[object][bin], near_top_nats_allowed);
+  check("mode below the best bin, nats",
+        top - expected.log_likelihood[object][bin] - std::log(objects[object].weight),
+        near_top.allowed);
   const Pose pose = reference::bin_pose(histogram.lattice(), *estimate.mode.bin);
   const glm::dvec2 shift = estimate.mode.T_object_robot.translation_mm - pose.translation_mm;
   EXPECT_LE(std::hypot(shift.x, shift.y), 1e-8) << name_;

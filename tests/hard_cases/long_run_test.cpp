@@ -29,10 +29,7 @@ std::vector<Hypothesis> near_twins() {
 
 /// A few bins so close together that all of them stay near the top.
 HistogramOptions near_the_top(int rows, int thetas = 3) {
-  HistogramOptions options;
-  options.lattice = {
-      .x_mm = {-0.002, 0.002, 3}, .y_mm = {1.0, 1.002, rows}, .theta_rad = {0.5, 0.5005, thetas}};
-  return options;
+  return {.lattice = {{-0.002, 0.002, 3}, {1.0, 1.002, rows}, {0.5, 0.5005, thetas}, {}}};
 }
 
 TEST(LongRun, TenThousandTouchesInARow) {

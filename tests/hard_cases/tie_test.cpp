@@ -10,9 +10,7 @@
 namespace palpate::tie_test {
 
 HistogramOptions symmetric_options() {
-  HistogramOptions options;
-  options.lattice = {.x_mm = {-4.0, 4.0, 5}, .y_mm = {-4.0, 4.0, 5}, .theta_rad = {0, two_pi, 8}};
-  return options;
+  return {.lattice = {{-4.0, 4.0, 5}, {-4.0, 4.0, 5}, {0, two_pi, 8}, {}}};
 }
 
 /// The bin of the pose that is turned by quarters of a turn about the object's middle. The lattice
