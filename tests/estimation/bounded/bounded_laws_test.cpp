@@ -61,6 +61,24 @@ TEST_P(BoundedLaws, HoldInFloat64AndToTheBit) {
   expect_laws(GetParam().objects, GetParam().options, GetParam().recording);
 }
 
+/// Expects bounds to agree with the histogram about "none of these" after so many touches, of each
+/// of which the method allows a float32 mean 1e-3 nats, and its bounds to hold its log evidence and
+/// its odds against the first object.
+void expect_none_as_dense(const Estimate& ours, const Estimate& theirs, std::size_t touches) {
+  const double nats = 1e-3 * static_cast<double>(touches) + 1e-9;
+  const LogInterval none = ours.certificate->none_log_evidence.value();
+  const double share = *theirs.none_log_evidence - theirs.log_evidence[0];
+  EXPECT_LE(none.low - ours.log_evidence[0], share + nats);
+  EXPECT_GE(none.high - ours.log_evidence[0], share - nats);
+  EXPECT_LE(none.low, *ours.none_log_evidence);
+  EXPECT_GE(none.high, *ours.none_log_evidence);
+  const auto [least, most] = ours.certificate->log_evidence[0];
+  const double against = ours.log_evidence[0] - *ours.none_log_evidence;
+  EXPECT_NEAR(std::log(ours.identity[0] / ours.none), against, 1e-9);
+  EXPECT_GE(against, least - none.high - 1e-12);
+  EXPECT_LE(against, most - none.low + 1e-12);
+}
+
 void expect_same_pose(const RefinedPose& ours, const RefinedPose& theirs) {
   // Logs that are 1e-4 nats off per touch move a mean within 2.5 mm by at most some 1e-3 mm.
   const auto& [our_mm, our_rad] = ours.T_object_robot;

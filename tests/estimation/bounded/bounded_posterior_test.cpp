@@ -15,17 +15,13 @@
 
 namespace palpate::bounded_posterior_test {
 
-TEST(BoundedPosterior, BeforeAnyTouchKnowsTheWeights) {
+TEST(BoundedPosterior, BeforeAnyTouchKnowsTheWeightsAndSaysHowItSearches) {
   const BoundedPosterior posterior(two_made_up(), small_options());
   const Estimate estimate = posterior.estimate();
   EXPECT_NEAR(estimate.identity[0], 0.25, 1e-12);
   EXPECT_NEAR(estimate.identity[1], 0.75, 1e-12);
   EXPECT_EQ(estimate.mode.log_likelihood, 0.0);
   EXPECT_FALSE(estimate.contradicted);
-}
-
-TEST(BoundedPosterior, SaysHowItWasFound) {
-  const BoundedPosterior posterior(two_shapes(), small_options());
   EXPECT_FALSE(posterior.path().empty());
   EXPECT_EQ(posterior.path().find('\n'), std::string::npos);
   EXPECT_GT(posterior.host_bytes(), 0U);

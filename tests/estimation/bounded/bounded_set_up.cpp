@@ -1,9 +1,6 @@
 #include "bounded_set_up.hpp"
 
-#include <cmath>
 #include <numeric>
-
-#include <gtest/gtest.h>
 
 #include "support/touched_shape.hpp"
 
@@ -56,21 +53,6 @@ BothFilters::BothFilters(Device& device, const std::vector<Hypothesis>& objects,
 void BothFilters::update(const Touch& touch) {
   bounded.update(touch);
   dense.update(touch);
-}
-
-void expect_none_as_dense(const Estimate& ours, const Estimate& theirs, std::size_t touches) {
-  const double nats = 1e-3 * static_cast<double>(touches) + 1e-9;
-  const LogInterval none = ours.certificate->none_log_evidence.value();
-  const double share = *theirs.none_log_evidence - theirs.log_evidence[0];
-  EXPECT_LE(none.low - ours.log_evidence[0], share + nats);
-  EXPECT_GE(none.high - ours.log_evidence[0], share - nats);
-  EXPECT_LE(none.low, *ours.none_log_evidence);
-  EXPECT_GE(none.high, *ours.none_log_evidence);
-  const auto [least, most] = ours.certificate->log_evidence[0];
-  const double against = ours.log_evidence[0] - *ours.none_log_evidence;
-  EXPECT_NEAR(std::log(ours.identity[0] / ours.none), against, 1e-9);
-  EXPECT_GE(against, least - none.high - 1e-12);
-  EXPECT_LE(against, most - none.low + 1e-12);
 }
 
 }  // namespace palpate

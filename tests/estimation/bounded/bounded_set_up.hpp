@@ -44,9 +44,4 @@ struct BothFilters {
   PoseHistogram dense;
 };
 
-/// Expects bounds to agree with the histogram about "none of these" after so many touches, of each
-/// of which the method allows a float32 mean 1e-3 nats, and its bounds to hold its log evidence and
-/// its odds against the first object.
-void expect_none_as_dense(const Estimate& ours, const Estimate& theirs, std::size_t touches);
-
 }  // namespace palpate
