@@ -21,9 +21,8 @@ std::size_t random_object(const BinCase& of, Uniform& random);
 /// Cosine and sine of a theta of the lattice.
 glm::dvec2 turn_of(const PoseLattice& lattice, int theta);
 
-/// Calls visit(level, tile, bound, penalties) for all tiles of all levels at a theta, in whole
-/// batches: the bound of a bin's log-likelihood in nats, and the penalties that it lies below the
-/// level's best.
+/// Calls visit(level, tile, bound) for all tiles of all levels at a theta, in whole batches: the
+/// bound of a bin's log-likelihood in nats.
 template <typename Visit>
 void for_tiles(const TileBounds& bounds, const BinCase& of, int theta, const Visit& visit) {
   WindowPlaces placed;
@@ -37,7 +36,7 @@ void for_tiles(const TileBounds& bounds, const BinCase& of, int theta, const Vis
         bounds.add(l, of.elements, placed, x, y, sums);
         for (int i = 0; i < batch_tiles; ++i) {
           const Tile tile{.theta = theta, .x = x + i / batch_side, .y = y + i % batch_side};
-          visit(l, tile, best - sums[i] / penalties_per_nat, sums[i]);
+          visit(l, tile, best - sums[i] / penalties_per_nat);
         }
       }
     }

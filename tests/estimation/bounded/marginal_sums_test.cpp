@@ -58,17 +58,4 @@ TEST(MarginalSums, AreThoseOfTheirDefinition) {
   }
 }
 
-// 1e12 bins: one by one they would take hours.
-TEST(MarginalSums, OfOneLikelihoodTakeTheTimeOfTheGrid) {
-  constexpr int count = 1'000'000;
-  const PoseLattice many{{-10.0, 10.0, count}, {-10.0, 10.0, count}, {0.0, 1.0, 1}, {}};
-  const PoseLattice grid{{-10.0, 10.0, 5}, {-10.0, 10.0, 4}, {0.0, 1.0, 1}, {}};
-  MarginalSums sums(many, grid);
-  sums.add({.y_count = count, .x_count = count}, std::vector{0.0},
-           -2.0 * std::log(static_cast<double>(count)));
-  const Marginals marginals = sums.take();
-  EXPECT_LE(largest_difference(marginals.xy, std::vector(20, 1.0 / 20.0)), 1e-12);
-  EXPECT_NEAR(marginals.theta[0], 1.0, 1e-12);
-}
-
 }  // namespace palpate::marginal_sums_test

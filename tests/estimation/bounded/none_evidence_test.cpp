@@ -43,10 +43,10 @@ class NoneByBounds {
         [&](const LogInterval& found) { return found.high - found.low <= width_nats; },
         Deadline({}));
   }
-  LogInterval bounds_of(std::span<const Touch> touches, double width_nats = first_width) {
+  LogInterval bounds_of(std::span<const Touch> touches) {
     none.reset();
     add(touches);
-    return bounds(width_nats);
+    return bounds();
   }
 
   /// Its definition, by all bins, where touches lie as the robot says.
@@ -80,6 +80,14 @@ void expect_holds(const LogInterval& bounds, double value, double width_nats) {
   EXPECT_LE(bounds.high - bounds.low, width_nats);
 }
 
+/// Expects the bounds to hold the definition after a few searches, and after more of them.
+void expect_definition(NoneByBounds& none, std::span<const Touch> touches,
+                       double close_nats = 1e-6) {
+  const double expected = none.expected(touches);
+  expect_holds(none.bounds_of(touches), expected, first_width);
+  expect_holds(none.bounds(close_nats), expected, close_nats);
+}
+
 PoseLattice lattice_of(int x, int y, int theta) {
   return {.x_mm = {-15.0, 16.0, x},
           .y_mm = {-14.0, 15.0, y},
@@ -103,14 +111,12 @@ TEST(NoneEvidence, HoldsItsDefinition) {
         SCOPED_TRACE(fmt::format("{} elements, seed {}", elements, ++seed));
         const Recording recording = random_recording(1, elements, seed);
         const std::vector<Touch> touches = all_touches(recording);
-        const double expected = none.expected(touches);
-        expect_holds(none.bounds_of(touches), expected, first_width);
         // The table is so steep that its float64 rounding may be more.
         const KnownElements known =
             known_elements(TouchEvidence(touches[0], none.options.contact), none.options);
         const double error =
             std::max(none.likelihood.error(0, known), none.likelihood.error(1, known));
-        expect_holds(none.bounds(1e-6), expected, std::max(1e-6, 2.5 * error));
+        expect_definition(none, touches, std::max(1e-6, 2.5 * error));
       }
     }
   }
@@ -118,11 +124,9 @@ TEST(NoneEvidence, HoldsItsDefinition) {
 
 TEST(NoneEvidence, LeavesOutThatTouchesAreDisplaced) {
   const Recording recording = random_recording(2, 36, 720);
-  const std::vector<Touch> touches = all_touches(recording);
   for (const DisplacementSd& sd : {DisplacementSd{2.0, 0.33}, DisplacementSd{0.0, 0.3}}) {
     NoneByBounds displaced(two_objects(), lattice_of(19, 17, 20), {}, sd);
-    expect_holds(displaced.bounds_of(touches), displaced.expected(touches), first_width);
-    expect_holds(displaced.bounds(1e-6), displaced.expected(touches), 1e-6);
+    expect_definition(displaced, all_touches(recording));
   }
 }
 
@@ -140,8 +144,7 @@ TEST(NoneEvidence, CountsAnObjectOfSmallPriorThatAloneExplainsTheTouch) {
     element_mm *= 0.2;
   }
   recording.pressure.assign(12, 10.0);
-  const std::vector<Touch> touches = all_touches(recording);
-  expect_holds(none.bounds_of(touches), none.expected(touches), first_width);
+  expect_definition(none, all_touches(recording));
 }
 
 TEST(NoneEvidence, CountsAllBinsWhereTheArrayMeetsNoObject) {
@@ -153,7 +156,7 @@ TEST(NoneEvidence, CountsAllBinsWhereTheArrayMeetsNoObject) {
     NoneByBounds none(two_objects(), lattice);
     // Every bin sees nothing but the prior, and s is 1: it counts once, at the first touch.
     expect_holds(none.bounds_of(first), none.expected(first), 1e-9);
-    expect_holds(none.bounds_of(touches), none.expected(touches), first_width);
+    expect_definition(none, touches);
   }
 }
 
@@ -170,10 +173,9 @@ TEST(NoneEvidence, CountsNoTouchWithoutAKnownElement) {
 
 TEST(NoneEvidence, HoldsItsDefinitionOverOneBin) {
   const Recording recording = random_recording(3, 8, 708);
-  const std::vector<Touch> touches = all_touches(recording);
   for (const double x : {0.0, 30.0}) {
     NoneByBounds none(two_objects(), {{x, x, 1}, {0.5, 0.5, 1}, {0.4, 0.4, 1}, {}});
-    expect_holds(none.bounds_of(touches, 1e-8), none.expected(touches), 1e-8);
+    expect_definition(none, all_touches(recording), 1e-8);
   }
 }
 
@@ -186,7 +188,7 @@ TEST(NoneEvidence, DoesNotDependOnTheOrderButForTheFirstShare) {
   std::reverse(touches.begin() + 1, touches.end());  // the first stays the first
   expect_same(none.bounds_of(touches), forth);
   std::ranges::reverse(touches);
-  expect_holds(none.bounds_of(touches), none.expected(touches), first_width);
+  expect_definition(none, touches);
 }
 
 TEST(MeanSearch, FindsTheSameWhereItHasNoRoomForSums) {

@@ -108,45 +108,6 @@ TEST(SeenTiles, HoldsNothingWithoutElements) {
   EXPECT_EQ(seen.y_first, seen.y_end);
 }
 
-TEST(SeenTiles, HaveThePriorsBoundWhereNoElementSeesTheMap) {
-  Uniform random(502);
-  std::int64_t tiles = 0;
-  for (int trial = 0; trial < trials(200) && !HasFailure(); ++trial) {
-    SCOPED_TRACE(fmt::format("trial {}", trial));
-    const BinCase of = random_far_case(random);
-    const std::size_t object = random_object(of, random);
-    const TileBounds bounds(of.map, of.contact, object, of.lattice,
-                            tile_sizes(of.lattice, of.map.cell_mm, 1));
-    const double prior = prior_log_likelihood(of, object);
-    const auto elements = static_cast<double>(of.elements.from_pivot_mm.size());
-    for (std::size_t l = 0; l < bounds.levels().size(); ++l) {
-      // A penalty is rounded down by less than 1.01 steps, and capped.
-      const double bound =
-          bounds.best(l, of.elements) - bounds.penalty_beyond(l, of.elements) / penalties_per_nat;
-      ASSERT_GE(bound, prior - 1e-9);
-      if (!of.contact.table) {
-        ASSERT_LE(bound, prior + 1.01 * elements / penalties_per_nat + 1e-9);
-      }
-    }
-    for (int theta = 0; theta < of.lattice.theta_rad.count; ++theta) {
-      const BoundingBox reach = reach_of(of.elements, turn_of(of.lattice, theta));
-      for_tiles(bounds, of, theta,
-                [&](std::size_t l, const Tile& tile, double, std::uint32_t penalties) {
-                  const TileLevel& level = bounds.levels()[l];
-                  if (seen_tiles(reach, of.map, level).holds(tile)) {
-                    return;
-                  }
-                  const std::uint32_t beyond = bounds.penalty_beyond(l, of.elements);
-                  // The last squares of single bins reach beyond the map.
-                  ASSERT_TRUE(penalties == beyond || (penalties < beyond && level.size.bins == 1))
-                      << fmt::format("level {}, tile {}, {}", l, tile.x, tile.y);
-                  ++tiles;
-                });
-    }
-  }
-  EXPECT_GT(tiles, 40'000);
-}
-
 /// Expects of a search that it visits each bin at most once, with its likelihood, and that the
 /// others hold at most what it says was dropped.
 /// @returns number of bins that were settled together, without being evaluated

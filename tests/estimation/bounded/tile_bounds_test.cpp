@@ -49,7 +49,7 @@ void check_case(const BinCase& of, std::size_t object, const std::vector<TileSiz
     const BinBox whole = whole_plane(of.lattice, theta, static_cast<int>(object));
     std::vector<double> plane(static_cast<std::size_t>(whole.bins()));
     likelihood.evaluate(std::span(&whole, 1), of.elements, plane);
-    for_tiles(bounds, of, theta, [&](std::size_t l, const Tile& tile, double bound, std::uint32_t) {
+    for_tiles(bounds, of, theta, [&](std::size_t l, const Tile& tile, double bound) {
       const BinBox box = bounds.levels()[l].box_of(tile);
       if (box.bins() == 0) {
         return;
