@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "bounded_set_up.hpp"
+#include "estimation/log_sum.hpp"
 
 namespace palpate::bounded_none_test {
 
@@ -66,8 +67,16 @@ TEST(BoundedNone, IsBoundedAsCloselyAsTheEvidenceAndWithin0_3Nats) {
     const Estimate estimate = estimate_of(two_made_up(), options, random_recording(1, 36, 820));
     EXPECT_GE(none_width(estimate), row.least);
     EXPECT_LE(none_width(estimate), row.most);
-    for (const ProbabilityInterval& p : estimate.identity_bounds) {
-      EXPECT_LE(p.high - p.low, 0.3 / 4.0 + 4.0 * options.tolerance);
+    const Certificate& certificate = estimate.certificate.value();
+    const LogInterval none = *certificate.none_log_evidence;
+    for (std::size_t i = 0; i < 2; ++i) {
+      const auto [own_low, own_high] = certificate.log_evidence[i];
+      const auto [other_low, other_high] = certificate.log_evidence[1 - i];
+      const auto [low, high] = estimate.identity_bounds[i];
+      EXPECT_LE(high - low, 0.3 / 4.0 + 4.0 * options.tolerance);
+      // The least where all others have the most.
+      EXPECT_LE(low, 1.0 / (1.0 + std::exp(log_add(other_high, none.high) - own_low)) + 1e-12);
+      EXPECT_GE(high, 1.0 / (1.0 + std::exp(log_add(other_low, none.low) - own_high)) - 1e-12);
     }
   }
 }
