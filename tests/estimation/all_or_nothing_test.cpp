@@ -49,65 +49,6 @@ TEST(BrokenOffUpdate, LeavesABeliefThatSaysSo) {
   EXPECT_EQ(histogram.estimate().mode.log_likelihood, 0.0);
 }
 
-TEST(MapBuilder, OfTouchesOneOfWhichCannotBeMappedNoneIsTakenIn) {
-  Device device = Device::open();
-  Recording recording = random_recording(4, 36, 176);
-  const std::vector<Touch> sound = all_touches(recording);
-  MapBuilder expected(device, {});
-  expected.add(std::span(sound).first(2));
-  const OccupancyGrid map = expected.build("made up");
-
-  Device least = lowered_device([](gpu::Limits& limits) { limits.storage_range = 1 << 27; });
-  MapBuilder builder(least, {});
-  builder.add(std::span(sound).first(1));
-  const auto refuse = [&](const Pose& T_robot_sensor, const char* says) {
-    std::vector<Touch> touches(sound.begin() + 1, sound.end());
-    touches[2].T_robot_sensor = T_robot_sensor;
-    expect_named(input_error([&] { builder.add(touches); }), {says});
-  };
-  refuse({{infinity, 0.0}, 0.0}, "T_robot_sensor is not finite");
-  refuse({{1e300, 0.0}, 0.0}, "touch 2: an element at [1e+300");
-  refuse({{-1.1e9, 0.0}, 0.0}, "within 1e+09 mm");
-  refuse({{1e9 - 10.0, 0.0}, 0.0}, "use larger cells");  // too many cells to count
-  refuse({{1e4, 1e4}, 0.0}, "use larger cells");         // more than the device binds
-  builder.add(std::span(sound).subspan(1, 1));
-  const OccupancyGrid built = builder.build("made up");
-  EXPECT_EQ(built.origin_mm, map.origin_mm);
-  EXPECT_EQ(built.log_odds, map.log_odds) << "as if nothing had been refused";
-  expect_named(input_error([&] { builder.build("(none)"); }), {"(none)"});
-}
-
-TEST(MapBuilder, RoomForMoreNeverCostsWhatIsNeeded) {
-  const Recording recording = random_recording(3, 4, 177);
-  std::vector<Touch> touches = all_touches(recording);
-  Device device = Device::open();
-  gpu::Limits limits = device.context().limits();
-  // Touched from left to right, in cells of 8 bytes: what is needed in the end just fits.
-  const MapOptions options{.cell_mm = 0.25};
-  const auto place = [&](double first_mm, double second_mm, double third_mm) {
-    touches[0].T_robot_sensor = {{first_mm, 0.0}, 0.0};
-    touches[1].T_robot_sensor = {{second_mm, 0.0}, 0.0};
-    touches[2].T_robot_sensor = {{third_mm, 0.0}, 0.0};
-  };
-  place(0.0, 10.0, 80.0);
-  MapBuilder expected(device, options);
-  expected.add(touches);
-  const OccupancyGrid map = expected.build("made up");
-  limits.storage_range = map.log_odds.size() * 8;
-  device.context().lower_limits(limits);
-  MapBuilder builder(device, options);
-  for (const Touch& touch : touches) {
-    builder.add(std::span(&touch, 1));
-    builder.build("made up");
-  }
-  const OccupancyGrid built = builder.build("made up");
-  EXPECT_EQ(built.origin_mm, map.origin_mm);
-  ASSERT_EQ(built.log_odds.size(), map.log_odds.size());
-  for (std::size_t i = 0; i < built.log_odds.size(); ++i) {
-    ASSERT_NEAR(built.log_odds[i], map.log_odds[i], 1e-3) << "what the method allows a map";
-  }
-}
-
 // Asked on purpose, each of them. NOLINTBEGIN(bugprone-use-after-move)
 TEST(MovedFrom, FiltersMapBuildersAndDevicesSaySo) {
   Device device = Device::open();
