@@ -30,31 +30,17 @@ TEST_P(DeviceLimits, LeaveSumsOverMillionsOfBinsAsFloat64HasThem) {
   const Recording recording = random_recording(1, 3, 146);
   PoseHistogram histogram(device, std::span(&object, 1), options);
   histogram.update(all_touches(recording));
-  const std::vector<double> logs = histogram.log_likelihood(0);
-  const auto most = std::max_element(logs.begin(), logs.end());
-  const Estimate estimate = histogram.estimate();
-  EXPECT_EQ(estimate.mode.bin, most - logs.begin());
-  EXPECT_EQ(estimate.mode.log_likelihood, *most);
-  std::vector<double> xy(static_cast<std::size_t>(options.lattice.plane()), 0.0);
-  std::vector<double> theta(107, 0.0);
-  double total = 0.0;
-  for (std::size_t i = 0; i < logs.size(); ++i) {
-    const double p = std::exp(logs[i] - *most);
-    xy[i % xy.size()] += p;
-    theta[i / xy.size()] += p;
-    total += p;
-  }
-  for (double& p : xy) {
-    p /= total;
-  }
-  for (double& p : theta) {
-    p /= total;
-  }
+  const reference::Posterior own{options.lattice, {histogram.log_likelihood(0)}, {1.0}};
+  const Mode mode = histogram.estimate().mode;
+  EXPECT_EQ(mode.bin, reference::mode(own).bin);
+  EXPECT_EQ(mode.log_likelihood, std::ranges::max(own.log_likelihood[0]));
   // Sums of float32 parts, each of at most 512 terms: a relative 512 * 6e-8.
+  const auto expect_near = [](const std::vector<double>& sums, const std::vector<double>& of) {
+    EXPECT_LT(largest_difference(sums, of), 3e-5 * std::ranges::max(of));
+  };
   const Marginals marginals = histogram.marginals(0);
-  EXPECT_LT(largest_difference(marginals.xy, xy), 3e-5 * *std::max_element(xy.begin(), xy.end()));
-  EXPECT_LT(largest_difference(marginals.theta, theta),
-            3e-5 * *std::max_element(theta.begin(), theta.end()));
+  expect_near(marginals.xy, reference::marginal_xy(own, 0));
+  expect_near(marginals.theta, reference::marginal_theta(own, 0));
 }
 
 TEST_P(DeviceLimits, LeaveMapsAsTheReferenceHasThem) {

@@ -182,27 +182,23 @@ TEST(RefusedSize, IsOfTheLastByte) {
   EXPECT_NO_THROW(PoseHistogram(device, std::span(&object, 1), options));
 }
 
-TEST(RefusedSize, OfAMapThatNoBufferHoldsIsNamedByItsLabel) {
-  expect_named(refusal(
-                   [](gpu::Limits& limits) {
-                     limits.table_texels = 1000;
-                     constexpr int edge = 40 + 2 * shaders::MAP_BORDER;
-                     limits.storage_range = (edge * edge - 1) * sizeof(float);
-                   },
-                   {.lattice = {.x_mm = {-1, 1, 2}, .y_mm = {-1, 1, 2}, .theta_rad = {0, 1, 2}}},
-                   random_map(40, 40, 0.5, 1.0, 114)),
-               {"'made up'"});
-}
+TEST(RefusedSize, NamesWhatToMakeSmaller) {
+  const HistogramOptions small{
+      .lattice = {.x_mm = {-1, 1, 2}, .y_mm = {-1, 1, 2}, .theta_rad = {0, 1, 2}}};
+  const auto large_map = [](gpu::Limits& limits) {
+    constexpr int edge = 40 + 2 * shaders::MAP_BORDER;
+    limits.table_texels = 1000;
+    limits.storage_range = (edge * edge - 1) * sizeof(float);
+  };
+  expect_named(refusal(large_map, small, random_map(40, 40, 0.5, 1.0, 114)), {"'made up'"});
 
-TEST(RefusedSize, OfATableOfALearnedSensorAsksForFewerNodes) {
-  // One fewer than the table's 5 rows (Unknown, and four levels) of 521 nodes.
-  expect_named(refusal([](gpu::Limits& limits) { limits.table_texels = 5 * 521 - 1; },
-                       {.lattice = {}, .contact = random_table(1)}),
-               {"use fewer nodes"});
-}
+  // One texel fewer than the table's rows of 521 nodes.
+  const ContactModel learned = random_table(1);
+  const auto large_table = [](gpu::Limits& limits) { limits.table_texels = 5 * 521 - 1; };
+  expect_named(refusal(large_table, {.lattice = {}, .contact = learned}), {"use fewer nodes"});
 
-TEST(RefusedSize, OfAnObjectWhoseBlurNeedsMoreThetasThanASlabHolds) {
-  const HistogramOptions options{
+  // Slabs of 11, 11 and 2 thetas: a Gaussian of 0.2 rad reaches 4.
+  const HistogramOptions blurred{
       .lattice = {.x_mm = {-5.0, 6.0, 17}, .y_mm = {-3.0, 3.0, 9}, .theta_rad = {0.0, two_pi, 24}},
       .touch_sd = {.mm = 1.0, .rad = 0.2}};
   const auto planes = [](double count) {
@@ -210,9 +206,8 @@ TEST(RefusedSize, OfAnObjectWhoseBlurNeedsMoreThetasThanASlabHolds) {
       limits.storage_range = bytes;
     };
   };
-  // Slabs of 11, 11 and 2 thetas: a Gaussian of 0.2 rad reaches 4.
-  expect_named(refusal(planes(11.2), options), {"use fewer bins"});
-  expect_named(refusal(planes(0.7), options), {"bins x times y = 153"});
+  expect_named(refusal(planes(11.2), blurred), {"use fewer bins"});
+  expect_named(refusal(planes(0.7), blurred), {"bins x times y = 153"});
 }
 
 }  // namespace palpate::size_refusal_test
