@@ -45,14 +45,6 @@ TEST(GatherEvidence, CutsKnownElementsIntoSegmentsRelativeToThePivot) {
   EXPECT_EQ(gathered, expected);
 }
 
-TEST(GatherEvidence, OfUnknownElementsIsEmpty) {
-  Recording recording = random_recording(2, 36, 33);
-  recording.pressure.assign(recording.pressure.size(), 0.0);
-  const ContactEvidence evidence = gather_evidence(all_touches(recording), {}, {}, 5);
-  EXPECT_TRUE(evidence.from_pivot_mm.empty());
-  EXPECT_TRUE(evidence.segments.empty());
-}
-
 TEST(Split, AddsUpToTheCoordinate) {
   for (const double at : {0.0, 0.25, -0.25, -1.0, 1234.5678, -98765.4321, 1e-20, -1e-20, 3e8}) {
     const shaders::Split parts = split(at);

@@ -204,12 +204,14 @@ void add_devices(Cases& cases) {
   LikelihoodCase& large = cases.add("AMapThatNoTableHoldsBesideASmallOne");
   large.objects = {{random_map(40, 40, 0.5, steepness, 149), 1.0},
                    {random_map(9, 11, 0.5, steepness, 150), 1.0}};
+  large.paths = 2;
   large.lower = [](gpu::Limits& limits) { limits.table_texels = bordered(40, 40) - 1; };
   LikelihoodCase& tables = cases.add("MapsInSeveralTables");
   tables.objects = {};
   for (std::uint64_t i = 0; i < 5; ++i) {
     tables.objects.push_back({random_map(11, 12, i == 2 ? 0.3 : 0.5, steepness, 152 + i), 1.0});
   }
+  tables.paths = 2;  // of two sizes of cells
   tables.lower = [](gpu::Limits& limits) { limits.table_texels = 2 * bordered(11, 12); };
 }
 

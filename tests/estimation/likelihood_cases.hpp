@@ -22,6 +22,7 @@ struct LikelihoodCase {
   double nats = per_touch;  ///< what a touch may add to the difference
   double share = 0.0;       ///< of the largest log-likelihood, which may be off as well
   std::string path;         ///< by which the likelihood must be evaluated
+  std::size_t paths = 0;    ///< how many there must be, where it matters
   std::function<void(gpu::Limits&)> lower = {};  ///< makes the device a lesser one
 
   friend void PrintTo(const LikelihoodCase& of, std::ostream* out) { *out << of.name; }

@@ -246,27 +246,6 @@ TEST(TouchRegion, IsTheObjectsBoxesGrownByTheArray) {
   expect_region(touch_region(std::span(&empty, 1), 0.0).lattice, {-10.25, -8.25}, {10.25, 8.25});
 }
 
-TEST(TouchRegion, HoldsTheSensorWhereverItMeetsTheObject) {
-  const Hypothesis bar = bar_at(3.0, -1.0);
-  const std::vector<glm::dvec2> elements_mm = digitacts_array();
-  const PoseLattice region = touch_region(std::span(&bar, 1), array_reach_mm(elements_mm)).lattice;
-  Uniform random(190);
-  int met = 0;
-  for (int i = 0; i < 2000; ++i) {
-    const Pose T_object_sensor{{random(-15.0, 20.0), random(-18.0, 16.0)}, random(0.0, two_pi)};
-    const bool meets = std::ranges::any_of(elements_mm, [&](const glm::dvec2& element) {
-      const glm::dvec2 from_bar = T_object_sensor * element - glm::dvec2(3.0, -1.0);
-      return std::abs(from_bar.x) <= 1.25 && std::abs(from_bar.y) <= 0.75;
-    });
-    const glm::dvec2& origin = T_object_sensor.translation_mm;
-    const bool inside = origin.x >= region.x_mm.lower && origin.x <= region.x_mm.upper &&
-                        origin.y >= region.y_mm.lower && origin.y <= region.y_mm.upper;
-    EXPECT_TRUE(inside || !meets) << origin.x << ", " << origin.y;
-    met += meets ? 1 : 0;
-  }
-  EXPECT_GT(met, 100);
-}
-
 TEST(TouchRegion, RefusesAnArrayThatCannotBe) {
   EXPECT_THROW(touch_region({}, 1.0), Error);
   for (const double reach : {-1.0, std::nan(""), 2.0 * farthest_mm}) {

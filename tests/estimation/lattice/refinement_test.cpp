@@ -311,11 +311,6 @@ std::vector<DisplacedBin> parabola(double nats) {
   return bins;
 }
 
-TEST(FlatteningRoot, IsTheLeastWhereThatSpreadsTheBeliefEnough) {
-  EXPECT_EQ(flattening_root(parabola(0.0), 8.0), 8.0);
-  EXPECT_EQ(flattening_root(parabola(4.0), 8.0), 8.0);
-}
-
 TEST(FlatteningRoot, SpreadsASharpBeliefByAThirdOfItsWindow) {
   // A normal distribution: its variance is root / (2 nats), a third of the window's own is 0.394
   // mm.

@@ -115,9 +115,7 @@ TEST(ParticleFilter, ATouchThatSaysNothingMovesButWeighsNothing) {
   const Recording recording = random_recording(1, 36, 437);
   const Recording nothing = says_nothing();
   for (const bool touched : {false, true}) {
-    if (touched) {
-      filter.update(recording.touch(0));
-    }
+    filter.update(touched ? recording.touch(0) : nothing.touch(0));
     const auto before = filter.particles();
     const double effective = filter.effective_sample_size();
     filter.update(nothing.touch(0));
