@@ -237,21 +237,6 @@ TEST_F(TouchedGain, IsReproducibleAndTheSameAmongOtherCandidates) {
   EXPECT_EQ(gains(std::span(candidates).subspan(17, 1), 5), (std::vector{all[34], all[35]}));
 }
 
-TEST_F(TouchedGain, IsNothingWhereNoObjectCanBe) {
-  const TouchGain gain = gain_of({{500.0, -500.0}, 0.0}, {});
-  // Every sample predicts the prior everywhere; sums of floats are equal or off by an ulp.
-  EXPECT_NEAR(gain.identity, 0.0, 1e-5);
-  EXPECT_NEAR(gain.pose, 0.0, 1e-5);
-}
-
-TEST_F(TouchedGain, DoesNotTellObjectsOfOneLabelApart) {
-  const TouchGain alike = gain_of(candidate, {.label_of = {7, 7, 7}});
-  const TouchGain apart = gain_of(candidate, {});
-  EXPECT_NEAR(alike.identity, 0.0, 1e-12);
-  EXPECT_GT(apart.identity, 0.01);
-  EXPECT_NEAR(alike.both(), apart.both(), 0.2) << "other readings, one information";
-}
-
 TEST(ExpectedGain, SlipMovesObjectsAboutTheirMiddle) {
   const Body body{.centroid_mm = {30.0, -10.0}};
   const PoseSample start{.object = 0, .T_object_robot = {{2.0, 1.0}, 0.7}};
