@@ -5,8 +5,8 @@
 #include <gtest/gtest.h>
 
 #include "gpu/command_stream.hpp"
-#include "philox_words.hpp"
 #include "palpate/device.hpp"
+#include "philox_words.hpp"
 
 namespace palpate::philox_test {
 
