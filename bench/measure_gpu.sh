@@ -50,7 +50,7 @@ step() {
 }
 
 # The benchmark's test would run the benchmark again.
-choice=(-E '^bench_test') bench_options=()
+choice=(-E '^bench.test_command') bench_options=()
 # Programs without the option --device, such as the tests, read PALPATE_DEVICE.
 if [ -n "$device" ]; then
   export PALPATE_DEVICE=$device

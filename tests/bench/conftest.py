@@ -1,15 +1,21 @@
-"""Runs the programs of bench/ as a user does."""
+"""Runs the programs of bench/ in the process of the test."""
 
+import importlib
 import json
 import os
 import pathlib
-import subprocess
 import sys
 from typing import Any
 
 import pytest
 
+import bench.program
 import palpate
+
+sys.path.append(str(pathlib.Path(__file__).parents[1] / "support"))
+from program import Done, run_program
+
+DEVICE = os.environ.get("PALPATE_DEVICE", "llvmpipe")
 
 
 class Program:
@@ -18,8 +24,8 @@ class Program:
     def __init__(self, folder: pathlib.Path, name: str, *arguments: object) -> None:
         self.folder = folder
         done = run(name, "--json", folder / "results.json", *arguments)
-        assert done.returncode == 0, done.stderr
-        self.output = done.stdout
+        assert done.status == 0, done.err
+        self.output = done.out
         self.document: dict[str, Any] = json.loads((folder / "results.json").read_text())
 
     def expect_charts(self, *names: str) -> None:
@@ -30,17 +36,17 @@ class Program:
             assert svg.endswith("</svg>\n"), name
 
 
-def run(name: str, *arguments: object) -> subprocess.CompletedProcess[str]:
+def run(name: str, *arguments: object) -> Done:
     """Runs a program to its end, whatever comes of it; name: that of its module."""
-    device = os.environ.get("PALPATE_DEVICE", "llvmpipe")
-    return subprocess.run(
-        [sys.executable, "-m", name, "--device", device, *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        timeout=300,
-    )
+    program = importlib.import_module(name).program
+    return run_program(lambda: bench.program.main(program), "--device", DEVICE, *arguments)
+
+
+def expect_refused(done: Done, words: str) -> None:
+    assert (done.status, done.err.count("\n")) == (2, 1), done.err
+    assert words in done.err
 
 
 @pytest.fixture(scope="session")
 def device() -> palpate.Device:
-    return palpate.Device.open(os.environ.get("PALPATE_DEVICE", "llvmpipe"))
+    return palpate.Device.open(DEVICE)

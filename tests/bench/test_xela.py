@@ -1,15 +1,17 @@
 """The reader of an XELA array's letters, on arrays that the simulator makes."""
 
 import pathlib
-import subprocess
-import sys
 from typing import Any
 
 import numpy
 import pytest
+from conftest import expect_refused
 from numpy.typing import NDArray
+from program import Done, run_program
 
+import bench.program
 import palpate
+from bench import xela
 from bench.xela import recording_of
 
 PITCH_MM = 4.7
@@ -49,36 +51,14 @@ def test_readings_lie_where_the_robot_took_them(reverse: bool) -> None:
     assert numpy.allclose(recording.pressure, held, atol=1e-9), "the mean of the held frames"
 
 
-def test_an_unknown_is_placed_on_a_map_of_such_touches(device: palpate.Device) -> None:
-    recording = recording_of(readings("F", False), PITCH_MM, object="F")
-    builder = palpate.MapBuilder(device)
-    builder.add(recording)
-    truth = palpate.random_object_pose(seed=4)
-    unknown = palpate.simulate(
-        "F", palpate.random_poses(6, seed=3), T_object_robot=truth,
-        elements_mm=recording.elements_mm, sensor=SHARP,
-    )  # fmt: skip
-    [record] = palpate.recognize(unknown, [builder.build("F")], device=device)
-    assert record.refined_error_mm < 0.8  # elements are 4.7 mm apart
-
-
 def test_the_program_writes_a_recording_and_refuses_other_arrays(tmp_path: pathlib.Path) -> None:
-    def run(array: NDArray[Any]) -> subprocess.CompletedProcess[str]:
+    def run(array: NDArray[Any]) -> Done:
         numpy.save(tmp_path / "letter.npy", array)
-        command = [sys.executable, "-m", "bench.xela", "letter.npy", "--pitch-mm", str(PITCH_MM),
-                   "--object", "F", "-o", "F.h5"]  # fmt: skip
-        root = pathlib.Path(__file__).parents[2]
-        return subprocess.run(
-            [*command[:3], *(str(tmp_path / word) if word.endswith((".npy", ".h5")) else word
-                             for word in command[3:])],
-            cwd=root, capture_output=True, text=True, timeout=60,
-        )  # fmt: skip
+        flags = ("--pitch-mm", PITCH_MM, "--object", "F", "-o", tmp_path / "F.h5")
+        return run_program(lambda: bench.program.main(xela.run), tmp_path / "letter.npy", *flags)
 
     array = readings("F", False)
     for wrong in (array[0], array[..., :47], array.astype(complex), array[:, :, :0]):
-        refused = run(wrong)
-        assert refused.returncode == 2
-        assert "letter.npy: shape (" in refused.stderr and refused.stderr.count("\n") == 1
-    done = run(array)
-    assert done.returncode == 0, done.stderr
+        expect_refused(run(wrong), "letter.npy: shape (")
+    assert run(array).status == 0
     assert len(palpate.read_recording(tmp_path / "F.h5")) == 100

@@ -1,7 +1,8 @@
 #include <algorithm>
-#include <set>
-#include <sstream>
+#include <regex>
 
+#include "cli/former_flags.hpp"
+#include "options/option.hpp"
 #include "support/program.hpp"
 #include "support/sample_files.hpp"
 
@@ -11,8 +12,9 @@ using nlohmann::json;
 
 using DevicesCommand = ProgramTest;
 
-TEST_F(DevicesCommand, JsonNamesOneChosenDevice) {
-  const json devices = json::parse(done({"devices", "--json"}));
+TEST_F(DevicesCommand, NamesOneChosenDevice) {
+  const json devices = json::parse(done("devices --json"));
+  const std::string text = done("devices");
   ASSERT_FALSE(devices.empty());
   int chosen = 0;
   for (const json& device : devices) {
@@ -23,35 +25,27 @@ TEST_F(DevicesCommand, JsonNamesOneChosenDevice) {
     EXPECT_TRUE(device.at("usable").is_boolean());
     EXPECT_GT(device.at("memory_gib").get<double>(), 0.0);
     chosen += device.at("chosen").get<bool>() ? 1 : 0;
+    for (const char* shown : {"name", "reason"}) {
+      expect_named(text, {device[shown].get<std::string>().c_str()});
+    }
   }
   EXPECT_EQ(chosen, 1);
-}
-
-TEST_F(DevicesCommand, TextMarksTheChosenDevice) {
-  const json devices = json::parse(done({"devices", "--json"}));
-  const std::string text = done({"devices"});
-  for (const json& device : devices) {
-    EXPECT_NE(text.find(device["name"].get<std::string>()), std::string::npos) << text;
-    EXPECT_NE(text.find(device["reason"].get<std::string>()), std::string::npos) << text;
-  }
   EXPECT_TRUE(text.starts_with("*") || text.find("\n*") != std::string::npos) << text;
 }
 
 TEST_F(DevicesCommand, AMachineWithoutVulkanDoesAllThatNeedsNoDevice) {
   const Variable vulkan("PALPATE_VULKAN_LIBRARY", "/nonexistent/libvulkan.so.1");
-  done({"simulate", "A", "-o", "A.h5", "--poses", "random:3"});
-  done({"info", "A.h5"});
-  done({"sensors", "--json"});
+  done("simulate A -o A.h5 --poses random:3");
+  done("info A.h5");
+  done("sensors --json");
   write_map(folder_ / "A.map.h5", sample_map("A"));
   write_recording(folder_ / "u.h5", sample_unknown("A", {}, 3));
-  EXPECT_EQ(record({"u.h5", "--maps", "A.map.h5", "--filter", "bounded"})["device"], "none");
+  EXPECT_EQ(record("u.h5 --maps A.map.h5 --filter bounded")["device"], "none");
   put_bytes(folder_ / "c.csv", "x_mm,y_mm,theta_rad\n0,0,0\n2,1,0.5\n");
-  done({"plan", "u.h5", "--maps", "A.map.h5", "--candidates", "c.csv", "--filter", "bounded"});
-  for (const std::vector<std::string>& arguments :
-       {std::vector<std::string>{"devices"},
-        {"map", "A.h5", "-o", "new.h5"},
-        {"recognize", "u.h5", "--maps", "A.map.h5", "--filter", "bounded", "--device", "0"}}) {
-    const Outcome outcome = palpate(arguments);
+  done("plan u.h5 --maps A.map.h5 --candidates c.csv --filter bounded");
+  for (const char* command : {"devices", "map A.h5 -o new.h5",
+                              "recognize u.h5 --maps A.map.h5 --filter bounded --device 0"}) {
+    const Outcome outcome = palpate(command);
     EXPECT_EQ(outcome.status, 1);
     EXPECT_EQ(outcome.out, "");
     EXPECT_TRUE(outcome.err.ends_with("install libvulkan1 and mesa-vulkan-drivers\n"))
@@ -60,125 +54,107 @@ TEST_F(DevicesCommand, AMachineWithoutVulkanDoesAllThatNeedsNoDevice) {
   }
 }
 
-struct Help {
-  const char* command;
-  std::vector<const char*> mentions;  ///< flags with their defaults and units
-
-  friend void PrintTo(const Help& help, std::ostream* out) { *out << help.command; }
-};
-
-class CommandHelp : public ProgramTest, public testing::WithParamInterface<Help> {};
-
-TEST_P(CommandHelp, MentionsEveryFlagWithDefaultAndUnit) {
-  const std::string help = done({GetParam().command, "--help"});
-  for (const char* part : GetParam().mentions) {
-    EXPECT_NE(help.find(part), std::string::npos) << "'" << part << "' not in\n" << help;
-  }
-}
-
-INSTANTIATE_TEST_SUITE_P(
-    All, CommandHelp,
-    testing::Values(
-        Help{"devices", {"--json"}}, Help{"sensors", {"--json", "USB", "(*)"}},
-        Help{"simulate",
-             {"SHAPE", "-o,", "--seed", "=1", "--poses", "grid", "random:N", "--psf-mm", "mm",
-              "--noise-kpa", "=0.7", "kPa", "--object-pose", "X,Y,DEG", "random", "--touches"}},
-        Help{"map",
-             {"RECORDING",   "-o,",           "FOLDER/", "--cell-mm",     "=0.5",      "mm",
-              "--spread-mm", "a quarter",     "--peak",  "default: 0.9]", "--prior",   "=auto",
-              "--threshold", "2 kPa",         "--ratio", "0.3",           "--frames",  "A:B",
-              "--symmetry",  "--label",       "--png",   "--device",      "--unposed", "--max-maps",
-              "--mirror",    "--sensor-model"}},
-        Help{"recognize",
-             {"RECORDING",      "--maps",      "--scene",     "--bins",      "25x25x16",
-              "--x-mm",         "-10:10",      "--y-mm",      "mm",          "--theta-deg",
-              "0:360",          "degrees",     "--pivot-mm",  "X,Y",         "0,0",
-              "--prior",        "--gamma",     "0.1",         "--threshold", "2 kPa",
-              "--ratio",        "0.3",         "--frames",    "A:B",         "--touches",
-              "--each-frame",   "--filter",    "histogram",   "--particles", "10000",
-              "--resampling",   "systematic",  "--augmented", "--seed",      "--trace",
-              "--json",         "--posterior", "--png",       "--device",    "T_object_robot",
-              "bounded",        "100000",      "--tolerance", "1e-6",        "--budget-ms",
-              "--evidence-nats"}},
-        Help{"batch",
-             {"INPUT", "-o,", "path, frames and label", "--maps", "--shard", "I/N",
-              "SLURM_ARRAY_TASK_ID", "--chunk", "100", "--threads", "--each-frame", "--trace"}},
-        Help{"merge", {"RESULTS", "-o,", "NDJSON", "--partial"}},
-        Help{"plan",
-             {"RECORDING", "--maps", "--candidates", "grid", "CSV", "mm", "rad", "--goal", "=both",
-              "identity", "--samples", "=96", "--plan-seed", "=0", "--json", "nats"}},
-        Help{"evaluate", {"RESULTS", "--json", "95 %", "(none)"}},
-        Help{"calibrate",
-             {"RECORDING", "-o,", "YAML", "--maps", "--unposed", "--threshold", "pressure unit",
-              "[default: learned]", "--ratio", "--layer", "=auto", "log_odds", "--levels",
-              "[default: 7 ", "--frames", "A:B", "--sensor-model"}},
-        Help{"record",
-             {"--sensor", "replay:FILE", "simulate:SHAPE", "-o,", "--seconds", "--poses", "FIFO",
-              "--tare", "=0.5", "--object"}},
-        Help{"touches",
-             {"FRAMES", "-o,", "--onset", "2 kPa", "--release", "half", "--steady", "=0.15",
-              "--min-steady-s", "=0.1", "--smooth-s", "=0.05", "--drift-s", "2 to 32"}},
-        Help{"import",
-             {"PRESSURES",
-              "--poses",
-              "--array",
-              "COLUMNS:ROWS:PITCH",
-              "mm",
-              "--first-element",
-              "=bottom-left",
-              "--order",
-              "=rows",
-              "--dead",
-              "-o,",
-              "--rows",
-              "frames",
-              "touches",
-              "--pressure-unit",
-              "=kPa",
-              "--pose-unit",
-              "mm,rad",
-              "--time-unit",
-              "--time-column",
-              "--pressure-columns",
-              "--pose-columns",
-              "TX,TY,TZ,QX,QY,QZ,QW",
-              "--plane",
-              "=auto",
-              "--largest-gap-s",
-              "2.5 times",
-              "--rate",
-              "--object",
-              "--truth"}},
-        Help{"export", {"FILE", "-o,", "Folder"}}, Help{"info", {"FILE"}},
-        Help{"view", {"PATH", "--page", "8080", "--page-address", "127.0.0.1"}}),
-    [](const auto& test) { return std::string(test.param.command); });
+const std::vector<std::string> commands{"batch",    "calibrate", "check",     "devices", "evaluate",
+                                        "export",   "import",    "info",      "live",    "map",
+                                        "merge",    "plan",      "recognize", "record",  "sensors",
+                                        "simulate", "touches",   "view"};
 
 using ProgramHelp = ProgramTest;
 
-TEST_F(ProgramHelp, ListsTheCommands) {
-  const std::string help = done({"--help"});
-  for (const char* command :
-       {"devices", "sensors", "record", "touches", "simulate", "map", "recognize", "live", "batch",
-        "merge", "evaluate", "calibrate", "plan", "info", "import", "export", "view"}) {
-    EXPECT_NE(help.find(std::string("\n  ") + command), std::string::npos) << help;
+TEST_F(ProgramHelp, OfACommandMentionsDefaultsFormsAndUnits) {
+  for (const auto& [command, mentions] : std::initializer_list<std::pair<std::string, const char*>>{
+           {"sensors", "USB (*)"},
+           {"simulate", "SHAPE =1 grid random:N mm =0.7 kPa X,Y,DEG"},
+           {"map", "FOLDER/ =0.5 mm quarter 0.9] =auto kPa 0.3] A:B"},
+           {"recognize",
+            "25x25x16 -10:10 mm 0:360 degrees X,Y 0,0 0.1] kPa 0.3] A:B histogram 10000] "
+            "systematic "
+            "T_object_robot 100000 1e-6"},
+           {"batch", "INPUT path, label I/N SLURM_ARRAY_TASK_ID 100"},
+           {"merge", "RESULTS NDJSON --partial"},
+           {"plan", "grid CSV mm rad =both identity =96 =0 nats"},
+           {"evaluate", "RESULTS 95 (none)"},
+           {"calibrate", "YAML unit learned] =auto log_odds 7 A:B"},
+           {"record", "replay:FILE simulate:SHAPE FIFO =0.5"},
+           {"touches", "FRAMES kPa half =0.15 =0.1 =0.05 32"},
+           {"import",
+            "PRESSURES COLUMNS:ROWS:PITCH mm =bottom-left =rows frames touches =kPa mm,rad "
+            "TX,TY,TZ,QX,QY,QZ,QW =auto 2.5"},
+           {"export", "FILE Folder"},
+           {"view", "PATH 8080 127.0.0.1"}}) {
+    const std::string help = done(command + " --help");
+    for (const std::string& word : CommandLine(mentions).arguments()) {
+      expect_named(help, {word.c_str()});
+    }
+  }
+  const std::string recognize = done("recognize --help");
+  for (const Option& option : options()) {
+    expect_named(recognize, {("--" + std::string(option.name)).c_str()});
   }
 }
 
-TEST_F(ProgramHelp, GroupsFlagsByWhatTheyAreFor) {
-  const std::string help = done({"recognize", "--help"});
-  for (const char* group : {"\nOptions:\n", "\nBins and region:\n", "\nFilter:\n"}) {
-    EXPECT_NE(help.find(group), std::string::npos) << help;
+TEST_F(ProgramHelp, ListsTheCommandsAndTheVersion) {
+  const std::string help = done("--help");
+  for (const std::string& command : commands) {
+    expect_named(help, {("\n  " + command).c_str()});
   }
+  EXPECT_EQ(done("--version"), PALPATE_VERSION "\n");
+}
+
+TEST_F(ProgramHelp, GroupsFlagsByWhatTheyAreFor) {
+  const std::string help = done("recognize --help");
+  expect_named(help, {"\nOptions:\n", "\nBins and region:\n", "\nFilter:\n"});
   EXPECT_LT(help.find("\n  --maps "), help.find("\nBins and region:"));
   EXPECT_GT(help.find("\n  --bins "), help.find("\nBins and region:"));
 }
 
-TEST_F(ProgramHelp, WhatIsNoCommandOrFlagIsNamed) {
-  EXPECT_EQ(palpate({"touch-the-moon"}).err,
-            "palpate: 'touch-the-moon' is no command or flag; see palpate --help\n");
-  expect_refused({"map", "--spread"}, {"'--spread' is no flag", "see palpate map --help"});
+// What the program says to a flag that a command has lost.
+using FormerFlags = ProgramTest;
+
+std::string command_of(const cli::FormerFlag& flag) {
+  return flag.command.empty() ? "recognize" : std::string(flag.command);
 }
 
-TEST_F(ProgramHelp, VersionIsTheProjects) { EXPECT_EQ(done({"--version"}), PALPATE_VERSION "\n"); }
+TEST_F(FormerFlags, AreAnsweredWithWhatToUseInstead) {
+  EXPECT_EQ(cli::answer_to_former_flag({}), std::nullopt);
+  for (const cli::FormerFlag& flag : cli::former_flags()) {
+    const std::string name(flag.name);
+    const std::string command = command_of(flag);
+    const std::string words = " is no flag of palpate " + command;
+    for (const std::string& given : {name, name + "=3"}) {
+      const std::array typed{command.c_str(), "a.h5", given.c_str()};
+      expect_named(cli::answer_to_former_flag(typed).value_or(""),
+                   {("'" + given + "'" + words).c_str(), flag.remedy.data()});
+    }
+    const std::array after{command.c_str(), "--", name.c_str()};
+    EXPECT_EQ(cli::answer_to_former_flag(after), std::nullopt) << "a file of this name";
+    const std::array other{"no-command", name.c_str()};
+    EXPECT_EQ(cli::answer_to_former_flag(other).has_value(), flag.command.empty());
+  }
+  const cli::FormerFlag& first = cli::former_flags().front();
+  expect_refused({command_of(first), "a.h5", std::string(first.name)},
+                 {std::string(first.name), std::string(first.remedy)});
+}
+
+// A row that hides a flag of today, or names one that there is not, misleads.
+TEST_F(FormerFlags, TheTableAgreesWithTheHelp) {
+  std::string all;
+  std::map<std::string, std::string> help;
+  for (const std::string& command : commands) {
+    all += help[command] = done(command + " --help");
+  }
+  const auto names = [](const std::string& text, std::string_view flag) {
+    return std::regex_search(text, std::regex(std::string(flag) + "(?![a-z-])"));
+  };
+  for (const cli::FormerFlag& flag : cli::former_flags()) {
+    const std::string& of_command = flag.command.empty() ? all : help.at(command_of(flag));
+    EXPECT_FALSE(names(of_command, flag.name)) << flag.command << " " << flag.name;
+    const std::string remedy(flag.remedy);
+    const std::regex named("--[a-z][a-z-]*");
+    for (std::sregex_iterator at(remedy.begin(), remedy.end(), named), end; at != end; ++at) {
+      EXPECT_TRUE(names(all, at->str())) << flag.name << ": " << at->str();
+    }
+  }
+}
 
 }  // namespace palpate::device_and_help_test

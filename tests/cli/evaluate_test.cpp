@@ -1,17 +1,15 @@
-// palpate evaluate on results written by hand, whose scores are worked out here, and on results of
-// palpate recognize.
+// palpate evaluate on results written by hand, whose scores are worked out here, and on results
+// that it cannot take.
 
+#include <algorithm>
 #include <cmath>
 
-#include <gmock/gmock.h>
-
+#include "recognition/judged_results.hpp"
 #include "support/program.hpp"
-#include "support/sample_files.hpp"
 
 namespace palpate::evaluate_test {
 
 using nlohmann::json;
-using testing::HasSubstr;
 
 json record(const char* truth, const char* best, double a, double b, double none) {
   json record{{"recording", "u.h5"},
@@ -36,20 +34,27 @@ json four() {
 
 class EvaluateCommand : public ProgramTest {
  protected:
-  json evaluated(const std::vector<std::string>& results) const {
-    std::vector<std::string> arguments{"evaluate"};
-    arguments.insert(arguments.end(), results.begin(), results.end());
-    arguments.insert(arguments.end(), {"--json", "-"});
-    return json::parse(done(arguments));
+  json evaluated(const std::string& results) const {
+    return json::parse(done("evaluate " + results + " --json -"));
+  }
+  json evaluation_of(const json& records) const {
+    put_bytes(folder_ / "r.json", records.dump(2));
+    return evaluated("r.json");
   }
 };
 
-TEST_F(EvaluateCommand, WritesAllNumbersAsJson) {
-  put_bytes(folder_ / "r.json", four().dump(2));
-  const json e = evaluated({"r.json"});
-  EXPECT_EQ(e["records"], 3);
-  EXPECT_EQ(e["without_truth"], 1);
-  EXPECT_EQ(e["right"], 2);
+TEST_F(EvaluateCommand, WritesAllNumbersAsJsonAndInWords) {
+  const json e = evaluation_of(four());
+  json expected = e;
+  expected.merge_patch(json::parse(R"json({
+      "records": 3, "without_truth": 1, "right": 2, "known_classes": {"records": 2},
+      "unknown_classes": {"called_none": 1,
+                          "area_under_curve": {"score": "1 - none", "area": 1.0, "known": 2}},
+      "confusion": {"rows": ["A", "M"], "columns": ["A", "B", "(none)"],
+                    "counts": [[1, 1, 0], [0, 0, 1]]},
+      "error_mm": {"records": 1, "median": 0.5},
+      "refined_error_mm": {"median": 0.25}})json"));
+  EXPECT_EQ(e, expected);
   EXPECT_NEAR(e["accuracy"].get<double>(), 2.0 / 3.0, 1e-12);
   EXPECT_NEAR(e["log_loss"].get<double>(), -std::log(0.9 * 0.25 * 0.7) / 3.0, 1e-12);
   EXPECT_NEAR(e["calibration_error"].get<double>(), (0.1 + 2 * (0.725 - 0.5)) / 3.0, 1e-12)
@@ -58,39 +63,23 @@ TEST_F(EvaluateCommand, WritesAllNumbersAsJson) {
   EXPECT_EQ(e["reliability"][7]["records"], 2);
   EXPECT_EQ(e["reliability"][7]["accuracy"], 0.5);
   EXPECT_FALSE(e["reliability"][0].contains("accuracy"));
-  EXPECT_EQ(e["known_classes"]["records"], 2);
-  EXPECT_EQ(e["unknown_classes"]["called_none"], 1);
-  const json& area = e["unknown_classes"]["area_under_curve"];
-  EXPECT_EQ(area["score"], "1 - none");
-  EXPECT_EQ(area["area"], 1.0);
-  EXPECT_EQ(area["known"], 2);
-  EXPECT_EQ(e["classes"].size(), 2u);
+  ASSERT_EQ(e["classes"].size(), 2u);
   EXPECT_EQ(e["classes"][0]["recall"], 0.5);
   EXPECT_EQ(e["classes"][1]["known"], false);
-  EXPECT_EQ(e["confusion"]["rows"], json({"A", "M"}));
-  EXPECT_EQ(e["confusion"]["columns"], json({"A", "B", "(none)"}));
-  EXPECT_EQ(e["confusion"]["counts"], json({{1, 1, 0}, {0, 0, 1}}));
-  EXPECT_EQ(e["error_mm"], json({{"records", 1}, {"median", 0.5}}));
-  EXPECT_EQ(e["refined_error_mm"]["median"], 0.25);
-}
 
-TEST_F(EvaluateCommand, SaysTheSameInWords) {
-  put_bytes(folder_ / "r.json", four().dump());
-  const std::string text = done({"evaluate", "r.json"});
-  for (const char* part :
-       {"66.7 %", "1 record without a true label left out", "0.7 to 0.8", "A", "1 B", "M (unknown)",
-        "unknown classes: 1 of 1 called \"(none)\"", "by 1 - none: 1.000 +- 0.000",
-        "median error of refined poses 0.25 mm (1 record), of modes 0.50 mm (1 record)"}) {
-    EXPECT_THAT(text, HasSubstr(part));
-  }
-  json known = json::array({four()[0]});
-  put_bytes(folder_ / "r.json", known.dump());
-  EXPECT_EQ(done({"evaluate", "r.json"}).find("nknown"), std::string::npos);
+  expect_named(
+      done("evaluate r.json"),
+      {"66.7 %", "1 record without a true label left out", "0.7 to 0.8", "A", "1 B", "M (unknown)",
+       "unknown classes: 1 of 1 called \"(none)\"", "by 1 - none: 1.000 +- 0.000",
+       "median error of refined poses 0.25 mm (1 record), of modes 0.50 mm (1 record)"});
+  done("evaluate r.json --json e.json");
+  EXPECT_EQ(json::parse(bytes_of(folder_ / "e.json")), e);
+  evaluation_of(json::array({four()[0]}));
+  EXPECT_EQ(done("evaluate r.json").find("nknown"), std::string::npos);
 }
 
 TEST_F(EvaluateCommand, ReadsLinesFoldersAndSingleRecords) {
-  put_bytes(folder_ / "all.json", four().dump());
-  const json expected = evaluated({"all.json"});
+  const json expected = evaluation_of(four());
   std::string lines;
   std::filesystem::create_directory(folder_ / "results");
   for (std::size_t i = 0; i < 4; ++i) {
@@ -99,10 +88,10 @@ TEST_F(EvaluateCommand, ReadsLinesFoldersAndSingleRecords) {
   }
   put_bytes(folder_ / "lines.ndjson", lines);
   put_bytes(folder_ / "results/notes.txt", "no results");
-  EXPECT_EQ(evaluated({"lines.ndjson"}), expected);
-  EXPECT_EQ(evaluated({"results"}), expected);
-  EXPECT_EQ(evaluated({"results/0.json", "results/1.json", "results/2.json", "results/3.json"}),
-            expected);
+  for (const std::string results :
+       {"lines.ndjson", "results", "results/0.json results/1.json results/2.json results/3.json"}) {
+    EXPECT_EQ(evaluated(results), expected) << results;
+  }
 }
 
 TEST_F(EvaluateCommand, TakesTheFitWhereNothingSaysNone) {
@@ -111,41 +100,80 @@ TEST_F(EvaluateCommand, TakesTheFitWhereNothingSaysNone) {
     each.erase("none");
     each["fit"] = {{"z", each["best"] == "(none)" ? -5.0 : 0.0}, {"verdict", "fits"}};
   }
-  put_bytes(folder_ / "r.json", records.dump());
-  EXPECT_EQ(evaluated({"r.json"})["unknown_classes"]["area_under_curve"]["score"], "fit.z");
+  EXPECT_EQ(evaluation_of(records)["unknown_classes"]["area_under_curve"]["score"], "fit.z");
 }
 
-TEST_F(EvaluateCommand, WritesAFile) {
-  put_bytes(folder_ / "r.json", four().dump());
-  done({"evaluate", "r.json", "--json", "e.json"});
-  EXPECT_EQ(json::parse(bytes_of(folder_ / "e.json")), evaluated({"r.json"}));
+const json sound = json::parse(
+    R"({"recording": "u.h5", "best": "A", "identity": {"A": 0.75, "B": 0.25}, "truth": {"object": "A"}})");
+
+/// What is said of such a file's text.
+std::string refusal_of(const std::string& text) {
+  return input_error([&] {
+    JudgedResults results;
+    add_records("bad.json", text, results);
+    evaluate(results, "bad.json");
+  });
 }
 
-TEST_F(EvaluateCommand, TakesWhatRecognizeWrites) {
-  write_map(folder_ / "A.map.h5", sample_map("A"));
-  write_map(folder_ / "I.map.h5", sample_map("I"));
-  const Pose pose{{2.0, -3.0}, 1.0};
-  write_recording(folder_ / "a.h5", sample_unknown("A", pose, 6));
-  write_recording(folder_ / "i.h5", sample_unknown("I", pose, 6));
-  write_recording(folder_ / "e.h5", sample_unknown("E", pose, 6));
-  Recording nameless = sample_unknown("A", pose, 6);
-  nameless.truth.reset();
-  nameless.object.clear();
-  write_recording(folder_ / "nameless.h5", nameless);
-  done({"recognize", "a.h5", "i.h5", "e.h5", "nameless.h5", "--maps", "A.map.h5", "I.map.h5",
-        "--none", "--bins", "25x25x16", "--json", "r.json"});
-  const json records = json::parse(bytes_of(folder_ / "r.json"));
-  const json e = evaluated({"r.json"});
-  int right = 0;
-  for (const json& each : records) {
-    right += each.value("right", false) ? 1 : 0;
+TEST(ResultsThatCannotBeJudged, AreRefusedByFileRecordAndField) {
+  const std::pair<const char*, const char*> cases[] = {
+      {R"(3)", "no JSON object but number"},
+      {R"({"best": null})", "'best' is missing"},
+      {R"({"best": 1})", "'best' is number"},
+      {R"({"best": "C"})", "'best' 'C' has no probability"},
+      {R"({"identity": null})", "'identity' is missing"},
+      {R"({"identity": {"A": 1.5}})", "'identity.A' = 1.5, not a probability; give 0 to 1"},
+      {R"({"identity": {"B": -0.25}})", "'identity.B' = -0.25, not a probability; give 0 to 1"},
+      {R"({"identity": {"A": 0.5}})", "'identity' sums to 0.75"},
+      {R"({"none": 2})", "'none' = 2, not a probability; give 0 to 1"},
+      {R"({"none": "?"})", "'none' is string"},
+      {R"({"fit": 1.0})", "'fit' is number"},
+      {R"({"fit": {"z": "x"}})", "'fit.z' is string"},
+      {R"({"truth": "A"})", "'truth' is string"},
+      {R"({"truth": {"object": null}})", "'truth.object' is missing"},
+      {R"({"error_mm": -1.0})", "'error_mm' = -1 mm"}};
+  for (const auto& [change, words] : cases) {
+    json records = json::array({sound, sound});
+    records[1].merge_patch(json::parse(change));
+    expect_named(refusal_of(records.dump()), {"bad.json: record 1", words});
   }
-  EXPECT_EQ(e["records"], 3);
-  EXPECT_EQ(e["without_truth"], 1);
-  EXPECT_EQ(e["right"], right);
-  EXPECT_EQ(e["known_classes"]["records"], 2);
-  EXPECT_EQ(e["unknown_classes"]["records"], 1);
-  EXPECT_EQ(e["unknown_classes"]["area_under_curve"]["score"], "1 - none");
+  json records = json::array({sound});
+  records[0]["identity"]["A"] = nullptr;
+  expect_named(refusal_of(records.dump()), {"record 0", "'identity.A' is null, not a number"});
+}
+
+TEST(ResultsThatCannotBeJudged, AreTextsWithoutRecords) {
+  json nameless = sound;
+  nameless.erase("truth");
+  const std::pair<std::string, const char*> cases[] = {
+      {"recordings", "not JSON at byte 1"},
+      {"[" + sound.dump() + ",]", "not JSON at byte"},
+      {sound.dump() + "\n\n" + sound.dump().substr(0, 20), "line 3 (record 1) is not JSON"},
+      {"[1e999]", "too large"},
+      {"3", "holds number, not an array of records"},
+      {"[]", "none of 0 record(s) has a true label"},
+      {"", "none of 0 record(s)"},
+      {R"({"touch_sd": {"mm": 1}})", "record 0: field 'best' is missing"},
+      {json::array({nameless, nameless}).dump(),
+       "none of 2 record(s) has a true label ('truth'); name the object"}};
+  for (const auto& [text, words] : cases) {
+    expect_named(refusal_of(text), {"bad.json: ", words});
+  }
+}
+
+TEST_F(EvaluateCommand, RefusesFilesInOneLine) {
+  std::filesystem::create_directory(folder_ / "empty");
+  std::filesystem::create_directory(folder_ / "results");
+  put_bytes(folder_ / "results/a.json", sound.dump());
+  put_bytes(folder_ / "bad.json", "[3]");
+  expect_refused("evaluate results/a.json bad.json --json e.json", {"bad.json: record 0"});
+  expect_refused("evaluate missing.json", {"missing.json: no such file"});
+  expect_refused("evaluate empty", {"empty: a folder without *.json"});
+  expect_refused("evaluate", {"RESULTS is required", "palpate evaluate --help"});
+  expect_refused("evaluate results/a.json results", {"results/a.json: given twice"});
+  expect_refused("evaluate results --json ./results/a.json",
+                 {"--json ./results/a.json", "RESULTS reads", "overwrite"});
+  expect_refused("evaluate results --json nowhere/e.json", {"nowhere", "does not exist"});
 }
 
 }  // namespace palpate::evaluate_test

@@ -1,121 +1,104 @@
+#include <sys/resource.h>
+#include <unistd.h>
+
 #include <algorithm>
+#include <sstream>
 
 #include <fmt/format.h>
 
+#include "letter_files.hpp"
 #include "support/memory_limit.hpp"
-#include "support/program.hpp"
-#include "support/sample_files.hpp"
 
 namespace palpate::full_disk_test {
 
-class FullDisk : public ProgramTest {
+class FullDisk : public LetterFiles {
  protected:
-  FullDisk() {
-    write_map(folder_ / "A.map.h5", sample_map("A"));
-    write_recording(folder_ / "u.h5", sample_unknown("A", {}, 6));
-    write_recording(folder_ / "A.h5", sample_training("A", 48));
-  }
-
-  static void expect_failure(const Outcome& outcome, const char* named) {
+  /// Expects status 1 and one line that names this.
+  void expect_failure(const std::string& command, const Surroundings& surroundings,
+                      const char* named) const {
+    SCOPED_TRACE(command);
+    const Outcome outcome = palpate(command, surroundings);
     EXPECT_EQ(outcome.status, 1) << outcome.err;
-    EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
-    EXPECT_NE(outcome.err.find(named), std::string::npos) << outcome.err;
+    EXPECT_EQ(std::ranges::count(outcome.err, '\n'), 1) << outcome.err;
+    expect_named(outcome.err, {named});
   }
-};
-
-struct Output {
-  const char* name;
-  std::vector<std::string> arguments;
-  const char* file;
-
-  friend void PrintTo(const Output& output, std::ostream* out) { *out << output.file; }
-};
-
-class FullDiskOutput : public FullDisk, public testing::WithParamInterface<Output> {};
-
-TEST_P(FullDiskOutput, LeavesNoPartAndAnOlderFileIntact) {
-  const std::filesystem::path target = folder_ / GetParam().file;
-  std::filesystem::create_directories(target.parent_path());
-  for (const char* older : {"", "an older file"}) {
-    std::filesystem::remove(target);
-    if (*older != '\0') {
-      put_bytes(target, older);
-    }
+  /// The same, and the folder as it was before, where files may grow to so many bytes.
+  void expect_untouched(const std::string& command, rlim_t bytes, const char* named) const {
     const auto before = content_of(folder_.path());
+    expect_failure(command, {.largest_file_bytes = bytes}, named);
+    EXPECT_TRUE(content_of(folder_.path()) == before) << "the folder has changed: " << command;
+  }
+};
+
+TEST_F(FullDisk, LeavesNoPartOfAnOutputAndAnOlderFileIntact) {
+  for (const auto& [command, file] :
+       {std::pair{"simulate A -o new.h5", "new.h5"},
+        {"map A.h5 -o new.map.h5", "new.map.h5"},
+        {"map A.h5 -o new/", "new/A.map.h5"},
+        {"recognize u.h5 --maps maps/A.map.h5 --trace --json r.json", "r.json"},
+        {"recognize u.h5 --maps maps/A.map.h5 --posterior p.h5", "p.h5"},
+        {"recognize u.h5 --maps maps/A.map.h5 --png sheets", "sheets/u.png"}}) {
+    std::filesystem::create_directories((folder_ / file).parent_path());
+    put_bytes(folder_ / file, "an older file");
     // Below the size of every output here, above that of a message.
-    const Outcome outcome = palpate(GetParam().arguments, {.largest_file_bytes = 2048});
-    expect_failure(outcome, GetParam().file);
-    EXPECT_TRUE(content_of(folder_.path()) == before) << "the folder has changed";
+    expect_untouched(command, 2048, file);
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    All, FullDiskOutput,
-    testing::Values(Output{"recording", {"simulate", "A", "-o", "new.h5"}, "new.h5"},
-                    Output{"map", {"map", "A.h5", "-o", "new.map.h5"}, "new.map.h5"},
-                    Output{"map_in_folder", {"map", "A.h5", "-o", "maps/"}, "maps/A.map.h5"},
-                    Output{
-                        "json",
-                        {"recognize", "u.h5", "--maps", "A.map.h5", "--trace", "--json", "r.json"},
-                        "r.json"},
-                    Output{"posterior",
-                           {"recognize", "u.h5", "--maps", "A.map.h5", "--posterior", "p.h5"},
-                           "p.h5"},
-                    Output{"sheet",
-                           {"recognize", "u.h5", "--maps", "A.map.h5", "--png", "sheets"},
-                           "sheets/u.png"}),
-    [](const auto& test) { return std::string(test.param.name); });
-
-TEST_F(FullDisk, StandardOutputThatCannotBeWrittenIsAFailure) {
-  expect_failure(palpate({"recognize", "u.h5", "--maps", "A.map.h5", "--json", "-"},
-                         {.standard_output = "/dev/full"}),
-                 "standard output");
+TEST_F(FullDisk, LeavesJsonAndPosteriorBothOrNone) {
+  const std::string recognize =
+      "recognize A.h5 --maps maps/A.map.h5 --json r.json --posterior p.h5";
+  // Below the size of one of them, above that of the other.
+  expect_untouched(recognize + " --bins 5x5x4 --trace", 12000, "r.json");
+  expect_untouched(recognize + " --bins 25x25x16", 12000, "p.h5");
 }
 
-TEST_F(FullDisk, LongOutputThatCannotBeWrittenIsAFailureOfStandardOutputToo) {
-  // More than standard output keeps back until the end.
-  expect_failure(palpate({"recognize", "u.h5", "--maps", "A.map.h5", "--each-frame", "--trace",
-                          "--bins", "5x5x4", "--json", "-"},
-                         {.standard_output = "/dev/full"}),
-                 "standard output");
-  expect_failure(palpate({"live", "--sensor", "simulate:A,rate=100,touches=2,speed=max", "--maps",
-                          "A.map.h5", "--bins", "5x5x4"},
-                         {.standard_output = "/dev/full"}),
-                 "standard output");
-}
-
-TEST_F(FullDisk, HelpThatCannotBeWrittenIsAFailure) {
-  for (const char* flag : {"--help", "--version"}) {
-    expect_failure(palpate({flag}, {.standard_output = "/dev/full"}), "standard output");
+TEST_F(FullDisk, OfStandardOutputIsAFailureThatLeavesFiles) {
+  const std::string recognize =
+      "recognize A.h5 --maps maps/A.map.h5 --bins 5x5x4 --each-frame --trace";
+  for (const std::string& command :
+       {std::string("recognize u.h5 --maps maps/A.map.h5 --json -"),
+        // More than standard output keeps back until the end.
+        recognize + " --json -", std::string("--help"), std::string("--version"),
+        std::string("live --sensor simulate:A,rate=100,touches=2,speed=max --maps maps/A.map.h5"
+                    " --bins 5x5x4")}) {
+    expect_failure(command, {.standard_output = "/dev/full"}, "standard output");
   }
-}
-
-TEST_F(FullDisk, ResultsAreWrittenWhereNobodyListens) {
-  const Outcome outcome = palpate({"recognize", "A.h5", "--maps", "A.map.h5", "--each-frame",
-                                   "--trace", "--bins", "5x5x4", "--json", "r.json"},
-                                  {.standard_output = "/dev/full"});
-  expect_failure(outcome, "standard output");
+  expect_failure(recognize + " --json r.json", {.standard_output = "/dev/full"}, "standard output");
   EXPECT_EQ(nlohmann::json::parse(bytes_of(folder_ / "r.json")).size(), 48u);
 }
 
-TEST_F(FullDisk, JsonAndPosteriorAreBothWrittenOrNone) {
-  const auto before = content_of(folder_.path());
-  const auto expect_none = [&](const std::string& bins, bool trace, const char* refused) {
-    std::vector<std::string> arguments{"recognize", "A.h5",   "--maps", "A.map.h5",    "--bins",
-                                       bins,        "--json", "r.json", "--posterior", "p.h5"};
-    if (trace) {
-      arguments.emplace_back("--trace");
-    }
-    // Below the size of one of them, above that of the other.
-    expect_failure(palpate(arguments, {.largest_file_bytes = 12000}), refused);
-    EXPECT_TRUE(content_of(folder_.path()) == before) << "the folder has changed";
-  };
-  expect_none("5x5x4", true, "r.json");
-  expect_none("25x25x16", false, "p.h5");
-}
+// Closed, as a daemon's are.
+TEST_F(FullDisk, OrClosedStreamsKeepTheStatusAndLandInNoFile) {
+  const std::vector<int> every{STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO};
+  EXPECT_EQ(palpate("info missing.h5", {.standard_error = "/dev/full"}).status, 2);
+  EXPECT_EQ(palpate("info missing.h5", {.closed = every}).status, 2);
+  EXPECT_EQ(palpate("--version", {.closed = every}).status, 0);
 
-TEST_F(FullDisk, StandardErrorThatCannotBeWrittenKeepsTheStatus) {
-  EXPECT_EQ(palpate({"info", "missing.h5"}, {.standard_error = "/dev/full"}).status, 2);
+  const std::string recognize = "recognize u.h5 --maps maps --bins 5x5x4 --posterior p.h5 --png s";
+  EXPECT_EQ(palpate(recognize).status, 0);
+  const auto expected = content_of(folder_.path());
+  for (const std::vector<int>& closed :
+       {std::vector{STDIN_FILENO}, {STDOUT_FILENO}, {STDERR_FILENO}, every}) {
+    std::filesystem::remove(folder_ / "p.h5");
+    std::filesystem::remove_all(folder_ / "s");
+    EXPECT_EQ(palpate(recognize, {.closed = closed}).status, 0);
+    EXPECT_TRUE(content_of(folder_.path()) == expected);
+  }
+  for (const std::vector<int>& closed : {std::vector{STDOUT_FILENO}, every}) {
+    const Outcome live = palpate(
+        "live --sensor simulate:A,rate=100,seed=3,touches=2,speed=max --maps maps"
+        " --bins 5x5x4 --json f",
+        {.closed = closed});
+    EXPECT_EQ(live.status, 0) << live.err;
+    EXPECT_EQ(live.err, "");
+    std::istringstream file(bytes_of(folder_ / "f"));
+    int lines = 0;
+    for (std::string line; std::getline(file, line); ++lines) {
+      EXPECT_TRUE(nlohmann::json::accept(line)) << line;
+    }
+    EXPECT_EQ(lines, 2);
+  }
 }
 
 // Each of 20,000 readings has its own time, and so a frame of 10,000 elements: 1.6 GB.
@@ -131,11 +114,46 @@ TEST_F(FullDisk, AndMemoryThatEndsAreOneLine) {
     text += fmt::format("{},0,1\n", i);
   }
   put_bytes(folder_ / "log.csv", text);
-  const auto before = content_of(folder_.path());
-  const Outcome outcome = palpate({"import", "log.csv", "--array", "100:100:1", "-o", "o.h5"},
-                                  {.memory_bytes = 512 << 20});
-  expect_failure(outcome, "palpate: out of memory; end other programs, or use smaller files");
-  EXPECT_TRUE(content_of(folder_.path()) == before);
+  expect_failure("import log.csv --array 100:100:1 -o o.h5", {.memory_bytes = 512 << 20},
+                 "palpate: out of memory; end other programs, or use smaller files");
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "o.h5"));
+}
+
+using ImportMemory = ProgramTest;
+
+/// The largest memory of a command so far.
+long largest_kib() {
+  rusage usage{};
+  ::getrusage(RUSAGE_CHILDREN, &usage);
+  return usage.ru_maxrss;
+}
+
+TEST_F(ImportMemory, OfLongLogsIsLittle) {
+#ifdef __SANITIZE_ADDRESS__
+  GTEST_SKIP() << "the sanitizer holds memory of its own";
+#endif
+  done("simulate A -o A.h5");
+  const long before = largest_kib();
+  // 200,000 frames: 7 MB of text and 6 MB of pressures.
+  std::string log = "time,p0,p1,p2,p3\n";
+  for (int i = 0; i < 200'000; ++i) {
+    log += fmt::format("{},0.125,1.25,2.5,{}\n", i * 0.001, i % 7);
+  }
+  put_bytes(folder_ / "log.csv", log);
+  done("import log.csv -o o.h5 --array 4:1:2");
+  // The recording takes 72 bytes a row here (pressures, pose and time), and its file as much again,
+  // twice; every row of text would be 40 bytes more.
+  EXPECT_LT(largest_kib() - before, 64 * 1024);
+  EXPECT_EQ(read_recording(folder_ / "o.h5").size(), 200'000u);
+  // 2,000 readings at as many times: frames of 4,096 elements each.
+  log = "time,element,pressure\n";
+  for (int i = 0; i < 2000; ++i) {
+    log += fmt::format("{0},{0},0.5\n", i);
+  }
+  put_bytes(folder_ / "log.csv", log);
+  done("import log.csv -o o.h5 --array 64:64:2");
+  constexpr long checked_kib = 2000 * (4096 * (8 + 1 + 4) + 88) / 1024;
+  EXPECT_LT(largest_kib() - before, checked_kib);
 }
 
 }  // namespace palpate::full_disk_test

@@ -11,16 +11,19 @@ namespace palpate::info_test {
 class InfoCommand : public ProgramTest {
  protected:
   void expect_info(const char* file, std::initializer_list<const char*> parts) const {
-    expect_named(done({"info", file}), parts);
+    expect_named(done(std::string("info ") + file), parts);
+  }
+  void expect_info(const Recording& recording, std::initializer_list<const char*> parts) const {
+    write_recording(folder_ / "r.h5", recording);
+    expect_info("r.h5", parts);
   }
 };
 
 TEST_F(InfoCommand, Recording) {
-  write_recording(folder_ / "u.h5", sample_unknown("A", {{2.0, -3.0}, 1.0}, 6));
-  expect_info("u.h5", {"u.h5: recording of an unknown object", "touches           6",
-                       "elements          36", "kPa", "A at x 1.444 mm, y 3.304 mm"});
-  write_recording(folder_ / "A.h5", sample_training("A", 2));
-  expect_info("A.h5", {"recording of A"});
+  expect_info(sample_unknown("A", {{2.0, -3.0}, 1.0}, 6),
+              {"r.h5: recording of an unknown object", "touches           6",
+               "elements          36", "kPa", "A at x 1.444 mm, y 3.304 mm"});
+  expect_info(sample_training("A", 2), {"recording of A"});
 }
 
 TEST_F(InfoCommand, RangesOfPosesPressuresAndArray) {
@@ -28,11 +31,11 @@ TEST_F(InfoCommand, RangesOfPosesPressuresAndArray) {
   recording.T_robot_sensor = {{{-3.5, 2.0}, 0.5}, {{4.0, 8.25}, -1.0}};
   recording.pressure.assign(72, 1.0);
   std::fill(recording.pressure.begin(), recording.pressure.begin() + 10, 16.0);
-  write_recording(folder_ / "r.h5", recording);
-  expect_info("r.h5", {"9.8 x 9.5 mm: x -4.9 to 4.9, y -4.75 to 4.75 mm",
-                       "pitch             1.9 mm", "1 to 16 kPa, median 1, 99th percentile 16",
-                       "in contact        1 touches, more than 2 kPa above 0",
-                       "x -3.5 to 4 mm, y 2 to 8.25 mm", "theta -1 to 0.5 rad, -57.3 to 28.6 deg"});
+  expect_info(recording,
+              {"9.8 x 9.5 mm: x -4.9 to 4.9, y -4.75 to 4.75 mm", "pitch             1.9 mm",
+               "1 to 16 kPa, median 1, 99th percentile 16",
+               "in contact        1 touches, more than 2 kPa above 0",
+               "x -3.5 to 4 mm, y 2 to 8.25 mm", "theta -1 to 0.5 rad, -57.3 to 28.6 deg"});
 }
 
 TEST_F(InfoCommand, SuspicionsComeLast) {
@@ -42,27 +45,19 @@ TEST_F(InfoCommand, SuspicionsComeLast) {
     pose.theta_rad *= 180.0 / std::numbers::pi;
   }
   write_recording(folder_ / "r.h5", recording);
-  const std::string said = done({"info", "r.h5"});
+  const std::string said = done("info r.h5");
   const std::string suspicions = said.substr(std::min(said.find("Suspicious:\n"), said.size()));
   expect_named(suspicions, {"are these metres?\n", "are these degrees?\n"});
   EXPECT_EQ(std::count(suspicions.begin(), suspicions.end(), '\n'), 3) << suspicions;
 }
 
 // Streams have offsets, phases of rest, and ramps; without noise, most frames are equal.
-TEST_F(InfoCommand, SimulatedRecordingsAreNotSuspicious) {
-  for (const std::string noise : {"0", "0.7"}) {
-    done({"simulate", "E", "--noise-kpa", noise, "-o", "train.h5"});
-    done({"simulate", "E", "--noise-kpa", noise, "--object-pose", "random", "--touches", "9", "-o",
-          "unknown.h5"});
-    for (const std::string touches : {"1", "12"}) {
-      done({"record", "--sensor",
-            "simulate:A,object=random,speed=max,noise=" + noise + ",touches=" + touches, "-o",
-            "frames" + touches + ".h5"});
-    }
-    done({"touches", "frames12.h5", "-o", "touches.h5"});
-    for (const char* file : {"train.h5", "unknown.h5", "frames1.h5", "frames12.h5", "touches.h5"}) {
-      const std::string said = done({"info", file});
-      EXPECT_EQ(said.find("Suspicious"), std::string::npos) << said;
+TEST_F(InfoCommand, SimulatedStreamsAreNotSuspicious) {
+  for (const std::string sensor : {"touches=1,noise=0", "touches=12,noise=0.7"}) {
+    done("record -o frames.h5 --sensor simulate:A,object=random,speed=max," + sensor);
+    done("touches frames.h5 -o touches.h5");
+    for (const char* file : {"info frames.h5", "info touches.h5"}) {
+      EXPECT_EQ(done(file).find("Suspicious"), std::string::npos) << sensor;
     }
   }
 }
@@ -73,8 +68,7 @@ TEST_F(InfoCommand, RawStreamOfAChangingArray) {
   stream.pressure_unit = "raw";
   stream.time_s = {1.7e9, 1.7e9 + 2.5};
   stream.elements_mm.resize(2 * stream.elements());
-  write_recording(folder_ / "s.h5", stream);
-  expect_info("s.h5", {"frames           2", "raw", "positions change", "2.500 s",
+  expect_info(stream, {"frames           2", "raw", "positions change", "2.500 s",
                        "in contact        not known"});
 }
 
@@ -86,17 +80,16 @@ TEST_F(InfoCommand, DeadElementsDoNotCountAmongThePressures) {
   recording.valid[4] = 0;
   recording.pressure[3] = 4000.0;
   recording.pressure[4] = std::nan("");
-  write_recording(folder_ / "d.h5", recording);
-  expect_info("d.h5", {"1.5 to 1.5 kPa", "dead readings     2 of 36"});
+  expect_info(recording, {"1.5 to 1.5 kPa", "dead readings     2 of 36"});
 }
 
 TEST_F(InfoCommand, ClosesRecordingsOnly) {
   write_recording(folder_ / "u.h5", sample_training("A", 1));
   const std::string before = bytes_of(folder_ / "u.h5");
-  expect_named(done({"info", "--close", "u.h5"}), {"touches           1"});
+  expect_named(done("info --close u.h5"), {"touches           1"});
   EXPECT_TRUE(bytes_of(folder_ / "u.h5") == before) << "it is closed already";
   write_map(folder_ / "I.map.h5", sample_map("I"));
-  expect_refused({"info", "--close", "I.map.h5"}, {"I.map.h5", "palpate.map", "recording"});
+  expect_refused("info --close I.map.h5", {"I.map.h5", "palpate.map", "recording"});
 }
 
 TEST_F(InfoCommand, Map) {

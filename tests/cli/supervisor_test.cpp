@@ -38,6 +38,7 @@ class Supervisor : public testing::Test {
               std::uint64_t patience_s = 60) const {
     const pid_t pid = ::fork();
     if (pid == 0) {
+      std::signal(SIGPIPE, SIG_DFL);  // which a test of a page ignores
       const int complained = ::creat((folder_ / "complained").c_str(), 0600);
       try {
         cli::supervise(restart, patience_s);

@@ -97,7 +97,7 @@ bool FakePort::two_stop_bits() const { return (settings_of(far_).c_cflag & CSTOP
 FakeSerialBoard::FakeSerialBoard(FakeUsb& usb, const std::string& serial, Ids ids, int address,
                                  bool has_driver)
     : usb_(usb),
-      device_(usb, address, /*port=*/address,
+      device_(usb, address,
               {.vendor = ids.vendor,
                .product = ids.product,
                .manufacturer = "Maker",

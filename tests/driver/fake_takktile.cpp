@@ -2,6 +2,10 @@
 
 #include <bit>
 
+#include <gtest/gtest.h>
+
+#include "streamed.hpp"
+
 namespace palpate {
 
 namespace {
@@ -26,11 +30,25 @@ double expected_kpa(int raw_pressure, int raw_temperature, int recalibrations) {
   return 50.0 + compensated * 65.0 / 1023.0;
 }
 
+std::vector<Frame> expect_frames(Sensor& sensor, std::size_t cells, int first_raw,
+                                 std::size_t count, int recalibrations) {
+  std::vector<Frame> frames = take(sensor, count);
+  EXPECT_EQ(frames.size(), count);
+  for (const Frame& frame : frames) {
+    EXPECT_EQ(frame.values.size(), cells);
+    for (const double value : frame.values) {
+      EXPECT_NEAR(value, expected_kpa(first_raw, 512, recalibrations), kpa_tolerance);
+    }
+    ++first_raw;
+  }
+  return frames;
+}
+
 FakeTakktile::FakeTakktile(FakeUsb& usb, const std::string& serial,
                            std::vector<std::uint8_t> alive_rows, Layout layout, int address)
     : alive_rows_(std::move(alive_rows)),
       layout_(layout),
-      device_(usb, address, /*port=*/address,
+      device_(usb, address,
               {.vendor = 0x59e3,
                .product = 0x74c7,
                .manufacturer = "TakkTile LLC",
@@ -62,7 +80,7 @@ void FakeTakktile::send_frame(int raw_pressure, int raw_temperature) {
       frame.push_back(static_cast<std::uint8_t>(raw << 6));
     }
   }
-  device_.send_message(frame);
+  device_.send(frame);
 }
 
 std::optional<Bytes> FakeTakktile::answer(const FakeUsbDevice::Setup& setup) {
@@ -82,16 +100,12 @@ std::optional<Bytes> FakeTakktile::answer(const FakeUsbDevice::Setup& setup) {
       }
       return map;
     }
-    case 0x6c:
+    case 0x6c: {
       // The MPL115A2's data sheet: a0 = 2009.75, b1 = -2.375854, b2 = -0.920471, c12 = 0.000790.
-      return Bytes{static_cast<std::uint8_t>(0x3e + recalibrations_),
-                   0xce,
-                   0xb3,
-                   0xf9,
-                   0xc5,
-                   0x17,
-                   0x33,
-                   0xc8};
+      Bytes calibration = {0x3e, 0xce, 0xb3, 0xf9, 0xc5, 0x17, 0x33, 0xc8};
+      calibration[0] = static_cast<std::uint8_t>(calibration[0] + recalibrations_);
+      return calibration;
+    }
     case 0xc7: {
       // TCC0.CTRLA = TC_CLKSEL_DIV256_gc & wIndex: the timer runs if a bit of 0x06 is set.
       constexpr int clock_by_256 = 0x06;

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "fake_usb_device.hpp"
+#include "palpate/sensor.hpp"
 
 namespace palpate {
 
@@ -13,6 +14,11 @@ namespace palpate {
 double expected_kpa(int raw_pressure, int raw_temperature = 512, int recalibrations = 0);
 /// The data sheet rounds the coefficients to 1e-6; readings of up to 1023 multiply them twice.
 constexpr double kpa_tolerance = 0.05;
+
+/// Takes `count` frames, each of as many cells, which read first_raw, first_raw + 1, ... from frame
+/// to frame; returns them.
+std::vector<Frame> expect_frames(Sensor& sensor, std::size_t cells, int first_raw,
+                                 std::size_t count = 1, int recalibrations = 0);
 
 /// A TakkTile as its published firmware behaves.
 class FakeTakktile {

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 namespace palpate {
 
@@ -23,36 +24,17 @@ gboolean leave(UMockdevIoctlBase*, UMockdevIoctlClient* client, gpointer) {
   return TRUE;
 }
 
-std::string hex(const Bytes& bytes) {
-  std::string text;
-  for (const std::uint8_t byte : bytes) {
-    text += fmt::format("{:02x}", byte);
-  }
-  return text;
-}
-
 /// USB 2.0, table 9-8.
 Bytes device_descriptor(std::uint16_t vendor, std::uint16_t product, std::uint8_t device_class,
                         bool has_serial) {
-  const auto low = [](int value) { return static_cast<std::uint8_t>(value); };
-  return {18,
-          1,
-          0x00,
-          0x02,  // USB 2.0
-          device_class,
-          0,
-          0,
-          FakeUsbDevice::packet_bytes,
-          low(vendor),
-          low(vendor >> 8),
-          low(product),
-          low(product >> 8),
-          0x00,
-          0x01,  // release
-          1,
-          2,  // manufacturer, product
-          low(has_serial ? 3 : 0),
-          1};
+  Bytes bytes = {18, 1, 0x00, 0x02, device_class, 0, 0, FakeUsbDevice::packet_bytes};
+  for (const std::uint16_t word : {vendor, product, std::uint16_t{0x0100}}) {
+    bytes.push_back(static_cast<std::uint8_t>(word));
+    bytes.push_back(static_cast<std::uint8_t>(word >> 8));
+  }
+  const std::uint8_t serial = has_serial ? 3 : 0;
+  bytes.insert(bytes.end(), {1, 2, serial, 1});  // manufacturer, product, serial number
+  return bytes;
 }
 
 std::string usb_device_text(const std::string& path, int address, const Bytes& descriptors) {
@@ -61,9 +43,9 @@ std::string usb_device_text(const std::string& path, int address, const Bytes& d
       "E: BUSNUM=001\nE: DEVNUM={1:03}\nE: DEVNAME=/dev/bus/usb/001/{1:03}\n"
       "A: bConfigurationValue=1\\n\nA: busnum=1\\n\nA: devnum={1}\\n\nA: speed=12\\n\n"
       "A: idVendor={2:04x}\\n\nA: idProduct={3:04x}\\n\nA: bDeviceClass={4:02x}\\n\n"
-      "H: descriptors={5}\n",
+      "H: descriptors={5:02x}\n",
       path, address, descriptors[8] | descriptors[9] << 8, descriptors[10] | descriptors[11] << 8,
-      descriptors[4], hex(descriptors));
+      descriptors[4], fmt::join(descriptors, ""));
 }
 
 }  // namespace
@@ -84,12 +66,16 @@ void FakeUsb::add(const std::string& description) {
   }
 }
 
-void FakeUsb::pass_on(const std::string& node) {
-  umockdev_testbed_detach_ioctl(testbed_, node.c_str(), nullptr);
+void FakeUsb::attach(const std::string& node, UMockdevIoctlBase* handler) {
   GError* error = nullptr;
-  if (!umockdev_testbed_attach_ioctl(testbed_, node.c_str(), kernel_, &error)) {
+  if (!umockdev_testbed_attach_ioctl(testbed_, node.c_str(), handler, &error)) {
     throw std::runtime_error(error->message);
   }
+}
+
+void FakeUsb::pass_on(const std::string& node) {
+  umockdev_testbed_detach_ioctl(testbed_, node.c_str(), nullptr);
+  attach(node, kernel_);
 }
 
 FakeUsb::~FakeUsb() {
@@ -104,11 +90,11 @@ std::string FakeUsb::root() const {
   return root;
 }
 
-FakeUsbDevice::FakeUsbDevice(FakeUsb& usb, int address, int port, Identity identity,
-                             Bytes configuration, Firmware firmware)
+FakeUsbDevice::FakeUsbDevice(FakeUsb& usb, int address, Identity identity, Bytes configuration,
+                             Firmware firmware)
     : usb_(usb),
       address_(address),
-      port_(port),
+      port_(address),
       identity_(std::move(identity)),
       configuration_(std::move(configuration)),
       firmware_(std::move(firmware)) {
@@ -151,15 +137,10 @@ void FakeUsbDevice::plug(int by) {
   attribute("product", identity_.product_name);
   attribute("serial", identity_.serial);
   // Comes before the device appears: a program that sees the device can open it.
-  GError* error = nullptr;
-  if (!umockdev_testbed_attach_ioctl(usb_.testbed(), node().c_str(), last().handler, &error)) {
-    throw std::runtime_error(error->message);
-  }
+  usb_.attach(node(), last().handler);
   usb_.add(text);
-  for (int interface = 0; interface < configuration_.at(4); ++interface) {
-    usb_.add(fmt::format("P: {}/{}:1.{}\nE: SUBSYSTEM=usb\nE: DEVTYPE=usb_interface\n", syspath(),
-                         port(), interface));
-  }
+  usb_.add(
+      fmt::format("P: {}/{}:1.0\nE: SUBSYSTEM=usb\nE: DEVTYPE=usb_interface\n", syspath(), port()));
 }
 
 void FakeUsbDevice::unplug() {
@@ -174,66 +155,41 @@ void FakeUsbDevice::unplug() {
       last().finished.push_back(std::move(urb));
     }
     last().under_way.clear();
-    last().claimed.clear();
+    last().claimed = false;
   }
   const std::string path = "/sys" + syspath();
-  for (int interface = 0; interface < configuration_.at(4); ++interface) {
-    umockdev_testbed_remove_device(usb_.testbed(),
-                                   fmt::format("{}/{}:1.{}", path, port(), interface).c_str());
-  }
+  umockdev_testbed_remove_device(usb_.testbed(), fmt::format("{}/{}:1.0", path, port()).c_str());
   umockdev_testbed_uevent(usb_.testbed(), path.c_str(), "remove");
   umockdev_testbed_remove_device(usb_.testbed(), path.c_str());
   umockdev_testbed_detach_ioctl(usb_.testbed(), node().c_str(), nullptr);
 }
 
-void FakeUsbDevice::send_packet(Bytes bytes) {
+void FakeUsbDevice::queue(const std::vector<Turn>& turns) {
   {
     const std::lock_guard lock(mutex_);
-    turns_.push_back({.packet = std::move(bytes)});
+    turns_.insert(turns_.end(), turns.begin(), turns.end());
   }
   changed_.notify_all();
 }
 
-void FakeUsbDevice::send_message(const Bytes& bytes) {
-  {
-    const std::lock_guard lock(mutex_);
-    std::size_t sent = 0;
-    for (; sent + packet_bytes <= bytes.size(); sent += packet_bytes) {
-      const auto begin = bytes.begin() + static_cast<std::ptrdiff_t>(sent);
-      turns_.push_back({.packet = Bytes(begin, begin + packet_bytes)});
-    }
-    turns_.push_back(
-        {.packet = Bytes(bytes.begin() + static_cast<std::ptrdiff_t>(sent), bytes.end())});
+void FakeUsbDevice::send(std::span<const std::uint8_t> bytes, bool end) {
+  std::vector<Turn> turns;
+  for (; bytes.size() >= packet_bytes; bytes = bytes.subspan(packet_bytes)) {
+    turns.push_back({.packet = Bytes(bytes.begin(), bytes.begin() + packet_bytes)});
   }
-  changed_.notify_all();
+  if (end) {
+    turns.push_back({.packet = Bytes(bytes.begin(), bytes.end())});
+  }
+  queue(turns);
 }
 
 void FakeUsbDevice::send_fault(Fault fault, int times) {
-  {
-    const std::lock_guard lock(mutex_);
-    turns_.insert(turns_.end(), static_cast<std::size_t>(times),
-                  Turn{.packet = {}, .fault = fault});
-  }
-  changed_.notify_all();
+  queue(std::vector<Turn>(static_cast<std::size_t>(times), {.packet = {}, .fault = fault}));
 }
 
-void FakeUsbDevice::refuse_requests(bool refuse) {
+void FakeUsbDevice::behave(Manner manner) {
   const std::lock_guard lock(mutex_);
-  refusing_ = refuse;
-}
-
-void FakeUsbDevice::ignore_requests(bool ignore) {
-  const std::lock_guard lock(mutex_);
-  ignoring_ = ignore;
-}
-
-void FakeUsbDevice::show_driver(int interface, const std::string& driver) {
-  const std::string path = fmt::format("/sys{}/{}:1.{}", syspath(), port(), interface);
-  std::filesystem::remove(usb_.root() + path + "/driver");
-  if (!driver.empty()) {
-    umockdev_testbed_set_attribute_link(usb_.testbed(), path.c_str(), "driver",
-                                        ("../../../../../bus/usb/drivers/" + driver).c_str());
-  }
+  manner_ = manner;
 }
 
 void FakeUsbDevice::occupy(bool occupied) {
@@ -241,7 +197,13 @@ void FakeUsbDevice::occupy(bool occupied) {
     const std::lock_guard lock(mutex_);
     occupied_ = occupied;
   }
-  show_driver(0, occupied ? "usbfs" : "");
+  const std::string path = fmt::format("/sys{}/{}:1.0", syspath(), port());
+  if (occupied) {
+    umockdev_testbed_set_attribute_link(usb_.testbed(), path.c_str(), "driver",
+                                        "../../../../../bus/usb/drivers/usbfs");
+  } else {
+    std::filesystem::remove(usb_.root() + path + "/driver");
+  }
 }
 
 void FakeUsbDevice::forbid() {
@@ -251,29 +213,13 @@ void FakeUsbDevice::forbid() {
   chmod((usb_.root() + node()).c_str(), is_root ? S_IRUSR | S_IWUSR : 0);
 }
 
-std::vector<FakeUsbDevice::Setup> FakeUsbDevice::requests() const {
+FakeUsbDevice::Seen FakeUsbDevice::seen() const {
   const std::lock_guard lock(mutex_);
-  return requests_;
-}
-
-int FakeUsbDevice::halts_cleared() const {
-  const std::lock_guard lock(mutex_);
-  return halts_cleared_;
-}
-
-int FakeUsbDevice::urbs_under_way() const {
-  const std::lock_guard lock(mutex_);
-  return static_cast<int>(last().under_way.size());
-}
-
-bool FakeUsbDevice::claimed(int interface) const {
-  const std::lock_guard lock(mutex_);
-  return last().claimed.contains(interface);
-}
-
-std::size_t FakeUsbDevice::waiting_packets() const {
-  const std::lock_guard lock(mutex_);
-  return turns_.size();
+  return {.requests = requests_,
+          .halts_cleared = halts_cleared_,
+          .urbs_under_way = last().under_way.size(),
+          .waiting_packets = turns_.size(),
+          .claimed = last().claimed};
 }
 
 }  // namespace palpate

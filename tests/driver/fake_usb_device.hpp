@@ -3,15 +3,16 @@
 #include <linux/usbdevice_fs.h>
 #include <umockdev.h>
 
+#include <cerrno>
 #include <condition_variable>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <functional>
-#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -31,7 +32,8 @@ class FakeUsb {
   UMockdevTestbed* testbed() const { return testbed_; }
   /// Adds a device by its description, as umockdev-record writes it.
   void add(const std::string& description);
-  /// Lets the kernel answer the ioctls of this device file, instead of umockdev.
+  /// Lets a handler, or the kernel, answer the ioctls of this device file.
+  void attach(const std::string& node, UMockdevIoctlBase* handler);
   void pass_on(const std::string& node);
   std::string root() const;
 
@@ -59,14 +61,23 @@ class FakeUsbDevice {
     std::uint16_t value = 0;
     std::uint16_t index = 0;
   };
+  struct Seen {
+    std::vector<Setup> requests;
+    int halts_cleared = 0;
+    std::size_t urbs_under_way = 0;
+    std::size_t waiting_packets = 0;  ///< that the host has not fetched yet
+    bool claimed = false;
+  };
   /// Answers a control request, from the thread that plays the kernel: with bytes for the host, or
   /// with nullopt for a stall.
   using Firmware = std::function<std::optional<Bytes>(const Setup& setup)>;
-  /// How a packet's turn on the bus ends, as the kernel reports it in the status of a URB.
-  enum class Fault { none, stall, overflow, protocol };
+  enum class Manner { answers, refuses, ignores };
+  /// How a packet's turn on the bus ends: minus the status of the URB.
+  enum class Fault { none = 0, stall = EPIPE, overflow = EOVERFLOW, protocol = EPROTO };
 
+  /// @param address also the number of its port
   /// @param configuration the configuration descriptor and the descriptors behind it
-  FakeUsbDevice(FakeUsb& usb, int address, int port, Identity identity, Bytes configuration,
+  FakeUsbDevice(FakeUsb& usb, int address, Identity identity, Bytes configuration,
                 Firmware firmware);
   /// Sensors with submitted transfers must be stopped before: nobody would end the transfers.
   ~FakeUsbDevice();
@@ -80,32 +91,24 @@ class FakeUsbDevice {
   /// the device is plugged in again.
   void unplug();
 
-  /// Queues a packet of the bulk endpoint towards the host.
-  void send_packet(Bytes bytes);
-  /// Queues bytes as packets of 64 bytes and a last, shorter packet, which may be empty.
-  void send_message(const Bytes& bytes);
+  /// Queues bytes of the bulk endpoint towards the host, as packets of 64 bytes and, where they end
+  /// here, a last, shorter packet, which may be empty.
+  void send(std::span<const std::uint8_t> bytes, bool end = true);
   /// Makes the next turn on the bus end this way. A stall stays until the halt is cleared.
   void send_fault(Fault fault, int times = 1);
-  /// Refuses every control request by a stall, or never answers one.
-  void refuse_requests(bool refuse);
-  void ignore_requests(bool ignore);
+  /// Answers control requests, refuses each by a stall, or never answers one.
+  void behave(Manner manner);
   /// Lets only root open the device; nobody if the test is not run by root.
   void forbid();
-  /// Lets another program hold the interfaces.
+  /// Lets another program hold the interface.
   void occupy(bool occupied);
 
-  // What the host did.
-  std::vector<Setup> requests() const;
-  int halts_cleared() const;
-  int urbs_under_way() const;
-  bool claimed(int interface) const;
-  /// Number of packets that the host has not fetched yet.
-  std::size_t waiting_packets() const;
+  /// What the host did.
+  Seen seen() const;
 
   std::string node() const;
   std::string port() const;
   std::string syspath() const;
-  const Identity& identity() const { return identity_; }
 
  private:
   struct Unref {
@@ -137,21 +140,20 @@ class FakeUsbDevice {
     UMockdevIoctlBase* handler;
     bool plugged = true;
     bool halted = false;
-    std::map<int, UMockdevIoctlClient*> claimed = {};  // by which open file
+    bool claimed = false;
     std::deque<Urb> under_way = {};
     std::deque<Urb> finished = {};
   };
 
   static gboolean on_ioctl(UMockdevIoctlBase*, UMockdevIoctlClient* client, gpointer attachment);
   void handle(UMockdevIoctlClient* client, Attachment& attachment);
-  int take_interface(int interface, UMockdevIoctlClient* client, Attachment& attachment) const;
   int submit(UMockdevIoctlData* argument, Attachment& attachment);
   static int discard(UMockdevIoctlData* argument, Attachment& attachment);
   int reap(UMockdevIoctlData* argument, Attachment& attachment, std::unique_lock<std::mutex>& lock);
   void run_control(Urb& urb);
   void run_bulk(Attachment& attachment);
   Attachment& last() const { return *attachments_.back(); }
-  void show_driver(int interface, const std::string& driver);
+  void queue(const std::vector<Turn>& turns);
 
   FakeUsb& usb_;
   int address_;
@@ -163,8 +165,7 @@ class FakeUsbDevice {
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   std::vector<std::unique_ptr<Attachment>> attachments_;  // earlier ones may still be open
-  bool refusing_ = false;
-  bool ignoring_ = false;
+  Manner manner_ = Manner::answers;
   bool occupied_ = false;
   std::deque<Turn> turns_;
   std::vector<Setup> requests_;

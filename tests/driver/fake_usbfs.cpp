@@ -23,14 +23,6 @@ gboolean FakeUsbDevice::on_ioctl(UMockdevIoctlBase*, UMockdevIoctlClient* client
 
 void FakeUsbDevice::handle(UMockdevIoctlClient* client, Attachment& attachment) {
   UMockdevIoctlData* argument = umockdev_ioctl_client_get_arg(client);
-  const auto memory = [&](std::size_t bytes) {
-    return Memory(umockdev_ioctl_data_resolve(argument, 0, bytes, nullptr));
-  };
-  const auto number = [&](std::size_t bytes) {
-    unsigned value = 0;
-    std::memcpy(&value, memory(bytes)->data, sizeof(value));
-    return static_cast<int>(value);
-  };
   std::unique_lock lock(mutex_);
   const unsigned long request = umockdev_ioctl_client_get_request(client);
   int code = 0;  // an errno
@@ -39,23 +31,24 @@ void FakeUsbDevice::handle(UMockdevIoctlClient* client, Attachment& attachment) 
   } else {
     switch (request) {
       case USBDEVFS_GET_CAPABILITIES: {
-        const std::uint32_t capabilities =
+        constexpr std::uint32_t capabilities =
             USBDEVFS_CAP_ZERO_PACKET | USBDEVFS_CAP_NO_PACKET_SIZE_LIM |
             USBDEVFS_CAP_BULK_CONTINUATION | USBDEVFS_CAP_REAP_AFTER_DISCONNECT;
-        std::memcpy(memory(sizeof(capabilities))->data, &capabilities, sizeof(capabilities));
+        const Memory memory(
+            umockdev_ioctl_data_resolve(argument, 0, sizeof(capabilities), nullptr));
+        std::memcpy(memory->data, &capabilities, sizeof(capabilities));
         break;
       }
       case USBDEVFS_GETDRIVER:
         code = ENODATA;
         break;
-      case USBDEVFS_DISCONNECT_CLAIM:  // the interface's number comes first
-        code = take_interface(number(sizeof(usbdevfs_disconnect_claim)), client, attachment);
-        break;
+      case USBDEVFS_DISCONNECT_CLAIM:
       case USBDEVFS_CLAIMINTERFACE:
-        code = take_interface(number(sizeof(unsigned)), client, attachment);
+        attachment.claimed = !occupied_;
+        code = occupied_ ? EBUSY : 0;
         break;
       case USBDEVFS_RELEASEINTERFACE:
-        attachment.claimed.erase(number(sizeof(unsigned)));
+        attachment.claimed = false;
         break;
       case USBDEVFS_CLEAR_HALT:
         attachment.halted = false;
@@ -79,15 +72,6 @@ void FakeUsbDevice::handle(UMockdevIoctlClient* client, Attachment& attachment) 
   umockdev_ioctl_client_complete(client, code == 0 ? 0 : -1, code);
 }
 
-int FakeUsbDevice::take_interface(int interface, UMockdevIoctlClient* client,
-                                  Attachment& attachment) const {
-  if (occupied_) {
-    return EBUSY;
-  }
-  const auto claim = attachment.claimed.try_emplace(interface, client).first;
-  return claim->second == client ? 0 : EBUSY;
-}
-
 int FakeUsbDevice::submit(UMockdevIoctlData* argument, Attachment& attachment) {
   Urb urb;
   urb.data.reset(umockdev_ioctl_data_resolve(argument, 0, sizeof(usbdevfs_urb), nullptr));
@@ -98,7 +82,8 @@ int FakeUsbDevice::submit(UMockdevIoctlData* argument, Attachment& attachment) {
   }
   if (urb.fields().type == USBDEVFS_URB_TYPE_CONTROL) {
     run_control(urb);
-    (ignoring_ ? attachment.under_way : attachment.finished).push_back(std::move(urb));
+    (manner_ == Manner::ignores ? attachment.under_way : attachment.finished)
+        .push_back(std::move(urb));
   } else {
     attachment.under_way.push_back(std::move(urb));
   }
@@ -114,7 +99,7 @@ void FakeUsbDevice::run_control(Urb& urb) {
   constexpr std::size_t setup_bytes = 8;
   const std::size_t room = word(6);
   requests_.push_back(setup);
-  const std::optional<Bytes> reply = refusing_ || ignoring_ ? std::nullopt : firmware_(setup);
+  const std::optional<Bytes> reply = manner_ == Manner::answers ? firmware_(setup) : std::nullopt;
   if (!reply) {
     urb.status = -EPIPE;
     return;
@@ -142,38 +127,20 @@ void FakeUsbDevice::run_bulk(Attachment& attachment) {
   while (attachment.finished.empty() && (attachment.halted || !turns_.empty()) &&
          !attachment.under_way.empty() && attachment.plugged) {
     Urb& urb = attachment.under_way.front();
-    if (attachment.halted) {
-      urb.status = -EPIPE;
-      attachment.finished.push_back(std::move(urb));
-      attachment.under_way.pop_front();
-      continue;
+    Turn turn{.packet = {}, .fault = Fault::stall};
+    if (!attachment.halted) {
+      turn = std::move(turns_.front());
+      turns_.pop_front();
+      attachment.halted = turn.fault == Fault::stall;
     }
-    const Turn turn = std::move(turns_.front());
-    turns_.pop_front();
     const auto room = static_cast<std::size_t>(urb.fields().buffer_length) - urb.filled;
-    switch (turn.fault) {
-      case Fault::stall:
-        attachment.halted = true;
-        urb.status = -EPIPE;
-        break;
-      case Fault::overflow:
-        urb.status = -EOVERFLOW;
-        break;
-      case Fault::protocol:
-        urb.status = -EPROTO;
-        break;
-      case Fault::none:
-        if (turn.packet.size() > room) {
-          urb.status = -EOVERFLOW;
-          break;
-        }
-        if (!turn.packet.empty()) {
-          std::memcpy(urb.buffer->data + urb.filled, turn.packet.data(), turn.packet.size());
-        }
-        urb.filled += turn.packet.size();
-        if (turn.packet.size() == packet_bytes && turn.packet.size() < room) {
-          continue;
-        }
+    urb.status = -static_cast<int>(turn.packet.size() > room ? Fault::overflow : turn.fault);
+    if (urb.status == 0) {
+      std::ranges::copy(turn.packet, urb.buffer->data + urb.filled);
+      urb.filled += turn.packet.size();
+      if (turn.packet.size() == packet_bytes && turn.packet.size() < room) {
+        continue;
+      }
     }
     attachment.finished.push_back(std::move(urb));
     attachment.under_way.pop_front();

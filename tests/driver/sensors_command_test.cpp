@@ -25,17 +25,17 @@ class SensorsCommand : public ProgramTest {
   FakeUsb usb_;
 };
 
-TEST_F(SensorsCommand, SaysThatNothingIsPluggedIn) {
+TEST_F(SensorsCommand, TellsBoardsFromOtherDevices) {
   EXPECT_EQ(done({"sensors"}), "no USB devices\n");
   EXPECT_EQ(json::parse(done({"sensors", "--json"})), json::array());
-}
-
-TEST_F(SensorsCommand, TellsBoardsFromOtherDevices) {
   FakeTakktile takktile(usb_, "0012", {0b11111, 0b111});
   const FakeSerialBoard tsf85(usb_, "", {}, 3);
   const FakeSerialBoard other(usb_, "B2", {.vendor = 0x2341, .product = 0x8036}, 4);
+  const FakeSerialBoard without_driver(usb_, "A1", {}, 5, /*has_driver=*/false);
+  const unsigned baud_before = tsf85.port().baud();
   const json boards = json::parse(done({"sensors", "--json"}));
-  ASSERT_EQ(boards.size(), 3U);
+  ASSERT_EQ(boards.size(), 4U);
+  EXPECT_EQ(tsf85.port().baud(), baud_before) << "opening it could restart the board";
   EXPECT_EQ(boards[0], json::parse(R"({
     "name": "takktile:0012", "bus": 1, "address": 2, "vendor": "59e3", "product": "74c7",
     "manufacturer": "TakkTile LLC", "product_name": "TakkTile USB", "serial": "0012",
@@ -43,8 +43,15 @@ TEST_F(SensorsCommand, TellsBoardsFromOtherDevices) {
   EXPECT_EQ(boards[1]["name"], "tsf85:1-3") << "no serial number: named by its port";
   EXPECT_EQ(boards[1]["serial_port"], tsf85.node());
   EXPECT_EQ(boards[1]["elements"], 56);
+  EXPECT_EQ(boards[1]["rate_hz"], 100.0);
+  EXPECT_EQ(boards[1]["pressure_unit"], "raw");
+  EXPECT_EQ(boards[1]["usable"], true);
   EXPECT_EQ(boards[2]["usable"], false);
   EXPECT_EQ(boards[2]["name"], "");
+  EXPECT_THAT(boards[2]["reason"], HasSubstr("PROFILE:/dev/ttyUSB4"));
+  EXPECT_EQ(boards[3]["name"], "tsf85:A1");
+  EXPECT_EQ(boards[3]["usable"], false);
+  EXPECT_THAT(boards[3]["reason"], HasSubstr("modprobe"));
 
   const std::string text = done({"sensors"});
   EXPECT_THAT(text, HasSubstr("* 59e3:74c7  takktile:0012\n"
@@ -80,17 +87,13 @@ TEST_F(SensorsCommand, RecordsASerialBoardUntilItIsUnplugged) {
   EXPECT_GT(std::stoi(frames[1]), sent / 4) << "what came is kept";
 }
 
-TEST_F(SensorsCommand, SaysWhyABoardCannotBeUsed) {
-  FakeTakktile board(usb_, "0012", {0b11111});
-  board.usb().refuse_requests(true);
-  EXPECT_THAT(done({"sensors"}), HasSubstr("     not usable: USB device 59e3:74c7 at 1-2: request "
-                                           "0x5C: it refuses the request"));
-}
-
-TEST_F(SensorsCommand, DoesNotPassOnWhatADeviceWouldSayToATerminal) {
+TEST_F(SensorsCommand, SaysWhyABoardCannotBeUsedAndNothingThatATerminalObeys) {
   FakeTakktile board(usb_, "\x1b[2J", {0b11111});
   EXPECT_THAT(done({"sensors"}), Not(HasSubstr("\x1b")));
   EXPECT_EQ(json::parse(done({"sensors", "--json"})).size(), 1U);
+  board.usb().behave(FakeUsbDevice::Manner::refuses);
+  EXPECT_THAT(done({"sensors"}), HasSubstr("     not usable: USB device 59e3:74c7 at 1-2: request "
+                                           "0x5C: it refuses the request"));
 }
 
 }  // namespace palpate::sensors_command_test

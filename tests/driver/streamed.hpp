@@ -37,14 +37,4 @@ inline std::vector<Frame> take(Sensor& sensor, std::size_t count) {
   return frames;
 }
 
-/// Calls `send` with 0, 1, ... at a board's frame rate.
-inline void at_rate(double rate_hz, int count, const std::function<void(int)>& send) {
-  auto next = std::chrono::steady_clock::now();
-  for (int i = 0; i < count; ++i) {
-    send(i);
-    next += std::chrono::nanoseconds(static_cast<long>(1e9 / rate_hz));
-    std::this_thread::sleep_until(next);
-  }
-}
-
 }  // namespace palpate

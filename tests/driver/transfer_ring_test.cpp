@@ -23,13 +23,17 @@ class Ring : public testing::Test {
   }
 
   /// Handles events until the callbacks of all sent packets have returned.
-  bool pump() {
-    const auto end = std::chrono::steady_clock::now() + patience;
-    while (board_.usb().waiting_packets() > 0 && std::chrono::steady_clock::now() < end) {
+  bool pump(bool has_memory = true) {
+    return becomes_true([&] {
+      std::optional<WithoutMemory> none;
+      if (!has_memory) {
+        none.emplace();
+      }
       timeval time{.tv_sec = 0, .tv_usec = 1000};
       libusb_handle_events_timeout_completed(context_.get(), &time, nullptr);
-    }
-    return board_.usb().waiting_packets() == 0;
+      none.reset();
+      return board_.usb().seen().waiting_packets == 0;
+    });
   }
 
   static constexpr std::size_t transfer_bytes = 512;
@@ -43,34 +47,29 @@ class Ring : public testing::Test {
 
 TEST_F(Ring, TellsWhichTransferAPacketEnded) {
   for (const std::size_t bytes : {transfer_bytes, transfer_bytes - 64, std::size_t{3}}) {
-    board_.usb().send_message(Bytes(bytes, 1));
+    board_.usb().send(Bytes(bytes, 1));
   }
   ASSERT_TRUE(pump());
-  const std::vector<Completion> completions = ring_->completed();
-  ASSERT_EQ(completions.size(), 4U);
-  EXPECT_EQ(completions[0].bytes.size(), transfer_bytes);
-  EXPECT_FALSE(completions[0].ended) << "full, but with full packets only";
-  EXPECT_TRUE(completions[1].bytes.empty());
-  EXPECT_TRUE(completions[1].ended);
-  EXPECT_EQ(completions[2].bytes.size(), transfer_bytes - 64);
-  EXPECT_TRUE(completions[2].ended);
-  EXPECT_EQ(completions[3].bytes.size(), 3U);
-  EXPECT_TRUE(completions[3].ended);
+  std::vector<std::pair<std::size_t, bool>> completions;
+  for (const Completion& completion : ring_->completed()) {
+    completions.emplace_back(completion.bytes.size(), completion.ended);
+  }
+  // The first is full, but with full packets only.
+  EXPECT_EQ(completions,
+            (std::vector<std::pair<std::size_t, bool>>{
+                {transfer_bytes, false}, {0, true}, {transfer_bytes - 64, true}, {3, true}}));
 }
 
 TEST_F(Ring, CountsWhatItHasNoMemoryToKeep) {
-  board_.usb().send_packet(Bytes(1, 1));
+  board_.usb().send(Bytes(1, 1));
   ASSERT_TRUE(pump());
   // More transfers than the ring keeps spare buffers for.
   constexpr std::uint64_t lost = 2 * TransferRing::transfers;
   for (std::uint64_t i = 0; i < lost; ++i) {
-    board_.usb().send_packet(Bytes(2, 2));
+    board_.usb().send(Bytes(2, 2));
   }
-  {
-    const WithoutMemory none;
-    pump();
-  }
-  board_.usb().send_packet(Bytes(3, 3));
+  ASSERT_TRUE(pump(/*has_memory=*/false));
+  board_.usb().send(Bytes(3, 3));
   ASSERT_TRUE(pump());
   const std::vector<Completion> completions = ring_->completed();
   ASSERT_EQ(completions.size(), 2U);
@@ -82,34 +81,23 @@ TEST_F(Ring, CountsWhatItHasNoMemoryToKeep) {
 }
 
 TEST_F(Ring, NeedsNoMemoryForAsMuchAsWasRecycled) {
-  constexpr int packets = 5;
-  const auto send = [&] {
-    for (int i = 0; i < packets; ++i) {
-      board_.usb().send_packet(Bytes(1, static_cast<std::uint8_t>(i)));
+  for (int round = 0; round < 4; ++round) {
+    for (const std::uint8_t i : {0, 1, 2, 3, 4}) {
+      board_.usb().send(Bytes(1, i));
     }
-  };
-  send();
-  ASSERT_TRUE(pump());
-  std::vector<Completion> completions = ring_->completed();
-  for (int round = 0; round < 3; ++round) {
-    ASSERT_EQ(completions.size(), static_cast<std::size_t>(packets));
-    for (int i = 0; i < packets; ++i) {
-      EXPECT_EQ(completions[static_cast<std::size_t>(i)].bytes,
-                Bytes(1, static_cast<std::uint8_t>(i)));
-      EXPECT_EQ(completions[static_cast<std::size_t>(i)].missing, 0U);
+    ASSERT_TRUE(pump(/*has_memory=*/round == 0));
+    std::vector<Completion> completions = ring_->completed();
+    ASSERT_EQ(completions.size(), 5U) << round;
+    for (const std::uint8_t i : {0, 1, 2, 3, 4}) {
+      EXPECT_EQ(completions[i].bytes, Bytes(1, i));
+      EXPECT_EQ(completions[i].missing, 0U);
     }
     ring_->recycle(std::move(completions));
-    send();
-    {
-      const WithoutMemory none;
-      pump();
-    }
-    completions = ring_->completed();
   }
 }
 
 TEST_F(Ring, EndsWithoutMemory) {
-  board_.usb().send_packet(Bytes(64, 1));  // the transfer waits for more packets
+  board_.usb().send(Bytes(64, 1), /*end=*/false);  // the transfer waits for more packets
   ASSERT_TRUE(pump());
   {
     const WithoutMemory none;

@@ -46,35 +46,21 @@ def hidden_members(headers):
         header.read_text(), re.MULTILINE))
 
 
-def is_hidden(symbol, hidden):
-    member = re.match(r"palpate::\w+::(.*)", symbol)
-    return member is not None and bare(member[1]).startswith(hidden)
+class Declared:
+    """What public headers declare."""
 
+    def __init__(self, headers):
+        self.names = public_names(headers)
+        self.hidden = hidden_members(headers)
 
-def missing(exported, archive, headers):
-    """Public functions that the archive has and the shared library keeps to itself."""
-    names = public_names(headers)
-    hidden = hidden_members(headers)
-    found = []
-    for symbol in archive - exported:
-        match = re.match(r"palpate::(\w+)(?:::~?\w+)?[(\[]", symbol)
-        if match and match[1] in names and not is_hidden(symbol, hidden):
-            found.append(symbol)
-    return found
-
-
-def undeclared(exported, headers):
-    """Exported symbols that no public header declares: internals, and other libraries' templates."""
-    names = public_names(headers)
-    hidden = hidden_members(headers)
-    found = []
-    for symbol in exported:
-        match = re.match(r"(?:vtable for |typeinfo (?:name )?for )?"
-                         r"palpate::(operator\W|\w+)", symbol)
-        declared = match and (match[1] in names or match[1].startswith("operator"))
-        if not declared or is_hidden(symbol, hidden):
-            found.append(symbol)
-    return found
+    def has(self, symbol, pattern):
+        """Whether the symbol is of this pattern, whose first group is a public name or an operator,
+        and no member that the headers keep to the library."""
+        match = re.match(pattern, symbol)
+        member = re.match(r"palpate::\w+::(.*)", symbol)
+        return (match is not None
+                and (match[1] in self.names or match[1].startswith("operator"))
+                and not (member and bare(member[1]).startswith(self.hidden)))
 
 
 def main():
@@ -94,9 +80,12 @@ def main():
     archive = symbols(options.nm, options.archive, "T", "--extern-only")
     faults = [f"new, add it to {options.list.name}: {s}" for s in exported - recorded]
     faults += [f"gone: {s}" for s in recorded - exported]
-    faults += [f"public, but without PALPATE_API: {s}"
-               for s in missing(exported, archive, headers)]
-    faults += [f"exported, but in no public header: {s}" for s in undeclared(exported, headers)]
+    declared = Declared(headers)
+    faults += [f"public, but without PALPATE_API: {s}" for s in archive - exported
+               if declared.has(s, r"palpate::(\w+)(?:::~?\w+)?[(\[]")]
+    faults += [f"exported, but in no public header: {s}" for s in exported
+               if not declared.has(s, r"(?:vtable for |typeinfo (?:name )?for )?"
+                                      r"palpate::(operator\W|\w+)")]
     # A program may link the archive beside libvulkan or beside a volk of its own.
     defined = symbols(options.nm, options.archive, "A-TV-Z", "--extern-only")
     faults += [f"another library's name: {s}" for s in defined if re.match("vk[A-Z]|volk[A-Z]", s)]

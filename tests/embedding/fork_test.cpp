@@ -2,16 +2,14 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <cstdlib>
 #include <functional>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include <gtest/gtest.h>
-
 #include "letters.hpp"
+#include "support/errors.hpp"
 
 namespace palpate::fork_test {
 

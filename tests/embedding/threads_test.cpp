@@ -1,27 +1,20 @@
 // What the headers allow several threads to do at the same time; the preset `threads` runs these
 // tests with ThreadSanitizer.
-#include <unistd.h>
-
-#include <array>
 #include <atomic>
-#include <filesystem>
 #include <functional>
 #include <string>
 #include <thread>
 #include <vector>
 
-#include <gtest/gtest.h>
-
 #include "letters.hpp"
+#include "support/scratch_folder.hpp"
 
 namespace palpate::threads_test {
 
-constexpr int threads = 4;
-
-/// Calls `work(i)` on thread i, all at the same time.
-void on_threads(const std::function<void(int)>& work) {
+/// Calls `work(i)` on each of `threads` threads, all at the same time.
+void on_threads(int threads, const std::function<void(int)>& work) {
   std::atomic<int> ready = 0;
-  std::vector<std::thread> running;
+  std::vector<std::jthread> running;
   for (int i = 0; i < threads; ++i) {
     running.emplace_back([&, i] {
       ++ready;
@@ -30,93 +23,67 @@ void on_threads(const std::function<void(int)>& work) {
       work(i);
     });
   }
-  for (std::thread& thread : running) {
-    thread.join();
-  }
-}
-
-std::vector<double> histogram_after(Device& device, const std::vector<Hypothesis>& maps,
-                                    const Recording& unknown, std::size_t first) {
-  PoseHistogram belief(device, maps, {.lattice = small_lattice()});
-  for (std::size_t i = first; i < unknown.size(); ++i) {
-    belief.update(unknown.touch(i));
-    belief.estimate();
-  }
-  return belief.log_likelihood(1);
 }
 
 class Threads : public testing::Test {
  protected:
+  std::vector<double> histogram_after(Device& device, std::size_t first) const {
+    PoseHistogram belief(device, maps_, {.lattice = small_lattice()});
+    for (std::size_t i = first; i < unknown_.size(); ++i) {
+      belief.update(unknown_.touch(i));
+      belief.estimate();
+    }
+    return belief.log_likelihood(1);
+  }
+  std::vector<double> particles() {
+    ParticleFilter filter(device_, maps_, {.particles = 500, .seed = 7});
+    filter.update(unknown_.touches(0, unknown_.size()));
+    return filter.estimate().identity;
+  }
+  std::vector<double> gains_after(std::size_t touches) {
+    PoseHistogram belief(device_, maps_, {.lattice = small_lattice()});
+    belief.update(unknown_.touches(0, touches));
+    std::vector<double> gains;
+    for (const TouchGain& gain : belief.expected_gain(
+             random_poses(20, /*seed=*/4), digitacts_array(), {.samples = 32, .seed = 5})) {
+      gains.push_back(gain.both());
+    }
+    return gains;
+  }
+  std::vector<double> map_of_e() {
+    const std::vector<float> log_odds = letter_maps(device_)[1].map.log_odds;
+    return {log_odds.begin(), log_odds.end()};
+  }
+
   Device device_ = Device::open();
   std::vector<Hypothesis> maps_ = letter_maps(device_);
   Recording unknown_ = unknown_letter(6);
 };
 
-TEST_F(Threads, ShareADeviceWithTheResultsOfOneThread) {
-  std::vector<std::vector<double>> alone;
-  for (int i = 0; i < threads; ++i) {
-    alone.push_back(histogram_after(device_, maps_, unknown_, i));
-  }
-  std::vector<std::vector<double>> together(threads);
-  on_threads([&](int i) { together[i] = histogram_after(device_, maps_, unknown_, i); });
-  for (int i = 0; i < threads; ++i) {
-    EXPECT_EQ(together[i], alone[i]) << "thread " << i;
-  }
-}
-
-TEST_F(Threads, MakeDifferentEstimatorsOnADevice) {
-  const auto particles_after = [&] {
-    ParticleFilter filter(device_, maps_, {.particles = 500, .seed = 7});
-    filter.update(unknown_.touches(0, unknown_.size()));
-    return filter.estimate().identity;
-  };
-  const std::vector<double> particles = particles_after();
-  const std::vector<double> bins = histogram_after(device_, maps_, unknown_, 0);
-  on_threads([&](int i) {
-    switch (i) {
-      case 0:
-        EXPECT_EQ(particles_after(), particles);
-        break;
-      case 1:
-        EXPECT_EQ(histogram_after(device_, maps_, unknown_, 0), bins);
-        break;
-      default:
-        EXPECT_EQ(letter_maps(device_)[1].map.log_odds, maps_[1].map.log_odds);
-    }
-  });
-}
-
 // Planning divides the candidates among threads of its own.
-TEST_F(Threads, PlanTouchesOnADevice) {
-  const std::vector<Pose> candidates = random_poses(20, /*seed=*/4);
-  const std::vector<glm::dvec2> elements_mm = digitacts_array();
-  const auto gains_after = [&](std::size_t touches) {
-    PoseHistogram belief(device_, maps_, {.lattice = small_lattice()});
-    belief.update(unknown_.touches(0, touches));
-    std::vector<double> gains;
-    for (const TouchGain& gain :
-         belief.expected_gain(candidates, elements_mm, {.samples = 32, .seed = 5})) {
-      gains.push_back(gain.both());
-    }
-    return gains;
-  };
-  const std::array alone{gains_after(1), gains_after(2)};
-  on_threads([&](int i) { EXPECT_EQ(gains_after(1 + i % 2), alone[i % 2]) << "thread " << i; });
-}
-
-TEST_F(Threads, OpenDevicesOfTheirOwn) {
-  on_threads([&](int i) {
-    Device device = Device::open();
-    EXPECT_EQ(histogram_after(device, maps_, unknown_, i),
-              histogram_after(device, maps_, unknown_, i));
-  });
+TEST_F(Threads, ShareADeviceWithTheResultsOfOneThread) {
+  const std::vector<std::function<std::vector<double>()>> works = {
+      [&] { return histogram_after(device_, 0); },
+      [&] { return histogram_after(device_, 2); },
+      [&] { return particles(); },
+      [&] { return map_of_e(); },
+      [&] { return gains_after(1); },
+      [&] { return gains_after(2); },
+      [&] {
+        Device own = Device::open();
+        return histogram_after(own, 0);
+      }};
+  std::vector<std::vector<double>> alone;
+  for (const auto& work : works) {
+    alone.push_back(work());
+  }
+  EXPECT_EQ(alone.back(), alone.front()) << "a device of its own";
+  on_threads(static_cast<int>(works.size()), [&](int i) { EXPECT_EQ(works[i](), alone[i]) << i; });
 }
 
 TEST_F(Threads, ReadAndWriteFiles) {
-  const std::filesystem::path folder =
-      std::filesystem::temp_directory_path() / ("palpate_threads_test." + std::to_string(getpid()));
-  std::filesystem::create_directory(folder);
-  on_threads([&](int i) {
+  const ScratchFolder folder;
+  on_threads(4, [&](int i) {
     const auto path = folder / (std::to_string(i) + ".h5");
     for (int round = 0; round < 3; ++round) {
       write_recording(path, unknown_);
@@ -126,15 +93,14 @@ TEST_F(Threads, ReadAndWriteFiles) {
       EXPECT_THROW(read_map(folder / "missing.h5"), Error);
     }
   });
-  std::filesystem::remove_all(folder);
 }
 
 TEST(Log, TakesTheMessagesOfAllThreadsOneAtATime) {
   int messages = 0;  // no atomic: the library calls one at a time
   set_log([&](LogLevel, const std::string&) { ++messages; });
-  on_threads([](int) { Device::open(); });
+  on_threads(4, [](int) { Device::open(); });
   set_log({});
-  EXPECT_EQ(messages, threads);
+  EXPECT_EQ(messages, 4);
 }
 
 }  // namespace palpate::threads_test

@@ -1,180 +1,158 @@
+// Options and maps that are out of range are refused by the name of what is wrong.
+
 #include <functional>
-#include <string>
-#include <tuple>
+#include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 
+#include "beliefs.hpp"
+#include "made_up_sensors.hpp"
 #include "palpate/balanced_lattice.hpp"
-#include "palpate/error.hpp"
 #include "palpate/map_builder.hpp"
-#include "palpate/particle_filter.hpp"
-#include "palpate/pose_histogram.hpp"
+#include "support/errors.hpp"
 #include "support/limits.hpp"
-#include "support/synthetic.hpp"
 
 namespace palpate::refusal_test {
 
-void expect_refused(const std::function<void()>& call, const std::string& says) {
-  try {
-    call();
-    ADD_FAILURE() << "accepted, though " << says << " is wrong";
-  } catch (const Error& error) {
-    const std::string message = error.what();
-    EXPECT_EQ(error.fault(), Fault::input) << message;
-    EXPECT_NE(message.find(says), std::string::npos) << message;
-    EXPECT_EQ(message.find('\n'), std::string::npos) << message;
-  }
-}
-
 TEST(MapOptions, OutOfRangeAreRefused) {
   Device device = Device::open();
-  const auto refuse = [&](const MapOptions& options, const std::string& says) {
-    expect_refused([&] { const MapBuilder builder(device, options); }, says);
-  };
+  std::vector<std::pair<MapOptions, const char*>> wrong{
+      {{.classifier = {.threshold = nan}}, "threshold"},
+      {{.classifier = {.threshold = -1.0}}, "threshold"},
+      {{.classifier = {.ratio = nan}}, "ratio"},
+      {{.classifier = {.ratio = -1.0}}, "ratio"},
+      {{.sensor = {.peak = 1e-7}}, "peak"}};
   for (const double length : {0.0, -0.5, nan, infinity, 1e-7, 1.1e6, 1e154, 1e200}) {
-    refuse({.cell_mm = length}, "cell");
-    refuse({.sensor = {.spread_mm = length}}, "spread");
+    wrong.push_back({{.cell_mm = length}, "cell"});
+    wrong.push_back({{.sensor = {.spread_mm = length}}, "spread"});
   }
-  for (const double wrong : {nan, -1.0}) {
-    refuse({.classifier = {.threshold = wrong}}, "threshold");
-    refuse({.classifier = {.ratio = wrong}}, "ratio");
-  }
-  refuse({.sensor = {.peak = 1e-7}}, "peak");
   for (const double p : {0.0, 1.0, -0.5, 2.0, nan}) {
-    refuse({.sensor = {.peak = p}}, "peak");
-    refuse({.sensor = {.prior = p}}, "prior");
+    wrong.push_back({{.sensor = {.peak = p}}, "peak"});
+    wrong.push_back({{.sensor = {.prior = p}}, "prior"});
+  }
+  for (const auto& [options, name] : wrong) {
+    expect_named(input_error([&] { const MapBuilder builder(device, options); }), {name});
   }
 }
 
-TEST(MapOptions, AMapTooLargeIsRefusedBeforeItIsBuilt) {
-  Device device = Device::open();
-  Recording recording = random_recording(2, 36, 121);
-  recording.T_robot_sensor[1].translation_mm = {1e6, 1e6};
-  const auto build = [&](double cell_mm) {
-    MapBuilder builder(device, {.cell_mm = cell_mm});
-    builder.add(all_touches(recording));
-    return builder.build("made up");
+/// What both filters are given.
+struct Input {
+  std::vector<Hypothesis> objects{{random_map(5, 4, 0.5, 1.0, 122), 1.0}};
+  PoseLattice lattice = {};
+  ContactModel contact = {};
+
+  OccupancyGrid& map() { return objects[0].map; }
+};
+
+TEST(FilterInput, OutOfRangeIsRefused) {
+  using Change = std::function<void(Input&)>;
+  std::vector<std::pair<const char*, Change>> wrong{
+      {"no objects", [](Input& in) { in.objects.clear(); }},
+      {"'made up'", [](Input& in) { in.map().nx = 0; }},
+      {"19 log odds", [](Input& in) { in.map().log_odds.pop_back(); }},
+      {"prior", [](Input& in) { in.map().prior = nan; }},
+      {"symmetry", [](Input& in) { in.map().symmetry = -1; }},
+      {"(none)", [](Input& in) { in.map().label = "(none)"; }},
+      {"threshold", [](Input& in) { in.contact.classifier.threshold = nan; }},
+      {"ratio", [](Input& in) { in.contact.classifier.ratio = nan; }},
+      {"ratio", [](Input& in) { in.contact.classifier.ratio = 1.5; }},
+      {"differs from 0.3",
+       [](Input& in) { in.objects.push_back(in.objects[0]), in.map().prior = 0.3; }},
+      {"2 objects, but there are 1", [](Input& in) { in.contact = random_table(2); }},
+      {"y_mm",
+       [](Input& in) {
+         in.lattice.y_mm = {5.0, -5.0, 3};
+       }},
+      {"y_mm",
+       [](Input& in) {
+         in.lattice.y_mm = {-1e200, 1e200, 3};
+       }},
+      {"theta_rad",
+       [](Input& in) {
+         in.lattice.theta_rad = {0.0, nan, 3};
+       }},
+      {"pivot_mm", [](Input& in) {
+         in.lattice.pivot_mm = {infinity, 0.0};
+       }}};
+  const auto add = [&](const char* name, std::initializer_list<double> values,
+                       const std::function<void(Input&, double)>& set) {
+    for (const double value : values) {
+      wrong.emplace_back(name, [set, value](Input& in) { set(in, value); });
+    }
   };
-  expect_refused([&] { build(0.001); }, "use larger cells");
-  expect_refused([&] { build(10.0); }, "use larger cells");
-  EXPECT_NO_THROW(build(1000.0));
+  add("cell_mm", {0.0, -1.0, nan, infinity, 1e-200, 1e154, 1e200},
+      [](Input& in, double value) { in.map().cell_mm = value; });
+  add("spread_mm", {0.0, -1.0, nan, infinity, 500.0},
+      [](Input& in, double value) { in.map().spread_mm = value; });
+  add("origin_mm", {nan, infinity, 1e10},
+      [](Input& in, double value) { in.map().origin_mm.y = value; });
+  add("finite", {nan, infinity, -infinity},
+      [](Input& in, double value) { in.map().log_odds[7] = static_cast<float>(value); });
+  add("weight", {0.0, -1.0, nan, infinity},
+      [](Input& in, double value) { in.objects[0].weight = value; });
+  add("gamma", {-0.1, 1.0, nan}, [](Input& in, double value) { in.contact.gamma = value; });
+  add("prior", {0.0, 1.0, nan}, [](Input& in, double value) { in.contact.prior = value; });
+  Device device = Device::open();
+  for (const auto& [name, change] : wrong) {
+    SCOPED_TRACE(name);
+    Input in;
+    change(in);
+    const HistogramOptions bins{.lattice = in.lattice, .contact = in.contact};
+    expect_named(input_error([&] { const PoseHistogram made(device, in.objects, bins); }), {name});
+    const ParticleOptions particles{.particles = 10, .region = in.lattice, .contact = in.contact};
+    expect_named(input_error([&] { const ParticleFilter made(device, in.objects, particles); }),
+                 {name});
+  }
+}
+
+TEST(HistogramOptions, OutOfRangeAreRefused) {
+  Device device = Device::open();
+  std::vector<Hypothesis> objects = three_objects();
+  std::vector<std::pair<HistogramOptions, const char*>> wrong{
+      {{.lattice = {.x_mm = {-10.0, 10.0, 0}}}, "x_mm"},
+      {{.lattice = {}, .touch_sd = {.mm = -1.0}}, "touch_sd mm"},
+      {{.lattice = {}, .touch_sd = {.rad = nan}}, "touch_sd rad"},
+      {{.lattice = {}, .slip_sd = {.mm = 30.0}}, "slip_sd mm"}};
+  for (const double weight : {0.0, -1.0, nan, infinity}) {
+    wrong.push_back({{.lattice = {}, .none_weight = weight}, "none_weight"});
+  }
+  for (const auto& [options, name] : wrong) {
+    expect_named(input_error([&] { const PoseHistogram made(device, objects, options); }), {name});
+  }
+  objects[0].map.prior = 0.3;
+  EXPECT_NO_THROW(PoseHistogram(device, objects, {.lattice = {}, .contact = {.prior = 0.25}}))
+      << "maps of several priors, where one is given";
+}
+
+TEST(ParticleOptions, OutOfRangeAreRefused) {
+  Device device = Device::open();
+  std::vector<std::pair<ParticleOptions, const char*>> wrong{
+      {{.region = {}, .alpha_fast = 1.1}, "alpha_fast = "},
+      {{.region = {.y_mm = {0.0, 2e5, 1}}}, "region y_mm = "}};
+  for (const int n : {0, -1, 1'000'001}) {
+    wrong.push_back({{.particles = n, .region = {}}, "particles = "});
+  }
+  for (const double deviation : {-1.0, nan, 1e9}) {
+    wrong.push_back({{.region = {}, .motion_mm = deviation}, "motion_mm = "});
+    wrong.push_back({{.region = {}, .motion_rad = deviation}, "motion_rad = "});
+  }
+  for (const double rate : {-0.1, 0.0, 0.5, nan}) {
+    wrong.push_back({{.region = {}, .alpha_slow = rate}, "alpha_slow = "});
+  }
+  for (const auto& [options, name] : wrong) {
+    expect_named(input_error([&] { const ParticleFilter made(device, three_objects(), options); }),
+                 {name});
+  }
 }
 
 TEST(BalancedLattice, OfAMapThatIsNotSoundIsRefused) {
-  for (const auto& [cell_mm, spread_mm, says] :
-       {std::tuple(1e200, 0.5, "cell_mm"), std::tuple(0.5, 500.0, "spread_mm")}) {
-    Hypothesis object{random_map(5, 4, 0.5, 1.0, 122), 1.0};
-    object.map.cell_mm = cell_mm;
-    object.map.spread_mm = spread_mm;
-    expect_refused([&] { balanced_lattice({}, std::span(&object, 1)); }, says);
-  }
-}
-
-class HistogramInput : public testing::Test {
- protected:
-  /// Both filters are given the same.
-  void refuse(const std::string& says) {
-    expect_refused([&] { const PoseHistogram histogram(device, objects, options); }, says);
-    const ParticleOptions particles{
-        .particles = 10, .region = options.lattice, .contact = options.contact};
-    expect_refused([&] { const ParticleFilter filter(device, objects, particles); }, says);
-  }
-
-  Device device = Device::open();
-  std::vector<Hypothesis> objects{{random_map(5, 4, 0.5, 1.0, 122), 1.0}};
-  HistogramOptions options;
-};
-
-TEST_F(HistogramInput, WithoutObjectsIsRefused) {
-  objects.clear();
-  refuse("no objects");
-}
-
-TEST_F(HistogramInput, WithAMapThatIsNoGridIsRefused) {
-  const OccupancyGrid sound = objects[0].map;
-  objects[0].map.nx = 0;
-  refuse("'made up'");
-  objects[0].map = sound;
-  objects[0].map.log_odds.pop_back();
-  refuse("19 log odds");
-  for (const double cell_mm : {0.0, -1.0, nan, infinity, 1e-200, 1e154, 1e200}) {
-    objects[0].map = sound;
-    objects[0].map.cell_mm = cell_mm;
-    refuse("cell_mm");
-  }
-  for (const double spread_mm : {0.0, -1.0, nan, infinity, 500.0}) {
-    objects[0].map = sound;
-    objects[0].map.spread_mm = spread_mm;
-    refuse("spread_mm");
-  }
-  for (const double origin_mm : {nan, infinity, 1e10}) {
-    objects[0].map = sound;
-    objects[0].map.origin_mm.y = origin_mm;
-    refuse("origin_mm");
-  }
-  for (const double log_odds : {nan, infinity, -infinity}) {
-    objects[0].map = sound;
-    objects[0].map.log_odds[7] = static_cast<float>(log_odds);
-    refuse("finite");
-  }
-  objects[0].map = sound;
-  objects[0].map.prior = nan;
-  refuse("prior");
-  objects[0].map = sound;
-  objects[0].map.symmetry = -1;
-  refuse("symmetry");
-  objects[0].map = sound;
-  objects[0].map.label = "(none)";
-  refuse("(none)");
-}
-
-TEST_F(HistogramInput, WithAClassifierThatDecidesNothingIsRefused) {
-  options.contact.classifier.threshold = nan;
-  refuse("threshold");
-  options.contact.classifier = {.ratio = nan};
-  refuse("ratio");
-  options.contact.classifier = {.ratio = 1.5};
-  refuse("ratio");
-}
-
-TEST_F(HistogramInput, WithAWeightThatIsNotPositiveIsRefused) {
-  for (const double weight : {0.0, -1.0, nan, infinity}) {
-    objects[0].weight = weight;
-    refuse("weight");
-  }
-}
-
-TEST_F(HistogramInput, WithAGammaOrPriorOutOfRangeIsRefused) {
-  for (const double gamma : {-0.1, 1.0, nan}) {
-    options.contact.gamma = gamma;
-    refuse("gamma");
-  }
-  options.contact.gamma = 0.1;
-  for (const double prior : {0.0, 1.0, nan}) {
-    options.contact.prior = prior;
-    refuse("prior");
-  }
-}
-
-TEST_F(HistogramInput, WithMapsOfDifferentPriorsIsRefusedUnlessOneIsGiven) {
-  objects.push_back({random_map(5, 4, 0.5, 1.0, 123), 1.0});
-  objects[1].map.prior = 0.3;
-  refuse("0.3");
-  options.contact.prior = 0.25;
-  EXPECT_NO_THROW(PoseHistogram(device, objects, options));
-}
-
-TEST_F(HistogramInput, WithALatticeOutOfRangeIsRefused) {
-  options.lattice.x_mm.count = 0;
-  refuse("x_mm");
-  options.lattice = {.y_mm = {5.0, -5.0, 3}};
-  refuse("y_mm");
-  options.lattice = {.theta_rad = {0.0, nan, 3}};
-  refuse("theta_rad");
-  options.lattice = {.pivot_mm = {infinity, 0.0}};
-  refuse("pivot_mm");
-  options.lattice = {.y_mm = {-1e200, 1e200, 3}};
-  refuse("y_mm");
+  Input in;
+  in.map().cell_mm = 1e200;
+  expect_named(input_error([&] { balanced_lattice({}, in.objects); }), {"cell_mm"});
+  in = {};
+  in.map().spread_mm = 500.0;
+  expect_named(input_error([&] { balanced_lattice({}, in.objects); }), {"spread_mm"});
 }
 
 }  // namespace palpate::refusal_test

@@ -11,25 +11,29 @@
 
 namespace palpate::touch_overlap_test {
 
+/// What is counted in every row of y at a theta.
+std::vector<OverlapPlane::Bins> rows_of(const Touch& touch, const PoseLattice& lattice,
+                                        const OccupancyGrid& map, int theta) {
+  const ArrayRectangle array =
+      array_rectangle(touch.T_robot_sensor, touch.elements_mm, lattice.pivot_mm);
+  const OverlapPlane plane(array, occupied_box(map), lattice, theta);
+  std::vector<OverlapPlane::Bins> rows(static_cast<std::size_t>(lattice.y_mm.count));
+  plane.find_rows(rows);
+  return rows;
+}
+
 /// Expects every bin to be counted where the reference says that rectangles meet there.
 /// @returns the number of such bins
 std::int64_t expect_the_same_bins(const Touch& touch, const PoseLattice& lattice,
                                   const OccupancyGrid& map) {
   std::int64_t total = 0;
+  std::int64_t bin = 0;
   for (int t = 0; t < lattice.theta_rad.count; ++t) {
-    const ArrayRectangle array =
-        array_rectangle(touch.T_robot_sensor, touch.elements_mm, lattice.pivot_mm);
-    const OverlapPlane plane(array, occupied_box(map), lattice, t);
-    std::vector<OverlapPlane::Bins> rows(static_cast<std::size_t>(lattice.y_mm.count));
-    plane.find_rows(rows);
-    for (int y = 0; y < lattice.y_mm.count; ++y) {
-      const OverlapPlane::Bins row = rows[static_cast<std::size_t>(y)];
-      for (int x = 0; x < lattice.x_mm.count; ++x) {
-        const std::int64_t bin =
-            (std::int64_t{t} * lattice.y_mm.count + y) * lattice.x_mm.count + x;
+    for (const OverlapPlane::Bins& row : rows_of(touch, lattice, map, t)) {
+      for (int x = 0; x < lattice.x_mm.count; ++x, ++bin) {
         const bool counted = x >= row.first && x < row.first + row.count;
         EXPECT_EQ(counted, reference::overlaps(touch, reference::bin_pose(lattice, bin), map))
-            << "theta " << t << ", row " << y << ", column " << x;
+            << "theta " << t << ", column " << x << ", bin " << bin;
         total += counted ? 1 : 0;
       }
     }
@@ -118,12 +122,7 @@ TEST(ArrayOverlap, OfAnArrayBeyondAllMeasureIsEverywhere) {
   recording.T_robot_sensor = {{{0.0, 0.0}, 0.3}};
   const PoseLattice lattice{.x_mm = {-9, 9, 5}, .y_mm = {-9, 9, 4}, .theta_rad = {0, 6, 3}};
   for (int t = 0; t < 3; ++t) {
-    const OverlapPlane plane(
-        array_rectangle(recording.T_robot_sensor.front(), recording.elements_mm, {}),
-        occupied_box(corner_map(641)), lattice, t);
-    std::vector<OverlapPlane::Bins> rows(static_cast<std::size_t>(lattice.y_mm.count));
-    plane.find_rows(rows);
-    for (const OverlapPlane::Bins& row : rows) {
+    for (const auto& row : rows_of(recording.touch(0), lattice, corner_map(641), t)) {
       EXPECT_EQ(row.count, lattice.x_mm.count);
     }
   }

@@ -29,21 +29,18 @@ TEST(LabelPlaces, OfMarksOnOneAnotherCoverNeitherMarksNorEachOther) {
   }
 }
 
-TEST(LabelPlaces, LieRightAboveUnlessTheRoomEndsThere) {
+TEST(LabelPlaces, LieRightAboveUnlessTheRoomEndsThereOrIsTooSmall) {
   const Box mark{50.0, 50.0, 20.0, 20.0};
-  const std::vector<PlacedLabel> label{{mark, {60.0, 18.0}}};
-  const Box free = places_of(label, std::vector{mark}, {0.0, 0.0, 480.0, 480.0}).front();
+  const auto place_in = [&](const Box& room) {
+    return places_of(std::vector{PlacedLabel{mark, {60.0, 18.0}}}, std::vector{mark}, room).front();
+  };
+  const Box free = place_in({0.0, 0.0, 480.0, 480.0});
   EXPECT_GT(free.left + free.width / 2.0, mark.right());
   EXPECT_LT(free.bottom(), mark.top);
-  const Box corner = places_of(label, std::vector{mark}, {0.0, 45.0, 80.0, 480.0}).front();
+  const Box corner = place_in({0.0, 45.0, 80.0, 480.0});
   EXPECT_LE(corner.right(), 80.0);
   EXPECT_GE(corner.top, 45.0);
-}
-
-TEST(LabelPlaces, WithoutRoomAreRightAbove) {
-  const Box mark{50.0, 50.0, 20.0, 20.0};
-  const std::vector<PlacedLabel> label{{mark, {60.0, 18.0}}};
-  EXPECT_LT(places_of(label, std::vector{mark}, {40.0, 40.0, 40.0, 40.0}).front().bottom(), 50.0);
+  EXPECT_LT(place_in({40.0, 40.0, 40.0, 40.0}).bottom(), 50.0);
 }
 
 }  // namespace palpate::label_places_test

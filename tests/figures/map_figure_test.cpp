@@ -1,14 +1,15 @@
-#include <limits>
 #include <span>
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "figures/evidence_scale.hpp"
 #include "figures/figures.hpp"
 #include "figures/map_layer.hpp"
-#include "palpate/error.hpp"
 #include "picture.hpp"
+#include "support/errors.hpp"
+#include "support/limits.hpp"
 
 namespace palpate::map_figure_test {
 
@@ -37,29 +38,38 @@ TEST(MapLayer, ColoursEveryCellByItsDistanceFromThePrior) {
   EXPECT_EQ(picture.at(50, 10), rgb(diverging(1.0)));
 }
 
-TEST(EvidenceScale, CoversNineOfTenSeenCells) {
-  OccupancyGrid map = unseen("A", 100, 10);
-  for (std::size_t k = 0; k < 100; ++k) {
-    map.log_odds[k] += k < 95 ? -3.7F : 1000.0F;
+/// The scale of a row of cells with this evidence, in nats over the prior.
+double range_of(const std::vector<float>& evidence, double prior = 0.5) {
+  OccupancyGrid map{.prior = prior, .nx = static_cast<int>(evidence.size()), .ny = 1};
+  for (const float nats : evidence) {
+    map.log_odds.push_back(nats + static_cast<float>(map.prior_log_odds()));
   }
-  EXPECT_EQ(evidence_scale(std::span(&map, 1)).range_nats, 4.0);
+  return evidence_scale(std::span(&map, 1)).range_nats;
 }
 
-TEST(EvidenceScale, IsFiniteWhereNothingWasSeen) {
-  const OccupancyGrid map = unseen("A", 5, 5);
-  EXPECT_EQ(evidence_scale(std::span(&map, 1)).range_nats, 1.0);
+TEST(EvidenceScale, NineOfTenCellsStayWithinIt) {
+  // Nine of ten up to 3.9, one far beyond; then the ninth is beyond, too.
+  std::vector<float> nats{0.1F, -0.2F, 0.3F, -0.4F, 0.5F, 0.6F, 0.7F, -0.8F, 3.9F, -3.9F, 70.0F};
+  EXPECT_EQ(range_of(nats, 0.2), 4.0);
+  std::erase(nats, -3.9F);
+  EXPECT_EQ(range_of(nats, 0.2), 80.0);
 }
 
-TEST(DrawMaps, LeavesUnseenCellsWhite) {
-  const Picture picture = decode(draw(unseen("A", 20, 20)));
-  int coloured = 0;
-  for (const std::uint32_t pixel : picture.pixels) {
-    const std::uint32_t red = pixel >> 16;
-    const std::uint32_t blue = pixel & 0xFF;
-    coloured += red != blue;
-  }
-  EXPECT_GT(coloured, 0);
-  EXPECT_LE(coloured, 440 * 20) << "more than the colour bar";
+TEST(EvidenceScale, IsRoundedUpToANumberWhoseHalfIsShort) {
+  EXPECT_EQ(range_of({1.0F}), 1.0);
+  EXPECT_EQ(range_of({1.01F}), 2.0);
+  EXPECT_EQ(range_of({-5.0F}), 6.0);
+  EXPECT_EQ(range_of({8.5F}), 10.0);
+}
+
+TEST(EvidenceScale, CellsWithoutEvidenceDoNotCount) {
+  EXPECT_EQ(range_of({0.0F, 0.0F}), 1.0);
+  std::vector<float> evidence(1000, 0.0F);
+  evidence.resize(2000, 0.009F);  // a remnant of a Gaussian's tail
+  evidence.push_back(static_cast<float>(infinity));
+  EXPECT_EQ(range_of(evidence), 1.0);
+  evidence.push_back(5.5F);
+  EXPECT_EQ(range_of(evidence), 6.0);
 }
 
 TEST(DrawMaps, DrawsEachCellInItsPlaceWithYUp) {
@@ -92,34 +102,31 @@ TEST(DrawMaps, WrapsIntoRowsOfAtMostSix) {
   EXPECT_GT(seven.height, 3 * six.height / 2) << "two rows";
 }
 
-TEST(DrawMaps, DrawsWhateverItsShapeAndLabel) {
-  OccupancyGrid one_cell = unseen("", 1, 1);
+TEST(DrawMaps, DrawsWhateverItsShapeAndLabelInTheSameBytes) {
+  const OccupancyGrid one_cell = unseen("", 1, 1);
   OccupancyGrid infinite = unseen("a label much longer than the map below it is wide", 3, 200);
-  infinite.log_odds[0] = std::numeric_limits<float>::infinity();
-  infinite.log_odds[1] = -std::numeric_limits<float>::infinity();
-  infinite.log_odds[2] = std::numeric_limits<float>::quiet_NaN();
-  OccupancyGrid wide = unseen("\xFF\n", 500, 1);
+  infinite.log_odds[0] = static_cast<float>(infinity);
+  infinite.log_odds[1] = -static_cast<float>(infinity);
+  infinite.log_odds[2] = static_cast<float>(nan);
+  const OccupancyGrid wide = unseen("\xFF\n", 500, 1);
   for (const OccupancyGrid& map : {one_cell, infinite, wide}) {
-    const Picture picture = decode(draw(map));
+    const std::string png = draw(map);
+    const Picture picture = decode(png);
     EXPECT_GT(picture.width, 300);
     EXPECT_GT(picture.height, 200);
+    EXPECT_EQ(draw(map), png);
   }
-  decode(draw_maps(std::vector{one_cell, infinite, wide}));
-  decode(draw_maps(std::vector<OccupancyGrid>(200, one_cell)));
-}
-
-TEST(DrawMaps, GivesTheSameBytesAgain) {
-  OccupancyGrid map = unseen("A", 30, 30);
-  map.log_odds[17] = 3.0F;
-  EXPECT_EQ(draw(map), draw(map));
+  std::vector<OccupancyGrid> many(60, one_cell);
+  many.insert(many.end(), {infinite, wide});
+  decode(draw_maps(many));
 }
 
 TEST(DrawMaps, RefusesWhatItCannotDraw) {
-  EXPECT_THROW(draw_maps({}), Error);
-  EXPECT_THROW(draw(unseen("A", 0, 5)), Error);
   OccupancyGrid short_of_values = unseen("A", 4, 5);
   short_of_values.log_odds.pop_back();
-  EXPECT_THROW(draw(short_of_values), Error);
+  input_error([] { draw_maps({}); });
+  input_error([] { draw(unseen("A", 0, 5)); });
+  input_error([&] { draw(short_of_values); });
 }
 
 }  // namespace palpate::map_figure_test

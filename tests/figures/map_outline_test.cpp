@@ -5,6 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include "picture.hpp"
+
 namespace palpate::map_outline_test {
 
 /// Cells of 0.5 mm whose rows are given from below: '#' is occupied.
@@ -20,16 +22,6 @@ OccupancyGrid map_of(const std::vector<std::string>& rows) {
     }
   }
   return map;
-}
-
-/// Above 0 for a counter-clockwise polygon.
-double area(const std::vector<glm::dvec2>& p) {
-  double twice = 0.0;
-  for (std::size_t i = 0; i < p.size(); ++i) {
-    const glm::dvec2& next = p[(i + 1) % p.size()];
-    twice += p[i].x * next.y - next.x * p[i].y;
-  }
-  return twice / 2.0;
 }
 
 TEST(MapOutline, OfABlockRunsBetweenItsCellsAndTheOthers) {
@@ -50,11 +42,7 @@ TEST(MapOutline, IsAsLongAsTheShapeAndNoRectangleAboutIt) {
 TEST(MapOutline, RunsAboutHolesTheOtherWay) {
   const auto outlines = outlines_of(map_of({"####", "#..#", "#..#", "####", "....", "##.."}));
   ASSERT_EQ(outlines.size(), 3U);
-  int holes = 0;
-  for (const auto& outline : outlines) {
-    holes += area(outline) < 0.0 ? 1 : 0;
-  }
-  EXPECT_EQ(holes, 1);
+  EXPECT_EQ(std::ranges::count_if(outlines, [](const auto& o) { return area(o) < 0.0; }), 1);
 }
 
 TEST(MapOutline, MeetsEdgesOfTheGridAndHoldsNothingWhereNothingIsOccupied) {
@@ -65,8 +53,7 @@ TEST(MapOutline, MeetsEdgesOfTheGridAndHoldsNothingWhereNothingIsOccupied) {
 }
 
 TEST(MapOutline, JoinsCellsThatMeetAtACorner) {
-  const auto outlines = outlines_of(map_of({"#.", ".#"}));
-  EXPECT_EQ(outlines.size(), 1U);
+  EXPECT_EQ(outlines_of(map_of({"#.", ".#"})).size(), 1U);
 }
 
 }  // namespace palpate::map_outline_test

@@ -68,4 +68,14 @@ std::uint32_t rgb(const Colour& colour) {
   return byte(colour.red) << 16 | byte(colour.green) << 8 | byte(colour.blue);
 }
 
+double area(const std::vector<glm::dvec2>& polygon) {
+  double twice = 0.0;
+  for (std::size_t k = 0; k < polygon.size(); ++k) {
+    const glm::dvec2 a = polygon[k];
+    const glm::dvec2 b = polygon[(k + 1) % polygon.size()];
+    twice += a.x * b.y - a.y * b.x;
+  }
+  return twice / 2.0;
+}
+
 }  // namespace palpate

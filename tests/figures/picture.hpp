@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include <glm/vec2.hpp>
+
 #include "figures/palette.hpp"
 
 namespace palpate {
@@ -32,5 +34,8 @@ Difference difference(const Picture& a, const Picture& b);
 
 /// 0xRRGGBB.
 std::uint32_t rgb(const Colour& colour);
+
+/// Of a polygon, above 0 where it is counter-clockwise.
+double area(const std::vector<glm::dvec2>& polygon);
 
 }  // namespace palpate

@@ -12,13 +12,13 @@
 #include "palpate/map_builder.hpp"
 #include "palpate/pose_error.hpp"
 #include "palpate/pose_histogram.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::shared_golden_test {
 
 using nlohmann::json;
 
 constexpr double map_tolerance = 1e-3;       // nats per cell, by the golden values' own page
-constexpr double per_touch = 1e-4;           // nats per touch, by the golden values' own page
 constexpr double identity_tolerance = 5e-4;  // of a probability, at every touch
 constexpr double metric_tolerance = 1e-6;    // mm: float64 on both sides, printed to 16 digits
 
@@ -30,14 +30,6 @@ class SharedGolden : public testing::Test {
     }
     std::ifstream file(folder / "golden.json");
     golden = json::parse(file);
-  }
-
-  HistogramOptions histogram_options() const {
-    HistogramOptions options;
-    options.contact.classifier = classifier();
-    options.contact.gamma = golden.at("gamma");
-    options.contact.prior = golden.at("prior").get<double>();
-    return options;
   }
 
   ContactClassifier classifier() const {
@@ -62,7 +54,7 @@ TEST_F(SharedGolden, MapsAgreeInEveryCell) {
                                            .peak = golden.at("peak"),
                                            .prior = golden.at("prior")},
                                 .classifier = classifier()});
-    builder.add(training.touches(0, training.size()));
+    builder.add(all_touches(training));
     const OccupancyGrid map = builder.build(label);
     const glm::dvec2 offset = (expected.origin_mm - map.origin_mm) / map.cell_mm;
     for (int j = 0; j < expected.ny; ++j) {
@@ -85,8 +77,10 @@ TEST_F(SharedGolden, RecognitionAgreesInEveryBin) {
   for (const std::string& label : layout.objects) {
     objects.push_back({read_map(folder / (label + ".map.h5")), 1.0});
   }
-  HistogramOptions options = histogram_options();
-  options.lattice = layout.lattice;
+  const HistogramOptions options{.lattice = layout.lattice,
+                                 .contact = {.classifier = classifier(),
+                                             .gamma = golden.at("gamma"),
+                                             .prior = golden.at("prior").get<double>()}};
   Device device = Device::open();
   PoseHistogram histogram(device, objects, options);
 
@@ -117,10 +111,7 @@ TEST_F(SharedGolden, RecognitionAgreesInEveryBin) {
       const std::vector<double> bins = histogram.log_likelihood(static_cast<int>(i));
       product.insert(product.end(), bins.begin(), bins.end());
     }
-    ASSERT_EQ(product.size(), expected.size());
-    for (std::size_t bin = 0; bin < product.size(); ++bin) {
-      ASSERT_NEAR(product[bin], expected[bin], tolerance) << file << ", bin " << bin;
-    }
+    EXPECT_LE(largest_difference(product, expected), tolerance) << file;
 
     // The mode may be any bin within the tolerance of the largest.
     const Mode mode = histogram.estimate().mode;

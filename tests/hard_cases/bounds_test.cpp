@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 
@@ -7,55 +6,21 @@
 
 #include "hard_case.hpp"
 #include "palpate/balanced_lattice.hpp"
-#include "palpate/particle_filter.hpp"
 
 namespace palpate::bounds_test {
 
 constexpr double most_finite = std::numeric_limits<double>::max();
 
-bool is_finite(const Pose& pose) {
-  return all_finite(std::vector{pose.translation_mm.x, pose.translation_mm.y, pose.theta_rad});
-}
-
-void expect_numbers(PoseHistogram& histogram, std::size_t objects, std::span<const Touch> touches) {
-  histogram.reset();
-  histogram.update(touches);
-  const Estimate estimate = histogram.estimate();
-  EXPECT_TRUE(all_finite(estimate.identity));
-  EXPECT_NEAR(total(estimate.identity) + estimate.none, 1.0, 1e-12);
-  EXPECT_TRUE(is_finite(estimate.mode.T_object_robot));
-  EXPECT_TRUE(all_finite(std::vector{estimate.mode.log_likelihood, estimate.none}));
-  const RefinedPose refined = histogram.refine(estimate.mode);
-  EXPECT_TRUE(is_finite(refined.T_object_robot));
-  EXPECT_TRUE(all_finite(refined.covariance));
-  for (std::size_t object = 0; object < objects; ++object) {
-    EXPECT_TRUE(all_finite(histogram.log_likelihood(static_cast<int>(object))));
-    EXPECT_TRUE(all_finite(histogram.marginals(static_cast<int>(object)).xy));
-  }
-}
-
-void expect_numbers(ParticleFilter& filter, std::span<const Touch> touches) {
+/// Gives a filter the touches and expects finite numbers.
+template <typename Filter>
+Estimate expect_numbers(Filter& filter, std::span<const Touch> touches) {
   filter.reset();
   filter.update(touches);
-  const Estimate estimate = filter.estimate();
-  EXPECT_TRUE(all_finite(estimate.identity));
-  EXPECT_NEAR(total(estimate.identity), 1.0, 1e-9);
+  Estimate estimate = filter.estimate();
+  EXPECT_NEAR(total(estimate.identity) + estimate.none, 1.0, 1e-9);
   EXPECT_TRUE(is_finite(estimate.mode.T_object_robot));
-}
-
-/// Runs both filters over each of the recordings and expects all of their results to be finite.
-void expect_numbers(Device& device, std::span<const Hypothesis> objects, const PoseLattice& lattice,
-                    std::span<const Recording> recordings) {
-  EXPECT_GE(balanced_lattice(lattice, objects, 10'000).lattice.bins(), 1);
-  PoseHistogram histogram(device, objects, {.lattice = lattice, .none_weight = 1.0});
-  ParticleOptions options{.particles = 200, .region = lattice};
-  options.region.x_mm.upper = std::min(lattice.x_mm.upper, lattice.x_mm.lower + 1e5);
-  options.region.y_mm.upper = std::min(lattice.y_mm.upper, lattice.y_mm.lower + 1e5);
-  ParticleFilter filter(device, objects, options);
-  for (const Recording& recording : recordings) {
-    expect_numbers(histogram, objects.size(), all_touches(recording));
-    expect_numbers(filter, all_touches(recording));
-  }
+  EXPECT_TRUE(std::isfinite(estimate.mode.log_likelihood));
+  return estimate;
 }
 
 TEST(Bounds, OfMapsLatticesAndTouchesLeaveNumbers) {
@@ -79,52 +44,49 @@ TEST(Bounds, OfMapsLatticesAndTouchesLeaveNumbers) {
       for (const PoseLattice& lattice :
            {PoseLattice{{-3, 3, 4}, {-3, 3, 3}, {0, 6, 3}, {}},
             PoseLattice{{-1e9, 1e9, 5}, {-1e9, 1e9, 3}, {1e9 - 6.0, 1e9, 3}, {1e9, -1e9}}}) {
-        expect_numbers(device, objects, lattice, std::array{usual, far});
+        EXPECT_GE(balanced_lattice(lattice, objects, 10'000).lattice.bins(), 1);
+        PoseHistogram histogram(device, objects, {.lattice = lattice, .none_weight = 1.0});
+        ParticleOptions options{.particles = 200, .region = lattice};
+        for (Axis* axis : {&options.region.x_mm, &options.region.y_mm}) {
+          axis->upper = std::min(axis->upper, axis->lower + 1e5);
+        }
+        ParticleFilter filter(device, objects, options);
+        for (const Recording& recording : {usual, far}) {
+          expect_numbers(filter, all_touches(recording));
+          expect_finite(histogram.refine(expect_numbers(histogram, all_touches(recording)).mode));
+          for (const int object : {0, 1}) {
+            EXPECT_TRUE(all_finite(histogram.log_likelihood(object)));
+            EXPECT_TRUE(all_finite(histogram.marginals(object).xy));
+          }
+        }
       }
     }
   }
 }
 
 TEST(Bounds, WhatLiesBeyondThemOnBothSidesDoesNotMeet) {
-  HardCase hard("an element and a lattice that are both further away than cells are counted",
-                "both are clamped to the same bound, and meet in the middle of the map",
-                "beyond 2^29 cells they stand for places that never meet: the prior's likelihood");
-  Hypothesis object{random_map(21, 21, 0.5, 12.0, 524), 1.0};
-  object.map.cell_mm = 1e-3;
-  object.map.origin_mm = {-0.01, -0.01};
+  HardCase hard("an element and a lattice that are both further away than cells are counted");
+  std::vector<Hypothesis> objects{{random_map(21, 21, 1e-3, 12.0, 524), 1.0},
+                                  {random_map(21, 21, 1e-3, 12.0, 526), 1.0}};
   Recording recording = random_recording(1, 36, 525);
-  recording.T_robot_sensor[0] = {{3e6, 0.0}, 0.0};
-  Device device = Device::open();
+  const auto at = [](double x_mm) {
+    return PoseLattice{{x_mm, x_mm, 1}, {0, 0, 1}, {0, 0, 1}, {}};
+  };
   // The object lies at -1e6 mm, and the touch is 2e6 mm away from it: more than 1e9 cells.
-  HistogramOptions options;
-  options.lattice = {.x_mm = {-1e6, -1e6, 1}, .y_mm = {0.0, 0.0, 1}, .theta_rad = {0.0, 0.0, 1}};
-  PoseHistogram histogram(device, std::span(&object, 1), options);
-  histogram.update(recording.touch(0));
-  const double by_prior =
-      reference_posterior(std::span(&object, 1), options, all_touches(recording))
-          .log_likelihood[0][0];
-  hard.expect("log-likelihood, nats", std::abs(histogram.log_likelihood(0)[0] - by_prior), 1e-4);
+  recording.T_robot_sensor[0] = {{3e6, 0.0}, 0.0};
+  hard.expect_posterior(objects, {.lattice = at(-1e6)}, all_touches(recording));
 
   // The particle filter clamps places at 2^20 cells, here 524.288 mm. All particles have one pose.
-  object.map.origin_mm = {-0.01, -0.01};
   recording.T_robot_sensor[0] = {{530.0, 0.0}, 0.0};
-  const OccupancyGrid other = random_map(21, 21, 0.5, 12.0, 526);
-  std::vector<Hypothesis> objects{object, {other, 1.0}};
-  objects[1].map.cell_mm = 1e-3;
-  objects[1].map.origin_mm = {-0.01, -0.01};
-  ParticleFilter filter(device, objects,
-                        {.particles = 1000,
-                         .region = {.x_mm = {-524.288, -524.288, 1},
-                                    .y_mm = {0.0, 0.0, 1},
-                                    .theta_rad = {0.0, 0.0, 1}},
-                         .motion_mm = 0.0,
-                         .motion_rad = 0.0});
   for (glm::dvec2& element : recording.elements_mm) {
     element *= 0.001;
   }
+  ParticleFilter filter(
+      hard.device(), objects,
+      {.particles = 1000, .region = at(-524.288), .motion_mm = 0.0, .motion_rad = 0.0});
   filter.update(recording.touch(0));
-  const Estimate estimate = filter.estimate();
-  hard.expect("identity of particles off the map", std::abs(estimate.identity[0] - 0.5), 1e-5);
+  hard.expect("identity of particles off the map", std::abs(filter.estimate().identity[0] - 0.5),
+              1e-5);
 }
 
 }  // namespace palpate::bounds_test

@@ -7,7 +7,9 @@
 #include <vector>
 
 #include "palpate/map_builder.hpp"
+#include "palpate/particle_filter.hpp"
 #include "palpate/pose_histogram.hpp"
+#include "support/certified.hpp"
 #include "support/sanitized.hpp"
 #include "support/synthetic.hpp"
 
@@ -28,10 +30,11 @@ struct Allowed {
   double at(double log_likelihood) const;
 };
 
-/// A case of docs/hard_cases.md. Its destructor prints the case's row of the table there.
+/// A case of docs/hard_cases.md, which says by this name what could go wrong and what bounds the
+/// error. Its destructor prints the largest errors for the case's row there.
 class HardCase {
  public:
-  HardCase(std::string name, std::string risk, std::string bound);
+  explicit HardCase(std::string name) : name_(std::move(name)) {}
   ~HardCase();
   HardCase(const HardCase&) = delete;
   HardCase& operator=(const HardCase&) = delete;
@@ -39,21 +42,36 @@ class HardCase {
   /// Expects the error to be allowed, and keeps each quantity's largest error.
   void expect(const std::string& quantity, double error, double allowed);
 
-  /// Runs a histogram over the touches and expects finite results that agree with float64: every
-  /// bin, the posterior near its top, identity, mode, marginals and their sums.
-  Estimate expect_posterior(Device& device, std::span<const Hypothesis> objects,
-                            const HistogramOptions& options, std::span<const Touch> touches,
-                            Allowed allowed = {});
-  /// As expect_posterior() for `times` repetitions of the touches, which float64 sums once.
-  Estimate expect_posterior_of_repeated(Device& device, std::span<const Hypothesis> objects,
-                                        const HistogramOptions& options,
-                                        std::span<const Touch> touches, int times, Allowed allowed);
+  /// The device of the case, opened where one is asked for.
+  Device& device();
+
+  /// Runs a histogram over the touches, so many times, and expects finite results that agree with
+  /// float64, which sums them once: every bin, the posterior near its top, identity, mode,
+  /// marginals and their sums.
+  Estimate expect_posterior(std::span<const Hypothesis> objects, const HistogramOptions& options,
+                            std::span<const Touch> touches, Allowed allowed = {}, int times = 1);
+
+  /// Expects the laws of a posterior by bounds, see palpate::expect_laws(), and its answers to be
+  /// the tolerance away from float64 at most.
+  /// @param nats what rounding may add to a log-likelihood
+  /// @returns what was seen after the last touch
+  Certified expect_laws(std::span<const Hypothesis> objects, const BoundedOptions& options,
+                        const Recording& recording, double nats = 1e-9);
+  /// As a histogram of these options has them.
+  Certified expect_laws(std::span<const Hypothesis> objects, const HistogramOptions& options,
+                        const Recording& recording, double nats = 1e-9);
+
+  /// Gives the touches to particles one by one, and expects finite results and, after each touch,
+  /// every particle's weight to agree with float64 at the particle's pose.
+  /// @returns the filter after the last touch
+  ParticleFilter expect_particles(std::span<const Hypothesis> objects,
+                                  const ParticleOptions& options, const Recording& recording,
+                                  double allowed_nats = 1e-4);
 
   /// Expects a map's cell within MapBuilder's promise: 1e-3 nats or a relative 1e-4.
   void expect_cell(double log_odds, double expected);
   /// Builds a map of the touches and expects finite cells that agree with float64.
-  OccupancyGrid expect_map(Device& device, std::span<const Touch> touches,
-                           const MapOptions& options);
+  OccupancyGrid expect_map(std::span<const Touch> touches, const MapOptions& options);
 
  private:
   struct Largest {
@@ -65,13 +83,20 @@ class HardCase {
   void check(const std::string& quantity, double error, double allowed) const;
 
   std::string name_;
-  std::string risk_;
-  std::string bound_;
   std::map<std::string, Largest> largest_;
+  std::optional<Device> device_;
 };
+
+/// 5 x 6 x 4 bins over 10 x 10 mm and all angles.
+HistogramOptions small_options();
+/// 2,000 particles over 10 x 10 mm and all angles about a pivot.
+ParticleOptions two_thousand_particles(const glm::dvec2& pivot_mm = {});
 
 /// Whether all numbers are finite.
 bool all_finite(std::span<const double> numbers);
+bool is_finite(const Pose& pose);
+/// Expects finite numbers and no negative variance.
+void expect_finite(const RefinedPose& refined);
 
 /// The sum of the numbers.
 double total(std::span<const double> numbers);

@@ -5,15 +5,10 @@
 
 #include <csignal>
 
+#include "file_parts.hpp"
 #include "palpate/files.hpp"
-#include "support/scratch_folder.hpp"
 
 namespace palpate::atomic_file_test {
-
-std::size_t files_in(const ScratchFolder& folder) {
-  return static_cast<std::size_t>(
-      std::distance(std::filesystem::directory_iterator(folder.path()), {}));
-}
 
 // For its lifetime, files of this process may not grow beyond the size: a full disk, in small.
 class FullDisk {
@@ -35,107 +30,75 @@ class FullDisk {
   void (*handler_)(int);
 };
 
-OccupancyGrid map_of(int cells) {
-  OccupancyGrid map;
-  map.nx = cells;
-  map.ny = 1;
-  map.log_odds.assign(static_cast<std::size_t>(cells), 1.0f);
-  return map;
-}
+class AtomicFiles : public OneFile {
+ protected:
+  AtomicFiles() { put_bytes(path_, "old"); }
 
-TEST(AtomicFile, AppearsOnCommitOnly) {
-  const ScratchFolder folder;
-  const std::filesystem::path target = folder / "a.txt";
-  put_bytes(target, "old");
-  {
-    AtomicFile file(target);
-    file.write("new");
-    EXPECT_EQ(bytes_of(target), "old");
+  std::ptrdiff_t files() const {
+    return std::distance(std::filesystem::directory_iterator(folder_.path()), {});
   }
-  EXPECT_EQ(bytes_of(target), "old");
-  EXPECT_EQ(files_in(folder), 1u);
-  AtomicFile file(target);
-  put_bytes(file.path(), "new");  // as a library would, by name
-  file.commit();
-  EXPECT_EQ(bytes_of(target), "new");
-  EXPECT_EQ(files_in(folder), 1u);
-}
-
-TEST(AtomicFile, LeavesLinksInPlace) {
-  const ScratchFolder folder;
-  put_bytes(folder / "a.txt", "old");
-  std::filesystem::create_symlink("a.txt", folder / "link");
-  AtomicFile file(folder / "link");
-  file.write("new");
-  file.commit();
-  EXPECT_TRUE(std::filesystem::is_symlink(folder / "link"));
-  EXPECT_EQ(bytes_of(folder / "a.txt"), "new");
-}
-
-TEST(AtomicFile, ReplacesLinksWhereAsked) {
-  const ScratchFolder folder;
-  std::filesystem::create_directory(folder / "folder");
-  put_bytes(folder / "a.txt", "old");
-  for (const char* behind : {"a.txt", "folder", "missing"}) {
-    std::filesystem::create_symlink(behind, folder / "link");
-    AtomicFile file(folder / "link", AtomicFile::Links::replaced);
+  static void write_new(const std::filesystem::path& path,
+                        AtomicFile::Links links = AtomicFile::Links::followed) {
+    AtomicFile file(path, links);
     file.write("new");
     file.commit();
-    EXPECT_TRUE(std::filesystem::is_regular_file(std::filesystem::symlink_status(folder / "link")));
-    std::filesystem::remove(folder / "link");
   }
-  EXPECT_EQ(bytes_of(folder / "a.txt"), "old");
-  EXPECT_FALSE(std::filesystem::exists(folder / "missing"));
-}
+};
 
-TEST(AtomicFile, IsAsReadableAsAnyOther) {
-  const ScratchFolder folder;
-  put_bytes(folder / "plain", "");
-  AtomicFile file(folder / "atomic");
+TEST_F(AtomicFiles, AppearOnCommitOnly) {
+  {
+    AtomicFile file(path_);
+    file.write("new");
+    EXPECT_EQ(bytes_of(path_), "old");
+  }
+  EXPECT_EQ(bytes_of(path_), "old");
+  EXPECT_EQ(files(), 1);
+  AtomicFile file(path_);
+  put_bytes(file.path(), "new");  // as a library would, by name
+  const auto readable = std::filesystem::status(path_).permissions();
   file.commit();
-  EXPECT_EQ(std::filesystem::status(folder / "atomic").permissions(),
-            std::filesystem::status(folder / "plain").permissions());
+  EXPECT_EQ(bytes_of(path_), "new");
+  EXPECT_EQ(files(), 1);
+  EXPECT_EQ(std::filesystem::status(path_).permissions(), readable) << "as any other file";
 }
 
-TEST(AtomicFile, NamesTargetsThatItCannotBe) {
-  const ScratchFolder folder;
-  const std::string missing = (folder / "no" / "a.h5").string();
-  expect_named(input_error([&] { AtomicFile file(missing); }),
-               {missing.c_str(), "does not exist", "mkdir -p"});
-  expect_named(input_error([&] { AtomicFile file(folder.path()); }),
-               {folder.path().c_str(), "is a folder"});
-  expect_named(input_error([&] { AtomicFile file("/dev/full"); }), {"/dev/full", "regular"});
-  put_bytes(folder / "a.txt", "");
-  const std::string below_file = (folder / "a.txt" / "b").string();
-  expect_named(input_error([&] { AtomicFile file(below_file); }), {below_file.c_str()});
-  EXPECT_EQ(files_in(folder), 1u);
+TEST_F(AtomicFiles, LeaveLinksInPlaceOrReplaceThemWhereAsked) {
+  const std::filesystem::path link = folder_ / "link";
+  std::filesystem::create_directory(folder_ / "folder");
+  for (const char* behind : {"file.h5", "folder", "missing"}) {
+    std::filesystem::create_symlink(behind, link);
+    write_new(link, AtomicFile::Links::replaced);
+    EXPECT_TRUE(std::filesystem::is_regular_file(std::filesystem::symlink_status(link))) << behind;
+    std::filesystem::remove(link);
+  }
+  EXPECT_EQ(bytes_of(path_), "old");
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "missing"));
+  std::filesystem::create_symlink("file.h5", link);
+  write_new(link);
+  EXPECT_TRUE(std::filesystem::is_symlink(link));
+  EXPECT_EQ(bytes_of(path_), "new");
 }
 
-TEST(AtomicFile, KeepsTheOldFileWhereTheDiskIsFull) {
-  const ScratchFolder folder;
-  write_map(folder / "a.h5", map_of(10));
-  const std::string old = bytes_of(folder / "a.h5");
+TEST_F(AtomicFiles, NameTargetsThatTheyCannotBe) {
+  for (const auto& [target, why] : {std::pair{(folder_ / "no" / "a.h5").string(), "does not exist"},
+                                    {folder_.path().string(), "is a folder"},
+                                    {"/dev/full", "regular"},
+                                    {(path_ / "b").string(), ""}}) {
+    expect_named(input_error([&] { AtomicFile file(target); }), {target.c_str(), why});
+  }
+  EXPECT_EQ(files(), 1);
+}
+
+TEST_F(AtomicFiles, KeepTheOldOnesWhereTheDiskIsFull) {
+  OccupancyGrid map{.nx = 100'000, .ny = 1};
+  map.log_odds.assign(100'000, 1.0F);
   {
     const FullDisk full(4096);
-    try {
-      write_map(folder / "a.h5", map_of(100'000));
-      ADD_FAILURE() << "a full disk went unnoticed";
-    } catch (const Error& error) {
-      EXPECT_EQ(error.fault(), Fault::system);
-      expect_named(error.what(), {"a.h5", "write"});
-    }
+    expect_named(error_of(Fault::system, [&] { write_map(path_, map); }), {"file.h5", "write"});
+    error_of(Fault::system, [&] { write_map_server(folder_ / "a.yaml", map); });
   }
-  EXPECT_EQ(bytes_of(folder / "a.h5"), old);
-  EXPECT_EQ(files_in(folder), 1u);
-}
-
-TEST(AtomicFile, LeavesNeitherOfAPairWhereTheDiskIsFull) {
-  const ScratchFolder folder;
-  {
-    const FullDisk full(4096);
-    EXPECT_THROW(write_map_server(folder / "a.yaml", map_of(100'000)), Error);
-  }
-  EXPECT_EQ(files_in(folder), 0u);
+  EXPECT_EQ(bytes_of(path_), "old");
+  EXPECT_EQ(files(), 1) << "nor one of a pair";
 }
 
 }  // namespace palpate::atomic_file_test

@@ -1,31 +1,38 @@
 #include "palpate/frame_recorder.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/mman.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
+#include <atomic>
+#include <chrono>
 #include <cmath>
-#include <limits>
+#include <csignal>
+#include <cstdlib>
+#include <functional>
+#include <random>
+#include <thread>
 
+#include "file_parts.hpp"
+#include "io/recording_state.hpp"
 #include "numbered_frames.hpp"
 #include "palpate/files.hpp"
-#include "support/scratch_folder.hpp"
+#include "support/limits.hpp"
+#include "support/trials.hpp"
 
 namespace palpate::frame_recorder_test {
 
-class FrameRecorderFile : public testing::Test {
+class FrameRecorderFile : public OneFile {
  protected:
-  ScratchFolder folder_;
-  std::filesystem::path path_ = folder_ / "stream.h5";
+  FrameRecorderFile() : OneFile("stream.h5") {}
 };
 
+// Over several saves; RoundTrip.StreamOfFrames has what is read of the sensor.
 TEST_F(FrameRecorderFile, ComesBackAsItWasAdded) {
-  SensorDescription sensor = sensor_of(3);
-  sensor.pressure_unit = "raw";
-  sensor.valid = {1, 0, 1};
-  sensor.baseline = {10.0, 0.0, 12.5};
-  sensor.object = "A";
-  sensor.truth = {.object = "E", .T_object_robot = {{1.0, 2.0}, 3.0}};
   constexpr std::size_t n = 1000;
-  FrameRecorder recorder(path_, sensor);
+  FrameRecorder recorder(path_, sensor_of(3));
   for (std::size_t i = 0; i < n; ++i) {
     Frame frame = frame_of(i, 3);
     frame.device_time_s = static_cast<double>(i);
@@ -45,20 +52,17 @@ TEST_F(FrameRecorderFile, ComesBackAsItWasAdded) {
   expect_prefix(read, 3);
   EXPECT_EQ(read.sensor, "Test");
   EXPECT_EQ(read.serial, "7");
-  EXPECT_EQ(read.pressure_unit, "raw");
-  EXPECT_EQ(read.object, "A");
-  EXPECT_EQ(read.elements_mm, sensor.elements_mm);
-  EXPECT_EQ(read.valid, sensor.valid);
-  EXPECT_EQ(read.baseline, sensor.baseline);
-  ASSERT_TRUE(read.truth);
-  EXPECT_EQ(read.truth->object, "E");
-  EXPECT_EQ(read.truth->T_object_robot.theta_rad, 3.0);
-  EXPECT_EQ(read.device_time_s[17], 17.0);
-  EXPECT_EQ(read.lost_before[15], 2u);
-  EXPECT_EQ(read.lost_before[16], 0u);
-  EXPECT_EQ(read.T_robot_sensor[16].translation_mm, glm::dvec2(16.0, 0.25));
-  EXPECT_EQ(read.T_robot_sensor[16].theta_rad, -9.0);
-  EXPECT_TRUE(std::isnan(read.T_robot_sensor[17].theta_rad));
+  for (std::size_t i = 0; i < n; ++i) {
+    ASSERT_EQ(read.device_time_s[i], static_cast<double>(i));
+    ASSERT_EQ(read.lost_before[i], i % 5 == 0 ? 2u : 0u);
+    const Pose& pose = read.T_robot_sensor[i];
+    if (i % 2 == 0) {
+      ASSERT_EQ(pose.translation_mm, glm::dvec2(static_cast<double>(i), 0.25));
+      ASSERT_EQ(pose.theta_rad, -9.0);
+    } else {
+      ASSERT_TRUE(std::isnan(pose.theta_rad));
+    }
+  }
 }
 
 TEST_F(FrameRecorderFile, AppearsOnlyWithFrames) {
@@ -75,56 +79,31 @@ TEST_F(FrameRecorderFile, AppearsOnlyWithFrames) {
   EXPECT_EQ(read_recording(path_).size(), 1u);
 }
 
-TEST_F(FrameRecorderFile, FrameWithAReadingThatIsNoNumberCountsAsLost) {
-  SensorDescription sensor = sensor_of(2);
-  sensor.valid = {1, 0};
-  FrameRecorder recorder(path_, sensor);
-  recorder.add(frame_of(0, 2));
-  for (const double wrong : {std::nan(""), 1e300}) {  // no number, and none in float32
-    Frame frame = frame_of(1, 2);
-    frame.values[0] = wrong;
-    recorder.add(frame);
-  }
-  Frame dead = frame_of(2, 2);
-  dead.values[1] = std::nan("");
-  recorder.add(dead);
-  recorder.close();
-  const Recording read = read_recording(path_);
-  ASSERT_EQ(read.size(), 2u);
-  EXPECT_EQ(recorder.lost(), 2u);
-  EXPECT_EQ(read.lost_before, (std::vector<std::uint64_t>{0, 2}));
-}
-
-TEST_F(FrameRecorderFile, UnknownReadingsComeBackAsNaNs) {
+TEST_F(FrameRecorderFile, WithoutAKnownReadingIsLostAndWithOneHasTheOthersUnknown) {
   SensorDescription sensor = sensor_of(3);
-  sensor.valid = {1, 1, 0};
+  sensor.valid = {1, 1, 0};  // what a dead element reads does not count
   FrameRecorder recorder(path_, sensor);
-  const double inf = std::numeric_limits<double>::infinity();
-  for (const double none : {std::nan(""), inf, -inf, 1e300, -3.5e38}) {
+  const auto add = [&](std::vector<double> values) {
     Frame frame = frame_of(recorder.frames(), 3);
-    frame.values[1] = none;
-    frame.values[2] = none;  // a dead element's does not count
+    frame.values = std::move(values);
     recorder.add(frame);
+  };
+  add({1.0, 2.0, nan});
+  for (const double none : {nan, infinity, -infinity, 1e300, -3.5e38}) {  // the last in float32
+    add({none, none, 4.0});
+    add({1.0, none, none});
   }
-  recorder.add(frame_of(5, 3));
   EXPECT_EQ(recorder.frames(), 6u);
-  EXPECT_EQ(recorder.lost(), 0u);
+  EXPECT_EQ(recorder.lost(), 5u);
   EXPECT_EQ(recorder.unknown_readings(), 5u);
   recorder.close();
   const Recording read = read_recording(path_);
   ASSERT_EQ(read.size(), 6u);
+  EXPECT_EQ(read.lost_before, (std::vector<std::uint64_t>{0, 1, 1, 1, 1, 1}));
   for (std::size_t i = 0; i < 6; ++i) {
-    EXPECT_EQ(read.pressure[3 * i], reading(i, 0));
-    EXPECT_EQ(std::isnan(read.pressure[3 * i + 1]), i < 5) << i;
+    EXPECT_EQ(read.pressure[3 * i], 1.0);
+    EXPECT_EQ(std::isnan(read.pressure[3 * i + 1]), i > 0) << i;
   }
-  // What was read can be written and read again; touches must be whole.
-  write_recording(folder_ / "again.h5", read);
-  EXPECT_TRUE(std::isnan(read_recording(folder_ / "again.h5").pressure[1]));
-  Recording touches = read;
-  touches.rows = "touches";
-  touches.T_robot_sensor.assign(6, {});
-  expect_named(input_error([&] { write_recording(folder_ / "touches.h5", touches); }),
-               {"'pressure'[0, 1]", "nan"});
 }
 
 TEST_F(FrameRecorderFile, RefusesWhatDoesNotFit) {
@@ -132,8 +111,161 @@ TEST_F(FrameRecorderFile, RefusesWhatDoesNotFit) {
   expect_named(input_error([&] { recorder.add(frame_of(0, 3)); }), {"3 values", "2 elements"});
   SensorDescription sensor = sensor_of(2);
   sensor.baseline = {1.0};
-  expect_named(input_error([&] { FrameRecorder(path_, sensor); }), {"stream.h5", "1 baseline"});
-  expect_named(input_error([&] { FrameRecorder(path_, {}); }), {"0 elements"});
+  expect_named(refusal([&] { FrameRecorder(path_, sensor); }), {"1 baseline"});
+  expect_named(refusal([&] { FrameRecorder(path_, {}); }), {"0 elements"});
+}
+
+constexpr std::size_t elements = 36;
+
+// What a forked recorder is told, and tells of itself.
+struct Progress {
+  std::atomic<std::size_t> wanted = 0;
+  std::atomic<std::size_t> added = 0;
+  std::atomic<std::size_t> flushed = 0;
+};
+
+// A recorder in a process of its own, which can be killed.
+class FrameRecorderProcess : public FrameRecorderFile {
+ protected:
+  FrameRecorderProcess()
+      : progress_(new (::mmap(nullptr, sizeof(Progress), PROT_READ | PROT_WRITE,
+                              MAP_SHARED | MAP_ANONYMOUS, -1, 0)) Progress) {}
+  ~FrameRecorderProcess() override { ::munmap(progress_, sizeof(Progress)); }
+
+  // Runs `work` in a process of its own, which must not return to the test.
+  pid_t fork_recorder(const std::function<void()>& work) {
+    new (progress_) Progress;
+    const pid_t pid = ::fork();
+    if (pid == 0) {
+      try {
+        work();
+      } catch (...) {
+        ::_exit(3);
+      }
+      ::_exit(0);
+    }
+    return pid;
+  }
+
+  template <class Condition>
+  static void wait_until(const Condition& condition, pid_t pid) {
+    while (!condition()) {
+      ASSERT_EQ(::waitpid(pid, nullptr, WNOHANG), 0) << "the recorder has ended";
+      std::this_thread::yield();
+    }
+  }
+
+  static int ending(pid_t pid, int signal = 0) {
+    ::kill(pid, signal);
+    int status = 0;
+    ::waitpid(pid, &status, 0);
+    return status;
+  }
+
+  void add_next(FrameRecorder& recorder) {
+    const std::size_t i = progress_->added++;
+    recorder.add(frame_of(i, elements));
+  }
+
+  // Expects the stream's beginning in the file, where there is one, and all but the last second of
+  // what was added. Removes the file and says whether there was one.
+  bool removed_whole() {
+    const bool there = std::filesystem::exists(path_);
+    std::size_t kept = 0;
+    if (there) {
+      const Recording read = read_recording(path_);
+      expect_prefix(read, elements);
+      kept = read.size();
+      std::filesystem::remove(path_);
+    }
+    EXPECT_LE(static_cast<double>(progress_->added - kept) / frame_rate_hz, 1.0);
+    return there;
+  }
+
+  Progress* progress_;
+};
+
+TEST_F(FrameRecorderProcess, FileIsReadAsBeingRecordedFromTheMomentItAppears) {
+  for (int run = 0; run < trials(6); ++run) {
+    SCOPED_TRACE(run);
+    const pid_t pid = fork_recorder([&] {
+      FrameRecorder recorder(path_, sensor_of(elements));
+      for (progress_->wanted = 1;;) {
+        if (progress_->added < progress_->wanted) {
+          add_next(recorder);
+        } else if (progress_->flushed < progress_->wanted) {
+          recorder.flush();
+          progress_->flushed = progress_->added.load();
+        } else {
+          std::this_thread::sleep_for(std::chrono::microseconds(100));  // leaves the test its time
+        }
+      }
+    });
+    wait_until([&] { return ::access(path_.c_str(), F_OK) == 0; }, pid);
+    EXPECT_TRUE(is_marked_open(path_));
+    EXPECT_EQ(recorder_of(path_), Recorder::there);
+    for (const std::size_t frames : {1000u, 3000u}) {
+      progress_->wanted = frames;
+      wait_until([&] { return progress_->flushed == frames; }, pid);
+      const Recording read = read_recording(path_);
+      EXPECT_FALSE(read.closed);
+      EXPECT_EQ(read.size(), frames);
+      expect_prefix(read, elements);
+    }
+    ending(pid, SIGKILL);
+    EXPECT_EQ(recorder_of(path_), Recorder::gone);
+    std::filesystem::remove(path_);
+  }
+}
+
+TEST_F(FrameRecorderProcess, KilledAtAnyMomentHoldsAllButTheLastSecond) {
+  std::mt19937_64 random(20110509);
+  const int runs = trials(20);
+  int appeared = 0;
+  for (int run = 0; run < runs; ++run) {
+    SCOPED_TRACE(run);
+    // As fast as the machine can: most of the time goes into saving, where a kill hurts most.
+    const pid_t pid = fork_recorder([&] {
+      FrameRecorder recorder(path_, sensor_of(elements));
+      for (;;) {
+        add_next(recorder);
+      }
+    });
+    // A number of frames, not a time, so that a slow machine is as far; then some way into saving.
+    const std::size_t frames = random() % 5000;
+    wait_until([&] { return progress_->added >= frames; }, pid);
+    std::this_thread::sleep_for(std::chrono::microseconds(random() % 2000));
+    ending(pid, SIGKILL);
+    appeared += removed_whole() ? 1 : 0;
+  }
+  EXPECT_GE(appeared, runs * 3 / 4);  // the first rows are saved after 250 frames
+}
+
+TEST_F(FrameRecorderProcess, FullDiskIsOneErrorAndLeavesWhatWasSaved) {
+  std::signal(SIGXFSZ, SIG_IGN);  // errors of writing, not signals
+  std::mt19937_64 random(7);
+  const int runs = trials(10);
+  int appeared = 0;
+  for (int run = 0; run < runs; ++run) {
+    SCOPED_TRACE(run);
+    const rlim_t bytes = 1000 + random() % 1500000;
+    const pid_t pid = fork_recorder([&] {
+      const rlimit limit{.rlim_cur = bytes, .rlim_max = bytes};
+      ::setrlimit(RLIMIT_FSIZE, &limit);
+      const std::string said = error_of(Fault::system, [&] {
+        FrameRecorder recorder(path_, sensor_of(elements));
+        while (progress_->added < 20000) {
+          add_next(recorder);
+        }
+      });
+      expect_named(said, {"stream.h5", "File too large"});
+      std::exit(HasFailure() ? 1 : 0);  // as a program ends: HDF5 crashes then, if it is not closed
+    });
+    EXPECT_EQ(ending(pid), 0);
+    appeared += removed_whole() ? 1 : 0;
+  }
+  std::signal(SIGXFSZ, SIG_DFL);
+  EXPECT_GE(appeared, runs / 2);
 }
 
 }  // namespace palpate::frame_recorder_test

@@ -1,112 +1,78 @@
 #include <gtest/gtest.h>
-#include <yaml-cpp/yaml.h>
 
-#include <cmath>
-#include <limits>
+#include <tuple>
 
 #include "file_parts.hpp"
 #include "palpate/files.hpp"
-#include "support/scratch_folder.hpp"
+#include "support/limits.hpp"
 
 namespace palpate::map_test {
 
 OccupancyGrid small_map() {
-  OccupancyGrid map;
-  map.label = "A";
-  map.cell_mm = 0.5;
-  map.origin_mm = {-3.5, 12.0};
-  map.prior = 0.1;
-  map.symmetry = 2;
-  map.spread_mm = 0.7;
-  map.suggested_symmetry = 0;
-  map.nx = 3;
-  map.ny = 2;
+  OccupancyGrid map{.label = "A",
+                    .cell_mm = 0.5,
+                    .origin_mm = {-3.5, 12.0},
+                    .prior = 0.1,
+                    .symmetry = 2,
+                    .spread_mm = 0.7,
+                    .suggested_symmetry = 0,
+                    .nx = 3,
+                    .ny = 2};
   const auto unseen = static_cast<float>(map.prior_log_odds());
   map.log_odds = {-1000.0f, unseen, 8.0f, 0.25f, -1.0f, unseen + 0.01f};
   return map;
 }
 
-class MapFile : public testing::Test {
- protected:
-  std::string message(const FileParts& parts) {
-    parts.save(path_);
-    const std::string text = input_error([&] { read_map(path_); });
-    expect_named(text, {path_.c_str()});
-    return text;
-  }
+auto fields_of(const OccupancyGrid& map) {
+  return std::tuple(map.label, map.cell_mm, map.origin_mm.x, map.origin_mm.y, map.prior,
+                    map.symmetry, map.spread_mm, map.suggested_symmetry, map.mirror, map.nx, map.ny,
+                    map.log_odds, map.observations, map.mean_level);
+}
 
-  ScratchFolder folder_;
-  std::filesystem::path path_ = folder_ / "A.map.h5";
+class MapFile : public OneFile {
+ protected:
+  std::string message(const FileParts& parts) const {
+    parts.save(path_);
+    return refusal([&] { read_map(path_); });
+  }
 };
 
-TEST_F(MapFile, ComesBackAsItWasWritten) {
-  const OccupancyGrid written = small_map();
-  write_map(path_, written);
-  EXPECT_EQ(read_format(path_), "palpate.map");
-  const OccupancyGrid read = read_map(path_);
-  EXPECT_EQ(read.label, written.label);
-  EXPECT_EQ(read.cell_mm, written.cell_mm);
-  EXPECT_EQ(read.origin_mm, written.origin_mm);
-  EXPECT_EQ(read.prior, written.prior);
-  EXPECT_EQ(read.symmetry, written.symmetry);
-  EXPECT_EQ(read.spread_mm, written.spread_mm);
-  EXPECT_EQ(read.suggested_symmetry, written.suggested_symmetry);
-  EXPECT_EQ(read.nx, written.nx);
-  EXPECT_EQ(read.ny, written.ny);
-  EXPECT_EQ(read.log_odds, written.log_odds);
-}
-
-TEST_F(MapFile, KeepsWhatGoesWithTheCells) {
+TEST_F(MapFile, ComesBackAsItWasWrittenWithWhatItMayHold) {
   OccupancyGrid written = small_map();
-  EXPECT_TRUE(read_map((write_map(path_, written), path_)).observations.empty());
-  written.mirror = true;
-  written.observations = {0.0F, 1.0F, 2.0F, 3.5F, 4.0F, 5.0F};
-  written.mean_level = {0.0F, 10.0F, 20.0F, 30.0F, 40.0F, 255.0F};
-  write_map(path_, written);
-  const OccupancyGrid read = read_map(path_);
-  EXPECT_TRUE(read.mirror);
-  EXPECT_EQ(read.observations, written.observations);
-  EXPECT_EQ(read.mean_level, written.mean_level);
-  written.observations.pop_back();
-  expect_named(input_error([&] { write_map(path_, written); }), {"observations"});
-  written.observations.clear();
-  written.mean_level[3] = -1.0F;
-  expect_named(input_error([&] { write_map(path_, written); }), {"mean_level", "[1, 0]"});
-}
-
-TEST_F(MapFile, MayNotKnowTheSpread) {
+  for (const bool whole : {false, true}) {
+    if (whole) {
+      written.mirror = true;
+      written.observations = {0.0F, 1.0F, 2.0F, 3.5F, 4.0F, 5.0F};
+      written.mean_level = {0.0F, 10.0F, 20.0F, 30.0F, 40.0F, 255.0F};
+    }
+    write_map(path_, written);
+    EXPECT_EQ(read_format(path_), "palpate.map");
+    EXPECT_EQ(fields_of(read_map(path_)), fields_of(written));
+  }
   map_parts().save(path_);
-  OccupancyGrid map = read_map(path_);
-  EXPECT_FALSE(map.spread_mm);
-  write_map(path_, map);
+  const OccupancyGrid bare = read_map(path_);
+  EXPECT_FALSE(bare.spread_mm || bare.suggested_symmetry || bare.mirror);
+  write_map(path_, bare);
   EXPECT_FALSE(read_map(path_).spread_mm);
 }
 
+// FaultOfAMap has the values that no map may have.
 TEST_F(MapFile, NamesAttributesItCannotTake) {
   const auto spoilt = [&](const char* name, auto value) {
     return message(map_parts().attribute(name, value));
   };
-  const double nan = std::numeric_limits<double>::quiet_NaN();
-  const double infinity = std::numeric_limits<double>::infinity();
-  for (const double cell_mm : {0.0, -0.5, nan, infinity, 1e-200, 1e154, 1e200}) {
-    expect_named(spoilt("cell_mm", cell_mm), {"'cell_mm'"});
-  }
-  for (const double spread_mm : {0.0, -0.5, nan, infinity, 500.0}) {
-    expect_named(spoilt("spread_mm", spread_mm), {"'spread_mm'"});
-  }
-  for (const double prior : {0.0, 1.0, -0.1, nan}) {
-    expect_named(spoilt("prior", prior), {"'prior'"});
+  for (const char* name : {"cell_mm", "spread_mm", "prior"}) {
+    expect_named(spoilt(name, nan), {("'" + std::string(name) + "'").c_str()});
   }
   for (const double symmetry : {-1.0, 0.5, 1e12, nan}) {
     expect_named(spoilt("symmetry", symmetry), {"'symmetry'"});
     expect_named(spoilt("suggested_symmetry", symmetry), {"'suggested_symmetry'"});
   }
   expect_named(spoilt("origin_mm", std::vector<double>{0, nan}), {"'origin_mm'", "nan"});
-  expect_named(spoilt("origin_mm", std::vector<double>{1e300, 0}), {"'origin_mm'", "1e+300"});
-  expect_named(spoilt("label", "(none)"), {"'label'", "(none)", "choose another"});
   expect_named(spoilt("origin_mm", std::vector<double>{0, 0, 0}), {"'origin_mm'", "3", "2"});
+  expect_named(spoilt("label", "(none)"), {"'label'", "(none)"});
   expect_named(spoilt("version", 2), {"'version'", "newer"});
-  expect_named(spoilt("format", "palpate.recording"), {"a recording", "palpate recognize", "map"});
+  expect_named(spoilt("format", "palpate.recording"), {"a recording", "map"});
   for (const char* name :
        {"format", "version", "label", "cell_mm", "origin_mm", "prior", "symmetry"}) {
     expect_named(message(map_parts().without(name)), {"attribute", name, "missing"});
@@ -114,10 +80,8 @@ TEST_F(MapFile, NamesAttributesItCannotTake) {
 }
 
 TEST_F(MapFile, NamesLogOddsItCannotTake) {
-  expect_named(message(map_parts().dataset("log_odds", {2, 3}, {0, 0, 0, 0, 0, NAN})),
+  expect_named(message(map_parts().dataset("log_odds", {2, 3}, {0, 0, 0, 0, 0, nan})),
                {"'log_odds'[1, 2]", "nan"});
-  expect_named(message(map_parts().dataset("log_odds", {2, 3}, 2e30)),
-               {"'log_odds'[0, 0]", "2e+30"});
   // Finite in float64, infinite in the grid's float32.
   expect_named(message(map_parts().dataset("log_odds", {2, 3}, 1e300)), {"'log_odds'", "inf"});
   expect_named(message(map_parts().dataset("log_odds", {0, 3})), {"'log_odds'", "[0, 3]"});
@@ -126,42 +90,29 @@ TEST_F(MapFile, NamesLogOddsItCannotTake) {
 }
 
 TEST_F(MapFile, IsNotWrittenWhereItCouldNotBeRead) {
-  OccupancyGrid map = small_map();
-  map.prior = 1.0;
-  expect_named(input_error([&] { write_map(path_, map); }), {path_.c_str(), "'prior'"});
-  map = small_map();
-  map.nx = 4;
-  expect_named(input_error([&] { write_map(path_, map); }), {path_.c_str(), "4 x 2"});
-  map = small_map();
-  map.label = "(none)";
-  expect_named(input_error([&] { write_map(path_, map); }), {path_.c_str(), "'label'"});
-  map = small_map();
-  map.cell_mm = 1e200;
-  expect_named(input_error([&] { write_map(path_, map); }), {path_.c_str(), "'cell_mm'"});
+  const auto spoilt = [&](auto OccupancyGrid::*field, const auto& value) {
+    OccupancyGrid map = small_map();
+    map.*field = value;
+    return refusal([&] { write_map(path_, map); });
+  };
+  expect_named(spoilt(&OccupancyGrid::prior, 1.0), {"'prior'"});
+  expect_named(spoilt(&OccupancyGrid::label, "\xc3"), {"'label'"});
+  expect_named(spoilt(&OccupancyGrid::nx, 4), {"4 x 2"});
+  expect_named(spoilt(&OccupancyGrid::observations, std::vector(5, 1.0F)), {"observations"});
+  expect_named(spoilt(&OccupancyGrid::mean_level, std::vector{0.0F, 0.0F, 0.0F, -1.0F, 0.0F, 0.0F}),
+               {"mean_level", "[1, 0]"});
   EXPECT_TRUE(std::filesystem::is_empty(folder_.path()));
 }
 
 TEST_F(MapFile, ShowsMapServerWhatIsOccupiedFreeAndUnknown) {
-  const std::filesystem::path yaml_path = folder_ / "A.yaml";
-  write_map_server(yaml_path, small_map());
+  write_map_server(folder_ / "A.yaml", small_map());
   // The upper row comes first: p = 0.56 unknown, 0.27 unknown, 0.10 free though barely seen; then
   // p = 0 free, unseen, nearly 1 occupied.
   const std::string pixels{'\xcd', '\xcd', '\xfe', '\xfe', '\xcd', '\x00'};
   EXPECT_EQ(bytes_of(folder_ / "A.pgm"), "P5\n3 2\n255\n" + pixels);
-  const YAML::Node yaml = YAML::LoadFile(yaml_path.string());
-  EXPECT_EQ(yaml["image"].as<std::string>(), "A.pgm");
-  EXPECT_EQ(yaml["mode"].as<std::string>(), "trinary");
-  EXPECT_EQ(yaml["negate"].as<int>(), 0);
-  // Written with 12 digits.
-  EXPECT_NEAR(yaml["resolution"].as<double>(), 0.0005, 1e-15);
-  EXPECT_NEAR(yaml["origin"][0].as<double>(), -0.00375, 1e-14);
-  EXPECT_NEAR(yaml["origin"][1].as<double>(), 0.01175, 1e-14);
-  EXPECT_EQ(yaml["origin"][2].as<double>(), 0.0);
-  EXPECT_EQ(yaml["occupied_thresh"].as<double>(), 0.65);
-  EXPECT_EQ(yaml["free_thresh"].as<double>(), 0.196);
-}
-
-TEST_F(MapFile, WantsAYamlNameForMapServer) {
+  EXPECT_EQ(bytes_of(folder_ / "A.yaml"),
+            "image: A.pgm\nmode: trinary\nresolution: 0.0005\norigin: [-0.00375, 0.01175, 0]\n"
+            "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n");
   expect_named(input_error([&] { write_map_server(folder_ / "A.pgm", small_map()); }),
                {"A.pgm", ".yaml"});
 }

@@ -1,15 +1,9 @@
 // A recording that was cut off is closed for programs other than Palpate.
 
 #include <gtest/gtest.h>
-#include <linux/capability.h>
-#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <array>
-#include <atomic>
-#include <cmath>
-#include <csignal>
 #include <functional>
 
 #include "file_parts.hpp"
@@ -17,36 +11,31 @@
 #include "numbered_frames.hpp"
 #include "palpate/files.hpp"
 #include "palpate/frame_recorder.hpp"
-#include "support/scratch_folder.hpp"
+#include "support/limits.hpp"
 
 namespace palpate::recording_closing_test {
 
 constexpr std::size_t elements = 36;
 
-/// While this lives, root may write only what its permissions let it write, as anybody else.
-class ObeyedPermissions {
- public:
-  ObeyedPermissions() {
-    EXPECT_EQ(::syscall(SYS_capget, &header_, before_), 0);
-    auto after = std::to_array(before_);
-    after[0].effective &= ~(1U << CAP_DAC_OVERRIDE);
-    EXPECT_EQ(::syscall(SYS_capset, &header_, after.data()), 0);
-  }
-  ~ObeyedPermissions() { ::syscall(SYS_capset, &header_, before_); }
-  ObeyedPermissions(const ObeyedPermissions&) = delete;
-  ObeyedPermissions& operator=(const ObeyedPermissions&) = delete;
-
- private:
-  __user_cap_header_struct header_{.version = _LINUX_CAPABILITY_VERSION_3, .pid = 0};
-  __user_cap_data_struct before_[_LINUX_CAPABILITY_U32S_3] = {};
-};
-
-class RecordingClosing : public testing::Test {
+class RecordingClosing : public OneFile {
  protected:
-  // A recording of so many frames whose recorder ended without closing it.
-  void cut_off(std::size_t frames) {
+  RecordingClosing() : OneFile("frames.h5") {}
+
+  // How a process of its own ends that does this.
+  static int status_of(const std::function<void()>& work) {
     const pid_t pid = ::fork();
     if (pid == 0) {
+      work();
+      ::_exit(0);  // as a kill
+    }
+    int status = -1;
+    ::waitpid(pid, &status, 0);
+    return status;
+  }
+
+  // A recording of so many frames whose recorder ended without closing it.
+  void cut_off(std::size_t frames) const {
+    const auto record = [&] {
       FrameRecorder recorder(path_, sensor_of(elements));
       for (std::size_t i = 0; i < frames; ++i) {
         recorder.add(frame_of(i, elements));
@@ -55,23 +44,16 @@ class RecordingClosing : public testing::Test {
         }
       }
       recorder.flush();
-      ::_exit(0);  // as a kill
-    }
-    int status = -1;
-    ::waitpid(pid, &status, 0);
-    ASSERT_EQ(status, 0);
+      ::_exit(0);  // before the recorder closes it
+    };
+    ASSERT_EQ(status_of(record), 0);
   }
 
   // Marks the file as open, as a recorder that was killed leaves it.
   void leave_open() const {
     const Hdf5Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
     set_appendable(access.get());
-    const pid_t pid = ::fork();
-    if (pid == 0) {
-      H5Fopen(path_.c_str(), H5F_ACC_RDWR | H5F_ACC_SWMR_WRITE, access.get());
-      ::_exit(0);
-    }
-    ::waitpid(pid, nullptr, 0);
+    status_of([&] { H5Fopen(path_.c_str(), H5F_ACC_RDWR | H5F_ACC_SWMR_WRITE, access.get()); });
   }
 
   // As other programs open a file: for reading or for writing, without SWMR.
@@ -85,13 +67,10 @@ class RecordingClosing : public testing::Test {
     ASSERT_EQ(recording.size(), frames);
     expect_prefix(recording, elements);
   }
-
-  ScratchFolder folder_;
-  std::filesystem::path path_ = folder_ / "frames.h5";
 };
 
 TEST_F(RecordingClosing, OpensTheFileForOthersAndKeepsEveryRow) {
-  for (const std::size_t frames : {1u, 2u, 257u, 3001u}) {
+  for (const std::size_t frames : {1u, 257u, 3001u}) {
     cut_off(frames);
     EXPECT_FALSE(opens());
     EXPECT_FALSE(read_recording(path_).closed);
@@ -110,14 +89,12 @@ TEST_F(RecordingClosing, KeepsWholeRowsOnly) {
   cut_off(1000);
   ASSERT_TRUE(close_recording(path_));
   edit(path_, [](hid_t file) {
-    const auto extend = [&](const char* name, std::initializer_list<hsize_t> extents) {
-      const Hdf5Handle dataset(H5Dopen2(file, name, H5P_DEFAULT), H5Dclose);
-      EXPECT_GE(H5Dset_extent(dataset.get(), extents.begin()), 0);
-    };
-    extend("pressure", {1010, elements});
-    extend("sensor_pose", {1007, 3});
-    extend("lost_before", {1007});
-    extend("time", {1003});
+    for (const auto& [name, extents] : {std::pair{"pressure", Extents{1010, elements}},
+                                        {"sensor_pose", {1007, 3}},
+                                        {"lost_before", {1007}},
+                                        {"time", {1003}}}) {
+      EXPECT_GE(H5Dset_extent(dataset_of(file, name).get(), extents.data()), 0) << name;
+    }
   });
   leave_open();
   ASSERT_FALSE(opens());
@@ -125,8 +102,7 @@ TEST_F(RecordingClosing, KeepsWholeRowsOnly) {
   expect_frames(1000);
   edit(path_, [](hid_t file) {
     for (const char* name : {"pressure", "sensor_pose", "lost_before", "time"}) {
-      const Hdf5Handle dataset(H5Dopen2(file, name, H5P_DEFAULT), H5Dclose);
-      const Hdf5Handle space(H5Dget_space(dataset.get()), H5Sclose);
+      const Hdf5Handle space(H5Dget_space(dataset_of(file, name).get()), H5Sclose);
       hsize_t extents[2] = {};
       H5Sget_simple_extent_dims(space.get(), extents, nullptr);
       EXPECT_EQ(extents[0], 1000u) << name;
@@ -144,14 +120,11 @@ TEST_F(RecordingClosing, ABaselineThatIsHalfWrittenWasNotTaken) {
   recorder.add(frame_of(0, elements));
   recorder.close();
   const auto unwrite = [&](std::size_t first, std::size_t end) {
+    std::vector<double> baseline(elements, 1.0);
+    std::fill(baseline.begin() + static_cast<std::ptrdiff_t>(first),
+              baseline.begin() + static_cast<std::ptrdiff_t>(end), nan);
     edit(path_, [&](hid_t file) {
-      std::vector<double> baseline(elements, 1.0);
-      std::fill(baseline.begin() + static_cast<std::ptrdiff_t>(first),
-                baseline.begin() + static_cast<std::ptrdiff_t>(end), std::nan(""));
-      const Hdf5Handle dataset(H5Dopen2(file, "baseline", H5P_DEFAULT), H5Dclose);
-      EXPECT_GE(H5Dwrite(dataset.get(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT,
-                         baseline.data()),
-                0);
+      put_values(dataset_of(file, "baseline"), H5T_NATIVE_DOUBLE, baseline.data());
     });
   };
   unwrite(20, elements);
@@ -167,66 +140,56 @@ TEST_F(RecordingClosing, ABaselineThatIsHalfWrittenWasNotTaken) {
 
 TEST_F(RecordingClosing, WhileItIsRecordedIsRefusedAndCostsNothing) {
   FrameRecorder recorder(path_, sensor_of(elements));
-  for (std::size_t i = 0; i < 500; ++i) {
-    recorder.add(frame_of(i, elements));
-  }
+  const auto record_to = [&](std::size_t frames) {
+    for (std::size_t i = recorder.frames(); i < frames; ++i) {
+      recorder.add(frame_of(i, elements));
+    }
+  };
+  record_to(500);
   recorder.flush();
   EXPECT_EQ(recorder_of(path_), Recorder::there);
-  expect_named(input_error([&] { close_recording(path_); }), {"frames.h5", "recording", "wait"});
-  // Another process is refused as well.
-  const pid_t pid = ::fork();
-  if (pid == 0) {
-    try {
-      close_recording(path_);
-      ::_exit(1);
-    } catch (const Error&) {
-      ::_exit(0);
-    }
-  }
-  int status = -1;
-  ::waitpid(pid, &status, 0);
-  EXPECT_EQ(status, 0);
-  for (std::size_t i = 500; i < 1000; ++i) {
-    recorder.add(frame_of(i, elements));
-  }
+  // This process finds the file open in its own HDF5 library.
+  EXPECT_FALSE(read_recording(path_).closed);
+  const auto close = [&] { close_recording(path_); };
+  expect_named(refusal(close), {"recording", "wait"});
+  EXPECT_EQ(status_of([&] {
+              refusal(close);
+              ::_exit(HasFailure() ? 1 : 0);
+            }),
+            0)
+      << "another process is refused as well";
+  record_to(1000);
   recorder.close();
+  EXPECT_TRUE(read_recording(path_).closed);
   expect_frames(1000);
   EXPECT_EQ(recorder_of(path_), Recorder::gone);
 }
 
-// The process that records finds the file open in its own HDF5 library.
-TEST_F(RecordingClosing, RecordingProcessKnowsThatItsFileIsNotClosed) {
-  FrameRecorder recorder(path_, sensor_of(elements));
-  recorder.add(frame_of(0, elements));
-  recorder.flush();
-  EXPECT_FALSE(read_recording(path_).closed);
-  recorder.add(frame_of(1, elements));
-  recorder.close();
-  EXPECT_TRUE(read_recording(path_).closed);
-  expect_frames(2);
-}
-
 TEST_F(RecordingClosing, WhatIsNoRecordingIsLeftAlone) {
+  const auto expect_left_alone = [&](const char* named) {
+    const std::string before = bytes_of(path_);
+    expect_named(input_error([&] { close_recording(path_); }), {named});
+    EXPECT_TRUE(bytes_of(path_) == before);
+  };
   map_parts().save(path_);
-  const std::string before = bytes_of(path_);
-  expect_named(input_error([&] { close_recording(path_); }), {"a map"});
-  EXPECT_TRUE(bytes_of(path_) == before);
-  // A file that is cut off and damaged besides.
+  expect_left_alone("a map");
   cut_off(300);
-  std::string bytes = bytes_of(path_);
-  bytes.resize(2000);
-  put_bytes(path_, bytes);
-  input_error([&] { close_recording(path_); });
-  EXPECT_TRUE(bytes_of(path_) == bytes);
+  std::filesystem::resize_file(path_, 2000);  // damaged besides
+  expect_left_alone("");
 }
 
 TEST_F(RecordingClosing, NeedsTheRightToWrite) {
   cut_off(300);
-  std::filesystem::permissions(path_, std::filesystem::perms::owner_read);
-  {
-    const ObeyedPermissions obeyed;
-    expect_named(input_error([&] { close_recording(path_); }), {"frames.h5", "permissions"});
-  }
+  using std::filesystem::perms;
+  std::filesystem::permissions(path_, perms::owner_read | perms::others_read);
+  std::filesystem::permissions(folder_.path(), perms::owner_all | perms::others_exec);
+  EXPECT_EQ(status_of([&] {
+              constexpr uid_t nobody = 65534;
+              EXPECT_EQ(::setuid(::getuid() == 0 ? nobody : ::getuid()), 0);  // root may all
+              expect_named(refusal([&] { close_recording(path_); }), {"permissions"});
+              ::_exit(HasFailure() ? 1 : 0);
+            }),
+            0);
   expect_frames(300);
 }
 

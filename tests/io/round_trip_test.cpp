@@ -1,19 +1,20 @@
-// What the library agrees to write it reads back as it was, whatever it is; what it refuses leaves
-// no file.
+// A recording that the library agrees to write it reads back as it was, whatever it is; what it
+// refuses leaves no file.
 
 #include <gtest/gtest.h>
 
-#include <bit>
 #include <cmath>
 #include <limits>
 #include <random>
 
+#include "file_parts.hpp"
 #include "io/recording_rules.hpp"
 #include "model/stream_time.hpp"
 #include "palpate/files.hpp"
 #include "palpate/frame_recorder.hpp"
+#include "same.hpp"
 #include "support/limits.hpp"
-#include "support/scratch_folder.hpp"
+#include "support/trials.hpp"
 
 namespace palpate::round_trip_test {
 
@@ -73,10 +74,8 @@ class Hostile {
   }
 
   std::vector<glm::dvec2> points(std::size_t n) {
-    std::vector<glm::dvec2> list;
-    for (std::size_t i = 0; i < n; ++i) {
-      list.emplace_back(number(), number());
-    }
+    std::vector<glm::dvec2> list(n);
+    std::ranges::generate(list, [&] { return glm::dvec2(number(), number()); });
     return list;
   }
 
@@ -92,64 +91,37 @@ class Hostile {
   std::size_t rarity_ = 1;
 };
 
-bool same(double a, double b) {
-  return std::isnan(a) ? std::isnan(b)
-                       : std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b);
-}
-
-bool same(const std::vector<double>& a, const std::vector<double>& b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
-                    [](double x, double y) { return same(x, y); });
-}
-
-bool same(const Pose& a, const Pose& b) {
-  return same(a.translation_mm.x, b.translation_mm.x) &&
-         same(a.translation_mm.y, b.translation_mm.y) && same(a.theta_rad, b.theta_rad);
-}
-
-bool same(const std::optional<Truth>& a, const std::optional<Truth>& b) {
-  return a.has_value() == b.has_value() &&
-         (!a || (a->object == b->object && same(a->T_object_robot, b->T_object_robot)));
-}
-
-class RoundTrip : public testing::Test {
+class RoundTrip : public OneFile {
  protected:
-  // Writes, and expects a file that `check` finds right, or an Error of the user's input and none.
-  template <typename Write, typename Check>
-  void expect_whole_or_refused(const Write& write, const Check& check) {
-    bool refused = false;
-    try {
-      write();
-    } catch (const Error& error) {
-      refused = true;
-      EXPECT_EQ(error.fault(), Fault::input) << error.what();
-      EXPECT_EQ(std::string_view(error.what()).find('\n'), std::string_view::npos);
-      EXPECT_TRUE(std::filesystem::is_empty(folder_.path())) << error.what();
-    }
-    ++(refused ? refused_ : written_);
-    if (!refused) {
-      ASSERT_NO_THROW(check());
+  // As often as `runs` says: writes what `draw` returns, and expects a file that `check` finds
+  // right, or an Error of the user's input and none. Neither is rare, or the draws test nothing.
+  template <typename Draw, typename Write, typename Check>
+  void expect_whole_or_refused(int runs, const Draw& draw, const Write& write, const Check& check) {
+    int refused = 0;
+    for (int run = 0; run < runs; ++run) {
+      SCOPED_TRACE(run);
+      const auto drawn = draw(run % 2 == 0);
+      try {
+        write(drawn);
+      } catch (const Error& error) {
+        EXPECT_EQ(error.fault(), Fault::input) << error.what();
+        EXPECT_EQ(std::string_view(error.what()).find('\n'), std::string_view::npos);
+        EXPECT_TRUE(std::filesystem::is_empty(folder_.path())) << error.what();
+        ++refused;
+        continue;
+      }
+      ASSERT_NO_THROW(check(drawn));
       std::filesystem::remove(path_);
     }
+    EXPECT_GT(refused, runs / 5);
+    EXPECT_LT(refused, runs * 4 / 5);
   }
-
-  // Neither outcome is rare, or the draws test nothing.
-  void expect_both_outcomes() const {
-    EXPECT_GT(written_, 30);
-    EXPECT_GT(refused_, 30);
-  }
-
-  ScratchFolder folder_;
-  std::filesystem::path path_ = folder_ / "file.h5";
-  int written_ = 0;
-  int refused_ = 0;
 };
 
 TEST_F(RoundTrip, Recording) {
   Hostile draw(20110509);
-  for (int run = 0; run < 120; ++run) {
-    SCOPED_TRACE(run);
-    draw.set_rarity(run % 2 == 0 ? 30 : 2000);
+  const auto drawn = [&](bool often) {
+    draw.set_rarity(often ? 30 : 2000);
     const std::size_t n = 1 + draw.below(5);
     const std::size_t e = 1 + draw.below(4);
     Recording r;
@@ -173,99 +145,11 @@ TEST_F(RoundTrip, Recording) {
     if (draw.once_in(2)) {
       r.truth = {.object = draw.text(), .T_object_robot = draw.pose()};
     }
-    expect_whole_or_refused([&] { write_recording(path_, r); },
-                            [&] {
-                              const Recording read = read_recording(path_);
-                              EXPECT_EQ(read.object, r.object);
-                              EXPECT_EQ(read.sensor, r.sensor);
-                              EXPECT_EQ(read.serial, r.serial);
-                              EXPECT_EQ(read.pressure_unit, r.pressure_unit);
-                              EXPECT_EQ(read.rows, r.rows);
-                              EXPECT_TRUE(same(read.pressure, r.pressure));
-                              EXPECT_EQ(read.elements_mm, r.elements_mm);
-                              EXPECT_EQ(read.valid, r.valid);
-                              EXPECT_EQ(read.time_s, r.time_s);
-                              EXPECT_TRUE(same(read.baseline, r.baseline));
-                              EXPECT_TRUE(same(read.device_time_s, r.device_time_s));
-                              EXPECT_EQ(read.lost_before, r.lost_before);
-                              EXPECT_TRUE(same(read.truth, r.truth));
-                              ASSERT_EQ(read.size(), r.size());
-                              for (std::size_t i = 0; i < r.size(); ++i) {
-                                EXPECT_TRUE(same(read.T_robot_sensor[i], r.T_robot_sensor[i]));
-                              }
-                            });
-  }
-  expect_both_outcomes();
-}
-
-TEST_F(RoundTrip, Map) {
-  Hostile draw(6);
-  for (int run = 0; run < 150; ++run) {
-    SCOPED_TRACE(run);
-    draw.set_rarity(run % 2 == 0 ? 10 : 1000);
-    OccupancyGrid m;
-    m.label = draw.text();
-    m.cell_mm = std::abs(draw.number()) + 0.25;
-    m.origin_mm = {draw.number(), draw.number()};
-    m.prior = draw.once_in(20) ? draw.number() : draw.one_of({0.2, 1e-300, 1.0 - 0x1p-53});
-    m.symmetry = draw.once_in(20) ? -1 : static_cast<int>(draw.below(5));
-    if (draw.once_in(2)) {
-      m.spread_mm = std::abs(draw.number()) + 0.25;
-    }
-    m.nx = static_cast<int>(draw.below(20));
-    m.ny = static_cast<int>(1 + draw.below(3));
-    const auto cells = static_cast<std::size_t>(m.nx) * static_cast<std::size_t>(m.ny);
-    for (const double value : draw.numbers(draw.size(cells))) {
-      m.log_odds.push_back(static_cast<float>(value));
-    }
-    expect_whole_or_refused([&] { write_map(path_, m); },
-                            [&] {
-                              const OccupancyGrid read = read_map(path_);
-                              EXPECT_EQ(read.label, m.label);
-                              EXPECT_EQ(read.cell_mm, m.cell_mm);
-                              EXPECT_EQ(read.origin_mm, m.origin_mm);
-                              EXPECT_EQ(read.prior, m.prior);
-                              EXPECT_EQ(read.symmetry, m.symmetry);
-                              EXPECT_EQ(read.spread_mm, m.spread_mm);
-                              EXPECT_EQ(read.nx, m.nx);
-                              EXPECT_EQ(read.ny, m.ny);
-                              EXPECT_EQ(read.log_odds, m.log_odds);
-                            });
-  }
-  expect_both_outcomes();
-}
-
-TEST_F(RoundTrip, Posterior) {
-  Hostile draw(3);
-  for (int run = 0; run < 150; ++run) {
-    SCOPED_TRACE(run);
-    draw.set_rarity(run % 2 == 0 ? 20 : 1000);
-    Posterior p;
-    for (std::size_t i = draw.size(1 + draw.below(3)); i > 0; --i) {
-      p.objects.push_back(draw.text());
-    }
-    std::size_t bins = p.objects.size();
-    for (Axis* axis : {&p.lattice.x_mm, &p.lattice.y_mm, &p.lattice.theta_rad}) {
-      axis->lower = draw.number();
-      axis->upper = axis->lower + std::abs(draw.number());
-      axis->count = draw.once_in(50) ? draw.one_of({0, -1, std::numeric_limits<int>::max()})
-                                     : static_cast<int>(1 + draw.below(4));
-      bins *= static_cast<std::size_t>(axis->count > 0 && axis->count < 5 ? axis->count : 1);
-    }
-    p.lattice.pivot_mm = {draw.number(), draw.number()};
-    p.log_likelihood = draw.numbers(draw.size(bins));
-    expect_whole_or_refused([&] { write_posterior(path_, p); },
-                            [&] {
-                              const Posterior read = read_posterior(path_);
-                              EXPECT_EQ(read.objects, p.objects);
-                              EXPECT_EQ(read.log_likelihood, p.log_likelihood);
-                              EXPECT_EQ(read.lattice.x_mm.lower, p.lattice.x_mm.lower);
-                              EXPECT_EQ(read.lattice.theta_rad.upper, p.lattice.theta_rad.upper);
-                              EXPECT_EQ(read.lattice.y_mm.count, p.lattice.y_mm.count);
-                              EXPECT_EQ(read.lattice.pivot_mm, p.lattice.pivot_mm);
-                            });
-  }
-  expect_both_outcomes();
+    return r;
+  };
+  expect_whole_or_refused(
+      trials(100), drawn, [&](const Recording& r) { write_recording(path_, r); },
+      [&](const Recording& r) { expect_same(read_recording(path_), r); });
 }
 
 // What a stored frame is read back as: what is no pose, no time of a device and no reading of an
@@ -283,9 +167,8 @@ void expect_stored(const Recording& read, std::size_t i, const Frame& frame, std
 
 TEST_F(RoundTrip, StreamOfFrames) {
   Hostile draw(24);
-  for (int run = 0; run < 150; ++run) {
-    SCOPED_TRACE(run);
-    draw.set_rarity(run % 2 == 0 ? 20 : 200);
+  const auto drawn = [&](bool often) {
+    draw.set_rarity(often ? 20 : 200);
     const std::size_t e = 1 + draw.below(4);
     SensorDescription sensor;
     sensor.name = draw.text();
@@ -298,46 +181,46 @@ TEST_F(RoundTrip, StreamOfFrames) {
     if (draw.once_in(4)) {
       sensor.truth = {.object = draw.text(), .T_object_robot = draw.pose()};
     }
-    std::vector<Frame> stored;
-    expect_whole_or_refused(
-        [&] {
-          FrameRecorder recorder(path_, sensor);
-          for (std::size_t i = 0; i < 12 || (recorder.frames() == 0 && i < 1000); ++i) {
-            Frame frame{.host_time_s = draw.number(), .values = draw.numbers(e)};
-            frame.lost_before = draw.count();
-            if (!draw.once_in(3)) {
-              frame.T_robot_sensor = draw.pose();
-            }
-            if (!draw.once_in(3)) {
-              frame.device_time_s = draw.number();
-            }
-            const std::uint64_t before = recorder.frames();
-            recorder.add(frame);
-            if (recorder.frames() > before) {
-              stored.push_back(frame);
-            }
-            if (draw.once_in(3)) {
-              recorder.flush();
-            }
-          }
-          recorder.close();
-        },
-        [&] {
-          const Recording read = read_recording(path_);
-          EXPECT_TRUE(read.closed);
-          EXPECT_EQ(read.object, sensor.object);
-          EXPECT_EQ(read.pressure_unit, sensor.pressure_unit);
-          EXPECT_EQ(read.elements_mm, sensor.elements_mm);
-          EXPECT_EQ(read.valid, sensor.valid);
-          EXPECT_TRUE(same(read.baseline, sensor.baseline));
-          EXPECT_TRUE(same(read.truth, sensor.truth));
-          ASSERT_EQ(read.size(), stored.size());
-          for (std::size_t i = 0; i < stored.size(); ++i) {
-            expect_stored(read, i, stored[i], e);
-          }
-        });
-  }
-  expect_both_outcomes();
+    return sensor;
+  };
+  std::vector<Frame> stored;
+  const auto record = [&](const SensorDescription& sensor) {
+    stored.clear();
+    FrameRecorder recorder(path_, sensor);
+    for (std::size_t i = 0; i < 12 || (recorder.frames() == 0 && i < 1000); ++i) {
+      Frame frame{.host_time_s = draw.number(), .values = draw.numbers(sensor.elements_mm.size())};
+      frame.lost_before = draw.count();
+      if (!draw.once_in(3)) {
+        frame.T_robot_sensor = draw.pose();
+      }
+      if (!draw.once_in(3)) {
+        frame.device_time_s = draw.number();
+      }
+      const std::uint64_t before = recorder.frames();
+      recorder.add(frame);
+      if (recorder.frames() > before) {
+        stored.push_back(frame);
+      }
+      if (draw.once_in(3)) {
+        recorder.flush();
+      }
+    }
+    recorder.close();
+  };
+  expect_whole_or_refused(trials(80), drawn, record, [&](const SensorDescription& sensor) {
+    const Recording read = read_recording(path_);
+    EXPECT_TRUE(read.closed);
+    EXPECT_EQ(read.object, sensor.object);
+    EXPECT_EQ(read.pressure_unit, sensor.pressure_unit);
+    EXPECT_EQ(read.elements_mm, sensor.elements_mm);
+    EXPECT_EQ(read.valid, sensor.valid);
+    EXPECT_TRUE(same(read.baseline, sensor.baseline));
+    EXPECT_TRUE(same(read.truth, sensor.truth));
+    ASSERT_EQ(read.size(), stored.size());
+    for (std::size_t i = 0; i < stored.size(); ++i) {
+      expect_stored(read, i, stored[i], sensor.elements_mm.size());
+    }
+  });
 }
 
 }  // namespace palpate::round_trip_test

@@ -2,29 +2,27 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <string>
 #include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
 
+#include "learning/feature_learning.hpp"
 #include "palpate/error.hpp"
-#include "support/synthetic.hpp"
+#include "simulated_presses.hpp"
+#include "support/errors.hpp"
+#include "support/limits.hpp"
 
 namespace palpate::contact_learning_test {
-
-double normal(Uniform& random) {
-  return std::sqrt(-2.0 * std::log(random(1e-12, 1.0))) * std::cos(two_pi * random(0.0, 1.0));
-}
 
 /// Touches [touch][element] of one row of elements, 1 mm apart, as a press.
 struct RowPress {
   explicit RowPress(const std::vector<std::vector<double>>& pressures,
                     std::vector<std::uint8_t> valid = {}) {
-    for (std::size_t e = 0; e < pressures.front().size(); ++e) {
-      recording.elements_mm.emplace_back(e, 0.0);
-    }
+    recording.elements_mm = grid_array(static_cast<int>(pressures.front().size()), 1, 1.0);
     for (const std::vector<double>& touch : pressures) {
       recording.T_robot_sensor.emplace_back();
       recording.pressure.insert(recording.pressure.end(), touch.begin(), touch.end());
@@ -37,6 +35,10 @@ struct RowPress {
   std::vector<Press> presses;
 };
 
+double threshold_of(const std::vector<double>& pressures, std::vector<std::uint8_t> valid = {}) {
+  return learn_classifier(RowPress({pressures}, std::move(valid)).presses).threshold;
+}
+
 std::vector<double> exps(std::vector<double> logs) {
   for (double& x : logs) {
     x = std::exp(x);
@@ -46,12 +48,13 @@ std::vector<double> exps(std::vector<double> logs) {
 
 TEST(ContactClassifierOfPresses, PartsByOtsuOverLogarithms) {
   // n1 n2 (m1 - m2)^2 is 3 * 1 * 8^2 = 192 where the gap to 9 is, 100 and 48 at the others.
-  EXPECT_NEAR(learn_classifier(RowPress({exps({0.0, 1.0, 2.0, 9.0})}).presses).threshold,
-              std::exp(5.5), 1e-9);
+  std::vector<double> pressures = exps({0.0, 1.0, 2.0, 9.0});
+  EXPECT_NEAR(threshold_of(pressures), std::exp(5.5), 1e-9);
+  // What is no reading is left out.
+  pressures.insert(pressures.end(), {1e9, nan, -5.0, 0.0});
+  EXPECT_NEAR(threshold_of(pressures, {1, 1, 1, 1, 0, 1, 1, 1}), std::exp(5.5), 1e-9);
   // Not always at the largest gap: 1 * 10 * 5.5^2 = 302.5 below 4, 6 * 5 * (11 / 3)^2 = 403 above.
-  EXPECT_NEAR(learn_classifier(
-                  RowPress({exps({0.0, 4.0, 4.0, 4.0, 4.0, 4.0, 7.0, 7.0, 7.0, 7.0, 7.0})}).presses)
-                  .threshold,
+  EXPECT_NEAR(threshold_of(exps({0.0, 4.0, 4.0, 4.0, 4.0, 4.0, 7.0, 7.0, 7.0, 7.0, 7.0})),
               std::exp(5.5), 1e-9);
 }
 
@@ -72,56 +75,18 @@ TEST(ContactClassifierOfPresses, LearnsTheRatioFromSharesOfThePeak) {
       << "all shares are 1";
 }
 
-TEST(ContactClassifierOfPresses, LeavesOutWhatIsNoReading) {
-  const double nan = std::numeric_limits<double>::quiet_NaN();
-  std::vector<double> pressures = exps({0.0, 1.0, 2.0, 9.0});
-  for (const double none : {1e9, nan, -5.0, 0.0}) {
-    pressures.push_back(none);
-  }
-  const RowPress row({pressures}, {1, 1, 1, 1, 0, 1, 1, 1});
-  EXPECT_NEAR(learn_classifier(row.presses).threshold, std::exp(5.5), 1e-9);
-}
-
-TEST(ContactClassifierOfPresses, PartsTwoClusters) {
-  Uniform random(41);
-  std::vector<std::vector<double>> touches;
-  double highest_noise = 0.0;
-  double lowest_contact = 1e9;
-  for (int touch = 0; touch < 20; ++touch) {
-    touches.emplace_back();
-    for (int e = 0; e < 60; ++e) {
-      const bool contact = e % 3 == 0;
-      const double x =
-          contact ? 20.0 * std::exp(0.25 * normal(random)) : 0.5 * std::exp(0.4 * normal(random));
-      (contact ? lowest_contact : highest_noise) =
-          contact ? std::min(lowest_contact, x) : std::max(highest_noise, x);
-      touches.back().push_back(x);
-    }
-  }
-  const ContactClassifier found = learn_classifier(RowPress(touches).presses);
-  ASSERT_LT(highest_noise, lowest_contact);
-  EXPECT_NEAR(found.threshold, std::sqrt(highest_noise * lowest_contact), 1e-9);
-  EXPECT_GT(found.ratio, 0.05);
-  EXPECT_LT(found.ratio, 0.3);
-}
-
 TEST(ContactClassifierOfPresses, RefusesPressuresThatTellNothing) {
   const auto refusal = [](const std::vector<double>& pressures) {
-    try {
-      learn_classifier(RowPress({pressures}).presses);
-    } catch (const Error& error) {
-      return std::string(error.what());
-    }
-    return std::string();
+    return input_error([&] { threshold_of(pressures); });
   };
-  EXPECT_NE(refusal({7.0, 7.0, 0.0}).find("all pressures above 0 are 7"), std::string::npos);
-  EXPECT_NE(refusal({7.0, 0.0, 0.0}).find("give `threshold`"), std::string::npos);
-  EXPECT_NE(refusal({0.0, 0.0, -1.0}).find("no pressure is above 0"), std::string::npos);
+  expect_named(refusal({7.0, 7.0, 0.0}), {"all pressures above 0 are 7", "give `threshold`"});
+  expect_named(refusal({0.0, 0.0, -1.0}), {"no pressure is above 0"});
 }
 
-/// Touches of 30 x 30 elements, 1 mm apart: noise, and contact in the middle with crosstalk around.
+/// Six touches of 30 x 30 elements, 1 mm apart: noise, and contact in the middle with crosstalk
+/// around.
 struct NoisyPresses {
-  NoisyPresses(double sd, bool clipped, double crosstalk) {
+  NoisyPresses(bool clipped, double crosstalk) {
     recording.elements_mm = grid_array(30, 30, 1.0);
     Uniform random(43);
     for (int touch = 0; touch < 6; ++touch) {
@@ -137,56 +102,51 @@ struct NoisyPresses {
         recording.pressure.push_back(clipped ? std::max(0.0, pressure) : pressure);
       }
     }
-    presses.push_back({.name = "noise", .label = "L", .touches = all_touches(recording)});
+  }
+  double floor() const {
+    const std::vector<Press> presses{
+        {.name = "noise", .label = "L", .touches = all_touches(recording)}};
+    return noise_floor(presses, {.threshold = 6.0, .ratio = 0.5});
   }
 
+  static constexpr double sd = 0.7;
   Recording recording;
-  std::vector<Press> presses;
 };
 
 TEST(NoiseFloor, IsTheDeviationOfUntouchedElements) {
   // About 4700 readings tell it within 1 %, half of them cut off within 1.6 %.
-  const ContactClassifier classifier{.threshold = 6.0, .ratio = 0.5};
   for (const bool clipped : {true, false}) {
     for (const double crosstalk : {0.0, 5.0}) {
-      const NoisyPresses noisy(0.7, clipped, crosstalk);
-      EXPECT_NEAR(noise_floor(noisy.presses, classifier), 0.7, 0.035) << clipped << crosstalk;
+      EXPECT_NEAR(NoisyPresses(clipped, crosstalk).floor(), 0.7, 0.035) << clipped << crosstalk;
     }
   }
+  EXPECT_EQ(noise_floor(RowPress({{20.0, 21.0, 0.5}}).presses, {}), 0.0) << "all are touched";
 }
 
-TEST(NoiseFloor, CountsContactBelowTheRatio) {
+TEST(NoiseFloor, CountsContactBelowTheRatioAndNoDeadElements) {
   // 8 is Unknown by the ratio beside 20, but no noise.
-  NoisyPresses noisy(0.7, false, 0.0);
-  for (std::size_t i = 0; i < noisy.recording.pressure.size(); ++i) {
-    const glm::dvec2& element = noisy.recording.elements_mm[i % 900];
+  NoisyPresses low(false, 0.0);
+  for (std::size_t i = 0; i < low.recording.pressure.size(); ++i) {
+    const glm::dvec2& element = low.recording.elements_mm[i % 900];
     if (std::max(std::abs(element.x - 10.0), std::abs(element.y - 10.0)) < 2.0) {
-      noisy.recording.pressure[i] = 8.0;
+      low.recording.pressure[i] = 8.0;
     }
   }
-  EXPECT_NEAR(noise_floor(noisy.presses, {.threshold = 6.0, .ratio = 0.5}), 0.7, 0.035);
-}
-
-TEST(NoiseFloor, LeavesOutDeadElements) {
-  NoisyPresses noisy(0.7, true, 0.0);
-  noisy.recording.valid.assign(900, 1);
-  noisy.recording.valid[0] = 0;
+  EXPECT_NEAR(low.floor(), 0.7, 0.035);
+  NoisyPresses dead(true, 0.0);
+  dead.recording.valid.assign(900, 1);
+  dead.recording.valid[0] = 0;
   for (std::size_t touch = 0; touch < 6; ++touch) {
-    noisy.recording.pressure[900 * touch] = 500.0;
+    dead.recording.pressure[900 * touch] = 500.0;
   }
-  noisy.presses[0].touches = all_touches(noisy.recording);
-  EXPECT_NEAR(noise_floor(noisy.presses, {.threshold = 6.0, .ratio = 0.5}), 0.7, 0.035);
-}
-
-TEST(NoiseFloor, IsNoneWhereAllElementsAreTouched) {
-  EXPECT_EQ(noise_floor(RowPress({{20.0, 21.0, 0.5}}).presses, {}), 0.0);
+  EXPECT_NEAR(dead.floor(), 0.7, 0.035);
 }
 
 /// Readings of a random map, drawn from Eq. 7 normalised.
 LevelCounts drawn_counts(double gamma, double prior, std::uint64_t seed) {
   Uniform random(seed);
   LevelCounts counts(2);
-  for (int i = 0; i < 40000; ++i) {
+  for (int i = 0; i < 20'000; ++i) {
     const double value = random(-8.0, 8.0);
     const double p = probability_from_log_odds(value);
     const double contact =
@@ -208,28 +168,25 @@ TEST(GammaFit, RecoversWhatReadingsWereDrawnWith) {
 TEST(GammaFit, LeavesOutCellsThatNothingSensed) {
   LevelCounts counts = drawn_counts(0.1, 0.2, 46);
   const double sensed = fit_gamma(counts, 0.2);
-  for (int i = 0; i < 40000; ++i) {
-    counts.add(Reading::in_contact, ReadingLayer::beyond);
-    counts.add(Reading::in_contact, ReadingLayer::near_free);
+  for (const double value : {ReadingLayer::beyond, ReadingLayer::near_free}) {
+    counts.add(Reading::in_contact, value, 40'000.0);
   }
   EXPECT_EQ(fit_gamma(counts, 0.2), sensed);
 }
 
-TEST(ShareInContact, CountsKnownElements) {
+TEST(ShareInContact, CountsKnownElementsWithinBounds) {
+  const auto share = [](const RowPress& row, const ContactClassifier& classifier = {}) {
+    return share_in_contact(row.presses[0].touches, classifier);
+  };
   // Three In Contact, one Unknown (between the threshold and half of 20), two dead, four of none.
-  const RowPress row({{20.0, 20.0, 15.0, 5.0, 20.0, 20.0, 0.0, 0.0, 1.0, 0.5}},
-                     {1, 1, 1, 1, 0, 0, 1, 1, 1, 1});
-  const ContactClassifier classifier{.threshold = 2.0, .ratio = 0.5};
-  EXPECT_NEAR(share_in_contact(row.presses[0].touches, classifier), 3.5 / 8.0, 1e-12);
-}
-
-TEST(ShareInContact, StaysWithinBounds) {
+  EXPECT_NEAR(share(RowPress({{20.0, 20.0, 15.0, 5.0, 20.0, 20.0, 0.0, 0.0, 1.0, 0.5}},
+                             {1, 1, 1, 1, 0, 0, 1, 1, 1, 1}),
+                    {.threshold = 2.0, .ratio = 0.5}),
+              3.5 / 8.0, 1e-12);
   std::vector<double> weak(200, 0.0);
   weak.back() = 1.0;  // where all are the same, they are Unknown
-  const RowPress none({weak});
-  EXPECT_EQ(share_in_contact(none.presses[0].touches, {}), 0.01);
-  const RowPress all({std::vector<double>(200, 20.0)});
-  EXPECT_EQ(share_in_contact(all.presses[0].touches, {}), 0.5);
+  EXPECT_EQ(share(RowPress({weak})), 0.01);
+  EXPECT_EQ(share(RowPress({std::vector<double>(200, 20.0)})), 0.5);
 }
 
 TEST(LevelEdges, PartContactsIntoEqualShares) {
@@ -264,9 +221,73 @@ TEST(Readings, OfNoiseAloneMakeNoContact) {
   const LearnedReadings found = learn_readings(presses, {.spacing_mm = 2.0});
   EXPECT_NEAR(found.noise, std::sqrt((3.0 * 4.0 + 0.25) / 4.0), 0.01);
   EXPECT_EQ(found.classifier.threshold, 3.0 * found.noise);
-  EXPECT_EQ(learn_readings(presses, {.threshold = 1.0, .spacing_mm = 2.0}).classifier.threshold,
-            1.0)
-      << "as given";
+  const ReadingOptions given{.threshold = 1.0, .spacing_mm = 2.0};
+  EXPECT_EQ(learn_readings(presses, given).classifier.threshold, 1.0);
+}
+
+LabelledFeatures press(const char* label, double value) {
+  return {label, {{value, 2.0 * value, 7.0}}};
+}
+
+/// With what keeps like presses from being demanded alike.
+double sd(double variance) { return std::sqrt(variance + 0.05 * 0.05); }
+
+TEST(FeatureLearning, DrawsDeviationsTowardsThePooledOnes) {
+  const std::vector<LabelledFeatures> presses{press("A", 1.0), press("A", 3.0), press("B", 10.0),
+                                              press("B", 16.0)};
+  const LearnedFeatures learned = learn_features(presses);
+  // Squared differences: A 2, B 18; pooled 20 / 2. Shrunk: (2 + 4 * 10) / 6 and (18 + 40) / 6.
+  EXPECT_DOUBLE_EQ(learned.objects.at("A").mean[0], 2.0);
+  EXPECT_NEAR(learned.objects.at("A").sd[0], sd(42.0 / 6.0 * 1.5), 1e-9);
+  EXPECT_NEAR(learned.objects.at("B").sd[0], sd(58.0 / 6.0 * 1.5), 1e-9);
+  EXPECT_NEAR(learned.objects.at("B").sd[1], sd(4.0 * 58.0 / 6.0 * 1.5), 1e-9);
+  EXPECT_DOUBLE_EQ(learned.objects.at("A").sd[2], 0.05) << "the least deviation";
+  EXPECT_DOUBLE_EQ(learned.any.mean[0], 7.5);
+  EXPECT_NEAR(learned.any.sd[0], sd(141.0 / 3.0), 1e-9);
+  EXPECT_EQ(learned.weight, 0.0);
+}
+
+TEST(FeatureLearning, NoCorrelationIsSoHighThatRoundingInAFileBreaksIt) {
+  const std::vector<LabelledFeatures> presses{press("A", 1.0), press("A", 1e6)};
+  EXPECT_NEAR(learn_features(presses).any.correlation[0], 0.999, 1e-6);
+}
+
+TEST(FeatureLearning, FeaturesThatGoTogetherAreExpectedToGoTogether) {
+  // The force is the area's double or so, and the peak goes its own way.
+  const std::vector<LabelledFeatures> presses{{"A", {{1.0, 2.1, 5.0}}}, {"A", {{2.0, 3.9, 5.2}}},
+                                              {"A", {{3.0, 6.1, 5.2}}}, {"A", {{4.0, 7.9, 5.0}}},
+                                              {"B", {{1.0, 1.0, 1.0}}}, {"B", {{1.0, 1.0, 1.0}}}};
+  const FeatureDistribution learned = learn_features(presses).objects.at("A");
+  EXPECT_GT(learned.correlation[0], 0.9);
+  EXPECT_LT(learned.correlation[0], 1.0);
+  EXPECT_NEAR(learned.correlation[1], 0.0, 0.05);
+  // Both are an sd from the mean in area; one has the force of its area.
+  const double apart = learned.sd[0];
+  const double fits = learned.log_density({{2.5 + apart, 5.0 + 2.0 * apart, 5.1}});
+  const double does_not = learned.log_density({{2.5 + apart, 5.0 - 2.0 * apart, 5.1}});
+  EXPECT_GT(fits, does_not + 5.0);
+}
+
+TEST(FeatureLearning, DensityIsThatOfTheCovariance) {
+  FeatureDistribution distribution{
+      .mean = {1.0, 2.0, 3.0}, .sd = {0.5, 2.0, 1.0}, .correlation = {0.6, -0.3, 0.2}};
+  // -z^T C^-1 z / 2 - log sqrt((2 pi)^3 det C); the sd multiply to 1.
+  const glm::dmat3 c{{1.0, 0.6, -0.3}, {0.6, 1.0, 0.2}, {-0.3, 0.2, 1.0}};
+  const glm::dvec3 z{1.0, -0.5, 2.0};
+  const double expected = -0.5 * glm::dot(z, glm::inverse(c) * z) - 1.5 * std::log(two_pi) -
+                          0.5 * std::log(glm::determinant(c));
+  EXPECT_NEAR(distribution.log_density({{1.5, 1.0, 5.0}}), expected, 1e-12);
+  distribution.correlation = {0.9, 0.9, -0.9};
+  EXPECT_TRUE(std::isnan(distribution.log_density({{1.5, 1.0, 5.0}})));
+}
+
+TEST(FeatureLearning, OfOnePressEachTakesAllPressesAndOfOneIsFinite) {
+  // The variance of both is 8; (0 + 4 * 8) / 5 * 2.
+  const LearnedFeatures both = learn_features(std::vector{press("A", 1.0), press("B", 5.0)});
+  EXPECT_NEAR(both.objects.at("A").sd[0], sd(12.8), 1e-9);
+  const LearnedFeatures one = learn_features(std::vector{press("A", 1.0)});
+  EXPECT_DOUBLE_EQ(one.objects.at("A").sd[0], 0.05);
+  EXPECT_DOUBLE_EQ(one.any.sd[0], 0.05);
 }
 
 }  // namespace palpate::contact_learning_test

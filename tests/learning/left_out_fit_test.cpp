@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <filesystem>
+#include <initializer_list>
 #include <memory>
 #include <optional>
 #include <string>
@@ -17,87 +17,92 @@
 #include "model/random.hpp"
 #include "palpate/files.hpp"
 #include "palpate/simulation.hpp"
+#include "support/scratch_folder.hpp"
+#include "support/shared_device.hpp"
 
 namespace palpate::left_out_fit_test {
 
-class LeftOutFit : public testing::Test {
- protected:
-  static Recording touches(std::size_t count, std::uint64_t seed) {
-    Simulator simulator(make_shape("E"), {}, digitacts_array(), 5);
-    Recording recording = simulator.touch(random_poses(count, seed), {});
-    recording.object = "E";
-    return recording;
+/// Touches of the letter E.
+Recording touches(std::size_t count, std::uint64_t seed) {
+  Simulator simulator(make_shape("E"), {}, digitacts_array(), 5);
+  Recording recording = simulator.touch(random_poses(count, seed), {});
+  recording.object = "E";
+  return recording;
+}
+
+OccupancyGrid map_of(const Recording& recording) {
+  MapBuilder builder(shared_device(), MapOptions());
+  builder.add(recording.touches(0, recording.size()));
+  return builder.build("E");
+}
+
+/// The source of a map of these touches, with what they are like where they are left out.
+MapSource judged(const Recording& recording, const std::vector<std::string>& groups = {}) {
+  MapSource source{.touches = recording, .options = MapOptions(), .groups = groups};
+  judge_left_out(shared_device(), source);
+  return source;
+}
+
+/// Expects the same of an optional scale's fields.
+template <class Scale>
+void expect_same(const std::optional<Scale>& a, const std::optional<Scale>& b,
+                 std::initializer_list<double Scale::*> fields) {
+  ASSERT_EQ(a.has_value(), b.has_value());
+  for (double Scale::*field : fields) {
+    EXPECT_TRUE(!a || (*a).*field == (*b).*field);
   }
+}
 
-  /// The source of a map of these touches, with what they are like where they are left out.
-  MapSource judged(const Recording& recording) {
-    MapSource source{recording, MapOptions()};
-    judge_left_out(device_, source);
-    return source;
-  }
-  FitScale scale(const Recording& recording) { return judged(recording).left_out.value(); }
-
-  Device device_ = Device::open();
-};
-
-TEST_F(LeftOutFit, IsThatOfTouchesToCome) {
+TEST(LeftOutFit, IsThatOfTouchesToCome) {
   const Recording learned = touches(150, 1);
-  MapBuilder builder(device_, MapOptions());
-  builder.add(learned.touches(0, learned.size()));
-  const OccupancyGrid map = builder.build("E");
+  const OccupancyGrid map = map_of(learned);
   std::vector<double> z;
   const Recording others = touches(100, 2);
   for (const Touch& touch : others.touches(0, 100)) {
     z.push_back(fit_of(std::span(&touch, 1), Pose{}, map, ContactModel{})->z);
   }
   const FitScale to_come = scale_of(z).value();
-  const FitScale told = scale(learned);
+  const FitScale told = judged(learned).left_out.value();
   // Three standard errors; a quarter less touches makes the maps a little worse, too.
   EXPECT_NEAR(told.mean, to_come.mean, 3.0 * told.sd * std::sqrt(1.0 / 150 + 1.0 / 100) + 0.03);
   EXPECT_NEAR(told.sd / to_come.sd, 1.0, 0.5) << "rare touches make most of it";
 }
 
-TEST_F(LeftOutFit, IsWorseWhereTouchesContradict) {
-  const Recording sound = touches(60, 1);
-  Recording off = sound;
-  for (std::size_t i = 0; i < off.size(); i += 2) {
-    off.T_robot_sensor[i].translation_mm.x += 3.0;
+TEST(LeftOutFit, IsWorseWhereTouchesContradict) {
+  Recording recording = touches(60, 1);
+  const FitScale sound = judged(recording).left_out.value();
+  for (std::size_t i = 0; i < recording.size(); i += 2) {
+    recording.T_robot_sensor[i].translation_mm.x += 3.0;
   }
-  EXPECT_LT(scale(off).mean, scale(sound).mean - 0.5);
-  EXPECT_GT(scale(off).sd, scale(sound).sd);
+  const FitScale off = judged(recording).left_out.value();
+  EXPECT_LT(off.mean, sound.mean - 0.5);
+  EXPECT_GT(off.sd, sound.sd);
 }
 
-TEST_F(LeftOutFit, NeedsSixteenTouchesInContact) {
+TEST(LeftOutFit, NeedsSixteenTouchesInContact) {
   Recording few = touches(40, 1);
   std::fill_n(few.pressure.begin(), 25 * few.elements(), 0.0);
   EXPECT_FALSE(judged(few).left_out);
   EXPECT_FALSE(judged(few).pose_scale);
 }
 
-TEST_F(LeftOutFit, IsKeptInTheMapsFile) {
-  const std::filesystem::path file =
-      std::filesystem::path(testing::TempDir()) / "left_out_fit_test.map.h5";
+TEST(LeftOutFit, IsKeptInTheMapsFile) {
+  const ScratchFolder folder;
   const Recording learned = touches(40, 1);
-  MapBuilder builder(device_, MapOptions());
-  builder.add(learned.touches(0, learned.size()));
-  OccupancyGrid map = builder.build("E");
+  OccupancyGrid map = map_of(learned);
   MapSource grouped = judged(learned);
   grouped.groups.assign(25, "anna");
   grouped.groups.resize(40, "b\"en");
   for (const MapSource& source : {MapSource{learned, MapOptions()}, judged(learned), grouped}) {
     map.source = std::make_shared<const MapSource>(source);
-    write_map(file, map);
-    const OccupancyGrid back = read_map(file);
-    const auto& [touches, options, fit, pose, groups] = *back.source;
-    EXPECT_EQ(groups, source.groups);
-    ASSERT_EQ(fit.has_value(), source.left_out.has_value());
-    EXPECT_TRUE(!fit || (fit->mean == source.left_out->mean && fit->sd == source.left_out->sd));
-    ASSERT_EQ(pose.has_value(), source.pose_scale.has_value());
-    EXPECT_TRUE(!pose || (pose->factor == source.pose_scale->factor &&
-                          pose->map_sd_mm == source.pose_scale->map_sd_mm));
-    EXPECT_EQ(with_prior(device_, map, 0.3).source->left_out.has_value(), fit.has_value());
+    write_map(folder / "E.map.h5", map);
+    const MapSource back = *read_map(folder / "E.map.h5").source;
+    EXPECT_EQ(back.groups, source.groups);
+    expect_same(back.left_out, source.left_out, {&FitScale::mean, &FitScale::sd});
+    expect_same(back.pose_scale, source.pose_scale, {&PoseScale::factor, &PoseScale::map_sd_mm});
+    EXPECT_EQ(with_prior(shared_device(), map, 0.3).source->left_out.has_value(),
+              source.left_out.has_value());
   }
-  std::filesystem::remove(file);
 }
 
 /// Errors of groups whose belief is some 0.5 or 0.1 mm wide along each axis, and really spread by
@@ -139,7 +144,7 @@ TEST(PoseScale, MovesTheBodyAsFarAlongEveryAxis) {
   }
 }
 
-TEST_F(LeftOutFit, TouchesOfATurnedArrayAreAtOnePlace) {
+TEST(LeftOutFit, TouchesOfATurnedArrayAreAtOnePlace) {
   Recording recording = touches(6, 1);
   const glm::dvec2 middle_mm = array_centre_mm(recording.elements_mm);
   const std::vector<glm::dvec2> at_mm{{0.2, 0.0}, {7.0, 0.0}, {0.2, 0.0},
@@ -155,33 +160,33 @@ TEST_F(LeftOutFit, TouchesOfATurnedArrayAreAtOnePlace) {
 }
 
 // On every day the object lies elsewhere, by more than touches of one day can tell.
-TEST_F(LeftOutFit, IsOfGroupsOnMapsWithoutThem) {
+TEST(LeftOutFit, IsOfGroupsOnMapsWithoutThem) {
   constexpr std::array offsets_mm{0.5, -0.5, 0.4, -0.4};
-  Recording learned = touches(120, 3);
-  MapSource source{learned, MapOptions()};
-  for (std::size_t i = 0; i < learned.size(); ++i) {
-    source.touches.T_robot_sensor[i].translation_mm.x += offsets_mm[i / 30];
-    source.touches.T_robot_sensor[i].translation_mm.y -= offsets_mm[(i / 30 + 2) % 4];
+  Recording recording = touches(120, 3);
+  const PoseScale still = judged(recording).pose_scale.value();
+  EXPECT_LT(still.factor, 0.7) << "Eq. 7 is less sure of poses than this sensor deserves";
+  EXPECT_GT(still.factor, 0.1);
+  EXPECT_LT(still.map_sd_mm, 0.15);
+  std::vector<std::string> days;
+  for (std::size_t i = 0; i < recording.size(); ++i) {
+    recording.T_robot_sensor[i].translation_mm +=
+        glm::dvec2(offsets_mm[i / 30], -offsets_mm[(i / 30 + 2) % 4]);
+    days.push_back("day " + std::to_string(i / 30));
   }
-  judge_left_out(device_, source);
-  const double by_places_mm = source.pose_scale->map_sd_mm;
-  const double fit = source.left_out->mean;
-  for (std::size_t i = 0; i < learned.size(); ++i) {
-    source.groups.push_back("day " + std::to_string(i / 30));
-  }
-  judge_left_out(device_, source);
-  EXPECT_LT(by_places_mm, 0.25) << "others of the same day are in the map";
+  const MapSource by_places = judged(recording);
+  const MapSource by_days = judged(recording, days);
+  EXPECT_LT(by_places.pose_scale->map_sd_mm, 0.25) << "others of the same day are in the map";
   // Three other days move a map by a third of a day's offset the other way; theta moves by less.
-  EXPECT_GT(source.pose_scale->map_sd_mm, 0.35);
-  EXPECT_LT(source.pose_scale->map_sd_mm, 0.75);
-  EXPECT_LT(source.left_out->mean, fit);
-  source.groups.assign(learned.size(), "one day");
-  judge_left_out(device_, source);
-  EXPECT_EQ(source.pose_scale->map_sd_mm, by_places_mm) << "one group tells of no other";
+  EXPECT_GT(by_days.pose_scale->map_sd_mm, 0.35);
+  EXPECT_LT(by_days.pose_scale->map_sd_mm, 0.75);
+  EXPECT_LT(by_days.left_out->mean, by_places.left_out->mean);
+  const MapSource one_day = judged(recording, std::vector<std::string>(120, "one day"));
+  EXPECT_EQ(one_day.pose_scale->map_sd_mm, by_places.pose_scale->map_sd_mm)
+      << "one group tells of no other";
 }
 
 // The map of three corners knows nothing of the fourth, at whatever angle it was touched there.
-TEST_F(LeftOutFit, PosesAreSoughtOnMapsWithoutTheirPlaces) {
+TEST(LeftOutFit, PosesAreSoughtOnMapsWithoutTheirPlaces) {
   const glm::dvec2 middle_mm = array_centre_mm(digitacts_array());
   std::vector<Pose> poses;
   for (int k = 0; k < 80; ++k) {
@@ -189,18 +194,9 @@ TEST_F(LeftOutFit, PosesAreSoughtOnMapsWithoutTheirPlaces) {
     poses.push_back({corner_mm - rotate(0.3 * k, middle_mm), 0.3 * k});
   }
   Simulator simulator(make_shape("E"), {}, digitacts_array(), 5);
-  Recording corners = simulator.touch(poses, {});
-  corners.object = "E";
-  const MapSource source = judged(corners);
+  const MapSource source = judged(simulator.touch(poses, {}));
   EXPECT_TRUE(source.left_out) << "touches were judged";
   EXPECT_FALSE(source.pose_scale) << "but found nowhere";
-}
-
-TEST_F(LeftOutFit, Eq7IsLessSureOfPosesThanThisSensorDeserves) {
-  const PoseScale scale = judged(touches(120, 3)).pose_scale.value();
-  EXPECT_LT(scale.factor, 0.7);
-  EXPECT_GT(scale.factor, 0.1);
-  EXPECT_LT(scale.map_sd_mm, 0.15);
 }
 
 }  // namespace palpate::left_out_fit_test

@@ -1,16 +1,18 @@
-// Presses that say little: refused in words, or learned from as calibrate_sensor() documents.
+// Presses that say little: refused in words, or learned from as calibrate_sensor() documents. What
+// judges a fold has not seen it.
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
 
 #include "learning/sensor_calibration.hpp"
-#include "palpate/error.hpp"
 #include "simulated_presses.hpp"
+#include "support/errors.hpp"
+#include "support/limits.hpp"
 
 namespace palpate::sensor_calibration_degenerate_test {
 
@@ -24,30 +26,9 @@ LetterPresses two_letters(int touches = 16) {
   return letters;
 }
 
-std::string refusal(const std::vector<Press>& presses,
+void expect_refused(const char* named, const std::vector<Press>& presses,
                     const SensorCalibrationOptions& options = {}) {
-  try {
-    calibrate_sensor(presses, {}, options);
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "not refused";
-}
-
-/// The calibration; its numbers are sound and its confidence finite.
-/// @param options of two folds: each fold learns again all that is learned
-SensorCalibration learned(const std::vector<Press>& presses,
-                          const SensorCalibrationOptions& options = {.folds = 2}) {
-  SensorCalibration found = calibrate_sensor(presses, {}, options);
-  found.sensor.validate();
-  EXPECT_TRUE(found.sensor.table.has_value());
-  for (const double nats : found.sensor.table->shared) {
-    EXPECT_TRUE(std::isfinite(nats) && nats <= 0.0) << nats;
-  }
-  for (const auto& scores : {found.before, found.table, found.after}) {
-    EXPECT_TRUE(!scores || std::isfinite(scores->log_loss));
-  }
-  return found;
+  expect_named(input_error([&] { calibrate_sensor(presses, {}, options); }), {named});
 }
 
 bool warns(const SensorCalibration& found, const std::string& part) {
@@ -56,113 +37,107 @@ bool warns(const SensorCalibration& found, const std::string& part) {
   });
 }
 
-class DegeneratePresses : public testing::TestWithParam<bool> {};
+/// Presses at known or unknown poses.
+class DegeneratePresses : public testing::TestWithParam<bool> {
+ protected:
+  /// The calibration; its numbers are sound and its confidence finite.
+  /// @param options of two folds: each fold learns again all that is learned
+  SensorCalibration learned(LetterPresses letters,
+                            const SensorCalibrationOptions& options = {.folds = 2}) {
+    letters.make_presses(GetParam());
+    SensorCalibration found = calibrate_sensor(letters.presses, {}, options);
+    found.sensor.validate();
+    EXPECT_TRUE(found.sensor.table.has_value());
+    for (const double nats : found.sensor.table->shared) {
+      EXPECT_TRUE(std::isfinite(nats) && nats <= 0.0) << nats;
+    }
+    for (const auto& scores : {found.before, found.table, found.after}) {
+      EXPECT_TRUE(!scores || std::isfinite(scores->log_loss));
+    }
+    return found;
+  }
+};
 
-TEST_P(DegeneratePresses, OneIsRefused) {
-  LetterPresses letters;
-  letters.add("A", 1, 63);
-  letters.make_presses(GetParam());
-  EXPECT_NE(refusal(letters.presses).find("at least two touches of one object"), std::string::npos)
-      << refusal(letters.presses);
-}
-
-TEST_P(DegeneratePresses, OneOfEachObjectIsRefused) {
-  LetterPresses letters = two_letters(1);
-  letters.make_presses(GetParam());
-  EXPECT_NE(refusal(letters.presses).find("none of 2 touches"), std::string::npos);
+TEST_P(DegeneratePresses, ThatSayNothingAreRefused) {
+  LetterPresses one;
+  one.add("A", 1, 63);
+  one.make_presses(GetParam());
+  expect_refused("at least two touches of one object", one.presses);
+  LetterPresses one_each = two_letters(1);
+  one_each.make_presses(GetParam());
+  expect_refused("none of 2 touches", one_each.presses);
+  LetterPresses unknown = two_letters();
+  for (Recording& recording : unknown.recordings) {
+    recording.valid.assign(elements, 0);
+  }
+  unknown.make_presses(GetParam());
+  expect_refused("no pressure is above 0", unknown.presses);
+  expect_refused("no pressure is above", unknown.presses, {.threshold = 2.0, .ratio = 0.3});
 }
 
 TEST_P(DegeneratePresses, OfOneObjectKeepTheDefaultConfidence) {
   LetterPresses letters;
   letters.add("A", 20, 64);
-  letters.make_presses(GetParam());
-  const SensorCalibration found = learned(letters.presses);
+  const SensorCalibration found = learned(letters);
   EXPECT_EQ(found.objects, 1U);
   EXPECT_EQ(found.sensor.temperature, 1.0);
-  EXPECT_FALSE(found.sensor.features || found.before);
+  EXPECT_FALSE(found.sensor.features || found.before || found.table || found.after);
   ASSERT_EQ(found.warnings.size(), 1U);
   EXPECT_TRUE(warns(found, "touches of one object say nothing about confidence"));
 }
 
-TEST_P(DegeneratePresses, AllUnknownAreRefused) {
-  LetterPresses letters = two_letters();
-  for (Recording& recording : letters.recordings) {
-    recording.valid.assign(elements, 0);
-  }
-  letters.make_presses(GetParam());
-  EXPECT_NE(refusal(letters.presses).find("no pressure is above 0"), std::string::npos);
-  EXPECT_NE(refusal(letters.presses, {.threshold = 2.0, .ratio = 0.3}).find("no pressure is above"),
-            std::string::npos);
-}
-
 TEST_P(DegeneratePresses, SomeUnknownAreLeftOut) {
   LetterPresses letters = two_letters();
-  const SensorCalibration expected = [&] {
-    LetterPresses without = letters;
-    for (Recording& recording : without.recordings) {
-      recording.pressure.resize(14 * elements);
-      recording.T_robot_sensor.resize(14);
-    }
-    without.make_presses(GetParam());
-    return learned(without.presses);
-  }();
-  for (Recording& recording : letters.recordings) {
-    std::fill(recording.pressure.end() - 2 * elements, recording.pressure.end() - elements, 0.0);
-    std::fill(recording.pressure.end() - elements, recording.pressure.end(),
-              std::numeric_limits<double>::quiet_NaN());
+  LetterPresses without = letters;
+  for (std::size_t k = 0; k < 2; ++k) {
+    without.recordings[k].pressure.resize(14 * elements);
+    without.recordings[k].T_robot_sensor.resize(14);
+    std::vector<double>& pressure = letters.recordings[k].pressure;
+    std::fill(pressure.end() - 2 * elements, pressure.end() - elements, 0.0);
+    std::fill(pressure.end() - elements, pressure.end(), nan);
   }
-  letters.make_presses(GetParam());
-  const SensorCalibration found = learned(letters.presses);
+  const SensorCalibration found = learned(letters);
   EXPECT_TRUE(warns(found, "A.h5, touch 14: all elements are Unknown"));
   EXPECT_TRUE(warns(found, "with 3 more such touches"));
-  EXPECT_EQ(found.sensor.table->shared, expected.sensor.table->shared);
+  EXPECT_EQ(found.sensor.table->shared, learned(without).sensor.table->shared);
   EXPECT_EQ(found.after->records, 28U);
 }
 
-TEST_P(DegeneratePresses, OfADeadElementIgnoreIt) {
+TEST_P(DegeneratePresses, OfADeadElementIgnoreItAndOfAStuckOneAreWarnedOf) {
   LetterPresses letters = two_letters();
-  for (Recording& recording : letters.recordings) {
-    recording.valid.assign(elements, 1);
-    recording.valid[8] = 0;
+  LetterPresses stuck = letters;
+  for (std::size_t k = 0; k < 2; ++k) {
+    letters.recordings[k].valid.assign(elements, 1);
+    letters.recordings[k].valid[8] = 0;
   }
-  letters.make_presses(GetParam());
-  const SensorCalibration expected = learned(letters.presses);
-  for (Recording& recording : letters.recordings) {
-    for (std::size_t i = 8; i < recording.pressure.size(); i += elements) {
-      recording.pressure[i] = i % 5 == 0 ? std::numeric_limits<double>::quiet_NaN() : 900.0;
+  LetterPresses noisy = letters;
+  for (std::size_t k = 0; k < 2; ++k) {
+    for (std::size_t i = 8; i < 16 * elements; i += elements) {
+      noisy.recordings[k].pressure[i] = i % 5 == 0 ? nan : 900.0;
+      stuck.recordings[k].pressure[i] = 45.0;
     }
   }
-  letters.make_presses(GetParam());
-  const SensorCalibration found = learned(letters.presses);
+  const SensorCalibration expected = learned(letters);
+  const SensorCalibration found = learned(noisy);
   EXPECT_EQ(found.sensor.classifier.threshold, expected.sensor.classifier.threshold);
   EXPECT_EQ(found.sensor.noise, expected.sensor.noise);
   EXPECT_EQ(found.sensor.table->shared, expected.sensor.table->shared);
-  ASSERT_EQ(found.sensor.features.has_value(), !GetParam()) << "at unknown poses only";
-  ASSERT_EQ(expected.sensor.features.has_value(), !GetParam());
+  for (const SensorCalibration& each : {found, expected}) {
+    ASSERT_EQ(each.sensor.features.has_value(), !GetParam()) << "at unknown poses only";
+    EXPECT_FALSE(warns(each, "stuck"));
+  }
   if (found.sensor.features) {
     EXPECT_EQ(found.sensor.features->any.mean, expected.sensor.features->any.mean);
   }
-  EXPECT_FALSE(warns(found, "stuck"));
-}
-
-TEST_P(DegeneratePresses, OfAStuckElementAreWarnedOf) {
-  LetterPresses letters = two_letters();
-  for (Recording& recording : letters.recordings) {
-    for (std::size_t i = 8; i < recording.pressure.size(); i += elements) {
-      recording.pressure[i] = 45.0;
-    }
-  }
-  letters.make_presses(GetParam());
-  const SensorCalibration found = learned(letters.presses);
-  EXPECT_TRUE(warns(found, "element 8 reads the same pressure above the threshold in all 32"));
-  EXPECT_TRUE(warns(found, "'valid' to 0"));
+  const SensorCalibration of_stuck = learned(stuck);
+  EXPECT_TRUE(warns(of_stuck, "element 8 reads the same pressure above the threshold in all 32"));
+  EXPECT_TRUE(warns(of_stuck, "'valid' to 0"));
 }
 
 TEST_P(DegeneratePresses, OfAnObjectTouchedOnceAreWarnedOf) {
   LetterPresses letters = two_letters();
   letters.add("R", 1, 65);
-  letters.make_presses(GetParam());
-  const SensorCalibration found = learned(letters.presses);
+  const SensorCalibration found = learned(letters);
   EXPECT_TRUE(warns(found, "'R': no touch has a map of the object"));
   EXPECT_FALSE(found.sensor.table->objects.contains("R"));
   EXPECT_EQ(found.after->records, 32U);
@@ -173,8 +148,7 @@ TEST_P(DegeneratePresses, OfOneObjectUnderTwoLabelsMakeNoneSure) {
   letters.add("A", 18, 66);
   letters.add("A", 18, 67);
   letters.recordings[1].object = "B";
-  letters.make_presses(GetParam());
-  const SensorCalibration found = learned(letters.presses);
+  const SensorCalibration found = learned(letters);
   EXPECT_EQ(found.objects, 2U);
   EXPECT_LT(found.after->accuracy(), 0.7);
   EXPECT_LT(found.after->log_loss, std::log(2.0) + 0.15) << "hardly worse than a guess";
@@ -187,59 +161,100 @@ TEST_P(DegeneratePresses, WithoutTheLevelsAskedForHaveFewer) {
       pressure = pressure > 8.0 ? 20.0 : pressure > 4.0 ? 10.0 : 0.0;
     }
   }
-  letters.make_presses(GetParam());
-  const SensorCalibration found =
-      learned(letters.presses,
-              {.threshold = 2.0, .ratio = 0.3, .tables = {{MapLayer::mean_level, 7}}, .folds = 2});
-  EXPECT_EQ(found.sensor.table->level_edges, (std::vector<double>{20.0}));
-  const SensorCalibration two =
-      learned(letters.presses,
-              {.threshold = 15.0, .ratio = 0.3, .tables = {{MapLayer::mean_level, 8}}, .folds = 2});
-  EXPECT_EQ(two.sensor.table->levels(), 2U) << "one pressure In Contact is one level";
+  const auto table = [&](double threshold, std::size_t levels) {
+    return learned(letters, {.threshold = threshold,
+                             .ratio = 0.3,
+                             .tables = {{MapLayer::mean_level, levels}},
+                             .folds = 2})
+        .sensor.table.value();
+  };
+  EXPECT_EQ(table(2.0, 7).level_edges, (std::vector<double>{20.0}));
+  EXPECT_EQ(table(15.0, 8).levels(), 2U) << "one pressure In Contact is one level";
 }
 
 INSTANTIATE_TEST_SUITE_P(AtPoses, DegeneratePresses, testing::Bool(),
                          [](const auto& test) { return test.param ? "Known" : "Unknown"; });
 
-TEST(DegenerateCalibration, OfElementsThatAllChangeWarnsOfNone) {
-  EXPECT_FALSE(warns(learned(two_letters().presses), "stuck"));
-}
-
-TEST(DegenerateCalibration, OfNoPressesOrPosesOfBothKindsIsRefused) {
-  EXPECT_NE(refusal({}).find("no touches"), std::string::npos);
-  LetterPresses letters = two_letters();
-  letters.presses[3].T_object_robot.reset();
-  EXPECT_NE(refusal(letters.presses).find("A.h5, touch 3: its pose is unknown"), std::string::npos);
-}
-
-TEST(DegenerateCalibration, OptionsOutOfRangeAreRefused) {
+TEST(DegenerateCalibration, IsRefusedByWhatIsWrong) {
   const LetterPresses letters = two_letters();
-  EXPECT_NE(refusal(letters.presses, {.threshold = 1000.0}).find("above the contact threshold"),
-            std::string::npos);
-  EXPECT_NE(refusal(letters.presses, {.ratio = 1.0}).find("ratio = 1"), std::string::npos);
-}
-
-TEST(DegenerateCalibration, OfAnArrayOfOneElementIsRefused) {
-  Recording recording;
-  recording.object = "A";
-  recording.elements_mm = {{0.0, 0.0}};
-  recording.T_robot_sensor = {Pose{}, {{1.0, 0.0}, 0.0}};
-  recording.pressure = {1.0, 20.0};
-  EXPECT_NE(
-      refusal({posed_press(recording, 0), posed_press(recording, 1)}).find("one element each"),
-      std::string::npos);
-}
-
-TEST(DegenerateCalibration, OnMapsOfOtherObjectsIsRefused) {
-  const LetterPresses letters = two_letters();
+  expect_refused("no touches", {});
+  std::vector<Press> mixed = letters.presses;
+  mixed[3].T_object_robot.reset();
+  expect_refused("A.h5, touch 3: its pose is unknown", mixed);
+  expect_refused("above the contact threshold", letters.presses, {.threshold = 1000.0});
+  expect_refused("ratio = 1", letters.presses, {.ratio = 1.0});
+  Recording one_element;
+  one_element.object = "A";
+  one_element.elements_mm = {{0.0, 0.0}};
+  one_element.T_robot_sensor = {Pose{}, {{1.0, 0.0}, 0.0}};
+  one_element.pressure = {1.0, 20.0};
+  expect_refused("one element each", posed_presses(one_element));
   TrainingMap other = maps_by_folds(letters.presses, {}, 2).without_folds.front();
   other.map.label = "Z";
-  try {
-    calibrate_sensor(letters.presses, {other.map}, {});
-    FAIL() << "a table of nothing was learned";
-  } catch (const Error& error) {
-    EXPECT_NE(std::string(error.what()).find("or a map of it"), std::string::npos);
+  expect_named(input_error([&] { calibrate_sensor(letters.presses, {other.map}, {}); }),
+               {"or a map of it"});
+  const auto beyond = [&](const Axis& x_mm, bool auto_pivot) {
+    return SensorCalibrationOptions{
+        .bins = RecognitionBins{.lattice = {.x_mm = x_mm}, .auto_pivot = auto_pivot}};
+  };
+  expect_refused("beyond the bins' -5:5", letters.presses, beyond({-5.0, 5.0, 10}, true));
+  expect_refused("too long", letters.presses, beyond({-1e5, 1e5, 2'000'000'000}, false));
+}
+
+class HeldOutCalibration : public testing::TestWithParam<bool> {};
+
+TEST_P(HeldOutCalibration, JudgesAFoldByWhatTheOtherFoldsSayAlone) {
+  const bool known_poses = GetParam();
+  constexpr std::size_t touches = 15;
+  constexpr std::size_t elements = 36;
+  constexpr std::size_t judged = 2;  // the fold
+  LetterPresses letters;
+  letters.add("A", touches, 61);
+  letters.add("U", touches, 62);
+  letters.make_presses(known_poses);
+  const std::vector<std::size_t> fold = folds_of(letters.presses, 5);
+  const ModelLearning how{
+      .readings = {.spacing_mm = 1.9},
+      .bins = known_poses ? std::optional(BinSteps{1.0, 1.0, 0.5}) : std::nullopt};
+  const auto model = [&] {
+    letters.make_presses(known_poses);
+    const std::vector<Press> others = presses_without(judged, letters.presses, how.folds);
+    return models_of(others, {{MapLayer::mean_level, 4}}, how).front();
+  };
+  const auto press_harder = [&](bool judged_ones) {
+    for (std::size_t i = 0; i < fold.size(); ++i) {
+      double* const pressure =
+          letters.recordings[i / touches].pressure.data() + (i % touches) * elements;
+      for (std::size_t e = 0; e < elements && (fold[i] == judged) == judged_ones; ++e) {
+        pressure[e] = 3.0 + 2.0 * pressure[e] * pressure[e];
+      }
+    }
+  };
+  const FoldModel before = model();
+  press_harder(true);
+  const FoldModel same = model();
+  press_harder(false);
+  const FoldModel other = model();
+  EXPECT_EQ(same.how.contact.classifier.threshold, before.how.contact.classifier.threshold);
+  EXPECT_NE(other.how.contact.classifier.threshold, before.how.contact.classifier.threshold);
+  EXPECT_EQ(same.how.contact.classifier.ratio, before.how.contact.classifier.ratio);
+  EXPECT_NE(other.how.contact.classifier.ratio, before.how.contact.classifier.ratio);
+  EXPECT_EQ(same.how.contact.prior, before.how.contact.prior);
+  EXPECT_EQ(same.how.level_edges, before.how.level_edges);
+  EXPECT_NE(other.how.level_edges, before.how.level_edges);
+  EXPECT_EQ(before.how.layer.near_mm, 2.0 * how.readings.spacing_mm);
+  EXPECT_EQ(before.how.layer.far_mm, 6.0 * how.readings.spacing_mm);
+  EXPECT_EQ(same.how.layer.full_level, before.how.layer.full_level);
+  EXPECT_EQ(same.maps[0].map.log_odds, before.maps[0].map.log_odds);
+  EXPECT_EQ(same.table->shared, before.table->shared);
+  ASSERT_EQ(same.features.has_value(), !known_poses);
+  if (!known_poses) {
+    EXPECT_EQ(same.features->any.mean, before.features->any.mean);
+    EXPECT_NE(other.features->any.mean, before.features->any.mean);
   }
 }
+
+INSTANTIATE_TEST_SUITE_P(AtPoses, HeldOutCalibration, testing::Bool(),
+                         [](const auto& test) { return test.param ? "Known" : "Unknown"; });
 
 }  // namespace palpate::sensor_calibration_degenerate_test

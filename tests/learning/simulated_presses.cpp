@@ -1,6 +1,6 @@
 #include "simulated_presses.hpp"
 
-#include "support/synthetic.hpp"
+#include <cmath>
 
 namespace palpate {
 
@@ -38,6 +38,18 @@ std::vector<Press> posed_presses(const Recording& recording) {
     presses.push_back(posed_press(recording, touch));
   }
   return presses;
+}
+
+MapOptions map_options() { return {.cell_mm = 0.75, .sensor = {.spread_mm = 0.75, .prior = 0.2}}; }
+
+TableLearning learning_on(const std::vector<TrainingMap>& maps) {
+  return {.layer = {.near_mm = 3.0, .far_mm = 9.0},
+          .contact = {.prior = 0.2},
+          .lattice = placing_lattice(maps, 1.5, two_pi / 24.0)};
+}
+
+double normal(Uniform& random) {
+  return std::sqrt(-2.0 * std::log(random(1e-12, 1.0))) * std::cos(two_pi * random(0.0, 1.0));
 }
 
 void LetterPresses::add(const std::string& letter, const std::vector<Pose>& T_object_sensor,

@@ -5,9 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "learning/press.hpp"
+#include "learning/table_learning.hpp"
 #include "palpate/simulation.hpp"
 #include "palpate/touch.hpp"
+#include "support/synthetic.hpp"
 #include "support/touched_shape.hpp"
 
 namespace palpate {
@@ -28,6 +29,13 @@ struct SimulatedPresses {
 
 /// Every touch of a recording as a press at a known pose.
 std::vector<Press> posed_presses(const Recording& recording);
+
+/// How presses are mapped, and a table is learned on such maps.
+MapOptions map_options();
+TableLearning learning_on(const std::vector<TrainingMap>& maps);
+
+/// A number of the standard normal distribution.
+double normal(Uniform& random);
 
 /// Touches of simulated letters by the DigiTacts array.
 struct LetterPresses {

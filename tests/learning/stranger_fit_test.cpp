@@ -17,48 +17,49 @@ using Fits = std::map<std::size_t, std::vector<StrangerFit>>;
 
 std::optional<double> sd_of(const Fits& fits) { return with_strangers(fits, scale).stranger_sd; }
 
-/// Fits as wide as the model says, one in ten of them wider, of objects left out.
-class Strangers {
- public:
-  void add(std::size_t label, int count, std::size_t touches, double stranger_sd) {
+/// Fits of one object that is left out, drawn as wide as the model says, one in ten of them wider.
+struct Drawn {
+  std::size_t label = 0;
+  int count = 0;
+  std::size_t touches = 3;
+  double stranger_sd = 4.0;
+};
+
+Fits fits_of(const std::vector<Drawn>& strangers) {
+  Random random(7, Stream::readings);
+  Fits fits;
+  for (const auto& [label, count, touches, stranger_sd] : strangers) {
     const auto n = static_cast<double>(touches);
+    const double spread = std::hypot(scale.sd, std::sqrt(n) * scale.shared_sd);
     for (int i = 0; i < count; ++i) {
-      const double own_sd = random_.uniform() < 0.1 ? 5.0 : 1.0;
-      const double z = std::hypot(own_sd, stranger_sd * (n - 1.0)) * random_.normal();
-      fits[label].push_back(
-          {{.z = scale.mean * std::sqrt(n) +
-                 z * std::sqrt(scale.sd * scale.sd + n * scale.shared_sd * scale.shared_sd)},
-           touches});
+      const double own_sd = random.uniform() < 0.1 ? 5.0 : 1.0;
+      const double z = std::hypot(own_sd, stranger_sd * (n - 1.0)) * random.normal();
+      fits[label].push_back({{.z = scale.mean * std::sqrt(n) + z * spread}, touches});
     }
   }
-
-  Fits fits;
-
- private:
-  Random random_{7, Stream::readings};
-};
+  return fits;
+}
 
 TEST(WithStrangers, FindsTheSdByWhichFitsWereDrawn) {
   for (const double truth : {1.5, 3.0, 6.0}) {
-    Strangers strangers;
-    for (const std::size_t label : {0U, 1U, 2U}) {
-      strangers.add(label, 300, 3, truth);
-      strangers.add(label, 100, 2, truth);
-    }
-    EXPECT_NEAR(sd_of(strangers.fits).value(), truth, 0.1 * truth);
+    const Fits fits = fits_of({{0, 300, 3, truth},
+                               {1, 300, 3, truth},
+                               {2, 300, 3, truth},
+                               {0, 100, 2, truth},
+                               {1, 100, 2, truth},
+                               {2, 100, 2, truth}});
+    EXPECT_NEAR(sd_of(fits).value(), truth, 0.1 * truth);
   }
 }
 
 TEST(WithStrangers, FindsWhatSingleTouchesAreLike) {
   Random random(8, Stream::readings);
+  const double spread = std::hypot(scale.sd, scale.shared_sd);
   for (const SingleFitScale& truth : {SingleFitScale{0.0, 1.0}, SingleFitScale{-6.0, 3.0}}) {
     Fits fits;
-    const double spread = std::sqrt(scale.sd * scale.sd + scale.shared_sd * scale.shared_sd);
-    for (const std::size_t label : {0U, 1U, 2U}) {
-      for (int i = 0; i < 300; ++i) {
-        const double z = truth.mean + truth.sd * random.normal();
-        fits[label].push_back({{.z = scale.mean + spread * z}, 1});
-      }
+    for (int i = 0; i < 900; ++i) {
+      const double z = truth.mean + truth.sd * random.normal();
+      fits[i % 3].push_back({{.z = scale.mean + spread * z}, 1});
     }
     const FitScale found = with_strangers(fits, scale);
     ASSERT_TRUE(found.stranger_alone);
@@ -70,42 +71,25 @@ TEST(WithStrangers, FindsWhatSingleTouchesAreLike) {
   }
 }
 
-TEST(WithStrangers, OfFewerThanThreeObjectsIsNone) {
-  Strangers strangers;
-  strangers.add(0, 300, 3, 4.0);
-  strangers.add(1, 300, 3, 4.0);
+TEST(WithStrangers, OfFewerThanThreeObjectsOrFiveGroupsIsNone) {
   EXPECT_FALSE(sd_of({}));
-  EXPECT_FALSE(sd_of(strangers.fits));
-  strangers.add(2, 4, 3, 4.0);
-  strangers.add(2, 20, 1, 4.0);
-  EXPECT_FALSE(sd_of(strangers.fits)) << "of four groups, and of single touches";
-  strangers.add(2, 1, 3, 4.0);
-  EXPECT_TRUE(sd_of(strangers.fits));
+  EXPECT_FALSE(sd_of(fits_of({{0, 300}, {1, 300}})));
+  EXPECT_FALSE(sd_of(fits_of({{0, 300}, {1, 300}, {2, 4}, {2, 20, 1}})))
+      << "of four groups, and of single touches";
+  EXPECT_TRUE(sd_of(fits_of({{0, 300}, {1, 300}, {2, 5}, {2, 20, 1}})));
 }
 
 TEST(WithStrangers, CountsObjectsAlikeHoweverOftenTheyWereTouched) {
-  Strangers alike;
-  Strangers often;
-  for (const std::size_t label : {0U, 1U, 2U}) {
-    const double stranger_sd = label == 0 ? 2.0 : 8.0;
-    alike.add(label, 200, 3, stranger_sd);
-    often.add(label, label == 0 ? 4000 : 200, 3, stranger_sd);
-  }
-  const double expected = sd_of(alike.fits).value();
-  EXPECT_NEAR(sd_of(often.fits).value(), expected, 0.15 * expected);
+  const auto sd = [](int of_first) {
+    return sd_of(fits_of({{0, of_first, 3, 2.0}, {1, 200, 3, 8.0}, {2, 200, 3, 8.0}})).value();
+  };
+  EXPECT_NEAR(sd(4000), sd(200), 0.15 * sd(200));
 }
 
 TEST(WithStrangers, StaysWithinAQuarterAndFourTimesPalpatesOwn) {
-  Strangers alike;
-  Strangers unlike;
-  for (const std::size_t label : {0U, 1U, 2U}) {
-    alike.add(label, 50, 3, 0.0);
-    for (int i = 0; i < 50; ++i) {
-      unlike.fits[label].push_back({{.z = -largest_fit_z}, 2});
-    }
-  }
-  EXPECT_EQ(sd_of(alike.fits), 1.0);
-  EXPECT_NEAR(sd_of(unlike.fits).value(), 16.0, 1.0);
+  EXPECT_EQ(sd_of(fits_of({{0, 50, 3, 0.0}, {1, 50, 3, 0.0}, {2, 50, 3, 0.0}})), 1.0);
+  const std::vector<StrangerFit> unlike(50, {{.z = -largest_fit_z}, 2});
+  EXPECT_NEAR(sd_of({{0, unlike}, {1, unlike}, {2, unlike}}).value(), 16.0, 1.0);
 }
 
 }  // namespace palpate::stranger_fit_test

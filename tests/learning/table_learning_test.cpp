@@ -6,36 +6,29 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <glm/geometric.hpp>
 
+#include "learning/level_counts.hpp"
 #include "model/bounding_box.hpp"
 #include "model/interpolated_map.hpp"
 #include "palpate/error.hpp"
 #include "simulated_presses.hpp"
-#include "support/synthetic.hpp"
+#include "support/errors.hpp"
 
 namespace palpate::table_learning_test {
-
-MapOptions map_options() { return {.cell_mm = 0.75, .sensor = {.spread_mm = 0.75, .prior = 0.2}}; }
-
-TableLearning learning(const std::vector<TrainingMap>& maps) {
-  return {.layer = {.near_mm = 3.0, .far_mm = 9.0},
-          .contact = {.prior = 0.2},
-          .lattice = placing_lattice(maps, 1.5, two_pi / 24.0)};
-}
 
 /// Counts as count_placed() would with every press on every other map of its object, at its true
 /// place.
 LevelCounts true_counts(const SimulatedPresses& simulated, const std::vector<TrainingMap>& maps,
                         const TableLearning& how) {
   const std::vector<OccupancyGrid> layers = layers_of(maps, how.layer);
-  const ContactModel classifier = how.classifier();
   LevelCounts counts(2);
   for (std::size_t i = 0; i < layers.size(); ++i) {
     for (std::size_t j = 0; j < layers.size(); ++j) {
       if (i != j && simulated.presses[i].label == simulated.presses[j].label) {
         const Pose T_object_robot =
             inverse(simulated.T_object_robot[j]) * simulated.T_object_robot[i];
-        counts.add(evidence_of(simulated.presses[i].touches, classifier),
+        counts.add(evidence_of(simulated.presses[i].touches, how.classifier()),
                    std::span(&T_object_robot, 1), layers[j]);
       }
     }
@@ -48,7 +41,7 @@ TEST(TableLearning, CountsPressesAtKnownPosesWithinABinOfThem) {
   letters.add("A", 6, 61);
   const std::vector<TrainingMap> maps =
       maps_by_folds(letters.presses, map_options(), 3).without_folds;
-  TableLearning how = learning(maps);
+  TableLearning how = learning_on(maps);
   const std::vector<OccupancyGrid> layers = layers_of(maps, how.layer);
   const PlacedPresses placed = learn_table(letters.presses, maps, how);
   const auto counts = [&] {
@@ -64,21 +57,20 @@ TEST(TableLearning, CountsPressesAtKnownPosesWithinABinOfThem) {
   for (const Press& press : letters.presses) {
     box.take_in(press.T_object_robot->translation_mm);
   }
-  const ContactModel classifier = how.classifier();
+  const Pose about{box.middle(), 0.0};
   LevelCounts expected(2);
   for (const OwnPlacement& own : placed.placements) {
     const Press& press = letters.presses[own.press];
     const InterpolatedMap values(layers[own.map], layers[own.map].prior);
-    const std::vector<Reading> readings = classifier.classify(press.touches.front());
+    const Touch& touch = press.touches.front();
+    const std::vector<Reading> readings = how.classifier().classify(touch);
     for (int i = 0; i < 27; ++i) {
       const Pose turned{{}, (i % 3 - 1) * 0.1};
       const Pose moved{{(i / 3 % 3 - 1) * 0.5, (i / 9 - 1) * 0.3}, 0.0};
-      const Pose about{box.middle(), 0.0};
-      const Pose T_object_sensor = moved * about * turned * inverse(about) * *press.T_object_robot *
-                                   press.touches.front().T_robot_sensor;
+      const Pose T_object_sensor =
+          moved * about * turned * inverse(about) * *press.T_object_robot * touch.T_robot_sensor;
       for (std::size_t e = 0; e < readings.size(); ++e) {
-        expected.add(readings[e],
-                     values.log_odds(T_object_sensor * press.touches.front().elements_mm[e]),
+        expected.add(readings[e], values.log_odds(T_object_sensor * touch.elements_mm[e]),
                      1.0 / 27.0);
       }
     }
@@ -89,55 +81,11 @@ TEST(TableLearning, CountsPressesAtKnownPosesWithinABinOfThem) {
   }
 }
 
-TEST(TableLearning, RecoversTheTableOfASimulatedSensor) {
-  // At known poses: readings are drawn from a table.
-  const std::vector<double> elements_of_level{0.0, 5.0, 15.0};
-  const OccupancyGrid layer = [] {
-    OccupancyGrid grid = random_map(60, 60, 2.0, 8.0, 1);
-    grid.prior = probability_from_log_odds(ReadingLayer::beyond);
-    return grid;
-  }();
-  const auto truth = [](std::size_t level, double value) {
-    const double contact = 0.05 + 0.9 / (1.0 + std::exp(-value));
-    return level == 0 ? 1.0 - contact : level == 1 ? 0.7 * contact : 0.3 * contact;
-  };
-  TableLearning how{.level_edges = {10.0}, .contact = {.prior = 0.2}};
-  how.contact.classifier = {.threshold = 2.0, .ratio = 0.1};
-  const ContactModel classifier = how.classifier();
-  Uniform random(2);
-  Recording recording;
-  recording.T_robot_sensor = {Pose{}};
-  for (int i = 0; i < 200000; ++i) {
-    recording.elements_mm.push_back(
-        layer.centre_mm(static_cast<int>(random(0.0, 60.0)), static_cast<int>(random(0.0, 60.0))));
-    const auto j = static_cast<std::size_t>(
-        std::lround((recording.elements_mm.back().y - layer.origin_mm.y) / layer.cell_mm));
-    const auto k = static_cast<std::size_t>(
-        std::lround((recording.elements_mm.back().x - layer.origin_mm.x) / layer.cell_mm));
-    const double value = layer.log_odds[j * 60 + k];
-    const double at = random(0.0, 1.0);
-    const std::size_t level = at < truth(0, value) ? 0 : at < 1.0 - truth(2, value) ? 1 : 2;
-    recording.pressure.push_back(elements_of_level[level]);
-  }
-  LevelCounts counts(3);
-  const std::vector<Touch> touches = all_touches(recording);
-  counts.add(evidence_of(touches, classifier), std::vector{Pose{}}, layer);
-  const LearnedTable table = table_of({{"A", counts}}, how);
-  for (std::size_t level = 0; level < 3; ++level) {
-    for (int node = 17; node < 48; ++node) {
-      const double value = -16.0 + 0.5 * node;
-      const double p = std::exp(table.shared[level * 49 + static_cast<std::size_t>(node)]);
-      // About 6000 readings a node.
-      EXPECT_NEAR(p, truth(level, value), 0.025) << level << " at " << value;
-    }
-  }
-}
-
 TEST(TableLearning, FindsAtUnknownPosesWhatItWouldAtKnownOnes) {
   SimulatedPresses simulated;
   simulated.add_shapes(5, 3);
   const std::vector<TrainingMap> maps = maps_of_presses(simulated.presses, map_options());
-  const TableLearning how = learning(maps);
+  const TableLearning how = learning_on(maps);
   double shown = 0.0;
   const PlacedPresses placed = learn_table(simulated.presses, maps, how, [&](double fraction) {
     EXPECT_GE(fraction, shown);
@@ -159,13 +107,11 @@ TEST(TableLearning, FindsAtUnknownPosesWhatItWouldAtKnownOnes) {
   // Presses lie within a bin of where they were, all but few.
   int right = 0;
   for (const OwnPlacement& own : placed.placements) {
-    if (simulated.presses[own.press].label == "L") {
-      const Pose truth_pose =
-          inverse(simulated.T_object_robot[own.map]) * simulated.T_object_robot[own.press];
-      const glm::dvec2 off =
-          truth_pose.translation_mm - own.placement.T_object_robot.translation_mm;
-      right += std::hypot(off.x, off.y) < 2.0 ? 1 : 0;
-    }
+    const Pose truth_pose =
+        inverse(simulated.T_object_robot[own.map]) * simulated.T_object_robot[own.press];
+    const double off_mm =
+        glm::distance(truth_pose.translation_mm, own.placement.T_object_robot.translation_mm);
+    right += simulated.presses[own.press].label == "L" && off_mm < 2.0 ? 1 : 0;
   }
   EXPECT_GE(right, 16) << "of 20";
 }
@@ -174,28 +120,23 @@ TEST(TableLearning, CountsAPressOnItsBestMapsOnly) {
   SimulatedPresses simulated;
   simulated.add(on_disc, "disc", 3, 4);
   const std::vector<TrainingMap> maps = maps_of_presses(simulated.presses, map_options());
-  TableLearning how = learning(maps);
-  const std::vector<OccupancyGrid> layers = layers_of(maps, how.layer);
+  TableLearning how = learning_on(maps);
   const Pose far{{1000.0, 0.0}, 0.0};
   const std::vector<OwnPlacement> placements{{0, 1, {Pose{}, -5.0, 0.0}}, {0, 2, {far, -9.0, 0.0}}};
-  how.best_maps = 1;
-  ObjectCounts counts = count_placed(placements, simulated.presses, layers, how);
-  EXPECT_NEAR(counts.at("disc").total(), 196.0, 1e-9);
-  EXPECT_EQ(counts.at("disc").at_node(8), 0.0) << "no reading is beyond the map";
-  how.best_maps = 3;
-  counts = count_placed(placements, simulated.presses, layers, how);
-  EXPECT_NEAR(counts.at("disc").at_node(8), 196.0, 1e-9);
+  const auto counts = [&](std::size_t best_maps) {
+    how.best_maps = best_maps;
+    return count_placed(placements, simulated.presses, layers_of(maps, how.layer), how).at("disc");
+  };
+  EXPECT_NEAR(counts(1).total(), 196.0, 1e-9);
+  EXPECT_EQ(counts(1).at_node(8), 0.0) << "no reading is beyond the map";
+  EXPECT_NEAR(counts(3).at_node(8), 196.0, 1e-9);
 }
 
 TEST(TableLearning, ShrinksObjectsTowardsAllTogether) {
-  TableLearning how{.contact = {.prior = 0.2}};
-  ObjectCounts counts;
-  for (const char* label : {"A", "B"}) {
-    LevelCounts& own = counts.try_emplace(label, 2).first->second;
-    for (int i = 0; i < 100; ++i) {
-      own.add(*label == 'A' ? Reading::in_contact : Reading::no_contact, 0.0);
-    }
-  }
+  const TableLearning how{.contact = {.prior = 0.2}};
+  ObjectCounts counts{{"A", LevelCounts(2)}, {"B", LevelCounts(2)}};
+  counts.at("A").add(Reading::in_contact, 0.0, 100.0);
+  counts.at("B").add(Reading::no_contact, 0.0, 100.0);
   const LearnedTable table = table_of(counts, how);
   const double eq7 = 0.5;  // at log odds 0 both readings are as likely
   const double shared = (100.0 + 20.0 * eq7) / 220.0;
@@ -207,11 +148,9 @@ TEST(TableLearning, ShrinksObjectsTowardsAllTogether) {
 }
 
 TEST(TableLearning, KeepsEquation7ForALevelThatNothingReached) {
-  TableLearning how{.level_edges = {1000.0}, .contact = {.prior = 0.2}};
+  const TableLearning how{.level_edges = {1000.0}, .contact = {.prior = 0.2}};
   LevelCounts counts(3);
-  for (int i = 0; i < 80; ++i) {
-    counts.add(Reading::in_contact, 0.0);
-  }
+  counts.add(Reading::in_contact, 0.0, 80.0);
   const LearnedTable table = table_of({{"A", counts}}, how);
   EXPECT_NEAR(std::exp(table.shared[2 * 49 + 32]), 20.0 * 0.25 / 100.0, 1e-12);
 }
@@ -220,13 +159,8 @@ TEST(TableLearning, OfNoPairOfPressesIsRefused) {
   SimulatedPresses simulated;
   simulated.add_shapes(1, 5);
   const std::vector<TrainingMap> maps = maps_of_presses(simulated.presses, map_options());
-  try {
-    learn_table(simulated.presses, maps, learning(maps));
-    FAIL() << "a table of nothing was learned";
-  } catch (const Error& error) {
-    EXPECT_NE(std::string(error.what()).find("at least two touches of one object"),
-              std::string::npos);
-  }
+  expect_named(input_error([&] { learn_table(simulated.presses, maps, learning_on(maps)); }),
+               {"at least two touches of one object"});
 }
 
 TEST(TableLearning, CountsTouchesAtKnownPosesOnMapsOfTheOthers) {
@@ -247,25 +181,99 @@ TEST(TableLearning, CountsTouchesAtKnownPosesOnMapsOfTheOthers) {
   const LevelCounts counts =
       count_placed(placed.placements, presses, layers_of(maps, how.layer), how).at("L");
   EXPECT_NEAR(counts.total(), 40.0 * 36.0, 1e-6);
-  // The touches are without error: where maps of the others are sure, they are right.
-  double wrong = 0.0;
-  double sure = 0.0;
-  for (int node = 0; node < ReadingLayer::nodes; ++node) {
-    const double value = ReadingLayer::first_node + 0.5 * node;
-    if (std::abs(value) >= 6.0 && value >= -8.0) {
-      wrong += counts.at(value > 0.0 ? 0 : 1, node);
-      sure += counts.at_node(node);
-    }
-  }
-  EXPECT_GT(sure, 300.0);
-  EXPECT_LT(wrong, 0.08 * sure);
+  EXPECT_TRUE(maps_by_folds(presses, map_options(), 1).without_folds.empty());
+  EXPECT_THROW(learn_table(presses, {}, how), Error) << "one fold has no maps of others";
 }
 
-TEST(TableLearning, OfOneFoldHasNoMapsOfOthers) {
-  Recording recording = touches_of(on_letter_l, Pose{}, 4, 6);
-  const std::vector<Press> presses = posed_presses(recording);
-  EXPECT_TRUE(maps_by_folds(presses, map_options(), 1).without_folds.empty());
-  EXPECT_THROW(learn_table(presses, {}, {.contact = {.prior = 0.2}}), Error);
+/// The node whose value this is.
+int node_of(double value) { return static_cast<int>(std::lround((value + 16.0) * 2.0)); }
+
+TEST(LevelCounts, DividesAReadingBetweenTheNodesBesideIt) {
+  LevelCounts counts(3);
+  counts.add(Reading::no_contact, -16.0);
+  counts.add(Reading::in_contact, 0.125);
+  counts.add(contact_level(1), 100.0);
+  counts.add(Reading::unknown, 0.0);
+  EXPECT_DOUBLE_EQ(counts.at(0, 0), 1.0);
+  EXPECT_DOUBLE_EQ(counts.at(1, node_of(0.0)), 0.75);
+  EXPECT_DOUBLE_EQ(counts.at(1, node_of(0.5)), 0.25);
+  EXPECT_DOUBLE_EQ(counts.at(2, 48), 1.0);
+  EXPECT_DOUBLE_EQ(counts.total(), 3.0);
+  LevelCounts twice = counts;
+  twice += counts;
+  EXPECT_DOUBLE_EQ(twice.at_node(node_of(0.0)), 1.5);
+}
+
+TEST(LevelCounts, ReadsTheLayerAtTheElementsOfAPlacedTouch) {
+  OccupancyGrid layer{.label = "A", .cell_mm = 1.0, .origin_mm = {0.0, 0.0}, .nx = 2, .ny = 1};
+  layer.prior = probability_from_log_odds(ReadingLayer::beyond);
+  layer.log_odds = {-3.0F, 5.0F};
+  const std::vector<glm::dvec2> elements{{0.0, 0.0}, {1.0, 0.0}, {2.0, 0.0}, {50.0, 0.0}};
+  const std::vector<double> pressure{0.0, 20.0, 40.0, 0.0};
+  const Touch touch{{}, elements, pressure};
+  ContactModel model{.classifier = {.threshold = 2.0, .ratio = 0.1}};
+  model.table = LikelihoodTable{.nodes = 49, .level_edges = {30.0}, .log_likelihood = {}};
+  LevelCounts counts(3);
+  // The object is moved by -1 mm along x, so that elements 1 and 2 lie on the layer's cells.
+  const Pose T_object_robot{{-1.0, 0.0}, 0.0};
+  counts.add(evidence_of(std::span(&touch, 1), model), std::span(&T_object_robot, 1), layer);
+  EXPECT_DOUBLE_EQ(counts.at(1, node_of(-3.0)), 1.0);
+  EXPECT_DOUBLE_EQ(counts.at(2, node_of(5.0)), 1.0);
+  EXPECT_DOUBLE_EQ(counts.at(0, node_of(-12.0)), 2.0) << "beyond the layer";
+}
+
+/// The probability of a level that a table has at a layer's value.
+double probability(const std::vector<double>& table, std::size_t level, double value) {
+  return std::exp(table[level * 49 + static_cast<std::size_t>(node_of(value))]);
+}
+
+TEST(InitialTable, IsEquation7OverLogOdds) {
+  const std::vector<double> table = initial_table({}, 2, {.gamma = 0.2, .prior = 0.1});
+  ASSERT_EQ(table.size(), 98U);
+  const auto p = [&](std::size_t level, double value) { return probability(table, level, value); };
+  // gamma m + (1 - gamma) p over the sum of both readings, 2 gamma m + 1 - gamma = 0.84.
+  EXPECT_NEAR(p(1, 0.0), (0.02 + 0.8 * 0.5) / 0.84, 1e-12);
+  EXPECT_NEAR(p(1, 2.0), (0.02 + 0.8 / (1.0 + std::exp(-2.0))) / 0.84, 1e-12);
+  EXPECT_NEAR(p(0, 2.0) + p(1, 2.0), 1.0, 1e-12);
+  for (const double unseen : {-16.0, -15.0, -12.0, -10.0, -8.5}) {
+    EXPECT_NEAR(p(1, unseen), (0.02 + 0.8 * 0.1) / 0.84, 1e-12) << unseen;
+  }
+  EXPECT_NEAR(p(1, -8.0), (0.02 + 0.8 / (1.0 + std::exp(8.0))) / 0.84, 1e-12);
+}
+
+TEST(InitialTable, OverMeanLevelsStartsAtTheThreshold) {
+  const ReadingLayer layer = mean_level_layer(15.0, 255.0);
+  EXPECT_DOUBLE_EQ(layer.unit_level, 1.0);
+  const std::vector<double> table =
+      initial_table(layer, 4, {.classifier = {.threshold = 15.0}, .gamma = 0.0, .prior = 0.1});
+  EXPECT_NEAR(probability(table, 0, 0.0), 0.5, 1e-12);
+  EXPECT_NEAR(probability(table, 3, 0.0), 0.5 / 3.0, 1e-12);
+  EXPECT_NEAR(probability(table, 0, 3.0), 1.0 / (1.0 + std::exp(3.0)), 1e-12);
+}
+
+TEST(MeanLevelLayer, TakesAnyPressure) {
+  EXPECT_DOUBLE_EQ(mean_level_layer(2.0, 0.0).unit_level, 2.0);
+  EXPECT_DOUBLE_EQ(mean_level_layer(2.0, 0.0).full_level, 6.0);
+  EXPECT_THROW(mean_level_layer(0.0, 255.0), Error);
+}
+
+TEST(ShrunkTable, AddsPseudoCountsAndHasAFloor) {
+  LevelCounts counts(2);
+  counts.add(Reading::in_contact, 1.0, 24.0);
+  counts.add(Reading::no_contact, 1.0, 6.0);
+  // Twice the probabilities: they are normalised.
+  std::vector<double> towards(98, 0.0);
+  std::vector<double> table = shrunk_table(counts, towards, 20.0);
+  const auto at = static_cast<std::size_t>(node_of(1.0));
+  EXPECT_NEAR(std::exp(table[at]), (6.0 + 10.0) / 50.0, 1e-12);
+  EXPECT_NEAR(std::exp(table[49 + at]), (24.0 + 10.0) / 50.0, 1e-12);
+  EXPECT_NEAR(std::exp(table[0]), 0.5, 1e-12) << "a node without counts keeps what it had";
+  LevelCounts free(2);
+  free.add(Reading::no_contact, 1.0);
+  std::fill(towards.begin() + 49, towards.end(), -100.0);
+  table = shrunk_table(free, towards, 20.0);
+  EXPECT_DOUBLE_EQ(table[49], std::log(1e-6));
+  EXPECT_DOUBLE_EQ(table[49 + at], std::log(1e-6));
 }
 
 }  // namespace palpate::table_learning_test

@@ -1,35 +1,42 @@
-#include "palpate/contact.hpp"
-
-#include <limits>
-#include <random>
+#include <cmath>
+#include <numbers>
 #include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 
-#include "palpate/error.hpp"
+#include "palpate/contact.hpp"
+#include "palpate/contact_model.hpp"
 #include "reference/reference.hpp"
+#include "support/errors.hpp"
+#include "support/limits.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::contact_test {
 
 constexpr Reading in = Reading::in_contact;
 constexpr Reading no = Reading::no_contact;
 constexpr Reading unknown = Reading::unknown;
-
-std::vector<Reading> classify(const std::vector<double>& pressure,
-                              const std::vector<std::uint8_t>& valid = {},
-                              const ContactClassifier& classifier = {}) {
-  const std::vector<glm::dvec2> elements(pressure.size());
-  return classifier.classify(
-      {.T_robot_sensor = {}, .elements_mm = elements, .pressure = pressure, .valid = valid});
-}
-
 using Readings = std::vector<Reading>;
+
+/// The readings, which must be the reference's.
+Readings classify(const std::vector<double>& pressure, const std::vector<std::uint8_t>& valid = {},
+                  const ContactClassifier& classifier = {}) {
+  const std::vector<glm::dvec2> elements(pressure.size());
+  const Touch touch{.elements_mm = elements, .pressure = pressure, .valid = valid};
+  const Readings readings = classifier.classify(touch);
+  EXPECT_EQ(readings, reference::classify(touch, classifier));
+  return readings;
+}
 
 TEST(ContactClassifier, NeedsBothTestsToAgree) {
   // Threshold 2, ratio 0.3, largest 20: the second bound is 6.
   EXPECT_EQ(classify({20.0, 7.0, 5.0, 1.0}), (Readings{in, in, unknown, no}));
   // Largest 4: the second bound is 1.2.
   EXPECT_EQ(classify({4.0, 2.5, 1.5, 1.0}), (Readings{in, in, unknown, no}));
+  EXPECT_EQ(classify({1.0, 1.0}), (Readings{unknown, unknown})) << "equal, below the threshold";
+  EXPECT_EQ(classify({0.0, 0.0}), (Readings{unknown, unknown})) << "none is below 0.3 times 0";
+  EXPECT_TRUE(classify({}).empty());
 }
 
 TEST(ContactClassifier, EqualityIsUnknown) {
@@ -39,64 +46,36 @@ TEST(ContactClassifier, EqualityIsUnknown) {
   EXPECT_EQ(classify({3.0, 1.5}, {}, half), (Readings{in, unknown})) << "ratio, below the other";
 }
 
-TEST(ContactClassifier, AllZeroIsUnknown) {
-  // Nothing is below 0.3 times a largest pressure of 0.
-  EXPECT_EQ(classify({0.0, 0.0, 0.0}), (Readings{unknown, unknown, unknown}));
-}
-
-TEST(ContactClassifier, EqualPressuresBelowTheThresholdAreUnknown) {
-  EXPECT_EQ(classify({1.0, 1.0}), (Readings{unknown, unknown}));
-}
-
-TEST(ContactClassifier, DeadElementsAreUnknownAndDoNotSetTheMaximum) {
-  const double nan = std::numeric_limits<double>::quiet_NaN();
+TEST(ContactClassifier, DeadElementsAndNonNumbersAreUnknownAndDoNotSetTheMaximum) {
   EXPECT_EQ(classify({1e9, 5.0, 1.0}, {0, 1, 1}), (Readings{unknown, in, no}));
   EXPECT_EQ(classify({nan, 5.0, 1.0}, {0, 1, 1}), (Readings{unknown, in, no}));
   EXPECT_EQ(classify({5.0, 1.0}, {0, 0}), (Readings{unknown, unknown}));
-}
-
-TEST(ContactClassifier, ANonNumberIsUnknownAndChangesNoOther) {
-  const double nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(classify({nan, 5.0, 1.0}), (Readings{unknown, in, no}));
   EXPECT_EQ(classify({5.0, nan, 1.0}), (Readings{in, unknown, no}));
 }
 
-TEST(ContactClassifier, EmptyArrayHasNoReadings) { EXPECT_TRUE(classify({}).empty()); }
-
 TEST(ContactClassifier, AgreesWithTheReference) {
-  std::mt19937_64 random(11);
-  // Halves, so that many pressures equal a bound.
-  std::uniform_int_distribution<int> halves(0, 12);
-  std::bernoulli_distribution alive(0.9);
-  const ContactClassifier classifier{.threshold = 2.0, .ratio = 0.5};
+  Uniform random(11);
   for (int trial = 0; trial < 200; ++trial) {
     std::vector<double> pressure(9);
     std::vector<std::uint8_t> valid(9);
     for (std::size_t i = 0; i < pressure.size(); ++i) {
-      pressure[i] = halves(random) / 2.0;
-      valid[i] = alive(random) ? 1 : 0;
+      // Halves, so that many pressures equal a bound.
+      pressure[i] = std::floor(random(0.0, 13.0)) / 2.0;
+      valid[i] = random(0.0, 1.0) < 0.9 ? 1 : 0;
     }
-    const std::vector<glm::dvec2> elements(9);
-    const Touch touch{
-        .T_robot_sensor = {}, .elements_mm = elements, .pressure = pressure, .valid = valid};
-    EXPECT_EQ(classifier.classify(touch), reference::classify(touch, classifier));
+    classify(pressure, valid, {.threshold = 2.0, .ratio = 0.5});
   }
 }
 
 TEST(ContactClassifier, RefusesBoundsThatDecideNothing) {
-  const auto expect_refused = [](const ContactClassifier& classifier, const std::string& field) {
-    for (const bool by_use : {false, true}) {
-      try {
-        by_use ? static_cast<void>(classify({5.0, 1.0}, {}, classifier)) : classifier.validate();
-        ADD_FAILURE() << field << " was accepted";
-      } catch (const Error& error) {
-        EXPECT_EQ(error.fault(), Fault::input);
-        EXPECT_NE(std::string(error.what()).find(field), std::string::npos) << error.what();
-      }
-    }
+  const auto expect_refused = [](const ContactClassifier& classifier, const char* field) {
+    expect_named(input_error([&] { classifier.validate(); }), {field});
+    const std::vector<glm::dvec2> elements(2);
+    const std::vector<double> pressure{5.0, 1.0};
+    const Touch touch{.elements_mm = elements, .pressure = pressure};
+    expect_named(input_error([&] { classifier.classify(touch); }), {field});
   };
-  const double nan = std::numeric_limits<double>::quiet_NaN();
-  const double infinity = std::numeric_limits<double>::infinity();
   for (const double threshold : {nan, infinity, -infinity, -0.1}) {
     expect_refused({.threshold = threshold}, "threshold = ");
   }
@@ -109,8 +88,7 @@ TEST(ContactClassifier, RefusesBoundsThatDecideNothing) {
 TEST(FaultOfReadings, IsAPlaceBeyondWhatAMapMayReach) {
   const ElementReading near{{1e9, -1e9}, in};
   EXPECT_EQ(fault_of(std::vector{near}), std::nullopt);
-  for (const double far : {1.1e9, -1e300, std::numeric_limits<double>::infinity(),
-                           std::numeric_limits<double>::quiet_NaN()}) {
+  for (const double far : {1.1e9, -1e300, infinity, nan}) {
     for (const glm::dvec2 at : {glm::dvec2(far, 0.0), glm::dvec2(0.0, far)}) {
       EXPECT_NE(fault_of(std::vector<ElementReading>{near, {at, no}}), std::nullopt) << far;
     }
@@ -120,7 +98,7 @@ TEST(FaultOfReadings, IsAPlaceBeyondWhatAMapMayReach) {
 TEST(KnownReadings, AreInTheRobotFrameWithoutTheUnknown) {
   const std::vector<glm::dvec2> elements{{1.0, 0.0}, {2.0, 0.0}, {3.0, 0.0}};
   const std::vector<double> pressure{10.0, 2.5, 0.0};
-  const Touch touch{.T_robot_sensor = {{100.0, 200.0}, 1.5707963267948966},
+  const Touch touch{.T_robot_sensor = {{100.0, 200.0}, std::numbers::pi / 2.0},
                     .elements_mm = elements,
                     .pressure = pressure};
   const std::vector<ElementReading> known = known_readings(touch, {});
@@ -131,6 +109,135 @@ TEST(KnownReadings, AreInTheRobotFrameWithoutTheUnknown) {
   EXPECT_NEAR(known[0].position_mm.y, 201.0, 1e-12);
   EXPECT_EQ(known[1].reading, no);
   EXPECT_NEAR(known[1].position_mm.y, 203.0, 1e-12);
+}
+
+/// The model's log-likelihood, which must be the reference's.
+double log_likelihood(const ContactModel& model, Reading reading, double log_odds,
+                      std::size_t object = 0) {
+  const double nats = model.log_likelihood(reading, {log_odds}, object);
+  EXPECT_NEAR(nats, reference::log_likelihood(reading, {log_odds}, model, object), 1e-12)
+      << "float64 rounding of logs below 30";
+  return nats;
+}
+
+TEST(ContactModel, IsEquation7) {
+  for (const double gamma : {0.0, 1e-6, 0.1, 0.5, 0.99}) {
+    for (const double prior : {0.02, 0.2, 0.7}) {
+      for (double l = -30.0; l <= 30.0; l += 0.7) {
+        for (const Reading reading : {in, no, unknown}) {
+          log_likelihood({.gamma = gamma, .prior = prior}, reading, l);
+        }
+      }
+    }
+  }
+}
+
+TEST(ContactModel, HasAFloorWithGammaAlone) {
+  const ContactModel without{.gamma = 0.0, .prior = 0.2};
+  EXPECT_EQ(without.log_likelihood(in, {-1000.0}), -1000.0);
+  EXPECT_EQ(without.log_likelihood(in, {1000.0}), 0.0);
+  EXPECT_EQ(without.log_likelihood(no, {1000.0}), -1000.0);
+  EXPECT_EQ(without.log_likelihood(no, {-1000.0}), 0.0);
+  const ContactModel with{.gamma = 0.1, .prior = 0.2};
+  EXPECT_NEAR(with.log_likelihood(in, {-1000.0}), std::log(0.02), 1e-15);
+  EXPECT_NEAR(with.log_likelihood(no, {1000.0}), std::log(0.02), 1e-15);
+  EXPECT_NEAR(with.log_likelihood(in, {1000.0}), std::log(0.92), 1e-15);
+}
+
+TEST(ContactModel, RefusesWhatIsOutOfRange) {
+  ContactModel().validate();
+  ContactModel{.gamma = 0.0}.validate();
+  for (const double gamma : {-0.1, 1.0, 2.0, nan}) {
+    expect_named(input_error([&] { ContactModel{.gamma = gamma}.validate(); }), {"gamma = "});
+  }
+  for (const double prior : {0.0, 1.0, -1.0, nan}) {
+    expect_named(input_error([&] { ContactModel{.prior = prior}.validate(); }), {"prior = "});
+  }
+}
+
+/// Two objects, three levels, three nodes.
+LikelihoodTable small_table() {
+  return {.first_log_odds = -2.0,
+          .last_log_odds = 2.0,
+          .nodes = 3,
+          .level_edges = {10.0},
+          .log_likelihood = {-1.0, -2.0, -4.0, -5.0, -3.0, -1.0, -9.0, -8.0, -7.0,  //
+                             -0.1, -0.2, -0.3, -0.4, -0.5, -0.6, -0.7, -0.8, -0.9}};
+}
+
+TEST(LikelihoodTable, IsLinearBetweenItsNodesAndConstantBeyond) {
+  ContactModel model{.table = small_table()};
+  struct Row {
+    Reading reading;
+    double log_odds;
+    std::size_t object;
+    double nats;
+  };
+  for (const auto& [reading, log_odds, object, nats] :
+       {Row{no, -2.0, 0, -1.0}, Row{no, 0.0, 0, -2.0}, Row{no, 1.0, 0, -3.0}, Row{no, 2.0, 0, -4.0},
+        Row{no, -100.0, 0, -1.0}, Row{no, 100.0, 0, -4.0}, Row{in, -1.0, 0, -4.0},
+        Row{contact_level(1), 1.5, 0, -7.25}, Row{in, 1.0, 1, -0.55}, Row{unknown, 1.0, 1, 0.0}}) {
+    EXPECT_DOUBLE_EQ(log_likelihood(model, reading, log_odds, object), nats);
+  }
+  model.table->log_likelihood.resize(9);
+  for (const std::size_t object : {0U, 1U, 7U}) {
+    EXPECT_EQ(log_likelihood(model, no, 1.0, object), -3.0) << "one set for all objects";
+  }
+}
+
+TEST(LikelihoodTable, DividesContactByItsEdges) {
+  ContactModel model{.table = small_table()};
+  model.table->level_edges = {7.0, 10.0, 15.0};
+  const std::vector<double> pressure{20.0, 1.0, 6.5, 7.0, 9.99, 10.0, 15.0, 3.0, nan, 40.0};
+  const std::vector<std::uint8_t> valid{1, 1, 1, 1, 1, 1, 1, 1, 1, 0};
+  const std::vector<glm::dvec2> elements(pressure.size());
+  const Touch touch{.elements_mm = elements, .pressure = pressure, .valid = valid};
+  // Eq. 3 asks for more than 2 and 6; 3.0 is between them.
+  const std::vector<Reading> expected{
+      contact_level(3), no,      in,      contact_level(1), contact_level(1), contact_level(2),
+      contact_level(3), unknown, unknown, unknown};
+  EXPECT_EQ(model.classify(touch), expected);
+  EXPECT_EQ(reference::classify(touch, model), expected);
+  model.table.reset();
+  EXPECT_EQ(model.classify(touch), model.classifier.classify(touch)) << "Eq. 7 knows one level";
+}
+
+TEST(LikelihoodTable, RefusesOneThatIsNotSound) {
+  using Table = LikelihoodTable;
+  /// A table that is changed in one respect, and what is said of it.
+  const auto expect_refused = [](const auto& change, const char* says) {
+    ContactModel model{.table = small_table()};
+    model.validate();
+    change(*model.table);
+    expect_named(input_error([&] { model.validate(); }), {"likelihood table: ", says});
+  };
+  for (const std::size_t nodes : {0U, 1U}) {
+    expect_refused([&](Table& t) { t.nodes = nodes; }, "nodes = ");
+  }
+  for (const double end : {nan, infinity, -2.0, -3.0, -1.999, 1001.0}) {
+    expect_refused([&](Table& t) { t.last_log_odds = end; }, "3 nodes from log odds -2 to");
+  }
+  expect_refused([](Table& t) { t.first_log_odds = nan; }, "3 nodes from log odds nan to");
+  for (const double edge : {nan, infinity}) {
+    expect_refused([&](Table& t) { t.level_edges = {edge}; }, "level_edges[0] = ");
+  }
+  expect_refused([](Table& t) { t.level_edges = {5.0, 3.0}; }, "level_edges[1] = 3");
+  expect_refused([](Table& t) { t.level_edges = {5.0, 5.0}; }, "level_edges[1] = 5");
+  expect_refused([](Table& t) { t.level_edges = {1, 2, 3, 4, 5, 6, 7}; }, "9 levels");
+  expect_refused([](Table& t) { t.log_likelihood.clear(); }, "0 numbers");
+  expect_refused([](Table& t) { t.log_likelihood.pop_back(); }, "17 numbers");
+  for (const double nats : {nan, infinity, -infinity, -2e30}) {
+    expect_refused([&](Table& t) { t.log_likelihood[13] = nats; }, "log_likelihood[1, 1, 1] = ");
+  }
+}
+
+TEST(LikelihoodTable, HasUpToEightLevels) {
+  ContactModel model{.table = small_table()};
+  model.table->level_edges = {1, 2, 3, 4, 5, 6};
+  model.table->log_likelihood.assign(8 * 3, -1.0);
+  model.validate();
+  EXPECT_EQ(model.table->levels(), most_reading_levels);
+  EXPECT_EQ(model.log_likelihood(contact_level(6), {0.5}), -1.0);
 }
 
 }  // namespace palpate::contact_test

@@ -1,13 +1,113 @@
-#include "model/reading_mixture.hpp"
-
+#include <algorithm>
 #include <cmath>
+#include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "model/mixture_kernel.hpp"
+#include "model/predicted_readings.hpp"
+#include "model/reading_mixture.hpp"
 #include "palpate/fit.hpp"
+#include "palpate/touch.hpp"
+#include "support/every_set_of_instructions.hpp"
+#include "support/limits.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::reading_mixture_test {
+
+TEST(PredictedReadings, AreTheContactModels) {
+  const Pose T_object_sensor{{1.0, -2.0}, 0.4};
+  const std::vector<glm::dvec2> elements_mm = digitacts_array();
+  for (const double steepness : {0.0, 1.0, 30.0, 1000.0}) {
+    const OccupancyGrid map = random_map(33, 21, 0.5, steepness, 3);
+    for (const double gamma : {0.0, 1e-9, 0.1, 0.9}) {
+      const ContactModel model{.gamma = gamma, .prior = 0.2};
+      const InterpolatedMap interpolated(map, *model.prior);
+      const std::vector<double> logs =
+          reading_log_likelihoods(elements_mm, T_object_sensor, interpolated, model, 0);
+      ASSERT_EQ(logs.size(), 2 * elements_mm.size());
+      for (std::size_t i = 0; i < logs.size(); ++i) {
+        const MapSample sample{interpolated.log_odds(T_object_sensor * elements_mm[i / 2])};
+        const double expected = model.log_likelihood(static_cast<Reading>(i % 2), sample, 0);
+        // Two ways of rounding: places by 1e-15 mm, at slopes of up to 4,000 nats/mm.
+        EXPECT_NEAR(logs[i], expected, 1e-10 * std::max(1.0, std::abs(expected)));
+      }
+    }
+  }
+}
+
+/// What the functions give for one set of instructions, or for the machine's best.
+struct Answers {
+  std::vector<double> sums = std::vector<double>(16);
+  double log_sum = 0.0;
+  std::vector<double> probability = std::vector<double>(3 * 16);
+  std::vector<double> mean = std::vector<double>(16, 0.5);
+  std::vector<double> variance = std::vector<double>(16, 0.25);
+
+  bool operator==(const Answers&) const = default;
+};
+
+/// A number within (-4, 0], another one for every i.
+double log_at(std::size_t i) {
+  return -4.0 * std::abs(std::sin(1.0 + 0.7 * static_cast<double>(i)));
+}
+
+Answers answers() {
+  Answers all;
+  std::vector<double> logs(3 * 16);
+  for (std::size_t i = 0; i < logs.size(); ++i) {
+    logs[i] = log_at(i);
+  }
+  const double* const rows[] = {logs.data() + 16, logs.data(), logs.data() + 32};
+  sum_rows(rows, all.sums);
+  std::vector<double> values(logs.begin(), logs.begin() + 16);
+  values[14] = values[15] = -infinity;
+  all.log_sum = log_sum_exp(values);
+  predict_element(
+      {.log_likelihood = logs.data(), .probability = all.probability.data(), .levels = 3}, all.mean,
+      all.variance);
+  return all;
+}
+
+TEST(MixtureKernel, IsWithinItsTolerance) {
+  const Answers found = answers();
+  double sum = 0.0;
+  for (std::size_t h = 0; h < 16; ++h) {
+    EXPECT_EQ(found.sums[h], log_at(16 + h) + log_at(h) + log_at(32 + h));
+    sum += h < 14 ? std::exp(log_at(h)) : 0.0;
+    double total = 0.0;
+    for (std::size_t level = 0; level < 3; ++level) {
+      total += std::exp(log_at(16 * level + h));
+    }
+    double mean = 0.0;
+    double squares = 0.0;
+    for (std::size_t level = 0; level < 3; ++level) {
+      const double l = log_at(16 * level + h);
+      const double q = std::exp(l) / total;
+      EXPECT_NEAR(found.probability[16 * level + h], q, 1e-12);
+      mean += q * l;
+      squares += q * l * l;
+    }
+    EXPECT_NEAR(found.mean[h], 0.5 + mean, 1e-12);
+    EXPECT_NEAR(found.variance[h], 0.25 + squares - mean * mean, 1e-11);
+  }
+  EXPECT_NEAR(found.log_sum, std::log(sum), 1e-12);
+}
+
+TEST(MixtureKernel, StaysInRange) {
+  std::vector<double> values(8, -infinity);
+  values[3] = -5000.0;
+  EXPECT_EQ(log_sum_exp(values), -5000.0);
+  values[4] = -1e30;
+  EXPECT_EQ(log_sum_exp(values), -5000.0);
+}
+
+TEST(MixtureKernel, EverySetOfInstructionsGivesTheSameBits) {
+  const Answers best = answers();
+  with_every_set_of_instructions(
+      [&](const std::string& name) { EXPECT_EQ(answers(), best) << name; });
+}
 
 constexpr Reading no = Reading::no_contact;
 constexpr Reading yes = Reading::in_contact;

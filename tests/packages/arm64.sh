@@ -11,7 +11,7 @@ set -euo pipefail
 
 source=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 programs=("$@")
-[ $# -gt 0 ] || programs=(model_test io_test estimation_bounded_test estimation_bounded_slow_test
+[ $# -gt 0 ] || programs=(model_test io_test estimation_bounded_test
   streaming_test parsing_test golden_test)
 
 # shellcheck source=tests/packages/root.sh

@@ -3,6 +3,8 @@ import os
 import pathlib
 import re
 import subprocess
+import sys
+import warnings
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -10,21 +12,24 @@ import pytest
 
 import palpate
 
+sys.path.append(str(pathlib.Path(__file__).parents[1] / "support"))
+
 
 @pytest.fixture(scope="session")
 def device() -> palpate.Device:
     return palpate.Device.open(os.environ.get("PALPATE_DEVICE", "llvmpipe"))
 
 
+def learned(device: palpate.Device, letter: str) -> palpate.OccupancyGrid:
+    """The map of a letter, from touches of seed 1."""
+    builder = palpate.MapBuilder(device)
+    builder.add(palpate.simulate(letter, seed=1))
+    return builder.build(letter)
+
+
 @pytest.fixture(scope="session")
 def maps(device: palpate.Device) -> list[palpate.OccupancyGrid]:
-    """Maps of three letters, from touches of seed 1."""
-    built = []
-    for letter in "AEI":
-        builder = palpate.MapBuilder(device)
-        builder.add(palpate.simulate(letter, seed=1))
-        built.append(builder.build(letter))
-    return built
+    return [learned(device, letter) for letter in "AEI"]
 
 
 @pytest.fixture(scope="session")
@@ -38,26 +43,40 @@ def unknown() -> palpate.Recording:
     )
 
 
-def command(*arguments: object) -> str:
-    """Runs the command `palpate` and returns its output."""
-    run = subprocess.run(
-        [os.environ["PALPATE_COMMAND"], *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        timeout=300,
-    )
-    if run.returncode != 0:
-        raise RuntimeError(run.stderr.removeprefix("palpate: ").rstrip("\n"))
-    return run.stdout
+def run(*arguments: object, cwd: pathlib.Path | None = None) -> "subprocess.CompletedProcess[str]":
+    """Runs the command `palpate` to its end, whatever comes of it."""
+    line = [os.environ["PALPATE_COMMAND"], *map(str, arguments)]
+    return subprocess.run(line, cwd=cwd, capture_output=True, text=True, timeout=300)
+
+
+def command(*arguments: object, cwd: pathlib.Path | None = None) -> str:
+    """What the command `palpate` prints."""
+    done = run(*arguments, cwd=cwd)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
 
 
 def refusal(*arguments: object) -> str:
     """What the command says of input that it refuses."""
-    run = subprocess.run(
-        [os.environ["PALPATE_COMMAND"], *map(str, arguments)], capture_output=True, text=True
-    )
-    assert run.returncode == 2, run.stderr
-    return run.stderr.removeprefix("palpate: ").rstrip("\n")
+    done = run(*arguments)
+    assert done.returncode == 2, done.stderr
+    return done.stderr.removeprefix("palpate: ").rstrip("\n")
+
+
+def error_of(call: Callable[..., object], *arguments: object, **named: object) -> str:
+    """What the call says of input that it refuses."""
+    with pytest.raises(palpate.Error) as refused:
+        call(*arguments, **named)
+    assert refused.value.fault == "input"
+    return str(refused.value)
+
+
+def warned(call: Callable[..., Any], *arguments: object, **named: object) -> tuple[Any, str]:
+    """What the call returns, and what it warns of."""
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        value = call(*arguments, **named)
+    return value, " ".join(str(warning.message) for warning in said)
 
 
 def expect_refused(
@@ -65,45 +84,52 @@ def expect_refused(
 ) -> None:
     """The call is refused as the command with the arguments is, but for how each spells options.
     `spelled` has how Python spells each option that the command's words name."""
-    with pytest.raises(palpate.Error) as refused:
-        call()
-    words = refusal(*arguments)
+    words, said = refusal(*arguments), error_of(call)
     for flag, keyword in spelled.items():
         assert flag in words
         words = words.replace(flag, keyword)
-    said = str(refused.value)
     assert "--" not in said
     assert said == words if spelled else OPTION.sub("OPTION", said) == OPTION.sub("OPTION", words)
-    assert refused.value.fault == "input"
+
+
+def printed(*arguments: object) -> Any:
+    """The command's JSON."""
+    return json.loads(command(*arguments, "--json", "-"))
 
 
 class Files:
-    """Maps and an unknown that the command has written."""
+    """Maps and an unknown that the command has written, and a record that knows no truth."""
 
     def __init__(self, folder: pathlib.Path) -> None:
+        self.folder = folder
         self.maps = folder / "maps"
         self.unknown = folder / "E.h5"
-        train = []
-        for seed, letter in enumerate("AE", start=1):
-            train.append(folder / f"{letter}.train.h5")
-            command("simulate", letter, "-o", train[-1], "--seed", seed)
-        flags = ("--prior", "0.2", "--sensor-model", "none")
-        command("map", *train, "-o", f"{self.maps}/", *flags)
-        self.train = train
-        command(
-            "simulate", "E", "-o", self.unknown, "--object-pose", "random", "--touches", 9,
-            "--seed", 4,
-        )  # fmt: skip
+        self.without_truth = folder / "r.json"
+        self.without_truth.write_text('[{"best": "A", "identity": {"A": 1.0}}]')
+        self.train = [folder / f"{letter}.train.h5" for letter in "AE"]
+        for seed, file in enumerate(self.train, start=1):
+            command("simulate", file.name[0], "-o", file, "--seed", seed)
+        command("map", *self.train, "-o", f"{self.maps}/", "--prior", "0.2", "--sensor-model", "none")
+        placed = ("--object-pose", "random", "--touches", 9, "--seed", 4)
+        command("simulate", "E", "-o", self.unknown, *placed)
 
     def recognized(self, *flags: object) -> list[dict[str, Any]]:
-        output = command("recognize", self.unknown, "--maps", self.maps, "--json", "-", *flags)
-        records: list[dict[str, Any]] = json.loads(output)
+        records: list[dict[str, Any]] = printed("recognize", self.unknown, "--maps", self.maps, *flags)
         return records
 
 
 @pytest.fixture(scope="session")
 def files(tmp_path_factory: pytest.TempPathFactory) -> Files:
     return Files(tmp_path_factory.mktemp("files"))
+
+
+@pytest.fixture(scope="session")
+def presses(tmp_path_factory: pytest.TempPathFactory) -> list[pathlib.Path]:
+    """Ten touches of each of two letters, all over them."""
+    folder = tmp_path_factory.mktemp("presses")
+    for letter in "AU":
+        palpate.simulate(letter, palpate.training_grid()[::19]).save(folder / f"{letter}.h5")
+    return [folder / "A.h5", folder / "U.h5"]
 
 
 OPTION = re.compile(

@@ -96,6 +96,24 @@ class Bag:
         vector = self.of("geometry_msgs/msg/Vector3", x, y, z)
         return self.of("geometry_msgs/msg/Transform", vector, q)
 
+    def plain(self, topic: str, values: Any, received_s: float, kind: str = "Float32") -> None:
+        """Writes readings without a time of their own."""
+        layout = self.of("std_msgs/msg/MultiArrayLayout", [], 0)
+        row = numpy.array(values, dtype=kind.lower())
+        self.write(topic, self.of(f"std_msgs/msg/{kind}MultiArray", layout, row), received_s)
+
+    def edge(self, parent: str, child: str, stamp_s: float, *place: Any) -> Any:
+        """T_parent_child: x, y, z in m, and a rotation."""
+        header, transform = self.header(stamp_s, parent), self.pose("Transform", *place)
+        return self.of("geometry_msgs/msg/TransformStamped", header, child, transform)
+
+    def frames(self, topic: str, edges: list[Any], received_s: float) -> None:
+        self.write(topic, self.of("tf2_msgs/msg/TFMessage", edges), received_s)
+
+    def stamped_pose(self, topic: str, stamp_s: float, received_s: float, *place: Any) -> None:
+        header, pose = self.header(stamp_s, "base"), self.pose("Pose", *place)
+        self.write(topic, self.of("geometry_msgs/msg/PoseStamped", header, pose), received_s)
+
     def write(self, topic: str, message: Any, received_s: float) -> None:
         name = message.__msgtype__
         if topic not in self.connections:

@@ -1,23 +1,27 @@
 """Bags of each storage become the recordings of what they hold; what they lack is said."""
 
 import math
-import os
 import pathlib
 import re
 import struct
 import subprocess
 import sys
-import warnings
 from typing import Any
 
 import numpy
 import pytest
+from conftest import error_of, warned
+from program import Done, run_program
 
 import palpate
 from palpate import _bag_messages, _bag_transforms, read_bag
-from palpate.bag import topics
+from palpate.bag import main, topics
 
 from ros_bag import START_S, Bag, about_z, pointing_down
+
+PLAIN: dict[str, Any] = {"pressure_topic": "/plain", "array": (2, 2, 2)}
+HAND: dict[str, Any] = {**PLAIN, "pressure_topic": "/hand", "pressure_field": "fingers.taxels", "pressure_unit": "raw"}
+
 
 def readings(i: int) -> numpy.ndarray:
     return numpy.array([i + 0.5, 0.25, 3, i], dtype=numpy.float32)
@@ -29,33 +33,33 @@ def write_log(path: pathlib.Path, storage: str) -> pathlib.Path:
     Messages arrive 5 ms after their time. Transforms come between the frames.
     """
     bag = Bag(path, storage)
-    moving = "geometry_msgs/msg/TransformStamped"
-    flange = bag.of(moving, bag.header(0.0, "arm"), "/array", bag.pose("Transform", 0, 0, -0.02, pointing_down(0)))
-    cup = bag.of(moving, bag.header(0.0, "base"), "cup", bag.pose("Transform", 0.6, 0.1, 0, about_z(0.3)))
-    array = "tf2_msgs/msg/TFMessage"
-    bag.write("/tf_static", bag.of(array, [flange, cup]), START_S)
+    flange = bag.edge("arm", "/array", 0.0, 0, 0, -0.02, pointing_down(0))
+    cup = bag.edge("base", "cup", 0.0, 0.6, 0.1, 0, about_z(0.3))
+    bag.frames("/tf_static", [flange, cup], START_S)
     for k in range(11):
-        at = START_S + 0.1 * k - 0.05
-        arm = bag.pose("Transform", 0.6 + 0.01 * (k - 0.5), 0.1, 0.3, about_z(0.05 * (k - 0.5)))
-        edges = [bag.of(moving, bag.header(at, "/base"), "arm", arm)]
-        bag.write("/tf", bag.of(array, edges), at + 0.005)
+        at, steps = START_S + 0.1 * k - 0.05, k - 0.5
+        arm = bag.edge("/base", "arm", at, 0.6 + 0.01 * steps, 0.1, 0.3, about_z(0.05 * steps))
+        bag.frames("/tf", [arm], at + 0.005)
     for i in range(10):
         at = START_S + 0.1 * i
-        layout = bag.of("std_msgs/msg/MultiArrayLayout", [], 0)
-        bag.write("/plain", bag.of("std_msgs/msg/Float32MultiArray", layout, readings(i)), at)
+        bag.plain("/plain", readings(i), at)
         taxels = (100 * readings(i)).astype(numpy.uint16)
         fingers = [bag.of("lab_msgs/msg/Finger", name, part)
                    for name, part in (("a", taxels[:1]), ("b", taxels[1:]))]  # fmt: skip
         hand = bag.of("lab_msgs/msg/Hand", bag.header(at), numpy.array([7, 8], dtype=numpy.int32), fingers)
         bag.write("/hand", hand, at + 0.005)
-        pose = bag.pose("Pose", 0.6 + 0.01 * i, 0.1, 0.28, pointing_down(0.05 * i))
-        bag.write("/pose", bag.of("geometry_msgs/msg/PoseStamped", bag.header(at, "base"), pose), at + 0.005)
+        bag.stamped_pose("/pose", at, at + 0.005, 0.6 + 0.01 * i, 0.1, 0.28, pointing_down(0.05 * i))
     return bag.close()
 
 
-@pytest.fixture(params=["bag", "sqlite3", "mcap"])
-def log(request: pytest.FixtureRequest, tmp_path: pathlib.Path) -> pathlib.Path:
-    return write_log(tmp_path, request.param)
+@pytest.fixture(scope="module", params=["bag", "sqlite3", "mcap"])
+def log(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> pathlib.Path:
+    return write_log(tmp_path_factory.mktemp(request.param), request.param)
+
+
+@pytest.fixture
+def mcap(tmp_path: pathlib.Path) -> pathlib.Path:
+    return write_log(tmp_path, "mcap")
 
 
 def expect_poses(recording: palpate.Recording) -> None:
@@ -67,38 +71,29 @@ def expect_poses(recording: palpate.Recording) -> None:
     numpy.testing.assert_allclose(recording.time_s, [START_S + 0.1 * i for i in range(10)], atol=1e-6)
 
 
-def test_frames_take_the_chain_of_transforms(log: pathlib.Path) -> None:
-    with pytest.warns(UserWarning) as said:
-        recording = read_bag(
-            log, pressure_topic="/hand", pressure_field="fingers.taxels", tf=("base", "array"),
-            truth_tf=("base", "cup"), array=(2, 2, 2), pressure_unit="raw", object="cup",
-        )  # fmt: skip
+def test_frames_take_the_chain_of_transforms(log: pathlib.Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    frames: dict[str, Any] = {**HAND, "tf": ("base", "array"), "truth_tf": ("base", "cup"), "object": "cup"}
+    recording, said = warned(read_bag, log, **frames)
     expect_poses(recording)
     assert recording.pressure.tolist() == [(100 * readings(i)).astype(int).tolist() for i in range(10)]
     assert recording.truth is not None and recording.object == "cup" == recording.truth.object
-    numpy.testing.assert_allclose(
-        inverse(recording.truth.T_object_robot), [600, 100, 0.3], atol=1e-9
-    )
-    assert any("its y is turned over" in str(warning.message) for warning in said)
-
-
-def inverse(pose: Any) -> list[float]:
-    x, y, theta = pose
-    c, s = math.cos(theta), math.sin(theta)
-    return [-c * x - s * y, s * x - c * y, -theta]
+    found = palpate.inverse(recording.truth.T_object_robot)
+    numpy.testing.assert_allclose(found, [600, 100, 0.3], atol=1e-9)
+    assert "its y is turned over" in said
+    monkeypatch.setattr(_bag_transforms, "_BLOCK", 4)
+    joined, _ = warned(read_bag, log, **frames)
+    for name in ("pressure", "time_s", "T_robot_sensor"):
+        assert numpy.array_equal(getattr(recording, name), getattr(joined, name)), "over blocks"
 
 
 def test_frames_take_the_poses_of_a_topic(log: pathlib.Path) -> None:
-    seen: list[float] = []
-    with pytest.warns(UserWarning) as said:
-        recording = read_bag(
-            log, pressure_topic="/plain", pose_topic="/pose", array="2:2:2", dead=(1,), progress=seen.append
-        )
+    recording, said = warned(read_bag, log, **{**PLAIN, "array": "2:2:2"}, pose_topic="/pose", dead=(1,))
     expect_poses(recording)
     assert recording.pressure.tolist() == [readings(i).tolist() for i in range(10)]
     assert recording.valid is not None and recording.valid.tolist() == [True, False, True, True]
-    words = " ".join(str(warning.message) for warning in said)
-    assert "/plain: 10 of 10 messages have no time of their own" in words
+    assert "/plain: 10 of 10 messages have no time of their own" in said
+    falling, _ = warned(read_bag, log, **PLAIN, sign=-1)
+    assert numpy.array_equal(falling.pressure, -recording.pressure)
 
 
 def test_topics_are_listed(log: pathlib.Path) -> None:
@@ -111,22 +106,26 @@ def test_topics_are_listed(log: pathlib.Path) -> None:
     assert 8.0 < found["/pose"].rate_hz < 10.0
 
 
-def test_what_a_log_lacks_is_said(log: pathlib.Path) -> None:
-    def refused(words: str, **options: Any) -> None:
-        given = {"pressure_topic": "/plain", "array": (2, 2, 2), **options}
-        with pytest.raises(palpate.Error) as error:
-            read_bag(log, **given)
-        assert str(error.value).startswith(f"{log}: ") and words in str(error.value), error.value
-
-    refused("has no topic /none; it has /hand, /plain", pressure_topic="/none")
-    refused("/pose: geometry_msgs/msg/PoseStamped has no list of numbers", pressure_topic="/pose")
-    refused("has the lists serial, fingers.taxels; name one by pressure_field", pressure_topic="/hand")
-    refused("no list of numbers taxels; it has serial", pressure_topic="/hand", pressure_field="taxels")
-    refused("/hand: lab_msgs/msg/Hand is no pose", pose_topic="/hand")
-    refused("no chain of transforms joins these frames; the log has arm, array, base", tf=("base", "head"))
-    refused("has 4 readings a frame for an array of 6 elements; correct array", array=(2, 3, 2))
-    with pytest.raises(palpate.Error, match="both say where the sensor is"):
-        read_bag(log, pressure_topic="/plain", array=(2, 2, 2), pose_topic="/p", tf=("a", "b"))
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"pressure_topic": "/none"}, "has no topic /none; it has /hand, /plain"),
+        ({"pressure_topic": "/pose"}, "/pose: geometry_msgs/msg/PoseStamped has no list of numbers"),
+        ({"pressure_topic": "/hand"}, "has the lists serial, fingers.taxels; name one by pressure_field"),
+        ({"pressure_topic": "/hand", "pressure_field": "taxels"}, "no list of numbers taxels; it has serial"),
+        ({"pose_topic": "/hand"}, "/hand: lab_msgs/msg/Hand is no pose"),
+        ({"tf": ("base", "head")}, "no chain of transforms joins these frames; the log has arm, array, base"),
+        ({"tf": ("array", "head")}, "tf array:head: no chain"),
+        ({"array": (2, 3, 2)}, "has 4 readings a frame for an array of 6 elements; correct array"),
+        ({"pose_topic": "/p", "tf": ("a", "b")}, "both say where the sensor is"),
+        ({"tf": ("base", "array"), "pose_delay": math.nan}, "pose_delay="),
+        ({"tf": ("base", "array"), "largest_gap_s": -1.0}, "largest_gap_s="),
+    ],
+)
+def test_what_a_log_lacks_is_said(log: pathlib.Path, options: dict[str, Any], words: str) -> None:
+    said = error_of(read_bag, log, **{**PLAIN, **options})
+    assert words in said
+    assert said.startswith(f"{log}: ") or "pose_topic" in said or "give seconds" in said
 
 
 @pytest.mark.parametrize("storage", ["bag", "mcap"])
@@ -134,8 +133,8 @@ def test_known_types_need_no_field(tmp_path: pathlib.Path, storage: str) -> None
     bag = Bag(tmp_path, storage)
     for i in range(2):
         at, row = START_S + i, readings(i)
-        channels = [bag.of("sensor_msgs/msg/ChannelFloat32", "a", row[:3]),
-                    bag.of("sensor_msgs/msg/ChannelFloat32", "b", row[3:])]  # fmt: skip
+        channels = [bag.of("sensor_msgs/msg/ChannelFloat32", name, part)
+                    for name, part in (("a", row[:3]), ("b", row[3:]))]  # fmt: skip
         bag.write("/state", bag.of("tactile_msgs/msg/TactileState", bag.header(at), channels), at)
         bag.write("/takktile", bag.of("takktile_ros/msg/Touch", row, 0 * row), at)
         taxels = [bag.of("xela_server_ros2/msg/Taxel", 1, 2, int(10 * value)) for value in row]
@@ -145,25 +144,21 @@ def test_known_types_need_no_field(tmp_path: pathlib.Path, storage: str) -> None
     log = bag.close()
     assert {topic.guess for topic in topics(log)} == {"pressures"}
     for topic, factor in (("/state", 1), ("/takktile", 1), ("/xela", 10)):
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            recording = read_bag(log, pressure_topic=topic, array=(2, 2, 2))
+        recording, _ = warned(read_bag, log, **{**PLAIN, "pressure_topic": topic})
         expected = [[int(10 * v) if factor == 10 else float(v) for v in readings(i)] for i in range(2)]
         assert recording.pressure.tolist() == expected
         assert numpy.isnan(recording.T_robot_sensor).all()
-    with pytest.raises(palpate.Error, match="has no list of numbers pressures; it has pressure, temp"):
-        read_bag(log, pressure_topic="/takktile", pressure_field="pressures", array=(2, 2, 2))
+    said = error_of(read_bag, log, **{**PLAIN, "pressure_topic": "/takktile"}, pressure_field="pressures")
+    assert "has no list of numbers pressures; it has pressure, temp" in said
 
 
 def test_every_kind_of_pose_is_read(tmp_path: pathlib.Path) -> None:
     bag = Bag(tmp_path, "sqlite3")
-    layout = bag.of("std_msgs/msg/MultiArrayLayout", [], 0)
     covariance = numpy.zeros(36)
     zero = bag.of("geometry_msgs/msg/Vector3", 0, 0, 0)
     for i in range(3):
-        at = START_S + i
-        pose, transform = (bag.pose(kind, 0.1 * i, 0.2, 0, about_z(0.1 * i)) for kind in ("Pose", "Transform"))
-        header = bag.header(at, "base")
+        at, place = START_S + i, (0.1 * i, 0.2, 0, about_z(0.1 * i))
+        pose, header = bag.pose("Pose", *place), bag.header(at, "base")
         with_covariance = bag.of("geometry_msgs/msg/PoseWithCovariance", pose, covariance)
         twist = bag.of("geometry_msgs/msg/Twist", zero, zero)
         moving = bag.of("geometry_msgs/msg/TwistWithCovariance", twist, covariance)
@@ -172,66 +167,38 @@ def test_every_kind_of_pose_is_read(tmp_path: pathlib.Path) -> None:
             "/stamped": bag.of("geometry_msgs/msg/PoseStamped", header, pose),
             "/covariance": bag.of("geometry_msgs/msg/PoseWithCovarianceStamped", header, with_covariance),
             "/odometry": bag.of("nav_msgs/msg/Odometry", header, "array", with_covariance, moving),
-            "/transform": bag.of("geometry_msgs/msg/TransformStamped", header, "array", transform),
-            "/plain": bag.of("std_msgs/msg/Float32MultiArray", layout, readings(i)),
+            "/transform": bag.edge("base", "array", at, *place),
         }.items():
             bag.write(topic, message, at)
+        bag.plain("/plain", readings(i), at)
     log = bag.close()
     for topic in ("/pose", "/stamped", "/covariance", "/odometry", "/transform"):
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            recording = read_bag(log, pressure_topic="/plain", pose_topic=topic, array=(2, 2, 2))
+        recording, _ = warned(read_bag, log, **PLAIN, pose_topic=topic)
         expected = [[100 * i, 200, 0.1 * i] for i in range(3)]
         numpy.testing.assert_allclose(recording.T_robot_sensor, expected, atol=1e-4, err_msg=topic)
 
 
 def test_frames_in_a_gap_of_transforms_have_no_pose(tmp_path: pathlib.Path) -> None:
     bag = Bag(tmp_path, "mcap")
-    layout = bag.of("std_msgs/msg/MultiArrayLayout", [], 0)
     for k in range(101):  # every 10 ms but for 0.4 s in the middle
         if not 30 < k < 70:
             at = START_S + 0.01 * k
-            arm = bag.pose("Transform", 0.01 * k, 0, 0, about_z(0))
-            edge = bag.of("geometry_msgs/msg/TransformStamped", bag.header(at, "base"), "array", arm)
-            other = bag.of("geometry_msgs/msg/TransformStamped", bag.header(at, "base"), "other", arm)
-            bag.write("/tf", bag.of("tf2_msgs/msg/TFMessage", [other, edge]), at)
+            edges = [bag.edge("base", child, at, 0.01 * k, 0, 0, about_z(0)) for child in ("other", "array")]
+            bag.frames("/tf", edges, at)
     for i in range(6):  # slower than the transforms
-        bag.write("/plain", bag.of("std_msgs/msg/Float32MultiArray", layout, readings(i)), START_S + 0.2 * i)
+        bag.plain("/plain", readings(i), START_S + 0.2 * i)
     log = bag.close()
     [file] = log.glob("*.mcap")
-    with pytest.warns(UserWarning, match="2 of 6 frames have no pose"):
-        recording = read_bag(file, pressure_topic="/plain", tf=("base", "array"), array=(2, 2, 2))
+    recording, said = warned(read_bag, file, **PLAIN, tf=("base", "array"))
+    assert "2 of 6 frames have no pose" in said
     known = ~numpy.isnan(recording.T_robot_sensor[:, 0])
     assert known.tolist() == [True, True, False, False, True, True]
     numpy.testing.assert_allclose(recording.T_robot_sensor[known, 0], [0, 200, 800, 1000], atol=1e-3)
     alone = tmp_path / "alone.mcap"
     alone.write_bytes(file.read_bytes())
     assert [topic.name for topic in topics(alone)] == ["/plain", "/tf"], "without its folder"
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        wide = read_bag(
-            log, pressure_topic="/plain", tf=("base", "array"), array=(2, 2, 2), largest_gap_s=1
-        )
+    wide, _ = warned(read_bag, log, **PLAIN, tf=("base", "array"), largest_gap_s=1)
     numpy.testing.assert_allclose(wide.T_robot_sensor[:, 0], [200 * i for i in range(6)], atol=1e-3)
-    for name, value in (("pose_delay", math.nan), ("largest_gap_s", -1.0)):
-        with pytest.raises(palpate.Error, match=f"{name}=.*give seconds"):
-            read_bag(
-                log, pressure_topic="/plain", tf=("base", "array"), array=(2, 2, 2), **{name: value}
-            )
-    with pytest.raises(palpate.Error, match="tf array:cup: no chain"):
-        read_bag(log, pressure_topic="/plain", tf=("array", "cup"), array=(2, 2, 2))
-
-
-def test_chains_join_over_blocks(log: pathlib.Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    given: dict[str, Any] = {"pressure_topic": "/hand", "pressure_field": "fingers.taxels", "array": (2, 2, 2)}
-    given |= {"tf": ("base", "array"), "truth_tf": ("base", "cup"), "pressure_unit": "raw"}
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        whole = read_bag(log, **given)
-        monkeypatch.setattr(_bag_transforms, "_BLOCK", 4)
-        joined = read_bag(log, **given)
-    for name in ("pressure", "time_s", "T_robot_sensor"):
-        assert numpy.array_equal(getattr(whole, name), getattr(joined, name)), name
 
 
 def test_frames_come_in_the_order_of_their_times(tmp_path: pathlib.Path) -> None:
@@ -240,25 +207,13 @@ def test_frames_come_in_the_order_of_their_times(tmp_path: pathlib.Path) -> None
         finger = bag.of("lab_msgs/msg/Finger", "a", numpy.full(4, k, dtype=numpy.uint16))
         serial = numpy.array([7, 8], dtype=numpy.int32)
         bag.write("/hand", bag.of("lab_msgs/msg/Hand", bag.header(START_S + k), serial, [finger]), START_S + i)
-    recording = read_bag(
-        bag.close(), pressure_topic="/hand", pressure_field="fingers.taxels", array=(2, 2, 2), pressure_unit="raw"
-    )
+    recording = read_bag(bag.close(), **HAND)
     assert recording.pressure.tolist() == [[float(k)] * 4 for k in range(10)]
 
 
-def test_readings_that_fall_are_turned(log: pathlib.Path) -> None:
-    given: dict[str, Any] = {"pressure_topic": "/plain", "array": (2, 2, 2)}
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        rising, falling = read_bag(log, **given), read_bag(log, **given, sign=-1)
-    assert numpy.array_equal(falling.pressure, -rising.pressure)
-
-
-def test_only_wanted_transforms_are_kept(tmp_path: pathlib.Path) -> None:
-    log = write_log(tmp_path, "mcap")
-
+def test_only_wanted_transforms_are_kept(mcap: pathlib.Path) -> None:
     def kept(target: str, source: str) -> dict[str, int]:
-        with _bag_messages.opened(str(log)) as bag:
+        with _bag_messages.opened(str(mcap)) as bag:
             tree = bag.transforms([(target, source)])
             bag.read([tree], None)
         return {name: len(edge.rows) // 7 for name, edge in tree.edges.items()}
@@ -268,114 +223,84 @@ def test_only_wanted_transforms_are_kept(tmp_path: pathlib.Path) -> None:
     assert kept("base", "cup") == {"array": 1, "arm": 0, "cup": 1}
 
 
-@pytest.mark.parametrize("from_tf", [True, False])
-def test_a_delay_of_the_poses_is_taken_from_their_times(log: pathlib.Path, from_tf: bool) -> None:
-    poses: dict[str, Any] = {"tf": ("base", "array")} if from_tf else {"pose_topic": "/pose"}
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        recording = read_bag(log, pressure_topic="/plain", array=(2, 2, 2), pose_delay=0.02, **poses)
+@pytest.mark.parametrize("poses", [{"tf": ("base", "array")}, {"pose_topic": "/pose"}])
+def test_a_delay_of_the_poses_is_taken_from_their_times(log: pathlib.Path, poses: dict[str, Any]) -> None:
+    recording, _ = warned(read_bag, log, **PLAIN, pose_delay=0.02, **poses)
     # The arm moves by 10 mm in 0.1 s.
-    numpy.testing.assert_allclose(
-        recording.T_robot_sensor[1:9, 0], [602 + 10 * i for i in range(1, 9)], atol=0.01
-    )
+    expected = [602 + 10 * i for i in range(1, 9)]
+    numpy.testing.assert_allclose(recording.T_robot_sensor[1:9, 0], expected, atol=0.01)
 
 
 def test_clocks_that_differ_are_said(tmp_path: pathlib.Path) -> None:
     """Ten presses of 0.4 to 0.6 s each, and 0.5 s to the next place; poses are stamped 0.4 s late."""
     bag = Bag(tmp_path, "mcap")
-    layout = bag.of("std_msgs/msg/MultiArrayLayout", [], 0)
     at, place = START_S, 0.0
     for k in range(10):
         for i in range(45 + 3 * (k * k % 5)):
             pressed = i >= 25
             place += 0.0 if pressed else 0.0003
-            values = numpy.array([9.5 * pressed, 0, 0, 0.5], dtype=numpy.float32)
-            bag.write("/plain", bag.of("std_msgs/msg/Float32MultiArray", layout, values), at)
-            arm = bag.pose("Pose", 0.6 + place, 0.1, 0.28, pointing_down(0))
-            bag.write("/pose", bag.of("geometry_msgs/msg/PoseStamped", bag.header(at + 0.4, "base"), arm), at)
+            bag.plain("/plain", [9.5 * pressed, 0, 0, 0.5], at)
+            bag.stamped_pose("/pose", at + 0.4, at, 0.6 + place, 0.1, 0.28, pointing_down(0))
             at += 0.02
     log = bag.close()
-
-    def said(**options: Any) -> str:
-        with pytest.warns(UserWarning) as warned:
-            read_bag(log, pressure_topic="/plain", array=(2, 2, 2), pose_topic="/pose", **options)
-        return " ".join(str(warning.message) for warning in warned)
-
-    assert re.search(r"/pose: the poses' clock seems 0\.(3|4)\d s ahead: .*pose_delay=0\.(3|4)", said()), said()
-    assert "clock seems" not in said(pose_delay=0.4)
+    _, said = warned(read_bag, log, **PLAIN, pose_topic="/pose")
+    assert re.search(r"/pose: the poses' clock seems 0\.(3|4)\d s ahead: .*pose_delay=0\.(3|4)", said), said
+    assert "clock seems" not in warned(read_bag, log, **PLAIN, pose_topic="/pose", pose_delay=0.4)[1]
 
 
 def test_what_a_callback_raises_is_not_the_logs_fault(tmp_path: pathlib.Path) -> None:
     bag = Bag(tmp_path, "mcap")
-    layout = bag.of("std_msgs/msg/MultiArrayLayout", [], 0)
     for i in range(1000):
-        bag.write("/plain", bag.of("std_msgs/msg/Float32MultiArray", layout, readings(i)), START_S + i)
+        bag.plain("/plain", readings(i), START_S + i)
     log = bag.close()
 
     def stop(fraction: float) -> None:
         raise ValueError(f"at {fraction}")
 
     with pytest.raises(ValueError, match="at 1.0"):
-        read_bag(log, pressure_topic="/plain", array=(2, 2, 2), progress=stop)
+        read_bag(log, **PLAIN, progress=stop)
 
 
-def test_a_log_that_is_cut_off_is_said(tmp_path: pathlib.Path) -> None:
+def test_a_log_that_is_cut_off_or_not_there_is_said(tmp_path: pathlib.Path, mcap: pathlib.Path) -> None:
     log = write_log(tmp_path, "bag")
     log.write_bytes(log.read_bytes()[:3000])
-    with pytest.raises(palpate.Error, match="log.bag: cannot be read as a bag"):
-        topics(log)
-    folder = write_log(tmp_path, "mcap")
-    [storage] = folder.glob("*.mcap")
-    storage.write_bytes(storage.read_bytes()[:200])
-    with pytest.raises(palpate.Error, match="mcap: cannot be read as a bag"):
-        topics(folder)
-    with pytest.raises(palpate.Error, match="none.bag: no such file"):
-        topics(tmp_path / "none.bag")
-
-
-def test_a_length_beyond_all_memory_is_said(tmp_path: pathlib.Path) -> None:
-    folder = write_log(tmp_path, "mcap")
-    [storage] = folder.glob("*.mcap")
+    assert "log.bag: cannot be read as a bag" in error_of(topics, log)
+    [storage] = mcap.glob("*.mcap")
     whole = storage.read_bytes()
-    storage.write_bytes(whole[:9] + struct.pack("<Q", 1 << 62) + whole[17:])  # of the first record
-    with pytest.raises(palpate.Error, match=r"mcap: cannot be read as a bag \(a part of it does not fit"):
-        topics(folder)
+    storage.write_bytes(whole[:200])
+    assert "mcap: cannot be read as a bag" in error_of(topics, mcap)
+    storage.write_bytes(whole[:9] + struct.pack("<Q", 1 << 62) + whole[17:])  # the length of the first record
+    assert "mcap: cannot be read as a bag (a part of it does not fit" in error_of(topics, mcap)
+    assert "none.bag: no such file" in error_of(topics, tmp_path / "none.bag")
 
 
-def test_the_program_writes_what_the_function_returns(tmp_path: pathlib.Path) -> None:
-    log = write_log(tmp_path, "mcap")
+def test_the_program_writes_what_the_function_returns(mcap: pathlib.Path, tmp_path: pathlib.Path) -> None:
+    def run(*arguments: object) -> Done:
+        return run_program(main, *arguments)
 
-    def run(*arguments: object) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(
-            [sys.executable, "-m", "palpate.bag", *map(str, arguments)], capture_output=True, text=True
-        )
-
-    listed = run(log, "--list")
+    listed = subprocess.run([sys.executable, "-m", "palpate.bag", mcap, "--list"], capture_output=True, text=True)
     assert listed.returncode == 0 and "lab_msgs/msg/Hand" in listed.stdout, listed.stderr
     file = tmp_path / "f.h5"
     flags = ("--pressure-topic", "/plain", "--array", "2:2:2", "--tf", "base:array", "--plane", "0,0,1")
-    done = run(log, *flags, "-o", file)
-    assert done.returncode == 0, done.stderr
-    assert "10 frames of 4 elements, 10 with a pose; next: palpate touches" in done.stdout
-    assert "palpate.bag: " in done.stderr
+    done = run(mcap, *flags, "-o", file)
+    assert done.status == 0, done.err
+    assert "10 frames of 4 elements, 10 with a pose; next: palpate touches" in done.out
+    assert "palpate.bag: " in done.err
     expect_poses(palpate.read_recording(file))
-    unposed = run(log, *flags[:4], "-o", tmp_path / "unposed.h5")
-    assert "none with a pose, as neither --tf nor --pose-topic is given" in unposed.stdout
+    unposed = run(mcap, *flags[:4], "-o", tmp_path / "unposed.h5")
+    assert "none with a pose, as neither --tf nor --pose-topic is given" in unposed.out
     for arguments, words in (
-        ((log,), "--pressure-topic: missing; --list shows"),
-        ((log, *flags), "--output: missing"),
-        ((log, *flags, "--tf", "base", "-o", file), "--tf base: give two frames, TARGET:SOURCE"),
+        ((mcap,), "--pressure-topic: missing; --list shows"),
+        ((mcap, *flags), "--output: missing"),
+        ((mcap, *flags, "--tf", "base", "-o", file), "--tf base: give two frames, TARGET:SOURCE"),
         ((tmp_path / "none.bag", "--list"), "none.bag: no such file"),
-        ((log, *flags, "-o", tmp_path), ": cannot be written; give a file in a folder that exists"),
-        ((log, *flags, "-o", tmp_path / "none" / "f.h5"), ": cannot be written; give a file"),
-        ((log, *flags, "--array", "2:3:2", "-o", file), "array of 6 elements; correct --array\n"),
-        ((log, *flags, "--tf", "base:head", "-o", file), ": --tf base:head: no chain of transforms"),
-        (
-            (log, "--pressure-topic", "/hand", *flags[2:], "-o", file),
-            "name one by --pressure-field\n",
-        ),
+        ((mcap, *flags, "-o", tmp_path), ": cannot be written; give a file in a folder that exists"),
+        ((mcap, *flags, "-o", tmp_path / "none" / "f.h5"), ": cannot be written; give a file"),
+        ((mcap, *flags, "--array", "2:3:2", "-o", file), "array of 6 elements; correct --array\n"),
+        ((mcap, *flags, "--tf", "base:head", "-o", file), ": --tf base:head: no chain of transforms"),
+        ((mcap, "--pressure-topic", "/hand", *flags[2:], "-o", file), "name one by --pressure-field\n"),
     ):
         wrong = run(*arguments)
-        assert wrong.returncode == 2 and words in wrong.stderr, wrong.stderr
-        assert wrong.stderr.count("\n") == 1
-    assert os.path.exists(file)
+        assert wrong.status == 2 and words in wrong.err, wrong.err
+        assert wrong.err.count("\n") == 1
+    assert file.exists()

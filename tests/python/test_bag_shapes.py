@@ -1,19 +1,19 @@
-"""Bags whose messages hold pads of several fingers, poses in fields of their own, and flags."""
+"""Bags whose messages hold pads of several fingers, poses in fields of their own, and flags; and frames that
+move although they should not."""
 
 import math
 import pathlib
-import subprocess
-import sys
-import warnings
 from typing import Any
 
 import numpy
 import pytest
 from backports import zstd
+from conftest import error_of, warned
+from program import run_program
 
 import palpate
 from palpate import read_bag
-from palpate.bag import topics
+from palpate.bag import main, topics
 
 from ros_bag import START_S, Bag, about_z
 
@@ -27,7 +27,6 @@ def matrix(x: float, theta: float, by_rows: bool) -> numpy.ndarray:
 def write_states(path: pathlib.Path, by_rows: bool = False, skewed: int = -1) -> pathlib.Path:
     """Five states of a hand with a pad of two elements on each of two fingers, and a palm of one."""
     bag = Bag(path, "mcap")
-    layout = bag.of("std_msgs/msg/MultiArrayLayout", [], 0)
     for i in range(5):
         at = START_S + 0.1 * i
         pads = [bag.of("lab_msgs/msg/Pad", name, numpy.array([i, first + i], dtype=numpy.float32),
@@ -37,102 +36,136 @@ def write_states(path: pathlib.Path, by_rows: bool = False, skewed: int = -1) ->
         pose[0] += 1.0 if i == skewed else 0.0
         tool = bag.pose("Pose", 0.1 * i, 0.2, 0.1, about_z(0.1 * i))
         bag.write("/state", bag.of("lab_msgs/msg/State", bag.header(at), pose, tool, pads), at)
-        palm = numpy.array([7 + i], dtype=numpy.float32)
-        bag.write("/palm", bag.of("std_msgs/msg/Float32MultiArray", layout, palm), at + 0.01)
+        bag.plain("/palm", [7 + i], at + 0.01)
     return bag.close()
 
 
-def read(log: pathlib.Path, **options: Any) -> tuple[palpate.Recording, str]:
-    given: dict[str, Any] = {"pressure_topic": "/state", "array": (2, 1, 2), "pressure_field": "pads[left].values"}
-    with warnings.catch_warnings(record=True) as said:
-        warnings.simplefilter("always")
-        recording = read_bag(log, **{**given, **options})
-    return recording, " ".join(str(warning.message) for warning in said)
+STATE: dict[str, Any] = {"pressure_topic": "/state", "array": (2, 1, 2), "pressure_field": "pads[left].values"}
+
+
+def read(log: pathlib.Path, **options: Any) -> palpate.Recording:
+    recording: palpate.Recording = warned(read_bag, log, **{**STATE, **options})[0]
+    return recording
 
 
 @pytest.mark.parametrize("key, first", [("left", 10), ("1", 20), ("right", 20)])
 def test_one_part_of_a_list_is_read(tmp_path: pathlib.Path, key: str, first: int) -> None:
-    recording, said = read(write_states(tmp_path), pressure_field=f"pads[{key}].values")
+    log = write_states(tmp_path)
+    recording, said = warned(read_bag, log, **{**STATE, "pressure_field": f"pads[{key}].values"})
     assert recording.pressure[1:].tolist() == [[i, first + i] for i in range(1, 5)]
-    unknown = numpy.isnan(recording.pressure[0]).tolist()
-    assert unknown == [False, first == 20], "by its flags"
+    assert numpy.isnan(recording.pressure[0]).tolist() == [False, first == 20], "by its flags"
     assert ("1 readings are unknown by their flags pads" in said) == (first == 20)
 
 
-def test_parts_that_a_list_lacks_are_named(tmp_path: pathlib.Path) -> None:
-    log = write_states(tmp_path)
-    for key, words in (("thumb", "no item has this name or frame; the list has left, right"),
-                       ("2", "the list has 2 items, counted from 0")):  # fmt: skip
-        with pytest.raises(palpate.Error, match=f"/state: pads.*: .{key}.: {words}"):
-            read(log, pressure_field=f"pads[{key}].values")
-
-
 def test_pads_on_two_topics_are_one_array(tmp_path: pathlib.Path) -> None:
-    elements = numpy.array([[-1.0, 0], [1, 0], [9, 0]])
-    with pytest.raises(palpate.Error, match="no list of numbers pads.left..values"):
-        read(write_states(tmp_path), pressure_topic=["/state", "/palm"], array=elements)
-    bag = Bag(tmp_path / "two", "mcap")
-    layout = bag.of("std_msgs/msg/MultiArrayLayout", [], 0)
+    bag = Bag(tmp_path, "mcap")
     for i in range(4):
-        for topic, late_s, values in (("/left", 0.0, [i, i]), ("/palm", 0.01, [5 + i])):
-            if topic == "/left" or i < 2:
-                row = numpy.array(values, dtype=numpy.float32)
-                bag.write(topic, bag.of("std_msgs/msg/Float32MultiArray", layout, row), START_S + i + late_s)
-    recording, _ = read(bag.close(), pressure_topic=["/left", "/palm"], pressure_field=None, array=elements)
+        bag.plain("/left", [i, i], START_S + i)
+        if i < 2:
+            bag.plain("/palm", [5 + i], START_S + i + 0.01)
+    hand = {"pressure_topic": ["/left", "/palm"], "pressure_field": None, "array": [[-1.0, 0], [1, 0], [9, 0]]}
+    recording = read(bag.close(), **hand)
     assert recording.pressure[:2].tolist() == [[0, 0, 5], [1, 1, 6]]
     assert numpy.isnan(recording.pressure[2:, 2]).all(), "the palm is silent"
 
 
 @pytest.mark.parametrize("by_rows", [False, True])
-@pytest.mark.parametrize("field", ["tool", "O_T_EE"])
-def test_a_field_of_the_message_is_the_pose(tmp_path: pathlib.Path, field: str, by_rows: bool) -> None:
+def test_a_field_of_the_message_is_the_pose(tmp_path: pathlib.Path, by_rows: bool) -> None:
     log = write_states(tmp_path, by_rows)
-    recording, _ = read(log, pose_topic="/state", pose_field=field)
-    numpy.testing.assert_allclose(recording.T_robot_sensor, [[100 * i, 200, 0.1 * i] for i in range(5)], atol=1e-6)
-
-
-def test_a_mount_takes_the_flange_to_the_array(tmp_path: pathlib.Path) -> None:
-    recording, _ = read(
-        write_states(tmp_path), pose_topic="/state", pose_field="tool", mount=(10, 0, 0, 0, 0, 90)
-    )
+    expected = [[100 * i, 200, 0.1 * i] for i in range(5)]
+    for field in ("tool", "O_T_EE"):
+        recording = read(log, pose_topic="/state", pose_field=field)
+        numpy.testing.assert_allclose(recording.T_robot_sensor, expected, atol=1e-6, err_msg=field)
+    mounted = read(log, pose_topic="/state", pose_field="tool", mount=(10, 0, 0, 0, 0, 90))
     expected = [[100 * i + 10 * math.cos(0.1 * i), 200 + 10 * math.sin(0.1 * i), 0.1 * i + math.pi / 2]
                 for i in range(5)]  # fmt: skip
-    numpy.testing.assert_allclose(recording.T_robot_sensor, expected, atol=1e-6)
+    numpy.testing.assert_allclose(mounted.T_robot_sensor, expected, atol=1e-6)
 
 
-def test_fields_that_are_no_pose_are_named(tmp_path: pathlib.Path) -> None:
+def test_fields_that_a_message_lacks_are_named(tmp_path: pathlib.Path) -> None:
     log = write_states(tmp_path, skewed=3)
-    for field, words in (("O_T_EE", "the matrix of message 3, counted from 0, is no rotation"),
-                         ("pads", "is no pose, no transform"),
-                         ("pose", "has no field pose; it has header, O_T_EE, tool, pads")):  # fmt: skip
-        with pytest.raises(palpate.Error, match=words):
-            read(log, pose_topic="/state", pose_field=field)
-    with pytest.raises(palpate.Error, match="name its field by pose_field"):
-        read(log, pose_topic="/state")
+    for options, words in (
+        ({"pressure_field": "pads[thumb].values"},
+         "/state: pads[thumb].values: [thumb]: no item has this name or frame; the list has left, right"),
+        ({"pressure_field": "pads[2].values"}, "/state: pads[2].values: [2]: the list has 2 items, counted from 0"),
+        ({"pressure_topic": ["/state", "/palm"]}, "no list of numbers pads[left].values"),
+        ({"pose_field": "O_T_EE"}, "the matrix of message 3, counted from 0, is no rotation"),
+        ({"pose_field": "pads"}, "is no pose, no transform"),
+        ({"pose_field": "pose"}, "has no field pose; it has header, O_T_EE, tool, pads"),
+        ({}, "name its field by pose_field"),
+    ):  # fmt: skip
+        poses = {} if "pressure_topic" in options else {"pose_topic": "/state"}
+        poses |= {"pose_field": "tool"} if "pressure_field" in options else {}
+        assert words in error_of(read_bag, log, **{**STATE, **poses, **options})
 
 
 def test_a_compressed_file_is_read_and_a_cut_one_told_how_to_be_mended(tmp_path: pathlib.Path) -> None:
     [file] = write_states(tmp_path).glob("*.mcap")
-    alone = tmp_path / "log.mcap"
+    alone, packed = tmp_path / "log.mcap", tmp_path / "log.mcap.zstd"
     alone.write_bytes(file.read_bytes())
-    packed = tmp_path / "log.mcap.zstd"
     packed.write_bytes(zstd.compress(file.read_bytes()))
-    assert read(packed)[0].pressure.tolist() == read(alone)[0].pressure.tolist()
+    assert read(packed).pressure.tolist() == read(alone).pressure.tolist()
     assert [topic.name for topic in topics(packed)] == ["/palm", "/state"]
     alone.write_bytes(file.read_bytes()[:-300])
-    with pytest.raises(palpate.Error, match="log.mcap: cannot be read as a bag .*'mcap recover .*log.mcap -o"):
-        read(alone)
+    said = error_of(read_bag, alone, **STATE)
+    assert "log.mcap: cannot be read as a bag " in said and f"'mcap recover {alone} -o" in said
     packed.write_bytes(zstd.compress(file.read_bytes())[:-100])
-    with pytest.raises(palpate.Error, match="log.mcap.zstd: cannot be read as a bag"):
-        read(packed)
+    assert "log.mcap.zstd: cannot be read as a bag" in error_of(read_bag, packed, **STATE)
 
 
-def test_the_command_takes_them(tmp_path: pathlib.Path) -> None:
-    log = write_states(tmp_path)
-    run = subprocess.run(
-        [sys.executable, "-m", "palpate.bag", log, "--pressure-topic", "/state", "--pressure-field",
-         "pads[left].values", "--pose-topic", "/state", "--pose-field", "tool", "--mount", "0,0,0,0,0,0",
-         "--array", "2:1:2", "-o", tmp_path / "f.h5"], capture_output=True, text=True,
+def test_the_program_takes_them(tmp_path: pathlib.Path) -> None:
+    done = run_program(
+        main, write_states(tmp_path), "--pressure-topic", "/state", "--pressure-field", "pads[left].values",
+        "--pose-topic", "/state", "--pose-field", "tool", "--mount", "0,0,0,0,0,0", "--array", "2:1:2",
+        "-o", tmp_path / "f.h5",
     )  # fmt: skip
-    assert run.returncode == 0, run.stderr
-    assert "5 frames of 2 elements, 5 with a pose" in run.stdout
+    assert done.status == 0, done.err
+    assert "5 frames of 2 elements, 5 with a pose" in done.out
+
+
+# Frames that move
+
+
+Edge = tuple[str, float, str, str, float, float]  #: topic, time, parent, child, x in m, theta
+
+
+def read_frames(path: pathlib.Path, edges: list[Edge], **options: Any) -> tuple[palpate.Recording, str]:
+    """Of a bag of ten frames every 0.1 s, and of transforms; and what is said."""
+    bag = Bag(path, "mcap")
+    for topic, at, parent, child, x, theta in sorted(edges, key=lambda edge: edge[1]):
+        edge = bag.edge(parent, child, START_S + at, x, 0, 0, about_z(theta))
+        bag.frames(topic, [edge], START_S + at)
+    for i in range(10):
+        bag.plain("/plain", numpy.zeros(4), START_S + 0.1 * i)
+    return warned(read_bag, bag.close(), pressure_topic="/plain", array=(2, 2, 2), tf=("base", "array"), **options)
+
+
+@pytest.mark.parametrize("still_at_s", [-1.0, 0.55, 2.0])
+@pytest.mark.parametrize("still_parent", ["base", "table"])
+def test_what_moves_in_tf_moves(tmp_path: pathlib.Path, still_at_s: float, still_parent: str) -> None:
+    moving = [("/tf", 0.1 * k - 0.05, "base", "array", 0.01 * (k - 0.5), 0.0) for k in range(11)]
+    still = ("/tf_static", still_at_s, still_parent, "array", 0.5, 0.0)
+    table = ("/tf_static", -1.0, "base", "table", 0.1, 0.0)
+    recording, said = read_frames(tmp_path, [*moving, still, table])
+    numpy.testing.assert_allclose(recording.T_robot_sensor[:, 0], [10 * i for i in range(10)], atol=1e-4)
+    assert "the frame array is in /tf_static, but moves in /tf: its transforms of /tf are taken" in said
+    assert "the frame table" not in said
+
+
+def test_what_other_frames_do_is_not_said(tmp_path: pathlib.Path) -> None:
+    still = [("/tf_static", -1.0, "base", name, 0.0, 0.0) for name in ("array", "other")]
+    _, said = read_frames(tmp_path, [*still, ("/tf", 0.0, "base", "other", 0.1, 0.0)])
+    assert "moves in /tf" not in said
+
+
+@pytest.mark.parametrize("mm, degrees, moves", [(0.9, 0.9, False), (1.1, 0.0, True), (0.0, 1.1, True)])
+def test_an_object_that_moves_has_no_truth(
+    tmp_path: pathlib.Path, mm: float, degrees: float, moves: bool
+) -> None:
+    places = [(0.2, 0.0)] * 7 + [(0.2 + 1e-3 * mm, math.radians(degrees))] * 3
+    cup = [("/tf", 0.1 * k, "base", "cup", *place) for k, place in enumerate(places)]
+    array = ("/tf_static", -1.0, "base", "array", 0.0, 0.0)
+    recording, said = read_frames(tmp_path, [array, *cup], truth_tf=("base", "cup"), object="cup")
+    words = f"the frame moves by {mm:.1f} mm and {degrees:.1f}°, so that the recording has no truth"
+    assert (words in said) == moves
+    assert (recording.truth is None) == moves and recording.object == "cup"

@@ -1,4 +1,4 @@
-"""The functions of palpate.commands give the numbers of the commands, and refuse in their words."""
+"""What is Python's own of the functions that have the numbers of commands: arguments and results."""
 
 import json
 import pathlib
@@ -7,15 +7,11 @@ from typing import Any
 
 import numpy
 import pytest
-from conftest import Files, command, comparable, expect_refused
+from conftest import Files, error_of, printed, warned
 from matplotlib.figure import Figure
 
 import palpate
-
-SMALL = ["--bins", "10x10x8"]
-
-
-# Evaluation
+from palpate import _palpate
 
 
 def record(truth: str, best: str, a: float, b: float, none: float, **more: object) -> dict[str, Any]:
@@ -36,13 +32,13 @@ RECORDS = [
 ]
 
 
-def test_an_evaluation_is_the_json_of_the_command(tmp_path: pathlib.Path) -> None:
+def test_an_evaluation_of_records_and_files_is_that_of_the_command(tmp_path: pathlib.Path) -> None:
     finite = json.loads(json.dumps(RECORDS), parse_constant=lambda _: None)
     (tmp_path / "results").mkdir()
     (tmp_path / "results" / "r.json").write_text(json.dumps(finite[:-1]))
     (tmp_path / "failed.json").write_text('{"recording": "f.h5", "touches": 0, "error": "is not there"}')
     both = [tmp_path / "results", tmp_path / "failed.json"]
-    expected = json.loads(command("evaluate", *both, "--json", "-"))
+    expected = printed("evaluate", *both)
     for results in (RECORDS, both, [both[0], palpate.Record(RECORDS[-1])]):
         given = palpate.evaluate(results)
         assert given == expected
@@ -55,6 +51,12 @@ def test_an_evaluation_is_the_json_of_the_command(tmp_path: pathlib.Path) -> Non
         assert [*zip(*accuracy.get_data(), strict=True)] == [
             (each.mean_confidence, each.accuracy) for each in scores.reliability if each.records
         ]
+    for records, words in (
+        (RECORDS[6], "records: none of 1 record"),
+        ([RECORDS[0], {"truth": {"object": "A"}}], "records: record 1: field 'best' is missing"),
+        ([3], "records: record 0 is no JSON object"),
+    ):
+        assert error_of(palpate.evaluate, records).startswith(words)
 
 
 def test_what_is_recognised_can_be_evaluated(files: Files) -> None:
@@ -73,55 +75,6 @@ def test_none_that_is_true_has_the_weight_of_the_flag_without_a_number(files: Fi
     assert flag.identity == auto.identity
 
 
-def test_what_is_no_record_with_a_truth_is_refused(tmp_path: pathlib.Path) -> None:
-    (tmp_path / "r.json").write_text(json.dumps(RECORDS[6:7]))
-    expect_refused(lambda: palpate.evaluate(tmp_path / "r.json"), "evaluate", tmp_path / "r.json")
-    with pytest.raises(palpate.Error, match="^records: none of 1 record"):
-        palpate.evaluate(RECORDS[6])
-    with pytest.raises(palpate.Error, match="^records: record 1: field 'best' is missing"):
-        palpate.evaluate([RECORDS[0], {"truth": {"object": "A"}}])
-    with pytest.raises(palpate.Error, match="^records: record 0 is no JSON object"):
-        palpate.evaluate([3])  # type: ignore[list-item]
-
-
-# Plans
-
-
-def planned(files: Files, *flags: object) -> dict[str, Any]:
-    output = command("plan", files.unknown, "--maps", files.maps, "--json", "-", *SMALL, *flags)
-    plan: dict[str, Any] = json.loads(output)
-    return plan
-
-
-def comparable_plan(plan: dict[str, Any]) -> dict[str, Any]:
-    return {**comparable(plan), "believed": comparable(plan["believed"])}
-
-
-def test_a_plan_is_the_json_of_the_command(files: Files, tmp_path: pathlib.Path) -> None:
-    fractions: list[float] = []
-    plan = palpate.plan(
-        files.unknown, files.maps, bins=(10, 10, 8), touches=2, goal="identity", samples=40,
-        plan_seed=3, progress=fractions.append,
-    )  # fmt: skip
-    flags = ["--touches", 2, "--goal", "identity", "--samples", 40, "--plan-seed", 3]
-    assert comparable_plan(plan) == comparable_plan(planned(files, "--candidates", "grid", *flags))
-    assert not any("--" in warning for warning in [*plan.get("warnings", ()), *plan.believed.get("warnings", ())])
-    assert len(plan.candidates) > 50 and fractions[-1] == 1
-    first = plan.candidates[0]
-    assert plan.T_robot_sensor[0].tolist() == [first.x_mm, first.y_mm, first.theta_rad]
-    assert repr(plan.believed).startswith("Record(")
-
-    hurried = palpate.plan(files.unknown, files.maps, bins="fine", touches=1, budget_ms=1e-6)
-    assert hurried.believed.dropped_mass > 1e-5 and hurried.device == "none"
-
-    table = tmp_path / "poses.csv"
-    table.write_text("x,y,theta\n0,0,0\n5,-3,1\n40,40,0\n")
-    expected = planned(files, "--candidates", table, "--touches", 3)
-    with pytest.warns(UserWarning, match="poses taken to be in mm and rad"):
-        plan = palpate.plan(files.unknown, files.maps, candidates=table, bins=(10, 10, 8), touches=3)
-    assert comparable_plan(plan) == comparable_plan(expected)
-
-
 def test_a_plan_takes_arrays_and_maps_in_memory(files: Files, device: palpate.Device) -> None:
     maps = [palpate.read_map(path) for path in sorted(files.maps.iterdir())]
     unknown = palpate.read_recording(files.unknown)
@@ -131,92 +84,43 @@ def test_a_plan_takes_arrays_and_maps_in_memory(files: Files, device: palpate.De
     )
     assert plan.believed.mode["map"] == "map 'E'"
     assert numpy.array_equal(plan.T_robot_sensor, poses[[one.index for one in plan.candidates]])
+    hurried = palpate.plan(files.unknown, files.maps, bins="fine", touches=1, budget_ms=1e-6)
+    assert hurried.believed.dropped_mass > 1e-5 and hurried.device == "none"
 
 
-def test_a_plan_is_refused_in_the_words_of_the_command(files: Files) -> None:
-    expect_refused(
-        lambda: palpate.plan(files.unknown, files.maps, samples=1),
-        "plan", files.unknown, "--maps", files.maps, "--candidates", "grid", "--samples", 1,
-    )  # fmt: skip
-
-
-def test_candidates_that_are_no_poses_are_refused(files: Files) -> None:
-    cases: list[tuple[Any, str]] = [
+@pytest.mark.parametrize(
+    ("candidates", "words"),
+    [
         (numpy.zeros((2, 2)), r"candidates: shape \(2, 2\); give \(n, 3\)"),
         (numpy.zeros((0, 3)), "^candidates: holds no pose"),
         ([[numpy.nan, 0, 0]], "^candidates: pose 0 .* is unknown or out of reach"),
-    ]
-    for candidates, message in cases:
-        with pytest.raises(palpate.Error, match=message):
-            palpate.plan(files.unknown, files.maps, candidates=candidates)
-    with pytest.raises(TypeError, match="not list"):  # a plan is of one recording
-        palpate.plan([files.unknown], files.maps)  # type: ignore[arg-type]
-    with pytest.raises(TypeError, match="unexpected keyword argument 'each_frame'"):
-        palpate.plan(files.unknown, files.maps, each_frame=True)  # type: ignore[call-arg]
+    ],
+)
+def test_candidates_that_are_no_poses_are_refused(files: Files, candidates: Any, words: str) -> None:
+    assert re.search(words, error_of(palpate.plan, files.unknown, files.maps, candidates=candidates))
 
 
-# Calibration
-
-
-@pytest.fixture(scope="module")
-def presses(tmp_path_factory: pytest.TempPathFactory) -> list[pathlib.Path]:
-    """Ten touches of each of two letters, all over them."""
-    folder = tmp_path_factory.mktemp("presses")
-    paths = []
-    for letter in "AU":
-        palpate.simulate(letter, palpate.training_grid()[::19]).save(folder / f"{letter}.h5")
-        paths.append(folder / f"{letter}.h5")
-    return paths
-
-
-def test_a_calibration_is_that_of_the_command(
-    presses: list[pathlib.Path], tmp_path: pathlib.Path
-) -> None:
-    flags = ["--bins", "6x6x6", "--theta-deg", "0:180", "--levels", 3]
-    said = command("calibrate", *presses, "-o", tmp_path / "command.yaml", *flags)
-    fractions: list[float] = []
-    given = palpate.calibrate(
-        [presses[0], palpate.read_recording(presses[1])],
-        bins=(6, 6, 6), theta_deg=(0, 180), levels=3, progress=fractions.append,
-    )  # fmt: skip
-    given.sensor.save(tmp_path / "module.yaml")
-    assert (tmp_path / "module.yaml").read_bytes() == (tmp_path / "command.yaml").read_bytes()
-    rows = re.findall(r"^log-loss, nats +(.*)$", said, re.MULTILINE)
-    for row, scores in zip(rows, (given, given.groups), strict=True):
-        told = (scores.before, scores.table, scores.after)
-        assert row.split() == [f"{one.log_loss:.3f}" for one in told]
-    assert given.objects == 2 and fractions == sorted(fractions) and fractions[-1] == 1
-    assert repr(given) == f"SensorCalibration(2 objects, {given.after.right} of {given.after.records} touches right)"
-    assert json.loads(json.dumps(given)) == given and given.tried[0].layer == "mean_level"
-    sensor = given.sensor
-    levels = len(sensor.level_edges) + 2
-    assert sensor.layer == "mean_level" and sensor.log_likelihood.shape == (levels, 49)
-    assert numpy.allclose(numpy.exp(sensor.log_likelihood).sum(axis=0), 1)
-    lines = given.plot(Figure().add_subplot()).lines
-    assert numpy.allclose(sum(line.get_ydata() for line in lines), 1)
-    assert [*lines[0].get_xdata()[[0, -1]]] == [-8, 8] and len(lines) == levels
-    assert sensor.stranger_sd is None
+def test_arguments_of_another_type_are_refused(files: Files, presses: list[pathlib.Path]) -> None:
+    calls: list[tuple[Any, list[Any], dict[str, Any], str]] = [
+        (palpate.plan, [[files.unknown], files.maps], {}, "not list"),  # a plan is of one recording
+        (palpate.plan, [files.unknown], {"each_frame": True}, "unexpected keyword argument 'each_frame'"),
+        (palpate.calibrate, [presses], {"bins": "auto"}, "bins: 'auto'; give counts"),
+        (palpate.learn_maps, [presses], {"cell_mm": "wide"}, r"^cell_mm: 'wide'; give float \| None"),
+        (palpate.check_setup, [presses], {"psf_mm": 1.0}, "'psf_mm'; give spread_mm, half of it"),
+        (palpate.import_tables, [files.folder / "p.csv"], {"array": (2, 2, 1), "rate": "fast"},
+         "rate: 'fast'; give float"),
+    ]  # fmt: skip
+    for call, arguments, options, words in calls:
+        with pytest.raises(TypeError, match=words):
+            call(*arguments, **options)
 
 
 def test_calibrations_that_cannot_be_are_refused(presses: list[pathlib.Path]) -> None:
-    expect_refused(
-        lambda: palpate.calibrate(presses, unposed=True, x_mm=(-1, 1)),
-        "calibrate", *presses, "-o", presses[0].with_name("s.yaml"), "--unposed", "--x-mm=-1:1",
-        spelled={"--bins, --x-mm, --y-mm, --theta-deg and --pivot-mm":
-                 "bins=, x_mm=, y_mm=, theta_deg= and pivot_mm="},
-    )  # fmt: skip
-    for options, message in [
-        ({"layer": "both"}, "^layer='both'"), ({"levels": 1}, "^levels=1"), ({"max_maps": 0}, "^max_maps=0"),
-        ({"group": "day"}, "^group='day'"), ({"ratio": 1}, "^ratio=1"),
-    ]:  # fmt: skip
-        with pytest.raises(palpate.Error, match=message):
-            palpate.calibrate(presses, **options)  # type: ignore[arg-type]
-    with pytest.raises(TypeError, match="bins: 'auto'; give counts"):
-        palpate.calibrate(presses, bins="auto")  # type: ignore[arg-type]
-    with pytest.raises(palpate.Error, match=r"^recordings\[0\]: attribute 'object' is empty"):
-        recording = palpate.read_recording(presses[0])
-        palpate.calibrate(palpate.Recording(recording.pressure, recording.T_robot_sensor,
-                                            recording.elements_mm))  # fmt: skip
+    for option, value in {"layer": "both", "levels": 1, "max_maps": 0, "group": "day", "ratio": 1}.items():
+        assert error_of(palpate.calibrate, presses, **{option: value}).startswith(f"{option}={value!r}")
+    touches = palpate.read_recording(presses[0])
+    unnamed = palpate.Recording(touches.pressure, touches.T_robot_sensor, touches.elements_mm)
+    assert error_of(palpate.calibrate, unnamed).startswith("recordings[0]: attribute 'object' is empty")
 
 
 def test_a_calibration_can_be_given_up(presses: list[pathlib.Path]) -> None:
@@ -225,6 +129,30 @@ def test_a_calibration_can_be_given_up(presses: list[pathlib.Path]) -> None:
 
     with pytest.raises(KeyboardInterrupt):
         palpate.calibrate(presses, progress=give_up)
+
+
+def test_a_learned_sensor_is_drawn(presses: list[pathlib.Path]) -> None:
+    calibration = palpate.calibrate(presses, bins=(6, 6, 6), theta_deg=(0, 180), levels=3)
+    sensor = calibration.sensor
+    levels = len(sensor.level_edges) + 2
+    assert sensor.layer == "mean_level" and sensor.log_likelihood.shape == (levels, 49)
+    assert numpy.allclose(numpy.exp(sensor.log_likelihood).sum(axis=0), 1)
+    lines = calibration.plot(Figure().add_subplot()).lines
+    assert numpy.allclose(sum(line.get_ydata() for line in lines), 1)
+    assert [*lines[0].get_xdata()[[0, -1]]] == [-8, 8] and len(lines) == levels
+    assert sensor.stranger_sd is None
+
+
+def test_options_that_learn_maps_shares_with_recognition_are_those_of_its_table() -> None:
+    shared = {"threshold", "ratio", "sensor_model", "touch_sd_mm", "touch_sd_deg", "frames", "device"}
+    assert set(_palpate.Request.options()) >= shared
+    assert palpate.learn_maps.__kwdefaults__.keys() >= shared
+
+
+def test_what_the_command_warns_of_is_a_warning() -> None:
+    recording = palpate.simulate("A", numpy.zeros((5, 3)), seed=1)
+    _, said = warned(palpate.learn_maps, recording, sensor_model="none")
+    assert re.search("all 5 touches are at one pose.*give unposed=", said)
 
 
 def test_the_programs_of_the_guide_run(

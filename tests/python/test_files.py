@@ -1,4 +1,4 @@
-"""Files, beside h5py and in threads."""
+"""Files, beside h5py and in threads; and streams of frames."""
 
 import os
 import pathlib
@@ -9,6 +9,7 @@ from typing import Any
 import h5py
 import numpy
 import pytest
+from conftest import error_of
 
 import palpate
 
@@ -38,36 +39,32 @@ def test_a_recording_comes_back_as_it_was(tmp_path: pathlib.Path) -> None:
     assert back.path == str(tmp_path / "r.h5")
 
 
-def test_a_map_comes_back_as_it_was(tmp_path: pathlib.Path,
-                                    maps: list[palpate.OccupancyGrid]) -> None:  # fmt: skip
+def test_a_map_comes_back_as_it_was(tmp_path: pathlib.Path, maps: list[palpate.OccupancyGrid]) -> None:
+    cells = maps[0].log_odds
     maps[0].save(tmp_path / "a.map.h5")
     back = palpate.read_map(tmp_path / "a.map.h5")
-    assert numpy.array_equal(back.log_odds, maps[0].log_odds)
+    assert numpy.array_equal(back.log_odds, cells)
     assert back.origin_mm.tolist() == maps[0].origin_mm.tolist()
-    own = palpate.OccupancyGrid("A", maps[0].log_odds, cell_mm=0.5, origin_mm=maps[0].origin_mm)
-    assert numpy.array_equal(own.log_odds, maps[0].log_odds)
-    assert own.observations is None and own.mean_level is None
-    layers = {"observations": maps[0].log_odds * 0 + 3, "mean_level": maps[0].log_odds * 0 + 0.5}
-    for name, cells in layers.items():
-        one = palpate.OccupancyGrid("A", maps[0].log_odds, cell_mm=0.5, origin_mm=(0, 0),
-                                    **{name: cells})  # fmt: skip
-        assert numpy.array_equal(getattr(one, name), cells), name
-    with pytest.raises(palpate.Error, match="prior"):
-        palpate.OccupancyGrid("A", maps[0].log_odds, cell_mm=0.5, origin_mm=(0, 0), prior=1.5)
+    layers = {"observations": cells * 0 + 3, "mean_level": cells * 0 + 0.5}
+    for given in ({}, *({name: layer} for name, layer in layers.items())):
+        one = palpate.OccupancyGrid("A", cells, cell_mm=0.5, origin_mm=(0, 0), **given)
+        assert numpy.array_equal(one.log_odds, cells)
+        for name in layers:
+            held = getattr(one, name)
+            assert numpy.array_equal(held, given[name]) if name in given else held is None, name
+    assert "prior" in error_of(palpate.OccupancyGrid, "A", cells, cell_mm=0.5, origin_mm=(0, 0), prior=1.5)
 
 
-def test_files_are_refused_in_the_words_of_the_command(tmp_path: pathlib.Path) -> None:
-    missing = tmp_path / "missing.h5"
-    with pytest.raises(palpate.Error, match=f"^{missing}: .*") as refused:
-        palpate.read_recording(missing)
-    assert "\n" not in str(refused.value)
+def test_files_that_cannot_be_read_or_written_are_named(tmp_path: pathlib.Path) -> None:
     text = tmp_path / "text.h5"
     text.write_text("no HDF5")
-    with pytest.raises(palpate.Error, match="is not an HDF5 file"):
-        palpate.read_map(text)
-    with pytest.raises(palpate.Error) as refused:
-        palpate.simulate("A").save(tmp_path / "no_folder" / "a.h5")
-    assert refused.value.fault == "input"
+    for use, path, words in (
+        (palpate.read_recording, tmp_path / "missing.h5", ": "),
+        (palpate.read_map, text, ": is not an HDF5 file"),
+        (palpate.simulate("A").save, tmp_path / "no_folder" / "a.h5", ": "),
+    ):
+        said = error_of(use, path)
+        assert said.startswith(f"{path}{words}") and "\n" not in said
 
 
 @pytest.mark.parametrize("form", [str, os.fsencode, pathlib.Path])
@@ -76,10 +73,9 @@ def test_names_of_files_need_not_be_utf8(
     maps: list[palpate.OccupancyGrid], unknown: palpate.Recording,
 ) -> None:  # fmt: skip
     name = os.fsdecode(os.fsencode(tmp_path) + b"/\xff")
-    recording, grid, scene = (form(f"{name}.{end}") for end in ("h5", "map.h5", "yaml"))
+    recording, grid = (form(f"{name}.{end}") for end in ("h5", "map.h5"))
     unknown.save(recording)
     maps[0].save(grid)
-    pathlib.Path(f"{name}.yaml").write_bytes(b'objects: [{map: "' + os.fsencode(grid) + b'"}]')
     back = palpate.read_recording(recording)
     assert back.path == f"{name}.h5"
     assert palpate.read_map(grid).label == "A"
@@ -88,39 +84,64 @@ def test_names_of_files_need_not_be_utf8(
         assert (record.best, record.recording) == ("A", f"{name}.h5")
     [done] = palpate.recognize_many(recording, {"maps": grid, "bins": (5, 5, 4), "device": device.name})
     assert done.record.best == "A"
-    missing = form(f"{name}.none")
     for read in (palpate.read_recording, palpate.simulate, palpate.open_sensor,
                  lambda path: palpate.recognize(back, grid, scene=path),
                  lambda path: palpate.recognize(back, path)):  # fmt: skip
-        with pytest.raises(palpate.Error) as refused:
-            read(missing)
-        assert f"{name}.none" in str(refused.value)
+        assert f"{name}.none" in error_of(read, form(f"{name}.none"))
 
 
 def test_h5py_and_palpate_share_a_process_and_its_threads(tmp_path: pathlib.Path) -> None:
     recording = palpate.simulate("A", palpate.random_poses(20, seed=1))
     recording.save(tmp_path / "0.h5")
-    failures: list[BaseException] = []
+    sound: list[str] = []
 
     def read_and_write(thread: int) -> None:
-        try:
-            for i in range(10):
-                mine = tmp_path / f"{thread}.{i}.h5"
-                if thread % 2 == 0:
-                    palpate.read_recording(tmp_path / "0.h5").save(mine)
-                    with h5py.File(mine) as file:
-                        assert numpy.array_equal(file["pressure"][:], recording.pressure)
-                else:
-                    with h5py.File(mine, "w") as file:
-                        file["numbers"] = numpy.arange(1000)
-                    back = palpate.read_recording(tmp_path / "0.h5")
-                    assert numpy.array_equal(back.pressure, recording.pressure)
-        except BaseException as failure:
-            failures.append(failure)
+        for i in range(10):
+            mine = tmp_path / f"{thread}.{i}.h5"
+            back = palpate.read_recording(tmp_path / "0.h5")
+            if thread % 2 == 0:
+                back.save(mine)
+                with h5py.File(mine) as file:
+                    assert numpy.array_equal(file["pressure"][:], recording.pressure)
+            else:
+                with h5py.File(mine, "w") as file:
+                    file["numbers"] = numpy.arange(1000)
+                assert numpy.array_equal(back.pressure, recording.pressure)
+            sound.append(mine.name)
 
     threads = [threading.Thread(target=read_and_write, args=[thread]) for thread in range(4)]
     for each in threads:
         each.start()
     for each in threads:
         each.join()
-    assert not failures
+    assert len(sound) == 40, "no thread failed"
+
+
+class Stream:
+    """A sensor of three elements at 100 Hz, as far as touches() asks it."""
+
+    elements_mm = palpate.grid_array(3, 1, 2.0)
+    baseline = numpy.zeros(3)
+    valid = None
+
+    def __iter__(self) -> Any:
+        """Two touches, from whose begin on an element is not known; the stream ends during the second."""
+        for time_s in numpy.arange(0, 4, 0.01):
+            pressed = time_s % 2 >= 1
+            values = [0.0, 20.0 * pressed, numpy.nan if pressed else 0.0]
+            yield palpate.Frame(time_s, values, (1, 2, 3))
+
+
+def test_touches_of_a_stream_come_with_their_unknown_elements_also_at_the_end() -> None:
+    found = list(palpate.touches(Stream()))  # type: ignore[arg-type]
+    assert len(found) == 2
+    for touch in found:
+        assert touch.T_robot_sensor.tolist() == [1, 2, 3]
+        assert touch.pressure[:2] == pytest.approx([0, 20])
+        assert touch.valid is not None and touch.valid.tolist() == [1, 1, 0]
+
+
+def test_a_detector_takes_each_option() -> None:
+    for option in ("onset", "release", "min_steady_s", "steady", "smooth_s", "drift_s"):
+        with pytest.raises(palpate.Error, match=rf"\b{option}\b"):
+            palpate.TouchDetector(**{option: -1.0})  # type: ignore[arg-type]

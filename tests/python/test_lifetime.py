@@ -1,4 +1,5 @@
-"""Objects keep what they need, and leave nothing behind."""
+"""Objects keep what they need, and leave nothing behind; what a child of fork() has of its parent's objects
+does not hang."""
 
 import gc
 import os
@@ -7,8 +8,31 @@ import sys
 
 import numpy
 import pytest
+from conftest import learned
 
 import palpate
+
+# What scripts of this file begin with.
+BEGIN = """
+import multiprocessing, os, sys, threading
+import palpate
+
+name = os.environ.get("PALPATE_DEVICE", "llvmpipe")
+touches = palpate.simulate("E", seed=1)
+
+def begun(device):
+    builder = palpate.MapBuilder(device)
+    builder.add(touches)
+    grid = builder.build("E")
+    return builder, grid, palpate.PoseHistogram(device, [grid])
+"""
+
+
+def run(script: str, *arguments: str) -> "subprocess.CompletedProcess[str]":
+    return subprocess.run(
+        [sys.executable, "-c", BEGIN + script, *arguments], capture_output=True, text=True, timeout=120,
+        env={**os.environ, "PYTHONWARNINGS": "ignore"},  # of forks beside threads
+    )  # fmt: skip
 
 
 def resident_kib() -> int:
@@ -20,32 +44,32 @@ def test_objects_outlive_their_device_and_their_arrays(
     maps: list[palpate.OccupancyGrid], unknown: palpate.Recording
 ) -> None:
     device = palpate.Device.open(os.environ.get("PALPATE_DEVICE", "llvmpipe"))
-    belief = palpate.PoseHistogram(device, list(maps))
     builder = palpate.MapBuilder(device)
-    particles = palpate.ParticleFilter(device, maps, particles=200)
-    bounded = palpate.BoundedPosterior(device, maps)
+    beliefs = [
+        palpate.PoseHistogram(device, list(maps)),
+        palpate.ParticleFilter(device, maps, particles=200),
+        palpate.BoundedPosterior(device, maps),
+    ]
     del device
     gc.collect()
-    touch = palpate.Touch(unknown[0].T_robot_sensor.copy(), unknown.elements_mm.copy(),
-                          unknown.pressure[0].copy())  # fmt: skip
+    arrays = (unknown[0].T_robot_sensor.copy(), unknown.elements_mm.copy(), unknown.pressure[0].copy())
+    touch = palpate.Touch(*arrays)
+    del arrays
     gc.collect()
-    for belief_of in (belief, particles, bounded):
-        belief_of.update(touch)
-        assert belief_of.estimate().identity.sum() == pytest.approx(1.0, abs=1e-9)
+    for belief in beliefs:
+        belief.update(touch)
+        assert belief.estimate().identity.sum() == pytest.approx(1.0, abs=1e-9)
     builder.add(unknown)
     assert builder.build("E").nx > 10
 
 
-def test_a_view_outlives_its_object(device: palpate.Device) -> None:
-    builder = palpate.MapBuilder(device)
-    builder.add(palpate.simulate("A", seed=1))
-    grid = builder.build("A")
+def test_a_view_outlives_its_object(device: palpate.Device, maps: list[palpate.OccupancyGrid]) -> None:
+    grid = learned(device, "A")
     cells = grid.log_odds
-    expected = cells.copy()
     del grid
     gc.collect()
-    builder.build("A")
-    assert numpy.array_equal(cells, expected)
+    learned(device, "A")
+    assert numpy.array_equal(cells, maps[0].log_odds)
 
 
 def test_a_thousand_constructions_take_no_memory(
@@ -79,7 +103,7 @@ def test_a_call_keeps_what_it_reads(device: palpate.Device) -> None:
     touches = palpate.simulate("E", seed=1)
     built = []
     for clears in (False, True):
-        given = [*touches] * 20
+        given = [*touches] * 10
         shown: list[float] = []
 
         def show(fraction: float, given: list[palpate.Touch] = given, clears: bool = clears) -> None:
@@ -89,58 +113,119 @@ def test_a_call_keeps_what_it_reads(device: palpate.Device) -> None:
 
         builder = palpate.MapBuilder(device)
         builder.add(given, progress=show)
-        assert len(shown) > 1 and len(given) == (0 if clears else 20 * len(touches))
+        assert len(shown) > 1 and len(given) == (0 if clears else 10 * len(touches))
         built.append(builder.build("E").log_odds)
     assert numpy.array_equal(*built)
 
 
-def test_the_interpreter_ends_during_work_and_with_live_objects() -> None:
-    script = """
-import _thread, os, threading, time
-import palpate
-device = palpate.Device.open(os.environ.get("PALPATE_DEVICE", "llvmpipe"))
-builder = palpate.MapBuilder(device)
-builder.add(palpate.simulate("A"))
-belief = palpate.PoseHistogram(device, [builder.build("A")],
-                               palpate.PoseLattice((-40, 40, 300), (-40, 40, 300), (0, 6.28, 60)))
-threading.Timer(0.2, _thread.interrupt_main).start()
-try:
-    belief.update(palpate.simulate("A")[:20])
-except KeyboardInterrupt:
-    print("interrupted")
-"""
-    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=120)
-    assert (run.returncode, run.stdout, run.stderr) == (0, "interrupted\n", "")
-
-
 # A daemon thread is in a call when the interpreter ends.
-DAEMON = """
-import os, sys, threading, time
-import palpate
-device = palpate.Device.open(os.environ.get("PALPATE_DEVICE", "llvmpipe"))
-touches = palpate.simulate("E", seed=1)
-builder = palpate.MapBuilder(device)
-builder.add(touches)
-belief = palpate.PoseHistogram(device, [builder.build("E")])
+ENDING = """
+builder, grid, belief = begun(palpate.Device.open(name))
 sensor = palpate.open_sensor("simulate:E,rate=1")
 sensor.start()
-work = {"update": lambda: belief.update(touches[0]), "sensor": sensor.next}[sys.argv[1]]
-begun = threading.Event()
+at_work = threading.Event()
 
-def work_on():
-    begun.set()
+def update():
+    belief.update([*touches] * 20, progress=lambda fraction: at_work.set())
+
+def sense():
+    at_work.set()
     while True:
-        work()
+        sensor.next()
 
-threading.Thread(target=work_on, daemon=True).start()
-begun.wait()
-time.sleep(0.1)
+threading.Thread(target={"update": update, "sensor": sense}[sys.argv[1]], daemon=True).start()
+at_work.wait()
 """
 
 
 @pytest.mark.parametrize("work", ["update", "sensor"])
 def test_the_interpreter_ends_while_daemon_threads_are_in_calls(work: str) -> None:
-    run = subprocess.run(
-        [sys.executable, "-c", DAEMON, work], capture_output=True, text=True, timeout=120
-    )
-    assert (run.returncode, run.stderr) == (0, "")
+    done = run(ENDING, work)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
+# What a child does, by the state of its parent: it prints what goes wrong, and leaves as Python does.
+FORKED = """
+def device_of_its_own(_=None):
+    belief = begun(palpate.Device.open(name))[2]
+    belief.update(touches[:3])
+    return belief.estimate().identity.tolist()
+
+def refused(*uses):
+    for use in uses:
+        try:
+            print("not refused:", use())
+        except palpate.Error as error:
+            assert error.fault == "input"
+            print(str(error).replace(" belongs to the parent process, whose devices do not survive "
+                "fork(); open devices in the child alone, or start processes without fork (in "
+                "Python with the start method \\"spawn\\")", ""))
+
+def in_a_child(work):
+    sys.stdout.flush()
+    child = os.fork()
+    if child == 0:
+        work()
+        sys.exit()
+    print("child ended with", os.waitpid(child, 0)[1])
+
+if sys.argv[1] == "closed":
+    device_of_its_own()
+    palpate.Device.list()
+    in_a_child(lambda: print(device_of_its_own()))
+    with multiprocessing.get_context("fork").Pool(2) as pool:
+        print(pool.map(device_of_its_own, range(2)))
+    sys.exit()
+
+device = palpate.Device.open(name)
+builder, grid, belief = begun(device)
+particles = palpate.ParticleFilter(device, [grid], particles=100)
+bounded = palpate.BoundedPosterior(device, [grid])
+sensor = palpate.open_sensor("simulate:E")
+sensor.start()
+for each in (belief, particles, bounded):
+    each.update(touches[:3])
+    each.estimate()
+
+def use_all():
+    refused(lambda: belief.update(touches[3]), belief.estimate, lambda: belief.lattice,
+            lambda: particles.update(touches[3]), bounded.estimate, lambda: builder.add(touches),
+            lambda: palpate.PoseHistogram(device, [grid]), sensor.next,
+            lambda: palpate.recognize(touches[:3], grid, device=device),
+            lambda: palpate.Device.open(name), palpate.Device.list)
+    print(repr(belief) == f"PoseHistogram(E on '{device.name}')", len(palpate.simulate("A")))
+
+at_work = threading.Event()
+over = threading.Event()
+
+def show(fraction):
+    at_work.set()
+    if over.is_set():
+        raise SystemExit
+
+thread = threading.Thread(target=lambda: builder.add([*touches] * 100, progress=show))
+if sys.argv[1] == "at work":
+    thread.start()
+    at_work.wait()
+in_a_child(use_all)
+over.set()
+if sys.argv[1] == "at work":
+    thread.join()
+belief.update(touches[3])  # the parent goes on
+print(belief.estimate().identity.tolist())
+"""
+
+REFUSED = ["device:"] * 7 + ["sensor:", "device:", "Vulkan:", "Vulkan:", "True 192"]
+
+
+@pytest.mark.parametrize(
+    ("state", "lines"),
+    [
+        ("closed", ["[1.0]", "child ended with 0", "[[1.0], [1.0]]"]),
+        ("open", [*REFUSED, "child ended with 0", "[1.0]"]),
+        ("at work", [*REFUSED, "child ended with 0", "[1.0]"]),
+    ],
+)
+def test_a_child_of_fork_is_refused_at_once_or_works(state: str, lines: list[str]) -> None:
+    done = run(FORKED, state)
+    assert (done.returncode, done.stdout.splitlines(), done.stderr) == (0, lines, "")

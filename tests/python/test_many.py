@@ -9,52 +9,49 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterable, Iterator
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from conftest import Files, command, comparable, error_of, run
 
 import palpate
 from palpate import many
 
-from conftest import Files, command, comparable
-
-TASK: palpate.Task = {"bins": (12, 12, 12), "x_mm": (-12, 12), "y_mm": (-12, 12), "filter": "bounded"}
+REGION: Any = {"bins": (12, 12, 12), "x_mm": (-12, 12), "y_mm": (-12, 12)}
 FLAGS = ["--bins", "12x12x12", "--x-mm=-12:12", "--y-mm=-12:12", "--filter", "bounded"]
-#: Maps that bring no sensor model.
-EQ_7 = ("--sensor-model", "none")
+#: Maps that bring no sensor model, of cells for which few bins do.
+COARSE = ("--sensor-model", "none", "--prior", "0.2", "--cell-mm", 2)
 
 
 @pytest.fixture(scope="module")
-def recordings(files: Files, tmp_path_factory: pytest.TempPathFactory) -> pathlib.Path:
+def recordings(tmp_path_factory: pytest.TempPathFactory) -> pathlib.Path:
     """A folder of eleven unknowns and a broken recording."""
     folder = tmp_path_factory.mktemp("unknowns")
     for seed in range(11):
         palpate.simulate(
-            "AE"[seed % 2],
-            palpate.random_poses(3, seed=seed),
+            "AE"[seed % 2], palpate.random_poses(3, seed=seed), seed=seed,
             T_object_robot=palpate.random_object_pose(seed=seed),
-            seed=seed,
-        ).save(folder / f"{seed:02}.h5")
+        ).save(folder / f"{seed:02}.h5")  # fmt: skip
     (folder / "05b.h5").write_bytes(b"no recording")
     return folder
 
 
+@pytest.fixture(scope="module")
+def task(files: Files) -> palpate.Task:
+    return {**REGION, "filter": "bounded", "maps": files.maps}
+
+
 def batch(folder: pathlib.Path, inputs: pathlib.Path, maps: pathlib.Path, *flags: str) -> list[bytes]:
     """The lines of `palpate batch`."""
-    results = folder / "results"
-    run = subprocess.run(
-        [os.environ["PALPATE_COMMAND"], "batch", inputs, "-o", results, "--maps", maps, *flags],
-        capture_output=True, text=True, timeout=300,
-    )  # fmt: skip
-    assert run.returncode in (0, 3), run.stderr
-    command("merge", results, "-o", folder / "all.ndjson")
+    done = run("batch", inputs, "-o", folder / "results", "--maps", maps, *flags)
+    assert done.returncode in (0, 3), done.stderr
+    command("merge", folder / "results", "-o", folder / "all.ndjson")
     return (folder / "all.ndjson").read_bytes().splitlines(keepends=True)
 
 
 @pytest.fixture(scope="module")
-def expected(
-    files: Files, recordings: pathlib.Path, tmp_path_factory: pytest.TempPathFactory
-) -> list[bytes]:
+def expected(files: Files, recordings: pathlib.Path, tmp_path_factory: pytest.TempPathFactory) -> list[bytes]:
     lines = batch(tmp_path_factory.mktemp("batch"), recordings, files.maps, *FLAGS)
     assert len(lines) == 12
     return lines
@@ -64,11 +61,9 @@ def expected(
 def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
     distributed = pytest.importorskip("distributed", reason="dask.distributed is not installed")
     with distributed.LocalCluster(
-        n_workers=2,
-        threads_per_worker=1,
-        dashboard_address=None,
+        n_workers=2, threads_per_worker=1, dashboard_address=None,
         local_directory=tmp_path_factory.mktemp("dask"),
-    ) as cluster:
+    ) as cluster:  # fmt: skip
         yield cluster
 
 
@@ -83,9 +78,8 @@ def lines_of(results: Iterable[palpate.Recognized]) -> list[bytes]:
 
 
 def test_without_a_client_this_process_recognises(
-    files: Files, recordings: pathlib.Path, expected: list[bytes]
+    task: palpate.Task, recordings: pathlib.Path, expected: list[bytes]
 ) -> None:
-    task: palpate.Task = {**TASK, "maps": files.maps}
     results = list(palpate.recognize_many(recordings, task, chunk=5))
     assert [result.line for result in results] == expected
     assert [result.index for result in results] == list(range(12))
@@ -99,7 +93,7 @@ def test_without_a_client_this_process_recognises(
 
 
 def test_records_are_those_of_recognize(files: Files, recordings: pathlib.Path) -> None:
-    task: palpate.Task = {**TASK, "maps": [files.maps], "trace": True}
+    task: palpate.Task = {**REGION, "filter": "bounded", "maps": [files.maps], "trace": True}
     path = recordings / "03.h5"
     [result] = palpate.recognize_many([path], task)
     [record] = palpate.recognize(path, **task)
@@ -113,35 +107,35 @@ def test_records_are_those_of_recognize(files: Files, recordings: pathlib.Path) 
     assert dict(result.record) == dict(record)
 
 
+@pytest.mark.parametrize("each_frame", [False, True])
 def test_what_all_recordings_tell_together_is_settled_once(
-    files: Files, recordings: pathlib.Path, tmp_path: pathlib.Path
+    each_frame: bool, files: Files, recordings: pathlib.Path, tmp_path: pathlib.Path
 ) -> None:
     # The array of one recording reaches farther, which widens the region of all.
     wide = palpate.simulate("A", palpate.random_poses(2, seed=7), seed=7)
     palpate.Recording(
         wide.pressure, wide.T_robot_sensor, wide.elements_mm * 1.5
     ).save(tmp_path / "wide.h5")
-    maps = tmp_path / "maps"  # of large cells, for which few bins do
-    command("map", *files.train, "-o", f"{maps}/", "--prior", "0.2", "--cell-mm", 2, *EQ_7)
+    maps = tmp_path / "maps"
+    command("map", *files.train, "-o", f"{maps}/", *COARSE)
     table = tmp_path / "list.csv"
     table.write_text(
         f"path,frames,label\n{recordings}/00.h5,0:2,A\n{recordings}/01.h5,,E\n"
         f"{recordings}/missing.h5,,E\nwide.h5,,\n"
     )
-    for flag in ([], ["--each-frame"]):
-        task: palpate.Task = {"maps": maps, "each_frame": bool(flag), "filter": "bounded"}
-        lines = batch(tmp_path / f"batch{len(flag)}", table, maps, "--filter", "bounded", *flag)
-        results = list(palpate.recognize_many(table, task, chunk=1))
-        assert [result.line for result in results] == lines
-        assert len(lines) == (4 if not flag else 2 + 3 + 1 + 2)
-        alone = list(palpate.recognize_many(f"{recordings}/01.h5", task))
-        assert alone[0].line != results[1 if not flag else 2].line, "the list widens the region"
+    task: palpate.Task = {"maps": maps, "each_frame": each_frame, "filter": "bounded"}
+    flags = ["--each-frame"] if each_frame else []
+    lines = batch(tmp_path, table, maps, "--filter", "bounded", *flags)
+    results = list(palpate.recognize_many(table, task, chunk=1))
+    assert [result.line for result in results] == lines
+    assert len(lines) == (2 + 3 + 1 + 2 if each_frame else 4)
+    alone = list(palpate.recognize_many(f"{recordings}/01.h5", task))
+    assert alone[0].line != results[2 if each_frame else 1].line, "the list widens the region"
 
 
 def test_workers_give_the_bytes_of_batch(
-    client: Any, cluster: Any, files: Files, recordings: pathlib.Path, expected: list[bytes]
+    client: Any, cluster: Any, task: palpate.Task, recordings: pathlib.Path, expected: list[bytes]
 ) -> None:
-    task: palpate.Task = {**TASK, "maps": files.maps}
     assert lines_of(palpate.recognize_many(recordings, task, client=client, chunk=1)) == expected
     cluster.scale(4)
     client.wait_for_workers(4, timeout=120)
@@ -152,23 +146,27 @@ def test_workers_give_the_bytes_of_batch(
     )
     assert lines_of(by_address) == expected
     # The histogram, too, which computes on the device.
-    task["filter"] = "histogram"
-    assert lines_of(palpate.recognize_many(recordings, task, client=client, chunk=3)) == [
-        result.line for result in palpate.recognize_many(recordings, task)
+    dense: palpate.Task = {**task, "filter": "histogram"}
+    assert lines_of(palpate.recognize_many(recordings, dense, client=client, chunk=3)) == [
+        result.line for result in palpate.recognize_many(recordings, dense)
     ]
 
 
-def test_a_worker_that_dies_in_the_middle_changes_nothing(
-    client: Any, files: Files, recordings: pathlib.Path, expected: list[bytes]
-) -> None:
-    results = palpate.recognize_many(
-        recordings, {**TASK, "maps": files.maps}, client=client, chunk=1
-    )
-    # Stopped, it keeps the chunks that it is handed; another one's first result is the event.
+def killed(client: Any, results: Iterator[palpate.Recognized]) -> tuple[palpate.Recognized, int]:
+    """Kills a worker after another one's first result; returns both. Stopped, it keeps the chunks that it is
+    handed."""
     victim = next(iter(client.run(os.getpid).values()))
     os.kill(victim, signal.SIGSTOP)
     first = next(results)
     os.kill(victim, signal.SIGKILL)
+    return first, victim
+
+
+def test_a_worker_that_dies_in_the_middle_changes_nothing(
+    client: Any, task: palpate.Task, recordings: pathlib.Path, expected: list[bytes]
+) -> None:
+    results = palpate.recognize_many(recordings, task, client=client, chunk=1)
+    first, victim = killed(client, results)
     everything = [first, *results]
     assert lines_of(everything) == expected
     assert len(everything) == 12
@@ -176,107 +174,92 @@ def test_a_worker_that_dies_in_the_middle_changes_nothing(
 
 
 def test_recordings_that_kill_their_workers_are_named(
-    client: Any, cluster: Any, files: Files, recordings: pathlib.Path, monkeypatch: pytest.MonkeyPatch
+    client: Any, cluster: Any, task: palpate.Task, recordings: pathlib.Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(cluster.scheduler, "allowed_failures", 0)
-    results = palpate.recognize_many(
-        recordings, {**TASK, "maps": files.maps}, client=client, chunk=1
-    )
-    victim = next(iter(client.run(os.getpid).values()))
-    os.kill(victim, signal.SIGSTOP)
-    next(results)
-    os.kill(victim, signal.SIGKILL)
-    with pytest.raises(palpate.Error, match=r"\.h5: workers died again and again"):
-        list(results)
+    results = palpate.recognize_many(recordings, task, client=client, chunk=1)
+    killed(client, results)
+    assert ".h5: workers died again and again" in error_of(list, results)
 
 
 def test_an_iteration_that_ends_early_leaves_nothing_behind(
-    client: Any, files: Files, recordings: pathlib.Path
+    client: Any, task: palpate.Task, recordings: pathlib.Path
 ) -> None:
-    results = palpate.recognize_many(
-        recordings, {**TASK, "maps": files.maps}, client=client, chunk=1
-    )
+    results = palpate.recognize_many(recordings, task, client=client, chunk=1)
     next(results)
     results.close()
     assert not [state for state in client.futures.values() if state.status == "pending"]
 
 
 def test_errors_of_workers_arrive(
-    client: Any,
-    files: Files,
-    recordings: pathlib.Path,
-    tmp_path: pathlib.Path,
+    client: Any, files: Files, task: palpate.Task, recordings: pathlib.Path, tmp_path: pathlib.Path,
     monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    with pytest.raises(palpate.Error, match="nowhere: no such file") as raised:
-        palpate.recognize_many(recordings, {"maps": "/nowhere"}, client=client)
-    assert raised.value.fault == "input"
+) -> None:  # fmt: skip
+    def begun(paths: Any, **changed: Any) -> Iterator[palpate.Recognized]:
+        return palpate.recognize_many(paths, {**task, **changed}, client=client)  # type: ignore[typeddict-item]
+
+    assert "nowhere: no such file" in error_of(begun, recordings, maps="/nowhere")
     changing = tmp_path / "changing.h5"
     changing.write_bytes((recordings / "00.h5").read_bytes())
-    results = palpate.recognize_many(changing, {**TASK, "maps": files.maps}, client=client)
+    results = begun(changing)
     changing.write_bytes(b"")
-    with pytest.raises(palpate.Error, match="changing.h5: has changed since the batch began"):
-        list(results)
+    assert "changing.h5: has changed since the batch began" in error_of(list, results)
     maps = tmp_path / "maps"
     maps.mkdir()
     for map in files.maps.iterdir():
         (maps / map.name).write_bytes(map.read_bytes())
-    results = palpate.recognize_many(recordings, {**TASK, "maps": maps}, client=client)
-    command("map", *files.train, "-o", f"{maps}/", "--prior", "0.3", *EQ_7)
-    with pytest.raises(palpate.Error, match="map.h5 has changed; give all workers the same"):
-        list(results)
+    results = begun(recordings, maps=maps)
+    command("map", *files.train, "-o", f"{maps}/", *COARSE)
+    assert "map.h5 has changed; give all workers the same" in error_of(list, results)
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(palpate.Error, match="'?unknowns'?: is relative to .*give absolute paths"):
-        palpate.recognize_many("unknowns", {**TASK, "maps": files.maps}, client=client)
+    assert re.search("'?unknowns'?: is relative to .*give absolute paths", error_of(begun, "unknowns"))
 
 
 @pytest.mark.parametrize(
-    ("task", "arguments", "message"),
+    ("changed", "arguments", "message"),
     [
         ({"bin": 3}, {}, "task: 'bin' is not known; give bins, x_mm"),
         ({"budget_ms": 3.0}, {}, "task: 'budget_ms' is not known"),
         ({}, {"chunk": 0}, "chunk 0: give at least 1"),
         ({}, {"paths": []}, "paths: none"),
-        ({}, {}, "maps: missing"),
+        ({"maps": []}, {}, "maps: missing"),
     ],
 )
 def test_a_wrong_call_is_refused_at_once(
-    task: Any, arguments: dict[str, Any], message: str, recordings: pathlib.Path
+    changed: Any, arguments: dict[str, Any], message: str, task: palpate.Task, recordings: pathlib.Path
 ) -> None:
-    with pytest.raises(palpate.Error, match=re.escape(message)):
-        palpate.recognize_many(**{"paths": recordings, "task": task, **arguments})
+    call = {"paths": recordings, "task": {**task, **changed}, **arguments}
+    assert message in error_of(palpate.recognize_many, **call)
 
 
 def test_an_open_device_is_no_part_of_a_task(
-    device: palpate.Device, files: Files, recordings: pathlib.Path
+    device: palpate.Device, task: palpate.Task, recordings: pathlib.Path
 ) -> None:
-    task: Any = {"maps": files.maps, "device": device}
     with pytest.raises(TypeError, match="^device: each worker opens its own; give a name"):
-        palpate.recognize_many(recordings, task)
+        palpate.recognize_many(recordings, {**task, "device": device})  # type: ignore[typeddict-item]
 
 
-def test_what_every_recording_tells_is_told_once(files: Files, recordings: pathlib.Path) -> None:
-    task: palpate.Task = {"maps": files.maps, "bins": (8, 8, 8), "x_mm": (-12, 12),
-                          "y_mm": (-12, 12), "filter": "histogram", "touch_sd_deg": 3}  # fmt: skip
+def test_what_every_recording_tells_is_told_once(task: palpate.Task, recordings: pathlib.Path) -> None:
+    coarse: Any = {**task, "bins": (8, 8, 8), "filter": "histogram", "touch_sd_deg": 3}
     paths = [recordings / "00.h5", recordings / "01.h5"]
     with pytest.warns(UserWarning) as told:
-        assert len(list(palpate.recognize_many(paths, task, chunk=1))) == 2
+        assert len(list(palpate.recognize_many(paths, coarse, chunk=1))) == 2
     assert len([each for each in told if "does not resolve" in str(each.message)]) == 1
 
 
 @pytest.mark.parametrize("filter", ["bounded", "histogram"])
 def test_another_device_is_refused_where_results_depend_on_it(
-    filter: str, files: Files, recordings: pathlib.Path
+    filter: str, task: palpate.Task, recordings: pathlib.Path
 ) -> None:
-    asked = many._asked([], {**TASK, "maps": files.maps, "filter": filter})  # type: ignore[typeddict-item]
-    batch, entries, _ = many._settle([str(recordings / "00.h5")], asked, 1)
-    elsewhere = dataclasses.replace(batch, device="another device")
+    asked = many._asked([], {**task, "filter": filter})  # type: ignore[typeddict-item]
+    settled, entries, _ = many._settle([str(recordings / "00.h5")], asked, 1)
+    elsewhere = dataclasses.replace(settled, device="another device")
     lines = [entry for entry, _ in entries]
     if filter == "bounded":
         assert len(many._recognize(lines, elsewhere, 1)[0]) == 1
     else:
-        with pytest.raises(palpate.Error, match="the batch was settled on another device"):
-            many._recognize(lines, elsewhere, 1)
+        said = error_of(many._recognize, lines, elsewhere, 1)
+        assert "the batch was settled on another device" in said
 
 
 def test_a_folder_is_the_same_under_another_name(
@@ -286,34 +269,23 @@ def test_a_folder_is_the_same_under_another_name(
     (tmp_path / "link").symlink_to("real")
     monkeypatch.chdir(tmp_path / "real")
     many._Asked({}, str(tmp_path / "link"), "a.h5").require_folder()
-    with pytest.raises(palpate.Error, match="a.h5: is relative to"):
-        many._Asked({}, str(tmp_path), "a.h5").require_folder()
+    assert "a.h5: is relative to" in error_of(many._Asked({}, str(tmp_path), "a.h5").require_folder)
 
 
 def test_without_dask_an_error_says_what_to_install(
-    files: Files, recordings: pathlib.Path, monkeypatch: pytest.MonkeyPatch
+    task: palpate.Task, recordings: pathlib.Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(palpate.Error, match=r"pip install 'palpate\[dask\]'"):
-        palpate.recognize_many(recordings, {"maps": files.maps}, client="tcp://127.0.0.1:1")
-    assert list(palpate.recognize_many(recordings / "00.h5", {**TASK, "maps": files.maps}))
-
-
-class Info:
-    """A device as Device.list() has it."""
-
-    def __init__(self, index: int, name: str, chosen: bool = False, usable: bool = True) -> None:
-        self.index, self.name, self.chosen, self.usable = index, name, chosen, usable
+    said = error_of(palpate.recognize_many, recordings, task, client="tcp://127.0.0.1:1")
+    assert "pip install 'palpate[dask]'" in said
+    assert list(palpate.recognize_many(recordings / "00.h5", task))
 
 
 def test_workers_of_a_computer_take_different_devices_of_a_kind() -> None:
+    names = ["CPU", "GPU", "GPU", "GPU", "GPU", "other GPU"]
     listed: Any = [
-        Info(0, "CPU"),
-        Info(1, "GPU", chosen=True),
-        Info(2, "GPU"),
-        Info(3, "GPU", usable=False),
-        Info(4, "GPU"),
-        Info(5, "other GPU"),
+        SimpleNamespace(index=index, name=name, chosen=index == 1, usable=index != 3)
+        for index, name in enumerate(names)
     ]
     taken = [many._index_of(listed, "", lambda place=place: place) for place in range(5)]
     assert taken == [1, 2, 4, 1, 2]
@@ -327,7 +299,7 @@ PLACE = "from palpate import many; print(many._place_on_host(), flush=True); inp
 
 
 def test_a_dead_worker_gives_its_place_back() -> None:
-    def begin() -> tuple[subprocess.Popen[str], int]:
+    def begin() -> tuple["subprocess.Popen[str]", int]:
         process = subprocess.Popen(
             [sys.executable, "-c", PLACE], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         )
@@ -349,20 +321,14 @@ def test_a_dead_worker_gives_its_place_back() -> None:
 
 
 def test_the_program_of_the_guide_runs(
-    client: Any,
-    cluster: Any,
-    files: Files,
-    recordings: pathlib.Path,
-    tmp_path: pathlib.Path,
+    client: Any, cluster: Any, files: Files, recordings: pathlib.Path, tmp_path: pathlib.Path,
     monkeypatch: pytest.MonkeyPatch,
-) -> None:
+) -> None:  # fmt: skip
     page = (pathlib.Path(__file__).parents[2] / "docs" / "batch.md").read_text()
     [program] = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
     (tmp_path / "unknowns").mkdir()
-    for name in ("00.h5", "01.h5", "02.h5"):
-        (tmp_path / "unknowns" / name).write_bytes((recordings / name).read_bytes())
-    command("map", *files.train, "-o", f"{tmp_path}/maps/", "--prior", "0.2", "--cell-mm", 2, *EQ_7)
-
+    (tmp_path / "unknowns" / "00.h5").write_bytes((recordings / "00.h5").read_bytes())
+    command("map", *files.train, "-o", f"{tmp_path}/maps/", *COARSE)
     distributed_client = type(client)
 
     def connect(*, n_workers: int, threads_per_worker: int) -> Any:

@@ -1,10 +1,16 @@
-"""What is misused raises the exception that Python has for it, and no call ends the process."""
+"""What is misused raises the exception that Python has for it, and no call ends the process; without Vulkan, all
+that needs no device works."""
 
 import inspect
+import os
 import pathlib
+import subprocess
+import sys
+from typing import Any
 
 import numpy
 import pytest
+from conftest import error_of
 
 import palpate
 from palpate import _palpate
@@ -70,28 +76,26 @@ def test_an_axis_or_a_displacement_of_another_form_is_refused_by_name(
         for name in ("x_mm", "y_mm", "theta_rad"):
             with pytest.raises(TypeError, match=rf"^{name}: give an Axis or \(lower, upper, count\)"):
                 palpate.PoseLattice(**{name: axis})
-    for belief, name in (
-        (palpate.PoseHistogram, "touch_sd"), (palpate.PoseHistogram, "slip_sd"),
-        (palpate.BoundedPosterior, "touch_sd"),
-    ):  # fmt: skip
+    histogram, bounded = palpate.PoseHistogram, palpate.BoundedPosterior
+    for belief, name in ((histogram, "touch_sd"), (histogram, "slip_sd"), (bounded, "touch_sd")):
         with pytest.raises(TypeError, match=rf"^{name}: give a DisplacementSd or \(mm, rad\)"):
-            belief(device, maps, **{name: (1,)})
+            belief(device, maps, **{name: (1,)})  # type: ignore[operator]
 
 
 def test_what_a_path_raises_is_raised(tmp_path: pathlib.Path) -> None:
     for use in (palpate.read_map, palpate.read_recording, RECORDING.save, palpate.open_sensor,
                 palpate.simulate, lambda path: palpate.recognize(RECORDING, path)):  # fmt: skip
-        with pytest.raises(ZeroDivisionError):
-            use(Raising())
-        with pytest.raises(ValueError, match="null byte"):
-            use(f"{tmp_path}/a\0b")
-        with pytest.raises(TypeError):
-            use(3)
+        for path, error in ((Raising(), ZeroDivisionError), (f"{tmp_path}/a\0b", ValueError), (3, TypeError)):
+            with pytest.raises(error):
+                use(path)
 
 
 def test_a_flag_of_another_type_is_refused_by_name() -> None:
-    for name, value, wanted in (("seed", -1, "int"), ("prior", "a", "float"), ("touches", 1.5, "int"),
-                                ("bins", 3, "tuple"), ("sensor_model", 3, "str")):  # fmt: skip
+    flags: list[tuple[str, Any, str]] = [
+        ("seed", -1, "int"), ("prior", "a", "float"), ("touches", 1.5, "int"), ("bins", 3, "tuple"),
+        ("sensor_model", 3, "str"),
+    ]  # fmt: skip
+    for name, value, wanted in flags:
         with pytest.raises(TypeError, match=f"^{name}: {value!r}; give .*{wanted}"):
             palpate.recognize(RECORDING, (), **{name: value})
 
@@ -107,5 +111,31 @@ def test_progress_and_timeouts_are_checked_before_the_work(
     with pytest.raises(ValueError, match="timeout_s: is not a number"):
         sensor.next(numpy.nan)
     assert sensor.next(1e300) is not None
-    with pytest.raises(palpate.Error, match="no frame came"):
-        palpate.baseline_of([], sensor)
+    assert "no frame came" in error_of(palpate.baseline_of, [], sensor)
+
+
+WITHOUT_VULKAN = """
+import palpate
+
+assert len(palpate.simulate("A", palpate.random_poses(3, seed=1))) == 3
+for use in (lambda: palpate.open_sensor("tsf85:none").start(), palpate.Device.open, palpate.Device.list):
+    try:
+        use()
+    except palpate.Error as error:
+        print(f"{error.fault}: {error}")
+"""
+
+
+def test_a_missing_loader_of_vulkan_is_an_error_that_names_the_packages() -> None:
+    library = "/nonexistent/libvulkan.so.1"
+    run = subprocess.run(
+        [sys.executable, "-c", WITHOUT_VULKAN], capture_output=True, text=True, timeout=120,
+        env={**os.environ, "PALPATE_VULKAN_LIBRARY": library},
+    )  # fmt: skip
+    assert run.returncode == 0, run.stderr
+    board, *vulkan = run.stdout.splitlines()
+    assert "not plugged in" in board
+    assert len(vulkan) == 2
+    for line in vulkan:
+        assert line.startswith(f"system: Vulkan cannot be loaded: {library}: ")
+        assert line.endswith("on Debian, install libvulkan1 and mesa-vulkan-drivers")

@@ -11,6 +11,7 @@ from unittest.mock import MagicMock
 
 import numpy
 import pytest
+from conftest import error_of, learned, warned
 from rosbags.typesys import Stores, get_typestore
 
 import palpate
@@ -27,6 +28,8 @@ session = importlib.import_module("palpate_ros2.session")
 TYPES = get_typestore(Stores.ROS2_HUMBLE)
 #: Where the touched object was moved to, from where it was learned, in the robot's frame.
 MOVED = (300.0, -200.0, 2.0)
+#: Of the E in the stream.
+T_ROBOT_OBJECT = palpate.inverse((5.0, 3.0, math.radians(40)))
 
 
 def new(name: str) -> Any:
@@ -54,13 +57,10 @@ def sent(message: Any) -> Any:
 @pytest.fixture(scope="module")
 def records(device: palpate.Device) -> dict[str, tuple[palpate.OccupancyGrid, palpate.Record]]:
     """What is recognised of an E, an I and an O that lie at MOVED."""
-    grids = []
-    for letter in "EIO":
-        builder = palpate.MapBuilder(device)
-        builder.add(palpate.simulate(letter))
-        grids.append(builder.build(letter))
-        grids[-1].symmetry = {"E": 1, "I": 2, "O": 0}[letter]
+    grids = [learned(device, letter) for letter in "EIO"]
     found = {}
+    for grid, symmetry in zip(grids, (1, 2, 0), strict=True):
+        grid.symmetry = symmetry
     for grid in grids:
         touched = palpate.simulate(
             grid.label, palpate.random_poses(8, seed=4), T_object_robot=palpate.inverse(MOVED), seed=5
@@ -69,6 +69,19 @@ def records(device: palpate.Device) -> dict[str, tuple[palpate.OccupancyGrid, pa
         assert record.best == grid.label
         found[grid.label] = grid, record
     return found
+
+
+@pytest.fixture(scope="module")
+def frames() -> list[palpate.Frame]:
+    """Four touches of an E."""
+    with palpate.open_sensor("simulate:E,object=5:3:40,touches=4,seed=3,speed=max") as sensor:
+        return list(sensor)
+
+
+def message_of(frame: palpate.Frame) -> Any:
+    message = new("std_msgs/msg/Float32MultiArray")
+    message.data = numpy.array(frame.values, dtype=numpy.float32)
+    return message
 
 
 @pytest.mark.parametrize("letter", "EIO")
@@ -86,21 +99,6 @@ def test_the_pose_is_that_of_the_record(records: Any, letter: str) -> None:
     assert not covariance[2:5].any(), "z, roll and pitch"
     sd = numpy.sqrt(covariance.diagonal()[[0, 1, 5]]) * (1000, 1000, 1)
     assert sd == pytest.approx(record.refined.sd, rel=1e-6)
-
-
-def test_the_covariance_is_carried_over_to_the_object_in_the_robots_frame(records: Any) -> None:
-    # Draws of T_object_robot, inverted and turned as the record's pose is; 1 % of 200,000 draws.
-    _, record = records["I"]
-    refined = record.refined
-    mean = numpy.array([refined.x_mm, refined.y_mm, refined.theta_rad])
-    turned = palpate.compose(mean, refined.T_robot_object)
-    draws = numpy.random.default_rng(1).multivariate_normal(mean, 1e-4 * numpy.array(refined.covariance), 200_000)
-    c, s = numpy.cos(draws[:, 2]), numpy.sin(draws[:, 2])
-    x, y = turned[0] - draws[:, 0], turned[1] - draws[:, 1]
-    found = numpy.cov(numpy.array([c * x + s * y, c * y - s * x, -draws[:, 2]])) * 1e4
-    expected = session.covariance_of(record)
-    scale = numpy.sqrt(numpy.outer(expected.diagonal(), expected.diagonal()))
-    assert numpy.abs((found - expected) / scale).max() < 0.01
 
 
 @pytest.mark.parametrize("mirrored", [False, True])
@@ -123,15 +121,6 @@ def test_the_map_lies_where_the_object_lies(records: Any, mirrored: bool) -> Non
     middle = (-14, 20) if mirrored else (14, 20)
     assert at == pytest.approx(palpate.transform(record.refined.T_robot_object, [middle])[0] / 1000)
     assert info.origin.position.z == 0.05
-
-
-def test_the_map_of_an_object_covers_it(records: Any) -> None:
-    grid, record = records["E"]
-    message = sent(conversion.map_message(new, grid, record, "base", START_S, 0.0))
-    cells = message.data.reshape(message.info.height, message.info.width)
-    assert cells.shape == grid.log_odds.shape
-    assert cells.min() >= -1 and cells.max() <= 100
-    assert numpy.array_equal(cells > 50, grid.log_odds > math.log(50.5 / 49.5))
 
 
 def test_markers_show_array_uncertainty_and_label(records: Any) -> None:
@@ -160,18 +149,12 @@ def test_planar_poses_are_those_of_a_bag(tmp_path: pathlib.Path) -> None:
     bag = Bag(tmp_path, "mcap")
     poses = []
     for k, theta in enumerate((0.4, -2.5, 1.0, 1.0)):
-        arm = bag.pose("Transform", 0.6, 0.01 * k, 0.3, pointing_down(theta))
-        at = START_S + 0.05 * k
-        edge = bag.of("geometry_msgs/msg/TransformStamped", bag.header(at, "base"), "array", arm)
-        bag.write("/tf", bag.of("tf2_msgs/msg/TFMessage", [edge]), at)
-        if k == 3:
-            break  # the transform after the last frame
-        poses.append(session.planar_pose(arm)[0])
-        layout = bag.of("std_msgs/msg/MultiArrayLayout", [], 0)
-        values = numpy.array([9.5, 0, 0, 1], dtype=numpy.float32)
-        bag.write("/p", bag.of("std_msgs/msg/Float32MultiArray", layout, values), at)
-    with pytest.warns(UserWarning):
-        recording = read_bag(bag.close(), pressure_topic="/p", tf=("base", "array"), array=(2, 2, 2))
+        place, at = (0.6, 0.01 * k, 0.3, pointing_down(theta)), START_S + 0.05 * k
+        bag.frames("/tf", [bag.edge("base", "array", at, *place)], at)
+        if k < 3:  # the last transform comes after the last frame
+            poses.append(session.planar_pose(bag.pose("Transform", *place))[0])
+            bag.plain("/p", [9.5, 0, 0, 1], at)
+    recording, _ = warned(read_bag, bag.close(), pressure_topic="/p", tf=("base", "array"), array=(2, 2, 2))
     # Times since 1970 resolve 0.2 us, in which this arm moves 5e-5 mm.
     numpy.testing.assert_allclose(recording.T_robot_sensor, poses, atol=1e-3)
     assert session.planar_pose(bag.pose("Transform", 0, 0, 0.3, about_z(3.0))) == (
@@ -179,43 +162,18 @@ def test_planar_poses_are_those_of_a_bag(tmp_path: pathlib.Path) -> None:
     )  # fmt: skip
 
 
-def test_a_session_recognises_a_stream(device: palpate.Device) -> None:
-    grids = []
-    for letter in "AE":
-        builder = palpate.MapBuilder(device)
-        builder.add(palpate.simulate(letter))
-        grids.append(builder.build(letter))
-    with palpate.open_sensor("simulate:E,object=5:3:40,touches=4,seed=3,speed=max") as sensor:
-        frames = list(sensor)
-        elements_mm = sensor.elements_mm
-    valid = numpy.ones((2, 36), dtype=numpy.uint8)
-    valid[:, 7] = 0
-    array = palpate.Recording(numpy.zeros((2, 36)), [(0, 0, 0)] * 2, elements_mm, valid=valid)
-    stream = session.Session(array, grids, options={"device": device})
-    records = []
-    for frame in frames:
-        message = new("std_msgs/msg/Float32MultiArray")
-        message.data = numpy.array(frame.values, dtype=numpy.float32)
-        message.data[7] = 1e3 * len(records)  # of the dead element
-        touch = stream.add(frame.host_time_s, readings(message, message.__msgtype__))
-        if touch is not None:
-            middle = (touch.begin_s + touch.end_s) / 2
-            [pose] = [f.T_robot_sensor for f in frames if abs(f.host_time_s - middle) < 0.0051][:1]
-            records.append(stream.recognise(touch, pose))
-    assert [record.touches for record in records] == [1, 2, 3, 4]
-    assert records[-1].best == "E" and stream.map_of("E") is grids[1] and stream.map_of("(none)") is None
-    truth = palpate.inverse((5.0, 3.0, math.radians(40)))
-    assert records[-1].refined.T_robot_object[:2] == pytest.approx(truth[:2], abs=1.0)
-    stream.next_unknown()
-    assert stream.touches == 0
-    with pytest.raises(palpate.Error, match="3 readings for an array of 36 elements"):
-        stream.add(0.0, [1.0, 2.0, 3.0])
-    touched = session.Session(array, grids)
+def test_frames_of_another_array_and_touches_at_the_start_are_refused(
+    maps: list[palpate.OccupancyGrid], frames: list[palpate.Frame]
+) -> None:
+    array = palpate.Recording(numpy.zeros((2, 36)), [(0, 0, 0)] * 2, palpate.digitacts_array())
+    stream = session.Session(array, maps)
+    assert stream.map_of("E") is maps[1] and stream.map_of("(none)") is None
+    assert "3 readings for an array of 36 elements" in error_of(stream.add, 0.0, [1.0, 2.0, 3.0])
     with pytest.raises(palpate.Error, match="touched while its baseline is taken"):
         for k, frame in enumerate(frames[120:200]):
-            touched.add(0.01 * k, frame.values)
-    with pytest.raises(palpate.Error, match="has no list of numbers sensors.values"):
-        readings(new("std_msgs/msg/Float32MultiArray"), "tactile_msgs/msg/TactileState")
+            stream.add(0.01 * k, frame.values)
+    state = "tactile_msgs/msg/TactileState"
+    assert "has no list of numbers sensors.values" in error_of(readings, message_of(frames[0]), state)
 
 
 class StandIns:
@@ -250,8 +208,7 @@ class StandIns:
         class Buffer:
             def lookup_transform(self, target: str, source: str, at: Any, _: Any) -> Any:
                 outer.asked.append((target, source))
-                times = numpy.array([frame.host_time_s for frame in frames])
-                frame = frames[int(numpy.abs(times - 1e-9 * at.nanoseconds).argmin())]
+                frame = min(frames, key=lambda frame: abs(frame.host_time_s - 1e-9 * at.nanoseconds))
                 x, y, theta = frame.T_robot_sensor
                 transform = new("geometry_msgs/msg/TransformStamped")
                 transform.transform.translation = TYPES.types["geometry_msgs/msg/Vector3"](x / 1000, y / 1000, 0.1)
@@ -278,15 +235,15 @@ class StandIns:
 
 
 def test_the_node_publishes_what_it_finds(
-    device: palpate.Device, tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    for letter in "AE":
-        builder = palpate.MapBuilder(device)
-        builder.add(palpate.simulate(letter))
-        builder.build(letter).save(tmp_path / f"{letter}.map.h5")
-    palpate.simulate("A", palpate.random_poses(2, seed=1)).save(tmp_path / "A.h5")
-    with palpate.open_sensor("simulate:E,object=5:3:40,touches=4,seed=3,speed=max") as sensor:
-        frames = list(sensor)
+    maps: list[palpate.OccupancyGrid], frames: list[palpate.Frame], tmp_path: pathlib.Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    for grid in maps[:2]:
+        grid.save(tmp_path / f"{grid.label}.map.h5")
+    valid = numpy.ones((2, 36), dtype=numpy.uint8)
+    valid[:, 7] = 0
+    array = palpate.Recording(numpy.zeros((2, 36)), [(0, 0, 0)] * 2, palpate.digitacts_array(), valid=valid)
+    array.save(tmp_path / "A.h5")
     parameters = {"maps": str(tmp_path), "recording": str(tmp_path / "A.h5"), "base_frame": "base"}
     ros = StandIns(parameters, frames)
     for name, module in ros.modules.items():
@@ -294,20 +251,20 @@ def test_the_node_publishes_what_it_finds(
     monkeypatch.delitem(sys.modules, "palpate_ros2.node", raising=False)
     node = importlib.import_module("palpate_ros2.node").Recognise()
     for frame in frames:
-        message = new("std_msgs/msg/Float32MultiArray")
-        message.data = numpy.array(frame.values, dtype=numpy.float32)
         ros.now_s = frame.host_time_s
+        message = message_of(frame)
+        message.data[7] = 1e3 * len(ros.asked)  # of the dead element
         node.take(message)
     assert ros.asked == [("base", "array")] * 4
     assert [text for text in ros.said if text.startswith("touch 4: E with probability 1.000, fits")]
     # Each message where something was found; the pose where it is sure.
     assert len(ros.published["~/map"]) == len(ros.published["~/markers"]) >= len(ros.published["~/pose"]) >= 1
     pose = sent(ros.published["~/pose"][-1])
-    truth = palpate.inverse((5.0, 3.0, math.radians(40)))
     assert pose.header.frame_id == "base"
-    assert (pose.pose.pose.position.x, pose.pose.pose.position.y) == pytest.approx(truth[:2] / 1000, abs=1e-3)
-    assert pose.pose.pose.position.z == pytest.approx(0.1)
+    at = pose.pose.pose.position
+    assert (at.x, at.y, at.z) == pytest.approx((*T_ROBOT_OBJECT[:2] / 1000, 0.1), abs=1e-3)
     assert node.next_unknown(None, SimpleNamespace()).message == "forgot 4 touches"
+    message = message_of(frames[0])
     message.data = message.data[:35]
     node.take(message)
     assert "35 readings for an array of 36 elements" in ros.said[-1]

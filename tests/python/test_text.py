@@ -1,13 +1,29 @@
-"""What objects say of themselves."""
+"""What objects say of themselves, and how they are shown."""
+
+import json
+import os
+import pathlib
+import urllib.request
 
 import numpy
 import pytest
+from conftest import error_of
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 import palpate
 
+Maps = list[palpate.OccupancyGrid]
+
+
+@pytest.fixture(scope="module")
+def record(device: palpate.Device, maps: Maps, unknown: palpate.Recording) -> palpate.Record:
+    [record] = palpate.recognize(unknown, maps, device=device)
+    return record
+
 
 def test_texts_tell_what_an_object_is(
-    device: palpate.Device, maps: list[palpate.OccupancyGrid], unknown: palpate.Recording
+    device: palpate.Device, maps: Maps, unknown: palpate.Recording, record: palpate.Record
 ) -> None:
     assert repr(device).startswith("Device('llvmpipe") or device.name not in ("", "llvmpipe")
     assert repr(maps[0]).startswith("OccupancyGrid('A', ")
@@ -18,8 +34,15 @@ def test_texts_tell_what_an_object_is(
     belief.update(unknown)
     assert "mode of object 1: x " in repr(belief.estimate())
     assert "+-" in repr(belief.refine())
-    [record] = palpate.recognize(unknown, maps, bins=(10, 10, 8), device=device)
     assert repr(record).startswith("Record('E' with probability ")
+
+
+def test_records_complete_and_hold_arrays(record: palpate.Record) -> None:
+    assert {"best", "refined", "mode"} <= set(dir(record))
+    assert {"sd", "covariance", "keys"} <= set(dir(record.refined))
+    assert record.refined.covariance.shape == (3, 3)
+    assert record.refined.sd.tolist() == record["refined"]["sd"]
+    assert record.mode.object == "E" and json.loads(json.dumps(record)) == record
     with pytest.raises(AttributeError, match="the record has no 'bset'; it has recording, "):
         record.bset  # noqa: B018
 
@@ -32,50 +55,45 @@ def test_poses_compose() -> None:
     both = palpate.transform(T_a_b, palpate.transform(T_b_c, points))
     assert numpy.allclose(both, palpate.transform(T_a_c, points), atol=1e-12)
     assert numpy.allclose(palpate.compose(T_a_c, palpate.inverse(T_a_c)), 0, atol=1e-12)
-    with pytest.raises(palpate.Error, match=r"T_a_b: shape \(2,\); give \(3,\)"):
-        palpate.inverse((1, 2))
+    assert error_of(palpate.inverse, (1, 2)).startswith("T_a_b: shape (2,); give (3,)")
 
 
-def test_pictures_are_of_maps_and_beliefs(
-    device: palpate.Device, maps: list[palpate.OccupancyGrid], unknown: palpate.Recording
+def test_pictures_are_of_maps_beliefs_and_records(
+    device: palpate.Device, maps: Maps, unknown: palpate.Recording, record: palpate.Record
 ) -> None:
     belief = palpate.PoseHistogram(device, maps)
     belief.update(unknown)
     for shown in (maps[0], belief.marginals(1)):
         png = shown._repr_png_()
-        assert png is not None
-        assert png.startswith(b"\x89PNG")
-    from matplotlib.figure import Figure
+        assert png is not None and png.startswith(b"\x89PNG")
 
-    ax = Figure().add_subplot()
+    def drawn(shown: palpate.OccupancyGrid | palpate.Recording | palpate.Record) -> Axes:
+        axes = Figure().add_subplot()
+        assert shown.plot(axes) is axes
+        return axes
+
     wide = palpate.OccupancyGrid("A", maps[0].log_odds[:40], cell_mm=0.5, origin_mm=(0, 0))
-    assert wide.plot(ax) is ax
-    assert ax.get_images()[0].get_extent() == pytest.approx((-0.25, wide.nx / 2 - 0.25, -0.25, 19.75))
-    ax = Figure().add_subplot()
-    assert unknown.plot(ax) is ax
-    [points] = ax.collections
-    assert len(points.get_offsets()) == unknown.pressure.size
-    ax = Figure().add_subplot()
-    [record] = palpate.recognize(unknown, maps, device=device)
-    assert record.plot(ax) is ax
-    for line, radius in zip(ax.lines[1:3], (1.515, 2.448), strict=True):
-        x, y, _ = record.refined.T_robot_object
-        sd_x, sd_y, _ = record.refined.sd
-        assert max(line.get_xdata()) - x == pytest.approx(radius * sd_x, rel=1e-2)
-        assert max(line.get_ydata()) - y == pytest.approx(radius * sd_y, rel=1e-2)
-    ax = Figure().add_subplot()
-    assert maps[0].plot(ax) is ax
-    left, right, bottom, top = ax.get_images()[0].get_extent()
+    assert drawn(wide).get_images()[0].get_extent() == pytest.approx((-0.25, wide.nx / 2 - 0.25, -0.25, 19.75))
+    left, right, bottom, top = drawn(maps[0]).get_images()[0].get_extent()
     assert right - left == pytest.approx(maps[0].nx * maps[0].cell_mm)
     assert (left + 0.25, bottom + 0.25) == pytest.approx(tuple(maps[0].origin_mm))
+    [points] = drawn(unknown).collections
+    assert len(points.get_offsets()) == unknown.pressure.size
+    for line, radius in zip(drawn(record).lines[1:3], (1.515, 2.448), strict=True):
+        for data, axis in ((line.get_xdata(), 0), (line.get_ydata(), 1)):
+            reach = max(data) - record.refined.T_robot_object[axis]
+            assert reach == pytest.approx(radius * record.refined.sd[axis], rel=1e-2)
 
 
-def test_the_pose_error_is_that_of_the_refined_pose(
-    maps: list[palpate.OccupancyGrid], unknown: palpate.Recording, device: palpate.Device
-) -> None:
-    [record] = palpate.recognize(unknown, maps, device=device)
-    assert unknown.truth is not None
-    refined = (record.refined["x_mm"], record.refined["y_mm"], record.refined["theta_rad"])
-    error = palpate.pose_error_mm(maps[1], refined, unknown.truth.T_object_robot)
-    assert error == record.refined_error_mm
-    assert error < 1.0
+def test_show_serves_files_and_draws_what_is_in_memory(tmp_path: pathlib.Path, maps: Maps) -> None:
+    command = os.environ["PALPATE_COMMAND"]
+    maps[0].save(tmp_path / "A.map.h5")
+    page = palpate.show(tmp_path / "A.map.h5", command=command)
+    assert isinstance(page, palpate.Page)
+    with urllib.request.urlopen(page.url + "file/0") as answer:
+        assert json.load(answer)["label"] == "A"
+    assert f'<iframe src="{page.url}"' in page._repr_html_()
+    page.close()
+    assert "nothing.h5: no such file" in error_of(palpate.show, tmp_path / "nothing.h5", command=command)
+    axes = palpate.show(maps[0])
+    assert not isinstance(axes, palpate.Page) and axes.get_xlabel() == "x, mm"

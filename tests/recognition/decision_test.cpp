@@ -1,9 +1,21 @@
-// What a decision to act asks for, and what it says where it is not to.
+// Where a belief lies, by every filter, what a decision to act asks for, and what it says where it
+// is not to.
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <optional>
+#include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
+#include <glm/geometric.hpp>
 
+#include "estimation/lattice/refinement.hpp"
+#include "recognition/belief_modes.hpp"
 #include "recognition/recognition_record.hpp"
 #include "shapes.hpp"
+#include "support/unknown_of.hpp"
 
 namespace palpate::decision_test {
 
@@ -103,6 +115,164 @@ TEST(Decision, SaysWhatSpeaksAgainst) {
   step.identity = {0.9, 0.1, 0.0};
   step.places.within_mm = 0.9;
   EXPECT_TRUE(decide(step, task).act) << "the task's own costs";
+}
+
+class Places : public testing::Test {
+ protected:
+  /// The last step of a letter's first touches.
+  RecognitionStep step_by(std::size_t filter, std::size_t touches) {
+    const RecognitionTask task(shapes(), every_filter()[filter]);
+    Recogniser recogniser(shared_device(), task);
+    return take_step(recogniser, task, recording.touches(0, touches), unknown_of(recording).truth);
+  }
+
+  Recording recording = touched_letter(5);
+};
+
+TEST_F(Places, AreTheMassesOfTheFullHistogram) {
+  const RecognitionTask task(shapes(), every_filter()[0]);
+  for (const std::size_t touches : {1U, 3U, 6U}) {
+    Recogniser recogniser(shared_device(), task);
+    const RecognitionStep step = take_step(recogniser, task, recording.touches(0, touches), {});
+    PoseLattice lattice;
+    const auto likely = recogniser.likely_bins(std::vector{0, 1}, 1e-6, lattice);
+    double near = 0.0;
+    for (const std::size_t object : {0U, 1U}) {
+      std::vector<double> shares = recogniser.histogram()->log_likelihood(static_cast<int>(object));
+      const double top = *std::ranges::max_element(shares);
+      double sum = 0.0;
+      for (double& share : shares) {
+        share = std::exp(share - top);
+        sum += share;
+      }
+      double mass = 0.0;
+      for (const auto& [bin, share] : likely[object]) {
+        mass += share;
+        EXPECT_NEAR(share, shares[static_cast<std::size_t>(bin)] / sum, 1e-6);
+        if (static_cast<int>(object) == step.mode.object) {
+          const double mm = pose_error_mm(displaced_body(task.hypotheses[object].map),
+                                          step.symmetry, step.pose(), lattice.T_object_robot(bin));
+          near += mm <= neighbourhood_mm ? step.identity[object] * share : 0.0;
+        }
+      }
+      EXPECT_NEAR(mass, 1.0, 0.01) << "6,400 bins below 1e-6 each";
+    }
+    EXPECT_NEAR(step.places.share, near, 1e-3) << "which adds bins from 1.5e-7 on";
+    double all = 0.0;
+    for (const BeliefMode& mode : step.places.modes) {
+      all += mode.probability;
+      EXPECT_LE(mode.probability, step.identity[static_cast<std::size_t>(mode.object)] + 1e-9);
+    }
+    EXPECT_LE(all, 1.0 + 1e-9);
+    EXPECT_GT(all, 0.5);
+    EXPECT_LE(step.places.modes.size(), 5U);
+    EXPECT_TRUE(
+        std::ranges::is_sorted(step.places.modes, std::greater<>(), &BeliefMode::probability));
+  }
+}
+
+TEST_F(Places, AreTheSameByBoundsAsByTheHistogram) {
+  for (const std::size_t touches : {1U, 2U, 6U}) {
+    const RecognitionStep dense = step_by(0, touches);
+    const RecognitionStep bounded = step_by(2, touches);
+    ASSERT_EQ(bounded.places.modes.size(), dense.places.modes.size());
+    for (std::size_t i = 0; i < dense.places.modes.size(); ++i) {
+      const BeliefMode& a = dense.places.modes[i];
+      const BeliefMode& b = bounded.places.modes[i];
+      EXPECT_EQ(a.object, b.object);
+      // The histogram rounds in float32.
+      EXPECT_NEAR(a.probability, b.probability, 1e-4);
+      EXPECT_LT(
+          glm::distance(a.pose.T_robot_object.translation_mm, b.pose.T_robot_object.translation_mm),
+          1e-2);
+    }
+    EXPECT_NEAR(dense.places.share, bounded.places.share, 1e-3);
+    EXPECT_EQ(dense.places.own, bounded.places.own);
+    EXPECT_EQ(dense.decision.act, bounded.decision.act);
+  }
+}
+
+TEST_F(Places, OfOneLabelWeighAsTheTemperatureHasLabelsWeigh) {
+  constexpr double temperature = 2.5;
+  // The same touch twice leaves the modes that one touch leaves.
+  const std::vector<Touch> twice(2, recording.touch(0));
+  for (const std::size_t filter : {0U, 2U}) {
+    RecognitionTask task(shapes(), every_filter()[filter]);
+    Recogniser recogniser(shared_device(), task);
+    const RecognitionStep plain = take_step(recogniser, task, twice, {});
+    task.sensor.temperature = temperature - 0.5;
+    task.sensor.temperature_growth = 0.5;
+    recogniser.reset();
+    const RecognitionStep tempered = take_step(recogniser, task, twice, {});
+    std::vector<std::pair<double, double>> weights;  // of modes of the pose's object
+    for (const BeliefMode& a : plain.places.modes) {
+      for (const BeliefMode& b : tempered.places.modes) {
+        if (a.object == plain.mode.object && b.object == a.object &&
+            a.best.theta_rad == b.best.theta_rad &&
+            a.best.translation_mm == b.best.translation_mm) {
+          weights.emplace_back(a.probability, b.probability);
+        }
+      }
+    }
+    ASSERT_GE(weights.size(), 2U);
+    double gained = 0.0;
+    for (const auto& [before, now] : weights) {
+      gained += now - before;
+      const double ratio = before / weights.front().first;
+      EXPECT_NEAR(now / weights.front().second, std::pow(ratio, 1.0 / temperature), 1e-6);
+    }
+    EXPECT_NEAR(gained, 0.0, 1e-5);
+    // The bins go with the mode that they are of.
+    ASSERT_TRUE(plain.places.own && tempered.places.own);
+    EXPECT_NEAR(tempered.places.share / tempered.places.modes[*tempered.places.own].probability,
+                plain.places.share / plain.places.modes[*plain.places.own].probability, 0.02);
+    EXPECT_LT(tempered.places.share, plain.places.share);
+    EXPECT_GT(tempered.places.within_mm.value(), plain.places.within_mm.value());
+  }
+}
+
+TEST_F(Places, OfAnObjectThatLooksAlikeWhenTurnedAreOneWhicheverHasTheMode) {
+  for (const std::size_t filter : {0U, 2U}) {
+    const auto modes_of_disc = [&](std::optional<int> suggested) {
+      std::vector<Hypothesis> maps = shapes();
+      maps[1].map.symmetry = 1;  // a disc, which is not the mode's object
+      maps[1].map.suggested_symmetry = suggested;
+      RecognitionTask task(maps, every_filter()[filter]);
+      task.sensor.temperature = 20.0;  // the disc has a share
+      Recogniser recogniser(shared_device(), task);
+      const RecognitionStep step = take_step(recogniser, task, recording.touches(0, 1), {});
+      EXPECT_EQ(step.mode.object, 0);
+      return std::ranges::count(step.places.modes, 1, &BeliefMode::object);
+    };
+    const auto apart = modes_of_disc({});
+    EXPECT_GT(apart, 1);
+    EXPECT_LT(modes_of_disc(0), apart);
+  }
+}
+
+TEST_F(Places, AreNoneBeforeATouchReachesTheBelief) {
+  std::ranges::fill(recording.pressure, 0.0);
+  RecognitionTask task(shapes(), every_filter()[2]);
+  task.auto_pivot = true;
+  const RecognitionStep step = last_step(task, recording);
+  EXPECT_TRUE(step.places.modes.empty());
+  EXPECT_FALSE(step.places.within_mm || step.places.peak);
+  EXPECT_FALSE(step.decision.act);
+}
+
+TEST_F(Places, OfParticlesAreWhereTheHistogramsAre) {
+  const RecognitionStep dense = step_by(0, 6);
+  const RecognitionStep particles = step_by(1, 6);
+  ASSERT_FALSE(dense.places.modes.empty());
+  ASSERT_FALSE(particles.places.modes.empty());
+  const BeliefMode& a = dense.places.modes.front();
+  const BeliefMode& b = particles.places.modes.front();
+  EXPECT_EQ(a.object, b.object);
+  EXPECT_GT(b.probability, 0.5);
+  // Motion noise of 1 mm and 0.1 rad comes between, and bins of 22.5 degrees.
+  EXPECT_LT(pose_error_mm(displaced_body(shapes()[a.object].map), 1, inverse(a.pose.T_robot_object),
+                          inverse(b.pose.T_robot_object)),
+            3.0);
 }
 
 }  // namespace palpate::decision_test

@@ -1,6 +1,8 @@
 #include "recognition/evaluation.hpp"
 
 #include <cmath>
+#include <span>
+#include <vector>
 
 #include <gmock/gmock.h>
 
@@ -26,30 +28,30 @@ std::vector<JudgedRecord> six() {
           record("M", "(none)", 0.2, 0.1, 0.7), record("M", "A", 0.85, 0.1, 0.05)};
 }
 
-TEST(Evaluation, CountsWhatIsRight) {
+TEST(Evaluation, CountsWhatIsRightAndItsLogLoss) {
   const Evaluation e = evaluate(six());
   EXPECT_EQ(e.all.records, 6u);
   EXPECT_EQ(e.all.right, 3u) << "M is \"(none)\"";
   EXPECT_DOUBLE_EQ(e.all.accuracy(), 0.5);
   EXPECT_DOUBLE_EQ(e.all.interval().low, wilson_interval(3, 6).low);
+  EXPECT_NEAR(e.all.log_loss, 1.0537453, 1e-6) << "-ln(0.9 0.2 0.95 0.3 0.7 0.05) / 6";
   EXPECT_EQ(e.known.value().records, 4u);
   EXPECT_EQ(e.known->right, 2u);
+  EXPECT_NEAR(e.known->log_loss, 0.7425161, 1e-6) << "-ln(0.9 0.2 0.95 0.3) / 4";
   EXPECT_EQ(e.unknown.value().records, 2u);
   EXPECT_EQ(e.unknown->right, 1u);
-}
 
-TEST(Evaluation, LogLossIsOfTheRightAnswer) {
-  const Evaluation e = evaluate(six());
-  EXPECT_NEAR(e.all.log_loss, 1.0537453, 1e-6) << "-ln(0.9 0.2 0.95 0.3 0.7 0.05) / 6";
-  EXPECT_NEAR(e.known->log_loss, 0.7425161, 1e-6) << "-ln(0.9 0.2 0.95 0.3) / 4";
+  const auto known_alone = six();
+  const Evaluation without = evaluate(std::span(known_alone).first(4));
+  EXPECT_FALSE(without.known || without.unknown || without.known_against_unknown);
 }
 
 TEST(Evaluation, AnImpossibleAnswerCostsTheFloor) {
-  const std::vector wrong{record("A", "B", 0.0, 1.0, 0.0)};
-  EXPECT_NEAR(evaluate(wrong).all.log_loss, 27.631, 1e-3) << "-ln 1e-12";
-  std::vector without_none{record("M", "B", 0.0, 1.0, 0.0)};
-  without_none[0].identity.erase("(none)");
-  EXPECT_NEAR(evaluate(without_none).all.log_loss, 27.631, 1e-3);
+  std::vector wrong{record("A", "B", 0.0, 1.0, 0.0), record("M", "B", 0.0, 1.0, 0.0)};
+  wrong[1].identity.erase("(none)");
+  for (const JudgedRecord& each : wrong) {
+    EXPECT_NEAR(evaluate(std::span(&each, 1)).all.log_loss, 27.631, 1e-3) << "-ln 1e-12";
+  }
 }
 
 TEST(Evaluation, CalibrationErrorWeighsTheBinsByTheirRecords) {
@@ -102,13 +104,6 @@ TEST(Evaluation, AClassMayBeKnownInSomeRecordsOnly) {
   EXPECT_EQ(e.classes[2].right, 1u);
 }
 
-TEST(Evaluation, WithoutUnknownClassesHasNothingToTellApart) {
-  std::vector<JudgedRecord> records = six();
-  records.resize(4);
-  const Evaluation e = evaluate(records);
-  EXPECT_FALSE(e.known || e.unknown || e.known_against_unknown);
-}
-
 TEST(KnownAgainstUnknown, PrefersNoneToTheFit) {
   std::vector<JudgedRecord> records = six();
   const auto by_none = evaluate(records).known_against_unknown.value();
@@ -123,9 +118,9 @@ TEST(KnownAgainstUnknown, PrefersNoneToTheFit) {
   }
   EXPECT_EQ(evaluate(records).known_against_unknown->score, KnownScore::none);
   records[0].none.reset();
-  EXPECT_EQ(evaluate(records).known_against_unknown->score, KnownScore::fit)
-      << "one record has no other score";
-  EXPECT_EQ(evaluate(records).known_against_unknown->area, 1.0);
+  const auto by_fit = evaluate(records).known_against_unknown.value();
+  EXPECT_EQ(by_fit.score, KnownScore::fit) << "one record has no other score";
+  EXPECT_EQ(by_fit.area, 1.0);
 }
 
 TEST(KnownAgainstUnknown, TakesTheFitOfTheRecordsThatHaveOne) {
@@ -158,6 +153,35 @@ TEST(Evaluation, MediansAreOverTheRecordsThatHaveAnError) {
   EXPECT_DOUBLE_EQ(e.error_mm->value, 2.5);
   EXPECT_EQ(e.refined_error_mm.value().count, 1u);
   EXPECT_DOUBLE_EQ(e.refined_error_mm->value, 0.25);
+}
+
+TEST(WilsonInterval, HasThePublishedEnds) {
+  // Newcombe 1998, table I: 81 of 263 and 0 of 20, to four digits.
+  EXPECT_NEAR(wilson_interval(81, 263).low, 0.2553, 5e-5);
+  EXPECT_NEAR(wilson_interval(81, 263).high, 0.3662, 5e-5);
+  EXPECT_EQ(wilson_interval(0, 20).low, 0.0);
+  EXPECT_NEAR(wilson_interval(0, 20).high, 0.1611, 5e-5);
+  EXPECT_EQ(wilson_interval(20, 20).high, 1.0);
+}
+
+TEST(ToldApart, CountsPairsAndHalfOfTies) {
+  const std::vector higher{0.9, 0.4, 0.8};
+  const std::vector lower{0.5, 0.4};
+  // 0.9 and 0.8 exceed both, 0.4 is a tie with 0.4 and below 0.5.
+  EXPECT_DOUBLE_EQ(told_apart(lower, higher), 4.5 / 6.0);
+  EXPECT_DOUBLE_EQ(told_apart(higher, lower), 1.5 / 6.0);
+  EXPECT_DOUBLE_EQ(told_apart(std::vector{0.0}, higher), 1.0);
+}
+
+TEST(ToldApart, HasTheErrorOfHanleyAndMcNeil) {
+  // Area 0.75, two and three values: Q1 = 0.75 / 1.25 = 0.6, Q2 = 2 * 0.5625 / 1.75 = 0.642857;
+  // (0.1875 + 2 * 0.0375 + 1 * 0.080357) / 6 = 0.0571429.
+  EXPECT_NEAR(told_apart_error(0.75, 2, 3), std::sqrt(0.0571429), 1e-6);
+  // Their example of 58 normal and 51 abnormal images, with an area of 0.893.
+  EXPECT_NEAR(told_apart_error(0.893, 58, 51), 0.0325, 5e-5);
+  EXPECT_EQ(told_apart_error(1.0, 4, 5), 0.0);
+  EXPECT_EQ(told_apart_error(0.0, 4, 5), 0.0);
+  EXPECT_NEAR(told_apart_error(0.5, 1, 1), 0.5, 1e-12);
 }
 
 }  // namespace palpate::evaluation_test

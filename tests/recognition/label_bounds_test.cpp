@@ -5,22 +5,23 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <limits>
 #include <numeric>
+#include <optional>
 
 #include "recognition/recognition_record.hpp"
 #include "shapes.hpp"
+#include "support/limits.hpp"
 #include "support/synthetic.hpp"
-#include "support/unknown_of.hpp"
+#include "support/trials.hpp"
 
 namespace palpate::label_bounds_test {
 
-/// Maps of L, disc and L again: labels L and disc, and with a weight "(none)".
-RecognitionTask three_maps(std::optional<double> none_weight) {
-  std::vector<Hypothesis> maps = shapes();
-  maps.push_back(maps[0]);
-  return {maps, BoundedOptions{.none_weight = none_weight}};
+/// Labels L and disc, and with a weight "(none)".
+RecognitionTask by_bounds(std::optional<double> none_weight = {}) {
+  return {three_maps(), BoundedOptions{.none_weight = none_weight}};
 }
+
+constexpr double nothing = -infinity;
 
 /// Evidence of three hypotheses and of none, as a filter that evaluated the lows tells it; none's
 /// is at most so many times as large.
@@ -43,46 +44,38 @@ Estimate estimate_of(const std::vector<LogInterval>& evidence, double none,
   return estimate;
 }
 
-TEST(LabelBounds, AreTheProbabilitiesWhereTheEvidenceIsExact) {
-  const RecognitionTask task = three_maps({});
-  const RecognitionStep step =
-      judge(estimate_of({{-3.0, -3.0}, {-2.0, -2.0}, {-4.0, -4.0}}, 0.0), {}, task);
-  ASSERT_EQ(step.identity_bounds.size(), 2u);
-  for (std::size_t i = 0; i < 2; ++i) {
-    // Sums of three logs in float64.
-    EXPECT_NEAR(step.identity_bounds[i].low, step.identity[i], 1e-14);
-    EXPECT_NEAR(step.identity_bounds[i].high, step.identity[i], 1e-14);
-  }
-}
-
-TEST(LabelBounds, HoldTheProbabilityHoweverItIsRounded) {
-  const RecognitionTask task = three_maps({});
+TEST(LabelBounds, AreTheProbabilitiesOfExactEvidenceHoweverTheseAreRounded) {
+  const RecognitionTask task = by_bounds();
   const Estimate estimate = estimate_of({{-3.0, -3.0}, {-2.0, -2.0}, {-4.0, -4.0}}, 0.0);
   const Tempering tempering = tempering_of({}, task);
   std::vector<double> identity = label_probabilities(estimate, tempering, task);
-  identity[0] *= 1.0 - 1e-12;
-  identity[1] *= 1.0 + 1e-12;
-  const auto bounds = label_bounds(estimate, identity, tempering, task);
-  for (std::size_t i = 0; i < 2; ++i) {
-    EXPECT_LE(bounds[i].low, identity[i]);
-    EXPECT_GE(bounds[i].high, identity[i]);
+  for (const double rounding : {1e-14, 1e-12}) {  // the first is of sums of three logs in float64
+    identity[0] *= 1.0 - rounding;
+    identity[1] *= 1.0 + rounding;
+    const auto bounds = label_bounds(estimate, identity, tempering, task);
+    ASSERT_EQ(bounds.size(), 2u);
+    for (std::size_t i = 0; i < 2; ++i) {
+      EXPECT_LE(bounds[i].low, identity[i]);
+      EXPECT_GE(bounds[i].high, identity[i]);
+      EXPECT_LE(bounds[i].high - bounds[i].low, 2.0 * rounding);
+    }
   }
 }
 
 TEST(LabelBounds, OfOneLabelAreCertain) {
-  RecognitionTask task({shapes()[0], shapes()[0]}, BoundedOptions{});
-  const Estimate estimate = estimate_of({{-9.0, 0.0}, {-8.0, -2.0}}, 0.0);
-  const RecognitionStep step = judge(estimate, {}, task);
-  ASSERT_EQ(step.identity_bounds.size(), 1u);
-  EXPECT_EQ(step.identity_bounds[0].low, 1.0) << "whichever of its maps it is";
-  EXPECT_EQ(step.identity_bounds[0].high, 1.0);
+  const RecognitionTask task({shapes()[0], shapes()[0]}, BoundedOptions{});
+  const auto bounds =
+      judge(estimate_of({{-9.0, 0.0}, {-8.0, -2.0}}, 0.0), {}, task).identity_bounds;
+  ASSERT_EQ(bounds.size(), 1u);
+  EXPECT_EQ(bounds[0].low, 1.0) << "whichever of its maps it is";
+  EXPECT_EQ(bounds[0].high, 1.0);
 }
 
 TEST(LabelBounds, HoldEveryEvidenceWithinItsBoundsAndAreReached) {
   Uniform random(3);
-  for (int trial = 0; trial < 200; ++trial) {
+  for (int trial = 0; trial < trials(100); ++trial) {
     const double none = trial % 2 == 0 ? 0.0 : std::exp(random(-8.0, 2.0));
-    const RecognitionTask task = three_maps(none > 0.0 ? std::optional(1.0) : std::nullopt);
+    const RecognitionTask task = by_bounds(none > 0.0 ? std::optional(1.0) : std::nullopt);
     std::vector<LogInterval> evidence;
     for (int h = 0; h < 3; ++h) {
       const double low = random(-6.0, 0.0);
@@ -111,56 +104,46 @@ TEST(LabelBounds, HoldEveryEvidenceWithinItsBoundsAndAreReached) {
       // A probability is monotone in each evidence, so that its extremes lie in the corners.
       EXPECT_NEAR(step.identity_bounds[i].low, seen[i].low, 1e-12);
       EXPECT_NEAR(step.identity_bounds[i].high, seen[i].high, 1e-12);
-      EXPECT_LE(step.identity_bounds[i].low, step.identity[i]);
-      EXPECT_GE(step.identity_bounds[i].high, step.identity[i]);
     }
   }
 }
 
 TEST(LabelBounds, OfEvidenceThatNothingIsKnownOf) {
-  constexpr double nothing = -std::numeric_limits<double>::infinity();
-  Estimate estimate = estimate_of({{0.0, 0.0}, {nothing, -2000.0}, {nothing, 1.0}}, 0.0);
-  const RecognitionStep step = judge(estimate, {}, three_maps({}));
-  EXPECT_EQ(step.identity_bounds[1].low, 0.0);
-  EXPECT_EQ(step.identity_bounds[1].high, 0.0) << "below every float64";
-  EXPECT_EQ(step.identity_bounds[0].low, 1.0);
-  EXPECT_EQ(step.identity_bounds[0].high, 1.0);
+  const auto bounds =
+      judge(estimate_of({{0.0, 0.0}, {nothing, -2000.0}, {nothing, 1.0}}, 0.0), {}, by_bounds())
+          .identity_bounds;
+  EXPECT_EQ(bounds[1].low, 0.0);
+  EXPECT_EQ(bounds[1].high, 0.0) << "below every float64";
+  EXPECT_EQ(bounds[0].low, 1.0);
+  EXPECT_EQ(bounds[0].high, 1.0);
 }
 
 TEST(LabelBounds, OfASearchThatEvaluatedNothing) {
-  constexpr double nothing = -std::numeric_limits<double>::infinity();
-  const RecognitionTask task({shapes()[0]}, BoundedOptions{});
   const Estimate estimate{.identity = {1.0},
                           .certificate = Certificate{.log_evidence = {{nothing, 0.0}}}};
-  const RecognitionStep step = judge(estimate, {}, task);
-  EXPECT_EQ(step.identity_bounds[0].low, 0.0) << "and no NaN";
-  EXPECT_EQ(step.identity_bounds[0].high, 1.0);
+  const auto bounds =
+      judge(estimate, {}, RecognitionTask({shapes()[0]}, BoundedOptions{})).identity_bounds;
+  EXPECT_EQ(bounds[0].low, 0.0) << "and no NaN";
+  EXPECT_EQ(bounds[0].high, 1.0);
 }
 
-TEST(LabelBounds, AreOfBoundsAlone) {
-  Device device = Device::open();
-  const Recording recording = touched_letter(1);
-  for (const FilterOptions& filter : every_filter()) {
-    const RecognitionTask task(shapes(), filter);
-    Recogniser recogniser(device, task);
-    const RecognitionRecord record = recognise(recogniser, task, unknown_of(recording), true);
-    for (const RecognitionStep& step : record.trace) {
-      if (!std::holds_alternative<BoundedOptions>(filter)) {
-        EXPECT_FALSE(step.certificate);
-        EXPECT_TRUE(step.identity_bounds.empty());
-        continue;
-      }
-      ASSERT_TRUE(step.certificate);
+class LabelBoundsOfAStep : public ByEveryFilter {};
+
+TEST_P(LabelBoundsOfAStep, AreOfBoundsAlone) {
+  const RecognitionTask task(shapes(), filter());
+  for (const RecognitionStep& step : recognised(task, touched_letter(1), true).trace) {
+    ASSERT_EQ(step.certificate.has_value(), bounded());
+    ASSERT_EQ(step.identity_bounds.size(), bounded() ? 2u : 0u);
+    for (std::size_t i = 0; i < step.identity_bounds.size(); ++i) {
       EXPECT_LE(step.certificate->dropped_mass, 1e-6) << "the tolerance";
-      ASSERT_EQ(step.identity_bounds.size(), 2u);
-      for (std::size_t i = 0; i < 2; ++i) {
-        EXPECT_LE(step.identity_bounds[i].low, step.identity[i]);
-        EXPECT_GE(step.identity_bounds[i].high, step.identity[i]);
-        // All of the mass that is dropped may be of one label.
-        EXPECT_LE(step.identity_bounds[i].high - step.identity_bounds[i].low, 2.1e-6);
-      }
+      EXPECT_LE(step.identity_bounds[i].low, step.identity[i]);
+      EXPECT_GE(step.identity_bounds[i].high, step.identity[i]);
+      // All of the mass that is dropped may be of one label.
+      EXPECT_LE(step.identity_bounds[i].high - step.identity_bounds[i].low, 2.1e-6);
     }
   }
 }
+
+INSTANTIATE_TEST_SUITE_P(By, LabelBoundsOfAStep, each_filter, filter_name);
 
 }  // namespace palpate::label_bounds_test

@@ -4,8 +4,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 #include <optional>
 #include <utility>
 
@@ -17,11 +19,9 @@
 
 namespace palpate::label_probability_test {
 
-/// Maps of L, disc and L again.
-RecognitionTask three_maps(const FilterOptions& filter = HistogramOptions{}) {
-  std::vector<Hypothesis> maps = shapes();
-  maps.push_back(maps[0]);
-  return {maps, filter};
+/// Two labels of three maps.
+RecognitionTask two_labels(const FilterOptions& filter = HistogramOptions{}) {
+  return {three_maps(), filter};
 }
 
 /// Evidence of 3 and 1 of the maps of L, of 1 of the disc.
@@ -29,141 +29,111 @@ Estimate four_to_one() {
   return {.identity = {0.6, 0.2, 0.2}, .log_evidence = {std::log(3.0), 0.0, 0.0}};
 }
 
-/// A press of two elements in contact of three, with features log 3, log 8 and log 6.
-class Press {
- public:
-  Touch touch() const {
-    return {.T_robot_sensor = {}, .elements_mm = elements_mm_, .pressure = pressure_};
-  }
-  static constexpr std::array<double, 3> of_one{3.0, 8.0, 6.0};
+/// Presses of two elements in contact of three, with features log 3, log 8 and log 6.
+std::vector<Touch> presses(std::size_t count) {
+  static const std::vector<glm::dvec2> elements_mm(3);
+  static const std::vector<double> pressure{10.0, 0.0, 4.0};
+  return std::vector<Touch>(
+      count, {.T_robot_sensor = {}, .elements_mm = elements_mm, .pressure = pressure});
+}
+constexpr std::array<double, 3> features_of_one{3.0, 8.0, 6.0};
 
- private:
-  std::vector<glm::dvec2> elements_mm_ = std::vector<glm::dvec2>(3);
-  std::vector<double> pressure_{10.0, 0.0, 4.0};
-};
+/// The step after so many of these presses.
+RecognitionStep step_after(std::size_t count, const Estimate& estimate,
+                           const RecognitionTask& task) {
+  return judge(estimate, {}, task, evidence_of(presses(count), task.contact()));
+}
 
 /// Any object's features are about 0, and the letter's about those of the press.
 LearnedFeatures features_of_the_letter() {
   FeatureDistribution any{.mean = {0.0, 0.0, 0.0}, .sd = {1.0, 1.0, 1.0}};
   FeatureDistribution letter = any;
-  for (std::size_t i = 0; i < 3; ++i) {
-    letter.mean[i] = std::log(Press::of_one[i]);
-  }
+  std::ranges::transform(features_of_one, letter.mean.begin(),
+                         [](double x) { return std::log(x); });
   return {.weight = 0.5, .any = any, .objects = {{"L", letter}}};
 }
 
 /// What one press says for the letter: half of half the squared distance to any object's mean.
 double nats_of_one_press() {
   double squares = 0.0;
-  for (const double one : Press::of_one) {
+  for (const double one : features_of_one) {
     squares += std::log(one) * std::log(one);
   }
   return 0.5 * 0.5 * squares;
 }
 
-TEST(LabelProbability, IsTheSumOfTheMapsAtTemperatureOne) {
-  EXPECT_EQ(judge(four_to_one(), {}, three_maps()).identity, (std::vector<double>{0.8, 0.2}));
-}
-
-TEST(LabelProbability, IsTheRootOfTheEvidenceAtTemperatureTwo) {
-  RecognitionTask task = three_maps();
-  task.sensor.temperature = 2.0;
-  const RecognitionStep step = judge(four_to_one(), {}, task);
-  // Evidence 4 and 1.
-  EXPECT_NEAR(step.identity[0], 2.0 / 3.0, 1e-15);
-  EXPECT_NEAR(step.identity[1], 1.0 / 3.0, 1e-15);
-  EXPECT_EQ(step.best, 0u);
-}
-
-TEST(LabelProbability, IsTemperedMoreWithEveryTouch) {
-  RecognitionTask task = three_maps();
-  task.sensor.temperature = 1.0;
-  task.sensor.temperature_growth = 0.5;
-  const Press press;
-  for (const std::size_t touches : {1U, 2U, 3U}) {
-    const std::vector<Touch> all(touches, press.touch());
-    const double times = std::pow(4.0, 1.0 / (0.5 + 0.5 * static_cast<double>(touches)));
-    const RecognitionStep step = judge(four_to_one(), {}, task, evidence_of(all, task.contact()));
-    EXPECT_NEAR(step.identity[0], times / (times + 1.0), 1e-15) << touches;
+TEST(LabelProbability, IsARootOfTheEvidenceTimesWhatFeaturesSay) {
+  const double press = std::exp(nats_of_one_press());
+  struct Row {
+    const char* name;
+    double temperature;
+    double growth;
+    std::size_t presses;
+    bool features;
+    std::optional<double> none;  ///< evidence
+    std::vector<double> odds;    ///< of L, the disc and "(none)"
+  };
+  const Row rows[] = {
+      {"sum of the maps", 1.0, 0.0, 0, false, {}, {4.0, 1.0}},
+      {"root of the evidence", 2.0, 0.0, 0, false, {}, {2.0, 1.0}},
+      {"root of none's, too", 2.0, 0.0, 0, false, 9.0, {2.0, 1.0, 3.0}},
+      {"first touch", 1.0, 0.5, 1, false, {}, {4.0, 1.0}},
+      {"second touch", 1.0, 0.5, 2, false, {}, {std::pow(4.0, 1.0 / 1.5), 1.0}},
+      {"third touch", 1.0, 0.5, 3, false, {}, {2.0, 1.0}},
+      {"features, none's as any's", 2.0, 0.0, 2, true, 1.0, {2.0 * press * press, 1.0, 1.0}},
+      {"features that turn it round", 1.0, 0.0, 1, true, 5.0, {4.0 * press, 1.0, 5.0}}};
+  for (const auto& [name, temperature, growth, presses, features, none, odds] : rows) {
+    SCOPED_TRACE(name);
+    RecognitionTask task =
+        two_labels(HistogramOptions{.none_weight = none ? std::optional(1.0) : std::nullopt});
+    task.sensor.temperature = temperature;
+    task.sensor.temperature_growth = growth;
+    if (features) {
+      task.sensor.features = features_of_the_letter();
+    }
+    Estimate estimate = four_to_one();
+    if (none) {
+      estimate.none_log_evidence = std::log(*none);
+    }
+    const RecognitionStep step = step_after(presses, estimate, task);
+    const double total = std::accumulate(odds.begin(), odds.end(), 0.0);
+    ASSERT_EQ(step.identity.size(), odds.size());
+    for (std::size_t i = 0; i < odds.size(); ++i) {
+      EXPECT_NEAR(step.identity[i], odds[i] / total, 1e-14);
+    }
+    EXPECT_EQ(odds[step.best], *std::ranges::max_element(odds));
   }
 }
 
 TEST(LabelProbability, IsNotTemperedByTouchesThatTellNothing) {
-  RecognitionTask task = three_maps();
+  RecognitionTask task = two_labels();
   task.sensor.temperature_growth = 0.5;
-  const Press press;
-  std::vector<TouchEvidence> touches = evidence_of(std::vector(1, press.touch()), task.contact());
-  const RecognitionStep one = judge(four_to_one(), {}, task, touches);
-  TouchEvidence silent = touches.front();
-  silent.readings.assign(silent.readings.size(), Reading::unknown);
-  silent.contacts = 0;
-  touches.insert(touches.begin(), silent);
-  const RecognitionStep two = judge(four_to_one(), {}, task, touches);
-  EXPECT_EQ(two.identity, one.identity);
-}
-
-TEST(LabelProbability, TempersNoneOfTheseToo) {
-  RecognitionTask task = three_maps(HistogramOptions{.none_weight = 1.0});
-  task.sensor.temperature = 2.0;
-  Estimate estimate = four_to_one();
-  estimate.none_log_evidence = std::log(9.0);
-  const RecognitionStep step = judge(estimate, {}, task);
-  EXPECT_NEAR(step.identity[0], 2.0 / 6.0, 1e-15);
-  EXPECT_NEAR(step.identity[1], 1.0 / 6.0, 1e-15);
-  EXPECT_NEAR(step.identity[2], 3.0 / 6.0, 1e-15);
-  EXPECT_EQ(task.labels[step.best], none_label);
+  std::vector<TouchEvidence> touches = evidence_of(presses(2), task.contact());
+  touches[0].readings.assign(3, Reading::unknown);
+  touches[0].contacts = 0;
+  EXPECT_EQ(judge(four_to_one(), {}, task, touches).identity,
+            step_after(1, four_to_one(), task).identity);
 }
 
 TEST(LabelProbability, ReachesEvidenceBelowEveryNumber) {
-  RecognitionTask task = three_maps();
+  RecognitionTask task = two_labels();
   task.sensor.temperature = 1000.0;
   const Estimate estimate{.identity = {1.0, 0.0, 0.0}, .log_evidence = {0.0, -2000.0, -9000.0}};
   const RecognitionStep step = judge(estimate, {}, task);
   EXPECT_NEAR(step.identity[1] / step.identity[0], std::exp(-2.0), 1e-14);
 }
 
-TEST(LabelProbability, AddsWhatEveryPressSaysAfterTheTemperature) {
-  RecognitionTask task = three_maps(HistogramOptions{.none_weight = 1.0});
-  task.sensor.temperature = 2.0;
-  task.sensor.features = features_of_the_letter();
-  Estimate estimate = four_to_one();
-  estimate.none_log_evidence = 0.0;
-  const Press press;
-  const std::vector<Touch> two{press.touch(), press.touch()};
-  const RecognitionStep step = judge(estimate, {}, task, evidence_of(two, task.contact()));
-  const double of_letter = 2.0 * std::exp(2.0 * nats_of_one_press());
-  EXPECT_NEAR(step.identity[0], of_letter / (of_letter + 1.0 + 1.0), 1e-14);
-  EXPECT_NEAR(step.identity[1], 1.0 / (of_letter + 1.0 + 1.0), 1e-14) << "as any object";
-  EXPECT_NEAR(step.identity[2], step.identity[1], 1e-15) << "as any object";
-}
-
-TEST(LabelProbability, MayTurnTheMostProbableLabelAround) {
-  RecognitionTask task = three_maps();
-  task.sensor.features = features_of_the_letter();
-  const Estimate estimate{.identity = {0.1, 0.9, 0.0},
-                          .log_evidence = {std::log(0.1), std::log(0.9), -1e9}};
-  const Press press;
-  const std::vector<Touch> touches{press.touch()};
-  const RecognitionStep step =
-      judge(estimate, {.label = "L"}, task, evidence_of(touches, task.contact()));
-  ASSERT_GT(std::exp(nats_of_one_press()), 9.0 / 2.0);
-  const double odds = std::exp(nats_of_one_press()) / 9.0;
-  EXPECT_NEAR(step.identity[0] / step.identity[1], odds, 1e-14);
-  EXPECT_EQ(step.best, odds > 1.0 ? 0u : 1u);
-}
-
 TEST(LabelProbability, PassesOverTouchesWithoutContact) {
-  RecognitionTask task = three_maps();
+  RecognitionTask task = two_labels();
   task.sensor.features = features_of_the_letter();
-  const std::vector<glm::dvec2> elements_mm(2);
-  const std::vector<double> pressure{0.0, 0.5};
-  const Touch touch{.T_robot_sensor = {}, .elements_mm = elements_mm, .pressure = pressure};
-  EXPECT_EQ(feature_nats(evidence_of(std::span(&touch, 1), task.contact()), task),
-            std::vector<double>(2));
+  const std::vector<double> pressure{0.0, 0.5, 0.0};
+  std::vector<Touch> touch = presses(1);
+  touch[0].pressure = pressure;
+  EXPECT_EQ(feature_nats(evidence_of(touch, task.contact()), task), std::vector<double>(2));
 }
 
 TEST(LabelBounds, FollowTheTemperatureAndTheFeatures) {
-  RecognitionTask task = three_maps(BoundedOptions{});
+  RecognitionTask task = two_labels(BoundedOptions{});
   task.sensor.temperature = 2.0;
   Estimate estimate = four_to_one();
   // Evidence of L within 4 to 9, of the disc within 1 to 4.
@@ -177,9 +147,7 @@ TEST(LabelBounds, FollowTheTemperatureAndTheFeatures) {
   EXPECT_NEAR(step.identity_bounds[1].high, 2.0 / (2.0 + 2.0), 1e-15);
 
   task.sensor.features = features_of_the_letter();
-  const Press press;
-  const std::vector<Touch> touches{press.touch()};
-  const RecognitionStep with = judge(estimate, {}, task, evidence_of(touches, task.contact()));
+  const RecognitionStep with = step_after(1, estimate, task);
   const double times = std::exp(nats_of_one_press());
   EXPECT_NEAR(with.identity_bounds[0].low, 2.0 * times / (2.0 * times + 2.0), 1e-14);
   EXPECT_NEAR(with.identity_bounds[1].high, 2.0 / (2.0 + 2.0 * times), 1e-14);
@@ -207,7 +175,7 @@ TEST(Evidence, IsWhatBoundsFindWhereATemperatureNeedsIt) {
 
 /// What is told of the filter's bins where the sensor model was learned on others.
 std::string wider_bins(const FilterOptions& filter, const std::optional<BinSteps>& learned) {
-  RecognitionTask task = three_maps(filter);
+  RecognitionTask task = two_labels(filter);
   task.sensor.bins = learned;
   return wider_bins_sentence(task);
 }
@@ -230,36 +198,84 @@ TEST(WiderBins, AreToldOfWhereTheSensorModelWasLearnedOnNarrowerOnes) {
   EXPECT_EQ(wider_bins(ParticleOptions{}, BinSteps{0.6, 0.6, 0.0}), "") << "particles have none";
 }
 
-TEST(Misfit, CountsForNoneAloneWhereTheScaleWasLearned) {
-  HistogramOptions with_none;
-  with_none.none_weight = 0.2;
-  RecognitionTask task = three_maps(with_none);
-  const Press press;
-  const std::vector<TouchEvidence> touches(3, TouchEvidence(press.touch(), task.contact()));
+/// Three presses of a task with "(none)", and how well objects of the sensor model fit.
+class MisfitOfNone : public testing::Test {
+ protected:
+  Tempering tempering(const Fit& fit) const { return tempering_of(touches_, task_, fit); }
+
+  RecognitionTask task_ = two_labels(HistogramOptions{.none_weight = 0.2});
+  std::vector<TouchEvidence> touches_ = evidence_of(presses(3), task_.contact());
+  FitScale scale_{.mean = 0.1, .sd = 0.9, .shared_sd = 0.1};
+};
+
+TEST_F(MisfitOfNone, CountsForNoneAloneWhereTheScaleWasLearned) {
   const Fit fit{.z = -8.0};
-  EXPECT_EQ(tempering_of(touches, task, fit).features.back(), 0.0);
-  task.sensor.fit_scale = FitScale{.mean = 0.1, .sd = 0.9, .shared_sd = 0.1};
-  const std::vector<double> nats = tempering_of(touches, task, fit).features;
-  EXPECT_EQ(nats.back(), misfit_nats(fit, 3, {.stranger_sd = usual_stranger_sd}));
-  EXPECT_EQ(nats.front(), 0.0);
+  EXPECT_EQ(tempering(fit).features.back(), 0.0);
+  task_.sensor.fit_scale = scale_;
+  EXPECT_EQ(tempering(fit).features.back(),
+            misfit_nats(fit, 3, {.stranger_sd = usual_stranger_sd}));
+  EXPECT_EQ(tempering(fit).features.front(), 0.0);
 }
 
-TEST(Misfit, IsByHowBadlyStrangersFitTheObjectsOfTheSensorModel) {
-  RecognitionTask task = three_maps(HistogramOptions{.none_weight = 0.2});
-  const Press press;
-  const std::vector<TouchEvidence> touches(3, TouchEvidence(press.touch(), task.contact()));
+TEST_F(MisfitOfNone, IsByHowBadlyStrangersFitTheObjectsOfTheSensorModel) {
   Estimate estimate = four_to_one();
   estimate.none_log_evidence = 0.0;
   const auto none = [&](const Fit& fit, std::optional<double> stranger_sd) {
-    task.sensor.fit_scale =
-        FitScale{.mean = 0.1, .sd = 0.9, .shared_sd = 0.1, .stranger_sd = stranger_sd};
-    return label_probabilities(estimate, tempering_of(touches, task, fit), task).back();
+    task_.sensor.fit_scale = scale_;
+    task_.sensor.fit_scale->stranger_sd = stranger_sd;
+    return label_probabilities(estimate, tempering(fit), task_).back();
   };
   // Where strangers fit hardly worse than learned objects, a fair fit may be one's, and a bad one
   // is neither's.
   EXPECT_GT(none({.z = -2.0}, 1.0), none({.z = -2.0}, {}));
   EXPECT_LT(none({.z = -16.0}, 1.0), none({.z = -16.0}, {}));
   EXPECT_EQ(none({.z = -2.0}, usual_stranger_sd), none({.z = -2.0}, {}));
+}
+
+double nats(double z, std::size_t touches) { return misfit_nats({.z = z}, touches, {}); }
+
+TEST(Misfit, SpeaksForNoneTheMoreTouchesThereAre) {
+  EXPECT_EQ(nats(-4.0, 1), 0.0) << "a stranger's single touch fits as well";
+  EXPECT_LT(nats(0.0, 3), -1.5);
+  EXPECT_LT(nats(0.0, 9), nats(0.0, 3));
+  EXPECT_GT(nats(-4.0, 3), 0.0);
+  EXPECT_GT(nats(-8.0, 5), 2.0);
+  EXPECT_TRUE(std::isfinite(nats(-largest_fit_z, 2)) && std::isfinite(nats(largest_fit_z, 2)));
+}
+
+TEST(Misfit, OfAGoodFitSpeaksAgainstNoneTheMoreTheWorseStrangersFit) {
+  const Fit good{.z = 0.0};
+  EXPECT_LT(misfit_nats(good, 3, {.stranger_sd = 8.0}), misfit_nats(good, 3, {.stranger_sd = 2.0}));
+  EXPECT_EQ(misfit_nats(good, 3, {.stranger_sd = 0.0}), 0.0)
+      << "strangers fit as learned objects do";
+  const Fit bad{.z = -16.0};
+  EXPECT_GT(misfit_nats(bad, 3, {.stranger_sd = 8.0}), misfit_nats(bad, 3, {.stranger_sd = 2.0}));
+}
+
+TEST(StrangerDensity, SumsToTheSameWhateverTheSpread) {
+  const auto sum = [](std::size_t touches, double stranger_sd) {
+    double all = 0.0;
+    for (double z = -29.5; z < 30.0; z += 1.0) {
+      all += stranger_density({.z = z}, touches, {.stranger_sd = stranger_sd});
+    }
+    return all;
+  };
+  EXPECT_NEAR(sum(3, 2.0), sum(1, 2.0), 1e-3 * sum(1, 2.0));
+  EXPECT_NEAR(sum(2, 4.0), sum(3, 2.0), 1e-3 * sum(1, 2.0));
+}
+
+TEST(Misfit, OfOneTouchIsByWhatStrangersAreLike) {
+  const Fit bad{.z = -6.0};
+  EXPECT_EQ(misfit_nats(bad, 1, {}), 0.0) << "one touch of a stranger fits as well";
+  const FitScale scale{.stranger_sd = 3.0, .stranger_alone = SingleFitScale{-6.0, 2.0}};
+  EXPECT_GT(misfit_nats(bad, 1, scale), 2.0);
+  EXPECT_LT(misfit_nats({.z = 0.0}, 1, scale), -2.0);
+  EXPECT_EQ(misfit_nats(bad, 2, scale), misfit_nats(bad, 2, {.stranger_sd = 3.0}));
+  // One in ten of either spreads wider, and all touches of another sensor do.
+  const double learned =
+      0.9 * std::exp(-2.0) / 3.0 + 0.1 * std::exp(-18.0 / (25.0 + 8.0)) / std::sqrt(25.0 + 8.0);
+  const double stranger = 0.9 / 2.0 + 0.1 / std::sqrt(25.0 + 3.0);
+  EXPECT_NEAR(misfit_nats(bad, 1, scale), std::log(stranger / learned), 1e-12);
 }
 
 }  // namespace palpate::label_probability_test

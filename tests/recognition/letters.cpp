@@ -2,25 +2,24 @@
 
 #include "palpate/map_builder.hpp"
 #include "palpate/simulation.hpp"
+#include "support/shared_device.hpp"
 
 namespace palpate {
 
-OccupancyGrid learned_map(Device& device, const std::string& shape, std::uint64_t seed) {
+OccupancyGrid learned_map(const std::string& shape) {
   const Recording training =
-      Simulator(make_shape(shape), {}, digitacts_array(), seed).touch(training_grid(), {});
-  MapBuilder builder(device, {});
+      Simulator(make_shape(shape), {}, digitacts_array(), 1).touch(training_grid(), {});
+  MapBuilder builder(shared_device(), {});
   builder.add(training.touches(0, training.size()));
   return builder.build(shape);
 }
 
-std::vector<Hypothesis> learned_letters(Device& device) {
-  // Learned once: a device that is opened anew is the same.
-  static const std::vector<Hypothesis> letters = [&] {
-    constexpr std::uint64_t seed = 1;
+const std::vector<Hypothesis>& learned_letters() {
+  static const std::vector<Hypothesis> letters = [] {
     std::vector<Hypothesis> learned;
     for (const auto& [letter, symmetry] : {std::pair{"A", 1}, std::pair{"E", 1}, std::pair{"I", 2},
                                            std::pair{"O", 0}, std::pair{"U", 1}}) {
-      learned.push_back({.map = learned_map(device, letter, seed)});
+      learned.push_back({.map = learned_map(letter)});
       learned.back().map.symmetry = symmetry;
     }
     return learned;

@@ -10,9 +10,8 @@
 namespace palpate::live_recognition_test {
 
 TEST(LiveRecognition, BelievesOfAStreamWhatRecogniseDoesOfItsTouches) {
-  Device device = Device::open();
   const RecognitionTask task(shapes(), every_filter()[0]);
-  Recogniser recogniser(device, task);
+  Recogniser recogniser(shared_device(), task);
   const std::unique_ptr<Sensor> sensor =
       open_virtual_sensor("simulate:L,touches=4,speed=max,object=1:-2:40,seed=3");
   std::vector<LiveTouch> touches;

@@ -2,16 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <optional>
 #include <stdexcept>
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include "palpate/error.hpp"
+#include "recognition/nearby_fit.hpp"
 #include "recognition/record_json.hpp"
+#include "recognition/scaled_pose.hpp"
 #include "reference/reference.hpp"
 #include "shapes.hpp"
+#include "support/limits.hpp"
 #include "support/synthetic.hpp"
 #include "support/touched_shape.hpp"
 #include "support/unknown_of.hpp"
@@ -33,45 +35,44 @@ void expect_same(const RecognitionRecord& actual, const RecognitionRecord& expec
   EXPECT_EQ(actual.last().refined_error_mm, expected.last().refined_error_mm);
 }
 
-TEST(Recognise, MakesABrokenUnknownARecordAndTheOthersAreRight) {
-  Device device = Device::open();
+class Recognise : public ByEveryFilter {
+ protected:
+  RecognitionTask task_{shapes(), filter()};
+};
+
+TEST_P(Recognise, MakesABrokenUnknownARecordAndTheOthersAreRight) {
   const Recording letter = touched_letter(4);
   const Recording disc = touched_disc(5);
   Recording unsound = touched_letter(6);
-  unsound.T_robot_sensor[3].translation_mm.x = std::numeric_limits<double>::quiet_NaN();
-  Query unreadable{.recording = "gone.h5", .error = "gone.h5: cannot be read"};
+  unsound.T_robot_sensor[3].translation_mm.x = nan;
+  const Query unreadable{.recording = "gone.h5", .error = "gone.h5: cannot be read"};
   const std::vector<Query> unknowns{unknown_of(letter),
                                     unknown_of(unsound),
                                     unreadable,
                                     {.recording = "empty"},
                                     unknown_of(disc)};
-  for (const FilterOptions& filter : every_filter()) {
-    const RecognitionTask task(shapes(), filter);
-    Recogniser recogniser(device, task);
-    for (const bool trace : {false, true}) {
-      std::vector<RecognitionRecord> records;
-      for (const Query& unknown : unknowns) {
-        records.push_back(recognise(recogniser, task, unknown, trace));
-      }
-      for (const std::size_t good : {0U, 4U}) {
-        Recogniser alone(device, task);
-        expect_same(records[good], recognise(alone, task, unknowns[good], trace));
-        EXPECT_EQ(records[good].last().right, true);
-        EXPECT_EQ(records[good].trace.size(), trace ? 6U : 1U);
-        EXPECT_NO_THROW(records[good].require_steps());
-      }
-      EXPECT_NE(records[1].error.find("finite"), std::string::npos) << records[1].error;
-      EXPECT_TRUE(records[1].trace.empty()) << "none of the touches before the unsound one";
-      EXPECT_EQ(records[1].recording, "L");
-      EXPECT_EQ(records[2].error, unreadable.error);
-      EXPECT_EQ(records[3].error, "empty: no touches");
-      EXPECT_THROW(records[3].require_steps(), Error);
+  Recogniser recogniser(shared_device(), task_);
+  for (const bool trace : {false, true}) {
+    std::vector<RecognitionRecord> records;
+    for (const Query& unknown : unknowns) {
+      records.push_back(recognise(recogniser, task_, unknown, trace));
     }
+    for (const auto& [good, recording] : {std::pair(0U, &letter), {4U, &disc}}) {
+      expect_same(records[good], recognised(task_, *recording, trace));
+      EXPECT_EQ(records[good].last().right, true);
+      EXPECT_EQ(records[good].trace.size(), trace ? 6U : 1U);
+      EXPECT_NO_THROW(records[good].require_steps());
+    }
+    EXPECT_NE(records[1].error.find("finite"), std::string::npos) << records[1].error;
+    EXPECT_TRUE(records[1].trace.empty()) << "none of the touches before the unsound one";
+    EXPECT_EQ(records[1].recording, "L");
+    EXPECT_EQ(records[2].error, unreadable.error);
+    EXPECT_EQ(records[3].error, "empty: no touches");
+    EXPECT_THROW(records[3].require_steps(), Error);
   }
 }
 
-TEST(Recognise, EndsItsTraceWithTheSameBits) {
-  Device device = Device::open();
+TEST(RecogniseTrace, EndsWithTheSameBits) {
   const Recording letter = touched_letter(7);
   std::vector<FilterOptions> filters = every_filter();
   auto displaced = std::get<BoundedOptions>(every_filter().back());
@@ -83,7 +84,7 @@ TEST(Recognise, EndsItsTraceWithTheSameBits) {
     RecognitionTask task(shapes(), filter);
     for (const auto tolerance : {std::optional<double>(), std::optional(1e-3)}) {
       task.trace_tolerance = tolerance;
-      Recogniser recogniser(device, task);
+      Recogniser recogniser(shared_device(), task);
       const RecognitionRecord traced = recognise(recogniser, task, unknown_of(letter), true);
       expect_same(traced, recognise(recogniser, task, unknown_of(letter), false));
       task.drawn_tolerance = tolerance;
@@ -105,19 +106,14 @@ TEST(Recognise, EndsItsTraceWithTheSameBits) {
   }
 }
 
-TEST(Recognise, APosesScaleIsThatOfReadingsAlone) {
-  Device device = Device::open();
+TEST(PoseOfAStep, IsScaledByThatOfReadingsAlone) {
   const Recording letter = touched_letter(7);
   constexpr double factor = 0.25;
   const auto widened = [&](const FilterOptions& filter) {
     RecognitionTask task(shapes(), filter);
-    const auto variance = [&] {
-      Recogniser recogniser(device, task);
-      return recognise(recogniser, task, unknown_of(letter), false).last().refined->covariance[0];
-    };
-    const double before = variance();
+    const double before = last_step(task, letter).refined->covariance[0];
     task.sensor.pose_scale = PoseScale{.factor = factor};
-    return variance() / before;
+    return last_step(task, letter).refined->covariance[0] / before;
   };
   const auto exact = std::get<HistogramOptions>(every_filter().front());
   EXPECT_NEAR(widened(exact), factor, 1e-9);
@@ -129,10 +125,9 @@ TEST(Recognise, APosesScaleIsThatOfReadingsAlone) {
   }
 }
 
-TEST(Recognise, SaysHowFarItIsAndCanBeLeft) {
-  Device device = Device::open();
+TEST(Progress, SaysHowFarRecognitionIsAndCanEndIt) {
   const RecognitionTask task(shapes(), every_filter()[1]);
-  Recogniser recogniser(device, task);
+  Recogniser recogniser(shared_device(), task);
   const Recording recording = touched_letter(8);
   for (const bool trace : {false, true}) {
     std::vector<double> fractions;
@@ -149,10 +144,9 @@ TEST(Recognise, SaysHowFarItIsAndCanBeLeft) {
   }
 }
 
-TEST(Recognise, CountsTouchesOnceBoundsHaveSearched) {
-  Device device = Device::open();
+TEST(Progress, CountsTouchesOnceBoundsHaveSearched) {
   const RecognitionTask task(shapes(), every_filter()[2]);
-  Recogniser recogniser(device, task);
+  Recogniser recogniser(shared_device(), task);
   for (const bool trace : {false, true}) {
     std::vector<double> touches;
     recognise(recogniser, task, unknown_of(touched_letter(8)), trace,
@@ -168,65 +162,43 @@ bool on_cross(const glm::dvec2& p_mm) {
   return (x < 1.5 && y < 8.0) || (y < 1.5 && x < 8.0);
 }
 
-TEST(Recognise, SaysWhatFitsAndWhatDoesNot) {
-  Device device = Device::open();
-  Recording cross = touches_of(on_cross, {{1.0, -2.0}, 0.4}, 30, 21);
-  for (const FilterOptions& filter : every_filter()) {
-    const RecognitionTask task(shapes(), filter);
-    Recogniser recogniser(device, task);
-    for (const Recording& learned : {touched_letter(22), touched_disc(23)}) {
-      const Fit fit = recognise(recogniser, task, unknown_of(learned), false).last().fit.value();
-      EXPECT_EQ(fit.verdict, Verdict::fits) << learned.path << ", z = " << fit.z;
-    }
-    const Fit fit = recognise(recogniser, task, unknown_of(cross), false).last().fit.value();
-    EXPECT_EQ(fit.verdict, Verdict::does_not_fit) << "z = " << fit.z;
+TEST_P(Recognise, SaysWhatFitsAndWhatDoesNot) {
+  for (const Recording& learned : {touched_letter(22), touched_disc(23)}) {
+    const Fit fit = last_step(task_, learned).fit.value();
+    EXPECT_EQ(fit.verdict, Verdict::fits) << learned.path << ", z = " << fit.z;
   }
+  Recording cross = touches_of(on_cross, {{1.0, -2.0}, 0.4}, 16, 21);
+  const Fit fit = last_step(task_, cross).fit.value();
+  EXPECT_EQ(fit.verdict, Verdict::does_not_fit) << "z = " << fit.z;
   std::fill(cross.pressure.begin(), cross.pressure.end(), 2.0);
-  const RecognitionTask task(shapes(), every_filter()[0]);
-  Recogniser recogniser(device, task);
-  EXPECT_FALSE(recognise(recogniser, task, unknown_of(cross), false).last().fit)
-      << "all at the threshold: nothing is known";
+  EXPECT_FALSE(last_step(task_, cross).fit) << "all at the threshold: nothing is known";
+  std::fill(cross.pressure.begin(), cross.pressure.end(), -20.0);  // No Contact
+  EXPECT_FALSE(last_step(task_, cross).fit) << "an object out of reach explains such touches";
+  cross.pressure.back() = 10.0;
+  EXPECT_TRUE(last_step(task_, cross).fit);
 }
 
-TEST(Recognise, SaysNothingOfTheFitWhereNothingWasTouched) {
-  Device device = Device::open();
-  for (const FilterOptions& filter : every_filter()) {
-    const RecognitionTask task(shapes(), filter);
-    Recogniser recogniser(device, task);
-    Recording recording = touched_letter(25);
-    for (double& pressure : recording.pressure) {
-      pressure = -20.0;  // No Contact, also where no element is in contact
-    }
-    EXPECT_FALSE(recognise(recogniser, task, unknown_of(recording), false).last().fit)
-        << "an object out of reach explains such touches";
-    recording.pressure.back() = 10.0;
-    EXPECT_TRUE(recognise(recogniser, task, unknown_of(recording), false).last().fit);
-  }
-}
+INSTANTIATE_TEST_SUITE_P(By, Recognise, each_filter, filter_name);
 
-TEST(Recognise, FitsTheAveragedLikelihoodWhereTouchesMayBeDisplaced) {
-  Device device = Device::open();
+TEST(FitOfAStep, IsOfTheAveragedLikelihoodWhereTouchesMayBeDisplaced) {
   const Recording recording = touched_letter(26);
   HistogramOptions filter = std::get<HistogramOptions>(every_filter()[0]);
   filter.touch_sd = {.mm = 1.0, .rad = 0.05};
   const RecognitionTask task(shapes(), filter);
-  Recogniser recogniser(device, task);
-  const RecognitionStep step = recognise(recogniser, task, unknown_of(recording), false).last();
+  const RecognitionStep step = last_step(task, recording);
   const OccupancyGrid& map = task.hypotheses[step.mode.object].map;
   EXPECT_EQ(step.fit.value().z,
             fit_of(all_touches(recording), step.pose(), map, filter.contact, filter.touch_sd)->z);
   EXPECT_NE(step.fit->z, fit_of(all_touches(recording), step.pose(), map, filter.contact)->z);
 }
 
-TEST(Recognise, FitsTheBestLearnedObjectAtThePoseThatItReports) {
-  Device device = Device::open();
+TEST(FitOfAStep, IsOfTheBestLearnedObjectAtThePoseThatIsReported) {
   const Recording recording = touched_letter(24);
   HistogramOptions filter = std::get<HistogramOptions>(every_filter()[0]);
   filter.none_weight = 1e300;
   filter.contact.gamma = 0.2;
   const RecognitionTask task(shapes(), filter);
-  Recogniser recogniser(device, task);
-  const RecognitionRecord record = recognise(recogniser, task, unknown_of(recording), true);
+  const RecognitionRecord record = recognised(task, recording, true);
   ASSERT_EQ(record.trace.size(), 6U);
   for (std::size_t i = 0; i < 6; ++i) {
     const RecognitionStep& step = record.trace[i];
@@ -239,9 +211,7 @@ TEST(Recognise, FitsTheBestLearnedObjectAtThePoseThatItReports) {
 }
 
 TEST(Judge, AddsUpTheMapsOfALabel) {
-  std::vector<Hypothesis> three = shapes();
-  three.push_back(three[0]);
-  const RecognitionTask task(three, HistogramOptions{});
+  const RecognitionTask task(three_maps(), HistogramOptions{});
   const RecognitionStep step =
       judge(estimate_of({0.3, 0.4, 0.3}, 1, {}), {.label = "L", .T_object_robot = Pose{}}, task);
   EXPECT_EQ(step.identity, (std::vector<double>{0.3 + 0.3, 0.4}));
@@ -295,12 +265,9 @@ TEST(Judge, FindsNoErrorOfAnObjectWithoutABody) {
 }
 
 TEST(TakeStep, JudgesTheRefinedPoseToo) {
-  Device device = Device::open();
   const RecognitionTask task(shapes(), every_filter()[0]);
-  Recogniser recogniser(device, task);
   const Recording letter = touched_letter(9);
-  const Query unknown = unknown_of(letter);
-  const RecognitionStep step = take_step(recogniser, task, unknown.touches, unknown.truth);
+  const RecognitionStep step = last_step(task, letter);
   ASSERT_EQ(step.mode.object, 0);
   const OccupancyGrid& map = task.hypotheses[0].map;
   const Pose& truth = letter.truth->T_object_robot;
@@ -327,8 +294,7 @@ TEST(RecordJson, HasFitAndWarningsWhereTheStepHas) {
   RecognitionTask task(shapes(), every_filter()[0]);
   task.map_paths.assign(task.hypotheses.size(), "shape.map.h5");
   RecognitionStep step{.identity = std::vector<double>(task.labels.size()), .mode = {.object = 0}};
-  EXPECT_FALSE(to_json(step, task).contains("fit"));
-  EXPECT_FALSE(to_json(step, task).contains("warnings"));
+  EXPECT_FALSE(to_json(step, task).contains("fit") || to_json(step, task).contains("warnings"));
   step.warnings = {"one", "two"};
   for (const auto& [verdict, text] : {std::pair{Verdict::fits, "fits"},
                                       {Verdict::doubtful, "doubtful"},
@@ -337,6 +303,56 @@ TEST(RecordJson, HasFitAndWarningsWhereTheStepHas) {
     const nlohmann::json json = to_json(step, task);
     EXPECT_EQ(json.at("fit"), (nlohmann::json{{"z", -4.5}, {"verdict", text}}));
     EXPECT_EQ(json.at("warnings"), (nlohmann::json{"one", "two"}));
+  }
+}
+
+// Of n touches, each of which tells the place with a variance, the belief has an n-th of that.
+TEST(ScaledPose, ExactTouchesScaleAsTheirReadingsDo) {
+  for (const int touches : {1, 3, 9}) {
+    EXPECT_DOUBLE_EQ(belief_factor(0.4, 0.1, {.touches = touches}), 0.4);
+  }
+}
+
+TEST(ScaledPose, WhatDisplacementAddsStays) {
+  constexpr double readings_mm2 = 0.3;
+  constexpr double displacement_mm2 = 1.2;
+  constexpr double factor = 0.4;
+  for (const int touches : {1, 3, 9}) {
+    const double before = (readings_mm2 + displacement_mm2) / touches;
+    const double after = (factor * readings_mm2 + displacement_mm2) / touches;
+    EXPECT_NEAR(
+        belief_factor(factor, before, {.displacement_mm2 = displacement_mm2, .touches = touches}),
+        after / before, 1e-9);
+  }
+}
+
+TEST(ScaledPose, ABeliefNoWiderThanDisplacementMakesItStays) {
+  EXPECT_EQ(belief_factor(0.4, 0.1, {.displacement_mm2 = 1.0, .touches = 9}), 1.0);
+  EXPECT_EQ(belief_factor(2.5, 0.1, {.displacement_mm2 = 1.0, .touches = 9}), 1.0);
+}
+
+// Where an object slips, a belief settles where a touch tells as much as a slip forgets:
+// p^2 = c s for readings of a variance c far above that of a slip, s.
+TEST(ScaledPose, ASlippingBeliefGrowsAsTheRootOfItsReadings) {
+  constexpr double slip_mm2 = 1e-4;
+  constexpr double readings_mm2 = 1.0;
+  EXPECT_NEAR(belief_factor(0.25, std::sqrt(slip_mm2 * readings_mm2),
+                            {.slip_mm2 = slip_mm2, .touches = 10'000}),
+              0.5, 0.01);
+}
+
+TEST(NearbyFit, IsAsGoodAsThatOfTheTruePoseHalfAStepAway) {
+  const OccupancyGrid map = map_of(on_letter_l, "L");
+  const ContactModel contact{.prior = 0.2};
+  const Pose truth{{1.3, -0.8}, 0.7};
+  const Recording recording = touches_of(on_letter_l, truth, 20, 856);
+  const std::vector<Touch> touches = all_touches(recording);
+  const double at_truth = fit_of(touches, truth, map, contact, 0)->z;
+  for (const glm::dvec2& off_mm : {glm::dvec2(0.375, 0.0), {-0.4375, 0.25}, {0.4, 0.4}}) {
+    const Pose start{truth.translation_mm + off_mm, truth.theta_rad + 0.05};
+    EXPECT_LT(fit_of(touches, start, map, contact, 0)->z, at_truth - 1.0);
+    // The best pose of these touches fits a little better than the true one.
+    EXPECT_GT(best_fit_near(evidence_of(touches, contact), start, map, contact, 0)->z, at_truth);
   }
 }
 

@@ -2,21 +2,21 @@
 
 #include "recognition/resolve.hpp"
 
-#include <filesystem>
-#include <fstream>
 #include <memory>
 #include <numbers>
 #include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include "options/option.hpp"
 #include "palpate/error.hpp"
 #include "palpate/map_builder.hpp"
 #include "recognition/filter_choice.hpp"
+#include "recognition/recognition_task.hpp"
 #include "shapes.hpp"
+#include "support/errors.hpp"
+#include "support/scratch_folder.hpp"
 
 namespace palpate::resolve_test {
 
@@ -38,23 +38,25 @@ RecognitionTask task_of(const Request& request) {
 }
 
 std::string refusal(const Request& request) {
-  try {
-    task_of(request);
-  } catch (const Error& error) {
-    EXPECT_EQ(error.fault(), Fault::input);
-    return error.what();
-  }
-  return "";
+  return input_error([&] { task_of(request); });
 }
 
-class SceneFile {
+/// The shapes, with what is changed.
+template <class Change>
+Request changed(const Change& change) {
+  Request request = request_of_shapes();
+  change(request);
+  return request;
+}
+
+/// A file of a test's own.
+class OneFile {
  public:
-  explicit SceneFile(const std::string& text) { std::ofstream(path_) << text; }
-  ~SceneFile() { std::filesystem::remove(path_); }
-  const std::string& path() const { return path_; }
+  explicit OneFile(const std::string& text) { put_bytes(path(), text); }
+  std::string path() const { return folder_ / "resolve_test.yaml"; }
 
  private:
-  std::string path_ = std::filesystem::path(testing::TempDir()) / "resolve_test.yaml";
+  ScratchFolder folder_;
 };
 
 TEST(Resolve, WhatIsNotAskedIsThePapers) {
@@ -72,45 +74,37 @@ TEST(Resolve, WhatIsNotAskedIsThePapers) {
 TEST(Resolve, AnOptionOfBoundsAsksForBounds) {
   Request request = request_of_shapes();
   request.tolerance = 1e-3;
-  const RecognitionTask task = task_of(request);
-  EXPECT_EQ(std::get<BoundedOptions>(task.filter).tolerance, 1e-3);
-  EXPECT_EQ(task.filter_asked_for_by, "`tolerance`");
   request.touch_sd_deg = 2.0;
-  EXPECT_DOUBLE_EQ(std::get<BoundedOptions>(task_of(request).filter).touch_sd.rad,
-                   2.0 * std::numbers::pi / 180.0);
-  EXPECT_DOUBLE_EQ(task_of(request).touch_sd().rad, 2.0 * std::numbers::pi / 180.0);
   request.budget_ms = 10.0;
-  EXPECT_DOUBLE_EQ(std::get<BoundedOptions>(task_of(request).filter).budget_s.value(), 0.01);
+  const RecognitionTask task = task_of(request);
+  const auto& bounded = std::get<BoundedOptions>(task.filter);
+  EXPECT_EQ(bounded.tolerance, 1e-3);
+  EXPECT_EQ(task.filter_asked_for_by, "`tolerance`");
+  EXPECT_DOUBLE_EQ(bounded.touch_sd.rad, 2.0 * std::numbers::pi / 180.0);
+  EXPECT_DOUBLE_EQ(task.touch_sd().rad, 2.0 * std::numbers::pi / 180.0);
+  EXPECT_DOUBLE_EQ(bounded.budget_s.value(), 0.01);
 }
 
 TEST(Resolve, ObjectsThatSlipAreFollowedByTheHistogramWhichIsSaidWhereBoundsWereDue) {
-  const auto said = [](const Request& request) {
-    const RecognitionTask task = task_of(request);
+  const auto said = [](FilterKind filter, int bins) {
+    const RecognitionTask task = task_of(changed([&](Request& r) {
+      r.slip_sd_deg = 2.0;
+      r.filter = filter;
+      r.bins = std::array{bins, bins, bins};
+    }));
     EXPECT_DOUBLE_EQ(std::get<HistogramOptions>(task.filter).slip_sd.rad,
                      2.0 * std::numbers::pi / 180.0);
-    return std::ranges::any_of(task.remarks, [](const std::string& remark) {
-      return remark.find("followed by the histogram") != remark.npos;
-    });
+    return testing::Value(task.remarks, testing::Contains(HasSubstr("followed by the histogram")));
   };
-  Request request = request_of_shapes();
-  request.slip_sd_deg = 2.0;
-  for (const FilterKind kind :
-       {FilterKind::automatic, FilterKind::bounded, FilterKind::histogram}) {
-    request.filter = kind;
-    EXPECT_EQ(said(request), kind == FilterKind::bounded);
-  }
-  request.filter = FilterKind::automatic;
-  request.bins = std::array{60, 60, 60};
-  EXPECT_TRUE(said(request));
-  request.tolerance = 1e-3;
-  EXPECT_THAT(refusal(request), HasSubstr("`tolerance`: has no effect where objects slip"));
+  EXPECT_FALSE(said(FilterKind::automatic, 5));
+  EXPECT_TRUE(said(FilterKind::bounded, 5));
+  EXPECT_FALSE(said(FilterKind::histogram, 5));
+  EXPECT_TRUE(said(FilterKind::automatic, 60));
 }
 
 TEST(Resolve, CountsThatWereSettledBeforeStand) {
-  Request request = request_of_shapes();
-  request.bins = BinWidth::automatic;
   const RecognitionTask task = resolve(
-      request,
+      changed([](Request& r) { r.bins = BinWidth::automatic; }),
       {.pressure_unit = "kPa", .source = "a test", .reach_mm = 8.0, .counts = std::array{7, 8, 9}});
   EXPECT_TRUE(task.auto_pivot);
   EXPECT_EQ(task.lattice().x_mm.count, 7);
@@ -118,31 +112,21 @@ TEST(Resolve, CountsThatWereSettledBeforeStand) {
 }
 
 TEST(Resolve, AWeightOfNoneOf0LeavesItOut) {
-  Request request = request_of_shapes();
-  request.none = 0.0;
-  for (const FilterKind filter : {FilterKind::automatic, FilterKind::particles}) {
-    request.filter = filter;
-    EXPECT_EQ(task_of(request).labels.size(), 2u);
+  const OneFile scene("none: 0");
+  for (const Request& request : {changed([](Request& r) { r.none = 0.0; }), changed([](Request& r) {
+                                   r.none = 0.0, r.filter = FilterKind::particles;
+                                 }),
+                                 changed([&](Request& r) { r.scene = scene.path(); })}) {
+    EXPECT_EQ(task_of(complete(request)).labels.size(), 2u);
   }
-  const SceneFile scene("none: 0");
-  request.none = {};
-  request.scene = scene.path();
-  EXPECT_EQ(task_of(complete(request)).labels.size(), 2u);
 }
 
 TEST(Resolve, TouchesCountByPlaceButAsThePaperHasItAndWhereTheObjectSlips) {
-  Request request = request_of_shapes();
-  for (const FilterKind filter : {FilterKind::particles, FilterKind::automatic}) {
-    request.filter = filter;
-    EXPECT_TRUE(task_of(request).by_place);
-  }
-  request.slip_sd_mm = 0.5;
-  request.slip_sd_deg = 3.0;
-  EXPECT_FALSE(task_of(request).by_place);
-  request.slip_sd_mm.reset();
-  request.slip_sd_deg.reset();
-  request.none = 0.0;
-  EXPECT_FALSE(task_of(request).by_place);
+  const auto by_place = [](const auto& change) { return task_of(changed(change)).by_place; };
+  EXPECT_TRUE(by_place([](Request& r) { r.filter = FilterKind::particles; }));
+  EXPECT_TRUE(by_place([](Request& r) { r.filter = FilterKind::automatic; }));
+  EXPECT_FALSE(by_place([](Request& r) { r.slip_sd_mm = 0.5, r.slip_sd_deg = 3.0; }));
+  EXPECT_FALSE(by_place([](Request& r) { r.none = 0.0; }));
 }
 
 /// The shapes, learned from touches that had these z on maps of the others.
@@ -160,22 +144,19 @@ Request request_of_learned() {
 }
 
 TEST(Resolve, ASearchOfPoorFitsGoesOnWhereClosenessIsAskedFor) {
-  const SceneFile file("");
+  const OneFile file("");
   LearnedSensor sensor{.table = LearnedTable{}};
   sensor.table->shared.assign(2 * ReadingLayer::nodes, -1.0);
   write_sensor_model(file.path(), sensor);
-  Request request = request_of_shapes();
-  request.sensor_model = file.path();
-  request.filter = FilterKind::bounded;
-  const auto poor_bins = [&] {
-    return std::get<BoundedOptions>(task_of(request).filter).poor_bins;
+  const auto poor_bins = [&](const auto& change) {
+    Request request = changed(change);
+    request.sensor_model = file.path();
+    request.filter = FilterKind::bounded;
+    return std::get<BoundedOptions>(task_of(request).filter).poor_bins.has_value();
   };
-  EXPECT_TRUE(poor_bins());
-  request.tolerance = 1e-6;
-  EXPECT_FALSE(poor_bins());
-  request.tolerance.reset();
-  request.evidence_nats = 0.1;
-  EXPECT_FALSE(poor_bins());
+  EXPECT_TRUE(poor_bins([](Request&) {}));
+  EXPECT_FALSE(poor_bins([](Request& r) { r.tolerance = 1e-6; }));
+  EXPECT_FALSE(poor_bins([](Request& r) { r.evidence_nats = 0.1; }));
 }
 
 TEST(Resolve, TheFitsScaleIsOfTouchesThatMapsHadNotSeen) {
@@ -205,31 +186,28 @@ TEST(Resolve, BinsOfALargeRegionResolveTheMapsWhereThePivotLiesAtATouch) {
 }
 
 TEST(Resolve, TouchesThatAreJudgedOtherwiseHaveNoScale) {
-  const Request learned = request_of_learned();
-  std::vector<Request> others(8, learned);
-  others[0].gamma = 0.2;
-  others[1].prior = 0.4;
-  others[2].threshold = 3.0;
-  others[3].ratio = 0.2;
-  others[4].touch_sd_mm = 1.0;
-  others[5].slip_sd_deg = 1.0;
-  others[6].filter = FilterKind::particles;
-  others[7].bins = std::array{6, 5, 4};
-  for (std::size_t i = 0; i < others.size(); ++i) {
-    const FitScale scale = task_of(others[i]).fit_scale();
-    EXPECT_EQ(std::pair(scale.mean, scale.sd), std::pair(0.0, 1.0)) << i;
-  }
-  // Poses have the map's errors always, and the readings' where these are judged as the map did.
-  for (std::size_t i = 0; i < others.size(); ++i) {
-    const PoseScale scale = task_of(others[i]).pose_scale();
-    const bool readings_alike = others[i].touch_sd_mm || others[i].slip_sd_deg;
-    EXPECT_NEAR(scale.factor, readings_alike ? 0.5 : 1.0, 1e-12) << i;
-    EXPECT_NEAR(scale.map_sd_mm, 0.1, 1e-12) << i;
+  for (const auto& [option, text] : {std::pair{"gamma", "0.2"},
+                                     {"prior", "0.4"},
+                                     {"threshold", "3"},
+                                     {"ratio", "0.2"},
+                                     {"touch-sd-mm", "1"},
+                                     {"slip-sd-deg", "1"},
+                                     {"filter", "particles"},
+                                     {"bins", "6x5x4"}}) {
+    SCOPED_TRACE(option);
+    Request request = request_of_learned();
+    ASSERT_EQ(set_option(request, option_named(option), text), "");
+    const RecognitionTask task = task_of(request);
+    EXPECT_EQ(std::pair(task.fit_scale().mean, task.fit_scale().sd), std::pair(0.0, 1.0));
+    // Poses have the map's errors always, and the readings' where these are judged as the map did.
+    const bool readings_alike = request.touch_sd_mm || request.slip_sd_deg;
+    EXPECT_NEAR(task.pose_scale().factor, readings_alike ? 0.5 : 1.0, 1e-12);
+    EXPECT_NEAR(task.pose_scale().map_sd_mm, 0.1, 1e-12);
   }
 }
 
 TEST(Request, ASceneGivesWhatIsNotAsked) {
-  const SceneFile scene("{gamma: 0.2, ratio: 0.4, bins: [3, 3, 3], none: auto, slip_sd: {mm: 1}}");
+  const OneFile scene("{gamma: 0.2, ratio: 0.4, bins: [3, 3, 3], none: auto, slip_sd: {mm: 1}}");
   Request request = request_of_shapes();
   request.scene = scene.path();
   request.gamma = 0.05;
@@ -242,37 +220,28 @@ TEST(Request, ASceneGivesWhatIsNotAsked) {
   EXPECT_EQ(histogram.none_weight, 2.0 / 9.0) << "one in ten, beside both maps";
 }
 
-TEST(Request, ARefusalNamesTheOptionOrTheScenesKey) {
-  const SceneFile scene("{filter: bounded, slip_sd: {deg: 2}}");
-  Request request = request_of_shapes();
-  request.scene = scene.path();
-  request.filter = FilterKind::particles;
-  request.none = Automatic{};
-  EXPECT_THAT(refusal(complete(request)), HasSubstr("particles have no mean"));
-}
-
-TEST(Request, ValuesThatCannotBeMeantAreRefused) {
-  const auto refused = [](auto&& change) {
-    Request request = request_of_shapes();
-    change(request);
-    return refusal(request);
+TEST(Request, ValuesThatCannotBeMeantAreRefusedByOption) {
+  const auto expect_refused = [](const char* named, const auto& change) {
+    EXPECT_THAT(refusal(complete(changed(change))), HasSubstr(named));
   };
-  EXPECT_THAT(refused([](Request& r) { r.bins = std::array{0, 1, 1}; }), HasSubstr("`bins 0x1x1`"));
-  EXPECT_THAT(refused([](Request& r) {
-                r.x_mm = {5.0, -5.0};
-              }),
-              HasSubstr("`x-mm 5:-5`: give the lower end first"));
-  EXPECT_THAT(refused([](Request& r) { r.theta_deg = {0.0, 400.0}; }), HasSubstr("full circle"));
-  EXPECT_THAT(refused([](Request& r) { r.pivot_mm = glm::dvec2(1e10, 0.0); }),
-              HasSubstr("`pivot-mm 1"));
-  EXPECT_THAT(refused([](Request& r) { r.gamma = 1.0; }), HasSubstr("`gamma 1`"));
-  EXPECT_THAT(refused([](Request& r) { r.none = -1.0; }), HasSubstr("`none -1`"));
-  EXPECT_THAT(refused([](Request& r) { r.touch_sd_mm = 500.0; }),
-              HasSubstr("`touch-sd-mm 500`: wider than the region, 20 mm"));
-  EXPECT_THAT(refused([](Request& r) { r.act_below_mm = 0.0; }), HasSubstr("`act-below-mm 0`"));
-  EXPECT_THAT(refused([](Request& r) { r.act_above = 1.5; }), HasSubstr("`act-above 1.5`"));
-  EXPECT_THAT(refused([](Request& r) { r.particles = 10; }), HasSubstr("add `filter particles`"));
-  EXPECT_THAT(refused([](Request& r) { r.given_maps.clear(); }), HasSubstr("`maps`: missing"));
+  expect_refused("`bins 0x1x1`", [](Request& r) { r.bins = std::array<int, 3>{0, 1, 1}; });
+  expect_refused("`x-mm 5:-5`", [](Request& r) { r.x_mm = Range{5.0, -5.0}; });
+  expect_refused("full circle", [](Request& r) { r.theta_deg = Range{0.0, 400.0}; });
+  expect_refused("`pivot-mm 1", [](Request& r) { r.pivot_mm = glm::dvec2(1e10, 0.0); });
+  expect_refused("`gamma 1`", [](Request& r) { r.gamma = 1.0; });
+  expect_refused("`none -1`", [](Request& r) { r.none = -1.0; });
+  expect_refused("`touch-sd-mm 500`: wider", [](Request& r) { r.touch_sd_mm = 500.0; });
+  expect_refused("`act-below-mm 0`", [](Request& r) { r.act_below_mm = 0.0; });
+  expect_refused("`act-above 1.5`", [](Request& r) { r.act_above = 1.5; });
+  expect_refused("`filter particles`", [](Request& r) { r.particles = 10; });
+  expect_refused("`tolerance`", [](Request& r) { r.slip_sd_deg = 2.0, r.tolerance = 1e-3; });
+  expect_refused("`maps`: missing", [](Request& r) { r.given_maps.clear(); });
+  const OneFile scene("{filter: bounded, slip_sd: {deg: 2}}");
+  expect_refused("particles have no mean", [&](Request& r) {
+    r.scene = scene.path();
+    r.filter = FilterKind::particles;
+    r.none = Automatic{};
+  });
 }
 
 TEST(RecognitionOptions, EveryOptionIsReadAsItWasWritten) {
@@ -316,6 +285,10 @@ TEST(RecognitionOptions, EveryOptionIsReadAsItWasWritten) {
   EXPECT_EQ(option_texts(request_with(words)), words);
 }
 
+TEST(RecognitionOptions, HelpSaysWhereAutoChangesToBounds) {
+  EXPECT_THAT(option_named("filter").help, HasSubstr(std::to_string(most_histogram_bins)));
+}
+
 TEST(RecognitionOptions, ATextThatCannotBeMeantLeavesTheOptionAsItWas) {
   Request request;
   EXPECT_EQ(set_option(request, option_named("gamma"), "0.2"), "");
@@ -324,20 +297,33 @@ TEST(RecognitionOptions, ATextThatCannotBeMeantLeavesTheOptionAsItWas) {
         << wrong;
     EXPECT_EQ(request.gamma, 0.2) << wrong;
   }
-  EXPECT_NE(set_option(request, option_named("bins"), "5x5"), "");
-  EXPECT_FALSE(request.bins);
+  for (const auto& [option, wrong] : {std::pair{"speed", "1"},
+                                      {"trace", "yes"},
+                                      {"bins", "6x5"},
+                                      {"frames", "3:2"},
+                                      {"gamma", "1"}}) {
+    EXPECT_THROW(request_with({{option, wrong}}), Error) << option;
+  }
 }
 
-TEST(RecognitionOptions, HelpSaysWhereAutoChangesToBounds) {
-  EXPECT_THAT(option_named("filter").help, HasSubstr(std::to_string(most_histogram_bins)));
+TEST(RecognitionTask, NamesEachLabelOnceAndNoneLast) {
+  std::vector<Hypothesis> three = shapes();
+  three.push_back(three[0]);
+  const RecognitionTask known(three, HistogramOptions{});
+  EXPECT_EQ(known.labels, (std::vector<std::string>{"L", "disc"}));
+  EXPECT_EQ(known.label_of, (std::vector<std::size_t>{0, 1, 0}));
+  const RecognitionTask with_none(three, HistogramOptions{.none_weight = 2.0});
+  EXPECT_EQ(with_none.labels, (std::vector<std::string>{"L", "disc", "(none)"}));
+  const RecognitionTask bounded_with_none(three, BoundedOptions{.none_weight = 2.0});
+  EXPECT_EQ(bounded_with_none.labels, with_none.labels);
 }
 
-TEST(RecognitionOptions, WhatIsNoOptionOrNoValueIsRefused) {
-  EXPECT_THROW(request_with({{"speed", "1"}}), Error);
-  EXPECT_THROW(request_with({{"trace", "yes"}}), Error);
-  EXPECT_THROW(request_with({{"bins", "6x5"}}), Error);
-  EXPECT_THROW(request_with({{"frames", "3:2"}}), Error);
-  EXPECT_THROW(request_with({{"gamma", "1"}}), Error);
+TEST(RecognitionTask, CountsBinsBeyondEveryInteger) {
+  constexpr int many = 2'000'000'000;
+  const PoseLattice lattice{
+      .x_mm = {.count = many}, .y_mm = {.count = many}, .theta_rad = {.count = many}};
+  const RecognitionTask task(shapes(), HistogramOptions{.lattice = lattice});
+  EXPECT_GT(task.bins_in_all(), 1'000'000'000'000'000'000);
 }
 
 }  // namespace palpate::resolve_test

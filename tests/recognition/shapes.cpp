@@ -4,6 +4,7 @@
 
 #include "support/synthetic.hpp"
 #include "support/touched_shape.hpp"
+#include "support/unknown_of.hpp"
 
 namespace palpate {
 
@@ -34,7 +35,22 @@ std::vector<FilterOptions> every_filter() {
           BoundedOptions{.lattice = lattice}};
 }
 
+std::vector<Hypothesis> three_maps() {
+  std::vector<Hypothesis> maps = shapes();
+  maps.push_back(maps[0]);
+  return maps;
+}
+
 Recording touched_letter(std::uint64_t seed) { return touched(on_letter_l, "L", seed); }
 Recording touched_disc(std::uint64_t seed) { return touched(on_disc, "disc", seed); }
+
+RecognitionRecord recognised(const RecognitionTask& task, const Recording& recording, bool trace) {
+  Recogniser recogniser(shared_device(), task);
+  return recognise(recogniser, task, unknown_of(recording), trace);
+}
+
+RecognitionStep last_step(const RecognitionTask& task, const Recording& recording) {
+  return recognised(task, recording).last();
+}
 
 }  // namespace palpate

@@ -3,19 +3,18 @@
 #include "palpate/drawn_map.hpp"
 
 #include <cmath>
-#include <limits>
 #include <numbers>
 
 #include <gmock/gmock.h>
 
-#include "palpate/error.hpp"
+#include "support/errors.hpp"
+#include "support/limits.hpp"
 
 namespace palpate::drawn_map_test {
 
 using testing::AllOf;
 using testing::Each;
 using testing::Ge;
-using testing::HasSubstr;
 using testing::Le;
 
 constexpr double pixel_mm = 0.1;
@@ -96,38 +95,31 @@ TEST(DrawnMap, HasRowsAlongYAndColumnsAlongX) {
 }
 
 TEST(DrawnMap, RefusesWhatMakesNoMap) {
-  const auto words = [](const auto& call) {
-    try {
-      call();
-    } catch (const Error& error) {
-      return std::string(error.what());
-    }
-    return std::string("no error");
-  };
-  const auto with = [&](const DrawnMapOptions& options) {
-    return words([&] { drawn_map("bar", bar_mask(), options); });
-  };
-  EXPECT_THAT(with({.cell_mm = 0.0}), HasSubstr("cell size = 0 mm: give"));
-  EXPECT_THAT(with({.peak = 0.5}), HasSubstr("`peak 0.5`: must be above 0.5"));
-  EXPECT_THAT(with({.felt_share = 1.0}), HasSubstr("`felt-share 1`: must lie between 0 and 1"));
-  EXPECT_THAT(with({.reach_mm = -1.0}), HasSubstr("reach = -1 mm: give 0 to"));
-  EXPECT_THAT(with({.spread_mm = 30.0, .felt_share = 0.9}), HasSubstr("no cell would be occupied"));
-  const auto of = [&](const Mask& mask) { return words([&] { drawn_map("bar", mask); }); };
-  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_THAT(of({.pixel_mm = nan}), HasSubstr("a pixel = nan mm: give"));
-  EXPECT_THAT(of({.rows = 2, .columns = 2, .occupied = {1}}), HasSubstr("1 pixels in 2 rows of 2"));
-  EXPECT_THAT(of({.rows = 1, .columns = 1, .occupied = {0}}), HasSubstr("no pixel is occupied"));
-  EXPECT_THAT(of({.origin_mm = {nan, 0.0}, .rows = 1, .columns = 1, .occupied = {1}}),
-              HasSubstr("origin = nan,0 mm: give finite numbers"));
-  EXPECT_THAT(of({.origin_mm = {1e9, 0.0}, .rows = 1, .columns = 1, .occupied = {1}}),
-              HasSubstr("give an origin nearer to it"));
-  const auto shape = [&](const Shape& of_shape) {
-    return words([&] { mask_of(of_shape, pixel_mm); });
-  };
-  EXPECT_THAT(shape({.label = "line", .strokes = {}, .polygons = {{{0, 0}, {1, 1}, {2, 2}}}}),
-              HasSubstr("shape 'line': covers no area"));
-  EXPECT_THAT(shape({.label = "field", .strokes = {}, .polygons = {{{0, 0}, {9e5, 0}, {0, 9e5}}}}),
-              HasSubstr("pixels of 0.1 mm are more than 1e+08; use larger cells"));
+  const std::pair<const char*, DrawnMapOptions> of_options[] = {
+      {"cell size = 0 mm", {.cell_mm = 0.0}},
+      {"`peak 0.5`", {.peak = 0.5}},
+      {"`felt-share 1`", {.felt_share = 1.0}},
+      {"reach = -1 mm", {.reach_mm = -1.0}},
+      {"no cell would be occupied", {.spread_mm = 30.0, .felt_share = 0.9}}};
+  for (const auto& [named, options] : of_options) {
+    expect_named(input_error([&] { drawn_map("bar", bar_mask(), options); }), {named});
+  }
+  const std::pair<const char*, Mask> of_masks[] = {
+      {"a pixel = nan mm", {.pixel_mm = nan}},
+      {"1 pixels in 2 rows of 2", {.rows = 2, .columns = 2, .occupied = {1}}},
+      {"no pixel is occupied", {.rows = 1, .columns = 1, .occupied = {0}}},
+      {"origin = nan,0 mm", {.origin_mm = {nan, 0.0}, .rows = 1, .columns = 1, .occupied = {1}}},
+      {"an origin nearer", {.origin_mm = {1e9, 0.0}, .rows = 1, .columns = 1, .occupied = {1}}}};
+  for (const auto& [named, mask] : of_masks) {
+    expect_named(input_error([&] { drawn_map("bar", mask); }), {named});
+  }
+  const std::pair<const char*, std::vector<glm::dvec2>> of_polygons[] = {
+      {"shape 'drawn': covers no area", {{0, 0}, {1, 1}, {2, 2}}},
+      {"pixels of 0.1 mm are more than 1e+08", {{0, 0}, {9e5, 0}, {0, 9e5}}}};
+  for (const auto& [named, polygon] : of_polygons) {
+    const Shape shape{.label = "drawn", .strokes = {}, .polygons = {polygon}};
+    expect_named(input_error([&] { mask_of(shape, pixel_mm); }), {named});
+  }
 }
 
 }  // namespace palpate::drawn_map_test

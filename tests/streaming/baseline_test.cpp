@@ -1,9 +1,8 @@
 #include "palpate/baseline.hpp"
 
-#include <cmath>
-
 #include "press.hpp"
-#include "support/scratch_folder.hpp"
+#include "support/errors.hpp"
+#include "support/limits.hpp"
 
 namespace palpate::baseline_test {
 
@@ -17,7 +16,7 @@ TEST(Baseline, IsTheMedianOfEveryElement) {
   std::vector<Frame> frames = PressStream{.noise = 0.7}.frames(1.0, [](double) {
     return std::vector<double>{50.0, -3.0};
   });
-  frames[40].values = {1e6, nan("")};  // a spike, and a reading that is none
+  frames[40].values = {1e6, nan};  // a spike, and a reading that is none
   const std::vector<double> baseline = baseline_of(frames, two_elements(), 2.0);
   // Five standard errors of the median, 1.25 * 0.7 / sqrt(100).
   EXPECT_NEAR(baseline[0], 50.0, 0.44);
@@ -25,20 +24,30 @@ TEST(Baseline, IsTheMedianOfEveryElement) {
 }
 
 TEST(Baseline, RefusesATouchedArray) {
-  const auto frames = PressStream{}.frames(1.0, [](double t) {
+  auto frames = PressStream{}.frames(1.0, [](double t) {
     return std::vector<double>{3.0, 3.0 + 5.0 * press(t, 0.3, 10.0)};
   });
   expect_named(input_error([&] { baseline_of(frames, two_elements(), 2.0); }),
                {"touched", "element 1", "kPa"});
-  // Without a pressure that is a touch there is none.
-  EXPECT_NEAR(baseline_of(frames, two_elements(), {})[0], 3.0, 0.3);
+  // Unknown readings tell nothing either way.
+  for (std::size_t i = 0; i < frames.size(); i += 2) {
+    frames[i].values = {infinity, nan};
+  }
+  expect_named(input_error([&] { baseline_of(frames, two_elements(), 2.0); }),
+               {"touched", "element 1"});
+  // Without a pressure that is a touch there is none. Five standard errors of the median, 1.25 *
+  // 0.3 / sqrt(50).
+  EXPECT_NEAR(baseline_of(frames, two_elements(), {})[0], 3.0, 0.27);
+  frames[7].values = {1.0};
+  expect_named(input_error([&] { baseline_of(frames, two_elements(), 2.0); }),
+               {"1 values", "2 elements"});
 }
 
 TEST(Baseline, DeadElementsMayReadAnything) {
   SensorDescription sensor = two_elements();
   sensor.valid = {0, 1};
   const auto frames = PressStream{}.frames(1.0, [](double t) {
-    return std::vector<double>{t > 0.5 ? nan("") : 1e9, 4.0};
+    return std::vector<double>{t > 0.5 ? nan : 1e9, 4.0};
   });
   const std::vector<double> baseline = baseline_of(frames, sensor, 2.0);
   EXPECT_EQ(baseline[0], 0.0);
@@ -47,7 +56,7 @@ TEST(Baseline, DeadElementsMayReadAnything) {
 
 TEST(Baseline, RefusesNothingToGoBy) {
   expect_named(input_error([] { baseline_of({}, two_elements(), 2.0); }), {"no frame"});
-  const std::vector<Frame> frames(5, Frame{.values = {nan(""), 1.0}});
+  const std::vector<Frame> frames(5, Frame{.values = {nan, 1.0}});
   expect_named(input_error([&] { baseline_of(frames, two_elements(), 2.0); }), {"element 0"});
 }
 

@@ -1,8 +1,6 @@
 #include "streaming/frame_smoother.hpp"
 #include "support/limits.hpp"
 
-#include <gtest/gtest.h>
-
 #include <cfloat>
 #include <cmath>
 #include <random>
@@ -93,7 +91,7 @@ TEST(FrameSmoother, UnknownReadingsTakeNoPart) {
 }
 
 // A spike beside an Unknown reading is a single bad reading still.
-TEST(FrameSmoother, MedianIsOfKnownReadings) {
+TEST(FrameSmoother, TakesTheMedianOfKnownReadings) {
   for (const std::size_t spike : {20u, 22u}) {
     std::vector<std::vector<double>> frames(40, {5.0});
     frames[spike] = {1e9};

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <gtest/gtest.h>
+
 namespace palpate {
 
 double press(double time_s, double begin_s, double steady_s) {
@@ -39,8 +41,10 @@ std::vector<Frame> PressStream::frames(double seconds, const Pressures& pressure
 }
 
 std::vector<DetectedTouch> touches_in(const std::vector<Frame>& frames,
-                                      const TouchDetectorOptions& options) {
-  TouchDetector detector(options, {}, {});
+                                      const TouchDetectorOptions& options,
+                                      const std::vector<double>& baseline,
+                                      const std::vector<std::uint8_t>& valid) {
+  TouchDetector detector(options, baseline, valid);
   std::vector<DetectedTouch> touches;
   const auto take = [&](std::optional<DetectedTouch> touch) {
     if (touch) {
@@ -52,6 +56,21 @@ std::vector<DetectedTouch> touches_in(const std::vector<Frame>& frames,
   }
   take(detector.finish());
   return touches;
+}
+
+void expect_same(std::span<const DetectedTouch> touches, std::span<const DetectedTouch> expected,
+                 double scale) {
+  ASSERT_EQ(touches.size(), expected.size());
+  for (std::size_t i = 0; i < touches.size(); ++i) {
+    SCOPED_TRACE(i);
+    std::vector<double> pressure = expected[i].pressure;
+    std::ranges::for_each(pressure, [&](double& value) { value *= scale; });
+    EXPECT_EQ(touches[i].pressure, pressure);
+    EXPECT_EQ(touches[i].begin_s, expected[i].begin_s);
+    EXPECT_EQ(touches[i].end_s, expected[i].end_s);
+    EXPECT_EQ(touches[i].frames, expected[i].frames);
+    EXPECT_EQ(touches[i].valid, expected[i].valid);
+  }
 }
 
 }  // namespace palpate

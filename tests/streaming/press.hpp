@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <random>
+#include <span>
 #include <vector>
 
 #include "palpate/touch_detector.hpp"
@@ -28,8 +29,14 @@ struct PressStream {
 
 inline constexpr double stream_begin_s = 1.7e9;
 
-/// The touches in a stream that begins untouched with nothing to subtract.
+/// The touches in a stream, and the one that is not over at its end.
 std::vector<DetectedTouch> touches_in(const std::vector<Frame>& frames,
-                                      const TouchDetectorOptions& options = {});
+                                      const TouchDetectorOptions& options = {},
+                                      const std::vector<double>& baseline = {},
+                                      const std::vector<std::uint8_t>& valid = {});
+
+/// Expects the same touches, their pressure times `scale`.
+void expect_same(std::span<const DetectedTouch> touches, std::span<const DetectedTouch> expected,
+                 double scale = 1.0);
 
 }  // namespace palpate

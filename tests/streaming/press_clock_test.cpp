@@ -79,14 +79,14 @@ TEST(ClockOffset, IsFoundFromPosesThatStandStillInPresses) {
     EXPECT_GT(offset->against, 6u);
     EXPECT_LE(offset->left, 1u);
   }
+  // Of presses once a second, it is the one nearest to 0.
+  EXPECT_NEAR(Logs({.regular = true}, 0.3).offset().value().seconds, 0.3, 0.1);
 }
 
 TEST(ClockOffset, IsFoundFromHeightsWhereTheArrayIsLiftedAndSetDownAtOnePlace) {
-  const Habit habit{.step_mm = 0.0, .lift_mm = 15.0};
-  EXPECT_FALSE(Logs(habit, 0.62).offset()) << "in a plane nothing moves";
-  const auto offset = Logs(habit, 0.62).offset(true);
-  ASSERT_TRUE(offset);
-  EXPECT_NEAR(offset->seconds, 0.62, 0.1);
+  const Logs logs({.step_mm = 0.0, .lift_mm = 15.0}, 0.62);
+  EXPECT_FALSE(logs.offset()) << "in a plane nothing moves";
+  EXPECT_NEAR(logs.offset(true).value().seconds, 0.62, 0.1);
 }
 
 TEST(ClockOffset, IsNoneWhereTheClocksAgree) {
@@ -102,12 +102,6 @@ TEST(ClockOffset, IsNoneWherePressesDoNotShowIt) {
   EXPECT_FALSE(Logs({.slide_mm_per_s = 20.0}, 0.62).offset()) << "it slides under load";
   EXPECT_FALSE(Logs({.rest_s = 1.0}, 0.4).offset()) << "it rests for longer than the offset";
   EXPECT_FALSE(Logs({.presses = 3}, 0.62).offset()) << "too few presses";
-}
-
-TEST(ClockOffset, IsTheOneNearestTo0WherePressesAreRegular) {
-  const auto offset = Logs({.regular = true}, 0.3).offset();  // one a second
-  ASSERT_TRUE(offset);
-  EXPECT_NEAR(offset->seconds, 0.3, 0.1);
 }
 
 TEST(ClockOffset, OfClocksWithoutACommonEpochIsNamedOnlyWhereOneAloneExplainsThePresses) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <map>
 #include <numeric>
@@ -44,6 +45,23 @@ double distance(std::span<const double> a, std::span<const double> b) {
     sum += std::abs(a[i] - b[i]);
   }
   return sum / 2.0;
+}
+
+/// Entropy of objects and bins, in nats.
+double entropy(const reference::Posterior& truth) {
+  const std::vector<double> prior = log_prior(truth.weight);
+  std::vector<double> logs;
+  for (std::size_t i = 0; i < prior.size(); ++i) {
+    for (const double nats : truth.log_likelihood[i]) {
+      logs.push_back(prior[i] + nats);
+    }
+  }
+  const double log_total = log_sum(logs);
+  double sum = 0.0;
+  for (const double log : logs) {
+    sum -= std::exp(log - log_total) * (log - log_total);
+  }
+  return sum;
 }
 
 /// The mass of the places that `estimated` gives nothing.
@@ -158,6 +176,11 @@ Certified expect_certified(const BoundedPosterior& posterior, std::span<const Hy
   seen.total_variation = std::max({seen.total_variation, by_xy, by_theta});
   EXPECT_LE(seen.total_variation, allowed);
 
+  if (!options.budget_s && options.tolerance <= 1e-3) {
+    // The dropped mass, times the log of the bins and how far below the others they may be.
+    EXPECT_NEAR(posterior.entropy(), entropy(truth), 1e-9 + 100.0 * allowed);
+  }
+
   const auto object = static_cast<std::size_t>(estimate.mode.object);
   const double at_mode = truth.log_likelihood[object][static_cast<std::size_t>(*estimate.mode.bin)];
   EXPECT_NEAR(estimate.mode.log_likelihood, at_mode, nats);
@@ -191,6 +214,100 @@ Certified expect_certified(std::span<const Hypothesis> objects, const BoundedOpt
                           nats);
 }
 
+namespace {
+
+struct Cancelled {};
+
+/// Expects a search to end at any cancel point, of many at nine of them, and the next call to tell
+/// the same as without.
+void expect_the_same_after_a_cancel(std::span<const Hypothesis> objects, BoundedOptions options,
+                                    std::span<const Touch> touches,
+                                    const std::vector<std::vector<double>>& told) {
+  int passed = 0;
+  int last = -1;
+  options.cancel_point = [&] {
+    if (passed++ == last) {
+      throw Cancelled();
+    }
+  };
+  BoundedPosterior posterior(objects, options);
+  posterior.update(touches);
+  posterior.estimate();
+  const int points = passed;  // 0 where no element sees a map, and nothing is searched
+  for (int point = 0; point < points; point += 1 + points / 9) {
+    posterior.reset();
+    posterior.update(touches);
+    passed = 0;
+    last = point;
+    EXPECT_THROW(posterior.estimate(), Cancelled) << "at cancel point " << point;
+    last = -1;
+    EXPECT_EQ(told_by(posterior, objects.size()), told) << "cancelled at point " << point;
+  }
+}
+
+}  // namespace
+
+std::vector<Certified> expect_laws(std::span<const Hypothesis> objects,
+                                   const BoundedOptions& options, const Recording& recording,
+                                   double nats) {
+  const std::vector<Touch> touches = all_touches(recording);
+  const std::size_t count = objects.size();
+  const bool certified = !options.none_weight;
+  BoundedPosterior posterior(objects, options);
+  const auto untouched = told_by(posterior, count);
+  reference::Posterior truth = reference_posterior(objects, options, {});
+  std::vector<Certified> seen;
+  const auto look = [&] {
+    if (certified) {
+      SCOPED_TRACE(::testing::Message() << seen.size() << " touches");
+      seen.push_back(expect_certified(posterior, objects, options, truth, nats));
+    }
+  };
+  look();
+  for (const Touch& touch : touches) {
+    posterior.update(touch);
+    const reference::Posterior of_touch =
+        reference_posterior(objects, options, std::span(&touch, 1));
+    for (std::size_t i = 0; i < count; ++i) {
+      std::ranges::transform(truth.log_likelihood[i], of_touch.log_likelihood[i],
+                             truth.log_likelihood[i].begin(), std::plus());
+    }
+    look();
+  }
+  const auto told = told_by(posterior, count);
+  EXPECT_EQ(told_by(posterior, count), told) << "asked again";
+  posterior.reset();
+  EXPECT_EQ(told_by(posterior, count), untouched) << "after a reset";
+  posterior.update(touches);
+  posterior.reset();  // of touches that nothing has asked about
+  posterior.update(touches);
+  EXPECT_EQ(told_by(posterior, count), told) << "all at once, after a reset";
+
+  BoundedOptions on_one_thread = options;
+  on_one_thread.threads = 1;
+  BoundedPosterior another_order(objects, on_one_thread);
+  for (std::size_t i = 0; i < touches.size(); ++i) {
+    another_order.update(touches[i == 0 ? 0 : touches.size() - i]);
+    another_order.sample(3, i);
+  }
+  EXPECT_EQ(told_by(another_order, count), told) << "in another order, on one thread";
+  expect_the_same_after_a_cancel(objects, options, touches, told);
+
+  const Pose T_moved_robot{{31.0, -17.0}, 0.9};
+  BoundedOptions in_moved = options;
+  in_moved.lattice.pivot_mm = T_moved_robot * options.lattice.pivot_mm;
+  in_moved.lattice.theta_rad.lower -= T_moved_robot.theta_rad;
+  in_moved.lattice.theta_rad.upper -= T_moved_robot.theta_rad;
+  if (certified) {
+    SCOPED_TRACE("in a frame that has moved");
+    const Recording there = moved(recording, T_moved_robot);
+    BoundedPosterior moved_posterior(objects, in_moved);
+    moved_posterior.update(all_touches(there));
+    expect_certified(moved_posterior, objects, in_moved, truth, 2.0 * nats);
+  }
+  return seen;
+}
+
 std::vector<std::vector<double>> told_by(const BoundedPosterior& posterior, std::size_t objects) {
   const Estimate estimate = posterior.estimate();
   const Certificate certificate = estimate.certificate.value();
@@ -205,7 +322,8 @@ std::vector<std::vector<double>> told_by(const BoundedPosterior& posterior, std:
        estimate.mode.log_likelihood},
       {refined.T_object_robot.translation_mm.x, refined.T_object_robot.translation_mm.y,
        refined.T_object_robot.theta_rad},
-      {refined.covariance.begin(), refined.covariance.end()}};
+      {refined.covariance.begin(), refined.covariance.end()},
+      {posterior.entropy()}};
   for (std::size_t i = 0; i < objects; ++i) {
     const auto [grid, xy, theta] = posterior.marginals(static_cast<int>(i));
     told.push_back(xy);

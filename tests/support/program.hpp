@@ -2,16 +2,18 @@
 
 #include <sys/resource.h>
 
-#include <cstdlib>
 #include <filesystem>
+#include <initializer_list>
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <nlohmann/json.hpp>
 
 #include "support/scratch_folder.hpp"
+#include "support/variable.hpp"
 
 namespace palpate {
 
@@ -33,39 +35,28 @@ struct Surroundings {
   std::vector<int> closed;                   ///< standard streams that are closed, as a daemon's
 };
 
+/// The program's arguments: a list, or a text of them with a space between each two.
+class CommandLine {
+ public:
+  CommandLine(std::initializer_list<std::string> arguments) : arguments_(arguments) {}
+  CommandLine(std::vector<std::string> arguments) : arguments_(std::move(arguments)) {}
+  CommandLine(const std::string& text);
+  CommandLine(const char* text) : CommandLine(std::string(text)) {}
+
+  const std::vector<std::string>& arguments() const& { return arguments_; }
+  std::vector<std::string> arguments() && { return std::move(arguments_); }
+  std::string text() const;
+
+ private:
+  std::vector<std::string> arguments_;
+};
+
+/// The file of the palpate program.
+const char* program();
+
 /// Runs the palpate program in `folder`, on which its relative paths depend.
 Outcome run_program(const std::filesystem::path& folder, const std::vector<std::string>& arguments,
                     const Surroundings& surroundings = {});
-
-/// The palpate program on a terminal of its own.
-class ProgramOnTerminal {
- public:
-  /// `environment` is set on top of the test's own. Throws, and so fails the test, where the
-  /// machine has no pseudo-terminal to give.
-  ProgramOnTerminal(const std::filesystem::path& folder, const std::vector<std::string>& arguments,
-                    const std::map<std::string, std::string>& environment = {}, int columns = 80,
-                    int rows = 24);
-  ~ProgramOnTerminal();
-  ProgramOnTerminal(const ProgramOnTerminal&) = delete;
-  ProgramOnTerminal& operator=(const ProgramOnTerminal&) = delete;
-
-  /// Waits until the program has shown this since the last call; false if it ends before.
-  bool shows(const std::string& text);
-  void type(const std::string& keys) const;
-  /// Waits for the end of the program: its status, and all that it has shown.
-  Outcome finish();
-
- private:
-  bool read_more();
-
-  int terminal_ = -1;
-  pid_t pid_ = -1;
-  std::string text_;
-  std::size_t seen_ = 0;  ///< of text_, by shows()
-};
-
-/// In a forked child: becomes the palpate program.
-[[noreturn]] void become_program(const std::vector<std::string>& arguments);
 
 /// Every file and folder below `folder`, with the files' content.
 std::map<std::string, std::string> content_of(const std::filesystem::path& folder);
@@ -73,40 +64,29 @@ std::map<std::string, std::string> content_of(const std::filesystem::path& folde
 /// Runs the program in a folder of the test's own.
 class ProgramTest : public testing::Test {
  protected:
-  Outcome palpate(const std::vector<std::string>& arguments,
-                  const Surroundings& surroundings = {}) const {
-    return run_program(folder_.path(), arguments, surroundings);
+  Outcome palpate(const CommandLine& command, const Surroundings& surroundings = {}) const {
+    return run_program(folder_.path(), command.arguments(), surroundings);
   }
-  /// Starts the program, whose output goes to the files "said" and "complained".
-  pid_t start(const std::vector<std::string>& arguments) const;
-  /// Kills the program with SIGKILL and waits for its end.
-  static void kill_program(pid_t pid);
   /// Standard output of a run that has to go well and say nothing else.
-  std::string done(const std::vector<std::string>& arguments) const;
+  std::string done(const CommandLine& command) const;
+  /// Standard error of a run that has to go well.
+  std::string remarks(const CommandLine& command) const;
   /// The records of `recognize` with these arguments, as `--json -` prints them.
-  nlohmann::json records(std::vector<std::string> arguments) const;
+  nlohmann::json records(const CommandLine& flags) const;
   /// The one record of `recognize` with these arguments.
-  nlohmann::json record(const std::vector<std::string>& arguments) const;
+  nlohmann::json record(const CommandLine& flags) const;
   /// Expects status 2, one line on standard error that holds every one of `named`, nothing on
   /// standard output, and the folder as it was before.
-  void expect_refused(const std::vector<std::string>& arguments,
-                      const std::vector<std::string>& named) const;
+  void expect_refused(const CommandLine& command, const std::vector<std::string>& named) const;
+  /// The same of each of these commands.
+  void expect_each_refused(
+      const std::vector<std::pair<std::string, std::vector<std::string>>>& commands) const {
+    for (const auto& [command, named] : commands) {
+      expect_refused(command, named);
+    }
+  }
 
   ScratchFolder folder_;
-};
-
-/// A variable of the environment while it lives.
-class Variable {
- public:
-  Variable(const char* name, const std::string& value) : name_(name) {
-    ::setenv(name, value.c_str(), 1);
-  }
-  ~Variable() { ::unsetenv(name_); }
-  Variable(const Variable&) = delete;
-  Variable& operator=(const Variable&) = delete;
-
- private:
-  const char* name_;
 };
 
 }  // namespace palpate

@@ -6,7 +6,6 @@
 #include <limits>
 #include <numbers>
 
-#include "estimation/lattice/refinement.hpp"
 
 namespace palpate {
 
@@ -97,7 +96,7 @@ reference::Posterior reference_posterior(std::span<const Hypothesis> hypotheses,
       logs = of_touches(touches);
     } else {
       logs.resize(static_cast<std::size_t>(options.lattice.bins()));
-      const glm::dvec2 centroid_mm = displaced_body(hypothesis.map).centroid_mm;
+      const glm::dvec2 centroid_mm = reference::body_of(hypothesis.map).centroid_mm;
       for (std::size_t i = 0; i < touches.size(); ++i) {
         if (i > 0 && !options.slip_sd.none()) {
           logs = reference::slipped(logs, options.lattice, options.slip_sd, centroid_mm);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <iterator>
 #include <numbers>
 #include <span>
 #include <string>
@@ -27,6 +28,12 @@ class Uniform {
  private:
   std::uint64_t state_;
 };
+
+/// One of several choices, each as likely.
+template <typename Choices>
+auto one_of(Uniform& random, const Choices& choices) {
+  return choices[static_cast<std::size_t>(random(0.0, static_cast<double>(std::size(choices))))];
+}
 
 /// Touches of no object in particular: elements over [-6, 6]^2 mm, poses over [-8, 8]^2 mm and all
 /// angles, and as many In Contact as No Contact and Unknown elements; the first is In Contact.

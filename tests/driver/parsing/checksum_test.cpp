@@ -7,81 +7,67 @@
 #include <string_view>
 #include <vector>
 
+#include "sent_frame.hpp"
+
 namespace palpate::checksum_test {
 
 using Kind = Checksum::Kind;
+using Parameters = Checksum::Parameters;
 
-std::uint32_t of(const Checksum::Parameters& parameters, std::string_view text) {
-  const std::vector<std::uint8_t> bytes(text.begin(), text.end());
-  return Checksum(parameters)(bytes);
+Parameters crc(std::size_t bytes, std::uint32_t polynomial, std::uint32_t init = 0,
+               std::uint32_t xor_out = 0, bool reflect = false) {
+  return {.bytes = bytes,
+          .polynomial = polynomial,
+          .init = init,
+          .xor_out = xor_out,
+          .reflect = reflect};
 }
 
-// The values named "check", over "123456789", of the catalogue of parametrised CRC algorithms.
-TEST(Checksum, GivesTheCatalogueValues) {
-  constexpr std::string_view check = "123456789";
-  EXPECT_EQ(of({.bytes = 1, .polynomial = 0x07}, check), 0xf4u) << "CRC-8/SMBUS";
-  EXPECT_EQ(of({.bytes = 1, .polynomial = 0x31, .reflect = true}, check), 0xa1u) << "CRC-8/MAXIM";
-  EXPECT_EQ(of({.bytes = 2, .polynomial = 0x1021, .init = 0xffff}, check), 0x29b1u)
-      << "CRC-16/CCITT-FALSE";
-  EXPECT_EQ(of({.bytes = 2, .polynomial = 0x1021}, check), 0x31c3u) << "CRC-16/XMODEM";
-  EXPECT_EQ(of({.bytes = 2, .polynomial = 0x8005, .init = 0xffff, .reflect = true}, check), 0x4b37u)
-      << "CRC-16/MODBUS";
-  // An asymmetric initial value shows whether it is reflected with the register.
-  EXPECT_EQ(of({.bytes = 2, .polynomial = 0x1021, .init = 0xb2aa, .reflect = true}, check), 0x63d0u)
-      << "CRC-16/RIELLO";
-  EXPECT_EQ(of({.bytes = 4,
-                .polynomial = 0x04c11db7,
-                .init = 0xffffffff,
-                .xor_out = 0xffffffff,
-                .reflect = true},
-               check),
-            0xcbf43926u)
-      << "CRC-32/ISO-HDLC";
-  EXPECT_EQ(
-      of({.bytes = 4, .polynomial = 0x04c11db7, .init = 0xffffffff, .xor_out = 0xffffffff}, check),
-      0xfc891918u)
-      << "CRC-32/BZIP2";
-}
+struct ChecksumCase {
+  const char* name;
+  std::uint32_t expected;
+  std::string_view bytes;
+  Parameters parameters;
+};
 
-// The packets that the vendor's command set prints as examples; the CRC is sent low byte first.
-TEST(Checksum, AgreesWithWeissRoboticsExamples) {
-  const auto weiss = [](std::string_view bytes) {
-    return of({.kind = Kind::weiss, .bytes = 2}, bytes);
-  };
-  EXPECT_EQ(weiss({"\xaa\xaa\xaa\x01\x02\x00\x12\x34", 8}), 0x666du);
-  EXPECT_EQ(weiss({"\xaa\xaa\xaa\x01\x00\x00", 6}), 0x10e8u);
-  EXPECT_EQ(weiss({"\xaa\xaa\xaa\x06\x00\x00", 6}), 0x2697u);
-  // The checksum differs from the CRC-16 whose table it uses.
-  EXPECT_NE(of({.bytes = 2, .polynomial = 0x1021, .init = 0xffff}, {"\xaa\xaa\xaa\x01\x00\x00", 6}),
-            0x10e8u);
-}
+constexpr std::string_view check = "123456789";
+constexpr std::string_view three = "\xff\x02\x10";  // 255 + 2 + 16 = 273 = 0x111
 
-TEST(Checksum, AddsAndExors) {
-  constexpr std::string_view bytes = "\xff\x02\x10";  // 255 + 2 + 16 = 273 = 0x111
-  EXPECT_EQ(of({.kind = Kind::sum, .bytes = 1}, bytes), 0x11u);
-  EXPECT_EQ(of({.kind = Kind::sum, .bytes = 2}, bytes), 0x111u);
-  EXPECT_EQ(of({.kind = Kind::sum, .bytes = 1, .xor_out = 0xff}, bytes), 0xeeu);
-  EXPECT_EQ(of({.kind = Kind::exor, .bytes = 1}, bytes), 0xedu);
-  EXPECT_EQ(of({.kind = Kind::exor, .bytes = 1, .init = 0x0f}, bytes), 0xe2u);
+// The values named "check", over "123456789", are those of the catalogue of parametrised CRC
+// algorithms; those of Weiss Robotics, of packets that its command set prints as examples.
+const ChecksumCase cases[] = {
+    {"CRC-8/SMBUS", 0xf4, check, crc(1, 0x07)},
+    {"CRC-8/MAXIM", 0xa1, check, crc(1, 0x31, 0, 0, true)},
+    {"CRC-16/CCITT-FALSE", 0x29b1, check, crc(2, 0x1021, 0xffff)},
+    {"CRC-16/XMODEM", 0x31c3, check, crc(2, 0x1021)},
+    {"CRC-16/MODBUS", 0x4b37, check, crc(2, 0x8005, 0xffff, 0, true)},
+    // An asymmetric initial value shows whether it is reflected with the register.
+    {"CRC-16/RIELLO", 0x63d0, check, crc(2, 0x1021, 0xb2aa, 0, true)},
+    {"CRC-32/ISO-HDLC", 0xcbf43926, check, crc(4, 0x04c11db7, 0xffffffff, 0xffffffff, true)},
+    {"CRC-32/BZIP2", 0xfc891918, check, crc(4, 0x04c11db7, 0xffffffff, 0xffffffff)},
+    {"Weiss 1", 0x10e8, {"\xaa\xaa\xaa\x01\x00\x00", 6}, {.kind = Kind::weiss, .bytes = 2}},
+    {"Weiss 6", 0x2697, {"\xaa\xaa\xaa\x06\x00\x00", 6}, {.kind = Kind::weiss, .bytes = 2}},
+    {"8-bit sum", 0x11, three, {.kind = Kind::sum, .bytes = 1}},
+    {"16-bit sum", 0x111, three, {.kind = Kind::sum, .bytes = 2}},
+    {"sum of all", 0xbd, three, {.kind = Kind::sum, .bytes = 1, .init = 0x31, .xor_out = 0xff}},
+    {"exclusive or", 0xed, three, {.kind = Kind::exor, .bytes = 1}},
+    {"begun", 0xe2, three, {.kind = Kind::exor, .bytes = 1, .init = 0x0f}},
+    {"CRC of nothing", 0xffff, "", crc(2, 0x1021, 0xffff)},
+    {"sum of nothing", 0, "", {.kind = Kind::sum, .bytes = 1}}};
+
+TEST(Checksum, GivesThePublishedValues) {
+  for (const ChecksumCase& row : cases) {
+    const Bytes bytes(row.bytes.begin(), row.bytes.end());
+    EXPECT_EQ(Checksum(row.parameters)(bytes), row.expected) << row.name;
+  }
 }
 
 TEST(Checksum, OfAStretchNeedsOnlyTheRunningValuesAtItsEnds) {
   std::mt19937 random(20261122);
-  std::vector<std::uint8_t> stream(2000);
-  for (std::uint8_t& byte : stream) {
-    byte = static_cast<std::uint8_t>(random());
-  }
-  for (const Checksum::Parameters& parameters : std::vector<Checksum::Parameters>{
-           {.kind = Kind::sum, .bytes = 1, .init = 0x31, .xor_out = 0xff},
-           {.kind = Kind::sum, .bytes = 2},
-           {.kind = Kind::exor, .bytes = 1, .init = 0x0f},
-           {.kind = Kind::weiss, .bytes = 2},
-           {.bytes = 1, .polynomial = 0x07, .init = 0x5a},
-           {.bytes = 2, .polynomial = 0x1021, .init = 0xb2aa, .reflect = true},
-           {.bytes = 2, .polynomial = 0x8005, .init = 0xffff, .xor_out = 0x1234},
-           {.bytes = 4, .polynomial = 0x04c11db7, .init = 0xffffffff, .xor_out = 0xffffffff},
-           {.bytes = 4, .polynomial = 0x04c11db7, .init = 0xffffffff, .reflect = true}}) {
-    const Checksum checksum(parameters);
+  const Bytes stream = random_bytes(2000, random);
+  for (const ChecksumCase& row : cases) {
+    SCOPED_TRACE(row.name);
+    const Checksum checksum(row.parameters);
     std::vector<std::uint32_t> running{static_cast<std::uint32_t>(random() & 0xff)};
     for (const std::uint8_t byte : stream) {
       running.push_back(checksum.run_on(running.back(), byte));
@@ -96,18 +82,13 @@ TEST(Checksum, OfAStretchNeedsOnlyTheRunningValuesAtItsEnds) {
 }
 
 TEST(Checksum, OfTheLongestStretch) {
-  const Checksum crc({.bytes = 4, .polynomial = 0x04c11db7, .init = 0xffffffff});
-  const std::vector<std::uint8_t> stream(Checksum::longest_stretch, 0x5a);
+  const Checksum checksum(crc(4, 0x04c11db7, 0xffffffff));
+  const Bytes stream(Checksum::longest_stretch, 0x5a);
   std::uint32_t running = 0;
   for (const std::uint8_t byte : stream) {
-    running = crc.run_on(running, byte);
+    running = checksum.run_on(running, byte);
   }
-  EXPECT_EQ(crc.of_stretch(0, running, stream.size()), crc(stream));
-}
-
-TEST(Checksum, OfNothingIsItsBeginning) {
-  EXPECT_EQ(of({.bytes = 2, .polynomial = 0x1021, .init = 0xffff}, ""), 0xffffu);
-  EXPECT_EQ(of({.kind = Kind::sum, .bytes = 1}, ""), 0u);
+  EXPECT_EQ(checksum.of_stretch(0, running, stream.size()), checksum(stream));
 }
 
 }  // namespace palpate::checksum_test

@@ -38,12 +38,7 @@ TEST_P(LargestPacket, IsFoundBehindManyThatBeginLikeIt) {
   Bytes noise(1'000'000, 0);
   noise[0] = 1;  // out of step from here on
   receiver.push(noise);
-  // In pieces, as a board with short packets delivers them.
-  for (std::size_t at = 0; at < packet.size(); at += 7) {
-    const auto begin = packet.begin() + static_cast<std::ptrdiff_t>(at);
-    receiver.push(Bytes(
-        begin, begin + static_cast<std::ptrdiff_t>(std::min<std::size_t>(7, packet.size() - at))));
-  }
+  receiver.push_in_pieces(packet, [] { return 7; });  // as a board of short packets delivers it
   ASSERT_EQ(receiver.frames().size(), 1u);
   EXPECT_EQ(receiver.frames()[0].values.back(), packet[1 + 3 * 16383]);
   EXPECT_EQ(receiver.garbage(), noise.size());

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "driver/serial_profile.hpp"
@@ -17,15 +18,23 @@ class Receiver {
  public:
   explicit Receiver(const SerialProfile& profile) : deframer_(make_deframer(profile)) {}
 
-  void push(const Bytes& bytes) { deframer_->push(bytes, frames_); }
+  void push(std::span<const std::uint8_t> bytes) { deframer_->push(bytes, frames_); }
   void send(const std::vector<SentFrame>& sent) { push(stream_of(sent)); }
+  /// Pushes pieces of as many bytes as `size` says, as transfers deliver them.
+  template <class Size>
+  void push_in_pieces(std::span<const std::uint8_t> bytes, const Size& size) {
+    while (!bytes.empty()) {
+      const std::size_t piece = std::min<std::size_t>(bytes.size(), size());
+      push(bytes.first(piece));
+      bytes = bytes.subspan(piece);
+    }
+  }
 
   /// Whether the frames [begin, end) came in order, perhaps among other frames.
   bool has(const std::vector<SentFrame>& sent, std::size_t begin, std::size_t end) const {
     auto at = frames_.begin();
     for (std::size_t i = begin; i < end; ++i) {
-      at = std::find_if(at, frames_.end(),
-                        [&](const ParsedFrame& frame) { return frame.values == sent[i].values; });
+      at = std::ranges::find(at, frames_.end(), sent[i].values, &ParsedFrame::values);
       if (at == frames_.end()) {
         return false;
       }
@@ -39,12 +48,11 @@ class Receiver {
     EXPECT_TRUE(has(sent, 0, sent.size()));
   }
 
-  std::size_t strangers(const std::vector<SentFrame>& sent) const {
-    return static_cast<std::size_t>(
-        std::count_if(frames_.begin(), frames_.end(), [&](const ParsedFrame& frame) {
-          return std::none_of(sent.begin(), sent.end(),
-                              [&](const SentFrame& s) { return s.values == frame.values; });
-        }));
+  /// Number of frames that were not sent.
+  auto strangers(const std::vector<SentFrame>& sent) const {
+    return std::ranges::count_if(frames_, [&](const ParsedFrame& frame) {
+      return std::ranges::find(sent, frame.values, &SentFrame::values) == sent.end();
+    });
   }
 
   void clear() { frames_.clear(); }

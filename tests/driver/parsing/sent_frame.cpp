@@ -1,7 +1,8 @@
 #include "sent_frame.hpp"
 
+#include <algorithm>
 #include <bit>
-#include <stdexcept>
+#include <map>
 
 namespace palpate {
 
@@ -9,6 +10,18 @@ namespace {
 
 void append(Bytes& bytes, const Bytes& more) {
   bytes.insert(bytes.end(), more.begin(), more.end());
+}
+
+std::uint16_t weiss_checksum(const Bytes& bytes) {
+  unsigned crc = 0xffff;
+  for (const std::uint8_t byte : bytes) {
+    unsigned entry = ((crc ^ byte) & 0xff) << 8;
+    for (int bit = 0; bit < 8; ++bit) {
+      entry = (entry & 0x8000) != 0 ? entry << 1 ^ 0x1021 : entry << 1;
+    }
+    crc = (entry & 0xffff) ^ crc >> 8;
+  }
+  return static_cast<std::uint16_t>(crc);
 }
 
 SentFrame tsf85_frame(std::mt19937& random) {
@@ -46,7 +59,8 @@ SentFrame wts_frame(std::mt19937& random) {
   return frame;
 }
 
-SentFrame flexitac_frame(std::size_t rows, std::mt19937& random) {
+template <std::size_t rows>
+SentFrame flexitac_frame(std::mt19937& random) {
   SentFrame frame{.bytes = {0xaa, 0x55}, .values = {}};
   append(frame.bytes, random_bytes(rows * 32, random));
   frame.values.assign(frame.bytes.begin() + 2, frame.bytes.end());
@@ -74,39 +88,29 @@ SentFrame anyskin_frame(std::mt19937& random) {
 }  // namespace
 
 SentFrame random_frame(const std::string& board, std::mt19937& random) {
-  if (board == "tsf85") {
-    return tsf85_frame(random);
-  }
-  if (board == "wts") {
-    return wts_frame(random);
-  }
-  if (board == "flexitac" || board == "flexitac12") {
-    return flexitac_frame(board == "flexitac" ? 16 : 12, random);
-  }
-  if (board == "anyskin") {
-    return anyskin_frame(random);
-  }
-  throw std::invalid_argument("no board " + board);
+  static const std::map<std::string, SentFrame (*)(std::mt19937&)> boards = {
+      {"tsf85", tsf85_frame},
+      {"wts", wts_frame},
+      {"flexitac", flexitac_frame<16>},
+      {"flexitac12", flexitac_frame<12>},
+      {"anyskin", anyskin_frame}};
+  return boards.at(board)(random);
 }
 
-std::uint16_t weiss_checksum(const Bytes& bytes) {
-  unsigned crc = 0xffff;
-  for (const std::uint8_t byte : bytes) {
-    unsigned entry = ((crc ^ byte) & 0xff) << 8;
-    for (int bit = 0; bit < 8; ++bit) {
-      entry = (entry & 0x8000) != 0 ? entry << 1 ^ 0x1021 : entry << 1;
-    }
-    crc = (entry & 0xffff) ^ crc >> 8;
-  }
-  return static_cast<std::uint16_t>(crc);
+std::vector<SentFrame> random_frames(const std::string& board, std::size_t count,
+                                     std::mt19937& random) {
+  std::vector<SentFrame> frames(count);
+  std::ranges::generate(frames, [&] { return random_frame(board, random); });
+  return frames;
 }
 
 Bytes wts_packet(std::uint8_t id, const Bytes& payload) {
-  Bytes packet;
-  for (const std::size_t byte : {std::size_t{0xaa}, std::size_t{0xaa}, std::size_t{0xaa},
-                                 std::size_t{id}, payload.size(), payload.size() >> 8}) {
-    packet.push_back(static_cast<std::uint8_t>(byte));
-  }
+  Bytes packet = {0xaa,
+                  0xaa,
+                  0xaa,
+                  id,
+                  static_cast<std::uint8_t>(payload.size()),
+                  static_cast<std::uint8_t>(payload.size() >> 8)};
   append(packet, payload);
   const std::uint16_t crc = weiss_checksum(packet);
   append(packet, {static_cast<std::uint8_t>(crc), static_cast<std::uint8_t>(crc >> 8)});
@@ -115,10 +119,40 @@ Bytes wts_packet(std::uint8_t id, const Bytes& payload) {
 
 Bytes random_bytes(std::size_t count, std::mt19937& random) {
   Bytes bytes(count);
-  for (std::uint8_t& byte : bytes) {
-    byte = static_cast<std::uint8_t>(random());
-  }
+  std::ranges::generate(bytes, [&] { return static_cast<std::uint8_t>(random()); });
   return bytes;
+}
+
+void damage(Bytes& bytes, Damage kind, std::mt19937& random) {
+  const auto place = [&] {
+    return bytes.begin() + static_cast<std::ptrdiff_t>(random() % (bytes.size() + 1));
+  };
+  const auto [from, to] = std::minmax({place(), place()});
+  switch (kind) {
+    case Damage::bits_flip:
+      for (unsigned flips = 1 + random() % 8; flips > 0 && !bytes.empty(); --flips) {
+        bytes[random() % bytes.size()] ^= static_cast<std::uint8_t>(1u << random() % 8);
+      }
+      break;
+    case Damage::end_lost:
+      bytes.erase(from, bytes.end());
+      break;
+    case Damage::middle_lost:
+      bytes.erase(from, to);
+      break;
+    case Damage::others_between: {
+      const Bytes more = random_bytes(random() % 70, random);
+      bytes.insert(from, more.begin(), more.end());
+      break;
+    }
+    case Damage::some_twice: {
+      const Bytes again(from, to);
+      bytes.insert(to, again.begin(), again.end());
+      break;
+    }
+    case Damage::all_random:
+      bytes = random_bytes(random() % 80, random);
+  }
 }
 
 Bytes stream_of(const std::vector<SentFrame>& frames) {

@@ -20,14 +20,19 @@ struct SentFrame {
 /// A frame with random readings of "wts", "tsf85", "flexitac", "flexitac12" or "anyskin", written
 /// byte by byte after the board's protocol, without the profile.
 SentFrame random_frame(const std::string& board, std::mt19937& random);
+std::vector<SentFrame> random_frames(const std::string& board, std::size_t count,
+                                     std::mt19937& random);
 
-/// Weiss Robotics' checksum, bit by bit.
-std::uint16_t weiss_checksum(const Bytes& bytes);
-
-/// A WTS packet.
+/// A WTS packet, whose checksum is computed bit by bit.
 Bytes wts_packet(std::uint8_t id, const Bytes& payload);
 
 Bytes random_bytes(std::size_t count, std::mt19937& random);
+
+enum class Damage { bits_flip, end_lost, middle_lost, others_between, some_twice, all_random };
+constexpr int kinds_of_damage = 6;
+
+/// Damages bytes as a line or a board may damage them.
+void damage(Bytes& bytes, Damage kind, std::mt19937& random);
 
 /// The bytes of all frames, in order.
 Bytes stream_of(const std::vector<SentFrame>& frames);

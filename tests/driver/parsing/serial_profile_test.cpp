@@ -1,42 +1,40 @@
 #include "driver/serial_profile.hpp"
 
-#include <gtest/gtest.h>
+#include <sstream>
 
+#include "receiver.hpp"
 #include "support/host_locale.hpp"
 #include "support/scratch_folder.hpp"
+#include "support/trials.hpp"
 
 namespace palpate::serial_profile_test {
 
-TEST(ShippedProfiles, AreFoundByName) {
-  EXPECT_EQ(shipped_profiles(),
-            (std::vector<std::string>{"anyskin", "flexitac", "flexitac12", "tsf85", "wts"}));
-  for (const std::string& name : shipped_profiles()) {
+TEST(ShippedProfiles, AreFoundByNameAndSayWhatTheBoardsAre) {
+  const HostLocale locale;
+  const std::pair<const char*, std::size_t> boards[] = {
+      {"anyskin", 5}, {"flexitac", 512}, {"flexitac12", 384}, {"tsf85", 56}, {"wts", 84}};
+  std::vector<std::string> names;
+  for (const auto& [name, elements] : boards) {
+    SCOPED_TRACE(name);
+    names.emplace_back(name);
     const SerialProfile profile = read_serial_profile(name);
-    EXPECT_EQ(profile.pressure_unit, "raw") << name;
-    EXPECT_EQ(profile.packet.elements, profile.elements_mm.size()) << name;
+    EXPECT_EQ(profile.pressure_unit, "raw");
+    EXPECT_EQ(profile.elements_mm.size(), elements);
+    EXPECT_EQ(profile.packet.elements, elements);
+    EXPECT_EQ(profile.line.baud, names.back().starts_with("flexitac") ? 2000000u : 115200u);
     EXPECT_NE(make_deframer(profile), nullptr);
   }
-}
-
-TEST(ShippedProfiles, SayWhatTheBoardsAre) {
+  EXPECT_EQ(shipped_profiles(), names);
   const SerialProfile tsf85 = read_serial_profile("tsf85");
   EXPECT_EQ(tsf85.usb, (std::vector<UsbId>{{0x16d0, 0x14cc}, {0x04b4, 0xf232}}));
-  EXPECT_EQ(tsf85.line.baud, 115200u);
   EXPECT_EQ(tsf85.start, (std::vector<std::uint8_t>{0x9a, 0, 0x58, 1, 10}));
-  EXPECT_EQ(tsf85.elements_mm.size(), 56u);
-  EXPECT_EQ(read_serial_profile("wts").elements_mm.size(), 84u);
-  EXPECT_EQ(read_serial_profile("flexitac").elements_mm.size(), 512u);
-  EXPECT_EQ(read_serial_profile("flexitac12").elements_mm.size(), 384u);
-  for (const char* name : {"flexitac", "flexitac12"}) {
-    EXPECT_EQ(read_serial_profile(name).line.baud, 2000000u);
-  }
-  EXPECT_EQ(read_serial_profile("anyskin").elements_mm.size(), 5u);
+  expect_named(input_error([] { read_serial_profile("digitacts"); }),
+               {"digitacts", "anyskin, flexitac, flexitac12, tsf85, wts"});
 }
 
-TEST(ShippedProfiles, AreNamedWhereAnotherWasAskedFor) {
-  expect_named(input_error([] { read_serial_profile("digitacts"); }),
-               {"digitacts", "anyskin, flexitac, flexitac12, tsf85, wts", ".yaml"});
-}
+// The least that a profile must say.
+const std::string head = "name: own\nelements: [[0, 0], [2, 0]]\n";
+const std::string packet = "packet: [{bytes: aa}, {values: u8}]\n";
 
 class ProfileFile : public testing::Test {
  protected:
@@ -45,27 +43,19 @@ class ProfileFile : public testing::Test {
     return read_serial_profile(path_.string());
   }
 
-  /// Expects a message of one line that names the file and these words.
-  void expect_refused(const std::string& yaml, std::initializer_list<const char*> parts) {
-    const std::string message = input_error([&] { read(yaml); });
-    expect_named(message, {path_.c_str()});
-    expect_named(message, parts);
+  /// Expects that a profile is refused by its path, and by this place in it.
+  void expect_refused(const std::string& yaml, const char* place) {
+    SCOPED_TRACE(yaml);
+    expect_named(input_error([&] { read(yaml); }), {path_.c_str(), place});
   }
 
   ScratchFolder folder_;
   std::filesystem::path path_ = folder_ / "own.yaml";
 };
 
-// The least that a profile must say.
-constexpr const char* head = "name: own\nelements: [[0, 0], [2, 0]]\n";
-constexpr const char* packet = "packet: [{bytes: aa}, {values: u8}]\n";
-
-std::string with(const std::string& line) { return std::string(head) + line + "\n" + packet; }
-std::string with_packet(const std::string& fields) {
-  return std::string(head) + "packet:\n" + fields;
-}
-
+// Also in a program whose numbers have decimal commas
 TEST_F(ProfileFile, SaysAllThatItCan) {
+  const HostLocale locale;
   const SerialProfile profile = read(R"(
 name: Own board
 usb: [1209:0001, "1209:ABCD"]
@@ -74,10 +64,10 @@ start: 01 02ff
 stop: ""
 unit: kPa
 gain: 0.5
-offset: -3
-rate_hz: 250
+offset: -3.250
+rate_hz: 1000.500
 elements:
-  - [1, 2]
+  - [1.125, 2.500]
   - {grid: [2, 3], pitch_mm: [2, -4], center_mm: [10, 0], fastest: y}
 packet:
   - bytes: aa 55
@@ -94,14 +84,15 @@ packet:
   EXPECT_TRUE(profile.stop.empty());
   EXPECT_EQ(profile.pressure_unit, "kPa");
   EXPECT_EQ(profile.packet.gain, 0.5);
-  EXPECT_EQ(profile.packet.offset, -3.0);
-  EXPECT_EQ(profile.rate_hz, 250.0);
-  EXPECT_EQ(profile.elements_mm,
-            (std::vector<glm::dvec2>{{1, 2}, {9, 4}, {9, 0}, {9, -4}, {11, 4}, {11, 0}, {11, -4}}));
+  EXPECT_EQ(profile.packet.offset, -3.25);
+  EXPECT_EQ(profile.rate_hz, 1000.5);
+  EXPECT_EQ(
+      profile.elements_mm,
+      (std::vector<glm::dvec2>{{1.125, 2.5}, {9, 4}, {9, 0}, {9, -4}, {11, 4}, {11, 0}, {11, -4}}));
 }
 
 TEST_F(ProfileFile, NeedsLittle) {
-  const SerialProfile profile = read(with(""));
+  const SerialProfile profile = read(head + packet);
   EXPECT_TRUE(profile.usb.empty());
   EXPECT_EQ(profile.line.baud, 115200u);
   EXPECT_EQ(profile.pressure_unit, "raw");
@@ -109,114 +100,156 @@ TEST_F(ProfileFile, NeedsLittle) {
 }
 
 TEST_F(ProfileFile, IsRefusedWhereItIsNone) {
-  expect_named(input_error([&] { read_serial_profile((folder_ / "no.yaml").string()); }),
-               {"no.yaml", "no such profile"});
-  expect_named(input_error([&] { read_serial_profile(folder_.path().string()); }),
-               {folder_.path().c_str(), "no such profile"});
-  expect_refused("", {"line 1", "give a map with keys out of name"});
-  expect_refused("just text", {"line 1", "just text", "give a map"});
-  expect_refused("name: [", {"correct the YAML"});
-  expect_refused(std::string(head) + packet + "---\nname: other\n",
-                 {"line 4", "second document", "leave one"});
-  expect_refused("name: own\n", {"'elements' is missing"});
-  expect_refused(head, {"'packet' is missing"});
-}
-
-TEST_F(ProfileFile, NamesLineKeyValueAndRemedy) {
-  expect_refused(with("colour: red"), {"line 3", "colour", "unknown key", "elements, packet"});
-  expect_refused(with("name: twice"), {"line 3", "name", "given twice"});
-  expect_refused(with("usb: [16d0-14cc]"), {"line 3", "usb[0]", "16d0-14cc", "lsusb"});
-  expect_refused(with("usb: 16d0:14cc"), {"line 3", "usb", "give a list"});
-  expect_refused(with("line: {baud: fast}"), {"line 3", "baud", "fast", "whole number from 50"});
-  expect_refused(with("line: {speed: 9600}"), {"line 3", "speed", "baud, data_bits"});
-  expect_refused(with("line: {parity: mark}"), {"parity", "mark", "none, odd, even"});
-  expect_refused(with("start: 0g"), {"line 3", "start", "0g", "hexadecimal"});
-  expect_refused(with("start: 012"), {"start", "012", "hexadecimal"});
-  expect_refused(with("unit: psi"), {"unit", "psi", "raw, kPa"});
-  expect_refused(with("gain: .nan"), {"gain", "give a number"});
-  expect_refused(with("rate_hz: -1"), {"rate_hz", "-1", "from 0"});
-  expect_refused("name: own\nelements: [[0, 0], [1]]\npacket: []\n",
-                 {"line 2", "elements[1]", "give [x, y]"});
-  expect_refused("name: own\nelements: [{grid: [2, 2]}]\npacket: []\n",
-                 {"line 2", "elements[0]", "pitch_mm"});
-  expect_refused("name: own\nelements: [{grid: [1024, 1024], pitch_mm: [1, 1]}]\npacket: []\n",
-                 {"elements[0]", "more than 16384"});
-  expect_refused("name: own\nelements: []\npacket: []\n", {"elements", "give 1 to"});
-}
-
-TEST_F(ProfileFile, SaysWhatIsWrongWithAPacket) {
-  expect_refused(with_packet("  - bytes: aa\n"), {"line 4", "packet", "'values' or 'parts'"});
-  expect_refused(with_packet("  - values: u8\n"), {"packet", "nothing marks a packet"});
-  expect_refused(with_packet("  - bytes: aa\n  - colour: 3\n"),
-                 {"line 5", "packet[1]", "unknown field", "bytes, only"});
-  expect_refused(with_packet("  - bytes: aa\n  - {values: u8, colour: 3}\n"),
-                 {"line 5", "colour", "unknown key", "values, stride, at"});
-  expect_refused(with_packet("  - bytes: aa\n  - values: u24\n"),
-                 {"line 5", "values", "u24", "u16le"});
-  expect_refused(with_packet("  - bytes: aa\n  - {values: u16le, stride: 2, at: 1}\n"),
-                 {"line 5", "packet[1]", "enlarge 'stride'"});
-  expect_refused(with_packet("  - bytes: aa\n  - length: f32le\n  - values: u8\n"),
-                 {"line 5", "length", "f32le", "u16le"});
-  expect_refused(with_packet("  - bytes: aa\n  - {length: u8, most: 1}\n  - values: u8\n"),
-                 {"line 5", "'most' is 1", "2 bytes"});
-  expect_refused(with_packet("  - bytes: aa\n  - length: u8\n  - bytes: bb\n  - values: u8\n"),
-                 {"line 6", "packet[2]", "'only'"});
-  expect_refused(with_packet("  - bytes: aa\n  - values: u8\n  - length: u8\n"),
-                 {"line 5", "packet[1]", "behind 'length'"});
-  expect_refused(with_packet("  - bytes: aa\n  - values: u8\n  - checksum: crc16\n"),
-                 {"line 6", "packet[2]", "polynomial"});
-  expect_refused(with_packet("  - bytes: aa\n  - values: u8\n"
-                             "  - {checksum: crc8, polynomial: 0x100}\n"),
-                 {"line 6", "packet[2]", "8 bits"});
-  expect_refused(with_packet("  - bytes: aa\n  - values: u8\n  - {checksum: sum8, from: 3}\n"),
-                 {"line 6", "packet[2]", "only 3 bytes"});
-  expect_refused(
-      with_packet("  - bytes: aa\n  - values: u8\n  - {checksum: sum8, covers: after}\n"),
-      {"line 6", "covers: after"});
-  expect_refused(with_packet("  - bytes: aa\n  - values: u8\n  - checksum: sum8\n"
-                             "  - checksum: sum8\n"),
-                 {"packet", "at most once"});
-  expect_refused(with_packet("  - bytes: aa\n  - {parts: u8, tags: [{tag: 1, values: 1}]}\n"),
-                 {"line 5", "packet[1]", "carry 1 values", "2 elements"});
-  expect_refused(with_packet("  - bytes: aa\n  - {parts: u8, tags: [{values: 2}]}\n"),
-                 {"line 5", "tags[0]", "'tag' is missing"});
-  expect_refused(with_packet("  - bytes: aa\n"
-                             "  - {parts: u8, tags: [{tag: 1, values: 2}, {tag: 2, skip: 9}]}\n"),
-                 {"line 5", "packet[1]", "differ in size"});
-  expect_refused(with_packet("  - bytes: aa\n  - length: u8\n"
-                             "  - {parts: u8, tags: [{tag: 1, values: 2}]}\n"),
-                 {"line 5", "packet[1]", "add 'most'"});
-  const std::string parts = "  - {parts: u8, tags: [{tag: 1, values: 2}]}\n";
-  const std::string checksum = "  - checksum: sum8\n";
-  expect_refused(with_packet("  - bytes: aa\n  - {length: u16le, most: 4097}\n" + parts),
-                 {"line 5", "'most' is 4097", "at most 4096", "add 'checksum'"});
-  read(with_packet("  - bytes: aa\n  - {length: u16le, most: 4096}\n" + parts));
-  read(with_packet("  - bytes: aa\n  - {length: u16le, most: 65536}\n" + parts + checksum));
-}
-
-TEST_F(ProfileFile, HostProgramWithDecimalCommasReadsTheSame) {
-  const std::string yaml =
-      "name: own\nelements: [[1.125, -2.500], [1.500, 2]]\ngain: 1.500\noffset: -0.250\n"
-      "rate_hz: 1000.500\npacket: [{bytes: aa}, {values: u8}, {checksum: crc16, polynomial: "
-      "0x1021}]\n";
-  const HostLocale locale;
-  const SerialProfile profile = read(yaml);
-  EXPECT_EQ(profile.elements_mm, (std::vector<glm::dvec2>{{1.125, -2.5}, {1.5, 2.0}}));
-  EXPECT_EQ(profile.packet.gain, 1.5);
-  EXPECT_EQ(profile.packet.offset, -0.25);
-  EXPECT_EQ(profile.rate_hz, 1000.5);
-  expect_refused(with("gain: 1,5"), {"line 3", "gain", "give a number"});
-  EXPECT_EQ(shipped_profiles().size(), 5u);
-  for (const std::string& name : shipped_profiles()) {
-    EXPECT_NO_THROW(read_serial_profile(name));
+  const std::filesystem::path missing = folder_ / "no.yaml";
+  for (const std::filesystem::path& path : {missing, folder_.path()}) {
+    expect_named(input_error([&] { read_serial_profile(path.string()); }),
+                 {path.c_str(), "no such profile"});
+  }
+  const std::pair<std::string, const char*> texts[] = {
+      {"", "line 1: 'the profile': give a map"},
+      {"just text", "line 1: 'the profile' = 'just text': give a map"},
+      {"name: [", "correct the YAML"},
+      {head + packet + "---\nname: other\n", "line 4: a second document"},
+      {"name: own\n", "'elements' is missing"},
+      {head, "'packet' is missing"},
+      {"name: own\nelements: [[0, 0], [1]]\npacket: []\n", "line 2: 'elements[1]': give [x, y]"},
+      {"name: own\nelements: [{grid: [2, 2]}]\npacket: []\n", "line 2: 'elements[0]': a grid has"},
+      {"name: own\nelements: [{grid: [1024, 1024], pitch_mm: [1, 1]}]\npacket: []\n",
+       "'elements[0]': more than 16384"},
+      {"name: own\nelements: []\npacket: []\n", "'elements': give 1 to"}};
+  for (const auto& [text, place] : texts) {
+    expect_refused(text, place);
   }
 }
 
+TEST_F(ProfileFile, IsRefusedByLineAndKey) {
+  const HostLocale locale;  // a program's own reads no number that others do not
+  const std::pair<const char*, const char*> lines[] = {
+      {"colour: red", "line 3: 'key' = 'colour': unknown key"},
+      {"name: twice", "line 3: 'key' = 'name': key given twice"},
+      {"usb: [16d0-14cc]", "line 3: 'usb[0]' = '16d0-14cc'"},
+      {"usb: 16d0:14cc", "line 3: 'usb' = '16d0:14cc': give a list"},
+      {"line: {baud: fast}", "line 3: 'baud' = 'fast': give a whole number from 50"},
+      {"line: {baud: 0x+1c200}", "'baud' = '0x+1c200': give a whole number"},
+      {"line: {baud: 0x}", "'baud' = '0x': give a whole number"},
+      {"line: {speed: 9600}", "line 3: 'key' = 'speed': unknown key"},
+      {"line: {parity: mark}", "'parity' = 'mark'"},
+      {"start: 0g", "line 3: 'start' = '0g'"},
+      {"start: 012", "'start' = '012'"},
+      {"unit: psi", "'unit' = 'psi'"},
+      {"gain: .nan", "'gain' = '.nan': give a number"},
+      {"gain: 1,5", "'gain' = '1,5': give a number"},
+      {"rate_hz: -1", "'rate_hz' = '-1'"}};
+  for (const auto& [line, place] : lines) {
+    expect_refused(head + line + "\n" + packet, place);
+  }
+}
+
+TEST_F(ProfileFile, IsRefusedByTheFieldOfItsPacket) {
+  const std::pair<const char*, const char*> packets[] = {
+      {"bytes: aa", "line 4: 'packet': give exactly one field"},
+      {"values: u8", "'packet': nothing marks a packet"},
+      {"bytes: aa\n  - colour: 3", "line 5: 'packet[1]': unknown field"},
+      {"bytes: aa\n  - {values: u8, colour: 3}", "line 5: 'key' = 'colour': unknown key"},
+      {"bytes: aa\n  - values: u24", "line 5: 'values' = 'u24'"},
+      {"bytes: aa\n  - {values: u16le, stride: 2, at: 1}",
+       "line 5: 'packet[1]': a value at byte 1 does not fit"},
+      {"bytes: aa\n  - length: f32le\n  - values: u8", "line 5: 'length' = 'f32le'"},
+      {"bytes: aa\n  - {length: u8, most: 1}\n  - values: u8",
+       "line 5: 'packet[1]': 'most' is 1, but the values take 2 bytes"},
+      {"bytes: aa\n  - length: u8\n  - bytes: bb\n  - values: u8",
+       "line 6: 'packet[2]': behind 'length', only the end has 'bytes'"},
+      {"bytes: aa\n  - values: u8\n  - length: u8",
+       "line 5: 'packet[1]': put 'values' or 'parts' behind 'length'"},
+      {"bytes: aa\n  - values: u8\n  - checksum: crc16", "line 6: 'packet[2]': a crc needs"},
+      {"bytes: aa\n  - values: u8\n  - {checksum: crc8, polynomial: 0x100}",
+       "line 6: 'packet[2]': shorten polynomial, init and xor_out to 8 bits"},
+      {"bytes: aa\n  - values: u8\n  - {checksum: sum8, from: 3}", "only 3 bytes"},
+      {"bytes: aa\n  - values: u8\n  - {checksum: sum8, covers: after}",
+       "line 6: 'packet[2]': 'covers: after'"},
+      {"bytes: aa\n  - values: u8\n  - checksum: sum8\n  - checksum: sum8",
+       "'packet': give 'length', 'time' and 'checksum' at most once"},
+      {"bytes: aa\n  - length: u8\n  - values: u8\n  - checksum: sum8\n  - skip: 1",
+       "'packet[3]': put 'checksum' before 'length' or at the end"},
+      {"bytes: aa\n  - {parts: u8, tags: [{tag: 1, values: 1}]}",
+       "carry 1 values, but there are 2 elements"},
+      {"bytes: aa\n  - {parts: u8, tags: [{values: 2}]}",
+       "line 5: 'tags[0]': key 'tag' is missing"},
+      {"bytes: aa\n  - {parts: u8, tags: [{tag: 1, values: 2}, {tag: 2, skip: 9}]}",
+       "line 5: 'packet[1]': parts differ in size"},
+      {"bytes: aa\n  - length: u8\n  - {parts: u8, tags: [{tag: 1, values: 2}]}",
+       "line 5: 'packet[1]': add 'most'"},
+      {"bytes: aa\n  - {length: u16le, most: 4097}\n  - {parts: u8, tags: [{tag: 1, values: 2}]}",
+       "line 5: 'packet[1]': 'most' is 4097"}};
+  for (const auto& [fields, place] : packets) {
+    expect_refused(head + "packet:\n  - " + fields + "\n", place);
+  }
+  const std::string parts = ", {parts: u8, tags: [{tag: 1, values: 2}]}";
+  read(head + "packet: [bytes: aa, {length: u16le, most: 4096}" + parts + "]\n");
+  read(head + "packet: [bytes: aa, {length: u16le, most: 65536}" + parts + ", checksum: sum8]\n");
+}
+
 TEST_F(ProfileFile, WholeNumbersAreDecimalOrHexadecimal) {
-  EXPECT_EQ(read(with("line: {baud: 0115200}")).line.baud, 115200u);
-  EXPECT_EQ(read(with("line: {baud: 0x1c200}")).line.baud, 115200u);
-  expect_refused(with("line: {baud: 0x+1c200}"), {"baud", "0x+1c200", "whole number"});
-  expect_refused(with("line: {baud: 0x}"), {"baud", "0x", "whole number"});
+  for (const char* number : {"0115200", "0x1c200"}) {
+    EXPECT_EQ(read(head + "line: {baud: " + number + "}\n" + packet).line.baud, 115200u);
+  }
+}
+
+// Lines of the shipped profiles, changed and put together at random.
+TEST(MutatedProfile, IsReadOrRefusedInOneLine) {
+  std::mt19937 random(61);
+  const std::vector<std::string> boards = shipped_profiles();
+  std::vector<std::string> texts;
+  std::vector<std::string> lines;
+  for (const std::string& name : boards) {
+    std::istringstream file(bytes_of(read_serial_profile(name).path));
+    texts.emplace_back();
+    for (std::string line; std::getline(file, line);) {
+      if (!line.starts_with('#') && !line.empty()) {  // comments would only take time
+        lines.push_back(line + "\n");
+        texts.back() += lines.back();
+      }
+    }
+  }
+  const std::vector<std::string> words = {
+      "0",  "-1",  "65536",  "1e308", ".nan",  "u16le",   "[",  "]",         "{",  "}",
+      "*a", "&a ", "tag: 0", "aa",    "bytes", "most: 1", "? ", "!!binary ", "\t", "\xff"};
+  int read = 0;
+  for (int trial = 0; trial < trials(2000); ++trial) {
+    std::string text = texts[random() % texts.size()];
+    for (unsigned edits = random() % 4 == 0 ? 3 : 1; edits > 0; --edits) {
+      const std::size_t at = random() % (text.size() + 1);
+      const std::size_t next_line = text.find('\n', at);
+      switch (random() % 3) {
+        case 0:
+          text.insert(next_line == std::string::npos ? at : next_line + 1,
+                      lines[random() % lines.size()]);
+          break;
+        case 1:
+          text.erase(at, random() % 30);
+          break;
+        default:
+          text.replace(at, random() % 6, words[random() % words.size()]);
+      }
+    }
+    try {
+      const SerialProfile profile = parse_serial_profile(text, "mutated.yaml");
+      Receiver receiver(profile);
+      for (int i = 0; i < 4; ++i) {
+        receiver.send({random_frame(boards[random() % boards.size()], random)});
+      }
+      for (const ParsedFrame& frame : receiver.frames()) {
+        ASSERT_EQ(frame.values.size(), profile.elements_mm.size());
+      }
+      ++read;
+    } catch (const Error& error) {
+      ASSERT_EQ(error.fault(), Fault::input);
+      const std::string message = error.what();
+      ASSERT_TRUE(message.starts_with("mutated.yaml: line ")) << message << "\n" << text;
+      ASSERT_EQ(message.find('\n'), std::string::npos) << message;
+    }
+  }
+  EXPECT_GT(read, trials(2000) / 16) << "too few get as far as a deframer";
 }
 
 }  // namespace palpate::serial_profile_test

@@ -27,11 +27,8 @@ KnownElements random_elements(std::size_t count, double half_mm, std::size_t lev
 /// A table of four levels that is not monotone, the last level steeper than any map.
 LikelihoodTable crooked_table();
 
-/// A table of three levels, about as steep as learned ones.
-LikelihoodTable gentle_table();
-
-/// Log-likelihood of the elements at every bin of the boxes, in nats: the definition in long
-/// double.
-std::vector<long double> by_definition(const BinCase& of, const std::vector<BinBox>& boxes);
+/// Log-likelihood of the elements at every bin of the boxes, in nats, from the reference. The pivot
+/// is the robot's origin.
+std::vector<double> by_definition(const BinCase& of, const std::vector<BinBox>& boxes);
 
 }  // namespace palpate

@@ -3,18 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <iterator>
 
 #include "support/touched_shape.hpp"
 
 namespace palpate {
 
 namespace {
-
-template <typename Choices>
-auto one_of(Uniform& random, const Choices& choices) {
-  return choices[static_cast<std::size_t>(random(0.0, static_cast<double>(std::size(choices))))];
-}
 
 /// Bins about a place of the map's, in mm.
 Axis random_axis(Uniform& random, double cell_mm, double middle_mm) {
@@ -37,29 +31,27 @@ LikelihoodTable table_of_two() {
   return table;
 }
 
-}  // namespace
-
+/// One of the kinds of maps that bounds must hold on: a letter; noise of log odds within +-12 or
+/// +-1000; few cells; cells of 0.02 and 100 mm; one cell.
 OccupancyGrid random_bound_map(Uniform& random) {
+  struct Kind {
+    int nx, ny;
+    double cell_mm, steepness;
+  };
+  constexpr std::array<Kind, 8> kinds{{{0, 0, 0.0, 0.0},
+                                       {31, 27, 0.5, 12.0},
+                                       {29, 33, 0.37, 1000.0},
+                                       {3, 2, 0.5, 12.0},
+                                       {41, 17, 0.02, 12.0},
+                                       {21, 30, 100.0, 12.0},
+                                       {1, 1, 2.0, 1000.0},
+                                       {64, 5, 0.5, 3.0}}};
   const auto seed = static_cast<std::uint64_t>(random(1.0, 1e9));
-  switch (static_cast<int>(random(0.0, 8.0))) {
-    case 0:
-      return map_of(on_letter_l, "L");
-    case 1:
-      return random_map(31, 27, 0.5, 12.0, seed);
-    case 2:
-      return random_map(29, 33, 0.37, 1000.0, seed);
-    case 3:
-      return random_map(3, 2, 0.5, 12.0, seed);
-    case 4:
-      return random_map(41, 17, 0.02, 12.0, seed);
-    case 5:
-      return random_map(21, 30, 100.0, 12.0, seed);
-    case 6:
-      return random_map(1, 1, 2.0, 1000.0, seed);
-    default:
-      return random_map(64, 5, 0.5, 3.0, seed);
-  }
+  const auto [nx, ny, cell_mm, steepness] = one_of(random, kinds);
+  return nx == 0 ? map_of(on_letter_l, "L") : random_map(nx, ny, cell_mm, steepness, seed);
 }
+
+}  // namespace
 
 BinCase random_bound_case(Uniform& random) {
   BinCase of{.map = random_bound_map(random), .contact = {}, .lattice = {}, .elements = {}};

@@ -4,13 +4,10 @@
 
 #include "bins_by_definition.hpp"
 #include "estimation/bounded/tables/tile_bounds.hpp"
+#include "estimation/bounded/tables/window_table.hpp"
 #include "support/synthetic.hpp"
 
 namespace palpate {
-
-/// One of the kinds of maps that bounds must hold on: a letter; noise of log odds within +-12 or
-/// +-1000; few cells; cells of 0.02 and 100 mm; one cell.
-OccupancyGrid random_bound_map(Uniform& random);
 
 /// A random map, a model (Eq. 7 with gamma of 0 or 0.1, or a crooked table of two objects'
 /// numbers), a lattice around the map (steps from a tenth of a cell to many cells, axes of one bin,
@@ -24,12 +21,24 @@ std::size_t random_object(const BinCase& of, Uniform& random);
 /// Cosine and sine of a theta of the lattice.
 glm::dvec2 turn_of(const PoseLattice& lattice, int theta);
 
-/// Calls visit(first_x, first_y) with the first tile of every batch of a level.
+/// Calls visit(level, tile, bound) for all tiles of all levels at a theta, in whole batches: the
+/// bound of a bin's log-likelihood in nats.
 template <typename Visit>
-void for_batches(const TileLevel& level, const Visit& visit) {
-  for (int y = 0; y < level.y.tiles(); y += batch_side) {
-    for (int x = 0; x < level.x.tiles(); x += batch_side) {
-      visit(x, y);
+void for_tiles(const TileBounds& bounds, const BinCase& of, int theta, const Visit& visit) {
+  WindowPlaces placed;
+  for (std::size_t l = 0; l < bounds.levels().size(); ++l) {
+    const TileLevel& level = bounds.levels()[l];
+    bounds.place(l, turn_of(of.lattice, theta), of.elements, placed);
+    const double best = bounds.best(l, of.elements);
+    for (int y = 0; y < level.y.tiles(); y += batch_side) {
+      for (int x = 0; x < level.x.tiles(); x += batch_side) {
+        std::uint32_t sums[batch_tiles] = {};
+        bounds.add(l, of.elements, placed, x, y, sums);
+        for (int i = 0; i < batch_tiles; ++i) {
+          const Tile tile{.theta = theta, .x = x + i / batch_side, .y = y + i % batch_side};
+          visit(l, tile, best - sums[i] / penalties_per_nat);
+        }
+      }
     }
   }
 }

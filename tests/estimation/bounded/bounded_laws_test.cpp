@@ -1,252 +1,170 @@
-// The laws of the bounded posterior's interface.
+// The laws of the bounded posterior in every regime: by Eq. 7 and by a table, at rest and
+// displaced.
 
+#include <algorithm>
 #include <cmath>
-#include <functional>
-#include <optional>
-#include <stdexcept>
-#include <utility>
+#include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
-#include <tbb/global_control.h>
 
+#include "bins_by_definition.hpp"
 #include "bounded_set_up.hpp"
-#include "palpate/bounded_posterior.hpp"
 #include "support/certified.hpp"
+#include "support/touched_shape.hpp"
 
 namespace palpate::bounded_laws_test {
 
-TEST(BoundedPosterior, DoesNotDependOnTheOrderOfTouchesNorOnWhenOneAsked) {
-  for (const bool none : {false, true}) {
-    BoundedOptions options = small_options();
-    if (none) {
-      options.none_weight = 0.5;
-    }
-    const Recording recording = touches_of_l(5, 807);
-    const std::vector<Touch> touches = all_touches(recording);
-    BoundedPosterior at_once(two_shapes(), options);
-    at_once.update(touches);
-    const auto expected = told_by(at_once, 2);
-    EXPECT_EQ(told_by(at_once, 2), expected) << "asked again";
+/// Objects and touches under one model.
+struct Regime {
+  std::string name;
+  std::vector<Hypothesis> objects;
+  BoundedOptions options;
+  Recording recording;
+};
 
-    BoundedPosterior one_by_one(two_shapes(), options);
-    for (const Touch& touch : touches) {
-      one_by_one.estimate();
-      one_by_one.update(touch);
-      one_by_one.marginals(0);
-    }
-    EXPECT_EQ(told_by(one_by_one, 2), expected);
+std::vector<Regime> regimes() {
+  std::vector<Regime> all;
+  for (const bool displaced : {false, true}) {
+    const BoundedOptions options = displaced ? uncertain_options() : small_options();
+    const std::string name = displaced ? "Displaced" : "AtRest";
+    all.push_back({name + "ByEquation7", two_shapes(), options, touches_of_l(5, 951)});
 
-    // The first touch stays the first: the share of "none of these" is the first one's.
-    for (const std::vector<std::size_t>& order :
-         {std::vector<std::size_t>{0, 4, 3, 2, 1}, {0, 2, 4, 1, 3}}) {
-      BoundedPosterior other(two_shapes(), options);
-      other.update(touches[order[0]]);
-      other.update(std::vector{touches[order[1]], touches[order[2]]});
-      other.estimate();
-      other.update(std::vector{touches[order[3]], touches[order[4]]});
-      EXPECT_EQ(told_by(other, 2), expected);
+    Regime& without_gamma = all.emplace_back(all.back());
+    without_gamma.name = name + "WithoutGamma";
+    without_gamma.options.contact.gamma = 0.0;
+
+    all.push_back({name + "ByATable", two_made_up(), options, random_recording(4, 20, 953)});
+    all.back().options.contact.table = crooked_table();
+    for (double& nats : all.back().options.contact.table->log_likelihood) {
+      // Between likelihoods that lie thousands of nats apart, a turned bin's place is not certain.
+      nats = std::clamp(nats, -9.0, 0.0);
+    }
+
+    all.push_back({name + "WithNoneOfThese", two_shapes(), options, touches_of_l(4, 952)});
+    all.back().options.none_weight = 2.0;
+    all.back().options.evidence_nats = 1e-4;  // of "none of these", too
+
+    all.push_back({name + "WithEvidence", two_made_up(), options, random_recording(3, 36, 954)});
+    all.back().objects[0].weight = 1e-9;
+    all.back().options.evidence_nats = 0.01;
+  }
+  return all;
+}
+
+class BoundedLaws : public testing::TestWithParam<Regime> {};
+
+INSTANTIATE_TEST_SUITE_P(Regimes, BoundedLaws, testing::ValuesIn(regimes()),
+                         [](const auto& info) { return info.param.name; });
+
+TEST_P(BoundedLaws, HoldInFloat64AndToTheBit) {
+  expect_laws(GetParam().objects, GetParam().options, GetParam().recording);
+}
+
+/// Expects bounds to agree with the histogram about "none of these" after so many touches, of each
+/// of which the method allows a float32 mean 1e-3 nats, and its bounds to hold its log evidence and
+/// its odds against the first object.
+void expect_none_as_dense(const Estimate& ours, const Estimate& theirs, std::size_t touches) {
+  const double nats = 1e-3 * static_cast<double>(touches) + 1e-9;
+  const LogInterval none = ours.certificate->none_log_evidence.value();
+  const double share = *theirs.none_log_evidence - theirs.log_evidence[0];
+  EXPECT_LE(none.low - ours.log_evidence[0], share + nats);
+  EXPECT_GE(none.high - ours.log_evidence[0], share - nats);
+  EXPECT_LE(none.low, *ours.none_log_evidence);
+  EXPECT_GE(none.high, *ours.none_log_evidence);
+  const auto [least, most] = ours.certificate->log_evidence[0];
+  const double against = ours.log_evidence[0] - *ours.none_log_evidence;
+  EXPECT_NEAR(std::log(ours.identity[0] / ours.none), against, 1e-9);
+  EXPECT_GE(against, least - none.high - 1e-12);
+  EXPECT_LE(against, most - none.low + 1e-12);
+}
+
+void expect_same_pose(const RefinedPose& ours, const RefinedPose& theirs) {
+  // Logs that are 1e-4 nats off per touch move a mean within 2.5 mm by at most some 1e-3 mm.
+  const auto& [our_mm, our_rad] = ours.T_object_robot;
+  const auto& [their_mm, their_rad] = theirs.T_object_robot;
+  EXPECT_NEAR(our_mm.x, their_mm.x, 1e-3);
+  EXPECT_NEAR(our_mm.y, their_mm.y, 1e-3);
+  EXPECT_NEAR(our_rad, their_rad, 1e-3);
+  const auto& covariance = theirs.covariance;
+  for (std::size_t k = 0; k < 9; ++k) {
+    EXPECT_NEAR(ours.covariance[k], covariance[k],
+                1e-9 + 1e-3 * std::max(covariance[4 * (k / 3)], covariance[4 * (k % 3)]));
+  }
+}
+
+TEST_P(BoundedLaws, TellWhatFloat64LeavesOutAsTheHistogramDoes) {
+  const auto& [name, objects, options, recording] = GetParam();
+  Device device = Device::open();
+  BothFilters both(device, objects, options);
+  for (std::size_t n = 0; n <= recording.size(); ++n) {
+    SCOPED_TRACE(testing::Message() << n << " touches");
+    if (n > 0) {
+      both.update(recording.touch(n - 1));
+    }
+    const Estimate ours = both.bounded.estimate();
+    const Estimate theirs = both.dense.estimate();
+    EXPECT_EQ(ours.contradicted, theirs.contradicted);
+    expect_same_pose(both.bounded.refine(theirs.mode), both.dense.refine(theirs.mode));
+    if (n == recording.size()) {  // fewer leave ties
+      EXPECT_EQ(ours.mode.object, theirs.mode.object);
+      EXPECT_EQ(ours.mode.bin, theirs.mode.bin);
+      EXPECT_EQ(ours.mode.T_object_robot.theta_rad, theirs.mode.T_object_robot.theta_rad);
+    }
+    if (options.none_weight) {
+      expect_none_as_dense(ours, theirs, n);
+      EXPECT_LT(largest_difference(ours.identity, theirs.identity), 1e-4);
+      EXPECT_NEAR(sum(ours.identity) + ours.none, 1.0, 1e-12);
+      EXPECT_NEAR(both.bounded.entropy(), both.dense.entropy(), 1e-3 + 1e-4);
     }
   }
 }
 
-TEST(BoundedPosterior, AfterAResetIsANewOne) {
-  BoundedOptions options = small_options();
-  options.none_weight = 0.5;
-  const Recording before = random_recording(3, 20, 808);
-  const Recording recording = touches_of_l(3, 809);
-  BoundedPosterior fresh(two_shapes(), options);
-  const auto untouched = told_by(fresh, 2);
-  fresh.update(all_touches(recording));
-  BoundedPosterior used(two_shapes(), options);
-  used.update(all_touches(before));
-  used.estimate();
-  used.reset();
-  EXPECT_EQ(told_by(used, 2), untouched);
-  used.update(all_touches(before));
-  used.reset();
-  used.update(all_touches(recording));
-  EXPECT_EQ(told_by(used, 2), told_by(fresh, 2));
-  EXPECT_NE(told_by(used, 2), untouched);
-}
-
-TEST(BoundedPosterior, TakesInAllTouchesOrNone) {
-  BoundedOptions options = small_options();
-  options.none_weight = 0.5;
-  Recording recording = touches_of_l(4, 810);
-  const std::vector<Touch> sound = recording.touches(0, 3);
-  recording.T_robot_sensor[3].translation_mm.x = nan;
-  const std::vector<Touch> touches = all_touches(recording);
-  BoundedPosterior posterior(two_shapes(), options);
-  posterior.update(touches[0]);
-  const auto before = told_by(posterior, 2);
-  expect_refused([&] { posterior.update(touches); }, "T_robot_sensor is not finite");
-  EXPECT_EQ(told_by(posterior, 2), before);
-  // Broken off at the first call of `progress`, and at the last one.
-  int calls = 0;
-  BoundedPosterior(two_shapes(), options).update(sound, [&](double done) {
-    EXPECT_GT(done, 0.0);
-    EXPECT_LE(done, 1.0);
-    ++calls;
-  });
-  ASSERT_GT(calls, 0);
-  for (const int last : {1, calls}) {
-    int call = 0;
-    EXPECT_THROW(posterior.update(std::span(sound).subspan(1),
-                                  [&](double) {
-                                    if (++call >= last || call >= 1 + last / 2) {
-                                      throw std::runtime_error("broken off");
-                                    }
-                                  }),
-                 std::runtime_error);
-    EXPECT_EQ(told_by(posterior, 2), before);
+TEST_P(BoundedLaws, AreCertifiedWithinAnyBudget) {
+  const auto& [name, objects, given, recording] = GetParam();
+  if (given.none_weight) {
+    return;  // which float64 here leaves out
   }
-  posterior.update(std::span(sound).subspan(1));
-  BoundedPosterior other(two_shapes(), options);
-  other.update(sound);
-  EXPECT_EQ(told_by(posterior, 2), told_by(other, 2)) << "as if nothing had been refused";
-}
-
-TEST(BoundedPosterior, HasTheSameBitsOnAnyNumberOfThreads) {
-  // More threads than the machine may have cores.
-  const tbb::global_control allow(tbb::global_control::max_allowed_parallelism, 4);
-  const Recording recording = touches_of_l(3, 811);
-  std::vector<std::vector<double>> one;
-  for (const int threads : {1, 4, 0, 3}) {
-    BoundedOptions options = small_options();
-    options.none_weight = 0.5;
-    options.threads = threads;
-    BoundedPosterior posterior(two_shapes(), options);
-    for (const Touch& touch : all_touches(recording)) {
-      posterior.update(touch);
-      posterior.estimate();
-    }
-    const auto told = told_by(posterior, 2);
-    if (one.empty()) {
-      one = told;
-    }
-    EXPECT_EQ(told, one) << threads << " threads";
-  }
-}
-
-TEST(BoundedPosterior, GivesTheSameAfterACancelledSearchAsWithoutOne) {
-  const Recording recording = touches_of_l(2, 813);
-  struct Cancelled {};
-  for (const std::optional<double> budget_s : {std::optional<double>(), std::optional(1e3)}) {
-    BoundedOptions options = small_options();
-    options.budget_s = budget_s;
-    BoundedPosterior expected(two_shapes(), options);
-    expected.update(recording.touches(0, 2));
-    int left = -1;  // cancel points until one throws; never below 0
-    int passed = 0;
-    options.cancel_point = [&] {
-      ++passed;
-      if (left >= 0 && left-- == 0) {
-        throw Cancelled();
+  BoundedOptions options = given;
+  // After one touch nearly every bin matters, and the budget leaves most of them out.
+  for (const std::size_t count : {std::size_t{1}, recording.size()}) {
+    const std::vector<Touch> touches = recording.touches(0, count);
+    const reference::Posterior truth = reference_posterior(objects, options, touches);
+    for (const double budget_s : {1e-9, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 10.0}) {
+      SCOPED_TRACE(testing::Message() << count << " touches, " << budget_s << " s");
+      options.budget_s = budget_s;
+      BoundedPosterior posterior(objects, options);
+      for (const Touch& touch : touches) {
+        posterior.update(touch);
+        posterior.estimate();
       }
-    };
-    BoundedPosterior posterior(two_shapes(), options);
-    const auto cancelled_after = [&](int points, const auto& call) {
-      left = points;
-      EXPECT_THROW(call(), Cancelled) << points;
-      left = -1;
-    };
-    posterior.update(recording.touches(0, 2));
-    passed = 0;
-    posterior.estimate();
-    const int points = passed;
-    EXPECT_GT(points, 2);
-    for (int i = 0; i < points; ++i) {
-      posterior.reset();
-      posterior.update(recording.touches(0, 2));
-      cancelled_after(i, [&] { posterior.estimate(); });
-      EXPECT_EQ(told_by(posterior, 2), told_by(expected, 2)) << i;
+      expect_certified(posterior, objects, options, truth);
     }
-    // Every call that searches can be cancelled.
-    posterior.reset();
-    posterior.update(recording.touches(0, 2));
-    cancelled_after(0, [&] { posterior.marginals(0); });
-    cancelled_after(0, [&] { posterior.entropy(); });
-    cancelled_after(0, [&] { posterior.sample(3, 1); });
-    cancelled_after(0, [&] { posterior.refined_blocks(); });
-    EXPECT_EQ(posterior.entropy(), expected.entropy());
   }
 }
 
-TEST(BoundedPosterior, MovesItsPivotOnlyBeforeATouch) {
-  const Recording recording = touches_of_l(2, 812);
+TEST(BoundedPosterior, AnswersVeryManyTouchesByFewBins) {
   BoundedOptions options = small_options();
-  options.none_weight = 0.5;
-  BoundedPosterior moved(two_shapes(), options);
-  moved.estimate();
-  moved.move_pivot({-3.0, 4.0});
-  options.lattice.pivot_mm = {-3.0, 4.0};
-  BoundedPosterior made(two_shapes(), options);
-  EXPECT_EQ(told_by(moved, 2), told_by(made, 2));
-  moved.update(all_touches(recording));
-  made.update(all_touches(recording));
-  const auto told = told_by(made, 2);
-  EXPECT_EQ(told_by(moved, 2), told);
-  expect_refused([&] { moved.move_pivot({1.0, 1.0}); }, "call reset() before the pivot moves");
-  EXPECT_EQ(told_by(moved, 2), told);
-  moved.reset();
-  expect_refused([&] { moved.move_pivot({nan, 0.0}); }, "pivot_mm");
-  moved.update(all_touches(recording));
-  EXPECT_EQ(told_by(moved, 2), told) << "the pivot stays over reset()";
-}
-
-// Asked on purpose, each of them. NOLINTBEGIN(bugprone-use-after-move)
-TEST(BoundedPosterior, SaysThatItWasMovedFrom) {
-  const Recording recording = random_recording(1, 36, 813);
-  BoundedPosterior first(two_made_up(), small_options());
-  BoundedPosterior second(std::move(first));
-  second.update(recording.touch(0));
-  for (const auto& call : std::vector<std::function<void()>>{
-           [&] { first.reset(); }, [&] { first.move_pivot({}); },
-           [&] { first.update(recording.touch(0)); }, [&] { first.estimate(); },
-           [&] { first.refine({}); }, [&] { first.marginals(0); },
-           [&] { first.marginals(0, small_options().lattice); },
-           [&] { first.log_likelihood(0, {}); }, [&] { first.entropy(); },
-           [&] { first.sample(1, 1); }, [&] { first.lattice(); }, [&] { first.path(); },
-           [&] { first.host_bytes(); }}) {
-    expect_refused(call, "bounded posterior: was moved from");
+  // The mode's log-likelihood falls with each touch, and the bounds of large tiles lie above it by
+  // ever more nats. Each of ten touches comes ten times.
+  const Recording recording = touches_of_l(10, 811);
+  reference::Posterior truth = reference_posterior(two_shapes(), options, all_touches(recording));
+  for (std::vector<double>& logs : truth.log_likelihood) {
+    std::ranges::transform(logs, logs.begin(), [](double nats) { return 10.0 * nats; });
   }
-  first = std::move(second);
-  EXPECT_NE(first.estimate().mode.log_likelihood, 0.0);
-}
-// NOLINTEND(bugprone-use-after-move)
-
-TEST(BoundedPosterior, RefusesWhatItCannotDo) {
-  const auto refuse = [&](const std::function<void(BoundedOptions&)>& change,
-                          const std::string& says) {
-    BoundedOptions options = small_options();
-    change(options);
-    expect_refused([&] { BoundedPosterior(two_made_up(), options); }, says);
-  };
-  for (const double tolerance : {0.0, -1e-6, 1.0, 2.0, nan, HUGE_VAL}) {
-    refuse([&](BoundedOptions& o) { o.tolerance = tolerance; }, "tolerance");
+  for (const bool evidence : {false, true}) {
+    SCOPED_TRACE(evidence);
+    if (evidence) {
+      options.evidence_nats = 0.05;
+      options.evidence_range_nats = 100.0;
+    }
+    BoundedPosterior posterior(two_shapes(), options);
+    for (int time = 0; time < 10; ++time) {
+      posterior.update(all_touches(recording));
+    }
+    const Certified seen = expect_certified(posterior, two_shapes(), options, truth, 1e-8);
+    EXPECT_LT(seen.estimate.certificate->bins_evaluated, options.lattice.bins() / 10);
   }
-  for (const double number : {0.0, -1.0, nan, HUGE_VAL}) {
-    refuse([&](BoundedOptions& o) { o.budget_s = number; }, "budget");
-    refuse([&](BoundedOptions& o) { o.evidence_nats = number; }, "evidence_nats");
-    refuse([&](BoundedOptions& o) { o.none_weight = number; }, "none_weight");
-  }
-  for (const double number : {-0.1, nan, HUGE_VAL}) {
-    refuse([&](BoundedOptions& o) { o.evidence_growth = number; }, "evidence_growth");
-  }
-  refuse([&](BoundedOptions& o) { o.threads = -1; }, "threads");
-  refuse([&](BoundedOptions& o) { o.lattice.x_mm.count = 0; }, "bins x_mm");
-  refuse([&](BoundedOptions& o) { o.contact.gamma = 1.0; }, "gamma");
-  expect_refused([&] { BoundedPosterior({}, small_options()); }, "give at least one map");
-  std::vector<Hypothesis> objects = two_made_up();
-  objects[1].weight = 0.0;
-  expect_refused([&] { BoundedPosterior(objects, small_options()); }, "weight");
-  objects = two_made_up();
-  objects[1].map.prior = 0.4;
-  expect_refused([&] { BoundedPosterior(objects, small_options()); }, "prior");
-  BoundedPosterior posterior(two_made_up(), small_options());
-  expect_refused([&] { posterior.refine({.object = 2}); }, "object 2");
-  expect_refused([&] { posterior.refine({.object = 0, .bin = 1'000'000}); }, "bin");
 }
 
 }  // namespace palpate::bounded_laws_test

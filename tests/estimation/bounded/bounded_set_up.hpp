@@ -9,6 +9,7 @@
 
 #include "palpate/bounded_posterior.hpp"
 #include "palpate/pose_histogram.hpp"
+#include "support/errors.hpp"
 #include "support/limits.hpp"
 #include "support/synthetic.hpp"
 
@@ -22,6 +23,8 @@ const std::vector<Hypothesis>& two_made_up();
 
 /// 13 x 12 x 16 bins.
 BoundedOptions small_options();
+/// These where touches are uncertain by 1 mm and 0.2 rad.
+BoundedOptions uncertain_options();
 
 /// Touches of the L, at one pose.
 Recording touches_of_l(std::size_t touches, std::uint64_t seed);
@@ -31,11 +34,14 @@ double sum(std::span<const double> values);
 /// The options of a histogram over the same bins, displacements and "none of these".
 HistogramOptions dense_options(const BoundedOptions& options);
 
-/// Expects bounds to agree with the histogram about identities, "none of these", the mode, the
-/// refined pose and the marginals, by what the method allows float32 after so many touches.
-void expect_as_dense(BoundedPosterior& bounded, PoseHistogram& dense, std::size_t touches);
+/// A posterior by bounds, and a histogram of the same bins.
+struct BothFilters {
+  BothFilters(Device& device, const std::vector<Hypothesis>& objects,
+              const BoundedOptions& options);
+  void update(const Touch& touch);
 
-/// Expects the call to throw an Error of the user's input, in one line that says this.
-void expect_refused(const std::function<void()>& call, const std::string& says);
+  BoundedPosterior bounded;
+  PoseHistogram dense;
+};
 
 }  // namespace palpate

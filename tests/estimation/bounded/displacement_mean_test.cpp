@@ -1,23 +1,17 @@
 // Means over displacements against the reference, and their bounds over tiles.
 
+#include "estimation/bounded/displaced/displacement_mean.hpp"
+
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <vector>
 
 #include <gtest/gtest.h>
 
-#include "estimation/bounded/displaced/displacement_mean.hpp"
+#include "support/limits.hpp"
 #include "support/synthetic.hpp"
 
 namespace palpate::displacement_mean_test {
-
-struct Case {
-  PoseLattice lattice;
-  DisplacementSd sd;
-  glm::dvec2 sensor_mm;
-  double spread_nats;  ///< of the log-likelihoods
-};
 
 PoseLattice lattice_of(int nx, int ny, int thetas, double turn = two_pi) {
   return {.x_mm = {-5.0, 6.0, nx},
@@ -26,79 +20,63 @@ PoseLattice lattice_of(int nx, int ny, int thetas, double turn = two_pi) {
           .pivot_mm = {2.0, -1.0}};
 }
 
-std::vector<Case> cases() {
-  return {{lattice_of(11, 9, 12), {1.0, 0.2}, {3.0, 4.0}, 3.0},
-          {lattice_of(11, 9, 12), {1.0, 0.2}, {3.0, 4.0}, 60.0},
-          {lattice_of(13, 7, 9, 1.5), {0.7, 0.1}, {-20.0, 9.0}, 20.0},
-          {lattice_of(1, 9, 12), {1.0, 0.4}, {3.0, 4.0}, 10.0},
-          {lattice_of(11, 1, 1), {2.5, 0.4}, {3.0, 4.0}, 10.0},
-          {lattice_of(6, 5, 20), {0.0, 0.5}, {2.0, 5.0}, 10.0},
-          {lattice_of(6, 5, 20), {3.0, 0.0}, {90.0, 5.0}, 10.0},
-          {lattice_of(18, 19, 5), {6.0, 2.0}, {2.5, -0.5}, 30.0},
-          // Beyond what float64 holds.
-          {lattice_of(7, 8, 6), {0.6, 0.3}, {3.0, 4.0}, 4000.0}};
-}
+/// A lattice, displacements and the place of the sensor.
+struct Case {
+  PoseLattice lattice;
+  DisplacementSd sd;
+  glm::dvec2 sensor_mm;
+  double spread_nats;  ///< of the log-likelihoods
 
-std::vector<double> random_logs(const PoseLattice& lattice, double spread, std::uint64_t seed) {
-  Uniform random(seed);
-  std::vector<double> logs(static_cast<std::size_t>(lattice.bins()));
-  // Some thetas are far less likely than others.
-  double of_theta = 0.0;
-  for (std::size_t bin = 0; bin < logs.size(); ++bin) {
-    if (bin % static_cast<std::size_t>(lattice.plane()) == 0) {
-      of_theta = random(-spread, 0.0);
-    }
-    logs[bin] = of_theta + random(-spread, 0.0);
-  }
-  return logs;
-}
-
-/// Blocks of tiles along an axis.
-int blocks_of(const Axis& axis, int bins) { return (axis.count + 4 * bins - 1) / (4 * bins); }
-
-std::vector<BlockRun> all_blocks(const PoseLattice& lattice, int bins) {
-  std::vector<BlockRun> runs;
-  for (int theta = 0; theta < lattice.theta_rad.count; ++theta) {
-    for (int y = 0; y < blocks_of(lattice.y_mm, bins); ++y) {
-      runs.push_back({theta, y, 0, blocks_of(lattice.x_mm, bins)});
-    }
-  }
-  return runs;
-}
-
-/// Sets each tile's likelihood to that of its best bin.
-template <typename Value>
-PlaceSource<Value> source_of(const std::vector<double>& logs, const PoseLattice& lattice,
-                             int bins) {
-  return [&logs, lattice, bins](std::span<const BlockRun> runs, const PlaceRows<Value>& rows) {
-    for (const BlockRun& run : runs) {
-      const int y_end = std::min(4 * (run.y + 1) * bins, lattice.y_mm.count);
-      const int x_end = std::min(4 * (run.x + run.count) * bins, lattice.x_mm.count);
-      for (int y = 4 * run.y * bins; y < y_end; ++y) {
-        for (int x = 4 * run.x * bins; x < x_end; ++x) {
-          const double log = logs[static_cast<std::size_t>(
-              (run.theta * lattice.y_mm.count + y) * lattice.x_mm.count + x)];
-          Value& of_tile = *rows.at(x / bins, y / bins);
-          of_tile = std::max(of_tile, static_cast<Value>(log));
-        }
+  /// Some thetas are far less likely than others.
+  std::vector<double> random_logs(std::uint64_t seed) const {
+    Uniform random(seed);
+    std::vector<double> logs;
+    for (int theta = 0; theta < lattice.theta_rad.count; ++theta) {
+      const double of_theta = random(-spread_nats, 0.0);
+      for (std::int64_t bin = 0; bin < lattice.plane(); ++bin) {
+        logs.push_back(of_theta + random(-spread_nats, 0.0));
       }
     }
-  };
+    return logs;
+  }
+};
+
+const Case cases[] = {{lattice_of(11, 9, 12), {1.0, 0.2}, {3.0, 4.0}, 3.0},
+                      {lattice_of(11, 9, 12), {1.0, 0.2}, {3.0, 4.0}, 60.0},
+                      {lattice_of(13, 7, 9, 1.5), {0.7, 0.1}, {-20.0, 9.0}, 20.0},
+                      {lattice_of(1, 9, 12), {1.0, 0.4}, {3.0, 4.0}, 10.0},
+                      {lattice_of(11, 1, 1), {2.5, 0.4}, {3.0, 4.0}, 10.0},
+                      {lattice_of(6, 5, 20), {0.0, 0.5}, {2.0, 5.0}, 10.0},
+                      {lattice_of(6, 5, 20), {3.0, 0.0}, {90.0, 5.0}, 10.0},
+                      {lattice_of(18, 19, 5), {6.0, 2.0}, {2.5, -0.5}, 30.0},
+                      // Beyond what float64 holds.
+                      {lattice_of(7, 8, 6), {0.6, 0.3}, {3.0, 4.0}, 4000.0}};
+
+/// All blocks of tiles of so many bins along each axis, and a few of them.
+std::vector<std::vector<BlockRun>> all_blocks_and_few(const PoseLattice& lattice, int bins) {
+  const auto blocks = [&](const Axis& axis) { return (axis.count + 4 * bins - 1) / (4 * bins); };
+  std::vector<BlockRun> all;
+  for (int theta = 0; theta < lattice.theta_rad.count; ++theta) {
+    for (int y = 0; y < blocks(lattice.y_mm); ++y) {
+      all.push_back({theta, y, 0, blocks(lattice.x_mm)});
+    }
+  }
+  return {all, {all.front(), all[all.size() / 2], all.back()}};
 }
 
-/// Calls visit(bin, place of the results) for every bin of some runs' tiles.
+/// Calls visit(bin, x, y, place of its tile's result) for every bin of some runs' tiles.
 template <typename Visit>
 void for_bins(std::span<const BlockRun> runs, const PoseLattice& lattice, int bins,
               const Visit& visit) {
   std::size_t first = 0;
   for (const BlockRun& run : runs) {
     for (int i = 0; i < 16 * run.count; ++i) {
-      const int x = bins * (4 * (run.x + i / 16) + i % 4);
-      const int y = bins * (4 * run.y + i % 16 / 4);
-      for (int row = y; row < std::min(y + bins, lattice.y_mm.count); ++row) {
-        for (int column = x; column < std::min(x + bins, lattice.x_mm.count); ++column) {
-          const int bin = (run.theta * lattice.y_mm.count + row) * lattice.x_mm.count + column;
-          visit(static_cast<std::size_t>(bin), first + static_cast<std::size_t>(i));
+      const int x_first = bins * (4 * (run.x + i / 16) + i % 4);
+      const int y_first = bins * (4 * run.y + i % 16 / 4);
+      for (int y = y_first; y < std::min(y_first + bins, lattice.y_mm.count); ++y) {
+        for (int x = x_first; x < std::min(x_first + bins, lattice.x_mm.count); ++x) {
+          const int bin = (run.theta * lattice.y_mm.count + y) * lattice.x_mm.count + x;
+          visit(static_cast<std::size_t>(bin), x, y, first + static_cast<std::size_t>(i));
         }
       }
     }
@@ -106,59 +84,48 @@ void for_bins(std::span<const BlockRun> runs, const PoseLattice& lattice, int bi
   }
 }
 
-TEST(DisplacementMean, IsTheReferences) {
-  std::uint64_t seed = 941;
-  for (const Case& c : cases()) {
-    SCOPED_TRACE(::testing::Message() << "seed " << seed);
-    const std::vector<double> logs = random_logs(c.lattice, c.spread_nats, seed++);
-    const std::vector<double> expected =
-        reference::displaced_touch(logs, c.lattice, c.sd, {c.sensor_mm, 0.4});
-    const DisplacementWeights weights(c.lattice, c.sd);
-    const DisplacementMean mean(weights, 1);
-    const auto source = source_of<double>(logs, c.lattice, 1);
-    const std::vector<BlockRun> all = all_blocks(c.lattice, 1);
-    // A few blocks are as all are.
-    for (const std::vector<BlockRun>& targets :
-         {all, std::vector{all.front(), all[all.size() / 2], all.back()}}) {
-      const std::vector<double> found =
-          mean.means(c.sensor_mm - c.lattice.pivot_mm, targets, source);
-      std::size_t bins = 0;
-      for_bins(targets, c.lattice, 1, [&](std::size_t bin, std::size_t place) {
-        ++bins;
-        // Logs of some thousand nats keep 16 digits.
-        const double nats = 1e-11 + mean.mean_error();
-        EXPECT_NEAR(found[place], expected[bin], nats) << "bin " << bin;
-      });
-      EXPECT_GT(bins, 0U);
-    }
-  }
+/// Sets each tile's likelihood to that of its best bin.
+template <typename Value>
+PlaceSource<Value> source_of(const std::vector<double>& logs, const PoseLattice& lattice,
+                             int bins) {
+  return [&logs, lattice, bins](std::span<const BlockRun> runs, const PlaceRows<Value>& rows) {
+    for_bins(runs, lattice, bins, [&](std::size_t bin, int x, int y, std::size_t /*place*/) {
+      Value& of_tile = *rows.at(x / bins, y / bins);
+      of_tile = std::max(of_tile, static_cast<Value>(logs[bin]));
+    });
+  };
 }
 
-TEST(DisplacementMean, IsBoundedOverTiles) {
-  std::uint64_t seed = 961;
-  for (const Case& c : cases()) {
+TEST(DisplacementMean, IsTheReferencesAndBoundedOverTiles) {
+  std::uint64_t seed = 941;
+  for (const Case& c : cases) {
+    const DisplacementWeights weights(c.lattice, c.sd);
+    const glm::dvec2 from_pivot_mm = c.sensor_mm - c.lattice.pivot_mm;
     for (const int bins : {1, 2, 4, 16}) {
       SCOPED_TRACE(::testing::Message() << "seed " << seed << ", tiles of " << bins);
-      const std::vector<double> logs = random_logs(c.lattice, c.spread_nats, seed++);
+      const std::vector<double> logs = c.random_logs(seed++);
       const std::vector<double> expected =
           reference::displaced_touch(logs, c.lattice, c.sd, {c.sensor_mm, 0.4});
-      const DisplacementWeights weights(c.lattice, c.sd);
       const DisplacementMean mean(weights, bins);
-      const std::vector<BlockRun> all = all_blocks(c.lattice, bins);
-      double closest = std::numeric_limits<double>::infinity();
-      for (const std::vector<BlockRun>& asked :
-           {all, std::vector{all.front(), all[all.size() / 2], all.back()}}) {
-        const std::vector<double> bounds = mean.bounds(c.sensor_mm - c.lattice.pivot_mm, asked,
-                                                       source_of<float>(logs, c.lattice, bins));
-        for_bins(asked, c.lattice, bins, [&](std::size_t bin, std::size_t place) {
+      double closest = infinity;
+      for (const std::vector<BlockRun>& asked : all_blocks_and_few(c.lattice, bins)) {
+        const std::vector<double> bounds =
+            mean.bounds(from_pivot_mm, asked, source_of<float>(logs, c.lattice, bins));
+        std::vector<double> means;
+        if (bins == 1) {
+          means = mean.means(from_pivot_mm, asked, source_of<double>(logs, c.lattice, 1));
+        }
+        for_bins(asked, c.lattice, bins, [&](std::size_t bin, int, int, std::size_t place) {
           // float32 keeps seven digits of the logs.
           EXPECT_GE(bounds[place], expected[bin] - 1e-6 * c.spread_nats) << "bin " << bin;
           closest = std::min(closest, bounds[place] - expected[bin]);
+          if (bins == 1) {
+            // Logs of some thousand nats keep 16 digits.
+            EXPECT_NEAR(means[place], expected[bin], 1e-11 + mean.mean_error()) << "bin " << bin;
+          }
         });
       }
-      if (bins == 1) {
-        EXPECT_LT(closest, 0.01) << "no closer over any bin";
-      }
+      EXPECT_LT(closest, bins == 1 ? 0.01 : infinity) << "no closer over any bin";
     }
   }
 }

@@ -3,16 +3,17 @@
 #include "estimation/bounded/marginal_sums.hpp"
 
 #include <cmath>
-#include <numeric>
 #include <vector>
 
 #include <gtest/gtest.h>
+
+#include "support/synthetic.hpp"
 
 namespace palpate::marginal_sums_test {
 
 constexpr PoseLattice bins{.x_mm = {-10.0, 10.0, 23},
                            .y_mm = {-7.0, 11.0, 17},
-                           .theta_rad = {0.0, 6.283185307179586, 9},
+                           .theta_rad = {0.0, two_pi, 9},
                            .pivot_mm = {30.0, -4.0}};
 constexpr BinBox box{
     .object = 0, .theta = 5, .y_first = 3, .y_count = 11, .x_first = 2, .x_count = 20};
@@ -35,13 +36,6 @@ Marginals by_definition(const PoseLattice& grid, const std::vector<double>& logs
   return sums;
 }
 
-void expect_near(const std::vector<double>& actual, const std::vector<double>& expected) {
-  ASSERT_EQ(actual.size(), expected.size());
-  for (std::size_t i = 0; i < actual.size(); ++i) {
-    EXPECT_NEAR(actual[i], expected[i], 1e-12 * box.bins()) << "sums of a few hundred float64";
-  }
-}
-
 TEST(MarginalSums, AreThoseOfTheirDefinition) {
   std::vector<double> logs;
   for (int i = 0; i < box.bins(); ++i) {
@@ -49,33 +43,19 @@ TEST(MarginalSums, AreThoseOfTheirDefinition) {
   }
   // Steps that share no border with the bins' centres. The last grid ends within the region.
   for (const PoseLattice& grid :
-       {bins, PoseLattice{{-10.0, 10.0, 7}, {-7.0, 11.0, 5}, {0.0, 6.283185307179586, 4}, {30, -4}},
-        PoseLattice{{-10.0, 10.0, 7}, {-7.0, 11.0, 5}, {0.0, 6.283185307179586, 4}, {28, 3}},
+       {bins, PoseLattice{{-10.0, 10.0, 7}, {-7.0, 11.0, 5}, {0.0, two_pi, 4}, {30, -4}},
+        PoseLattice{{-10.0, 10.0, 7}, {-7.0, 11.0, 5}, {0.0, two_pi, 4}, {28, 3}},
         PoseLattice{{-4.0, 3.1, 50}, {-2.0, 4.1, 1}, {1.0, 2.0, 3}, {30, -4}}}) {
     for (const std::vector<double>& likelihoods : {logs, std::vector<double>{-2.0}}) {
       MarginalSums sums(bins, grid);
       sums.add(box, likelihoods, -1.5);
       const Marginals actual = sums.take();
       const Marginals expected = by_definition(grid, likelihoods, -1.5);
-      expect_near(actual.xy, expected.xy);
-      expect_near(actual.theta, expected.theta);
+      // Sums of a few hundred float64.
+      EXPECT_LE(largest_difference(actual.xy, expected.xy), 1e-12 * box.bins());
+      EXPECT_LE(largest_difference(actual.theta, expected.theta), 1e-12 * box.bins());
     }
   }
-}
-
-// 1.6e13 bins: one by one they would take days.
-TEST(MarginalSums, OfOneLikelihoodTakeTheTimeOfTheGrid) {
-  constexpr int count = 4'000'000;
-  const PoseLattice many{{-10.0, 10.0, count}, {-10.0, 10.0, count}, {0.0, 1.0, 1}, {}};
-  const PoseLattice grid{{-10.0, 10.0, 5}, {-10.0, 10.0, 4}, {0.0, 1.0, 1}, {}};
-  MarginalSums sums(many, grid);
-  sums.add({.y_count = count, .x_count = count}, std::vector{0.0},
-           -2.0 * std::log(static_cast<double>(count)));
-  const Marginals marginals = sums.take();
-  for (const double p : marginals.xy) {
-    EXPECT_NEAR(p, 1.0 / 20.0, 1e-12) << "float64";
-  }
-  EXPECT_NEAR(marginals.theta[0], 1.0, 1e-12);
 }
 
 }  // namespace palpate::marginal_sums_test

@@ -2,12 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <gtest/gtest.h>
 
-#include "palpate/bounded_posterior.hpp"
-#include "support/synthetic.hpp"
-#include "support/touched_shape.hpp"
+#include "bounded_set_up.hpp"
 
 namespace palpate::thinned_lattice_test {
 
@@ -50,10 +49,7 @@ TEST(ThinnedLattice, ItsCentresAreCentresOfTheLattice) {
 }
 
 TEST(ThinnedLattice, RefinedPosesLieInTheRegion) {
-  const std::vector<Hypothesis> objects{{map_of(on_letter_l, "L"), 1.0}};
-  const Pose truth{{1.3, -0.8}, 0.7};
-  const Recording recording = touches_of(on_letter_l, truth, 5, 832);
-  const std::vector<Touch> touches = all_touches(recording);
+  const Recording recording = touches_of_l(5, 832);
   Device device = Device::open();
   Uniform uniform(833);
   const auto axis = [&](double middle, double widest) {
@@ -62,22 +58,17 @@ TEST(ThinnedLattice, RefinedPosesLieInTheRegion) {
     return Axis{lower, lower + width, static_cast<int>(uniform(1.0, 12.0))};
   };
   for (int trial = 0; trial < 8; ++trial) {
-    const bool full = trial % 4 == 3;
+    SCOPED_TRACE(testing::Message() << "trial " << trial);
     const PoseLattice region{
-        .x_mm = axis(truth.translation_mm.x, 10.0),
-        .y_mm = axis(truth.translation_mm.y, 10.0),
-        .theta_rad = full ? Axis{-1.0, -1.0 + two_pi, 2 * trial} : axis(truth.theta_rad, 5.0)};
-    BoundedPosterior bounded(objects, {.lattice = region});
-    PoseHistogram histogram(device, objects, {.lattice = region});
-    bounded.update(touches);
-    histogram.update(touches);
-    SCOPED_TRACE(testing::Message()
-                 << region.x_mm.count << " x " << region.y_mm.count << " x "
-                 << region.theta_rad.count << " bins over " << region.x_mm.lower << ":"
-                 << region.x_mm.upper << ", " << region.y_mm.lower << ":" << region.y_mm.upper
-                 << ", " << region.theta_rad.lower << ":" << region.theta_rad.upper);
-    for (const RefinedPose& refined :
-         {bounded.refine(bounded.estimate().mode), histogram.refine(histogram.estimate().mode)}) {
+        .x_mm = axis(1.3, 10.0),
+        .y_mm = axis(-0.8, 10.0),
+        .theta_rad = trial % 4 == 3 ? Axis{-1.0, -1.0 + two_pi, 2 * trial} : axis(0.7, 5.0)};
+    BothFilters both(device, {two_shapes()[0]}, {.lattice = region});
+    for (const Touch& touch : all_touches(recording)) {
+      both.update(touch);
+    }
+    for (const RefinedPose& refined : {both.bounded.refine(both.bounded.estimate().mode),
+                                       both.dense.refine(both.dense.estimate().mode)}) {
       const auto& [place_mm, theta_rad] = refined.T_object_robot;
       for (const auto& [at, within] :
            {std::pair(place_mm.x, region.x_mm), std::pair(place_mm.y, region.y_mm),

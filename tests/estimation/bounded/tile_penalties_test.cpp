@@ -1,18 +1,105 @@
+// Tables of the least penalties of windows, and the penalties of tiles, which they sum.
+
 #include "estimation/bounded/tables/tile_penalties.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <limits>
 #include <numeric>
+#include <utility>
 
 #include <gtest/gtest.h>
 
 #include "bins_by_definition.hpp"
-#include "random_penalties.hpp"
+#include "estimation/bounded/tables/window_table.hpp"
 #include "support/every_set_of_instructions.hpp"
 #include "support/synthetic.hpp"
 
 namespace palpate::tile_penalties_test {
+
+/// Penalties of independent squares, from 0 to `largest`; the largest occurs, also beyond.
+SquarePenalties random_penalties(int nx, int ny, std::uint16_t largest, std::uint64_t seed) {
+  Uniform random(seed);
+  SquarePenalties penalties{.best = -0.3, .nx = nx, .ny = ny, .least = {}, .beyond = largest};
+  for (int i = 0; i < nx * ny; ++i) {
+    penalties.least.push_back(static_cast<std::uint16_t>(random(0.0, largest + 1.0)));
+  }
+  penalties.least.back() = largest;
+  return penalties;
+}
+
+/// The least penalty within so many squares along each axis from square (x, y) on, by definition.
+std::uint16_t least_penalty(const SquarePenalties& penalties, int window, int x, int y) {
+  std::uint16_t least = std::numeric_limits<std::uint16_t>::max();
+  for (int j = y; j < y + window; ++j) {
+    for (int i = x; i < x + window; ++i) {
+      const bool inside = i >= 0 && j >= 0 && i < penalties.nx && j < penalties.ny;
+      least =
+          std::min(least, inside ? penalties.least[static_cast<std::size_t>(j) * penalties.nx + i]
+                                 : penalties.beyond);
+    }
+  }
+  return least;
+}
+
+/// Calls visit(x, y, row, column, entry) with the square at which each entry's window begins.
+template <typename Visit>
+void for_entries(const WindowTable& table, const Visit& visit) {
+  const int side = 1 << table.side_log2;
+  auto entry = table.entries.begin();
+  for (int phase_y = 0; phase_y < side; ++phase_y) {
+    for (int phase_x = 0; phase_x < side; ++phase_x) {
+      for (int row = 0; row < table.rows; ++row) {
+        for (int column = 0; column < table.columns; ++column) {
+          for (int j = 0; j < batch_side; ++j, ++entry) {
+            visit((column - WindowTable::margin) * side + phase_x,
+                  (row + j - WindowTable::margin) * side + phase_y, row, column, *entry);
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST(WindowTable, HoldsTheLeastPenaltyOfEveryWindow) {
+  for (const glm::ivec2 squares : {glm::ivec2(2, 2), {7, 5}, {16, 9}, {33, 1}}) {
+    for (const auto& [side, window] :
+         {std::pair(1, 2), {2, 3}, {4, 5}, {8, 9}, {1, 1}, {2, 1}, {8, 1}}) {
+      SCOPED_TRACE(testing::Message() << squares.x << " x " << squares.y << ", side " << side
+                                      << ", window " << window);
+      const SquarePenalties penalties = random_penalties(squares.x, squares.y, 8192, 91);
+      const WindowTable table = window_table(penalties, side, window);
+      ASSERT_EQ(1 << table.side_log2, side);
+      ASSERT_EQ(table.best, penalties.best);
+      ASSERT_EQ(table.beyond, penalties.beyond);
+      ASSERT_EQ(table.entries.size(),
+                static_cast<std::size_t>(side) * side * table.rows * table.columns * batch_side);
+      std::uint16_t largest = 0;
+      for_entries(table, [&](int x, int y, int, int, std::uint16_t entry) {
+        ASSERT_EQ(entry, least_penalty(penalties, window, x, y)) << "square " << x << ", " << y;
+        largest = std::max(largest, entry);
+      });
+      EXPECT_EQ(table.largest, largest);
+    }
+  }
+}
+
+TEST(WindowTable, EndsInBatchesThatSeeOnlyThePrior) {
+  // Farther batches take the entries of these.
+  for (const int side : {1, 2, 8}) {
+    SquarePenalties penalties = random_penalties(13, 11, 100, 92);
+    penalties.beyond = 200;
+    const WindowTable table = window_table(penalties, side, side + 1);
+    for_entries(table, [&](int x, int y, int row, int column, std::uint16_t entry) {
+      if (column < batch_side || column >= table.columns - batch_side || row < 1 ||
+          row >= table.rows - batch_side) {
+        ASSERT_EQ(entry, 200) << "side " << side << ", square " << x << ", " << y;
+      }
+    });
+  }
+}
 
 /// Elements over squares of a table, the batches of tiles and the sums before them.
 struct BatchCase {
@@ -102,16 +189,11 @@ void expect_sums(const BatchCase& of, std::size_t split = 0) {
 TEST(TilePenalties, AreTheSumsOfWindowsWithEverySetOfInstructions) {
   for (std::size_t count = 0; count <= 70; ++count) {
     for (const int side : {1, 2, 8}) {
-      expect_sums(random_batch(count, side, 900, 93 + 7 * count));
+      expect_sums(random_batch(count, side, 900, 93 + 7 * count), count / 3);
     }
-  }
-}
-
-TEST(TilePenalties, OfSingleBinsAreThoseOfTheSquaresTheySee) {
-  for (std::size_t count = 0; count <= 70; count += 7) {
-    BatchCase of = random_batch(count, 4, 900, 99 + count);
-    of.window = 1;
-    expect_sums(of);
+    BatchCase of_single_bins = random_batch(count, 4, 900, 99 + count);
+    of_single_bins.window = 1;
+    expect_sums(of_single_bins);
   }
 }
 
@@ -120,32 +202,18 @@ TEST(TilePenalties, OfNeighbouringBatchesAreThoseOfEach) {
   Uniform random(100);
   for (std::uint64_t trial = 0; trial < 300; ++trial) {
     const int side = 1 << static_cast<int>(random(0.0, 4.0));
-    BatchCase of =
-        random_batch(static_cast<std::size_t>(random(0.0, 70.0)), side, 900, 1000 + trial);
+    const auto elements = static_cast<std::size_t>(random(0.0, 70.0));
+    BatchCase of = random_batch(elements, side, trial % 3 == 0 ? 8192 : 900, 1000 + trial);
     of.batches = static_cast<int>(random(1.0, 9.0));
     of.first_x -= static_cast<int>(random(0.0, 40.0));
     of.first_y -= static_cast<int>(random(0.0, 20.0));
     of.penalties.beyond = static_cast<std::uint16_t>(random(0.0, 901.0));
-    of.before = trial % 2 == 0 ? 0 : 123456789;
-    expect_sums(of, of.elements.from_pivot_mm.size() / 3);
+    of.before = one_of(random, std::array{0U, 123456789U, largest_sum});
+    expect_sums(of, static_cast<std::size_t>(random(0.0, static_cast<double>(elements) + 1.0)));
   }
 }
 
-TEST(TilePenalties, OfARunThatBeginsAnywhereAreThose) {
-  for (std::size_t split = 0; split <= 35; ++split) {
-    expect_sums(random_batch(36, 2, 8192, 94 + split), split);
-  }
-}
-
-TEST(TilePenalties, AddToWhatIsThere) {
-  BatchCase of = random_batch(36, 2, 8192, 95);
-  of.before = 123456789;
-  expect_sums(of);
-  of.before = largest_sum;
-  expect_sums(of);
-}
-
-TEST(TilePenalties, OfAPressOfManyElementsDoNotWrap) {
+TEST(TilePenalties, OfManyElementsNeitherWrapNorExceedTheLargestSum) {
   // 16 bits hold 7 of the largest penalties.
   for (const int side : {1, 8}) {
     for (const std::uint16_t largest : {std::uint16_t{0}, std::uint16_t{1}, largest_penalty}) {
@@ -156,24 +224,16 @@ TEST(TilePenalties, OfAPressOfManyElementsDoNotWrap) {
       }
     }
   }
-}
-
-TEST(TilePenalties, StopAtTheLargestSum) {
+  expect_sums(random_batch(300000, 1, 4000, 98));
   BatchCase of = random_batch(300000, 1, largest_penalty, 97);
   std::fill(of.penalties.least.begin(), of.penalties.least.end(), largest_penalty);
-  const std::vector<std::uint32_t> all(batch_tiles, largest_sum);
-  ASSERT_EQ(sums_by_definition(of), all);
-  expect_sums(of);
   of.batches = 2;
+  ASSERT_EQ(sums_by_definition(of), std::vector<std::uint32_t>(2 * batch_tiles, largest_sum));
   expect_sums(of);
   // Just below it.
   of.elements.from_pivot_mm.resize(largest_sum / largest_penalty - 1);
   ASSERT_LT(sums_by_definition(of).front(), largest_sum);
   expect_sums(of);
-}
-
-TEST(TilePenalties, OfVeryManyElementsAreTheirSum) {
-  expect_sums(random_batch(300000, 1, 4000, 98));
 }
 
 }  // namespace palpate::tile_penalties_test

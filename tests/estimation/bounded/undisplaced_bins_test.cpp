@@ -49,11 +49,9 @@ TEST(UndisplacedBins, ShowInNoBit) {
   const PoseLattice lattice{.x_mm = {-4.0, 4.0, 21}, .y_mm = {-3.0, 3.0, 18}};
   const DisplacementSd touch_sd{0.6, 0.4};
   const BinLikelihood likelihood(two, {.prior = 0.2}, lattice, touch_sd);
-  const std::vector<glm::dvec2> elements_mm{{0.6, 0.3}, {-0.7, 1.8}, {0.0, -1.2}};
-  const std::vector<double> pressure{9.0, 1.0, 9.0};
-  const Touch touch{
-      .T_robot_sensor = {{0.4, 0.2}, 0.0}, .elements_mm = elements_mm, .pressure = pressure};
-  const KnownElements alone = known_elements(TouchEvidence(touch, {}), {.touch_sd = touch_sd});
+  const Recording recording = random_recording(1, 5, 873);
+  const KnownElements alone =
+      known_elements(TouchEvidence(recording.touch(0), {}), {.touch_sd = touch_sd});
   KnownElements keeping = alone;
   constexpr std::size_t few_blocks = 10'000;
   for (const std::size_t room : {few_blocks, UndisplacedBins::most_bytes}) {

@@ -11,19 +11,14 @@
 #include "palpate/simulation.hpp"
 #include "palpate/touch.hpp"
 #include "support/synthetic.hpp"
+#include "support/touched_shape.hpp"
 
 namespace palpate::balanced_lattice_test {
 
 /// A letter as it is, on cells of 0.5 mm.
 Hypothesis letter(const char* name) {
   const Shape shape = make_shape(name);
-  OccupancyGrid map{.label = name, .origin_mm = {-16, -16}, .nx = 65, .ny = 65, .log_odds = {}};
-  for (int j = 0; j < map.ny; ++j) {
-    for (int i = 0; i < map.nx; ++i) {
-      map.log_odds.push_back(shape.contains(map.centre_mm(i, j)) ? 4.0F : -4.0F);
-    }
-  }
-  return {map, 1.0};
+  return {map_of([&](const glm::dvec2& p_mm) { return shape.contains(p_mm); }, name), 1.0};
 }
 
 const std::vector<Hypothesis>& letters() {
@@ -87,36 +82,30 @@ TEST(BalancedLattice, TakesTheFinestMapAndTheLongestLever) {
   EXPECT_GT(fine_lattice({}, objects).lattice.theta_rad.count, 2 * one.lattice.theta_rad.count);
 }
 
-TEST(BalancedLattice, StopsAtWhatTheSensorShows) {
-  const auto counts = [](double cell_mm, std::optional<double> spread_mm) {
+TEST(BalancedLattice, StepsAreOfTheCellOrOfWhatTheSensorShows) {
+  struct Row {
+    double cell_mm;
+    std::optional<double> spread_mm;
+    double fine_mm;       ///< 0.6 times the larger
+    double automatic_mm;  ///< 0.6 times the larger of the cell and twice the spread
+  };
+  // A map that does not know the spread has as much as its cell.
+  for (const auto& [cell_mm, spread_mm, fine_mm, automatic_mm] :
+       {Row{0.25, {}, 0.15, 0.3}, Row{0.25, 0.5, 0.3, 0.6}, Row{0.25, 0.1, 0.15, 0.15},
+        Row{0.5, 0.5, 0.3, 0.6}, Row{0.5, {}, 0.3, 0.6}, Row{1.0, 0.5, 0.6, 0.6},
+        Row{2.0, 0.5, 1.2, 1.2}}) {
+    SCOPED_TRACE(testing::Message() << cell_mm << ", " << spread_mm.value_or(0.0));
     Hypothesis object = letter("O");
-    object.map.origin_mm *= cell_mm / object.map.cell_mm;
     object.map.cell_mm = cell_mm;
     object.map.spread_mm = spread_mm;
-    return fine_lattice({}, std::span(&object, 1)).lattice.x_mm.count;
-  };
-  EXPECT_EQ(counts(0.25, {}), 134) << "not known";
-  EXPECT_EQ(counts(0.25, 0.5), 67) << "20 mm in steps of 0.6 x 0.5 mm";
-  EXPECT_EQ(counts(0.25, 0.1), 134) << "cells wider than the spread";
-  EXPECT_EQ(counts(0.5, 0.5), 67);
-  EXPECT_EQ(counts(1.0, 0.5), 34);
+    const BalancedLattice fine = fine_lattice({}, std::span(&object, 1));
+    EXPECT_DOUBLE_EQ(fine.step_mm, fine_mm);
+    EXPECT_EQ(fine.lattice.x_mm.count, std::ceil(20.0 / fine_mm - 1e-9));
+    EXPECT_DOUBLE_EQ(balanced_lattice({}, std::span(&object, 1)).step_mm, automatic_mm);
+  }
   std::vector<Hypothesis> objects{letter("O"), letter("O")};
   objects[0].map.spread_mm = 2.0;
   EXPECT_EQ(fine_lattice({}, objects).lattice.x_mm.count, 67) << "the finest counts";
-}
-
-TEST(BalancedLattice, ForTheRefinedPoseSkipsWhatItEvensOut) {
-  const auto step_mm = [](double cell_mm, std::optional<double> spread_mm) {
-    Hypothesis object = letter("O");
-    object.map.cell_mm = cell_mm;
-    object.map.spread_mm = spread_mm;
-    return balanced_lattice({}, std::span(&object, 1)).step_mm;
-  };
-  EXPECT_DOUBLE_EQ(step_mm(0.5, 0.5), 0.6) << "twice the spread";
-  EXPECT_DOUBLE_EQ(step_mm(0.25, 0.5), 0.6);
-  EXPECT_DOUBLE_EQ(step_mm(1.0, 0.5), 0.6) << "the cell";
-  EXPECT_DOUBLE_EQ(step_mm(2.0, 0.5), 1.2);
-  EXPECT_DOUBLE_EQ(step_mm(0.5, {}), 0.6) << "as if the spread were the cell";
   const PoseLattice fine = fine_lattice({}, letters()).lattice;
   const PoseLattice lattice = balanced_lattice({}, letters()).lattice;
   EXPECT_EQ(lattice.x_mm.count, 34) << "20 mm in steps of 0.6 mm";
@@ -124,36 +113,35 @@ TEST(BalancedLattice, ForTheRefinedPoseSkipsWhatItEvensOut) {
 }
 
 TEST(BalancedLattice, FollowsUncertainTouchesUpToTwoAndAHalfSteps) {
-  const auto lattice = [](const DisplacementSd& sd, BinWidth width = BinWidth::automatic) {
-    return balanced_lattice({}, letters(), most_balanced_bins, width, sd);
+  const auto lattice = [](const DisplacementSd& touch_sd, const DisplacementSd& slip_sd,
+                          BinWidth width = BinWidth::automatic) {
+    return balanced_lattice({}, letters(), most_balanced_bins, width, touch_sd, slip_sd);
   };
-  const BalancedLattice exact = lattice({});
+  const BalancedLattice exact = lattice({}, {});
   const double step_rad = exact.lattice.theta_rad.step();
-  ASSERT_DOUBLE_EQ(exact.step_mm, 0.6);
-  const auto step_mm = [&](double sd_mm) {
-    const BalancedLattice with = lattice({.mm = sd_mm, .rad = 0.0});
-    EXPECT_EQ(with.lattice.theta_rad.count, exact.lattice.theta_rad.count) << sd_mm;
-    EXPECT_EQ(with.lattice.x_mm.count, std::ceil(20.0 / with.step_mm)) << sd_mm;
+  struct Row {
+    DisplacementSd touch_sd;
+    DisplacementSd slip_sd;
+    double step_mm;
+    double steps_of_theta;
+  };
+  for (const auto& [touch_sd, slip_sd, step_mm, steps_of_theta] :
+       {Row{{}, {}, 0.6, 1.0}, Row{{.mm = 1.0}, {}, 0.6, 1.0}, Row{{.mm = 1.5}, {}, 0.75, 1.0},
+        Row{{.mm = 2.0}, {}, 1.0, 1.0}, Row{{.mm = 3.0}, {}, 1.5, 1.0},
+        Row{{.mm = 9.0}, {}, 1.5, 1.0},              // two and a half steps
+        Row{{.rad = 3.0 * step_rad}, {}, 0.6, 1.5},  // half of it
+        Row{{}, {.mm = 0.8}, 1.0, 1.0},
+        Row{{}, {.rad = 2.0 * step_rad}, 0.6, 2.5},  // five quarters
+        Row{{.mm = 2.0}, {.mm = 0.6}, 1.0, 1.0}}) {  // the wider of both
+    SCOPED_TRACE(testing::Message() << touch_sd.mm << ", " << slip_sd.mm << " mm");
+    const BalancedLattice with = lattice(touch_sd, slip_sd);
+    EXPECT_DOUBLE_EQ(with.step_mm, step_mm);
+    EXPECT_EQ(with.lattice.x_mm.count, std::ceil(20.0 / step_mm - 1e-9));
+    EXPECT_NEAR(with.lattice.theta_rad.step(), steps_of_theta * step_rad,
+                steps_of_theta > 1.0 ? 0.04 * step_rad : 0.0);
     EXPECT_FALSE(with.coarsened);
-    return with.step_mm;
-  };
-  EXPECT_DOUBLE_EQ(step_mm(1.0), 0.6) << "half of it is less";
-  EXPECT_DOUBLE_EQ(step_mm(1.5), 0.75);
-  EXPECT_DOUBLE_EQ(step_mm(2.0), 1.0);
-  EXPECT_DOUBLE_EQ(step_mm(3.0), 1.5);
-  EXPECT_DOUBLE_EQ(step_mm(9.0), 1.5) << "two and a half steps";
-  const BalancedLattice turned = lattice({.mm = 0.0, .rad = 3.0 * step_rad});
-  EXPECT_DOUBLE_EQ(turned.step_mm, 0.6);
-  EXPECT_NEAR(turned.lattice.theta_rad.step(), 1.5 * step_rad, 0.02 * step_rad);
-  const auto slipping = [](const DisplacementSd& touch_sd, const DisplacementSd& slip_sd) {
-    return balanced_lattice({}, letters(), most_balanced_bins, BinWidth::automatic, touch_sd,
-                            slip_sd);
-  };
-  EXPECT_DOUBLE_EQ(slipping({}, {.mm = 0.8}).step_mm, 1.0) << "five quarters of a slip";
-  EXPECT_DOUBLE_EQ(slipping({.mm = 2.0}, {.mm = 0.6}).step_mm, 1.0) << "the wider of both";
-  EXPECT_NEAR(slipping({}, {.rad = 2.0 * step_rad}).lattice.theta_rad.step(), 2.5 * step_rad,
-              0.04 * step_rad);
-  const BalancedLattice fine = lattice({.mm = 9.0, .rad = 1.0}, BinWidth::fine);
+  }
+  const BalancedLattice fine = lattice({.mm = 9.0, .rad = 1.0}, {}, BinWidth::fine);
   EXPECT_EQ(fine.lattice.bins(), fine_lattice({}, letters()).lattice.bins()) << "for the mode";
 }
 
@@ -230,58 +218,32 @@ Hypothesis bar_at(double x, double y) {
   return {map, 1.0};
 }
 
-TEST(TouchRegion, IsTheObjectsBoxGrownByTheArray) {
-  const Hypothesis bar = bar_at(3.0, -1.0);
-  const TouchRegion region = touch_region(std::span(&bar, 1), 7.0);
+void expect_region(const PoseLattice& region, const glm::dvec2& lower, const glm::dvec2& upper) {
+  EXPECT_DOUBLE_EQ(region.x_mm.lower, lower.x);
+  EXPECT_DOUBLE_EQ(region.x_mm.upper, upper.x);
+  EXPECT_DOUBLE_EQ(region.y_mm.lower, lower.y);
+  EXPECT_DOUBLE_EQ(region.y_mm.upper, upper.y);
+  EXPECT_TRUE(region.full_circle());
+  EXPECT_EQ(region.pivot_mm, glm::dvec2(0.0));
+}
+
+TEST(TouchRegion, IsTheObjectsBoxesGrownByTheArray) {
   // Five cells by three, and 7 mm to every side.
-  EXPECT_DOUBLE_EQ(region.lattice.x_mm.lower, 3.0 - 1.25 - 7.0);
-  EXPECT_DOUBLE_EQ(region.lattice.x_mm.upper, 3.0 + 1.25 + 7.0);
-  EXPECT_DOUBLE_EQ(region.lattice.y_mm.lower, -1.0 - 0.75 - 7.0);
-  EXPECT_DOUBLE_EQ(region.lattice.y_mm.upper, -1.0 + 0.75 + 7.0);
-  EXPECT_TRUE(region.lattice.full_circle());
-  EXPECT_EQ(region.lattice.pivot_mm, glm::dvec2(0.0));
-  EXPECT_DOUBLE_EQ(region.excess, 1.0);
-}
-
-TEST(TouchRegion, HoldsTheSensorWhereverItMeetsTheObject) {
+  const glm::dvec2 half(1.25 + 7.0, 0.75 + 7.0);
   const Hypothesis bar = bar_at(3.0, -1.0);
-  const std::vector<glm::dvec2> elements_mm = digitacts_array();
-  const PoseLattice region = touch_region(std::span(&bar, 1), array_reach_mm(elements_mm)).lattice;
-  Uniform random(190);
-  int met = 0;
-  for (int i = 0; i < 2000; ++i) {
-    const Pose T_object_sensor{{random(-15.0, 20.0), random(-18.0, 16.0)}, random(0.0, two_pi)};
-    const bool meets = std::ranges::any_of(elements_mm, [&](const glm::dvec2& element) {
-      const glm::dvec2 from_bar = T_object_sensor * element - glm::dvec2(3.0, -1.0);
-      return std::abs(from_bar.x) <= 1.25 && std::abs(from_bar.y) <= 0.75;
-    });
-    if (meets) {
-      ++met;
-      const glm::dvec2& origin = T_object_sensor.translation_mm;
-      EXPECT_GE(origin.x, region.x_mm.lower);
-      EXPECT_LE(origin.x, region.x_mm.upper);
-      EXPECT_GE(origin.y, region.y_mm.lower);
-      EXPECT_LE(origin.y, region.y_mm.upper);
-    }
-  }
-  EXPECT_GT(met, 100);
-}
+  const TouchRegion one = touch_region(std::span(&bar, 1), 7.0);
+  expect_region(one.lattice, glm::dvec2(3.0, -1.0) - half, glm::dvec2(3.0, -1.0) + half);
+  EXPECT_DOUBLE_EQ(one.excess, 1.0);
 
-TEST(TouchRegion, OfAMapWithoutAnObjectIsTheWholeMaps) {
+  const std::vector<Hypothesis> apart{bar_at(-50.0, 0.0), bar_at(50.0, 0.0)};
+  const TouchRegion both = touch_region(apart, 7.0);
+  expect_region(both.lattice, glm::dvec2(-50.0, 0.0) - half, glm::dvec2(50.0, 0.0) + half);
+  EXPECT_DOUBLE_EQ(both.excess, (100.0 + 16.5) / 16.5);
+  EXPECT_DOUBLE_EQ(touch_region(letters(), 7.0).excess, 1.0) << "about one origin";
+
   Hypothesis empty = bar_at(0.0, 0.0);
   std::ranges::fill(empty.map.log_odds, -1.0F);
-  const PoseLattice region = touch_region(std::span(&empty, 1), 0.0).lattice;
-  EXPECT_DOUBLE_EQ(region.x_mm.lower, -10.25);
-  EXPECT_DOUBLE_EQ(region.y_mm.upper, 8.25);
-}
-
-TEST(TouchRegion, TellsHowFarApartTheObjectsLie) {
-  const std::vector<Hypothesis> apart{bar_at(-50.0, 0.0), bar_at(50.0, 0.0)};
-  const TouchRegion region = touch_region(apart, 7.0);
-  EXPECT_DOUBLE_EQ(region.lattice.x_mm.lower, -50.0 - 1.25 - 7.0);
-  EXPECT_DOUBLE_EQ(region.lattice.x_mm.upper, 50.0 + 1.25 + 7.0);
-  EXPECT_DOUBLE_EQ(region.excess, (100.0 + 16.5) / 16.5);
-  EXPECT_DOUBLE_EQ(touch_region(letters(), 7.0).excess, 1.0) << "about one origin";
+  expect_region(touch_region(std::span(&empty, 1), 0.0).lattice, {-10.25, -8.25}, {10.25, 8.25});
 }
 
 TEST(TouchRegion, RefusesAnArrayThatCannotBe) {

@@ -7,10 +7,9 @@
 #include <gtest/gtest.h>
 #include <glm/geometric.hpp>
 
+#include "beliefs.hpp"
 #include "model/displacement_points.hpp"
 #include "palpate/error.hpp"
-#include "palpate/pose_histogram.hpp"
-#include "support/synthetic.hpp"
 
 namespace palpate::expected_gain_test {
 
@@ -18,12 +17,6 @@ namespace palpate::expected_gain_test {
 const std::vector<glm::dvec2> elements{{-2.0, -1.0}, {0.0, -1.2}, {2.1, -1.0},
                                        {-1.9, 1.0},  {0.3, 1.0},  {2.0, 1.1}};
 const ContactModel contact{.prior = 0.2};
-
-std::vector<Hypothesis> three_objects() {
-  return {{random_map(31, 27, 0.5, 4.0, 81)},
-          {random_map(25, 25, 0.5, 4.0, 82)},
-          {random_map(14, 15, 1.0, 4.0, 83)}};
-}
 
 std::vector<OccupancyGrid> maps_of(std::span<const Hypothesis> objects) {
   std::vector<OccupancyGrid> maps;
@@ -73,32 +66,48 @@ Estimated estimated(const std::vector<double>& values) {
   return {mean, std::sqrt(squares / (n - 1.0) / n)};
 }
 
+/// What a gain is on average over so many seeds, and says of its own errors.
+struct AverageGain {
+  Estimated identity;
+  Estimated both;
+  TouchGain::StandardError stated;
+};
+template <class GainOfSeed>
+AverageGain average(int seeds, const GainOfSeed& gain_of) {
+  std::vector<double> identity;
+  std::vector<double> both;
+  AverageGain average;
+  for (int seed = 0; seed < seeds; ++seed) {
+    const TouchGain gain = gain_of(static_cast<std::uint64_t>(seed));
+    identity.push_back(gain.identity);
+    both.push_back(gain.both());
+    average.stated.identity += gain.standard_error.identity / seeds;
+    average.stated.both += gain.standard_error.both / seeds;
+  }
+  average.identity = estimated(identity);
+  average.both = estimated(both);
+  return average;
+}
+
 TEST(ExpectedGain, IsTheMutualInformationOfItsSamples) {
   const std::vector<Hypothesis> objects = three_objects();
   const ReadingPredictor predictor(objects, contact);
   const std::vector<PoseSample> samples = random_samples(40);
-  const std::vector<Pose> candidates{{{1.0, 0.5}, 0.4}, {{-2.0, 3.0}, 2.0}};
   for (const auto& label_of : {std::vector<std::size_t>{}, std::vector<std::size_t>{0, 1, 0}}) {
-    for (const Pose& candidate : candidates) {
-      std::vector<double> identity;
-      std::vector<double> both;
-      for (std::uint64_t seed = 0; seed < 300; ++seed) {
-        const TouchGain gain = expected_gain(predictor, samples, std::span(&candidate, 1), elements,
-                                             {}, {.seed = seed, .label_of = label_of})
-                                   .front();
-        identity.push_back(gain.identity);
-        both.push_back(gain.both());
-      }
+    for (const Pose& candidate : {Pose{{1.0, 0.5}, 0.4}, Pose{{-2.0, 3.0}, 2.0}}) {
+      const AverageGain gain = average(300, [&](std::uint64_t seed) {
+        return expected_gain(predictor, samples, std::span(&candidate, 1), elements, {},
+                             {.seed = seed, .label_of = label_of})
+            .front();
+      });
       const reference::Gain exact = exact_gain(samples, objects, label_of, candidate);
       EXPECT_GT(exact.identity, 0.03);
       EXPECT_GT(exact.both, exact.identity + 0.1);
       // Four standard errors, and what the predictor's tables are off by.
-      const Estimated by_identity = estimated(identity);
-      EXPECT_NEAR(by_identity.mean, exact.identity, 4.0 * by_identity.error + 1e-3);
-      EXPECT_LT(by_identity.error, 0.01) << "or the test would see nothing";
-      const Estimated by_both = estimated(both);
-      EXPECT_NEAR(by_both.mean, exact.both, 4.0 * by_both.error + 1e-3);
-      EXPECT_LT(by_both.error, 0.015);
+      EXPECT_NEAR(gain.identity.mean, exact.identity, 4.0 * gain.identity.error + 1e-3);
+      EXPECT_LT(gain.identity.error, 0.01) << "or the test would see nothing";
+      EXPECT_NEAR(gain.both.mean, exact.both, 4.0 * gain.both.error + 1e-3);
+      EXPECT_LT(gain.both.error, 0.015);
     }
   }
 }
@@ -112,66 +121,55 @@ TEST(ExpectedGain, AveragesOverWhereTheSensorMayHaveBeen) {
   const std::vector<PoseSample> samples = random_samples(40);
   const Pose candidate{{1.0, 0.5}, 0.4};
   const DisplacementSd touch_sd{.mm = 1.0, .rad = 0.1};
-  std::vector<double> both;
-  for (std::uint64_t seed = 0; seed < 300; ++seed) {
-    both.push_back(expected_gain(predictor, samples, std::span(&candidate, 1), elements, touch_sd,
-                                 {.seed = seed})
-                       .front()
-                       .both());
-  }
+  const AverageGain gain = average(300, [&](std::uint64_t seed) {
+    return expected_gain(predictor, samples, std::span(&candidate, 1), elements, touch_sd,
+                         {.seed = seed})
+        .front();
+  });
   const double exact = exact_gain(samples, objects, {}, candidate, touch_sd).both;
   EXPECT_LT(exact, exact_gain(samples, objects, {}, candidate).both - 0.1);
   // Six displacements stand for all: they tell a little more than all would.
-  EXPECT_NEAR(estimated(both).mean, exact, 0.08);
+  EXPECT_NEAR(gain.both.mean, exact, 0.08);
 }
 
 /// A lattice of four places in a row, known up to 1 mm, after one touch.
-struct Touched {
-  Touched() {
-    options.lattice = {.x_mm = {-2.0, 2.0, 4}, .y_mm = {0.5, 0.5, 1}, .theta_rad = {0.3, 0.3, 1}};
-    options.contact = contact;
-    histogram.emplace(device, objects, options);
-    histogram->update(random_recording(1, 9, 85).touch(0));
+class TouchedGain : public testing::Test {
+ protected:
+  TouchedGain() { histogram.update(random_recording(1, 9, 85).touch(0)); }
+
+  TouchGain gain_of(const Pose& candidate, const PlanOptions& plan,
+                    std::span<const glm::dvec2> array = elements) const {
+    return histogram.expected_gain(std::span(&candidate, 1), array, plan).front();
   }
+
+  const Pose candidate{{1.0, 0.5}, 0.4};
+  const PoseLattice lattice{
+      .x_mm = {-2.0, 2.0, 4}, .y_mm = {0.5, 0.5, 1}, .theta_rad = {0.3, 0.3, 1}};
+  const std::vector<Hypothesis> objects = three_objects();
   Device device = Device::open();
-  std::vector<Hypothesis> objects = three_objects();
-  HistogramOptions options;
-  std::optional<PoseHistogram> histogram;
+  PoseHistogram histogram{device, objects, {.lattice = lattice, .contact = contact}};
 };
 
-TEST(ExpectedGain, OfAHistogramIsThatOfItsBins) {
-  const Touched touched;
+TEST_F(TouchedGain, OfAHistogramIsThatOfItsBins) {
   // The belief is uniform within a bin: eight places of each stand for all.
   std::vector<reference::BeliefSample> belief;
-  const std::vector<double> identity = touched.histogram->estimate().identity;
   for (std::size_t object = 0; object < 3; ++object) {
-    const Marginals marginals = touched.histogram->marginals(static_cast<int>(object));
-    for (int bin = 0; bin < 4; ++bin) {
-      for (int part = 0; part < 8; ++part) {
-        const double x = touched.options.lattice.x_mm.centre(bin) + (part - 3.5) / 8.0;
-        belief.push_back({.object = object,
-                          .label = object,
-                          .T_object_robot = touched.options.lattice.T_object_robot(x, 0.5, 0.3),
-                          .probability = marginals.xy[bin] / 8.0});
-      }
+    const Marginals marginals = histogram.marginals(static_cast<int>(object));
+    for (int part = 0; part < 4 * 8; ++part) {
+      const double x = lattice.x_mm.centre(part / 8) + (part % 8 - 3.5) / 8.0;
+      belief.push_back({.object = object,
+                        .label = object,
+                        .T_object_robot = lattice.T_object_robot(x, 0.5, 0.3),
+                        .probability = marginals.xy[part / 8] / 8.0});
     }
   }
-  const Pose candidate{{1.0, 0.5}, 0.4};
-  const reference::Gain exact = reference::expected_gain(
-      belief, maps_of(touched.objects), candidate, elements, contact, std::array{Pose{}});
-  std::vector<double> by_identity;
-  std::vector<double> both;
-  for (std::uint64_t seed = 0; seed < 40; ++seed) {
-    const TouchGain gain =
-        touched.histogram
-            ->expected_gain(std::span(&candidate, 1), elements, {.samples = 512, .seed = seed})
-            .front();
-    by_identity.push_back(gain.identity);
-    both.push_back(gain.both());
-  }
+  const reference::Gain exact = reference::expected_gain(belief, maps_of(objects), candidate,
+                                                         elements, contact, std::array{Pose{}});
+  const AverageGain gain = average(
+      40, [&](std::uint64_t seed) { return gain_of(candidate, {.samples = 512, .seed = seed}); });
   // Finite samples tell on average (samples per bin, 8 readings that matter) some 0.01 more.
-  EXPECT_NEAR(estimated(by_identity).mean, exact.identity, 0.02);
-  EXPECT_NEAR(estimated(both).mean, exact.both, 0.02);
+  EXPECT_NEAR(gain.identity.mean, exact.identity, 0.02);
+  EXPECT_NEAR(gain.both.mean, exact.both, 0.02);
   EXPECT_GT(exact.both, 0.2);
 }
 
@@ -198,51 +196,36 @@ TEST(ExpectedGain, IsNeverBelowZero) {
   }
 }
 
-TEST(ExpectedGain, KnowsItsErrorAboutALongRun) {
-  const Touched touched;
+TEST_F(TouchedGain, KnowsItsErrorAboutALongRun) {
   const std::vector<glm::dvec2> array = digitacts_array();
-  for (const Pose& candidate : {Pose{{1.0, 0.5}, 0.4}, Pose{{7.0, -3.0}, 2.0}}) {
-    const auto gain = [&](std::size_t samples, std::uint64_t seed) {
-      return touched.histogram
-          ->expected_gain(std::span(&candidate, 1), array, {.samples = samples, .seed = seed})
-          .front();
-    };
-    const TouchGain long_run = gain(2048, 1000);
-    std::vector<double> identity;
-    std::vector<double> both;
-    TouchGain::StandardError stated;
+  for (const Pose& pose : {candidate, Pose{{7.0, -3.0}, 2.0}}) {
+    const TouchGain long_run = gain_of(pose, {.samples = 2048, .seed = 1000}, array);
     constexpr int seeds = 60;
-    for (int seed = 0; seed < seeds; ++seed) {
-      const TouchGain one = gain(96, static_cast<std::uint64_t>(seed));
-      identity.push_back(one.identity);
-      both.push_back(one.both());
-      stated.identity += one.standard_error.identity / seeds;
-      stated.both += one.standard_error.both / seeds;
-    }
+    const AverageGain gain = average(seeds, [&](std::uint64_t seed) {
+      return gain_of(pose, {.samples = 96, .seed = seed}, array);
+    });
     // A fourteenth of a bin's poses lies in a sample: gains come out too small.
-    EXPECT_NEAR(estimated(identity).mean, long_run.identity, 0.03);
-    EXPECT_NEAR(estimated(both).mean, long_run.both(), 0.15);
+    EXPECT_NEAR(gain.identity.mean, long_run.identity, 0.03);
+    EXPECT_NEAR(gain.both.mean, long_run.both(), 0.15);
     // Drawn samples err a little more than simulated readings show.
-    const double root = std::sqrt(static_cast<double>(seeds));
-    const double of_identity = root * estimated(identity).error;
-    const double of_both = root * estimated(both).error;
-    EXPECT_GT(stated.identity, 0.5 * of_identity);
-    EXPECT_LT(stated.identity, 2.0 * of_identity);
-    EXPECT_GT(stated.both, 0.5 * of_both);
-    EXPECT_LT(stated.both, 2.0 * of_both);
+    const auto expect_like = [](double stated, const Estimated& of) {
+      const double deviation = std::sqrt(static_cast<double>(seeds)) * of.error;
+      EXPECT_GT(stated, 0.5 * deviation);
+      EXPECT_LT(stated, 2.0 * deviation);
+    };
+    expect_like(gain.stated.identity, gain.identity);
+    expect_like(gain.stated.both, gain.both);
   }
 }
 
-TEST(ExpectedGain, IsReproducibleAndTheSameAmongOtherCandidates) {
-  const Touched touched;
+TEST_F(TouchedGain, IsReproducibleAndTheSameAmongOtherCandidates) {
   std::vector<Pose> candidates;
   for (int i = 0; i < 40; ++i) {
     candidates.push_back({{0.2 * i - 4.0, 0.1 * i}, 0.3 * i});
   }
   const auto gains = [&](std::span<const Pose> poses, std::uint64_t seed) {
     std::vector<double> values;
-    for (const TouchGain& gain :
-         touched.histogram->expected_gain(poses, elements, {.seed = seed})) {
+    for (const TouchGain& gain : histogram.expected_gain(poses, elements, {.seed = seed})) {
       values.push_back(gain.identity);
       values.push_back(gain.pose);
     }
@@ -251,31 +234,7 @@ TEST(ExpectedGain, IsReproducibleAndTheSameAmongOtherCandidates) {
   const std::vector<double> all = gains(candidates, 5);
   EXPECT_EQ(gains(candidates, 5), all);
   EXPECT_NE(gains(candidates, 6), all);
-  const std::vector<double> one = gains(std::span(candidates).subspan(17, 1), 5);
-  EXPECT_EQ(one[0], all[34]);
-  EXPECT_EQ(one[1], all[35]);
-}
-
-TEST(ExpectedGain, IsNothingWhereNoObjectCanBe) {
-  const Touched touched;
-  const Pose far{{500.0, -500.0}, 0.0};
-  const TouchGain gain = touched.histogram->expected_gain(std::span(&far, 1), elements).front();
-  // Every sample predicts the prior everywhere; sums of floats are equal or off by an ulp.
-  EXPECT_NEAR(gain.identity, 0.0, 1e-5);
-  EXPECT_NEAR(gain.pose, 0.0, 1e-5);
-}
-
-TEST(ExpectedGain, ObjectsOfOneLabelAreNotToldApart) {
-  const Touched touched;
-  const Pose candidate{{1.0, 0.5}, 0.4};
-  const auto gain = [&](const std::vector<std::size_t>& label_of) {
-    return touched.histogram
-        ->expected_gain(std::span(&candidate, 1), elements, {.label_of = label_of})
-        .front();
-  };
-  EXPECT_NEAR(gain({7, 7, 7}).identity, 0.0, 1e-12);
-  EXPECT_GT(gain({}).identity, 0.01);
-  EXPECT_NEAR(gain({7, 7, 7}).both(), gain({}).both(), 0.2) << "other readings, one information";
+  EXPECT_EQ(gains(std::span(candidates).subspan(17, 1), 5), (std::vector{all[34], all[35]}));
 }
 
 TEST(ExpectedGain, SlipMovesObjectsAboutTheirMiddle) {
@@ -298,9 +257,7 @@ TEST(ExpectedGain, SlipMovesObjectsAboutTheirMiddle) {
   EXPECT_NEAR(turns / 4000.0, 0.01, 0.08 * 0.01);
 }
 
-TEST(ExpectedGain, RefusesWhatItCannotRank) {
-  const Touched touched;
-  const PoseHistogram& histogram = *touched.histogram;
+TEST_F(TouchedGain, IsRefusedOfWhatCannotBeRanked) {
   const std::vector<Pose> one(1);
   const std::vector<Pose> unknown{Pose{}, unknown_pose};
   const std::vector<glm::dvec2> nan{{0.0, std::nan("")}};

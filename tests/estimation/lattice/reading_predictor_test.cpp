@@ -11,7 +11,9 @@
 namespace palpate::reading_predictor_test {
 
 /// Largest difference in nats from the normalised log-likelihoods, over random poses.
-double largest_error(std::span<const Hypothesis> objects, const ContactModel& contact) {
+double largest_error(const ContactModel& contact) {
+  const std::vector<Hypothesis> objects{{random_map(31, 27, 0.5, 6.0, 81)},
+                                        {random_map(14, 15, 1.0, 6.0, 83)}};
   const ReadingPredictor predictor(objects, contact);
   const std::vector<glm::dvec2> elements = digitacts_array();
   const std::size_t levels = predictor.levels();
@@ -44,17 +46,13 @@ double largest_error(std::span<const Hypothesis> objects, const ContactModel& co
 }
 
 TEST(ReadingPredictor, AgreesWithTheContactModel) {
-  const std::vector<Hypothesis> objects{{random_map(31, 27, 0.5, 6.0, 81)},
-                                        {random_map(14, 15, 1.0, 6.0, 83)}};
   for (const double gamma : {0.0, 0.1, 0.9}) {
     // Straight lines between the table's nodes, and places in float32 of a cell.
-    EXPECT_LT(largest_error(objects, {.gamma = gamma, .prior = 0.2}), 2e-4) << gamma;
+    EXPECT_LT(largest_error({.gamma = gamma, .prior = 0.2}), 2e-4) << gamma;
   }
 }
 
 TEST(ReadingPredictor, KnowsTheLevelsOfATableAndItsObjects) {
-  const std::vector<Hypothesis> objects{{random_map(31, 27, 0.5, 6.0, 81)},
-                                        {random_map(14, 15, 1.0, 6.0, 83)}};
   // Nodes one nat apart are nodes of the predictor's table too.
   LikelihoodTable table{.first_log_odds = -8.0,
                         .last_log_odds = 8.0,
@@ -67,7 +65,7 @@ TEST(ReadingPredictor, KnowsTheLevelsOfATableAndItsObjects) {
   }
   // Levels' slopes differ by up to 8, so the curvature of their log-sum is at most 16: times the
   // square of a step of 1/32 nats, over 8.
-  EXPECT_LT(largest_error(objects, {.prior = 0.2, .table = table}), 2e-3);
+  EXPECT_LT(largest_error({.prior = 0.2, .table = table}), 2e-3);
 }
 
 }  // namespace palpate::reading_predictor_test

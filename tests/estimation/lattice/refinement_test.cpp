@@ -1,349 +1,366 @@
+// The refined pose and its covariance, of known beliefs and of real ones.
+
+#include "estimation/lattice/refinement.hpp"
+
+#include <algorithm>
+#include <array>
 #include <cmath>
-#include <functional>
-#include <numbers>
-#include <numeric>
 #include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 
-#include "estimation/lattice/refinement.hpp"
 #include "palpate/error.hpp"
-#include "palpate/pose_error.hpp"
 #include "palpate/pose_histogram.hpp"
-#include "palpate/simulation.hpp"
-#include "plain_refinement.hpp"
+#include "support/limits.hpp"
 #include "support/synthetic.hpp"
+#include "support/touched_shape.hpp"
 
 namespace palpate::refinement_test {
 
-/// `lever_mm` is how far from the robot's origin, where a turn shows, the poses are compared.
-void expect_near(const RefinedPose& a, const RefinedPose& b, double lever_mm = 0.0) {
-  // Logs that are 1e-4 nats off per touch move a mean within 2.5 mm by at most some 1e-3 mm.
-  const double tolerance_mm = 1e-3 * (1.0 + lever_mm);
-  EXPECT_NEAR(a.T_object_robot.translation_mm.x, b.T_object_robot.translation_mm.x, tolerance_mm);
-  EXPECT_NEAR(a.T_object_robot.translation_mm.y, b.T_object_robot.translation_mm.y, tolerance_mm);
-  EXPECT_NEAR(wrap_angle(a.T_object_robot.theta_rad - b.T_object_robot.theta_rad, two_pi), 0.0,
-              1e-3);
-  for (int i = 0; i < 9; ++i) {
-    const double larger = std::max(a.covariance[4 * (i / 3)], a.covariance[4 * (i % 3)]);
-    EXPECT_NEAR(a.covariance[i], b.covariance[i], 1e-3 * larger + 1e-9) << "entry " << i;
-  }
-}
-
-/// Boxes of one object's bins, as a belief gives them.
-std::vector<double> bins_of(const std::vector<double>& logs, const PoseLattice& lattice,
-                            std::span<const BinBox> boxes) {
-  std::vector<double> values;
-  for (const BinBox& box : boxes) {
-    for (std::int64_t i = 0; i < box.bins(); ++i) {
-      values.push_back(logs[static_cast<std::size_t>(box.bin(i, lattice))]);
-    }
-  }
-  return values;
-}
-
-struct Region {
-  const char* name;
-  PoseLattice lattice;
-
-  friend void PrintTo(const Region& region, std::ostream* out) { *out << region.name; }
+/// The refined pose around a bin: x_mm, y_mm, theta_rad, and its covariance xx, yy, tt, xy, xt, yt.
+struct Golden {
+  std::int64_t bin;
+  std::array<double, 9> numbers;
 };
 
-class Refinement : public testing::TestWithParam<Region> {};
+/// A belief after touches of the letter L, or where there are none, after two of no object in
+/// particular. Its refined poses are golden values, from another implementation that looked at
+/// every bin of the lattice in float64.
+struct Belief {
+  const char* name;
+  PoseLattice lattice;
+  std::vector<Golden> golden;
+  std::size_t letter_touches = 0;
 
-TEST_P(Refinement, IsThePlainPeakAndCovarianceOfTheReferencesBelief) {
-  const PoseLattice& lattice = GetParam().lattice;
-  const Hypothesis object{random_map(21, 17, 0.5, 4.0, 131), 1.0};
-  Recording recording = random_recording(2, 36, 132);
+  friend void PrintTo(const Belief& belief, std::ostream* out) { *out << belief.name; }
+};
+
+const std::vector<Belief> beliefs{
+    {"FullCircle",
+     {{-4, 4, 19}, {-4, 4, 18}, {0, two_pi, 41}, {}},
+     {{5909, {-2.2278, -1.3417, 2.7045, 2.1435, 0.62991, 0.037912, 0.13116, 0.091105, -0.098495}},
+      {4674, {-2.1251, 1.5088, 2.069, 1.7996, 1.9638, 0.064596, 0.48476, -0.18018, -0.19417}},
+      {14021, {2.1439, 1.6813, 6.2078, 0.68267, 1.1959, 0.076529, -0.65748, -0.11253, 0.11703}},
+      {0, {-2.1255, -1.6637, 0.079762, 0.85941, 1.4006, 0.072047, 0.31306, 0.10824, -0.078496}},
+      {7011, {-2.1057, 0.18037, 3.1564, 0.99869, 0.77921, 0.090968, 0.20816, 0.068353, -0.07134}},
+      {9348, {-1.7947, -1.1387, 4.2215, 0.88059, 0.59082, 0.10043, -0.085238, 0.06949, -0.12308}}}},
+    {"CircleFromElsewhere",
+     {{-4, 4, 19}, {-4, 4, 18}, {-2, two_pi - 2, 40}, {}},
+     {{4627,
+       {0.68732, -0.086009, 0.18986, 0.42561, 0.8943, 0.10869, -0.0062022, -0.0089237, 0.21785}},
+      {9120, {-2.1276, 1.5092, 2.1517, 2.0307, 2.8322, 0.070092, 1.7007, -0.25987, -0.36576}},
+      {0, {-1.7952, -1.9965, -1.9284, 0.83183, 0.59194, 0.071969, 0.24744, 0.063538, -0.079986}},
+      {13679, {2.1917, 1.6049, 4.1869, 0.60242, 1.1924, 0.10279, 0.065748, 0.053598, 0.25229}},
+      {4560, {-2.1065, -0.944, 0.12973, 2.2801, 0.66596, 0.060595, -0.048903, 0.20293, -0.071631}},
+      {6840, {-2.1633, -2.0177, 1.2292, 1.1773, 0.89317, 0.066308, -0.24932, 0.045715, -0.13151}}}},
+    {"PartOfTheCircle",
+     {{-4, 4, 19}, {-3, 5, 18}, {0.3, 2.3, 14}, {}},
+     {{4694, {-1.2868, 2.8327, 1.8811, 3.4016, 0.28243, 0.094027, -0.28081, -0.51141, 0.017427}},
+      {3192, {-2.1671, -0.13474, 1.6522, 1.3274, 1.5688, 0.11142, 0.53355, 0.028597, -0.18467}},
+      {0, {-1.7269, -1.1258, 0.71667, 1.6182, 1.0439, 0.037627, 0.43842, -0.02094, -0.075751}},
+      {4787, {1.9999, 2.6603, 1.9013, 2.3881, 0.34028, 0.052628, -0.27398, -0.28757, 0.065866}},
+      {1596, {-1.8789, 2.4033, 0.79016, 0.82033, 2.4128, 0.048902, -0.7418, -0.063022, -0.12103}},
+      {2394, {-2.1872, -1.0959, 1.3556, 1.4613, 1.1838, 0.072992, 0.043748, 0.04414, -0.1804}}}},
+    {"CoarserThanTheWindow",
+     {{-15, 15, 5}, {-16, 16, 4}, {0, two_pi, 3}, {}},
+     {{11, {-5.8206, 3.797, 1.0082, 9.8441, 17.577, 2.0748, 0.52121, -1.997, -2.8242}},
+      {59, {5.8022, 3.9928, 5.2372, 28.539, 13.097, 0.93052, -1.9119, -0.15073, 0.10069}},
+      {0, {-5.7375, -3.0869, 0.9921, 9.6504, 46.762, 2.0903, 5.5336, -1.9533, -2.9271}},
+      {20, {-5.7375, -3.0869, 3.0926, 9.6504, 46.762, 3.8529, 5.5336, 2.3587, -5.4413}},
+      {30, {-5.8206, 3.797, 3.0937, 9.8441, 17.577, 3.873, 0.52121, 2.2819, -0.0045449}},
+      {40, {-5.7375, -3.0869, 5.3401, 9.6504, 46.762, 3.673, 5.5336, -0.40537, 8.3684}}}},
+    {"TwoAngles",
+     {{-4, 4, 11}, {-4, 4, 12}, {0, two_pi, 2}, {}},
+     {{169, {-0.71092, -1.4987, 5.2801, 0.40694, 0.86715, 1.4196, 0.26054, -0.011569, -0.12932}},
+      {88, {-1.9714, 1.6019, 2.1222, 1.6483, 0.85684, 1.2745, -0.48975, -0.50469, 0.22804}},
+      {0, {-2.0456, -2.0715, 2.3798, 0.64116, 0.639, 3.4843, 0.23287, 0.16369, 0.14858}},
+      {263, {2.0278, 1.9675, 5.5058, 1.049, 0.92303, 3.7566, 0.11419, -0.060962, 0.37364}},
+      {132, {-1.9563, -2.1226, 5.3634, 1.4355, 0.27695, 1.5748, 0.51353, -0.7875, -0.38326}},
+      {176, {-1.9243, -1.0265, 5.2188, 1.3848, 0.62882, 1.1464, -0.51591, -0.5451, 0.24782}}}},
+    {"PivotFarAway",
+     {{-4, 4, 19}, {-4, 4, 18}, {0, two_pi, 41}, {300, -200}},
+     {{4674, {-34.45, -357.59, 2.069, 8202.4, 82.014, 0.064596, -813.25, 23.017, -2.2822}}}},
+    {"ObjectFarFromThePivot",
+     {{26, 34, 19}, {-4, 4, 18}, {0, two_pi, 41}, {}},
+     {{0, {27.6915, -0.015326, 0.2378, 0.92713, 4.6406, 0.013367, 0.042055, 0.0016112, 0.18038}},
+      {14021,
+       {32.1895, 0.035842, 6.0632, 0.96045, 4.581, 0.011859, -0.076061, -0.0029141, 0.15916}}}},
+    {"FixedX",
+     {{0.7, 0.7, 1}, {-4, 4, 18}, {0, two_pi, 41}, {}},
+     {{689, {0.7, -1.2012, 6.0301, 0, 0.47658, 0.028991, 0, 0, 0.055517}},
+      {246, {0.7, 1.5227, 2.0476, 0, 1.7256, 0.038408, 0, 0, -0.017792}},
+      {0, {0.7, -1.242, 0.060931, 0, 0.34493, 0.15933, 0, 0, 0.11628}},
+      {737, {0.7, 1.5294, 6.1988, 0, 1.6989, 0.042328, 0, 0, -0.13966}},
+      {369, {0.7, 0.18039, 3.1033, 0, 0.4094, 0.077599, 0, 0, -0.058031}},
+      {492, {0.7, -1.0065, 4.2237, 0, 0.16046, 0.045122, 0, 0, -0.0057212}}}},
+    {"FixedAngle",
+     {{-4, 4, 19}, {-4, 4, 18}, {0.4, 0.4, 1}, {5, 6}},
+     {{199, {-2.0393, -7.1691, 0.4, 0.61567, 0.50775, 0, -0.20169, 0, 0}},
+      {341, {-0.13071, -5.4178, 0.4, 1.6312, 1.2692, 0, 1.1094, 0, 0}},
+      {0, {-4.3397, -9.1728, 0.4, 1.1014, 1.0979, 0, 0.39774, 0, 0}},
+      {114, {-4.0024, -7.8896, 0.4, 1.4561, 0.99076, 0, 0.46336, 0, 0}},
+      {171, {-4.3156, -7.1779, 0.4, 2.4079, 0.60049, 0, 0.9464, 0, 0}},
+      {228, {-4.3812, -6.0094, 0.4, 2.5643, 0.48069, 0, -0.5942, 0, 0}}}},
+    {"OneBinOfEachAxis",
+     {{-1, 1, 1}, {-2, 2, 1}, {0, two_pi, 1}, {3, 4}},
+     {{0, {3, 4, 3.1416, 52.971, 30.942, 3.2899, -39.478, -13.159, 9.8696}}}},
+    {"APoint",
+     {{1, 1, 1}, {2, 2, 1}, {3, 3, 1}, {3, 4}},
+     {{0, {4.5345, 5.5366, 3, 0, 0, 0, 0, 0, 0}}}},
+    {"SharpOnCoarseBins",
+     {{-5.4, 5.4, 7}, {-5.4, 5.4, 7}, {0, two_pi, 28}, {}},
+     {{171,
+       {0.22504, -0.064129, 0.78043, 0.002711, 0.0058157, 0.00012015, -0.0002678, -4.2623e-05,
+        6.7848e-05}},
+      {457,
+       {0.032557, -1.5733, 1.4831, 0.19943, 0.19929, 0.0047968, -0.00099114, 0.00079781,
+        -0.00074603}},
+      {686, {-4.6286, -0.01221, 3.6928, 0.19837, 0.19852, 0.0042914, 0, 0, 0.00011906}}},
+     50},
+    {"SharpOnFineBins",
+     {{-1.5, 1.5, 15}, {-1.5, 1.5, 15}, {0.4, 1.2, 20}, {1, 2}},
+     {{2123,
+       {1.0035, -2.2701, 0.79652, 0.0028774, 0.0048846, 0.00012763, 0.00011718, 0.00034121,
+        0.00010385}}},
+     50},
+    {"BroadOnFineBins",
+     {{-3, 3, 24}, {-3, 3, 24}, {0, two_pi, 60}, {}},
+     {{4285,
+       {0.37895, -0.19105, 0.81074, 0.042205, 0.046606, 0.0025059, -0.0018868, -0.0042153,
+        -0.00058629}},
+      {11520,
+       {-0.50161, -1.6937, 1.7575, 0.061476, 0.047802, 0.054753, -0.0097242, -0.026524, 0.00982}},
+      {17280, {-2.0342, -2.052, 3.1381, 0.54251, 0.67451, 0.13333, 0.54509, 0.23723, 0.29438}}},
+     3}};
+
+/// Expects a refined pose within a tolerance in mm and rad.
+void expect_near(const RefinedPose& refined, const Golden& golden, double tolerance,
+                 double lever_mm) {
+  const auto& [translation_mm, theta_rad] = refined.T_object_robot;
+  const std::array<double, 9>& expected = golden.numbers;
+  EXPECT_NEAR(translation_mm.x, expected[0], tolerance * (1.0 + lever_mm));
+  EXPECT_NEAR(translation_mm.y, expected[1], tolerance * (1.0 + lever_mm));
+  EXPECT_NEAR(wrap_angle(theta_rad - expected[2], two_pi), 0.0, tolerance);
+  constexpr std::pair<int, int> entries[] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}};
+  for (std::size_t i = 0; i < 6; ++i) {
+    const auto [row, column] = entries[i];
+    const double entry = refined.covariance[3 * row + column];
+    EXPECT_NEAR(entry, expected[3 + i],
+                tolerance * std::max(expected[3 + row], expected[3 + column]))
+        << row << column;
+    EXPECT_EQ(entry, refined.covariance[3 * column + row]) << "not symmetric";
+  }
+}
+
+class Refinement : public testing::TestWithParam<Belief> {};
+
+TEST_P(Refinement, HasTheGoldenPosesAndCovariances) {
+  const auto& [name, lattice, golden, letter_touches] = GetParam();
+  const bool letter = letter_touches > 0;
+  const Hypothesis object{letter ? map_of(on_letter_l, "L") : random_map(21, 17, 0.5, 4.0, 131)};
   // About the pivot, or else nothing of the object is touched.
-  recording = moved(recording, {lattice.pivot_mm, 0.0});
+  const Recording recording =
+      moved(letter ? touches_of(on_letter_l, {{0.3, -0.2}, 0.8}, letter_touches, 7)
+                   : random_recording(2, 36, 132),
+            {lattice.pivot_mm, 0.0});
   Device device = Device::open();
   PoseHistogram histogram(device, std::span(&object, 1), {.lattice = lattice});
   histogram.update(all_touches(recording));
   const reference::Posterior expected =
       reference_posterior(std::span(&object, 1), {.lattice = lattice}, all_touches(recording));
-  // The reference's belief refines as the device's does.
-  const auto reference_boxes = [&](std::span<const BinBox> boxes) {
-    return bins_of(expected.log_likelihood[0], lattice, boxes);
+  const auto in_boxes = [&](std::span<const BinBox> boxes) {
+    std::vector<double> values;
+    for (const BinBox& box : boxes) {
+      for (std::int64_t i = 0; i < box.bins(); ++i) {
+        values.push_back(expected.log_likelihood[0][box.bin(i, lattice)]);
+      }
+    }
+    return values;
   };
-  Mode mode = histogram.estimate().mode;
-  const std::int64_t n = lattice.bins();
   const double lever_mm = std::hypot(lattice.pivot_mm.x, lattice.pivot_mm.y);
-  for (const std::int64_t bin :
-       {mode.bin.value(), std::int64_t{0}, n - 1, n / 3, n / 2, 2 * n / 3}) {
-    SCOPED_TRACE("bin " + std::to_string(bin));
-    mode.bin = bin;
-    const RefinedPose plain =
-        plain_refinement(expected.log_likelihood[0], lattice, object.map, bin);
-    expect_near(histogram.refine(mode), plain, lever_mm);
-    expect_near(refine(reference_boxes, lattice, displaced_body(object.map), mode), plain,
+  for (const Golden& one : golden) {
+    SCOPED_TRACE(one.bin);
+    expect_near(refine(in_boxes, lattice, displaced_body(object.map), {.bin = one.bin}), one, 2e-4,
                 lever_mm);
+    // Logs that are 1e-4 nats off per touch move a mean within 2.5 mm by at most some 1e-3 mm.
+    const RefinedPose on_device = histogram.refine({.bin = one.bin});
+    expect_near(on_device, one, 1e-3, lever_mm);
     const RefinedPose from_pose =
-        histogram.refine({.bin = {}, .T_object_robot = lattice.T_object_robot(bin)});
-    EXPECT_EQ(from_pose.T_object_robot.theta_rad, histogram.refine(mode).T_object_robot.theta_rad);
-    EXPECT_EQ(from_pose.covariance, histogram.refine(mode).covariance);
+        histogram.refine({.bin = {}, .T_object_robot = lattice.T_object_robot(one.bin)});
+    EXPECT_EQ(from_pose.T_object_robot.theta_rad, on_device.T_object_robot.theta_rad);
+    EXPECT_EQ(from_pose.covariance, on_device.covariance);
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    All, Refinement,
-    testing::Values(
-        Region{"FullCircle", {{-4, 4, 19}, {-4, 4, 18}, {0, two_pi, 41}, {}}},
-        Region{"CircleFromElsewhere", {{-4, 4, 19}, {-4, 4, 18}, {-2, two_pi - 2, 40}, {}}},
-        Region{"PartOfTheCircle", {{-4, 4, 19}, {-3, 5, 18}, {0.3, 2.3, 14}, {}}},
-        Region{"CoarserThanTheWindow", {{-15, 15, 5}, {-16, 16, 4}, {0, two_pi, 3}, {}}},
-        Region{"TwoAngles", {{-4, 4, 11}, {-4, 4, 12}, {0, two_pi, 2}, {}}},
-        Region{"PivotFarAway", {{-4, 4, 19}, {-4, 4, 18}, {0, two_pi, 41}, {300, -200}}},
-        Region{"ObjectFarFromThePivot", {{26, 34, 19}, {-4, 4, 18}, {0, two_pi, 41}, {}}},
-        Region{"FixedX", {{0.7, 0.7, 1}, {-4, 4, 18}, {0, two_pi, 41}, {}}},
-        Region{"FixedAngle", {{-4, 4, 19}, {-4, 4, 18}, {0.4, 0.4, 1}, {5, 6}}},
-        Region{"OneBinOfEachAxis", {{-1, 1, 1}, {-2, 2, 1}, {0, two_pi, 1}, {3, 4}}},
-        Region{"APoint", {{1, 1, 1}, {2, 2, 1}, {3, 3, 1}, {3, 4}}}),
-    [](const auto& test) { return std::string(test.param.name); });
+INSTANTIATE_TEST_SUITE_P(Beliefs, Refinement, testing::ValuesIn(beliefs),
+                         [](const auto& each) { return std::string(each.param.name); });
 
-TEST(RefinedPose, AFixedAxisHasNoVariance) {
-  const Hypothesis object{random_map(21, 17, 0.5, 4.0, 133), 1.0};
-  const Recording recording = random_recording(2, 36, 134);
-  Device device = Device::open();
-  PoseHistogram histogram(
-      device, std::span(&object, 1),
-      {.lattice = {.x_mm = {0.7, 0.7, 5}, .y_mm = {-4, 4, 18}, .theta_rad = {0.4, 0.4, 7}}});
-  histogram.update(all_touches(recording));
-  const RefinedPose refined = histogram.refine(histogram.estimate().mode);
-  EXPECT_EQ(refined.T_object_robot.translation_mm.x, 0.7);
-  EXPECT_EQ(refined.T_object_robot.theta_rad, 0.4);
-  for (const int entry : {0, 1, 2, 3, 5, 6, 7, 8}) {
-    EXPECT_EQ(refined.covariance[entry], 0.0) << entry;
-  }
-  EXPECT_GT(refined.covariance[4], 1e-3) << "a pose is no point, however few bins hold the belief";
-}
+constexpr double spin_mm = 8.0;  // a radian moves the object by so much
 
-TEST(RefinedPose, MovesWithTheRobotFrame) {
-  const Hypothesis object{random_map(21, 17, 0.5, 4.0, 135), 1.0};
-  const Recording recording = random_recording(2, 36, 136);
-  PoseLattice lattice{{-4, 4, 19}, {-4, 4, 18}, {0, two_pi, 41}, {1, 2}};
-  const Pose T_moved_robot{{130.0, -70.0}, 0.9};
-  PoseLattice moved_lattice = lattice;
-  moved_lattice.pivot_mm = T_moved_robot * lattice.pivot_mm;
-  moved_lattice.theta_rad.lower -= T_moved_robot.theta_rad;
-  moved_lattice.theta_rad.upper -= T_moved_robot.theta_rad;
-  Device device = Device::open();
-  const auto refined = [&](const PoseLattice& region, const Recording& touches) {
-    PoseHistogram histogram(device, std::span(&object, 1), {.lattice = region});
-    histogram.update(all_touches(touches));
-    return histogram.refine(histogram.estimate().mode);
+using LogBelief = std::function<double(const glm::dvec3&)>;
+
+/// Refines around the best bin of a belief over x, y and theta, which is evaluated where it is
+/// asked.
+RefinedPose refined(const PoseLattice& lattice, const glm::dvec2& centroid_mm,
+                    const LogBelief& log_belief) {
+  const auto at_bin = [&](std::int64_t bin) {
+    const Pose pose = lattice.T_object_robot(bin);
+    return log_belief({pose * lattice.pivot_mm, pose.theta_rad});
   };
-  const RefinedPose here = refined(lattice, recording);
-  const RefinedPose there = refined(moved_lattice, moved(recording, T_moved_robot));
-  RefinedPose expected{.T_object_robot = here.T_object_robot * inverse(T_moved_robot)};
-  // translation' = translation + R(theta) v, v the old origin as seen from the new frame, so
-  // d translation' / d theta = R(theta) turned by a quarter v.
-  const glm::dvec2 slope = rotate(here.T_object_robot.theta_rad + std::numbers::pi / 2.0,
-                                  inverse(T_moved_robot).translation_mm);
-  const double jacobian[3][3] = {{1, 0, slope.x}, {0, 1, slope.y}, {0, 0, 1}};
-  for (int a = 0; a < 3; ++a) {
-    for (int b = 0; b < 3; ++b) {
-      for (int k = 0; k < 9; ++k) {
-        expected.covariance[3 * a + b] +=
-            jacobian[a][k / 3] * here.covariance[k] * jacobian[b][k % 3];
+  const auto in_boxes = [&](std::span<const BinBox> boxes) {
+    std::vector<double> values;
+    for (const BinBox& box : boxes) {
+      for (std::int64_t i = 0; i < box.bins(); ++i) {
+        values.push_back(at_bin(box.bin(i, lattice)));
+      }
+    }
+    return values;
+  };
+  std::int64_t best = 0;
+  double most = at_bin(best);
+  for (std::int64_t bin = 1; bin < lattice.bins(); ++bin) {
+    if (const double here = at_bin(bin); here > most) {
+      best = bin;
+      most = here;
+    }
+  }
+  return refine(in_boxes, lattice, {.centroid_mm = centroid_mm, .inertia_mm2 = spin_mm * spin_mm},
+                {.bin = best});
+}
+
+/// Bins of 0.25 mm, and of as much for the object in theta.
+PoseLattice lattice_from(double theta_rad) {
+  return {.x_mm = {-4.0, 4.0, 32},
+          .y_mm = {-4.0, 4.0, 32},
+          .theta_rad = {theta_rad, theta_rad + two_pi, 201},
+          .pivot_mm = {}};
+}
+
+TEST(RefinedPose, OfAnExactQuadraticIsItsPeakAndItsCovarianceTheInverse) {
+  Uniform random(191);
+  for (int trial = 0; trial < 6; ++trial) {
+    const glm::dvec3 peak(random(-0.5, 0.5), random(-0.5, 0.5), random(0.0, two_pi));
+    // Standard deviations of 0.2 to 0.4 mm along axes that are turned against the lattice's.
+    glm::dmat3 root(1.0);
+    for (int i = 0; i < 3; ++i) {
+      for (int k = 0; k < 3; ++k) {
+        root[i][k] = i == k ? random(0.25, 0.4) : random(-0.1, 0.1);
+      }
+    }
+    const glm::dmat3 covariance_mm2 = root * glm::transpose(root);
+    const glm::dmat3 precision = glm::inverse(covariance_mm2);
+    for (const double from_rad : {0.0, -2.5}) {
+      const PoseLattice lattice = lattice_from(from_rad);
+      const RefinedPose pose = refined(lattice, glm::dvec2(peak), [&](const glm::dvec3& at) {
+        const glm::dvec3 d(glm::dvec2(at) - glm::dvec2(peak),
+                           spin_mm * wrap_angle(at.z - peak.z, two_pi));
+        return -0.5 * glm::dot(d, precision * d);
+      });
+      // A turn about the mean also swings the centroid, by the mean's error times the turn.
+      EXPECT_NEAR(pose.T_object_robot.translation_mm.x, peak.x, 1e-3);
+      EXPECT_NEAR(pose.T_object_robot.translation_mm.y, peak.y, 1e-3);
+      EXPECT_NEAR(spin_mm * wrap_angle(pose.T_object_robot.theta_rad - peak.z, two_pi), 0.0, 1e-3);
+      const glm::dvec3 scale(1.0, 1.0, spin_mm);
+      for (int i = 0; i < 3; ++i) {
+        for (int k = 0; k < 3; ++k) {
+          EXPECT_NEAR(pose.covariance[3 * i + k] * scale[i] * scale[k], covariance_mm2[i][k], 1e-3)
+              << i << ", " << k;
+        }
       }
     }
   }
-  expect_near(there, expected, 150.0);
 }
 
-TEST(RefinedPose, OfAUniformBeliefIsTheBinsOwnAndSoIsThatOfTies) {
-  const Hypothesis object{random_map(21, 21, 0.5, 4.0, 137), 1.0};
-  const PoseLattice lattice{{-8, 8, 33}, {-8, 8, 33}, {0, two_pi, 30}, {}};
-  Device device = Device::open();
-  const PoseHistogram histogram(device, std::span(&object, 1), {.lattice = lattice});
-  Mode mode{.bin = (7 * lattice.plane()) + 16 * 33 + 16};
-  // The window is symmetric only about the centroid's image, so ask for an angle alone.
-  const RefinedPose refined = histogram.refine(mode);
-  EXPECT_NEAR(refined.T_object_robot.theta_rad, lattice.T_object_robot(*mode.bin).theta_rad,
-              lattice.theta_rad.step() / 2);
-  for (const int variance : {0, 4}) {
-    // A ball of 2.5 mm: a fifth of the radius's square along each axis.
-    EXPECT_NEAR(refined.covariance[variance], 2.5 * 2.5 / 5.0, 0.3);
-  }
-  mode.bin = 0;
-  EXPECT_GT(histogram.refine(mode).T_object_robot.translation_mm.x, -8.0) << "within the region";
-}
-
-TEST(RefinedPose, OfATwoFoldSymmetricObjectKeepsToOneMode) {
-  // A bar of 12 x 3 mm about the origin.
-  OccupancyGrid bar{.label = "bar", .origin_mm = {-8, -8}, .nx = 33, .ny = 33, .log_odds = {}};
-  for (int j = 0; j < 33; ++j) {
-    for (int i = 0; i < 33; ++i) {
-      const bool on = std::abs(i - 16) <= 12 && std::abs(j - 16) <= 3;
-      bar.log_odds.push_back(on ? 4.0F : -4.0F);
+TEST(RefinedPose, OfAFullCircleLiesOnItWhereverItBegins) {
+  const double step = lattice_from(0.0).theta_rad.step();
+  for (int shift = -16; shift <= 16; ++shift) {
+    // A peak about the seam, steeper to one side, so that mean and peak may lie on two sides of it.
+    const double peak = 0.25 * shift * step;
+    for (const double side : {-1.0, 1.0}) {
+      const auto log_belief = [&](const glm::dvec3& at) {
+        const double turn_mm = spin_mm * wrap_angle(at.z - peak, two_pi);
+        const double sd_mm = side * turn_mm > 0.0 ? 0.15 : 0.6;
+        return -0.5 * (at.x * at.x + at.y * at.y) / 0.16 -
+               0.5 * turn_mm * turn_mm / (sd_mm * sd_mm);
+      };
+      // Both lattices have the same bins. One has its seam at the peak, the other opposite.
+      PoseLattice lattice = lattice_from(0.0);
+      lattice.x_mm = lattice.y_mm = {-1.0, 1.0, 8};
+      PoseLattice turned = lattice;
+      turned.theta_rad.lower -= 100 * step;
+      turned.theta_rad.upper -= 100 * step;
+      const double theta_rad = refined(lattice, {}, log_belief).T_object_robot.theta_rad;
+      const double other_rad = refined(turned, {}, log_belief).T_object_robot.theta_rad;
+      EXPECT_GE(theta_rad, lattice.theta_rad.lower) << shift;
+      EXPECT_LT(theta_rad, lattice.theta_rad.upper) << shift;
+      EXPECT_GE(other_rad, turned.theta_rad.lower) << shift;
+      EXPECT_LT(other_rad, turned.theta_rad.upper) << shift;
+      EXPECT_NEAR(wrap_angle(theta_rad - other_rad, two_pi), 0.0, 1e-6) << shift;
+      EXPECT_LT(spin_mm * std::abs(wrap_angle(theta_rad - peak, two_pi)), 1.0) << shift;
     }
   }
-  const Hypothesis object{bar, 1.0};
-  const Pose T_object_robot{{0.55, -0.35}, 1.03};
-  Recording recording;
-  recording.elements_mm = digitacts_array();
-  Uniform random(138);
-  for (int touch = 0; touch < 6; ++touch) {
-    const Pose T_robot_sensor =
-        inverse(T_object_robot) * Pose{{random(-5, 5), random(-2, 2)}, random(0, two_pi)};
-    recording.T_robot_sensor.push_back(T_robot_sensor);
-    for (const glm::dvec2& element : recording.elements_mm) {
-      const glm::dvec2 p = T_object_robot * (T_robot_sensor * element);
-      recording.pressure.push_back(std::abs(p.x) < 6.25 && std::abs(p.y) < 1.75 ? 9.0 : 0.0);
-    }
-  }
-  const PoseLattice lattice{{-3, 3, 20}, {-3, 3, 20}, {0, two_pi, 80}, {}};
-  Device device = Device::open();
-  PoseHistogram histogram(device, std::span(&object, 1), {.lattice = lattice});
-  histogram.update(all_touches(recording));
-  Mode mode = histogram.estimate().mode;
-  const RefinedPose one = histogram.refine(mode);
-  const Body body = body_of(bar);
-  EXPECT_LT(pose_error_mm(body, 2, one.T_object_robot, T_object_robot), 0.4) << "a bin's diagonal";
-  EXPECT_LT(
-      std::abs(wrap_angle(one.T_object_robot.theta_rad - mode.T_object_robot.theta_rad, two_pi)),
-      0.2);
-  // The other mode: half the circle on, the place mirrored.
-  const std::int64_t n = lattice.plane();
-  const std::int64_t in_plane = mode.bin.value() % n;
-  mode.bin = (*mode.bin / n + 40) % 80 * n + (n - 1 - in_plane);
-  const RefinedPose other = histogram.refine(mode);
-  EXPECT_NEAR(
-      std::abs(wrap_angle(one.T_object_robot.theta_rad - other.T_object_robot.theta_rad, two_pi)),
-      std::numbers::pi, 1e-3);
-  EXPECT_NEAR(one.covariance[8], other.covariance[8], 1e-4);
-}
-
-/// A letter that was learned, and touched in a pose that is to be found.
-struct Unknown {
-  const Hypothesis& object;
-  Recording touches;
-  Pose truth;
-  std::uint64_t seed = 0;
-};
-
-/// Letters without symmetry, a few unknowns of each.
-void for_each_unknown(Device& device, int unknowns, int touches,
-                      const std::function<void(const Unknown&)>& visit) {
-  std::uint64_t seed = 1400;
-  for (const char* letter : {"A", "E", "U"}) {
-    Simulator simulator(make_shape(letter), SensorModel{}, digitacts_array(), ++seed);
-    MapBuilder builder(device, {});
-    const Recording training = simulator.touch(training_grid(), Pose{});
-    builder.add(all_touches(training));
-    const Hypothesis object{builder.build(letter), 1.0};
-    for (int i = 0; i < unknowns; ++i) {
-      const Pose truth = random_object_pose(++seed);
-      std::vector<Pose> poses = random_poses(touches, ++seed);
-      for (Pose& pose : poses) {
-        pose = inverse(truth) * pose;
-      }
-      visit({object, simulator.touch(poses, truth), truth, seed});
-    }
-  }
-}
-
-/// A lattice about the truth, shifted by up to two fifths of a bin.
-PoseLattice around(const Unknown& unknown, PoseLattice lattice) {
-  Uniform random(unknown.seed);
-  const Pose& truth = unknown.truth;
-  for (const auto& [axis, at] : {std::pair(&lattice.x_mm, truth.translation_mm.x),
-                                 {&lattice.y_mm, truth.translation_mm.y},
-                                 {&lattice.theta_rad, truth.theta_rad}}) {
-    const double by = at + random(-0.4, 0.4) * axis->step();
-    axis->lower += by;
-    axis->upper += by;
-  }
-  return lattice;
-}
-
-double mean(const std::vector<double>& values) {
-  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
-}
-
-TEST(RefinedPose, ErrsLessThanTheModeAndKnowsByHowMuch) {
-  Device device = Device::open();
-  std::vector<double> modes;
-  std::vector<double> refined;
-  std::vector<double> normalised;
-  for_each_unknown(device, 4, 15, [&](const Unknown& unknown) {
-    // The bins of 64 x 64 x 244 over the whole region, around the truth only.
-    const PoseLattice lattice =
-        around(unknown, {{-2.5, 2.5, 16}, {-2.5, 2.5, 16}, {-0.4, 0.4, 31}, {}});
-    PoseHistogram histogram(device, std::span(&unknown.object, 1), {.lattice = lattice});
-    histogram.update(all_touches(unknown.touches));
-    const Mode mode = histogram.estimate().mode;
-    const RefinedPose pose = histogram.refine(mode);
-    const Body body = body_of(unknown.object.map);
-    modes.push_back(pose_error_mm(body, 1, mode.T_object_robot, unknown.truth));
-    refined.push_back(pose_error_mm(body, 1, pose.T_object_robot, unknown.truth));
-    glm::dmat3 covariance;
-    for (int k = 0; k < 9; ++k) {
-      covariance[k / 3][k % 3] = pose.covariance[k];
-    }
-    const glm::dvec3 error(
-        pose.T_object_robot.translation_mm - unknown.truth.translation_mm,
-        wrap_angle(pose.T_object_robot.theta_rad - unknown.truth.theta_rad, two_pi));
-    normalised.push_back(glm::dot(error, glm::inverse(covariance) * error));
-  });
-  // `./dev bench sweep` measures 0.36 and 0.15 mm for touches anywhere.
-  EXPECT_LT(mean(refined), 0.2);
-  EXPECT_LT(mean(refined), 0.8 * mean(modes));
-  // 3 for a covariance that is exact; Eq. 7 is less sure than this sensor deserves.
-  EXPECT_LT(mean(normalised), 3.0);
-  EXPECT_GT(mean(normalised), 0.3);
-}
-
-TEST(RefinedPose, LiesBetweenCoarseBinsAfterManyTouches) {
-  Device device = Device::open();
-  std::vector<double> after_15;
-  std::vector<double> after_50;
-  for_each_unknown(device, 8, 50, [&](const Unknown& unknown) {
-    // The bins of 13 x 13 x 55 over the whole region, around the truth only.
-    const PoseLattice lattice =
-        around(unknown, {{-5.4, 5.4, 7}, {-5.4, 5.4, 7}, {-0.8, 0.8, 14}, {}});
-    PoseHistogram histogram(device, std::span(&unknown.object, 1), {.lattice = lattice});
-    const auto refined_error_mm = [&] {
-      const RefinedPose pose = histogram.refine(histogram.estimate().mode);
-      return pose_error_mm(body_of(unknown.object.map), 1, pose.T_object_robot, unknown.truth);
-    };
-    histogram.update(unknown.touches.touches(0, 15));
-    after_15.push_back(refined_error_mm());
-    histogram.update(unknown.touches.touches(15, 50));
-    after_50.push_back(refined_error_mm());
-  });
-  // Nearly all of the belief is in one bin by then, of 1.5 mm: where the bin is says little.
-  EXPECT_LT(mean(after_50), 0.85 * mean(after_15));
-  EXPECT_LT(mean(after_50), 0.3);
 }
 
 TEST(RefinedPose, OfWhatIsNotThereIsRefused) {
   const Hypothesis object{random_map(5, 4, 0.5, 1.0, 139), 1.0};
   Device device = Device::open();
   const PoseHistogram histogram(device, std::span(&object, 1), {});
-  const Pose nowhere{{std::numeric_limits<double>::quiet_NaN(), 0.0}, 0.0};
   for (const Mode& mode :
        {Mode{.object = 1}, Mode{.object = -1}, Mode{.bin = -1},
-        Mode{.bin = histogram.lattice().bins()}, Mode{.T_object_robot = nowhere}}) {
+        Mode{.bin = histogram.lattice().bins()}, Mode{.T_object_robot = {{nan, 0.0}, 0.0}}}) {
     EXPECT_THROW(histogram.refine(mode), Error);
   }
 }
 
-TEST(RefinedPose, OfAMapWithoutAnOccupiedCellIsFinite) {
+TEST(DisplacedBody, OfAMapWithoutAnOccupiedCellIsTheWholeGrid) {
   OccupancyGrid map = random_map(9, 7, 0.5, 1.0, 140);
-  for (float& l : map.log_odds) {
-    l = -std::abs(l);
+  map.log_odds.assign(map.log_odds.size(), -1.0F);
+  const Body whole = displaced_body(map);
+  EXPECT_EQ(whole.centroid_mm, map.origin_mm + glm::dvec2(2.0, 1.5));
+  EXPECT_DOUBLE_EQ(whole.inertia_mm2, (4.5 * 4.5 + 3.5 * 3.5) / 12.0);
+  map.log_odds[10] = 1.0F;
+  EXPECT_EQ(displaced_body(map).centroid_mm, map.centre_mm(1, 1));
+}
+
+/// Bins 0.1 mm apart within 2 mm, with logs that fall by `nats` over the first millimetre from the
+/// middle and with its square.
+std::vector<DisplacedBin> parabola(double nats) {
+  std::vector<DisplacedBin> bins;
+  for (int i = -20; i <= 20; ++i) {
+    const double mm = 0.1 * i;
+    bins.push_back({{mm, 0.0, 0.0}, -1e6 - nats * mm * mm});
   }
-  const Hypothesis object{map, 1.0};
-  Device device = Device::open();
-  const PoseHistogram histogram(device, std::span(&object, 1), {});
-  const RefinedPose refined = histogram.refine(histogram.estimate().mode);
-  EXPECT_TRUE(std::isfinite(refined.T_object_robot.translation_mm.x));
-  EXPECT_GE(refined.covariance[0], 0.8 * 0.8 / 12.0);
+  return bins;
+}
+
+TEST(FlatteningRoot, SpreadsASharpBeliefByAThirdOfItsWindow) {
+  // A normal distribution: its variance is root / (2 nats), a third of the window's own is 0.394
+  // mm.
+  const double window_mm = 0.1 * std::sqrt((41.0 * 41.0 - 1.0) / 12.0);
+  for (const double nats : {100.0, 1e3, 1e4, 1e9}) {
+    const double root = flattening_root(parabola(nats), 8.0);
+    EXPECT_NEAR(std::sqrt(root / (2.0 * nats)), window_mm / 3.0, 0.03) << nats;
+  }
+}
+
+TEST(FlatteningRoot, FollowsTheBeliefWithoutSteps) {
+  double before = flattening_root(parabola(100.0), 8.0);
+  for (double nats = 101.0; nats < 400.0; nats += 1.0) {
+    const double root = flattening_root(parabola(nats), 8.0);
+    EXPECT_GT(root, before);
+    EXPECT_LT(root, 1.03 * before);
+    before = root;
+  }
+}
+
+TEST(FlatteningRoot, OfOneBinOrOneThatHasItAllIsFinite) {
+  EXPECT_EQ(flattening_root(std::vector<DisplacedBin>{{{0.0, 0.0, 0.0}, -5.0}}, 8.0), 8.0);
+  const std::vector<DisplacedBin> certain{{{0.0, 0.0, 0.0}, 0.0}, {{1.0, 0.0, 0.0}, -1e30}};
+  EXPECT_TRUE(std::isfinite(flattening_root(certain, 8.0)));
 }
 
 }  // namespace palpate::refinement_test

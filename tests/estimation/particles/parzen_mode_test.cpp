@@ -6,8 +6,8 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/pose.hpp"
-#include "support/synthetic.hpp"
+#include "beliefs.hpp"
+#include "support/least_limits.hpp"
 
 namespace palpate::parzen_mode_test {
 
@@ -51,8 +51,7 @@ double largest_density(const Cloud& cloud, int objects, double extent) {
   return reference::largest_parzen(reference_particles(cloud), objects, extent + 2.0);
 }
 
-ParzenMaximum find(const Cloud& cloud) {
-  Device device = Device::open();
+ParzenMaximum find(const Cloud& cloud, Device device = Device::open()) {
   gpu::CommandStream stream(device.context());
   ParzenMode mode(device.context(), stream, cloud.particles.size());
   return mode.find(cloud.particles, cloud.weights);
@@ -106,17 +105,21 @@ TEST(ParzenMode, ReachesAcrossTheCutOfTheCircleAndBetweenTiles) {
 }
 
 TEST(ParzenMode, OfManyParticlesInOnePlaceIsTheirWeight) {
-  // More than one unit takes, and more than one loop may.
+  // More than one unit takes, more than one loop may, and than a table of the least limits holds.
   constexpr std::size_t n = 100'000;
   const Cloud cloud{std::vector<shaders::Particle>(
                         n, {.object = 3, .x_mm = 1.5F, .y_mm = -2.0F, .theta_rad = 0.0F}),
                     std::vector<double>(n, 1.0 / n)};
-  const ParzenMaximum maximum = find(cloud);
-  EXPECT_EQ(maximum.object, 3U);
-  EXPECT_EQ(maximum.x_mm, 1.5);
-  EXPECT_EQ(maximum.y_mm, -2.0);
-  EXPECT_EQ(maximum.theta_rad, 0.0);
-  EXPECT_NEAR(maximum.density, 1.0, 1e-9) << "float64 rounding";
+  for (const bool least : {false, true}) {
+    const ParzenMaximum maximum = find(cloud, lowered_device([&](gpu::Limits& limits) {
+                                         limits = least ? gpu::least_limits(limits) : limits;
+                                       }));
+    EXPECT_EQ(maximum.object, 3U);
+    EXPECT_EQ(maximum.x_mm, 1.5);
+    EXPECT_EQ(maximum.y_mm, -2.0);
+    EXPECT_EQ(maximum.theta_rad, 0.0);
+    EXPECT_NEAR(maximum.density, 1.0, 1e-9) << "float64 rounding";
+  }
 }
 
 }  // namespace palpate::parzen_mode_test

@@ -1,0 +1,159 @@
+#!/usr/bin/env python3
+"""Every command of the pages runs, prints what the page quotes, and ends in what it tells."""
+
+import json
+import math
+import re
+import subprocess
+import unittest
+
+from document import ROOT, PageTest
+
+
+class Pages(PageTest):
+    # Some 15 seconds of a processor: most go into learning the sensor.
+    def test_start_recognises_an_e(self) -> None:
+        _, complained = self.run_page("start.md")
+        self.assertEqual(complained, "")
+        self.assert_written("maps.png", "sheets/unknown.png")
+        [record] = self.json("result.json")
+        self.assertEqual(record["best"], "E")
+        self.assertGreater(record["identity"]["E"], 0.99)
+        # The page: the first touch decides nothing, the second one does, and the refined pose is nearer
+        # to the truth than the mode.
+        first, second, *_, last = record["trace"]
+        self.assertLess(first["identity"][first["best"]], 0.9)
+        self.assertGreater(second["identity"]["E"], 0.99)
+        for sd_after_all, sd in zip(last["refined"]["sd"], first["refined"]["sd"], strict=True):
+            self.assertLess(sd_after_all, sd)
+        self.assertLess(record["refined_error_mm"], record["error_mm"])
+
+    # Some 13 seconds of a processor: three maps, and every command on automatic bins.
+    def test_how_sure_tells_the_stranger(self) -> None:
+        said, complained = self.run_page("how_sure.md")
+        self.assertEqual(complained, "")
+        self.assert_written("sheets/stranger.png")
+        known, stranger = self.json("result.json")
+        self.assertEqual(known["best"], "E")
+        self.assertNotIn("warnings", known)
+        self.assertTrue(known["decision"]["act"])
+        self.assertEqual(stranger["best"], "(none)")
+        self.assertEqual(stranger["mode"]["object"], "U")
+        self.assertEqual(stranger["fit"]["verdict"], "does not fit")
+        self.assertIn("% of the belief unproven", said)  # the budget of 1 ms
+
+    # Some 40 seconds of a processor, a third of them for the fit, which recognises twelve unknowns again
+    # for every displacement that it tries.
+    def test_misplaced_touches_are_noticed_measured_and_averaged(self) -> None:
+        self.run_page("misplaced.md")
+        exact, averaged = self.scores("exact.json"), self.scores("averaged.json")
+        self.assertEqual(exact["accuracy"], 1)
+        self.assertEqual(averaged["accuracy"], 1)
+        self.assertLess(averaged["refined_error_mm"]["median"], exact["refined_error_mm"]["median"])
+
+    # The page runs the Python module. Some 23 seconds of a processor, for lattices of up to
+    # a million bins by the histogram.
+    def test_bins_help_the_mode_only(self) -> None:
+        said, complained = self.run_page("bins.md")
+        self.assertEqual(complained, "")
+        self.assert_written("sweep/sweep_own_bins.png", "sweep/sweep_own_time.svg")
+        points = self.json("sweep.json")["points"]
+        self.assertEqual(len(points), 7)
+        for point, error_mm, sd_mm in [(3, 0.275, 0.211), (6, 0.189, 0.144)]:
+            self.assertAlmostEqual(points[point]["refined_error_mm"]["mean"], error_mm, delta=0.02)
+            self.assertAlmostEqual(points[point]["sd_mm"], sd_mm, delta=0.02)
+        # The page's table, with room for other rounding.
+        for results, error_mm, room, refined_mm, refined_room in [
+            ("auto.json", 0.40, 0.03, 0.18, 0.02),
+            ("fine.json", 0.24, 0.03, 0.19, 0.02),
+            ("coarse.json", 1.19, 0.06, 0.96, 0.06),
+        ]:
+            records = self.json(results)
+            for field, mean, delta in [
+                ("error_mm", error_mm, room),
+                ("refined_error_mm", refined_mm, refined_room),
+            ]:
+                told = sum(record[field] for record in records) / len(records)
+                self.assertAlmostEqual(told, mean, delta=delta, msg=f"{results} {field}")
+        for counts in ("62 x 71 x 200", "124 x 141 x 400"):
+            self.assertIn(f"2 maps, {counts} bins each", said)
+
+    def test_programs_act_on_lines_of_touches(self) -> None:
+        self.run_page("programs.md")
+        self.assert_written("ros/A.yaml", "ros/E.yaml")
+        [record, *_] = self.json("result.json")
+        self.assertEqual(record["best"], "E")
+        self.assertIn("none", record)
+
+    def test_batch_recognises_and_merges(self) -> None:
+        _, complained = self.run_page("batch.md")
+        self.assertIn("listed/: 4 of 4 unknowns, 1 failed", complained)
+        self.assertEqual(self.scores("results")["accuracy"], 1)
+        self.assert_written("all.ndjson", "shared.ndjson", "results/runs/000002.json")
+
+    # Some 34 seconds of a processor: the sensor of an array of 256 elements is learned, and 18 touches
+    # are recognised with it, each alone.
+    def test_own_sensor_finds_the_unknown(self) -> None:
+        said, complained = self.run_page("own_sensor.md")
+        self.assertEqual(complained, "", "the logs of the page are in order")
+        self.assertNotIn("Suspicious", said)
+        self.assert_written("maps.png", "drawn.png", "maps/sensor.yaml", "sheets/unknown.png")
+        [record] = self.json("result.json")
+        live = json.loads((self.folder / "live.json").read_text().splitlines()[-1])
+        self.assertEqual((record["best"], live["best"]), ("A", "A"))
+        self.assertEqual(record["fit"]["verdict"], "fits")
+        self.assertEqual(live["fit"]["verdict"], "fits")
+        self.assertNotIn("warnings", record)
+        # The truth is not in the logs: object=-446.41:26.795:-30 is T_object_robot. Half an element's
+        # pitch; half an element over the 12.5 mm from the letter's middle to its ends.
+        refined = record["refined"]
+        for axis, (truth, largest) in enumerate([(400, 1), (200, 1), (math.pi / 6, 1 / 12.5)]):
+            error = abs(refined["T_robot_object"][axis] - truth)
+            self.assertLess(error, largest, axis)
+            # One in 16,000 normal errors is larger.
+            self.assertLess(error, 4 * refined["sd"][axis], axis)
+            # `live` cannot look ahead for what the array reads untouched, as `touches` does.
+            self.assertAlmostEqual(
+                live["refined"]["T_robot_object"][axis],
+                refined["T_robot_object"][axis],
+                delta=refined["sd"][axis],
+            )
+        # The page says that the sensor model brings the poses nearer to the truth, by more than half.
+        before, after = self.scores("before.json"), self.scores("after.json")
+        self.assertEqual((before["accuracy"], after["accuracy"]), (1, 1))
+        self.assertLess(after["refined_error_mm"]["median"], 0.5 * before["refined_error_mm"]["median"])
+
+    # Without any pose: 4 letters and one that was never learned. Some 17 seconds of a processor, most to
+    # find where presses lie on each other.
+    def test_own_presses_at_unknown_poses_make_a_recogniser(self) -> None:
+        _, complained = self.run_page("own_presses.md")
+        self.assertEqual(complained, "", "the logs of the page are in order")
+        self.assert_written("maps.png")
+        found = self.scores("results.json")
+        self.assertEqual(found["records"], 50)
+        # The page says 37 of 40; of 200 such presses 92 % are right, so that fewer than 33 of 40 are one
+        # time in 100.
+        self.assertGreaterEqual(found["known_classes"]["right"], 33)
+        self.assertLess(found["known_classes"]["log_loss"], 0.4)
+        self.assertGreater(found["unknown_classes"]["area_under_curve"]["area"], 0.85)
+
+    def test_files_has_a_program_that_writes_a_recording(self) -> None:
+        page = (ROOT / "docs/files.md").read_text()
+        [program, *_] = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+        # Debian's Python, with the package python3-h5py.
+        subprocess.run(["/usr/bin/python3", "-c", program], cwd=self.folder, check=True)
+        info = self.done("info", "disc.h5")
+        self.assert_named(info, "recording of disc", "touches           25", "0.5 to 12 kPa")
+        self.assertIn("elements          36", info)
+        self.done("map", "disc.h5", "-o", "disc.map.h5")
+        area = (
+            "import h5py; map = h5py.File('disc.map.h5'); cells = map['log_odds'][:]; "
+            "print((cells > 0).sum() * map.attrs['cell_mm'] ** 2)"
+        )
+        said = subprocess.check_output(["/usr/bin/python3", "-c", area], cwd=self.folder)
+        # A disc with a radius of 8 mm has 201 mm2; elements 2 mm apart show its edge to half of that.
+        self.assertAlmostEqual(float(said), 201, delta=50)
+
+
+if __name__ == "__main__":
+    unittest.main()

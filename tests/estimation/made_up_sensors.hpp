@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "palpate/contact_model.hpp"
+#include "palpate/estimate.hpp"
+#include "palpate/reading_layer.hpp"
+
+namespace palpate {
+
+/// A table of Eq. 7 at the nodes from -13 to 13, `node_step` apart.
+inline constexpr double node_step = 0.05;
+ContactModel tabled(double gamma);
+
+/// A table of random numbers for every object and four levels of contact between 6 and 20 kPa.
+ContactModel random_table(std::size_t objects);
+
+/// A learned sensor on maps that were sensed in part, over their log odds or mean levels: of three
+/// objects, the second has numbers of its own and may lie on either side.
+struct LearnedScene {
+  std::vector<Hypothesis> objects;
+  ContactModel contact;
+};
+LearnedScene learned_scene(MapLayer of, std::uint64_t seed);
+
+}  // namespace palpate

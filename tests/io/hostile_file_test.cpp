@@ -1,0 +1,300 @@
+// Files that mean harm, or that only look so.
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <functional>
+
+#include "file_parts.hpp"
+#include "io/file_summary.hpp"
+#include "io/hdf5_reader.hpp"
+#include "io/recording_survey.hpp"
+#include "palpate/files.hpp"
+#include "support/memory_limit.hpp"
+#include "support/sanitized.hpp"
+
+namespace palpate::hostile_file_test {
+
+constexpr H5Z_filter_t filter_id = 40000;  // of nobody
+
+// A file can lead to other files, which may be FIFOs or anything the user can read. None of them is
+// opened.
+class OutsideFile : public OneFile {
+ protected:
+  OutsideFile() {
+    EXPECT_EQ(::mkfifo((folder_ / "fifo").c_str(), 0600), 0);
+    // Something that could be taken for numbers, and a file with a dataset of the right shape.
+    put_bytes(folder_ / "secret", std::string(24, 's'));
+    recording_parts().save(folder_ / "other.h5");
+  }
+
+  // What reading says once `change` was made to a file without pressures names the dataset and the
+  // word. Whoever opened the FIFO would wait for ever.
+  void expect_refused(const std::function<void(hid_t)>& change, const char* word) const {
+    recording_parts().without("pressure").save(path_);
+    edit(path_, change);
+    if (H5Zfilter_avail(filter_id) > 0) {
+      H5Zunregister(filter_id);  // it was there to write the file
+    }
+    expect_named(refusal([&] { read_recording(path_); }), {"'pressure'", word});
+  }
+
+  std::string other(const char* name) const { return (folder_ / name).string(); }
+
+  const Extents shape_{2, 3};
+};
+
+TEST_F(OutsideFile, ExternalStorageIsNotRead) {
+  for (const char* name : {"fifo", "secret", "missing"}) {
+    expect_refused(
+        [&](hid_t file) {
+          const Hdf5Handle storage = storage_in({});
+          H5Pset_external(storage.get(), other(name).c_str(), 0, 24);
+          new_dataset(file, "pressure", H5T_NATIVE_FLOAT, space_of(shape_), storage.get());
+        },
+        "another file");
+  }
+}
+
+TEST_F(OutsideFile, LinksAreNotFollowed) {
+  for (const char* name : {"fifo", "other.h5", "missing"}) {
+    const auto lead_away = [&](hid_t file, const char* object, const char* link) {
+      H5Lcreate_external(other(name).c_str(), object, file, link, H5P_DEFAULT, H5P_DEFAULT);
+    };
+    expect_refused([&](hid_t file) { lead_away(file, "/pressure", "pressure"); },
+                   "link to another file");
+    // On the way of a link within the file.
+    expect_refused(
+        [&](hid_t file) {
+          lead_away(file, "/", "away");
+          H5Lcreate_soft("/away/pressure", file, "pressure", H5P_DEFAULT, H5P_DEFAULT);
+        },
+        "link");
+  }
+  // libhdf5, which is not this process's alone, might follow it to another file.
+  expect_refused(
+      [](hid_t file) { H5Lcreate_soft("/elements", file, "pressure", H5P_DEFAULT, H5P_DEFAULT); },
+      "link");
+  // A link of a kind that a program has made up.
+  H5L_class_t kind{.version = H5L_LINK_CLASS_T_VERS,
+                   .id = static_cast<H5L_type_t>(H5L_TYPE_UD_MIN + 36)};
+  kind.trav_func = [](const char*, hid_t, const void*, size_t, hid_t, hid_t) -> hid_t {
+    return H5I_INVALID_HID;
+  };
+  ASSERT_GE(H5Lregister(&kind), 0);
+  expect_refused(
+      [&](hid_t file) {
+        H5Lcreate_ud(file, "pressure", kind.id, "x", 1, H5P_DEFAULT, H5P_DEFAULT);
+      },
+      "link to another file");
+  H5Lunregister(kind.id);
+}
+
+TEST_F(OutsideFile, VirtualDatasetsAreNotResolved) {
+  for (const char* name : {"fifo", "other.h5", "missing"}) {
+    for (const bool unlimited : {false, true}) {
+      expect_refused(
+          [&](hid_t file) {
+            // Even the shape of an unlimited one is read from its sources.
+            const hsize_t most[] = {unlimited ? H5S_UNLIMITED : 2, 3};
+            const Hdf5Handle space = space_of(shape_, most);
+            const hsize_t begin[] = {0, 0};
+            const hsize_t one[] = {1, 1};
+            H5Sselect_hyperslab(space.get(), H5S_SELECT_SET, begin, nullptr, one, most);
+            const Hdf5Handle storage = storage_in({});
+            EXPECT_GE(H5Pset_virtual(storage.get(), space.get(), other(name).c_str(), "/pressure",
+                                     space.get()),
+                      0);
+            new_dataset(file, "pressure", H5T_NATIVE_FLOAT, space_of(shape_, most), storage.get());
+          },
+          "virtual");
+    }
+  }
+}
+
+// A file must not choose which code is loaded.
+TEST_F(OutsideFile, FiltersAreNotLoaded) {
+  // A FIFO among the plugins: whoever opens it waits.
+  ASSERT_EQ(::mkfifo((folder_ / "libfilter.so").c_str(), 0600), 0);
+  H5PLprepend(folder_.path().c_str());
+  expect_refused(
+      [&](hid_t file) {
+        H5Z_class2_t filter{.version = H5Z_CLASS_T_VERS, .id = filter_id, .encoder_present = 1};
+        filter.decoder_present = 1;
+        filter.name = "test";
+        filter.filter = [](unsigned, size_t, const unsigned*, size_t bytes, size_t*, void**) {
+          return bytes;
+        };
+        ASSERT_GE(H5Zregister(&filter), 0);
+        const Hdf5Handle storage = storage_in({});
+        H5Pset_chunk(storage.get(), 2, shape_.data());
+        H5Pset_filter(storage.get(), filter.id, H5Z_FLAG_MANDATORY, 0, nullptr);
+        const std::vector<float> values(6, 1.0F);
+        put_values(new_dataset(file, "pressure", H5T_NATIVE_FLOAT, space_of(shape_), storage.get()),
+                   H5T_NATIVE_FLOAT, values.data());
+      },
+      "cannot be read");
+  H5PLremove(0);
+}
+
+// What the caller has set up stays as it was.
+TEST_F(OutsideFile, ExternalLinksAndPluginsStayAllowedElsewhere) {
+  recording_parts().save(path_);
+  unsigned before = 0;
+  unsigned after = 0;
+  H5PLget_loading_state(&before);
+  EXPECT_EQ(read_recording(path_).pressure.size(), 6u);
+  H5PLget_loading_state(&after);
+  EXPECT_EQ(before, after);
+  EXPECT_GT(H5Lis_registered(H5L_TYPE_EXTERNAL), 0);
+}
+
+constexpr std::uint64_t mib = 1 << 20;
+
+// Writes a dataset of floats whose chunks all hold these values: made by copying the stored bytes
+// of the first chunk.
+void save_equal_chunks(const std::filesystem::path& path, const char* name, const Extents& extents,
+                       const Extents& chunk, const std::vector<float>& values) {
+  edit(path, [&](hid_t file) {
+    const Hdf5Handle space = space_of(extents);
+    const Hdf5Handle dataset =
+        new_dataset(file, name, H5T_NATIVE_FLOAT, space, storage_in(chunk).get());
+    const hsize_t origin[] = {0, 0};
+    H5Sselect_hyperslab(space.get(), H5S_SELECT_SET, origin, nullptr, chunk.data(), nullptr);
+    ASSERT_GE(H5Dwrite(dataset.get(), H5T_NATIVE_FLOAT, space_of(chunk).get(), space.get(),
+                       H5P_DEFAULT, values.data()),
+              0);
+    ASSERT_GE(H5Dflush(dataset.get()), 0);
+    hsize_t size = 0;
+    ASSERT_GE(H5Dget_chunk_storage_size(dataset.get(), origin, &size), 0);
+    std::string stored(size, '\0');
+    std::uint32_t filters = 0;
+    ASSERT_GE(H5Dread_chunk(dataset.get(), H5P_DEFAULT, origin, &filters, stored.data()), 0);
+    for (hsize_t j = 0; j < extents[0]; j += chunk[0]) {
+      for (hsize_t i = 0; i < extents[1]; i += chunk[1]) {
+        const hsize_t place[] = {j, i};
+        ASSERT_GE(H5Dwrite_chunk(dataset.get(), H5P_DEFAULT, 0, place, size, stored.data()), 0);
+      }
+    }
+  });
+}
+
+// A stream of `chunks` times 4,096 frames of 40 elements: 640 KiB of pressures each.
+void save_frames(const std::filesystem::path& path, hsize_t chunks) {
+  constexpr hsize_t rows = 4096;
+  constexpr hsize_t elements = 40;
+  std::vector<double> places;
+  for (hsize_t k = 0; k < elements; ++k) {
+    places.insert(places.end(), {2.0 * static_cast<double>(k), 0.0});
+  }
+  recording_parts()
+      .attribute("rows", "frames")
+      .without("pressure")
+      .without("sensor_pose")
+      .dataset("elements", {elements, 2}, places)
+      .save(path);
+  std::vector<float> pressures(rows * elements, 0.0F);
+  pressures.back() = 5.0F;
+  save_equal_chunks(path, "pressure", {rows * chunks, elements}, {rows, elements}, pressures);
+  save_equal_chunks(path, "sensor_pose", {rows * chunks, 3}, {rows, 3},
+                    std::vector<float>(rows * 3, 1.5F));
+}
+
+// Files that hold far more than their size on the disk says.
+class LargeFile : public OneFile {
+ protected:
+  // Private writable memory of this process, as RLIMIT_DATA counts it.
+  static std::uint64_t data_bytes() {
+    std::uint64_t pages[6] = {};  // size, resident, shared, text, library, data
+    std::ifstream statm("/proc/self/statm");
+    for (std::uint64_t& field : pages) {
+      statm >> field;
+    }
+    return pages[5] * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
+  }
+
+  // Whether the work, in a process of its own that may hold so much memory beyond what it holds
+  // already, returns true.
+  static bool done_with_memory(std::uint64_t bytes, const std::function<bool()>& work) {
+    const pid_t pid = ::fork();
+    if (pid == 0) {
+      const rlimit limit{.rlim_cur = data_bytes() + bytes, .rlim_max = RLIM_INFINITY};
+      ::setrlimit(RLIMIT_DATA, &limit);
+      try {
+        ::_exit(work() ? 0 : 1);
+      } catch (const std::exception&) {
+        ::_exit(2);
+      }
+    }
+    int status = -1;
+    ::waitpid(pid, &status, 0);
+    return status == 0;
+  }
+};
+
+// 67 MB of cells, stored as 18 KB for each of 16 chunks. What compresses by a factor of 1000 takes
+// its time to read; a limit is for what is read.
+TEST_F(LargeFile, MapIsSummarizedInPiecesAndReadWhole) {
+  constexpr hsize_t edge = 1024;
+  map_parts().without("log_odds").save(path_);
+  save_equal_chunks(path_, "log_odds", {4 * edge, 4 * edge}, {edge, edge},
+                    std::vector<float>(edge * edge, 0.0F));
+  EXPECT_EQ(read_map(path_).log_odds.size(), 4096u * 4096u);
+  if (sanitized) {
+    GTEST_SKIP() << "the sanitizer holds memory of its own";
+  }
+  EXPECT_TRUE(done_with_memory(40 * mib, [&] {
+    const MapSummary summary = summarize_map(path_);
+    return summary.head.nx == 4096 && summary.occupied == 0 && summary.log_odds.most == 0.0;
+  }));
+}
+
+// 42 MB of pressures.
+TEST_F(LargeFile, RecordingIsSurveyedInPieces) {
+  if (sanitized || !limits_memory()) {
+    GTEST_SKIP() << "memory of processes is not limited here";
+  }
+  constexpr hsize_t chunks = 64;
+  save_frames(path_, chunks);
+  EXPECT_TRUE(done_with_memory(20 * mib, [&] {
+    const RecordingSurvey survey = survey_recording(path_);
+    return survey.head.rows == 4096 * chunks && survey.pressure.in_contact == chunks &&
+           survey.with_pose == 4096 * chunks && suspicions_of(survey).size() == 0;
+  }));
+  EXPECT_FALSE(done_with_memory(20 * mib, [&] { return read_recording(path_).size() > 0; }))
+      << "the limit holds";
+}
+
+// Rows may be longer than a piece, and chunks may lie across them.
+TEST_F(LargeFile, PiecesComeInOrderWhateverTheChunks) {
+  const Extents shape{3, 2, 700, 101};
+  std::vector<double> values(3 * 2 * 700 * 101);
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    values[k] = -static_cast<double>(k);
+  }
+  for (const Extents& chunk :
+       {Extents{}, {3, 2, 700, 1}, {1, 1, 1, 101}, {2, 2, 300, 50}, {1, 2, 70, 9}}) {
+    posterior_parts()
+        .without("log_likelihood")
+        .attribute("objects", std::vector<std::string>{"A", "B", "C"})
+        .attribute("bins_theta", 2)
+        .attribute("bins_y", 700)
+        .attribute("bins_x", 101)
+        .save(path_);
+    edit(path_, [&](hid_t file) {
+      put_values(new_dataset(file, "log_likelihood", H5T_NATIVE_DOUBLE, space_of(shape),
+                             storage_in(chunk).get()),
+                 H5T_NATIVE_DOUBLE, values.data());
+    });
+    EXPECT_TRUE(read_posterior(path_).log_likelihood == values);
+    const PosteriorSummary summary = summarize_posterior(path_);
+    ASSERT_EQ(summary.peaks.size(), 3u);
+    EXPECT_EQ(summary.peaks[2].log_likelihood, values[2 * 2 * 700 * 101]);
+    EXPECT_EQ(summary.peaks[2].bin, 0);
+  }
+}
+
+}  // namespace palpate::hostile_file_test
