@@ -6,7 +6,6 @@
 #include <limits>
 #include <numbers>
 
-
 namespace palpate {
 
 double Uniform::operator()(double lower, double upper) {

@@ -106,4 +106,19 @@ INSTANTIATE_TEST_SUITE_P(All, ShippedBoard,
                          testing::Values("tsf85", "wts", "flexitac", "flexitac12", "anyskin"),
                          [](const auto& board) { return std::string(board.param); });
 
+// The example that PacketDeframer is explained by.
+TEST(PacketDeframer, FindsItsPlaceAgainBehindLostAndWrongBytes) {
+  Receiver receiver(
+      parse_serial_profile("name: two elements\nelements: [[0, 0], [2, 0]]\n"
+                           "packet: [{bytes: aa 55}, {values: u8}, {checksum: sum8, from: 2}]\n",
+                           "example.yaml"));
+  receiver.push(
+      Bytes{0x31, 0xaa, 0x55, 7, 9, 0x10, 0xaa, 0x55, 0xaa, 0x55, 3, 4, 7, 0xaa, 0x55, 5, 6, 0xff});
+  ASSERT_EQ(receiver.frames().size(), 2u);
+  EXPECT_EQ(receiver.frames()[0].values, (std::vector<double>{7, 9}));
+  EXPECT_EQ(receiver.frames()[1].values, (std::vector<double>{3, 4}));
+  EXPECT_EQ(receiver.checksum_errors(), 2u);
+  EXPECT_EQ(receiver.garbage(), 1u + 2u + 5u);
+}
+
 }  // namespace palpate::packet_deframer_test
