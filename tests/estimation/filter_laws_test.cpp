@@ -242,6 +242,13 @@ TEST_P(ParticleLaws, AgreesWithFloat64) {
   const Estimate estimate = filter.estimate();
   EXPECT_NEAR(std::accumulate(estimate.identity.begin(), estimate.identity.end(), 0.0), 1.0, 1e-9);
   EXPECT_TRUE(std::isfinite(estimate.mode.log_likelihood));
+  double evidence = 0.0;
+  for (const double log_evidence : estimate.log_evidence) {
+    evidence += std::exp(log_evidence);
+  }
+  for (std::size_t i = 0; i < of.objects.size(); ++i) {
+    EXPECT_NEAR(std::exp(estimate.log_evidence[i]) / evidence, estimate.identity[i], 1e-9);
+  }
 }
 
 TEST_P(ParticleLaws, IsTheSameHoweverUpdated) {

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <random>
 
 #include <gtest/gtest.h>
@@ -227,6 +228,26 @@ TEST(PressFeatures, AreLogarithmsOfAreaForceAndPeak) {
   EXPECT_DOUBLE_EQ(area, std::log(3.0));
   EXPECT_DOUBLE_EQ(force, std::log(8.25));
   EXPECT_DOUBLE_EQ(peak, std::log(6.0));
+}
+
+TEST(FeatureDistribution, HasTheDensityOfItsCovariance) {
+  FeatureDistribution distribution{
+      .mean = {1.0, 2.0, 3.0}, .sd = {0.5, 2.0, 1.5}, .correlation = {0.6, -0.3, 0.2}};
+  // -z^T C^-1 z / 2 - log sqrt((2 pi)^3 det C) - log of the product of sds; C^-1 by its cofactors.
+  const double det = 1.0 + 2.0 * 0.6 * -0.3 * 0.2 - 0.36 - 0.09 - 0.04;
+  const double z[3] = {1.0, -0.5, 2.0};
+  const double cofactor[3][3] = {{1.0 - 0.04, -0.3 * 0.2 - 0.6, 0.6 * 0.2 + 0.3},
+                                 {-0.3 * 0.2 - 0.6, 1.0 - 0.09, -0.3 * 0.6 - 0.2},
+                                 {0.6 * 0.2 + 0.3, -0.3 * 0.6 - 0.2, 1.0 - 0.36}};
+  double expected = -1.5 * std::log(2.0 * std::numbers::pi) - 0.5 * std::log(det) - std::log(1.5);
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      expected -= 0.5 * z[i] * cofactor[i][j] / det * z[j];
+    }
+  }
+  EXPECT_NEAR(distribution.log_density({{1.5, 1.0, 6.0}}), expected, 1e-12);
+  distribution.correlation = {0.9, 0.9, -0.9};
+  EXPECT_TRUE(std::isnan(distribution.log_density({{1.5, 1.0, 6.0}}))) << "no covariance";
 }
 
 }  // namespace palpate::learned_sensor_test

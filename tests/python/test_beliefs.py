@@ -53,6 +53,7 @@ def test_a_map_is_built_by_the_classifier_that_is_given(device: palpate.Device, 
 
 def test_bins_and_seeds_are_the_ones_that_are_given() -> None:
     lattice = palpate.PoseLattice((-1, 1, 2), (-1, 1, 2), (0, 1, 2))
+    assert lattice.T_object_robot(0).tolist() == [-0.5, -0.5, 0.25]
     assert lattice.T_object_robot(7).tolist() == [0.5, 0.5, 0.75]
     for bin in (-1, 8):
         with pytest.raises(IndexError, match=f"bin {bin} of 8"):
