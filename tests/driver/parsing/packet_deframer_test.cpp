@@ -85,8 +85,11 @@ TEST_P(ShippedBoard, IsInStepTwoFramesAfterDamage) {
     }
     ASSERT_TRUE(receiver.has(sent, 0, 3));
     ASSERT_TRUE(receiver.has(sent, 5, 8));
-    // Without a checksum, the damaged frame and one more may have wrong values.
-    ASSERT_LE(receiver.strangers(sent), between_frames || board_ == "wts" ? 0 : 2);
+    // Without a checksum, the damaged frame and one more may have wrong values. That of the WTS
+    // misses some pairs of flipped bits: the packet's own checksum behind it then leaves 0.
+    const bool is_missed = weiss_checksum(damaged[3].bytes) == 0;
+    const int wrong = board_ == "wts" ? (is_missed ? 1 : 0) : 2;
+    ASSERT_LE(receiver.strangers(sent), between_frames ? 0 : wrong);
     ASSERT_GE(receiver.garbage() - garbage_before, garbage.size());
     ASSERT_LE(receiver.garbage() - garbage_before, stream.size());
   }

@@ -6,12 +6,6 @@
 
 namespace palpate {
 
-namespace {
-
-void append(Bytes& bytes, const Bytes& more) {
-  bytes.insert(bytes.end(), more.begin(), more.end());
-}
-
 std::uint16_t weiss_checksum(const Bytes& bytes) {
   unsigned crc = 0xffff;
   for (const std::uint8_t byte : bytes) {
@@ -22,6 +16,12 @@ std::uint16_t weiss_checksum(const Bytes& bytes) {
     crc = (entry & 0xffff) ^ crc >> 8;
   }
   return static_cast<std::uint16_t>(crc);
+}
+
+namespace {
+
+void append(Bytes& bytes, const Bytes& more) {
+  bytes.insert(bytes.end(), more.begin(), more.end());
 }
 
 SentFrame tsf85_frame(std::mt19937& random) {
