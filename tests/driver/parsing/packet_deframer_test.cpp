@@ -124,4 +124,16 @@ TEST(PacketDeframer, FindsItsPlaceAgainBehindLostAndWrongBytes) {
   EXPECT_EQ(receiver.garbage(), 1u + 2u + 5u);
 }
 
+TEST(PacketDeframer, FindsTheFieldsBehindCountedParts) {
+  Receiver receiver(parse_serial_profile(
+      "name: parts\nelements: [[0, 0], [2, 0]]\n"
+      "packet: [{bytes: aa}, {length: u8, most: 16}, {parts: u8, tags: [{tag: 1, values: 2}]},\n"
+      "         {time: u8}, {checksum: sum8}]\n",
+      "parts.yaml"));
+  receiver.push(Bytes{0xaa, 4, 1, 7, 9, 5, 0xc4});
+  ASSERT_EQ(receiver.frames().size(), 1u);
+  EXPECT_EQ(receiver.frames()[0].values, (std::vector<double>{7, 9}));
+  EXPECT_NEAR(receiver.frames()[0].device_time_s.value(), 0.005, 1e-12);
+}
+
 }  // namespace palpate::packet_deframer_test
