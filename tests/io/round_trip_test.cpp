@@ -168,7 +168,7 @@ void expect_stored(const Recording& read, std::size_t i, const Frame& frame, std
 TEST_F(RoundTrip, StreamOfFrames) {
   Hostile draw(24);
   const auto drawn = [&](bool often) {
-    draw.set_rarity(often ? 12 : 200);
+    draw.set_rarity(often ? 6 : 200);
     const std::size_t e = 1 + draw.below(4);
     SensorDescription sensor;
     sensor.name = draw.text();
