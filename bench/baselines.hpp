@@ -3,7 +3,7 @@
 #include <span>
 #include <vector>
 
-#include "estimation/contact_evidence.hpp"
+#include "estimation/known_elements.hpp"
 #include "gpu/command_stream.hpp"
 #include "palpate/contact_model.hpp"
 #include "palpate/pose_histogram.hpp"
@@ -62,7 +62,7 @@ class CpuLoop {
 
  private:
   /// `rotated` are the elements of the row's theta.
-  void add_row(std::size_t object, std::int64_t row, std::span<const shaders::Segment> segments,
+  void add_row(std::size_t object, std::int64_t row, std::span<const ReadingRun> runs,
                const shaders::RotatedElement* rotated);
 
   PoseLattice lattice_;

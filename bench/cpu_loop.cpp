@@ -11,7 +11,7 @@ namespace palpate::bench {
 
 namespace {
 
-constexpr std::size_t segment_elements = 64;  // summed in one float, as in the product
+constexpr std::size_t longest_run = 64;  // summed in one float, as in the product
 // Eight likelihoods of at least the floor's size multiply within float32: one logarithm for all.
 constexpr std::uint32_t factors_per_log = 8;
 constexpr float clamp_nats = 20.0F;  // beyond it the likelihood is flat to one part in 1e7
@@ -88,17 +88,17 @@ CpuLoop::CpuLoop(std::span<const Hypothesis> hypotheses, const PoseLattice& latt
 }
 
 void CpuLoop::update(std::span<const Touch> touches) {
-  const ContactEvidence evidence =
-      gather_evidence(touches, ContactModel{}, lattice_.pivot_mm, segment_elements);
-  const std::size_t elements = evidence.from_pivot_mm.size();
+  const KnownElements known =
+      gathered(evidence_of(touches, ContactModel{}), lattice_.pivot_mm, longest_run);
+  const std::size_t elements = known.from_pivot_mm.size();
   const std::vector<shaders::RotatedElement> rotated =
-      rotate_evidence(evidence.from_pivot_mm, lattice_.theta_rad, maps_.front().cell_mm);
+      rotated_elements(known.from_pivot_mm, lattice_.theta_rad, maps_.front().cell_mm);
   const std::int64_t rows = std::int64_t{lattice_.theta_rad.count} * lattice_.y_mm.count;
   std::atomic<std::int64_t> next = 0;
   const auto work = [&] {
     for (std::int64_t i = next++; i < rows * static_cast<std::int64_t>(maps_.size()); i = next++) {
       const std::int64_t row = i % rows;
-      add_row(static_cast<std::size_t>(i / rows), row, evidence.segments,
+      add_row(static_cast<std::size_t>(i / rows), row, known.runs,
               rotated.data() + static_cast<std::size_t>(row / lattice_.y_mm.count) * elements);
     }
   };
@@ -109,8 +109,7 @@ void CpuLoop::update(std::span<const Touch> touches) {
   work();
 }
 
-void CpuLoop::add_row(std::size_t object, std::int64_t row,
-                      std::span<const shaders::Segment> segments,
+void CpuLoop::add_row(std::size_t object, std::int64_t row, std::span<const ReadingRun> runs,
                       const shaders::RotatedElement* rotated) {
   const int nx = lattice_.x_mm.count;
   const BorderedMap& map = maps_[object];
@@ -124,13 +123,13 @@ void CpuLoop::add_row(std::size_t object, std::int64_t row,
   float* const part = bins.part.data();
   float* const product = bins.product.data();
 
-  for (const shaders::Segment& segment : segments) {
-    const float sign = segment.reading == shaders::IN_CONTACT ? 1.0F : -1.0F;
+  for (const ReadingRun& run : runs) {
+    const float sign = run.reading == Reading::in_contact ? 1.0F : -1.0F;
     std::fill(bins.part.begin(), bins.part.end(), 0.0F);
-    for (std::uint32_t group = segment.begin; group < segment.end; group += factors_per_log) {
+    for (std::size_t group = run.begin; group < run.end; group += factors_per_log) {
       std::fill(bins.product.begin(), bins.product.end(), 1.0F);
-      const std::uint32_t end = std::min(group + factors_per_log, segment.end);
-      for (std::uint32_t k = group; k < end; ++k) {
+      const std::size_t end = std::min(group + factors_per_log, run.end);
+      for (std::size_t k = group; k < end; ++k) {
         multiply(bins, map, bin_y, rotated[k], sign, random_floor_, random_floor_ + trust_);
       }
 #pragma omp simd

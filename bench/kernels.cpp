@@ -221,14 +221,14 @@ class Steps {
   /// Seconds that the host classifies the touch and rotates its elements.
   double prepare(const Touch& touch) {
     return seconds_of([&] {
-      evidence_ = gather_evidence(std::span(&touch, 1), ContactModel{}, lattice_.pivot_mm,
-                                  likelihood_.segment_elements());
-      rotate_evidence(evidence_.from_pivot_mm, lattice_.theta_rad, cell_mm_);
+      known_ = gathered(evidence_of({&touch, 1}, ContactModel{}), lattice_.pivot_mm,
+                        likelihood_.longest_run());
+      rotated_elements(known_.from_pivot_mm, lattice_.theta_rad, cell_mm_);
     });
   }
   /// Seconds that the device works on what prepare() left.
   double run_on_device() {
-    likelihood_.accumulate(evidence_, belief_, {});
+    likelihood_.accumulate(known_, belief_, {});
     const double accumulating = stream_.device_seconds();
     belief_.summarise();
     return accumulating + stream_.device_seconds();
@@ -240,7 +240,7 @@ class Steps {
   gpu::CommandStream stream_;
   DenseBelief belief_;
   DenseLikelihood likelihood_;
-  ContactEvidence evidence_;
+  KnownElements known_;
 };
 
 /// Times an estimate from the moment of its touch, in all and step by step.

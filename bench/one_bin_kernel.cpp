@@ -3,8 +3,8 @@
 #include <bit>
 
 #include "estimation/bordered_map.hpp"
-#include "estimation/contact_evidence.hpp"
 #include "estimation/kernel_sizes.hpp"
+#include "estimation/known_elements.hpp"
 #include "one_bin.hpp"
 #include "one_bin_push.h"
 
@@ -13,7 +13,7 @@ namespace palpate::bench {
 namespace {
 
 constexpr std::uint32_t workgroup = 64;
-constexpr std::size_t segment_elements = 64;  // summed in one float, as in the product
+constexpr std::size_t longest_run = 64;  // summed in one float, as in the product
 
 gpu::Kernel make_kernel(gpu::Context& context, const ContactModel& model) {
   const std::vector<gpu::Access> bindings(5, gpu::Access::storage);
@@ -52,17 +52,21 @@ OneBinKernel::OneBinKernel(Device& device, std::span<const Hypothesis> hypothese
 }
 
 void OneBinKernel::update(std::span<const Touch> touches) {
-  const ContactEvidence evidence =
-      gather_evidence(touches, ContactModel{}, lattice_.pivot_mm, segment_elements);
+  const KnownElements known =
+      gathered(evidence_of(touches, ContactModel{}), lattice_.pivot_mm, longest_run);
+  std::vector<shaders::Segment> runs;
+  for (const ReadingRun& run : known.runs) {
+    runs.push_back(segment_of(run));
+  }
   const gpu::Buffer elements = stream_.uploaded(
-      rotate_evidence(evidence.from_pivot_mm, lattice_.theta_rad, cell_mm_), "elements");
-  const gpu::Buffer segments = stream_.uploaded(evidence.segments, "segments");
+      rotated_elements(known.from_pivot_mm, lattice_.theta_rad, cell_mm_), "elements");
+  const gpu::Buffer segments = stream_.uploaded(runs, "segments");
   for (const Object& object : objects_) {
     const shaders::OneBinPush push{
         .nx = static_cast<shaders::uint>(lattice_.x_mm.count),
         .ny = static_cast<shaders::uint>(lattice_.y_mm.count),
-        .segments = static_cast<shaders::uint>(evidence.segments.size()),
-        .elements = static_cast<shaders::uint>(evidence.from_pivot_mm.size()),
+        .segments = static_cast<shaders::uint>(runs.size()),
+        .elements = static_cast<shaders::uint>(known.from_pivot_mm.size()),
         .map_width = object.width,
         .map_height = object.height};
     const auto plane = static_cast<std::uint32_t>(lattice_.plane());

@@ -1,13 +1,29 @@
 #include "estimation/bordered_map.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
-
-#include "estimation/contact_evidence.hpp"
+#include <utility>
 
 namespace palpate {
 
 namespace {
+
+// Cells that are told apart, and what stands for those beyond. Clamped to the same bound, an
+// element and a bin that are both beyond would meet on the map. So they never do: these differ from
+// each other, and from what is told apart, by some 2^28 cells, the side of no map that a device
+// holds.
+constexpr int farthest_cell = 1 << 29;
+constexpr int element_beyond = (1 << 30) - 1;
+constexpr int axis_beyond = 3 << 28;
+
+shaders::Split split(double coordinate_cells, int beyond) {
+  if (!(std::abs(coordinate_cells) < farthest_cell)) {
+    return {std::signbit(coordinate_cells) ? -beyond : beyond, 0.0F};
+  }
+  const double cell = std::floor(coordinate_cells);
+  return {static_cast<int>(cell), static_cast<float>(coordinate_cells - cell)};
+}
 
 std::uint64_t cell_bytes(gpu::Access access) {
   return access == gpu::Access::table ? sizeof(shaders::Corners) : sizeof(float);
@@ -83,6 +99,26 @@ int BorderedMaps::add(gpu::CommandStream& stream, const OccupancyGrid& map, doub
   }
   added_ += bordered_cells(map);
   return static_cast<int>(first);
+}
+
+shaders::Split split(double coordinate_cells) { return split(coordinate_cells, element_beyond); }
+
+shaders::Split split_axis(double coordinate_cells) { return split(coordinate_cells, axis_beyond); }
+
+std::vector<shaders::RotatedElement> rotated_elements(std::span<const glm::dvec2> from_pivot_mm,
+                                                      const Axis& theta_rad, double cell_mm,
+                                                      std::vector<shaders::RotatedElement> reuse) {
+  std::vector<shaders::RotatedElement> rotated = std::move(reuse);
+  rotated.clear();
+  rotated.reserve(from_pivot_mm.size() * static_cast<std::size_t>(theta_rad.count));
+  for (int t = 0; t < theta_rad.count; ++t) {
+    const double c = std::cos(theta_rad.centre(t)) / cell_mm;
+    const double s = std::sin(theta_rad.centre(t)) / cell_mm;
+    for (const glm::dvec2& p : from_pivot_mm) {
+      rotated.push_back({split(c * p.x - s * p.y), split(s * p.x + c * p.y)});
+    }
+  }
+  return rotated;
 }
 
 std::vector<shaders::Split> axes_in_cells(const OccupancyGrid& map, const PoseLattice& lattice) {

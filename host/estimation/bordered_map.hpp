@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string_view>
 #include <vector>
 
@@ -44,6 +45,19 @@ class BorderedMaps {
   gpu::Buffer nodes_;
   std::uint64_t added_ = 0;  ///< cells
 };
+
+/// Splits an element's coordinate into whole cells and the rest. One beyond 2^29 cells, or that is
+/// no number, counts as off every map: its cell becomes so large that the sum with any cell of
+/// split_axis() is outside, yet within int32.
+shaders::Split split(double coordinate_cells);
+/// Splits the coordinate of a place of the lattice, to which an element's is added.
+shaders::Split split_axis(double coordinate_cells);
+
+/// Every element rotated by every theta of the lattice, in cells, [theta, element].
+/// @param reuse memory for the result
+std::vector<shaders::RotatedElement> rotated_elements(
+    std::span<const glm::dvec2> from_pivot_mm, const Axis& theta_rad, double cell_mm,
+    std::vector<shaders::RotatedElement> reuse = {});
 
 /// The lattice's x, then its y, in cells of the map with its border, [nx + ny].
 std::vector<shaders::Split> axes_in_cells(const OccupancyGrid& map, const PoseLattice& lattice);

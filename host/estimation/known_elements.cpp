@@ -1,14 +1,20 @@
 #include "estimation/known_elements.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
 #include <numeric>
 #include <tuple>
 #include <utility>
 
-#include "estimation/contact_evidence.hpp"
 #include "palpate/occupancy_grid.hpp"
 
 namespace palpate {
+
+static_assert(shaders::NO_CONTACT == static_cast<shaders::uint>(Reading::no_contact) &&
+              shaders::IN_CONTACT == static_cast<shaders::uint>(Reading::in_contact) &&
+              shaders::UNKNOWN == static_cast<shaders::uint>(Reading::unknown));
 
 namespace {
 
@@ -58,6 +64,21 @@ bool touched_before(const KnownElements& a, const KnownElements& b) {
   return std::ranges::lexicographical_compare(a.from_pivot_mm, b.from_pivot_mm, {}, place, place);
 }
 
+/// Of one reading.
+double prior_log_likelihood(Reading reading, const ContactModel& contact) {
+  const MapSample prior{.log_odds = log_odds_from_probability(contact.prior.value())};
+  const std::size_t sets = contact.table ? contact.table->sets() : 1;
+  double largest = -std::numeric_limits<double>::infinity();
+  for (std::size_t set = 0; set < sets; ++set) {
+    largest = std::max(largest, contact.log_likelihood(reading, prior, set));
+  }
+  double sum = 0.0;
+  for (std::size_t set = 0; set < sets; ++set) {
+    sum += std::exp(contact.log_likelihood(reading, prior, set) - largest);
+  }
+  return largest + std::log(sum / static_cast<double>(sets));
+}
+
 }  // namespace
 
 std::vector<std::size_t> sorted_touches(std::span<const KnownElements> touches) {
@@ -101,10 +122,49 @@ KnownElements merged(std::span<const KnownElements> lists) {
   return all;
 }
 
-double prior_log_likelihood(const KnownElements& elements, const ContactModel& contact) {
+KnownElements gathered(std::span<const TouchEvidence> touches, const glm::dvec2& pivot_mm,
+                       std::size_t longest_run, KnownElements reuse) {
+  std::size_t elements = 0;
+  for (const TouchEvidence& touch : touches) {
+    elements += touch.readings.size();
+  }
+  KnownElements known = std::move(reuse);
+  known.from_pivot_mm.clear();
+  known.from_pivot_mm.reserve(elements);
+  known.runs.clear();
+  // A run for every reading of a touch, and for every part of one that is too long.
+  known.runs.reserve(touches.size() * most_reading_levels + elements / longest_run);
+  for (const TouchEvidence& touch : touches) {
+    for (std::size_t level = 0; level < most_reading_levels; ++level) {
+      const auto reading = static_cast<Reading>(level);
+      const std::size_t first = known.from_pivot_mm.size();
+      for (std::size_t e = 0; e < touch.readings.size(); ++e) {
+        if (touch.readings[e] == reading) {
+          known.from_pivot_mm.push_back(touch.T_robot_sensor * touch.elements_mm[e] - pivot_mm);
+        }
+      }
+      const std::size_t end = known.from_pivot_mm.size();
+      for (std::size_t begin = first; begin < end; begin += longest_run) {
+        known.runs.push_back({reading, begin, std::min(begin + longest_run, end)});
+      }
+    }
+  }
+  return known;
+}
+
+double prior_log_likelihood(std::span<const KnownElements> elements, const ContactModel& contact) {
+  std::array<std::size_t, most_reading_levels> counts{};
+  for (const KnownElements& known : elements) {
+    for (const ReadingRun& run : known.runs) {
+      counts[static_cast<std::size_t>(run.reading)] += run.end - run.begin;
+    }
+  }
   double sum = 0.0;
-  for (const ReadingRun& run : elements.runs) {
-    sum += static_cast<double>(run.end - run.begin) * prior_log_likelihood(run.reading, contact);
+  for (std::size_t level = 0; level < counts.size(); ++level) {
+    if (counts[level] > 0) {
+      sum += static_cast<double>(counts[level]) *
+             prior_log_likelihood(static_cast<Reading>(level), contact);
+    }
   }
   return sum;
 }

@@ -10,6 +10,7 @@
 #include "model/touch_evidence.hpp"
 #include "palpate/bounded_posterior.hpp"
 #include "palpate/contact_model.hpp"
+#include "shaders/interface.h"
 
 namespace palpate {
 
@@ -23,12 +24,10 @@ struct ReadingRun {
 };
 
 /// The elements of some touches that are not Unknown, in the robot frame and relative to the
-/// lattice's pivot. Elements multiply (Eq. 13), so that neither touches nor their order count:
-/// equal readings stand together, by their places. ContactEvidence holds the same elements for a
-/// device, touch by touch.
+/// lattice's pivot, in runs of equal readings.
 struct KnownElements {
   std::vector<glm::dvec2> from_pivot_mm;
-  std::vector<ReadingRun> runs;  ///< ascending by reading
+  std::vector<ReadingRun> runs;
 
   /// What is bounded and evaluated by itself: all of these elements together, or each displaced
   /// touch.
@@ -38,13 +37,14 @@ struct KnownElements {
 
   // Displaced touches, whose sensors may have stood elsewhere (touch_sd), are averaged each by
   // itself: their elements do not multiply with those of others.
-  std::vector<KnownElements> touches = {};  ///< each by itself; empty where all are exact
+  std::vector<KnownElements> touches = {};  ///< each by itself; empty where none is displaced
   glm::dvec2 sensor_from_pivot_mm = {};     ///< of one touch: the sensor's origin
   /// Where set, keeps what was evaluated of this one touch. Copies share it.
   std::shared_ptr<UndisplacedBins> undisplaced_bins = {};
 };
 
-/// The elements that are not Unknown.
+/// The elements of a touch for a search. Elements multiply (Eq. 13), so that neither touches nor
+/// their order count: there is one run of each reading, ascending, its elements ordered by place.
 /// @param options whose lattice has the pivot, and whose touch_sd says whether touches are
 /// displaced
 KnownElements known_elements(const TouchEvidence& touch, const BoundedOptions& options);
@@ -52,13 +52,35 @@ KnownElements known_elements(const TouchEvidence& touch, const BoundedOptions& o
 /// Indices of touches in an order that does not depend on when they came.
 std::vector<std::size_t> sorted_touches(std::span<const KnownElements> touches);
 
-/// The elements of all. Displaced touches stay in the order of the lists.
+/// The elements of all, in runs as those of one touch. Displaced touches stay in the order of the
+/// lists.
 KnownElements merged(std::span<const KnownElements> lists);
 
-/// The log-likelihood of the elements where nothing was sensed, in nats.
-double prior_log_likelihood(const KnownElements& elements, const ContactModel& contact);
-/// The log-likelihood of the elements where nothing was sensed by the numbers of each of so many
-/// objects, in nats, [object].
+/// The elements of touches for a device, touch by touch, each in runs of equal readings. No run is
+/// longer than `longest_run`, what one dispatch takes. They stand in the memory of `reuse`: touches
+/// of no more elements than before allocate nothing, whatever they read, and from_pivot_mm has room
+/// for every element of the touches.
+KnownElements gathered(std::span<const TouchEvidence> touches, const glm::dvec2& pivot_mm,
+                       std::size_t longest_run, KnownElements reuse = {});
+
+/// A run as kernels read it, in a list that begins at element `first`.
+inline shaders::Segment segment_of(const ReadingRun& run, std::size_t first = 0) {
+  return {.begin = static_cast<shaders::uint>(run.begin - first),
+          .end = static_cast<shaders::uint>(run.end - first),
+          .reading = static_cast<shaders::uint>(run.reading)};
+}
+
+/// Touches contradict all hypotheses where a map of nothing but the prior explains them better than
+/// the best pose of any object does, by more than this many nats. exp(-700) is among the smallest
+/// numbers that float64 holds at full precision.
+inline constexpr double contradiction_nats = 700.0;
+
+/// The log-likelihood of the elements on a map of nothing but the prior (Eq. 7), in nats. Where a
+/// table holds numbers of their own for every object, that of a reading is the log of the mean of
+/// the objects' likelihoods.
+double prior_log_likelihood(std::span<const KnownElements> elements, const ContactModel& contact);
+/// The log-likelihood of the elements on such a map by the numbers of each of so many objects, in
+/// nats, [object].
 std::vector<double> prior_log_likelihoods(const KnownElements& elements,
                                           const ContactModel& contact, std::size_t objects);
 

@@ -18,7 +18,7 @@
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 
-#include "model/interpolated_map.hpp"
+#include "model/map_likelihood.hpp"
 #include "model/touch_evidence.hpp"
 
 namespace palpate {
@@ -144,19 +144,21 @@ std::optional<SetupFinding> offset_on_drawings(const std::vector<Press>& presses
   struct Tried {
     TouchEvidence evidence;
     Pose T_object_sensor;
-    const InterpolatedMap* field;
-    ContactModel contact;
+    const MapLikelihood* likelihood;
   };
-  std::list<InterpolatedMap> fields;
+  std::list<MapLikelihood> likelihoods;
   std::vector<Tried> tried;
   for (const OccupancyGrid& map : maps) {
-    const InterpolatedMap* field = map.drawn ? &fields.emplace_back(map, map.prior) : nullptr;
+    if (!map.drawn) {
+      continue;
+    }
+    const ContactModel contact{.classifier = classifier, .prior = map.prior};
+    const MapLikelihood& likelihood = likelihoods.emplace_back(map, contact);
     for (const Press& press : presses) {
-      if (field != nullptr && press.label == map.label) {
+      if (press.label == map.label) {
         const Touch& touch = press.touches.front();
-        const ContactModel contact{.classifier = classifier, .prior = map.prior};
         tried.push_back({TouchEvidence(touch, contact),
-                         *press.T_object_robot * touch.T_robot_sensor, field, contact});
+                         *press.T_object_robot * touch.T_robot_sensor, &likelihood});
       }
     }
   }
@@ -166,12 +168,8 @@ std::optional<SetupFinding> offset_on_drawings(const std::vector<Press>& presses
   return offset_of([&](const Pose& offset) {
     std::vector<double> nats(tried.size());
     tbb::parallel_for(std::size_t{0}, tried.size(), [&](std::size_t i) {
-      const auto& [evidence, T_object_sensor, field, contact] = tried[i];
-      const Pose T_object_array = T_object_sensor * offset;
-      for (std::size_t e = 0; e < evidence.readings.size(); ++e) {
-        const double log_odds = field->log_odds(T_object_array * evidence.elements_mm[e]);
-        nats[i] += contact.log_likelihood(evidence.readings[e], MapSample{log_odds});
-      }
+      const auto& [evidence, T_object_sensor, likelihood] = tried[i];
+      nats[i] = likelihood->at(evidence, T_object_sensor * offset);
     });
     return std::accumulate(nats.begin(), nats.end(), 0.0);
   });

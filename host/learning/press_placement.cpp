@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
@@ -13,7 +14,6 @@
 #include "learning/plane_sums.hpp"
 #include "model/bounding_box.hpp"
 #include "model/contact_readings.hpp"
-#include "model/interpolated_map.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
@@ -23,10 +23,13 @@ namespace {
 /// Bins that are evaluated at the elements' own places.
 constexpr std::size_t evaluated_bins = 8;
 
-/// The contact model with a table.
-ContactModel sound(const ContactModel& contact) {
+/// The contact model with a table. Beyond a layer that a table is over lies the layer's own prior.
+ContactModel sound(ContactModel contact, const OccupancyGrid& layer) {
   contact.validate();
-  return tabulated(contact);
+  if (contact.table) {
+    contact.prior = layer.prior;
+  }
+  return tabulated(std::move(contact));
 }
 
 /// The indices of the largest values, the largest and then the first one first.
@@ -59,9 +62,8 @@ int PressPlacer::Samples::nearest(double mm) const {
 PressPlacer::PressPlacer(const Hypothesis& hypothesis, const ContactModel& contact,
                          const PoseLattice& lattice)
     : layer_(hypothesis.compared()),
-      contact_(sound(contact)),
-      map_(layer_, contact.table ? layer_.prior : contact.prior.value()),
-      likelihood_(map_, contact_, 0),
+      contact_(sound(contact, layer_)),
+      likelihood_(layer_, contact_),
       lattice_(lattice) {
   lattice_.collapse_fixed().validate();
   if (const auto fault = fault_of(layer_)) {
@@ -168,8 +170,8 @@ void PressPlacer::cover(double reach_mm) {
       for (int row = 0; row < y_.columns; ++row) {
         for (int column = 0; column < x_.columns; ++column, ++at) {
           const double log_odds =
-              map_.log_odds({x_.first_mm + x_.step_mm * (column * x_.per_step + x_phase),
-                             y_.first_mm + y_.step_mm * (row * y_.per_step + y_phase)});
+              likelihood_.log_odds({x_.first_mm + x_.step_mm * (column * x_.per_step + x_phase),
+                                    y_.first_mm + y_.step_mm * (row * y_.per_step + y_phase)});
           const double none = likelihood_.of(Reading::no_contact, log_odds);
           no_contact_[at] = static_cast<float>(none);
           unknown_excess_[at] = -no_contact_[at];

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "learning/training_maps.hpp"
-#include "model/evidence_likelihood.hpp"
+#include "model/map_likelihood.hpp"
 #include "model/touch_evidence.hpp"
 #include "palpate/contact_model.hpp"
 #include "palpate/estimate.hpp"
@@ -74,8 +74,7 @@ class PressPlacer {
 
   const OccupancyGrid& layer_;
   ContactModel contact_;  ///< with a table
-  InterpolatedMap map_;
-  EvidenceLikelihood likelihood_;
+  MapLikelihood likelihood_;
   PoseLattice lattice_;
   double reach_mm_ = -1.0;  ///< the tables cover elements so far from the pivot
   Samples x_;

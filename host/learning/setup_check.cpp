@@ -17,6 +17,7 @@
 #include "learning/mount_search.hpp"
 #include "learning/setup_judge.hpp"
 #include "model/bounding_box.hpp"
+#include "model/map_likelihood.hpp"
 #include "palpate/error.hpp"
 #include "palpate/fit.hpp"
 
@@ -182,14 +183,14 @@ void check_elements(SetupJudge& judge, Setup& setup, SetupCheck& check) {
   };
   std::vector<Element> elements(setup.elements_mm.size());
   judge.visit(setup, [&](const TriedTouch& given, const Touch& touch, const OccupancyGrid& map) {
-    const InterpolatedMap field(map, map.prior);
+    const MapLikelihood likelihood(map, judge.contact());
     for (std::size_t e = 0; e < given.readings.size(); ++e) {
       if (given.readings[e] == Reading::unknown) {
         continue;
       }
       const glm::dvec2 p = touch.T_robot_sensor * touch.elements_mm[e];
-      const double yes = judge.log_likelihood(Reading::in_contact, field, p);
-      const double no = judge.log_likelihood(Reading::no_contact, field, p);
+      const double yes = likelihood.at(Reading::in_contact, p);
+      const double no = likelihood.at(Reading::no_contact, p);
       const double share = 1.0 / (1.0 + std::exp(no - yes));
       const bool contact = is_contact(given.readings[e]);
       elements[e].contacts += contact ? 1 : 0;

@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "model/map_likelihood.hpp"
 #include "model/touch_evidence.hpp"
 #include "palpate/error.hpp"
 #include "palpate/fit.hpp"
@@ -76,10 +77,9 @@ double SetupJudge::nats(const Setup& setup) {
   double sum = 0.0;
   try {
     visit(setup, [&](const TriedTouch& given, const Touch& touch, const OccupancyGrid& map) {
-      const InterpolatedMap field(map, map.prior);
+      const MapLikelihood likelihood(map, contact_);
       for (std::size_t e = 0; e < given.readings.size(); ++e) {
-        sum +=
-            log_likelihood(given.readings[e], field, touch.T_robot_sensor * touch.elements_mm[e]);
+        sum += likelihood.at(given.readings[e], touch.T_robot_sensor * touch.elements_mm[e]);
       }
     });
   } catch (const Error& error) {
@@ -97,13 +97,13 @@ SetupFit SetupJudge::fit(const Setup& setup) {
     const std::optional<Fit> fit = fit_of({&touch, 1}, {}, map, contact_);
     result.touches += fit ? 1 : 0;
     result.misfits += fit && fit->z < fits_from_z ? 1 : 0;
-    const InterpolatedMap field(map, map.prior);
-    const MapSample unknown{std::log(map.prior / (1.0 - map.prior))};
+    const MapLikelihood likelihood(map, contact_);
+    const double prior_log_odds = std::log(map.prior / (1.0 - map.prior));
     for (std::size_t e = 0; e < given.readings.size(); ++e) {
       if (is_alive(touch, e)) {
         const Reading reading = given.readings[e];
-        result.told += log_likelihood(reading, field, touch.T_robot_sensor * touch.elements_mm[e]) -
-                       contact_.log_likelihood(reading, unknown);
+        result.told += likelihood.at(reading, touch.T_robot_sensor * touch.elements_mm[e]) -
+                       likelihood.of(reading, prior_log_odds);
       }
     }
   });

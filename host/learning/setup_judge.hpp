@@ -12,7 +12,6 @@
 
 #include <glm/vec2.hpp>
 
-#include "model/interpolated_map.hpp"
 #include "palpate/contact_model.hpp"
 #include "palpate/map_builder.hpp"
 #include "palpate/touch.hpp"
@@ -74,10 +73,6 @@ class SetupJudge {
 
   /// Visits every touch as the set-up has it. @throws Error as MapBuilder does
   void visit(const Setup& setup, const Take& take);
-
-  double log_likelihood(Reading reading, const InterpolatedMap& field, const glm::dvec2& p) const {
-    return contact_.log_likelihood(reading, MapSample{field.log_odds(p)});
-  }
 
   /// By object.
   const std::map<std::string, std::vector<TriedTouch>>& touches() const { return touches_; }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <span>
 #include <utility>
 
@@ -36,6 +37,32 @@ double interpolate(const LikelihoodTable& table, Reading level, double log_odds,
       last);
   const auto node = std::min(static_cast<std::size_t>(place), table.nodes - 2);
   return std::lerp(nats[node], nats[node + 1], place - static_cast<double>(node));
+}
+
+/// The model's log-likelihoods at nodes of its own.
+LikelihoodTable sampled(const ContactModel& contact) {
+  LikelihoodTable table{.first_log_odds = -16.0,
+                        .last_log_odds = 16.0,
+                        .nodes = 1025,
+                        .level_edges = {},
+                        .log_likelihood = {}};
+  std::size_t sets = 1;
+  if (contact.table) {
+    table.level_edges = contact.table->level_edges;
+    sets = contact.table->sets();
+  }
+  const double last = static_cast<double>(table.nodes - 1);
+  for (std::size_t set = 0; set < sets; ++set) {
+    for (std::size_t level = 0; level < table.levels(); ++level) {
+      for (std::size_t node = 0; node < table.nodes; ++node) {
+        const double value =
+            std::lerp(table.first_log_odds, table.last_log_odds, static_cast<double>(node) / last);
+        table.log_likelihood.push_back(
+            contact.log_likelihood(static_cast<Reading>(level), {.log_odds = value}, set));
+      }
+    }
+  }
+  return table;
 }
 
 [[noreturn]] void refuse_table(const std::string& fault) {
@@ -137,20 +164,24 @@ double ContactModel::log_likelihood(Reading reading, const MapSample& map,
 }
 
 ContactModel tabulated(ContactModel contact) {
-  if (contact.table) {
-    return contact;
+  if (!contact.table) {
+    contact.table = sampled(contact);
   }
-  LikelihoodTable table{.first_log_odds = -16.0,
-                        .last_log_odds = 16.0,
-                        .nodes = 1025,
-                        .level_edges = {},
-                        .log_likelihood = {}};
-  const double last = static_cast<double>(table.nodes - 1);
-  for (const Reading reading : {Reading::no_contact, Reading::in_contact}) {
-    for (std::size_t node = 0; node < table.nodes; ++node) {
-      const double value =
-          std::lerp(table.first_log_odds, table.last_log_odds, static_cast<double>(node) / last);
-      table.log_likelihood.push_back(contact.log_likelihood(reading, {.log_odds = value}));
+  return contact;
+}
+
+ContactModel predictive(ContactModel contact) {
+  LikelihoodTable table = sampled(contact);
+  const std::size_t of_a_set = table.levels() * table.nodes;
+  for (std::size_t set = 0; set < table.log_likelihood.size(); set += of_a_set) {
+    for (std::size_t node = set; node < set + table.nodes; ++node) {
+      double all = -std::numeric_limits<double>::infinity();
+      for (std::size_t at = node; at < set + of_a_set; at += table.nodes) {
+        all = log_sum(all, table.log_likelihood[at]);
+      }
+      for (std::size_t at = node; at < set + of_a_set; at += table.nodes) {
+        table.log_likelihood[at] -= all;
+      }
     }
   }
   contact.table = std::move(table);

@@ -20,4 +20,9 @@ std::vector<Reading> classify(const Touch& touch, const ContactClassifier& class
 /// @param contact with a prior
 ContactModel tabulated(ContactModel contact);
 
+/// A model that gives every reading but Unknown its log-probability, log P(r | l) / sum over all r'
+/// of P(r' | l), in a table: within 2e-4 nats of Eq. 7, log odds beyond +-16 as at +-16.
+/// @param contact with a prior
+ContactModel predictive(ContactModel contact);
+
 }  // namespace palpate

@@ -1,12 +1,12 @@
 #include "palpate/fit.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <vector>
 
 #include "model/displacement_points.hpp"
-#include "model/interpolated_map.hpp"
-#include "model/predicted_readings.hpp"
+#include "model/map_likelihood.hpp"
 #include "model/random.hpp"
 #include "model/reading_mixture.hpp"
 #include "model/touch_evidence.hpp"
@@ -15,14 +15,25 @@ namespace palpate {
 
 namespace {
 
-/// @param log_p [level] log-likelihood of each reading of an element, in nats
+/// Adds an element's reading, which has probability q(r) = P(r) / sum over all r' of P(r').
+/// @param log_p [level] log P of each reading, in nats
 void add(FitSums& sums, Reading reading, std::span<const double> log_p) {
-  const PredictedReading predicted = predicted_reading(log_p);
-  const double mean = predicted.most + predicted.below_most;
+  const double largest = *std::ranges::max_element(log_p);
+  std::array<double, most_reading_levels> probability{};
+  double total = 0.0;
+  for (std::size_t level = 0; level < log_p.size(); ++level) {
+    total += probability[level] = std::exp(log_p[level] - largest);
+  }
+  double below_largest = 0.0;  // of the mean: no cancellation
+  for (std::size_t level = 0; level < log_p.size(); ++level) {
+    probability[level] /= total;
+    below_largest += probability[level] * (log_p[level] - largest);
+  }
+  const double mean = largest + below_largest;
   sums.deviation += log_p[static_cast<std::size_t>(reading)] - mean;
   for (std::size_t level = 0; level < log_p.size(); ++level) {
     const double from_mean = log_p[level] - mean;
-    sums.variance += predicted.probability[level] * from_mean * from_mean;
+    sums.variance += probability[level] * from_mean * from_mean;
   }
 }
 
@@ -35,13 +46,12 @@ Verdict verdict_on(double z, double fits_from = fits_from_z,
 
 /// What the object says about these elements where each of the displacements may be the sensor's.
 ReadingMixture mixture_of(std::span<const glm::dvec2> elements_mm, const Pose& T_object_sensor,
-                          std::span<const Pose> displacements, const InterpolatedMap& map,
-                          const ContactModel& contact, std::size_t object) {
-  ReadingMixture mixture(displacements.size(), elements_mm.size(), reading_levels(contact));
+                          std::span<const Pose> displacements, const MapLikelihood& likelihood) {
+  ReadingMixture mixture(displacements.size(), elements_mm.size(), likelihood.levels());
+  std::vector<double> logs(elements_mm.size() * likelihood.levels());
   for (std::size_t k = 0; k < displacements.size(); ++k) {
-    const std::vector<double> logs = reading_log_likelihoods(
-        elements_mm, T_object_sensor * displacements[k], map, contact, object);
-    mixture.set(k, std::span(logs));
+    likelihood.all_readings(elements_mm, T_object_sensor * displacements[k], logs);
+    mixture.set(k, logs);
   }
   return mixture;
 }
@@ -147,9 +157,7 @@ std::vector<std::optional<FitSums>> fit_sums(std::span<const TouchEvidence> touc
   constexpr std::size_t points = 128;  // log means of letters within 0.1 nats, sd 1 mm and 0.05 rad
   constexpr std::size_t draws = 64;    // the mean of z is out by 1 / sqrt(draws) at most
   constexpr std::uint64_t seed = 0;
-  ContactModel model = contact;
-  model.prior = contact.prior.value_or(map.prior);
-  const InterpolatedMap interpolated(map, *model.prior);
+  const MapLikelihood likelihood(map, contact, object);
   const std::vector<Pose> displacements = displacement_points(touch_sd, points);
   Random random(seed, Stream::readings);
   const auto displaced = [&](const TouchEvidence& known, const Pose& T_object_sensor) {
@@ -158,16 +166,15 @@ std::vector<std::optional<FitSums>> fit_sums(std::span<const TouchEvidence> touc
       displacement = random_displacement(touch_sd, random);
     }
     const ReadingMixture judge =
-        mixture_of(known.elements_mm, T_object_sensor, displacements, interpolated, model, object);
-    const ReadingMixture source =
-        mixture_of(known.elements_mm, T_object_sensor, drawn, interpolated, model, object);
+        mixture_of(known.elements_mm, T_object_sensor, displacements, likelihood);
+    const ReadingMixture source = mixture_of(known.elements_mm, T_object_sensor, drawn, likelihood);
     const Moments predicted = predicted_log_mean(judge, source, random);
     return FitSums{judge.log_mean(known.readings) - predicted.mean, predicted.variance};
   };
-  const auto exact = [&](const TouchEvidence& known, const Pose& T_object_sensor) {
-    const std::size_t levels = reading_levels(model);
-    const std::vector<double> logs =
-        reading_log_likelihoods(known.elements_mm, T_object_sensor, interpolated, model, object);
+  const auto undisplaced = [&](const TouchEvidence& known, const Pose& T_object_sensor) {
+    const std::size_t levels = likelihood.levels();
+    std::vector<double> logs(known.readings.size() * levels);
+    likelihood.all_readings(known.elements_mm, T_object_sensor, logs);
     FitSums sums;
     for (std::size_t e = 0; e < known.readings.size(); ++e) {
       add(sums, known.readings[e], std::span(logs).subspan(e * levels, levels));
@@ -179,7 +186,7 @@ std::vector<std::optional<FitSums>> fit_sums(std::span<const TouchEvidence> touc
     const TouchEvidence known = touch.known();
     const Pose T_object_sensor = T_object_robot * touch.T_robot_sensor;
     sums.push_back(known.readings.empty() ? std::optional<FitSums>()
-                   : touch_sd.none()      ? exact(known, T_object_sensor)
+                   : touch_sd.none()      ? undisplaced(known, T_object_sensor)
                                           : displaced(known, T_object_sensor));
   }
   return sums;

@@ -12,7 +12,8 @@ namespace palpate {
 class InterpolatedMap {
  public:
   /// @param map outlives this object
-  InterpolatedMap(const OccupancyGrid& map, double prior);
+  InterpolatedMap(const OccupancyGrid& map, double prior)
+      : map_(map), beyond_(log_odds_from_probability(prior)) {}
 
   double log_odds(const glm::dvec2& p_object_mm) const {
     const glm::dvec2 place = (p_object_mm - map_.origin_mm) / map_.cell_mm;
@@ -41,7 +42,10 @@ class InterpolatedMap {
     return whole - static_cast<int>(value < whole);
   }
   static double between(double a, double b, double share) { return a + share * (b - a); }
-  double cell(int i, int j) const;
+  double cell(int i, int j) const {
+    const bool inside = i >= 0 && i < map_.nx && j >= 0 && j < map_.ny;
+    return inside ? static_cast<double>(map_.at(i, j)) : beyond_;
+  }
 
   const OccupancyGrid& map_;
   double beyond_;

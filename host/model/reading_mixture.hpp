@@ -21,9 +21,8 @@ class ReadingMixture {
   std::size_t levels() const { return levels_; }
 
   /// What one hypothesis says: the log-likelihood of every reading, [element, level], in nats, as
-  /// reading_log_likelihoods() gives it.
-  template <typename Number>
-  void set(std::size_t hypothesis, std::span<const Number> log_likelihoods) {
+  /// MapLikelihood::all_readings() gives it.
+  void set(std::size_t hypothesis, std::span<const double> log_likelihoods) {
     for (std::size_t i = 0; i < log_likelihoods.size(); ++i) {
       log_likelihood_[i * stride_ + hypothesis] = log_likelihoods[i];
     }

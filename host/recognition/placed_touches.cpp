@@ -11,7 +11,6 @@
 
 #include "estimation/lattice/refinement.hpp"
 #include "model/contact_readings.hpp"
-#include "model/interpolated_map.hpp"
 
 namespace palpate {
 
@@ -29,9 +28,7 @@ bool stays(const Axis& axis) { return axis.lower == axis.upper; }
 PlacedTouches::PlacedTouches(std::span<const TouchEvidence> touches, const RecognitionTask& task,
                              std::size_t object, const PoseLattice& region)
     : touches_(touches),
-      likelihood_(InterpolatedMap(
-                      task.hypotheses[object].compared(),
-                      with_prior(task.contact(), task.hypotheses[object].compared()).prior.value()),
+      likelihood_(task.hypotheses[object].compared(),
                   tabulated(with_prior(task.contact(), task.hypotheses[object].compared())),
                   object),
       region_(region),

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "model/evidence_likelihood.hpp"
+#include "model/map_likelihood.hpp"
 #include "model/touch_evidence.hpp"
 #include "palpate/lattice.hpp"
 #include "recognition/recognition_task.hpp"
@@ -56,7 +56,7 @@ class PlacedTouches {
 
  private:
   std::span<const TouchEvidence> touches_;
-  EvidenceLikelihood likelihood_;
+  MapLikelihood likelihood_;
   PoseLattice region_;
   glm::dvec2 middle_mm_{0.0};  ///< of the arrays, in the robot frame
   double rad_per_mm_ = 0.0;    ///< turn that moves the object by 1 mm, root mean square

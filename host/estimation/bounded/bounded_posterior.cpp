@@ -12,10 +12,9 @@
 #include "estimation/bounded/search_memory.hpp"
 #include "estimation/hypotheses.hpp"
 #include "estimation/lattice/expected_gain.hpp"
-#include "estimation/lattice/reading_predictor.hpp"
 #include "estimation/lattice/refinement.hpp"
 #include "estimation/log_sum.hpp"
-#include "model/interpolated_map.hpp"
+#include "model/map_likelihood.hpp"
 #include "model/own_process.hpp"
 #include "palpate/error.hpp"
 
@@ -30,8 +29,8 @@ struct BoundedPosterior::Impl {
   }
 
   BoundedBelief belief;
-  std::optional<ReadingPredictor> predictor;  ///< once a gain is asked for
-  std::vector<Body> bodies;                   ///< [hypothesis]
+  std::optional<PredictedReadings> predicted;  ///< once a gain is asked for
+  std::vector<Body> bodies;                    ///< [hypothesis]
   OwnProcess process;
 };
 
@@ -297,15 +296,15 @@ double BoundedPosterior::log_likelihood(int object, const Pose& T_object_robot) 
                      .x_count = 1};
     return belief.log_likelihood(std::span(&box, 1)).front();
   }
-  const ContactModel& contact = belief.touches().options().contact;
-  const InterpolatedMap map(belief.touches().hypotheses()[object].compared(), *contact.prior);
+  const MapLikelihood likelihood(belief.touches().hypotheses()[object].compared(),
+                                 belief.touches().options().contact,
+                                 static_cast<std::size_t>(object));
   double sum = 0.0;
   for (const ReadingRun& run : elements.runs) {
     for (std::size_t e = run.begin; e < run.end; ++e) {
       const glm::dvec2 p_mm = T_object_robot * (elements.from_pivot_mm[e] +
                                                 belief.touches().options().lattice.pivot_mm);
-      sum += contact.log_likelihood(run.reading, {map.log_odds(p_mm)},
-                                    static_cast<std::size_t>(object));
+      sum += likelihood.at(run.reading, p_mm);
     }
   }
   return sum;
@@ -336,11 +335,11 @@ std::vector<TouchGain> BoundedPosterior::expected_gain(std::span<const Pose> T_r
   Impl& posterior = with_touches_taken_in();
   BoundedBelief& belief = posterior.belief;
   require_plan(T_robot_sensor, elements_mm, plan, posterior.bodies.size());
-  if (!posterior.predictor) {
-    posterior.predictor.emplace(belief.touches().hypotheses(), belief.touches().options().contact);
+  if (!posterior.predicted) {
+    posterior.predicted.emplace(belief.touches().hypotheses(), belief.touches().options().contact);
   }
   const std::vector<PoseSample> samples = belief.sample(plan.samples, plan.seed);
-  return palpate::expected_gain(*posterior.predictor, samples, T_robot_sensor, elements_mm,
+  return palpate::expected_gain(*posterior.predicted, samples, T_robot_sensor, elements_mm,
                                 belief.touches().options().touch_sd, plan);
 }
 

@@ -132,40 +132,38 @@ void DenseLikelihood::reserve(std::size_t elements) {
   }
 }
 
-void DenseLikelihood::accumulate(const ContactEvidence& evidence, const DenseBelief& belief,
+void DenseLikelihood::accumulate(const KnownElements& known, const DenseBelief& belief,
                                  const std::function<void(double)>& progress) {
-  const auto& segments = evidence.segments;
+  const std::vector<ReadingRun>& runs = known.runs;
   const double bins = static_cast<double>(lattice_.bins()) * static_cast<double>(objects_);
-  const double all_work = bins * static_cast<double>(evidence.from_pivot_mm.size());
+  const double all_work = bins * static_cast<double>(known.from_pivot_mm.size());
   double done = 0.0;
   double pending = 0.0;
-  // For the whole touches, so that the next ones, of which more may be known, find room.
-  const std::size_t most = std::min(evidence.elements(), batch_elements_);
-  reserve(most);
-  batch_.reserve(segments.capacity());
-  rotated_.reserve(most * static_cast<std::size_t>(lattice_.theta_rad.count));
+  // For all elements of the touches, so that the next ones, of which more may be known, find room.
+  const std::size_t room = std::min(known.from_pivot_mm.capacity(), batch_elements_);
+  reserve(room);
+  batch_.reserve(runs.capacity());
+  rotated_.reserve(room * static_cast<std::size_t>(lattice_.theta_rad.count));
 
-  for (std::size_t s = 0; s < segments.size();) {
-    // As many whole segments as the table holds and as the kernel's loops take together: up to two
-    // iterations for an element and eight for a segment.
-    const std::size_t first = segments[s].begin;
+  for (std::size_t run = 0; run < runs.size();) {
+    // As many whole runs as the table holds and as the kernel's loops take together: up to two
+    // iterations for an element and eight for a run.
+    const std::size_t first = runs[run].begin;
     batch_.clear();
-    const auto fits = [&](const shaders::Segment& next) {
+    const auto fits = [&](const ReadingRun& next) {
       const std::size_t elements = next.end - first;
       return elements <= batch_elements_ &&
              elements + 4 * (batch_.size() + 1) <= gpu::most_iterations;
     };
-    for (; s < segments.size() && fits(segments[s]); ++s) {
-      batch_.push_back(segments[s]);
-      batch_.back().begin -= static_cast<shaders::uint>(first);
-      batch_.back().end -= static_cast<shaders::uint>(first);
+    for (; run < runs.size() && fits(runs[run]); ++run) {
+      batch_.push_back(segment_of(runs[run], first));
     }
     const std::size_t elements = batch_.back().end;
     stream_.upload(segments_, batch_);
 
     for (const Group& group : groups_) {
-      rotated_ = rotate_evidence(std::span(evidence.from_pivot_mm).subspan(first, elements),
-                                 lattice_.theta_rad, group.kind.cell_mm, std::move(rotated_));
+      rotated_ = rotated_elements(std::span(known.from_pivot_mm).subspan(first, elements),
+                                  lattice_.theta_rad, group.kind.cell_mm, std::move(rotated_));
       stream_.upload(elements_, rotated_);
       for (const Slab& slab : belief.slabs()) {
         const Range range = within(group, slab);

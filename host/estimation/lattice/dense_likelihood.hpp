@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "estimation/contact_evidence.hpp"
 #include "estimation/contact_kernel.hpp"
+#include "estimation/known_elements.hpp"
 #include "estimation/lattice/dense_belief.hpp"
 #include "estimation/lattice/map_table.hpp"
 #include "gpu/command_stream.hpp"
@@ -33,12 +33,12 @@ class DenseLikelihood {
                   std::span<const Hypothesis> hypotheses, const PoseLattice& lattice,
                   const ContactModel& model);
 
-  /// Most elements that one segment of the evidence may hold.
-  std::size_t segment_elements() const { return batch_elements_; }
+  /// Most elements that one run may hold.
+  std::size_t longest_run() const { return batch_elements_; }
 
-  /// Adds the evidence to the belief. Runs the stream from time to time, so that no submission
-  /// keeps a device busy for long, and reports the fraction done.
-  void accumulate(const ContactEvidence& evidence, const DenseBelief& belief,
+  /// Adds the elements' log-likelihoods to the belief. Runs the stream from time to time, so that
+  /// no submission keeps a device busy for long, and reports the fraction done.
+  void accumulate(const KnownElements& elements, const DenseBelief& belief,
                   const std::function<void(double)>& progress);
 
   /// The path of every cell size among the maps, and why it was chosen.

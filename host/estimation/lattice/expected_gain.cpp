@@ -12,6 +12,7 @@
 
 #include <fmt/format.h>
 
+#include "model/contact_readings.hpp"
 #include "model/displacement_points.hpp"
 #include "model/random.hpp"
 #include "palpate/error.hpp"
@@ -126,14 +127,15 @@ class Mean {
 /// One thread's work on candidates, with its memory.
 class GainEstimator {
  public:
-  GainEstimator(const ReadingPredictor& predictor, const SampledBelief& belief,
+  GainEstimator(const PredictedReadings& predicted, const SampledBelief& belief,
                 std::span<const glm::dvec2> elements_mm)
-      : predictor_(predictor),
+      : predicted_(predicted),
         belief_(belief),
         elements_mm_(elements_mm),
         columns_((belief.samples.size() + lanes - 1) / lanes * lanes),
         copies_(belief.displacements.size()),
-        copy_size_(elements_mm.size() * predictor.levels() * columns_),
+        copy_size_(elements_mm.size() * predicted.levels() * columns_),
+        of_sample_(elements_mm.size() * predicted.levels()),
         logs_(copies_ * copy_size_),
         rows_(elements_mm.size()),
         sums_(copies_ * columns_),
@@ -176,9 +178,13 @@ class GainEstimator {
       const Pose displaced = T_robot_sensor * belief_.displacements[copy];
       for (std::size_t i = 0; i < belief_.samples.size(); ++i) {
         const PoseSample& sample = belief_.samples[i];
-        predictor_.predict(static_cast<std::size_t>(sample.object),
-                           sample.T_object_robot * displaced, elements_mm_,
-                           std::span(logs_).subspan(copy * copy_size_ + i), columns_);
+        predicted_.of(static_cast<std::size_t>(sample.object))
+            .all_readings(elements_mm_, sample.T_object_robot * displaced, of_sample_);
+        float* out = logs_.data() + copy * copy_size_ + i;
+        for (const double log : of_sample_) {
+          *out = static_cast<float>(log);
+          out += columns_;
+        }
       }
     }
   }
@@ -186,7 +192,7 @@ class GainEstimator {
   /// Simulates the readings by a copy of sample i: the row of logs_ of each.
   void read(std::size_t i, std::size_t copy) {
     const float* const logs = logs_.data() + copy * copy_size_ + i;
-    const std::size_t levels = predictor_.levels();
+    const std::size_t levels = predicted_.levels();
     for (std::size_t e = 0; e < rows_.size(); ++e) {
       float left = belief_.uniforms[i * rows_.size() + e];
       std::size_t row = e * levels;
@@ -254,12 +260,13 @@ class GainEstimator {
     return {.identity = std::max(identity / all - log_all, 0.0), .pose = std::max(pose / all, 0.0)};
   }
 
-  const ReadingPredictor& predictor_;
+  const PredictedReadings& predicted_;
   const SampledBelief& belief_;
   std::span<const glm::dvec2> elements_mm_;
   std::size_t columns_;
   std::size_t copies_;                  ///< of every sample: displacements
   std::size_t copy_size_;               ///< numbers of one copy in logs_
+  std::vector<double> of_sample_;       ///< [element, level]
   std::vector<float> logs_;             ///< [copy, element, level, sample]
   std::vector<std::size_t> rows_;       ///< [element] of the simulated reading
   std::vector<float> sums_;             ///< [copy, sample]
@@ -268,6 +275,17 @@ class GainEstimator {
 };
 
 }  // namespace
+
+PredictedReadings::PredictedReadings(std::span<const Hypothesis> hypotheses,
+                                     const ContactModel& contact) {
+  const ContactModel model = predictive(contact);
+  for (const Hypothesis& hypothesis : hypotheses) {
+    maps_.push_back(hypothesis.compared());
+  }
+  for (const OccupancyGrid& map : maps_) {
+    on_map_.emplace_back(map, model, on_map_.size());
+  }
+}
 
 void require_plan(std::span<const Pose> T_robot_sensor, std::span<const glm::dvec2> elements_mm,
                   const PlanOptions& options, std::size_t objects) {
@@ -319,7 +337,7 @@ void slip(std::span<PoseSample> samples, std::span<const Body> bodies, const Dis
   }
 }
 
-std::vector<TouchGain> expected_gain(const ReadingPredictor& predictor,
+std::vector<TouchGain> expected_gain(const PredictedReadings& predicted,
                                      std::span<const PoseSample> samples,
                                      std::span<const Pose> T_robot_sensor,
                                      std::span<const glm::dvec2> elements_mm,
@@ -333,7 +351,7 @@ std::vector<TouchGain> expected_gain(const ReadingPredictor& predictor,
                               (gains.size() + fewest_candidates - 1) / fewest_candidates);
   std::atomic<std::size_t> next = 0;
   const auto work = [&] {
-    GainEstimator estimator(predictor, belief, elements_mm);
+    GainEstimator estimator(predicted, belief, elements_mm);
     for (std::size_t i = next++; i < gains.size(); i = next++) {
       gains[i] = estimator.gain(T_robot_sensor[i]);
     }

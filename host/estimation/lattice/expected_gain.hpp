@@ -5,7 +5,8 @@
 
 #include <glm/vec2.hpp>
 
-#include "estimation/lattice/reading_predictor.hpp"
+#include "model/map_likelihood.hpp"
+#include "palpate/contact_model.hpp"
 #include "palpate/displacement.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/plan.hpp"
@@ -13,6 +14,21 @@
 #include "palpate/pose_error.hpp"
 
 namespace palpate {
+
+/// What touches of the hypotheses' objects read: the log-probability of every reading, see
+/// predictive(), on a copy of each map.
+class PredictedReadings {
+ public:
+  /// @param contact resolved for these hypotheses: with a prior
+  PredictedReadings(std::span<const Hypothesis> hypotheses, const ContactModel& contact);
+
+  const MapLikelihood& of(std::size_t object) const { return on_map_[object]; }
+  std::size_t levels() const { return on_map_.front().levels(); }
+
+ private:
+  std::vector<OccupancyGrid> maps_;
+  std::vector<MapLikelihood> on_map_;
+};
 
 /// Throws Error unless there are candidates and elements, all finite, 2 to 4096 samples, and a
 /// label for every object or none.
@@ -40,7 +56,7 @@ void slip(std::span<PoseSample> samples, std::span<const Body> bodies, const Dis
 /// mm and 0.05 rad, and their ranking holds (correlation 0.94 to 0.97 with 48 displacements of 600
 /// samples).
 /// @param options `samples` is not read
-std::vector<TouchGain> expected_gain(const ReadingPredictor& predictor,
+std::vector<TouchGain> expected_gain(const PredictedReadings& predicted,
                                      std::span<const PoseSample> samples,
                                      std::span<const Pose> T_robot_sensor,
                                      std::span<const glm::dvec2> elements_mm,

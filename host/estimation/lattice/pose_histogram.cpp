@@ -7,14 +7,13 @@
 #include <fmt/format.h>
 
 #include "estimation/change_in_steps.hpp"
-#include "estimation/contact_evidence.hpp"
 #include "estimation/displacement_check.hpp"
 #include "estimation/hypotheses.hpp"
+#include "estimation/known_elements.hpp"
 #include "estimation/lattice/dense_belief.hpp"
 #include "estimation/lattice/dense_likelihood.hpp"
 #include "estimation/lattice/expected_gain.hpp"
 #include "estimation/lattice/histogram_room.hpp"
-#include "estimation/lattice/reading_predictor.hpp"
 #include "estimation/lattice/refinement.hpp"
 #include "estimation/lattice/touch_by_touch.hpp"
 #include "estimation/pose_draws.hpp"
@@ -31,7 +30,7 @@ struct PoseHistogram::Impl {
         stream(device.context()),
         belief(device.context(), stream, options.lattice, hypotheses.size()),
         likelihood(device.context(), stream, belief, hypotheses, options.lattice, options.contact),
-        predictor(hypotheses, options.contact),
+        predicted(hypotheses, options.contact),
         log_weight(log_weights(hypotheses)) {
     for (const Hypothesis& hypothesis : hypotheses) {
       bodies.push_back(displaced_body(hypothesis.map));
@@ -47,34 +46,31 @@ struct PoseHistogram::Impl {
 
   /// Eq. 13: the log-belief of a bin is the sum of the touches' log-likelihoods there (Eq. 7).
   void update(std::span<const TouchEvidence> touches, const std::function<void(double)>& progress) {
-    const std::span<const ContactEvidence> evidence = gatherer.gather(
-        touches, by_touch.has_value(), options.lattice.pivot_mm, likelihood.segment_elements());
     change.change([&] {
       touched = touched || !touches.empty();
       summarised.reset();
-      if (by_touch) {
-        update_by_touch(touches, evidence, progress);
-      } else {
-        likelihood.accumulate(evidence.front(), belief, progress);
+      if (!by_touch) {
+        gather(touches);
+        likelihood.accumulate(known, belief, progress);
+        return;
       }
-      prior_log_likelihood += palpate::prior_log_likelihood(evidence, options.contact);
+      for (std::size_t i = 0; i < touches.size(); ++i) {
+        gather(touches.subspan(i, 1));
+        const auto evaluate = [&](const DenseBelief& uniform) {
+          likelihood.accumulate(known, uniform, {});
+        };
+        // std::function would allocate a copy of it.
+        by_touch->update(touches[i], std::cref(evaluate), belief);
+        if (progress) {
+          progress(static_cast<double>(i + 1) / static_cast<double>(touches.size()));
+        }
+      }
     });
   }
 
-  /// Updates as above where each touch's likelihood is wanted by itself.
-  void update_by_touch(std::span<const TouchEvidence> touches,
-                       std::span<const ContactEvidence> evidence,
-                       const std::function<void(double)>& progress) {
-    for (std::size_t i = 0; i < touches.size(); ++i) {
-      const auto evaluate = [&](const DenseBelief& uniform) {
-        likelihood.accumulate(evidence[i], uniform, {});
-      };
-      // std::function would allocate a copy of it.
-      by_touch->update(touches[i], evidence[i], std::cref(evaluate), belief);
-      if (progress) {
-        progress(static_cast<double>(i + 1) / static_cast<double>(touches.size()));
-      }
-    }
+  void gather(std::span<const TouchEvidence> touches) {
+    known = gathered(touches, options.lattice.pivot_mm, likelihood.longest_run(), std::move(known));
+    prior_log_likelihood += palpate::prior_log_likelihood({&known, 1}, options.contact);
   }
 
   /// The largest bin and the sum of every object; reduced once after each update.
@@ -144,8 +140,8 @@ struct PoseHistogram::Impl {
   DenseBelief belief;
   DenseLikelihood likelihood;
   std::vector<TouchEvidence> classified;  ///< room for touches that are not classified
-  EvidenceGatherer gatherer;
-  ReadingPredictor predictor;  ///< of touches that are only imagined
+  KnownElements known;                    ///< of what is being taken in
+  PredictedReadings predicted;            ///< of touches that are only imagined
   std::vector<double> log_weight;
   std::optional<TouchByTouch> by_touch;   ///< where the options need each touch by itself
   std::optional<double> none_log_weight;  ///< log of its prior weight times the number of bins
@@ -330,7 +326,7 @@ std::vector<TouchGain> PoseHistogram::expected_gain(std::span<const Pose> T_robo
   if (histogram.touched) {  // the object slips between touches, not before the first
     slip(samples, histogram.bodies, histogram.options.slip_sd, plan.seed);
   }
-  return palpate::expected_gain(histogram.predictor, samples, T_robot_sensor, elements_mm,
+  return palpate::expected_gain(histogram.predicted, samples, T_robot_sensor, elements_mm,
                                 histogram.options.touch_sd, plan);
 }
 

@@ -111,7 +111,7 @@ void TouchByTouch::reset() {
   felt_ = false;
 }
 
-void TouchByTouch::update(const TouchEvidence& touch, const ContactEvidence& evidence,
+void TouchByTouch::update(const TouchEvidence& touch,
                           const std::function<void(const DenseBelief&)>& evaluate,
                           DenseBelief& belief) {
   if (slip_blur_ && touched_) {
@@ -123,7 +123,7 @@ void TouchByTouch::update(const TouchEvidence& touch, const ContactEvidence& evi
   // A touch without a known element says nothing, not even where the array was. A displacement
   // moves likelihood between neighbouring bins: it changes their sum at the edge of the overlap
   // alone, and is left out of it.
-  if (overlap_ && !evidence.segments.empty()) {
+  if (overlap_ && touch.tells()) {
     add_to_none(array_rectangle(touch.T_robot_sensor, touch.elements_mm, pivot_mm));
   }
   touch_blur_.blur_planes(scratch_, scratch_, references_);

@@ -6,7 +6,6 @@
 #include <span>
 #include <vector>
 
-#include "estimation/contact_evidence.hpp"
 #include "estimation/lattice/dense_belief.hpp"
 #include "estimation/lattice/dense_likelihood.hpp"
 #include "estimation/lattice/displacement_blur.hpp"
@@ -75,8 +74,8 @@ class TouchByTouch {
                DenseBelief& belief);
 
   /// Adds a touch. `evaluate` adds its log-likelihood at every bin to a belief that is uniform.
-  void update(const TouchEvidence& touch, const ContactEvidence& evidence,
-              const std::function<void(const DenseBelief&)>& evaluate, DenseBelief& belief);
+  void update(const TouchEvidence& touch, const std::function<void(const DenseBelief&)>& evaluate,
+              DenseBelief& belief);
   /// Forgets all touches.
   void reset();
 

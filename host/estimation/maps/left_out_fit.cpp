@@ -18,7 +18,7 @@
 #include "estimation/lattice/refinement.hpp"
 #include "model/body_spread.hpp"
 #include "model/contact_readings.hpp"
-#include "model/evidence_likelihood.hpp"
+#include "model/map_likelihood.hpp"
 #include "model/random.hpp"
 
 namespace palpate {
@@ -63,8 +63,7 @@ std::vector<PlaceError> place_errors(std::span<const TouchEvidence> touches, con
   constexpr std::size_t most_touches = 54;  // in all groups of a size
   constexpr double another_peak_mm = 1.5;
   constexpr double wide_mm = 0.8;
-  const EvidenceLikelihood likelihood(InterpolatedMap(of.compared(), model.prior.value()),
-                                      tabulated(model), object);
+  const MapLikelihood likelihood(of.compared(), tabulated(model), object);
   const Body body = displaced_body(of.map);
   const PoseLattice lattice = lattice_about(body);
   std::vector<PlaceError> errors;

@@ -8,7 +8,6 @@
 #include <fmt/format.h>
 
 #include "estimation/change_in_steps.hpp"
-#include "estimation/contact_evidence.hpp"
 #include "estimation/hypotheses.hpp"
 #include "estimation/kernel_sizes.hpp"
 #include "estimation/particles/particle_draws.hpp"
@@ -139,11 +138,13 @@ struct ParticleFilter::Impl {
     summary = summarise(sums);
   }
 
-  void update(const ContactEvidence& evidence) {
+  void update(const TouchEvidence& evidence) {
+    known = gathered({&evidence, 1}, options.region.pivot_mm, ParticleLikelihood::longest_run(),
+                     std::move(known));
     ++touch;
     // A touch that says nothing moves the particles and leaves their weights: drawing anew would
     // only lose some. So would it before the first touch, when all weigh the same.
-    const bool informative = !evidence.segments.empty();
+    const bool informative = !known.runs.empty();
     if (!informative || !weighed) {
       draw(shaders::DRAW_SAME, 0.0);
     } else {
@@ -155,13 +156,13 @@ struct ParticleFilter::Impl {
       stream.run();
       return;
     }
-    likelihood.weigh(evidence, particles, size(), log_weights);
+    likelihood.weigh(known, particles, size(), log_weights);
     sum_weights();
     weighed = true;
     // The largest weight is the touch's log-likelihood by the particle that explains it best.
-    prior_over_best += prior_log_likelihood(evidence.counts, options.contact) - summary.log_largest;
+    prior_over_best += prior_log_likelihood({&known, 1}, options.contact) - summary.log_largest;
     averages.add(summary.log_largest + std::log(summary.sum / static_cast<double>(size())),
-                 evidence.from_pivot_mm.size());
+                 known.from_pivot_mm.size());
   }
 
   struct Weighed {
@@ -239,7 +240,7 @@ struct ParticleFilter::Impl {
   std::vector<shaders::WeightBlock> sums;
   std::vector<shaders::DrawBlock> bounds;  ///< what goes to draw_blocks
   std::vector<TouchEvidence> classified;   ///< room for touches that are not classified
-  EvidenceGatherer gatherer;
+  KnownElements known;                     ///< of the touch that is being taken in
   WeightSummary summary;
   LikelihoodAverages averages;
   shaders::uint touch = 0;  ///< counts the touches since the start
@@ -296,11 +297,9 @@ void ParticleFilter::update(std::span<const Touch> touches,
 void ParticleFilter::update(std::span<const TouchEvidence> touches,
                             const std::function<void(double)>& progress) {
   Impl& filter = whole();
-  const std::span<const ContactEvidence> evidence = filter.gatherer.gather(
-      touches, true, filter.options.region.pivot_mm, ParticleLikelihood::segment_elements());
   filter.change.change([&] {
     for (std::size_t i = 0; i < touches.size(); ++i) {
-      filter.update(evidence[i]);
+      filter.update(touches[i]);
       if (progress) {
         progress(static_cast<double>(i + 1) / static_cast<double>(touches.size()));
       }

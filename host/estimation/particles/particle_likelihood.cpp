@@ -122,7 +122,7 @@ ParticleLikelihood::ParticleLikelihood(gpu::Context& context, gpu::CommandStream
   reserve(64);
 }
 
-std::size_t ParticleLikelihood::segment_elements() { return most_elements; }
+std::size_t ParticleLikelihood::longest_run() { return most_elements; }
 
 void ParticleLikelihood::reserve(std::size_t elements) {
   const std::size_t texels = shaders::HEADINGS + elements * cell_sizes_mm_.size();
@@ -141,32 +141,30 @@ void ParticleLikelihood::reserve(std::size_t elements) {
   }
 }
 
-void ParticleLikelihood::weigh(const ContactEvidence& evidence, const gpu::Buffer& particles,
+void ParticleLikelihood::weigh(const KnownElements& known, const gpu::Buffer& particles,
                                std::size_t count, const gpu::Buffer& log_weights) {
-  // Room for the whole touch: of the next one more elements may be known.
-  const std::size_t room = std::min(evidence.elements(), most_elements);
+  // Room for all elements of the touch: of the next one more may be known.
+  const std::size_t room = std::min(known.from_pivot_mm.capacity(), most_elements);
   turned_mm_.clear();
-  turned_mm_.reserve(evidence.elements());
-  batch_.reserve(evidence.segments.capacity());
+  turned_mm_.reserve(known.from_pivot_mm.capacity());
+  batch_.reserve(known.runs.capacity());
   table_.reserve(room * cell_sizes_mm_.size());
-  for (const glm::dvec2& p : evidence.from_pivot_mm) {
+  for (const glm::dvec2& p : known.from_pivot_mm) {
     turned_mm_.push_back(rotate(theta_centre_rad_, p));
   }
   if (room * sizeof(shaders::Segment) > segments_.bytes()) {
     stream_.run();  // what was recorded may use the tables that go
     reserve(room);
   }
-  const std::vector<shaders::Segment>& segments = evidence.segments;
+  const std::vector<ReadingRun>& runs = known.runs;
   double pending = 0.0;
-  std::size_t s = 0;
+  std::size_t run = 0;
   do {
-    const bool fresh = s == 0;
-    const std::size_t first = segments.empty() ? 0 : segments[s].begin;
+    const bool fresh = run == 0;
+    const std::size_t first = runs.empty() ? 0 : runs[run].begin;
     batch_.clear();
-    for (; s < segments.size() && segments[s].end - first <= room; ++s) {
-      batch_.push_back(segments[s]);
-      batch_.back().begin -= static_cast<shaders::uint>(first);
-      batch_.back().end -= static_cast<shaders::uint>(first);
+    for (; run < runs.size() && runs[run].end - first <= room; ++run) {
+      batch_.push_back(segment_of(runs[run], first));
     }
     const std::size_t elements = batch_.empty() ? 0 : batch_.back().end;
     table_.clear();
@@ -192,7 +190,7 @@ void ParticleLikelihood::weigh(const ContactEvidence& evidence, const gpu::Buffe
                      {&segments_, &contact_.nodes(), &turns_, maps_.nodes().read_as(Access::table),
                       maps_.nodes().read_as(Access::storage), &objects_, &particles, &log_weights},
                      push, {groups_of(invocations, independent_lanes(context_.limits())), 1, 1});
-  } while (s < segments.size());
+  } while (run < runs.size());
 }
 
 std::uint64_t ParticleLikelihood::device_bytes() const {

@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "estimation/bordered_map.hpp"
-#include "estimation/contact_evidence.hpp"
 #include "estimation/contact_kernel.hpp"
+#include "estimation/known_elements.hpp"
 #include "gpu/command_stream.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
@@ -27,12 +27,12 @@ class ParticleLikelihood {
                      const ContactModel& model);
 
   /// Most elements that one segment of the evidence may hold.
-  static std::size_t segment_elements();
+  static std::size_t longest_run();
 
   /// Records the weighing of `count` particles, shaders::Particle about the region's centre, by one
   /// touch, all alike where it has no known element. Where it has very many, runs the stream in
   /// between.
-  void weigh(const ContactEvidence& evidence, const gpu::Buffer& particles, std::size_t count,
+  void weigh(const KnownElements& known, const gpu::Buffer& particles, std::size_t count,
              const gpu::Buffer& log_weights);
 
   std::uint64_t device_bytes() const;

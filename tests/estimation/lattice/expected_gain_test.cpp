@@ -91,19 +91,19 @@ AverageGain average(int seeds, const GainOfSeed& gain_of) {
 
 TEST(ExpectedGain, IsTheMutualInformationOfItsSamples) {
   const std::vector<Hypothesis> objects = three_objects();
-  const ReadingPredictor predictor(objects, contact);
+  const PredictedReadings predicted(objects, contact);
   const std::vector<PoseSample> samples = random_samples(40);
   for (const auto& label_of : {std::vector<std::size_t>{}, std::vector<std::size_t>{0, 1, 0}}) {
     for (const Pose& candidate : {Pose{{1.0, 0.5}, 0.4}, Pose{{-2.0, 3.0}, 2.0}}) {
       const AverageGain gain = average(300, [&](std::uint64_t seed) {
-        return expected_gain(predictor, samples, std::span(&candidate, 1), elements, {},
+        return expected_gain(predicted, samples, std::span(&candidate, 1), elements, {},
                              {.seed = seed, .label_of = label_of})
             .front();
       });
       const reference::Gain exact = exact_gain(samples, objects, label_of, candidate);
       EXPECT_GT(exact.identity, 0.03);
       EXPECT_GT(exact.both, exact.identity + 0.1);
-      // Four standard errors, and what the predictor's tables are off by.
+      // Four standard errors, and what the predicted tables are off by.
       EXPECT_NEAR(gain.identity.mean, exact.identity, 4.0 * gain.identity.error + 1e-3);
       EXPECT_LT(gain.identity.error, 0.01) << "or the test would see nothing";
       EXPECT_NEAR(gain.both.mean, exact.both, 4.0 * gain.both.error + 1e-3);
@@ -117,12 +117,12 @@ TEST(ExpectedGain, AveragesOverWhereTheSensorMayHaveBeen) {
   const std::vector<Hypothesis> objects{{random_map(9, 9, 3.0, 4.0, 81)},
                                         {random_map(8, 9, 3.0, 4.0, 82)},
                                         {random_map(9, 8, 3.0, 4.0, 83)}};
-  const ReadingPredictor predictor(objects, contact);
+  const PredictedReadings predicted(objects, contact);
   const std::vector<PoseSample> samples = random_samples(40);
   const Pose candidate{{1.0, 0.5}, 0.4};
   const DisplacementSd touch_sd{.mm = 1.0, .rad = 0.1};
   const AverageGain gain = average(300, [&](std::uint64_t seed) {
-    return expected_gain(predictor, samples, std::span(&candidate, 1), elements, touch_sd,
+    return expected_gain(predicted, samples, std::span(&candidate, 1), elements, touch_sd,
                          {.seed = seed})
         .front();
   });
@@ -175,7 +175,7 @@ TEST_F(TouchedGain, OfAHistogramIsThatOfItsBins) {
 
 TEST(ExpectedGain, IsNeverBelowZero) {
   const std::vector<Hypothesis> objects = three_objects();
-  const ReadingPredictor predictor(objects, contact);
+  const PredictedReadings predicted(objects, contact);
   std::vector<Pose> candidates;
   for (int i = 0; i < 20; ++i) {
     candidates.push_back({{4.0 * i, 0.5 * i}, 0.3 * i});  // the later, the less they touch
@@ -185,7 +185,7 @@ TEST(ExpectedGain, IsNeverBelowZero) {
     for (const DisplacementSd& touch_sd : {DisplacementSd{}, DisplacementSd{1.0, 0.1}}) {
       for (std::uint64_t seed = 0; seed < 20; ++seed) {
         for (const TouchGain& gain :
-             expected_gain(predictor, samples, candidates, elements, touch_sd, {.seed = seed})) {
+             expected_gain(predicted, samples, candidates, elements, touch_sd, {.seed = seed})) {
           EXPECT_GE(gain.identity, 0.0);
           EXPECT_GE(gain.pose, 0.0);
           EXPECT_LE(gain.both(), std::log(static_cast<double>(count)) + 1e-5);
