@@ -5,7 +5,7 @@
 #include <cmath>
 #include <thread>
 
-#include "estimation/bordered_map.hpp"
+#include "estimation/kernel_inputs.hpp"
 
 namespace palpate::bench {
 

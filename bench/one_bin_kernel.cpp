@@ -2,7 +2,7 @@
 
 #include <bit>
 
-#include "estimation/bordered_map.hpp"
+#include "estimation/kernel_inputs.hpp"
 #include "estimation/kernel_sizes.hpp"
 #include "estimation/known_elements.hpp"
 #include "one_bin.hpp"

@@ -36,26 +36,26 @@ AxisBlur::AxisBlur(const Axis& axis, double sd, int bins)
     return distance <= steps ? of_bins[distance] : 0.0;
   };
   for (int tile = 0; tile * bins - (bins - 1) <= steps; ++tile) {
-    double most = 0.0;
+    double largest = 0.0;
     for (int from = 0; from < bins; ++from) {
       double sum = 0.0;
       for (int to = tile * bins; to < (tile + 1) * bins; ++to) {
         sum += between(from, to);
       }
-      most = std::max(most, sum);
+      largest = std::max(largest, sum);
     }
-    weight.push_back(most);
+    weight.push_back(largest);
   }
   for (int first = 0; first < axis.count; first += bins) {
-    double most = 0.0;
+    double largest = 0.0;
     for (int bin = first; bin < std::min(first + bins, axis.count); ++bin) {
       double inside = 0.0;
       for (int to = std::max(0, bin - steps); to <= std::min(axis.count - 1, bin + steps); ++to) {
         inside += between(bin, to);
       }
-      most = std::max(most, 1.0 / inside);
+      largest = std::max(largest, 1.0 / inside);
     }
-    scale.push_back(most);
+    scale.push_back(largest);
   }
 }
 

@@ -114,10 +114,10 @@ PoseLattice with_pivot(PoseLattice lattice, const glm::dvec2& pivot_mm, const ch
 }
 
 std::vector<double> normalised(std::vector<double> logs) {
-  const double most = *std::max_element(logs.begin(), logs.end());
+  const double largest = std::ranges::max(logs);
   double total = 0.0;
   for (double& p : logs) {
-    p = std::exp(p - most);
+    p = std::exp(p - largest);
     total += p;
   }
   for (double& p : logs) {

@@ -39,13 +39,13 @@ ReductionSizes reduction_sizes(const gpu::Limits& limits, std::int64_t bins) {
   const std::uint32_t lanes =
       lanes_up_to(limits, std::min(wanted, limits.shared_bytes / shared_per_lane));
   // Long stretches amortise the tree of the end. On a GPU 32 texels do, 512 bytes of a lane.
-  const std::int64_t most = limits.cpu ? 128 : 32;
+  const std::int64_t limit = limits.cpu ? 128 : 32;
   constexpr std::int64_t batch = shaders::REDUCE_BATCH;
   const std::int64_t texels = bins / 2 / (lanes * groups_that_fill(limits));
   return {.lanes = lanes,
           .side_by_side = side_by_side(limits, lanes),
           .texels_per_lane =
-              static_cast<std::uint32_t>(std::clamp(texels / batch * batch, batch, most))};
+              static_cast<std::uint32_t>(std::clamp(texels / batch * batch, batch, limit))};
 }
 
 MarginalSizes marginal_sizes(const gpu::Limits& limits, std::int64_t plane, std::int64_t thetas) {

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "model/extremes.hpp"
+#include "model/bounding_box.hpp"
 #include "palpate/files.hpp"
 
 namespace palpate {

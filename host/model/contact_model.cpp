@@ -16,6 +16,63 @@ namespace palpate {
 
 namespace {
 
+bool is_alive(const Touch& touch, std::size_t element) {
+  return touch.valid.empty() || touch.valid[element] != 0;
+}
+
+void require_sound(const Touch& touch) {
+  const std::size_t e = touch.pressure.size();
+  if (touch.elements_mm.size() != e || (!touch.valid.empty() && touch.valid.size() != e)) {
+    throw Error(Fault::input,
+                fmt::format("touch: {} pressures, {} elements and {} validities; make them agree",
+                            e, touch.elements_mm.size(), touch.valid.size()));
+  }
+  const auto finite = [](const glm::dvec2& p) { return std::isfinite(p.x) && std::isfinite(p.y); };
+  if (!finite(touch.T_robot_sensor.translation_mm) ||
+      !std::isfinite(touch.T_robot_sensor.theta_rad)) {
+    throw Error(Fault::input, "touch: T_robot_sensor is not finite; give finite numbers");
+  }
+  for (std::size_t i = 0; i < e; ++i) {
+    if (!finite(touch.elements_mm[i]) || (is_alive(touch, i) && std::isinf(touch.pressure[i]))) {
+      throw Error(Fault::input,
+                  fmt::format("touch: element {}: its place or pressure is not finite; mark a dead "
+                              "element as not valid",
+                              i));
+    }
+  }
+}
+
+/// ContactClassifier::classify() in the memory of `reuse`.
+std::vector<Reading> classes_of(const Touch& touch, const ContactClassifier& classifier,
+                                std::vector<Reading> reuse) {
+  classifier.validate();
+  require_sound(touch);
+  const double threshold = classifier.threshold;
+  const double ratio = classifier.ratio;
+  const std::size_t e = touch.pressure.size();
+  double largest = -std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < e; ++i) {
+    if (is_alive(touch, i)) {
+      largest = std::max(largest, touch.pressure[i]);
+    }
+  }
+
+  std::vector<Reading> readings = std::move(reuse);
+  readings.assign(e, Reading::unknown);
+  for (std::size_t i = 0; i < e; ++i) {
+    if (!is_alive(touch, i)) {
+      continue;
+    }
+    const double pressure = touch.pressure[i];
+    if (pressure > threshold && pressure > ratio * largest) {
+      readings[i] = Reading::in_contact;
+    } else if (pressure < threshold && pressure < ratio * largest) {
+      readings[i] = Reading::no_contact;
+    }
+  }
+  return readings;
+}
+
 /// log(1 / (1 + exp(-l))), exact where the logistic function itself would underflow.
 double log_logistic(double l) { return std::min(l, 0.0) - std::log1p(std::exp(-std::abs(l))); }
 
@@ -70,6 +127,47 @@ LikelihoodTable sampled(const ContactModel& contact) {
 }
 
 }  // namespace
+
+void ContactClassifier::validate() const {
+  if (!(threshold >= 0.0) || !std::isfinite(threshold)) {
+    throw Error(Fault::input, fmt::format("threshold = {}: give a pressure of at least 0, in the "
+                                          "recording's unit",
+                                          threshold));
+  }
+  if (!(ratio >= 0.0 && ratio < 1.0)) {
+    throw Error(Fault::input, fmt::format("ratio = {}: must be at least 0 and below 1", ratio));
+  }
+}
+
+std::vector<Reading> ContactClassifier::classify(const Touch& touch) const {
+  return classes_of(touch, *this, {});
+}
+
+std::vector<ElementReading> known_readings(const Touch& touch,
+                                           const ContactClassifier& classifier) {
+  const std::vector<Reading> readings = classifier.classify(touch);
+  std::vector<ElementReading> known;
+  known.reserve(readings.size());
+  for (std::size_t i = 0; i < readings.size(); ++i) {
+    if (readings[i] != Reading::unknown) {
+      known.push_back({touch.T_robot_sensor * touch.elements_mm[i], readings[i]});
+    }
+  }
+  return known;
+}
+
+std::optional<std::string> fault_of(std::span<const ElementReading> readings) {
+  for (const ElementReading& reading : readings) {
+    const glm::dvec2& p = reading.position_mm;
+    if (!(std::abs(p.x) <= farthest_mm && std::abs(p.y) <= farthest_mm)) {
+      return fmt::format(
+          "an element at [{}, {}] mm; keep touches within {:g} mm of the robot "
+          "frame's origin, or check the poses' unit",
+          p.x, p.y, farthest_mm);
+    }
+  }
+  return {};
+}
 
 void LikelihoodTable::validate() const {
   constexpr double farthest = 1000.0;
@@ -127,7 +225,7 @@ std::vector<Reading> ContactModel::classify(const Touch& touch) const {
 
 std::vector<Reading> classify(const Touch& touch, const ContactModel& model,
                               std::vector<Reading> reuse) {
-  std::vector<Reading> readings = classify(touch, model.classifier, std::move(reuse));
+  std::vector<Reading> readings = classes_of(touch, model.classifier, std::move(reuse));
   if (model.table) {
     const std::vector<double>& edges = model.table->level_edges;
     for (std::size_t i = 0; i < readings.size(); ++i) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <string_view>
 #include <utility>
 
 #include <fmt/format.h>
@@ -21,13 +22,26 @@ namespace palpate {
 
 namespace {
 
+/// Throws Error, "sensor model: <field> = <value>: <remedy>", unless the value fits.
 template <typename Value>
-[[noreturn]] void refuse(const char* field, const Value& value, const char* remedy) {
-  throw Error(Fault::input, fmt::format("sensor model: {} = {}: {}", field, value, remedy));
+void require(bool fits, std::string_view field, const Value& value, std::string_view remedy) {
+  if (!fits) {
+    throw Error(Fault::input, fmt::format("sensor model: {} = {}: {}", field, value, remedy));
+  }
 }
 
 bool is_positive(double x) { return x > 0.0 && std::isfinite(x); }
 bool from_0(double x) { return x >= 0.0 && std::isfinite(x); }
+
+void require_finite(std::string_view field, double x) {
+  require(std::isfinite(x), field, x, "give a number");
+}
+void require_positive(std::string_view field, double x) {
+  require(is_positive(x), field, x, "give a positive number");
+}
+void require_from_0(std::string_view field, double x) {
+  require(from_0(x), field, x, "give a number from 0");
+}
 
 /// The matrix of correlations; none where it is not positive definite.
 std::optional<glm::dmat3> correlations_of(const FeatureDistribution& distribution) {
@@ -39,28 +53,47 @@ std::optional<glm::dmat3> correlations_of(const FeatureDistribution& distributio
   return definite ? std::optional(all) : std::nullopt;
 }
 
-/// @param numbers [level, node] of a learned table with so many nodes
-void require_log_probabilities(std::span<const double> numbers, std::size_t nodes) {
-  for (std::size_t i = 0; i < numbers.size(); ++i) {
-    if (!(numbers[i] <= 0.0)) {
-      refuse(fmt::format("table: number [{}, {}]", i / nodes, i % nodes).c_str(), numbers[i],
-             "give the log of a probability, 0 or less");
-    }
+/// @param numbers [level, node] of a learned table
+void require_sound(const LearnedTable& table, const std::vector<double>& numbers) {
+  table_of(table, numbers).validate();
+  const auto wrong = std::ranges::find_if_not(numbers, [](double log) { return log <= 0.0; });
+  if (wrong != numbers.end()) {
+    const std::ptrdiff_t i = wrong - numbers.begin();
+    require(false,
+            fmt::format("table: number [{}, {}]", i / ReadingLayer::nodes, i % ReadingLayer::nodes),
+            *wrong, "give the log of a probability, 0 or less");
   }
 }
 
 void require_sound(const FeatureDistribution& distribution) {
   for (std::size_t i = 0; i < PressFeatures::count; ++i) {
-    if (!std::isfinite(distribution.mean[i])) {
-      refuse("features: mean", distribution.mean[i], "give a number");
-    }
-    if (!is_positive(distribution.sd[i])) {
-      refuse("features: sd", distribution.sd[i], "give a positive number");
-    }
+    require_finite("features: mean", distribution.mean[i]);
+    require_positive("features: sd", distribution.sd[i]);
   }
-  if (!correlations_of(distribution)) {
-    refuse("features: correlation", fmt::format("[{}]", fmt::join(distribution.correlation, ", ")),
-           "give correlations that a distribution can have");
+  require(correlations_of(distribution).has_value(), "features: correlation",
+          fmt::format("[{}]", fmt::join(distribution.correlation, ", ")),
+          "give correlations that a distribution can have");
+}
+
+void require_sound(const FitScale& scale) {
+  require_finite("fit_scale: mean", scale.mean);
+  require_positive("fit_scale: sd", scale.sd);
+  require_from_0("fit_scale: shared_sd", scale.shared_sd);
+  if (const auto& alone = scale.alone) {
+    require_finite("fit_scale: alone: mean", alone->mean);
+    require_positive("fit_scale: alone: sd", alone->sd);
+  }
+  if (scale.stranger_sd) {
+    require_positive("fit_scale: stranger_sd", *scale.stranger_sd);
+  }
+  if (const auto& stranger = scale.stranger_alone) {
+    require_finite("fit_scale: stranger_alone: mean", stranger->mean);
+    require(stranger->sd >= 1.0, "fit_scale: stranger_alone: sd", stranger->sd,
+            "give a number from 1, that of learned objects");
+  }
+  if (const auto& array = scale.array) {
+    require(is_positive(array->elements) && is_positive(array->spacing_mm), "fit_scale: array",
+            array->elements, "give a number of elements and a spacing_mm above 0");
   }
 }
 
@@ -131,94 +164,47 @@ void apply(const LearnedSensor& sensor, std::vector<Hypothesis>& hypotheses,
 }
 
 void LearnedSensor::validate() const {
-  if (pressure_unit != "kPa" && pressure_unit != "raw") {
-    refuse("pressure_unit", pressure_unit, "give kPa or raw");
-  }
+  require(pressure_unit == "kPa" || pressure_unit == "raw", "pressure_unit", pressure_unit,
+          "give kPa or raw");
   classifier.validate();
-  if (!from_0(noise)) {
-    refuse("noise", noise, "give a number from 0");
+  require_from_0("noise", noise);
+  require(gamma >= 0.0 && gamma < 1.0, "gamma", gamma, "give a number in [0, 1)");
+  require(prior >= least_prior && prior <= 1.0 - least_prior, "prior", prior,
+          "give a probability from 1e-6 to 1 - 1e-6");
+  require(spread_mm >= least_length_mm && spread_mm <= most_length_mm, "spread_mm", spread_mm,
+          "give a length from 1e-6 to 1e6");
+  for (const double sd : {touch_sd.mm, touch_sd.rad}) {
+    require(from_0(sd), "touch_sd", sd, "give numbers from 0");
   }
-  if (!(gamma >= 0.0 && gamma < 1.0)) {
-    refuse("gamma", gamma, "give a number in [0, 1)");
-  }
-  if (!(prior >= least_prior && prior <= 1.0 - least_prior)) {
-    refuse("prior", prior, "give a probability from 1e-6 to 1 - 1e-6");
-  }
-  if (!(spread_mm >= least_length_mm && spread_mm <= most_length_mm)) {
-    refuse("spread_mm", spread_mm, "give a length from 1e-6 to 1e6");
-  }
-  if (!from_0(touch_sd.mm) || !from_0(touch_sd.rad)) {
-    refuse("touch_sd", from_0(touch_sd.mm) ? touch_sd.rad : touch_sd.mm, "give numbers from 0");
-  }
-  if (!is_positive(temperature)) {
-    refuse("temperature", temperature, "give a positive number");
-  }
-  if (!from_0(temperature_growth)) {
-    refuse("temperature_growth", temperature_growth, "give a number from 0");
-  }
+  require_positive("temperature", temperature);
+  require_from_0("temperature_growth", temperature_growth);
   if (bins) {
     for (const double step : {bins->x_mm, bins->y_mm, bins->theta_rad}) {
-      if (!from_0(step)) {
-        refuse("bins", step, "give steps from 0");
-      }
+      require(from_0(step), "bins", step, "give steps from 0");
     }
   }
   if (table) {
     table->layer.validate();
-    table_of(*table, table->shared).validate();
-    require_log_probabilities(table->shared, ReadingLayer::nodes);
+    require_sound(*table, table->shared);
     for (const auto& [label, own] : table->objects) {
-      if (own.size() != table->shared.size()) {
-        refuse("table: numbers", own.size(), "give as many to every object as to all together");
-      }
-      table_of(*table, own).validate();
-      require_log_probabilities(own, ReadingLayer::nodes);
+      require(own.size() == table->shared.size(), "table: numbers", own.size(),
+              "give as many to every object as to all together");
+      require_sound(*table, own);
     }
   }
   if (features) {
-    if (!from_0(features->weight)) {
-      refuse("features: weight", features->weight, "give a number from 0");
-    }
+    require_from_0("features: weight", features->weight);
     require_sound(features->any);
     for (const auto& [label, own] : features->objects) {
       require_sound(own);
     }
   }
-  if (fit_scale && !std::isfinite(fit_scale->mean)) {
-    refuse("fit_scale: mean", fit_scale->mean, "give a number");
+  if (fit_scale) {
+    require_sound(*fit_scale);
   }
-  if (fit_scale && !is_positive(fit_scale->sd)) {
-    refuse("fit_scale: sd", fit_scale->sd, "give a positive number");
-  }
-  if (pose_scale && !is_positive(pose_scale->factor)) {
-    refuse("pose_scale: factor", pose_scale->factor, "give a positive number");
-  }
-  if (pose_scale && !from_0(pose_scale->map_sd_mm)) {
-    refuse("pose_scale: map_sd_mm", pose_scale->map_sd_mm, "give a number from 0");
-  }
-  if (fit_scale && !from_0(fit_scale->shared_sd)) {
-    refuse("fit_scale: shared_sd", fit_scale->shared_sd, "give a number from 0");
-  }
-  if (fit_scale && fit_scale->alone && !std::isfinite(fit_scale->alone->mean)) {
-    refuse("fit_scale: alone: mean", fit_scale->alone->mean, "give a number");
-  }
-  if (fit_scale && fit_scale->alone && !is_positive(fit_scale->alone->sd)) {
-    refuse("fit_scale: alone: sd", fit_scale->alone->sd, "give a positive number");
-  }
-  if (fit_scale && fit_scale->stranger_sd && !is_positive(*fit_scale->stranger_sd)) {
-    refuse("fit_scale: stranger_sd", *fit_scale->stranger_sd, "give a positive number");
-  }
-  if (fit_scale && fit_scale->stranger_alone && !std::isfinite(fit_scale->stranger_alone->mean)) {
-    refuse("fit_scale: stranger_alone: mean", fit_scale->stranger_alone->mean, "give a number");
-  }
-  if (fit_scale && fit_scale->stranger_alone && !(fit_scale->stranger_alone->sd >= 1.0)) {
-    refuse("fit_scale: stranger_alone: sd", fit_scale->stranger_alone->sd,
-           "give a number from 1, that of learned objects");
-  }
-  if (fit_scale && fit_scale->array &&
-      !(is_positive(fit_scale->array->elements) && is_positive(fit_scale->array->spacing_mm))) {
-    refuse("fit_scale: array", fit_scale->array->elements,
-           "give a number of elements and a spacing_mm above 0");
+  if (pose_scale) {
+    require_positive("pose_scale: factor", pose_scale->factor);
+    require_from_0("pose_scale: map_sd_mm", pose_scale->map_sd_mm);
   }
 }
 

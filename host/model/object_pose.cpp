@@ -4,7 +4,9 @@
 
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
+#include <glm/vec3.hpp>
 
+#include "model/body_spread.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/pose_error.hpp"
 
@@ -12,14 +14,18 @@ namespace palpate {
 
 namespace {
 
+glm::dmat3 matrix_of(const std::array<double, 9>& rows) {
+  glm::dmat3 columns{0.0};
+  for (int i = 0; i < 9; ++i) {
+    columns[i % 3][i / 3] = rows[i];
+  }
+  return columns;
+}
+
 /// The covariance of what depends so on (x, y, theta), row by row, to first order.
 std::array<double, 9> carried_over(const std::array<double, 9>& covariance,
                                    const glm::dmat3& jacobian) {
-  glm::dmat3 columns{0.0};
-  for (int i = 0; i < 9; ++i) {
-    columns[i % 3][i / 3] = covariance[i];
-  }
-  const glm::dmat3 carried = jacobian * columns * glm::transpose(jacobian);
+  const glm::dmat3 carried = jacobian * matrix_of(covariance) * glm::transpose(jacobian);
   std::array<double, 9> result{};
   for (int i = 0; i < 9; ++i) {
     // Rounding must not leave it unsymmetric.
@@ -27,6 +33,13 @@ std::array<double, 9> carried_over(const std::array<double, 9>& covariance,
   }
   return result;
 }
+
+/// How a turn about the object frame's origin moves the centroid in the robot frame, mm per rad.
+glm::dvec2 arm_mm(const Body& body, const ObjectPose& pose) {
+  return rotate(pose.T_robot_object.theta_rad + std::numbers::pi / 2.0, body.centroid_mm);
+}
+
+double spin_mm(const Body& body) { return std::sqrt(std::max(body.inertia_mm2, 1e-12)); }
 
 }  // namespace
 
@@ -57,6 +70,29 @@ RefinedPose least_turned(const std::optional<Body>& body, int symmetry,
   jacobian[0] = {rotate(turn_rad, {1.0, 0.0}), 0.0};
   jacobian[1] = {rotate(turn_rad, {0.0, 1.0}), 0.0};
   return {turned, carried_over(refined.covariance, jacobian)};
+}
+
+glm::dmat3 motion_covariance(const Body& body, const ObjectPose& pose) {
+  glm::dmat3 motion{1.0};  // by columns
+  motion[2] = {arm_mm(body, pose), spin_mm(body)};
+  return motion * matrix_of(pose.covariance) * glm::transpose(motion);
+}
+
+double spread_mm(const Body& body, const ObjectPose& pose) {
+  const glm::dmat3 covariance = motion_covariance(body, pose);
+  return std::sqrt(std::max(0.0, covariance[0][0] + covariance[1][1] + covariance[2][2]));
+}
+
+ObjectPose scaled(const Body& body, ObjectPose pose, const PoseScale& scale) {
+  const double sd_mm = scale.map_sd_mm;
+  const double turn_rad = sd_mm / spin_mm(body);
+  // The centroid rests, so the frame's origin moves.
+  const glm::dvec3 turn(-turn_rad * arm_mm(body, pose), turn_rad);
+  for (int i = 0; i < 9; ++i) {
+    pose.covariance[i] = scale.factor * pose.covariance[i] + turn[i / 3] * turn[i % 3] +
+                         (i == 0 || i == 4 ? sd_mm * sd_mm : 0.0);
+  }
+  return pose;
 }
 
 }  // namespace palpate

@@ -8,6 +8,7 @@
 #include <glm/common.hpp>
 #include <glm/vector_relational.hpp>
 
+#include "model/bounding_box.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/object_frame.hpp"
 #include "palpate/pose_error.hpp"
@@ -186,6 +187,24 @@ void centre_frame(OccupancyGrid& map) {
 
 Pose in_centred_frame(const OccupancyGrid& map, const Pose& T_object_robot) {
   return inverse(Pose{map.centred_mm, 0.0}) * T_object_robot;
+}
+
+BoundingBox occupied_box(const OccupancyGrid& map) {
+  BoundingBox box;
+  for (int j = 0; j < map.ny; ++j) {
+    for (int i = 0; i < map.nx; ++i) {
+      if (map.at(i, j) > 0.0F) {
+        box.take_in(map.centre_mm(i, j));
+      }
+    }
+  }
+  if (box.empty()) {
+    box.take_in(map.centre_mm(0, 0));
+    box.take_in(map.centre_mm(map.nx - 1, map.ny - 1));
+  }
+  box.lower -= map.cell_mm / 2.0;
+  box.upper += map.cell_mm / 2.0;
+  return box;
 }
 
 }  // namespace palpate

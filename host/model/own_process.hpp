@@ -3,9 +3,22 @@
 #include <memory>
 #include <utility>
 
-#include "model/moved_from.hpp"
+#include <fmt/format.h>
+
+#include "palpate/error.hpp"
 
 namespace palpate {
+
+/// Returns what an object of a public class holds. Throws Error, naming the class, where the object
+/// was moved from.
+template <typename T>
+T& held_by(const std::unique_ptr<T>& held, const char* name) {
+  if (!held) {
+    throw Error(Fault::input,
+                fmt::format("{}: was moved from; use the object that it was moved to", name));
+  }
+  return *held;
+}
 
 /// The process that an object was made in. A child of fork() has a copy of the object, but not the
 /// threads that work for it, and cannot use the device that its parent has opened.

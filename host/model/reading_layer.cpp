@@ -79,9 +79,9 @@ class DistanceLine {
   std::vector<std::int64_t> cell_;
 };
 
-double value_of_level(double level, const ReadingLayer& how) {
-  const double share =
-      std::log1p(level / how.unit_level) / std::log1p(how.full_level / how.unit_level);
+double value_of_level(double level, const ReadingLayer& settings) {
+  const double share = std::log1p(level / settings.unit_level) /
+                       std::log1p(settings.full_level / settings.unit_level);
   return ReadingLayer::largest_value * std::min(2.0 * share - 1.0, 1.0);
 }
 
@@ -100,21 +100,21 @@ void ReadingLayer::validate() const {
   }
 }
 
-OccupancyGrid reading_layer(const OccupancyGrid& map, const ReadingLayer& how) {
-  how.validate();
-  if (how.of == MapLayer::mean_level && map.mean_level.empty()) {
+OccupancyGrid reading_layer(const OccupancyGrid& map, const ReadingLayer& settings) {
+  settings.validate();
+  if (settings.of == MapLayer::mean_level && map.mean_level.empty()) {
     throw Error(Fault::input,
                 fmt::format("map '{}': no mean level, which the sensor model compares readings "
                             "with; build it with palpate map `sensor-model`",
                             map.label));
   }
-  const auto border = static_cast<std::int64_t>(std::ceil(how.far_mm / map.cell_mm)) + 1;
+  const auto border = static_cast<std::int64_t>(std::ceil(settings.far_mm / map.cell_mm)) + 1;
   const std::int64_t nx = map.nx + 2 * border;
   const std::int64_t ny = map.ny + 2 * border;
   if (nx > most_cells / ny) {
     throw Error(Fault::input, fmt::format("map '{}': {} x {} cells with the {} mm around them are "
                                           "too many; use larger cells",
-                                          map.label, map.nx, map.ny, how.far_mm));
+                                          map.label, map.nx, map.ny, settings.far_mm));
   }
   OccupancyGrid layer = map;
   layer.prior = probability_from_log_odds(ReadingLayer::beyond);
@@ -138,8 +138,9 @@ OccupancyGrid reading_layer(const OccupancyGrid& map, const ReadingLayer& how) {
       if (sensed) {
         nearest.squared[at] = 0.0;
         nearest.cell[at] = static_cast<std::int64_t>(k);
-        const double value = how.of == MapLayer::mean_level ? value_of_level(map.mean_level[k], how)
-                                                            : double{map.log_odds[k]};
+        const double value = settings.of == MapLayer::mean_level
+                                 ? value_of_level(map.mean_level[k], settings)
+                                 : double{map.log_odds[k]};
         layer.log_odds[at] = static_cast<float>(
             std::clamp(value, -ReadingLayer::largest_value, ReadingLayer::largest_value));
       }
@@ -157,9 +158,9 @@ OccupancyGrid reading_layer(const OccupancyGrid& map, const ReadingLayer& how) {
     if (nearest.squared[at] > 0.0 && nearest.cell[at] >= 0) {
       const bool occupied = map.log_odds[static_cast<std::size_t>(nearest.cell[at])] > 0.0F;
       const double value =
-          nearest.squared[at] <= squared(how.near_mm)
+          nearest.squared[at] <= squared(settings.near_mm)
               ? (occupied ? ReadingLayer::near_occupied : ReadingLayer::near_free)
-          : nearest.squared[at] <= squared(how.far_mm)
+          : nearest.squared[at] <= squared(settings.far_mm)
               ? (occupied ? ReadingLayer::midway_occupied : ReadingLayer::midway_free)
               : ReadingLayer::beyond;
       layer.log_odds[at] = static_cast<float>(value);

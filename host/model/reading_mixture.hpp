@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstddef>
-#include <limits>
 #include <span>
 #include <vector>
 
@@ -9,6 +8,9 @@
 #include "palpate/contact.hpp"
 
 namespace palpate {
+
+/// Lists of hypotheses are padded to a multiple of this.
+inline constexpr std::size_t mixture_lanes = 8;
 
 /// What equally likely hypotheses, such as poses drawn from a belief, say about the readings of one
 /// touch. No element is Unknown; given the hypothesis, elements are independent.
@@ -28,10 +30,8 @@ class ReadingMixture {
     }
   }
 
-  /// log of the mean likelihood of the readings, [element], over all hypotheses but `left_out`, in
-  /// nats.
-  double log_mean(std::span<const Reading> readings, std::size_t left_out = all) const;
-  static constexpr std::size_t all = std::numeric_limits<std::size_t>::max();
+  /// log of the mean likelihood of the readings, [element], over all hypotheses, in nats.
+  double log_mean(std::span<const Reading> readings) const;
 
  private:
   friend class PredictedTouches;
@@ -76,8 +76,7 @@ struct Moments {
 };
 
 /// Mean and variance of `judge.log_mean()` over touches as `source` predicts them: one touch is
-/// drawn from each of its hypotheses. Where judge and source are one object, a touch's own
-/// hypothesis is left out of its mean. The log-likelihood under the touch's own hypothesis, whose
+/// drawn from each of its hypotheses. The log-likelihood under the touch's own hypothesis, whose
 /// moments are sums over the elements, serves as control variate (regression estimator), so that
 /// readings too rare to be drawn still count.
 Moments predicted_log_mean(const ReadingMixture& judge, const ReadingMixture& source,

@@ -71,11 +71,11 @@ class TurnedMap {
         ny_(static_cast<std::size_t>(map.ny)),
         log_odds_(map.log_odds) {
     constexpr float clip = 4.0F;  // a cell that is very sure must not drown its neighbours
-    constexpr double unseen = 1e-3;
+    constexpr double not_sensed = 1e-3;
     const double prior = map.prior_log_odds();
     for (float& l : log_odds_) {
-      l = std::abs(l - prior) < unseen ? std::numeric_limits<float>::quiet_NaN()
-                                       : std::clamp(l, -clip, clip);
+      l = std::abs(l - prior) < not_sensed ? std::numeric_limits<float>::quiet_NaN()
+                                           : std::clamp(l, -clip, clip);
     }
   }
 
@@ -180,8 +180,8 @@ std::optional<RotationalSymmetry> measure_symmetry(const OccupancyGrid& map) {
     return apart_mm(turned.likeness(turn_rad), occupied, map);
   };
   RotationalSymmetry symmetry{.apart_mm = {}, .tolerance_mm = tolerance_mm(map)};
-  const auto most = static_cast<int>(symmetry.apart_mm.size()) - 1;
-  for (int n = 2; n <= most; ++n) {
+  const auto largest_fold = static_cast<int>(symmetry.apart_mm.size()) - 1;
+  for (int n = 2; n <= largest_fold; ++n) {
     for (int k = 1; 2 * k <= n; ++k) {
       symmetry.apart_mm[n] = std::max(symmetry.apart_mm[n], apart(circle_rad * k / n));
     }

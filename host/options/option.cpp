@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "model/number_text.hpp"
 #include "options/refused_option.hpp"
@@ -18,31 +19,74 @@ namespace palpate {
 
 namespace {
 
-template <typename Value>
-using Words = std::vector<std::pair<Value, const char*>>;
+using Counts = std::array<int, 3>;
 
-const Words<FilterKind> filter_words{{FilterKind::automatic, "auto"},
-                                     {FilterKind::histogram, "histogram"},
-                                     {FilterKind::bounded, "bounded"},
-                                     {FilterKind::particles, "particles"}};
-const Words<Resampling> resampling_words{{Resampling::multinomial, "multinomial"},
-                                         {Resampling::systematic, "systematic"}};
-const Words<BinWidth> bin_words{{BinWidth::automatic, "auto"}, {BinWidth::fine, "fine"}};
+/// The words that a value of the type is one of.
+template <typename Value>
+constexpr auto words = std::array<std::pair<Value, const char*>, 0>{};
+template <>
+constexpr auto words<bool> = std::to_array<std::pair<bool, const char*>>({{true, "true"},
+                                                                          {false, "false"}});
+template <>
+constexpr auto words<Automatic> = std::to_array<std::pair<Automatic, const char*>>({{Automatic{},
+                                                                                     "auto"}});
+template <>
+constexpr auto words<BinWidth> = std::to_array<std::pair<BinWidth, const char*>>(
+    {{BinWidth::automatic, "auto"}, {BinWidth::fine, "fine"}});
+template <>
+constexpr auto words<FilterKind> =
+    std::to_array<std::pair<FilterKind, const char*>>({{FilterKind::automatic, "auto"},
+                                                       {FilterKind::histogram, "histogram"},
+                                                       {FilterKind::bounded, "bounded"},
+                                                       {FilterKind::particles, "particles"}});
+template <>
+constexpr auto words<Resampling> = std::to_array<std::pair<Resampling, const char*>>(
+    {{Resampling::multinomial, "multinomial"}, {Resampling::systematic, "systematic"}});
 
 template <typename Value>
-std::string word_of(const Words<Value>& words, Value value) {
-  return std::ranges::find(words, value, &std::pair<Value, const char*>::first)->second;
-}
-
+concept Word = !words<Value>.empty();
 template <typename Value>
-std::optional<Value> value_of(const Words<Value>& words, const std::string& word) {
-  for (const auto& [value, name] : words) {
-    if (word == name) {
-      return value;
-    }
-  }
-  return {};
-}
+concept Number = std::is_arithmetic_v<Value> && !std::is_same_v<Value, bool>;
+
+/// What joins the numbers of a value; none where it has one.
+template <typename Value>
+constexpr std::optional<char> separator = {};
+template <>
+constexpr std::optional<char> separator<Range> = ':';
+template <>
+constexpr std::optional<char> separator<Frames> = ':';
+template <>
+constexpr std::optional<char> separator<Counts> = 'x';
+template <>
+constexpr std::optional<char> separator<glm::dvec2> = ',';
+template <typename Numbers, typename Other>
+constexpr std::optional<char> separator<std::variant<Numbers, Other>> = separator<Numbers>;
+template <typename Value>
+constexpr std::optional<char> separator<std::optional<Value>> = separator<Value>;
+
+/// What texts a value has.
+template <typename Value>
+constexpr const char* wanted = "a text";
+template <Number Value>
+constexpr const char* wanted<Value> = std::is_integral_v<Value> ? "a whole number" : "a number";
+template <>
+constexpr const char* wanted<bool> = "true or false";
+template <>
+constexpr const char* wanted<Range> = "LOWER:UPPER, such as -10:10";
+template <>
+constexpr const char* wanted<Bins> = "XxYxTHETA, such as 25x25x16, or auto, or fine";
+template <>
+constexpr const char* wanted<Pivot> = "X,Y in mm, or auto";
+template <>
+constexpr const char* wanted<NoneWeight> = "a weight from 0, or auto";
+template <>
+constexpr const char* wanted<Frames> = "A:B, for the touches A to B - 1, counted from 0";
+template <>
+constexpr const char* wanted<FilterKind> = "auto, histogram, bounded or particles";
+template <>
+constexpr const char* wanted<Resampling> = "multinomial or systematic";
+template <typename Value>
+constexpr const char* wanted<std::optional<Value>> = wanted<Value>;
 
 /// The `count` finite numbers between the separators, which are all of the text.
 template <typename Number, std::size_t count>
@@ -59,114 +103,83 @@ std::optional<std::array<Number, count>> numbers_of(const std::string& text, cha
   return numbers;
 }
 
-constexpr char range_separator = ':';
-constexpr char bins_separator = 'x';
-constexpr char point_separator = ',';
-
-// read() sets the value by its text, or returns false. wanted() says what texts the value has.
+// read() sets the value by its text, or returns false; text_of() is the text that read() reads.
 
 bool read(const std::string& text, std::string& value) {
   value = text;
   return true;
 }
-std::string wanted(const std::string& /*value*/) { return "a text"; }
+std::string text_of(const std::string& text) { return text; }
 
-bool read(const std::string& text, bool& value) {
-  value = text == "true";
-  return value || text == "false";
+template <Word Value>
+bool read(const std::string& text, Value& value) {
+  for (const auto& [known, word] : words<Value>) {
+    if (text == word) {
+      value = known;
+      return true;
+    }
+  }
+  return false;
 }
-std::string wanted(bool /*value*/) { return "true or false"; }
+std::string text_of(bool value) { return value ? "true" : ""; }
+template <Word Value>
+std::string text_of(Value value) {
+  return std::ranges::find(words<Value>, value, &std::pair<Value, const char*>::first)->second;
+}
 
-template <typename Number>
-requires std::is_arithmetic_v<Number>
-bool read(const std::string& text, Number& value) {
-  const std::optional<Number> number = detail::all_of<Number>(text);
-  value = number.value_or(Number{});
+template <Number Value>
+bool read(const std::string& text, Value& value) {
+  const std::optional<Value> number = detail::all_of<Value>(text);
+  value = number.value_or(Value{});
   return number && std::isfinite(static_cast<double>(value));
 }
-template <typename Number>
-requires std::is_arithmetic_v<Number> std::string wanted(Number /*value*/) {
-  return std::is_integral_v<Number> ? "a whole number" : "a number";
+template <Number Value>
+std::string text_of(Value number) {
+  return fmt::format("{}", number);
 }
 
-bool read(const std::string& text, Range& value) {
-  const auto ends = numbers_of<double, 2>(text, range_separator);
-  value = ends.value_or(Range{});
-  return ends.has_value();
+template <typename Value, std::size_t count>
+bool read(const std::string& text, std::array<Value, count>& value) {
+  const auto numbers = numbers_of<Value, count>(text, *separator<std::array<Value, count>>);
+  value = numbers.value_or(value);
+  return numbers.has_value();
 }
-std::string wanted(const Range& /*value*/) { return "LOWER:UPPER, such as -10:10"; }
-
-bool read(const std::string& text, Bins& value) {
-  const auto counts = numbers_of<int, 3>(text, bins_separator);
-  const auto width = value_of(bin_words, text);
-  value = width ? Bins(*width) : Bins(counts.value_or(std::array<int, 3>{}));
-  return counts || width;
-}
-std::string wanted(const Bins& /*value*/) {
-  return "XxYxTHETA, such as 25x25x16, or auto, or fine";
+template <typename Value, std::size_t count>
+std::string text_of(const std::array<Value, count>& numbers) {
+  return fmt::format("{}",
+                     fmt::join(numbers, std::string(1, *separator<std::array<Value, count>>)));
 }
 
-bool read(const std::string& text, Pivot& value) {
-  const auto xy = numbers_of<double, 2>(text, point_separator);
-  value = xy ? Pivot(glm::dvec2((*xy)[0], (*xy)[1])) : Pivot(Automatic{});
-  return xy || text == "auto";
+bool read(const std::string& text, glm::dvec2& value) {
+  const auto xy = numbers_of<double, 2>(text, *separator<glm::dvec2>);
+  value = xy ? glm::dvec2((*xy)[0], (*xy)[1]) : value;
+  return xy.has_value();
 }
-std::string wanted(const Pivot& /*value*/) { return "X,Y in mm, or auto"; }
-
-bool read(const std::string& text, NoneWeight& value) {
-  const std::optional<double> weight = number_of(text);
-  value = weight ? NoneWeight(*weight) : NoneWeight(Automatic{});
-  return weight || text == "auto";
-}
-std::string wanted(const NoneWeight& /*value*/) { return "a weight from 0, or auto"; }
+std::string text_of(const glm::dvec2& point) { return fmt::format("{},{}", point.x, point.y); }
 
 bool read(const std::string& text, Frames& value) {
-  const auto ends = numbers_of<std::int64_t, 2>(text, range_separator);
+  const auto ends = numbers_of<std::int64_t, 2>(text, *separator<Frames>);
   if (!ends || (*ends)[0] < 0 || (*ends)[1] < 0) {
     return false;
   }
   value = {static_cast<std::size_t>((*ends)[0]), static_cast<std::size_t>((*ends)[1])};
   return true;
 }
-std::string wanted(const Frames& /*value*/) {
-  return "A:B, for the touches A to B - 1, counted from 0";
+std::string text_of(const Frames& frames) { return fmt::format("{}:{}", frames.begin, frames.end); }
+
+template <typename Numbers, typename Other>
+bool read(const std::string& text, std::variant<Numbers, Other>& value) {
+  return read(text, value.template emplace<Other>()) ||
+         read(text, value.template emplace<Numbers>());
+}
+template <typename Numbers, typename Other>
+std::string text_of(const std::variant<Numbers, Other>& value) {
+  return std::visit([](const auto& one) { return text_of(one); }, value);
 }
 
 template <typename Value>
-bool read_word(const Words<Value>& words, const std::string& text, Value& value) {
-  const std::optional<Value> known = value_of(words, text);
-  value = known.value_or(words.front().first);
-  return known.has_value();
-}
-bool read(const std::string& text, FilterKind& value) {
-  return read_word(filter_words, text, value);
-}
-std::string wanted(FilterKind /*value*/) { return "auto, histogram, bounded or particles"; }
-bool read(const std::string& text, Resampling& value) {
-  return read_word(resampling_words, text, value);
-}
-std::string wanted(Resampling /*value*/) { return "multinomial or systematic"; }
-
-// The texts that read() reads.
-std::string text_of(const std::string& text) { return text; }
-std::string text_of(bool value) { return value ? "true" : ""; }
-template <typename Number>
-requires std::is_arithmetic_v<Number> std::string text_of(Number number) {
-  return fmt::format("{}", number);
-}
-std::string text_of(const Range& range) { return fmt::format("{}:{}", range[0], range[1]); }
-std::string text_of(const std::array<int, 3>& counts) {
-  return fmt::format("{}x{}x{}", counts[0], counts[1], counts[2]);
-}
-std::string text_of(const glm::dvec2& point) { return fmt::format("{},{}", point.x, point.y); }
-std::string text_of(const Frames& frames) { return fmt::format("{}:{}", frames.begin, frames.end); }
-std::string text_of(Automatic /*word*/) { return "auto"; }
-std::string text_of(BinWidth width) { return word_of(bin_words, width); }
-std::string text_of(FilterKind kind) { return word_of(filter_words, kind); }
-std::string text_of(Resampling resampling) { return word_of(resampling_words, resampling); }
-template <typename... Values>
-std::string text_of(const std::variant<Values...>& value) {
-  return std::visit([](const auto& one) { return text_of(one); }, value);
+bool read(const std::string& text, std::optional<Value>& value) {
+  return read(text, value.emplace());
 }
 template <typename Value>
 std::string text_of(const std::optional<Value>& value) {
@@ -193,14 +206,12 @@ bool within(const NumberLimits& limits, double number) {
 // fault() says what to give in the place of a value that was read but cannot be meant, or "".
 
 template <typename Value>
-requires(!std::is_arithmetic_v<Value> || std::is_same_v<Value, bool>) std::string
-    fault(const NumberLimits& /*limits*/, const Value& /*value*/) {
+std::string fault(const NumberLimits& /*limits*/, const Value& /*value*/) {
   return "";
 }
-template <typename Number>
-requires(std::is_arithmetic_v<Number> && !std::is_same_v<Number, bool>) std::string
-    fault(const NumberLimits& limits, Number number) {
-  return within(limits, static_cast<double>(number)) ? "" : wanted(number) + words_of(limits);
+template <Number Value>
+std::string fault(const NumberLimits& limits, const Value& number) {
+  return within(limits, static_cast<double>(number)) ? "" : wanted<Value> + words_of(limits);
 }
 std::string fault(const NumberLimits& limits, const Range& range) {
   const auto [lower, upper] = range;
@@ -209,24 +220,24 @@ std::string fault(const NumberLimits& limits, const Range& range) {
   }
   return lower > upper ? "the lower end first: the range is reversed" : "";
 }
-std::string fault(const NumberLimits& limits, const Bins& bins) {
-  const auto* counts = std::get_if<std::array<int, 3>>(&bins);
-  return counts == nullptr || std::ranges::min(*counts) >= limits.least
-             ? ""
-             : "at least 1 for every count";
+std::string fault(const NumberLimits& limits, const Counts& counts) {
+  return std::ranges::min(counts) >= limits.least ? "" : "at least 1 for every count";
 }
-std::string fault(const NumberLimits& limits, const Pivot& pivot) {
-  const auto* xy = std::get_if<glm::dvec2>(&pivot);
-  return xy == nullptr || (within(limits, xy->x) && within(limits, xy->y))
+std::string fault(const NumberLimits& limits, const glm::dvec2& point) {
+  return within(limits, point.x) && within(limits, point.y)
              ? ""
              : fmt::format("numbers within +-{:g}", limits.most);
 }
 std::string fault(const NumberLimits& limits, const NoneWeight& none) {
   const auto* weight = std::get_if<double>(&none);
-  return weight == nullptr || within(limits, *weight) ? "" : wanted(none);
+  return weight == nullptr || within(limits, *weight) ? "" : wanted<NoneWeight>;
 }
 std::string fault(const NumberLimits& /*limits*/, const Frames& frames) {
   return frames.begin < frames.end ? "" : "A:B with A from 0 and below B: this selects no touch";
+}
+template <typename Numbers, typename Other>
+std::string fault(const NumberLimits& limits, const std::variant<Numbers, Other>& value) {
+  return std::visit([&](const auto& one) { return fault(limits, one); }, value);
 }
 template <typename Value>
 std::string fault(const NumberLimits& limits, const std::optional<Value>& value) {
@@ -234,22 +245,12 @@ std::string fault(const NumberLimits& limits, const std::optional<Value>& value)
 }
 
 template <typename Value>
-bool read(const std::string& text, std::optional<Value>& value) {
-  return read(text, value.emplace());
+std::string wanted_within(const NumberLimits& /*limits*/, const Value& /*value*/) {
+  return wanted<Value>;
 }
-template <typename Value>
-std::string wanted(const std::optional<Value>& /*value*/) {
-  return wanted(Value{});
-}
-
-template <typename Value>
-std::string wanted_within(const NumberLimits& /*limits*/, const Value& value) {
-  return wanted(value);
-}
-template <typename Number>
-requires std::is_arithmetic_v<Number> std::string wanted_within(
-    const NumberLimits& limits, const std::optional<Number>& /*value*/) {
-  return wanted(Number{}) + words_of(limits);
+template <Number Value>
+std::string wanted_within(const NumberLimits& limits, const std::optional<Value>& /*value*/) {
+  return wanted<Value> + words_of(limits);
 }
 
 /// What to give in the place of the value that the request has, or "".
@@ -258,17 +259,6 @@ std::string fault_of(const Request& request, const Option& option) {
       std::visit([&](auto member) { return fault(option.limits, request.*member); }, option.member);
   return wanted.empty() ? "" : "give " + wanted;
 }
-
-template <typename Value>
-constexpr std::optional<char> separator = {};
-template <>
-constexpr std::optional<char> separator<std::optional<Bins>> = bins_separator;
-template <>
-constexpr std::optional<char> separator<std::optional<Range>> = range_separator;
-template <>
-constexpr std::optional<char> separator<std::optional<Frames>> = range_separator;
-template <>
-constexpr std::optional<char> separator<std::optional<Pivot>> = point_separator;
 
 }  // namespace
 
@@ -349,7 +339,7 @@ Request request_with(const std::map<std::string, std::string>& texts) {
   return request;
 }
 
-std::string name_of(FilterKind kind) { return word_of(filter_words, kind); }
+std::string name_of(FilterKind kind) { return text_of(kind); }
 
 std::optional<char> separator_of(const Option& option) {
   return std::visit([]<typename Value>(Value Request::* /*member*/) { return separator<Value>; },
@@ -357,7 +347,7 @@ std::optional<char> separator_of(const Option& option) {
 }
 
 Pose parse_pose(std::string_view option, const std::string& text) {
-  const auto numbers = numbers_of<double, 3>(text, point_separator);
+  const auto numbers = numbers_of<double, 3>(text, *separator<glm::dvec2>);
   if (!numbers) {
     refuse_option(option, text, "give it as X,Y,DEG, in mm and degrees");
   }
@@ -367,7 +357,7 @@ Pose parse_pose(std::string_view option, const std::string& text) {
 
 Frames parse_frames(const std::string& what, const std::string& text) {
   Frames frames;
-  std::string remedy = read(text, frames) ? fault({}, frames) : wanted(frames);
+  std::string remedy = read(text, frames) ? fault({}, frames) : wanted<Frames>;
   if (!remedy.empty()) {
     throw Error(Fault::input, fmt::format("{} {}: give {}", what, text, remedy));
   }

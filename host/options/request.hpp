@@ -17,7 +17,9 @@
 namespace palpate {
 
 /// Asks for what follows from the maps and the touches.
-struct Automatic {};
+struct Automatic {
+  friend bool operator==(const Automatic&, const Automatic&) = default;
+};
 
 enum class FilterKind { automatic, histogram, bounded, particles };
 

@@ -10,7 +10,7 @@
 #include <glm/vec2.hpp>
 
 #include "model/bounding_box.hpp"
-#include "model/moved_from.hpp"
+#include "model/own_process.hpp"
 #include "model/random.hpp"
 #include "palpate/error.hpp"
 #include "palpate/pose.hpp"

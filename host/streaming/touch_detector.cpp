@@ -9,7 +9,7 @@
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
 
-#include "model/moved_from.hpp"
+#include "model/own_process.hpp"
 #include "palpate/error.hpp"
 #include "palpate/pose_track.hpp"
 #include "streaming/frame_smoother.hpp"

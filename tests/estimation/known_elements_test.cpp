@@ -9,7 +9,7 @@
 
 #include <gtest/gtest.h>
 
-#include "estimation/bordered_map.hpp"
+#include "estimation/kernel_inputs.hpp"
 #include "palpate/error.hpp"
 #include "support/limits.hpp"
 #include "support/synthetic.hpp"

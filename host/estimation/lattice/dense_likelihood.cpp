@@ -1,18 +1,26 @@
 #include "estimation/lattice/dense_likelihood.hpp"
 
 #include <algorithm>
+#include <bit>
+#include <cmath>
+#include <initializer_list>
 #include <utility>
 
 #include <fmt/format.h>
+#include <glm/vec2.hpp>
 
 #include "estimation/kernel_sizes.hpp"
 #include "model/log_message.hpp"
 #include "palpate/error.hpp"
+#include "shaders/accumulate_rows.hpp"
+#include "shaders/accumulate_tiles.hpp"
 #include "shaders/interface.h"
 
 namespace palpate {
 
 namespace {
+
+using gpu::Access;
 
 constexpr VkDeviceSize table_bytes = 16 << 20;
 // A batch of whole products, so that it does not matter which elements share one.
@@ -32,6 +40,164 @@ std::vector<std::uint32_t> first_bins_of(const DenseBelief& belief, std::size_t 
     bins.push_back(static_cast<std::uint32_t>(slab->first_bin(object)));
   }
   return bins;
+}
+
+/// How kernels read the map. Throws Error where the device has no way.
+gpu::Access access_of(const gpu::Context& context, const OccupancyGrid& map) {
+  const gpu::Limits& limits = context.limits();
+  if (const auto access = map_access(limits, bordered_cells(map))) {
+    return *access;
+  }
+  throw Error(
+      Fault::input,
+      fmt::format("map '{}': {} x {} cells exceed the {} that kernels of device '{}' read in one "
+                  "buffer; build it with larger cells",
+                  map.label, map.nx, map.ny, most_map_cells(limits), context.name()));
+}
+
+std::size_t axis_bins(const PoseLattice& lattice) {
+  return static_cast<std::size_t>(lattice.x_mm.count) + lattice.y_mm.count;
+}
+
+constexpr std::uint32_t longest_run = 8;
+constexpr std::uint32_t longest_edge = 5;
+
+/// Neighbouring bins that an invocation takes, which together span at most `cells` cells.
+struct Tile {
+  std::uint32_t cells = 0;
+  std::uint32_t x = 0;
+  std::uint32_t y = 0;
+
+  std::uint32_t bins() const { return x * y; }
+};
+
+std::uint32_t bins_within(std::uint32_t cells, double step_cells, int count) {
+  const double limit = 1.0 + std::floor(cells / std::max(step_cells, 1e-9) * (1.0 + 1e-12));
+  return static_cast<std::uint32_t>(
+      std::min({limit, static_cast<double>(count), static_cast<double>(longest_edge)}));
+}
+
+Tile tile_within(std::uint32_t cells, const glm::dvec2& step_cells, const PoseLattice& lattice,
+                 std::uint32_t most_bins) {
+  Tile tile{.cells = cells,
+            .x = bins_within(cells, step_cells.x, lattice.x_mm.count),
+            .y = bins_within(cells, step_cells.y, lattice.y_mm.count)};
+  while (tile.bins() > most_bins) {
+    (tile.x > tile.y ? tile.x : tile.y) -= 1;
+  }
+  return tile;
+}
+
+/// Fewest bins with which a tile is faster than runs of bins. On a CPU device a run takes as long
+/// as a tile of nine over two cells, measured. A GPU waits for fetches: a tile has four, a run one
+/// a bin.
+std::uint32_t least_bins(const gpu::Limits& limits) { return limits.cpu ? 10 : 5; }
+
+/// The run length that covers a row with the fewest bins beyond its end, the longest of equals.
+std::uint32_t run_for(std::uint32_t nx, std::uint32_t longest) {
+  std::uint32_t best = 1;
+  for (std::uint32_t run = 1; run <= std::min(nx, longest); ++run) {
+    // Sharing the element's load is worth a little waste.
+    const auto cost = [nx](std::uint32_t r) { return groups_of(nx, r) * (r + 1); };
+    if (cost(run) <= cost(best)) {
+      best = run;
+    }
+  }
+  return best;
+}
+
+/// @param shape what this kernel alone is specialised by
+gpu::Kernel kernel_of(gpu::Context& context, const char* name, std::span<const std::uint32_t> spirv,
+                      const MapKind& maps, const ContactModel& model,
+                      std::initializer_list<std::uint32_t> shape) {
+  std::vector<std::uint32_t> constants = contact_constants(context.limits(), model);
+  constants.push_back(maps.access == Access::table ? 1U : 0U);
+  constants.insert(constants.end(), shape);
+  return {context,
+          {.name = name,
+           .spirv = spirv,
+           .bindings = {Access::table, Access::table, Access::table, Access::table, Access::storage,
+                        Access::storage, Access::storage, Access::storage},
+           .push_bytes = sizeof(shaders::LikelihoodPush),
+           .constants = constants}};
+}
+
+/// Puts every hypothesis's map into a group. Throws Error where a map, or the lattice along x and
+/// y, is larger than what kernels read.
+std::vector<MapGroup> group_maps(const gpu::Context& context,
+                                 std::span<const Hypothesis> hypotheses,
+                                 const PoseLattice& lattice) {
+  const gpu::Limits& limits = context.limits();
+  const std::size_t most_places =
+      std::min(limits.storage_range, limits.allocation) / sizeof(shaders::Split);
+  const std::size_t most_objects = most_places / axis_bins(lattice);
+  if (most_objects == 0) {
+    const bool x = lattice.x_mm.count > lattice.y_mm.count;
+    throw Error(Fault::input,
+                fmt::format("bins {} = {}: device '{}' takes at most {} of x and y together; use "
+                            "fewer",
+                            x ? "x" : "y", (x ? lattice.x_mm : lattice.y_mm).count, context.name(),
+                            most_places));
+  }
+  std::vector<MapGroup> groups;
+  for (std::size_t object = 0; object < hypotheses.size(); ++object) {
+    const OccupancyGrid& map = hypotheses[object].compared();
+    const MapKind kind{map.cell_mm, access_of(context, map)};
+    const std::uint64_t cells = bordered_cells(map);
+    const std::uint64_t limit = most_map_cells(limits, kind.access);
+    const auto group = std::find_if(groups.begin(), groups.end(), [&](const MapGroup& g) {
+      return g.kind == kind && g.cells + cells <= limit && g.objects.size() < most_objects;
+    });
+    if (group == groups.end()) {
+      groups.push_back({kind, cells, {object}});
+    } else {
+      group->cells += cells;
+      group->objects.push_back(object);
+    }
+  }
+  return groups;
+}
+
+/// Chooses neighbouring bins in register tiles or, where too few bins lie side by side within two
+/// of the map's cells, runs of bins of a row.
+/// @param objects whose bins a dispatch takes together
+LikelihoodPath choose_path(gpu::Context& context, const PoseLattice& lattice, std::size_t objects,
+                           const MapKind& maps, const ContactModel& model) {
+  const gpu::Limits& limits = context.limits();
+  const glm::dvec2 step_cells = glm::dvec2(lattice.x_mm.step(), lattice.y_mm.step()) / maps.cell_mm;
+  const std::uint32_t most_bins =
+      most_bins_per_invocation(limits, lattice.bins() * static_cast<std::int64_t>(objects));
+  Tile tile = tile_within(1, step_cells, lattice, most_bins);
+  // Sixteen nodes in the place of nine cost a fifth more a bin, but are shared: measured, 5 x 5
+  // bins over two cells take three quarters of the time of 3 x 3 over one, and as long as 4 x 4.
+  if (const Tile wide = tile_within(2, step_cells, lattice, most_bins);
+      wide.bins() >= 2 * tile.bins()) {
+    tile = wide;
+  }
+  if (tile.bins() >= least_bins(limits)) {
+    const auto bits = [](double value) {
+      return std::bit_cast<std::uint32_t>(static_cast<float>(value));
+    };
+    return {
+        .kernel = kernel_of(context, "accumulate_tiles", shaders::accumulate_tiles, maps, model,
+                            {tile.x, tile.y, bits(step_cells.x), bits(step_cells.y), tile.cells}),
+        .bins_x = tile.x,
+        .bins_y = tile.y,
+        .description = fmt::format("register tiles of {} x {} bins over {} of a side: the "
+                                   "lattice's step is {:.3g} x {:.3g} of a map cell",
+                                   tile.x, tile.y, tile.cells == 1 ? "one cell" : "two cells",
+                                   step_cells.x, step_cells.y)};
+  }
+  const std::uint32_t run =
+      run_for(static_cast<std::uint32_t>(lattice.x_mm.count), std::min(longest_run, most_bins));
+  return {
+      .kernel = kernel_of(context, "accumulate_rows", shaders::accumulate_rows, maps, model, {run}),
+      .bins_x = run,
+      .bins_y = 1,
+      .description = fmt::format("runs of {} bins: at a lattice step of {:.3g} x {:.3g} map "
+                                 "cells fewer bins than a tile needs lie side by side{}",
+                                 run, step_cells.x, step_cells.y,
+                                 limits.cpu ? "" : ", or tiles leave the GPU idle")};
 }
 
 }  // namespace
@@ -72,11 +238,26 @@ DenseLikelihood::DenseLikelihood(gpu::Context& context, gpu::CommandStream& stre
       contact_(context, stream, model),
       batch_elements_(batch_for(context, lattice, hypotheses.size())) {
   const std::vector<std::uint32_t> first_bins = first_bins_of(belief, hypotheses.size());
-  for (const MapGroup& group : group_maps(context, hypotheses, lattice)) {
-    groups_.push_back({group,
-                       choose_path(context, lattice, group.objects.size(), group.kind, model),
-                       MapTable(context, stream, group, hypotheses, lattice, first_bins,
-                                *model.prior, contact_)});
+  for (MapGroup& maps : group_maps(context, hypotheses, lattice)) {
+    LikelihoodPath path = choose_path(context, lattice, maps.objects.size(), maps.kind, model);
+    BorderedMaps nodes(context, maps.kind.access, maps.cells,
+                       fmt::format("map '{}'", hypotheses[maps.objects.front()].map.label));
+    std::vector<shaders::Split> axes;
+    std::vector<shaders::ObjectPlace> places;
+    for (const std::size_t object : maps.objects) {
+      const OccupancyGrid& map = hypotheses[object].compared();
+      places.push_back({.first_node = nodes.add(stream, map, *model.prior),
+                        .map_width = map.nx + 2 * shaders::MAP_BORDER,
+                        .map_height = map.ny + 2 * shaders::MAP_BORDER,
+                        .first_axis = static_cast<shaders::uint>(axes.size()),
+                        .first_bin = first_bins[object],
+                        .first_table_node = contact_.first_node(object)});
+      const std::vector<shaders::Split> own_axes = axes_in_cells(map, lattice);
+      axes.insert(axes.end(), own_axes.begin(), own_axes.end());
+    }
+    groups_.push_back({std::move(maps), std::move(path), std::move(nodes),
+                       stream.uploaded(axes, "the lattice's axes"),
+                       stream.uploaded(places, "the objects' places")});
   }
   reserve(1);
   for (const Group& group : groups_) {
@@ -107,13 +288,12 @@ void DenseLikelihood::dispatch(const Group& group, const Range& range, const Sla
                                      .elements = static_cast<shaders::uint>(elements),
                                      .object_first = range.first};
   const LikelihoodPath& path = group.path;
-  const MapTable& maps = group.maps;
   const std::uint32_t invocations =
       groups_of(slab.nx, path.bins_x) * groups_of(slab.row_count, path.bins_y);
   stream_.dispatch(
       path.kernel,
-      {&segments_, &contact_.nodes(), &elements_, maps.nodes().read_as(gpu::Access::table),
-       maps.nodes().read_as(gpu::Access::storage), &maps.axes(), &maps.places(),
+      {&segments_, &contact_.nodes(), &elements_, group.maps.nodes().read_as(Access::table),
+       group.maps.nodes().read_as(Access::storage), &group.axes, &group.places,
        &slab.log_likelihood},
       push,
       {groups_of(invocations, independent_lanes(context_.limits())), range.count,
@@ -201,7 +381,7 @@ std::vector<std::string> DenseLikelihood::paths() const {
 std::uint64_t DenseLikelihood::device_bytes() const {
   std::uint64_t bytes = elements_.bytes() + segments_.bytes() + contact_.nodes().bytes();
   for (const Group& group : groups_) {
-    bytes += group.maps.device_bytes();
+    bytes += group.maps.nodes().bytes() + group.axes.bytes() + group.places.bytes();
   }
   return bytes;
 }

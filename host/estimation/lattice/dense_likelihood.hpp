@@ -5,18 +5,46 @@
 #include <limits>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
-#include "estimation/contact_kernel.hpp"
+#include "estimation/kernel_inputs.hpp"
 #include "estimation/known_elements.hpp"
 #include "estimation/lattice/dense_belief.hpp"
-#include "estimation/lattice/map_table.hpp"
 #include "gpu/command_stream.hpp"
+#include "gpu/kernel.hpp"
 #include "palpate/contact_model.hpp"
 #include "palpate/lattice.hpp"
 #include "palpate/pose_histogram.hpp"
 
 namespace palpate {
+
+/// A way to evaluate the likelihood over the lattice, for maps of one cell size: a kernel of which
+/// an invocation takes bins_x x bins_y bins of one theta. All of them bind the buffers of
+/// shaders/likelihood_buffers.glsl.
+struct LikelihoodPath {
+  gpu::Kernel kernel;
+  std::uint32_t bins_x = 1;
+  std::uint32_t bins_y = 1;
+  std::string description;  ///< what it does and why it was chosen
+};
+
+/// What a path is made for: maps of one cell size that kernels read in one way.
+struct MapKind {
+  double cell_mm = 0.0;
+  /// Tables are the fast way, which not every device has for large maps.
+  gpu::Access access = gpu::Access::table;
+
+  bool operator==(const MapKind&) const = default;
+};
+
+/// Objects whose maps are of one kind and, like their axes, together no larger than what a kernel
+/// reads at once.
+struct MapGroup {
+  MapKind kind;
+  std::uint64_t cells = 0;           ///< that the maps take in a buffer
+  std::vector<std::size_t> objects;  ///< ascending
+};
 
 /// The log-likelihood of touches at every bin of the lattice, for several maps (Eq. 7).
 class DenseLikelihood {
@@ -50,7 +78,9 @@ class DenseLikelihood {
   /// Objects that a dispatch takes together.
   struct Group : MapGroup {
     LikelihoodPath path;
-    MapTable maps;
+    BorderedMaps maps;
+    gpu::Buffer axes;    ///< the lattice's x centres, then its y, in cells of each map, [object]
+    gpu::Buffer places;  ///< shaders::ObjectPlace, [object]
   };
   /// The objects of a group that a slab holds: a range of group.objects.
   struct Range {

@@ -3,8 +3,7 @@
 #include <span>
 #include <vector>
 
-#include "estimation/bordered_map.hpp"
-#include "estimation/contact_kernel.hpp"
+#include "estimation/kernel_inputs.hpp"
 #include "estimation/known_elements.hpp"
 #include "gpu/command_stream.hpp"
 #include "palpate/estimate.hpp"

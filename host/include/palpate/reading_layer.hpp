@@ -44,8 +44,8 @@ struct PALPATE_API ReadingLayer {
 /// The grid of Hypothesis::layer: it covers the map and far_mm around it. Its cells stand in
 /// `log_odds`, its prior is that of the value beyond. A cell was sensed where `observations` are
 /// above 0; without observations, where the log odds differ from the prior's.
-/// @throws Error where the map has no mean level but `how` asks for it, or the map's cells with
-/// what is around them exceed most_cells
-PALPATE_API OccupancyGrid reading_layer(const OccupancyGrid& map, const ReadingLayer& how);
+/// @throws Error where the map has no mean level but `settings` asks for it, or the map's cells
+/// with what is around them exceed most_cells
+PALPATE_API OccupancyGrid reading_layer(const OccupancyGrid& map, const ReadingLayer& settings);
 
 }  // namespace palpate
