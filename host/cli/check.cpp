@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -32,16 +31,6 @@ struct CheckArguments {
   std::string write_array;
 };
 
-void check_outputs(const CheckArguments& options) {
-  CommandFiles files;
-  for (const std::string& recording : options.recordings) {
-    files.reads("RECORDING", recording);
-  }
-  files.writes("--json", options.json, CommandFiles::Dash::stream);
-  files.writes("--write-array", options.write_array);
-  files.prepare();
-}
-
 std::string json_of(const SetupCheck& check) {
   auto all = nlohmann::ordered_json::array();
   for (const SetupFinding& finding : check.findings) {
@@ -51,7 +40,11 @@ std::string json_of(const SetupCheck& check) {
 }
 
 void check(const CheckArguments& options) {
-  check_outputs(options);
+  CommandFiles()
+      .reads("RECORDING", options.recordings)
+      .writes("--json", options.json, CommandFiles::Dash::stream)
+      .writes("--write-array", options.write_array)
+      .prepare();
   const std::vector<Recording> recordings = read_touch_recordings(options.recordings);
   const Recording& first = recordings.front();
   MapOptions maps{.cell_mm = require_above("--cell-mm", options.cell_mm, 0.0)};
@@ -60,11 +53,9 @@ void check(const CheckArguments& options) {
   maps.classifier = make_classifier(first.pressure_unit, first.path, options.request.threshold,
                                     options.request.ratio);
   Device device = Device::open(options.request.device);
-  SetupCheck found;
-  {
-    Progress progress("trying set-ups");
-    found = check_setup(device, recordings, maps, [&](double done) { progress.show(done); });
-  }
+  const SetupCheck found = with_progress("trying set-ups", [&](const auto& show) {
+    return check_setup(device, recordings, maps, show);
+  });
   if (!options.write_array.empty()) {
     write_file(options.write_array, array_table(found.elements_mm));
   }
@@ -95,13 +86,13 @@ void check(const CheckArguments& options) {
 }  // namespace
 
 void add_check(CLI::App& app) {
-  auto* command = app.add_subcommand(
-      "check",
+  const auto [command, options] = add_command<CheckArguments>(
+      app, "check",
       "Ask touches at known poses which set-up explains them best: the order of the elements, "
-      "where "
-      "the array sits in the tool, its pitch, units of the poses, dead elements, and touches that "
-      "contradict the others. Each finding comes with its evidence, in nats, and what mends it");
-  const auto options = std::make_shared<CheckArguments>();
+      "where the array sits in the tool, its pitch, units of the poses, dead elements, and touches "
+      "that contradict the others. Each finding comes with its evidence, in nats, and what mends "
+      "it",
+      check);
   command
       ->add_option("RECORDING", options->recordings,
                    "Recordings of touches (HDF5), of one array and of objects that stay in place: "
@@ -123,7 +114,6 @@ void add_check(CLI::App& app) {
                       "the distance of neighbouring elements; 0.5 for DigiTacts and one element]");
   add_option_flag(*command, options->request, "device",
                   "Vulkan device, by index or a part of its name");
-  command->callback([options] { check(*options); });
 }
 
 }  // namespace palpate::cli

@@ -11,9 +11,8 @@
 #include "io/atomic_file.hpp"
 #include "io/file_identity.hpp"
 #include "io/input_file.hpp"
-#include "palpate/error.hpp"
 
-namespace palpate {
+namespace palpate::cli {
 
 namespace {
 
@@ -39,23 +38,35 @@ std::optional<Place> place_of(const std::filesystem::path& file, std::optional<i
 
 }  // namespace
 
-void CommandFiles::reads(const std::string& flag, const std::filesystem::path& file, Dash dash) {
+CommandFiles& CommandFiles::reads(const std::string& flag, const std::filesystem::path& file,
+                                  Dash dash) {
   if (!file.empty()) {
     read_.push_back({flag, file, dash == Dash::stream && file == "-"});
   }
+  return *this;
 }
 
-void CommandFiles::writes(const std::string& flag, const std::filesystem::path& file, Dash dash) {
+CommandFiles& CommandFiles::reads(const std::string& flag, const std::vector<std::string>& files) {
+  for (const std::string& file : files) {
+    reads(flag, std::filesystem::path(file));
+  }
+  return *this;
+}
+
+CommandFiles& CommandFiles::writes(const std::string& flag, const std::filesystem::path& file,
+                                   Dash dash) {
   if (!file.empty()) {
     written_.push_back({flag, file, dash == Dash::stream && file == "-"});
   }
+  return *this;
 }
 
-void CommandFiles::writes_in(const std::string& flag, const std::filesystem::path& folder,
-                             const std::string& name) {
+CommandFiles& CommandFiles::writes_in(const std::string& flag, const std::filesystem::path& folder,
+                                      const std::string& name) {
   if (!folder.empty()) {
     written_.push_back({flag, folder / name, false, true});
   }
+  return *this;
 }
 
 void CommandFiles::require_distinct() const {
@@ -98,4 +109,4 @@ void CommandFiles::prepare() const {
   }
 }
 
-}  // namespace palpate
+}  // namespace palpate::cli

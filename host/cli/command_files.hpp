@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-namespace palpate {
+namespace palpate::cli {
 
 /// Refuses command lines that write a file which they also read, or write twice, even under another
 /// path, a symbolic link or a hard link. Holds each file with the flag that names it.
@@ -13,13 +13,16 @@ class CommandFiles {
   /// Whether "-" names a file called "-", or standard input or output.
   enum class Dash { file, stream };
 
-  /// Adds a file that the command reads, unless its name is "".
-  void reads(const std::string& flag, const std::filesystem::path& file, Dash dash = Dash::file);
+  /// Adds files that the command reads, unless their name is "".
+  CommandFiles& reads(const std::string& flag, const std::filesystem::path& file,
+                      Dash dash = Dash::file);
+  CommandFiles& reads(const std::string& flag, const std::vector<std::string>& files);
   /// Adds a file that the command writes, which need not exist, unless its name is "".
-  void writes(const std::string& flag, const std::filesystem::path& file, Dash dash = Dash::file);
+  CommandFiles& writes(const std::string& flag, const std::filesystem::path& file,
+                       Dash dash = Dash::file);
   /// Adds a file in a folder that the command makes where it is missing, unless the folder is "".
-  void writes_in(const std::string& flag, const std::filesystem::path& folder,
-                 const std::string& name);
+  CommandFiles& writes_in(const std::string& flag, const std::filesystem::path& folder,
+                          const std::string& name);
 
   /// Compares existing regular files and FIFOs by device and inode, others by their paths.
   /// Terminals and other devices may be both read and written. Call it before the work, which may
@@ -41,4 +44,4 @@ class CommandFiles {
   std::vector<Named> written_;
 };
 
-}  // namespace palpate
+}  // namespace palpate::cli

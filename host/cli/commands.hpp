@@ -17,8 +17,9 @@ void add_map(CLI::App& app);
 void add_check(CLI::App& app);
 void add_calibrate(CLI::App& app);
 void add_recognize(CLI::App& app);
-/// @param status becomes the exit status of a run that succeeds
-void add_batch(CLI::App& app, int& status);
+/// Its run throws CLI::RuntimeError, with the exit status, where it succeeds but some unknowns
+/// fail.
+void add_batch(CLI::App& app);
 void add_merge(CLI::App& app);
 void add_plan(CLI::App& app);
 void add_evaluate(CLI::App& app);

@@ -1,11 +1,10 @@
 #include "cli/commands.hpp"
 
-#include <memory>
-
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "cli/options.hpp"
 #include "palpate/device.hpp"
 
 namespace palpate::cli {
@@ -47,11 +46,10 @@ void print_devices(bool json) {
 }  // namespace
 
 void add_devices(CLI::App& app) {
-  auto* command = app.add_subcommand(
-      "devices", "List the Vulkan devices and why each is used or not; (*) marks the default");
-  const auto json = std::make_shared<bool>(false);
+  const auto [command, json] = add_command<bool>(
+      app, "devices", "List the Vulkan devices and why each is used or not; (*) marks the default",
+      print_devices);
   command->add_flag("--json", *json, "Print the list as JSON");
-  command->callback([json] { print_devices(*json); });
 }
 
 }  // namespace palpate::cli

@@ -1,20 +1,20 @@
 #include "cli/commands.hpp"
 
-#include <unistd.h>
-
+#include <algorithm>
 #include <filesystem>
-#include <memory>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
 #include "cli/command_files.hpp"
-#include "cli/evaluate_output.hpp"
 #include "cli/options.hpp"
-#include "cli/recognition_flags.hpp"
 #include "cli/results_folder.hpp"
+#include "cli/text_table.hpp"
+#include "palpate/occupancy_grid.hpp"
 #include "recognition/batch/batch_task.hpp"
 #include "recognition/judged_results.hpp"
 #include "recognition/record_json.hpp"
@@ -24,50 +24,144 @@ namespace palpate::cli {
 
 namespace {
 
+std::string scores_table(const Evaluation& evaluation) {
+  // A column without content is left out.
+  TextTable table({{""}, {"all", true}, {"known classes", true}});
+  const auto add = [&](const char* name, auto text_of) {
+    table.add({name, text_of(evaluation.all),
+               evaluation.known ? std::string(text_of(*evaluation.known)) : ""});
+  };
+  add("records", [](const Scores& s) { return fmt::format("{}", s.records); });
+  add("right", [](const Scores& s) { return fmt::format("{}", s.right); });
+  add_score_rows(table, {&evaluation.all, evaluation.known ? &*evaluation.known : nullptr});
+  return table.text();
+}
+
+std::string reliability_table(const Scores& scores) {
+  TextTable table({{"confidence"},
+                   {"records", true},
+                   {"mean", true},
+                   {"accuracy", true},
+                   {"95 % interval", true}});
+  for (const ReliabilityBin& bin : scores.bins) {
+    if (bin.records > 0) {
+      table.add({fmt::format("{:.1f} to {:.1f}", bin.lower, bin.upper),
+                 fmt::format("{}", bin.records), percent(bin.mean_confidence),
+                 percent(bin.accuracy()), range_words(bin.interval())});
+    }
+  }
+  return table.text();
+}
+
+std::string class_name(const ClassScores& scores) {
+  return scores.label + (scores.known ? "" : " (unknown)");
+}
+
+/// The wrong answers, the most frequent first.
+std::string taken_for(const ClassScores& scores, const std::vector<std::string>& answers) {
+  const std::string_view right = scores.known ? std::string_view(scores.label) : none_label;
+  std::vector<std::pair<std::string, std::size_t>> wrong;
+  for (std::size_t k = 0; k < answers.size(); ++k) {
+    if (scores.taken[k] > 0 && answers[k] != right) {
+      wrong.emplace_back(answers[k], scores.taken[k]);
+    }
+  }
+  return tally(std::move(wrong));
+}
+
+std::string class_table(const Evaluation& evaluation) {
+  TextTable table({{"class"},
+                   {"records", true},
+                   {"right", true},
+                   {"recall", true},
+                   {"95 % interval", true},
+                   {"taken for"}});
+  for (const ClassScores& scores : evaluation.classes) {
+    table.add({class_name(scores), fmt::format("{}", scores.records),
+               fmt::format("{}", scores.right), percent(scores.recall()),
+               range_words(scores.interval()), taken_for(scores, evaluation.answers)});
+  }
+  return table.text();
+}
+
+std::string unknown_words(const Evaluation& evaluation) {
+  if (!evaluation.unknown) {
+    return "";
+  }
+  const Scores& unknown = *evaluation.unknown;
+  std::string text = fmt::format(
+      "unknown classes: {} of {} called \"(none)\" ({}, 95 % interval {})\n", unknown.right,
+      unknown.records, percent(unknown.accuracy()), range_words(unknown.interval()));
+  if (const auto& against = evaluation.known_against_unknown) {
+    text += fmt::format(
+        "area under the curve of known against unknown classes by {}: {:.3f} +- {:.3f} ({} known, "
+        "{} unknown)\n",
+        name_of(against->score), against->area, against->standard_error, against->known,
+        against->unknown);
+  } else if (evaluation.known) {
+    text += "no area under the curve: records of both kinds need none or fit.z\n";
+  }
+  return text;
+}
+
+std::string error_words(const Evaluation& evaluation) {
+  std::string text;
+  const auto add = [&](const char* of, const std::optional<Median>& median) {
+    if (median) {
+      text += fmt::format("{}{} {:.2f} mm ({})", text.empty() ? "median error of " : ", of ", of,
+                          median->value, count_of(median->count, "record", "records"));
+    }
+  };
+  add("refined poses", evaluation.refined_error_mm);
+  add("modes", evaluation.error_mm);
+  return text.empty() ? "" : text + "\n";
+}
+
+/// The scores, the reliability bins that have records, a line for each class with what it was taken
+/// for, unknown classes and pose errors.
+std::string evaluation_text(const Evaluation& evaluation, std::size_t without_truth) {
+  std::string text = scores_table(evaluation);
+  if (without_truth > 0) {
+    text += fmt::format("{} without a true label left out\n",
+                        count_of(without_truth, "record", "records"));
+  }
+  text += "\n" + reliability_table(evaluation.all);
+  text += "\n" + class_table(evaluation);
+  text += unknown_words(evaluation) + error_words(evaluation);
+  return text;
+}
+
 struct EvaluateArguments {
   std::vector<std::string> results;
   std::string json;
 };
 
-/// Throws Error where an output cannot be written, before any file is.
-void check_outputs(const EvaluateArguments& options,
-                   const std::vector<std::filesystem::path>& read) {
-  CommandFiles files;
-  for (const std::filesystem::path& file : read) {
-    files.reads("RESULTS", file);
-  }
-  for (const std::string& results : options.results) {
-    if (ResultsFolder(results).has_task()) {
-      files.reads("RESULTS", ResultsFolder(results).task());
-    }
-  }
-  files.writes("--json", options.json, CommandFiles::Dash::stream);
-  files.prepare();
-}
-
 /// Says how much a folder of palpate batch still lacks.
-void tell_missing(const std::string& results) {
-  if (!ResultsFolder(results).has_task()) {
-    return;
-  }
-  const ResultsFolder folder(results);
+void tell_missing(const ResultsFolder& folder) {
   const BatchTask task = read_batch_task(folder.task());
   const std::size_t chunks = task.chunks();
   const std::size_t missing = chunks - folder.finished_chunks(chunks).size();
   if (missing > 0) {
     tell_on_stderr(fmt::format("{}: {} of {} chunks are missing; palpate batch completes them",
-                               results, missing, chunks));
+                               folder.path().string(), missing, chunks));
   }
 }
 
 void evaluate_results(const EvaluateArguments& options) {
   const std::vector<std::filesystem::path> files = result_files(options.results);
-  check_outputs(options, files);
+  std::vector<ResultsFolder> folders(options.results.begin(), options.results.end());
+  std::erase_if(folders, [](const ResultsFolder& folder) { return !folder.has_task(); });
+  CommandFiles all;
+  for (const std::filesystem::path& file : files) {
+    all.reads("RESULTS", file);
+  }
+  for (const ResultsFolder& folder : folders) {
+    all.reads("RESULTS", folder.task());
+  }
+  all.writes("--json", options.json, CommandFiles::Dash::stream).prepare();
   const JudgedResults results = read_results(files);
   const Evaluation evaluation = evaluate(results, options.results.front());
-  for (const std::string& folder : options.results) {
-    tell_missing(folder);
-  }
+  std::ranges::for_each(folders, tell_missing);
   if (const std::string failed = failed_words(results); !failed.empty()) {
     tell_on_stderr(failed);
   }
@@ -78,22 +172,20 @@ void evaluate_results(const EvaluateArguments& options) {
 }  // namespace
 
 void add_evaluate(CLI::App& app) {
-  auto* command = app.add_subcommand(
-      "evaluate",
+  const auto [command, options] = add_command<EvaluateArguments>(
+      app, "evaluate",
       "Compare what palpate recognize --json or palpate batch wrote with the truth: accuracy and "
-      "recall of every "
-      "class with 95 % intervals, what each class was taken for, log-loss, how far confidence is "
-      "from accuracy, and median pose errors. A class that no map has is an unknown class, whose "
-      "right answer is \"(none)\"; the area under the curve says how well unknown classes are told "
-      "from known ones");
-  const auto options = std::make_shared<EvaluateArguments>();
+      "recall of every class with 95 % intervals, what each class was taken for, log-loss, how far "
+      "confidence is from accuracy, and median pose errors. A class that no map has is an unknown "
+      "class, whose right answer is \"(none)\"; the area under the curve says how well unknown "
+      "classes are told from known ones",
+      evaluate_results);
   command
       ->add_option("RESULTS", options->results,
                    "JSON files of palpate recognize, files with one such record a line, folders of "
                    "palpate batch, or folders of *.json. Records without a true label are left out")
       ->required();
   command->add_option("--json", options->json, "Write all numbers as JSON; - is standard output");
-  command->callback([options] { evaluate_results(*options); });
 }
 
 }  // namespace palpate::cli

@@ -183,18 +183,17 @@ void export_tables(const ExportArguments& options) {
 }  // namespace
 
 void add_export(CLI::App& app) {
-  auto* command = app.add_subcommand(
-      "export",
+  const auto [command, options] = add_command<ExportArguments>(
+      app, "export",
       "Write a recording as CSV tables: pressures.csv, poses.csv and array.csv. The command also "
-      "prints the 'palpate import' that makes the same recording from them");
-  const auto options = std::make_shared<ExportArguments>();
+      "prints the 'palpate import' that makes the same recording from them",
+      export_tables);
   command->add_option("FILE", options->recording, "Recording of touches or frames (HDF5)")
       ->required();
   command
       ->add_option("-o,--output", options->folder,
                    "Folder to write to; made where it is missing. Older tables are replaced")
       ->required();
-  command->callback([options] { export_tables(*options); });
 }
 
 }  // namespace palpate::cli

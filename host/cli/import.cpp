@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <memory>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -64,8 +63,7 @@ void print_summary(const ImportArguments& options, const ImportedRecording& impo
   }
   if (imported.in_gaps > 0) {
     fmt::print(
-        ", {} without one as the poses around them are more than {:.3g} s apart "
-        "(--largest-gap-s)",
+        ", {} without one as the poses around them are more than {:.3g} s apart (--largest-gap-s)",
         imported.in_gaps, imported.largest_gap_s);
   }
   std::size_t unknown = 0;
@@ -98,15 +96,6 @@ struct Imported {
   ImportArguments options;
   ImportedRecording tables;
 };
-
-CommandFiles files_of(const ImportArguments& options) {
-  CommandFiles files;
-  files.reads("PRESSURES", options.pressures);
-  files.reads("--poses", options.poses);
-  files.reads("--array", options.array);
-  files.writes("-o", options.output);
-  return files;
-}
 
 void write(const Imported& imported) {
   const auto& [options, tables] = imported;
@@ -184,8 +173,12 @@ std::vector<ImportArguments> imports_of(const ImportArguments& options) {
 void import_tables(const ImportArguments& options) {
   std::vector<Imported> all;
   for (const ImportArguments& one : imports_of(options)) {
-    files_of(one).require_distinct();
-    require_writable(one.output);
+    CommandFiles()
+        .reads("PRESSURES", one.pressures)
+        .reads("--poses", one.poses)
+        .reads("--array", one.array)
+        .writes("-o", one.output)
+        .prepare();
     all.push_back({one, palpate::import_tables(one)});
   }
   std::ranges::for_each(all, write);
@@ -194,45 +187,40 @@ void import_tables(const ImportArguments& options) {
 }  // namespace
 
 void add_import(CLI::App& app) {
-  auto* command = app.add_subcommand(
-      "import",
+  const auto [command, options] = add_command<ImportArguments>(
+      app, "import",
       "Write a recording (HDF5) from tables: pressures, poses and the positions of the elements. "
       "Tables are CSV files, with commas, semicolons, tabs or blanks between the cells. "
-      "docs/files.md describes them");
-  const auto options = std::make_shared<ImportArguments>();
+      "docs/files.md describes them",
+      import_tables);
   command
       ->add_option("PRESSURES", options->pressures,
                    "CSV: a row for each frame or touch, with a column for each element (and time, "
                    "where it is known); or a row for each reading, with the columns time, element "
-                   "(counted from 0) and pressure. An "
-                   "empty cell or NaN is an unknown reading; an element without any reading is "
-                   "dead")
+                   "(counted from 0) and pressure. An empty cell or NaN is an unknown reading; an "
+                   "element without any reading is dead")
       ->required();
-  command->add_option(
-      "--poses", options->poses,
-      "CSV with the poses T_robot_sensor: columns x, y, theta (or yaw), or of poses in space (see "
-      "--pose-columns), and time. Frames take the "
-      "pose interpolated at their time; without a column time, rows are taken one by one. It may "
-      "be PRESSURES itself [default: frames without poses]");
-  command->add_flag(
-      "--unposed", options->unposed,
-      "The sensor's poses are unknown: write rows that are touches at the pose 0, for "
-      "'palpate map --unposed', 'palpate calibrate --unposed' and 'palpate recognize "
-      "--each-frame'; frames stay without poses");
+  command->add_option("--poses", options->poses,
+                      "CSV with the poses T_robot_sensor: columns x, y, theta (or yaw), or of "
+                      "poses in space (see --pose-columns), and time. Frames take the pose "
+                      "interpolated at their time; without a column time, rows are taken one by "
+                      "one. It may be PRESSURES itself [default: frames without poses]");
+  command->add_flag("--unposed", options->unposed,
+                    "The sensor's poses are unknown: write rows that are touches at the pose 0, "
+                    "for 'palpate map --unposed', 'palpate calibrate --unposed' and 'palpate "
+                    "recognize --each-frame'; frames stay without poses");
   add_array_flags(*command, *options)->required();
   command->add_option("-o,--output", options->output, "Recording to write (HDF5)")->required();
+  command->add_option("--rows", options->rows,
+                      "What a row of the pressures is: frames (a stream, of which 'palpate "
+                      "touches' finds the touches) or touches (single presses, each with a pose or "
+                      "--unposed) [default: frames where there are times, else touches]");
+  command->add_option("--pose-unit", options->pose_unit,
+                      "Units of the poses: mm,rad or mm,deg or m,rad or m,deg [default: by the "
+                      "columns' names, as in x_m or theta_deg, else mm,rad]");
   command->add_option(
-      "--rows", options->rows,
-      "What a row of the pressures is: frames (a stream, of which 'palpate touches' "
-      "finds the touches) or touches (single presses, each with a pose or --unposed) [default: "
-      "frames where there are times, else touches]");
-  command->add_option(
-      "--pose-unit", options->pose_unit,
-      "Units of the poses: mm,rad or mm,deg or m,rad or m,deg [default: by the columns' names, as "
-      "in x_m or theta_deg, else mm,rad]");
-  command->add_option("--time-unit", options->time_unit,
-                      "Unit of the times: s, ms, us or ns [default: by the column's name, as in "
-                      "time_ns, else s]");
+      "--time-unit", options->time_unit,
+      "Unit of the times: s, ms, us or ns [default: by the column's name, as in time_ns, else s]");
   command->add_option("--time-column", options->time_column,
                       "Name of the column of times, in both tables; a column without a name is "
                       "called by its number, from 1 [default: time, timestamp, stamp or t]");
@@ -247,32 +235,28 @@ void add_import(CLI::App& app) {
   command->add_option("--split", options->split,
                       "Write a recording for each value of this column, OUTPUT-VALUE.h5, labelled "
                       "by it unless --object is given");
-  command->add_option(
-      "--pressure-columns", options->pressure_columns,
-      "Columns of the pressures, of their own table, separated by commas: names or numbers from 1, "
-      "FIRST:LAST, START::STEP (3::3, every third from the third on), patterns (*_fz, or p{n}_fz "
-      "in "
-      "the order of the numbers) or a beginning of names [default: all columns that are neither "
-      "time nor pose]");
+  command->add_option("--pressure-columns", options->pressure_columns,
+                      "Columns of the pressures, of their own table, separated by commas: names or "
+                      "numbers from 1, FIRST:LAST, START::STEP (3::3, every third from the third "
+                      "on), patterns (*_fz, or p{n}_fz in the order of the numbers) or a beginning "
+                      "of names [default: all columns that are neither time nor pose]");
   command->add_option("--pressure-component", options->pressure_component,
                       "Of elements that read three axes, in three columns each: z, or norm, the "
                       "length of the vector [default: one column an element]");
   command->add_option(
       "--pose-columns", options->pose_columns,
       "Columns of the poses, of their own table, as --pressure-columns names them: X,Y,THETA; or "
-      "in "
-      "space X,Y,Z,ROLL,PITCH,YAW (see --euler), a rotation vector X,Y,Z,RX,RY,RZ, a quaternion "
+      "in space X,Y,Z,ROLL,PITCH,YAW (see --euler), a rotation vector X,Y,Z,RX,RY,RZ, a quaternion "
       "TX,TY,TZ,QX,QY,QZ,QW, or the 12 or 16 numbers of a matrix [default: these names; "
       "actual_TCP_pose_0 to 5; O_T_EE_0 to 15]");
   command->add_option(
       "--euler", options->euler,
       "Axes about which three angles turn, in the order of their columns: xyz, zyx and so on about "
       "fixed axes, ZYX and so on about moving ones, as SciPy has them; or vector, a rotation "
-      "vector "
-      "[default: xyz, of columns called rx, ry and rz a vector]");
-  command->add_option("--matrix", options->matrix,
-                      "How matrices are written: columns or rows [default: the one by which they "
-                      "are rotations]");
+      "vector [default: xyz, of columns called rx, ry and rz a vector]");
+  command->add_option(
+      "--matrix", options->matrix,
+      "How matrices are written: columns or rows [default: the one by which they are rotations]");
   command->add_option(
       "--mount", options->mount,
       "X,Y,Z,ROLL,PITCH,YAW: the array's pose in the frame whose poses are logged, such as the "
@@ -280,13 +264,13 @@ void add_import(CLI::App& app) {
   command
       ->add_option(
           "--plane", options->plane,
-          "Plane of the touches, of poses in space: auto, the robot's xy plane or the plane "
-          "across the array's mean direction; or its normal NX,NY,NZ in the robot frame")
+          "Plane of the touches, of poses in space: auto, the robot's xy plane or the plane across "
+          "the array's mean direction; or its normal NX,NY,NZ in the robot frame")
       ->capture_default_str();
-  command->add_option("--largest-gap-s", options->largest_gap_s,
-                      "Poses further apart in time than this are not interpolated: a frame between "
-                      "them has no pose, s [default: 2.5 times the median step of the poses' "
-                      "times, at least 0.1]");
+  command->add_option(
+      "--largest-gap-s", options->largest_gap_s,
+      "Poses further apart in time than this are not interpolated: a frame between them has no "
+      "pose, s [default: 2.5 times the median step of the poses' times, at least 0.1]");
   command->add_option("--pose-delay", options->pose_delay_s,
                       "How far the poses' clock is ahead of the readings' clock, s; subtracted "
                       "from the poses' times [default: 0]");
@@ -296,7 +280,6 @@ void add_import(CLI::App& app) {
   command->add_option("--truth", options->truth,
                       "True identity and pose T_object_robot of the object, LABEL,X,Y,THETA in the "
                       "units of the poses, else of --pose-unit");
-  command->callback([options] { import_tables(*options); });
 }
 
 }  // namespace palpate::cli

@@ -1,11 +1,14 @@
+#include <cerrno>
 #include <chrono>
 #include <csignal>
-#include <functional>
+#include <cstdio>
+#include <cstring>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
@@ -22,6 +25,7 @@
 #include "palpate/pose_track.hpp"
 #include "palpate/virtual_sensor.hpp"
 #include "recognition/live_recognition.hpp"
+#include "recognition/record_json.hpp"
 
 namespace palpate::cli {
 
@@ -46,7 +50,7 @@ class Findings {
   void add(const std::string& finding) {
     const std::lock_guard lock(mutex_);
     last_ = finding;
-    fmt::print(stderr, "palpate: {}\n", finding);
+    tell_on_stderr(finding);
   }
   std::string last() const {
     const std::lock_guard lock(mutex_);
@@ -58,25 +62,40 @@ class Findings {
   std::string last_;
 };
 
-/// Tells on standard error when the state of the sensor changes that a person has to act on.
-class SensorWatch {
+/// Tells on standard error what has changed of the sensor that a person has to act on.
+void tell_change(const LiveState& before, const LiveState& now) {
+  if (now.taring && !before.taring) {
+    tell_on_stderr("taring: do not touch the array");
+  }
+  if (now.gone != before.gone) {
+    tell_on_stderr(now.gone ? "the board is unplugged; plug it in again to go on"
+                            : "the board is back");
+  }
+}
+
+/// A file to which lines are added; other programs can read each line at once.
+class LineFile {
  public:
-  void update(const LiveState& state) {
-    if (state.taring && !taring_) {
-      fmt::print(stderr, "palpate: taring: do not touch the array\n");
+  /// Replaces an older file; "-" is standard output. Throws Error.
+  explicit LineFile(const std::string& path)
+      : path_(path),
+        file_(path == "-" ? stdout : std::fopen(path.c_str(), "we"),
+              [](std::FILE* file) { return file == stdout ? 0 : std::fclose(file); }) {
+    if (!file_) {
+      refuse_flag("--json", path_, "cannot be made: {}", std::strerror(errno));
     }
-    if (state.gone != gone_) {
-      fmt::print(
-          stderr, "palpate: {}\n",
-          state.gone ? "the board is unplugged; plug it in again to go on" : "the board is back");
+  }
+  /// Throws Error where the line cannot be written.
+  void add(const std::string& line) const {
+    if (std::fputs(line.c_str(), file_.get()) < 0 || std::fflush(file_.get()) != 0) {
+      throw Error(Fault::system,
+                  fmt::format("--json {}: cannot be written: {}", path_, std::strerror(errno)));
     }
-    taring_ = state.taring;
-    gone_ = state.gone;
   }
 
  private:
-  bool taring_ = false;
-  bool gone_ = false;
+  std::string path_;
+  std::unique_ptr<std::FILE, int (*)(std::FILE*)> file_;
 };
 
 /// Uses the recogniser once and forgets: the first touch pages memory in and may compile shaders,
@@ -102,19 +121,18 @@ void warm_up(Recogniser& recogniser, const RecognitionTask& task, const SensorDe
 /// Says what is wrong with the frames' times and readings.
 void judge_frames(const LiveState& state) {
   if (100 * state.frames_back > state.counters.frames) {  // a clock may be set back once
-    fmt::print(stderr,
-               "palpate: time runs backwards at {} of {} frames, each of which ends a touch; send "
-               "the frames in the order of their times\n",
-               state.frames_back, state.counters.frames);
+    tell_on_stderr(
+        fmt::format("time runs backwards at {} of {} frames, each of which ends a touch; send the "
+                    "frames in the order of their times",
+                    state.frames_back, state.counters.frames));
   }
   // A sensor whose rest is taken in a press, too, reads below it for a while; frames out of order
   // are not smoothed.
   if (state.frames_back == 0 && 20 * state.frames_below > state.counters.frames) {
-    fmt::print(stderr,
-               "palpate: the readings fall below their rest by more than the onset in {} of {} "
-               "frames; if they fall under load, give --sign -1 to 'palpate import', or beside "
-               "--sensor -\n",
-               state.frames_below, state.counters.frames);
+    tell_on_stderr(fmt::format(
+        "the readings fall below their rest by more than the onset in {} of {} frames; if they "
+        "fall under load, give --sign -1 to 'palpate import', or beside --sensor -",
+        state.frames_below, state.counters.frames));
   }
 }
 
@@ -129,11 +147,10 @@ void live(const LiveArguments& options) {
   require_above("--tare", options.tare_s, 0.0, true);
   const Request request = complete(options.request);
   if (options.poses.empty() && options.sensor != "-" && !is_virtual_sensor(options.sensor)) {
-    refuse(
-        "--poses",
-        "missing; sensor {} does not know where it is: give a file, a FIFO or - with the robot's "
-        "poses",
-        options.sensor);
+    refuse("--poses",
+           "missing; sensor {} does not know where it is: give a file, a FIFO or - with the "
+           "robot's poses",
+           options.sensor);
   }
   Findings findings;
   const OpenSensor opened =
@@ -171,7 +188,7 @@ void live(const LiveArguments& options) {
   // Where the reader of our output ends, writing fails with an error as on a full disk; SIGPIPE
   // would end the program silently.
   std::signal(SIGPIPE, SIG_IGN);
-  const Interruption interruption;
+  catch_interruptions();
   const bool to_program = options.json == "-";
   std::FILE* const people = to_program ? stderr : stdout;
   std::optional<LivePage> page;
@@ -181,7 +198,7 @@ void live(const LiveArguments& options) {
     std::fflush(people);
   }
   if (!to_program) {
-    fmt::print("{}\n", table_heading(task));
+    fmt::print("{}", table_heading(task));
     std::fflush(stdout);
   }
   bool resolved = true;  // nothing was said yet
@@ -214,45 +231,43 @@ void live(const LiveArguments& options) {
       findings.add(unresolved);
     }
     if (json) {
-      json->add(json_line(touch, task));
+      json->add(text_of(to_json(touch, task)));
     }
     if (page) {
       page->add(touch);
     }
     if (!to_program) {
-      fmt::print("{}\n", table_line(touch, task));
+      fmt::print("{}", table_line(touch, task));
       std::fflush(stdout);
     }
   };
   LiveRecognition recognition(*opened.sensor, elements_mm, recogniser, task, settings, on_touch);
-  {
-    SensorWatch watch;
-    if (page) {
-      page->serve(&recognition);
-    }
-    // A page stays to be looked at.
-    while (!interruption.requested() && !recognition.failed()) {
-      if (recognition.wait_for_end(40ms)) {
-        if (!page) {
-          break;
-        }
-        std::this_thread::sleep_for(40ms);
-      }
-      const LiveState state = recognition.state();
-      watch.update(state);
-      if (page) {
-        page->update(state, findings.last());
-      }
-    }
-    if (page) {
-      page->serve(nullptr);
-    }
-    recognition.finish();
+  if (page) {
+    page->serve(&recognition);
   }
+  LiveState state;
+  // A page stays to be looked at.
+  while (!interrupted() && !recognition.failed()) {
+    if (recognition.wait_for_end(40ms)) {
+      if (!page) {
+        break;
+      }
+      std::this_thread::sleep_for(40ms);
+    }
+    const LiveState before = std::exchange(state, recognition.state());
+    tell_change(before, state);
+    if (page) {
+      page->update(state, findings.last());
+    }
+  }
+  if (page) {
+    page->serve(nullptr);
+  }
+  recognition.finish();
 
-  const LiveState state = recognition.state();
+  state = recognition.state();
   judge_frames(state);
-  if (state.all_touches == 0 && state.without_pose > 0 && !interruption.requested()) {
+  if (state.all_touches == 0 && state.without_pose > 0 && !interrupted()) {
     refuse(source, "none of its {} touches has a pose; give --poses{}", state.without_pose,
            opened.lines != nullptr ? ", or x_mm, y_mm and theta_rad in its lines" : "");
   }
@@ -266,38 +281,33 @@ void live(const LiveArguments& options) {
 }  // namespace
 
 void add_live(CLI::App& app) {
-  auto* command = app.add_subcommand(
-      "live",
-      "Recognise what a sensor touches and find its pose in the robot frame, T_robot_object, with "
-      "one standard deviation, a line for each touch, until Ctrl-C; --page shows the belief in a "
-      "browser");
-  const auto options = std::make_shared<LiveArguments>();
+  const auto [command, options] =
+      add_command<LiveArguments>(app, "live",
+                                 "Recognise what a sensor touches and find its pose in the robot "
+                                 "frame, T_robot_object, with one standard deviation, a line for "
+                                 "each touch, until Ctrl-C; --page shows the belief in a browser",
+                                 live);
   add_sensor_flags(*command, *options,
                    " [default: the poses of the replay, of the simulation or of the lines]");
   add_recognition_flags(*command, options->request, options->verbose);
   add_detector_flags(*command, options->detector, "10; 0: the rest stays the baseline");
   command
-      ->add_option(
-          "--tare", options->tare_s,
-          "Seconds at the start in which nothing may touch the array and its baseline is read, "
-          "unless the sensor knows the baseline; 0: no baseline")
+      ->add_option("--tare", options->tare_s,
+                   "Seconds at the start in which nothing may touch the array and its baseline is "
+                   "read, unless the sensor knows the baseline; 0: no baseline")
       ->capture_default_str();
-  command->add_option(
-      "--reset-after", options->reset_after_s,
-      "Seconds without contact after which the next touch is of another unknown object "
-      "[default: never]");
-  command->add_option(
-      "--plan", options->plan,
-      "After each estimate, plan the next touch by this goal, identity, pose or both: the best "
-      "sensor pose of a grid about the places where the object may be (see 'palpate plan') "
-      "[default: no plan]");
-  command->add_option(
-      "--json", options->json,
-      "Write a line of JSON for each touch as it comes, and with --plan a line with "
-      "\"next\" as soon as its plan is there; - is standard output");
+  command->add_option("--reset-after", options->reset_after_s,
+                      "Seconds without contact after which the next touch is of another unknown "
+                      "object [default: never]");
+  command->add_option("--plan", options->plan,
+                      "After each estimate, plan the next touch by this goal, identity, pose or "
+                      "both: the best sensor pose of a grid about the places where the object may "
+                      "be (see 'palpate plan') [default: no plan]");
+  command->add_option("--json", options->json,
+                      "Write a line of JSON for each touch as it comes, and with --plan a line "
+                      "with \"next\" as soon as its plan is there; - is standard output");
   add_page_flags(*command, options->page);
   command->get_option("--page-address")->needs("--page");
-  command->callback([options] { live(*options); });
 }
 
 }  // namespace palpate::cli

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -37,9 +36,9 @@ void add_map_flags(CLI::App& command, MapFlags& flags) {
                   "Recordings of touches (HDF5), or drawings (PNG), each of one object")
       ->required();
   command
-      .add_option("-o,--output", flags.output,
-                  "Map to write (HDF5), or FOLDER/ for one map of each object, or several with "
-                  "--unposed")
+      .add_option(
+          "-o,--output", flags.output,
+          "Map to write (HDF5), or FOLDER/ for one map of each object, or several with --unposed")
       ->required();
   command
       .add_option("--cell-mm", flags.cell_mm,
@@ -50,15 +49,14 @@ void add_map_flags(CLI::App& command, MapFlags& flags) {
                      "Standard deviation of the inverse sensor model, mm [default: a quarter of "
                      "the distance of neighbouring elements; 0.5 for DigiTacts, for one element "
                      "and for drawings; with --unposed 0.6 times that distance]");
-  command.add_option(
-      "--peak", flags.peak,
-      "Peak of the inverse sensor model, a probability p below 1 [default: 0.9]; of a "
-      "drawing, whose log odds lie within +-log(p / (1 - p)) [default: 0.999]");
+  command.add_option("--peak", flags.peak,
+                     "Peak of the inverse sensor model, a probability p below 1 [default: 0.9]; of "
+                     "a drawing, whose log odds lie within +-log(p / (1 - p)) [default: 0.999]");
   command
-      .add_option("--prior", flags.prior,
-                  "Probability that an unseen cell is occupied; auto: the area of all objects "
-                  "divided by the area that their maps cover, with --unposed the share of elements "
-                  "in contact")
+      .add_option(
+          "--prior", flags.prior,
+          "Probability that an unseen cell is occupied; auto: the area of all objects divided by "
+          "the area that their maps cover, with --unposed the share of elements in contact")
       ->default_str("auto");
   Request& request = flags.shared;
   add_option_flag(command, request, "threshold",
@@ -66,11 +64,11 @@ void add_map_flags(CLI::App& command, MapFlags& flags) {
                   "--unposed learns the sensor; else 2 kPa, and required for raw pressure]");
   add_option_flag(command, request, "ratio",
                   "Threshold as a fraction of the touch's largest pressure [default: 0.3]");
-  add_option_flag(command, request, "sensor-model",
-                  "Sensor model (YAML) whose threshold, ratio, spread and prior are the "
-                  "defaults; none learns no sensor [default: into a FOLDER/, the sensor is "
-                  "learned from the touches, and FOLDER/sensor.yaml is written where it is "
-                  "better than Eq. 7 on touches that are left out]");
+  add_option_flag(
+      command, request, "sensor-model",
+      "Sensor model (YAML) whose threshold, ratio, spread and prior are the defaults; none learns "
+      "no sensor [default: into a FOLDER/, the sensor is learned from the touches, and "
+      "FOLDER/sensor.yaml is written where it is better than Eq. 7 on touches that are left out]");
   add_option_flag(command, request, "touch-sd-mm",
                   "How exact the robot's poses are: standard deviation of the sensor's true "
                   "position about the reported one, along x and along y, mm. The touches are "
@@ -78,35 +76,34 @@ void add_map_flags(CLI::App& command, MapFlags& flags) {
   add_option_flag(command, request, "touch-sd-deg",
                   "The same of the sensor's angle, degrees [default: 0]");
   add_option_flag(command, request, "frames");
-  command.add_option("--symmetry", flags.symmetry,
-                     "n-fold rotational symmetry, where 1 is none and 0 any rotation; of all "
-                     "objects, or of some, such as nut=6,key=1. Where the map looks the same after "
-                     "turns, recognition takes them as equal once touches cannot tell them apart "
-                     "[default: 1]");
+  command.add_option(
+      "--symmetry", flags.symmetry,
+      "n-fold rotational symmetry, where 1 is none and 0 any rotation; of all objects, or of some, "
+      "such as nut=6,key=1. Where the map looks the same after turns, recognition takes them as "
+      "equal once touches cannot tell them apart [default: 1]");
   command.add_option(
       "--origin", flags.origin,
-      "Where the object's frame lies in the robot frame of the touches: robot, at "
-      "its origin; centroid, at the middle of the occupied cells; X,Y,DEG, in mm and "
-      "degrees; auto, at the robot's origin where the map covers it, else at the "
-      "centroid. Of a drawing, in the frame of the picture's lower left corner, auto: at the "
-      "centroid [default: auto]");
+      "Where the object's frame lies in the robot frame of the touches: robot, at its origin; "
+      "centroid, at the middle of the occupied cells; X,Y,DEG, in mm and degrees; auto, at the "
+      "robot's origin where the map covers it, else at the centroid. Of a drawing, in the frame of "
+      "the picture's lower left corner, auto: at the centroid [default: auto]");
   command.add_flag("--mirror", flags.mirror,
                    "The object is flat and may lie on its other side; with --unposed, presses of "
                    "that side join the maps mirrored");
-  command.add_option("--label", flags.label,
-                     "Label of the map [default: the object that the recording names, "
-                     "or a drawing's file]");
-  command.add_option("--group", flags.group,
-                     "How touches are grouped, such as by the person or the day that made them. A "
-                     "group is left out as a whole where it is learned how sure to be, so that "
-                     "this holds for other people and days: recording, a group a file; label, a "
-                     "group for each GROUP of recordings whose object is LABEL@GROUP, of which "
-                     "LABEL is the map's");
-  command.add_flag("--unposed", flags.unposed,
-                   "The sensor's poses are unknown: find how the presses of an object lie beside "
-                   "each other, and build its maps from their means. For arrays so large that a "
-                   "press shows much of the object. Lists presses that fit poorly, and leaves out "
-                   "those that fit nowhere");
+  command.add_option(
+      "--label", flags.label,
+      "Label of the map [default: the object that the recording names, or a drawing's file]");
+  command.add_option(
+      "--group", flags.group,
+      "How touches are grouped, such as by the person or the day that made them. A group is left "
+      "out as a whole where it is learned how sure to be, so that this holds for other people and "
+      "days: recording, a group a file; label, a group for each GROUP of recordings whose object "
+      "is LABEL@GROUP, of which LABEL is the map's");
+  command.add_flag(
+      "--unposed", flags.unposed,
+      "The sensor's poses are unknown: find how the presses of an object lie beside each other, "
+      "and build its maps from their means. For arrays so large that a press shows much of the "
+      "object. Lists presses that fit poorly, and leaves out those that fit nowhere");
   command
       .add_option("--max-maps", flags.max_maps,
                   "With --unposed, most maps of an object: presses that do not fit a map begin "
@@ -127,16 +124,11 @@ void build_maps(const MapFlags& flags) {
   prepare_outputs(flags, task.names(), task.learns_sensor);
   std::ranges::for_each(task.remarks, tell_on_stderr);
   std::optional<Device> device;  // opened once it is needed
-  LearnedMaps learned;
-  {
-    Progress progress("learning maps");
-    learned = learn_maps(
-        task,
-        [&]() -> Device& {
-          return device ? *device : device.emplace(Device::open(flags.shared.device));
-        },
-        [&](double fraction) { progress.show(fraction); });
-  }
+  const auto open_device = [&]() -> Device& {
+    return device ? *device : device.emplace(Device::open(flags.shared.device));
+  };
+  const LearnedMaps learned = with_progress(
+      "learning maps", [&](const auto& show) { return learn_maps(task, open_device, show); });
   std::ranges::for_each(learned.remarks, tell_on_stderr);
   write_maps(flags, learned);
 }
@@ -146,9 +138,7 @@ void build_maps(const MapFlags& flags) {
 void prepare_outputs(const MapFlags& flags, const std::vector<std::string>& names,
                      bool with_sensor) {
   CommandFiles files;
-  for (const std::string& recording : flags.recordings) {
-    files.reads("RECORDING", recording);
-  }
+  files.reads("RECORDING", flags.recordings);
   if (flags.shared.sensor_model != no_sensor_model) {
     files.reads("--sensor-model", flags.shared.sensor_model);
   }
@@ -169,9 +159,7 @@ void prepare_outputs(const MapFlags& flags, const std::vector<std::string>& name
       files.writes("-o", path);
     }
   }
-  if (!flags.png.empty()) {
-    files.writes("--png", flags.png);
-  }
+  files.writes("--png", flags.png);
   if (!flags.ros.empty()) {
     for (const std::string& name : names) {
       const std::filesystem::path yaml = ros_path(flags, name);
@@ -210,22 +198,27 @@ void write_maps(const MapFlags& flags, const LearnedMaps& learned) {
   }
 }
 
+namespace {
+
+void make_maps(const MapFlags& flags) {
+  if (flags.of_drawings()) {
+    build_drawn_maps(flags);
+  } else {
+    require_no_drawing_flags(flags);
+    build_maps(flags);
+  }
+}
+
+}  // namespace
+
 void add_map(CLI::App& app) {
-  auto* command = app.add_subcommand("map",
-                                     "Build an object's occupancy grid from touches at known "
-                                     "poses, with --unposed from presses at unknown poses, or "
-                                     "from a drawing");
-  const auto flags = std::make_shared<MapFlags>();
+  const auto [command, flags] =
+      add_command<MapFlags>(app, "map",
+                            "Build an object's occupancy grid from touches at known poses, with "
+                            "--unposed from presses at unknown poses, or from a drawing",
+                            make_maps);
   add_map_flags(*command, *flags);
   add_drawing_flags(*command, *flags);
-  command->callback([flags] {
-    if (flags->of_drawings()) {
-      build_drawn_maps(*flags);
-    } else {
-      require_no_drawing_flags(*flags);
-      build_maps(*flags);
-    }
-  });
 }
 
 }  // namespace palpate::cli

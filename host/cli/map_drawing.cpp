@@ -105,14 +105,14 @@ bool MapFlags::of_drawings() const { return std::ranges::any_of(recordings, is_d
 
 void add_drawing_flags(CLI::App& command, MapFlags& flags) {
   command.add_option("--mm-per-pixel", flags.mm_per_pixel, "Of a drawing, edge of a pixel, mm");
-  command.add_option("--occupied", flags.occupied,
-                     "Of a drawing, whether the object is where it is dark or light [default: "
-                     "dark]");
-  command.add_option("--felt-share", flags.felt_share,
-                     "Of a drawing, the least share of an element's point spread on the object "
-                     "with which the element feels it; 0.5 leaves outlines where they are drawn "
-                     "[default: 0.2, midway between No Contact and In Contact, 1.7 spreads "
-                     "outside]");
+  command.add_option(
+      "--occupied", flags.occupied,
+      "Of a drawing, whether the object is where it is dark or light [default: dark]");
+  command.add_option(
+      "--felt-share", flags.felt_share,
+      "Of a drawing, the least share of an element's point spread on the object with which the "
+      "element feels it; 0.5 leaves outlines where they are drawn [default: 0.2, midway between No "
+      "Contact and In Contact, 1.7 spreads outside]");
   command.add_option("--array", flags.array,
                      "Of a drawing, the array that will touch the object, COLUMNS:ROWS:PITCH or a "
                      "file as of import: the map covers what it senses about the outline [default: "
@@ -147,10 +147,10 @@ void build_drawn_maps(const MapFlags& flags) {
     Mask mask = read_drawing(flags.recordings[i], {.mm_per_pixel = flags.mm_per_pixel,
                                                    .light = flags.occupied == "light"});
     if (const std::string edges = reached_edges(mask); !edges.empty()) {
-      tell_on_stderr(fmt::format(
-          "{}: the object reaches the picture's edge ({}), and is cut off where it goes on beyond; "
-          "leave {} paper all around it",
-          flags.recordings[i], edges, flags.occupied == "light" ? "dark" : "white"));
+      tell_on_stderr(
+          fmt::format("{}: the object reaches the picture's edge ({}), and is cut off where it "
+                      "goes on beyond; leave {} paper all around it",
+                      flags.recordings[i], edges, flags.occupied == "light" ? "dark" : "white"));
     }
     mask.origin_mm -= origin.T_learned_robot_object.translation_mm;
     maps.push_back(drawn_map(labels[i], mask, options));

@@ -4,7 +4,13 @@
 #include <cmath>
 #include <system_error>
 
+#include "model/option_words.hpp"
+
 namespace palpate::cli {
+
+void tell_on_stderr(const std::string& sentence) {
+  fmt::print(stderr, "palpate: {}\n", in_flags(sentence));
+}
 
 double require_above(const std::string& flag, double value, double least, bool inclusive) {
   if (!std::isfinite(value) || value < least || (!inclusive && value == least)) {
@@ -22,8 +28,6 @@ std::string require_whole_number(const std::string& text) {
              ? ""
              : fmt::format("{}: give a whole number, such as 10", text);
 }
-
-void require_writable(const std::filesystem::path& file) { const AtomicFile probe(file); }
 
 void write_file(const std::filesystem::path& file, std::string_view bytes,
                 AtomicFile::Links links) {

@@ -1,10 +1,13 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 
+#include <CLI/CLI.hpp>
 #include <glm/vec2.hpp>
 
 #include "io/atomic_file.hpp"
@@ -12,6 +15,19 @@
 #include "model/angle_unit.hpp"
 
 namespace palpate::cli {
+
+/// Adds a command whose flags are to fill the arguments, with which `run` is called.
+template <typename Arguments, typename Run>
+std::pair<CLI::App*, Arguments*> add_command(CLI::App& app, const char* name, const char* about,
+                                             const Run& run) {
+  CLI::App* command = app.add_subcommand(name, about);
+  const auto arguments = std::make_shared<Arguments>();
+  command->callback([arguments, run] { run(*arguments); });
+  return {command, arguments.get()};
+}
+
+/// Says a sentence to the user, on standard error, its options as flags.
+void tell_on_stderr(const std::string& sentence);
 
 /// Throws Error, "<flag> <value>: <message>"; the message is formatted as by fmt::format().
 template <typename Value, typename... Parts>
@@ -27,8 +43,6 @@ double require_above(const std::string& flag, double value, double least, bool i
 /// octal, wraps -1 around and clamps numbers that are too large.
 std::string require_whole_number(const std::string& text);
 
-/// Throws Error unless the file can be written. A command checks so before its work begins.
-void require_writable(const std::filesystem::path& file);
 /// Writes a file that appears whole or not at all. Throws Error.
 void write_file(const std::filesystem::path& file, std::string_view bytes,
                 AtomicFile::Links links = AtomicFile::Links::followed);

@@ -4,7 +4,6 @@
 #include <array>
 #include <filesystem>
 #include <functional>
-#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -30,8 +29,7 @@ namespace {
 
 std::string believed_words(const Plan& plan) {
   return fmt::format(
-      "after {}: {:.2f} nats unknown of the identity, {:.2f} of the pose, "
-      "counted in bins",
+      "after {}: {:.2f} nats unknown of the identity, {:.2f} of the pose, counted in bins",
       count_of(plan.record.touches, "touch", "touches"), plan.identity_nats,
       std::max(plan.both_nats - plan.identity_nats, 0.0));
 }
@@ -49,7 +47,7 @@ std::string table_of(const Plan& plan) {
        {"candidate", true}});
   for (std::size_t i = 0; i < std::min(plan.ranked.size(), most_rows); ++i) {
     const PlannedTouch& touch = plan.ranked[i];
-    const std::array<std::string, 3> pose = pose_text(touch.T_robot_sensor).value;
+    const std::array<std::string, 3> pose = pose_cells(touch.T_robot_sensor);
     table.add({std::to_string(i + 1), pose[0], pose[1], pose[2], gain_text(touch.gain, plan.goal),
                // The goal's gain stands in its own column; one without content is left out.
                plan.goal == PlanGoal::identity ? "" : fmt::format("{:.2f}", touch.gain.identity),
@@ -83,25 +81,19 @@ struct PlanArguments {
   std::string json;
 };
 
-/// Throws Error where an output cannot be written, before any work is done.
-void check_outputs(const PlanArguments& options, const Request& request) {
-  CommandFiles files;
-  files.reads("RECORDING", options.recording);
-  if (options.candidates != candidate_grid_word && options.candidates != options.recording) {
-    files.reads("--candidates", options.candidates);
-  }
-  add_recognition_files(request, files);
-  files.writes("--json", options.json, CommandFiles::Dash::stream);
-  files.prepare();
-}
-
 void plan_touches(const PlanArguments& options) {
   const PlanRequest wanted =
       plan_request(options.goal, options.candidates, options.samples, options.seed, tell_on_stderr);
   const RecognitionJob job{complete(options.request), read_touch_recordings({options.recording})};
   const RecognitionTask& task = job.task();
   require_plannable(task);
-  check_outputs(options, job.request());
+  CommandFiles files;
+  files.reads("RECORDING", options.recording);
+  if (options.candidates != candidate_grid_word && options.candidates != options.recording) {
+    files.reads("--candidates", options.candidates);
+  }
+  add_recognition_files(job.request(), files);
+  files.writes("--json", options.json, CommandFiles::Dash::stream).prepare();
   Recogniser recogniser = open_telling(job);
   const Plan plan = plan_touch(recogniser, task, job.unknowns().front(), wanted);
   if (const std::string words = recogniser.unresolved_words(); !words.empty()) {
@@ -117,23 +109,25 @@ void plan_touches(const PlanArguments& options) {
 }  // namespace
 
 void add_plan(CLI::App& app) {
-  auto* command = app.add_subcommand(
-      "plan",
+  const auto [command, options] = add_command<PlanArguments>(
+      app, "plan",
       "Rank poses for the next touch by what each is expected to tell, in nats, given the touches "
       "of a recording: the mutual information between the touch's readings and the object and its "
-      "pose. Prints the ten best poses T_robot_sensor, in the robot frame");
-  const auto options = std::make_shared<PlanArguments>();
+      "pose. Prints the ten best poses T_robot_sensor, in the robot frame",
+      plan_touches);
   command->add_option("RECORDING", options->recording, "Recording of the touches so far (HDF5)")
       ->required();
   add_recognition_flags(*command, options->request, options->verbose);
-  hide_particle_flags(*command);
+  // Out of the help, as the plan needs bins; read still, to be refused with the reason.
+  for (const char* flag : {"--particles", "--resampling", "--augmented", "--seed"}) {
+    command->get_option(flag)->group("");
+  }
   command
-      ->add_option(
-          "--candidates", options->candidates,
-          "Sensor poses T_robot_sensor to choose from: a CSV file with the columns x, y and theta "
-          "(or yaw; in mm and rad, or as the names say: x_m, theta_deg), the touches of a "
-          "recording (.h5), or grid: 100 to 300 poses about the places where the object may be, "
-          "half an array apart, at four angles")
+      ->add_option("--candidates", options->candidates,
+                   "Sensor poses T_robot_sensor to choose from: a CSV file with the columns x, y "
+                   "and theta (or yaw; in mm and rad, or as the names say: x_m, theta_deg), the "
+                   "touches of a recording (.h5), or grid: 100 to 300 poses about the places where "
+                   "the object may be, half an array apart, at four angles")
       ->required();
   command
       ->add_option("--goal", options->goal,
@@ -151,10 +145,9 @@ void add_plan(CLI::App& app) {
                    "Seed of the samples and of the readings that they simulate")
       ->check(require_whole_number)
       ->capture_default_str();
-  command->add_option("--json", options->json,
-                      "Write what is believed and all candidates, the best first, as JSON; - is "
-                      "standard output");
-  command->callback([options] { plan_touches(*options); });
+  command->add_option(
+      "--json", options->json,
+      "Write what is believed and all candidates, the best first, as JSON; - is standard output");
 }
 
 }  // namespace palpate::cli

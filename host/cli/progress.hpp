@@ -33,4 +33,11 @@ class Progress {
   bool visible_ = false;
 };
 
+/// The result of work that calls its argument now and then with the fraction done.
+template <typename Work>
+auto with_progress(const char* what, const Work& work) {
+  Progress progress(what);
+  return work([&](double fraction) { progress.show(fraction); });
+}
+
 }  // namespace palpate::cli

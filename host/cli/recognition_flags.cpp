@@ -6,7 +6,6 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/options.hpp"
-#include "model/option_words.hpp"
 #include "options/option.hpp"
 
 namespace palpate::cli {
@@ -48,14 +47,8 @@ void add_recognition_flags(CLI::App& command, Request& request, bool& verbose) {
     }
   }
   command.add_flag("--verbose", verbose,
-                   "Say on standard error how the filter works: its device and memory, the kernels"
-                   " of the likelihood, the lattice, the seconds it took");
-}
-
-void hide_particle_flags(CLI::App& command) {
-  for (const char* flag : {"--particles", "--resampling", "--augmented", "--seed"}) {
-    command.get_option(flag)->group("");
-  }
+                   "Say on standard error how the filter works: its device and memory, the kernels "
+                   "of the likelihood, the lattice, the seconds it took");
 }
 
 void add_selection_flags(CLI::App& command, Request& request) {
@@ -64,10 +57,6 @@ void add_selection_flags(CLI::App& command, Request& request) {
       add_option_flag(command, request, option.name);
     }
   }
-}
-
-void tell_on_stderr(const std::string& sentence) {
-  fmt::print(stderr, "palpate: {}\n", in_flags(sentence));
 }
 
 Recogniser open_telling(const RecognitionJob& job, const std::function<void()>& cancel_point) {

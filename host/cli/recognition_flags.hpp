@@ -17,10 +17,6 @@ namespace palpate::cli {
 /// Adds the flags of maps, sensor, lattice and filter, and --verbose.
 void add_recognition_flags(CLI::App& command, Request& request, bool& verbose);
 
-/// Leaves the flags of particles out of the help of a command that needs a belief over bins. They
-/// are read still, so that the command refuses them with its reason.
-void hide_particle_flags(CLI::App& command);
-
 /// Adds the flags that select unknowns from recordings.
 void add_selection_flags(CLI::App& command, Request& request);
 
@@ -28,9 +24,6 @@ void add_selection_flags(CLI::App& command, Request& request);
 /// @param help "": the option's own
 void add_option_flag(CLI::App& command, Request& request, std::string_view name,
                      const std::string& help = "");
-
-/// Says a sentence to the user, on standard error, its options as flags.
-void tell_on_stderr(const std::string& sentence);
 
 /// Opens the job's filter, then tells the task's remarks: bins that do not fit deserve only their
 /// refusal. Throws Error.

@@ -2,7 +2,6 @@
 
 #include <filesystem>
 #include <functional>
-#include <memory>
 #include <optional>
 #include <set>
 #include <span>
@@ -50,9 +49,7 @@ std::filesystem::path png_path(const RecognizeArguments& options, const Query& u
 void check_outputs(const RecognizeArguments& options, const RecognitionJob& job) {
   const std::vector<Query>& unknowns = job.unknowns();
   CommandFiles files;
-  for (const std::string& recording : options.recordings) {
-    files.reads("RECORDING", recording);
-  }
+  files.reads("RECORDING", options.recordings);
   add_recognition_files(job.request(), files);
   if (!options.posterior.empty()) {
     if (!traits_of(job.task().filter).bins) {
@@ -117,36 +114,6 @@ void write_results(const RecognizeArguments& options, const RecognitionTask& tas
   }
 }
 
-/// The line that shows how far the recognition of several unknowns is.
-class UnknownsProgress {
- public:
-  explicit UnknownsProgress(std::size_t unknowns) : unknowns_(unknowns) {}
-
-  /// Shows the fraction of the present unknown that is done.
-  void show(double fraction) {
-    done_ = fraction;
-    show();
-  }
-  /// Shows the same fraction some time later.
-  void show() {
-    const std::string present = unknowns_ == 1 ? ""
-                                               : fmt::format(", {:.0f} % of unknown {} of {}",
-                                                             100.0 * done_, before_ + 1, unknowns_);
-    line_.show((static_cast<double>(before_) + done_) / static_cast<double>(unknowns_), present);
-  }
-  /// The next unknown begins.
-  void next() {
-    ++before_;
-    done_ = 0.0;
-  }
-
- private:
-  std::size_t unknowns_;
-  std::size_t before_ = 0;  ///< unknowns that are recognised
-  double done_ = 0.0;       ///< of the present one
-  Progress line_{"recognising"};
-};
-
 void recognize(const RecognizeArguments& options) {
   const RecognitionJob job{complete(options.request),
                            read_touch_recordings(options.recordings),
@@ -155,11 +122,20 @@ void recognize(const RecognizeArguments& options) {
   const RecognitionTask& task = job.task();
   check_outputs(options, job);
   std::string unresolved;
-  std::optional<UnknownsProgress> progress(job.unknowns().size());
+  std::vector<RecognitionRecord> records;
+  std::optional<Progress> progress("recognising");
+  double done = 0.0;  // of the present unknown
+  const auto show_progress = [&] {
+    const std::size_t all = job.unknowns().size();
+    progress->show((static_cast<double>(records.size()) + done) / static_cast<double>(all),
+                   all == 1 ? ""
+                            : fmt::format(", {:.0f} % of unknown {} of {}", 100.0 * done,
+                                          records.size() + 1, all));
+  };
   Recogniser recogniser = open_telling(job, [&] {
     // Between the steps of bounds' searches, which may take minutes.
     if (progress) {
-      progress->show();
+      show_progress();
     }
   });
   if (!options.png.empty()) {
@@ -168,13 +144,15 @@ void recognize(const RecognizeArguments& options) {
 
   // The picture shows the identity after every touch, so it needs the trace.
   const bool trace = request.trace || !options.png.empty();
-  std::vector<RecognitionRecord> records;
   auto json = nlohmann::ordered_json::array();
   for (const Query& unknown : job.unknowns()) {
-    records.push_back(recognise(
-        recogniser, task, unknown, trace, [&](double fraction) { progress->show(fraction); },
-        !request.trace));
+    const auto show = [&](double fraction) {
+      done = fraction;
+      show_progress();
+    };
+    records.push_back(recognise(recogniser, task, unknown, trace, show, !request.trace));
     records.back().require_steps();
+    done = 0.0;
     if (unresolved.empty()) {
       unresolved = recogniser.unresolved_words();
     }
@@ -187,7 +165,6 @@ void recognize(const RecognizeArguments& options) {
           draw_recognition(sheet_of(records.back(), unknown, task,
                                     belief_of(recogniser, records.back().last().mode.object))));
     }
-    progress->next();
   }
   progress.reset();
 
@@ -221,26 +198,23 @@ void recognize(const RecognizeArguments& options) {
 }  // namespace
 
 void add_recognize(CLI::App& app) {
-  auto* command = app.add_subcommand(
-      "recognize",
+  const auto [command, options] = add_command<RecognizeArguments>(
+      app, "recognize",
       "Recognise the object of each recording among known maps and find its pose in the robot "
       "frame, T_robot_object: p_robot = R(theta) p_object + (x, y), with one standard deviation. "
-      "The JSON file has T_object_robot as well");
-  const auto options = std::make_shared<RecognizeArguments>();
+      "The JSON file has T_object_robot as well",
+      recognize);
   command->add_option("RECORDING", options->recordings, "Recordings of unknown objects (HDF5)")
       ->required();
   add_recognition_flags(*command, options->request, options->verbose);
   add_selection_flags(*command, options->request);
   command->add_option("--json", options->json, "Write the records as JSON; - is standard output");
-  command->add_option(
-      "--posterior", options->posterior,
-      "Write the log-likelihood of every bin (HDF5), with --filter bounded of those "
-      "that it evaluated; for one recording or frame");
-  command->add_option(
-      "--png", options->png,
-      "Folder for a picture of each unknown: the touches on the map, the belief over x and y, "
-      "the identity after every touch");
-  command->callback([options] { recognize(*options); });
+  command->add_option("--posterior", options->posterior,
+                      "Write the log-likelihood of every bin (HDF5), with --filter bounded of "
+                      "those that it evaluated; for one recording or frame");
+  command->add_option("--png", options->png,
+                      "Folder for a picture of each unknown: the touches on the map, the belief "
+                      "over x and y, the identity after every touch");
 }
 
 }  // namespace palpate::cli

@@ -1,5 +1,4 @@
 #include <chrono>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -36,105 +35,85 @@ struct RecordArguments : SensorArguments {
   std::string object;
 };
 
-/// The sensor's frames until --seconds are over, the sensor ends or a signal interrupts.
-class FrameSource {
- public:
-  FrameSource(Sensor& sensor, std::optional<double> seconds) : sensor_(sensor), seconds_(seconds) {}
-
-  /// The next frame; none after the last frame, and none where 0.1 s pass without a frame: see
-  /// done().
-  std::optional<Frame> next() {
-    std::optional<Frame> frame = sensor_.next(100ms);
-    if (!frame) {
-      // A silent board ends too, after --seconds, or a script would wait forever.
-      done_ =
-          interruption_.requested() || sensor_.ended() ||
-          (seconds_ && std::chrono::duration<double>(Clock::now() - heard_).count() > *seconds_);
-      return {};
-    }
-    heard_ = Clock::now();
-    const double elapsed_s = time_.advance(frame->host_time_s);
-    if (interruption_.requested() || (seconds_ && elapsed_s >= *seconds_)) {
-      done_ = true;
-      return {};
-    }
-    return frame;
-  }
-
-  bool done() const { return done_; }
-
- private:
-  Interruption interruption_;
-  Sensor& sensor_;
-  std::optional<double> seconds_;
-  Clock::time_point heard_ = Clock::now();
-  StreamTime time_;
-  bool done_ = false;
-};
-
-/// Writes all frames to the recording. Those of the tare wait in memory until the baseline is
-/// known, so that a tare that fails leaves an older file as it is.
-class RecordingUnderWay {
+/// Records the sensor's frames until --seconds are over, the sensor ends or a signal interrupts.
+/// Those of the tare wait in memory until the baseline is known, so that a tare that fails leaves
+/// an older file as it is.
+class FrameRecording {
  public:
   /// @param tare_s duration of the tare in seconds; 0: the sensor knows its baseline, or has none
-  RecordingUnderWay(const std::string& output, SensorDescription sensor, double tare_s)
+  FrameRecording(const std::string& output, SensorDescription sensor, double tare_s)
       : output_(output), sensor_(std::move(sensor)), tare_s_(tare_s) {
     if (tare_s_ == 0.0) {
       recorder_.emplace(output_, sensor_);
     }
   }
 
-  void add(const Frame& frame) {
-    time_.advance(frame.host_time_s);
-    if (recorder_) {
-      recorder_->add(frame);
-      return;
-    }
-    of_tare_.push_back(frame);
-    if (time_.elapsed_s() >= tare_s_) {
-      end_tare();
-    }
-  }
-  void flush() {
-    if (recorder_) {
-      recorder_->flush();
+  void record(Sensor& sensor, std::optional<double> seconds) {
+    StreamTime time;
+    Clock::time_point heard = Clock::now();
+    while (!interrupted()) {
+      if (const std::optional<Frame> frame = sensor.next(100ms)) {
+        heard = Clock::now();
+        const double elapsed_s = time.advance(frame->host_time_s);
+        if (seconds && elapsed_s >= *seconds) {
+          break;
+        }
+        add(*frame, elapsed_s);
+        continue;
+      }
+      // A silent board ends too, after --seconds, or a script would wait forever.
+      const std::chrono::duration<double> silent_s = Clock::now() - heard;
+      if (sensor.ended() || (seconds && silent_s.count() > *seconds)) {
+        break;
+      }
+      if (recorder_) {
+        recorder_->flush();
+      }
     }
   }
 
-  /// Closes the file. Throws Error where no frame was recorded or the array was touched during the
-  /// tare; no recording is left then.
-  void close(const std::string& sensor) {
+  /// Closes the file, and returns its frames and seconds in words. Throws Error where no frame was
+  /// recorded or the array was touched during the tare; no recording is left then.
+  std::string close(const std::string& sensor) {
     if (!recorder_ && !of_tare_.empty()) {
       end_tare();
     }
-    if (!recorder_ || recorder_->frames() + recorder_->unreadable() == 0) {
+    const std::uint64_t frames = recorder_ ? recorder_->frames() : 0;
+    if (frames + (recorder_ ? recorder_->unreadable() : 0) == 0) {
       throw Error(Fault::system,
                   fmt::format("sensor {}: no frame came; see palpate sensors", sensor));
     }
-    if (recorder_->frames() == 0) {
+    if (frames == 0) {
       refuse("sensor " + sensor,
              "none of its {} frames has both a known reading and a time; check the board and its "
              "connection with palpate sensors",
              recorder_->unreadable());
     }
     recorder_->close();
-  }
-
-  void print_summary(const std::string& output) const {
-    const double seconds = time_.elapsed_s();
-    const std::uint64_t frames = recorder_->frames();
-    fmt::print("{}: {} frames in {:.3f} s", output, frames, seconds);
-    if (frames > 1 && seconds > 0.0) {
-      fmt::print(", {:.1f} Hz", static_cast<double>(frames - 1) / seconds);
-    }
-    fmt::print(", {} lost, {} with a pose", recorder_->lost(), recorder_->with_pose());
-    if (recorder_->unknown_readings() > 0) {
-      fmt::print(", {} readings unknown", recorder_->unknown_readings());
-    }
-    fmt::print("\n");
+    return fmt::format(
+        "{} frames in {:.3f} s{}, {} lost, {} with a pose{}", frames, elapsed_s_,
+        frames > 1 && elapsed_s_ > 0.0
+            ? fmt::format(", {:.1f} Hz", static_cast<double>(frames - 1) / elapsed_s_)
+            : "",
+        recorder_->lost(), recorder_->with_pose(),
+        recorder_->unknown_readings() > 0
+            ? fmt::format(", {} readings unknown", recorder_->unknown_readings())
+            : "");
   }
 
  private:
+  void add(const Frame& frame, double elapsed_s) {
+    elapsed_s_ = elapsed_s;
+    if (recorder_) {
+      recorder_->add(frame);
+      return;
+    }
+    of_tare_.push_back(frame);
+    if (elapsed_s_ >= tare_s_) {
+      end_tare();
+    }
+  }
+
   void end_tare() {
     const bool raw = sensor_.pressure_unit == "raw";
     sensor_.baseline = baseline_of(
@@ -150,15 +129,14 @@ class RecordingUnderWay {
   SensorDescription sensor_;
   double tare_s_;
   std::vector<Frame> of_tare_;
-  StreamTime time_;
+  double elapsed_s_ = 0.0;                 ///< at the last frame that was recorded
   std::optional<FrameRecorder> recorder_;  ///< once the baseline is known
 };
 
 void record(const RecordArguments& options) {
   CommandFiles files;
   add_sensor_files(options, files);
-  files.writes("-o", options.output);
-  files.prepare();
+  files.writes("-o", options.output).prepare();
   if (options.seconds) {
     require_above("--seconds", *options.seconds, 0.0);
   } else if (is_endless_flood(options.sensor)) {
@@ -170,49 +148,40 @@ void record(const RecordArguments& options) {
   if (!is_printable(options.object)) {
     refuse("--object", "give printable text, in UTF-8");
   }
-  const OpenSensor opened = open_sensor(
-      options, [](const std::string& problem) { fmt::print(stderr, "palpate: {}\n", problem); });
+  const OpenSensor opened = open_sensor(options, tell_on_stderr);
   Sensor& sensor = *opened.sensor;
   SensorDescription description = sensor.description();
   if (!options.object.empty()) {
     description.object = options.object;
   }
 
-  FrameSource source(sensor, options.seconds);
-  RecordingUnderWay recording(options.output, description,
-                              description.baseline.empty() ? options.tare_s : 0.0);
+  catch_interruptions();
+  FrameRecording recording(options.output, description,
+                           description.baseline.empty() ? options.tare_s : 0.0);
   sensor.start();
-  while (!source.done()) {
-    if (const std::optional<Frame> frame = source.next()) {
-      recording.add(*frame);
-    } else {
-      recording.flush();
-    }
-  }
+  recording.record(sensor, options.seconds);
   sensor.stop();
-  recording.close(options.sensor);
-  recording.print_summary(options.output);
+  fmt::print("{}: {}\n", options.output, recording.close(options.sensor));
   report_refused(opened);
 }
 
 }  // namespace
 
 void add_record(CLI::App& app) {
-  auto* command = app.add_subcommand(
-      "record",
-      "Record the frames of a sensor until Ctrl-C; 'palpate touches' finds the touches in them. "
-      "After the tare, a kill, a crash or a full disk costs at most the last second of the "
-      "recording");
-  const auto options = std::make_shared<RecordArguments>();
+  const auto [command, options] =
+      add_command<RecordArguments>(app, "record",
+                                   "Record the frames of a sensor until Ctrl-C; 'palpate touches' "
+                                   "finds the touches in them. After the tare, a kill, a crash or "
+                                   "a full disk costs at most the last second of the recording",
+                                   record);
   add_sensor_flags(*command, *options, "");
   command
       ->add_option("-o,--output", options->output,
                    "Recording of frames to write (HDF5); replaces an older file")
       ->required();
-  command->add_option(
-      "--seconds", options->seconds,
-      "Stop after this time, s [default: at Ctrl-C]. Required for a simulation of more than "
-      "10 MB/s without touches=N");
+  command->add_option("--seconds", options->seconds,
+                      "Stop after this time, s [default: at Ctrl-C]. Required for a simulation of "
+                      "more than 10 MB/s without touches=N");
   command
       ->add_option("--tare", options->tare_s,
                    "Duration of the tare at the start, s: nothing may touch the array, and the "
@@ -220,7 +189,6 @@ void add_record(CLI::App& app) {
                    "no known reading, nothing is recorded and an older file stays. 0: no tare")
       ->capture_default_str();
   command->add_option("--object", options->object, "Label of the touched object");
-  command->callback([options] { record(*options); });
 }
 
 }  // namespace palpate::cli

@@ -15,43 +15,34 @@ namespace palpate::cli {
 
 namespace {
 
-using Column = TextTable::Column;
-
 std::string printable_name(const RecognitionRecord& record) { return printable(name_of(record)); }
 
 /// What the labels that were not always right were taken for, most often first.
 std::string confusions(const std::vector<RecognitionRecord>& records, const RecognitionTask& task) {
-  struct Row {
-    int all = 0;
-    int right = 0;
-    std::map<std::string, int> wrong;
+  struct Answers {
+    std::size_t all = 0;
+    std::size_t right = 0;
+    std::map<std::string, std::size_t> wrong;
   };
-  std::map<std::string, Row> rows;
+  std::map<std::string, Answers> answers_of;  // [true label]
+  bool all_right = true;
   for (const RecognitionRecord& record : records) {
     if (const auto right = record.last().right) {
-      Row& row = rows[record.true_label];
-      ++row.all;
-      ++(*right ? row.right : row.wrong[task.labels[record.last().best]]);
+      Answers& answers = answers_of[record.true_label];
+      ++answers.all;
+      ++(*right ? answers.right : answers.wrong[task.labels[record.last().best]]);
+      all_right = all_right && *right;
     }
   }
-  if (std::all_of(rows.begin(), rows.end(),
-                  [](const auto& row) { return row.second.right == row.second.all; })) {
+  if (all_right) {
     return "";
   }
-  std::string text = fmt::format("\n{:<16} {:>9}  taken for\n", "object", "right");
-  for (const auto& [label, row] : rows) {
-    std::vector<std::pair<int, std::string>> wrong;
-    for (const auto& [other, count] : row.wrong) {
-      wrong.emplace_back(-count, other);
-    }
-    std::sort(wrong.begin(), wrong.end());
-    std::string list;
-    for (const auto& [count, other] : wrong) {
-      list += fmt::format("{}{} {}", list.empty() ? "" : ", ", -count, printable(other));
-    }
-    text += fmt::format("{:<16} {:>4} of {:<2}  {}\n", printable(label), row.right, row.all, list);
+  TextTable table({{"object"}, {"right", true}, {"taken for"}});
+  for (const auto& [label, answers] : answers_of) {
+    table.add({label, fmt::format("{} of {}", answers.right, answers.all),
+               tally({answers.wrong.begin(), answers.wrong.end()})});
   }
-  return text;
+  return "\n" + table.text();
 }
 
 /// Of more unknowns a line each would hide the table, where a column says on which to act.
@@ -151,27 +142,11 @@ std::string name_of(const RecognitionRecord& record) {
 }
 
 std::string trace_table(const RecognitionRecord& record, const RecognitionTask& task) {
-  TextTable table({{"  touch", true},
-                   {"best"},
-                   {"prob.", true},
-                   {"dropped", true},
-                   {"at pose", true},
-                   {"x mm", true},
-                   {"y mm", true},
-                   {"theta deg", true},
-                   {"error mm", true},
-                   {"effective particles", true},
-                   {"touch's z", true},
-                   {"fit"}});
+  TextTable table(step_columns({{"  touch", true}}, {"effective particles", true}));
   for (std::size_t i = 0; i < record.trace.size(); ++i) {
-    const RecognitionStep& step = record.trace[i];
-    const std::array<std::string, 3> pose = pose_cells(pose_text(step));
-    const auto& particles = step.effective_sample_size;
-    table.add({fmt::format("{}", i + 1), object_words(step, task),
-               fmt::format("{:.3f}", step.confidence()), dropped_text(step), share_text(step, task),
-               pose[0], pose[1], pose[2], step.right ? error_text(step.pose_error_mm()) : "",
-               particles ? fmt::format("{:.1f}", *particles) : "", touch_fit_text(step),
-               fit_words(step)});
+    const auto& particles = record.trace[i].effective_sample_size;
+    table.add(step_cells({fmt::format("{}", i + 1)}, record.trace[i], task,
+                         particles ? fmt::format("{:.1f}", *particles) : ""));
   }
   const std::string truth = sentences_of(record.last(), task).truth;
   return printable_name(record) + "\n" + table.text() + (truth.empty() ? "" : "  " + truth + "\n");
@@ -219,42 +194,47 @@ std::string result_table(const std::vector<RecognitionRecord>& records,
                    {fmt::format("{}{}{}", with_fit ? "fit" : "", with_fit && with_error ? ", " : "",
                                 with_error ? "error" : ""),
                     false}});
-  const auto add_pose = [&](const char* what, const std::string& label, const Pose& T_robot_object,
-                            std::optional<double> error_mm) {
-    const PoseText pose = pose_text(T_robot_object);
-    table.add({what, "", "", label, "", "", pose.value[0], pose.value[1], pose.value[2],
-               error_mm ? fmt::format("{:.2f} mm off", *error_mm) : ""});
+  const auto add = [&table](const char* what, const std::string& label,
+                            std::optional<double> probability, const Pose& T_robot_object,
+                            const StandardDeviations& sd, const std::string& last) {
+    const auto [x, y, theta] = pose_cells(T_robot_object, sd);
+    table.add({what, "", "", label, share_text(probability), "", x, y, theta, last});
+  };
+  const auto off = [](std::optional<double> error_mm) {
+    return error_mm ? fmt::format("{:.2f} mm off", *error_mm) : "";
   };
   for (const RecognitionRecord& record : records) {
     const RecognitionStep& step = record.last();
-    const std::array<std::string, 3> pose = pose_cells(pose_text(step));
-    const std::string act = !with_act ? "" : step.decision.act ? "act" : "-";
-    const std::string share = share_text(step, task);
-    std::vector<std::string> row{
-        name_of(record),        fmt::format("{}", record.touches),        act,
-        best_words(step, task), fmt::format("{:.3f}", step.confidence()), dropped_text(step)};
-    if (!share.empty()) {  // the pose has not the probability of the best label
-      row.insert(row.end(), 4, "");
+    const std::string posed = task.name_of(step.mode.object);
+    TextTable::Row row{name_of(record),
+                       fmt::format("{}", record.touches),
+                       !with_act           ? ""
+                       : step.decision.act ? "act"
+                                           : "-",
+                       best_words(step, task),
+                       share_text(step.confidence()),
+                       dropped_text(step)};
+    if (const auto share = share_at_pose(step, task)) {  // less than that of the best label
+      row.resize(10);
       table.add(row);
-      row = {"  pose", "", "", printable(task.name_of(step.mode.object)), share, ""};
+      add("  pose", posed, share, step.T_robot_object(), sd_at_peak(step), fit_words(step));
+    } else {
+      const auto [x, y, theta] = pose_cells(step.T_robot_object(), sd_at_peak(step));
+      row.insert(row.end(), {x, y, theta, fit_words(step)});
+      table.add(row);
     }
-    row.insert(row.end(), {pose[0], pose[1], pose[2], fit_words(step)});
-    table.add(row);
     for (const BeliefMode& mode : other_modes(step)) {
-      const std::array<std::string, 3> there =
-          pose_cells(pose_text(mode.pose.T_robot_object, mode.pose.sd()));
-      table.add({"  or", "", "", printable(task.name_of(mode.object)),
-                 fmt::format("{:.3f}", mode.probability), "", there[0], there[1], there[2], ""});
+      add("  or", task.name_of(mode.object), mode.probability, mode.pose.T_robot_object,
+          mode.pose.sd(), "");
     }
     if (const double none = none_probability(step, task); none >= 0.01) {
-      table.add({"  or", "", "", std::string(none_label), fmt::format("{:.3f}", none), "", "", "",
-                 "", ""});
+      table.add({"  or", "", "", std::string(none_label), share_text(none), "", "", "", "", ""});
     }
     if (step.refined) {
-      add_pose("  mode", task.name_of(step.mode.object), step.mode_T_robot_object(), step.error_mm);
+      add("  mode", posed, {}, step.mode_T_robot_object(), {}, off(step.error_mm));
     }
     if (const std::optional<Pose> truth = step.true_T_robot_object()) {
-      add_pose("  truth", step.truth.label, *truth, step.pose_error_mm());
+      add("  truth", step.truth.label, {}, *truth, {}, off(step.pose_error_mm()));
     } else if (step.right == false) {
       table.add({"  truth", "", "", step.truth.label, "", "", "", "", "", "wrong object"});
     }

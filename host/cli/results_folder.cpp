@@ -18,32 +18,6 @@ namespace palpate::cli {
 
 namespace {
 
-std::optional<std::size_t> count_in(std::string_view text) {
-  std::size_t number = 0;
-  const char* const end = text.data() + text.size();
-  const auto [rest, error] = std::from_chars(text.data(), end, number);
-  return error == std::errc{} && rest == end ? std::optional(number) : std::nullopt;
-}
-
-}  // namespace
-
-Shard shard_of(const std::string& flag) {
-  if (flag.empty()) {
-    return {};
-  }
-  const std::string_view text = flag;
-  const std::size_t slash = text.find('/');
-  const auto index = count_in(text.substr(0, slash));
-  const auto count = slash == text.npos ? std::nullopt : count_in(text.substr(slash + 1));
-  if (!index || !count || *index >= *count || *count > most_shards) {
-    refuse_flag("--shard", flag, "give it as I/N, with I from 0 to N - 1 and N up to {}",
-                most_shards);
-  }
-  return {*index, *count};
-}
-
-namespace {
-
 namespace fs = std::filesystem;
 
 std::string numbered(std::size_t index, const char* suffix) {

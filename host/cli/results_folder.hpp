@@ -8,19 +8,6 @@
 
 namespace palpate::cli {
 
-/// One of `count` parts of the chunks of a results folder: chunk k belongs to shard k mod count.
-struct Shard {
-  std::size_t index = 0;
-  std::size_t count = 1;
-};
-
-/// Most shards of a results folder.
-inline constexpr std::size_t most_shards = 1'000'000;
-
-/// The shard of a flag's "I/N"; the whole where it is "".
-/// @throws Error (Fault::input) on anything else than 0 <= I < N
-Shard shard_of(const std::string& flag);
-
 /// The files of a results folder, see docs/files.md: task.ndjson says what is computed,
 /// chunks/K.ndjson holds the records of some successive unknowns, runs/K.json how they came about.
 class ResultsFolder {

@@ -55,20 +55,20 @@ TouchDetectorOptions detector_options(const DetectorFlags& flags, const std::str
 namespace {
 
 constexpr const char* sensor_help =
-    "A board, by its name in 'palpate sensors' or the path of its profile; "
-    "behind a colon which one, as in flexitac:/dev/ttyUSB0; "
-    "- for frames of the array --array that another program writes to standard input, a line each: "
-    "JSON as {\"time\": s since 1970, \"pressure\": [...]}, or CSV with the time before the "
-    "readings; the time may be left out, and x_mm, y_mm and theta_rad of T_robot_sensor added; "
-    "replay:FILE[,speed=F|max], which plays a recording of frames; or "
-    "simulate:SHAPE[,rate=HZ][,array=COLUMNS:ROWS:PITCH_MM][,seed=N][,touches=N][,noise=KPA]"
-    "[,object=random|X_MM:Y_MM:DEG][,speed=F|max], which simulates a robot that presses an array "
+    "A board, by its name in 'palpate sensors' or the path of its profile; behind a colon which "
+    "one, as in flexitac:/dev/ttyUSB0; - for frames of the array --array that another program "
+    "writes to standard input, a line each: JSON as {\"time\": s since 1970, \"pressure\": [...]}, "
+    "or CSV with the time before the readings; the time may be left out, and x_mm, y_mm and "
+    "theta_rad of T_robot_sensor added; replay:FILE[,speed=F|max], which plays a recording of "
+    "frames; or "
+    "simulate:SHAPE[,rate=HZ][,array=COLUMNS:ROWS:PITCH_MM][,seed=N][,touches=N][,noise=KPA][,"
+    "object=random|X_MM:Y_MM:DEG][,speed=F|max], which simulates a robot that presses an array "
     "onto a shape";
 
 constexpr const char* poses_help =
     "File, FIFO or - (standard input) with the poses T_robot_sensor, one line of JSON each: "
-    "{\"time\": s since 1970, \"x_mm\": mm, \"y_mm\": mm, \"theta_rad\": rad}; or CSV whose "
-    "header has these names";
+    "{\"time\": s since 1970, \"x_mm\": mm, \"y_mm\": mm, \"theta_rad\": rad}; or CSV whose header "
+    "has these names";
 
 /// The flags that add_array_flags() adds.
 constexpr const char* array_flags[] = {"--array", "--first-element", "--order",
@@ -157,7 +157,7 @@ void add_sensor_files(const SensorArguments& arguments, CommandFiles& files) {
 void report_refused(const OpenSensor& opened) {
   const auto report = [](std::uint64_t lines, const char* of, const std::string& first) {
     if (lines > 0) {
-      fmt::print(stderr, "palpate: {} lines of {} were skipped; the first: {}\n", lines, of, first);
+      tell_on_stderr(fmt::format("{} lines of {} were skipped; the first: {}", lines, of, first));
     }
   };
   if (opened.lines != nullptr) {
@@ -169,8 +169,8 @@ void report_refused(const OpenSensor& opened) {
   const PosedSensor::Poses poses = opened.posed->poses();
   report(poses.refused, "poses", poses.first_refused);
   if (poses.set_back > 0) {
-    fmt::print(stderr, "palpate: the clock of the poses was set back {}\n",
-               poses.set_back == 1 ? "once" : fmt::format("{} times", poses.set_back));
+    tell_on_stderr("the clock of the poses was set back " +
+                   (poses.set_back == 1 ? "once" : fmt::format("{} times", poses.set_back)));
   }
 }
 

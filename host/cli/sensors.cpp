@@ -1,4 +1,3 @@
-#include <memory>
 #include <string>
 #include <vector>
 
@@ -7,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.hpp"
+#include "cli/options.hpp"
 #include "model/printable.hpp"
 #include "palpate/driver.hpp"
 #include "recognition/record_json.hpp"
@@ -61,11 +61,10 @@ void print_text(const std::vector<BoardInfo>& boards) {
 }  // namespace
 
 void add_sensors(CLI::App& app) {
-  auto* command = app.add_subcommand(
-      "sensors", "List the USB devices; (*) marks the usable boards, others are explained");
-  const auto json = std::make_shared<bool>(false);
+  const auto [command, json] = add_command<bool>(
+      app, "sensors", "List the USB devices; (*) marks the usable boards, others are explained",
+      [](bool as_json) { (as_json ? print_json : print_text)(list_boards()); });
   command->add_flag("--json", *json, "Print the list as JSON");
-  command->callback([json] { (*json ? print_json : print_text)(list_boards()); });
 }
 
 }  // namespace palpate::cli

@@ -26,6 +26,16 @@ std::string printed(std::string words) {
   return words;
 }
 
+/// Edge of the squares that stand for elements, mm: 90 % of the pitch, at most 1.8 mm.
+double element_edge_mm(std::span<const glm::dvec2> elements_mm) {
+  const glm::dvec2& first = elements_mm.front();
+  double nearest = 2.0;
+  for (const glm::dvec2& other : elements_mm.subspan(1)) {
+    nearest = std::min(nearest, std::hypot(other.x - first.x, other.y - first.y));
+  }
+  return 0.9 * nearest;
+}
+
 std::vector<RecognitionSheet::Caption> captions(const RecognitionRecord& record,
                                                 const RecognitionTask& task) {
   const RecognitionStep& last = record.last();
@@ -44,7 +54,7 @@ std::vector<RecognitionSheet::Caption> captions(const RecognitionRecord& record,
   for (std::size_t k = 0; k < std::min(other.size(), shown); ++k) {
     others += fmt::format("{}{:.0f} % {} at {}", k == 0 ? "or " : ", ",
                           100.0 * other[k].probability, printable(task.name_of(other[k].object)),
-                          pose_words(pose_text(other[k].pose.T_robot_object)));
+                          pose_words(other[k].pose.T_robot_object));
   }
   others += other.size() > shown ? fmt::format(", and {} more", other.size() - shown) : "";
   add(printed(others), true);
@@ -56,7 +66,7 @@ std::vector<RecognitionSheet::Caption> captions(const RecognitionRecord& record,
     add(finding, true);
   }
   if (last.refined) {
-    std::string mode = "most probable bin: " + pose_words(pose_text(last.mode_T_robot_object()));
+    std::string mode = "most probable bin: " + pose_words(last.mode_T_robot_object());
     mode += last.error_mm ? "; error " + error_text(last.error_mm) + " mm" : "";
     add(printed(mode), false);
   }
@@ -64,15 +74,6 @@ std::vector<RecognitionSheet::Caption> captions(const RecognitionRecord& record,
 }
 
 }  // namespace
-
-double element_edge_mm(std::span<const glm::dvec2> elements_mm) {
-  const glm::dvec2& first = elements_mm.front();
-  double nearest = 2.0;
-  for (const glm::dvec2& other : elements_mm.subspan(1)) {
-    nearest = std::min(nearest, std::hypot(other.x - first.x, other.y - first.y));
-  }
-  return 0.9 * nearest;
-}
 
 PlacedBelief belief_of(const Recogniser& recogniser, int object) {
   constexpr double least_share = 1e-6;
@@ -94,7 +95,7 @@ RecognitionSheet sheet_of(const RecognitionRecord& record, const Query& unknown,
                              : last.decision.act ? "Act: "
                                                  : "Do not act: ") +
                  shorten_middle(identity_words(last, task), longest_identity) + ": " +
-                 printed(pose_words(pose_text(last)));
+                 printed(pose_words(last.T_robot_object(), sd_at_peak(last)));
   sheet.captions = captions(record, task);
   sheet.map = task.hypotheses[last.mode.object].map;
   sheet.map.symmetry = last.symmetry;

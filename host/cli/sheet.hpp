@@ -1,14 +1,9 @@
 #pragma once
 
-#include <span>
-
 #include "figures/figures.hpp"
 #include "recognition/recognition_record.hpp"
 
 namespace palpate::cli {
-
-/// Edge of the squares that stand for elements, mm: 90 % of the pitch, at most 1.8 mm.
-double element_edge_mm(std::span<const glm::dvec2> elements_mm);
 
 /// Where one object's belief lies; a single empty cell where it has none.
 PlacedBelief belief_of(const Recogniser& recogniser, int object);

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <charconv>
-#include <memory>
 #include <optional>
 #include <random>
 #include <string>
@@ -58,18 +57,11 @@ std::vector<Pose> draw(std::vector<Pose> poses, std::size_t n, std::uint64_t see
   return poses;
 }
 
-/// Throws Error where the recording could not be written, or would overwrite the shape.
-void check_output(const SimulateArguments& options) {
-  CommandFiles files;
-  if (!built_in_shape(options.shape)) {
-    files.reads("SHAPE", options.shape);
-  }
-  files.writes("-o", options.output);
-  files.prepare();
-}
-
 void simulate(const SimulateArguments& options) {
-  check_output(options);
+  CommandFiles()
+      .reads("SHAPE", built_in_shape(options.shape) ? "" : options.shape)
+      .writes("-o", options.output)
+      .prepare();
   const Shape shape = make_shape(options.shape);
   const bool unknown = !options.object_pose.empty();
   Pose T_object_robot;
@@ -113,9 +105,9 @@ void simulate(const SimulateArguments& options) {
 }  // namespace
 
 void add_simulate(CLI::App& app) {
-  auto* command = app.add_subcommand(
-      "simulate", "Simulate touches of a shape with a DigiTacts array and write a recording");
-  const auto options = std::make_shared<SimulateArguments>();
+  const auto [command, options] = add_command<SimulateArguments>(
+      app, "simulate", "Simulate touches of a shape with a DigiTacts array and write a recording",
+      simulate);
   command
       ->add_option("SHAPE", options->shape,
                    "A to Z, 0 to 9, ring, bar, or a polygon file with lines 'x y' in mm")
@@ -139,7 +131,6 @@ void add_simulate(CLI::App& app) {
       ->add_option("--touches", options->touches,
                    "Use N of the poses, drawn at random without replacement [default: all]")
       ->check(require_whole_number);
-  command->callback([options] { simulate(*options); });
 }
 
 }  // namespace palpate::cli

@@ -27,43 +27,38 @@ const std::string& posed_label(const RecognitionStep& step, const RecognitionTas
   return task.labels[task.label_of[static_cast<std::size_t>(step.mode.object)]];
 }
 
-}  // namespace
-
-PoseText pose_text(const Pose& T_robot_object, const std::optional<std::array<double, 3>>& sd) {
-  PoseText text{.value = {two_decimals(T_robot_object.translation_mm.x),
-                          two_decimals(T_robot_object.translation_mm.y),
-                          two_decimals(degrees(T_robot_object.theta_rad))},
-                .sd = {}};
-  if (sd) {
-    text.sd = {two_decimals((*sd)[0]), two_decimals((*sd)[1]), two_decimals(degrees((*sd)[2]))};
-  }
-  return text;
-}
-
-PoseText pose_text(const RecognitionStep& step) {
-  return pose_text(step.T_robot_object(), step.places.peak ? step.sd() : std::nullopt);
-}
-
-std::array<std::string, 3> pose_cells(const PoseText& pose) {
-  std::array<std::string, 3> cells = pose.value;
-  for (std::size_t k = 0; k < cells.size(); ++k) {
-    cells[k] += pose.sd[k].empty() ? "" : "+-" + pose.sd[k];
-  }
-  return cells;
-}
-
-std::string pose_words(const PoseText& pose) {
-  const auto with_sd = [&](std::size_t k) {
-    return pose.sd[k].empty() ? pose.value[k] : pose.value[k] + " +-" + pose.sd[k];
+/// x and y in mm and theta in degrees, each followed by its deviation after `plus_minus`.
+std::array<std::string, 3> numbers(const Pose& pose, const StandardDeviations& sd,
+                                   const char* plus_minus) {
+  const auto text = [&](double value, std::size_t axis, double (*unit)(double)) {
+    return two_decimals(unit(value)) + (sd ? plus_minus + two_decimals(unit((*sd)[axis])) : "");
   };
-  return fmt::format("x {} mm, y {} mm, theta {} deg", with_sd(0), with_sd(1), with_sd(2));
+  const auto mm = [](double length_mm) { return length_mm; };
+  return {text(pose.translation_mm.x, 0, mm), text(pose.translation_mm.y, 1, mm),
+          text(pose.theta_rad, 2, degrees)};
 }
 
+/// The object of the step and, where the pose is another object's, that object: "A", "A mirrored",
+/// "(none), pose of A".
 std::string object_words(const RecognitionStep& step, const RecognitionTask& task) {
   const std::string& best = task.labels[step.best];
-  const std::string& posed = posed_label(step, task);
   const std::string object = task.name_of(step.mode.object);
-  return printable(best == posed ? object : fmt::format("{}, pose of {}", best, object));
+  return best == posed_label(step, task) ? object : fmt::format("{}, pose of {}", best, object);
+}
+
+}  // namespace
+
+std::array<std::string, 3> pose_cells(const Pose& T_robot_object, const StandardDeviations& sd) {
+  return numbers(T_robot_object, sd, "+-");
+}
+
+std::string pose_words(const Pose& T_robot_object, const StandardDeviations& sd) {
+  const auto [x, y, theta] = numbers(T_robot_object, sd, " +-");
+  return fmt::format("x {} mm, y {} mm, theta {} deg", x, y, theta);
+}
+
+StandardDeviations sd_at_peak(const RecognitionStep& step) {
+  return step.places.peak ? step.sd() : std::nullopt;
 }
 
 std::string identity_words(const RecognitionStep& step, const RecognitionTask& task) {
@@ -101,7 +96,7 @@ std::vector<BeliefMode> other_modes(const RecognitionStep& step) {
 }
 
 std::string result_words(const RecognitionStep& step, const RecognitionTask& task) {
-  return identity_words(step, task) + ": " + pose_words(pose_text(step));
+  return identity_words(step, task) + ": " + pose_words(step.T_robot_object(), sd_at_peak(step));
 }
 
 std::string fit_words(const RecognitionStep& step) {
@@ -127,19 +122,35 @@ std::string dropped_text(const RecognitionStep& step) {
   return fmt::format("{:.1g}", std::min(rounded, 1.0));
 }
 
-std::string touch_fit_text(const RecognitionStep& step) {
-  const bool told = !step.touch_fit.empty() && step.touch_fit.back();
-  return told ? fmt::format("{:+.1f}", *step.touch_fit.back()) : "";
-}
-
-std::string share_text(const RecognitionStep& step, const RecognitionTask& task,
-                       const char* else_text) {
-  const std::optional<double> share = share_at_pose(step, task);
-  return share ? fmt::format("{:.3f}", *share) : else_text;
+std::string share_text(std::optional<double> share) {
+  return share ? fmt::format("{:.3f}", *share) : "";
 }
 
 std::string error_text(std::optional<double> error_mm) {
   return error_mm ? fmt::format("{:.2f}", *error_mm) : "-";
+}
+
+std::vector<TextTable::Column> step_columns(std::vector<TextTable::Column> first,
+                                            const TextTable::Column& extra, std::size_t dropped) {
+  const std::vector<TextTable::Column> others{
+      {"best", false, 10},     {"prob.", true, 5},    {"dropped", true, dropped},
+      {"at pose", true, 7},    {"x mm", true, 14},    {"y mm", true, 14},
+      {"theta deg", true, 15}, {"error mm", true, 8}, extra,
+      {"touch's z", true, 9},  {"fit", false, 12}};
+  first.insert(first.end(), others.begin(), others.end());
+  return first;
+}
+
+TextTable::Row step_cells(TextTable::Row first, const RecognitionStep& step,
+                          const RecognitionTask& task, const std::string& extra) {
+  const auto [x, y, theta] = pose_cells(step.T_robot_object(), sd_at_peak(step));
+  const bool touch_fits = !step.touch_fit.empty() && step.touch_fit.back();
+  first.insert(first.end(),
+               {object_words(step, task), share_text(step.confidence()), dropped_text(step),
+                share_text(share_at_pose(step, task)), x, y, theta,
+                step.right ? error_text(step.pose_error_mm()) : "", extra,
+                touch_fits ? fmt::format("{:+.1f}", *step.touch_fit.back()) : "", fit_words(step)});
+  return first;
 }
 
 namespace {
@@ -155,8 +166,8 @@ std::string truth_words(const RecognitionStep& step) {
   }
   std::string words = "truth: " + printable(step.truth.label);
   if (const std::optional<Pose> truth = step.true_T_robot_object()) {
-    words += fmt::format(" at {}; error {} mm", pose_words(pose_text(*truth)),
-                         error_text(step.pose_error_mm()));
+    words +=
+        fmt::format(" at {}; error {} mm", pose_words(*truth), error_text(step.pose_error_mm()));
   }
   return words;
 }
@@ -250,8 +261,8 @@ std::string next_touch_words(const PlannedTouch& touch, PlanGoal goal) {
     return fmt::format("no candidate tells anything about the {}",
                        goal == PlanGoal::both ? "object or its pose" : goal_word(goal));
   }
-  return fmt::format("touch next at {}: {} nats expected",
-                     pose_words(pose_text(touch.T_robot_sensor)), gain_text(touch.gain, goal));
+  return fmt::format("touch next at {}: {} nats expected", pose_words(touch.T_robot_sensor),
+                     gain_text(touch.gain, goal));
 }
 
 namespace {

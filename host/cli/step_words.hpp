@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "cli/text_table.hpp"
 #include "recognition/recognition_job.hpp"
 #include "recognition/recognition_record.hpp"
 #include "recognition/touch_plan.hpp"
@@ -14,23 +15,16 @@
 
 namespace palpate::cli {
 
-/// The numbers of a pose in the robot frame: x and y in mm, theta in degrees, two decimals each.
-struct PoseText {
-  std::array<std::string, 3> value;
-  std::array<std::string, 3> sd;  ///< "" where there is none
-};
-PoseText pose_text(const Pose& T_robot_object, const std::optional<std::array<double, 3>>& sd = {});
-/// T_robot_object of a step, to act on, with its standard deviations where the belief has a peak
-/// there.
-PoseText pose_text(const RecognitionStep& step);
+using StandardDeviations = std::optional<std::array<double, 3>>;
 
-/// x, y and theta for a table: "9.81+-0.05".
-std::array<std::string, 3> pose_cells(const PoseText& pose);
+/// x and y in mm and theta in degrees, with their deviations, for a table: "9.81+-0.05".
+std::array<std::string, 3> pose_cells(const Pose& T_robot_object,
+                                      const StandardDeviations& sd = {});
 /// "x 9.81 +-0.05 mm, y 0.23 +-0.05 mm, theta -126.04 +-0.31 deg"
-std::string pose_words(const PoseText& pose);
-/// The object of the step and, where the pose is another object's, that object: "A", "A mirrored",
-/// "(none), pose of A".
-std::string object_words(const RecognitionStep& step, const RecognitionTask& task);
+std::string pose_words(const Pose& T_robot_object, const StandardDeviations& sd = {});
+/// The deviations of a step's T_robot_object(), where the belief has a peak there.
+StandardDeviations sd_at_peak(const RecognitionStep& step);
+
 /// How much of the belief lies about the pose, where this is less than 95 % of the probability of
 /// the best label, or the pose is another object's.
 std::optional<double> share_at_pose(const RecognitionStep& step, const RecognitionTask& task);
@@ -55,22 +49,26 @@ struct StepSentences {
 };
 StepSentences sentences_of(const RecognitionStep& step, const RecognitionTask& task);
 
-/// What a table says of the fit: "fits", "doubtful", "no fit" or "contradicted"; "" without a fit.
+// Cells of tables; "" where there is nothing to say.
+
+/// "fits", "doubtful", "no fit" or "contradicted".
 std::string fit_words(const RecognitionStep& step);
-
-/// Dropped mass of a bounded posterior, rounded up to one digit: "3e-07"; "" without a certificate.
+/// Dropped mass of a bounded posterior, rounded up to one digit: "3e-07".
 std::string dropped_text(const RecognitionStep& step);
-
-/// The z of the last touch by itself, RecognitionStep::touch_fit, with its sign: "-2.3"; "" where
-/// there is none.
-std::string touch_fit_text(const RecognitionStep& step);
-
-/// share_at_pose() for a table: "0.152", `else_text` where there is none.
-std::string share_text(const RecognitionStep& step, const RecognitionTask& task,
-                       const char* else_text = "");
-
+/// A probability, as "0.152".
+std::string share_text(std::optional<double> share);
 /// A pose error in mm, "-" where there is none.
 std::string error_text(std::optional<double> error_mm);
+
+/// The columns of tables with a line for each touch: these, then best, prob., dropped, at pose, x,
+/// y, theta, error, `extra`, the touch's z and fit.
+/// @param dropped width of its column in lines by themselves
+std::vector<TextTable::Column> step_columns(std::vector<TextTable::Column> first,
+                                            const TextTable::Column& extra,
+                                            std::size_t dropped = 0);
+/// The row of a step below step_columns().
+TextTable::Row step_cells(TextTable::Row first, const RecognitionStep& step,
+                          const RecognitionTask& task, const std::string& extra);
 
 /// The part of a gain that the goal asks for, with its standard error: "2.31+-0.07".
 std::string gain_text(const TouchGain& gain, PlanGoal goal);

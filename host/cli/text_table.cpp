@@ -1,11 +1,14 @@
 #include "cli/text_table.hpp"
 
 #include <algorithm>
+#include <functional>
+#include <iterator>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "model/printable.hpp"
+#include "recognition/evaluation.hpp"
 
 namespace palpate::cli {
 
@@ -47,50 +50,87 @@ std::string shorten_middle(std::string_view text, std::size_t columns) {
 
 std::string percent(double share) { return fmt::format("{:.1f} %", 100.0 * share); }
 
+std::string range_words(const Interval& interval) {
+  return fmt::format("{:.1f} to {:.1f} %", 100.0 * interval.low, 100.0 * interval.high);
+}
+
 std::string count_of(std::size_t count, const char* one, const char* more) {
   return fmt::format("{} {}", count, count == 1 ? one : more);
 }
 
+std::string tally(std::vector<std::pair<std::string, std::size_t>> answers) {
+  std::ranges::stable_sort(answers, std::ranges::greater{},
+                           &std::pair<std::string, std::size_t>::second);
+  std::string text;
+  for (const auto& [answer, count] : answers) {
+    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count, answer);
+  }
+  return text;
+}
+
 TextTable::TextTable(std::vector<Column> columns) : columns_(std::move(columns)) {}
 
-void TextTable::add(const std::vector<std::string>& cells) {
-  std::vector<std::string>& row = rows_.emplace_back();
-  for (const std::string& cell : cells) {
-    row.push_back(printable(cell));
+void TextTable::add(const Row& cells) {
+  Row& row = rows_.emplace_back();
+  std::ranges::transform(cells, std::back_inserter(row), printable);
+}
+
+TextTable::Row TextTable::headings() const {
+  Row row;
+  std::ranges::transform(columns_, std::back_inserter(row), &Column::heading);
+  return row;
+}
+
+std::string TextTable::line(const Row& cells) const {
+  std::vector<std::size_t> widths;
+  std::ranges::transform(columns_, std::back_inserter(widths), &Column::width);
+  return line(cells, widths);
+}
+
+std::string TextTable::line(const Row& cells, const std::vector<std::size_t>& widths) const {
+  constexpr std::size_t gap = 2;
+  std::string line;
+  for (std::size_t k = 0; k < columns_.size(); ++k) {
+    if (widths[k] > 0) {
+      const std::string blanks(widths[k] - std::min(columns_of(cells[k]), widths[k]), ' ');
+      line += columns_[k].right ? blanks + cells[k] : cells[k] + blanks;
+      line += std::string(gap, ' ');
+    }
   }
+  line.resize(line.find_last_not_of(' ') + 1);
+  return line + "\n";
 }
 
 std::string TextTable::text() const {
-  constexpr std::size_t gap = 2;
   std::vector<std::size_t> widths(columns_.size(), 0);
   for (std::size_t k = 0; k < columns_.size(); ++k) {
-    for (const std::vector<std::string>& row : rows_) {
+    for (const Row& row : rows_) {
       widths[k] = std::max(widths[k], columns_of(row[k]));
     }
     if (widths[k] > 0) {
       widths[k] = std::max(widths[k], columns_of(columns_[k].heading));
     }
   }
-  std::string text;
-  const auto add_line = [&](const auto& cell_of) {
-    std::string line;
-    for (std::size_t k = 0; k < columns_.size(); ++k) {
-      if (widths[k] == 0) {
-        continue;
-      }
-      const std::string& cell = cell_of(k);
-      const std::string blanks(widths[k] - columns_of(cell), ' ');
-      line += columns_[k].right ? blanks + cell : cell + blanks;
-      line += std::string(gap, ' ');
-    }
-    line.resize(line.find_last_not_of(' ') + 1);
-    text += line + "\n";
-  };
-  add_line([&](std::size_t k) -> const std::string& { return columns_[k].heading; });
-  for (const std::vector<std::string>& row : rows_) {
-    add_line([&](std::size_t k) -> const std::string& { return row[k]; });
+  std::string text = line(headings(), widths);
+  for (const Row& row : rows_) {
+    text += line(row, widths);
   }
   return text;
+}
+
+void add_score_rows(TextTable& table, const std::vector<const Scores*>& columns) {
+  const auto add = [&](const char* name, auto text_of) {
+    std::vector<std::string> cells{name};
+    for (const Scores* scores : columns) {
+      cells.push_back(scores == nullptr ? std::string() : text_of(*scores));
+    }
+    table.add(cells);
+  };
+  add("accuracy", [](const Scores& s) { return percent(s.accuracy()); });
+  add("95 % interval", [](const Scores& s) { return range_words(s.interval()); });
+  add("log-loss, nats", [](const Scores& s) { return fmt::format("{:.3f}", s.log_loss); });
+  add("calibration error",
+      [](const Scores& s) { return fmt::format("{:.3f}", s.calibration_error); });
 }
 
 }  // namespace palpate::cli

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -10,12 +11,11 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <CLI/CLI.hpp>
+#include <glm/geometric.hpp>
 
 #include "cli/command_files.hpp"
 #include "cli/commands.hpp"
 #include "cli/options.hpp"
-#include "cli/press_watch.hpp"
-#include "cli/recognition_flags.hpp"
 #include "cli/sensor_option.hpp"
 #include "io/recording_state.hpp"
 #include "model/option_words.hpp"
@@ -39,73 +39,115 @@ struct TouchesArguments {
   bool unposed = false;
 };
 
-/// The frames of a recording as pressures above their rest.
-class RestedFrames {
- public:
-  /// Finds the rest in a first pass, unless `drift_s` is 0: then it is the recording's baseline.
-  RestedFrames(Sensor& stream, const TouchDetectorOptions& thresholds,
-               std::optional<double> drift_s)
-      : stream_(stream) {
-    if (drift_s == 0.0) {
-      rest_ = {
-          .time_s = {0.0},
-          .readings = {stream.description().baseline.begin(), stream.description().baseline.end()}};
-    } else {
-      RestFinder finder(stream.description().valid, thresholds.onset, thresholds.release);
-      for (stream.start(); !stream.ended();) {
-        if (const std::optional<Frame> frame = stream.next({})) {
-          finder.add(*frame);
-        }
-      }
-      rest_ = finder.find(drift_s);
-    }
-    stream.start();
+/// What the elements read untouched: the recording's baseline where `drift_s` is 0, else found in
+/// a pass over the whole stream.
+Rest rest_of(Sensor& stream, const TouchDetectorOptions& thresholds,
+             std::optional<double> drift_s) {
+  const SensorDescription& sensor = stream.description();
+  if (drift_s == 0.0) {
+    return {.time_s = {0.0}, .readings = {sensor.baseline.begin(), sensor.baseline.end()}};
   }
-
-  bool ended() const { return stream_.ended(); }
-  std::optional<Frame> next() {
-    std::optional<Frame> frame = stream_.next({});
-    if (frame && is_readable(*frame, stream_.description().valid)) {
-      backwards_ += last_s_ && frame->host_time_s < *last_s_ ? 1 : 0;
-      last_s_ = frame->host_time_s;
-      rest_.at(time_.advance(frame->host_time_s), at_);
-      for (std::size_t k = 0; k < at_.size(); ++k) {
-        frame->values[k] -= at_[k];
-      }
+  RestFinder finder(sensor.valid, thresholds.onset, thresholds.release);
+  for (stream.start(); !stream.ended();) {
+    if (const std::optional<Frame> frame = stream.next({})) {
+      finder.add(*frame);
     }
-    return frame;
   }
-
-  const Rest& rest() const { return rest_; }
-  /// Frames that are older than the one before.
-  std::uint64_t backwards() const { return backwards_; }
-
- private:
-  Sensor& stream_;
-  Rest rest_;
-  StreamTime time_;
-  std::vector<double> at_;
-  std::optional<double> last_s_;
-  std::uint64_t backwards_ = 0;
-};
+  return finder.find(drift_s);
+}
 
 /// What may have cost touches, each in a sentence.
-std::vector<std::string> complaints(const RestedFrames& frames, std::uint64_t all) {
+/// @param backwards frames that are older than the one before, of `all`
+std::vector<std::string> complaints(const Rest& rest, std::uint64_t backwards, std::uint64_t all) {
   std::vector<std::string> words;
-  if (frames.backwards() > 0) {
-    words.push_back(fmt::format(
-        "time runs backwards at {} of its {} frames, each of which ends a touch; write the frames "
-        "in the order of their times",
-        frames.backwards(), all));
+  if (backwards > 0) {
+    words.push_back(
+        fmt::format("time runs backwards at {} of its {} frames, each of which ends a touch; write "
+                    "the frames in the order of their times",
+                    backwards, all));
   }
-  if (const auto rises_s = frames.rest().rises_s) {
+  if (rest.rises_s) {
     words.push_back(fmt::format(
         "from {:.2f} s on an element reads more by the onset for over {:.3g} s, which counts as "
         "drift; if a press lasts that long, give --drift-s, more than its length",
-        *rises_s, frames.rest().window_s));
+        *rest.rises_s, rest.window_s));
   }
   return words;
 }
+
+/// Watches the presses of a stream for what keeps them from being touches.
+class PressWatch {
+ public:
+  explicit PressWatch(const TouchDetectorOptions& options) : options_(options) {}
+
+  /// @param smoothed what the detector judges the frame by
+  void add(const Frame& frame, const std::vector<double>& smoothed, bool touching) {
+    first_s_ = first_s_.value_or(frame.host_time_s);
+    last_s_ = frame.host_time_s;
+    for (const double pressure : smoothed) {
+      if (pressure > largest_) {
+        largest_ = pressure;
+        largest_s_ = last_s_ - *first_s_;
+      }
+    }
+    if (!touching) {
+      return;
+    }
+    pressed_s_ = pressed_s_.value_or(last_s_);
+    if (const std::optional<Pose>& pose = frame.T_robot_sensor) {
+      first_pose_ = first_pose_.value_or(*pose);
+      moved_mm_ =
+          std::max(moved_mm_, glm::distance(first_pose_->translation_mm, pose->translation_mm));
+    }
+  }
+  /// Takes the end of a press, and whether it makes touches.
+  void end(bool makes_touches) {
+    if (!makes_touches && pressed_s_ && missed_++ < most_shown) {
+      const std::string press = fmt::format("the press {:.1f} s from its start, of {:.2f} s,",
+                                            *pressed_s_ - *first_s_, last_s_ - *pressed_s_);
+      words_.push_back(
+          moved_mm_ >= options_.steady_mm
+              ? fmt::format("{} moved by {:.1f} mm (hold the array still, or give --slide MM)",
+                            press, moved_mm_)
+              : fmt::format("{} was never steady for {:g} s (press longer, or give another "
+                            "--min-steady-s or --steady)",
+                            press, options_.min_steady_s));
+    }
+    pressed_s_.reset();
+    first_pose_.reset();
+    moved_mm_ = 0.0;
+  }
+
+  /// Why no press made a touch, and what to give, in sentences.
+  /// @param unit of the pressures
+  std::vector<std::string> reasons(const std::string& unit) const {
+    std::vector<std::string> words = words_;
+    if (missed_ > most_shown) {
+      words.push_back(fmt::format("and {} more presses make no touch", missed_ - most_shown));
+    }
+    if (missed_ == 0) {
+      words.push_back(
+          fmt::format("its readings reach {:.3g} {} above their rest, {:.1f} s from its start, and "
+                      "a touch begins above {:g} (lower --onset)",
+                      largest_, unit, largest_s_, options_.onset));
+    }
+    return words;
+  }
+
+ private:
+  static constexpr std::size_t most_shown = 3;
+
+  TouchDetectorOptions options_;
+  std::optional<double> first_s_;    ///< of the stream
+  std::optional<double> pressed_s_;  ///< when the press under way began
+  double last_s_ = 0.0;
+  std::optional<Pose> first_pose_;  ///< of the press under way
+  double moved_mm_ = 0.0;           ///< from it, at most
+  double largest_ = 0.0;            ///< pressure above the rest
+  double largest_s_ = 0.0;          ///< when, from the first frame on
+  std::size_t missed_ = 0;
+  std::vector<std::string> words_;  ///< of the first presses without a touch
+};
 
 /// Appends the touch and a row of `valid` for it, `unposed` at the pose 0; returns false where the
 /// touch needs a pose and has none.
@@ -179,21 +221,12 @@ void close_input(const std::string& frames) {
     }
   } catch (const Error& error) {
     // The touches are written: a disk for reading only is no reason to fail.
-    fmt::print(stderr, "palpate: {}; only Palpate and SWMR readers can open it\n", error.what());
+    tell_on_stderr(fmt::format("{}; only Palpate and SWMR readers can open it", error.what()));
   }
 }
 
-/// The options of a detector of pressures above a rest that is known.
-TouchDetectorOptions fixed_rest(TouchDetectorOptions options) {
-  options.drift_s = 0.0;
-  return options;
-}
-
 void find_touches(const TouchesArguments& options) {
-  CommandFiles files;
-  files.reads("FRAMES", options.frames);
-  files.writes("-o", options.output);
-  files.prepare();
+  CommandFiles().reads("FRAMES", options.frames).writes("-o", options.output).prepare();
   if (options.detector.drift_s) {
     require_above("--drift-s", *options.detector.drift_s, 0.0, true);
   }
@@ -205,7 +238,9 @@ void find_touches(const TouchesArguments& options) {
   const SensorDescription& sensor = stream->description();
   const TouchDetectorOptions thresholds =
       detector_options(options.detector, sensor.pressure_unit, options.frames);
-  TouchDetector detector(fixed_rest(thresholds), {}, sensor.valid);
+  TouchDetectorOptions above_rest = thresholds;
+  above_rest.drift_s = 0.0;
+  TouchDetector detector(above_rest, {}, sensor.valid);
   Recording recording;
   recording.object = sensor.object;
   recording.pressure_unit = sensor.pressure_unit;
@@ -239,23 +274,36 @@ void find_touches(const TouchesArguments& options) {
       presses.without_pose += append(one, options.unposed, recording) ? 0 : 1;
     }
   };
-  RestedFrames frames(*stream, thresholds, options.detector.drift_s);
-  if (frames.rest().falls) {
+  const Rest rest = rest_of(*stream, thresholds, options.detector.drift_s);
+  if (rest.falls) {
     refuse(options.frames,
            "its readings fall in presses, where Palpate needs readings that rise; import it again "
            "with --sign -1");
   }
-  while (!frames.ended()) {
-    if (const std::optional<Frame> frame = frames.next()) {
-      unknown += unknown_readings(*frame, sensor.valid);
-      unreadable += is_readable(*frame, sensor.valid) ? 0 : 1;
-      const std::optional<DetectedTouch> touch = detector.add(*frame);
-      watch.add(*frame, detector.smoothed(), detector.touching());
-      if (stroke && detector.touching()) {
-        stroke->add(*frame);
-      }
-      take(touch);
+  StreamTime time;
+  std::vector<double> rest_now;
+  std::optional<double> last_s;
+  std::uint64_t backwards = 0;
+  for (stream->start(); !stream->ended();) {
+    std::optional<Frame> frame = stream->next({});
+    if (!frame) {
+      continue;
     }
+    if (is_readable(*frame, sensor.valid)) {
+      backwards += last_s && frame->host_time_s < *last_s ? 1 : 0;
+      last_s = frame->host_time_s;
+      rest.at(time.advance(frame->host_time_s), rest_now);
+      std::ranges::transform(frame->values, rest_now, frame->values.begin(), std::minus<>{});
+    } else {
+      ++unreadable;
+    }
+    unknown += unknown_readings(*frame, sensor.valid);
+    const std::optional<DetectedTouch> touch = detector.add(*frame);
+    watch.add(*frame, detector.smoothed(), detector.touching());
+    if (stroke && detector.touching()) {
+      stroke->add(*frame);
+    }
+    take(touch);
   }
   take(detector.finish());
   presses.all = recording.size() + presses.without_pose + presses.unsteady;
@@ -263,7 +311,7 @@ void find_touches(const TouchesArguments& options) {
   if (const auto finding = dropped(presses, clock)) {
     recording.findings.push_back(*finding);
   }
-  const std::vector<std::string> complaint = complaints(frames, stream->counters().frames);
+  const std::vector<std::string> complaint = complaints(rest, backwards, stream->counters().frames);
 
   if (recording.size() == 0) {
     if (presses.without_pose > 0) {
@@ -314,11 +362,11 @@ void find_touches(const TouchesArguments& options) {
 }  // namespace
 
 void add_touches(CLI::App& app) {
-  auto* command = app.add_subcommand(
-      "touches",
+  const auto [command, options] = add_command<TouchesArguments>(
+      app, "touches",
       "Find the touches in a recording of frames and write them for 'palpate map' and 'palpate "
-      "recognize'. A recording that was cut off is closed, as by 'palpate info --close'");
-  const auto options = std::make_shared<TouchesArguments>();
+      "recognize'. A recording that was cut off is closed, as by 'palpate info --close'",
+      find_touches);
   command
       ->add_option("FRAMES", options->frames,
                    "Recording of frames, as 'palpate record' writes it (HDF5)")
@@ -335,11 +383,10 @@ void add_touches(CLI::App& app) {
                       "Presses during which the array slides: cut each into touches, one every so "
                       "many millimetres where the array moves steadily, with the pose at its "
                       "middle, mm [default: a press is one touch, where the array stands still]");
-  command->add_flag("--unposed", options->unposed,
-                    "The sensor's poses are unknown: write every touch at the pose 0, for 'palpate "
-                    "map --unposed', 'palpate calibrate --unposed' and 'palpate recognize "
-                    "--each-frame'");
-  command->callback([options] { find_touches(*options); });
+  command->add_flag(
+      "--unposed", options->unposed,
+      "The sensor's poses are unknown: write every touch at the pose 0, for 'palpate map "
+      "--unposed', 'palpate calibrate --unposed' and 'palpate recognize --each-frame'");
 }
 
 }  // namespace palpate::cli

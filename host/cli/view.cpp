@@ -1,5 +1,4 @@
 #include <chrono>
-#include <memory>
 #include <string>
 #include <thread>
 #include <vector>
@@ -9,6 +8,7 @@
 
 #include "cli/commands.hpp"
 #include "cli/interruption.hpp"
+#include "cli/options.hpp"
 #include "cli/page/page_feed.hpp"
 #include "cli/page/page_server.hpp"
 #include "cli/page/viewed_files.hpp"
@@ -35,10 +35,10 @@ void view(const ViewArguments& options) {
                                [](const nlohmann::json&) {
                                  throw Error(Fault::input, "saved files are only looked at");
                                }});
-  const Interruption interruption;
+  catch_interruptions();
   fmt::print("{}; Ctrl-C ends it\n", server.words());
   std::fflush(stdout);
-  while (!interruption.requested()) {
+  while (!interrupted()) {
     std::this_thread::sleep_for(50ms);
   }
 }
@@ -46,18 +46,17 @@ void view(const ViewArguments& options) {
 }  // namespace
 
 void add_view(CLI::App& app) {
-  auto* command = app.add_subcommand("view",
-                                     "Show saved files in a browser, until Ctrl-C: recordings "
-                                     "frame by frame, maps, and results of "
-                                     "recognize, live and batch, which can be filtered and sorted");
-  const auto options = std::make_shared<ViewArguments>();
+  const auto [command, options] = add_command<ViewArguments>(
+      app, "view",
+      "Show saved files in a browser, until Ctrl-C: recordings frame by frame, maps, and results "
+      "of recognize, live and batch, which can be filtered and sorted",
+      view);
   command
-      ->add_option("PATH", options->paths,
-                   "Recordings, maps, JSON of recognize or live, folders of batch, or folders of "
-                   "such files")
+      ->add_option(
+          "PATH", options->paths,
+          "Recordings, maps, JSON of recognize or live, folders of batch, or folders of such files")
       ->required();
   add_page_flags(*command, options->page);
-  command->callback([options] { view(*options); });
 }
 
 }  // namespace palpate::cli

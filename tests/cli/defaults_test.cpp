@@ -3,9 +3,6 @@
 
 #include <cmath>
 #include <numbers>
-#include <sstream>
-
-#include <fmt/format.h>
 
 #include "letter_files.hpp"
 #include "options/option.hpp"
@@ -28,12 +25,6 @@ class Defaults : public LetterFiles {
     return read_posterior(folder_ / "p.h5").lattice;
   }
 };
-
-void expect_same(const json& a, const json& b) {
-  for (const char* field : {"mode", "refined", "identity"}) {
-    EXPECT_EQ(a[field], b[field]) << field;
-  }
-}
 
 void expect_same_axes(const PoseLattice& a, const PoseLattice& b, double rounding) {
   for (const auto axis : {&PoseLattice::x_mm, &PoseLattice::y_mm, &PoseLattice::theta_rad}) {
@@ -123,32 +114,6 @@ TEST(DefaultLattice, GivesWayTogetherToAnyPartOfALattice) {
   }
 }
 
-TEST_F(Defaults, AreWhatAutoAsksForInFlagsAndScenes) {
-  const glm::dvec2 pivot_mm = unknown_.T_robot_sensor.front().translation_mm;
-  const std::string pivot = fmt::format("--pivot-mm={},{}", pivot_mm.x, pivot_mm.y);
-  const std::string wide = "--x-mm=-15:15 --y-mm=-15:15 --bins=30x30x36 ";
-  struct Case {
-    std::string flags;
-    std::string scene;
-    std::string same_as;  ///< these flags
-  };
-  for (const auto& [flags, scene, same_as] :
-       std::initializer_list<Case>{{"--bins auto", "bins: [5, 5, 4]", ""},
-                                   {"--pivot-mm auto", "region: {pivot_mm: [90, 90]}", ""},
-                                   {"", "{bins: auto, region: {pivot_mm: auto}}", ""},
-                                   {"", "bins: fine", "--bins fine"},
-                                   {"", "bins: [9, 9, 8]", "--bins=9x9x8"},
-                                   {"", "region: {x_mm: [-4, 9]}", "--x-mm=-4:9"},
-                                   {"", "region: {pivot_mm: [3, -2]}", "--pivot-mm=3,-2"},
-                                   {wide + "--pivot-mm=auto", "", wide + pivot}}) {
-    SCOPED_TRACE(flags + scene);
-    put_bytes(folder_ / "scene.yaml", scene);
-    const std::string few = "--filter=bounded --touches 3 ";
-    expect_same(of("u.h5", few + flags + " --scene scene.yaml"), of("u.h5", few + same_as));
-  }
-  expect_same(of("u.h5", "--bins auto"), of("u.h5"));
-}
-
 TEST_F(Defaults, FineBinsAreHalfAsWide) {
   const PoseLattice usual = lattice_of("u.h5", "--touches=1 --filter=bounded");
   const PoseLattice fine = lattice_of("u.h5", "--touches=1 --filter=bounded --bins=fine");
@@ -157,26 +122,6 @@ TEST_F(Defaults, FineBinsAreHalfAsWide) {
   // Counts round up.
   EXPECT_NEAR(fine.x_mm.count, 2 * usual.x_mm.count, 2);
   EXPECT_NEAR(fine.theta_rad.count, 2 * usual.theta_rad.count, 2);
-}
-
-TEST_F(Defaults, LiveAndRecognizeGiveTheSameNumbers) {
-  for (const std::string object : {"random", "-400:-200:30"}) {
-    SCOPED_TRACE(object);
-    done("record -o frames.h5 --sensor simulate:A,rate=100,seed=3,touches=5,speed=max,object=" +
-         object);
-    remarks("live --sensor replay:frames.h5,speed=max --maps maps --json live.jsonl");
-    done("touches frames.h5 -o touches.h5");
-    const json trace = of("touches.h5", "--trace")["trace"];
-    ASSERT_EQ(trace.size(), 5u);
-    std::istringstream lines(bytes_of(folder_ / "live.jsonl"));
-    for (const json& step : trace) {
-      std::string line;
-      ASSERT_TRUE(std::getline(lines, line));
-      // A touch that is evaluated ahead is added in one step: float32 rounds it by some 1e-5 nats.
-      expect_like(json::parse(line), step, 1e-4, 1e-4);
-    }
-    EXPECT_EQ(trace.back()["best"], "A");
-  }
 }
 
 TEST_F(Defaults, TellOfObjectsFarApartInTheirFrames) {

@@ -1,7 +1,7 @@
 #include <algorithm>
+#include <map>
 #include <regex>
 
-#include "cli/former_flags.hpp"
 #include "options/option.hpp"
 #include "support/program.hpp"
 #include "support/sample_files.hpp"
@@ -108,53 +108,42 @@ TEST_F(ProgramHelp, GroupsFlagsByWhatTheyAreFor) {
   EXPECT_GT(help.find("\n  --bins "), help.find("\nBins and region:"));
 }
 
-// What the program says to a flag that a command has lost.
-using FormerFlags = ProgramTest;
-
-std::string command_of(const cli::FormerFlag& flag) {
-  return flag.command.empty() ? "recognize" : std::string(flag.command);
-}
-
-TEST_F(FormerFlags, AreAnsweredWithWhatToUseInstead) {
-  EXPECT_EQ(cli::answer_to_former_flag({}), std::nullopt);
-  for (const cli::FormerFlag& flag : cli::former_flags()) {
-    const std::string name(flag.name);
-    const std::string command = command_of(flag);
-    const std::string words = " is no flag of palpate " + command;
-    for (const std::string& given : {name, name + "=3"}) {
-      const std::array typed{command.c_str(), "a.h5", given.c_str()};
-      expect_named(cli::answer_to_former_flag(typed).value_or(""),
-                   {("'" + given + "'" + words).c_str(), flag.remedy.data()});
-    }
-    const std::array after{command.c_str(), "--", name.c_str()};
-    EXPECT_EQ(cli::answer_to_former_flag(after), std::nullopt) << "a file of this name";
-    const std::array other{"no-command", name.c_str()};
-    EXPECT_EQ(cli::answer_to_former_flag(other).has_value(), flag.command.empty());
-  }
-  const cli::FormerFlag& first = cli::former_flags().front();
-  expect_refused({command_of(first), "a.h5", std::string(first.name)},
-                 {std::string(first.name), std::string(first.remedy)});
-}
-
-// A row that hides a flag of today, or names one that there is not, misleads.
-TEST_F(FormerFlags, TheTableAgreesWithTheHelp) {
+// What the program says to flags that commands have lost.
+TEST_F(ProgramHelp, OfFormerFlagsSaysWhatToUseInstead) {
+  const std::map<std::string, std::map<std::string, std::string>> remedies{
+      {"recognize",
+       {{"--help-all", "give --help"},
+        {"--memory-mib", "give --filter bounded"},
+        {"--fit-touch-sd", "give --touch-sd-mm"}}},
+      {"batch", {{"--update", "give -o a new folder"}}},
+      {"calibrate", {{"--png", "draw it in Python, by palpate.calibrate"}}},
+      {"check", {{"--psf-mm", "give --spread-mm"}, {"--help-all", "give --help"}}},
+      {"evaluate", {{"--png", "draw it in Python, by palpate.evaluate"}}},
+      {"map", {{"--psf-mm", "give --spread-mm"}}},
+      {"plan", {{"--png", "read the table, or give --json"}}},
+      {"touches", {{"--tare", "leave it out"}}}};
   std::string all;
   std::map<std::string, std::string> help;
   for (const std::string& command : commands) {
     all += help[command] = done(command + " --help");
   }
-  const auto names = [](const std::string& text, std::string_view flag) {
-    return std::regex_search(text, std::regex(std::string(flag) + "(?![a-z-])"));
+  const auto names = [](const std::string& text, const std::string& flag) {
+    return std::regex_search(text, std::regex(flag + "(?![a-z-])"));
   };
-  for (const cli::FormerFlag& flag : cli::former_flags()) {
-    const std::string& of_command = flag.command.empty() ? all : help.at(command_of(flag));
-    EXPECT_FALSE(names(of_command, flag.name)) << flag.command << " " << flag.name;
-    const std::string remedy(flag.remedy);
-    const std::regex named("--[a-z][a-z-]*");
-    for (std::sregex_iterator at(remedy.begin(), remedy.end(), named), end; at != end; ++at) {
-      EXPECT_TRUE(names(all, at->str())) << flag.name << ": " << at->str();
+  for (const auto& [command, flags] : remedies) {
+    for (const auto& [flag, remedy] : flags) {
+      EXPECT_FALSE(names(help[command], flag)) << "a row that hides a flag of today misleads";
+      expect_refused({command, "a.h5", flag + "=3"},
+                     {"'" + flag + "=3' is no flag of palpate " + command + "; " + remedy});
+      std::smatch instead;
+      if (std::regex_search(remedy, instead, std::regex("--[a-z][a-z-]*"))) {
+        EXPECT_TRUE(names(all, instead.str())) << remedy;
+      }
     }
   }
+  expect_refused("map a.h5 --psf-mm", {"'--psf-mm' is no flag of palpate map; give"});
+  expect_refused("info -- --help-all", {"--help-all: no such file"});
+  expect_refused("recognize --update", {"'--update' is no flag of palpate recognize; see palpate"});
 }
 
 }  // namespace palpate::device_and_help_test

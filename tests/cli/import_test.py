@@ -272,7 +272,7 @@ class Import(ImportTest):
         self.assert_named(back, "--pressure-unit raw", "--object=A", f"--truth=A,500,2,{math.pi / 2}")
         self.said()
         self.assertNotIn(b"sensor_pose", (self.folder / "o.h5").read_bytes())
-        self.assert_named(self.done("info", "o.h5"), "frames           3", "with a pose       0 frames")
+        self.assert_named(self.done("info", "o.h5"), "frames            3", "with a pose       0 frames")
 
     def test_a_grids_readings_come_in_any_order(self) -> None:
         """What stands where, seen with x to the right and y upwards: the upper row, then the lower one."""

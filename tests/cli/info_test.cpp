@@ -68,7 +68,7 @@ TEST_F(InfoCommand, RawStreamOfAChangingArray) {
   stream.pressure_unit = "raw";
   stream.time_s = {1.7e9, 1.7e9 + 2.5};
   stream.elements_mm.resize(2 * stream.elements());
-  expect_info(stream, {"frames           2", "raw", "positions change", "2.500 s",
+  expect_info(stream, {"frames            2", "raw", "positions change", "2.500 s",
                        "in contact        not known"});
 }
 

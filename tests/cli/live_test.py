@@ -91,12 +91,15 @@ class Live(PreparedTest, StreamTest):
                 of_frame[20] = math.nan
         self.record_lines("spoilt.h5", self.frames)
         for file, *flags in (
-            ("frames", "--filter=bounded", "--tolerance=1e-6"),
-            ("spoilt", "--filter=histogram"),
+            ("frames", "--maps=maps", "--tolerance=1e-6"),  # the first touch places the lattice
+            ("frames", *FLAGS, "--filter=bounded", "--tolerance=1e-6"),
+            ("spoilt", *FLAGS, "--filter=histogram"),
         ):
-            touches = self.touches(f"replay:{file}.h5,speed=max", *flags)
+            replay = f"replay:{file}.h5,speed=max"
+            self.palpate("live", "--sensor", replay, "--json", "live.jsonl", *flags)
+            touches = self.written()
             self.palpate("touches", f"{file}.h5", "-o", "touches.h5")
-            [record] = self.records("touches.h5", "--trace", *FLAGS, *flags)
+            [record] = self.records("touches.h5", "--trace", *flags)
             self.assertEqual((len(touches), len(record["trace"]), touches[-1]["best"]), (4, 4, "E"))
             for touch, step in zip(touches, record["trace"], strict=True):
                 # What the array reads untouched is told to more than these digits by both.

@@ -11,7 +11,7 @@ namespace palpate::map_sensor_test {
 
 using nlohmann::json;
 
-/// Every test learns a sensor: some three seconds of a processor each time.
+/// Learning a sensor takes some three seconds of a processor.
 class MapSensor : public ProgramTest {
  protected:
   MapSensor() {
@@ -40,8 +40,8 @@ class MapSensor : public ProgramTest {
   }
 };
 
-TEST_F(MapSensor, IsWrittenWithTheMapsAndTakenWithThem) {
-  expect_named(done("map A.h5 U.h5 -o maps/"),
+TEST_F(MapSensor, IsLearnedWithItsMapsAndTakenWithThemAlone) {
+  expect_named(done("map A.h5 U.h5 -o maps/ --prior 0.3"),
                {"maps/sensor.yaml: learned from 60 touches: ", " +-", ", beyond chance)",
                 "maps/sensor.yaml: \"(none)\" goes by a figure of Palpate's own"});
   const LearnedSensor learned = read_sensor_model(sensor("maps"));
@@ -56,10 +56,20 @@ TEST_F(MapSensor, IsWrittenWithTheMapsAndTakenWithThem) {
   EXPECT_EQ(recognised("maps/A.map.h5").second["sensor_model"], "maps/sensor.yaml")
       << "a map named singly";
 
+  // It is learned anew from the touches of the other maps, in whatever order.
+  expect_named(done("map A.h5 -o apart/ --prior 0.3"),
+               {"no sensor model: it takes 15 touches or more of each of two objects"});
+  EXPECT_FALSE(std::filesystem::exists(sensor("apart")));
+  done("map U.h5 -o apart/ --prior 0.3");
+  EXPECT_TRUE(bytes_of(sensor("apart")) == bytes_of(sensor("maps")));
+  // Maps that no longer are what it was learned for take it along.
+  expect_named(done("map A.h5 -o apart/ --frames 0:10"), {"apart/sensor.yaml: removed"});
+  EXPECT_FALSE(std::filesystem::exists(sensor("apart")));
+
   // Without it, maps and results are those of Eq. 7.
   const json none = recognised("maps --sensor-model none").second;
   EXPECT_FALSE(none.contains("sensor_model"));
-  done("map A.h5 U.h5 -o plain/ --sensor-model none");
+  done("map A.h5 U.h5 -o plain/ --sensor-model none --prior 0.3");
   EXPECT_FALSE(std::filesystem::exists(sensor("plain")));
   json plain = recognised("plain").second;
   plain["mode"]["map"] = none["mode"]["map"];
@@ -72,18 +82,11 @@ TEST_F(MapSensor, IsWrittenWithTheMapsAndTakenWithThem) {
   remarks("merge results -o results.ndjson");
   EXPECT_EQ(json::parse(bytes_of(folder_ / "results.ndjson"))["sensor_model"], "maps/sensor.yaml");
 
-  // Of earlier maps it is said to stay.
-  expect_named(remarks("map A.h5 -o maps/ --sensor-model none"),
-               {"maps/sensor.yaml: stays, and was learned for earlier maps"});
-  EXPECT_TRUE(std::filesystem::exists(sensor("maps")));
-}
-
-TEST_F(MapSensor, IsLeftOutWhereItDoesNotGoWithWhatIsAsked) {
-  done("map A.h5 U.h5 -o maps/");
+  // It is left out where it does not go with what is asked.
   expect_left_out("maps --gamma 0.1", {"maps/sensor.yaml is left out: --gamma"});
   expect_left_out("maps --threshold 1.5", {"is left out: its threshold is"});
 
-  done("map A.h5 -o single.map.h5");
+  done("map A.h5 -o single.map.h5 --prior 0.3");
   EXPECT_FALSE(std::filesystem::exists(folder_ / "sensor.yaml"));
   std::filesystem::copy(folder_ / "single.map.h5", folder_ / "maps/other.map.h5");
   expect_left_out("maps", {"was not learned for maps/other.map.h5, and is left out"});
@@ -103,21 +106,11 @@ TEST_F(MapSensor, IsLeftOutWhereItDoesNotGoWithWhatIsAsked) {
                   {"other/sensor.yaml does not say which maps it is for, and is left out",
                    "maps/sensor.yaml was not learned for single.map.h5, and is left out; build "
                    "the maps of both anew in one folder"});
-}
 
-TEST_F(MapSensor, IsLearnedAnewFromTheTouchesOfTheOtherMaps) {
-  expect_named(done("map A.h5 -o maps/ --prior 0.3"),
-               {"no sensor model: it takes 15 touches or more of each of two objects"});
-  EXPECT_FALSE(std::filesystem::exists(sensor("maps")));
-  expect_named(done("map U.h5 -o maps/ --prior 0.3"),
-               {"maps/sensor.yaml: learned from 60 touches"});
-  EXPECT_EQ(read_sensor_model(sensor("maps")).maps.size(), 2u);
-  done("map A.h5 U.h5 -o together/ --prior 0.3");
-  EXPECT_TRUE(bytes_of(sensor("maps")) == bytes_of(sensor("together"))) << "in whatever order";
-
-  // Maps that no longer are what it was learned for take it along.
-  expect_named(done("map A.h5 -o maps/ --frames 0:10"), {"maps/sensor.yaml: removed"});
-  EXPECT_FALSE(std::filesystem::exists(sensor("maps")));
+  // Of earlier maps it is said to stay.
+  expect_named(remarks("map A.h5 -o maps/ --sensor-model none"),
+               {"maps/sensor.yaml: stays, and was learned for earlier maps"});
+  EXPECT_TRUE(std::filesystem::exists(sensor("maps")));
 }
 
 // On every day the objects lie elsewhere, by more than touches of one day can tell.

@@ -17,7 +17,7 @@ class FilesOfACommand : public testing::Test {
     std::filesystem::create_directory_symlink("d", folder_ / "folder");
   }
 
-  std::string refusal_of(const CommandFiles& files) const {
+  std::string refusal_of(const cli::CommandFiles& files) const {
     return input_error([&] { files.prepare(); });
   }
 
@@ -27,21 +27,21 @@ class FilesOfACommand : public testing::Test {
 TEST_F(FilesOfACommand, AreTheSameByLinksAndOtherPaths) {
   for (const std::string name : {"hard", "link", "d/file", "d/../d/file", "folder/file"}) {
     const std::string written = folder_ / name;
-    CommandFiles read;
+    cli::CommandFiles read;
     read.reads("FRAMES", folder_ / "d/file");
     read.writes("-o", written);
     expect_named(refusal_of(read), {("-o " + written + ": ").c_str(), "would overwrite",
                                     "d/file, which FRAMES reads; choose another name"});
-    CommandFiles twice;
+    cli::CommandFiles twice;
     twice.writes("--png", folder_ / "d/file");
     twice.writes("-o", written);
     expect_named(refusal_of(twice), {"which --png writes"});
   }
-  CommandFiles none_yet;
+  cli::CommandFiles none_yet;
   none_yet.writes("--png", folder_ / "new");
   none_yet.writes_in("-o", folder_ / "d/..", "new");
   expect_named(refusal_of(none_yet), {"-o ", "/new", "which --png writes"});
-  CommandFiles distinct;
+  cli::CommandFiles distinct;
   distinct.reads("FRAMES", folder_ / "d/file");
   distinct.reads("--poses", folder_ / "hard");
   distinct.reads("--array", "");
@@ -51,12 +51,12 @@ TEST_F(FilesOfACommand, AreTheSameByLinksAndOtherPaths) {
 
 // Nothing is lost in a device; a FIFO would feed the command its own output.
 TEST_F(FilesOfACommand, MayBeDevicesButNotAFifo) {
-  CommandFiles device;
+  cli::CommandFiles device;
   device.reads("--poses", "/dev/null");
   device.writes("--json", "/dev/null");
   device.require_distinct();
   ASSERT_EQ(::mkfifo((folder_ / "fifo").c_str(), 0600), 0);
-  CommandFiles fifo;
+  cli::CommandFiles fifo;
   fifo.reads("--poses", folder_ / "fifo");
   fifo.writes("--json", folder_ / "d/../fifo");
   expect_named(refusal_of(fifo), {"--json", "--poses reads"});

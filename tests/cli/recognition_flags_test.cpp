@@ -203,6 +203,16 @@ TEST_F(TaskOfFlags, HasFlagsRatherThanTheScenesKeysAndTheSensorModel) {
             task_told({"--touch-sd-mm=1", "--touch-sd-deg=5", "--bins=9x9x8"}));
 }
 
+TEST_F(TaskOfFlags, HasTheDefaultLatticeWhereFlagsSayAutoWhateverTheScene) {
+  const json automatic = task_told({});
+  EXPECT_TRUE(automatic["auto_pivot"]);
+  EXPECT_EQ(task_told({"--bins=auto"}, "bins: [5, 5, 4]"), automatic);
+  EXPECT_EQ(task_told({"--pivot-mm=auto"}, "region: {pivot_mm: [90, 90]}"), automatic);
+  EXPECT_EQ(task_told({}, "{bins: auto, region: {pivot_mm: auto}}"), automatic);
+  EXPECT_EQ(task_told({}, "bins: fine"), task_told({"--bins=fine"}));
+  EXPECT_NE(task_told({"--bins=fine"})["x"], automatic["x"]);
+}
+
 TEST_F(TaskOfFlags, TakesTouchesForExactByParticlesWhateverTheSensorModelSays) {
   const json r = task_told(
       {"--filter=particles", "--bins=9x9x8", "--sensor-model=" + (folder_ / "s.yaml").string()});

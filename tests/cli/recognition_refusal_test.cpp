@@ -20,8 +20,6 @@ struct Refused {
 TEST_F(RecognitionFlags, AreRefusedByNameAndValueWhereTheyCannotBeMeant) {
   std::vector<Refused> all{
       {{"--filter=bounded", "--particles=9"}, "", {"--particles", "add --filter particles"}},
-      {{"--filter=bounded", "--none=-1"}, "", {"--none -1", "from 0"}},
-      {{"--none=nan"}, "", {"--none nan", "or auto"}},
       {{"--none", "v.h5"}, "", {"--none v.h5", "from 0", "or auto"}},
       {{"--filter=particles", "--none=1"}, "", {"--none 1", "--filter histogram"}},
       {{"--filter=particles", "--none"}, "", {"--none", "--filter histogram"}},
@@ -41,9 +39,7 @@ TEST_F(RecognitionFlags, AreRefusedByNameAndValueWhereTheyCannotBeMeant) {
       {{}, "slip_sd: {deg: .nan}", {"'deg'", "from 0"}},
       {{}, "touch_sd: {rad: 0.1}", {"'rad'", "unknown key", "deg"}},
       {{}, "touch_sd: 1", {"touch_sd"}},
-      {{"--x-mm=-1e200:1e200"}, "", {"--x-mm", "-1e200:1e200", "+-1e+09"}},
       {{"--y-mm=0:2e9"}, "", {"--y-mm", "0:2e9", "+-1e+09"}},
-      {{"--theta-deg=0:1e200"}, "", {"--theta-deg", "0:1e200"}},
       {{"--pivot-mm=1e+200,0"}, "", {"--pivot-mm", "1e+200"}},
       {{}, "region: {x_mm: [0, 1e200]}", {"x_mm", "0:1e200"}},
       {{"--sensor-model=none.yaml"}, "", {"none.yaml", "no such file"}},
@@ -58,18 +54,7 @@ TEST_F(RecognitionFlags, AreRefusedByNameAndValueWhereTheyCannotBeMeant) {
   }
   for (const std::string flag :
        {"--touch-sd-mm", "--touch-sd-deg", "--slip-sd-mm", "--slip-sd-deg"}) {
-    for (const std::string value : {"-1", "nan", "inf", "x"}) {
-      all.push_back({{flag + "=" + value}, "", {flag, value, "give a number from 0"}});
-    }
     all.push_back({{flag + "=1000"}, "", {flag + " 1000: wider than the region, "}});
-  }
-  for (const std::string value : {"0", "1", "-1e-3", "2", "nan"}) {
-    all.push_back({{"--tolerance=" + value}, "", {"--tolerance", "above 0, below 1"}});
-  }
-  for (const std::string flag : {"--budget-ms", "--evidence-nats"}) {
-    for (const std::string value : {"0", "-1", "nan", "inf"}) {
-      all.push_back({{flag + "=" + value}, "", {flag, "above 0"}});
-    }
   }
   for (const Refused& wrong : all) {
     SCOPED_TRACE(fmt::format("{} {}", fmt::join(wrong.flags, " "), wrong.scene));

@@ -209,7 +209,7 @@ TEST(ResultTable, SaysWhichObjectAWrongOneWasAndWhosePoseItIs) {
   const std::string text = result_table({record}, sample_task());
   EXPECT_THAT(text, HasSubstr("\n  truth             I"));
   EXPECT_THAT(text, HasSubstr("wrong object\n0 of 1 right (0.0 %)\n"));
-  EXPECT_THAT(text, HasSubstr("I                   0 of 1   1 A\n"));
+  EXPECT_THAT(text, HasSubstr("\nobject   right  taken for\nI       0 of 1  1 A\n"));
 
   record.trace.back().identity = {0.4, 0.6};
   record.trace.back().best = 1;
@@ -313,13 +313,13 @@ TEST(RecordOutput, SaysTheSameNumbersEverywhere) {
     EXPECT_EQ(json.at("refined").at("covariance")[k / 3][k % 3], step.refined->covariance[k]);
   }
   EXPECT_EQ(json.at("error_mm"), step.error_mm.value());
-  const std::string words = pose_words(
-      pose_text(Pose{{pose[0], pose[1]}, pose[2]}, std::array<double, 3>{sd[0], sd[1], sd[2]}));
+  const std::string words =
+      pose_words(Pose{{pose[0], pose[1]}, pose[2]}, std::array<double, 3>{sd[0], sd[1], sd[2]});
   EXPECT_EQ(words, "x 398.76 +-0.05 mm, y -20.50 +-0.10 mm, theta 28.65 +-0.57 deg");
   const std::string error = error_text(json.at("refined_error_mm").get<double>());
   const std::string true_words =
       fmt::format("truth: A at {}; error {} mm",
-                  pose_words(pose_text(Pose{{truth[0], truth[1]}, truth[2]})), error);
+                  pose_words(Pose{{truth[0], truth[1]}, truth[2]}), error);
   LiveState state;
   state.last = LiveTouch{.touch = {.T_robot_sensor = Pose{}}, .step = step};
   const std::string misfit =
@@ -332,7 +332,7 @@ TEST(RecordOutput, SaysTheSameNumbersEverywhere) {
     EXPECT_THAT(table_line(*state.last, task), HasSubstr(part));
   }
   EXPECT_THAT(table_line(*state.last, task), HasSubstr(" " + error + " "));
-  const nlohmann::json live = nlohmann::json::parse(json_line(*state.last, task));
+  const nlohmann::json live = to_json(*state.last, task);
   for (const char* key : {"refined", "truth", "fit", "warnings", "refined_error_mm"}) {
     EXPECT_EQ(live.at(key), json.at(key)) << key;
   }

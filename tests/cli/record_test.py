@@ -44,7 +44,7 @@ class Record(StreamTest):
         said = self.done("record", *sensor, "-o", "s.h5")
         self.assertEqual(said, "s.h5: 400 frames in 3.990 s, 100.0 Hz, 0 lost, 400 with a pose\n")
         self.assert_named(
-            self.done("info", "s.h5"), "recording of letter", "frames           400",
+            self.done("info", "s.h5"), "recording of letter", "frames            400",
             "rate              100.0 Hz", "lost              0", "baseline          ",
             "closed            yes", "simulated DigiTacts",
         )  # fmt: skip

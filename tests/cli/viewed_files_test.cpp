@@ -53,7 +53,8 @@ TEST_F(ViewedFiles, FieldsThatAreNullAreMissing) {
          "mode": {"map": null, "mirrored": null}, "fit": null, "decision": {"act": null})");
   const cli::ViewedFiles files(std::vector{path});
   EXPECT_EQ(files.get("/file/0"),
-            R"({"kind":"records","rows":[["",0,"E",1.0,null,null,null,null]]})");
+            R"({"kind":"records","rows":[["",0,"E",1.0,null,null,null,null]]})"
+            "\n");
   EXPECT_TRUE(files.get("/file/0/record/0"));
   EXPECT_FALSE(files.get("/file/0/map/0"));
 }

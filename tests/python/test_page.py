@@ -202,6 +202,19 @@ def test_buttons_do_what_they_say_and_a_page_comes_back_after_a_break(
     browser.find_element(By.ID, "fit-views").click()
     browser.until(lambda: browser.picture("robot") == before)
 
+    # Keys are the page's own, but not with Ctrl or Meta, nor where somebody types or chooses.
+    def paused_by(selector: str, **modifiers: bool) -> bool:
+        browser.execute_script(
+            "const [selector, modifiers] = arguments;"
+            "document.querySelector(selector).dispatchEvent("
+            "new KeyboardEvent('keydown', {key: 'p', bubbles: true, ...modifiers}))", selector, modifiers,
+        )  # fmt: skip
+        return browser.find_element(By.ID, "pause").get_attribute("aria-pressed") == "true"
+
+    assert not paused_by("body", ctrlKey=True) and not paused_by("body", metaKey=True)
+    assert not paused_by("#object") and not paused_by("#filter")
+    assert paused_by("body") and not paused_by("body")
+
     browser.find_element(By.ID, "next-unknown").click()
     browser.until(lambda: browser.touches() == 0 and browser.title == "Palpate")
     assert browser.text("decision") == "waiting for the first touch"

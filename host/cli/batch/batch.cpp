@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
-#include <memory>
+#include <regex>
 #include <string>
 #include <thread>
 #include <utility>
@@ -43,10 +43,8 @@ SettledBatch settle_batch(const ResultsFolder& folder, const BatchTask& asked,
                           const Request& request, std::size_t threads) {
   if (!folder.has_task()) {
     BatchTask task = asked;
-    {
-      Progress progress("looking through the recordings");
-      survey_inputs(task.inputs, request, threads, [&](double done) { progress.show(done); });
-    }
+    with_progress("looking through the recordings",
+                  [&](const auto& show) { survey_inputs(task.inputs, request, threads, show); });
     task.inferred = infer(task.inputs, request);
     RecognitionJob job = job_of(task, request);
     make_folder(folder.path());
@@ -79,6 +77,29 @@ struct BatchArguments {
 
 /// Exit status where all is done but some unknowns failed, which other programs rely on.
 constexpr int some_failed = 3;
+
+/// One of `count` parts of the chunks of a results folder: chunk k belongs to shard k mod count.
+struct Shard {
+  std::size_t index = 0;
+  std::size_t count = 1;
+};
+
+/// The shard of a flag's "I/N"; the whole where it is "".
+Shard shard_of(const std::string& flag) {
+  constexpr std::size_t most_shards = 1'000'000;
+  static const std::regex form("([0-9]{1,7})/([0-9]{1,7})");
+  std::smatch numbers;
+  Shard shard;
+  if (std::regex_match(flag, numbers, form)) {
+    shard = {std::stoul(numbers[1]), std::stoul(numbers[2])};
+  }
+  if ((!flag.empty() && numbers.empty()) || shard.index >= shard.count ||
+      shard.count > most_shards) {
+    refuse_flag("--shard", flag, "give it as I/N, with I from 0 to N - 1 and N up to {}",
+                most_shards);
+  }
+  return shard;
+}
 
 /// The cores that this process may use: a job's or those of taskset.
 std::size_t cores() {
@@ -150,7 +171,7 @@ std::string batch_summary(const BatchArguments& options, const Shard& shard, con
   return text + fmt::format("; {} failed\n", failed);
 }
 
-int batch(const BatchArguments& options) {
+void batch(const BatchArguments& options) {
   refuse_budget(options.request);
   if (options.chunk < 1) {
     refuse_flag("--chunk", options.chunk, "give at least 1");
@@ -182,19 +203,21 @@ int batch(const BatchArguments& options) {
                    .verbose = options.verbose});
   }
   fmt::print("{}", batch_summary(options, shard, chunks, now, seconds_since(begin)));
-  return chunks.finished.failed + now.failed > 0 ? some_failed : 0;
+  if (chunks.finished.failed + now.failed > 0) {
+    throw CLI::RuntimeError(some_failed);
+  }
 }
 
 }  // namespace
 
-void add_batch(CLI::App& app, int& status) {
-  auto* command = app.add_subcommand(
-      "batch",
+void add_batch(CLI::App& app) {
+  const auto [command, options] = add_command<BatchArguments>(
+      app, "batch",
       "Recognise very many unknowns into a folder of results. Killed at any moment, the same "
-      "command goes on where it was, and its results are the same, byte for byte. A recording "
-      "that cannot be recognised becomes a record with its error, and the exit status is 3. "
-      "Several processes or machines share the work by --shard; palpate merge joins the results");
-  const auto options = std::make_shared<BatchArguments>();
+      "command goes on where it was, and its results are the same, byte for byte. A recording that "
+      "cannot be recognised becomes a record with its error, and the exit status is 3. Several "
+      "processes or machines share the work by --shard; palpate merge joins the results",
+      batch);
   command
       ->add_option("INPUT", options->inputs,
                    "Manifests (*.csv with the columns path, frames and label, of which path alone "
@@ -218,7 +241,6 @@ void add_batch(CLI::App& app, int& status) {
       ->add_option("--threads", options->threads,
                    "Host threads; results do not depend on them [default: the cores at hand]")
       ->check(require_whole_number);
-  command->callback([options, &status] { status = batch(*options); });
 }
 
 }  // namespace palpate::cli

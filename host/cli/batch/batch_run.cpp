@@ -26,75 +26,9 @@ namespace palpate::cli {
 
 namespace {
 
-/// A queue between threads that holds no more than so many bytes, or one item that is larger.
-template <typename Item>
-class BoundedQueue {
- public:
-  explicit BoundedQueue(std::size_t most_bytes) : most_bytes_(most_bytes) {}
-
-  /// Waits for room. False where the queue is closed, which drops the item.
-  bool push(Item item, std::size_t bytes) {
-    std::unique_lock lock(mutex_);
-    room_.wait(lock, [&] { return closed_ || items_.empty() || bytes_ + bytes <= most_bytes_; });
-    if (closed_) {
-      return false;
-    }
-    bytes_ += bytes;
-    items_.emplace_back(std::move(item), bytes);
-    item_.notify_one();
-    return true;
-  }
-
-  /// Waits for an item. None once the queue is closed and empty.
-  std::optional<Item> pop() {
-    std::unique_lock lock(mutex_);
-    item_.wait(lock, [&] { return closed_ || !items_.empty(); });
-    return take();
-  }
-
-  /// As pop(), but returns none where no item comes within this time.
-  std::optional<Item> pop_within(std::chrono::milliseconds time) {
-    std::unique_lock lock(mutex_);
-    item_.wait_for(lock, time, [&] { return closed_ || !items_.empty(); });
-    return take();
-  }
-
-  /// Lets nothing more in. What is in the queue still comes out.
-  void close() {
-    const std::lock_guard lock(mutex_);
-    closed_ = true;
-    item_.notify_all();
-    room_.notify_all();
-  }
-  bool ended() {
-    const std::lock_guard lock(mutex_);
-    return closed_ && items_.empty();
-  }
-
- private:
-  std::optional<Item> take() {
-    if (items_.empty()) {
-      return {};
-    }
-    std::optional<Item> item(std::move(items_.front().first));
-    bytes_ -= items_.front().second;
-    items_.pop_front();
-    room_.notify_all();
-    return item;
-  }
-
-  std::size_t most_bytes_;
-  std::mutex mutex_;
-  std::condition_variable item_;
-  std::condition_variable room_;
-  std::deque<std::pair<Item, std::size_t>> items_;
-  std::size_t bytes_ = 0;
-  bool closed_ = false;
-};
-
 using namespace std::chrono_literals;
 
-/// Unknowns that have been read, and lines that wait for the disk.
+/// Of unknowns that have been read; one may be larger.
 constexpr std::size_t most_waiting_bytes = 64 << 20;
 /// How often progress is shown where nothing else happens.
 constexpr auto pause = 200ms;
@@ -104,14 +38,6 @@ struct Job {
   std::size_t index;  ///< among all unknowns
   std::shared_ptr<const Recording> recording;
   Query unknown;
-};
-
-/// A record as text.
-struct RecordLine {
-  std::size_t index;
-  std::string text;
-  double seconds;
-  bool failed;
 };
 
 /// The lines of a chunk, some of which are still missing.
@@ -152,14 +78,11 @@ std::size_t bytes_of(const Query& unknown) {
   return bytes;
 }
 
+/// Threads that read unknowns, and threads that recognise them and write the chunks.
 class Pipeline {
  public:
   explicit Pipeline(const BatchRun& run)
-      : run_(run),
-        task_(run.job.task()),
-        unknowns_(run.task.unknowns()),
-        jobs_(most_waiting_bytes),
-        lines_(most_waiting_bytes) {
+      : run_(run), task_(run.job.task()), unknowns_(run.task.unknowns()) {
     std::size_t at = 0;
     for (const BatchEntry& entry : run.task.inputs) {
       first_.push_back(at);
@@ -169,20 +92,19 @@ class Pipeline {
   }
 
   BatchCounts run(const std::function<void(const BatchCounts&)>& progress) {
-    readers_left_ = (recognisers_ + 1) / 2;
     recognisers_left_ = recognisers_;
+    readers_left_ = (recognisers_ + 1) / 2;
     std::vector<std::jthread> threads;
-    for (std::size_t i = 0; i < (recognisers_ + 1) / 2; ++i) {
-      threads.emplace_back([&] { guard([&] { read(); }, readers_left_, jobs_); });
+    for (std::size_t i = readers_left_; i > 0; --i) {
+      threads.emplace_back([this] { guard([this] { read(); }, readers_left_); });
     }
     for (std::size_t i = 0; i < recognisers_; ++i) {
       threads.emplace_back(
-          [this, i] { guard([this, i] { recognise_jobs(i == 0); }, recognisers_left_, lines_); });
+          [this, i] { guard([this, i] { recognise_unknowns(i == 0); }, recognisers_left_); });
     }
-    try {
-      write(progress);
-    } catch (...) {
-      fail();
+    for (std::unique_lock lock(mutex_); recognisers_left_ > 0;) {
+      changed_.wait_for(lock, pause);
+      progress(counts_);
     }
     threads.clear();  // joins
     if (failure_) {
@@ -194,27 +116,19 @@ class Pipeline {
  private:
   std::size_t chunk_of(std::size_t unknown) const { return unknown / run_.task.chunk_unknowns; }
 
-  /// Remembers the exception at hand, if it is the first one, and ends all threads.
-  void fail() {
-    {
-      const std::lock_guard lock(mutex_);
-      failure_ = failure_ ? failure_ : std::current_exception();
-    }
-    jobs_.close();
-    lines_.close();
-  }
-
-  /// Runs a thread; the last one of its kind closes the queue that they fill.
-  template <typename Work, typename Queue>
-  void guard(const Work& work, std::atomic<std::size_t>& left, Queue& filled) {
+  /// Runs one of `left` threads. What it throws, if it is the first, ends all threads.
+  template <typename Work>
+  void guard(const Work& work, std::size_t& left) {
+    std::exception_ptr failure;
     try {
       work();
     } catch (...) {
-      fail();
+      failure = std::current_exception();
     }
-    if (--left == 0) {
-      filled.close();
-    }
+    const std::lock_guard lock(mutex_);
+    failure_ = failure_ ? failure_ : failure;
+    --left;
+    changed_.notify_all();
   }
 
   bool is_wanted(std::size_t input) const {
@@ -238,37 +152,60 @@ class Pipeline {
     }
   }
 
-  /// False where the queue is closed.
+  /// False where another thread has failed.
   bool push_unknowns(std::size_t input, ReadInput read) {
     for (std::size_t i = 0; i < read.unknowns.size(); ++i) {
       const std::size_t index = first_[input] + i;
-      if (run_.wanted[chunk_of(index)]) {
-        const std::size_t bytes = bytes_of(read.unknowns[i]);
-        if (!jobs_.push({index, read.recording, std::move(read.unknowns[i])}, bytes)) {
-          return false;
-        }
+      if (run_.wanted[chunk_of(index)] &&
+          !push({index, read.recording, std::move(read.unknowns[i])})) {
+        return false;
       }
     }
     return true;
   }
 
-  void recognise_jobs(bool first) {
+  /// Waits for room. False where another thread has failed.
+  bool push(Job job) {
+    const std::size_t bytes = bytes_of(job.unknown);
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [&] {
+      return failure_ || waiting_.empty() || waiting_bytes_ + bytes <= most_waiting_bytes;
+    });
+    if (failure_) {
+      return false;
+    }
+    waiting_bytes_ += bytes;
+    waiting_.push_back(std::move(job));
+    changed_.notify_all();
+    return true;
+  }
+
+  /// Waits for an unknown; none where all have been taken or another thread has failed.
+  std::optional<Job> pop() {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [&] { return failure_ || !waiting_.empty() || readers_left_ == 0; });
+    if (failure_ || waiting_.empty()) {
+      return {};
+    }
+    std::optional<Job> job(std::move(waiting_.front()));
+    waiting_.pop_front();
+    waiting_bytes_ -= bytes_of(job->unknown);
+    changed_.notify_all();
+    return job;
+  }
+
+  void recognise_unknowns(bool first) {
     const bool trace = run_.job.request().trace;
     Recogniser recogniser = run_.job.open({.threads = run_.threads / recognisers_});
     if (first && run_.verbose) {
       print_engine(run_.job, recogniser);
     }
-    while (const std::optional<Job> job = jobs_.pop()) {
+    while (const std::optional<Job> job = pop()) {
       const RecognitionRecord record = recognise(recogniser, task_, job->unknown, trace);
       if (record.error.empty()) {
         tell_once(recogniser.unresolved_words());
       }
-      RecordLine line{job->index, text_of(to_json(record, task_, std::nullopt, trace)),
-                      record.seconds, !record.error.empty()};
-      const std::size_t bytes = line.text.size();
-      if (!lines_.push(std::move(line), bytes)) {
-        return;
-      }
+      add(job->index, record, text_of(to_json(record, task_, std::nullopt, trace)));
     }
   }
 
@@ -278,33 +215,32 @@ class Pipeline {
     }
   }
 
-  void write(const std::function<void(const BatchCounts&)>& progress) {
-    while (!lines_.ended()) {
-      if (std::optional<RecordLine> line = lines_.pop_within(pause)) {
-        add(*std::move(line));
+  /// Takes the line of a record, and writes its chunk where that was the last one missing.
+  void add(std::size_t unknown, const RecognitionRecord& record, std::string line) {
+    const std::size_t index = chunk_of(unknown);
+    const std::size_t first = index * run_.task.chunk_unknowns;
+    const bool failed = !record.error.empty();
+    OpenChunk finished;
+    {
+      const std::lock_guard lock(mutex_);
+      OpenChunk& chunk = open_[index];
+      if (chunk.lines.empty()) {
+        chunk.missing = std::min(run_.task.chunk_unknowns, unknowns_ - first);
+        chunk.lines.resize(chunk.missing);
+        chunk.seconds.resize(chunk.missing);
       }
-      progress(counts_);
+      chunk.lines[unknown - first] = std::move(line);
+      chunk.seconds[unknown - first] = record.seconds;
+      chunk.failed += failed ? 1 : 0;
+      counts_.failed += failed ? 1 : 0;
+      ++counts_.done;
+      if (--chunk.missing > 0) {
+        return;
+      }
+      finished = std::move(chunk);
+      open_.erase(index);
     }
-  }
-
-  void add(RecordLine line) {
-    const std::size_t chunk = chunk_of(line.index);
-    const std::size_t first = chunk * run_.task.chunk_unknowns;
-    OpenChunk& open = open_[chunk];
-    if (open.lines.empty()) {
-      open.missing = std::min(run_.task.chunk_unknowns, unknowns_ - first);
-      open.lines.resize(open.missing);
-      open.seconds.resize(open.missing);
-    }
-    open.lines[line.index - first] = std::move(line.text);
-    open.seconds[line.index - first] = line.seconds;
-    open.failed += line.failed ? 1 : 0;
-    counts_.failed += line.failed ? 1 : 0;
-    ++counts_.done;
-    if (--open.missing == 0) {
-      write(chunk, open);
-      open_.erase(chunk);
-    }
+    write(index, finished);
   }
 
   void write(std::size_t index, const OpenChunk& chunk) const {
@@ -326,16 +262,18 @@ class Pipeline {
 
   const BatchRun& run_;
   const RecognitionTask& task_;
-  std::size_t unknowns_;
+  const std::size_t unknowns_;
   std::vector<std::size_t> first_;  ///< [input] index of its first unknown
   std::size_t recognisers_ = 1;
-  BoundedQueue<Job> jobs_;
-  BoundedQueue<RecordLine> lines_;
   std::atomic<std::size_t> next_input_ = 0;
-  std::atomic<std::size_t> readers_left_ = 0;
-  std::atomic<std::size_t> recognisers_left_ = 0;
   std::atomic<bool> told_ = false;
-  std::mutex mutex_;
+
+  std::mutex mutex_;  ///< of what follows
+  std::condition_variable changed_;
+  std::deque<Job> waiting_;
+  std::size_t waiting_bytes_ = 0;
+  std::size_t readers_left_ = 0;
+  std::size_t recognisers_left_ = 0;
   std::exception_ptr failure_;  ///< the first one
   std::map<std::size_t, OpenChunk> open_;
   BatchCounts counts_;

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <memory>
 #include <optional>
 
 #include <fmt/format.h>
@@ -52,8 +51,7 @@ void check_output(const MergeArguments& options, const ResultsFolder& folder,
   for (const std::size_t chunk : there) {
     files.reads("RESULTS", folder.chunk(chunk));
   }
-  files.writes("-o", options.output, CommandFiles::Dash::stream);
-  files.prepare();
+  files.writes("-o", options.output, CommandFiles::Dash::stream).prepare();
   const auto place = identity_of(std::filesystem::absolute(options.output).parent_path());
   if (options.output != "-" && place && place == identity_of(folder.chunks())) {
     refuse_flag("-o", options.output, "lies among the chunks that are merged; choose another name");
@@ -105,18 +103,17 @@ void merge(const MergeArguments& options) {
 }  // namespace
 
 void add_merge(CLI::App& app) {
-  auto* command =
-      app.add_subcommand("merge",
-                         "Join the results of palpate batch: one record a line (NDJSON), in the "
-                         "order of the inputs. Says what is missing");
-  const auto options = std::make_shared<MergeArguments>();
+  const auto [command, options] =
+      add_command<MergeArguments>(app, "merge",
+                                  "Join the results of palpate batch: one record a line (NDJSON), "
+                                  "in the order of the inputs. Says what is missing",
+                                  merge);
   command->add_option("RESULTS", options->results, "Folder of results of palpate batch")
       ->required();
   command->add_option("-o,--output", options->output,
                       "File to write; - is standard output [default: -]");
   command->add_flag("--partial", options->partial,
                     "Join what is there, instead of refusing where chunks are missing");
-  command->callback([options] { merge(*options); });
 }
 
 }  // namespace palpate::cli

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "cli/live_record.hpp"
 #include "cli/page/page_json.hpp"
 #include "cli/sheet.hpp"
 #include "cli/step_words.hpp"
@@ -78,7 +79,7 @@ LivePage::LivePage(const PageAddress& address, const SensorDescription& sensor,
       server_(address, feed_,
               {.get = [this](const std::string& path) { return get(path); },
                .act = [this](const nlohmann::json& request) { act(request); }}) {
-  feed_.set("setup", line_of(setup(sensor, elements_mm, task, plan)));
+  feed_.set("setup", text_of(setup(sensor, elements_mm, task, plan)));
 }
 
 void LivePage::serve(LiveRecognition* recognition) {
@@ -89,7 +90,7 @@ void LivePage::serve(LiveRecognition* recognition) {
 std::optional<std::string> LivePage::get(const std::string& path) const {
   for (std::size_t i = 0; i < task_.hypotheses.size(); ++i) {
     if (path == fmt::format("/map/{}", i)) {
-      return line_of(map_json(task_.hypotheses[i].map));
+      return text_of(map_json(task_.hypotheses[i].map));
     }
   }
   return {};
@@ -120,7 +121,7 @@ void LivePage::begin_unknown() {
   for (const char* event : {"touch", "next", "belief"}) {
     feed_.forget(event);
   }
-  feed_.set("unknown", "{}");
+  feed_.set("unknown", "{}\n");
 }
 
 void LivePage::add(const LiveTouch& touch) {
@@ -129,7 +130,7 @@ void LivePage::add(const LiveTouch& touch) {
   json["words"] = sentences(touch.step, task_);
   json["map"] = touch.step.mode.object;
   json["readings"] = readings_text(touch);
-  feed_.add("touch", line_of(json));
+  feed_.add("touch", text_of(json));
   show_belief();
 }
 
@@ -142,13 +143,13 @@ void LivePage::show_belief() {
   nlohmann::ordered_json json = belief_json(belief);
   json["map"] = object;
   json["chosen"] = looked_at_ >= 0;
-  feed_.set("belief", line_of(json));
+  feed_.set("belief", text_of(json));
 }
 
 void LivePage::plan(const LiveTouch& touch) {
   nlohmann::ordered_json json = to_json(*touch.next);
   json["words"] = next_touch_words(*touch.next, *plan_);
-  feed_.set("next", line_of(json));
+  feed_.set("next", text_of(json));
 }
 
 void LivePage::update(const LiveState& state, const std::string& warning) {
@@ -157,6 +158,12 @@ void LivePage::update(const LiveState& state, const std::string& warning) {
     return;
   }
   shown_ = now;
+  const double counted_s = std::chrono::duration<double>(now - counted_).count();
+  if (counted_s >= 1.0) {
+    rate_hz_ = static_cast<double>(state.counters.frames - frames_before_) / counted_s;
+    frames_before_ = state.counters.frames;
+    counted_ = now;
+  }
   nlohmann::ordered_json json{{"pressure", pressure_json(state.pressure)},
                               {"touching", state.touching},
                               {"taring", state.taring},
@@ -166,7 +173,7 @@ void LivePage::update(const LiveState& state, const std::string& warning) {
                               {"frames", state.counters.frames},
                               {"lost", state.counters.lost},
                               {"without_pose", state.without_pose},
-                              {"rate_hz", std::round(rate_.hz(state.counters.frames))},
+                              {"rate_hz", std::round(rate_hz_)},
                               {"worst_latency_ms", state.worst_latency_ms}};
   if (state.T_robot_sensor) {
     json["pose"] = pose_json(*state.T_robot_sensor);
@@ -174,7 +181,7 @@ void LivePage::update(const LiveState& state, const std::string& warning) {
   if (!warning.empty()) {
     json["warning"] = in_flags(warning);
   }
-  feed_.set("frame", line_of(json));
+  feed_.set("frame", text_of(json));
 }
 
 }  // namespace palpate::cli

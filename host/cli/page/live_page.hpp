@@ -7,7 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "cli/live_record.hpp"
 #include "cli/page/page_feed.hpp"
 #include "cli/page/page_server.hpp"
 #include "recognition/live_recognition.hpp"
@@ -56,7 +55,9 @@ class LivePage {
   LiveRecognition* recognition_ = nullptr;
 
   Clock::time_point shown_{};
-  FrameRate rate_;
+  Clock::time_point counted_ = Clock::now();  ///< when the frames of rate_hz_ began
+  std::uint64_t frames_before_ = 0;           ///< until then
+  double rate_hz_ = 0.0;                      ///< of the frames over a second or more
 
   PageFeed feed_;
   PageServer server_;  ///< ends before all that it reads

@@ -11,7 +11,7 @@
 
 namespace palpate::cli {
 
-/// An event for the pages that look: a name, and data in one line of JSON.
+/// An event for the pages that look: a name, and a line of JSON with its end.
 struct PageEvent {
   std::uint64_t number = 0;  ///< grows from event to event
   std::string name;

@@ -13,33 +13,11 @@ namespace palpate::cli {
 
 namespace {
 
-std::string base64(std::span<const std::uint8_t> bytes) {
-  static constexpr char digits[] =
-      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  text.reserve((bytes.size() + 2) / 3 * 4);
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    const std::size_t left = std::min<std::size_t>(3, bytes.size() - i);
-    std::uint32_t word = 0;
-    for (std::size_t k = 0; k < 3; ++k) {
-      word = word << 8 | (k < left ? bytes[i + k] : 0u);
-    }
-    for (std::size_t k = 0; k < 4; ++k) {
-      text += k <= left ? digits[word >> (18 - 6 * k) & 63u] : '=';
-    }
-  }
-  return text;
-}
-
 std::uint8_t byte(double value) {
   return value > 0.0 ? static_cast<std::uint8_t>(std::lround(std::min(value, 255.0))) : 0;
 }
 
 }  // namespace
-
-std::string line_of(const nlohmann::ordered_json& json) {
-  return json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
-}
 
 nlohmann::ordered_json pose_json(const Pose& pose) {
   return {pose.translation_mm.x, pose.translation_mm.y, pose.theta_rad};
@@ -55,10 +33,8 @@ nlohmann::ordered_json places_json(std::span<const glm::dvec2> places_mm) {
 
 nlohmann::ordered_json pressure_json(std::span<const double> pressure) {
   auto json = nlohmann::ordered_json::array();
-  for (const double value : pressure) {
-    json.push_back(std::isfinite(value) ? nlohmann::ordered_json(std::strtod(
-                                              fmt::format("{:.4g}", value).c_str(), nullptr))
-                                        : nullptr);
+  for (const double value : pressure) {  // what is not finite becomes null
+    json.push_back(std::strtod(fmt::format("{:.4g}", value).c_str(), nullptr));
   }
   return json;
 }
@@ -72,13 +48,10 @@ nlohmann::ordered_json map_json(const OccupancyGrid& map) {
     evidence.push_back(byte(128.0 + 127.0 * std::clamp(part, -1.0, 1.0)));
   }
   const glm::dvec2 lower_mm = lower_edge_mm(map);
-  return {{"label", map.label},
-          {"lower_mm", {lower_mm.x, lower_mm.y}},
-          {"cell_mm", map.cell_mm},
-          {"nx", map.nx},
-          {"ny", map.ny},
-          {"nats", nats},
-          {"evidence", base64(evidence)}};
+  return {{"label", map.label},     {"lower_mm", {lower_mm.x, lower_mm.y}},
+          {"cell_mm", map.cell_mm}, {"nx", map.nx},
+          {"ny", map.ny},           {"nats", nats},
+          {"evidence", evidence}};
 }
 
 nlohmann::ordered_json belief_json(const PlacedBelief& belief) {
@@ -97,7 +70,7 @@ nlohmann::ordered_json belief_json(const PlacedBelief& belief) {
           {"cell_mm", belief.cell_mm},
           {"cells", belief.cells},
           {"peak", peak},
-          {"xy", base64(xy)},
+          {"xy", xy},
           {"theta", theta}};
 }
 

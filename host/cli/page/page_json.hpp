@@ -10,13 +10,11 @@
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/pose.hpp"
 
-// What the page draws, as JSON. Pictures are base64 of a byte for each cell, row by row, the lowest
-// row first.
+// What the page draws, as JSON. Pictures are a number from 0 to 255 for each cell, row by row, the
+// lowest row first.
 
 namespace palpate::cli {
 
-/// One line, as an event needs it; what is not UTF-8 is replaced.
-std::string line_of(const nlohmann::ordered_json& json);
 /// [x, y, theta] in mm and rad.
 nlohmann::ordered_json pose_json(const Pose& pose);
 /// [[x, y], ...] in mm.

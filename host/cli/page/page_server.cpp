@@ -1,20 +1,27 @@
 #include "cli/page/page_server.hpp"
 
 #include <arpa/inet.h>
+#include <poll.h>
+#include <sys/eventfd.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <atomic>
+#include <cerrno>
 #include <chrono>
 #include <cstdlib>
+#include <semaphore>
 #include <string_view>
 #include <thread>
+#include <utility>
 
 #include <fmt/format.h>
+#include <httplib.h>
 #include <CLI/CLI.hpp>
 
 #include "cli/options.hpp"
-#include "cli/page/limited_server.hpp"
 #include "cli/page/page_feed.hpp"
 #include "cli/page/site.hpp"
 #include "model/option_words.hpp"
@@ -24,10 +31,13 @@ namespace palpate::cli {
 namespace {
 
 using namespace std::chrono_literals;
+using Clock = std::chrono::steady_clock;
 
 constexpr int most_pages = 16;     ///< that take events at a time
 constexpr int other_requests = 4;  ///< threads that are left to answer while all of them look
-constexpr std::size_t most_asked = 4096;  ///< bytes of a request's body
+constexpr std::size_t most_asked = 4096;      ///< bytes of a request's body
+constexpr int most_requests = 100;            ///< of a connection
+constexpr double least_bytes_per_s = 4096.0;  ///< that whoever reads an answer takes
 
 bool is_ip(const std::string& host) {
   unsigned char bytes[sizeof(in6_addr)];
@@ -72,9 +82,106 @@ void own_port_alone(int socket) {
   setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof(yes));
 }
 
-std::string sent_text(const PageEvent& event) {
-  return fmt::format("event: {}\ndata: {}\n\n", event.name, *event.data);
-}
+/// A connection, which a request may use within the limits.
+class LimitedStream : public httplib::Stream {
+ public:
+  LimitedStream(socket_t socket, const RequestLimits& limits, int ended)
+      : socket_(socket), limits_(limits), ended_(ended) {}
+
+  /// Waits for a request's first byte; false where none comes.
+  bool begin() {
+    if (begin_ == end_ && !fill(limits_.idle)) {
+      return false;
+    }
+    bytes_left_ = limits_.bytes;
+    read_until_ = Clock::now() + limits_.reading;
+    patience_ = limits_.writing;
+    return true;
+  }
+
+  ssize_t read(char* bytes, std::size_t size) override {
+    if (begin_ == end_ && !fill(read_until_ - Clock::now())) {
+      return -1;
+    }
+    const std::size_t count = std::min({size, end_ - begin_, bytes_left_});
+    std::copy_n(buffer_.begin() + begin_, count, bytes);
+    begin_ += count;
+    bytes_left_ -= count;
+    return count > 0 || size == 0 ? static_cast<ssize_t>(count) : -1;
+  }
+
+  /// The client may make the server wait for limits.writing, and for longer as it takes bytes.
+  ssize_t write(const char* bytes, std::size_t size) override {
+    const Clock::time_point begin = Clock::now();
+    if (!wait(POLLOUT, patience_)) {
+      return -1;
+    }
+    const ssize_t count = ::send(socket_, bytes, size, MSG_NOSIGNAL | MSG_DONTWAIT);
+    const std::chrono::duration<double> earned(static_cast<double>(count) / least_bytes_per_s);
+    patience_ = std::min<Clock::duration>(
+        limits_.writing,
+        patience_ - (Clock::now() - begin) + std::chrono::duration_cast<Clock::duration>(earned));
+    return count;
+  }
+
+  bool is_readable() const override { return begin_ != end_ || wait(POLLIN, 0s); }
+  bool is_writable() const override { return wait(POLLOUT, patience_); }
+  void get_remote_ip_and_port(std::string&, int&) const override {}  // nothing asks for them
+  void get_local_ip_and_port(std::string&, int&) const override {}
+  socket_t socket() const override { return socket_; }
+
+ private:
+  /// Whether the socket is ready in time, and before the server ends.
+  bool wait(short event, Clock::duration time) const {
+    const Clock::time_point until = Clock::now() + time;
+    std::array<pollfd, 2> ready{{{socket_, event, 0}, {ended_, POLLIN, 0}}};
+    int count = 0;
+    do {
+      const auto left = std::chrono::ceil<std::chrono::milliseconds>(until - Clock::now());
+      count = ::poll(ready.data(), ready.size(), static_cast<int>(std::max(left, 0ms).count()));
+    } while (count < 0 && errno == EINTR);
+    return count > 0 && ready[1].revents == 0;
+  }
+
+  bool fill(Clock::duration time) {
+    if (!wait(POLLIN, time)) {
+      return false;
+    }
+    const ssize_t count = ::recv(socket_, buffer_.data(), buffer_.size(), MSG_DONTWAIT);
+    begin_ = 0;
+    end_ = static_cast<std::size_t>(std::max<ssize_t>(count, 0));
+    return count > 0;
+  }
+
+  const socket_t socket_;
+  const RequestLimits& limits_;
+  const int ended_;
+  std::array<char, 4096> buffer_;
+  std::size_t begin_ = 0;
+  std::size_t end_ = 0;
+  std::size_t bytes_left_ = 0;
+  Clock::time_point read_until_;
+  Clock::duration patience_{};
+};
+
+/// Threads for connections. Where many wait, the next are not accepted, so that they cannot take
+/// all file descriptors of the program.
+class Connections : public httplib::ThreadPool {
+ public:
+  Connections(int threads, int most)
+      : httplib::ThreadPool(static_cast<std::size_t>(threads)), room_(most) {}
+
+  void enqueue(std::function<void()> serve) override {
+    room_.acquire();
+    httplib::ThreadPool::enqueue([this, serve = std::move(serve)] {
+      serve();
+      room_.release();
+    });
+  }
+
+ private:
+  std::counting_semaphore<> room_;
+};
 
 }  // namespace
 
@@ -91,21 +198,69 @@ void add_page_flags(CLI::App& command, PageAddress& address) {
       ->type_name("PORT")
       ->check(CLI::Range(0, 65535));
   command
-      .add_option(
-          "--page-address", address.host,
-          "Address at which the page is served; 0.0.0.0 shows it to everybody who can reach "
-          "this machine, and lets them press its buttons")
+      .add_option("--page-address", address.host,
+                  "Address at which the page is served; 0.0.0.0 shows it to everybody who can "
+                  "reach this machine, and lets them press its buttons")
       ->capture_default_str();
 }
 
-struct PageServer::Impl {
+/// httplib's server within RequestLimits: httplib itself limits each read's time but not a
+/// request's, and neither a request's headers nor a body that comes in chunks or compressed.
+struct PageServer::Impl : httplib::Server {
   PageAddress address;
   PageFeed& feed;
   PageAnswers answers;
-  LimitedServer server;
+  RequestLimits limits;
   int port = 0;
+  const int ended = ::eventfd(0, EFD_CLOEXEC);  ///< readable once the server ends
   std::atomic<int> pages{0};
   std::thread thread;
+
+  Impl(const PageAddress& at, PageFeed& events, PageAnswers others, const RequestLimits& of_client)
+      : address(at), feed(events), answers(std::move(others)), limits(of_client) {
+    if (ended < 0) {
+      throw Error(Fault::system, "the page: no file descriptor is left; end other programs");
+    }
+    new_task_queue = [this] {
+      return new Connections(most_pages + other_requests, limits.connections);
+    };
+  }
+  ~Impl() override { ::close(ended); }
+
+  /// Ends listen_after_bind(), whether it has begun or not, and waits for no client.
+  void end() {
+    ::eventfd_write(ended, 1);
+    // Unlike stop(), also before the listening thread has begun.
+    if (const socket_t listening = svr_sock_.exchange(INVALID_SOCKET);
+        listening != INVALID_SOCKET) {
+      ::shutdown(listening, SHUT_RDWR);
+      ::close(listening);
+    }
+  }
+
+  bool process_and_close_socket(socket_t socket) override {
+    LimitedStream stream(socket, limits, ended);
+    bool more = true;
+    for (int left = most_requests; more && left > 0 && stream.begin(); --left) {
+      more = false;
+      bool closed = false;
+      const bool answered =
+          process_request(stream, left == 1, closed, [&more](httplib::Request& request) {
+            request.ranges.clear();                     // 2,650 ranges would be as many copies
+            request.headers.erase("Content-Encoding");  // a body stays as small as it was sent
+            // What is left of a body that nobody reads shall not be taken for the next request.
+            more = request.method == "GET" && !request.has_header("Content-Length") &&
+                   !request.has_header("Transfer-Encoding");
+            if (!more) {
+              request.headers.erase("Connection");
+              request.set_header("Connection", "close");
+            }
+          });
+      more = more && answered && !closed;
+    }
+    ::shutdown(socket, SHUT_RDWR);
+    return ::close(socket) == 0;
+  }
 
   void give_events(httplib::Response& response) {
     if (pages.fetch_add(1) >= most_pages) {
@@ -122,7 +277,7 @@ struct PageServer::Impl {
           std::string text = first ? "retry: 1000\nevent: hello\ndata: {}\n\n" : "";
           first = false;
           for (const PageEvent& event : feed.after(sent, 10s)) {
-            text += sent_text(event);
+            text += fmt::format("event: {}\ndata: {}\n", event.name, *event.data);
             sent = event.number;
           }
           if (feed.closed()) {
@@ -169,21 +324,17 @@ struct PageServer::Impl {
 
 PageServer::PageServer(const PageAddress& address, PageFeed& feed, PageAnswers answers,
                        const RequestLimits& limits)
-    : impl_(new Impl{.address = address,
-                     .feed = feed,
-                     .answers = std::move(answers),
-                     .server = {limits, most_pages + other_requests}}) {
-  LimitedServer& server = impl_->server;
+    : impl_(new Impl(address, feed, std::move(answers), limits)) {
+  Impl& server = *impl_;
   server.set_socket_options(own_port_alone);
   server.set_tcp_nodelay(true);  // a body shall not wait 40 ms for the head's acknowledgement
   server.set_payload_max_length(most_asked);
   // The page loads nothing from elsewhere. Notebooks of this machine may hold it in a frame.
-  server.set_default_headers(
-      {{"Content-Security-Policy",
-        "default-src 'self'; img-src 'self' data:; frame-ancestors 'self' http://localhost:* "
-        "http://127.0.0.1:*"},
-       {"X-Content-Type-Options", "nosniff"},
-       {"Cross-Origin-Resource-Policy", "same-origin"}});
+  server.set_default_headers({{"Content-Security-Policy",
+                               "default-src 'self'; img-src 'self' data:; frame-ancestors 'self' "
+                               "http://localhost:* http://127.0.0.1:*"},
+                              {"X-Content-Type-Options", "nosniff"},
+                              {"Cross-Origin-Resource-Policy", "same-origin"}});
   server.set_pre_routing_handler([](const httplib::Request& request, httplib::Response& response) {
     if (may_read(request)) {
       return httplib::Server::HandlerResponse::Unhandled;
@@ -210,17 +361,17 @@ PageServer::PageServer(const PageAddress& address, PageFeed& feed, PageAnswers a
                 "or 0.0.0.0 for all of them");
   }
   if (impl_->port < 0) {
-    refuse_flag("--page", asked,
-                "cannot be had at {}: another program may use it; give another port, or 0 for a "
-                "free one",
-                address.host);
+    refuse_flag(
+        "--page", asked,
+        "cannot be had at {}: another program may use it; give another port, or 0 for a free one",
+        address.host);
   }
-  impl_->thread = std::thread([this] { impl_->server.listen_after_bind(); });
+  impl_->thread = std::thread([this] { impl_->listen_after_bind(); });
 }
 
 PageServer::~PageServer() {
   impl_->feed.close();
-  impl_->server.end();
+  impl_->end();
   impl_->thread.join();
 }
 
@@ -239,7 +390,7 @@ std::string PageServer::words() const {
                       : fmt::format("; from the machine before you, reach it through ssh -L "
                                     "{0}:127.0.0.1:{0}",
                                     impl_->port)
-                : ", for everybody who can reach this machine: what the array feels, and the "
+                      : ", for everybody who can reach this machine: what the array feels, and the "
                   "buttons");
 }
 

@@ -1,12 +1,14 @@
 #include "cli/page/viewed_files.hpp"
 
 #include <algorithm>
-#include <array>
-#include <cstdlib>
-#include <limits>
+#include <cstdint>
+#include <filesystem>
+#include <iterator>
+#include <regex>
 #include <set>
+#include <utility>
 
-#include <glm/vec3.hpp>
+#include <nlohmann/json.hpp>
 
 #include "cli/page/page_json.hpp"
 #include "io/input_file.hpp"
@@ -14,206 +16,270 @@
 #include "io/recording_survey.hpp"
 #include "palpate/files.hpp"
 #include "recognition/judged_results.hpp"
+#include "recognition/record_json.hpp"
 
 namespace palpate::cli {
 
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+/// A file with what a page shows of it.
+class ViewedFile {
+ public:
+  explicit ViewedFile(fs::path file) : path(std::move(file)) {}
+  virtual ~ViewedFile() = default;
+
+  virtual const char* kind() const = 0;
+  virtual Json whole() const = 0;
+  /// A part by its name and number; null where there is none.
+  virtual Json part(const std::string& name, std::size_t index) const = 0;
+
+  const fs::path path;
+};
+
 namespace {
 
-namespace fs = std::filesystem;
-using Json = nlohmann::json;
-
 constexpr std::size_t rows_at_once = 64;
-constexpr const char* kinds[] = {"recording", "map", "records"};
-
-bool is_hdf5(const fs::path& path) {
-  const std::string extension = path.extension();
-  return extension == ".h5" || extension == ".hdf5";
-}
 
 /// The known poses whose x or y is the least or the largest.
-nlohmann::ordered_json reach_of(std::span<const Pose> poses) {
-  std::vector<glm::dvec3> known;
-  for (const Pose& pose : poses) {
-    if (is_finite(pose)) {
-      known.emplace_back(pose.translation_mm, pose.theta_rad);
-    }
-  }
-  auto json = nlohmann::ordered_json::array();
+Json reach_of(std::vector<Pose> poses) {
+  std::erase_if(poses, [](const Pose& pose) { return !is_finite(pose); });
+  auto json = Json::array();
   for (const int axis : {0, 1}) {
-    const auto [least, most] =
-        std::ranges::minmax_element(known, {}, [axis](const glm::dvec3& p) { return p[axis]; });
+    const auto [least, most] = std::ranges::minmax_element(
+        poses, {}, [axis](const Pose& pose) { return pose.translation_mm[axis]; });
     for (const auto end : {least, most}) {
-      if (end != known.end()) {
-        json.push_back({end->x, end->y, end->z});
+      if (end != poses.end()) {
+        json.push_back(pose_json(*end));
       }
     }
   }
   return json;
+}
+
+class RecordingFile : public ViewedFile {
+ public:
+  explicit RecordingFile(const fs::path& file) : ViewedFile(file) {
+    ReadingHistogram readings;
+    const auto append = [](auto& list) {
+      return [&list](auto values) { list.insert(list.end(), values.begin(), values.end()); };
+    };
+    const auto pressure = [&](std::span<const double> values) {
+      append(pressure_)(values);
+      for (const double value : values) {
+        if (value > 0.0 && value < 1e30) {  // one reading of 1e38 shall not be the scale
+          readings.add(value);
+          shows_pressure_ = true;
+        }
+      }
+    };
+    const auto elements = [&](std::span<const glm::dvec2> places) {
+      // A changing array is drawn as it begins.
+      const std::size_t left = elements_ - recording_.elements_mm.size();
+      append(recording_.elements_mm)(places.first(std::min(left, places.size())));
+    };
+    const auto head = [&](const RecordingHead& of_file) {
+      recording_ = of_file.recording;
+      elements_ = of_file.elements;
+      pressure_.reserve(of_file.rows * of_file.elements);
+      recording_.T_robot_sensor.reserve(of_file.rows);
+    };
+    scan_recording(file, {.head = head,
+                          .pressure = pressure,
+                          .T_robot_sensor = append(recording_.T_robot_sensor),
+                          .elements_mm = elements,
+                          .time_s = append(recording_.time_s),
+                          .device_time_s = [](auto) {},
+                          .lost_before = [](auto) {}});
+    largest_ = shows_pressure_ ? readings.quantile(0.999) : 0.0;
+  }
+
+  const char* kind() const override { return "recording"; }
+
+  Json whole() const override {
+    const std::vector<std::uint8_t>& valid = recording_.valid;
+    Json json{{"rows", recording_.rows},
+              {"count", recording_.size()},
+              {"object", recording_.object},
+              {"pressure_unit", recording_.pressure_unit},
+              {"elements_mm", places_json(recording_.elements_mm)},
+              {"reach", reach_of(recording_.T_robot_sensor)},
+              {"valid", std::span(valid).first(valid.size() >= elements_ ? elements_ : 0)}};
+    if (shows_pressure_) {
+      json["largest"] = largest_;
+    }
+    if (!recording_.time_s.empty()) {
+      json["begin_s"] = recording_.time_s.front();
+    }
+    return json;
+  }
+
+  Json part(const std::string& name, std::size_t first) const override {
+    if (name != "rows" || first >= recording_.size()) {
+      return nullptr;
+    }
+    Json json{{"first", first}, {"pressure", Json::array()}, {"pose", Json::array()}};
+    const std::size_t last = std::min(recording_.size(), first + rows_at_once);
+    for (std::size_t i = first; i < last; ++i) {
+      const auto row = pressure_.begin() + static_cast<std::ptrdiff_t>(i * elements_);
+      json["pressure"].push_back(
+          pressure_json(std::vector<double>(row, row + static_cast<std::ptrdiff_t>(elements_))));
+      json["pose"].push_back(pose_json(recording_.T_robot_sensor[i]));  // NaN becomes null
+      if (!recording_.time_s.empty()) {
+        json["time"].push_back(recording_.time_s[i]);
+      }
+    }
+    return json;
+  }
+
+ private:
+  Recording recording_;  ///< without pressures
+  std::size_t elements_ = 0;
+  /// [n, e]; four digits are shown, so float holds them.
+  std::vector<float> pressure_;
+  bool shows_pressure_ = false;
+  double largest_ = 0.0;  ///< of the pressures but for the last in a thousand
+};
+
+class MapFile : public ViewedFile {
+ public:
+  explicit MapFile(const fs::path& file) : ViewedFile(file), map_(read_map(file)) {}
+
+  const char* kind() const override { return "map"; }
+  Json whole() const override { return map_json(map_); }
+  Json part(const std::string& /*name*/, std::size_t /*index*/) const override { return nullptr; }
+
+ private:
+  OccupancyGrid map_;
+};
+
+/// What stands behind these keys, each in the object of the one before; null where there is none.
+Json value_at(const nlohmann::json& record, std::initializer_list<const char*> keys) {
+  const nlohmann::json* at = &record;
+  for (const char* key : keys) {
+    if (!at->is_object() || !at->contains(key)) {
+      return nullptr;
+    }
+    at = &at->at(key);
+  }
+  return *at;
+}
+
+std::string text_at(const nlohmann::json& record, std::initializer_list<const char*> keys) {
+  const Json value = value_at(record, keys);
+  return value.is_string() ? value.get<std::string>() : "";
 }
 
 /// What `live --json` wrote is of touches, one a line.
-bool is_live(const Json& record) {
-  const auto holds_number = [&](const char* key) {
-    return record.contains(key) && record[key].is_number();
-  };
-  return holds_number("unknown") && holds_number("touch");
+bool is_live(const nlohmann::json& record) {
+  return value_at(record, {"unknown"}).is_number() && value_at(record, {"touch"}).is_number();
 }
 
-/// "" where the field is missing or null.
-std::string text_in(const Json& record, const char* key) {
-  return record.contains(key) && record[key].is_string() ? record[key].get<std::string>() : "";
-}
-
-}  // namespace
-
-ViewedFiles::Rows ViewedFiles::rows_of(const fs::path& path) {
-  Rows rows;
-  ReadingHistogram readings;
-  std::size_t known = 0;
-  Recording& recording = rows.recording;
-  const auto append = [](auto& list) {
-    return [&list](auto values) { list.insert(list.end(), values.begin(), values.end()); };
-  };
-  scan_recording(path,
-                 {.head =
-                      [&](const RecordingHead& head) {
-                        recording = head.recording;
-                        rows.elements = head.elements;
-                        rows.pressure.reserve(head.rows * head.elements);
-                        recording.T_robot_sensor.reserve(head.rows);
-                      },
-                  .pressure =
-                      [&](std::span<const double> values) {
-                        append(rows.pressure)(values);
-                        for (const double value : values) {
-                          // One reading of 1e38 shall not be the scale.
-                          if (value > 0.0 && value < 1e30) {
-                            readings.add(value);
-                            ++known;
-                          }
-                        }
-                      },
-                  .T_robot_sensor = append(recording.T_robot_sensor),
-                  .elements_mm =
-                      [&](std::span<const glm::dvec2> places) {
-                        // A changing array is drawn as it begins.
-                        const std::size_t left = rows.elements - recording.elements_mm.size();
-                        append(recording.elements_mm)(places.first(std::min(left, places.size())));
-                      },
-                  .time_s = append(recording.time_s),
-                  .device_time_s = [](auto) {},
-                  .lost_before = [](auto) {}});
-  rows.largest = known == 0 ? 0.0 : readings.quantile(0.999);
-  return rows;
-}
-
-nlohmann::ordered_json ViewedFiles::described(const Rows& rows) {
-  const Recording& recording = rows.recording;
-  const std::size_t e = rows.elements;
-  nlohmann::ordered_json json{
-      {"kind", kinds[0]},
-      {"rows", recording.rows},
-      {"count", recording.size()},
-      {"object", recording.object},
-      {"pressure_unit", recording.pressure_unit},
-      {"elements_mm", places_json(recording.elements_mm)},
-      {"reach", reach_of(recording.T_robot_sensor)},
-      {"valid", recording.valid.size() >= e
-                    ? std::vector(recording.valid.begin(), recording.valid.begin() + e)
-                    : std::vector<std::uint8_t>()}};
-  if (rows.largest > 0.0) {
-    json["largest"] = rows.largest;
+class RecordsFile : public ViewedFile {
+ public:
+  explicit RecordsFile(const fs::path& results) : ViewedFile(results) {
+    for (const fs::path& file : result_files(std::vector<std::string>{results.string()})) {
+      std::vector<nlohmann::json> lines;  // of the unknown that live told of last
+      for (nlohmann::json& record : records_in(file)) {
+        if (!is_live(record)) {
+          add(record);
+        } else if (!record.contains("next")) {
+          if (!lines.empty() && lines.back()["unknown"] != record["unknown"]) {
+            add_unknown(std::exchange(lines, {}));
+          }
+          lines.push_back(std::move(record));
+        } else if (!lines.empty()) {
+          lines.back()["next"] = record["next"];
+        }
+      }
+      add_unknown(lines);
+    }
   }
-  if (!recording.time_s.empty()) {
-    json["begin_s"] = recording.time_s.front();
-  }
-  return json;
-}
 
-nlohmann::ordered_json ViewedFiles::some_of(const Rows& rows, std::size_t first) {
-  const Recording& recording = rows.recording;
-  const std::size_t last = std::min(recording.size(), first + rows_at_once);
-  std::vector<double> row(rows.elements);
-  auto pressure = nlohmann::ordered_json::array();
-  auto pose = nlohmann::ordered_json::array();
-  for (std::size_t i = first; i < last; ++i) {
-    std::copy_n(&rows.pressure[i * row.size()], row.size(), row.begin());
-    pressure.push_back(pressure_json(row));
-    pose.push_back(pose_json(recording.T_robot_sensor[i]));  // NaN becomes null
-  }
-  nlohmann::ordered_json json{{"first", first}, {"pressure", pressure}, {"pose", pose}};
-  if (!recording.time_s.empty()) {
-    json["time"] = std::vector(recording.time_s.begin() + static_cast<std::ptrdiff_t>(first),
-                               recording.time_s.begin() + static_cast<std::ptrdiff_t>(last));
-  }
-  return json;
-}
+  const char* kind() const override { return "records"; }
+  Json whole() const override { return {{"rows", rows_}}; }
 
-void ViewedFiles::Records::add(const Json& record) {
-  const std::string best = text_in(record, "best");
-  const std::string error = text_in(record, "error");
-  const bool counted = record.contains("touches") && record["touches"].is_number();
-  nlohmann::ordered_json row{text_in(record, "recording"),
-                             counted ? record["touches"].get<int>() : 0};
-  if (record.contains("frame")) {
-    row[0] = row[0].get<std::string>() + " frame " + record["frame"].dump();
+  Json part(const std::string& name, std::size_t index) const override {
+    if (index >= records_.size()) {
+      return nullptr;
+    }
+    const auto record = nlohmann::json::parse(records_[index]);
+    return name == "record" ? Json(record) : name == "map" ? map_of(record) : nullptr;
   }
-  const auto inner = [&record](const char* key, const char* of) -> nlohmann::ordered_json {
-    return record.contains(key) && record[key].contains(of)
-               ? nlohmann::ordered_json(record[key][of])
-               : nullptr;
-  };
-  row.push_back(error.empty() ? best : error);
-  row.push_back(inner("identity", best.c_str()));
-  row.push_back(inner("truth", "object"));
-  const char* error_mm = record.contains("refined_error_mm") ? "refined_error_mm" : "error_mm";
-  row.push_back(record.contains(error_mm) ? nlohmann::ordered_json(record[error_mm]) : nullptr);
-  row.push_back(inner("fit", "verdict"));
-  row.push_back(inner("decision", "act"));
-  rows.push_back(row);
-  text.push_back(line_of(record));
-}
 
-ViewedFiles::Records ViewedFiles::records_of(const fs::path& results) {
-  Records records;
-  std::vector<Json> lines;  // of the unknown that live told of last
-  const auto end_unknown = [&] {
+ private:
+  void add(const nlohmann::json& record) {
+    const std::string best = text_at(record, {"best"});
+    const std::string error = text_at(record, {"error"});
+    const Json touches = value_at(record, {"touches"});
+    const Json frame = value_at(record, {"frame"});
+    rows_.push_back(Json::array(
+        {text_at(record, {"recording"}) +
+             (record.contains("frame") ? " frame " + frame.dump() : ""),
+         touches.is_number() ? touches : Json(0), error.empty() ? best : error,
+         value_at(record, {"identity", best.c_str()}), value_at(record, {"truth", "object"}),
+         value_at(record, {record.contains("refined_error_mm") ? "refined_error_mm" : "error_mm"}),
+         value_at(record, {"fit", "verdict"}), value_at(record, {"decision", "act"})}));
+    records_.push_back(text_of(record));
+  }
+
+  /// Adds an unknown of `live`: its last line, with all of them as its trace.
+  void add_unknown(const std::vector<nlohmann::json>& lines) {
     if (!lines.empty()) {
-      Json record = lines.back();
+      nlohmann::json record = lines.back();
       record["recording"] = "unknown " + std::to_string(record["unknown"].get<int>() + 1);
       record["touches"] = record["touch"].get<int>() + 1;
       record["trace"] = lines;
-      records.add(record);
-      lines.clear();
+      add(record);
     }
-  };
-  for (const fs::path& file : result_files(std::vector<std::string>{results.string()})) {
-    for (Json& record : records_in(file)) {
-      if (!is_live(record)) {
-        records.add(record);
-        continue;
-      }
-      if (record.contains("next")) {
-        if (!lines.empty()) {
-          lines.back()["next"] = record["next"];
-        }
-        continue;
-      }
-      if (!lines.empty() && lines.back()["unknown"] != record["unknown"]) {
-        end_unknown();
-      }
-      lines.push_back(std::move(record));
-    }
-    end_unknown();
   }
-  return records;
+
+  Json map_of(const nlohmann::json& record) const {
+    // Relative to where recognize ran, which may be where this runs, or beside the results.
+    const fs::path named = text_at(record, {"mode", "map"});
+    for (const fs::path& file : {named, path.parent_path() / named}) {
+      try {
+        const OccupancyGrid map = read_map(file);
+        return map_json(value_at(record, {"mode", "mirrored"}) == true ? mirror_image(map) : map);
+      } catch (const Error&) {
+        // A map that is elsewhere now is not shown.
+      }
+    }
+    return nullptr;
+  }
+
+  std::vector<std::string> records_;  ///< JSON of each
+  Json rows_ = Json::array();
+};
+
+bool is_hdf5(const fs::path& path) {
+  return path.extension() == ".h5" || path.extension() == ".hdf5";
 }
+
+std::unique_ptr<const ViewedFile> open_file(const fs::path& path) {
+  if (!is_hdf5(path)) {
+    return std::make_unique<RecordsFile>(path);
+  }
+  require_readable(path);
+  const std::string format = read_format(path);
+  if (format == "palpate.recording") {
+    return std::make_unique<RecordingFile>(path);
+  }
+  if (format == "palpate.map") {
+    return std::make_unique<MapFile>(path);
+  }
+  refuse(path,
+         "attribute 'format' = '{}'; give recordings, maps or results of recognize, live or batch",
+         format);
+}
+
+}  // namespace
 
 ViewedFiles::ViewedFiles(std::span<const std::string> paths) {
   for (const std::string& path : paths) {
     std::error_code error;
     if (!fs::is_directory(path, error) || fs::exists(fs::path(path) / "task.ndjson", error)) {
-      add(path);
+      files_.push_back(open_file(path));
       continue;
     }
     std::set<fs::path> inside;
@@ -226,103 +292,34 @@ ViewedFiles::ViewedFiles(std::span<const std::string> paths) {
     if (inside.empty()) {
       refuse(path, "a folder without *.h5 or *.json; give recordings, maps or results");
     }
-    for (const fs::path& file : inside) {
-      add(file);
-    }
+    std::ranges::transform(inside, std::back_inserter(files_), open_file);
   }
 }
 
-void ViewedFiles::add(const fs::path& path) {
-  if (!is_hdf5(path)) {
-    files_.push_back({path, records_of(path)});
-    return;
-  }
-  require_readable(path);
-  const std::string format = read_format(path);
-  if (format == "palpate.recording") {
-    files_.push_back({path, rows_of(path)});
-  } else if (format == "palpate.map") {
-    files_.push_back({path, read_map(path)});
-  } else {
-    refuse(path,
-           "attribute 'format' = '{}'; give recordings, maps or results of recognize, live or "
-           "batch",
-           format);
-  }
-}
+ViewedFiles::~ViewedFiles() = default;
 
 std::string ViewedFiles::list() const {
-  auto json = nlohmann::ordered_json::array();
-  for (const File& file : files_) {
-    json.push_back({{"name", file.path.string()}, {"kind", kinds[file.content.index()]}});
+  auto json = Json::array();
+  for (const auto& file : files_) {
+    json.push_back({{"name", file->path.string()}, {"kind", file->kind()}});
   }
-  return line_of(json);
-}
-
-std::optional<nlohmann::ordered_json> ViewedFiles::answer(const File& file) const {
-  if (const auto* map = std::get_if<OccupancyGrid>(&file.content)) {
-    nlohmann::ordered_json json = map_json(*map);
-    json["kind"] = kinds[1];
-    return json;
-  }
-  if (const auto* records = std::get_if<Records>(&file.content)) {
-    return nlohmann::ordered_json{{"kind", kinds[2]}, {"rows", records->rows}};
-  }
-  return described(std::get<Rows>(file.content));
-}
-
-std::optional<nlohmann::ordered_json> ViewedFiles::answer(const File& file, const std::string& what,
-                                                          std::size_t index) const {
-  if (const auto* rows = std::get_if<Rows>(&file.content)) {
-    return what == "rows" && index < rows->recording.size() ? std::optional(some_of(*rows, index))
-                                                            : std::nullopt;
-  }
-  const auto* records = std::get_if<Records>(&file.content);
-  if (records == nullptr || index >= records->text.size()) {
-    return {};
-  }
-  const Json record = Json::parse(records->text[index]);
-  if (what == "record") {
-    return record;
-  }
-  if (what != "map" || !record.contains("mode")) {
-    return {};
-  }
-  // Relative to where recognize ran, which may be where this runs, or beside the results.
-  const Json& mode = record["mode"];
-  const fs::path named = text_in(mode, "map");
-  const bool mirrored = mode.contains("mirrored") && mode["mirrored"] == true;
-  for (const fs::path& path : {named, file.path.parent_path() / named}) {
-    try {
-      OccupancyGrid map = read_map(path);
-      return map_json(mirrored ? mirror_image(map) : map);
-    } catch (const Error&) {
-      // A map that is elsewhere now is not shown.
-    }
-  }
-  return {};
+  return text_of(json);
 }
 
 std::optional<std::string> ViewedFiles::get(const std::string& path) const {
-  std::vector<std::string> parts;
-  for (std::size_t at = 0; at < path.size();) {
-    const std::size_t next = std::min(path.find('/', at + 1), path.size());
-    parts.push_back(path.substr(at + 1, next - at - 1));
-    at = next;
-  }
-  const auto number = [&parts](std::size_t i) {
-    const bool whole = !parts[i].empty() && parts[i].size() < 10 &&
-                       parts[i].find_first_not_of("0123456789") == std::string::npos;
-    return whole ? std::strtoul(parts[i].c_str(), nullptr, 10)
-                 : std::numeric_limits<unsigned long>::max();
-  };
-  if ((parts.size() != 2 && parts.size() != 4) || parts[0] != "file" ||
-      number(1) >= files_.size()) {
+  static const std::regex form("/file/([0-9]{1,9})(/([a-z]+)/([0-9]{1,9}))?");
+  std::smatch asked;
+  if (!std::regex_match(path, asked, form) || std::stoul(asked[1]) >= files_.size()) {
     return {};
   }
-  const File& file = files_[number(1)];
-  const auto json = parts.size() == 2 ? answer(file) : answer(file, parts[2], number(3));
-  return json ? std::optional(line_of(*json)) : std::nullopt;
+  const ViewedFile& file = *files_[std::stoul(asked[1])];
+  if (asked[2].matched) {
+    const Json part = file.part(asked[3], std::stoul(asked[4]));
+    return part.is_null() ? std::nullopt : std::optional(text_of(part));
+  }
+  Json json{{"kind", file.kind()}};
+  json.update(file.whole());
+  return text_of(json);
 }
 
 }  // namespace palpate::cli

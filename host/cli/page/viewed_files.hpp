@@ -1,18 +1,14 @@
 #pragma once
 
-#include <filesystem>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
-#include <variant>
 #include <vector>
 
-#include <nlohmann/json.hpp>
-
-#include "palpate/occupancy_grid.hpp"
-#include "palpate/touch.hpp"
-
 namespace palpate::cli {
+
+class ViewedFile;
 
 /// Saved files, for a page to look at: recordings, maps, and what `recognize --json`, `live --json`
 /// and `batch` wrote.
@@ -21,6 +17,7 @@ class ViewedFiles {
   /// Reads the files, or of folders what they hold.
   /// @throws Error naming the first that cannot be read or is none of these
   explicit ViewedFiles(std::span<const std::string> paths);
+  ~ViewedFiles();
 
   /// [{name, kind}], kind "recording", "map" or "records", as the event "files".
   std::string list() const;
@@ -33,34 +30,7 @@ class ViewedFiles {
   std::optional<std::string> get(const std::string& path) const;
 
  private:
-  struct Records {
-    std::vector<std::string> text;  ///< JSON of each
-    nlohmann::ordered_json rows = nlohmann::ordered_json::array();
-
-    void add(const nlohmann::json& record);
-  };
-  /// Rows to look at: four digits of a pressure are shown, so float holds it.
-  struct Rows {
-    Recording recording;  ///< without pressures
-    std::size_t elements = 0;
-    std::vector<float> pressure;  ///< [n, e]
-    double largest = 0.0;         ///< of the pressures but for the last in a thousand; 0: none
-  };
-  struct File {
-    std::filesystem::path path;
-    std::variant<Rows, OccupancyGrid, Records> content;
-  };
-
-  void add(const std::filesystem::path& path);
-  static Rows rows_of(const std::filesystem::path& recording);
-  static Records records_of(const std::filesystem::path& results);
-  static nlohmann::ordered_json described(const Rows& rows);
-  static nlohmann::ordered_json some_of(const Rows& rows, std::size_t first);
-  std::optional<nlohmann::ordered_json> answer(const File& file) const;
-  std::optional<nlohmann::ordered_json> answer(const File& file, const std::string& what,
-                                               std::size_t index) const;
-
-  std::vector<File> files_;
+  std::vector<std::unique_ptr<const ViewedFile>> files_;
 };
 
 }  // namespace palpate::cli

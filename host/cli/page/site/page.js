@@ -1,11 +1,11 @@
 // Keeps what the server tells, and draws it: at most once for each picture of the screen.
 
+import { element, make } from "./elements.js";
 import { Plane } from "./plane.js";
 import { drawArray, drawBelief, drawIdentity, drawRobot, headline, numbersOfTouch, poseWords,
          truthWords } from "./panels.js";
 import { view } from "./view.js";
 
-const element = (id) => document.getElementById(id);
 const state = { setup: null, frame: null, touches: [], belief: null, next: null, maps: {},
                 name: "Palpate" };
 let paused = false;
@@ -35,50 +35,34 @@ function draw() {
   drawIdentity(state, element("identity"), element("identities"));
 }
 
-/** Puts texts into a list's items. */
-function fill(list, texts) {
-  list.replaceChildren(...texts.map((text) => {
-    const item = document.createElement("li");
-    item.textContent = text;
-    return item;
-  }));
-}
-
 function tellTouch() {
   const last = state.touches.at(-1);
-  const decision = element("decision");
-  decision.className = last ? (last.decision?.act ? "act" : "wait") : "";
-  decision.textContent =
-    last ? (last.decision?.act ? "Act" : "Touch again") : "waiting for the first touch";
+  const [decision, className] = !last ? ["waiting for the first touch", ""]
+    : last.decision?.act ? ["Act", "act"] : ["Touch again", "wait"];
+  Object.assign(element("decision"), { className, textContent: decision });
   element("headline").textContent = last ? headline(last) : "";
   element("pose").textContent = last ? poseWords(last) : "";
   element("because").textContent = last?.decision?.because ?? "";
   document.title = last ? `${last.best} ${Math.round(100 * last.identity[last.best])} %` : state.name;
-  const next = state.next?.words ? [state.next.words] : [];
   const words = last ? (last.words ?? [truthWords(last), ...(last.warnings ?? [])]) : [];
-  fill(element("words"), [...next, ...words.filter(Boolean)]);
-  element("numbers").replaceChildren(...(last ? numbersOfTouch(last) : []).flatMap((row) =>
-    row.map((text, i) => {
-      const part = document.createElement(i ? "dd" : "dt");
-      part.textContent = text;
-      return part;
-    })));
+  element("words").replaceChildren(
+    ...[state.next?.words, ...words].filter(Boolean).map((text) => make("li", {}, text)));
+  element("numbers").replaceChildren(...(last ? numbersOfTouch(last) : []).flatMap(
+    ([name, value]) => [make("dt", {}, name), make("dd", {}, value)]));
   tellTouches(last);
 }
 
 function tellTouches(last) {
   element("touches").replaceChildren(...Array.from(state.touches, (touch, i) => {
     if (!touch) return ""; // of so many touches the server keeps the last
-    const item = document.createElement("li");
     const out = last.left_out?.includes(i) ?? false;
-    item.className = out ? "out" : "";
-    item.append(`${touch.best} ${(100 * touch.identity[touch.best]).toFixed(0)} % `);
-    if (!state.setup.live) return item;
-    const button = document.createElement("button");
-    button.textContent = out ? "take in again" : "mark as bad";
-    button.setAttribute("aria-label", `touch ${i + 1}: ${button.textContent}`);
-    button.onclick = () => ask({ do: "leave out", touch: i, out: !out });
-    item.append(button);
+    const item = make("li", { className: out ? "out" : "" },
+                      `${touch.best} ${(100 * touch.identity[touch.best]).toFixed(0)} % `);
+    if (state.setup.live) {
+      const words = out ? "take in again" : "mark as bad";
+      const onclick = () => ask({ do: "leave out", touch: i, out: !out });
+      item.append(make("button", { "aria-label": `touch ${i + 1}: ${words}`, onclick }, words));
+    }
     return item;
   }));
 }
@@ -129,13 +113,8 @@ const on = {
   },
   setup(setup) {
     state.setup = setup;
-    const choices = ["most probable object", ...setup.maps].map((name, i) => {
-      const option = document.createElement("option");
-      option.value = i - 1;
-      option.textContent = name;
-      return option;
-    });
-    element("object").replaceChildren(...choices);
+    element("object").replaceChildren(...["most probable object", ...setup.maps].map(
+      (name, i) => make("option", { value: i - 1 }, name)));
   },
   frame(frame) {
     state.frame = frame;
@@ -165,14 +144,10 @@ for (const [name, take] of Object.entries(on)) {
     redraw();
   });
 }
-events.onopen = () => {
-  element("connection").textContent = "connected";
-  element("connection").className = "";
-};
-events.onerror = () => {
-  element("connection").textContent = "connection lost; trying again";
-  element("connection").className = "lost";
-};
+const tellConnection = (textContent, className) =>
+  Object.assign(element("connection"), { textContent, className });
+events.onopen = () => tellConnection("connected", "");
+events.onerror = () => tellConnection("connection lost; trying again", "lost");
 
 function pause() {
   paused = !paused;

@@ -1,6 +1,7 @@
 // What each panel draws of the page's state.
 
-import { Plane, bytesOf, imageOf, placed, prepare, rgba, theme } from "./plane.js";
+import { make } from "./elements.js";
+import { imageOf, placed, prepare, rgba, theme } from "./plane.js";
 
 // Radii of the ellipses that hold 68 and 95 % of a Gaussian over the plane.
 const ellipses = [Math.sqrt(-2 * Math.log(1 - 0.68)), Math.sqrt(-2 * Math.log(1 - 0.95))];
@@ -9,12 +10,12 @@ const degrees = (rad) => (180 / Math.PI) * rad;
 const series = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
 const noneColour = "#888888";
 
-export const percent = (p) => `${(100 * p).toFixed(p > 0.9995 || p < 0.0005 ? 0 : 1)} %`;
-export const colourOf = (state, label) =>
+const percent = (p) => `${(100 * p).toFixed(p > 0.9995 || p < 0.0005 ? 0 : 1)} %`;
+const colourOf = (state, label) =>
   label === "(none)" ? noneColour : series[state.setup.labels.indexOf(label) % series.length];
 
 /** T_robot_object to act on, [x, y, theta]. */
-export const poseOfObject = (touch) => touch.refined?.T_robot_object ?? touch.T_robot_object;
+const poseOfObject = (touch) => touch.refined?.T_robot_object ?? touch.T_robot_object;
 
 export function headline(touch) {
   const unlike = touch.fit?.verdict === "does not fit" && touch.best !== "(none)" ? "unlike " : "";
@@ -43,7 +44,7 @@ function numbersOf(text) {
 }
 
 /** The edge of an element's square: nine tenths of the way to the nearest other element. */
-export function elementEdge(elements) {
+function elementEdge(elements) {
   const [first, ...others] = elements.length ? elements : [[0, 0]];
   const nearest = Math.min(2, ...others.map((e) => Math.hypot(e[0] - first[0], e[1] - first[1])));
   return 0.9 * nearest;
@@ -58,6 +59,16 @@ function boundsOf(places, margin) {
   const lower = [0, 1].map((i) => Math.min(...places.map((p) => p[i])) - margin);
   const upper = [0, 1].map((i) => Math.max(...places.map((p) => p[i])) + margin);
   return { lower, upper };
+}
+
+/** Draws lines, each from [u, v] to the next two. */
+function strokeLines(context, ...lines) {
+  context.beginPath();
+  for (const [u, v, ...end] of lines) {
+    context.moveTo(u, v);
+    context.lineTo(...end);
+  }
+  context.stroke();
 }
 
 /** The largest pressure that has a colour of its own: of a recording's, or five thresholds. */
@@ -88,12 +99,7 @@ export function drawArray(state, plane, caption) {
       ++dead;
       context.strokeStyle = theme("--soft");
       const [[u, v], r] = [plane.pixel(element), 0.3 * edge * plane.scale];
-      context.beginPath();
-      context.moveTo(u - r, v - r);
-      context.lineTo(u + r, v + r);
-      context.moveTo(u + r, v - r);
-      context.lineTo(u - r, v + r);
-      context.stroke();
+      strokeLines(context, [u - r, v - r, u + r, v + r], [u + r, v - r, u - r, v + r]);
     } else if (value === null) {
       context.fillStyle = theme("--soft");
       context.textAlign = "center";
@@ -118,18 +124,17 @@ export function drawArray(state, plane, caption) {
     (dead ? `; crossed: ${dead} dead` : "");
 }
 
-const mapImages = new Map();
 function imageOfMap(map) {
   const key = `${theme("--occupied")}|${theme("--free")}`;
   if (map.key !== key) {
     const [occupied, free] = [numbersOf(theme("--occupied")), numbersOf(theme("--free"))];
-    mapImages.set(map, imageOf(bytesOf(map.evidence), map.nx, map.ny, (byte) => {
+    map.key = key;
+    map.image = imageOf(map.evidence, map.nx, map.ny, (byte) => {
       const part = (byte - 128) / 127;
       return [...(part > 0 ? occupied : free), 200 * Math.min(1, Math.abs(part))];
-    }));
-    map.key = key;
+    });
   }
-  return mapImages.get(map);
+  return map.image;
 }
 
 /** The elements of the array at a pose, as squares in the robot frame. */
@@ -241,12 +246,7 @@ function drawTruth(plane, touch) {
   const [u, v] = plane.pixel(truth);
   context.strokeStyle = theme("--truth");
   context.setLineDash([2, 2]);
-  context.beginPath();
-  context.moveTo(u - 9, v);
-  context.lineTo(u + 9, v);
-  context.moveTo(u, v - 9);
-  context.lineTo(u, v + 9);
-  context.stroke();
+  strokeLines(context, [u - 9, v, u + 9, v], [u, v - 9, u, v + 9]);
   context.setLineDash([]);
 }
 
@@ -259,7 +259,7 @@ export function drawBelief(state, plane, turn, caption) {
   plane.begin();
   if (belief?.xy) {
     const colour = numbersOf(theme("--pressure"));
-    const image = imageOf(bytesOf(belief.xy), belief.cells, belief.cells,
+    const image = imageOf(belief.xy, belief.cells, belief.cells,
                           (byte) => [...colour, byte]);
     plane.cells(image, belief.lower_mm, belief.cell_mm);
     const last = state.touches.at(-1);
@@ -333,14 +333,10 @@ export function drawIdentity(state, canvas, list) {
   const last = state.touches.at(-1);
   const sorted = [...state.setup.labels].sort(
     (a, b) => (last?.identity[b] ?? 0) - (last?.identity[a] ?? 0));
-  list.replaceChildren(...sorted.slice(0, 12).map((label) => {
-    const item = document.createElement("li");
-    const swatch = document.createElement("span");
-    swatch.className = "swatch";
-    swatch.style.background = colourOf(state, label);
-    item.append(swatch, last ? `${label} ${percent(last.identity[label])}` : label);
-    return item;
-  }));
+  list.replaceChildren(...sorted.slice(0, 12).map((label) => make(
+    "li", {},
+    make("span", { className: "swatch", style: `background: ${colourOf(state, label)}` }),
+    last ? `${label} ${percent(last.identity[label])}` : label)));
 }
 
 /** Names and values of what is worth reading after a touch. */

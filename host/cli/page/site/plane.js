@@ -182,9 +182,6 @@ export class Plane {
   }
 }
 
-/** Bytes of base64. */
-export const bytesOf = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
-
 /** An image of bytes; colour(byte) gives [red, green, blue, alpha]. */
 export function imageOf(bytes, nx, ny, colour) {
   const table = Array.from({ length: 256 }, (_, byte) => colour(byte));

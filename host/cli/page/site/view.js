@@ -1,6 +1,7 @@
 // Saved files: recordings row by row, maps, and tables of records.
 
-const element = (id) => document.getElementById(id);
+import { element, make } from "./elements.js";
+
 const columns = ["recording", "touches", "best", "probability", "truth", "error, mm", "fit", "act"];
 const mostRows = 500; // of a table are drawn; the filter finds the others
 const rowsAtOnce = 64; // as the server sends them
@@ -15,22 +16,18 @@ async function json(path) {
 export function view(files, state, tell) {
   const choice = element("file");
   element("files-panel").hidden = false;
-  choice.replaceChildren(...files.map(({ name, kind }, i) => {
-    const option = document.createElement("option");
-    option.value = i;
-    option.textContent = `${name} (${kind})`;
-    return option;
-  }));
+  choice.replaceChildren(...files.map(
+    ({ name, kind }, i) => make("option", { value: i }, `${name} (${kind})`)));
   const open = async () => {
     const index = Number(choice.value);
     const file = await json(`file/${index}`);
     if (!file) return;
-    Object.assign(state, { frame: null, touches: [], belief: null, next: null, maps: {} });
-    state.setup = empty();
+    Object.assign(state, nothing(), { maps: {}, name: files[index].name });
+    state.setup = { sensor: "", pressure_unit: "", elements_mm: [], valid: [], labels: [], maps: [],
+                    live: false };
     document.body.dataset.shows = file.kind;
     element("records").hidden = file.kind !== "records";
     element("scrub").hidden = true;
-    state.name = files[index].name;
     await { recording: openRecording, map: openMap, records: openRecords }[file.kind](
       { index, file, state, tell });
   };
@@ -38,10 +35,7 @@ export function view(files, state, tell) {
   open();
 }
 
-function empty() {
-  return { sensor: "", pressure_unit: "", elements_mm: [], valid: [], labels: [], maps: [],
-           live: false };
-}
+const nothing = () => ({ frame: null, touches: [], belief: null, next: null });
 
 function openMap({ file, state, tell }) {
   state.maps.alone = file;
@@ -127,39 +121,28 @@ function openRecords({ index, file, state, tell }) {
     await openRecord(await json(`file/${index}/record/${i}`),
                      await json(`file/${index}/map/${i}`), state, tell);
   };
-  element("records").querySelector("thead tr").replaceChildren(...columns.map((name, column) => {
-    const cell = document.createElement("th");
-    const button = document.createElement("button");
-    button.textContent = name;
-    button.onclick = () => {
-      order = { column, down: order?.column === column && !order.down };
-      draw();
-    };
-    cell.append(button);
-    return cell;
-  }));
+  const sortBy = (column) => {
+    order = { column, down: order?.column === column && !order.down };
+    draw();
+  };
+  element("records").querySelector("thead tr").replaceChildren(...columns.map((name, column) =>
+    make("th", {}, make("button", { onclick: () => sortBy(column) }, name))));
   filter.oninput = draw;
   draw();
   return file.rows.length ? choose(0) : undefined;
 }
 
 function line(values, chosen, choose) {
-  const row = document.createElement("tr");
-  row.tabIndex = 0;
-  row.setAttribute("aria-selected", chosen);
-  row.onclick = choose;
-  row.onkeydown = (event) => { if (event.key === "Enter") choose(); };
-  row.append(...values.map((value, column) => {
-    const cell = document.createElement("td");
-    cell.textContent = typeof value === "number" && columns[column] !== "touches"
-      ? value.toFixed(3) : value === true ? "act" : value === false ? "no" : (value ?? "");
-    return cell;
-  }));
-  return row;
+  const text = (value, column) =>
+    typeof value === "number" && columns[column] !== "touches" ? value.toFixed(3)
+      : value === true ? "act" : value === false ? "no" : (value ?? "");
+  const onkeydown = (event) => { if (event.key === "Enter") choose(); };
+  return make("tr", { tabIndex: 0, "aria-selected": chosen, onclick: choose, onkeydown },
+              ...values.map((value, column) => make("td", {}, text(value, column))));
 }
 
 async function openRecord(record, map, state, tell) {
-  Object.assign(state, { frame: null, touches: [], belief: null, next: null });
+  Object.assign(state, nothing());
   element("scrub").hidden = true;
   if (!record.identity) { // it could not be recognised
     tell();
