@@ -107,14 +107,14 @@ void DenseLikelihood::dispatch(const Group& group, const Range& range, const Sla
                                      .elements = static_cast<shaders::uint>(elements),
                                      .object_first = range.first};
   const LikelihoodPath& path = group.path;
-  const MapTable& maps = group.maps;
+  const MapTable& tables = group.tables;
+  const gpu::Buffer& maps = tables.maps.nodes();
   const std::uint32_t invocations =
       groups_of(slab.nx, path.bins_x) * groups_of(slab.row_count, path.bins_y);
   stream_.dispatch(
       path.kernel,
-      {&segments_, &contact_.nodes(), &elements_, maps.nodes().read_as(gpu::Access::table),
-       maps.nodes().read_as(gpu::Access::storage), &maps.axes(), &maps.places(),
-       &slab.log_likelihood},
+      {&segments_, &contact_.nodes(), &elements_, maps.read_as(gpu::Access::table),
+       maps.read_as(gpu::Access::storage), &tables.axes, &tables.places, &slab.log_likelihood},
       push,
       {groups_of(invocations, independent_lanes(context_.limits())), range.count,
        slab.theta_count});
@@ -203,7 +203,7 @@ std::vector<std::string> DenseLikelihood::paths() const {
 std::uint64_t DenseLikelihood::device_bytes() const {
   std::uint64_t bytes = elements_.bytes() + segments_.bytes() + contact_.nodes().bytes();
   for (const Group& group : groups_) {
-    bytes += group.maps.device_bytes();
+    bytes += group.tables.device_bytes();
   }
   return bytes;
 }

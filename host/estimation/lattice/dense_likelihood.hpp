@@ -50,7 +50,7 @@ class DenseLikelihood {
   /// Objects that a dispatch takes together.
   struct Group : MapGroup {
     LikelihoodPath path;
-    MapTable maps;
+    MapTable tables;
   };
   /// The objects of a group that a slab holds: a range of group.objects.
   struct Range {

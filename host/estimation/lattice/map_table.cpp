@@ -125,23 +125,23 @@ MapTable::MapTable(gpu::Context& context, gpu::CommandStream& stream, const MapG
                    std::span<const Hypothesis> hypotheses, const PoseLattice& lattice,
                    std::span<const std::uint32_t> first_bins, double prior,
                    const ContactTable& contact)
-    : maps_(context, group.kind.access, group.cells,
-            fmt::format("map '{}'", hypotheses[group.objects.front()].map.label)) {
-  std::vector<shaders::Split> axes;
-  std::vector<shaders::ObjectPlace> places;
+    : maps(context, group.kind.access, group.cells,
+           fmt::format("map '{}'", hypotheses[group.objects.front()].map.label)) {
+  std::vector<shaders::Split> all_axes;
+  std::vector<shaders::ObjectPlace> all_places;
   for (const std::size_t object : group.objects) {
     const OccupancyGrid& map = hypotheses[object].compared();
-    places.push_back({.first_node = maps_.add(stream, map, prior),
-                      .map_width = bordered(map.nx),
-                      .map_height = bordered(map.ny),
-                      .first_axis = static_cast<shaders::uint>(axes.size()),
-                      .first_bin = first_bins[object],
-                      .first_table_node = contact.first_node(object)});
+    all_places.push_back({.first_node = maps.add(stream, map, prior),
+                          .map_width = bordered(map.nx),
+                          .map_height = bordered(map.ny),
+                          .first_axis = static_cast<shaders::uint>(all_axes.size()),
+                          .first_bin = first_bins[object],
+                          .first_table_node = contact.first_node(object)});
     const std::vector<shaders::Split> own_axes = axes_in_cells(map, lattice);
-    axes.insert(axes.end(), own_axes.begin(), own_axes.end());
+    all_axes.insert(all_axes.end(), own_axes.begin(), own_axes.end());
   }
-  axes_ = stream.uploaded(axes, "the lattice's axes");
-  places_ = stream.uploaded(places, "the objects' places");
+  axes = stream.uploaded(all_axes, "the lattice's axes");
+  places = stream.uploaded(all_places, "the objects' places");
 }
 
 LikelihoodPath choose_path(gpu::Context& context, const PoseLattice& lattice, std::size_t objects,

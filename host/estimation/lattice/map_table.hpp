@@ -54,26 +54,21 @@ std::vector<MapGroup> group_maps(const gpu::Context& context,
                                  const PoseLattice& lattice);
 
 /// The maps of a group on the device, one after the other, and what a kernel needs to find each.
-class MapTable {
- public:
+struct MapTable {
   /// Records the upload. Beyond each map lies the prior.
   /// @param first_bins ObjectPlace::first_bin of every hypothesis
   MapTable(gpu::Context& context, gpu::CommandStream& stream, const MapGroup& group,
            std::span<const Hypothesis> hypotheses, const PoseLattice& lattice,
            std::span<const std::uint32_t> first_bins, double prior, const ContactTable& contact);
 
-  const gpu::Buffer& nodes() const { return maps_.nodes(); }
-  /// The lattice's x centres, then its y centres, in cells of each map, [object].
-  const gpu::Buffer& axes() const { return axes_; }
-  /// shaders::ObjectPlace, [object].
-  const gpu::Buffer& places() const { return places_; }
+  std::uint64_t device_bytes() const {
+    return maps.nodes().bytes() + axes.bytes() + places.bytes();
+  }
 
-  std::uint64_t device_bytes() const { return nodes().bytes() + axes_.bytes() + places_.bytes(); }
-
- private:
-  BorderedMaps maps_;
-  gpu::Buffer axes_;
-  gpu::Buffer places_;
+  BorderedMaps maps;
+  gpu::Buffer
+      axes;  ///< the lattice's x centres, then its y centres, in cells of each map, [object]
+  gpu::Buffer places;  ///< shaders::ObjectPlace, [object]
 };
 
 }  // namespace palpate
