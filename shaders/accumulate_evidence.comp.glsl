@@ -61,18 +61,14 @@ float twice_atanh_series(const float t) {
   return t * (2.0 + q * (2.0 / 3.0 + q * (2.0 / 5.0 + q * (2.0 / 7.0 + q * (2.0 / 9.0)))));
 }
 
-void main() {
-  const Tile tile = tiles[push.tile_first + gl_WorkGroupID.x];
-  const uvec2 block = gl_LocalInvocationID.xy * BLOCK_CELLS;
-  const vec2 corner = vec2(block) * push.cell_mm;
-  vec2 sum[BLOCK_CELLS][BLOCK_CELLS];
-  float part[BLOCK_CELLS][BLOCK_CELLS];
-  FOR_EACH_CELL { sum[j][i] = vec2(0.0); }
+vec2 sum[BLOCK_CELLS][BLOCK_CELLS];  // of log-odds increments, in two floats
 
-  const uint near_end = tile.first + tile.near;
-  for (uint first = tile.first; first < near_end; first += CHUNK) {
+// Adds the readings [begin, end) of the list to the sums. Far ones have small increments.
+void add(const uint begin, const uint end, const vec2 corner, const bool far) {
+  float part[BLOCK_CELLS][BLOCK_CELLS];
+  for (uint first = begin; first < end; first += CHUNK) {
     FOR_EACH_CELL { part[j][i] = 0.0; }
-    for (uint k = first; k < min(first + CHUNK, near_end); ++k) {
+    for (uint k = first; k < min(first + CHUNK, end); ++k) {
       const vec4 reading = texelFetch(readings, int(k));
       weigh(corner, reading);
       FOR_EACH_CELL {
@@ -81,22 +77,20 @@ void main() {
         // (1 + |t|) / (1 - |t|) without the cancellation in 1 - |t|.
         const float odds = (2.0 + g * (reading.w + abs(reading.z))) / (2.0 - 2.0 * g);
         part[j][i] +=
-            abs(t) < SERIES_REACH ? twice_atanh_series(t) : sign(reading.z) * log(odds);
+            far || abs(t) < SERIES_REACH ? twice_atanh_series(t) : sign(reading.z) * log(odds);
       }
     }
     FOR_EACH_CELL { sum[j][i] = two_float_add(sum[j][i], part[j][i]); }
   }
+}
 
-  const uint end = tile.first + tile.count;
-  for (uint first = near_end; first < end; first += CHUNK) {
-    FOR_EACH_CELL { part[j][i] = 0.0; }
-    for (uint k = first; k < min(first + CHUNK, end); ++k) {
-      const vec4 reading = texelFetch(readings, int(k));
-      weigh(corner, reading);
-      FOR_EACH_CELL { part[j][i] += twice_atanh_series(half_tanh(weight[j][i], reading)); }
-    }
-    FOR_EACH_CELL { sum[j][i] = two_float_add(sum[j][i], part[j][i]); }
-  }
+void main() {
+  const Tile tile = tiles[push.tile_first + gl_WorkGroupID.x];
+  const uvec2 block = gl_LocalInvocationID.xy * BLOCK_CELLS;
+  const vec2 corner = vec2(block) * push.cell_mm;
+  FOR_EACH_CELL { sum[j][i] = vec2(0.0); }
+  add(tile.first, tile.first + tile.near, corner, false);
+  add(tile.first + tile.near, tile.first + tile.count, corner, true);
 
   const uvec2 at = uvec2(tile.column, tile.row) + block;
   FOR_EACH_CELL {

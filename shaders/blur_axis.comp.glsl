@@ -14,7 +14,9 @@ layout(constant_id = 1) const uint SOURCE = BLUR_TOUCH;
 layout(constant_id = 2) const uint STEPS = 0;     // the weights reach as many bins to either side
 layout(constant_id = 3) const bool EVEN = false;  // rows have an even number of bins
 
-#include "blur_weights.glsl"
+// A Gaussian that reaches no farther has its weights in registers; another reads the table.
+const uint REGISTER_STEPS = 32;
+float weight_at[REGISTER_STEPS + 1];
 
 layout(binding = 0) uniform samplerBuffer source;      // two bins a texel
 layout(binding = 1) uniform samplerBuffer references;  // [object] log-likelihood in two floats
@@ -38,7 +40,7 @@ const int STRIDE = ALONG_X ? 2 : 1;
 const int BEGIN = ALONG_X ? -REACH - REACH % 2 : -REACH;
 
 float weight_of(const int distance) {
-  return STEPS <= BLUR_CONSTANT_STEPS ? weight_at[min(distance, int(BLUR_CONSTANT_STEPS))]
+  return STEPS <= REGISTER_STEPS ? weight_at[min(distance, int(REGISTER_STEPS))]
                                       : texelFetch(weights, distance).x;
 }
 
@@ -93,9 +95,13 @@ void main() {
   reference = texelFetch(references, int(object)).xy;
   largest = plane_max[object * push.all_thetas + theta];
 
-  fill_weights();
+  if (STEPS <= REGISTER_STEPS) {
+    [[unroll]] for (int k = 0; k <= REACH; ++k) {
+      weight_at[k] = texelFetch(weights, k).x;
+    }
+  }
   [[unroll]] for (int b = 0; b < BINS * LINES; ++b) { sum[b] = 0.0; }
-  if (STEPS <= BLUR_CONSTANT_STEPS) {
+  if (STEPS <= REGISTER_STEPS) {
     [[unroll]] for (int j = BEGIN; j < BINS + REACH; j += STRIDE) { add(j); }
   } else {
     for (int j = BEGIN; j < BINS + REACH; j += STRIDE) { add(j); }

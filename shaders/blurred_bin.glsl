@@ -1,6 +1,23 @@
 // A bin's likelihood as the passes of a blur read it. A kernel defines SOURCE and the table `source`,
 // two bins of two words a texel, before it includes this file.
 
+#include "two_float.glsl"
+
+// A pass leaves a mean likelihood relative to the largest of the plane, times exp(BLUR_LIFT), or the
+// logarithm of this, which is negative, where it lies below a limit. The limits grow from pass to
+// pass, so that what a sum leaves out below one changes no sum above the next by more than 1e-4.
+const float BLUR_LIFT = 80.0;
+const float BLUR_SMALLEST = -86.0;  // exp() of it is a normal float
+const float BLUR_LARGEST = 88.0;    // exp() of it is finite
+const float LEAST_ALONG_Y = 1e-31;
+const float LEAST_ALONG_X = 1e-25;
+const float LEAST_OF_TURNS = 1e-19;
+// Weights of a Gaussian are followed by their logarithms. Where float32 does not hold the least of
+// them, a sum that is smaller than BLUR_VAGUE, some 75 nats below the largest of the plane, is made
+// again of logarithms.
+const float LEAST_WEIGHT = 1.2e-38;
+const float BLUR_VAGUE = 100.0;
+
 const float LOWEST = -3e38;
 
 // What SOURCE names, of a bin's two words.

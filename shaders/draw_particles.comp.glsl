@@ -8,19 +8,15 @@
 #include "interface.h"
 
 layout(local_size_x_id = 0) in;
-layout(constant_id = 1) const bool PARTICLES_IN_TABLE = true;  // else in storage
-layout(constant_id = 2) const bool CUMULATIVE_IN_TABLE = true;
 
 #include "philox.glsl"
 
-layout(binding = 0) uniform isamplerBuffer particle_table;  // Particle
-layout(std430, binding = 1) readonly buffer Particles { ivec4 particle_storage[]; };
+layout(std430, binding = 0) readonly buffer Particles { Particle particles[]; };
 // [particle], the weights' sum within its block, inclusive.
-layout(binding = 2) uniform samplerBuffer cumulative_table;
-layout(std430, binding = 3) readonly buffer Cumulative { float cumulative_storage[]; };
-layout(binding = 4) uniform isamplerBuffer blocks;  // DrawBlock
-layout(std430, binding = 5) readonly buffer Shares { ObjectShare shares[]; };
-layout(std430, binding = 6) writeonly buffer Drawn { Particle drawn[]; };
+layout(std430, binding = 1) readonly buffer Cumulative { float cumulative[]; };
+layout(binding = 2) uniform isamplerBuffer blocks;  // DrawBlock
+layout(std430, binding = 3) readonly buffer Shares { ObjectShare shares[]; };
+layout(std430, binding = 4) writeonly buffer Drawn { Particle drawn[]; };
 layout(push_constant) uniform Push { DrawPush push; };
 
 const float PI = 3.14159265358979;
@@ -83,8 +79,7 @@ uint find(const uint key, const uint chance) {
   high = min(low + WEIGHT_BLOCK, push.particles) - 1;
   while (low < high) {
     const uint middle = (low + high) / 2;
-    const bool below = target < (CUMULATIVE_IN_TABLE ? texelFetch(cumulative_table, int(middle)).x
-                                                     : cumulative_storage[middle]);
+    const bool below = target < cumulative[middle];
     low = below ? low : middle + 1;
     high = below ? middle : high;
   }
@@ -92,13 +87,12 @@ uint find(const uint key, const uint chance) {
 }
 
 Particle moved(const uint ancestor, const uint particle) {
-  const ivec4 from =
-      PARTICLES_IN_TABLE ? texelFetch(particle_table, int(ancestor)) : particle_storage[ancestor];
+  const Particle from = particles[ancestor];
   const uvec4 words = random(particle, RANDOM_MOTION);
   const vec2 shift = normals(words.xy) * push.motion_mm;
   const float turn = normals(words.zw).x * push.motion_rad;
-  return Particle(uint(from.x), intBitsToFloat(from.y) + shift.x, intBitsToFloat(from.z) + shift.y,
-                  wrap(intBitsToFloat(from.w) + turn));
+  return Particle(from.object, from.x_mm + shift.x, from.y_mm + shift.y,
+                  wrap(from.theta_rad + turn));
 }
 
 void main() {

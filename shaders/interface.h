@@ -35,10 +35,6 @@ const uint FACTORS_PER_LOG = 8;
 // skip more readings; larger ones copy each reading into fewer lists.
 const int TILE_CELLS = 16;
 
-// Log-likelihood differences are clamped at -80 nats: smaller terms change no float32 sum and would
-// make exp() slow.
-const float NEGLIGIBLE = -80.0;
-
 // Texels that a lane of reduce_belief reads before it rescales its sum to a new maximum.
 const uint REDUCE_BATCH = 4;
 
@@ -141,32 +137,15 @@ struct ReducePush {
 };
 
 // What the passes of a blur read of a bin: the log-likelihood of a touch, the difference of a
-// belief from its object's largest, or what the pass along y or x has left: a mean likelihood
-// relative to the largest of the plane, times exp(BLUR_LIFT), or the logarithm of this, which is
-// negative, where it lies below a limit. The limits grow from pass to pass, so that what a sum
-// leaves out below one changes no sum above the next by more than 1e-4.
+// belief from its object's largest, or what the pass along y or x has left, see blurred_bin.glsl.
 const uint BLUR_TOUCH = 0;
 const uint BLUR_BELIEF = 1;
 const uint BLUR_ALONG_Y = 2;
 const uint BLUR_ALONG_X = 3;
-const float BLUR_LIFT = 80.0;
-const float BLUR_SMALLEST = -86.0;  // exp() of it is a normal float
-const float BLUR_LARGEST = 88.0;    // exp() of it is finite
-const float LEAST_ALONG_Y = 1e-31;
-const float LEAST_ALONG_X = 1e-25;
-const float LEAST_OF_TURNS = 1e-19;
-// Weights of a Gaussian are followed by their logarithms. Where float32 does not hold the least of
-// them, a sum that is smaller than BLUR_VAGUE, some 75 nats below the largest of the plane, is made
-// again of logarithms.
-const float LEAST_WEIGHT = 1.2e-38;
-const float BLUR_VAGUE = 100.0;
 
 // Bins of a line that an invocation of blur_axis takes; along y, of two lines.
 const uint BLUR_STRIP_X = 16;
 const uint BLUR_STRIP_Y = 8;
-
-// Weights that the kernel holds as constants; a Gaussian that reaches farther reads a table.
-const uint BLUR_CONSTANT_STEPS = 32;
 
 // The bins of a slab that holds whole planes.
 struct PlanesPush {
@@ -258,8 +237,7 @@ struct MarginalPush {
 // Number of headings with tabled cosine and sine. A theta is a heading plus a small remainder.
 const uint HEADINGS = 256;
 
-// Lanes and particles of one workgroup of sum_weights. Each lane takes consecutive particles.
-const uint WEIGHT_LANES = 64;
+// Particles of one workgroup of sum_weights.
 const uint WEIGHT_BLOCK = 1024;
 
 // How draw_particles finds a particle.
@@ -279,7 +257,7 @@ const uint RANDOM_OFFSET = 3;
 const int PARZEN_EDGE = 4;
 const int PARZEN_THETAS = 10;
 
-// A particle; its pose is relative to the region's centre. A table of them is one of ivec4.
+// A particle; its pose is relative to the region's centre.
 struct Particle {
   uint object;
   float x_mm;

@@ -19,7 +19,7 @@ layout(push_constant) uniform Push { PlanesPush push; };
 shared float largest[gl_WorkGroupSize.x];
 
 void main() {
-  const uint theta = gl_WorkGroupID.x;
+  const uint theta = gl_WorkGroupID.z;
   const uint object = gl_WorkGroupID.y;
   const uint lane = gl_LocalInvocationID.x;
   const uint plane = push.nx * push.ny;

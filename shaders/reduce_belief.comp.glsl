@@ -8,7 +8,7 @@
 // in float64 and in order, so that equal input gives equal bits.
 
 #include "interface.h"
-#include "log_pair.glsl"
+#include "two_float.glsl"
 
 layout(local_size_x_id = 0) in;  // a power of two
 layout(constant_id = 1) const uint SIDE_BY_SIDE = 8;      // lanes that read one stretch of memory

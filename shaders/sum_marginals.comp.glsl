@@ -7,7 +7,7 @@
 // both sums. The host adds the parts in order.
 
 #include "interface.h"
-#include "log_pair.glsl"
+#include "two_float.glsl"
 
 layout(local_size_x_id = 0) in;
 layout(constant_id = 1) const uint SIDE_BY_SIDE = 8;  // lanes that read one stretch of memory

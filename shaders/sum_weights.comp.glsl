@@ -8,16 +8,14 @@
 // them relies: every lane starts from exactly the sum with which the previous lane ends.
 
 #include "interface.h"
-#include "log_pair.glsl"
+#include "two_float.glsl"
 
+const uint WEIGHT_LANES = 64;  // each takes consecutive particles
 layout(local_size_x = WEIGHT_LANES) in;
 
-layout(constant_id = 0) const bool WEIGHTS_IN_TABLE = true;  // else in storage
-
-layout(binding = 0) uniform samplerBuffer log_weight_table;  // two floats
-layout(std430, binding = 1) readonly buffer LogWeights { vec2 log_weight_storage[]; };
-layout(std430, binding = 2) writeonly buffer Cumulative { float cumulative[]; };
-layout(std430, binding = 3) writeonly buffer Blocks { WeightBlock blocks[]; };
+layout(std430, binding = 0) readonly buffer LogWeights { vec2 log_weights[]; };  // two floats
+layout(std430, binding = 1) writeonly buffer Cumulative { float cumulative[]; };
+layout(std430, binding = 2) writeonly buffer Blocks { WeightBlock blocks[]; };
 layout(push_constant) uniform Push { uint particles; } push;
 
 const uint RUN = WEIGHT_BLOCK / WEIGHT_LANES;
@@ -35,9 +33,7 @@ void main() {
   vec2 most = vec2(0.0);
   [[unroll]] for (uint i = 0; i < RUN; ++i) {
     // A lane past the end repeats the last particle without counting it.
-    const uint at = min(first + i, push.particles - 1);
-    value[i] =
-        WEIGHTS_IN_TABLE ? texelFetch(log_weight_table, int(at)).xy : log_weight_storage[at];
+    value[i] = log_weights[min(first + i, push.particles - 1)];
     most = i == 0 || exceeds(value[i], most) ? value[i] : most;
   }
   largest[lane] = most;

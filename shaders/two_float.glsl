@@ -30,3 +30,16 @@ vec2 two_float_product(float a, float b) {
       (((a_high * b_high - product) + a_high * b_low) + a_low * b_high) + a_low * b_low;
   return vec2(product, error);
 }
+
+// Log-likelihood differences are clamped at -80 nats: smaller terms change no float32 sum and would
+// make exp() slow.
+const float NEGLIGIBLE = -80.0;
+
+// Compares two logarithms, each a normalised pair.
+bool exceeds(const vec2 a, const vec2 b) { return a.x > b.x || (a.x == b.x && a.y > b.y); }
+
+// exp(value - reference) of such logarithms.
+float relative(const vec2 value, const vec2 reference) {
+  precise float difference = (value.x - reference.x) + (value.y - reference.y);
+  return exp(max(difference, NEGLIGIBLE));
+}

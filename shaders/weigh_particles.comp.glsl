@@ -16,7 +16,6 @@ layout(local_size_x_id = 0) in;
 const uint BINS = 1;
 const uint FACTORS_PER_DIVISION = 1;
 
-#include "map_corners.glsl"
 #include "segment_sum.glsl"
 
 layout(binding = 2) uniform samplerBuffer turns;  // CoarseAndFine: headings, then elements
@@ -78,10 +77,7 @@ void interpolate(const int element_index) {
   const int column = clamp(cell.x, 0, object.width - 2);
   const int row = clamp(cell.y, 0, object.height - 2);
   const int node = object.first + row * object.width + column;
-  const vec4 corner = corners(node, object.width);
-  const float low = corner.x + (corner.y - corner.x) * f.x;
-  const float high = corner.z + (corner.w - corner.z) * f.x;
-  log_odds_of[0] = low + (high - low) * f.y;
+  log_odds_of[0] = between(corners(node, object.width), f);
 }
 
 void main() {

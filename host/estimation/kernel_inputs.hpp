@@ -64,7 +64,7 @@ std::vector<shaders::RotatedElement> rotated_elements(
 std::vector<shaders::Split> axes_in_cells(const OccupancyGrid& map, const PoseLattice& lattice);
 
 /// The specialization constants 0 to 6 of the kernels that evaluate the contact model: the
-/// lanes of a workgroup, then those of shaders/contact_likelihood.glsl. The model's prior must be
+/// lanes of a workgroup, then those of shaders/segment_sum.glsl. The model's prior must be
 /// set.
 std::vector<std::uint32_t> contact_constants(const gpu::Limits& limits, const ContactModel& model);
 

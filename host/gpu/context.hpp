@@ -9,7 +9,7 @@
 
 #include <vulkan/vulkan_core.h>
 
-#include "gpu/pipelines.hpp"
+#include "gpu/kernel.hpp"
 #include "model/own_process.hpp"
 #include "palpate/device.hpp"
 #include "palpate/vulkan_device.hpp"

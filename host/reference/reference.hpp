@@ -34,13 +34,21 @@
 ///   p_k         probability of bin k of the histogram
 namespace palpate::reference {
 
+// --- pose.cpp: Eq. 17-20 ---
+
 /// p_a = R(theta) p_b + t, in mm.
 glm::dvec2 transform(const Pose& T_a_b, const glm::dvec2& p_b);
 
-/// p_b = R(-theta) (p_a - t), in mm.
-glm::dvec2 transform_back(const Pose& T_a_b, const glm::dvec2& p_a);
+/// Centroid and mean squared distance from it, J, of the map's cells with log odds > 0.
+Body body_of(const OccupancyGrid& map);
 
-// --- contact.cpp: Eq. 3 ---
+/// Eq. 17-20 (Chirikjian and Zhou 1998): root mean squared displacement of the body between two
+/// poses, sqrt(|centroid difference|^2 + 2 J (1 - cos dtheta)), in mm. The map's symmetry wraps
+/// dtheta.
+double pose_error_mm(const OccupancyGrid& map, const Pose& T_object_robot_estimate,
+                     const Pose& T_object_robot_truth);
+
+// --- map.cpp: Eq. 1-6 ---
 // In Contact: e > T and e > ratio e_max. No Contact: e < T and e < ratio e_max. Unknown: otherwise.
 
 /// Eq. 3: the class of every element, [e].
@@ -48,7 +56,6 @@ std::vector<Reading> classify(const Touch& touch, const ContactClassifier& class
 /// The class of every element, with In Contact at the levels of the model's table, [e].
 std::vector<Reading> classify(const Touch& touch, const ContactModel& model);
 
-// --- map.cpp: Eq. 1, 2, 4-6 ---
 // At a distance d from an element, G'(d) = a exp(-d^2 / (2 s^2)) (Eq. 4). The element alone makes
 // p = m + (1 - m) G' In Contact, p = m - m G' with No Contact and p = m where Unknown (Eq. 5).
 
@@ -81,7 +88,7 @@ double log_likelihood(Reading reading, const MapSample& map, const ContactModel&
 double log_likelihood(const Touch& touch, const Pose& T_object_robot, const OccupancyGrid& map,
                       const ContactModel& model, std::size_t object = 0);
 
-// --- fit.cpp ---
+// --- prediction.cpp: fit and gain ---
 // At a place the map predicts reading r with probability q(r), the likelihood of r over the sum of
 // the likelihoods of all readings but Unknown. M and V are mean and variance of log-likelihood(r)
 // under q. Over the known elements, z = sum (log-likelihood(reading) - M) / sqrt(sum V).
@@ -98,6 +105,30 @@ std::optional<Fit> fit_of(std::span<const Touch> touches, const Pose& T_object_r
 std::optional<Fit> fit_of(std::span<const Touch> touches, const Pose& T_object_robot,
                           const OccupancyGrid& map, const ContactModel& model,
                           const DisplacementSd& touch_sd, std::size_t object = 0);
+
+// Given sample i of the belief, with the probability w_i, element e reads z_e with the probability
+// q(z_e | i), the likelihood of z_e over the sum of the likelihoods of all readings but Unknown;
+// f(z | i) is the mean over displacements of the product over e. Then both = sum over i and z of
+// w_i f(z | i) log(f(z | i) / f(z)) with f(z) = sum over i of w_i f(z | i).
+
+/// An object at a pose, with its probability.
+struct BeliefSample {
+  std::size_t object = 0;
+  std::size_t label = 0;
+  Pose T_object_robot;
+  double probability = 0.0;
+};
+
+/// Mutual information between one touch's readings and the unknown, in nats, by summing over all
+/// readings of the array: few elements only.
+struct Gain {
+  double identity = 0.0;  ///< about the label
+  double both = 0.0;      ///< about the sample
+};
+/// @param displacements of the sensor, of equal probability; one at 0 where touches are exact
+Gain expected_gain(std::span<const BeliefSample> samples, std::span<const OccupancyGrid> maps,
+                   const Pose& T_robot_sensor, std::span<const glm::dvec2> elements_mm,
+                   const ContactModel& model, std::span<const Pose> displacements);
 
 // --- particles.cpp: Eq. 8-12 ---
 
@@ -192,41 +223,5 @@ Mode mode(const Posterior& posterior);
 std::vector<double> marginal_xy(const Posterior& posterior, int object);
 /// Probability of every theta of one object, [ntheta].
 std::vector<double> marginal_theta(const Posterior& posterior, int object);
-
-// --- gain.cpp ---
-// Given sample i of the belief, with the probability w_i, element e reads z_e with the probability
-// q(z_e | i), the likelihood of z_e over the sum of the likelihoods of all readings but Unknown;
-// f(z | i) is the mean over displacements of the product over e. Then both = sum over i and z of
-// w_i f(z | i) log(f(z | i) / f(z)) with f(z) = sum over i of w_i f(z | i).
-
-/// An object at a pose, with its probability.
-struct BeliefSample {
-  std::size_t object = 0;
-  std::size_t label = 0;
-  Pose T_object_robot;
-  double probability = 0.0;
-};
-
-/// Mutual information between one touch's readings and the unknown, in nats, by summing over all
-/// readings of the array: few elements only.
-struct Gain {
-  double identity = 0.0;  ///< about the label
-  double both = 0.0;      ///< about the sample
-};
-/// @param displacements of the sensor, of equal probability; one at 0 where touches are exact
-Gain expected_gain(std::span<const BeliefSample> samples, std::span<const OccupancyGrid> maps,
-                   const Pose& T_robot_sensor, std::span<const glm::dvec2> elements_mm,
-                   const ContactModel& model, std::span<const Pose> displacements);
-
-// --- pose_error.cpp: Eq. 17-20 ---
-
-/// Centroid and mean squared distance from it, J, of the map's cells with log odds > 0.
-Body body_of(const OccupancyGrid& map);
-
-/// Eq. 17-20 (Chirikjian and Zhou 1998): root mean squared displacement of the body between two
-/// poses, sqrt(|centroid difference|^2 + 2 J (1 - cos dtheta)), in mm. The map's symmetry wraps
-/// dtheta.
-double pose_error_mm(const OccupancyGrid& map, const Pose& T_object_robot_estimate,
-                     const Pose& T_object_robot_truth);
 
 }  // namespace palpate::reference

@@ -22,14 +22,6 @@ namespace palpate {
 
 namespace {
 
-/// Returns the strokes of 'A'..'Z' or '0'..'9', 25 mm high and 4.5 mm wide, with the glyph's
-/// bounding box centred on the origin; none for any other character.
-std::vector<Shape::Stroke> glyph_strokes(char character);
-
-/// Returns an elliptical arc as a polyline, counter-clockwise where to_deg > from_deg.
-std::vector<glm::dvec2> arc(const glm::dvec2& centre_mm, const glm::dvec2& radii_mm,
-                            double from_deg, double to_deg);
-
 constexpr double width_mm = 4.5;
 /// Half the height between the centre lines of the top and the bottom stroke.
 constexpr double h = (25.0 - width_mm) / 2.0;
@@ -106,6 +98,7 @@ void centre(std::vector<Shape::Stroke>& strokes) {
   }
 }
 
+/// Returns an elliptical arc as a polyline, counter-clockwise where to_deg > from_deg.
 std::vector<glm::dvec2> arc(const glm::dvec2& centre_mm, const glm::dvec2& radii_mm,
                             double from_deg, double to_deg) {
   // Chords of 2 degrees lie within 0.002 mm of the largest glyph's circle.
@@ -118,6 +111,8 @@ std::vector<glm::dvec2> arc(const glm::dvec2& centre_mm, const glm::dvec2& radii
   return points;
 }
 
+/// Returns the strokes of 'A'..'Z' or '0'..'9', 25 mm high and 4.5 mm wide, with the glyph's
+/// bounding box centred on the origin; none for any other character.
 std::vector<Shape::Stroke> glyph_strokes(char character) {
   const auto glyph = centre_lines.find(character);
   if (glyph == centre_lines.end()) {

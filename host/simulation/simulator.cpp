@@ -21,6 +21,10 @@ namespace palpate {
 
 namespace {
 
+constexpr double pitch_mm = 6.8;             ///< of the training grid
+constexpr double reach_mm = 1.5 * pitch_mm;  ///< outermost of the 4 positions
+constexpr double turn_rad = 2.0 * std::numbers::pi;
+
 /// Radius at which the point spread is cut off, in standard deviations: 6e-7 of it lies beyond.
 constexpr double reach = 5.0;
 
@@ -140,26 +144,25 @@ class DisplacementField {
   std::vector<double> values_;  ///< [ny, nx]
 };
 
-enum class Zero { allowed, refused };
-
-void require(const char* field, double value, Zero zero) {
-  // The bound is far beyond any sensor and keeps the arithmetic finite. NaN is refused too.
-  constexpr double largest = 1e6;
-  const bool above_lower_end = zero == Zero::allowed ? value >= 0.0 : value > 0.0;
-  if (!above_lower_end || value > largest) {
-    throw Error(Fault::input,
-                fmt::format("sensor {} = {}: give a number {} 0, at most {}", field, value,
-                            zero == Zero::allowed ? "from" : "above", largest));
-  }
-}
-
 void validate(const SensorModel& model) {
-  require("psf_mm", model.psf_mm, Zero::allowed);
-  require("element_mm", model.element_mm, Zero::refused);
-  require("pressure_kpa", model.pressure_kpa, Zero::refused);
-  require("force_spread", model.force_spread, Zero::allowed);
-  require("gain_spread", model.gain_spread, Zero::allowed);
-  require("noise_kpa", model.noise_kpa, Zero::allowed);
+  // The bound is far beyond any sensor and keeps the arithmetic finite.
+  constexpr double largest = 1e6;
+  struct Field {
+    const char* name;
+    double value;
+    bool may_be_0;
+  };
+  for (const auto& [name, value, may_be_0] :
+       {Field{"psf_mm", model.psf_mm, true}, Field{"element_mm", model.element_mm, false},
+        Field{"pressure_kpa", model.pressure_kpa, false},
+        Field{"force_spread", model.force_spread, true},
+        Field{"gain_spread", model.gain_spread, true}, Field{"noise_kpa", model.noise_kpa, true}}) {
+    // Written so that NaN is refused.
+    if (!(may_be_0 ? value >= 0.0 : value > 0.0) || value > largest) {
+      throw Error(Fault::input, fmt::format("sensor {} = {}: give a number {} 0, at most {}", name,
+                                            value, may_be_0 ? "from" : "above", largest));
+    }
+  }
 }
 
 void validate(const std::vector<glm::dvec2>& elements_mm) {
@@ -235,14 +238,6 @@ Recording Simulator::touch(const std::vector<Pose>& T_robot_sensor, const Pose& 
   }
   return recording;
 }
-
-namespace {
-
-constexpr double pitch_mm = 6.8;
-constexpr double reach_mm = 1.5 * pitch_mm;  ///< outermost of the 4 positions
-constexpr double turn_rad = 2.0 * std::numbers::pi;
-
-}  // namespace
 
 std::vector<Pose> training_grid() {
   constexpr int angles = 12;

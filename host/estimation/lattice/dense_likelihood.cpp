@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <initializer_list>
 #include <utility>
 
 #include <fmt/format.h>
@@ -12,8 +11,7 @@
 #include "estimation/kernel_sizes.hpp"
 #include "model/log_message.hpp"
 #include "palpate/error.hpp"
-#include "shaders/accumulate_rows.hpp"
-#include "shaders/accumulate_tiles.hpp"
+#include "shaders/accumulate_likelihood.hpp"
 #include "shaders/interface.h"
 
 namespace palpate {
@@ -62,7 +60,8 @@ std::size_t axis_bins(const PoseLattice& lattice) {
 constexpr std::uint32_t longest_run = 8;
 constexpr std::uint32_t longest_edge = 5;
 
-/// Neighbouring bins that an invocation takes, which together span at most `cells` cells.
+/// Neighbouring bins that an invocation takes, which together span at most `cells` cells; of a run,
+/// 0.
 struct Tile {
   std::uint32_t cells = 0;
   std::uint32_t x = 0;
@@ -104,22 +103,6 @@ std::uint32_t run_for(std::uint32_t nx, std::uint32_t longest) {
     }
   }
   return best;
-}
-
-/// @param shape what this kernel alone is specialised by
-gpu::Kernel kernel_of(gpu::Context& context, const char* name, std::span<const std::uint32_t> spirv,
-                      const MapKind& maps, const ContactModel& model,
-                      std::initializer_list<std::uint32_t> shape) {
-  std::vector<std::uint32_t> constants = contact_constants(context.limits(), model);
-  constants.push_back(maps.access == Access::table ? 1U : 0U);
-  constants.insert(constants.end(), shape);
-  return {context,
-          {.name = name,
-           .spirv = spirv,
-           .bindings = {Access::table, Access::table, Access::table, Access::table, Access::storage,
-                        Access::storage, Access::storage, Access::storage},
-           .push_bytes = sizeof(shaders::LikelihoodPush),
-           .constants = constants}};
 }
 
 /// Puts every hypothesis's map into a group. Throws Error where a map, or the lattice along x and
@@ -174,30 +157,37 @@ LikelihoodPath choose_path(gpu::Context& context, const PoseLattice& lattice, st
       wide.bins() >= 2 * tile.bins()) {
     tile = wide;
   }
-  if (tile.bins() >= least_bins(limits)) {
-    const auto bits = [](double value) {
-      return std::bit_cast<std::uint32_t>(static_cast<float>(value));
-    };
-    return {
-        .kernel = kernel_of(context, "accumulate_tiles", shaders::accumulate_tiles, maps, model,
-                            {tile.x, tile.y, bits(step_cells.x), bits(step_cells.y), tile.cells}),
-        .bins_x = tile.x,
-        .bins_y = tile.y,
-        .description = fmt::format("register tiles of {} x {} bins over {} of a side: the "
-                                   "lattice's step is {:.3g} x {:.3g} of a map cell",
-                                   tile.x, tile.y, tile.cells == 1 ? "one cell" : "two cells",
-                                   step_cells.x, step_cells.y)};
+  const bool tiled = tile.bins() >= least_bins(limits);
+  if (!tiled) {
+    const auto nx = static_cast<std::uint32_t>(lattice.x_mm.count);
+    tile = {.cells = 0, .x = run_for(nx, std::min(longest_run, most_bins)), .y = 1};
   }
-  const std::uint32_t run =
-      run_for(static_cast<std::uint32_t>(lattice.x_mm.count), std::min(longest_run, most_bins));
+  const auto step_bits = [&](double step) {
+    return std::bit_cast<std::uint32_t>(tiled ? static_cast<float>(step) : 0.0F);
+  };
+  std::vector<std::uint32_t> constants = contact_constants(limits, model);
+  constants.insert(constants.end(), {maps.access == Access::table ? 1U : 0U, tile.x, tile.y,
+                                     step_bits(step_cells.x), step_bits(step_cells.y), tile.cells});
   return {
-      .kernel = kernel_of(context, "accumulate_rows", shaders::accumulate_rows, maps, model, {run}),
-      .bins_x = run,
-      .bins_y = 1,
-      .description = fmt::format("runs of {} bins: at a lattice step of {:.3g} x {:.3g} map "
-                                 "cells fewer bins than a tile needs lie side by side{}",
-                                 run, step_cells.x, step_cells.y,
-                                 limits.cpu ? "" : ", or tiles leave the GPU idle")};
+      .kernel = gpu::Kernel(context, {.name = "accumulate_likelihood",
+                                      .spirv = shaders::accumulate_likelihood,
+                                      .bindings = {Access::table, Access::table, Access::table,
+                                                   Access::table, Access::storage, Access::storage,
+                                                   Access::storage, Access::storage},
+                                      .push_bytes = sizeof(shaders::LikelihoodPush),
+                                      .constants = constants}),
+      .bins_x = tile.x,
+      .bins_y = tile.y,
+      .description =
+          tiled
+              ? fmt::format("register tiles of {} x {} bins over {} of a side: the lattice's step "
+                            "is {:.3g} x {:.3g} of a map cell",
+                            tile.x, tile.y, tile.cells == 1 ? "one cell" : "two cells",
+                            step_cells.x, step_cells.y)
+              : fmt::format("runs of {} bins: at a lattice step of {:.3g} x {:.3g} map cells "
+                            "fewer bins than a tile needs lie side by side{}",
+                            tile.x, step_cells.x, step_cells.y,
+                            limits.cpu ? "" : ", or tiles leave the GPU idle")};
 }
 
 }  // namespace

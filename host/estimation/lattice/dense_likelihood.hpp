@@ -19,9 +19,8 @@
 
 namespace palpate {
 
-/// A way to evaluate the likelihood over the lattice, for maps of one cell size: a kernel of which
-/// an invocation takes bins_x x bins_y bins of one theta. All of them bind the buffers of
-/// shaders/likelihood_buffers.glsl.
+/// A way to evaluate the likelihood over the lattice, for maps of one cell size: the
+/// kernel accumulate_likelihood, of which an invocation takes bins_x x bins_y bins of one theta.
 struct LikelihoodPath {
   gpu::Kernel kernel;
   std::uint32_t bins_x = 1;

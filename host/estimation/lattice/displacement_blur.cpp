@@ -1,7 +1,6 @@
 #include "estimation/lattice/displacement_blur.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -18,7 +17,6 @@ namespace {
 
 using gpu::Access;
 
-constexpr std::uint32_t rows_of_a_turn = 4;  // of an invocation of sum_turns
 /// Farther than any lattice has bins, yet whole numbers are exact.
 constexpr double farthest = 1 << 23;
 
@@ -117,39 +115,42 @@ gpu::Buffer maxima_buffer(gpu::Context& context, std::uint64_t count) {
           gpu::table_where_it_fits(context.limits(), bytes, VK_FORMAT_R32_SFLOAT)};
 }
 
-/// Whether no object's bins are cut into parts.
-bool objects_in_one_slab(const gpu::Context& context, const PoseLattice& lattice,
-                         std::size_t objects) {
-  const std::vector<SlabExtent> slabs = DenseBelief::cut(context, lattice, objects);
-  return std::all_of(slabs.begin(), slabs.end(), [&](const SlabExtent& slab) {
-    return static_cast<int>(slab.theta_count) == lattice.theta_rad.count;
-  });
-}
-
-/// Throws Error where the blur would need parts of an object's bins that no dispatch has at hand.
-void require_whole_planes(const gpu::Context& context, const PoseLattice& lattice,
-                          std::size_t objects, std::uint32_t lanes, int theta_steps) {
+/// Into how many slabs every object's bins are cut. Throws Error where these are parts that no
+/// dispatch has at hand.
+std::size_t slabs_of_an_object(const gpu::Context& context, const PoseLattice& lattice,
+                               std::size_t objects, std::uint32_t lanes, int theta_steps) {
   const auto most_bins = std::int64_t{gpu::most_iterations} * lanes;
-  std::uint32_t shortest = static_cast<std::uint32_t>(lattice.theta_rad.count);
-  std::size_t parts_of_first = 0;
-  bool whole = lattice.plane() <= most_bins;
+  auto shortest = static_cast<std::uint32_t>(lattice.theta_rad.count);
+  std::size_t of_first = 0;
+  bool whole_planes = lattice.plane() <= most_bins;
   for (const SlabExtent& slab : DenseBelief::cut(context, lattice, objects)) {
-    whole = whole && static_cast<int>(slab.row_count) == lattice.y_mm.count;
+    whole_planes = whole_planes && static_cast<int>(slab.row_count) == lattice.y_mm.count;
     shortest = std::min(shortest, slab.theta_count);
-    parts_of_first += slab.holds(0) ? 1 : 0;
+    of_first += slab.holds(0) ? 1 : 0;
   }
-  if (!whole) {
+  if (!whole_planes) {
     throw Error(Fault::input,
                 fmt::format("bins x times y = {}: device '{}' blurs at most {} for uncertain "
                             "touches, slips and \"none of these\"; use fewer",
                             lattice.plane(), context.name(), most_bins));
   }
   // Where there are two parts, one is the other's neighbour on both sides.
-  if (parts_of_first > 2 && static_cast<std::uint32_t>(theta_steps) > shortest) {
+  if (of_first > 2 && static_cast<std::uint32_t>(theta_steps) > shortest) {
     throw Error(Fault::input,
                 fmt::format("a standard deviation of theta reaches {} bins, more than the {} of a "
                             "part of an object's bins on device '{}'; use fewer bins",
                             theta_steps, shortest, context.name()));
+  }
+  return of_first;
+}
+
+void require_short_loops(const Axis& axis, double sd_mm) {
+  // A loop over the bins of a strip and over the steps, and other loops.
+  const int steps = std::min(blur_steps(axis, sd_mm), axis.count - 1);
+  if (int{shaders::BLUR_STRIP_X} * (2 * steps + 1) > int{gpu::most_iterations}) {
+    throw Error(
+        Fault::input,
+        fmt::format("a standard deviation of {} mm reaches {} bins; use fewer bins", sd_mm, steps));
   }
 }
 
@@ -161,11 +162,9 @@ DisplacementBlur::DisplacementBlur(gpu::Context& context, gpu::CommandStream& st
                                    std::span<const glm::dvec2> slip_centroids_mm)
     : context_(context),
       stream_(stream),
-      lattice_(lattice),
+      weights_(lattice, sd),
       objects_(objects),
-      sd_(sd),
       slips_(!slip_centroids_mm.empty()),
-      theta_steps_(blur_steps(lattice.theta_rad, sd.rad)),
       lanes_(independent_lanes(context.limits())),
       max_planes_(context, {.name = "max_planes",
                             .spirv = shaders::max_planes,
@@ -175,24 +174,18 @@ DisplacementBlur::DisplacementBlur(gpu::Context& context, gpu::CommandStream& st
       along_y_(make_pass(lattice.y_mm, false)),
       along_x_(make_pass(lattice.x_mm, true)),
       // A slip takes each bin from a place of its own: neighbours share no reads.
-      turn_rows_(slips_ ? 1 : rows_of_a_turn),
+      turn_rows_(slips_ ? 1 : 4),
       turn_columns_(slips_ ? 1 : 2),
-      turns_(turn_buffer(context, turns_of(lattice, objects, theta_steps_))),
-      plane_max_(
-          maxima_buffer(context, planes() + 2 * (static_cast<std::size_t>(theta_steps_) + 1))),
+      turns_(turn_buffer(context, turns_of(lattice, objects, weights_.theta_steps()))),
+      plane_max_(maxima_buffer(
+          context, planes() + 2 * (static_cast<std::size_t>(weights_.theta_steps()) + 1))),
       references_(context, objects * sizeof(TwoFloat), gpu::Memory::device, "maxima of objects",
                   VK_FORMAT_R32G32_SFLOAT),
-      host_turns_(slip_turns(lattice, slip_centroids_mm, theta_steps_)) {
-  require_whole_planes(context, lattice, objects, lanes_, theta_steps_);
-  for (const Axis& axis : {lattice.x_mm, lattice.y_mm}) {
-    // A loop over the bins of a strip and over the steps, and other loops.
-    const int steps = std::min(blur_steps(axis, sd.mm), axis.count - 1);
-    if (int{shaders::BLUR_STRIP_X} * (2 * steps + 1) > int{gpu::most_iterations}) {
-      throw Error(Fault::input,
-                  fmt::format("a standard deviation of {} mm reaches {} bins; use fewer bins",
-                              sd.mm, steps));
-    }
-  }
+      host_turns_(slip_turns(lattice, slip_centroids_mm, weights_.theta_steps())) {
+  const std::size_t slabs =
+      slabs_of_an_object(context, lattice, objects, lanes_, weights_.theta_steps());
+  require_short_loops(lattice.x_mm, sd.mm);
+  require_short_loops(lattice.y_mm, sd.mm);
   sum_turns_ = gpu::Kernel(
       context,
       {.name = "sum_turns",
@@ -202,39 +195,34 @@ DisplacementBlur::DisplacementBlur(gpu::Context& context, gpu::CommandStream& st
        .push_bytes = sizeof(shaders::TurnPush),
        .constants = {lanes_, slips_ ? 1U : 0U, turn_rows_,
                      blurs_planes() ? shaders::BLUR_ALONG_X : shaders::BLUR_TOUCH,
-                     objects_in_one_slab(context, lattice, objects) ? 1U : 0U,
-                     turns_.is_table() ? 1U : 0U, plane_max_.is_table() ? 1U : 0U}});
+                     slabs == 1 ? 1U : 0U, turns_.is_table() ? 1U : 0U,
+                     plane_max_.is_table() ? 1U : 0U}});
   std::vector<double> of_turns;
-  for (int k = 0; k <= theta_steps_; ++k) {
+  for (int k = 0; k <= weights_.theta_steps(); ++k) {
     of_turns.push_back(blur_weight(k, lattice.theta_rad, sd.rad));
   }
   stream.upload(plane_max_, with_logs(of_turns), planes() * sizeof(float));
 }
 
 DisplacementBlur::Pass DisplacementBlur::make_pass(const Axis& axis, bool along_x) {
-  const AxisBlur blur(axis, sd_.mm, 1);
-  std::vector<std::uint32_t> constants{lanes_, along_x ? shaders::BLUR_ALONG_Y : source(),
-                                       static_cast<std::uint32_t>(blur.steps),
-                                       lattice_.x_mm.count % 2 == 0 ? 1U : 0U};
-  for (std::size_t k = 0; k <= shaders::BLUR_CONSTANT_STEPS; ++k) {
-    const double weight = k < blur.weight.size() ? blur.weight[k] : 0.0;
-    constants.push_back(std::bit_cast<std::uint32_t>(static_cast<float>(weight)));
-  }
+  const AxisBlur blur(axis, weights_.sd().mm, 1);
   const std::int64_t strips =
       groups_of(axis.count, along_x ? shaders::BLUR_STRIP_X : shaders::BLUR_STRIP_Y);
-  return {
-      .kernel =
-          gpu::Kernel(context_, {.name = "blur_axis",
-                                 .spirv = shaders::blur_axis,
-                                 .bindings = {Access::table, Access::table, Access::storage,
-                                              Access::table, Access::storage, Access::storage},
-                                 .push_bytes = sizeof(shaders::PlanesPush),
-                                 .constants = constants}),
-      .weights =
-          stream_.uploaded(with_logs(blur.weight), "weights of a blur", VK_FORMAT_R32_SFLOAT),
-      .norms = stream_.uploaded(std::vector<float>(blur.scale.begin(), blur.scale.end()),
-                                "weights of a blur"),
-      .invocations = strips * (along_x ? lattice_.y_mm.count : groups_of(lattice_.x_mm.count, 2))};
+  const Axis& x = lattice().x_mm;
+  return {.kernel = gpu::Kernel(
+              context_,
+              {.name = "blur_axis",
+               .spirv = shaders::blur_axis,
+               .bindings = {Access::table, Access::table, Access::storage, Access::table,
+                            Access::storage, Access::storage},
+               .push_bytes = sizeof(shaders::PlanesPush),
+               .constants = {lanes_, along_x ? shaders::BLUR_ALONG_Y : source(),
+                             static_cast<std::uint32_t>(blur.steps), x.count % 2 == 0 ? 1U : 0U}}),
+          .weights =
+              stream_.uploaded(with_logs(blur.weight), "weights of a blur", VK_FORMAT_R32_SFLOAT),
+          .norms = stream_.uploaded(std::vector<float>(blur.scale.begin(), blur.scale.end()),
+                                    "weights of a blur"),
+          .invocations = strips * (along_x ? lattice().y_mm.count : groups_of(x.count, 2))};
 }
 
 std::uint64_t DisplacementBlur::device_bytes() const {
@@ -242,48 +230,49 @@ std::uint64_t DisplacementBlur::device_bytes() const {
          along_y_.norms.bytes() + turns_.bytes() + plane_max_.bytes() + references_.bytes();
 }
 
+std::array<std::uint32_t, 3> DisplacementBlur::groups(std::int64_t lanes, const Slab& slab) const {
+  if (warming_up_) {
+    return {1, 1, 1};
+  }
+  return {groups_of(lanes, lanes_), slab.object_count, slab.theta_count};
+}
+
 void DisplacementBlur::run_pass(const Pass& pass, const DenseBelief& from,
-                                const DenseBelief& scratch, bool few_groups) {
+                                const DenseBelief& scratch) {
   for (std::size_t i = 0; i < scratch.slabs().size(); ++i) {
     const Slab& slab = scratch.slabs()[i];
-    const std::array<std::uint32_t, 3> groups{groups_of(pass.invocations, lanes_),
-                                              slab.object_count, slab.theta_count};
     stream_.dispatch(pass.kernel,
                      {&from.slabs()[i].log_likelihood, &references_, &plane_max_, &pass.weights,
                       &pass.norms, &slab.log_likelihood},
-                     planes_of(slab, lattice_.theta_rad.count),
-                     few_groups ? std::array<std::uint32_t, 3>{1, 1, 1} : groups);
+                     planes_of(slab, lattice().theta_rad.count), groups(pass.invocations, slab));
   }
 }
 
 void DisplacementBlur::blur_planes(const DenseBelief& from, const DenseBelief& scratch,
-                                   std::span<const TwoFloat> references, bool few_groups) {
+                                   std::span<const TwoFloat> references) {
   stream_.upload(references_, references);
-  for (std::size_t i = 0; i < scratch.slabs().size(); ++i) {
-    const Slab& slab = scratch.slabs()[i];
-    stream_.dispatch(max_planes_, {&from.slabs()[i].log_likelihood, &references_, &plane_max_},
-                     planes_of(slab, lattice_.theta_rad.count),
-                     few_groups
-                         ? std::array<std::uint32_t, 3>{1, 1, 1}
-                         : std::array<std::uint32_t, 3>{slab.theta_count, slab.object_count, 1});
+  for (const Slab& slab : from.slabs()) {
+    stream_.dispatch(max_planes_, {&slab.log_likelihood, &references_, &plane_max_},
+                     planes_of(slab, lattice().theta_rad.count), groups(lanes_, slab));
   }
   if (blurs_planes()) {
-    run_pass(along_y_, from, scratch, few_groups);
-    run_pass(along_x_, scratch, scratch, few_groups);
+    run_pass(along_y_, from, scratch);
+    run_pass(along_x_, scratch, scratch);
   }
 }
 
 void DisplacementBlur::turn_for(const glm::dvec2& sensor_from_pivot_mm) {
-  const auto turns = 2 * static_cast<std::size_t>(theta_steps_) + 1;
-  const auto thetas = static_cast<std::size_t>(lattice_.theta_rad.count);
+  const int steps = weights_.theta_steps();
+  const int thetas = lattice().theta_rad.count;
+  const int turns = 2 * steps + 1;
   constexpr auto beyond = static_cast<float>(farthest);
-  host_turns_.assign(thetas * turns, {.whole_x = beyond, .whole_y = beyond});
-  const DisplacementWeights weights(lattice_, sd_);
-  for (std::size_t t = 0; t < thetas; ++t) {
-    weights.find_taps(static_cast<int>(t), sensor_from_pivot_mm, taps_);
+  host_turns_.assign(static_cast<std::size_t>(thetas) * turns,
+                     {.whole_x = beyond, .whole_y = beyond});
+  for (int theta = 0; theta < thetas; ++theta) {
+    weights_.find_taps(theta, sensor_from_pivot_mm, taps_);
     for (const Tap& tap : taps_) {
       shaders::Turn& turn =
-          host_turns_[t * turns + static_cast<std::size_t>(tap.steps + theta_steps_)];
+          host_turns_[static_cast<std::size_t>(theta) * turns + tap.steps + steps];
       turn.whole_x = static_cast<float>(tap.bins.x);
       turn.whole_y = static_cast<float>(tap.bins.y);
       turn.fraction_x = static_cast<float>(tap.fraction.x);
@@ -292,10 +281,9 @@ void DisplacementBlur::turn_for(const glm::dvec2& sensor_from_pivot_mm) {
   }
 }
 
-void DisplacementBlur::sum_turns(const DenseBelief& scratch, const DenseBelief& belief,
-                                 bool few_groups) {
+void DisplacementBlur::sum_turns(const DenseBelief& scratch, const DenseBelief& belief) {
   stream_.upload(turns_, host_turns_);
-  const auto thetas = static_cast<std::uint32_t>(lattice_.theta_rad.count);
+  const auto thetas = static_cast<std::uint32_t>(lattice().theta_rad.count);
   const std::span<const Slab> slabs = scratch.slabs();
   for (std::size_t i = 0; i < slabs.size(); ++i) {
     const Slab& slab = slabs[i];
@@ -303,9 +291,9 @@ void DisplacementBlur::sum_turns(const DenseBelief& scratch, const DenseBelief& 
         slab_with(slabs, slab.object_first, (slab.theta_first + thetas - 1) % thetas);
     const Slab& after =
         slab_with(slabs, slab.object_first, (slab.theta_first + slab.theta_count) % thetas);
-    const shaders::TurnPush push{.slab = planes_of(slab, lattice_.theta_rad.count),
-                                 .steps = static_cast<shaders::uint>(theta_steps_),
-                                 .around = lattice_.full_circle() ? 1U : 0U,
+    const shaders::TurnPush push{.slab = planes_of(slab, lattice().theta_rad.count),
+                                 .steps = static_cast<shaders::uint>(weights_.theta_steps()),
+                                 .around = lattice().full_circle() ? 1U : 0U,
                                  .theta_before = before.theta_first,
                                  .thetas_before = before.theta_count,
                                  .theta_after = after.theta_first,
@@ -317,11 +305,7 @@ void DisplacementBlur::sum_turns(const DenseBelief& scratch, const DenseBelief& 
                       &references_, turns_.read_as(Access::table), turns_.read_as(Access::storage),
                       plane_max_.read_as(Access::table), plane_max_.read_as(Access::storage),
                       &belief.slabs()[i].log_likelihood},
-                     push,
-                     few_groups
-                         ? std::array<std::uint32_t, 3>{1, 1, 1}
-                         : std::array<std::uint32_t, 3>{groups_of(invocations, lanes_),
-                                                        slab.object_count, slab.theta_count});
+                     push, groups(invocations, slab));
   }
 }
 
@@ -330,8 +314,10 @@ void DisplacementBlur::warm_up(const DenseBelief& scratch, const DenseBelief& be
   if (!slips_) {
     turn_for({});
   }
-  blur_planes(slips_ ? belief : scratch, scratch, references, true);
-  sum_turns(scratch, belief, true);
+  warming_up_ = true;
+  blur_planes(slips_ ? belief : scratch, scratch, references);
+  sum_turns(scratch, belief);
+  warming_up_ = false;
 }
 
 }  // namespace palpate

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -36,16 +37,15 @@ class DisplacementBlur {
   /// @param scratch holds the result
   /// @param references a log-likelihood of every object that values are relative to: 0 for a touch,
   /// the largest of a belief
-  /// @param few_groups one workgroup of each kernel, to no use but that drivers compile it
   void blur_planes(const DenseBelief& from, const DenseBelief& scratch,
-                   std::span<const TwoFloat> references, bool few_groups = false);
+                   std::span<const TwoFloat> references);
   /// Sets where touches are taken from as theta grows by k steps: t + (R(theta) - R(theta + alpha))
   /// r.
   /// @param sensor_from_pivot_mm r: the sensor's origin relative to the pivot, in the robot frame
   void turn_for(const glm::dvec2& sensor_from_pivot_mm);
   /// Records the sum over thetas of what blur_planes() has left in `scratch`: adds it to the belief
   /// (a touch), or replaces the belief by it.
-  void sum_turns(const DenseBelief& scratch, const DenseBelief& belief, bool few_groups = false);
+  void sum_turns(const DenseBelief& scratch, const DenseBelief& belief);
   /// Runs every kernel once, on a workgroup each: drivers compile them then, and no touch has to
   /// wait for that. What the beliefs hold afterwards is of no use.
   void warm_up(const DenseBelief& scratch, const DenseBelief& belief);
@@ -59,30 +59,31 @@ class DisplacementBlur {
     std::int64_t invocations = 0;  ///< of a plane
   };
 
+  const PoseLattice& lattice() const { return weights_.lattice(); }
   std::size_t planes() const {
-    return objects_ * static_cast<std::size_t>(lattice_.theta_rad.count);
+    return objects_ * static_cast<std::size_t>(lattice().theta_rad.count);
   }
   /// A touch that is not displaced along x and y stays as it is; of a belief, the difference from
   /// its largest is wanted.
-  bool blurs_planes() const { return sd_.mm > 0.0 || slips_; }
+  bool blurs_planes() const { return weights_.sd().mm > 0.0 || slips_; }
   std::uint32_t source() const { return slips_ ? shaders::BLUR_BELIEF : shaders::BLUR_TOUCH; }
   Pass make_pass(const Axis& axis, bool along_x);
-  void run_pass(const Pass& pass, const DenseBelief& from, const DenseBelief& scratch,
-                bool few_groups);
+  void run_pass(const Pass& pass, const DenseBelief& from, const DenseBelief& scratch);
+  /// Workgroups for so many lanes in each plane of a slab; one while kernels are only compiled.
+  std::array<std::uint32_t, 3> groups(std::int64_t lanes, const Slab& slab) const;
 
   gpu::Context& context_;
   gpu::CommandStream& stream_;
-  PoseLattice lattice_;
+  DisplacementWeights weights_;
   std::size_t objects_;
-  DisplacementSd sd_;
   bool slips_;
-  int theta_steps_;
-  std::uint32_t lanes_;
+  bool warming_up_ = false;
+  std::uint32_t lanes_;  ///< of a workgroup
   gpu::Kernel max_planes_;
   Pass along_y_;
   Pass along_x_;
   gpu::Kernel sum_turns_;
-  std::uint32_t turn_rows_;     ///< bins along y of an invocation of sum_turns
+  std::uint32_t turn_rows_;     ///< bins along y that an invocation of sum_turns takes
   std::uint32_t turn_columns_;  ///< along x
   gpu::Buffer turns_;
   gpu::Buffer plane_max_;   ///< [object, theta], then weights of theta and their logarithms

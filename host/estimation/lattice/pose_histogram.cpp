@@ -13,7 +13,6 @@
 #include "estimation/lattice/dense_belief.hpp"
 #include "estimation/lattice/dense_likelihood.hpp"
 #include "estimation/lattice/expected_gain.hpp"
-#include "estimation/lattice/histogram_room.hpp"
 #include "estimation/lattice/refinement.hpp"
 #include "estimation/lattice/touch_by_touch.hpp"
 #include "estimation/pose_draws.hpp"
@@ -23,6 +22,30 @@
 #include "palpate/error.hpp"
 
 namespace palpate {
+
+namespace {
+
+/// Throws Error where the device holds fewer bins, before there is a buffer of them.
+void require_room(const gpu::Context& context, const HistogramOptions& options,
+                  std::size_t objects) {
+  constexpr double mib = 1 << 20;
+  const PoseLattice& lattice = options.lattice;
+  const int beliefs = TouchByTouch::wanted_by(options) ? 2 : 1;  // a touch by itself
+  // In floating point: there may be too many bins to count.
+  const double needed_mib = beliefs * (static_cast<double>(objects * sizeof(TwoFloat)) / mib) *
+                            lattice.x_mm.count * lattice.y_mm.count * lattice.theta_rad.count;
+  const double memory_mib = static_cast<double>(context.limits().memory) / mib;
+  if (needed_mib > memory_mib) {
+    throw Error(
+        Fault::input,
+        fmt::format("{} objects x {} x {} x {} pose bins need {:.0f} MiB, device '{}' has "
+                    "{:.0f}; use fewer bins or objects",
+                    objects, lattice.x_mm.count, lattice.y_mm.count, lattice.theta_rad.count,
+                    std::ceil(needed_mib), context.name(), memory_mib));
+  }
+}
+
+}  // namespace
 
 struct PoseHistogram::Impl {
   Impl(Device& device, std::span<const Hypothesis> hypotheses, const HistogramOptions& wanted)

@@ -16,6 +16,13 @@ double scale(const shaders::WeightBlock& block, const WeightSummary& summary) {
   return std::exp(log_largest(block) - summary.log_largest);
 }
 
+/// The search takes the last block for every key beyond the bounds: it must be one of weight.
+void drop_unreached(std::vector<shaders::DrawBlock>& draw) {
+  while (draw.size() > 1 && draw[draw.size() - 2].key_end == draw.back().key_end) {
+    draw.pop_back();
+  }
+}
+
 }  // namespace
 
 shaders::uint in_words(double probability) {
@@ -74,10 +81,7 @@ std::vector<shaders::DrawBlock> multinomial_blocks(std::span<const shaders::Weig
     draw.push_back(
         {.key_end = static_cast<shaders::uint>(end), .last = 0.0F, .step = 0.0F, .sum = block.sum});
   }
-  // The search takes the last block for every key beyond the bounds: it must be one of weight.
-  while (draw.size() > 1 && draw[draw.size() - 2].key_end == draw.back().key_end) {
-    draw.pop_back();
-  }
+  drop_unreached(draw);
   return draw;
 }
 
@@ -106,9 +110,7 @@ std::vector<shaders::DrawBlock> systematic_blocks(std::span<const shaders::Weigh
          .sum = block.sum});
     before += unit * block.sum;
   }
-  while (draw.size() > 1 && draw[draw.size() - 2].key_end == draw.back().key_end) {
-    draw.pop_back();
-  }
+  drop_unreached(draw);
   // Rounding of the sums may leave the last key beyond all bounds.
   shaders::DrawBlock& last = draw.back();
   last.last += static_cast<float>(draws - last.key_end) * last.step;

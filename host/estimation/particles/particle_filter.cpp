@@ -12,10 +12,10 @@
 #include "estimation/kernel_sizes.hpp"
 #include "estimation/particles/particle_draws.hpp"
 #include "estimation/particles/particle_likelihood.hpp"
-#include "estimation/particles/particle_options.hpp"
 #include "estimation/particles/parzen_mode.hpp"
 #include "gpu/command_stream.hpp"
 #include "model/own_process.hpp"
+#include "palpate/error.hpp"
 #include "shaders/draw_particles.hpp"
 #include "shaders/sum_weights.hpp"
 
@@ -24,6 +24,48 @@ namespace palpate {
 namespace {
 
 using gpu::Access;
+
+constexpr int most_particles = 1'000'000;
+// Beyond, float32 would no longer place a particle to a hundredth of a millimetre.
+constexpr double widest_mm = 100'000.0;
+
+void require(bool sound, const char* name, double value, const char* remedy) {
+  if (!sound) {
+    throw Error(Fault::input, fmt::format("{} = {}: {}", name, value, remedy));
+  }
+}
+
+/// Throws Error on a number of particles, a region, a noise or a rate out of range.
+void validate(const ParticleOptions& options) {
+  require(options.particles >= 1 && options.particles <= most_particles, "particles",
+          options.particles, "give 1 to 1,000,000");
+  for (const auto& [name, axis] : {std::pair{"region x_mm", options.region.x_mm},
+                                   std::pair{"region y_mm", options.region.y_mm}}) {
+    require(axis.upper - axis.lower <= widest_mm, name, axis.upper - axis.lower,
+            "extends over more than 100 m; give a smaller one");
+  }
+  const auto is_deviation = [](double v) { return v >= 0.0 && v <= 1000.0; };
+  require(is_deviation(options.motion_mm), "motion_mm", options.motion_mm, "give 0 to 1000");
+  require(is_deviation(options.motion_rad), "motion_rad", options.motion_rad, "give 0 to 1000");
+  require(options.alpha_slow > 0.0 && options.alpha_slow < options.alpha_fast, "alpha_slow",
+          options.alpha_slow, "give a rate above 0 and below alpha_fast");
+  require(options.alpha_fast <= 1.0, "alpha_fast", options.alpha_fast, "give at most 1");
+}
+
+/// Throws Error where the device cannot hold so many particles, before any memory is taken.
+void require_room(const ParticleOptions& options, const gpu::Context& context) {
+  // Two generations, log weights in two floats and their running sums.
+  constexpr VkDeviceSize bytes = 2 * sizeof(shaders::Particle) + sizeof(TwoFloat) + sizeof(float);
+  const gpu::Limits& limits = context.limits();
+  const VkDeviceSize most =
+      std::min({VkDeviceSize{limits.table_texels} * shaders::WEIGHT_BLOCK,  // sums of blocks
+                std::min(limits.storage_range, limits.allocation) / sizeof(shaders::Particle),
+                limits.memory / bytes});
+  if (static_cast<VkDeviceSize>(options.particles) > most) {
+    throw Error(Fault::input, fmt::format("particles = {}: device '{}' takes at most {}; use fewer",
+                                          options.particles, context.name(), most));
+  }
+}
 
 }  // namespace
 
@@ -36,24 +78,20 @@ struct ParticleFilter::Impl {
         likelihood(context, stream, hypotheses, options.region, options.contact),
         parzen(context, stream, size()),
         lanes(independent_lanes(context.limits())),
-        particles(buffer_for<shaders::Particle>("particles", VK_FORMAT_R32G32B32A32_SINT)),
-        drawn(buffer_for<shaders::Particle>("particles", VK_FORMAT_R32G32B32A32_SINT)),
-        log_weights(buffer_for<TwoFloat>("particle weights", VK_FORMAT_R32G32_SFLOAT)),
-        cumulative(buffer_for<float>("particle weights", VK_FORMAT_R32_SFLOAT)),
-        draw_kernel(context,
-                    {.name = "draw_particles",
-                     .spirv = shaders::draw_particles,
-                     .bindings = {Access::table, Access::storage, Access::table, Access::storage,
-                                  Access::table, Access::storage, Access::storage},
-                     .push_bytes = sizeof(shaders::DrawPush),
-                     .constants = {lanes, particles.is_table() ? 1U : 0U,
-                                   cumulative.is_table() ? 1U : 0U}}),
-        sum_kernel(context,
-                   {.name = "sum_weights",
-                    .spirv = shaders::sum_weights,
-                    .bindings = {Access::table, Access::storage, Access::storage, Access::storage},
-                    .push_bytes = sizeof(shaders::uint),
-                    .constants = {log_weights.is_table() ? 1U : 0U}}),
+        particles(of_each<shaders::Particle>("particles")),
+        drawn(of_each<shaders::Particle>("particles")),
+        log_weights(of_each<TwoFloat>("particle weights")),
+        cumulative(of_each<float>("particle weights")),
+        draw_kernel(context, {.name = "draw_particles",
+                              .spirv = shaders::draw_particles,
+                              .bindings = {Access::storage, Access::storage, Access::table,
+                                           Access::storage, Access::storage},
+                              .push_bytes = sizeof(shaders::DrawPush),
+                              .constants = {lanes}}),
+        sum_kernel(context, {.name = "sum_weights",
+                             .spirv = shaders::sum_weights,
+                             .bindings = {Access::storage, Access::storage, Access::storage},
+                             .push_bytes = sizeof(shaders::uint)}),
         averages(options.alpha_slow, options.alpha_fast) {
     sums.resize(groups_of(size(), shaders::WEIGHT_BLOCK));
     bounds.reserve(sums.size());
@@ -67,12 +105,10 @@ struct ParticleFilter::Impl {
     start();
   }
 
-  /// A value of every particle, as a table where so many fit one.
+  /// Room for a value of every particle.
   template <typename Value>
-  gpu::Buffer buffer_for(std::string_view purpose, VkFormat texel) {
-    const std::size_t bytes = size() * sizeof(Value);
-    return {context, bytes, gpu::Memory::device, purpose,
-            gpu::table_where_it_fits(context.limits(), bytes, texel)};
+  gpu::Buffer of_each(std::string_view purpose) {
+    return {context, size() * sizeof(Value), gpu::Memory::device, purpose};
   }
 
   std::size_t size() const { return static_cast<std::size_t>(options.particles); }
@@ -93,11 +129,11 @@ struct ParticleFilter::Impl {
   }
 
   /// Records the drawing of all particles; see shaders::DrawPush.
-  void draw(shaders::uint how, double injected) {
+  void draw(shaders::uint method, double injected) {
     bounds.clear();
-    if (how == shaders::DRAW_MULTINOMIAL) {
+    if (method == shaders::DRAW_MULTINOMIAL) {
       bounds = multinomial_blocks(sums, summary, std::move(bounds));
-    } else if (how == shaders::DRAW_SYSTEMATIC) {
+    } else if (method == shaders::DRAW_SYSTEMATIC) {
       const auto words = philox({0, touch, shaders::RANDOM_OFFSET, 0}, key());
       bounds = systematic_blocks(sums, summary, options.particles, words[0] * 0x1p-32,
                                  std::move(bounds));
@@ -108,7 +144,7 @@ struct ParticleFilter::Impl {
         .key_high = key()[1],
         .touch = touch,
         .particles = static_cast<shaders::uint>(size()),
-        .draw = how,
+        .draw = method,
         .injected = in_words(injected),
         .objects = share_count,
         .blocks = static_cast<shaders::uint>(bounds.size()),
@@ -117,20 +153,14 @@ struct ParticleFilter::Impl {
         .half_theta_rad = static_cast<float>(half(options.region.theta_rad)),
         .motion_mm = static_cast<float>(options.motion_mm),
         .motion_rad = static_cast<float>(options.motion_rad)};
-    // A table of integers stands in for one.
-    stream.dispatch(draw_kernel,
-                    {particles.is_table() ? &particles : &draw_blocks,
-                     particles.read_as(Access::storage), cumulative.read_as(Access::table),
-                     cumulative.read_as(Access::storage), &draw_blocks, &shares, &drawn},
-                    push, {groups_of(size(), lanes), 1, 1});
+    stream.dispatch(draw_kernel, {&particles, &cumulative, &draw_blocks, &shares, &drawn}, push,
+                    {groups_of(size(), lanes), 1, 1});
     std::swap(particles, drawn);
   }
 
   /// Sums the weights for the next drawing and for what is said of them.
   void sum_weights() {
-    stream.dispatch(sum_kernel,
-                    {log_weights.read_as(Access::table), log_weights.read_as(Access::storage),
-                     &cumulative, &block_sums},
+    stream.dispatch(sum_kernel, {&log_weights, &cumulative, &block_sums},
                     static_cast<shaders::uint>(size()),
                     {static_cast<std::uint32_t>(sums.size()), 1, 1});
     stream.download(block_sums, sums);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <numbers>
 #include <vector>
 
@@ -124,7 +125,7 @@ std::vector<std::uint64_t> reached_tiles(const SortedParticles& sorted) {
     }
   }
   const auto make_unique = [](std::vector<std::uint64_t>& keys) {
-    std::sort(keys.begin(), keys.end());
+    std::ranges::sort(keys);
     keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
   };
   make_unique(occupied);
@@ -166,30 +167,72 @@ Tile gather(const SortedParticles& sorted, std::uint64_t tile_key) {
   return tile;
 }
 
-/// Cuts the tile's ranges into units.
-void append_units(const Tile& tile, std::vector<shaders::ConeUnit>& units,
-                  std::vector<Range>& ranges) {
-  const Key key(tile.key);
-  std::uint32_t room = 0;
-  for (const Range& range : tile.ranges) {
-    for (std::uint32_t begin = range[0]; begin < range[1];) {
-      if (room == 0) {
-        const auto first = static_cast<shaders::uint>(ranges.size());
-        units.push_back({.x = key.x * edge,
-                         .y = key.y * edge,
-                         .theta = key.sector * shaders::PARZEN_THETAS,
-                         .range_first = first,
-                         .range_end = first});
-        room = unit_particles;
-      }
-      const std::uint32_t end = std::min(range[1], begin + room);
-      ranges.push_back({begin, end});
-      ++units.back().range_end;
-      room -= end - begin;
-      begin = end;
+/// The tiles that a particle reaches, the heaviest first.
+std::vector<Tile> tiles_of(const SortedParticles& sorted) {
+  std::vector<Tile> tiles;
+  for (const std::uint64_t key : reached_tiles(sorted)) {
+    if (Tile tile = gather(sorted, key); !tile.ranges.empty()) {
+      tiles.push_back(std::move(tile));
     }
   }
+  std::ranges::stable_sort(tiles, std::ranges::greater(), &Tile::mass);
+  return tiles;
 }
+
+/// What the device sums at once.
+struct Batch {
+  std::vector<shaders::ConeUnit> units;
+  std::vector<Range> ranges;
+  std::vector<std::size_t> unit_end;  ///< of every tile
+
+  /// Cuts the tile's ranges into units.
+  void add(const Tile& tile) {
+    const Key key(tile.key);
+    std::uint32_t room = 0;
+    for (const Range& range : tile.ranges) {
+      for (std::uint32_t begin = range[0]; begin < range[1];) {
+        if (room == 0) {
+          const auto first = static_cast<shaders::uint>(ranges.size());
+          units.push_back({.x = key.x * edge,
+                           .y = key.y * edge,
+                           .theta = key.sector * shaders::PARZEN_THETAS,
+                           .range_first = first,
+                           .range_end = first});
+          room = unit_particles;
+        }
+        const std::uint32_t end = std::min(range[1], begin + room);
+        ranges.push_back({begin, end});
+        ++units.back().range_end;
+        room -= end - begin;
+        begin = end;
+      }
+    }
+    unit_end.push_back(units.size());
+  }
+};
+
+/// The grid point of the largest density so far.
+struct Largest {
+  double density = 0.0;
+  std::size_t tile = 0;
+  int point = 0;
+
+  /// @param first tile of the batch
+  void take_in(const Batch& batch, std::span<const float> densities, std::size_t first) {
+    std::size_t unit = 0;
+    for (std::size_t i = 0; i < batch.unit_end.size(); ++i) {
+      std::array<double, points> sums{};
+      for (; unit < batch.unit_end[i]; ++unit) {
+        for (int k = 0; k < points; ++k) {
+          sums[k] += densities[unit * points + k];
+        }
+      }
+      if (const auto most = std::ranges::max_element(sums); *most > density) {
+        *this = {*most, first + i, static_cast<int>(most - sums.begin())};
+      }
+    }
+  }
+};
 
 /// Eq. 11 in float64 at one point of a tile's grid.
 double density_at(const SortedParticles& sorted, const Tile& tile, const ParzenMaximum& at) {
@@ -230,70 +273,39 @@ ParzenMode::ParzenMode(gpu::Context& context, gpu::CommandStream& stream,
 ParzenMaximum ParzenMode::find(std::span<const shaders::Particle> particles,
                                std::span<const double> weights) {
   const SortedParticles sorted = sort(particles, weights);
-  std::vector<Tile> tiles;
-  for (const std::uint64_t key : reached_tiles(sorted)) {
-    Tile tile = gather(sorted, key);
-    if (!tile.ranges.empty()) {
-      tiles.push_back(std::move(tile));
-    }
-  }
-  std::stable_sort(tiles.begin(), tiles.end(),
-                   [](const Tile& a, const Tile& b) { return a.mass > b.mass; });
-
+  const std::vector<Tile> tiles = tiles_of(sorted);
   const gpu::Buffer sources = stream_.uploaded(sorted.particle, "particles", texel_);
-  double best = 0.0;
-  std::size_t best_tile = 0;
-  int best_point = 0;
-  for (std::size_t t = 0; t < tiles.size() && tiles[t].mass > best;) {
-    std::vector<shaders::ConeUnit> units;
-    std::vector<Range> ranges;
-    std::vector<std::size_t> unit_end;  // of every tile of this run
+  Largest best;
+  for (std::size_t t = 0; t < tiles.size() && tiles[t].mass > best.density;) {
     const std::size_t first = t;
-    const std::size_t most_tiles = first == 0 ? first_tiles : tiles.size();
-    for (; t < tiles.size() && t - first < most_tiles && tiles[t].mass > best &&
-           units.size() < units_per_run;
-         ++t) {
-      append_units(tiles[t], units, ranges);
-      unit_end.push_back(units.size());
+    const std::size_t end = first == 0 ? std::min(first_tiles, tiles.size()) : tiles.size();
+    Batch batch;
+    for (; t < end && tiles[t].mass > best.density && batch.units.size() < units_per_run; ++t) {
+      batch.add(tiles[t]);
     }
-    std::vector<float> densities(units.size() * points);
+    std::vector<float> densities(batch.units.size() * points);
     const gpu::Buffer sums(context_, std::span(densities).size_bytes(), gpu::Memory::device,
                            "the Parzen estimate");
-    const gpu::Buffer range_table = stream_.uploaded(ranges, "ranges of particles");
-    const gpu::Buffer unit_table = stream_.uploaded(units, "tiles of the Parzen estimate");
+    const gpu::Buffer ranges = stream_.uploaded(batch.ranges, "ranges of particles");
+    const gpu::Buffer units = stream_.uploaded(batch.units, "tiles of the Parzen estimate");
     peak_bytes_ = std::max<std::uint64_t>(
-        peak_bytes_, sources.bytes() + range_table.bytes() + unit_table.bytes() + sums.bytes());
+        peak_bytes_, sources.bytes() + ranges.bytes() + units.bytes() + sums.bytes());
     stream_.dispatch(sum_cones_,
                      {sources.read_as(gpu::Access::table), sources.read_as(gpu::Access::storage),
-                      &range_table, &unit_table, &sums},
+                      &ranges, &units, &sums},
                      shaders::ConePush{static_cast<float>(step_mm), static_cast<float>(step_rad)},
-                     {static_cast<std::uint32_t>(units.size()), 1, 1});
+                     {static_cast<std::uint32_t>(batch.units.size()), 1, 1});
     stream_.download(sums, densities);
     stream_.run();
-
-    std::size_t unit = 0;
-    for (std::size_t i = 0; i < unit_end.size(); ++i) {
-      std::array<double, points> density{};
-      for (; unit < unit_end[i]; ++unit) {
-        for (int point = 0; point < points; ++point) {
-          density[point] += densities[unit * points + point];
-        }
-      }
-      const auto most = std::max_element(density.begin(), density.end());
-      if (*most > best) {
-        best = *most;
-        best_tile = first + i;
-        best_point = static_cast<int>(most - density.begin());
-      }
-    }
+    best.take_in(batch, densities, first);
   }
 
-  const Tile& tile = tiles[best_tile];
+  const Tile& tile = tiles[best.tile];
   const Key key(tile.key);
-  const int turn = key.sector * shaders::PARZEN_THETAS + best_point / (edge * edge);
+  const int turn = key.sector * shaders::PARZEN_THETAS + best.point / (edge * edge);
   ParzenMaximum maximum{.object = key.object,
-                        .x_mm = step_mm * (key.x * edge + best_point % edge),
-                        .y_mm = step_mm * (key.y * edge + best_point / edge % edge),
+                        .x_mm = step_mm * (key.x * edge + best.point % edge),
+                        .y_mm = step_mm * (key.y * edge + best.point / edge % edge),
                         .theta_rad = wrap_angle(step_rad * turn, two_pi)};
   maximum.density = density_at(sorted, tile, maximum);
   return maximum;

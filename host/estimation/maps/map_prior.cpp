@@ -1,0 +1,110 @@
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "estimation/maps/left_out_fit.hpp"
+#include "model/cell_range.hpp"
+#include "palpate/error.hpp"
+#include "palpate/map_builder.hpp"
+
+namespace palpate {
+
+namespace {
+
+/// Occupied area over modelled area, pooled over objects.
+class AreaShare {
+ public:
+  /// Counts the cells of a map built with a prior of 0.5.
+  void add(const OccupancyGrid& map) {
+    // Evidence below the map's own tolerance counts as none.
+    constexpr double no_evidence = 2.0 * map_cut_tolerance;
+    // In cells of the first map, so that sums of like maps are whole numbers.
+    first_cell_mm_ = first_cell_mm_ > 0.0 ? first_cell_mm_ : map.cell_mm;
+    const double cell = std::pow(map.cell_mm / first_cell_mm_, 2.0);
+    for (const float evidence : map.log_odds) {
+      occupied_ += evidence > no_evidence ? cell : 0.0;
+      modelled_ += std::abs(evidence) > no_evidence ? cell : 0.0;
+    }
+  }
+
+  double share() const {
+    // Where nothing, or everything, was in contact, half a cell keeps the logs finite.
+    const double fraction = (occupied_ + 0.5) / (modelled_ + 1.0);
+    return std::clamp(fraction, least_prior, 1.0 - least_prior);
+  }
+
+ private:
+  double occupied_ = 0.0;
+  double modelled_ = 0.0;
+  double first_cell_mm_ = 0.0;
+};
+
+OccupancyGrid built(Device& device, const OccupancyGrid& map, double prior) {
+  if (map.drawn) {
+    OccupancyGrid same = map;
+    same.prior = prior;
+    return same;
+  }
+  if (!map.source) {
+    throw Error(Fault::input,
+                fmt::format("map '{}': it holds no touches to build it from again; build it anew",
+                            map.label));
+  }
+  MapOptions options = map.source->options;
+  options.sensor.prior = prior;
+  MapBuilder builder(device, options);
+  const Recording& touches = map.source->touches;
+  builder.add(touches.touches(0, touches.size()));
+  return builder.build(map.label);
+}
+
+}  // namespace
+
+OccupancyGrid with_prior(Device& device, const OccupancyGrid& map, double prior) {
+  if (map.drawn) {
+    return built(device, map, prior);
+  }
+  const OccupancyGrid other = built(device, map, prior);
+  if (other.nx != map.nx || other.ny != map.ny) {
+    throw Error(
+        Fault::input,
+        fmt::format("map '{}': its touches make {} x {} cells, but it has {} x {}; build it "
+                    "anew",
+                    map.label, other.nx, other.ny, map.nx, map.ny));
+  }
+  OccupancyGrid result = map;
+  result.prior = prior;
+  result.log_odds = other.log_odds;
+  auto source = std::make_shared<MapSource>(*map.source);
+  source->options.sensor.prior = prior;
+  if (map.source->left_out) {
+    judge_left_out(device, *source);
+  }
+  result.source = std::move(source);
+  return result;
+}
+
+double pooled_prior(Device& device, std::span<const OccupancyGrid> maps) {
+  AreaShare share;
+  for (const OccupancyGrid& map : maps) {
+    share.add(built(device, map, 0.5));
+  }
+  return share.share();
+}
+
+double estimate_prior(Device& device, std::span<const ObjectTouches> objects, MapOptions options) {
+  options.sensor.prior = 0.5;
+  AreaShare share;
+  MapBuilder builder(device, options);
+  for (const ObjectTouches& object : objects) {
+    builder.clear();
+    builder.add(object.touches);
+    share.add(builder.build(object.label));
+  }
+  return share.share();
+}
+
+}  // namespace palpate
