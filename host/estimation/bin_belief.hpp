@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "estimation/bin_box.hpp"
+#include "palpate/estimate.hpp"
+#include "palpate/lattice.hpp"
+
+namespace palpate {
+
+/// A belief over objects and the bins of a lattice, and what can be asked of it: of a histogram as
+/// of the bins that a search by bounds evaluated.
+struct BinBelief {
+  const PoseLattice& lattice;
+  /// [object] added to the log-likelihood of a bin, makes its share of log_evidence.
+  std::vector<double> log_weight;
+  /// [object] log of its prior weight times the summed likelihood of its bins, in nats.
+  std::vector<double> log_evidence;
+  /// Of "none of these", as log_evidence.
+  double none_log_evidence = -std::numeric_limits<double>::infinity();
+  /// Visits the bins of these objects, each once. May leave out bins that together, in a block of a
+  /// few thousand, hold less than `least_share` of their object's belief.
+  std::function<void(std::span<const int> objects, double least_share, const BinVisitor&)> visit;
+
+  /// Probabilities of an object's poses on a grid; a bin counts in the grid's nearest bin
+  /// (PoseLattice::bin_of()). Those of all objects and "none of these" together sum to 1. Takes the
+  /// time of the bins that are visited where the grid turns about another pivot, and else less.
+  /// @throws Error where there is no such object, or on a grid that is not sound
+  Marginals marginals(int object, PoseLattice grid) const;
+  /// The bins that hold at least this share of their object's belief, [object].
+  /// @throws Error where there is no such object
+  std::vector<std::vector<BinShare>> likely_bins(std::span<const int> objects,
+                                                 double least_share) const;
+  /// Entropy over objects and bins in nats, "none of these" left out.
+  double entropy() const;
+  /// Draws objects and poses, "none of these" left out, in the order of objects and bins: a bin in
+  /// each of `count` equal parts of the belief, and a pose anywhere in the bin.
+  std::vector<PoseSample> sample(std::size_t count, std::uint64_t seed) const;
+
+ private:
+  /// The objects that hold a part of the belief.
+  std::vector<int> likely_objects() const;
+  /// Log of the summed likelihood of all objects' bins, with prior weights.
+  double log_total() const;
+};
+
+}  // namespace palpate
