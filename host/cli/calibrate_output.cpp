@@ -13,7 +13,7 @@
 #include "cli/text_table.hpp"
 #include "learning/level_counts.hpp"
 #include "model/option_words.hpp"
-#include "recognition/misfit.hpp"
+#include "recognition/object_fit.hpp"
 
 namespace palpate::cli {
 

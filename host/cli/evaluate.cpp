@@ -18,7 +18,6 @@
 #include "recognition/batch/batch_task.hpp"
 #include "recognition/judged_results.hpp"
 #include "recognition/record_json.hpp"
-#include "recognition/result_json.hpp"
 
 namespace palpate::cli {
 
