@@ -11,7 +11,6 @@ from palpate import _charts as charts
 from palpate._tables import column, count_text, mean_text, seconds_text, value_of
 
 from .program import Json
-from .sweep_runs import AUTO_RULE
 from .trials import Floats
 
 
@@ -154,7 +153,6 @@ def bounds_chart(document: Json) -> Figure:
         ):
             y, label = f"{kind}/{asked}", f"{name}, {words}"
             chart.add(document["bounds"], "bins_in_all", y, label, color=colour, **look)
-    charts.rule(chart.axes, AUTO_RULE, "--filter auto", vertical=True)
     return chart.finish()
 
 

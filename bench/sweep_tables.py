@@ -56,8 +56,7 @@ BOUNDS: list[Column] = [
     ("certificates that hold", "certificates_hold", plain),
     ("same mode", "same_modes", plain),
     ("host memory, MiB", "host_bytes", _MIB),
-    ("--filter auto takes", "auto", plain),
-    ("the faster one", "auto_is_faster", plain),
+    ("bounds are faster", "bounds_are_faster", plain),
 ]
 LIMITS: list[Column] = [
     ("what is changed", "name", plain),

@@ -20,7 +20,7 @@
 #include "learning/level_counts.hpp"
 #include "model/option_words.hpp"
 #include "palpate/files.hpp"
-#include "recognition/misfit.hpp"
+#include "recognition/object_fit.hpp"
 #include "recognition/recordings.hpp"
 
 namespace palpate::cli {

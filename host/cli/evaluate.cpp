@@ -18,7 +18,6 @@
 #include "recognition/batch/batch_task.hpp"
 #include "recognition/judged_results.hpp"
 #include "recognition/record_json.hpp"
-#include "recognition/result_json.hpp"
 
 namespace palpate::cli {
 
@@ -78,7 +77,7 @@ std::string class_table(const Evaluation& evaluation) {
                    {"taken for"}});
   for (const ClassScores& scores : evaluation.classes) {
     table.add({class_name(scores), fmt::format("{}", scores.records),
-               fmt::format("{}", scores.right), percent(scores.recall()),
+               fmt::format("{}", scores.right), percent(scores.accuracy()),
                range_words(scores.interval()), taken_for(scores, evaluation.answers)});
   }
   return table.text();
@@ -96,7 +95,7 @@ std::string unknown_words(const Evaluation& evaluation) {
     text += fmt::format(
         "area under the curve of known against unknown classes by {}: {:.3f} +- {:.3f} ({} known, "
         "{} unknown)\n",
-        name_of(against->score), against->area, against->standard_error, against->known,
+        against->score, against->area, against->standard_error, against->known,
         against->unknown);
   } else if (evaluation.known) {
     text += "no area under the curve: records of both kinds need none or fit.z\n";

@@ -113,7 +113,7 @@ void warm_up(Recogniser& recogniser, const RecognitionTask& task, const SensorDe
                     .valid = sensor.valid};
   recogniser.update(std::span(&touch, 1));
   if (!traits_of(task.filter).certificate) {  // a search of one touch is long, compiles nothing
-    recogniser.refine(recogniser.estimate().mode);
+    recogniser.filter().refine(recogniser.estimate().mode);
   }
   recogniser.reset();
 }
@@ -163,8 +163,7 @@ void live(const LiveArguments& options) {
       detector_options(options.detector, description.pressure_unit, source);
   const RecognitionJob job(request, Circumstances{.pressure_unit = description.pressure_unit,
                                                   .source = source,
-                                                  .reach_mm = array_reach_mm(elements_mm),
-                                                  .waited_for = true});
+                                                  .reach_mm = array_reach_mm(elements_mm)});
   const RecognitionTask& task = job.task();
   if (goal && !traits_of(task.filter).bins) {
     refuse_flag("--plan", options.plan,

@@ -7,7 +7,6 @@
 
 #include "cli/step_words.hpp"
 #include "recognition/record_json.hpp"
-#include "recognition/result_json.hpp"
 
 namespace palpate::cli {
 

@@ -20,7 +20,6 @@
 #include "cli/text_table.hpp"
 #include "recognition/record_json.hpp"
 #include "recognition/recordings.hpp"
-#include "recognition/result_json.hpp"
 #include "recognition/touch_plan.hpp"
 
 namespace palpate::cli {

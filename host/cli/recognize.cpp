@@ -84,7 +84,7 @@ void export_posterior(const std::filesystem::path& path, const RecognitionTask& 
   for (const Hypothesis& hypothesis : task.hypotheses) {
     labels.push_back(hypothesis.map.label);
   }
-  if (std::optional<EvaluatedBelief> evaluated = recogniser.evaluated_bins()) {
+  if (std::optional<EvaluatedBelief> evaluated = recogniser.filter().evaluated_bins()) {
     write_posterior(path, {.objects = std::move(labels),
                            .lattice = recogniser.lattice(),
                            .log_likelihood = std::move(evaluated->log_likelihood),
@@ -92,7 +92,7 @@ void export_posterior(const std::filesystem::path& path, const RecognitionTask& 
                            .index = std::move(evaluated->index)});
     return;
   }
-  const PoseHistogram& histogram = *recogniser.histogram();
+  const PoseHistogram& histogram = *recogniser.filter().histogram();
   write_posterior(path, labels, histogram.lattice(), [&](std::size_t object) {
     return histogram.log_likelihood(static_cast<int>(object));
   });

@@ -9,7 +9,6 @@
 #include "cli/options.hpp"
 #include "model/option_words.hpp"
 #include "model/printable.hpp"
-#include "recognition/filter_choice.hpp"
 #include "recognition/record_json.hpp"
 
 namespace palpate::cli {
@@ -265,25 +264,6 @@ std::string next_touch_words(const PlannedTouch& touch, PlanGoal goal) {
                      gain_text(touch.gain, goal));
 }
 
-namespace {
-
-/// Why the task has its filter; "" where there is no more to say.
-std::string reason_of_filter(const RecognitionTask& task) {
-  const std::int64_t bins = task.bins_in_all();
-  if (task.auto_filter) {
-    if (bins <= most_histogram_bins && traits_of(task.filter).certificate) {
-      return "chosen by --filter auto: each touch is waited for";
-    }
-    return fmt::format("chosen by --filter auto: {} bins in all, {} {}", bins,
-                       bins > most_histogram_bins ? "more than" : "at most", most_histogram_bins);
-  }
-  return task.filter_asked_for_by.empty()
-             ? ""
-             : fmt::format("asked for by {}", in_flags(task.filter_asked_for_by));
-}
-
-}  // namespace
-
 std::string setup_words(const RecognitionJob& job) {
   const RecognitionTask& task = job.task();
   const auto mirrored =
@@ -291,7 +271,7 @@ std::string setup_words(const RecognitionJob& job) {
   const std::size_t maps = task.hypotheses.size() - mirrored;
   return fmt::format("{} map{}{}{}, {}{}", maps, maps == 1 ? "" : "s",
                      mirrored > 0 ? fmt::format(" and {} mirrored", mirrored) : "",
-                     task.sensor_model.empty() ? "" : " with " + printable(task.sensor_model),
+                     task.sensor.file.empty() ? "" : " with " + printable(task.sensor.file),
                      size_words(task.filter),
                      task.uses_device() ? ", on " + job.device_name() : "");
 }
@@ -303,14 +283,14 @@ void print_engine(const RecognitionJob& job, const Recogniser& recogniser) {
     return fmt::format("{} {:g} to {:g} {}, {} bins in steps of {:.4g}", name, axis.lower * unit,
                        axis.upper * unit, unit_name, axis.count, axis.step() * unit);
   };
-  std::vector<std::string> filter = recogniser.words();
-  if (std::string reason = reason_of_filter(task); !reason.empty()) {
-    filter.push_back(std::move(reason));
+  std::vector<std::string> filter = recogniser.filter().words();
+  if (!task.filter_chosen_by.empty()) {
+    filter.push_back("chosen by " + in_flags(task.filter_chosen_by));
   }
   std::string memory = job.device_name();
   if (task.uses_device()) {
     memory += fmt::format(", {:.1f} MiB of its memory",
-                          static_cast<double>(recogniser.device_bytes()) / (1 << 20));
+                          static_cast<double>(recogniser.filter().device_bytes()) / (1 << 20));
   }
   fmt::print(stderr,
              "device: {}\nfilter: {}\nlattice: {}\n         {}\n"

@@ -13,7 +13,7 @@
 #include "estimation/lattice/refinement.hpp"
 #include "learning/progress.hpp"
 #include "palpate/pose_error.hpp"
-#include "recognition/nearby_fit.hpp"
+#include "recognition/object_fit.hpp"
 
 namespace palpate {
 

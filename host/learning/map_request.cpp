@@ -19,7 +19,7 @@
 #include "options/refused_option.hpp"
 #include "palpate/files.hpp"
 #include "palpate/object_frame.hpp"
-#include "recognition/folder_sensor.hpp"
+#include "recognition/request.hpp"
 
 namespace palpate {
 

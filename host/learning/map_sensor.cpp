@@ -12,8 +12,8 @@
 #include "learning/calibration_task.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
-#include "recognition/folder_sensor.hpp"
 #include "recognition/recordings.hpp"
+#include "recognition/request.hpp"
 
 namespace palpate {
 

@@ -4,7 +4,7 @@
 #include <limits>
 #include <utility>
 
-#include "recognition/misfit.hpp"
+#include "recognition/object_fit.hpp"
 
 namespace palpate {
 

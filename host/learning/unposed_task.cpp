@@ -12,7 +12,7 @@
 #include "learning/table_learning.hpp"
 #include "learning/unposed_maps.hpp"
 #include "palpate/error.hpp"
-#include "recognition/folder_sensor.hpp"
+#include "recognition/request.hpp"
 
 namespace palpate {
 

@@ -101,8 +101,8 @@ const std::array table{
     Option{"filter", "filter", filter, &Request::filter, any,
            "histogram: evaluates every pose bin; bounded: the same bins, but evaluates only those "
            "that matter and proves how little the others can; particles: the paper's particle "
-           "filter; auto: bounded for more than 100000 bins of all objects together, else "
-           "histogram, which it also takes for --posterior [default: auto]"},
+           "filter; auto: bounded, or histogram where objects slip, for --posterior, and where the "
+           "search by bounds would take too much memory [default: auto]"},
     Option{"tolerance", "", filter, &Request::tolerance, within_0_1,
            "With --filter bounded: largest share of the belief that may be left unproven; the "
            "search goes on until it is reached. Rounding, which counts as unproven, may exceed a "

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace palpate {
 
@@ -14,16 +15,35 @@ constexpr std::int64_t most_kept_cells = std::int64_t{1}
                                          << 22;  ///< cells are wider where there are more
 constexpr int unseen = -1;                       ///< label of a cell without one
 
+}  // namespace
+
 std::array<const Axis*, 3> axes_of(const PoseLattice& lattice) {
   return {&lattice.x_mm, &lattice.y_mm, &lattice.theta_rad};
 }
-
-}  // namespace
 
 AxisIndices indices_of(const PoseLattice& lattice, std::int64_t bin) {
   const auto in_plane = static_cast<int>(bin % lattice.plane());
   return {in_plane % lattice.x_mm.count, in_plane / lattice.x_mm.count,
           static_cast<int>(bin / lattice.plane())};
+}
+
+LatticePlace place_of(const RefinedPose& refined, const PoseLattice& lattice) {
+  const glm::dvec2 xy_mm = refined.T_object_robot * lattice.pivot_mm;
+  const double middle_rad = (lattice.theta_rad.lower + lattice.theta_rad.upper) / 2.0;
+  return {xy_mm.x, xy_mm.y,
+          middle_rad +
+              wrap_angle(refined.T_object_robot.theta_rad - middle_rad, 2.0 * std::numbers::pi)};
+}
+
+LatticePlace variances_of(const RefinedPose& refined, const PoseLattice& lattice) {
+  // The translation of T_object_robot is (x, y) - R(theta) pivot.
+  const glm::dvec2 slope =
+      rotate(refined.T_object_robot.theta_rad + std::numbers::pi / 2.0, lattice.pivot_mm);
+  const std::array<double, 9>& c = refined.covariance;
+  const auto variance = [&](int i) {
+    return c[4 * i] + 2.0 * slope[i] * c[3 * i + 2] + slope[i] * slope[i] * c[8];
+  };
+  return {variance(0), variance(1), c[8]};
 }
 
 double spin_mm(const Body& body) { return std::sqrt(std::max(body.inertia_mm2, 1e-12)); }

@@ -10,9 +10,19 @@
 
 namespace palpate {
 
+/// x, y and theta.
+std::array<const Axis*, 3> axes_of(const PoseLattice& lattice);
+
 /// Indices of a bin along x, y and theta.
 using AxisIndices = std::array<int, 3>;
 AxisIndices indices_of(const PoseLattice& lattice, std::int64_t bin);
+
+/// (x_mm, y_mm, theta_rad) of a lattice.
+using LatticePlace = std::array<double, 3>;
+/// A refined pose on the lattice, with the turn of theta that is nearest to the region's middle.
+LatticePlace place_of(const RefinedPose& refined, const PoseLattice& lattice);
+/// Variances of that place.
+LatticePlace variances_of(const RefinedPose& refined, const PoseLattice& lattice);
 
 /// Root mean square distance of the body from its centroid, mm: how far a turn by 1 rad moves it.
 double spin_mm(const Body& body);

@@ -9,8 +9,7 @@
 #include "palpate/learned_sensor.hpp"
 #include "recognition/label_probability.hpp"
 #include "recognition/recognition_record.hpp"
-#include "recognition/scaled_pose.hpp"
-#include "recognition/warnings.hpp"
+#include "recognition/scales.hpp"
 
 namespace palpate {
 
@@ -29,6 +28,29 @@ std::vector<double> shares_of_label(const Estimate& estimate, const RecognitionT
     shares.push_back(all == log_zero ? 0.0 : std::exp(estimate.log_evidence[i] - all));
   }
   return shares;
+}
+
+/// Share of an object's belief at angles that are nearer to another of its n likenesses than to
+/// its own, where all angles look alike (n = 0) at those more than 1/16 of a turn away.
+/// @param shares [theta]
+double share_at_other_turns(const Axis& theta, std::span<const double> shares, double own_rad,
+                            int n) {
+  const double own_half_rad = std::numbers::pi / (n == 0 ? 8 : n);
+  double all = 0.0;
+  double other = 0.0;
+  for (std::size_t k = 0; k < shares.size(); ++k) {
+    const double theta_rad = theta.centre(static_cast<int>(k));
+    all += shares[k];
+    if (std::abs(wrap_angle(theta_rad - own_rad, 2.0 * std::numbers::pi)) > own_half_rad) {
+      other += shares[k];
+    }
+  }
+  return all > 0.0 ? other / all : 0.0;
+}
+
+/// Whether the map looks the same after turns that it does not call equal.
+bool may_look_alike(const OccupancyGrid& map) {
+  return map.symmetry == 1 && map.suggested_symmetry.value_or(1) != 1;
 }
 
 /// The symmetry of an object's map, as far as its bins tell.
@@ -139,7 +161,7 @@ ObjectPose between_bins(const Recogniser& recogniser, const RecognitionTask& tas
     return on_scale(task, recogniser.evidence(), of.body, mode.pose);
   }
   if (!scaled) {
-    refined = recogniser.refine({.object = mode.object, .T_object_robot = mode.best});
+    refined = recogniser.filter().refine({.object = mode.object, .T_object_robot = mode.best});
   }
   if (!refined) {
     return on_scale(task, recogniser.evidence(), of.body, mode.pose);
@@ -147,6 +169,64 @@ ObjectPose between_bins(const Recogniser& recogniser, const RecognitionTask& tas
   ObjectPose pose = inverse(least_turned(of.body, of.symmetry, *refined));
   pose.T_robot_object.theta_rad = wrap_angle(pose.T_robot_object.theta_rad, 2.0 * std::numbers::pi);
   return scaled ? pose : on_scale(task, recogniser.evidence(), of.body, pose);
+}
+
+/// BeliefPlaces::modes, whose poses are those of bins.
+std::vector<BeliefMode> probable_modes(std::span<const PoseBelief> beliefs,
+                                       const RecognitionTask& task, const RecognitionStep& step) {
+  std::vector<BeliefMode> modes;
+  for (const PoseBelief& belief : beliefs) {
+    for (BeliefMode mode : belief.found.modes) {
+      mode.probability *= step.identity[task.label_of[belief.object]];
+      if (mode.probability >= least_probability) {
+        modes.push_back(mode);
+      }
+    }
+  }
+  std::ranges::stable_sort(modes, std::greater<>(), &BeliefMode::probability);
+  modes.resize(std::min(modes.size(), most_modes));
+  return modes;
+}
+
+/// Sets share, within_mm and peak by the belief in the pose's object.
+/// @param of_label probability of its label
+void describe_neighbourhood(const PoseBelief& belief, const PoseLattice& lattice,
+                            double share_of_label, double of_label, const RecognitionStep& step,
+                            BeliefPlaces& places) {
+  std::vector<PartAway> parts = parts_away(belief.of, belief.bins, step.pose());
+  const double near = share_within(parts, neighbourhood_mm);
+  places.share = std::min(of_label * near, of_label);  // shares round
+  const auto bins_near = std::ranges::count_if(
+      parts, [](const PartAway& part) { return part.mm <= neighbourhood_mm; });
+  const double flat = static_cast<double>(bins_near) / static_cast<double>(lattice.bins());
+  places.peak = near > std::min(0.5, std::numbers::e * flat) * share_of_label;
+  if (step.refined) {
+    parts = spread_between_bins(belief.of, std::move(parts), *step.refined);
+  }
+  const double proven = step.certificate ? 1.0 - step.certificate->dropped_mass : 1.0;
+  // Above 1 where the label has less than all that is to lie near.
+  const double share = held / (of_label * proven);
+  places.within_mm = share <= 1.0 ? distance_holding(std::move(parts), share) : std::nullopt;
+}
+
+/// The mode that an estimate's mode is of; none where it is of none.
+/// @param posed the belief in the estimate's object
+std::optional<std::size_t> mode_at(std::span<const BeliefMode> modes, const PoseBelief& posed,
+                                   const Mode& at) {
+  std::optional<std::size_t> nearest;
+  double nearest_mm = neighbourhood_mm;
+  for (std::size_t i = 0; i < modes.size(); ++i) {
+    if (modes[i].object != at.object) {
+      continue;
+    }
+    const double mm =
+        pose_error_mm(posed.of.body, posed.of.symmetry, modes[i].best, at.T_object_robot);
+    if (mm <= nearest_mm) {
+      nearest_mm = mm;
+      nearest = i;
+    }
+  }
+  return nearest;
 }
 
 std::string percent(double probability) {
@@ -173,6 +253,30 @@ std::string percent_below(double probability) {
 
 }  // namespace
 
+int symmetry_told(const OccupancyGrid& map, const Axis& theta, std::span<const double> shares,
+                  double own_rad, double temperature) {
+  constexpr double least_share = 0.05;
+  if (!may_look_alike(map)) {
+    return map.symmetry;
+  }
+  const double other = share_at_other_turns(theta, shares, own_rad, *map.suggested_symmetry);
+  // Turns weigh as other poses do.
+  const double odds = std::pow(other / (1.0 - other), 1.0 / temperature);
+  return odds < least_share / (1.0 - least_share) ? map.symmetry : *map.suggested_symmetry;
+}
+
+int symmetry_told(const Recogniser& recogniser, const RecognitionTask& task,
+                  const RecognitionStep& step) {
+  const OccupancyGrid& map = task.hypotheses[step.mode.object].map;
+  if (!may_look_alike(map)) {
+    return map.symmetry;  // the marginals are not asked for
+  }
+  const Marginals marginals = recogniser.marginals(step.mode.object);
+  return symmetry_told(map, marginals.grid.theta_rad, marginals.theta,
+                       step.mode.T_object_robot.theta_rad,
+                       task.temperature_after(recogniser.evidence()));
+}
+
 BeliefPlaces places_of(const Recogniser& recogniser, const Estimate& estimate,
                        const RecognitionTask& task, const RecognitionStep& step) {
   if (!recogniser.touched()) {
@@ -180,56 +284,19 @@ BeliefPlaces places_of(const Recogniser& recogniser, const Estimate& estimate,
   }
   const std::vector<double> share_of_label = shares_of_label(estimate, task);
   PoseLattice lattice;
-  BeliefPlaces places;
   const std::vector<PoseBelief> beliefs =
       pose_beliefs(recogniser, task, step, share_of_label, lattice);
-  for (const PoseBelief& belief : beliefs) {
-    const double of_label = step.identity[task.label_of[belief.object]];
-    for (BeliefMode mode : belief.found.modes) {
-      mode.probability *= of_label;
-      if (mode.probability >= least_probability) {
-        places.modes.push_back(mode);
-      }
-    }
-    if (belief.object != step.mode.object) {
-      continue;
-    }
-    std::vector<PartAway> parts = parts_away(belief.of, belief.bins, step.pose());
-    const double near = share_within(parts, neighbourhood_mm);
-    places.share = std::min(of_label * near, of_label);  // shares round
-    const auto bins_near = std::ranges::count_if(
-        parts, [](const PartAway& part) { return part.mm <= neighbourhood_mm; });
-    const double flat = static_cast<double>(bins_near) / static_cast<double>(lattice.bins());
-    places.peak = near > std::min(0.5, std::numbers::e * flat) * share_of_label[belief.object];
-    if (step.refined) {
-      parts = spread_between_bins(belief.of, std::move(parts), *step.refined);
-    }
-    const double proven = step.certificate ? 1.0 - step.certificate->dropped_mass : 1.0;
-    // Above 1 where the label has less than all that is to lie near.
-    const double share = held / (of_label * proven);
-    places.within_mm = share <= 1.0 ? distance_holding(std::move(parts), share) : std::nullopt;
-  }
-  std::ranges::stable_sort(places.modes, std::greater<>(), &BeliefMode::probability);
-  places.modes.resize(std::min(places.modes.size(), most_modes));
-  const auto binned = [&](int object) -> const BinnedObject& {
-    return std::ranges::find(beliefs, object, &PoseBelief::object)->of;
+  const auto belief_in = [&](int object) -> const PoseBelief& {
+    return *std::ranges::find(beliefs, object, &PoseBelief::object);
   };
-  const BinnedObject& posed = binned(step.mode.object);
-  double nearest_mm = neighbourhood_mm;
-  for (std::size_t i = 0; i < places.modes.size(); ++i) {
-    const BeliefMode& mode = places.modes[i];
-    const double mm =
-        mode.object == step.mode.object
-            ? pose_error_mm(posed.body, posed.symmetry, mode.best, step.mode.T_object_robot)
-            : 2.0 * neighbourhood_mm;
-    if (mm <= nearest_mm) {
-      nearest_mm = mm;
-      places.own = i;
-    }
-  }
+  const PoseBelief& posed = belief_in(step.mode.object);
+  BeliefPlaces places{.modes = probable_modes(beliefs, task, step)};
+  describe_neighbourhood(posed, lattice, share_of_label[step.mode.object],
+                         step.identity[task.label_of[step.mode.object]], step, places);
+  places.own = mode_at(places.modes, posed, step.mode);
   for (std::size_t i = 0; i < places.modes.size(); ++i) {
     BeliefMode& mode = places.modes[i];
-    mode.pose = between_bins(recogniser, task, mode, binned(mode.object),
+    mode.pose = between_bins(recogniser, task, mode, belief_in(mode.object).of,
                              i == places.own ? step.refined : std::nullopt);
   }
   return places;

@@ -131,19 +131,24 @@ std::vector<ClassScores> classes_of(std::span<const JudgedRecord> records,
   return result;
 }
 
-std::optional<double> score_of(const JudgedRecord& record, KnownScore score) {
-  if (score == KnownScore::fit) {
-    return record.fit_z;
-  }
-  return record.none ? std::optional(1.0 - *record.none) : std::nullopt;
-}
+/// What tells known from unknown classes; larger for known ones.
+struct KnownScore {
+  const char* name;
+  std::optional<double> (*of)(const JudgedRecord& record);
+};
+constexpr KnownScore known_scores[] = {
+    {"1 - none",
+     [](const JudgedRecord& record) {
+       return record.none ? std::optional(1.0 - *record.none) : std::nullopt;
+     }},
+    {"fit.z", [](const JudgedRecord& record) { return record.fit_z; }}};
 
-std::optional<KnownAgainstUnknown> compare_by(KnownScore score,
+std::optional<KnownAgainstUnknown> compare_by(const KnownScore& score,
                                               std::span<const JudgedRecord> records) {
   std::vector<double> of_known;
   std::vector<double> of_unknown;
   for (const JudgedRecord& record : records) {
-    if (const auto value = score_of(record, score)) {
+    if (const auto value = score.of(record)) {
       (record.of_known_class() ? of_known : of_unknown).push_back(*value);
     }
   }
@@ -152,7 +157,7 @@ std::optional<KnownAgainstUnknown> compare_by(KnownScore score,
   }
   const double area = told_apart(of_unknown, of_known);
   return KnownAgainstUnknown{
-      .score = score,
+      .score = score.name,
       .known = of_known.size(),
       .unknown = of_unknown.size(),
       .area = area,
@@ -161,7 +166,7 @@ std::optional<KnownAgainstUnknown> compare_by(KnownScore score,
 
 std::optional<KnownAgainstUnknown> known_against_unknown(std::span<const JudgedRecord> records) {
   std::optional<KnownAgainstUnknown> best;
-  for (const KnownScore score : {KnownScore::none, KnownScore::fit}) {
+  for (const KnownScore& score : known_scores) {
     const auto by_score = compare_by(score, records);
     if (by_score && (!best || by_score->records() > best->records())) {
       best = by_score;
@@ -189,8 +194,6 @@ std::optional<Median> median_of(std::span<const JudgedRecord> records,
 }
 
 }  // namespace
-
-const char* name_of(KnownScore score) { return score == KnownScore::none ? "1 - none" : "fit.z"; }
 
 bool JudgedRecord::of_known_class() const {
   return truth != none_answer && identity.contains(truth);

@@ -49,16 +49,21 @@ struct JudgedRecord {
   double answer_probability() const;
 };
 
-/// The records whose best label has a probability in [lower, upper); the last bin includes 1.
-struct ReliabilityBin {
-  double lower = 0.0;
-  double upper = 0.0;
+/// How many of some records are right.
+struct Counted {
   std::size_t records = 0;
   std::size_t right = 0;
-  double mean_confidence = 0.0;  ///< of records > 0
 
+  /// Where there are records.
   double accuracy() const { return static_cast<double>(right) / static_cast<double>(records); }
   Interval interval() const { return wilson_interval(static_cast<double>(right), records); }
+};
+
+/// The records whose best label has a probability in [lower, upper); the last bin includes 1.
+struct ReliabilityBin : Counted {
+  double lower = 0.0;
+  double upper = 0.0;
+  double mean_confidence = 0.0;  ///< where there are records
 };
 
 /// The smallest probability of a right answer that log_loss counts with: an answer that was held
@@ -66,44 +71,27 @@ struct ReliabilityBin {
 inline constexpr double least_answer_probability = 1e-12;
 
 /// How right, and how honest, a set of records is.
-struct Scores {
-  std::size_t records = 0;
-  std::size_t right = 0;
+struct Scores : Counted {
   double log_loss = 0.0;  ///< mean of -log(probability of the right answer), nats
   /// Expected calibration error: the mean over the records of how far the accuracy of their bin is
   /// from its mean confidence.
   double calibration_error = 0.0;
   std::array<ReliabilityBin, 10> bins;
-
-  double accuracy() const { return static_cast<double>(right) / static_cast<double>(records); }
-  Interval interval() const { return wilson_interval(static_cast<double>(right), records); }
 };
 
-/// The records of one true label, those where its class was known apart from those where not.
-struct ClassScores {
+/// The records of one true label, those where its class was known apart from those where not. Those
+/// of an unknown class are right where they were called "(none)".
+struct ClassScores : Counted {
   std::string label;
   bool known = true;
-  std::size_t records = 0;
-  std::size_t right = 0;           ///< of an unknown class: called "(none)"
   std::vector<std::size_t> taken;  ///< [answer] how often each was the best label
-
-  double recall() const { return static_cast<double>(right) / static_cast<double>(records); }
-  Interval interval() const { return wilson_interval(static_cast<double>(right), records); }
 };
 
-/// What tells known from unknown classes; larger for known ones.
-enum class KnownScore {
-  none,  ///< 1 - JudgedRecord::none
-  fit    ///< JudgedRecord::fit_z
-};
-
-/// "1 - none" or "fit.z", by the fields of a record.
-const char* name_of(KnownScore score);
-
-/// Area under the curve (ROC) of records of known against those of unknown classes: the probability
-/// that the one of the known class has the larger score; a tie counts half.
+/// Area under the curve (ROC) of records of known against those of unknown classes by a score that
+/// is larger for known ones: the probability that the one of the known class has the larger score;
+/// a tie counts half.
 struct KnownAgainstUnknown {
-  KnownScore score = KnownScore::none;
+  std::string score;      ///< "1 - none" or "fit.z", by the fields of a record
   std::size_t known = 0;  ///< records that have the score
   std::size_t unknown = 0;
   double area = 0.0;
@@ -121,8 +109,8 @@ struct Evaluation {
   Scores all;
   std::optional<Scores> known;    ///< of known classes alone, where others are among the records
   std::optional<Scores> unknown;  ///< of unknown classes; `right` counts those called "(none)"
-  /// By the score that most records have, in the order of KnownScore among equals; only where
-  /// records of both kinds of classes have one.
+  /// By the score that most records have, "1 - none" among equals; only where records of both kinds
+  /// of classes have one.
   std::optional<KnownAgainstUnknown> known_against_unknown;
   /// Labels of known classes among the records, and what else was some record's best; last
   /// "(none)", where it was possible.

@@ -204,14 +204,22 @@ auto& lattice_in(Options& options) {
   }
 }
 
-/// By which kind of options, one function for each.
-template <typename... Functions>
-struct Each : Functions... {
-  using Functions::operator()...;
-};
-// Clang 14, which the linter is made of, deduces the arguments of no aggregate by itself.
-template <typename... Functions>
-Each(Functions...) -> Each<Functions...>;
+FilterTraits traits(const HistogramOptions& histogram) {
+  return {.bins = true,
+          .every_bin = true,
+          .touch_sd = histogram.touch_sd,
+          .slip_sd = histogram.slip_sd,
+          .none_weight = histogram.none_weight};
+}
+FilterTraits traits(const BoundedOptions& bounded) {
+  return {.bins = true,
+          .certificate = true,
+          .touch_sd = bounded.touch_sd,
+          .none_weight = bounded.none_weight,
+          .tolerance = bounded.tolerance,
+          .budget_s = bounded.budget_s};
+}
+FilterTraits traits(const ParticleOptions& /*particles*/) { return {}; }
 
 constexpr int most_bins = 400;
 constexpr int most_angles = 360;
@@ -229,23 +237,7 @@ Axis coarser(const Axis& axis) {
 }  // namespace
 
 FilterTraits traits_of(const FilterOptions& options) {
-  return std::visit(Each{[](const HistogramOptions& one) {
-                           return FilterTraits{.bins = true,
-                                               .every_bin = true,
-                                               .touch_sd = one.touch_sd,
-                                               .slip_sd = one.slip_sd,
-                                               .none_weight = one.none_weight};
-                         },
-                         [](const BoundedOptions& one) {
-                           return FilterTraits{.bins = true,
-                                               .certificate = true,
-                                               .touch_sd = one.touch_sd,
-                                               .none_weight = one.none_weight,
-                                               .tolerance = one.tolerance,
-                                               .budget_s = one.budget_s};
-                         },
-                         [](const ParticleOptions&) { return FilterTraits{}; }},
-                    options);
+  return std::visit([](const auto& one) { return traits(one); }, options);
 }
 
 const PoseLattice& lattice_of(const FilterOptions& options) {
@@ -261,45 +253,27 @@ FilterOptions with_lattice(FilterOptions options, const PoseLattice& lattice) {
   return options;
 }
 
-std::optional<BoundedOptions> bounded_instead(const FilterOptions& options) {
-  const auto* histogram = std::get_if<HistogramOptions>(&options);
-  if (histogram == nullptr || !histogram->slip_sd.none()) {
-    return {};
-  }
-  return BoundedOptions{.lattice = histogram->lattice,
-                        .contact = histogram->contact,
-                        .touch_sd = histogram->touch_sd,
-                        .none_weight = histogram->none_weight};
-}
-
 std::string size_words(const FilterOptions& options) {
-  const auto bins = [](const PoseLattice& lattice) {
-    return fmt::format("{} x {} x {} bins each", lattice.x_mm.count, lattice.y_mm.count,
-                       lattice.theta_rad.count);
-  };
-  return std::visit(
-      Each{[&](const HistogramOptions& one) { return bins(one.lattice); },
-           [&](const BoundedOptions& one) { return bins(one.lattice) + " by bounds"; },
-           [](const ParticleOptions& one) { return fmt::format("{} particles", one.particles); }},
-      options);
+  if (const auto* particles = std::get_if<ParticleOptions>(&options)) {
+    return fmt::format("{} particles", particles->particles);
+  }
+  const PoseLattice& lattice = lattice_of(options);
+  return fmt::format("{} x {} x {} bins each{}", lattice.x_mm.count, lattice.y_mm.count,
+                     lattice.theta_rad.count, traits_of(options).certificate ? " by bounds" : "");
 }
 
 std::unique_ptr<Filter> make_filter(Device* device, std::span<const Hypothesis> hypotheses,
                                     const FilterOptions& options, const FilterResources& search) {
-  using Made = std::unique_ptr<Filter>;
-  return std::visit(
-      Each{[&](const HistogramOptions& one) -> Made {
-             return std::make_unique<HistogramFilter>(PoseHistogram(*device, hypotheses, one));
-           },
-           [&](BoundedOptions one) -> Made {
-             one.threads = search.threads > 0 ? static_cast<int>(search.threads) : one.threads;
-             one.cancel_point = search.cancel_point ? search.cancel_point : one.cancel_point;
-             return std::make_unique<BoundedFilter>(hypotheses, one);
-           },
-           [&](const ParticleOptions& one) -> Made {
-             return std::make_unique<Particles>(*device, hypotheses, one);
-           }},
-      options);
+  if (const auto* histogram = std::get_if<HistogramOptions>(&options)) {
+    return std::make_unique<HistogramFilter>(PoseHistogram(*device, hypotheses, *histogram));
+  }
+  if (const auto* particles = std::get_if<ParticleOptions>(&options)) {
+    return std::make_unique<Particles>(*device, hypotheses, *particles);
+  }
+  auto bounded = std::get<BoundedOptions>(options);
+  bounded.threads = search.threads > 0 ? static_cast<int>(search.threads) : bounded.threads;
+  bounded.cancel_point = search.cancel_point ? search.cancel_point : bounded.cancel_point;
+  return std::make_unique<BoundedFilter>(hypotheses, bounded);
 }
 
 PoseLattice marginal_grid(const PoseLattice& lattice) {

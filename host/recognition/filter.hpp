@@ -52,9 +52,6 @@ const PoseLattice& lattice_of(const FilterOptions& options);
 const ContactModel& contact_of(const FilterOptions& options);
 /// The filter on another lattice.
 FilterOptions with_lattice(FilterOptions options, const PoseLattice& lattice);
-/// The options of a bounded posterior of the same bins; none where the filter is no histogram, or
-/// objects slip, which bounds do not follow.
-std::optional<BoundedOptions> bounded_instead(const FilterOptions& options);
 /// What the belief is divided into: "25 x 25 x 16 bins each", "10000 particles".
 std::string size_words(const FilterOptions& options);
 

@@ -5,10 +5,8 @@
 #include <numbers>
 #include <tuple>
 #include <utility>
-#include <vector>
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include "estimation/bounded/search_memory.hpp"
 #include "estimation/displacement_check.hpp"
@@ -32,7 +30,10 @@ void set_displacement(const std::optional<double>& asked_mm, const std::optional
 }
 
 BoundedOptions asked_bounds(const Request& request, const HistogramOptions& histogram) {
-  BoundedOptions bounded = bounded_instead(histogram).value();
+  BoundedOptions bounded{.lattice = histogram.lattice,
+                         .contact = histogram.contact,
+                         .touch_sd = histogram.touch_sd,
+                         .none_weight = histogram.none_weight};
   bounded.tolerance = request.tolerance.value_or(bounded.tolerance);
   if (request.budget_ms) {
     bounded.budget_s = 1e-3 * *request.budget_ms;
@@ -65,6 +66,79 @@ ParticleOptions asked_particles(const Request& request, const HistogramOptions& 
   return particles;
 }
 
+/// The filter by the wish and the options alone, on the region's bins.
+ChosenFilter asked_filter(Asked& asked, const FilterWish& wish, const HistogramOptions& histogram) {
+  const Request& request = asked.request;
+  const bool by_histogram = wish.kind == FilterKind::histogram;
+  if (wish.kind == FilterKind::particles) {
+    return {asked_particles(request, histogram), wish.by};
+  }
+  if (!histogram.slip_sd.none()) {
+    if (const std::string_view option = option_of_bounds(request); !option.empty()) {
+      refuse_option(option,
+                    "has no effect where objects slip, as the histogram alone follows them; leave "
+                    "it out");
+    }
+    if (!by_histogram) {
+      asked.remarks.emplace_back(
+          "objects that slip are followed by the histogram, over every bin; `filter histogram` "
+          "says so");
+    }
+    return {histogram, ""};
+  }
+  const std::string& every_bin_for = asked.of.every_bin_for;
+  if (wish.kind == FilterKind::bounded || (!by_histogram && every_bin_for.empty())) {
+    return {asked_bounds(request, histogram), wish.by};
+  }
+  // What would have to go for bounds to take the bins.
+  std::string by = by_histogram ? wish.by : "";
+  if (!every_bin_for.empty()) {
+    by = fmt::format("`{}`{}{}", every_bin_for, by_histogram ? " and " : "", by);
+  }
+  return {histogram, by};
+}
+
+/// The lattice with counts that were settled before or, where a width is given, chosen.
+PoseLattice settled_lattice(Asked& asked, const FilterOptions& filter,
+                            std::span<const Hypothesis> hypotheses, std::optional<BinWidth> width) {
+  PoseLattice lattice = lattice_of(filter);
+  if (const auto& counts = asked.of.counts) {
+    lattice.x_mm.count = (*counts)[0];
+    lattice.y_mm.count = (*counts)[1];
+    lattice.theta_rad.count = (*counts)[2];
+    return lattice;
+  }
+  if (!width) {
+    return lattice;
+  }
+  const auto [bins, most] = chosen_bins(asked.device, hypotheses, filter, *width);
+  if (bins.coarsened) {
+    asked.remarks.push_back(fmt::format(
+        "`bins {}`: steps of {:.2f} mm, wider than the maps resolve, keep to {} bins in all; "
+        "narrow the region, or give `bins`",
+        *width == BinWidth::fine ? "fine" : "auto", bins.step_mm, most));
+  }
+  return bins.lattice;
+}
+
+/// An axis of one bin limits nothing.
+/// @param lattice with the counts that are used
+/// @throws Error where a standard deviation is wider than the region
+void require_within_region(const Request& request, const PoseLattice& lattice) {
+  const DisplacementSd widest = widest_displacement(lattice);
+  const double widest_deg = widest.rad * 180.0 / std::numbers::pi;
+  for (const auto& [option, sd, most, unit] :
+       {std::tuple{"touch-sd-mm", request.touch_sd_mm, widest.mm, "mm"},
+        std::tuple{"slip-sd-mm", request.slip_sd_mm, widest.mm, "mm"},
+        std::tuple{"touch-sd-deg", request.touch_sd_deg, widest_deg, "deg"},
+        std::tuple{"slip-sd-deg", request.slip_sd_deg, widest_deg, "deg"}}) {
+    if (sd.value_or(0.0) > most) {
+      refuse_given(request, option,
+                   "wider than the region, {:g} {}; give less, or widen the region", most, unit);
+    }
+  }
+}
+
 }  // namespace
 
 FilterWish filter_wish(const Request& request) {
@@ -89,68 +163,33 @@ FilterWish filter_wish(const Request& request) {
   return {kind, request.filter ? origin_of_option(request, "filter") : "`filter auto`"};
 }
 
-ChosenFilter choose_filter(const FilterWish& wish, const Request& request,
-                           const std::string& every_bin_for, HistogramOptions histogram) {
-  if (wish.kind == FilterKind::particles) {
-    return {asked_particles(request, histogram), false, wish.by};
+ChosenFilter choose_filter(Asked& asked, const FilterWish& wish,
+                           std::span<const Hypothesis> hypotheses, HistogramOptions histogram,
+                           std::optional<BinWidth> width) {
+  const Request& request = asked.request;
+  if (wish.kind != FilterKind::particles) {
+    set_displacement(request.touch_sd_mm, request.touch_sd_deg, histogram.touch_sd);
+    set_displacement(request.slip_sd_mm, request.slip_sd_deg, histogram.slip_sd);
   }
-  set_displacement(request.touch_sd_mm, request.touch_sd_deg, histogram.touch_sd);
-  set_displacement(request.slip_sd_mm, request.slip_sd_deg, histogram.slip_sd);
-  const bool slips = !histogram.slip_sd.none();
-  if (slips && wish.kind == FilterKind::bounded) {
-    if (const std::string_view option = option_of_bounds(request); !option.empty()) {
-      refuse_option(option,
-                    "has no effect where objects slip, as the histogram alone follows them; leave "
-                    "it out");
-    }
-  } else if (wish.kind == FilterKind::bounded) {
-    return {asked_bounds(request, histogram), false, wish.by};
+  ChosenFilter filter = asked_filter(asked, wish, histogram);
+  const PoseLattice lattice = settled_lattice(asked, filter.options, hypotheses, width);
+  require_within_region(request, lattice);
+  filter.options = with_lattice(filter.options, lattice);
+  const auto* bounded = std::get_if<BoundedOptions>(&filter.options);
+  if (wish.kind == FilterKind::automatic && bounded != nullptr &&
+      !bounds_have_room(hypotheses, *bounded)) {
+    filter.options = with_lattice(histogram, lattice);
   }
-  std::vector<std::string> by;  // what would have to go for bounds to take the bins
-  if (!every_bin_for.empty()) {
-    by.push_back(fmt::format("`{}`", every_bin_for));
-  }
-  if (wish.kind == FilterKind::histogram) {
-    by.push_back(wish.by);
-  }
-  return {histogram, by.empty() && !slips, slips ? "" : fmt::format("{}", fmt::join(by, " and "))};
-}
-
-void require_within_region(const Request& request, const PoseLattice& lattice) {
-  const DisplacementSd widest = widest_displacement(lattice);
-  const double widest_deg = widest.rad * 180.0 / std::numbers::pi;
-  for (const auto& [option, sd, most, unit] :
-       {std::tuple{"touch-sd-mm", request.touch_sd_mm, widest.mm, "mm"},
-        std::tuple{"slip-sd-mm", request.slip_sd_mm, widest.mm, "mm"},
-        std::tuple{"touch-sd-deg", request.touch_sd_deg, widest_deg, "deg"},
-        std::tuple{"slip-sd-deg", request.slip_sd_deg, widest_deg, "deg"}}) {
-    if (sd.value_or(0.0) > most) {
-      refuse_given(request, option,
-                   "wider than the region, {:g} {}; give less, or widen the region", most, unit);
-    }
-  }
+  return filter;
 }
 
 ChosenBins chosen_bins(const DeviceSource& device, std::span<const Hypothesis> hypotheses,
-                       const ChosenFilter& filter, BinWidth width) {
-  const FilterTraits traits = traits_of(filter.options);
-  const bool by_bounds =
-      traits.certificate || (filter.automatic && bounded_instead(filter.options));
-  const std::int64_t most = by_bounds ? most_bounded_bins : most_bins_on(device());
-  return {balanced_lattice(lattice_of(filter.options), hypotheses, most, width, traits.touch_sd,
+                       const FilterOptions& filter, BinWidth width) {
+  const FilterTraits traits = traits_of(filter);
+  const std::int64_t most = traits.certificate ? most_bounded_bins : most_bins_on(device());
+  return {balanced_lattice(lattice_of(filter), hypotheses, most, width, traits.touch_sd,
                            traits.slip_sd),
           most};
-}
-
-FilterOptions filter_for_bins(std::span<const Hypothesis> hypotheses, const FilterOptions& filter,
-                              std::int64_t most_bins) {
-  if (bins_in_all(hypotheses.size(), lattice_of(filter)) > most_bins) {
-    const std::optional<BoundedOptions> bounded = bounded_instead(filter);
-    if (bounded && bounds_have_room(hypotheses, *bounded)) {
-      return *bounded;
-    }
-  }
-  return filter;
 }
 
 FilterOptions with_evidence(FilterOptions filter, const LearnedSensor& sensor,

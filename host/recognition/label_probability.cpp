@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "recognition/misfit.hpp"
+#include "recognition/object_fit.hpp"
 
 namespace palpate {
 
@@ -99,6 +99,10 @@ std::vector<double> label_probabilities(const Estimate& estimate, const Temperin
   return logs;
 }
 
+namespace {
+
+/// [label] bounds of the log evidence of its hypotheses together; of none_label, where the task has
+/// it, those of "none of these".
 std::vector<LogInterval> label_log_bounds(const Estimate& estimate, const RecognitionTask& task) {
   const Certificate& certificate = *estimate.certificate;
   std::vector<LogInterval> of_label(task.labels.size(), {log_zero, log_zero});
@@ -112,6 +116,8 @@ std::vector<LogInterval> label_log_bounds(const Estimate& estimate, const Recogn
   }
   return of_label;
 }
+
+}  // namespace
 
 std::vector<ProbabilityInterval> label_bounds(const Estimate& estimate,
                                               std::span<const double> identity,

@@ -55,11 +55,6 @@ inline constexpr double log_zero = -std::numeric_limits<double>::infinity();
 /// log(exp(a) + exp(b))
 double log_sum(double a, double b);
 
-/// [label] bounds of the log evidence of its hypotheses together; of none_label, where the task has
-/// it, those of "none of these".
-/// @param estimate with a certificate
-std::vector<LogInterval> label_log_bounds(const Estimate& estimate, const RecognitionTask& task);
-
 /// The bounds of each label's probability, from the bounds of its hypotheses' log evidence
 /// (Certificate::log_evidence). A label is least probable where its own evidence is the lowest and
 /// all other evidence the highest. With q of label_probabilities() for the label's evidence E:

@@ -371,14 +371,10 @@ void LiveRecognition::tell(RecognitionStep step) {
 }
 
 PlannedTouch LiveRecognition::plan(const DetectedTouch& touch) const {
-  std::vector<glm::dvec2> living_mm;
-  for (std::size_t e = 0; e < elements_mm_.size(); ++e) {
-    if (touch.valid.empty() || touch.valid[e] != 0) {
-      living_mm.push_back(elements_mm_[e]);
-    }
-  }
+  const std::vector<glm::dvec2> living_mm = living_elements(view_of(touch));
   const PlanOptions options;
-  const std::vector<PoseSample> samples = recogniser_.sample(options.samples, options.seed);
+  const std::vector<PoseSample> samples =
+      recogniser_.filter().sample(options.samples, options.seed);
   const std::vector<Pose> candidates =
       candidate_grid(samples, task_, living_mm, touch.T_robot_sensor->theta_rad);
   return rank_touches(recogniser_, task_, candidates, living_mm, *options_.plan, options).front();

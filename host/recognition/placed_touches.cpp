@@ -11,6 +11,7 @@
 
 #include "estimation/lattice/refinement.hpp"
 #include "model/contact_readings.hpp"
+#include "recognition/belief_cells.hpp"
 
 namespace palpate {
 
@@ -39,16 +40,21 @@ PlacedTouches::PlacedTouches(std::span<const TouchEvidence> touches, const Recog
   }
 }
 
+double PlacedTouches::evaluate(const TouchEvidence& touch, const Pose& T_object_robot,
+                               std::span<const Pose> displacements, std::span<double> nats) const {
+  const Pose T_object_sensor = T_object_robot * touch.T_robot_sensor;
+  for (std::size_t k = 0; k < nats.size(); ++k) {
+    nats[k] = likelihood_.at(touch, T_object_sensor * displacements[k]);
+  }
+  return *std::ranges::max_element(nats);
+}
+
 double PlacedTouches::log_likelihood(const Pose& T_object_robot,
                                      std::span<const Pose> displacements, TouchRange range) const {
   std::vector<double> nats(displacements.size());
   double sum = 0.0;
   for (const TouchEvidence& touch : touches_.subspan(range.begin, range.end - range.begin)) {
-    const Pose T_object_sensor = T_object_robot * touch.T_robot_sensor;
-    for (std::size_t k = 0; k < nats.size(); ++k) {
-      nats[k] = likelihood_.at(touch, T_object_sensor * displacements[k]);
-    }
-    const double most = *std::ranges::max_element(nats);
+    const double most = evaluate(touch, T_object_robot, displacements, nats);
     double mean = 0.0;
     for (const double one : nats) {
       mean += std::exp(one - most) / static_cast<double>(nats.size());
@@ -103,7 +109,7 @@ double PlacedTouches::log_volume(const PlacedPeak& peak, std::span<const Pose> d
                                  TouchRange range) const {
   constexpr double step_mm = 0.4;
   constexpr double least_curvature = 0.01;  // per mm^2: no peak is wider than 10 mm
-  const std::array<const Axis*, 3> axes{&region_.x_mm, &region_.y_mm, &region_.theta_rad};
+  const std::array<const Axis*, 3> axes = axes_of(region_);
   const auto at = [&](const glm::dvec3& steps) {
     return log_likelihood(
         moved(peak.T_object_robot, step_mm * glm::dvec2(steps), step_mm * steps.z * rad_per_mm_),
@@ -152,11 +158,7 @@ double PlacedTouches::displaced_mm(const Pose& T_object_robot, std::span<const P
     if (!touch.in_contact()) {
       continue;
     }
-    const Pose T_object_sensor = T_object_robot * touch.T_robot_sensor;
-    for (std::size_t k = 0; k < nats.size(); ++k) {
-      nats[k] = likelihood_.at(touch, T_object_sensor * displacements[k]);
-    }
-    const double most = *std::ranges::max_element(nats);
+    const double most = evaluate(touch, T_object_robot, displacements, nats);
     double weight = 0.0;
     double weighed = 0.0;
     for (std::size_t k = 0; k < nats.size(); ++k) {

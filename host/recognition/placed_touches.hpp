@@ -49,12 +49,15 @@ class PlacedTouches {
   /// at this pose: the standard deviation along x and y, mm.
   double displaced_mm(const Pose& T_object_robot, std::span<const Pose> displacements,
                       TouchRange range) const;
+
+ private:
+  /// Writes the log-likelihood of a touch at each displacement; returns the largest.
+  double evaluate(const TouchEvidence& touch, const Pose& T_object_robot,
+                  std::span<const Pose> displacements, std::span<double> nats) const;
   /// The pose after a shift of the touches' middle in the object frame, mm, and a turn about it, as
   /// far as the region's axes do not stay.
   Pose moved(const Pose& T_object_robot, const glm::dvec2& shift_mm, double turn_rad) const;
-  std::size_t size() const { return touches_.size(); }
 
- private:
   std::span<const TouchEvidence> touches_;
   MapLikelihood likelihood_;
   PoseLattice region_;

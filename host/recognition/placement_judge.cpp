@@ -7,6 +7,7 @@
 #include <numbers>
 #include <numeric>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -14,6 +15,7 @@
 #include "estimation/hypotheses.hpp"
 #include "model/displacement_points.hpp"
 #include "palpate/pose_error.hpp"
+#include "recognition/belief_cells.hpp"
 #include "recognition/label_probability.hpp"
 #include "recognition/placed_touches.hpp"
 
@@ -24,7 +26,7 @@ namespace {
 constexpr double usual_rad_per_mm = 0.05;     // a robot that is 1 mm off is some 3 degrees off
 constexpr std::size_t fewest_in_contact = 2;  // before and after a move: one touch fits anywhere
 
-constexpr std::size_t points_told = 32;  // for the touch-sd that the task has
+constexpr std::size_t touch_sd_points = 32;  // for the touch-sd that the task has
 /// Volume of the moves that count as equally likely where an object moves a little, mm^2 rad.
 constexpr double near_places = 30.0 * 30.0 * 0.8;
 /// Tempered log odds from which another explanation is taken before that of the step: objects
@@ -49,55 +51,14 @@ struct Question {
   std::vector<double> log_weight = {};  ///< [hypothesis]
   std::size_t in_contact = 0;           ///< touches
 
-  std::span<const TouchEvidence> touches() const { return recogniser.evidence(); }
-  TouchRange all() const { return {0, touches().size()}; }
   double log_bin() const {
-    const PoseLattice& lattice = recogniser.lattice();
     double log_volume = 0.0;
-    for (const Axis* axis : {&lattice.x_mm, &lattice.y_mm, &lattice.theta_rad}) {
+    for (const Axis* axis : axes_of(recogniser.lattice())) {
       log_volume += axis->step() > 0.0 ? std::log(axis->step()) : 0.0;
     }
     return log_volume;
   }
-  /// The log evidence of a hypothesis that has a peak, on the scale of Estimate::log_evidence.
-  double log_evidence(int object, double nats, double log_volume) const {
-    return nats + log_volume - log_bin() + offset + log_weight[object];
-  }
-  Fit fit(std::span<const TouchEvidence> placed, const Pose& T_object_robot, DisplacementSd sd,
-          int object) const {
-    const OccupancyGrid& map = task.hypotheses[object].compared();
-    return task.fit_scale().of(
-        evidence_fit(placed, T_object_robot, map, task.contact(), sd, object).value(), in_contact);
-  }
 };
-
-/// The touches each lie somewhere else.
-Explanation displaced(const Question& question, const PlacedTouches& touches, int object,
-                      const Pose& from) {
-  constexpr std::size_t points = 64;
-  constexpr double least_mm = 0.2;
-  constexpr double most_mm = 2.0;
-  const DisplacementSd told = question.task.touch_sd();
-  const double rad_per_mm = told.mm > 0.0 && told.rad > 0.0 ? told.rad / told.mm : usual_rad_per_mm;
-  const TouchRange all = question.all();
-  // Each round learns the standard deviation anew (expectation maximisation).
-  double sd_mm = std::max(1.0, told.mm);
-  PlacedPeak peak{from, 0.0};
-  for (const double first_mm : {1.0, 0.5}) {
-    const auto at = displacement_points({sd_mm, rad_per_mm * sd_mm}, points / 2);
-    peak = touches.climb(peak.T_object_robot, at, all, first_mm);
-    const double next_mm = touches.displaced_mm(peak.T_object_robot, at, all);
-    // Twice its step, which is short.
-    sd_mm = std::clamp(next_mm * next_mm / sd_mm, least_mm, most_mm);
-  }
-  const DisplacementSd sd{sd_mm, rad_per_mm * sd_mm};
-  const auto at = displacement_points(sd, points);
-  peak = touches.climb(peak.T_object_robot, at, all, 0.25);
-  return {
-      .placement = {.object = object, .displaced = sd},
-      .log_evidence = question.log_evidence(object, peak.nats, touches.log_volume(peak, at, all)),
-      .fit = question.fit(question.touches(), peak.T_object_robot, sd, object)};
-}
 
 /// The best peaks of the touches before and from each touch on.
 struct Parts {
@@ -105,24 +66,149 @@ struct Parts {
   std::vector<PlacedPeak> from;    ///< [touch] of it and those after it
 };
 
-/// Looks at places in the whole region, coarsely; none where there are too many. Touches are added
-/// one by one from either end as long as a place is not far worse than the best for as many.
-std::optional<Parts> coarse_parts(const PlacedTouches& touches, const PoseLattice& region) {
+/// One hypothesis, and how it explains an unknown's touches.
+class Explainer {
+ public:
+  Explainer(const Question& question, int object)
+      : question_(question),
+        object_(object),
+        touches_(question.recogniser.evidence()),
+        placed_(touches_, question.task, static_cast<std::size_t>(object),
+                question.recogniser.lattice()) {}
+
+  /// The log evidence by the peak near a pose, where touches lie as the task has it: what bins say
+  /// of a peak that is narrower than they are cannot be compared with this.
+  double log_evidence_near(const Pose& from) const {
+    const auto at = displacement_points(question_.task.touch_sd(), touch_sd_points);
+    const PlacedPeak peak = placed_.climb(from, at, all_, 0.5);
+    return log_evidence(peak.nats, placed_.log_volume(peak, at, all_));
+  }
+  /// The touches each lie somewhere else.
+  Explanation displaced(const Pose& from) const;
+  /// The object moved once.
+  /// @param starts where its parts are climbed from
+  /// @param log_places of the volume of the places that it may have moved to, mm^2 rad
+  std::optional<Explanation> moved(const Parts& starts, double log_places) const;
+  /// The same with all parts climbed from one pose.
+  std::optional<Explanation> moved(const Pose& from) const {
+    const std::vector<PlacedPeak> here(touches_.size() + 1, {from, 0.0});
+    return moved({here, here}, std::log(near_places));
+  }
+  /// Looks at places in the whole region, coarsely; none where there are too many. Touches are
+  /// added one by one from either end as long as a place is not far worse than the best for as
+  /// many.
+  std::optional<Parts> coarse_parts() const;
+  /// Of the places that suit the first touches or the last, the one that suits all where each may
+  /// lie a millimetre beside its place.
+  Pose best_start(const Parts& parts) const;
+
+ private:
+  /// The log evidence of a peak, on the scale of Estimate::log_evidence.
+  double log_evidence(double nats, double log_volume) const {
+    return nats + log_volume - question_.log_bin() + question_.offset +
+           question_.log_weight[object_];
+  }
+  Fit fit(std::span<const TouchEvidence> touches, const Pose& T_object_robot,
+          DisplacementSd sd) const {
+    const RecognitionTask& task = question_.task;
+    const OccupancyGrid& map = task.hypotheses[object_].compared();
+    return task.fit_scale().of(
+        evidence_fit(touches, T_object_robot, map, task.contact(), sd, object_).value(),
+        question_.in_contact);
+  }
+
+  const Question& question_;
+  int object_;
+  std::span<const TouchEvidence> touches_;
+  PlacedTouches placed_;
+  TouchRange all_{0, touches_.size()};
+};
+
+Explanation Explainer::displaced(const Pose& from) const {
+  constexpr std::size_t points = 64;
+  constexpr double least_mm = 0.2;
+  constexpr double most_mm = 2.0;
+  const DisplacementSd touch_sd = question_.task.touch_sd();
+  const double rad_per_mm =
+      touch_sd.mm > 0.0 && touch_sd.rad > 0.0 ? touch_sd.rad / touch_sd.mm : usual_rad_per_mm;
+  // Each round learns the standard deviation anew (expectation maximisation).
+  double sd_mm = std::max(1.0, touch_sd.mm);
+  PlacedPeak peak{from, 0.0};
+  for (const double first_mm : {1.0, 0.5}) {
+    const auto at = displacement_points({sd_mm, rad_per_mm * sd_mm}, points / 2);
+    peak = placed_.climb(peak.T_object_robot, at, all_, first_mm);
+    const double next_mm = placed_.displaced_mm(peak.T_object_robot, at, all_);
+    // Twice its step, which is short.
+    sd_mm = std::clamp(next_mm * next_mm / sd_mm, least_mm, most_mm);
+  }
+  const DisplacementSd sd{sd_mm, rad_per_mm * sd_mm};
+  const auto at = displacement_points(sd, points);
+  peak = placed_.climb(peak.T_object_robot, at, all_, 0.25);
+  return {.placement = {.object = object_, .displaced = sd},
+          .log_evidence = log_evidence(peak.nats, placed_.log_volume(peak, at, all_)),
+          .fit = fit(touches_, peak.T_object_robot, sd)};
+}
+
+std::optional<Explanation> Explainer::moved(const Parts& starts, double log_places) const {
+  if (question_.in_contact < 2 * fewest_in_contact) {
+    return {};
+  }
+  const std::size_t n = touches_.size();
+  const RecognitionTask& task = question_.task;
+  const auto at = displacement_points(task.touch_sd(), touch_sd_points);
+  double most = log_zero;
+  std::size_t after = 0;
+  std::array<PlacedPeak, 2> parts;
+  std::size_t in_contact = 0;
+  for (std::size_t k = 1; k < n; ++k) {
+    in_contact += touches_[k - 1].in_contact() ? 1 : 0;
+    if (in_contact < fewest_in_contact || question_.in_contact - in_contact < fewest_in_contact) {
+      continue;
+    }
+    const PlacedPeak a = placed_.climb(starts.before[k].T_object_robot, at, {0, k}, 1.0);
+    const PlacedPeak b = placed_.climb(starts.from[k].T_object_robot, at, {k, n}, 1.0);
+    if (a.nats + b.nats > most) {
+      most = a.nats + b.nats;
+      after = k;
+      parts = {a, b};
+    }
+  }
+  if (after == 0) {
+    return {};
+  }
+  const auto& [before, from] = parts;
+  std::vector<TouchEvidence> kept(touches_.begin(), touches_.end());
+  const Pose move = inverse(before.T_object_robot) * from.T_object_robot;
+  for (std::size_t i = after; i < n; ++i) {
+    kept[i].T_robot_sensor = move * kept[i].T_robot_sensor;
+  }
+  const double volumes =
+      placed_.log_volume(before, at, {0, after}) + placed_.log_volume(from, at, {after, n});
+  const std::optional<Body>& body = task.bodies[object_];
+  const double moved_mm = body ? pose_error_mm(*body, task.hypotheses[object_].map.symmetry,
+                                               before.T_object_robot, from.T_object_robot)
+                               : 0.0;
+  return Explanation{.placement = {.object = object_, .moved_after = after, .moved_mm = moved_mm},
+                     .log_evidence = log_evidence(most, volumes - log_places) -
+                                     std::log(static_cast<double>(n - 1)),
+                     .fit = fit(kept, before.T_object_robot, task.touch_sd())};
+}
+
+std::optional<Parts> Explainer::coarse_parts() const {
   const std::vector<Pose> at(1);
-  constexpr double step_mm = 1.25;
-  constexpr double step_rad = 0.125;
+  constexpr std::array steps{1.25, 1.25, 0.125};  // mm, mm, rad
   constexpr std::int64_t most_places = 400'000;
   constexpr double hopeless = 30.0;  // nats; more than the coarse steps cost
-  const auto coarse = [](Axis axis, double step) {
-    axis.count = std::max(static_cast<int>(std::ceil((axis.upper - axis.lower) / step)), 1);
-    return axis;
-  };
-  const PoseLattice places{coarse(region.x_mm, step_mm), coarse(region.y_mm, step_mm),
-                           coarse(region.theta_rad, step_rad), region.pivot_mm};
+  PoseLattice places = question_.recogniser.lattice();
+  for (const auto& [axis, step] : {std::pair{&places.x_mm, steps[0]},
+                                   {&places.y_mm, steps[1]},
+                                   {&places.theta_rad, steps[2]}}) {
+    axis->count = std::max(static_cast<int>(std::ceil((axis->upper - axis->lower) / step)), 1);
+  }
   if (places.bins() > most_places) {
     return {};
   }
-  const std::size_t n = touches.size();
+  const std::size_t n = touches_.size();
   const PlacedPeak none{{}, log_zero};
   Parts best{std::vector<PlacedPeak>(n + 1, none), std::vector<PlacedPeak>(n + 1, none)};
   for (std::int64_t place = 0; place < places.bins(); ++place) {
@@ -131,7 +217,7 @@ std::optional<Parts> coarse_parts(const PlacedTouches& touches, const PoseLattic
       double nats = 0.0;
       for (std::size_t i = 0; i < n; ++i) {
         const std::size_t touch = backwards ? n - 1 - i : i;
-        nats += touches.log_likelihood(to, at, {touch, touch + 1});
+        nats += placed_.log_likelihood(to, at, {touch, touch + 1});
         PlacedPeak& part = parts[backwards ? touch : touch + 1];
         if (nats > part.nats) {
           part = {to, nats};
@@ -146,84 +232,19 @@ std::optional<Parts> coarse_parts(const PlacedTouches& touches, const PoseLattic
   return best;
 }
 
-/// Of the places that suit the first touches or the last, the one that suits all where each may lie
-/// a millimetre beside its place.
-Pose best_start(const PlacedTouches& touches, const Parts& parts, TouchRange all) {
+Pose Explainer::best_start(const Parts& parts) const {
   const auto at = displacement_points({1.0, usual_rad_per_mm}, 32);
   PlacedPeak best{{}, log_zero};
   for (const std::vector<PlacedPeak>* of : {&parts.before, &parts.from}) {
     for (const PlacedPeak& part : *of) {
       const double nats =
-          part.nats == log_zero ? log_zero : touches.log_likelihood(part.T_object_robot, at, all);
+          part.nats == log_zero ? log_zero : placed_.log_likelihood(part.T_object_robot, at, all_);
       if (nats > best.nats) {
         best = {part.T_object_robot, nats};
       }
     }
   }
   return best.T_object_robot;
-}
-
-/// The object moved once.
-/// @param starts where its parts are climbed from
-/// @param log_places of the volume of the places that it may have moved to, mm^2 rad
-std::optional<Explanation> moved(const Question& question, const PlacedTouches& touches, int object,
-                                 const Parts& starts, double log_places) {
-  if (question.in_contact < 2 * fewest_in_contact) {
-    return {};
-  }
-  const std::size_t n = touches.size();
-  const DisplacementSd told = question.task.touch_sd();
-  const auto at = displacement_points(told, points_told);
-  double most = log_zero;
-  std::size_t after = 0;
-  std::array<PlacedPeak, 2> parts;
-  std::size_t in_contact = 0;
-  for (std::size_t k = 1; k < n; ++k) {
-    in_contact += question.touches()[k - 1].in_contact() ? 1 : 0;
-    if (in_contact < fewest_in_contact || question.in_contact - in_contact < fewest_in_contact) {
-      continue;
-    }
-    const PlacedPeak a = touches.climb(starts.before[k].T_object_robot, at, {0, k}, 1.0);
-    const PlacedPeak b = touches.climb(starts.from[k].T_object_robot, at, {k, n}, 1.0);
-    if (a.nats + b.nats > most) {
-      most = a.nats + b.nats;
-      after = k;
-      parts = {a, b};
-    }
-  }
-  if (after == 0) {
-    return {};
-  }
-  std::vector<TouchEvidence> kept(question.touches().begin(), question.touches().end());
-  const Pose move = inverse(parts[0].T_object_robot) * parts[1].T_object_robot;
-  for (std::size_t i = after; i < n; ++i) {
-    kept[i].T_robot_sensor = move * kept[i].T_robot_sensor;
-  }
-  const double volumes =
-      touches.log_volume(parts[0], at, {0, after}) + touches.log_volume(parts[1], at, {after, n});
-  const Hypothesis& hypothesis = question.task.hypotheses[object];
-  const std::optional<Body>& body = question.task.bodies[object];
-  return Explanation{.placement = {.object = object,
-                                   .moved_after = after,
-                                   .moved_mm = body ? pose_error_mm(*body, hypothesis.map.symmetry,
-                                                                    parts[0].T_object_robot,
-                                                                    parts[1].T_object_robot)
-                                                    : 0.0},
-                     .log_evidence = question.log_evidence(object, most, volumes - log_places) -
-                                     std::log(static_cast<double>(n - 1)),
-                     .fit = question.fit(kept, parts[0].T_object_robot, told, object)};
-}
-
-/// The log evidence of a hypothesis by its peak near a pose, where touches lie as the task has it:
-/// what bins say of a peak that is narrower than they are cannot be compared with this.
-double log_evidence_here(const Question& question, const std::pair<int, Pose>& at_pose) {
-  const auto& [object, from] = at_pose;
-  const RecognitionTask& task = question.task;
-  const PlacedTouches placed(question.touches(), task, static_cast<std::size_t>(object),
-                             question.recogniser.lattice());
-  const auto at = displacement_points(task.touch_sd(), points_told);
-  const PlacedPeak peak = placed.climb(from, at, question.all(), 0.5);
-  return question.log_evidence(object, peak.nats, placed.log_volume(peak, at, question.all()));
 }
 
 /// The most probable hypotheses and where each explains the touches best.
@@ -280,7 +301,11 @@ std::optional<TouchPlacement> judge_placement(const Recogniser& recogniser,
     objects.resize(1);
   }
   const double temperature = task.temperature_after(touches);
-  const double exact = log_evidence_here(question, objects.front());
+  std::vector<Explainer> explainers;
+  for (const auto& [object, from] : objects) {
+    explainers.emplace_back(question, object);
+  }
+  const double exact = explainers.front().log_evidence_near(objects.front().second);
   const auto explains = [&](const Explanation& one) {
     if (one.fit.verdict == Verdict::does_not_fit) {
       return false;
@@ -302,24 +327,18 @@ std::optional<TouchPlacement> judge_placement(const Recogniser& recogniser,
       found = one;
     }
   };
-  const auto placed_on = [&](int object) {
-    return PlacedTouches(touches, task, static_cast<std::size_t>(object), recogniser.lattice());
-  };
-  for (const auto& [object, from] : objects) {
-    const PlacedTouches placed = placed_on(object);
-    const std::vector<PlacedPeak> here(touches.size() + 1, {from, 0.0});
-    consider(displaced(question, placed, object, from));
-    consider(moved(question, placed, object, {here, here}, std::log(near_places)));
+  for (std::size_t i = 0; i < objects.size(); ++i) {
+    consider(explainers[i].displaced(objects[i].second));
+    consider(explainers[i].moved(objects[i].second));
   }
   // Displacements would make a search through the region long.
   if (!found && unexplained && task.touch_sd().none()) {
-    const PoseLattice& region = recogniser.lattice();
-    const double log_places = std::log(static_cast<double>(region.bins())) + question.log_bin();
-    for (const auto& [object, from] : objects) {
-      const PlacedTouches placed = placed_on(object);
-      if (const auto parts = coarse_parts(placed, region)) {
-        consider(displaced(question, placed, object, best_start(placed, *parts, question.all())));
-        consider(moved(question, placed, object, *parts, log_places));
+    const double log_places =
+        std::log(static_cast<double>(recogniser.lattice().bins())) + question.log_bin();
+    for (const Explainer& explainer : explainers) {
+      if (const auto parts = explainer.coarse_parts()) {
+        consider(explainer.displaced(explainer.best_start(*parts)));
+        consider(explainer.moved(*parts, log_places));
       }
     }
   }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -8,12 +9,53 @@
 #include <string>
 #include <vector>
 
+#include <glm/vec2.hpp>
+
 #include "model/touch_evidence.hpp"
 #include "recognition/filter.hpp"
 #include "recognition/recognition_task.hpp"
-#include "recognition/touch_places.hpp"
 
 namespace palpate {
+
+/// How much touches of one unknown tell beside each other. Readings of one place share what the map
+/// lacks there, and do not multiply as those of different places do. So each touch has a weight,
+///   w_i = max(0, 1 - sum over earlier j of w_j k(d_ij) min(1, 2 c_j / c_i)),
+///   k(d) = max(0, 1 - (d / s)^2),
+/// with d the elements' root mean square distance between the two touches, s the elements' spacing
+/// and c the number of elements In Contact: a press after a mere brush tells its own. About any
+/// place the weights sum to about one, and touches further apart than s keep theirs. The first
+/// touch of a place counts whole, whatever comes later, so that beliefs need no second look at it.
+class TouchPlaces {
+ public:
+  void clear() { *this = {}; }
+  /// The touch with as many of its known elements as its weight says, spread over the array; the
+  /// others are Unknown. So all filters, "(none)" and the fit give it that weight.
+  TouchEvidence weighed(const TouchEvidence& touch) const;
+  /// weighed() of a touch that belongs to those before from now on.
+  TouchEvidence add(const TouchEvidence& touch);
+  /// What to say where touches are written twice, or lie so close together that they count as half
+  /// as many at most; else "".
+  std::string words() const;
+
+ private:
+  struct Place {
+    glm::dvec2 middle_mm{0.0};  ///< mean of the elements in the robot frame
+    double theta_rad = 0.0;
+    double square_mm2 = 0.0;  ///< elements' mean squared distance from the middle
+    double contacts = 0.0;
+    double force = 0.0;  ///< TouchEvidence::force
+    double weight = 1.0;
+  };
+
+  static Place place_of(const TouchEvidence& touch);
+  double weight_of(const Place& place, const TouchEvidence& touch) const;
+  TouchEvidence thinned(const TouchEvidence& touch, double weight) const;
+
+  std::vector<Place> places_;  ///< of touches with a weight above 0
+  std::size_t touches_ = 0;    ///< In Contact
+  std::size_t repeated_ = 0;   ///< of these, equal to an earlier one to the digit
+  double counted_ = 0.0;       ///< sum of their weights
+};
 
 /// The filter that a task names. Functions throw Error as those of PoseHistogram, BoundedPosterior
 /// and ParticleFilter do.
@@ -33,24 +75,11 @@ class Recogniser {
   /// belief together with that touch; until then the belief is the one before any touch.
   /// `progress` is called now and then with the fraction done.
   void update(std::span<const Touch> touches, const std::function<void(double)>& progress = {});
+  /// What the belief tells.
+  const Filter& filter() const { return *filter_; }
   /// See Filter::estimate().
   Estimate estimate(std::optional<double> tolerance = {}) const {
     return filter_->estimate(tolerance);
-  }
-  /// The refined pose near the mode; empty for particles.
-  std::optional<RefinedPose> refine(const Mode& mode) const { return filter_->refine(mode); }
-  /// ParticleFilter::effective_sample_size(); empty without particles.
-  std::optional<double> effective_sample_size() const { return filter_->effective_sample_size(); }
-  std::vector<PoseSample> sample(std::size_t count, std::uint64_t seed) const {
-    return filter_->sample(count, seed);
-  }
-  /// Filter::entropy(); empty for particles.
-  std::optional<double> entropy() const { return filter_->entropy(); }
-  /// See PoseHistogram::expected_gain(); empty for particles.
-  std::vector<TouchGain> expected_gain(std::span<const Pose> T_robot_sensor,
-                                       std::span<const glm::dvec2> elements_mm,
-                                       const PlanOptions& plan) const {
-    return filter_->expected_gain(T_robot_sensor, elements_mm, plan);
   }
   /// Whether the belief has taken in a touch since reset(). Touches that wait for an automatic
   /// pivot do not count.
@@ -74,14 +103,6 @@ class Recogniser {
   std::string unresolved_words() const;
   /// See TouchPlaces::words().
   std::string place_words() const { return places_.words(); }
-  /// See Filter::words().
-  std::vector<std::string> words() const { return filter_->words(); }
-  std::uint64_t device_bytes() const { return filter_->device_bytes(); }
-  std::uint64_t host_bytes() const { return filter_->host_bytes(); }
-  /// See Filter::histogram().
-  const PoseHistogram* histogram() const { return filter_->histogram(); }
-  /// See Filter::evaluated_bins().
-  std::optional<EvaluatedBelief> evaluated_bins() const { return filter_->evaluated_bins(); }
 
  private:
   /// Whether an automatic pivot has yet to be placed.

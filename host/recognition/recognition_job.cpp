@@ -73,13 +73,13 @@ Recogniser RecognitionJob::open(const FilterResources& search) const {
   } catch (const Error& error) {
     // A resolved task is sound: only the bins' memory can be refused.
     if (error.fault() == Fault::input && traits_of(task_.filter).every_bin &&
-        !task_.filter_asked_for_by.empty() &&
+        !task_.filter_chosen_by.empty() &&
         bounds_have_room(task_.hypotheses, {.lattice = task_.lattice(),
                                             .contact = task_.contact(),
                                             .touch_sd = task_.touch_sd()})) {
       throw Error(Fault::input,
                   fmt::format("{}, or leave out {}: `filter bounded` needs no device memory",
-                              error.what(), task_.filter_asked_for_by));
+                              error.what(), task_.filter_chosen_by));
     }
     throw;
   }

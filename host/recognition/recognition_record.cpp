@@ -8,15 +8,16 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "estimation/lattice/refinement.hpp"
 #include "palpate/error.hpp"
 #include "palpate/object_frame.hpp"
 #include "palpate/pose_error.hpp"
 #include "recognition/label_probability.hpp"
-#include "recognition/nearby_fit.hpp"
+#include "recognition/object_fit.hpp"
 #include "recognition/placement_judge.hpp"
-#include "recognition/scaled_pose.hpp"
+#include "recognition/scales.hpp"
 #include "recognition/warnings.hpp"
 
 namespace palpate {
@@ -49,51 +50,10 @@ PartialTruth in_frame_of_map(const RecognitionTask& task, PartialTruth truth) {
   return truth;
 }
 
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
-
-/// RecognitionStep::fit and RecognitionStep::touch_fit.
-struct StepFit {
-  std::optional<Fit> fit = {};
-  std::vector<std::optional<double>> touches = {};
-};
-
-StepFit fit_of(const Mode& mode, const std::optional<RefinedPose>& refined,
-               std::span<const TouchEvidence> touches, const RecognitionTask& task) {
-  const auto in_contact =
-      static_cast<std::size_t>(std::ranges::count_if(touches, &TouchEvidence::in_contact));
-  if (in_contact == 0) {
-    return {};
-  }
-  const auto object = static_cast<std::size_t>(mode.object);
-  const OccupancyGrid& map = task.hypotheses[object].compared();
-  const FitScale scale = task.fit_scale_for(touches);
-  if (!refined) {
-    const std::optional<Fit> fit =
-        best_fit_near(touches, mode.T_object_robot, map, task.contact(), object);
-    return {.fit = scale.of(fit.value(), in_contact)};
-  }
-  const std::vector<std::optional<FitSums>> sums =
-      fit_sums(touches, refined->T_object_robot, map, task.contact(), task.touch_sd(), object);
-  StepFit result{.fit = scale.of(combined_fit(sums).value(), in_contact)};
-  FitScale of_one = scale;
-  if (in_contact > 1) {
-    of_one.alone.reset();  // the pose is that of all touches
-  }
-  for (const std::optional<FitSums>& touch : sums) {
-    const std::optional<Fit> fit = combined_fit(std::span(&touch, 1));
-    result.touches.push_back(fit ? std::optional(of_one.of(*fit, 1).z) : std::nullopt);
-  }
-  return result;
-}
-
 /// RecognitionStep::refined
 std::optional<RefinedPose> refined_near(const Mode& mode, const Recogniser& recogniser,
                                         const RecognitionTask& task) {
-  const std::optional<RefinedPose> refined = recogniser.refine(mode);
+  const std::optional<RefinedPose> refined = recogniser.filter().refine(mode);
   return refined
              ? std::optional(on_scale(task, recogniser.evidence(),
                                       displaced_body(task.hypotheses[mode.object].map), *refined))
@@ -118,6 +78,83 @@ RecognitionStep identity_after(Recogniser& recogniser, const RecognitionTask& ta
       estimate_after(recogniser, task, touches, progress, task.drawn_tolerance);
   return judge(estimate, {}, task, recogniser.evidence(),
                refined_near(estimate.mode, recogniser, task));
+}
+
+/// What to say where symmetry_told() takes turns as equal that the map does not, or where a known
+/// pose error is such a turn; else none.
+std::optional<std::string> turned_alike(const RecognitionTask& task, const RecognitionStep& step) {
+  constexpr double least_error_mm = 1.0;
+  const OccupancyGrid& map = task.hypotheses[step.mode.object].map;
+  const int n = map.suggested_symmetry.value_or(1);
+  if (map.symmetry != 1 || n == 1) {
+    return {};
+  }
+  const std::string alike =
+      fmt::format("{} looks the same after {}", map.label,
+                  n == 0 ? "any turn" : fmt::format("every 1/{} of a turn", n));
+  if (step.symmetry == n) {
+    return fmt::format(
+        "{}, and the touches do not tell such turns apart: they count as equal; build its map with "
+        "`symmetry {}` where they always are, with `symmetry 1` where they never are",
+        alike, n);
+  }
+  const std::optional<double> error_mm = step.pose_error_mm();
+  if (!error_mm) {
+    return {};
+  }
+  const double ignored_mm =
+      pose_error_mm(step.body.value(), n, step.pose(), *step.truth.T_object_robot);
+  return *error_mm - ignored_mm > least_error_mm
+             ? std::optional(
+                   fmt::format("{}, and the pose error of {:.2f} mm is {:.2f} mm where "
+                               "such turns do not count; build its map with `symmetry {}`",
+                               alike, *error_mm, ignored_mm, n))
+             : std::nullopt;
+}
+
+/// The touches, from 0, that disagree where all others fit the mode's object at the pose: by
+/// touch_fit, a third of them at most, and the others are three or more in contact. Else none.
+std::vector<std::size_t> unlike_touches(std::span<const TouchEvidence> touches,
+                                        const RecognitionTask& task, const RecognitionStep& step) {
+  constexpr double unlike_z = -8.0;
+  constexpr double others_from_z = -5.0;
+  // A stranger's few touches may agree by chance.
+  const std::size_t least_others = task.labels[step.best] == none_label ? 7 : 3;
+  std::vector<std::size_t> unlike;
+  std::size_t others = 0;
+  for (std::size_t i = 0; i < step.touch_fit.size(); ++i) {
+    const std::optional<double>& z = step.touch_fit[i];
+    if (z && *z < unlike_z) {
+      unlike.push_back(i);
+    } else if (z && *z < others_from_z) {
+      return {};  // where many fit badly, none stands out
+    } else if (z && touches[i].in_contact()) {
+      ++others;
+    }
+  }
+  return others < std::max(least_others, 2 * unlike.size()) ? std::vector<std::size_t>() : unlike;
+}
+
+/// What to say of these touches.
+std::string unlike_words(std::span<const std::size_t> unlike, const RecognitionTask& task,
+                         const RecognitionStep& step) {
+  double lowest_z = 0.0;
+  std::vector<std::size_t> numbers;
+  for (const std::size_t touch : unlike) {
+    lowest_z = std::min(lowest_z, *step.touch_fit[touch]);
+    numbers.push_back(touch + 1);
+  }
+  const std::string name = task.name_of(step.mode.object);
+  const bool one = unlike.size() == 1;
+  const bool last = unlike.front() + unlike.size() == step.touch_fit.size();
+  return fmt::format(
+      "touch{} {} fit{} {} {:.0f} standard deviations worse than touches of {} do, while the "
+      "others "
+      "fit: {}",
+      one ? "" : "es", fmt::join(numbers, ", "), one ? "s" : "", name, -lowest_z, name,
+      last  ? "did the object move, or does the array touch something else?"
+      : one ? "leave it out, or look at its pose"
+            : "leave them out, or look at their poses");
 }
 
 /// Warns where a learned object explains the touches only if they lie elsewhere than the robot
@@ -189,8 +226,7 @@ void RecognitionRecord::require_steps() const {
 RecognitionStep judge(const Estimate& estimate, const PartialTruth& truth,
                       const RecognitionTask& task, std::span<const TouchEvidence> touches,
                       const std::optional<RefinedPose>& refined) {
-  const std::vector<std::string>& labels = task.labels;
-  StepFit fit = fit_of(estimate.mode, refined, touches, task);
+  ObjectFit fit = fit_of(estimate.mode, refined, touches, task);
   const Tempering tempering = tempering_of(touches, task, fit.fit);
   RecognitionStep step{.touches = touches.size(),
                        .identity = label_probabilities(estimate, tempering, task),
@@ -206,11 +242,11 @@ RecognitionStep judge(const Estimate& estimate, const PartialTruth& truth,
     step.identity_bounds = label_bounds(estimate, step.identity, tempering, task);
     step.certificate = estimate.certificate;
   }
-  step.best = static_cast<std::size_t>(
-      std::max_element(step.identity.begin(), step.identity.end()) - step.identity.begin());
+  step.best =
+      static_cast<std::size_t>(std::ranges::max_element(step.identity) - step.identity.begin());
   if (!truth.label.empty()) {
-    const bool learned = std::find(labels.begin(), labels.end(), truth.label) != labels.end();
-    step.right = labels[step.best] == (learned ? truth.label : none_label);
+    const bool learned = std::ranges::find(task.labels, truth.label) != task.labels.end();
+    step.right = task.labels[step.best] == (learned ? truth.label : none_label);
   }
   measure_errors(task, step);
   return step;
@@ -220,20 +256,13 @@ RecognitionStep take_step(Recogniser& recogniser, const RecognitionTask& task,
                           std::span<const Touch> touches, const PartialTruth& truth,
                           const std::function<void(double)>& progress,
                           std::optional<double> tolerance) {
-  const Clock::time_point start = Clock::now();
   const Estimate estimate = estimate_after(recogniser, task, touches, progress, tolerance);
-  const double seconds = seconds_since(start);
-  const Clock::time_point estimated = Clock::now();
-  const std::optional<RefinedPose> refined = refined_near(estimate.mode, recogniser, task);
-  const double refine_seconds = seconds_since(estimated);
-
   const std::span<const TouchEvidence> evidence = recogniser.evidence();
-  RecognitionStep step = judge(estimate, truth, task, evidence, refined);
-  step.seconds = seconds;
-  step.refine_seconds = refine_seconds;
+  RecognitionStep step =
+      judge(estimate, truth, task, evidence, refined_near(estimate.mode, recogniser, task));
   step.symmetry = symmetry_told(recogniser, task, step);
   measure_errors(task, step);  // again, by the symmetry that is told
-  step.effective_sample_size = recogniser.effective_sample_size();
+  step.effective_sample_size = recogniser.filter().effective_sample_size();
   step.places = places_of(recogniser, estimate, task, step);
   step.decision = decide(step, task);
 
@@ -265,7 +294,7 @@ RecognitionRecord recognise(Recogniser& recogniser, const RecognitionTask& task,
   if (!record.error.empty()) {
     return record;
   }
-  const Clock::time_point start = Clock::now();
+  const auto start = std::chrono::steady_clock::now();
   const std::span<const Touch> touches = unknown.touches;
   const std::size_t together = trace ? 1 : touches.size();
   bool progress_threw = false;  // its Error is the caller's, not the unknown's
@@ -297,7 +326,7 @@ RecognitionRecord recognise(Recogniser& recogniser, const RecognitionTask& task,
     record.trace.clear();
     record.error = fmt::format("{}: {}", unknown.recording, error.what());
   }
-  record.seconds = seconds_since(start);
+  record.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return record;
 }
 

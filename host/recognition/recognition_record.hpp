@@ -95,8 +95,6 @@ struct RecognitionStep {
   BeliefPlaces places = {};           ///< where the belief lies, all objects' together
   Decision decision = {};             ///< whether to act on pose()
   std::vector<std::string> warnings;  ///< what looks wrong with the touches, in whole sentences
-  double seconds = 0.0;               ///< wall time from the touch to the estimate
-  double refine_seconds = 0.0;        ///< wall time of the refined pose
 
   double confidence() const { return identity[best]; }
   /// The refined pose, or the mode's where there is none; T_object_robot.
@@ -137,6 +135,17 @@ RecognitionStep judge(const Estimate& estimate, const PartialTruth& truth,
                       const RecognitionTask& task, std::span<const TouchEvidence> touches = {},
                       const std::optional<RefinedPose>& refined = {});
 
+/// The n-fold symmetry of the mode's object as far as touches tell: its map's, or where that is 1
+/// and the belief spreads over turns after which the map looks the same, the one that the map shows
+/// (OccupancyGrid::suggested_symmetry).
+int symmetry_told(const Recogniser& recogniser, const RecognitionTask& task,
+                  const RecognitionStep& step);
+/// The same of an object's map and its belief.
+/// @param shares [theta] of the belief, at the centres of the axis
+/// @param own_rad the most probable theta
+/// @param temperature by which turns weigh, see LearnedSensor
+int symmetry_told(const OccupancyGrid& map, const Axis& theta, std::span<const double> shares,
+                  double own_rad, double temperature);
 /// Where the belief lies about the step's pose.
 BeliefPlaces places_of(const Recogniser& recogniser, const Estimate& estimate,
                        const RecognitionTask& task, const RecognitionStep& step);

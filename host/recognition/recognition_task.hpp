@@ -1,6 +1,5 @@
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -9,16 +8,11 @@
 #include <vector>
 
 #include "model/touch_evidence.hpp"
-#include "palpate/balanced_lattice.hpp"
-#include "palpate/device.hpp"
-#include "palpate/learned_sensor.hpp"
 #include "palpate/pose_error.hpp"
 #include "recognition/filter.hpp"
+#include "recognition/request.hpp"
 
 namespace palpate {
-
-/// Bins of so many objects together.
-std::int64_t bins_in_all(std::size_t objects, const PoseLattice& lattice);
 
 /// When a robot acts on a result; see decide().
 struct ActWhere {
@@ -37,7 +31,8 @@ struct RecognitionTask {
   /// See FilterTraits.
   DisplacementSd touch_sd() const { return traits_of(filter).touch_sd; }
   DisplacementSd slip_sd() const { return traits_of(filter).slip_sd; }
-  std::int64_t bins_in_all() const { return palpate::bins_in_all(hypotheses.size(), lattice()); }
+  /// Bins of all objects together.
+  std::int64_t bins_in_all() const;
   const ContactClassifier& classifier() const { return contact().classifier; }
   /// The label of a hypothesis, and that it is the mirrored one where it is.
   std::string name_of(int object) const;
@@ -58,25 +53,23 @@ struct RecognitionTask {
   const FilterOptions filter;  ///< as it is opened
   /// Each label once, in the order of the maps; none_label comes last where "none of these" has a
   /// weight.
-  const std::vector<std::string> labels;
-  const std::vector<std::size_t> label_of;  ///< [hypothesis] index into labels
+  std::vector<std::string> labels = {};
+  std::vector<std::size_t> label_of = {};  ///< [hypothesis] index into labels
   /// [hypothesis] the occupied cells of its map; none where no cell is.
-  const std::vector<std::optional<Body>> bodies;
+  std::vector<std::optional<Body>> bodies = {};
   std::vector<std::string> map_paths = {};  ///< [hypothesis] file of the map; empty without files
-  /// By which the lattice's counts were chosen; none where these were given.
-  std::optional<BinWidth> bin_width = {};
-  bool auto_filter = false;  ///< filter_for_bins() chose between the histogram and bounds
-  /// What asked for the filter, such as an option; "" where nothing did.
-  std::string filter_asked_for_by = {};
+  /// What chose the filter, such as "`filter auto`" or "`posterior`"; "" where objects slip, which
+  /// the histogram alone follows.
+  std::string filter_chosen_by = {};
   /// The pivot is the array's centre at the first touch of each unknown with an element In Contact.
   bool auto_pivot = false;
   /// Touches of one place count as about one, see TouchPlaces.
   bool by_place = false;
-  std::string sensor_model = {};  ///< file of what was learned about the sensor; "" by Eq. 7
-  /// What was learned: how sure probabilities are, the bins that they are for, press features and
-  /// the scales of fits and poses; by Eq. 7 its scales alone, of the maps' left-out touches. What
-  /// the request overrides, and its table, count as `filter` has them.
-  LearnedSensor sensor = {};
+  /// What was learned about the sensor: how sure probabilities are, the bins that they are for,
+  /// press features and the scales of fits and poses. By Eq. 7 it has no file, and the scales
+  /// alone, of the maps' left-out touches. What the request overrides, and its table, count as
+  /// `filter` has them.
+  SensorFromFile sensor = {};
   /// Tolerance of a trace's steps before the last; BoundedOptions::tolerance where it is not set.
   std::optional<double> trace_tolerance = {};
   /// The same of steps of which a picture shows the identity alone.
@@ -84,9 +77,5 @@ struct RecognitionTask {
   ActWhere act = {};                      ///< for RecognitionStep::decision
   std::vector<std::string> remarks = {};  ///< sentences for the user, once the filter is open
 };
-
-/// What to say where the task's bins are more than 1.5 times as wide as those of the sensor model;
-/// "" elsewhere.
-std::string wider_bins_sentence(const RecognitionTask& task);
 
 }  // namespace palpate

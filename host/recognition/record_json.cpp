@@ -1,20 +1,27 @@
 #include "recognition/record_json.hpp"
 
+#include <algorithm>
 #include <numbers>
+#include <vector>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 
 namespace palpate {
 
 namespace {
 
+using Json = nlohmann::ordered_json;
+
 /// [x, y, theta], theta in [-pi, pi).
-nlohmann::ordered_json to_json(const Pose& pose) {
+Json to_json(const Pose& pose) {
   return {pose.translation_mm.x, pose.translation_mm.y,
           wrap_angle(pose.theta_rad, 2.0 * std::numbers::pi)};
 }
 
 /// [3][3]
-nlohmann::ordered_json to_json(const std::array<double, 9>& covariance) {
-  auto rows = nlohmann::ordered_json::array();
+Json to_json(const std::array<double, 9>& covariance) {
+  auto rows = Json::array();
   for (std::size_t row = 0; row < 3; ++row) {
     const double* values = &covariance[3 * row];
     rows.push_back({values[0], values[1], values[2]});
@@ -22,7 +29,7 @@ nlohmann::ordered_json to_json(const std::array<double, 9>& covariance) {
   return rows;
 }
 
-nlohmann::ordered_json to_json(const RecognitionStep& step, const RefinedPose& refined) {
+Json to_json(const RecognitionStep& step, const RefinedPose& refined) {
   return {{"T_robot_object", to_json(step.T_robot_object())},
           {"sd", *step.sd()},
           {"x_mm", refined.T_object_robot.translation_mm.x},
@@ -31,25 +38,22 @@ nlohmann::ordered_json to_json(const RecognitionStep& step, const RefinedPose& r
           {"covariance", to_json(refined.covariance)}};
 }
 
-nlohmann::ordered_json to_json(const BeliefMode& mode, const RecognitionTask& task) {
+Json to_json(const BeliefMode& mode, const RecognitionTask& task) {
   const Hypothesis& hypothesis = task.hypotheses[static_cast<std::size_t>(mode.object)];
-  nlohmann::ordered_json json{{"object", hypothesis.map.label},
-                              {"probability", mode.probability},
-                              {"T_robot_object", to_json(mode.pose.T_robot_object)},
-                              {"covariance", to_json(mode.pose.covariance)}};
+  Json json{{"object", hypothesis.map.label},
+            {"probability", mode.probability},
+            {"T_robot_object", to_json(mode.pose.T_robot_object)},
+            {"covariance", to_json(mode.pose.covariance)}};
   if (hypothesis.map.mirror) {
     json["mirrored"] = hypothesis.mirrored;
   }
   return json;
 }
 
-nlohmann::ordered_json to_json(std::optional<double> error_mm) {
-  return error_mm ? nlohmann::ordered_json(*error_mm) : nullptr;
-}
+Json to_json(std::optional<double> error_mm) { return error_mm ? Json(*error_mm) : nullptr; }
 
 /// Adds what a bounded posterior proves of its estimate.
-void add_certificate(nlohmann::ordered_json& json, const RecognitionStep& step,
-                     const RecognitionTask& task) {
+void add_certificate(Json& json, const RecognitionStep& step, const RecognitionTask& task) {
   const Certificate& certificate = *step.certificate;
   json["dropped_mass"] = certificate.dropped_mass;
   for (std::size_t i = 0; i < task.labels.size(); ++i) {
@@ -60,6 +64,26 @@ void add_certificate(nlohmann::ordered_json& json, const RecognitionStep& step,
   json["bins_evaluated"] = certificate.bins_evaluated;
   json["blocks_bounded"] = certificate.blocks_bounded;
 }
+
+Json to_json(const Interval& interval) { return {interval.low, interval.high}; }
+
+Json unknown_to_json(const Evaluation& evaluation) {
+  const Scores& unknown = *evaluation.unknown;
+  Json json{{"records", unknown.records},
+            {"called_none", unknown.right},
+            {"share_called_none", unknown.accuracy()},
+            {"share_interval", to_json(unknown.interval())}};
+  if (const auto& against = evaluation.known_against_unknown) {
+    json["area_under_curve"] = {{"score", against->score},
+                                {"known", against->known},
+                                {"unknown", against->unknown},
+                                {"area", against->area},
+                                {"standard_error", against->standard_error}};
+  }
+  return json;
+}
+
+Json to_json(const Median& median) { return {{"records", median.count}, {"median", median.value}}; }
 
 }  // namespace
 
@@ -75,17 +99,16 @@ std::string verdict_text(Verdict verdict) {
   return "does not fit";
 }
 
-nlohmann::ordered_json truth_to_json(const PartialTruth& truth) {
-  nlohmann::ordered_json json{{"object", truth.label}};
+Json truth_to_json(const PartialTruth& truth) {
+  Json json{{"object", truth.label}};
   if (truth.T_object_robot) {
     json["T_robot_object"] = to_json(inverse(*truth.T_object_robot));
   }
   return json;
 }
 
-nlohmann::ordered_json to_json(const RecognitionStep& step, const RecognitionTask& task,
-                               OptionWords words) {
-  nlohmann::ordered_json json;
+Json to_json(const RecognitionStep& step, const RecognitionTask& task, OptionWords words) {
+  Json json;
   if (!step.decision.because.empty()) {
     json["decision"] = {{"act", step.decision.act}, {"because", step.decision.because}};
     if (step.places.within_mm) {
@@ -118,7 +141,7 @@ nlohmann::ordered_json to_json(const RecognitionStep& step, const RecognitionTas
     if (step.refined) {
       json["refined"]["share"] = step.places.share;
     }
-    json["modes"] = nlohmann::ordered_json::array();
+    json["modes"] = Json::array();
     for (const BeliefMode& each : step.places.modes) {
       json["modes"].push_back(to_json(each, task));
     }
@@ -137,7 +160,7 @@ nlohmann::ordered_json to_json(const RecognitionStep& step, const RecognitionTas
     json["fit"] = {{"z", step.fit->z}, {"verdict", verdict_text(step.fit->verdict)}};
   }
   if (!step.touch_fit.empty()) {
-    nlohmann::ordered_json& fits = json["touch_fit"] = nlohmann::ordered_json::array();
+    Json& fits = json["touch_fit"] = Json::array();
     for (const std::optional<double>& z : step.touch_fit) {
       fits.push_back(to_json(z));
     }
@@ -157,10 +180,9 @@ nlohmann::ordered_json to_json(const RecognitionStep& step, const RecognitionTas
   return json;
 }
 
-nlohmann::ordered_json to_json(const RecognitionRecord& record, const RecognitionTask& task,
-                               const std::optional<std::string>& device, bool with_trace,
-                               OptionWords words) {
-  nlohmann::ordered_json json{{"recording", record.recording}};
+Json to_json(const RecognitionRecord& record, const RecognitionTask& task,
+             const std::optional<std::string>& device, bool with_trace, OptionWords words) {
+  Json json{{"recording", record.recording}};
   if (record.frame) {
     json["frame"] = *record.frame;
   }
@@ -176,15 +198,15 @@ nlohmann::ordered_json to_json(const RecognitionRecord& record, const Recognitio
   if (!record.true_label.empty()) {
     json["truth"] = truth_to_json(record.last().truth);
   }
-  if (!task.sensor_model.empty()) {
-    json["sensor_model"] = task.sensor_model;
+  if (!task.sensor.file.empty()) {
+    json["sensor_model"] = task.sensor.file;
   }
   if (device) {
     json["seconds"] = record.seconds;
     json["device"] = *device;
   }
   if (with_trace) {
-    auto trace = nlohmann::ordered_json::array();
+    auto trace = Json::array();
     for (const RecognitionStep& step : record.trace) {
       trace.push_back(to_json(step, task, words));
     }
@@ -193,8 +215,110 @@ nlohmann::ordered_json to_json(const RecognitionRecord& record, const Recognitio
   return json;
 }
 
-std::string text_of(const nlohmann::ordered_json& json, int indent) {
-  return json.dump(indent, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+Json to_json(const Scores& scores) {
+  Json json{{"records", scores.records},     {"right", scores.right},
+            {"accuracy", scores.accuracy()}, {"accuracy_interval", to_json(scores.interval())},
+            {"log_loss", scores.log_loss},   {"calibration_error", scores.calibration_error},
+            {"reliability", Json::array()}};
+  for (const ReliabilityBin& bin : scores.bins) {
+    Json row{{"lower", bin.lower}, {"upper", bin.upper}, {"records", bin.records}};
+    if (bin.records > 0) {
+      row["mean_confidence"] = bin.mean_confidence;
+      row["accuracy"] = bin.accuracy();
+      row["accuracy_interval"] = to_json(bin.interval());
+    }
+    json["reliability"].push_back(row);
+  }
+  return json;
+}
+
+Json to_json(const Evaluation& evaluation, const JudgedResults& results) {
+  Json json = to_json(evaluation.all);
+  json["without_truth"] = results.without_truth;
+  json["failed"] = results.failed;
+  if (evaluation.known) {
+    json["known_classes"] = to_json(*evaluation.known);
+  }
+  if (evaluation.unknown) {
+    json["unknown_classes"] = unknown_to_json(evaluation);
+  }
+  json["classes"] = Json::array();
+  json["confusion"] = {
+      {"rows", Json::array()}, {"columns", evaluation.answers}, {"counts", Json::array()}};
+  for (const ClassScores& scores : evaluation.classes) {
+    json["classes"].push_back({{"class", scores.label},
+                               {"known", scores.known},
+                               {"records", scores.records},
+                               {"right", scores.right},
+                               {"recall", scores.accuracy()},
+                               {"recall_interval", to_json(scores.interval())}});
+    json["confusion"]["rows"].push_back(scores.label);
+    json["confusion"]["counts"].push_back(scores.taken);
+  }
+  if (evaluation.error_mm) {
+    json["error_mm"] = to_json(*evaluation.error_mm);
+  }
+  if (evaluation.refined_error_mm) {
+    json["refined_error_mm"] = to_json(*evaluation.refined_error_mm);
+  }
+  return json;
+}
+
+Json to_json(const PlannedTouch& touch) {
+  const Pose& pose = touch.T_robot_sensor;
+  const TouchGain::StandardError& error = touch.gain.standard_error;
+  return {{"index", touch.index},
+          {"x_mm", pose.translation_mm.x},
+          {"y_mm", pose.translation_mm.y},
+          {"theta_rad", pose.theta_rad},
+          {"gain",
+           {{"identity", touch.gain.identity},
+            {"pose", touch.gain.pose},
+            {"both", touch.gain.both()},
+            {"standard_error",
+             {{"identity", error.identity}, {"pose", error.pose}, {"both", error.both}}}}}};
+}
+
+Json to_json(const Plan& plan, const RecognitionTask& task, const std::string& device,
+             OptionWords words) {
+  Json json{{"recording", plan.record.recording},
+            {"touches", plan.record.touches},
+            {"goal", goal_word(plan.goal)},
+            {"believed", to_json(plan.record.last(), task, words)}};
+  json["believed"]["entropy"] = {{"identity", plan.identity_nats},
+                                 {"pose", plan.both_nats - plan.identity_nats},
+                                 {"both", plan.both_nats}};
+  json["candidates"] = Json::array();
+  for (const PlannedTouch& touch : plan.ranked) {
+    json["candidates"].push_back(to_json(touch));
+  }
+  std::vector<std::string> warnings = warnings_of(plan);
+  std::ranges::transform(warnings, warnings.begin(), words);
+  if (!warnings.empty()) {
+    json["warnings"] = warnings;
+  }
+  json["samples"] = plan.samples.size();
+  json["seed"] = plan.seed;
+  json["seconds"] = plan.seconds;
+  json["device"] = device;
+  return json;
+}
+
+Json to_json(const SetupFinding& finding, OptionWords words) {
+  Json json{{"what", finding.what}, {"nats", finding.nats}, {"words", words(finding.words)}};
+  if (!finding.options.empty()) {
+    json["flag"] = words(fmt::format("`{}`", fmt::join(finding.options, "` `")));
+  }
+  if (finding.array_offset) {
+    const Pose& offset = *finding.array_offset;
+    json["array_offset"] = {offset.translation_mm.x, offset.translation_mm.y, offset.theta_rad};
+    json["sd"] = *finding.sd;
+  }
+  return json;
+}
+
+std::string text_of(const Json& json, int indent) {
+  return json.dump(indent, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace palpate

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <iterator>
 #include <set>
-#include <system_error>
 
 #include <fmt/format.h>
 
@@ -107,36 +106,6 @@ double largest_reach_mm(std::span<const Recording> recordings) {
     }
   }
   return reach;
-}
-
-std::vector<std::filesystem::path> maps_in(const std::filesystem::path& folder) {
-  std::error_code error;
-  std::vector<std::filesystem::path> files;
-  const std::filesystem::directory_iterator entries(folder, error);
-  if (error) {
-    refuse(folder, "cannot be read: {}; check its permissions", error.message());
-  }
-  for (const auto& entry : entries) {
-    // A look into each file would take as long as reading it.
-    if (entry.path().filename().string().ends_with(".map.h5") ||
-        (entry.path().extension() == ".h5" && read_format(entry.path()) == "palpate.map")) {
-      files.push_back(entry.path());
-    }
-  }
-  std::sort(files.begin(), files.end());
-  return files;
-}
-
-std::vector<std::filesystem::path> map_files(const std::filesystem::path& argument) {
-  std::error_code error;
-  if (!std::filesystem::is_directory(argument, error)) {
-    return {argument};
-  }
-  std::vector<std::filesystem::path> files = maps_in(argument);
-  if (files.empty()) {
-    refuse(argument, "a folder without maps; build some with palpate map");
-  }
-  return files;
 }
 
 }  // namespace palpate

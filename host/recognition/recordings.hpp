@@ -1,6 +1,5 @@
 #pragma once
 
-#include <filesystem>
 #include <optional>
 #include <span>
 #include <string>
@@ -42,13 +41,5 @@ std::vector<Query> list_unknowns(const Request& request, std::span<const Recordi
 /// The largest reach of any touch's array, which may change from touch to touch; see
 /// array_reach_mm().
 double largest_reach_mm(std::span<const Recording> recordings);
-
-/// The maps in a folder: its *.map.h5 and what else is a map among its *.h5, in order.
-/// @throws Error where the folder cannot be read
-std::vector<std::filesystem::path> maps_in(const std::filesystem::path& folder);
-
-/// The map files that an argument of --maps stands for: itself or, of a folder, maps_in().
-/// @throws Error where a folder has none
-std::vector<std::filesystem::path> map_files(const std::filesystem::path& argument);
 
 }  // namespace palpate

@@ -1,15 +1,18 @@
 #include "recognition/request.hpp"
 
+#include <algorithm>
+#include <array>
 #include <numbers>
 #include <set>
+#include <system_error>
 
 #include <fmt/format.h>
 
+#include "io/file_hash.hpp"
 #include "io/input_file.hpp"
 #include "options/option.hpp"
 #include "options/refused_option.hpp"
-#include "recognition/folder_sensor.hpp"
-#include "recognition/recordings.hpp"
+#include "palpate/files.hpp"
 
 namespace palpate {
 
@@ -21,6 +24,47 @@ void set_range(const std::optional<Range>& range, double unit, Axis& axis) {
     axis.lower = (*range)[0] * unit;
     axis.upper = (*range)[1] * unit;
   }
+}
+
+/// The sensor model in the folder of a map's file; none where there is no such file.
+std::optional<std::filesystem::path> sensor_beside(const std::filesystem::path& map) {
+  std::error_code ignored;
+  std::filesystem::path file = map.parent_path() / folder_sensor_name;
+  return std::filesystem::exists(file, ignored) ? std::optional(std::move(file)) : std::nullopt;
+}
+
+template <typename Values>
+void append(std::string& bytes, const Values& values) {
+  bytes.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(values[0]));
+}
+
+/// The one sensor model in the folders of the maps' files.
+SensorFromFile sensor_beside_all(std::span<const Hypothesis> hypotheses,
+                                 std::vector<std::string>& remarks) {
+  std::set<std::filesystem::path> files;
+  SensorFromFile known;
+  for (const Hypothesis& hypothesis : hypotheses) {
+    const std::string& map = hypothesis.map.file;
+    const auto beside = map.empty() ? std::nullopt : sensor_beside(map);
+    if (!beside || !files.insert(*beside).second) {
+      continue;
+    }
+    SensorFromFile sensor = sensor_from(*beside);
+    if (sensor.maps.empty()) {
+      remarks.push_back(
+          fmt::format("{} does not say which maps it is for, and is left out; give "
+                      "`sensor-model {}` to take it",
+                      sensor.file, sensor.file));
+    } else if (known.file.empty()) {
+      known = std::move(sensor);
+    } else if (hash_of_file(*beside) != hash_of_file(known.file)) {
+      refuse(*beside,
+             "differs from {}: each is for the maps of its own folder; give `sensor-model` with "
+             "one of them, or `sensor-model none`",
+             known.file);
+    }
+  }
+  return known;
 }
 
 }  // namespace
@@ -92,6 +136,75 @@ std::vector<std::pair<std::string, std::filesystem::path>> files_of(const Reques
     files.emplace_back(of_maps, sensor);
   }
   return files;
+}
+
+std::vector<std::filesystem::path> maps_in(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::vector<std::filesystem::path> files;
+  const std::filesystem::directory_iterator entries(folder, error);
+  if (error) {
+    refuse(folder, "cannot be read: {}; check its permissions", error.message());
+  }
+  for (const auto& entry : entries) {
+    // A look into each file would take as long as reading it.
+    if (entry.path().filename().string().ends_with(".map.h5") ||
+        (entry.path().extension() == ".h5" && read_format(entry.path()) == "palpate.map")) {
+      files.push_back(entry.path());
+    }
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+std::vector<std::filesystem::path> map_files(const std::filesystem::path& argument) {
+  std::error_code error;
+  if (!std::filesystem::is_directory(argument, error)) {
+    return {argument};
+  }
+  std::vector<std::filesystem::path> files = maps_in(argument);
+  if (files.empty()) {
+    refuse(argument, "a folder without maps; build some with palpate map");
+  }
+  return files;
+}
+
+std::string digest_of(const OccupancyGrid& map) {
+  std::string bytes;
+  append(bytes, std::array{map.cell_mm, map.origin_mm.x, map.origin_mm.y, map.prior});
+  append(bytes, std::array{map.nx, map.ny});
+  append(bytes, map.log_odds);
+  append(bytes, map.observations);
+  append(bytes, map.mean_level);
+  return hash_of(bytes);
+}
+
+SensorFromFile sensor_from(const std::filesystem::path& file) {
+  return {read_sensor_model(file), file.string()};
+}
+
+SensorFromFile folder_sensor(std::span<const Hypothesis> hypotheses,
+                             std::vector<std::string>& remarks) {
+  SensorFromFile known = sensor_beside_all(hypotheses, remarks);
+  if (known.file.empty()) {
+    return known;
+  }
+  const auto stranger = std::ranges::find_if_not(hypotheses, [&](const Hypothesis& hypothesis) {
+    return std::ranges::any_of(known.maps, [digest = digest_of(hypothesis.map)](const auto& map) {
+      return map.second == digest;
+    });
+  });
+  if (stranger == hypotheses.end()) {
+    return known;
+  }
+  const OccupancyGrid& map = stranger->map;
+  const bool of_folder = std::filesystem::path(map.file).parent_path() ==
+                         std::filesystem::path(known.file).parent_path();
+  remarks.push_back(fmt::format(
+      "{} was not learned for {}, and is left out; build {} with palpate map, or give "
+      "`sensor-model`",
+      known.file, map.file.empty() ? fmt::format("the map of '{}' in memory", map.label) : map.file,
+      of_folder ? "the folder's maps anew" : "the maps of both anew in one folder"));
+  return {};
 }
 
 bool infers_region(const Request& request) {

@@ -1,5 +1,3 @@
-#include "recognition/resolve.hpp"
-
 #include <algorithm>
 #include <set>
 #include <span>
@@ -17,41 +15,34 @@
 #include "palpate/files.hpp"
 #include "palpate/map_builder.hpp"
 #include "recognition/filter_choice.hpp"
-#include "recognition/folder_sensor.hpp"
+#include "recognition/recognition_job.hpp"
 #include "recognition/recordings.hpp"
-#include "recognition/scales_of_maps.hpp"
+#include "recognition/scales.hpp"
 
 namespace palpate {
 
 namespace {
 
-/// What resolve() is given, and the sentences that it has for the user.
-struct Asked {
-  const Request& request;
-  const Circumstances& of;
-  const DeviceSource& device;
-  std::vector<std::string> remarks = {};
-};
-
-// Each step below is a function of those before it.
+// resolve() is five steps, each a function of those before it.
 
 // 1. The objects.
 
 struct Objects {
-  std::vector<Scene::Object> named;
-  std::vector<Hypothesis> hypotheses;  ///< [object], with what the scene says of them
+  std::vector<Hypothesis> hypotheses;  ///< with what the scene says of them
+  std::vector<std::string> files;      ///< [hypothesis] of its map
 };
 
-Objects read_objects(const Request& request) {
-  Objects objects{objects_of(request), {}};
-  for (const GivenMap& given : request.given_maps) {
-    objects.hypotheses.push_back(given.hypothesis);
+Objects objects_in(const Request& request) {
+  Objects objects;
+  for (const auto& [name, hypothesis] : request.given_maps) {
+    objects.hypotheses.push_back(hypothesis);
+    objects.files.push_back(name);
   }
-  if (!objects.hypotheses.empty()) {
+  if (!objects.files.empty()) {
     return objects;
   }
   std::set<std::optional<FileIdentity>> seen;
-  for (const Scene::Object& object : objects.named) {
+  for (const Scene::Object& object : objects_of(request)) {
     OccupancyGrid map = read_map(object.map);
     if (!seen.insert(identity_of(object.map)).second) {
       refuse(object.map,
@@ -67,19 +58,9 @@ Objects read_objects(const Request& request) {
     map.symmetry = object.symmetry.value_or(map.symmetry);
     map.mirror = object.mirror.value_or(map.mirror);
     objects.hypotheses.push_back({std::move(map), object.weight});
+    objects.files.push_back(object.map.string());
   }
   return objects;
-}
-
-/// The file of every hypothesis's map; a mirror image has that of the object before it.
-std::vector<std::string> paths_of(const std::vector<Scene::Object>& objects,
-                                  const std::vector<Hypothesis>& hypotheses) {
-  std::vector<std::string> paths;
-  auto object = objects.begin();
-  for (const Hypothesis& hypothesis : hypotheses) {
-    paths.push_back(hypothesis.mirrored ? paths.back() : (object++)->map.string());
-  }
-  return paths;
 }
 
 // 2. The sensor: what was learned about it, and the objects as its readings are compared with them.
@@ -89,79 +70,71 @@ std::string_view option_of_eq7(const Request& request) {
   return first_given(request, {"gamma", "prior"});
 }
 
-/// The model of the maps' folder, unless it does not go with what is asked or touched.
-std::optional<SensorFromFile> usual_sensor(Asked& asked, std::span<const Hypothesis> hypotheses) {
-  const Request& request = asked.request;
-  const Circumstances& of = asked.of;
-  std::optional<SensorFromFile> usual = folder_sensor(hypotheses, asked.remarks);
-  if (!usual) {
-    return {};
-  }
-  const std::string& file = usual->file;
-  const LearnedSensor& sensor = usual->sensor;
-  const auto left_out = [&](const std::string& why) {
-    asked.remarks.push_back(
-        fmt::format("{} is left out: {}; `sensor-model none` says so", file, why));
-    return std::nullopt;
-  };
+/// Why the model of the maps' folder does not go with what is asked or touched; "" where it does.
+std::string why_left_out(const LearnedSensor& sensor, const Request& request,
+                         const Circumstances& of) {
   if (sensor.pressure_unit != of.pressure_unit) {
-    return left_out(fmt::format("it is for pressures in {}, and those of {} are in {}",
-                                sensor.pressure_unit, of.source, of.pressure_unit));
+    return fmt::format("it is for pressures in {}, and those of {} are in {}", sensor.pressure_unit,
+                       of.source, of.pressure_unit);
   }
   if (const std::string_view option = option_of_eq7(request); !option.empty()) {
-    return left_out(fmt::format("`{}` is for Eq. 7", option));
+    return fmt::format("`{}` is for Eq. 7", option);
   }
   for (const auto& [option, given, learned] :
        {std::tuple{"threshold", request.threshold, sensor.classifier.threshold},
         std::tuple{"ratio", request.ratio, sensor.classifier.ratio}}) {
     if (given && *given != learned) {
-      return left_out(
-          fmt::format("its {} is {:.4g}, not `{} {:g}`", option, learned, option, *given));
+      return fmt::format("its {} is {:.4g}, not `{} {:g}`", option, learned, option, *given);
     }
   }
-  return usual;
+  return "";
 }
 
-/// None by Eq. 7.
-std::optional<SensorFromFile> sensor_of(Asked& asked, std::span<const Hypothesis> hypotheses) {
+/// The model of no file where touches are judged by Eq. 7.
+SensorFromFile sensor_of(Asked& asked, std::span<const Hypothesis> hypotheses) {
   const Request& request = asked.request;
   const Circumstances& of = asked.of;
-  const std::string& file = request.sensor_model;
-  if (file == no_sensor_model) {
+  if (request.sensor_model == no_sensor_model) {
     return {};
   }
-  if (file.empty()) {
-    return usual_sensor(asked, hypotheses);
+  if (request.sensor_model.empty()) {
+    SensorFromFile usual = folder_sensor(hypotheses, asked.remarks);
+    const std::string why = usual.file.empty() ? "" : why_left_out(usual, request, of);
+    if (why.empty()) {
+      return usual;
+    }
+    asked.remarks.push_back(
+        fmt::format("{} is left out: {}; `sensor-model none` says so", usual.file, why));
+    return {};
   }
-  LearnedSensor sensor = read_sensor_model(file);
+  SensorFromFile sensor = sensor_from(request.sensor_model);
   if (sensor.pressure_unit != of.pressure_unit) {
-    refuse(file, "pressure_unit = {}, but {} has pressures in {}; calibrate from recordings in {}",
+    refuse(sensor.file,
+           "pressure_unit = {}, but {} has pressures in {}; calibrate from recordings in {}",
            sensor.pressure_unit, of.source, of.pressure_unit, of.pressure_unit);
   }
   if (const std::string_view option = option_of_eq7(request); sensor.table && !option.empty()) {
-    refuse_given(request, option, "the table of {} takes its place; leave it out", file);
+    refuse_given(request, option, "the table of {} takes its place; leave it out", sensor.file);
   }
-  return SensorFromFile{file, std::move(sensor)};
+  return sensor;
 }
 
-/// The hypotheses, maps of unlike priors brought to the one that all of their touches together
-/// tell.
-std::vector<Hypothesis> with_one_prior(Asked& asked, const std::vector<Scene::Object>& named,
-                                       std::vector<Hypothesis> hypotheses) {
+/// Brings maps of unlike priors to the one that all of their touches together tell.
+void equalize_priors(Asked& asked, Objects& objects) {
+  std::vector<Hypothesis>& hypotheses = objects.hypotheses;
   const std::optional<std::size_t> other = differing_prior(hypotheses);
   if (!other) {
-    return hypotheses;
+    return;
   }
   std::vector<OccupancyGrid> maps;
   for (std::size_t i = 0; i < hypotheses.size(); ++i) {
     maps.push_back(hypotheses[i].map);
     if (!maps.back().source && !maps.back().drawn) {
-      refuse(
-          named[*other].map,
-          "prior {} differs from {} of {}, and {} holds no touches to build it from again; build "
-          "the maps anew, or say which prior to use with `prior`",
-          hypotheses[*other].map.prior, maps.front().prior, named.front().map.string(),
-          named[i].map.string());
+      refuse(objects.files[*other],
+             "prior {} differs from {} of {}, and {} holds no touches to build it from again; "
+             "build the maps anew, or say which prior to use with `prior`",
+             hypotheses[*other].map.prior, maps.front().prior, objects.files.front(),
+             objects.files[i]);
     }
   }
   Device& device = asked.device();
@@ -174,43 +147,35 @@ std::vector<Hypothesis> with_one_prior(Asked& asked, const std::vector<Scene::Ob
       "which their touches tell together",
       maps.front().prior, printable(maps.front().label), maps[*other].prior,
       printable(maps[*other].label), prior));
-  return hypotheses;
 }
 
-/// What touches are compared with, and by which model.
-struct Comparison {
-  std::vector<Hypothesis> hypotheses;  ///< mirror images stand after their objects
-  ContactModel contact;
-};
-
-/// What is asked overrides what was learned.
-/// @param sensor null by Eq. 7
-Comparison comparison_by(const LearnedSensor* sensor, Asked& asked,
-                         const std::vector<Scene::Object>& named,
-                         std::vector<Hypothesis> hypotheses) {
+/// The model by which touches are compared with the objects, which get what it asks of them, and
+/// their mirror images. What is asked overrides what was learned.
+ContactModel contact_by(const SensorFromFile& sensor, Asked& asked, Objects& objects) {
   const Request& request = asked.request;
-  std::optional<double> threshold = request.threshold;
-  std::optional<double> ratio = request.ratio;
-  if (sensor != nullptr) {
-    threshold = threshold.value_or(sensor->classifier.threshold);
-    ratio = ratio.value_or(sensor->classifier.ratio);
-  }
-  const ContactClassifier classifier =
-      make_classifier(asked.of.pressure_unit, asked.of.source, threshold, ratio);
-  Comparison by{std::move(hypotheses), {}};
-  if (sensor == nullptr || !sensor->table) {
-    by.contact.prior = request.prior;
+  const ContactClassifier usual = sensor.file.empty()
+                                      ? make_classifier(asked.of.pressure_unit, asked.of.source,
+                                                        request.threshold, request.ratio)
+                                      : sensor.classifier;
+  ContactModel contact;
+  if (!sensor.table) {
+    contact.prior = request.prior;
     if (!request.prior) {
-      by.hypotheses = with_one_prior(asked, named, std::move(by.hypotheses));
+      equalize_priors(asked, objects);
     }
   }
-  add_mirror_images(by.hypotheses);
-  if (sensor != nullptr) {
-    apply(*sensor, by.hypotheses, by.contact);
+  add_mirror_images(objects.hypotheses);
+  for (std::size_t i = 0; i < objects.hypotheses.size(); ++i) {
+    if (objects.hypotheses[i].mirrored) {  // after its object
+      objects.files.insert(objects.files.begin() + static_cast<std::ptrdiff_t>(i),
+                           objects.files[i - 1]);
+    }
   }
-  by.contact.classifier = classifier;
-  by.contact.gamma = request.gamma.value_or(sensor != nullptr ? sensor->gamma : usual_gamma);
-  return by;
+  apply(sensor, objects.hypotheses, contact);
+  contact.classifier.threshold = request.threshold.value_or(usual.threshold);
+  contact.classifier.ratio = request.ratio.value_or(usual.ratio);
+  contact.gamma = request.gamma.value_or(sensor.gamma);
+  return contact;
 }
 
 // 3. The region.
@@ -262,7 +227,7 @@ struct NoneOfThese {
   bool for_its_bins = false;          ///< it is left out as the bins are too wide to tell it
 };
 
-NoneOfThese none_of_these(const Request& request, const LearnedSensor* sensor, const Region& region,
+NoneOfThese none_of_these(const Request& request, const LearnedSensor& sensor, const Region& region,
                           std::span<const Hypothesis> hypotheses) {
   const NoneWeight wish = request.none.value_or(Automatic{});
   if (const auto* weight = std::get_if<double>(&wish)) {
@@ -275,7 +240,7 @@ NoneOfThese none_of_these(const Request& request, const LearnedSensor* sensor, c
     constexpr double far_from_independent = 5.0;
     const bool far_too_wide =
         !region.bin_width && !resolves(region.lattice, hypotheses, far_wider, region.near_mm);
-    if (far_too_wide || (sensor != nullptr && sensor->temperature > far_from_independent)) {
+    if (far_too_wide || sensor.temperature > far_from_independent) {
       return {.for_its_bins = far_too_wide};
     }
   }
@@ -287,53 +252,13 @@ NoneOfThese none_of_these(const Request& request, const LearnedSensor* sensor, c
   return {.weight = odds * sum};
 }
 
-// 5. The filter.
-
-/// The filter on the bins that are used: those settled before, chosen, or given.
-/// @param histogram what was settled by the steps before
-ChosenFilter filter_on_bins(Asked& asked, const FilterWish& wish, const HistogramOptions& histogram,
-                            const std::optional<BinWidth>& width,
-                            std::span<const Hypothesis> hypotheses) {
-  const Request& request = asked.request;
-  ChosenFilter filter = choose_filter(wish, request, asked.of.every_bin_for, histogram);
-  if (asked.of.counts) {
-    PoseLattice lattice = histogram.lattice;
-    lattice.x_mm.count = (*asked.of.counts)[0];
-    lattice.y_mm.count = (*asked.of.counts)[1];
-    lattice.theta_rad.count = (*asked.of.counts)[2];
-    filter.options = with_lattice(filter.options, lattice);
-  } else if (width) {
-    const auto [bins, most] = chosen_bins(asked.device, hypotheses, filter, *width);
-    filter.options = with_lattice(filter.options, bins.lattice);
-    if (bins.coarsened) {
-      asked.remarks.push_back(fmt::format(
-          "`bins {}`: steps of {:.2f} mm, wider than the maps resolve, keep to {} bins in all; "
-          "narrow the region, or give `bins`",
-          *width == BinWidth::fine ? "fine" : "auto", bins.step_mm, most));
-    }
-  }
-  const PoseLattice& lattice = lattice_of(filter.options);
-  require_within_region(request, lattice);
-  const bool by_bounds_at_rest = wish.kind == FilterKind::bounded ||
-                                 (wish.kind == FilterKind::automatic &&
-                                  bins_in_all(hypotheses.size(), lattice) > most_histogram_bins);
-  if (by_bounds_at_rest && !traits_of(filter.options).slip_sd.none()) {
-    asked.remarks.emplace_back(
-        "objects that slip are followed by the histogram, over every bin; `filter histogram` says "
-        "so");
-  }
-  if (filter.automatic) {
-    filter.options =
-        filter_for_bins(hypotheses, filter.options, asked.of.waited_for ? 0 : most_histogram_bins);
-  }
-  return filter;
-}
+// 5. The filter: choose_filter().
 
 /// By Eq. 7 with "(none)" left out all touches multiply, as in the paper; and where the object
 /// slips, a touch of the same place tells where it went.
 bool counts_by_place(const Request& request, const RecognitionTask& task) {
   const double* none = request.none ? std::get_if<double>(&*request.none) : nullptr;
-  const bool as_in_the_paper = task.sensor_model.empty() && none != nullptr && *none == 0.0;
+  const bool as_in_the_paper = task.sensor.file.empty() && none != nullptr && *none == 0.0;
   return !as_in_the_paper && task.slip_sd().none();
 }
 
@@ -344,35 +269,25 @@ RecognitionTask resolve(const Request& request, const Circumstances& of,
   require_sound(request);
   const FilterWish wish = filter_wish(request);
   Asked asked{request, of, device};
-  Objects objects = read_objects(request);
-  const std::optional<SensorFromFile> learned = sensor_of(asked, objects.hypotheses);
-  const LearnedSensor* sensor = learned ? &learned->sensor : nullptr;
-  Comparison by = comparison_by(sensor, asked, objects.named, std::move(objects.hypotheses));
-  const Region region = region_of(asked, by.hypotheses);
-  const NoneOfThese none = none_of_these(request, sensor, region, by.hypotheses);
-  ChosenFilter filter =
-      filter_on_bins(asked, wish,
-                     {.lattice = region.lattice,
-                      .contact = by.contact,
-                      .none_weight = none.weight,
-                      .touch_sd = sensor != nullptr ? sensor->touch_sd : DisplacementSd{}},
-                     region.bin_width, by.hypotheses);
-  if (sensor != nullptr) {
-    const bool honour_tolerance =
-        request.tolerance || request.evidence_nats;  // what was asked for holds
-    filter.options = with_evidence(filter.options, *sensor, honour_tolerance);
-  }
-
-  RecognitionTask task(std::move(by.hypotheses), std::move(filter.options));
-  task.map_paths = paths_of(objects.named, task.hypotheses);
-  task.bin_width = region.bin_width;
+  Objects objects = objects_in(request);
+  SensorFromFile sensor = sensor_of(asked, objects.hypotheses);
+  const ContactModel contact = contact_by(sensor, asked, objects);
+  const Region region = region_of(asked, objects.hypotheses);
+  const NoneOfThese none = none_of_these(request, sensor, region, objects.hypotheses);
+  ChosenFilter filter = choose_filter(asked, wish, objects.hypotheses,
+                                      {.lattice = region.lattice,
+                                       .contact = contact,
+                                       .none_weight = none.weight,
+                                       .touch_sd = sensor.touch_sd},
+                                      region.bin_width);
+  const bool honour_tolerance = request.tolerance || request.evidence_nats;  // what is asked holds
+  RecognitionTask task(std::move(objects.hypotheses),
+                       with_evidence(std::move(filter.options), sensor, honour_tolerance));
+  task.map_paths = std::move(objects.files);
   task.auto_pivot = region.auto_pivot;
-  task.auto_filter = filter.automatic;
-  task.filter_asked_for_by = filter.asked_for_by;
-  if (learned) {
-    task.sensor_model = learned->file;
-    task.sensor = learned->sensor;
-  } else {
+  task.filter_chosen_by = filter.by;
+  task.sensor = std::move(sensor);
+  if (task.sensor.file.empty()) {  // by Eq. 7
     const auto [fit, pose] = scales_of_maps(task, region.near_mm);
     task.sensor.fit_scale = fit;
     task.sensor.pose_scale = pose;

@@ -92,20 +92,6 @@ class Reach {
   BoundingBox around_;               ///< all of them, in the robot frame
 };
 
-/// The elements of a touch that are alive.
-std::vector<glm::dvec2> living_elements(const Touch& touch, const std::string& recording) {
-  std::vector<glm::dvec2> living;
-  for (std::size_t e = 0; e < touch.elements_mm.size(); ++e) {
-    if (touch.valid.empty() || touch.valid[e] != 0) {
-      living.push_back(touch.elements_mm[e]);
-    }
-  }
-  if (living.empty()) {
-    refuse(recording, "valid: every element is dead; a touch would tell nothing");
-  }
-  return living;
-}
-
 /// The poses of a file: of a recording's touches, or the rows of a table.
 std::vector<Pose> read_candidates(const std::filesystem::path& path,
                                   const std::function<void(const std::string&)>& tell) {
@@ -171,6 +157,16 @@ double gain_for(const TouchGain& gain, PlanGoal goal) {
                                     : gain.both();
 }
 
+std::vector<glm::dvec2> living_elements(const Touch& touch) {
+  std::vector<glm::dvec2> living;
+  for (std::size_t e = 0; e < touch.elements_mm.size(); ++e) {
+    if (touch.valid.empty() || touch.valid[e] != 0) {
+      living.push_back(touch.elements_mm[e]);
+    }
+  }
+  return living;
+}
+
 std::vector<PlannedTouch> rank_touches(const Recogniser& recogniser, const RecognitionTask& task,
                                        std::span<const Pose> T_robot_sensor,
                                        std::span<const glm::dvec2> elements_mm, PlanGoal goal,
@@ -178,7 +174,7 @@ std::vector<PlannedTouch> rank_touches(const Recogniser& recogniser, const Recog
   PlanOptions by_label = options;
   by_label.label_of = task.label_of;
   const std::vector<TouchGain> gains =
-      recogniser.expected_gain(T_robot_sensor, elements_mm, by_label);
+      recogniser.filter().expected_gain(T_robot_sensor, elements_mm, by_label);
   std::vector<PlannedTouch> ranked;
   for (std::size_t i = 0; i < gains.size(); ++i) {
     ranked.push_back({i, T_robot_sensor[i], gains[i]});
@@ -270,12 +266,16 @@ Plan plan_touch(Recogniser& recogniser, const RecognitionTask& task, const Query
     refuse(unknown.recording, "has no touches; give a recording with at least one");
   }
   Plan plan{.goal = request.goal,
-            .elements_mm = living_elements(unknown.touches.front(), unknown.recording),
+            .elements_mm = living_elements(unknown.touches.front()),
             .seed = request.options.seed};
+  if (plan.elements_mm.empty()) {
+    refuse(unknown.recording, "valid: every element is dead; a touch would tell nothing");
+  }
   plan.record = recognise(recogniser, task, unknown, false, progress);
   plan.record.require_steps();
   const auto start = std::chrono::steady_clock::now();
-  plan.samples = recogniser.sample(request.options.samples, request.options.seed);
+  const Filter& belief = recogniser.filter();
+  plan.samples = belief.sample(request.options.samples, request.options.seed);
   const std::vector<Pose> candidates =
       request.candidates.empty() ? candidate_grid(plan.samples, task, plan.elements_mm,
                                                   unknown.touches.front().T_robot_sensor.theta_rad)
@@ -284,8 +284,8 @@ Plan plan_touch(Recogniser& recogniser, const RecognitionTask& task, const Query
       rank_touches(recogniser, task, candidates, plan.elements_mm, request.goal, request.options);
   plan.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   // Gains are of the belief before temperature and features.
-  plan.identity_nats = label_entropy(sums_by_label(recogniser.estimate(), task), task);
-  plan.both_nats = recogniser.entropy().value();
+  plan.identity_nats = label_entropy(sums_by_label(belief.estimate({}), task), task);
+  plan.both_nats = belief.entropy().value();
   return plan;
 }
 

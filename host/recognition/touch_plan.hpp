@@ -38,6 +38,9 @@ struct PlannedTouch {
   TouchGain gain;
 };
 
+/// The elements of the touch's array that are alive, in the sensor frame.
+std::vector<glm::dvec2> living_elements(const Touch& touch);
+
 /// Ranks candidate touches by what each is expected to tell; see PoseHistogram::expected_gain().
 /// Not for particles. Maps of one label count as one object. The largest gain comes first. Gains
 /// below least_gain_nats count as equal; of equal gains comes first the one that tells most about

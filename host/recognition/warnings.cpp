@@ -3,63 +3,264 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <optional>
+#include <utility>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
-#include "palpate/pose_error.hpp"
+#include "model/angle_unit.hpp"
+#include "model/bounding_box.hpp"
+#include "model/element_spacing.hpp"
+#include "recognition/belief_cells.hpp"
 
 namespace palpate {
 
 namespace {
 
-using Place = std::array<double, 3>;  ///< (x_mm, y_mm, theta_rad) of a lattice
+/// A sentence (see warnings_about()), or none where all looks right.
+using Warning = std::optional<std::string>;
+
+// Rules about the touches of an unknown, at least one.
+
+/// The cells of a map, in the object frame. The box is no tighter than the grid, so that it costs
+/// no look at the cells.
+BoundingBox cells_of(const OccupancyGrid& map) {
+  BoundingBox box;
+  box.take_in(map.origin_mm - map.cell_mm / 2.0);
+  box.take_in(map.centre_mm(map.nx - 1, map.ny - 1) + map.cell_mm / 2.0);
+  return box;
+}
+
+/// "1 touch", "2 touches"
+std::string touches_in_words(std::size_t touches) {
+  return fmt::format("{} touch{}", touches, touches == 1 ? "" : "es");
+}
+
+/// Whether two touches felt something else: whether more than a tenth of the elements that both
+/// know read differently.
+bool differ(const TouchEvidence& a, const TouchEvidence& b) {
+  std::size_t known = 0;
+  std::size_t different = 0;
+  for (std::size_t i = 0; i < std::min(a.readings.size(), b.readings.size()); ++i) {
+    if (a.readings[i] != Reading::unknown && b.readings[i] != Reading::unknown) {
+      ++known;
+      different += is_contact(a.readings[i]) != is_contact(b.readings[i]) ? 1 : 0;
+    }
+  }
+  return 10 * different > known;
+}
+
+/// Distance by which the poses of a region keep an array from a map, or 0 or less where some pose
+/// brings the array to the map. Angles count as free, so that the distance is never too large.
+/// @param from_pivot_mm the array's middle minus the pivot
+/// @param array_mm diagonal of the array
+double gap_mm(const glm::dvec2& from_pivot_mm, double array_mm, const BoundingBox& cells,
+              const PoseLattice& region) {
+  // p_o = R(theta) from_pivot + (x, y) is in the box of cells where R(theta) from_pivot is in this
+  // box.
+  const glm::dvec2 lower = cells.lower - glm::dvec2(region.x_mm.upper, region.y_mm.upper);
+  const glm::dvec2 upper = cells.upper - glm::dvec2(region.x_mm.lower, region.y_mm.lower);
+  const double nearest = glm::length(glm::max(glm::max(lower, -upper), glm::dvec2(0.0)));
+  const double farthest = glm::length(glm::max(glm::abs(lower), glm::abs(upper)));
+  const double distance = glm::length(from_pivot_mm);
+  return std::max(nearest - distance, distance - farthest) - array_mm / 2.0;
+}
+
+/// The sensor's positions look like metres.
+Warning positions_in_metres(std::span<const TouchEvidence> touches) {
+  // Arms reach 2 m, and touches of one object lie within 1 m. Presses in one place differ by less
+  // than 0.001 mm where they are copies of one number. In mm, presses within 1 mm and 2 mm from the
+  // origin would all feel alike.
+  constexpr double reach = 2.0;
+  constexpr double widest = 1.0;
+  constexpr double narrowest = 1e-3;
+  constexpr double same_angle_rad = 0.1;
+  if (touches.size() < 3) {
+    return {};
+  }
+  BoundingBox positions;
+  for (const TouchEvidence& touch : touches) {
+    positions.take_in(touch.T_robot_sensor.translation_mm);
+  }
+  const double span = positions.diagonal();
+  const glm::dvec2 farthest = glm::max(glm::abs(positions.lower), glm::abs(positions.upper));
+  if (!(std::max(farthest.x, farthest.y) < reach && span < widest && span > narrowest)) {
+    return {};
+  }
+  const TouchEvidence& first = touches.front();
+  const bool alike = std::ranges::all_of(touches, [&](const TouchEvidence& touch) {
+    const double turn_rad = touch.T_robot_sensor.theta_rad - first.T_robot_sensor.theta_rad;
+    return std::abs(wrap_angle(turn_rad, 2.0 * std::numbers::pi)) < same_angle_rad &&
+           !differ(touch, first);
+  });
+  if (alike) {
+    return {};
+  }
+  return fmt::format(
+      "the sensor's positions span {:.2g} mm over {}, which differ in angle or in what they feel: "
+      "are the positions in metres? Palpate takes millimetres; import them with `pose-unit m,rad`, "
+      "or multiply x and y of sensor_pose by 1000",
+      span, touches_in_words(touches.size()));
+}
+
+/// The sensor's angles look like degrees.
+Warning angles_in_degrees(std::span<const TouchEvidence> touches) {
+  const auto theta_rad = [](const TouchEvidence& touch) { return touch.T_robot_sensor.theta_rad; };
+  const auto [least, most] = std::ranges::minmax_element(touches, {}, theta_rad);
+  if (!seem_degrees(theta_rad(*least), theta_rad(*most))) {
+    return {};
+  }
+  const auto largest = theta_rad(*most) > -theta_rad(*least) ? most : least;
+  return fmt::format(
+      "the sensor's angle is {:.4g} rad at touch {}, beyond a full turn of 6.283 rad: are the "
+      "angles in degrees? Palpate takes radians; import them with `pose-unit mm,deg`, or multiply "
+      "theta of sensor_pose by 0.0174533",
+      theta_rad(*largest), largest - touches.begin() + 1);
+}
+
+/// The array and a map have scales that do not fit together.
+Warning other_scale(std::span<const TouchEvidence> touches, const RecognitionTask& task) {
+  const auto& elements_mm = touches.front().elements_mm;
+  if (elements_mm.size() < 2) {
+    return {};  // a single element has no scale
+  }
+  const double array_mm = bounding_box(elements_mm).diagonal();
+  const double pitch_mm = spacing_of(elements_mm)->nearest_mm.least;
+  for (const Hypothesis& hypothesis : task.hypotheses) {
+    const OccupancyGrid& map = hypothesis.map;
+    const double map_mm = cells_of(map).diagonal();
+    if (map.cell_mm > array_mm) {
+      return fmt::format(
+          "the array measures {:.2g} mm across, less than one cell of {:.2g} mm of map '{}': one "
+          "of them is not in millimetres; check the unit of the array's elements, then of the map",
+          array_mm, map.cell_mm, map.label);
+    }
+    if (map_mm < pitch_mm) {
+      return fmt::format(
+          "map '{}' measures {:.2g} mm across, less than the {:.2g} mm between two elements of the "
+          "array: one of them is not in millimetres; check the unit of the map, then of the "
+          "array's elements",
+          map.label, map_mm, pitch_mm);
+    }
+  }
+  return {};
+}
+
+/// The threshold leaves no element known, or the touches tell nothing, since no element was ever in
+/// contact or all were.
+Warning nothing_felt(std::span<const TouchEvidence> touches, double threshold) {
+  constexpr std::size_t few = 3;  // a touch or two may well miss the object, or lie wholly on it
+  bool contact = false;
+  bool none = false;
+  double largest = -std::numeric_limits<double>::infinity();
+  double least = std::numeric_limits<double>::infinity();
+  for (const TouchEvidence& touch : touches) {
+    contact = contact || touch.in_contact();
+    none = none || std::ranges::count(touch.readings, Reading::no_contact) > 0;
+    largest = std::max(largest, touch.largest_pressure);
+    least = std::min(least, touch.least_pressure);
+    // Eq. 3 compares a single element with itself, and so never finds it out of contact.
+    if (contact && (none || touch.readings.size() == 1)) {
+      return {};
+    }
+  }
+  const std::string over = touches_in_words(touches.size());
+  if (largest < least) {
+    return fmt::format(
+        "no element is alive and has a number for its pressure in {}: check the recording's "
+        "pressure and valid",
+        over);
+  }
+  if (touches.size() < few) {
+    return {};
+  }
+  using Words = std::pair<const char*, const char*>;
+  const auto [fault, remedy] =
+      contact ? Words("ever out of contact",
+                      "above the pressure of an untouched element, or tare the sensor")
+      : none
+          ? Words("ever in contact", "below the pressure of a touched element, or touch the object")
+          : Words("known to be in contact or out of contact",
+                  "within that range, and a `ratio` above 0");
+  return fmt::format(
+      "no element is {} in {}: pressures range from {:.3g} to {:.3g}, and the contact threshold is "
+      "{:.3g}, in the recording's unit; choose a `threshold` {}",
+      fault, over, least, largest, threshold, remedy);
+}
+
+/// No pose of the region brings most of the touches that have an element In Contact to any map.
+Warning out_of_reach(std::span<const TouchEvidence> touches, const RecognitionTask& task,
+                     const PoseLattice& region) {
+  std::size_t contacts = 0;
+  std::size_t beyond = 0;
+  double nearest_mm = std::numeric_limits<double>::infinity();
+  BoundingBox cells;           // of the nearest map
+  double array_mm = 0.0;       // of a touch out of reach
+  glm::dvec2 middles_mm{0.0};  // sum over the touches out of reach
+  for (const TouchEvidence& touch : touches) {
+    if (!touch.in_contact()) {
+      continue;
+    }
+    ++contacts;
+    const glm::dvec2 middle_mm = touch.middle_mm();
+    const double diagonal_mm = bounding_box(touch.elements_mm).diagonal();
+    const auto gap_to = [&](const Hypothesis& object) {
+      return gap_mm(middle_mm - region.pivot_mm, diagonal_mm, cells_of(object.map), region);
+    };
+    const auto nearest = std::ranges::min_element(task.hypotheses, {}, gap_to);
+    const double gap = gap_to(*nearest);
+    if (gap <= 0.0) {
+      continue;
+    }
+    ++beyond;
+    middles_mm += middle_mm;
+    array_mm = diagonal_mm;
+    if (gap < nearest_mm) {
+      nearest_mm = gap;
+      cells = cells_of(nearest->map);
+    }
+  }
+  if (2 * beyond <= contacts) {
+    return {};
+  }
+  const std::string evidence = fmt::format(
+      "no pose of the region brings {} of {} in contact nearer than {:.1f} mm to any map", beyond,
+      touches_in_words(contacts), nearest_mm);
+  const glm::dvec2 middle_mm = middles_mm / static_cast<double>(beyond);
+  if (task.auto_pivot) {
+    return fmt::format(
+        "{}: the array is on average {:.1f} mm from the first touch in contact; check that all "
+        "touches are of one object that lay still, and that the positions are in mm",
+        evidence, glm::distance(middle_mm, region.pivot_mm));
+  }
+  // A pivot among the touches brings them into the region; the region must then meet the map.
+  const std::string ranges =
+      gap_mm({0.0, 0.0}, array_mm, cells, region) <= 0.0
+          ? ""
+          : fmt::format(" `x-mm={:.1f}:{:.1f}` `y-mm={:.1f}:{:.1f}`", cells.lower.x, cells.upper.x,
+                        cells.lower.y, cells.upper.y);
+  return fmt::format(
+      "{}: the array is on average {:.1f} mm from the pivot at {:g},{:g} mm; give "
+      "`pivot-mm={:.1f},{:.1f}`{}, near the touches",
+      evidence, glm::distance(middle_mm, region.pivot_mm), region.pivot_mm.x, region.pivot_mm.y,
+      middle_mm.x, middle_mm.y, ranges);
+}
+
+// Rules about the estimate.
 
 constexpr double degrees_per_rad = 180.0 / std::numbers::pi;
-
-std::array<const Axis*, 3> axes_of(const PoseLattice& lattice) {
-  return {&lattice.x_mm, &lattice.y_mm, &lattice.theta_rad};
-}
-
-/// A refined pose on the lattice. Theta has the turn that is nearest to the region's middle.
-Place place_of(const RefinedPose& refined, const PoseLattice& lattice) {
-  const glm::dvec2 xy_mm = refined.T_object_robot * lattice.pivot_mm;
-  const double middle_rad = (lattice.theta_rad.lower + lattice.theta_rad.upper) / 2.0;
-  return {xy_mm.x, xy_mm.y,
-          middle_rad +
-              wrap_angle(refined.T_object_robot.theta_rad - middle_rad, 2.0 * std::numbers::pi)};
-}
-
-/// Variances of the place. The covariance is of T_object_robot, whose translation is
-/// (x, y) - R(theta) pivot.
-Place variances_of(const RefinedPose& refined, const PoseLattice& lattice) {
-  const glm::dvec2 slope =
-      rotate(refined.T_object_robot.theta_rad + std::numbers::pi / 2.0, lattice.pivot_mm);
-  const std::array<double, 9>& c = refined.covariance;
-  const auto variance = [&](int i) {
-    return c[4 * i] + 2.0 * slope[i] * c[3 * i + 2] + slope[i] * slope[i] * c[8];
-  };
-  return {variance(0), variance(1), c[8]};
-}
-
-/// Whether enough elements were in contact to tell one place from another. After fewer, the best
-/// pose lies anywhere in the region, its edges included.
-bool felt_enough(std::span<const TouchEvidence> touches) {
-  constexpr std::size_t enough = 24;  // two to three touches of a letter by the 6 x 6 array
-  std::size_t contacts = 0;
-  for (const TouchEvidence& touch : touches) {
-    contacts += touch.contacts;
-  }
-  return contacts >= enough;
-}
+constexpr std::array axis_names{"x", "y", "theta"};
 
 /// The refined pose's standard deviations are those of a bin, since the bins are too wide for the
 /// refinement.
-std::optional<std::string> coarse_bins(const RecognitionTask& task, const PoseLattice& lattice,
-                                       const RecognitionStep& step) {
+Warning coarse_bins(const RecognitionTask& task, const PoseLattice& lattice,
+                    const RecognitionStep& step) {
   // docs/refinement.md: the refinement needs 20 bins within 2.5 mm, and steps up to about 1.5 mm.
   constexpr double widest_bin_mm3 = 4.0 / 3.0 * std::numbers::pi * 2.5 * 2.5 * 2.5 / 20.0;
   constexpr double widest_step_mm = 1.5;
@@ -68,10 +269,9 @@ std::optional<std::string> coarse_bins(const RecognitionTask& task, const PoseLa
   if (!step.refined || !body) {
     return {};
   }
-  const Place variances = variances_of(*step.refined, lattice);
+  const LatticePlace variances = variances_of(*step.refined, lattice);
   // How far the object moves, root mean square, where the pose moves by 1 mm or 1 rad.
-  const Place lever_mm{1.0, 1.0, std::sqrt(body->inertia_mm2)};
-  constexpr std::array names{"x", "y", "theta"};
+  const LatticePlace lever_mm{1.0, 1.0, std::sqrt(body->inertia_mm2)};
   std::vector<std::string> coarse;
   std::array<int, 3> counts{};
   double bin_mm3 = 1.0;
@@ -85,10 +285,10 @@ std::optional<std::string> coarse_bins(const RecognitionTask& task, const PoseLa
     bin_mm3 *= step_mm;
     const double bins_own = axis.step() * axis.step() / 12.0;
     if (step_mm > widest_step_mm && variances[i] < own_share * bins_own) {
-      coarse.push_back(i < 2 ? fmt::format("{} in bins of {:.3g} mm", names[i], axis.step())
-                             : fmt::format("{} in bins of {:.3g} degrees, which turn the object by "
-                                           "{:.2g} mm",
-                                           names[i], axis.step() * degrees_per_rad, step_mm));
+      coarse.push_back(
+          i < 2 ? fmt::format("{} in bins of {:.3g} mm", axis_names[i], axis.step())
+                : fmt::format("theta in bins of {:.3g} degrees, which turn the object by {:.2g} mm",
+                              axis.step() * degrees_per_rad, step_mm));
       counts[i] = static_cast<int>(std::ceil(axis.count * step_mm / 1.0));
     }
   }
@@ -102,32 +302,32 @@ std::optional<std::string> coarse_bins(const RecognitionTask& task, const PoseLa
 }
 
 /// The best pose lies at an end of an axis.
-std::optional<std::string> at_the_edge(std::span<const TouchEvidence> touches,
-                                       const RecognitionTask& task, const PoseLattice& lattice,
-                                       const RecognitionStep& step) {
-  if (!step.refined || !step.mode.bin) {
+Warning at_the_edge(std::span<const TouchEvidence> touches, const RecognitionTask& task,
+                    const PoseLattice& lattice, const RecognitionStep& step) {
+  // Fewer elements in contact do not tell one place from another: the best pose lies anywhere in
+  // the region, its edges included.
+  constexpr std::size_t enough = 24;  // two to three touches of a letter by the 6 x 6 array
+  std::size_t contacts = 0;
+  for (const TouchEvidence& touch : touches) {
+    contacts += touch.contacts;
+  }
+  if (!step.refined || !step.mode.bin || contacts < enough) {
     return {};
   }
-  const std::int64_t in_plane = *step.mode.bin % lattice.plane();
-  const std::array<std::int64_t, 3> index{in_plane % lattice.x_mm.count,
-                                          in_plane / lattice.x_mm.count,
-                                          *step.mode.bin / lattice.plane()};
-  const Place place = place_of(*step.refined, lattice);
-  const Place variances = variances_of(*step.refined, lattice);
-  constexpr std::array names{"x", "y", "theta"};
+  const AxisIndices index = indices_of(lattice, *step.mode.bin);
+  const LatticePlace place = place_of(*step.refined, lattice);
+  const LatticePlace variances = variances_of(*step.refined, lattice);
   constexpr std::array options{"x-mm", "y-mm", "theta-deg"};
   for (int i = 0; i < 3; ++i) {
     const Axis& axis = *axes_of(lattice)[i];
-    if (axis.count < 3 || (i == 2 && lattice.full_circle())) {
-      continue;
-    }
     const bool first = index[i] == 0;
-    if (!first && index[i] != axis.count - 1) {
+    if (axis.count < 3 || (i == 2 && lattice.full_circle()) ||
+        !(first || index[i] == axis.count - 1)) {
       continue;
     }
     // Between the bins the pose may lie well inside, as that of an object within the region does.
     const double inside = first ? place[i] - axis.lower : axis.upper - place[i];
-    if (inside > std::max(axis.step(), std::sqrt(variances[i])) || !felt_enough(touches)) {
+    if (inside > std::max(axis.step(), std::sqrt(variances[i]))) {
       continue;
     }
     const double unit = i < 2 ? 1.0 : degrees_per_rad;
@@ -141,15 +341,14 @@ std::optional<std::string> at_the_edge(std::span<const TouchEvidence> touches,
     return fmt::format(
         "the best pose lies at the edge of the region, {} = {:.4g} {} of {:.4g} to {:.4g}: the "
         "object may lie outside; {}",
-        names[i], place[i] * unit, i < 2 ? "mm" : "degrees", axis.lower * unit, axis.upper * unit,
-        remedy);
+        axis_names[i], place[i] * unit, i < 2 ? "mm" : "degrees", axis.lower * unit,
+        axis.upper * unit, remedy);
   }
   return {};
 }
 
 /// The belief has no peak about the pose.
-std::optional<std::string> pose_untold(std::span<const TouchEvidence> touches,
-                                       const RecognitionStep& step) {
+Warning pose_untold(std::span<const TouchEvidence> touches, const RecognitionStep& step) {
   if (step.places.peak) {
     return {};
   }
@@ -158,78 +357,13 @@ std::optional<std::string> pose_untold(std::span<const TouchEvidence> touches,
              : "the touches do not tell the pose: no touch has an element In Contact";
 }
 
-/// Share of an object's belief at angles that are nearer to another of its n likenesses than to
-/// its own, where all angles look alike (n = 0) at those more than 1/16 of a turn away.
-/// @param shares [theta]
-double share_at_other_turns(const Axis& theta, std::span<const double> shares, double own_rad,
-                            int n) {
-  const double own_half_rad = std::numbers::pi / (n == 0 ? 8 : n);
-  double all = 0.0;
-  double other = 0.0;
-  for (std::size_t k = 0; k < shares.size(); ++k) {
-    const double theta_rad = theta.centre(static_cast<int>(k));
-    all += shares[k];
-    if (std::abs(wrap_angle(theta_rad - own_rad, 2.0 * std::numbers::pi)) > own_half_rad) {
-      other += shares[k];
-    }
-  }
-  return all > 0.0 ? other / all : 0.0;
-}
-
-/// Whether the map looks the same after turns that it does not call equal.
-bool may_look_alike(const OccupancyGrid& map) {
-  return map.symmetry == 1 && map.suggested_symmetry.value_or(1) != 1;
-}
-
 }  // namespace
-
-std::vector<std::size_t> unlike_touches(std::span<const TouchEvidence> touches,
-                                        const RecognitionTask& task, const RecognitionStep& step) {
-  constexpr double unlike_z = -8.0;
-  constexpr double others_from_z = -5.0;
-  // A stranger's few touches may agree by chance.
-  const std::size_t least_others = task.labels[step.best] == none_label ? 7 : 3;
-  std::vector<std::size_t> unlike;
-  std::size_t others = 0;
-  for (std::size_t i = 0; i < step.touch_fit.size(); ++i) {
-    const std::optional<double>& z = step.touch_fit[i];
-    if (z && *z < unlike_z) {
-      unlike.push_back(i);
-    } else if (z && *z < others_from_z) {
-      return {};  // where many fit badly, none stands out
-    } else if (z && touches[i].in_contact()) {
-      ++others;
-    }
-  }
-  return others < std::max(least_others, 2 * unlike.size()) ? std::vector<std::size_t>() : unlike;
-}
-
-std::string unlike_words(std::span<const std::size_t> unlike, const RecognitionTask& task,
-                         const RecognitionStep& step) {
-  double lowest_z = 0.0;
-  std::vector<std::size_t> numbers;
-  for (const std::size_t touch : unlike) {
-    lowest_z = std::min(lowest_z, *step.touch_fit[touch]);
-    numbers.push_back(touch + 1);
-  }
-  const std::string name = task.name_of(step.mode.object);
-  const bool one = unlike.size() == 1;
-  const bool last = unlike.front() + unlike.size() == step.touch_fit.size();
-  return fmt::format(
-      "touch{} {} fit{} {} {:.0f} standard deviations worse than touches of {} do, while the "
-      "others "
-      "fit: {}",
-      one ? "" : "es", fmt::join(numbers, ", "), one ? "s" : "", name, -lowest_z, name,
-      last  ? "did the object move, or does the array touch something else?"
-      : one ? "leave it out, or look at its pose"
-            : "leave them out, or look at their poses");
-}
 
 std::vector<std::string> warnings_about(std::span<const TouchEvidence> touches,
                                         const RecognitionTask& task, const PoseLattice& lattice,
                                         const RecognitionStep& step) {
   std::vector<std::string> warnings;
-  const auto add = [&](std::optional<std::string> warning) {
+  const auto add = [&](Warning warning) {
     if (warning) {
       warnings.push_back(*std::move(warning));
     }
@@ -241,7 +375,7 @@ std::vector<std::string> warnings_about(std::span<const TouchEvidence> touches,
   if (warnings.empty()) {
     add(pose_untold(touches, step));
   }
-  const std::optional<std::string> degrees = angles_in_degrees(touches);
+  const Warning degrees = angles_in_degrees(touches);
   // Touches at wrong angles do not fit; where the touches fit, the estimate deserves its warnings.
   const bool fits = step.fit && step.fit->verdict == Verdict::fits;
   const bool estimate_counts = warnings.empty() && (!degrees || fits);
@@ -249,64 +383,10 @@ std::vector<std::string> warnings_about(std::span<const TouchEvidence> touches,
   // An estimate from such touches is not worth a word. On bins that are too coarse, the edge is no
   // sign of an object outside.
   if (estimate_counts) {
-    const std::optional<std::string> coarse = coarse_bins(task, lattice, step);
+    const Warning coarse = coarse_bins(task, lattice, step);
     add(coarse ? coarse : at_the_edge(touches, task, lattice, step));
   }
   return warnings;
-}
-
-int symmetry_told(const OccupancyGrid& map, const Axis& theta, std::span<const double> shares,
-                  double own_rad, double temperature) {
-  constexpr double least_share = 0.05;
-  if (!may_look_alike(map)) {
-    return map.symmetry;
-  }
-  const double other = share_at_other_turns(theta, shares, own_rad, *map.suggested_symmetry);
-  // Turns weigh as other poses do.
-  const double odds = std::pow(other / (1.0 - other), 1.0 / temperature);
-  return odds < least_share / (1.0 - least_share) ? map.symmetry : *map.suggested_symmetry;
-}
-
-int symmetry_told(const Recogniser& recogniser, const RecognitionTask& task,
-                  const RecognitionStep& step) {
-  const OccupancyGrid& map = task.hypotheses[step.mode.object].map;
-  if (!may_look_alike(map)) {
-    return map.symmetry;  // the marginals are not asked for
-  }
-  const Marginals marginals = recogniser.marginals(step.mode.object);
-  return symmetry_told(map, marginals.grid.theta_rad, marginals.theta,
-                       step.mode.T_object_robot.theta_rad,
-                       task.temperature_after(recogniser.evidence()));
-}
-
-std::optional<std::string> turned_alike(const RecognitionTask& task, const RecognitionStep& step) {
-  constexpr double least_error_mm = 1.0;
-  const OccupancyGrid& map = task.hypotheses[step.mode.object].map;
-  const int n = map.suggested_symmetry.value_or(1);
-  if (map.symmetry != 1 || n == 1) {
-    return {};
-  }
-  const std::string alike =
-      fmt::format("{} looks the same after {}", map.label,
-                  n == 0 ? "any turn" : fmt::format("every 1/{} of a turn", n));
-  if (step.symmetry == n) {
-    return fmt::format(
-        "{}, and the touches do not tell such turns apart: they count as equal; build its map with "
-        "`symmetry {}` where they always are, with `symmetry 1` where they never are",
-        alike, n);
-  }
-  const std::optional<double> error_mm = step.pose_error_mm();
-  if (!error_mm) {
-    return {};
-  }
-  const double ignored_mm =
-      pose_error_mm(step.body.value(), n, step.pose(), *step.truth.T_object_robot);
-  return *error_mm - ignored_mm > least_error_mm
-             ? std::optional(
-                   fmt::format("{}, and the pose error of {:.2f} mm is {:.2f} mm where "
-                               "such turns do not count; build its map with `symmetry {}`",
-                               alike, *error_mm, ignored_mm, n))
-             : std::nullopt;
 }
 
 }  // namespace palpate

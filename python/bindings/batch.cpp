@@ -15,7 +15,7 @@
 
 #include "bindings.hpp"
 #include "palpate/error.hpp"
-#include "recognition/batch/batch_resolution.hpp"
+#include "recognition/batch/batch_task.hpp"
 #include "recognition/batch/input_reading.hpp"
 #include "recognition/record_json.hpp"
 #include "recognition/recordings.hpp"
@@ -182,7 +182,7 @@ void bind_batch(nb::module_& module) {
           "memory_bytes",
           [](const Shared<OpenBatch>& self) {
             const Recogniser& recogniser = self.constant().recogniser;
-            return recogniser.device_bytes() + recogniser.host_bytes();
+            return recogniser.filter().device_bytes() + recogniser.filter().host_bytes();
           },
           "Memory held: the device's, or the host's where bounds recognise.")
       .def(

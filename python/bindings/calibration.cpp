@@ -14,8 +14,8 @@
 #include "learning/setup_check.hpp"
 #include "model/element_spacing.hpp"
 #include "model/option_words.hpp"
+#include "recognition/record_json.hpp"
 #include "recognition/recordings.hpp"
-#include "recognition/result_json.hpp"
 #include "request.hpp"
 
 namespace palpate::python {

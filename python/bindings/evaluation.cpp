@@ -7,7 +7,7 @@
 #include "call.hpp"
 #include "json.hpp"
 #include "recognition/judged_results.hpp"
-#include "recognition/result_json.hpp"
+#include "recognition/record_json.hpp"
 
 namespace palpate::python {
 

@@ -14,7 +14,6 @@
 #include "json.hpp"
 #include "model/option_words.hpp"
 #include "recognition/record_json.hpp"
-#include "recognition/result_json.hpp"
 #include "recognition/touch_plan.hpp"
 #include "request.hpp"
 

@@ -50,15 +50,13 @@ json told(const RecognitionTask& task) {
            {"by_place", task.by_place},
            {"act", {task.act.below_mm, task.act.above}},
            {"filter", task.filter.index()},
-           {"auto_filter", task.auto_filter},
            {"trace_tolerance", rounded(task.trace_tolerance)},
            {"drawn_tolerance", rounded(task.drawn_tolerance)},
            {"tolerance", rounded(traits.tolerance)},
            {"budget_s", rounded(traits.budget_s)},
-           {"sensor", task.sensor_model.empty() ? 0.0 : task.sensor.temperature}};
-  if (const auto* bounded = std::get_if<BoundedOptions>(&task.filter)) {
-    all["evidence_nats"] = rounded(bounded->evidence_nats);
-  }
+           {"sensor", task.sensor.file.empty() ? 0.0 : task.sensor.temperature}};
+  const auto* bounded = std::get_if<BoundedOptions>(&task.filter);
+  all["evidence_nats"] = bounded != nullptr ? rounded(bounded->evidence_nats) : json();
   if (const auto* of = std::get_if<ParticleOptions>(&task.filter)) {
     all["particles"] = {of->particles, of->resampling == Resampling::systematic, of->augmented,
                         of->seed};
@@ -72,9 +70,9 @@ const json papers = R"json({
   "x": [-10, 10, 20], "y": [-10, 10, 20], "theta": [0, 360, 72], "pivot": [0, 0],
   "auto_pivot": false, "prior": null, "gamma": 0.1, "threshold": 2, "ratio": 0.3,
   "touch_sd": [0, 0], "slip_sd": [0, 0], "none": 0.222222222, "labels": ["A", "I", "(none)"],
-  "by_place": true, "act": [0.5, 0.99], "filter": 0, "auto_filter": true,
-  "trace_tolerance": 1e-4, "drawn_tolerance": 1e-3, "tolerance": null, "budget_s": null,
-  "sensor": 0
+  "by_place": true, "act": [0.5, 0.99], "filter": 1,
+  "trace_tolerance": 1e-4, "drawn_tolerance": 1e-3, "tolerance": 1e-6, "budget_s": null,
+  "evidence_nats": null, "sensor": 0
 })json"_json;
 
 class TaskOfFlags : public RecognitionFlags {
@@ -141,10 +139,9 @@ TEST_F(TaskOfFlags, HasThePapersNumbersWhereNoneIsGiven) {
   EXPECT_EQ(task_told({"--bins=20x20x72"}), papers);
   const std::map<std::string, json> changes{
       {"auto", json::object()},
-      {"histogram", {{"auto_filter", false}}},
-      {"bounded",
-       {{"auto_filter", false}, {"filter", 1}, {"tolerance", 1e-6}, {"evidence_nats", nullptr}}},
-      {"particles", R"({"auto_filter": false, "filter": 2, "none": null, "labels": ["A", "I"],
+      {"bounded", json::object()},
+      {"histogram", {{"filter", 0}, {"tolerance", nullptr}}},
+      {"particles", R"({"filter": 2, "tolerance": null, "none": null, "labels": ["A", "I"],
                         "particles": [10000, false, false, 0], "motion": [1, 5.729577951]})"_json}};
   for (const auto& [filter, of_filter] : changes) {
     json expected = papers;

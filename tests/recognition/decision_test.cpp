@@ -138,7 +138,8 @@ TEST_F(Places, AreTheMassesOfTheFullHistogram) {
     const auto likely = recogniser.likely_bins(std::vector{0, 1}, 1e-6, lattice);
     double near = 0.0;
     for (const std::size_t object : {0U, 1U}) {
-      std::vector<double> shares = recogniser.histogram()->log_likelihood(static_cast<int>(object));
+      std::vector<double> shares =
+          recogniser.filter().histogram()->log_likelihood(static_cast<int>(object));
       const double top = *std::ranges::max_element(shares);
       double sum = 0.0;
       for (double& share : shares) {

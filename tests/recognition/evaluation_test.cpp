@@ -82,7 +82,7 @@ TEST(Evaluation, ListsClassesAndWhatTheyWereTakenFor) {
   ASSERT_EQ(e.classes.size(), 3u);
   EXPECT_EQ(e.classes[0].label, "A");
   EXPECT_EQ(e.classes[0].right, 1u);
-  EXPECT_DOUBLE_EQ(e.classes[0].recall(), 0.5);
+  EXPECT_DOUBLE_EQ(e.classes[0].accuracy(), 0.5);
   EXPECT_THAT(e.classes[0].taken, ElementsAre(1, 1, 0));
   EXPECT_THAT(e.classes[1].taken, ElementsAre(0, 1, 1));
   EXPECT_EQ(e.classes[2].label, "M");
@@ -107,7 +107,7 @@ TEST(Evaluation, AClassMayBeKnownInSomeRecordsOnly) {
 TEST(KnownAgainstUnknown, PrefersNoneToTheFit) {
   std::vector<JudgedRecord> records = six();
   const auto by_none = evaluate(records).known_against_unknown.value();
-  EXPECT_EQ(by_none.score, KnownScore::none);
+  EXPECT_EQ(by_none.score, "1 - none");
   EXPECT_EQ(by_none.known, 4u);
   EXPECT_EQ(by_none.unknown, 2u);
   EXPECT_DOUBLE_EQ(by_none.area, 7.0 / 8.0) << "1, 1, 1, 0.4 against 0.3, 0.95";
@@ -116,10 +116,10 @@ TEST(KnownAgainstUnknown, PrefersNoneToTheFit) {
   for (JudgedRecord& each : records) {
     each.fit_z = each.of_known_class() ? 0.5 : -0.1;
   }
-  EXPECT_EQ(evaluate(records).known_against_unknown->score, KnownScore::none);
+  EXPECT_EQ(evaluate(records).known_against_unknown->score, "1 - none");
   records[0].none.reset();
   const auto by_fit = evaluate(records).known_against_unknown.value();
-  EXPECT_EQ(by_fit.score, KnownScore::fit) << "one record has no other score";
+  EXPECT_EQ(by_fit.score, "fit.z") << "one record has no other score";
   EXPECT_EQ(by_fit.area, 1.0);
 }
 
@@ -134,7 +134,7 @@ TEST(KnownAgainstUnknown, TakesTheFitOfTheRecordsThatHaveOne) {
   records[1].fit_z = -4.0;
   records[5].fit_z = -3.0;
   const auto by_fit = evaluate(records).known_against_unknown.value();
-  EXPECT_EQ(by_fit.score, KnownScore::fit);
+  EXPECT_EQ(by_fit.score, "fit.z");
   EXPECT_EQ(by_fit.known, 2u);
   EXPECT_EQ(by_fit.unknown, 1u);
   EXPECT_DOUBLE_EQ(by_fit.area, 0.5);

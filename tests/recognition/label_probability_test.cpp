@@ -13,8 +13,9 @@
 
 #include "palpate/error.hpp"
 #include "recognition/filter_choice.hpp"
-#include "recognition/misfit.hpp"
+#include "recognition/object_fit.hpp"
 #include "recognition/recognition_record.hpp"
+#include "recognition/scales.hpp"
 #include "shapes.hpp"
 
 namespace palpate::label_probability_test {

@@ -41,11 +41,11 @@ TEST_F(RecogniserTells, OfAHistogramWhatTheHistogramTells) {
 
   const Estimate estimate = histogram.estimate();
   expect_same(recogniser.estimate(), estimate);
-  EXPECT_EQ(recogniser.refine(estimate.mode)->T_object_robot.theta_rad,
+  EXPECT_EQ(recogniser.filter().refine(estimate.mode)->T_object_robot.theta_rad,
             histogram.refine(estimate.mode).T_object_robot.theta_rad);
   EXPECT_EQ(recogniser.marginals(0).xy, histogram.marginals(0).xy);
-  EXPECT_EQ(recogniser.histogram()->log_likelihood(0), histogram.log_likelihood(0));
-  EXPECT_FALSE(recogniser.effective_sample_size());
+  EXPECT_EQ(recogniser.filter().histogram()->log_likelihood(0), histogram.log_likelihood(0));
+  EXPECT_FALSE(recogniser.filter().effective_sample_size());
 }
 
 TEST_F(RecogniserTells, OfParticlesWhatTheParticlesTell) {
@@ -58,9 +58,9 @@ TEST_F(RecogniserTells, OfParticlesWhatTheParticlesTell) {
 
   const Estimate estimate = particles.estimate();
   expect_same(recogniser.estimate(), estimate);
-  EXPECT_EQ(recogniser.effective_sample_size(), particles.effective_sample_size());
-  EXPECT_FALSE(recogniser.refine(estimate.mode));
-  EXPECT_EQ(recogniser.histogram(), nullptr);
+  EXPECT_EQ(recogniser.filter().effective_sample_size(), particles.effective_sample_size());
+  EXPECT_FALSE(recogniser.filter().refine(estimate.mode));
+  EXPECT_EQ(recogniser.filter().histogram(), nullptr);
   EXPECT_EQ(fractions.size(), 6U);
   EXPECT_EQ(fractions.back(), 1.0);
   for (const int object : {0, 1}) {
@@ -84,14 +84,15 @@ TEST_F(RecogniserTells, OfBoundsWhatTheBoundedPosteriorTells) {
 
   const Estimate estimate = bounded.estimate();
   expect_same(recogniser.estimate(), estimate);
-  EXPECT_EQ(recogniser.refine(estimate.mode)->covariance, bounded.refine(estimate.mode).covariance);
+  EXPECT_EQ(recogniser.filter().refine(estimate.mode)->covariance,
+            bounded.refine(estimate.mode).covariance);
   EXPECT_EQ(recogniser.marginals(0).xy, bounded.marginals(0).xy);
-  EXPECT_EQ(recogniser.sample(3, 1)[2].T_object_robot.translation_mm,
+  EXPECT_EQ(recogniser.filter().sample(3, 1)[2].T_object_robot.translation_mm,
             bounded.sample(3, 1)[2].T_object_robot.translation_mm);
-  EXPECT_FALSE(recogniser.effective_sample_size());
-  EXPECT_EQ(recogniser.histogram(), nullptr);
-  EXPECT_NE(recogniser.words().front().find(bounded.path()), std::string::npos);
-  EXPECT_EQ(recogniser.device_bytes(), 0u);
+  EXPECT_FALSE(recogniser.filter().effective_sample_size());
+  EXPECT_EQ(recogniser.filter().histogram(), nullptr);
+  EXPECT_NE(recogniser.filter().words().front().find(bounded.path()), std::string::npos);
+  EXPECT_EQ(recogniser.filter().device_bytes(), 0u);
 }
 
 /// The pivot is the array's centre at the first touch in contact, somewhere in a robot's reach.

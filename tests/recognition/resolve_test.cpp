@@ -1,6 +1,6 @@
-// A request, its scene file, and the task that it resolves to. None of these tasks needs a device.
+// A request, its scene file, and the task that it resolves to.
 
-#include "recognition/resolve.hpp"
+#include "recognition/recognition_job.hpp"
 
 #include <memory>
 #include <numbers>
@@ -61,14 +61,42 @@ class OneFile {
 
 TEST(Resolve, WhatIsNotAskedIsThePapers) {
   const RecognitionTask task = task_of(request_of_shapes());
-  const auto& histogram = std::get<HistogramOptions>(task.filter);
-  EXPECT_EQ(histogram.contact.gamma, 0.1);
-  EXPECT_EQ(histogram.contact.classifier.threshold, 2.0);
-  EXPECT_EQ(histogram.contact.classifier.ratio, 0.3);
+  EXPECT_EQ(task.contact().gamma, 0.1);
+  EXPECT_EQ(task.classifier().threshold, 2.0);
+  EXPECT_EQ(task.classifier().ratio, 0.3);
   EXPECT_EQ(task.lattice().x_mm.lower, -10.0);
   EXPECT_EQ(task.lattice().y_mm.count, 5);
   EXPECT_FALSE(task.auto_pivot);
-  EXPECT_TRUE(task.auto_filter);
+}
+
+TEST(Resolve, TakesBoundsUnlessSomethingAsksForTheHistogramOrTheyHaveNoRoom) {
+  Request request = request_of_shapes();
+  request.touch_sd_deg = 2.0;
+  const RecognitionTask by_bounds = task_of(request);
+  const auto& bounded = std::get<BoundedOptions>(by_bounds.filter);
+  EXPECT_EQ(by_bounds.filter_chosen_by, "`filter auto`");
+  EXPECT_EQ(bounded.tolerance, 1e-6);
+  EXPECT_FALSE(bounded.budget_s || bounded.evidence_nats);
+  EXPECT_DOUBLE_EQ(bounded.touch_sd.rad, 2.0 * std::numbers::pi / 180.0);
+
+  const RecognitionTask by_posterior =
+      resolve(request, {.pressure_unit = "kPa", .every_bin_for = "posterior"});
+  EXPECT_DOUBLE_EQ(std::get<HistogramOptions>(by_posterior.filter).touch_sd.rad,
+                   bounded.touch_sd.rad);
+  EXPECT_EQ(by_posterior.filter_chosen_by, "`posterior`");
+
+  request.bins = std::array{100'000, 100'000, 1};
+  const RecognitionTask large = task_of(request);
+  const auto& histogram = std::get<HistogramOptions>(large.filter);
+  EXPECT_EQ(histogram.lattice.x_mm.count, 100'000) << "too large for both; the histogram says so";
+  EXPECT_DOUBLE_EQ(histogram.touch_sd.rad, bounded.touch_sd.rad);
+  EXPECT_EQ(large.filter_chosen_by, "`filter auto`");
+
+  request.bins = std::array{1000, 1000, 540};
+  request.touch_sd_deg.reset();
+  const RecognitionTask many = task_of(request);
+  EXPECT_GT(many.bins_in_all(), most_bounded_bins);
+  EXPECT_TRUE(traits_of(many.filter).certificate) << "there is room";
 }
 
 TEST(Resolve, AnOptionOfBoundsAsksForBounds) {
@@ -79,27 +107,25 @@ TEST(Resolve, AnOptionOfBoundsAsksForBounds) {
   const RecognitionTask task = task_of(request);
   const auto& bounded = std::get<BoundedOptions>(task.filter);
   EXPECT_EQ(bounded.tolerance, 1e-3);
-  EXPECT_EQ(task.filter_asked_for_by, "`tolerance`");
+  EXPECT_EQ(task.filter_chosen_by, "`tolerance`");
   EXPECT_DOUBLE_EQ(bounded.touch_sd.rad, 2.0 * std::numbers::pi / 180.0);
   EXPECT_DOUBLE_EQ(task.touch_sd().rad, 2.0 * std::numbers::pi / 180.0);
   EXPECT_DOUBLE_EQ(bounded.budget_s.value(), 0.01);
 }
 
-TEST(Resolve, ObjectsThatSlipAreFollowedByTheHistogramWhichIsSaidWhereBoundsWereDue) {
-  const auto said = [](FilterKind filter, int bins) {
+TEST(Resolve, ObjectsThatSlipAreFollowedByTheHistogramWhichIsSaidWhereItWasNotAskedFor) {
+  const auto said = [](FilterKind filter) {
     const RecognitionTask task = task_of(changed([&](Request& r) {
       r.slip_sd_deg = 2.0;
       r.filter = filter;
-      r.bins = std::array{bins, bins, bins};
     }));
     EXPECT_DOUBLE_EQ(std::get<HistogramOptions>(task.filter).slip_sd.rad,
                      2.0 * std::numbers::pi / 180.0);
     return testing::Value(task.remarks, testing::Contains(HasSubstr("followed by the histogram")));
   };
-  EXPECT_FALSE(said(FilterKind::automatic, 5));
-  EXPECT_TRUE(said(FilterKind::bounded, 5));
-  EXPECT_FALSE(said(FilterKind::histogram, 5));
-  EXPECT_TRUE(said(FilterKind::automatic, 60));
+  EXPECT_TRUE(said(FilterKind::automatic));
+  EXPECT_TRUE(said(FilterKind::bounded));
+  EXPECT_FALSE(said(FilterKind::histogram));
 }
 
 TEST(Resolve, CountsThatWereSettledBeforeStand) {
@@ -206,6 +232,51 @@ TEST(Resolve, TouchesThatAreJudgedOtherwiseHaveNoScale) {
   }
 }
 
+/// The bins of the shapes on a filter of the shared device.
+ChosenBins chosen(const FilterOptions& filter, BinWidth width = BinWidth::fine) {
+  return chosen_bins(shared_device, shapes(), filter, width);
+}
+
+PoseLattice wide_lattice() { return {.x_mm = {-1000.0, 1000.0, 1}, .y_mm = {-1000.0, 1000.0, 1}}; }
+
+TEST(ChosenBins, AreThoseOfTheMapsWhereTheDeviceHoldsSoMany) {
+  for (const FilterOptions& filter : every_filter()) {
+    const BalancedLattice bins = chosen(filter).balanced;
+    EXPECT_FALSE(bins.coarsened);
+    const PoseLattice balanced =
+        balanced_lattice(lattice_of(filter), shapes(), most_balanced_bins, BinWidth::fine).lattice;
+    EXPECT_EQ(bins.lattice.x_mm.count, balanced.x_mm.count);
+    EXPECT_EQ(bins.lattice.theta_rad.count, balanced.theta_rad.count);
+  }
+}
+
+TEST(ChosenBins, FollowUncertainTouches) {
+  const DisplacementSd sd{.mm = 2.0, .rad = 0.2};
+  const auto step_mm = [](const FilterOptions& filter) {
+    return chosen(filter, BinWidth::automatic).balanced.step_mm;
+  };
+  const double exact = step_mm(BoundedOptions{});
+  EXPECT_GT(step_mm(BoundedOptions{.touch_sd = sd}), 1.2 * exact);
+  EXPECT_EQ(step_mm(HistogramOptions{.touch_sd = sd}), step_mm(BoundedOptions{.touch_sd = sd}));
+  EXPECT_EQ(step_mm(ParticleOptions{}), exact);
+}
+
+TEST(ChosenBins, AreCoarserWhereTheDeviceHoldsFewerButForBounds) {
+  const HistogramOptions histogram{.lattice = wide_lattice()};
+  const std::int64_t held = most_bins_on(shared_device());
+  const ChosenBins coarse = chosen(histogram);
+  ASSERT_TRUE(coarse.balanced.coarsened);
+  EXPECT_EQ(coarse.most_bins, held);
+  EXPECT_LE(2 * coarse.balanced.lattice.bins(), held);
+  EXPECT_GT(coarse.balanced.step_mm, balanced_step * 0.5) << "of cells of 0.5 mm";
+  const ChosenBins bins = chosen(BoundedOptions{.lattice = wide_lattice()});
+  ASSERT_TRUE(bins.balanced.coarsened);
+  EXPECT_EQ(bins.most_bins, most_bounded_bins);
+  const std::int64_t all = 2 * bins.balanced.lattice.bins();
+  EXPECT_LE(all, most_bounded_bins);
+  EXPECT_GT(all, most_balanced_bins) << "more than any histogram gets";
+}
+
 TEST(Request, ASceneGivesWhatIsNotAsked) {
   const OneFile scene("{gamma: 0.2, ratio: 0.4, bins: [3, 3, 3], none: auto, slip_sd: {mm: 1}}");
   Request request = request_of_shapes();
@@ -283,10 +354,6 @@ TEST(RecognitionOptions, EveryOptionIsReadAsItWasWritten) {
   const std::map<std::string, std::string> words{
       {"bins", "fine"}, {"pivot-mm", "auto"}, {"none", "auto"}, {"filter", "auto"}};
   EXPECT_EQ(option_texts(request_with(words)), words);
-}
-
-TEST(RecognitionOptions, HelpSaysWhereAutoChangesToBounds) {
-  EXPECT_THAT(option_named("filter").help, HasSubstr(std::to_string(most_histogram_bins)));
 }
 
 TEST(RecognitionOptions, ATextThatCannotBeMeantLeavesTheOptionAsItWas) {

@@ -1,6 +1,6 @@
 // How much touches tell beside earlier ones, by how far from these they are.
 
-#include "recognition/touch_places.hpp"
+#include "recognition/recogniser.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -17,7 +17,6 @@
 #include "cli/recognition_flags.hpp"
 #include "cli/results_folder.hpp"
 #include "io/input_file.hpp"
-#include "recognition/batch/batch_resolution.hpp"
 #include "recognition/batch/batch_task.hpp"
 #include "recognition/batch/input_reading.hpp"
 #include "recognition/recordings.hpp"

@@ -19,7 +19,7 @@
 #include "cli/recognition_flags.hpp"
 #include "cli/step_words.hpp"
 #include "io/input_file.hpp"
-#include "recognition/batch/batch_resolution.hpp"
+#include "recognition/batch/batch_task.hpp"
 #include "recognition/record_json.hpp"
 
 namespace palpate::cli {

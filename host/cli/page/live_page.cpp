@@ -12,7 +12,6 @@
 #include "model/option_words.hpp"
 #include "palpate/error.hpp"
 #include "recognition/record_json.hpp"
-#include "recognition/result_json.hpp"
 
 namespace palpate::cli {
 

@@ -10,8 +10,10 @@
 #include <nlohmann/json.hpp>
 
 #include "io/atomic_file.hpp"
+#include "io/file_hash.hpp"
 #include "io/input_file.hpp"
 #include "options/option.hpp"
+#include "options/refused_option.hpp"
 
 namespace palpate {
 
@@ -58,71 +60,6 @@ std::string from_utf8(const std::string& text) {
 /// A whole number from 0. @throws OrderedJson::exception where it is none
 std::size_t count_of(const OrderedJson& json) {
   return json.get_ref<const OrderedJson::number_unsigned_t&>();
-}
-
-OrderedJson to_json(const BatchEntry& entry) {
-  OrderedJson json{{"path", to_utf8(entry.input.path)}};
-  if (entry.input.frames) {
-    json["frames"] = OrderedJson::array({entry.input.frames->begin, entry.input.frames->end});
-  }
-  if (!entry.input.label.empty()) {
-    json["label"] = to_utf8(entry.input.label);
-  }
-  if (entry.stamp) {
-    json["bytes"] = entry.stamp->bytes;
-    json["modified_ns"] = entry.stamp->modified_ns;
-  }
-  if (const auto& survey = entry.survey) {
-    json["survey"] = {survey->touches, survey->reach_mm, survey->pressure_unit};
-  }
-  return json;
-}
-
-BatchEntry entry_of(const OrderedJson& json) {
-  BatchEntry entry;
-  entry.input.path = from_utf8(json.at("path"));
-  if (json.contains("frames")) {
-    entry.input.frames =
-        Frames{count_of(json.at("frames").at(0)), count_of(json.at("frames").at(1))};
-  }
-  entry.input.label = from_utf8(json.value("label", ""));
-  if (json.contains("bytes")) {
-    entry.stamp = FileStamp{count_of(json.at("bytes")), json.at("modified_ns")};
-  }
-  if (json.contains("survey")) {
-    const OrderedJson& survey = json.at("survey");
-    entry.survey = InputSurvey{count_of(survey.at(0)), survey.at(1), survey.at(2)};
-  }
-  return entry;
-}
-
-OrderedJson head_to_json(const BatchTask& task) {
-  OrderedJson maps = OrderedJson::array();
-  for (const std::string& map : task.request.maps) {
-    maps.push_back(to_utf8(map));
-  }
-  OrderedJson options = OrderedJson::object();
-  for (const auto& [option, text] : option_texts(task.request)) {
-    options[option] = to_utf8(text);
-  }
-  OrderedJson files = OrderedJson::object();
-  for (const auto& [file, hash] : task.files) {
-    files[to_utf8(file)] = hash;
-  }
-  const Circumstances& inferred = task.inferred;
-  return {{"format", format},
-          {"version", version},
-          {"program", task.program},
-          {"inputs", task.inputs.size()},
-          {"unknowns", task.unknowns()},
-          {"chunk_unknowns", task.chunk_unknowns},
-          {"maps", maps},
-          {"options", options},
-          {"files", files},
-          {"pressure_unit", inferred.pressure_unit},
-          {"unit_from", to_utf8(inferred.source)},
-          {"reach_mm", inferred.reach_mm},
-          {"bins", task.bins}};
 }
 
 BatchTask head_of(const OrderedJson& json) {
@@ -233,13 +170,74 @@ std::size_t BatchTask::chunks() const {
   return all / chunk_unknowns + (all % chunk_unknowns != 0 ? 1 : 0);
 }
 
-std::string head_text(const BatchTask& task) { return head_to_json(task).dump() + "\n"; }
-
-std::string entry_text(const BatchEntry& entry) { return to_json(entry).dump() + "\n"; }
+std::string head_text(const BatchTask& task) {
+  OrderedJson maps = OrderedJson::array();
+  for (const std::string& map : task.request.maps) {
+    maps.push_back(to_utf8(map));
+  }
+  OrderedJson options = OrderedJson::object();
+  for (const auto& [option, text] : option_texts(task.request)) {
+    options[option] = to_utf8(text);
+  }
+  OrderedJson files = OrderedJson::object();
+  for (const auto& [file, hash] : task.files) {
+    files[to_utf8(file)] = hash;
+  }
+  const Circumstances& inferred = task.inferred;
+  const OrderedJson json{{"format", format},
+                         {"version", version},
+                         {"program", task.program},
+                         {"inputs", task.inputs.size()},
+                         {"unknowns", task.unknowns()},
+                         {"chunk_unknowns", task.chunk_unknowns},
+                         {"maps", maps},
+                         {"options", options},
+                         {"files", files},
+                         {"pressure_unit", inferred.pressure_unit},
+                         {"unit_from", to_utf8(inferred.source)},
+                         {"reach_mm", inferred.reach_mm},
+                         {"bins", task.bins}};
+  return json.dump() + "\n";
+}
 
 BatchTask head_from(std::string_view text) { return head_of(OrderedJson::parse(text)); }
 
-BatchEntry entry_from(std::string_view text) { return entry_of(OrderedJson::parse(text)); }
+std::string entry_text(const BatchEntry& entry) {
+  OrderedJson json{{"path", to_utf8(entry.input.path)}};
+  if (entry.input.frames) {
+    json["frames"] = OrderedJson::array({entry.input.frames->begin, entry.input.frames->end});
+  }
+  if (!entry.input.label.empty()) {
+    json["label"] = to_utf8(entry.input.label);
+  }
+  if (entry.stamp) {
+    json["bytes"] = entry.stamp->bytes;
+    json["modified_ns"] = entry.stamp->modified_ns;
+  }
+  if (const auto& survey = entry.survey) {
+    json["survey"] = {survey->touches, survey->reach_mm, survey->pressure_unit};
+  }
+  return json.dump() + "\n";
+}
+
+BatchEntry entry_from(std::string_view text) {
+  const OrderedJson json = OrderedJson::parse(text);
+  BatchEntry entry;
+  entry.input.path = from_utf8(json.at("path"));
+  if (json.contains("frames")) {
+    entry.input.frames =
+        Frames{count_of(json.at("frames").at(0)), count_of(json.at("frames").at(1))};
+  }
+  entry.input.label = from_utf8(json.value("label", ""));
+  if (json.contains("bytes")) {
+    entry.stamp = FileStamp{count_of(json.at("bytes")), json.at("modified_ns")};
+  }
+  if (json.contains("survey")) {
+    const OrderedJson& survey = json.at("survey");
+    entry.survey = InputSurvey{count_of(survey.at(0)), survey.at(1), survey.at(2)};
+  }
+  return entry;
+}
 
 BatchTask read_batch_task(const fs::path& file) {
   require_readable(file);
@@ -320,6 +318,34 @@ std::string difference_of_inputs(const BatchTask& before, const BatchTask& now) 
              ? ""
              : fmt::format("{} inputs are given, its results are of {}", now.inputs.size(),
                            before.inputs.size());
+}
+
+void refuse_budget(const Request& request) {
+  if (request.budget_ms) {
+    refuse_option("budget-ms", *request.budget_ms,
+                  "its results depend on the clock, and a batch's are the same on every run; leave "
+                  "it out, or use palpate recognize");
+  }
+}
+
+void hash_files(BatchTask& task, const Request& request) {
+  task.files.clear();
+  for (const auto& [option, file] : files_of(request)) {
+    if (!task.files.contains(file.string())) {
+      task.files[file.string()] = hash_of_file(file);
+    }
+  }
+}
+
+RecognitionJob job_of(BatchTask& task, const Request& request, DeviceSource device) {
+  Circumstances circumstances = task.inferred;
+  if (task.bins != std::array<int, 3>{}) {
+    circumstances.counts = task.bins;
+  }
+  RecognitionJob job(request, circumstances, std::move(device));
+  const PoseLattice& lattice = job.task().lattice();
+  task.bins = {lattice.x_mm.count, lattice.y_mm.count, lattice.theta_rad.count};
+  return job;
 }
 
 }  // namespace palpate

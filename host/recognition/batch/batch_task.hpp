@@ -12,8 +12,8 @@
 #include <string_view>
 #include <vector>
 
+#include "recognition/recognition_job.hpp"
 #include "recognition/request.hpp"
-#include "recognition/resolve.hpp"
 
 namespace palpate {
 
@@ -83,5 +83,21 @@ bool write_batch_task(const std::filesystem::path& file, const BatchTask& task);
 std::string difference_of_tasks(const BatchTask& before, const BatchTask& now);
 /// The first input that differs, in words; "" where none does.
 std::string difference_of_inputs(const BatchTask& before, const BatchTask& now);
+
+// How a batch's request becomes a task, once, before anyone recognises a part of it: everything
+// that follows from all inputs together, or from the device at hand, so that no record depends on
+// who computes it. Requests are completed.
+
+/// Refuses budget_ms, whose results depend on the clock. @throws Error
+void refuse_budget(const Request& request);
+
+/// Puts the hashes of the files that the recognition depends on into the task. @throws Error
+void hash_files(BatchTask& task, const Request& request);
+
+/// The recognition that a task with its inference asks for, on the task's bins. Where the task has
+/// none yet, settles them and puts them there.
+/// @param device see RecognitionJob
+/// @throws Error
+RecognitionJob job_of(BatchTask& task, const Request& request, DeviceSource device = {});
 
 }  // namespace palpate

@@ -4,12 +4,13 @@
 
 #include <algorithm>
 #include <atomic>
-#include <exception>
 #include <filesystem>
-#include <mutex>
 #include <system_error>
 #include <thread>
 
+#include <tbb/task_arena.h>
+
+#include "estimation/parallel_for.hpp"
 #include "io/csv_table.hpp"
 #include "io/file_hash.hpp"
 #include "io/input_file.hpp"
@@ -208,41 +209,23 @@ ReadInput read_entry(const BatchTask& task, const BatchEntry& entry, const Reque
 
 void survey_inputs(std::span<BatchEntry> inputs, const Request& request, std::size_t threads,
                    const std::function<void(double)>& progress) {
-  std::atomic<std::size_t> next = 0;
-  std::exception_ptr failure;
-  std::mutex mutex;
-  const auto missing = static_cast<std::size_t>(std::ranges::count_if(
-      inputs, [](const BatchEntry& entry) { return !entry.survey.has_value(); }));
-  if (missing == 0 || !(request.each_frame || infers_region(request))) {
+  if (!request.each_frame && !infers_region(request)) {
     return;
   }
-  threads = std::min(threads, missing);
-  const auto work = [&](bool shows) {
-    try {
-      for (std::size_t i = next++; i < inputs.size(); i = next++) {
-        if (!inputs[i].survey) {
-          inputs[i].survey = survey_of(inputs[i], request);
-        }
-        if (shows) {
-          progress(static_cast<double>(i) / static_cast<double>(inputs.size()));
-        }
+  std::atomic<std::size_t> done = 0;
+  const auto caller = std::this_thread::get_id();
+  tbb::task_arena arena(static_cast<int>(std::max<std::size_t>(threads, 1)));
+  arena.execute([&] {
+    parallel_for(inputs.size(), [&](std::size_t i) {
+      if (!inputs[i].survey) {
+        inputs[i].survey = survey_of(inputs[i], request);
       }
-    } catch (...) {
-      next = inputs.size();
-      const std::lock_guard lock(mutex);
-      failure = std::current_exception();
-    }
-  };
-  {
-    std::vector<std::jthread> others;
-    for (std::size_t i = 1; i < threads; ++i) {
-      others.emplace_back(work, false);
-    }
-    work(true);
-  }
-  if (failure) {
-    std::rethrow_exception(failure);
-  }
+      ++done;
+      if (std::this_thread::get_id() == caller) {
+        progress(static_cast<double>(done) / static_cast<double>(inputs.size()));
+      }
+    });
+  });
 }
 
 Circumstances infer(std::span<const BatchEntry> inputs, const Request& request) {
