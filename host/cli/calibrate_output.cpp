@@ -11,7 +11,7 @@
 #include "cli/evaluate_output.hpp"
 #include "cli/options.hpp"
 #include "cli/text_table.hpp"
-#include "learning/level_counts.hpp"
+#include "learning/table_learning.hpp"
 #include "model/option_words.hpp"
 #include "recognition/misfit.hpp"
 

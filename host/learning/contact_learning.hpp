@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "learning/level_counts.hpp"
 #include "learning/press.hpp"
 #include "palpate/contact.hpp"
+#include "palpate/learned_sensor.hpp"
 #include "palpate/map_builder.hpp"
 
 namespace palpate {
@@ -61,12 +61,26 @@ ContactClassifier learn_classifier(const std::vector<Press>& presses,
 /// be cut off at 0. 0 where there are no such elements.
 double noise_floor(const std::vector<Press>& presses, const ContactClassifier& classifier);
 
-/// Gamma of Eq. 7 under which readings are most likely where the log odds are known.
-/// @param counts of two levels over log odds; nodes of cells that nothing sensed are left out
-double fit_gamma(const LevelCounts& counts, double prior);
-
 /// The share of elements In Contact among the known ones, in [0.01, 0.5]: the object's area over
 /// the area that touches sensed.
 double share_in_contact(std::span<const Touch> touches, const ContactClassifier& classifier);
+
+/// The features of a press of an object.
+struct LabelledFeatures {
+  std::string label;
+  PressFeatures features;
+};
+
+/// The distribution of each object's features. An object's covariance is drawn towards that of all
+/// presses about the means of their objects, as if four presses more had varied so:
+/// C = (n C_object + 4 C_pooled) / (n + 4) * (1 + 1 / n) + 0.05^2 I, where the factor is what the
+/// mean of n presses misses, and the last term keeps presses that were all alike from being
+/// demanded alike. Where every object has one press, all presses' covariance stands for the pooled
+/// one. `any` has the mean and covariance of all presses. The weight stays 0.
+/// @param presses at least one
+LearnedFeatures learn_features(std::span<const LabelledFeatures> presses);
+/// The distributions of presses' features, each press by its first touch.
+LearnedFeatures learn_features(const std::vector<Press>& presses,
+                               const ContactClassifier& classifier);
 
 }  // namespace palpate

@@ -1,4 +1,4 @@
-#include "learning/map_sensor.hpp"
+#include "learning/map_task.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -12,7 +12,6 @@
 
 #include "estimation/maps/left_out_fit.hpp"
 #include "io/input_file.hpp"
-#include "learning/map_sensor.hpp"
 #include "learning/observed_map.hpp"
 #include "learning/press.hpp"
 #include "learning/progress.hpp"
@@ -31,7 +30,7 @@ namespace {
 /// Gathers the touches of all recordings by label, in the labels' order.
 void group_by_label(MapTask& task, const ContactClassifier& classifier) {
   const MapRequest& request = task.request;
-  const Pose T_object_robot = inverse(object_origin(request).T_learned_robot_object);
+  const Pose T_object_robot = inverse(given_origin(request).value_or(Pose{}));
   struct Group {
     std::vector<Touch> touches;
     std::vector<TouchSource> sources;
@@ -220,7 +219,7 @@ OccupancyGrid posed_map(const MapTask& task, std::size_t object, const ObjectTou
   }
   judge_left_out(device, source);
   map.source = std::make_shared<const MapSource>(std::move(source));
-  settle_frame(object_origin(task.request), map);
+  settle_frame(task.request, map);
   return map;
 }
 

@@ -1,4 +1,4 @@
-#include "learning/mount_search.hpp"
+#include "learning/array_place.hpp"
 
 #include <algorithm>
 #include <array>
@@ -14,6 +14,8 @@
 #include <tbb/parallel_for.h>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+
+#include "learning/local_search.hpp"
 
 namespace palpate {
 
@@ -159,20 +161,19 @@ FoundMount MountSearch::refined(FoundMount from, Squares& squares) const {
   };
   constexpr std::array levels{Level{2.0, 2.0, 0.12}, Level{1.5, 1.0, 0.06}, Level{1.5, 0.5, 0.03}};
   for (const Level& level : levels) {
-    from.nats = nats(from.offset, level.square_mm, squares);
-    for (bool better = true; better;) {
-      better = false;
-      const Pose at = from.offset;
+    const auto value_of = [&](const Pose& at) { return nats(at, level.square_mm, squares); };
+    const auto neighbours_of = [&](const Pose& at) {
+      std::vector<Pose> neighbours;
       for (const auto& [x, y, turn] :
            {std::array{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}}) {
-        const Pose tried{at.translation_mm + level.step_mm * glm::dvec2(x, y),
-                         at.theta_rad + level.step_rad * turn};
-        if (const double other = nats(tried, level.square_mm, squares); other > from.nats) {
-          from = {tried, other};
-          better = true;
-        }
+        neighbours.push_back({at.translation_mm + level.step_mm * glm::dvec2(x, y),
+                              at.theta_rad + level.step_rad * turn});
       }
-    }
+      return neighbours;
+    };
+    const auto [offset, best] =
+        climb(Summit<Pose>{from.offset, value_of(from.offset)}, neighbours_of, value_of);
+    from = {offset, best};
   }
   return from;
 }

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "learning/cross_validation.hpp"
-#include "learning/sensor_gain.hpp"
 #include "palpate/learned_sensor.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/setup_finding.hpp"
@@ -97,9 +96,9 @@ struct SensorCalibration {
 /// @param presses all at known poses or all at unknown ones
 /// @param given maps to compare presses with, with their mean level where a table is over that;
 /// without: maps of other presses
-/// @throws Error where no press has a map of its object that it is no part of, on poses some of
-/// which are known, where presses tell no threshold or have no pressure above it, and as
-/// observed_map() and learn_table() do; what `progress` throws
+/// @throws Error where no press has a map of its object that it is no part of, where presses tell
+/// no threshold or have no pressure above it, and as observed_map() and learn_table() do; what
+/// `progress` throws
 SensorCalibration calibrate_sensor(const std::vector<Press>& presses,
                                    const std::vector<OccupancyGrid>& given,
                                    const SensorCalibrationOptions& options,

@@ -13,8 +13,6 @@
 #include <glm/geometric.hpp>
 
 #include "learning/array_place.hpp"
-#include "learning/element_order.hpp"
-#include "learning/mount_search.hpp"
 #include "learning/setup_judge.hpp"
 #include "model/bounding_box.hpp"
 #include "palpate/error.hpp"

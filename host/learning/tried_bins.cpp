@@ -9,7 +9,6 @@
 
 #include <fmt/format.h>
 
-#include "learning/cross_validation.hpp"
 #include "model/bounding_box.hpp"
 #include "model/touch_evidence.hpp"
 #include "palpate/error.hpp"

@@ -26,6 +26,10 @@ struct RecognitionBins {
 /// @param press at a known pose; T_object_robot of the returned one is the drawn pose
 Press as_unknown(const Press& press, const RecognitionBins& bins, Random& random);
 
+/// Presses in a group, and most groups that a press is in.
+inline constexpr std::size_t presses_in_group = 3;
+inline constexpr std::size_t groups_of_press = 3;
+
 /// Touches of one object at known poses as one press, in the robot frame of the first.
 /// @param presses at known poses, at least one
 Press together(std::span<const Press* const> presses);

@@ -10,7 +10,7 @@
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 
-#include "learning/feature_learning.hpp"
+#include "learning/table_learning.hpp"
 #include "palpate/error.hpp"
 #include "simulated_presses.hpp"
 #include "support/errors.hpp"

@@ -1,4 +1,4 @@
-#include "learning/sensor_gain.hpp"
+#include "learning/held_out.hpp"
 
 #include <cmath>
 

@@ -8,7 +8,6 @@
 #include <gtest/gtest.h>
 #include <glm/geometric.hpp>
 
-#include "learning/level_counts.hpp"
 #include "model/bounding_box.hpp"
 #include "model/interpolated_map.hpp"
 #include "palpate/error.hpp"
