@@ -1,4 +1,4 @@
-#include "learning/array_place.hpp"
+#include "learning/setup_judge.hpp"
 
 #include <algorithm>
 #include <array>
@@ -265,7 +265,6 @@ void check_offset(SetupJudge& judge, Setup& setup, double& nats, SetupCheck& che
     check.findings.push_back(*finding);
     setup = setup_at(*finding->array_offset);
     nats = judge.nats(setup);
-    check.elements_mm = setup.elements_mm;
   }
 }
 
@@ -295,7 +294,6 @@ void check_pitch(SetupJudge& judge, Setup& setup, double& nats, SetupCheck& chec
                      best)});
     setup = scaled(best);
     nats = most;
-    check.elements_mm = setup.elements_mm;
   }
 }
 
@@ -324,27 +322,24 @@ void check_order(SetupJudge& judge, Setup& setup, double& nats, SetupCheck& chec
     check.remarks.emplace_back("the array is no grid: the order of its elements was not tried");
     return;
   }
-  const std::vector<glm::dvec2> given = setup.elements_mm;
   double best = nats;
-  std::vector<std::string> options;
-  for (const auto& [import_options, elements_mm] : orders) {
+  ElementOrder found;
+  for (const ElementOrder& order : orders) {
     Setup other = setup;
-    other.elements_mm = elements_mm;
-    const double tried = elements_mm == given ? nats : judge.nats(other);
+    other.elements_mm = order.elements_mm;
+    const double tried = order.elements_mm == setup.elements_mm ? nats : judge.nats(other);
     if (tried > best) {
       best = tried;
-      options = import_options;
-      check.elements_mm = elements_mm;
+      found = order;
     }
   }
   // Where touches overlap little, how the elements lie among the cells tells orders apart by a
   // little; a wrong order costs a good part of all that the touches tell.
   if (best - nats > std::max(least_nats, least_share * std::abs(nats))) {
-    check.findings.push_back(order_finding(options, best - nats));
-    setup.elements_mm = check.elements_mm;
+    check.findings.push_back(order_finding(found.options, best - nats));
+    setup.elements_mm = found.elements_mm;
     nats = best;
   }
-  check.elements_mm = setup.elements_mm;
 }
 
 }  // namespace palpate

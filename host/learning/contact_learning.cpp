@@ -87,19 +87,6 @@ double learned_threshold(const std::vector<Press>& presses) {
   return std::exp(otsu_threshold(logs));
 }
 
-double share_in_contact(std::span<const TouchEvidence> touches) {
-  double contacts = 0.0;
-  double known = 0.0;
-  for (const TouchEvidence& touch : touches) {
-    contacts += static_cast<double>(touch.contacts);
-    known += static_cast<double>(touch.known().readings.size());
-  }
-  // No array, however it was pressed, says that the world is empty or full.
-  constexpr double least = 0.01;
-  constexpr double most = 0.5;
-  return std::clamp((contacts + 0.5) / (known + 1.0), least, most);
-}
-
 /// Pressures of all elements In Contact, ascending.
 std::vector<double> contact_pressures(std::span<const Touch> touches,
                                       std::span<const TouchEvidence> evidence) {
@@ -150,15 +137,6 @@ FeatureDistribution distribution_of(const glm::dvec3& mean, const glm::dmat3& co
 
 }  // namespace
 
-MapOptions LearnedReadings::maps() const {
-  if (given_maps) {
-    return *given_maps;
-  }
-  return {.cell_mm = 0.5 * spacing_mm,
-          .sensor = {.spread_mm = spread_mm, .prior = prior},
-          .classifier = classifier};
-}
-
 std::vector<double> LearnedReadings::level_edges(std::size_t levels) const {
   std::vector<double> edges;
   for (std::size_t level = 2; level < levels && !pressures.empty(); ++level) {
@@ -171,7 +149,7 @@ std::vector<double> LearnedReadings::level_edges(std::size_t levels) const {
 }
 
 LearnedReadings learn_readings(const std::vector<Press>& presses, const ReadingOptions& options) {
-  LearnedReadings readings{.spacing_mm = options.spacing_mm, .given_maps = options.maps};
+  LearnedReadings readings{.spacing_mm = options.spacing_mm};
   if (options.threshold && options.ratio) {
     readings.classifier = {.threshold = *options.threshold, .ratio = *options.ratio};
   } else {
@@ -198,15 +176,13 @@ LearnedReadings learn_readings(const std::vector<Press>& presses, const ReadingO
                             "`threshold`",
                             readings.classifier.threshold, options.pressure_unit));
   }
-  if (options.maps) {
-    readings.prior = options.maps->sensor.prior;
-    readings.spread_mm = options.maps->sensor.spread_mm;
-    return readings;
-  }
-  readings.prior = share_in_contact(evidence);
   constexpr double of_spacing = 0.6;  // leaves no gaps between the elements of a press
-  readings.spread_mm = at_known_poses(presses) ? usual_spread_mm(options.spacing_mm)
-                                               : of_spacing * options.spacing_mm;
+  const double spread_mm = at_known_poses(presses) ? usual_spread_mm(options.spacing_mm)
+                                                   : of_spacing * options.spacing_mm;
+  readings.maps = options.maps.value_or(
+      MapOptions{.cell_mm = 0.5 * options.spacing_mm,
+                 .sensor = {.spread_mm = spread_mm, .prior = share_in_contact(evidence)},
+                 .classifier = readings.classifier});
   return readings;
 }
 
@@ -256,8 +232,17 @@ double noise_floor(const std::vector<Press>& presses, const ContactClassifier& c
   return count > 0.0 ? std::sqrt(cut * squares / count) : 0.0;
 }
 
-double share_in_contact(std::span<const Touch> touches, const ContactClassifier& classifier) {
-  return share_in_contact(evidence_of(touches, {.classifier = classifier}));
+double share_in_contact(std::span<const TouchEvidence> touches) {
+  double contacts = 0.0;
+  double known = 0.0;
+  for (const TouchEvidence& touch : touches) {
+    contacts += static_cast<double>(touch.contacts);
+    known += static_cast<double>(touch.known().readings.size());
+  }
+  // No array, however it was pressed, says that the world is empty or full.
+  constexpr double least = 0.01;
+  constexpr double most = 0.5;
+  return std::clamp((contacts + 0.5) / (known + 1.0), least, most);
 }
 
 LearnedFeatures learn_features(std::span<const LabelledFeatures> presses) {

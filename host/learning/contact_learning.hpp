@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "learning/press.hpp"
+#include "model/touch_evidence.hpp"
 #include "palpate/contact.hpp"
 #include "palpate/learned_sensor.hpp"
 #include "palpate/map_builder.hpp"
@@ -26,15 +27,11 @@ struct ReadingOptions {
 /// What presses say of a sensor's readings, whatever objects they are of.
 struct LearnedReadings {
   ContactClassifier classifier;
-  double noise = 0.0;                         ///< see noise_floor()
-  std::vector<double> pressures;              ///< of all elements In Contact, ascending
-  double prior = 0.2;                         ///< see share_in_contact()
-  double spread_mm = 0.5;                     ///< of maps
-  double spacing_mm = 0.0;                    ///< between the elements
-  std::optional<MapOptions> given_maps = {};  ///< ReadingOptions::maps
+  double noise = 0.0;             ///< see noise_floor()
+  std::vector<double> pressures;  ///< of all elements In Contact, ascending
+  double spacing_mm = 0.0;        ///< between the elements
+  MapOptions maps;                ///< the given ones, or else with cells of half a spacing
 
-  /// The given options of maps, or else those of maps with cells of half a spacing.
-  MapOptions maps() const;
   /// Pressures that part the elements In Contact into `levels` - 1 levels of about as many elements
   /// each; fewer where pressures are the same.
   std::vector<double> level_edges(std::size_t levels) const;
@@ -63,7 +60,7 @@ double noise_floor(const std::vector<Press>& presses, const ContactClassifier& c
 
 /// The share of elements In Contact among the known ones, in [0.01, 0.5]: the object's area over
 /// the area that touches sensed.
-double share_in_contact(std::span<const Touch> touches, const ContactClassifier& classifier);
+double share_in_contact(std::span<const TouchEvidence> touches);
 
 /// The features of a press of an object.
 struct LabelledFeatures {

@@ -51,7 +51,7 @@ struct LabelScore {
 class FoldTrial {
  public:
   FoldTrial(const std::vector<std::string>& labels, const FoldModel& model,
-            const ModelLearning& settings)
+            const CalibrationSettings& settings)
       : labels_(labels), model_(model), settings_(settings), maps_of_(labels.size()) {
     for (const TrainingMap& map : model.maps) {
       const std::optional<std::size_t> label = label_of(map.map.label);
@@ -61,7 +61,7 @@ class FoldTrial {
       hypotheses_.push_back({.map = map.map});
     }
     if (model.table) {
-      std::vector<OccupancyGrid> layers = layers_of(model.maps, model.how.layer);
+      std::vector<OccupancyGrid> layers = layers_of(model.maps, model.learning.layer);
       for (std::size_t map = 0; map < layers.size(); ++map) {
         hypotheses_[map].layer = std::move(layers[map]);
       }
@@ -78,22 +78,20 @@ class FoldTrial {
         tried.push_back(presses[i]);
       }
     }
-    const Unknowns asked =
-        settings_.bins ? unknowns_of(tried, *settings_.bins, fold) : Unknowns{.presses = tried};
-    const ContactModel classifier =
-        model_.table ? contact_with(model_.how.contact, *model_.table, "") : model_.how.contact;
+    const std::vector<Unknown> asked = unknowns_of(tried, settings_.bins, fold);
+    const ContactModel classifier = model_.table
+                                        ? contact_with(model_.learning.contact, *model_.table, "")
+                                        : model_.learning.contact;
     std::vector<std::vector<TouchEvidence>> evidence;
-    for (const Press& press : asked.presses) {
-      evidence.push_back(evidence_of(press.touches, classifier));
+    for (const Unknown& unknown : asked) {
+      evidence.push_back(evidence_of(unknown.press.touches, classifier));
     }
     const auto scores = score(evidence, progress);
     CrossValidation result;
-    for (std::size_t i = 0; i < asked.presses.size(); ++i) {
-      HeldOut& unknown = result.unknowns.emplace_back(HeldOut{.fold = fold, .log_evidence = {}});
-      if (i >= tried.size()) {
-        unknown.half = asked.half_of_group[i - tried.size()];
-      }
-      judge(asked.presses[i], evidence[i], scores[i], unknown);
+    for (std::size_t i = 0; i < asked.size(); ++i) {
+      HeldOut held_out{.fold = fold, .half = asked[i].half, .log_evidence = {}};
+      judge(asked[i].press, evidence[i], scores[i], held_out);
+      result.unknowns.push_back(std::move(held_out));
     }
     if (settings_.bins && model_.table) {
       result.place_errors = errors_of(tried);
@@ -112,13 +110,13 @@ class FoldTrial {
   }
 
   ContactModel contact_for(std::size_t label) const {
-    return model_.table ? contact_with(model_.how.contact, *model_.table, labels_[label])
-                        : model_.how.contact;
+    return model_.table ? contact_with(model_.learning.contact, *model_.table, labels_[label])
+                        : model_.learning.contact;
   }
 
   PressPlacer placer_on(std::size_t map, const ContactModel& contact) const {
     return {hypotheses_[map], contact,
-            settings_.bins ? settings_.bins->lattice : model_.how.lattice};
+            settings_.bins ? settings_.bins->lattice : model_.learning.lattice};
   }
 
   /// The scores of presses, [press][label].
@@ -202,7 +200,7 @@ class FoldTrial {
   std::vector<double> log_densities(const TouchEvidence& touch) const {
     std::vector<double> densities;
     if (model_.features) {
-      const PressFeatures own = features_of(touch, model_.how.contact.classifier.threshold);
+      const PressFeatures own = features_of(touch, model_.learning.contact.classifier.threshold);
       for (const std::string& label : labels_) {
         const auto known = model_.features->objects.find(label);
         const FeatureDistribution& of_label =
@@ -286,15 +284,15 @@ class FoldTrial {
 
   const std::vector<std::string>& labels_;
   const FoldModel& model_;
-  const ModelLearning& settings_;
+  const CalibrationSettings& settings_;
   std::vector<Hypothesis> hypotheses_;             ///< [map]
   std::vector<std::vector<std::size_t>> maps_of_;  ///< [label]
 };
 
 /// What presses say of presses that are not among them by Eq. 7.
-FoldModel eq7_model(const LearnedPresses& learned, const ModelLearning& settings) {
-  FoldModel model{.maps = learned.maps, .how = table_learning({}, learned, settings)};
-  model.how.contact.classifier = learned.readings.maps().classifier;
+FoldModel eq7_model(const LearnedPresses& learned, const CalibrationSettings& settings) {
+  FoldModel model{.maps = learned.maps, .learning = table_learning({}, learned, settings)};
+  model.learning.contact.classifier = learned.readings.maps.classifier;
   if (settings.steps && settings.given.empty()) {
     // Touches at known poses are tried on maps of all others, as unknowns will be.
     model.maps = learned.of_objects;
@@ -308,10 +306,10 @@ FoldModel eq7_model(const LearnedPresses& learned, const ModelLearning& settings
 }  // namespace
 
 LearnedPresses with_maps(std::vector<Press> presses, LearnedReadings readings,
-                         const ModelLearning& settings) {
+                         const CalibrationSettings& settings) {
   LearnedPresses learned{std::move(presses), std::move(readings), settings.given};
   if (settings.given.empty()) {
-    const MapOptions maps = learned.readings.maps();
+    const MapOptions& maps = learned.readings.maps;
     if (settings.steps) {
       MapsByFolds built = maps_by_folds(learned.presses, maps, settings.folds);
       learned.maps = std::move(built.without_folds);
@@ -324,7 +322,7 @@ LearnedPresses with_maps(std::vector<Press> presses, LearnedReadings readings,
 }
 
 TableLearning table_learning(const TableKind& kind, const LearnedPresses& learned,
-                             const ModelLearning& settings) {
+                             const CalibrationSettings& settings) {
   constexpr double near = 2.0;  // in spacings of the elements
   constexpr double far = 6.0;
   const LearnedReadings& readings = learned.readings;
@@ -336,7 +334,7 @@ TableLearning table_learning(const TableKind& kind, const LearnedPresses& learne
   table.layer.near_mm = near * readings.spacing_mm;
   table.layer.far_mm = far * readings.spacing_mm;
   table.level_edges = readings.level_edges(kind.levels);
-  table.contact = {.classifier = readings.classifier, .prior = readings.prior};
+  table.contact = {.classifier = readings.classifier, .prior = readings.maps.sensor.prior};
   if (settings.steps) {
     table.counted_within = *settings.steps;
   } else {
@@ -359,8 +357,7 @@ std::set<std::string> compared_labels(const LearnedPresses& learned) {
 }
 
 std::vector<FoldModel> models_of(const std::vector<Press>& presses,
-                                 const std::vector<TableKind>& tables,
-                                 const ModelLearning& settings,
+                                 const CalibrationSettings& settings,
                                  const std::function<void(double)>& progress) {
   LearnedPresses learned;
   FoldModel eq7;
@@ -370,14 +367,15 @@ std::vector<FoldModel> models_of(const std::vector<Press>& presses,
   } catch (const Error&) {
     return {};
   }
-  Progress work(static_cast<double>(tables.size()), progress);
+  Progress work(static_cast<double>(settings.tables.size()), progress);
   std::vector<FoldModel> models;
-  for (const TableKind& kind : tables) {
+  for (const TableKind& kind : settings.tables) {
     FoldModel& model = models.emplace_back(eq7);
-    model.how = table_learning(kind, learned, settings);
-    model.table = compared_labels(learned).empty()
-                      ? model.how.initial()
-                      : learn_table(learned.presses, learned.maps, model.how, work.part(1.0)).table;
+    model.learning = table_learning(kind, learned, settings);
+    model.table =
+        compared_labels(learned).empty()
+            ? model.learning.initial()
+            : learn_table(learned.presses, learned.maps, model.learning, work.part(1.0)).table;
   }
   models.push_back(std::move(eq7));
   return models;
@@ -391,7 +389,7 @@ CrossValidation& CrossValidation::operator+=(const CrossValidation& fold) {
 
 CrossValidation try_fold(std::size_t fold, const std::vector<Press>& presses,
                          const std::vector<std::string>& labels, const FoldModel& model,
-                         const ModelLearning& settings,
+                         const CalibrationSettings& settings,
                          const std::function<void(double)>& progress) {
   return FoldTrial(labels, model, settings).run(fold, presses, progress);
 }

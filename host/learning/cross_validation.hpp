@@ -24,19 +24,23 @@ struct TableKind {
   std::size_t levels = 2;
 };
 
-/// How presses are learned from, all of them or those of some folds, and recognised by models that
-/// have not seen them.
-struct ModelLearning {
-  ReadingOptions readings;
-  std::size_t folds = 5;                ///< at least 2
-  std::size_t most_maps = 20;           ///< of an object, that a press is tried on; above 0
-  std::vector<TrainingMap> given = {};  ///< to compare presses with; none: maps of the presses
-  /// For presses at known poses: steps of the bins on which unknowns will be recognised; none:
-  /// poses are unknown.
-  std::optional<BinSteps> steps = {};
-  /// For presses at known poses, which are tried as_unknown() on these bins; none: presses are
-  /// tried as they are, on TableLearning::lattice.
+/// How a sensor is learned from presses, all of them or those of some folds, and how presses are
+/// tried on models that have not seen them.
+struct CalibrationSettings {
+  ReadingOptions readings = {};
+  /// Tables to try, the simplest first; none stands for default_tables(). With one object there is
+  /// nothing to compare by, and the last is taken.
+  std::vector<TableKind> tables = {};
+  std::size_t folds = 5;      ///< of the cross-validation, at least 2
+  std::size_t most_maps = 5;  ///< of an object, that a press is tried on; above 0
+  /// Bins on which unknowns will be recognised, for touches at known poses, which are tried
+  /// as_unknown() on them. None stands for bins half the elements' spacing and 5 degrees wide,
+  /// about the array's centre; to try_fold(), for TableLearning::lattice.
   std::optional<RecognitionBins> bins = {};
+
+  // calibrate_sensor() sets:
+  std::vector<TrainingMap> given = {};  ///< to compare presses with; none: maps of the presses
+  std::optional<BinSteps> steps = {};   ///< of the bins; none: poses are unknown
 };
 
 /// Presses, and what they say before any table.
@@ -51,11 +55,11 @@ struct LearnedPresses {
 /// host threads.
 /// @throws Error as observed_map()
 LearnedPresses with_maps(std::vector<Press> presses, LearnedReadings readings,
-                         const ModelLearning& settings);
+                         const CalibrationSettings& settings);
 
 /// How the presses learn a table.
 TableLearning table_learning(const TableKind& kind, const LearnedPresses& learned,
-                             const ModelLearning& settings);
+                             const CalibrationSettings& settings);
 
 /// The labels of presses that have a map of their object without them.
 std::set<std::string> compared_labels(const LearnedPresses& learned);
@@ -63,7 +67,7 @@ std::set<std::string> compared_labels(const LearnedPresses& learned);
 /// What the presses of all folds but one say, from the contact threshold on.
 struct FoldModel {
   std::vector<TrainingMap> maps;
-  TableLearning how;
+  TableLearning learning;
   std::optional<LearnedTable> table = {};  ///< none: Eq. 7 on the maps' log odds
   /// Only from presses at unknown poses: a touch at a known pose shows a part of an object, and its
   /// features would tell where it is.
@@ -75,15 +79,14 @@ struct FoldModel {
 /// @returns none where so few presses tell no threshold or make no map
 /// @throws what `progress` throws
 std::vector<FoldModel> models_of(const std::vector<Press>& presses,
-                                 const std::vector<TableKind>& tables,
-                                 const ModelLearning& settings,
+                                 const CalibrationSettings& settings,
                                  const std::function<void(double)>& progress = {});
 
 /// What models that had not seen the presses said of them.
 struct CrossValidation {
-  /// Presses with a map of their object in the other folds and, with ModelLearning::bins, groups of
-  /// several of one object and fold. A press is in groups of one half only. A fold with fewer
-  /// presses of each object has no groups.
+  /// Presses with a map of their object in the other folds and, with CalibrationSettings::bins,
+  /// groups of several of one object and fold. A press is in groups of one half only. A fold with
+  /// fewer presses of each object has no groups.
   std::vector<HeldOut> unknowns;
   std::vector<PlaceError> place_errors;  ///< of presses at known poses, by a table
 
@@ -99,7 +102,7 @@ struct CrossValidation {
 /// @throws Error as PressPlacer does; what `progress` throws
 CrossValidation try_fold(std::size_t fold, const std::vector<Press>& presses,
                          const std::vector<std::string>& labels, const FoldModel& model,
-                         const ModelLearning& settings,
+                         const CalibrationSettings& settings,
                          const std::function<void(double)>& progress = {});
 
 }  // namespace palpate

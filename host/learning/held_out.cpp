@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <map>
 #include <numeric>
 #include <string>
 #include <utility>
 
 #include "estimation/log_sum.hpp"
+#include "recognition/misfit.hpp"
 
 namespace palpate {
 
@@ -27,6 +30,42 @@ std::vector<double> log_errors_of(std::span<const HeldOut> all) {
 
 double mean_of(std::span<const double> numbers) {
   return std::accumulate(numbers.begin(), numbers.end(), 0.0) / static_cast<double>(numbers.size());
+}
+
+using StrangerFits = std::map<std::size_t, std::vector<StrangerFit>>;
+
+/// The fits of one touch each, or of several, of objects with five or more, on a scale; none where
+/// these are fewer than three objects.
+std::vector<std::vector<StrangerFit>> counted(const StrangerFits& objects, const FitScale& scale,
+                                              bool single_touches) {
+  constexpr std::size_t enough = 5;
+  constexpr std::size_t least_objects = 3;
+  std::vector<std::vector<StrangerFit>> all;
+  for (const auto& [label, fits] : objects) {
+    std::vector<StrangerFit> own;
+    for (const auto& [fit, touches] : fits) {
+      if ((touches == 1) == single_touches) {
+        own.push_back({scale.of(fit, touches), touches});
+      }
+    }
+    if (own.size() >= enough) {
+      all.push_back(std::move(own));
+    }
+  }
+  return all.size() < least_objects ? std::vector<std::vector<StrangerFit>>{} : all;
+}
+
+/// Each object counts alike.
+double log_density(const std::vector<std::vector<StrangerFit>>& objects, const FitScale& scale) {
+  double sum = 0.0;
+  for (const std::vector<StrangerFit>& fits : objects) {
+    double of_object = 0.0;
+    for (const auto& [fit, touches] : fits) {
+      of_object += std::log(stranger_density(fit, touches, scale));
+    }
+    sum += of_object / static_cast<double>(fits.size());
+  }
+  return sum;
 }
 
 }  // namespace
@@ -115,6 +154,49 @@ SensorGain gain_of(std::span<const HeldOut> eq7, std::span<const HeldOut> temper
   }
   gain.better = gain.gains && !costs;
   return gain;
+}
+
+FitScale with_strangers(const StrangerFits& objects, FitScale scale) {
+  constexpr double least_sd = 1.0;
+  constexpr double most_sd = 16.0;
+  constexpr double step = 1.05;
+  constexpr double least_mean = -16.0;
+  constexpr double mean_step = 0.5;
+  scale.stranger_sd.reset();
+  scale.stranger_alone.reset();
+  const auto of_several = counted(objects, scale, false);
+  const auto of_one = counted(objects, scale, true);
+  FitScale tried = scale;
+  double likeliest_sd = -std::numeric_limits<double>::infinity();
+  double likeliest_alone = likeliest_sd;
+  for (double sd = least_sd; sd <= most_sd; sd *= step) {
+    tried.stranger_sd = sd;
+    if (const double nats = log_density(of_several, tried);
+        !of_several.empty() && nats > likeliest_sd) {
+      likeliest_sd = nats;
+      scale.stranger_sd = sd;
+    }
+    for (double mean = 0.0; mean >= least_mean && !of_one.empty(); mean -= mean_step) {
+      tried.stranger_alone = {mean, sd};
+      if (const double nats = log_density(of_one, tried); nats > likeliest_alone) {
+        likeliest_alone = nats;
+        scale.stranger_alone = tried.stranger_alone;
+      }
+    }
+  }
+  return scale;
+}
+
+std::string unlearned_strangers(const LearnedSensor& sensor) {
+  const bool known_poses = sensor.bins.has_value();
+  if (!sensor.fit_scale || (known_poses ? sensor.fit_scale->stranger_sd.has_value()
+                                        : sensor.fit_scale->stranger_alone.has_value())) {
+    return "";
+  }
+  return known_poses ? "\"(none)\" goes by a figure of Palpate's own for how badly strangers fit; "
+                       "to learn it, give 15 touches or more of each of three objects"
+                     : "how badly strangers fit is not learned, so that a press does not tell "
+                       "\"(none)\"; give presses of three objects or more";
 }
 
 }  // namespace palpate

@@ -6,12 +6,20 @@
 #include <map>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
-#include "learning/stranger_fit.hpp"
+#include "palpate/fit.hpp"
+#include "palpate/learned_sensor.hpp"
 #include "recognition/evaluation.hpp"
 
 namespace palpate {
+
+/// How touches of an object that is left out fit the best of all others.
+struct StrangerFit {
+  Fit fit;                  ///< by evidence_fit(), on no scale
+  std::size_t touches = 0;  ///< with an element In Contact
+};
 
 /// A press, or a group of several presses of one object, and what a model that has not seen it says
 /// of it. What does not apply is none.
@@ -114,5 +122,19 @@ struct SensorGain {
 /// @param eq7 what Eq. 7 says, with gamma 0.1
 /// @param tempered what the table says, see tempered_by_folds()
 SensorGain gain_of(std::span<const HeldOut> eq7, std::span<const HeldOut> tempered);
+
+/// The scale with stranger_sd and stranger_alone by which the fits are likeliest, those of several
+/// touches and of one; each object counts alike. Either is none where fewer than three objects have
+/// five such fits.
+/// @param objects [label]
+/// @param scale of learned objects' z
+/// @returns stranger_sd from 1 to 16, stranger_alone with a mean from -16 to 0 and an sd from 1 to
+/// 16
+FitScale with_strangers(const std::map<std::size_t, std::vector<StrangerFit>>& objects,
+                        FitScale scale);
+
+/// Says, without a full stop, that touches did not tell how badly strangers fit; "" where they did,
+/// or where nothing of fits was learned.
+std::string unlearned_strangers(const LearnedSensor& sensor);
 
 }  // namespace palpate

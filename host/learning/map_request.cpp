@@ -33,11 +33,11 @@ std::map<std::string, int> symmetries_of(const MapRequest& request) {
     const std::size_t equals = item.rfind('=');
     const std::string label = equals == std::string::npos ? "" : item.substr(0, equals);
     const std::string n = equals == std::string::npos ? item : item.substr(equals + 1);
-    int whole = 0;
-    const auto [rest, error] = std::from_chars(n.data(), n.data() + n.size(), whole);
+    int turns = 0;
+    const auto [rest, error] = std::from_chars(n.data(), n.data() + n.size(), turns);
     const bool plain = n == "0" || (!n.empty() && n.front() >= '1' && n.front() <= '9');
     if (!plain || error != std::errc{} || rest != n.data() + n.size() ||
-        (label.empty() && item != request.symmetry) || !result.emplace(label, whole).second) {
+        (label.empty() && item != request.symmetry) || !result.emplace(label, turns).second) {
       refuse_option(
           "symmetry", request.symmetry,
           "give a whole number from 0, or one for each of some labels, such as nut=6,key=1");

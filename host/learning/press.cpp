@@ -1,6 +1,7 @@
 #include "learning/press.hpp"
 
 #include <algorithm>
+#include <cstdint>
 #include <iterator>
 #include <map>
 #include <tuple>
@@ -87,13 +88,41 @@ GroupedObject grouped_object(const Recording& recording, const std::string& by) 
 }
 
 bool has_poses(const Recording& recording) {
-  for (const Pose& pose : recording.T_robot_sensor) {
+  return std::ranges::any_of(recording.T_robot_sensor, [&](const Pose& pose) {
     const Pose& first = recording.T_robot_sensor.front();
-    if (pose.translation_mm != first.translation_mm || pose.theta_rad != first.theta_rad) {
-      return true;
+    return pose.translation_mm != first.translation_mm || pose.theta_rad != first.theta_rad;
+  });
+}
+
+Recording gathered(const ObjectTouches& object, const std::string& pressure_unit) {
+  Recording result{.object = object.label, .pressure_unit = pressure_unit};
+  std::size_t most = 0;
+  bool one_array = true;
+  bool dead = false;
+  for (const Touch& touch : object.touches) {
+    most = std::max(most, touch.pressure.size());
+    one_array =
+        one_array && std::ranges::equal(touch.elements_mm, object.touches.front().elements_mm);
+    dead = dead || !touch.valid.empty();
+  }
+  for (const Touch& touch : object.touches) {
+    const std::size_t lacks = most - touch.pressure.size();
+    result.T_robot_sensor.push_back(touch.T_robot_sensor);
+    result.pressure.insert(result.pressure.end(), touch.pressure.begin(), touch.pressure.end());
+    result.pressure.insert(result.pressure.end(), lacks, 0.0);
+    if (!one_array || result.elements_mm.empty()) {
+      result.elements_mm.insert(result.elements_mm.end(), touch.elements_mm.begin(),
+                                touch.elements_mm.end());
+      result.elements_mm.insert(result.elements_mm.end(), lacks, touch.elements_mm.front());
+    }
+    if (dead || !one_array) {
+      const std::vector<std::uint8_t> all_alive(touch.pressure.size(), 1);
+      const std::span<const std::uint8_t> valid = touch.valid.empty() ? all_alive : touch.valid;
+      result.valid.insert(result.valid.end(), valid.begin(), valid.end());
+      result.valid.insert(result.valid.end(), lacks, 0);
     }
   }
-  return false;
+  return result;
 }
 
 Press single_press(const Recording& recording, std::size_t touch) {
@@ -227,22 +256,23 @@ MapsByFolds maps_by_folds(const std::vector<Press>& presses, const MapOptions& o
   MapsByFolds maps{.of_objects = objects_of(presses), .without_folds = {}};
   std::vector<std::vector<TrainingMap>> without(maps.of_objects.size());
   tbb::parallel_for(std::size_t{0}, maps.of_objects.size(), [&](std::size_t object) {
-    TrainingMap& whole = maps.of_objects[object];
+    TrainingMap& object_map = maps.of_objects[object];
     std::vector<Touch> touches;
     std::vector<std::size_t> part;
-    for (const std::size_t press : whole.presses) {
+    for (const std::size_t press : object_map.presses) {
       touches.push_back(presses[press].touches.front());
       touches.back().T_robot_sensor =
           *presses[press].T_object_robot * touches.back().T_robot_sensor;
       part.push_back(fold[press]);
     }
-    ObservedMaps built = named(
-        whole.map.label, [&] { return observed_maps(touches, part, options, whole.map.label); });
-    whole.map = std::move(built.all);
+    ObservedMaps built = named(object_map.map.label, [&] {
+      return observed_maps(touches, part, options, object_map.map.label);
+    });
+    object_map.map = std::move(built.all);
     for (std::size_t own = 0; own < built.without.size(); ++own) {
       if (std::ranges::find(part, own) != part.end() && !built.without[own].log_odds.empty()) {
-        TrainingMap& map =
-            without[object].emplace_back(TrainingMap{std::move(built.without[own]), whole.presses});
+        TrainingMap& map = without[object].emplace_back(
+            TrainingMap{std::move(built.without[own]), object_map.presses});
         std::erase_if(map.presses, [&](std::size_t press) { return fold[press] == own; });
       }
     }

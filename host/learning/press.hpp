@@ -42,6 +42,10 @@ GroupedObject grouped_object(const Recording& recording, const std::string& by);
 /// Whether the robot knew where it touched: some touches of the recording are at different poses.
 bool has_poses(const Recording& recording);
 
+/// The touches as one recording. Where their arrays differ, it has elements for the largest, and
+/// those that a touch lacks are dead.
+Recording gathered(const ObjectTouches& object, const std::string& pressure_unit);
+
 /// One touch as a press: its pose is unknown, so the robot frame is put where the middle of the
 /// array's elements is the origin and theta is 0.
 Press single_press(const Recording& recording, std::size_t touch);

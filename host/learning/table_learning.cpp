@@ -65,9 +65,9 @@ std::vector<OwnPlacement> place_all(const std::vector<Press>& presses,
                                     const std::vector<std::vector<TouchEvidence>>& evidence,
                                     const std::vector<TrainingMap>& maps,
                                     const std::vector<OccupancyGrid>& layers,
-                                    const TableLearning& how, const LearnedTable& table,
+                                    const TableLearning& settings, const LearnedTable& table,
                                     Progress& progress) {
-  const auto presses_of = presses_by_map(presses, maps, how.most_maps);
+  const auto presses_of = presses_by_map(presses, maps, settings.most_maps);
   std::vector<std::vector<OwnPlacement>> on_map(maps.size());
   tbb::parallel_for(std::size_t{0}, maps.size(), [&](std::size_t map) {
     std::optional<PressPlacer> placer;
@@ -78,8 +78,8 @@ std::vector<OwnPlacement> place_all(const std::vector<Press>& presses,
         placement.T_object_robot = *presses[press].T_object_robot;
       } else {
         if (!placer) {
-          placer.emplace(hypothesis, contact_with(how.contact, table, hypothesis.map.label),
-                         how.lattice);
+          placer.emplace(hypothesis, contact_with(settings.contact, table, hypothesis.map.label),
+                         settings.lattice);
         }
         placement = placer->place(evidence[press]);
       }
@@ -266,15 +266,15 @@ LearnedTable TableLearning::initial() const {
 
 ContactModel TableLearning::classifier() const { return contact_with(contact, initial(), ""); }
 
-LearnedTable table_of(const ObjectCounts& counts, const TableLearning& how) {
-  LearnedTable table = how.initial();
+LearnedTable table_of(const ObjectCounts& counts, const TableLearning& settings) {
+  LearnedTable table = settings.initial();
   LevelCounts all(table.levels());
   for (const auto& [label, own] : counts) {
     all += own;
   }
-  table.shared = shrunk_table(all, table.shared, how.shared_pseudo_counts);
+  table.shared = shrunk_table(all, table.shared, settings.shared_pseudo_counts);
   for (const auto& [label, own] : counts) {
-    table.objects[label] = shrunk_table(own, table.shared, how.object_pseudo_counts);
+    table.objects[label] = shrunk_table(own, table.shared, settings.object_pseudo_counts);
   }
   return table;
 }
@@ -301,18 +301,19 @@ std::vector<OccupancyGrid> layers_of(const std::vector<TrainingMap>& maps,
 }
 
 PlacedPresses learn_table(const std::vector<Press>& presses, const std::vector<TrainingMap>& maps,
-                          const TableLearning& how, const std::function<void(double)>& progress) {
-  const std::vector<OccupancyGrid> layers = layers_of(maps, how.layer);
-  const ContactModel classifier = how.classifier();
+                          const TableLearning& settings,
+                          const std::function<void(double)>& progress) {
+  const std::vector<OccupancyGrid> layers = layers_of(maps, settings.layer);
+  const ContactModel classifier = settings.classifier();
   std::vector<std::vector<TouchEvidence>> evidence;
   for (const Press& press : presses) {
     evidence.push_back(evidence_of(press.touches, classifier));
   }
-  const int rounds = at_known_poses(presses) ? 1 : how.rounds;
-  PlacedPresses placed{.placements = {}, .table = how.initial()};
+  const int rounds = at_known_poses(presses) ? 1 : settings.rounds;
+  PlacedPresses placed{.placements = {}, .table = settings.initial()};
   Progress counter(static_cast<double>(maps.size()) * rounds, progress);
   for (int round = 0; round < rounds; ++round) {
-    placed.placements = place_all(presses, evidence, maps, layers, how, placed.table, counter);
+    placed.placements = place_all(presses, evidence, maps, layers, settings, placed.table, counter);
     if (placed.placements.empty()) {
       throw Error(
           Fault::input,
@@ -321,19 +322,19 @@ PlacedPresses learn_table(const std::vector<Press>& presses, const std::vector<T
               "touches of its object; give at least two touches of one object, or a map of it",
               presses.size()));
     }
-    placed.table = table_of(count_placed(placed.placements, presses, layers, how), how);
+    placed.table = table_of(count_placed(placed.placements, presses, layers, settings), settings);
   }
   return placed;
 }
 
 ObjectCounts count_placed(std::span<const OwnPlacement> placements,
                           const std::vector<Press>& presses,
-                          const std::vector<OccupancyGrid>& layers, const TableLearning& how) {
+                          const std::vector<OccupancyGrid>& layers, const TableLearning& settings) {
   std::vector<std::vector<const OwnPlacement*>> of_press(presses.size());
   for (const OwnPlacement& placement : placements) {
     of_press[placement.press].push_back(&placement);
   }
-  const ContactModel classifier = how.classifier();
+  const ContactModel classifier = settings.classifier();
   const std::map<std::string, BoundingBox> boxes = boxes_of(presses);
   ObjectCounts counts;
   for (std::size_t press = 0; press < presses.size(); ++press) {
@@ -341,15 +342,15 @@ ObjectCounts count_placed(std::span<const OwnPlacement> placements,
     std::ranges::stable_sort(on, [](const OwnPlacement* a, const OwnPlacement* b) {
       return a->placement.log_likelihood > b->placement.log_likelihood;
     });
-    on.resize(std::min(on.size(), how.best_maps));
+    on.resize(std::min(on.size(), settings.best_maps));
     const std::vector<TouchEvidence> evidence = evidence_of(presses[press].touches, classifier);
     for (const OwnPlacement* placement : on) {
       const std::vector<Pose> poses =
           presses[press].T_object_robot
               ? counted_at(*presses[press].T_object_robot, boxes.at(presses[press].label).middle(),
-                           how.counted_within)
+                           settings.counted_within)
               : std::vector{placement->placement.T_object_robot};
-      counts.try_emplace(presses[press].label, how.level_edges.size() + 2)
+      counts.try_emplace(presses[press].label, settings.level_edges.size() + 2)
           .first->second.add(evidence, poses, layers[placement->map]);
     }
   }

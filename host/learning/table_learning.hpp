@@ -106,7 +106,7 @@ using ObjectCounts = std::map<std::string, LevelCounts>;
 /// The table that counts say: the shared one is drawn towards Eq. 7's, and each object's towards
 /// the shared one, see shrunk_table(). A level or a node that was never seen so keeps what Eq. 7
 /// says, and an object with few counts keeps what all objects say together.
-LearnedTable table_of(const ObjectCounts& counts, const TableLearning& how);
+LearnedTable table_of(const ObjectCounts& counts, const TableLearning& settings);
 
 /// A table with an object's numbers, or the shared ones where the object has none of its own.
 LikelihoodTable table_for(const LearnedTable& table, const std::string& label);
@@ -139,13 +139,13 @@ std::vector<OccupancyGrid> layers_of(const std::vector<TrainingMap>& maps,
 /// @throws Error where no press has a map of its object that it is no part of, or as PressPlacer
 /// does; what `progress` throws
 PlacedPresses learn_table(const std::vector<Press>& presses, const std::vector<TrainingMap>& maps,
-                          const TableLearning& how,
+                          const TableLearning& settings,
                           const std::function<void(double)>& progress = {});
 
 /// Counts the readings of placed presses, each on the best of its maps.
 /// @param layers of the maps
 ObjectCounts count_placed(std::span<const OwnPlacement> placements,
                           const std::vector<Press>& presses,
-                          const std::vector<OccupancyGrid>& layers, const TableLearning& how);
+                          const std::vector<OccupancyGrid>& layers, const TableLearning& settings);
 
 }  // namespace palpate

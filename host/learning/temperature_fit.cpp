@@ -92,12 +92,12 @@ class PressLoss {
 
   /// The fit by the evidence and the features.
   TemperatureFit of_both() const {
-    const double alone = of_evidence().temperature;
+    const double by_evidence = of_evidence().temperature;
     // The least loss at each weight has one minimum along it.
     constexpr double most_weight = 2.0;
     const double weight = least_place(
-        0.0, most_weight, [&](double w) { return loss(best_temperature(w, alone), w); });
-    return {.temperature = best_temperature(weight, alone), .feature_weight = weight};
+        0.0, most_weight, [&](double w) { return loss(best_temperature(w, by_evidence), w); });
+    return {.temperature = best_temperature(weight, by_evidence), .feature_weight = weight};
   }
 
  private:

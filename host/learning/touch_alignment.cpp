@@ -238,15 +238,15 @@ double PredictiveMap::log_likelihood(std::size_t touch, const Pose& T_robot_sens
 
 double PredictiveMap::log_odds(const glm::dvec2& p_robot_mm) const {
   const glm::dvec2 place = p_robot_mm / options_.cell_mm;
-  const glm::dvec2 whole = glm::floor(place);
-  const auto i = static_cast<std::int64_t>(whole.x);
-  const auto j = static_cast<std::int64_t>(whole.y);
+  const glm::dvec2 first = glm::floor(place);
+  const auto i = static_cast<std::int64_t>(first.x);
+  const auto j = static_cast<std::int64_t>(first.y);
   if (!cells_.contains({i, j, 2, 2})) {
     return log_odds_from_probability(options_.sensor.prior);
   }
   const double* low = &log_odds_[cells_.index(i, j)];
   const double* high = low + cells_.nx;
-  const glm::dvec2 f = place - whole;
+  const glm::dvec2 f = place - first;
   return std::lerp(std::lerp(low[0], low[1], f.x), std::lerp(high[0], high[1], f.x), f.y);
 }
 

@@ -10,6 +10,7 @@
 
 #include "learning/observed_map.hpp"
 #include "learning/press_search.hpp"
+#include "learning/progress.hpp"
 #include "model/element_spacing.hpp"
 #include "palpate/error.hpp"
 
@@ -51,7 +52,7 @@ class PressFusion {
       : presses_(presses),
         options_(options),
         step_mm_(step_mm),
-        progress_(progress),
+        report_(Progress(1.0, progress).part(1.0)),
         search_(options.contact, step_mm,
                 std::ranges::max_element(presses, {}, &UnposedPress::reach_mm)->reach_mm(),
                 options.temperature),
@@ -60,7 +61,7 @@ class PressFusion {
         homes_(presses.size()) {
     tbb::parallel_for(std::size_t{0}, presses.size(), [&](std::size_t p) {
       const PressSide& press = presses_[p].sides.front();
-      const Hypothesis own = alone(p);
+      const Hypothesis own = single_map(p);
       own_gain_[p] = search_.gain(press.evidence(), own, {});
       contact_gain_[p] = search_.gain(press.contact(), own, {});
     });
@@ -82,7 +83,7 @@ class PressFusion {
     while (!settled_ && rounds_ < most_rounds) {
       settled_ = !place_all();
       ++rounds_;
-      report(0.5 + 0.5 * rounds_ / most_rounds);
+      report_(0.5 + 0.5 * rounds_ / most_rounds);
       // Later maps would leave their presses no time to settle.
       if (rounds_ < most_rounds / 2 && open_maps()) {
         settled_ = false;
@@ -144,12 +145,6 @@ class PressFusion {
     return result;
   }
 
-  void report(double fraction) const {
-    if (progress_) {
-      progress_(fraction);
-    }
-  }
-
   Hypothesis compared(const MapSums& map) const {
     Hypothesis result{.map = map.mean("")};
     if (options_.layer) {
@@ -159,7 +154,7 @@ class PressFusion {
   }
 
   /// The map of one press, in the press's robot frame.
-  Hypothesis alone(std::size_t press) const {
+  Hypothesis single_map(std::size_t press) const {
     MapSums map(options_.map);
     map.add(presses_[press].image, {});
     return compared(map);
@@ -203,7 +198,7 @@ class PressFusion {
     for (std::size_t c = 0; c < columns; ++c) {
       const std::size_t of = c * n / columns;
       fits_.columns.push_back(of);
-      const Hypothesis map = alone(of);
+      const Hypothesis map = single_map(of);
       single_.emplace_back(n);
       tbb::parallel_for(std::size_t{0}, n, [&](std::size_t p) {
         single_.back()[p] = search_.best_place(presses_[p].sides, map);
@@ -211,7 +206,7 @@ class PressFusion {
       for (std::size_t p = 0; p < n; ++p) {
         fits_.fit[p][c] = p == of ? 1.0 : fit_of(p, single_.back()[p]);
       }
-      report(0.5 * static_cast<double>(c + 1) / static_cast<double>(columns));
+      report_(0.5 * static_cast<double>(c + 1) / static_cast<double>(columns));
     }
   }
 
@@ -293,10 +288,10 @@ class PressFusion {
     bool changed = false;
     for (std::size_t p = 0; p < presses_.size(); ++p) {
       const PressHome before = homes_[p];
-      const bool alone_there = before.map && maps_[*before.map].presses == 1;
+      const bool only_one_there = before.map && maps_[*before.map].presses == 1;
       leave(p);
       const PressHome best = best_home(p, before);
-      homes_[p] = alone_there && best.fit < good_fit ? before : best;
+      homes_[p] = only_one_there && best.fit < good_fit ? before : best;
       join(p);
       const PressHome& now = homes_[p];
       const PressSide& side = presses_[p].sides[now.place.mirrored ? 1 : 0];
@@ -313,7 +308,7 @@ class PressFusion {
   std::span<const UnposedPress> presses_;
   const UnposedOptions& options_;
   double step_mm_;
-  const std::function<void(double)>& progress_;
+  std::function<void(double)> report_;
   PressSearch search_;
   std::vector<double> own_gain_;      ///< [press] on the map of this press alone
   std::vector<double> contact_gain_;  ///< [press] the part of own_gain_ of its elements In Contact

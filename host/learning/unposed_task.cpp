@@ -37,8 +37,8 @@ UnposedOptions unposed_options(const MapTask& task, const std::optional<LearnedS
     constexpr double of_pitch = 0.6;  // leaves no gaps between the elements of a press
     result.map.sensor.spread_mm = of_pitch * pitch_mm;
   }
-  result.map.sensor.prior =
-      task.prior(sensor).value_or(share_in_contact(all, result.map.classifier));
+  result.map.sensor.prior = task.prior(sensor).value_or(
+      share_in_contact(evidence_of(all, {.classifier = result.map.classifier})));
   result.contact.classifier = result.map.classifier;
   result.contact.prior = result.map.sensor.prior;
   result.most_maps = task.most_maps();

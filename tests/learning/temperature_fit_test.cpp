@@ -260,26 +260,6 @@ TEST(TemperatureFit, RefusesWhatCannotBeTried) {
   EXPECT_THROW(fit_temperature(std::vector<HeldOut>{{.truth = 0, .log_evidence = {1.0}}}), Error);
 }
 
-TEST(ClearlyLess, IsByMoreThanTwoStandardErrors) {
-  // Differences one above and one below their mean in turn: a standard error of 1 / sqrt(n - 1).
-  const auto losses = [](double mean, int n) {
-    std::vector<double> of_each;
-    for (int i = 0; i < n; ++i) {
-      of_each.push_back(10.0 - mean + (i % 2 == 0 ? 1.0 : -1.0));
-    }
-    return of_each;
-  };
-  const std::vector<double> same(100, 10.0);
-  const auto clearly_less = [](const std::vector<double>& a, const std::vector<double>& b) {
-    return difference_of(a, b).is_clear();
-  };
-  EXPECT_TRUE(clearly_less(losses(2.0, 100), same));
-  EXPECT_TRUE(clearly_less(losses(0.21, 100), same));
-  EXPECT_FALSE(clearly_less(losses(0.19, 100), same)) << "within two standard errors of 0.1005";
-  EXPECT_FALSE(clearly_less(losses(-2.0, 100), same));
-  EXPECT_FALSE(clearly_less(same, same));
-}
-
 TEST(GoldenSection, FindsTheLeastValue) {
   int calls = 0;
   const double found = least_at(-3.0, 7.0, 1e-6, [&](double x) {
