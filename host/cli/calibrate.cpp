@@ -17,7 +17,7 @@
 #include "cli/recognition_flags.hpp"
 #include "cli/text_table.hpp"
 #include "learning/calibration_task.hpp"
-#include "learning/level_counts.hpp"
+#include "learning/table_learning.hpp"
 #include "model/option_words.hpp"
 #include "palpate/files.hpp"
 #include "recognition/object_fit.hpp"

@@ -131,11 +131,8 @@ void build_drawn_maps(const MapFlags& flags) {
   check_flags(flags);
   flags.validate();
   const DrawnMapOptions options = options_of(flags);
-  ObjectOrigin origin = object_origin(flags);
-  if (origin.kind == ObjectOrigin::Kind::automatic) {
-    origin.kind = ObjectOrigin::Kind::centroid;
-  }
-  if (origin.T_learned_robot_object.theta_rad != 0.0) {
+  const Pose origin = given_origin(flags).value_or(Pose{});
+  if (origin.theta_rad != 0.0) {
     refuse_flag("--origin", flags.origin, "a drawing is not turned; give the angle 0");
   }
   const std::vector<std::string> labels = labels_of(flags);
@@ -152,9 +149,9 @@ void build_drawn_maps(const MapFlags& flags) {
                       "goes on beyond; leave {} paper all around it",
                       flags.recordings[i], edges, flags.occupied == "light" ? "dark" : "white"));
     }
-    mask.origin_mm -= origin.T_learned_robot_object.translation_mm;
+    mask.origin_mm -= origin.translation_mm;
     maps.push_back(drawn_map(labels[i], mask, options));
-    settle_frame(origin, maps.back());
+    settle_frame(flags, maps.back());
     maps.back().mirror = flags.mirror;
   }
   const double prior = given_prior(flags).value_or(occupied_share(maps));

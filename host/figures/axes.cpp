@@ -1,6 +1,9 @@
 #include "figures/axes.hpp"
 
 #include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
 
 namespace palpate {
 
@@ -8,6 +11,17 @@ namespace {
 
 constexpr double tick_px = 6.0;
 constexpr Pen axis_pen{.colour = ink, .width_px = 1.5};
+
+/// Draws a frame around the view, and ticks with their labels below it.
+void draw_x_axis(Canvas& canvas, const View& view, const std::vector<Tick>& ticks) {
+  canvas.frame(view.box, axis_pen);
+  const double bottom = view.box.bottom();
+  for (const Tick& tick : ticks) {
+    const double x = view.pixel({tick.value, view.lower.y}).x;
+    canvas.segment({x, bottom}, {x, bottom + tick_px}, axis_pen);
+    canvas.text(tick.label, {x, bottom + tick_px + small.size_px}, small, Align::centre);
+  }
+}
 
 }  // namespace
 
@@ -38,12 +52,7 @@ void draw_axes(Canvas& canvas, const View& view, const std::vector<Tick>& x_tick
                const std::vector<Tick>& y_ticks, std::string_view x_label,
                std::string_view y_label) {
   const Box& box = view.box;
-  canvas.frame(box, axis_pen);
-  for (const Tick& tick : x_ticks) {
-    const double x = view.pixel({tick.value, view.lower.y}).x;
-    canvas.segment({x, box.bottom()}, {x, box.bottom() + tick_px}, axis_pen);
-    canvas.text(tick.label, {x, box.bottom() + tick_px + small.size_px}, small, Align::centre);
-  }
+  draw_x_axis(canvas, view, x_ticks);
   double widest = 0.0;
   for (const Tick& tick : y_ticks) {
     widest = std::max(widest, canvas.text_width(tick.label, small));
@@ -63,13 +72,38 @@ void draw_colour_bar(Canvas& canvas, const Box& box, double lower, double upper,
   const int shades = static_cast<int>(box.width);
   canvas.cells(box, shades, 1,
                [&](int i, int) { return colour(lower + (upper - lower) * (i + 0.5) / shades); });
-  canvas.frame(box, axis_pen);
-  for (const Tick& tick : ticks) {
-    const double x = box.left + box.width * (tick.value - lower) / (upper - lower);
-    canvas.segment({x, box.bottom()}, {x, box.bottom() + tick_px}, axis_pen);
-    canvas.text(tick.label, {x, box.bottom() + tick_px + small.size_px}, small, Align::centre);
-  }
+  draw_x_axis(canvas, {.box = box, .lower = {lower, 0.0}, .upper = {upper, 1.0}}, ticks);
   canvas.text(caption, {box.left + box.width / 2, box.bottom() + 52.0}, body, Align::centre);
+}
+
+std::string number(double value) {
+  std::string text = fmt::format("{:g}", value);
+  if (text.front() == '-') {
+    text.replace(0, 1, "−");
+  }
+  return text;
+}
+
+std::vector<Tick> even_ticks(double lower, double upper, int count, double smallest_step) {
+  const double width = (upper - lower) / count;
+  const double decade = std::pow(10.0, std::floor(std::log10(width)));
+  double step = 10.0 * decade;
+  for (const double factor : {5.0, 2.0, 1.0}) {
+    // The margin keeps a width that is itself a step from being rounded up to the next one.
+    if (factor * decade >= width * (1.0 - 1e-9)) {
+      step = factor * decade;
+    }
+  }
+  step = std::max(step, smallest_step);
+
+  const double margin = 1e-9 * (upper - lower);
+  std::vector<Tick> ticks;
+  const double first = std::ceil((lower - margin) / step);
+  for (int k = 0; k <= count && (first + k) * step <= upper + margin; ++k) {
+    const double value = (first + k) * step + 0.0;  // adding zero turns -0 into 0
+    ticks.push_back({value, number(value)});
+  }
+  return ticks;
 }
 
 }  // namespace palpate

@@ -114,15 +114,8 @@ std::string Canvas::fit(std::string_view text, double width_px, const Font& font
 
 void Canvas::stroke(const Pen& pen) {
   cairo_t* context = context_.get();
-  if (pen.dashed) {
-    const double dash[] = {4.0 * pen.width_px, 3.0 * pen.width_px};
-    cairo_set_dash(context, dash, 2, 0.0);
-  } else if (pen.dotted) {
-    const double dots[] = {1.0 * pen.width_px, 2.0 * pen.width_px};
-    cairo_set_dash(context, dots, 2, 0.0);
-  } else {
-    cairo_set_dash(context, nullptr, 0, 0.0);
-  }
+  const double dash[] = {4.0 * pen.width_px, 3.0 * pen.width_px};
+  cairo_set_dash(context, dash, pen.dashed ? 2 : 0, 0.0);
   if (pen.halo_px > 0.0) {
     set_source(context, {1.0, 1.0, 1.0, pen.colour.alpha});
     cairo_set_line_width(context, pen.width_px + 2.0 * pen.halo_px);

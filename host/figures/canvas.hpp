@@ -39,7 +39,6 @@ struct Pen {
   Colour colour = ink;
   double width_px = 2.0;
   bool dashed = false;
-  bool dotted = false;
   double halo_px = 0.0;  ///< on each side
 };
 

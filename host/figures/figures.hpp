@@ -18,7 +18,8 @@ namespace palpate {
 /// Draws maps side by side at one scale and returns the bytes of a PNG file. Colours show log odds
 /// relative to each map's prior (white = prior, blue = empty, red = occupied); one colour bar in
 /// nats serves all, and each has axes in mm. y points up. The same maps give the same bytes.
-/// @throws Error on an empty list, a map without cells, or lack of memory
+/// @param maps at least one
+/// @throws Error on lack of memory
 std::string draw_maps(std::span<const OccupancyGrid> maps);
 
 /// Contents of one recognised object's sheet.
@@ -52,8 +53,7 @@ struct RecognitionSheet {
 /// and y; the belief over where T_robot_object's origin lies; and the identity probabilities over
 /// the touches. For a symmetric object, the true pose drawn is the one nearest to the estimate. The
 /// same sheet gives the same bytes.
-/// @throws Error on a map without cells, arrays of the wrong size, a symmetric object with a truth
-/// but without an occupied cell, or lack of memory
+/// @throws Error on a symmetric object with a truth but without an occupied cell, or lack of memory
 std::string draw_recognition(const RecognitionSheet& sheet);
 
 }  // namespace palpate

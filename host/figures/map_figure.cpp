@@ -6,7 +6,6 @@
 
 #include "figures/figures.hpp"
 #include "figures/map_layer.hpp"
-#include "palpate/error.hpp"
 
 namespace palpate {
 
@@ -86,12 +85,6 @@ void draw_tile(Canvas& canvas, const Box& tile, double px_per_mm, const Occupanc
 }  // namespace
 
 std::string draw_maps(std::span<const OccupancyGrid> maps) {
-  if (maps.empty()) {
-    throw Error(Fault::input, "no map to draw: give at least one");
-  }
-  for (const OccupancyGrid& map : maps) {
-    require_cells(map);
-  }
   const EvidenceScale scale = evidence_scale(maps);
   const Grid grid = arrange(maps);
 

@@ -5,18 +5,7 @@
 
 #include <fmt/format.h>
 
-#include "palpate/error.hpp"
-
 namespace palpate {
-
-void require_cells(const OccupancyGrid& map) {
-  if (map.nx < 1 || map.ny < 1 ||
-      map.log_odds.size() != static_cast<std::size_t>(map.nx) * map.ny) {
-    throw Error(Fault::input, fmt::format("map '{}': {} values for {} x {} cells: nothing to draw, "
-                                          "build the map from touches first",
-                                          map.label, map.log_odds.size(), map.nx, map.ny));
-  }
-}
 
 void draw_cells(Canvas& canvas, const View& view, const OccupancyGrid& map,
                 const EvidenceScale& scale) {

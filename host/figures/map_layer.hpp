@@ -6,9 +6,6 @@
 
 namespace palpate {
 
-/// Throws Error unless the map has cells and a value for each cell.
-void require_cells(const OccupancyGrid& map);
-
 void draw_cells(Canvas& canvas, const View& view, const OccupancyGrid& map,
                 const EvidenceScale& scale);
 

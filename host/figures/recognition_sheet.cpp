@@ -10,18 +10,15 @@
 #include <utility>
 #include <vector>
 
-#include <fmt/format.h>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 #include "figures/figures.hpp"
-#include "figures/footprint.hpp"
 #include "figures/identity_panel.hpp"
 #include "figures/label_places.hpp"
 #include "figures/map_layer.hpp"
-#include "figures/map_outline.hpp"
+#include "figures/outlines.hpp"
 #include "model/bounding_box.hpp"
-#include "palpate/error.hpp"
 #include "palpate/pose_error.hpp"
 
 namespace palpate {
@@ -58,25 +55,6 @@ Box plot(int panel) {
 }
 
 Box bar(int panel) { return {plot(panel).left, bar_top_px, side_px, bar_height_px}; }
-
-void validate(const RecognitionSheet& sheet) {
-  require_cells(sheet.map);
-  const auto cells = static_cast<std::size_t>(sheet.belief.cells) * sheet.belief.cells;
-  if (cells == 0 || sheet.belief.xy.size() != cells) {
-    throw Error(Fault::input, fmt::format("sheet '{}': belief.xy has {} values: give {} x {}, one "
-                                          "for each cell",
-                                          sheet.title, sheet.belief.xy.size(), sheet.belief.cells,
-                                          sheet.belief.cells));
-  }
-  for (const std::vector<double>& probabilities : sheet.identity) {
-    if (probabilities.size() != sheet.labels.size()) {
-      throw Error(Fault::input,
-                  fmt::format("sheet '{}': identity has {} probabilities after a touch: give {}, "
-                              "one per label",
-                              sheet.title, probabilities.size(), sheet.labels.size()));
-    }
-  }
-}
 
 void draw_title(Canvas& canvas, const Box& plot, std::string_view title) {
   canvas.text(canvas.fit(title, plot.width, heading), {plot.left, top_px - 50.0}, heading);
@@ -361,7 +339,6 @@ void draw_belief(Canvas& canvas, const RecognitionSheet& sheet) {
 }  // namespace
 
 std::string draw_recognition(const RecognitionSheet& sheet) {
-  validate(sheet);
   Canvas canvas(static_cast<int>(width_px), static_cast<int>(height_px));
   draw_captions(canvas, sheet);
   draw_touches(canvas, sheet);

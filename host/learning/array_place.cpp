@@ -1,4 +1,4 @@
-#include "learning/array_place.hpp"
+#include "learning/setup_judge.hpp"
 
 #include <algorithm>
 #include <array>
@@ -8,16 +8,21 @@
 #include <map>
 #include <numbers>
 #include <numeric>
+#include <set>
 #include <span>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <tbb/parallel_for.h>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 
+#include "learning/local_search.hpp"
 #include "model/map_likelihood.hpp"
 #include "model/touch_evidence.hpp"
 
@@ -46,28 +51,32 @@ std::optional<SetupFinding> offset_of(const std::function<double(const Pose&)>& 
   const auto pose_of = [](const Place& at) { return Pose{{at[0], at[1]}, at[2]}; };
   std::map<Place, double> known;
   const auto judged = [&](const Place& at) {
-    const auto found = known.find(at);
-    if (found != known.end()) {
-      return found->second;
+    const auto [entry, is_new] = known.try_emplace(at);
+    if (is_new) {
+      entry->second = nats(pose_of(at));
     }
-    return known.emplace(at, nats(pose_of(at))).first->second;
+    return entry->second;
   };
-  Place best{start.translation_mm.x, start.translation_mm.y, start.theta_rad};
-  const Place finest{0.125, 0.125, 0.0125};
-  for (double step = 8.0; step >= 1.0;) {  // in units of the finest
-    Place next = best;
+  constexpr Place finest{0.125, 0.125, 0.0125};
+  double step = 8.0;  // in units of the finest
+  const auto neighbours_of = [&](const Place& place) {
+    std::vector<Place> neighbours;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       for (const double side : {-1.0, 1.0}) {
-        Place at = best;
-        at[axis] += side * step * finest[axis];
-        next = judged(at) > judged(next) ? at : next;
+        neighbours.push_back(place);
+        neighbours.back()[axis] += side * step * finest[axis];
       }
     }
-    step = next == best ? step / 2.0 : step;
-    best = next;
+    return neighbours;
+  };
+  const Place from{start.translation_mm.x, start.translation_mm.y, start.theta_rad};
+  Summit<Place> found{from, judged(from)};
+  for (; step >= 1.0; step /= 2.0) {
+    found = climb(found, neighbours_of, judged);
   }
   // The likelihood near its maximum as a parabola, in units of twice the finest steps.
-  const double top = judged(best);
+  const Place best = found.place;
+  const double top = found.value;
   const auto near = [&](std::size_t a, double da, std::size_t b, double db) {
     Place at = best;
     at[a] += da * 2.0 * finest[a];
@@ -122,6 +131,55 @@ double moved_mm(std::span<const glm::dvec2> elements_mm, const Pose& offset) {
     squares += glm::dot(moved, moved);
   }
   return std::sqrt(squares / static_cast<double>(elements_mm.size()));
+}
+
+/// Where the elements are a full grid, the eight orders in which it may be read.
+std::vector<ElementOrder> orders_of(std::span<const glm::dvec2> elements_mm) {
+  constexpr double same_mm = 1e-6;
+  const auto less = [](double a, double b) { return a < b - same_mm; };
+  std::set<double, decltype(less)> xs(less);
+  std::set<double, decltype(less)> ys(less);
+  for (const glm::dvec2& p : elements_mm) {
+    xs.insert(p.x);
+    ys.insert(p.y);
+  }
+  const std::vector<double> x(xs.begin(), xs.end());
+  const std::vector<double> y(ys.begin(), ys.end());
+  std::vector<ElementOrder> orders;
+  if (x.size() < 2 || y.size() < 2 || x.size() * y.size() != elements_mm.size()) {
+    return orders;
+  }
+  for (const bool by_rows : {true, false}) {
+    for (const char* first : {"bottom-left", "bottom-right", "top-left", "top-right"}) {
+      const bool right = std::string_view(first).ends_with("right");
+      const bool top = std::string_view(first).starts_with("top");
+      std::vector<glm::dvec2> order;
+      for (std::size_t e = 0; e < elements_mm.size(); ++e) {
+        const std::size_t i = by_rows ? e % x.size() : e / y.size();
+        const std::size_t j = by_rows ? e / x.size() : e % y.size();
+        order.emplace_back(x[right ? x.size() - 1 - i : i], y[top ? y.size() - 1 - j : j]);
+      }
+      orders.push_back({{fmt::format("first-element {}", first),
+                         fmt::format("order {}", by_rows ? "rows" : "columns")},
+                        std::move(order)});
+    }
+  }
+  return orders;
+}
+
+/// Whether a turn of one array about its middle by a multiple of a right angle makes the other.
+bool turns_into(std::span<const glm::dvec2> a, std::span<const glm::dvec2> b) {
+  constexpr double same_mm = 1e-6;
+  const glm::dvec2 middle = array_centre_mm(a);
+  for (int quarter = 0; quarter < 4; ++quarter) {
+    const Pose turn{{}, quarter * std::numbers::pi / 2.0};
+    const auto turned = [&](const glm::dvec2& p) { return middle + turn * (p - middle); };
+    if (std::ranges::equal(
+            a, b, [&](auto& p, auto& q) { return glm::distance(turned(p), q) < same_mm; })) {
+      return true;
+    }
+  }
+  return false;
 }
 
 }  // namespace
@@ -205,7 +263,6 @@ void check_offset(SetupJudge& judge, Setup& setup, double& nats, SetupCheck& che
     check.findings.push_back(*finding);
     setup = setup_at(*finding->array_offset);
     nats = judge.nats(setup);
-    check.elements_mm = setup.elements_mm;
   }
 }
 
@@ -215,18 +272,16 @@ void check_pitch(SetupJudge& judge, Setup& setup, double& nats, SetupCheck& chec
     other.elements_mm = placed(setup.elements_mm, {}, scale);
     return other;
   };
-  double best = 1.0;
-  double most = nats;
-  for (double step = 0.08; step >= 0.01;) {
-    double next = best;
-    for (const double tried : {best * (1.0 - step), best * (1.0 + step)}) {
-      const double other = judge.nats(scaled(tried));
-      next = other > most ? tried : next;
-      most = std::max(most, other);
-    }
-    step = next == best ? step / 2.0 : step;
-    best = next;
+  Summit<double> found{1.0, nats};
+  for (double step = 0.08; step >= 0.01; step /= 2.0) {
+    found = climb(
+        found,
+        [&](double scale) {
+          return std::array{scale * (1.0 - step), scale * (1.0 + step)};
+        },
+        [&](double scale) { return judge.nats(scaled(scale)); });
   }
+  const auto& [best, most] = found;
   // Touches at the places of a grid alone seem to be 3 % off.
   constexpr double least_change = 0.04;
   if (most - nats > least_nats && std::abs(best - 1.0) > least_change) {
@@ -237,7 +292,51 @@ void check_pitch(SetupJudge& judge, Setup& setup, double& nats, SetupCheck& chec
                      best)});
     setup = scaled(best);
     nats = most;
-    check.elements_mm = setup.elements_mm;
+  }
+}
+
+std::vector<ElementOrder> orders_but_for_turns(std::span<const glm::dvec2> elements_mm) {
+  std::vector<ElementOrder> kept{{{}, {elements_mm.begin(), elements_mm.end()}}};
+  for (ElementOrder& order : orders_of(elements_mm)) {
+    if (std::ranges::none_of(kept, [&](const ElementOrder& other) {
+          return turns_into(other.elements_mm, order.elements_mm);
+        })) {
+      kept.push_back(std::move(order));
+    }
+  }
+  return kept;
+}
+
+SetupFinding order_finding(const std::vector<std::string>& options, double nats) {
+  return {"element_order", nats,
+          fmt::format("the elements are read in another order: import with `{}`",
+                      fmt::join(options, "` and `")),
+          options};
+}
+
+void check_order(SetupJudge& judge, Setup& setup, double& nats, SetupCheck& check) {
+  const auto orders = orders_of(setup.elements_mm);
+  if (orders.empty()) {
+    check.remarks.emplace_back("the array is no grid: the order of its elements was not tried");
+    return;
+  }
+  double best = nats;
+  ElementOrder found;
+  for (const ElementOrder& order : orders) {
+    Setup other = setup;
+    other.elements_mm = order.elements_mm;
+    const double tried = order.elements_mm == setup.elements_mm ? nats : judge.nats(other);
+    if (tried > best) {
+      best = tried;
+      found = order;
+    }
+  }
+  // Where touches overlap little, how the elements lie among the cells tells orders apart by a
+  // little; a wrong order costs a good part of all that the touches tell.
+  if (best - nats > std::max(least_nats, least_share * std::abs(nats))) {
+    check.findings.push_back(order_finding(found.options, best - nats));
+    setup.elements_mm = found.elements_mm;
+    nats = best;
   }
 }
 

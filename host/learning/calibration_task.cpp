@@ -7,7 +7,6 @@
 #include <fmt/format.h>
 
 #include "io/input_file.hpp"
-#include "learning/array_place.hpp"
 #include "options/option.hpp"
 #include "palpate/object_frame.hpp"
 #include "recognition/recordings.hpp"
@@ -141,11 +140,12 @@ CalibrationTask calibration_task(const CalibrationRequest& request, const Reques
         "`bins`, `x-mm`, `y-mm`, `theta-deg` and `pivot-mm` are for touches at known poses; leave "
         "them out: touches at unknown poses are placed on bins one element wide");
   }
-  task.options = {.pressure_unit = recordings.front().pressure_unit,
-                  .threshold = recognition.threshold,
-                  .ratio = recognition.ratio,
-                  .tables = tables_of(request, known_poses, task.maps),
-                  .most_maps = static_cast<std::size_t>(request.max_maps)};
+  ReadingOptions& readings = task.options.readings;
+  readings.pressure_unit = recordings.front().pressure_unit;
+  readings.threshold = recognition.threshold;
+  readings.ratio = recognition.ratio;
+  task.options.tables = tables_of(request, known_poses, task.maps);
+  task.options.most_maps = static_cast<std::size_t>(request.max_maps);
   if (!infers_region(recognition)) {
     task.options.bins = {given_lattice(recognition), has_auto_pivot(recognition)};
   }

@@ -20,7 +20,7 @@ struct CalibrationRequest {
   bool unposed = false;        ///< the recordings' poses do not count
   std::string layer = "auto";  ///< auto, mean_level or log_odds
   std::optional<int> levels;   ///< of readings; none: as default_tables() has them
-  int max_maps = 5;            ///< SensorCalibrationOptions::most_maps
+  int max_maps = 5;            ///< CalibrationSettings::most_maps
   std::string group;           ///< what is left out together, see grouped_object()
 };
 
@@ -28,7 +28,7 @@ struct CalibrationRequest {
 struct CalibrationTask {
   std::vector<Press> presses;
   std::vector<OccupancyGrid> maps;
-  SensorCalibrationOptions options;
+  CalibrationSettings options;
 
   bool known_poses() const { return presses.front().T_object_robot.has_value(); }
 };

@@ -2,11 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numeric>
 
 #include <fmt/format.h>
+#include <glm/exponential.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
+#include <glm/vec3.hpp>
 
-#include "learning/golden_section.hpp"
 #include "model/element_spacing.hpp"
 #include "model/touch_evidence.hpp"
 #include "palpate/error.hpp"
@@ -83,19 +87,6 @@ double learned_threshold(const std::vector<Press>& presses) {
   return std::exp(otsu_threshold(logs));
 }
 
-double share_in_contact(std::span<const TouchEvidence> touches) {
-  double contacts = 0.0;
-  double known = 0.0;
-  for (const TouchEvidence& touch : touches) {
-    contacts += static_cast<double>(touch.contacts);
-    known += static_cast<double>(touch.known().readings.size());
-  }
-  // No array, however it was pressed, says that the world is empty or full.
-  constexpr double least = 0.01;
-  constexpr double most = 0.5;
-  return std::clamp((contacts + 0.5) / (known + 1.0), least, most);
-}
-
 /// Pressures of all elements In Contact, ascending.
 std::vector<double> contact_pressures(std::span<const Touch> touches,
                                       std::span<const TouchEvidence> evidence) {
@@ -111,16 +102,40 @@ std::vector<double> contact_pressures(std::span<const Touch> touches,
   return pressures;
 }
 
-}  // namespace
+constexpr double least_sd = 0.05;  ///< least deviation of a logarithm, 5 % of the feature
+constexpr double pseudo_presses = 4.0;
+/// The largest correlation. Numbers rounded in a file still make a distribution below it.
+constexpr double most_correlated = 0.999;
 
-MapOptions LearnedReadings::maps() const {
-  if (given_maps) {
-    return *given_maps;
+/// The products of the differences from a mean, summed over presses.
+struct Scatter {
+  double n = 0.0;
+  glm::dvec3 mean{0.0};
+  glm::dmat3 products{0.0};
+
+  /// Welford's update, which keeps its digits where presses are nearly alike.
+  void add(const PressFeatures& features) {
+    const auto [area, force, peak] = features.values;
+    const glm::dvec3 values(area, force, peak);
+    const glm::dvec3 before = values - mean;
+    n += 1.0;
+    mean += before / n;
+    products += glm::outerProduct(before, values - mean);
   }
-  return {.cell_mm = 0.5 * spacing_mm,
-          .sensor = {.spread_mm = spread_mm, .prior = prior},
-          .classifier = classifier};
+};
+
+FeatureDistribution distribution_of(const glm::dvec3& mean, const glm::dmat3& covariance) {
+  const glm::dvec3 variance(covariance[0][0], covariance[1][1], covariance[2][2]);
+  const glm::dvec3 sd = glm::sqrt(variance + least_sd * least_sd);
+  const auto correlation = [&](int i, int j) {
+    return most_correlated * covariance[i][j] / (sd[i] * sd[j]);
+  };
+  return {.mean = {mean.x, mean.y, mean.z},
+          .sd = {sd.x, sd.y, sd.z},
+          .correlation = {correlation(0, 1), correlation(0, 2), correlation(1, 2)}};
 }
+
+}  // namespace
 
 std::vector<double> LearnedReadings::level_edges(std::size_t levels) const {
   std::vector<double> edges;
@@ -134,7 +149,7 @@ std::vector<double> LearnedReadings::level_edges(std::size_t levels) const {
 }
 
 LearnedReadings learn_readings(const std::vector<Press>& presses, const ReadingOptions& options) {
-  LearnedReadings readings{.spacing_mm = options.spacing_mm, .given_maps = options.maps};
+  LearnedReadings readings{.spacing_mm = options.spacing_mm};
   if (options.threshold && options.ratio) {
     readings.classifier = {.threshold = *options.threshold, .ratio = *options.ratio};
   } else {
@@ -161,15 +176,13 @@ LearnedReadings learn_readings(const std::vector<Press>& presses, const ReadingO
                             "`threshold`",
                             readings.classifier.threshold, options.pressure_unit));
   }
-  if (options.maps) {
-    readings.prior = options.maps->sensor.prior;
-    readings.spread_mm = options.maps->sensor.spread_mm;
-    return readings;
-  }
-  readings.prior = share_in_contact(evidence);
   constexpr double of_spacing = 0.6;  // leaves no gaps between the elements of a press
-  readings.spread_mm = at_known_poses(presses) ? usual_spread_mm(options.spacing_mm)
-                                               : of_spacing * options.spacing_mm;
+  const double spread_mm = at_known_poses(presses) ? usual_spread_mm(options.spacing_mm)
+                                                   : of_spacing * options.spacing_mm;
+  readings.maps = options.maps.value_or(
+      MapOptions{.cell_mm = 0.5 * options.spacing_mm,
+                 .sensor = {.spread_mm = spread_mm, .prior = share_in_contact(evidence)},
+                 .classifier = readings.classifier});
   return readings;
 }
 
@@ -219,28 +232,51 @@ double noise_floor(const std::vector<Press>& presses, const ContactClassifier& c
   return count > 0.0 ? std::sqrt(cut * squares / count) : 0.0;
 }
 
-double fit_gamma(const LevelCounts& counts, double prior) {
-  const auto loss = [&](double gamma) {
-    double nats = 0.0;
-    for (int node = 0; node < ReadingLayer::nodes; ++node) {
-      const double value = LevelCounts::value_at(node);
-      if (value >= -ReadingLayer::largest_value) {
-        const double p = probability_from_log_odds(value);
-        // Eq. 7's two values sum to less than 1.
-        nats += counts.at(0, node) * std::log(gamma * prior + (1.0 - gamma) * (1.0 - p)) +
-                counts.at(1, node) * std::log(gamma * prior + (1.0 - gamma) * p) -
-                counts.at_node(node) * std::log(1.0 - gamma * (1.0 - 2.0 * prior));
-      }
-    }
-    return -nats;
-  };
-  constexpr double least = 1e-3;
-  constexpr double most = 0.9;
-  return least_at(least, most, 1e-4, loss);
+double share_in_contact(std::span<const TouchEvidence> touches) {
+  double contacts = 0.0;
+  double known = 0.0;
+  for (const TouchEvidence& touch : touches) {
+    contacts += static_cast<double>(touch.contacts);
+    known += static_cast<double>(touch.known().readings.size());
+  }
+  // No array, however it was pressed, says that the world is empty or full.
+  constexpr double least = 0.01;
+  constexpr double most = 0.5;
+  return std::clamp((contacts + 0.5) / (known + 1.0), least, most);
 }
 
-double share_in_contact(std::span<const Touch> touches, const ContactClassifier& classifier) {
-  return share_in_contact(evidence_of(touches, {.classifier = classifier}));
+LearnedFeatures learn_features(std::span<const LabelledFeatures> presses) {
+  Scatter all;
+  std::map<std::string, Scatter> objects;
+  for (const LabelledFeatures& press : presses) {
+    all.add(press.features);
+    objects[press.label].add(press.features);
+  }
+  const glm::dmat3 of_all = all.products / std::max(1.0, all.n - 1.0);
+  const double freedoms = all.n - static_cast<double>(objects.size());
+  glm::dmat3 pooled = of_all;
+  if (freedoms > 0.0) {
+    pooled = glm::dmat3(0.0);
+    for (const auto& [label, own] : objects) {
+      pooled += own.products / freedoms;
+    }
+  }
+  LearnedFeatures learned{.any = distribution_of(all.mean, of_all)};
+  for (const auto& [label, own] : objects) {
+    const double share = (1.0 + 1.0 / own.n) / (own.n + pseudo_presses);
+    learned.objects[label] =
+        distribution_of(own.mean, share * (own.products + pseudo_presses * pooled));
+  }
+  return learned;
+}
+
+LearnedFeatures learn_features(const std::vector<Press>& presses,
+                               const ContactClassifier& classifier) {
+  std::vector<LabelledFeatures> features;
+  for (const Press& press : presses) {
+    features.push_back({press.label, press_features(press.touches.front(), classifier)});
+  }
+  return learn_features(features);
 }
 
 }  // namespace palpate

@@ -6,9 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "learning/level_counts.hpp"
 #include "learning/press.hpp"
+#include "model/touch_evidence.hpp"
 #include "palpate/contact.hpp"
+#include "palpate/learned_sensor.hpp"
 #include "palpate/map_builder.hpp"
 
 namespace palpate {
@@ -26,15 +27,11 @@ struct ReadingOptions {
 /// What presses say of a sensor's readings, whatever objects they are of.
 struct LearnedReadings {
   ContactClassifier classifier;
-  double noise = 0.0;                         ///< see noise_floor()
-  std::vector<double> pressures;              ///< of all elements In Contact, ascending
-  double prior = 0.2;                         ///< see share_in_contact()
-  double spread_mm = 0.5;                     ///< of maps
-  double spacing_mm = 0.0;                    ///< between the elements
-  std::optional<MapOptions> given_maps = {};  ///< ReadingOptions::maps
+  double noise = 0.0;             ///< see noise_floor()
+  std::vector<double> pressures;  ///< of all elements In Contact, ascending
+  double spacing_mm = 0.0;        ///< between the elements
+  MapOptions maps;                ///< the given ones, or else with cells of half a spacing
 
-  /// The given options of maps, or else those of maps with cells of half a spacing.
-  MapOptions maps() const;
   /// Pressures that part the elements In Contact into `levels` - 1 levels of about as many elements
   /// each; fewer where pressures are the same.
   std::vector<double> level_edges(std::size_t levels) const;
@@ -61,12 +58,26 @@ ContactClassifier learn_classifier(const std::vector<Press>& presses,
 /// be cut off at 0. 0 where there are no such elements.
 double noise_floor(const std::vector<Press>& presses, const ContactClassifier& classifier);
 
-/// Gamma of Eq. 7 under which readings are most likely where the log odds are known.
-/// @param counts of two levels over log odds; nodes of cells that nothing sensed are left out
-double fit_gamma(const LevelCounts& counts, double prior);
-
 /// The share of elements In Contact among the known ones, in [0.01, 0.5]: the object's area over
 /// the area that touches sensed.
-double share_in_contact(std::span<const Touch> touches, const ContactClassifier& classifier);
+double share_in_contact(std::span<const TouchEvidence> touches);
+
+/// The features of a press of an object.
+struct LabelledFeatures {
+  std::string label;
+  PressFeatures features;
+};
+
+/// The distribution of each object's features. An object's covariance is drawn towards that of all
+/// presses about the means of their objects, as if four presses more had varied so:
+/// C = (n C_object + 4 C_pooled) / (n + 4) * (1 + 1 / n) + 0.05^2 I, where the factor is what the
+/// mean of n presses misses, and the last term keeps presses that were all alike from being
+/// demanded alike. Where every object has one press, all presses' covariance stands for the pooled
+/// one. `any` has the mean and covariance of all presses. The weight stays 0.
+/// @param presses at least one
+LearnedFeatures learn_features(std::span<const LabelledFeatures> presses);
+/// The distributions of presses' features, each press by its first touch.
+LearnedFeatures learn_features(const std::vector<Press>& presses,
+                               const ContactClassifier& classifier);
 
 }  // namespace palpate

@@ -11,7 +11,10 @@
 #include <glm/vec3.hpp>
 
 #include "estimation/lattice/refinement.hpp"
+#include "estimation/log_sum.hpp"
+#include "learning/local_search.hpp"
 #include "learning/progress.hpp"
+#include "palpate/error.hpp"
 #include "palpate/pose_error.hpp"
 #include "recognition/object_fit.hpp"
 
@@ -23,16 +26,14 @@ constexpr double nothing = -std::numeric_limits<double>::infinity();
 
 /// What the maps of one label say of a press.
 struct LabelScore {
-  double log_evidence_sum = nothing;     ///< log of the sum over the maps
+  LogSum evidence;                       ///< over the maps
   double best_log_likelihood = nothing;  ///< at the best pose of the best map
   std::size_t best_map = 0;
   Pose best_pose;
   std::size_t maps = 0;
 
   void add(std::size_t map, const PressPlacement& placement) {
-    const double larger = std::max(log_evidence_sum, placement.log_evidence);
-    const double smaller = std::min(log_evidence_sum, placement.log_evidence);
-    log_evidence_sum = larger + std::log1p(std::exp(smaller - larger));
+    evidence.add(placement.log_evidence);
     if (placement.log_likelihood > best_log_likelihood) {
       best_log_likelihood = placement.log_likelihood;
       best_map = map;
@@ -40,8 +41,9 @@ struct LabelScore {
     }
     ++maps;
   }
+  /// Of the mean over the maps.
   double log_evidence() const {
-    return maps == 0 ? nothing : log_evidence_sum - std::log(static_cast<double>(maps));
+    return maps == 0 ? nothing : evidence.log() - std::log(static_cast<double>(maps));
   }
 };
 
@@ -49,50 +51,49 @@ struct LabelScore {
 class FoldTrial {
  public:
   FoldTrial(const std::vector<std::string>& labels, const FoldModel& model,
-            const CrossValidationOptions& options)
-      : labels_(labels), model_(model), options_(options), maps_of_(labels.size()) {
-    for (std::size_t map = 0; map < model.maps.size(); ++map) {
-      const std::optional<std::size_t> label = label_of(model.maps[map].map.label);
-      if (label && maps_of_[*label].size() < options.maps_per_object) {
-        maps_of_[*label].push_back(map);
+            const CalibrationSettings& settings)
+      : labels_(labels), model_(model), settings_(settings), maps_of_(labels.size()) {
+    for (const TrainingMap& map : model.maps) {
+      const std::optional<std::size_t> label = label_of(map.map.label);
+      if (label && maps_of_[*label].size() < settings.most_maps) {
+        maps_of_[*label].push_back(hypotheses_.size());
       }
+      hypotheses_.push_back({.map = map.map});
     }
     if (model.table) {
-      layers_ = layers_of(model.maps, model.how.layer);
+      std::vector<OccupancyGrid> layers = layers_of(model.maps, model.learning.layer);
+      for (std::size_t map = 0; map < layers.size(); ++map) {
+        hypotheses_[map].layer = std::move(layers[map]);
+      }
     }
-    std::ranges::transform(model.maps, std::back_inserter(bodies_),
-                           [](const TrainingMap& map) { return displaced_body(map.map); });
   }
 
-  bool has_map(const std::string& label) const {
-    const std::optional<std::size_t> at = label_of(label);
-    return at && !maps_of_[*at].empty();
-  }
-
-  /// @param tried presses of the fold whose objects have maps
-  CrossValidation run(const std::vector<Press>& tried, std::size_t fold,
+  CrossValidation run(std::size_t fold, const std::vector<Press>& presses,
                       const std::function<void(double)>& progress) const {
-    CrossValidation result;
-    if (tried.empty()) {
-      return result;
+    const std::vector<std::size_t> fold_of = folds_of(presses, settings_.folds);
+    std::vector<Press> tried;
+    for (std::size_t i = 0; i < presses.size(); ++i) {
+      const std::optional<std::size_t> label = label_of(presses[i].label);
+      if (fold_of[i] == fold && label && !maps_of_[*label].empty()) {
+        tried.push_back(presses[i]);
+      }
     }
-    const Unknowns asked =
-        options_.bins ? unknowns_of(tried, *options_.bins, fold) : Unknowns{.presses = tried};
-    const ContactModel classifier =
-        model_.table ? contact_with(model_.how.contact, *model_.table, "") : model_.how.contact;
+    const std::vector<Unknown> asked = unknowns_of(tried, settings_.bins, fold);
+    const ContactModel classifier = model_.table
+                                        ? contact_with(model_.learning.contact, *model_.table, "")
+                                        : model_.learning.contact;
     std::vector<std::vector<TouchEvidence>> evidence;
-    for (const Press& press : asked.presses) {
-      evidence.push_back(evidence_of(press.touches, classifier));
+    for (const Unknown& unknown : asked) {
+      evidence.push_back(evidence_of(unknown.press.touches, classifier));
     }
     const auto scores = score(evidence, progress);
-    for (std::size_t i = 0; i < asked.presses.size(); ++i) {
-      HeldOut& unknown = result.unknowns.emplace_back(HeldOut{.fold = fold, .log_evidence = {}});
-      if (i >= tried.size()) {
-        unknown.half = asked.half_of_group[i - tried.size()];
-      }
-      judge(asked.presses[i], evidence[i], scores[i], unknown);
+    CrossValidation result;
+    for (std::size_t i = 0; i < asked.size(); ++i) {
+      HeldOut held_out{.fold = fold, .half = asked[i].half, .log_evidence = {}};
+      judge(asked[i].press, evidence[i], scores[i], held_out);
+      result.unknowns.push_back(std::move(held_out));
     }
-    if (options_.bins && model_.table) {
+    if (settings_.bins && model_.table) {
       result.place_errors = errors_of(tried);
     }
     return result;
@@ -109,8 +110,13 @@ class FoldTrial {
   }
 
   ContactModel contact_for(std::size_t label) const {
-    return model_.table ? contact_with(model_.how.contact, *model_.table, labels_[label])
-                        : model_.how.contact;
+    return model_.table ? contact_with(model_.learning.contact, *model_.table, labels_[label])
+                        : model_.learning.contact;
+  }
+
+  PressPlacer placer_on(std::size_t map, const ContactModel& contact) const {
+    return {hypotheses_[map], contact,
+            settings_.bins ? settings_.bins->lattice : model_.learning.lattice};
   }
 
   /// The scores of presses, [press][label].
@@ -122,12 +128,7 @@ class FoldTrial {
     tbb::parallel_for(std::size_t{0}, labels_.size(), [&](std::size_t label) {
       const ContactModel contact = contact_for(label);
       for (const std::size_t map : maps_of_[label]) {
-        Hypothesis hypothesis{.map = model_.maps[map].map};
-        if (model_.table) {
-          hypothesis.layer = layers_[map];
-        }
-        PressPlacer placer(hypothesis, contact,
-                           options_.bins ? options_.bins->lattice : model_.how.lattice);
+        PressPlacer placer = placer_on(map, contact);
         for (std::size_t i = 0; i < presses.size(); ++i) {
           scores[i][label].add(map, placer.place(presses[i]));
         }
@@ -166,62 +167,40 @@ class FoldTrial {
   /// See HeldOut::error_mm.
   double pose_error_of(std::span<const TouchEvidence> press, std::size_t label,
                        const Pose& T_object_robot) const {
-    constexpr int steps = 3;  // to either side
     constexpr int most_rounds = 6;
     constexpr double enough = 0.6;  // of a step: a standard deviation that the steps resolve
     const std::size_t map = maps_of_[label].front();
-    Hypothesis hypothesis{.map = model_.maps[map].map};
-    if (model_.table) {
-      hypothesis.layer = layers_[map];
-    }
-    const PressPlacer placer(hypothesis, contact_for(label), options_.bins->lattice);
+    const PressPlacer placer = placer_on(map, contact_for(label));
     // The first window is wide: one that ended near the truth would draw beliefs to it.
-    glm::dvec3 step{0.3 * options_.spacing_mm, 0.3 * options_.spacing_mm, 0.06};
+    const double spacing_mm = settings_.readings.spacing_mm;
+    glm::dvec3 step{0.3 * spacing_mm, 0.3 * spacing_mm, 0.06};
     glm::dvec3 middle{T_object_robot.translation_mm, T_object_robot.theta_rad};
     const auto pose_at = [](const glm::dvec3& at) { return Pose{{at.x, at.y}, at.z}; };
-    for (int round = 0; round < most_rounds; ++round) {
-      double most = nothing;
-      std::vector<std::pair<double, glm::dvec3>> about;
-      for (int a = -steps; a <= steps; ++a) {
-        for (int y = -steps; y <= steps; ++y) {
-          for (int x = -steps; x <= steps; ++x) {
-            const glm::dvec3 at = middle + step * glm::dvec3(x, y, a);
-            about.emplace_back(placer.log_likelihood(press, pose_at(at)), at);
-            most = std::max(most, about.back().first);
-          }
-        }
-      }
-      double sum = 0.0;
-      glm::dvec3 mean{0.0};
-      glm::dvec3 squares{0.0};
-      for (const auto& [log_likelihood, at] : about) {
-        const double weight = std::exp(log_likelihood - most);
-        sum += weight;
-        mean += weight * (at - middle);
-        squares += weight * (at - middle) * (at - middle);
-      }
-      mean /= sum;
-      const glm::dvec3 variance = squares / sum - mean * mean;
-      middle += mean;
-      bool resolved = true;
+    bool resolved = false;
+    for (int round = 0; round < most_rounds && !resolved; ++round) {
+      std::vector<std::pair<glm::dvec3, double>> about;
+      visit_grid({3, 3, 3}, [&](const glm::dvec3& index) {
+        const glm::dvec3 at = middle + step * index;
+        about.emplace_back(at - middle, placer.log_likelihood(press, pose_at(at)));
+      });
+      const Moments belief(about);
+      middle += belief.mean;
+      resolved = true;
       for (int axis = 0; axis < 3; ++axis) {
-        if (!(variance[axis] > enough * enough * step[axis] * step[axis])) {
+        if (!(belief.variance[axis] > enough * enough * step[axis] * step[axis])) {
           step[axis] /= 2.0;
           resolved = false;
         }
       }
-      if (resolved) {
-        break;
-      }
     }
-    return pose_error_mm(bodies_[map], 1, pose_at(middle), T_object_robot);
+    return pose_error_mm(displaced_body(hypotheses_[map].map), 1, pose_at(middle), T_object_robot);
   }
 
   /// Log density of a touch's features under every label; empty without features.
   std::vector<double> log_densities(const TouchEvidence& touch) const {
     std::vector<double> densities;
     if (model_.features) {
-      const PressFeatures own = features_of(touch, model_.how.contact.classifier.threshold);
+      const PressFeatures own = features_of(touch, model_.learning.contact.classifier.threshold);
       for (const std::string& label : labels_) {
         const auto known = model_.features->objects.find(label);
         const FeatureDistribution& of_label =
@@ -230,6 +209,17 @@ class FoldTrial {
       }
     }
     return densities;
+  }
+
+  /// How a press fits the best of these objects at about the best pose.
+  std::optional<Fit> best_fit(std::span<const TouchEvidence> press,
+                              const std::vector<LabelScore>& scores,
+                              std::span<const std::size_t> labels) const {
+    const std::size_t label = *std::ranges::max_element(
+        labels, {}, [&](std::size_t one) { return scores[one].best_log_likelihood; });
+    const LabelScore& at = scores[label];
+    return best_fit_near(press, at.best_pose, hypotheses_[at.best_map].compared(),
+                         contact_for(label), 0);
   }
 
   /// The labels but one that have maps.
@@ -244,26 +234,12 @@ class FoldTrial {
     return others;
   }
 
-  const OccupancyGrid& compared(std::size_t map) const {
-    return model_.table ? layers_[map] : model_.maps[map].map;
-  }
-
-  /// How a press fits the best of these objects at about the best pose.
-  std::optional<Fit> best_fit(std::span<const TouchEvidence> press,
-                              const std::vector<LabelScore>& scores,
-                              std::span<const std::size_t> labels) const {
-    const std::size_t label = *std::ranges::max_element(
-        labels, {}, [&](std::size_t one) { return scores[one].best_log_likelihood; });
-    const LabelScore& at = scores[label];
-    return best_fit_near(press, at.best_pose, compared(at.best_map), contact_for(label), 0);
-  }
-
   /// How a press fits its object at its pose, or where that is unknown, the best object.
   std::optional<Fit> fit_of(std::span<const TouchEvidence> press,
                             const std::vector<LabelScore>& scores, std::size_t truth,
                             const std::optional<Pose>& T_object_robot) const {
     if (T_object_robot) {
-      return evidence_fit(press, *T_object_robot, compared(scores[truth].best_map),
+      return evidence_fit(press, *T_object_robot, hypotheses_[scores[truth].best_map].compared(),
                           contact_for(truth), {}, 0);
     }
     std::vector<std::size_t> labels = others_of(truth, scores);
@@ -280,15 +256,15 @@ class FoldTrial {
     if (!model_.table || others.size() < 2 || in_contact == 0) {
       return {};
     }
-    const std::optional<Fit> fit = best_fit(press, scores, others);
-    return StrangerFit{fit.value(), static_cast<std::size_t>(in_contact)};
+    return StrangerFit{best_fit(press, scores, others).value(),
+                       static_cast<std::size_t>(in_contact)};
   }
 
   /// Errors of the places of presses at known poses.
   std::vector<PlaceError> errors_of(const std::vector<Press>& presses) const {
     std::vector<PlaceError> errors;
     for (std::size_t label = 0; label < labels_.size(); ++label) {
-      ContactModel contact = contact_for(label);
+      const ContactModel contact = contact_for(label);
       std::map<std::string, std::vector<TouchEvidence>> of_group;
       for (const Press& press : presses) {
         TouchEvidence touch(press.touches.front(), contact);
@@ -297,18 +273,10 @@ class FoldTrial {
           of_group[press.group].push_back(std::move(touch));
         }
       }
-      if (of_group.empty()) {
-        continue;
-      }
-      const std::size_t map = maps_of_[label].front();
-      Hypothesis of{.map = model_.maps[map].map};
-      if (model_.table) {
-        of.layer = layers_[map];
-      }
-      contact.prior = contact.prior.value_or(of.compared().prior);
       // Touches of several groups together would hide by how much each is off.
       for (const auto& [group, touches] : of_group) {
-        std::ranges::move(place_errors(touches, of, contact, 0), std::back_inserter(errors));
+        std::ranges::move(place_errors(touches, hypotheses_[maps_of_[label].front()], contact, 0),
+                          std::back_inserter(errors));
       }
     }
     return errors;
@@ -316,13 +284,102 @@ class FoldTrial {
 
   const std::vector<std::string>& labels_;
   const FoldModel& model_;
-  const CrossValidationOptions& options_;
+  const CalibrationSettings& settings_;
+  std::vector<Hypothesis> hypotheses_;             ///< [map]
   std::vector<std::vector<std::size_t>> maps_of_;  ///< [label]
-  std::vector<OccupancyGrid> layers_;              ///< [map] with a table
-  std::vector<Body> bodies_;                       ///< [map]
 };
 
+/// What presses say of presses that are not among them by Eq. 7.
+FoldModel eq7_model(const LearnedPresses& learned, const CalibrationSettings& settings) {
+  FoldModel model{.maps = learned.maps, .learning = table_learning({}, learned, settings)};
+  model.learning.contact.classifier = learned.readings.maps.classifier;
+  if (settings.steps && settings.given.empty()) {
+    // Touches at known poses are tried on maps of all others, as unknowns will be.
+    model.maps = learned.of_objects;
+  }
+  if (!settings.steps) {
+    model.features = learn_features(learned.presses, learned.readings.classifier);
+  }
+  return model;
+}
+
 }  // namespace
+
+LearnedPresses with_maps(std::vector<Press> presses, LearnedReadings readings,
+                         const CalibrationSettings& settings) {
+  LearnedPresses learned{std::move(presses), std::move(readings), settings.given};
+  if (settings.given.empty()) {
+    const MapOptions& maps = learned.readings.maps;
+    if (settings.steps) {
+      MapsByFolds built = maps_by_folds(learned.presses, maps, settings.folds);
+      learned.maps = std::move(built.without_folds);
+      learned.of_objects = std::move(built.of_objects);
+    } else {
+      learned.maps = maps_of_presses(learned.presses, maps);
+    }
+  }
+  return learned;
+}
+
+TableLearning table_learning(const TableKind& kind, const LearnedPresses& learned,
+                             const CalibrationSettings& settings) {
+  constexpr double near = 2.0;  // in spacings of the elements
+  constexpr double far = 6.0;
+  const LearnedReadings& readings = learned.readings;
+  TableLearning table;
+  if (kind.layer == MapLayer::mean_level) {
+    table.layer = mean_level_layer(readings.classifier.threshold,
+                                   readings.pressures.empty() ? 0.0 : readings.pressures.back());
+  }
+  table.layer.near_mm = near * readings.spacing_mm;
+  table.layer.far_mm = far * readings.spacing_mm;
+  table.level_edges = readings.level_edges(kind.levels);
+  table.contact = {.classifier = readings.classifier, .prior = readings.maps.sensor.prior};
+  if (settings.steps) {
+    table.counted_within = *settings.steps;
+  } else {
+    table.lattice = placing_lattice(learned.maps, readings.spacing_mm, placing_step_rad);
+  }
+  return table;
+}
+
+std::set<std::string> compared_labels(const LearnedPresses& learned) {
+  std::set<std::string> labels;
+  for (std::size_t i = 0; i < learned.presses.size(); ++i) {
+    const std::string& label = learned.presses[i].label;
+    if (std::ranges::any_of(learned.maps, [&](const TrainingMap& map) {
+          return map.map.label == label && !map.holds(i);
+        })) {
+      labels.insert(label);
+    }
+  }
+  return labels;
+}
+
+std::vector<FoldModel> models_of(const std::vector<Press>& presses,
+                                 const CalibrationSettings& settings,
+                                 const std::function<void(double)>& progress) {
+  LearnedPresses learned;
+  FoldModel eq7;
+  try {
+    learned = with_maps(presses, learn_readings(presses, settings.readings), settings);
+    eq7 = eq7_model(learned, settings);
+  } catch (const Error&) {
+    return {};
+  }
+  Progress work(static_cast<double>(settings.tables.size()), progress);
+  std::vector<FoldModel> models;
+  for (const TableKind& kind : settings.tables) {
+    FoldModel& model = models.emplace_back(eq7);
+    model.learning = table_learning(kind, learned, settings);
+    model.table =
+        compared_labels(learned).empty()
+            ? model.learning.initial()
+            : learn_table(learned.presses, learned.maps, model.learning, work.part(1.0)).table;
+  }
+  models.push_back(std::move(eq7));
+  return models;
+}
 
 CrossValidation& CrossValidation::operator+=(const CrossValidation& fold) {
   unknowns.insert(unknowns.end(), fold.unknowns.begin(), fold.unknowns.end());
@@ -332,17 +389,9 @@ CrossValidation& CrossValidation::operator+=(const CrossValidation& fold) {
 
 CrossValidation try_fold(std::size_t fold, const std::vector<Press>& presses,
                          const std::vector<std::string>& labels, const FoldModel& model,
-                         const CrossValidationOptions& options,
+                         const CalibrationSettings& settings,
                          const std::function<void(double)>& progress) {
-  const FoldTrial trial(labels, model, options);
-  const std::vector<std::size_t> fold_of = folds_of(presses, options.folds);
-  std::vector<Press> tried;
-  for (std::size_t i = 0; i < presses.size(); ++i) {
-    if (fold_of[i] == fold && trial.has_map(presses[i].label)) {
-      tried.push_back(presses[i]);
-    }
-  }
-  return trial.run(tried, fold, progress);
+  return FoldTrial(labels, model, settings).run(fold, presses, progress);
 }
 
 }  // namespace palpate

@@ -4,7 +4,6 @@
 #include <functional>
 #include <optional>
 #include <set>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -13,7 +12,6 @@
 #include "learning/held_out.hpp"
 #include "learning/press.hpp"
 #include "learning/table_learning.hpp"
-#include "learning/training_maps.hpp"
 #include "learning/tried_bins.hpp"
 #include "palpate/learned_sensor.hpp"
 
@@ -26,12 +24,23 @@ struct TableKind {
   std::size_t levels = 2;
 };
 
-/// How presses are learned from, all of them or those of some folds.
-struct ModelLearning {
-  ReadingOptions readings;
-  std::size_t folds = 5;                ///< that maps of touches at known poses are built without
+/// How a sensor is learned from presses, all of them or those of some folds, and how presses are
+/// tried on models that have not seen them.
+struct CalibrationSettings {
+  ReadingOptions readings = {};
+  /// Tables to try, the simplest first; none stands for default_tables(). With one object there is
+  /// nothing to compare by, and the last is taken.
+  std::vector<TableKind> tables = {};
+  std::size_t folds = 5;      ///< of the cross-validation, at least 2
+  std::size_t most_maps = 5;  ///< of an object, that a press is tried on; above 0
+  /// Bins on which unknowns will be recognised, for touches at known poses, which are tried
+  /// as_unknown() on them. None stands for bins half the elements' spacing and 5 degrees wide,
+  /// about the array's centre; to try_fold(), for TableLearning::lattice.
+  std::optional<RecognitionBins> bins = {};
+
+  // calibrate_sensor() sets:
   std::vector<TrainingMap> given = {};  ///< to compare presses with; none: maps of the presses
-  std::optional<BinSteps> bins = {};    ///< for presses at known poses; none: poses are unknown
+  std::optional<BinSteps> steps = {};   ///< of the bins; none: poses are unknown
 };
 
 /// Presses, and what they say before any table.
@@ -46,11 +55,11 @@ struct LearnedPresses {
 /// host threads.
 /// @throws Error as observed_map()
 LearnedPresses with_maps(std::vector<Press> presses, LearnedReadings readings,
-                         const ModelLearning& how);
+                         const CalibrationSettings& settings);
 
 /// How the presses learn a table.
 TableLearning table_learning(const TableKind& kind, const LearnedPresses& learned,
-                             const ModelLearning& how);
+                             const CalibrationSettings& settings);
 
 /// The labels of presses that have a map of their object without them.
 std::set<std::string> compared_labels(const LearnedPresses& learned);
@@ -58,7 +67,7 @@ std::set<std::string> compared_labels(const LearnedPresses& learned);
 /// What the presses of all folds but one say, from the contact threshold on.
 struct FoldModel {
   std::vector<TrainingMap> maps;
-  TableLearning how;
+  TableLearning learning;
   std::optional<LearnedTable> table = {};  ///< none: Eq. 7 on the maps' log odds
   /// Only from presses at unknown poses: a touch at a known pose shows a part of an object, and its
   /// features would tell where it is.
@@ -70,21 +79,12 @@ struct FoldModel {
 /// @returns none where so few presses tell no threshold or make no map
 /// @throws what `progress` throws
 std::vector<FoldModel> models_of(const std::vector<Press>& presses,
-                                 const std::vector<TableKind>& tables, const ModelLearning& how,
+                                 const CalibrationSettings& settings,
                                  const std::function<void(double)>& progress = {});
-
-struct CrossValidationOptions {
-  std::size_t folds = 5;             ///< at least 2
-  std::size_t maps_per_object = 20;  ///< most maps of an object that a press is placed on, above 0
-  /// For presses at known poses, which are looked for as_unknown() on these bins; none: all presses
-  /// stay as they are, and are looked for on TableLearning::lattice.
-  std::optional<RecognitionBins> bins = {};
-  double spacing_mm = 0.0;  ///< between the elements
-};
 
 /// What models that had not seen the presses said of them.
 struct CrossValidation {
-  /// Presses with a map of their object in the other folds and, with CrossValidationOptions::bins,
+  /// Presses with a map of their object in the other folds and, with CalibrationSettings::bins,
   /// groups of several of one object and fold. A press is in groups of one half only. A fold with
   /// fewer presses of each object has no groups.
   std::vector<HeldOut> unknowns;
@@ -92,10 +92,6 @@ struct CrossValidation {
 
   CrossValidation& operator+=(const CrossValidation& fold);
 };
-
-/// Presses in a group, and most groups that a press is in.
-inline constexpr std::size_t presses_in_group = 3;
-inline constexpr std::size_t groups_of_press = 3;
 
 /// Recognises every press of a fold, see folds_of(), at an unknown pose, with what the presses of
 /// the other folds say. The log evidence of a label is the log of the mean over its maps, or
@@ -106,7 +102,7 @@ inline constexpr std::size_t groups_of_press = 3;
 /// @throws Error as PressPlacer does; what `progress` throws
 CrossValidation try_fold(std::size_t fold, const std::vector<Press>& presses,
                          const std::vector<std::string>& labels, const FoldModel& model,
-                         const CrossValidationOptions& options,
+                         const CalibrationSettings& settings,
                          const std::function<void(double)>& progress = {});
 
 }  // namespace palpate

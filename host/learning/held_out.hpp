@@ -6,11 +6,20 @@
 #include <map>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
-#include "learning/stranger_fit.hpp"
+#include "palpate/fit.hpp"
+#include "palpate/learned_sensor.hpp"
+#include "recognition/evaluation.hpp"
 
 namespace palpate {
+
+/// How touches of an object that is left out fit the best of all others.
+struct StrangerFit {
+  Fit fit;                  ///< by evidence_fit(), on no scale
+  std::size_t touches = 0;  ///< with an element In Contact
+};
 
 /// A press, or a group of several presses of one object, and what a model that has not seen it says
 /// of it. What does not apply is none.
@@ -39,22 +48,22 @@ struct HeldOut {
 
 /// The held-out presses and groups for which `is(unknown)` holds.
 template <typename Is>
-std::vector<HeldOut> those(std::span<const HeldOut> all, const Is& is) {
+std::vector<HeldOut> selected(std::span<const HeldOut> all, const Is& is) {
   std::vector<HeldOut> some;
   std::ranges::copy_if(all, std::back_inserter(some), is);
   return some;
 }
 /// Those of a fold (inside) or of all other folds.
 inline std::vector<HeldOut> of_fold(std::span<const HeldOut> all, std::size_t fold, bool inside) {
-  return those(all, [=](const HeldOut& one) { return (one.fold == fold) == inside; });
+  return selected(all, [=](const HeldOut& one) { return (one.fold == fold) == inside; });
 }
-/// Presses alone.
-inline std::vector<HeldOut> alone(std::span<const HeldOut> all) {
-  return those(all, [](const HeldOut& one) { return !one.half; });
+/// Presses that are in no group.
+inline std::vector<HeldOut> single_touches(std::span<const HeldOut> all) {
+  return selected(all, [](const HeldOut& one) { return !one.half; });
 }
 /// Groups of a half.
 inline std::vector<HeldOut> of_half(std::span<const HeldOut> all, std::size_t half) {
-  return those(all, [=](const HeldOut& one) { return one.half == half; });
+  return selected(all, [=](const HeldOut& one) { return one.half == half; });
 }
 /// Groups, those of the first half before those of the second.
 inline std::vector<HeldOut> groups_in(std::span<const HeldOut> all) {
@@ -75,5 +84,57 @@ std::map<std::size_t, std::vector<Value>> by_label(std::span<const HeldOut> all,
   }
   return of_label;
 }
+
+/// Logarithms of the labels' probabilities: proportional to evidence^(1 / temperature) *
+/// density^weight.
+std::vector<double> log_probabilities(const HeldOut& press, double temperature,
+                                      double feature_weight = 0.0);
+/// How right and how honest the probabilities of presses are; see evaluate().
+Scores scores_of(std::span<const HeldOut> presses, double temperature, double feature_weight = 0.0);
+/// The losses of single touches with their labels' log probabilities, in nats.
+std::vector<double> losses_of(std::span<const HeldOut> all);
+
+/// By how much more the second of two models loses on the same presses.
+struct LossDifference {
+  double mean = 0.0;
+  double standard_error = 0.0;
+  /// Whether the first loses less beyond chance: by more than two standard errors.
+  bool is_clear() const;
+};
+LossDifference difference_of(std::span<const double> losses, std::span<const double> others);
+
+/// What recognition gains by a learned sensor over Eq. 7 on touches that neither has seen.
+struct SensorGain {
+  double log_loss_before = 0.0;  ///< of single touches by Eq. 7 with gamma 0.1, in nats
+  double log_loss = 0.0;         ///< of single touches by the table and the temperature
+  LossDifference less_loss;      ///< of single touches, in nats
+  /// Geometric means of HeldOut::error_mm; none where there are no groups.
+  std::optional<double> error_mm_before;  ///< by Eq. 7
+  std::optional<double> error_mm;         ///< by the table
+  LossDifference less_error;              ///< of the errors' logarithms, where there are groups
+  /// Either the loss or the error is less beyond chance, and neither is more beyond chance by over
+  /// 0.02 nats, or a tenth of the error: touches that are all told apart have next to no loss, with
+  /// a temperature a little more.
+  bool better = false;
+  bool gains = false;  ///< the first of both
+};
+
+/// @param eq7 what Eq. 7 says, with gamma 0.1
+/// @param tempered what the table says, see tempered_by_folds()
+SensorGain gain_of(std::span<const HeldOut> eq7, std::span<const HeldOut> tempered);
+
+/// The scale with stranger_sd and stranger_alone by which the fits are likeliest, those of several
+/// touches and of one; each object counts alike. Either is none where fewer than three objects have
+/// five such fits.
+/// @param objects [label]
+/// @param scale of learned objects' z
+/// @returns stranger_sd from 1 to 16, stranger_alone with a mean from -16 to 0 and an sd from 1 to
+/// 16
+FitScale with_strangers(const std::map<std::size_t, std::vector<StrangerFit>>& objects,
+                        FitScale scale);
+
+/// Says, without a full stop, that touches did not tell how badly strangers fit; "" where they did,
+/// or where nothing of fits was learned.
+std::string unlearned_strangers(const LearnedSensor& sensor);
 
 }  // namespace palpate

@@ -33,11 +33,11 @@ std::map<std::string, int> symmetries_of(const MapRequest& request) {
     const std::size_t equals = item.rfind('=');
     const std::string label = equals == std::string::npos ? "" : item.substr(0, equals);
     const std::string n = equals == std::string::npos ? item : item.substr(equals + 1);
-    int whole = 0;
-    const auto [rest, error] = std::from_chars(n.data(), n.data() + n.size(), whole);
+    int turns = 0;
+    const auto [rest, error] = std::from_chars(n.data(), n.data() + n.size(), turns);
     const bool plain = n == "0" || (!n.empty() && n.front() >= '1' && n.front() <= '9');
     if (!plain || error != std::errc{} || rest != n.data() + n.size() ||
-        (label.empty() && item != request.symmetry) || !result.emplace(label, whole).second) {
+        (label.empty() && item != request.symmetry) || !result.emplace(label, turns).second) {
       refuse_option(
           "symmetry", request.symmetry,
           "give a whole number from 0, or one for each of some labels, such as nut=6,key=1");
@@ -128,7 +128,7 @@ void MapRequest::validate() const {
     refuse_option("peak", *peak, "must be below 1, or one reading would make a cell certain");
   }
   given_prior(*this);
-  object_origin(*this);
+  given_origin(*this);
   symmetries_of(*this);
   if (max_maps && !unposed) {
     refuse_option("max-maps", *max_maps,
@@ -154,31 +154,27 @@ std::optional<double> given_prior(const MapRequest& request) {
   return prior;
 }
 
-ObjectOrigin object_origin(const MapRequest& request) {
-  using Kind = ObjectOrigin::Kind;
-  if (request.unposed && !request.origin.empty()) {
-    refuse_option("origin", request.origin,
+std::optional<Pose> given_origin(const MapRequest& request) {
+  const std::string& origin = request.origin;
+  if (request.unposed && !origin.empty()) {
+    refuse_option("origin", origin,
                   "presses at unknown poses tell of no robot frame; leave it out");
   }
-  const std::map<std::string, Kind> kinds{{"", Kind::automatic},
-                                          {"auto", Kind::automatic},
-                                          {"centroid", Kind::centroid},
-                                          {"robot", Kind::robot}};
-  if (const auto known = kinds.find(request.origin); known != kinds.end()) {
-    return {known->second};
+  if (origin.empty() || origin == "auto" || origin == "centroid" || origin == "robot") {
+    return {};
   }
-  if (std::ranges::count(request.origin, ',') != 2) {
-    refuse_option("origin", request.origin,
+  if (std::ranges::count(origin, ',') != 2) {
+    refuse_option("origin", origin,
                   "give auto, centroid, robot, or the frame's pose X,Y,DEG in the robot frame, mm "
                   "and degrees");
   }
-  return {Kind::given, parse_pose("origin", request.origin)};
+  return parse_pose("origin", origin);
 }
 
-void settle_frame(const ObjectOrigin& origin, OccupancyGrid& map) {
-  using Kind = ObjectOrigin::Kind;
-  map.T_learned_robot_object = origin.T_learned_robot_object;
-  if (origin.kind == Kind::centroid || (origin.kind == Kind::automatic && !holds_origin(map))) {
+void settle_frame(const MapRequest& request, OccupancyGrid& map) {
+  map.T_learned_robot_object = given_origin(request).value_or(Pose{});
+  const bool automatic = request.origin.empty() || request.origin == "auto";
+  if (request.origin == "centroid" || (automatic && (map.drawn || !holds_origin(map)))) {
     centre_frame(map);
   }
 }

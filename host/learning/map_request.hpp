@@ -48,16 +48,13 @@ struct MapRequest {
 /// The prior that is given; none where it is to be estimated. @throws Error on another text
 std::optional<double> given_prior(const MapRequest& request);
 
-/// Which point of the robot frame of the touches is the object frame's origin.
-struct ObjectOrigin {
-  /// The robot's own; the object's middle; or the robot's, where that lies on the map.
-  enum class Kind { robot, centroid, automatic, given } kind = Kind::automatic;
-  Pose T_learned_robot_object{};  ///< where it is given
-};
-/// @throws Error on a text that is none of these, or where poses are unknown
-ObjectOrigin object_origin(const MapRequest& request);
-/// Settles the object's frame of a map that was learned in the robot's, or in a given one.
-void settle_frame(const ObjectOrigin& origin, OccupancyGrid& map);
+/// The object frame's pose X,Y,DEG in the robot frame of the touches, where the request gives one.
+/// @throws Error on an origin that is neither this nor a word, or where poses are unknown
+std::optional<Pose> given_origin(const MapRequest& request);
+/// Settles the object's frame of a map that was learned in the robot's, or in a given one: centroid
+/// puts its origin in the object's middle, and so does auto where a map is drawn, or the robot's
+/// origin lies beyond it.
+void settle_frame(const MapRequest& request, OccupancyGrid& map);
 
 /// @throws Error where the request's symmetry names a label that no object has
 void require_known_symmetries(const MapRequest& request, const std::vector<std::string>& labels);

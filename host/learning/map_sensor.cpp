@@ -1,4 +1,4 @@
-#include "learning/map_sensor.hpp"
+#include "learning/map_task.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -236,7 +236,7 @@ void learn_sensor(const MapTask& task, const MapOptions& options, LearnedMaps& l
         {}, {.threshold = request.shared.threshold, .ratio = request.shared.ratio}, touches, {});
     require_enough(calibration.presses, least_touches);
     give_groups(all, calibration.presses);
-    calibration.options.maps = options;
+    calibration.options.readings.maps = options;
     learn_from(calibration, request, learned, progress);
     if (!learned.sensor) {
       return;

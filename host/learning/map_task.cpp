@@ -12,7 +12,6 @@
 
 #include "estimation/maps/left_out_fit.hpp"
 #include "io/input_file.hpp"
-#include "learning/map_sensor.hpp"
 #include "learning/observed_map.hpp"
 #include "learning/press.hpp"
 #include "learning/progress.hpp"
@@ -31,7 +30,7 @@ namespace {
 /// Gathers the touches of all recordings by label, in the labels' order.
 void group_by_label(MapTask& task, const ContactClassifier& classifier) {
   const MapRequest& request = task.request;
-  const Pose T_object_robot = inverse(object_origin(request).T_learned_robot_object);
+  const Pose T_object_robot = inverse(given_origin(request).value_or(Pose{}));
   struct Group {
     std::vector<Touch> touches;
     std::vector<TouchSource> sources;
@@ -139,39 +138,6 @@ std::optional<LearnedSensor> sensor_of(const MapRequest& request, const Recordin
   return sensor;
 }
 
-/// The touches as one recording. Where their arrays differ, it has elements for the largest, and
-/// those that a touch lacks are dead.
-Recording gathered(const ObjectTouches& object, const std::string& pressure_unit) {
-  Recording result{.object = object.label, .pressure_unit = pressure_unit};
-  std::size_t most = 0;
-  bool one_array = true;
-  bool dead = false;
-  for (const Touch& touch : object.touches) {
-    most = std::max(most, touch.pressure.size());
-    one_array =
-        one_array && std::ranges::equal(touch.elements_mm, object.touches.front().elements_mm);
-    dead = dead || !touch.valid.empty();
-  }
-  for (const Touch& touch : object.touches) {
-    const std::size_t lacks = most - touch.pressure.size();
-    result.T_robot_sensor.push_back(touch.T_robot_sensor);
-    result.pressure.insert(result.pressure.end(), touch.pressure.begin(), touch.pressure.end());
-    result.pressure.insert(result.pressure.end(), lacks, 0.0);
-    if (!one_array || result.elements_mm.empty()) {
-      result.elements_mm.insert(result.elements_mm.end(), touch.elements_mm.begin(),
-                                touch.elements_mm.end());
-      result.elements_mm.insert(result.elements_mm.end(), lacks, touch.elements_mm.front());
-    }
-    if (dead || !one_array) {
-      const std::vector<std::uint8_t> all_alive(touch.pressure.size(), 1);
-      const std::span<const std::uint8_t> valid = touch.valid.empty() ? all_alive : touch.valid;
-      result.valid.insert(result.valid.end(), valid.begin(), valid.end());
-      result.valid.insert(result.valid.end(), lacks, 0);
-    }
-  }
-  return result;
-}
-
 /// Aligns the touches by touch_sd, and says how far they moved.
 void align(std::vector<ObjectTouches>& objects, const DisplacementSd& sd, const MapOptions& options,
            LearnedMaps& learned, const std::function<void(double)>& progress) {
@@ -220,7 +186,7 @@ OccupancyGrid posed_map(const MapTask& task, std::size_t object, const ObjectTou
   }
   judge_left_out(device, source);
   map.source = std::make_shared<const MapSource>(std::move(source));
-  settle_frame(object_origin(task.request), map);
+  settle_frame(task.request, map);
   return map;
 }
 

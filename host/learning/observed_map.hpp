@@ -5,8 +5,10 @@
 #include <string>
 #include <vector>
 
+#include "model/cell_range.hpp"
 #include "palpate/map_builder.hpp"
 #include "palpate/occupancy_grid.hpp"
+#include "palpate/pose.hpp"
 #include "palpate/touch.hpp"
 
 namespace palpate {
@@ -36,5 +38,54 @@ struct ObservedMaps {
 /// @throws Error as observed_map() for any of the maps
 ObservedMaps observed_maps(std::span<const Touch> touches, std::span<const std::size_t> part,
                            const MapOptions& options, const std::string& label);
+
+/// Where what one press says, observed_map() of the press by itself, lies on a map of several.
+struct ImagePlace {
+  Pose T_object_image;
+  bool mirrored = false;  ///< the image is mirrored, x to -x, before the pose
+  double weight = 1.0;    ///< above 0: how sure the place is
+};
+
+/// What touches say of the cells of a map, summed in float64.
+class MapSums {
+ public:
+  /// @param range of the cells; it grows by images
+  explicit MapSums(const MapOptions& options, const CellRange& range = {});
+
+  /// Adds a touch: its evidence (Eq. 4-6), and its pressure where it observed cells.
+  /// @param known elements of the touch, in the robot frame
+  /// @param radius_mm at which Gaussians are cut off
+  void add(const Touch& touch, std::span<const ElementReading> known, double radius_mm);
+  /// Adds what a press says, weighted, at the cells that it observed. Its image is read bilinearly
+  /// between the observed cells, without error where its cells fall on the map's.
+  void add(const OccupancyGrid& image, const ImagePlace& place) { change(image, place, 1); }
+  /// Takes back an image that was added at this very place.
+  void remove(const OccupancyGrid& image, const ImagePlace& place) { change(image, place, -1); }
+  /// Adds sums over the same cells.
+  MapSums& operator+=(const MapSums& other);
+
+  /// The map of these cells: the sum of the evidence, the number of touches that observed a cell,
+  /// and their mean pressure.
+  OccupancyGrid sum(const std::string& label, const CellRange& range) const;
+  /// The map of the observed cells, or of one cell where there are none: the weighted means of
+  /// evidence and pressure, and the number of presses that observed a cell.
+  OccupancyGrid mean(const std::string& label) const;
+
+ private:
+  struct Cell {
+    double evidence = 0.0;  ///< log odds beyond the prior's, weighted
+    double level = 0.0;     ///< pressure, weighted
+    double weight = 0.0;    ///< of the touches that observed the cell
+    int touches = 0;        ///< that observed the cell
+  };
+
+  void change(const OccupancyGrid& image, const ImagePlace& place, int sign);
+  void make_room(const CellRange& needed);
+  OccupancyGrid map(const std::string& label, const CellRange& range, bool mean) const;
+
+  MapOptions options_;
+  CellRange range_;
+  std::vector<Cell> cells_;  ///< of the range, [ny, nx]
+};
 
 }  // namespace palpate

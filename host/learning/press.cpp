@@ -1,11 +1,16 @@
 #include "learning/press.hpp"
 
 #include <algorithm>
+#include <cstdint>
+#include <iterator>
 #include <map>
 #include <tuple>
+#include <utility>
 
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
 
+#include "learning/observed_map.hpp"
 #include "model/elements_that.hpp"
 #include "model/touch_evidence.hpp"
 #include "palpate/error.hpp"
@@ -37,6 +42,29 @@ std::vector<std::size_t> folds_of_groups(const std::vector<Press>& presses, std:
   return fold_of.size() < 2 ? std::vector<std::size_t>{} : fold;
 }
 
+/// What `build` returns; its errors name whose map it would have been.
+template <typename Build>
+auto named(const std::string& name, const Build& build) {
+  try {
+    return build();
+  } catch (const Error& error) {
+    throw Error(error.fault(), fmt::format("{}: {}", name, error.what()));
+  }
+}
+
+/// The presses of every object, with its label but no map, by label.
+std::vector<TrainingMap> objects_of(const std::vector<Press>& presses) {
+  std::map<std::string, std::vector<std::size_t>> of_label;
+  for (std::size_t i = 0; i < presses.size(); ++i) {
+    of_label[presses[i].label].push_back(i);
+  }
+  std::vector<TrainingMap> objects;
+  for (auto& [label, own] : of_label) {
+    objects.push_back({{.label = label}, std::move(own)});
+  }
+  return objects;
+}
+
 }  // namespace
 
 GroupedObject grouped_object(const Recording& recording, const std::string& by) {
@@ -60,13 +88,41 @@ GroupedObject grouped_object(const Recording& recording, const std::string& by) 
 }
 
 bool has_poses(const Recording& recording) {
-  for (const Pose& pose : recording.T_robot_sensor) {
+  return std::ranges::any_of(recording.T_robot_sensor, [&](const Pose& pose) {
     const Pose& first = recording.T_robot_sensor.front();
-    if (pose.translation_mm != first.translation_mm || pose.theta_rad != first.theta_rad) {
-      return true;
+    return pose.translation_mm != first.translation_mm || pose.theta_rad != first.theta_rad;
+  });
+}
+
+Recording gathered(const ObjectTouches& object, const std::string& pressure_unit) {
+  Recording result{.object = object.label, .pressure_unit = pressure_unit};
+  std::size_t most = 0;
+  bool one_array = true;
+  bool dead = false;
+  for (const Touch& touch : object.touches) {
+    most = std::max(most, touch.pressure.size());
+    one_array =
+        one_array && std::ranges::equal(touch.elements_mm, object.touches.front().elements_mm);
+    dead = dead || !touch.valid.empty();
+  }
+  for (const Touch& touch : object.touches) {
+    const std::size_t lacks = most - touch.pressure.size();
+    result.T_robot_sensor.push_back(touch.T_robot_sensor);
+    result.pressure.insert(result.pressure.end(), touch.pressure.begin(), touch.pressure.end());
+    result.pressure.insert(result.pressure.end(), lacks, 0.0);
+    if (!one_array || result.elements_mm.empty()) {
+      result.elements_mm.insert(result.elements_mm.end(), touch.elements_mm.begin(),
+                                touch.elements_mm.end());
+      result.elements_mm.insert(result.elements_mm.end(), lacks, touch.elements_mm.front());
+    }
+    if (dead || !one_array) {
+      const std::vector<std::uint8_t> all_alive(touch.pressure.size(), 1);
+      const std::span<const std::uint8_t> valid = touch.valid.empty() ? all_alive : touch.valid;
+      result.valid.insert(result.valid.end(), valid.begin(), valid.end());
+      result.valid.insert(result.valid.end(), lacks, 0);
     }
   }
-  return false;
+  return result;
 }
 
 Press single_press(const Recording& recording, std::size_t touch) {
@@ -115,17 +171,6 @@ std::vector<Press> presses_without(std::size_t fold, const std::vector<Press>& p
 bool at_known_poses(const std::vector<Press>& presses) {
   return std::ranges::all_of(presses,
                              [](const Press& press) { return press.T_object_robot.has_value(); });
-}
-
-void require_poses_of_one_kind(const std::vector<Press>& presses) {
-  for (const Press& press : presses) {
-    if (press.T_object_robot.has_value() != presses.front().T_object_robot.has_value()) {
-      throw Error(Fault::input,
-                  fmt::format("{}: its pose is {}known, unlike that of {}; calibrate "
-                              "from one kind",
-                              press.name, press.T_object_robot ? "" : "un", presses.front().name));
-    }
-  }
 }
 
 CheckedPresses without_unknown(const std::vector<Press>& presses,
@@ -192,6 +237,50 @@ std::vector<std::string> stuck_elements(const std::vector<Press>& presses, doubl
     }
   }
   return warnings;
+}
+
+std::vector<TrainingMap> maps_of_presses(const std::vector<Press>& presses,
+                                         const MapOptions& options) {
+  std::vector<TrainingMap> maps(presses.size());
+  tbb::parallel_for(std::size_t{0}, presses.size(), [&](std::size_t i) {
+    const Press& press = presses[i];
+    maps[i] = {named(press.name, [&] { return observed_map(press.touches, options, press.label); }),
+               {i}};
+  });
+  return maps;
+}
+
+MapsByFolds maps_by_folds(const std::vector<Press>& presses, const MapOptions& options,
+                          std::size_t folds) {
+  const std::vector<std::size_t> fold = folds_of(presses, folds);
+  MapsByFolds maps{.of_objects = objects_of(presses), .without_folds = {}};
+  std::vector<std::vector<TrainingMap>> without(maps.of_objects.size());
+  tbb::parallel_for(std::size_t{0}, maps.of_objects.size(), [&](std::size_t object) {
+    TrainingMap& object_map = maps.of_objects[object];
+    std::vector<Touch> touches;
+    std::vector<std::size_t> part;
+    for (const std::size_t press : object_map.presses) {
+      touches.push_back(presses[press].touches.front());
+      touches.back().T_robot_sensor =
+          *presses[press].T_object_robot * touches.back().T_robot_sensor;
+      part.push_back(fold[press]);
+    }
+    ObservedMaps built = named(object_map.map.label, [&] {
+      return observed_maps(touches, part, options, object_map.map.label);
+    });
+    object_map.map = std::move(built.all);
+    for (std::size_t own = 0; own < built.without.size(); ++own) {
+      if (std::ranges::find(part, own) != part.end() && !built.without[own].log_odds.empty()) {
+        TrainingMap& map = without[object].emplace_back(
+            TrainingMap{std::move(built.without[own]), object_map.presses});
+        std::erase_if(map.presses, [&](std::size_t press) { return fold[press] == own; });
+      }
+    }
+  });
+  for (std::vector<TrainingMap>& own : without) {
+    std::ranges::move(own, std::back_inserter(maps.without_folds));
+  }
+  return maps;
 }
 
 }  // namespace palpate

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <optional>
 #include <span>
@@ -7,6 +8,8 @@
 #include <vector>
 
 #include "palpate/contact.hpp"
+#include "palpate/map_builder.hpp"
+#include "palpate/occupancy_grid.hpp"
 #include "palpate/pose.hpp"
 #include "palpate/touch.hpp"
 
@@ -39,6 +42,10 @@ GroupedObject grouped_object(const Recording& recording, const std::string& by);
 /// Whether the robot knew where it touched: some touches of the recording are at different poses.
 bool has_poses(const Recording& recording);
 
+/// The touches as one recording. Where their arrays differ, it has elements for the largest, and
+/// those that a touch lacks are dead.
+Recording gathered(const ObjectTouches& object, const std::string& pressure_unit);
+
 /// One touch as a press: its pose is unknown, so the robot frame is put where the middle of the
 /// array's elements is the origin and theta is 0.
 Press single_press(const Recording& recording, std::size_t touch);
@@ -60,9 +67,6 @@ std::vector<Press> presses_without(std::size_t fold, const std::vector<Press>& p
 /// Whether all presses are at known poses.
 bool at_known_poses(const std::vector<Press>& presses);
 
-/// @throws Error where some presses are at known poses and others are not
-void require_poses_of_one_kind(const std::vector<Press>& presses);
-
 /// Presses, and sentences about what seems wrong with them.
 struct CheckedPresses {
   std::vector<Press> presses;
@@ -79,5 +83,31 @@ CheckedPresses without_unknown(const std::vector<Press>& presses,
 /// @returns whole sentences; none where all is well
 std::vector<std::string> stuck_elements(const std::vector<Press>& presses, double threshold,
                                         std::span<const double> contact_pressures);
+
+/// A map that presses are compared with, and the presses that it was built from.
+struct TrainingMap {
+  OccupancyGrid map;
+  std::vector<std::size_t> presses = {};  ///< indices, ascending; none of a map from elsewhere
+
+  bool holds(std::size_t press) const { return std::ranges::binary_search(presses, press); }
+};
+
+/// The map that each press makes alone, see observed_map(), in the press's robot frame. Takes all
+/// host threads.
+/// @throws Error, naming the press, as observed_map() does
+std::vector<TrainingMap> maps_of_presses(const std::vector<Press>& presses,
+                                         const MapOptions& options);
+
+/// Maps of presses at known poses, in the object frame.
+struct MapsByFolds {
+  std::vector<TrainingMap> of_objects;  ///< of all presses of every object
+  /// For every object and every fold, see folds_of(), of the object's presses of the other folds.
+  std::vector<TrainingMap> without_folds;
+};
+/// Takes all host threads.
+/// @param presses at known poses, of one touch each
+/// @throws Error, naming the object, as observed_map() does
+MapsByFolds maps_by_folds(const std::vector<Press>& presses, const MapOptions& options,
+                          std::size_t folds);
 
 }  // namespace palpate

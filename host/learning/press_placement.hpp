@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "learning/training_maps.hpp"
+#include "learning/press.hpp"
 #include "model/map_likelihood.hpp"
 #include "model/touch_evidence.hpp"
 #include "palpate/contact_model.hpp"

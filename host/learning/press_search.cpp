@@ -1,3 +1,5 @@
+#include "learning/press_search.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -6,7 +8,6 @@
 
 #include <glm/geometric.hpp>
 
-#include "learning/press_fusion.hpp"
 #include "learning/press_placement.hpp"
 #include "model/bounding_box.hpp"
 #include "model/contact_readings.hpp"
@@ -54,13 +55,6 @@ struct PressSearch::SideScores {
   std::vector<float> bins;
 };
 
-/// A pose on the way to the best one.
-struct PressSearch::Summit {
-  const SideScores* of = nullptr;
-  Pose T_object_robot;
-  double log_likelihood = -std::numeric_limits<double>::infinity();
-};
-
 namespace {
 
 /// A pose so far beyond every map that only the map's prior counts there.
@@ -93,9 +87,16 @@ PoseLattice lattice_for(const PressSide& side, const Hypothesis& map, double ste
 
 }  // namespace
 
-PressSearch::PressSearch(const ContactModel& contact, double step_mm, int angles,
+PressSearch::PressSearch(const ContactModel& contact, double step_mm, double reach_mm,
                          double temperature)
-    : contact_(tabulated(contact)), step_mm_(step_mm), angles_(angles), temperature_(temperature) {}
+    : contact_(tabulated(contact)), step_mm_(step_mm), temperature_(temperature) {
+  // So many that the lattice moves a contact by about one and a half steps; the search climbs
+  // between them.
+  constexpr int fewest = 24;
+  constexpr int most = 48;
+  const double angles = std::ceil(2.0 * std::numbers::pi * reach_mm / (1.5 * step_mm));
+  angles_ = std::clamp(static_cast<int>(angles), fewest, most);
+}
 
 double PressSearch::gain(std::span<const TouchEvidence> press, const Hypothesis& map,
                          const Pose& T_object_robot) const {
@@ -103,39 +104,34 @@ double PressSearch::gain(std::span<const TouchEvidence> press, const Hypothesis&
   return placer.log_likelihood(press, T_object_robot) - placer.log_likelihood(press, beyond);
 }
 
-PressSearch::Summit PressSearch::climb(const Summit& start) const {
+Summit<Pose> PressSearch::top_near(const SideScores& scores, const Pose& start) const {
   constexpr int halvings = 3;
-  const std::span<const TouchEvidence> press = start.of->side.evidence();
-  const PressPlacer& placer = start.of->placer;
   double shift_mm = step_mm_ / 2.0;
   double turn_rad = std::numbers::pi / angles_;
-  Summit from = start;
-  from.log_likelihood = placer.log_likelihood(press, from.T_object_robot);
-  for (int halving = 0; halving < halvings;) {
-    Summit best = from;
+  const auto neighbours_of = [&](const Pose& at) {
+    std::vector<Pose> moved;
     for (const double sign : {-1.0, 1.0}) {
       for (const Pose& move : {Pose{{sign * shift_mm, 0.0}, 0.0}, Pose{{0.0, sign * shift_mm}, 0.0},
                                Pose{{0.0, 0.0}, sign * turn_rad}}) {
-        const Pose moved{from.T_object_robot.translation_mm + move.translation_mm,
-                         from.T_object_robot.theta_rad + move.theta_rad};
-        if (const double l = placer.log_likelihood(press, moved); l > best.log_likelihood) {
-          best.log_likelihood = l;
-          best.T_object_robot = moved;
-        }
+        moved.push_back({at.translation_mm + move.translation_mm, at.theta_rad + move.theta_rad});
       }
     }
-    if (best.log_likelihood > from.log_likelihood) {
-      from = best;
-    } else {
-      shift_mm /= 2.0;
-      turn_rad /= 2.0;
-      ++halving;
-    }
+    return moved;
+  };
+  const auto value_of = [&](const Pose& at) {
+    return scores.placer.log_likelihood(scores.side.evidence(), at);
+  };
+  Summit<Pose> top{start, value_of(start)};
+  for (int halving = 0; halving < halvings; ++halving) {
+    top = climb(top, neighbours_of, value_of);
+    shift_mm /= 2.0;
+    turn_rad /= 2.0;
   }
-  return from;
+  return top;
 }
 
-double PressSearch::certainty_of(const Summit& best, const std::vector<SideScores>& scores) const {
+double PressSearch::certainty_of(const Pose& best, const SideScores& on,
+                                 const std::vector<SideScores>& scores) const {
   constexpr double negligible = 20.0;  // e^-20: a million such places weigh 2e-3
   float highest = -std::numeric_limits<float>::infinity();
   for (const SideScores& of : scores) {
@@ -151,9 +147,9 @@ double PressSearch::certainty_of(const Summit& best, const std::vector<SideScore
       }
       const double weight = std::exp(-below);
       total += weight;
-      if (&of == best.of &&
+      if (&of == &on &&
           displacement_mm(of.side, of.lattice.T_object_robot(static_cast<std::int64_t>(bin)),
-                          best.T_object_robot) <= 2.0 * step_mm_) {
+                          best) <= 2.0 * step_mm_) {
         near += weight;
       }
     }
@@ -163,46 +159,48 @@ double PressSearch::certainty_of(const Summit& best, const std::vector<SideScore
 
 PressPlace PressSearch::best_place(const std::vector<PressSide>& sides,
                                    const Hypothesis& map) const {
+  struct Start {
+    const SideScores* on;
+    Summit<Pose> at;
+  };
   std::vector<SideScores> scores;
   scores.reserve(sides.size());
-  std::vector<Summit> summits;
+  std::vector<Start> best_at_angles;
   std::size_t places = 0;
   for (const PressSide& side : sides) {
     const PoseLattice lattice = lattice_for(side, map, step_mm_, angles_);
-    SideScores& of = scores.emplace_back(
+    SideScores& on = scores.emplace_back(
         SideScores{side, !scores.empty(), lattice, PressPlacer(map, contact_, lattice), {}});
-    of.bins = of.placer.log_likelihoods(side.evidence());
-    places += of.bins.size();
-    for (const std::size_t bin : best_bins(of.bins, lattice)) {
-      summits.push_back(
-          {&of, lattice.T_object_robot(static_cast<std::int64_t>(bin)), double{of.bins[bin]}});
+    on.bins = on.placer.log_likelihoods(side.evidence());
+    places += on.bins.size();
+    for (const std::size_t bin : best_bins(on.bins, lattice)) {
+      best_at_angles.push_back(
+          {&on, {lattice.T_object_robot(static_cast<std::int64_t>(bin)), on.bins[bin]}});
     }
   }
-  std::ranges::stable_sort(summits, std::ranges::greater{}, &Summit::log_likelihood);
+  std::ranges::stable_sort(best_at_angles, std::ranges::greater{},
+                           [](const Start& start) { return start.at.value; });
 
   constexpr std::size_t most_climbs = 2;
-  std::vector<Summit> starts;
-  for (const Summit& summit : summits) {
-    const bool near_another = std::ranges::any_of(starts, [&](const Summit& start) {
-      return start.of == summit.of && displacement_mm(summit.of->side, start.T_object_robot,
-                                                      summit.T_object_robot) < 2.0 * step_mm_;
+  std::vector<Start> starts;
+  for (const Start& start : best_at_angles) {
+    const bool near_another = std::ranges::any_of(starts, [&](const Start& other) {
+      return other.on == start.on &&
+             displacement_mm(start.on->side, other.at.place, start.at.place) < 2.0 * step_mm_;
     });
     if (!near_another && starts.size() < most_climbs) {
-      starts.push_back(summit);
+      starts.push_back(start);
     }
   }
-  Summit best;
-  for (const Summit& start : starts) {
-    const Summit top = climb(start);
-    if (top.log_likelihood > best.log_likelihood) {
-      best = top;
-    }
+  for (Start& start : starts) {
+    start.at = top_near(*start.on, start.at.place);
   }
-  return {.T_object_robot = best.T_object_robot,
-          .mirrored = best.of->mirrored,
-          .gain = best.log_likelihood -
-                  best.of->placer.log_likelihood(best.of->side.evidence(), beyond),
-          .certainty = certainty_of(best, scores),
+  const auto& [on, best] =
+      *std::ranges::max_element(starts, {}, [](const Start& start) { return start.at.value; });
+  return {.T_object_robot = best.place,
+          .mirrored = on->mirrored,
+          .gain = best.value - on->placer.log_likelihood(on->side.evidence(), beyond),
+          .certainty = certainty_of(best.place, *on, scores),
           .log_places = std::log(static_cast<double>(places))};
 }
 

@@ -9,9 +9,8 @@
 #include <fmt/format.h>
 
 #include "estimation/maps/left_out_fit.hpp"
-#include "learning/array_place.hpp"
-#include "learning/feature_learning.hpp"
 #include "learning/progress.hpp"
+#include "learning/setup_judge.hpp"
 #include "learning/temperature_fit.hpp"
 #include "model/element_spacing.hpp"
 #include "palpate/error.hpp"
@@ -40,26 +39,15 @@ double spacing_mm_of(const std::vector<Press>& presses) {
   return spacing_mm;
 }
 
-/// The bins for which touches at known poses are learned.
-RecognitionBins bins_for(const std::vector<Press>& presses, const SensorCalibrationOptions& options,
-                         double spacing_mm) {
-  const RecognitionBins bins =
-      options.bins.value_or(RecognitionBins{fine_lattice(presses, spacing_mm)});
-  bins.lattice.validate();
-  if (bins.auto_pivot) {
-    require_within(presses, bins.lattice);
-  }
-  return bins;
-}
-
-/// No more of these bins than touches are tried on in a short time.
-RecognitionBins affordable_bins(const RecognitionBins& bins, const LearnedPresses& learned,
-                                const SensorCalibrationOptions& options) {
+/// The bins' lattice, or as fine a one as touches are tried on in a short time.
+/// @param given whether a user gave the bins
+PoseLattice affordable(const CalibrationSettings& settings, const LearnedPresses& learned,
+                       bool given) {
   // Among the maps of folds, a touch is tried on the one that was built without it.
   std::map<std::string, std::size_t> maps_of;
   for (const TrainingMap& map : learned.maps) {
     std::size_t& count = maps_of[map.map.label];
-    count = map.presses.empty() ? std::min(count + 1, options.most_maps) : 1;
+    count = map.presses.empty() ? std::min(count + 1, settings.most_maps) : 1;
   }
   std::size_t maps = 0;
   for (const auto& [label, count] : maps_of) {
@@ -67,9 +55,9 @@ RecognitionBins affordable_bins(const RecognitionBins& bins, const LearnedPresse
   }
   const TrialCost cost{.maps = maps,
                        .spacing_mm = learned.readings.spacing_mm,
-                       .minutes = options.bins ? minutes_at_bins : minutes};
-  return {affordable_lattice(bins.lattice, learned.presses, learned.readings.classifier, cost),
-          bins.auto_pivot};
+                       .minutes = given ? minutes_at_bins : minutes};
+  return affordable_lattice(settings.bins->lattice, learned.presses, learned.readings.classifier,
+                            cost);
 }
 
 std::vector<std::string> labels_of(const std::vector<TrainingMap>& maps) {
@@ -84,14 +72,14 @@ std::vector<std::string> labels_of(const std::vector<TrainingMap>& maps) {
 std::vector<std::string> warnings_about(const LearnedPresses& learned) {
   std::vector<std::string> warnings = stuck_elements(
       learned.presses, learned.readings.classifier.threshold, learned.readings.pressures);
-  std::set<std::string> alone;
+  std::set<std::string> uncompared;
   for (const Press& press : learned.presses) {
-    alone.insert(press.label);
+    uncompared.insert(press.label);
   }
   for (const std::string& label : compared_labels(learned)) {
-    alone.erase(label);
+    uncompared.erase(label);
   }
-  for (const std::string& label : alone) {
+  for (const std::string& label : uncompared) {
     warnings.push_back(
         fmt::format("'{}': no touch has a map of the object that it is no part of, so that "
                     "nothing is learned of its readings; give it two touches{} or a map",
@@ -100,84 +88,65 @@ std::vector<std::string> warnings_about(const LearnedPresses& learned) {
   return warnings;
 }
 
-/// The sensor without what a table and its cross-validation say.
-LearnedSensor sensor_of(const LearnedReadings& readings, const std::string& pressure_unit,
-                        const std::optional<BinSteps>& bins) {
-  LearnedSensor sensor{
-      .pressure_unit = pressure_unit, .noise = readings.noise, .classifier = readings.classifier};
-  sensor.prior = readings.prior;
-  sensor.spread_mm = readings.spread_mm;
-  sensor.bins = bins;
-  return sensor;
-}
-
 /// Gamma by the placed presses, counted over log odds.
 double gamma_of(const PlacedPresses& placed, const TableLearning& table,
                 const LearnedPresses& learned) {
-  TableLearning how = table;
-  how.layer = {.near_mm = table.layer.near_mm, .far_mm = table.layer.far_mm};
-  how.level_edges.clear();
-  how.counted_within = {};  // gamma is of the sensor, whatever the bins
+  TableLearning settings = table;
+  settings.layer = {.near_mm = table.layer.near_mm, .far_mm = table.layer.far_mm};
+  settings.level_edges.clear();
+  settings.counted_within = {};  // gamma is of the sensor, whatever the bins
   LevelCounts all(2);
-  for (const auto& [label, counts] :
-       count_placed(placed.placements, learned.presses, layers_of(learned.maps, how.layer), how)) {
+  for (const auto& [label, counts] : count_placed(
+           placed.placements, learned.presses, layers_of(learned.maps, settings.layer), settings)) {
     all += counts;
   }
-  return fit_gamma(all, learned.readings.prior);
+  return fit_gamma(all, learned.readings.maps.sensor.prior);
 }
 
 /// A table, and what it says of presses that it has not seen.
-struct TriedModel {
+struct TriedModel : CrossValidation {
   TableKind kind;
-  TableLearning how;
+  TableLearning learning;
   PlacedPresses placed;
-  std::vector<HeldOut> unknowns = {};
-  std::vector<HeldOut> after = {};  ///< with temperature and features
-  std::vector<PlaceError> place_errors = {};
+  std::vector<HeldOut> after = {};  ///< the unknowns with temperature and features
 };
 
 /// What is tried on presses that it has not seen.
 struct Trials {
   std::vector<TriedModel> tables;
-  std::vector<HeldOut> eq7;
+  CrossValidation eq7;
 };
 
 /// Learns each table from all presses, and tries every fold's presses on the models_of() the
 /// others.
 Trials cross_validate(const LearnedPresses& learned, const std::vector<std::string>& labels,
-                      const std::vector<TableKind>& tables, const ModelLearning& how,
-                      const CrossValidationOptions& options,
+                      const CalibrationSettings& settings,
                       const std::function<void(double)>& progress) {
-  const auto count = static_cast<double>(tables.size());
-  const auto folds = static_cast<double>(options.folds);
+  const auto count = static_cast<double>(settings.tables.size());
+  const auto folds = static_cast<double>(settings.folds);
   Progress work(count * (1.0 + folds) * table_cost + count + 1.0, progress);
   Trials trials;
-  for (const TableKind& kind : tables) {
-    TriedModel& one =
-        trials.tables.emplace_back(TriedModel{kind, table_learning(kind, learned, how), {}});
-    one.placed = learn_table(learned.presses, learned.maps, one.how, work.part(table_cost));
+  for (const TableKind& kind : settings.tables) {
+    TriedModel& one = trials.tables.emplace_back(
+        TriedModel{{}, kind, table_learning(kind, learned, settings), {}});
+    one.placed = learn_table(learned.presses, learned.maps, one.learning, work.part(table_cost));
   }
-  std::vector<CrossValidation> found(tables.size() + 1);  // of Eq. 7 last
-  for (std::size_t fold = 0; fold < options.folds; ++fold) {
-    const std::vector<Press> others = presses_without(fold, learned.presses, options.folds);
+  for (std::size_t fold = 0; fold < settings.folds; ++fold) {
+    const std::vector<Press> others = presses_without(fold, learned.presses, settings.folds);
     const auto show_learning = work.part(count * table_cost);
     if (others.size() == learned.presses.size()) {  // there are fewer groups than folds
       work.part((count + 1.0) / folds)(1.0);
       continue;
     }
-    const std::vector<FoldModel> models = models_of(others, tables, how, show_learning);
+    const std::vector<FoldModel> models = models_of(others, settings, show_learning);
     for (std::size_t i = 0; i < models.size(); ++i) {
-      found[i] +=
-          try_fold(fold, learned.presses, labels, models[i], options, work.part(1.0 / folds));
+      CrossValidation& found = i < trials.tables.size() ? trials.tables[i] : trials.eq7;
+      found += try_fold(fold, learned.presses, labels, models[i], settings, work.part(1.0 / folds));
     }
   }
-  for (std::size_t i = 0; i < tables.size(); ++i) {
-    TriedModel& one = trials.tables[i];
-    one.unknowns = std::move(found[i].unknowns);
-    one.place_errors = std::move(found[i].place_errors);
+  for (TriedModel& one : trials.tables) {
     one.after = tempered_by_folds(one.unknowns);
   }
-  trials.eq7 = std::move(found.back().unknowns);
   return trials;
 }
 
@@ -189,7 +158,7 @@ const TriedModel& kept(const std::vector<TriedModel>& tried,
   };
   const TriedModel* best = &tried.front();
   for (const TriedModel& one : tried) {
-    best = is_clearly_less(losses(one), losses(*best)) ? &one : best;
+    best = difference_of(losses(one), losses(*best)).is_clear() ? &one : best;
   }
   return *best;
 }
@@ -243,45 +212,22 @@ std::optional<FitScale> fit_scale_of(std::span<const HeldOut> unknowns,
   return scale;
 }
 
-/// The scores of groups; none where there are no groups.
-std::optional<GroupScores> group_scores_of(std::span<const HeldOut> eq7,
-                                           std::span<const HeldOut> table,
-                                           std::span<const HeldOut> after) {
-  const auto scores = [](std::span<const HeldOut> all) { return scores_of(groups_in(all), 1.0); };
-  if (groups_in(after).empty()) {
-    return {};
-  }
-  return GroupScores{presses_in_group, scores(eq7), scores(table), scores(after)};
-}
-
-/// Warns where Eq. 7 with a temperature is clearly better about presses than the table is; what few
-/// presses could show by chance is no warning.
-std::optional<std::string> warning_of_loss(std::span<const HeldOut> eq7,
-                                           std::span<const HeldOut> after) {
-  const std::vector<HeldOut> without = tempered_by_folds(alone(eq7));
-  if (!is_clearly_less(losses_of(without), losses_of(after))) {
-    return {};
-  }
-  return fmt::format(
-      "on touches that it has not seen, the learned table has a log-loss of {:.3f}, worse than "
-      "{:.3f} by Eq. 7 with a temperature: give more touches of each object, or recognize without "
-      "the sensor model",
-      scores_of(alone(after), 1.0).log_loss, scores_of(without, 1.0).log_loss);
-}
-
 /// Adds how right the cross-validation is: each fold's presses are judged by the table that the
 /// other folds keep.
 void judge(const Trials& trials, std::size_t folds, bool known_poses, SensorCalibration& judged) {
-  const std::vector<HeldOut>& eq7 = trials.eq7;
+  const std::vector<HeldOut>& eq7 = trials.eq7.unknowns;
   const auto table = said_by_kept(trials.tables, folds, &TriedModel::unknowns);
   const auto after = said_by_kept(trials.tables, folds, &TriedModel::after);
   for (const TriedModel& one : trials.tables) {
-    judged.tried.push_back({one.kind, scores_of(alone(one.after), 1.0).log_loss});
+    judged.tried.push_back({one.kind, scores_of(single_touches(one.after), 1.0).log_loss});
   }
-  judged.before = scores_of(alone(eq7), 1.0);
-  judged.table = scores_of(alone(table), 1.0);
-  judged.after = scores_of(alone(after), 1.0);
-  judged.groups = group_scores_of(eq7, table, after);
+  judged.before = scores_of(single_touches(eq7), 1.0);
+  judged.table = scores_of(single_touches(table), 1.0);
+  judged.after = scores_of(single_touches(after), 1.0);
+  if (!groups_in(after).empty()) {
+    const auto scores = [](std::span<const HeldOut> all) { return scores_of(groups_in(all), 1.0); };
+    judged.groups = GroupScores{presses_in_group, scores(eq7), scores(table), scores(after)};
+  }
   if (judged.groups || !known_poses) {
     judged.gain = gain_of(eq7, after);
   } else {
@@ -291,8 +237,14 @@ void judge(const Trials& trials, std::size_t folds, bool known_poses, SensorCali
                     "object",
                     presses_in_group, presses_in_group * folds));
   }
-  if (const auto warning = warning_of_loss(eq7, after)) {
-    judged.warnings.push_back(*warning);
+  // What few presses could show by chance is no warning.
+  const std::vector<HeldOut> without = tempered_by_folds(single_touches(eq7));
+  if (difference_of(losses_of(without), losses_of(after)).is_clear()) {
+    judged.warnings.push_back(fmt::format(
+        "on touches that it has not seen, the learned table has a log-loss of {:.3f}, worse than "
+        "{:.3f} by Eq. 7 with a temperature: give more touches of each object, or recognize "
+        "without the sensor model",
+        judged.after->log_loss, scores_of(without, 1.0).log_loss));
   }
 }
 
@@ -300,25 +252,12 @@ void judge(const Trials& trials, std::size_t folds, bool known_poses, SensorCali
 void set_numbers(const TriedModel& model, const LearnedPresses& learned, LearnedSensor& sensor) {
   const TemperatureFit fit = fit_temperature(model.unknowns);
   sensor.table = model.placed.table;
-  sensor.gamma = gamma_of(model.placed, model.how, learned);
+  sensor.gamma = gamma_of(model.placed, model.learning, learned);
   sensor.temperature = fit.temperature;
   sensor.temperature_growth = fit.growth;
   sensor.features = features_of(learned, fit.feature_weight);
   sensor.fit_scale = fit_scale_of(model.unknowns, learned.presses);
   sensor.pose_scale = pose_scale_of(model.place_errors);
-}
-
-/// The calibration of the sensor with one table, of which nothing can be judged.
-SensorCalibration of_one_object(SensorCalibration calibration, const LearnedPresses& learned,
-                                const TableLearning& table,
-                                const std::function<void(double)>& progress) {
-  const PlacedPresses placed = learn_table(learned.presses, learned.maps, table, progress);
-  calibration.sensor.table = placed.table;
-  calibration.sensor.gamma = gamma_of(placed, table, learned);
-  calibration.warnings.emplace_back(
-      "touches of one object say nothing about confidence: the temperature stays 1, and "
-      "press features are not learned; give touches of two objects or more");
-  return calibration;
 }
 
 }  // namespace
@@ -331,62 +270,67 @@ std::vector<TableKind> default_tables(bool known_poses) {
 
 SensorCalibration calibrate_sensor(const std::vector<Press>& given_presses,
                                    const std::vector<OccupancyGrid>& given,
-                                   const SensorCalibrationOptions& options,
+                                   const CalibrationSettings& options,
                                    const std::function<void(double)>& progress) {
   if (given_presses.empty()) {
     throw Error(Fault::input, "no touches; give recordings with touches");
   }
-  require_poses_of_one_kind(given_presses);
   const bool known_poses = at_known_poses(given_presses);
-  const std::vector<TableKind> tables =
-      options.tables.empty() ? default_tables(known_poses) : options.tables;
-  ModelLearning how{.readings = {.pressure_unit = options.pressure_unit,
-                                 .threshold = options.threshold,
-                                 .ratio = options.ratio,
-                                 .spacing_mm = spacing_mm_of(given_presses),
-                                 .maps = options.maps},
-                    .folds = options.folds};
+  CalibrationSettings settings = options;
+  settings.readings.spacing_mm = spacing_mm_of(given_presses);
+  if (settings.tables.empty()) {
+    settings.tables = default_tables(known_poses);
+  }
   for (const OccupancyGrid& map : given) {
-    how.given.push_back({map});
+    settings.given.push_back({map});
   }
 
   std::optional<SetupFinding> array_offset;
   if (known_poses && std::ranges::any_of(given, &OccupancyGrid::drawn)) {
     array_offset = offset_on_drawings(given_presses, given,
-                                      learn_readings(given_presses, how.readings).classifier);
+                                      learn_readings(given_presses, settings.readings).classifier);
   }
   const std::vector<Press> presses =
       array_offset ? with_offset(given_presses, *array_offset->array_offset) : given_presses;
-  const LearnedReadings readings = learn_readings(presses, how.readings);
+  const LearnedReadings readings = learn_readings(presses, settings.readings);
   const CheckedPresses checked = without_unknown(presses, readings.classifier);
-  std::optional<RecognitionBins> bins;
   if (known_poses) {
-    bins = bins_for(checked.presses, options, readings.spacing_mm);
-    const PoseLattice& lattice = bins->lattice;
-    how.bins = {lattice.x_mm.step(), lattice.y_mm.step(), lattice.theta_rad.step()};
+    settings.bins = options.bins.value_or(
+        RecognitionBins{fine_lattice(checked.presses, settings.readings.spacing_mm)});
+    const PoseLattice& lattice = settings.bins->lattice;
+    lattice.validate();
+    if (settings.bins->auto_pivot) {
+      require_within(checked.presses, lattice);
+    }
+    settings.steps = {lattice.x_mm.step(), lattice.y_mm.step(), lattice.theta_rad.step()};
   }
-  const LearnedPresses learned = with_maps(checked.presses, readings, how);
+  const LearnedPresses learned = with_maps(checked.presses, readings, settings);
   const std::vector<std::string> labels = labels_of(learned.maps);
-  SensorCalibration calibration{.sensor = sensor_of(readings, options.pressure_unit, how.bins),
-                                .maps = readings.maps(),
+  SensorCalibration calibration{.sensor = {.pressure_unit = settings.readings.pressure_unit,
+                                           .noise = readings.noise,
+                                           .classifier = readings.classifier,
+                                           .prior = readings.maps.sensor.prior,
+                                           .spread_mm = readings.maps.sensor.spread_mm,
+                                           .bins = settings.steps},
+                                .maps = readings.maps,
                                 .array_offset = std::move(array_offset),
                                 .objects = labels.size(),
                                 .warnings = checked.warnings};
   std::ranges::copy(warnings_about(learned), std::back_inserter(calibration.warnings));
   if (labels.size() < 2) {
-    return of_one_object(std::move(calibration), learned,
-                         table_learning(tables.back(), learned, how), progress);
+    const TableLearning table = table_learning(settings.tables.back(), learned, settings);
+    const PlacedPresses placed = learn_table(learned.presses, learned.maps, table, progress);
+    calibration.sensor.table = placed.table;
+    calibration.sensor.gamma = gamma_of(placed, table, learned);
+    calibration.warnings.emplace_back(
+        "touches of one object say nothing about confidence: the temperature stays 1, and "
+        "press features are not learned; give touches of two objects or more");
+    return calibration;
   }
-
-  if (bins) {
-    bins = affordable_bins(*bins, learned, options);
+  if (known_poses) {
+    settings.bins->lattice = affordable(settings, learned, options.bins.has_value());
   }
-  const Trials trials = cross_validate(learned, labels, tables, how,
-                                       {.folds = options.folds,
-                                        .maps_per_object = options.most_maps,
-                                        .bins = bins,
-                                        .spacing_mm = readings.spacing_mm},
-                                       progress);
+  const Trials trials = cross_validate(learned, labels, settings, progress);
   set_numbers(kept(trials.tables), learned, calibration.sensor);
   judge(trials, options.folds, known_poses, calibration);
   return calibration;

@@ -7,29 +7,11 @@
 #include <vector>
 
 #include "learning/cross_validation.hpp"
-#include "learning/sensor_gain.hpp"
 #include "palpate/learned_sensor.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/setup_finding.hpp"
 
 namespace palpate {
-
-/// What a calibration starts from.
-struct SensorCalibrationOptions {
-  std::string pressure_unit = "kPa";
-  std::optional<double> threshold;  ///< learned where there is none
-  std::optional<double> ratio;      ///< learned where there is none
-  /// Tables to try, the simplest first; none stands for default_tables(). With one object there is
-  /// nothing to compare by, and the last is taken.
-  std::vector<TableKind> tables = {};
-  std::size_t folds = 5;      ///< of the cross-validation, at least 2
-  std::size_t most_maps = 5;  ///< of an object, in the cross-validation
-  /// Bins on which unknowns will be recognised, for touches at known poses; none stands for bins
-  /// half the elements' spacing and 5 degrees wide, about the array's centre.
-  std::optional<RecognitionBins> bins = {};
-  /// How the maps are built that unknowns will be recognised with; none: as ReadingOptions::maps.
-  std::optional<MapOptions> maps = {};
-};
 
 /// Touches at known poses have a table of seven levels over the mean pressure, which also tells
 /// where between the elements an edge lies. Presses at unknown poses have a table of contact over
@@ -97,12 +79,12 @@ struct SensorCalibration {
 /// @param presses all at known poses or all at unknown ones
 /// @param given maps to compare presses with, with their mean level where a table is over that;
 /// without: maps of other presses
-/// @throws Error where no press has a map of its object that it is no part of, on poses some of
-/// which are known, where presses tell no threshold or have no pressure above it, and as
-/// observed_map() and learn_table() do; what `progress` throws
+/// @throws Error where no press has a map of its object that it is no part of, where presses tell
+/// no threshold or have no pressure above it, and as observed_map() and learn_table() do; what
+/// `progress` throws
 SensorCalibration calibrate_sensor(const std::vector<Press>& presses,
                                    const std::vector<OccupancyGrid>& given,
-                                   const SensorCalibrationOptions& options,
+                                   const CalibrationSettings& options,
                                    const std::function<void(double)>& progress = {});
 
 }  // namespace palpate

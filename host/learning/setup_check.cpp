@@ -12,9 +12,8 @@
 #include <fmt/ranges.h>
 #include <glm/geometric.hpp>
 
-#include "learning/array_place.hpp"
-#include "learning/element_order.hpp"
-#include "learning/mount_search.hpp"
+#include "learning/press.hpp"
+#include "learning/progress.hpp"
 #include "learning/setup_judge.hpp"
 #include "model/bounding_box.hpp"
 #include "model/map_likelihood.hpp"
@@ -138,8 +137,7 @@ void search_widely(SetupJudge& judge, Setup& setup, SetupCheck& check) {
   if (!best) {
     return;
   }
-  const auto placed_best = [&](const Setup& from) {
-    Setup at = from;
+  const auto placed_best = [&](Setup at) {
     for (glm::dvec2& p : at.elements_mm) {
       p = best->mount.offset * p;
     }
@@ -159,7 +157,6 @@ void search_widely(SetupJudge& judge, Setup& setup, SetupCheck& check) {
     check.findings.push_back(order_finding(best->order.options, nats - placed_best(as_given)));
   }
   setup = found;
-  check.elements_mm = setup.elements_mm;
   nats = judge.nats(setup);
   check_offset(judge, setup, nats, check, best->mount.offset);
   check_pitch(judge, setup, nats, check);
@@ -255,22 +252,12 @@ void check_touches(SetupJudge& judge, Setup& setup, SetupCheck& check) {
 
 /// Every so many touches of a recording, so that there are at most `most`.
 Recording thinned(const Recording& recording, std::size_t most) {
-  const std::size_t e = recording.elements();
+  ObjectTouches few{recording.object, {}};
   const std::size_t every = (recording.size() + most - 1) / most;
-  Recording few{.path = recording.path,
-                .object = recording.object,
-                .pressure_unit = recording.pressure_unit,
-                .elements_mm = recording.elements_mm};
   for (std::size_t i = 0; i < recording.size(); i += every) {
-    const Touch touch = recording.touch(i);
-    few.T_robot_sensor.push_back(touch.T_robot_sensor);
-    few.pressure.insert(few.pressure.end(), touch.pressure.begin(), touch.pressure.end());
-    few.valid.insert(few.valid.end(), touch.valid.begin(), touch.valid.end());
+    few.touches.push_back(recording.touch(i));
   }
-  if (few.valid.size() != few.size() * e) {
-    few.valid.clear();
-  }
-  return few;
+  return gathered(few, recording.pressure_unit);
 }
 
 /// What the recordings' logs showed.
@@ -304,8 +291,8 @@ std::optional<SetupFinding> suspected_order(Device& device, std::span<const Reco
   if (few.empty()) {
     return {};
   }
-  SetupCheck check{.elements_mm = few.front().elements_mm};
-  Setup setup{.elements_mm = check.elements_mm};
+  SetupCheck check;
+  Setup setup{.elements_mm = few.front().elements_mm};
   try {
     SetupJudge judge(device, few, options);
     if (!at_one_place(judge, setup)) {
@@ -331,12 +318,9 @@ SetupCheck check_setup(Device& device, std::span<const Recording> recordings,
                               recording.path));
     }
   }
-  const auto show = [&](double fraction) {
-    if (progress) {
-      progress(fraction);
-    }
-  };
-  SetupCheck check{.elements_mm = recordings.front().elements_mm};
+  const auto show = Progress(1.0, progress).part(1.0);
+  const Setup given{.elements_mm = recordings.front().elements_mm};
+  SetupCheck check{.elements_mm = given.elements_mm};
   const std::vector<SetupFinding> logged = findings_of_logs(recordings);
   std::optional<SetupJudge> some_judge;
   try {
@@ -351,7 +335,6 @@ SetupCheck check_setup(Device& device, std::span<const Recording> recordings,
     return check;
   }
   SetupJudge& judge = *some_judge;
-  const Setup given{.elements_mm = check.elements_mm};
   Setup setup = given;
   SetupFit fit;
   const auto judged = [&] {
@@ -377,17 +360,18 @@ SetupCheck check_setup(Device& device, std::span<const Recording> recordings,
   }
   show(0.5);
   if (!judged() && moved) {
-    check = {.remarks = std::move(check.remarks), .elements_mm = given.elements_mm};
+    check = {.remarks = std::move(check.remarks)};
     setup = given;
     search_widely(judge, setup, check);
     show(0.9);
     if (!judged()) {
       check = {.findings = {unexplained(fit)},
                .remarks = std::move(check.remarks),
-               .elements_mm = given.elements_mm,
                .touches = check.touches};
+      setup = given;
     }
   }
+  check.elements_mm = setup.elements_mm;
   check.findings.insert(check.findings.end(), logged.begin(), logged.end());
   return check;
 }

@@ -6,10 +6,9 @@
 #include <limits>
 #include <optional>
 #include <set>
-#include <string>
 #include <utility>
 
-#include "learning/golden_section.hpp"
+#include "learning/local_search.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
@@ -18,39 +17,9 @@ namespace {
 
 constexpr double most_temperature = 1e6;
 
-double log_sum_exp(std::span<const double> nats) {
-  const double largest = *std::ranges::max_element(nats);
-  double sum = 0.0;
-  for (const double x : nats) {
-    sum += std::exp(x - largest);
-  }
-  return largest + std::log(sum);
-}
-
-/// Logarithms of the labels' probabilities.
-std::vector<double> log_probabilities(const HeldOut& press, double temperature,
-                                      double feature_weight) {
-  std::vector<double> nats = press.log_evidence;
-  for (std::size_t i = 0; i < nats.size(); ++i) {
-    nats[i] /= temperature;
-    nats[i] += press.log_density.empty() ? 0.0 : feature_weight * press.log_density[i];
-  }
-  const double sum = log_sum_exp(nats);
-  for (double& x : nats) {
-    x -= sum;
-  }
-  return nats;
-}
-
 /// -log of the label's probability.
 double loss_of(const HeldOut& press, double temperature, double feature_weight) {
   return -log_probabilities(press, temperature, feature_weight)[press.truth];
-}
-
-void require_presses(std::span<const HeldOut> presses) {
-  if (presses.empty()) {
-    throw Error(Fault::input, "calibration: no presses to try the model on; give more presses");
-  }
 }
 
 /// By how much one label's number exceeds the best other's.
@@ -123,12 +92,12 @@ class PressLoss {
 
   /// The fit by the evidence and the features.
   TemperatureFit of_both() const {
-    const double alone = of_evidence().temperature;
+    const double by_evidence = of_evidence().temperature;
     // The least loss at each weight has one minimum along it.
     constexpr double most_weight = 2.0;
     const double weight = least_place(
-        0.0, most_weight, [&](double w) { return loss(best_temperature(w, alone), w); });
-    return {.temperature = best_temperature(weight, alone), .feature_weight = weight};
+        0.0, most_weight, [&](double w) { return loss(best_temperature(w, by_evidence), w); });
+    return {.temperature = best_temperature(weight, by_evidence), .feature_weight = weight};
   }
 
  private:
@@ -213,33 +182,11 @@ double fit_growth(std::span<const HeldOut> all, const TemperatureFit& fit) {
 
 }  // namespace
 
-std::vector<double> press_probabilities(const HeldOut& press, double temperature,
-                                        double feature_weight) {
-  std::vector<double> p = log_probabilities(press, temperature, feature_weight);
-  for (double& x : p) {
-    x = std::exp(x);
-  }
-  return p;
-}
-
-Scores scores_of(std::span<const HeldOut> presses, double temperature, double feature_weight) {
-  require_presses(presses);
-  std::vector<JudgedRecord> records;
-  for (const HeldOut& press : presses) {
-    const std::vector<double> p = press_probabilities(press, temperature, feature_weight);
-    JudgedRecord record{.truth = std::to_string(press.truth)};
-    for (std::size_t label = 0; label < p.size(); ++label) {
-      record.identity[std::to_string(label)] = p[label];
-    }
-    record.best = std::to_string(std::ranges::max_element(p) - p.begin());
-    records.push_back(std::move(record));
-  }
-  return evaluate(records).all;
-}
-
 TemperatureFit fit_temperature(std::span<const HeldOut> all) {
-  const std::vector<HeldOut> presses = alone(all);
-  require_presses(presses);
+  const std::vector<HeldOut> presses = single_touches(all);
+  if (presses.empty()) {
+    throw Error(Fault::input, "calibration: no presses to try the model on; give more presses");
+  }
   const PressLoss loss(presses);
   TemperatureFit fit =
       loss.has_features() && features_help(presses) ? loss.of_both() : loss.of_evidence();
@@ -249,7 +196,7 @@ TemperatureFit fit_temperature(std::span<const HeldOut> all) {
 
 std::vector<HeldOut> tempered_by_folds(std::span<const HeldOut> all) {
   std::vector<HeldOut> tempered(all.begin(), all.end());
-  const std::vector<HeldOut> presses = alone(all);
+  const std::vector<HeldOut> presses = single_touches(all);
   for (const std::size_t fold : folds_in(presses)) {
     const std::vector<HeldOut> others = of_fold(presses, fold, false);
     TemperatureFit fit =
@@ -265,29 +212,6 @@ std::vector<HeldOut> tempered_by_folds(std::span<const HeldOut> all) {
     }
   }
   return tempered;
-}
-
-bool LossDifference::is_clear() const {
-  constexpr double rounding = 1e-9;
-  return mean > std::max(rounding, 2.0 * standard_error);
-}
-
-LossDifference difference_of(std::span<const double> losses, std::span<const double> others) {
-  const auto n = static_cast<double>(losses.size());
-  double mean = 0.0;
-  for (std::size_t i = 0; i < losses.size(); ++i) {
-    mean += (others[i] - losses[i]) / n;
-  }
-  double variance = 0.0;
-  for (std::size_t i = 0; i < losses.size(); ++i) {
-    const double apart = others[i] - losses[i] - mean;
-    variance += apart * apart / std::max(1.0, n - 1.0);
-  }
-  return {mean, std::sqrt(variance / n)};
-}
-
-bool is_clearly_less(std::span<const double> losses, std::span<const double> others) {
-  return difference_of(losses, others).is_clear();
 }
 
 }  // namespace palpate

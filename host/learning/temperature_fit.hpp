@@ -6,17 +6,8 @@
 
 #include "learning/held_out.hpp"
 #include "palpate/learned_sensor.hpp"
-#include "recognition/evaluation.hpp"
 
 namespace palpate {
-
-/// Probabilities of the labels: proportional to evidence^(1 / temperature) * density^weight.
-std::vector<double> press_probabilities(const HeldOut& press, double temperature,
-                                        double feature_weight = 0.0);
-
-/// How right and how honest the probabilities of presses are; see evaluate().
-/// @throws Error on no press
-Scores scores_of(std::span<const HeldOut> presses, double temperature, double feature_weight = 0.0);
 
 /// See LearnedSensor::temperature.
 struct TemperatureFit {
@@ -52,16 +43,5 @@ TemperatureFit fit_temperature(std::span<const HeldOut> all);
 /// half.
 /// @throws Error as fit_temperature()
 std::vector<HeldOut> tempered_by_folds(std::span<const HeldOut> all);
-
-/// By how much more the second of two models loses on the same presses.
-struct LossDifference {
-  double mean = 0.0;
-  double standard_error = 0.0;
-  /// Whether the first loses less beyond chance: by more than two standard errors.
-  bool is_clear() const;
-};
-LossDifference difference_of(std::span<const double> losses, std::span<const double> others);
-/// LossDifference::is_clear()
-bool is_clearly_less(std::span<const double> losses, std::span<const double> others);
 
 }  // namespace palpate

@@ -1,77 +1,50 @@
 #include "learning/touch_alignment.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <limits>
+#include <cstdint>
 #include <utility>
 #include <vector>
 
 #include <tbb/parallel_for.h>
+#include <glm/common.hpp>
+#include <glm/exponential.hpp>
 #include <glm/geometric.hpp>
 
-#include "learning/predictive_map.hpp"
+#include "learning/local_search.hpp"
 #include "learning/progress.hpp"
+#include "model/bounding_box.hpp"
 
 namespace palpate {
 
 namespace {
 
 /// x and y in mm and an angle in rad.
-using Axes = std::array<double, 3>;
-
-Pose pose_of(const Axes& at) { return {{at[0], at[1]}, at[2]}; }
-
-struct Moments {
-  Axes mean{};
-  Axes variance{};
-};
+Pose pose_of(const glm::dvec3& at) { return {{at.x, at.y}, at.z}; }
 
 /// Points about a centre, equally far apart along each axis: `steps` to either side.
 struct Grid {
-  Axes centre{};
-  Axes half{};  ///< 0: one point along this axis
+  glm::dvec3 centre{0.0};
+  glm::dvec3 half{0.0};  ///< 0: one point along this axis
   int steps = 0;
 };
 
 /// The mean and variance of a displacement under prior times likelihood, over the points of a grid.
 template <typename LogLikelihood>
-Moments moments(const Grid& grid, const Axes& prior_sd, const LogLikelihood& log_likelihood) {
-  std::vector<std::pair<Axes, double>> points;
-  double most = -std::numeric_limits<double>::infinity();
-  const auto last = [&](std::size_t axis) { return grid.half[axis] > 0.0 ? grid.steps : 0; };
-  for (int a = -last(2); a <= last(2); ++a) {
-    for (int y = -last(1); y <= last(1); ++y) {
-      for (int x = -last(0); x <= last(0); ++x) {
-        const Axes index{static_cast<double>(x), static_cast<double>(y), static_cast<double>(a)};
-        Axes at = grid.centre;
-        double nats = 0.0;
-        for (std::size_t k = 0; k < 3; ++k) {
-          at[k] += grid.half[k] * index[k] / grid.steps;
-          const double z = prior_sd[k] > 0.0 ? at[k] / prior_sd[k] : 0.0;
-          nats -= 0.5 * z * z;
-        }
-        nats += log_likelihood(pose_of(at));
-        most = std::max(most, nats);
-        points.emplace_back(at, nats);
-      }
-    }
-  }
-  Moments result;
-  double sum = 0.0;
-  for (const auto& [at, nats] : points) {
-    const double weight = std::exp(nats - most);
-    sum += weight;
-    for (std::size_t k = 0; k < 3; ++k) {
-      result.mean[k] += weight * at[k];
-      result.variance[k] += weight * at[k] * at[k];
-    }
-  }
-  for (std::size_t k = 0; k < 3; ++k) {
-    result.mean[k] /= sum;
-    result.variance[k] = std::max(0.0, result.variance[k] / sum - result.mean[k] * result.mean[k]);
-  }
-  return result;
+Moments moments(const Grid& grid, const glm::dvec3& prior_sd, const LogLikelihood& log_likelihood) {
+  std::vector<std::pair<glm::dvec3, double>> points;
+  const auto steps = [&](double half) { return half > 0.0 ? grid.steps : 0; };
+  visit_grid({steps(grid.half.x), steps(grid.half.y), steps(grid.half.z)},
+             [&](const glm::dvec3& index) {
+               const glm::dvec3 at = grid.centre + grid.half * index / (1.0 * grid.steps);
+               double nats = 0.0;
+               for (int k = 0; k < 3; ++k) {
+                 const double z = prior_sd[k] > 0.0 ? at[k] / prior_sd[k] : 0.0;
+                 nats -= 0.5 * z * z;
+               }
+               points.emplace_back(at, nats + log_likelihood(pose_of(at)));
+             });
+  return Moments(points);
 }
 
 /// The posterior of a displacement: over the prior's width, then about what is found there.
@@ -79,17 +52,12 @@ template <typename LogLikelihood>
 Moments posterior(const DisplacementSd& sd, const LogLikelihood& log_likelihood) {
   constexpr double reach = 2.4;       // in standard deviations
   constexpr double least_step = 0.2;  // of the wide grid's: it tells no smaller deviation
-  const Axes prior_sd{sd.mm, sd.mm, sd.rad};
-  Grid wide{.steps = 4};
-  for (std::size_t k = 0; k < 3; ++k) {
-    wide.half[k] = reach * prior_sd[k];
-  }
+  const glm::dvec3 prior_sd{sd.mm, sd.mm, sd.rad};
+  const Grid wide{.half = reach * prior_sd, .steps = 4};
   const Moments rough = moments(wide, prior_sd, log_likelihood);
   Grid near{.centre = rough.mean, .steps = 3};
-  for (std::size_t k = 0; k < 3; ++k) {
-    const double step = wide.half[k] / wide.steps;
-    near.half[k] = std::max(2.0 * std::sqrt(rough.variance[k]), near.steps * least_step * step);
-  }
+  near.half = glm::max(2.0 * glm::sqrt(rough.variance),
+                       near.steps * least_step * (wide.half / (1.0 * wide.steps)));
   return moments(near, prior_sd, log_likelihood);
 }
 
@@ -195,6 +163,92 @@ DisplacementSd pooled(std::span<const ObjectTouches> objects,
 }
 
 }  // namespace
+
+PredictiveMap::PredictiveMap(std::span<const Touch> touches, const MapOptions& options)
+    : options_(options) {
+  contact_.prior = options.sensor.prior;
+  BoundingBox box;
+  for (const Touch& touch : touches) {
+    Touch in_sensor_frame = touch;
+    in_sensor_frame.T_robot_sensor = {};
+    Part& part = touches_.emplace_back();
+    part.known = known_readings(in_sensor_frame, options.classifier);
+    for (const ElementReading& element : part.known) {
+      box.take_in(touch.T_robot_sensor * element.position_mm);
+    }
+  }
+  constexpr double tolerance = 1e-3;  // nats
+  constexpr int nodes = 1024;         // increments between them are linear within 1e-4 nats
+  radius_mm_ = options.sensor.support_radius_mm(1, tolerance);
+  for (const Reading reading : {Reading::no_contact, Reading::in_contact}) {
+    for (int node = 0; node <= nodes + 1; ++node) {
+      increments_[is_contact(reading) ? 1 : 0].push_back(
+          options.sensor.increment(reading, radius_mm_ * std::sqrt(node / double{nodes})));
+    }
+  }
+  if (!box.empty()) {
+    cells_ = cover(box.lower, box.upper, radius_mm_, options.cell_mm);
+  }
+  log_odds_.assign(static_cast<std::size_t>(cells_.nx * cells_.ny),
+                   log_odds_from_probability(options.sensor.prior));
+  for (std::size_t i = 0; i < touches.size(); ++i) {
+    put_in(i, touches[i].T_robot_sensor);
+  }
+}
+
+void PredictiveMap::take_out(std::size_t touch) {
+  for (const auto& [cell, increment] : touches_[touch].added) {
+    log_odds_[cell] -= increment;
+  }
+  touches_[touch].added.clear();
+}
+
+void PredictiveMap::put_in(std::size_t touch, const Pose& T_robot_sensor) {
+  Part& part = touches_[touch];
+  for (const ElementReading& element : part.known) {
+    visit_near(cells_, options_.cell_mm, T_robot_sensor * element.position_mm, radius_mm_,
+               [&](std::size_t cell, double squared) {
+                 const double nats = increment(element.reading, squared);
+                 log_odds_[cell] += nats;
+                 part.added.emplace_back(cell, nats);
+               });
+  }
+}
+
+double PredictiveMap::increment(Reading reading, double squared_mm) const {
+  const std::vector<double>& of_class = increments_[is_contact(reading) ? 1 : 0];
+  const double place =
+      squared_mm / (radius_mm_ * radius_mm_) * static_cast<double>(of_class.size() - 2);
+  const auto node = static_cast<std::size_t>(place);
+  return std::lerp(of_class[node], of_class[node + 1], place - static_cast<double>(node));
+}
+
+double PredictiveMap::log_likelihood(std::size_t touch, const Pose& T_robot_sensor) const {
+  // The axes of all elements; rotating each would take the sine and cosine anew.
+  const glm::dvec2 x = rotate(T_robot_sensor.theta_rad, {1.0, 0.0});
+  const glm::dvec2 y{-x.y, x.x};
+  double sum = 0.0;
+  for (const ElementReading& element : touches_[touch].known) {
+    const glm::dvec2 p =
+        T_robot_sensor.translation_mm + element.position_mm.x * x + element.position_mm.y * y;
+    sum += contact_.log_likelihood(element.reading, {log_odds(p)});
+  }
+  return sum;
+}
+
+double PredictiveMap::log_odds(const glm::dvec2& p_robot_mm) const {
+  const glm::dvec2 place = p_robot_mm / options_.cell_mm;
+  const glm::dvec2 first = glm::floor(place);
+  const auto i = static_cast<std::int64_t>(first.x);
+  const auto j = static_cast<std::int64_t>(first.y);
+  if (!cells_.contains({i, j, 2, 2})) {
+    return log_odds_from_probability(options_.sensor.prior);
+  }
+  const double* low = &log_odds_[cells_.index(i, j)];
+  const double* high = low + cells_.nx;
+  const glm::dvec2 f = place - first;
+  return std::lerp(std::lerp(low[0], low[1], f.x), std::lerp(high[0], high[1], f.x), f.y);
+}
 
 TouchAlignment align_touches(std::span<ObjectTouches> objects, const DisplacementSd& sd,
                              MapOptions options, const std::function<void(double)>& progress) {

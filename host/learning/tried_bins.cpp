@@ -9,7 +9,6 @@
 
 #include <fmt/format.h>
 
-#include "learning/cross_validation.hpp"
 #include "model/bounding_box.hpp"
 #include "model/touch_evidence.hpp"
 #include "palpate/error.hpp"
@@ -102,12 +101,16 @@ Press together(std::span<const Press* const> presses) {
   return all;
 }
 
-Unknowns unknowns_of(const std::vector<Press>& presses, const RecognitionBins& bins,
-                     std::size_t fold) {
-  Unknowns asked{.presses = presses};
+std::vector<Unknown> unknowns_of(const std::vector<Press>& presses,
+                                 const std::optional<RecognitionBins>& bins, std::size_t fold) {
+  std::vector<Unknown> asked;
   std::map<std::string, std::vector<const Press*>> of_label;
   for (const Press& press : presses) {
+    asked.push_back({press});
     of_label[press.label].push_back(&press);
+  }
+  if (!bins) {
+    return asked;
   }
   Random random(fold, Stream::unknowns);
   std::size_t half = fold % 2;
@@ -119,14 +122,13 @@ Unknowns unknowns_of(const std::vector<Press>& presses, const RecognitionBins& b
     const std::array parts{std::span(own).first(middle), std::span(own).subspan(middle)};
     for (std::size_t k = 0; k < parts.size(); ++k) {
       for (Press& group : groups_of(parts.at(k), random)) {
-        asked.presses.push_back(std::move(group));
-        asked.half_of_group.push_back((half + k) % 2);
+        asked.push_back({std::move(group), (half + k) % 2});
       }
     }
     half = 1 - half;
   }
-  for (Press& press : asked.presses) {
-    press = as_unknown(press, bins, random);
+  for (Unknown& unknown : asked) {
+    unknown.press = as_unknown(unknown.press, *bins, random);
   }
   return asked;
 }

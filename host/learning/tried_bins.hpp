@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <numbers>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -26,18 +27,23 @@ struct RecognitionBins {
 /// @param press at a known pose; T_object_robot of the returned one is the drawn pose
 Press as_unknown(const Press& press, const RecognitionBins& bins, Random& random);
 
+/// Presses in a group, and most groups that a press is in.
+inline constexpr std::size_t presses_in_group = 3;
+inline constexpr std::size_t groups_of_press = 3;
+
 /// Touches of one object at known poses as one press, in the robot frame of the first.
 /// @param presses at known poses, at least one
 Press together(std::span<const Press* const> presses);
 
-/// Presses of a fold that are to be recognised.
-struct Unknowns {
-  std::vector<Press> presses;  ///< single presses, and then groups of them
-  std::vector<std::size_t> half_of_group = {};
+/// A press, or a group of presses, of a fold that is to be recognised.
+struct Unknown {
+  Press press;
+  std::optional<std::size_t> half = {};  ///< see HeldOut::half
 };
-/// Presses at known poses, and groups of presses_in_group of one object, as_unknown().
-Unknowns unknowns_of(const std::vector<Press>& presses, const RecognitionBins& bins,
-                     std::size_t fold);
+/// Presses, and with bins, at known poses, groups of presses_in_group of one object behind them,
+/// all as_unknown().
+std::vector<Unknown> unknowns_of(const std::vector<Press>& presses,
+                                 const std::optional<RecognitionBins>& bins, std::size_t fold);
 
 /// Steps of theta at which presses at unknown poses are placed; steps of x and y are the elements'
 /// spacing.

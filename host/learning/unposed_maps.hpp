@@ -18,10 +18,10 @@ namespace palpate {
 /// How presses at unknown poses become maps.
 struct UnposedOptions {
   MapOptions map;                     ///< of the maps, and the classifier of their evidence
-  ContactModel contact;               ///< by which presses are placed on maps
+  ContactModel contact;               ///< by which presses are placed on maps, with its prior
   std::optional<ReadingLayer> layer;  ///< what the contact model's table is over
-  std::size_t most_maps = 1;
-  bool mirror = false;  ///< the object may lie on its other side
+  std::size_t most_maps = 1;          ///< at least 1
+  bool mirror = false;                ///< the object may lie on its other side
   /// By which log-likelihoods are divided to say how sure a place is: neighbouring elements are not
   /// independent, so that their sum exaggerates.
   double temperature = 10.0;
@@ -80,8 +80,8 @@ inline constexpr double doubtful_fit = 0.5;
 /// quarter of the elements' spacing, after eight at most. The maps hold weighted means over their
 /// presses: of log odds and of pressure.
 /// @param progress is called now and then with the fraction done
-/// @throws Error on an option out of range, a touch that is not sound, arrays of one element, or
-/// where no press can be placed: none has an element In Contact
+/// @throws Error on a touch that is not sound, arrays of one element, or where no press can be
+/// placed: none has an element In Contact
 UnposedMaps unposed_maps(std::span<const Touch> presses, const std::string& label,
                          const UnposedOptions& options,
                          const std::function<void(double)>& progress = {});
@@ -89,5 +89,20 @@ UnposedMaps unposed_maps(std::span<const Touch> presses, const std::string& labe
 /// The distance between neighbouring elements, in mm: the least over all presses.
 /// @throws Error where no array has two elements apart
 double element_pitch_mm(std::span<const Touch> presses);
+
+/// How well presses fit maps of one press each: rows are presses, columns the maps. 1: as well
+/// as in the press's own map.
+struct FitTable {
+  std::vector<std::size_t> columns;      ///< the press that each map is of
+  std::vector<std::vector<double>> fit;  ///< [press][column]
+};
+
+/// The column that as a further map would raise the presses' best fits most, added up; a fit counts
+/// from 0 to 1. Columns of presses that fit a map already are left out.
+/// @param best [press] fit in the maps that there are, 0 without
+/// @param enough fit from which a press needs no further map
+/// @returns none where all presses fit
+std::optional<std::size_t> next_map(const FitTable& table, std::span<const double> best,
+                                    double enough);
 
 }  // namespace palpate

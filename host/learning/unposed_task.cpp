@@ -6,7 +6,6 @@
 
 #include "io/input_file.hpp"
 #include "learning/contact_learning.hpp"
-#include "learning/map_sensor.hpp"
 #include "learning/map_task.hpp"
 #include "learning/progress.hpp"
 #include "learning/table_learning.hpp"
@@ -38,8 +37,8 @@ UnposedOptions unposed_options(const MapTask& task, const std::optional<LearnedS
     constexpr double of_pitch = 0.6;  // leaves no gaps between the elements of a press
     result.map.sensor.spread_mm = of_pitch * pitch_mm;
   }
-  result.map.sensor.prior =
-      task.prior(sensor).value_or(share_in_contact(all, result.map.classifier));
+  result.map.sensor.prior = task.prior(sensor).value_or(
+      share_in_contact(evidence_of(all, {.classifier = result.map.classifier})));
   result.contact.classifier = result.map.classifier;
   result.contact.prior = result.map.sensor.prior;
   result.most_maps = task.most_maps();
@@ -49,17 +48,6 @@ UnposedOptions unposed_options(const MapTask& task, const std::optional<LearnedS
     result.temperature = sensor->temperature;
   }
   return result;
-}
-
-/// Sets the learned table of the object, or else that of all objects.
-void use_table(const std::optional<LearnedSensor>& sensor, const std::string& label,
-               UnposedOptions& options) {
-  if (sensor && sensor->table) {
-    const auto own = sensor->table->objects.find(label);
-    options.contact.table = table_of(
-        *sensor->table, own == sensor->table->objects.end() ? sensor->table->shared : own->second);
-    options.layer = sensor->table->layer;
-  }
 }
 
 std::string fit_words(const UnposedMap& map) {
@@ -181,7 +169,10 @@ LearnedMaps learn_unposed_maps(const MapTask& task, const std::function<void(dou
   UnposedOptions options = unposed_options(task, sensor);
   for (std::size_t i = 0; i < task.objects.size(); ++i) {
     const auto& [label, touches] = task.objects[i];
-    use_table(sensor, label, options);
+    if (sensor && sensor->table) {
+      options.contact.table = table_for(*sensor->table, label);
+      options.layer = sensor->table->layer;
+    }
     add_object(task, i, unposed_maps(touches, label, options, work.part(1.0)), learned);
   }
   for (const auto& [name, map] : learned.maps) {

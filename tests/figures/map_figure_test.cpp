@@ -121,12 +121,4 @@ TEST(DrawMaps, DrawsWhateverItsShapeAndLabelInTheSameBytes) {
   decode(draw_maps(many));
 }
 
-TEST(DrawMaps, RefusesWhatItCannotDraw) {
-  OccupancyGrid short_of_values = unseen("A", 4, 5);
-  short_of_values.log_odds.pop_back();
-  input_error([] { draw_maps({}); });
-  input_error([] { draw(unseen("A", 0, 5)); });
-  input_error([&] { draw(short_of_values); });
-}
-
 }  // namespace palpate::map_figure_test

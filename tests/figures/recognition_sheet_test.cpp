@@ -206,15 +206,4 @@ TEST(RecognitionSheet, DrawsManyLabelsAndTouchesInTheColoursOfTheSeries) {
   }
 }
 
-TEST(RecognitionSheet, RefusesArraysOfTheWrongSize) {
-  const auto expect_refused = [](const auto& change) {
-    RecognitionSheet sheet = example();
-    change(sheet);
-    input_error([&] { draw_recognition(sheet); });
-  };
-  expect_refused([](RecognitionSheet& sheet) { sheet.belief.xy.pop_back(); });
-  expect_refused([](RecognitionSheet& sheet) { sheet.identity[1].pop_back(); });
-  expect_refused([](RecognitionSheet& sheet) { sheet.map.log_odds.clear(); });
-}
-
 }  // namespace palpate::recognition_sheet_test

@@ -10,7 +10,7 @@
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 
-#include "learning/feature_learning.hpp"
+#include "learning/table_learning.hpp"
 #include "palpate/error.hpp"
 #include "simulated_presses.hpp"
 #include "support/errors.hpp"
@@ -176,7 +176,7 @@ TEST(GammaFit, LeavesOutCellsThatNothingSensed) {
 
 TEST(ShareInContact, CountsKnownElementsWithinBounds) {
   const auto share = [](const RowPress& row, const ContactClassifier& classifier = {}) {
-    return share_in_contact(row.presses[0].touches, classifier);
+    return share_in_contact(evidence_of(row.presses[0].touches, {.classifier = classifier}));
   };
   // Three In Contact, one Unknown (between the threshold and half of 20), two dead, four of none.
   EXPECT_NEAR(share(RowPress({{20.0, 20.0, 15.0, 5.0, 20.0, 20.0, 0.0, 0.0, 1.0, 0.5}},

@@ -6,7 +6,6 @@
 
 #include <gtest/gtest.h>
 
-#include "learning/feature_learning.hpp"
 #include "learning/temperature_fit.hpp"
 #include "simulated_presses.hpp"
 
@@ -14,22 +13,22 @@ namespace palpate::cross_validation_test {
 
 /// Tries all folds on the maps of the others' presses, by Eq. 7 or a table that they learned.
 CrossValidation tried(const std::vector<Press>& presses, const std::vector<std::string>& labels,
-                      const CrossValidationOptions& options, bool with_table = false) {
+                      const CalibrationSettings& options, bool with_table = false) {
   CrossValidation all;
   for (std::size_t fold = 0; fold < options.folds; ++fold) {
     const std::vector<Press> others = presses_without(fold, presses, options.folds);
     FoldModel model;
     model.maps = options.bins ? maps_by_folds(others, map_options(), 1).of_objects
                               : maps_of_presses(others, map_options());
-    model.how = learning_on(model.maps);
-    model.how.rounds = 1;
+    model.learning = learning_on(model.maps);
+    model.learning.rounds = 1;
     if (!options.bins && !others.empty()) {
-      model.features = learn_features(others, model.how.contact.classifier);
+      model.features = learn_features(others, model.learning.contact.classifier);
     }
     if (with_table) {
       const std::vector<TrainingMap> maps =
           options.bins ? maps_by_folds(others, map_options(), 2).without_folds : model.maps;
-      model.table = learn_table(others, maps, model.how).table;
+      model.table = learn_table(others, maps, model.learning).table;
     }
     all += try_fold(fold, presses, labels, model, options);
   }
@@ -45,7 +44,7 @@ LetterPresses two_letters(int of_a, int of_u, std::uint64_t seed = 16) {
 }
 
 /// Two folds on bins about this place.
-CrossValidationOptions on_bins(int bins, int theta_bins, double half_mm = 12.0, double x_mm = 0.0) {
+CalibrationSettings on_bins(int bins, int theta_bins, double half_mm = 12.0, double x_mm = 0.0) {
   return {.folds = 2,
           .bins = RecognitionBins{.lattice = {.x_mm = {x_mm - half_mm, x_mm + half_mm, bins},
                                               .y_mm = {-half_mm, half_mm, bins},
@@ -86,9 +85,9 @@ TEST(CrossValidation, LeavesOutPressesWhoseObjectHasNoMapWithoutThem) {
 TEST(CrossValidation, LooksForPressesAtKnownPosesAsForUnknownsAloneAndInGroups) {
   const LetterPresses letters = two_letters(24, 14);
   // A place that the presses do not have: only as unknowns do they come there.
-  const CrossValidationOptions options = on_bins(24, 48, 12.0, 100.0);
+  const CalibrationSettings options = on_bins(24, 48, 12.0, 100.0);
   const CrossValidation found = tried(letters.presses, {"A", "U"}, options);
-  const std::vector<HeldOut> presses = alone(found.unknowns);
+  const std::vector<HeldOut> presses = single_touches(found.unknowns);
   ASSERT_EQ(presses.size(), 38U);
   // Either fold has 12 presses of A: the 6 of each half make two groups three times over. It has 7
   // presses of U: 3 and 4 make one group each.
@@ -112,7 +111,7 @@ TEST(CrossValidation, TakesNoMoreMapsOfAnObjectThanItMay) {
   SimulatedPresses simulated;
   simulated.add_shapes(4, 21);
   const auto evidence = [&](std::size_t most) {
-    return tried(simulated.presses, {"L", "disc"}, {.folds = 2, .maps_per_object = most})
+    return tried(simulated.presses, {"L", "disc"}, {.folds = 2, .most_maps = most})
         .unknowns.front()
         .log_evidence[0];
   };
@@ -152,7 +151,7 @@ TEST(CrossValidation, JudgesTheFitOfPressesAtKnownPosesWhereTheyAre) {
 
 TEST(CrossValidation, JudgesHowPressesFitBestAndHowStrangersFitTheBestOfTwoOthers) {
   LetterPresses letters = two_letters(48, 48, 23);
-  const CrossValidationOptions options = on_bins(18, 30);
+  const CalibrationSettings options = on_bins(18, 30);
   const auto strangers = [](const CrossValidation& of) {
     return by_label(of.unknowns, &HeldOut::stranger_fit);
   };

@@ -27,7 +27,7 @@ LetterPresses two_letters(int touches = 16) {
 }
 
 void expect_refused(const char* named, const std::vector<Press>& presses,
-                    const SensorCalibrationOptions& options = {}) {
+                    const CalibrationSettings& options = {}) {
   expect_named(input_error([&] { calibrate_sensor(presses, {}, options); }), {named});
 }
 
@@ -43,7 +43,7 @@ class DegeneratePresses : public testing::TestWithParam<bool> {
   /// The calibration; its numbers are sound and its confidence finite.
   /// @param options of two folds: each fold learns again all that is learned
   SensorCalibration learned(LetterPresses letters,
-                            const SensorCalibrationOptions& options = {.folds = 2}) {
+                            const CalibrationSettings& options = {.folds = 2}) {
     letters.make_presses(GetParam());
     SensorCalibration found = calibrate_sensor(letters.presses, {}, options);
     found.sensor.validate();
@@ -72,7 +72,8 @@ TEST_P(DegeneratePresses, ThatSayNothingAreRefused) {
   }
   unknown.make_presses(GetParam());
   expect_refused("no pressure is above 0", unknown.presses);
-  expect_refused("no pressure is above", unknown.presses, {.threshold = 2.0, .ratio = 0.3});
+  expect_refused("no pressure is above", unknown.presses,
+                 {.readings = {.threshold = 2.0, .ratio = 0.3}});
 }
 
 TEST_P(DegeneratePresses, OfOneObjectKeepTheDefaultConfidence) {
@@ -162,8 +163,7 @@ TEST_P(DegeneratePresses, WithoutTheLevelsAskedForHaveFewer) {
     }
   }
   const auto table = [&](double threshold, std::size_t levels) {
-    return learned(letters, {.threshold = threshold,
-                             .ratio = 0.3,
+    return learned(letters, {.readings = {.threshold = threshold, .ratio = 0.3},
                              .tables = {{MapLayer::mean_level, levels}},
                              .folds = 2})
         .sensor.table.value();
@@ -178,11 +178,9 @@ INSTANTIATE_TEST_SUITE_P(AtPoses, DegeneratePresses, testing::Bool(),
 TEST(DegenerateCalibration, IsRefusedByWhatIsWrong) {
   const LetterPresses letters = two_letters();
   expect_refused("no touches", {});
-  std::vector<Press> mixed = letters.presses;
-  mixed[3].T_object_robot.reset();
-  expect_refused("A.h5, touch 3: its pose is unknown", mixed);
-  expect_refused("above the contact threshold", letters.presses, {.threshold = 1000.0});
-  expect_refused("ratio = 1", letters.presses, {.ratio = 1.0});
+  expect_refused("above the contact threshold", letters.presses,
+                 {.readings = {.threshold = 1000.0}});
+  expect_refused("ratio = 1", letters.presses, {.readings = {.ratio = 1.0}});
   Recording one_element;
   one_element.object = "A";
   one_element.elements_mm = {{0.0, 0.0}};
@@ -194,7 +192,7 @@ TEST(DegenerateCalibration, IsRefusedByWhatIsWrong) {
   expect_named(input_error([&] { calibrate_sensor(letters.presses, {other.map}, {}); }),
                {"or a map of it"});
   const auto beyond = [&](const Axis& x_mm, bool auto_pivot) {
-    return SensorCalibrationOptions{
+    return CalibrationSettings{
         .bins = RecognitionBins{.lattice = {.x_mm = x_mm}, .auto_pivot = auto_pivot}};
   };
   expect_refused("beyond the bins' -5:5", letters.presses, beyond({-5.0, 5.0, 10}, true));
@@ -213,13 +211,14 @@ TEST_P(HeldOutCalibration, JudgesAFoldByWhatTheOtherFoldsSayAlone) {
   letters.add("U", touches, 62);
   letters.make_presses(known_poses);
   const std::vector<std::size_t> fold = folds_of(letters.presses, 5);
-  const ModelLearning how{
+  const CalibrationSettings settings{
       .readings = {.spacing_mm = 1.9},
-      .bins = known_poses ? std::optional(BinSteps{1.0, 1.0, 0.5}) : std::nullopt};
+      .tables = {{MapLayer::mean_level, 4}},
+      .steps = known_poses ? std::optional(BinSteps{1.0, 1.0, 0.5}) : std::nullopt};
   const auto model = [&] {
     letters.make_presses(known_poses);
-    const std::vector<Press> others = presses_without(judged, letters.presses, how.folds);
-    return models_of(others, {{MapLayer::mean_level, 4}}, how).front();
+    const std::vector<Press> others = presses_without(judged, letters.presses, settings.folds);
+    return models_of(others, settings).front();
   };
   const auto press_harder = [&](bool judged_ones) {
     for (std::size_t i = 0; i < fold.size(); ++i) {
@@ -235,16 +234,18 @@ TEST_P(HeldOutCalibration, JudgesAFoldByWhatTheOtherFoldsSayAlone) {
   const FoldModel same = model();
   press_harder(false);
   const FoldModel other = model();
-  EXPECT_EQ(same.how.contact.classifier.threshold, before.how.contact.classifier.threshold);
-  EXPECT_NE(other.how.contact.classifier.threshold, before.how.contact.classifier.threshold);
-  EXPECT_EQ(same.how.contact.classifier.ratio, before.how.contact.classifier.ratio);
-  EXPECT_NE(other.how.contact.classifier.ratio, before.how.contact.classifier.ratio);
-  EXPECT_EQ(same.how.contact.prior, before.how.contact.prior);
-  EXPECT_EQ(same.how.level_edges, before.how.level_edges);
-  EXPECT_NE(other.how.level_edges, before.how.level_edges);
-  EXPECT_EQ(before.how.layer.near_mm, 2.0 * how.readings.spacing_mm);
-  EXPECT_EQ(before.how.layer.far_mm, 6.0 * how.readings.spacing_mm);
-  EXPECT_EQ(same.how.layer.full_level, before.how.layer.full_level);
+  EXPECT_EQ(same.learning.contact.classifier.threshold,
+            before.learning.contact.classifier.threshold);
+  EXPECT_NE(other.learning.contact.classifier.threshold,
+            before.learning.contact.classifier.threshold);
+  EXPECT_EQ(same.learning.contact.classifier.ratio, before.learning.contact.classifier.ratio);
+  EXPECT_NE(other.learning.contact.classifier.ratio, before.learning.contact.classifier.ratio);
+  EXPECT_EQ(same.learning.contact.prior, before.learning.contact.prior);
+  EXPECT_EQ(same.learning.level_edges, before.learning.level_edges);
+  EXPECT_NE(other.learning.level_edges, before.learning.level_edges);
+  EXPECT_EQ(before.learning.layer.near_mm, 2.0 * settings.readings.spacing_mm);
+  EXPECT_EQ(before.learning.layer.far_mm, 6.0 * settings.readings.spacing_mm);
+  EXPECT_EQ(same.learning.layer.full_level, before.learning.layer.full_level);
   EXPECT_EQ(same.maps[0].map.log_odds, before.maps[0].map.log_odds);
   EXPECT_EQ(same.table->shared, before.table->shared);
   ASSERT_EQ(same.features.has_value(), !known_poses);

@@ -198,11 +198,10 @@ TEST(DefaultTables, OfKnownPosesAreOverThePressureAlone) {
 
 TEST(SensorCalibration, TakesTheThresholdAndRatioGiven) {
   const LetterPresses letters = three_letters(24);
-  const SensorCalibrationOptions given{.threshold = 1.0,
-                                       .ratio = 0.2,
-                                       .tables = {{MapLayer::log_odds, 2}},
-                                       .folds = 2,
-                                       .bins = bins(5, 5, 6)};
+  const CalibrationSettings given{.readings = {.threshold = 1.0, .ratio = 0.2},
+                                  .tables = {{MapLayer::log_odds, 2}},
+                                  .folds = 2,
+                                  .bins = bins(5, 5, 6)};
   const ContactClassifier both = calibrate_sensor(letters.presses, {}, given).sensor.classifier;
   EXPECT_EQ(both.threshold, 1.0);
   EXPECT_EQ(both.ratio, 0.2);

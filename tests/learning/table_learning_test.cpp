@@ -8,7 +8,6 @@
 #include <gtest/gtest.h>
 #include <glm/geometric.hpp>
 
-#include "learning/level_counts.hpp"
 #include "model/bounding_box.hpp"
 #include "model/interpolated_map.hpp"
 #include "palpate/error.hpp"
@@ -20,15 +19,15 @@ namespace palpate::table_learning_test {
 /// Counts as count_placed() would with every press on every other map of its object, at its true
 /// place.
 LevelCounts true_counts(const SimulatedPresses& simulated, const std::vector<TrainingMap>& maps,
-                        const TableLearning& how) {
-  const std::vector<OccupancyGrid> layers = layers_of(maps, how.layer);
+                        const TableLearning& settings) {
+  const std::vector<OccupancyGrid> layers = layers_of(maps, settings.layer);
   LevelCounts counts(2);
   for (std::size_t i = 0; i < layers.size(); ++i) {
     for (std::size_t j = 0; j < layers.size(); ++j) {
       if (i != j && simulated.presses[i].label == simulated.presses[j].label) {
         const Pose T_object_robot =
             inverse(simulated.T_object_robot[j]) * simulated.T_object_robot[i];
-        counts.add(evidence_of(simulated.presses[i].touches, how.classifier()),
+        counts.add(evidence_of(simulated.presses[i].touches, settings.classifier()),
                    std::span(&T_object_robot, 1), layers[j]);
       }
     }
@@ -41,14 +40,14 @@ TEST(TableLearning, CountsPressesAtKnownPosesWithinABinOfThem) {
   letters.add("A", 6, 61);
   const std::vector<TrainingMap> maps =
       maps_by_folds(letters.presses, map_options(), 3).without_folds;
-  TableLearning how = learning_on(maps);
-  const std::vector<OccupancyGrid> layers = layers_of(maps, how.layer);
-  const PlacedPresses placed = learn_table(letters.presses, maps, how);
+  TableLearning settings = learning_on(maps);
+  const std::vector<OccupancyGrid> layers = layers_of(maps, settings.layer);
+  const PlacedPresses placed = learn_table(letters.presses, maps, settings);
   const auto counts = [&] {
-    return count_placed(placed.placements, letters.presses, layers, how).at("A");
+    return count_placed(placed.placements, letters.presses, layers, settings).at("A");
   };
   const LevelCounts exact = counts();
-  how.counted_within = {.x_mm = 1.5, .y_mm = 0.9, .theta_rad = 0.3};
+  settings.counted_within = {.x_mm = 1.5, .y_mm = 0.9, .theta_rad = 0.3};
   const LevelCounts within = counts();
   EXPECT_NEAR(within.total(), exact.total(), 1e-9 * exact.total());
 
@@ -63,7 +62,7 @@ TEST(TableLearning, CountsPressesAtKnownPosesWithinABinOfThem) {
     const Press& press = letters.presses[own.press];
     const InterpolatedMap values(layers[own.map], layers[own.map].prior);
     const Touch& touch = press.touches.front();
-    const std::vector<Reading> readings = how.classifier().classify(touch);
+    const std::vector<Reading> readings = settings.classifier().classify(touch);
     for (int i = 0; i < 27; ++i) {
       const Pose turned{{}, (i % 3 - 1) * 0.1};
       const Pose moved{{(i / 3 % 3 - 1) * 0.5, (i / 9 - 1) * 0.3}, 0.0};
@@ -85,16 +84,16 @@ TEST(TableLearning, FindsAtUnknownPosesWhatItWouldAtKnownOnes) {
   SimulatedPresses simulated;
   simulated.add_shapes(5, 3);
   const std::vector<TrainingMap> maps = maps_of_presses(simulated.presses, map_options());
-  const TableLearning how = learning_on(maps);
+  const TableLearning settings = learning_on(maps);
   double shown = 0.0;
-  const PlacedPresses placed = learn_table(simulated.presses, maps, how, [&](double fraction) {
+  const PlacedPresses placed = learn_table(simulated.presses, maps, settings, [&](double fraction) {
     EXPECT_GE(fraction, shown);
     shown = fraction;
   });
   EXPECT_EQ(shown, 1.0);
   EXPECT_EQ(placed.placements.size(), 40U);
-  const LevelCounts counts = true_counts(simulated, maps, how);
-  const std::vector<double> truth = shrunk_table(counts, how.initial().shared, 20.0);
+  const LevelCounts counts = true_counts(simulated, maps, settings);
+  const std::vector<double> truth = shrunk_table(counts, settings.initial().shared, 20.0);
   int compared = 0;
   for (int node = 0; node < ReadingLayer::nodes; ++node) {
     if (counts.at_node(node) > 150.0) {
@@ -120,12 +119,13 @@ TEST(TableLearning, CountsAPressOnItsBestMapsOnly) {
   SimulatedPresses simulated;
   simulated.add(on_disc, "disc", 3, 4);
   const std::vector<TrainingMap> maps = maps_of_presses(simulated.presses, map_options());
-  TableLearning how = learning_on(maps);
+  TableLearning settings = learning_on(maps);
   const Pose far{{1000.0, 0.0}, 0.0};
   const std::vector<OwnPlacement> placements{{0, 1, {Pose{}, -5.0, 0.0}}, {0, 2, {far, -9.0, 0.0}}};
   const auto counts = [&](std::size_t best_maps) {
-    how.best_maps = best_maps;
-    return count_placed(placements, simulated.presses, layers_of(maps, how.layer), how).at("disc");
+    settings.best_maps = best_maps;
+    return count_placed(placements, simulated.presses, layers_of(maps, settings.layer), settings)
+        .at("disc");
   };
   EXPECT_NEAR(counts(1).total(), 196.0, 1e-9);
   EXPECT_EQ(counts(1).at_node(8), 0.0) << "no reading is beyond the map";
@@ -133,25 +133,26 @@ TEST(TableLearning, CountsAPressOnItsBestMapsOnly) {
 }
 
 TEST(TableLearning, ShrinksObjectsTowardsAllTogether) {
-  const TableLearning how{.contact = {.prior = 0.2}};
+  const TableLearning settings{.contact = {.prior = 0.2}};
   ObjectCounts counts{{"A", LevelCounts(2)}, {"B", LevelCounts(2)}};
   counts.at("A").add(Reading::in_contact, 0.0, 100.0);
   counts.at("B").add(Reading::no_contact, 0.0, 100.0);
-  const LearnedTable table = table_of(counts, how);
+  const LearnedTable table = table_of(counts, settings);
   const double eq7 = 0.5;  // at log odds 0 both readings are as likely
   const double shared = (100.0 + 20.0 * eq7) / 220.0;
   EXPECT_NEAR(std::exp(table.shared[49 + 32]), shared, 1e-12);
   EXPECT_NEAR(std::exp(table.objects.at("A")[49 + 32]), (100.0 + 200.0 * shared) / 300.0, 1e-12);
   EXPECT_NEAR(std::exp(table.objects.at("B")[49 + 32]), 200.0 * shared / 300.0, 1e-12);
-  EXPECT_EQ(contact_with(how.contact, table, "C").table->log_likelihood, table.shared);
-  EXPECT_EQ(contact_with(how.contact, table, "A").table->log_likelihood, table.objects.at("A"));
+  EXPECT_EQ(contact_with(settings.contact, table, "C").table->log_likelihood, table.shared);
+  EXPECT_EQ(contact_with(settings.contact, table, "A").table->log_likelihood,
+            table.objects.at("A"));
 }
 
 TEST(TableLearning, KeepsEquation7ForALevelThatNothingReached) {
-  const TableLearning how{.level_edges = {1000.0}, .contact = {.prior = 0.2}};
+  const TableLearning settings{.level_edges = {1000.0}, .contact = {.prior = 0.2}};
   LevelCounts counts(3);
   counts.add(Reading::in_contact, 0.0, 80.0);
-  const LearnedTable table = table_of({{"A", counts}}, how);
+  const LearnedTable table = table_of({{"A", counts}}, settings);
   EXPECT_NEAR(std::exp(table.shared[2 * 49 + 32]), 20.0 * 0.25 / 100.0, 1e-12);
 }
 
@@ -169,8 +170,8 @@ TEST(TableLearning, CountsTouchesAtKnownPosesOnMapsOfTheOthers) {
   const std::vector<Press> presses = posed_presses(recording);
   const std::vector<TrainingMap> maps = maps_by_folds(presses, map_options(), 5).without_folds;
   ASSERT_EQ(maps.size(), 5U);
-  const TableLearning how{.layer = {.near_mm = 3.0, .far_mm = 9.0}, .contact = {.prior = 0.2}};
-  const PlacedPresses placed = learn_table(presses, maps, how);
+  const TableLearning settings{.layer = {.near_mm = 3.0, .far_mm = 9.0}, .contact = {.prior = 0.2}};
+  const PlacedPresses placed = learn_table(presses, maps, settings);
   for (const OwnPlacement& own : placed.placements) {
     EXPECT_FALSE(maps[own.map].holds(own.press));
     const Pose T_object_sensor =
@@ -179,10 +180,10 @@ TEST(TableLearning, CountsTouchesAtKnownPosesOnMapsOfTheOthers) {
                 recording.T_robot_sensor[own.press].translation_mm.x, 1e-12);
   }
   const LevelCounts counts =
-      count_placed(placed.placements, presses, layers_of(maps, how.layer), how).at("L");
+      count_placed(placed.placements, presses, layers_of(maps, settings.layer), settings).at("L");
   EXPECT_NEAR(counts.total(), 40.0 * 36.0, 1e-6);
   EXPECT_TRUE(maps_by_folds(presses, map_options(), 1).without_folds.empty());
-  EXPECT_THROW(learn_table(presses, {}, how), Error) << "one fold has no maps of others";
+  EXPECT_THROW(learn_table(presses, {}, settings), Error) << "one fold has no maps of others";
 }
 
 /// The node whose value this is.

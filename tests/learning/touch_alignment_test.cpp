@@ -6,7 +6,6 @@
 #include <gtest/gtest.h>
 #include <glm/geometric.hpp>
 
-#include "learning/predictive_map.hpp"
 #include "learning/touch_alignment.hpp"
 #include "model/displacement_points.hpp"
 #include "palpate/map_builder.hpp"

@@ -1,4 +1,4 @@
-#include "learning/training_maps.hpp"
+#include "learning/press.hpp"
 
 #include <algorithm>
 #include <cmath>
