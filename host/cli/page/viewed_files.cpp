@@ -71,38 +71,31 @@ ViewedFiles::Rows ViewedFiles::rows_of(const fs::path& path) {
   ReadingHistogram readings;
   std::size_t known = 0;
   Recording& recording = rows.recording;
-  const auto append = [](auto& list) {
-    return [&list](auto values) { list.insert(list.end(), values.begin(), values.end()); };
+  const RecordingFile file(path);
+  recording = file.head().recording;
+  rows.elements = file.head().elements;
+  rows.pressure.reserve(file.head().rows * rows.elements);
+  const auto append = [](auto& list, const auto& more) {
+    list.insert(list.end(), more.begin(), more.end());
   };
-  scan_recording(path,
-                 {.head =
-                      [&](const RecordingHead& head) {
-                        recording = head.recording;
-                        rows.elements = head.elements;
-                        rows.pressure.reserve(head.rows * head.elements);
-                        recording.T_robot_sensor.reserve(head.rows);
-                      },
-                  .pressure =
-                      [&](std::span<const double> values) {
-                        append(rows.pressure)(values);
-                        for (const double value : values) {
-                          // One reading of 1e38 shall not be the scale.
-                          if (value > 0.0 && value < 1e30) {
-                            readings.add(value);
-                            ++known;
-                          }
-                        }
-                      },
-                  .T_robot_sensor = append(recording.T_robot_sensor),
-                  .elements_mm =
-                      [&](std::span<const glm::dvec2> places) {
-                        // A changing array is drawn as it begins.
-                        const std::size_t left = rows.elements - recording.elements_mm.size();
-                        append(recording.elements_mm)(places.first(std::min(left, places.size())));
-                      },
-                  .time_s = append(recording.time_s),
-                  .device_time_s = [](auto) {},
-                  .lost_before = [](auto) {}});
+  Recording some;
+  const std::uint64_t at_once = std::max<std::uint64_t>(1, (1 << 19) / rows.elements);
+  for (std::uint64_t first = 0; first < file.head().rows; first += at_once) {
+    file.read(first, std::min(at_once, file.head().rows - first), some);
+    append(rows.pressure, some.pressure);
+    append(recording.T_robot_sensor, some.T_robot_sensor);
+    append(recording.time_s, some.time_s);
+    if (recording.elements_mm.empty()) {  // a changing array is drawn as it begins
+      append(recording.elements_mm, std::span(some.elements_mm).first(rows.elements));
+    }
+    for (const double value : some.pressure) {
+      // One reading of 1e38 shall not be the scale.
+      if (value > 0.0 && value < 1e30) {
+        readings.add(value);
+        ++known;
+      }
+    }
+  }
   rows.largest = known == 0 ? 0.0 : readings.quantile(0.999);
   return rows;
 }
