@@ -18,7 +18,7 @@
 #include "cli/former_flags.hpp"
 #include "cli/help.hpp"
 #include "cli/supervisor.hpp"
-#include "io/descriptor.hpp"
+#include "model/descriptor.hpp"
 #include "model/option_words.hpp"
 #include "palpate/error.hpp"
 

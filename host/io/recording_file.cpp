@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "io/file_format.hpp"
+#include "io/hdf5_contents.hpp"
 #include "io/hdf5_writer.hpp"
 #include "io/recording_rules.hpp"
 #include "model/number_text.hpp"
@@ -92,35 +93,39 @@ void require_agreement(const std::filesystem::path& path, const Recording& recor
 
 RecordingFile::RecordingFile(const std::filesystem::path& path)
     : path_(path),
-      file_(path,
-            {"format", "version", "object", "pressure_unit", "length_unit", "rows", "true_object",
-             "true_T_object_robot", "sensor", "serial", "findings"},
-            {"pressure", "sensor_pose", "elements", "valid", "time", "baseline", "device_time",
-             "lost_before"}) {
+      file_(std::make_unique<Hdf5Contents>(
+          path,
+          std::vector<std::string>{"format", "version", "object", "pressure_unit", "length_unit",
+                                   "rows", "true_object", "true_T_object_robot", "sensor", "serial",
+                                   "findings"},
+          std::vector<std::string>{"pressure", "sensor_pose", "elements", "valid", "time",
+                                   "baseline", "device_time", "lost_before"})) {
   read_texts();
   read_extents();
   read_elements();
   require_head(path_, head_.recording, head_.elements);
 }
 
+RecordingFile::~RecordingFile() = default;
+
 void RecordingFile::read_texts() {
-  require_format(file_, recording_format);
-  if (const std::string unit = file_.text("length_unit"); unit != "mm") {
-    file_.refuse("attribute 'length_unit' = '{}'; convert lengths to 'mm'", unit);
+  require_format(*file_, recording_format);
+  if (const std::string unit = file_->text("length_unit"); unit != "mm") {
+    file_->refuse("attribute 'length_unit' = '{}'; convert lengths to 'mm'", unit);
   }
   Recording& r = head_.recording;
-  r.closed = file_.closed();
+  r.closed = file_->closed();
   r.path = path_.string();
-  r.object = file_.text("object");
-  r.pressure_unit = file_.text("pressure_unit");
+  r.object = file_->text("object");
+  r.pressure_unit = file_->text("pressure_unit");
   for (const auto& [name, text] :
        {std::pair{"rows", &r.rows}, {"sensor", &r.sensor}, {"serial", &r.serial}}) {
-    if (file_.has_attribute(name)) {
-      *text = file_.text(name);
+    if (file_->has_attribute(name)) {
+      *text = file_->text(name);
     }
   }
-  r.truth = read_truth(file_);
-  r.findings = read_findings(file_);
+  r.truth = read_truth(*file_);
+  r.findings = read_findings(*file_);
 }
 
 /// The complete rows of a stream that is being recorded or was cut off: the rows that all datasets
@@ -128,43 +133,43 @@ void RecordingFile::read_texts() {
 std::uint64_t RecordingFile::complete_rows() const {
   std::uint64_t rows = UINT64_MAX;
   for (const char* name : row_names) {
-    if (file_.has_dataset(name)) {
-      const Shape& shape = file_.shape(name);
+    if (file_->has_dataset(name)) {
+      const Shape& shape = file_->shape(name);
       rows = std::min(rows, shape.empty() ? 0 : shape[0]);
     }
   }
   std::uint64_t written = rows;
-  if (file_.has_dataset("time") && file_.shape("time").size() == 1) {
+  if (file_->has_dataset("time") && file_->shape("time").size() == 1) {
     const auto take = [&](std::uint64_t first, std::span<const double> times) {
       const auto nan = std::ranges::find_if(times, [](double t) { return std::isnan(t); });
       if (nan != times.end()) {
         written = std::min(written, first + static_cast<std::uint64_t>(nan - times.begin()));
       }
     };
-    file_.read("time", take, 0, rows);
+    file_->read("time", take, 0, rows);
   }
   return written;
 }
 
 void RecordingFile::read_extents() {
-  if (!file_.closed()) {
+  if (!file_->closed()) {
     rows_ = complete_rows();
   }
-  file_.shape("pressure", 2);
+  file_->shape("pressure", 2);
   const Shape pressure = shape_of("pressure");
   const std::uint64_t n = head_.rows = pressure[0];
   const std::uint64_t e = head_.elements = pressure[1];
   if (n == 0 || e == 0) {
-    file_.refuse("dataset 'pressure' is empty, {}; record at least one touch by one element",
-                 pressure);
+    file_->refuse("dataset 'pressure' is empty, {}; record at least one touch by one element",
+                  pressure);
   }
   if (head_.recording.rows != "frames") {
-    file_.shape("sensor_pose");  // which only frames may lack
+    file_->shape("sensor_pose");  // which only frames may lack
   }
   has("sensor_pose", {{n, 3}});
-  file_.shape("elements");
+  file_->shape("elements");
   has("elements", {{e, 2}, {n, e, 2}});
-  array_changes_ = file_.shape("elements").size() == 3;
+  head_.array_changes = file_->shape("elements").size() == 3;
   for (const char* name : {"time", "device_time", "lost_before"}) {
     has(name, {{n}});
   }
@@ -175,11 +180,11 @@ void RecordingFile::read_elements() {
   Recording& r = head_.recording;
   const auto [n, e] = std::pair{head_.rows, head_.elements};
   if (has("valid", {{e}, {n, e}})) {
-    r.valid.reserve(file_.size("valid"));
-    file_.read("valid", [&](std::uint64_t, std::span<const double> values) {
+    r.valid.reserve(file_->size("valid"));
+    file_->read("valid", [&](std::uint64_t, std::span<const double> values) {
       for (const double valid : values) {
         if (std::isnan(valid)) {
-          file_.refuse(
+          file_->refuse(
               "dataset 'valid' holds NaN; store 0 for a dead element and 1 for the others");
         }
         r.valid.push_back(valid != 0);
@@ -187,7 +192,7 @@ void RecordingFile::read_elements() {
     });
   }
   if (has("baseline", {{e}})) {
-    r.baseline = file_.read<double>("baseline");
+    r.baseline = file_->read<double>("baseline");
     // A NaN in the baseline of a stream: the recording was cut off before the baseline was known.
     for (std::uint64_t k = 0; r.rows == "frames" && k < r.baseline.size(); ++k) {
       if ((r.valid.size() != e || r.valid[k] != 0) && std::isnan(r.baseline[k])) {
@@ -195,8 +200,8 @@ void RecordingFile::read_elements() {
       }
     }
   }
-  if (!array_changes_) {
-    read_tuples(file_, "elements", 0, e, r.elements_mm);
+  if (!head_.array_changes) {
+    read_tuples(*file_, "elements", 0, e, r.elements_mm);
     require_elements(path_, 0, r.elements_mm);
   }
 }
@@ -204,18 +209,18 @@ void RecordingFile::read_elements() {
 void RecordingFile::read(std::uint64_t first, std::uint64_t count, Recording& rows) const {
   const auto read_list = [&](const char* name, std::vector<double>& list) {
     list.clear();
-    if (file_.has_dataset(name)) {
-      read_tuples(file_, name, first, count, list);
+    if (file_->has_dataset(name)) {
+      read_tuples(*file_, name, first, count, list);
     }
   };
   read_list("pressure", rows.pressure);
-  if (file_.has_dataset("sensor_pose")) {
-    read_tuples(file_, "sensor_pose", first, count, rows.T_robot_sensor);
+  if (file_->has_dataset("sensor_pose")) {
+    read_tuples(*file_, "sensor_pose", first, count, rows.T_robot_sensor);
   } else {
     rows.T_robot_sensor.assign(count, unknown_pose);  // a stream without poses
   }
-  if (array_changes_) {
-    read_tuples(file_, "elements", first, count, rows.elements_mm);
+  if (head_.array_changes) {
+    read_tuples(*file_, "elements", first, count, rows.elements_mm);
   }
   read_list("time", rows.time_s);
   read_list("device_time", rows.device_time_s);
@@ -226,14 +231,14 @@ void RecordingFile::read(std::uint64_t first, std::uint64_t count, Recording& ro
 /// Rows of the counts of lost frames, where the file has them.
 std::vector<std::uint64_t> RecordingFile::counts(std::uint64_t first, std::uint64_t count) const {
   std::vector<std::uint64_t> counts;
-  if (!file_.has_dataset("lost_before")) {
+  if (!file_->has_dataset("lost_before")) {
     return counts;
   }
-  for (const double value : file_.read<double>("lost_before", first, count)) {
+  for (const double value : file_->read<double>("lost_before", first, count)) {
     if (!(value >= 0.0 && value <= static_cast<double>(largest_count) &&
           value == std::floor(value))) {
-      file_.refuse("dataset 'lost_before' holds {}; store counts of frames up to {}", value,
-                   largest_count);
+      file_->refuse("dataset 'lost_before' holds {}; store counts of frames up to {}", value,
+                    largest_count);
     }
     counts.push_back(static_cast<std::uint64_t>(value));
   }
@@ -242,7 +247,7 @@ std::vector<std::uint64_t> RecordingFile::counts(std::uint64_t first, std::uint6
 
 /// The dataset's shape without incomplete rows.
 Shape RecordingFile::shape_of(const char* name) const {
-  Shape shape = file_.shape(name);
+  Shape shape = file_->shape(name);
   if (std::ranges::find(row_names, std::string_view(name)) != std::end(row_names) &&
       !shape.empty()) {
     shape[0] = std::min(shape[0], rows_);
@@ -252,12 +257,12 @@ Shape RecordingFile::shape_of(const char* name) const {
 
 /// Whether the file has the dataset. Throws Error where its shape does not fit.
 bool RecordingFile::has(const char* name, const std::vector<Shape>& fitting) const {
-  if (!file_.has_dataset(name)) {
+  if (!file_->has_dataset(name)) {
     return false;
   }
   if (const Shape shape = shape_of(name); std::ranges::find(fitting, shape) == fitting.end()) {
-    file_.refuse("dataset '{}' has the shape {}; 'pressure' is [{}, {}], so make it {}", name,
-                 shape, head_.rows, head_.elements, fmt::format("{}", fmt::join(fitting, " or ")));
+    file_->refuse("dataset '{}' has the shape {}; 'pressure' is [{}, {}], so make it {}", name,
+                  shape, head_.rows, head_.elements, fmt::format("{}", fmt::join(fitting, " or ")));
   }
   return true;
 }

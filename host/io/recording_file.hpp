@@ -2,11 +2,14 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
+#include <vector>
 
-#include "io/hdf5_contents.hpp"
 #include "palpate/touch.hpp"
 
 namespace palpate {
+
+class Hdf5Contents;
 
 /// A recording without its rows, as a file announces it.
 struct RecordingHead {
@@ -15,6 +18,7 @@ struct RecordingHead {
   Recording recording;
   std::uint64_t rows = 0;      ///< n
   std::uint64_t elements = 0;  ///< e
+  bool array_changes = false;  ///< `elements` is [n, e, 2]
 };
 
 /// An open "palpate.recording" HDF5 file, which is read and checked as Hdf5Contents does.
@@ -22,6 +26,7 @@ class RecordingFile {
  public:
   /// Reads the head. @throws Error as read_recording() does
   explicit RecordingFile(const std::filesystem::path& path);
+  ~RecordingFile();
 
   const RecordingHead& head() const { return head_; }
   /// Reads rows into those of `rows`: pressures, poses, times, lost counts and, where the array
@@ -38,8 +43,7 @@ class RecordingFile {
   std::vector<std::uint64_t> counts(std::uint64_t first, std::uint64_t count) const;
 
   std::filesystem::path path_;
-  Hdf5Contents file_;
-  bool array_changes_ = false;       ///< `elements` is [n, e, 2]
+  std::unique_ptr<const Hdf5Contents> file_;
   std::uint64_t rows_ = UINT64_MAX;  ///< complete rows of a file that is not closed
   RecordingHead head_;
 };
