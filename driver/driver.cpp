@@ -12,25 +12,21 @@
 
 #include "driver/device.hpp"
 #include "driver/open_sensor.hpp"
-#include "driver/serial_port.hpp"
 #include "driver/serial_profile.hpp"
-#include "driver/takktile_link.hpp"
+#include "driver/takktile_protocol.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
 
 namespace {
 
-/// Fills in what a TakkTile tells without disturbing a program that uses it.
 void inspect_takktile(const ListedDevice& device, BoardInfo& info) {
   if (is_claimed(device)) {
     info.reason = in_use(device.node);
     return;
   }
   try {
-    const UsbContext context;
-    UsbHandle handle(context, device);
-    const SensorDescription description = takktile::read_setup(handle).description;
+    const SensorDescription description = describe_takktile(device);
     info.elements = description.elements_mm.size();
     info.pressure_unit = description.pressure_unit;
     info.usable = true;

@@ -9,16 +9,13 @@
 #include <exception>
 #include <mutex>
 #include <optional>
+#include <thread>
 #include <utility>
 
+#include "driver/deframer.hpp"
 #include "palpate/sensor.hpp"
 
 namespace palpate {
-
-/// The host's clock, since the Unix epoch, by which frames are stamped.
-inline double host_clock_s() {
-  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
-}
 
 /// Passes frames from the thread that reads the bus to the thread that asks for frames. A full
 /// queue drops its oldest frame and counts the loss in the next frame's lost_before.
@@ -92,6 +89,60 @@ class FrameQueue {
   std::deque<Frame> frames_;
   std::exception_ptr failure_;
   Counters counters_;
+};
+
+/// A sensor whose thread reads a board, between start() and stop(), and passes frames to next()
+/// through a queue. Only that thread uses push() and publish() meanwhile.
+class QueuedSensor : public Sensor {
+ public:
+  QueuedSensor() = default;
+  QueuedSensor(const QueuedSensor&) = delete;
+  QueuedSensor& operator=(const QueuedSensor&) = delete;
+
+  const SensorDescription& description() const override { return description_; }
+  std::optional<Frame> next(std::chrono::milliseconds timeout) override {
+    return queue_.pop(timeout);
+  }
+  SensorCounters counters() const override {
+    const FrameQueue::Counters queue = queue_.counters();
+    const std::lock_guard lock(mutex_);
+    SensorCounters counters = published_;
+    counters.frames = queue.pushed - queue.dropped;
+    counters.lost += queue.dropped;
+    return counters;
+  }
+
+ protected:
+  /// Forgets the frames and the counts of an earlier stream.
+  void forget() {
+    queue_.clear();
+    lost_before_next_ = 0;
+    publish({});
+  }
+  /// Counts frames that are known to be lost before the next.
+  void lose(std::uint64_t frames) { lost_before_next_ += frames; }
+  void push(ParsedFrame frame, double host_time_s) {
+    queue_.push({.host_time_s = host_time_s,
+                 .device_time_s = frame.device_time_s,
+                 .values = std::move(frame.values),
+                 .lost_before = std::exchange(lost_before_next_, 0)});
+  }
+  /// Makes the counts those that counters() returns, with those of the queue.
+  void publish(const SensorCounters& counters) {
+    const std::lock_guard lock(mutex_);
+    published_ = counters;
+  }
+  /// Declares that no further frame will come, and why: the exception that is handled.
+  void fail() { queue_.fail(std::current_exception()); }
+
+  SensorDescription description_;
+  std::thread thread_;
+
+ private:
+  std::uint64_t lost_before_next_ = 0;
+  FrameQueue queue_;
+  mutable std::mutex mutex_;
+  SensorCounters published_;  ///< guarded by mutex_
 };
 
 }  // namespace palpate

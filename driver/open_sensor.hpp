@@ -8,9 +8,15 @@
 
 namespace palpate {
 
+/// Reads what a TakkTile tells without disturbing a program that uses it. @throws Error
+SensorDescription describe_takktile(const ListedDevice& device);
+
 /// Opens a TakkTile. @param which its serial number or port; "" if only one is plugged in
 /// @throws Error
 std::unique_ptr<Sensor> open_takktile(const std::string& which);
+
+/// Why the device file of a port could not be opened with this errno, and the remedy.
+std::string why_not_opened(const std::string& node, int code);
 
 /// Opens the serial port of a board that a profile describes.
 /// @param kind the profile's name or path, for messages

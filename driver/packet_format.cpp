@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <type_traits>
+#include <utility>
 
 namespace palpate {
 
@@ -134,9 +135,40 @@ double NumberType::read(std::span<const std::uint8_t> wire) const {
                   : static_cast<double>(pattern);
 }
 
-std::size_t bytes_of(const PacketFormat::Field& field, std::size_t elements, bool counted) {
+std::size_t bytes_of(const PacketFormat::Parts& field, const PacketFormat::Part& part) {
+  return 1 + part.skip + part.values * field.type.bytes;
+}
+
+PacketLayout::PacketLayout(PacketFormat format)
+    : format_(std::move(format)), tail_(fields().size()) {
+  if (const auto* first = as<PacketFormat::Fixed>(fields().front())) {
+    preamble_ = first->bytes;
+  } else if (const auto* last = as<PacketFormat::Fixed>(fields().back())) {
+    terminator_ = last->bytes;
+  }
+  for (std::size_t i = 0; i < fields().size(); ++i) {
+    middle_ = as<PacketFormat::Length>(fields()[i]) != nullptr ? i + 1 : middle_;
+  }
+  while (tail_ > middle_ && (as<PacketFormat::Check>(fields()[tail_ - 1]) != nullptr ||
+                             as<PacketFormat::Fixed>(fields()[tail_ - 1]) != nullptr)) {
+    --tail_;
+  }
+  shifted_from_ = tail_;
+  for (std::size_t i = 0; i < fields().size(); ++i) {
+    offsets_.push_back(offsets_.back() + bytes_of(fields()[i]));
+    if (const auto* check = as<PacketFormat::Check>(fields()[i])) {
+      check_ = check;
+      check_field_ = i;
+    } else if (as<PacketFormat::Parts>(fields()[i]) != nullptr) {
+      has_parts_ = true;
+      shifted_from_ = std::min(shifted_from_, i + 1);
+    }
+  }
+}
+
+std::size_t PacketLayout::bytes_of(const PacketFormat::Field& field) const {
   return std::visit(
-      [&](const auto& content) -> std::size_t {
+      [this](const auto& content) -> std::size_t {
         using Content = std::decay_t<decltype(content)>;
         if constexpr (std::is_same_v<Content, PacketFormat::Fixed> ||
                       std::is_same_v<Content, PacketFormat::Only>) {
@@ -147,9 +179,9 @@ std::size_t bytes_of(const PacketFormat::Field& field, std::size_t elements, boo
                              std::is_same_v<Content, PacketFormat::Time>) {
           return content.type.bytes;
         } else if constexpr (std::is_same_v<Content, PacketFormat::Values>) {
-          return elements * content.stride_bytes;
+          return format_.elements * content.stride_bytes;
         } else if constexpr (std::is_same_v<Content, PacketFormat::Parts>) {
-          return counted ? 0 : bytes_of(content, content.parts.front());
+          return has_length() ? 0 : palpate::bytes_of(content, content.parts.front());
         } else {
           return content.checksum.bytes();
         }
@@ -157,39 +189,55 @@ std::size_t bytes_of(const PacketFormat::Field& field, std::size_t elements, boo
       field);
 }
 
-std::size_t bytes_of(const PacketFormat::Parts& field, const PacketFormat::Part& part) {
-  return 1 + part.skip + part.values * field.type.bytes;
+std::size_t PacketLayout::begin_of(std::size_t field, std::size_t packet_bytes) const {
+  return offsets_[field] + (field < shifted_from_ ? 0 : packet_bytes - whole_bytes());
 }
 
-PacketShape shape_of(const PacketFormat& format) {
-  PacketShape shape;
-  const std::vector<PacketFormat::Field>& fields = format.fields;
-  for (std::size_t i = 0; i < fields.size(); ++i) {
-    if (std::holds_alternative<PacketFormat::Length>(fields[i])) {
-      shape.counted = true;
-      shape.head_fields = i + 1;
+PacketLayout::Bytes PacketLayout::place_of(std::size_t field, Bytes packet) const {
+  const bool is_counted = has_length() && as<PacketFormat::Parts>(fields()[field]) != nullptr;
+  return packet.subspan(
+      begin_of(field, packet.size()),
+      is_counted ? packet.size() - whole_bytes() : offsets_[field + 1] - offsets_[field]);
+}
+
+PacketLayout::CheckPlace PacketLayout::check_place(std::size_t packet_bytes) const {
+  const std::size_t offset = begin_of(check_field_, packet_bytes);
+  return check_->after ? CheckPlace{offset, offset + check_->checksum.bytes(), packet_bytes}
+                       : CheckPlace{offset, check_->from_byte, offset};
+}
+
+PacketLayout::Packet PacketLayout::packet_at_front(Bytes stream) const {
+  std::size_t total = whole_bytes();
+  // Behind a Length, only packets with values have a field at its offset. The tail follows below.
+  const std::size_t known = has_length() ? middle_ : fields().size();
+  for (std::size_t i = 0; i < known && offsets_[i] <= stream.size(); ++i) {
+    const Bytes rest = stream.subspan(offsets_[i]);
+    if (const auto* fixed = as<PacketFormat::Fixed>(fields()[i])) {
+      if (!begins_like(rest, fixed->bytes)) {
+        return {Packet::Fit::none};
+      }
+    } else if (const auto* length = as<PacketFormat::Length>(fields()[i])) {
+      if (rest.size() < length->type.bytes) {
+        return {Packet::Fit::incomplete};
+      }
+      const double count = length->type.read(rest) - static_cast<double>(length->extra);
+      if (count < 0 || count > static_cast<double>(length->most)) {
+        return {Packet::Fit::none};
+      }
+      total += static_cast<std::size_t>(count) - middle_bytes();
     }
-    shape.parts = shape.parts || std::holds_alternative<PacketFormat::Parts>(fields[i]);
   }
-  while (shape.tail_fields < fields.size() - shape.head_fields) {
-    const PacketFormat::Field& last = fields[fields.size() - 1 - shape.tail_fields];
-    if (!std::holds_alternative<PacketFormat::Check>(last) &&
-        !std::holds_alternative<PacketFormat::Fixed>(last)) {
-      break;
-    }
-    ++shape.tail_fields;
+  if (stream.size() < total) {
+    return {Packet::Fit::incomplete};
   }
-  for (std::size_t i = 0; i < fields.size(); ++i) {
-    const std::size_t bytes = bytes_of(fields[i], format.elements, shape.counted);
-    if (i < shape.head_fields) {
-      shape.head_bytes += bytes;
-    } else if (i < fields.size() - shape.tail_fields) {
-      shape.middle_bytes += bytes;
-    } else {
-      shape.tail_bytes += bytes;
+  for (std::size_t i = tail_; i < fields().size(); ++i) {
+    const auto* fixed = as<PacketFormat::Fixed>(fields()[i]);
+    if (fixed != nullptr &&
+        !begins_like(stream.first(total).subspan(begin_of(i, total)), fixed->bytes)) {
+      return {Packet::Fit::none};
     }
   }
-  return shape;
+  return {Packet::Fit::whole, total};
 }
 
 }  // namespace palpate

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -128,24 +129,91 @@ struct PacketFormat {
   double period_s = 0.0;  ///< from frame to frame; 0: unknown
 };
 
-/// The sections of a format: head | middle, whose bytes the Length counts | tail.
-struct PacketShape {
-  bool counted = false;         ///< the format has a Length
-  bool parts = false;           ///< the format has Parts
-  std::size_t head_fields = 0;  ///< fields up to the Length; 0 without a Length
-  std::size_t tail_fields = 0;  ///< the trailing Check and Fixed fields
-  std::size_t head_bytes = 0;
-  std::size_t middle_bytes = 0;  ///< in a packet with values, without counted Parts
-  std::size_t tail_bytes = 0;
-};
-
-PacketShape shape_of(const PacketFormat& format);
-
-/// Size of a field, in bytes, in a packet with values. Parts have size 0 if a Length counts them,
-/// and the size of one part otherwise.
-std::size_t bytes_of(const PacketFormat::Field& field, std::size_t elements, bool counted);
-
 /// Size of a part, in bytes, with its tag.
 std::size_t bytes_of(const PacketFormat::Parts& field, const PacketFormat::Part& part);
+
+/// Whether `bytes` begins with `pattern`, or `pattern` with `bytes`.
+inline bool begins_like(std::span<const std::uint8_t> bytes,
+                        std::span<const std::uint8_t> pattern) {
+  const std::size_t known = std::min(bytes.size(), pattern.size());
+  return std::ranges::equal(bytes.first(known), pattern.first(known));
+}
+
+/// A format's field as one of its kinds; nullptr where it is of another.
+template <class Field>
+const Field* as(const PacketFormat::Field& field) {
+  return std::get_if<Field>(&field);
+}
+
+/// Where the fields of a format's packets lie.
+///
+///     head, to the Length | middle, which the Length counts | tail: trailing Check and Fixed
+///     fields
+///
+/// Fields up to counted Parts keep their distance from the packet's first byte, those behind from
+/// its last one. Without a Length, all packets have one size.
+class PacketLayout {
+ public:
+  using Bytes = std::span<const std::uint8_t>;
+
+  explicit PacketLayout(PacketFormat format);
+  PacketLayout(const PacketLayout&) = delete;  // check() points into the format
+  PacketLayout& operator=(const PacketLayout&) = delete;
+
+  const PacketFormat& format() const { return format_; }
+  const std::vector<PacketFormat::Field>& fields() const { return format_.fields; }
+  bool has_length() const { return middle_ > 0; }
+  bool has_parts() const { return has_parts_; }
+  /// Indices of the first field of the middle, which is 0 without a Length, and of the tail.
+  std::size_t middle() const { return middle_; }
+  std::size_t tail() const { return tail_; }
+  /// What packets begin with; empty where a terminator marks them.
+  const std::vector<std::uint8_t>& preamble() const { return preamble_; }
+  /// What packets end with; empty where a preamble marks them.
+  const std::vector<std::uint8_t>& terminator() const { return terminator_; }
+  /// The format's, if it has one.
+  const PacketFormat::Check* check() const { return check_; }
+  /// Where a field, or the end, lies in a packet with values, without counted Parts.
+  std::size_t offset(std::size_t field) const { return offsets_[field]; }
+  std::size_t middle_bytes() const { return offsets_[tail_] - offsets_[middle_]; }
+  std::size_t whole_bytes() const { return offsets_.back(); }
+
+  struct Packet {
+    enum class Fit : std::uint8_t { none, incomplete, whole };
+    Fit fit = Fit::none;
+    std::size_t bytes = 0;  ///< its size, where it is whole
+  };
+  /// Whether a packet begins with the stream's first byte, by its fixed bytes and its length. Its
+  /// checksum is not looked at.
+  Packet packet_at_front(Bytes stream) const;
+
+  /// A field of a packet with values.
+  Bytes place_of(std::size_t field, Bytes packet) const;
+  /// Where the Check of a packet of this size lies, and the bytes that it covers.
+  struct CheckPlace {
+    std::size_t offset = 0;
+    std::size_t begin = 0;
+    std::size_t end = 0;
+  };
+  CheckPlace check_place(std::size_t packet_bytes) const;
+
+ private:
+  /// Size of a field in a packet with values. Parts have size 0 if a Length counts them, and the
+  /// size of one part otherwise.
+  std::size_t bytes_of(const PacketFormat::Field& field) const;
+  /// Where a field begins in a packet of this size.
+  std::size_t begin_of(std::size_t field, std::size_t packet_bytes) const;
+
+  PacketFormat format_;
+  bool has_parts_ = false;
+  std::size_t middle_ = 0;
+  std::size_t tail_ = 0;
+  std::vector<std::size_t> offsets_ = {0};  ///< [field + 1]
+  std::size_t shifted_from_ = 0;  ///< the first field that keeps its distance from the packet's end
+  std::vector<std::uint8_t> preamble_;
+  std::vector<std::uint8_t> terminator_;
+  const PacketFormat::Check* check_ = nullptr;
+  std::size_t check_field_ = 0;
+};
 
 }  // namespace palpate

@@ -37,12 +37,11 @@ NumberType read_number_type(const Entry& entry) {
 
 Format::Check read_check(const Entry& field) {
   using Kind = Checksum::Kind;
-  Checksum::Parameters kind;
   Checksum::Parameters options;
-  Format::Check check{.checksum = Checksum(kind)};
+  Format::Check check{.checksum = Checksum(options)};
   read_keys(field, {{"checksum",
                      [&](const Entry& e) {
-                       kind = e.one_of<Checksum::Parameters>(
+                       const auto kind = e.one_of<Checksum::Parameters>(
                            {{"sum8", {.kind = Kind::sum, .bytes = 1}},
                             {"sum16", {.kind = Kind::sum, .bytes = 2}},
                             {"xor8", {.kind = Kind::exor, .bytes = 1}},
@@ -50,6 +49,8 @@ Format::Check read_check(const Entry& field) {
                             {"crc16", {.kind = Kind::crc, .bytes = 2}},
                             {"crc32", {.kind = Kind::crc, .bytes = 4}},
                             {"weiss16", {.kind = Kind::weiss, .bytes = 2}}});
+                       options.kind = kind.kind;
+                       options.bytes = kind.bytes;
                      }},
                     {"polynomial", whole(options.polynomial, 1)},
                     {"init", whole(options.init, 0)},
@@ -66,7 +67,7 @@ Format::Check read_check(const Entry& field) {
                     {"covers", [&](const Entry& e) {
                        check.after = e.one_of<bool>({{"before", false}, {"after", true}});
                      }}});
-  const bool is_crc = kind.kind == Kind::crc;
+  const bool is_crc = options.kind == Kind::crc;
   if (is_crc != (options.polynomial != 0)) {
     field.refuse(is_crc ? "a crc needs 'polynomial', such as 0x1021; add it"
                         : "'polynomial' belongs to a crc; remove it");
@@ -74,15 +75,13 @@ Format::Check read_check(const Entry& field) {
   if (!is_crc && options.reflect) {
     field.refuse("'reflect' belongs to a crc; remove it");
   }
-  if (kind.kind == Kind::weiss && (options.init != 0 || options.xor_out != 0)) {
+  if (options.kind == Kind::weiss && (options.init != 0 || options.xor_out != 0)) {
     field.refuse("weiss16 has its own 'init' and 'xor_out'; remove them");
   }
-  const std::uint64_t end = std::uint64_t{1} << (8 * kind.bytes);
+  const std::uint64_t end = std::uint64_t{1} << (8 * options.bytes);
   if (std::max({options.polynomial, options.init, options.xor_out}) >= end) {
-    field.refuse(fmt::format("shorten polynomial, init and xor_out to {} bits", 8 * kind.bytes));
+    field.refuse(fmt::format("shorten polynomial, init and xor_out to {} bits", 8 * options.bytes));
   }
-  options.kind = kind.kind;
-  options.bytes = kind.bytes;
   check.checksum = Checksum(options);
   return check;
 }
@@ -250,41 +249,38 @@ void check_parts(const Entry& field, const Format::Parts& parts, bool counted) {
 
 // Behind a Length, a field's place is known only in packets with values, except in the tail.
 void check_places(const std::vector<Entry>& entries, const Format& format) {
-  const PacketShape shape = shape_of(format);
-  const std::size_t tail = format.fields.size() - shape.tail_fields;
-  std::size_t offset = 0;
+  const PacketLayout layout(format);
   for (std::size_t i = 0; i < format.fields.size(); ++i) {
     const Format::Field& field = format.fields[i];
-    const bool in_middle = shape.counted && i >= shape.head_fields && i < tail;
+    const bool in_middle = layout.has_length() && i >= layout.middle() && i < layout.tail();
     if (in_middle && std::holds_alternative<Format::Fixed>(field)) {
       entries[i].refuse("behind 'length', only the end has 'bytes'; write 'only' instead");
     }
     if (in_middle && std::holds_alternative<Format::Check>(field)) {
       entries[i].refuse("put 'checksum' before 'length' or at the end");
     }
-    if (shape.counted && i < shape.head_fields &&
-        (std::holds_alternative<Format::Values>(field) ||
-         std::holds_alternative<Format::Parts>(field))) {
+    if (i < layout.middle() && (std::holds_alternative<Format::Values>(field) ||
+                                std::holds_alternative<Format::Parts>(field))) {
       entries[i].refuse("put 'values' or 'parts' behind 'length'");
     }
     if (const auto* check = std::get_if<Format::Check>(&field)) {
       // Bytes in front of the checksum in the shortest packet.
-      const std::size_t before = shape.counted && i >= tail ? shape.head_bytes : offset;
+      const std::size_t before =
+          layout.offset(layout.has_length() && i >= layout.tail() ? layout.middle() : i);
       if (!check->after && check->from_byte >= before) {
         entries[i].refuse(
             fmt::format("'from' is {}, but only {} bytes precede the checksum; lower it",
                         check->from_byte, before));
       }
-      if (check->after && (i >= tail || check->from_byte != 0)) {
+      if (check->after && (i >= layout.tail() || check->from_byte != 0)) {
         entries[i].refuse(
             "'covers: after' needs a checksum in front of the values, without 'from'");
       }
     }
     if (const auto* parts = std::get_if<Format::Parts>(&field)) {
-      check_parts(entries[i], *parts, shape.counted);
+      check_parts(entries[i], *parts, layout.has_length());
     }
-    offset += bytes_of(field, format.elements, shape.counted);
-    if (offset > most_packet_bytes) {
+    if (layout.offset(i + 1) > most_packet_bytes) {
       entries[i].refuse(fmt::format(
           "a packet is longer than {} bytes; give fewer elements or fields", most_packet_bytes));
     }
@@ -293,23 +289,23 @@ void check_places(const std::vector<Entry>& entries, const Format& format) {
 
 // By default, no packet is larger than the packet with the values.
 void set_most(const std::vector<Entry>& entries, Format& format) {
-  const PacketShape shape = shape_of(format);
+  const PacketLayout layout(format);
   for (std::size_t i = 0; i < format.fields.size(); ++i) {
     if (auto* length = std::get_if<Format::Length>(&format.fields[i])) {
-      if (length->most == 0 && shape.parts) {
+      if (length->most == 0 && layout.has_parts()) {
         entries[i].refuse("add 'most', the largest number of bytes that 'length' counts");
       }
-      length->most = length->most == 0 ? shape.middle_bytes : length->most;
-      if (shape.parts && count_of<Format::Check>(format) == 0 &&
+      length->most = length->most == 0 ? layout.middle_bytes() : length->most;
+      if (layout.has_parts() && count_of<Format::Check>(format) == 0 &&
           length->most > most_unchecked_parts_bytes) {
         entries[i].refuse(
             fmt::format("'most' is {}, but parts without a checksum have at most {} "
                         "bytes; lower it, or add 'checksum'",
                         length->most, most_unchecked_parts_bytes));
       }
-      if (length->most < shape.middle_bytes) {
+      if (length->most < layout.middle_bytes()) {
         entries[i].refuse(fmt::format("'most' is {}, but the values take {} bytes; enlarge it",
-                                      length->most, shape.middle_bytes));
+                                      length->most, layout.middle_bytes()));
       }
     }
   }

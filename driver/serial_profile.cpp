@@ -9,7 +9,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "driver/data_folder.hpp"
 #include "driver/profile_packet.hpp"
 #include "palpate/error.hpp"
 

@@ -1,30 +1,154 @@
 #include <algorithm>
-#include <chrono>
+#include <cerrno>
 #include <cstdint>
-#include <exception>
+#include <cstring>
 #include <memory>
-#include <mutex>
-#include <optional>
 #include <span>
 #include <string>
 #include <thread>
 #include <utility>
 #include <vector>
 
+// The kernel's own termios takes every baud rate, <termios.h> those of a list; both declare it.
+#include <asm/termbits.h>
 #include <fmt/format.h>
+#include <grp.h>
+#include <linux/serial.h>
+#include <poll.h>
 #include <sys/eventfd.h>
+#include <sys/file.h>
+#include <sys/ioctl.h>
+#include <sys/stat.h>
 
 #include "driver/device.hpp"
 #include "driver/frame_queue.hpp"
 #include "driver/open_sensor.hpp"
-#include "driver/serial_port.hpp"
 #include "driver/serial_profile.hpp"
+#include "model/descriptor.hpp"
+#include "model/stream_time.hpp"
 #include "palpate/error.hpp"
 #include "palpate/sensor.hpp"
 
 namespace palpate {
 
 namespace {
+
+constexpr const char* gone = "hung up: the board was unplugged; plug it in and start again";
+
+std::string missing_permission(const std::string& node) {
+  struct stat file {};
+  const group* owner = stat(node.c_str(), &file) == 0 ? getgrgid(file.st_gid) : nullptr;
+  return fmt::format(
+      "no permission to open it; join its group with 'sudo usermod -aG {} $USER' and log in again",
+      owner != nullptr ? owner->gr_name : "dialout");
+}
+
+Descriptor opened(const std::string& node) {
+  // Without O_NONBLOCK, a port without carrier would not open.
+  Descriptor port(node, O_RDWR | O_NOCTTY | O_NONBLOCK);
+  if (!port.valid()) {
+    const Fault fault = errno == ENOENT ? Fault::input : Fault::system;
+    throw Error(fault, fmt::format("{}: {}", node, why_not_opened(node, errno)));
+  }
+  return port;
+}
+
+tcflag_t control_flags(const SerialLine& line) {
+  constexpr tcflag_t sizes[] = {CS5, CS6, CS7, CS8};
+  tcflag_t flags = BOTHER | CREAD | CLOCAL | HUPCL | sizes[line.data_bits - 5];
+  flags |= line.parity == SerialLine::Parity::none ? 0 : PARENB;
+  flags |= line.parity == SerialLine::Parity::odd ? PARODD : 0;
+  flags |= line.stop_bits == 2 ? CSTOPB : 0;
+  return flags;
+}
+
+/// A serial port of the kernel's, such as /dev/ttyUSB0, opened for this program alone.
+class SerialPort {
+ public:
+  /// Opens the port with these settings of the line. @throws Error naming the port and the remedy
+  SerialPort(const std::string& node, const SerialLine& line) : node_(node), port_(opened(node)) {
+    termios2 settings{};
+    if (ioctl(port_.get(), TCGETS2, &settings) != 0) {
+      throw Error(Fault::input, node_ + ": is no serial port; check the path");
+    }
+    // The lock keeps out programs that ask for it, root's too; TIOCEXCL keeps out every other
+    // user's.
+    if (flock(port_.get(), LOCK_EX | LOCK_NB) != 0) {
+      refuse(in_use(node_));
+    }
+    ioctl(port_.get(), TIOCEXCL);
+    settings.c_iflag = 0;
+    settings.c_oflag = 0;
+    settings.c_lflag = 0;
+    settings.c_cflag = control_flags(line);
+    settings.c_ispeed = line.baud;
+    settings.c_ospeed = line.baud;
+    settings.c_cc[VMIN] = 1;
+    settings.c_cc[VTIME] = 0;
+    if (ioctl(port_.get(), TCSETS2, &settings) != 0) {
+      refuse(fmt::format("refuses {} baud with {} data bits: {}; check 'line' in the profile",
+                         line.baud, line.data_bits, std::strerror(errno)));
+    }
+    // An FTDI chip otherwise keeps bytes for 16 ms. Ports without such a timer refuse.
+    serial_struct chip{};
+    if (ioctl(port_.get(), TIOCGSERIAL, &chip) == 0) {
+      chip.flags |= ASYNC_LOW_LATENCY;
+      ioctl(port_.get(), TIOCSSERIAL, &chip);
+    }
+  }
+  // A port that another program has open, too, would stay closed to users.
+  ~SerialPort() { ioctl(port_.get(), TIOCNXCL); }
+  SerialPort(const SerialPort&) = delete;
+  SerialPort& operator=(const SerialPort&) = delete;
+
+  /// Forgets what came and was not read. @throws Error where the device is gone
+  void flush() {
+    if (ioctl(port_.get(), TCFLSH, TCIFLUSH) != 0) {
+      refuse(gone);
+    }
+  }
+
+  /// @throws Error where the device takes not all bytes
+  void write(const std::vector<std::uint8_t>& bytes) {
+    // A profile has at most 256 bytes to send, for which every driver has room.
+    const ssize_t taken = ::write(port_.get(), bytes.data(), bytes.size());
+    if (taken < 0 && errno != EAGAIN) {
+      refuse(gone);
+    }
+    if (taken != static_cast<ssize_t>(bytes.size())) {
+      refuse("does not take the bytes that the profile sends; check that it is the right board");
+    }
+  }
+
+  /// Waits until bytes come or the device goes, or until `wake` is readable, which it returns.
+  bool wait(const Descriptor& wake) {
+    pollfd files[] = {{.fd = port_.get(), .events = POLLIN, .revents = 0},
+                      {.fd = wake.get(), .events = POLLIN, .revents = 0}};
+    poll(files, 2, -1);
+    return (files[1].revents & POLLIN) != 0;
+  }
+
+  /// Takes what came, up to the room in `buffer`: nothing where nothing came.
+  /// @throws Error where the device is gone
+  std::span<const std::uint8_t> read(std::span<std::uint8_t> buffer) {
+    const ssize_t count = ::read(port_.get(), buffer.data(), buffer.size());
+    if (count > 0) {
+      return buffer.first(static_cast<std::size_t>(count));
+    }
+    if (count == 0 || (errno != EAGAIN && errno != EINTR)) {
+      refuse(gone);
+    }
+    return {};
+  }
+
+ private:
+  [[noreturn]] void refuse(const std::string& what) const {
+    throw Error(Fault::system, fmt::format("{}: {}", node_, what));
+  }
+
+  std::string node_;
+  Descriptor port_;
+};
 
 int new_event() {
   const int event = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
@@ -34,11 +158,9 @@ int new_event() {
   return event;
 }
 
-/// A sensor that streams from a board behind a serial port.
-///
-/// Between start() and stop(), a thread of the sensor's own reads the port and passes frames to
-/// next() through a queue. Once the board is gone, next() throws until start() finds it again.
-class SerialSensor final : public Sensor {
+/// A sensor that streams from a board behind a serial port. Once the board is gone, next() throws
+/// until start() finds it again.
+class SerialSensor final : public QueuedSensor {
  public:
   SerialSensor(SerialProfile profile, std::string kind, std::string which)
       : profile_(std::move(profile)), kind_(std::move(kind)), which_(std::move(which)) {
@@ -54,22 +176,11 @@ class SerialSensor final : public Sensor {
 
   ~SerialSensor() override { stop(); }
 
-  SerialSensor(const SerialSensor&) = delete;
-  SerialSensor& operator=(const SerialSensor&) = delete;
-
-  const SensorDescription& description() const override { return description_; }
-
   void start() override {
     stop();
-    queue_.clear();
-    lost_before_next_ = 0;
-    publish({});
+    forget();
     begin();
     thread_ = std::thread([this] { run(); });
-  }
-
-  std::optional<Frame> next(std::chrono::milliseconds timeout) override {
-    return queue_.pop(timeout);
   }
 
   void stop() override {
@@ -87,15 +198,6 @@ class SerialSensor final : public Sensor {
     } catch (const Error&) {
       // The board may be unplugged; it is stopped either way.
     }
-  }
-
-  SensorCounters counters() const override {
-    const FrameQueue::Counters queue = queue_.counters();
-    const std::lock_guard lock(mutex_);
-    SensorCounters counters = published_;
-    counters.frames = queue.pushed - queue.dropped;
-    counters.lost += queue.dropped;
-    return counters;
   }
 
  private:
@@ -145,7 +247,7 @@ class SerialSensor final : public Sensor {
       }
     } catch (...) {
       port_.reset();  // a port that hung up would keep its name from the board that comes back
-      queue_.fail(std::current_exception());
+      fail();
     }
   }
 
@@ -155,42 +257,43 @@ class SerialSensor final : public Sensor {
     const std::uint64_t damaged_before = deframer_->counters().checksum_errors;
     deframer_->push(bytes, parsed_);
     const DeframerCounters& counted = deframer_->counters();
-    lost_before_next_ += counted.checksum_errors - damaged_before;
+    lose(counted.checksum_errors - damaged_before);
     for (ParsedFrame& frame : parsed_) {
-      queue_.push({.host_time_s = host_time_s,
-                   .device_time_s = frame.device_time_s,
-                   .values = std::move(frame.values),
-                   .lost_before = std::exchange(lost_before_next_, 0)});
+      push(std::move(frame), host_time_s);
     }
     publish({.lost = counted.checksum_errors,
              .checksum_errors = counted.checksum_errors,
              .garbage_bytes = counted.garbage_bytes});
   }
 
-  void publish(const SensorCounters& counters) {
-    const std::lock_guard lock(mutex_);
-    published_ = counters;
-  }
-
   SerialProfile profile_;
   std::string kind_;
   std::string which_;
-  SensorDescription description_;
 
   // Between start() and stop(), only the sensor's thread reads the port and uses these.
   std::unique_ptr<SerialPort> port_;
   std::unique_ptr<Deframer> deframer_;
   std::vector<ParsedFrame> parsed_;
-  std::uint64_t lost_before_next_ = 0;
-
-  std::thread thread_;
-  FileDescriptor stopping_{new_event()};  // readable once stop() is called
-  FrameQueue queue_;
-  mutable std::mutex mutex_;
-  SensorCounters published_;  // guarded by mutex_
+  Descriptor stopping_{new_event()};  // readable once stop() is called
 };
 
 }  // namespace
+
+std::string why_not_opened(const std::string& node, int code) {
+  switch (code) {
+    case EACCES:
+    case EPERM:
+      return missing_permission(node);
+    case EBUSY:
+      return in_use(node);
+    case ENOENT:
+    case ENODEV:
+    case ENXIO:
+      return "not plugged in; see palpate sensors";
+    default:
+      return fmt::format("cannot be opened: {}; check the path", std::strerror(code));
+  }
+}
 
 std::unique_ptr<Sensor> open_serial_board(SerialProfile profile, const std::string& kind,
                                           const std::string& which) {

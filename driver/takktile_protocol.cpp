@@ -59,11 +59,11 @@ std::vector<Cell> parse_alive_map(std::span<const std::uint8_t> reply) {
   return cells;
 }
 
-std::vector<glm::dvec2> element_positions(std::span<const Cell> cells, double pitch_mm) {
+std::vector<glm::dvec2> element_positions(std::span<const Cell> cells) {
   std::vector<glm::dvec2> elements_mm;
   for (const Cell& cell : cells) {
-    elements_mm.emplace_back((cell.column - (columns - 1) / 2.0) * pitch_mm,
-                             (cell.row - (rows - 1) / 2.0) * pitch_mm);
+    elements_mm.emplace_back((cell.column - (columns - 1) / 2.0) * default_pitch_mm,
+                             (cell.row - (rows - 1) / 2.0) * default_pitch_mm);
   }
   return elements_mm;
 }

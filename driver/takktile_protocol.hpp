@@ -15,7 +15,6 @@ namespace palpate::takktile {
 // calibration. All are IN requests to the device, also the request that starts and stops the
 // stream.
 inline constexpr UsbId usb_id{.vendor = 0x59e3, .product = 0x74c7};
-inline constexpr std::uint8_t request_type = 0xc0;
 inline constexpr std::size_t packet_bytes = 64;
 
 inline constexpr std::uint8_t request_alive_map = 0x5c;    ///< ask for alive_map_request_bytes
@@ -54,8 +53,7 @@ std::vector<Cell> parse_alive_map(std::span<const std::uint8_t> reply);
 
 /// Centres of the cells in the sensor frame, in mm: columns along x, rows along y. The origin is
 /// the middle of the whole grid, dead cells included.
-std::vector<glm::dvec2> element_positions(std::span<const Cell> cells,
-                                          double pitch_mm = default_pitch_mm);
+std::vector<glm::dvec2> element_positions(std::span<const Cell> cells);
 
 /// Coefficients of one cell's barometer, an MPL115A2 (its data sheet, "Coefficients").
 struct Calibration {
@@ -76,14 +74,14 @@ double pressure_kpa(const Calibration& calibration, std::uint16_t raw_pressure,
 
 /// Decodes the bulk stream, one packet per push. A frame has 4 bytes per cell that is alive and
 /// ends with a packet of fewer than packet_bytes, perhaps an empty packet.
-class Deframer final : public palpate::Deframer {
+class Deframer {
  public:
   /// @param calibrations [cell] in the order of parse_alive_map()
   explicit Deframer(std::vector<Calibration> calibrations);
 
-  void push(std::span<const std::uint8_t> packet, std::vector<ParsedFrame>& frames) override;
-  void reset() override;
-  const DeframerCounters& counters() const override { return counters_; }
+  void push(std::span<const std::uint8_t> packet, std::vector<ParsedFrame>& frames);
+  void reset();
+  const DeframerCounters& counters() const { return counters_; }
 
   /// Size of a frame in bytes.
   std::size_t frame_bytes() const { return 4 * calibrations_.size(); }

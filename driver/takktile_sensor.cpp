@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <exception>
 #include <memory>
-#include <mutex>
 #include <optional>
+#include <span>
 #include <string>
 #include <thread>
 #include <utility>
@@ -16,12 +16,129 @@
 #include "driver/frame_queue.hpp"
 #include "driver/open_sensor.hpp"
 #include "driver/serial_profile.hpp"
-#include "driver/takktile_link.hpp"
+#include "driver/takktile_protocol.hpp"
 #include "driver/transfer_ring.hpp"
+#include "driver/usb_device.hpp"
 #include "palpate/error.hpp"
-#include "palpate/sensor.hpp"
 
 namespace palpate {
+
+namespace takktile {
+
+namespace {
+
+// wIndex starts and stops the stream. The firmware ANDs it with the bits 0x06 of its timer's clock
+// source: a wIndex of 1 would stop the timer.
+constexpr std::uint16_t start_index = 0xff;
+constexpr std::uint16_t stop_index = 0;
+
+// A transfer is longer than any frame, so that a frame's short packet ends every transfer.
+constexpr std::size_t transfer_packets = 8;
+static_assert(transfer_packets * packet_bytes > 4 * rows * columns);
+
+/// What a board tells of itself, before its interface is claimed.
+struct Setup {
+  SensorDescription description;
+  std::vector<Calibration> calibrations;  ///< [e]
+};
+
+/// @throws Error
+Setup read_setup(UsbHandle& handle) {
+  Setup setup;
+  const std::vector<Cell> cells =
+      parse_alive_map(handle.control_in(request_alive_map, alive_map_request_bytes));
+  for (const Cell& cell : cells) {
+    setup.calibrations.push_back(parse_calibration(handle.control_in(
+        request_calibration, calibration_bytes, static_cast<std::uint16_t>(cell.column),
+        static_cast<std::uint16_t>(cell.row))));
+  }
+  // The rate is unknown: the period begins only after all cells are read, which takes longer.
+  setup.description = {.name = "TakkTile",
+                       .serial = handle.device().serial,
+                       .pressure_unit = "kPa",
+                       .elements_mm = element_positions(cells)};
+  return setup;
+}
+
+/// A TakkTile whose interface is claimed and whose calibration is read: barometers under rubber, in
+/// strips of five, which answer USB vendor requests. Between begin() and end() the link holds the
+/// board's stream. Use it from one thread.
+class Link {
+ public:
+  /// The context and the counters must outlive the link. @throws Error
+  Link(const UsbContext& context, const ListedDevice& device, TransferRing::Counters& counters)
+      : context_(context),
+        counters_(counters),
+        handle_(context, device),
+        stream_(handle_.vendor_interface()),
+        setup_((handle_.claim(stream_.number), read_setup(handle_))),
+        deframer_(setup_.calibrations) {}
+
+  const SensorDescription& description() const { return setup_.description; }
+
+  /// Starts the stream. @throws Error
+  void begin() {
+    deframer_.reset();
+    // The ring must be ready before the board sends.
+    ring_.emplace(context_, handle_, stream_.endpoint, transfer_packets * packet_bytes, counters_);
+    try {
+      handle_.control_in(request_stream, stream_reply_bytes, default_period_ticks, start_index);
+    } catch (...) {
+      ring_.reset();
+      throw;
+    }
+  }
+
+  /// Ends the stream and frees the ring. Returns the transfers not yet taken from the ring.
+  std::vector<TransferRing::Completion> end() {
+    try {
+      handle_.control_in(request_stream, stream_reply_bytes, 0, stop_index);
+    } catch (const Error&) {
+      // The board may be unplugged; the transfers and interfaces are released either way.
+    }
+    ring_->drain();
+    std::vector<TransferRing::Completion> last = ring_->completed();
+    ring_.reset();
+    return last;
+  }
+
+  /// The ring of the running stream.
+  TransferRing& ring() { return *ring_; }
+  Deframer& deframer() { return deframer_; }
+
+  /// Passes the bytes of a transfer to the deframer and appends the frames that they complete.
+  /// @return the number of frames known to be spoiled
+  std::uint64_t parse(const TransferRing::Completion& completion,
+                      std::vector<ParsedFrame>& frames) {
+    const std::size_t before = frames.size();
+    // The deframer takes single packets. A transfer that ended early behind full packets alone
+    // ended with an empty packet.
+    std::span<const std::uint8_t> rest = completion.bytes;
+    while (rest.size() >= packet_bytes) {
+      deframer_.push(rest.first(packet_bytes), frames);
+      rest = rest.subspan(packet_bytes);
+    }
+    if (completion.ended || !rest.empty()) {
+      deframer_.push(rest, frames);
+    }
+    // A transfer that ended without a frame had too few cells or too many.
+    const bool spoiled = completion.ended && !completion.bytes.empty() && frames.size() == before;
+    return spoiled ? 1 : 0;
+  }
+
+ private:
+  const UsbContext& context_;
+  TransferRing::Counters& counters_;
+  UsbHandle handle_;
+  VendorInterface stream_;
+  Setup setup_;
+  Deframer deframer_;
+  std::optional<TransferRing> ring_;
+};
+
+}  // namespace
+
+}  // namespace takktile
 
 namespace {
 
@@ -57,10 +174,9 @@ std::vector<ListedDevice> boards() { return with_id(usb_devices(), {takktile::us
 
 /// A sensor that streams from a TakkTile, also after it was unplugged and plugged in again.
 ///
-/// Between start() and stop(), a thread of the sensor's own uses the device: it handles libusb's
-/// events, decodes transfers, ends stalls and waits for an unplugged board. It passes frames to
-/// next() through a queue.
-class TakktileSensor final : public Sensor {
+/// Its thread handles libusb's events, decodes transfers, ends stalls and waits for an unplugged
+/// board.
+class TakktileSensor final : public QueuedSensor {
  public:
   /// @param which serial number or port of the board; "" if only one is plugged in. @throws Error
   explicit TakktileSensor(const std::string& which) {
@@ -74,27 +190,16 @@ class TakktileSensor final : public Sensor {
 
   ~TakktileSensor() override { stop(); }
 
-  TakktileSensor(const TakktileSensor&) = delete;
-  TakktileSensor& operator=(const TakktileSensor&) = delete;
-
-  const SensorDescription& description() const override { return description_; }
-
   void start() override {
     stop();
-    queue_.clear();
+    forget();
     transfer_counters_ = {};
     tally_ = {};
-    lost_before_next_ = 0;
-    publish();
     begin();
     gone_ = false;
     stopping_ = false;
     back_off_ = first_back_off;
     thread_ = std::thread([this] { run(); });
-  }
-
-  std::optional<Frame> next(std::chrono::milliseconds timeout) override {
-    return queue_.pop(timeout);
   }
 
   bool gone() const override { return gone_; }
@@ -105,15 +210,6 @@ class TakktileSensor final : public Sensor {
       libusb_interrupt_event_handler(context_.get());
       thread_.join();
     }
-  }
-
-  SensorCounters counters() const override {
-    const FrameQueue::Counters queue = queue_.counters();
-    const std::lock_guard lock(mutex_);
-    SensorCounters counters = published_;
-    counters.frames = queue.pushed - queue.dropped;
-    counters.lost += queue.dropped;
-    return counters;
   }
 
  private:
@@ -148,15 +244,15 @@ class TakktileSensor final : public Sensor {
         } else {
           wait_for_return();
         }
-        publish();
+        publish_counts();
       }
       if (link_) {
         deliver(link_->end());
-        publish();
+        publish_counts();
       }
     } catch (...) {
       link_.reset();
-      queue_.fail(std::current_exception());
+      fail();
     }
   }
 
@@ -167,17 +263,17 @@ class TakktileSensor final : public Sensor {
     deliver(completions);
     ring.recycle(std::move(completions));
     if (ring.lost()) {
-      lose();
+      let_go();
     } else if (ring.halted()) {
       try {
         ring.recover();
       } catch (const Error&) {
-        lose();
+        let_go();
       }
     }
   }
 
-  void lose() {
+  void let_go() {
     link_.reset();
     gone_ = true;
   }
@@ -221,12 +317,12 @@ class TakktileSensor final : public Sensor {
   }
 
   void deliver(const std::vector<TransferRing::Completion>& completions) {
-    Deframer& deframer = link_->deframer();
+    takktile::Deframer& deframer = link_->deframer();
     for (const TransferRing::Completion& completion : completions) {
       if (completion.missing > 0) {
         // A lower bound: each missing transfer held at least part of a frame.
         deframer.reset();
-        lost_before_next_ += completion.missing;
+        lose(completion.missing);
         tally_.lost += completion.missing;
       }
       const std::uint64_t garbage_before = deframer.counters().garbage_bytes;
@@ -234,23 +330,20 @@ class TakktileSensor final : public Sensor {
       const std::uint64_t spoiled = link_->parse(completion, parsed_);
       tally_.garbage_bytes += deframer.counters().garbage_bytes - garbage_before;
       tally_.lost += spoiled;
-      lost_before_next_ += spoiled;
+      lose(spoiled);
       for (ParsedFrame& frame : parsed_) {
-        queue_.push({.host_time_s = completion.host_time_s,
-                     .device_time_s = frame.device_time_s,
-                     .values = std::move(frame.values),
-                     .lost_before = std::exchange(lost_before_next_, 0)});
+        push(std::move(frame), completion.host_time_s);
         back_off_ = first_back_off;
       }
     }
   }
 
-  void publish() {
-    const std::lock_guard lock(mutex_);
-    published_ = tally_;
-    published_.timeouts = transfer_counters_.timeouts;
-    published_.stalls = transfer_counters_.stalls;
-    published_.overflows = transfer_counters_.overflows;
+  void publish_counts() {
+    SensorCounters counters = tally_;
+    counters.timeouts = transfer_counters_.timeouts;
+    counters.stalls = transfer_counters_.stalls;
+    counters.overflows = transfer_counters_.overflows;
+    publish(counters);
   }
 
   UsbContext context_;
@@ -262,19 +355,19 @@ class TakktileSensor final : public Sensor {
   SensorCounters tally_;
   std::unique_ptr<takktile::Link> link_;  // none while the board is gone
   std::vector<ParsedFrame> parsed_;
-  std::uint64_t lost_before_next_ = 0;
   std::chrono::milliseconds back_off_ = {};
 
-  SensorDescription description_;
-  std::thread thread_;
   std::atomic<bool> stopping_ = false;
   std::atomic<bool> gone_ = false;
-  FrameQueue queue_;
-  mutable std::mutex mutex_;
-  SensorCounters published_;  // copy of tally_ for counters(), guarded by mutex_
 };
 
 }  // namespace
+
+SensorDescription describe_takktile(const ListedDevice& device) {
+  const UsbContext context;
+  UsbHandle handle(context, device);
+  return takktile::read_setup(handle).description;
+}
 
 std::unique_ptr<Sensor> open_takktile(const std::string& which) {
   return std::make_unique<TakktileSensor>(which);

@@ -4,7 +4,7 @@
 #include <new>
 #include <utility>
 
-#include "driver/frame_queue.hpp"
+#include "model/stream_time.hpp"
 
 namespace palpate {
 

@@ -6,8 +6,6 @@
 
 #include <fmt/format.h>
 
-#include "driver/data_folder.hpp"
-
 namespace palpate {
 
 namespace {
@@ -122,13 +120,13 @@ void UsbHandle::claim(int interface) {
   claimed_.push_back(interface);
 }
 
-std::vector<std::uint8_t> UsbHandle::control_in(const ControlRequest& request,
-                                                std::uint16_t length) {
+std::vector<std::uint8_t> UsbHandle::control_in(std::uint8_t request, std::uint16_t length,
+                                                std::uint16_t value, std::uint16_t index) {
+  constexpr std::uint8_t from_vendor = 0xc0;  // USB 2.0, table 9-2: IN, vendor, to the device
   std::vector<std::uint8_t> reply(length);
-  const int filled =
-      checked(device_, fmt::format("request 0x{:02X}", request.request),
-              libusb_control_transfer(handle_.get(), request.type, request.request, request.value,
-                                      request.index, reply.data(), length, patience_ms));
+  const int filled = checked(device_, fmt::format("request 0x{:02X}", request),
+                             libusb_control_transfer(handle_.get(), from_vendor, request, value,
+                                                     index, reply.data(), length, patience_ms));
   reply.resize(static_cast<std::size_t>(filled));
   return reply;
 }

@@ -33,14 +33,6 @@ class UsbContext {
 /// interface in use, the program to end, if /proc shows it.
 Error usb_fault(const ListedDevice& device, const std::string& what, int code);
 
-/// The fields of a control request, by USB 2.0, table 9-2.
-struct ControlRequest {
-  std::uint8_t type = 0;  ///< bmRequestType; 0x80 = towards the host
-  std::uint8_t request = 0;
-  std::uint16_t value = 0;
-  std::uint16_t index = 0;
-};
-
 /// An interface with a bulk endpoint towards the host.
 struct VendorInterface {
   int number = 0;
@@ -62,7 +54,9 @@ class UsbHandle {
   /// Claims the interface. A kernel driver that holds it is detached until the handle is destroyed.
   void claim(int interface);
 
-  std::vector<std::uint8_t> control_in(const ControlRequest& request, std::uint16_t length);
+  /// Asks the device a request of its vendor's; returns its reply, at most so long.
+  std::vector<std::uint8_t> control_in(std::uint8_t request, std::uint16_t length,
+                                       std::uint16_t value = 0, std::uint16_t index = 0);
   void clear_halt(std::uint8_t endpoint);
 
   const ListedDevice& device() const { return device_; }

@@ -113,7 +113,8 @@ void write(const Imported& imported) {
 /// The values in the column that splits the rows, each once, in their order; 1 and 1.0 are one.
 std::vector<std::string> values_in(const ImportArguments& options) {
   constexpr std::size_t most = 1000;
-  CsvTable table = open_table(options.pressures, table_options(options));
+  validate(options);
+  CsvTable table = open_table(options.pressures, options);
   const auto column = table.find_or_count(options.split);
   if (!column) {
     table.refuse_columns("`split {}`: no column is called so", options.split);

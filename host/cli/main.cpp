@@ -21,7 +21,7 @@
 
 #include "cli/commands.hpp"
 #include "cli/supervisor.hpp"
-#include "io/descriptor.hpp"
+#include "model/descriptor.hpp"
 #include "model/option_words.hpp"
 #include "palpate/error.hpp"
 

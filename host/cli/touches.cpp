@@ -25,7 +25,7 @@
 #include "palpate/touch_detector.hpp"
 #include "palpate/virtual_sensor.hpp"
 #include "streaming/rest_finder.hpp"
-#include "streaming/stroke_touches.hpp"
+#include "streaming/press_touches.hpp"
 
 namespace palpate::cli {
 

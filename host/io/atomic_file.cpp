@@ -8,8 +8,8 @@
 #include <cstring>
 #include <system_error>
 
-#include "io/descriptor.hpp"
 #include "io/input_file.hpp"
+#include "model/descriptor.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "io/csv_table.hpp"
+#include "io/table_columns.hpp"
 
 namespace palpate {
 
@@ -16,5 +16,20 @@ namespace palpate {
 /// @throws Error where a part names no column, or one twice
 std::vector<std::size_t> choose_columns(const CsvTable& table, const std::string& text,
                                         const std::vector<std::size_t>& taken, const char* option);
+
+/// For each element the columns of the axes of which its reading is made: one, or x, y and z.
+using PressureColumns = std::vector<std::vector<std::size_t>>;
+
+/// The columns of each element among those of the pressures.
+/// @throws Error where they are more or fewer than the elements, or not in their order
+PressureColumns pressure_columns(const CsvTable& table, const std::vector<std::size_t>& columns,
+                                 std::size_t elements, const TableOptions& options);
+
+/// True where the rows are as wide as the array's grid.
+bool is_of_blocks(const CsvTable& table, const TableOptions& options);
+
+/// The reading of the row in the columns of an element, NaN where it is unknown: of the last axis,
+/// or the length of the vector.
+double reading_in(const CsvTable& table, const std::vector<std::size_t>& axes, bool is_norm);
 
 }  // namespace palpate

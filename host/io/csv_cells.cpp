@@ -39,11 +39,6 @@ std::vector<std::string_view> cells_in(std::string_view line, char separator) {
   return cells;
 }
 
-bool are_numbers(const std::vector<std::string_view>& cells, char separator) {
-  return std::ranges::all_of(
-      cells, [&](std::string_view cell) { return cell.empty() || is_numeric(cell, separator); });
-}
-
 bool is_half_empty(const std::vector<std::string_view>& cells) {
   return 2 * static_cast<std::size_t>(std::ranges::count(cells, std::string_view())) >=
          cells.size();
@@ -145,6 +140,11 @@ bool is_numeric(std::string_view cell, char separator) {
   double number = 0.0;
   const char* const end = text.data() + text.size();
   return !text.empty() && std::from_chars(text.data(), end, number).ptr == end;
+}
+
+bool are_numbers(const std::vector<std::string_view>& cells, char separator) {
+  return std::ranges::all_of(
+      cells, [&](std::string_view cell) { return cell.empty() || is_numeric(cell, separator); });
 }
 
 bool is_header(const std::vector<std::string_view>& cells, char separator) {

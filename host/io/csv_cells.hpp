@@ -33,6 +33,9 @@ std::optional<double> number_in(std::string_view cell, char separator);
 /// True for the text of a number, finite or not: 1, -2.5, inf, nan, 1e999.
 bool is_numeric(std::string_view cell, char separator);
 
+/// True for a row of such texts and empty cells.
+bool are_numbers(const std::vector<std::string_view>& cells, char separator);
+
 /// Where rows of a table begin in a text that may hold other lines before them.
 struct TableStart {
   std::size_t first = 0;  ///< index of the row that is the first, or the header

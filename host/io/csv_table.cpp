@@ -11,7 +11,7 @@
 
 #include <fmt/ranges.h>
 
-#include "io/descriptor.hpp"
+#include "model/descriptor.hpp"
 #include "model/number_text.hpp"
 #include "model/printable.hpp"
 
@@ -138,6 +138,15 @@ bool CsvTable::is_kept() const {
   });
 }
 
+/// The row's cells, without an empty one behind a last separator; false where they are more or
+/// fewer than the columns.
+bool CsvTable::has_width() {
+  if (cells_.size() == columns_.size() + 1 && cells_.back().empty()) {
+    cells_.pop_back();
+  }
+  return cells_.size() == columns_.size();
+}
+
 bool CsvTable::next() {
   do {
     row_is_first_ = std::exchange(row_is_ready_, false);
@@ -146,10 +155,7 @@ bool CsvTable::next() {
         return false;
       }
       split();
-      if (cells_.size() == columns_.size() + 1 && cells_.back().empty()) {
-        cells_.pop_back();
-      }
-      if (cells_.size() != columns_.size()) {
+      if (!has_width()) {
         refuse("the row has {} cells, the first row {}; write the same columns in every row",
                cells_.size(), columns_.size());
       }
@@ -165,15 +171,8 @@ bool CsvTable::next_numbers(bool& passed) {
     return true;
   }
   while (next_line()) {
-    if (split_cells(line_, separator_, cells_) != nullptr) {
-      continue;
-    }
-    if (cells_.size() == columns_.size() + 1 && cells_.back().empty()) {
-      cells_.pop_back();
-    }
-    if (cells_.size() == columns_.size() && std::ranges::all_of(cells_, [&](std::string_view cell) {
-          return cell.empty() || is_numeric(cell, separator_);
-        })) {
+    if (split_cells(line_, separator_, cells_) == nullptr && has_width() &&
+        are_numbers(cells_, separator_)) {
       passed = number_ > before + 1;
       return true;
     }

@@ -88,6 +88,7 @@ class CsvTable {
  private:
   bool next_line();
   void split();
+  bool has_width();
   void find_start(std::uint64_t header_line);
   void name_columns();
   bool is_kept() const;

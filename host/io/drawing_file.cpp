@@ -12,14 +12,6 @@ namespace palpate {
 
 namespace {
 
-/// A picture of grey values, row 0 at the top.
-struct GreyPicture {
-  std::size_t rows = 0;
-  std::size_t columns = 0;
-  double pixel_mm = 0.0;
-  std::vector<std::uint8_t> grey = {};  ///< [rows, columns], 0 is black
-};
-
 /// Grey of a colour, by Rec. 709.
 std::uint8_t luma(std::uint32_t red, std::uint32_t green, std::uint32_t blue) {
   return static_cast<std::uint8_t>((54 * red + 183 * green + 19 * blue) / 256);
@@ -33,8 +25,9 @@ bool ends_in(const std::filesystem::path& path, const char* ending) {
   return own == ending;
 }
 
-/// Reads a PNG picture on white paper, or black where light is occupied.
-GreyPicture read_png(const std::filesystem::path& path, const DrawingOptions& options) {
+/// Reads which places of a PNG picture on white paper, or black where light is occupied, are
+/// occupied.
+Mask read_png(const std::filesystem::path& path, const DrawingOptions& options) {
   struct Image : png_image {
     Image() : png_image{} { version = PNG_IMAGE_VERSION; }
     ~Image() { png_image_free(this); }
@@ -54,22 +47,28 @@ GreyPicture read_png(const std::filesystem::path& path, const DrawingOptions& op
            "`mm-per-pixel`",
            image.width, image.height);
   }
-  GreyPicture picture{
-      .rows = image.height, .columns = image.width, .pixel_mm = *options.mm_per_pixel};
   image.format = PNG_FORMAT_RGBA;
   std::vector<png_byte> colours(PNG_IMAGE_SIZE(image));
-  if (png_image_finish_read(&image, nullptr, colours.data(), 0, nullptr) == 0) {
+  const int upwards = -static_cast<int>(PNG_IMAGE_ROW_STRIDE(image));
+  if (png_image_finish_read(&image, nullptr, colours.data(), upwards, nullptr) == 0) {
     refuse(path, "is damaged ({}); save it again as PNG", image.message);
   }
+  Mask mask{.pixel_mm = *options.mm_per_pixel,
+            .origin_mm = glm::dvec2(*options.mm_per_pixel / 2.0),
+            .rows = image.height,
+            .columns = image.width};
+  mask.occupied.reserve(colours.size() / 4);
   // Transparent edges are mixed with the paper as viewers do: without gamma.
   const std::uint32_t paper = options.light ? 0 : 255;
-  picture.grey.reserve(colours.size() / 4);
+  constexpr std::uint8_t middle_grey = 128;
   for (std::size_t i = 0; i < colours.size(); i += 4) {
     const std::uint32_t alpha = colours[i + 3];
     const auto over = [&](std::uint32_t c) { return (c * alpha + paper * (255 - alpha)) / 255; };
-    picture.grey.push_back(luma(over(colours[i]), over(colours[i + 1]), over(colours[i + 2])));
+    const bool is_light =
+        luma(over(colours[i]), over(colours[i + 1]), over(colours[i + 2])) >= middle_grey;
+    mask.occupied.push_back(is_light == options.light ? 1 : 0);
   }
-  return picture;
+  return mask;
 }
 
 }  // namespace
@@ -90,19 +89,7 @@ Mask read_drawing(const std::filesystem::path& path, const DrawingOptions& optio
     refuse(fmt::format("`mm-per-pixel {}`", *options.mm_per_pixel), "give {:g} to {:g} mm",
            least_length_mm, most_length_mm);
   }
-  const GreyPicture picture = read_png(path, options);
-  Mask mask{.pixel_mm = picture.pixel_mm,
-            .origin_mm = glm::dvec2(picture.pixel_mm / 2.0),
-            .rows = picture.rows,
-            .columns = picture.columns};
-  mask.occupied.reserve(picture.grey.size());
-  constexpr std::uint8_t middle_grey = 128;
-  for (std::size_t row = picture.rows; row-- > 0;) {
-    for (std::size_t column = 0; column < picture.columns; ++column) {
-      const bool is_light = picture.grey[row * picture.columns + column] >= middle_grey;
-      mask.occupied.push_back(is_light == options.light ? 1 : 0);
-    }
-  }
+  Mask mask = read_png(path, options);
   if (std::ranges::count(mask.occupied, 1) == 0) {
     refuse(path, "nothing in it is {}; fill the object's area {}, or give `occupied {}`",
            options.light ? "light" : "dark", options.light ? "white" : "black",
@@ -112,19 +99,21 @@ Mask read_drawing(const std::filesystem::path& path, const DrawingOptions& optio
 }
 
 std::string reached_edges(const Mask& mask) {
-  bool left = false, right = false, lower = false, upper = false;
-  for (std::size_t i = 0; i < mask.occupied.size(); ++i) {
-    const std::size_t row = i / mask.columns;
-    const std::size_t column = i % mask.columns;
-    const bool occupied = mask.occupied[i] != 0;
-    left |= occupied && column == 0;
-    right |= occupied && column + 1 == mask.columns;
-    lower |= occupied && row == 0;
-    upper |= occupied && row + 1 == mask.rows;
-  }
+  const auto reaches = [&](std::size_t first, std::size_t count, std::size_t step) {
+    for (std::size_t i = 0; i < count; ++i) {
+      if (mask.occupied[first + i * step] != 0) {
+        return true;
+      }
+    }
+    return false;
+  };
+  const std::size_t columns = mask.columns;
   std::string edges;
-  for (const auto& [reached, name] : {std::pair(left, "left"), std::pair(right, "right"),
-                                      std::pair(lower, "lower"), std::pair(upper, "upper")}) {
+  for (const auto& [reached, name] :
+       {std::pair(reaches(0, mask.rows, columns), "left"),
+        std::pair(reaches(columns - 1, mask.rows, columns), "right"),
+        std::pair(reaches(0, columns, 1), "lower"),
+        std::pair(reaches((mask.rows - 1) * columns, columns, 1), "upper")}) {
     if (reached) {
       edges += (edges.empty() ? "" : ", ") + std::string(name);
     }

@@ -105,6 +105,19 @@ struct FrameRecorder::Impl {
     pending.clear();
   }
 
+  // Calls use(name, shape of a row, values) of every dataset that grows. `time` comes last: a row
+  // that has its time is complete.
+  void each_dataset(const auto& use) {
+    using Shape = Hdf5Writer::Shape;
+    use("pressure", Shape{sensor.elements_mm.size()}, pending.pressure);
+    use("sensor_pose", Shape{3}, pending.sensor_pose);
+    if (has_device_time) {
+      use("device_time", Shape{}, pending.device_time_s);
+    }
+    use("lost_before", Shape{}, pending.lost_before);
+    use("time", Shape{}, pending.time_s);
+  }
+
   // Writes the first rows as a whole file, opens it for more, and then gives it its name: whenever
   // the recorder is killed, there is no file or a readable one, and a reader can always tell that
   // the file is being recorded.
@@ -122,14 +135,10 @@ struct FrameRecorder::Impl {
       if (!sensor.baseline.empty()) {
         out.dataset("baseline", {e}, sensor.baseline);
       }
-      constexpr auto growing = Hdf5Writer::Storage::growing;
-      out.dataset("pressure", {n, e}, pending.pressure, growing);
-      out.dataset("sensor_pose", {n, 3}, pending.sensor_pose, growing);
-      if (has_device_time) {
-        out.dataset("device_time", {n}, pending.device_time_s, growing);
-      }
-      out.dataset("lost_before", {n}, pending.lost_before, growing);
-      out.dataset("time", {n}, pending.time_s, growing);
+      each_dataset([&](const char* name, Hdf5Writer::Shape shape, const auto& values) {
+        shape.insert(shape.begin(), n);
+        out.dataset(name, shape, values, Hdf5Writer::Storage::growing);
+      });
       try {
         out.save([&](const std::filesystem::path& finished) { open(finished); });
       } catch (...) {
@@ -154,13 +163,11 @@ struct FrameRecorder::Impl {
       mark_as_being_recorded(*static_cast<int*>(descriptor));
     }
     bool open = file.valid();
-    for (const char* name : row_names) {
-      if (has_device_time || std::string_view(name) != "device_time") {
-        Hdf5Handle dataset(H5Dopen2(file.get(), name, H5P_DEFAULT), H5Dclose);
-        open = open && dataset.valid();
-        datasets.emplace(name, std::move(dataset));
-      }
-    }
+    each_dataset([&](const char* name, const Hdf5Writer::Shape&, const auto&) {
+      Hdf5Handle dataset(H5Dopen2(file.get(), name, H5P_DEFAULT), H5Dclose);
+      open = open && dataset.valid();
+      datasets.emplace(name, std::move(dataset));
+    });
     if (!open) {
       throw Error(Fault::system,
                   fmt::format("{}: cannot be written: {}; free or repair the disk and try again",
@@ -174,28 +181,23 @@ struct FrameRecorder::Impl {
                   fmt::format("{}: is closed; record to another file", path.string()));
     }
     const Hdf5Session session;
-    append("pressure", H5T_NATIVE_FLOAT, sensor.elements_mm.size(), pending.pressure.data());
-    append("sensor_pose", H5T_NATIVE_DOUBLE, 3, pending.sensor_pose.data());
-    append("lost_before", H5T_NATIVE_UINT64, 1, pending.lost_before.data());
-    if (has_device_time) {
-      append("device_time", H5T_NATIVE_DOUBLE, 1, pending.device_time_s.data());
-    }
-    // `time` comes last: a row that has its time is complete.
-    append("time", H5T_NATIVE_DOUBLE, 1, pending.time_s.data());
+    each_dataset([this](const char* name, const Hdf5Writer::Shape& row, const auto& values) {
+      append(datasets.at(name).get(), row.empty() ? 1 : row[0], values.data());
+    });
   }
 
-  void append(std::string_view name, hid_t type, std::size_t width, const void* values) {
-    const hid_t dataset = datasets.at(name).get();
+  void append(hid_t dataset, std::size_t width, const void* values) {
     const int rank = width == 1 ? 1 : 2;
     const hsize_t begin[] = {saved, 0};
     const hsize_t count[] = {pending.size(), width};
     const hsize_t extent[] = {saved + pending.size(), width};
     bool done = H5Dset_extent(dataset, extent) >= 0;
+    const Hdf5Handle type(H5Dget_type(dataset), H5Tclose);
     const Hdf5Handle there(H5Dget_space(dataset), H5Sclose);
     const Hdf5Handle here(H5Screate_simple(rank, count, nullptr), H5Sclose);
     done = done &&
            H5Sselect_hyperslab(there.get(), H5S_SELECT_SET, begin, nullptr, count, nullptr) >= 0 &&
-           H5Dwrite(dataset, type, here.get(), there.get(), H5P_DEFAULT, values) >= 0 &&
+           H5Dwrite(dataset, type.get(), here.get(), there.get(), H5P_DEFAULT, values) >= 0 &&
            H5Dflush(dataset) >= 0;
     if (!done) {
       fail();

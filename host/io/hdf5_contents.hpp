@@ -4,16 +4,21 @@
 #include <filesystem>
 #include <functional>
 #include <map>
-#include <memory>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
-#include "io/hdf5_reader.hpp"
+#include "io/hdf5_handle.hpp"
 #include "io/input_file.hpp"
 
 namespace palpate {
+
+/// Most numbers in one piece of a dataset.
+inline constexpr std::uint64_t hdf5_piece = 1 << 17;
+
+/// The bytes of values of this shape and width; UINT64_MAX on overflow.
+std::uint64_t stored_bytes(std::span<const std::uint64_t> shape, std::uint64_t width);
 
 /// The named attributes and datasets that exist in an HDF5 file's root group.
 ///
@@ -25,23 +30,22 @@ namespace palpate {
 /// has a process watch it, see watch_reading(); in another program, soft links are refused too.
 class Hdf5Contents {
  public:
-  /// Takes a piece of a dataset's numbers in row-major order; `first` is the index of its first. A
-  /// piece holds whole rows of the last axis, unless such a row has more than hdf5_piece numbers.
-  /// Must not use HDF5.
+  /// Takes a piece of a dataset's numbers in row-major order; `first` counts the numbers that were
+  /// read before it. A piece holds whole rows of the last axis, unless such a row has more than
+  /// hdf5_piece numbers. Must not use HDF5.
   using Take = std::function<void(std::uint64_t first, std::span<const double> numbers)>;
 
   /// @throws Error where the file is missing, unreadable, no HDF5 file, truncated or damaged.
   Hdf5Contents(const std::filesystem::path& path, const std::vector<std::string>& attributes,
                const std::vector<std::string>& datasets);
+  ~Hdf5Contents();
+  Hdf5Contents(const Hdf5Contents&) = delete;
+  Hdf5Contents& operator=(const Hdf5Contents&) = delete;
 
   /// False for a file that is being recorded or whose recorder was killed: see FrameRecorder.
   bool closed() const { return closed_; }
   bool has_attribute(const std::string& name) const { return attributes_.contains(name); }
   bool has_dataset(const std::string& name) const { return datasets_.contains(name); }
-
-  ~Hdf5Contents();
-  Hdf5Contents(const Hdf5Contents&) = delete;
-  Hdf5Contents& operator=(const Hdf5Contents&) = delete;
 
   // The functions below throw Error, naming file and field, on a missing field or another type.
   std::string text(const std::string& attribute) const;
@@ -53,8 +57,24 @@ class Hdf5Contents {
   /// Returns the shape of a dataset of numbers; throws Error where it has not `rank` dimensions.
   const std::vector<std::uint64_t>& shape(const std::string& dataset,
                                           std::optional<std::size_t> rank = {}) const;
-  /// Reads the dataset's first rows, or all.
-  void read(const std::string& dataset, const Take& take, std::uint64_t rows = UINT64_MAX);
+  /// Numbers in so many rows of the dataset, or in all that follow, from one on.
+  std::uint64_t size(const std::string& dataset, std::uint64_t first_row = 0,
+                     std::uint64_t rows = UINT64_MAX) const;
+  /// Reads these rows.
+  void read(const std::string& dataset, const Take& take, std::uint64_t first_row = 0,
+            std::uint64_t rows = UINT64_MAX) const;
+  /// Returns these rows' numbers.
+  template <typename Number>
+  std::vector<Number> read(const std::string& dataset, std::uint64_t first_row = 0,
+                           std::uint64_t rows = UINT64_MAX) const {
+    std::vector<Number> all;
+    all.reserve(size(dataset, first_row, rows));
+    const auto take = [&](std::uint64_t, std::span<const double> some) {
+      all.insert(all.end(), some.begin(), some.end());
+    };
+    read(dataset, take, first_row, rows);
+    return all;
+  }
 
   /// Throws Error, "<path>: <message>"; see palpate::refuse().
   template <typename... Parts>
@@ -64,14 +84,43 @@ class Hdf5Contents {
   }
 
  private:
-  const Hdf5Value& find(const std::map<std::string, Hdf5Value>& fields, const char* kind,
-                        const std::string& name) const;
+  struct Field {
+    std::vector<std::uint64_t> shape;  ///< empty for a scalar
+    std::string problem;               ///< why it cannot be read; "": it can
+  };
+  /// Integers, floats and enumerations of any width, or texts of fixed or variable length.
+  struct Attribute : Field {
+    std::vector<double> numbers;
+    std::vector<std::string> texts;
+  };
+  struct Dataset : Field {
+    Hdf5Handle handle{H5I_INVALID_HID, H5Dclose};
+    std::uint64_t band_bytes = 0;  ///< of the chunks that a pass over the rows holds at once
+  };
+
+  // Return the field's problem.
+  static std::string read_attribute(hid_t attribute, std::uint64_t file_bytes, Attribute& value);
+  std::string open(const std::string& name, std::uint64_t file_bytes, Dataset& dataset) const;
+  std::string reopen_with_cache(const std::string& name, hid_t creation, std::size_t width,
+                                Dataset& dataset) const;
+  template <typename Named>
+  const Named& find(const std::map<std::string, Named>& fields, const char* kind,
+                    const std::string& name) const {
+    const auto found = fields.find(name);
+    if (found == fields.end()) {
+      refuse("{} '{}' is missing; add it", kind, name);
+    }
+    if (!found->second.problem.empty()) {
+      refuse("{} '{}' {}", kind, name, found->second.problem);
+    }
+    return found->second;
+  }
 
   std::filesystem::path path_;
   bool closed_ = true;
-  std::map<std::string, Hdf5Value> attributes_;
-  std::map<std::string, Hdf5Value> datasets_;
-  std::unique_ptr<Hdf5Reader> reader_;
+  Hdf5Handle file_{H5I_INVALID_HID, H5Fclose};
+  std::map<std::string, Attribute> attributes_;
+  std::map<std::string, Dataset> datasets_;
 };
 
 }  // namespace palpate

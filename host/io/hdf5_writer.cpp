@@ -9,7 +9,7 @@
 #include <unistd.h>
 
 #include "io/atomic_file.hpp"
-#include "io/descriptor.hpp"
+#include "model/descriptor.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {

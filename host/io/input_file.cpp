@@ -4,7 +4,7 @@
 #include <cstring>
 #include <system_error>
 
-#include "io/descriptor.hpp"
+#include "model/descriptor.hpp"
 
 namespace palpate {
 

@@ -39,12 +39,8 @@ Hdf5Contents open_map(const std::filesystem::path& path) {
            "touch_elements", "touch_valid"}};
 }
 
-/// Reads and checks an open map file, holding a few MB of it at a time.
-/// @param head called with the map without cells
-/// @param cells called with the log odds in row-major order, in pieces
-void scan(const std::filesystem::path& path, Hdf5Contents& file,
-          const std::function<void(const OccupancyGrid&)>& head,
-          const std::function<void(std::span<const float>)>& cells) {
+/// Reads and checks the map without its cells.
+OccupancyGrid read_map_head(const std::filesystem::path& path, const Hdf5Contents& file) {
   require_format(file, map_format);
   OccupancyGrid map;
   map.label = file.text("label");
@@ -78,17 +74,25 @@ void scan(const std::filesystem::path& path, Hdf5Contents& file,
   map.nx = static_cast<int>(shape[1]);
   require_text(path, "attribute 'label'", map.label);
   require_sound(path, fault_without_cells(map));
-  head(map);
+  return map;
+}
+
+/// Reads and checks the log odds, holding a few MB of them at a time.
+/// @param cells called with them in row-major order, in pieces
+void read_cells(const std::filesystem::path& path, const Hdf5Contents& file,
+                const OccupancyGrid& head,
+                const std::function<void(std::span<const float>)>& cells) {
   std::vector<float> narrow;
   file.read("log_odds", [&](std::uint64_t first, std::span<const double> log_odds) {
     narrow.assign(log_odds.begin(), log_odds.end());
-    require_sound(path, fault_of_cells(map, first, narrow));
+    require_sound(path, fault_of_cells(head, first, narrow));
     cells(narrow);
   });
 }
 
 /// Reads numbers that go with the cells, where the file has them.
-std::vector<float> read_layer(Hdf5Contents& file, const char* name, const OccupancyGrid& map) {
+std::vector<float> read_layer(const Hdf5Contents& file, const char* name,
+                              const OccupancyGrid& map) {
   if (!file.has_dataset(name)) {
     return {};
   }
@@ -98,26 +102,18 @@ std::vector<float> read_layer(Hdf5Contents& file, const char* name, const Occupa
     file.refuse("dataset '{}' has the shape {}, 'log_odds' {}; store one number for each cell",
                 name, file.shape(name, 2), cells);
   }
-  std::vector<float> numbers;
-  numbers.reserve(map.log_odds.size());
-  file.read(name, [&](std::uint64_t, std::span<const double> part) {
-    numbers.insert(numbers.end(), part.begin(), part.end());
-  });
-  return numbers;
+  return file.read<float>(name);
 }
 
 /// All numbers of a dataset of this shape.
-std::vector<double> read_all(Hdf5Contents& file, const char* name,
+template <typename Number = double>
+std::vector<Number> read_all(const Hdf5Contents& file, const char* name,
                              const std::vector<std::uint64_t>& shape) {
   if (file.shape(name) != shape) {
     file.refuse("dataset '{}' has the shape {}, not {}; build the map anew", name, file.shape(name),
                 shape);
   }
-  std::vector<double> numbers;
-  file.read(name, [&](std::uint64_t, std::span<const double> part) {
-    numbers.insert(numbers.end(), part.begin(), part.end());
-  });
-  return numbers;
+  return file.read<Number>(name);
 }
 
 /// The groups of `touches` touches, as write_groups() wrote them.
@@ -156,8 +152,8 @@ void write_groups(Hdf5Writer& file, const std::vector<std::string>& groups) {
 }
 
 /// Reads what the map was built from, where the file has it.
-std::shared_ptr<const MapSource> read_source(const std::filesystem::path& path, Hdf5Contents& file,
-                                             const OccupancyGrid& map) {
+std::shared_ptr<const MapSource> read_source(const std::filesystem::path& path,
+                                             const Hdf5Contents& file, const OccupancyGrid& map) {
   if (!file.has_dataset("touch_pressure") || !map.spread_mm) {
     return {};
   }
@@ -206,8 +202,7 @@ std::shared_ptr<const MapSource> read_source(const std::filesystem::path& path, 
     source->groups = read_groups(file, n);
   }
   if (file.has_dataset("touch_valid")) {
-    const std::vector<double> valid = read_all(file, "touch_valid", {n, e});
-    touches.valid.assign(valid.begin(), valid.end());
+    touches.valid = read_all<std::uint8_t>(file, "touch_valid", {n, e});
   }
   return source;
 }
@@ -243,35 +238,27 @@ void write_source(Hdf5Writer& file, const MapSource& source) {
 }  // namespace
 
 MapSummary summarize_map(const std::filesystem::path& path) {
-  MapSummary summary;
+  const Hdf5Contents file = open_map(path);
+  MapSummary summary{.head = read_map_head(path, file), .log_odds = {}};
   std::optional<Extremes> log_odds;
-  Hdf5Contents file = open_map(path);
-  scan(
-      path, file, [&](const OccupancyGrid& head) { summary.head = head; },
-      [&](std::span<const float> cells) {
-        for (const float cell : cells) {
-          widen(log_odds, cell);
-          summary.occupied += cell > 0.0F ? 1 : 0;
-        }
-      });
+  read_cells(path, file, summary.head, [&](std::span<const float> cells) {
+    for (const float cell : cells) {
+      widen(log_odds, cell);
+      summary.occupied += cell > 0.0F ? 1 : 0;
+    }
+  });
   summary.log_odds = log_odds.value();  // no map is without cells
   return summary;
 }
 
 OccupancyGrid read_map(const std::filesystem::path& path) {
-  Hdf5Contents file = open_map(path);
-  OccupancyGrid map;
-  scan(
-      path, file,
-      [&](const OccupancyGrid& head) {
-        map = head;
-        map.file = path.string();
-        const auto count = static_cast<std::size_t>(map.nx) * static_cast<std::size_t>(map.ny);
-        map.log_odds.reserve(count);
-      },
-      [&](std::span<const float> cells) {
-        map.log_odds.insert(map.log_odds.end(), cells.begin(), cells.end());
-      });
+  const Hdf5Contents file = open_map(path);
+  OccupancyGrid map = read_map_head(path, file);
+  map.file = path.string();
+  map.log_odds.reserve(static_cast<std::size_t>(map.nx) * static_cast<std::size_t>(map.ny));
+  read_cells(path, file, map, [&](std::span<const float> cells) {
+    map.log_odds.insert(map.log_odds.end(), cells.begin(), cells.end());
+  });
   map.observations = read_layer(file, "observations", map);
   map.mean_level = read_layer(file, "mean_level", map);
   map.source = read_source(path, file, map);
@@ -307,12 +294,11 @@ void write_map(const std::filesystem::path& path, const OccupancyGrid& map) {
   if (map.centred_mm != glm::dvec2(0.0)) {
     file.attribute("centred_mm", {map.centred_mm.x, map.centred_mm.y});
   }
-  file.dataset("log_odds", {static_cast<std::size_t>(map.ny), static_cast<std::size_t>(map.nx)},
-               map.log_odds);
   const std::vector<std::size_t> shape{static_cast<std::size_t>(map.ny),
                                        static_cast<std::size_t>(map.nx)};
-  for (const auto& [name, numbers] :
-       {std::pair{"observations", &map.observations}, std::pair{"mean_level", &map.mean_level}}) {
+  for (const auto& [name, numbers] : {std::pair{"log_odds", &map.log_odds},
+                                      {"observations", &map.observations},
+                                      {"mean_level", &map.mean_level}}) {
     if (!numbers->empty()) {
       file.dataset(name, shape, *numbers);
     }

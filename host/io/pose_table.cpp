@@ -34,21 +34,18 @@ TableColumns columns_without_names(const CsvTable& table, const TableOptions& op
         "without a time before them, or add a header",
         count);
   }
-  const auto column = [](std::size_t index, const std::optional<Unit>& unit, const Unit& usual) {
-    return UnitColumn{.index = index, .unit = unit.value_or(usual), .assumed = !unit};
-  };
   TableColumns columns;
   columns.pose.form = of_pose == in_space ? PoseForm::quaternion : PoseForm::planar;
   std::size_t index = 0;
   if (count > of_pose) {
-    columns.time = column(index++, options.time_unit, time_units.front());
+    columns.time = unit_column(table, index++, time_units, options);
   }
   const std::size_t lengths = of_pose == in_space ? 3 : 2;
-  for (std::size_t i = 0; i < of_pose; ++i) {
-    columns.pose.columns.push_back(
-        i < lengths           ? column(index++, options.length_unit, length_units.front())
-        : of_pose == in_space ? UnitColumn{.index = index++}
-                              : column(index++, options.angle_unit, angle_units.front()));
+  for (std::size_t i = 0; i < of_pose; ++i, ++index) {
+    columns.pose.columns.push_back(i < lengths ? unit_column(table, index, length_units, options)
+                                   : of_pose == in_space
+                                       ? UnitColumn{.index = index}
+                                       : unit_column(table, index, angle_units, options));
   }
   return columns;
 }
@@ -68,38 +65,20 @@ TableColumns find_columns(const CsvTable& table, const TableOptions& options) {
                            : "");
 }
 
-/// Columns of rotations out of the plane, and of the height, that poses of x, y and theta leave
-/// out.
-struct LeftOut {
-  std::vector<UnitColumn> rotations;
-  std::optional<UnitColumn> height;
-};
-
-LeftOut left_out_of(const CsvTable& table, const PoseColumns& pose, const TableOptions& options) {
-  constexpr Quantity rotations[] = {{"roll", angle_units, "pose-unit"},
-                                    {"pitch", angle_units, "pose-unit"},
-                                    {"rx", angle_units, "pose-unit"},
-                                    {"ry", angle_units, "pose-unit"}};
-  constexpr Quantity height{"z", length_units, "pose-unit"};
-  const auto taken = [&](const std::optional<UnitColumn>& column) {
-    return column &&
-           std::ranges::find(pose.columns, column->index, &UnitColumn::index) != pose.columns.end();
-  };
-  LeftOut left_out;
-  if (!table.has_header()) {
-    return left_out;
-  }
-  for (const Quantity& quantity : rotations) {
-    const auto column = find_column(table, quantity, "", options.angle_unit);
-    if (column && !taken(column)) {
-      left_out.rotations.push_back(*column);
+/// The columns of these names that are no part of the pose.
+std::vector<UnitColumn> columns_beside(const PoseColumns& pose, const CsvTable& table,
+                                       std::initializer_list<const char*> names,
+                                       std::span<const Unit> units, const TableOptions& options) {
+  std::vector<UnitColumn> beside;
+  for (const char* name : names) {
+    const auto column =
+        table.has_header() ? find_column(table, name, units, options) : std::nullopt;
+    if (column &&
+        std::ranges::find(pose.columns, column->index, &UnitColumn::index) == pose.columns.end()) {
+      beside.push_back(*column);
     }
   }
-  left_out.height = find_column(table, height, "", options.length_unit);
-  if (taken(left_out.height)) {
-    left_out.height.reset();
-  }
-  return left_out;
+  return beside;
 }
 
 /// Refuses a row whose rotation does not leave the array flat in the xy plane.
@@ -224,20 +203,16 @@ class SpatialReader {
   }
 
  private:
-  // The position's unit is not that of the rotation's numbers.
-  std::vector<double> with_rotation(std::span<const double> in_mm) const {
-    std::vector<double> numbers(in_mm.begin(), in_mm.end());
+  /// None where the numbers are no rotation and position.
+  std::optional<SpatialPose> matrix_of(std::span<const double> in_mm, bool by_columns) const {
+    // The position's unit is not that of the rotation's numbers.
     const Unit& unit = pose_.columns.front().unit;
+    std::vector<double> numbers(in_mm.begin(), in_mm.end());
     for (double& number : numbers) {
       number *= unit.divisor / unit.multiplier;
     }
-    return numbers;
-  }
-
-  std::optional<SpatialPose> matrix_of(std::span<const double> in_mm, bool by_columns) const {
-    auto pose = pose_of_matrix(with_rotation(in_mm), by_columns);
+    auto pose = pose_of_matrix(numbers, by_columns);
     if (pose) {
-      const Unit& unit = pose_.columns.front().unit;
       pose->translation_mm *= unit.multiplier / unit.divisor;
     }
     return pose;
@@ -279,16 +254,6 @@ class SpatialReader {
   bool by_columns_ = true;
 };
 
-/// Says what a table of x, y and an angle leaves out.
-void say_left_out(const CsvTable& table, const LeftOut& left_out, PoseTable& poses) {
-  if (left_out.height) {
-    poses.understood.push_back(fmt::format(
-        "its column '{}' was left out; poses in space (with roll, pitch and yaw, or a quaternion) "
-        "have a height",
-        printable(table.columns()[left_out.height->index])));
-  }
-}
-
 }  // namespace
 
 PoseTable read_poses(const std::filesystem::path& path, const TableOptions& options,
@@ -301,8 +266,17 @@ PoseTable read_poses(const std::filesystem::path& path, const TableOptions& opti
     poses.units[i] = pose.columns[i].unit;
     poses.assumed_units = poses.assumed_units || pose.columns[i].assumed;
   }
-  const LeftOut left_out = is_planar ? left_out_of(table, pose, options) : LeftOut();
-  say_left_out(table, left_out, poses);
+  // Poses of x, y and an angle leave out the height and rotations out of the plane.
+  std::vector<UnitColumn> rotations;
+  if (is_planar) {
+    rotations = columns_beside(pose, table, {"roll", "pitch", "rx", "ry"}, angle_units, options);
+    for (const UnitColumn& height : columns_beside(pose, table, {"z"}, length_units, options)) {
+      poses.understood.push_back(fmt::format(
+          "its column '{}' was left out; poses in space (with roll, pitch and yaw, or a "
+          "quaternion) have a height",
+          printable(table.columns()[height.index])));
+    }
+  }
   const SpatialReader spatial(path, options, pose);
   if (table.skipped_lines() > 0) {
     poses.understood.push_back(skipped_words(table));
@@ -310,15 +284,12 @@ PoseTable read_poses(const std::filesystem::path& path, const TableOptions& opti
   if (!pose.are_usual) {
     poses.understood.push_back(spatial.words(table));
   }
-  std::optional<TableTimes> times;
-  if (time && with_times) {
-    times.emplace(table, *time);
-  }
+  TableTimes times(table, time.value_or(UnitColumn()));
   std::uint64_t repeated = 0;
   while (table.next()) {
-    require_flat(table, left_out.rotations);
-    if (times) {
-      const double time_s = times->next(poses.time_s.size());
+    require_flat(table, rotations);
+    if (time && with_times) {
+      const double time_s = times.next(poses.time_s.size());
       if (!poses.time_s.empty() && time_s == poses.time_s.back()) {
         ++repeated;
         continue;
@@ -340,7 +311,7 @@ PoseTable read_poses(const std::filesystem::path& path, const TableOptions& opti
     poses.understood.push_back(fmt::format(
         "{} of its rows repeat the time of the row before, whose pose is kept", repeated));
   }
-  poses.steps = times ? std::move(times->steps) : std::vector<ClockStep>();
+  poses.steps = std::move(times.steps);
   return poses;
 }
 

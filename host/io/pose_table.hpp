@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "io/spatial_pose.hpp"
-#include "io/table_times.hpp"
+#include "io/table_columns.hpp"
 #include "palpate/pose.hpp"
 
 namespace palpate {

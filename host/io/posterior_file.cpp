@@ -14,7 +14,6 @@
 #include "io/hdf5_writer.hpp"
 #include "io/input_file.hpp"
 #include "io/recording_rules.hpp"
-#include "io/stored_bytes.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
@@ -77,7 +76,7 @@ std::int64_t numbered_bins(const std::filesystem::path& path, const Posterior& p
 }
 
 /// The rows of `index`, [n, 4] of object, theta, y and x, as places among all bins.
-std::vector<std::int64_t> read_index(const std::filesystem::path& path, Hdf5Contents& file,
+std::vector<std::int64_t> read_index(const std::filesystem::path& path, const Hdf5Contents& file,
                                      const Posterior& posterior) {
   numbered_bins(path, posterior);
   const std::uint64_t rows = file.shape("log_likelihood", 1)[0];
@@ -109,15 +108,15 @@ std::vector<std::int64_t> read_index(const std::filesystem::path& path, Hdf5Cont
   return index;
 }
 
-/// Reads and checks a posterior's file, holding a few MB of it and `index` at a time.
-/// @param head called with the posterior without log-likelihoods
-/// @param log_likelihood called with the log-likelihoods, in their order, in pieces
-void scan_posterior(const std::filesystem::path& path, const std::function<void(Posterior)>& head,
-                    const std::function<void(std::span<const double>)>& log_likelihood) {
-  Hdf5Contents file(path,
-                    {"format", "version", "objects", "bins_x", "bins_y", "bins_theta", "x_mm",
-                     "y_mm", "theta_rad", "pivot_mm", "rest_mass_bound"},
-                    {"log_likelihood", "index"});
+Hdf5Contents open_posterior(const std::filesystem::path& path) {
+  return {path,
+          {"format", "version", "objects", "bins_x", "bins_y", "bins_theta", "x_mm", "y_mm",
+           "theta_rad", "pivot_mm", "rest_mass_bound"},
+          {"log_likelihood", "index"}};
+}
+
+/// Reads and checks the posterior without its log-likelihoods.
+Posterior read_posterior_head(const std::filesystem::path& path, const Hdf5Contents& file) {
   const int version = require_format(file, posterior_format, evaluated_version);
   Posterior posterior;
   posterior.objects = file.texts("objects");
@@ -137,11 +136,7 @@ void scan_posterior(const std::filesystem::path& path, const std::function<void(
     file.refuse("dataset 'log_likelihood' has the shape {}; its attributes make it {}", shape,
                 expected);
   }
-  head(std::move(posterior));
-  file.read("log_likelihood", [&](std::uint64_t, std::span<const double> values) {
-    require_log_likelihoods(path, values);
-    log_likelihood(values);
-  });
+  return posterior;
 }
 
 void write_posterior_head(Hdf5Writer& file, int version, const std::vector<std::string>& objects,
@@ -194,49 +189,33 @@ void write_evaluated(const std::filesystem::path& path, const Posterior& posteri
 }  // namespace
 
 PosteriorSummary summarize_posterior(const std::filesystem::path& path) {
-  PosteriorSummary summary;
-  std::int64_t bins = 0;
-  std::int64_t k = 0;
-  scan_posterior(
-      path,
-      [&](Posterior head) {
-        bins = head.lattice.bins();
-        summary.peaks.assign(head.objects.size(), {-std::numeric_limits<double>::infinity(), 0});
-        summary.head = std::move(head);
-      },
-      [&](std::span<const double> values) {
-        const bool every_bin = !summary.head.rest_mass_bound;
-        for (const double value : values) {
-          const std::int64_t place =
-              every_bin ? k : summary.head.index[static_cast<std::size_t>(k)];
-          PosteriorSummary::Peak& peak = summary.peaks[static_cast<std::size_t>(place / bins)];
-          if (value > peak.log_likelihood) {
-            peak = {value, place % bins};
-          }
-          ++k;
-        }
-      });
+  const Hdf5Contents file = open_posterior(path);
+  PosteriorSummary summary{.head = read_posterior_head(path, file), .peaks = {}};
+  const Posterior& head = summary.head;
+  const std::int64_t bins = head.lattice.bins();
+  summary.peaks.assign(head.objects.size(), {-std::numeric_limits<double>::infinity(), 0});
+  file.read("log_likelihood", [&](std::uint64_t first, std::span<const double> values) {
+    require_log_likelihoods(path, values);
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      const std::int64_t place =
+          head.rest_mass_bound ? head.index[first + i] : static_cast<std::int64_t>(first + i);
+      PosteriorSummary::Peak& peak = summary.peaks[static_cast<std::size_t>(place / bins)];
+      if (values[i] > peak.log_likelihood) {
+        peak = {values[i], place % bins};
+      }
+    }
+  });
   return summary;
 }
 
 Posterior read_posterior(const std::filesystem::path& path) {
-  Posterior posterior;
-  scan_posterior(
-      path,
-      [&](Posterior head) {
-        posterior = std::move(head);
-        if (posterior.rest_mass_bound) {
-          posterior.log_likelihood.reserve(posterior.index.size());
-          return;
-        }
-        const std::vector<std::uint64_t> shape =
-            shape_of(posterior.objects.size(), posterior.lattice);
-        posterior.log_likelihood.reserve(stored_bytes(shape, 1));
-      },
-      [&](std::span<const double> values) {
-        posterior.log_likelihood.insert(posterior.log_likelihood.end(), values.begin(),
-                                        values.end());
-      });
+  const Hdf5Contents file = open_posterior(path);
+  Posterior posterior = read_posterior_head(path, file);
+  posterior.log_likelihood.reserve(file.size("log_likelihood"));
+  file.read("log_likelihood", [&](std::uint64_t, std::span<const double> values) {
+    require_log_likelihoods(path, values);
+    posterior.log_likelihood.insert(posterior.log_likelihood.end(), values.begin(), values.end());
+  });
   return posterior;
 }
 

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "io/column_choice.hpp"
-#include "io/pressure_columns.hpp"
 #include "model/number_text.hpp"
 #include "model/printable.hpp"
 #include "model/stream_time.hpp"
@@ -58,27 +57,25 @@ PressureTable read_wide(CsvTable& table, std::size_t elements, const TableOption
   std::optional<UnitColumn> time = find_time(table, options);
   if (!table.has_header() && !time && options.pressure_columns.empty() &&
       table.columns().size() == elements + 1) {
-    time = UnitColumn{.index = 0, .unit = options.time_unit.value_or(time_units.front())};
+    time = unit_column(table, 0, time_units, options);
   }
   const auto device_time = table.find("device_time");
   const auto lost_before = table.find("lost_before");
   const std::vector<UnitColumn> pose = find_pose(table, options).columns;
   std::vector<std::size_t> taken;
-  for (const auto& column : {device_time, lost_before}) {
+  const auto take = [&](const std::optional<std::size_t>& column) {
     if (column) {
       taken.push_back(*column);
     }
-  }
-  if (time) {
-    taken.push_back(time->index);
-  }
+  };
+  take(device_time);
+  take(lost_before);
+  take(time ? std::optional(time->index) : std::nullopt);
   for (const UnitColumn& column : pose) {
-    taken.push_back(column.index);
+    take(column.index);
   }
-  for (const auto& [name, value] : options.where) {
-    if (const auto column = table.find_or_count(name)) {
-      taken.push_back(*column);
-    }
+  for (const auto& [name, value] : conditions(options)) {
+    take(table.find_or_count(name));
   }
   const std::vector<std::size_t> columns =
       options.pressure_columns.empty()
@@ -103,16 +100,13 @@ PressureTable read_wide(CsvTable& table, std::size_t elements, const TableOption
   }
   all.holds_poses = !pose.empty();
   all.pressure.reserve(table.count_lines() * elements);
-  std::optional<TableTimes> times;
-  if (time) {
-    times.emplace(table, *time);
-  }
+  TableTimes times(table, time.value_or(UnitColumn()));
   while (table.next()) {
     for (const std::vector<std::size_t>& axes : readings) {
       all.pressure.push_back(reading_in(table, axes, is_norm));
     }
-    if (times) {
-      all.time_s.push_back(times->next(all.time_s.size()));
+    if (time) {
+      all.time_s.push_back(times.next(all.time_s.size()));
     }
     if (device_time) {
       all.device_time_s.push_back(table.number(*device_time).value_or(unknown_number));
@@ -122,7 +116,7 @@ PressureTable read_wide(CsvTable& table, std::size_t elements, const TableOption
           count_in(table, *lost_before, largest_count, "is no count of lost frames"));
     }
   }
-  all.steps = times ? std::move(times->steps) : std::vector<ClockStep>();
+  all.steps = std::move(times.steps);
   return all;
 }
 
@@ -152,22 +146,6 @@ PressureTable read_blocks(CsvTable& table, std::size_t rows) {
   return all;
 }
 
-/// At least the number of runs of rows with the same cell in a column: a number may be written in
-/// two ways.
-std::uint64_t count_runs(const std::filesystem::path& path, std::size_t column,
-                         const TableOptions& options) {
-  CsvTable rows = open_table(path, options);
-  std::string last;
-  std::uint64_t runs = 0;
-  while (rows.next()) {
-    if (runs == 0 || rows.text(column) != last) {
-      last = rows.text(column);
-      ++runs;
-    }
-  }
-  return runs;
-}
-
 double frame_in(const CsvTable& table, std::size_t column, double last) {
   const double frame = table.require_number(column);
   if (frame < last) {
@@ -194,19 +172,14 @@ std::optional<PressureTable> read_long(CsvTable& table, std::size_t elements,
         "or name it by `time-column`");
   }
   PressureTable all;
-  all.pressure.reserve(count_runs(table.path(), time ? time->index : *frame_column, options) *
-                       elements);
+  all.pressure.reserve(table.count_lines());  // of as many readings, where none is left out
   const std::string remedy =
       fmt::format("is no element; the array has {}, counted from 0", elements);
   double last = before_all;
   std::vector<bool> read(elements);
-  std::optional<TableTimes> times;
-  if (time) {
-    times.emplace(table, *time);
-  }
+  TableTimes times(table, time.value_or(UnitColumn()));
   while (table.next()) {
-    const double key =
-        times ? times->next(all.time_s.size()) : frame_in(table, *frame_column, last);
+    const double key = time ? times.next(all.time_s.size()) : frame_in(table, *frame_column, last);
     if (key != last) {
       all.pressure.insert(all.pressure.end(), elements, unknown_number);
       read.assign(elements, false);
@@ -224,7 +197,7 @@ std::optional<PressureTable> read_long(CsvTable& table, std::size_t elements,
     all.pressure[all.pressure.size() - elements + element] =
         table.number(*pressure_column).value_or(unknown_number);
   }
-  all.steps = times ? std::move(times->steps) : std::vector<ClockStep>();
+  all.steps = std::move(times.steps);
   return all;
 }
 
@@ -233,7 +206,7 @@ UnitColumn find_axis(const CsvTable& table, std::size_t axis) {
     return {.index = axis, .unit = length_units.front()};
   }
   const char* const name = axis == 0 ? "x" : "y";
-  const auto column = find_column(table, {name, length_units, "array"}, "", {});
+  const auto column = find_column(table, name, length_units, {});
   if (!column) {
     table.refuse_columns("no column is called '{}'; write a row 'x y' in mm for each element",
                          name);

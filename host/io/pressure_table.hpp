@@ -6,7 +6,7 @@
 
 #include <glm/vec2.hpp>
 
-#include "io/table_times.hpp"
+#include "io/table_columns.hpp"
 
 namespace palpate {
 

@@ -20,6 +20,36 @@ void require_one_of(const std::filesystem::path& path, const char* attribute,
   }
 }
 
+void require_pressures(const std::filesystem::path& path, const Recording& head,
+                       std::size_t elements, std::size_t first_row,
+                       std::span<const double> pressure) {
+  for (std::size_t i = 0; i < pressure.size(); ++i) {
+    const std::size_t k = first_row * elements + i;
+    const bool alive =
+        head.valid.empty() || head.valid[head.valid.size() == elements ? k % elements : k] != 0;
+    const bool unknown = head.rows == "frames" && std::isnan(pressure[i]);
+    if (!std::isfinite(pressure[i]) && alive && !unknown) {
+      refuse(path,
+             "dataset 'pressure'[{}, {}] = {}; store finite numbers, and 0 in 'valid' for a dead "
+             "element",
+             k / elements, k % elements, pressure[i]);
+    }
+  }
+}
+
+void require_poses(const std::filesystem::path& path, bool may_be_unknown, std::size_t first_row,
+                   std::span<const Pose> T_robot_sensor) {
+  for (std::size_t i = 0; i < T_robot_sensor.size(); ++i) {
+    const Pose& pose = T_robot_sensor[i];
+    const bool unknown = std::isnan(pose.translation_mm.x) && std::isnan(pose.translation_mm.y) &&
+                         std::isnan(pose.theta_rad);
+    if (!is_finite(pose) && !(unknown && may_be_unknown)) {
+      refuse(path, "dataset 'sensor_pose'[{}] = [{}, {}, {}]; store finite numbers", first_row + i,
+             pose.translation_mm.x, pose.translation_mm.y, pose.theta_rad);
+    }
+  }
+}
+
 }  // namespace
 
 void require_rows_of_touches(const Recording& recording) {
@@ -62,36 +92,6 @@ void require_head(const std::filesystem::path& path, const Recording& head, std:
   }
 }
 
-void require_pressures(const std::filesystem::path& path, const Recording& head,
-                       std::size_t elements, std::size_t first, std::span<const double> pressure) {
-  for (std::size_t i = 0; i < pressure.size(); ++i) {
-    const std::size_t k = first + i;
-    const bool alive =
-        head.valid.empty() || head.valid[head.valid.size() == elements ? k % elements : k] != 0;
-    const bool unknown = head.rows == "frames" && std::isnan(pressure[i]);
-    if (alive && !unknown && !std::isfinite(pressure[i])) {
-      refuse(path,
-             "dataset 'pressure'[{}, {}] = {}; store finite numbers, and 0 in 'valid' for a dead "
-             "element",
-             k / elements, k % elements, pressure[i]);
-    }
-  }
-}
-
-void require_poses(const std::filesystem::path& path, const Recording& head, std::size_t first,
-                   std::span<const Pose> T_robot_sensor) {
-  const bool may_be_unknown = head.rows == "frames";
-  for (std::size_t i = 0; i < T_robot_sensor.size(); ++i) {
-    const Pose& pose = T_robot_sensor[i];
-    const bool unknown = std::isnan(pose.translation_mm.x) && std::isnan(pose.translation_mm.y) &&
-                         std::isnan(pose.theta_rad);
-    if (!is_finite(pose) && !(unknown && may_be_unknown)) {
-      refuse(path, "dataset 'sensor_pose'[{}] = [{}, {}, {}]; store finite numbers", first + i,
-             pose.translation_mm.x, pose.translation_mm.y, pose.theta_rad);
-    }
-  }
-}
-
 void require_elements(const std::filesystem::path& path, std::size_t first,
                       std::span<const glm::dvec2> elements_mm) {
   for (std::size_t i = 0; i < elements_mm.size(); ++i) {
@@ -103,32 +103,27 @@ void require_elements(const std::filesystem::path& path, std::size_t first,
   }
 }
 
-void require_times(const std::filesystem::path& path, std::size_t first,
-                   std::span<const double> time_s) {
-  for (std::size_t i = 0; i < time_s.size(); ++i) {
-    if (!std::isfinite(time_s[i])) {
-      refuse(path, "dataset 'time'[{}] = {}; store seconds since the Unix epoch", first + i,
-             time_s[i]);
+void require_rows(const std::filesystem::path& path, const Recording& head, std::size_t elements,
+                  const Recording& rows, std::size_t first_row) {
+  require_pressures(path, head, elements, first_row, rows.pressure);
+  require_poses(path, head.rows == "frames", first_row, rows.T_robot_sensor);
+  require_elements(path, first_row * elements, rows.elements_mm);
+  for (std::size_t i = 0; i < rows.time_s.size(); ++i) {
+    if (!std::isfinite(rows.time_s[i])) {
+      refuse(path, "dataset 'time'[{}] = {}; store seconds since the Unix epoch", first_row + i,
+             rows.time_s[i]);
     }
   }
-}
-
-void require_device_times(const std::filesystem::path& path, std::size_t first,
-                          std::span<const double> device_time_s) {
-  for (std::size_t i = 0; i < device_time_s.size(); ++i) {
-    if (std::isinf(device_time_s[i])) {
+  for (std::size_t i = 0; i < rows.device_time_s.size(); ++i) {
+    if (std::isinf(rows.device_time_s[i])) {
       refuse(path, "dataset 'device_time'[{}] = {}; store seconds, or NaN where they are unknown",
-             first + i, device_time_s[i]);
+             first_row + i, rows.device_time_s[i]);
     }
   }
-}
-
-void require_lost_counts(const std::filesystem::path& path, std::size_t first,
-                         std::span<const std::uint64_t> lost_before) {
-  for (std::size_t i = 0; i < lost_before.size(); ++i) {
-    if (lost_before[i] > largest_count) {
-      refuse(path, "dataset 'lost_before'[{}] = {}; store counts up to {}", first + i,
-             lost_before[i], largest_count);
+  for (std::size_t i = 0; i < rows.lost_before.size(); ++i) {
+    if (rows.lost_before[i] > largest_count) {
+      refuse(path, "dataset 'lost_before'[{}] = {}; store counts up to {}", first_row + i,
+             rows.lost_before[i], largest_count);
     }
   }
 }

@@ -19,24 +19,17 @@ void require_text(const std::filesystem::path& path, std::string_view field, std
 /// @param elements number of elements of the array
 void require_head(const std::filesystem::path& path, const Recording& head, std::size_t elements);
 
-// The functions below check some of the rows; `first` is the index of the first value among all.
-
-/// Pressures [n, e] of living elements are finite or, in a stream of frames, NaN (Unknown). Uses
-/// `head.valid`.
-void require_pressures(const std::filesystem::path& path, const Recording& head,
-                       std::size_t elements, std::size_t first, std::span<const double> pressure);
-/// Poses are finite or, in a stream of frames, all NaN (unknown at that time).
-void require_poses(const std::filesystem::path& path, const Recording& head, std::size_t first,
-                   std::span<const Pose> T_robot_sensor);
+/// Requires finite places. @param first index of the first of them
 void require_elements(const std::filesystem::path& path, std::size_t first,
                       std::span<const glm::dvec2> elements_mm);
-void require_times(const std::filesystem::path& path, std::size_t first,
-                   std::span<const double> time_s);
-/// Times of the sensor's own clock may be NaN (unknown).
-void require_device_times(const std::filesystem::path& path, std::size_t first,
-                          std::span<const double> device_time_s);
-void require_lost_counts(const std::filesystem::path& path, std::size_t first,
-                         std::span<const std::uint64_t> lost_before);
+
+/// Requires sound rows. Pressures of living elements and poses are finite or, in a stream of
+/// frames, NaN (Unknown); times of the sensor's own clock may be NaN (unknown).
+/// @param head holds `valid` of all rows
+/// @param rows some of the recording's rows; may be `head`
+/// @param first_row index of the first of them
+void require_rows(const std::filesystem::path& path, const Recording& head, std::size_t elements,
+                  const Recording& rows, std::size_t first_row);
 
 /// Refuses a raw stream, whose rows are frames.
 void require_rows_of_touches(const Recording& recording);

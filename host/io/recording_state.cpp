@@ -8,13 +8,13 @@
 
 #include <fmt/format.h>
 
-#include "io/descriptor.hpp"
 #include "io/file_format.hpp"
 #include "io/hdf5_handle.hpp"
 #include "io/hdf5_writer.hpp"
 #include "io/input_file.hpp"
 #include "io/recording_survey.hpp"
 #include "io/watched_reading.hpp"
+#include "model/descriptor.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
 

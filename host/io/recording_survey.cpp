@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <span>
 #include <utility>
 
 #include <fmt/format.h>
@@ -27,81 +28,97 @@ std::uint64_t digest_with(std::uint64_t digest, double number) {
   return digest ^ (digest >> 31);
 }
 
+// Numbers of a block of rows that are held at a time: 4 MiB.
+constexpr std::uint64_t block = 1 << 19;
+
 class Survey {
  public:
-  explicit Survey(const std::filesystem::path& path) : path_(path) {}
+  explicit Survey(const std::filesystem::path& path) : file_(path) {}
 
   RecordingSurvey run() {
-    const auto each = [this](const auto& values) {
-      for (const auto& value : values) {
-        take(value);
+    result_.head = file_.head();
+    if (head_.pressure_unit == "kPa") {
+      result_.threshold = ContactClassifier{}.threshold;
+    }
+    result_.pressure.elements.resize(e_);
+    take_places(0, head_.elements_mm);
+    Recording rows;
+    const std::uint64_t at_once = std::max<std::uint64_t>(1, block / e_);
+    for (std::uint64_t first = 0; first < file_.head().rows; first += at_once) {
+      file_.read(first, std::min(at_once, file_.head().rows - first), rows);
+      take_places(first, rows.elements_mm);
+      for (std::size_t i = 0; i < rows.size(); ++i) {
+        take_row(first + i, rows, i);
       }
-    };
-    scan_recording(path_, {.head = [&](const RecordingHead& head) { begin(head); },
-                           .pressure = [&](auto values) { take_pressures(values); },
-                           .T_robot_sensor = each,
-                           .elements_mm = each,
-                           .time_s = each,
-                           .device_time_s = [](std::span<const double>) {},
-                           .lost_before =
-                               [&](auto counts) {
-                                 result_.lost = result_.lost.value_or(0);
-                                 for (const std::uint64_t count : counts) {
-                                   count_lost(*result_.lost, count);
-                                 }
-                               }});
+    }
     result_.spacing = spacing_of(places_mm_);
     if (result_.spacing) {
       for (std::size_t& element : result_.spacing->closest) {
         element = placed_[element];
       }
     }
-    result_.repeated = repeated_touches();
+    std::ranges::sort(touches_);
+    const auto repeated = std::ranges::unique(touches_);
+    result_.repeated = repeated.size();
     return std::move(result_);
   }
 
  private:
-  /// RecordingSurvey::repeated
-  std::uint64_t repeated_touches() const {
-    std::vector<std::uint64_t> digests;
-    for (std::size_t i = 0; i < std::min(pressed_.size(), posed_.size()); ++i) {
-      if (pressed_[i] != 0) {
-        digests.push_back(pressed_[i] ^ posed_[i]);
+  void take_row(std::uint64_t row, const Recording& rows, std::size_t i) {
+    const bool felt = take_pressures(row, std::span(rows.pressure).subspan(i * e_, e_));
+    const Pose& pose = rows.T_robot_sensor[i];
+    take_pose(pose);
+    if (felt && head_.rows != "frames") {
+      std::uint64_t digest = 0;
+      for (const double pressure : std::span(rows.pressure).subspan(i * e_, e_)) {
+        digest = digest_with(digest, pressure);
       }
+      for (const double part : {pose.translation_mm.x, pose.translation_mm.y, pose.theta_rad}) {
+        digest = digest_with(digest, part);
+      }
+      touches_.push_back(digest);
     }
-    std::ranges::sort(digests);
-    return digests.size() -
-           static_cast<std::size_t>(std::unique(digests.begin(), digests.end()) - digests.begin());
-  }
-
-  bool of_touches() const { return result_.head.recording.rows != "frames"; }
-
-  void begin(const RecordingHead& head) {
-    result_.head = head;
-    if (head.recording.pressure_unit == "kPa") {
-      result_.threshold = ContactClassifier{}.threshold;
+    if (!rows.time_s.empty()) {
+      take_time(row, rows.time_s[i]);
     }
-    result_.pressure.elements.resize(head.elements);
-  }
-
-  void take_pressures(std::span<const double> pressures) {
-    const std::vector<std::uint8_t>& valid = result_.head.recording.valid;
-    const std::size_t e = result_.head.elements;
-    const bool valid_by_row = valid.size() > e;
-    for (const double pressure : pressures) {
-      if (valid.empty() || valid[(valid_by_row ? pressure_row_ * e : 0) + element_] != 0) {
-        take_reading(pressure);
-      }
-      pressures_ = digest_with(pressures_, pressure);
-      if (++element_ == e) {
-        end_row();
-      }
+    if (!rows.lost_before.empty()) {
+      result_.lost = result_.lost.value_or(0);
+      count_lost(*result_.lost, rows.lost_before[i]);
     }
   }
 
-  void take_reading(double reading) {
+  bool is_alive(std::uint64_t row, std::size_t element) const {
+    const std::vector<std::uint8_t>& valid = head_.valid;
+    return valid.empty() || valid[(valid.size() > e_ ? row * e_ : 0) + element] != 0;
+  }
+
+  /// Returns whether the row is in contact.
+  bool take_pressures(std::uint64_t row, std::span<const double> readings) {
+    std::optional<double> strongest;  // pressure above the baseline
+    std::size_t strongest_element = 0;
+    for (std::size_t element = 0; element < e_; ++element) {
+      if (!is_alive(row, element)) {
+        continue;
+      }
+      const std::vector<double>& baseline = head_.baseline;
+      const double pressure = readings[element] - (baseline.empty() ? 0.0 : baseline[element]);
+      take_reading(row, element, readings[element], pressure);
+      if (!std::isnan(readings[element]) && (!strongest || pressure > *strongest)) {
+        strongest = pressure;
+        strongest_element = element;
+      }
+    }
+    if (!strongest || (result_.threshold && !(*strongest > *result_.threshold))) {
+      return false;
+    }
+    ++result_.pressure.in_contact;
+    ++result_.pressure.elements[strongest_element].strongest;
+    return true;
+  }
+
+  void take_reading(std::uint64_t row, std::size_t of_element, double reading, double pressure) {
     PressureSurvey& all = result_.pressure;
-    ElementSurvey& element = all.elements[element_];
+    ElementSurvey& element = all.elements[of_element];
     ++element.alive;
     if (std::isnan(reading)) {
       ++all.unknown;
@@ -111,6 +128,7 @@ class Survey {
     ++element.known;
     element.zeros += reading == 0.0 ? 1 : 0;
     element.last = reading;
+    element.contacts += result_.threshold && pressure > *result_.threshold ? 1 : 0;
     all.readings.add(reading);
     if (!all.range || reading > all.range->most) {
       all.at_most = 0;
@@ -118,46 +136,17 @@ class Survey {
     }
     widen(all.range, reading);
     if (reading == all.range->most) {
-      const std::uint64_t apart = result_.head.recording.rows == "frames" ? 2 : 1;
-      if (all.at_most == 0 || pressure_row_ >= last_at_most_ + apart) {
+      const std::uint64_t apart = head_.rows == "frames" ? 2 : 1;
+      if (all.at_most == 0 || row >= last_at_most_ + apart) {
         ++all.times_at_most;
       }
       ++all.at_most;
-      last_at_most_ = pressure_row_;
-    }
-    const std::vector<double>& baseline = result_.head.recording.baseline;
-    const double pressure = baseline.empty() ? reading : reading - baseline[element_];
-    element.contacts += in_contact(pressure) && result_.threshold ? 1 : 0;
-    if (!strongest_ || pressure > *strongest_) {
-      strongest_ = pressure;
-      strongest_element_ = element_;
+      last_at_most_ = row;
     }
   }
 
-  bool in_contact(double pressure) const {
-    return !result_.threshold || pressure > *result_.threshold;
-  }
-
-  void end_row() {
-    const bool felt = strongest_ && in_contact(*strongest_);
-    if (of_touches()) {
-      pressed_.push_back(felt ? pressures_ : 0);
-    }
-    pressures_ = 1;
-    if (felt) {
-      ++result_.pressure.in_contact;
-      ++result_.pressure.elements[strongest_element_].strongest;
-    }
-    strongest_.reset();
-    element_ = 0;
-    ++pressure_row_;
-  }
-
-  void take(const Pose& T_robot_sensor) {
+  void take_pose(const Pose& T_robot_sensor) {
     const auto& [t, theta_rad] = T_robot_sensor;
-    if (of_touches()) {
-      posed_.push_back(digest_with(digest_with(digest_with(0, t.x), t.y), theta_rad));
-    }
     if (std::isnan(theta_rad)) {
       return;
     }
@@ -170,51 +159,45 @@ class Survey {
     result_.poses->theta_rad.include(theta_rad);
   }
 
-  void take(const glm::dvec2& place_mm) {
-    const std::uint64_t k = place_++;
-    const std::vector<std::uint8_t>& valid = result_.head.recording.valid;
-    const std::uint64_t e = result_.head.elements;
-    if (!valid.empty() && valid[valid.size() == e ? k % e : k] == 0) {
-      return;
-    }
-    if (!result_.array) {
-      result_.array = {{place_mm.x, place_mm.x}, {place_mm.y, place_mm.y}};
-    }
-    result_.array->x_mm.include(place_mm.x);
-    result_.array->y_mm.include(place_mm.y);
-    if (k < e) {
-      places_mm_.push_back(place_mm);
-      placed_.push_back(k);
+  /// Takes the places of the elements from this row on.
+  void take_places(std::uint64_t row, std::span<const glm::dvec2> places_mm) {
+    for (std::size_t k = 0; k < places_mm.size(); ++k) {
+      const glm::dvec2& place_mm = places_mm[k];
+      if (!is_alive(row + k / e_, k % e_)) {
+        continue;
+      }
+      if (!result_.array) {
+        result_.array = {{place_mm.x, place_mm.x}, {place_mm.y, place_mm.y}};
+      }
+      result_.array->x_mm.include(place_mm.x);
+      result_.array->y_mm.include(place_mm.y);
+      if (row + k / e_ == 0) {
+        places_mm_.push_back(place_mm);
+        placed_.push_back(k);
+      }
     }
   }
 
-  void take(double time_s) {
+  void take_time(std::uint64_t row, double time_s) {
     const double before_s = last_s_.value_or(time_s);
     if (time_s < before_s && result_.times_back++ == 0) {
-      result_.first_back = row_;
+      result_.first_back = row;
     }
     result_.long_steps += time_s - before_s > TouchDetectorOptions{}.largest_gap_s ? 1 : 0;
     result_.elapsed_s = time_.advance(time_s);
     last_s_ = time_s;
-    ++row_;
   }
 
-  const std::filesystem::path& path_;
+  RecordingFile file_;
+  const Recording& head_ = file_.head().recording;
+  std::size_t e_ = file_.head().elements;
   RecordingSurvey result_;
-  std::uint64_t pressure_row_ = 0;      ///< row of the next pressure
-  std::size_t element_ = 0;             ///< its element
-  std::optional<double> strongest_;     ///< largest pressure above the baseline in this row
-  std::size_t strongest_element_ = 0;   ///< the element that reads it
   std::uint64_t last_at_most_ = 0;      ///< last row with the largest reading
-  std::uint64_t pressures_ = 1;         ///< digest of this row's pressures so far
-  std::vector<std::uint64_t> pressed_;  ///< [touch] digest of the pressures; 0 without contact
-  std::vector<std::uint64_t> posed_;    ///< [touch] digest of the pose
+  std::vector<std::uint64_t> touches_;  ///< digests of the touches in contact
   std::vector<glm::dvec2> places_mm_;   ///< of the living elements in the first row
   std::vector<std::size_t> placed_;     ///< their indices in the array
-  std::uint64_t place_ = 0;             ///< index of the next place
   StreamTime time_;
   std::optional<double> last_s_;
-  std::uint64_t row_ = 0;  ///< row of the next time
 };
 
 }  // namespace

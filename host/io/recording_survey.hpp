@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "io/recording_scan.hpp"
+#include "io/recording_file.hpp"
 #include "model/bounding_box.hpp"
 #include "model/element_spacing.hpp"
 

@@ -7,8 +7,6 @@
 #include <glm/gtc/quaternion.hpp>
 #include <glm/vec3.hpp>
 
-#include "io/table_columns.hpp"
-
 namespace palpate {
 
 /// A pose in space.

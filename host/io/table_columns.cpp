@@ -2,8 +2,12 @@
 
 #include <algorithm>
 #include <cctype>
+#include <iterator>
+
+#include <fmt/ranges.h>
 
 #include "io/column_choice.hpp"
+#include "io/spatial_pose.hpp"
 #include "model/number_text.hpp"
 #include "model/printable.hpp"
 
@@ -15,26 +19,29 @@ constexpr Unit no_unit[] = {{""}};
 constexpr Unit metres[] = {{"m", 1e3, 1.0}};
 constexpr Unit radians[] = {{"rad"}};
 
+/// A quantity that columns hold, with its usual names, separated by blanks, and its units.
+struct Quantity {
+  std::string_view names;
+  std::span<const Unit> units;
+};
+
 // rostopic echo -p names its times %time.
-constexpr Quantity time_of_row{"time timestamp stamp t %time", time_units, "time-unit"};
-constexpr Quantity theta{"theta yaw", angle_units, "pose-unit"};
-constexpr Quantity planar_position[] = {{"x", length_units, "pose-unit"},
-                                        {"y", length_units, "pose-unit"}};
+constexpr std::string_view names_of_time = "time timestamp stamp t %time";
+constexpr Quantity theta{"theta yaw", angle_units};
+constexpr Quantity planar_position[] = {{"x", length_units}, {"y", length_units}};
 constexpr Quantity position[] = {
-    {"tx x position.x pose.position.x field.pose.position.x", length_units, "pose-unit"},
-    {"ty y position.y pose.position.y field.pose.position.y", length_units, "pose-unit"},
-    {"tz z position.z pose.position.z field.pose.position.z", length_units, "pose-unit"}};
+    {"tx x position.x pose.position.x field.pose.position.x", length_units},
+    {"ty y position.y pose.position.y field.pose.position.y", length_units},
+    {"tz z position.z pose.position.z field.pose.position.z", length_units}};
 constexpr Quantity quaternion[] = {
-    {"qx orientation.x pose.orientation.x field.pose.orientation.x", no_unit, "pose-unit"},
-    {"qy orientation.y pose.orientation.y field.pose.orientation.y", no_unit, "pose-unit"},
-    {"qz orientation.z pose.orientation.z field.pose.orientation.z", no_unit, "pose-unit"},
-    {"qw orientation.w pose.orientation.w field.pose.orientation.w", no_unit, "pose-unit"}};
-constexpr Quantity roll_pitch_yaw[] = {{"roll", angle_units, "pose-unit"},
-                                       {"pitch", angle_units, "pose-unit"},
-                                       {"yaw", angle_units, "pose-unit"}};
-constexpr Quantity rotation_vector[] = {{"rx", angle_units, "pose-unit"},
-                                        {"ry", angle_units, "pose-unit"},
-                                        {"rz", angle_units, "pose-unit"}};
+    {"qx orientation.x pose.orientation.x field.pose.orientation.x", no_unit},
+    {"qy orientation.y pose.orientation.y field.pose.orientation.y", no_unit},
+    {"qz orientation.z pose.orientation.z field.pose.orientation.z", no_unit},
+    {"qw orientation.w pose.orientation.w field.pose.orientation.w", no_unit}};
+constexpr Quantity roll_pitch_yaw[] = {
+    {"roll", angle_units}, {"pitch", angle_units}, {"yaw", angle_units}};
+constexpr Quantity rotation_vector[] = {
+    {"rx", angle_units}, {"ry", angle_units}, {"rz", angle_units}};
 
 /// Names of units that stand for the units above.
 constexpr std::pair<std::string_view, std::string_view> spellings[] = {
@@ -71,47 +78,12 @@ NameParts parts_of(std::string_view name, std::span<const Unit> units) {
   return unit ? NameParts{name.substr(0, line), unit} : NameParts{name, {}};
 }
 
-std::optional<std::size_t> find_usual(const CsvTable& table, const Quantity& quantity) {
-  for (const std::string_view name : split_text(quantity.names, ' ')) {
-    if (const auto found = table.find(name);
-        found && (name != "t" || table.columns()[*found] == name)) {  // T is a temperature
-      return found;
-    }
-    for (std::size_t i = 0; i < table.columns().size(); ++i) {
-      const auto [stem, unit] = parts_of(table.columns()[i], quantity.units);
-      if (unit && (alike(stem, name) && (name != "t" || stem == name))) {
-        return i;
-      }
-    }
-  }
-  return {};
-}
-
-std::optional<Unit> unit_for(const Quantity& quantity, const TableOptions& options) {
-  return quantity.units.data() == length_units.data()  ? options.length_unit
-         : quantity.units.data() == angle_units.data() ? options.angle_unit
-                                                       : std::nullopt;
-}
-
-UnitColumn with_unit(const CsvTable& table, std::size_t index, const Quantity& quantity,
-                     const std::optional<Unit>& unit) {
-  const std::string& name = table.columns()[index];
-  const std::optional<Unit> named = parts_of(name, quantity.units).unit;
-  if (named && unit && named->name != unit->name) {
-    table.refuse_columns("column '{}' is in {} by its name, in {} by `{}`; make them agree",
-                         printable(name), named->name, unit->name, quantity.option);
-  }
-  return {.index = index,
-          .unit = named.value_or(unit.value_or(quantity.units.front())),
-          .assumed = !named && !unit && quantity.units.size() > 1};
-}
-
 /// Adds the columns of the quantities; false, and none added, unless the table has all.
 bool add_all(const CsvTable& table, std::span<const Quantity> quantities,
              const TableOptions& options, std::vector<UnitColumn>& columns) {
   std::vector<UnitColumn> found;
   for (const Quantity& quantity : quantities) {
-    const auto column = find_column(table, quantity, "", unit_for(quantity, options));
+    const auto column = find_column(table, quantity.names, quantity.units, options);
     if (!column) {
       return false;
     }
@@ -215,17 +187,63 @@ PoseColumns named_pose(const CsvTable& table, const TableOptions& options) {
           options.pose_columns, chosen.size());
   }
   for (std::size_t i = 0; i < chosen.size(); ++i) {
-    pose.columns.push_back(
-        with_unit(table, chosen[i], quantities[i], unit_for(quantities[i], options)));
+    pose.columns.push_back(unit_column(table, chosen[i], quantities[i].units, options));
   }
   return pose;
 }
 
 }  // namespace
 
+void validate(const TableOptions& options) {
+  const auto require_one_of = [](const char* option, const std::string& value,
+                                 std::initializer_list<const char*> values) {
+    if (!value.empty() && std::ranges::find(values, value) == values.end()) {
+      refuse(fmt::format("`{} {}`", option, value), "give {}",
+             fmt::format("{}", fmt::join(values, " or ")));
+    }
+  };
+  if (!options.time_unit.empty() && !given_unit(options, time_units)) {
+    refuse(fmt::format("`time-unit {}`", options.time_unit), "give s, ms, us or ns");
+  }
+  require_one_of("pose-unit", options.pose_unit, {"mm,rad", "mm,deg", "m,rad", "m,deg"});
+  for (const std::string& where : options.where) {
+    if (const std::size_t equals = where.find('='); equals == where.npos || equals == 0) {
+      refuse(fmt::format("`where {}`", where), "give COLUMN=VALUE");
+    }
+  }
+  require_one_of("pressure-component", options.pressure_component, {"z", "norm"});
+  require_one_of("matrix", options.matrix, {"columns", "rows"});
+  if (!options.euler.empty() && options.euler != "vector" && !are_axes(options.euler)) {
+    refuse(fmt::format("`euler {}`", options.euler),
+           "give the axes of the three angles in their order, xyz, zyx and so on about fixed axes, "
+           "XYZ, ZYX and so on about moving ones, or vector for a rotation vector");
+  }
+}
+
+std::optional<Unit> given_unit(const TableOptions& options, std::span<const Unit> units) {
+  const std::string& pose = options.pose_unit;
+  const std::size_t comma = std::min(pose.find(','), pose.size());
+  const std::string name = units.data() == time_units.data()     ? options.time_unit
+                           : units.data() == length_units.data() ? pose.substr(0, comma)
+                           : units.data() == angle_units.data()
+                               ? pose.substr(std::min(comma + 1, pose.size()))
+                               : "";
+  const auto found = std::ranges::find(units, name, &Unit::name);
+  return name.empty() || found == units.end() ? std::nullopt : std::optional(*found);
+}
+
+std::vector<std::pair<std::string, std::string>> conditions(const TableOptions& options) {
+  std::vector<std::pair<std::string, std::string>> conditions;
+  for (const std::string& where : options.where) {
+    const std::size_t equals = where.find('=');
+    conditions.emplace_back(where.substr(0, equals), where.substr(equals + 1));
+  }
+  return conditions;
+}
+
 CsvTable open_table(const std::filesystem::path& path, const TableOptions& options) {
   CsvTable table(path, options.header_line);
-  for (const auto& [name, value] : options.where) {
+  for (const auto& [name, value] : conditions(options)) {
     if (const auto column = table.find_or_count(name)) {
       table.keep_where(*column, value);
     }
@@ -240,16 +258,45 @@ std::string skipped_words(const CsvTable& table) {
                      table.header_number(), table.header_words(), lines == 1 ? "is" : "are");
 }
 
-std::optional<UnitColumn> find_column(const CsvTable& table, const Quantity& quantity,
-                                      const std::string& name, const std::optional<Unit>& unit) {
-  const auto index = name.empty() ? find_usual(table, quantity) : table.find_or_count(name);
-  return index ? std::optional(with_unit(table, *index, quantity, unit)) : std::nullopt;
+UnitColumn unit_column(const CsvTable& table, std::size_t index, std::span<const Unit> units,
+                       const TableOptions& options) {
+  const std::string& name = table.columns()[index];
+  const std::optional<Unit> named = parts_of(name, units).unit;
+  const std::optional<Unit> given = given_unit(options, units);
+  if (named && given && named->name != given->name) {
+    table.refuse_columns("column '{}' is in {} by its name, in {} by `{}`; make them agree",
+                         printable(name), named->name, given->name,
+                         units.data() == time_units.data() ? "time-unit" : "pose-unit");
+  }
+  return {.index = index,
+          .unit = named.value_or(given.value_or(units.front())),
+          .assumed = !named && !given && units.size() > 1};
+}
+
+std::optional<UnitColumn> find_column(const CsvTable& table, std::string_view names,
+                                      std::span<const Unit> units, const TableOptions& options) {
+  for (const std::string_view name : split_text(names, ' ')) {
+    const auto is_it = [&](std::string_view text) {
+      return name == "t" ? text == name : alike(text, name);  // T is a temperature
+    };
+    if (const auto found = table.find(name); found && is_it(table.columns()[*found])) {
+      return unit_column(table, *found, units, options);
+    }
+    for (std::size_t i = 0; i < table.columns().size(); ++i) {
+      const auto [stem, unit] = parts_of(table.columns()[i], units);
+      if (unit && is_it(stem)) {
+        return unit_column(table, i, units, options);
+      }
+    }
+  }
+  return {};
 }
 
 std::optional<UnitColumn> find_time(const CsvTable& table, const TableOptions& options) {
-  const bool has_it =
-      !options.time_column.empty() && table.find_or_count(options.time_column).has_value();
-  return find_column(table, time_of_row, has_it ? options.time_column : "", options.time_unit);
+  const auto named =
+      options.time_column.empty() ? std::nullopt : table.find_or_count(options.time_column);
+  return named ? unit_column(table, *named, time_units, options)
+               : find_column(table, names_of_time, time_units, options);
 }
 
 PoseColumns find_pose(const CsvTable& table, const TableOptions& options) {

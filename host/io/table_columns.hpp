@@ -31,27 +31,33 @@ inline constexpr std::array<Unit, 4> time_units{
 inline constexpr std::array<Unit, 2> length_units{{{"mm"}, {"m", 1e3, 1.0}}};
 inline constexpr std::array<Unit, 2> angle_units{{{"rad"}, {"deg", std::numbers::pi, 180.0}}};
 
-/// What the options say about the columns, rows and units of tables.
+/// What the options say about the columns, rows and units of tables; "" where one is not given.
 struct TableOptions {
-  std::uint64_t header_line = 0;  ///< of the table, from 1; 0: found
-  /// Columns and what their cells must be, where a table has the column.
-  std::vector<std::pair<std::string, std::string>> where = {};
-  std::string time_column;       ///< "": the usual names
-  std::string pressure_columns;  ///< see choose_columns(); "": all that are left
-  /// Of elements that read three axes: "z", or "norm", the length of the vector; "": of one.
-  std::string pressure_component = {};
-  std::string pose_columns = {};  ///< see choose_columns(); "": the usual names
-  bool may_name_poses = true;     ///< there is an option `pose-columns`
+  std::uint64_t header_line = 0;   ///< of the table, from 1; 0: found
+  std::vector<std::string> where;  ///< COLUMN=VALUE: rows whose cells hold it, if it has the column
+  std::string time_column;         ///< "": the usual names
+  std::string pressure_columns;    ///< see choose_columns(); "": all that are left
+  std::string pressure_component;  ///< of elements that read three axes: "z", or "norm", the length
+  std::string pose_columns;        ///< see choose_columns(); "": the usual names
+  bool may_name_poses = true;      ///< there is an option `pose-columns`
   /// Axes about which three angles turn one after another: "xyz" fixed ones, "ZYX" moving ones, as
   /// SciPy has them; "vector": they are a rotation vector; "": roll, pitch and yaw about xyz.
-  std::string euler = {};
-  std::string matrix = {};          ///< how a matrix is written: "columns" or "rows"; "": found
-  std::optional<Unit> time_unit;    ///< none: by the column's name, else s
-  std::optional<Unit> length_unit;  ///< none: by the column's name, else mm
-  std::optional<Unit> angle_unit;   ///< none: by the column's name, else rad
+  std::string euler;
+  std::string matrix;     ///< how a matrix is written: "columns" or "rows"; "": found
+  std::string time_unit;  ///< "s", "ms", "us" or "ns"; "": by the column's name, else s
+  std::string pose_unit;  ///< such as "m,deg"; "": by the columns' names, else mm and rad
   std::optional<std::array<std::size_t, 2>> grid = {};  ///< columns and rows of the array
   bool has_blocks = false;  ///< each frame may be a block of rows, as the array has them
 };
+
+/// @throws Error naming the option whose value makes no sense
+void validate(const TableOptions& options);
+
+/// The unit that the options give for columns that have one of these units.
+std::optional<Unit> given_unit(const TableOptions& options, std::span<const Unit> units);
+
+/// The columns, and what their cells must be, that `where` names.
+std::vector<std::pair<std::string, std::string>> conditions(const TableOptions& options);
 
 /// Opens a table with the options' header line, and passes over the rows that `where` leaves out.
 CsvTable open_table(const std::filesystem::path& path, const TableOptions& options);
@@ -66,18 +72,16 @@ struct UnitColumn {
   bool assumed = false;  ///< neither the name nor an option gives the unit
 };
 
-/// A quantity that columns hold, with its usual names and its units.
-struct Quantity {
-  std::string_view names;  ///< separated by blanks
-  std::span<const Unit> units;
-  const char* option;  ///< that gives its unit
-};
+/// The column of this number, whose unit is that of its name, of the options, or the first.
+/// @throws Error where the column's name and the options differ
+UnitColumn unit_column(const CsvTable& table, std::size_t index, std::span<const Unit> units,
+                       const TableOptions& options);
 
-/// Finds the column of this name or, where it is "", of a usual name. A name may end with its unit,
-/// such as time_ms, time [ms] or time (ms). None where there is no such column.
-/// @throws Error where the column's name and `unit` differ
-std::optional<UnitColumn> find_column(const CsvTable& table, const Quantity& quantity,
-                                      const std::string& name, const std::optional<Unit>& unit);
+/// Finds the column of one of these names, which are separated by blanks. A name may end with its
+/// unit, such as time_ms, time [ms] or time (ms). None where there is no such column.
+/// @throws Error as unit_column()
+std::optional<UnitColumn> find_column(const CsvTable& table, std::string_view names,
+                                      std::span<const Unit> units, const TableOptions& options);
 
 /// Finds the column of times: `options.time_column` where the table has it, else a usual name.
 std::optional<UnitColumn> find_time(const CsvTable& table, const TableOptions& options);
@@ -96,5 +100,41 @@ struct PoseColumns {
 /// no columns where there are none.
 /// @throws Error where the options name so many that they are no pose
 PoseColumns find_pose(const CsvTable& table, const TableOptions& options);
+
+/// A row at which the clock of a table steps back.
+struct ClockStep {
+  std::size_t row = 0;     ///< the first of the new stretch, of those that are read
+  std::uint64_t line = 0;  ///< of the file
+  double from_s = 0.0;
+  double to_s = 0.0;
+};
+
+/// Seconds of a date and time by ISO 8601, such as 2026-11-29T12:41:27.5+01:00, since the Unix
+/// epoch (without an offset as of UTC), or of a time of day, such as 12:41:27,5, since midnight;
+/// none where the text is neither.
+/// @param of_day gets whether it is a time of day
+std::optional<double> clock_time_of(std::string_view text, bool& of_day);
+
+/// Reads the times of a table's rows, in numbers or as clocks write them.
+class TableTimes {
+ public:
+  TableTimes(const CsvTable& table, const UnitColumn& column) : table_(table), column_(column) {}
+
+  /// Returns the row's time in seconds, and notes where it is earlier than that of the row before.
+  /// Times of day go on after midnight.
+  /// @param row of those that are read
+  /// @throws Error where the cell holds no time, or more than ten rows are earlier than the row
+  /// before
+  double next(std::size_t row);
+
+  std::vector<ClockStep> steps;
+
+ private:
+  const CsvTable& table_;
+  UnitColumn column_;
+  double last_s_ = 0.0;
+  double days_s_ = 0.0;  ///< of times of day, since the first row
+  bool first_ = true;
+};
 
 }  // namespace palpate

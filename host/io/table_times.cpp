@@ -1,4 +1,4 @@
-#include "io/table_times.hpp"
+#include "io/table_columns.hpp"
 
 #include <array>
 #include <chrono>

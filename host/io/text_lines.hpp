@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "io/descriptor.hpp"
+#include "model/descriptor.hpp"
 
 namespace palpate {
 

@@ -1,10 +1,16 @@
 #pragma once
 
 #include <algorithm>
+#include <chrono>
 #include <cstdint>
 #include <optional>
 
 namespace palpate {
+
+/// The host's clock, since the Unix epoch, by which frames are stamped.
+inline double host_clock_s() {
+  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+}
 
 /// Measures how long a stream has run by the host times of its frames. Where the host's clock is
 /// set back, no time is added, so that nothing waits for the clock to catch up. A clock set forward

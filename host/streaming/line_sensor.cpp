@@ -8,6 +8,7 @@
 
 #include "io/csv_cells.hpp"
 #include "model/printable.hpp"
+#include "model/stream_time.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
@@ -22,10 +23,6 @@ constexpr std::size_t most_bytes_per_reading = 64;
 
 /// A program that never ends its line may not hold up next().
 constexpr int most_late = 4;
-
-double now_s() {
-  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
-}
 
 }  // namespace
 
@@ -67,7 +64,7 @@ void LineSensor::take(const LineReader::Line& line) {
     refuse_line(line, Kind::malformed, "is longer than any frame");
     return;
   }
-  const double read_s = now_s();
+  const double read_s = host_clock_s();
   auto read = format_.read(line.text, read_s);
   if (std::holds_alternative<FrameLines::Problem>(read) && counters_.frames == 0) {
     format_ = FrameLines(format_.elements());  // what looked like a header was a greeting

@@ -7,8 +7,7 @@
 #include <vector>
 
 #include "palpate/pose_track.hpp"
-#include "streaming/frame_line.hpp"
-#include "streaming/line_reader.hpp"
+#include "streaming/stream_lines.hpp"
 
 namespace palpate {
 

@@ -12,8 +12,7 @@
 
 #include "palpate/error.hpp"
 #include "palpate/pose_track.hpp"
-#include "streaming/frame_line.hpp"
-#include "streaming/line_reader.hpp"
+#include "streaming/stream_lines.hpp"
 
 namespace palpate {
 
@@ -79,15 +78,15 @@ class PoseReader {
       refuse_line(Flaw::too_long, line_, "is longer than any pose");
       return;
     }
-    const auto read = format_.read(line.text);
-    if (const auto* problem = std::get_if<PoseLines::Problem>(&read)) {
-      using Kind = PoseLines::Problem::Kind;
+    const auto read = format_.read(line.text, 0.0);
+    if (const auto* problem = std::get_if<FrameLines::Problem>(&read)) {
+      using Kind = FrameLines::Problem::Kind;
       refuse_line(problem->kind == Kind::malformed   ? Flaw::no_pose
                   : problem->kind == Kind::no_number ? Flaw::no_number
                                                      : Flaw::far_away,
                   line_, problem->words);
-    } else if (const auto* pose = std::get_if<PoseLines::TimedPose>(&read)) {
-      add(pose->time_s, pose->T_robot_sensor);
+    } else if (const auto* frame = std::get_if<Frame>(&read)) {
+      add(frame->host_time_s, *frame->T_robot_sensor);
     }
   }
 
@@ -143,7 +142,7 @@ class PoseReader {
 
   PoseTrack& track_;
   PosedSensor::Complaint complain_;
-  PoseLines format_;
+  FrameLines format_{0};
   LineReader lines_;
   bool ended_ = false;
   std::uint64_t line_ = 0;       ///< the last line that was taken

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "model/random.hpp"
+#include "model/stream_time.hpp"
 #include "palpate/simulation.hpp"
 #include "streaming/pace.hpp"
 #include "streaming/pose_between.hpp"
@@ -35,10 +36,6 @@ double smooth_step(double u) {
 double force_at(double t) {
   return smooth_step((t - travel_s) / ramp_s) -
          smooth_step((t - travel_s - ramp_s - steady_s) / ramp_s);
-}
-
-double unix_time_s() {
-  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
 }
 
 /// Simulates a robot that presses an array onto a shape again and again.
@@ -80,7 +77,7 @@ class SimulatedSensor : public Sensor {
     presses_ = 1;
     at_ = 0;
     counters_ = {};
-    start_s_ = unix_time_s();
+    start_s_ = host_clock_s();
     pace_.start(0.0);
   }
 

@@ -1,5 +1,4 @@
 #include "streaming/table_import.hpp"
-#include "streaming/import_survey.hpp"
 
 #include <algorithm>
 #include <array>
@@ -8,88 +7,14 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include "io/recording_rules.hpp"
-#include "io/table_columns.hpp"
 #include "model/number_text.hpp"
-#include "streaming/clock_stretches.hpp"
 #include "streaming/import_array.hpp"
 #include "streaming/pose_join.hpp"
 #include "streaming/touch_plane.hpp"
 
 namespace palpate {
-
-namespace {
-
-/// Splits the text into `count` parts, the first of which may hold the separator itself; no parts
-/// where there are fewer.
-std::vector<std::string> split_last(std::string text, char separator, std::size_t count) {
-  std::vector<std::string> parts;
-  for (std::size_t at = text.npos; parts.size() + 1 < count; text.resize(at)) {
-    at = text.rfind(separator);
-    if (at == text.npos) {
-      return {};
-    }
-    parts.insert(parts.begin(), text.substr(at + 1));
-  }
-  parts.insert(parts.begin(), text);
-  return parts;
-}
-
-std::optional<Unit> unit_named(std::span<const Unit> units, const std::string& name) {
-  const auto found = std::ranges::find(units, name, &Unit::name);
-  return found == units.end() ? std::nullopt : std::optional(*found);
-}
-
-}  // namespace
-
-TableOptions table_options(const ImportOptions& options) {
-  TableOptions table{.header_line = options.header_line,
-                     .time_column = options.time_column,
-                     .pressure_columns = options.pressure_columns,
-                     .pressure_component = options.pressure_component,
-                     .pose_columns = options.pose_columns,
-                     .euler = options.euler,
-                     .matrix = options.matrix};
-  if (!options.time_unit.empty()) {
-    table.time_unit = unit_named(time_units, options.time_unit);
-    if (!table.time_unit) {
-      refuse(fmt::format("`time-unit {}`", options.time_unit), "give s, ms, us or ns");
-    }
-  }
-  if (!options.pose_unit.empty()) {
-    const auto names = split_last(options.pose_unit, ',', 2);
-    table.length_unit = names.empty() ? std::nullopt : unit_named(length_units, names[0]);
-    table.angle_unit = names.empty() ? std::nullopt : unit_named(angle_units, names[1]);
-    if (!table.length_unit || !table.angle_unit) {
-      refuse(fmt::format("`pose-unit {}`", options.pose_unit),
-             "give mm,rad or mm,deg or m,rad or m,deg");
-    }
-  }
-  for (const std::string& where : options.where) {
-    const std::size_t equals = where.find('=');
-    if (equals == where.npos || equals == 0) {
-      refuse(fmt::format("`where {}`", where), "give COLUMN=VALUE");
-    }
-    table.where.emplace_back(where.substr(0, equals), where.substr(equals + 1));
-  }
-  const auto require_one_of = [](const char* option, const std::string& value,
-                                 std::initializer_list<const char*> values) {
-    if (!value.empty() && std::ranges::find(values, value) == values.end()) {
-      refuse(fmt::format("`{} {}`", option, value), "give {}",
-             fmt::format("{}", fmt::join(values, " or ")));
-    }
-  };
-  require_one_of("pressure-component", options.pressure_component, {"z", "norm"});
-  require_one_of("matrix", options.matrix, {"columns", "rows"});
-  if (!options.euler.empty() && options.euler != "vector" && !are_axes(options.euler)) {
-    refuse(fmt::format("`euler {}`", options.euler),
-           "give the axes of the three angles in their order, xyz, zyx and so on about fixed axes, "
-           "XYZ, ZYX and so on about moving ones, or vector for a rotation vector");
-  }
-  return table;
-}
 
 namespace {
 
@@ -144,15 +69,19 @@ void choose_rows(const ImportOptions& options, std::size_t n, Recording& recordi
 
 /// The label and the pose of `truth`, whose numbers are still in the units of the tables.
 Truth truth_of(const std::string& text) {
-  const auto parts = split_last(text, ',', 4);
-  std::array<std::optional<double>, 3> pose;
-  for (std::size_t i = 0; i < 3; ++i) {
-    pose[i] = parts.empty() || parts[0].empty() ? std::nullopt : number_of(parts[i + 1]);
-    if (!pose[i]) {
+  std::string label = text;  // which may hold commas itself
+  std::array<double, 3> pose{};
+  for (std::size_t i = pose.size(); i-- > 0;) {
+    const std::size_t comma = label.rfind(',');
+    const auto number =
+        comma == label.npos || comma == 0 ? std::nullopt : number_of(label.substr(comma + 1));
+    if (!number) {
       refuse(fmt::format("`truth {}`", text), "give LABEL,X,Y,THETA, in the units of the poses");
     }
+    pose[i] = *number;
+    label.resize(comma);
   }
-  return {parts[0], {{*pose[0], *pose[1]}, *pose[2]}};
+  return {label, {{pose[0], pose[1]}, pose[2]}};
 }
 
 /// The pose of `truth` in mm and rad.
@@ -233,21 +162,6 @@ void mount_array(const SpatialPose& mount, PoseTable& poses) {
   }
 }
 
-/// The options of a table of poses, which is another than that of the pressures unless it is the
-/// same file.
-TableOptions pose_options(const ImportOptions& options, TableOptions columns) {
-  columns.header_line = in_one_file(options) ? columns.header_line : 0;
-  return columns;
-}
-
-/// The options of the table of pressures.
-TableOptions pressure_options(const ImportOptions& options, TableOptions columns) {
-  if (options.poses.empty() || !in_one_file(options)) {
-    columns.pose_columns.clear();  // they are of another table
-  }
-  return columns;
-}
-
 /// The recording of rows that are read.
 ImportedRecording recording_of(const ImportOptions& options, ArrayTable array, ImportRows rows) {
   const std::optional<glm::dvec3> normal = plane_normal(options.plane);
@@ -318,31 +232,38 @@ ImportedRecording recording_of(const ImportOptions& options, ArrayTable array, I
 }  // namespace
 
 ImportedRecording import_tables(const ImportOptions& options) {
-  TableOptions columns = table_options(options);
+  validate(options);
   check_numbers(options);
   auto truth = options.truth.empty() ? std::nullopt : std::optional(truth_of(options.truth));
   ArrayTable array = import_array(options);
-  if (!options.time_column.empty() && !has_column(options.pressures, options.time_column) &&
-      !has_column(options.poses, options.time_column)) {
-    refuse(fmt::format("`time-column {}`", options.time_column),
-           "no table has this column; give its name");
-  }
-  for (const auto& [name, value] : columns.where) {
+  const auto require_column = [&](const std::string& option, const std::string& name) {
     if (!has_column(options.pressures, name) && !has_column(options.poses, name)) {
-      refuse(fmt::format("`where {}={}`", name, value), "no table has this column; give its name");
+      refuse(fmt::format("`{}`", option), "no table has this column; give its name");
     }
+  };
+  if (!options.time_column.empty()) {
+    require_column("time-column " + options.time_column, options.time_column);
   }
-  columns.grid = grid_size(options);
-  columns.has_blocks = options.rows == "frames";
-  ImportRows rows{.pressures = read_pressures(options.pressures, array.elements_mm.size(),
-                                              pressure_options(options, columns))};
-  const Unit length_unit = columns.length_unit.value_or(length_units.front());
+  for (const auto& [name, value] : conditions(options)) {
+    require_column(fmt::format("where {}={}", name, value), name);
+  }
+  // The poses may have a table of their own, with other columns and another header.
+  const bool one_file = in_one_file(options);
+  TableOptions of_pressures = options;
+  of_pressures.grid = grid_size(options);
+  of_pressures.has_blocks = options.rows == "frames";
+  of_pressures.pose_columns = one_file ? options.pose_columns : "";
+  TableOptions of_poses = options;
+  of_poses.header_line = one_file ? options.header_line : 0;
+  ImportRows rows{.pressures =
+                      read_pressures(options.pressures, array.elements_mm.size(), of_pressures)};
+  const Unit length_unit = given_unit(options, length_units).value_or(length_units.front());
   std::array<Unit, 3> pose_units{length_unit, length_unit,
-                                 columns.angle_unit.value_or(angle_units.front())};
+                                 given_unit(options, angle_units).value_or(angle_units.front())};
   if (!options.poses.empty()) {
     // The rows of one file belong together, even where their times are equal.
-    rows.poses = read_poses(options.poses, pose_options(options, columns), !in_one_file(options));
-    if (in_one_file(options) && options.pose_delay_s != 0.0 &&
+    rows.poses = read_poses(options.poses, of_poses, !one_file);
+    if (one_file && options.pose_delay_s != 0.0 &&
         rows.pressures.time_s.size() == rows.poses->T_robot_sensor.size()) {
       rows.poses->time_s = rows.pressures.time_s;
       rows.poses->steps = rows.pressures.steps;

@@ -17,7 +17,7 @@ namespace palpate {
 
 /// The tables of 'palpate import', and what they hold; texts are as its options have them, "" where
 /// one is not given.
-struct ImportOptions {
+struct ImportOptions : TableOptions {
   std::string pressures;
   std::string poses;
   std::string array;  ///< COLUMNS:ROWS:PITCH, or a file
@@ -30,16 +30,6 @@ struct ImportOptions {
   std::optional<std::vector<glm::dvec2>> elements_mm;
   std::string pressure_unit = "kPa";
   int sign = 1;  ///< -1: readings fall under load, and are taken times -1
-  std::string pose_unit;
-  std::string time_unit;
-  std::string time_column;
-  std::uint64_t header_line = 0;   ///< of the pressures, from 1; 0: found
-  std::vector<std::string> where;  ///< COLUMN=VALUE: only rows of which all hold
-  std::string pressure_columns;
-  std::string pressure_component;  ///< "z" or "norm" of elements that read x, y and z
-  std::string pose_columns;
-  std::string euler;   ///< axes of three angles, or "vector", see TableOptions
-  std::string matrix;  ///< "columns" or "rows", see TableOptions
   /// X,Y,Z,ROLL,PITCH,YAW, mm and degrees about fixed axes: the pose of the array in the frame
   /// whose poses are given; "": it is this frame.
   std::string mount;
@@ -65,10 +55,6 @@ struct ImportedRecording {
   /// What was understood, or is worth saying, in sentences that begin with their file.
   std::vector<std::string> understood = {};
 };
-
-/// What the options say about columns, rows and units.
-/// @throws Error naming the option whose value makes no sense
-TableOptions table_options(const ImportOptions& options);
 
 /// Reads the pressures and the poses and joins them.
 /// @throws Error, naming the option and its value, or file and line or row, where the tables do not

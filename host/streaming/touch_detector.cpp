@@ -13,8 +13,8 @@
 #include "palpate/error.hpp"
 #include "palpate/pose_track.hpp"
 #include "streaming/frame_smoother.hpp"
+#include "streaming/press_touches.hpp"
 #include "streaming/rest_follower.hpp"
-#include "streaming/touch_mean.hpp"
 
 namespace palpate {
 

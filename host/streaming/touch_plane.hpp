@@ -8,7 +8,7 @@
 
 #include "io/pose_table.hpp"
 #include "palpate/touch.hpp"
-#include "streaming/import_survey.hpp"
+#include "streaming/import_array.hpp"
 
 namespace palpate {
 

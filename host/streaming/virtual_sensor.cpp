@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -14,6 +13,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "model/number_text.hpp"
 #include "model/stream_time.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
@@ -49,22 +49,19 @@ class ReplayedSensor : public Sensor {
     if (r.elements_mm.size() != e) {
       refuse("dataset 'elements' changes from frame to frame; record each array to its own file");
     }
-    description_.name = r.sensor;
-    description_.serial = r.serial;
-    description_.pressure_unit = r.pressure_unit;
-    description_.elements_mm = r.elements_mm;
+    description_ = {.name = r.sensor,
+                    .serial = r.serial,
+                    .pressure_unit = r.pressure_unit,
+                    .elements_mm = r.elements_mm,
+                    .valid = std::vector<std::uint8_t>(r.valid.empty() ? 0 : e, 0),
+                    .baseline = r.baseline,
+                    .object = r.object,
+                    .truth = r.truth,
+                    .findings = r.findings};
     // An element that is valid in no frame is dead.
-    description_.valid.assign(r.valid.empty() ? 0 : e, 0);
-    for (std::size_t i = 0; i < r.size(); ++i) {
-      const Touch frame = r.touch(i);
-      for (std::size_t k = 0; k < frame.valid.size(); ++k) {
-        description_.valid[k] |= frame.valid[k];
-      }
+    for (std::size_t k = 0; k < r.valid.size(); ++k) {
+      description_.valid[k % e] |= r.valid[k];
     }
-    description_.baseline = r.baseline;
-    description_.object = r.object;
-    description_.truth = r.truth;
-    description_.findings = r.findings;
     StreamTime time;
     for (const double time_s : r.time_s) {
       time.advance(time_s);
@@ -214,25 +211,20 @@ class SourceName {
   /// The parts of A:B:C.
   std::array<std::string_view, 3> three(std::string_view key, std::string_view text,
                                         std::string_view remedy) const {
-    const std::size_t first = text.find(':');
-    const std::size_t second = text.find(':', first == text.npos ? first : first + 1);
-    if (second == text.npos) {
+    const std::vector<std::string_view> parts = split_text(text, ':');
+    if (parts.size() != 3) {
       refuse(key, remedy);
     }
-    return {text.substr(0, first), text.substr(first + 1, second - first - 1),
-            text.substr(second + 1)};
+    return {parts[0], parts[1], parts[2]};
   }
 
   template <typename Number>
   Number parse(std::string_view key, std::string_view text, Number least, Number most) const {
-    Number value{};
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    // Refuses NaN too.
-    if (error != std::errc{} || end != text.data() + text.size() ||
-        !(value >= least && value <= most)) {
+    const auto value = detail::all_of<Number>(text);
+    if (!value || !(*value >= least && *value <= most)) {  // NaN too
       refuse(key, fmt::format("= {}: give a number from {} to {}", text, least, most));
     }
-    return value;
+    return *value;
   }
 
   std::string name_;

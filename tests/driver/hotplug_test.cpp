@@ -124,6 +124,9 @@ TEST_F(Hotplug, OtherCellsThanBeforeAreRefused) {
                           plugged.sensor->next(patience);
                         }),
                {"4 elements instead of 5"});
+  EXPECT_FALSE(plugged.board.usb().seen().claimed) << "given back";
+  plugged.board.replace_cells({0b11111});
+  plugged.expect_start(100);
 }
 
 TEST_F(Hotplug, TwoBoardsStreamAtOnce) {

@@ -5,7 +5,7 @@
 
 #include <fmt/format.h>
 
-#include "driver/data_folder.hpp"
+#include "driver/device.hpp"
 #include "fake_serial_board.hpp"
 #include "ordinary_user.hpp"
 #include "palpate/driver.hpp"

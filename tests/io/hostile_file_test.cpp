@@ -10,7 +10,6 @@
 
 #include "file_parts.hpp"
 #include "io/file_summary.hpp"
-#include "io/hdf5_reader.hpp"
 #include "io/recording_survey.hpp"
 #include "palpate/files.hpp"
 #include "support/memory_limit.hpp"

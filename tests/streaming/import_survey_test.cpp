@@ -4,7 +4,7 @@
 
 #include <gmock/gmock.h>
 
-#include "streaming/import_survey.hpp"
+#include "streaming/import_array.hpp"
 
 namespace palpate::import_survey_test {
 

@@ -12,7 +12,7 @@
 
 #include "cli/page/page_json.hpp"
 #include "io/input_file.hpp"
-#include "io/recording_rules.hpp"
+#include "io/recording_file.hpp"
 #include "io/recording_survey.hpp"
 #include "palpate/files.hpp"
 #include "recognition/judged_results.hpp"
@@ -57,40 +57,34 @@ Json reach_of(std::vector<Pose> poses) {
   return json;
 }
 
-class RecordingFile : public ViewedFile {
+class ViewedRecording : public ViewedFile {
  public:
-  explicit RecordingFile(const fs::path& file) : ViewedFile(file) {
-    ReadingHistogram readings;
-    const auto append = [](auto& list) {
-      return [&list](auto values) { list.insert(list.end(), values.begin(), values.end()); };
+  explicit ViewedRecording(const fs::path& path) : ViewedFile(path) {
+    const RecordingFile file(path);
+    recording_ = file.head().recording;
+    elements_ = file.head().elements;
+    pressure_.reserve(file.head().rows * elements_);
+    const auto append = [](auto& list, const auto& more) {
+      list.insert(list.end(), more.begin(), more.end());
     };
-    const auto pressure = [&](std::span<const double> values) {
-      append(pressure_)(values);
-      for (const double value : values) {
+    ReadingHistogram readings;
+    Recording some;
+    const std::uint64_t at_once = std::max<std::uint64_t>(1, (1 << 19) / elements_);
+    for (std::uint64_t first = 0; first < file.head().rows; first += at_once) {
+      file.read(first, std::min(at_once, file.head().rows - first), some);
+      append(pressure_, some.pressure);
+      append(recording_.T_robot_sensor, some.T_robot_sensor);
+      append(recording_.time_s, some.time_s);
+      if (recording_.elements_mm.empty()) {  // a changing array is drawn as it begins
+        append(recording_.elements_mm, std::span(some.elements_mm).first(elements_));
+      }
+      for (const double value : some.pressure) {
         if (value > 0.0 && value < 1e30) {  // one reading of 1e38 shall not be the scale
           readings.add(value);
           shows_pressure_ = true;
         }
       }
-    };
-    const auto elements = [&](std::span<const glm::dvec2> places) {
-      // A changing array is drawn as it begins.
-      const std::size_t left = elements_ - recording_.elements_mm.size();
-      append(recording_.elements_mm)(places.first(std::min(left, places.size())));
-    };
-    const auto head = [&](const RecordingHead& of_file) {
-      recording_ = of_file.recording;
-      elements_ = of_file.elements;
-      pressure_.reserve(of_file.rows * of_file.elements);
-      recording_.T_robot_sensor.reserve(of_file.rows);
-    };
-    scan_recording(file, {.head = head,
-                          .pressure = pressure,
-                          .T_robot_sensor = append(recording_.T_robot_sensor),
-                          .elements_mm = elements,
-                          .time_s = append(recording_.time_s),
-                          .device_time_s = [](auto) {},
-                          .lost_before = [](auto) {}});
+    }
     largest_ = shows_pressure_ ? readings.quantile(0.999) : 0.0;
   }
 
@@ -263,7 +257,7 @@ std::unique_ptr<const ViewedFile> open_file(const fs::path& path) {
   require_readable(path);
   const std::string format = read_format(path);
   if (format == "palpate.recording") {
-    return std::make_unique<RecordingFile>(path);
+    return std::make_unique<ViewedRecording>(path);
   }
   if (format == "palpate.map") {
     return std::make_unique<MapFile>(path);

@@ -41,7 +41,7 @@ TEST(TakkTileElements, LieOnAGridAboutTheOrigin) {
   EXPECT_EQ(elements_mm[1] - elements_mm[0], glm::dvec2(default_pitch_mm, 0));
   EXPECT_EQ(elements_mm[5] - elements_mm[0], glm::dvec2(0, default_pitch_mm));
   // A cell keeps its place when other cells are dead.
-  EXPECT_EQ(element_positions(std::vector<Cell>{{7, 4}}, 2.0).front(), glm::dvec2(4, 7));
+  EXPECT_EQ(element_positions(std::vector<Cell>{{7, 4}}).front(), glm::dvec2(16, 28));
 }
 
 // The example of the MPL115A2 data sheet (Freescale, "Pressure compensation"): a0 = 0x3ece,

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <fcntl.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <utility>
@@ -14,8 +15,13 @@ class Descriptor {
   /// Takes over an open close-on-exec descriptor; a negative one stays invalid and keeps errno.
   explicit Descriptor(int descriptor) : descriptor_(descriptor) {}
   /// Opens a file; invalid, with errno, where that fails.
-  Descriptor(const std::filesystem::path& path, int flags, mode_t mode = 0);
-  ~Descriptor();
+  Descriptor(const std::filesystem::path& path, int flags, mode_t mode = 0)
+      : Descriptor(::open(path.c_str(), flags | O_CLOEXEC, mode)) {}
+  ~Descriptor() {
+    if (valid()) {
+      ::close(descriptor_);
+    }
+  }
   Descriptor(Descriptor&& other) noexcept : descriptor_(std::exchange(other.descriptor_, -1)) {}
   Descriptor& operator=(Descriptor&& other) noexcept {
     std::swap(descriptor_, other.descriptor_);
@@ -31,6 +37,13 @@ class Descriptor {
 
 /// Opens /dev/null in place of closed standard streams. Otherwise the first files opened would take
 /// their numbers, and what is printed would go into them. Call it first in main().
-void open_closed_streams();
+inline void open_closed_streams() {
+  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    // open() takes the lowest free number, which is this stream's.
+    if (::fcntl(stream, F_GETFD) == -1 && ::open("/dev/null", O_RDWR) < 0) {
+      return;
+    }
+  }
+}
 
 }  // namespace palpate
