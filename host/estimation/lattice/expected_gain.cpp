@@ -11,6 +11,7 @@
 #include <tbb/enumerable_thread_specific.h>
 
 #include "estimation/parallel_for.hpp"
+#include "model/contact_readings.hpp"
 #include "model/displacement_points.hpp"
 #include "model/random.hpp"
 #include "palpate/error.hpp"
