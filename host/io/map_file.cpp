@@ -90,28 +90,13 @@ void read_cells(const std::filesystem::path& path, const Hdf5Contents& file,
   });
 }
 
-/// Reads numbers that go with the cells, where the file has them.
-std::vector<float> read_layer(const Hdf5Contents& file, const char* name,
-                              const OccupancyGrid& map) {
-  if (!file.has_dataset(name)) {
-    return {};
-  }
-  const std::vector<std::uint64_t> cells{static_cast<std::uint64_t>(map.ny),
-                                         static_cast<std::uint64_t>(map.nx)};
-  if (file.shape(name, 2) != cells) {
-    file.refuse("dataset '{}' has the shape {}, 'log_odds' {}; store one number for each cell",
-                name, file.shape(name, 2), cells);
-  }
-  return file.read<float>(name);
-}
-
 /// All numbers of a dataset of this shape.
 template <typename Number = double>
 std::vector<Number> read_all(const Hdf5Contents& file, const char* name,
-                             const std::vector<std::uint64_t>& shape) {
+                             const std::vector<std::uint64_t>& shape,
+                             const char* remedy = "build the map anew") {
   if (file.shape(name) != shape) {
-    file.refuse("dataset '{}' has the shape {}, not {}; build the map anew", name, file.shape(name),
-                shape);
+    file.refuse("dataset '{}' has the shape {}, not {}; {}", name, file.shape(name), shape, remedy);
   }
   return file.read<Number>(name);
 }
@@ -259,8 +244,13 @@ OccupancyGrid read_map(const std::filesystem::path& path) {
   read_cells(path, file, map, [&](std::span<const float> cells) {
     map.log_odds.insert(map.log_odds.end(), cells.begin(), cells.end());
   });
-  map.observations = read_layer(file, "observations", map);
-  map.mean_level = read_layer(file, "mean_level", map);
+  for (const auto& [name, layer] :
+       {std::pair{"observations", &map.observations}, {"mean_level", &map.mean_level}}) {
+    if (file.has_dataset(name)) {
+      *layer = read_all<float>(file, name, file.shape("log_odds"),
+                               "store one number for each cell, as in 'log_odds'");
+    }
+  }
   map.source = read_source(path, file, map);
   require_sound(path, fault_of(map));
   return map;

@@ -63,17 +63,13 @@ ArrayTable grid_array_of(const Grid& grid, const std::string& first, const std::
   if (order != "rows" && order != "columns") {
     refuse(fmt::format("`order {}`", order), "give rows or columns");
   }
-  const bool by_rows = order == "rows";
   const std::vector<glm::dvec2> by_place = grid_array(grid.columns, grid.rows, grid.pitch_mm);
   ArrayTable array;
   const auto columns = static_cast<std::size_t>(grid.columns);
   const auto rows = static_cast<std::size_t>(grid.rows);
-  const std::size_t line = by_rows ? columns : rows;
   for (std::size_t e = 0; e < by_place.size(); ++e) {
-    const std::size_t along = e % line;
-    const std::size_t across = e / line;
-    const std::size_t i = by_rows ? along : across;
-    const std::size_t j = by_rows ? across : along;
+    const std::size_t i = order == "rows" ? e % columns : e / rows;
+    const std::size_t j = order == "rows" ? e / columns : e % rows;
     const std::size_t column = right ? columns - 1 - i : i;
     const std::size_t row = top ? rows - 1 - j : j;
     array.elements_mm.push_back(by_place[row * columns + column]);
@@ -140,8 +136,8 @@ ArrayTable import_array(const ImportOptions& options) {
 }
 
 void mark_unknown(const std::string& path, const ImportSurvey& survey, Recording& recording) {
-  const std::size_t e = survey.elements();
-  std::vector<std::uint8_t> read = survey.read();
+  std::vector<std::uint8_t> read = survey.read;
+  const std::size_t e = read.size();
   for (std::size_t i = 0; i < recording.valid.size(); ++i) {
     read[i] &= recording.valid[i];
   }
@@ -163,46 +159,41 @@ void mark_unknown(const std::string& path, const ImportSurvey& survey, Recording
   }
 }
 
-ImportSurvey::ImportSurvey(std::size_t elements, std::vector<std::uint8_t> valid)
-    : valid_(std::move(valid)),
-      read_(elements, 0),
-      least_(elements, std::numeric_limits<double>::infinity()) {
-  valid_.resize(elements, 1);
-}
-
-void ImportSurvey::add(std::span<const double> pressure) {
-  const std::size_t e = elements();
-  for (std::size_t k = 0; k < pressure.size(); ++k) {
-    const double p = pressure[k];
+ImportSurvey survey_of(const Recording& recording) {
+  const std::size_t e = recording.elements_mm.size();
+  ImportSurvey survey{.load = {}, .read = std::vector<std::uint8_t>(e, 0), .whole_up_to = {}};
+  std::vector<double> least(e, std::numeric_limits<double>::infinity());
+  bool whole = true;
+  double largest = 0.0;
+  for (std::size_t k = 0; k < recording.pressure.size(); ++k) {
+    const double p = recording.pressure[k];
     const std::size_t i = k % e;
     if (i == 0) {
-      load_.push_back(0.0F);
+      survey.load.push_back(0.0F);
     }
     if (!std::isfinite(p)) {
       continue;
     }
-    read_[i] = 1;
-    whole_ = whole_ && p == std::floor(p);
-    largest_ = std::max(largest_, p);
-    if (valid_[i] != 0) {
-      least_[i] = std::min(least_[i], p);
-      load_.back() = std::max(load_.back(), static_cast<float>(p - least_[i]));
+    survey.read[i] = 1;
+    whole = whole && p == std::floor(p);
+    largest = std::max(largest, p);
+    if (recording.valid.empty() || recording.valid[i] != 0) {
+      least[i] = std::min(least[i], p);
+      survey.load.back() = std::max(survey.load.back(), static_cast<float>(p - least[i]));
     }
   }
+  constexpr double least_raw = 100.0;  // thresholded pressures may be small whole numbers
+  survey.whole_up_to = whole && largest >= least_raw ? std::optional(largest) : std::nullopt;
+  return survey;
 }
 
 std::vector<bool> ImportSurvey::pressed() const {
-  const float most = load_.empty() ? 0.0F : *std::ranges::max_element(load_);
+  const float most = load.empty() ? 0.0F : *std::ranges::max_element(load);
   std::vector<bool> pressed;
-  for (const float load : load_) {
-    pressed.push_back(load > 0.0F && load >= 0.5F * most);
+  for (const float l : load) {
+    pressed.push_back(l > 0.0F && l >= 0.5F * most);
   }
   return pressed;
-}
-
-std::optional<double> ImportSurvey::whole_up_to() const {
-  constexpr double least = 100.0;  // thresholded pressures may be small whole numbers
-  return whole_ && largest_ >= least ? std::optional(largest_) : std::nullopt;
 }
 
 }  // namespace palpate

@@ -79,8 +79,8 @@ void find_clock(const PoseTable& poses, const ImportSurvey& survey, const Import
                     .T_robot_sensor = poses.T_robot_sensor,
                     .height_mm = poses.height_mm,
                     .largest_gap_s = options.largest_gap_s.value_or(usual_gap_s(time_s))};
-  if (const auto offset = clock_offset(recording.time_s, survey.load(), log,
-                                       array_reach_mm(recording.elements_mm))) {
+  if (const auto offset =
+          clock_offset(recording.time_s, survey.load, log, array_reach_mm(recording.elements_mm))) {
     recording.findings.push_back(clock_finding(*offset, options.pose_delay_s));
   }
 }

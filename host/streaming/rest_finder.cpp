@@ -124,7 +124,7 @@ void RestFinder::add(const Frame& frame) {
   pressure_.resize(elements_);
   known_.resize(elements_, 0);
   for (std::size_t k = 0; k < elements_; ++k) {
-    const bool known = (valid_.empty() || valid_[k] != 0) && is_known(frame.values[k]);
+    const bool known = is_alive(k) && is_known(frame.values[k]);
     pressure_[k] = known ? frame.values[k] : std::numeric_limits<double>::quiet_NaN();
     known_[k] |= known ? 1 : 0;
   }
@@ -194,7 +194,7 @@ RestFinder::Opened RestFinder::open(float sign, double window_s, std::span<const
     readings->assign(readings_.size(), 0.0F);
   }
   for (std::size_t k = 0; k < elements_; ++k) {
-    if (!valid_.empty() && valid_[k] == 0) {
+    if (!is_alive(k)) {
       continue;
     }
     const std::vector<float> values = column(k, sign);
@@ -254,7 +254,7 @@ double RestFinder::window_for(float sign) const {
 std::vector<float> RestFinder::departure(float sign, double window_s) const {
   std::vector<float> most(time_s_.size(), 0.0F);
   for (std::size_t k = 0; k < elements_; ++k) {
-    if (!valid_.empty() && valid_[k] == 0) {
+    if (!is_alive(k)) {
       continue;
     }
     const std::vector<float> values = column(k, sign);

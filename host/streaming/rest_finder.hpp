@@ -50,6 +50,7 @@ class RestFinder {
  private:
   struct Opened;
 
+  bool is_alive(std::size_t element) const { return valid_.empty() || valid_[element] != 0; }
   void end_block();
   std::vector<float> column(std::size_t element, float sign) const;
   float low_by(std::span<const float> values, std::span<const float> rest,

@@ -188,9 +188,8 @@ ImportedRecording recording_of(const ImportOptions& options, ArrayTable array, I
   recording.time_s = std::move(pressures.time_s);
   recording.device_time_s = std::move(pressures.device_time_s);
   recording.lost_before = std::move(pressures.lost_before);
-  ImportSurvey survey(recording.elements_mm.size(), recording.valid);
-  survey.add(recording.pressure);
-  imported.whole_up_to = recording.pressure_unit == "kPa" ? survey.whole_up_to() : std::nullopt;
+  const ImportSurvey survey = survey_of(recording);
+  imported.whole_up_to = recording.pressure_unit == "kPa" ? survey.whole_up_to : std::nullopt;
   choose_rows(options, survey.rows(), recording);
   mark_unknown(options.pressures, survey, recording);
   if (poses) {

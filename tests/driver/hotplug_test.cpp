@@ -129,6 +129,21 @@ TEST_F(Hotplug, OtherCellsThanBeforeAreRefused) {
   plugged.expect_start(100);
 }
 
+TEST_F(Hotplug, ABoardThatComesBackWithoutCellsIsStillAwaited) {
+  PluggedIn plugged(usb_);
+  plugged.sensor->start();
+  plugged.expect_frame(100);
+  plugged.unplug_and_notice();
+  plugged.board.replace_cells({0});
+  plugged.board.usb().plug();
+  EXPECT_FALSE(plugged.sensor->next(300ms));
+  EXPECT_TRUE(plugged.sensor->gone());
+  expect_named(plugged.refusal(Fault::system), {"no cell answers"});
+  EXPECT_FALSE(plugged.board.usb().seen().claimed) << "given back";
+  plugged.board.replace_cells({0b11111});
+  plugged.expect_start(100);
+}
+
 TEST_F(Hotplug, TwoBoardsStreamAtOnce) {
   PluggedIn left(usb_, "L");
   FakeTakktile right(usb_, "R", {0b111}, Layout::bits, 3);
