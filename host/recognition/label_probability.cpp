@@ -12,13 +12,10 @@ namespace {
 /// exp(a) / (exp(a) + exp(b)); 0 where both are 0
 double share(double a, double b) { return a == log_zero ? 0.0 : 1.0 / (1.0 + std::exp(b - a)); }
 
-}  // namespace
-
-double log_sum(double a, double b) {
-  const double most = std::max(a, b);
-  return most == log_zero ? log_zero : most + std::log1p(std::exp(std::min(a, b) - most));
-}
-
+/// What the presses' features say for every label, in nats: the features' weight times the sum over
+/// the touches of the log density by the label's distribution above that by the distribution of any
+/// object. Only touches with an element In Contact count. 0 for none_label, whose presses are those
+/// of any object, and for all where the task has no features.
 std::vector<double> feature_nats(std::span<const TouchEvidence> touches,
                                  const RecognitionTask& task) {
   std::vector<double> nats(task.labels.size());
@@ -39,6 +36,13 @@ std::vector<double> feature_nats(std::span<const TouchEvidence> touches,
     }
   }
   return nats;
+}
+
+}  // namespace
+
+double log_sum(double a, double b) {
+  const double most = std::max(a, b);
+  return most == log_zero ? log_zero : most + std::log1p(std::exp(std::min(a, b) - most));
 }
 
 std::vector<double> sums_by_label(const Estimate& estimate, const RecognitionTask& task) {
@@ -67,9 +71,7 @@ Tempering tempering_of(std::span<const TouchEvidence> touches, const Recognition
   const FitScale scale = task.fit_scale();
   const bool on_scale = scale.shared_sd > 0.0;
   if (fit && on_scale && task.labels.back() == none_label) {
-    tempering.features.back() += misfit_nats(
-        *fit, static_cast<std::size_t>(std::ranges::count_if(touches, &TouchEvidence::in_contact)),
-        scale);
+    tempering.features.back() += misfit_nats(*fit, touches_in_contact(touches), scale);
   }
   return tempering;
 }

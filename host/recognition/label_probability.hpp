@@ -11,14 +11,6 @@
 
 namespace palpate {
 
-/// What the presses' features say for every label, in nats: the features' weight times the sum over
-/// the touches of the log density by the label's distribution above that by the distribution of any
-/// object. Only touches with an element In Contact count. 0 for none_label, whose presses are those
-/// of any object, and for all where the task has no features.
-/// @throws Error on features beside a threshold of 0
-std::vector<double> feature_nats(std::span<const TouchEvidence> touches,
-                                 const RecognitionTask& task);
-
 /// The sums of Estimate::identity over the maps of every label, [label]: the probabilities at
 /// temperature 1 and without features.
 std::vector<double> sums_by_label(const Estimate& estimate, const RecognitionTask& task);
@@ -30,7 +22,7 @@ std::vector<double> label_log_evidence(const Estimate& estimate, const Recogniti
 /// What the task's sensor model makes of the evidence of labels after some touches.
 struct Tempering {
   double temperature = 1.0;      ///< of so many touches
-  std::vector<double> features;  ///< [label] feature_nats() of the touches, and misfit_nats()
+  std::vector<double> features;  ///< [label] what features of the presses say, and misfit_nats()
 
   /// log of E^(1 / temperature) exp(features), but for a constant.
   /// @param log_evidence log E, E being the sum over the label's maps of weight times evidence
@@ -40,7 +32,7 @@ struct Tempering {
 };
 /// @param fit of the best object, on the task's scale; adds misfit_nats() to none_label where that
 /// scale was learned
-/// @throws Error as feature_nats()
+/// @throws Error on features beside a threshold of 0
 Tempering tempering_of(std::span<const TouchEvidence> touches, const RecognitionTask& task,
                        const std::optional<Fit>& fit = {});
 

@@ -28,8 +28,7 @@ double density(const Fit& fit, double mean, double widened_sd) {
 
 ObjectFit fit_of(const Mode& mode, const std::optional<RefinedPose>& refined,
                  std::span<const TouchEvidence> touches, const RecognitionTask& task) {
-  const auto in_contact =
-      static_cast<std::size_t>(std::ranges::count_if(touches, &TouchEvidence::in_contact));
+  const std::size_t in_contact = touches_in_contact(touches);
   if (in_contact == 0) {
     return {};
   }

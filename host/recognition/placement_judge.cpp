@@ -279,8 +279,7 @@ std::optional<TouchPlacement> judge_placement(const Recogniser& recogniser,
                                               const RecognitionStep& step) {
   const std::span<const TouchEvidence> touches = recogniser.evidence();
   Question question{.recogniser = recogniser, .task = task};
-  question.in_contact =
-      static_cast<std::size_t>(std::ranges::count_if(touches, &TouchEvidence::in_contact));
+  question.in_contact = touches_in_contact(touches);
   const bool none = task.labels[step.best] == none_label;
   const bool unexplained = none || (step.fit && step.fit->verdict == Verdict::does_not_fit);
   const bool doubtful = step.decision.act || (step.fit && step.fit->verdict == Verdict::doubtful);

@@ -73,10 +73,6 @@ TouchEvidence TouchPlaces::thinned(const TouchEvidence& touch, double weight) co
   return some;
 }
 
-TouchEvidence TouchPlaces::weighed(const TouchEvidence& touch) const {
-  return thinned(touch, weight_of(place_of(touch), touch));
-}
-
 TouchEvidence TouchPlaces::add(const TouchEvidence& touch) {
   Place place = place_of(touch);
   place.weight = weight_of(place, touch);

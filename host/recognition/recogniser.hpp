@@ -29,9 +29,8 @@ class TouchPlaces {
  public:
   void clear() { *this = {}; }
   /// The touch with as many of its known elements as its weight says, spread over the array; the
-  /// others are Unknown. So all filters, "(none)" and the fit give it that weight.
-  TouchEvidence weighed(const TouchEvidence& touch) const;
-  /// weighed() of a touch that belongs to those before from now on.
+  /// others are Unknown. So all filters, "(none)" and the fit give it that weight. It belongs to
+  /// the touches before from now on.
   TouchEvidence add(const TouchEvidence& touch);
   /// What to say where touches are written twice, or lie so close together that they count as half
   /// as many at most; else "".

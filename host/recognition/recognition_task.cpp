@@ -7,6 +7,10 @@
 
 namespace palpate {
 
+std::size_t touches_in_contact(std::span<const TouchEvidence> touches) {
+  return static_cast<std::size_t>(std::ranges::count_if(touches, &TouchEvidence::in_contact));
+}
+
 RecognitionTask::RecognitionTask(std::vector<Hypothesis> objects, FilterOptions options)
     : hypotheses(std::move(objects)), filter(std::move(options)) {
   for (const Hypothesis& hypothesis : hypotheses) {

@@ -14,6 +14,9 @@
 
 namespace palpate {
 
+/// How many have an element In Contact.
+std::size_t touches_in_contact(std::span<const TouchEvidence> touches);
+
 /// When a robot acts on a result; see decide().
 struct ActWhere {
   double below_mm = 0.5;  ///< 95 % of the belief lies within this distance of the pose

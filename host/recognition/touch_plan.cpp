@@ -1,6 +1,7 @@
 #include "recognition/touch_plan.hpp"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
@@ -22,6 +23,8 @@
 namespace palpate {
 
 namespace {
+
+constexpr std::array goal_words{"identity", "pose", "both"};  ///< [PlanGoal]
 
 constexpr std::size_t most_places = 75;
 constexpr std::size_t fewest_places = 25;
@@ -114,13 +117,6 @@ std::vector<Pose> read_candidates(const std::filesystem::path& path,
   return table.T_robot_sensor;
 }
 
-/// What is unknown of the goal, nats.
-double unknown_nats(const Plan& plan) {
-  return plan.goal == PlanGoal::identity ? plan.identity_nats
-         : plan.goal == PlanGoal::pose   ? plan.both_nats - plan.identity_nats
-                                         : plan.both_nats;
-}
-
 /// Entropy of the labels in nats, "(none)" left out.
 double label_entropy(std::span<const double> identity, const RecognitionTask& task) {
   double total = 0.0;
@@ -139,17 +135,14 @@ double label_entropy(std::span<const double> identity, const RecognitionTask& ta
 }  // namespace
 
 PlanGoal parse_goal(std::string_view option, const std::string& text) {
-  for (const PlanGoal goal : {PlanGoal::identity, PlanGoal::pose, PlanGoal::both}) {
-    if (text == goal_word(goal)) {
-      return goal;
-    }
+  const auto word = std::ranges::find(goal_words, text);
+  if (word == goal_words.end()) {
+    refuse_option(option, text, "not known; use identity, pose or both");
   }
-  refuse_option(option, text, "not known; use identity, pose or both");
+  return static_cast<PlanGoal>(word - goal_words.begin());
 }
 
-std::string goal_word(PlanGoal goal) {
-  return goal == PlanGoal::identity ? "identity" : goal == PlanGoal::pose ? "pose" : "both";
-}
+std::string goal_word(PlanGoal goal) { return goal_words[static_cast<std::size_t>(goal)]; }
 
 double gain_for(const TouchGain& gain, PlanGoal goal) {
   return goal == PlanGoal::identity ? gain.identity
@@ -300,7 +293,9 @@ std::string limit_words(const Plan& plan) {
         "candidates may not be in order; give more `samples`",
         samples, most);
   }
-  if (gain <= unknown_nats(plan) + least_gain_nats) {
+  const TouchGain unknown{.identity = plan.identity_nats,
+                          .pose = plan.both_nats - plan.identity_nats};
+  if (gain <= gain_for(unknown, plan.goal) + least_gain_nats) {
     return "";
   }
   return plan.goal == PlanGoal::identity

@@ -130,7 +130,8 @@ TEST(LabelProbability, PassesOverTouchesWithoutContact) {
   const std::vector<double> pressure{0.0, 0.5, 0.0};
   std::vector<Touch> touch = presses(1);
   touch[0].pressure = pressure;
-  EXPECT_EQ(feature_nats(evidence_of(touch, task.contact()), task), std::vector<double>(2));
+  EXPECT_EQ(tempering_of(evidence_of(touch, task.contact()), task).features,
+            std::vector<double>(2));
 }
 
 TEST(LabelBounds, FollowTheTemperatureAndTheFeatures) {
