@@ -20,7 +20,6 @@
 #include "recognition/batch/batch_resolution.hpp"
 #include "recognition/batch/batch_task.hpp"
 #include "recognition/batch/input_reading.hpp"
-#include "recognition/recordings.hpp"
 #include "recognition/request.hpp"
 
 namespace palpate::cli {
