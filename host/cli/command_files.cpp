@@ -1,6 +1,5 @@
 #include "cli/command_files.hpp"
 
-#include <fmt/format.h>
 #include <unistd.h>
 
 #include <map>

@@ -12,7 +12,6 @@
 #include "cli/command_files.hpp"
 #include "cli/commands.hpp"
 #include "cli/options.hpp"
-#include "cli/recognition_flags.hpp"
 #include "cli/sensor_option.hpp"
 #include "io/recording_rules.hpp"
 #include "io/recording_survey.hpp"

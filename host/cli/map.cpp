@@ -25,11 +25,6 @@ namespace palpate::cli {
 
 namespace {
 
-/// The file for ROS beside the map of this name in the folder of --ros.
-std::filesystem::path ros_path(const MapFlags& flags, const std::string& name) {
-  return std::filesystem::path(flags.ros) / (name + ".yaml");
-}
-
 void add_map_flags(CLI::App& command, MapFlags& flags) {
   command
       .add_option("RECORDING", flags.recordings,
@@ -145,30 +140,23 @@ void prepare_outputs(const MapFlags& flags, const std::vector<std::string>& name
   if (std::error_code none; std::filesystem::is_regular_file(flags.array, none)) {
     files.reads("--array", flags.array);
   }
-  std::vector<std::filesystem::path> outputs;
+  const auto writes = [&](const std::filesystem::path& file) {
+    if (flags.to_folder()) {
+      files.writes_in("-o", file.parent_path(), file.filename().string());
+    } else {
+      files.writes("-o", file);
+    }
+  };
   for (const std::string& name : names) {
-    outputs.push_back(flags.map_file(name));
+    writes(flags.map_file(name));
+    for (const char* extension : {".yaml", ".pgm"}) {
+      files.writes_in("--ros", flags.ros, name + extension);
+    }
   }
   if (with_sensor) {
-    outputs.push_back(flags.sensor_file());
-  }
-  for (const std::filesystem::path& path : outputs) {
-    if (flags.to_folder()) {
-      files.writes_in("-o", path.parent_path(), path.filename().string());
-    } else {
-      files.writes("-o", path);
-    }
+    writes(flags.sensor_file());
   }
   files.writes("--png", flags.png);
-  if (!flags.ros.empty()) {
-    for (const std::string& name : names) {
-      const std::filesystem::path yaml = ros_path(flags, name);
-      for (const std::filesystem::path& file :
-           {yaml, std::filesystem::path(yaml).replace_extension(".pgm")}) {
-        files.writes_in("--ros", file.parent_path(), file.filename().string());
-      }
-    }
-  }
   files.prepare();
 }
 
@@ -188,7 +176,7 @@ void write_maps(const MapFlags& flags, const LearnedMaps& learned) {
     fmt::print("{}\n", in_flags(line));
   }
   for (std::size_t i = 0; i < drawn.size() && !flags.ros.empty(); ++i) {
-    const std::filesystem::path yaml = ros_path(flags, learned.maps[i].name);
+    const auto yaml = std::filesystem::path(flags.ros) / (learned.maps[i].name + ".yaml");
     write_map_server(yaml, learned.maps[i].map);
     fmt::print("{}\n", yaml.string());
   }

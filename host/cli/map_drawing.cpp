@@ -9,7 +9,6 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/options.hpp"
-#include "cli/recognition_flags.hpp"
 #include "io/drawing_file.hpp"
 #include "model/printable.hpp"
 #include "streaming/import_array.hpp"

@@ -1,11 +1,6 @@
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
-#include <filesystem>
-#include <functional>
-#include <optional>
-#include <span>
 #include <string>
 
 #include <fmt/format.h>

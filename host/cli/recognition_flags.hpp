@@ -7,7 +7,6 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/command_files.hpp"
-#include "options/option.hpp"
 #include "recognition/recognition_job.hpp"
 
 namespace palpate::cli {

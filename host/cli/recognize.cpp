@@ -1,10 +1,7 @@
-#include <unistd.h>
 
 #include <filesystem>
-#include <functional>
 #include <optional>
 #include <set>
-#include <span>
 #include <string>
 #include <utility>
 
@@ -20,7 +17,6 @@
 #include "cli/record_table.hpp"
 #include "cli/sheet.hpp"
 #include "cli/step_words.hpp"
-#include "cli/text_table.hpp"
 #include "io/atomic_file.hpp"
 #include "palpate/files.hpp"
 #include "recognition/record_json.hpp"

@@ -11,13 +11,11 @@
 #include "cli/interruption.hpp"
 #include "cli/options.hpp"
 #include "cli/sensor_option.hpp"
-#include "io/atomic_file.hpp"
 #include "model/printable.hpp"
 #include "model/stream_time.hpp"
 #include "palpate/baseline.hpp"
 #include "palpate/error.hpp"
 #include "palpate/frame_recorder.hpp"
-#include "palpate/pose_track.hpp"
 #include "palpate/touch_detector.hpp"
 #include "palpate/virtual_sensor.hpp"
 

@@ -1,8 +1,10 @@
 #include "cli/record_table.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <map>
+#include <numeric>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -10,10 +12,68 @@
 #include "cli/step_words.hpp"
 #include "cli/text_table.hpp"
 #include "model/printable.hpp"
+#include "recognition/record_json.hpp"
+#include "recognition/result_json.hpp"
 
 namespace palpate::cli {
 
 namespace {
+
+/// Whether the pose is of the best label, and of no other.
+bool is_of_best(const RecognitionStep& step, const RecognitionTask& task) {
+  return task.labels[step.best] == task.labels[task.label_of[step.mode.object]];
+}
+
+// Cells of tables; "" where there is nothing to say.
+
+/// "A", "A mirrored", "(none), pose of A".
+std::string object_words(const RecognitionStep& step, const RecognitionTask& task) {
+  const std::string object = task.name_of(step.mode.object);
+  return is_of_best(step, task) ? object
+                                : fmt::format("{}, pose of {}", task.labels[step.best], object);
+}
+
+/// "fits", "doubtful", "no fit" or "contradicted".
+std::string fit_words(const RecognitionStep& step) {
+  if (!step.contradicted && !step.fit) {
+    return "";
+  }
+  return step.contradicted                            ? "contradicted"
+         : step.fit->verdict == Verdict::does_not_fit ? "no fit"
+                                                      : verdict_text(step.fit->verdict);
+}
+
+/// A probability.
+std::string share_text(std::optional<double> share) {
+  return share ? fmt::format("{:.3f}", *share) : "";
+}
+
+/// The columns of tables with a line for each touch.
+/// @param dropped width of its column in lines by themselves
+std::vector<TextTable::Column> step_columns(std::vector<TextTable::Column> first,
+                                            const TextTable::Column& extra,
+                                            std::size_t dropped = 0) {
+  const std::vector<TextTable::Column> others{
+      {"best", false, 10},     {"prob.", true, 5},    {"dropped", true, dropped},
+      {"at pose", true, 7},    {"x mm", true, 14},    {"y mm", true, 14},
+      {"theta deg", true, 15}, {"error mm", true, 8}, extra,
+      {"touch's z", true, 9},  {"fit", false, 12}};
+  first.insert(first.end(), others.begin(), others.end());
+  return first;
+}
+
+/// A row below step_columns().
+TextTable::Row step_cells(TextTable::Row first, const RecognitionStep& step,
+                          const RecognitionTask& task, const std::string& extra) {
+  const auto [x, y, theta] = pose_cells(step.T_robot_object(), sd_at_peak(step));
+  const bool touch_fits = !step.touch_fit.empty() && step.touch_fit.back();
+  first.insert(first.end(),
+               {object_words(step, task), share_text(step.confidence()), dropped_text(step),
+                share_text(share_at_pose(step, task)), x, y, theta,
+                step.right ? error_text(step.pose_error_mm()) : "", extra,
+                touch_fits ? fmt::format("{:+.1f}", *step.touch_fit.back()) : "", fit_words(step)});
+  return first;
+}
 
 std::string printable_name(const RecognitionRecord& record) { return printable(name_of(record)); }
 
@@ -63,13 +123,6 @@ std::string decisions(const std::vector<RecognitionRecord>& records, const Recog
     }
   }
   return decided > few_decided ? fmt::format("act on {} of {} unknowns\n", acts, decided) : text;
-}
-
-/// The best label, and "mirrored" where the pose is of its other side.
-std::string best_words(const RecognitionStep& step, const RecognitionTask& task) {
-  const std::string& best = task.labels[step.best];
-  const bool posed = best == task.labels[task.label_of[step.mode.object]];
-  return printable(posed ? task.name_of(step.mode.object) : best);
 }
 
 /// The probability of "(none)" where another label is the best; 0 where it is not among the labels.
@@ -134,7 +187,28 @@ std::string symmetries(const std::vector<RecognitionRecord>& records, const Reco
   return text;
 }
 
+/// The table of `live`.
+TextTable live_table(const RecognitionTask& task) {
+  const std::size_t dropped = traits_of(task.filter).certificate ? 7 : 0;
+  return TextTable(
+      step_columns({{"unknown", true, 7}, {"touch", true, 5}}, {"latency ms", true, 10}, dropped));
+}
+
 }  // namespace
+
+std::string dropped_text(const RecognitionStep& step) {
+  if (!step.certificate) {
+    return "";
+  }
+  const double mass = step.certificate->dropped_mass;
+  if (!(mass > 0.0)) {
+    return "0";
+  }
+  const double digit = std::pow(10.0, std::floor(std::log10(mass)));
+  // A number that has one digit keeps it, whatever the division's rounding.
+  const double rounded = digit * std::ceil(mass / digit * (1.0 - 1e-12));
+  return fmt::format("{:.1g}", std::min(rounded, 1.0));
+}
 
 std::string name_of(const RecognitionRecord& record) {
   const std::string file = std::filesystem::path(record.recording).filename().string();
@@ -211,7 +285,7 @@ std::string result_table(const std::vector<RecognitionRecord>& records,
                        !with_act           ? ""
                        : step.decision.act ? "act"
                                            : "-",
-                       best_words(step, task),
+                       printable(is_of_best(step, task) ? posed : task.labels[step.best]),
                        share_text(step.confidence()),
                        dropped_text(step)};
     if (const auto share = share_at_pose(step, task)) {  // less than that of the best label
@@ -241,6 +315,82 @@ std::string result_table(const std::vector<RecognitionRecord>& records,
   }
   return decisions(records, task) + table.text() + findings(records, task) +
          symmetries(records, task) + summary(records) + confusions(records, task);
+}
+
+nlohmann::ordered_json to_json(const LiveTouch& touch, const RecognitionTask& task) {
+  const Pose& pose = *touch.touch.T_robot_sensor;
+  nlohmann::ordered_json json{{"time", 0.5 * (touch.touch.begin_s + touch.touch.end_s)},
+                              {"unknown", touch.unknown},
+                              {"touch", touch.index},
+                              {"pose",
+                               {{"x_mm", pose.translation_mm.x},
+                                {"y_mm", pose.translation_mm.y},
+                                {"theta_rad", pose.theta_rad}}}};
+  json.update(to_json(touch.step, task));
+  if (!touch.step.truth.label.empty()) {
+    json["truth"] = truth_to_json(touch.step.truth);
+  }
+  json["latency_ms"] = touch.latency_ms;
+  json["frames_lost"] = touch.frames_lost;
+  if (!touch.left_out.empty()) {
+    json["left_out"] = touch.left_out;
+  }
+  return json;
+}
+
+std::string plan_line(const LiveTouch& touch) {
+  nlohmann::ordered_json json{
+      {"unknown", touch.unknown}, {"touch", touch.index}, {"next", to_json(touch.next.value())}};
+  json["next"].erase("index");  // of a grid that nobody else knows
+  return text_of(json);
+}
+
+std::string table_heading(const RecognitionTask& task) {
+  const TextTable table = live_table(task);
+  return table.line(table.headings());
+}
+
+std::string table_line(const LiveTouch& touch, const RecognitionTask& task) {
+  TextTable::Row row =
+      step_cells({fmt::format("{}", touch.unknown + 1), fmt::format("{}", touch.index + 1)},
+                 touch.step, task, fmt::format("{:.2f}", touch.latency_ms));
+  std::ranges::replace(row, std::string(), "-");
+  row.back() += touch.step.decision.act ? ", act" : "";
+  return live_table(task).line(row);
+}
+
+std::string summary(const LiveState& state, std::vector<double> latencies_ms,
+                    const RecognitionTask& task) {
+  std::string text;
+  if (state.last) {
+    const RecognitionStep& step = state.last->step;
+    const StepSentences words = sentences_of(step, task);
+    std::vector<std::string> lines{words.decision, result_words(step, task), words.truth};
+    std::ranges::copy(words.findings, std::back_inserter(lines));
+    for (const std::string& line : lines) {
+      text += line.empty() ? "" : line + "\n";
+    }
+  }
+  text += fmt::format("{} touches, {} frames, {} lost", state.all_touches, state.counters.frames,
+                      state.counters.lost);
+  if (state.counters.reconnects > 0) {
+    text += fmt::format(", the board came back {} times", state.counters.reconnects);
+  }
+  if (state.without_pose > 0) {
+    text += fmt::format(", {} touches without a pose passed over", state.without_pose);
+  }
+  if (state.unknown_readings > 0) {
+    text += fmt::format(", {} readings unknown", state.unknown_readings);
+  }
+  text += "\n";
+  if (!latencies_ms.empty()) {
+    std::ranges::sort(latencies_ms);
+    const std::size_t n = latencies_ms.size();
+    text += fmt::format("from frame to estimate: median {:.2f} ms, worst {:.2f} ms\n",
+                        std::midpoint(latencies_ms[(n - 1) / 2], latencies_ms[n / 2]),
+                        state.worst_latency_ms);
+  }
+  return text;
 }
 
 }  // namespace palpate::cli

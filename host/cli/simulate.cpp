@@ -1,9 +1,8 @@
 #include "cli/commands.hpp"
 
-#include <algorithm>
-#include <charconv>
 #include <optional>
 #include <random>
+#include <regex>
 #include <string>
 
 #include <fmt/format.h>
@@ -34,14 +33,9 @@ std::vector<Pose> sensor_poses(const std::string& text, std::uint64_t seed) {
   if (text == "grid") {
     return training_grid();
   }
-  const std::string prefix = "random:";
-  int n = 0;
-  const char* const end = text.data() + text.size();
-  if (text.starts_with(prefix)) {
-    const auto [rest, error] = std::from_chars(text.data() + prefix.size(), end, n);
-    if (error == std::errc{} && rest == end && n > 0) {
-      return random_poses(n, seed);
-    }
+  static const std::regex random("random:0*([1-9][0-9]{0,8})");
+  if (std::smatch count; std::regex_match(text, count, random)) {
+    return random_poses(std::stoi(count[1]), seed);
   }
   refuse_flag("--poses", text, "give grid, or random:N with N above 0");
 }

@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "cli/options.hpp"
+#include "model/angle_unit.hpp"
 #include "model/option_words.hpp"
 #include "model/printable.hpp"
 #include "recognition/record_json.hpp"
@@ -35,14 +35,6 @@ std::array<std::string, 3> numbers(const Pose& pose, const StandardDeviations& s
   const auto mm = [](double length_mm) { return length_mm; };
   return {text(pose.translation_mm.x, 0, mm), text(pose.translation_mm.y, 1, mm),
           text(pose.theta_rad, 2, degrees)};
-}
-
-/// The object of the step and, where the pose is another object's, that object: "A", "A mirrored",
-/// "(none), pose of A".
-std::string object_words(const RecognitionStep& step, const RecognitionTask& task) {
-  const std::string& best = task.labels[step.best];
-  const std::string object = task.name_of(step.mode.object);
-  return best == posed_label(step, task) ? object : fmt::format("{}, pose of {}", best, object);
 }
 
 }  // namespace
@@ -98,58 +90,8 @@ std::string result_words(const RecognitionStep& step, const RecognitionTask& tas
   return identity_words(step, task) + ": " + pose_words(step.T_robot_object(), sd_at_peak(step));
 }
 
-std::string fit_words(const RecognitionStep& step) {
-  if (!step.contradicted && !step.fit) {
-    return "";
-  }
-  return step.contradicted                            ? "contradicted"
-         : step.fit->verdict == Verdict::does_not_fit ? "no fit"
-                                                      : verdict_text(step.fit->verdict);
-}
-
-std::string dropped_text(const RecognitionStep& step) {
-  if (!step.certificate) {
-    return "";
-  }
-  const double mass = step.certificate->dropped_mass;
-  if (!(mass > 0.0)) {
-    return "0";
-  }
-  const double digit = std::pow(10.0, std::floor(std::log10(mass)));
-  // A number that has one digit keeps it, whatever the division's rounding.
-  const double rounded = digit * std::ceil(mass / digit * (1.0 - 1e-12));
-  return fmt::format("{:.1g}", std::min(rounded, 1.0));
-}
-
-std::string share_text(std::optional<double> share) {
-  return share ? fmt::format("{:.3f}", *share) : "";
-}
-
 std::string error_text(std::optional<double> error_mm) {
   return error_mm ? fmt::format("{:.2f}", *error_mm) : "-";
-}
-
-std::vector<TextTable::Column> step_columns(std::vector<TextTable::Column> first,
-                                            const TextTable::Column& extra, std::size_t dropped) {
-  const std::vector<TextTable::Column> others{
-      {"best", false, 10},     {"prob.", true, 5},    {"dropped", true, dropped},
-      {"at pose", true, 7},    {"x mm", true, 14},    {"y mm", true, 14},
-      {"theta deg", true, 15}, {"error mm", true, 8}, extra,
-      {"touch's z", true, 9},  {"fit", false, 12}};
-  first.insert(first.end(), others.begin(), others.end());
-  return first;
-}
-
-TextTable::Row step_cells(TextTable::Row first, const RecognitionStep& step,
-                          const RecognitionTask& task, const std::string& extra) {
-  const auto [x, y, theta] = pose_cells(step.T_robot_object(), sd_at_peak(step));
-  const bool touch_fits = !step.touch_fit.empty() && step.touch_fit.back();
-  first.insert(first.end(),
-               {object_words(step, task), share_text(step.confidence()), dropped_text(step),
-                share_text(share_at_pose(step, task)), x, y, theta,
-                step.right ? error_text(step.pose_error_mm()) : "", extra,
-                touch_fits ? fmt::format("{:+.1f}", *step.touch_fit.back()) : "", fit_words(step)});
-  return first;
 }
 
 namespace {

@@ -5,7 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "cli/text_table.hpp"
 #include "recognition/recognition_job.hpp"
 #include "recognition/recognition_record.hpp"
 #include "recognition/touch_plan.hpp"
@@ -49,26 +48,8 @@ struct StepSentences {
 };
 StepSentences sentences_of(const RecognitionStep& step, const RecognitionTask& task);
 
-// Cells of tables; "" where there is nothing to say.
-
-/// "fits", "doubtful", "no fit" or "contradicted".
-std::string fit_words(const RecognitionStep& step);
-/// Dropped mass of a bounded posterior, rounded up to one digit: "3e-07".
-std::string dropped_text(const RecognitionStep& step);
-/// A probability, as "0.152".
-std::string share_text(std::optional<double> share);
 /// A pose error in mm, "-" where there is none.
 std::string error_text(std::optional<double> error_mm);
-
-/// The columns of tables with a line for each touch: these, then best, prob., dropped, at pose, x,
-/// y, theta, error, `extra`, the touch's z and fit.
-/// @param dropped width of its column in lines by themselves
-std::vector<TextTable::Column> step_columns(std::vector<TextTable::Column> first,
-                                            const TextTable::Column& extra,
-                                            std::size_t dropped = 0);
-/// The row of a step below step_columns().
-TextTable::Row step_cells(TextTable::Row first, const RecognitionStep& step,
-                          const RecognitionTask& task, const std::string& extra);
 
 /// The part of a gain that the goal asks for, with its standard error: "2.31+-0.07".
 std::string gain_text(const TouchGain& gain, PlanGoal goal);

@@ -9,7 +9,6 @@
 #include "cli/commands.hpp"
 #include "cli/interruption.hpp"
 #include "cli/options.hpp"
-#include "cli/page/page_feed.hpp"
 #include "cli/page/page_server.hpp"
 #include "cli/page/viewed_files.hpp"
 #include "palpate/error.hpp"
@@ -27,14 +26,13 @@ struct ViewArguments {
 
 void view(const ViewArguments& options) {
   const ViewedFiles files(options.paths);
-  PageFeed feed;
-  feed.set("files", files.list());
-  const PageServer server(options.page, feed,
-                          {.get = [&files](const std::string& path) { return files.get(path); },
-                           .act =
-                               [](const nlohmann::json&) {
-                                 throw Error(Fault::input, "saved files are only looked at");
-                               }});
+  PageServer server(options.page,
+                    {.get = [&files](const std::string& path) { return files.get(path); },
+                     .act =
+                         [](const nlohmann::json&) {
+                           throw Error(Fault::input, "saved files are only looked at");
+                         }});
+  server.feed().set("files", files.list());
   catch_interruptions();
   fmt::print("{}; Ctrl-C ends it\n", server.words());
   std::fflush(stdout);

@@ -23,19 +23,26 @@ TEST_F(InfoCommand, Recording) {
   expect_info(sample_unknown("A", {{2.0, -3.0}, 1.0}, 6),
               {"r.h5: recording of an unknown object", "touches           6",
                "elements          36", "kPa", "A at x 1.444 mm, y 3.304 mm"});
-  expect_info(sample_training("A", 2), {"recording of A"});
-}
-
-TEST_F(InfoCommand, RangesOfPosesPressuresAndArray) {
   Recording recording = sample_training("A", 2);
   recording.T_robot_sensor = {{{-3.5, 2.0}, 0.5}, {{4.0, 8.25}, -1.0}};
   recording.pressure.assign(72, 1.0);
   std::fill(recording.pressure.begin(), recording.pressure.begin() + 10, 16.0);
   expect_info(recording,
-              {"9.8 x 9.5 mm: x -4.9 to 4.9, y -4.75 to 4.75 mm", "pitch             1.9 mm",
-               "1 to 16 kPa, median 1, 99th percentile 16",
+              {"recording of A", "9.8 x 9.5 mm: x -4.9 to 4.9, y -4.75 to 4.75 mm",
+               "pitch             1.9 mm", "1 to 16 kPa, median 1, 99th percentile 16",
                "in contact        1 touches, more than 2 kPa above 0",
                "x -3.5 to 4 mm, y 2 to 8.25 mm", "theta -1 to 0.5 rad, -57.3 to 28.6 deg"});
+  recording.valid.assign(36, 1);
+  recording.valid[3] = recording.valid[4] = 0;
+  recording.pressure[3] = 4000.0;
+  recording.pressure[4] = std::nan("");
+  expect_info(recording, {"1 to 16 kPa", "dead readings     2 of 36"});
+  recording.rows = "frames";
+  recording.pressure_unit = "raw";
+  recording.time_s = {1.7e9, 1.7e9 + 2.5};
+  recording.elements_mm.resize(72);
+  expect_info(recording, {"frames            2", "raw", "positions change", "2.500 s",
+                          "in contact        not known"});
 }
 
 TEST_F(InfoCommand, SuspicionsComeLast) {
@@ -60,27 +67,6 @@ TEST_F(InfoCommand, SimulatedStreamsAreNotSuspicious) {
       EXPECT_EQ(done(file).find("Suspicious"), std::string::npos) << sensor;
     }
   }
-}
-
-TEST_F(InfoCommand, RawStreamOfAChangingArray) {
-  Recording stream = sample_training("A", 2);
-  stream.rows = "frames";
-  stream.pressure_unit = "raw";
-  stream.time_s = {1.7e9, 1.7e9 + 2.5};
-  stream.elements_mm.resize(2 * stream.elements());
-  expect_info(stream, {"frames            2", "raw", "positions change", "2.500 s",
-                       "in contact        not known"});
-}
-
-TEST_F(InfoCommand, DeadElementsDoNotCountAmongThePressures) {
-  Recording recording = sample_training("A", 1);
-  recording.pressure.assign(recording.elements(), 1.5);
-  recording.valid.assign(recording.elements(), 1);
-  recording.valid[3] = 0;
-  recording.valid[4] = 0;
-  recording.pressure[3] = 4000.0;
-  recording.pressure[4] = std::nan("");
-  expect_info(recording, {"1.5 to 1.5 kPa", "dead readings     2 of 36"});
 }
 
 TEST_F(InfoCommand, ClosesRecordingsOnly) {

@@ -5,6 +5,7 @@
 
 #include "cli/recognition_flags.hpp"
 #include "model/option_words.hpp"
+#include "options/option.hpp"
 #include "recognition/recognition_job.hpp"
 #include "support/sample_files.hpp"
 #include "support/scratch_folder.hpp"

@@ -8,7 +8,6 @@
 
 #include <numbers>
 
-#include "cli/live_record.hpp"
 #include "cli/sheet.hpp"
 #include "cli/step_words.hpp"
 #include "palpate/pose_error.hpp"
@@ -317,9 +316,8 @@ TEST(RecordOutput, SaysTheSameNumbersEverywhere) {
       pose_words(Pose{{pose[0], pose[1]}, pose[2]}, std::array<double, 3>{sd[0], sd[1], sd[2]});
   EXPECT_EQ(words, "x 398.76 +-0.05 mm, y -20.50 +-0.10 mm, theta 28.65 +-0.57 deg");
   const std::string error = error_text(json.at("refined_error_mm").get<double>());
-  const std::string true_words =
-      fmt::format("truth: A at {}; error {} mm",
-                  pose_words(Pose{{truth[0], truth[1]}, truth[2]}), error);
+  const std::string true_words = fmt::format(
+      "truth: A at {}; error {} mm", pose_words(Pose{{truth[0], truth[1]}, truth[2]}), error);
   LiveState state;
   state.last = LiveTouch{.touch = {.T_robot_sensor = Pose{}}, .step = step};
   const std::string misfit =

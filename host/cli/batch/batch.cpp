@@ -19,7 +19,6 @@
 #include "io/input_file.hpp"
 #include "recognition/batch/batch_task.hpp"
 #include "recognition/batch/input_reading.hpp"
-#include "recognition/recordings.hpp"
 #include "recognition/request.hpp"
 
 namespace palpate::cli {

@@ -16,10 +16,9 @@
 #include <utility>
 
 #include "cli/options.hpp"
-#include "cli/recognition_flags.hpp"
 #include "cli/step_words.hpp"
 #include "io/input_file.hpp"
-#include "recognition/batch/batch_task.hpp"
+#include "recognition/batch/input_reading.hpp"
 #include "recognition/record_json.hpp"
 
 namespace palpate::cli {

@@ -6,7 +6,6 @@
 
 #include "cli/results_folder.hpp"
 #include "recognition/batch/batch_task.hpp"
-#include "recognition/batch/input_reading.hpp"
 #include "recognition/recognition_job.hpp"
 
 namespace palpate::cli {

@@ -5,8 +5,8 @@
 
 #include <fmt/format.h>
 
-#include "cli/live_record.hpp"
 #include "cli/page/page_json.hpp"
+#include "cli/record_table.hpp"
 #include "cli/sheet.hpp"
 #include "cli/step_words.hpp"
 #include "model/option_words.hpp"
@@ -75,10 +75,9 @@ LivePage::LivePage(const PageAddress& address, const SensorDescription& sensor,
     : task_(task),
       recogniser_(recogniser),
       plan_(plan),
-      server_(address, feed_,
-              {.get = [this](const std::string& path) { return get(path); },
-               .act = [this](const nlohmann::json& request) { act(request); }}) {
-  feed_.set("setup", text_of(setup(sensor, elements_mm, task, plan)));
+      server_(address, {.get = [this](const std::string& path) { return get(path); },
+                        .act = [this](const nlohmann::json& request) { act(request); }}) {
+  server_.feed().set("setup", text_of(setup(sensor, elements_mm, task, plan)));
 }
 
 void LivePage::serve(LiveRecognition* recognition) {
@@ -118,9 +117,9 @@ void LivePage::act(const nlohmann::json& request) {
 void LivePage::begin_unknown() {
   last_.reset();
   for (const char* event : {"touch", "next", "belief"}) {
-    feed_.forget(event);
+    server_.feed().forget(event);
   }
-  feed_.set("unknown", "{}\n");
+  server_.feed().set("unknown", "{}\n");
 }
 
 void LivePage::add(const LiveTouch& touch) {
@@ -129,7 +128,7 @@ void LivePage::add(const LiveTouch& touch) {
   json["words"] = sentences(touch.step, task_);
   json["map"] = touch.step.mode.object;
   json["readings"] = readings_text(touch);
-  feed_.add("touch", text_of(json));
+  server_.feed().add("touch", text_of(json));
   show_belief();
 }
 
@@ -142,13 +141,13 @@ void LivePage::show_belief() {
   nlohmann::ordered_json json = belief_json(belief);
   json["map"] = object;
   json["chosen"] = looked_at_ >= 0;
-  feed_.set("belief", text_of(json));
+  server_.feed().set("belief", text_of(json));
 }
 
 void LivePage::plan(const LiveTouch& touch) {
   nlohmann::ordered_json json = to_json(*touch.next);
   json["words"] = next_touch_words(*touch.next, *plan_);
-  feed_.set("next", text_of(json));
+  server_.feed().set("next", text_of(json));
 }
 
 void LivePage::update(const LiveState& state, const std::string& warning) {
@@ -180,7 +179,7 @@ void LivePage::update(const LiveState& state, const std::string& warning) {
   if (!warning.empty()) {
     json["warning"] = in_flags(warning);
   }
-  feed_.set("frame", text_of(json));
+  server_.feed().set("frame", text_of(json));
 }
 
 }  // namespace palpate::cli

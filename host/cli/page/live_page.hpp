@@ -7,7 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "cli/page/page_feed.hpp"
 #include "cli/page/page_server.hpp"
 #include "recognition/live_recognition.hpp"
 
@@ -59,7 +58,6 @@ class LivePage {
   std::uint64_t frames_before_ = 0;           ///< until then
   double rate_hz_ = 0.0;                      ///< of the frames over a second or more
 
-  PageFeed feed_;
   PageServer server_;  ///< ends before all that it reads
 };
 

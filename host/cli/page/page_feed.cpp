@@ -1,7 +1,6 @@
 #include "cli/page/page_feed.hpp"
 
 #include <algorithm>
-#include <iterator>
 
 namespace palpate::cli {
 

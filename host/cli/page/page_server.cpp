@@ -13,7 +13,6 @@
 #include <chrono>
 #include <cstdlib>
 #include <semaphore>
-#include <string_view>
 #include <thread>
 #include <utility>
 
@@ -22,7 +21,6 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/options.hpp"
-#include "cli/page/page_feed.hpp"
 #include "cli/page/site.hpp"
 #include "model/option_words.hpp"
 
@@ -36,7 +34,6 @@ using Clock = std::chrono::steady_clock;
 constexpr int most_pages = 16;     ///< that take events at a time
 constexpr int other_requests = 4;  ///< threads that are left to answer while all of them look
 constexpr std::size_t most_asked = 4096;      ///< bytes of a request's body
-constexpr int most_requests = 100;            ///< of a connection
 constexpr double least_bytes_per_s = 4096.0;  ///< that whoever reads an answer takes
 
 bool is_ip(const std::string& host) {
@@ -82,25 +79,18 @@ void own_port_alone(int socket) {
   setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof(yes));
 }
 
-/// A connection, which a request may use within the limits.
+/// A connection, which its one request may use within the limits.
 class LimitedStream : public httplib::Stream {
  public:
   LimitedStream(socket_t socket, const RequestLimits& limits, int ended)
-      : socket_(socket), limits_(limits), ended_(ended) {}
-
-  /// Waits for a request's first byte; false where none comes.
-  bool begin() {
-    if (begin_ == end_ && !fill(limits_.idle)) {
-      return false;
-    }
-    bytes_left_ = limits_.bytes;
-    read_until_ = Clock::now() + limits_.reading;
-    patience_ = limits_.writing;
-    return true;
-  }
+      : socket_(socket),
+        ended_(ended),
+        bytes_left_(limits.bytes),
+        read_until_(Clock::now() + limits.reading),
+        most_patience_(limits.writing) {}
 
   ssize_t read(char* bytes, std::size_t size) override {
-    if (begin_ == end_ && !fill(read_until_ - Clock::now())) {
+    if (begin_ == end_ && !fill()) {
       return -1;
     }
     const std::size_t count = std::min({size, end_ - begin_, bytes_left_});
@@ -119,7 +109,7 @@ class LimitedStream : public httplib::Stream {
     const ssize_t count = ::send(socket_, bytes, size, MSG_NOSIGNAL | MSG_DONTWAIT);
     const std::chrono::duration<double> earned(static_cast<double>(count) / least_bytes_per_s);
     patience_ = std::min<Clock::duration>(
-        limits_.writing,
+        most_patience_,
         patience_ - (Clock::now() - begin) + std::chrono::duration_cast<Clock::duration>(earned));
     return count;
   }
@@ -143,8 +133,8 @@ class LimitedStream : public httplib::Stream {
     return count > 0 && ready[1].revents == 0;
   }
 
-  bool fill(Clock::duration time) {
-    if (!wait(POLLIN, time)) {
+  bool fill() {
+    if (!wait(POLLIN, read_until_ - Clock::now())) {
       return false;
     }
     const ssize_t count = ::recv(socket_, buffer_.data(), buffer_.size(), MSG_DONTWAIT);
@@ -154,14 +144,14 @@ class LimitedStream : public httplib::Stream {
   }
 
   const socket_t socket_;
-  const RequestLimits& limits_;
   const int ended_;
   std::array<char, 4096> buffer_;
   std::size_t begin_ = 0;
   std::size_t end_ = 0;
-  std::size_t bytes_left_ = 0;
-  Clock::time_point read_until_;
-  Clock::duration patience_{};
+  std::size_t bytes_left_;
+  const Clock::time_point read_until_;
+  const Clock::duration most_patience_;
+  Clock::duration patience_ = most_patience_;
 };
 
 /// Threads for connections. Where many wait, the next are not accepted, so that they cannot take
@@ -208,7 +198,7 @@ void add_page_flags(CLI::App& command, PageAddress& address) {
 /// request's, and neither a request's headers nor a body that comes in chunks or compressed.
 struct PageServer::Impl : httplib::Server {
   PageAddress address;
-  PageFeed& feed;
+  PageFeed feed;
   PageAnswers answers;
   RequestLimits limits;
   int port = 0;
@@ -216,8 +206,8 @@ struct PageServer::Impl : httplib::Server {
   std::atomic<int> pages{0};
   std::thread thread;
 
-  Impl(const PageAddress& at, PageFeed& events, PageAnswers others, const RequestLimits& of_client)
-      : address(at), feed(events), answers(std::move(others)), limits(of_client) {
+  Impl(const PageAddress& at, PageAnswers of_program, const RequestLimits& of_client)
+      : address(at), answers(std::move(of_program)), limits(of_client) {
     if (ended < 0) {
       throw Error(Fault::system, "the page: no file descriptor is left; end other programs");
     }
@@ -240,24 +230,12 @@ struct PageServer::Impl : httplib::Server {
 
   bool process_and_close_socket(socket_t socket) override {
     LimitedStream stream(socket, limits, ended);
-    bool more = true;
-    for (int left = most_requests; more && left > 0 && stream.begin(); --left) {
-      more = false;
-      bool closed = false;
-      const bool answered =
-          process_request(stream, left == 1, closed, [&more](httplib::Request& request) {
-            request.ranges.clear();                     // 2,650 ranges would be as many copies
-            request.headers.erase("Content-Encoding");  // a body stays as small as it was sent
-            // What is left of a body that nobody reads shall not be taken for the next request.
-            more = request.method == "GET" && !request.has_header("Content-Length") &&
-                   !request.has_header("Transfer-Encoding");
-            if (!more) {
-              request.headers.erase("Connection");
-              request.set_header("Connection", "close");
-            }
-          });
-      more = more && answered && !closed;
-    }
+    bool closed = false;
+    // The only request of a connection: what is left of a body that nobody reads is no request.
+    process_request(stream, true, closed, [](httplib::Request& request) {
+      request.ranges.clear();                     // 2,650 ranges would be as many copies
+      request.headers.erase("Content-Encoding");  // a body stays as small as it was sent
+    });
     ::shutdown(socket, SHUT_RDWR);
     return ::close(socket) == 0;
   }
@@ -322,9 +300,8 @@ struct PageServer::Impl : httplib::Server {
   }
 };
 
-PageServer::PageServer(const PageAddress& address, PageFeed& feed, PageAnswers answers,
-                       const RequestLimits& limits)
-    : impl_(new Impl(address, feed, std::move(answers), limits)) {
+PageServer::PageServer(const PageAddress& address, PageAnswers answers, const RequestLimits& limits)
+    : impl_(new Impl(address, std::move(answers), limits)) {
   Impl& server = *impl_;
   server.set_socket_options(own_port_alone);
   server.set_tcp_nodelay(true);  // a body shall not wait 40 ms for the head's acknowledgement
@@ -375,6 +352,8 @@ PageServer::~PageServer() {
   impl_->thread.join();
 }
 
+PageFeed& PageServer::feed() { return impl_->feed; }
+
 std::string PageServer::url() const {
   const std::string& host = impl_->address.host;
   const bool brackets = host.find(':') != std::string::npos;  // of IPv6
@@ -390,7 +369,7 @@ std::string PageServer::words() const {
                       : fmt::format("; from the machine before you, reach it through ssh -L "
                                     "{0}:127.0.0.1:{0}",
                                     impl_->port)
-                      : ", for everybody who can reach this machine: what the array feels, and the "
+                : ", for everybody who can reach this machine: what the array feels, and the "
                   "buttons");
 }
 

@@ -9,13 +9,13 @@
 
 #include <nlohmann/json.hpp>
 
+#include "cli/page/page_feed.hpp"
+
 namespace CLI {
 class App;
 }
 
 namespace palpate::cli {
-
-class PageFeed;
 
 inline constexpr int default_page_port = 8080;
 /// Where a page is served.
@@ -37,27 +37,25 @@ struct PageAnswers {
 /// What one client may take of the server. A client that takes more is hung up on.
 struct RequestLimits {
   std::size_t bytes = 16384;                ///< of a request: its head and its body
-  std::chrono::milliseconds idle{1000};     ///< until a request begins
-  std::chrono::milliseconds reading{2000};  ///< from then until the whole request is there
+  std::chrono::milliseconds reading{2000};  ///< until the whole request is there
   std::chrono::milliseconds writing{5000};  ///< that a client stops taking the answer
   int connections = 64;                     ///< that are served or wait; others are not accepted
 };
 
-/// Serves Palpate's page over HTTP from construction on: its files, the events of a feed (as
-/// server-sent events, to 16 pages at a time), and `answers`. Answers are given on threads of the
-/// server's own. Requests for another host than this one, or from a page of another site, get 403,
-/// so that no other site reads what the robot feels.
+/// Serves Palpate's page over HTTP from construction on: its files, the events of its feed
+/// (as server-sent events, to 16 pages at a time), and `answers`. Answers are given on threads of
+/// the server's own. Requests for another host than this one, or from a page of another site, get
+/// 403, so that no other site reads what the robot feels.
 class PageServer {
  public:
-  /// @param feed outlives the server
   /// @throws Error where the address is none of this machine's, or the port cannot be had
-  PageServer(const PageAddress& address, PageFeed& feed, PageAnswers answers,
-             const RequestLimits& limits = {});
-  /// Closes the feed and ends all connections, whatever their clients do.
+  PageServer(const PageAddress& address, PageAnswers answers, const RequestLimits& limits = {});
+  /// Ends all connections, whatever their clients do.
   ~PageServer();
   PageServer(const PageServer&) = delete;
   PageServer& operator=(const PageServer&) = delete;
 
+  PageFeed& feed();
   /// "http://127.0.0.1:8080/"
   std::string url() const;
   /// The sentence that tells where the page is, and what it exposes where others can reach it.
