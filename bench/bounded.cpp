@@ -22,7 +22,6 @@ void Answers::add(const Answers& others) {
     to.insert(to.end(), from.begin(), from.end());
   };
   append(seconds, others.seconds);
-  append(cpu_seconds, others.cpu_seconds);
   append(modes, others.modes);
   append(bins_evaluated, others.bins_evaluated);
   append(dropped_mass, others.dropped_mass);
@@ -192,26 +191,19 @@ Json measure_bounded_mode(const BoundedInputs& inputs, Report& report) {
   const std::vector<Recording> unknowns =
       unknown_recordings(inputs.unknowns(), touches_per_unknown, speed_seed);
   const std::int64_t bins = inputs.bins_in_all(lattice);
-  Json records = Json::array();
-  for (const double tolerance : {BoundedOptions{}.tolerance, 0.1}) {
-    const BoundedOptions options{.lattice = lattice, .tolerance = tolerance};
-    BoundedPosterior posterior(inputs.letters, options);
-    const Answers answers = answer_each(posterior, unknowns, true);
-    const double tables_ms = table_ms(inputs, options, unknowns.front());
-    Case measured{.name = fmt::format("mode {}, tolerance {}", size_of(lattice), tolerance),
-                  .facts = {{"objects", inputs.letters.size()},
-                            {"touches", touches_per_unknown},
-                            {"unknowns", unknowns.size()}},
-                  .measurements = measurements_of(answers, "to the mode", bins, at_most(most_ms))};
-    measured.measurements.push_back({"tables included, median", answers.median_ms() + tables_ms,
-                                     "ms", at_most(most_with_tables_ms)});
-    report.add(measured);
-    records.push_back({{"bins", size_of(lattice)},
-                       {"tolerance", tolerance},
-                       {"table_ms", tables_ms},
-                       {"answers", answers.record()}});
-  }
-  return records;
+  const BoundedOptions options{.lattice = lattice};
+  BoundedPosterior posterior(inputs.letters, options);
+  const Answers answers = answer_each(posterior, unknowns, true);
+  const double tables_ms = table_ms(inputs, options, unknowns.front());
+  Case measured{.name = "mode " + size_of(lattice),
+                .facts = {{"objects", inputs.letters.size()},
+                          {"touches", touches_per_unknown},
+                          {"unknowns", unknowns.size()}},
+                .measurements = measurements_of(answers, "to the mode", bins, at_most(most_ms))};
+  measured.measurements.push_back({"tables included, median", answers.median_ms() + tables_ms, "ms",
+                                   at_most(most_with_tables_ms)});
+  report.add(measured);
+  return {{"bins", size_of(lattice)}, {"table_ms", tables_ms}, {"answers", answers.record()}};
 }
 
 /// Touch after touch, each with an estimate, the first within a budget.
@@ -253,8 +245,8 @@ void measure_bounded(const RunOptions& options, std::span<char* const> command_l
   const std::vector<Hypothesis> letters = letter_maps(report.device(), training_recordings());
   const BoundedInputs inputs{report.device(), letters, options.quick};
   constexpr decltype(&measure_bounded_speed) measures[] = {
-      measure_bounded_speed, measure_bounded_mode,      measure_bounded_streaming,
-      measure_bounded_large, measure_bounded_misplaced, measure_bounded_search};
+      measure_bounded_speed, measure_bounded_mode, measure_bounded_streaming, measure_bounded_large,
+      measure_bounded_search};
   static_assert(std::size(measures) == std::size(bounded_parts));
   for (std::size_t i = 0; i < std::size(measures); ++i) {
     if (options.part.empty() || options.part == bounded_parts[i]) {

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <ctime>
 #include <optional>
 #include <span>
 #include <string>
@@ -16,8 +15,7 @@ namespace palpate::bench {
 
 /// Answers of a belief, [unknown], and what they took.
 struct Answers {
-  std::vector<double> seconds = {};      ///< of update() and estimate()
-  std::vector<double> cpu_seconds = {};  ///< of all threads
+  std::vector<double> seconds = {};  ///< of update() and estimate()
   std::vector<Mode> modes = {};
   // Bounds alone have these:
   std::vector<double> bins_evaluated = {};
@@ -28,12 +26,10 @@ struct Answers {
   template <typename Belief>
   Estimate ask(Belief& belief, std::span<const Touch> touches) {
     Estimate estimate;
-    const std::clock_t before = std::clock();
     seconds.push_back(seconds_of([&] {
       belief.update(touches);
       estimate = belief.estimate();
     }));
-    cpu_seconds.push_back(static_cast<double>(std::clock() - before) / CLOCKS_PER_SEC);
     note(estimate);
     return estimate;
   }
@@ -84,9 +80,6 @@ struct BoundedInputs {
 
 /// Many objects, far away: time and memory.
 Json measure_bounded_large(const BoundedInputs& inputs, Report& report);
-/// Touches that are not where the robot says: time and memory, beside the dense engine where it can
-/// answer.
-Json measure_bounded_misplaced(const BoundedInputs& inputs, Report& report);
 /// The blocks of poses that one search goes into after 1, 3 and 9 touches, for a picture.
 Json measure_bounded_search(const BoundedInputs& inputs, Report& report);
 

@@ -8,7 +8,6 @@
 
 #include "bounded.hpp"
 #include "letters.hpp"
-#include "model/random.hpp"
 
 namespace palpate::bench {
 
@@ -78,82 +77,6 @@ Json measure_scene(const BoundedInputs& inputs, const LargeScene& scene, bool ab
           {"peak_bytes", peak},        {"answers", answers.record()}};
 }
 
-/// Median, least and most of the seconds.
-Json times_of(const Answers& answers) {
-  const std::vector<double>& seconds = answers.seconds;
-  return seconds.empty() ? Json(nullptr)
-                         : Json{{"median", median(seconds)},
-                                {"least", std::ranges::min(seconds)},
-                                {"most", std::ranges::max(seconds)},
-                                {"unknowns", seconds.size()}};
-}
-
-constexpr std::uint64_t misplaced_seed = 1'406'000'000;
-constexpr DisplacementSd misplaced_sd{1.0, 0.05};
-
-/// Lets the robot say that the array was elsewhere, by normal numbers of its own for every touch.
-void misplace(Recording& recording, std::uint64_t seed) {
-  Random random(seed, Stream::pose_noise);
-  for (Pose& pose : recording.T_robot_sensor) {
-    Pose displaced;
-    displaced.translation_mm.x = misplaced_sd.mm * random.normal();
-    displaced.translation_mm.y = misplaced_sd.mm * random.normal();
-    displaced.theta_rad = misplaced_sd.rad * random.normal();
-    pose = pose * displaced;
-  }
-}
-
-struct MisplacedScene {
-  int objects = 0;
-  double extent_mm = 0.0;  ///< of unknowns
-  PoseLattice lattice;
-  int dense = 0;  ///< unknowns that the dense engine answers, too
-  double most_ms = 0.0;
-};
-
-Json measure_misplaced(const BoundedInputs& inputs, const MisplacedScene& scene,
-                       const std::vector<Hypothesis>& objects, Report& report) {
-  std::vector<Recording> unknowns = glyph_unknowns(
-      scene.objects, inputs.unknowns(), touches_per_unknown, scene.extent_mm, misplaced_seed);
-  for (std::size_t i = 0; i < unknowns.size(); ++i) {
-    misplace(unknowns[i], misplaced_seed + i);
-  }
-  const auto bins = scene.lattice.bins() * static_cast<std::int64_t>(objects.size());
-  restart_peak_memory();
-  const std::uint64_t before = resident_bytes();
-  BoundedPosterior posterior(objects, {.lattice = scene.lattice, .touch_sd = misplaced_sd});
-  const Answers answers = answer_each(posterior, unknowns, true);
-  const std::uint64_t peak = peak_resident_bytes() - before;
-  Answers dense;
-  if (scene.dense > 0) {
-    PoseHistogram histogram(inputs.device, objects,
-                            {.lattice = scene.lattice, .touch_sd = misplaced_sd});
-    dense = answer_each(histogram, std::span(unknowns).first(static_cast<std::size_t>(scene.dense)),
-                        true);
-  }
-  Case measured{
-      .name = fmt::format("misplaced touches, {} bins in all", count_text(bins)),
-      .facts = {{"bins", size_of(scene.lattice)},
-                {"objects", objects.size()},
-                {"touches", touches_per_unknown},
-                {"unknowns", unknowns.size()}},
-      .measurements = measurements_of(answers, "all threads", bins, at_most(scene.most_ms))};
-  measured.measurements.push_back({"CPU, median", 1e3 * median(answers.cpu_seconds), "ms"});
-  measured.measurements.push_back({"peak of the process above before", mib(peak), "MiB"});
-  if (!dense.seconds.empty()) {
-    measured.measurements.push_back(
-        {fmt::format("dense engine, median of {}", dense.seconds.size()), dense.median_ms(), "ms"});
-    measured.measurements.push_back(
-        {"dense engine, CPU, median", 1e3 * median(dense.cpu_seconds), "ms"});
-  }
-  report.add(measured);
-  return {{"objects", objects.size()},
-          {"bins_in_all", bins},
-          {"peak_bytes", peak},
-          {"answers", answers.record()},
-          {"dense", times_of(dense)}};
-}
-
 }  // namespace
 
 Json measure_bounded_large(const BoundedInputs& inputs, Report& report) {
@@ -167,20 +90,6 @@ Json measure_bounded_large(const BoundedInputs& inputs, Report& report) {
     for (const bool about_touches : {false, true}) {
       records.push_back(measure_scene(inputs, scene, about_touches, objects, report));
     }
-  }
-  return records;
-}
-
-Json measure_bounded_misplaced(const BoundedInputs& inputs, Report& report) {
-  const std::vector<MisplacedScene> scenes =
-      inputs.quick
-          ? std::vector<MisplacedScene>{{3, 10.0, lattice_of(20, 20, 20), 3, 200.0}}
-          : std::vector<MisplacedScene>{{5, 10.0, lattice_of(100, 100, 100), 3, 200.0},
-                                        {20, 100.0, lattice_over(100.0, false), 0, 3000.0}};
-  Json records = Json::array();
-  for (const MisplacedScene& scene : scenes) {
-    records.push_back(measure_misplaced(
-        inputs, scene, letter_maps(inputs.device, glyph_recordings(scene.objects)), report));
   }
   return records;
 }

@@ -14,8 +14,7 @@ namespace palpate::bench {
 /// What all cases work on.
 struct Inputs {
   Device& device;
-  std::string device_name;  ///< as asked for, for processes that open it anew; may be empty
-  bool quick = false;       ///< small sizes, next to no repeats
+  bool quick = false;  ///< small sizes, next to no repeats
   std::vector<Recording> training;
   std::vector<Hypothesis> letters;  ///< maps of 0.5 mm cells
   ContactModel model;               ///< that of the letters' histograms

@@ -1,9 +1,6 @@
 """Sec. IV of the paper on simulated letters: histogram and particle filters over touches."""
 
 import argparse
-import csv
-import io
-import pathlib
 import time
 from collections.abc import Sequence
 from itertools import groupby
@@ -14,7 +11,7 @@ import numpy
 import palpate
 from palpate import _charts as charts
 from palpate._statistics import errors_over, present
-from palpate._tables import Column, Table, column, number, plain, print_table, value_of
+from palpate._tables import Column, Table, column, number, plain, print_table
 
 from .experiment_charts import MOST_PARTICLES, as_many, draw
 from .measures import calibration, share_record, student_record, with_interval
@@ -28,7 +25,6 @@ from .trials import (
     letter_maps,
     make_trials,
     recognized,
-    truth_of,
 )
 
 SEED = 1_000
@@ -187,61 +183,6 @@ def comparisons_of(runs: Sequence[Json], off_by: str) -> list[Json]:
     return rows
 
 
-def write_csv(path: pathlib.Path, rows: Sequence[Json]) -> None:
-    """Writes a table, numbers to six digits."""
-    text = io.StringIO()
-    table = csv.DictWriter(text, rows[0], lineterminator="\n")
-    table.writeheader()
-    for row in rows:
-        table.writerow({k: f"{v:.6g}" if isinstance(v, float) else v for k, v in row.items()})
-    write(path, text.getvalue())
-
-
-def curve_rows(runs: Sequence[Json]) -> list[Json]:
-    """A row for every point of the curves of filters."""
-    names = ("touches", "accuracy", "accuracy_low", "accuracy_high", "mean_confidence", "located")
-    return [
-        {"filter": run["filter"], "count": run["count"]}
-        | {name: point[name] for name in names}
-        | {
-            f"{kind}_{of}_mm": value_of(point, f"{errors}/{of}")
-            for kind, errors in (("error", "error_mm"), ("refined", "refined_error_mm"))
-            for of in ("mean", "median", "p95")
-        }
-        for run in runs
-        for point in run["curve"]
-    ]
-
-
-def write_tables(folder: str, document: Json, runs: Sequence[Json], labels: Sequence[str]) -> None:
-    """Writes the curves, the calibrations, and every touch of every trial; labels: the true objects."""
-    bins = [
-        {"filter": run["filter"], "count": run["count"]}
-        | {"confidence_from": part["lower"], "estimates": part["count"]}
-        | {of: part[of] for of in ("mean_confidence", "fraction_right")}
-        for run in document["filters"]
-        for part in run["calibration"]["bins"]
-    ]
-    noisy = [
-        {"noise_mm": level["translation_mm"], "noise_rad": level["rotation_rad"]} | row
-        for level in document["pose_noise"]
-        for row in curve_rows(level["filters"])
-    ]
-    trials = [
-        {"filter": run["filter"], "count": run["count"]}
-        | {"trial": trial, "object": labels[trial], "touches": touches, "right": int(step["right"])}
-        | {of: step.get(of) for of in ("confidence", "error_mm", "refined_error_mm")}
-        for run in runs
-        for trial, steps in enumerate(run["steps"])
-        for touches, step in enumerate(steps, start=1)
-    ]
-    curves = curve_rows(document["filters"])
-    for name, rows in (
-        ("curves", curves), ("calibration", bins), ("pose_noise", noisy), ("trials", trials),
-    ):  # fmt: skip
-        write_csv(pathlib.Path(folder, f"{name}.csv"), rows)
-
-
 def measure(options: argparse.Namespace) -> None:
     """Runs all filters, prints their rows, and writes what the options name."""
     device, facts = begin(options)
@@ -252,7 +193,7 @@ def measure(options: argparse.Namespace) -> None:
     kinds += [(kind, count) for kind in ("particles", "augmented") for count in particles]
     of_noise = [*kinds[1:3], ("particles", MOST_PARTICLES)]
     comparisons: list[Json] = []
-    levels, every, table = [], [], Table(RUNS)
+    levels, table = [], Table(RUNS)
     for mm, rad in NOISE:
         exact, off_by = mm == 0.0, f"{mm:g} mm, {rad:g} rad"
         most = touches if exact else min(touches, 20)
@@ -262,7 +203,6 @@ def measure(options: argparse.Namespace) -> None:
             runs.append(run_filter(device, maps, trials, kind, size))
             table.append(row_of(runs[-1], off_by))
         comparisons += comparisons_of(runs, off_by)
-        every += runs
         without = [{name: of for name, of in run.items() if name != "steps"} for run in runs]
         levels.append({"translation_mm": mm, "rotation_rad": rad, "filters": without})
     print_table(COMPARISONS, comparisons)
@@ -272,9 +212,6 @@ def measure(options: argparse.Namespace) -> None:
         "pose_noise": levels[1:],
     }
     write(options.json, document)
-    if options.csv:
-        labels = [truth_of(trial).object for trial in trials]
-        write_tables(options.csv, document, every[: len(kinds)], labels)
     if options.plots:
         charts.save(draw(document), options.plots)
 
@@ -289,10 +226,8 @@ def program() -> None:
         plots="draw the paper's figures in this folder",
         trials="trials per letter [10, or 4 with --quick]",
     )
-    add = flags.add_argument
-    add("--touches", type=at_least_1, metavar="N",
-        help="touches per trial, at most 192 [50, or 12 with --quick]")  # fmt: skip
-    add("--csv", metavar="FOLDER", help="write tables to this folder")
+    flags.add_argument("--touches", type=at_least_1, metavar="N",
+                       help="touches per trial, at most 192 [50, or 12 with --quick]")  # fmt: skip
     measure(flags.parse_args())
 
 

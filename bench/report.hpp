@@ -121,8 +121,7 @@ class Report {
 // The commands.
 
 /// Names of the parts of `bounded`, in order.
-inline constexpr const char* bounded_parts[] = {"speed", "mode",      "streaming",
-                                                "large", "misplaced", "search"};
+inline constexpr const char* bounded_parts[] = {"speed", "mode", "streaming", "large", "search"};
 
 // Each prints its results as Markdown tables and writes them to the file that its options name.
 // They throw Error where the device or the file cannot be opened.

@@ -20,7 +20,7 @@ from .sweep_runs import (
     measure_limits,
     measure_particles,
 )
-from .sweep_tables import BOUNDS, LIMITS, PRINTED, STEPS, VERDICTS
+from .sweep_tables import BOUNDS, LIMITS, RUNS, STEPS, VERDICTS
 from .trials import (
     TABLE_1,
     VOWELS,
@@ -127,7 +127,7 @@ def measure(device: palpate.Device, options: argparse.Namespace) -> Json:
     particles = [1_000, 10_000] if quick else [100, 1_000, 10_000, 100_000, 1_000_000]
     bounded = [1e2, 1e3, 1e4, 3e4] if quick else [1e3, 3e3, 1e4, 2e4, 3e4, 1e5, 1e6, 1e7]
     training = [one[:: 3 if quick else 1] for one in training_recordings()]
-    points = Table(PRINTED)
+    points = Table(RUNS)
     bounds: list[Json] = []
     knees: list[Json] = []
 

@@ -36,11 +36,7 @@ RUNS: list[Column] = [
     ("nearest bin, mm", "nearest_bin_mm", _MM),
     ("largest deviation, nats", "deviation_nats/largest", _NATS),
     ("RMS", "deviation_nats/rms", _NATS),
-    ("mode: median, mm", "error_mm/median", _MM),
-    ("refined: median, mm", "refined_error_mm/median", _MM),
-    ("least probability", "least_confidence", number(".6f")),
 ]
-PRINTED = RUNS[:20]
 BOUNDS: list[Column] = [
     ("bins per object", "count", count_text),
     ("bins in all", "bins_in_all", count_text),

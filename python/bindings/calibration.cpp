@@ -100,9 +100,8 @@ void bind_learned_sensor(nb::module_& module) {
       });
 }
 
-SensorCalibration calibrate(const GivenRecordings& given, PythonRequest request,
+SensorCalibration calibrate(const std::vector<Recording>& recordings, PythonRequest request,
                             const CalibrationRequest& wanted, const Report& report) {
-  const std::vector<Recording> recordings = read_recordings(given);
   if (request.given_maps.empty()) {
     read_maps(request);
   }
@@ -135,19 +134,18 @@ Json to_json(const SensorCalibration& calibration) {
   return json;
 }
 
-std::tuple<Fields, LearnedSensor> calibrate_python(nb::handle recordings,
-                                                   const PythonRequest& request,
+std::tuple<Fields, LearnedSensor> calibrate_python(nb::handle given, const PythonRequest& request,
                                                    const CalibrationRequest& wanted,
                                                    const Progress& progress) {
-  const GivenRecordings given = given_recordings(recordings);
-  const SensorCalibration calibration = run(
-      progress, [&](const Report& report) { return calibrate(given, request, wanted, report); });
+  const std::vector<Recording> recordings = recordings_of(given);
+  const SensorCalibration calibration = run(progress, [&](const Report& report) {
+    return calibrate(recordings, request, wanted, report);
+  });
   return {fields_of(to_json(calibration)), calibration.sensor};
 }
 
-Json check(const GivenRecordings& given, const PythonRequest& request, double cell_mm,
+Json check(const std::vector<Recording>& recordings, const PythonRequest& request, double cell_mm,
            std::optional<double> spread_mm, const Report& report) {
-  const std::vector<Recording> recordings = read_recordings(given);
   const Recording& first = recordings.front();
   MapOptions options{.cell_mm = cell_mm,
                      .sensor = {.spread_mm = spread_mm ? *spread_mm : usual_spread_mm(recordings)}};
@@ -168,11 +166,11 @@ Json check(const GivenRecordings& given, const PythonRequest& request, double ce
   return json;
 }
 
-Fields check_python(nb::handle recordings, const PythonRequest& request, double cell_mm,
+Fields check_python(nb::handle given, const PythonRequest& request, double cell_mm,
                     std::optional<double> spread_mm, const Progress& progress) {
-  const GivenRecordings given = given_recordings(recordings);
+  const std::vector<Recording> recordings = recordings_of(given);
   return fields_of(run(progress, [&](const Report& report) {
-    return check(given, request, cell_mm, spread_mm, report);
+    return check(recordings, request, cell_mm, spread_mm, report);
   }));
 }
 

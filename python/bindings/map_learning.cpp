@@ -19,9 +19,8 @@ using namespace nb::literals;
 
 namespace {
 
-LearnedMaps learn(const GivenRecordings& given, const MapRequest& request,
+LearnedMaps learn(const std::vector<Recording>& recordings, const MapRequest& request,
                   const std::shared_ptr<Device>& open_device, const Report& report) {
-  const std::vector<Recording> recordings = read_recordings(given);
   const MapTask task = map_task(request, recordings);
   std::shared_ptr<Device> device;
   LearnedMaps learned = learn_maps(
@@ -59,12 +58,12 @@ void bind_map_learning(nb::module_& module) {
       .def_rw("max_maps", &MapRequest::max_maps);
   module.def(
       "learn_maps",
-      [](nb::handle recordings, const PythonRequest& shared, MapRequest request,
+      [](nb::handle given, const PythonRequest& shared, MapRequest request,
          const Progress& progress) {
         request.shared = shared;
-        const GivenRecordings given = given_recordings(recordings);
+        const std::vector<Recording> recordings = recordings_of(given);
         LearnedMaps learned = run(progress, [&](const Report& report) {
-          return learn(given, request, shared.open_device, report);
+          return learn(recordings, request, shared.open_device, report);
         });
         Learned result{{}, std::move(learned.sensor), in_python(std::move(learned.words))};
         for (auto& [name, map] : learned.maps) {

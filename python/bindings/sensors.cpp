@@ -121,15 +121,8 @@ void bind_frame(nb::module_& module) {
           "__init__",
           [](Frame* self, double host_time_s, const ArrayLike& values,
              const std::optional<ArrayLike>& T_robot_sensor) {
-            ArrayReader reader;
-            const Floats readings = reader.readings(values, "values", {"e"});
-            std::vector<double> known = readings.copied();
-            if (const auto flags = reader.valid(values, {}, {"e"})) {
-              for (std::size_t k = 0; k < known.size(); ++k) {
-                known[k] = flags->data[k] != 0 ? known[k] : std::nan("");
-              }
-            }
-            Frame frame{.host_time_s = host_time_s, .values = std::move(known)};
+            Frame frame{.host_time_s = host_time_s,
+                        .values = ArrayReader().known(values, "values", {"e"}).copied()};
             if (T_robot_sensor) {
               frame.T_robot_sensor = pose_of(*T_robot_sensor, "T_robot_sensor");
             }
@@ -145,10 +138,7 @@ void bind_frame(nb::module_& module) {
                    "[e] in the sensor's pressure unit; NaN: unknown.")
       .def_prop_ro("T_robot_sensor", array_of(&Frame::T_robot_sensor),
                    "[3] (x_mm, y_mm, theta_rad), or None.")
-      .def("__repr__", [](const Frame& self) {
-        return fmt::format("Frame({} elements at {:.3f} s{})", self.values.size(), self.host_time_s,
-                           self.T_robot_sensor ? ", posed" : "");
-      });
+      .def("__repr__", &repr_of);
 }
 
 void bind_sensor(nb::module_& module) {
@@ -236,10 +226,7 @@ void bind_detector(nb::module_& module) {
                    "[e], 0 for an element that is dead or was hardly known; empty: all are alive.")
       .def_prop_ro("T_robot_sensor", array_of(&DetectedTouch::T_robot_sensor),
                    "[3] (x_mm, y_mm, theta_rad), or None.")
-      .def("__repr__", [](const DetectedTouch& self) {
-        return fmt::format("DetectedTouch({} frames from {:.3f} to {:.3f} s)", self.frames,
-                           self.begin_s, self.end_s);
-      });
+      .def("__repr__", &repr_of);
 
   nb::class_<TouchDetector>(module, "TouchDetector",
                             "Finds touches in a stream of frames by onset, steady phase and "
@@ -249,7 +236,7 @@ void bind_detector(nb::module_& module) {
           [](TouchDetector* self, double onset, double release, double min_steady_s, double steady,
              double smooth_s, double drift_s, const std::optional<ArrayLike>& baseline,
              const std::optional<ArrayLike>& valid) {
-            ArrayReader reader;
+            const ArrayReader reader;
             std::vector<double> zeros;
             std::vector<std::uint8_t> alive;
             if (baseline) {

@@ -108,22 +108,6 @@ def _run(arguments: argparse.Namespace) -> None:
     folder = os.path.dirname(arguments.output) or "."
     if os.path.isdir(arguments.output) or not os.access(folder, os.W_OK):
         raise Error(f"-o {arguments.output}: cannot be written; give a file in a folder that exists")
-    try:
-        dead = [int(text) for text in arguments.dead.split(",") if arguments.dead]
-    except ValueError:
-        raise Error(f"--dead {arguments.dead}: give numbers of elements, such as 13,42") from None
-    plane: Any = arguments.plane
-    if plane != "auto":
-        try:
-            plane = tuple(float(text) for text in plane.split(","))
-        except ValueError:
-            raise Error(f"--plane {arguments.plane}: give auto, or a normal such as 0,0,1") from None
-    mount: Any = arguments.mount
-    if mount is not None:
-        try:
-            mount = tuple(float(text) for text in mount.split(","))
-        except ValueError:
-            raise Error(f"--mount {arguments.mount}: give X,Y,Z,ROLL,PITCH,YAW, mm and degrees") from None
     shown = sys.stderr.isatty()
     recording, remarks = read_frames(
         log=arguments.log,
@@ -132,15 +116,15 @@ def _run(arguments: argparse.Namespace) -> None:
         pressure_field=arguments.pressure_field,
         pose_topic=arguments.pose_topic,
         pose_field=arguments.pose_field,
-        mount=mount,
+        mount=arguments.mount,
         tf=_frames("--tf", arguments.tf),
         truth_tf=_frames("--truth-tf", arguments.truth_tf),
         first_element=arguments.first_element,
         order=arguments.order,
-        dead=dead,
+        dead=arguments.dead,
         pressure_unit=arguments.pressure_unit,
         sign=arguments.sign,
-        plane=plane,
+        plane=arguments.plane,
         largest_gap_s=arguments.largest_gap_s,
         pose_delay=arguments.pose_delay,
         object=arguments.object,
