@@ -14,9 +14,9 @@ Shape = tuple[str, ...]  #: numbers, or letters that stand for one number throug
 class Reader:
     """Takes the arrays of one call, whose extents have to agree.
 
-    Methods return the array of the argument itself where dtype and layout allow it, or else a copy. name: of the
-    argument; shapes: the one that the array has to have, and one of more axes where it may have more. They raise
-    Error naming the argument, its shape and the shape that it needs.
+    Methods return the array of the argument itself where dtype and layout allow it, or else a copy. name:
+    of the argument; shapes: the one that the array has to have, and one of more axes where it may have
+    more. They raise Error naming the argument, its shape and the shape that it needs.
     """
 
     def __init__(self) -> None:

@@ -59,8 +59,8 @@ class Touch(_OverArrays):
         pressure: ArrayLike,
         valid: ArrayLike | None = None,
     ) -> None:
-        """T_robot_sensor [3] (x_mm, y_mm, theta_rad); elements_mm [e, 2], element centres in the sensor frame;
-        pressure [e] in the recording's unit; valid [e], False for a dead element.
+        """T_robot_sensor [3] (x_mm, y_mm, theta_rad); elements_mm [e, 2], element centres in the sensor
+        frame; pressure [e] in the recording's unit; valid [e], False for a dead element.
 
         Raises Error on other shapes.
         """
@@ -151,10 +151,10 @@ class Recording(_OverArrays):
         device_time_s: ArrayLike | None = None,
         lost_before: ArrayLike | None = None,
     ) -> None:
-        """pressure [n, e] in pressure_unit, "kPa" or "raw"; poses T_robot_sensor [n, 3] (x_mm, y_mm, theta_rad);
-        elements_mm [e, 2] in the sensor frame, or [n, e, 2] where the array changes; valid [e] or [n, e], False
-        for a dead element; time_s [n] since the Unix epoch; object: its label, "" where unknown; rows: "touches",
-        or "frames" of a raw stream, in which poses and pressures may be NaN (unknown).
+        """pressure [n, e] in pressure_unit, "kPa" or "raw"; poses T_robot_sensor [n, 3] (x_mm, y_mm,
+        theta_rad); elements_mm [e, 2] in the sensor frame, or [n, e, 2] where the array changes; valid [e] or
+        [n, e], False for a dead element; time_s [n] since the Unix epoch; object: its label, "" where unknown;
+        rows: "touches", or "frames" of a raw stream, in which poses and pressures may be NaN (unknown).
 
         Raises Error naming the argument whose shape does not fit.
         """
@@ -212,16 +212,16 @@ class Recording(_OverArrays):
         """These arrays, of those with a row for each touch some rows."""
         import numpy
 
-        arrays = {name: vars(self)[name] for name in names}
-        return {
-            # A step makes another layout, and so a copy.
-            name: array if array is None or array.ndim == _AXES[name] else numpy.ascontiguousarray(array[rows])
-            for name, array in arrays.items()
-        }
+        def part(array: Any, axes: int) -> Any:
+            if array is None or array.ndim == axes:
+                return array
+            return numpy.ascontiguousarray(array[rows])  # a step makes another layout, and so a copy
+
+        return {name: part(vars(self)[name], _AXES[name]) for name in names}
 
     def save(self, path: str | bytes | os.PathLike[str] | os.PathLike[bytes]) -> None:
-        """Writes a recording file (HDF5), whole or not at all. Raises Error where the content is not sound or the
-        file cannot be written."""
+        """Writes a recording file (HDF5), whole or not at all. Raises Error where the content is not sound or
+        the file cannot be written."""
         _palpate.write_recording(path, self)
 
     def plot(self, ax: Axes | None = None) -> Axes:
