@@ -6,14 +6,17 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <map>
 #include <random>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
 #include <fmt/format.h>
 
 #include "letters.hpp"
+#include "palpate/bounded_posterior.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
 #include "reference/reference.hpp"
@@ -265,6 +268,45 @@ Case many_unknowns_case(const Inputs& inputs) {
         at_least(goal_rate_over_processes)},
        {"palpate batch by bounds", unknowns / batch, "unknowns per s", at_least(goal_batch_rate)}});
   return result;
+}
+
+Json search_by_bounds(const std::vector<Hypothesis>& letters, bool quick) {
+  // An A, whose first touch meets an edge of the letter, on bins all over the letters.
+  constexpr std::uint64_t seed = 1'405'000'018;
+  constexpr double extent_mm = 15.0;
+  const Recording unknown = unknown_recordings(1, touches_per_unknown, seed).front();
+  PoseLattice lattice = quick ? lattice_of(20, 20, 16) : lattice_of(200, 200, 250);
+  lattice.x_mm = {-extent_mm, extent_mm, lattice.x_mm.count};
+  lattice.y_mm = lattice.x_mm;
+  // As --pivot-mm auto: x and y are where the first touch lies on the letter.
+  lattice.pivot_mm = unknown.T_robot_sensor.front().translation_mm;
+  const glm::dvec2 place_mm = unknown.truth->T_object_robot * lattice.pivot_mm;
+  BoundedPosterior posterior(letters, {.lattice = lattice});
+  Json stages = Json::array();
+  std::size_t done = 0;
+  for (const std::size_t touches : {std::size_t{1}, std::size_t{3}, std::size_t{9}}) {
+    posterior.update(unknown.touches(done, touches));
+    done = touches;
+    std::map<std::tuple<int, int, int, int, int>, int> thetas;  // by level and place
+    for (const PoseBlock& b : posterior.refined_blocks()) {
+      if (b.object == 0) {
+        ++thetas[{b.level, b.x_first, b.x_count, b.y_first, b.y_count}];
+      }
+    }
+    Json blocks = Json::array();
+    for (const auto& [at, count] : thetas) {
+      const auto& [level, x, nx, y, ny] = at;
+      blocks.push_back({level, x, nx, y, ny, count});
+    }
+    stages.push_back({{"touches", touches},
+                      {"bins_evaluated", posterior.estimate().certificate->bins_evaluated},
+                      {"blocks", blocks}});
+  }
+  return {{"bins", {lattice.x_mm.count, lattice.y_mm.count, lattice.theta_rad.count}},
+          {"bins_in_all", lattice.bins() * static_cast<std::int64_t>(letters.size())},
+          {"extent_mm", extent_mm},
+          {"place_mm", {place_mm.x, place_mm.y}},
+          {"stages", stages}};
 }
 
 }  // namespace palpate::bench

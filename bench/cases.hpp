@@ -44,4 +44,7 @@ Case map_stream_case(const Inputs& inputs, bool one_spot);
 /// Times the recognition of many unknown objects in turn, in one process and in a process each.
 Case many_unknowns_case(const Inputs& inputs);
 
+/// The blocks of poses that one search by bounds goes into after 1, 3 and 9 touches, for a picture.
+Json search_by_bounds(const std::vector<Hypothesis>& letters, bool quick);
+
 }  // namespace palpate::bench

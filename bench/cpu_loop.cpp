@@ -1,4 +1,4 @@
-#include "baselines.hpp"
+#include "cpu_loop.hpp"
 
 #include <algorithm>
 #include <atomic>

@@ -8,8 +8,8 @@
 
 #include <fmt/format.h>
 
-#include "baselines.hpp"
 #include "cases.hpp"
+#include "cpu_loop.hpp"
 #include "estimation/lattice/dense_belief.hpp"
 #include "estimation/lattice/dense_likelihood.hpp"
 #include "letters.hpp"
@@ -63,7 +63,7 @@ Inputs make_inputs(Device& device, const RunOptions& options) {
 constexpr double goal_bytes_per_bin = 10.0;
 constexpr double goal_nats_per_touch = 1e-4;
 
-/// The lattice with its x and y bins, and as many thetas of the full circle as the baselines have
+/// The lattice with its x and y bins, and as many thetas of the full circle as the CPU loop has
 /// time for, about a second.
 PoseLattice part_of(PoseLattice lattice, bool quick) {
   const std::int64_t most_bins = quick ? 10000 : 80000;  // per object
@@ -72,8 +72,8 @@ PoseLattice part_of(PoseLattice lattice, bool quick) {
   return lattice;
 }
 
-/// Times the likelihood of an unknown's touches beside two baselines, the one-bin kernel and the
-/// CPU loop, with the error of each. Leaves some touches in the histogram.
+/// Times the likelihood of an unknown's touches beside the CPU loop, with the error of both. Leaves
+/// some touches in the histogram.
 Case likelihood_case(const Inputs& inputs, PoseHistogram& histogram, double goal_ns) {
   const std::vector<Touch> touches =
       inputs.unknowns.front().touches(0, inputs.quick ? 3 : touches_per_unknown);
@@ -95,9 +95,6 @@ Case likelihood_case(const Inputs& inputs, PoseHistogram& histogram, double goal
   histogram.update(touches);
   const auto peak = static_cast<double>(peak_resident_bytes());
   const ErrorStatistics errors = errors_of(lattice, histogram);
-  OneBinKernel one_bin(inputs.device, inputs.letters, part, inputs.model);
-  one_bin.update(touches);
-  const ErrorStatistics one_bin_errors = errors_of(part, one_bin);
   CpuLoop cpu_loop(inputs.letters, part, inputs.model);
   cpu_loop.update(touches);
   const ErrorStatistics cpu_errors = errors_of(part, cpu_loop);
@@ -105,12 +102,10 @@ Case likelihood_case(const Inputs& inputs, PoseHistogram& histogram, double goal
   const auto bins = static_cast<double>(objects) * static_cast<double>(lattice.bins());
   const int repeats = inputs.quick ? 1 : bins > 1e7 ? 3 : bins > 1e6 ? 7 : 25;
   const std::function<void()> contenders[] = {[&] { histogram.update(touches); },
-                                              [&] { one_bin.update(touches); },
                                               [&] { cpu_loop.update(touches); }};
   const std::vector<std::vector<double>> seconds = interleave(contenders, repeats);
   const double ns = ns_per_ber(lattice, median(seconds[0]));
-  const double one_bin_ns = ns_per_ber(part, median(seconds[1]));
-  const double cpu_ns = ns_per_ber(part, median(seconds[2]));
+  const double cpu_ns = ns_per_ber(part, median(seconds[1]));
   const auto per_touch = static_cast<double>(touches.size());
   return {.name = "likelihood " + size_of(lattice),
           .facts = {{"objects", objects},
@@ -118,20 +113,16 @@ Case likelihood_case(const Inputs& inputs, PoseHistogram& histogram, double goal
                     {"elements", elements},
                     {"path", histogram.paths()},
                     {"repeats", repeats},
-                    {"baselines' thetas", part.theta_rad.count},
+                    {"CPU loop's thetas", part.theta_rad.count},
                     {"CPU loop's threads", std::thread::hardware_concurrency()}},
           .measurements = {
               {"median", median(seconds[0]), "s"},
               {"per bin, element and touch", ns, "ns", at_most(goal_ns)},
-              {"one-bin kernel, per bin, element and touch", one_bin_ns, "ns"},
               {"CPU loop, per bin, element and touch", cpu_ns, "ns"},
-              {"one-bin kernel's time over this", one_bin_ns / ns, "times"},
               {"CPU loop's time over this", cpu_ns / ns, "times"},
               {"largest error", errors.largest() / per_touch, "nats per touch",
                at_most(goal_nats_per_touch)},
               {"RMS error", errors.rms() / per_touch, "nats per touch"},
-              {"one-bin kernel's largest error", one_bin_errors.largest() / per_touch,
-               "nats per touch"},
               {"CPU loop's largest error", cpu_errors.largest() / per_touch, "nats per touch"},
               {"device memory", static_cast<double>(histogram.device_bytes()) / bins, "B per bin",
                bins > 1e7 ? std::optional(at_most(goal_bytes_per_bin)) : std::nullopt},
