@@ -1,4 +1,4 @@
-// `palpate recognize` and `palpate plan`.
+// `palpate recognize`, `palpate plan` and `palpate evaluate`.
 
 #include <string>
 #include <utility>
@@ -13,6 +13,7 @@
 #include "estimate.hpp"
 #include "json.hpp"
 #include "model/option_words.hpp"
+#include "recognition/judged_results.hpp"
 #include "recognition/record_json.hpp"
 #include "recognition/result_json.hpp"
 #include "recognition/touch_plan.hpp"
@@ -102,6 +103,15 @@ std::tuple<Fields, Sentences> plan_python(nb::handle recordings, const PythonReq
   return {fields_of(plan), in_python(std::move(sentences))};
 }
 
+Fields evaluate_results(const std::vector<std::string>& paths, const nb::bytes& records) {
+  const std::string text(records.c_str(), records.size());
+  return fields_of(run([&] {
+    JudgedResults results = read_results(result_files(paths));
+    add_records("records", text, results);
+    return to_json(evaluate(results, paths.empty() ? "records" : paths.front()), results);
+  }));
+}
+
 }  // namespace
 
 void bind_recognition(nb::module_& module) {
@@ -110,6 +120,9 @@ void bind_recognition(nb::module_& module) {
   module.def("plan", &plan_python, "recordings"_a, "request"_a, "goal"_a, "candidates"_a,
              "samples"_a, "seed"_a, "progress"_a = nb::none(),
              "A plan as in the JSON of `palpate plan`, and what is worth a warning.");
+  module.def("evaluate_results", &evaluate_results, "paths"_a, "records"_a,
+             "The JSON of `palpate evaluate`, of files and folders of results, and of more records "
+             "as a\nJSON array.");
 }
 
 }  // namespace palpate::python

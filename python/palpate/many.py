@@ -236,11 +236,11 @@ def _results(chunks: Sequence[list[_Entry]], done: _Done) -> Generator[Recognize
     first = [0]
     for chunk in chunks:
         first.append(first[-1] + sum(count for _, count in chunk))
-    told = False
+    warned = False
     with closing(done):
         for index, (lines, sentence, device, host) in done:
-            if sentence and not told:
-                told = True
+            if sentence and not warned:
+                warned = True
                 warnings.warn(sentence, stacklevel=2)
             for i, (line, own, seconds) in enumerate(lines, start=first[index]):
                 record = Record(json.loads(own or line))
