@@ -1,57 +1,115 @@
-#include "bounded.hpp"
-
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <iterator>
+#include <numbers>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
 
 #include <fmt/format.h>
 
+#include "cases.hpp"
+#include "letters.hpp"
+#include "palpate/bounded_posterior.hpp"
+#include "palpate/pose_histogram.hpp"
+#include "report.hpp"
+
 namespace palpate::bench {
 
-void Answers::note(const Estimate& estimate) {
-  modes.push_back(estimate.mode);
-  if (const auto& certificate = estimate.certificate) {
-    bins_evaluated.push_back(static_cast<double>(certificate->bins_evaluated));
-    dropped_mass.push_back(certificate->dropped_mass);
-    mode_certain += certificate->mode_certain ? 1 : 0;
+namespace {
+
+/// Answers of a belief, [unknown], and what they took.
+struct Answers {
+  std::vector<double> seconds = {};  ///< of update() and estimate()
+  std::vector<Estimate> estimates = {};
+
+  /// Takes in the touches and asks once; what was known before counts too.
+  template <typename Belief>
+  const Estimate& ask(Belief& belief, std::span<const Touch> touches) {
+    Estimate& estimate = estimates.emplace_back();
+    seconds.push_back(seconds_of([&] {
+      belief.update(touches);
+      estimate = belief.estimate();
+    }));
+    return estimate;
   }
+  void add(const Answers& others) {
+    seconds.insert(seconds.end(), others.seconds.begin(), others.seconds.end());
+    estimates.insert(estimates.end(), others.estimates.begin(), others.estimates.end());
+  }
+  double median_ms() const { return 1e3 * median(seconds); }
+  /// A number of the certificates, which bounds alone have.
+  template <typename Number>
+  std::vector<double> certified(Number Certificate::*number) const {
+    std::vector<double> numbers;
+    for (const Estimate& estimate : estimates) {
+      numbers.push_back(static_cast<double>((*estimate.certificate).*number));
+    }
+    return numbers;
+  }
+  int modes_certain() const {
+    return static_cast<int>(std::ranges::count(certified(&Certificate::mode_certain), 1.0));
+  }
+  /// The figures of every answer by bounds, [unknown] each.
+  Json record() const {
+    std::vector<double> milliseconds = seconds;
+    std::ranges::for_each(milliseconds, [](double& s) { s *= 1e3; });
+    return {{"milliseconds", milliseconds},
+            {"bins_evaluated", certified(&Certificate::bins_evaluated)},
+            {"dropped_mass", certified(&Certificate::dropped_mass)},
+            {"mode_certain", modes_certain()}};
+  }
+};
+
+/// Asks once about each unknown after all of its touches, from the uniform belief on.
+/// @param warm_up asks about the first unknown once more before, which does not count
+template <typename Belief>
+Answers answer_each(Belief& belief, std::span<const Recording> unknowns, bool warm_up) {
+  belief.reset();
+  if (warm_up) {
+    Answers().ask(belief, all_touches(unknowns.front()));
+  }
+  Answers answers;
+  for (const Recording& unknown : unknowns) {
+    belief.reset();
+    answers.ask(belief, all_touches(unknown));
+  }
+  return answers;
 }
 
-void Answers::add(const Answers& others) {
-  const auto append = [](auto& to, const auto& from) {
-    to.insert(to.end(), from.begin(), from.end());
-  };
-  append(seconds, others.seconds);
-  append(cpu_seconds, others.cpu_seconds);
-  append(modes, others.modes);
-  append(bins_evaluated, others.bins_evaluated);
-  append(dropped_mass, others.dropped_mass);
-  mode_certain += others.mode_certain;
-}
-
-Json Answers::record() const {
-  std::vector<double> milliseconds;
-  std::ranges::transform(seconds, std::back_inserter(milliseconds),
-                         [](double s) { return 1e3 * s; });
-  return {{"milliseconds", milliseconds},
-          {"bins_evaluated", bins_evaluated},
-          {"dropped_mass", dropped_mass},
-          {"mode_certain", mode_certain}};
-}
-
+/// Rows of times, bins evaluated and certificate. `name` begins the names of the times.
 std::vector<Measurement> measurements_of(const Answers& answers, const std::string& name,
                                          std::int64_t bins_in_all, std::optional<Goal> median_ms) {
-  const double evaluated = median(answers.bins_evaluated);
+  const double evaluated = median(answers.certified(&Certificate::bins_evaluated));
   return {{name + ", median", answers.median_ms(), "ms", median_ms},
           {name + ", least", 1e3 * std::ranges::min(answers.seconds), "ms"},
           {name + ", most", 1e3 * std::ranges::max(answers.seconds), "ms"},
           {"bins evaluated, median", evaluated, "bins"},
           {"of all bins", 100.0 * evaluated / static_cast<double>(bins_in_all), "%"},
-          {"certificate, largest", std::ranges::max(answers.dropped_mass), "mass"},
-          share_of("mode certain", answers.mode_certain, answers.modes.size())};
+          {"certificate, largest", std::ranges::max(answers.certified(&Certificate::dropped_mass)),
+           "mass"},
+          share_of("mode certain", answers.modes_certain(), answers.estimates.size())};
 }
 
-namespace {
+/// What the parts of `palpate-bench bounded` work on.
+struct BoundedInputs {
+  Device& device;
+  const std::vector<Hypothesis>& letters;
+  bool quick = false;
+
+  int unknowns() const { return quick ? 3 : 20; }
+  std::int64_t bins_in_all(const PoseLattice& lattice) const {
+    return lattice.bins() * static_cast<std::int64_t>(letters.size());
+  }
+  Json facts() const {
+    return {
+        {"objects", letters.size()}, {"touches", touches_per_unknown}, {"unknowns", unknowns()}};
+  }
+};
+
+// Each part adds its cases to the report and returns a record of every run.
 
 constexpr std::uint64_t speed_seed = 1'400'000'000;
 
@@ -67,9 +125,9 @@ struct Size {
 int same_modes(const Answers& bounded, const Answers& dense) {
   constexpr double one_likelihood = 1e-3;
   int same = 0;
-  for (std::size_t i = 0; i < dense.modes.size(); ++i) {
-    const Mode& a = bounded.modes[i];
-    const Mode& b = dense.modes[i];
+  for (std::size_t i = 0; i < dense.estimates.size(); ++i) {
+    const Mode& a = bounded.estimates[i].mode;
+    const Mode& b = dense.estimates[i].mode;
     const bool one_bin = a.object == b.object && a.bin == b.bin;
     same += one_bin || std::abs(a.log_likelihood - b.log_likelihood) < one_likelihood ? 1 : 0;
   }
@@ -127,17 +185,16 @@ Json measure_size(const BoundedInputs& inputs, const Size& size,
                                                         : std::nullopt;
   };
   Case measured{.name = fmt::format("speed {}", size_of(size.lattice)),
-                .facts = {{"objects", inputs.letters.size()},
-                          {"touches", touches_per_unknown},
-                          {"unknowns", unknowns.size()},
-                          {"path", threaded.path()}},
+                .facts = inputs.facts(),
                 .measurements = measurements_of(all, "all threads", bins, goal(false))};
+  measured.facts["path"] = threaded.path();
   std::vector<Measurement>& rows = measured.measurements;
   rows.push_back({"one thread, median", one.median_ms(), "ms", goal(true)});
   rows.push_back({"tables, once", tables_ms, "ms", at_most(most_table_ms)});
   rows.push_back({"dense engine, median", dense.median_ms(), "ms"});
   rows.push_back({"dense over bounded, all threads", dense.median_ms() / all.median_ms(), "times"});
-  rows.push_back(share_of("the dense engine's mode", same_modes(all, dense), dense.modes.size()));
+  rows.push_back(
+      share_of("the dense engine's mode", same_modes(all, dense), dense.estimates.size()));
   report.add(measured);
   return {{"bins", size_of(size.lattice)}, {"bins_in_all", bins},
           {"path", threaded.path()},       {"host_bytes", threaded.host_bytes()},
@@ -154,7 +211,7 @@ constexpr double least_share_first = 80.0;
 
 void add_case(const Answers& answers, const std::string& touches, std::int64_t bins,
               const std::optional<Goal>& median_ms, bool first, Report& report) {
-  const std::vector<double>& dropped = answers.dropped_mass;
+  const std::vector<double> dropped = answers.certified(&Certificate::dropped_mass);
   Case measured{
       .name = "streaming, " + touches,
       .facts = {{"bins in all", bins}, {"answers", dropped.size()}},
@@ -192,26 +249,17 @@ Json measure_bounded_mode(const BoundedInputs& inputs, Report& report) {
   const std::vector<Recording> unknowns =
       unknown_recordings(inputs.unknowns(), touches_per_unknown, speed_seed);
   const std::int64_t bins = inputs.bins_in_all(lattice);
-  Json records = Json::array();
-  for (const double tolerance : {BoundedOptions{}.tolerance, 0.1}) {
-    const BoundedOptions options{.lattice = lattice, .tolerance = tolerance};
-    BoundedPosterior posterior(inputs.letters, options);
-    const Answers answers = answer_each(posterior, unknowns, true);
-    const double tables_ms = table_ms(inputs, options, unknowns.front());
-    Case measured{.name = fmt::format("mode {}, tolerance {}", size_of(lattice), tolerance),
-                  .facts = {{"objects", inputs.letters.size()},
-                            {"touches", touches_per_unknown},
-                            {"unknowns", unknowns.size()}},
-                  .measurements = measurements_of(answers, "to the mode", bins, at_most(most_ms))};
-    measured.measurements.push_back({"tables included, median", answers.median_ms() + tables_ms,
-                                     "ms", at_most(most_with_tables_ms)});
-    report.add(measured);
-    records.push_back({{"bins", size_of(lattice)},
-                       {"tolerance", tolerance},
-                       {"table_ms", tables_ms},
-                       {"answers", answers.record()}});
-  }
-  return records;
+  const BoundedOptions options{.lattice = lattice};
+  BoundedPosterior posterior(inputs.letters, options);
+  const Answers answers = answer_each(posterior, unknowns, true);
+  const double tables_ms = table_ms(inputs, options, unknowns.front());
+  Case measured{.name = "mode " + size_of(lattice),
+                .facts = inputs.facts(),
+                .measurements = measurements_of(answers, "to the mode", bins, at_most(most_ms))};
+  measured.measurements.push_back({"tables included, median", answers.median_ms() + tables_ms, "ms",
+                                   at_most(most_with_tables_ms)});
+  report.add(measured);
+  return {{"bins", size_of(lattice)}, {"table_ms", tables_ms}, {"answers", answers.record()}};
 }
 
 /// Touch after touch, each with an estimate, the first within a budget.
@@ -246,6 +294,86 @@ Json measure_bounded_streaming(const BoundedInputs& inputs, Report& report) {
   return records;
 }
 
+constexpr std::uint64_t large_seed = 1'402'000'000;
+
+double mib(std::uint64_t bytes) { return static_cast<double>(bytes) / (1 << 20); }
+
+struct LargeScene {
+  int objects = 0;
+  double most_ms = 0.0;
+  std::optional<double> most_mib = {};
+};
+
+/// The region about the pivot, in steps of 0.5 mm and 2 degrees.
+PoseLattice lattice_over(double extent_mm, bool quick) {
+  const int count = quick ? 20 : static_cast<int>(4.0 * extent_mm);
+  const Axis axis{-extent_mm, extent_mm, count};
+  return {.x_mm = axis, .y_mm = axis, .theta_rad = {0.0, 2.0 * std::numbers::pi, quick ? 12 : 180}};
+}
+
+/// `about_touches` turns theta about the first touch, as --pivot-mm auto; else about the robot
+/// frame's origin, which then lies as far away as the region reaches.
+Json measure_scene(const BoundedInputs& inputs, const LargeScene& scene, bool about_touches,
+                   const std::vector<Hypothesis>& objects, Report& report) {
+  const double extent_mm = inputs.quick ? 20.0 : 100.0;
+  const PoseLattice lattice = lattice_over(extent_mm, inputs.quick);
+  const std::vector<Recording> unknowns =
+      glyph_unknowns(scene.objects, inputs.unknowns(), touches_per_unknown, extent_mm, large_seed);
+  const auto bins = lattice.bins() * static_cast<std::int64_t>(objects.size());
+  restart_peak_memory();
+  const std::uint64_t before = resident_bytes();
+  std::optional<BoundedPosterior> posterior;
+  const double seconds =
+      seconds_of([&] { posterior.emplace(objects, BoundedOptions{.lattice = lattice}); });
+  Answers answers;
+  int right = 0;
+  for (const Recording& unknown : unknowns) {
+    posterior->reset();
+    if (about_touches) {
+      posterior->move_pivot(unknown.T_robot_sensor.front().translation_mm);
+    }
+    const std::vector<double> identity = answers.ask(*posterior, all_touches(unknown)).identity;
+    const auto best = std::ranges::max_element(identity) - identity.begin();
+    right += objects[static_cast<std::size_t>(best)].map.label == unknown.object ? 1 : 0;
+  }
+  const std::uint64_t peak = peak_resident_bytes() - before;
+  const std::string pivot = about_touches ? "the first touch" : "the robot's origin";
+  Case measured{
+      .name = fmt::format("large, {} objects, pivot at {}", objects.size(), pivot),
+      .facts = {{"region", fmt::format("±{} mm, all angles", extent_mm)},
+                {"bins", size_of(lattice)},
+                {"bins in all", bins},
+                {"touches", touches_per_unknown},
+                {"unknowns", unknowns.size()}},
+      .measurements = measurements_of(answers, "all threads", bins, at_most(scene.most_ms))};
+  const auto most_mib = scene.most_mib ? std::optional(at_most(*scene.most_mib)) : std::nullopt;
+  measured.measurements.push_back({"construction", 1e3 * seconds, "ms"});
+  measured.measurements.push_back(
+      {"held by the posterior", mib(posterior->host_bytes()), "MiB", most_mib});
+  measured.measurements.push_back({"peak of the process above before", mib(peak), "MiB", most_mib});
+  measured.measurements.push_back(share_of("object right", right, unknowns.size()));
+  report.add(measured);
+  return {{"objects", objects.size()}, {"pivot", pivot},
+          {"bins_in_all", bins},       {"host_bytes", posterior->host_bytes()},
+          {"peak_bytes", peak},        {"answers", answers.record()}};
+}
+
+/// Many objects, far away: time and memory.
+Json measure_bounded_large(const BoundedInputs& inputs, Report& report) {
+  const std::vector<LargeScene> scenes =
+      inputs.quick ? std::vector<LargeScene>{{3, 120.0, 200.0}}
+                   : std::vector<LargeScene>{{20, 120.0, 200.0}, {100, 600.0}};
+  Json records = Json::array();
+  for (const LargeScene& scene : scenes) {
+    const std::vector<Hypothesis> objects =
+        letter_maps(inputs.device, glyph_recordings(scene.objects));
+    for (const bool about_touches : {false, true}) {
+      records.push_back(measure_scene(inputs, scene, about_touches, objects, report));
+    }
+  }
+  return records;
+}
+
 }  // namespace
 
 void measure_bounded(const RunOptions& options, std::span<char* const> command_line) {
@@ -253,8 +381,10 @@ void measure_bounded(const RunOptions& options, std::span<char* const> command_l
   const std::vector<Hypothesis> letters = letter_maps(report.device(), training_recordings());
   const BoundedInputs inputs{report.device(), letters, options.quick};
   constexpr decltype(&measure_bounded_speed) measures[] = {
-      measure_bounded_speed, measure_bounded_mode,      measure_bounded_streaming,
-      measure_bounded_large, measure_bounded_misplaced, measure_bounded_search};
+      measure_bounded_speed, measure_bounded_mode, measure_bounded_streaming, measure_bounded_large,
+      [](const BoundedInputs& inputs, Report& /*report*/) {
+        return search_by_bounds(inputs.letters, inputs.quick);
+      }};
   static_assert(std::size(measures) == std::size(bounded_parts));
   for (std::size_t i = 0; i < std::size(measures); ++i) {
     if (options.part.empty() || options.part == bounded_parts[i]) {

@@ -85,15 +85,15 @@ class Trial(NamedTuple):
             touches = trial.touches(registration)
             # Steps before the last, too, tell improbable objects, for the log-loss.
             closely: Any = {"filter": "bounded", "tolerance": 1e-6}
-            (told,) = palpate.recognize(
+            (found,) = palpate.recognize(
                 touches, grids, trace=trace, none=0.0, **closely, **REGION, **options
             )
-            return told
+            return found
 
-        whole = self._replace(windows=self.press.tiles())
+        all_windows = self._replace(windows=self.press.tiles())
         steps = record(self, trace=True)["trace"]
         after = {str(n): (self._replace(windows=self.windows[:n]), steps[n - 1]) for n in WINDOWS}
-        return after | {WHOLE: (whole, record(whole, trace=False))}
+        return after | {WHOLE: (all_windows, record(all_windows, trace=False))}
 
 
 def draw_round(presses: Sequence[Press], objects: int, random: numpy.random.Generator) -> list[Trial]:

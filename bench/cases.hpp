@@ -14,8 +14,7 @@ namespace palpate::bench {
 /// What all cases work on.
 struct Inputs {
   Device& device;
-  std::string device_name;  ///< as asked for, for processes that open it anew; may be empty
-  bool quick = false;       ///< small sizes, next to no repeats
+  bool quick = false;  ///< small sizes, next to no repeats
   std::vector<Recording> training;
   std::vector<Hypothesis> letters;  ///< maps of 0.5 mm cells
   ContactModel model;               ///< that of the letters' histograms
@@ -44,5 +43,8 @@ Case map_stream_case(const Inputs& inputs, bool one_spot);
 
 /// Times the recognition of many unknown objects in turn, in one process and in a process each.
 Case many_unknowns_case(const Inputs& inputs);
+
+/// The blocks of poses that one search by bounds goes into after 1, 3 and 9 touches, for a picture.
+Json search_by_bounds(const std::vector<Hypothesis>& letters, bool quick);
 
 }  // namespace palpate::bench

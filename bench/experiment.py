@@ -1,9 +1,6 @@
 """Sec. IV of the paper on simulated letters: histogram and particle filters over touches."""
 
 import argparse
-import csv
-import io
-import pathlib
 import time
 from collections.abc import Sequence
 from itertools import groupby
@@ -11,12 +8,14 @@ from typing import Any
 
 import numpy
 
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
 import palpate
 from palpate import _charts as charts
 from palpate._statistics import errors_over, present
-from palpate._tables import Column, Table, column, number, plain, print_table, value_of
+from palpate._tables import Column, Table, column, number, plain, print_table
 
-from .experiment_charts import MOST_PARTICLES, as_many, draw
 from .measures import calibration, share_record, student_record, with_interval
 from .program import Json, at_least_1, begin, main, parser, write
 from .trials import (
@@ -28,7 +27,6 @@ from .trials import (
     letter_maps,
     make_trials,
     recognized,
-    truth_of,
 )
 
 SEED = 1_000
@@ -37,6 +35,13 @@ SEED = 1_000
 BALANCED: Bins = (13, 13, 55)
 #: What the robot reports of the array's pose is off by these standard deviations, in mm and rad.
 NOISE = ((0.0, 0.0), (1.0, 0.05), (2.0, 0.1))
+
+# What the paper reports of letters that it touched with a real sensor.
+PUBLISHED_BINS_KNOW_AFTER = {1_000: 46, 10_000: 9}  # touches to an accuracy of 100 %
+PUBLISHED_ERROR_MM = 1.3  # mean, of the histogram
+PUBLISHED_PARTICLE_ACCURACY = 74.0  # %, where 10,000 particles level out
+MOST_PARTICLES = 10_000
+MEAN_ERROR = "mean pose error of trials with the right letter (mm)"
 
 _MM = number(".3f")
 RUNS: list[Column] = [
@@ -146,11 +151,11 @@ def ranges_of(touches: Sequence[int]) -> str:
 
 def standing(leads: Floats) -> str:
     """Which of two is ahead after 1, 2, ... touches, by their leads; nothing where one is NaN."""
-    told = []
+    parts = []
     for word, sign in (("ahead", 1), ("tied", 0), ("behind", -1)):
         if len(at := numpy.flatnonzero(numpy.sign(leads) == sign)):
-            told.append(f"{word} at touch {ranges_of((at + 1).tolist())}")
-    return "; ".join(told)
+            parts.append(f"{word} at touch {ranges_of((at + 1).tolist())}")
+    return "; ".join(parts)
 
 
 def comparisons_of(runs: Sequence[Json], off_by: str) -> list[Json]:
@@ -187,59 +192,125 @@ def comparisons_of(runs: Sequence[Json], off_by: str) -> list[Json]:
     return rows
 
 
-def write_csv(path: pathlib.Path, rows: Sequence[Json]) -> None:
-    """Writes a table, numbers to six digits."""
-    text = io.StringIO()
-    table = csv.DictWriter(text, rows[0], lineterminator="\n")
-    table.writeheader()
-    for row in rows:
-        table.writerow({k: f"{v:.6g}" if isinstance(v, float) else v for k, v in row.items()})
-    write(path, text.getvalue())
+def as_many(a: int, b: int) -> bool:
+    """Whether two counts agree within a tenth.
+
+    Whole numbers of balanced bins along each axis rarely multiply to a given count.
+    """
+    return 10 * abs(a - b) <= max(a, b)
 
 
-def curve_rows(runs: Sequence[Json]) -> list[Json]:
-    """A row for every point of the curves of filters."""
-    names = ("touches", "accuracy", "accuracy_low", "accuracy_high", "mean_confidence", "located")
-    return [
-        {"filter": run["filter"], "count": run["count"]}
-        | {name: point[name] for name in names}
-        | {
-            f"{kind}_{of}_mm": value_of(point, f"{errors}/{of}")
-            for kind, errors in (("error", "error_mm"), ("refined", "refined_error_mm"))
-            for of in ("mean", "median", "p95")
-        }
-        for run in runs
-        for point in run["curve"]
-    ]
+def plot(axes: Axes, run: Json, path: str, label: str, scale: float = 1.0, **look: Any) -> str:
+    """A field over touches, with a mark at every fifth, so that the dashes show between: the colour."""
+    curve = run["curve"]
+    touches, values = column(curve, "touches"), scale * column(curve, path)
+    (line,) = axes.plot(touches, values, label=label, markevery=5, **look)
+    return str(line.get_color())
 
 
-def write_tables(folder: str, document: Json, runs: Sequence[Json], labels: Sequence[str]) -> None:
-    """Writes the curves, the calibrations, and every touch of every trial; labels: the true objects."""
-    bins = [
-        {"filter": run["filter"], "count": run["count"]}
-        | {"confidence_from": part["lower"], "estimates": part["count"]}
-        | {of: part[of] for of in ("mean_confidence", "fraction_right")}
-        for run in document["filters"]
-        for part in run["calibration"]["bins"]
-    ]
-    noisy = [
-        {"noise_mm": level["translation_mm"], "noise_rad": level["rotation_rad"]} | row
-        for level in document["pose_noise"]
-        for row in curve_rows(level["filters"])
-    ]
-    trials = [
-        {"filter": run["filter"], "count": run["count"]}
-        | {"trial": trial, "object": labels[trial], "touches": touches, "right": int(step["right"])}
-        | {of: step.get(of) for of in ("confidence", "error_mm", "refined_error_mm")}
-        for run in runs
-        for trial, steps in enumerate(run["steps"])
-        for touches, step in enumerate(steps, start=1)
-    ]
-    curves = curve_rows(document["filters"])
-    for name, rows in (
-        ("curves", curves), ("calibration", bins), ("pose_noise", noisy), ("trials", trials),
-    ):  # fmt: skip
-        write_csv(pathlib.Path(folder, f"{name}.csv"), rows)
+def draw_accuracy(runs: list[Json]) -> Axes:
+    """With 95 % intervals as shades."""
+    axes = charts.chart("touches", "trials with the right letter, and 95 % interval (%)")
+    for run in runs:
+        colour = plot(axes, run, "accuracy", run["name"], 100.0)
+        touches, *ends = (
+            column(run["curve"], of) for of in ("touches", "accuracy_low", "accuracy_high")
+        )
+        axes.fill_between(
+            touches, 100.0 * ends[0], 100.0 * ends[1], color=colour, alpha=0.12, linewidth=0
+        )
+    axes.set_ylim(0.0, 105.0)
+    return axes
+
+
+def draw_errors(runs: list[Json]) -> Axes:
+    """Mean errors of modes."""
+    axes = charts.chart("touches", MEAN_ERROR)
+    for run in runs:
+        plot(axes, run, "error_mm/mean", run["name"])
+    axes.set_ylim(bottom=0.0)
+    return axes
+
+
+def draw_noise(document: Json, most: int) -> Axes:
+    """Colours tell the noise apart, dashes the filters, each with its largest count."""
+    title = "standard deviation of the error of the reported sensor pose"
+    axes = charts.chart("touches", MEAN_ERROR, title, yscale="log")
+    exact = {"translation_mm": 0.0, "rotation_rad": 0.0, "filters": document["filters"]}
+    for kind, count, look in (
+        ("histogram", most, charts.SOLID),
+        ("particles", MOST_PARTICLES, charts.DASHED),
+    ):
+        for colour, level in zip(charts.COLOURS, [exact, *document["pose_noise"]], strict=False):
+            for run in level["filters"]:
+                if run["filter"] == kind and run["count"] == count:
+                    off = f"{level['translation_mm']:g} mm, {level['rotation_rad']:g} rad"
+                    plot(axes, run, "error_mm/mean", f"{run['name']}, {off}", color=colour, **look)
+    axes.set_xlim(right=len(document["pose_noise"][0]["filters"][0]["curve"]) + 0.5)
+    return axes
+
+
+def draw_calibration(runs: list[Json]) -> Axes:
+    """The share that is right against the probability that was told."""
+    fewest = 10  # estimates of which a fraction says something
+    axes = charts.chart(
+        "confidence: probability of the most probable letter (%)",
+        "estimates that are right (%)",
+        f"expected calibration error in brackets; at least {fewest} estimates per point",
+    )
+    for run in runs:
+        bins = [part for part in run["calibration"]["bins"] if part["count"] >= fewest]
+        confidence, right = (100.0 * column(bins, of) for of in ("mean_confidence", "fraction_right"))
+        error = 100.0 * run["calibration"]["expected_error"]
+        axes.plot(confidence, right, label=f"{run['name']} ({error:.1f} %)")
+    axes.plot([0, 100], [0, 100], ":", marker="", color=charts.GREY, label="perfectly calibrated")
+    axes.set(xlim=(0.0, 100.0), ylim=(0.0, 105.0))
+    return axes
+
+
+def draw(document: Json) -> dict[str, Figure]:
+    """Fig. 6a, 6b, 7a and 7b with the paper's headline numbers, and what goes beyond the paper."""
+    histograms, particles, augmented = (
+        [run for run in document["filters"] if run["filter"] == kind]
+        for kind in ("histogram", "particles", "augmented")
+    )
+    drawn = {"fig6a": draw_accuracy(particles), "fig7a": draw_accuracy(histograms)}
+    charts.rule(drawn["fig6a"], PUBLISHED_PARTICLE_ACCURACY, "paper: 10,000 particles level out")
+    for mark, (count, touches) in zip("PD", PUBLISHED_BINS_KNOW_AFTER.items(), strict=True):
+        look: Json = {"color": charts.GREY, "markersize": 8, "linestyle": ""}
+        label = f"paper: {count:,} bins reach 100 %"
+        drawn["fig7a"].plot(touches, 100.0, marker=mark, label=label, **look)
+    drawn |= {"fig6b": draw_errors(particles), "fig7b": draw_errors(histograms)}
+    charts.rule(drawn["fig7b"], PUBLISHED_ERROR_MM, f"paper: {PUBLISHED_ERROR_MM} mm")
+
+    drawn["augmented"] = charts.chart("touches", "trials with the right letter (%)")
+    for runs, dash in ((particles, "-"), (augmented, "--")):
+        for colour, run in zip(charts.COLOURS, runs, strict=False):
+            look = {"color": colour, "linestyle": dash}
+            plot(drawn["augmented"], run, "accuracy", run["name"], 100.0, **look)
+    drawn["augmented"].set_ylim(0.0, 105.0)
+
+    most = max(run["count"] for run in histograms)
+    largest = [run for run in histograms if as_many(run["count"], most)]
+    finest = next(run for run in largest if run["count"] == most)
+    y = "pose error of trials with the right letter (mm)"
+    drawn["errors"] = charts.chart("touches", y, finest["name"], yscale="log")
+    for label, path in (
+        ("mode, mean", "error_mm/mean"),
+        ("mode, 95th percentile", "error_mm/p95"),
+        ("mode, median", "error_mm/median"),
+        ("refined, 95th percentile", "refined_error_mm/p95"),
+        ("refined, mean", "refined_error_mm/mean"),
+    ):
+        plot(drawn["errors"], finest, path, label)
+    drawn["refined"] = charts.chart("touches", MEAN_ERROR, yscale="log")
+    for run in largest:
+        plot(drawn["refined"], run, "error_mm/mean", f"{run['name']}, mode")
+        plot(drawn["refined"], run, "refined_error_mm/mean", f"{run['name']}, refined")
+    drawn["pose_noise"] = draw_noise(document, most)
+    # All particle filters would hide more than they show.
+    drawn["calibration"] = draw_calibration([*histograms, particles[-1]])
+    return {name: charts.finished(axes) for name, axes in drawn.items()}
 
 
 def measure(options: argparse.Namespace) -> None:
@@ -252,7 +323,7 @@ def measure(options: argparse.Namespace) -> None:
     kinds += [(kind, count) for kind in ("particles", "augmented") for count in particles]
     of_noise = [*kinds[1:3], ("particles", MOST_PARTICLES)]
     comparisons: list[Json] = []
-    levels, every, table = [], [], Table(RUNS)
+    levels, table = [], Table(RUNS)
     for mm, rad in NOISE:
         exact, off_by = mm == 0.0, f"{mm:g} mm, {rad:g} rad"
         most = touches if exact else min(touches, 20)
@@ -262,7 +333,6 @@ def measure(options: argparse.Namespace) -> None:
             runs.append(run_filter(device, maps, trials, kind, size))
             table.append(row_of(runs[-1], off_by))
         comparisons += comparisons_of(runs, off_by)
-        every += runs
         without = [{name: of for name, of in run.items() if name != "steps"} for run in runs]
         levels.append({"translation_mm": mm, "rotation_rad": rad, "filters": without})
     print_table(COMPARISONS, comparisons)
@@ -272,9 +342,6 @@ def measure(options: argparse.Namespace) -> None:
         "pose_noise": levels[1:],
     }
     write(options.json, document)
-    if options.csv:
-        labels = [truth_of(trial).object for trial in trials]
-        write_tables(options.csv, document, every[: len(kinds)], labels)
     if options.plots:
         charts.save(draw(document), options.plots)
 
@@ -289,10 +356,8 @@ def program() -> None:
         plots="draw the paper's figures in this folder",
         trials="trials per letter [10, or 4 with --quick]",
     )
-    add = flags.add_argument
-    add("--touches", type=at_least_1, metavar="N",
-        help="touches per trial, at most 192 [50, or 12 with --quick]")  # fmt: skip
-    add("--csv", metavar="FOLDER", help="write tables to this folder")
+    flags.add_argument("--touches", type=at_least_1, metavar="N",
+                       help="touches per trial, at most 192 [50, or 12 with --quick]")  # fmt: skip
     measure(flags.parse_args())
 
 

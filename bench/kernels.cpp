@@ -52,7 +52,6 @@ namespace {
 Inputs make_inputs(Device& device, const RunOptions& options) {
   Inputs inputs{
       .device = device,
-      .device_name = options.device,
       .quick = options.quick,
       .training = training_recordings(),
       .unknowns = unknown_recordings(options.quick ? 20 : 1000, touches_per_unknown, 100)};

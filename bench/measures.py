@@ -83,9 +83,9 @@ def with_interval(form: str, factor: float = 1.0) -> Text:
     """Writes `factor` times such a record, as in "0.041 (0.018 to 0.072)"."""
 
     def text(record: Mean) -> str:
-        told = {of: format(factor * value, form) for of, value in record.items()}
-        ends = f" ({told['low']} to {told['high']})" if "low" in told else ""
-        return told["mean"] + ends
+        texts = {of: format(factor * value, form) for of, value in record.items()}
+        ends = f" ({texts['low']} to {texts['high']})" if "low" in texts else ""
+        return texts["mean"] + ends
 
     return text
 
@@ -97,19 +97,19 @@ def calibration(confidences: ArrayLike, right: ArrayLike) -> Json:
     distance between confidence and share right, bins weighted by their counts (Naeini, Cooper and
     Hauskrecht 2015).
     """
-    told, was = numpy.asarray(confidences), numpy.asarray(right, numpy.float64)
-    of = numpy.minimum((told * 10).astype(int), 9)
+    confidence, was = numpy.asarray(confidences), numpy.asarray(right, numpy.float64)
+    of = numpy.minimum((confidence * 10).astype(int), 9)
     bins = [
         {
             "lower": i / 10,
             "count": int((of == i).sum()),
-            "mean_confidence": float(told[of == i].mean()),
+            "mean_confidence": float(confidence[of == i].mean()),
             "fraction_right": float(was[of == i].mean()),
         }
         for i in numpy.unique(of).tolist()
     ]
     off = [abs(each["mean_confidence"] - each["fraction_right"]) * each["count"] for each in bins]
-    return {"expected_error": sum(off) / len(told), "bins": bins}
+    return {"expected_error": sum(off) / len(confidence), "bins": bins}
 
 
 def normalised_error(

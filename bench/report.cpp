@@ -21,6 +21,13 @@ namespace {
 
 constexpr const char* row = "| {:<28} | {:<46} | {:<28} | {:<8} | {:<7} |\n";
 
+/// Strings as they are, numbers in their shortest form.
+std::string plain_text(const Json& value) {
+  return value.is_string()         ? value.get<std::string>()
+         : value.is_number_float() ? fmt::format("{}", value.get<double>())
+                                   : value.dump();
+}
+
 /// A field of /proc/self/status, which are in KiB; 0 where there is none.
 std::uint64_t status_bytes(std::string_view field) {
   std::ifstream status("/proc/self/status");
@@ -31,16 +38,6 @@ std::uint64_t status_bytes(std::string_view field) {
   }
   return 0;
 }
-
-}  // namespace
-
-double seconds_of(const std::function<void()>& call) {
-  const auto start = std::chrono::steady_clock::now();
-  call();
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
-namespace {
 
 /// Seconds of the last of the calls that fill a fifth of a second.
 double seconds_at_full_clock(const std::function<void()>& call) {
@@ -53,6 +50,12 @@ double seconds_at_full_clock(const std::function<void()>& call) {
 }
 
 }  // namespace
+
+double seconds_of(const std::function<void()>& call) {
+  const auto start = std::chrono::steady_clock::now();
+  call();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
 
 std::vector<std::vector<double>> interleave(std::span<const std::function<void()>> contenders,
                                             int repeats) {
@@ -98,22 +101,6 @@ void ErrorStatistics::add(double error) {
 }
 
 double ErrorStatistics::rms() const { return std::sqrt(squares_ / static_cast<double>(count_)); }
-
-std::string plain_text(const Json& value) {
-  if (value.is_array()) {
-    return fmt::format("{}", fmt::join(value.get<std::vector<std::string>>(), "; "));
-  }
-  return value.is_string()         ? value.get<std::string>()
-         : value.is_number_float() ? fmt::format("{}", value.get<double>())
-                                   : value.dump();
-}
-
-std::string count_text(double count) {
-  return count >= 0.9995e9   ? fmt::format("{:.3g} G", count / 1e9)
-         : count >= 0.9995e6 ? fmt::format("{:.3g} M", count / 1e6)
-         : count >= 0.9995e3 ? fmt::format("{:.3g} k", count / 1e3)
-                             : fmt::format("{:.3g}", count);
-}
 
 Measurement share_of(const std::string& name, int count, std::size_t trials,
                      std::optional<Goal> goal) {

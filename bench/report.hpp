@@ -54,7 +54,6 @@ class ErrorStatistics {
   void add(double error);
   double largest() const { return largest_; }
   double rms() const;
-  std::uint64_t count() const { return count_; }
 
  private:
   double largest_ = 0.0;
@@ -63,11 +62,6 @@ class ErrorStatistics {
 };
 
 using Json = nlohmann::ordered_json;
-
-/// Strings as they are, numbers in their shortest form, lists joined by "; ".
-std::string plain_text(const Json& value);
-/// A count such as 100, 17.5 k, 1 M or 1 G.
-std::string count_text(double count);
 
 /// What a measured value is held against.
 struct Goal {
@@ -121,13 +115,12 @@ class Report {
 // The commands.
 
 /// Names of the parts of `bounded`, in order.
-inline constexpr const char* bounded_parts[] = {"speed", "mode",      "streaming",
-                                                "large", "misplaced", "search"};
+inline constexpr const char* bounded_parts[] = {"speed", "mode", "streaming", "large", "search"};
 
 // Each prints its results as Markdown tables and writes them to the file that its options name.
 // They throw Error where the device or the file cannot be opened.
 
-/// Speed, memory and error of every kernel, beside two baselines and float64.
+/// Speed, memory and error of every kernel, beside a loop on the CPU and float64.
 void measure_kernels(const RunOptions& options, std::span<char* const> command_line);
 
 /// The posterior by bounds: its time for nine touches on lattices of several sizes, touch by touch

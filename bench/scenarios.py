@@ -25,7 +25,7 @@ def off_by(mm: float, rad: float) -> Touching:
     return Touching(at_random_poses=True, noise=(mm, rad))
 
 
-def told(mm: float, rad: float) -> Json:
+def with_touch_sd(mm: float, rad: float) -> Json:
     """Recognition that knows how far touches are off."""
     return {"touch_sd_mm": mm, "touch_sd_deg": math.degrees(rad)}
 
@@ -127,7 +127,7 @@ SCENARIOS = {
     ),
     "misplaced-told": Scenario(
         "touches 1 mm and 0.05 rad off, which is known", touching=off_by(1.0, 0.05),
-        engines={name: model | told(1.0, 0.05) for name, model in MODELS.items()}, **_GAINS,
+        engines={name: model | with_touch_sd(1.0, 0.05) for name, model in MODELS.items()}, **_GAINS,
     ),
     "misplaced-untold": Scenario(
         "touches 0.5 mm and 0.02 rad off, which nobody says", touching=off_by(0.5, 0.02), engines=MODELS,
@@ -135,11 +135,11 @@ SCENARIOS = {
     ),
     "misplaced-1mm": Scenario(
         "touches 1 mm and 0.05 rad off, as if exact and averaged", touching=off_by(1.0, 0.05),
-        engines={"as if exact": {}, "averaged": told(1.0, 0.05)}, **_MISPLACED,
+        engines={"as if exact": {}, "averaged": with_touch_sd(1.0, 0.05)}, **_MISPLACED,
     ),
     "misplaced-2mm": Scenario(
         "the same of 2 mm and 0.1 rad", touching=off_by(2.0, 0.1),
-        engines={"as if exact": {}, "averaged": told(2.0, 0.1)}, **_MISPLACED,
+        engines={"as if exact": {}, "averaged": with_touch_sd(2.0, 0.1)}, **_MISPLACED,
     ),
     "fit": Scenario("how well learned letters and other shapes fit", engines=_BINS, **_FIT),
     "fit-16x16": Scenario(
@@ -163,7 +163,7 @@ SCENARIOS = {
     "none-misplaced": Scenario(
         "(none) where touches are 1 mm and 0.05 rad off", touching=off_by(1.0, 0.05),
         options=EQ7 | EVEN_NONE | on_bins(20, 20, 75),
-        engines={"as if exact": {}, "averaged": told(1.0, 0.05)}, **_NONE,
+        engines={"as if exact": {}, "averaged": with_touch_sd(1.0, 0.05)}, **_NONE,
     ),
     "strangers": Scenario(
         "outlines drawn at random, by the command's defaults", columns=("none", "strangers"),
@@ -211,8 +211,8 @@ def trials_of(
 
     later: what is added to the seeds. The folder gets the outlines of strangers.
     """
-    whole = any(PLANNED in engine for engine in scenario.engines.values())
-    touches = len(palpate.training_grid()) if whole else scenario.touches
+    all_poses = any(PLANNED in engine for engine in scenario.engines.values())
+    touches = len(palpate.training_grid()) if all_poses else scenario.touches
 
     def made(shapes: Sequence[str], number: int, seed: int) -> list[palpate.Recording]:
         own: tuple[Any, int] = (shapes, number)

@@ -105,7 +105,6 @@ def record_of(
         "seconds_refine": None if numpy.isnan(refine_s).any() else quantile(refine_s, 0.5),
         "device_bytes": device_bytes,
         "accuracy": float(right[:, -1].mean()),
-        "least_confidence": float(confidence[:, -1].min()),
         "expected_calibration_error": calibration(confidence.ravel(), right.ravel())["expected_error"],
         "by_bounds": None,
         "nearest_bin_mm": None,

@@ -63,20 +63,12 @@ def letter_maps(
 ) -> list[palpate.OccupancyGrid]:
     """The letters' maps, which share the prior that their touches give, with their symmetries."""
     training = training_recordings() if training is None else training
-    sensor = palpate.InverseSensorModel(spread_mm=spread_mm)
-    prior = palpate.estimate_prior(
-        device, {recording.object: recording for recording in training}, cell_mm=cell_mm, sensor=sensor
-    )
-    sensor = palpate.InverseSensorModel(spread_mm=spread_mm, prior=prior)
-    builder = palpate.MapBuilder(device, cell_mm=cell_mm, sensor=sensor)
-    maps = []
-    for recording in training:
-        builder.clear()
-        builder.add(recording)
-        maps.append(builder.build(recording.object))
-        maps[-1].symmetry = SYMMETRY.get(recording.object, 1)
-        palpate.keep_touches(device, maps[-1], recording, sensor=sensor)
-    return maps
+    labels = [recording.object for recording in training]
+    learned = palpate.learn_maps(
+        training, cell_mm=cell_mm, spread_mm=spread_mm, origin="robot", sensor_model="none",
+        symmetry={label: SYMMETRY.get(label, 1) for label in labels}, device=device,
+    )  # fmt: skip
+    return sorted(learned.maps, key=lambda grid: labels.index(grid.label))
 
 
 def make_trials(

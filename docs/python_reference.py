@@ -17,8 +17,8 @@ from sphinx.util.docutils import SphinxDirective
 PACKAGE = Path(os.environ["PALPATE_PYTHON_PACKAGE"])
 # Later files override earlier ones.
 FILES = {
-    "palpate": ["_palpate.pyi", "_error.py", "results.py", "recognition.py", "many.py", "_bag.py",
-                "commands.py", "learning.py", "show.py", "streams.py"],
+    "palpate": ["_palpate.pyi", "_error.py", "_recording.py", "results.py", "recognition.py", "many.py",
+                "_bag.py", "commands.py", "show.py", "streams.py"],
     "palpate.reference": ["reference.pyi"],
 }
 

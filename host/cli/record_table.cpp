@@ -13,7 +13,6 @@
 #include "cli/text_table.hpp"
 #include "model/printable.hpp"
 #include "recognition/record_json.hpp"
-#include "recognition/result_json.hpp"
 
 namespace palpate::cli {
 

@@ -3,8 +3,9 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <initializer_list>
-#include <map>
+#include <numeric>
 #include <optional>
 #include <span>
 #include <string>
@@ -32,66 +33,63 @@ struct Array {
   std::vector<std::size_t> shape;
 
   std::size_t size() const {
-    std::size_t count = 1;
-    for (const std::size_t extent : shape) {
-      count *= extent;
-    }
-    return count;
+    return std::accumulate(shape.begin(), shape.end(), std::size_t{1}, std::multiplies());
   }
-  std::span<const Value> values() const& { return {data, size()}; }
-  std::span<const Value> values() const&& = delete;  // the memory goes with the array
-  template <typename To = Value>
-  std::vector<To> copied() const {
-    return {data, data + size()};
+  std::span<const Value> values() const& { return rows<Value>(); }
+  /// Poses [n, 3] as rows of x_mm, y_mm and theta_rad, and points [n, 2] in mm.
+  template <typename Row>
+  std::span<const Row> rows() const& {
+    return {reinterpret_cast<const Row*>(data), size() * sizeof(Value) / sizeof(Row)};
+  }
+  // The memory goes with the array.
+  std::span<const Value> values() const&& = delete;
+  template <typename Row>
+  std::span<const Row> rows() const&& = delete;
+
+  template <typename Row = Value>
+  std::vector<Row> copied() const {
+    const auto all = rows<Row>();
+    return {all.begin(), all.end()};
   }
 };
 using Floats = Array<double>;
 using Bytes = Array<std::uint8_t>;
-using Counts = Array<std::uint64_t>;
 
-/// Reads the array in place. Throws what NumPy raises where the array's layout is not C's.
+/// Reads the array in place. Throws what Python raises where it is of other values, or its layout
+/// is not C's.
 template <typename Value>
 Array<Value> in_place(nb::object array);
 
-/// Poses [n, 3] as rows of x_mm, y_mm and theta_rad, and points [n, 2] in mm.
-std::span<const Pose> as_poses(const Floats& array);
-std::span<const glm::dvec2> as_points(const Floats& array);
-
-/// Takes the arrays of one call, whose extents have to agree. Each function returns the array of
-/// the argument itself where dtype and layout allow it, or else a copy.
-/// @param name of the argument, for messages
-/// @param shape of the array: numbers, or letters that stand for one number throughout
-/// @param longer the shape of an array of more axes, where it may have more
-/// @throws Error naming the argument, its shape and the shape that it needs
+/// Takes the arrays of one call, whose extents have to agree: palpate._arrays.Reader in C++.
 class ArrayReader {
  public:
   using Shape = std::initializer_list<const char*>;
 
-  Floats floats(nb::handle object, const char* name, Shape shape, Shape longer = {});
-  /// Readings, the only arrays that may have masked values (numpy.ma).
-  Floats readings(nb::handle object, const char* name, Shape shape, Shape longer = {});
-  /// The flags `valid` of elements or of all readings, 0 also where a reading is masked; none where
-  /// all are valid.
-  /// @param shape of the readings
-  std::optional<Bytes> valid(nb::handle readings, const std::optional<ArrayLike>& valid,
-                             Shape shape);
-  /// Booleans, or integers that are 0 or not.
-  /// @param wanted what the message asks for where the array holds anything else
-  Bytes flags(nb::handle object, const char* name, Shape shape, Shape longer = {},
-              const char* wanted = "booleans, False for a dead element");
-  Counts counts(nb::handle object, const char* name, Shape shape);
-  /// What a letter stands for by now.
-  std::size_t extent(const std::string& letter) const { return extents_.at(letter).value; }
+  Floats floats(nb::handle given, const char* name, Shape shape) const {
+    return in_place<double>(read("floats", given, name, shape));
+  }
+  /// Readings, NaN where they are masked.
+  Floats known(nb::handle given, const char* name, Shape shape) const {
+    return in_place<double>(read("known", given, name, shape));
+  }
+  Bytes flags(nb::handle given, const char* name, Shape shape) const {
+    return in_place<std::uint8_t>(read("flags", given, name, shape));
+  }
+  /// Booleans of a picture.
+  Bytes pixels(nb::handle given, const char* name, Shape shape) const {
+    return in_place<std::uint8_t>(read("pixels", given, name, shape));
+  }
 
  private:
-  struct Extent {
-    std::size_t value;
-    std::string given_by;
-  };
-  template <typename Value>
-  Array<Value> checked(const nb::object& array, const char* name, Shape shape, Shape longer = {});
+  nb::object read(const char* kind, nb::handle given, const char* name, Shape shape) const {
+    nb::list extents;
+    for (const char* extent : shape) {
+      extents.append(extent);
+    }
+    return reader_.attr(kind)(given, name, nb::tuple(extents));
+  }
 
-  std::map<std::string, Extent> extents_;
+  nb::object reader_ = call("palpate._arrays", "Reader");
 };
 
 /// A pose (x_mm, y_mm, theta_rad), or a point (x_mm, y_mm).

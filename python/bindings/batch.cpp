@@ -1,8 +1,6 @@
 // What `palpate batch` settles and recognises, for processes that somebody else hands the
 // recordings to: palpate/many.py.
 
-#include <algorithm>
-#include <iterator>
 #include <memory>
 #include <string>
 #include <utility>
@@ -28,14 +26,11 @@ using namespace nb::literals;
 
 namespace {
 
-nb::bytes bytes_of(const std::string& text) { return nb::bytes(text.data(), text.size()); }
-std::string text_in(const nb::bytes& bytes) { return {bytes.c_str(), bytes.size()}; }
+using Entries = std::vector<std::tuple<std::string, std::size_t>>;
 
-using Entries = std::vector<std::tuple<nb::bytes, std::size_t>>;
-
-std::tuple<nb::bytes, Entries, Sentences> settle(const std::vector<std::string>& inputs,
-                                                 nb::handle maps, PythonRequest request,
-                                                 Device& device, std::size_t threads) {
+std::tuple<std::string, Entries, Sentences> settle(const std::vector<std::string>& inputs,
+                                                   nb::handle maps, PythonRequest request,
+                                                   Device& device, std::size_t threads) {
   if (inputs.empty()) {
     throw Error(Fault::input, "paths: none; give recordings, a folder of them or a manifest");
   }
@@ -56,10 +51,10 @@ std::tuple<nb::bytes, Entries, Sentences> settle(const std::vector<std::string>&
   });
   Entries entries;
   for (const BatchEntry& entry : task.inputs) {
-    entries.emplace_back(bytes_of(entry_text(entry)), task.unknowns_of(entry));
+    entries.emplace_back(entry_text(entry), task.unknowns_of(entry));
   }
   task.inputs.clear();
-  return {bytes_of(head_text(task)), std::move(entries), std::move(sentences)};
+  return {head_text(task), std::move(entries), std::move(sentences)};
 }
 
 /// A settled batch on a device, ready to recognise any of its recordings.
@@ -85,18 +80,14 @@ OpenBatch open_batch(const std::string& head, Device& device, std::size_t thread
   return {std::move(task), std::move(job), std::move(recogniser)};
 }
 
-struct Line {
-  std::string text;         ///< as `palpate batch` writes it
-  std::string python_text;  ///< with options in the words of Python
-  double seconds;
-};
+using Lines = std::vector<std::tuple<std::string, std::string, double>>;
 
 /// The entries' lines, and a sentence on what is not resolved, "" where there is none.
-std::pair<std::vector<Line>, std::string> recognise_entries(
-    OpenBatch& batch, const std::vector<std::string>& entries) {
+std::tuple<Lines, std::string> recognise_entries(OpenBatch& batch,
+                                                 const std::vector<std::string>& entries) {
   const Request& request = batch.job.request();
   const RecognitionTask& task = batch.job.task();
-  std::vector<Line> lines;
+  Lines lines;
   std::string unresolved;
   for (const std::string& entry : entries) {
     const ReadInput read = read_entry(batch.task, entry_from(entry), request);
@@ -104,32 +95,17 @@ std::pair<std::vector<Line>, std::string> recognise_entries(
       const RecognitionRecord record = recognise(batch.recogniser, task, unknown, request.trace,
                                                  [](double) { check_signals(); });
       if (record.error.empty() && unresolved.empty()) {
-        unresolved = batch.recogniser.unresolved_words();
+        unresolved = in_keywords(batch.recogniser.unresolved_words());
       }
       const auto text = [&](OptionWords words) {
         return palpate::text_of(to_json(record, task, std::nullopt, request.trace, words));
       };
-      lines.push_back({text(in_flags), text(in_keywords), record.seconds});
+      std::string line = text(in_flags);
+      std::string own = text(in_keywords);
+      lines.emplace_back(line, own == line ? "" : own, record.seconds);
     }
   }
   return {std::move(lines), std::move(unresolved)};
-}
-
-using Lines = std::vector<std::tuple<nb::bytes, nb::bytes, double>>;
-
-std::tuple<Lines, std::string> recognise_python(const Shared<OpenBatch>& batch,
-                                                const std::vector<nb::bytes>& entries) {
-  std::vector<std::string> texts;
-  std::ranges::transform(entries, std::back_inserter(texts), text_in);
-  const auto [recognised, unresolved] =
-      batch.use([&](OpenBatch& open) { return recognise_entries(open, texts); });
-  Lines lines;
-  for (const Line& line : recognised) {
-    lines.emplace_back(bytes_of(line.text),
-                       bytes_of(line.python_text == line.text ? "" : line.python_text),
-                       line.seconds);
-  }
-  return {std::move(lines), in_keywords(unresolved)};
 }
 
 }  // namespace
@@ -147,10 +123,9 @@ void bind_batch(nb::module_& module) {
                                 "recordings. One thread at\na time recognises.")
       .def_static(
           "open",
-          [](const nb::bytes& head, const std::shared_ptr<Device>& device, std::size_t threads) {
-            const std::string text = text_in(head);
+          [](const std::string& head, const std::shared_ptr<Device>& device, std::size_t threads) {
             return make_shared_on(device,
-                                  [&](Device& on) { return open_batch(text, on, threads); });
+                                  [&](Device& on) { return open_batch(head, on, threads); });
           },
           "head"_a, "device"_a, "threads"_a,
           "Raises Error where palpate, a map, the scene or the sensor model is not as it was when\n"
@@ -186,9 +161,13 @@ void bind_batch(nb::module_& module) {
           },
           "Memory held: the device's, or the host's where bounds recognise.")
       .def(
-          "recognize", &recognise_python, "entries"_a,
+          "recognize",
+          [](const Shared<OpenBatch>& self, const std::vector<std::string>& entries) {
+            return self.use([&](OpenBatch& open) { return recognise_entries(open, entries); });
+          },
+          "entries"_a,
           "The record of each unknown as a line of JSON, as `palpate batch` writes it; again,\n"
-          "with options in the words of Python, or b\"\" where that is the same; and its seconds.\n"
+          "with options in the words of Python, or \"\" where that is the same; and its seconds.\n"
           "Then what is worth a warning, or \"\". A recording that cannot be recognised has a\n"
           "record with its error.\n\n"
           "Raises Error where a recording has changed since the batch was settled.");

@@ -18,9 +18,7 @@ void bind_sensors(nb::module_& module);
 void bind_request(nb::module_& module);
 void bind_recognition(nb::module_& module);
 void bind_batch(nb::module_& module);
-void bind_evaluation(nb::module_& module);
-void bind_calibration(nb::module_& module);
-void bind_map_learning(nb::module_& module);
+void bind_learning(nb::module_& module);
 void bind_import(nb::module_& module);
 
 /// "PoseLattice(x_mm=(-10, 10, 25), ...)"

@@ -39,16 +39,12 @@ void bind_device(nb::module_& module) {
       .def_ro("usable", &DeviceInfo::usable, "Palpate can compute on it.")
       .def_ro("chosen", &DeviceInfo::chosen, "Device.open() takes this device.")
       .def_ro("reason", &DeviceInfo::reason, "Why the device is chosen or refused.")
-      .def("__repr__", [](const DeviceInfo& self) {
-        return fmt::format("DeviceInfo({}: '{}', {}{})", self.index, self.name, self.type,
-                           self.chosen ? ", chosen" : "");
-      });
+      .def("__repr__", &repr_of);
 
   nb::class_<Device>(
       module, "Device",
-      "An open Vulkan device. The objects made on it keep it open. Threads may share "
-      "it and them:\none thread at a time uses an object, and the others wait "
-      "without the GIL.")
+      "An open Vulkan device. The objects made on it keep it open. Threads may share it and them:\n"
+      "one thread at a time uses an object, and the others wait without the GIL.")
       .def_static(
           "open",
           [](const Name& name) {

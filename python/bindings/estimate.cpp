@@ -40,10 +40,7 @@ void bind_mode(nb::module_& module) {
                    "[3] (x_mm, y_mm, theta_rad); the bin's centre, where there is a bin.")
       .def_ro("log_likelihood", &Mode::log_likelihood,
               "Of all touches, without prior weights, in nats.")
-      .def("__repr__", [](const Mode& self) {
-        return fmt::format("Mode(object {}, T_object_robot {})", self.object,
-                           text_of(self.T_object_robot));
-      });
+      .def("__repr__", &repr_of);
 
   nb::class_<RefinedPose>(
       module, "RefinedPose",
@@ -86,10 +83,7 @@ void bind_certificate(nb::module_& module) {
       .def_prop_ro(
           "log_evidence", [](const Certificate& self) { return pairs_of(self.log_evidence); },
           "(low, high) of every map's log evidence, in nats.")
-      .def("__repr__", [](const Certificate& self) {
-        return fmt::format("Certificate(dropped_mass={:.1e}, bins_evaluated={})", self.dropped_mass,
-                           self.bins_evaluated);
-      });
+      .def("__repr__", &repr_of);
 }
 
 void bind_estimate_class(nb::module_& module) {
@@ -142,9 +136,7 @@ void bind_marginals(nb::module_& module) {
       .def_ro("object", &PoseSample::object, "Index into the maps.")
       .def_prop_ro("T_object_robot", array_of(&PoseSample::T_object_robot),
                    "[3] (x_mm, y_mm, theta_rad).")
-      .def("__repr__", [](const PoseSample& self) {
-        return fmt::format("PoseSample(object {}, {})", self.object, text_of(self.T_object_robot));
-      });
+      .def("__repr__", &repr_of);
 }
 
 /// A number of every candidate, [n].

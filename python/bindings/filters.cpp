@@ -128,6 +128,8 @@ void bind_belief(nb::class_<Named<Belief>> belief, const char* class_name) {
       .def("likely_bins", &likely_bins<Belief>, "object"_a, "least_share"_a = 1e-6,
            "The bins that hold at least least_share of the object's belief: indices [n] into the\n"
            "lattice, theta, y, x, x fastest, and the shares [n].")
+      .def("entropy", shared_method<Own>(&Belief::entropy),
+           "Entropy of the belief over objects and bins, in nats; by bounds over evaluated bins.")
       .def("sample", shared_method<Own>(&Belief::sample), "count"_a, "seed"_a = 0,
            "Draws objects and poses from the belief.")
       .def("expected_gain", &expected_gain<Belief>, "T_robot_sensor"_a, "elements_mm"_a,
@@ -163,18 +165,15 @@ void bind_histogram(nb::module_& module) {
               "contact"_a = ContactModel{}, "none_weight"_a = nb::none(),
               "touch_sd"_a = DisplacementSd{}, "slip_sd"_a = DisplacementSd{},
               "Starts with a uniform belief. none_weight: prior weight of \"none of these\";\n"
-              "touch_sd: how far the sensor may have been from\n"
-              "where it was said to be; slip_sd: how far the object moves between touches.\n\n"
-              "Raises Error on maps that are not sound or differ in their prior, on options out "
-              "of\n"
-              "range, and where the device has too little memory.")
+              "touch_sd: how far the sensor may have been from where it was said to be; slip_sd:\n"
+              "how far the object moves between touches.\n\n"
+              "Raises Error on maps that are not sound or differ in their prior, on options out\n"
+              "of range, and where the device has too little memory.")
           .def("update", &update<PoseHistogram>, "touches"_a, "progress"_a = nb::none(),
                "Multiplies the belief by the likelihood of these touches (Eq. 7, 13).\n\n"
-               "progress(fraction) is called up to 20 times a second. After Ctrl-C, or where "
-               "progress\n"
-               "raises, the belief is left half-way: call reset(). Raises Error on a touch that is "
-               "not\n"
-               "sound, of which none is taken in.")
+               "progress(fraction) is called up to 20 times a second. After Ctrl-C, or where\n"
+               "progress raises, the belief is left half-way: call reset(). Raises Error on a\n"
+               "touch that is not sound, of which none is taken in.")
           .def(
               "move_pivot",
               [](const Histogram& self, const ArrayLike& pivot_mm) {
@@ -191,8 +190,6 @@ void bind_histogram(nb::module_& module) {
               "log_likelihood", &log_likelihood, "object"_a,
               "Log-likelihood of every bin of one object in nats, [ntheta, ny, nx], without prior\n"
               "weights.")
-          .def("entropy", shared_method<Histogram>(&PoseHistogram::entropy),
-               "Entropy of the belief over objects and bins, in nats.")
           .def_prop_ro("device_bytes", shared_method<Histogram>(&PoseHistogram::device_bytes),
                        "Device memory held.");
   bind_belief(belief, "PoseHistogram");
@@ -248,10 +245,9 @@ void bind_particles(nb::module_& module) {
               "resampling"_a = Resampling::multinomial, "augmented"_a = false,
               "alpha_slow"_a = ParticleOptions{}.alpha_slow,
               "alpha_fast"_a = ParticleOptions{}.alpha_fast, "seed"_a = 0,
-              "Particles start uniformly over the region, whose bin counts are ignored. motion_mm "
-              "and\n"
-              "motion_rad: standard deviations of the noise at each touch; augmented: adds random\n"
-              "particles while touches fit worse than before (Augmented MCL).\n\n"
+              "Particles start uniformly over the region, whose bin counts are ignored. motion_mm\n"
+              "and motion_rad: standard deviations of the noise at each touch; augmented: adds\n"
+              "random particles while touches fit worse than before (Augmented MCL).\n\n"
               "Raises Error as PoseHistogram does.")
           .def("update", &update<ParticleFilter>, "touches"_a, "progress"_a = nb::none(),
                "Resamples, moves and weighs the particles by each touch in turn (Eq. 7-8).\n\n"
@@ -265,9 +261,8 @@ void bind_particles(nb::module_& module) {
                shared_method<Particles>(&ParticleFilter::effective_sample_size),
                "1 / sum of squared weights, in [1, n].")
           .def("particles", &particles,
-               "All particles: objects [n], T_object_robot [n, 3] (x_mm, y_mm, theta_rad) and "
-               "weights\n"
-               "[n], which sum to 1.")
+               "All particles: objects [n], T_object_robot [n, 3] (x_mm, y_mm, theta_rad) and\n"
+               "weights [n], which sum to 1.")
           .def_prop_ro("device_bytes", shared_method<Particles>(&ParticleFilter::device_bytes),
                        "Device memory held.");
   bind_text(filter, "ParticleFilter");
@@ -315,11 +310,9 @@ void bind_bounded(nb::module_& module) {
               "sensor's poses may be; threads: 0 for as many as the machine has cores.\n\n"
               "Raises Error as PoseHistogram does.")
           .def("update", &update<BoundedPosterior>, "touches"_a, "progress"_a = nb::none(),
-               "Multiplies the belief by the likelihood of these touches (Eq. 7, 13); takes in "
-               "none of\n"
-               "them after Ctrl-C or where progress(fraction) raises. Raises Error on a touch that "
-               "is\n"
-               "not sound.")
+               "Multiplies the belief by the likelihood of these touches (Eq. 7, 13); takes in\n"
+               "none of them after Ctrl-C or where progress(fraction) raises. Raises Error on a\n"
+               "touch that is not sound.")
           .def(
               "estimate", shared_method<Bounded>(&BoundedPosterior::estimate),
               "tolerance"_a = nb::none(),
@@ -351,8 +344,6 @@ void bind_bounded(nb::module_& module) {
                "The bins that the search evaluated: indices [n] into [object, theta, y, x], x\n"
                "fastest, log-likelihoods [n] in nats, without prior weights, and a bound of the\n"
                "share of the belief that all other bins hold together.")
-          .def("entropy", shared_method<Bounded>(&BoundedPosterior::entropy),
-               "Entropy of the belief over objects and evaluated bins, in nats.")
           .def_prop_ro("host_bytes", shared_method<Bounded>(&BoundedPosterior::host_bytes),
                        "Memory held.");
   bind_belief(belief, "BoundedPosterior");

@@ -59,7 +59,7 @@ std::vector<std::string> remarks_on(const ImportedRecording& imported,
   return remarks;
 }
 
-using Imported = std::tuple<ArrayRecording, std::vector<std::string>>;
+using Imported = std::tuple<RecordingObject, std::vector<std::string>>;
 
 /// The options, with the elements that stand for the array.
 ImportOptions with_elements(ImportOptions options, const std::optional<ArrayLike>& elements_mm) {
@@ -71,7 +71,7 @@ ImportOptions with_elements(ImportOptions options, const std::optional<ArrayLike
 
 Imported returned(ImportedRecording imported, const ImportOptions& options) {
   std::vector<std::string> remarks = remarks_on(imported, options);
-  return {array_recording(std::move(imported.recording)), std::move(remarks)};
+  return {to_python(std::move(imported.recording)), std::move(remarks)};
 }
 
 Imported import_tables_python(const ImportOptions& given,
@@ -105,7 +105,7 @@ Imported import_frames(const ImportOptions& given, const ArrayLike& pressures,
                        const std::optional<ArrayLike>& poses,
                        const std::optional<ArrayLike>& object_pose) {
   const ImportOptions options = with_elements(given, elements_mm);
-  ArrayReader reader;
+  const ArrayReader reader;
   ImportRows rows;
   const Floats readings = reader.floats(pressures, "pressures", {"n", "e"});
   rows.elements = readings.shape[1];

@@ -6,7 +6,6 @@
 
 #include "bindings.hpp"
 #include "estimate.hpp"
-#include "estimation/maps/left_out_fit.hpp"
 #include "palpate/balanced_lattice.hpp"
 #include "palpate/drawn_map.hpp"
 #include "palpate/error.hpp"
@@ -25,9 +24,7 @@ using namespace nb::literals;
 
 namespace {
 
-std::vector<float> cells_of(const ArrayLike& cells, const char* name, ArrayReader& reader) {
-  return reader.floats(cells, name, {"ny", "nx"}).copied<float>();
-}
+std::vector<float> cells_of(const Floats& cells) { return {cells.data, cells.data + cells.size()}; }
 
 /// [ny, nx], a view of cells of the map.
 Result<const float, 2> view_cells(const OccupancyGrid& map, const std::vector<float>& cells) {
@@ -67,20 +64,12 @@ void bind_drawn_maps(nb::class_<OccupancyGrid>& grid) {
       [](const std::string& label, const ArrayLike& mask, double pixel_mm,
          const ArrayLike& origin_mm, double cell_mm, double spread_mm, double peak, double prior,
          double felt_share, double reach_mm) {
-        ArrayReader reader;
-        Mask drawn{.pixel_mm = pixel_mm, .origin_mm = point_of(origin_mm, "origin_mm")};
-        // A picture's 0 and 255 would be taken for False and True.
-        const nb::object type = nb::module_::import_("numpy").attr("asarray")(mask).attr("dtype");
-        if (nb::cast<std::string>(type.attr("kind")) != "b") {
-          throw Error(Fault::input,
-                      fmt::format("mask: dtype {}; give booleans, True where occupied",
-                                  nb::cast<std::string>(type.attr("name"))));
-        }
-        drawn.occupied =
-            reader.flags(mask, "mask", {"rows", "columns"}, {}, "booleans, True where occupied")
-                .copied<std::uint8_t>();
-        drawn.rows = reader.extent("rows");
-        drawn.columns = reader.extent("columns");
+        const Bytes pixels = ArrayReader().pixels(mask, "mask", {"rows", "columns"});
+        const Mask drawn{.pixel_mm = pixel_mm,
+                         .origin_mm = point_of(origin_mm, "origin_mm"),
+                         .rows = pixels.shape[0],
+                         .columns = pixels.shape[1],
+                         .occupied = pixels.copied()};
         const DrawnMapOptions options{cell_mm, spread_mm, peak, prior, felt_share, reach_mm};
         return run([&] { return drawn_map(label, drawn, options); });
       },
@@ -137,7 +126,10 @@ void bind_map(nb::module_& module) {
              std::optional<double> spread_mm, bool mirror,
              const std::optional<ArrayLike>& observations,
              const std::optional<ArrayLike>& mean_level) {
-            ArrayReader reader;
+            const ArrayReader reader;
+            const auto cells = [&](const ArrayLike& given, const char* name) {
+              return reader.floats(given, name, {"ny", "nx"});
+            };
             OccupancyGrid map{.label = label,
                               .cell_mm = cell_mm,
                               .origin_mm = point_of(origin_mm, "origin_mm"),
@@ -145,14 +137,15 @@ void bind_map(nb::module_& module) {
                               .symmetry = symmetry,
                               .spread_mm = spread_mm,
                               .mirror = mirror};
-            map.log_odds = cells_of(log_odds, "log_odds", reader);
-            map.ny = static_cast<int>(reader.extent("ny"));
-            map.nx = static_cast<int>(reader.extent("nx"));
+            const Floats odds = cells(log_odds, "log_odds");
+            map.log_odds = cells_of(odds);
+            map.ny = static_cast<int>(odds.shape[0]);
+            map.nx = static_cast<int>(odds.shape[1]);
             if (observations) {
-              map.observations = cells_of(*observations, "observations", reader);
+              map.observations = cells_of(cells(*observations, "observations"));
             }
             if (mean_level) {
-              map.mean_level = cells_of(*mean_level, "mean_level", reader);
+              map.mean_level = cells_of(cells(*mean_level, "mean_level"));
             }
             if (const auto fault = fault_of(map)) {
               throw Error(Fault::input, *fault);
@@ -238,9 +231,7 @@ void bind_hypothesis(nb::module_& module) {
       .def_ro("map", &Hypothesis::map, "The map of the object.")
       .def_ro("weight", &Hypothesis::weight, "Prior weight relative to the other objects.")
       .def_ro("mirrored", &Hypothesis::mirrored, "The map is the mirror image of the learned one.")
-      .def("__repr__", [](const Hypothesis& self) {
-        return fmt::format("Hypothesis('{}', weight={:g})", self.map.label, self.weight);
-      });
+      .def("__repr__", &repr_of);
 }
 
 void bind_metric(nb::module_& module) {
@@ -361,7 +352,7 @@ void bind_map_builder(nb::module_& module) {
         for (const auto& [label, touches] : objects) {
           TouchViews views = views_of(touches);
           all.push_back({label, std::move(views.touches)});
-          kept.insert(kept.end(), views.kept.begin(), views.kept.end());
+          kept.push_back(std::move(views.kept));
         }
         const MapOptions options = options_of(cell_mm, sensor, classifier);
         return run([&] { return estimate_prior(device, all, options); });
@@ -370,19 +361,6 @@ void bind_map_builder(nb::module_& module) {
       "sensor"_a = InverseSensorModel{}, "classifier"_a = ContactClassifier{},
       "p(m) as in the paper: occupied area over modelled area, pooled over all objects, which are\n"
       "touches by label.");
-  module.def(
-      "keep_touches",
-      [](Device& device, OccupancyGrid& map, const ArrayRecording& recording,
-         const InverseSensorModel& sensor, const ContactClassifier& classifier) {
-        MapSource source{recording.copied(), options_of(map.cell_mm, sensor, classifier)};
-        run([&] { judge_left_out(device, source); });
-        map.source = std::make_shared<const MapSource>(std::move(source));
-      },
-      "device"_a, "map"_a, "recording"_a, nb::kw_only(), "sensor"_a = InverseSensorModel{},
-      "classifier"_a = ContactClassifier{},
-      "Keeps in the map the touches that it was built from, as `palpate map` does: maps of unlike\n"
-      "priors can be built again, and fits are on the scale of touches that maps had not seen.\n"
-      "sensor, classifier: the builder's.");
 }
 
 }  // namespace palpate::python

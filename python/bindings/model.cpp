@@ -47,7 +47,7 @@ void bind_lattice(nb::module_& module) {
       .def_rw("count", &Axis::count, "Number of bins.")
       .def_prop_ro("step", &Axis::step, "Width of a bin.")
       .def("centre", &Axis::centre, "i"_a, "Centre of bin i.")
-      .def("__repr__", [](const Axis& self) { return "Axis" + axis_text(self); });
+      .def("__repr__", &repr_of);
   nb::implicitly_convertible<std::tuple<double, double, int>, Axis>();
 
   nb::class_<PoseLattice>(
@@ -117,10 +117,7 @@ void bind_contact(nb::module_& module) {
            "threshold in the recording's pressure unit; ratio in [0, 1).")
       .def_ro("threshold", &ContactClassifier::threshold)
       .def_ro("ratio", &ContactClassifier::ratio)
-      .def("__repr__", [](const ContactClassifier& self) {
-        return fmt::format("ContactClassifier(threshold={:g}, ratio={:g})", self.threshold,
-                           self.ratio);
-      });
+      .def("__repr__", &repr_of);
 
   nb::class_<ContactModel>(module, "ContactModel",
                            "How likely a reading is at a place of a map (Eq. 3 and 7).")
@@ -133,11 +130,7 @@ void bind_contact(nb::module_& module) {
       .def_ro("classifier", &ContactModel::classifier)
       .def_ro("gamma", &ContactModel::gamma)
       .def_ro("prior", &ContactModel::prior)
-      .def("__repr__", [](const ContactModel& self) {
-        return fmt::format("ContactModel(threshold={:g}, ratio={:g}, gamma={:g}, prior={})",
-                           self.classifier.threshold, self.classifier.ratio, self.gamma,
-                           self.prior ? fmt::format("{:g}", *self.prior) : "the maps'");
-      });
+      .def("__repr__", &repr_of);
 
   nb::class_<InverseSensorModel>(
       module, "InverseSensorModel",
@@ -150,10 +143,7 @@ void bind_contact(nb::module_& module) {
       .def_ro("spread_mm", &InverseSensorModel::spread_mm)
       .def_ro("peak", &InverseSensorModel::peak)
       .def_ro("prior", &InverseSensorModel::prior)
-      .def("__repr__", [](const InverseSensorModel& self) {
-        return fmt::format("InverseSensorModel(spread_mm={:g}, peak={:g}, prior={:g})",
-                           self.spread_mm, self.peak, self.prior);
-      });
+      .def("__repr__", &repr_of);
 
   nb::class_<DisplacementSd>(module, "DisplacementSd",
                              "Standard deviations of a small displacement: of x and y in mm, and "
@@ -167,9 +157,7 @@ void bind_contact(nb::module_& module) {
           "sd"_a)
       .def_rw("mm", &DisplacementSd::mm, "Of x and y, in mm.")
       .def_rw("rad", &DisplacementSd::rad, "Of the angle, in radians.")
-      .def("__repr__", [](const DisplacementSd& self) {
-        return fmt::format("DisplacementSd(mm={:g}, rad={:g})", self.mm, self.rad);
-      });
+      .def("__repr__", &repr_of);
   nb::implicitly_convertible<std::tuple<double, double>, DisplacementSd>();
 }
 

@@ -47,8 +47,6 @@ NB_MODULE(_palpate, module) {
   bind_request(module);
   bind_recognition(module);
   bind_batch(module);
-  bind_evaluation(module);
-  bind_calibration(module);
-  bind_map_learning(module);
+  bind_learning(module);
   bind_import(module);
 }

@@ -1,4 +1,4 @@
-// `palpate recognize` and `palpate plan`.
+// `palpate recognize`, `palpate plan` and `palpate evaluate`.
 
 #include <string>
 #include <utility>
@@ -13,6 +13,7 @@
 #include "estimate.hpp"
 #include "json.hpp"
 #include "model/option_words.hpp"
+#include "recognition/judged_results.hpp"
 #include "recognition/record_json.hpp"
 #include "recognition/touch_plan.hpp"
 #include "request.hpp"
@@ -23,17 +24,23 @@ using namespace nb::literals;
 
 namespace {
 
-struct Answer {
-  nlohmann::ordered_json records = nlohmann::ordered_json::array();
-  Sentences sentences;
-};
+using Json = nlohmann::ordered_json;
+using Answer = std::pair<Json, Sentences>;
 
+Sentences with_more(Sentences sentences, const std::string& more) {
+  if (!more.empty()) {
+    sentences.push_back(more);
+  }
+  return sentences;
+}
+
+/// The records, and what is worth a warning.
 Answer recognize(const RecognitionJob& job, const Report& report) {
   const std::vector<Query>& unknowns = job.unknowns();
   const bool with_trace = job.request().trace;
   const RecognitionTask& task = job.task();
   Recogniser recogniser = job.open({.cancel_point = check_signals});
-  Answer answer{.sentences = task.remarks};
+  Json records = Json::array();
   std::string unresolved;
   for (std::size_t i = 0; i < unknowns.size(); ++i) {
     const auto show = [&](double fraction) {
@@ -44,39 +51,27 @@ Answer recognize(const RecognitionJob& job, const Report& report) {
     if (unresolved.empty()) {
       unresolved = recogniser.unresolved_words();
     }
-    answer.records.push_back(to_json(record, task, job.device_name(), with_trace, in_keywords));
+    records.push_back(to_json(record, task, job.device_name(), with_trace, in_keywords));
   }
-  if (!unresolved.empty()) {
-    answer.sentences.push_back(unresolved);
-  }
-  return answer;
+  return {std::move(records), with_more(task.remarks, unresolved)};
+}
+
+/// The plan, and what is worth a warning.
+Answer plan_next(const RecognitionJob& job, const PlanRequest& wanted, const Report& report) {
+  const RecognitionTask& task = job.task();
+  require_plannable(task);
+  Recogniser recogniser = job.open({.cancel_point = check_signals});
+  const Plan plan = plan_touch(recogniser, task, job.unknowns().front(), wanted, report);
+  return {to_json(plan, task, job.device_name(), in_keywords),
+          with_more(task.remarks, recogniser.unresolved_words())};
 }
 
 using Records = nb::typed<nb::list, Fields>;
 
 std::tuple<Records, Sentences> recognize_python(nb::handle recordings, const PythonRequest& request,
                                                 const Progress& progress) {
-  const Answer answer = run_job(recordings, request, progress, &recognize);
-  return {nb::borrow<Records>(to_python(answer.records)), in_python(answer.sentences)};
-}
-
-struct Planned {
-  nlohmann::ordered_json plan;
-  Sentences told;
-};
-
-Planned plan_next(const RecognitionJob& job, const PlanRequest& wanted, const Report& report) {
-  Planned planned;
-  const RecognitionTask& task = job.task();
-  require_plannable(task);
-  Recogniser recogniser = job.open({.cancel_point = check_signals});
-  planned.told = task.remarks;
-  const Plan plan = plan_touch(recogniser, task, job.unknowns().front(), wanted, report);
-  if (const std::string words = recogniser.unresolved_words(); !words.empty()) {
-    planned.told.push_back(words);
-  }
-  planned.plan = to_json(plan, task, job.device_name(), in_keywords);
-  return planned;
+  const auto [records, sentences] = run_job(recordings, request, progress, &recognize);
+  return {nb::borrow<Records>(to_python(records)), in_python(sentences)};
 }
 
 std::tuple<Fields, Sentences> plan_python(nb::handle recordings, const PythonRequest& request,
@@ -99,12 +94,21 @@ std::tuple<Fields, Sentences> plan_python(nb::handle recordings, const PythonReq
   if (!poses.empty()) {
     wanted.candidates = std::move(poses);
   }
-  const Planned planned =
+  const auto [plan, more] =
       run_job(recordings, request, progress, [&](const RecognitionJob& job, const Report& report) {
         return plan_next(job, wanted, report);
       });
-  sentences.insert(sentences.end(), planned.told.begin(), planned.told.end());
-  return {fields_of(planned.plan), in_python(std::move(sentences))};
+  sentences.insert(sentences.end(), more.begin(), more.end());
+  return {fields_of(plan), in_python(std::move(sentences))};
+}
+
+Fields evaluate_results(const std::vector<std::string>& paths, const nb::bytes& records) {
+  const std::string text(records.c_str(), records.size());
+  return fields_of(run([&] {
+    JudgedResults results = read_results(result_files(paths));
+    add_records("records", text, results);
+    return to_json(evaluate(results, paths.empty() ? "records" : paths.front()), results);
+  }));
 }
 
 }  // namespace
@@ -115,6 +119,9 @@ void bind_recognition(nb::module_& module) {
   module.def("plan", &plan_python, "recordings"_a, "request"_a, "goal"_a, "candidates"_a,
              "samples"_a, "seed"_a, "progress"_a = nb::none(),
              "A plan as in the JSON of `palpate plan`, and what is worth a warning.");
+  module.def("evaluate_results", &evaluate_results, "paths"_a, "records"_a,
+             "The JSON of `palpate evaluate`, of files and folders of results, and of more records "
+             "as a\nJSON array.");
 }
 
 }  // namespace palpate::python

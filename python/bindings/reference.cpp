@@ -13,9 +13,10 @@ using namespace nb::literals;
 
 namespace {
 
-Result<std::uint8_t, 1> classify(const ArrayTouch& touch, const ContactClassifier& classifier) {
+Result<std::uint8_t, 1> classify(const TouchObject& touch, const ContactClassifier& classifier) {
+  const TouchViews views = views_of(touch);
   std::vector<std::uint8_t> classes;
-  for (const Reading reading : reference::classify(touch.touch(), classifier)) {
+  for (const Reading reading : reference::classify(views.touches.front(), classifier)) {
     classes.push_back(static_cast<std::uint8_t>(reading));
   }
   return owned(std::move(classes));
@@ -31,10 +32,10 @@ Result<double, 2> log_odds_map(const TouchesLike& touches, const OccupancyGrid& 
                {static_cast<std::size_t>(grid.ny), static_cast<std::size_t>(grid.nx)});
 }
 
-double log_likelihood(const ArrayTouch& touch, const ArrayLike& T_object_robot,
+double log_likelihood(const TouchObject& touch, const ArrayLike& T_object_robot,
                       const OccupancyGrid& map, const ContactModel& contact) {
-  return reference::log_likelihood(touch.touch(), pose_of(T_object_robot, "T_object_robot"), map,
-                                   contact);
+  return reference::log_likelihood(views_of(touch).touches.front(),
+                                   pose_of(T_object_robot, "T_object_robot"), map, contact);
 }
 
 Result<double, 3> log_likelihoods(const TouchesLike& touches, const PoseLattice& lattice,
@@ -48,7 +49,7 @@ Result<double, 3> log_likelihoods(const TouchesLike& touches, const PoseLattice&
 Result<double, 1> identity(const std::vector<ArrayLike>& log_likelihoods,
                            const std::optional<std::vector<double>>& weights) {
   reference::Posterior posterior;
-  ArrayReader reader;
+  const ArrayReader reader;
   for (const ArrayLike& bins : log_likelihoods) {
     posterior.log_likelihood.push_back(
         reader.floats(bins, "log_likelihoods", {"ntheta", "ny", "nx"}).copied());

@@ -33,53 +33,54 @@ Value typed(nb::handle value) {
   return value_of<Value>(value, "another type is wanted");
 }
 
-/// The text of an option's value, as a flag has it; each member takes values of its type.
+// What Python gives for the value of an option.
+template <typename Value>
+struct Given {
+  using Type = std::conditional_t<std::is_enum_v<Value>, std::string, Value>;
+};
+template <>
+struct Given<Bins> {
+  using Type = std::variant<std::array<int, 3>, std::string>;
+};
+template <>
+struct Given<Pivot> {
+  using Type = std::variant<std::array<double, 2>, std::string>;
+};
+template <>
+struct Given<NoneWeight> {
+  using Type = std::variant<double, std::string>;
+};
+template <>
+struct Given<Frames> {
+  using Type = std::array<std::int64_t, 2>;
+};
+
+/// The text of an option's value, as a flag has it.
 struct OptionText {
   nb::handle given;
+  std::string separator;  ///< of numbers
 
-  template <typename Numbers>
-  static std::string joined(const Numbers& numbers, const char* separator) {
+  template <typename Value>
+  std::string operator()(Value Request::* /*of*/) const {
+    return text(typed<typename Given<Value>::Type>(given));
+  }
+  template <typename Value>
+  std::string operator()(std::optional<Value> Request::* /*of*/) const {
+    return text(typed<typename Given<Value>::Type>(given));
+  }
+
+ private:
+  template <typename Value>
+  std::string text(const Value& value) const {
+    return fmt::format("{}", value);
+  }
+  template <typename Number, std::size_t n>
+  std::string text(const std::array<Number, n>& numbers) const {
     return fmt::format("{}", fmt::join(numbers, separator));
   }
-  /// Numbers, or a word.
-  template <typename Numbers>
-  std::string numbers_or_word(const char* separator) const {
-    const auto value = typed<std::variant<Numbers, std::string>>(given);
-    const auto* word = std::get_if<std::string>(&value);
-    return word != nullptr ? *word : joined(std::get<Numbers>(value), separator);
-  }
-
-  std::string operator()(std::string Request::* /*of*/) const { return typed<std::string>(given); }
-  std::string operator()(bool Request::* /*of*/) const {
-    return fmt::format("{}", typed<bool>(given));
-  }
-  template <typename Number>
-  requires std::is_arithmetic_v<Number> std::string operator()(
-      std::optional<Number> Request::* /*of*/) const {
-    return fmt::format("{}", typed<Number>(given));
-  }
-  std::string operator()(std::optional<Range> Request::* /*of*/) const {
-    return joined(typed<Range>(given), ":");
-  }
-  std::string operator()(std::optional<Bins> Request::* /*of*/) const {
-    return numbers_or_word<std::array<int, 3>>("x");
-  }
-  std::string operator()(std::optional<Pivot> Request::* /*of*/) const {
-    return numbers_or_word<std::array<double, 2>>(",");
-  }
-  std::string operator()(std::optional<NoneWeight> Request::* /*of*/) const {
-    const auto value = typed<std::variant<double, std::string>>(given);
-    const auto* word = std::get_if<std::string>(&value);
-    return word != nullptr ? *word : fmt::format("{}", std::get<double>(value));
-  }
-  std::string operator()(std::optional<Frames> Request::* /*of*/) const {
-    return joined(typed<std::array<std::int64_t, 2>>(given), ":");
-  }
-  /// A word.
-  template <typename Word>
-  requires std::is_enum_v<Word> std::string operator()(
-      std::optional<Word> Request::* /*of*/) const {
-    return typed<std::string>(given);
+  template <typename... Values>
+  std::string text(const std::variant<Values...>& values) const {
+    return std::visit([&](const auto& value) { return text(value); }, values);
   }
 };
 
@@ -100,7 +101,9 @@ void set_option(PythonRequest& request, std::string option, nb::handle given) {
   if (row == options().end()) {
     throw nb::attribute_error(option.c_str());
   }
-  const std::string text = std::visit(OptionText{given}, row->member);
+  const auto separator = separator_of(*row);
+  const std::string text =
+      std::visit(OptionText{given, separator ? std::string(1, *separator) : ""}, row->member);
   if (const std::string remedy = palpate::set_option(request, *row, text); !remedy.empty()) {
     refuse_option(option, text, "{}", remedy);
   }
@@ -108,7 +111,7 @@ void set_option(PythonRequest& request, std::string option, nb::handle given) {
 
 /// A list of what an argument gives: one item, or an iterable of them.
 nb::object items_of(nb::handle given) {
-  const bool is_one = is_path(given.ptr()) || nb::isinstance<ArrayRecording>(given) ||
+  const bool is_one = is_path(given.ptr()) || is_recording(given.ptr()) ||
                       nb::isinstance<OccupancyGrid>(given) || nb::isinstance<Hypothesis>(given);
   return call("builtins", "list", is_one ? nb::make_tuple(given) : nb::borrow(given));
 }
@@ -136,40 +139,30 @@ void read_maps(Request& request) {
   }
 }
 
-std::vector<Recording> read_recordings(const GivenRecordings& given) {
-  std::vector<std::string> files;
-  for (const auto& item : given) {
-    if (const auto* file = std::get_if<std::string>(&item)) {
-      files.push_back(*file);
-    }
-  }
-  std::vector<Recording> read_files = read_touch_recordings(files);
-  std::vector<Recording> all;
-  auto file = read_files.begin();
-  for (const auto& item : given) {
-    const auto* recording = std::get_if<Recording>(&item);
-    all.push_back(recording == nullptr ? std::move(*file++) : *recording);
-    require_touches(all.back(), all.front());
-  }
-  return all;
-}
-
-GivenRecordings given_recordings(nb::handle given) {
-  GivenRecordings recordings;
+std::vector<Recording> recordings_of(nb::handle given) {
+  std::vector<Recording> recordings;
+  std::vector<std::string> files;  // of the recordings without a path
   for (const nb::handle item : items_of(given)) {
-    const ArrayRecording* recording = nullptr;
-    if (nb::try_cast(item, recording) && recording != nullptr) {
-      Recording copy = recording->copied();
+    if (is_recording(item.ptr())) {
+      Recording& copy = recordings.emplace_back(recording_of(nb::borrow<RecordingObject>(item)));
       if (copy.path.empty()) {
-        copy.path = fmt::format("recordings[{}]", recordings.size());
+        copy.path = fmt::format("recordings[{}]", recordings.size() - 1);
       }
-      recordings.emplace_back(std::move(copy));
     } else {
-      recordings.emplace_back(nb::borrow<PathLike>(item).text());
+      files.push_back(nb::borrow<PathLike>(item).text());
+      recordings.emplace_back();
     }
   }
   if (recordings.empty()) {
     throw Error(Fault::input, "recordings: none; give a Recording or a file");
+  }
+  std::vector<Recording> read_files = run([&] { return read_touch_recordings(files); });
+  auto file = read_files.begin();
+  for (Recording& recording : recordings) {
+    if (recording.path.empty()) {
+      recording = std::move(*file++);
+    }
+    require_touches(recording, recordings.front());
   }
   return recordings;
 }

@@ -3,7 +3,6 @@
 #include <memory>
 #include <string>
 #include <utility>
-#include <variant>
 #include <vector>
 
 #include "call.hpp"
@@ -29,12 +28,9 @@ void add_maps(nb::handle given, Request& request);
 /// Reads the maps in the request's files, after those in memory.
 void read_maps(Request& request);
 
-/// Recordings as a call from Python gives them: files, or recordings in memory.
-using GivenRecordings = std::vector<std::variant<std::string, Recording>>;
-/// Throws Error as read_touch_recordings() does.
-std::vector<Recording> read_recordings(const GivenRecordings& given);
-/// Takes a Recording, a file, or an iterable of them. Throws Error where there are none.
-GivenRecordings given_recordings(nb::handle given);
+/// The recordings of touches that a Recording, a file, or an iterable of them gives.
+/// @throws Error as read_touch_recordings() does, and where there are none
+std::vector<Recording> recordings_of(nb::handle given);
 
 /// The device that is open, or else the one of this name, see Device::open(). Throws Error, also
 /// in a child of fork() whose parent has opened it.
@@ -51,13 +47,12 @@ inline std::shared_ptr<Device> device_of(const std::shared_ptr<Device>& open,
 template <typename F>
 auto run_job(nb::handle recordings, const PythonRequest& request, const Progress& progress,
              F work) {
-  const GivenRecordings given = given_recordings(recordings);
+  std::vector<Recording> touched = recordings_of(recordings);
   return run(progress, [&](const Report& report) {
     const Request completed = complete(request);
-    std::vector<Recording> read = read_recordings(given);
     const auto device = device_of(request.open_device, completed.device);
     return work(
-        RecognitionJob(completed, std::move(read), {}, [&]() -> Device& { return *device; }),
+        RecognitionJob(completed, std::move(touched), {}, [&]() -> Device& { return *device; }),
         report);
   });
 }

@@ -5,7 +5,6 @@
 
 #include <fmt/format.h>
 #include <nanobind/stl/optional.h>
-#include <nanobind/stl/unique_ptr.h>
 #include <nanobind/stl/vector.h>
 
 #include "bindings.hpp"
@@ -25,91 +24,77 @@ using namespace std::chrono_literals;
 
 namespace {
 
-/// A sensor that one thread at a time calls, without the GIL.
-class SharedSensor {
- public:
-  explicit SharedSensor(std::unique_ptr<Sensor> sensor)
-      : sensor_("sensor", {}, std::move(sensor)) {}
+using SharedSensor = Shared<std::unique_ptr<Sensor>>;
 
-  template <typename F>
-  auto use(F work) {
-    return sensor_.use([&](std::unique_ptr<Sensor>& sensor) { return work(*sensor); });
+/// What `work`, a function or method of the sensor, returns.
+template <typename F>
+auto called(F work) {
+  return [work](const SharedSensor& self) {
+    return self.use([&](std::unique_ptr<Sensor>& sensor) { return std::invoke(work, *sensor); });
+  };
+}
+
+SensorDescription description_of(const SharedSensor& self) {
+  return called(&Sensor::description)(self);
+}
+
+/// The next frame; none where the stream has ended, or after the timeout. Ctrl-C ends the wait.
+std::optional<Frame> next(const SharedSensor& self, std::optional<double> timeout_s) {
+  using Clock = std::chrono::steady_clock;
+  constexpr double longest_s = 1e8;  // that the clock can count
+  if (timeout_s && std::isnan(*timeout_s)) {
+    throw nb::value_error("timeout_s: is not a number; give seconds, or None to wait for a frame");
   }
-
-  /// The next frame; none where the stream has ended, or after the timeout. Ctrl-C ends the wait.
-  std::optional<Frame> next(std::optional<double> timeout_s) {
-    using Clock = std::chrono::steady_clock;
-    constexpr double longest_s = 1e8;  // that the clock can count
-    if (timeout_s && std::isnan(*timeout_s)) {
-      throw nb::value_error(
-          "timeout_s: is not a number; give seconds, or None to wait for a frame");
+  const auto end = Clock::now() + std::chrono::duration<double>(
+                                      std::clamp(timeout_s.value_or(0.0), 0.0, longest_s));
+  const auto take = called([&](Sensor& sensor) {
+    auto wait = std::chrono::milliseconds(50);
+    if (timeout_s) {
+      const auto left = std::chrono::ceil<std::chrono::milliseconds>(end - Clock::now());
+      wait = std::clamp(left, 0ms, wait);
     }
-    const auto end = Clock::now() + std::chrono::duration<double>(
-                                        std::clamp(timeout_s.value_or(0.0), 0.0, longest_s));
-    for (;;) {
-      auto [frame, ended] = use([&](Sensor& sensor) {
-        auto wait = std::chrono::milliseconds(50);
-        if (timeout_s) {
-          const auto left = std::chrono::ceil<std::chrono::milliseconds>(end - Clock::now());
-          wait = std::clamp(left, 0ms, wait);
-        }
-        auto taken = sensor.next(wait);
-        const bool over = !taken && sensor.ended();
-        return std::pair(std::move(taken), over);
-      });
-      if (frame || ended || (timeout_s && Clock::now() >= end)) {
-        return std::move(frame);
-      }
-      if (PyErr_CheckSignals() != 0) {
-        throw nb::python_error();
-      }
+    auto taken = sensor.next(wait);
+    const bool over = !taken && sensor.ended();
+    return std::pair(std::move(taken), over);
+  });
+  for (;;) {
+    auto [frame, ended] = take(self);
+    if (frame || ended || (timeout_s && Clock::now() >= end)) {
+      return std::move(frame);
+    }
+    if (PyErr_CheckSignals() != 0) {
+      throw nb::python_error();
     }
   }
+}
 
-  SensorDescription description() {
-    return use([](const Sensor& sensor) { return sensor.description(); });
-  }
-
- private:
-  Shared<std::unique_ptr<Sensor>> sensor_;
-};
-
-std::unique_ptr<SharedSensor> open_sensor(const PathLike& board_or_file,
-                                          const std::optional<PathLike>& pose_source) {
+SharedSensor open_sensor(const PathLike& board_or_file,
+                         const std::optional<PathLike>& pose_source) {
   std::optional<std::filesystem::path> poses;
   if (pose_source) {
     poses = pose_source->path();
   }
   const std::string name = board_or_file.text();
-  auto sensor = run([&] {
-    std::unique_ptr<Sensor> opened =
-        is_virtual_sensor(name) ? open_virtual_sensor(name) : open_board(name);
-    return poses ? std::make_unique<PosedSensor>(std::move(opened), poses->string())
-                 : std::move(opened);
-  });
-  return std::make_unique<SharedSensor>(std::move(sensor));
+  return {"sensor", {}, run([&] {
+            std::unique_ptr<Sensor> opened =
+                is_virtual_sensor(name) ? open_virtual_sensor(name) : open_board(name);
+            return poses ? std::make_unique<PosedSensor>(std::move(opened), poses->string())
+                         : std::move(opened);
+          })};
 }
 
-// Methods and properties of the class Sensor.
-
-/// What `work`, a function or method of the sensor, returns.
-template <typename F>
-auto called(F work) {
-  return [work](SharedSensor& self) {
-    return self.use([&](Sensor& sensor) { return std::invoke(work, sensor); });
-  };
-}
+// Properties of the class Sensor.
 
 template <typename Value>
 auto described(Value SensorDescription::*field) {
-  return [field](SharedSensor& self) { return self.description().*field; };
+  return [field](const SharedSensor& self) { return description_of(self).*field; };
 }
 
 /// [e], or None where the sensor has no such values.
 template <typename ArrayType, typename Value>
 auto described_array(std::vector<Value> SensorDescription::*field) {
-  return [field](SharedSensor& self) -> std::optional<ArrayType> {
-    std::vector<Value> values = self.description().*field;
+  return [field](const SharedSensor& self) -> std::optional<ArrayType> {
+    std::vector<Value> values = description_of(self).*field;
     return values.empty() ? std::nullopt
                           : std::optional(nb::borrow<ArrayType>(owned(std::move(values))));
   };
@@ -121,15 +106,8 @@ void bind_frame(nb::module_& module) {
           "__init__",
           [](Frame* self, double host_time_s, const ArrayLike& values,
              const std::optional<ArrayLike>& T_robot_sensor) {
-            ArrayReader reader;
-            const Floats readings = reader.readings(values, "values", {"e"});
-            std::vector<double> known = readings.copied();
-            if (const auto flags = reader.valid(values, {}, {"e"})) {
-              for (std::size_t k = 0; k < known.size(); ++k) {
-                known[k] = flags->data[k] != 0 ? known[k] : std::nan("");
-              }
-            }
-            Frame frame{.host_time_s = host_time_s, .values = std::move(known)};
+            Frame frame{.host_time_s = host_time_s,
+                        .values = ArrayReader().known(values, "values", {"e"}).copied()};
             if (T_robot_sensor) {
               frame.T_robot_sensor = pose_of(*T_robot_sensor, "T_robot_sensor");
             }
@@ -145,10 +123,7 @@ void bind_frame(nb::module_& module) {
                    "[e] in the sensor's pressure unit; NaN: unknown.")
       .def_prop_ro("T_robot_sensor", array_of(&Frame::T_robot_sensor),
                    "[3] (x_mm, y_mm, theta_rad), or None.")
-      .def("__repr__", [](const Frame& self) {
-        return fmt::format("Frame({} elements at {:.3f} s{})", self.values.size(), self.host_time_s,
-                           self.T_robot_sensor ? ", posed" : "");
-      });
+      .def("__repr__", &repr_of);
 }
 
 void bind_sensor(nb::module_& module) {
@@ -178,13 +153,13 @@ void bind_sensor(nb::module_& module) {
           nb::sig("def __iter__(self) -> Sensor"))
       .def("__next__",
            [](SharedSensor& self) {
-             auto frame = self.next({});
+             auto frame = next(self, {});
              if (!frame) {
                throw nb::stop_iteration();
              }
              return *std::move(frame);
            })
-      .def("next", &SharedSensor::next, "timeout_s"_a = nb::none(),
+      .def("next", &next, "timeout_s"_a = nb::none(),
            "The next frame; None where none comes within timeout_s, and after the stream's end.\n"
            "Ctrl-C ends the wait.")
       .def_prop_ro("ended", called(&Sensor::ended),
@@ -202,7 +177,7 @@ void bind_sensor(nb::module_& module) {
           "The true identity and pose, where a replay or a simulation knows them, or None.")
       .def_prop_ro(
           "elements_mm",
-          [](SharedSensor& self) { return to_array(self.description().elements_mm); },
+          [](const SharedSensor& self) { return to_array(description_of(self).elements_mm); },
           "[e, 2] in the sensor frame.")
       .def_prop_ro("valid", described_array<ByteArray>(&SensorDescription::valid),
                    "[e], 0 for a dead element; None: all are alive.")
@@ -211,7 +186,7 @@ void bind_sensor(nb::module_& module) {
       .def_prop_ro("lost", called([](const Sensor& sensor) { return sensor.counters().lost; }),
                    "Frames lost since start().")
       .def("__repr__", [](SharedSensor& self) {
-        const SensorDescription sensor = self.description();
+        const SensorDescription sensor = description_of(self);
         return fmt::format("Sensor('{}', {} elements in {})", sensor.name,
                            sensor.elements_mm.size(), sensor.pressure_unit);
       });
@@ -236,10 +211,7 @@ void bind_detector(nb::module_& module) {
                    "[e], 0 for an element that is dead or was hardly known; empty: all are alive.")
       .def_prop_ro("T_robot_sensor", array_of(&DetectedTouch::T_robot_sensor),
                    "[3] (x_mm, y_mm, theta_rad), or None.")
-      .def("__repr__", [](const DetectedTouch& self) {
-        return fmt::format("DetectedTouch({} frames from {:.3f} to {:.3f} s)", self.frames,
-                           self.begin_s, self.end_s);
-      });
+      .def("__repr__", &repr_of);
 
   nb::class_<TouchDetector>(module, "TouchDetector",
                             "Finds touches in a stream of frames by onset, steady phase and "
@@ -249,7 +221,7 @@ void bind_detector(nb::module_& module) {
           [](TouchDetector* self, double onset, double release, double min_steady_s, double steady,
              double smooth_s, double drift_s, const std::optional<ArrayLike>& baseline,
              const std::optional<ArrayLike>& valid) {
-            ArrayReader reader;
+            const ArrayReader reader;
             std::vector<double> zeros;
             std::vector<std::uint8_t> alive;
             if (baseline) {
@@ -284,7 +256,7 @@ void bind_detector(nb::module_& module) {
   module.def(
       "baseline_of",
       [](const std::vector<Frame>& frames, SharedSensor& sensor, std::optional<double> onset) {
-        return owned(baseline_of(frames, sensor.description(), onset));
+        return owned(baseline_of(frames, description_of(sensor), onset));
       },
       "frames"_a, "sensor"_a, "onset"_a = nb::none(),
       "Takes a tare: what the untouched array reads, [e], as medians over the frames. With onset,\n"

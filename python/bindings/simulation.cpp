@@ -14,11 +14,11 @@ using namespace nb::literals;
 
 namespace {
 
-ArrayRecording simulate(const PathLike& letter_or_file,
-                        const std::optional<ArrayLike>& T_object_sensor,
-                        const std::optional<ArrayLike>& T_object_robot,
-                        const std::optional<ArrayLike>& elements_mm, std::uint64_t seed,
-                        const SensorModel& model) {
+RecordingObject simulate(const PathLike& letter_or_file,
+                         const std::optional<ArrayLike>& T_object_sensor,
+                         const std::optional<ArrayLike>& T_object_robot,
+                         const std::optional<ArrayLike>& elements_mm, std::uint64_t seed,
+                         const SensorModel& model) {
   const std::vector<Pose> poses =
       T_object_sensor ? poses_of(*T_object_sensor, "T_object_sensor") : training_grid();
   const std::vector<glm::dvec2> elements =
@@ -26,7 +26,7 @@ ArrayRecording simulate(const PathLike& letter_or_file,
   const std::optional<Pose> object =
       T_object_robot ? std::optional(pose_of(*T_object_robot, "T_object_robot")) : std::nullopt;
   const std::string shape = letter_or_file.text();
-  return array_recording(run([&] {
+  return to_python(run([&] {
     const Shape made = make_shape(shape);
     Simulator simulator(made, model, elements, seed);
     std::vector<Pose> T_robot_sensor = poses;

@@ -1,154 +1,185 @@
 #include "touches.hpp"
 
-#include <fmt/format.h>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <utility>
 
+#include <fmt/format.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/vector.h>
+
+#include "bindings.hpp"
+#include "call.hpp"
 #include "palpate/error.hpp"
+#include "palpate/files.hpp"
 
 namespace palpate::python {
 
+using namespace nb::literals;
+
 namespace {
 
-/// Row i of an array [n, e...], where it has one more axis than `rank`; else all of it.
+constexpr const char* classes = "palpate._recording";
+
+bool is_a(PyObject* object, const char* name) {
+  return nb::isinstance(object, nb::module_::import_(classes).attr(name));
+}
+
+/// An attribute's array; none for None.
 template <typename Value>
-Array<Value> row(const Array<Value>& array, std::size_t rank, std::size_t i) {
-  return array.shape.size() == rank ? array : in_place<Value>(array.object[i]);
+std::optional<Array<Value>> array_in(nb::handle of, const char* name) {
+  nb::object array = of.attr(name);
+  return array.is_none() ? std::nullopt : std::optional(in_place<Value>(std::move(array)));
+}
+
+template <typename Row>
+std::vector<Row> copied(nb::handle of, const char* name) {
+  const auto array = array_in<NumberOf<Row>>(of, name);
+  return array ? array->template copied<Row>() : std::vector<Row>();
 }
 
 template <typename Value>
-std::span<const Value> bytes_row(const std::optional<Array<Value>>& array, std::size_t i,
-                                 std::size_t elements) {
-  if (!array) {
-    return {};
+Value value_in(nb::handle of, const char* name) {
+  return value_of<Value>(of.attr(name), fmt::format("{}: a value of another type", name));
+}
+
+/// Views of [n] rows of an attribute's array, each of `each` items; of an array of one row, the
+/// same for all.
+template <typename Row>
+auto rows_of(nb::handle of, const char* name, std::size_t each) {
+  const auto array = array_in<NumberOf<Row>>(of, name);
+  const std::span<const Row> all = array ? array->template rows<Row>() : std::span<const Row>();
+  return
+      [all, each](std::size_t i) { return all.size() <= each ? all : all.subspan(i * each, each); };
+}
+
+/// [n] touches of e elements, whose arrays the object keeps.
+void add_touches(nb::handle of, std::size_t n, std::size_t e, std::vector<Touch>& touches) {
+  const auto pose = rows_of<Pose>(of, "T_robot_sensor", 1);
+  const auto elements_mm = rows_of<glm::dvec2>(of, "elements_mm", e);
+  const auto pressure = rows_of<double>(of, "pressure", e);
+  const auto valid = rows_of<std::uint8_t>(of, "valid", e);
+  for (std::size_t i = 0; i < n; ++i) {
+    touches.push_back({pose(i).front(), elements_mm(i), pressure(i), valid(i)});
   }
-  return array->values().subspan(array->shape.size() == 1 ? 0 : i * elements, elements);
 }
 
-/// An array over a vector's memory, which it takes over.
+/// The vector's memory as an array, or None where it is empty.
 template <typename Row, std::size_t rank>
-auto taken(std::vector<Row> rows, const std::size_t (&shape)[rank]) {
-  return in_place<NumberOf<Row>>(owned(std::move(rows), shape));
-}
-
-template <typename Value>
-std::vector<Value> vector_of(const std::optional<Array<Value>>& array) {
-  return array ? array->copied() : std::vector<Value>();
+nb::object array_or_none(std::vector<Row>& rows, const std::size_t (&shape)[rank]) {
+  return rows.empty() ? nb::none() : nb::object(owned(std::move(rows), shape));
 }
 
 }  // namespace
 
-Touch ArrayTouch::touch() const {
-  return {.T_robot_sensor = as_poses(T_robot_sensor).front(),
-          .elements_mm = as_points(elements_mm),
-          .pressure = pressure.values(),
-          .valid = valid ? valid->values() : std::span<const std::uint8_t>()};
-}
-
-void ArrayTouch::keep(std::vector<nb::object>& kept) const {
-  kept.insert(kept.end(), {elements_mm.object, pressure.object});
-  if (valid) {
-    kept.push_back(valid->object);
-  }
-}
-
-Touch ArrayRecording::touch(std::size_t i) const {
-  const auto places = as_points(elements_mm);
-  return {.T_robot_sensor = as_poses(T_robot_sensor)[i],
-          .elements_mm =
-              elements_mm.shape.size() == 2 ? places : places.subspan(i * elements(), elements()),
-          .pressure = pressure.values().subspan(i * elements(), elements()),
-          .valid = bytes_row(valid, i, elements())};
-}
-
-ArrayTouch ArrayRecording::array_touch(std::size_t i) const {
-  return {.T_robot_sensor = row(T_robot_sensor, 1, i),
-          .elements_mm = row(elements_mm, 2, i),
-          .pressure = row(pressure, 1, i),
-          .valid = valid ? std::optional(row(*valid, 1, i)) : std::nullopt};
-}
-
-std::vector<Touch> ArrayRecording::touches(std::size_t begin, std::size_t end) const {
-  std::vector<Touch> touches;
-  for (std::size_t i = begin; i < end; ++i) {
-    touches.push_back(touch(i));
-  }
-  return touches;
-}
-
-void ArrayRecording::keep(std::vector<nb::object>& kept) const {
-  kept.insert(kept.end(), {T_robot_sensor.object, pressure.object, elements_mm.object});
-  if (valid) {
-    kept.push_back(valid->object);
-  }
-}
-
-Recording ArrayRecording::copied() const {
-  const auto poses = as_poses(T_robot_sensor);
-  const auto places = as_points(elements_mm);
-  Recording copy = static_cast<const Recording&>(*this);
-  copy.T_robot_sensor = {poses.begin(), poses.end()};
-  copy.pressure = pressure.copied();
-  copy.elements_mm = {places.begin(), places.end()};
-  copy.valid = vector_of(valid);
-  copy.time_s = vector_of(time_s);
-  copy.baseline = vector_of(baseline);
-  copy.device_time_s = vector_of(device_time_s);
-  copy.lost_before = vector_of(lost_before);
-  return copy;
-}
-
-ArrayRecording array_recording(Recording recording) {
-  const std::size_t n = recording.size();
-  const std::size_t e = recording.elements();
-  const auto optional = [](auto& values, const auto&... shape) {
-    using Value = typename std::decay_t<decltype(values)>::value_type;
-    return values.empty() ? std::nullopt
-                          : std::optional<Array<Value>>(taken(std::move(values), shape...));
-  };
-  const std::size_t frames[] = {n};
-  const std::size_t array[] = {e};
-  const std::size_t all[] = {n, e};
-  ArrayRecording result;
-  const bool moves = recording.elements_mm.size() != e;
-  result.elements_mm = moves ? taken(std::move(recording.elements_mm), {n, e, 2})
-                             : taken(std::move(recording.elements_mm), {e, 2});
-  result.valid = recording.valid.size() > e ? optional(recording.valid, all)
-                                            : optional(recording.valid, array);
-  result.T_robot_sensor = taken(std::move(recording.T_robot_sensor), {n, 3});
-  result.pressure = taken(std::move(recording.pressure), {n, e});
-  result.time_s = optional(recording.time_s, frames);
-  result.baseline = optional(recording.baseline, array);
-  result.device_time_s = optional(recording.device_time_s, frames);
-  result.lost_before = optional(recording.lost_before, frames);
-  static_cast<Recording&>(result) = std::move(recording);
-  return result;
-}
+bool is_touch(PyObject* object) { return is_a(object, "Touch"); }
+bool is_recording(PyObject* object) { return is_a(object, "Recording"); }
 
 TouchViews views_of(nb::handle touches) {
-  TouchViews views;
-  if (const ArrayTouch* touch = nullptr; nb::try_cast(touches, touch) && touch != nullptr) {
-    views.touches.push_back(touch->touch());
-    touch->keep(views.kept);
+  TouchViews views{.touches = {}, .kept = nb::borrow(touches)};
+  if (is_recording(touches.ptr())) {
+    const auto shape = array_in<double>(touches, "pressure")->shape;
+    add_touches(touches, shape[0], shape[1], views.touches);
     return views;
   }
-  if (const ArrayRecording* recording = nullptr;
-      nb::try_cast(touches, recording) && recording != nullptr) {
-    views.touches = recording->touches(0, recording->size());
-    recording->keep(views.kept);
-    return views;
-  }
-  const nb::object all = call("builtins", "list", touches);
-  for (const nb::handle item : all) {
-    const ArrayTouch* touch = nullptr;
-    if (!nb::try_cast(item, touch) || touch == nullptr) {
+  // A list of its own, which the progress cannot change.
+  views.kept = call("builtins", "list",
+                    is_touch(touches.ptr()) ? nb::make_tuple(touches) : nb::borrow(touches));
+  for (const nb::handle item : views.kept) {
+    if (!is_touch(item.ptr())) {
       throw Error(Fault::input,
                   fmt::format("touches: item {} is a {}; give a Touch, a Recording or an iterable "
                               "of Touch",
                               views.touches.size(), nb::inst_name(item).c_str()));
     }
-    views.touches.push_back(touch->touch());
-    touch->keep(views.kept);
+    add_touches(item, 1, array_in<double>(item, "pressure")->size(), views.touches);
   }
   return views;
+}
+
+Recording recording_of(const RecordingObject& given) {
+  return {.path = value_in<std::string>(given, "path"),
+          .object = value_in<std::string>(given, "object"),
+          .pressure_unit = value_in<std::string>(given, "pressure_unit"),
+          .rows = value_in<std::string>(given, "rows"),
+          .T_robot_sensor = copied<Pose>(given, "T_robot_sensor"),
+          .pressure = copied<double>(given, "pressure"),
+          .elements_mm = copied<glm::dvec2>(given, "elements_mm"),
+          .valid = copied<std::uint8_t>(given, "valid"),
+          .time_s = copied<double>(given, "time_s"),
+          .truth = value_in<std::optional<Truth>>(given, "truth"),
+          .findings = value_in<std::vector<SetupFinding>>(given, "_findings"),
+          .sensor = value_in<std::string>(given, "sensor"),
+          .serial = value_in<std::string>(given, "serial"),
+          .baseline = copied<double>(given, "baseline"),
+          .device_time_s = copied<double>(given, "device_time_s"),
+          .lost_before = copied<std::uint64_t>(given, "lost_before"),
+          .closed = value_in<bool>(given, "closed")};
+}
+
+RecordingObject to_python(Recording recording) {
+  const std::size_t n = recording.size();
+  const std::size_t e = recording.elements();
+  const bool moves = recording.elements_mm.size() != e;
+  const bool flags_each = recording.valid.size() > e;
+  nb::dict fields;
+  fields["elements_mm"] = moves ? nb::object(owned(std::move(recording.elements_mm), {n, e, 2}))
+                                : nb::object(owned(std::move(recording.elements_mm), {e, 2}));
+  fields["valid"] =
+      flags_each ? array_or_none(recording.valid, {n, e}) : array_or_none(recording.valid, {e});
+  fields["T_robot_sensor"] = owned(std::move(recording.T_robot_sensor), {n, 3});
+  fields["pressure"] = owned(std::move(recording.pressure), {n, e});
+  fields["time_s"] = array_or_none(recording.time_s, {n});
+  fields["baseline"] = array_or_none(recording.baseline, {e});
+  fields["device_time_s"] = array_or_none(recording.device_time_s, {n});
+  fields["lost_before"] = array_or_none(recording.lost_before, {n});
+  fields["path"] = recording.path;
+  fields["object"] = recording.object;
+  fields["pressure_unit"] = recording.pressure_unit;
+  fields["rows"] = recording.rows;
+  fields["truth"] = recording.truth;
+  fields["sensor"] = recording.sensor;
+  fields["serial"] = recording.serial;
+  fields["closed"] = recording.closed;
+  fields["_findings"] = recording.findings;
+  return nb::borrow<RecordingObject>(
+      nb::module_::import_(classes).attr("Recording").attr("_of")(fields));
+}
+
+void bind_touches(nb::module_& module) {
+  nb::class_<SetupFinding>(module, "SetupFinding", "What a recording's logs showed.");
+  nb::class_<Truth>(module, "Truth", "The true identity and pose of an unknown object.")
+      .def(
+          "__init__",
+          [](Truth* self, const std::string& object, const ArrayLike& T_object_robot) {
+            new (self) Truth{object, pose_of(T_object_robot, "T_object_robot")};
+          },
+          "object"_a, "T_object_robot"_a, "T_object_robot [3] (x_mm, y_mm, theta_rad).")
+      .def_ro("object", &Truth::object, "The label of the object.")
+      .def_prop_ro("T_object_robot", array_of(&Truth::T_object_robot),
+                   "[3] (x_mm, y_mm, theta_rad).")
+      .def("__repr__", &repr_of);
+  module.def(
+      "write_recording",
+      [](const PathLike& file, const RecordingObject& recording) {
+        const Recording copy = recording_of(recording);
+        const std::filesystem::path path = file.path();
+        run([&] { write_recording(path, copy); });
+      },
+      "path"_a, "recording"_a, "Writes a recording file (HDF5), whole or not at all.");
+  module.def(
+      "read_recording",
+      [](const PathLike& file) {
+        const std::filesystem::path path = file.path();
+        return to_python(run([&] { return read_recording(path); }));
+      },
+      "path"_a,
+      "Reads a recording file (HDF5); of an unclosed file, the whole rows. Raises Error naming\n"
+      "file, field and remedy, also where a shape is larger than what is stored of it. A file "
+      "that\n"
+      "is damaged so that libhdf5 crashes or loops takes this process with it: check files of\n"
+      "unknown origin with the command `palpate info FILE` first.");
 }
 
 }  // namespace palpate::python

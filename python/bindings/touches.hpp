@@ -1,6 +1,5 @@
 #pragma once
 
-#include <optional>
 #include <vector>
 
 #include <nanobind/nanobind.h>
@@ -10,56 +9,35 @@
 
 namespace palpate::python {
 
-/// A touch whose arrays are NumPy's.
-struct ArrayTouch {
-  Floats T_robot_sensor;  ///< [3]
-  Floats elements_mm;     ///< [e, 2]
-  Floats pressure;        ///< [e]
-  std::optional<Bytes> valid;
+bool is_touch(PyObject* object);
+bool is_recording(PyObject* object);
 
-  Touch touch() const;
-  /// Adds the objects that touch() depends on.
-  void keep(std::vector<nb::object>& kept) const;
+// The classes of palpate._recording, whose arrays are NumPy's.
+struct TouchObject : nb::object {
+  NB_OBJECT_DEFAULT(TouchObject, nb::object, "palpate._recording.Touch", is_touch)
 };
-
-/// A recording whose arrays are NumPy's, in the place of Recording's own, which are empty.
-struct ArrayRecording : Recording {
-  Floats T_robot_sensor;  ///< [n, 3]
-  Floats pressure;        ///< [n, e]
-  Floats elements_mm;     ///< [e, 2] or [n, e, 2]
-  std::optional<Bytes> valid;
-  std::optional<Floats> time_s;
-  std::optional<Floats> baseline;
-  std::optional<Floats> device_time_s;
-  std::optional<Counts> lost_before;
-
-  std::size_t size() const { return pressure.shape[0]; }
-  std::size_t elements() const { return pressure.shape[1]; }
-  Touch touch(std::size_t i) const;
-  ArrayTouch array_touch(std::size_t i) const;
-  std::vector<Touch> touches(std::size_t begin, std::size_t end) const;
-  void keep(std::vector<nb::object>& kept) const;
-  /// A copy, for writing.
-  Recording copied() const;
+struct RecordingObject : nb::object {
+  NB_OBJECT_DEFAULT(RecordingObject, nb::object, "palpate._recording.Recording", is_recording)
 };
-
-/// Takes over the recording's memory.
-ArrayRecording array_recording(Recording recording);
-
-/// A Touch, a Recording, or an iterable of touches. Named with their module, which
-/// palpate.reference is not.
+/// A Touch, a Recording, or an iterable of touches.
 struct TouchesLike : nb::object {
   NB_OBJECT_DEFAULT(TouchesLike, nb::object,
-                    "palpate._palpate.Touch | palpate._palpate.Recording | "
-                    "collections.abc.Iterable[palpate._palpate.Touch]",
+                    "palpate._recording.Touch | palpate._recording.Recording | "
+                    "collections.abc.Iterable[palpate._recording.Touch]",
                     any_object)
 };
 
-/// Views of touches, and the objects whose memory they see.
+/// Views of touches, and the object that keeps their memory.
 struct TouchViews {
   std::vector<Touch> touches;
-  std::vector<nb::object> kept;
+  nb::object kept;
 };
+/// Throws Error where an item is no touch.
 TouchViews views_of(nb::handle touches);
+
+/// A copy, without the GIL's need.
+Recording recording_of(const RecordingObject& recording);
+/// Takes over the recording's memory.
+RecordingObject to_python(Recording recording);
 
 }  // namespace palpate::python

@@ -46,12 +46,16 @@ nb::object call(const char* module, const char* function, Arguments&&... argumen
   return nb::module_::import_(module).attr(function)(std::forward<Arguments>(arguments)...);
 }
 
-// The methods `plot` and `_repr_png_`, which palpate.plots implements in Python.
+// Methods that are implemented in Python.
 
 inline nb::object plot_method(nb::handle self, nb::handle ax) {
   return call("palpate.plots", "plot", self, ax);
 }
 inline nb::object png_method(nb::handle self) { return call("palpate.plots", "png", self); }
+/// Class(name=value, ...), by the properties.
+inline nb::str repr_of(nb::handle self) {
+  return nb::str(call("palpate.results", "text_of", self));
+}
 inline const nb::sig plot_signature(
     "def plot(self, ax: matplotlib.axes.Axes | None = None) -> matplotlib.axes.Axes");
 inline const nb::sig png_signature("def _repr_png_(self) -> bytes | None");

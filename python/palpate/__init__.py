@@ -36,12 +36,10 @@ from ._palpate import (
     PoseHistogram as PoseHistogram,
     PoseLattice as PoseLattice,
     PoseSample as PoseSample,
-    Recording as Recording,
     RefinedPose as RefinedPose,
     Resampling as Resampling,
     Sensor as Sensor,
     SensorModel as SensorModel,
-    Touch as Touch,
     TouchDetector as TouchDetector,
     TouchGains as TouchGains,
     Truth as Truth,
@@ -52,7 +50,6 @@ from ._palpate import (
     estimate_prior as estimate_prior,
     grid_array as grid_array,
     inverse as inverse,
-    keep_touches as keep_touches,
     measure_symmetry as measure_symmetry,
     open_sensor as open_sensor,
     pose_error_mm as pose_error_mm,
@@ -66,14 +63,16 @@ from ._palpate import (
     transform as transform,
 )
 from ._bag import read_bag as read_bag
+from ._recording import Recording as Recording, Touch as Touch
 from .commands import (
+    LearnedMaps as LearnedMaps,
     calibrate as calibrate,
     check_setup as check_setup,
     evaluate as evaluate,
     import_tables as import_tables,
+    learn_maps as learn_maps,
     plan as plan,
 )
-from .learning import LearnedMaps as LearnedMaps, learn_maps as learn_maps
 from .many import (
     Recognized as Recognized,
     Task as Task,

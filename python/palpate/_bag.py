@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from . import _palpate
 from ._error import Error
-from ._palpate import Recording
-from .recognition import _Path, array_option, filled, warn
+from ._recording import Recording
+from .recognition import _Path, import_request, warn
 
 # The build writes the stubs by importing the package, where there is no NumPy.
 if TYPE_CHECKING:
@@ -86,20 +86,15 @@ def read_frames(
     if truth_tf is not None and pose_topic is None and tf is None:
         raise Error("truth_tf: needs the sensor's poses in the same frame; give pose_topic or tf")
     name = os.fsdecode(log)
-    text, elements_mm = array_option(array)
     names = [pressure_topic] if isinstance(pressure_topic, str) else list(pressure_topic)
-    plane = options["plane"]
     source = pose_topic or (":".join(tf) if tf else "")
     options |= {
-        "array": text,
+        "array": array,
         "pressures": f"{name}: {', '.join(names)}",
         "poses": f"{name}: {source}" if source else "",
-        "dead": ",".join(map(str, options["dead"])),
-        "plane": plane if isinstance(plane, str) else ",".join(map(str, plane)),
         "pose_delay": pose_delay,
-        "mount": None if options["mount"] is None else ",".join(map(str, options["mount"])),
     }
-    request = filled(_palpate.ImportOptions(), read_bag, options)
+    request, elements_mm = import_request(read_bag, options)
     _palpate.require_sound(request, elements_mm)
     with opened(name) as bag:
         pads = [bag.pressures(topic, pressure_field) for topic in names]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy
 from numpy.typing import NDArray
 
-from ._bag_transforms import row_of, row_of_numbers, stamp_s
+from ._bag_transforms import in_order, row_of, row_of_numbers, stamp_s
 from ._error import Error
 
 #: Fields by which an item of a list is called.
@@ -138,12 +138,7 @@ class Pressures(_Timed):
 
     def in_order(self) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64]]:
         """The frames' times [n], ascending, and their readings [n, e]."""
-        time_s = numpy.frombuffer(self.time_s)
-        rows: NDArray[numpy.float64] = numpy.frombuffer(self.values).reshape(-1, self.elements)
-        if numpy.any(time_s[1:] < time_s[:-1]):
-            order = numpy.argsort(time_s, kind="stable")
-            time_s, rows = time_s[order], rows[order]
-        return time_s, rows
+        return in_order(self.time_s, self.values, self.elements)
 
 
 def together(

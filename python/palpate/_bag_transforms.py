@@ -50,6 +50,16 @@ def stamp_s(stamp: Any) -> float:
     return float(stamp.sec) + 1e-9 * float(stamp.nanosec)
 
 
+def in_order(times: "numbers[float]", values: "numbers[float]", width: int) -> tuple[Rows, Rows]:
+    """Times [n], ascending, and rows [n, width] of values that lie one behind the other."""
+    time_s: Rows = numpy.frombuffer(times)
+    rows: Rows = numpy.frombuffer(values).reshape(-1, width)
+    if numpy.any(time_s[1:] < time_s[:-1]):
+        order = numpy.argsort(time_s, kind="stable")
+        time_s, rows = time_s[order], rows[order]
+    return time_s, rows
+
+
 @dataclass
 class _Edge:
     """T_parent_child over time; of a static one there is a single row."""
@@ -62,12 +72,7 @@ class _Edge:
 
     def log(self) -> tuple[Rows, Rows]:
         """Times, ascending, and rows."""
-        time_s: Rows = numpy.frombuffer(self.time_s)
-        rows: Rows = numpy.frombuffer(self.rows).reshape(-1, 7)
-        if numpy.any(time_s[1:] < time_s[:-1]):
-            order = numpy.argsort(time_s, kind="stable")
-            time_s, rows = time_s[order], rows[order]
-        return time_s, rows
+        return in_order(self.time_s, self.rows, 7)
 
 
 def _gap_s(time_s: Rows) -> float:

@@ -19,14 +19,14 @@ Json = dict[str, Any]
 def begin(options: argparse.Namespace, **own: object) -> tuple[Device, Json]:
     """Opens the device, and prints the facts that explain a run's numbers, a program's `own` among them.
 
-    What cannot be written is known before the minutes of work: the options csv and plots name folders,
-    json and html files. Raises Error where an output cannot be written, or the device not be opened.
+    What cannot be written is known before the minutes of work: the option plots names a folder, json a file.
+    Raises Error where an output cannot be written, or the device not be opened.
     """
     for flag, value in vars(options).items():
         try:
-            if flag in ("csv", "plots") and value:
+            if flag == "plots" and value:
                 os.makedirs(value, exist_ok=True)
-            if flag in ("json", "html") and value:
+            if flag == "json" and value:
                 pathlib.Path(_part(value)).touch()
                 os.remove(_part(value))
         except OSError as error:

@@ -30,7 +30,7 @@ class Data:
     options: dict[str, Any]
     maps: dict[tuple[str, bool], Hypothesis] = field(default_factory=dict)
     auto_pivot: bool = False
-    entries: list[tuple[bytes, int]] = field(default_factory=list)
+    entries: list[tuple[str, int]] = field(default_factory=list)
 
     def open(self, **options: Any) -> "_palpate.OpenBatch":
         """The batch of all recordings, as `palpate batch` settles it."""
@@ -59,7 +59,7 @@ class Data:
 
         The first recording is recognised once more before, which does not count: it warms up.
         """
-        lines: list[tuple[bytes, bytes, float]] = []
+        lines: list[tuple[str, str, float]] = []
         batch.recognize([self.entries[0][0]])
         for entry, _ in self.entries:
             if len(lines) < unknowns:

@@ -108,53 +108,35 @@ def _run(arguments: argparse.Namespace) -> None:
     folder = os.path.dirname(arguments.output) or "."
     if os.path.isdir(arguments.output) or not os.access(folder, os.W_OK):
         raise Error(f"-o {arguments.output}: cannot be written; give a file in a folder that exists")
-    try:
-        dead = [int(text) for text in arguments.dead.split(",") if arguments.dead]
-    except ValueError:
-        raise Error(f"--dead {arguments.dead}: give numbers of elements, such as 13,42") from None
-    plane: Any = arguments.plane
-    if plane != "auto":
+    for flag, number, form in (
+        ("dead", int, "numbers of elements, such as 13,42"),
+        ("plane", float, "auto, or a normal such as 0,0,1"),
+        ("mount", float, "X,Y,Z,ROLL,PITCH,YAW, mm and degrees"),
+    ):
+        text = getattr(arguments, flag)
         try:
-            plane = tuple(float(text) for text in plane.split(","))
+            _ = [number(part) for part in text.split(",")] if text and text != "auto" else []
         except ValueError:
-            raise Error(f"--plane {arguments.plane}: give auto, or a normal such as 0,0,1") from None
-    mount: Any = arguments.mount
-    if mount is not None:
-        try:
-            mount = tuple(float(text) for text in mount.split(","))
-        except ValueError:
-            raise Error(f"--mount {arguments.mount}: give X,Y,Z,ROLL,PITCH,YAW, mm and degrees") from None
+            raise Error(f"--{flag} {text}: give {form}") from None
     shown = sys.stderr.isatty()
-    recording, remarks = read_frames(
-        log=arguments.log,
-        pressure_topic=arguments.pressure_topic.split(","),
-        array=arguments.array,
-        pressure_field=arguments.pressure_field,
-        pose_topic=arguments.pose_topic,
-        pose_field=arguments.pose_field,
-        mount=mount,
-        tf=_frames("--tf", arguments.tf),
-        truth_tf=_frames("--truth-tf", arguments.truth_tf),
-        first_element=arguments.first_element,
-        order=arguments.order,
-        dead=dead,
-        pressure_unit=arguments.pressure_unit,
-        sign=arguments.sign,
-        plane=plane,
-        largest_gap_s=arguments.largest_gap_s,
-        pose_delay=arguments.pose_delay,
-        object=arguments.object,
-        progress=_show_progress if shown else None,
-    )
+    options = vars(arguments) | {
+        "pressure_topic": arguments.pressure_topic.split(","),
+        "tf": _frames("--tf", arguments.tf),
+        "truth_tf": _frames("--truth-tf", arguments.truth_tf),
+        "progress": _show_progress if shown else None,
+    }
+    output = options.pop("output")
+    del options["list"]
+    recording, remarks = read_frames(**options)
     if shown:
         print("\r" + " " * 16 + "\r", end="", file=sys.stderr)
-    recording.save(arguments.output)
+    recording.save(output)
     warn(remarks)
     posed = f"{int(numpy.isfinite(recording.T_robot_sensor[:, 0]).sum())} with a pose"
     if arguments.tf is None and arguments.pose_topic is None:
         posed = "none with a pose, as neither --tf nor --pose-topic is given"
-    print(f"{arguments.output}: {len(recording)} frames of {recording.pressure.shape[1]} elements, "
-          f"{posed}; next: palpate touches {arguments.output} -o TOUCHES.h5")  # fmt: skip
+    print(f"{output}: {len(recording)} frames of {recording.pressure.shape[1]} elements, "
+          f"{posed}; next: palpate touches {output} -o TOUCHES.h5")  # fmt: skip
 
 
 def main() -> int:

@@ -1,4 +1,4 @@
-"""`palpate import`, `check`, `calibrate`, `plan` and `evaluate` as functions.
+"""`palpate import`, `check`, `calibrate`, `map`, `plan` and `evaluate` as functions.
 
 They have the commands' rules, defaults and words.
 """
@@ -6,11 +6,13 @@ They have the commands' rules, defaults and words.
 import json
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 from . import _palpate
 from ._error import Error
-from ._palpate import Device, Recording, Truth
+from ._palpate import Device, LearnedSensor, OccupancyGrid, Truth
+from ._recording import Recording
 from .many import Recognized
 from .recognition import (
     RecognitionOptions,
@@ -18,8 +20,9 @@ from .recognition import (
     _Pair,
     _Path,
     _Recordings,
-    array_option,
     filled,
+    import_request,
+    recognition_request,
     request_of,
     warn,
 )
@@ -55,7 +58,7 @@ def plan(
     Raises Error in the words of the command, also for particles, which have no belief of all poses.
     What the command would say on standard error becomes a UserWarning.
     """
-    request = _request("plan", maps, options, device, budget_ms=budget_ms)
+    request = recognition_request("plan", options, maps, budget_ms=budget_ms, device=device)
     fields, sentences = _palpate.plan(
         [recording], request, goal, candidates, samples, plan_seed, progress
     )
@@ -112,6 +115,81 @@ def calibrate(
         progress,
     )
     return SensorCalibration(fields, sensor)
+
+
+@dataclass(frozen=True)
+class LearnedMaps:
+    """Maps that learn_maps() learned, with the sensor that their touches tell.
+
+    maps: by label, of several maps of a label those of more presses first; sensor: None where the touches
+    do not tell that it is better than Eq. 7; words: what the command prints of them, line by line.
+    """
+
+    maps: list[OccupancyGrid]
+    sensor: LearnedSensor | None
+    words: list[str]
+
+
+def learn_maps(
+    recordings: _Recordings,
+    folder: _Path | None = None,
+    *,
+    cell_mm: float | None = None,
+    spread_mm: float | None = None,
+    peak: float | None = None,
+    prior: float | Literal["auto"] | None = None,
+    origin: tuple[float, float, float] | Literal["auto", "centroid", "robot"] | None = None,
+    symmetry: int | Mapping[str, int] | None = None,
+    mirror: bool = False,
+    label: str = "",
+    group: Literal["", "recording", "label"] = "",
+    unposed: bool = False,
+    max_maps: int | None = None,
+    threshold: float | None = None,
+    ratio: float | None = None,
+    sensor_model: _Path | Literal["none"] | None = None,
+    touch_sd_mm: float | None = None,
+    touch_sd_deg: float | None = None,
+    frames: tuple[int, int] | None = None,
+    device: Device | str | int | None = None,
+    progress: Callable[[float], object] | None = None,
+) -> LearnedMaps:
+    """Learns maps of objects from touches, and the sensor with them, as `palpate map` does.
+
+    Options are the flags of `palpate map`, with its defaults; `palpate map --help` explains them.
+
+    recordings: of touches, each with its `object`; folder: where to write the maps, LABEL.map.h5, and
+    the sensor, sensor.yaml, as `palpate map -o FOLDER/` does, so that recognize() with the folder takes
+    both, and the sensor is learned from the touches of all maps in it; None writes nothing. origin:
+    (x_mm, y_mm, degrees) of the object's frame in the robot frame, or a word; symmetry: n-fold, of all
+    objects or by label; frames (a, b): the touches a to b - 1; device: an open Device, or a name or index
+    as for Device.open(); touches at unknown poses use none.
+
+    Raises Error in the words of the command. What the command would say on standard error becomes a
+    UserWarning.
+    """
+    given = locals()
+    shared = ("threshold", "ratio", "sensor_model", "touch_sd_mm", "touch_sd_deg", "frames", "device")
+    own = ("cell_mm", "spread_mm", "peak", "mirror", "label", "group", "unposed", "max_maps")
+    options = {name: given[name] for name in own}
+    if folder is not None:
+        options["output"] = os.path.join(os.fsdecode(folder), "")
+    if prior is not None:
+        options["prior"] = str(prior)
+    if origin is not None:
+        options["origin"] = origin if isinstance(origin, str) else ",".join(map(str, origin))
+    if isinstance(symmetry, Mapping):
+        options["symmetry"] = ",".join(f"{name}={n}" for name, n in symmetry.items())
+    elif symmetry is not None:
+        options["symmetry"] = str(symmetry)
+    maps, sensor, words, sentences = _palpate.learn_maps(
+        recordings,
+        request_of({name: given[name] for name in shared}),
+        filled(_palpate.MapRequest(), learn_maps, options),
+        progress,
+    )
+    warn(sentences)
+    return LearnedMaps(maps, sensor, words)
 
 
 def check_setup(
@@ -228,25 +306,18 @@ def import_tables(
     differ become a UserWarning.
     """
     options = dict(locals())
-    del options["truth"]
-    options["array"], elements_mm = array_option(array)
-    options["dead"] = ",".join(map(str, dead))
-    options["plane"] = plane if isinstance(plane, str) else ",".join(map(str, plane))
-    for names in ("pose_unit", "pose_columns", "pressure_columns", "mount"):
-        if options[names] is not None and not isinstance(options[names], str):
-            options[names] = ",".join(map(str, options[names]))
+    for name in ("truth", "time_s", "pose_time_s"):
+        del options[name]
     options["where"] = [f"{name}={value}" for name, value in (where or {}).items()]
-    del options["time_s"], options["pose_time_s"]
     if isinstance(pressures, (str, bytes, os.PathLike)):
         if time_s is not None or pose_time_s is not None:
             raise Error("time_s and pose_time_s: are for arrays; a table has a column of times")
-        request = filled(_palpate.ImportOptions(), import_tables, options)
-        recording, sentences = _palpate.import_tables(request, elements_mm)
+        recording, sentences = _palpate.import_tables(*import_request(import_tables, options))
     elif isinstance(poses, (str, bytes, os.PathLike)):
         raise Error(f"poses: {os.fsdecode(poses)!r} is a file beside an array of pressures; give an array")
     else:
         options |= {"pressures": "pressures", "poses": None if poses is None else "poses"}
-        request = filled(_palpate.ImportOptions(), import_tables, options)
+        request, elements_mm = import_request(import_tables, options)
         recording, sentences = _imported_arrays(request, elements_mm, pressures, time_s, poses, pose_time_s)
     recording.truth = truth
     warn(sentences)
@@ -277,16 +348,3 @@ def _imported_arrays(
         elements_mm,
         rows,
     )
-
-
-def _request(
-    function: str,
-    maps: _Maps,
-    options: RecognitionOptions,
-    device: Device | str | int | None,
-    **own: float | None,
-) -> _palpate.Request:
-    for name in options:
-        if name not in RecognitionOptions.__annotations__:
-            raise TypeError(f"{function}() got an unexpected keyword argument '{name}'")
-    return request_of({**options, **own, "device": device}, maps)

@@ -162,14 +162,14 @@ def _paths(given: _Path | Iterable[_Path]) -> list[str]:
 class _Batch:
     """A settled batch, as workers receive it."""
 
-    head: bytes
+    head: str
     device: str  #: name of the device that it was settled on
     asked: _Asked
 
 
-_Entry = tuple[bytes, int]  # a recording, and how many unknowns it holds
+_Entry = tuple[str, int]  # a recording, and how many unknowns it holds
 #: Lines, again in Python's words where these differ, and seconds; a sentence, device, host.
-_Lines = tuple[list[tuple[bytes, bytes, float]], str, str, str]
+_Lines = tuple[list[tuple[str, str, float]], str, str, str]
 _Done = Generator[tuple[int, _Lines], None, None]  # chunks by their index
 
 
@@ -236,14 +236,15 @@ def _results(chunks: Sequence[list[_Entry]], done: _Done) -> Generator[Recognize
     first = [0]
     for chunk in chunks:
         first.append(first[-1] + sum(count for _, count in chunk))
-    told = False
+    warned = False
     with closing(done):
         for index, (lines, sentence, device, host) in done:
-            if sentence and not told:
-                told = True
+            if sentence and not warned:
+                warned = True
                 warnings.warn(sentence, stacklevel=2)
             for i, (line, own, seconds) in enumerate(lines, start=first[index]):
-                yield Recognized(i, Record(json.loads(own or line)), line, seconds, device, host)
+                record = Record(json.loads(own or line))
+                yield Recognized(i, record, line.encode(), seconds, device, host)
 
 
 # What follows runs in the workers.
@@ -269,7 +270,7 @@ def _settle(
     return _Batch(head, device.name, asked), entries, sentences
 
 
-def _recognize(entries: list[bytes], batch: _Batch, threads: int | None = None) -> _Lines:
+def _recognize(entries: list[str], batch: _Batch, threads: int | None = None) -> _Lines:
     global _opened
     batch.asked.require_folder()
     with _opening:

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy
 
 from ._error import Error
-from ._palpate import LearnedSensor, Marginals, OccupancyGrid, Recording, transform
+from ._palpate import LearnedSensor, Marginals, OccupancyGrid, transform
+from ._recording import Recording
 from .results import Evaluation, Record, Scores
 
 if TYPE_CHECKING:

@@ -4,11 +4,15 @@ import inspect
 import os
 import warnings
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any, Literal, TypedDict, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypedDict, TypeVar
 
 from . import _palpate
-from ._palpate import Device, Hypothesis, OccupancyGrid, Recording
+from ._palpate import Device, Hypothesis, OccupancyGrid
+from ._recording import Recording
 from .results import Record
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 _Path = str | bytes | os.PathLike[str] | os.PathLike[bytes]
 _Pair = tuple[float, float]
@@ -18,7 +22,7 @@ _Request = TypeVar("_Request")
 
 
 class RecognitionOptions(TypedDict, total=False):
-    """Options of recognize(), by their names, that plan() and Task have, too."""
+    """Options of recognize(), plan() and Task, by their names."""
 
     bins: tuple[int, int, int] | Literal["auto", "fine"]
     x_mm: _Pair
@@ -49,38 +53,16 @@ def recognize(
     recordings: _Recordings,
     maps: _Maps = (),
     *,
-    bins: tuple[int, int, int] | Literal["auto", "fine"] | None = None,
-    x_mm: _Pair | None = None,
-    y_mm: _Pair | None = None,
-    theta_deg: _Pair | None = None,
-    pivot_mm: _Pair | Literal["auto"] | None = None,
-    scene: _Path | None = None,
-    sensor_model: _Path | Literal["none"] | None = None,
-    prior: float | None = None,
-    gamma: float | None = None,
-    threshold: float | None = None,
-    ratio: float | None = None,
-    touch_sd_mm: float | None = None,
-    touch_sd_deg: float | None = None,
-    slip_sd_mm: float | None = None,
-    slip_sd_deg: float | None = None,
-    none: float | Literal["auto"] | None = None,
-    filter: Literal["auto", "histogram", "bounded", "particles"] | None = None,
-    tolerance: float | None = None,
     budget_ms: float | None = None,
-    evidence_nats: float | None = None,
-    act_below_mm: float | None = None,
-    act_above: float | None = None,
     particles: int | None = None,
     resampling: Literal["multinomial", "systematic"] | None = None,
     augmented: bool = False,
     seed: int | None = None,
-    frames: tuple[int, int] | None = None,
-    touches: int | None = None,
     each_frame: bool = False,
     trace: bool = False,
     device: Device | str | int | None = None,
     progress: Callable[[float], object] | None = None,
+    **options: "Unpack[RecognitionOptions]",
 ) -> list[Record]:
     """Recognises the object of each recording among known maps and finds its pose.
 
@@ -98,14 +80,24 @@ def recognize(
     would say on standard error becomes a UserWarning; what looks wrong with the touches is in the
     records' `warnings`.
     """
-    options = {
-        name: value
-        for name, value in locals().items()
-        if name not in ("recordings", "maps", "progress")
-    }
-    records, sentences = _palpate.recognize(recordings, request_of(options, maps), progress)
+    own = {name: value for name, value in locals().items() if name in recognize.__annotations__}
+    for name in ("recordings", "maps", "progress", "options"):
+        del own[name]
+    records, sentences = _palpate.recognize(
+        recordings, recognition_request("recognize", options, maps, **own), progress
+    )
     warn(sentences)
     return [Record(record) for record in records]
+
+
+def recognition_request(
+    function: str, options: RecognitionOptions, maps: _Maps, **own: object
+) -> _palpate.Request:
+    """What a function is asked by these options, and those of its own."""
+    for name in options:
+        if name not in RecognitionOptions.__annotations__:
+            raise TypeError(f"{function}() got an unexpected keyword argument '{name}'")
+    return request_of({**options, **own}, maps)
 
 
 def request_of(options: Mapping[str, object], maps: object = ()) -> _palpate.Request:
@@ -123,18 +115,26 @@ def filled(request: _Request, function: Callable[..., Any], options: Mapping[str
             try:
                 setattr(request, name, os.fsdecode(value) if path else value)
             except TypeError:
-                wanted = inspect.formatannotation(function.__annotations__[name])
+                types = RecognitionOptions.__annotations__ | function.__annotations__
+                wanted = inspect.formatannotation(types[name])
                 raise TypeError(f"{name}: {value!r}; give {wanted}") from None
     return request
 
 
-def array_option(array: Any) -> tuple[str | None, Any]:
-    """What the option `array` says as a text, or else the elements' centres."""
+def import_request(
+    function: Callable[..., Any], options: Mapping[str, Any]
+) -> tuple[_palpate.ImportOptions, Any]:
+    """What an import is asked, and the elements' centres where `array` gives these."""
+    texts = dict(options)
+    array, texts["array"] = options["array"], None
     if isinstance(array, tuple) and len(array) == 3 and isinstance(array[0], int):
-        return ":".join(map(str, array)), None
-    if isinstance(array, (str, bytes, os.PathLike)):
-        return os.fsdecode(array), None
-    return None, array
+        texts["array"], array = ":".join(map(str, array)), None
+    elif isinstance(array, (str, bytes, os.PathLike)):
+        texts["array"], array = array, None
+    for name in ("dead", "plane", "mount", "pose_unit", "pose_columns", "pressure_columns"):
+        if isinstance(given := texts.get(name), Iterable) and not isinstance(given, str):
+            texts[name] = ",".join(map(str, given))
+    return filled(_palpate.ImportOptions(), function, texts), array
 
 
 def warn(sentences: list[str]) -> None:

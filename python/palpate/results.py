@@ -10,6 +10,20 @@ if TYPE_CHECKING:
     from ._palpate import LearnedSensor
 
 
+def text_of(shown: object) -> str:
+    """Class(name=value, ...), by the properties of a class of C++; arrays to three digits."""
+
+    def text(value: Any) -> str:
+        if hasattr(value, "dtype"):
+            import numpy
+
+            return numpy.array2string(value, precision=3, threshold=8, separator=", ")
+        return f"{value:.6g}" if isinstance(value, float) else repr(value)
+
+    names = [name for name, of in vars(type(shown)).items() if isinstance(of, property)]
+    return f"{type(shown).__name__}({', '.join(f'{name}={text(getattr(shown, name))}' for name in names)})"
+
+
 class Fields(dict[str, Any]):
     """A JSON object whose keys are attributes, too; lists of numbers are arrays as attributes."""
 

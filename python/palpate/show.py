@@ -10,7 +10,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from ._error import Error
-from ._palpate import Marginals, OccupancyGrid, Recording
+from ._palpate import Marginals, OccupancyGrid
+from ._recording import Recording
 from .results import Record
 
 if TYPE_CHECKING:

@@ -3,7 +3,8 @@
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from ._palpate import DetectedTouch, Frame, Sensor, Touch, TouchDetector, baseline_of
+from ._palpate import DetectedTouch, Frame, Sensor, TouchDetector, baseline_of
+from ._recording import Touch
 
 # The build writes the stubs by importing the package, where there is no NumPy.
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ import math
 import os
 import time
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy
 
@@ -22,12 +22,19 @@ from ._sweep_runs import Data, Document, Run, counts_of, lattices_of, measure
 from ._tables import (
     Column,
     Table,
+    column,
     count_text,
     mean_text,
     number,
     plain,
     seconds_text,
 )
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+#: The files of --plots, without their endings.
+CHARTS = ("sweep_own_bins", "sweep_own_time")
 _LEAST_TRUE_POSES = 3  # by which errors are judged
 
 
@@ -198,6 +205,42 @@ def _advice(
     )
 
 
+def _charts_of(document: Document) -> "dict[str, Figure]":
+    """The charts of a sweep: error and time against bins."""
+    from . import _charts as charts
+
+    points = document["points"]
+    truth_known = document["true_poses"] > 0
+    counts = column(points, "count")
+    y = "mean pose error (mm)" if truth_known else "mean distance from the pose of the finest bins (mm)"
+    errors, times = (
+        charts.chart("bins per object", of, xscale="log", yscale="log")
+        for of in (y, "time per unknown")
+    )
+    charts.ticks(times.yaxis, seconds_text, (1.0, 2.0, 5.0))
+    field = "error_mm" if truth_known else "from_finest_mm"
+    spread: Document = {"color": charts.GREY, "linestyle": ":", "marker": ""}
+    for axes, path, label, look in (
+        (errors, f"{field}/mean", "mode", charts.SOLID),
+        (errors, f"refined_{field}/mean", "refined pose", charts.DASHED),
+        (errors, "sd_mm", "standard deviation of x and y, median", spread),
+        (times, "seconds_histogram", "histogram", charts.SOLID),
+        (times, "seconds_bounds", "by bounds", charts.DASHED),
+    ):
+        axes.plot(counts, column(points, path), label=label, **look)
+    for name, label, colour in (
+        ("auto_count", "--bins auto", charts.GREY),
+        ("fine_count", "--bins fine", charts.GREY),
+        ("refined_count", "enough", "black"),
+    ):
+        at = document[name]
+        if at is not None and counts[0] <= at <= counts[-1]:
+            charts.rule(errors, at, label, vertical=True, colour=colour)
+    for axes in (errors, times):
+        charts.ticks(axes.xaxis, count_text)
+    return dict(zip(CHARTS, map(charts.finished, (errors, times)), strict=True))
+
+
 def _pair(flag: str, text: str | None) -> tuple[float, float] | str | None:
     """LOWER:UPPER, or X,Y or auto of a pivot. Raises Error."""
     pivot = flag == "--pivot-mm"
@@ -250,7 +293,7 @@ def _run() -> None:
         options[name] = _pair("--" + name.replace("_", "-"), given[name])
     if arguments.plots:
         try:
-            from . import _charts, _sweep_charts
+            from ._charts import save
         except ImportError as missing:
             raise Error("--plots: Matplotlib is missing; pip install 'palpate[plot]'") from missing
     device, facts = begin(arguments, palpate=__version__)
@@ -266,7 +309,7 @@ def _run() -> None:
     document["seconds in all"] = round(time.perf_counter() - start, 1)
     print(f"\n{document['advice']}")
     if arguments.plots:
-        _charts.save(_sweep_charts.draw(document), arguments.plots)
+        save(_charts_of(document), arguments.plots)
     write(arguments.json, document)
 
 

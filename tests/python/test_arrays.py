@@ -40,6 +40,15 @@ def test_slices_and_touches_share_the_memory() -> None:
     assert [len(touch.pressure) for touch in recording] == [6, 6, 6, 6]  # ends by itself
 
 
+def test_arrays_that_were_checked_stay() -> None:
+    recording = palpate.Recording(**arrays())
+    for checked in (recording, recording[0]):
+        with pytest.raises(AttributeError, match=f"pressure of a {type(checked).__name__} cannot be set"):
+            checked.pressure = numpy.zeros(1)
+    recording.object = "mug"
+    assert recording[1:].object == "mug"
+
+
 def test_a_slice_has_the_rows_of_every_array() -> None:
     rows = {"valid": numpy.eye(4, 6, dtype=bool), "time_s": numpy.arange(4.0),
             "device_time_s": numpy.arange(4.0) * 2, "lost_before": numpy.arange(4)}  # fmt: skip

@@ -120,7 +120,8 @@ def test_a_call_keeps_what_it_reads(device: palpate.Device) -> None:
 
 # A daemon thread is in a call when the interpreter ends.
 ENDING = """
-builder, grid, belief = begun(palpate.Device.open(name))
+device = palpate.Device.open(name)
+builder, grid, belief = begun(device)
 sensor = palpate.open_sensor("simulate:E,rate=1")
 sensor.start()
 at_work = threading.Event()
@@ -128,17 +129,23 @@ at_work = threading.Event()
 def update():
     belief.update([*touches] * 20, progress=lambda fraction: at_work.set())
 
+def recognize(filter):
+    palpate.recognize([touches] * 20, grid, bins=(60, 60, 60), filter=filter, device=device,
+                      progress=lambda fraction: at_work.set())
+
 def sense():
     at_work.set()
     while True:
         sensor.next()
 
-threading.Thread(target={"update": update, "sensor": sense}[sys.argv[1]], daemon=True).start()
+work = {"update": update, "histogram": lambda: recognize("histogram"), "bounds": lambda: recognize("bounded"),
+        "sensor": sense}[sys.argv[1]]
+threading.Thread(target=work, daemon=True).start()
 at_work.wait()
 """
 
 
-@pytest.mark.parametrize("work", ["update", "sensor"])
+@pytest.mark.parametrize("work", ["update", "histogram", "bounds", "sensor"])
 def test_the_interpreter_ends_while_daemon_threads_are_in_calls(work: str) -> None:
     done = run(ENDING, work)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")

@@ -12,7 +12,7 @@ from program import Done, run_program
 
 import palpate
 from palpate import _program, sweep
-from palpate._sweep_charts import CHARTS
+from palpate.sweep import CHARTS
 
 DEVICE = ("--device", "llvmpipe")
 

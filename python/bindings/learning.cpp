@@ -1,3 +1,5 @@
+// `palpate calibrate`, `palpate check` and `palpate map`.
+
 #include <string>
 #include <tuple>
 #include <vector>
@@ -11,6 +13,7 @@
 #include "bindings.hpp"
 #include "json.hpp"
 #include "learning/calibration_task.hpp"
+#include "learning/map_task.hpp"
 #include "learning/setup_check.hpp"
 #include "model/element_spacing.hpp"
 #include "model/option_words.hpp"
@@ -58,8 +61,8 @@ void bind_learned_sensor(nb::module_& module) {
       .def_prop_ro(
           "stranger_alone",
           [](const LearnedSensor& self) {
-            const auto& alone = self.fit_scale ? self.fit_scale->stranger_alone : std::nullopt;
-            return alone ? std::optional(std::tuple(alone->mean, alone->sd)) : std::nullopt;
+            const auto& fit = self.fit_scale ? self.fit_scale->stranger_alone : std::nullopt;
+            return fit ? std::optional(std::tuple(fit->mean, fit->sd)) : std::nullopt;
           },
           "(mean, standard deviation) of fit.z of one touch where the object was never learned;\n"
           "None where fewer than three objects tell it.")
@@ -100,9 +103,8 @@ void bind_learned_sensor(nb::module_& module) {
       });
 }
 
-SensorCalibration calibrate(const GivenRecordings& given, PythonRequest request,
+SensorCalibration calibrate(const std::vector<Recording>& recordings, PythonRequest request,
                             const CalibrationRequest& wanted, const Report& report) {
-  const std::vector<Recording> recordings = read_recordings(given);
   if (request.given_maps.empty()) {
     read_maps(request);
   }
@@ -135,19 +137,18 @@ Json to_json(const SensorCalibration& calibration) {
   return json;
 }
 
-std::tuple<Fields, LearnedSensor> calibrate_python(nb::handle recordings,
-                                                   const PythonRequest& request,
+std::tuple<Fields, LearnedSensor> calibrate_python(nb::handle given, const PythonRequest& request,
                                                    const CalibrationRequest& wanted,
                                                    const Progress& progress) {
-  const GivenRecordings given = given_recordings(recordings);
-  const SensorCalibration calibration = run(
-      progress, [&](const Report& report) { return calibrate(given, request, wanted, report); });
+  const std::vector<Recording> recordings = recordings_of(given);
+  const SensorCalibration calibration = run(progress, [&](const Report& report) {
+    return calibrate(recordings, request, wanted, report);
+  });
   return {fields_of(to_json(calibration)), calibration.sensor};
 }
 
-Json check(const GivenRecordings& given, const PythonRequest& request, double cell_mm,
+Json check(const std::vector<Recording>& recordings, const PythonRequest& request, double cell_mm,
            std::optional<double> spread_mm, const Report& report) {
-  const std::vector<Recording> recordings = read_recordings(given);
   const Recording& first = recordings.front();
   MapOptions options{.cell_mm = cell_mm,
                      .sensor = {.spread_mm = spread_mm ? *spread_mm : usual_spread_mm(recordings)}};
@@ -168,17 +169,71 @@ Json check(const GivenRecordings& given, const PythonRequest& request, double ce
   return json;
 }
 
-Fields check_python(nb::handle recordings, const PythonRequest& request, double cell_mm,
+Fields check_python(nb::handle given, const PythonRequest& request, double cell_mm,
                     std::optional<double> spread_mm, const Progress& progress) {
-  const GivenRecordings given = given_recordings(recordings);
+  const std::vector<Recording> recordings = recordings_of(given);
   return fields_of(run(progress, [&](const Report& report) {
-    return check(given, request, cell_mm, spread_mm, report);
+    return check(recordings, request, cell_mm, spread_mm, report);
   }));
+}
+
+LearnedMaps learn(const std::vector<Recording>& recordings, const MapRequest& request,
+                  const std::shared_ptr<Device>& open_device, const Report& report) {
+  const MapTask task = map_task(request, recordings);
+  std::shared_ptr<Device> device;
+  LearnedMaps learned = learn_maps(
+      task,
+      [&]() -> Device& {
+        device = device_of(open_device, request.shared.device);
+        return *device;
+      },
+      report);
+  learned.remarks.insert(learned.remarks.begin(), task.remarks.begin(), task.remarks.end());
+  if (!request.output.empty()) {
+    save(request, learned);
+  }
+  return learned;
+}
+
+using Learned = std::tuple<std::vector<OccupancyGrid>, std::optional<LearnedSensor>, Sentences>;
+
+void bind_maps_learned(nb::module_& module) {
+  nb::class_<MapRequest>(module, "MapRequest", "What is asked of maps beside a Request's options.")
+      .def(nb::init<>())
+      .def_rw("output", &MapRequest::output)
+      .def_rw("cell_mm", &MapRequest::cell_mm)
+      .def_rw("spread_mm", &MapRequest::spread_mm)
+      .def_rw("peak", &MapRequest::peak)
+      .def_rw("prior", &MapRequest::prior)
+      .def_rw("origin", &MapRequest::origin)
+      .def_rw("symmetry", &MapRequest::symmetry)
+      .def_rw("mirror", &MapRequest::mirror)
+      .def_rw("label", &MapRequest::label)
+      .def_rw("group", &MapRequest::group)
+      .def_rw("unposed", &MapRequest::unposed)
+      .def_rw("max_maps", &MapRequest::max_maps);
+  module.def(
+      "learn_maps",
+      [](nb::handle given, const PythonRequest& shared, MapRequest request,
+         const Progress& progress) {
+        request.shared = shared;
+        const std::vector<Recording> recordings = recordings_of(given);
+        LearnedMaps learned = run(progress, [&](const Report& report) {
+          return learn(recordings, request, shared.open_device, report);
+        });
+        Learned result{{}, std::move(learned.sensor), in_python(std::move(learned.words))};
+        for (auto& [name, map] : learned.maps) {
+          std::get<0>(result).push_back(std::move(map));
+        }
+        return std::tuple_cat(std::move(result), std::tuple(in_python(std::move(learned.remarks))));
+      },
+      "recordings"_a, "request"_a, "maps"_a, "progress"_a = nb::none(),
+      "The maps, the sensor, what is said of them, and what is worth a warning.");
 }
 
 }  // namespace
 
-void bind_calibration(nb::module_& module) {
+void bind_learning(nb::module_& module) {
   bind_learned_sensor(module);
   nb::class_<CalibrationRequest>(
       module, "CalibrationRequest",
@@ -196,6 +251,7 @@ void bind_calibration(nb::module_& module) {
   module.def("check_setup", &check_python, "recordings"_a, "request"_a, "cell_mm"_a,
              "spread_mm"_a.none(), "progress"_a = nb::none(),
              "What the touches say; of the request count the classifier and the device.");
+  bind_maps_learned(module);
 }
 
 }  // namespace palpate::python
