@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include <fmt/format.h>
-
 namespace palpate {
 
 void draw_cells(Canvas& canvas, const View& view, const OccupancyGrid& map,

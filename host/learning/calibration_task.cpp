@@ -1,8 +1,6 @@
 #include "learning/calibration_task.hpp"
 
 #include <algorithm>
-#include <map>
-#include <utility>
 
 #include <fmt/format.h>
 

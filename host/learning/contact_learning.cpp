@@ -176,9 +176,8 @@ LearnedReadings learn_readings(const std::vector<Press>& presses, const ReadingO
                             "`threshold`",
                             readings.classifier.threshold, options.pressure_unit));
   }
-  constexpr double of_spacing = 0.6;  // leaves no gaps between the elements of a press
   const double spread_mm = at_known_poses(presses) ? usual_spread_mm(options.spacing_mm)
-                                                   : of_spacing * options.spacing_mm;
+                                                   : unposed_spread_mm(options.spacing_mm);
   readings.maps = options.maps.value_or(
       MapOptions{.cell_mm = 0.5 * options.spacing_mm,
                  .sensor = {.spread_mm = spread_mm, .prior = share_in_contact(evidence)},

@@ -37,9 +37,12 @@ struct LearnedReadings {
   std::vector<double> level_edges(std::size_t levels) const;
 };
 
+/// The spread of maps of presses at unknown poses, which leaves no gaps between their elements.
+constexpr double unposed_spread_mm(double spacing_mm) { return 0.6 * spacing_mm; }
+
 /// Learns the classifier, then what it makes of the presses. A learned threshold is at least three
-/// standard deviations of the noise. The maps' spread is usual_spread_mm() at known poses, and 0.6
-/// spacings at unknown ones. Where their options are given, spread and prior are theirs.
+/// standard deviations of the noise. The maps' spread is usual_spread_mm() at known poses, and
+/// unposed_spread_mm() at unknown ones. Where their options are given, spread and prior are theirs.
 /// @throws Error as learn_classifier(), on a classifier out of range, and where no pressure is
 /// above the threshold
 LearnedReadings learn_readings(const std::vector<Press>& presses, const ReadingOptions& options);

@@ -4,9 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 #include <numbers>
-#include <numeric>
 #include <utility>
 #include <vector>
 

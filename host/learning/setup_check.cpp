@@ -10,7 +10,6 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <glm/geometric.hpp>
 
 #include "learning/press.hpp"
 #include "learning/progress.hpp"

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <optional>
 
 #include <fmt/format.h>
@@ -177,8 +176,6 @@ double LevelCounts::at_node(int node) const {
   }
   return sum;
 }
-
-double LevelCounts::total() const { return std::accumulate(counts_.begin(), counts_.end(), 0.0); }
 
 std::vector<double> initial_table(const ReadingLayer& layer, std::size_t levels,
                                   const ContactModel& contact) {

@@ -45,8 +45,6 @@ class LevelCounts {
   double at(std::size_t level, int node) const;
   /// Readings of all levels at a node.
   double at_node(int node) const;
-  /// All readings.
-  double total() const;
 
  private:
   std::vector<double> counts_;

@@ -34,8 +34,7 @@ UnposedOptions unposed_options(const MapTask& task, const std::optional<LearnedS
     result.map.cell_mm = 0.5 * pitch_mm;
   }
   if (!sensor && !task.request.spread_mm) {
-    constexpr double of_pitch = 0.6;  // leaves no gaps between the elements of a press
-    result.map.sensor.spread_mm = of_pitch * pitch_mm;
+    result.map.sensor.spread_mm = unposed_spread_mm(pitch_mm);
   }
   result.map.sensor.prior = task.prior(sensor).value_or(
       share_in_contact(evidence_of(all, {.classifier = result.map.classifier})));
