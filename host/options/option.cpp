@@ -21,27 +21,28 @@ namespace {
 
 using Counts = std::array<int, 3>;
 
+template <typename Value>
+using Named = std::pair<Value, const char*>;
+
 /// The words that a value of the type is one of.
 template <typename Value>
-constexpr auto words = std::array<std::pair<Value, const char*>, 0>{};
+constexpr std::array<Named<Value>, 0> words{};
 template <>
-constexpr auto words<bool> = std::to_array<std::pair<bool, const char*>>({{true, "true"},
-                                                                          {false, "false"}});
+constexpr std::array<Named<bool>, 2> words<bool>{{{true, "true"}, {false, "false"}}};
 template <>
-constexpr auto words<Automatic> = std::to_array<std::pair<Automatic, const char*>>({{Automatic{},
-                                                                                     "auto"}});
+constexpr std::array<Named<Automatic>, 1> words<Automatic>{{{Automatic{}, "auto"}}};
 template <>
-constexpr auto words<BinWidth> = std::to_array<std::pair<BinWidth, const char*>>(
-    {{BinWidth::automatic, "auto"}, {BinWidth::fine, "fine"}});
+constexpr std::array<Named<BinWidth>, 2> words<BinWidth>{
+    {{BinWidth::automatic, "auto"}, {BinWidth::fine, "fine"}}};
 template <>
-constexpr auto words<FilterKind> =
-    std::to_array<std::pair<FilterKind, const char*>>({{FilterKind::automatic, "auto"},
-                                                       {FilterKind::histogram, "histogram"},
-                                                       {FilterKind::bounded, "bounded"},
-                                                       {FilterKind::particles, "particles"}});
+constexpr std::array<Named<FilterKind>, 4> words<FilterKind>{
+    {{FilterKind::automatic, "auto"},
+     {FilterKind::histogram, "histogram"},
+     {FilterKind::bounded, "bounded"},
+     {FilterKind::particles, "particles"}}};
 template <>
-constexpr auto words<Resampling> = std::to_array<std::pair<Resampling, const char*>>(
-    {{Resampling::multinomial, "multinomial"}, {Resampling::systematic, "systematic"}});
+constexpr std::array<Named<Resampling>, 2> words<Resampling>{
+    {{Resampling::multinomial, "multinomial"}, {Resampling::systematic, "systematic"}}};
 
 template <typename Value>
 concept Word = !words<Value>.empty();
@@ -124,7 +125,7 @@ bool read(const std::string& text, Value& value) {
 std::string text_of(bool value) { return value ? "true" : ""; }
 template <Word Value>
 std::string text_of(Value value) {
-  return std::ranges::find(words<Value>, value, &std::pair<Value, const char*>::first)->second;
+  return std::ranges::find(words<Value>, value, &Named<Value>::first)->second;
 }
 
 template <Number Value>
