@@ -57,9 +57,9 @@ Json reach_of(std::vector<Pose> poses) {
   return json;
 }
 
-class RecordingFile : public ViewedFile {
+class ViewedRecording : public ViewedFile {
  public:
-  explicit RecordingFile(const fs::path& file) : ViewedFile(file) {
+  explicit ViewedRecording(const fs::path& file) : ViewedFile(file) {
     ReadingHistogram readings;
     const auto append = [](auto& list) {
       return [&list](auto values) { list.insert(list.end(), values.begin(), values.end()); };
@@ -141,9 +141,9 @@ class RecordingFile : public ViewedFile {
   double largest_ = 0.0;  ///< of the pressures but for the last in a thousand
 };
 
-class MapFile : public ViewedFile {
+class ViewedMap : public ViewedFile {
  public:
-  explicit MapFile(const fs::path& file) : ViewedFile(file), map_(read_map(file)) {}
+  explicit ViewedMap(const fs::path& file) : ViewedFile(file), map_(read_map(file)) {}
 
   const char* kind() const override { return "map"; }
   Json whole() const override { return map_json(map_); }
@@ -175,9 +175,9 @@ bool is_live(const nlohmann::json& record) {
   return value_at(record, {"unknown"}).is_number() && value_at(record, {"touch"}).is_number();
 }
 
-class RecordsFile : public ViewedFile {
+class ViewedRecords : public ViewedFile {
  public:
-  explicit RecordsFile(const fs::path& results) : ViewedFile(results) {
+  explicit ViewedRecords(const fs::path& results) : ViewedFile(results) {
     for (const fs::path& file : result_files(std::vector<std::string>{results.string()})) {
       std::vector<nlohmann::json> lines;  // of the unknown that live told of last
       for (nlohmann::json& record : records_in(file)) {
@@ -258,15 +258,15 @@ bool is_hdf5(const fs::path& path) {
 
 std::unique_ptr<const ViewedFile> open_file(const fs::path& path) {
   if (!is_hdf5(path)) {
-    return std::make_unique<RecordsFile>(path);
+    return std::make_unique<ViewedRecords>(path);
   }
   require_readable(path);
   const std::string format = read_format(path);
   if (format == "palpate.recording") {
-    return std::make_unique<RecordingFile>(path);
+    return std::make_unique<ViewedRecording>(path);
   }
   if (format == "palpate.map") {
-    return std::make_unique<MapFile>(path);
+    return std::make_unique<ViewedMap>(path);
   }
   refuse(path,
          "attribute 'format' = '{}'; give recordings, maps or results of recognize, live or batch",
