@@ -135,9 +135,9 @@ class ViewedRecording : public ViewedFile {
   double largest_ = 0.0;  ///< of the pressures but for the last in a thousand
 };
 
-class MapFile : public ViewedFile {
+class ViewedMap : public ViewedFile {
  public:
-  explicit MapFile(const fs::path& file) : ViewedFile(file), map_(read_map(file)) {}
+  explicit ViewedMap(const fs::path& file) : ViewedFile(file), map_(read_map(file)) {}
 
   const char* kind() const override { return "map"; }
   Json whole() const override { return map_json(map_); }
@@ -169,9 +169,9 @@ bool is_live(const nlohmann::json& record) {
   return value_at(record, {"unknown"}).is_number() && value_at(record, {"touch"}).is_number();
 }
 
-class RecordsFile : public ViewedFile {
+class ViewedRecords : public ViewedFile {
  public:
-  explicit RecordsFile(const fs::path& results) : ViewedFile(results) {
+  explicit ViewedRecords(const fs::path& results) : ViewedFile(results) {
     for (const fs::path& file : result_files(std::vector<std::string>{results.string()})) {
       std::vector<nlohmann::json> lines;  // of the unknown that live told of last
       for (nlohmann::json& record : records_in(file)) {
@@ -252,7 +252,7 @@ bool is_hdf5(const fs::path& path) {
 
 std::unique_ptr<const ViewedFile> open_file(const fs::path& path) {
   if (!is_hdf5(path)) {
-    return std::make_unique<RecordsFile>(path);
+    return std::make_unique<ViewedRecords>(path);
   }
   require_readable(path);
   const std::string format = read_format(path);
@@ -260,7 +260,7 @@ std::unique_ptr<const ViewedFile> open_file(const fs::path& path) {
     return std::make_unique<ViewedRecording>(path);
   }
   if (format == "palpate.map") {
-    return std::make_unique<MapFile>(path);
+    return std::make_unique<ViewedMap>(path);
   }
   refuse(path,
          "attribute 'format' = '{}'; give recordings, maps or results of recognize, live or batch",
