@@ -5,7 +5,6 @@
 #include <tuple>
 
 #include "estimation/hypotheses.hpp"
-#include "estimation/log_sum.hpp"
 #include "estimation/pose_draws.hpp"
 #include "model/random.hpp"
 
@@ -55,14 +54,14 @@ struct GridIndices {
     theta = along(from.theta_rad, [&](double at) { return bin(x, y, at) / to.plane(); });
   }
 
-  void add(const BinBox& box, std::span<const double> log_likelihood, double log_offset,
-           Marginals& sums) const {
+  void add(const BinBox& box, std::span<const double> log_likelihood, double reference,
+           double log_scale, Marginals& sums) const {
     const std::span columns = std::span(column).subspan(box.x_first, box.x_count);
     const std::span rows = std::span(row).subspan(box.y_first, box.y_count);
     const auto width = static_cast<std::size_t>(sums.grid.x_mm.count);
     double all = 0.0;
     if (log_likelihood.size() == 1) {
-      const double p = std::exp(log_likelihood[0] + log_offset);
+      const double p = std::exp((log_likelihood[0] - reference) + log_scale);
       for_runs(rows, [&](std::int32_t at_row, double of_rows) {
         for_runs(columns, [&](std::int32_t at_column, double of_columns) {
           sums.xy[at_row * width + at_column] += p * of_rows * of_columns;
@@ -73,7 +72,7 @@ struct GridIndices {
       auto log_p = log_likelihood.begin();
       for (const std::int32_t at_row : rows) {
         for (const std::int32_t at_column : columns) {
-          const double p = std::exp(*log_p++ + log_offset);
+          const double p = std::exp((*log_p++ - reference) + log_scale);
           sums.xy[at_row * width + at_column] += p;
           all += p;
         }
@@ -84,10 +83,11 @@ struct GridIndices {
 };
 
 /// Adds the bins of a box by their centres' poses.
-void add_by_pose(const BinBox& box, std::span<const double> log_likelihood, double log_offset,
-                 const PoseLattice& lattice, Marginals& sums) {
+void add_by_pose(const BinBox& box, std::span<const double> log_likelihood, double reference,
+                 double log_scale, const PoseLattice& lattice, Marginals& sums) {
   for (std::int64_t i = 0; i < box.bins(); ++i) {
-    const double p = std::exp(log_likelihood[log_likelihood.size() == 1 ? 0 : i] + log_offset);
+    const double l = log_likelihood[log_likelihood.size() == 1 ? 0 : i];
+    const double p = std::exp((l - reference) + log_scale);
     const std::int64_t at = sums.grid.bin_of(lattice.T_object_robot(box.bin(i, lattice)));
     sums.xy[at % sums.grid.plane()] += p;
     sums.theta[at / sums.grid.plane()] += p;
@@ -96,19 +96,10 @@ void add_by_pose(const BinBox& box, std::span<const double> log_likelihood, doub
 
 }  // namespace
 
-double BinBelief::log_total() const {
-  LogSum total;
-  for (const double of_object : log_evidence) {
-    total.add(of_object);
-  }
-  return total.log();
-}
-
 std::vector<int> BinBelief::likely_objects() const {
-  const double least = log_total() + std::log(negligible_share);
   std::vector<int> likely;
-  for (std::size_t i = 0; i < log_evidence.size(); ++i) {
-    if (!(log_evidence[i] < least)) {
+  for (std::size_t i = 0; i < objects.size(); ++i) {
+    if (!(objects[i].log_identity < std::log(negligible_share))) {
       likely.push_back(static_cast<int>(i));
     }
   }
@@ -116,62 +107,64 @@ std::vector<int> BinBelief::likely_objects() const {
 }
 
 Marginals BinBelief::marginals(int object, PoseLattice grid) const {
-  require_object(object, log_weight.size());
+  require_object(object, objects.size());
   grid.collapse_fixed().validate();
   Marginals sums{.grid = grid,
                  .xy = std::vector<double>(static_cast<std::size_t>(grid.plane())),
                  .theta = std::vector<double>(static_cast<std::size_t>(grid.theta_rad.count))};
-  const double log_offset = log_weight[object] - log_add(log_total(), none_log_evidence);
+  const Object& of = objects[object];
+  const double log_scale = of.log_share + of.log_identity + log_objects;
   const bool same_pivot = lattice.pivot_mm == grid.pivot_mm;
   const GridIndices indices(lattice, grid);
   visit(std::span(&object, 1), negligible_share,
         [&](const BinBox& box, std::span<const double> log_likelihood) {
           if (same_pivot) {
-            indices.add(box, log_likelihood, log_offset, sums);
+            indices.add(box, log_likelihood, of.reference, log_scale, sums);
           } else {
-            add_by_pose(box, log_likelihood, log_offset, lattice, sums);
+            add_by_pose(box, log_likelihood, of.reference, log_scale, lattice, sums);
           }
         });
   return sums;
 }
 
-std::vector<std::vector<BinShare>> BinBelief::likely_bins(std::span<const int> objects,
+std::vector<std::vector<BinShare>> BinBelief::likely_bins(std::span<const int> asked,
                                                           double least_share) const {
-  for (const int object : objects) {
-    require_object(object, log_weight.size());
+  for (const int object : asked) {
+    require_object(object, objects.size());
   }
   constexpr double rounding = 1e-5;  // of a block's sum in float32
-  std::vector<std::vector<BinShare>> likely(log_weight.size());
-  visit(objects, (1.0 - rounding) * least_share,
+  const double least = std::log(least_share);
+  std::vector<std::vector<BinShare>> likely(objects.size());
+  visit(asked, (1.0 - rounding) * least_share,
         [&](const BinBox& box, std::span<const double> log_likelihood) {
-          const double log_sum = log_evidence[box.object] - log_weight[box.object];
-          const double least = log_sum + std::log(least_share);
           const bool alike = log_likelihood.size() == 1;
-          if (alike && log_likelihood[0] < least) {
+          const Object& of = objects[box.object];
+          if (alike && of.log_share_of(log_likelihood[0]) < least) {
             return;
           }
           for (std::int64_t i = 0; i < box.bins(); ++i) {
-            const double log_share = log_likelihood[alike ? 0 : static_cast<std::size_t>(i)];
+            const double log_share =
+                of.log_share_of(log_likelihood[alike ? 0 : static_cast<std::size_t>(i)]);
             if (log_share >= least) {
-              likely[box.object].push_back({box.bin(i, lattice), std::exp(log_share - log_sum)});
+              likely[box.object].push_back({box.bin(i, lattice), std::exp(log_share)});
             }
           }
         });
-  std::vector<std::vector<BinShare>> of_objects;
-  for (const int object : objects) {
-    of_objects.push_back(likely[object]);
+  std::vector<std::vector<BinShare>> of_asked;
+  for (const int object : asked) {
+    of_asked.push_back(likely[object]);
   }
-  return of_objects;
+  return of_asked;
 }
 
 double BinBelief::entropy() const {
-  const double log_all = log_total();
   double entropy = 0.0;
   visit(likely_objects(), negligible_share,
         [&](const BinBox& box, std::span<const double> log_likelihood) {
           const double times = log_likelihood.size() == 1 ? static_cast<double>(box.bins()) : 1.0;
           for (const double l : log_likelihood) {
-            const double log_p = log_weight[box.object] + l - log_all;
+            const double log_p =
+                objects[box.object].log_share_of(l) + objects[box.object].log_identity;
             entropy -= times * std::exp(log_p) * log_p;
           }
         });
@@ -185,7 +178,6 @@ std::vector<PoseSample> BinBelief::sample(std::size_t count, std::uint64_t seed)
   };
   Random random(seed, Stream::belief);
   const std::vector<double> parts = one_in_each_part(count, random);
-  const double log_all = log_total();
   std::vector<DrawnBin> draws;
   DrawnBin best;
   double largest = 0.0;
@@ -193,10 +185,10 @@ std::vector<PoseSample> BinBelief::sample(std::size_t count, std::uint64_t seed)
   visit(likely_objects(), negligible_share,
         [&](const BinBox& box, std::span<const double> log_likelihood) {
           const std::int64_t alike = log_likelihood.size() == 1 ? box.bins() : 1;
-          const double log_offset = log_weight[box.object] - log_all;
+          const Object& of = objects[box.object];
           for (std::size_t i = 0; i < log_likelihood.size(); ++i) {
             const auto first = static_cast<std::int64_t>(i);
-            const double p = std::exp(log_offset + log_likelihood[i]);
+            const double p = std::exp(of.log_share_of(log_likelihood[i]) + of.log_identity);
             const double after = reached + p * static_cast<double>(alike);
             while (draws.size() < parts.size() && parts[draws.size()] < after) {
               const auto within = static_cast<std::int64_t>((parts[draws.size()] - reached) / p);

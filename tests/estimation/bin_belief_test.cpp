@@ -37,12 +37,11 @@ Marginals by_definition(const PoseLattice& grid, const std::vector<double>& logs
   return sums;
 }
 
-/// A belief that consists of one box.
-BinBelief belief_of(const std::vector<double>& log_likelihood, double log_evidence) {
+/// A belief that consists of one box, of log-likelihoods relative to this one.
+BinBelief belief_of(const std::vector<double>& log_likelihood, double reference) {
   return {.lattice = bins,
-          .log_weight = {0.0},
-          .log_evidence = {log_evidence},
-          .visit = [&](std::span<const int> /*objects*/, double /*least_share*/,
+          .objects = {{.reference = reference}},
+          .visit = [&](std::span<const int> /*asked*/, double /*least_share*/,
                        const BinVisitor& visitor) { visitor(box, log_likelihood); }};
 }
 

@@ -198,9 +198,9 @@ void BoundedBelief::visit(const BinVisitor& visitor) {
 }
 
 BinBelief BoundedBelief::bins() {
+  const SearchResult& result = found();
   BinBelief all{.lattice = options_.lattice,
-                .log_weight = space_.log_weight,
-                .log_evidence = {},
+                .objects = {},
                 .visit = [this](std::span<const int> objects, double /*least_share*/,
                                 const BinVisitor& visitor) {
                   std::vector<std::uint8_t> asked(hypotheses_.size());
@@ -213,10 +213,13 @@ BinBelief BoundedBelief::bins() {
                     }
                   });
                 }};
-  for (const HypothesisMass& mass : found().mass) {
-    all.log_evidence.push_back(mass.evaluated);
+  const double log_total = result.all().evaluated;
+  for (std::size_t i = 0; i < hypotheses_.size(); ++i) {
+    const double evaluated = result.mass[i].evaluated;
+    all.objects.push_back(
+        {.log_share = space_.log_weight[i] - evaluated, .log_identity = evaluated - log_total});
   }
-  all.none_log_evidence = none_estimate();
+  all.log_objects = log_total - log_add(log_total, none_estimate());
   return all;
 }
 

@@ -229,7 +229,6 @@ bool NoneEvidence::search(TouchMean& mean, const Deadline& deadline) {
     return false;
   }
   const LogInterval last = mean.found.empty() ? mean.before : mean.found.back();
-  mean.log_share = mean.search.log_share();
   mean.close_searches += close ? 1 : 0;
   mean.found.push_back({std::max(last.low, found->low), std::min(last.high, found->high)});
   mean.closest = mean.close_searches == left_out_nats.size() ||
@@ -257,7 +256,7 @@ LogInterval NoneEvidence::bounds(const Enough& enough, const Deadline& deadline)
     }
     std::ranges::sort(low);
     std::ranges::sort(high);
-    const double log_share = means_.front().log_share;
+    const double log_share = means_.front().search.log_share();
     return LogInterval{std::accumulate(low.begin(), low.end(), log_share),
                        std::accumulate(high.begin(), high.end(), log_share)};
   };

@@ -45,8 +45,7 @@ class MeanSearch {
   /// @returns nothing where the deadline passed. On the threads of the caller's arena; the bits do
   /// not depend on their number.
   std::optional<LogInterval> bounds(double least, const Deadline& deadline);
-  /// Log of the share of the bins that count among all, by prior weight. To be asked for after
-  /// bounds().
+  /// Log of the share of the bins that count among all, by prior weight; 0 before bounds().
   double log_share() const { return log_share_; }
   /// Host memory of what searches keep.
   std::uint64_t bytes() const;
@@ -123,7 +122,6 @@ class NoneEvidence {
   /// What is known of one touch.
   struct TouchMean {
     MeanSearch search;
-    double log_share = 0.0;  ///< of the bins that count among all, by prior weight, in nats
     /// Bounds of the log of the mean before any search, and after each that no deadline ended.
     LogInterval before{-std::numeric_limits<double>::infinity(),
                        -std::numeric_limits<double>::infinity()};

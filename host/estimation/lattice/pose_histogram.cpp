@@ -16,6 +16,7 @@
 #include "estimation/lattice/expected_gain.hpp"
 #include "estimation/lattice/refinement.hpp"
 #include "estimation/lattice/touch_by_touch.hpp"
+#include "estimation/log_sum.hpp"
 #include "gpu/command_stream.hpp"
 #include "model/own_process.hpp"
 #include "palpate/error.hpp"
@@ -121,8 +122,7 @@ struct PoseHistogram::Impl {
 
   BinBelief bins() {
     BinBelief all{.lattice = options.lattice,
-                  .log_weight = log_weight,
-                  .log_evidence = log_evidence(),
+                  .objects = {},
                   .visit = [this](std::span<const int> objects, double least_share,
                                   const BinVisitor& visitor) {
                     for (const int object : objects) {
@@ -130,11 +130,19 @@ struct PoseHistogram::Impl {
                                    least_share, visitor);
                     }
                   }};
-    for (std::size_t i = 0; i < all.log_weight.size(); ++i) {
-      all.log_weight[i] += lost_mass(i);
+    const std::vector<double> identity = normalised(log_evidence());
+    for (std::size_t i = 0; i < identity.size(); ++i) {
+      const BeliefSummary& summary = summaries()[i];
+      all.objects.push_back({.reference = summary.max.value(),
+                             .log_share = -std::log(summary.sum),
+                             .log_identity = std::log(identity[i])});
     }
     if (none_log_weight) {
-      all.none_log_evidence = none_log_evidence();
+      LogSum objects;
+      for (const double of_object : log_evidence()) {
+        objects.add(of_object);
+      }
+      all.log_objects = objects.log() - log_add(objects.log(), none_log_evidence());
     }
     return all;
   }

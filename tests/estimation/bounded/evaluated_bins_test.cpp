@@ -13,7 +13,7 @@
 
 #include <gtest/gtest.h>
 
-#include "bins_by_definition.hpp"
+#include "bound_cases.hpp"
 #include "bounded_set_up.hpp"
 #include "palpate/bounded_posterior.hpp"
 #include "support/certified.hpp"

@@ -12,7 +12,7 @@
 
 #include <gtest/gtest.h>
 
-#include "bins_by_definition.hpp"
+#include "bound_cases.hpp"
 #include "support/every_set_of_instructions.hpp"
 #include "support/synthetic.hpp"
 
