@@ -247,14 +247,6 @@ struct OverlapPartial {
   uint bins;
 };
 
-struct MarginalPush {
-  uint plane;      // number of (x, y) places in the slab
-  uint thetas;     // number of thetas in the slab
-  uint first_bin;  // of the object in the slab; even
-  float max_high;  // the kernel sums exp(log-likelihood - max)
-  float max_low;
-};
-
 // Number of headings with tabled cosine and sine. A theta is a heading plus a small remainder.
 const uint HEADINGS = 256;
 
@@ -374,7 +366,7 @@ static_assert(sizeof(TileReading) == 16 && sizeof(Tile) == 20 && sizeof(Evidence
 static_assert(sizeof(RotatedElement) == 16 && sizeof(Segment) == 16 && sizeof(TableNode) == 8);
 static_assert(sizeof(Corners) == 16 && sizeof(ObjectPlace) == 24);
 static_assert(sizeof(LikelihoodPush) == 28 && sizeof(Partial) == 16);
-static_assert(sizeof(ReducePush) == 12 && sizeof(MarginalPush) == 20);
+static_assert(sizeof(ReducePush) == 12);
 static_assert(sizeof(TurnPush) == 52 && sizeof(Turn) == 64);
 static_assert(sizeof(ArrayAtTheta) == 16 && sizeof(ObjectBox) == 16);
 static_assert(sizeof(OverlapPush) == 56 && sizeof(OverlapPartial) == 12);

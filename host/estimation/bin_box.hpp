@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <span>
@@ -26,6 +27,15 @@ struct BinBox {
   }
 };
 
+/// The number of bins of some boxes together.
+inline std::size_t bins_in(std::span<const BinBox> boxes) {
+  std::size_t bins = 0;
+  for (const BinBox& box : boxes) {
+    bins += static_cast<std::size_t>(box.bins());
+  }
+  return bins;
+}
+
 /// All bins of an object at one theta.
 inline BinBox whole_plane(const PoseLattice& lattice, int theta, int object = 0) {
   return {.object = object,
@@ -33,6 +43,10 @@ inline BinBox whole_plane(const PoseLattice& lattice, int theta, int object = 0)
           .y_count = lattice.y_mm.count,
           .x_count = lattice.x_mm.count};
 }
+
+/// Takes bins of a belief, one box after another, with their log-likelihoods [y, x] in nats; a
+/// single number stands for all bins of its box.
+using BinVisitor = std::function<void(const BinBox&, std::span<const double>)>;
 
 /// The log-likelihoods of bins in nats, box after box, each [y, x]: read from a dense belief or
 /// evaluated on demand.

@@ -48,23 +48,6 @@ ReductionSizes reduction_sizes(const gpu::Limits& limits, std::int64_t bins) {
               static_cast<std::uint32_t>(std::clamp(texels / batch * batch, batch, most))};
 }
 
-MarginalSizes marginal_sizes(const gpu::Limits& limits, std::int64_t plane, std::int64_t thetas) {
-  // Thetas times lanes of parts lie in shared memory, of which every device has 16 KiB. A GPU
-  // keeps several workgroups at once if each takes no more than that.
-  const std::uint32_t lanes = lanes_up_to(limits, limits.cpu ? 64 : 128);
-  const std::uint32_t row_bytes = (lanes + 1) * sizeof(float);
-  const std::uint32_t most_thetas = std::bit_floor(
-      std::max(1U, std::min({limits.shared_bytes / row_bytes, lanes, limits.cpu ? 64U : 32U})));
-  const std::int64_t pairs_of_a_plane = (plane + 2 * lanes - 1) / (2 * lanes);
-  const std::int64_t chunks = (thetas + most_thetas - 1) / most_thetas;
-  const std::int64_t pairs = pairs_of_a_plane * chunks / groups_that_fill(limits);
-  return {.lanes = lanes,
-          .side_by_side = side_by_side(limits, lanes),
-          .pairs_per_lane = static_cast<std::uint32_t>(
-              std::clamp<std::int64_t>(pairs, 1, std::min<std::int64_t>(16, pairs_of_a_plane))),
-          .thetas = most_thetas};
-}
-
 std::uint32_t independent_lanes(const gpu::Limits& limits) {
   // Small workgroups spread a small lattice over all units, and 64 lanes are whole subgroups of
   // nearly every device.

@@ -39,19 +39,6 @@ struct ReductionSizes {
 
 ReductionSizes reduction_sizes(const gpu::Limits& limits, std::int64_t bins);
 
-/// How sum_marginals covers (x, y) indices, in pairs, and thetas.
-struct MarginalSizes {
-  std::uint32_t lanes = 0;           ///< of a workgroup
-  std::uint32_t side_by_side = 0;    ///< lanes that read neighbouring pairs; divides `lanes`
-  std::uint32_t pairs_per_lane = 0;  ///< at most 16, which a lane holds in registers
-  std::uint32_t thetas = 0;          ///< of a workgroup, at most `lanes`
-
-  /// (x, y) indices of one workgroup.
-  std::uint32_t plane() const { return 2 * lanes * pairs_per_lane; }
-};
-
-MarginalSizes marginal_sizes(const gpu::Limits& limits, std::int64_t plane, std::int64_t thetas);
-
 /// Workgroup of the kernels whose invocations share nothing: likelihoods and the sum of beliefs.
 std::uint32_t independent_lanes(const gpu::Limits& limits);
 

@@ -46,24 +46,6 @@ TEST_P(KernelSizes, OfAReductionFitTheDeviceAndTheKernel) {
   }
 }
 
-TEST_P(KernelSizes, OfMarginalsFitTheDeviceAndTheKernel) {
-  for (const std::int64_t plane : counts) {
-    for (const std::int64_t thetas : {1, 7, 65, 1000}) {
-      const MarginalSizes sizes = marginal_sizes(limits, plane, thetas);
-      expect_workgroup(sizes.lanes);
-      EXPECT_LE((sizes.lanes + 1) * sizes.thetas * 4, limits.shared_bytes);
-      EXPECT_GE(sizes.thetas, 1U);
-      EXPECT_LE(sizes.thetas, sizes.lanes) << "a lane sums each theta";
-      EXPECT_EQ(sizes.lanes % sizes.side_by_side, 0U);
-      EXPECT_GE(sizes.pairs_per_lane, 1U);
-      EXPECT_LE(sizes.pairs_per_lane, 16U);
-      if (sizes.pairs_per_lane > 1) {
-        EXPECT_LT((sizes.pairs_per_lane - 1) * 2 * sizes.lanes, plane) << "lanes without a bin";
-      }
-    }
-  }
-}
-
 TEST_P(KernelSizes, OfMapsAndLikelihoodsFitTheDevice) {
   const std::uint32_t block = block_cells(limits);
   EXPECT_EQ(shaders::TILE_CELLS % block, 0U);
@@ -87,8 +69,6 @@ TEST_P(KernelSizes, FillTheDeviceAsFarAsTheBinsAllow) {
     } else if (bins >= 10'000'000) {
       EXPECT_GE(bins / most, 1 << 16);
       EXPECT_GE(bins / reduction.bins(), 500);
-      const MarginalSizes marginal = marginal_sizes(limits, bins / 100, 100);
-      EXPECT_GE(bins / 100 / marginal.plane() * (100 / marginal.thetas), 500);
     } else if (bins <= 1 << 16) {
       EXPECT_EQ(most, 1U);
       EXPECT_EQ(reduction.texels_per_lane, shaders::REDUCE_BATCH);

@@ -3,13 +3,15 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <utility>
 
-#include "estimation/bin_box.hpp"
-#include "estimation/pose_draws.hpp"
-#include "model/random.hpp"
-#include "palpate/estimate.hpp"
-#include "palpate/lattice.hpp"
+#include <fmt/format.h>
+#include <tbb/info.h>
+
+#include "estimation/bounded/displaced/undisplaced_bins.hpp"
+#include "estimation/bounded/search/bound_search.hpp"
+#include "estimation/hypotheses.hpp"
 
 namespace palpate {
 
@@ -25,89 +27,100 @@ constexpr double negligible = 1e-4;
 constexpr double untold_nats = 1.0;
 constexpr double unlimited = std::numeric_limits<double>::infinity();
 
-/// A bin of one hypothesis's lattice.
-struct DrawnBin {
-  std::int32_t object = 0;
-  std::int64_t bin = 0;
-};
-
-/// Draws bins from a belief whose bins come box by box, one in each of equal parts of the belief.
-class BeliefDraws {
- public:
-  /// @param targets ascending, as parts of the belief
-  /// @param lattice,log_weight outlive this object; log_weight is [hypothesis], the log of its
-  /// prior weight
-  /// @param log_total log of the summed likelihood of all bins to come, with prior weights
-  BeliefDraws(std::vector<double> targets, const PoseLattice& lattice,
-              std::span<const double> log_weight, double log_total)
-      : lattice_(lattice),
-        log_weight_(log_weight),
-        log_total_(log_total),
-        targets_(std::move(targets)) {
-    draws_.reserve(targets_.size());
-  }
-
-  /// See BinVisitor.
-  void add(const BinBox& box, std::span<const double> log_likelihood) {
-    const bool alike = log_likelihood.size() == 1;
-    for (std::size_t i = 0; i < log_likelihood.size(); ++i) {
-      const std::int64_t bins = alike ? box.bins() : 1;
-      const double p = std::exp(log_weight_[box.object] - log_total_ + log_likelihood[i]);
-      const double after = reached_ + p * static_cast<double>(bins);
-      last_ = {box.object, box.bin(static_cast<std::int64_t>(i) + bins - 1, lattice_)};
-      while (draws_.size() < targets_.size() && targets_[draws_.size()] < after) {
-        const auto within = static_cast<std::int64_t>((targets_[draws_.size()] - reached_) / p);
-        const std::int64_t bin = static_cast<std::int64_t>(i) + std::min(within, bins - 1);
-        draws_.push_back({box.object, box.bin(bin, lattice_)});
-      }
-      reached_ = after;
-    }
-  }
-
-  /// The draws, in the order of objects and bins.
-  std::vector<DrawnBin> take() {
-    draws_.resize(targets_.size(), last_);  // rounding may leave the last draw out
-    std::ranges::sort(draws_, {},
-                      [](const DrawnBin& one) { return std::pair(one.object, one.bin); });
-    return std::move(draws_);
-  }
-
- private:
-  const PoseLattice& lattice_;
-  std::span<const double> log_weight_;
-  double log_total_;
-  std::vector<double> targets_;  ///< ascending, as parts of the belief
-  std::vector<DrawnBin> draws_;
-  double reached_ = 0.0;  ///< part of the belief that has come
-  DrawnBin last_;         ///< the last bin that has come
-};
-
 }  // namespace
 
+BoundedBelief::BoundedBelief(std::span<const Hypothesis> hypotheses, const BoundedOptions& options)
+    : options_(options),
+      hypotheses_(hypotheses.begin(), hypotheses.end()),
+      // More threads than cores gain nothing.
+      threads_(options.threads > 0 ? std::min(options.threads, tbb::info::default_concurrency())
+                                   : tbb::info::default_concurrency()),
+      arena_(threads_),
+      likelihood_(hypotheses_, options_.contact, options_.lattice, options_.touch_sd),
+      space_(arena_.execute([&] { return SearchSpace(hypotheses_, options_); })),
+      largest_(space_) {
+  if (options_.none_weight) {
+    none_.emplace(space_, options_, likelihood_);
+    none_log_weight_ = none_log_weight(*options_.none_weight, hypotheses_, options_.lattice);
+  }
+}
+
 void BoundedBelief::reset() {
-  touches_.reset();
+  change_.forget();
+  touches_.clear();
+  taken_in_ = 0;
+  informative_ = 0;
+  elements_ = {};
+  largest_.reset();
+  if (none_) {
+    none_->reset();
+  }
   found_.reset();
 }
 
 void BoundedBelief::move_pivot(const glm::dvec2& pivot_mm) {
-  touches_.move_pivot(pivot_mm);
+  options_.lattice = with_pivot(options_.lattice, pivot_mm, "bounded posterior", taken_in_ > 0);
+  likelihood_.move_pivot(pivot_mm);
   found_.reset();
+}
+
+KeptTouches& BoundedBelief::kept() {
+  change_.refuse();
+  return touches_;
 }
 
 void BoundedBelief::take_in() {
-  if (!touches_.waiting()) {
+  change_.refuse();
+  if (taken_in_ == touches_.size()) {
     return;
   }
   found_.reset();
-  touches_.take_in();
+  change_.change([&] {
+    const std::span<const TouchEvidence> added = touches_.all().subspan(taken_in_);
+    std::vector<KnownElements> known;
+    for (const TouchEvidence& touch : added) {
+      known.push_back(known_elements(touch, options_));
+      for (KnownElements& displaced : known.back().touches) {
+        displaced.undisplaced_bins = std::make_shared<UndisplacedBins>(
+            hypotheses_.size(), space_.turns.size(), UndisplacedBins::most_bytes / touches_.size());
+      }
+    }
+    arena_.execute([&] { largest_.add(known); });
+    known.insert(known.begin(), std::move(elements_));
+    elements_ = merged(known);
+    if (none_) {
+      none_->add(added);
+    }
+    taken_in_ = touches_.size();
+    informative_ += static_cast<std::size_t>(std::ranges::count_if(added, &TouchEvidence::tells));
+  });
+}
+
+std::string BoundedBelief::path() const {
+  return fmt::format("{} on {} thread{}", vector_instructions(), threads_,
+                     threads_ == 1 ? "" : "s");
+}
+
+std::uint64_t BoundedBelief::bytes() const {
+  std::uint64_t bytes = likelihood_.bytes() + space_.bytes() + largest_.bytes();
+  for (const KnownElements& touch : elements_.touches) {
+    bytes += touch.undisplaced_bins->bytes();
+  }
+  return bytes + (none_ ? none_->bytes() : 0) + (found_ ? found_->bins.bytes() : 0);
+}
+
+std::vector<double> BoundedBelief::log_likelihood(std::span<const BinBox> boxes,
+                                                  const BinLikelihood& likelihood) const {
+  std::vector<double> logs(bins_in(boxes));
+  arena_.execute([&] { likelihood.evaluate(boxes, elements_, logs); });
+  return logs;
 }
 
 SearchGoal BoundedBelief::goal(double tolerance) const {
-  SearchGoal goal{tolerance, options().evidence_nats, options().evidence_range_nats};
-  goal.poor_bins = options().poor_bins;
-  const std::size_t touches = touches_.informative();
-  if (goal.evidence_nats && touches > 1) {
-    const double grown = 1.0 + options().evidence_growth * static_cast<double>(touches - 1);
+  SearchGoal goal{tolerance, options_.evidence_nats, options_.evidence_range_nats,
+                  options_.poor_bins};
+  if (goal.evidence_nats && informative_ > 1) {
+    const double grown = 1.0 + options_.evidence_growth * static_cast<double>(informative_ - 1);
     *goal.evidence_nats *= grown;
     goal.evidence_range_nats *= grown;
   }
@@ -115,27 +128,26 @@ SearchGoal BoundedBelief::goal(double tolerance) const {
 }
 
 const SearchResult& BoundedBelief::found(std::optional<double> asked) {
-  const Deadline deadline = until(options().budget_s);
+  const Deadline deadline = until(options_.budget_s);
   const double tolerance = asked.value_or(this->tolerance());
   if (!found_ || tolerance < found_->tolerance) {
     // A budget may end the search before it proves as much as an earlier one.
-    Found closer = search(tolerance);
+    Found closer = find(tolerance);
     if (!found_ || better(closer, *found_)) {
       found_ = std::move(closer);
     }
     found_->tolerance = tolerance;
   }
-  if (touches_.has_none() && !found_->none) {
-    found_->none =
-        touches_.bound_none([&](const LogInterval& none) { return close_enough(none); }, deadline);
+  if (none_ && !found_->none) {
+    found_->none = bound_none(deadline);
   }
   return found_->result;
 }
 
-BoundedBelief::Found BoundedBelief::search(double tolerance) {
+BoundedBelief::Found BoundedBelief::find(double tolerance) {
   // "None of these" has the rest of a budget, which is half of it at least.
-  std::optional<double> budget_s = options().budget_s;
-  if (touches_.has_none() && budget_s) {
+  std::optional<double> budget_s = options_.budget_s;
+  if (none_ && budget_s) {
     *budget_s /= 2.0;
   }
   Deadline deadline = until(budget_s);
@@ -144,9 +156,9 @@ BoundedBelief::Found BoundedBelief::search(double tolerance) {
     // What is proven soon comes first: a search that is cut short proves little.
     first.tolerance = std::max(first.tolerance, first_tolerance);
   }
-  Found best = search(first, deadline);
+  Found best = find(first, deadline);
   if (first.tolerance > tolerance && !deadline.passed()) {
-    Found closer = search(goal(tolerance), deadline);
+    Found closer = find(goal(tolerance), deadline);
     if (better(closer, best)) {
       best = std::move(closer);
     }
@@ -154,10 +166,10 @@ BoundedBelief::Found BoundedBelief::search(double tolerance) {
   return best;
 }
 
-BoundedBelief::Found BoundedBelief::search(const SearchGoal& goal, Deadline& deadline) {
+BoundedBelief::Found BoundedBelief::find(const SearchGoal& goal, Deadline& deadline) {
   EvaluatedBins bins(deadline.exists());
-  SearchResult result = touches_.search(
-      goal, deadline, [&](const BinBox& box, std::span<const double> log_likelihood) {
+  SearchResult result =
+      search(goal, deadline, [&](const BinBox& box, std::span<const double> log_likelihood) {
         bins.add(box, log_likelihood);
         if (bins.full()) {
           // With a budget, bins are evaluated as long as there is room for them: another search
@@ -168,42 +180,68 @@ BoundedBelief::Found BoundedBelief::search(const SearchGoal& goal, Deadline& dea
   return {std::move(result), std::move(bins), goal};
 }
 
+SearchResult BoundedBelief::search(const SearchGoal& goal, const Deadline& deadline,
+                                   const BinVisitor& visitor, std::vector<PoseBlock>* refined) {
+  return arena_.execute([&] {
+    return run_search({space_, options_, likelihood_, elements_, goal, deadline, visitor}, largest_,
+                      refined);
+  });
+}
+
 void BoundedBelief::visit(const BinVisitor& visitor) {
+  found();
   if (found_->bins.complete()) {
     found_->bins.visit(visitor);
   } else {
-    touches_.search(found_->goal, until({}), visitor);
+    search(found_->goal, until({}), visitor);
   }
 }
 
-std::vector<PoseSample> BoundedBelief::sample(std::size_t count, std::uint64_t seed) {
-  found();
-  Random random(seed, Stream::belief);
-  BeliefDraws draws(one_in_each_part(count, random), options().lattice, touches_.log_weight(),
-                    log_total());
-  visit([&](const BinBox& box, std::span<const double> log_likelihood) {
-    draws.add(box, log_likelihood);
-  });
-  std::vector<PoseSample> samples;
-  samples.reserve(count);
-  for (const DrawnBin& drawn : draws.take()) {
-    samples.push_back({drawn.object, draw_within(drawn.bin, options().lattice, random)});
+BinBelief BoundedBelief::bins() {
+  const SearchResult& result = found();
+  BinBelief all{.lattice = options_.lattice,
+                .objects = {},
+                .visit = [this](std::span<const int> objects, double /*least_share*/,
+                                const BinVisitor& visitor) {
+                  std::vector<std::uint8_t> asked(hypotheses_.size());
+                  for (const int object : objects) {
+                    asked[object] = 1;
+                  }
+                  visit([&](const BinBox& box, std::span<const double> log_likelihood) {
+                    if (asked[box.object] != 0) {
+                      visitor(box, log_likelihood);
+                    }
+                  });
+                }};
+  const double log_total = result.all().evaluated;
+  for (std::size_t i = 0; i < hypotheses_.size(); ++i) {
+    const double evaluated = result.mass[i].evaluated;
+    all.objects.push_back(
+        {.log_share = space_.log_weight[i] - evaluated, .log_identity = evaluated - log_total});
   }
-  return samples;
+  all.log_objects = log_total - log_add(log_total, none_estimate());
+  return all;
 }
 
 std::vector<PoseBlock> BoundedBelief::refined_blocks() {
-  const std::size_t finest = touches_.finest_level();
   std::vector<PoseBlock> blocks;
   std::vector<PoseBlock> evaluated;
   const auto note = [&](const BinBox& box, std::span<const double> log_likelihoods) {
     if (static_cast<std::int64_t>(log_likelihoods.size()) == box.bins()) {
-      evaluated.push_back(block_of(box, finest));
+      evaluated.push_back(block_of(box, space_.finest_level()));
     }
   };
-  touches_.search(goal(tolerance()), until({}), note, &blocks);
+  search(goal(tolerance()), until({}), note, &blocks);
   blocks.insert(blocks.end(), evaluated.begin(), evaluated.end());
   return blocks;
+}
+
+LogInterval BoundedBelief::bound_none(const Deadline& deadline) {
+  const auto weighted = [&](const LogInterval& bounds) {
+    return LogInterval{none_log_weight_ + bounds.low, none_log_weight_ + bounds.high};
+  };
+  const auto enough = [&](const LogInterval& bounds) { return close_enough(weighted(bounds)); };
+  return weighted(arena_.execute([&] { return none_->bounds(enough, deadline); }));
 }
 
 bool BoundedBelief::close_enough(const LogInterval& none) const {
@@ -213,8 +251,9 @@ bool BoundedBelief::close_enough(const LogInterval& none) const {
   // With a range, the evidence is for a temperature that is applied later, to "none of these", too.
   const bool for_temperature = asked.evidence_range_nats < unlimited;
   const double nats = asked.evidence_nats.value_or(none_nats);
+  const double objects = found_->result.all().evaluated;
   return none.high - none.low <= (for_temperature ? nats : std::min(nats, none_nats)) ||
-         none.high < log_total() - range || none.low > log_total() + range;
+         none.high < objects - range || none.low > objects + range;
 }
 
 LogInterval BoundedBelief::none_log_evidence() const {
@@ -222,7 +261,7 @@ LogInterval BoundedBelief::none_log_evidence() const {
 }
 
 double BoundedBelief::none_estimate() const {
-  if (!touches_.has_none()) {
+  if (!none_) {
     return -unlimited;
   }
   const LogInterval none = none_log_evidence();
@@ -231,11 +270,11 @@ double BoundedBelief::none_estimate() const {
   // Without a budget, a search of the hypotheses ends early where all fits are poor, which tells of
   // "none of these".
   const bool told =
-      !options().budget_s || (close_enough(none) && objects.high - objects.low <= untold_nats);
+      !options_.budget_s || (close_enough(none) && objects.high - objects.low <= untold_nats);
   if (told || !std::isfinite(all.evaluated)) {
     return std::isfinite(none.low) ? std::midpoint(none.low, none.high) : none.high;
   }
-  const double prior_odds = touches_.none_log_weight() - std::log(options().lattice.bins());
+  const double prior_odds = none_log_weight_ - std::log(options_.lattice.bins());
   return all.evaluated + std::clamp(prior_odds, none.low - objects.high, none.high - objects.low);
 }
 

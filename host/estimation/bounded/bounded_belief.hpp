@@ -4,53 +4,74 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
+#include <tbb/task_arena.h>
+
+#include "estimation/bin_belief.hpp"
 #include "estimation/bounded/evaluated_bins.hpp"
-#include "estimation/bounded/searched_touches.hpp"
+#include "estimation/bounded/leaves/bin_likelihood.hpp"
+#include "estimation/bounded/none_evidence.hpp"
+#include "estimation/bounded/search/item_bounds.hpp"
+#include "estimation/bounded/search/search_space.hpp"
+#include "estimation/change_in_steps.hpp"
+#include "estimation/known_elements.hpp"
 #include "palpate/bounded_posterior.hpp"
 
 namespace palpate {
 
 /// What a BoundedPosterior believes: the touches, and what the last search through all of them
-/// found. Whoever asks for what is not found yet has it searched for.
+/// found. Touches are only kept at first; take_in() brings everything that searches go through in
+/// step. Whoever asks for what is not found yet has it searched for.
 class BoundedBelief {
  public:
   /// @param options checked, with a resolved contact model
-  BoundedBelief(std::span<const Hypothesis> hypotheses, const BoundedOptions& options)
-      : touches_(hypotheses, options) {}
+  BoundedBelief(std::span<const Hypothesis> hypotheses, const BoundedOptions& options);
+  BoundedBelief(const BoundedBelief&) = delete;  // its parts refer to each other
+  BoundedBelief& operator=(const BoundedBelief&) = delete;
 
   void reset();
   /// @throws Error after the first touch
   void move_pivot(const glm::dvec2& pivot_mm);
   /// The touches that are kept for take_in(), to be added to.
-  KeptTouches& kept() { return touches_.kept(); }
+  /// @throws Error where memory ended in the middle of take_in(), until reset()
+  KeptTouches& kept();
   /// Takes in the touches that were kept, and forgets what was found without them. All below is
   /// about the touches that were taken in.
-  /// @throws Error where memory ended in the middle of it, until reset()
+  /// @throws Error as kept() does
   void take_in();
 
-  const SearchedTouches& touches() const { return touches_; }
-  /// See SearchedTouches.
-  std::vector<double> log_likelihood(std::span<const BinBox> boxes) const {
-    return touches_.log_likelihood(boxes);
-  }
-  std::uint64_t bytes() const { return touches_.bytes() + (found_ ? found_->bins.bytes() : 0); }
+  const BoundedOptions& options() const { return options_; }
+  const std::vector<Hypothesis>& hypotheses() const { return hypotheses_; }
+  const KnownElements& elements() const { return elements_; }
+  const BinLikelihood& likelihood() const { return likelihood_; }
+  /// [hypothesis] log of its prior weight
+  const std::vector<double>& log_weight() const { return space_.log_weight; }
+  /// How blocks are bounded and bins evaluated.
+  std::string path() const;
+  /// Host memory, in bytes.
+  std::uint64_t bytes() const;
+
+  /// Log-likelihood of bins, box after box, [y, x] in each, in nats.
+  /// @param likelihood over the lattice that the boxes are of
+  std::vector<double> log_likelihood(std::span<const BinBox> boxes,
+                                     const BinLikelihood& likelihood) const;
 
   /// The result of a search to the tolerance, or as far as the options' budget reaches. Bounds
   /// "none of these" beside it. What was found within a smaller tolerance stays.
   /// @param tolerance where none is given, that of the last search of these touches, and before one
   /// that of the options
   const SearchResult& found(std::optional<double> tolerance = {});
-  /// Visits the bins that the last search evaluated; searches again where there was no room to keep
-  /// them.
+  /// Visits the bins that found() evaluates; searches again where there was no room to keep them.
   void visit(const BinVisitor& visitor);
-  /// Log of the summed likelihood of these bins, with prior weights.
-  double log_total() const { return found_->result.all().evaluated; }
-  /// Draws from the bins that found() evaluates.
-  std::vector<PoseSample> sample(std::size_t count, std::uint64_t seed);
+  /// The bins that found() evaluates, to be asked.
+  BinBelief bins();
   /// The blocks that a search divides or evaluates.
   std::vector<PoseBlock> refined_blocks();
+
+  /// Whether the options ask for "none of these".
+  bool has_none() const { return none_.has_value(); }
   /// Bounds of the log evidence of "none of these" with its prior weight, as SearchResult::mass
   /// has that of the hypotheses: within 0.05 nats, or known to lie so far from the evidence of the
   /// hypotheses that the tolerance leaves one of them out, or as far as the budget reaches; within
@@ -71,27 +92,43 @@ class BoundedBelief {
     std::optional<LogInterval> none = {};  ///< none_log_evidence(), once it is bounded
   };
 
-  const BoundedOptions& options() const { return touches_.options(); }
   Deadline until(const std::optional<double>& budget_s) const {
-    return Deadline(budget_s, &options().cancel_point);
+    return Deadline(budget_s, &options_.cancel_point);
   }
   /// The goal that the options and a tolerance set.
   SearchGoal goal(double tolerance) const;
   /// found()'s where none is given.
-  double tolerance() const { return found_ ? found_->tolerance : options().tolerance; }
+  double tolerance() const { return found_ ? found_->tolerance : options_.tolerance; }
 
   /// Searches to the tolerance, or as far as the options' budget reaches.
-  Found search(double tolerance);
+  Found find(double tolerance);
   /// Ends the deadline where there is no room for more bins.
-  Found search(const SearchGoal& goal, Deadline& deadline);
+  Found find(const SearchGoal& goal, Deadline& deadline);
+  /// @param refined where not null, takes the tiles that are divided
+  SearchResult search(const SearchGoal& goal, const Deadline& deadline, const BinVisitor& visitor,
+                      std::vector<PoseBlock>* refined = nullptr);
   /// Whether the later of two searches through the same touches is to be kept.
   static bool better(const Found& later, const Found& earlier) {
     return later.result.unproven() < earlier.result.unproven();
   }
+  LogInterval bound_none(const Deadline& deadline);
   /// Whether the bounds of "none of these" are as close as the options ask for.
   bool close_enough(const LogInterval& none) const;
 
-  SearchedTouches touches_;
+  BoundedOptions options_;
+  std::vector<Hypothesis> hypotheses_;
+  int threads_;
+  mutable tbb::task_arena arena_;
+  BinLikelihood likelihood_;
+  SearchSpace space_;
+  double none_log_weight_ = 0.0;  ///< log of its prior weight times the number of bins
+  KeptTouches touches_;
+  std::size_t taken_in_ = 0;          ///< of the touches
+  std::size_t informative_ = 0;       ///< of these, see TouchEvidence::tells()
+  KnownElements elements_;            ///< of all these
+  LargestTiles largest_;              ///< of all these
+  std::optional<NoneEvidence> none_;  ///< of all these, where the options ask for it
+  ChangeInSteps change_{"bounded posterior: memory ended in the middle of an update; call reset()"};
   std::optional<Found> found_;  ///< nothing before a search
 };
 

@@ -2,14 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <utility>
 
 #include <fmt/format.h>
+
 #include "estimation/bounded/bounded_belief.hpp"
-#include "estimation/bounded/checked_options.hpp"
-#include "estimation/bounded/marginal_sums.hpp"
 #include "estimation/bounded/search_memory.hpp"
+#include "estimation/displacement_check.hpp"
 #include "estimation/hypotheses.hpp"
 #include "estimation/lattice/expected_gain.hpp"
 #include "estimation/lattice/reading_predictor.hpp"
@@ -20,6 +19,77 @@
 #include "palpate/error.hpp"
 
 namespace palpate {
+
+namespace {
+
+/// @throws Error unless it holds
+void require(bool sound, const char* field, double value, const char* remedy) {
+  if (!sound) {
+    throw Error(Fault::input, fmt::format("{} = {}: give {}", field, value, remedy));
+  }
+}
+
+void require_tolerance(double tolerance) {
+  require(tolerance > 0.0 && tolerance < 1.0, "tolerance", tolerance,
+          "a share of the mass between 0 and 1, such as 1e-6");
+}
+
+/// The options, with what follows from them and the hypotheses.
+/// @throws Error where they are not sound, or need more memory than a search may take
+BoundedOptions checked(const BoundedOptions& options, std::span<const Hypothesis> hypotheses) {
+  validate_hypotheses(hypotheses);
+  require_tolerance(options.tolerance);
+  const auto require_positive = [](const std::optional<double>& value, const char* field,
+                                   const char* remedy) {
+    require(!value || (*value > 0.0 && std::isfinite(*value)), field, value.value_or(0.0), remedy);
+  };
+  require_positive(options.budget_s, "budget_s", "a positive number of seconds, or none");
+  require_positive(options.evidence_nats, "evidence_nats", "a positive number of nats, or none");
+  require(options.evidence_growth >= 0.0 && std::isfinite(options.evidence_growth),
+          "evidence_growth", options.evidence_growth, "a number from 0");
+  require_positive(options.none_weight, "none_weight", "a positive number, or none");
+  require(options.threads >= 0, "threads", options.threads, "at least 1, or 0 for all cores");
+  BoundedOptions all = options;
+  all.lattice.collapse_fixed().validate();
+  validate_displacement(all.touch_sd, all.lattice, "touch_sd");
+  all.contact = resolve(options.contact, hypotheses);
+  if (const std::string why = why_no_room(hypotheses, all, memory_for_search()); !why.empty()) {
+    throw Error(Fault::input, why);
+  }
+  return all;
+}
+
+/// Bounds of every identity probability.
+/// @param bounds [hypothesis] of the log evidence; `none` of "none of these"
+std::vector<ProbabilityInterval> identity_bounds(std::span<const double> identity,
+                                                 std::span<const LogInterval> bounds,
+                                                 const LogInterval& none) {
+  // Where nothing is known, an interval ends at 0 or 1.
+  const auto probability = [](double own, double others) {
+    const double p = 1.0 / (1.0 + std::exp(others - own));
+    return std::isnan(p) ? std::optional<double>() : p;
+  };
+  std::vector<ProbabilityInterval> intervals;
+  for (std::size_t i = 0; i < bounds.size(); ++i) {
+    LogSum others_low;
+    LogSum others_high;
+    others_low.add(none.low);
+    others_high.add(none.high);
+    for (std::size_t other = 0; other < bounds.size(); ++other) {
+      if (other != i) {
+        others_low.add(bounds[other].low);
+        others_high.add(bounds[other].high);
+      }
+    }
+    // Rounding must not leave out what lies between them.
+    intervals.push_back(
+        {std::min(identity[i], probability(bounds[i].low, others_high.log()).value_or(0.0)),
+         std::max(identity[i], probability(bounds[i].high, others_low.log()).value_or(1.0))});
+  }
+  return intervals;
+}
+
+}  // namespace
 
 struct BoundedPosterior::Impl {
   Impl(std::span<const Hypothesis> hypotheses, const BoundedOptions& options)
@@ -68,7 +138,7 @@ void BoundedPosterior::update(std::span<const Touch> touches,
   if (progress) {
     progress(1.0);
   }
-  belief.kept().add(touches, belief.touches().options().contact);
+  belief.kept().add(touches, belief.options().contact);
 }
 
 void BoundedPosterior::update(std::span<const TouchEvidence> touches,
@@ -85,155 +155,69 @@ Estimate BoundedPosterior::estimate(std::optional<double> tolerance) const {
   if (tolerance) {
     require_tolerance(*tolerance);
   }
-  const SearchResult& found =
-      belief.found(tolerance.value_or(belief.touches().options().tolerance));
-  Estimate estimate;
-  std::vector<double> logs;
-  std::vector<LogInterval> bounds;
-  for (const HypothesisMass& mass : found.mass) {
-    logs.push_back(mass.evaluated);
-    bounds.push_back(mass.bounds());
-  }
+  const SearchResult& found = belief.found(tolerance.value_or(belief.options().tolerance));
   // Dropped and rounding mass over the whole that they are part of.
   const double dropped = found.unproven();
   Certificate certificate{.dropped_mass = std::isfinite(dropped) ? dropped / (1.0 + dropped) : 1.0,
-                          .log_evidence = bounds,
                           .mode_certain = found.mode_certain,
                           .blocks_bounded = found.blocks_bounded,
                           .bins_evaluated = found.bins_evaluated};
-  const LogInterval none = belief.none_log_evidence();
-  if (belief.touches().has_none()) {
-    logs.push_back(belief.none_estimate());
-    certificate.none_log_evidence = none;
+  Estimate estimate{.mode = {.object = found.best_object,
+                             .bin = found.best_bin,
+                             .T_object_robot = lattice().T_object_robot(found.best_bin),
+                             .log_likelihood = found.best_log_likelihood},
+                    .contradicted = found.contradicted};
+  for (const HypothesisMass& mass : found.mass) {
+    estimate.log_evidence.push_back(mass.evaluated);
+    certificate.log_evidence.push_back(mass.bounds());
   }
-  estimate.identity = normalised(logs);
-  if (belief.touches().has_none()) {
+  std::vector<double> logs = estimate.log_evidence;
+  const LogInterval none = belief.none_log_evidence();
+  if (belief.has_none()) {
+    certificate.none_log_evidence = none;
+    estimate.none_log_evidence = belief.none_estimate();
+    logs.push_back(*estimate.none_log_evidence);
+  }
+  estimate.identity = normalised(std::move(logs));
+  if (belief.has_none()) {
     estimate.none = estimate.identity.back();
     estimate.identity.pop_back();
-    estimate.none_log_evidence = belief.none_estimate();
-    logs.pop_back();
   }
-  estimate.log_evidence = std::move(logs);
-  // Where nothing is known, an interval ends at 0 or 1.
-  const auto probability = [](double own, double others) {
-    const double p = 1.0 / (1.0 + std::exp(others - own));
-    return std::isnan(p) ? std::optional<double>() : p;
-  };
-  for (std::size_t i = 0; i < bounds.size(); ++i) {
-    LogSum others_low;
-    LogSum others_high;
-    others_low.add(none.low);
-    others_high.add(none.high);
-    for (std::size_t other = 0; other < bounds.size(); ++other) {
-      if (other != i) {
-        others_low.add(bounds[other].low);
-        others_high.add(bounds[other].high);
-      }
-    }
-    // Rounding must not leave out what lies between them.
-    const double p = estimate.identity[i];
-    estimate.identity_bounds.push_back(
-        {std::min(p, probability(bounds[i].low, others_high.log()).value_or(0.0)),
-         std::max(p, probability(bounds[i].high, others_low.log()).value_or(1.0))});
-  }
+  estimate.identity_bounds = identity_bounds(estimate.identity, certificate.log_evidence, none);
   estimate.certificate = std::move(certificate);
-  estimate.mode = {.object = found.best_object,
-                   .bin = found.best_bin,
-                   .T_object_robot = lattice().T_object_robot(found.best_bin),
-                   .log_likelihood = found.best_log_likelihood};
-  estimate.contradicted = found.contradicted;
   return estimate;
 }
 
 RefinedPose BoundedPosterior::refine(const Mode& mode) const {
   Impl& posterior = with_touches_taken_in();
   require_object(mode.object, posterior.bodies.size());
-  BoundedBelief& belief = posterior.belief;
+  const BoundedBelief& belief = posterior.belief;
   // Where bins are very fine, a few of them tell the peak, and all would take long. A mean over
   // displacements takes the others all the same.
-  const PoseLattice fit =
-      belief.touches().options().touch_sd.none() ? thinned(lattice()) : lattice();
-  const bool thin = fit.plane() != lattice().plane();
-  std::optional<BinLikelihood> of_thin;
+  const PoseLattice fit = belief.options().touch_sd.none() ? thinned(lattice()) : lattice();
+  std::optional<BinLikelihood> of_fit;
   Mode start = mode;
-  if (thin) {
-    of_thin.emplace(belief.touches().hypotheses(), belief.touches().options().contact, fit);
+  if (fit.plane() != lattice().plane()) {
+    of_fit.emplace(belief.hypotheses(), belief.options().contact, fit);
     if (mode.bin && *mode.bin >= 0 && *mode.bin < lattice().bins()) {
       start.bin = fit.bin_of(lattice().T_object_robot(*mode.bin));
     }
   }
-  const auto log_likelihood = [&](std::span<const BinBox> boxes) {
-    if (!thin) {
-      return belief.log_likelihood(boxes);
-    }
-    std::size_t bins = 0;
-    for (const BinBox& box : boxes) {
-      bins += static_cast<std::size_t>(box.bins());
-    }
-    std::vector<double> logs(bins);
-    belief.touches().on_threads(
-        [&] { of_thin->evaluate(boxes, belief.touches().elements(), logs); });
-    return logs;
-  };
-  return palpate::refine(log_likelihood, fit, posterior.bodies[mode.object], start);
+  const BinLikelihood& likelihood = of_fit ? *of_fit : belief.likelihood();
+  return palpate::refine(
+      [&](std::span<const BinBox> boxes) { return belief.log_likelihood(boxes, likelihood); }, fit,
+      posterior.bodies[mode.object], start);
 }
 
 Marginals BoundedPosterior::marginals(int object) const { return marginals(object, lattice()); }
 
 Marginals BoundedPosterior::marginals(int object, const PoseLattice& grid) const {
-  Impl& posterior = with_touches_taken_in();
-  require_object(object, posterior.bodies.size());
-  PoseLattice onto = grid;
-  onto.collapse_fixed().validate();
-  BoundedBelief& belief = posterior.belief;
-  belief.found();
-  const double log_total =
-      log_add(belief.log_total(), belief.none_estimate()) - belief.touches().log_weight()[object];
-  MarginalSums sums(lattice(), onto);
-  belief.visit([&](const BinBox& box, std::span<const double> log_likelihood) {
-    if (box.object == object) {
-      sums.add(box, log_likelihood, -log_total);
-    }
-  });
-  return sums.take();
+  return with_touches_taken_in().belief.bins().marginals(object, grid);
 }
 
 std::vector<std::vector<BinShare>> BoundedPosterior::likely_bins(std::span<const int> objects,
                                                                  double least_share) const {
-  Impl& posterior = with_touches_taken_in();
-  for (const int object : objects) {
-    require_object(object, posterior.bodies.size());
-  }
-  BoundedBelief& belief = posterior.belief;
-  const SearchResult& found = belief.found();
-  std::vector<std::vector<BinShare>> likely(posterior.bodies.size());
-  std::vector<std::uint8_t> asked(likely.size());
-  for (const int object : objects) {
-    asked[object] = 1;
-  }
-  belief.visit([&](const BinBox& box, std::span<const double> log_likelihood) {
-    if (asked[box.object] == 0) {
-      return;
-    }
-    const double log_total =
-        found.mass[box.object].evaluated - belief.touches().log_weight()[box.object];
-    const double least = log_total + std::log(least_share);
-    const auto all_alike = log_likelihood.size() == 1;
-    if (all_alike && log_likelihood[0] < least) {
-      return;
-    }
-    for (std::int64_t i = 0; i < box.bins(); ++i) {
-      const double log_share = log_likelihood[all_alike ? 0 : static_cast<std::size_t>(i)];
-      if (log_share >= least) {
-        likely[box.object].push_back({box.bin(i, lattice()), std::exp(log_share - log_total)});
-      }
-    }
-  });
-  std::vector<std::vector<BinShare>> of_objects;
-  for (const int object : objects) {
-    of_objects.push_back(likely[object]);
-  }
-  return of_objects;
+  return with_touches_taken_in().belief.bins().likely_bins(objects, least_share);
 }
 
 EvaluatedBelief BoundedPosterior::evaluated_bins() const {
@@ -255,7 +239,7 @@ EvaluatedBelief BoundedPosterior::evaluated_bins() const {
   LogSum off_map;
   belief.visit([&](const BinBox& box, std::span<const double> log_likelihood) {
     if (static_cast<std::int64_t>(log_likelihood.size()) != box.bins()) {
-      off_map.add(belief.touches().log_weight()[box.object] + log_likelihood[0] +
+      off_map.add(belief.log_weight()[box.object] + log_likelihood[0] +
                   std::log(static_cast<double>(box.bins())));
       return;
     }
@@ -270,7 +254,7 @@ EvaluatedBelief BoundedPosterior::evaluated_bins() const {
     evaluated.index.push_back(bin.place);
     evaluated.log_likelihood.push_back(bin.log_likelihood);
   }
-  const double rest = std::exp(off_map.log() - belief.log_total()) + found.unproven();
+  const double rest = std::exp(off_map.log() - found.all().evaluated) + found.unproven();
   evaluated.rest_mass_bound = rest < 1.0 ? rest : 1.0;
   return evaluated;
 }
@@ -285,8 +269,8 @@ double BoundedPosterior::log_likelihood(int object, const Pose& T_object_robot) 
                                           translation_mm.y, theta_rad));
   }
   BoundedBelief& belief = posterior.belief;
-  const KnownElements& elements = belief.touches().elements();
-  if (!belief.touches().options().touch_sd.none()) {
+  const KnownElements& elements = belief.elements();
+  if (!belief.options().touch_sd.none()) {
     const std::int64_t bin = lattice().bin_of(T_object_robot);
     const auto row = static_cast<std::int32_t>(bin / lattice().x_mm.count);
     const BinBox box{.object = object,
@@ -295,15 +279,15 @@ double BoundedPosterior::log_likelihood(int object, const Pose& T_object_robot) 
                      .y_count = 1,
                      .x_first = static_cast<std::int32_t>(bin % lattice().x_mm.count),
                      .x_count = 1};
-    return belief.log_likelihood(std::span(&box, 1)).front();
+    return belief.log_likelihood(std::span(&box, 1), belief.likelihood()).front();
   }
-  const ContactModel& contact = belief.touches().options().contact;
-  const InterpolatedMap map(belief.touches().hypotheses()[object].compared(), *contact.prior);
+  const ContactModel& contact = belief.options().contact;
+  const InterpolatedMap map(belief.hypotheses()[object].compared(), *contact.prior);
   double sum = 0.0;
   for (const ReadingRun& run : elements.runs) {
     for (std::size_t e = run.begin; e < run.end; ++e) {
-      const glm::dvec2 p_mm = T_object_robot * (elements.from_pivot_mm[e] +
-                                                belief.touches().options().lattice.pivot_mm);
+      const glm::dvec2 p_mm =
+          T_object_robot * (elements.from_pivot_mm[e] + belief.options().lattice.pivot_mm);
       sum += contact.log_likelihood(run.reading, {map.log_odds(p_mm)},
                                     static_cast<std::size_t>(object));
     }
@@ -311,23 +295,10 @@ double BoundedPosterior::log_likelihood(int object, const Pose& T_object_robot) 
   return sum;
 }
 
-double BoundedPosterior::entropy() const {
-  BoundedBelief& belief = with_touches_taken_in().belief;
-  belief.found();
-  const double log_total = belief.log_total();
-  double entropy = 0.0;
-  belief.visit([&](const BinBox& box, std::span<const double> log_likelihood) {
-    const double times = log_likelihood.size() == 1 ? static_cast<double>(box.bins()) : 1.0;
-    for (const double l : log_likelihood) {
-      const double log_p = belief.touches().log_weight()[box.object] + l - log_total;
-      entropy -= times * std::exp(log_p) * log_p;
-    }
-  });
-  return entropy;
-}
+double BoundedPosterior::entropy() const { return with_touches_taken_in().belief.bins().entropy(); }
 
 std::vector<PoseSample> BoundedPosterior::sample(std::size_t count, std::uint64_t seed) const {
-  return with_touches_taken_in().belief.sample(count, seed);
+  return with_touches_taken_in().belief.bins().sample(count, seed);
 }
 
 std::vector<TouchGain> BoundedPosterior::expected_gain(std::span<const Pose> T_robot_sensor,
@@ -337,22 +308,20 @@ std::vector<TouchGain> BoundedPosterior::expected_gain(std::span<const Pose> T_r
   BoundedBelief& belief = posterior.belief;
   require_plan(T_robot_sensor, elements_mm, plan, posterior.bodies.size());
   if (!posterior.predictor) {
-    posterior.predictor.emplace(belief.touches().hypotheses(), belief.touches().options().contact);
+    posterior.predictor.emplace(belief.hypotheses(), belief.options().contact);
   }
-  const std::vector<PoseSample> samples = belief.sample(plan.samples, plan.seed);
+  const std::vector<PoseSample> samples = belief.bins().sample(plan.samples, plan.seed);
   return palpate::expected_gain(*posterior.predictor, samples, T_robot_sensor, elements_mm,
-                                belief.touches().options().touch_sd, plan);
+                                belief.options().touch_sd, plan);
 }
 
 std::vector<PoseBlock> BoundedPosterior::refined_blocks() const {
   return with_touches_taken_in().belief.refined_blocks();
 }
 
-const PoseLattice& BoundedPosterior::lattice() const {
-  return impl().belief.touches().options().lattice;
-}
+const PoseLattice& BoundedPosterior::lattice() const { return impl().belief.options().lattice; }
 
-std::string BoundedPosterior::path() const { return impl().belief.touches().path(); }
+std::string BoundedPosterior::path() const { return impl().belief.path(); }
 
 std::uint64_t BoundedPosterior::host_bytes() const { return impl().belief.bytes(); }
 

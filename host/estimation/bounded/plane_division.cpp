@@ -84,6 +84,20 @@ class PlaneDivision::PenaltySum {
   double sum_ = 0.0;
 };
 
+OverlapPlane::Bins PlaneDivision::Plane::in_row(const BinBox& box, int y) const {
+  const OverlapPlane::Bins& row = rows[static_cast<std::size_t>(y)];
+  const int first = std::max(box.x_first, row.first);
+  return {first, std::max(0, std::min(box.x_first + box.x_count, row.first + row.count) - first)};
+}
+
+std::int64_t PlaneDivision::Plane::count_in(const BinBox& box) const {
+  std::int64_t count = 0;
+  for (int y = box.y_first; y < box.y_first + box.y_count; ++y) {
+    count += in_row(box, y).count;
+  }
+  return count;
+}
+
 PlaneDivision::PlaneDivision(const MeanTask& task, std::size_t object)
     : task_(task),
       object_(object),
@@ -94,11 +108,9 @@ PlaneDivision::PlaneDivision(const MeanTask& task, std::size_t object)
 
 PlaneSurvey PlaneDivision::survey(int theta, LargestSums& sums) {
   const Plane plane = this->plane(theta);
-  PlaneSurvey found{.bins = plane.counted.bins};
+  PlaneSurvey found{.bins = plane.bins};
   if (!plane.all_seen) {
-    const BinBox seen =
-        plane.largest.x_first < plane.largest.x_end ? box_of(0, plane, plane.largest) : BinBox{};
-    found.off_map = plane.counted.outside(seen);
+    found.off_map = plane.bins - plane.count_in(box_of(0, plane, plane.largest));
   }
   sums = largest_sums(plane);
   if (!sums.empty()) {
@@ -115,7 +127,7 @@ PlaneSurvey PlaneDivision::survey(int theta, LargestSums& sums) {
 
 double PlaneDivision::divide(int theta, double least, const LargestSums& kept) {
   const Plane plane = this->plane(theta);
-  if (plane.counted.around.bins() == 0) {
+  if (plane.bins == 0) {
     return PlaneSurvey::nothing;
   }
   Division division{.plane = plane};
@@ -139,14 +151,33 @@ double PlaneDivision::divide(int theta, double least, const LargestSums& kept) {
 }
 
 double PlaneDivision::evaluated() const {
-  return task_.space.log_weight[object_] + boxes_.log_sum(task_.likelihood, task_.elements);
+  std::vector<double> values(bins_in(boxes_));
+  task_.likelihood.evaluate_undisplaced(boxes_, task_.elements, values);
+  LogSum sum;
+  auto value = values.cbegin();
+  auto row = boxes_rows_.cbegin();
+  for (const BinBox& box : boxes_) {
+    for (int y = 0; y < box.y_count; ++y, ++row, value += box.x_count) {
+      for (int x = 0; x < row->count; ++x) {
+        sum.add(value[row->first - box.x_first + x]);
+      }
+    }
+  }
+  return task_.space.log_weight[object_] + sum.log();
 }
 
 PlaneDivision::Plane PlaneDivision::plane(int theta) const {
-  Plane plane{.counted = task_.counted.plane(object_, theta)};
-  const BinBox& around = plane.counted.around;
-  plane.all_seen = around.bins() == 0;
-  if (plane.all_seen) {
+  Plane plane{.theta = theta};
+  plane.rows.resize(static_cast<std::size_t>(task_.lattice.y_mm.count));
+  if (task_.everywhere) {
+    std::ranges::fill(plane.rows, OverlapPlane::Bins{0, task_.lattice.x_mm.count});
+  } else {
+    OverlapPlane(task_.array, task_.space.boxes[object_], task_.lattice, theta)
+        .find_rows(plane.rows);
+  }
+  BinBox& around = plane.around;
+  plane.bins = count_bins(plane.rows, around);
+  if (plane.bins == 0) {
     return plane;
   }
   const int x_end = around.x_first + around.x_count;
@@ -161,6 +192,7 @@ PlaneDivision::Plane PlaneDivision::plane(int theta) const {
                           down(std::min(x_tile_end, seen.x_end) + batch_side - 1),
                           down(std::max(y_tile, seen.y_first)),
                           down(std::min(y_tile_end, seen.y_end) + batch_side - 1)};
+  plane.all_seen = false;
   if (batches.x_first < batches.x_end && batches.y_first < batches.y_end) {
     plane.largest = batches;
     const BinBox box = box_of(0, plane, batches);
@@ -185,7 +217,7 @@ PlaneDivision::LargestSums PlaneDivision::largest_sums(const Plane& plane) {
   LargestSums sums(static_cast<std::size_t>(tiles.x_end - tiles.x_first) *
                    static_cast<std::size_t>(tiles.y_end - tiles.y_first));
   for_batches(tiles, sums.data(), [&](int x, int y, std::uint32_t* of_batch) {
-    bounds_.add(0, task_.elements, places(0, plane.counted.theta), x, y, of_batch);
+    bounds_.add(0, task_.elements, places(0, plane.theta), x, y, of_batch);
   });
   return sums;
 }
@@ -208,12 +240,12 @@ void PlaneDivision::divide_batch(Division& division, std::size_t level, int x, i
       const BinBox box = box_of(level, plane, {x + i, x + i + 1, y + j, y + j + 1});
       if (sum > last_divided) {
         division.left_out[level].add(sum, box.bins());
-      } else if (plane.counted.any_in(box)) {
+      } else if (plane.count_in(box) > 0) {
         std::uint32_t parts[batch_tiles] = {};
         const int first_x = (x + i) * batch_side;
         const int first_y = (y + j) * batch_side;
-        bounds_.add(level + 1, task_.elements, places(level + 1, plane.counted.theta), first_x,
-                    first_y, parts);
+        bounds_.add(level + 1, task_.elements, places(level + 1, plane.theta), first_x, first_y,
+                    parts);
         divide_batch(division, level + 1, first_x, first_y, parts);
       }
     }
@@ -228,7 +260,7 @@ void PlaneDivision::take_smallest(Division& division, int x, int y, const std::u
     for (int j = 0; j < batch_side; ++j) {
       const TileRange tile{x + i, x + i + 1, y + j, y + j + 1};
       if (sums[batch_side * i + j] <= division.last_divided[finest] &&
-          plane.counted.any_in(box_of(finest, plane, tile))) {
+          plane.count_in(box_of(finest, plane, tile)) > 0) {
         needed = {std::min(needed.x_first, tile.x_first), std::max(needed.x_end, tile.x_end),
                   std::min(needed.y_first, tile.y_first), std::max(needed.y_end, tile.y_end)};
       }
@@ -237,7 +269,10 @@ void PlaneDivision::take_smallest(Division& division, int x, int y, const std::u
   division.left_out[finest].add_batch(levels_[finest], x, y, sums, needed);
   if (needed.x_first < needed.x_end) {
     // The smallest tiles of a batch are evaluated as one box, with those between them.
-    boxes_.add(box_of(finest, plane, needed), plane.counted);
+    const BinBox& box = boxes_.emplace_back(box_of(finest, plane, needed));
+    for (int y_bin = box.y_first; y_bin < box.y_first + box.y_count; ++y_bin) {
+      boxes_rows_.push_back(plane.in_row(box, y_bin));
+    }
   }
 }
 

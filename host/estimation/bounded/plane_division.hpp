@@ -6,11 +6,11 @@
 #include <span>
 #include <vector>
 
-#include "estimation/bounded/counted_bins.hpp"
 #include "estimation/bounded/leaves/bin_likelihood.hpp"
 #include "estimation/bounded/search/search_space.hpp"
 #include "estimation/bounded/tables/tile_bounds.hpp"
 #include "estimation/known_elements.hpp"
+#include "estimation/touch_overlap.hpp"
 #include "model/bounding_box.hpp"
 
 namespace palpate {
@@ -18,11 +18,13 @@ namespace palpate {
 /// What the search for the mean of a touch's likelihood is given; it outlives the search's parts.
 struct MeanTask {
   const SearchSpace& space;
+  const PoseLattice& lattice;
   const BinLikelihood& likelihood;
   const KnownElements& elements;
   std::span<const BoundingBox> reaches;                 ///< [theta] of the elements
   const std::vector<std::vector<double>>& unpenalised;  ///< [object][level]; see unpenalised()
-  const CountedBins& counted;
+  const ArrayRectangle& array;  ///< of the touch; bins at which it overlaps an object count
+  bool everywhere;              ///< all bins count
 };
 
 /// What the largest tiles of a plane, one object at one theta, tell.
@@ -59,12 +61,20 @@ class PlaneDivision {
 
  private:
   class PenaltySum;
-  /// A plane, and the largest tiles of it that are looked at.
+  /// A plane's bins that count in the mean, and the largest tiles that are looked at.
   struct Plane {
-    CountedPlane counted;
+    int theta = 0;
+    std::vector<OverlapPlane::Bins> rows;  ///< [y] bins that count
+    BinBox around;                         ///< a box around all rows
+    std::int64_t bins = 0;                 ///< number of bins that count
     /// Whole batches, about those that see the map and hold bins that count.
     TileRange largest;
-    bool all_seen = false;  ///< the largest tiles hold all bins that count
+    bool all_seen = true;  ///< the largest tiles hold all bins that count
+
+    /// The bins of a box's row that count.
+    OverlapPlane::Bins in_row(const BinBox& box, int y) const;
+    /// The number of bins of the box that count.
+    std::int64_t count_in(const BinBox& box) const;
   };
   /// A plane that is being divided.
   struct Division {
@@ -80,7 +90,7 @@ class PlaneDivision {
 
   Plane plane(int theta) const;
   BinBox box_of(std::size_t level, const Plane& plane, const TileRange& tiles) const {
-    return levels_[level].box_of(static_cast<std::int32_t>(object_), plane.counted.theta, tiles);
+    return levels_[level].box_of(static_cast<std::int32_t>(object_), plane.theta, tiles);
   }
   const WindowPlaces& places(std::size_t level, int theta);
   LargestSums largest_sums(const Plane& plane);
@@ -95,9 +105,10 @@ class PlaneDivision {
   std::size_t object_;
   const TileBounds& bounds_;
   std::span<const TileLevel> levels_;
-  std::span<const double> unpenalised_;  ///< [level]
-  std::vector<Placed> placed_;           ///< [level]
-  CountedBoxes boxes_;                   ///< to be evaluated
+  std::span<const double> unpenalised_;         ///< [level]
+  std::vector<Placed> placed_;                  ///< [level]
+  std::vector<BinBox> boxes_;                   ///< to be evaluated
+  std::vector<OverlapPlane::Bins> boxes_rows_;  ///< [box, row] bins that count
 };
 
 }  // namespace palpate

@@ -2,13 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
+#include <utility>
 
 #include <fmt/format.h>
 
 #include "shaders/interface.h"
 #include "shaders/reduce_belief.hpp"
-#include "shaders/sum_marginals.hpp"
 
 namespace palpate {
 
@@ -34,12 +35,28 @@ std::size_t partials_of(const SlabExtent& slab, const ReductionSizes& sizes) {
   return std::size_t{slab.object_count} * groups_of(slab.bins(), sizes.bins());
 }
 
-/// Adds every row of `parts` to `sums`.
-void add_rows(std::span<const float> parts, std::span<double> sums) {
-  for (; !parts.empty(); parts = parts.subspan(sums.size())) {
-    for (std::size_t i = 0; i < sums.size(); ++i) {
-      sums[i] += parts[i];
-    }
+/// Visits neighbouring bins of a slab as boxes: whole rows of a plane, or a part of a row.
+/// @param first of the bins, in the object's part of the slab
+void visit_boxes(const Slab& slab, std::size_t object, std::int64_t first,
+                 std::span<const double> log_likelihood, const BinVisitor& visitor) {
+  while (!log_likelihood.empty()) {
+    const auto in_plane = static_cast<std::uint32_t>(first % slab.plane());
+    const std::uint32_t row = in_plane / slab.nx;
+    const std::uint32_t x = in_plane % slab.nx;
+    const std::size_t rows = log_likelihood.size() / slab.nx;
+    const bool whole_rows = x == 0 && rows > 0;
+    const BinBox box{
+        .object = static_cast<std::int32_t>(object),
+        .theta = static_cast<std::int32_t>(slab.theta_first + first / slab.plane()),
+        .y_first = static_cast<std::int32_t>(slab.row_first + row),
+        .y_count = static_cast<std::int32_t>(
+            whole_rows ? std::min<std::size_t>(rows, slab.row_count - row) : 1),
+        .x_first = static_cast<std::int32_t>(x),
+        .x_count = static_cast<std::int32_t>(
+            whole_rows ? slab.nx : std::min<std::size_t>(slab.nx - x, log_likelihood.size()))};
+    visitor(box, log_likelihood.first(static_cast<std::size_t>(box.bins())));
+    log_likelihood = log_likelihood.subspan(static_cast<std::size_t>(box.bins()));
+    first += box.bins();
   }
 }
 
@@ -52,20 +69,12 @@ DenseBelief::DenseBelief(gpu::Context& context, gpu::CommandStream& stream,
       lattice_(lattice),
       objects_(objects),
       reduction_(sizes_for(context, lattice, objects)),
-      marginal_(marginal_sizes(context.limits(), lattice.plane(), lattice.theta_rad.count)),
       reduce_(context, {.name = "reduce_belief",
                         .spirv = shaders::reduce_belief,
                         .bindings = {Access::table, Access::storage},
                         .push_bytes = sizeof(shaders::ReducePush),
                         .constants = {reduction_.lanes, reduction_.side_by_side,
-                                      reduction_.texels_per_lane}}),
-      sum_marginals_(
-          context, {.name = "sum_marginals",
-                    .spirv = shaders::sum_marginals,
-                    .bindings = {Access::table, Access::storage, Access::storage},
-                    .push_bytes = sizeof(shaders::MarginalPush),
-                    .constants = {marginal_.lanes, marginal_.side_by_side, marginal_.pairs_per_lane,
-                                  marginal_.thetas, lattice.x_mm.count % 2 == 0 ? 1U : 0U}}) {
+                                      reduction_.texels_per_lane}}) {
   for (const SlabExtent& extent : cut(context, lattice, objects)) {
     slabs_.push_back(
         {extent, gpu::Buffer(context, extent.bytes(), gpu::Memory::device,
@@ -151,20 +160,22 @@ std::vector<BeliefSummary> DenseBelief::summarise(std::vector<BeliefSummary> reu
   return summaries;
 }
 
-template <typename Wanted, typename Visit>
-void DenseBelief::read_blocks(std::size_t object, const BeliefSummary& summary,
-                              const Wanted& wanted, const Visit& visit) const {
+void DenseBelief::visit(std::size_t object, const BeliefSummary& summary, double least_share,
+                        const BinVisitor& visitor) const {
   constexpr std::size_t most_bins = std::size_t{1} << 20;  // read at once
   std::vector<std::pair<const BeliefBlock*, std::vector<TwoFloat>>> read;
-  const auto take_in = [&] {
+  std::vector<double> log_likelihood;
+  const auto visit_read = [&] {
     stream_.run();
     for (const auto& [block, bins] : read) {
-      visit(*block, bins);
+      log_likelihood.clear();
+      std::ranges::transform(bins, std::back_inserter(log_likelihood), &TwoFloat::value);
+      visit_boxes(slabs_[block->slab], object, block->first, log_likelihood, visitor);
     }
     read.clear();
   };
   for (const BeliefBlock& block : summary.blocks) {
-    if (!wanted(block)) {
+    if (block.sum < least_share * summary.sum) {
       continue;
     }
     const Slab& slab = slabs_[block.slab];
@@ -172,139 +183,10 @@ void DenseBelief::read_blocks(std::size_t object, const BeliefSummary& summary,
     stream_.download(slab.log_likelihood, read.back().second,
                      (slab.first_bin(object) + block.first) * sizeof(TwoFloat));
     if (read.size() * reduction_.bins() >= most_bins) {
-      take_in();
+      visit_read();
     }
   }
-  take_in();
-}
-
-std::vector<std::int64_t> DenseBelief::bins_at(std::size_t object, const BeliefSummary& summary,
-                                               std::span<const double> parts) const {
-  /// A block with some of the parts in it.
-  struct Hit {
-    const BeliefBlock* block;
-    double before;          ///< summed probability before the block
-    std::size_t parts_end;  ///< in `parts`
-  };
-  std::vector<Hit> hits;
-  auto block = summary.blocks.begin();
-  double before = 0.0;
-  for (std::size_t i = 0; i < parts.size(); ++i) {
-    while (block + 1 != summary.blocks.end() && before + block->sum <= parts[i] * summary.sum) {
-      before += block->sum;
-      ++block;
-    }
-    if (hits.empty() || hits.back().block != &*block) {
-      hits.push_back({&*block, before, i});
-    }
-    hits.back().parts_end = i + 1;
-  }
-  std::vector<std::int64_t> found;
-  auto wanted = hits.begin();
-  auto hit = hits.begin();
-  read_blocks(
-      object, summary,
-      [&](const BeliefBlock& next) {
-        const bool is_hit = wanted != hits.end() && wanted->block == &next;
-        wanted += is_hit ? 1 : 0;
-        return is_hit;
-      },
-      [&](const BeliefBlock& from, std::span<const TwoFloat> bins) {
-        std::size_t bin = 0;
-        const auto mass = [&] { return std::exp(bins[bin].value() - summary.max.value()); };
-        double reached = hit->before + mass();  // up to and with `bin`
-        while (found.size() < hit->parts_end) {
-          // Rounding must not lead past the block's last bin.
-          while (bin + 1 < bins.size() && reached <= parts[found.size()] * summary.sum) {
-            ++bin;
-            reached += mass();
-          }
-          found.push_back(lattice_index(lattice_, slabs_[from.slab],
-                                        from.first + static_cast<std::int64_t>(bin)));
-        }
-        ++hit;
-      });
-  return found;
-}
-
-double DenseBelief::entropy(std::size_t object, const BeliefSummary& summary) const {
-  constexpr double negligible = 1e-5;  // nats, of all blocks left out together
-  double below_max = 0.0;              // mean of max - log-likelihood
-  const auto counts = [&](const BeliefBlock& block) {
-    // The largest that n bins of a summed probability p can add: p log(n / p).
-    const double p = block.sum / summary.sum;
-    const double most = p * (std::log(static_cast<double>(block.bins)) - std::log(p));
-    return most > negligible / static_cast<double>(summary.blocks.size());
-  };
-  read_blocks(object, summary, counts,
-              [&](const BeliefBlock& /*block*/, std::span<const TwoFloat> bins) {
-                for (const TwoFloat& bin : bins) {
-                  const double below = summary.max.value() - bin.value();
-                  below_max += std::exp(-below) / summary.sum * below;
-                }
-              });
-  return below_max + std::log(summary.sum);
-}
-
-std::vector<BinShare> DenseBelief::likely_bins(std::size_t object, const BeliefSummary& summary,
-                                               double least_share) const {
-  std::vector<BinShare> likely;
-  const auto may_hold = [&](const BeliefBlock& block) {
-    constexpr double rounding = 1e-5;  // of the block's sum
-    return block.sum * (1.0 + rounding) >= least_share * summary.sum;
-  };
-  read_blocks(
-      object, summary, may_hold, [&](const BeliefBlock& block, std::span<const TwoFloat> bins) {
-        for (std::size_t i = 0; i < bins.size(); ++i) {
-          const double share = std::exp(bins[i].value() - summary.max.value()) / summary.sum;
-          if (share >= least_share) {
-            likely.push_back({lattice_index(lattice_, slabs_[block.slab],
-                                            block.first + static_cast<std::int64_t>(i)),
-                              share});
-          }
-        }
-      });
-  return likely;
-}
-
-Marginals DenseBelief::marginals(std::size_t object, TwoFloat max, double of_largest) const {
-  Marginals sums{.grid = lattice_, .xy = {}, .theta = {}};
-  sums.xy.resize(static_cast<std::size_t>(lattice_.plane()));
-  sums.theta.resize(static_cast<std::size_t>(lattice_.theta_rad.count));
-  for (const Slab& slab : slabs_) {
-    if (!slab.holds(object)) {
-      continue;
-    }
-    const std::uint32_t chunks = groups_of(slab.theta_count, marginal_.thetas);
-    const std::uint32_t blocks = groups_of(slab.plane(), marginal_.plane());
-    std::vector<float> over_theta(std::size_t{chunks} * slab.plane());
-    std::vector<float> over_plane(std::size_t{blocks} * slab.theta_count);
-    const gpu::Buffer theta_parts(context_, std::span(over_theta).size_bytes(), gpu::Memory::device,
-                                  "a marginal");
-    const gpu::Buffer plane_parts(context_, std::span(over_plane).size_bytes(), gpu::Memory::device,
-                                  "a marginal");
-    const shaders::MarginalPush push{
-        .plane = slab.plane(),
-        .thetas = slab.theta_count,
-        .first_bin = static_cast<shaders::uint>(slab.first_bin(object)),
-        .max_high = max.high,
-        .max_low = max.low};
-    stream_.dispatch(sum_marginals_, {&slab.log_likelihood, &theta_parts, &plane_parts}, push,
-                     {blocks, chunks, 1});
-    stream_.download(theta_parts, over_theta);
-    stream_.download(plane_parts, over_plane);
-    stream_.run();
-
-    add_rows(over_theta,
-             std::span(sums.xy).subspan(std::size_t{slab.row_first} * slab.nx, slab.plane()));
-    add_rows(over_plane, std::span(sums.theta).subspan(slab.theta_first, slab.theta_count));
-  }
-  for (std::vector<double>* marginal : {&sums.xy, &sums.theta}) {
-    for (double& sum : *marginal) {
-      sum *= of_largest;
-    }
-  }
-  return sums;
+  visit_read();
 }
 
 std::vector<double> DenseBelief::download(std::span<const BinBox> boxes) const {

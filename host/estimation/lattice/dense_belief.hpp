@@ -7,7 +7,6 @@
 #include "estimation/bin_box.hpp"
 #include "estimation/kernel_sizes.hpp"
 #include "gpu/command_stream.hpp"
-#include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
 
 namespace palpate {
@@ -49,39 +48,21 @@ class DenseBelief {
   // These run the stream.
   /// @param reuse memory for the result
   std::vector<BeliefSummary> summarise(std::vector<BeliefSummary> reuse = {}) const;
-  /// @param max the object's largest log-likelihood
-  /// @param of_largest the probability of a bin of this log-likelihood
-  Marginals marginals(std::size_t object, TwoFloat max, double of_largest) const;
-  /// Bins of one object at which the summed probability reaches these parts of the whole, in [0,
-  /// 1), ascending. Reads only the blocks that hold them.
-  std::vector<std::int64_t> bins_at(std::size_t object, const BeliefSummary& summary,
-                                    std::span<const double> parts) const;
-  /// Entropy of one object's bins by themselves, in nats, within 1e-4. Reads only the blocks that
-  /// hold a part of it.
-  double entropy(std::size_t object, const BeliefSummary& summary) const;
-  /// The bins that hold at least this share of one object's belief. Reads only the blocks that may
-  /// have such a bin.
-  std::vector<BinShare> likely_bins(std::size_t object, const BeliefSummary& summary,
-                                    double least_share) const;
+  /// Visits the bins of one object in the lattice's order, but for blocks that hold less than this
+  /// share of the object's belief: these are not read.
+  void visit(std::size_t object, const BeliefSummary& summary, double least_share,
+             const BinVisitor& visitor) const;
   /// The log-likelihoods of boxes of bins, one after another, each [y, x].
   std::vector<double> download(std::span<const BinBox> boxes) const;
 
  private:
-  /// Calls visit(block, bins) with the bins of each of the object's blocks that is wanted(block),
-  /// some million bins at a time.
-  template <typename Wanted, typename Visit>
-  void read_blocks(std::size_t object, const BeliefSummary& summary, const Wanted& wanted,
-                   const Visit& visit) const;
-
   gpu::Context& context_;
   gpu::CommandStream& stream_;
   PoseLattice lattice_;
   std::size_t objects_;
   std::vector<Slab> slabs_;
   ReductionSizes reduction_;
-  MarginalSizes marginal_;
   gpu::Kernel reduce_;
-  gpu::Kernel sum_marginals_;
   gpu::Buffer partials_;  ///< of all slabs in order
   std::size_t partial_count_ = 0;
   mutable std::vector<shaders::Partial> read_partials_;  ///< memory that summarise() keeps

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "estimation/bin_belief.hpp"
 #include "estimation/change_in_steps.hpp"
 #include "estimation/contact_evidence.hpp"
 #include "estimation/displacement_check.hpp"
@@ -17,10 +18,9 @@
 #include "estimation/lattice/reading_predictor.hpp"
 #include "estimation/lattice/refinement.hpp"
 #include "estimation/lattice/touch_by_touch.hpp"
-#include "estimation/pose_draws.hpp"
+#include "estimation/log_sum.hpp"
 #include "gpu/command_stream.hpp"
 #include "model/own_process.hpp"
-#include "model/random.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
@@ -100,6 +100,33 @@ struct PoseHistogram::Impl {
 
   /// Log evidence of "none of these", where the options ask for it.
   double none_log_evidence() const { return *none_log_weight + by_touch->none_log_evidence(); }
+
+  BinBelief bins() {
+    BinBelief all{.lattice = options.lattice,
+                  .objects = {},
+                  .visit = [this](std::span<const int> objects, double least_share,
+                                  const BinVisitor& visitor) {
+                    for (const int object : objects) {
+                      belief.visit(static_cast<std::size_t>(object), summaries()[object],
+                                   least_share, visitor);
+                    }
+                  }};
+    const std::vector<double> identity = normalised(log_evidence());
+    for (std::size_t i = 0; i < identity.size(); ++i) {
+      const BeliefSummary& summary = summaries()[i];
+      all.objects.push_back({.reference = summary.max.value(),
+                             .log_share = -std::log(summary.sum),
+                             .log_identity = std::log(identity[i])});
+    }
+    if (none_log_weight) {
+      LogSum objects;
+      for (const double of_object : log_evidence()) {
+        objects.add(of_object);
+      }
+      all.log_objects = objects.log() - log_add(objects.log(), none_log_evidence());
+    }
+    return all;
+  }
 
   /// Eq. 14: an object's evidence over the sum for all objects and, where the options ask for it,
   /// "none of these", which stands last.
@@ -244,25 +271,12 @@ RefinedPose PoseHistogram::refine(const Mode& mode) const {
 }
 
 Marginals PoseHistogram::marginals(int object) const {
-  Impl& histogram = whole();
-  require_object(object, histogram.bodies.size());
-  const BeliefSummary& summary = histogram.summaries()[object];
-  const double of_largest = histogram.identity()[object] / summary.sum;
-  Marginals marginals = histogram.belief.marginals(object, summary.max, of_largest);
-  marginals.grid = lattice();  // the belief does not know where the pivot has moved to
-  return marginals;
+  return whole().bins().marginals(object, lattice());
 }
 
 std::vector<std::vector<BinShare>> PoseHistogram::likely_bins(std::span<const int> objects,
                                                               double least_share) const {
-  Impl& histogram = whole();
-  std::vector<std::vector<BinShare>> likely;
-  for (const int object : objects) {
-    require_object(object, histogram.bodies.size());
-    likely.push_back(histogram.belief.likely_bins(static_cast<std::size_t>(object),
-                                                  histogram.summaries()[object], least_share));
-  }
-  return likely;
+  return whole().bins().likely_bins(objects, least_share);
 }
 
 std::vector<double> PoseHistogram::log_likelihood(int object) const {
@@ -281,44 +295,10 @@ std::vector<double> PoseHistogram::log_likelihood(int object) const {
   return logs;
 }
 
-double PoseHistogram::entropy() const {
-  Impl& histogram = whole();
-  const std::vector<double> identity = normalised(histogram.log_evidence());
-  double entropy = 0.0;
-  for (std::size_t i = 0; i < identity.size(); ++i) {
-    // So unlikely an object adds less than 1e-7 nats, however many bins it has.
-    if (const double p = identity[i]; p > 1e-9) {
-      entropy += p * (histogram.belief.entropy(i, histogram.summaries()[i]) - std::log(p));
-    }
-  }
-  return entropy;
-}
+double PoseHistogram::entropy() const { return whole().bins().entropy(); }
 
 std::vector<PoseSample> PoseHistogram::sample(std::size_t count, std::uint64_t seed) const {
-  Impl& histogram = whole();
-  Random random(seed, Stream::belief);
-  const std::vector<double> identity = normalised(histogram.log_evidence());
-  const std::size_t objects = identity.size();
-  std::vector<std::vector<double>> parts(objects);
-  double before = 0.0;
-  std::size_t object = 0;
-  for (const double at : one_in_each_part(count, random)) {
-    while (object + 1 < objects && before + identity[object] <= at) {
-      before += identity[object++];
-    }
-    parts[object].push_back(std::clamp((at - before) / identity[object], 0.0, 1.0));
-  }
-  std::vector<PoseSample> samples;
-  samples.reserve(count);
-  for (std::size_t i = 0; i < objects; ++i) {
-    if (parts[i].empty()) {
-      continue;
-    }
-    for (const std::int64_t bin : histogram.belief.bins_at(i, histogram.summaries()[i], parts[i])) {
-      samples.push_back({static_cast<int>(i), draw_within(bin, histogram.options.lattice, random)});
-    }
-  }
-  return samples;
+  return whole().bins().sample(count, seed);
 }
 
 std::vector<TouchGain> PoseHistogram::expected_gain(std::span<const Pose> T_robot_sensor,

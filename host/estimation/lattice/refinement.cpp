@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <iterator>
 #include <numbers>
 #include <optional>
 #include <utility>
@@ -15,7 +16,6 @@
 #include <glm/matrix.hpp>
 #include <glm/vec3.hpp>
 
-#include "estimation/lattice/body_window.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
@@ -70,23 +70,6 @@ glm::dvec3 weighted_mean(const BodyWindow& window, double root) {
   return sum / total;
 }
 
-/// A place in (x_mm, y_mm, theta_rad), as an offset from the centre bin, and its covariance.
-struct Peak {
-  glm::dvec3 offset{0.0};
-  glm::dmat3 covariance{0.0};
-};
-
-/// The bins within the window's radius.
-std::vector<DisplacedBin> displaced_bins(const BodyWindow& window) {
-  std::vector<DisplacedBin> bins;
-  for (const BodyWindow::Bin& bin : window.bins) {
-    if (bin.within_radius) {
-      bins.push_back({bin.moved_mm, bin.log_likelihood});
-    }
-  }
-  return bins;
-}
-
 /// A value at a place, and its weight in the fit.
 struct WeightedValue {
   glm::dvec3 at{0.0};
@@ -95,7 +78,7 @@ struct WeightedValue {
 };
 
 /// The maximum of a quadratic.
-struct QuadraticPeak {
+struct Peak {
   glm::dvec3 at{0.0};
   /// Inverse of minus the second derivatives: of the log of a density, its covariance.
   glm::dmat3 covariance{0.0};
@@ -135,8 +118,8 @@ bool solve(std::vector<double> matrix, std::vector<double>& right) {
 /// The maximum of the quadratic that fits the values in weighted least squares. Coordinates that do
 /// not vary stay at 0, without variance. Returns nothing where there are fewer than two values per
 /// coefficient, too few different places, or no maximum of at least `least_curvature`.
-std::optional<QuadraticPeak> quadratic_peak(std::span<const WeightedValue> values,
-                                            const std::array<bool, 3>& varies) {
+std::optional<Peak> quadratic_peak(std::span<const WeightedValue> values,
+                                   const std::array<bool, 3>& varies) {
   std::vector<int> axes;
   for (int axis = 0; axis < 3; ++axis) {
     if (varies[axis]) {
@@ -189,7 +172,7 @@ std::optional<QuadraticPeak> quadratic_peak(std::span<const WeightedValue> value
   if (!solve(curvature, peak)) {
     return {};
   }
-  QuadraticPeak result;
+  Peak result;
   for (std::size_t a = 0; a < d; ++a) {
     result.at[axes[a]] = peak[a];
     std::vector<double> column(d);
@@ -202,8 +185,9 @@ std::optional<QuadraticPeak> quadratic_peak(std::span<const WeightedValue> value
   return result;
 }
 
-/// Peak of the quadratic in the body's motion that fits the log-belief around the mean. Nothing
-/// where the fit has no peak nearby and within the region.
+/// Peak of the quadratic in the body's motion that fits the log-belief around the mean, in (x_mm,
+/// y_mm, theta_rad) from the centre bin. Nothing where the fit has no peak nearby and within the
+/// region.
 std::optional<Peak> peak_near(const BodyWindow& window, const PoseLattice& lattice,
                               const Body& body, const glm::dvec3& mean, double root) {
   const BodyMotion motion(body, window.centre + mean);
@@ -223,7 +207,7 @@ std::optional<Peak> peak_near(const BodyWindow& window, const PoseLattice& latti
   }
   const std::array<const Axis*, 3> axes{&lattice.x_mm, &lattice.y_mm, &lattice.theta_rad};
   const std::array varies{axes[0]->count > 1, axes[1]->count > 1, axes[2]->count > 1};
-  const std::optional<QuadraticPeak> fitted = quadratic_peak(values, varies);
+  const std::optional<Peak> fitted = quadratic_peak(values, varies);
   if (!fitted || glm::dot(fitted->at, fitted->at) > farthest_peak_mm * farthest_peak_mm) {
     return {};
   }
@@ -232,11 +216,11 @@ std::optional<Peak> peak_near(const BodyWindow& window, const PoseLattice& latti
   if (std::abs(change.z) > farthest_rad) {
     return {};
   }
-  Peak peak{.offset = mean};
+  Peak peak{.at = mean};
   glm::dmat3 slope{0.0};  // of the change in the motion, by columns
   for (int i = 0; i < 3; ++i) {
     if (varies[i]) {
-      peak.offset[i] += change[i];
+      peak.at[i] += change[i];
       const double at = window.centre[i] + mean[i] + change[i];
       const bool around = i == 2 && lattice.full_circle();
       if (!around && (at < axes[i]->lower || at > axes[i]->upper)) {
@@ -300,17 +284,19 @@ double on_circle(const Axis& theta, double theta_rad) {
   return theta_rad - period_rad * std::floor((theta_rad - theta.lower) / period_rad);
 }
 
-// A larger share suits coarse bins after many touches, a smaller share fine bins after few.
-constexpr double wanted_share = 1.0 / 3.0;
-// To an n of 1e20. Where bins differ by more nats, one bin has all the weight whatever the n.
-constexpr int most_doublings = 64;
+/// The bins within the window's radius.
+std::vector<BodyWindow::Bin> within_radius(const BodyWindow& window) {
+  std::vector<BodyWindow::Bin> bins;
+  std::ranges::copy_if(window.bins, std::back_inserter(bins), &BodyWindow::Bin::within_radius);
+  return bins;
+}
 
 /// Root mean square distance from the mean under weights exp(log-likelihood * inverse_root).
-double spread_mm(std::span<const DisplacedBin> bins, double top, double inverse_root) {
+double spread_mm(std::span<const BodyWindow::Bin> bins, double top, double inverse_root) {
   glm::dvec3 sum{0.0};
   double squares = 0.0;
   double total = 0.0;
-  for (const DisplacedBin& bin : bins) {
+  for (const BodyWindow::Bin& bin : bins) {
     const double weight = std::exp((bin.log_likelihood - top) * inverse_root);
     sum += weight * bin.moved_mm;
     squares += weight * glm::dot(bin.moved_mm, bin.moved_mm);
@@ -341,7 +327,7 @@ RefinedPose refine(const BoxLogLikelihood& log_likelihood, const PoseLattice& la
   BinIndex centre = bin_of(lattice, mode);
   for (int pass = 1; pass <= passes; ++pass) {
     window = body_window(log_likelihood, lattice, mode.object, body, centre, radius_mm);
-    root = flattening_root(displaced_bins(window), least_root);
+    root = flattening_root(within_radius(window), least_root);
     mean = weighted_mean(window, root);
     const BinIndex nearest = bin_at(lattice, centre, mean);
     if (nearest == centre) {
@@ -349,13 +335,13 @@ RefinedPose refine(const BoxLogLikelihood& log_likelihood, const PoseLattice& la
     }
     centre = nearest;
   }
-  Peak peak = peak_near(window, lattice, body, mean, root).value_or(Peak{.offset = mean});
+  Peak peak = peak_near(window, lattice, body, mean, root).value_or(Peak{.at = mean});
   // The quadratic's weights reach so far: what spreads more has another shape there.
   if (peak.covariance == glm::dmat3(0.0) ||
-      spread_mm(displaced_bins(window), window.largest, 1.0) > peak_sd_mm) {
-    peak.covariance = second_moment(window, lattice, peak.offset);
+      spread_mm(within_radius(window), window.largest, 1.0) > peak_sd_mm) {
+    peak.covariance = second_moment(window, lattice, peak.at);
   }
-  glm::dvec3 place = window.centre + peak.offset;
+  glm::dvec3 place = window.centre + peak.at;
   if (lattice.full_circle()) {
     place.z = on_circle(lattice.theta_rad, place.z);
   }
@@ -380,8 +366,12 @@ PoseLattice thinned(PoseLattice lattice) {
   return lattice;
 }
 
-double flattening_root(std::span<const DisplacedBin> bins, double least) {
-  const double top = std::ranges::max(bins, {}, &DisplacedBin::log_likelihood).log_likelihood;
+double flattening_root(std::span<const BodyWindow::Bin> bins, double least) {
+  // A larger share suits coarse bins after many touches, a smaller share fine bins after few.
+  constexpr double wanted_share = 1.0 / 3.0;
+  // To an n of 1e20. Where bins differ by more nats, one bin has all the weight whatever the n.
+  constexpr int most_doublings = 64;
+  const double top = std::ranges::max(bins, {}, &BodyWindow::Bin::log_likelihood).log_likelihood;
   const double wanted_mm = wanted_share * spread_mm(bins, top, 0.0);
   double root = least;
   double narrow_mm = spread_mm(bins, top, 1.0 / root);

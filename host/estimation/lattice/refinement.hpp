@@ -2,9 +2,8 @@
 
 #include <span>
 
-#include <glm/vec3.hpp>
-
 #include "estimation/bin_box.hpp"
+#include "estimation/lattice/body_window.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
 #include "palpate/pose_error.hpp"
@@ -26,16 +25,10 @@ RefinedPose refine(const BoxLogLikelihood& log_likelihood, const PoseLattice& la
 /// within the lattice's, and its centres are centres of the lattice.
 PoseLattice thinned(PoseLattice lattice);
 
-/// A bin of a window.
-struct DisplacedBin {
-  glm::dvec3 moved_mm{0.0};  ///< how far the bin moves the object: shift and turn, in mm
-  double log_likelihood = 0.0;
-};
-
 /// The n, at least `least`, for which the bins under weights belief^(1/n) spread by a third of
 /// their spread under equal weights. The spread is the root mean square distance from the weighted
 /// mean. Returns `least` where the bins spread as far already. docs/refinement.md says why.
 /// @param bins at least one
-double flattening_root(std::span<const DisplacedBin> bins, double least);
+double flattening_root(std::span<const BodyWindow::Bin> bins, double least);
 
 }  // namespace palpate

@@ -11,7 +11,7 @@
 #include <gtest/gtest.h>
 #include <tbb/task_arena.h>
 
-#include "bins_by_definition.hpp"
+#include "bound_cases.hpp"
 #include "support/errors.hpp"
 #include "support/every_set_of_instructions.hpp"
 #include "support/synthetic.hpp"

@@ -71,14 +71,4 @@ TEST(BoundedGain, IsThatOfTheHistogram) {
   }
 }
 
-TEST(BoundedGain, IsReproducibleBySeed) {
-  BoundedPosterior bounded(two_shapes(), small_options());
-  bounded.update(touches_of_l(1, 861).touch(0));
-  const auto gain = [&](std::uint64_t seed) {
-    return bounded.expected_gain(candidates, digitacts_array(), {.seed = seed})[1].both();
-  };
-  EXPECT_EQ(gain(3), gain(3));
-  EXPECT_NE(gain(3), gain(4));
-}
-
 }  // namespace palpate::bounded_gain_test

@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "bins_by_definition.hpp"
+#include "bound_cases.hpp"
 #include "bounded_set_up.hpp"
 #include "support/certified.hpp"
 #include "support/touched_shape.hpp"

@@ -244,7 +244,7 @@ TEST(InstructionSets, GiveThePosteriorTheSameBits) {
     }
     std::optional<std::vector<std::vector<double>>> plain;
     with_every_set_of_instructions([&](const std::string& name) {
-      EXPECT_EQ(BinLikelihood::instructions(), name);
+      EXPECT_EQ(vector_instructions(), name);
       const std::vector<std::vector<double>> told = told_after_each(trial);
       EXPECT_EQ(told, plain.value_or(told)) << name;
       plain = told;

@@ -10,7 +10,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "bins_by_definition.hpp"
+#include "bound_cases.hpp"
 #include "estimation/hypotheses.hpp"
 #include "support/limits.hpp"
 #include "support/sanitized.hpp"

@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "bins_by_definition.hpp"
+#include "bound_cases.hpp"
 #include "model/interpolated_map.hpp"
 #include "support/limits.hpp"
 #include "support/synthetic.hpp"

@@ -117,31 +117,32 @@ std::int64_t expect_sound_search(const BinCase& of, double tolerance) {
       .lattice = of.lattice, .contact = of.contact, .tolerance = tolerance};
   const BinLikelihood likelihood(hypotheses, of.contact, of.lattice);
   SearchSpace space(hypotheses, options);
-  BoundSearch search(space, options, likelihood);
-  search.largest().add(of.elements);
+  LargestTiles largest(space);
+  largest.add(of.elements);
   // [object][bin], nan where a bin is not visited
   std::vector<std::vector<double>> visited(
       2, std::vector(static_cast<std::size_t>(of.lattice.bins()), nan));
   std::int64_t together = 0;
   bool once = true;
-  const SearchResult result = search.run(
-      of.elements, {.tolerance = tolerance}, Deadline({}),
-      [&](const BinBox& box, std::span<const double> values) {
-        const bool alike = values.size() == 1;
-        once = once && box.x_first + box.x_count <= of.lattice.x_mm.count &&
-               box.y_first + box.y_count <= of.lattice.y_mm.count;
-        for (std::int64_t i = 0; once && i < box.bins(); ++i) {
-          double& value = visited[static_cast<std::size_t>(box.object)]
-                                 [static_cast<std::size_t>(box.bin(i, of.lattice))];
-          once = std::isnan(value);
-          value = values[alike ? 0 : static_cast<std::size_t>(i)];
-        }
-        if (alike && box.bins() > 1) {
-          EXPECT_NEAR(values[0], prior_log_likelihood(of, static_cast<std::size_t>(box.object)),
-                      likelihood.error(static_cast<std::size_t>(box.object), of.elements));
-          together += box.bins();
-        }
-      });
+  const BinVisitor visit = [&](const BinBox& box, std::span<const double> values) {
+    const bool alike = values.size() == 1;
+    once = once && box.x_first + box.x_count <= of.lattice.x_mm.count &&
+           box.y_first + box.y_count <= of.lattice.y_mm.count;
+    for (std::int64_t i = 0; once && i < box.bins(); ++i) {
+      double& value = visited[static_cast<std::size_t>(box.object)]
+                             [static_cast<std::size_t>(box.bin(i, of.lattice))];
+      once = std::isnan(value);
+      value = values[alike ? 0 : static_cast<std::size_t>(i)];
+    }
+    if (alike && box.bins() > 1) {
+      EXPECT_NEAR(values[0], prior_log_likelihood(of, static_cast<std::size_t>(box.object)),
+                  likelihood.error(static_cast<std::size_t>(box.object), of.elements));
+      together += box.bins();
+    }
+  };
+  const SearchResult result = run_search(
+      {space, options, likelihood, of.elements, {.tolerance = tolerance}, Deadline({}), visit},
+      largest);
   EXPECT_TRUE(once) << "a bin was visited twice, or is none";
   for (std::size_t object = 0; object < 2; ++object) {
     const double rounding = 2.0 * likelihood.error(object, of.elements);

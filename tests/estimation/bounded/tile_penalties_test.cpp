@@ -1,6 +1,6 @@
 // Tables of the least penalties of windows, and the penalties of tiles, which they sum.
 
-#include "estimation/bounded/tables/tile_penalties.hpp"
+#include "estimation/bounded/tables/window_table.hpp"
 
 #include <algorithm>
 #include <array>
@@ -12,8 +12,7 @@
 
 #include <gtest/gtest.h>
 
-#include "bins_by_definition.hpp"
-#include "estimation/bounded/tables/window_table.hpp"
+#include "bound_cases.hpp"
 #include "support/every_set_of_instructions.hpp"
 #include "support/synthetic.hpp"
 

@@ -328,11 +328,11 @@ TEST(DisplacedBody, OfAMapWithoutAnOccupiedCellIsTheWholeGrid) {
 
 /// Bins 0.1 mm apart within 2 mm, with logs that fall by `nats` over the first millimetre from the
 /// middle and with its square.
-std::vector<DisplacedBin> parabola(double nats) {
-  std::vector<DisplacedBin> bins;
+std::vector<BodyWindow::Bin> parabola(double nats) {
+  std::vector<BodyWindow::Bin> bins;
   for (int i = -20; i <= 20; ++i) {
     const double mm = 0.1 * i;
-    bins.push_back({{mm, 0.0, 0.0}, -1e6 - nats * mm * mm});
+    bins.push_back({.moved_mm = {mm, 0.0, 0.0}, .log_likelihood = -1e6 - nats * mm * mm});
   }
   return bins;
 }
@@ -358,8 +358,9 @@ TEST(FlatteningRoot, FollowsTheBeliefWithoutSteps) {
 }
 
 TEST(FlatteningRoot, OfOneBinOrOneThatHasItAllIsFinite) {
-  EXPECT_EQ(flattening_root(std::vector<DisplacedBin>{{{0.0, 0.0, 0.0}, -5.0}}, 8.0), 8.0);
-  const std::vector<DisplacedBin> certain{{{0.0, 0.0, 0.0}, 0.0}, {{1.0, 0.0, 0.0}, -1e30}};
+  EXPECT_EQ(flattening_root(std::vector<BodyWindow::Bin>{{.log_likelihood = -5.0}}, 8.0), 8.0);
+  const std::vector<BodyWindow::Bin> certain{
+      {}, {.moved_mm = {1.0, 0.0, 0.0}, .log_likelihood = -1e30}};
   EXPECT_TRUE(std::isfinite(flattening_root(certain, 8.0)));
 }
 

@@ -10,6 +10,17 @@
 #include "estimation/bounded/displaced/blurred_plane.hpp"
 #include "estimation/parallel_for.hpp"
 
+// The mean of a touch's likelihood f over displacements, at a place p of one theta:
+//
+//   mean(p) = sum over taps of w B(p + d) / sum over taps of w inside(p + d)
+//
+// A tap (see DisplacementWeights) takes with weight w from one theta what lies d away, where the
+// turn moves the place to. B is f at this theta, blurred along y and then along x, each time over
+// the weights inside the region. Between bins, B is bilinear, and inside() the part of the bilinear
+// weights that lies in the region. Places that are tiles of several bins take upper bounds: f the
+// largest likelihood of a tile, the blurs' weights those of AxisBlur, B the largest of the four
+// tiles that p + d lies between, and inside() the least of any bin.
+
 namespace palpate {
 
 namespace {
@@ -18,11 +29,6 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr int side = BlockRun::side;
 
 int floor_quotient(int value, int by) { return value >= 0 ? value / by : -((by - 1 - value) / by); }
-
-/// Blocks of places along an axis.
-int blocks_of(const AxisBlur& axis) {
-  return (static_cast<int>(axis.scale.size()) + side - 1) / side;
-}
 
 /// Places by which a tap moves a place's first bin, rounded down.
 glm::ivec2 places_of(const Tap& tap, int bins) {
@@ -42,7 +48,7 @@ BlockRange blocks_taken(const Tap& tap, const BlockRun& run, const PlaceWeights&
 }
 
 /// The least part of a tap's bilinear weights that lies inside the region, for any bin of a place.
-inline double weight_inside(int place, int bins, const Axis& axis, int moved, double fraction) {
+double weight_inside(int place, int bins, const Axis& axis, int moved, double fraction) {
   const int end = std::min((place + 1) * bins, axis.count);
   if (place * bins + moved >= 0 && end + moved < axis.count) {
     return (1.0 - fraction) + fraction;  // all bins of most places lie inside
@@ -198,28 +204,26 @@ std::optional<std::vector<double>> average(const PlaceWeights& weights,
                                            const glm::dvec2& sensor_from_pivot_mm,
                                            std::span<const BlockRun> targets,
                                            const PlaceSource<typename Domain::Value>& source) {
-  const auto thetas = static_cast<std::size_t>(weights.touch.lattice().theta_rad.count);
+  /// The targets of one theta.
   struct Target {
     std::size_t first = 0;  ///< run
     std::size_t end = 0;
     std::size_t place = 0;  ///< of the first run's results
     std::vector<Tap> taps = {};
   };
+  const auto thetas = static_cast<std::size_t>(weights.touch.lattice().theta_rad.count);
   std::vector<Target> of_theta;
   std::size_t places = 0;
-  std::vector<BlockRange> ranges(thetas);
   std::vector<std::vector<BlockRange>> asked(thetas);
   for (std::size_t i = 0; i < targets.size(); ++i) {
-    if (i == 0 || targets[i].theta != targets[i - 1].theta) {
-      of_theta.push_back(
-          {i, i, places, weights.touch.taps(targets[i].theta, sensor_from_pivot_mm)});
+    const BlockRun& run = targets[i];
+    if (i == 0 || run.theta != targets[i - 1].theta) {
+      of_theta.push_back({i, i, places, weights.touch.taps(run.theta, sensor_from_pivot_mm)});
     }
     of_theta.back().end = i + 1;
-    places += static_cast<std::size_t>(targets[i].count) * BlockRun::places;
+    places += static_cast<std::size_t>(run.count) * BlockRun::places;
     for (const Tap& tap : of_theta.back().taps) {
-      const BlockRange taken = blocks_taken(tap, targets[i], weights);
-      if (!taken.empty()) {
-        ranges[tap.theta].take_in(taken);
+      if (const BlockRange taken = blocks_taken(tap, run, weights); !taken.empty()) {
         asked[tap.theta].push_back(taken);
       }
     }
@@ -229,8 +233,8 @@ std::optional<std::vector<double>> average(const PlaceWeights& weights,
   const BlurIn<Domain> blur_y(weights.y);
   parallel_for(thetas, [&](std::size_t theta) {
     if (!asked[theta].empty()) {
-      planes[theta] = blurred_plane<Domain>(static_cast<int>(theta), ranges[theta], asked[theta],
-                                            blur_x, blur_y, weights.bins > 1, source);
+      planes[theta] = blurred_plane<Domain>(static_cast<int>(theta), asked[theta], blur_x, blur_y,
+                                            weights.bins > 1, source);
     }
   });
   std::vector<double> means(places);

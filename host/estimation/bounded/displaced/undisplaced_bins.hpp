@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cstddef>
@@ -31,10 +32,42 @@ class UndisplacedBins {
   /// Copies those bins that are kept. @returns the others
   /// @param runs of one theta
   std::vector<BlockRun> copy(std::size_t object, std::span<const BlockRun> runs,
-                             const PlaceRows<double>& to) const;
+                             const PlaceRows<double>& to) const {
+    constexpr int side = BlockRun::side;
+    std::vector<BlockRun> others;
+    for (const BlockRun& run : runs) {
+      const Plane& plane = planes_[object * thetas_ + static_cast<std::size_t>(run.theta)];
+      for (int x = run.x; x < run.x + run.count; ++x) {
+        const auto kept = plane.find(place(run.y, x));
+        if (kept == plane.end()) {
+          append_block(run.theta, run.y, x, others);
+          continue;
+        }
+        for (int j = 0; j < side; ++j) {
+          std::copy_n(kept->second.data() + side * j, side, to.at(side * x, side * run.y + j));
+        }
+      }
+    }
+    return others;
+  }
   /// Keeps bins that copy() did not find, as far as there is room.
   /// @param runs of one theta
-  void keep(std::size_t object, std::span<const BlockRun> runs, const PlaceRows<double>& from);
+  void keep(std::size_t object, std::span<const BlockRun> runs, const PlaceRows<double>& from) {
+    constexpr int side = BlockRun::side;
+    for (const BlockRun& run : runs) {
+      Plane& plane = planes_[object * thetas_ + static_cast<std::size_t>(run.theta)];
+      for (int x = run.x; x < run.x + run.count; ++x) {
+        if (--room_ < 0) {  // other threads take room, too
+          ++room_;
+          return;
+        }
+        Block& block = plane[place(run.y, x)];
+        for (int j = 0; j < side; ++j) {
+          std::copy_n(from.at(side * x, side * run.y + j), side, block.data() + side * j);
+        }
+      }
+    }
+  }
   /// Host memory of what is kept, about.
   std::size_t bytes() const { return static_cast<std::size_t>(most_ - room_) * block_bytes; }
 
@@ -45,6 +78,10 @@ class UndisplacedBins {
   using Plane = std::unordered_map<std::uint64_t, Block>;
   /// With its place in the table.
   static constexpr std::size_t block_bytes = sizeof(Plane::value_type) + 3 * sizeof(void*);
+
+  static std::uint64_t place(int y, int x) {
+    return static_cast<std::uint64_t>(y) << 32 | static_cast<std::uint32_t>(x);
+  }
 
   std::size_t thetas_;
   std::vector<Plane> planes_;       ///< [object, theta]

@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <optional>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "estimation/bin_box.hpp"
@@ -68,8 +67,6 @@ class BinLikelihood {
 
   /// Host memory that the maps' nodes and the table hold.
   std::uint64_t bytes() const;
-  /// The vector instructions in use, such as "AVX3".
-  static std::string instructions() { return vector_instructions(); }
 
  private:
   /// Bins as if all touches were exact, on the caller's thread.

@@ -1,13 +1,6 @@
 // Bilinear interpolation between the nodes of MapPatches, for files that are compiled once for
 // every set of instructions.
 
-#if defined(PALPATE_PATCH_INTERPOLATION_INL) == defined(HWY_TARGET_TOGGLE)
-#ifdef PALPATE_PATCH_INTERPOLATION_INL
-#undef PALPATE_PATCH_INTERPOLATION_INL
-#else
-#define PALPATE_PATCH_INTERPOLATION_INL
-#endif
-
 #include <cstddef>
 #include <cstdint>
 
@@ -203,5 +196,3 @@ HWY_INLINE hn::Vec<D> log_odds(D d, const MapPatches& map, const LanesOfBlock<D>
 }  // namespace HWY_NAMESPACE
 }  // namespace palpate
 HWY_AFTER_NAMESPACE();
-
-#endif

@@ -1,13 +1,6 @@
 // The likelihood of bins: by Eq. 7 as products over the elements (ReadingForm), or as sums of the
 // elements' logs. For files that are compiled once for every set of instructions.
 
-#if defined(PALPATE_READING_LIKELIHOOD_INL) == defined(HWY_TARGET_TOGGLE)
-#ifdef PALPATE_READING_LIKELIHOOD_INL
-#undef PALPATE_READING_LIKELIHOOD_INL
-#else
-#define PALPATE_READING_LIKELIHOOD_INL
-#endif
-
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -15,7 +8,6 @@
 #include <hwy/highway.h>
 
 #include "estimation/bounded/leaves/bin_kernel.hpp"
-#include "estimation/bounded/leaves/patch_interpolation-inl.hpp"
 #include "model/vector_math-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
@@ -171,5 +163,3 @@ class TableRow {
 }  // namespace HWY_NAMESPACE
 }  // namespace palpate
 HWY_AFTER_NAMESPACE();
-
-#endif

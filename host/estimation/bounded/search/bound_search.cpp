@@ -306,20 +306,15 @@ class SearchRun {
 
 }  // namespace
 
-SearchResult BoundSearch::run(const KnownElements& elements, const SearchGoal& goal,
-                              const Deadline& deadline, const BinVisitor& visit,
-                              std::vector<PoseBlock>* refined) const {
-  std::vector<double> error;
-  for (std::size_t i = 0; i < space_.bounds.size(); ++i) {
-    error.push_back(likelihood_.error(i, elements));
+SearchResult run_search(SearchTask task, const LargestTiles& largest,
+                        std::vector<PoseBlock>* refined) {
+  for (std::size_t i = 0; i < task.space.bounds.size(); ++i) {
+    task.error.push_back(task.likelihood.error(i, task.elements));
   }
   // What rounding leaves may be used up.
-  SearchGoal reachable = goal;
-  reachable.tolerance =
-      std::max(goal.tolerance - 1.1 * std::ranges::max(error), goal.tolerance / 4.0);
-  return SearchRun({space_, options_, likelihood_, elements, error, reachable, deadline, visit},
-                   largest_, refined)
-      .result();
+  double& tolerance = task.goal.tolerance;
+  tolerance = std::max(tolerance - 1.1 * std::ranges::max(task.error), tolerance / 4.0);
+  return SearchRun(task, largest, refined).result();
 }
 
 PoseBlock block_of(const BinBox& box, std::size_t level) {

@@ -16,11 +16,11 @@ namespace {
 
 /// Bins that are evaluated before the total is looked at again: few at first, for the best ones
 /// raise it most.
-constexpr std::int64_t first_batch = 1024;
+constexpr std::size_t first_batch = 1024;
 /// As many where touches are displaced: then most work lies in the bins within reach of a batch's.
-constexpr std::int64_t first_displaced = 16384;
+constexpr std::size_t first_displaced = 16384;
 /// Products of bins and elements, where a budget must not be overdrawn by much: a few ms.
-constexpr std::int64_t budgeted_work = 5'000'000;
+constexpr std::size_t budgeted_work = 5'000'000;
 constexpr std::size_t leaves_per_task = 16;
 /// See BoundedOptions::poor_bins.
 constexpr double poor_share = 0.75;
@@ -50,7 +50,7 @@ Leaves::Leaves(const SearchTask& task, MassAccount& account)
 std::vector<BinBox> Leaves::boxes_of(std::span<const Tile> tiles) const {
   std::vector<BinBox> boxes;
   for (const Tile& tile : tiles) {
-    boxes.push_back(box_of(tile));
+    boxes.push_back(level_of(tile).box_of(tile));
   }
   return boxes;
 }
@@ -76,33 +76,32 @@ void Leaves::look(std::span<const Tile> tiles) {
 std::vector<Leaves::Family> Leaves::families_of(std::span<const Tile> tiles,
                                                 UnsettledMass& left) const {
   std::vector<Family> families;
-  // Single bins lie too far apart to be evaluated together, but where touches are displaced: those
-  // between them are evaluated all the same.
-  const bool alone = task_.space.bounds.front().levels().back().size.bins > 0 && !displaced_;
-  const int shift = alone ? 0 : std::countr_zero(unsigned{batch_side});
-  for (std::size_t i = 0; i < tiles.size(); ++i) {
-    const Tile& tile = tiles[i];
-    if (i == 0 || tile.object != tiles[i - 1].object || tile.theta != tiles[i - 1].theta ||
-        tile.y >> shift != tiles[i - 1].y >> shift || tile.x >> shift != tiles[i - 1].x >> shift) {
-      families.push_back({.first = i, .end = i, .slot = UnsettledMass::slots});
+  // Tiles of one bin lie too far apart to be evaluated together, but where touches are displaced:
+  // the bins between them are evaluated all the same.
+  const bool single_bins = task_.space.bounds.front().levels().back().size.bins > 0 && !displaced_;
+  const int shift = single_bins ? 0 : std::countr_zero(unsigned{batch_side});
+  const auto parent = [&](const Tile& tile) {
+    return std::tuple(tile.object, tile.theta, tile.y >> shift, tile.x >> shift);
+  };
+  for (std::size_t first = 0, end = 0; first < tiles.size(); first = end) {
+    Family& family = families.emplace_back();
+    for (; end < tiles.size() && parent(tiles[end]) == parent(tiles[first]); ++end) {
+      family.slot = std::min(family.slot, left.slot(tiles[end].bound));
+      if (probed(tiles[end])) {
+        family.probed = true;
+        remove(tiles[end], left);
+      }
     }
-    Family& family = families.back();
-    ++family.end;
-    family.slot = std::min(family.slot, left.slot(tile.bound));
-    if (probed(tile)) {
-      family.probed = true;
-      remove(tile, left);
-    }
+    family.tiles = tiles.subspan(first, end - first);
   }
   return families;
 }
 
-void Leaves::take(const Family& family, std::span<const Tile> tiles,
-                  const std::vector<std::size_t>& from, UnsettledMass& left,
+void Leaves::take(const Family& family, std::span<const std::size_t> from, UnsettledMass& left,
                   std::vector<BinBox>& boxes) const {
-  const Tile& first = tiles[family.first];
+  const Tile& first = family.tiles.front();
   std::optional<TileRange> range;
-  for (const Tile& tile : tiles.subspan(family.first, family.end - family.first)) {
+  for (const Tile& tile : family.tiles) {
     if (left.slot(tile.bound) >= from[tile.object]) {
       continue;
     }
@@ -114,18 +113,17 @@ void Leaves::take(const Family& family, std::span<const Tile> tiles,
                     : TileRange{tile.x, tile.x + 1, tile.y, tile.y + 1};
     } else if (!probed(tile)) {
       // No bin may be settled twice.
-      boxes.push_back(box_of(tile));
+      boxes.push_back(level_of(tile).box_of(tile));
       remove(tile, left);
     }
   }
   if (range) {
-    for (const Tile& tile : tiles.subspan(family.first, family.end - family.first)) {
+    for (const Tile& tile : family.tiles) {
       if (range->holds(tile)) {
         remove(tile, left);
       }
     }
-    boxes.push_back(
-        task_.space.bounds[first.object].levels().back().box_of(first.object, first.theta, *range));
+    boxes.push_back(level_of(first).box_of(first.object, first.theta, *range));
   }
 }
 
@@ -137,22 +135,19 @@ void Leaves::evaluate(std::span<const Tile> tiles, double tolerance) {
   std::vector<Family> families = families_of(tiles, left);
   std::vector<std::size_t> from = account_.droppable_from(left, tolerance);
   std::erase_if(families, [&](const Family& family) {
-    return family.slot >= from[tiles[family.first].object];
+    return family.slot >= from[family.tiles.front().object];
   });
   std::ranges::stable_sort(families, {}, &Family::slot);
-  const auto elements = static_cast<std::int64_t>(task_.elements.from_pivot_mm.size()) + 1;
-  const std::int64_t most =
+  const std::size_t elements = task_.elements.from_pivot_mm.size() + 1;
+  const std::size_t most =
       task_.deadline.exists() ? std::max(first_batch, budgeted_work / elements) : largest_batch;
-  std::int64_t size = displaced_ ? first_displaced : first_batch;
+  std::size_t size = displaced_ ? first_displaced : first_batch;
   for (std::size_t next = 0; next < families.size() && !ended();) {
     std::vector<BinBox> boxes;
-    std::int64_t bins = 0;
-    for (; next < families.size() && bins < size; ++next) {
+    for (std::size_t bins = 0; next < families.size() && bins < size; ++next) {
       const std::size_t before = boxes.size();
-      take(families[next], tiles, from, left, boxes);
-      for (const BinBox& box : std::span(boxes).subspan(before)) {
-        bins += box.bins();
-      }
+      take(families[next], from, left, boxes);
+      bins += bins_in(std::span(boxes).subspan(before));
     }
     add(std::move(boxes));
     from = account_.droppable_from(left, tolerance);
@@ -161,7 +156,7 @@ void Leaves::evaluate(std::span<const Tile> tiles, double tolerance) {
       // The best have told the total. Bins that lie together share all within reach of them.
       size = most;
       std::ranges::sort(families.begin() + static_cast<std::ptrdiff_t>(next), families.end(), {},
-                        &Family::first);
+                        [](const Family& family) { return family.tiles.data(); });
     }
   }
   account_.drop(left);

@@ -12,7 +12,7 @@
 namespace palpate {
 
 /// Bins that are evaluated together at most, but for the last tile's: limits the memory for them.
-inline constexpr std::int64_t largest_batch = 500'000;
+inline constexpr std::size_t largest_batch = 500'000;
 
 /// The last step of a search by bounds: evaluates the bins of the smallest tiles in the order of
 /// their bounds, as boxes, the leaves.
@@ -38,13 +38,12 @@ class Leaves {
   }
 
  private:
-  /// The parts of one tile, [first, end) of a list. Those that are needed are evaluated together,
-  /// as one box with those between them: fuller vectors.
+  /// Parts of one tile. Those that are needed are evaluated together, as one box with those between
+  /// them: fuller vectors.
   struct Family {
-    std::size_t first = 0;
-    std::size_t end = 0;
-    std::size_t slot = 0;  ///< of the largest bound
-    bool probed = false;   ///< one of them was evaluated
+    std::span<const Tile> tiles;
+    std::size_t slot = UnsettledMass::slots;  ///< of the largest bound
+    bool probed = false;                      ///< one of them was evaluated
   };
   struct Leaf {
     BinBox box;
@@ -53,19 +52,21 @@ class Leaves {
     double largest = 0.0;
   };
 
-  BinBox box_of(const Tile& tile) const {
-    return task_.space.bounds[tile.object].levels().back().box_of(tile);
+  const TileLevel& level_of(const Tile& tile) const {
+    return task_.space.bounds[tile.object].levels().back();
   }
   std::vector<BinBox> boxes_of(std::span<const Tile> tiles) const;
   bool probed(const Tile& tile) const;
   void remove(const Tile& tile, UnsettledMass& left) const {
-    left.remove(static_cast<std::size_t>(tile.object), tile.bound, box_of(tile).bins());
+    left.remove(static_cast<std::size_t>(tile.object), tile.bound,
+                level_of(tile).box_of(tile).bins());
   }
-  /// Removes those that were probed from what is left.
+  /// The families of tiles that are sorted by place. Removes those that were probed from what is
+  /// left.
   std::vector<Family> families_of(std::span<const Tile> tiles, UnsettledMass& left) const;
-  /// Takes a family's tiles before the slots `from` out of what is left, as boxes.
-  void take(const Family& family, std::span<const Tile> tiles, const std::vector<std::size_t>& from,
-            UnsettledMass& left, std::vector<BinBox>& boxes) const;
+  /// Takes a family's tiles before the slots `from`, [object], out of what is left, as boxes.
+  void take(const Family& family, std::span<const std::size_t> from, UnsettledMass& left,
+            std::vector<BinBox>& boxes) const;
   /// Evaluates the bins of boxes.
   /// @returns the leaves, sorted by place, with the sums of their bins
   std::vector<Leaf> evaluated(std::vector<BinBox> boxes);

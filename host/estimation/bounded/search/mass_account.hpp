@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "estimation/bin_box.hpp"
-#include "estimation/bounded/search/search_goal.hpp"
+#include "estimation/bounded/search/search_space.hpp"
 #include "estimation/log_sum.hpp"
 #include "palpate/lattice.hpp"
 

@@ -96,14 +96,6 @@ void TileDivision::for_largest(std::size_t row, const std::int64_t& end_sum,
   }
 }
 
-double TileDivision::bound_of(std::size_t object, std::size_t level, std::int64_t penalties) const {
-  return unpenalised_[object][level] - static_cast<double>(penalties) / penalties_per_nat;
-}
-
-double TileDivision::bound_of_largest(std::size_t object, std::int32_t sum) const {
-  return bound_of(object, 0, largest_.off_map(object) + sum);
-}
-
 std::vector<BinBox> TileDivision::off_map() const {
   std::vector<BinBox> boxes;
   for (std::size_t row = 0; row < seen_.size(); ++row) {
@@ -176,38 +168,51 @@ std::vector<Tile> TileDivision::best_smallest(std::vector<Tile> tiles, std::size
 
 std::vector<Tile> TileDivision::parts_of(std::span<const Tile> tiles, std::size_t level,
                                          std::vector<Tile>* off_map) {
-  const std::vector<std::int64_t> sums = sums_of_parts(tiles, level + 1);
   std::vector<Tile> parts;
-  parts.reserve(sums.size());
-  TileRange seen;
-  for (std::size_t i = 0; i < tiles.size(); ++i) {
-    const Tile& tile = tiles[i];
-    if (i == 0 || tile.object != tiles[i - 1].object || tile.theta != tiles[i - 1].theta) {
-      seen = seen_tiles(reaches_[tile.theta], space_.maps[tile.object],
-                        space_.bounds[tile.object].levels()[level + 1]);
+  parts.reserve(tiles.size() * batch_tiles);
+  for (std::size_t first = 0, end = 0; first < tiles.size(); first = end) {
+    while (end < tiles.size() && tiles[end].object == tiles[first].object) {
+      ++end;
     }
-    append_parts(tile, level + 1, std::span(sums).subspan(i * batch_tiles, batch_tiles), seen,
-                 parts, off_map);
+    append_parts(tiles.subspan(first, end - first), level + 1, parts, off_map);
   }
   bounded_ += static_cast<std::int64_t>(parts.size());
   return parts;
 }
 
+void TileDivision::append_parts(std::span<const Tile> tiles, std::size_t level,
+                                std::vector<Tile>& parts, std::vector<Tile>* off_map) const {
+  const auto object = static_cast<std::size_t>(tiles.front().object);
+  const std::vector<std::int64_t> sums = sums_of_parts(tiles, level);
+  const TileLevel& tiling = space_.bounds[object].levels()[level];
+  TileRange seen;
+  for (std::size_t i = 0; i < tiles.size(); ++i) {
+    const Tile& of = tiles[i];
+    if (i == 0 || of.theta != tiles[i - 1].theta) {
+      seen = seen_tiles(reaches_[of.theta], space_.maps[object], tiling);
+    }
+    for (int row = 0; row < batch_side; ++row) {
+      const int y = batch_side * of.y + row;
+      for (int column = 0; column < batch_side && tiling.y.bins(y) > 0; ++column) {
+        const std::int64_t penalties = sums[i * batch_tiles + batch_side * column + row];
+        const Tile part{bound_of(object, level, penalties), of.object, of.theta,
+                        batch_side * of.x + column, y};
+        if (tiling.x.bins(part.x) == 0) {
+          continue;
+        }
+        if (seen.holds(part)) {
+          parts.push_back(part);
+        } else if (off_map != nullptr) {
+          off_map->push_back(part);
+        }
+      }
+    }
+  }
+}
+
 std::vector<std::int64_t> TileDivision::sums_of_parts(std::span<const Tile> tiles,
                                                       std::size_t level) const {
   std::vector<std::int64_t> sums(tiles.size() * batch_tiles);
-  for (std::size_t first = 0, end = 0; first < tiles.size(); first = end) {
-    while (end < tiles.size() && tiles[end].object == tiles[first].object) {
-      ++end;
-    }
-    add_items(tiles.subspan(first, end - first), level,
-              std::span(sums).subspan(first * batch_tiles, (end - first) * batch_tiles));
-  }
-  return sums;
-}
-
-void TileDivision::add_items(std::span<const Tile> tiles, std::size_t level,
-                             std::span<std::int64_t> sums) const {
   const auto object = static_cast<std::size_t>(tiles.front().object);
   const std::span<const KnownElements> items = task_.elements.items();
   const std::vector<std::size_t> order = sorted_touches(items);
@@ -231,7 +236,7 @@ void TileDivision::add_items(std::span<const Tile> tiles, std::size_t level,
     rest -= least[i];
     auto from = added.begin();
     std::erase_if(open, [&](std::size_t tile) {
-      const auto of_tile = sums.subspan(tile * batch_tiles, batch_tiles);
+      const auto of_tile = std::span(sums).subspan(tile * batch_tiles, batch_tiles);
       std::transform(of_tile.begin(), of_tile.end(), from, of_tile.begin(), std::plus());
       from += batch_tiles;
       const std::int64_t best = rest + std::ranges::min(of_tile);
@@ -244,29 +249,7 @@ void TileDivision::add_items(std::span<const Tile> tiles, std::size_t level,
       return closed;
     });
   }
-}
-
-void TileDivision::append_parts(const Tile& of, std::size_t level,
-                                std::span<const std::int64_t> sums, const TileRange& seen,
-                                std::vector<Tile>& parts, std::vector<Tile>* off_map) const {
-  const TileLevel& tiling = space_.bounds[of.object].levels()[level];
-  const double unpenalised = unpenalised_[of.object][level];
-  for (int j = 0; j < batch_side; ++j) {
-    const int y = batch_side * of.y + j;
-    for (int i = 0; i < batch_side && tiling.y.bins(y) > 0; ++i) {
-      const auto penalties = static_cast<double>(sums[batch_side * i + j]);
-      const Tile part{unpenalised - penalties / penalties_per_nat, of.object, of.theta,
-                      batch_side * of.x + i, y};
-      if (tiling.x.bins(part.x) == 0) {
-        continue;
-      }
-      if (seen.holds(part)) {
-        parts.push_back(part);
-      } else if (off_map != nullptr) {
-        off_map->push_back(part);
-      }
-    }
-  }
+  return sums;
 }
 
 }  // namespace palpate

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "estimation/bounded/search/largest_tiles.hpp"
+#include "estimation/bounded/search/item_bounds.hpp"
 #include "estimation/bounded/search/mass_account.hpp"
 #include "estimation/bounded/search/search_space.hpp"
 #include "estimation/known_elements.hpp"
@@ -68,20 +68,19 @@ class TileDivision {
   template <typename Visit>
   void for_largest(std::size_t row, const std::int64_t& end_sum, const Visit& visit) const;
   /// The bound of a tile, from the sum of its elements' penalties.
-  double bound_of(std::size_t object, std::size_t level, std::int64_t penalties) const;
+  double bound_of(std::size_t object, std::size_t level, std::int64_t penalties) const {
+    return unpenalised_[object][level] - static_cast<double>(penalties) / penalties_per_nat;
+  }
   /// The bound of a largest tile, from the sum that LargestTiles keeps.
-  double bound_of_largest(std::size_t object, std::int32_t sum) const;
-  /// The sums of the elements' penalties over the parts of tiles, [tile, part], which are tiles of
-  /// this level.
+  double bound_of_largest(std::size_t object, std::int32_t sum) const {
+    return bound_of(object, 0, largest_.off_map(object) + sum);
+  }
+  /// The sums of the elements' penalties over the parts of one object's tiles, [tile, x, y].
+  /// @param level of the parts
   std::vector<std::int64_t> sums_of_parts(std::span<const Tile> tiles, std::size_t level) const;
-  /// Adds those of one object's tiles.
-  void add_items(std::span<const Tile> tiles, std::size_t level,
-                 std::span<std::int64_t> sums) const;
-  /// Appends those parts of a tile, which are tiles of this level, that hold bins.
-  /// @param sums of their penalties, [x, y]
-  /// @param seen the tiles that see the map; where not null, off_map takes the others
-  void append_parts(const Tile& of, std::size_t level, std::span<const std::int64_t> sums,
-                    const TileRange& seen, std::vector<Tile>& parts,
+  /// Appends the parts of one object's tiles; see parts_of().
+  /// @param level of the parts
+  void append_parts(std::span<const Tile> tiles, std::size_t level, std::vector<Tile>& parts,
                     std::vector<Tile>* off_map) const;
 
   const SearchTask& task_;

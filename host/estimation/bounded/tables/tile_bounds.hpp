@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "estimation/bin_box.hpp"
-#include "estimation/bounded/tables/tile_penalties.hpp"
 #include "estimation/bounded/tables/window_table.hpp"
 #include "estimation/known_elements.hpp"
 #include "palpate/contact_model.hpp"

@@ -1,6 +1,6 @@
 // Highway compiles this file once for every set of vector instructions. Products and sums are never
 // fused, so that every set gives the same bits.
-#include "estimation/bounded/tables/tile_penalties.hpp"
+#include "estimation/bounded/tables/window_table.hpp"
 
 #include <algorithm>
 

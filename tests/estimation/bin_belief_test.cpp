@@ -1,6 +1,7 @@
-// Sums of bins on a coarser grid, against their definition, bin by bin.
+// Marginals on a coarser grid, against their definition, bin by bin; and draws where rounding
+// leaves the last of them out.
 
-#include "estimation/bounded/marginal_sums.hpp"
+#include "estimation/bin_belief.hpp"
 
 #include <cmath>
 #include <vector>
@@ -9,7 +10,7 @@
 
 #include "support/synthetic.hpp"
 
-namespace palpate::marginal_sums_test {
+namespace palpate::bin_belief_test {
 
 constexpr PoseLattice bins{.x_mm = {-10.0, 10.0, 23},
                            .y_mm = {-7.0, 11.0, 17},
@@ -36,7 +37,15 @@ Marginals by_definition(const PoseLattice& grid, const std::vector<double>& logs
   return sums;
 }
 
-TEST(MarginalSums, AreThoseOfTheirDefinition) {
+/// A belief that consists of one box, of log-likelihoods relative to this one.
+BinBelief belief_of(const std::vector<double>& log_likelihood, double reference) {
+  return {.lattice = bins,
+          .objects = {{.reference = reference}},
+          .visit = [&](std::span<const int> /*asked*/, double /*least_share*/,
+                       const BinVisitor& visitor) { visitor(box, log_likelihood); }};
+}
+
+TEST(BinBelief, HasTheMarginalsOfTheirDefinition) {
   std::vector<double> logs;
   for (int i = 0; i < box.bins(); ++i) {
     logs.push_back(-3.0 + std::sin(0.7 * i));
@@ -47,9 +56,7 @@ TEST(MarginalSums, AreThoseOfTheirDefinition) {
         PoseLattice{{-10.0, 10.0, 7}, {-7.0, 11.0, 5}, {0.0, two_pi, 4}, {28, 3}},
         PoseLattice{{-4.0, 3.1, 50}, {-2.0, 4.1, 1}, {1.0, 2.0, 3}, {30, -4}}}) {
     for (const std::vector<double>& likelihoods : {logs, std::vector<double>{-2.0}}) {
-      MarginalSums sums(bins, grid);
-      sums.add(box, likelihoods, -1.5);
-      const Marginals actual = sums.take();
+      const Marginals actual = belief_of(likelihoods, 1.5).marginals(0, grid);
       const Marginals expected = by_definition(grid, likelihoods, -1.5);
       // Sums of a few hundred float64.
       EXPECT_LE(largest_difference(actual.xy, expected.xy), 1e-12 * box.bins());
@@ -58,4 +65,13 @@ TEST(MarginalSums, AreThoseOfTheirDefinition) {
   }
 }
 
-}  // namespace palpate::marginal_sums_test
+TEST(BinBelief, DrawsTheBestBinWhereRoundingLeavesTheLastPartOut) {
+  std::vector<double> logs(static_cast<std::size_t>(box.bins()), -100.0);
+  logs[7] = 0.0;
+  // The sum over the bins is taken to be a tenth larger than it is.
+  for (const PoseSample& sample : belief_of(logs, std::log(1.1)).sample(100, 5)) {
+    EXPECT_EQ(bins.bin_of(sample.T_object_robot), box.bin(7, bins));
+  }
+}
+
+}  // namespace palpate::bin_belief_test
