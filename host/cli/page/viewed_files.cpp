@@ -13,6 +13,7 @@
 #include "cli/page/page_json.hpp"
 #include "io/input_file.hpp"
 #include "io/recording_file.hpp"
+#include "io/recording_rules.hpp"
 #include "io/recording_survey.hpp"
 #include "palpate/files.hpp"
 #include "recognition/judged_results.hpp"
