@@ -12,6 +12,7 @@
 
 #include "cases.hpp"
 #include "letters.hpp"
+#include "model/random.hpp"
 #include "palpate/bounded_posterior.hpp"
 #include "palpate/pose_histogram.hpp"
 #include "report.hpp"
@@ -302,7 +303,20 @@ struct LargeScene {
   int objects = 0;
   double most_ms = 0.0;
   std::optional<double> most_mib = {};
+  DisplacementSd touch_sd = {};  ///< by which touches are off, and which the posterior is told
 };
+
+/// Lets the robot say that the array was elsewhere, by normal numbers of its own for every touch.
+void misplace(Recording& recording, const DisplacementSd& sd, std::uint64_t seed) {
+  Random random(seed, Stream::pose_noise);
+  for (Pose& pose : recording.T_robot_sensor) {
+    Pose displaced;
+    displaced.translation_mm.x = sd.mm * random.normal();
+    displaced.translation_mm.y = sd.mm * random.normal();
+    displaced.theta_rad = sd.rad * random.normal();
+    pose = pose * displaced;
+  }
+}
 
 /// The region about the pivot, in steps of 0.5 mm and 2 degrees.
 PoseLattice lattice_over(double extent_mm, bool quick) {
@@ -317,14 +331,18 @@ Json measure_scene(const BoundedInputs& inputs, const LargeScene& scene, bool ab
                    const std::vector<Hypothesis>& objects, Report& report) {
   const double extent_mm = inputs.quick ? 20.0 : 100.0;
   const PoseLattice lattice = lattice_over(extent_mm, inputs.quick);
-  const std::vector<Recording> unknowns =
+  std::vector<Recording> unknowns =
       glyph_unknowns(scene.objects, inputs.unknowns(), touches_per_unknown, extent_mm, large_seed);
+  for (std::size_t i = 0; i < unknowns.size(); ++i) {
+    misplace(unknowns[i], scene.touch_sd, large_seed + i);
+  }
   const auto bins = lattice.bins() * static_cast<std::int64_t>(objects.size());
   restart_peak_memory();
   const std::uint64_t before = resident_bytes();
   std::optional<BoundedPosterior> posterior;
-  const double seconds =
-      seconds_of([&] { posterior.emplace(objects, BoundedOptions{.lattice = lattice}); });
+  const double seconds = seconds_of([&] {
+    posterior.emplace(objects, BoundedOptions{.lattice = lattice, .touch_sd = scene.touch_sd});
+  });
   Answers answers;
   int right = 0;
   for (const Recording& unknown : unknowns) {
@@ -339,7 +357,8 @@ Json measure_scene(const BoundedInputs& inputs, const LargeScene& scene, bool ab
   const std::uint64_t peak = peak_resident_bytes() - before;
   const std::string pivot = about_touches ? "the first touch" : "the robot's origin";
   Case measured{
-      .name = fmt::format("large, {} objects, pivot at {}", objects.size(), pivot),
+      .name = fmt::format("large, {} objects, {}pivot at {}", objects.size(),
+                          scene.touch_sd.none() ? "" : "misplaced touches, ", pivot),
       .facts = {{"region", fmt::format("±{} mm, all angles", extent_mm)},
                 {"bins", size_of(lattice)},
                 {"bins in all", bins},
@@ -353,16 +372,22 @@ Json measure_scene(const BoundedInputs& inputs, const LargeScene& scene, bool ab
   measured.measurements.push_back({"peak of the process above before", mib(peak), "MiB", most_mib});
   measured.measurements.push_back(share_of("object right", right, unknowns.size()));
   report.add(measured);
-  return {{"objects", objects.size()}, {"pivot", pivot},
-          {"bins_in_all", bins},       {"host_bytes", posterior->host_bytes()},
-          {"peak_bytes", peak},        {"answers", answers.record()}};
+  return {{"objects", objects.size()},
+          {"misplaced", !scene.touch_sd.none()},
+          {"pivot", pivot},
+          {"bins_in_all", bins},
+          {"peak_bytes", peak},
+          {"host_bytes", posterior->host_bytes()},
+          {"answers", answers.record()}};
 }
 
-/// Many objects, far away: time and memory.
+/// Many objects, far away, also by misplaced touches: time and memory.
 Json measure_bounded_large(const BoundedInputs& inputs, Report& report) {
+  constexpr DisplacementSd sd{1.0, 0.05};
   const std::vector<LargeScene> scenes =
-      inputs.quick ? std::vector<LargeScene>{{3, 120.0, 200.0}}
-                   : std::vector<LargeScene>{{20, 120.0, 200.0}, {100, 600.0}};
+      inputs.quick
+          ? std::vector<LargeScene>{{3, 120.0, 200.0}, {3, 120.0, 200.0, sd}}
+          : std::vector<LargeScene>{{20, 120.0, 200.0}, {100, 600.0}, {20, 3000.0, {}, sd}};
   Json records = Json::array();
   for (const LargeScene& scene : scenes) {
     const std::vector<Hypothesis> objects =

@@ -98,7 +98,7 @@ def test_bounds_answer_within_the_tolerance_on_any_number_of_threads(bounded: di
         assert len(size["dense_seconds"]) == 3
     expect_within_tolerance(bounded["mode"]["answers"])
     assert bounded["mode"]["answers"]["mode_certain"] == 3
-    assert len(bounded["large"]) == 2, "two pivots"
+    assert len(bounded["large"]) == 4, "two pivots, exact and misplaced touches"
     for scene in bounded["large"]:
         expect_within_tolerance(scene["answers"])
         assert scene["host_bytes"] > 0

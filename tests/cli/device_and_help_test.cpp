@@ -68,8 +68,7 @@ TEST_F(ProgramHelp, OfACommandMentionsDefaultsFormsAndUnits) {
            {"map", "FOLDER/ =0.5 mm quarter 0.9] =auto kPa 0.3] A:B"},
            {"recognize",
             "25x25x16 -10:10 mm 0:360 degrees X,Y 0,0 0.1] kPa 0.3] A:B histogram 10000] "
-            "systematic "
-            "T_object_robot 100000 1e-6"},
+            "systematic T_object_robot slip, 1e-6"},
            {"batch", "INPUT path, label I/N SLURM_ARRAY_TASK_ID 100"},
            {"merge", "RESULTS NDJSON --partial"},
            {"plan", "grid CSV mm rad =both identity =96 =0 nats"},
