@@ -95,8 +95,7 @@ std::string unknown_words(const Evaluation& evaluation) {
     text += fmt::format(
         "area under the curve of known against unknown classes by {}: {:.3f} +- {:.3f} ({} known, "
         "{} unknown)\n",
-        against->score, against->area, against->standard_error, against->known,
-        against->unknown);
+        against->score, against->area, against->standard_error, against->known, against->unknown);
   } else if (evaluation.known) {
     text += "no area under the curve: records of both kinds need none or fit.z\n";
   }

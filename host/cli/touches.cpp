@@ -24,8 +24,8 @@
 #include "palpate/files.hpp"
 #include "palpate/touch_detector.hpp"
 #include "palpate/virtual_sensor.hpp"
-#include "streaming/rest_finder.hpp"
 #include "streaming/press_touches.hpp"
+#include "streaming/rest_finder.hpp"
 
 namespace palpate::cli {
 
