@@ -60,8 +60,8 @@ Json reach_of(std::vector<Pose> poses) {
 
 class ViewedRecording : public ViewedFile {
  public:
-  explicit ViewedRecording(const fs::path& path) : ViewedFile(path) {
-    const RecordingFile file(path);
+  explicit ViewedRecording(const fs::path& location) : ViewedFile(location) {
+    const RecordingFile file(location);
     recording_ = file.head().recording;
     elements_ = file.head().elements;
     pressure_.reserve(file.head().rows * elements_);
