@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 """`palpate plan`, and the plans of `palpate live`."""
 
 import json
@@ -171,7 +170,3 @@ class Plan(PreparedTest):
                 self.assertGreater(planned["next"]["gain"]["both"], 0.1)
         self.assert_refused([*live, "--plan=all"], "--plan all", "identity, pose or both")
         self.assert_refused([*live, "--plan=both", "--filter=particles"], "--plan both", "histogram")
-
-
-if __name__ == "__main__":
-    unittest.main()

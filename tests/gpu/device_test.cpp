@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cstdio>
 #include <functional>
 #include <optional>
 #include <string>
@@ -10,6 +11,7 @@
 #include <link.h>
 
 #include "gpu/context.hpp"
+#include "gpu/owned.hpp"
 #include "support/errors.hpp"
 #include "support/variable.hpp"
 
@@ -102,6 +104,48 @@ TEST(Context, HasTheLimitsThatVulkanGuarantees) {
 TEST(Context, AMemoryTypeThatDoesNotExistIsAnError) {
   Device device = Device::open();
   EXPECT_THROW(device.context().memory_type(0, 0, 0), Error);
+}
+
+/// Opens devices in a process that has not loaded Vulkan, at first by this library; ends it with 3
+/// where each of those attempts fails as the machine's fault, and says why, and a later one works.
+[[noreturn]] void open_with(const char* library) {
+  {
+    const Variable loader("PALPATE_VULKAN_LIBRARY", library);
+    std::fprintf(stderr, "%s\n", error_of(Fault::system, [] { Device::list(); }).c_str());
+    std::fprintf(stderr, "%s\n", error_of(Fault::system, [] { Device::open(); }).c_str());
+  }
+  std::exit(Device::open().name().empty() || testing::Test::HasFailure() ? 4 : 3);
+}
+
+TEST(VulkanDeathTest, NamesALoaderThatIsMissingOrNoneAndTriesAgainLater) {
+  // Each child starts anew: this process may have Vulkan.
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  EXPECT_EXIT(open_with("/nonexistent/libvulkan.so.1"), testing::ExitedWithCode(3),
+              "^Vulkan cannot be loaded: /nonexistent/libvulkan.so.1: [^\n]*; on Debian, install "
+              "libvulkan1 and mesa-vulkan-drivers\n");
+  EXPECT_EXIT(open_with("libm.so.6"), testing::ExitedWithCode(3),
+              "^Vulkan cannot be loaded: libm.so.6 is no loader of Vulkan 1.1; ");
+}
+
+using gpu::check;
+
+TEST(Result, OfAnErrorIsOneLineThatSaysWhatWasDoneAndWhatMendsIt) {
+  EXPECT_NO_THROW(check(VK_SUCCESS, "doing this"));
+  const std::pair<VkResult, const char*> errors[] = {
+      {VK_ERROR_DEVICE_LOST, "doing this: the device was lost"},
+      {VK_ERROR_DEVICE_LOST, "fewer bins"},
+      {VK_ERROR_OUT_OF_DEVICE_MEMORY, "doing this: out of device memory"},
+      {VK_ERROR_OUT_OF_DEVICE_MEMORY, "fewer bins"},
+      {VK_ERROR_OUT_OF_HOST_MEMORY, "doing this: "},
+      {VK_ERROR_INITIALIZATION_FAILED, "doing this: "},
+      {VK_ERROR_INCOMPATIBLE_DRIVER, "install"},
+      {VK_ERROR_LAYER_NOT_PRESENT, "PALPATE_VALIDATION"},
+      {VK_ERROR_FORMAT_NOT_SUPPORTED, "-11"}};
+  for (const auto& [error, words] : errors) {
+    const std::string message = error_of(Fault::system, [&] { check(error, "doing this"); });
+    EXPECT_TRUE(message.starts_with("doing this: ")) << message;
+    expect_named(message, {words});
+  }
 }
 
 }  // namespace palpate::device_test
