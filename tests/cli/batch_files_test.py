@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 """Which files `palpate batch` and `merge` write over, and what a task file from elsewhere may say."""
 
 import json
@@ -94,7 +93,3 @@ class Files(Batch):
         task = task.replace('"options":{', '"options":{"each-frame":"true",')
         self.put("r/task.ndjson", re.sub(r"\}\n$", ',"survey":[900000000,1,"kPa",""]}\n', task))
         self.assertIn("300000000 of 300000004 chunks", self.palpate("evaluate", "r").stderr)
-
-
-if __name__ == "__main__":
-    unittest.main()

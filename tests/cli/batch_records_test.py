@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 """The records of `palpate batch`, of which recordings they are, and who reads them."""
 
 import json
@@ -136,7 +135,3 @@ class Records(Batch):
         self.assertEqual(self.palpate("evaluate", "all.ndjson", "--json", "-").stdout, folder.stdout)
         (self.folder / "r/chunks/000001.ndjson").unlink()
         self.assertIn("1 of 4 chunks are missing", self.palpate("evaluate", "r").stderr)
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 """`palpate batch` is killed, meets a full disk, other processes and other inputs."""
 
 import ctypes
@@ -146,7 +145,3 @@ class Resumption(Batch):
         os.rename(self.folder / name(0), os.fsencode(self.folder) + b"/u/\xc3\xbc \x80\xff.h5")
         self.palpate(*batch("s"), status=3)
         self.assertIn("11 done before", self.palpate(*batch("s"), status=3).stdout)
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -1,7 +1,8 @@
 // The lattice that recognize and live take where nobody gives one: about the first touch, over the
-// region that the maps and the array make, in bins for the refined pose.
+// region that the maps and the array make, in bins for the refined pose. The posterior that
+// recognize writes.
 
-#include <cmath>
+#include <algorithm>
 #include <numbers>
 
 #include "letter_files.hpp"
@@ -34,58 +35,12 @@ void expect_same_axes(const PoseLattice& a, const PoseLattice& b, double roundin
   }
 }
 
-/// Expects the same but for rounding.
-void expect_like(const json& a, const json& b, double identity, double pose) {
-  EXPECT_EQ(a["best"], b["best"]);
-  for (const char* label : {"A", "I"}) {
-    EXPECT_NEAR(a["identity"][label].get<double>(), b["identity"][label].get<double>(), identity);
-  }
-  for (const char* field : {"x_mm", "y_mm", "theta_rad"}) {
-    EXPECT_NEAR(a["refined"][field].get<double>(), b["refined"][field].get<double>(), pose);
-  }
-}
-
 TEST_F(Defaults, FollowTheMapsTheArrayAndTheFirstTouch) {
   const PoseLattice lattice = lattice_of("u.h5", "");
   EXPECT_EQ(lattice.pivot_mm, unknown_.T_robot_sensor.front().translation_mm);
   const std::vector<Hypothesis> hypotheses{{.map = sample_map("A")}, {.map = sample_map("I")}};
   const TouchRegion region = touch_region(hypotheses, array_reach_mm(digitacts_array()));
   expect_same_axes(lattice, balanced_lattice(region.lattice, hypotheses).lattice, 0.0);
-}
-
-TEST_F(Defaults, FindAnObjectFarFromTheRobotsOrigin) {
-  // T_object_robot of an A whose origin lies at (400, 200) in the robot frame, turned by 40
-  // degrees.
-  const Pose T_object_robot = inverse(Pose{{400.0, 200.0}, 40.0 * std::numbers::pi / 180.0});
-  write_recording(folder_ / "far.h5", sample_unknown("A", T_object_robot, 9));
-  const json far = of("far.h5");
-  EXPECT_EQ(far["right"], true);
-  // Bins of 0.6 mm; the maps are ideal and the touches are not.
-  EXPECT_LT(far["refined_error_mm"].get<double>(), 0.6);
-  const json particles = of("far.h5", "--filter particles");
-  EXPECT_EQ(particles["right"], true);
-  // Motion noise of 1 mm and 0.1 rad at every touch.
-  EXPECT_LT(particles["error_mm"].get<double>(), 3.0);
-  EXPECT_EQ(of("far.h5", "--pivot-mm=0,0")["mode"]["map"].is_string(), true);
-}
-
-// Elements and poses of a frame 100 mm beside the array, such as the robot's flange.
-TEST_F(Defaults, AreTheSameInAnySensorFrame) {
-  const glm::dvec2 offset_mm{100.0, 0.0};
-  const PoseLattice lattice = lattice_of("u.h5", "--filter=bounded");
-  for (Pose& pose : unknown_.T_robot_sensor) {
-    pose = pose * Pose{-offset_mm, 0.0};
-  }
-  for (glm::dvec2& element_mm : unknown_.elements_mm) {
-    element_mm += offset_mm;
-  }
-  write_recording(folder_ / "flange.h5", unknown_);
-  const PoseLattice about_flange = lattice_of("flange.h5", "--filter=bounded");
-  EXPECT_NEAR(about_flange.pivot_mm.x, lattice.pivot_mm.x, 1e-9);
-  EXPECT_NEAR(about_flange.pivot_mm.y, lattice.pivot_mm.y, 1e-9);
-  expect_same_axes(about_flange, lattice, 1e-9);
-  // Places relative to the pivot differ by the rounding of 100 mm, 1e-14 mm.
-  expect_like(of("flange.h5", "--filter=bounded"), of("u.h5", "--filter=bounded"), 1e-6, 1e-4);
 }
 
 TEST(DefaultLattice, GivesWayTogetherToAnyPartOfALattice) {
@@ -114,16 +69,6 @@ TEST(DefaultLattice, GivesWayTogetherToAnyPartOfALattice) {
   }
 }
 
-TEST_F(Defaults, FineBinsAreHalfAsWide) {
-  const PoseLattice usual = lattice_of("u.h5", "--touches=1 --filter=bounded");
-  const PoseLattice fine = lattice_of("u.h5", "--touches=1 --filter=bounded --bins=fine");
-  EXPECT_EQ(fine.x_mm.lower, usual.x_mm.lower);
-  EXPECT_EQ(fine.pivot_mm, usual.pivot_mm);
-  // Counts round up.
-  EXPECT_NEAR(fine.x_mm.count, 2 * usual.x_mm.count, 2);
-  EXPECT_NEAR(fine.theta_rad.count, 2 * usual.theta_rad.count, 2);
-}
-
 TEST_F(Defaults, TellOfObjectsFarApartInTheirFrames) {
   const char* recognize = "recognize u.h5 --maps maps --json r.json";
   EXPECT_EQ(remarks(recognize), "");
@@ -139,6 +84,41 @@ TEST_F(Defaults, RefuseAFirstTouchBeyondEveryRobot) {
   write_recording(folder_ / "beyond.h5", unknown_);
   expect_refused("recognize beyond.h5 --maps maps",
                  {"beyond.h5", "first touch", "10000000000", "poses' unit"});
+}
+
+using RecognizePosterior = LetterFiles;
+
+TEST_F(RecognizePosterior, IsTheRecordsSource) {
+  const std::string u = "u.h5 --maps maps --touches=2 --bins=7x6x5 ";
+  const nlohmann::json r = record(u + "--posterior=p.h5 --none=0");
+  const Posterior p = read_posterior(folder_ / "p.h5");
+  EXPECT_FALSE(p.rest_mass_bound) << "auto writes every bin";
+  EXPECT_EQ(p.objects, (std::vector<std::string>{"A", "I"}));
+  EXPECT_EQ(std::tuple(p.lattice.x_mm.count, p.lattice.y_mm.count, p.lattice.theta_rad.count),
+            std::tuple(7, 6, 5));
+  const auto bins = static_cast<std::size_t>(p.lattice.bins());
+  ASSERT_EQ(p.log_likelihood.size(), 2 * bins);
+  const auto most = std::max_element(p.log_likelihood.begin(), p.log_likelihood.end());
+  const auto index = static_cast<std::size_t>(most - p.log_likelihood.begin());
+  EXPECT_EQ(r["mode"]["object"], p.objects[index / bins]);
+  const Pose T_object_robot = p.lattice.T_object_robot(static_cast<std::int64_t>(index % bins));
+  EXPECT_DOUBLE_EQ(r["mode"]["x_mm"].get<double>(), T_object_robot.translation_mm.x);
+  EXPECT_DOUBLE_EQ(r["mode"]["log_likelihood"].get<double>(), *most);
+
+  for (const char* ask : {"--filter=bounded", "--tolerance=1e-3"}) {
+    const nlohmann::json bounded = record(u + "--posterior=some.h5 " + ask);
+    const Posterior some = read_posterior(folder_ / "some.h5");
+    EXPECT_EQ(some.objects, p.objects);
+    EXPECT_EQ(some.lattice.bins(), p.lattice.bins());
+    EXPECT_EQ(some.index.size(), bounded["bins_evaluated"]);
+    ASSERT_TRUE(some.rest_mass_bound);
+    EXPECT_GE(*some.rest_mass_bound, bounded["dropped_mass"].get<double>());
+    EXPECT_LT(*some.rest_mass_bound, 1e-3);
+    for (std::size_t i = 0; i < some.index.size(); ++i) {
+      EXPECT_NEAR(some.log_likelihood[i], p.log_likelihood[static_cast<std::size_t>(some.index[i])],
+                  1e-3);
+    }
+  }
 }
 
 }  // namespace palpate::defaults_test

@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 """`palpate live` on recorded and simulated streams, and on frames that another program writes to standard
 input."""
 
@@ -239,7 +238,3 @@ class Live(PreparedTest, StreamTest):
     def test_says_where_a_line_cannot_be_written(self) -> None:
         full = self.palpate(*live(UNKNOWN_E, "--json", "/dev/full"), status=1)
         self.assertIn("/dev/full", full.stderr)
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 """`palpate plan`, and the plans of `palpate live`."""
 
 import json
@@ -71,13 +70,8 @@ class Plan(PreparedTest):
             self.assertEqual((third["x_mm"], third["y_mm"]), (3, -2))
             self.assertAlmostEqual(third["theta_rad"], math.pi / 4)
 
-    def test_is_reproducible_by_its_seed(self) -> None:
-        once, again, other = (self.plan("u.h5", "--plan-seed", seed)["candidates"] for seed in "334")
-        self.assertEqual(len(once), 6, "a recording's touches are candidates, too")
-        self.assertEqual(again, once)
-        self.assertNotEqual(other, once)
-
-    def test_takes_a_grid_about_the_object(self) -> None:
+    def test_takes_a_recordings_touches_or_a_grid_about_the_object(self) -> None:
+        self.assertEqual(len(self.plan("u.h5")["candidates"]), 6)
         ranked = self.plan("grid", "--goal", "pose")["candidates"]
         self.assertTrue(100 <= len(ranked) <= 300)
         self.assert_ranked(ranked, "pose")
@@ -171,7 +165,3 @@ class Plan(PreparedTest):
                 self.assertGreater(planned["next"]["gain"]["both"], 0.1)
         self.assert_refused([*live, "--plan=all"], "--plan all", "identity, pose or both")
         self.assert_refused([*live, "--plan=both", "--filter=particles"], "--plan both", "histogram")
-
-
-if __name__ == "__main__":
-    unittest.main()

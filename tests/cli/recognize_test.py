@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 """What `palpate recognize` writes and prints. What records hold, and which options they follow, is tested
 where it is made: here the command has to pass it on."""
 
@@ -131,13 +130,6 @@ class Recognize(PreparedTest):
         ):  # fmt: skip
             self.assert_named(self.printed("u.h5", *flags, "--verbose").stderr, *said)
 
-    def test_fine_bins_are_not_finer_than_the_sensor_shows(self) -> None:
-        flags = ("--cell-mm", "0.25", "--spread-mm", "0.5", "--sensor-model", "none")
-        self.palpate("map", "A.h5", "-o", "fine.map.h5", *flags)
-        region = ("--x-mm=1:3", "--y-mm=-4:-2.5", "--theta-deg=40:70", "--bins=fine", "--filter=bounded")
-        text = self.palpate("recognize", "u.h5", "--maps", "fine.map.h5", *region).stdout
-        self.assertIn("1 map, 7 x 5 x ", text, "steps of 0.3 mm")
-
     def test_judges_by_the_truth_that_a_recording_has(self) -> None:
         (self.folder / "p.csv").write_text("1," * 35 + "9,0,0,0\n" + "9," * 35 + "1,1,1,0\n")
         columns = ("--pose-columns", "37:39", "--pressure-columns", "1:36", "--array", "6:6:1.9")
@@ -193,19 +185,15 @@ class Recognize(PreparedTest):
 
     def test_calls_an_object_that_was_never_learned_none_or_its_touches_contradicted(self) -> None:
         # A surer map than a sensor deserves explains nothing of an O's touches.
-        sure = ("--peak", "0.9999", "--sensor-model", "none")
-        self.palpate("map", "A.h5", "-o", "sure.map.h5", *sure)
+        self.palpate("map", "A.h5", "-o", "sure.map.h5", "--peak=0.9999", "--sensor-model=none")
         few = ("o.h5", "--maps", "sure.map.h5", "--gamma=0", "--bins=20x20x16")
-        [record] = self.records(*few, "--none=1", "--touches=12", "--trace", "--png=sheets")
+        [record] = self.records(*few, "--none=1", "--touches=12", "--png=sheets")
         self.assertEqual((record["best"], record["right"], record["error_mm"]), ("(none)", True, None))
         self.assertEqual(record["mode"]["object"], "A", "the best object's bin")
-        self.assertEqual(record["trace"][-1]["best"], "(none)")
-        self.assertTrue((self.folder / "sheets/o.png").exists())
-        for filter in ("histogram", "bounded"):
-            [record] = self.records(*few, "--filter", filter)
-            self.assertTrue(record["contradicted"], filter)
+        [record] = self.records(*few)
+        self.assertTrue(record["contradicted"])
         text = self.palpate("recognize", *few, "--trace").stdout
-        self.assert_named(text, "  contradicted\n", "o.h5: contradicted: ")
+        self.assert_named(text, "  contradicted\n", "o.h5: contradicted: ", "1 map, 20 x 20 x 16 bins")
         self.assertFalse(self.u("--none=1e300", "--touches=1")["right"], "an A that was learned")
 
     def test_says_once_what_the_lattice_does_not_resolve(self) -> None:
@@ -241,21 +229,16 @@ class Recognize(PreparedTest):
         self.assert_refused(into_itself, "--json s.yaml", "--sensor-model reads")
 
     def test_names_the_mirrored_object(self) -> None:
-        mirrored = "".join(f"{-float(x)} {y}\n" for x, y in map(str.split, FLAG.splitlines()))
-        for file, polygon in {"learned/flag": FLAG, "turned/flag": mirrored}.items():
-            path = self.folder / file
-            path.parent.mkdir()
-            path.write_text(polygon)
-        self.palpate("simulate", "learned/flag", "-o", "flag.h5")
+        flag = self.folder / "flag"
+        flag.write_text(FLAG)
+        self.palpate("simulate", "flag", "-o", "flag.h5")
         self.palpate("map", "flag.h5", "--mirror", "-o", "maps/flag.map.h5", "--sensor-model", "none")
-        for side in ("learned", "turned"):
-            pose = ("--touches", "9", "--object-pose=2,-3,57")
-            self.palpate("simulate", f"{side}/flag", "-o", "u.h5", *pose)
-            record = self.u("--prior=0.2")
-            self.assertEqual(record["mode"]["mirrored"], side == "turned")
-            self.assertEqual(record["modes"][0]["mirrored"], side == "turned")
-            self.assertEqual((record["mode"]["map"], record["right"]), ("maps/flag.map.h5", True))
-            self.assertEqual(record["error_mm"] is None, side == "turned")
+        flag.write_text("".join(f"{-float(x)} {y}\n" for x, y in map(str.split, FLAG.splitlines())))
+        self.palpate("simulate", "flag", "-o", "u.h5", "--touches", "9", "--object-pose=2,-3,57")
+        record = self.u("--prior=0.2")
+        self.assertEqual((record["mode"]["mirrored"], record["modes"][0]["mirrored"]), (True, True))
+        self.assertEqual((record["mode"]["map"], record["right"]), ("maps/flag.map.h5", True))
+        self.assertIsNone(record["error_mm"])
         text = self.printed("u.h5", "--prior=0.2", "--png=sheets").stdout
         self.assert_named(text, "flag mirrored", "3 maps and 1 mirrored")
 
@@ -273,7 +256,3 @@ class Recognize(PreparedTest):
             status, text = program.finish()
         self.assertEqual(status, -signal.SIGINT)
         self.assertNotIn("{", text, "JSON comes whole or not at all")
-
-
-if __name__ == "__main__":
-    unittest.main()

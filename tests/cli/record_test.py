@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 """`palpate record`: what it writes, what it says, and what it leaves where it ends early."""
 
 import math
@@ -184,7 +183,3 @@ class Record(StreamTest):
         for label in ("caf\udce9", "a\nb"):  # before the sensor is opened
             self.refused("s.h5", "replay:none.h5", "--object", label, named=["--object", "UTF-8"])
         self.assert_refused(["record", "-o", "s.h5"], "--sensor")
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -2,7 +2,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "io/hdf5_contents.hpp"
 #include "palpate/files.hpp"
 #include "palpate/simulation.hpp"
 #include "support/program.hpp"
@@ -32,19 +31,13 @@ bool same_pose(const Pose& a, const Pose& b) {
 TEST_F(SimulateCommand, GridTouchesAKnownObject) {
   const Recording recording = simulate("A");
   EXPECT_EQ(recording.object, "A");
-  EXPECT_EQ(recording.pressure_unit, "kPa");
-  EXPECT_EQ(recording.rows, "touches");
-  EXPECT_EQ(recording.elements_mm.size(), 36u);
+  EXPECT_EQ(recording.elements_mm, digitacts_array());
   EXPECT_FALSE(recording.truth);
   const std::vector<Pose> grid = training_grid();
   ASSERT_EQ(recording.size(), 192u);
   for (std::size_t i = 0; i < grid.size(); ++i) {
     EXPECT_TRUE(same_pose(recording.T_robot_sensor[i], grid[i])) << i;
   }
-  const Hdf5Contents file(folder_ / "s.h5", {"format", "version", "length_unit"}, {});
-  EXPECT_EQ(file.text("format"), "palpate.recording");
-  EXPECT_EQ(file.integer("version", 0), 1);
-  EXPECT_EQ(file.text("length_unit"), "mm");
 }
 
 // A file may have any name; a label is printable.
@@ -81,14 +74,9 @@ TEST_F(SimulateCommand, UnknownHoldsItsTruthAndIsTouchedThere) {
   EXPECT_EQ(known.object, "A");
 }
 
-TEST_F(SimulateCommand, RandomPosesAreOfTheSeedAndWithinThePapersRange) {
-  const Pose first = simulate("A --object-pose random").truth.value().T_object_robot;
-  const Pose second = simulate("A --object-pose random --seed 2").truth.value().T_object_robot;
-  for (const Pose& pose : {first, second}) {
-    EXPECT_LE(std::abs(pose.translation_mm.x), 10.0);
-    EXPECT_LE(std::abs(pose.translation_mm.y), 10.0);
-  }
-  EXPECT_FALSE(same_pose(first, second));
+TEST_F(SimulateCommand, RandomPosesAreOfTheSeed) {
+  EXPECT_TRUE(same_pose(simulate("A --object-pose random --seed 2").truth.value().T_object_robot,
+                        random_object_pose(2)));
   EXPECT_EQ(simulate("A --poses random:17").size(), 17u);
   const std::string flags = "A --object-pose random --touches 5";
   EXPECT_TRUE(bytes(flags) == bytes(flags));

@@ -11,8 +11,6 @@
 
 namespace palpate::touches_test {
 
-using nlohmann::json;
-
 class TouchesCommand : public ProgramTest {
  protected:
   /// The frames of a simulated stream, which are in f.h5.
@@ -53,6 +51,7 @@ TEST_F(TouchesCommand, TouchesAtUnknownPosesAreKeptAtThePoseZero) {
   const Recording frames = frames_of("A,touches=3");
   const Recording posed = touches_in(frames);
   const Recording unposed = touches_in(frames, "--unposed");
+  EXPECT_EQ(posed.object, "A");
   EXPECT_EQ(unposed.pressure, posed.pressure);
   ASSERT_EQ(unposed.size(), 3u);
   for (const Pose& pose : unposed.T_robot_sensor) {
@@ -62,22 +61,6 @@ TEST_F(TouchesCommand, TouchesAtUnknownPosesAreKeptAtThePoseZero) {
   EXPECT_EQ(remarks("map t.h5 -o t.map.h5"),
             "palpate: t.h5: all 3 touches are at one pose; if their poses are unknown, give "
             "--unposed\n");
-}
-
-TEST_F(TouchesCommand, LettersAreRecognisedByWhatTheyFound) {
-  for (const std::string letter : {"A", "E"}) {
-    const Recording learned = touches_in(frames_of(letter + ",touches=60"));
-    EXPECT_EQ(learned.object, letter);
-    write_recording(folder_ / (letter + ".h5"), learned);
-    write_recording(folder_ / ("u" + letter + ".h5"),
-                    touches_in(frames_of(letter + ",touches=10,seed=77,object=random")));
-  }
-  done("map A.h5 E.h5 -o maps/ --sensor-model none");
-  for (const json& record : records("uA.h5 uE.h5 --maps maps")) {
-    EXPECT_TRUE(record.at("right").get<bool>()) << record.dump(1);
-    // Half a bin of 0.8 mm and of 22.5 degrees, at an arm of 8 mm.
-    EXPECT_LT(record.at("error_mm").get<double>(), 2.0);
-  }
 }
 
 TEST_F(TouchesCommand, StreamThatWasCutOffIsClosedForOthers) {
@@ -131,35 +114,26 @@ TEST_F(TouchesCommand, DeadElementsUnitAndSensorAreCopied) {
 
 TEST_F(TouchesCommand, AnElementThatIsUnknownInATouchIsNotValidInIt) {
   Recording frames = frames_of("A,touches=3");
-  const Recording all = touches_in(frames);
   for (std::size_t i = 210; i < 310; ++i) {  // the second press lasts from 2.3 to 3 s
     frames.pressure[36 * i + 5] = nan;
   }
   frames.pressure[36 * 50 + 7] = nan;
   expect_named(said_of(frames), {"3 touches", "101 readings unknown"});
   const Recording r = read_recording(folder_ / "t.h5");
-  ASSERT_EQ(r.size(), 3u);
-  ASSERT_EQ(r.valid.size(), 3u * 36u);
-  for (std::size_t k = 0; k < r.valid.size(); ++k) {
-    EXPECT_EQ(r.valid[k], k == 36 + 5 ? 0 : 1) << k;
-    if (k != 36 + 5) {
-      // Where element 5 is unknown, its rest is held, which may move the ends of what counts as
-      // untouched. Five times the noise of a rest, 0.1, for the element itself.
-      EXPECT_NEAR(r.pressure[k], all.pressure[k], k % 36 == 5 ? 0.5 : 0.25) << k;
-    }
-  }
+  std::vector<std::uint8_t> valid(3 * 36, 1);
+  valid[36 + 5] = 0;
+  EXPECT_EQ(r.valid, valid);
   EXPECT_EQ(r.pressure[36 + 5], 0.0);
   done("map t.h5 -o t.map.h5");
 }
 
 TEST_F(TouchesCommand, TouchesWithoutAPoseAreLeftOut) {
   Recording frames = frames_of("A,touches=3");
-  const Pose unknown{{nan, nan}, nan};
   // The first press begins at 1.3 s and ends at 2 s.
-  std::fill_n(frames.T_robot_sensor.begin(), 200, unknown);
+  std::fill_n(frames.T_robot_sensor.begin(), 200, unknown_pose);
   expect_named(said_of(frames), {"2 touches", "1 without a pose left out"});
   EXPECT_EQ(read_recording(folder_ / "t.h5").size(), 2u);
-  frames.T_robot_sensor.assign(frames.size(), unknown);
+  frames.T_robot_sensor.assign(frames.size(), unknown_pose);
   expect_no_touches(frames, {"f.h5", "3 touches", "--poses"});
 }
 
@@ -179,25 +153,17 @@ TEST_F(TouchesCommand, TheRestIsFoundWithoutABaseline) {
   EXPECT_NEAR(mean(fixed.pressure), mean(tared.pressure), 0.15);
 }
 
-// The stream is cut where the first press is under way: what follows tells the rest.
-TEST_F(TouchesCommand, AStreamMayBeginInATouch) {
+// The press begins at 1.3 s, is steady from 1.4 to 1.9 s, and what follows it tells the rest.
+TEST_F(TouchesCommand, NeitherStuckElementsNorABeginningInATouchCostATouch) {
   Recording frames = frames_of("A,touches=1");
-  const std::vector<double> times = frames.time_s;
-  // The press is steady from 1.4 to 1.9 s.
-  frames = part_of(frames, 150, frames.size());
-  frames.time_s.assign(times.begin() + 150, times.end());
-  frames.lost_before.clear();
-  frames.device_time_s.clear();
-  expect_named(said_of(frames), {"1 touches"});
-}
-
-TEST_F(TouchesCommand, ElementsThatAreStuckFromTheStartCostNoTouch) {
-  Recording frames = frames_of("A,touches=3");
   for (std::size_t i = 0; i < frames.size(); ++i) {
-    frames.pressure[36 * i + 4] = 9.0;
-    frames.pressure[36 * i + 31] = 9.0;
+    frames.pressure[36 * i + 4] = frames.pressure[36 * i + 31] = 9.0;
   }
-  expect_named(said_of(frames), {"3 touches"});
+  expect_named(said_of(frames), {"1 touches"});
+  for (std::size_t i = 0; i < 150; ++i) {
+    std::fill_n(frames.pressure.begin() + static_cast<std::ptrdiff_t>(36 * i), 36, nan);
+  }
+  expect_named(said_of(frames), {"1 touches"});
 }
 
 TEST_F(TouchesCommand, SaysWhatMayCostTouches) {

@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 """docs/architecture.md says what is: its table and its picture have the folders of tests/layers.py, in
 the order in which they may use each other, its functions stand in the files that they link to, and the
 lines of its diffs in the files that they name."""
@@ -57,7 +56,3 @@ class Sources(unittest.TestCase):
             else:
                 self.assertTrue(line.startswith("+"), line)
                 self.assertIn(line[1:], lines)
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 """Links and pictures of the Markdown pages lead to files and headings that exist, and rows stand in
 tables. The site's build knows its own pages only; README.md and bench/ are read elsewhere, too. The C++
 reference has every public header."""
@@ -65,7 +64,3 @@ class Reference(unittest.TestCase):
             for header in (ROOT / folder).iterdir():
                 if header.name not in ("palpate.hpp", "api.hpp"):  # which declare nothing of their own
                     self.assertIn(f"```{{doxygenfile}} {header.name}\n", reference)
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -1,5 +1,7 @@
 #include "letters.hpp"
 
+#include "support/sample_files.hpp"
+
 namespace palpate {
 
 std::vector<Hypothesis> letter_maps(Device& device) {
@@ -14,15 +16,7 @@ std::vector<Hypothesis> letter_maps(Device& device) {
   return hypotheses;
 }
 
-Recording unknown_letter(std::size_t touches) {
-  const Pose T_object_robot{{3.0, -2.0}, 1.0};
-  std::vector<Pose> T_robot_sensor = random_poses(static_cast<int>(touches), /*seed=*/2);
-  for (Pose& pose : T_robot_sensor) {
-    pose = inverse(T_object_robot) * pose;
-  }
-  Simulator sensor(make_shape("E"), SensorModel{}, digitacts_array(), /*seed=*/3);
-  return sensor.touch(T_robot_sensor, T_object_robot);
-}
+Recording unknown_letter(int touches) { return sample_unknown("E", {{3.0, -2.0}, 1.0}, touches); }
 
 PoseLattice small_lattice() {
   return {{-10.0, 10.0, 10}, {-10.0, 10.0, 10}, {0.0, 6.283185307179586, 16}};

@@ -47,22 +47,16 @@ double range_of(const std::vector<float>& evidence, double prior = 0.5) {
   return evidence_scale(std::span(&map, 1)).range_nats;
 }
 
-TEST(EvidenceScale, NineOfTenCellsStayWithinIt) {
+TEST(EvidenceScale, HoldsNineOfTenCellsThatHaveEvidenceRoundedUpToANumberWhoseHalfIsShort) {
+  EXPECT_EQ(range_of({1.0F}), 1.0);
+  EXPECT_EQ(range_of({1.01F}), 2.0);
+  EXPECT_EQ(range_of({-5.0F}), 6.0);
+  EXPECT_EQ(range_of({8.5F}), 10.0);
   // Nine of ten up to 3.9, one far beyond; then the ninth is beyond, too.
   std::vector<float> nats{0.1F, -0.2F, 0.3F, -0.4F, 0.5F, 0.6F, 0.7F, -0.8F, 3.9F, -3.9F, 70.0F};
   EXPECT_EQ(range_of(nats, 0.2), 4.0);
   std::erase(nats, -3.9F);
   EXPECT_EQ(range_of(nats, 0.2), 80.0);
-}
-
-TEST(EvidenceScale, IsRoundedUpToANumberWhoseHalfIsShort) {
-  EXPECT_EQ(range_of({1.0F}), 1.0);
-  EXPECT_EQ(range_of({1.01F}), 2.0);
-  EXPECT_EQ(range_of({-5.0F}), 6.0);
-  EXPECT_EQ(range_of({8.5F}), 10.0);
-}
-
-TEST(EvidenceScale, CellsWithoutEvidenceDoNotCount) {
   EXPECT_EQ(range_of({0.0F, 0.0F}), 1.0);
   std::vector<float> evidence(1000, 0.0F);
   evidence.resize(2000, 0.009F);  // a remnant of a Gaussian's tail

@@ -114,36 +114,28 @@ OccupancyGrid map_of(const std::vector<std::string>& rows) {
   return map;
 }
 
-TEST(MapOutline, OfABlockRunsBetweenItsCellsAndTheOthers) {
-  const auto outlines = outlines_of(map_of({"......", ".####.", ".####.", "......"}));
-  ASSERT_EQ(outlines.size(), 1U);
-  // Four by two cells without four corners, of an eighth of a cell each.
-  EXPECT_NEAR(area(outlines[0]), (8.0 - 4.0 / 8.0) * 0.25, 1e-12);
-  EXPECT_EQ(outlines[0].size(), 12U);
-}
-
-TEST(MapOutline, IsAsLongAsTheShapeAndNoRectangleAboutIt) {
-  const auto outlines = outlines_of(map_of({"#####", "#....", "#....", "#####"}));
-  ASSERT_EQ(outlines.size(), 1U);
-  EXPECT_LT(area(outlines[0]), 13.0 * 0.25);
-  EXPECT_GT(area(outlines[0]), 11.0 * 0.25);
-}
-
-TEST(MapOutline, RunsAboutHolesTheOtherWay) {
-  const auto outlines = outlines_of(map_of({"####", "#..#", "#..#", "####", "....", "##.."}));
-  ASSERT_EQ(outlines.size(), 3U);
-  EXPECT_EQ(std::ranges::count_if(outlines, [](const auto& o) { return area(o) < 0.0; }), 1);
-}
-
-TEST(MapOutline, MeetsEdgesOfTheGridAndHoldsNothingWhereNothingIsOccupied) {
-  EXPECT_TRUE(outlines_of(map_of({"...", "..."})).empty());
-  const auto outlines = outlines_of(map_of({"##", "##"}));
-  ASSERT_EQ(outlines.size(), 1U);
-  EXPECT_NEAR(area(outlines[0]), (4.0 - 4.0 / 8.0) * 0.25, 1e-12);
-}
-
-TEST(MapOutline, JoinsCellsThatMeetAtACorner) {
-  EXPECT_EQ(outlines_of(map_of({"#.", ".#"})).size(), 1U);
+TEST(MapOutline, RunsBetweenOccupiedCellsAndTheOthersWithCornersCutOff) {
+  // In cells: a corner of the object lacks an eighth, one that it surrounds has an eighth more.
+  const std::tuple<const char*, std::vector<std::string>, std::size_t, double> cases[] = {
+      {"a block", {"......", ".####.", ".####.", "......"}, 1, 8.0 - 4.0 / 8.0},
+      {"the grid's edges", {"##", "##"}, 1, 4.0 - 4.0 / 8.0},
+      {"nothing", {"...", "..."}, 0, 0.0},
+      {"no rectangle about it", {"#####", "#....", "#....", "#####"}, 1, 12.0 - 4.0 / 8.0},
+      {"cells that meet at a corner", {"#.", ".#"}, 1, 2.0 - 4.0 / 8.0},
+      {"a hole", {"####", "#..#", "#..#", "####", "....", "##.."}, 3, 14.0 - 4.0 / 8.0}};
+  for (const auto& [name, rows, count, cells] : cases) {
+    SCOPED_TRACE(name);
+    const auto outlines = outlines_of(map_of(rows));
+    EXPECT_EQ(outlines.size(), count);
+    double sum = 0.0;
+    for (const auto& outline : outlines) {
+      sum += area(outline);
+    }
+    EXPECT_NEAR(sum, cells * 0.25, 1e-12);
+    EXPECT_EQ(std::ranges::count_if(outlines, [](const auto& o) { return area(o) < 0.0; }),
+              count == 3 ? 1 : 0);
+  }
+  EXPECT_EQ(outlines_of(map_of({"......", ".####.", ".####.", "......"}))[0].size(), 12U);
 }
 
 }  // namespace palpate::outlines_test
