@@ -1,24 +1,44 @@
 #pragma once
 
 #include <atomic>
+#include <bit>
 #include <string>
 #include <vector>
 
+#include <gtest/gtest.h>
+
 #include "fake_usb_device.hpp"
-#include "palpate/sensor.hpp"
+#include "streamed.hpp"
 
 namespace palpate {
 
 /// The pressure of a cell of the fake, in kPa, by the formula and the worked example's coefficients
 /// of the MPL115A2's data sheet. Each recalibration of the fake adds 32 to a0.
-double expected_kpa(int raw_pressure, int raw_temperature = 512, int recalibrations = 0);
+inline double expected_kpa(int raw_pressure, int raw_temperature = 512, int recalibrations = 0) {
+  const double p = raw_pressure;
+  const double t = raw_temperature;
+  const double compensated =
+      2009.75 + 32.0 * recalibrations + (-2.375854 + 0.000790 * t) * p - 0.920471 * t;
+  return 50.0 + compensated * 65.0 / 1023.0;
+}
 /// The data sheet rounds the coefficients to 1e-6; readings of up to 1023 multiply them twice.
 constexpr double kpa_tolerance = 0.05;
 
 /// Takes `count` frames, each of as many cells, which read first_raw, first_raw + 1, ... from frame
 /// to frame; returns them.
-std::vector<Frame> expect_frames(Sensor& sensor, std::size_t cells, int first_raw,
-                                 std::size_t count = 1, int recalibrations = 0);
+inline std::vector<Frame> expect_frames(Sensor& sensor, std::size_t cells, int first_raw,
+                                        std::size_t count = 1, int recalibrations = 0) {
+  std::vector<Frame> frames = take(sensor, count);
+  EXPECT_EQ(frames.size(), count);
+  for (const Frame& frame : frames) {
+    EXPECT_EQ(frame.values.size(), cells);
+    for (const double value : frame.values) {
+      EXPECT_NEAR(value, expected_kpa(first_raw, 512, recalibrations), kpa_tolerance);
+    }
+    ++first_raw;
+  }
+  return frames;
+}
 
 /// A TakkTile as its published firmware behaves.
 class FakeTakktile {
@@ -28,22 +48,95 @@ class FakeTakktile {
 
   /// @param alive_rows [row] the cells that are alive, as bits
   FakeTakktile(FakeUsb& usb, const std::string& serial, std::vector<std::uint8_t> alive_rows,
-               Layout layout = Layout::bits, int address = 2);
+               Layout layout = Layout::bits, int address = 2)
+      : alive_rows_(std::move(alive_rows)),
+        layout_(layout),
+        device_(usb, address,
+                {.vendor = 0x59e3,
+                 .product = 0x74c7,
+                 .manufacturer = "TakkTile LLC",
+                 .product_name = "TakkTile USB",
+                 .serial = serial},
+                configuration(),
+                [this](const FakeUsbDevice::Setup& setup) { return answer(setup); }) {
+    alive_rows_.resize(8);
+  }
 
-  /// Sends a frame in which every cell reads these 10-bit numbers.
-  void send_frame(int raw_pressure, int raw_temperature = 512);
+  /// Sends a frame in which every cell reads this 10-bit number, and 512 for the temperature.
+  void send_frame(int raw_pressure) {
+    Bytes frame;
+    for (int cell = 0; cell < cells(); ++cell) {
+      for (const int raw : {raw_pressure, 512}) {
+        frame.push_back(static_cast<std::uint8_t>(raw >> 2));
+        frame.push_back(static_cast<std::uint8_t>(raw << 6));
+      }
+    }
+    device_.send(frame);
+  }
   /// Whether the host asked for frames.
   bool streaming() const { return streaming_; }
-  int cells() const;
+  int cells() const {
+    int cells = 0;
+    for (const std::uint8_t row : alive_rows_) {
+      cells += std::popcount(row);
+    }
+    return cells;
+  }
   /// Changes the calibration.
   void recalibrate() { ++recalibrations_; }
   /// Changes the cells that are alive.
-  void replace_cells(std::vector<std::uint8_t> alive_rows);
+  void replace_cells(std::vector<std::uint8_t> alive_rows) {
+    alive_rows_ = std::move(alive_rows);
+    alive_rows_.resize(8);
+  }
 
   FakeUsbDevice& usb() { return device_; }
 
  private:
-  std::optional<Bytes> answer(const FakeUsbDevice::Setup& setup);
+  static constexpr int columns = 5;
+
+  /// One vendor interface: bulk endpoint 0x81 towards the host, 0x02 from the host.
+  static Bytes configuration() {
+    return {9, 2, 32,   0, 1,  1,    0, 0x80, 50,  // one interface
+            9, 4, 0,    0, 2,  0xff, 0, 0,    0,   //
+            7, 5, 0x81, 2, 64, 0,    0,            //
+            7, 5, 0x02, 2, 64, 0,    0};
+  }
+  std::optional<Bytes> answer(const FakeUsbDevice::Setup& setup) {
+    if (setup.type != 0xc0) {
+      return std::nullopt;
+    }
+    switch (setup.request) {
+      case 0x5c: {
+        if (layout_ == Layout::bits) {
+          return alive_rows_;
+        }
+        Bytes map;
+        for (const std::uint8_t row : alive_rows_) {
+          for (int column = 0; column < columns; ++column) {
+            map.push_back((row >> column & 1) != 0 ? 0xff : 0x00);
+          }
+        }
+        return map;
+      }
+      case 0x6c: {
+        // The MPL115A2's data sheet: a0 = 2009.75, b1 = -2.375854, b2 = -0.920471, c12 = 0.000790.
+        Bytes calibration = {0x3e, 0xce, 0xb3, 0xf9, 0xc5, 0x17, 0x33, 0xc8};
+        calibration[0] = static_cast<std::uint8_t>(calibration[0] + recalibrations_);
+        return calibration;
+      }
+      case 0xc7: {
+        // TCC0.CTRLA = TC_CLKSEL_DIV256_gc & wIndex: the timer runs if a bit of 0x06 is set.
+        constexpr int clock_by_256 = 0x06;
+        streaming_ = (setup.index & clock_by_256) == clock_by_256;
+        return Bytes{static_cast<std::uint8_t>(setup.index != 0 ? 1 : 0)};
+      }
+      case 0xba:
+        return Bytes{1};
+      default:
+        return std::nullopt;
+    }
+  }
 
   std::vector<std::uint8_t> alive_rows_;
   Layout layout_;

@@ -49,6 +49,12 @@ struct PluggedIn {
   std::string refusal(Fault fault) {
     return error_of(fault, [&] { sensor->start(); });
   }
+  /// Expects that the board was given back, and is found once it has its cells again.
+  void expect_start_with_cells() {
+    EXPECT_FALSE(board.usb().seen().claimed) << "given back";
+    board.replace_cells({0b11111});
+    expect_start(100);
+  }
 
   FakeTakktile board;
   std::unique_ptr<Sensor> sensor;
@@ -124,9 +130,7 @@ TEST_F(Hotplug, OtherCellsThanBeforeAreRefused) {
                           plugged.sensor->next(patience);
                         }),
                {"4 elements instead of 5"});
-  EXPECT_FALSE(plugged.board.usb().seen().claimed) << "given back";
-  plugged.board.replace_cells({0b11111});
-  plugged.expect_start(100);
+  plugged.expect_start_with_cells();
 }
 
 TEST_F(Hotplug, ABoardThatComesBackWithoutCellsIsStillAwaited) {
@@ -139,9 +143,7 @@ TEST_F(Hotplug, ABoardThatComesBackWithoutCellsIsStillAwaited) {
   EXPECT_FALSE(plugged.sensor->next(300ms));
   EXPECT_TRUE(plugged.sensor->gone());
   expect_named(plugged.refusal(Fault::system), {"no cell answers"});
-  EXPECT_FALSE(plugged.board.usb().seen().claimed) << "given back";
-  plugged.board.replace_cells({0b11111});
-  plugged.expect_start(100);
+  plugged.expect_start_with_cells();
 }
 
 TEST_F(Hotplug, TwoBoardsStreamAtOnce) {
@@ -226,19 +228,6 @@ TEST_F(Restart, FindsABoardAtAnotherPortByItsSerialNumberOnlyAndNoOther) {
     }
     plugged.sensor->stop();
   }
-}
-
-TEST_F(Restart, RefusesOtherCellsThanBefore) {
-  PluggedIn plugged(usb_);
-  plugged.unplug();
-  plugged.board.replace_cells({0b1111});
-  EXPECT_TRUE(list_boards().empty());
-  plugged.board.usb().plug();
-  EXPECT_EQ(list_boards().at(0).address, 3);
-  expect_named(plugged.refusal(Fault::system), {"4 elements instead of 5"});
-  EXPECT_FALSE(plugged.board.usb().seen().claimed) << "given back";
-  plugged.board.replace_cells({0b11111});
-  plugged.expect_start(100);
 }
 
 TEST_F(Restart, FindsABoardThatIsMovedToAnotherPortWhileItStarts) {

@@ -4,6 +4,7 @@
 
 #include "file_parts.hpp"
 #include "palpate/files.hpp"
+#include "support/host_locale.hpp"
 #include "support/limits.hpp"
 
 namespace palpate::map_test {
@@ -35,6 +36,9 @@ class MapFile : public OneFile {
     parts.save(path_);
     return refusal([&] { read_map(path_); });
   }
+
+ private:
+  HostLocale locale_;  // which changes no file
 };
 
 TEST_F(MapFile, ComesBackAsItWasWrittenWithWhatItMayHold) {

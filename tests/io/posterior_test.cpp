@@ -1,7 +1,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <functional>
 #include <limits>
 
 #include "file_parts.hpp"
@@ -96,43 +95,26 @@ TEST_F(PosteriorFile, ThatIsNotSoundIsNeverWritten) {
   Posterior of_all{.objects = {"A"},
                    .lattice = {{0, 1, 1}, {0, 1, 1}, {0, 1, 2}},
                    .log_likelihood = {-1.0, -2.0}};
-  const auto expect_refused = [&](Posterior posterior, const std::function<void(Posterior&)>& spoil,
-                                  const char* named) {
+  const auto expect_refused = [&](const char* named, Posterior posterior, const auto& spoil) {
     spoil(posterior);
     expect_named(refusal([&] { write_posterior(path_, posterior); }), {named});
   };
-  expect_refused(
-      of_all, [](Posterior& p) { p.objects = {"\xff"}; }, "'objects'");
-  expect_refused(
-      of_all, [](Posterior& p) { p.objects.clear(); }, "'objects'");
-  expect_refused(
-      of_all, [](Posterior& p) { p.lattice.y_mm.count = -1; }, "y_mm");
-  expect_refused(
-      of_all, [](Posterior& p) { p.lattice.pivot_mm.x = nan; }, "pivot_mm");
-  expect_refused(
-      of_all, [](Posterior& p) { p.log_likelihood.pop_back(); }, "1 log-likelihoods");
-  expect_refused(
-      of_all, [](Posterior& p) { p.log_likelihood[1] = infinity; }, "inf");
+  expect_refused("'objects'", of_all, [](Posterior& p) { p.objects = {"\xff"}; });
+  expect_refused("'objects'", of_all, [](Posterior& p) { p.objects.clear(); });
+  expect_refused("y_mm", of_all, [](Posterior& p) { p.lattice.y_mm.count = -1; });
+  expect_refused("pivot_mm", of_all, [](Posterior& p) { p.lattice.pivot_mm.x = nan; });
+  expect_refused("1 log-likelihoods", of_all, [](Posterior& p) { p.log_likelihood.pop_back(); });
+  expect_refused("inf", of_all, [](Posterior& p) { p.log_likelihood[1] = infinity; });
   const Posterior of_some = of_some_bins();
-  expect_refused(
-      of_some, [](Posterior& p) { p.index.pop_back(); }, "2 bins and 3");
-  expect_refused(
-      of_some, [](Posterior& p) { p.index[1] = 2000; }, "2000 is no bin of 2000");
-  expect_refused(
-      of_some, [](Posterior& p) { p.index[0] = -1; }, "-1 is no bin");
-  expect_refused(
-      of_some, [](Posterior& p) { p.log_likelihood[0] = nan; }, "nan");
+  expect_refused("2 bins and 3", of_some, [](Posterior& p) { p.index.pop_back(); });
+  expect_refused("2000 is no bin of 2000", of_some, [](Posterior& p) { p.index[1] = 2000; });
+  expect_refused("-1 is no bin", of_some, [](Posterior& p) { p.index[0] = -1; });
+  expect_refused("nan", of_some, [](Posterior& p) { p.log_likelihood[0] = nan; });
   for (const double share : {-0.1, 1.1, nan}) {
-    expect_refused(
-        of_some, [&](Posterior& p) { p.rest_mass_bound = share; }, "rest_mass_bound");
+    expect_refused("rest_mass_bound", of_some, [&](Posterior& p) { p.rest_mass_bound = share; });
   }
   constexpr Axis most{0, 1, std::numeric_limits<int>::max()};
-  expect_refused(
-      of_some,
-      [&](Posterior& p) {
-        p.lattice = {most, most, most};
-      },
-      "too many");
+  expect_refused("too many", of_some, [&](Posterior& p) { p.lattice = {most, most, most}; });
   EXPECT_FALSE(std::filesystem::exists(path_));
 }
 

@@ -1,11 +1,10 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include <cmath>
-
 #include "file_parts.hpp"
 #include "palpate/files.hpp"
 #include "same.hpp"
+#include "support/host_locale.hpp"
 #include "support/limits.hpp"
 
 namespace palpate::recording_test {
@@ -39,6 +38,7 @@ TEST_F(RecordingFile, ComesBackAsItWasWrittenFromTheSameBytes) {
   const Recording written = small_recording();
   write_recording(path_, written);
   const std::string bytes = bytes_of(path_);
+  const HostLocale locale;  // of a program whose numbers have decimal commas
   write_recording(path_, written);
   EXPECT_EQ(bytes_of(path_), bytes);
   // HDF5 loads a file of the name that it is given for the one in memory, and frees it again.
@@ -269,15 +269,6 @@ TEST_F(RecordingFile, NamesWhatIsNoReadableHdf5File) {
     std::filesystem::permissions(path_, std::filesystem::perms::none);
     expect_named(message(), {"permissions"});
   }
-}
-
-TEST_F(RecordingFile, IsNotWrittenWhereItCouldNotBeRead) {
-  Recording spoilt = small_recording();
-  spoilt.pressure[0] = nan;
-  expect_named(refusal([&] { write_recording(path_, spoilt); }), {"'pressure'"});
-  spoilt.pressure.pop_back();
-  expect_named(refusal([&] { write_recording(path_, spoilt); }), {"agree"});
-  EXPECT_TRUE(std::filesystem::is_empty(folder_.path()));
 }
 
 // Files of another program, where they lie beside the source tree.

@@ -11,7 +11,6 @@
 #include <glm/matrix.hpp>
 
 #include "learning/table_learning.hpp"
-#include "palpate/error.hpp"
 #include "simulated_presses.hpp"
 #include "support/errors.hpp"
 #include "support/limits.hpp"

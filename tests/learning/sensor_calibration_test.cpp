@@ -71,6 +71,7 @@ TEST(SensorCalibration, OfLettersAtKnownPosesLearnsTheirSensor) {
   ASSERT_TRUE(found.sensor.bins.has_value());
   EXPECT_NEAR(found.sensor.bins->x_mm, 0.95, 1e-9);
   EXPECT_NEAR(found.sensor.bins->theta_rad, std::numbers::pi / 36.0, 1e-9);
+  EXPECT_EQ(default_tables(true).size(), 1U);
   EXPECT_EQ(found.sensor.table->levels(), 7U);
   EXPECT_EQ(found.sensor.table->layer.of, MapLayer::mean_level);
   // One touch, smaller than a letter, tells it better than chance.
@@ -91,6 +92,8 @@ TEST(SensorCalibration, OfLettersAtUnknownPosesIsComplete) {
   letters.make_presses(false);
   const SensorCalibration found = calibrate_sensor(letters.presses, {}, {});
   expect_complete(found, 60);
+  EXPECT_EQ(default_tables(false).size(), 2U);
+  EXPECT_EQ(default_tables(false)[0].layer, MapLayer::log_odds);
   EXPECT_TRUE(found.sensor.features->objects.contains("R"));
   EXPECT_FALSE(found.groups || found.sensor.bins || found.sensor.fit_scale->stranger_sd ||
                found.sensor.fit_scale->alone);
@@ -187,32 +190,6 @@ TEST(SensorCalibration, KeepsTheFirstTableUnlessAnotherIsBetterBeyondChance) {
   EXPECT_GT(found.tried[0].log_loss, found.tried[1].log_loss) << "by chance";
   EXPECT_EQ(found.sensor.table->levels(), 4U);
   EXPECT_EQ(found.after->log_loss, found.tried[0].log_loss);
-}
-
-TEST(DefaultTables, OfKnownPosesAreOverThePressureAlone) {
-  ASSERT_EQ(default_tables(true).size(), 1U);
-  EXPECT_EQ(default_tables(true)[0].layer, MapLayer::mean_level);
-  ASSERT_EQ(default_tables(false).size(), 2U);
-  EXPECT_EQ(default_tables(false)[0].layer, MapLayer::log_odds);
-}
-
-TEST(SensorCalibration, TakesTheThresholdAndRatioGiven) {
-  const LetterPresses letters = three_letters(24);
-  const CalibrationSettings given{.readings = {.threshold = 1.0, .ratio = 0.2},
-                                  .tables = {{MapLayer::log_odds, 2}},
-                                  .folds = 2,
-                                  .bins = bins(5, 5, 6)};
-  const ContactClassifier both = calibrate_sensor(letters.presses, {}, given).sensor.classifier;
-  EXPECT_EQ(both.threshold, 1.0);
-  EXPECT_EQ(both.ratio, 0.2);
-  const auto classifier = [&](std::optional<double> threshold, std::optional<double> ratio = {}) {
-    return learn_readings(letters.presses,
-                          {.threshold = threshold, .ratio = ratio, .spacing_mm = 1.9})
-        .classifier;
-  };
-  EXPECT_EQ(classifier(20.0).threshold, 20.0);
-  EXPECT_NE(classifier(20.0).ratio, classifier(1.0).ratio) << "of touches that exceed it";
-  EXPECT_EQ(classifier({}, 0.2).ratio, 0.2);
 }
 
 }  // namespace palpate::sensor_calibration_test

@@ -260,7 +260,7 @@ TEST(TemperatureFit, RefusesWhatCannotBeTried) {
   EXPECT_THROW(fit_temperature(std::vector<HeldOut>{{.truth = 0, .log_evidence = {1.0}}}), Error);
 }
 
-TEST(GoldenSection, FindsTheLeastValue) {
+TEST(GoldenSection, FindsTheLeastValueAtBothEndsTooAndTheLowestOfEqualOnes) {
   int calls = 0;
   const double found = least_at(-3.0, 7.0, 1e-6, [&](double x) {
     ++calls;
@@ -269,15 +269,10 @@ TEST(GoldenSection, FindsTheLeastValue) {
   EXPECT_NEAR(found, 1.25, 1e-6);
   // Each section leaves 0.618 of the interval: 34 for a factor of 1e7, and the two to begin with.
   EXPECT_LE(calls, 37);
-}
-
-TEST(GoldenSection, ReachesBothEnds) {
-  EXPECT_NEAR(least_at(2.0, 5.0, 1e-4, [](double x) { return -x; }), 5.0, 1e-4);
-  EXPECT_NEAR(least_at(2.0, 5.0, 1e-4, [](double x) { return x; }), 2.0, 1e-4);
-}
-
-TEST(GoldenSection, OfEqualValuesTakesTheLowest) {
-  EXPECT_NEAR(least_at(0.0, 2.0, 1e-4, [](double) { return 3.0; }), 0.0, 1e-4);
+  for (const auto& [slope, least] : {std::pair{-1.0, 5.0}, {1.0, 2.0}, {0.0, 2.0}}) {
+    const auto line = [slope = slope](double x) { return slope * x; };
+    EXPECT_NEAR(least_at(2.0, 5.0, 1e-4, line), least, 1e-4);
+  }
 }
 
 }  // namespace palpate::temperature_fit_test

@@ -67,18 +67,6 @@ TEST(TrainingMaps, OfTouchesThatSayNothingAreRefusedByObjectOrPress) {
                {"disc1.h5, touch 0"});
 }
 
-TEST(TrainingMaps, OfPressesAreOfOneEach) {
-  SimulatedPresses simulated;
-  simulated.add_shapes(2, 10);
-  const std::vector<TrainingMap> maps = maps_of_presses(simulated.presses, map_options());
-  ASSERT_EQ(maps.size(), 4U);
-  for (std::size_t i = 0; i < maps.size(); ++i) {
-    EXPECT_EQ(maps[i].presses, std::vector<std::size_t>{i});
-    EXPECT_EQ(maps[i].map.label, simulated.presses[i].label);
-  }
-  EXPECT_FALSE(TrainingMap{}.holds(0)) << "a map from elsewhere";
-}
-
 TEST(Presses, LieAboutTheOriginOfTheirFrameOrWhereTheRecordingSays) {
   Recording recording = random_recording(3, 12, 7);
   recording.path = "file.h5";

@@ -7,7 +7,6 @@
 
 #include <gtest/gtest.h>
 
-#include "learning/unposed_maps.hpp"
 #include "palpate/simulation.hpp"
 #include "support/errors.hpp"
 #include "support/synthetic.hpp"

@@ -9,9 +9,7 @@
 #include <cmath>
 #include <numeric>
 #include <optional>
-#include <utility>
 
-#include "palpate/error.hpp"
 #include "recognition/filter_choice.hpp"
 #include "recognition/object_fit.hpp"
 #include "recognition/recognition_record.hpp"

@@ -7,7 +7,6 @@
 #include "recognition/filter_choice.hpp"
 #include "shapes.hpp"
 #include "support/touched_shape.hpp"
-#include "support/unknown_of.hpp"
 
 namespace palpate::learned_recognition_test {
 

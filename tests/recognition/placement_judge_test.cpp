@@ -7,8 +7,8 @@
 
 #include <gmock/gmock.h>
 
-#include "letters.hpp"
 #include "model/displacement_points.hpp"
+#include "shapes.hpp"
 #include "support/shared_device.hpp"
 #include "support/unknown_of.hpp"
 

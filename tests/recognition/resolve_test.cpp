@@ -11,7 +11,6 @@
 
 #include "options/option.hpp"
 #include "palpate/error.hpp"
-#include "palpate/map_builder.hpp"
 #include "recognition/filter_choice.hpp"
 #include "recognition/recognition_task.hpp"
 #include "shapes.hpp"
@@ -374,8 +373,7 @@ TEST(RecognitionOptions, ATextThatCannotBeMeantLeavesTheOptionAsItWas) {
 }
 
 TEST(RecognitionTask, NamesEachLabelOnceAndNoneLast) {
-  std::vector<Hypothesis> three = shapes();
-  three.push_back(three[0]);
+  const std::vector<Hypothesis> three = three_maps();
   const RecognitionTask known(three, HistogramOptions{});
   EXPECT_EQ(known.labels, (std::vector<std::string>{"L", "disc"}));
   EXPECT_EQ(known.label_of, (std::vector<std::size_t>{0, 1, 0}));

@@ -8,7 +8,6 @@
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 
-#include "letters.hpp"
 #include "recognition/warnings.hpp"
 #include "shapes.hpp"
 

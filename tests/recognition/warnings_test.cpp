@@ -9,10 +9,8 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
-#include "letters.hpp"
 #include "shapes.hpp"
 #include "support/errors.hpp"
-
 #include "support/synthetic.hpp"
 #include "support/unknown_of.hpp"
 

@@ -224,23 +224,6 @@ class PoseFifo : public PoseSource {
   std::optional<PosedSensor> sensor_;
 };
 
-TEST_F(PoseFifo, WrongStampsCostNoFrameItsPoseAndAreSaidAtOnce) {
-  // Two of them in milliseconds
-  tell(lines(0, 21) + line(1000.0 * time_of(20), 20) + lines(21, 71) +
-       line(1000.0 * time_of(70), 70) + lines(71, 101));
-  add_frames(0, 50);
-  EXPECT_EQ(posed_frames(*sensor_), 50u);
-  ASSERT_EQ(complaints_.size(), 1u) << "when it happens";
-  expect_named(complaints_[0], {"poses ", "line 22", "1700000000200 s", "later"});
-  add_frames(50, 100);
-  EXPECT_EQ(posed_frames(*sensor_), 50u);
-  EXPECT_EQ(complaints_.size(), 1u) << "once";
-  EXPECT_EQ(sensor_->poses().read, 101u);
-  EXPECT_EQ(sensor_->poses().refused, 2u);
-  EXPECT_EQ(sensor_->poses().frames, 100u);
-  EXPECT_EQ(sensor_->poses().first_refused, complaints_[0].substr(6));
-}
-
 TEST_F(PoseFifo, EveryKindOfFaultIsSaidOnce) {
   std::string text;
   for (int i = 0; i < 3; ++i) {

@@ -1,7 +1,6 @@
 #include "palpate/virtual_sensor.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <numbers>
 
 #include "palpate/baseline.hpp"

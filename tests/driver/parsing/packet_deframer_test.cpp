@@ -3,8 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
+#include <string>
+#include <string_view>
+#include <vector>
 
+#include "driver/packet_format.hpp"
 #include "driver/serial_profile.hpp"
+#include "driver/without_memory.hpp"
 #include "receiver.hpp"
 #include "sent_frame.hpp"
 #include "support/trials.hpp"
@@ -134,6 +139,158 @@ TEST(PacketDeframer, FindsTheFieldsBehindCountedParts) {
   ASSERT_EQ(receiver.frames().size(), 1u);
   EXPECT_EQ(receiver.frames()[0].values, (std::vector<double>{7, 9}));
   EXPECT_NEAR(receiver.frames()[0].device_time_s.value(), 0.005, 1e-12);
+}
+
+constexpr const char* largest = R"(
+name: largest
+elements: [{grid: [128, 128], pitch_mm: [1, 1]}]
+packet:
+  - bytes: "00"
+  - {values: u8, stride: 3}
+)";
+
+class LargestPacket : public testing::TestWithParam<const char*> {};
+
+TEST_P(LargestPacket, IsFoundBehindManyThatBeginLikeIt) {
+  const std::string check = GetParam();
+  const SerialProfile profile =
+      parse_serial_profile(largest + ("  - {" + check + "}\n"), "largest.yaml");
+  const auto& checksum = std::get<PacketFormat::Check>(profile.packet.fields.back()).checksum;
+  Bytes packet(1 + 3 * 16384, 0);
+  for (std::size_t i = 1; i < packet.size(); ++i) {
+    packet[i] = static_cast<std::uint8_t>(i / 3);
+  }
+  const std::uint32_t sum = checksum(packet);
+  for (std::size_t i = 0; i < checksum.bytes(); ++i) {
+    packet.push_back(static_cast<std::uint8_t>(sum >> (8 * i)));
+  }
+  Receiver receiver(profile);
+  Bytes noise(1'000'000, 0);
+  noise[0] = 1;  // out of step from here on
+  receiver.push(noise);
+  receiver.push_in_pieces(packet, [] { return 7; });  // as a board of short packets delivers it
+  ASSERT_EQ(receiver.frames().size(), 1u);
+  EXPECT_EQ(receiver.frames()[0].values.back(), packet[1 + 3 * 16383]);
+  EXPECT_EQ(receiver.garbage(), noise.size());
+}
+
+// Each of these checksums is wrong for a packet of zeros.
+INSTANTIATE_TEST_SUITE_P(
+    Checksums, LargestPacket,
+    testing::Values("checksum: sum16, init: 0x1234", "checksum: weiss16",
+                    "checksum: xor8, init: 0x11",
+                    "checksum: crc32, polynomial: 0x04c11db7, init: 0xffffffff"));
+
+TEST(LargestParts, AreGoneThroughInBoundedWork) {
+  // Each byte begins a packet of 2570 bytes, whose last part is cut short.
+  Receiver receiver(parse_serial_profile(R"(
+name: parts
+elements: [[0, 0], [1, 0], [2, 0]]
+packet:
+  - bytes: "0a"
+  - {length: u16be, most: 4096}
+  - {parts: u8, tags: [{tag: 0x0a, values: 3}]}
+)",
+                                         "parts.yaml"));
+  receiver.push(Bytes(50'000, 0x0a));
+  EXPECT_TRUE(receiver.frames().empty());
+  EXPECT_GT(receiver.garbage(), 45'000u);
+}
+
+TEST(EndlessGarbage, NeedsNoMoreMemoryThanItsFirstBytes) {
+  const std::unique_ptr<Deframer> deframer = make_deframer(read_serial_profile("wts"));
+  std::vector<ParsedFrame> frames;
+  const Bytes piece(64, 0x00);
+  constexpr int pieces = 1000;
+  deframer->push(piece, frames);
+  deframer->push(piece, frames);
+  {
+    const WithoutMemory none;
+    for (int i = 2; i < pieces; ++i) {
+      deframer->push(piece, frames);
+    }
+  }
+  EXPECT_EQ(deframer->counters().garbage_bytes, pieces * piece.size());
+}
+
+using Kind = Checksum::Kind;
+using Parameters = Checksum::Parameters;
+
+Parameters crc(std::size_t bytes, std::uint32_t polynomial, std::uint32_t init = 0,
+               std::uint32_t xor_out = 0, bool reflect = false) {
+  return {.bytes = bytes,
+          .polynomial = polynomial,
+          .init = init,
+          .xor_out = xor_out,
+          .reflect = reflect};
+}
+
+struct ChecksumCase {
+  const char* name;
+  std::uint32_t expected;
+  std::string_view bytes;
+  Parameters parameters;
+};
+
+constexpr std::string_view check = "123456789";
+constexpr std::string_view three = "\xff\x02\x10";  // 255 + 2 + 16 = 273 = 0x111
+
+// The values named "check", over "123456789", are those of the catalogue of parametrised CRC
+// algorithms; those of Weiss Robotics, of packets that its command set prints as examples.
+const ChecksumCase cases[] = {
+    {"CRC-8/SMBUS", 0xf4, check, crc(1, 0x07)},
+    {"CRC-8/MAXIM", 0xa1, check, crc(1, 0x31, 0, 0, true)},
+    {"CRC-16/CCITT-FALSE", 0x29b1, check, crc(2, 0x1021, 0xffff)},
+    {"CRC-16/XMODEM", 0x31c3, check, crc(2, 0x1021)},
+    {"CRC-16/MODBUS", 0x4b37, check, crc(2, 0x8005, 0xffff, 0, true)},
+    // An asymmetric initial value shows whether it is reflected with the register.
+    {"CRC-16/RIELLO", 0x63d0, check, crc(2, 0x1021, 0xb2aa, 0, true)},
+    {"CRC-32/ISO-HDLC", 0xcbf43926, check, crc(4, 0x04c11db7, 0xffffffff, 0xffffffff, true)},
+    {"CRC-32/BZIP2", 0xfc891918, check, crc(4, 0x04c11db7, 0xffffffff, 0xffffffff)},
+    {"Weiss 1", 0x10e8, {"\xaa\xaa\xaa\x01\x00\x00", 6}, {.kind = Kind::weiss, .bytes = 2}},
+    {"Weiss 6", 0x2697, {"\xaa\xaa\xaa\x06\x00\x00", 6}, {.kind = Kind::weiss, .bytes = 2}},
+    {"8-bit sum", 0x11, three, {.kind = Kind::sum, .bytes = 1}},
+    {"16-bit sum", 0x111, three, {.kind = Kind::sum, .bytes = 2}},
+    {"sum of all", 0xbd, three, {.kind = Kind::sum, .bytes = 1, .init = 0x31, .xor_out = 0xff}},
+    {"exclusive or", 0xed, three, {.kind = Kind::exor, .bytes = 1}},
+    {"begun", 0xe2, three, {.kind = Kind::exor, .bytes = 1, .init = 0x0f}},
+    {"CRC of nothing", 0xffff, "", crc(2, 0x1021, 0xffff)},
+    {"sum of nothing", 0, "", {.kind = Kind::sum, .bytes = 1}}};
+
+TEST(Checksum, GivesThePublishedValues) {
+  for (const ChecksumCase& row : cases) {
+    const Bytes bytes(row.bytes.begin(), row.bytes.end());
+    EXPECT_EQ(Checksum(row.parameters)(bytes), row.expected) << row.name;
+  }
+}
+
+TEST(Checksum, OfAStretchNeedsOnlyTheRunningValuesAtItsEnds) {
+  std::mt19937 random(20261122);
+  const Bytes stream = random_bytes(2000, random);
+  for (const ChecksumCase& row : cases) {
+    SCOPED_TRACE(row.name);
+    const Checksum checksum(row.parameters);
+    std::vector<std::uint32_t> running{static_cast<std::uint32_t>(random() & 0xff)};
+    for (const std::uint8_t byte : stream) {
+      running.push_back(checksum.run_on(running.back(), byte));
+    }
+    for (int i = 0; i < 200; ++i) {
+      const auto [from, to] = std::minmax({random() % 2001, random() % 2001});
+      ASSERT_EQ(checksum.of_stretch(running[from], running[to], to - from),
+                checksum(std::span(stream).subspan(from, to - from)))
+          << from << " to " << to;
+    }
+  }
+}
+
+TEST(Checksum, OfTheLongestStretch) {
+  const Checksum checksum(crc(4, 0x04c11db7, 0xffffffff));
+  const Bytes stream(Checksum::longest_stretch, 0x5a);
+  std::uint32_t running = 0;
+  for (const std::uint8_t byte : stream) {
+    running = checksum.run_on(running, byte);
+  }
+  EXPECT_EQ(checksum.of_stretch(0, running, stream.size()), checksum(stream));
 }
 
 }  // namespace palpate::packet_deframer_test

@@ -23,10 +23,10 @@ SentFrame random_frame(const std::string& board, std::mt19937& random);
 std::vector<SentFrame> random_frames(const std::string& board, std::size_t count,
                                      std::mt19937& random);
 
-/// A WTS packet, whose checksum is computed bit by bit.
 /// Weiss Robotics' checksum, bit by bit; 0 over a packet with its own checksum behind it.
 std::uint16_t weiss_checksum(const Bytes& bytes);
 
+/// A WTS packet, whose checksum is computed so.
 Bytes wts_packet(std::uint8_t id, const Bytes& payload);
 
 Bytes random_bytes(std::size_t count, std::mt19937& random);
