@@ -18,18 +18,10 @@ namespace palpate::refusal_test {
 TEST(MapOptions, OutOfRangeAreRefused) {
   Device device = Device::open();
   std::vector<std::pair<MapOptions, const char*>> wrong{
-      {{.classifier = {.threshold = nan}}, "threshold"},
-      {{.classifier = {.threshold = -1.0}}, "threshold"},
-      {{.classifier = {.ratio = nan}}, "ratio"},
-      {{.classifier = {.ratio = -1.0}}, "ratio"},
-      {{.sensor = {.peak = 1e-7}}, "peak"}};
+      {{.classifier = {.threshold = nan}}, "threshold"}, {{.sensor = {.peak = 1e-7}}, "peak"}};
   for (const double length : {0.0, -0.5, nan, infinity, 1e-7, 1.1e6, 1e154, 1e200}) {
     wrong.push_back({{.cell_mm = length}, "cell"});
     wrong.push_back({{.sensor = {.spread_mm = length}}, "spread"});
-  }
-  for (const double p : {0.0, 1.0, -0.5, 2.0, nan}) {
-    wrong.push_back({{.sensor = {.peak = p}}, "peak"});
-    wrong.push_back({{.sensor = {.prior = p}}, "prior"});
   }
   for (const auto& [options, name] : wrong) {
     expect_named(input_error([&] { const MapBuilder builder(device, options); }), {name});
@@ -49,50 +41,17 @@ TEST(FilterInput, OutOfRangeIsRefused) {
   using Change = std::function<void(Input&)>;
   std::vector<std::pair<const char*, Change>> wrong{
       {"no objects", [](Input& in) { in.objects.clear(); }},
-      {"'made up'", [](Input& in) { in.map().nx = 0; }},
       {"19 log odds", [](Input& in) { in.map().log_odds.pop_back(); }},
-      {"prior", [](Input& in) { in.map().prior = nan; }},
-      {"symmetry", [](Input& in) { in.map().symmetry = -1; }},
-      {"(none)", [](Input& in) { in.map().label = "(none)"; }},
       {"threshold", [](Input& in) { in.contact.classifier.threshold = nan; }},
-      {"ratio", [](Input& in) { in.contact.classifier.ratio = nan; }},
-      {"ratio", [](Input& in) { in.contact.classifier.ratio = 1.5; }},
+      {"gamma", [](Input& in) { in.contact.gamma = 1.0; }},
+      {"prior", [](Input& in) { in.contact.prior = 0.0; }},
       {"differs from 0.3",
        [](Input& in) { in.objects.push_back(in.objects[0]), in.map().prior = 0.3; }},
       {"2 objects, but there are 1", [](Input& in) { in.contact = random_table(2); }},
-      {"y_mm",
-       [](Input& in) {
-         in.lattice.y_mm = {5.0, -5.0, 3};
-       }},
-      {"y_mm",
-       [](Input& in) {
-         in.lattice.y_mm = {-1e200, 1e200, 3};
-       }},
-      {"theta_rad",
-       [](Input& in) {
-         in.lattice.theta_rad = {0.0, nan, 3};
-       }},
-      {"pivot_mm", [](Input& in) {
-         in.lattice.pivot_mm = {infinity, 0.0};
-       }}};
-  const auto add = [&](const char* name, std::initializer_list<double> values,
-                       const std::function<void(Input&, double)>& set) {
-    for (const double value : values) {
-      wrong.emplace_back(name, [set, value](Input& in) { set(in, value); });
-    }
-  };
-  add("cell_mm", {0.0, -1.0, nan, infinity, 1e-200, 1e154, 1e200},
-      [](Input& in, double value) { in.map().cell_mm = value; });
-  add("spread_mm", {0.0, -1.0, nan, infinity, 500.0},
-      [](Input& in, double value) { in.map().spread_mm = value; });
-  add("origin_mm", {nan, infinity, 1e10},
-      [](Input& in, double value) { in.map().origin_mm.y = value; });
-  add("finite", {nan, infinity, -infinity},
-      [](Input& in, double value) { in.map().log_odds[7] = static_cast<float>(value); });
-  add("weight", {0.0, -1.0, nan, infinity},
-      [](Input& in, double value) { in.objects[0].weight = value; });
-  add("gamma", {-0.1, 1.0, nan}, [](Input& in, double value) { in.contact.gamma = value; });
-  add("prior", {0.0, 1.0, nan}, [](Input& in, double value) { in.contact.prior = value; });
+      {"pivot_mm", [](Input& in) { in.lattice.pivot_mm.x = infinity; }}};
+  for (const double weight : {0.0, -1.0, nan, infinity}) {
+    wrong.emplace_back("weight", [=](Input& in) { in.objects[0].weight = weight; });
+  }
   Device device = Device::open();
   for (const auto& [name, change] : wrong) {
     SCOPED_TRACE(name);
@@ -150,9 +109,6 @@ TEST(BalancedLattice, OfAMapThatIsNotSoundIsRefused) {
   Input in;
   in.map().cell_mm = 1e200;
   expect_named(input_error([&] { balanced_lattice({}, in.objects); }), {"cell_mm"});
-  in = {};
-  in.map().spread_mm = 500.0;
-  expect_named(input_error([&] { balanced_lattice({}, in.objects); }), {"spread_mm"});
 }
 
 }  // namespace palpate::refusal_test

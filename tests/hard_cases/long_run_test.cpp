@@ -59,23 +59,4 @@ TEST(LongRun, TheSameTouchTenThousandTimes) {
   }
 }
 
-TEST(LongRun, TheSameTouchAThousandTimesByBounds) {
-  HardCase hard("bounds: the same touch 1,000 times");
-  const std::vector<Hypothesis> objects = two_objects(6.0, 879);
-  const Recording recording = random_recording(1, 24, 880);
-  const BoundedOptions options{.lattice = {{-5.0, 5.0, 9}, {-5.0, 5.0, 8}, {0, two_pi, 7}, {}}};
-  reference::Posterior truth = reference_posterior(objects, options, all_touches(recording));
-  for (std::vector<double>& logs : truth.log_likelihood) {
-    for (double& l : logs) {
-      l *= 1000.0;
-    }
-  }
-  BoundedPosterior posterior(objects, options);
-  posterior.update(std::vector(1000, recording.touch(0)));
-  // 24,000 elements of 1e-15 and some 1e4 nats of 16 digits.
-  const Certified seen = expect_certified(posterior, objects, options, truth, 1e-6);
-  hard.expect("total variation", seen.total_variation, options.tolerance + 2e-6);
-  hard.expect("certificate", seen.estimate.certificate->dropped_mass, options.tolerance);
-}
-
 }  // namespace palpate::long_run_test

@@ -1,4 +1,5 @@
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <string>
 #include <vector>
@@ -57,14 +58,15 @@ TEST(ContactClassifier, DeadElementsAndNonNumbersAreUnknownAndDoNotSetTheMaximum
 TEST(ContactClassifier, AgreesWithTheReference) {
   Uniform random(11);
   for (int trial = 0; trial < 200; ++trial) {
+    // Whole multiples, of a subnormal number too, so that many pressures equal a bound.
+    const double unit = trial % 2 == 0 ? 0.5 : std::numeric_limits<double>::denorm_min();
     std::vector<double> pressure(9);
     std::vector<std::uint8_t> valid(9);
     for (std::size_t i = 0; i < pressure.size(); ++i) {
-      // Halves, so that many pressures equal a bound.
-      pressure[i] = std::floor(random(0.0, 13.0)) / 2.0;
+      pressure[i] = unit * std::floor(random(0.0, 13.0));
       valid[i] = random(0.0, 1.0) < 0.9 ? 1 : 0;
     }
-    classify(pressure, valid, {.threshold = 2.0, .ratio = 0.5});
+    classify(pressure, valid, {.threshold = 4.0 * unit, .ratio = 0.5});
   }
 }
 

@@ -6,8 +6,10 @@
 #include <string>
 #include <vector>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include "../made_up_sensors.hpp"
 #include "bound_cases.hpp"
 #include "bounded_set_up.hpp"
 #include "support/certified.hpp"
@@ -40,6 +42,21 @@ std::vector<Regime> regimes() {
       // Between likelihoods that lie thousands of nats apart, a turned bin's place is not certain.
       nats = std::clamp(nats, -9.0, 0.0);
     }
+
+    for (const MapLayer layer : {MapLayer::log_odds, MapLayer::mean_level}) {
+      const LearnedScene scene = learned_scene(layer, 321);
+      all.push_back({fmt::format("{}ByLayer{}", name, static_cast<int>(layer)), scene.objects,
+                     options, random_recording(3, 20, 955)});
+      all.back().options.contact = scene.contact;
+    }
+
+    // All elements are unknown, in contact, unknown and not in contact.
+    Recording alike = random_recording(4, 12, 868);
+    for (std::size_t i = 0; i < alike.pressure.size(); ++i) {
+      alike.valid.push_back(i / 12 % 2 == 0 ? 0 : 1);
+      alike.pressure[i] = i / 12 == 1 ? 10.0 : 0.0;
+    }
+    all.push_back({name + "ByTouchesOfOneReading", two_made_up(), options, alike});
 
     all.push_back({name + "WithNoneOfThese", two_shapes(), options, touches_of_l(4, 952)});
     all.back().options.none_weight = 2.0;

@@ -8,7 +8,9 @@
 #include <glm/vec3.hpp>
 
 #include "beliefs.hpp"
+#include "palpate/pose_error.hpp"
 #include "support/synthetic.hpp"
+#include "support/touched_shape.hpp"
 
 namespace palpate::particle_filter_test {
 
@@ -163,6 +165,33 @@ TEST(ParticleFilter, MemoryCountsWhatAnEstimateTakes) {
   filter.estimate();
   // All weigh the same, so that the estimate takes every particle, four floats each.
   EXPECT_GE(filter.device_bytes(), before + particles * 4 * sizeof(float));
+}
+
+TEST(ParticleFilter, RandomParticlesFindAnObjectThatWasTakenElsewhere) {
+  const std::vector<Hypothesis> objects{{map_of(on_letter_l, "L"), 1.0},
+                                        {map_of(on_disc, "disc"), 1.0}};
+  const Body body = body_of(objects[0].map);
+  const Pose first{{-6.0, -6.0}, 0.5};
+  const Pose second{{7.0, 5.0}, 3.6};
+  const Recording before = touches_of(on_letter_l, first, 8, 463);
+  const Recording after = touches_of(on_letter_l, second, 25, 464);
+  Device device = Device::open();
+  for (const bool augmented : {false, true}) {
+    ParticleOptions options{.particles = 5000, .region = {}};
+    options.augmented = augmented;
+    ParticleFilter filter(device, objects, options);
+    const auto error_mm = [&](const Pose& truth) {
+      return pose_error_mm(body, 1, filter.estimate().mode.T_object_robot, truth);
+    };
+    filter.update(all_touches(before));
+    EXPECT_LT(error_mm(first), 2.0);
+    filter.update(all_touches(after));
+    if (augmented) {
+      EXPECT_LT(error_mm(second), 2.0);
+    } else {
+      EXPECT_GT(error_mm(second), 4.0) << "or there was nothing to recover from";
+    }
+  }
 }
 
 }  // namespace palpate::particle_filter_test
