@@ -169,8 +169,6 @@ void add_tables(Cases& cases) {
     of.options.contact = std::move(scene.contact);
     return of;
   };
-  add("TableOfEquation7", {objects, tabled(0.1)});
-  add("TableOfEquation7WithoutAFloor", {objects, tabled(0.0)});
   add("TableOfEveryObject", {objects, random_table(3)});
   LikelihoodCase& none = add("TableOfEveryObjectAndNoneOfThese", {objects, random_table(3)});
   none.options.none_weight = 2.0;

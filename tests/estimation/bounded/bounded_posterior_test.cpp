@@ -10,7 +10,7 @@
 
 #include <gtest/gtest.h>
 
-#include "bounded_set_up.hpp"
+#include "bound_cases.hpp"
 #include "support/certified.hpp"
 
 namespace palpate::bounded_posterior_test {
