@@ -59,6 +59,9 @@ void add_sizes(Cases& cases) {
     // The tolerance is for arrays of 36; the errors of more elements add up.
     of.nats *= std::max(1.0, static_cast<double>(elements) / 36.0);
   }
+  LikelihoodCase& one = cases.add("OneBinAndOneElement");
+  one.recording = random_recording(1, 1, 452);
+  one.lattices = lattices_of({0.1}, 1, 1, 1);
   LikelihoodCase& objects = cases.add("MapsOfDifferentCellsAndWeights");
   objects.objects = {{random_map(31, 27, 0.5, steepness, 51), 1.0},
                      {random_map(20, 20, 1.0, steepness, 52), 3.0},
@@ -166,8 +169,6 @@ void add_tables(Cases& cases) {
     of.options.contact = std::move(scene.contact);
     return of;
   };
-  add("TableOfEquation7", {objects, tabled(0.1)});
-  add("TableOfEquation7WithoutAFloor", {objects, tabled(0.0)});
   add("TableOfEveryObject", {objects, random_table(3)});
   LikelihoodCase& none = add("TableOfEveryObjectAndNoneOfThese", {objects, random_table(3)});
   none.options.none_weight = 2.0;

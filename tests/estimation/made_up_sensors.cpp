@@ -10,6 +10,8 @@ namespace palpate {
 
 namespace {
 
+constexpr double node_step = 0.05;
+
 LikelihoodTable empty_table(std::vector<double> level_edges) {
   constexpr double end = 13.0;
   return {.first_log_odds = -end,
@@ -52,18 +54,6 @@ std::vector<double> jagged(std::size_t levels, Uniform& random) {
 }
 
 }  // namespace
-
-ContactModel tabled(double gamma) {
-  const ContactModel eq7{.gamma = gamma, .prior = 0.2};
-  LikelihoodTable table = empty_table({});
-  for (const Reading reading : {Reading::no_contact, Reading::in_contact}) {
-    for (std::size_t i = 0; i < table.nodes; ++i) {
-      const double l = table.first_log_odds + node_step * static_cast<double>(i);
-      table.log_likelihood.push_back(reference::log_likelihood(reading, {l}, eq7));
-    }
-  }
-  return {.table = std::move(table)};
-}
 
 ContactModel random_table(std::size_t objects) {
   LikelihoodTable table = empty_table({8.0, 11.0, 15.0});

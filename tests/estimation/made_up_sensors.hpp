@@ -9,10 +9,6 @@
 
 namespace palpate {
 
-/// A table of Eq. 7 at the nodes from -13 to 13, `node_step` apart.
-inline constexpr double node_step = 0.05;
-ContactModel tabled(double gamma);
-
 /// A table of random numbers for every object and four levels of contact between 6 and 20 kPa.
 ContactModel random_table(std::size_t objects);
 

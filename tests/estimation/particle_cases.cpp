@@ -61,9 +61,7 @@ std::vector<ParticleCase> particle_cases() {
                                       {random_map(23, 29, 0.5, 12.0, 74), 1.0}};
   LearnedScene levels = learned_scene(MapLayer::mean_level, 311);
   LearnedScene odds = learned_scene(MapLayer::log_odds, 311);
-  for (auto& [name, scene] : {std::pair("TableOfEquation7", LearnedScene{steep, tabled(0.1)}),
-                              {"TableOfEquation7WithoutAFloor", {steep, tabled(0.0)}},
-                              {"TableOfEveryObject", {steep, random_table(3)}},
+  for (auto& [name, scene] : {std::pair("TableOfEveryObject", LearnedScene{steep, random_table(3)}),
                               {"TableOfAllObjects", {steep, random_table(1)}},
                               {"LearnedLayerOfLogOdds", odds},
                               {"LearnedLayerOfMeanLevels", levels}}) {

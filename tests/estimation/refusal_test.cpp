@@ -1,4 +1,4 @@
-// Options and maps that are out of range are refused by the name of what is wrong.
+// Options, maps and displacements that are out of range are refused by the name of what is wrong.
 
 #include <functional>
 #include <utility>
@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "beliefs.hpp"
+#include "estimation/displacement_check.hpp"
 #include "made_up_sensors.hpp"
 #include "palpate/balanced_lattice.hpp"
 #include "palpate/map_builder.hpp"
@@ -18,18 +19,10 @@ namespace palpate::refusal_test {
 TEST(MapOptions, OutOfRangeAreRefused) {
   Device device = Device::open();
   std::vector<std::pair<MapOptions, const char*>> wrong{
-      {{.classifier = {.threshold = nan}}, "threshold"},
-      {{.classifier = {.threshold = -1.0}}, "threshold"},
-      {{.classifier = {.ratio = nan}}, "ratio"},
-      {{.classifier = {.ratio = -1.0}}, "ratio"},
-      {{.sensor = {.peak = 1e-7}}, "peak"}};
+      {{.classifier = {.threshold = nan}}, "threshold"}, {{.sensor = {.peak = 1e-7}}, "peak"}};
   for (const double length : {0.0, -0.5, nan, infinity, 1e-7, 1.1e6, 1e154, 1e200}) {
     wrong.push_back({{.cell_mm = length}, "cell"});
     wrong.push_back({{.sensor = {.spread_mm = length}}, "spread"});
-  }
-  for (const double p : {0.0, 1.0, -0.5, 2.0, nan}) {
-    wrong.push_back({{.sensor = {.peak = p}}, "peak"});
-    wrong.push_back({{.sensor = {.prior = p}}, "prior"});
   }
   for (const auto& [options, name] : wrong) {
     expect_named(input_error([&] { const MapBuilder builder(device, options); }), {name});
@@ -49,50 +42,17 @@ TEST(FilterInput, OutOfRangeIsRefused) {
   using Change = std::function<void(Input&)>;
   std::vector<std::pair<const char*, Change>> wrong{
       {"no objects", [](Input& in) { in.objects.clear(); }},
-      {"'made up'", [](Input& in) { in.map().nx = 0; }},
       {"19 log odds", [](Input& in) { in.map().log_odds.pop_back(); }},
-      {"prior", [](Input& in) { in.map().prior = nan; }},
-      {"symmetry", [](Input& in) { in.map().symmetry = -1; }},
-      {"(none)", [](Input& in) { in.map().label = "(none)"; }},
       {"threshold", [](Input& in) { in.contact.classifier.threshold = nan; }},
-      {"ratio", [](Input& in) { in.contact.classifier.ratio = nan; }},
-      {"ratio", [](Input& in) { in.contact.classifier.ratio = 1.5; }},
+      {"gamma", [](Input& in) { in.contact.gamma = 1.0; }},
+      {"prior", [](Input& in) { in.contact.prior = 0.0; }},
       {"differs from 0.3",
        [](Input& in) { in.objects.push_back(in.objects[0]), in.map().prior = 0.3; }},
       {"2 objects, but there are 1", [](Input& in) { in.contact = random_table(2); }},
-      {"y_mm",
-       [](Input& in) {
-         in.lattice.y_mm = {5.0, -5.0, 3};
-       }},
-      {"y_mm",
-       [](Input& in) {
-         in.lattice.y_mm = {-1e200, 1e200, 3};
-       }},
-      {"theta_rad",
-       [](Input& in) {
-         in.lattice.theta_rad = {0.0, nan, 3};
-       }},
-      {"pivot_mm", [](Input& in) {
-         in.lattice.pivot_mm = {infinity, 0.0};
-       }}};
-  const auto add = [&](const char* name, std::initializer_list<double> values,
-                       const std::function<void(Input&, double)>& set) {
-    for (const double value : values) {
-      wrong.emplace_back(name, [set, value](Input& in) { set(in, value); });
-    }
-  };
-  add("cell_mm", {0.0, -1.0, nan, infinity, 1e-200, 1e154, 1e200},
-      [](Input& in, double value) { in.map().cell_mm = value; });
-  add("spread_mm", {0.0, -1.0, nan, infinity, 500.0},
-      [](Input& in, double value) { in.map().spread_mm = value; });
-  add("origin_mm", {nan, infinity, 1e10},
-      [](Input& in, double value) { in.map().origin_mm.y = value; });
-  add("finite", {nan, infinity, -infinity},
-      [](Input& in, double value) { in.map().log_odds[7] = static_cast<float>(value); });
-  add("weight", {0.0, -1.0, nan, infinity},
-      [](Input& in, double value) { in.objects[0].weight = value; });
-  add("gamma", {-0.1, 1.0, nan}, [](Input& in, double value) { in.contact.gamma = value; });
-  add("prior", {0.0, 1.0, nan}, [](Input& in, double value) { in.contact.prior = value; });
+      {"pivot_mm", [](Input& in) { in.lattice.pivot_mm.x = infinity; }}};
+  for (const double weight : {0.0, -1.0, nan, infinity}) {
+    wrong.emplace_back("weight", [=](Input& in) { in.objects[0].weight = weight; });
+  }
   Device device = Device::open();
   for (const auto& [name, change] : wrong) {
     SCOPED_TRACE(name);
@@ -150,9 +110,67 @@ TEST(BalancedLattice, OfAMapThatIsNotSoundIsRefused) {
   Input in;
   in.map().cell_mm = 1e200;
   expect_named(input_error([&] { balanced_lattice({}, in.objects); }), {"cell_mm"});
-  in = {};
-  in.map().spread_mm = 500.0;
-  expect_named(input_error([&] { balanced_lattice({}, in.objects); }), {"spread_mm"});
+}
+
+constexpr PoseLattice region{
+    .x_mm = {-10.0, 10.0, 5}, .y_mm = {-4.0, 4.0, 5}, .theta_rad = {0.0, 1.0, 5}};
+
+void check(const DisplacementSd& sd, const PoseLattice& lattice = region) {
+  validate_displacement(sd, lattice, "touch_sd");
+}
+
+TEST(DisplacementCheck, TakesWhatTheRegionHolds) {
+  for (const DisplacementSd& sd :
+       {DisplacementSd{}, DisplacementSd{.mm = 8.0}, DisplacementSd{.rad = 1.0},
+        DisplacementSd{.mm = 1e-300, .rad = 0.05}}) {
+    EXPECT_NO_THROW(check(sd));
+  }
+}
+
+TEST(DisplacementCheck, NamesWhatCannotBeMeant) {
+  for (const double wrong : {-1.0, nan, infinity, 8.1}) {
+    EXPECT_TRUE(input_error([&] { check({.mm = wrong}); }).starts_with("touch_sd mm = ")) << wrong;
+    EXPECT_TRUE(input_error([&] { check({.rad = wrong}); }).starts_with("touch_sd rad = "));
+  }
+  expect_named(input_error([] { check({.mm = 8.1}); }), {"wider than the region, 8 mm"});
+}
+
+TEST(DisplacementCheck, LeavesAnAxisOfOneBinAlone) {
+  PoseLattice lattice = region;
+  lattice.y_mm.count = 1;
+  lattice.theta_rad.count = 1;
+  EXPECT_NO_THROW(check({.mm = 20.0, .rad = 100.0}, lattice));
+  EXPECT_THROW(check({.mm = 20.1}, lattice), Error);
+  lattice.x_mm.count = 1;
+  EXPECT_NO_THROW(check({.mm = 1e6}, lattice));
+}
+
+TEST(UnresolvedDisplacement, IsBelowHalfAStep) {
+  const auto said = [](const DisplacementSd& sd, const PoseLattice& lattice = region) {
+    return unresolved_by_steps(sd, lattice, "touch-sd").value_or("");
+  };
+  // Steps of 4 mm, 1.6 mm and 0.2 rad.
+  EXPECT_EQ(said({.mm = 2.0, .rad = 0.1}), "");
+  EXPECT_EQ(said({}), "") << "nothing is blurred";
+  expect_named(said({.mm = 1.9}), {"touch-sd of 1.9 mm: its step of x is 4 mm"});
+  expect_named(said({.rad = 0.09}), {"5.16 degrees: its step of theta is 11.5 degrees"});
+  PoseLattice fixed = region;
+  fixed.x_mm.count = 1;
+  fixed.theta_rad.count = 1;
+  EXPECT_EQ(said({.mm = 1.0, .rad = 0.01}, fixed), "") << "axes of one bin are not blurred";
+}
+
+TEST(UnresolvedDisplacement, LiesFarFromThePivot) {
+  PoseLattice lattice = region;
+  lattice.pivot_mm = {100.0, 0.0};
+  const auto said = [&](double x_mm, const DisplacementSd& sd) {
+    return unresolved_at({{x_mm, 0.0}, 0.0}, sd, lattice, "touch-sd").value_or("");
+  };
+  // A step of 0.2 rad moves a sensor at r mm by 0.2 r mm; twice the step of x is 8 mm.
+  EXPECT_EQ(said(139.0, {.mm = 1.0, .rad = 0.1}), "");
+  expect_named(said(141.0, {.mm = 1.0, .rad = 0.1}), {"move the pivot near the touches"});
+  EXPECT_EQ(said(141.0, {.mm = 5.0, .rad = 0.1}), "") << "10 mm";
+  EXPECT_EQ(said(1000.0, {.mm = 1.0}), "") << "no angle is blurred";
 }
 
 }  // namespace palpate::refusal_test

@@ -6,6 +6,7 @@
 
 #include "hard_case.hpp"
 #include "palpate/balanced_lattice.hpp"
+#include "support/limits.hpp"
 
 namespace palpate::bounds_test {
 
@@ -87,6 +88,50 @@ TEST(Bounds, WhatLiesBeyondThemOnBothSidesDoesNotMeet) {
   filter.update(recording.touch(0));
   hard.expect("identity of particles off the map", std::abs(filter.estimate().identity[0] - 0.5),
               1e-5);
+}
+
+/// Expects touches that say nothing to leave all particles alike.
+ParticleFilter expect_alike(HardCase& hard, const Recording& recording) {
+  const std::vector<Hypothesis> objects{{random_map(61, 61, 0.5, 4.0, 502), 1.0},
+                                        {random_map(31, 31, 1.0, 4.0, 503), 1.0}};
+  ParticleFilter filter = hard.expect_particles(objects, two_thousand_particles(), recording);
+  const std::vector<ParticleFilter::Particle> particles = filter.particles();
+  for (const ParticleFilter::Particle& particle : particles) {
+    EXPECT_EQ(particle.weight, particles.front().weight);
+  }
+  return filter;
+}
+
+TEST(Bounds, TouchesEntirelyOffTheMap) {
+  HardCase hard("touches entirely off the map, by 40 to 1e300 mm");
+  HardCase particles("particles: all-Unknown touches, and touches off the map by 40 to 1e300 mm");
+  const std::vector<Hypothesis> objects{{random_map(31, 27, 0.5, 6.0, 426), 1.0},
+                                        {random_map(25, 25, 0.5, 6.0, 427), 1.0}};
+  for (const double away_mm : {40.0, 1e6, 1e12, 1e300}) {
+    const Recording recording = moved(random_recording(3, 36, 428), {{away_mm, -away_mm}, 0.0});
+    double expected = 0.0;
+    for (const Touch& touch : all_touches(recording)) {
+      for (const ElementReading& r : known_readings(touch, {})) {
+        expected +=
+            ContactModel{.prior = 0.2}.log_likelihood(r.reading, {.log_odds = std::log(0.2 / 0.8)});
+      }
+    }
+    for (const double gamma : {0.1, 0.0}) {
+      HistogramOptions options = small_options();
+      options.contact.gamma = gamma;
+      const Estimate estimate = hard.expect_posterior(objects, options, all_touches(recording));
+      EXPECT_EQ(estimate.mode.bin, 0) << "all bins are alike";
+      EXPECT_EQ(estimate.mode.object, 0);
+      EXPECT_EQ(estimate.identity, (std::vector{0.5, 0.5}));
+      if (gamma > 0.0) {
+        EXPECT_NEAR(estimate.mode.log_likelihood, expected, 1e-4);
+      }
+    }
+    expect_alike(particles, recording);
+  }
+  Recording unknown = random_recording(5, 36, 504);
+  unknown.pressure.assign(unknown.pressure.size(), ContactClassifier{}.threshold);
+  EXPECT_NEAR(expect_alike(particles, unknown).estimate().identity[0], 0.5, 1e-12);
 }
 
 }  // namespace palpate::bounds_test

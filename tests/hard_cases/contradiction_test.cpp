@@ -62,35 +62,6 @@ TEST(Contradiction, CertainMapsWithoutGamma) {
   }
 }
 
-TEST(Contradiction, OfParticlesOnCertainMaps) {
-  HardCase hard("particles: gamma = 0 on maps at log odds of +-1,000, all contradicted");
-  const std::vector<Hypothesis> objects{{certain_map(412), 1.0}, {certain_map(413), 1.0}};
-  for (const bool augmented : {false, true}) {
-    ParticleOptions options = two_thousand_particles();
-    options.contact.gamma = 0.0;
-    options.augmented = augmented;
-    const ParticleFilter filter =
-        hard.expect_particles(objects, options, random_recording(3, 36, 509), 5e-3);
-    EXPECT_TRUE(filter.estimate().contradicted);
-  }
-}
-
-TEST(Contradiction, OfEveryHypothesis) {
-  HardCase hard("gamma = 0 and evidence that contradicts every hypothesis");
-  HardCase bounds("bounds: gamma = 0 and touches that contradict every hypothesis");
-  const std::vector<Hypothesis> objects{{filled_map(-1000.0F), 1.0}, {filled_map(-999.0F), 1.0}};
-  const Recording recording = press(10.0);
-  const HistogramOptions options = with_gamma(0.0);
-  for (const Estimate& estimate :
-       {hard.expect_posterior(objects, options, all_touches(recording), seven_digits),
-        bounds.expect_laws(objects, options, recording, 1e-7).estimate}) {
-    EXPECT_NEAR(estimate.mode.log_likelihood, -36.0 * 999.0,
-                estimate.certificate ? 1e-7 : 36.0 * 1e-4);
-    EXPECT_EQ(estimate.mode.object, 1);
-    EXPECT_TRUE(estimate.contradicted);
-  }
-}
-
 TEST(Contradiction, OfEveryHypothesisByPiecesOfThem) {
   HardCase hard("gamma = 0 and touches of pieces that no single hypothesis has");
   const std::vector<Hypothesis> objects{{filled_map(-1000.0F), 1.0}, {filled_map(1000.0F), 1.0}};
@@ -104,17 +75,6 @@ TEST(Contradiction, OfEveryHypothesisByPiecesOfThem) {
   EXPECT_EQ(histogram.estimate().none, 1.0);
   EXPECT_EQ(histogram.estimate().identity, (std::vector{0.0, 0.0}));
   EXPECT_TRUE(histogram.estimate().contradicted);
-}
-
-TEST(Contradiction, IsNoneWhereOneHypothesisFits) {
-  HardCase hard("gamma = 0 and evidence that contradicts all objects but one");
-  const std::vector<Hypothesis> objects{{filled_map(-1000.0F), 1.0}, {filled_map(1000.0F), 1e-30}};
-  const Estimate estimate =
-      hard.expect_posterior(objects, with_gamma(0.0), all_touches(press(10.0)), seven_digits);
-  EXPECT_EQ(estimate.mode.log_likelihood, 0.0);
-  EXPECT_EQ(estimate.mode.object, 1);
-  EXPECT_EQ(estimate.identity, (std::vector{0.0, 1.0}));
-  EXPECT_FALSE(estimate.contradicted);
 }
 
 TEST(Contradiction, LogOddsAtTheLargestThatAMapMayHold) {

@@ -230,11 +230,6 @@ ParticleFilter HardCase::expect_particles(std::span<const Hypothesis> objects,
   return filter;
 }
 
-void HardCase::expect_cell(double log_odds, double expected) {
-  expect("map, of what is allowed",
-         std::abs(log_odds - expected) / std::max(1e-3, 1e-4 * std::abs(expected)), 1.0);
-}
-
 OccupancyGrid HardCase::expect_map(std::span<const Touch> touches, const MapOptions& options) {
   MapBuilder builder(device(), options);
   builder.add(touches);
@@ -244,7 +239,8 @@ OccupancyGrid HardCase::expect_map(std::span<const Touch> touches, const MapOpti
   const std::vector<double> expected =
       reference::log_odds_map(touches, map, options.classifier, options.sensor);
   for (std::size_t cell = 0; cell < cells.size(); ++cell) {
-    expect_cell(cells[cell], expected[cell]);
+    const double allowed = std::max(1e-3, 1e-4 * std::abs(expected[cell]));
+    expect("map, of what is allowed", std::abs(cells[cell] - expected[cell]) / allowed, 1.0);
   }
   return map;
 }

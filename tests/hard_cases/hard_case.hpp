@@ -68,9 +68,8 @@ class HardCase {
                                   const ParticleOptions& options, const Recording& recording,
                                   double allowed_nats = 1e-4);
 
-  /// Expects a map's cell within MapBuilder's promise: 1e-3 nats or a relative 1e-4.
-  void expect_cell(double log_odds, double expected);
-  /// Builds a map of the touches and expects finite cells that agree with float64.
+  /// Builds a map of the touches and expects finite cells that agree with float64 within
+  /// MapBuilder's promise: 1e-3 nats or a relative 1e-4.
   OccupancyGrid expect_map(std::span<const Touch> touches, const MapOptions& options);
 
  private:

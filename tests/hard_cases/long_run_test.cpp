@@ -1,3 +1,9 @@
+// Runs of very many touches, and lattices of very many bins.
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
 #include <gtest/gtest.h>
 
 #include "hard_case.hpp"
@@ -59,23 +65,100 @@ TEST(LongRun, TheSameTouchTenThousandTimes) {
   }
 }
 
-TEST(LongRun, TheSameTouchAThousandTimesByBounds) {
-  HardCase hard("bounds: the same touch 1,000 times");
-  const std::vector<Hypothesis> objects = two_objects(6.0, 879);
-  const Recording recording = random_recording(1, 24, 880);
-  const BoundedOptions options{.lattice = {{-5.0, 5.0, 9}, {-5.0, 5.0, 8}, {0, two_pi, 7}, {}}};
-  reference::Posterior truth = reference_posterior(objects, options, all_touches(recording));
-  for (std::vector<double>& logs : truth.log_likelihood) {
-    for (double& l : logs) {
-      l *= 1000.0;
+// The belief takes 400 MB on the device, in several bindings if one binding cannot hold it.
+constexpr PoseLattice fifty_million() {
+  constexpr double step = 2.0 * std::numbers::pi / 250;
+  // Bins as wide as the map's cells, and centred on them.
+  return {.x_mm = {-5.0, 5.0, 500},
+          .y_mm = {-4.0, 4.0, 400},
+          .theta_rad = {-step / 2, 2.0 * std::numbers::pi - step / 2, 250}};
+}
+
+// In the last tenth of the bins. The pose half a turn away, which swaps the ends, is not in a bin.
+constexpr std::int64_t chosen_bin = (std::int64_t{231} * 400 + 317) * 500 + 349;
+
+/// One row of cells that are certainly empty except for both ends, which are certainly occupied.
+OccupancyGrid two_certain_cells(const glm::dvec2& first_mm) {
+  OccupancyGrid map{.label = "two cells",
+                    .cell_mm = 0.02,
+                    .origin_mm = first_mm,
+                    .prior = 1e-30,
+                    .nx = 251,
+                    .ny = 1};
+  map.log_odds.assign(251, -1000.0F);
+  map.log_odds.front() = map.log_odds.back() = 1000.0F;
+  return map;
+}
+
+/// A touch whose two elements lie on the map's two ends at this pose only.
+Recording touch_of_both_ends(const Pose& T_object_robot, const OccupancyGrid& map) {
+  Recording recording;
+  recording.T_robot_sensor.resize(1);
+  for (const int cell : {0, map.nx - 1}) {
+    recording.elements_mm.push_back(inverse(T_object_robot) * map.centre_mm(cell, 0));
+    recording.pressure.push_back(10.0);
+  }
+  return recording;
+}
+
+TEST(FiftyMillionBins, OfWhichOneOrAllHoldTheMass) {
+  HardCase hard("50 M bins, of which one holds all the mass, or all hold the same");
+  const PoseLattice lattice = fifty_million();
+  const Pose chosen = reference::bin_pose(lattice, chosen_bin);
+  const OccupancyGrid map = two_certain_cells(chosen.translation_mm);
+  const Hypothesis hypothesis{map, 1.0};
+  const HistogramOptions options{.lattice = lattice, .contact = {.gamma = 0.0}};
+  const auto bins = static_cast<double>(lattice.bins());
+  PoseHistogram histogram(hard.device(), std::span(&hypothesis, 1), options);
+
+  const Recording recording = touch_of_both_ends(chosen, map);
+  histogram.update(all_touches(recording));
+  Estimate estimate = histogram.estimate();
+  EXPECT_EQ(estimate.mode.bin, chosen_bin);
+  EXPECT_EQ(estimate.mode.log_likelihood, 0.0) << "a certain element costs nothing";
+  EXPECT_EQ(estimate.identity, std::vector{1.0});
+  Marginals marginals = histogram.marginals(0);
+  // Every other bin has an element in unseen space, at 69 nats, or worse: 50 M exp(-69) = 5e-23.
+  const auto in_plane = static_cast<std::size_t>(chosen_bin % lattice.plane());
+  const auto theta = static_cast<std::size_t>(chosen_bin / lattice.plane());
+  hard.expect("mass of the one bin", std::abs(marginals.xy[in_plane] - 1.0), 1e-15);
+  hard.expect("mass of the one bin", std::abs(marginals.theta[theta] - 1.0), 1e-15);
+  hard.expect("mass of the others", total(marginals.xy) - marginals.xy[in_plane], 1e-20);
+  hard.expect("mass of the others", total(marginals.theta) - marginals.theta[theta], 1e-20);
+  {
+    const std::vector<double> product = histogram.log_likelihood(0);
+    EXPECT_TRUE(all_finite(product));
+    Uniform random(481);
+    for (int sample = 0; sample < 2000; ++sample) {
+      // Half of the bins are near the pose.
+      const auto bin = sample % 2 == 0
+                           ? static_cast<std::int64_t>(random(0.0, bins))
+                           : chosen_bin + static_cast<std::int64_t>(random(-1500.0, 1500.0));
+      const double expected = reference::log_likelihood(
+          recording.touch(0), reference::bin_pose(lattice, bin), map, options.contact);
+      hard.expect("log-likelihood, nats",
+                  std::abs(product[static_cast<std::size_t>(bin)] - expected),
+                  Allowed{.nats = 5e-4, .relative = 3e-7}.at(expected));
     }
   }
-  BoundedPosterior posterior(objects, options);
-  posterior.update(std::vector(1000, recording.touch(0)));
-  // 24,000 elements of 1e-15 and some 1e4 nats of 16 digits.
-  const Certified seen = expect_certified(posterior, objects, options, truth, 1e-6);
-  hard.expect("total variation", seen.total_variation, options.tolerance + 2e-6);
-  hard.expect("certificate", seen.estimate.certificate->dropped_mass, options.tolerance);
+
+  // One reading in unseen space gives every bin the same log-likelihood: log m = -69 nats.
+  histogram.reset();
+  const Recording off = moved(recording, {{1000.0, 1000.0}, 0.0});
+  histogram.update(all_touches(off));
+  estimate = histogram.estimate();
+  EXPECT_EQ(estimate.mode.bin, 0) << "ties go to the lowest bin";
+  hard.expect("log-likelihood, nats",
+              std::abs(estimate.mode.log_likelihood - 2.0 * std::log(map.prior)), 5e-5);
+  EXPECT_EQ(estimate.identity, std::vector{1.0});
+  marginals = histogram.marginals(0);
+  const auto [least, most] = std::minmax_element(marginals.xy.begin(), marginals.xy.end());
+  // Sums of 250 and of 200,000 equal terms.
+  hard.expect("equal marginals, relative", std::abs(*least * bins / 250.0 - 1.0), 1e-6);
+  hard.expect("equal marginals, relative", std::abs(*most * bins / 250.0 - 1.0), 1e-6);
+  for (const double p : marginals.theta) {
+    hard.expect("equal marginals, relative", std::abs(p * 250.0 - 1.0), 1e-6);
+  }
 }
 
 }  // namespace palpate::long_run_test

@@ -1,59 +1,13 @@
-// Objects, lattices, cells and arrays of the least and of the largest sizes.
+// Cells and arrays of the least and of the largest sizes, of maps as they are built, too.
+
+#include <cmath>
 
 #include <gtest/gtest.h>
 
 #include "hard_case.hpp"
+#include "support/errors.hpp"
 
 namespace palpate::size_test {
-
-TEST(Size, OneObjectOneBinOneElement) {
-  HardCase hard("one object, one bin, one element");
-  const std::vector<Hypothesis> objects{{random_map(31, 27, 0.5, 6.0, 451), 1e-30}};
-  const Recording recording = random_recording(1, 1, 452);
-  for (const double half_mm : {0.0, 2.0}) {
-    HistogramOptions options;
-    options.lattice = {
-        .x_mm = {-half_mm, half_mm, 1}, .y_mm = {0.3, 0.3, 1}, .theta_rad = {1, 1, 1}};
-    for (const double gamma : {0.1, 0.0}) {
-      options.contact.gamma = gamma;
-      const Estimate estimate =
-          hard.expect_posterior(objects, options, all_touches(recording), {1e-5});
-      EXPECT_EQ(estimate.identity, std::vector{1.0});
-      EXPECT_EQ(estimate.mode.bin, 0);
-    }
-  }
-}
-
-TEST(Size, FewBinsByBounds) {
-  HardCase hard("bounds: one bin, one theta, one row and one column");
-  const std::vector<Hypothesis> objects = two_objects(6.0, 854);
-  const Recording recording = random_recording(4, 24, 856);
-  const Axis x{-5.0, 5.0, 9};
-  const Axis theta{0.0, two_pi, 7};
-  const Axis at{0.3, 0.3, 1};
-  const Axis wide{-2.0, 2.0, 1};
-  for (const PoseLattice& lattice : {PoseLattice{.x_mm = at, .y_mm = at, .theta_rad = at},
-                                     PoseLattice{.x_mm = wide, .y_mm = wide, .theta_rad = wide},
-                                     PoseLattice{.x_mm = x, .y_mm = x, .theta_rad = at},
-                                     PoseLattice{.x_mm = x, .y_mm = at, .theta_rad = theta},
-                                     PoseLattice{.x_mm = at, .y_mm = x, .theta_rad = theta},
-                                     PoseLattice{.x_mm = at, .y_mm = at, .theta_rad = theta}}) {
-    BoundedOptions options{.lattice = lattice};
-    hard.expect_laws(objects, options, recording);
-    options.contact.gamma = 0.0;
-    const Certified seen = hard.expect_laws(std::span(objects).first(1), options, recording);
-    EXPECT_EQ(seen.estimate.identity, std::vector{1.0});
-  }
-}
-
-TEST(Size, AMapOfOneCell) {
-  HardCase hard("a map of one cell");
-  const std::vector<Hypothesis> objects{{random_map(1, 1, 0.5, 6.0, 453), 1.0},
-                                        {random_map(1, 1, 8.0, 6.0, 454), 1.0},
-                                        {random_map(1, 9, 1.0, 6.0, 455), 1.0}};
-  const Recording recording = random_recording(4, 36, 456);
-  hard.expect_posterior(objects, small_options(), all_touches(recording));
-}
 
 TEST(Size, CellsOfTwoHundredthsOfAMillimetre) {
   HardCase hard("map cells of 0.02 mm");
@@ -101,6 +55,57 @@ TEST(Size, FourThousandElements) {
     options.contact.gamma = gamma;
     bounds.expect_laws(objects, options, recording, 1e-8);
     options.evidence_nats = 0.5;
+  }
+}
+
+TEST(Map, CellsOfTwoHundredthsOfAMillimetre) {
+  HardCase hard("a map in cells of 0.02 mm");
+  Recording recording = random_recording(1, 4, 494);
+  for (glm::dvec2& element : recording.elements_mm) {
+    element *= 0.2;
+  }
+  const OccupancyGrid map = hard.expect_map(all_touches(recording), {.cell_mm = 0.02});
+  EXPECT_GT(map.nx * map.ny, 50'000);
+}
+
+TEST(Map, CellsOfAHundredMillimetres) {
+  HardCase hard("a map in cells of 100 mm, and touches 1 m apart");
+  Recording recording = random_recording(60, 36, 495);
+  Uniform random(496);
+  for (Pose& pose : recording.T_robot_sensor) {
+    // Touches lie around the centres of cells: elsewhere, they would change no cell.
+    pose.translation_mm = {100.0 * std::floor(random(-8.0, 9.0)),
+                           100.0 * std::floor(random(-8.0, 9.0))};
+  }
+  // Cells that are 200, 20 and 2 spreads wide.
+  for (const double spread_mm : {0.5, 5.0, 50.0}) {
+    MapOptions options{.cell_mm = 100.0};
+    options.sensor.spread_mm = spread_mm;
+    hard.expect_map(all_touches(recording), options);
+  }
+}
+
+TEST(Map, PriorsAndPeaksAtTheirEnds) {
+  HardCase hard("a map with a prior of 1e-6 or 1 - 1e-6, and with a peak of 0.9999");
+  Recording recording = random_recording(2, 36, 497);
+  // At the centre of a cell, where the weight has its peak.
+  recording.T_robot_sensor[0] = {};
+  recording.elements_mm[0] = {1.0, 1.0};
+  for (const double prior : {1e-6, 1.0 - 1e-6}) {
+    for (const double peak : {0.9, 0.9999}) {
+      MapOptions options;
+      options.sensor = {.peak = peak, .prior = prior};
+      hard.expect_map(all_touches(recording), options);
+      // Many equal readings, whose errors add up.
+      const std::vector<Touch> many(200, recording.touch(0));
+      hard.expect_map(many, {.cell_mm = 2.0, .sensor = options.sensor});
+    }
+  }
+  // What lies a little beyond is refused.
+  for (const auto& [peak, prior, named] :
+       {std::tuple(0.9, 1e-7, "prior"), {0.9, 1.0 - 1e-7, "prior"}, {0.99999, 0.2, "peak"}}) {
+    const MapOptions options{.sensor = {.peak = peak, .prior = prior}};
+    expect_named(input_error([&] { MapBuilder(hard.device(), options); }), {named});
   }
 }
 

@@ -1,4 +1,4 @@
-// Objects and poses that no touch tells apart.
+// Objects and poses that no touch tells apart, and weights that do.
 
 #include <algorithm>
 #include <cmath>
@@ -11,19 +11,6 @@ namespace palpate::tie_test {
 
 HistogramOptions symmetric_options() {
   return {.lattice = {{-4.0, 4.0, 5}, {-4.0, 4.0, 5}, {0, two_pi, 8}, {}}};
-}
-
-/// The bin of the pose that is turned by quarters of a turn about the object's middle. The lattice
-/// must have the same bins in x and y.
-std::int64_t turned_on(const PoseLattice& lattice, std::int64_t bin, int quarters) {
-  const std::int64_t n = lattice.x_mm.count;
-  const std::int64_t x = bin % n;
-  const std::int64_t y = bin % lattice.plane() / n;
-  const std::int64_t theta = bin / lattice.plane();
-  const std::int64_t turned = (theta + lattice.theta_rad.count / 4) % lattice.theta_rad.count;
-  // (x, y) becomes (-y, x).
-  const std::int64_t once = turned * lattice.plane() + x * n + (n - 1 - y);
-  return quarters == 1 ? once : turned_on(lattice, once, quarters - 1);
 }
 
 /// Rings around the origin: equal to the bit after a quarter turn, nearly equal after other turns.
@@ -39,35 +26,6 @@ OccupancyGrid rings() {
     }
   }
   return map;
-}
-
-/// Expects of an object that so many quarters of a turn take to itself: three runs agree with
-/// float64, and with each other to the bit; a turn of the pose moves no log-likelihood.
-void expect_twins(HardCase& hard, const OccupancyGrid& map, int quarters,
-                  const Recording& recording) {
-  const std::vector<Hypothesis> objects{{map, 1.0}};
-  const HistogramOptions options = symmetric_options();
-  std::vector<double> first;
-  for (int run = 0; run < 3; ++run) {
-    const Estimate estimate = hard.expect_posterior(objects, options, all_touches(recording));
-    PoseHistogram histogram(hard.device(), objects, options);
-    histogram.update(all_touches(recording));
-    EXPECT_EQ(histogram.estimate().mode.bin, estimate.mode.bin);
-    const std::vector<double> bins = histogram.log_likelihood(0);
-    first = run == 0 ? bins : first;
-    EXPECT_EQ(bins, first);
-    const auto [least, most] = std::minmax_element(bins.begin(), bins.end());
-    EXPECT_GT(*most - *least, 1.0) << "the touches say nothing";
-    for (std::size_t bin = 0; bin < bins.size(); ++bin) {
-      const std::int64_t twin =
-          turned_on(options.lattice, static_cast<std::int64_t>(bin), quarters);
-      hard.expect("twins, nats", std::abs(bins[static_cast<std::size_t>(twin)] - bins[bin]), 1e-4);
-    }
-    const std::vector<double> theta = histogram.marginals(0).theta;
-    for (std::size_t t = 0; t < 8; ++t) {
-      EXPECT_NEAR(theta[t], theta[(t + 2 * static_cast<std::size_t>(quarters)) % 8], 1e-4);
-    }
-  }
 }
 
 TEST(Tie, IdenticalObjects) {
@@ -102,22 +60,6 @@ TEST(Tie, IdenticalObjects) {
   EXPECT_EQ(one.effective_sample_size(), 1.0);
 }
 
-TEST(Tie, TwoFoldSymmetry) {
-  HardCase hard("two-fold symmetry");
-  OccupancyGrid map = random_map(31, 27, 0.5, 6.0, 433);
-  map.symmetry = 2;
-  for (std::size_t cell = 0; cell < map.log_odds.size(); ++cell) {
-    map.log_odds[map.log_odds.size() - 1 - cell] = map.log_odds[cell];
-  }
-  map.origin_mm = -map.cell_mm * glm::dvec2(15.0, 13.0);
-  expect_twins(hard, map, 2, random_recording(3, 36, 434));
-}
-
-TEST(Tie, FullSymmetry) {
-  HardCase hard("full symmetry, touched all over");
-  expect_twins(hard, rings(), 1, random_recording(4, 36, 436));
-}
-
 TEST(Tie, FullSymmetryTouchedAtTheMiddle) {
   HardCase hard("full symmetry, touched at its middle");
   const std::vector<Hypothesis> objects{{rings(), 1.0}};
@@ -127,17 +69,78 @@ TEST(Tie, FullSymmetryTouchedAtTheMiddle) {
   recording.pressure = {10.0, 5.0};
   HistogramOptions options = symmetric_options();
   options.lattice.pivot_mm = {12.0, -7.0};
-  for (int run = 0; run < 3; ++run) {
-    const Estimate estimate = hard.expect_posterior(objects, options, all_touches(recording));
-    EXPECT_LT(estimate.mode.bin, options.lattice.plane()) << "not of the first theta";
-    PoseHistogram histogram(hard.device(), objects, options);
+  const Estimate estimate = hard.expect_posterior(objects, options, all_touches(recording));
+  EXPECT_LT(estimate.mode.bin, options.lattice.plane()) << "not of the first theta";
+  PoseHistogram histogram(hard.device(), objects, options);
+  histogram.update(all_touches(recording));
+  const std::vector<double> bins = histogram.log_likelihood(0);
+  for (std::size_t bin = 0; bin < bins.size(); ++bin) {
+    ASSERT_EQ(bins[bin], bins[bin % static_cast<std::size_t>(options.lattice.plane())]);
+  }
+  const std::vector<double> theta = histogram.marginals(0).theta;
+  EXPECT_EQ(theta, std::vector<double>(8, theta[0]));
+}
+
+TEST(Weight, ExtremelyUnequal) {
+  HardCase hard("prior weights of 1e-30 beside 1");
+  std::vector<Hypothesis> objects{{random_map(31, 27, 0.5, 6.0, 471), 1.0},
+                                  {random_map(31, 27, 0.5, 6.0, 472), 1e-30}};
+  const Recording recording = random_recording(40, 36, 473);
+  const Estimate before = hard.expect_posterior(objects, small_options(), {});
+  EXPECT_NEAR(before.identity[1], 1e-30, 1e-36) << "the weight itself, to six digits";
+
+  // The object that the touches favour gets the small weight: the evidence must outweigh 69 nats.
+  const auto told = [&](double first, double second) {
+    objects[0].weight = first;
+    objects[1].weight = second;
+    return hard.expect_posterior(objects, small_options(), all_touches(recording),
+                                 {.nats = 5e-4, .near_top_nats = 8e-5});
+  };
+  const auto log_odds_of = [](const Estimate& estimate, int object) {
+    const auto i = static_cast<std::size_t>(object);
+    return std::log(estimate.identity[i]) - std::log(estimate.identity[1 - i]);
+  };
+  const Estimate equal = told(1.0, 1.0);
+  const int favoured = equal.mode.object;
+  const Estimate after = favoured == 0 ? told(1e-30, 1.0) : told(1.0, 1e-30);
+  EXPECT_NEAR(log_odds_of(after, favoured), log_odds_of(equal, favoured) - 30.0 * std::log(10.0),
+              1e-9);
+}
+
+TEST(Weight, ExtremelyUnequalOfParticles) {
+  HardCase hard("particles: prior weights of 1e-30 beside 1, and of 1e308");
+  const auto first_identity = [&](double first, double second) {
+    const std::vector<Hypothesis> objects{{random_map(61, 61, 0.5, 4.0, 502), first},
+                                          {random_map(31, 31, 1.0, 4.0, 503), second}};
+    hard.expect_particles(objects, two_thousand_particles(), random_recording(2, 36, 510));
+    return ParticleFilter(hard.device(), objects, two_thousand_particles()).estimate().identity[0];
+  };
+  EXPECT_EQ(first_identity(1e-30, 1.0), 0.0) << "too light for one of 2,000 particles";
+  EXPECT_NEAR(first_identity(1e308, 1e308), 0.5, 1e-12);
+  EXPECT_NEAR(first_identity(5e-324, 5e-324), 0.5, 1e-12);
+}
+
+TEST(Weight, AtTheEndsOfFloat64) {
+  HardCase hard("prior weights of 1e308 and of 5e-324");
+  const OccupancyGrid map = random_map(31, 27, 0.5, 6.0, 474);
+  const Recording recording = random_recording(2, 36, 475);
+  struct Row {
+    double first;
+    double second;
+    double identity;  ///< of the second
+    int mode;
+  };
+  for (const Row& row :
+       {Row{1e308, 1.5e308, 0.6, 1}, Row{5e-324, 5e-324, 0.5, 0}, Row{5e-324, 1e308, 1.0, 1}}) {
+    SCOPED_TRACE(::testing::Message() << row.first << " and " << row.second);
+    PoseHistogram histogram(hard.device(),
+                            std::vector<Hypothesis>{{map, row.first}, {map, row.second}},
+                            small_options());
     histogram.update(all_touches(recording));
-    const std::vector<double> bins = histogram.log_likelihood(0);
-    for (std::size_t bin = 0; bin < bins.size(); ++bin) {
-      ASSERT_EQ(bins[bin], bins[bin % static_cast<std::size_t>(options.lattice.plane())]);
-    }
-    const std::vector<double> theta = histogram.marginals(0).theta;
-    EXPECT_EQ(theta, std::vector<double>(8, theta[0]));
+    const Estimate estimate = histogram.estimate();
+    hard.expect("identity", std::abs(estimate.identity[1] - row.identity), 1e-12);
+    EXPECT_TRUE(std::isfinite(estimate.mode.log_likelihood));
+    EXPECT_EQ(estimate.mode.object, row.mode);
   }
 }
 

@@ -104,16 +104,6 @@ TEST(InverseSensorModel, IsEquations4To6) {
   }
 }
 
-TEST(InverseSensorModel, TendsToThePriorFarAway) {
-  const InverseSensorModel model;
-  for (double d = 0.1; d < 5.0; d += 0.1) {
-    EXPECT_LT(model.increment(in, d), model.increment(in, d - 0.1));
-    EXPECT_GT(model.increment(in, d), 0.0);
-    EXPECT_LT(model.increment(no, d), 0.0);
-  }
-  EXPECT_EQ(model.increment(in, 1e6), 0.0);
-}
-
 TEST(InverseSensorModel, SupportRadiusKeepsTheCutSumBelowTheTolerance) {
   for (const double prior : {0.02, 0.2, 0.5, 0.98}) {
     for (const double peak : {1e-9, 0.3, 0.9, 0.9999}) {

@@ -174,5 +174,6 @@ def test_what_is_no_touch_is_refused(device: palpate.Device, maps: list[palpate.
     assert "touches: item 0 is a int; give a Touch" in error_of(belief.update, [3])
     said = error_of(palpate.PoseHistogram, device, ["A.map.h5"])
     assert "maps: item 0 is a str; give OccupancyGrid" in said
+    assert error_of(palpate.inverse, (1, 2)).startswith("T_a_b: shape (2,); give (3,)")
     error_of(belief.update, palpate.Touch((0, 0, 0), [[0, 0]], [numpy.inf]))  # an infinite pressure is not sound
     assert belief.estimate().identity[0] == pytest.approx(1 / 3)

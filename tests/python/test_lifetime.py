@@ -8,7 +8,6 @@ import sys
 
 import numpy
 import pytest
-from conftest import learned
 
 import palpate
 
@@ -61,15 +60,6 @@ def test_objects_outlive_their_device_and_their_arrays(
         assert belief.estimate().identity.sum() == pytest.approx(1.0, abs=1e-9)
     builder.add(unknown)
     assert builder.build("E").nx > 10
-
-
-def test_a_view_outlives_its_object(device: palpate.Device, maps: list[palpate.OccupancyGrid]) -> None:
-    grid = learned(device, "A")
-    cells = grid.log_odds
-    del grid
-    gc.collect()
-    learned(device, "A")
-    assert numpy.array_equal(cells, maps[0].log_odds)
 
 
 def test_a_thousand_constructions_take_no_memory(

@@ -5,7 +5,6 @@ import os
 import pathlib
 import urllib.request
 
-import numpy
 import pytest
 from conftest import error_of
 from matplotlib.axes import Axes
@@ -45,17 +44,6 @@ def test_records_complete_and_hold_arrays(record: palpate.Record) -> None:
     assert record.mode.object == "E" and json.loads(json.dumps(record)) == record
     with pytest.raises(AttributeError, match="the record has no 'bset'; it has recording, "):
         record.bset  # noqa: B018
-
-
-def test_poses_compose() -> None:
-    T_a_b = numpy.array([1.0, 2.0, 0.5])
-    T_b_c = (3.0, -1.0, 0.25)
-    T_a_c = palpate.compose(T_a_b, T_b_c)
-    points = numpy.array([[0.0, 0.0], [5.0, 1.0]])
-    both = palpate.transform(T_a_b, palpate.transform(T_b_c, points))
-    assert numpy.allclose(both, palpate.transform(T_a_c, points), atol=1e-12)
-    assert numpy.allclose(palpate.compose(T_a_c, palpate.inverse(T_a_c)), 0, atol=1e-12)
-    assert error_of(palpate.inverse, (1, 2)).startswith("T_a_b: shape (2,); give (3,)")
 
 
 def test_pictures_are_of_maps_beliefs_and_records(

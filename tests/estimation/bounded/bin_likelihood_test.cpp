@@ -225,6 +225,7 @@ void expect_same_bits(const BinCase& of, const std::string& what) {
   std::optional<std::vector<double>> first;
   with_every_set_of_instructions([&](const std::string& name) {
     SCOPED_TRACE(fmt::format("{}, {}", what, name));
+    EXPECT_EQ(vector_instructions(), name);
     const BinLikelihood likelihood = likelihood_of(of);
     const std::vector<double> whole = evaluated(likelihood, of, {plane});
     EXPECT_EQ(bits(whole), bits(first.value_or(whole)));

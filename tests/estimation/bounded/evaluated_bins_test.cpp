@@ -14,7 +14,6 @@
 #include <gtest/gtest.h>
 
 #include "bound_cases.hpp"
-#include "bounded_set_up.hpp"
 #include "palpate/bounded_posterior.hpp"
 #include "support/certified.hpp"
 

@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "bounded_set_up.hpp"
+#include "bound_cases.hpp"
 
 namespace palpate::search_memory_test {
 

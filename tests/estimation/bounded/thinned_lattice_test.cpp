@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "bounded_set_up.hpp"
+#include "bound_cases.hpp"
 
 namespace palpate::thinned_lattice_test {
 

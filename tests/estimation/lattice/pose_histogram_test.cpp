@@ -36,26 +36,6 @@ TEST_F(PoseHistogramTest, StartsUniformAndReturnsToIt) {
   }
 }
 
-TEST_F(PoseHistogramTest, GivesATieToTheFirstObject) {
-  const std::vector<Hypothesis> objects(2, {random_map(31, 27, 0.5, 12.0, 88), 1.0});
-  PoseHistogram histogram(device, objects, {.lattice = small_lattice()});
-  histogram.update(all_touches(random_recording(9, 36, 89)));
-  EXPECT_EQ(histogram.estimate().identity, (std::vector<double>{0.5, 0.5}));
-  EXPECT_EQ(histogram.estimate().mode.object, 0);
-}
-
-TEST_F(PoseHistogramTest, OrderOfTouchesDoesNotMatter) {
-  const Recording recording = random_recording(20, 36, 94);
-  std::vector<Touch> touches = all_touches(recording);
-  one.update(touches);
-  std::ranges::reverse(touches);
-  other.update(touches);
-  for (const int object : {0, 1, 2}) {
-    // Two floats keep 14 digits of some hundred nats; the segments' own sums are the same.
-    EXPECT_LT(largest_difference(one.log_likelihood(object), other.log_likelihood(object)), 1e-9);
-  }
-}
-
 TEST_F(PoseHistogramTest, UnknownElementsAndTouchesChangeNoBit) {
   const Recording known = random_recording(3, 36, 97);
   Recording more = known;
