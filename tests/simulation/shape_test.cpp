@@ -13,6 +13,7 @@
 #include "palpate/pose.hpp"
 #include "palpate/simulation.hpp"
 #include "support/errors.hpp"
+#include "support/host_locale.hpp"
 #include "support/scratch_folder.hpp"
 
 namespace palpate::shape_test {
@@ -152,6 +153,7 @@ class PolygonFile : public testing::Test {
  protected:
   Shape read(const std::string& text) const {
     put_bytes(path_, text);
+    const HostLocale locale;  // a program's own reads no number otherwise
     return make_shape(path_.string());
   }
   void expect_refused(const std::string& text, const std::string& line, const std::string& why) {
