@@ -1,4 +1,4 @@
-#include "estimation/displacement_check.hpp"
+#include "estimation/displacement_weights.hpp"
 
 #include <gtest/gtest.h>
 

@@ -22,9 +22,9 @@ LearnedSensor full_sensor() {
       .fit_scale = FitScale{.mean = -4.5,
                             .sd = 12.25,
                             .shared_sd = 0.5,
-                            .alone = SingleFitScale{1.5, 0.75},
+                            .single_touch = SingleFitScale{1.5, 0.75},
                             .stranger_sd = 3.25,
-                            .stranger_alone = SingleFitScale{-4.25, 2.75},
+                            .stranger_single_touch = SingleFitScale{-4.25, 2.75},
                             .array = FitArray{.elements = 36.0, .spacing_mm = 1.875}},
       .pose_scale = PoseScale{.factor = 1.25, .map_sd_mm = 0.375}};
   sensor.table->layer = {.of = MapLayer::mean_level,
@@ -115,7 +115,8 @@ TEST_F(SensorModelFile, MayLeaveKeysOut) {
   EXPECT_NE(written(sensor).find("\nfit_scale: {mean: 0.5, sd: 12.25}\n"), std::string::npos);
   const FitScale scale = read_sensor_model(path_).fit_scale.value();
   EXPECT_EQ(scale.sd, 12.25);
-  EXPECT_FALSE(scale.stranger_sd || scale.stranger_alone || scale.alone || scale.array);
+  EXPECT_FALSE(scale.stranger_sd || scale.stranger_single_touch || scale.single_touch ||
+               scale.array);
 }
 
 TEST_F(SensorModelFile, NamesTheKeyThatIsWrong) {
