@@ -230,11 +230,11 @@ Case many_unknowns_case(const Inputs& inputs) {
   }
   const std::size_t last = inputs.unknowns.size() - 1;
   for (const std::size_t i : {std::size_t{0}, last / 2, last}) {
-    PoseHistogram alone = letter_histogram(inputs, lattice);
-    bool alike = same(recognise(alone, inputs.unknowns[i]), estimates[i]);
+    PoseHistogram own = letter_histogram(inputs, lattice);
+    bool alike = same(recognise(own, inputs.unknowns[i]), estimates[i]);
     recognise(histogram, inputs.unknowns[i]);
     for (int object = 0; object < static_cast<int>(inputs.letters.size()); ++object) {
-      alike = alike && alone.log_likelihood(object) == histogram.log_likelihood(object);
+      alike = alike && own.log_likelihood(object) == histogram.log_likelihood(object);
     }
     different += alike ? 0 : 1;
   }

@@ -232,16 +232,16 @@ def draw_errors(runs: list[Json]) -> Axes:
     return axes
 
 
-def draw_noise(document: Json, most: int) -> Axes:
+def draw_noise(document: Json, largest_count: int) -> Axes:
     """Colours tell the noise apart, dashes the filters, each with its largest count."""
     title = "standard deviation of the error of the reported sensor pose"
     axes = charts.chart("touches", MEAN_ERROR, title, yscale="log")
-    exact = {"translation_mm": 0.0, "rotation_rad": 0.0, "filters": document["filters"]}
+    undisplaced = {"translation_mm": 0.0, "rotation_rad": 0.0, "filters": document["filters"]}
     for kind, count, look in (
-        ("histogram", most, charts.SOLID),
+        ("histogram", largest_count, charts.SOLID),
         ("particles", MOST_PARTICLES, charts.DASHED),
     ):
-        for colour, level in zip(charts.COLOURS, [exact, *document["pose_noise"]], strict=False):
+        for colour, level in zip(charts.COLOURS, [undisplaced, *document["pose_noise"]], strict=False):
             for run in level["filters"]:
                 if run["filter"] == kind and run["count"] == count:
                     off = f"{level['translation_mm']:g} mm, {level['rotation_rad']:g} rad"
@@ -325,11 +325,11 @@ def measure(options: argparse.Namespace) -> None:
     comparisons: list[Json] = []
     levels, table = [], Table(RUNS)
     for mm, rad in NOISE:
-        exact, off_by = mm == 0.0, f"{mm:g} mm, {rad:g} rad"
-        most = touches if exact else min(touches, 20)
-        trials = make_trials(VOWELS, each, most, SEED, Touching(noise=(mm, rad)))
+        undisplaced, off_by = mm == 0.0, f"{mm:g} mm, {rad:g} rad"
+        limit = touches if undisplaced else min(touches, 20)
+        trials = make_trials(VOWELS, each, limit, SEED, Touching(noise=(mm, rad)))
         runs = []
-        for kind, size in kinds if exact else of_noise:
+        for kind, size in kinds if undisplaced else of_noise:
             runs.append(run_filter(device, maps, trials, kind, size))
             table.append(row_of(runs[-1], off_by))
         comparisons += comparisons_of(runs, off_by)

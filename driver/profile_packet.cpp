@@ -52,9 +52,9 @@ Format::Check read_check(const Entry& field) {
                        options.kind = kind.kind;
                        options.bytes = kind.bytes;
                      }},
-                    {"polynomial", whole(options.polynomial, 1)},
-                    {"init", whole(options.init, 0)},
-                    {"xor_out", whole(options.xor_out, 0)},
+                    {"polynomial", whole_number(options.polynomial, 1)},
+                    {"init", whole_number(options.init, 0)},
+                    {"xor_out", whole_number(options.xor_out, 0)},
                     {"reflect",
                      [&](const Entry& e) {
                        options.reflect = e.one_of<bool>({{"false", false}, {"true", true}});
@@ -63,7 +63,7 @@ Format::Check read_check(const Entry& field) {
                      [&](const Entry& e) {
                        check.big_endian = e.one_of<bool>({{"le", false}, {"be", true}});
                      }},
-                    {"from", whole(check.from_byte, 0, most_packet_bytes)},
+                    {"from", whole_number(check.from_byte, 0, most_packet_bytes)},
                     {"covers", [&](const Entry& e) {
                        check.after = e.one_of<bool>({{"before", false}, {"after", true}});
                      }}});
@@ -95,8 +95,8 @@ Format::Length read_length(const Entry& field) {
                          e.refuse("give u8, u16le, u16be, u32le, u32be, u64le or u64be");
                        }
                      }},
-                    {"extra", whole(length.extra, 0, most_packet_bytes)},
-                    {"most", whole(length.most, 1, most_packet_bytes)}});
+                    {"extra", whole_number(length.extra, 0, most_packet_bytes)},
+                    {"most", whole_number(length.most, 1, most_packet_bytes)}});
   return length;
 }
 
@@ -116,8 +116,8 @@ Format::Time read_time(const Entry& field) {
 Format::Values read_values(const Entry& field) {
   Format::Values values{.stride_bytes = 0};
   read_keys(field, {{"values", [&](const Entry& e) { values.type = read_number_type(e); }},
-                    {"stride", whole(values.stride_bytes, 1, 256)},
-                    {"at", whole(values.at_byte, 0, 255)}});
+                    {"stride", whole_number(values.stride_bytes, 1, 256)},
+                    {"at", whole_number(values.at_byte, 0, 255)}});
   if (values.stride_bytes == 0) {
     values.stride_bytes = values.at_byte + values.type.bytes;
   }
@@ -132,10 +132,10 @@ Format::Part read_part(const Entry& entry, std::size_t elements) {
   Format::Part part;
   std::optional<std::uint8_t> tag;
   double tick_s = 0.0;
-  read_keys(entry, {{"tag", whole(tag, 0, 255)},
-                    {"mask", whole(part.mask, 0, 255)},
-                    {"values", whole(part.values, 1, static_cast<std::uint32_t>(elements))},
-                    {"skip", whole(part.skip, 0, 4096)},
+  read_keys(entry, {{"tag", whole_number(tag, 0, 255)},
+                    {"mask", whole_number(part.mask, 0, 255)},
+                    {"values", whole_number(part.values, 1, static_cast<std::uint32_t>(elements))},
+                    {"skip", whole_number(part.skip, 0, 4096)},
                     {"time",
                      [&](const Entry& e) {
                        part.time = {read_number_type(e), 0.0};
@@ -187,7 +187,7 @@ std::vector<std::uint8_t> read_only_bytes(const Entry& field, std::string_view k
 
 Format::Skip read_skip(const Entry& field) {
   Format::Skip skip;
-  read_keys(field, {{"skip", whole(skip.bytes, 1, 4096)}});
+  read_keys(field, {{"skip", whole_number(skip.bytes, 1, 4096)}});
   return skip;
 }
 
@@ -321,7 +321,7 @@ std::optional<std::uint16_t> hexadecimal(std::string_view digits) {
 }
 
 std::vector<std::uint8_t> read_bytes(const YamlEntry& entry, std::size_t least) {
-  constexpr std::size_t most = 256;
+  constexpr std::size_t limit = 256;
   std::vector<std::uint8_t> bytes;
   std::string digits = entry.node.IsScalar() ? entry.node.Scalar() : "?";
   std::erase(digits, ' ');
@@ -332,8 +332,8 @@ std::vector<std::uint8_t> read_bytes(const YamlEntry& entry, std::size_t least) 
     }
     bytes.push_back(static_cast<std::uint8_t>(*byte));
   }
-  if (bytes.size() < least || bytes.size() > most) {
-    entry.refuse(fmt::format("give {} to {} bytes", least, most));
+  if (bytes.size() < least || bytes.size() > limit) {
+    entry.refuse(fmt::format("give {} to {} bytes", least, limit));
   }
   return bytes;
 }

@@ -21,10 +21,11 @@ std::vector<std::uint8_t> read_bytes(const YamlEntry& entry, std::size_t least =
 
 /// Reads a whole number, decimal or hexadecimal after 0x, into `value`.
 template <class Number>
-auto whole(Number& value, std::uint32_t least,
-           std::uint32_t most = std::numeric_limits<std::uint32_t>::max()) {
-  return [&value, least, most](const YamlEntry& entry) {
-    value = static_cast<Number>(entry.integer(least, most, YamlEntry::Digits::also_hexadecimal));
+auto whole_number(Number& value, std::uint32_t least,
+                  std::uint32_t upper_bound = std::numeric_limits<std::uint32_t>::max()) {
+  return [&value, least, upper_bound](const YamlEntry& entry) {
+    value =
+        static_cast<Number>(entry.integer(least, upper_bound, YamlEntry::Digits::also_hexadecimal));
   };
 }
 

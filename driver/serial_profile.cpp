@@ -70,14 +70,14 @@ UsbId read_usb_id(const Entry& entry) {
 SerialLine read_line(const Entry& entry) {
   using Parity = SerialLine::Parity;
   SerialLine line;
-  read_keys(entry, {{"baud", whole(line.baud, 50, 100'000'000)},
-                    {"data_bits", whole(line.data_bits, 5, 8)},
+  read_keys(entry, {{"baud", whole_number(line.baud, 50, 100'000'000)},
+                    {"data_bits", whole_number(line.data_bits, 5, 8)},
                     {"parity",
                      [&](const Entry& e) {
                        line.parity = e.one_of<Parity>(
                            {{"none", Parity::none}, {"odd", Parity::odd}, {"even", Parity::even}});
                      }},
-                    {"stop_bits", whole(line.stop_bits, 1, 2)}});
+                    {"stop_bits", whole_number(line.stop_bits, 1, 2)}});
   return line;
 }
 
@@ -96,8 +96,8 @@ void append_grid(const Entry& entry, std::vector<glm::dvec2>& elements_mm) {
   read_keys(entry, {{"grid",
                      [&](const Entry& e) {
                        const std::vector<Entry> counts = e.list(2, "give the counts [x, y]");
-                       whole(nx, 1, 1024)(counts[0]);
-                       whole(ny, 1, 1024)(counts[1]);
+                       whole_number(nx, 1, 1024)(counts[0]);
+                       whole_number(ny, 1, 1024)(counts[1]);
                      }},
                     {"pitch_mm", [&](const Entry& e) { pitch_mm = read_point(e); }},
                     {"center_mm", [&](const Entry& e) { center_mm = read_point(e); }},

@@ -103,22 +103,22 @@ Deframer::Deframer(std::vector<Calibration> calibrations) : calibrations_(std::m
 
 void Deframer::reset() {
   frame_.clear();
-  whole_ = true;
+  frame_fits_ = true;
 }
 
 void Deframer::push(std::span<const std::uint8_t> packet, std::vector<ParsedFrame>& frames) {
-  if (whole_ && packet.size() <= frame_bytes() - frame_.size()) {
+  if (frame_fits_ && packet.size() <= frame_bytes() - frame_.size()) {
     frame_.insert(frame_.end(), packet.begin(), packet.end());
   } else {
     // More bytes than a frame: an end was lost. Decoding starts again after the next end.
     counters_.garbage_bytes += frame_.size() + packet.size();
     frame_.clear();
-    whole_ = false;
+    frame_fits_ = false;
   }
   if (packet.size() >= packet_bytes) {
     return;
   }
-  if (whole_ && !frame_.empty() && frame_.size() == frame_bytes()) {
+  if (frame_fits_ && !frame_.empty() && frame_.size() == frame_bytes()) {
     ParsedFrame& frame = frames.emplace_back();
     frame.values.reserve(calibrations_.size());
     for (std::size_t cell = 0; cell < calibrations_.size(); ++cell) {

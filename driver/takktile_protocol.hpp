@@ -89,7 +89,7 @@ class Deframer {
  private:
   std::vector<Calibration> calibrations_;
   std::vector<std::uint8_t> frame_;  // the bytes of the frame in progress
-  bool whole_ = true;                // false: the frame is too long, and skipped up to its end
+  bool frame_fits_ = true;           // false: the frame is too long, and skipped up to its end
   DeframerCounters counters_;
 };
 

@@ -65,7 +65,7 @@ float vague_below(const float least, const float least_weight) {
 // Adds a likelihood to a sum of logs, a pair of the largest term and the sum relative to it. A weight
 // that may be far from 1 belongs into the likelihood: the largest term decides what is negligible.
 vec2 log_sum_add(const vec2 sum, const float value, const float weight) {
-  const float most = max(sum.x, value);
-  return vec2(most, sum.y * exp(max(sum.x - most, NEGLIGIBLE)) +
-                        weight * exp(max(value - most, NEGLIGIBLE)));
+  const float highest = max(sum.x, value);
+  return vec2(highest, sum.y * exp(max(sum.x - highest, NEGLIGIBLE)) +
+                        weight * exp(max(value - highest, NEGLIGIBLE)));
 }

@@ -173,7 +173,7 @@ struct TurnPush {
 // plane, in bins, moved by whole + fraction + matrix (x, y). Fraction and matrix are two floats
 // each: a bin next to the place may have a weight below 1e-7 and yet count more than all others.
 // Kernels read four vec4.
-struct Turn {
+struct TurnedPlane {
   float whole_x;
   float whole_y;
   float unused[2];
@@ -345,7 +345,7 @@ static_assert(sizeof(RotatedElement) == 16 && sizeof(Segment) == 16 && sizeof(Ta
 static_assert(sizeof(Corners) == 16 && sizeof(ObjectPlace) == 24);
 static_assert(sizeof(LikelihoodPush) == 28 && sizeof(Partial) == 16);
 static_assert(sizeof(ReducePush) == 12);
-static_assert(sizeof(TurnPush) == 52 && sizeof(Turn) == 64);
+static_assert(sizeof(TurnPush) == 52 && sizeof(TurnedPlane) == 64);
 static_assert(sizeof(ArrayAtTheta) == 16 && sizeof(ObjectBox) == 16);
 static_assert(sizeof(OverlapPush) == 56 && sizeof(OverlapPartial) == 12);
 static_assert(sizeof(Particle) == 16 && sizeof(ObjectShare) == 8 && sizeof(DrawBlock) == 16);

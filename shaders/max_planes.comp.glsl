@@ -25,11 +25,11 @@ void main() {
   const uint plane = push.nx * push.ny;
   const uint first = object * push.stride + theta * plane;
   const vec2 reference = texelFetch(references, int(push.object_first + object)).xy;
-  float most = LOWEST;
+  float highest = LOWEST;
   for (uint i = lane; i < plane; i += gl_WorkGroupSize.x) {
-    most = max(most, word_of(first + i, reference));
+    highest = max(highest, word_of(first + i, reference));
   }
-  largest[lane] = most;
+  largest[lane] = highest;
   barrier();
   for (uint reach = gl_WorkGroupSize.x / 2; reach > 0; reach /= 2) {
     if (lane < reach) {

@@ -72,10 +72,10 @@ void main() {
       const vec2 other = best_value[lane + reach];
       const uint other_index = best_index[lane + reach];
       const bool more = exceeds(other, mine) || (other == mine && other_index < best_index[lane]);
-      const vec2 most = more ? other : mine;
+      const vec2 largest = more ? other : mine;
       sums[lane] =
-          sums[lane] * relative(mine, most) + sums[lane + reach] * relative(other, most);
-      best_value[lane] = most;
+          sums[lane] * relative(mine, largest) + sums[lane + reach] * relative(other, largest);
+      best_value[lane] = largest;
       best_index[lane] = more ? other_index : best_index[lane];
     }
     barrier();

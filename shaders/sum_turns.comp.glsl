@@ -20,7 +20,7 @@ layout(binding = 0) uniform samplerBuffer source;  // two bins a texel
 layout(binding = 1) uniform samplerBuffer source_before;  // of the thetas before the slab's
 layout(binding = 2) uniform samplerBuffer source_after;   // and after them
 layout(binding = 3) uniform samplerBuffer references;  // [object] log-likelihood in two floats
-layout(binding = 4) uniform samplerBuffer turn_table;  // Turn, [theta or object, step]
+layout(binding = 4) uniform samplerBuffer turn_table;  // TurnedPlane, [theta or object, step]
 layout(std430, binding = 5) readonly buffer TurnStorage { vec4 turn_storage[]; };
 // [object, theta], then weights by steps and their logarithms.
 layout(binding = 6) uniform samplerBuffer max_table;

@@ -30,13 +30,13 @@ void main() {
   const uint lane = gl_LocalInvocationID.x;
   const uint first = gl_WorkGroupID.x * WEIGHT_BLOCK + lane * RUN;
   vec2 value[RUN];
-  vec2 most = vec2(0.0);
+  vec2 highest = vec2(0.0);
   [[unroll]] for (uint i = 0; i < RUN; ++i) {
     // A lane past the end repeats the last particle without counting it.
     value[i] = log_weights[min(first + i, push.particles - 1)];
-    most = i == 0 || exceeds(value[i], most) ? value[i] : most;
+    highest = i == 0 || exceeds(value[i], highest) ? value[i] : highest;
   }
-  largest[lane] = most;
+  largest[lane] = highest;
   barrier();
   for (uint reach = WEIGHT_LANES / 2; reach > 0; reach /= 2) {
     if (lane < reach && exceeds(largest[lane + reach], largest[lane])) {
@@ -44,13 +44,13 @@ void main() {
     }
     barrier();
   }
-  most = largest[0];
+  highest = largest[0];
 
   float running[RUN];
   float sum = 0.0;
   float square = 0.0;
   [[unroll]] for (uint i = 0; i < RUN; ++i) {
-    const float weight = first + i < push.particles ? relative(value[i], most) : 0.0;
+    const float weight = first + i < push.particles ? relative(value[i], highest) : 0.0;
     sum += weight;
     square += weight > LEAST_SQUARED ? weight * weight : 0.0;
     running[i] = sum;
@@ -72,6 +72,6 @@ void main() {
     for (uint i = 0; i < WEIGHT_LANES; ++i) {
       all_squares += squares[i];
     }
-    blocks[gl_WorkGroupID.x] = WeightBlock(most.x, most.y, before + sum, all_squares);
+    blocks[gl_WorkGroupID.x] = WeightBlock(highest.x, highest.y, before + sum, all_squares);
   }
 }

@@ -54,7 +54,7 @@ std::string values_table(const SensorCalibration& calibration) {
   if (sensor.fit_scale) {
     table.add({"fit of learned objects, z", "0 +- 1",
                fmt::format("{:.2g} +- {:.2g}", sensor.fit_scale->mean, sensor.fit_scale->sd)});
-    if (const auto& learned = sensor.fit_scale->stranger_alone) {
+    if (const auto& learned = sensor.fit_scale->stranger_single_touch) {
       table.add({"of one touch of strangers, on it", "0 +- 1",
                  fmt::format("{:.2g} +- {:.2g}", learned->mean, learned->sd)});
     }

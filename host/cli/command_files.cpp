@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "io/atomic_file.hpp"
-#include "io/file_identity.hpp"
 #include "io/input_file.hpp"
 
 namespace palpate::cli {

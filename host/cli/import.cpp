@@ -111,7 +111,7 @@ void write(const Imported& imported) {
 
 /// The values in the column that splits the rows, each once, in their order; 1 and 1.0 are one.
 std::vector<std::string> values_in(const ImportArguments& options) {
-  constexpr std::size_t most = 1000;
+  constexpr std::size_t limit = 1000;
   validate(options);
   CsvTable table = open_table(options.pressures, options);
   const auto column = table.find_or_count(options.split);
@@ -127,9 +127,9 @@ std::vector<std::string> values_in(const ImportArguments& options) {
     if (!text.empty() && std::ranges::none_of(values, is_same)) {
       values.emplace_back(text);
     }
-    if (values.size() > most) {
+    if (values.size() > limit) {
       table.refuse("`split {}`: the column has more than {} values; name a column of labels",
-                   options.split, most);
+                   options.split, limit);
     }
   }
   return values;

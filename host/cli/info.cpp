@@ -69,21 +69,22 @@ void print_sensor_model(const std::string& path) {
               sensor.features->objects.size());
   }
   if (const auto& scale = sensor.fit_scale) {
-    print_row("fit scale", "z of learned objects {:.4g} +- {:.4g}{}{}{}{}", scale->mean, scale->sd,
-              scale->alone ? fmt::format(", of a single touch where it fits best {:.4g} +- {:.4g}",
-                                         scale->alone->mean, scale->alone->sd)
-                           : "",
-              scale->stranger_sd
-                  ? fmt::format(", of strangers +- {:.4g} more on it for every further touch",
-                                *scale->stranger_sd)
-                  : "",
-              scale->stranger_alone
-                  ? fmt::format(", of a single touch of strangers {:.4g} +- {:.4g} on it",
-                                scale->stranger_alone->mean, scale->stranger_alone->sd)
-                  : "",
-              scale->array ? fmt::format(", by {:.0f} elements {:.3g} mm apart",
-                                         scale->array->elements, scale->array->spacing_mm)
-                           : "");
+    print_row(
+        "fit scale", "z of learned objects {:.4g} +- {:.4g}{}{}{}{}", scale->mean, scale->sd,
+        scale->single_touch ? fmt::format(", of a single touch where it fits best {:.4g} +- {:.4g}",
+                                          scale->single_touch->mean, scale->single_touch->sd)
+                            : "",
+        scale->stranger_sd
+            ? fmt::format(", of strangers +- {:.4g} more on it for every further touch",
+                          *scale->stranger_sd)
+            : "",
+        scale->stranger_single_touch
+            ? fmt::format(", of a single touch of strangers {:.4g} +- {:.4g} on it",
+                          scale->stranger_single_touch->mean, scale->stranger_single_touch->sd)
+            : "",
+        scale->array ? fmt::format(", by {:.0f} elements {:.3g} mm apart", scale->array->elements,
+                                   scale->array->spacing_mm)
+                     : "");
   }
   if (sensor.pose_scale) {
     print_row("pose scale", "covariances times {:.4g}, and {:.4g} mm of the map along each axis",
@@ -206,10 +207,10 @@ void print_recording(const std::string& path) {
               r.truth->object, T.translation_mm.x, T.translation_mm.y,
               degrees(wrap_angle(T.theta_rad)));
   }
-  if (const std::vector<std::string> suspicions = suspicions_of(s); !suspicions.empty()) {
+  if (const std::vector<std::string> findings = findings_of(s); !findings.empty()) {
     fmt::print("Suspicious:\n");
-    for (const std::string& suspicion : suspicions) {
-      fmt::print("  {}\n", suspicion);
+    for (const std::string& finding : findings) {
+      fmt::print("  {}\n", finding);
     }
   }
 }

@@ -76,7 +76,7 @@ constexpr const char* array_flags[] = {"--array", "--first-element", "--order",
 
 /// Standard input as a sensor.
 std::unique_ptr<LineSensor> open_lines(const SensorArguments& arguments,
-                                       const PosedSensor::Complaint& complain) {
+                                       const PosedSensor::Warn& warn) {
   if (arguments.lines.array.empty()) {
     refuse("--array",
            "missing; frames on standard input do not say where their elements lie: give "
@@ -98,7 +98,7 @@ std::unique_ptr<LineSensor> open_lines(const SensorArguments& arguments,
                         .elements_mm = std::move(array.elements_mm),
                         .valid = std::move(array.valid),
                         .baseline = std::move(array.baseline)},
-      complain, arguments.lines.sign);
+      warn, arguments.lines.sign);
 }
 
 /// Requires that the flags of an array are left out where the sensor has one.
@@ -122,11 +122,11 @@ void require_no_array(const SensorArguments& arguments) {
 
 }  // namespace
 
-OpenSensor open_sensor(const SensorArguments& arguments, const PosedSensor::Complaint& complain) {
+OpenSensor open_sensor(const SensorArguments& arguments, const PosedSensor::Warn& warn) {
   const std::string& name = arguments.sensor;
   OpenSensor opened;
   if (name == "-") {
-    auto lines = open_lines(arguments, complain);
+    auto lines = open_lines(arguments, warn);
     opened.lines = lines.get();
     opened.sensor = std::move(lines);
   } else {
@@ -135,7 +135,7 @@ OpenSensor open_sensor(const SensorArguments& arguments, const PosedSensor::Comp
   }
   if (!arguments.poses.empty()) {
     auto posed = std::make_unique<PosedSensor>(std::move(opened.sensor), arguments.poses,
-                                               PosedSensor::usual_gap_s, complain);
+                                               PosedSensor::usual_gap_s, warn);
     opened.posed = posed.get();
     opened.sensor = std::move(posed);
   }

@@ -56,9 +56,9 @@ struct OpenSensor {
 };
 /// Opens a board, a replay, a simulation or standard input, with the poses of --poses if it is
 /// given.
-/// @param complain see PosedSensor and LineSensor
+/// @param warn see PosedSensor and LineSensor
 /// @throws Error naming the flag, and what may be given instead
-OpenSensor open_sensor(const SensorArguments& arguments, const PosedSensor::Complaint& complain);
+OpenSensor open_sensor(const SensorArguments& arguments, const PosedSensor::Warn& warn);
 
 /// Adds the files that the sensor reads.
 void add_sensor_files(const SensorArguments& arguments, CommandFiles& files);

@@ -142,10 +142,10 @@ std::string unproven_sentence(const RecognitionStep& step, const RecognitionTask
   const std::string best = printable(task.labels[step.best]);
   // Bounds round outwards.
   const double least = std::floor(1000.0 * low) / 10.0;
-  const double most = std::ceil(1000.0 * high) / 10.0;
-  return least == most ? fmt::format("{}; {} has {:.1f} % all the same", left, best, least)
-                       : fmt::format("{} {:.1f} % (at least {:.1f} %, at most {:.1f} %): {}", best,
-                                     100.0 * step.confidence(), least, most, left);
+  const double highest = std::ceil(1000.0 * high) / 10.0;
+  return least == highest ? fmt::format("{}; {} has {:.1f} % all the same", left, best, least)
+                          : fmt::format("{} {:.1f} % (at least {:.1f} %, at most {:.1f} %): {}",
+                                        best, 100.0 * step.confidence(), least, highest, left);
 }
 
 /// Touches that do not fit; "" where they fit or are doubtful.
@@ -163,7 +163,8 @@ std::string misfit_sentence(const RecognitionStep& step, const RecognitionTask& 
 /// That "(none)" has a weight, but a single touch and no sensor model that tells what one touch
 /// says of it; else "".
 std::string single_touch_sentence(const RecognitionStep& step, const RecognitionTask& task) {
-  if (step.touches != 1 || task.labels.back() != none_label || task.fit_scale().stranger_alone) {
+  if (step.touches != 1 || task.labels.back() != none_label ||
+      task.fit_scale().stranger_single_touch) {
     return "";
   }
   return "one touch cannot tell whether the object is one of the maps': the odds of (none) are "

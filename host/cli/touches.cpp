@@ -58,7 +58,8 @@ Rest rest_of(Sensor& stream, const TouchDetectorOptions& thresholds,
 
 /// What may have cost touches, each in a sentence.
 /// @param backwards frames that are older than the one before, of `all`
-std::vector<std::string> complaints(const Rest& rest, std::uint64_t backwards, std::uint64_t all) {
+std::vector<std::string> frame_findings(const Rest& rest, std::uint64_t backwards,
+                                        std::uint64_t all) {
   std::vector<std::string> words;
   if (backwards > 0) {
     words.push_back(
@@ -311,7 +312,8 @@ void find_touches(const TouchesArguments& options) {
   if (const auto finding = dropped(presses, clock)) {
     recording.findings.push_back(*finding);
   }
-  const std::vector<std::string> complaint = complaints(rest, backwards, stream->counters().frames);
+  const std::vector<std::string> findings =
+      frame_findings(rest, backwards, stream->counters().frames);
 
   if (recording.size() == 0) {
     if (presses.without_pose > 0) {
@@ -322,7 +324,7 @@ void find_touches(const TouchesArguments& options) {
              clock ? fmt::format("import again with --{}", fmt::join(clock->options, " --"))
                    : "record again with --poses");
     }
-    std::vector<std::string> reasons = complaint;
+    std::vector<std::string> reasons = findings;
     if (clock) {
       reasons.push_back(in_flags(clock->words));
     }
@@ -353,7 +355,7 @@ void find_touches(const TouchesArguments& options) {
     fmt::print(", {} readings unknown", unknown);
   }
   fmt::print("\n");
-  for (const std::string& words : complaint) {
+  for (const std::string& words : findings) {
     tell_on_stderr(fmt::format("{}: {}", options.frames, words));
   }
   close_input(options.frames);

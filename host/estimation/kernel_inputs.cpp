@@ -93,10 +93,10 @@ std::uint64_t bordered_cells(const OccupancyGrid& map) {
 }
 
 std::uint64_t most_map_cells(const gpu::Limits& limits, gpu::Access access) {
-  const std::uint64_t most = std::min(limits.allocation, limits.memory);
+  const std::uint64_t limit = std::min(limits.allocation, limits.memory);
   return access == gpu::Access::table
-             ? std::min<std::uint64_t>(limits.table_texels, most / cell_bytes(access))
-             : std::min(limits.storage_range, most) / cell_bytes(access);
+             ? std::min<std::uint64_t>(limits.table_texels, limit / cell_bytes(access))
+             : std::min(limits.storage_range, limit) / cell_bytes(access);
 }
 
 std::uint64_t most_map_cells(const gpu::Limits& limits) {
@@ -194,14 +194,14 @@ ContactTable::ContactTable(gpu::Context& context, gpu::CommandStream& stream,
     : nodes_of_a_set_(nodes_of_a_set(model)) {
   const std::uint64_t count =
       std::max<std::uint64_t>(1, (model.table ? model.table->sets() : 0) * nodes_of_a_set_);
-  const std::uint64_t most = std::min<std::uint64_t>(
+  const std::uint64_t limit = std::min<std::uint64_t>(
       context.limits().table_texels, context.limits().allocation / sizeof(shaders::TableNode));
-  if (count > most) {
+  if (count > limit) {
     throw Error(
         Fault::input,
         fmt::format("likelihood table: its {} nodes on the device exceed the {} that device '{}' "
                     "reads; use fewer nodes, levels or objects",
-                    count, most, context.name()));
+                    count, limit, context.name()));
   }
   std::vector<shaders::TableNode> nodes;
   if (const auto& table = model.table) {

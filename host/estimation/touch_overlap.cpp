@@ -20,6 +20,40 @@ glm::dvec2 within_reach(const glm::dvec2& mm) {
   return {limit(mm.x), limit(mm.y)};
 }
 
+/// The centres of an axis's bins.
+class BinCentres {
+ public:
+  explicit BinCentres(const Axis& axis)
+      : first_mm_(axis.centre(0)),
+        step_mm_(axis.step()),
+        per_mm_(1.0 / step_mm_),
+        last_(axis.count - 1) {}
+
+  double operator[](int bin) const { return first_mm_ + bin * step_mm_; }
+
+  RowBins within(double low_mm, double high_mm) const {
+    if (!(step_mm_ > 0.0)) {
+      return {0, low_mm <= first_mm_ && first_mm_ <= high_mm ? last_ + 1 : 0};
+    }
+    const double low = (low_mm - first_mm_) * per_mm_;
+    const double high = (high_mm - first_mm_) * per_mm_;
+    if (!(low <= last_ && high >= 0.0)) {
+      return {};
+    }
+    // Casts round towards 0, and are faster than std::ceil.
+    const int from = low > 0.0 ? static_cast<int>(low) : 0;
+    const int first = from + (from < low ? 1 : 0);
+    const int end = high < last_ ? static_cast<int>(high) + 1 : last_ + 1;
+    return first < end ? RowBins{first, end - first} : RowBins{};
+  }
+
+ private:
+  double first_mm_;
+  double step_mm_;
+  double per_mm_;
+  int last_;  ///< bin
+};
+
 }  // namespace
 
 ArrayRectangle array_rectangle(const Pose& T_robot_sensor, std::span<const glm::dvec2> elements_mm,
@@ -30,52 +64,30 @@ ArrayRectangle array_rectangle(const Pose& T_robot_sensor, std::span<const glm::
           .direction_rad = T_robot_sensor.theta_rad};
 }
 
-OverlapPlane::Line::Line(const Axis& axis)
-    : first_mm(axis.centre(0)), step_mm(axis.step()), per_mm(1.0 / step_mm), last(axis.count - 1) {}
-
-inline OverlapPlane::Bins OverlapPlane::Line::within(double low_mm, double high_mm) const {
-  if (!(step_mm > 0.0)) {
-    return {0, low_mm <= first_mm && first_mm <= high_mm ? last + 1 : 0};
-  }
-  const double low = (low_mm - first_mm) * per_mm;
-  const double high = (high_mm - first_mm) * per_mm;
-  if (!(low <= last && high >= 0.0)) {
-    return {};
-  }
-  // Casts round towards 0, and are faster than std::ceil.
-  const int from = low > 0.0 ? static_cast<int>(low) : 0;
-  const int first = from + (from < low ? 1 : 0);
-  const int end = high < last ? static_cast<int>(high) + 1 : last + 1;
-  return first < end ? Bins{first, end - first} : Bins{};
-}
-
-OverlapPlane::OverlapPlane(const ArrayRectangle& array, const BoundingBox& object,
-                           const PoseLattice& lattice, int theta)
-    : x_mm_(lattice.x_mm), y_mm_(lattice.y_mm) {
+void find_overlap(const ArrayRectangle& array, const BoundingBox& object,
+                  const PoseLattice& lattice, int theta, std::span<RowBins> rows) {
+  const BinCentres x_mm(lattice.x_mm);
+  const BinCentres y_mm(lattice.y_mm);
   const double theta_rad = lattice.theta_rad.centre(theta);
-  apart_mm_ = rotate(theta_rad, array.from_pivot_mm) - object.middle();
-  cos_ = std::cos(theta_rad + array.direction_rad);
-  sin_ = std::sin(theta_rad + array.direction_rad);
-  per_cos_ = 1.0 / cos_;
-  per_sin_ = 1.0 / sin_;
-  const double c = std::abs(cos_);
-  const double s = std::abs(sin_);
+  // From the object's middle to the array's, at x = y = 0, and the array's direction.
+  const glm::dvec2 apart_mm = rotate(theta_rad, array.from_pivot_mm) - object.middle();
+  const double cosine = std::cos(theta_rad + array.direction_rad);
+  const double sine = std::sin(theta_rad + array.direction_rad);
+  const double c = std::abs(cosine);
+  const double s = std::abs(sine);
   const glm::dvec2 half = object.extent() / 2.0;
-  reach_mm_ = half +
-              glm::dvec2(c * array.half_mm.x + s * array.half_mm.y,
-                         s * array.half_mm.x + c * array.half_mm.y) +
-              touching_mm;
-  turned_reach_mm_ =
+  // Of |apart|, along the object's axes and along the array's.
+  const glm::dvec2 reach_mm = half +
+                              glm::dvec2(c * array.half_mm.x + s * array.half_mm.y,
+                                         s * array.half_mm.x + c * array.half_mm.y) +
+                              touching_mm;
+  const glm::dvec2 turned_reach_mm =
       array.half_mm + glm::dvec2(c * half.x + s * half.y, s * half.x + c * half.y) + touching_mm;
   // So far the turned rectangle of offsets reaches; rounding must not lose a bin.
   constexpr double rounding = 1.0 + 1e-9;
-  const double turned = rounding * (s * turned_reach_mm_.x + c * turned_reach_mm_.y);
-  const double reach = std::min(reach_mm_.y, turned);
-  rows_ = y_mm_.within(-reach - apart_mm_.y, reach - apart_mm_.y);
-}
+  const double turned = rounding * (s * turned_reach_mm.x + c * turned_reach_mm.y);
+  const double reach = std::min(reach_mm.y, turned);
 
-void OverlapPlane::find_rows(std::span<Bins> of_row) const {
-  std::ranges::fill(of_row, Bins{});
   // Shadows that do not depend on x leave a row out, or do not bound it. All others bound it from
   // both sides, in an order that the slope's sign tells.
   struct Shadow {
@@ -84,12 +96,16 @@ void OverlapPlane::find_rows(std::span<Bins> of_row) const {
     double per_row;
     double reach;
   };
-  const Shadow shadows[] = {{cos_, per_cos_, sin_, turned_reach_mm_.x},
-                            {-sin_, -per_sin_, cos_, turned_reach_mm_.y}};
-  for (int y = rows_.first; y < rows_.first + rows_.count; ++y) {
-    const double apart_y = apart_mm_.y + y_mm_.centre(y);
-    double low = -reach_mm_.x;
-    double high = reach_mm_.x;
+  const double per_cosine = 1.0 / cosine;
+  const double per_sine = 1.0 / sine;
+  const Shadow shadows[] = {{cosine, per_cosine, sine, turned_reach_mm.x},
+                            {-sine, -per_sine, cosine, turned_reach_mm.y}};
+  std::ranges::fill(rows, RowBins{});
+  const auto [first_row, row_count] = y_mm.within(-reach - apart_mm.y, reach - apart_mm.y);
+  for (int y = first_row; y < first_row + row_count; ++y) {
+    const double apart_y = apart_mm.y + y_mm[y];
+    double low = -reach_mm.x;
+    double high = reach_mm.x;
     bool out = false;
     for (const Shadow& shadow : shadows) {
       const double offset = shadow.per_row * apart_y;
@@ -102,12 +118,12 @@ void OverlapPlane::find_rows(std::span<Bins> of_row) const {
       }
     }
     if (!out) {
-      of_row[static_cast<std::size_t>(y)] = x_mm_.within(low - apart_mm_.x, high - apart_mm_.x);
+      rows[static_cast<std::size_t>(y)] = x_mm.within(low - apart_mm.x, high - apart_mm.x);
     }
   }
 }
 
-std::int64_t count_bins(std::span<const OverlapPlane::Bins> rows, BinBox& around) {
+std::int64_t count_bins(std::span<const RowBins> rows, BinBox& around) {
   std::int64_t bins = 0;
   int x_first = std::numeric_limits<int>::max();
   int x_end = 0;

@@ -79,7 +79,7 @@ PlacedBelief placed_belief(const PoseLattice& lattice, std::span<const BinShare>
     double theta_rad = wrap_angle(-lattice.theta_rad.centre(k));
     belief.theta.push_back({theta_rad, turns[static_cast<std::size_t>(k)]});
   }
-  std::ranges::sort(belief.theta, {}, &PlacedBelief::Turn::theta_rad);
+  std::ranges::sort(belief.theta, {}, &PlacedBelief::ThetaShare::theta_rad);
   return belief;
 }
 

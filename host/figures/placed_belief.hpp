@@ -18,11 +18,11 @@ struct PlacedBelief {
   double cell_mm = 1.0;      ///< width of a cell, at least that of the lattice's bins
   int cells = 0;             ///< along x and along y
   std::vector<double> xy;    ///< [y, x] probability of a cell, summed over theta
-  struct Turn {
+  struct ThetaShare {
     double theta_rad = 0.0;  ///< of T_robot_object, in [-pi, pi)
     double probability = 0.0;
   };
-  std::vector<Turn> theta;  ///< one for each theta of the lattice, ascending
+  std::vector<ThetaShare> theta;  ///< one for each theta of the lattice, ascending
 };
 
 /// The belief from bins of the object's lattice. A bin with at least a ten thousandth of the belief

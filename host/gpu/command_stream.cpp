@@ -207,9 +207,9 @@ void CommandStream::dispatch_bytes(const Kernel& kernel, std::span<const Buffer*
                                    std::span<const std::byte> push,
                                    std::array<std::uint32_t, 3> groups) {
   record([&] {
-    const auto& most = context_.limits().group_count;
+    const auto& limit = context_.limits().group_count;
     if (buffers.size() != kernel.bindings().size() || push.size() != kernel.push_bytes() ||
-        groups[0] > most[0] || groups[1] > most[1] || groups[2] > most[2]) {
+        groups[0] > limit[0] || groups[1] > limit[1] || groups[2] > limit[2]) {
       throw Error(
           Fault::system,
           fmt::format("kernel {}: {} buffers, {} B of constants and {} x {} x {} workgroups "

@@ -209,7 +209,7 @@ void Context::lower_limits(const Limits& limits) {
   inspect();
   const Limits own = limits_;
   limits_ = limits;
-  const auto at_most = [](auto& limit, auto most) { limit = std::min(limit, most); };
+  const auto at_most = [](auto& limit, auto bound) { limit = std::min(limit, bound); };
   at_most(limits_.group_invocations, own.group_invocations);
   for (std::size_t i = 0; i < 3; ++i) {
     at_most(limits_.group_size[i], own.group_size[i]);
@@ -280,20 +280,13 @@ std::vector<DeviceInfo> Device::list(std::string_view name_or_index) {
 }
 
 Device Device::open(std::string_view name_or_index) {
-  return Device(std::make_unique<gpu::Context>(name_or_index));
+  return Device(new gpu::Context(name_or_index));
 }
 
-Device Device::share(const VulkanDevice& device) {
-  return Device(std::make_unique<gpu::Context>(device));
-}
+Device Device::share(const VulkanDevice& device) { return Device(new gpu::Context(device)); }
 
-Device::Device(std::unique_ptr<gpu::Context> context) : context_(std::move(context)) {}
-Device::Device(Device&&) noexcept = default;
-Device& Device::operator=(Device&& other) noexcept {
-  replace_held(context_, std::move(other.context_));
-  return *this;
-}
-Device::~Device() { replace_held(context_); }
+Device::Device(gpu::Context* context) : context_(context) {}
+void Device::Deleter::operator()(gpu::Context* context) const { delete_here(context); }
 
 const std::string& Device::name() const { return held_by(context_, "device").name(); }
 std::uint64_t Device::memory_bytes() const { return held_by(context_, "device").limits().memory; }

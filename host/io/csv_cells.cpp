@@ -177,14 +177,14 @@ TableStart find_table(const std::vector<std::string>& lines) {
   }
   std::map<std::pair<char, std::size_t>, std::size_t> counts;
   std::pair<char, std::size_t> shape{own, 0};
-  std::size_t most = 0;
+  std::size_t largest = 0;
   for (const std::string& line : lines) {
     const char separator = separator_of(line);
     const std::size_t width = count_cells(line, separator);
     const std::size_t count = width == 0 ? 0 : ++counts[{separator, width}];
     // Of shapes as frequent the one that comes last, but for lines that have no separator.
-    if (count > most || (count == most && width > 1)) {
-      most = count;
+    if (count > largest || (count == largest && width > 1)) {
+      largest = count;
       shape = {separator, width};
     }
   }

@@ -231,8 +231,8 @@ bool CsvTable::next_line() {
 }
 
 void CsvTable::split() {
-  if (const char* problem = split_cells(line_, separator_, cells_)) {
-    refuse("{}", problem);
+  if (const char* fault = split_cells(line_, separator_, cells_)) {
+    refuse("{}", fault);
   }
 }
 

@@ -92,7 +92,7 @@ bool read_texts(hid_t attribute, hid_t type, hid_t space, std::size_t count,
   return true;
 }
 
-std::string open_problem(const std::string& reason) {
+std::string open_fault(const std::string& reason) {
   if (reason.find("truncated") != std::string::npos) {
     return "is truncated; copy or record it again";
   }
@@ -117,7 +117,7 @@ Hdf5Handle open_file(const std::filesystem::path& path, std::string& reason) {
 }
 
 // Checked before the shape: for a virtual dataset's shape, HDF5 reads other files.
-std::string storage_problem(hid_t creation) {
+std::string storage_fault(hid_t creation) {
   if (H5Pget_layout(creation) == H5D_VIRTUAL) {
     return "is a virtual dataset, whose numbers lie in other datasets, which are not read; copy "
            "them into this file";
@@ -189,19 +189,19 @@ Hdf5Contents::Hdf5Contents(const std::filesystem::path& path,
   std::string reason;
   file_ = open_file(path, reason);
   if (!file_.valid()) {
-    refuse("{}", open_problem(reason));
+    refuse("{}", open_fault(reason));
   }
   for (const std::string& name : attributes) {
     if (H5Aexists(file_.get(), name.c_str()) != 0) {
       const Hdf5Handle attribute(H5Aopen(file_.get(), name.c_str(), H5P_DEFAULT), H5Aclose);
       Attribute& value = attributes_[name];
-      value.problem = read_attribute(attribute.get(), size_of(path), value);
+      value.fault = read_attribute(attribute.get(), size_of(path), value);
     }
   }
   for (const std::string& name : datasets) {
     if (H5Lexists(file_.get(), name.c_str(), H5P_DEFAULT) != 0) {
       Dataset& dataset = datasets_[name];
-      dataset.problem = open(name, size_of(path), dataset);
+      dataset.fault = open(name, size_of(path), dataset);
     }
   }
 }
@@ -258,8 +258,8 @@ std::string Hdf5Contents::open(const std::string& name, std::uint64_t file_bytes
                ? "is a link that leads to no dataset of this file; store the dataset itself"
                : damaged;
   }
-  if (std::string problem = storage_problem(creation.get()); !problem.empty()) {
-    return problem;
+  if (std::string fault = storage_fault(creation.get()); !fault.empty()) {
+    return fault;
   }
   const Hdf5Handle type(H5Dget_type(handle.get()), H5Tclose);
   const Hdf5Handle space(H5Dget_space(handle.get()), H5Sclose);

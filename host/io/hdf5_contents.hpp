@@ -86,7 +86,7 @@ class Hdf5Contents {
  private:
   struct Field {
     std::vector<std::uint64_t> shape;  ///< empty for a scalar
-    std::string problem;               ///< why it cannot be read; "": it can
+    std::string fault;                 ///< why it cannot be read; "": it can
   };
   /// Integers, floats and enumerations of any width, or texts of fixed or variable length.
   struct Attribute : Field {
@@ -110,8 +110,8 @@ class Hdf5Contents {
     if (found == fields.end()) {
       refuse("{} '{}' is missing; add it", kind, name);
     }
-    if (!found->second.problem.empty()) {
-      refuse("{} '{}' {}", kind, name, found->second.problem);
+    if (!found->second.fault.empty()) {
+      refuse("{} '{}' {}", kind, name, found->second.fault);
     }
     return found->second;
   }

@@ -219,13 +219,13 @@ Hdf5Handle Hdf5Writer::create_dataset(const char* name, const Shape& shape, hid_
   if (storage == Storage::growing) {
     const std::vector<hsize_t> chunk = growing_chunk(shape, H5Tget_size(type));
     std::vector<hsize_t> sizes(shape.begin(), shape.end());
-    std::vector<hsize_t> most = sizes;
-    most[0] = H5S_UNLIMITED;
+    std::vector<hsize_t> max_sizes = sizes;
+    max_sizes[0] = H5S_UNLIMITED;
     // NaN fills what a killed writer did not write.
     constexpr double unwritten = std::numeric_limits<double>::quiet_NaN();
     ready = ready &&
             H5Sset_extent_simple(space.get(), static_cast<int>(sizes.size()), sizes.data(),
-                                 most.data()) >= 0 &&
+                                 max_sizes.data()) >= 0 &&
             H5Pset_chunk(creation.get(), static_cast<int>(chunk.size()), chunk.data()) >= 0 &&
             (H5Tget_class(type) != H5T_FLOAT ||
              H5Pset_fill_value(creation.get(), H5T_NATIVE_DOUBLE, &unwritten) >= 0);

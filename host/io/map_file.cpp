@@ -66,8 +66,8 @@ OccupancyGrid read_map_head(const std::filesystem::path& path, const Hdf5Content
   map.mirror = file.has_attribute("mirror") && file.integer("mirror", 0) != 0;
   map.drawn = file.has_attribute("drawn") && file.integer("drawn", 0) != 0;
   const std::vector<std::uint64_t>& shape = file.shape("log_odds", 2);
-  const auto [least, most] = std::minmax(shape[0], shape[1]);
-  if (least < 1 || most > std::numeric_limits<int>::max()) {
+  const auto [least, largest] = std::minmax(shape[0], shape[1]);
+  if (least < 1 || largest > std::numeric_limits<int>::max()) {
     file.refuse("dataset 'log_odds' has the shape {}; store at least one cell", shape);
   }
   map.ny = static_cast<int>(shape[0]);
@@ -153,8 +153,8 @@ std::shared_ptr<const MapSource> read_source(const std::filesystem::path& path,
   touches.pressure_unit = file.text("pressure_unit");
   const std::uint64_t n = file.shape("touch_pressure", 2)[0];
   const std::uint64_t e = file.shape("touch_pressure", 2)[1];
-  constexpr std::uint64_t most = std::uint64_t{1} << 40;
-  if (n == 0 || e == 0 || n > most / e) {
+  constexpr std::uint64_t limit = std::uint64_t{1} << 40;
+  if (n == 0 || e == 0 || n > limit / e) {
     file.refuse("dataset 'touch_pressure' has the shape [{}, {}]; build the map anew", n, e);
   }
   touches.pressure = read_all(file, "touch_pressure", {n, e});
@@ -228,7 +228,7 @@ MapSummary summarize_map(const std::filesystem::path& path) {
   std::optional<Extremes> log_odds;
   read_cells(path, file, summary.head, [&](std::span<const float> cells) {
     for (const float cell : cells) {
-      widen(log_odds, cell);
+      include(log_odds, cell);
       summary.occupied += cell > 0.0F ? 1 : 0;
     }
   });

@@ -30,10 +30,10 @@ std::optional<std::size_t> find_one_of(const CsvTable& table,
 }
 
 /// Returns a whole number, at least 0, in a cell of the row.
-std::uint64_t count_in(const CsvTable& table, std::size_t column, std::uint64_t most,
+std::uint64_t count_in(const CsvTable& table, std::size_t column, std::uint64_t limit,
                        const char* remedy) {
   const double number = table.require_number(column);
-  if (!(number >= 0.0 && number <= static_cast<double>(most) && number == std::floor(number))) {
+  if (!(number >= 0.0 && number <= static_cast<double>(limit) && number == std::floor(number))) {
     table.refuse("column '{}': {} {}", printable(table.columns()[column]), number, remedy);
   }
   return static_cast<std::uint64_t>(number);

@@ -134,7 +134,7 @@ class Survey {
       all.at_most = 0;
       all.times_at_most = 0;
     }
-    widen(all.range, reading);
+    include(all.range, reading);
     if (reading == all.range->most) {
       const std::uint64_t apart = head_.rows == "frames" ? 2 : 1;
       if (all.at_most == 0 || row >= last_at_most_ + apart) {

@@ -106,6 +106,6 @@ RecordingSurvey survey_recording(const std::filesystem::path& path);
 /// times. Each item is one sentence of text that names the fault and mostly its remedy. The rules
 /// rather miss a fault than suspect a sound recording: a simulated recording gives no sentence,
 /// with or without noise, as soon as it touches its object.
-std::vector<std::string> suspicions_of(const RecordingSurvey& survey);
+std::vector<std::string> findings_of(const RecordingSurvey& survey);
 
 }  // namespace palpate

@@ -56,9 +56,9 @@ void describe(Keys& keys, FitScale& scale) {
   keys("mean", scale.mean);
   keys("sd", scale.sd);
   keys("shared_sd", scale.shared_sd, scale.shared_sd > 0.0);
-  keys("alone", scale.alone);
+  keys("alone", scale.single_touch);
   keys("stranger_sd", scale.stranger_sd);
-  keys("stranger_alone", scale.stranger_alone);
+  keys("stranger_alone", scale.stranger_single_touch);
   keys("array", scale.array);
 }
 

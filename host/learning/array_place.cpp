@@ -91,8 +91,8 @@ std::optional<SetupFinding> offset_of(const std::function<double(const Pose&)>& 
     for (int b = 0; b < a; ++b) {
       const double mixed =
           -(near(a, 1, b, 1) - near(a, 1, b, -1) - near(a, -1, b, 1) + near(a, -1, b, -1)) / 4.0;
-      const double most = 0.9 * std::sqrt(information[a][a] * information[b][b]);
-      information[a][b] = information[b][a] = std::clamp(mixed, -most, most);
+      const double limit = 0.9 * std::sqrt(information[a][a] * information[b][b]);
+      information[a][b] = information[b][a] = std::clamp(mixed, -limit, limit);
     }
   }
   const glm::dmat3 covariance = glm::inverse(information);
@@ -281,17 +281,17 @@ void check_pitch(SetupJudge& judge, Setup& setup, double& nats, SetupCheck& chec
         },
         [&](double scale) { return judge.nats(scaled(scale)); });
   }
-  const auto& [best, most] = found;
+  const auto& [best, best_nats] = found;
   // Touches at the places of a grid alone seem to be 3 % off.
   constexpr double least_change = 0.04;
-  if (most - nats > least_nats && std::abs(best - 1.0) > least_change) {
+  if (best_nats - nats > least_nats && std::abs(best - 1.0) > least_change) {
     check.findings.push_back(
-        {"pitch", most - nats,
+        {"pitch", best_nats - nats,
          fmt::format("the elements lie {:.2f} times as far apart as they are said to: correct the "
                      "pitch in `array`, or import with the corrected array",
                      best)});
     setup = scaled(best);
-    nats = most;
+    nats = best_nats;
   }
 }
 

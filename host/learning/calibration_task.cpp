@@ -65,9 +65,9 @@ void check_numbers(const CalibrationRequest& request, const Request& recognition
   if (recognition.threshold == 0.0) {
     refuse("`threshold 0`", "must be above 0");
   }
-  constexpr auto most = static_cast<int>(most_reading_levels);
-  if (request.levels && (*request.levels < 2 || *request.levels > most)) {
-    refuse(fmt::format("`levels {}`", *request.levels), "give 2 to {}", most);
+  constexpr auto limit = static_cast<int>(most_reading_levels);
+  if (request.levels && (*request.levels < 2 || *request.levels > limit)) {
+    refuse(fmt::format("`levels {}`", *request.levels), "give 2 to {}", limit);
   }
   if (request.layer != "auto" && request.layer != "mean_level" && request.layer != "log_odds") {
     refuse(fmt::format("`layer {}`", request.layer), "give auto, mean_level or log_odds");

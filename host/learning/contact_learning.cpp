@@ -240,8 +240,8 @@ double share_in_contact(std::span<const TouchEvidence> touches) {
   }
   // No array, however it was pressed, says that the world is empty or full.
   constexpr double least = 0.01;
-  constexpr double most = 0.5;
-  return std::clamp((contacts + 0.5) / (known + 1.0), least, most);
+  constexpr double limit = 0.5;
+  return std::clamp((contacts + 0.5) / (known + 1.0), least, limit);
 }
 
 LearnedFeatures learn_features(std::span<const LabelledFeatures> presses) {

@@ -78,19 +78,19 @@ class FoldTrial {
         tried.push_back(presses[i]);
       }
     }
-    const std::vector<Unknown> asked = unknowns_of(tried, settings_.bins, fold);
+    const std::vector<Trial> trials = trials_of(tried, settings_.bins, fold);
     const ContactModel classifier = model_.table
                                         ? contact_with(model_.learning.contact, *model_.table, "")
                                         : model_.learning.contact;
     std::vector<std::vector<TouchEvidence>> evidence;
-    for (const Unknown& unknown : asked) {
-      evidence.push_back(evidence_of(unknown.press.touches, classifier));
+    for (const Trial& trial : trials) {
+      evidence.push_back(evidence_of(trial.press.touches, classifier));
     }
     const auto scores = score(evidence, progress);
     CrossValidation result;
-    for (std::size_t i = 0; i < asked.size(); ++i) {
-      HeldOut held_out{.fold = fold, .half = asked[i].half, .log_evidence = {}};
-      judge(asked[i].press, evidence[i], scores[i], held_out);
+    for (std::size_t i = 0; i < trials.size(); ++i) {
+      HeldOut held_out{.fold = fold, .half = trials[i].half, .log_evidence = {}};
+      judge(trials[i].press, evidence[i], scores[i], held_out);
       result.unknowns.push_back(std::move(held_out));
     }
     if (settings_.bins && model_.table) {

@@ -163,12 +163,12 @@ FitScale with_strangers(const StrangerFits& objects, FitScale scale) {
   constexpr double least_mean = -16.0;
   constexpr double mean_step = 0.5;
   scale.stranger_sd.reset();
-  scale.stranger_alone.reset();
+  scale.stranger_single_touch.reset();
   const auto of_several = counted(objects, scale, false);
   const auto of_one = counted(objects, scale, true);
   FitScale tried = scale;
   double likeliest_sd = -std::numeric_limits<double>::infinity();
-  double likeliest_alone = likeliest_sd;
+  double likeliest_single = likeliest_sd;
   for (double sd = least_sd; sd <= most_sd; sd *= step) {
     tried.stranger_sd = sd;
     if (const double nats = log_density(of_several, tried);
@@ -177,10 +177,10 @@ FitScale with_strangers(const StrangerFits& objects, FitScale scale) {
       scale.stranger_sd = sd;
     }
     for (double mean = 0.0; mean >= least_mean && !of_one.empty(); mean -= mean_step) {
-      tried.stranger_alone = {mean, sd};
-      if (const double nats = log_density(of_one, tried); nats > likeliest_alone) {
-        likeliest_alone = nats;
-        scale.stranger_alone = tried.stranger_alone;
+      tried.stranger_single_touch = {mean, sd};
+      if (const double nats = log_density(of_one, tried); nats > likeliest_single) {
+        likeliest_single = nats;
+        scale.stranger_single_touch = tried.stranger_single_touch;
       }
     }
   }
@@ -190,7 +190,7 @@ FitScale with_strangers(const StrangerFits& objects, FitScale scale) {
 std::string unlearned_strangers(const LearnedSensor& sensor) {
   const bool known_poses = sensor.bins.has_value();
   if (!sensor.fit_scale || (known_poses ? sensor.fit_scale->stranger_sd.has_value()
-                                        : sensor.fit_scale->stranger_alone.has_value())) {
+                                        : sensor.fit_scale->stranger_single_touch.has_value())) {
     return "";
   }
   return known_poses ? "\"(none)\" goes by a figure of Palpate's own for how badly strangers fit; "

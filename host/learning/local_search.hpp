@@ -79,13 +79,13 @@ struct Moments {
   glm::dvec3 variance{0.0};
 
   explicit Moments(std::span<const std::pair<glm::dvec3, double>> points) {
-    double most = -std::numeric_limits<double>::infinity();
+    double largest = -std::numeric_limits<double>::infinity();
     for (const auto& [at, nats] : points) {
-      most = std::max(most, nats);
+      largest = std::max(largest, nats);
     }
     double sum = 0.0;
     for (const auto& [at, nats] : points) {
-      const double weight = std::exp(nats - most);
+      const double weight = std::exp(nats - largest);
       sum += weight;
       mean += weight * at;
       variance += weight * at * at;

@@ -106,11 +106,11 @@ void MapRequest::validate() const {
     refuse_option("label", none_label,
                   "stands for objects that were never learned; choose another label");
   }
-  for (const auto& [option, sd, most] :
+  for (const auto& [option, sd, limit] :
        {std::tuple{"touch-sd-mm", shared.touch_sd_mm, most_length_mm},
         {"touch-sd-deg", shared.touch_sd_deg, 180.0}}) {
-    if (sd && !(*sd >= 0.0 && *sd <= most)) {
-      refuse_option(option, *sd, "give 0 to {:g}", most);
+    if (sd && !(*sd >= 0.0 && *sd <= limit)) {
+      refuse_option(option, *sd, "give 0 to {:g}", limit);
     }
     if (sd && unposed) {
       refuse_option(option, *sd, "presses at unknown poses are placed anyway; leave it out");

@@ -149,8 +149,8 @@ void align(std::vector<ObjectTouches>& objects, const DisplacementSd& sd, const 
                   found.moved.mm, degrees(found.moved.rad), found.rounds));
   const auto compare = [&](const char* option, const char* unit, double given, double told) {
     constexpr double least = 0.75;
-    constexpr double most = 1.1;  // the posterior keeps what it finds near a given that is too low
-    if (given > 0.0 && !(told > least * given && told < most * given)) {
+    constexpr double limit = 1.1;  // the posterior keeps what it finds near a given that is too low
+    if (given > 0.0 && !(told > least * given && told < limit * given)) {
       learned.remarks.push_back(
           fmt::format("by the touches the sensor was {:.2g} {} off where `{}` says {:g}: give {}",
                       told, unit, option, given, told < given ? "less" : "more"));
@@ -194,9 +194,9 @@ LearnedMaps learn_posed_maps(const MapTask& task, Device& device,
                              const std::function<void(double)>& progress) {
   LearnedMaps learned{.replaces_sensor = task.learns_sensor};
   MapOptions options = task.options(task.sensor);
-  if (const auto suspicion = suspected_order(device, task.recordings, options)) {
-    learned.remarks.push_back(fmt::format("{} ({:.0f} nats; palpate check tells more)",
-                                          suspicion->words, suspicion->nats));
+  if (const auto finding = suspected_order(device, task.recordings, options)) {
+    learned.remarks.push_back(
+        fmt::format("{} ({:.0f} nats; palpate check tells more)", finding->words, finding->nats));
   }
   constexpr double align_cost = 4.0;  // of building the maps
   constexpr double sensor_cost = 7.0;

@@ -98,8 +98,8 @@ class MountSearch {
             std::max(presses.span_mm, glm::distance(pose.translation_mm, presses.middle_mm));
       }
     }
-    const std::size_t most = most_touches * elements_mm_.size() + 1;
-    for (std::size_t n = 0; n <= most; ++n) {
+    const std::size_t limit = most_touches * elements_mm_.size() + 1;
+    for (std::size_t n = 0; n <= limit; ++n) {
       log_gamma_half_.push_back(std::lgamma(static_cast<double>(n) + 0.5) - std::lgamma(0.5));
       log_factorial_.push_back(std::lgamma(static_cast<double>(n) + 1.0));
     }
@@ -111,10 +111,10 @@ class MountSearch {
     constexpr int angles = 30;
     constexpr std::size_t most_refined = 40;
     std::vector<FoundMount> found;
-    const int most = static_cast<int>(farthest_mount_mm / step_mm);
-    for (int x = -most; x <= most; ++x) {
-      for (int y = -most; y <= most; ++y) {
-        for (int a = 0; x * x + y * y <= most * most && a < angles; ++a) {
+    const int limit = static_cast<int>(farthest_mount_mm / step_mm);
+    for (int x = -limit; x <= limit; ++x) {
+      for (int y = -limit; y <= limit; ++y) {
+        for (int a = 0; x * x + y * y <= limit * limit && a < angles; ++a) {
           found.push_back(
               {{middle_mm_ + step_mm * glm::dvec2(x, y), a * 2.0 * std::numbers::pi / angles}});
         }

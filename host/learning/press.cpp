@@ -96,17 +96,17 @@ bool has_poses(const Recording& recording) {
 
 Recording gathered(const ObjectTouches& object, const std::string& pressure_unit) {
   Recording result{.object = object.label, .pressure_unit = pressure_unit};
-  std::size_t most = 0;
+  std::size_t largest = 0;
   bool one_array = true;
   bool dead = false;
   for (const Touch& touch : object.touches) {
-    most = std::max(most, touch.pressure.size());
+    largest = std::max(largest, touch.pressure.size());
     one_array =
         one_array && std::ranges::equal(touch.elements_mm, object.touches.front().elements_mm);
     dead = dead || !touch.valid.empty();
   }
   for (const Touch& touch : object.touches) {
-    const std::size_t lacks = most - touch.pressure.size();
+    const std::size_t lacks = largest - touch.pressure.size();
     result.T_robot_sensor.push_back(touch.T_robot_sensor);
     result.pressure.insert(result.pressure.end(), touch.pressure.begin(), touch.pressure.end());
     result.pressure.insert(result.pressure.end(), lacks, 0.0);

@@ -226,15 +226,6 @@ void PressPlacer::add(std::span<const float* const> elements, float* bins) const
   }
 }
 
-double PressPlacer::log_likelihood(std::span<const TouchEvidence> press,
-                                   const Pose& T_object_robot) const {
-  double sum = 0.0;
-  for (const TouchEvidence& touch : press) {
-    sum += likelihood_.at(touch, T_object_robot * touch.T_robot_sensor);
-  }
-  return sum;
-}
-
 PoseLattice placing_lattice(std::span<const TrainingMap> maps, double step_mm, double step_rad) {
   BoundingBox box;
   for (const TrainingMap& map : maps) {

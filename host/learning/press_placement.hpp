@@ -45,7 +45,9 @@ class PressPlacer {
   /// @throws Error as place() does
   std::vector<float> log_likelihoods(std::span<const TouchEvidence> press);
   /// The log-likelihood at any pose, in nats, at the elements' own places.
-  double log_likelihood(std::span<const TouchEvidence> press, const Pose& T_object_robot) const;
+  double log_likelihood(std::span<const TouchEvidence> press, const Pose& T_object_robot) const {
+    return likelihood_.at(press, T_object_robot);
+  }
 
  private:
   /// One axis of the samples: `per_step` of them to a step of the lattice.

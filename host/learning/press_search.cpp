@@ -10,6 +10,7 @@
 #include "learning/press_placement.hpp"
 #include "model/bounding_box.hpp"
 #include "model/contact_readings.hpp"
+#include "model/map_likelihood.hpp"
 
 namespace palpate {
 
@@ -92,15 +93,17 @@ PressSearch::PressSearch(const ContactModel& contact, double step_mm, double rea
   // So many that the lattice moves a contact by about one and a half steps; the search climbs
   // between them.
   constexpr int fewest = 24;
-  constexpr int most = 48;
+  constexpr int limit = 48;
   const double angles = std::ceil(2.0 * std::numbers::pi * reach_mm / (1.5 * step_mm));
-  angles_ = std::clamp(static_cast<int>(angles), fewest, most);
+  angles_ = std::clamp(static_cast<int>(angles), fewest, limit);
 }
 
 double PressSearch::gain(std::span<const TouchEvidence> press, const Hypothesis& map,
                          const Pose& T_object_robot) const {
-  const PressPlacer placer(map, contact_, {});
-  return placer.log_likelihood(press, T_object_robot) - placer.log_likelihood(press, beyond);
+  ContactModel contact = contact_;
+  contact.prior = map.compared().prior;  // beyond the layer lies its own prior
+  const MapLikelihood likelihood(map.compared(), contact);
+  return likelihood.at(press, T_object_robot) - likelihood.at(press, beyond);
 }
 
 Summit<Pose> PressSearch::top_near(const SideScores& scores, const Pose& start) const {

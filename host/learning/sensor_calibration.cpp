@@ -204,7 +204,7 @@ std::optional<FitScale> fit_scale_of(std::span<const HeldOut> unknowns,
     }
   }
   if (const auto best = scale_of(best_z)) {
-    scale.alone = {best->mean, best->sd};
+    scale.single_touch = {best->mean, best->sd};
   }
   scale = with_strangers(by_label(unknowns, &HeldOut::stranger_fit), scale);
   scale.array = FitArray{static_cast<double>(presses.front().touches.front().elements_mm.size()),

@@ -250,9 +250,9 @@ void check_touches(SetupJudge& judge, Setup& setup, SetupCheck& check) {
 }
 
 /// Every so many touches of a recording, so that there are at most `most`.
-Recording thinned(const Recording& recording, std::size_t most) {
+Recording thinned(const Recording& recording, std::size_t limit) {
   ObjectTouches few{recording.object, {}};
-  const std::size_t every = (recording.size() + most - 1) / most;
+  const std::size_t every = (recording.size() + limit - 1) / limit;
   for (std::size_t i = 0; i < recording.size(); i += every) {
     few.touches.push_back(recording.touch(i));
   }

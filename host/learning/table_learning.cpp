@@ -33,7 +33,7 @@ double value_of_level(double level, const ReadingLayer& layer) {
 /// it is no part of, `most` at most, and all maps are used about equally often.
 std::vector<std::vector<std::size_t>> presses_by_map(const std::vector<Press>& presses,
                                                      const std::vector<TrainingMap>& maps,
-                                                     std::size_t most) {
+                                                     std::size_t limit) {
   std::map<std::string, std::vector<std::size_t>> maps_of;
   for (std::size_t map = 0; map < maps.size(); ++map) {
     maps_of[maps[map].map.label].push_back(map);
@@ -47,7 +47,7 @@ std::vector<std::vector<std::size_t>> presses_by_map(const std::vector<Press>& p
     }
     const std::size_t first = placed_of[presses[press].label]++;
     std::size_t used = 0;
-    for (std::size_t k = 1; k <= own->second.size() && used < most; ++k) {
+    for (std::size_t k = 1; k <= own->second.size() && used < limit; ++k) {
       const std::size_t map = own->second[(first + k) % own->second.size()];
       if (!maps[map].holds(press)) {
         presses_of[map].push_back(press);
@@ -239,8 +239,8 @@ double fit_gamma(const LevelCounts& counts, double prior) {
     return -nats;
   };
   constexpr double least = 1e-3;
-  constexpr double most = 0.9;
-  return least_at(least, most, 1e-4, loss);
+  constexpr double limit = 0.9;
+  return least_at(least, limit, 1e-4, loss);
 }
 
 ReadingLayer mean_level_layer(double threshold, double full_level) {

@@ -118,10 +118,10 @@ class PressLoss {
   /// Log-loss of a press of two labels that is right or wrong with equal weights.
   static double of_even_press(double apart) { return apart / 2.0 + std::log1p(std::exp(-apart)); }
 
-  double best_temperature(double weight, double most) const {
-    return std::exp(least_place(std::log(coldest), std::log(most), [&](double log_temperature) {
-      return loss(std::exp(log_temperature), weight);
-    }));
+  double best_temperature(double weight, double upper_bound) const {
+    return std::exp(least_place(
+        std::log(coldest), std::log(upper_bound),
+        [&](double log_temperature) { return loss(std::exp(log_temperature), weight); }));
   }
 
   std::span<const HeldOut> presses_;

@@ -53,12 +53,13 @@ Moments posterior(const DisplacementSd& sd, const LogLikelihood& log_likelihood)
   constexpr double reach = 2.4;       // in standard deviations
   constexpr double least_step = 0.2;  // of the wide grid's: it tells no smaller deviation
   const glm::dvec3 prior_sd{sd.mm, sd.mm, sd.rad};
-  const Grid wide{.half = reach * prior_sd, .steps = 4};
-  const Moments rough = moments(wide, prior_sd, log_likelihood);
-  Grid near{.centre = rough.mean, .steps = 3};
-  near.half = glm::max(2.0 * glm::sqrt(rough.variance),
-                       near.steps * least_step * (wide.half / (1.0 * wide.steps)));
-  return moments(near, prior_sd, log_likelihood);
+  const Grid prior_grid{.half = reach * prior_sd, .steps = 4};
+  const Moments rough = moments(prior_grid, prior_sd, log_likelihood);
+  Grid near_grid{.centre = rough.mean, .steps = 3};
+  near_grid.half =
+      glm::max(2.0 * glm::sqrt(rough.variance),
+               near_grid.steps * least_step * (prior_grid.half / (1.0 * prior_grid.steps)));
+  return moments(near_grid, prior_sd, log_likelihood);
 }
 
 /// Moves all poses by the one rigid motion that brings them nearest to the reported ones, weighed

@@ -101,16 +101,16 @@ Press together(std::span<const Press* const> presses) {
   return all;
 }
 
-std::vector<Unknown> unknowns_of(const std::vector<Press>& presses,
-                                 const std::optional<RecognitionBins>& bins, std::size_t fold) {
-  std::vector<Unknown> asked;
+std::vector<Trial> trials_of(const std::vector<Press>& presses,
+                             const std::optional<RecognitionBins>& bins, std::size_t fold) {
+  std::vector<Trial> trials;
   std::map<std::string, std::vector<const Press*>> of_label;
   for (const Press& press : presses) {
-    asked.push_back({press});
+    trials.push_back({press});
     of_label[press.label].push_back(&press);
   }
   if (!bins) {
-    return asked;
+    return trials;
   }
   Random random(fold, Stream::unknowns);
   std::size_t half = fold % 2;
@@ -122,15 +122,15 @@ std::vector<Unknown> unknowns_of(const std::vector<Press>& presses,
     const std::array parts{std::span(own).first(middle), std::span(own).subspan(middle)};
     for (std::size_t k = 0; k < parts.size(); ++k) {
       for (Press& group : groups_of(parts.at(k), random)) {
-        asked.push_back({std::move(group), (half + k) % 2});
+        trials.push_back({std::move(group), (half + k) % 2});
       }
     }
     half = 1 - half;
   }
-  for (Unknown& unknown : asked) {
-    unknown.press = as_unknown(unknown.press, *bins, random);
+  for (Trial& trial : trials) {
+    trial.press = as_unknown(trial.press, *bins, random);
   }
-  return asked;
+  return trials;
 }
 
 PoseLattice fine_lattice(const std::vector<Press>& presses, double spacing_mm) {
@@ -177,14 +177,14 @@ PoseLattice affordable_lattice(PoseLattice lattice, const std::vector<Press>& pr
   const double per_bin = additions_per_bin(presses, classifier, cost.maps);
   const double bins = std::min(most_bins, cost.minutes * additions_per_minute / per_bin);
   const double wider = std::cbrt(bins_of(lattice) / bins);
-  const auto widen = [&](Axis& axis, double widest) {
+  const auto coarsen = [&](Axis& axis, double widest) {
     const double fewest = std::ceil((axis.upper - axis.lower) / widest);
     const double count = std::max({1.0, fewest, axis.count / wider});
     axis.count = static_cast<int>(std::min<double>(axis.count, count));
   };
-  widen(lattice.x_mm, cost.spacing_mm);
-  widen(lattice.y_mm, cost.spacing_mm);
-  widen(lattice.theta_rad, placing_step_rad);
+  coarsen(lattice.x_mm, cost.spacing_mm);
+  coarsen(lattice.y_mm, cost.spacing_mm);
+  coarsen(lattice.theta_rad, placing_step_rad);
   if (bins_of(lattice) > std::min(most_bins, most_minutes * additions_per_minute / per_bin)) {
     throw Error(
         Fault::input,

@@ -36,14 +36,14 @@ inline constexpr std::size_t groups_of_press = 3;
 Press together(std::span<const Press* const> presses);
 
 /// A press, or a group of presses, of a fold that is to be recognised.
-struct Unknown {
+struct Trial {
   Press press;
   std::optional<std::size_t> half = {};  ///< see HeldOut::half
 };
 /// Presses, and with bins, at known poses, groups of presses_in_group of one object behind them,
 /// all as_unknown().
-std::vector<Unknown> unknowns_of(const std::vector<Press>& presses,
-                                 const std::optional<RecognitionBins>& bins, std::size_t fold);
+std::vector<Trial> trials_of(const std::vector<Press>& presses,
+                             const std::optional<RecognitionBins>& bins, std::size_t fold);
 
 /// Steps of theta at which presses at unknown poses are placed; steps of x and y are the elements'
 /// spacing.

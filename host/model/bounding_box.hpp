@@ -26,7 +26,7 @@ struct Extremes {
   double largest_magnitude() const { return std::max(-least, most); }
 };
 
-inline void widen(std::optional<Extremes>& extremes, double value) {
+inline void include(std::optional<Extremes>& extremes, double value) {
   if (!extremes) {
     extremes = {value, value};
   }

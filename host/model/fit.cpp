@@ -59,13 +59,14 @@ ReadingMixture mixture_of(std::span<const glm::dvec2> elements_mm, const Pose& T
 }  // namespace
 
 Fit FitScale::of(const Fit& fit, std::size_t touches) const {
-  if (mean == 0.0 && sd == 1.0 && shared_sd == 0.0 && !alone) {
+  if (mean == 0.0 && sd == 1.0 && shared_sd == 0.0 && !single_touch) {
     return fit;
   }
   const auto n = static_cast<double>(touches);
-  const double gained = alone ? (alone->mean - mean) / std::sqrt(n) : 0.0;
-  const double spread =
-      alone && touches == 1 ? alone->sd : std::sqrt(sd * sd + n * shared_sd * shared_sd);
+  const double gained = single_touch ? (single_touch->mean - mean) / std::sqrt(n) : 0.0;
+  const double spread = single_touch && touches == 1
+                            ? single_touch->sd
+                            : std::sqrt(sd * sd + n * shared_sd * shared_sd);
   const double z =
       std::clamp((fit.z - mean * std::sqrt(n) - gained) / spread, -largest_fit_z, largest_fit_z);
   return {.z = z, .verdict = verdict_on(z, scaled_fits_from_z, scaled_doubtful_from_z)};
@@ -82,9 +83,9 @@ FitScale FitScale::for_array(const FitArray& other) const {
   scale.mean *= more;
   scale.shared_sd *= more;
   scale.sd *= denser;
-  if (scale.alone) {
-    scale.alone->mean *= more;
-    scale.alone->sd *= denser;
+  if (scale.single_touch) {
+    scale.single_touch->mean *= more;
+    scale.single_touch->sd *= denser;
   }
   scale.array = other;
   return scale;

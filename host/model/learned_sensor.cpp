@@ -79,14 +79,14 @@ void require_sound(const FitScale& scale) {
   require_finite("fit_scale: mean", scale.mean);
   require_positive("fit_scale: sd", scale.sd);
   require_from_0("fit_scale: shared_sd", scale.shared_sd);
-  if (const auto& alone = scale.alone) {
-    require_finite("fit_scale: alone: mean", alone->mean);
-    require_positive("fit_scale: alone: sd", alone->sd);
+  if (const auto& single_touch = scale.single_touch) {
+    require_finite("fit_scale: alone: mean", single_touch->mean);
+    require_positive("fit_scale: alone: sd", single_touch->sd);
   }
   if (scale.stranger_sd) {
     require_positive("fit_scale: stranger_sd", *scale.stranger_sd);
   }
-  if (const auto& stranger = scale.stranger_alone) {
+  if (const auto& stranger = scale.stranger_single_touch) {
     require_finite("fit_scale: stranger_alone: mean", stranger->mean);
     require(stranger->sd >= 1.0, "fit_scale: stranger_alone: sd", stranger->sd,
             "give a number from 1, that of learned objects");

@@ -57,6 +57,14 @@ double MapLikelihood::at(const TouchEvidence& touch, const Pose& T_object_sensor
   return sum;
 }
 
+double MapLikelihood::at(std::span<const TouchEvidence> touches, const Pose& T_object_robot) const {
+  double sum = 0.0;
+  for (const TouchEvidence& touch : touches) {
+    sum += at(touch, T_object_robot * touch.T_robot_sensor);
+  }
+  return sum;
+}
+
 void MapLikelihood::all_readings(std::span<const glm::dvec2> elements_mm,
                                  const Pose& T_object_sensor, std::span<double> logs) const {
   const SensorAxes axes(T_object_sensor);

@@ -48,6 +48,8 @@ class MapLikelihood {
   /// Sum over the touch's known elements.
   /// @param T_object_sensor in the place of the touch's own pose
   double at(const TouchEvidence& touch, const Pose& T_object_sensor) const;
+  /// Sum over the touches.
+  double at(std::span<const TouchEvidence> touches, const Pose& T_object_robot) const;
   /// Of every reading but Unknown of every element, [element, level].
   /// @param elements_mm in the sensor frame
   /// @param logs out: room for as many

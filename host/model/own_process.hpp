@@ -1,7 +1,6 @@
 #pragma once
 
 #include <memory>
-#include <utility>
 
 #include <fmt/format.h>
 
@@ -11,8 +10,8 @@ namespace palpate {
 
 /// Returns what an object of a public class holds. Throws Error, naming the class, where the object
 /// was moved from.
-template <typename T>
-T& held_by(const std::unique_ptr<T>& held, const char* name) {
+template <typename T, typename Deleter>
+T& held_by(const std::unique_ptr<T, Deleter>& held, const char* name) {
   if (!held) {
     throw Error(Fault::input,
                 fmt::format("{}: was moved from; use the object that it was moved to", name));
@@ -36,21 +35,20 @@ class OwnProcess {
 };
 
 /// As held_by(), of an object with a `process`. Throws Error in a child of it, too.
-template <typename T>
-T& held_here(const std::unique_ptr<T>& held, const char* name) {
+template <typename T, typename Deleter>
+T& held_here(const std::unique_ptr<T, Deleter>& held, const char* name) {
   T& object = held_by(held, name);
   object.process.require(name);
   return object;
 }
 
-/// Destroys what is held, and holds `next` instead. A child of its process leaves it as it is: its
-/// destructors would wait for the parent's threads.
+/// Destroys an object with a `process`. A child of its process leaves it as it is: its destructors
+/// would wait for the parent's threads.
 template <typename T>
-void replace_held(std::unique_ptr<T>& held, std::unique_ptr<T> next = {}) {
-  if (held && !held->process.is_here()) {
-    static_cast<void>(held.release());
+void delete_here(T* object) {
+  if (object->process.is_here()) {
+    delete object;
   }
-  held = std::move(next);
 }
 
 }  // namespace palpate

@@ -13,7 +13,7 @@ constexpr double saddle_nats = 1.0;  ///< a peak's least height above the saddle
 constexpr double foot_nats = 7.0;    ///< how far below its peak a mode reaches
 constexpr std::int64_t most_kept_cells = std::int64_t{1}
                                          << 22;  ///< cells are wider where there are more
-constexpr int unseen = -1;                       ///< label of a cell without one
+constexpr int unlabelled = -1;                   ///< label of a cell without one
 
 }  // namespace
 
@@ -86,7 +86,7 @@ BeliefCells::BeliefCells(const BinnedObject& of, std::span<const BinShare> bins,
       seen_.push_back(cell);
     }
   }
-  label_.resize(density_.size(), unseen);
+  label_.resize(density_.size(), unlabelled);
 }
 
 void BeliefCells::climb() {
@@ -159,7 +159,7 @@ std::size_t BeliefCells::neighbours(std::size_t cell, Neighbours& near) const {
           continue;
         }
         const std::size_t other = (static_cast<std::size_t>(theta) * count_[1] + y) * count_[0] + x;
-        if (label_[other] != unseen) {
+        if (label_[other] != unlabelled) {
           near[n++] = other;
         }
       }

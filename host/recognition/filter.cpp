@@ -227,11 +227,11 @@ constexpr int most_angles = 360;
 Axis coarser(const Axis& axis) {
   const int width = (axis.count - 1) / most_bins + 1;  // in bins of the axis
   const int count = (axis.count - 1) / width + 1;
-  Axis wide{axis.lower, axis.lower + axis.step() * width * count, count};
-  if (count * width == axis.count || wide.upper > farthest_mm) {
-    wide.upper = axis.upper;
+  Axis coarse{axis.lower, axis.lower + axis.step() * width * count, count};
+  if (count * width == axis.count || coarse.upper > farthest_mm) {
+    coarse.upper = axis.upper;
   }
-  return wide;
+  return coarse;
 }
 
 }  // namespace

@@ -9,7 +9,7 @@
 #include <fmt/format.h>
 
 #include "estimation/bounded/search_memory.hpp"
-#include "estimation/displacement_check.hpp"
+#include "estimation/displacement_weights.hpp"
 #include "options/option.hpp"
 #include "options/refused_option.hpp"
 
@@ -111,12 +111,12 @@ PoseLattice settled_lattice(Asked& asked, const FilterOptions& filter,
   if (!width) {
     return lattice;
   }
-  const auto [bins, most] = chosen_bins(asked.device, hypotheses, filter, *width);
+  const auto [bins, limit] = chosen_bins(asked.device, hypotheses, filter, *width);
   if (bins.coarsened) {
     asked.remarks.push_back(fmt::format(
         "`bins {}`: steps of {:.2f} mm, wider than the maps resolve, keep to {} bins in all; "
         "narrow the region, or give `bins`",
-        *width == BinWidth::fine ? "fine" : "auto", bins.step_mm, most));
+        *width == BinWidth::fine ? "fine" : "auto", bins.step_mm, limit));
   }
   return bins.lattice;
 }
@@ -127,14 +127,14 @@ PoseLattice settled_lattice(Asked& asked, const FilterOptions& filter,
 void require_within_region(const Request& request, const PoseLattice& lattice) {
   const DisplacementSd widest = widest_displacement(lattice);
   const double widest_deg = widest.rad * 180.0 / std::numbers::pi;
-  for (const auto& [option, sd, most, unit] :
+  for (const auto& [option, sd, limit, unit] :
        {std::tuple{"touch-sd-mm", request.touch_sd_mm, widest.mm, "mm"},
         std::tuple{"slip-sd-mm", request.slip_sd_mm, widest.mm, "mm"},
         std::tuple{"touch-sd-deg", request.touch_sd_deg, widest_deg, "deg"},
         std::tuple{"slip-sd-deg", request.slip_sd_deg, widest_deg, "deg"}}) {
-    if (sd.value_or(0.0) > most) {
+    if (sd.value_or(0.0) > limit) {
       refuse_given(request, option,
-                   "wider than the region, {:g} {}; give less, or widen the region", most, unit);
+                   "wider than the region, {:g} {}; give less, or widen the region", limit, unit);
     }
   }
 }
@@ -186,10 +186,10 @@ ChosenFilter choose_filter(Asked& asked, const FilterWish& wish,
 ChosenBins chosen_bins(const DeviceSource& device, std::span<const Hypothesis> hypotheses,
                        const FilterOptions& filter, BinWidth width) {
   const FilterTraits traits = traits_of(filter);
-  const std::int64_t most = traits.certificate ? most_bounded_bins : most_bins_on(device());
-  return {balanced_lattice(lattice_of(filter), hypotheses, most, width, traits.touch_sd,
+  const std::int64_t limit = traits.certificate ? most_bounded_bins : most_bins_on(device());
+  return {balanced_lattice(lattice_of(filter), hypotheses, limit, width, traits.touch_sd,
                            traits.slip_sd),
-          most};
+          limit};
 }
 
 FilterOptions with_evidence(FilterOptions filter, const LearnedSensor& sensor,

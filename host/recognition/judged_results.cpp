@@ -12,7 +12,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "io/file_identity.hpp"
 #include "io/input_file.hpp"
 
 namespace palpate {

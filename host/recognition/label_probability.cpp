@@ -41,8 +41,8 @@ std::vector<double> feature_nats(std::span<const TouchEvidence> touches,
 }  // namespace
 
 double log_sum(double a, double b) {
-  const double most = std::max(a, b);
-  return most == log_zero ? log_zero : most + std::log1p(std::exp(std::min(a, b) - most));
+  const double largest = std::max(a, b);
+  return largest == log_zero ? log_zero : largest + std::log1p(std::exp(std::min(a, b) - largest));
 }
 
 std::vector<double> sums_by_label(const Estimate& estimate, const RecognitionTask& task) {
@@ -89,10 +89,10 @@ std::vector<double> label_probabilities(const Estimate& estimate, const Temperin
   for (std::size_t i = 0; i < logs.size(); ++i) {
     logs[i] = tempering.tempered(logs[i], i);
   }
-  const double most = *std::max_element(logs.begin(), logs.end());
+  const double largest = *std::max_element(logs.begin(), logs.end());
   double total = 0.0;
   for (double& p : logs) {
-    p = std::exp(p - most);
+    p = std::exp(p - largest);
     total += p;
   }
   for (double& p : logs) {

@@ -12,13 +12,13 @@ namespace palpate {
 namespace {
 
 /// That of z, of which one in ten spreads wider, where something else widens all of them.
-double density(const Fit& fit, double mean, double widened_sd) {
+double density(const Fit& fit, double mean, double more_sd) {
   constexpr double odd_share = 0.1;
   constexpr double odd_sd = 5.0;
   constexpr double farthest = 30.0;  // no density is 0
   const double from_mean = std::clamp(fit.z, -farthest, farthest) - mean;
   const auto normal = [&](double own_sd) {
-    const double sd = std::hypot(own_sd, widened_sd);
+    const double sd = std::hypot(own_sd, more_sd);
     return std::exp(-0.5 * from_mean * from_mean / (sd * sd)) / sd;
   };
   return (1.0 - odd_share) * normal(1.0) + odd_share * normal(odd_sd);
@@ -45,7 +45,7 @@ ObjectFit fit_of(const Mode& mode, const std::optional<RefinedPose>& refined,
   ObjectFit result{.fit = scale.of(combined_fit(sums).value(), in_contact)};
   FitScale of_one = scale;
   if (in_contact > 1) {
-    of_one.alone.reset();  // the pose is that of all touches
+    of_one.single_touch.reset();  // the pose is that of all touches
   }
   for (const std::optional<FitSums>& touch : sums) {
     const std::optional<Fit> fit = combined_fit(std::span(&touch, 1));
@@ -86,8 +86,8 @@ std::optional<Fit> best_fit_near(std::span<const TouchEvidence> touches, const P
 }
 
 double stranger_density(const Fit& fit, std::size_t touches, const FitScale& scale) {
-  if (touches == 1 && scale.stranger_alone) {
-    const auto [mean, sd] = *scale.stranger_alone;
+  if (touches == 1 && scale.stranger_single_touch) {
+    const auto [mean, sd] = *scale.stranger_single_touch;
     return density(fit, mean, std::sqrt(std::max(sd * sd - 1.0, 0.0)));
   }
   const double each_sd = scale.stranger_sd.value_or(usual_stranger_sd);
@@ -98,9 +98,10 @@ double misfit_nats(const Fit& fit, std::size_t touches, const FitScale& scale) {
   // The scale is of the touches that were learned from. Of 160 single presses by a sensor whose
   // elements have other gains, one in ten has z below -3.9 and one in twenty below -5.4: the lower
   // half of a standard deviation of 3.
-  constexpr double alone_sd = 3.0;
-  const bool alone = touches == 1 && scale.stranger_alone;
-  const double learned = density(fit, 0.0, alone ? std::sqrt(alone_sd * alone_sd - 1.0) : 0.0);
+  constexpr double single_touch_sd = 3.0;
+  const bool single_touch = touches == 1 && scale.stranger_single_touch;
+  const double learned =
+      density(fit, 0.0, single_touch ? std::sqrt(single_touch_sd * single_touch_sd - 1.0) : 0.0);
   return std::log(stranger_density(fit, touches, scale) / learned);
 }
 

@@ -54,12 +54,12 @@ double PlacedTouches::log_likelihood(const Pose& T_object_robot,
   std::vector<double> nats(displacements.size());
   double sum = 0.0;
   for (const TouchEvidence& touch : touches_.subspan(range.begin, range.end - range.begin)) {
-    const double most = evaluate(touch, T_object_robot, displacements, nats);
+    const double largest = evaluate(touch, T_object_robot, displacements, nats);
     double mean = 0.0;
     for (const double one : nats) {
-      mean += std::exp(one - most) / static_cast<double>(nats.size());
+      mean += std::exp(one - largest) / static_cast<double>(nats.size());
     }
-    sum += most + std::log(mean);
+    sum += largest + std::log(mean);
   }
   return sum;
 }
@@ -136,9 +136,9 @@ double PlacedTouches::log_volume(const PlacedPeak& peak, std::span<const Pose> d
         const double mixed = at(unit(i) + unit(j)) + at(-unit(i) - unit(j)) -
                              at(unit(i) - unit(j)) - at(unit(j) - unit(i));
         // Where the touches' ripples outweigh the peak, axes count as independent.
-        const double most = 0.9 * std::sqrt(curvature[i][i] * curvature[j][j]);
+        const double limit = 0.9 * std::sqrt(curvature[i][i] * curvature[j][j]);
         curvature[i][j] = curvature[j][i] =
-            std::clamp(-mixed / (4.0 * step_mm * step_mm), -most, most);
+            std::clamp(-mixed / (4.0 * step_mm * step_mm), -limit, limit);
       }
     }
   }
@@ -158,11 +158,11 @@ double PlacedTouches::displaced_mm(const Pose& T_object_robot, std::span<const P
     if (!touch.in_contact()) {
       continue;
     }
-    const double most = evaluate(touch, T_object_robot, displacements, nats);
+    const double largest = evaluate(touch, T_object_robot, displacements, nats);
     double weight = 0.0;
     double weighed = 0.0;
     for (std::size_t k = 0; k < nats.size(); ++k) {
-      const double one = std::exp(nats[k] - most);
+      const double one = std::exp(nats[k] - largest);
       weight += one;
       weighed += one * glm::dot(displacements[k].translation_mm, displacements[k].translation_mm);
     }

@@ -156,7 +156,7 @@ std::optional<Explanation> Explainer::moved(const Parts& starts, double log_plac
   const std::size_t n = touches_.size();
   const RecognitionTask& task = question_.task;
   const auto at = displacement_points(task.touch_sd(), touch_sd_points);
-  double most = log_zero;
+  double largest = log_zero;
   std::size_t after = 0;
   std::array<PlacedPeak, 2> parts;
   std::size_t in_contact = 0;
@@ -167,8 +167,8 @@ std::optional<Explanation> Explainer::moved(const Parts& starts, double log_plac
     }
     const PlacedPeak a = placed_.climb(starts.before[k].T_object_robot, at, {0, k}, 1.0);
     const PlacedPeak b = placed_.climb(starts.from[k].T_object_robot, at, {k, n}, 1.0);
-    if (a.nats + b.nats > most) {
-      most = a.nats + b.nats;
+    if (a.nats + b.nats > largest) {
+      largest = a.nats + b.nats;
       after = k;
       parts = {a, b};
     }
@@ -189,7 +189,7 @@ std::optional<Explanation> Explainer::moved(const Parts& starts, double log_plac
                                                before.T_object_robot, from.T_object_robot)
                                : 0.0;
   return Explanation{.placement = {.object = object_, .moved_after = after, .moved_mm = moved_mm},
-                     .log_evidence = log_evidence(most, volumes - log_places) -
+                     .log_evidence = log_evidence(largest, volumes - log_places) -
                                      std::log(static_cast<double>(n - 1)),
                      .fit = fit(kept, before.T_object_robot, task.touch_sd())};
 }
@@ -250,14 +250,14 @@ Pose Explainer::best_start(const Parts& parts) const {
 /// The most probable hypotheses and where each explains the touches best.
 std::vector<std::pair<int, Pose>> candidates(const Recogniser& recogniser, const Estimate& estimate,
                                              const RecognitionStep& step, double& share) {
-  constexpr std::size_t most = 5;
+  constexpr std::size_t limit = 5;
   std::vector<int> objects(estimate.log_evidence.size());
   std::iota(objects.begin(), objects.end(), 0);
   std::ranges::stable_sort(objects, std::greater<>(),
                            [&](int object) { return estimate.log_evidence[object]; });
   const auto own = std::ranges::find(objects, step.mode.object);
   std::rotate(objects.begin(), own, own + 1);
-  objects.resize(std::min(objects.size(), most));
+  objects.resize(std::min(objects.size(), limit));
   PoseLattice lattice;
   const auto likely = recogniser.likely_bins(objects, 1e-3, lattice);
   std::vector<std::pair<int, Pose>> found;
@@ -304,14 +304,14 @@ std::optional<TouchPlacement> judge_placement(const Recogniser& recogniser,
   for (const auto& [object, from] : objects) {
     explainers.emplace_back(question, object);
   }
-  const double exact = explainers.front().log_evidence_near(objects.front().second);
+  const double unmoved = explainers.front().log_evidence_near(objects.front().second);
   const auto explains = [&](const Explanation& one) {
     if (one.fit.verdict == Verdict::does_not_fit) {
       return false;
     }
     const double least = one.placement.moved_after > 0 ? least_move_nats : least_displaced_nats;
     if (!none) {
-      return (one.log_evidence - exact) / temperature > least;
+      return (one.log_evidence - unmoved) / temperature > least;
     }
     const Tempering tempering = tempering_of(touches, task, one.fit);
     const std::size_t label = task.label_of[one.placement.object];

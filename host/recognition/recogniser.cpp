@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
 
-#include "estimation/displacement_check.hpp"
+#include "estimation/displacement_weights.hpp"
 #include "model/element_spacing.hpp"
 #include "palpate/error.hpp"
 

@@ -8,7 +8,6 @@
 
 #include <fmt/format.h>
 
-#include "io/file_hash.hpp"
 #include "io/input_file.hpp"
 #include "options/option.hpp"
 #include "options/refused_option.hpp"

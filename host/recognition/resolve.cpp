@@ -7,7 +7,6 @@
 
 #include <fmt/format.h>
 
-#include "io/file_identity.hpp"
 #include "io/input_file.hpp"
 #include "model/printable.hpp"
 #include "options/option.hpp"

@@ -115,8 +115,8 @@ Scales scales_of_maps(const RecognitionTask& task, std::optional<double> near_mm
   }
   const bool as_map = judges_as_map(task, near_mm);
   Scales scales;
-  const bool exact = task.touch_sd().none() && task.slip_sd().none();
-  if (!fits.empty() && as_map && exact) {
+  const bool undisplaced = task.touch_sd().none() && task.slip_sd().none();
+  if (!fits.empty() && as_map && undisplaced) {
     scales.fit = pooled(fits);
     scales.fit.array = array;
   }

@@ -32,17 +32,17 @@ class LogMean {
     }
   }
   double value() const {
-    double most = -std::numeric_limits<double>::infinity();
+    double largest = -std::numeric_limits<double>::infinity();
     for (const auto& [weight, log] : terms_) {
-      most = std::max(most, log);
+      largest = std::max(largest, log);
     }
     double sum = 0.0;
     double total = 0.0;
     for (const auto& [weight, log] : terms_) {
-      sum += weight * std::exp(log - most);
+      sum += weight * std::exp(log - largest);
       total += weight;
     }
-    return most + std::log(sum / total);
+    return largest + std::log(sum / total);
   }
 
  private:
@@ -135,12 +135,12 @@ glm::dvec2 turned(double theta_rad, const glm::dvec2& v) {
 }
 
 double log_sum(const std::vector<double>& logs) {
-  const double most = *std::max_element(logs.begin(), logs.end());
+  const double largest = *std::max_element(logs.begin(), logs.end());
   double sum = 0.0;
   for (const double l : logs) {
-    sum += std::exp(l - most);
+    sum += std::exp(l - largest);
   }
-  return most + std::log(sum);
+  return largest + std::log(sum);
 }
 
 /// Whether two rectangles meet: the second is turned by phi, and its centre is `apart` from the

@@ -9,20 +9,20 @@ namespace palpate::reference {
 namespace {
 
 double max_log_probability(const Posterior& posterior) {
-  double most = -std::numeric_limits<double>::infinity();
+  double largest = -std::numeric_limits<double>::infinity();
   for (std::size_t object = 0; object < posterior.weight.size(); ++object) {
     for (const double l : posterior.log_likelihood[object]) {
-      most = std::max(most, std::log(posterior.weight[object]) + l);
+      largest = std::max(largest, std::log(posterior.weight[object]) + l);
     }
   }
-  return most;
+  return largest;
 }
 
 /// Probability of every bin of one object, [theta, y, x]; those of all objects sum to 1.
 std::vector<double> probabilities(const Posterior& posterior, int object) {
-  const double most = max_log_probability(posterior);
+  const double largest = max_log_probability(posterior);
   const auto relative = [&](std::size_t o, double l) {
-    return posterior.weight[o] * std::exp(l - most);
+    return posterior.weight[o] * std::exp(l - largest);
   };
   double total = 0.0;
   for (std::size_t o = 0; o < posterior.weight.size(); ++o) {
@@ -80,11 +80,11 @@ std::vector<double> identity(const Posterior& posterior) {
 }
 
 Mode mode(const Posterior& posterior) {
-  const double most = max_log_probability(posterior);
+  const double largest = max_log_probability(posterior);
   for (std::size_t object = 0; object < posterior.weight.size(); ++object) {
     const std::vector<double>& logs = posterior.log_likelihood[object];
     for (std::size_t bin = 0; bin < logs.size(); ++bin) {
-      if (std::log(posterior.weight[object]) + logs[bin] == most) {  // Eq. 15, 16
+      if (std::log(posterior.weight[object]) + logs[bin] == largest) {  // Eq. 15, 16
         return {static_cast<int>(object), static_cast<std::int64_t>(bin)};
       }
     }

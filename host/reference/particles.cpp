@@ -7,14 +7,14 @@
 namespace palpate::reference {
 
 std::vector<double> importance_weights(std::span<const double> log_likelihoods) {
-  const double most = *std::max_element(log_likelihoods.begin(), log_likelihoods.end());
+  const double largest = *std::max_element(log_likelihoods.begin(), log_likelihoods.end());
   double sum = 0.0;
   for (const double l : log_likelihoods) {
-    sum += std::exp(l - most);
+    sum += std::exp(l - largest);
   }
   std::vector<double> weights;
   for (const double l : log_likelihoods) {
-    weights.push_back(std::exp(l - most) / sum);
+    weights.push_back(std::exp(l - largest) / sum);
   }
   return weights;
 }
@@ -45,18 +45,18 @@ double parzen(std::span<const Particle> particles, int object, const Pose& pose)
 
 double largest_parzen(std::span<const Particle> particles, int objects, double extent_mm) {
   const int cells = static_cast<int>(extent_mm / 0.5);
-  double most = 0.0;
+  double largest = 0.0;
   for (int object = 0; object < objects; ++object) {
     for (int k = 0; k < 50; ++k) {
       for (int j = -cells; j <= cells; ++j) {
         for (int i = -cells; i <= cells; ++i) {
           const Pose point{{0.5 * i, 0.5 * j}, 0.04 * std::numbers::pi * k};
-          most = std::max(most, parzen(particles, object, point));  // Eq. 12
+          largest = std::max(largest, parzen(particles, object, point));  // Eq. 12
         }
       }
     }
   }
-  return most;
+  return largest;
 }
 
 }  // namespace palpate::reference

@@ -40,13 +40,13 @@ Prediction predict(const OccupancyGrid& map, const glm::dvec2& p_object_mm,
   }
   // A log-sum-exp: the likelihoods themselves may all be too small for a double.
   const std::vector<double>& logs = prediction.log_likelihood;
-  const double most = *std::max_element(logs.begin(), logs.end());
+  const double largest = *std::max_element(logs.begin(), logs.end());
   double sum = 0.0;
   for (const double l : logs) {
-    sum += std::exp(l - most);
+    sum += std::exp(l - largest);
   }
   for (const double l : logs) {
-    prediction.probability.push_back(std::exp(l - most) / sum);
+    prediction.probability.push_back(std::exp(l - largest) / sum);
     prediction.mean += prediction.probability.back() * l;
   }
   for (std::size_t level = 0; level < logs.size(); ++level) {

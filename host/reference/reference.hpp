@@ -125,7 +125,7 @@ struct Gain {
   double identity = 0.0;  ///< about the label
   double both = 0.0;      ///< about the sample
 };
-/// @param displacements of the sensor, of equal probability; one at 0 where touches are exact
+/// @param displacements of the sensor, of equal probability; one at 0 where touches are undisplaced
 Gain expected_gain(std::span<const BeliefSample> samples, std::span<const OccupancyGrid> maps,
                    const Pose& T_robot_sensor, std::span<const glm::dvec2> elements_mm,
                    const ContactModel& model, std::span<const Pose> displacements);

@@ -22,13 +22,13 @@ double median(std::span<double> values) {
 double change_over(std::span<double> values) {
   const std::size_t quarter = values.size() / 4;
   double least = median(values.first(quarter));
-  double most = least;
+  double highest = least;
   for (std::size_t i = 1; i < 4; ++i) {
     const double middle = median(values.subspan(i * quarter, quarter));
     least = std::min(least, middle);
-    most = std::max(most, middle);
+    highest = std::max(highest, middle);
   }
-  return most - least;
+  return highest - least;
 }
 
 }  // namespace

@@ -38,15 +38,15 @@ std::optional<Grid> grid_of(const std::string& text) {
   if (!columns) {
     return {};
   }
-  constexpr std::int64_t most = 1024;
+  constexpr std::int64_t limit = 1024;
   const auto rows = whole_number_of(parts[1]);
   const auto pitch_mm = number_of(parts[2]);
-  if (*columns < 1 || *columns > most || !rows || *rows < 1 || *rows > most || !pitch_mm ||
+  if (*columns < 1 || *columns > limit || !rows || *rows < 1 || *rows > limit || !pitch_mm ||
       *pitch_mm < 1e-3 || *pitch_mm > 1e3) {
     refuse(fmt::format("`array {}`", text),
            "give COLUMNS:ROWS:PITCH, with 1 to {} columns and rows and a pitch of 0.001 to "
            "1000 mm, or a file",
-           most);
+           limit);
   }
   return Grid{static_cast<int>(*columns), static_cast<int>(*rows), *pitch_mm};
 }
@@ -188,10 +188,10 @@ ImportSurvey survey_of(const Recording& recording) {
 }
 
 std::vector<bool> ImportSurvey::pressed() const {
-  const float most = load.empty() ? 0.0F : *std::ranges::max_element(load);
+  const float peak = load.empty() ? 0.0F : *std::ranges::max_element(load);
   std::vector<bool> pressed;
   for (const float l : load) {
-    pressed.push_back(l > 0.0F && l >= 0.5F * most);
+    pressed.push_back(l > 0.0F && l >= 0.5F * peak);
   }
   return pressed;
 }

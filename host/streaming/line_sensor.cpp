@@ -26,9 +26,9 @@ constexpr int most_late = 4;
 
 }  // namespace
 
-LineSensor::LineSensor(SensorDescription description, PosedSensor::Complaint complain, int sign)
+LineSensor::LineSensor(SensorDescription description, PosedSensor::Warn warn, int sign)
     : description_(std::move(description)),
-      complain_(std::move(complain)),
+      warn_(std::move(warn)),
       sign_(sign),
       format_(description_.elements_mm.size()),
       reader_("frames", "-", 4096 + most_bytes_per_reading * description_.elements_mm.size(),
@@ -45,7 +45,7 @@ std::optional<Frame> LineSensor::next(std::chrono::milliseconds timeout) {
       throw Error(
           Fault::input,
           before_ > 0
-              ? problem_before_
+              ? finding_before_
               : fmt::format("{} ended before the first frame; write frames to it, a line each",
                             reader_.name()));
     }
@@ -59,23 +59,23 @@ std::optional<Frame> LineSensor::next(std::chrono::milliseconds timeout) {
 }
 
 void LineSensor::take(const LineReader::Line& line) {
-  using Kind = FrameLines::Problem::Kind;
+  using Kind = FrameLines::Finding::Kind;
   if (line.too_long) {
     refuse_line(line, Kind::malformed, "is longer than any frame");
     return;
   }
   const double read_s = host_clock_s();
   auto read = format_.read(line.text, read_s);
-  if (std::holds_alternative<FrameLines::Problem>(read) && counters_.frames == 0) {
+  if (std::holds_alternative<FrameLines::Finding>(read) && counters_.frames == 0) {
     format_ = FrameLines(format_.elements());  // what looked like a header was a greeting
     if (std::exchange(has_header_, false)) {
       ++before_;
       read = format_.read(line.text, read_s);
     }
   }
-  if (const auto* problem = std::get_if<FrameLines::Problem>(&read)) {
-    if (!may_stand_before(line, problem->words)) {
-      refuse_line(line, problem->kind, problem->words);
+  if (const auto* finding = std::get_if<FrameLines::Finding>(&read)) {
+    if (!may_stand_before(line, finding->words)) {
+      refuse_line(line, finding->kind, finding->words);
     }
   } else if (auto* frame = std::get_if<Frame>(&read)) {
     say_first(read_s, frame->host_time_s);
@@ -91,31 +91,31 @@ void LineSensor::take(const LineReader::Line& line) {
 }
 
 /// Leaves out a line before the first frame that a board prints as it starts.
-bool LineSensor::may_stand_before(const LineReader::Line& line, const std::string& problem) {
-  constexpr std::uint64_t most = 100;
+bool LineSensor::may_stand_before(const LineReader::Line& line, const std::string& finding) {
+  constexpr std::uint64_t limit = 100;
   const bool is_cut = line.number == 1 && !trimmed(line.text).starts_with('{');
-  if (counters_.frames > 0 || before_ == most || !(is_cut || FrameLines::is_text(line.text))) {
+  if (counters_.frames > 0 || before_ == limit || !(is_cut || FrameLines::is_text(line.text))) {
     return false;
   }
   format_ = FrameLines(format_.elements());  // numbers among the words are no columns
   if (before_++ == 0) {
     constexpr std::size_t enough = 60;
     first_before_ = printable(trimmed(line.text).substr(0, enough));
-    problem_before_ = words_about(line, problem);
+    finding_before_ = words_about(line, finding);
   }
   return true;
 }
 
 /// Says once what was left out before the first frame, and where times are in no seconds.
 void LineSensor::say_first(double now_s, double time_s) {
-  if (!complain_) {
+  if (!warn_) {
     return;
   }
   if (counters_.frames == 0 && before_ > 0) {
-    complain_(fmt::format("{}: {} before the first frame {} left out{}", reader_.name(),
-                          before_ == 1 ? "a line" : fmt::format("{} lines", before_),
-                          before_ == 1 ? "is" : "are",
-                          first_before_.empty() ? "" : fmt::format(": '{}'", first_before_)));
+    warn_(fmt::format("{}: {} before the first frame {} left out{}", reader_.name(),
+                      before_ == 1 ? "a line" : fmt::format("{} lines", before_),
+                      before_ == 1 ? "is" : "are",
+                      first_before_.empty() ? "" : fmt::format(": '{}'", first_before_)));
   }
   constexpr std::size_t enough = 20;
   constexpr double latest_s = 1e11;
@@ -135,23 +135,23 @@ void LineSensor::say_first(double now_s, double time_s) {
     unit = step_s >= 1e6 ? "nanoseconds" : step_s >= 1e3 ? "microseconds" : "milliseconds";
   }
   if (unit != nullptr) {
-    complain_(fmt::format(
+    warn_(fmt::format(
         "{}: its frames are {:.3g} s apart by their times, which look like {}; write seconds",
         reader_.name(), step_s, unit));
   }
 }
 
 std::string LineSensor::words_about(const LineReader::Line& line,
-                                    const std::string& problem) const {
+                                    const std::string& finding) const {
   return fmt::format(
       "{}, line {}: {}; write {{\"time\": s, \"pressure\": [{} numbers]}}, or CSV with {} "
       "readings, behind their time where it is known",
-      reader_.name(), line.number, problem, format_.elements(), format_.elements());
+      reader_.name(), line.number, finding, format_.elements(), format_.elements());
 }
 
-void LineSensor::refuse_line(const LineReader::Line& line, FrameLines::Problem::Kind kind,
-                             const std::string& problem) {
-  const std::string text = words_about(line, problem);
+void LineSensor::refuse_line(const LineReader::Line& line, FrameLines::Finding::Kind kind,
+                             const std::string& finding) {
+  const std::string text = words_about(line, finding);
   if (counters_.frames == 0) {
     throw Error(Fault::input, text);
   }
@@ -161,8 +161,8 @@ void LineSensor::refuse_line(const LineReader::Line& line, FrameLines::Problem::
   if (first_refused_.empty()) {
     first_refused_ = text;
   }
-  if (complain_ && !told_[static_cast<std::size_t>(kind)]) {
-    complain_(text);
+  if (warn_ && !told_[static_cast<std::size_t>(kind)]) {
+    warn_(text);
   }
   told_.set(static_cast<std::size_t>(kind));
 }

@@ -17,11 +17,11 @@ namespace palpate {
 /// lines of words, such as a board prints as it starts, and a first line that is cut.
 class LineSensor : public Sensor {
  public:
-  /// @param complain called from within next() with the first refused line of each kind, and with
+  /// @param warn called from within next() with the first refused line of each kind, and with
   /// what else is worth saying of the lines; may be empty
   /// @throws Error (Fault::input) where standard input cannot be read
   /// @param sign -1: readings fall under load, and are taken times -1
-  LineSensor(SensorDescription description, PosedSensor::Complaint complain, int sign = 1);
+  LineSensor(SensorDescription description, PosedSensor::Warn warn, int sign = 1);
 
   const SensorDescription& description() const override { return description_; }
   void start() override {}
@@ -36,14 +36,14 @@ class LineSensor : public Sensor {
 
  private:
   void take(const LineReader::Line& line);
-  bool may_stand_before(const LineReader::Line& line, const std::string& problem);
-  std::string words_about(const LineReader::Line& line, const std::string& problem) const;
+  bool may_stand_before(const LineReader::Line& line, const std::string& finding);
+  std::string words_about(const LineReader::Line& line, const std::string& finding) const;
   void say_first(double now_s, double time_s);
-  void refuse_line(const LineReader::Line& line, FrameLines::Problem::Kind kind,
-                   const std::string& problem);
+  void refuse_line(const LineReader::Line& line, FrameLines::Finding::Kind kind,
+                   const std::string& finding);
 
   SensorDescription description_;
-  PosedSensor::Complaint complain_;
+  PosedSensor::Warn warn_;
   int sign_;
   FrameLines format_;
   std::deque<Frame> frames_;  ///< read, and not yet taken
@@ -51,7 +51,7 @@ class LineSensor : public Sensor {
   bool has_header_ = false;        ///< no frame has come since the header
   std::uint64_t before_ = 0;       ///< lines left out before the first frame
   std::string first_before_;       ///< the first of them
-  std::string problem_before_;     ///< why it is no frame
+  std::string finding_before_;     ///< why it is no frame
   std::vector<double> first_s_;    ///< times of the first frames, of those that have one
   std::uint64_t lost_before_ = 0;  ///< lines refused since the last frame
   std::uint64_t refused_ = 0;

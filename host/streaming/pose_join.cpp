@@ -9,7 +9,6 @@
 
 #include <fmt/format.h>
 
-#include "io/file_identity.hpp"
 #include "io/input_file.hpp"
 #include "io/recording_rules.hpp"
 #include "palpate/pose_track.hpp"

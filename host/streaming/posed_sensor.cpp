@@ -27,11 +27,11 @@ constexpr int blocks_at_once = 4;
 class PoseReader {
  public:
   /// @param name path of a file or FIFO, or "-": standard input
-  /// @param complain called for the first refused line of each kind; may be empty
+  /// @param warn called for the first refused line of each kind; may be empty
   /// @throws Error where `name` cannot be read, or a line of a file is refused
-  PoseReader(const std::string& name, PoseTrack& track, PosedSensor::Complaint complain)
+  PoseReader(const std::string& name, PoseTrack& track, PosedSensor::Warn warn)
       : track_(track),
-        complain_(std::move(complain)),
+        warn_(std::move(warn)),
         lines_("poses", name, longest_line, [this](const LineReader::Line& line) { take(line); }) {
     while (is_file() && read_some()) {
     }
@@ -79,12 +79,12 @@ class PoseReader {
       return;
     }
     const auto read = format_.read(line.text, 0.0);
-    if (const auto* problem = std::get_if<FrameLines::Problem>(&read)) {
-      using Kind = FrameLines::Problem::Kind;
-      refuse_line(problem->kind == Kind::malformed   ? Flaw::no_pose
-                  : problem->kind == Kind::no_number ? Flaw::no_number
+    if (const auto* finding = std::get_if<FrameLines::Finding>(&read)) {
+      using Kind = FrameLines::Finding::Kind;
+      refuse_line(finding->kind == Kind::malformed   ? Flaw::no_pose
+                  : finding->kind == Kind::no_number ? Flaw::no_number
                                                      : Flaw::far_away,
-                  line_, problem->words);
+                  line_, finding->words);
     } else if (const auto* frame = std::get_if<Frame>(&read)) {
       add(frame->host_time_s, *frame->T_robot_sensor);
     }
@@ -111,20 +111,20 @@ class PoseReader {
                               early ? "not later than" : "far later than", aside_.before_s));
     }
     if (track_.set_back() != set_back_before) {
-      const std::string problem = fmt::format(
+      const std::string finding = fmt::format(
           "time = {} s is not later than the pose before, at {} s, and the poses after "
           "it go on from there: the robot's clock was set",
           aside_.time_s, aside_.before_s);
-      refuse_line(Flaw::clock_set_back, aside_.line, problem);
+      refuse_line(Flaw::clock_set_back, aside_.line, finding);
     }
   }
 
-  void refuse_line(Flaw flaw, std::uint64_t line, std::string_view problem) {
+  void refuse_line(Flaw flaw, std::uint64_t line, std::string_view finding) {
     const std::string text = fmt::format(
         "{}, line {}: {}; write {{\"time\": s, \"x_mm\": mm, \"y_mm\": mm, \"theta_rad\": rad}}, "
         "or CSV "
         "with these columns",
-        lines_.name(), line, problem);
+        lines_.name(), line, finding);
     if (is_file()) {
       throw Error(Fault::input, text);
     }
@@ -134,14 +134,14 @@ class PoseReader {
       first_refused_ = text;
     }
     const auto kind = static_cast<std::size_t>(flaw);
-    if (complain_ && !told_[kind]) {
-      complain_("poses " + text);
+    if (warn_ && !told_[kind]) {
+      warn_("poses " + text);
     }
     told_[kind] = true;
   }
 
   PoseTrack& track_;
-  PosedSensor::Complaint complain_;
+  PosedSensor::Warn warn_;
   FrameLines format_{0};
   LineReader lines_;
   bool ended_ = false;
@@ -181,9 +181,8 @@ struct PosedSensor::Impl {
     Clock::time_point since;
   };
 
-  Impl(std::unique_ptr<Sensor> inner, const std::string& name, double largest_gap_s,
-       Complaint complain)
-      : sensor(std::move(inner)), track(largest_gap_s), reader(name, track, std::move(complain)) {}
+  Impl(std::unique_ptr<Sensor> inner, const std::string& name, double largest_gap_s, Warn warn)
+      : sensor(std::move(inner)), track(largest_gap_s), reader(name, track, std::move(warn)) {}
 
   // True where no pose that is still to come can change the frame's pose.
   bool decided(const Frame& frame) const {
@@ -246,8 +245,8 @@ struct PosedSensor::Impl {
 };
 
 PosedSensor::PosedSensor(std::unique_ptr<Sensor> sensor, const std::string& poses,
-                         double largest_gap_s, Complaint complain)
-    : impl_(std::make_unique<Impl>(std::move(sensor), poses, largest_gap_s, std::move(complain))) {}
+                         double largest_gap_s, Warn warn)
+    : impl_(std::make_unique<Impl>(std::move(sensor), poses, largest_gap_s, std::move(warn))) {}
 
 PosedSensor::~PosedSensor() = default;
 

@@ -37,12 +37,12 @@ std::vector<PressInterval> presses_of(std::span<const double> time_s, std::span<
     const auto [low, high] = std::minmax(load[i - 1], load[i + 1]);
     smooth[i] = std::clamp(load[i], low, high);
   }
-  const float most = load.empty() ? 0.0F : *std::ranges::max_element(smooth);
+  const float peak = load.empty() ? 0.0F : *std::ranges::max_element(smooth);
   std::vector<PressInterval> presses;
   std::size_t first = 0;
   std::size_t frames = 0;
   for (std::size_t i = 0; i < smooth.size(); ++i) {
-    const bool pressed = most > 0.0F && smooth[i] >= 0.5F * most;
+    const bool pressed = peak > 0.0F && smooth[i] >= 0.5F * peak;
     const bool next = frames > 0 && time_s[i] - time_s[i - 1] <= longest_step_s;
     if (frames >= least_frames && !(pressed && next)) {
       const double quarter_s = 0.25 * (time_s[i - 1] - time_s[first]);

@@ -25,7 +25,7 @@ float quantile(std::span<float> values, double part) {
 template <typename Better>
 std::vector<float> running(std::span<const double> time_s, std::span<const float> values,
                            double window_s, Better better) {
-  std::vector<float> most(values.size());
+  std::vector<float> best(values.size());
   std::vector<std::size_t> candidates(values.size());
   std::size_t front = 0;
   std::size_t back = 0;
@@ -40,9 +40,9 @@ std::vector<float> running(std::span<const double> time_s, std::span<const float
     while (time_s[candidates[front]] < time_s[i] - 0.5 * window_s) {
       ++front;
     }
-    most[i] = values[candidates[front]];
+    best[i] = values[candidates[front]];
   }
-  return most;
+  return best;
 }
 
 std::vector<float> opening(std::span<const double> time_s, std::span<const float> values,
@@ -154,9 +154,9 @@ std::vector<float> RestFinder::column(std::size_t element, float sign) const {
   const float high = quantile(sorted, 0.75);
   const auto onset = static_cast<float>(onset_);
   const float least = low - 4.0F * (high - low) - 100.0F * onset;
-  const float most = high + 4.0F * (high - low) + 1e4F * onset;
+  const float limit = high + 4.0F * (high - low) + 1e4F * onset;
   std::ranges::replace_if(
-      values, [&](float v) { return v < least || v > most; }, unknown_reading);
+      values, [&](float v) { return v < least || v > limit; }, unknown_reading);
   fill_unknown(values);
   return values;
 }
@@ -252,7 +252,7 @@ double RestFinder::window_for(float sign) const {
 
 /// How far each block's most distant element lies above its rest, or below it for the sign -1, [b].
 std::vector<float> RestFinder::departure(float sign, double window_s) const {
-  std::vector<float> most(time_s_.size(), 0.0F);
+  std::vector<float> highest(time_s_.size(), 0.0F);
   for (std::size_t k = 0; k < elements_; ++k) {
     if (!is_alive(k)) {
       continue;
@@ -260,10 +260,10 @@ std::vector<float> RestFinder::departure(float sign, double window_s) const {
     const std::vector<float> values = column(k, sign);
     const std::vector<float> rest = opening_to_the_ends(time_s_, values, window_s);
     for (std::size_t i = 0; i < values.size(); ++i) {
-      most[i] = std::max(most[i], values[i] - rest[i]);
+      highest[i] = std::max(highest[i], values[i] - rest[i]);
     }
   }
-  return most;
+  return highest;
 }
 
 /// Whether the readings fall in presses. What departs from the rest does so first when the first
@@ -273,9 +273,9 @@ bool RestFinder::falls() const {
   const double window_s = std::max(window_for(1.0F), window_for(-1.0F));
   const std::vector<float> up = departure(1.0F, window_s);
   const std::vector<float> down = departure(-1.0F, window_s);
-  const float most = std::max(*std::ranges::max_element(up), *std::ranges::max_element(down));
+  const float highest = std::max(*std::ranges::max_element(up), *std::ranges::max_element(down));
   const auto departs = [&](float by) {
-    return by > std::max(static_cast<float>(onset_), 0.3F * most);
+    return by > std::max(static_cast<float>(onset_), 0.3F * highest);
   };
   const auto first = [&](const std::vector<float>& by) {
     return std::ranges::find_if(by, departs) - by.begin();

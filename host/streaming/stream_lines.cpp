@@ -23,7 +23,7 @@ namespace palpate {
 
 namespace {
 
-using Kind = FrameLines::Problem::Kind;
+using Kind = FrameLines::Finding::Kind;
 
 // What a column holds beside the numbers that have names.
 constexpr std::size_t reading = 4;
@@ -158,10 +158,10 @@ FrameLines::Line FrameLines::read_json(std::string_view line, double now_s) cons
     json = nlohmann::json::parse(without_nan(line), nullptr, false);
   }
   if (elements_ == 0 && !json.is_object()) {
-    return Problem{Kind::malformed, "is no JSON object"};
+    return Finding{Kind::malformed, "is no JSON object"};
   }
   if (json.is_discarded()) {
-    return Problem{Kind::malformed, "is no whole JSON"};
+    return Finding{Kind::malformed, "is no whole JSON"};
   }
   const nlohmann::json* list = json.is_array() ? &json : nullptr;
   Numbers numbers;
@@ -173,16 +173,16 @@ FrameLines::Line FrameLines::read_json(std::string_view line, double now_s) cons
       if (number != json.end() && number->is_number()) {
         numbers[k] = number->get<double>();
       } else if (number != json.end() && !number->is_null() && elements_ > 0) {
-        return Problem{Kind::no_number, fmt::format("'{}' is no number", names[k])};
+        return Finding{Kind::no_number, fmt::format("'{}' is no number", names[k])};
       }
     }
   }
   std::vector<double> values;
   if (elements_ > 0 && list == nullptr) {
-    return Problem{Kind::malformed, "has no list 'pressure'"};
+    return Finding{Kind::malformed, "has no list 'pressure'"};
   }
   if (elements_ > 0 && !add_readings(*list, values)) {
-    return Problem{Kind::no_number, "'pressure' holds something else than numbers and null"};
+    return Finding{Kind::no_number, "'pressure' holds something else than numbers and null"};
   }
   return frame_of(numbers, std::move(values), now_s);
 }
@@ -198,12 +198,12 @@ FrameLines::Line FrameLines::read_header(const std::vector<std::string_view>& ce
   }
   const auto readings = static_cast<std::size_t>(std::ranges::count(columns, reading));
   if (readings != elements_) {
-    return Problem{Kind::malformed, fmt::format("names {} readings for an array of {} elements",
+    return Finding{Kind::malformed, fmt::format("names {} readings for an array of {} elements",
                                                 readings, elements_)};
   }
   for (std::size_t k = 0; k < names.size() && elements_ == 0; ++k) {
     if (std::ranges::find(columns, k) == columns.end()) {
-      return Problem{Kind::malformed, fmt::format("names no column '{}'", names[k])};
+      return Finding{Kind::malformed, fmt::format("names no column '{}'", names[k])};
     }
   }
   columns_ = std::move(columns);
@@ -211,12 +211,12 @@ FrameLines::Line FrameLines::read_header(const std::vector<std::string_view>& ce
 }
 
 /// Finds what the columns of rows without a header hold, by the first row.
-std::optional<FrameLines::Problem> FrameLines::find_columns(
+std::optional<FrameLines::Finding> FrameLines::find_columns(
     const std::vector<std::string_view>& cells) {
   const std::size_t filled = cells.size() - (cells.back().empty() ? 1 : 0);
   const std::size_t before = elements_ == 0 ? reading : filled - std::min(filled, elements_);
   if (filled < elements_ || (before > 1 && before != reading)) {
-    return Problem{Kind::malformed,
+    return Finding{Kind::malformed,
                    fmt::format("has {} numbers for an array of {} elements", filled, elements_)};
   }
   for (std::size_t i = 0; i < cells.size(); ++i) {
@@ -227,22 +227,22 @@ std::optional<FrameLines::Problem> FrameLines::find_columns(
 
 FrameLines::Line FrameLines::read_csv(std::string_view line, double now_s) {
   std::vector<std::string_view> cells;
-  if (const char* problem = split_cells(line, separator_of(line), cells)) {
-    return Problem{Kind::malformed, problem};
+  if (const char* finding = split_cells(line, separator_of(line), cells)) {
+    return Finding{Kind::malformed, finding};
   }
   if (elements_ == 0 && cells.size() < names.size()) {
-    return Problem{Kind::malformed, "is no JSON object, and no row of CSV with four numbers"};
+    return Finding{Kind::malformed, "is no JSON object, and no row of CSV with four numbers"};
   }
   if (columns_.empty()) {
     if (!reading_in(cells.front())) {
       return read_header(cells);
     }
-    if (auto problem = find_columns(cells)) {
-      return *std::move(problem);
+    if (auto finding = find_columns(cells)) {
+      return *std::move(finding);
     }
   }
   if (elements_ > 0 && cells.size() != columns_.size()) {
-    return Problem{Kind::malformed,
+    return Finding{Kind::malformed,
                    fmt::format("has {} cells, the first line {}", cells.size(), columns_.size())};
   }
   Numbers numbers;
@@ -260,7 +260,7 @@ FrameLines::Line FrameLines::read_csv(std::string_view line, double now_s) {
     if (!number || (column == 0 && !std::isfinite(*number))) {
       // A message stays one short line whatever the cell holds.
       const bool shown = cells[i].size() <= 60 && is_printable(cells[i]);
-      return Problem{Kind::no_number, fmt::format("column {}{} is no {}", i + 1,
+      return Finding{Kind::no_number, fmt::format("column {}{} is no {}", i + 1,
                                                   shown ? fmt::format(" = '{}'", cells[i]) : "",
                                                   column == 0 ? "time" : "number")};
     }
@@ -289,7 +289,7 @@ bool FrameLines::is_text(std::string_view line) {
 FrameLines::Line FrameLines::frame_of(Numbers numbers, std::vector<double> values,
                                       double now_s) const {
   if (values.size() != elements_) {
-    return Problem{Kind::malformed, fmt::format("has {} readings for an array of {} elements",
+    return Finding{Kind::malformed, fmt::format("has {} readings for an array of {} elements",
                                                 values.size(), elements_)};
   }
   auto& [time_s, x_mm, y_mm, theta_rad] = numbers;
@@ -300,12 +300,12 @@ FrameLines::Line FrameLines::frame_of(Numbers numbers, std::vector<double> value
   if (elements_ == 0 || x_mm || y_mm || theta_rad) {
     for (std::size_t k = 0; k < names.size(); ++k) {
       if (!numbers[k]) {
-        return Problem{Kind::no_number, fmt::format("has no number '{}'", names[k])};
+        return Finding{Kind::no_number, fmt::format("has no number '{}'", names[k])};
       }
     }
     pose = Pose{{*x_mm, *y_mm}, *theta_rad};
     if (!is_robot_pose(*pose)) {
-      return Problem{
+      return Finding{
           Kind::far_away,
           fmt::format("x_mm = {}, y_mm = {}, theta_rad = {}: no robot is further away than 1e9 mm, "
                       "or has turned by more than 1e9 rad",

@@ -77,12 +77,12 @@ class LineReader {
 /// A pose has all four numbers. In lines of poses, other columns and keys are left out.
 class FrameLines {
  public:
-  struct Problem {
+  struct Finding {
     enum class Kind { malformed, no_number, far_away } kind = Kind::malformed;
     std::string words;
   };
   struct Header {};
-  using Line = std::variant<Frame, Problem, Header>;
+  using Line = std::variant<Frame, Finding, Header>;
 
   /// @param elements of the array, e; 0: the lines are poses
   explicit FrameLines(std::size_t elements) : elements_(elements) {}
@@ -104,7 +104,7 @@ class FrameLines {
   Line read_json(std::string_view line, double now_s) const;
   Line read_csv(std::string_view line, double now_s);
   Line read_header(const std::vector<std::string_view>& cells);
-  std::optional<Problem> find_columns(const std::vector<std::string_view>& cells);
+  std::optional<Finding> find_columns(const std::vector<std::string_view>& cells);
   Line frame_of(Numbers numbers, std::vector<double> values, double now_s) const;
 
   std::size_t elements_;

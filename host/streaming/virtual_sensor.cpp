@@ -166,9 +166,9 @@ class SourceName {
   const std::string& what() const { return what_; }
 
   template <typename Number>
-  std::optional<Number> number(std::string_view key, Number least, Number most) const {
+  std::optional<Number> number(std::string_view key, Number least, Number upper_bound) const {
     const auto text = option(key);
-    return text ? std::optional(parse<Number>(key, *text, least, most)) : std::nullopt;
+    return text ? std::optional(parse<Number>(key, *text, least, upper_bound)) : std::nullopt;
   }
 
   std::optional<double> speed() const {
@@ -219,10 +219,11 @@ class SourceName {
   }
 
   template <typename Number>
-  Number parse(std::string_view key, std::string_view text, Number least, Number most) const {
+  Number parse(std::string_view key, std::string_view text, Number least,
+               Number upper_bound) const {
     const auto value = detail::all_of<Number>(text);
-    if (!value || !(*value >= least && *value <= most)) {  // NaN too
-      refuse(key, fmt::format("= {}: give a number from {} to {}", text, least, most));
+    if (!value || !(*value >= least && *value <= upper_bound)) {  // NaN too
+      refuse(key, fmt::format("= {}: give a number from {} to {}", text, least, upper_bound));
     }
     return *value;
   }

@@ -90,24 +90,25 @@ double YamlEntry::number(const std::function<bool(double)>& fits, std::string_vi
   return *value;
 }
 
-double YamlEntry::number(double least, double most) const {
-  return number([&](double value) { return value >= least && value <= most; },
-                fmt::format("give a number from {:g} to {:g}", least, most));
+double YamlEntry::number(double least, double upper_bound) const {
+  return number([&](double value) { return value >= least && value <= upper_bound; },
+                fmt::format("give a number from {:g} to {:g}", least, upper_bound));
 }
 
 double YamlEntry::number() const {
   return number([](double) { return true; }, "give a number");
 }
 
-std::int64_t YamlEntry::whole_number(std::int64_t least, std::int64_t most, Digits digits) const {
+std::int64_t YamlEntry::whole_number(std::int64_t least, std::int64_t upper_bound,
+                                     Digits digits) const {
   // yaml-cpp's own conversion reads 010 as 8.
   const std::string text = node.IsScalar() ? node.Scalar() : "";
   const bool hexadecimal = digits == Digits::also_hexadecimal && text.starts_with("0x") &&
                            text.find_first_of("+-") == std::string::npos;
   const std::optional<std::int64_t> value =
       hexadecimal ? whole_number_of(text.substr(2), 16) : whole_number_of(text);
-  if (!value || *value < least || *value > most) {
-    refuse(fmt::format("give a whole number from {} to {}", least, most));
+  if (!value || *value < least || *value > upper_bound) {
+    refuse(fmt::format("give a whole number from {} to {}", least, upper_bound));
   }
   return *value;
 }

@@ -28,14 +28,14 @@ struct YamlEntry {
   std::string text() const;
   /// A finite number that satisfies `fits`.
   double number(const std::function<bool(double)>& fits, std::string_view remedy) const;
-  double number(double least, double most) const;
+  double number(double least, double upper_bound) const;
   double number() const;
   /// A whole number, decimal or, where `digits` says so, also hexadecimal after 0x.
   enum class Digits { decimal, also_hexadecimal };
   template <class Integer>
-  Integer integer(Integer least, Integer most = std::numeric_limits<Integer>::max(),
+  Integer integer(Integer least, Integer upper_bound = std::numeric_limits<Integer>::max(),
                   Digits digits = Digits::decimal) const {
-    return static_cast<Integer>(whole_number(least, most, digits));
+    return static_cast<Integer>(whole_number(least, upper_bound, digits));
   }
   std::vector<YamlEntry> list(std::string_view remedy) const;
   std::vector<YamlEntry> list(std::size_t count, std::string_view remedy) const;
@@ -54,7 +54,7 @@ struct YamlEntry {
   }
 
  private:
-  std::int64_t whole_number(std::int64_t least, std::int64_t most, Digits digits) const;
+  std::int64_t whole_number(std::int64_t least, std::int64_t upper_bound, Digits digits) const;
 };
 
 /// Hands the document of a YAML file to `read`; its node is null where the file has none.

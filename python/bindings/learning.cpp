@@ -61,7 +61,7 @@ void bind_learned_sensor(nb::module_& module) {
       .def_prop_ro(
           "stranger_alone",
           [](const LearnedSensor& self) {
-            const auto& fit = self.fit_scale ? self.fit_scale->stranger_alone : std::nullopt;
+            const auto& fit = self.fit_scale ? self.fit_scale->stranger_single_touch : std::nullopt;
             return fit ? std::optional(std::tuple(fit->mean, fit->sd)) : std::nullopt;
           },
           "(mean, standard deviation) of fit.z of one touch where the object was never learned;\n"

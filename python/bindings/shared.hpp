@@ -26,15 +26,13 @@ class Shared {
   /// @param device may be null
   Shared(const char* name, std::shared_ptr<Device> device, Object object)
       : name_(name), held_(new Held{std::move(device), std::move(object)}) {}
-  ~Shared() { replace_held(held_); }
-  Shared(Shared&&) noexcept = default;
 
   /// Runs `work(object, report)`, as run() does.
   template <typename F>
   auto use(const Progress& progress, F work) const {
     Held& held = held_here(held_, name_);
     return run(progress, [&](const Report& report) {
-      const Turn turn(held);
+      const ExclusiveUse use(held);
       return work(held.object, report);
     });
   }
@@ -43,7 +41,7 @@ class Shared {
   auto use(F work) const {
     Held& held = held_here(held_, name_);
     return run([&] {
-      const Turn turn(held);
+      const ExclusiveUse use(held);
       return work(held.object);
     });
   }
@@ -62,9 +60,9 @@ class Shared {
     std::atomic<std::thread::id> worker = {};  ///< the thread whose turn it is
   };
 
-  class Turn {
+  class ExclusiveUse {
    public:
-    explicit Turn(Held& held) : held_(held) {
+    explicit ExclusiveUse(Held& held) : held_(held) {
       if (held.worker == std::this_thread::get_id()) {
         throw Error(Fault::input,
                     "progress: uses the object whose progress it is; wait for the "
@@ -75,19 +73,23 @@ class Shared {
       }
       held.worker = std::this_thread::get_id();
     }
-    ~Turn() {
+    ~ExclusiveUse() {
       held_.worker = std::thread::id();
       held_.mutex.unlock();
     }
-    Turn(const Turn&) = delete;
-    Turn& operator=(const Turn&) = delete;
+    ExclusiveUse(const ExclusiveUse&) = delete;
+    ExclusiveUse& operator=(const ExclusiveUse&) = delete;
 
    private:
     Held& held_;
   };
 
+  struct Deleter {
+    void operator()(Held* held) const { delete_here(held); }
+  };
+
   const char* name_;
-  std::unique_ptr<Held> held_;
+  std::unique_ptr<Held, Deleter> held_;
 };
 
 /// Makes an object on the device, by `make(device)`, without the GIL.

@@ -59,9 +59,9 @@ TEST_F(InfoCommand, SuspicionsComeLast) {
   }
   write_recording(folder_ / "r.h5", recording);
   const std::string said = done("info r.h5");
-  const std::string suspicions = said.substr(std::min(said.find("Suspicious:\n"), said.size()));
-  expect_named(suspicions, {"are these metres?\n", "are these degrees?\n"});
-  EXPECT_EQ(std::count(suspicions.begin(), suspicions.end(), '\n'), 3) << suspicions;
+  const std::string findings = said.substr(std::min(said.find("Suspicious:\n"), said.size()));
+  expect_named(findings, {"are these metres?\n", "are these degrees?\n"});
+  EXPECT_EQ(std::count(findings.begin(), findings.end(), '\n'), 3) << findings;
 }
 
 // Streams have offsets, phases of rest, and ramps; without noise, most frames are equal.
@@ -124,9 +124,9 @@ TEST_F(InfoCommand, SensorModel) {
       .bins = BinSteps{.x_mm = 0.8, .y_mm = 0.4, .theta_rad = std::numbers::pi / 8.0},
       .fit_scale = FitScale{.mean = -4.5,
                             .sd = 12.25,
-                            .alone = SingleFitScale{1.5, 0.75},
+                            .single_touch = SingleFitScale{1.5, 0.75},
                             .stranger_sd = 3.5,
-                            .stranger_alone = SingleFitScale{-2.5, 1.25}},
+                            .stranger_single_touch = SingleFitScale{-2.5, 1.25}},
       .pose_scale = PoseScale{.factor = 0.75, .map_sd_mm = 0.125}};
   sensor.maps = {{"pen.map.h5", "1a"}, {"mug.map.h5", "2b"}};
   sensor.table->shared.assign(3 * ReadingLayer::nodes, -1.0);

@@ -164,7 +164,7 @@ TEST(Words, OfOneTouchSayThatItCannotTellWhetherTheObjectIsKnown) {
   step.touches = 1;
   EXPECT_TRUE(said(with_none));
   EXPECT_FALSE(said(sample_task()));
-  with_none.sensor.fit_scale = FitScale{.stranger_alone = SingleFitScale{-8.0, 2.0}};
+  with_none.sensor.fit_scale = FitScale{.stranger_single_touch = SingleFitScale{-8.0, 2.0}};
   EXPECT_FALSE(said(with_none)) << "the sensor model tells";
 }
 

@@ -12,13 +12,12 @@
 namespace palpate::touch_overlap_test {
 
 /// What is counted in every row of y at a theta.
-std::vector<OverlapPlane::Bins> rows_of(const Touch& touch, const PoseLattice& lattice,
-                                        const OccupancyGrid& map, int theta) {
+std::vector<RowBins> rows_of(const Touch& touch, const PoseLattice& lattice,
+                             const OccupancyGrid& map, int theta) {
   const ArrayRectangle array =
       array_rectangle(touch.T_robot_sensor, touch.elements_mm, lattice.pivot_mm);
-  const OverlapPlane plane(array, occupied_box(map), lattice, theta);
-  std::vector<OverlapPlane::Bins> rows(static_cast<std::size_t>(lattice.y_mm.count));
-  plane.find_rows(rows);
+  std::vector<RowBins> rows(static_cast<std::size_t>(lattice.y_mm.count));
+  find_overlap(array, occupied_box(map), lattice, theta, rows);
   return rows;
 }
 
@@ -29,7 +28,7 @@ std::int64_t expect_the_same_bins(const Touch& touch, const PoseLattice& lattice
   std::int64_t total = 0;
   std::int64_t bin = 0;
   for (int t = 0; t < lattice.theta_rad.count; ++t) {
-    for (const OverlapPlane::Bins& row : rows_of(touch, lattice, map, t)) {
+    for (const RowBins& row : rows_of(touch, lattice, map, t)) {
       for (int x = 0; x < lattice.x_mm.count; ++x, ++bin) {
         const bool counted = x >= row.first && x < row.first + row.count;
         EXPECT_EQ(counted, reference::overlaps(touch, reference::bin_pose(lattice, bin), map))

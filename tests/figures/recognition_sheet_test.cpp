@@ -229,10 +229,10 @@ TEST(PlacedBelief, ABinLiesWhereItsPoseHasTheObject) {
     EXPECT_NEAR(mean.x, expected.translation_mm.x, 0.2);
     EXPECT_NEAR(mean.y, expected.translation_mm.y, 0.2);
     EXPECT_NEAR(std::accumulate(belief.xy.begin(), belief.xy.end(), 0.0), 1.0, 1e-12);
-    const auto turn = std::ranges::max(belief.theta, {}, &PlacedBelief::Turn::probability);
+    const auto turn = std::ranges::max(belief.theta, {}, &PlacedBelief::ThetaShare::probability);
     EXPECT_NEAR(std::remainder(turn.theta_rad - expected.theta_rad, 2.0 * std::numbers::pi), 0.0,
                 1e-12);
-    EXPECT_TRUE(std::ranges::is_sorted(belief.theta, {}, &PlacedBelief::Turn::theta_rad));
+    EXPECT_TRUE(std::ranges::is_sorted(belief.theta, {}, &PlacedBelief::ThetaShare::theta_rad));
   }
 }
 

@@ -251,7 +251,7 @@ TEST_F(LargeFile, RecordingIsSurveyedInPieces) {
   EXPECT_TRUE(done_with_memory(20 * mib, [&] {
     const RecordingSurvey survey = survey_recording(path_);
     return survey.head.rows == 4096 * chunks && survey.pressure.in_contact == chunks &&
-           survey.with_pose == 4096 * chunks && suspicions_of(survey).size() == 0;
+           survey.with_pose == 4096 * chunks && findings_of(survey).size() == 0;
   }));
   EXPECT_FALSE(done_with_memory(20 * mib, [&] { return read_recording(path_).size() > 0; }))
       << "the limit holds";

@@ -22,8 +22,8 @@ class RecordingSurveyed : public OneFile {
     write_recording(path_, recording);
     return survey_recording(path_);
   }
-  std::vector<std::string> suspicions(const Recording& recording) const {
-    return suspicions_of(survey(recording));
+  std::vector<std::string> findings(const Recording& recording) const {
+    return findings_of(survey(recording));
   }
 };
 
@@ -94,7 +94,7 @@ TEST_F(RecordingSurveyed, DeadAndUnknownReadingsDoNotCount) {
   EXPECT_EQ(s.pressure.unknown, 1u);
   EXPECT_EQ(s.pressure.elements[3].known, 0u);
   EXPECT_EQ(s.pressure.elements[5].known, r.size() - 1);
-  EXPECT_TRUE(suspicions(r).empty());
+  EXPECT_TRUE(findings(r).empty());
 }
 
 TEST_F(RecordingSurveyed, QuantilesAreExactToABin) {
@@ -122,7 +122,7 @@ TEST_F(RecordingSurveyed, SpacingIsThatOfAllPairs) {
     for (const glm::dvec2& b : places) {
       nearest = &a == &b ? nearest : std::min(nearest, std::hypot(a.x - b.x, a.y - b.y));
     }
-    widen(expected, nearest);
+    include(expected, nearest);
   }
   const ElementSpacing spacing = spacing_of(places).value();
   // Two ways to round a square root.
@@ -136,7 +136,7 @@ TEST_F(RecordingSurveyed, SimulatedTouchesAreSound) {
     for (const int touches : {3, 9, 40, 200}) {
       for (const auto& [letter, seed] : {std::pair("E", 0u), {"O", 1u}}) {
         Simulator sensor(make_shape(letter), {.noise_kpa = noise_kpa}, digitacts_array(), seed);
-        EXPECT_EQ(suspicions(sensor.touch(random_poses(touches, seed), {})),
+        EXPECT_EQ(findings(sensor.touch(random_poses(touches, seed), {})),
                   std::vector<std::string>{})
             << letter << " " << touches << " " << noise_kpa;
       }
@@ -279,13 +279,13 @@ const Rule rules[] = {
      both(element(20, with_offset), [](Recording& r) { r.baseline.assign(36, 0.0); }),
      "Element 20 reads more than 2 kPa above the baseline in every frame"}};
 
-class Suspicions : public RecordingSurveyed, public testing::WithParamInterface<Rule> {};
+class RecordingFindings : public RecordingSurveyed, public testing::WithParamInterface<Rule> {};
 
-TEST_P(Suspicions, AreThoseOfTheRule) {
+TEST_P(RecordingFindings, AreThoseOfTheRule) {
   const auto& [name, sound, change, said, besides] = GetParam();
   Recording recording = sound();
   change(recording);
-  const std::vector<std::string> found = suspicions(recording);
+  const std::vector<std::string> found = findings(recording);
   ASSERT_EQ(found.size(), said == nullptr ? 0u : 1u) << testing::PrintToString(found);
   if (said != nullptr) {
     expect_named(found.front(), {said, besides});
@@ -293,7 +293,7 @@ TEST_P(Suspicions, AreThoseOfTheRule) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(All, Suspicions, testing::ValuesIn(rules),
+INSTANTIATE_TEST_SUITE_P(All, RecordingFindings, testing::ValuesIn(rules),
                          [](const auto& rule) { return std::string(rule.param.name); });
 
 }  // namespace palpate::recording_survey_test

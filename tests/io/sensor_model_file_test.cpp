@@ -22,9 +22,9 @@ LearnedSensor full_sensor() {
       .fit_scale = FitScale{.mean = -4.5,
                             .sd = 12.25,
                             .shared_sd = 0.5,
-                            .alone = SingleFitScale{1.5, 0.75},
+                            .single_touch = SingleFitScale{1.5, 0.75},
                             .stranger_sd = 3.25,
-                            .stranger_alone = SingleFitScale{-4.25, 2.75},
+                            .stranger_single_touch = SingleFitScale{-4.25, 2.75},
                             .array = FitArray{.elements = 36.0, .spacing_mm = 1.875}},
       .pose_scale = PoseScale{.factor = 1.25, .map_sd_mm = 0.375}};
   sensor.table->layer = {.of = MapLayer::mean_level,
@@ -45,7 +45,8 @@ LearnedSensor full_sensor() {
 }
 
 // Its file, as far as the numbers of the table.
-const std::string full_text = R"(format: palpate.sensor_model
+const std::string full_text =
+    R"(format: palpate.sensor_model
 version: 1
 pressure_unit: raw
 noise: 0.25
@@ -59,8 +60,8 @@ temperature: 31.5
 temperature_growth: 2.25
 bins: {x_mm: 0.5, y_mm: 0.25, theta_rad: 0.125}
 fit_scale: {mean: -4.5, sd: 12.25, shared_sd: 0.5, alone: {mean: 1.5, sd: 0.75}, )"
-                              R"(stranger_sd: 3.25, stranger_alone: {mean: -4.25, sd: 2.75}, )"
-                              R"(array: {elements: 36, spacing_mm: 1.875}}
+    R"(stranger_sd: 3.25, stranger_single_touch: {mean: -4.25, sd: 2.75}, )"
+    R"(array: {elements: 36, spacing_mm: 1.875}}
 pose_scale: {factor: 1.25, map_sd_mm: 0.375}
 features:
   weight: 0.25
@@ -115,7 +116,8 @@ TEST_F(SensorModelFile, MayLeaveKeysOut) {
   EXPECT_NE(written(sensor).find("\nfit_scale: {mean: 0.5, sd: 12.25}\n"), std::string::npos);
   const FitScale scale = read_sensor_model(path_).fit_scale.value();
   EXPECT_EQ(scale.sd, 12.25);
-  EXPECT_FALSE(scale.stranger_sd || scale.stranger_alone || scale.alone || scale.array);
+  EXPECT_FALSE(scale.stranger_sd || scale.stranger_single_touch || scale.single_touch ||
+               scale.array);
 }
 
 TEST_F(SensorModelFile, NamesTheKeyThatIsWrong) {
@@ -146,7 +148,7 @@ TEST_F(SensorModelFile, NamesTheKeyThatIsWrong) {
         {"shared_sd: 0.5", "shared_sd: -1", "fit_scale: shared_sd"},
         {"mean: 1.5, sd: 0.75", "mean: 1.5, sd: 0", "fit_scale: alone: sd"},
         {"stranger_sd: 3.25", "stranger_sd: 0", "fit_scale: stranger_sd"},
-        {"mean: -4.25, sd: 2.75", "mean: -4.25, sd: 0.5", "fit_scale: stranger_alone: sd"},
+        {"mean: -4.25, sd: 2.75", "mean: -4.25, sd: 0.5", "fit_scale: stranger_single_touch: sd"},
         {"noise: 0.25", "psf_mm: 1", "psf_mm", "remove it"},
         {"noise: 0.25", "familiarity: {offset: 1}", "familiarity", "remove it"},
         {"raw", "psi", "pressure_unit", "kPa or raw"}}) {

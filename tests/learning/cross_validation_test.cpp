@@ -323,12 +323,12 @@ TEST(WithStrangers, FindsWhatSingleTouchesAreLike) {
       fits[i % 3].push_back({{.z = scale.mean + spread * z}, 1});
     }
     const FitScale found = with_strangers(fits, scale);
-    ASSERT_TRUE(found.stranger_alone);
-    EXPECT_NEAR(found.stranger_alone->mean, truth.mean, 0.5);
-    EXPECT_NEAR(found.stranger_alone->sd, truth.sd, 0.15 * truth.sd);
+    ASSERT_TRUE(found.stranger_single_touch);
+    EXPECT_NEAR(found.stranger_single_touch->mean, truth.mean, 0.5);
+    EXPECT_NEAR(found.stranger_single_touch->sd, truth.sd, 0.15 * truth.sd);
     EXPECT_FALSE(found.stranger_sd) << "of single touches alone";
     fits.erase(2);
-    EXPECT_FALSE(with_strangers(fits, scale).stranger_alone) << "of two objects";
+    EXPECT_FALSE(with_strangers(fits, scale).stranger_single_touch) << "of two objects";
   }
 }
 

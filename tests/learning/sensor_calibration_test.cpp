@@ -36,7 +36,7 @@ void expect_complete(const SensorCalibration& found, std::size_t touches) {
   EXPECT_LE(found.after->log_loss, found.table->log_loss);
   EXPECT_LE(found.after->calibration_error, 0.1);
   EXPECT_GT(found.sensor.temperature, 1.0) << "elements are not independent";
-  EXPECT_TRUE(found.sensor.fit_scale->stranger_alone.has_value());
+  EXPECT_TRUE(found.sensor.fit_scale->stranger_single_touch.has_value());
   EXPECT_TRUE(found.warnings.empty());
 }
 
@@ -82,9 +82,9 @@ TEST(SensorCalibration, OfLettersAtKnownPosesLearnsTheirSensor) {
   EXPECT_EQ(found.sensor.spread_mm, 0.5);
   // Three touches of a letter fit the other two as badly as those of other strangers.
   EXPECT_NEAR(found.sensor.fit_scale->stranger_sd.value(), 4.0, 2.0);
-  ASSERT_TRUE(found.sensor.fit_scale->alone);
-  EXPECT_GT(found.sensor.fit_scale->alone->mean, found.sensor.fit_scale->mean + 0.1);
-  EXPECT_LT(found.sensor.fit_scale->alone->sd, 0.95 * found.sensor.fit_scale->sd);
+  ASSERT_TRUE(found.sensor.fit_scale->single_touch);
+  EXPECT_GT(found.sensor.fit_scale->single_touch->mean, found.sensor.fit_scale->mean + 0.1);
+  EXPECT_LT(found.sensor.fit_scale->single_touch->sd, 0.95 * found.sensor.fit_scale->sd);
 }
 
 TEST(SensorCalibration, OfLettersAtUnknownPosesIsComplete) {
@@ -96,7 +96,7 @@ TEST(SensorCalibration, OfLettersAtUnknownPosesIsComplete) {
   EXPECT_EQ(default_tables(false)[0].layer, MapLayer::log_odds);
   EXPECT_TRUE(found.sensor.features->objects.contains("R"));
   EXPECT_FALSE(found.groups || found.sensor.bins || found.sensor.fit_scale->stranger_sd ||
-               found.sensor.fit_scale->alone);
+               found.sensor.fit_scale->single_touch);
   EXPECT_EQ(found.sensor.temperature_growth, 0.0);
   EXPECT_NEAR(found.sensor.spread_mm, 0.6 * 1.9, 0.1) << "of the spacing";
 }

@@ -214,7 +214,8 @@ TEST(FitScale, IsWhatTouchesOfTheirOwnObjectShow) {
 }
 
 TEST(FitScale, OfOneTouchIsThatOfTouchesWhereTheyFitBest) {
-  const FitScale scale{.mean = 1.0, .sd = 2.0, .shared_sd = 1.0, .alone = SingleFitScale{1.5, 0.5}};
+  const FitScale scale{
+      .mean = 1.0, .sd = 2.0, .shared_sd = 1.0, .single_touch = SingleFitScale{1.5, 0.5}};
   EXPECT_EQ(scale.of({.z = 0.5}, 1).z, -2.0);
   // What the search for the pose gained is shared by more and more deviations.
   EXPECT_DOUBLE_EQ(scale.of({.z = 2.0 + 0.5 / 2.0}, 4).z, 0.0);
@@ -225,11 +226,11 @@ TEST(FitScale, GoesByTheNumberAndTheSpacingOfElements) {
   const FitScale scale{.mean = 1.0,
                        .sd = 2.0,
                        .shared_sd = 0.5,
-                       .alone = SingleFitScale{1.5, 0.5},
+                       .single_touch = SingleFitScale{1.5, 0.5},
                        .array = FitArray{.elements = 36.0, .spacing_mm = 2.0}};
   const FitScale dense = scale.for_array({.elements = 4.0 * 36.0, .spacing_mm = 1.0});
   EXPECT_EQ(std::tie(dense.mean, dense.sd, dense.shared_sd), std::tuple(2.0, 4.0, 1.0));
-  EXPECT_EQ(std::tie(dense.alone->mean, dense.alone->sd), std::tuple(3.0, 1.0));
+  EXPECT_EQ(std::tie(dense.single_touch->mean, dense.single_touch->sd), std::tuple(3.0, 1.0));
   const FitScale sparse = scale.for_array({.elements = 9.0, .spacing_mm = 4.0});
   EXPECT_EQ(std::tie(sparse.mean, sparse.sd), std::tuple(0.5, 2.0)) << "share no less";
   EXPECT_EQ(FitScale{.mean = 3.0}.for_array({.elements = 9.0, .spacing_mm = 4.0}).mean, 3.0)

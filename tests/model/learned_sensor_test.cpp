@@ -32,16 +32,16 @@ OccupancyGrid sparse_map(int nx, int ny, double share, unsigned seed) {
 }
 
 TEST(ReadingLayer, HoldsTheDefinitionInEveryCell) {
-  const ReadingLayer how{.near_mm = 1.6, .far_mm = 4.1};
+  const ReadingLayer settings{.near_mm = 1.6, .far_mm = 4.1};
   for (unsigned seed = 0; seed < 20; ++seed) {
     const OccupancyGrid map =
         sparse_map(3 + static_cast<int>(seed), 11, seed % 2 == 0 ? 0.05 : 0.4, seed);
-    const OccupancyGrid layer = reading_layer(map, how);
+    const OccupancyGrid layer = reading_layer(map, settings);
     EXPECT_EQ(layer.cell_mm, map.cell_mm);
     EXPECT_NEAR(layer.prior_log_odds(), ReadingLayer::beyond, 1e-9);
     const int border = (layer.nx - map.nx) / 2;
     EXPECT_EQ(layer.ny, map.ny + 2 * border);
-    EXPECT_GE(border * map.cell_mm, how.far_mm);
+    EXPECT_GE(border * map.cell_mm, settings.far_mm);
     EXPECT_EQ(layer.centre_mm(border, border), map.centre_mm(0, 0));
     for (int j = 0; j < layer.ny; ++j) {
       for (int i = 0; i < layer.nx; ++i) {
@@ -62,8 +62,9 @@ TEST(ReadingLayer, HoldsTheDefinitionInEveryCell) {
             }
           }
         }
-        if (nearest > 0.0 && nearest <= how.far_mm) {
-          value = nearest <= how.near_mm ? (occupied ? -15.0 : -10.0) : (occupied ? -14.0 : -11.0);
+        if (nearest > 0.0 && nearest <= settings.far_mm) {
+          value =
+              nearest <= settings.near_mm ? (occupied ? -15.0 : -10.0) : (occupied ? -14.0 : -11.0);
         }
         if (!tie) {
           ASSERT_NEAR(layer.at(i, j), value, 1e-6) << seed << ": " << i << ", " << j;
@@ -98,9 +99,9 @@ TEST(ReadingLayer, TakesThePriorForUnseenWhereNothingWasCounted) {
 
 TEST(ReadingLayer, RefusesWhatCannotBe) {
   OccupancyGrid map = sparse_map(5, 5, 0.5, 3);
-  for (const ReadingLayer& how :
+  for (const ReadingLayer& settings :
        {ReadingLayer{.near_mm = 5.0, .far_mm = 4.0}, {.unit_level = 0.0}, {.far_mm = 1e6}}) {
-    input_error([&] { reading_layer(map, how); });
+    input_error([&] { reading_layer(map, settings); });
   }
   map.mean_level.clear();
   expect_named(input_error([&] { reading_layer(map, {.of = MapLayer::mean_level}); }), {"'A'"});

@@ -267,7 +267,7 @@ TEST(StrangerDensity, SumsToTheSameWhateverTheSpread) {
 TEST(Misfit, OfOneTouchIsByWhatStrangersAreLike) {
   const Fit bad{.z = -6.0};
   EXPECT_EQ(misfit_nats(bad, 1, {}), 0.0) << "one touch of a stranger fits as well";
-  const FitScale scale{.stranger_sd = 3.0, .stranger_alone = SingleFitScale{-6.0, 2.0}};
+  const FitScale scale{.stranger_sd = 3.0, .stranger_single_touch = SingleFitScale{-6.0, 2.0}};
   EXPECT_GT(misfit_nats(bad, 1, scale), 2.0);
   EXPECT_LT(misfit_nats({.z = 0.0}, 1, scale), -2.0);
   EXPECT_EQ(misfit_nats(bad, 2, scale), misfit_nats(bad, 2, {.stranger_sd = 3.0}));

@@ -58,8 +58,8 @@ std::size_t most_at_once(const RecognitionTask& task, std::size_t threads) {
   }
   // A device that has few bins waits for the host, unless another thread gives it work meanwhile.
   constexpr std::int64_t filling_bins = 4'000'000;
-  constexpr std::int64_t most = 16;
-  const auto together = std::clamp<std::int64_t>(filling_bins / task.bins_in_all(), 1, most);
+  constexpr std::int64_t limit = 16;
+  const auto together = std::clamp<std::int64_t>(filling_bins / task.bins_in_all(), 1, limit);
   return std::min(threads, static_cast<std::size_t>(together));
 }
 

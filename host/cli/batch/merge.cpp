@@ -9,7 +9,6 @@
 #include "cli/options.hpp"
 #include "cli/results_folder.hpp"
 #include "io/atomic_file.hpp"
-#include "io/file_identity.hpp"
 #include "io/input_file.hpp"
 #include "recognition/batch/batch_task.hpp"
 
@@ -25,14 +24,14 @@ struct MergeArguments {
 
 /// The unknowns of the chunks that are not there: "100 to 199, 300 to 349", shortened.
 std::string missing_unknowns(const std::vector<std::size_t>& there, const BatchTask& task) {
-  constexpr std::size_t most = 3;
+  constexpr std::size_t limit = 3;
   std::string text;
   std::size_t ranges = 0;
   std::size_t begin = 0;
   for (std::size_t i = 0; i <= there.size(); ++i) {
     const std::size_t end = i < there.size() ? there[i] : task.chunks();
     if (begin < end) {
-      if (ranges++ == most) {
+      if (ranges++ == limit) {
         return text + ", and more";
       }
       text += fmt::format("{}{} to {}", text.empty() ? "" : ", ", begin * task.chunk_unknowns,

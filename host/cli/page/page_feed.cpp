@@ -18,10 +18,10 @@ void PageFeed::set(const std::string& name, std::string data) {
 }
 
 void PageFeed::add(const std::string& name, std::string data) {
-  constexpr std::ptrdiff_t most = 1000;
+  constexpr std::ptrdiff_t limit = 1000;
   {
     const std::lock_guard lock(mutex_);
-    if (std::ranges::count(events_, name, &PageEvent::name) >= most) {
+    if (std::ranges::count(events_, name, &PageEvent::name) >= limit) {
       events_.erase(std::ranges::find(events_, name, &PageEvent::name));
     }
     put(name, std::move(data));

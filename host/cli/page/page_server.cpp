@@ -158,8 +158,8 @@ class LimitedStream : public httplib::Stream {
 /// all file descriptors of the program.
 class Connections : public httplib::ThreadPool {
  public:
-  Connections(int threads, int most)
-      : httplib::ThreadPool(static_cast<std::size_t>(threads)), room_(most) {}
+  Connections(int threads, int limit)
+      : httplib::ThreadPool(static_cast<std::size_t>(threads)), room_(limit) {}
 
   void enqueue(std::function<void()> serve) override {
     room_.acquire();
@@ -362,15 +362,16 @@ std::string PageServer::url() const {
 
 std::string PageServer::words() const {
   const std::string& host = impl_->address.host;
-  const bool alone = host.starts_with("127.") || host == "::1" || host == "localhost";
+  const bool this_host_only = host.starts_with("127.") || host == "::1" || host == "localhost";
   return "the page is at " + url() +
-         (alone ? std::getenv("SSH_CONNECTION") == nullptr
-                      ? ""
-                      : fmt::format("; from the machine before you, reach it through ssh -L "
-                                    "{0}:127.0.0.1:{0}",
-                                    impl_->port)
-                : ", for everybody who can reach this machine: what the array feels, and the "
-                  "buttons");
+         (this_host_only
+              ? std::getenv("SSH_CONNECTION") == nullptr
+                    ? ""
+                    : fmt::format("; from the machine before you, reach it through ssh -L "
+                                  "{0}:127.0.0.1:{0}",
+                                  impl_->port)
+              : ", for everybody who can reach this machine: what the array feels, and the "
+                "buttons");
 }
 
 }  // namespace palpate::cli

@@ -31,7 +31,7 @@ class ViewedFile {
   virtual ~ViewedFile() = default;
 
   virtual const char* kind() const = 0;
-  virtual Json whole() const = 0;
+  virtual Json overview() const = 0;
   /// A part by its name and number; null where there is none.
   virtual Json part(const std::string& name, std::size_t index) const = 0;
 
@@ -91,7 +91,7 @@ class ViewedRecording : public ViewedFile {
 
   const char* kind() const override { return "recording"; }
 
-  Json whole() const override {
+  Json overview() const override {
     const std::vector<std::uint8_t>& valid = recording_.valid;
     Json json{{"rows", recording_.rows},
               {"count", recording_.size()},
@@ -141,7 +141,7 @@ class ViewedMap : public ViewedFile {
   explicit ViewedMap(const fs::path& file) : ViewedFile(file), map_(read_map(file)) {}
 
   const char* kind() const override { return "map"; }
-  Json whole() const override { return map_json(map_); }
+  Json overview() const override { return map_json(map_); }
   Json part(const std::string& /*name*/, std::size_t /*index*/) const override { return nullptr; }
 
  private:
@@ -192,7 +192,7 @@ class ViewedRecords : public ViewedFile {
   }
 
   const char* kind() const override { return "records"; }
-  Json whole() const override { return {{"rows", rows_}}; }
+  Json overview() const override { return {{"rows", rows_}}; }
 
   Json part(const std::string& name, std::size_t index) const override {
     if (index >= records_.size()) {
@@ -313,7 +313,7 @@ std::optional<std::string> ViewedFiles::get(const std::string& path) const {
     return part.is_null() ? std::nullopt : std::optional(text_of(part));
   }
   Json json{{"kind", file.kind()}};
-  json.update(file.whole());
+  json.update(file.overview());
   return text_of(json);
 }
 

@@ -8,7 +8,7 @@
 
 #include "estimation/bounded/bounded_belief.hpp"
 #include "estimation/bounded/search_memory.hpp"
-#include "estimation/displacement_check.hpp"
+#include "estimation/displacement_weights.hpp"
 #include "estimation/hypotheses.hpp"
 #include "estimation/lattice/expected_gain.hpp"
 #include "estimation/lattice/refinement.hpp"
@@ -106,14 +106,9 @@ struct BoundedPosterior::Impl {
 
 BoundedPosterior::BoundedPosterior(std::span<const Hypothesis> hypotheses,
                                    const BoundedOptions& options)
-    : impl_(std::make_unique<Impl>(hypotheses, checked(options, hypotheses))) {}
+    : impl_(new Impl(hypotheses, checked(options, hypotheses))) {}
 
-BoundedPosterior::~BoundedPosterior() { replace_held(impl_); }
-BoundedPosterior::BoundedPosterior(BoundedPosterior&&) noexcept = default;
-BoundedPosterior& BoundedPosterior::operator=(BoundedPosterior&& other) noexcept {
-  replace_held(impl_, std::move(other.impl_));
-  return *this;
-}
+void BoundedPosterior::Deleter::operator()(Impl* impl) const { delete_here(impl); }
 
 BoundedPosterior::Impl& BoundedPosterior::impl() const {
   return held_here(impl_, "bounded posterior");

@@ -84,8 +84,8 @@ class PlaneDivision::PenaltySum {
   double sum_ = 0.0;
 };
 
-OverlapPlane::Bins PlaneDivision::Plane::in_row(const BinBox& box, int y) const {
-  const OverlapPlane::Bins& row = rows[static_cast<std::size_t>(y)];
+RowBins PlaneDivision::Plane::in_row(const BinBox& box, int y) const {
+  const RowBins& row = rows[static_cast<std::size_t>(y)];
   const int first = std::max(box.x_first, row.first);
   return {first, std::max(0, std::min(box.x_first + box.x_count, row.first + row.count) - first)};
 }
@@ -170,10 +170,9 @@ PlaneDivision::Plane PlaneDivision::plane(int theta) const {
   Plane plane{.theta = theta};
   plane.rows.resize(static_cast<std::size_t>(task_.lattice.y_mm.count));
   if (task_.everywhere) {
-    std::ranges::fill(plane.rows, OverlapPlane::Bins{0, task_.lattice.x_mm.count});
+    std::ranges::fill(plane.rows, RowBins{0, task_.lattice.x_mm.count});
   } else {
-    OverlapPlane(task_.array, task_.space.boxes[object_], task_.lattice, theta)
-        .find_rows(plane.rows);
+    find_overlap(task_.array, task_.space.boxes[object_], task_.lattice, theta, plane.rows);
   }
   BinBox& around = plane.around;
   plane.bins = count_bins(plane.rows, around);

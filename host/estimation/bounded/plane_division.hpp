@@ -64,15 +64,15 @@ class PlaneDivision {
   /// A plane's bins that count in the mean, and the largest tiles that are looked at.
   struct Plane {
     int theta = 0;
-    std::vector<OverlapPlane::Bins> rows;  ///< [y] bins that count
-    BinBox around;                         ///< a box around all rows
-    std::int64_t bins = 0;                 ///< number of bins that count
+    std::vector<RowBins> rows;  ///< [y] bins that count
+    BinBox around;              ///< a box around all rows
+    std::int64_t bins = 0;      ///< number of bins that count
     /// Whole batches, about those that see the map and hold bins that count.
     TileRange largest;
     bool all_seen = true;  ///< the largest tiles hold all bins that count
 
     /// The bins of a box's row that count.
-    OverlapPlane::Bins in_row(const BinBox& box, int y) const;
+    RowBins in_row(const BinBox& box, int y) const;
     /// The number of bins of the box that count.
     std::int64_t count_in(const BinBox& box) const;
   };
@@ -105,10 +105,10 @@ class PlaneDivision {
   std::size_t object_;
   const TileBounds& bounds_;
   std::span<const TileLevel> levels_;
-  std::span<const double> unpenalised_;         ///< [level]
-  std::vector<Placed> placed_;                  ///< [level]
-  std::vector<BinBox> boxes_;                   ///< to be evaluated
-  std::vector<OverlapPlane::Bins> boxes_rows_;  ///< [box, row] bins that count
+  std::span<const double> unpenalised_;  ///< [level]
+  std::vector<Placed> placed_;           ///< [level]
+  std::vector<BinBox> boxes_;            ///< to be evaluated
+  std::vector<RowBins> boxes_rows_;      ///< [box, row] bins that count
 };
 
 }  // namespace palpate

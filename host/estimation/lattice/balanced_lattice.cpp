@@ -42,12 +42,12 @@ double lever_mm(const OccupancyGrid& map, const PoseLattice& region) {
 
 /// How much wider the steps may be where touches are displaced and objects slip, by standard
 /// deviations of the same unit as the step.
-double widening(double touch_sd, double slip_sd, double step) {
+double step_factor(double touch_sd, double slip_sd, double step) {
   // docs/refinement.md holds the measurements behind these numbers.
   constexpr double of_touch_sd = 0.5;
   constexpr double of_slip_sd = 1.25;
-  constexpr double most = 2.5;
-  return std::clamp(std::max(of_touch_sd * touch_sd, of_slip_sd * slip_sd) / step, 1.0, most);
+  constexpr double limit = 2.5;
+  return std::clamp(std::max(of_touch_sd * touch_sd, of_slip_sd * slip_sd) / step, 1.0, limit);
 }
 
 double count_of(double extent, double step) { return std::max(1.0, std::ceil(extent / step)); }
@@ -70,14 +70,14 @@ BalancedLattice balanced_lattice(const PoseLattice& region, std::span<const Hypo
     longest_mm = std::max(longest_mm, lever_mm(hypothesis.map, region));
   }
   const bool may_widen = width != BinWidth::fine;
-  const double wider = may_widen ? widening(touch_sd.mm, slip_sd.mm, wanted_mm) : 1.0;
-  const double wider_turns =
-      may_widen ? widening(touch_sd.rad * longest_mm, slip_sd.rad * longest_mm, wanted_mm) : 1.0;
+  const double xy_factor = may_widen ? step_factor(touch_sd.mm, slip_sd.mm, wanted_mm) : 1.0;
+  const double theta_factor =
+      may_widen ? step_factor(touch_sd.rad * longest_mm, slip_sd.rad * longest_mm, wanted_mm) : 1.0;
   // Shorter by as much as their steps are wider.
   const double extents_mm[] = {
-      (lattice.x_mm.upper - lattice.x_mm.lower) / wider,
-      (lattice.y_mm.upper - lattice.y_mm.lower) / wider,
-      (lattice.theta_rad.upper - lattice.theta_rad.lower) * longest_mm / wider_turns};
+      (lattice.x_mm.upper - lattice.x_mm.lower) / xy_factor,
+      (lattice.y_mm.upper - lattice.y_mm.lower) / xy_factor,
+      (lattice.theta_rad.upper - lattice.theta_rad.lower) * longest_mm / theta_factor};
   const auto bins = [&](double step_mm) {
     double product = static_cast<double>(hypotheses.size());
     for (const double extent_mm : extents_mm) {
@@ -86,21 +86,21 @@ BalancedLattice balanced_lattice(const PoseLattice& region, std::span<const Hypo
     return product;
   };
   // Counts are ints.
-  const auto most =
+  const auto limit =
       static_cast<double>(std::min<std::int64_t>(most_bins, std::numeric_limits<int>::max()));
   double step_mm = wanted_mm;
   // Axes that are down to one bin give no more, so the cube root may fall short.
-  for (double fewer = bins(step_mm); fewer > most; fewer = bins(step_mm)) {
+  for (double fewer = bins(step_mm); fewer > limit; fewer = bins(step_mm)) {
     if (fewer == static_cast<double>(hypotheses.size())) {
       throw Error(Fault::input, fmt::format("{} objects: a bin for each is more than {}; use fewer",
                                             hypotheses.size(), most_bins));
     }
-    step_mm *= std::clamp(std::cbrt(fewer / most), 1.01, 1e3);
+    step_mm *= std::clamp(std::cbrt(fewer / limit), 1.01, 1e3);
   }
   lattice.x_mm.count = static_cast<int>(count_of(extents_mm[0], step_mm));
   lattice.y_mm.count = static_cast<int>(count_of(extents_mm[1], step_mm));
   lattice.theta_rad.count = static_cast<int>(count_of(extents_mm[2], step_mm));
-  return {.lattice = lattice, .step_mm = step_mm * wider, .coarsened = step_mm > wanted_mm};
+  return {.lattice = lattice, .step_mm = step_mm * xy_factor, .coarsened = step_mm > wanted_mm};
 }
 
 TouchRegion touch_region(std::span<const Hypothesis> hypotheses, double reach_mm) {
@@ -119,11 +119,11 @@ TouchRegion touch_region(std::span<const Hypothesis> hypotheses, double reach_mm
   }
   const glm::dvec2 reach(reach_mm);
   const glm::dvec2 together = all.extent() + 2.0 * reach;
-  const glm::dvec2 alone = largest_mm + 2.0 * reach;
+  const glm::dvec2 apart_mm = largest_mm + 2.0 * reach;
   TouchRegion region{.lattice = {.x_mm = {all.lower.x - reach_mm, all.upper.x + reach_mm, 1},
                                  .y_mm = {all.lower.y - reach_mm, all.upper.y + reach_mm, 1},
                                  .theta_rad = {0.0, 2.0 * std::numbers::pi, 1}},
-                     .excess = together.x * together.y / (alone.x * alone.y)};
+                     .excess = together.x * together.y / (apart_mm.x * apart_mm.y)};
   region.lattice.validate();
   return region;
 }

@@ -1,4 +1,4 @@
-#include "estimation/lattice/body_window.hpp"
+#include "estimation/lattice/refinement.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -48,8 +48,8 @@ Range bins_within(int centre, double first, double last, const Axis& axis) {
     return {0, 1};
   }
   constexpr double rounding = 1e-6;
-  const double most = axis.count;
-  const auto steps = [&](double distance) { return std::clamp(distance, -most, most); };
+  const double limit = axis.count;
+  const auto steps = [&](double distance) { return std::clamp(distance, -limit, limit); };
   return clipped(centre + static_cast<int>(std::ceil(steps(first / axis.step()) - rounding)),
                  centre + static_cast<int>(std::floor(steps(last / axis.step()) + rounding)), axis);
 }

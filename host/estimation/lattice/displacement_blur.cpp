@@ -50,11 +50,11 @@ std::vector<float> with_logs(std::span<const double> weights) {
 /// Where a slip takes the belief of a bin from as theta grows by k steps: g + R(alpha) (t - g),
 /// [object, k].
 /// @param centroids_mm g of every object, in its frame
-std::vector<shaders::Turn> slip_turns(const PoseLattice& lattice,
-                                      std::span<const glm::dvec2> centroids_mm, int steps) {
+std::vector<shaders::TurnedPlane> slip_turns(const PoseLattice& lattice,
+                                             std::span<const glm::dvec2> centroids_mm, int steps) {
   const Axis& x = lattice.x_mm;
   const Axis& y = lattice.y_mm;
-  std::vector<shaders::Turn> turns;
+  std::vector<shaders::TurnedPlane> turns;
   for (const glm::dvec2& centroid : centroids_mm) {
     const glm::dvec2 first_mm = glm::dvec2(x.centre(0), y.centre(0)) - centroid;
     for (int k = -steps; k <= steps; ++k) {
@@ -62,7 +62,7 @@ std::vector<shaders::Turn> slip_turns(const PoseLattice& lattice,
       // R(alpha) - 1, applied to the first bin and to one bin more along each axis.
       const double c = -2.0 * std::sin(alpha / 2.0) * std::sin(alpha / 2.0);
       const double s = std::sin(alpha);
-      shaders::Turn turn{};
+      shaders::TurnedPlane turn{};
       set_shift(c * first_mm.x - s * first_mm.y, x, turn.whole_x, turn.fraction_x,
                 turn.fraction_x_low);
       set_shift(s * first_mm.x + c * first_mm.y, y, turn.whole_y, turn.fraction_y,
@@ -96,14 +96,14 @@ std::uint64_t turns_of(const PoseLattice& lattice, std::size_t objects, int step
 /// Throws Error where no buffer holds as many turns.
 gpu::Buffer turn_buffer(gpu::Context& context, std::uint64_t turns) {
   const gpu::Limits& limits = context.limits();
-  const std::uint64_t bytes = turns * sizeof(shaders::Turn);
+  const std::uint64_t bytes = turns * sizeof(shaders::TurnedPlane);
   const VkFormat texel = gpu::table_where_it_fits(limits, bytes, VK_FORMAT_R32G32B32A32_SFLOAT);
   if (texel == VK_FORMAT_UNDEFINED && bytes > limits.storage_range) {
     throw Error(
         Fault::input,
         fmt::format("a standard deviation of theta asks for {} turns, more than the {} that "
                     "device '{}' reads in one buffer; use fewer bins",
-                    turns, limits.storage_range / sizeof(shaders::Turn), context.name()));
+                    turns, limits.storage_range / sizeof(shaders::TurnedPlane), context.name()));
   }
   return {context, bytes, gpu::Memory::device, "turns of a blur", texel};
 }
@@ -271,7 +271,7 @@ void DisplacementBlur::turn_for(const glm::dvec2& sensor_from_pivot_mm) {
   for (int theta = 0; theta < thetas; ++theta) {
     weights_.find_taps(theta, sensor_from_pivot_mm, taps_);
     for (const Tap& tap : taps_) {
-      shaders::Turn& turn =
+      shaders::TurnedPlane& turn =
           host_turns_[static_cast<std::size_t>(theta) * turns + tap.steps + steps];
       turn.whole_x = static_cast<float>(tap.bins.x);
       turn.whole_y = static_cast<float>(tap.bins.y);

@@ -89,7 +89,7 @@ class DisplacementBlur {
   gpu::Buffer plane_max_;   ///< [object, theta], then weights of theta and their logarithms
   gpu::Buffer references_;  ///< [object]
   /// What goes to turns_: of a touch [theta, k], of a slip [object, k].
-  std::vector<shaders::Turn> host_turns_;
+  std::vector<shaders::TurnedPlane> host_turns_;
   std::vector<Tap> taps_;  ///< of a theta; kept, so that a touch allocates nothing
 };
 

@@ -8,7 +8,7 @@
 
 #include "estimation/bin_belief.hpp"
 #include "estimation/change_in_steps.hpp"
-#include "estimation/displacement_check.hpp"
+#include "estimation/displacement_weights.hpp"
 #include "estimation/hypotheses.hpp"
 #include "estimation/known_elements.hpp"
 #include "estimation/lattice/dense_belief.hpp"
@@ -160,12 +160,12 @@ struct PoseHistogram::Impl {
   /// Eq. 15-16: the bin of the largest posterior probability; of equal bins the first object's.
   Mode mode() {
     Mode mode;
-    double most = -std::numeric_limits<double>::infinity();
+    double largest = -std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < log_weight.size(); ++i) {
       const BeliefSummary& summary = summaries()[i];
       const double log_likelihood = summary.max.value() + lost_mass(i);
-      if (log_weight[i] + log_likelihood > most) {
-        most = log_weight[i] + log_likelihood;
+      if (log_weight[i] + log_likelihood > largest) {
+        largest = log_weight[i] + log_likelihood;
         mode = {.object = static_cast<int>(i),
                 .bin = summary.arg_max,
                 .T_object_robot = options.lattice.T_object_robot(summary.arg_max),
@@ -216,19 +216,14 @@ PoseHistogram::PoseHistogram(Device& device, std::span<const Hypothesis> hypothe
                                           *checked.none_weight));
   }
   require_room(device.context(), checked, hypotheses.size());
-  impl_ = std::make_unique<Impl>(device, hypotheses, checked);
+  impl_.reset(new Impl(device, hypotheses, checked));
 }
 
-PoseHistogram::~PoseHistogram() { replace_held(impl_); }
-PoseHistogram::PoseHistogram(PoseHistogram&&) noexcept = default;
-PoseHistogram& PoseHistogram::operator=(PoseHistogram&& other) noexcept {
-  replace_held(impl_, std::move(other.impl_));
-  return *this;
-}
+void PoseHistogram::Deleter::operator()(Impl* impl) const { delete_here(impl); }
 
 PoseHistogram::Impl& PoseHistogram::impl() const { return held_here(impl_, "histogram"); }
 
-PoseHistogram::Impl& PoseHistogram::whole() const {
+PoseHistogram::Impl& PoseHistogram::unbroken() const {
   Impl& held = impl();
   held.change.refuse();
   return held;
@@ -251,7 +246,7 @@ void PoseHistogram::reset() {
 }
 
 void PoseHistogram::move_pivot(const glm::dvec2& pivot_mm) {
-  Impl& histogram = whole();
+  Impl& histogram = unbroken();
   histogram.options.lattice =
       with_pivot(histogram.options.lattice, pivot_mm, "histogram", histogram.touched);
 }
@@ -259,16 +254,16 @@ void PoseHistogram::move_pivot(const glm::dvec2& pivot_mm) {
 void PoseHistogram::update(std::span<const Touch> touches,
                            const std::function<void(double)>& progress) {
   // All touches are classified before the first is added: one that is not sound refuses all.
-  update(evidence_of(touches, whole().options.contact, impl_->classified), progress);
+  update(evidence_of(touches, unbroken().options.contact, impl_->classified), progress);
 }
 
 void PoseHistogram::update(std::span<const TouchEvidence> touches,
                            const std::function<void(double)>& progress) {
-  whole().update(touches, progress);
+  unbroken().update(touches, progress);
 }
 
 Estimate PoseHistogram::estimate() const {
-  Impl& histogram = whole();
+  Impl& histogram = unbroken();
   Estimate estimate{.identity = histogram.identity(),
                     .log_evidence = histogram.log_evidence(),
                     .mode = histogram.mode(),
@@ -282,7 +277,7 @@ Estimate PoseHistogram::estimate() const {
 }
 
 RefinedPose PoseHistogram::refine(const Mode& mode) const {
-  Impl& histogram = whole();
+  Impl& histogram = unbroken();
   require_object(mode.object, histogram.bodies.size());
   return palpate::refine(
       [&](std::span<const BinBox> boxes) { return histogram.belief.download(boxes); }, lattice(),
@@ -290,16 +285,16 @@ RefinedPose PoseHistogram::refine(const Mode& mode) const {
 }
 
 Marginals PoseHistogram::marginals(int object) const {
-  return whole().bins().marginals(object, lattice());
+  return unbroken().bins().marginals(object, lattice());
 }
 
 std::vector<std::vector<BinShare>> PoseHistogram::likely_bins(std::span<const int> objects,
                                                               double least_share) const {
-  return whole().bins().likely_bins(objects, least_share);
+  return unbroken().bins().likely_bins(objects, least_share);
 }
 
 std::vector<double> PoseHistogram::log_likelihood(int object) const {
-  Impl& histogram = whole();
+  Impl& histogram = unbroken();
   require_object(object, histogram.bodies.size());
   std::vector<BinBox> all;
   for (int theta = 0; theta < lattice().theta_rad.count; ++theta) {
@@ -314,16 +309,16 @@ std::vector<double> PoseHistogram::log_likelihood(int object) const {
   return logs;
 }
 
-double PoseHistogram::entropy() const { return whole().bins().entropy(); }
+double PoseHistogram::entropy() const { return unbroken().bins().entropy(); }
 
 std::vector<PoseSample> PoseHistogram::sample(std::size_t count, std::uint64_t seed) const {
-  return whole().bins().sample(count, seed);
+  return unbroken().bins().sample(count, seed);
 }
 
 std::vector<TouchGain> PoseHistogram::expected_gain(std::span<const Pose> T_robot_sensor,
                                                     std::span<const glm::dvec2> elements_mm,
                                                     const PlanOptions& plan) const {
-  Impl& histogram = whole();
+  Impl& histogram = unbroken();
   require_plan(T_robot_sensor, elements_mm, plan, histogram.log_weight.size());
   std::vector<PoseSample> samples = sample(plan.samples, plan.seed);
   if (histogram.touched) {  // the object slips between touches, not before the first

@@ -246,13 +246,13 @@ void EvidenceGrid::add(std::span<const ElementReading> readings, double radius_m
     const gpu::Buffer tiles = stream_.uploaded(lists.tiles, "map tiles");
     const gpu::Buffer list =
         stream_.uploaded(lists.readings, "readings per map tile", VK_FORMAT_R32G32B32A32_SFLOAT);
-    const std::size_t most = context_.limits().group_count[0];
-    for (std::size_t tile = 0; tile < lists.tiles.size(); tile += most) {
+    const std::size_t limit = context_.limits().group_count[0];
+    for (std::size_t tile = 0; tile < lists.tiles.size(); tile += limit) {
       const shaders::EvidencePush push{.tile_first = static_cast<shaders::uint>(tile),
                                        .width = static_cast<shaders::uint>(range_.nx),
                                        .height = static_cast<shaders::uint>(range_.ny),
                                        .cell_mm = static_cast<float>(cell_mm_)};
-      const auto groups = static_cast<std::uint32_t>(std::min(most, lists.tiles.size() - tile));
+      const auto groups = static_cast<std::uint32_t>(std::min(limit, lists.tiles.size() - tile));
       stream_.dispatch(kernel_, {&tiles, &list, &cells_}, push, {groups, 1, 1});
     }
     stream_.run();
@@ -321,15 +321,10 @@ struct MapBuilder::Impl {
 
 MapBuilder::MapBuilder(Device& device, const MapOptions& options) {
   options.validate();
-  impl_ = std::make_unique<Impl>(device, options);
+  impl_.reset(new Impl(device, options));
 }
 
-MapBuilder::~MapBuilder() { replace_held(impl_); }
-MapBuilder::MapBuilder(MapBuilder&&) noexcept = default;
-MapBuilder& MapBuilder::operator=(MapBuilder&& other) noexcept {
-  replace_held(impl_, std::move(other.impl_));
-  return *this;
-}
+void MapBuilder::Deleter::operator()(Impl* impl) const { delete_here(impl); }
 
 MapBuilder::Impl& MapBuilder::impl() const { return held_here(impl_, "map builder"); }
 

@@ -57,13 +57,13 @@ void require_room(const ParticleOptions& options, const gpu::Context& context) {
   // Two generations, log weights in two floats and their running sums.
   constexpr VkDeviceSize bytes = 2 * sizeof(shaders::Particle) + sizeof(TwoFloat) + sizeof(float);
   const gpu::Limits& limits = context.limits();
-  const VkDeviceSize most =
+  const VkDeviceSize limit =
       std::min({VkDeviceSize{limits.table_texels} * shaders::WEIGHT_BLOCK,  // sums of blocks
                 std::min(limits.storage_range, limits.allocation) / sizeof(shaders::Particle),
                 limits.memory / bytes});
-  if (static_cast<VkDeviceSize>(options.particles) > most) {
+  if (static_cast<VkDeviceSize>(options.particles) > limit) {
     throw Error(Fault::input, fmt::format("particles = {}: device '{}' takes at most {}; use fewer",
-                                          options.particles, context.name(), most));
+                                          options.particles, context.name(), limit));
   }
 }
 
@@ -223,18 +223,19 @@ struct ParticleFilter::Impl {
   /// tell from 0; -infinity where an object has no particle.
   std::vector<double> log_sums(const Weighed& found) const {
     constexpr double nothing = -std::numeric_limits<double>::infinity();
-    std::vector<double> most(objects, nothing);
+    std::vector<double> largest(objects, nothing);
     for (std::size_t i = 0; i < found.states.size(); ++i) {
-      double& of_object = most[found.states[i].object];
+      double& of_object = largest[found.states[i].object];
       of_object = std::max(of_object, found.log_weights[i]);
     }
     std::vector<double> logs(objects);
     for (std::size_t i = 0; i < found.states.size(); ++i) {
       const shaders::uint object = found.states[i].object;
-      logs[object] += std::exp(found.log_weights[i] - most[object]);
+      logs[object] += std::exp(found.log_weights[i] - largest[object]);
     }
     for (std::size_t object = 0; object < objects; ++object) {
-      logs[object] = most[object] == nothing ? nothing : most[object] + std::log(logs[object]);
+      logs[object] =
+          largest[object] == nothing ? nothing : largest[object] + std::log(logs[object]);
     }
     return logs;
   }
@@ -290,19 +291,14 @@ ParticleFilter::ParticleFilter(Device& device, std::span<const Hypothesis> hypot
   checked.contact = resolve(options.contact, hypotheses);
   validate(checked);
   require_room(checked, device.context());
-  impl_ = std::make_unique<Impl>(device, hypotheses, checked);
+  impl_.reset(new Impl(device, hypotheses, checked));
 }
 
-ParticleFilter::~ParticleFilter() { replace_held(impl_); }
-ParticleFilter::ParticleFilter(ParticleFilter&&) noexcept = default;
-ParticleFilter& ParticleFilter::operator=(ParticleFilter&& other) noexcept {
-  replace_held(impl_, std::move(other.impl_));
-  return *this;
-}
+void ParticleFilter::Deleter::operator()(Impl* impl) const { delete_here(impl); }
 
 ParticleFilter::Impl& ParticleFilter::impl() const { return held_here(impl_, "particle filter"); }
 
-ParticleFilter::Impl& ParticleFilter::whole() const {
+ParticleFilter::Impl& ParticleFilter::unbroken() const {
   Impl& held = impl();
   held.change.refuse();
   return held;
@@ -311,7 +307,7 @@ ParticleFilter::Impl& ParticleFilter::whole() const {
 void ParticleFilter::reset() { impl().start(); }
 
 void ParticleFilter::move_pivot(const glm::dvec2& pivot_mm) {
-  Impl& filter = whole();
+  Impl& filter = unbroken();
   // Particles are kept about the region's centre, wherever the region lies.
   filter.options.region =
       with_pivot(filter.options.region, pivot_mm, "particle filter", filter.touch > 0);
@@ -319,14 +315,14 @@ void ParticleFilter::move_pivot(const glm::dvec2& pivot_mm) {
 
 void ParticleFilter::update(std::span<const Touch> touches,
                             const std::function<void(double)>& progress) {
-  Impl& filter = whole();
+  Impl& filter = unbroken();
   // All of them before the first is taken in, for one that is not sound refuses all.
   update(evidence_of(touches, filter.options.contact, filter.classified), progress);
 }
 
 void ParticleFilter::update(std::span<const TouchEvidence> touches,
                             const std::function<void(double)>& progress) {
-  Impl& filter = whole();
+  Impl& filter = unbroken();
   filter.change.change([&] {
     for (std::size_t i = 0; i < touches.size(); ++i) {
       filter.update(touches[i]);
@@ -338,7 +334,7 @@ void ParticleFilter::update(std::span<const TouchEvidence> touches,
 }
 
 Estimate ParticleFilter::estimate() const {
-  Impl& filter = whole();
+  Impl& filter = unbroken();
   const Impl::Weighed weighed = filter.download();
   Estimate estimate{.identity = std::vector<double>(filter.objects),
                     .log_evidence = filter.log_sums(weighed),
@@ -356,14 +352,14 @@ Estimate ParticleFilter::estimate() const {
 }
 
 double ParticleFilter::effective_sample_size() const {
-  Impl& filter = whole();
+  Impl& filter = unbroken();
   // Rounding of the device's sums could leave the range.
   return std::clamp(filter.summary.effective_sample_size(), 1.0,
                     static_cast<double>(filter.size()));
 }
 
 std::vector<ParticleFilter::Particle> ParticleFilter::particles() const {
-  Impl& filter = whole();
+  Impl& filter = unbroken();
   const Impl::Weighed weighed = filter.download();
   std::vector<Particle> particles;
   for (std::size_t i = 0; i < weighed.states.size(); ++i) {

@@ -227,8 +227,8 @@ struct Largest {
           sums[k] += densities[unit * points + k];
         }
       }
-      if (const auto most = std::ranges::max_element(sums); *most > density) {
-        *this = {*most, first + i, static_cast<int>(most - sums.begin())};
+      if (const auto highest = std::ranges::max_element(sums); *highest > density) {
+        *this = {*highest, first + i, static_cast<int>(highest - sums.begin())};
       }
     }
   }

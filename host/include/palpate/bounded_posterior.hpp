@@ -45,8 +45,8 @@ struct BoundedOptions {
   double evidence_growth = 0.0;
   /// Bins to evaluate before a search ends with what it has proven, where no bin of these explains
   /// the touches: where the best costs more than three quarters of the nats that they cost in
-  /// unseen space. By default such a search goes on, too. Where nothing fits, many bins fit about
-  /// as badly.
+  /// space off the map. By default such a search goes on, too. Where nothing fits, many bins fit
+  /// about as badly.
   std::optional<std::int64_t> poor_bins = {};
   /// Prior weight W of "none of these", as HistogramOptions::none_weight. Each touch's mean
   /// likelihood is bounded by searches of its own, until the log odds of "none of these" against
@@ -103,9 +103,6 @@ class PALPATE_API BoundedPosterior {
   /// option out of range, a table for another number of objects, or a lattice whose tiles and
   /// tables would take more than a quarter of the machine's memory
   BoundedPosterior(std::span<const Hypothesis> hypotheses, const BoundedOptions& options);
-  ~BoundedPosterior();
-  BoundedPosterior(BoundedPosterior&&) noexcept;
-  BoundedPosterior& operator=(BoundedPosterior&&) noexcept;
 
   /// Returns to the uniform belief, for the next unknown. Keeps the tables.
   void reset();
@@ -183,10 +180,13 @@ class PALPATE_API BoundedPosterior {
 
  private:
   struct PALPATE_LOCAL Impl;
+  struct PALPATE_API Deleter {
+    void operator()(Impl* impl) const;
+  };
   PALPATE_LOCAL Impl& impl() const;
   /// impl(), where no update has left the belief half-way. @throws Error where one has
   PALPATE_LOCAL Impl& with_touches_taken_in() const;
-  std::unique_ptr<Impl> impl_;
+  std::unique_ptr<Impl, Deleter> impl_;
 };
 
 }  // namespace palpate

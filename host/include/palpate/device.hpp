@@ -56,18 +56,18 @@ class PALPATE_API Device {
   /// @throws Error on a null handle, an older Vulkan, or a queue family that does not compute
   static Device share(const VulkanDevice& device);
 
-  Device(Device&&) noexcept;
-  Device& operator=(Device&&) noexcept;
-  ~Device();
-
   const std::string& name() const;  ///< as Vulkan reports it
   /// Size of the memory in which the device computes, in bytes; a CPU device shares the machine's.
   std::uint64_t memory_bytes() const;
   PALPATE_LOCAL gpu::Context& context();  ///< for the library's own classes
 
  private:
-  PALPATE_LOCAL explicit Device(std::unique_ptr<gpu::Context> context);
-  std::unique_ptr<gpu::Context> context_;
+  struct PALPATE_API Deleter {
+    void operator()(gpu::Context* context) const;
+  };
+
+  PALPATE_LOCAL explicit Device(gpu::Context* context);
+  std::unique_ptr<gpu::Context, Deleter> context_;
 };
 
 }  // namespace palpate

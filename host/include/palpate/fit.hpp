@@ -58,13 +58,13 @@ struct PALPATE_API FitScale {
   double shared_sd = 0.0;  ///< of what all touches of an object share, such as its map's errors
   /// One touch fits some object at some pose better than its own, and z varies less there. None: it
   /// is not known how much.
-  std::optional<SingleFitScale> alone = {};
+  std::optional<SingleFitScale> single_touch = {};
   /// What every touch after the first adds to the standard deviation of z on this scale where the
   /// object was never learned; none: Palpate's own figure.
   std::optional<double> stranger_sd = {};
   /// What z on this scale is like of one touch of an object that was never learned; its sd is 1 or
   /// more. None: one touch of it is taken to fit as well as one of a learned object.
-  std::optional<SingleFitScale> stranger_alone = {};
+  std::optional<SingleFitScale> stranger_single_touch = {};
   /// The array that it was learned with; none: it is not known, and the scale is of any.
   std::optional<FitArray> array = {};
 

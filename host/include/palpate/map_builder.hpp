@@ -33,9 +33,6 @@ class PALPATE_API MapBuilder {
  public:
   /// @throws Error as MapOptions::validate()
   MapBuilder(Device& device, const MapOptions& options);
-  ~MapBuilder();
-  MapBuilder(MapBuilder&&) noexcept;
-  MapBuilder& operator=(MapBuilder&&) noexcept;
 
   /// Adds the evidence of all these touches. Memory grows with the area that they cover, not with
   /// their number.
@@ -56,8 +53,11 @@ class PALPATE_API MapBuilder {
 
  private:
   struct PALPATE_LOCAL Impl;
+  struct PALPATE_API Deleter {
+    void operator()(Impl* impl) const;
+  };
   PALPATE_LOCAL Impl& impl() const;
-  std::unique_ptr<Impl> impl_;
+  std::unique_ptr<Impl, Deleter> impl_;
 };
 
 /// The touches of one object.

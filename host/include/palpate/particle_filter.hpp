@@ -53,9 +53,6 @@ class PALPATE_API ParticleFilter {
   /// range.
   ParticleFilter(Device& device, std::span<const Hypothesis> hypotheses,
                  const ParticleOptions& options);
-  ~ParticleFilter();
-  ParticleFilter(ParticleFilter&&) noexcept;
-  ParticleFilter& operator=(ParticleFilter&&) noexcept;
 
   /// Restores the initial particles for the next unknown: the same touches give the same run.
   /// @throws Error if the device fails
@@ -103,10 +100,13 @@ class PALPATE_API ParticleFilter {
 
  private:
   struct PALPATE_LOCAL Impl;
+  struct PALPATE_API Deleter {
+    void operator()(Impl* impl) const;
+  };
   PALPATE_LOCAL Impl& impl() const;
   /// Like impl(), but throws Error where a failed update left the particles half-way.
-  PALPATE_LOCAL Impl& whole() const;
-  std::unique_ptr<Impl> impl_;
+  PALPATE_LOCAL Impl& unbroken() const;
+  std::unique_ptr<Impl, Deleter> impl_;
 };
 
 }  // namespace palpate

@@ -53,9 +53,6 @@ class PALPATE_API PoseHistogram {
   /// little memory: where the bins alone are more, before any is taken
   PoseHistogram(Device& device, std::span<const Hypothesis> hypotheses,
                 const HistogramOptions& options);
-  ~PoseHistogram();
-  PoseHistogram(PoseHistogram&&) noexcept;
-  PoseHistogram& operator=(PoseHistogram&&) noexcept;
 
   /// Returns to the uniform belief, for the next unknown. @throws Error if the device fails
   void reset();
@@ -151,10 +148,13 @@ class PALPATE_API PoseHistogram {
 
  private:
   struct PALPATE_LOCAL Impl;
+  struct PALPATE_API Deleter {
+    void operator()(Impl* impl) const;
+  };
   PALPATE_LOCAL Impl& impl() const;
   /// impl(), where no update has left the belief half-way. @throws Error where one has
-  PALPATE_LOCAL Impl& whole() const;
-  std::unique_ptr<Impl> impl_;
+  PALPATE_LOCAL Impl& unbroken() const;
+  std::unique_ptr<Impl, Deleter> impl_;
 };
 
 }  // namespace palpate

@@ -86,13 +86,13 @@ class PALPATE_API PosedSensor : public Sensor {
   };
 
   /// Called with the fault of a refused line, which it names: once for each kind of fault.
-  using Complaint = std::function<void(const std::string&)>;
+  using Warn = std::function<void(const std::string&)>;
 
   /// @param poses path of a file or FIFO, or "-": standard input
-  /// @param complain called from within next(); may be empty
+  /// @param warn called from within next(); may be empty
   /// @throws Error (Fault::input) where `poses` cannot be read, or a line of a file is no pose
   PosedSensor(std::unique_ptr<Sensor> sensor, const std::string& poses,
-              double largest_gap_s = usual_gap_s, Complaint complain = {});
+              double largest_gap_s = usual_gap_s, Warn warn = {});
   ~PosedSensor() override;
 
   const SensorDescription& description() const override;

@@ -10,7 +10,6 @@
 #include <nlohmann/json.hpp>
 
 #include "io/atomic_file.hpp"
-#include "io/file_hash.hpp"
 #include "io/input_file.hpp"
 #include "options/option.hpp"
 #include "options/refused_option.hpp"

@@ -12,7 +12,6 @@
 
 #include "estimation/parallel_for.hpp"
 #include "io/csv_table.hpp"
-#include "io/file_hash.hpp"
 #include "io/input_file.hpp"
 #include "model/printable.hpp"
 #include "options/option.hpp"

@@ -14,7 +14,7 @@
 
 namespace palpate {
 
-/// Log-likelihoods of bins, in nats, as if the pose of their touch were exact. Means over
+/// Log-likelihoods of bins, in nats, as if their touch were undisplaced. Means over
 /// displacements take the same bins again and again: for bins nearby, and for the belief after
 /// further touches. Several threads may work on planes of different thetas.
 class UndisplacedBins {

@@ -29,13 +29,13 @@ struct AxisRun {
   std::array<double, most_block_bins> offset{};
 
   /// Takes as many bins from `begin` on as a block may span, `most` at most.
-  AxisRun(const Axis& axis_mm, int begin, int most, double origin_mm, const PlacedMap& map) {
+  AxisRun(const Axis& axis_mm, int begin, int limit, double origin_mm, const PlacedMap& map) {
     const auto at = [&](int bin) {
       const double cells = (axis_mm.centre(bin) - origin_mm) / map.cell_mm + MapPatches::border;
       return map.grid.rounded(cells);
     };
     first = at(begin);
-    for (; count < std::min(most, most_block_bins); ++count) {
+    for (; count < std::min(limit, most_block_bins); ++count) {
       const double cells = at(begin + count) - first;
       if (cells > most_block_cells) {
         break;
@@ -48,8 +48,8 @@ struct AxisRun {
 /// Bins along an axis for each of the fewest equal parts that fit a block.
 int bins_per_part(int count, double step_cells) {
   const double fit = step_cells > 0.0 ? std::floor(most_block_cells / step_cells) + 1.0 : 1e9;
-  const int most = static_cast<int>(std::min<double>(most_block_bins, fit));
-  const int parts = (count + most - 1) / most;
+  const int limit = static_cast<int>(std::min<double>(most_block_bins, fit));
+  const int parts = (count + limit - 1) / limit;
   return (count + parts - 1) / parts;
 }
 
@@ -122,8 +122,9 @@ BinLikelihood::BinLikelihood(std::span<const Hypothesis> hypotheses, const Conta
 
 void BinLikelihood::move_pivot(const glm::dvec2& pivot_mm) { lattice_.pivot_mm = pivot_mm; }
 
-void BinLikelihood::evaluate_alone(std::span<const BinBox> boxes, const KnownElements& elements,
-                                   double* log_likelihood) const {
+void BinLikelihood::evaluate_undisplaced(std::span<const BinBox> boxes,
+                                         const KnownElements& elements,
+                                         double* log_likelihood) const {
   PlacedElements placed;
   BinList bins;
   std::vector<ElementPatches> scratch;
@@ -195,8 +196,8 @@ void BinLikelihood::evaluate_undisplaced(std::span<const BinBox> boxes,
   }
   parallel_for(first_part.size() - 1, [&](std::size_t task) {
     const std::size_t first = first_part[task];
-    evaluate_alone(std::span(parts).subspan(first, first_part[task + 1] - first), elements,
-                   log_likelihood.data() + first_bin[first]);
+    evaluate_undisplaced(std::span(parts).subspan(first, first_part[task + 1] - first), elements,
+                         log_likelihood.data() + first_bin[first]);
   });
 }
 
@@ -222,7 +223,7 @@ void BinLikelihood::evaluate_blocks(std::size_t object, std::span<const BlockRun
                      .x_count = std::min(side * run.count, lattice_.x_mm.count - side * run.x)});
   }
   std::vector<double> values(bins_in(parts));
-  evaluate_alone(parts, touch, values.data());
+  evaluate_undisplaced(parts, touch, values.data());
   auto value = values.begin();
   for (const BinBox& part : parts) {
     for (int y = part.y_first; y < part.y_first + part.y_count; ++y) {

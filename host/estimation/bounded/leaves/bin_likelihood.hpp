@@ -60,7 +60,7 @@ class BinLikelihood {
                 std::span<double> log_likelihood) const;
   /// Proven bound, in nats, of the error of evaluate() at any bin of an object.
   double error(std::size_t object, const KnownElements& elements) const;
-  /// evaluate() and its error() as if all touches were exact.
+  /// evaluate() and its error() as if no touch were displaced.
   void evaluate_undisplaced(std::span<const BinBox> boxes, const KnownElements& elements,
                             std::span<double> log_likelihood) const;
   double undisplaced_error(std::size_t object, const KnownElements& elements) const;
@@ -69,10 +69,10 @@ class BinLikelihood {
   std::uint64_t bytes() const;
 
  private:
-  /// Bins as if all touches were exact, on the caller's thread.
-  void evaluate_alone(std::span<const BinBox> boxes, const KnownElements& elements,
-                      double* log_likelihood) const;
-  /// Sets a touch's bins as if its pose were exact, on the caller's thread.
+  /// Bins as if no touch were displaced, on the caller's thread.
+  void evaluate_undisplaced(std::span<const BinBox> boxes, const KnownElements& elements,
+                            double* log_likelihood) const;
+  /// Sets a touch's bins as if it were undisplaced, on the caller's thread.
   void evaluate_blocks(std::size_t object, std::span<const BlockRun> runs,
                        const KnownElements& touch, const PlaceRows<double>& rows) const;
   void evaluate_displaced(std::span<const BinBox> boxes, const KnownElements& elements,
@@ -81,7 +81,7 @@ class BinLikelihood {
   std::vector<PlacedMap> maps_;  ///< [object]
   ReadingForm form_;
   PoseLattice lattice_;
-  std::optional<DisplacementMean> displaced_;  ///< of bins; nothing where touches are exact
+  std::optional<DisplacementMean> displaced_;  ///< of bins; nothing where touches are undisplaced
 };
 
 }  // namespace palpate

@@ -50,7 +50,7 @@ PlacedMap::PlacedMap(const OccupancyGrid& map, double prior, const PoseLattice& 
       grid(reach_cells) {
   const double beyond = nodes.prior_log_odds();
   double least = beyond;
-  double most = beyond;
+  double highest = beyond;
   const auto node = [&](int i, int j) {
     return i >= 0 && i < map.nx && j >= 0 && j < map.ny ? double{map.at(i, j)} : beyond;
   };
@@ -58,13 +58,13 @@ PlacedMap::PlacedMap(const OccupancyGrid& map, double prior, const PoseLattice& 
     for (int i = -1; i < map.nx; ++i) {
       const double here = node(i, j);
       least = std::min(least, here);
-      most = std::max(most, here);
+      highest = std::max(highest, here);
       steepest =
           std::max({steepest, std::abs(node(i + 1, j) - here), std::abs(node(i, j + 1) - here)});
     }
   }
-  largest = std::max(std::abs(least), std::abs(most));
-  range = most - least;
+  largest = std::max(std::abs(least), std::abs(highest));
+  range = highest - least;
 }
 
 double BinLikelihood::undisplaced_error(std::size_t object, const KnownElements& elements) const {

@@ -22,7 +22,7 @@ constexpr std::size_t surveyed_tiles = 1024;
 constexpr std::size_t most_surveyed = 32768;
 /// Tiles that are divided together: bounds the memory for their parts. More where touches are
 /// displaced, since the parts of tiles that lie together share all within reach of them.
-constexpr std::size_t most_exact = 16384;
+constexpr std::size_t most_undisplaced = 16384;
 constexpr std::size_t most_displaced = 65536;
 
 /// One run of a search, from the largest tiles to their bins.
@@ -34,7 +34,7 @@ class SearchRun {
         goal_(task.goal),
         refined_(refined),
         finest_(space_.finest_level()),
-        most_together_(space_.displacement ? most_displaced : most_exact),
+        most_together_(space_.displacement ? most_displaced : most_undisplaced),
         division_(task, largest),
         account_(space_.log_weight, space_.label_of, task.options.lattice, goal_),
         leaves_(task, account_) {}

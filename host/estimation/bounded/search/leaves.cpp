@@ -139,7 +139,7 @@ void Leaves::evaluate(std::span<const Tile> tiles, double tolerance) {
   });
   std::ranges::stable_sort(families, {}, &Family::slot);
   const std::size_t elements = task_.elements.from_pivot_mm.size() + 1;
-  const std::size_t most =
+  const std::size_t limit =
       task_.deadline.exists() ? std::max(first_batch, budgeted_work / elements) : largest_batch;
   std::size_t size = displaced_ ? first_displaced : first_batch;
   for (std::size_t next = 0; next < families.size() && !ended();) {
@@ -151,10 +151,10 @@ void Leaves::evaluate(std::span<const Tile> tiles, double tolerance) {
     }
     add(std::move(boxes));
     from = account_.droppable_from(left, tolerance);
-    size = std::min(2 * size, most);
+    size = std::min(2 * size, limit);
     if (displaced_ && !task_.deadline.exists()) {
       // The best have told the total. Bins that lie together share all within reach of them.
-      size = most;
+      size = limit;
       std::ranges::sort(families.begin() + static_cast<std::ptrdiff_t>(next), families.end(), {},
                         [](const Family& family) { return family.tiles.data(); });
     }

@@ -28,8 +28,8 @@ void MassAccount::settle(std::int32_t object, std::int64_t bins, double log_mass
   of.evaluated.add(mass);
   of.terms += static_cast<double>(bins);
   // Beyond, expm1 is infinite, and the log of it is the error itself.
-  constexpr double most = 700.0;
-  of.rounding.add(mass + (error < most ? std::log(std::expm1(error)) : error));
+  constexpr double limit = 700.0;
+  of.rounding.add(mass + (error < limit ? std::log(std::expm1(error)) : error));
   raise_best(object, largest - error);
 }
 

@@ -134,7 +134,7 @@ struct SearchSpace {
   std::vector<BoundingBox> boxes;     ///< [hypothesis] around its occupied cells
   std::vector<TileBounds> bounds;     ///< [hypothesis]
 
-  std::optional<DisplacementWeights> displacement;  ///< nothing where touches are exact
+  std::optional<DisplacementWeights> displacement;  ///< nothing where touches are undisplaced
   std::vector<DisplacementMean> displaced;          ///< [level] of tiles' bounds
 };
 

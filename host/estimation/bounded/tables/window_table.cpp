@@ -40,14 +40,14 @@ class LargestLikelihood {
     }
     const double low = place_of(range.low);
     const double high = place_of(range.high);
-    double most = std::max(at(low), at(high));
+    double highest = std::max(at(low), at(high));
     // A node too many on either side leaves bounds true: rounding must not leave one out.
     constexpr double rounding = 1e-6;
     for (auto i = static_cast<std::size_t>(low + 1.0 - rounding);
          i < std::min(static_cast<std::size_t>(high + 1.0 + rounding), nodes_.size()); ++i) {
-      most = std::max(most, nodes_[i]);
+      highest = std::max(highest, nodes_[i]);
     }
-    return most;
+    return highest;
   }
 
  private:
@@ -157,19 +157,19 @@ SquarePenalties square_penalties(const MapSquares& squares, const ContactModel& 
   const double prior =
       contact.log_likelihood(reading, {log_odds_from_probability(*contact.prior)}, object);
   SquarePenalties penalties{.best = prior, .nx = squares.nx, .ny = squares.ny, .least = {}};
-  std::vector<double> most;
-  most.reserve(squares.ranges.size());
+  std::vector<double> highest;
+  highest.reserve(squares.ranges.size());
   for (const MapSquares::Range& range : squares.ranges) {
-    most.push_back(largest.in(range));
-    penalties.best = std::max(penalties.best, most.back());
+    highest.push_back(largest.in(range));
+    penalties.best = std::max(penalties.best, highest.back());
   }
   const auto penalty = [&](double log_likelihood) {
     return static_cast<std::uint16_t>(
         std::clamp((penalties.best - log_likelihood) * penalties_per_nat - margin, 0.0,
                    static_cast<double>(largest_penalty)));
   };
-  penalties.least.resize(most.size());
-  std::transform(most.begin(), most.end(), penalties.least.begin(), penalty);
+  penalties.least.resize(highest.size());
+  std::transform(highest.begin(), highest.end(), penalties.least.begin(), penalty);
   penalties.beyond = penalty(prior);
   return penalties;
 }

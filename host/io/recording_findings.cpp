@@ -19,9 +19,9 @@ constexpr std::uint64_t least_rows = 20;
 // A sound element is suspected with a chance of one in a million, in nats.
 constexpr double sure_nats = 14.0;
 
-class Suspicions {
+class RecordingFindings {
  public:
-  explicit Suspicions(const RecordingSurvey& survey) : s_(survey), p_(survey.pressure) {}
+  explicit RecordingFindings(const RecordingSurvey& survey) : s_(survey), p_(survey.pressure) {}
 
   std::vector<std::string> all() {
     look_at_array();
@@ -120,11 +120,11 @@ class Suspicions {
     }
     // A sensor that presses the same place again and again mostly feels it with one element.
     constexpr std::uint64_t least_touches = 5;
-    std::uint64_t most = 0;
+    std::uint64_t strongest_count = 0;
     for (const ElementSurvey& element : p_.elements) {
-      most = std::max(most, element.strongest);
+      strongest_count = std::max(strongest_count, element.strongest);
     }
-    return p_.in_contact >= least_touches && 2 * most < p_.in_contact;
+    return p_.in_contact >= least_touches && 2 * strongest_count < p_.in_contact;
   }
 
   void look_at_times() {
@@ -163,14 +163,14 @@ class Suspicions {
     constexpr std::uint64_t least_times = 5;
     constexpr std::uint64_t least_bins = 8;  // fewer: a switch, or noise of a few steps
     constexpr double much = 4.0;
-    const double most = p_.range->most;
-    const double near = most - 0.25 * (most - p_.readings.quantile(0.5));
-    const std::uint64_t bins = p_.readings.occupied(near, most);
-    const auto others = static_cast<double>(p_.readings.count(near, most) - p_.at_most);
+    const double highest = p_.range->most;
+    const double near = highest - 0.25 * (highest - p_.readings.quantile(0.5));
+    const std::uint64_t bins = p_.readings.occupied(near, highest);
+    const auto others = static_cast<double>(p_.readings.count(near, highest) - p_.at_most);
     if (p_.times_at_most >= least_times && bins >= least_bins &&
         static_cast<double>(p_.at_most) > much * others / static_cast<double>(bins)) {
       say("{} readings are exactly the largest, {:.4g} {}: the sensor saturates there.", p_.at_most,
-          most, unit);
+          highest, unit);
     }
   }
 
@@ -237,8 +237,8 @@ class Suspicions {
 
 }  // namespace
 
-std::vector<std::string> suspicions_of(const RecordingSurvey& survey) {
-  return Suspicions(survey).all();
+std::vector<std::string> findings_of(const RecordingSurvey& survey) {
+  return RecordingFindings(survey).all();
 }
 
 }  // namespace palpate
