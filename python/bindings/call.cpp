@@ -57,8 +57,8 @@ void check_signals() {
 }
 
 Report reporter(const Progress& progress) {
-  return [&progress](double fraction) {
-    thread_local Clock::time_point next;
+  // Of this call alone: a call that follows another at once shows its first fraction, too.
+  return [&progress, next = Clock::time_point()](double fraction) mutable {
     now_and_then(next, [&] {
       if (is_shown(progress)) {
         progress(fraction);

@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "beliefs.hpp"
-#include "estimation/displacement_check.hpp"
+#include "estimation/displacement_weights.hpp"
 #include "made_up_sensors.hpp"
 #include "palpate/balanced_lattice.hpp"
 #include "palpate/map_builder.hpp"
